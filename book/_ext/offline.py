@@ -1,0 +1,59 @@
+"""Let the book be read without any network, from a folder as well as from a server.
+
+Formulas: the package sphinx-mathjax-offline carries MathJax. Of its 24 MB, the pages need one
+script, the fonts, and the TeX extensions that the script loads when a formula asks for them;
+those are copied. The package's own Sphinx extension stays unused: it copies everything.
+
+Thebe, which Jupyter Book always adds, would run cells on a server elsewhere. It goes.
+"""
+
+import shutil
+from importlib.util import find_spec
+from pathlib import Path
+
+from sphinx_thebe import init_thebe_core, update_thebe_context
+
+SCRIPT = "mathjax/tex-mml-chtml.js"
+NEEDED = ["tex-mml-chtml.js", "output/chtml/fonts", "input/tex/extensions"]
+
+
+def mathjax_folder():
+    """Return the folder of the installed MathJax."""
+    spec = find_spec("sphinx-mathjax-offline")
+    if spec is None or not spec.submodule_search_locations:
+        raise RuntimeError("sphinx-mathjax-offline is not installed; run `make env`")
+    return Path(spec.submodule_search_locations[0]) / "static" / "mathjax"
+
+
+def copy_mathjax(app, exception):
+    """Copy what is needed of MathJax into the built book."""
+    if exception is not None or app.builder.format != "html":
+        return
+    for name in NEEDED:
+        source = mathjax_folder() / name
+        target = Path(app.outdir) / "_static" / "mathjax" / name
+        if source.is_dir():
+            ignore = shutil.ignore_patterns("all-packages.js")
+            shutil.copytree(source, target, dirs_exist_ok=True, ignore=ignore)
+        else:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(source, target)
+
+
+def drop_thebe(app, config):
+    """Take out the two steps that put Thebe into the pages."""
+    steps = [init_thebe_core, update_thebe_context]
+    for event, listeners in app.events.listeners.items():
+        app.events.listeners[event] = [
+            listener for listener in listeners if listener.handler not in steps
+        ]
+
+
+def setup(app):
+    """Register with Sphinx."""
+    # A page may have formulas in the outputs of its cells only, which Sphinx does not see.
+    app.set_html_assets_policy("always")
+    app.config.mathjax_path = SCRIPT
+    app.connect("config-inited", drop_thebe)
+    app.connect("build-finished", copy_mathjax)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
