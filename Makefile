@@ -1,0 +1,152 @@
+# armlock: the book, its tests and its environment. `make` lists what there is.
+#
+# Works with GNU make 3.81 (macOS) and newer. A target whose sources have not changed does
+# nothing; FORCE=1 makes it run all the same.
+
+# The first Python that is new enough; say `make book PYTHON=/path/to/python3` for another.
+PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
+	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; \
+	done || true)
+PORT ?= 8000
+
+VENV := .venv
+PY := $(VENV)/bin/python
+ENV_READY := $(VENV)/.environment-complete
+PACKAGE_READY := $(VENV)/.package-complete
+INDEX := build/html/index.html
+TESTS_PASSED := build/tests-passed
+
+# What the reader has set up for other projects must not reach this one.
+export PYTHONNOUSERSITE := 1
+export JUPYTER_PREFER_ENV_PATH := 1
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+export MPLCONFIGDIR := $(CURDIR)/$(VENV)/matplotlib
+export IPYTHONDIR := $(CURDIR)/$(VENV)/ipython
+unexport PYTHONPATH PYTHONHOME VIRTUAL_ENV MPLBACKEND
+
+find-sources = $(shell find $(wildcard $(1)) -type f \
+	-not -name '*.pyc' -not -name '*.nbi' -not -name '*.nbc' -not -path '*/.*' | sort)
+PACKAGE_SOURCES := $(call find-sources,armlock)
+BOOK_SOURCES := $(PACKAGE_SOURCES) $(call find-sources,book notebooks) tools/check_html.py
+TEST_SOURCES := $(PACKAGE_SOURCES) $(call find-sources,notebooks tests benchmarks) pyproject.toml
+NOTEBOOKS := $(wildcard notebooks/*.ipynb)
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help env book test bench serve lint format strip lock clean distclean always
+
+help: ## List the targets
+	@echo "armlock: make TARGET, where TARGET is one of"
+	@sed -n 's/^\([a-z]*\):.*## /  \1:/p' $(firstword $(MAKEFILE_LIST)) \
+		| awk -F: '{ printf "%-11s%s\n", $$1, $$2 }'
+	@echo "Variables: PYTHON=python3.12 (for env), PORT=8000 (for serve), FORCE=1 (run again)"
+
+## Environment ---------------------------------------------------------------------------
+
+env: $(PACKAGE_READY) ## Make .venv with every package of environment.txt, and this one
+
+# Both stamps are written last, so an interrupted install starts over. The kernel's log level
+# keeps its notes on transport, one for each notebook, out of the build's output.
+$(ENV_READY): environment.txt
+	@test -n "$(PYTHON)" || { \
+		echo "armlock needs Python 3.11 or newer, and found: $$(python3 --version 2>&1)."; \
+		echo "Install one, or name it: make $(MAKECMDGOALS) PYTHON=/path/to/python3"; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+		echo "armlock needs Python 3.11 or newer; $(PYTHON) is not: $$($(PYTHON) --version 2>&1)."; \
+		exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
+		echo "$(PYTHON) cannot make virtual environments: its venv or ensurepip is missing."; \
+		echo "On Debian and Ubuntu: apt-get install python3-venv"; exit 1; }
+	@echo "Installing the packages of environment.txt into $(VENV), once: a minute or two ..."
+	@rm -f $(ENV_READY) $(PACKAGE_READY)
+	@$(PYTHON) -m venv --clear $(VENV)
+	@$(PY) -m pip install --quiet --require-hashes --only-binary :all: -r environment.txt
+	@mkdir -p $(VENV)/etc/ipython
+	@echo '{"IPKernelApp": {"log_level": 40}}' > $(VENV)/etc/ipython/ipython_kernel_config.json
+	@$(PY) -c 'import matplotlib.font_manager'
+	@touch $@
+
+# README.md and LICENSE are part of the package's metadata, and must exist.
+$(PACKAGE_READY): $(ENV_READY) pyproject.toml
+	@$(PY) -m pip install --quiet --no-index --no-deps --no-build-isolation --editable .
+	@$(PY) -m pip check
+	@touch $@
+
+## Book ----------------------------------------------------------------------------------
+
+book: $(INDEX) ## Run all notebooks and build the book, as HTML that needs no network
+	@echo "The book is ready. Open this file in a browser: file://$(CURDIR)/$(INDEX)"
+
+# Every page is built and every notebook run anew: Sphinx does not see that the package has
+# changed. The new book replaces the old one only when it is complete, and is as old as the
+# start of its build, so that a source saved meanwhile counts as newer.
+$(INDEX): $(PACKAGE_READY) $(BOOK_SOURCES) build/book-sources $(if $(FORCE),always)
+	@touch build/book-started
+	@rm -rf build/_build
+	$(VENV)/bin/jupyter-book build . --all --config book/_config.yml --toc book/_toc.yml \
+		--path-output build -W -n --keep-going
+	$(PY) tools/check_html.py build/_build/html
+	@rm -rf build/html
+	@mv build/_build/html build/html
+	@touch -r build/book-started $@
+
+serve: $(INDEX) ## Serve the book at http://localhost:PORT
+	@echo "The book is at http://localhost:$(PORT) until you press Ctrl-C."
+	@$(PY) -m http.server $(PORT) --bind 127.0.0.1 --directory build/html
+
+## Tests ---------------------------------------------------------------------------------
+
+test: $(TESTS_PASSED) ## Run all tests, notebooks included
+	@test -e build/tests-ran || { echo "Tests passed at $$(cat $(TESTS_PASSED)), and" \
+		"nothing has changed since; make test FORCE=1 runs them again."; }
+	@rm -f build/tests-ran
+
+$(TESTS_PASSED): $(PACKAGE_READY) $(TEST_SOURCES) build/test-sources $(if $(FORCE),always)
+	@touch build/tests-started
+	$(PY) -m pytest --nbmake --numprocesses auto --maxprocesses 4 --dist worksteal
+	@date '+%Y-%m-%d %H:%M:%S' > $@
+	@touch -r build/tests-started $@
+	@touch build/tests-ran
+
+bench: $(PACKAGE_READY) ## Measure speed and memory, and print a table
+	$(PY) -m benchmarks
+
+# The lists of sources change when a file comes or goes, which no file's date would tell.
+build/book-sources: always
+	@mkdir -p build
+	@echo $(BOOK_SOURCES) | cmp -s - $@ || echo $(BOOK_SOURCES) > $@
+
+build/test-sources: always
+	@mkdir -p build
+	@echo $(TEST_SOURCES) | cmp -s - $@ || echo $(TEST_SOURCES) > $@
+
+always:
+
+## Upkeep --------------------------------------------------------------------------------
+
+lint: $(PACKAGE_READY) ## Check style, types, and that notebooks hold no outputs
+	$(PY) -m ruff check .
+	$(PY) -m ruff format --check .
+	$(PY) -m mypy
+	$(if $(NOTEBOOKS),$(PY) -m nbstripout --verify --keep-id $(NOTEBOOKS))
+	$(PY) tools/check_lock.py
+
+format: $(PACKAGE_READY) ## Format the code, and strip the notebooks' outputs
+	$(PY) -m ruff check --fix .
+	$(PY) -m ruff format .
+	$(if $(NOTEBOOKS),$(PY) -m nbstripout --keep-id $(NOTEBOOKS))
+
+lock: $(ENV_READY) ## Write environment.txt from pyproject.toml (UPGRADE=1: newest versions)
+	$(PY) -m uv pip compile pyproject.toml --all-extras \
+		--group build --group book --group test --group lint --group lock \
+		--universal --python-version 3.11 --fork-strategy fewest --only-binary :all: \
+		--generate-hashes --no-emit-index-url --no-emit-find-links --quiet \
+		--custom-compile-command "make lock" $(if $(UPGRADE),--upgrade) -o environment.txt
+	$(PY) tools/check_lock.py
+
+clean: ## Remove what was built
+	rm -rf build .pytest_cache .ruff_cache .mypy_cache .hypothesis
+	find . -name __pycache__ -not -path './$(VENV)/*' -prune -exec rm -rf {} +
+
+distclean: clean ## Remove the environment as well
+	rm -rf $(VENV)
