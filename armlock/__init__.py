@@ -1,0 +1,35 @@
+"""Stability and simulation of laser loops locked to delays of tens of seconds.
+
+The reproducible companion to "Robustness Analysis and Controller Design of Arm-locking
+System in Space-based Gravitational Wave Detectors".
+"""
+
+from armlock.characteristic import CharacteristicFunction
+from armlock.dsubdivision import d_curve, d_curve_branches, d_curve_line
+from armlock.loops import CommonArm, Controller, HayesEquation, Loop, SingleArm
+from armlock.roots import RootError, rightmost_root
+from armlock.semidiscretization import semi_discretization, spectral_radius, transition_matrix
+from armlock.stability import CountError, StabilityChart, stability_chart, unstable_roots
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "CharacteristicFunction",
+    "CommonArm",
+    "Controller",
+    "CountError",
+    "HayesEquation",
+    "Loop",
+    "RootError",
+    "SingleArm",
+    "StabilityChart",
+    "d_curve",
+    "d_curve_branches",
+    "d_curve_line",
+    "rightmost_root",
+    "semi_discretization",
+    "spectral_radius",
+    "stability_chart",
+    "transition_matrix",
+    "unstable_roots",
+]

@@ -1,0 +1,182 @@
+"""How a claim of the paper is written down, checked and shown.
+
+A claim is a function without arguments that computes a `Finding`. The decorator `claim`
+says where it stands and what it says, in our words, and enters it in the register:
+
+    @claim("C2", place="Eq. (5b)", says="...", chapter="03_common_arm")
+    def straight_line() -> Finding:
+        ...
+"""
+
+from __future__ import annotations
+
+import html
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cache
+
+
+class Verdict(StrEnum):
+    """What became of a claim."""
+
+    REPRODUCED = "reproduced"
+    IN_PART = "reproduced in part"
+    DIFFERS = "differs"
+    NOT_AS_WRITTEN = "not as written"
+    OPEN = "cannot be settled from the paper"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What the check of a claim found.
+
+    Attributes
+    ----------
+    verdict : Verdict
+        What became of the claim.
+    value : float
+        The number that decides it.
+    quantity : str
+        What that number is, unit included.
+    note : str
+        Why the verdict follows, and under which reading; numbers in it are computed.
+    """
+
+    verdict: Verdict
+    value: float
+    quantity: str
+    note: str
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One claim of the paper: identifier, place, our wording, chapter and check."""
+
+    identifier: str
+    place: str
+    says: str
+    chapter: str
+    check: Callable[[], Finding]
+
+
+_REGISTER: dict[str, Claim] = {}
+
+
+def claim(
+    identifier: str, *, place: str, says: str, chapter: str
+) -> Callable[[Callable[[], Finding]], Callable[[], Finding]]:
+    """Enter the decorated check in the register of claims.
+
+    Parameters
+    ----------
+    identifier : str
+        Letter and number, for instance "C7".
+    place : str
+        Where the paper makes the claim.
+    says : str
+        What it says, in our words.
+    chapter : str
+        Stem of the notebook that shows it.
+
+    Raises
+    ------
+    ValueError
+        If the identifier is taken.
+    """
+
+    def enter(check: Callable[[], Finding]) -> Callable[[], Finding]:
+        if identifier in _REGISTER:
+            raise ValueError(f"identifier must be new, got {identifier!r} a second time")
+        remembered = cache(check)
+        _REGISTER[identifier] = Claim(identifier, place, says, chapter, remembered)
+        return remembered
+
+    return enter
+
+
+def all_claims() -> list[Claim]:
+    """Return every registered claim, in the order of the paper's sections."""
+    return list(_REGISTER.values())
+
+
+class Ledger:
+    """Claims with their findings, shown as a table.
+
+    Parameters
+    ----------
+    claims : list of Claim
+        They are checked here, in this order.
+    """
+
+    def __init__(self, claims: list[Claim]) -> None:
+        self.entries = [(entry, entry.check()) for entry in claims]
+
+    def __getitem__(self, identifier: str) -> Finding:
+        """Return the finding of one claim."""
+        for entry, finding in self.entries:
+            if entry.identifier == identifier:
+                return finding
+        raise KeyError(identifier)
+
+    def __iter__(self) -> Iterator[tuple[Claim, Finding]]:
+        """Iterate over (claim, finding)."""
+        return iter(self.entries)
+
+    def __len__(self) -> int:
+        """Return how many claims there are."""
+        return len(self.entries)
+
+    def counts(self) -> Counter[Verdict]:
+        """Return how many claims met each verdict."""
+        return Counter(finding.verdict for _, finding in self.entries)
+
+    def __repr__(self) -> str:
+        """Return the table as text."""
+        return "\n".join(
+            f"{c.identifier:4s} {f.verdict}: {f.value:.6g} ({f.quantity}). {f.note}"
+            for c, f in self.entries
+        )
+
+    def _repr_html_(self) -> str:
+        """Return the table as HTML, for notebooks."""
+        rows = "".join(
+            f'<tr id="claim-{html.escape(c.identifier)}">'
+            f"<td><strong>{html.escape(c.identifier)}</strong><br>{html.escape(c.place)}</td>"
+            f"<td>{html.escape(c.says)}</td>"
+            f'<td><span class="verdict verdict-{f.verdict.name.lower()}">{f.verdict}</span></td>'
+            f"<td><strong>{f.value:.6g}</strong><br>{html.escape(f.quantity)}</td>"
+            f"<td>{html.escape(f.note)}</td></tr>"
+            for c, f in self.entries
+        )
+        return (
+            '<table class="claims"><thead><tr><th>Claim</th><th>What the paper says</th>'
+            "<th>Verdict</th><th>Deciding number</th><th>Why</th></tr></thead>"
+            f"<tbody>{rows}</tbody></table>"
+        )
+
+
+def check(*identifiers: str) -> Ledger:
+    """Check claims by identifier.
+
+    Parameters
+    ----------
+    *identifiers : str
+        For instance "C1", "C2".
+
+    Returns
+    -------
+    Ledger
+
+    Raises
+    ------
+    ValueError
+        If an identifier is not registered.
+    """
+    for identifier in identifiers:
+        if identifier not in _REGISTER:
+            raise ValueError(
+                f"identifier must be one of {', '.join(_REGISTER)}; got {identifier!r}"
+            )
+    return Ledger([_REGISTER[identifier] for identifier in identifiers])

@@ -1,0 +1,466 @@
+"""Compiled walks along the stability boundary s = j omega.
+
+Both walks take steps that are certified, not chosen: with a bound M on the second
+derivative over a step, the function stays within M step^2 / 2 of its tangent. So
+
+- `winding` never steps past the origin on the wrong side, and the argument it adds up is
+  exact up to rounding;
+- `sign_changes` never steps over two zeros at once, so that none is missed.
+
+Where rounding makes a value indistinguishable from zero, the walks say so.
+
+All functions here work on exponential sums sum_g P_g(omega) exp(j omega phase_g), see
+`armlock.characteristic.ExponentialSum`. They are evaluated as
+sum_g P_g + sum_g P_g (exp(j omega phase_g) - 1), which keeps its relative accuracy where
+the undelayed parts cancel, as they do at (c1, c2) = (1, 1) and low frequency.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+
+EPSILON = 2.0**-52
+# Rounding errors of one evaluation, in units of EPSILON times the sum of magnitudes.
+ROUNDING = 8.0
+# Share of a certified bound that a step may use up.
+SAFETY = 0.95
+
+# Status codes of `count_points`, below every count.
+BOUNDARY = -1
+DOUBTFUL = -2
+UNBOUNDED = -3
+
+
+@njit(cache=True, inline="always")
+def _real_horner(p, omega):
+    value = 0.0
+    for k in range(p.size - 1, -1, -1):
+        value = value * omega + p[k]
+    return value
+
+
+@njit(cache=True)
+def _evaluate(coefficients, sums, phases, omega):
+    """Value and derivative of an exponential sum; `sums` holds the sum over its groups."""
+    size = sums.size
+    value = 0j
+    slope = 0j
+    for k in range(size - 1, -1, -1):
+        slope = slope * omega + value
+        value = value * omega + sums[k]
+    for g in range(phases.size):
+        phase = phases[g]
+        if phase == 0.0:
+            continue
+        half = 0.5 * phase * omega
+        sine, cosine = np.sin(half), np.cos(half)
+        change = 2.0 * sine * complex(-sine, cosine)
+        p = 0j
+        dp = 0j
+        for k in range(size - 1, -1, -1):
+            dp = dp * omega + p
+            p = p * omega + coefficients[g, k]
+        value += p * change
+        slope += dp * change + p * (1j * phase) * (1.0 + change)
+    return value, slope
+
+
+@njit(cache=True)
+def _curvature_bound(coefficients, phases):
+    """Polynomial in omega that bounds the second derivative of an exponential sum."""
+    groups, size = coefficients.shape
+    bound = np.zeros(size)
+    for g in range(groups):
+        phase = abs(phases[g])
+        for k in range(size):
+            magnitude = abs(coefficients[g, k])
+            bound[k] += magnitude * phase * phase
+            if k >= 1:
+                bound[k - 1] += magnitude * 2.0 * k * phase
+            if k >= 2:
+                bound[k - 2] += magnitude * k * (k - 1.0)
+    return bound
+
+
+@njit(cache=True)
+def winding(coefficients, phases, noise, omega_end):
+    """Argument gathered by an exponential sum as omega goes from 0 to `omega_end`.
+
+    Returns the argument, the last value, and whether the sum stays clear of zero.
+    `noise` is the polynomial in omega that bounds its rounding error.
+    """
+    sums = np.zeros(coefficients.shape[1], dtype=np.complex128)
+    for g in range(coefficients.shape[0]):
+        for k in range(sums.size):
+            sums[k] += coefficients[g, k]
+    bound = _curvature_bound(coefficients, phases)
+    omega = 0.0
+    value, slope = _evaluate(coefficients, sums, phases, omega)
+    argument = 0.0
+    step = omega_end
+    if abs(value) <= _real_horner(noise, 0.0):
+        return argument, value, False
+    while omega < omega_end:
+        step = min(4.0 * step, omega_end - omega)
+        speed = slope.real * slope.real + slope.imag * slope.imag
+        approach = -(value.real * slope.real + value.imag * slope.imag)
+        while True:
+            nearest = 0.0
+            if approach > 0.0:
+                nearest = step if approach >= speed * step else approach / speed
+            distance = abs(value + nearest * slope)
+            if 0.5 * _real_horner(bound, omega + step) * step * step <= SAFETY * distance:
+                break
+            step *= 0.5
+            if step <= 4.0 * EPSILON * omega or step < 1e-300:
+                return argument, value, False
+        following = omega_end if step == omega_end - omega else omega + step
+        next_value, next_slope = _evaluate(coefficients, sums, phases, following)
+        if abs(next_value) <= _real_horner(noise, following):
+            return argument, next_value, False
+        # Along the tangent, then from its end to the curve: both parts are principal values.
+        tangent = value + step * slope
+        along = tangent * value.conjugate()
+        across = next_value * tangent.conjugate()
+        argument += np.arctan2(along.imag, along.real) + np.arctan2(across.imag, across.real)
+        omega, value, slope = following, next_value, next_slope
+    return argument, value, True
+
+
+@njit(cache=True)
+def _taylor_signs_positive(q, shift):
+    """Whether all coefficients of q(w + shift) are positive beyond rounding, or zero."""
+    size = q.size
+    p = q.copy()
+    magnitude = np.abs(q)
+    for i in range(size - 1):
+        for k in range(size - 2, i - 1, -1):
+            p[k] += shift * p[k + 1]
+            magnitude[k] += shift * magnitude[k + 1]
+    for k in range(size):
+        if p[k] < 1e-13 * magnitude[k]:
+            return False
+    return True
+
+
+@njit(cache=True)
+def last_crossing_bound(square_a, square_b1, square_b2, x, y):
+    """Frequency past which |A| > |x B1| + |y B2|, so that no root can cross; inf if none.
+
+    The three arguments hold |A|^2, |B1|^2, |B2|^2 at s = j omega as polynomials in
+    w = omega^2. With G = |A|^2 - |x B1|^2 - |y B2|^2 the inequality is G > 0 and
+    Q = G^2 - 4 |x B1|^2 |y B2|^2 > 0. A shift of w after which every coefficient of Q is
+    positive proves that Q has no root beyond it (Budan), and then G keeps its sign.
+    """
+    size = square_a.size
+    g = square_a - x * x * square_b1 - y * y * square_b2
+    q = np.zeros(2 * size - 1)
+    for i in range(size):
+        for k in range(size):
+            q[i + k] += g[i] * g[k] - 4.0 * (x * y) ** 2 * square_b1[i] * square_b2[k]
+    lead = q[2 * size - 2]
+    if g[size - 1] <= 0.0 or lead <= 0.0:
+        return np.inf
+    if _taylor_signs_positive(q, 0.0):
+        return 0.0
+    upper = 0.0
+    for k in range(1, q.size):
+        upper = max(upper, 2.0 * (abs(q[q.size - 1 - k]) / lead) ** (1.0 / k))
+    for _ in range(60):
+        if _taylor_signs_positive(q, upper):
+            break
+        upper *= 2.0
+    lower = 0.5 * upper
+    while lower > 1e-60 * upper and _taylor_signs_positive(q, lower):
+        upper = lower
+        lower *= 0.5
+    for _ in range(6):
+        middle = np.sqrt(lower * upper)
+        if _taylor_signs_positive(q, middle):
+            upper = middle
+        else:
+            lower = middle
+    return np.sqrt(upper)
+
+
+@njit(cache=True)
+def _remaining_argument(roots, omega):
+    """Argument that the polynomial with these roots gathers from j omega to infinity."""
+    argument = 0.0
+    for root in roots:
+        angle = np.arctan2(omega - root.imag, -root.real)
+        if root.real > 0.0 and angle < 0.0:
+            angle += 2.0 * np.pi
+        argument += 0.5 * np.pi - angle
+    return argument
+
+
+@njit(cache=True)
+def count_point(parts, phases, roots, squares, omega_end, x, y):
+    """Number of unstable roots at one point, or a status code below zero.
+
+    By the argument principle: degree / 2 less the argument over pi, gathered from 0 to
+    infinity, for a polynomial in s (`omega_end` is zero); degree less the argument over pi,
+    gathered from 0 to `omega_end`, for a map, whose boundary ends there.
+    """
+    coefficients = parts[0] - x * parts[1] - y * parts[2]
+    size = coefficients.shape[1]
+    noise = np.zeros(size + 1)
+    for g in range(phases.size):
+        for k in range(size):
+            magnitude = (
+                abs(parts[0, g, k]) + abs(x * parts[1, g, k]) + abs(y * parts[2, g, k])
+            ) * (ROUNDING * EPSILON)
+            noise[k] += magnitude
+            noise[k + 1] += magnitude * abs(phases[g])
+    is_map = omega_end > 0.0
+    end = omega_end
+    if not is_map:
+        end = last_crossing_bound(squares[0], squares[1], squares[2], x, y)
+        if end == np.inf:
+            return UNBOUNDED
+    argument, value, clear = winding(coefficients, phases, noise, end)
+    if not clear:
+        return BOUNDARY
+    if is_map:
+        count = roots.size - argument / np.pi
+    else:
+        a = 0j
+        for k in range(size - 1, -1, -1):
+            a = a * end + parts[0, 0, k]
+        ratio = value / a
+        # D / A winds no further past `end`; A itself does, in closed form.
+        argument += _remaining_argument(roots, end) - np.arctan2(ratio.imag, ratio.real)
+        count = 0.5 * roots.size - argument / np.pi
+    nearest = int(np.round(count))
+    if abs(count - nearest) > 1e-3 or nearest < 0:
+        return DOUBTFUL
+    return nearest
+
+
+@njit(cache=True, parallel=True)
+def count_points(parts, phases, roots, squares, omega_end, x, y):
+    """`count_point` over one-dimensional arrays x and y of the same length."""
+    counts = np.empty(x.size, dtype=np.int64)
+    for i in prange(x.size):
+        counts[i] = count_point(parts, phases, roots, squares, omega_end, x[i], y[i])
+    return counts
+
+
+@njit(cache=True)
+def _polish(coefficients, sums, phases, bound, lower, upper, start, sign_lower):
+    """Zero of the imaginary part in a bracket, by Newton steps kept inside it.
+
+    Returns the zero, and value and slope there.
+    """
+    omega = start
+    value, slope = 0j, 0j
+    for _ in range(80):
+        value, slope = _evaluate(coefficients, sums, phases, omega)
+        if (value.imag > 0.0) == (sign_lower > 0):
+            lower = omega
+        else:
+            upper = omega
+        move = -value.imag / slope.imag if slope.imag != 0.0 else np.inf
+        if not (lower <= omega + move <= upper):
+            omega = 0.5 * (lower + upper)
+            if upper - lower <= 2.0 * EPSILON * upper:
+                break
+            continue
+        omega += move
+        # What is left after a Newton step is at most curvature move^2 / (2 slope).
+        left = 0.5 * _real_horner(bound, upper) * move * move
+        if left <= 2.0 * EPSILON * upper * abs(slope.imag):
+            value += slope * move
+            break
+    return omega, value, slope
+
+
+@njit(cache=True)
+def _cubic_zero(step, h0, dh0, h1, dh1):
+    """Zero, as an offset in (0, step), of the cubic through values and slopes at both ends."""
+    t = h0 / (h0 - h1)
+    for _ in range(2):
+        u = 1.0 - t
+        h = (
+            (1.0 + 2.0 * t) * u * u * h0
+            + t * u * u * step * dh0
+            + t * t * (3.0 - 2.0 * t) * h1
+            - t * t * u * step * dh1
+        )
+        dh = (
+            6.0 * t * u * (h1 - h0)
+            + u * (1.0 - 3.0 * t) * step * dh0
+            + t * (3.0 * t - 2.0) * step * dh1
+        )
+        if dh == 0.0:
+            break
+        t -= h / dh
+    return t * step if 0.0 < t < 1.0 else 0.5 * step
+
+
+@njit(cache=True)
+def sign_changes(coefficients, phases, omega_end, is_map):
+    """Zeros in [0, omega_end] of the imaginary part of an exponential sum odd in omega.
+
+    Returns five arrays, an entry a zero:
+
+    - `omega`, polished;
+    - `jump`, twice the direction of the sign change (a conjugate pair crosses); once at
+      omega = 0 and, for a map, at `omega_end` (a real root crosses); 0 where rounding hides
+      whether there is one;
+    - `width`, how far rounding lets the zero move: for a zero that is not simple, half the
+      stretch in which the sign is doubtful;
+    - `value` and `slope`, the real part there and the magnitude of its slope.
+    """
+    groups, size = coefficients.shape
+    sums = np.zeros(size, dtype=np.complex128)
+    noise = np.zeros(size + 1)
+    for g in range(groups):
+        for k in range(size):
+            sums[k] += coefficients[g, k]
+            noise[k] += abs(coefficients[g, k].imag) * (ROUNDING * EPSILON)
+            noise[k + 1] += abs(coefficients[g, k] * phases[g]) * (ROUNDING * EPSILON)
+    bound = _curvature_bound(coefficients, phases)
+
+    zeros = np.empty((64, 4))
+    jumps = np.empty(64, dtype=np.int64)
+    found = 0
+
+    omega = 0.0
+    value, slope = _evaluate(coefficients, sums, phases, 0.0)
+    at_zero = value.real
+    h, dh = value.imag, slope.imag
+    sign = 0
+    if abs(dh) > noise[1]:
+        sign = 1 if dh > 0.0 else -1
+        zeros[0, 0], zeros[0, 1], zeros[0, 2], zeros[0, 3] = 0.0, 0.0, at_zero, abs(slope)
+        jumps[0] = sign
+        found = 1
+    doubtful = sign == 0
+    last_clear = 0.0
+    step = omega_end
+    while omega < omega_end:
+        step = min(2.0 * step, omega_end - omega)
+        curvature = _real_horner(bound, omega + step)
+        if curvature > 0.0:
+            # Monotonic over the first, of one sign over the second: one zero at most.
+            certified = abs(dh) / curvature
+            error = _real_horner(noise, omega)
+            if abs(h) > error:
+                toward = dh if h > 0.0 else -dh
+                root = np.sqrt(dh * dh + 2.0 * curvature * abs(h))
+                certified = max(certified, (toward + root) / curvature)
+            certified *= SAFETY
+            if doubtful:
+                # Nothing can be resolved here; leave the stretch, in proportion to it.
+                unresolved = 0.5 * np.sqrt(2.0 * error / curvature)
+                stretch = 0.25 * (omega - last_clear)
+                certified = max(certified, unresolved, stretch, 1e-14 * omega_end)
+            step = min(step, certified)
+        following = omega_end if step >= omega_end - omega else omega + step
+        old_h, old_dh = h, dh
+        value, slope = _evaluate(coefficients, sums, phases, following)
+        h, dh = value.imag, slope.imag
+        if abs(h) > _real_horner(noise, following):
+            now = 1 if h > 0.0 else -1
+            if now != sign or doubtful:
+                if found == jumps.size:
+                    zeros = np.concatenate((zeros, np.empty_like(zeros)))
+                    jumps = np.concatenate((jumps, np.empty_like(jumps)))
+                middle = 0.5 * (last_clear + following)
+                width = 0.5 * (following - last_clear)
+                if sign == 0:
+                    jumps[found] = now
+                    middle, width = 0.0, following
+                    there, rate = complex(at_zero), slope
+                elif now != sign:
+                    jumps[found] = 2 * now
+                    if not doubtful:
+                        middle = omega + _cubic_zero(following - omega, old_h, old_dh, h, dh)
+                    middle, there, rate = _polish(
+                        coefficients, sums, phases, bound, last_clear, following, middle, sign
+                    )
+                    error = _real_horner(noise, middle)
+                    if abs(rate.imag) * width > error:
+                        width = error / abs(rate.imag)
+                else:
+                    jumps[found] = 0
+                    there, rate = _evaluate(coefficients, sums, phases, middle)
+                zeros[found, 0], zeros[found, 1] = middle, width
+                zeros[found, 2], zeros[found, 3] = there.real, abs(rate)
+                found += 1
+            sign = now
+            last_clear = following
+            doubtful = False
+        else:
+            doubtful = True
+        omega = following
+    if is_map and sign != 0:
+        if found == jumps.size:
+            zeros = np.concatenate((zeros, np.empty_like(zeros)))
+            jumps = np.concatenate((jumps, np.empty_like(jumps)))
+        zeros[found, 0], zeros[found, 1] = omega_end, 0.0
+        zeros[found, 2], zeros[found, 3] = value.real, abs(slope)
+        jumps[found] = -sign
+        found += 1
+    zeros = zeros[:found]
+    return zeros[:, 0], jumps[:found], zeros[:, 1], zeros[:, 2], zeros[:, 3]
+
+
+@njit(cache=True, parallel=True)
+def fill_rows(
+    fixed, varying, phases, norm, norm_phases, ends, is_map, y, base, x, lower, upper
+):
+    """Counts along rows of a chart, from the crossings of each row.
+
+    A row is x = N / M; `fixed` - y `varying` holds N conj(M), `norm` holds M. Each row y[i]
+    starts with the count base[i] at x = lower, left of all `x` (ascending). Returns the
+    counts, which of them lie too near a crossing to be trusted, and the count at x = upper
+    (-1 where a crossing lies too near one of the two ends).
+    """
+    counts = np.empty((y.size, x.size), dtype=np.int64)
+    doubtful = np.zeros((y.size, x.size), dtype=np.bool_)
+    last = np.empty(y.size, dtype=np.int64)
+    norm_sums = np.zeros(norm.shape[1], dtype=np.complex128)
+    for g in range(norm_phases.size):
+        norm_sums += norm[g]
+    fastest = np.abs(phases).max()
+    for i in prange(y.size):
+        coefficients = fixed - y[i] * varying
+        magnitude = np.zeros(coefficients.shape[1])
+        for g in range(phases.size):
+            magnitude += np.abs(coefficients[g])
+        omegas, jumps, widths, values, slopes = sign_changes(
+            coefficients, phases, ends[i], is_map
+        )
+        change = np.zeros(x.size + 1, dtype=np.int64)
+        total = base[i]
+        trusted = base[i] >= 0
+        for k in range(omegas.size):
+            omega = omegas[k]
+            m, dm = _evaluate(norm, norm_sums, norm_phases, omega)
+            square = m.real * m.real + m.imag * m.imag
+            if square == 0.0:
+                continue
+            position = values[k] / square
+            steepness = (slopes[k] + 2.0 * abs(position) * abs(m) * abs(dm)) / square
+            rounding = ROUNDING * EPSILON * (1.0 + fastest * omega) / square
+            spread = 4.0 * steepness * widths[k] + rounding * _real_horner(magnitude, omega)
+            if abs(position - lower) <= spread or abs(position - upper) <= spread:
+                trusted = False
+            if lower < position < upper:
+                total += jumps[k]
+                change[np.searchsorted(x, position)] += jumps[k]
+            if position + spread >= x[0] and position - spread <= x[-1]:
+                near = np.searchsorted(x, position - spread)
+                while near < x.size and x[near] <= position + spread:
+                    doubtful[i, near] = True
+                    near += 1
+        running = base[i]
+        for k in range(x.size):
+            running += change[k]
+            counts[i, k] = running
+        last[i] = total if trusted else BOUNDARY
+    return counts, doubtful, last

@@ -1,0 +1,209 @@
+"""D-subdivision: the curves in the parameter plane on which a root lies on the axis.
+
+D(j omega; x, y) = 0 is, for each omega, a real linear 2 x 2 system for (x, y). Its solution
+traces the D-curve; at omega = 0, where D is real, it is a straight line instead. Between
+these curves the number of unstable roots is constant.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numpy.polynomial import polynomial as poly
+
+from armlock import contour
+from armlock.characteristic import CharacteristicFunction
+from armlock.validation import FloatArray, positive_number, real_array
+
+_EPSILON = float(np.finfo(float).eps)
+
+
+class Line(NamedTuple):
+    """The straight line weight_x x + weight_y y = value in the parameter plane."""
+
+    weight_x: float
+    weight_y: float
+    value: float
+
+
+class Branch(NamedTuple):
+    """One connected piece of the D-curve, between two of its poles.
+
+    Attributes
+    ----------
+    omega : float array, shape (n,)
+        Ascending frequencies in rad/s, away from the poles.
+    x, y : float arrays, shape (n,)
+        The points of the curve.
+    """
+
+    omega: FloatArray
+    x: FloatArray
+    y: FloatArray
+
+
+def _require_two_parameters(system: CharacteristicFunction) -> None:
+    """Raise if D(j omega) = 0 does not determine both free parameters."""
+    for name, b in zip(system.parameters, (system.b1, system.b2), strict=True):
+        if not b.any():
+            raise ValueError(
+                f"system must depend on both free parameters, but {system!r} does not "
+                f"depend on {name}: there is no D-curve"
+            )
+    if system.delay1 == system.delay2:
+        ratio = system.b1[-1] / system.b2[-1]
+        if system.b1.size == system.b2.size and np.allclose(
+            system.b1, ratio * system.b2, rtol=4 * _EPSILON, atol=0.0
+        ):
+            raise ValueError(
+                f"delay1 and delay2 must differ, got {system.delay1} for both: only one "
+                f"combination of {' and '.join(system.parameters)} enters, and the D-curve "
+                f"degenerates to lines"
+            )
+
+
+def d_curve(
+    system: CharacteristicFunction, omega: npt.ArrayLike
+) -> tuple[FloatArray, FloatArray]:
+    """Parameters at which s = j omega is a characteristic root.
+
+    Parameters
+    ----------
+    system : CharacteristicFunction
+        The loop, for instance `CommonArm()`.
+    omega : array_like of float
+        Angular frequencies in rad/s, any shape and sign.
+
+    Returns
+    -------
+    x, y : float arrays, shaped like `omega`
+        The point of the curve, nan where the curve has a pole. At omega = 0 every point of
+        the line `d_curve_line(system)` has a root, and nan is returned too.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If omega is not finite and real, or the system does not determine both parameters
+        (equal delays, or a free parameter without effect).
+
+    See Also
+    --------
+    d_curve_line : the straight line at omega = 0.
+    d_curve_branches : the curve sampled and cut at its poles, ready to be drawn.
+
+    Notes
+    -----
+    For the common arm this is Eq. (5a) of the paper, for the Hayes equation
+    a = omega cot(omega tau), b = -omega / sin(omega tau).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from armlock import HayesEquation, d_curve
+    >>> a, b = d_curve(HayesEquation(tau=1.0), np.pi / 2)
+    >>> bool(abs(a) < 1e-12), round(float(b), 12)
+    (True, -1.570796326795)
+    """
+    omega = real_array("omega", omega)
+    _require_two_parameters(system)
+    z = np.exp(1j * omega * system.step) if system.step else 1j * omega
+    a = poly.polyval(z, system.a)
+    b1, b2 = poly.polyval(z, system.b1), poly.polyval(z, system.b2)
+    # Only the difference of the delays enters here, which keeps low frequencies exact.
+    separation = system.delay1 - system.delay2
+    determinant = np.imag(b1 * np.conj(b2) * np.exp(-1j * omega * separation))
+    rounding = 4.0 * _EPSILON * np.abs(omega * separation) * np.abs(b1) * np.abs(b2)
+    determinant = np.where(np.abs(determinant) <= rounding, np.nan, determinant)
+    x = np.imag(a * np.conj(b2) * np.exp(1j * omega * system.delay2)) / determinant
+    y = -np.imag(a * np.conj(b1) * np.exp(1j * omega * system.delay1)) / determinant
+    return x, y
+
+
+def d_curve_line(system: CharacteristicFunction) -> Line:
+    """Straight line on which s = 0 is a characteristic root, in closed form.
+
+    Parameters
+    ----------
+    system : CharacteristicFunction
+        The loop.
+
+    Returns
+    -------
+    Line
+        weight_x x + weight_y y = value, from D(0) = 0; scaled so that the larger weight
+        has magnitude one.
+
+    Raises
+    ------
+    ValueError
+        If D(0) depends on neither parameter, so that there is no line.
+
+    Examples
+    --------
+    >>> from armlock import CommonArm
+    >>> from armlock.dsubdivision import d_curve_line
+    >>> d_curve_line(CommonArm())
+    Line(weight_x=1.0, weight_y=1.0, value=2.0)
+    """
+    a, b1, b2 = (float(part.real) for part in system.parts(0.0))
+    scale = b1 if abs(b1) >= abs(b2) else b2
+    if scale == 0.0:
+        raise ValueError(
+            f"system must depend on a free parameter at s = 0, but {system!r} does not"
+        )
+    return Line(b1 / scale, b2 / scale, a / scale)
+
+
+def d_curve_branches(
+    system: CharacteristicFunction, omega_max: float, *, points_per_turn: int = 48
+) -> list[Branch]:
+    """Sample the D-curve for 0 < omega < omega_max, cut at its poles.
+
+    Parameters
+    ----------
+    system : CharacteristicFunction
+        The loop.
+    omega_max : float
+        Highest frequency in rad/s.
+    points_per_turn : int, optional
+        Samples per turn of the longest delay, 2 pi / delay.
+
+    Returns
+    -------
+    list of Branch
+        In ascending frequency. No two points of a branch lie on different sides of a pole.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As `d_curve`, or if an argument is not positive.
+
+    Notes
+    -----
+    The poles are the zeros of the determinant of the 2 x 2 system, found with certified
+    steps (`armlock.contour.sign_changes`).
+    """
+    omega_max = positive_number("omega_max", omega_max)
+    if system.step:
+        omega_max = min(omega_max, np.pi / system.step)
+    density = positive_number("points_per_turn", points_per_turn)
+    _require_two_parameters(system)
+    _, b1, b2 = system.on_boundary()
+    determinant = b1.times_conjugate(b2)
+    poles = contour.sign_changes(
+        determinant.coefficients, determinant.phases, omega_max, bool(system.step)
+    )[0]
+    edges = np.unique(np.concatenate(([0.0], poles, [omega_max])))
+    branches = []
+    for start, stop in zip(edges[:-1], edges[1:], strict=True):
+        turns = (stop - start) * system.longest_delay / (2.0 * np.pi)
+        count = int(np.ceil(density * max(turns, 4.0)))
+        # Closer towards both ends, where the curve runs off to its poles.
+        share = 0.5 * (1.0 - np.cos(np.pi * (np.arange(count) + 0.5) / count))
+        omega = start + (stop - start) * share
+        x, y = d_curve(system, omega)
+        kept = np.isfinite(x) & np.isfinite(y)
+        branches.append(Branch(omega[kept], x[kept], y[kept]))
+    return branches

@@ -1,0 +1,31 @@
+"""Numbers of the paper, each with its place, and those it leaves open.
+
+"Robustness Analysis and Controller Design of Arm-locking System in Space-based
+Gravitational Wave Detectors", Y. Shao, X. Zhao, L. Ma, M. Xin.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+#: Round-trip delays of the two arms in s (Sec. III.A, the example of Fig. 4a).
+TAU1: Final = 20.1
+TAU2: Final = 19.9
+
+#: Loop gain of the common-arm example (Sec. III.A) and of the dual-arm chart (Sec. III.B).
+COMMON_ARM_GAIN: Final = 1.0
+DUAL_ARM_GAIN: Final = 10.0
+
+#: Step of the semi-discretization in s (caption of Fig. 4b).
+STEP: Final = 0.05
+
+#: Largest perturbation of c1 and c2 the paper considers (Sec. IV.A).
+PERTURBATION: Final = 1e-6
+
+#: Corner frequency p of the dual sensor in rad/s. The paper gives none; this one is taken
+#: from a public arm-locking code for arms of the same length.
+DUAL_SENSOR_CORNER: Final = 2.0 * math.pi * 0.4
+
+#: Arm length of Taiji in m (mission design: three million kilometres).
+TAIJI_ARM_LENGTH: Final = 3.0e9

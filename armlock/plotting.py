@@ -1,0 +1,241 @@
+"""Figures: one style, charts with labelled regions, curves cut at their poles, downloads."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from scipy import ndimage
+
+from armlock.dsubdivision import Branch, Line
+from armlock.stability import StabilityChart
+
+BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, BLACK = (
+    "#0072B2",
+    "#D55E00",
+    "#009E73",
+    "#CC79A7",
+    "#56B4E9",
+    "#E69F00",
+    "#000000",
+)
+#: Fill of the stable region.
+STABLE = "#B8C4CE"
+
+
+def use_style() -> None:
+    """Use the book's matplotlib style from here on."""
+    plt.style.use(Path(__file__).with_name("armlock.mplstyle"))
+
+
+def plot_stable_region(ax: Axes, chart: StabilityChart, color: str = STABLE) -> None:
+    """Shade the stable region of a chart and label the axes.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where to draw.
+    chart : StabilityChart
+        With ascending, evenly spaced axes.
+    color : str, optional
+        Fill of the region.
+    """
+    _image(ax, chart, np.where(chart.stable, 1.0, np.nan), ListedColormap([color]))
+
+
+def plot_counts(ax: Axes, chart: StabilityChart, largest: int = 12) -> None:
+    """Colour a chart by its number of unstable roots, the stable region apart.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where to draw.
+    chart : StabilityChart
+        With ascending, evenly spaced axes.
+    largest : int, optional
+        Counts above this share one colour.
+    """
+    shades = plt.get_cmap("Oranges")(np.linspace(0.08, 0.75, largest))
+    colors = ListedColormap([STABLE, *shades])
+    values = np.where(chart.counts < 0, np.nan, np.minimum(chart.counts, largest))
+    _image(ax, chart, values, colors, 0.0, float(largest))
+
+
+def _image(
+    ax: Axes,
+    chart: StabilityChart,
+    values: npt.NDArray[np.float64],
+    colors: ListedColormap,
+    low: float | None = None,
+    high: float | None = None,
+) -> None:
+    """Draw a grid of values, cells centred on the axes' points."""
+    half_x = 0.5 * (chart.x[-1] - chart.x[0]) / max(chart.x.size - 1, 1)
+    half_y = 0.5 * (chart.y[-1] - chart.y[0]) / max(chart.y.size - 1, 1)
+    ax.imshow(
+        values,
+        origin="lower",
+        aspect="auto",
+        interpolation="nearest",
+        cmap=colors,
+        vmin=low,
+        vmax=high,
+        extent=(
+            chart.x[0] - half_x,
+            chart.x[-1] + half_x,
+            chart.y[0] - half_y,
+            chart.y[-1] + half_y,
+        ),
+    )
+    label_parameters(ax, chart.system.parameters)
+
+
+def label_parameters(ax: Axes, parameters: tuple[str, str]) -> None:
+    """Label both axes with the names of the free parameters."""
+    for set_label, name in zip((ax.set_xlabel, ax.set_ylabel), parameters, strict=True):
+        letter, digits = name.rstrip("0123456789"), name.lstrip("abcdefghijklmnopqrstuvwxyz")
+        set_label(f"${letter}_{{{digits}}}$" if digits else f"${letter}$")
+
+
+def label_regions(ax: Axes, chart: StabilityChart, smallest: float = 0.002) -> None:
+    """Write the number of unstable roots into each region of a chart.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where to write.
+    chart : StabilityChart
+        Any chart.
+    smallest : float, optional
+        Regions below this share of the chart stay without a label.
+    """
+    for count in np.unique(chart.counts[chart.counts >= 0]):
+        regions, number = ndimage.label(chart.counts == count)
+        for index in range(1, number + 1):
+            region = np.pad(regions == index, 1)
+            if region.sum() < smallest * chart.counts.size:
+                continue
+            depth = ndimage.distance_transform_edt(region)
+            row, column = np.unravel_index(np.argmax(depth), depth.shape)
+            ax.text(
+                chart.x[column - 1],
+                chart.y[row - 1],
+                str(count),
+                ha="center",
+                va="center",
+                fontsize=8,
+                bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.8},
+            )
+
+
+def plot_branches(
+    ax: Axes,
+    branches: Sequence[Branch],
+    *,
+    color: str = BLUE,
+    linewidth: float = 0.8,
+    label: str | None = None,
+    rasterized: bool = True,
+) -> None:
+    """Draw the branches of a D-curve, none joined to the next."""
+    for index, branch in enumerate(branches):
+        ax.plot(
+            branch.x,
+            branch.y,
+            color=color,
+            linestyle="-",
+            linewidth=linewidth,
+            label=label if index == 0 else None,
+            rasterized=rasterized,
+        )
+
+
+def plot_line(
+    ax: Axes,
+    line: Line,
+    *,
+    color: str = ORANGE,
+    linestyle: str = "--",
+    label: str | None = None,
+) -> None:
+    """Draw the straight line of omega = 0 across the axes, keeping their limits."""
+    normal = np.array([line.weight_x, line.weight_y])
+    foot = line.value * normal / (normal @ normal)
+    along = foot + np.array([line.weight_y, -line.weight_x])
+    ax.axline(
+        (float(foot[0]), float(foot[1])),
+        (float(along[0]), float(along[1])),
+        color=color,
+        linestyle=linestyle,
+        label=label,
+    )
+
+
+class Downloads:
+    """Links to a figure's files, shown below it in the book."""
+
+    def __init__(self, name: str, files: Sequence[str]) -> None:
+        self.name = name
+        self.files = files
+
+    def __repr__(self) -> str:
+        """Name the files."""
+        return f"{self.name}: {', '.join(self.files) or 'files are written by make book'}"
+
+    def _repr_html_(self) -> str:
+        """Return links relative to a page one folder below the book's root."""
+        if not self.files:
+            return f"<p>The files of <code>{self.name}</code> are written by the book.</p>"
+        links = " · ".join(
+            f'<a href="../figures/{file}" download>{file.rsplit(".", 1)[1].upper()}</a>'
+            for file in self.files
+        )
+        return f'<p class="figure-downloads">Download this figure: {links}</p>'
+
+
+def publish(
+    figure: Figure, name: str, columns: Mapping[str, npt.ArrayLike], *, form: str = "%.10g"
+) -> Downloads:
+    """Write a figure as PNG and SVG and its data as CSV, and link to them.
+
+    Parameters
+    ----------
+    figure : Figure
+        The figure.
+    name : str
+        Stem of the files, unique in the book.
+    columns : mapping of str to array_like
+        Columns of the CSV, named with their units, for instance "omega [rad/s]". Shorter
+        columns are padded with empty fields.
+    form : str, optional
+        Format of the numbers.
+
+    Returns
+    -------
+    Downloads
+        Shows links in a notebook. The files go to the folder named by the environment
+        variable ARMLOCK_FIGURES, which the book's build sets; without it none are written.
+    """
+    folder = os.environ.get("ARMLOCK_FIGURES")
+    if not folder:
+        return Downloads(name, [])
+    target = Path(folder)
+    target.mkdir(parents=True, exist_ok=True)
+    arrays = [np.ravel(np.asarray(column)) for column in columns.values()]
+    length = max((array.size for array in arrays), default=0)
+    lines = [",".join(columns)]
+    lines += [
+        ",".join(form % array[i] if i < array.size else "" for array in arrays)
+        for i in range(length)
+    ]
+    (target / f"{name}.csv").write_text("\n".join(lines) + "\n")
+    figure.savefig(target / f"{name}.png", metadata={"Software": None})
+    figure.savefig(target / f"{name}.svg", metadata={"Date": None})
+    return Downloads(name, [f"{name}.{ending}" for ending in ("csv", "png", "svg")])

@@ -1,0 +1,229 @@
+"""Characteristic roots: the rightmost one, found, polished and certified.
+
+Candidates are eigenvalues of a Chebyshev discretization of the solution operator's
+generator (Breda, Maset and Vermiglio). Each is polished by Newton's method on the exact
+characteristic function; the rightmost is then certified by counting that no root lies to
+the right of it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from numpy.polynomial import polynomial as poly
+from scipy.interpolate import BarycentricInterpolator
+
+from armlock.characteristic import CharacteristicFunction, ComplexArray
+from armlock.realization import realize
+from armlock.stability import CountError, unstable_roots
+from armlock.validation import FloatArray, broadcast_pair, real_number
+
+_EPSILON = float(np.finfo(float).eps)
+# Degrees of the Chebyshev polynomial that are tried, one after the other.
+_DEGREES = (60, 120, 240, 480, 960)
+
+
+class RootError(RuntimeError):
+    """No root could be certified as the rightmost one; `estimate` is the best candidate."""
+
+    def __init__(self, message: str, estimate: complex) -> None:
+        super().__init__(message)
+        self.estimate = estimate
+
+
+def _chebyshev(degree: int) -> tuple[FloatArray, FloatArray]:
+    """Return the Chebyshev points on [-1, 1], from 1 down, and the differentiation matrix."""
+    points = np.cos(np.pi * np.arange(degree + 1) / degree)
+    weights = np.ones(degree + 1)
+    weights[[0, -1]] = 2.0
+    weights *= (-1.0) ** np.arange(degree + 1)
+    difference = points[:, None] - points[None, :] + np.eye(degree + 1)
+    matrix = np.outer(weights, 1.0 / weights) / difference
+    matrix -= np.diag(matrix.sum(axis=1))
+    return points, matrix
+
+
+def pseudospectral_roots(
+    system: CharacteristicFunction, x: float, y: float, degree: int
+) -> ComplexArray:
+    """Approximate the characteristic roots of smallest magnitude, rightmost first.
+
+    Parameters
+    ----------
+    system : CharacteristicFunction
+        The loop, in continuous time.
+    x, y : float
+        The free parameters.
+    degree : int
+        Degree of the Chebyshev polynomial on the interval of the longest delay. Roots of
+        magnitude up to about degree / delay are resolved.
+
+    Returns
+    -------
+    complex array, shape (degree + order of the equation,)
+        Eigenvalues in descending order of real part: approximations, some of them spurious.
+    """
+    form = realize(system, x, y)
+    states = form.state.shape[0]
+    longest = max((term.delay for term in form.delayed), default=0.0)
+    if longest == 0.0:
+        eigenvalues = np.linalg.eigvals(form.state).astype(np.complex128)
+        return eigenvalues[np.argsort(-eigenvalues.real)]
+    points, difference = _chebyshev(degree)
+    history = 0.5 * longest * (points - 1.0)
+    difference = difference * (2.0 / longest)
+    interpolate = BarycentricInterpolator(history, np.eye(degree + 1))
+    rows = [interpolate(-term.delay) for term in form.delayed]
+    # xi(0) in terms of the states and the history behind it.
+    direct = sum((t.direct * row for t, row in zip(form.delayed, rows, strict=True)))
+    present = np.zeros(states + degree)
+    present[:1] = 1.0 if states else 0.0
+    present[states:] += np.asarray(direct)[1:]
+    present /= 1.0 - np.asarray(direct)[0]
+    matrix = np.zeros((states + degree, states + degree))
+    matrix[:states, :states] = form.state
+    for term, row in zip(form.delayed, rows, strict=True):
+        signal = row[0] * present
+        signal[states:] += row[1:]
+        matrix[:states] += np.outer(term.column, signal)
+    matrix[states:] = np.outer(difference[1:, 0], present)
+    matrix[states:, states:] += difference[1:, 1:]
+    eigenvalues = np.linalg.eigvals(matrix).astype(np.complex128)
+    return eigenvalues[np.argsort(-eigenvalues.real)]
+
+
+def polish_root(
+    system: CharacteristicFunction, x: float, y: float, start: complex
+) -> tuple[complex, float]:
+    """Follow Newton's method on the exact characteristic function.
+
+    Parameters
+    ----------
+    system : CharacteristicFunction
+        The loop.
+    x, y : float
+        The free parameters.
+    start : complex
+        Where to start, in rad/s.
+
+    Returns
+    -------
+    root : complex
+        The root.
+    error : float
+        Length of the last Newton step, an estimate of its error; inf if the residual
+        |D(root)| is not down to rounding.
+    """
+    s = complex(start)
+    scale = 1.0 / max(system.longest_delay, _EPSILON)
+    move = np.inf
+    for _ in range(60):
+        # A step far to the left overflows; such a start is given up below.
+        with np.errstate(over="ignore", invalid="ignore"):
+            value = complex(system(s, x, y))
+            slope = complex(system.derivative(s, x, y))
+        if value == 0.0:
+            return s, 0.0
+        if slope == 0.0 or not np.isfinite(value):
+            return s, np.inf
+        before, move = move, abs(value / slope)
+        if move >= before and move < 1e-6 * max(abs(s), scale):
+            break
+        s -= value / slope
+        if move <= _EPSILON * abs(s):
+            break
+    parts = [
+        abs(poly.polyval(abs(s), np.abs(p))) * np.exp(-s.real * delay)
+        for p, delay in (
+            (system.a, 0.0),
+            (x * system.b1, system.delay1),
+            (y * system.b2, system.delay2),
+        )
+    ]
+    rounding = 64.0 * _EPSILON * (1.0 + abs(s) * system.longest_delay) * sum(parts)
+    residual = abs(complex(system(s, x, y)))
+    return s, float(move) if residual <= rounding else np.inf
+
+
+def _certified(
+    system: CharacteristicFunction, x: float, y: float, root: complex, error: float
+) -> bool:
+    """Whether no root lies right of `root`, by more than its error."""
+    scale = max(abs(root), 1.0 / max(system.longest_delay, _EPSILON))
+    margin = max(1e-11 * scale, 10.0 * error)
+    while margin <= 1e-6 * scale:
+        try:
+            count = int(unstable_roots(system.shifted(root.real + margin), x, y))
+        except CountError:
+            return False
+        if count >= 0:
+            return count == 0
+        margin *= 10.0
+    return False
+
+
+def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
+    """Find the rightmost root at one point, or raise `RootError`."""
+    best = complex(np.nan, np.nan)
+    for degree in _DEGREES:
+        starts = pseudospectral_roots(system, x, y, degree)
+        starts = starts[starts.imag >= 0.0][:12]
+        polished = [polish_root(system, x, y, start) for start in starts]
+        found = [(root, error) for root, error in polished if np.isfinite(error)]
+        if not found:
+            continue
+        best, error = max(found, key=lambda pair: pair[0].real)
+        if _certified(system, x, y, best, error):
+            return complex(best.real, abs(best.imag))
+    name1, name2 = system.parameters
+    raise RootError(
+        f"no rightmost root could be certified at ({name1}, {name2}) = ({x}, {y}); the best "
+        f"candidate is {best}",
+        best,
+    )
+
+
+def rightmost_root(
+    system: CharacteristicFunction, x: npt.ArrayLike, y: npt.ArrayLike
+) -> complex | ComplexArray:
+    """Return the characteristic root with the largest real part.
+
+    Parameters
+    ----------
+    system : CharacteristicFunction
+        The loop, for instance `CommonArm()`.
+    x, y : array_like of float
+        The free parameters; they broadcast.
+
+    Returns
+    -------
+    complex, or complex array of the broadcast shape
+        In rad/s; of a conjugate pair the one with Im >= 0.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If x or y is not finite and real, or the two do not broadcast.
+    RootError
+        If no root passes both checks; its `estimate` carries the best candidate.
+
+    Notes
+    -----
+    Two checks: the residual |D(s)| is down to rounding, and the count of roots to the right
+    of Re s is zero, so that the result agrees with `unstable_roots`.
+
+    Examples
+    --------
+    >>> from armlock import HayesEquation, rightmost_root
+    >>> root = rightmost_root(HayesEquation(tau=1.0), 0.0, -1.0)
+    >>> print(f"{root:.10f}")
+    -0.3181315052+1.3372357014j
+    """
+    name1, name2 = system.parameters
+    xs, ys = broadcast_pair(name1, x, name2, y)
+    if xs.ndim == 0:
+        return _rightmost(system, real_number(name1, xs[()]), real_number(name2, ys[()]))
+    flat = [
+        _rightmost(system, float(p), float(q)) for p, q in zip(xs.flat, ys.flat, strict=True)
+    ]
+    return np.array(flat, dtype=np.complex128).reshape(xs.shape)

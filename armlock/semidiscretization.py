@@ -1,0 +1,232 @@
+"""Semi-discretization: the delayed signal sampled, everything else exact.
+
+Over a step h the delayed signal is held (order 0, as in the paper) or interpolated linearly
+(order 1); the equation between the samples is solved exactly. What is left is a linear map
+of the samples, stable when the spectral radius of its transition matrix is below one.
+
+The characteristic function of the map has the same affine form as that of the loop, on the
+unit circle instead of the imaginary axis, so that `unstable_roots`, `stability_chart` and
+`d_curve` take it as they take the loop.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from numpy.polynomial import polynomial as poly
+from scipy.linalg import expm
+from scipy.signal import ss2tf
+
+from armlock.characteristic import CharacteristicFunction
+from armlock.realization import Realization, realize
+from armlock.validation import FloatArray, broadcast_pair, positive_number
+
+
+def _whole_steps(name: str, delay: float, step: float) -> int:
+    """Return delay / step, or raise if it is not a whole number."""
+    steps = round(delay / step)
+    if steps < 1 or abs(steps * step - delay) > 1e-9 * delay:
+        raise ValueError(
+            f"step must divide every delay, got step={step} for {name}={delay} "
+            f"({delay / step:g} steps)"
+        )
+    return steps
+
+
+def _checked(system: CharacteristicFunction, step: float, order: int) -> tuple[float, int]:
+    """Return the step and the order, or raise for what cannot be semi-discretized."""
+    step = positive_number("step", step)
+    if isinstance(order, bool) or order not in (0, 1):
+        raise ValueError(f"order must be 0 or 1, got {order!r}")
+    if system.step:
+        raise ValueError(
+            f"system must be in continuous time, got a map with step {system.step}"
+        )
+    if system.neutral:
+        raise ValueError(
+            "system must be of retarded type: a neutral loop feeds back the delayed signal "
+            "itself, which semi-discretization does not smooth"
+        )
+    for name, delay in (("delay1", system.delay1), ("delay2", system.delay2)):
+        if delay > 0.0:
+            _whole_steps(name, delay, step)
+    return step, int(order)
+
+
+def _sampled(
+    form: Realization, step: float, order: int
+) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
+    """Return exp(F h) and, per delayed term, the columns of its older and newer sample."""
+    states = form.state.shape[0]
+    columns = []
+    for term in form.delayed:
+        # exp of this block matrix holds the integrals of exp(F u) G and of u exp(F u) G.
+        block = np.zeros((states + 2, states + 2))
+        block[:states, :states] = form.state
+        block[:states, states] = term.column
+        block[states, states + 1] = 1.0 / step
+        integrals = expm(block * step)[:states, states:]
+        held, ramp = integrals[:, 0], integrals[:, 1]
+        columns.append((held, np.zeros(states)) if order == 0 else (held - ramp, ramp))
+    return np.asarray(expm(form.state * step)), columns
+
+
+def transition_matrix(
+    system: CharacteristicFunction, x: float, y: float, step: float, order: int = 0
+) -> FloatArray:
+    """Build the transition matrix of the semi-discretized loop.
+
+    Parameters
+    ----------
+    system : CharacteristicFunction
+        A retarded loop, for instance `CommonArm()`.
+    x, y : float
+        The free parameters.
+    step : float
+        Sampling step h in s; it must divide both delays.
+    order : {0, 1}, optional
+        0 holds the delayed sample xi(t_{i-r}) over the step, as the paper does; 1
+        interpolates linearly to the next one.
+
+    Returns
+    -------
+    float array, shape (n + r, n + r)
+        For the states at t_i and the r = longest delay / h samples before t_i; n is the
+        order of the equation.
+
+    Raises
+    ------
+    ValueError
+        If the step does not divide a delay, the order is not 0 or 1, or the loop is neutral.
+
+    Notes
+    -----
+    Eq. (8) of the paper in its corrected form; see Insperger and Stepan, ch. 3.
+    """
+    step, order = _checked(system, step, order)
+    form = realize(system, float(x), float(y))
+    flow, columns = _sampled(form, step, order)
+    states = form.state.shape[0]
+    steps = [_whole_steps("delay", term.delay, step) for term in form.delayed]
+    longest = max(steps, default=0)
+    matrix = np.zeros((states + longest, states + longest))
+    matrix[:states, :states] = flow
+
+    def add(back: int, column: FloatArray) -> None:
+        # The present sample is the first state, older ones stand behind the states.
+        matrix[:states, 0 if back == 0 else states + back - 1] += column
+
+    for back, (older, newer) in zip(steps, columns, strict=True):
+        add(back, older)
+        add(back - 1, newer)
+    if longest:
+        matrix[states, 0] = 1.0
+        rest = np.arange(longest - 1)
+        matrix[states + 1 + rest, states + rest] = 1.0
+    return matrix
+
+
+def spectral_radius(
+    system: CharacteristicFunction,
+    x: npt.ArrayLike,
+    y: npt.ArrayLike,
+    step: float,
+    order: int = 0,
+) -> FloatArray:
+    """Spectral radius of the semi-discretized loop, from dense eigenvalues.
+
+    Parameters
+    ----------
+    system : CharacteristicFunction
+        A retarded loop, for instance `CommonArm()` or `HayesEquation()`.
+    x, y : array_like of float
+        The free parameters; they broadcast.
+    step : float
+        Sampling step h in s; it must divide both delays.
+    order : {0, 1}, optional
+        As for `transition_matrix`.
+
+    Returns
+    -------
+    float array, of the broadcast shape
+        Below one where the map is stable.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If x or y is not finite and real or the two do not broadcast, if the step does not
+        divide a delay, if the order is not 0 or 1, or if the loop is neutral.
+
+    Examples
+    --------
+    >>> from armlock import HayesEquation, spectral_radius
+    >>> print(round(float(spectral_radius(HayesEquation(), -1, -1, step=0.1, order=1)), 12))
+    0.941189374167
+    """
+    name1, name2 = system.parameters
+    xs, ys = broadcast_pair(name1, x, name2, y)
+    _checked(system, step, order)
+    radii = [
+        np.abs(np.linalg.eigvals(transition_matrix(system, p, q, step, order))).max()
+        for p, q in zip(xs.flat, ys.flat, strict=True)
+    ]
+    return np.array(radii, dtype=np.float64).reshape(xs.shape)
+
+
+def semi_discretization(
+    system: CharacteristicFunction, step: float, order: int = 0
+) -> CharacteristicFunction:
+    """Characteristic function of the semi-discretized loop, affine like the loop's own.
+
+    Parameters
+    ----------
+    system : CharacteristicFunction
+        A retarded loop in which both free parameters stand before a delayed signal.
+    step : float
+        Sampling step h in s; it must divide both delays.
+    order : {0, 1}, optional
+        As for `transition_matrix`.
+
+    Returns
+    -------
+    CharacteristicFunction
+        With polynomials in exp(s h); its unstable roots are the eigenvalues of the
+        transition matrix outside the unit circle.
+
+    Raises
+    ------
+    ValueError
+        As `transition_matrix`, and if a free parameter stands before an undelayed signal:
+        it then enters through exp(F h) and the map is not affine in it.
+
+    Examples
+    --------
+    >>> from armlock import CommonArm, unstable_roots
+    >>> from armlock.semidiscretization import semi_discretization
+    >>> unstable_roots(semi_discretization(CommonArm(), step=0.05), [0.9, 0.5], [1.05, 1.6])
+    array([0, 5])
+    """
+    step, order = _checked(system, step, order)
+    for name, delay in zip(system.parameters, (system.delay1, system.delay2), strict=True):
+        if delay == 0.0:
+            raise ValueError(
+                f"the free parameter {name} of {system!r} stands before an undelayed signal, "
+                f"so that the map is not affine in it; use transition_matrix or "
+                f"spectral_radius at single points"
+            )
+    form = realize(system, 1.0, 1.0)
+    flow, columns = _sampled(form, step, order)
+    output = np.eye(1, system.degree)
+    numerators = []
+    for older, newer in columns:
+        held, below = ss2tf(flow, older[:, None], output, np.zeros((1, 1)))
+        ramp, _ = ss2tf(flow, newer[:, None], output, np.zeros((1, 1)))
+        numerators.append(poly.polyadd(held[0][::-1], np.append(0.0, ramp[0][::-1])))
+    return CharacteristicFunction(
+        np.poly(flow)[::-1],
+        *(poly.polytrim(numerator, tol=0.0) for numerator in numerators),
+        system.delay1,
+        system.delay2,
+        step=step,
+        parameters=system.parameters,
+    )

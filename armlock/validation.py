@@ -1,0 +1,74 @@
+"""Checks of arguments, all with one form of message: name, value, constraint."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def real_number(name: str, value: object) -> float:
+    """Return `value` as a float, or say why it is not a finite real number."""
+    if isinstance(value, (bool, str, bytes)) or np.ndim(value) != 0:  # type: ignore[arg-type]
+        raise TypeError(f"{name} must be a real number, got {value!r}")
+    if np.iscomplexobj(value):
+        raise TypeError(f"{name} must be real, got the complex value {value!r}")
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        raise TypeError(f"{name} must be a real number, got {value!r}") from None
+    if not math.isfinite(number):
+        raise ValueError(f"{name} must be finite, got {number}")
+    return number
+
+
+def positive_number(name: str, value: object) -> float:
+    """Return `value` as a finite float above zero, or raise."""
+    number = real_number(name, value)
+    if number <= 0.0:
+        raise ValueError(f"{name} must be positive, got {number}")
+    return number
+
+
+def real_array(name: str, value: object) -> FloatArray:
+    """Return `value` as a finite float array of any shape, or raise."""
+    array: npt.NDArray[Any] = np.asarray(value)
+    if np.iscomplexobj(array):
+        raise TypeError(f"{name} must be real, got complex values (dtype {array.dtype})")
+    if array.dtype == np.bool_ or not np.issubdtype(array.dtype, np.number):
+        raise TypeError(f"{name} must hold real numbers, got dtype {array.dtype}")
+    array = array.astype(np.float64)
+    finite = np.isfinite(array)
+    if not finite.all():
+        first = array[~finite].ravel()[0]
+        raise ValueError(f"{name} must be finite, got {first} among its {array.size} values")
+    return array
+
+
+def broadcast_pair(
+    name1: str, value1: object, name2: str, value2: object
+) -> tuple[FloatArray, FloatArray]:
+    """Return two finite real arrays of one shape, or name both shapes and raise."""
+    first, second = real_array(name1, value1), real_array(name2, value2)
+    try:
+        first, second = np.broadcast_arrays(first, second)
+    except ValueError:
+        raise ValueError(
+            f"{name1} and {name2} must broadcast together, got shapes "
+            f"{first.shape} and {second.shape}"
+        ) from None
+    return first, second
+
+
+def axis(name: str, value: object) -> FloatArray:
+    """Return a non-empty one-dimensional finite float array, or raise."""
+    array = real_array(name, value)
+    if array.ndim != 1:
+        raise ValueError(f"{name} must be one-dimensional, got shape {array.shape}")
+    if array.size == 0:
+        raise ValueError(f"{name} must hold at least one value, got an empty array")
+    return array
