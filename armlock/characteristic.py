@@ -18,9 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
-from armlock.validation import FloatArray, axis, positive_number, real_number
-
-ComplexArray = npt.NDArray[np.complex128]
+from armlock.validation import ComplexArray, FloatArray, axis, positive_number, real_number
 
 
 class ExponentialSum(NamedTuple):
@@ -140,9 +138,9 @@ class CharacteristicFunction:
         s = np.asarray(s, dtype=np.complex128)
         z = np.exp(s * self.step) if self.step else s
         return (
-            poly.polyval(z, self.a),
-            poly.polyval(z, self.b1) * np.exp(-s * self.delay1),
-            poly.polyval(z, self.b2) * np.exp(-s * self.delay2),
+            np.asarray(poly.polyval(z, self.a), dtype=np.complex128),
+            np.asarray(poly.polyval(z, self.b1) * np.exp(-s * self.delay1)),
+            np.asarray(poly.polyval(z, self.b2) * np.exp(-s * self.delay2)),
         )
 
     def __call__(self, s: npt.ArrayLike, x: npt.ArrayLike, y: npt.ArrayLike) -> ComplexArray:
@@ -209,9 +207,8 @@ class CharacteristicFunction:
 
         def convert(p: FloatArray, delay: float) -> ExponentialSum:
             if self.step:
-                return ExponentialSum(
-                    p[:, None].astype(np.complex128), self.step * np.arange(p.size) - delay
-                )
+                rates = np.asarray(self.step * np.arange(p.size) - delay, dtype=np.float64)
+                return ExponentialSum(p[:, None].astype(np.complex128), rates)
             powers = 1j ** (np.arange(p.size) % 4)
             # Each coefficient is kept exactly real or exactly imaginary.
             powers = np.round(powers.real) + 1j * np.round(powers.imag)

@@ -20,6 +20,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
+from armlock.validation import BoolArray, ComplexArray, FloatArray, IntArray
+
 EPSILON = 2.0**-52
 # Rounding errors of one evaluation, in units of EPSILON times the sum of magnitudes.
 ROUNDING = 8.0
@@ -33,7 +35,7 @@ UNBOUNDED = -3
 
 
 @njit(cache=True, inline="always")
-def _real_horner(p, omega):
+def _real_horner(p: FloatArray, omega: float) -> float:
     value = 0.0
     for k in range(p.size - 1, -1, -1):
         value = value * omega + p[k]
@@ -41,7 +43,9 @@ def _real_horner(p, omega):
 
 
 @njit(cache=True)
-def _evaluate(coefficients, sums, phases, omega):
+def _evaluate(
+    coefficients: ComplexArray, sums: ComplexArray, phases: FloatArray, omega: float
+) -> tuple[complex, complex]:
     """Value and derivative of an exponential sum; `sums` holds the sum over its groups."""
     size = sums.size
     value = 0j
@@ -67,7 +71,7 @@ def _evaluate(coefficients, sums, phases, omega):
 
 
 @njit(cache=True)
-def _curvature_bound(coefficients, phases):
+def _curvature_bound(coefficients: ComplexArray, phases: FloatArray) -> FloatArray:
     """Polynomial in omega that bounds the second derivative of an exponential sum."""
     groups, size = coefficients.shape
     bound = np.zeros(size)
@@ -84,7 +88,9 @@ def _curvature_bound(coefficients, phases):
 
 
 @njit(cache=True)
-def winding(coefficients, phases, noise, omega_end):
+def winding(
+    coefficients: ComplexArray, phases: FloatArray, noise: FloatArray, omega_end: float
+) -> tuple[float, complex, bool]:
     """Argument gathered by an exponential sum as omega goes from 0 to `omega_end`.
 
     Returns the argument, the last value, and whether the sum stays clear of zero.
@@ -129,7 +135,7 @@ def winding(coefficients, phases, noise, omega_end):
 
 
 @njit(cache=True)
-def _taylor_signs_positive(q, shift):
+def _taylor_signs_positive(q: FloatArray, shift: float) -> bool:
     """Whether all coefficients of q(w + shift) are positive beyond rounding, or zero."""
     size = q.size
     p = q.copy()
@@ -138,14 +144,13 @@ def _taylor_signs_positive(q, shift):
         for k in range(size - 2, i - 1, -1):
             p[k] += shift * p[k + 1]
             magnitude[k] += shift * magnitude[k + 1]
-    for k in range(size):
-        if p[k] < 1e-13 * magnitude[k]:
-            return False
-    return True
+    return bool(np.all(p >= 1e-13 * magnitude))
 
 
 @njit(cache=True)
-def last_crossing_bound(square_a, square_b1, square_b2, x, y):
+def last_crossing_bound(
+    square_a: FloatArray, square_b1: FloatArray, square_b2: FloatArray, x: float, y: float
+) -> float:
     """Frequency past which |A| > |x B1| + |y B2|, so that no root can cross; inf if none.
 
     The three arguments hold |A|^2, |B1|^2, |B2|^2 at s = j omega as polynomials in
@@ -181,11 +186,11 @@ def last_crossing_bound(square_a, square_b1, square_b2, x, y):
             upper = middle
         else:
             lower = middle
-    return np.sqrt(upper)
+    return float(np.sqrt(upper))
 
 
 @njit(cache=True)
-def _remaining_argument(roots, omega):
+def _remaining_argument(roots: ComplexArray, omega: float) -> float:
     """Argument that the polynomial with these roots gathers from j omega to infinity."""
     argument = 0.0
     for root in roots:
@@ -197,8 +202,16 @@ def _remaining_argument(roots, omega):
 
 
 @njit(cache=True)
-def count_point(parts, phases, roots, squares, omega_end, x, y):
-    """Number of unstable roots at one point, or a status code below zero.
+def count_point(
+    parts: ComplexArray,
+    phases: FloatArray,
+    roots: ComplexArray,
+    squares: FloatArray,
+    omega_end: float,
+    x: float,
+    y: float,
+) -> int:
+    """Return the number of unstable roots at one point, or a status code below zero.
 
     By the argument principle: degree / 2 less the argument over pi, gathered from 0 to
     infinity, for a polynomial in s (`omega_end` is zero); degree less the argument over pi,
@@ -240,7 +253,15 @@ def count_point(parts, phases, roots, squares, omega_end, x, y):
 
 
 @njit(cache=True, parallel=True)
-def count_points(parts, phases, roots, squares, omega_end, x, y):
+def count_points(
+    parts: ComplexArray,
+    phases: FloatArray,
+    roots: ComplexArray,
+    squares: FloatArray,
+    omega_end: float,
+    x: FloatArray,
+    y: FloatArray,
+) -> IntArray:
     """`count_point` over one-dimensional arrays x and y of the same length."""
     counts = np.empty(x.size, dtype=np.int64)
     for i in prange(x.size):
@@ -249,7 +270,16 @@ def count_points(parts, phases, roots, squares, omega_end, x, y):
 
 
 @njit(cache=True)
-def _polish(coefficients, sums, phases, bound, lower, upper, start, sign_lower):
+def _polish(
+    coefficients: ComplexArray,
+    sums: ComplexArray,
+    phases: FloatArray,
+    bound: FloatArray,
+    lower: float,
+    upper: float,
+    start: float,
+    sign_lower: int,
+) -> tuple[float, complex, complex]:
     """Zero of the imaginary part in a bracket, by Newton steps kept inside it.
 
     Returns the zero, and value and slope there.
@@ -278,7 +308,7 @@ def _polish(coefficients, sums, phases, bound, lower, upper, start, sign_lower):
 
 
 @njit(cache=True)
-def _cubic_zero(step, h0, dh0, h1, dh1):
+def _cubic_zero(step: float, h0: float, dh0: float, h1: float, dh1: float) -> float:
     """Zero, as an offset in (0, step), of the cubic through values and slopes at both ends."""
     t = h0 / (h0 - h1)
     for _ in range(2):
@@ -301,7 +331,9 @@ def _cubic_zero(step, h0, dh0, h1, dh1):
 
 
 @njit(cache=True)
-def sign_changes(coefficients, phases, omega_end, is_map):
+def sign_changes(
+    coefficients: ComplexArray, phases: FloatArray, omega_end: float, is_map: bool
+) -> tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray]:
     """Zeros in [0, omega_end] of the imaginary part of an exponential sum odd in omega.
 
     Returns five arrays, an entry a zero:
@@ -411,9 +443,20 @@ def sign_changes(coefficients, phases, omega_end, is_map):
 
 @njit(cache=True, parallel=True)
 def fill_rows(
-    fixed, varying, phases, norm, norm_phases, ends, is_map, y, base, x, lower, upper
-):
-    """Counts along rows of a chart, from the crossings of each row.
+    fixed: ComplexArray,
+    varying: ComplexArray,
+    phases: FloatArray,
+    norm: ComplexArray,
+    norm_phases: FloatArray,
+    ends: FloatArray,
+    is_map: bool,
+    y: FloatArray,
+    base: IntArray,
+    x: FloatArray,
+    lower: float,
+    upper: float,
+) -> tuple[IntArray, BoolArray, IntArray]:
+    """Fill rows of a chart with counts, from the crossings of each row.
 
     A row is x = N / M; `fixed` - y `varying` holds N conj(M), `norm` holds M. Each row y[i]
     starts with the count base[i] at x = lower, left of all `x` (ascending). Returns the

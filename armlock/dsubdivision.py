@@ -7,6 +7,7 @@ these curves the number of unstable roots is constant.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -197,7 +198,7 @@ def d_curve_branches(
     )[0]
     edges = np.unique(np.concatenate(([0.0], poles, [omega_max])))
     branches = []
-    for start, stop in zip(edges[:-1], edges[1:], strict=True):
+    for start, stop in pairwise(edges):
         turns = (stop - start) * system.longest_delay / (2.0 * np.pi)
         count = int(np.ceil(density * max(turns, 4.0)))
         # Closer towards both ends, where the curve runs off to its poles.

@@ -19,10 +19,10 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
 from armlock import sensors
-from armlock.characteristic import CharacteristicFunction, ComplexArray
+from armlock.characteristic import CharacteristicFunction
 from armlock.paper import COMMON_ARM_GAIN, TAU1, TAU2
 from armlock.sensors import SignalMapping
-from armlock.validation import axis, positive_number
+from armlock.validation import ComplexArray, axis, positive_number
 
 
 class HayesEquation(CharacteristicFunction):
@@ -113,7 +113,8 @@ class Loop(CharacteristicFunction):
             above, sensor_below = above[1:], sensor_below[1:]
         b1, b2 = np.convolve(above, m1), np.convolve(above, m2)
         self._open_denominator = np.convolve(below, sensor_below)
-        a = poly.polyadd(self._open_denominator, poly.polyadd(b1, b2))
+        both = poly.polyadd(b1, b2)
+        a = np.asarray(poly.polyadd(self._open_denominator, both), dtype=np.float64)
         super().__init__(a, b1, b2, self.tau1, self.tau2, parameters=("c1", "c2"))
 
     def open_loop(

@@ -99,9 +99,15 @@ def _image(
 
 def label_parameters(ax: Axes, parameters: tuple[str, str]) -> None:
     """Label both axes with the names of the free parameters."""
-    for set_label, name in zip((ax.set_xlabel, ax.set_ylabel), parameters, strict=True):
-        letter, digits = name.rstrip("0123456789"), name.lstrip("abcdefghijklmnopqrstuvwxyz")
-        set_label(f"${letter}_{{{digits}}}$" if digits else f"${letter}$")
+    ax.set_xlabel(_as_math(parameters[0]))
+    ax.set_ylabel(_as_math(parameters[1]))
+
+
+def _as_math(name: str) -> str:
+    """Set a parameter's name as TeX, its digits as subscript."""
+    letter = name.rstrip("0123456789")
+    digits = name[len(letter) :]
+    return f"${letter}_{{{digits}}}$" if digits else f"${letter}$"
 
 
 def label_regions(ax: Axes, chart: StabilityChart, smallest: float = 0.002) -> None:

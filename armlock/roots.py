@@ -13,10 +13,10 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 from scipy.interpolate import BarycentricInterpolator
 
-from armlock.characteristic import CharacteristicFunction, ComplexArray
+from armlock.characteristic import CharacteristicFunction
 from armlock.realization import realize
 from armlock.stability import CountError, unstable_roots
-from armlock.validation import FloatArray, broadcast_pair, real_number
+from armlock.validation import ComplexArray, FloatArray, broadcast_pair, real_number
 
 _EPSILON = float(np.finfo(float).eps)
 # Degrees of the Chebyshev polynomial that are tried, one after the other.

@@ -216,17 +216,26 @@ def semi_discretization(
             )
     form = realize(system, 1.0, 1.0)
     flow, columns = _sampled(form, step, order)
-    output = np.eye(1, system.degree)
-    numerators = []
-    for older, newer in columns:
-        held, below = ss2tf(flow, older[:, None], output, np.zeros((1, 1)))
-        ramp, _ = ss2tf(flow, newer[:, None], output, np.zeros((1, 1)))
-        numerators.append(poly.polyadd(held[0][::-1], np.append(0.0, ramp[0][::-1])))
+    b1, b2 = (
+        poly.polyadd(
+            _numerator(flow, older),
+            np.append(0.0, _numerator(flow, newer)),
+        )
+        for older, newer in columns
+    )
     return CharacteristicFunction(
-        np.poly(flow)[::-1],
-        *(poly.polytrim(numerator, tol=0.0) for numerator in numerators),
+        np.asarray(np.poly(flow)[::-1], dtype=np.float64),
+        np.asarray(b1, dtype=np.float64),
+        np.asarray(b2, dtype=np.float64),
         system.delay1,
         system.delay2,
         step=step,
         parameters=system.parameters,
     )
+
+
+def _numerator(flow: FloatArray, column: FloatArray) -> FloatArray:
+    """Ascending coefficients of the numerator from an input column to the first state."""
+    output = np.eye(1, flow.shape[0])
+    above, _ = ss2tf(flow, column[:, None], output, np.zeros((1, 1)))
+    return np.asarray(above[0][::-1], dtype=np.float64)

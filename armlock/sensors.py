@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
-from armlock.validation import positive_number
+from armlock.validation import ComplexArray, positive_number
 
 
 class SignalMapping(NamedTuple):
@@ -34,10 +34,10 @@ class SignalMapping(NamedTuple):
     denominator: Sequence[float]
     name: str
 
-    def weights(self, s: npt.ArrayLike) -> tuple[npt.NDArray, npt.NDArray]:
+    def weights(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """Evaluate (m1, m2) at complex s, in rad/s; both are shaped like `s`."""
         s = np.asarray(s, dtype=np.complex128)
-        below = poly.polyval(s, np.asarray(self.denominator, dtype=float))
+        below: ComplexArray = poly.polyval(s, np.asarray(self.denominator, dtype=float))
         return (
             poly.polyval(s, np.asarray(self.numerator1, dtype=float)) / below,
             poly.polyval(s, np.asarray(self.numerator2, dtype=float)) / below,
@@ -50,7 +50,7 @@ class SignalMapping(NamedTuple):
         tau2: float,
         c1: float = 1.0,
         c2: float = 1.0,
-    ) -> npt.NDArray[np.complex128]:
+    ) -> ComplexArray:
         """Evaluate the sensor's response P(s).
 
         Parameters
@@ -69,9 +69,8 @@ class SignalMapping(NamedTuple):
         tau1, tau2 = positive_number("tau1", tau1), positive_number("tau2", tau2)
         s = np.asarray(s, dtype=np.complex128)
         m1, m2 = self.weights(s)
-        response: npt.NDArray[np.complex128] = m1 * (1.0 - c1 * np.exp(-s * tau1)) + m2 * (
-            1.0 - c2 * np.exp(-s * tau2)
-        )
+        response: ComplexArray = m1 * (1.0 - c1 * np.exp(-s * tau1))
+        response += m2 * (1.0 - c2 * np.exp(-s * tau2))
         return response
 
 

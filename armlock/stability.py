@@ -17,10 +17,15 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
 from armlock import contour
-from armlock.characteristic import CharacteristicFunction, ComplexArray, ExponentialSum
-from armlock.validation import FloatArray, axis, broadcast_pair
-
-IntArray = npt.NDArray[np.int64]
+from armlock.characteristic import CharacteristicFunction, ExponentialSum
+from armlock.validation import (
+    BoolArray,
+    ComplexArray,
+    FloatArray,
+    IntArray,
+    axis,
+    broadcast_pair,
+)
 
 # How far outside a chart's axes its reference counts lie, in steps of the axis: no round
 # number, so that no reference point falls on a line a user would choose.
@@ -174,13 +179,13 @@ class StabilityChart:
     x: FloatArray
     y: FloatArray
     counts: IntArray
-    counted_singly: npt.NDArray[np.bool_]
+    counted_singly: BoolArray
     recounted_rows: npt.NDArray[np.intp]
 
     @property
-    def stable(self) -> npt.NDArray[np.bool_]:
+    def stable(self) -> BoolArray:
         """Where all roots lie in the open left half-plane."""
-        return self.counts == 0
+        return np.asarray(self.counts == 0)
 
 
 def stability_chart(
@@ -234,7 +239,7 @@ def stability_chart(
 
 def _chart_rows(
     system: CharacteristicFunction, x: FloatArray, y: FloatArray
-) -> tuple[IntArray, npt.NDArray[np.bool_], npt.NDArray[np.intp]]:
+) -> tuple[IntArray, BoolArray, npt.NDArray[np.intp]]:
     """Chart ascending axes; return counts, points counted singly, rows counted singly."""
     left, right = _ends(x)
     low, high = _ends(y)
@@ -275,7 +280,7 @@ def _walk(
     base: IntArray,
     lower: float,
     upper: float,
-) -> tuple[IntArray, npt.NDArray[np.bool_], IntArray]:
+) -> tuple[IntArray, BoolArray, IntArray]:
     """Fill rows from their crossings, starting with the counts `base` at x = lower."""
     a, b1, b2 = system.on_boundary()
     fixed, varying = a.times_conjugate(b1), b2.times_conjugate(b1)

@@ -9,18 +9,19 @@ import numpy as np
 import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
 
 
 def real_number(name: str, value: object) -> float:
     """Return `value` as a float, or say why it is not a finite real number."""
-    if isinstance(value, (bool, str, bytes)) or np.ndim(value) != 0:  # type: ignore[arg-type]
-        raise TypeError(f"{name} must be a real number, got {value!r}")
-    if np.iscomplexobj(value):
+    array: npt.NDArray[Any] = np.asarray(value)
+    if np.iscomplexobj(array):
         raise TypeError(f"{name} must be real, got the complex value {value!r}")
-    try:
-        number = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        raise TypeError(f"{name} must be a real number, got {value!r}") from None
+    if array.ndim != 0 or array.dtype == np.bool_ or not np.issubdtype(array.dtype, np.number):
+        raise TypeError(f"{name} must be a real number, got {value!r}")
+    number = float(array)
     if not math.isfinite(number):
         raise ValueError(f"{name} must be finite, got {number}")
     return number

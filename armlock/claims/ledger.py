@@ -145,7 +145,7 @@ class Ledger:
             f'<tr id="claim-{html.escape(c.identifier)}">'
             f"<td><strong>{html.escape(c.identifier)}</strong><br>{html.escape(c.place)}</td>"
             f"<td>{html.escape(c.says)}</td>"
-            f'<td><span class="verdict verdict-{f.verdict.name.lower()}">{f.verdict}</span></td>'
+            f'<td class="verdict verdict-{f.verdict.name.lower()}">{f.verdict}</td>'
             f"<td><strong>{f.value:.6g}</strong><br>{html.escape(f.quantity)}</td>"
             f"<td>{html.escape(f.note)}</td></tr>"
             for c, f in self.entries
