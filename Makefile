@@ -24,11 +24,13 @@ export MPLCONFIGDIR := $(CURDIR)/$(VENV)/matplotlib
 export IPYTHONDIR := $(CURDIR)/$(VENV)/ipython
 unexport PYTHONPATH PYTHONHOME VIRTUAL_ENV MPLBACKEND
 
+space := $(subst ,, )
 find-sources = $(shell find $(wildcard $(1)) -type f \
 	-not -name '*.pyc' -not -name '*.nbi' -not -name '*.nbc' -not -path '*/.*' | sort)
 PACKAGE_SOURCES := $(call find-sources,armlock)
 BOOK_SOURCES := $(PACKAGE_SOURCES) $(call find-sources,book notebooks) tools/check_html.py
-TEST_SOURCES := $(PACKAGE_SOURCES) $(call find-sources,notebooks tests benchmarks) pyproject.toml
+TEST_SOURCES := $(PACKAGE_SOURCES) $(call find-sources,notebooks tests benchmarks) \
+	pyproject.toml README.md
 NOTEBOOKS := $(wildcard notebooks/*.ipynb)
 
 .DEFAULT_GOAL := help
@@ -37,13 +39,14 @@ NOTEBOOKS := $(wildcard notebooks/*.ipynb)
 
 help: ## List the targets
 	@echo "armlock: make TARGET, where TARGET is one of"
-	@sed -n 's/^\([a-z]*\):.*## /  \1:/p' $(firstword $(MAKEFILE_LIST)) \
-		| awk -F: '{ printf "%-11s%s\n", $$1, $$2 }'
+	@sed -n 's/^\([a-z]*\):.*## \(.*\)/\1|\2/p' $(firstword $(MAKEFILE_LIST)) \
+		| awk -F'|' '{ printf "  %-11s%s\n", $$1, $$2 }'
 	@echo "Variables: PYTHON=python3.12 (for env), PORT=8000 (for serve), FORCE=1 (run again)"
 
 ## Environment ---------------------------------------------------------------------------
 
 env: $(PACKAGE_READY) ## Make .venv with every package of environment.txt, and this one
+	@echo "The environment is ready: $(VENV)"
 
 # Both stamps are written last, so an interrupted install starts over. The kernel's log level
 # keeps its notes on transport, one for each notebook, out of the build's output.
@@ -75,11 +78,12 @@ $(PACKAGE_READY): $(ENV_READY) pyproject.toml
 ## Book ----------------------------------------------------------------------------------
 
 book: $(INDEX) ## Run all notebooks and build the book, as HTML that needs no network
-	@echo "The book is ready. Open this file in a browser: file://$(CURDIR)/$(INDEX)"
+	@echo "The book is ready. Open it in a browser: file://$(subst $(space),%20,$(CURDIR))/$(INDEX)"
 
 # Every page is built and every notebook run anew: Sphinx does not see that the package has
 # changed. The new book replaces the old one only when it is complete, and is as old as the
-# start of its build, so that a source saved meanwhile counts as newer.
+# start of its build, so that a source saved meanwhile counts as newer. The link keeps the path
+# right that Jupyter Book has printed.
 $(INDEX): $(PACKAGE_READY) $(BOOK_SOURCES) build/book-sources $(if $(FORCE),always)
 	@touch build/book-started
 	@rm -rf build/_build
@@ -88,6 +92,7 @@ $(INDEX): $(PACKAGE_READY) $(BOOK_SOURCES) build/book-sources $(if $(FORCE),alwa
 	$(PY) tools/check_html.py build/_build/html
 	@rm -rf build/html
 	@mv build/_build/html build/html
+	@ln -s ../html build/_build/html
 	@touch -r build/book-started $@
 
 serve: $(INDEX) ## Serve the book at http://localhost:PORT
