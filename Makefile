@@ -24,7 +24,8 @@ export MPLCONFIGDIR := $(CURDIR)/$(VENV)/matplotlib
 export IPYTHONDIR := $(CURDIR)/$(VENV)/ipython
 unexport PYTHONPATH PYTHONHOME VIRTUAL_ENV MPLBACKEND
 
-space := $(subst ,, )
+empty :=
+space := $(empty) $(empty)
 find-sources = $(shell find $(wildcard $(1)) -type f \
 	-not -name '*.pyc' -not -name '*.nbi' -not -name '*.nbc' -not -path '*/.*' | sort)
 PACKAGE_SOURCES := $(call find-sources,armlock)
