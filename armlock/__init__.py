@@ -5,19 +5,30 @@ System in Space-based Gravitational Wave Detectors".
 """
 
 from armlock.characteristic import CharacteristicFunction
+from armlock.controllers import Controller
 from armlock.dsubdivision import d_curve, d_curve_branches, d_curve_line
-from armlock.loops import CommonArm, Controller, HayesEquation, Loop, SingleArm
+from armlock.loops import CommonArm, DualArm, HayesEquation, Loop, SingleArm, paper_loop
 from armlock.roots import RootError, rightmost_root
 from armlock.semidiscretization import semi_discretization, spectral_radius, transition_matrix
-from armlock.stability import CountError, StabilityChart, stability_chart, unstable_roots
+from armlock.stability import (
+    BOUNDARY,
+    UNCONFINED,
+    CountError,
+    StabilityChart,
+    stability_chart,
+    unstable_roots,
+)
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "BOUNDARY",
+    "UNCONFINED",
     "CharacteristicFunction",
     "CommonArm",
     "Controller",
     "CountError",
+    "DualArm",
     "HayesEquation",
     "Loop",
     "RootError",
@@ -26,6 +37,7 @@ __all__ = [
     "d_curve",
     "d_curve_branches",
     "d_curve_line",
+    "paper_loop",
     "rightmost_root",
     "semi_discretization",
     "spectral_radius",

@@ -4,8 +4,11 @@ Whatever the sensor and the controller, clearing denominators of 1 + L(s) leaves
 
     D(s; x, y) = A(s) - x B1(s) exp(-s delay1) - y B2(s) exp(-s delay2)
 
-with real polynomials A, B1, B2: affine in the two free parameters. The
-semi-discretized loop has the same form with polynomials in z = exp(s step)
+with real polynomials A, B1, B2: affine in the two free parameters. It is kept as what it is
+at a reference point plus the deviation from there, because near the ideal point (1, 1) of an
+arm-locking loop A, B1 and B2 are many orders of magnitude larger than what remains of them.
+
+The semi-discretized loop has the same form with polynomials in z = exp(s step)
 instead of s, so that both are one class here and one set of algorithms above.
 """
 
@@ -30,10 +33,14 @@ class ExponentialSum(NamedTuple):
         Polynomials in omega, ascending powers.
     phases : float array, shape (groups,)
         Phase rates, in s.
+    sums : complex array, shape (degree + 1,)
+        The sum of all P_g. It is carried along, and not summed up, because the P_g may
+        cancel to many digits.
     """
 
     coefficients: ComplexArray
     phases: FloatArray
+    sums: ComplexArray
 
     def times_conjugate(self, other: ExponentialSum) -> ExponentialSum:
         """Return this sum times the complex conjugate of `other`, at real omega."""
@@ -42,7 +49,34 @@ class ExponentialSum(NamedTuple):
             for q, other_phase in zip(other.coefficients, other.phases, strict=True):
                 rows.append(np.convolve(p, q.conj()))
                 phases.append(phase - other_phase)
-        return ExponentialSum(np.array(rows), np.array(phases))
+        sums = np.convolve(self.sums, other.sums.conj())
+        size = max(len(rows[0]), sums.size)
+        coefficients = np.array([np.pad(row, (0, size - row.size)) for row in rows])
+        return ExponentialSum(
+            coefficients, np.array(phases), np.pad(sums, (0, size - sums.size))
+        )
+
+    def scaled(self, weight: float) -> ExponentialSum:
+        """Return this sum times a number."""
+        return ExponentialSum(weight * self.coefficients, self.phases, weight * self.sums)
+
+    def plus(self, other: ExponentialSum) -> ExponentialSum:
+        """Return this sum plus another one, over the groups of both."""
+        size = max(
+            self.sums.size,
+            other.sums.size,
+            self.coefficients.shape[1],
+            other.coefficients.shape[1],
+        )
+
+        def padded(p: ComplexArray) -> ComplexArray:
+            return np.pad(p, [(0, 0)] * (p.ndim - 1) + [(0, size - p.shape[-1])])
+
+        return ExponentialSum(
+            np.concatenate((padded(self.coefficients), padded(other.coefficients))),
+            np.concatenate((self.phases, other.phases)),
+            padded(self.sums) + padded(other.sums),
+        )
 
 
 class CharacteristicFunction:
@@ -50,14 +84,18 @@ class CharacteristicFunction:
 
     Parameters
     ----------
-    a, b1, b2 : sequence of float
+    rest, b1, b2 : sequence of float
         Polynomial coefficients in ascending powers of s (of z = exp(s step) for a map).
+        With the reference at (0, 0), `rest` is A itself.
     delay1, delay2 : float
         Delays in s, zero or positive.
     step : float, optional
         Zero (default) for polynomials in s; the sampling step in s for a map.
     parameters : pair of str, optional
         Names of the two free parameters, used in messages and on axes.
+    reference : pair of float, optional
+        The point (x0, y0) at which D is `rest` when both delays are left out, so that
+        A = rest + x0 B1 + y0 B2. For a loop it is (1, 1), and `rest` the denominator of L.
 
     Raises
     ------
@@ -73,7 +111,7 @@ class CharacteristicFunction:
 
     def __init__(
         self,
-        a: Sequence[float] | FloatArray,
+        rest: Sequence[float] | FloatArray,
         b1: Sequence[float] | FloatArray,
         b2: Sequence[float] | FloatArray,
         delay1: float,
@@ -81,20 +119,30 @@ class CharacteristicFunction:
         *,
         step: float = 0.0,
         parameters: tuple[str, str] = ("x", "y"),
+        reference: tuple[float, float] = (0.0, 0.0),
     ) -> None:
-        self.a = _polynomial("a", a)
+        self.rest = _polynomial("rest", rest)
         self.b1 = _polynomial("b1", b1)
         self.b2 = _polynomial("b2", b2)
+        self.reference = (
+            real_number("reference[0]", reference[0]),
+            real_number("reference[1]", reference[1]),
+        )
+        at_reference = poly.polyadd(self.reference[0] * self.b1, self.reference[1] * self.b2)
+        self.a = _polynomial("a", np.asarray(poly.polyadd(self.rest, at_reference)))
         self.delay1 = _delay("delay1", delay1)
         self.delay2 = _delay("delay2", delay2)
         self.step = 0.0 if step == 0.0 else positive_number("step", step)
         self.parameters = parameters
         if not self.a.any():
-            raise ValueError("a must not be the zero polynomial")
+            raise ValueError(
+                f"A = rest + {self.reference[0]} B1 + {self.reference[1]} B2 must not vanish, "
+                f"got rest={self.rest.tolist()}"
+            )
         for name, b in (("b1", self.b1), ("b2", self.b2)):
             if b.size > self.a.size:
                 raise ValueError(
-                    f"{name} must not exceed the degree of a ({self.degree}), "
+                    f"{name} must not exceed the degree of A ({self.degree}), "
                     f"got degree {b.size - 1}: the equation would be of advanced type"
                 )
 
@@ -145,8 +193,13 @@ class CharacteristicFunction:
 
     def __call__(self, s: npt.ArrayLike, x: npt.ArrayLike, y: npt.ArrayLike) -> ComplexArray:
         """Evaluate D(s; x, y); the three arguments broadcast."""
-        a, b1, b2 = self.parts(s)
-        result: ComplexArray = a - np.asarray(x) * b1 - np.asarray(y) * b2
+        s = np.asarray(s, dtype=np.complex128)
+        x, y = np.asarray(x), np.asarray(y)
+        z = np.exp(s * self.step) if self.step else s
+        b1, b2 = poly.polyval(z, self.b1), poly.polyval(z, self.b2)
+        arm1 = (self.reference[0] - x) - x * np.expm1(-s * self.delay1)
+        arm2 = (self.reference[1] - y) - y * np.expm1(-s * self.delay2)
+        result: ComplexArray = poly.polyval(z, self.rest) + b1 * arm1 + b2 * arm2
         return result
 
     def derivative(self, s: npt.ArrayLike, x: npt.ArrayLike, y: npt.ArrayLike) -> ComplexArray:
@@ -155,14 +208,19 @@ class CharacteristicFunction:
         z = np.exp(s * self.step) if self.step else s
         dz = self.step * z if self.step else np.ones_like(s)
 
-        def term(p: FloatArray, delay: float) -> ComplexArray:
-            slope = poly.polyval(z, poly.polyder(p)) * dz - delay * poly.polyval(z, p)
-            return np.asarray(slope * np.exp(-s * delay), dtype=np.complex128)
+        def term(
+            p: FloatArray, delay: float, start: float, here: npt.ArrayLike
+        ) -> ComplexArray:
+            here = np.asarray(here)
+            arm = (start - here) - here * np.expm1(-s * delay)
+            change = here * delay * np.exp(-s * delay)
+            slope = poly.polyval(z, poly.polyder(p)) * dz
+            return np.asarray(slope * arm + poly.polyval(z, p) * change)
 
         result: ComplexArray = (
-            term(self.a, 0.0)
-            - np.asarray(x) * term(self.b1, self.delay1)
-            - np.asarray(y) * term(self.b2, self.delay2)
+            poly.polyval(z, poly.polyder(self.rest)) * dz
+            + term(self.b1, self.delay1, self.reference[0], x)
+            + term(self.b2, self.delay2, self.reference[1], y)
         )
         return result
 
@@ -173,52 +231,62 @@ class CharacteristicFunction:
         """
         sigma = real_number("sigma", sigma)
 
-        def move(p: FloatArray, delay: float) -> FloatArray:
+        def move(p: FloatArray) -> FloatArray:
             if self.step:
-                moved = p * np.exp(sigma * self.step * np.arange(p.size))
-            else:
-                moved = _taylor_shift(p, sigma)
-            return np.asarray(moved * np.exp(-sigma * delay))
+                return np.asarray(p * np.exp(sigma * self.step * np.arange(p.size)))
+            return _taylor_shift(p, sigma)
 
+        b1, b2 = move(self.b1), move(self.b2)
+        # What the two delays leave at the reference joins the undelayed rest.
+        left1 = -self.reference[0] * np.expm1(-sigma * self.delay1) * b1
+        left2 = -self.reference[1] * np.expm1(-sigma * self.delay2) * b2
+        rest = poly.polyadd(move(self.rest), poly.polyadd(left1, left2))
         return CharacteristicFunction(
-            move(self.a, 0.0),
-            move(self.b1, self.delay1),
-            move(self.b2, self.delay2),
+            np.asarray(rest),
+            np.exp(-sigma * self.delay1) * b1,
+            np.exp(-sigma * self.delay2) * b2,
             self.delay1,
             self.delay2,
             step=self.step,
             parameters=self.parameters,
+            reference=self.reference,
         )
 
     def exchanged(self) -> CharacteristicFunction:
         """Return the same function with its two free parameters exchanged."""
         return CharacteristicFunction(
-            self.a,
+            self.rest,
             self.b2,
             self.b1,
             self.delay2,
             self.delay1,
             step=self.step,
             parameters=self.parameters[::-1],
+            reference=self.reference[::-1],
         )
 
     def on_boundary(self) -> tuple[ExponentialSum, ExponentialSum, ExponentialSum]:
         """Return A, B1 and B2 (with their delays) at s = j omega as exponential sums."""
-
-        def convert(p: FloatArray, delay: float) -> ExponentialSum:
-            if self.step:
-                rates = np.asarray(self.step * np.arange(p.size) - delay, dtype=np.float64)
-                return ExponentialSum(p[:, None].astype(np.complex128), rates)
-            powers = 1j ** (np.arange(p.size) % 4)
-            # Each coefficient is kept exactly real or exactly imaginary.
-            powers = np.round(powers.real) + 1j * np.round(powers.imag)
-            return ExponentialSum((p * powers)[None, :], np.array([-delay]))
-
         return (
-            convert(self.a, 0.0),
-            convert(self.b1, self.delay1),
-            convert(self.b2, self.delay2),
+            self._sum(self.a, 0.0),
+            self._sum(self.b1, self.delay1),
+            self._sum(self.b2, self.delay2),
         )
+
+    def rest_on_boundary(self) -> ExponentialSum:
+        """Return `rest` at s = j omega as an exponential sum."""
+        return self._sum(self.rest, 0.0)
+
+    def _sum(self, p: FloatArray, delay: float) -> ExponentialSum:
+        """Return p exp(-s delay) at s = j omega as an exponential sum."""
+        if self.step:
+            rates = np.asarray(self.step * np.arange(p.size) - delay, dtype=np.float64)
+            terms = p[:, None].astype(np.complex128)
+            return ExponentialSum(terms, rates, terms.sum(axis=0))
+        powers = 1j ** (np.arange(p.size) % 4)
+        # Each coefficient is kept exactly real or exactly imaginary.
+        powers = np.round(powers.real) + 1j * np.round(powers.imag)
+        return ExponentialSum((p * powers)[None, :], np.array([-delay]), p * powers)
 
 
 def _taylor_shift(p: FloatArray, sigma: float) -> FloatArray:

@@ -11,8 +11,9 @@ Where rounding makes a value indistinguishable from zero, the walks say so.
 
 All functions here work on exponential sums sum_g P_g(omega) exp(j omega phase_g), see
 `armlock.characteristic.ExponentialSum`. They are evaluated as
-sum_g P_g + sum_g P_g (exp(j omega phase_g) - 1), which keeps its relative accuracy where
-the undelayed parts cancel, as they do at (c1, c2) = (1, 1) and low frequency.
+sum_g P_g + sum_g P_g (exp(j omega phase_g) - 1) with the first sum given, which keeps its
+relative accuracy where the undelayed parts cancel, as they do at (c1, c2) = (1, 1) and low
+frequency.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ SAFETY = 0.95
 
 # Status codes of `count_points`, below every count.
 BOUNDARY = -1
-DOUBTFUL = -2
-UNBOUNDED = -3
+UNCONFINED = -2
+DOUBTFUL = -3
 
 
 @njit(cache=True, inline="always")
@@ -71,36 +72,42 @@ def _evaluate(
 
 
 @njit(cache=True)
-def _curvature_bound(coefficients: ComplexArray, phases: FloatArray) -> FloatArray:
-    """Polynomial in omega that bounds the second derivative of an exponential sum."""
+def _curvature_bound(
+    coefficients: ComplexArray, sums: ComplexArray, phases: FloatArray
+) -> FloatArray:
+    """Polynomial in omega that bounds the second derivative of an exponential sum.
+
+    Where the polynomials are differentiated twice, |exp(j omega phase) - 1| is at most
+    omega |phase|, once at most |phase|.
+    """
     groups, size = coefficients.shape
     bound = np.zeros(size)
+    for k in range(2, size):
+        bound[k - 2] += abs(sums[k]) * k * (k - 1.0)
     for g in range(groups):
         phase = abs(phases[g])
         for k in range(size):
             magnitude = abs(coefficients[g, k])
             bound[k] += magnitude * phase * phase
             if k >= 1:
-                bound[k - 1] += magnitude * 2.0 * k * phase
-            if k >= 2:
-                bound[k - 2] += magnitude * k * (k - 1.0)
+                bound[k - 1] += magnitude * phase * (2.0 * k + k * (k - 1.0))
     return bound
 
 
 @njit(cache=True)
 def winding(
-    coefficients: ComplexArray, phases: FloatArray, noise: FloatArray, omega_end: float
+    coefficients: ComplexArray,
+    sums: ComplexArray,
+    phases: FloatArray,
+    noise: FloatArray,
+    omega_end: float,
 ) -> tuple[float, complex, bool]:
     """Argument gathered by an exponential sum as omega goes from 0 to `omega_end`.
 
     Returns the argument, the last value, and whether the sum stays clear of zero.
     `noise` is the polynomial in omega that bounds its rounding error.
     """
-    sums = np.zeros(coefficients.shape[1], dtype=np.complex128)
-    for g in range(coefficients.shape[0]):
-        for k in range(sums.size):
-            sums[k] += coefficients[g, k]
-    bound = _curvature_bound(coefficients, phases)
+    bound = _curvature_bound(coefficients, sums, phases)
     omega = 0.0
     value, slope = _evaluate(coefficients, sums, phases, omega)
     argument = 0.0
@@ -204,6 +211,8 @@ def _remaining_argument(roots: ComplexArray, omega: float) -> float:
 @njit(cache=True)
 def count_point(
     parts: ComplexArray,
+    sums: ComplexArray,
+    reference: FloatArray,
     phases: FloatArray,
     roots: ComplexArray,
     squares: FloatArray,
@@ -219,21 +228,24 @@ def count_point(
     """
     coefficients = parts[0] - x * parts[1] - y * parts[2]
     size = coefficients.shape[1]
+    dx, dy = x - reference[0], y - reference[1]
+    undelayed = sums[0] - dx * sums[1] - dy * sums[2]
     noise = np.zeros(size + 1)
-    for g in range(phases.size):
-        for k in range(size):
-            magnitude = (
-                abs(parts[0, g, k]) + abs(x * parts[1, g, k]) + abs(y * parts[2, g, k])
-            ) * (ROUNDING * EPSILON)
-            noise[k] += magnitude
-            noise[k + 1] += magnitude * abs(phases[g])
+    for k in range(size):
+        b1, b2 = abs(sums[1, k]), abs(sums[2, k])
+        noise[k] += EPSILON * ROUNDING * (abs(sums[0, k]) + abs(dx) * b1 + abs(dy) * b2)
+        # The parameters themselves are rounded numbers.
+        noise[k] += EPSILON * (abs(x) * b1 + abs(y) * b2)
+        for g in range(phases.size):
+            magnitude = abs(coefficients[g, k] * phases[g])
+            noise[k + 1] += EPSILON * ROUNDING * magnitude
     is_map = omega_end > 0.0
     end = omega_end
     if not is_map:
         end = last_crossing_bound(squares[0], squares[1], squares[2], x, y)
         if end == np.inf:
-            return UNBOUNDED
-    argument, value, clear = winding(coefficients, phases, noise, end)
+            return UNCONFINED
+    argument, value, clear = winding(coefficients, undelayed, phases, noise, end)
     if not clear:
         return BOUNDARY
     if is_map:
@@ -255,6 +267,8 @@ def count_point(
 @njit(cache=True, parallel=True)
 def count_points(
     parts: ComplexArray,
+    sums: ComplexArray,
+    reference: FloatArray,
     phases: FloatArray,
     roots: ComplexArray,
     squares: FloatArray,
@@ -265,7 +279,9 @@ def count_points(
     """`count_point` over one-dimensional arrays x and y of the same length."""
     counts = np.empty(x.size, dtype=np.int64)
     for i in prange(x.size):
-        counts[i] = count_point(parts, phases, roots, squares, omega_end, x[i], y[i])
+        counts[i] = count_point(
+            parts, sums, reference, phases, roots, squares, omega_end, x[i], y[i]
+        )
     return counts
 
 
@@ -332,11 +348,16 @@ def _cubic_zero(step: float, h0: float, dh0: float, h1: float, dh1: float) -> fl
 
 @njit(cache=True)
 def sign_changes(
-    coefficients: ComplexArray, phases: FloatArray, omega_end: float, is_map: bool
+    coefficients: ComplexArray,
+    phases: FloatArray,
+    sums: ComplexArray,
+    omega_end: float,
+    is_map: bool,
 ) -> tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray]:
-    """Zeros in [0, omega_end] of the imaginary part of an exponential sum odd in omega.
+    """Zeros in [0, omega_end] of the imaginary part of an exponential sum.
 
-    Returns five arrays, an entry a zero:
+    Where the imaginary part is odd in omega, as it is for a row of a chart, omega = 0 is one
+    of them. Returns five arrays, an entry a zero:
 
     - `omega`, polished;
     - `jump`, twice the direction of the sign change (a conjugate pair crosses); once at
@@ -347,14 +368,12 @@ def sign_changes(
     - `value` and `slope`, the real part there and the magnitude of its slope.
     """
     groups, size = coefficients.shape
-    sums = np.zeros(size, dtype=np.complex128)
     noise = np.zeros(size + 1)
-    for g in range(groups):
-        for k in range(size):
-            sums[k] += coefficients[g, k]
-            noise[k] += abs(coefficients[g, k].imag) * (ROUNDING * EPSILON)
+    for k in range(size):
+        noise[k] += abs(sums[k].imag) * (ROUNDING * EPSILON)
+        for g in range(groups):
             noise[k + 1] += abs(coefficients[g, k] * phases[g]) * (ROUNDING * EPSILON)
-    bound = _curvature_bound(coefficients, phases)
+    bound = _curvature_bound(coefficients, sums, phases)
 
     zeros = np.empty((64, 4))
     jumps = np.empty(64, dtype=np.int64)
@@ -365,7 +384,9 @@ def sign_changes(
     at_zero = value.real
     h, dh = value.imag, slope.imag
     sign = 0
-    if abs(dh) > noise[1]:
+    if abs(h) > noise[0]:
+        sign = 1 if h > 0.0 else -1
+    elif abs(dh) > noise[1]:
         sign = 1 if dh > 0.0 else -1
         zeros[0, 0], zeros[0, 1], zeros[0, 2], zeros[0, 3] = 0.0, 0.0, at_zero, abs(slope)
         jumps[0] = sign
@@ -441,34 +462,53 @@ def sign_changes(
     return zeros[:, 0], jumps[:found], zeros[:, 1], zeros[:, 2], zeros[:, 3]
 
 
+@njit(cache=True)
+def _squared(
+    norm: FloatArray, omega: float, omega_end: float, is_map: bool
+) -> tuple[float, float]:
+    """Value and slope of |M|^2, given as a polynomial or, for a map, a cosine series."""
+    value, slope = 0.0, 0.0
+    if is_map:
+        for k in range(norm.size):
+            rate = k * np.pi / omega_end
+            value += norm[k] * np.cos(rate * omega)
+            slope -= norm[k] * rate * np.sin(rate * omega)
+    else:
+        for k in range(norm.size - 1, -1, -1):
+            slope = slope * omega + value
+            value = value * omega + norm[k]
+    return value, slope
+
+
 @njit(cache=True, parallel=True)
 def fill_rows(
     fixed: ComplexArray,
     varying: ComplexArray,
+    fixed_sums: ComplexArray,
+    varying_sums: ComplexArray,
     phases: FloatArray,
-    norm: ComplexArray,
-    norm_phases: FloatArray,
+    norm: FloatArray,
     ends: FloatArray,
     is_map: bool,
     y: FloatArray,
+    deviation: FloatArray,
     base: IntArray,
     x: FloatArray,
-    lower: float,
-    upper: float,
+    lower: FloatArray,
+    upper: FloatArray,
 ) -> tuple[IntArray, BoolArray, IntArray]:
     """Fill rows of a chart with counts, from the crossings of each row.
 
-    A row is x = N / M; `fixed` - y `varying` holds N conj(M), `norm` holds M. Each row y[i]
-    starts with the count base[i] at x = lower, left of all `x` (ascending). Returns the
-    counts, which of them lie too near a crossing to be trusted, and the count at x = upper
-    (-1 where a crossing lies too near one of the two ends).
+    A row is x = N / M. `fixed` - y `varying` holds N conj(M); its sum over the groups is
+    `fixed_sums` - deviation `varying_sums`, where the deviation is that of y from the
+    reference. `norm` holds |M|^2 as real coefficients: of powers of omega, or, for a map, of
+    cosines of multiples of pi omega / omega_end. Row i starts with the count base[i] at
+    x = lower[i]. Returns the counts, which of them lie too near a crossing to be trusted, and
+    the count at x = upper[i] (-1 where a crossing lies too near one of the two ends).
     """
     counts = np.empty((y.size, x.size), dtype=np.int64)
     doubtful = np.zeros((y.size, x.size), dtype=np.bool_)
     last = np.empty(y.size, dtype=np.int64)
-    norm_sums = np.zeros(norm.shape[1], dtype=np.complex128)
-    for g in range(norm_phases.size):
-        norm_sums += norm[g]
     fastest = np.abs(phases).max()
     for i in prange(y.size):
         coefficients = fixed - y[i] * varying
@@ -476,24 +516,23 @@ def fill_rows(
         for g in range(phases.size):
             magnitude += np.abs(coefficients[g])
         omegas, jumps, widths, values, slopes = sign_changes(
-            coefficients, phases, ends[i], is_map
+            coefficients, phases, fixed_sums - deviation[i] * varying_sums, ends[i], is_map
         )
         change = np.zeros(x.size + 1, dtype=np.int64)
         total = base[i]
         trusted = base[i] >= 0
         for k in range(omegas.size):
             omega = omegas[k]
-            m, dm = _evaluate(norm, norm_sums, norm_phases, omega)
-            square = m.real * m.real + m.imag * m.imag
-            if square == 0.0:
+            square, change_of_square = _squared(norm, omega, ends[i], is_map)
+            if square <= 0.0:
                 continue
             position = values[k] / square
-            steepness = (slopes[k] + 2.0 * abs(position) * abs(m) * abs(dm)) / square
+            steepness = (slopes[k] + abs(position) * abs(change_of_square)) / square
             rounding = ROUNDING * EPSILON * (1.0 + fastest * omega) / square
             spread = 4.0 * steepness * widths[k] + rounding * _real_horner(magnitude, omega)
-            if abs(position - lower) <= spread or abs(position - upper) <= spread:
+            if abs(position - lower[i]) <= spread or abs(position - upper[i]) <= spread:
                 trusted = False
-            if lower < position < upper:
+            if lower[i] < position < upper[i]:
                 total += jumps[k]
                 change[np.searchsorted(x, position)] += jumps[k]
             if position + spread >= x[0] and position - spread <= x[-1]:

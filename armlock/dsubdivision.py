@@ -193,9 +193,7 @@ def d_curve_branches(
     _require_two_parameters(system)
     _, b1, b2 = system.on_boundary()
     determinant = b1.times_conjugate(b2)
-    poles = contour.sign_changes(
-        determinant.coefficients, determinant.phases, omega_max, bool(system.step)
-    )[0]
+    poles = contour.sign_changes(*determinant, omega_max, bool(system.step))[0]
     edges = np.unique(np.concatenate(([0.0], poles, [omega_max])))
     branches = []
     for start, stop in pairwise(edges):

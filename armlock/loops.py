@@ -11,16 +11,15 @@ which has no sensor, is one more characteristic function.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
-from armlock import sensors
+from armlock import paper, sensors
 from armlock.characteristic import CharacteristicFunction
-from armlock.paper import COMMON_ARM_GAIN, TAU1, TAU2
+from armlock.controllers import Controller, integrating_actuator, table_two
 from armlock.sensors import SignalMapping
 from armlock.validation import ComplexArray, axis, positive_number
 
@@ -56,30 +55,12 @@ class HayesEquation(CharacteristicFunction):
         return f"HayesEquation(tau={self.tau})"
 
 
-class Controller(NamedTuple):
-    """A rational function K(s), controller times actuator.
-
-    Attributes
-    ----------
-    numerator, denominator : sequence of float
-        Polynomial coefficients in ascending powers of s.
-    """
-
-    numerator: Sequence[float]
-    denominator: Sequence[float]
-
-
-def integrating_actuator(gain: float) -> Controller:
-    """Return K(s) = gain / s, the controller and actuator of Secs. II and III."""
-    return Controller((positive_number("gain", gain),), (0.0, 1.0))
-
-
 class Loop(CharacteristicFunction):
     """An arm-locking loop, with free parameters (c1, c2).
 
     Parameters
     ----------
-    controller : Controller
+    controller : Controller, control.TransferFunction, or (zeros, poles, gain)
         Controller times actuator, K(s).
     mapping : SignalMapping
         The sensor, for instance `armlock.sensors.COMMON`.
@@ -89,33 +70,68 @@ class Loop(CharacteristicFunction):
     Raises
     ------
     TypeError, ValueError
-        If a delay is not a positive finite number, or a polynomial is not finite and real.
+        If a delay is not a positive finite number, a polynomial is not finite and real, the
+        open loop has more zeros than poles, or 1 + L vanishes at high frequency.
 
     Notes
     -----
-    Poles of the sensor at s = 0 cancel against zeros of the controller there, by
-    construction.
+    Poles at s = 0 that controller, sensor or actuator cancel against zeros there drop out
+    here, by construction, so that they leave no root at s = 0 in D.
+
+    Examples
+    --------
+    A loop of one's own: a common-arm sensor, an integrator and a lead filter.
+
+    >>> from armlock import Controller, Loop, unstable_roots
+    >>> from armlock.sensors import COMMON
+    >>> loop = Loop(Controller([-0.02], [0.0, -0.1], 1.0), COMMON, tau1=20.1, tau2=19.9)
+    >>> unstable_roots(loop, [0.999, 1.001], 1.0)
+    array([0, 1])
     """
 
     def __init__(
-        self, controller: Controller, mapping: SignalMapping, tau1: float, tau2: float
+        self, controller: Any, mapping: SignalMapping, tau1: float, tau2: float
     ) -> None:
         self.tau1 = positive_number("tau1", tau1)
         self.tau2 = positive_number("tau2", tau2)
-        self.controller = controller
+        self.controller = Controller.of(controller)
         self.mapping = mapping
-        above = axis("controller.numerator", controller.numerator)
-        below = axis("controller.denominator", controller.denominator)
-        m1 = axis("mapping.numerator1", mapping.numerator1)
-        m2 = axis("mapping.numerator2", mapping.numerator2)
-        sensor_below = axis("mapping.denominator", mapping.denominator)
-        while above.size > 1 and above[0] == 0.0 == sensor_below[0]:
-            above, sensor_below = above[1:], sensor_below[1:]
-        b1, b2 = np.convolve(above, m1), np.convolve(above, m2)
-        self._open_denominator = np.convolve(below, sensor_below)
-        both = poly.polyadd(b1, b2)
-        a = np.asarray(poly.polyadd(self._open_denominator, both), dtype=np.float64)
-        super().__init__(a, b1, b2, self.tau1, self.tau2, parameters=("c1", "c2"))
+        above = self.controller.numerator
+        b1 = np.convolve(above, axis("mapping.numerator1", mapping.numerator1))
+        b2 = np.convolve(above, axis("mapping.numerator2", mapping.numerator2))
+        below = np.convolve(
+            self.controller.denominator, axis("mapping.denominator", mapping.denominator)
+        )
+        while below.size > 1 and below[0] == b1[0] == b2[0] == 0.0:
+            below, b1, b2 = below[1:], b1[1:], b2[1:]
+        order = below.size - 1
+        for name, b in (("1", b1), ("2", b2)):
+            if np.trim_zeros(b, "b").size - 1 > order:
+                raise ValueError(
+                    f"controller times signal mapping m{name} must be proper, got "
+                    f"{b.size - 1} zeros and {order} poles"
+                )
+        highest = sum(b[order] if b.size > order else 0.0 for b in (b1, b2)) + below[order]
+        if abs(highest) <= 1e-12 * abs(below[order]):
+            raise ValueError(
+                "the loop is not well posed: 1 + K (m1 + m2) vanishes at high frequency"
+            )
+        super().__init__(
+            below,
+            b1,
+            b2,
+            self.tau1,
+            self.tau2,
+            parameters=("c1", "c2"),
+            reference=(1.0, 1.0),
+        )
+
+    def __repr__(self) -> str:
+        """Name the sensor, the controller and the delays."""
+        return (
+            f"{type(self).__name__}({self.controller!r}, mapping={self.mapping.name!r}, "
+            f"tau1={self.tau1}, tau2={self.tau2})"
+        )
 
     def open_loop(
         self, s: npt.ArrayLike, c1: npt.ArrayLike = 1.0, c2: npt.ArrayLike = 1.0
@@ -134,12 +150,7 @@ class Loop(CharacteristicFunction):
         complex array, of the broadcast shape
         """
         s = np.asarray(s, dtype=np.complex128)
-        c1, c2 = np.asarray(c1, dtype=float), np.asarray(c2, dtype=float)
-        # 1 - c exp(-s tau) without cancellation at low frequency.
-        arm1 = (1.0 - c1) - c1 * np.expm1(-s * self.tau1)
-        arm2 = (1.0 - c2) - c2 * np.expm1(-s * self.tau2)
-        above = poly.polyval(s, self.b1) * arm1 + poly.polyval(s, self.b2) * arm2
-        result: ComplexArray = above / poly.polyval(s, self._open_denominator)
+        result: ComplexArray = self(s, c1, c2) / poly.polyval(s, self.rest) - 1.0
         return result
 
 
@@ -161,7 +172,7 @@ class SingleArm(Loop):
         If one of the two is not a positive finite number.
     """
 
-    def __init__(self, gain: float = COMMON_ARM_GAIN, tau: float = TAU1) -> None:
+    def __init__(self, gain: float = paper.COMMON_ARM_GAIN, tau: float = paper.TAU1) -> None:
         self.gain = positive_number("gain", gain)
         self.tau = positive_number("tau", tau)
         super().__init__(integrating_actuator(self.gain), sensors.SINGLE, tau, tau)
@@ -196,7 +207,10 @@ class CommonArm(Loop):
     """
 
     def __init__(
-        self, gain: float = COMMON_ARM_GAIN, tau1: float = TAU1, tau2: float = TAU2
+        self,
+        gain: float = paper.COMMON_ARM_GAIN,
+        tau1: float = paper.TAU1,
+        tau2: float = paper.TAU2,
     ) -> None:
         self.gain = positive_number("gain", gain)
         super().__init__(integrating_actuator(self.gain), sensors.COMMON, tau1, tau2)
@@ -204,3 +218,112 @@ class CommonArm(Loop):
     def __repr__(self) -> str:
         """Name the class and its arguments."""
         return f"CommonArm(gain={self.gain}, tau1={self.tau1}, tau2={self.tau2})"
+
+
+class DualArm(Loop):
+    """Dual-arm locking with an integrating actuator (paper, Sec. III.B).
+
+    Parameters
+    ----------
+    gain : float, optional
+        Loop gain g in rad/s.
+    tau1, tau2 : float, optional
+        Round-trip delays in s; they must differ.
+    corner : float, optional
+        Corner frequency p of the sensor in rad/s. The paper gives none.
+    difference : float, optional
+        The dtau that scales the sensor's integral, in s: tau1 - tau2 by default, as in
+        Sec. III.B. The source of Table I takes half of it.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If gain, corner or a delay is not a positive finite number, or the delays are equal.
+
+    Notes
+    -----
+    With the actuator's pole at s = 0 the sensor's integral makes L of order 1/s^2 there, and
+    D(0) = g p (c2 - c1). On the line c1 = c2 one of the two poles of L at s = 0 cancels:
+    the root s = 0 that D has there is a hidden mode, not a zero of 1 + L. A count is
+    reported as a boundary point all the same, for the mode does not decay.
+
+    Examples
+    --------
+    >>> from armlock import DualArm, unstable_roots
+    >>> unstable_roots(DualArm(gain=10.0), [1.0, 1.0, 1.0], [0.995, 1.0, 1.001])
+    array([1, -1, 0])
+    """
+
+    def __init__(
+        self,
+        gain: float = paper.DUAL_ARM_GAIN,
+        tau1: float = paper.TAU1,
+        tau2: float = paper.TAU2,
+        corner: float = paper.DUAL_SENSOR_CORNER,
+        *,
+        difference: float | None = None,
+    ) -> None:
+        self.gain = positive_number("gain", gain)
+        mapping = _dual_mapping(tau1, tau2, corner, difference)
+        super().__init__(integrating_actuator(self.gain), mapping, tau1, tau2)
+
+
+def paper_loop(
+    corner: float = paper.DUAL_SENSOR_CORNER,
+    tau1: float = paper.TAU1,
+    tau2: float = paper.TAU2,
+    *,
+    controller: Controller | None = None,
+    actuator: bool = False,
+    difference: float | None = None,
+) -> Loop:
+    """Return the loop of the paper's Sec. IV: the controller of Table II on the dual sensor.
+
+    Parameters
+    ----------
+    corner : float, optional
+        Corner frequency p of the sensor in rad/s. The paper gives none.
+    tau1, tau2 : float, optional
+        Round-trip delays in s; they must differ.
+    controller : Controller, optional
+        Table II by default; `armlock.controllers` has its stages and the printed variant.
+    actuator : bool, optional
+        Whether the integrating actuator 1/s of Secs. II and III is in the loop. Without it,
+        the default, the paper's claims on the controller come true.
+    difference : float, optional
+        The dtau of the sensor in s, tau1 - tau2 by default.
+
+    Returns
+    -------
+    Loop
+        Of neutral type without the actuator, of retarded type with it.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If corner or a delay is not a positive finite number, or the delays are equal.
+
+    Examples
+    --------
+    >>> from armlock import paper_loop, unstable_roots
+    >>> unstable_roots(paper_loop(), 1.0, [1.0, 1.0 - 1e-6])
+    array([0, 0])
+    """
+    chosen = table_two() if controller is None else controller
+    if actuator:
+        chosen = chosen * integrating_actuator()
+    return Loop(chosen, _dual_mapping(tau1, tau2, corner, difference), tau1, tau2)
+
+
+def _dual_mapping(
+    tau1: float, tau2: float, corner: float, difference: float | None
+) -> SignalMapping:
+    """Return the dual sensor, with dtau = tau1 - tau2 unless it is given."""
+    if difference is None:
+        difference = positive_number("tau1", tau1) - positive_number("tau2", tau2)
+        if difference == 0.0:
+            raise ValueError(
+                f"tau1 and tau2 must differ, got {tau1} for both: the dual sensor divides by "
+                f"their difference"
+            )
+    return sensors.dual(corner, difference)

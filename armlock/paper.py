@@ -29,3 +29,9 @@ DUAL_SENSOR_CORNER: Final = 2.0 * math.pi * 0.4
 
 #: Arm length of Taiji in m (mission design: three million kilometres).
 TAIJI_ARM_LENGTH: Final = 3.0e9
+
+#: Gain, zeros and poles of the controller in rad/s (Table II; Eq. 11 for their roles).
+CONTROLLER_GAIN: Final = 5000.0
+TABLE_2_STAGE_1_POLE: Final = 2.0 * math.pi * 1e-6
+TABLE_2_ZEROS: Final = tuple(2.0 * math.pi * f for f in (1e-8, 5e-6, 5e-6, 5e-6))
+TABLE_2_POLES: Final = tuple(2.0 * math.pi * f for f in (1e-6, 5e-5, 4e-4, 5e-5))

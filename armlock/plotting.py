@@ -184,6 +184,31 @@ def plot_line(
     )
 
 
+def chart_columns(
+    chart: StabilityChart, *, every: int = 1, units: tuple[str, str] = ("1", "1")
+) -> dict[str, npt.NDArray]:
+    """Return a chart as columns for `publish`, a row a point.
+
+    Parameters
+    ----------
+    chart : StabilityChart
+        Any chart.
+    every : int, optional
+        Take every so many points along each axis.
+    units : pair of str, optional
+        Units of the two free parameters.
+
+    Returns
+    -------
+    dict of str to array
+        The two free parameters and the number of unstable roots.
+    """
+    x, y = np.meshgrid(chart.x[::every], chart.y[::every])
+    names = [f"{p} [{u}]" for p, u in zip(chart.system.parameters, units, strict=True)]
+    counts = chart.counts[::every, ::every]
+    return {names[0]: x.ravel(), names[1]: y.ravel(), "unstable roots": counts.ravel()}
+
+
 class Downloads:
     """Links to a figure's files, shown below it in the book."""
 

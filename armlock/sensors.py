@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
-from armlock.validation import ComplexArray, positive_number
+from armlock.validation import ComplexArray, positive_number, real_number
 
 
 class SignalMapping(NamedTuple):
@@ -101,9 +101,11 @@ def dual(corner: float, difference: float) -> SignalMapping:
     Raises
     ------
     ValueError
-        If one of the two is not positive and finite.
+        If the corner is not positive and finite, or the difference is zero.
     """
     p = positive_number("corner", corner)
-    dtau = positive_number("difference", difference)
+    dtau = real_number("difference", difference)
+    if dtau == 0.0:
+        raise ValueError("difference must not be zero: the dual sensor divides by it")
     below = (0.0, p * dtau, dtau)
     return SignalMapping((p, p * dtau, dtau), (-p, p * dtau, dtau), below, "dual")

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
 from armlock import contour
-from armlock.characteristic import CharacteristicFunction, ExponentialSum
+from armlock.characteristic import CharacteristicFunction
 from armlock.validation import (
     BoolArray,
     ComplexArray,
@@ -27,13 +27,22 @@ from armlock.validation import (
     broadcast_pair,
 )
 
+BOUNDARY = contour.BOUNDARY
+UNCONFINED = contour.UNCONFINED
+
 # How far outside a chart's axes its reference counts lie, in steps of the axis: no round
 # number, so that no reference point falls on a line a user would choose.
 _OUTSIDE = 0.38196601125
 
 
 class CountError(RuntimeError):
-    """The number of unstable roots could not be decided; `points` says where."""
+    """The number of unstable roots could not be decided.
+
+    Attributes
+    ----------
+    points : float array, shape (n, 2)
+        Where.
+    """
 
     def __init__(self, message: str, points: FloatArray) -> None:
         super().__init__(message)
@@ -44,6 +53,8 @@ class _Compiled(NamedTuple):
     """A characteristic function in the form the compiled walks take."""
 
     parts: ComplexArray
+    sums: ComplexArray
+    reference: FloatArray
     phases: FloatArray
     roots: ComplexArray
     squares: FloatArray
@@ -52,21 +63,28 @@ class _Compiled(NamedTuple):
 
 @lru_cache(maxsize=64)
 def _compiled(system: CharacteristicFunction) -> _Compiled:
-    sums = system.on_boundary()
-    size = max(part.coefficients.shape[1] for part in sums)
-    phases = np.concatenate([part.phases for part in sums])
+    pieces = system.on_boundary()
+    size = max(piece.sums.size for piece in pieces)
+    phases = np.concatenate([piece.phases for piece in pieces])
     parts = np.zeros((3, phases.size, size), dtype=np.complex128)
+    sums = np.zeros((3, size), dtype=np.complex128)
     first = 0
-    for k, part in enumerate(sums):
-        groups, width = part.coefficients.shape
-        parts[k, first : first + groups, :width] = part.coefficients
+    for k, piece in enumerate(pieces):
+        groups, width = piece.coefficients.shape
+        parts[k, first : first + groups, :width] = piece.coefficients
+        sums[k, :width] = piece.sums
         first += groups
+    rest = system.rest_on_boundary().sums
+    sums[0] = 0.0
+    sums[0, : rest.size] = rest
     squares = np.zeros((3, system.degree + 1))
     for k, polynomial in enumerate((system.a, system.b1, system.b2)):
-        square = _squared_magnitude(polynomial)
+        square = squared_magnitude(polynomial)
         squares[k, : square.size] = square
     return _Compiled(
         parts,
+        sums,
+        np.array(system.reference),
         phases,
         poly.polyroots(system.a).astype(np.complex128),
         squares,
@@ -74,7 +92,7 @@ def _compiled(system: CharacteristicFunction) -> _Compiled:
     )
 
 
-def _squared_magnitude(p: FloatArray) -> FloatArray:
+def squared_magnitude(p: FloatArray) -> FloatArray:
     """Return |p(j omega)|^2 as a polynomial in omega^2, ascending."""
     even, odd = p[0::2].copy(), p[1::2].copy()
     even[1::2] *= -1.0
@@ -88,28 +106,51 @@ def _squared_magnitude(p: FloatArray) -> FloatArray:
     return square
 
 
+def last_crossing(
+    system: CharacteristicFunction, x: npt.ArrayLike, y: npt.ArrayLike
+) -> FloatArray:
+    """Frequency past which no root can cross the imaginary axis.
+
+    Parameters
+    ----------
+    system : CharacteristicFunction
+        The loop.
+    x, y : array_like of float
+        The free parameters; they broadcast.
+
+    Returns
+    -------
+    float array, of the broadcast shape
+        In rad/s: past it |A| > |x B1| + |y B2|, also for all smaller |x| and |y|. inf where a
+        neutral loop's high-frequency chain of roots is not confined to the left half-plane.
+    """
+    name1, name2 = system.parameters
+    xs, ys = broadcast_pair(name1, x, name2, y)
+    compiled = _compiled(system)
+    if system.step:
+        return np.full(xs.shape, compiled.omega_end)
+    ends = [
+        contour.last_crossing_bound(*compiled.squares, p, q)
+        for p, q in zip(xs.flat, ys.flat, strict=True)
+    ]
+    return np.array(ends, dtype=np.float64).reshape(xs.shape)
+
+
 def _count(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -> IntArray:
-    """Count at flat arrays of points; raise where no count can be given."""
+    """Count at flat arrays of points; raise where rounding spoils it."""
     counts: IntArray = contour.count_points(
         *_compiled(system), np.ascontiguousarray(x), np.ascontiguousarray(y)
     )
-    for status, reason in (
-        (
-            contour.UNBOUNDED,
-            "the delayed terms are as large as the undelayed one at high frequency, so that "
-            "infinitely many roots may be unstable",
-        ),
-        (contour.DOUBTFUL, "the argument of D does not add up to a whole number of turns"),
-    ):
-        bad = counts == status
-        if bad.any():
-            points = np.column_stack((x[bad], y[bad]))
-            name1, name2 = system.parameters
-            raise CountError(
-                f"no count at ({name1}, {name2}) = ({points[0, 0]}, {points[0, 1]}) and "
-                f"{len(points) - 1} further points: {reason}",
-                points,
-            )
+    bad = counts == contour.DOUBTFUL
+    if bad.any():
+        points = np.column_stack((x[bad], y[bad]))
+        name1, name2 = system.parameters
+        raise CountError(
+            f"no count at ({name1}, {name2}) = ({points[0, 0]}, {points[0, 1]}) and "
+            f"{len(points) - 1} further points: the argument of D does not add up to a whole "
+            f"number of turns",
+            points,
+        )
     return counts
 
 
@@ -128,17 +169,19 @@ def unstable_roots(
     Returns
     -------
     int array, of the broadcast shape
-        Number of unstable roots, multiplicity included. -1 where a root lies on the
-        imaginary axis, or nearer to it than rounding can tell. The point is stable, with
-        all roots in the open left half-plane, where the count is 0.
+        Number of unstable roots, multiplicity included. The point is stable, with all roots
+        in the open left half-plane, where it is 0. `BOUNDARY` (-1) where a root lies on the
+        imaginary axis, or nearer to it than rounding can tell. `UNCONFINED` (-2) where a
+        neutral loop has |x b1| + |y b2| >= |a| in its highest powers: there the chain of
+        roots at high frequency reaches the right half-plane, at the latest after an
+        arbitrarily small change of the delays, and no finite count would tell.
 
     Raises
     ------
     TypeError, ValueError
         If x or y is not finite and real, or the two do not broadcast.
     CountError
-        If the loop is neutral and its high-frequency chain of roots is not confined, or if
-        rounding spoils the count. Nothing is guessed.
+        If rounding spoils the count. Nothing is guessed.
 
     Notes
     -----
@@ -167,7 +210,7 @@ class StabilityChart:
     x, y : float arrays, shapes (n,) and (m,)
         The axes, as given.
     counts : int array, shape (m, n)
-        Number of unstable roots, -1 on the boundary.
+        As `unstable_roots`: number of unstable roots, or -1 or -2.
     counted_singly : bool array, shape (m, n)
         Points so near a crossing that they were counted on their own.
     recounted_rows : int array
@@ -243,33 +286,56 @@ def _chart_rows(
     """Chart ascending axes; return counts, points counted singly, rows counted singly."""
     left, right = _ends(x)
     low, high = _ends(y)
-    sides = np.array([left, right])
-    if system.b2.any():
-        base, at_low = np.array([left, right]), np.array([low, low])
-        columns, unsure, tops = _walk(
-            system.exchanged(), y, sides, _count(system, base, at_low), low, high
+    lower, upper = np.full(y.size, left), np.full(y.size, right)
+    confined = np.ones((y.size, x.size), dtype=np.bool_)
+    if system.neutral:
+        limit = _confined_up_to(system, y)
+        confined = np.abs(x) < limit[:, None]
+        # Rows end half-way between their last confined point and the limit.
+        inside = np.where(confined, np.abs(x), 0.0).max(axis=1)
+        ends_at = np.where(np.isfinite(limit), 0.5 * (inside + limit), np.inf)
+        lower, upper = np.maximum(lower, -ends_at), np.minimum(upper, ends_at)
+        base, top = _count(system, lower, y), _count(system, upper, y)
+    elif system.b2.any():
+        sides = np.array([left, right])
+        at_low, at_high = (_count(system, sides, np.full(2, level)) for level in (low, high))
+        columns, unsure, reached = _walk(
+            system.exchanged(), y, sides, at_low, np.full(2, low), np.full(2, high)
         )
-        wrong = (tops != _count(system, sides, np.array([high, high]))) | (tops < 0)
-        unsure[wrong] = True
+        unsure[(reached != at_high) | (reached < 0)] = True
         for k in range(2):
             here = unsure[k]
             columns[k, here] = _count(system, np.full(here.sum(), sides[k]), y[here])
+        base, top = columns
     else:
-        columns = np.repeat(_count(system, sides, np.array([low, low]))[:, None], y.size, 1)
-    counts, singly, last = _walk(system, x, y, columns[0], left, right)
-    failed = (last < 0) | (last != columns[1])
+        corners = _count(system, np.array([left, right]), np.full(2, low))
+        base, top = np.repeat(corners[:, None], y.size, axis=1)
+    counts, singly, reached = _walk(system, x, y, base, lower, upper)
+    failed = ((reached < 0) | (reached != top)) & confined.any(axis=1)
     singly[failed] = True
+    singly &= confined
     rows, across = np.nonzero(singly)
     counts[singly] = _count(system, x[across], y[rows])
+    counts[~confined] = UNCONFINED
     return counts, singly, np.flatnonzero(failed)
+
+
+def _confined_up_to(system: CharacteristicFunction, y: FloatArray) -> FloatArray:
+    """Return the |x| from which on the chain of a neutral loop is not confined."""
+
+    def lead(p: FloatArray) -> float:
+        return abs(float(p[-1])) if p.size == system.a.size else 0.0
+
+    left = np.maximum(lead(system.a) - np.abs(y) * lead(system.b2), 0.0)
+    if lead(system.b1) == 0.0:
+        return np.where(left > 0.0, np.inf, 0.0)
+    return np.asarray(left / lead(system.b1))
 
 
 def _ends(values: FloatArray) -> tuple[float, float]:
     """Return points just outside an ascending axis."""
-    if values.size == 1 or values[0] == values[-1]:
-        margin = _OUTSIDE * max(abs(float(values[0])), 1e-3)
-        return float(values[0]) - margin, float(values[-1]) + margin
-    margin = _OUTSIDE * float(values[-1] - values[0]) / (values.size - 1)
+    span = float(values[-1] - values[0])
+    margin = _OUTSIDE * (span / (values.size - 1) if span else max(abs(float(values[0])), 1e-3))
     return float(values[0]) - margin, float(values[-1]) + margin
 
 
@@ -278,48 +344,43 @@ def _walk(
     x: FloatArray,
     y: FloatArray,
     base: IntArray,
-    lower: float,
-    upper: float,
+    lower: FloatArray,
+    upper: FloatArray,
 ) -> tuple[IntArray, BoolArray, IntArray]:
     """Fill rows from their crossings, starting with the counts `base` at x = lower."""
     a, b1, b2 = system.on_boundary()
-    fixed, varying = a.times_conjugate(b1), b2.times_conjugate(b1)
-    joined = _joined(fixed, varying)
-    end = np.full(y.size, _compiled(system).omega_end)
-    if not system.step:
-        squares = _compiled(system).squares
-        reach = max(abs(lower), abs(upper))
-        for i, value in enumerate(y):
-            end[i] = contour.last_crossing_bound(*squares, reach, value)
-        if not np.isfinite(end).all():
-            # The corners decide which message applies.
-            worst = y[~np.isfinite(end)]
-            _count(system, np.full(worst.size, reach), worst)
-    counts, doubtful, last = contour.fill_rows(
-        *joined,
-        b1.coefficients,
-        # One delay alone does not change the magnitude of B1.
-        b1.phases if system.step else np.zeros(1),
-        end,
+    rest = system.rest_on_boundary()
+    # Delays left out, N = A - y B2 is rest + x0 B1 at the reference, exactly.
+    at_reference = rest.plus(b1.scaled(system.reference[0])).sums
+    fixed = a._replace(sums=at_reference).times_conjugate(b1)
+    varying = b2.times_conjugate(b1)
+    # Both over the groups of both, so that they add with a weight.
+    varying_only = fixed.scaled(0.0).plus(varying)
+    fixed = fixed.plus(varying.scaled(0.0))
+    if system.step:
+        norm = np.correlate(system.b1, system.b1, "full")[system.b1.size - 1 :]
+        norm[1:] *= 2.0
+    else:
+        square = squared_magnitude(system.b1)
+        norm = np.zeros(2 * square.size - 1)
+        norm[0::2] = square
+    ends = last_crossing(system, np.maximum(np.abs(lower), np.abs(upper)), y)
+    # A row that is nowhere confined has nothing to count.
+    ends = np.where(np.isfinite(ends), ends, 0.0)
+    filled: tuple[IntArray, BoolArray, IntArray] = contour.fill_rows(
+        fixed.coefficients,
+        varying_only.coefficients,
+        fixed.sums,
+        varying_only.sums,
+        fixed.phases,
+        norm,
+        ends,
         system.step > 0.0,
         np.ascontiguousarray(y),
+        y - system.reference[1],
         np.ascontiguousarray(base),
         np.ascontiguousarray(x),
         lower,
         upper,
     )
-    return counts, doubtful, last
-
-
-def _joined(
-    fixed: ExponentialSum, varying: ExponentialSum
-) -> tuple[ComplexArray, ComplexArray, FloatArray]:
-    """Return two sums over the groups of both, so that they add with a weight."""
-    phases = np.concatenate((fixed.phases, varying.phases))
-    size = max(fixed.coefficients.shape[1], varying.coefficients.shape[1])
-    first = np.zeros((phases.size, size), dtype=np.complex128)
-    second = np.zeros_like(first)
-    split = fixed.phases.size
-    first[:split, : fixed.coefficients.shape[1]] = fixed.coefficients
-    second[split:, : varying.coefficients.shape[1]] = varying.coefficients
-    return first, second, phases
+    return filled

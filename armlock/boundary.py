@@ -1,0 +1,90 @@
+"""The outline of a stable region that surrounds the origin, and its size."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from armlock.characteristic import CharacteristicFunction
+from armlock.stability import unstable_roots
+from armlock.validation import FloatArray, positive_number
+
+# Halvings of the bracket: from a reach of some units to about 1e-10.
+_HALVINGS = 36
+
+
+def rays(number: int = 180, elongation: float = 5.0) -> FloatArray:
+    """Directions from the origin, denser along x = -y.
+
+    Parameters
+    ----------
+    number : int, optional
+        How many, all the way around.
+    elongation : float, optional
+        Length over width of an ellipse along x = -y on which they are evenly spread.
+
+    Returns
+    -------
+    float array, shape (2, number)
+        Unit vectors.
+    """
+    angle = 2.0 * np.pi * np.arange(number) / number
+    along, across = elongation * np.cos(angle), np.sin(angle)
+    vectors = np.stack((across + along, across - along))
+    return np.asarray(vectors / np.hypot(*vectors))
+
+
+def boundary_radius(
+    system: CharacteristicFunction, directions: FloatArray, reach: float = 11.0
+) -> FloatArray:
+    """Distance from the origin to the boundary of the stable region.
+
+    Parameters
+    ----------
+    system : CharacteristicFunction
+        A loop or a map, stable at the origin and unstable at distance `reach`.
+    directions : float array, shape (2, n)
+        Unit vectors in the plane of the free parameters.
+    reach : float, optional
+        Where the bisection starts from outside.
+
+    Returns
+    -------
+    float array, shape (n,)
+        By bisection on the number of unstable roots. Where a ray meets the boundary more
+        than once, one of the crossings.
+
+    Raises
+    ------
+    ValueError
+        If the origin is not stable, or a point at distance `reach` is.
+    """
+    reach = positive_number("reach", reach)
+    inside = np.zeros(directions.shape[1])
+    outside = np.full(directions.shape[1], reach)
+    if unstable_roots(system, 0.0, 0.0) != 0:
+        raise ValueError(f"system must be stable at the origin, and {system!r} is not")
+    if (unstable_roots(system, *(outside * directions)) == 0).any():
+        raise ValueError(f"reach must lie outside the stable region, got {reach}")
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (inside + outside)
+        stable = unstable_roots(system, *(middle * directions)) == 0
+        inside = np.where(stable, middle, inside)
+        outside = np.where(stable, outside, middle)
+    return np.asarray(0.5 * (inside + outside))
+
+
+def outline(radius: FloatArray, directions: FloatArray) -> FloatArray:
+    """Return the corners radius * directions as a closed polygon, shape (2, n + 1)."""
+    corners = radius * directions
+    return np.concatenate((corners, corners[:, :1]), axis=1)
+
+
+def enclosed_area(closed: FloatArray) -> float:
+    """Area inside a closed polygon of shape (2, n + 1), by the shoelace formula."""
+    x, y = closed
+    return float(0.5 * abs(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])))
+
+
+def perimeter(closed: FloatArray) -> float:
+    """Length of a closed polygon of shape (2, n + 1)."""
+    return float(np.hypot(*np.diff(closed, axis=1)).sum())

@@ -1,0 +1,192 @@
+"""Controllers and actuators, as zeros, poles and gain.
+
+The factors are kept, not multiplied out: with poles at 1e-6 rad/s and crossings at some
+rad/s, the factors stay exact where expanded coefficients do not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from armlock import paper
+from armlock.validation import ComplexArray, FloatArray, positive_number, real_number
+
+
+@dataclass(frozen=True)
+class Controller:
+    """A rational function K(s) = gain prod(s - zeros) / prod(s - poles).
+
+    Parameters
+    ----------
+    zeros, poles : sequence of complex
+        In rad/s; complex ones in conjugate pairs.
+    gain : float
+        Factor in front, not zero.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a value is not finite, complex ones do not come in conjugate pairs, or the gain
+        is zero.
+
+    Examples
+    --------
+    >>> from armlock import Controller
+    >>> lag = Controller(zeros=[-2.0], poles=[-1.0], gain=3.0)
+    >>> complex(lag(0.0))
+    (6+0j)
+    """
+
+    zeros: tuple[complex, ...]
+    poles: tuple[complex, ...]
+    gain: float
+
+    def __init__(self, zeros: Sequence[complex], poles: Sequence[complex], gain: float) -> None:
+        object.__setattr__(self, "zeros", _factors("zeros", zeros))
+        object.__setattr__(self, "poles", _factors("poles", poles))
+        object.__setattr__(self, "gain", real_number("gain", gain))
+        if self.gain == 0.0:
+            raise ValueError("gain must not be zero: there would be no loop")
+
+    @classmethod
+    def of(cls, controller: Any) -> Self:
+        """Return a controller given as one, as a python-control system, or as a triple.
+
+        Parameters
+        ----------
+        controller : Controller, control.TransferFunction, or (zeros, poles, gain)
+            A python-control system must be continuous in time, with one input and output.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If it is none of these, or a system in discrete time or with several channels.
+        """
+        if isinstance(controller, cls):
+            return controller
+        if isinstance(controller, tuple) and len(controller) == 3:
+            return cls(*controller)
+        if not all(hasattr(controller, name) for name in ("num", "den", "zeros", "poles")):
+            raise TypeError(
+                "controller must be a Controller, a control.TransferFunction or a triple "
+                f"(zeros, poles, gain), got {type(controller).__name__}"
+            )
+        if controller.ninputs != 1 or controller.noutputs != 1:
+            raise ValueError(
+                "controller must have one input and one output, got "
+                f"{controller.ninputs} and {controller.noutputs}"
+            )
+        if controller.dt:
+            raise ValueError(
+                f"controller must be continuous in time, got sampling time {controller.dt}"
+            )
+        above = np.trim_zeros(np.asarray(controller.num[0][0], dtype=float), "f")
+        below = np.trim_zeros(np.asarray(controller.den[0][0], dtype=float), "f")
+        if above.size == 0:
+            raise ValueError("controller must not be zero: there would be no loop")
+        return cls(controller.zeros(), controller.poles(), float(above[0] / below[0]))
+
+    @property
+    def numerator(self) -> FloatArray:
+        """Coefficients of the numerator in ascending powers of s, gain included."""
+        return self.gain * _expanded(self.zeros)
+
+    @property
+    def denominator(self) -> FloatArray:
+        """Coefficients of the denominator in ascending powers of s."""
+        return _expanded(self.poles)
+
+    def __call__(self, s: npt.ArrayLike) -> ComplexArray:
+        """Evaluate K(s), factor by factor; `s` in rad/s, any shape."""
+        s = np.asarray(s, dtype=np.complex128)
+        value = np.full(s.shape, self.gain, dtype=np.complex128)
+        # In turn, so that the product neither overflows nor underflows on the way.
+        for k in range(max(len(self.zeros), len(self.poles))):
+            if k < len(self.zeros):
+                value *= s - self.zeros[k]
+            if k < len(self.poles):
+                value /= s - self.poles[k]
+        return value
+
+    def __mul__(self, other: Controller) -> Controller:
+        """Return the two in series."""
+        if not isinstance(other, Controller):
+            return NotImplemented
+        return Controller(
+            self.zeros + other.zeros, self.poles + other.poles, self.gain * other.gain
+        )
+
+
+def _factors(name: str, values: Sequence[complex]) -> tuple[complex, ...]:
+    """Return finite roots as a tuple, complex ones checked to come in pairs."""
+    roots = np.atleast_1d(np.asarray(values, dtype=np.complex128))
+    if roots.ndim != 1 or not np.isfinite(roots).all():
+        raise ValueError(f"{name} must be a sequence of finite numbers, got {values!r}")
+    upper = np.sort_complex(roots[roots.imag > 0.0])
+    lower = np.sort_complex(roots[roots.imag < 0.0].conj())
+    if upper.size != lower.size or not np.allclose(upper, lower, rtol=1e-12, atol=0.0):
+        raise ValueError(f"{name} must be real or in conjugate pairs, got {values!r}")
+    return tuple(complex(root) for root in roots)
+
+
+def _expanded(roots: tuple[complex, ...]) -> FloatArray:
+    """Return the coefficients of prod(s - roots), ascending."""
+    return np.ascontiguousarray(np.atleast_1d(np.poly(np.array(roots))).real[::-1])
+
+
+def integrating_actuator(gain: float = 1.0) -> Controller:
+    """Return K(s) = gain / s, the gain and actuator of the paper's Secs. II and III.
+
+    Parameters
+    ----------
+    gain : float, optional
+        In rad/s, positive.
+    """
+    return Controller((), (0.0,), positive_number("gain", gain))
+
+
+def stage_one(gain: float = paper.CONTROLLER_GAIN) -> Controller:
+    """Return G_L, the gain and two high-pass filters of the paper's Stage I (Eq. 11)."""
+    corner = paper.TABLE_2_STAGE_1_POLE
+    return Controller((0.0, 0.0), (-corner, -corner), positive_number("gain", gain))
+
+
+def stage_two(*, denominator: str = "table") -> Controller:
+    """Return G_c, the phase-lead compensators of the paper's Stage II.
+
+    Parameters
+    ----------
+    denominator : {"table", "printed"}, optional
+        "table" has the pole p24 of Table II; "printed" has s + z24 as Eq. (11) prints it,
+        which cancels the last zero.
+
+    Raises
+    ------
+    ValueError
+        If `denominator` is neither.
+    """
+    if denominator not in ("table", "printed"):
+        raise ValueError(f"denominator must be 'table' or 'printed', got {denominator!r}")
+    zeros = [-z for z in paper.TABLE_2_ZEROS]
+    poles = [-p for p in paper.TABLE_2_POLES]
+    if denominator == "printed":
+        zeros, poles = zeros[:-1], poles[:-1]
+    return Controller(zeros, poles, 1.0)
+
+
+def table_two(gain: float = paper.CONTROLLER_GAIN, *, denominator: str = "table") -> Controller:
+    """Return the complete controller of Table II, Stage I times Stage II.
+
+    Parameters
+    ----------
+    gain : float, optional
+        The paper's g.
+    denominator : {"table", "printed"}, optional
+        As for `stage_two`.
+    """
+    return stage_one(gain) * stage_two(denominator=denominator)
