@@ -1,0 +1,365 @@
+"""Charts of the common arm: against dense eigenvalues, against single counts, growth.
+
+The requirement: a chart of 1000 x 1000 points over [-3, 3]^2 takes at most a millionth of
+what dense eigenvalues take, point by point, with counts that agree with independent ones.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import style
+from matplotlib.figure import Figure
+
+import armlock
+from armlock import CommonArm, StabilityChart, stability_chart, unstable_roots
+from armlock.semidiscretization import semi_discretization, transition_matrix
+from armlock.validation import FloatArray
+from benchmarks import child
+from benchmarks.report import Row, Series, Topic, fit_series
+
+REACH = 3.0
+STEP = 0.05
+RATIO = 1e6
+MEMORY = 2**30
+# The arms differ by this much, in s, where the growth with the delay is measured.
+DIFFERENCE = 0.2
+# Eigenvalues nearer to the unit circle than this do not tell on which side they are.
+DOUBTFUL = 1e-9
+SEED = 20
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How much is measured."""
+
+    gains: tuple[float, ...] = (1.0, 10.0)
+    side: int = 1000
+    points: int = 2000
+    dense_points: int = 10
+    passes: int = 3
+    growth_side: tuple[int, ...] = (125, 250, 500, 1000, 2000)
+    growth_gain: tuple[float, ...] = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
+    growth_delay: tuple[float, ...] = (2.5, 5.0, 10.0, 20.0, 40.0, 80.0, 160.0)
+    growth_chart: int = 1000
+    seconds_each: float = 1.0
+    fresh_compile: bool = True
+
+
+QUICK = Sizes(
+    gains=(1.0,),
+    side=20,
+    points=30,
+    dense_points=1,
+    passes=1,
+    growth_side=(8, 16, 32),
+    growth_gain=(0.5, 1.0, 2.0),
+    growth_delay=(10.0, 20.0, 40.0),
+    growth_chart=16,
+    seconds_each=0.0,
+    fresh_compile=False,
+)
+
+
+def axis(side: int) -> FloatArray:
+    return np.linspace(-REACH, REACH, side)
+
+
+def timed(function: Callable[[], Any]) -> tuple[float, Any]:
+    start = time.perf_counter()
+    result = function()
+    return time.perf_counter() - start, result
+
+
+def chart_of(gain: float, side: int) -> StabilityChart:
+    """Chart a loop made for this call, so that nothing is kept from the call before."""
+    return stability_chart(CommonArm(gain), axis(side), axis(side))
+
+
+def random_square(points: int) -> FloatArray:
+    """Return random points of the square, shape (points, 2)."""
+    return np.random.default_rng(SEED).uniform(-REACH, REACH, (points, 2))
+
+
+# Run in processes of their own ---------------------------------------------------------
+
+
+def chart_alone(gain: float, side: int) -> dict[str, float]:
+    """Time the first chart of this process, and its peak memory; then a second one."""
+    first, _ = timed(lambda: chart_of(gain, side))
+    second, _ = timed(lambda: chart_of(gain, side))
+    return {"first": first, "second": second, "memory": child.peak_memory()}
+
+
+def side_by_side(gain: float, side: int, points: int, passes: int) -> dict[str, Any]:
+    """Time chart and dense eigenvalues in turn, so that both see the same machine."""
+    chart_of(gain, side)
+    system = CommonArm(gain)
+    charts: list[float] = []
+    dense: list[list[float]] = []
+    outside, doubtful, order = [], [], 0
+    where = random_square(points)
+    for i in range(passes):
+        for x, y in where:
+            charts.append(timed(lambda: chart_of(gain, side))[0])
+            matrix = transition_matrix(system, x, y, STEP)
+            seconds, values = timed(lambda matrix=matrix: np.linalg.eigvals(matrix))  # type: ignore[misc]
+            if i == 0:
+                dense.append([])
+                outside.append(int((np.abs(values) > 1.0).sum()))
+                doubtful.append(bool((np.abs(np.abs(values) - 1.0) < DOUBTFUL).any()))
+            dense[len(charts) - 1 - i * points].append(seconds)
+            order = matrix.shape[0]
+    return {
+        "charts": charts,
+        "dense": dense,
+        "outside": outside,
+        "doubtful": doubtful,
+        "order": order,
+    }
+
+
+def dense_alone(gain: float, points: int, passes: int) -> list[list[float]]:
+    """Time dense eigenvalues at the same points, a list of times a point."""
+    system = CommonArm(gain)
+    times = []
+    for x, y in random_square(points):
+        matrix = transition_matrix(system, x, y, STEP)
+        times.append(
+            [timed(lambda m=matrix: np.linalg.eigvals(m))[0] for _ in range(passes)]  # type: ignore[misc]
+        )
+    return times
+
+
+# The table -----------------------------------------------------------------------------
+
+
+def per_point(times: list[list[float]]) -> float:
+    """Return the mean over the points of the best time at each."""
+    return float(np.mean([min(at_point) for at_point in times]))
+
+
+def speed_rows(topic: Topic, gain: float, sizes: Sizes) -> None:
+    """Compare a chart with dense eigenvalues, and their count of the unstable ones."""
+    side, module = sizes.side, "benchmarks.charts"
+    arguments: dict[str, Any] = {"gain": gain, "points": sizes.dense_points}
+    both = child.call(
+        module, "side_by_side", child.ONE_THREAD, side=side, passes=sizes.passes, **arguments
+    )
+    # More threads are slower at this order on most machines, but not on all.
+    threaded = child.call(module, "dense_alone", {}, passes=1, **arguments)
+    topic.data[f"g = {gain:g}"] = both | {"dense, all threads": threaded}
+
+    chart, median = min(both["charts"]), float(np.median(both["charts"]))
+    one, many = per_point(both["dense"]), per_point(threaded)
+    size = side * side
+    order = both["order"]
+    g = f"g = {gain:g}:"
+    runs = len(both["charts"])
+    topic.rows += [
+        Row(f"{g} chart {side} x {side}, best of {runs} runs", chart),
+        Row(f"{g} the same, median", median),
+        Row(f"{g} dense {order} x {order} at {size:,} points [a], one thread", one * size),
+        Row(f"{g} dense {order} x {order} at {size:,} points [a], all threads", many * size),
+        Row(
+            f"{g} chart against dense, the faster one [a]",
+            ratio=min(one, many) * size / chart,
+            requirement=f"at least {RATIO:,.0f}",
+            met=min(one, many) * size / chart >= RATIO,
+        ),
+        Row(
+            f"{g} chart against dense, medians, one thread [a]",
+            ratio=float(np.median(both["dense"])) * size / median,
+        ),
+    ]
+    where = random_square(sizes.dense_points)
+    mapped = unstable_roots(semi_discretization(CommonArm(gain), STEP), *where.T)
+    clear = ~np.array(both["doubtful"])
+    differ = int((mapped != np.array(both["outside"]))[clear].sum())
+    topic.rows.append(
+        comparison(
+            f"{g} count of the map against its dense eigenvalues [b]", differ, int(clear.sum())
+        )
+    )
+
+
+def comparison(what: str, differ: int, points: int, seconds: float | None = None) -> Row:
+    return Row(
+        what,
+        seconds,
+        requirement=f"{differ} of {points} differ, none may",
+        met=differ == 0,
+        correctness=True,
+    )
+
+
+def count_rows(topic: Topic, gain: float, sizes: Sizes) -> None:
+    """Compare a chart with counts at single points, by the argument principle."""
+    side, g = sizes.side, f"g = {gain:g}:"
+    system, values = CommonArm(gain), axis(side)
+    unstable_roots(system, 0.0, 0.0)
+    chart_seconds, chart = timed(lambda: chart_of(gain, side))
+    rows, columns = np.random.default_rng(SEED).integers(0, side, (2, sizes.points))
+    seconds, counts = timed(lambda: unstable_roots(system, values[columns], values[rows]))
+    differ = int((counts != chart.counts[rows, columns]).sum())
+    each = seconds / sizes.points * side * side
+    ends = np.array([[0], [side - 1]])
+    end_seconds, at_ends = timed(lambda: unstable_roots(system, values[ends], values))
+    wrong = int((at_ends != chart.counts[:, [0, -1]].T).sum())
+    topic.rows += [
+        comparison(
+            f"{g} chart against single counts [c], random points",
+            differ,
+            sizes.points,
+            seconds,
+        ),
+        comparison(
+            f"{g} chart against single counts [c], both ends of all rows",
+            wrong,
+            2 * side,
+            end_seconds,
+        ),
+        Row(f"{g} single counts at {side * side:,} points [a]", each, each / chart_seconds),
+    ]
+    topic.data[f"g = {gain:g}"] |= {
+        "boundary points": int((chart.counts == -1).sum()),
+        "points counted singly": int(chart.counted_singly.sum()),
+        "rows counted singly": int(chart.recounted_rows.size),
+        "largest count": int(chart.counts.max()),
+    }
+
+
+def process_rows(topic: Topic, sizes: Sizes) -> None:
+    """Measure memory, and the first call with and without compiled code on disk."""
+    side, name = sizes.side, "benchmarks.charts"
+    for gain in sizes.gains:
+        warm = child.call(name, "chart_alone", {}, gain=gain, side=side)
+        topic.rows.append(memory_row(f"g = {gain:g}: chart {side} x {side}", warm["memory"]))
+    topic.rows.append(Row("first chart of a process, compiled code on disk", warm["first"]))
+    if sizes.fresh_compile:
+        with tempfile.TemporaryDirectory() as cache:
+            environment = {"NUMBA_CACHE_DIR": cache}
+            cold = child.call(name, "chart_alone", environment, gain=sizes.gains[0], side=side)
+        topic.rows += [
+            Row("compiling, once after installation", cold["first"] - cold["second"]),
+            memory_row("compiling and chart", cold["memory"]),
+        ]
+
+
+def memory_row(what: str, memory: int) -> Row:
+    return Row(
+        f"{what}: peak resident memory",
+        requirement=f"{memory / 2**20:.0f} MiB < {MEMORY / 2**20:.0f} MiB",
+        met=memory < MEMORY,
+    )
+
+
+# Growth --------------------------------------------------------------------------------
+
+
+def best_time(system: CommonArm, side: int, seconds_each: float) -> float:
+    """Return the best time of a chart, of three runs or as many as fit into the time."""
+    values = axis(side)
+    times: list[float] = []
+    while len(times) < 3 or (sum(times) < seconds_each and len(times) < 40):
+        times.append(timed(lambda: stability_chart(system, values, values))[0])
+    return min(times)
+
+
+def growth(sizes: Sizes) -> list[Series]:
+    """Measure how the time of a chart grows with grid side, gain and delay."""
+    side, limit = sizes.growth_chart, sizes.seconds_each
+    half = 0.5 * DIFFERENCE
+    series = [
+        fit_series(
+            f"g = {gain:g}",
+            "grid side",
+            sizes.growth_side,
+            [best_time(CommonArm(gain), n, limit) for n in sizes.growth_side],
+        )
+        for gain in sizes.gains
+    ]
+    series.append(
+        fit_series(
+            f"{side} x {side}",
+            "gain [rad/s]",
+            sizes.growth_gain,
+            [best_time(CommonArm(gain), side, limit) for gain in sizes.growth_gain],
+        )
+    )
+    for gain in sizes.gains:
+        arms = [CommonArm(gain, tau + half, tau - half) for tau in sizes.growth_delay]
+        series.append(
+            fit_series(
+                f"{side} x {side}, g = {gain:g}",
+                "mean delay [s]",
+                sizes.growth_delay,
+                [best_time(system, side, limit) for system in arms],
+            )
+        )
+    return series
+
+
+def plot_growth(series: list[Series], path: Path) -> None:
+    """Draw each growth series with its measured points and the line of its last exponent."""
+    with style.context(Path(armlock.__file__).with_name("armlock.mplstyle")):
+        variables = list(dict.fromkeys(one.variable for one in series))
+        figure = Figure(figsize=(3.6 * len(variables), 3.6))
+        panels = figure.subplots(1, len(variables), sharey=True, squeeze=False)[0]
+        for panel, variable in zip(panels, variables, strict=True):
+            for k, one in enumerate(s for s in series if s.variable == variable):
+                x, t = np.array(one.values[-3:]), np.array(one.seconds[-3:])
+                fit = np.exp(
+                    np.log(t).mean() + one.exponent_end * (np.log(x) - np.log(x).mean())
+                )
+                label = f"{one.what} (line: exponent {one.exponent_end:.2f})"
+                panel.loglog(
+                    one.values,
+                    one.seconds,
+                    color=f"C{k}",
+                    marker="os^"[k % 3],
+                    linestyle=":",
+                )
+                panel.loglog(x, fit, color=f"C{k}", linestyle="-", label=label)
+                panel.set_xticks(one.values, [f"{value:g}" for value in one.values])
+            panel.xaxis.minorticks_off()
+            panel.set_xlabel(variable)
+            panel.legend(loc="upper left", fontsize=7)
+        panels[0].set_ylabel("best time of a chart [s]")
+        # Room for the legends.
+        panels[0].set_ylim(top=4.0 * max(max(one.seconds) for one in series))
+        figure.savefig(path)
+
+
+def run(*, quick: bool, folder: Path) -> Topic:
+    """Measure everything about charts; the figure goes into `folder`."""
+    sizes = QUICK if quick else Sizes()
+    topic = Topic(f"Common arm, chart over [-{REACH:g}, {REACH:g}]^2")
+    topic.data["sizes"] = asdict(sizes)
+    process_rows(topic, sizes)
+    for gain in sizes.gains:
+        speed_rows(topic, gain, sizes)
+        count_rows(topic, gain, sizes)
+    topic.series = growth(sizes)
+    plot_growth(topic.series, folder / "chart_growth.png")
+    topic.figures.append("chart_growth.png")
+    topic.notes += [
+        f"[a] Extrapolated from {sizes.dense_points} random points (dense: the best of "
+        f"{sizes.passes} runs at each on one thread, of one on all; building the matrix does "
+        f"not count) or {sizes.points} (single counts).",
+        f"[b] The map is the semi-discretization of order 0 with a step of {STEP} s; the dense "
+        f"reference is numpy.linalg.eigvals of its transition matrix.",
+        "[c] Argument principle, point by point: another method than the chart's crossings.",
+        "Charts use all cores. They are timed in turn with the dense eigenvalues on one "
+        "thread, so that both see the same machine; compiling is timed apart.",
+        f"Growth: exponents are slopes of log time over log variable, over all values and over "
+        f"the three largest; small charts wait for fixed costs. Delays are the mean +- "
+        f"{0.5 * DIFFERENCE:g} s; side and delay grow at both gains.",
+    ]
+    return topic
