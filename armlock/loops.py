@@ -251,7 +251,7 @@ class DualArm(Loop):
     --------
     >>> from armlock import DualArm, unstable_roots
     >>> unstable_roots(DualArm(gain=10.0), [1.0, 1.0, 1.0], [0.995, 1.0, 1.001])
-    array([1, -1, 0])
+    array([ 1, -1,  0])
     """
 
     def __init__(

@@ -19,7 +19,7 @@ from scipy.signal import ss2tf
 
 from armlock.characteristic import CharacteristicFunction
 from armlock.realization import Realization, realize
-from armlock.validation import FloatArray, broadcast_pair, positive_number
+from armlock.validation import FloatArray, broadcast_pair, positive_number, real_number
 
 
 def _whole_steps(name: str, delay: float, step: float) -> int:
@@ -96,15 +96,17 @@ def transition_matrix(
 
     Raises
     ------
-    ValueError
-        If the step does not divide a delay, the order is not 0 or 1, or the loop is neutral.
+    TypeError, ValueError
+        If x or y is not a finite real number, the step does not divide a delay, the order is
+        not 0 or 1, or the loop is neutral.
 
     Notes
     -----
     Eq. (8) of the paper in its corrected form; see Insperger and Stepan, ch. 3.
     """
     step, order = _checked(system, step, order)
-    form = realize(system, float(x), float(y))
+    name1, name2 = system.parameters
+    form = realize(system, real_number(name1, x), real_number(name2, y))
     flow, columns = _sampled(form, step, order)
     states = form.state.shape[0]
     steps = [_whole_steps("delay", term.delay, step) for term in form.delayed]

@@ -14,9 +14,17 @@ IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
 
+def _array(name: str, value: object) -> npt.NDArray[Any]:
+    """Return `value` as an array, or say that nested lists differ in length."""
+    try:
+        return np.asarray(value)
+    except ValueError:
+        raise ValueError(f"{name} must be a rectangular array, got {value!r}") from None
+
+
 def real_number(name: str, value: object) -> float:
     """Return `value` as a float, or say why it is not a finite real number."""
-    array: npt.NDArray[Any] = np.asarray(value)
+    array = _array(name, value)
     if np.iscomplexobj(array):
         raise TypeError(f"{name} must be real, got the complex value {value!r}")
     if array.ndim != 0 or array.dtype == np.bool_ or not np.issubdtype(array.dtype, np.number):
@@ -37,7 +45,7 @@ def positive_number(name: str, value: object) -> float:
 
 def real_array(name: str, value: object) -> FloatArray:
     """Return `value` as a finite float array of any shape, or raise."""
-    array: npt.NDArray[Any] = np.asarray(value)
+    array = _array(name, value)
     if np.iscomplexobj(array):
         raise TypeError(f"{name} must be real, got complex values (dtype {array.dtype})")
     if array.dtype == np.bool_ or not np.issubdtype(array.dtype, np.number):
@@ -62,7 +70,8 @@ def broadcast_pair(
             f"{name1} and {name2} must broadcast together, got shapes "
             f"{first.shape} and {second.shape}"
         ) from None
-    return first, second
+    # Copies, because broadcast views are not to be written to.
+    return first.copy(), second.copy()
 
 
 def axis(name: str, value: object) -> FloatArray:
