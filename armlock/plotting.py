@@ -186,7 +186,7 @@ def plot_line(
 
 def chart_columns(
     chart: StabilityChart, *, every: int = 1, units: tuple[str, str] = ("1", "1")
-) -> dict[str, npt.NDArray]:
+) -> dict[str, npt.NDArray[np.float64]]:
     """Return a chart as columns for `publish`, a row a point.
 
     Parameters
@@ -206,7 +206,11 @@ def chart_columns(
     x, y = np.meshgrid(chart.x[::every], chart.y[::every])
     names = [f"{p} [{u}]" for p, u in zip(chart.system.parameters, units, strict=True)]
     counts = chart.counts[::every, ::every]
-    return {names[0]: x.ravel(), names[1]: y.ravel(), "unstable roots": counts.ravel()}
+    return {
+        names[0]: x.ravel(),
+        names[1]: y.ravel(),
+        "unstable roots": counts.ravel().astype(float),
+    }
 
 
 class Downloads:
