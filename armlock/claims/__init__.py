@@ -2,4 +2,18 @@
 
 from armlock.claims.ledger import Claim, Finding, Ledger, Verdict, all_claims, check, claim
 
-__all__ = ["Claim", "Finding", "Ledger", "Verdict", "all_claims", "check", "claim"]
+# In the order of the paper, which is the order of the register.
+from armlock.claims import table1  # isort: skip
+from armlock.claims import single_arm  # isort: skip
+
+__all__ = [
+    "Claim",
+    "Finding",
+    "Ledger",
+    "Verdict",
+    "all_claims",
+    "check",
+    "claim",
+    "single_arm",
+    "table1",
+]
