@@ -8,6 +8,14 @@ from armlock.characteristic import CharacteristicFunction
 from armlock.controllers import Controller
 from armlock.dsubdivision import d_curve, d_curve_branches, d_curve_line
 from armlock.loops import CommonArm, DualArm, HayesEquation, Loop, SingleArm, paper_loop
+from armlock.margins import Margins, critical_perturbation, margins, modulus_margin
+from armlock.nyquist import (
+    AxisCrossings,
+    NyquistCurve,
+    axis_crossings,
+    frequency_response,
+    nyquist,
+)
 from armlock.roots import RootError, rightmost_root
 from armlock.semidiscretization import semi_discretization, spectral_radius, transition_matrix
 from armlock.stability import (
@@ -24,6 +32,7 @@ __version__ = "0.1.0"
 __all__ = [
     "BOUNDARY",
     "UNCONFINED",
+    "AxisCrossings",
     "CharacteristicFunction",
     "CommonArm",
     "Controller",
@@ -31,12 +40,20 @@ __all__ = [
     "DualArm",
     "HayesEquation",
     "Loop",
+    "Margins",
+    "NyquistCurve",
     "RootError",
     "SingleArm",
     "StabilityChart",
+    "axis_crossings",
+    "critical_perturbation",
     "d_curve",
     "d_curve_branches",
     "d_curve_line",
+    "frequency_response",
+    "margins",
+    "modulus_margin",
+    "nyquist",
     "paper_loop",
     "rightmost_root",
     "semi_discretization",

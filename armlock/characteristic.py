@@ -273,6 +273,19 @@ class CharacteristicFunction:
             self._sum(self.b2, self.delay2),
         )
 
+    def at(self, x: float, y: float) -> ExponentialSum:
+        """Return D(j omega; x, y) at one point as an exponential sum."""
+        _, b1, b2 = self.on_boundary()
+        # Delays left out, `deviation` is what the point adds to `rest`.
+        deviation = b1.scaled(self.reference[0] - x).plus(b2.scaled(self.reference[1] - y))
+        combined = self._sum(self.a, 0.0).plus(b1.scaled(-x)).plus(b2.scaled(-y))
+        return combined._replace(sums=self.rest_on_boundary().plus(deviation).sums)
+
+    def deviation(self, x: float, y: float) -> ExponentialSum:
+        """Return x B1 exp(-s delay1) + y B2 exp(-s delay2) at s = j omega."""
+        _, b1, b2 = self.on_boundary()
+        return b1.scaled(x).plus(b2.scaled(y))
+
     def rest_on_boundary(self) -> ExponentialSum:
         """Return `rest` at s = j omega as an exponential sum."""
         return self._sum(self.rest, 0.0)

@@ -546,3 +546,40 @@ def fill_rows(
             counts[i, k] = running
         last[i] = total if trusted else BOUNDARY
     return counts, doubtful, last
+
+
+@njit(cache=True)
+def resolved_grid(
+    coefficients: ComplexArray,
+    phases: FloatArray,
+    sums: ComplexArray,
+    omega_end: float,
+    tolerance: float,
+) -> FloatArray:
+    """Frequencies from 0 to `omega_end` between which the sum is nearly straight.
+
+    Over each step it stays within `tolerance` times its magnitude of its tangent, or the
+    step is as small as rounding allows.
+    """
+    bound = _curvature_bound(coefficients, sums, phases)
+    grid = np.empty(1024)
+    found = 1
+    omega = 0.0
+    grid[0] = omega
+    step = omega_end
+    while omega < omega_end:
+        value, slope = _evaluate(coefficients, sums, phases, omega)
+        step = min(2.0 * step, omega_end - omega)
+        smallest = max(1e-13 * omega, 1e-16 * omega_end)
+        while True:
+            nearest = min(abs(value), abs(value + step * slope))
+            left = 0.5 * _real_horner(bound, omega + step) * step * step
+            if left <= tolerance * nearest or step <= smallest:
+                break
+            step *= 0.5
+        omega = omega_end if step >= omega_end - omega else omega + step
+        if found == grid.size:
+            grid = np.concatenate((grid, np.empty_like(grid)))
+        grid[found] = omega
+        found += 1
+    return grid[:found]

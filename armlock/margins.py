@@ -1,0 +1,452 @@
+"""How far a loop is from instability: margins, and the first perturbation that breaks it.
+
+Every minimum is taken over frequencies between which the loop's response is known to be
+nearly straight, and every crossing is found with certified steps, so that no grid of the
+user's enters a number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from numpy.polynomial import polynomial as poly
+from scipy.optimize import brentq, minimize_scalar
+
+from armlock import contour
+from armlock.characteristic import ExponentialSum
+from armlock.controllers import Controller
+from armlock.loops import Loop
+from armlock.nyquist import loop_numerator, reach
+from armlock.stability import BOUNDARY, CountError, last_crossing, unstable_roots
+from armlock.validation import ComplexArray, FloatArray, axis, real_number
+
+# How straight a response must be between two samples, relative to its distance from zero.
+_STRAIGHT = 0.02
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Distances of a stable loop from instability.
+
+    Attributes
+    ----------
+    gain_lower, gain_upper : float
+        The loop stays stable for every gain factor between the two; 0 and inf if unbounded.
+    phase : float
+        Smallest phase lag in rad at a gain crossover that makes the loop marginal; inf
+        without a crossover.
+    delay : float
+        Smallest additional loop delay in s that makes the loop unstable; inf if none does.
+        0 where the loop does not roll off: an arbitrarily small delay then destabilises it
+        at high frequency.
+    modulus : float
+        Smallest |1 + L|.
+    disk : float
+        Symmetric disk margin: 2 min |1 + L| / |1 - L|.
+    gain_omega, phase_omega, modulus_omega : float
+        Where the upper gain margin, the phase margin and the modulus margin are taken, in
+        rad/s; nan where there is none.
+    """
+
+    gain_lower: float
+    gain_upper: float
+    phase: float
+    delay: float
+    modulus: float
+    disk: float
+    gain_omega: float
+    phase_omega: float
+    modulus_omega: float
+
+
+def _require_stable(loop: Loop, c1: float, c2: float) -> None:
+    """Raise unless 1 + L has all its zeros in the open left half-plane."""
+    count = int(unstable_roots(loop, c1, c2))
+    if count != 0:
+        raise ValueError(
+            f"the loop must be stable at (c1, c2) = ({c1}, {c2}) to have margins, but "
+            f"unstable_roots gives {count}"
+        )
+
+
+def _tail_end(loop: Loop, c1: float, c2: float) -> float:
+    """Frequency past which L is its high-frequency limit, for minima over omega."""
+    end = float(last_crossing(loop, c1, c2))
+    if not loop.neutral:
+        level = reach(loop, c1, c2, 0.1)
+        return max(2.0 * end, level, 10.0 / loop.longest_delay)
+    period = 2.0 * np.pi / max(abs(loop.tau1 - loop.tau2), 1e-3 * loop.longest_delay)
+    return max(4.0 * end, 2.0 * period)
+
+
+def _at_infinity(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
+    """Infima of |1 + L| and of |1 + L| / |1 - L| as omega goes to infinity."""
+    if not loop.neutral:
+        return 1.0, 1.0
+
+    def lead(p: FloatArray) -> float:
+        return float(p[-1]) if p.size == loop.degree + 1 else 0.0
+
+    open_lead, b1, b2 = lead(loop.rest), lead(loop.b1), lead(loop.b2)
+    # L fills the disk b1 (1 - c1 u) + b2 (1 - c2 v), |u| = |v| = 1, divided by open_lead.
+    centre, radius = (b1 + b2) / open_lead, (abs(c1 * b1) + abs(c2 * b2)) / abs(open_lead)
+    angles = np.exp(1j * np.linspace(0.0, np.pi, 4001))
+    edge = centre + radius * angles
+    closest = max(abs(1.0 + centre) - radius, 0.0)
+    return closest, float(np.min(np.abs(1.0 + edge) / np.maximum(np.abs(1.0 - edge), 1e-300)))
+
+
+def _smallest(
+    distance: Callable[[FloatArray], FloatArray], grid: FloatArray
+) -> tuple[float, float]:
+    """Minimum of a smooth function over omega > 0, refined between samples; and where."""
+    grid = grid[grid > 0.0]
+    values = distance(grid)
+    inner = (values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:])
+    candidates = np.flatnonzero(inner) + 1
+    candidates = candidates[values[candidates] <= 1.1 * values.min()]
+    best = int(np.argmin(values))
+    found = [(float(values[best]), float(grid[best]))]
+    for k in candidates[np.argsort(values[candidates])][:200]:
+        low, high = np.log(grid[k - 1]), np.log(grid[k + 1])
+        result = minimize_scalar(
+            lambda u: float(distance(np.array([np.exp(u)]))[0]),
+            bounds=(low, high),
+            method="bounded",
+            options={"xatol": 1e-10},
+        )
+        found.append((float(result.fun), float(np.exp(result.x))))
+    return min(found)
+
+
+def _grid(loop: Loop, c1: float, c2: float) -> FloatArray:
+    """Frequencies between which D is nearly straight, up to the loop's tail."""
+    grid: FloatArray = contour.resolved_grid(
+        *loop.at(c1, c2), _tail_end(loop, c1, c2), _STRAIGHT
+    )
+    return grid
+
+
+def _modulus(loop: Loop, c1: float, c2: float, grid: FloatArray) -> tuple[float, float]:
+    """Smallest |1 + L| and where."""
+
+    def distance(omega: FloatArray) -> FloatArray:
+        return np.abs(1.0 + loop.open_loop(1j * omega, c1, c2))
+
+    value, omega = _smallest(distance, grid)
+    limit, _ = _at_infinity(loop, c1, c2)
+    return (value, omega) if value <= limit else (limit, np.inf)
+
+
+def modulus_margin(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> float:
+    """Smallest distance of the Nyquist curve from -1, min over omega of |1 + L|.
+
+    Parameters
+    ----------
+    loop : Loop
+        The loop, stable or not.
+    c1, c2 : float, optional
+        Multiplicative perturbations.
+
+    Returns
+    -------
+    float
+        The infimum over all omega > 0, the limit at high frequency included. For a neutral
+        loop that limit is taken over all small changes of the two delays.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If c1 or c2 is not finite and real.
+    CountError
+        If the chain of a neutral loop is not confined.
+
+    Examples
+    --------
+    >>> from armlock import modulus_margin, paper_loop
+    >>> print(f"{modulus_margin(paper_loop()):.4f}")
+    0.6156
+    """
+    c1, c2 = real_number("c1", c1), real_number("c2", c2)
+    _require_confined(loop, c1, c2)
+    return _modulus(loop, c1, c2, _grid(loop, c1, c2))[0]
+
+
+def _require_confined(loop: Loop, c1: float, c2: float) -> None:
+    """Raise where a neutral loop's chain of roots is not confined."""
+    if not np.isfinite(last_crossing(loop, c1, c2)):
+        raise CountError(
+            f"no margin at (c1, c2) = ({c1}, {c2}): the loop's high-frequency chain of roots "
+            f"is not confined to the left half-plane",
+            np.array([[c1, c2]]),
+        )
+
+
+def _crossovers(loop: Loop, c1: float, c2: float, end: float) -> FloatArray:
+    """Frequencies with |L| = 1, ascending."""
+    above = loop_numerator(loop, c1, c2)
+    below = loop.rest_on_boundary()
+    excess = above.times_conjugate(above).plus(below.times_conjugate(below).scaled(-1.0))
+    # sign_changes looks at the imaginary part.
+    turned = ExponentialSum(1j * excess.coefficients, excess.phases, 1j * excess.sums)
+    omega, jump, *_ = contour.sign_changes(*turned, end, False)
+    omega = omega[(omega > 0.0) & (jump != 0)]
+
+    def excess_at(u: float) -> float:
+        return float(np.log(np.abs(loop.open_loop(1j * np.exp(u), c1, c2))))
+
+    polished = []
+    for w in omega:
+        low, high = np.log(w) - 1e-6, np.log(w) + 1e-6
+        if excess_at(low) * excess_at(high) < 0.0:
+            w = np.exp(brentq(excess_at, low, high, xtol=1e-14, rtol=1e-14))
+        polished.append(float(w))
+    return np.array(polished)
+
+
+def _scaled(loop: Loop, factor: float) -> Loop:
+    """Return the loop with its gain multiplied by a factor."""
+    controller = loop.controller
+    return Loop(
+        Controller(controller.zeros, controller.poles, controller.gain * factor),
+        loop.mapping,
+        loop.tau1,
+        loop.tau2,
+    )
+
+
+def _gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float]:
+    """Gain factors around one between which the loop stays stable, and the upper one's omega.
+
+    With a factor k, D is rest + k N with N the numerator of L: a root crosses where
+    k = -rest / N is real. The highest gain is bounded by the chain of a neutral loop.
+    """
+    crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
+    lower, upper, where = 0.0, np.inf, np.nan
+    for top in (10.0, 1e3, 1e6):
+        factors = np.concatenate((np.geomspace(1e-6, 1.0, 13), np.geomspace(1.0, top, 13)))
+        ends = np.array([float(last_crossing(_scaled(loop, k), c1, c2)) for k in factors])
+        confined = np.isfinite(ends)
+        omega, jump, *_ = contour.sign_changes(*crossing, ends[confined].max(), False)
+        omega = omega[(omega > 0.0) & (jump != 0)]
+        value = loop.open_loop(1j * omega, c1, c2).real
+        factor = -1.0 / value[value < 0.0]
+        place = omega[value < 0.0]
+        lower = max(factor[factor < 1.0], default=0.0)
+        if (factor > 1.0).any():
+            best = int(np.argmin(np.where(factor > 1.0, factor, np.inf)))
+            upper, where = float(factor[best]), float(place[best])
+        if not confined.all():
+            limit = _chain_gain(loop, c1, c2)
+            if limit < upper:
+                upper, where = limit, np.inf
+        if upper <= top:
+            break
+    return float(lower), float(upper), where
+
+
+def _chain_gain(loop: Loop, c1: float, c2: float) -> float:
+    """Gain factor from which on the chain of a neutral loop is not confined."""
+
+    def lead(p: FloatArray) -> float:
+        return float(p[-1]) if p.size == loop.degree + 1 else 0.0
+
+    excess = abs(c1 * lead(loop.b1)) + abs(c2 * lead(loop.b2))
+    excess -= abs(lead(loop.b1) + lead(loop.b2))
+    return abs(lead(loop.rest)) / excess if excess > 0.0 else np.inf
+
+
+def margins(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> Margins:
+    """Compute all margins of a stable loop.
+
+    Parameters
+    ----------
+    loop : Loop
+        The loop.
+    c1, c2 : float, optional
+        Multiplicative perturbations.
+
+    Returns
+    -------
+    Margins
+
+    Raises
+    ------
+    TypeError, ValueError
+        If c1 or c2 is not finite and real, or the loop is not stable there.
+
+    Notes
+    -----
+    Phase and delay margins are taken over the crossovers up to the frequency past which L
+    has settled to its limit; a neutral loop has crossovers without end.
+    """
+    c1, c2 = real_number("c1", c1), real_number("c2", c2)
+    _require_stable(loop, c1, c2)
+    grid = _grid(loop, c1, c2)
+    modulus, modulus_omega = _modulus(loop, c1, c2, grid)
+
+    def ratio(omega: FloatArray) -> FloatArray:
+        response: ComplexArray = loop.open_loop(1j * omega, c1, c2)
+        return np.asarray(np.abs(1.0 + response) / np.maximum(np.abs(1.0 - response), 1e-300))
+
+    disk = 2.0 * min(_smallest(ratio, grid)[0], _at_infinity(loop, c1, c2)[1])
+    omega = _crossovers(loop, c1, c2, float(grid[-1]))
+    phase, delay, phase_omega = np.inf, np.inf, np.nan
+    if omega.size:
+        lag = np.mod(np.angle(loop.open_loop(1j * omega, c1, c2)) + np.pi, 2.0 * np.pi)
+        # A lag turns L clockwise; a lead may reach -1 sooner.
+        nearest = np.minimum(lag, 2.0 * np.pi - lag)
+        worst = int(np.argmin(nearest))
+        phase, phase_omega = float(nearest[worst]), float(omega[worst])
+        delay = float(np.min(lag / omega))
+    if loop.neutral:
+        lead = (loop.b1[-1] if loop.b1.size > loop.degree else 0.0) * (1.0 + abs(c1))
+        lead += (loop.b2[-1] if loop.b2.size > loop.degree else 0.0) * (1.0 + abs(c2))
+        if abs(lead) >= abs(float(loop.rest[-1])):
+            delay = 0.0
+    lower, upper, gain_omega = _gain_interval(loop, c1, c2)
+    return Margins(
+        lower, upper, phase, delay, modulus, disk, gain_omega, phase_omega, modulus_omega
+    )
+
+
+def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
+    """Return the smallest perturbation of (1, 1) in a direction that breaks the loop.
+
+    Parameters
+    ----------
+    loop : Loop
+        The loop.
+    direction : array_like of two floats
+        (d1, d2), taken as given and not normalised.
+
+    Returns
+    -------
+    float
+        Smallest eps > 0 such that the loop at (1, 1) + eps (d1, d2) is not stable: a root
+        reaches the imaginary axis there, or a neutral loop's high-frequency chain does. 0 if
+        it is unstable from the start, inf if no eps breaks it.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the direction is not two finite real numbers, or has length zero.
+    ValueError
+        If the loop is unstable at (1, 1) itself.
+    CountError
+        If the counts on the two sides of the result contradict it.
+
+    Notes
+    -----
+    Along the ray, D = D(1, 1) - eps (d1 B1 + d2 B2), so that eps = Re D(1, 1) / (...) where
+    the quotient is real; these frequencies are found with certified steps.
+
+    Examples
+    --------
+    >>> from armlock import critical_perturbation, paper_loop
+    >>> print(f"{critical_perturbation(paper_loop(), (0, -1)):.4e}")
+    2.9286e-06
+    """
+    vector = axis("direction", direction)
+    if vector.size != 2:
+        raise ValueError(f"direction must hold two numbers, got {vector.size}")
+    d1, d2 = float(vector[0]), float(vector[1])
+    if d1 == 0.0 and d2 == 0.0:
+        raise ValueError("direction must not have length zero, got (0, 0)")
+    start = int(unstable_roots(loop, 1.0, 1.0))
+    if start not in (0, BOUNDARY):
+        raise ValueError(
+            f"the loop must be stable at (1, 1) to lose stability, but unstable_roots gives "
+            f"{start} there"
+        )
+    pull = loop.deviation(d1, d2)
+    if not pull.coefficients.any():
+        return np.inf
+    family = loop.at(1.0, 1.0).times_conjugate(pull)
+    chain = _chain_limit(loop, d1, d2)
+    scale = 1.0 / float(np.hypot(d1, d2))
+    reaches = scale * 10.0 ** np.arange(-9.0, 7.0)
+    # Just below the limit of the chain, roots cross at ever higher frequency.
+    closer = chain * np.array([1.0 - 1e-2, 1.0 - 1e-4, 1.0 - 1e-6])
+    for top in [*reaches[reaches < closer[0]], *closer[np.isfinite(closer)]]:
+        end = float(last_crossing(loop, 1.0 + top * abs(d1), 1.0 + top * abs(d2)))
+        if not np.isfinite(end):
+            # |c1| and |c2| along the ray are smaller than these bounds.
+            end = float(last_crossing(loop, 1.0 + top * d1, 1.0 + top * d2))
+        omega, jump, *_ = contour.sign_changes(*family, end, False)
+        values = np.array([_ray_position(loop, d1, d2, float(w)) for w in omega[jump != 0]])
+        # A boundary at (1, 1) itself is not a crossing beyond it.
+        values = np.sort(values[(values > 1e-15 * scale) & (values <= top)])
+        if values.size:
+            return _confirmed(loop, d1, d2, float(values[0]), start)
+    return _confirmed(loop, d1, d2, chain, start) if np.isfinite(chain) else np.inf
+
+
+def _ray_position(loop: Loop, d1: float, d2: float, omega: float) -> float:
+    """Eps at which j omega is a root, from the exact quotient near a frequency found.
+
+    nan where the direction does not act at this frequency.
+    """
+
+    def quotient(w: float) -> complex:
+        s = 1j * w
+        p1 = d1 * loop.b1
+        p2 = d2 * loop.b2
+        pull = complex(poly.polyval(s, poly.polyadd(p1, p2)))
+        pull += complex(poly.polyval(s, p1) * np.expm1(-s * loop.tau1))
+        pull += complex(poly.polyval(s, p2) * np.expm1(-s * loop.tau2))
+        return complex(loop(s, 1.0, 1.0)) / pull if pull else complex(np.nan, np.nan)
+
+    if omega > 0.0:
+        low, high = omega * (1.0 - 1e-7), omega * (1.0 + 1e-7)
+        if quotient(low).imag * quotient(high).imag < 0.0:
+            omega = brentq(lambda w: quotient(w).imag, low, high, xtol=1e-300, rtol=1e-15)
+    return quotient(omega).real
+
+
+def _chain_limit(loop: Loop, d1: float, d2: float) -> float:
+    """Smallest eps > 0 at which the chain of a neutral loop ceases to be confined."""
+    if not loop.neutral:
+        return np.inf
+
+    def lead(p: FloatArray) -> float:
+        return abs(float(p[-1])) if p.size == loop.degree + 1 else 0.0
+
+    a, b1, b2 = lead(loop.a), lead(loop.b1), lead(loop.b2)
+
+    def spare(eps: float) -> float:
+        return a - abs(1.0 + eps * d1) * b1 - abs(1.0 + eps * d2) * b2
+
+    # Piecewise linear and concave: one zero beyond the last kink.
+    kinks = [0.0, *(-1.0 / d for d in (d1, d2) if d < 0.0)]
+    slope = -(abs(d1) * b1 + abs(d2) * b2)
+    candidates = []
+    for low, high in zip(sorted(kinks), [*sorted(kinks)[1:], np.inf], strict=True):
+        if spare(low) > 0.0 and np.isfinite(high) and spare(high) <= 0.0:
+            candidates.append(brentq(spare, low, high, xtol=1e-300, rtol=1e-15))
+        elif spare(low) > 0.0 and not np.isfinite(high) and slope < 0.0:
+            candidates.append(low - spare(low) / slope)
+    return min(candidates, default=np.inf if spare(0.0) > 0.0 else 0.0)
+
+
+def _confirmed(loop: Loop, d1: float, d2: float, eps: float, start: int) -> float:
+    """Hold a critical perturbation against counts on its two sides."""
+    before = int(unstable_roots(loop, 1.0 + 0.5 * eps * d1, 1.0 + 0.5 * eps * d2))
+    if before != 0:
+        if start == BOUNDARY:
+            return 0.0
+        raise CountError(
+            f"stability along ({d1}, {d2}) is lost before {eps}, where no crossing was found",
+            np.array([[1.0 + 0.5 * eps * d1, 1.0 + 0.5 * eps * d2]]),
+        )
+    beyond = 1.0 + 1e-6
+    after = int(unstable_roots(loop, 1.0 + beyond * eps * d1, 1.0 + beyond * eps * d2))
+    if after == 0:
+        raise CountError(
+            f"the loop is stable beyond the crossing at {eps} along ({d1}, {d2})",
+            np.array([[1.0 + beyond * eps * d1, 1.0 + beyond * eps * d2]]),
+        )
+    return eps

@@ -1,0 +1,371 @@
+"""The open loop on the imaginary axis: Nyquist curve, encirclements, crossings.
+
+The contour is a rectangle in the right half-plane, indented to the right around the pole of
+L at s = 0. It is sampled so finely that the argument of 1 + L is known without doubt, and
+the encirclements are then held against the count of unstable roots: Z = N + P.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import factorial
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+from numpy.polynomial import polynomial as poly
+
+from armlock import contour
+from armlock.characteristic import ExponentialSum
+from armlock.loops import Loop
+from armlock.stability import (
+    BOUNDARY,
+    UNCONFINED,
+    CountError,
+    last_crossing,
+    squared_magnitude,
+    unstable_roots,
+)
+from armlock.validation import (
+    ComplexArray,
+    FloatArray,
+    positive_number,
+    real_array,
+    real_number,
+)
+
+if TYPE_CHECKING:
+    import control
+
+# Largest change of the argument of 1 + L between neighbouring samples, in rad.
+_TURN = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class NyquistCurve:
+    """The open loop along the indented Nyquist contour, for omega >= 0.
+
+    Attributes
+    ----------
+    omega : float array, shape (n,)
+        Ascending frequencies in rad/s, from the indentation up.
+    response : complex array, shape (n,)
+        L(j omega).
+    indentation : complex array, shape (k,)
+        Points s from the positive real axis to the imaginary axis, on the quarter circle
+        around s = 0 that leaves the pole there outside. Empty where L has no pole there.
+    indentation_response : complex array, shape (k,)
+        L on the indentation: the infinite branch.
+    pole_order : int
+        Order of the pole of L at s = 0, after cancellation.
+    encirclements : int
+        N, clockwise turns around -1 of the whole contour, both signs of omega.
+    open_loop_poles : int
+        P, poles of L in the open right half-plane.
+    closed_loop_roots : int
+        Z = N + P, zeros of 1 + L in the right half-plane.
+    """
+
+    omega: FloatArray
+    response: ComplexArray
+    indentation: ComplexArray
+    indentation_response: ComplexArray
+    pole_order: int
+    encirclements: int
+    open_loop_poles: int
+    closed_loop_roots: int
+
+
+@dataclass(frozen=True, eq=False)
+class AxisCrossings:
+    """Where the Nyquist curve meets the negative real axis.
+
+    Attributes
+    ----------
+    omega : float array, shape (n,)
+        Ascending frequencies in rad/s.
+    value : float array, shape (n,)
+        L there, negative.
+    """
+
+    omega: FloatArray
+    value: FloatArray
+
+
+def frequency_response(
+    loop: Loop, omega: npt.ArrayLike, c1: float = 1.0, c2: float = 1.0
+) -> control.FrequencyResponseData:
+    """Return the open loop as a python-control frequency response, with exact delays.
+
+    Parameters
+    ----------
+    loop : Loop
+        The loop.
+    omega : array_like of float, one-dimensional
+        Angular frequencies in rad/s, positive.
+    c1, c2 : float, optional
+        Multiplicative perturbations.
+
+    Returns
+    -------
+    control.FrequencyResponseData
+        For `control.bode_plot` and its like. Take counts and margins from this package:
+        python-control takes them from the samples alone.
+    """
+    import control
+
+    omega = np.atleast_1d(real_array("omega", omega))
+    if (omega <= 0.0).any():
+        raise ValueError(f"omega must be positive, got {omega.min()} among its values")
+    response = loop.open_loop(1j * omega, real_number("c1", c1), real_number("c2", c2))
+    return control.frd(response, omega, name=type(loop).__name__)
+
+
+def loop_numerator(loop: Loop, c1: float, c2: float) -> ExponentialSum:
+    """Return the numerator of L, B1 (1 - c1 e1) + B2 (1 - c2 e2), as an exponential sum."""
+    _, b1, b2 = loop.on_boundary()
+    whole = ExponentialSum(b1.coefficients, np.zeros(1), b1.sums).plus(
+        ExponentialSum(b2.coefficients, np.zeros(1), b2.sums)
+    )
+    undelayed = b1.scaled(1.0 - c1).plus(b2.scaled(1.0 - c2)).sums
+    return whole.plus(loop.deviation(-c1, -c2))._replace(sums=undelayed)
+
+
+def _poles_at_zero(loop: Loop, c1: float, c2: float) -> int:
+    """Order of the pole of L at s = 0 once numerator and denominator have cancelled."""
+    order = int(np.flatnonzero(loop.rest)[0])
+    if order == 0:
+        return 0
+    # Taylor coefficients of B1 (1 - c1 exp(-s tau1)) + B2 (1 - c2 exp(-s tau2)).
+    taylor = np.zeros(order)
+    for b, c, tau in ((loop.b1, c1, loop.tau1), (loop.b2, c2, loop.tau2)):
+        arm = np.array([-c * (-tau) ** k / factorial(k) for k in range(order)])
+        arm[0] += 1.0
+        taylor += np.convolve(b, arm)[:order]
+    size = np.abs(loop.b1).max() + np.abs(loop.b2).max()
+    nonzero = np.flatnonzero(np.abs(taylor) > 1e-14 * size)
+    return order - (int(nonzero[0]) if nonzero.size else order)
+
+
+def open_loop_poles(loop: Loop) -> int:
+    """Count the poles of L in the open right half-plane.
+
+    Parameters
+    ----------
+    loop : Loop
+        The loop.
+
+    Returns
+    -------
+    int
+
+    Raises
+    ------
+    ValueError
+        If L has poles on the imaginary axis elsewhere than at s = 0: the contour is indented
+        there only.
+    """
+    sensor = poly.polyroots(np.asarray(loop.mapping.denominator))
+    poles = np.concatenate((np.asarray(loop.controller.poles), sensor))
+    poles = poles[np.abs(poles) > 0.0]
+    on_axis = np.abs(poles.real) <= 1e-12 * np.abs(poles)
+    if on_axis.any():
+        raise ValueError(
+            "the open loop must have no pole on the imaginary axis except at s = 0, got one "
+            f"at {poles[on_axis][0]}; unstable_roots counts such a loop all the same"
+        )
+    return int((poles.real > 0.0).sum())
+
+
+def _refined(
+    function: Callable[[ComplexArray], ComplexArray], points: ComplexArray
+) -> tuple[ComplexArray, ComplexArray]:
+    """Halve steps until 1 + L turns by less than _TURN and changes by less than half."""
+    values = function(points)
+    for _ in range(60):
+        before, after = 1.0 + values[:-1], 1.0 + values[1:]
+        ratio = after / before
+        wide = (np.abs(np.angle(ratio)) > _TURN) | (np.abs(ratio - 1.0) > 0.5)
+        if not wide.any():
+            return points, values
+        middles = 0.5 * (points[:-1][wide] + points[1:][wide])
+        places = np.flatnonzero(wide) + 1
+        values = np.insert(values, places, function(middles))
+        points = np.insert(points, places, middles)
+        if points.size > 20_000_000:
+            break
+    raise CountError("the Nyquist curve passes through -1", np.empty((0, 2)))
+
+
+def _between(start: complex, stop: complex) -> ComplexArray:
+    """Return evenly spaced points of a straight piece of the contour."""
+    return np.asarray(start + (stop - start) * np.linspace(0.0, 1.0, 200))
+
+
+def _turns(values: ComplexArray) -> float:
+    """Argument that 1 + L gathers along the samples."""
+    moved = 1.0 + values
+    return float(np.angle(moved[1:] / moved[:-1]).sum())
+
+
+def _radius(loop: Loop, c1: float, c2: float, order: int) -> float:
+    """Radius of an indentation within which L is its leading term at s = 0."""
+    scales = [abs(p) for p in (*loop.controller.poles, *loop.controller.zeros) if abs(p) > 0.0]
+    radius = 1e-3 * min([*scales, 1.0 / loop.longest_delay])
+    for _ in range(40):
+        near, nearer = (complex(loop.open_loop(r, c1, c2)) for r in (radius, 0.5 * radius))
+        if order:
+            settled = abs(nearer / near - 2.0**order) < 1e-3 and abs(near) > 1e3
+        else:
+            settled = abs(nearer - near) < 1e-3 * abs(1.0 + near)
+        if settled:
+            break
+        radius *= 0.1
+    return radius
+
+
+def nyquist(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> NyquistCurve:
+    """Trace the Nyquist curve and count its encirclements of -1.
+
+    Parameters
+    ----------
+    loop : Loop
+        The loop.
+    c1, c2 : float, optional
+        Multiplicative perturbations.
+
+    Returns
+    -------
+    NyquistCurve
+
+    Raises
+    ------
+    ValueError
+        If L has poles on the imaginary axis elsewhere than at s = 0.
+    CountError
+        If the curve passes through -1, the loop's high-frequency chain is not confined, or
+        the encirclements and the independent count of roots disagree.
+
+    Notes
+    -----
+    Up to the frequency past which no root can cross, on to where the delays have died out,
+    and back to the real axis. At (c1, c2) where L loses a pole at s = 0 by cancellation, D
+    has a root s = 0 that 1 + L has not; Z counts the zeros of 1 + L.
+
+    Examples
+    --------
+    >>> from armlock import SingleArm
+    >>> from armlock.nyquist import nyquist
+    >>> curve = nyquist(SingleArm(), c1=1.001)
+    >>> curve.encirclements, curve.open_loop_poles, curve.closed_loop_roots
+    (1, 0, 1)
+    """
+    c1, c2 = real_number("c1", c1), real_number("c2", c2)
+    poles = open_loop_poles(loop)
+    order = _poles_at_zero(loop, c1, c2)
+    end = float(last_crossing(loop, c1, c2))
+    if not np.isfinite(end):
+        raise CountError(
+            f"no Nyquist count at (c1, c2) = ({c1}, {c2}): the loop's high-frequency chain of "
+            f"roots is not confined",
+            np.array([[c1, c2]]),
+        )
+
+    def response(s: ComplexArray) -> ComplexArray:
+        return loop.open_loop(s, c1, c2)
+
+    radius = _radius(loop, c1, c2, order)
+    end = max(1.05 * end, 10.0 / loop.longest_delay, 10.0 * radius)
+    far = max(40.0 / min(loop.tau1, loop.tau2), end)
+    turn = 2.0 * np.pi / loop.longest_delay
+    low = np.geomspace(radius, max(turn, 2.0 * radius), 400)
+    high = np.arange(low[-1], end, turn / 16.0)[1:]
+    up, up_values = _refined(response, 1j * np.concatenate((low, high, [end])))
+    _, across = _refined(response, _between(1j * end, 1j * end + far))
+    _, down = _refined(response, _between(1j * end + far, far))
+    argument = _turns(up_values) + _turns(across) + _turns(down)
+    quarter = radius * np.exp(1j * np.linspace(0.0, 0.5 * np.pi, 64))
+    arc, arc_values = _refined(response, quarter)
+    argument += _turns(arc_values)
+    # Half of the contour, for omega >= 0, in the direction of ascending omega.
+    turns = argument / np.pi
+    encirclements = -round(turns)
+    count = encirclements + poles
+    expected = int(unstable_roots(loop, c1, c2))
+    if expected == BOUNDARY:
+        expected = int(unstable_roots(loop.shifted(radius), c1, c2))
+    if abs(turns + encirclements) > 1e-3 or (expected != UNCONFINED and expected != count):
+        raise CountError(
+            f"no Nyquist count at (c1, c2) = ({c1}, {c2}): {encirclements} encirclements and "
+            f"{poles} open-loop poles against {expected} roots",
+            np.array([[c1, c2]]),
+        )
+    return NyquistCurve(
+        up.imag,
+        up_values,
+        arc if order else np.empty(0, dtype=np.complex128),
+        arc_values if order else np.empty(0, dtype=np.complex128),
+        order,
+        encirclements,
+        poles,
+        count,
+    )
+
+
+def reach(loop: Loop, c1: float, c2: float, level: float) -> float:
+    """Frequency past which |L| stays below `level`; inf if it does not."""
+    bound: float = contour.last_crossing_bound(
+        squared_magnitude(np.pad(loop.rest, (0, loop.degree + 1 - loop.rest.size))),
+        *(
+            squared_magnitude(np.pad(b, (0, loop.degree + 1 - b.size)))
+            for b in (loop.b1, loop.b2)
+        ),
+        (1.0 + abs(c1)) / level,
+        (1.0 + abs(c2)) / level,
+    )
+    return bound
+
+
+def axis_crossings(
+    loop: Loop, c1: float = 1.0, c2: float = 1.0, *, omega_max: float | None = None
+) -> AxisCrossings:
+    """Find every crossing of the negative real axis by the Nyquist curve.
+
+    Parameters
+    ----------
+    loop : Loop
+        The loop.
+    c1, c2 : float, optional
+        Multiplicative perturbations.
+    omega_max : float, optional
+        Highest frequency in rad/s. By default where |L| has fallen below 1e-3 for good; a
+        loop whose |L| does not fall needs it.
+
+    Returns
+    -------
+    AxisCrossings
+
+    Raises
+    ------
+    ValueError
+        If `omega_max` is not given and |L| does not fall below 1e-3.
+
+    Notes
+    -----
+    Zeros of Im L, found with certified steps: none is missed, however close to another.
+    """
+    c1, c2 = real_number("c1", c1), real_number("c2", c2)
+    if omega_max is None:
+        omega_max = reach(loop, c1, c2, 1e-3)
+        if not np.isfinite(omega_max):
+            raise ValueError(
+                "omega_max must be given for a loop whose |L| does not fall to zero at high "
+                "frequency"
+            )
+    omega_max = positive_number("omega_max", omega_max)
+    crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
+    omega, jump, *_ = contour.sign_changes(*crossing, omega_max, False)
+    omega = omega[(omega > 0.0) & (jump != 0)]
+    value = loop.open_loop(1j * omega, c1, c2).real
+    return AxisCrossings(omega[value < 0.0], value[value < 0.0])
