@@ -141,18 +141,21 @@ class Ledger:
 
     def _repr_html_(self) -> str:
         """Return the table as HTML, for notebooks."""
+        # Two columns, so that the table also fits a narrow screen.
         rows = "".join(
-            f'<tr id="claim-{html.escape(c.identifier)}">'
-            f"<td><strong>{html.escape(c.identifier)}</strong><br>{html.escape(c.place)}</td>"
-            f"<td>{html.escape(c.says)}</td>"
-            f'<td class="verdict verdict-{f.verdict.name.lower()}">{f.verdict}</td>'
-            f"<td><strong>{f.value:.6g}</strong><br>{html.escape(f.quantity)}</td>"
-            f"<td>{html.escape(f.note)}</td></tr>"
+            f'<tr id="claim-{html.escape(c.identifier)}" '
+            'style="vertical-align: top; text-align: left">'
+            f"<td><strong>{html.escape(c.identifier)}</strong><br>"
+            f'<span class="verdict verdict-{f.verdict.name.lower()}">{f.verdict}</span>'
+            f"<br><small>{html.escape(c.place)}</small></td>"
+            f"<td><p>{html.escape(c.says)}</p>"
+            f"<p><strong>{f.value:.6g}</strong>: {html.escape(f.quantity)}.</p>"
+            f"<p>{html.escape(f.note)}</p></td></tr>"
             for c, f in self.entries
         )
         return (
-            '<table class="claims"><thead><tr><th>Claim</th><th>What the paper says</th>'
-            "<th>Verdict</th><th>Deciding number</th><th>Why</th></tr></thead>"
+            '<table class="claims"><thead><tr style="text-align: left"><th>Claim, verdict</th>'
+            "<th>What the paper says, the number that decides it, and why</th></tr></thead>"
             f"<tbody>{rows}</tbody></table>"
         )
 
