@@ -345,7 +345,7 @@ def modified_dual_row() -> Finding:
         "ratio of two responses that the row allows, at the common arm's first null",
         "H₊ and H₋ are not given in the paper. (H₊, H₋) = (1, 0) makes the common arm of the "
         "row and (1, p/((s+p) sΔτ)) the dual arm; at that null the two differ by a factor "
-        f"{spread:.3g}.",
+        f"{spread:.0f}.",
     )
 
 
