@@ -36,7 +36,7 @@ NOTEBOOKS := $(wildcard notebooks/*.ipynb)
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help env book test bench serve lint format strip lock clean distclean always
+.PHONY: help env book test claims bench serve lint format strip lock clean distclean always
 
 help: ## List the targets
 	@echo "armlock: make TARGET, where TARGET is one of"
@@ -88,7 +88,8 @@ book: $(INDEX) ## Run all notebooks and build the book, as HTML that needs no ne
 $(INDEX): $(PACKAGE_READY) $(BOOK_SOURCES) build/book-sources $(if $(FORCE),always)
 	@touch build/book-started
 	@rm -rf build/_build
-	$(VENV)/bin/jupyter-book build . --all --config book/_config.yml --toc book/_toc.yml \
+	ARMLOCK_FIGURES="$(CURDIR)/build/_build/html/figures" \
+		$(VENV)/bin/jupyter-book build . --all --config book/_config.yml --toc book/_toc.yml \
 		--path-output build -W -n --keep-going
 	$(PY) tools/check_html.py build/_build/html
 	@rm -rf build/html
@@ -113,6 +114,9 @@ $(TESTS_PASSED): $(PACKAGE_READY) $(TEST_SOURCES) build/test-sources $(if $(FORC
 	@date '+%Y-%m-%d %H:%M:%S' > $@
 	@touch -r build/tests-started $@
 	@touch build/tests-ran
+
+claims: $(PACKAGE_READY) ## Check every claim; print the ledger, write it as CSV and JSON
+	$(PY) -m armlock.claims build/claims
 
 bench: $(PACKAGE_READY) ## Measure speed and memory, and print a table
 	$(PY) -m benchmarks

@@ -10,12 +10,15 @@ says where it stands and what it says, in our words, and enters it in the regist
 
 from __future__ import annotations
 
+import csv
 import html
+import json
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
+from pathlib import Path
 
 
 class Verdict(StrEnum):
@@ -132,6 +135,34 @@ class Ledger:
         """Return how many claims met each verdict."""
         return Counter(finding.verdict for _, finding in self.entries)
 
+    def records(self) -> list[dict[str, str | float]]:
+        """Return the ledger as one flat record a claim."""
+        return [
+            {
+                "claim": entry.identifier,
+                "place": entry.place,
+                "says": entry.says,
+                "chapter": entry.chapter,
+                "verdict": str(finding.verdict),
+                "value": finding.value,
+                "quantity": finding.quantity,
+                "note": finding.note,
+            }
+            for entry, finding in self.entries
+        ]
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write claims.csv and claims.json into a folder, and return their paths."""
+        folder.mkdir(parents=True, exist_ok=True)
+        records = self.records()
+        table, tree = folder / "claims.csv", folder / "claims.json"
+        with table.open("w", newline="", encoding="utf-8") as stream:
+            writer = csv.DictWriter(stream, fieldnames=list(records[0]))
+            writer.writeheader()
+            writer.writerows(records)
+        tree.write_text(json.dumps(records, indent=1, ensure_ascii=False) + "\n", "utf-8")
+        return [table, tree]
+
     def __repr__(self) -> str:
         """Return the table as text."""
         return "\n".join(
@@ -145,7 +176,8 @@ class Ledger:
         rows = "".join(
             f'<tr id="claim-{html.escape(c.identifier)}" '
             'style="vertical-align: top; text-align: left">'
-            f"<td><strong>{html.escape(c.identifier)}</strong><br>"
+            '<td style="padding-right: 1em">'
+            f"<strong>{html.escape(c.identifier)}</strong><br>"
             f'<span class="verdict verdict-{f.verdict.name.lower()}">{f.verdict}</span>'
             f"<br><small>{html.escape(c.place)}</small></td>"
             f"<td><p>{html.escape(c.says)}</p>"
