@@ -35,7 +35,9 @@ def parameters(gain: npt.ArrayLike, k2: npt.ArrayLike) -> tuple[Any, Any]:
     return -gain, gain * np.asarray(k2, dtype=float)
 
 
-def lambert_root(a: npt.ArrayLike, b: npt.ArrayLike, tau: float, branch: int = 0) -> Any:
+def lambert_root(
+    a: npt.ArrayLike, b: npt.ArrayLike, tau: float, branch: npt.ArrayLike = 0
+) -> Any:
     """Roots of s = a + b exp(-s tau) in closed form, s = a + W_k(b tau exp(-a tau)) / tau.
 
     Parameters
@@ -44,8 +46,8 @@ def lambert_root(a: npt.ArrayLike, b: npt.ArrayLike, tau: float, branch: int = 0
         The free parameters; they broadcast.
     tau : float
         Delay in s.
-    branch : int, optional
-        Branch k of the Lambert W function; 0 is the rightmost root.
+    branch : array_like of int, optional
+        Branch k of the Lambert W function; 0 is the rightmost root. It broadcasts too.
 
     Returns
     -------
