@@ -44,6 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         module = importlib.import_module(f"benchmarks.{name}")
         topics[name] = module.run(quick=options.quick, folder=folder)
         topics[name].data["seconds"] = time.perf_counter() - start
+    about["load"].append(report.load())
     report.write(folder, about, topics)
     print(report.as_text(about, topics))
     print(f"Written: report.md, report.json and figures in {folder}")

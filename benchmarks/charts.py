@@ -48,7 +48,8 @@ class Sizes:
     growth_gain: tuple[float, ...] = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
     growth_delay: tuple[float, ...] = (2.5, 5.0, 10.0, 20.0, 40.0, 80.0, 160.0)
     growth_chart: int = 1000
-    seconds_each: float = 1.0
+    rounds: int = 4
+    seconds_each: float = 0.2
     fresh_compile: bool = True
 
 
@@ -62,6 +63,7 @@ QUICK = Sizes(
     growth_gain=(0.5, 1.0, 2.0),
     growth_delay=(10.0, 20.0, 40.0),
     growth_chart=16,
+    rounds=1,
     seconds_each=0.0,
     fresh_compile=False,
 )
@@ -71,9 +73,9 @@ def axis(side: int) -> FloatArray:
     return np.linspace(-REACH, REACH, side)
 
 
-def timed(function: Callable[[], Any]) -> tuple[float, Any]:
+def timed(function: Callable[..., Any], *arguments: Any) -> tuple[float, Any]:
     start = time.perf_counter()
-    result = function()
+    result = function(*arguments)
     return time.perf_counter() - start, result
 
 
@@ -92,8 +94,8 @@ def random_square(points: int) -> FloatArray:
 
 def chart_alone(gain: float, side: int) -> dict[str, float]:
     """Time the first chart of this process, and its peak memory; then a second one."""
-    first, _ = timed(lambda: chart_of(gain, side))
-    second, _ = timed(lambda: chart_of(gain, side))
+    first, _ = timed(chart_of, gain, side)
+    second, _ = timed(chart_of, gain, side)
     return {"first": first, "second": second, "memory": child.peak_memory()}
 
 
@@ -107,9 +109,9 @@ def side_by_side(gain: float, side: int, points: int, passes: int) -> dict[str, 
     where = random_square(points)
     for i in range(passes):
         for x, y in where:
-            charts.append(timed(lambda: chart_of(gain, side))[0])
+            charts.append(timed(chart_of, gain, side)[0])
             matrix = transition_matrix(system, x, y, STEP)
-            seconds, values = timed(lambda matrix=matrix: np.linalg.eigvals(matrix))  # type: ignore[misc]
+            seconds, values = timed(np.linalg.eigvals, matrix)
             if i == 0:
                 dense.append([])
                 outside.append(int((np.abs(values) > 1.0).sum()))
@@ -131,9 +133,7 @@ def dense_alone(gain: float, points: int, passes: int) -> list[list[float]]:
     times = []
     for x, y in random_square(points):
         matrix = transition_matrix(system, x, y, STEP)
-        times.append(
-            [timed(lambda m=matrix: np.linalg.eigvals(m))[0] for _ in range(passes)]  # type: ignore[misc]
-        )
+        times.append([timed(np.linalg.eigvals, matrix)[0] for _ in range(passes)])
     return times
 
 
@@ -204,13 +204,13 @@ def count_rows(topic: Topic, gain: float, sizes: Sizes) -> None:
     side, g = sizes.side, f"g = {gain:g}:"
     system, values = CommonArm(gain), axis(side)
     unstable_roots(system, 0.0, 0.0)
-    chart_seconds, chart = timed(lambda: chart_of(gain, side))
+    chart_seconds, chart = timed(chart_of, gain, side)
     rows, columns = np.random.default_rng(SEED).integers(0, side, (2, sizes.points))
-    seconds, counts = timed(lambda: unstable_roots(system, values[columns], values[rows]))
+    seconds, counts = timed(unstable_roots, system, values[columns], values[rows])
     differ = int((counts != chart.counts[rows, columns]).sum())
     each = seconds / sizes.points * side * side
     ends = np.array([[0], [side - 1]])
-    end_seconds, at_ends = timed(lambda: unstable_roots(system, values[ends], values))
+    end_seconds, at_ends = timed(unstable_roots, system, values[ends], values)
     wrong = int((at_ends != chart.counts[:, [0, -1]].T).sum())
     topic.rows += [
         comparison(
@@ -263,47 +263,40 @@ def memory_row(what: str, memory: int) -> Row:
 # Growth --------------------------------------------------------------------------------
 
 
-def best_time(system: CommonArm, side: int, seconds_each: float) -> float:
-    """Return the best time of a chart, of three runs or as many as fit into the time."""
-    values = axis(side)
-    times: list[float] = []
-    while len(times) < 3 or (sum(times) < seconds_each and len(times) < 40):
-        times.append(timed(lambda: stability_chart(system, values, values))[0])
-    return min(times)
+def best_times(cases: list[tuple[CommonArm, int]], sizes: Sizes) -> list[float]:
+    """Return the best time of each case: a system and the side of its grid.
+
+    They are timed in turn, round by round, so that a busy spell does not spoil one case.
+    """
+    times: list[list[float]] = [[] for _ in cases]
+    for _ in range(sizes.rounds):
+        for (system, side), of_case in zip(cases, times, strict=True):
+            values, stop = axis(side), time.perf_counter() + sizes.seconds_each
+            while True:
+                of_case.append(timed(stability_chart, system, values, values)[0])
+                if time.perf_counter() >= stop:
+                    break
+    return [min(of_case) for of_case in times]
 
 
 def growth(sizes: Sizes) -> list[Series]:
     """Measure how the time of a chart grows with grid side, gain and delay."""
-    side, limit = sizes.growth_chart, sizes.seconds_each
-    half = 0.5 * DIFFERENCE
-    series = [
-        fit_series(
-            f"g = {gain:g}",
-            "grid side",
-            sizes.growth_side,
-            [best_time(CommonArm(gain), n, limit) for n in sizes.growth_side],
-        )
-        for gain in sizes.gains
+    side, half = sizes.growth_chart, 0.5 * DIFFERENCE
+    named: list[tuple[str, str, tuple[float, ...], list[tuple[CommonArm, int]]]] = []
+    for g in sizes.gains:
+        sides = [(CommonArm(g), n) for n in sizes.growth_side]
+        named.append((f"g = {g:g}", "grid side", sizes.growth_side, sides))
+    gains = [(CommonArm(g), side) for g in sizes.growth_gain]
+    named.append((f"{side} x {side}", "gain [rad/s]", sizes.growth_gain, gains))
+    for g in sizes.gains:
+        arms = [(CommonArm(g, t + half, t - half), side) for t in sizes.growth_delay]
+        what = f"{side} x {side}, g = {g:g}"
+        named.append((what, "mean delay [s]", sizes.growth_delay, arms))
+    best = iter(best_times([case for *_, cases in named for case in cases], sizes))
+    return [
+        fit_series(what, variable, values, [next(best) for _ in values])
+        for what, variable, values, _ in named
     ]
-    series.append(
-        fit_series(
-            f"{side} x {side}",
-            "gain [rad/s]",
-            sizes.growth_gain,
-            [best_time(CommonArm(gain), side, limit) for gain in sizes.growth_gain],
-        )
-    )
-    for gain in sizes.gains:
-        arms = [CommonArm(gain, tau + half, tau - half) for tau in sizes.growth_delay]
-        series.append(
-            fit_series(
-                f"{side} x {side}, g = {gain:g}",
-                "mean delay [s]",
-                sizes.growth_delay,
-                [best_time(system, side, limit) for system in arms],
-            )
-        )
-    return series
 
 
 def plot_growth(series: list[Series], path: Path) -> None:

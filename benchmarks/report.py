@@ -111,8 +111,13 @@ def machine() -> dict[str, Any]:
         "numpy": np.__version__,
         "numba": numba.__version__,
         "armlock": armlock.__version__,
-        "load": round(os.getloadavg()[0], 2),
+        "load": [load()],
     }
+
+
+def load() -> float:
+    """Return how many processes have wanted a core, on average over the last minute."""
+    return round(os.getloadavg()[0], 2)
 
 
 def cores() -> int:
@@ -126,7 +131,7 @@ def machine_line(about: dict[str, Any]) -> str:
     return (
         f"{about['cores']} cores, {about['system']}, Python {about['python']}, "
         f"numpy {about['numpy']}, numba {about['numba']}, armlock {about['armlock']}; "
-        f"load average {about['load']} at the start"
+        f"load average {about['load'][0]} at the start, {about['load'][-1]} at the end"
     )
 
 
