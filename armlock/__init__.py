@@ -4,6 +4,12 @@ The reproducible companion to "Robustness Analysis and Controller Design of Arm-
 System in Space-based Gravitational Wave Detectors".
 """
 
+import os
+
+# Waiting threads of the compiled loops sleep instead of spinning, which on a busy machine
+# slows everything else down. It must be set before numba starts its threads.
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+
 from armlock.characteristic import CharacteristicFunction
 from armlock.controllers import Controller
 from armlock.dsubdivision import d_curve, d_curve_branches, d_curve_line

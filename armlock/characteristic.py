@@ -44,16 +44,18 @@ class ExponentialSum(NamedTuple):
 
     def times_conjugate(self, other: ExponentialSum) -> ExponentialSum:
         """Return this sum times the complex conjugate of `other`, at real omega."""
-        rows, phases = [], []
+        sums = np.convolve(self.sums, other.sums.conj())
+        size = max(self.coefficients.shape[1] + other.coefficients.shape[1] - 1, sums.size)
+        rows: dict[float, ComplexArray] = {}
         for p, phase in zip(self.coefficients, self.phases, strict=True):
             for q, other_phase in zip(other.coefficients, other.phases, strict=True):
-                rows.append(np.convolve(p, q.conj()))
-                phases.append(phase - other_phase)
-        sums = np.convolve(self.sums, other.sums.conj())
-        size = max(len(rows[0]), sums.size)
-        coefficients = np.array([np.pad(row, (0, size - row.size)) for row in rows])
+                product = np.convolve(p, q.conj())
+                row = rows.setdefault(phase - other_phase, np.zeros(size, dtype=np.complex128))
+                row[: product.size] += product
         return ExponentialSum(
-            coefficients, np.array(phases), np.pad(sums, (0, size - sums.size))
+            np.array(list(rows.values())),
+            np.array(list(rows)),
+            np.pad(sums, (0, size - sums.size)),
         )
 
     def scaled(self, weight: float) -> ExponentialSum:
@@ -158,6 +160,15 @@ class CharacteristicFunction:
             b.size == self.a.size and delay > 0.0
             for b, delay in ((self.b1, self.delay1), (self.b2, self.delay2))
         )
+
+    @property
+    def highest_coefficients(self) -> tuple[float, float, float]:
+        """Coefficients of the highest power of A in A, B1 and B2."""
+
+        def highest(p: FloatArray) -> float:
+            return float(p[-1]) if p.size == self.a.size else 0.0
+
+        return highest(self.a), highest(self.b1), highest(self.b2)
 
     @property
     def longest_delay(self) -> float:

@@ -87,10 +87,8 @@ def _at_infinity(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
     if not loop.neutral:
         return 1.0, 1.0
 
-    def lead(p: FloatArray) -> float:
-        return float(p[-1]) if p.size == loop.degree + 1 else 0.0
-
-    open_lead, b1, b2 = lead(loop.rest), lead(loop.b1), lead(loop.b2)
+    _, b1, b2 = loop.highest_coefficients
+    open_lead = float(loop.rest[-1])
     # L fills the disk b1 (1 - c1 u) + b2 (1 - c2 v), |u| = |v| = 1, divided by open_lead.
     centre, radius = (b1 + b2) / open_lead, (abs(c1 * b1) + abs(c2 * b2)) / abs(open_lead)
     angles = np.exp(1j * np.linspace(0.0, np.pi, 4001))
@@ -250,13 +248,9 @@ def _gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, floa
 
 def _chain_gain(loop: Loop, c1: float, c2: float) -> float:
     """Gain factor from which on the chain of a neutral loop is not confined."""
-
-    def lead(p: FloatArray) -> float:
-        return float(p[-1]) if p.size == loop.degree + 1 else 0.0
-
-    excess = abs(c1 * lead(loop.b1)) + abs(c2 * lead(loop.b2))
-    excess -= abs(lead(loop.b1) + lead(loop.b2))
-    return abs(lead(loop.rest)) / excess if excess > 0.0 else np.inf
+    _, b1, b2 = loop.highest_coefficients
+    excess = abs(c1 * b1) + abs(c2 * b2) - abs(b1 + b2)
+    return abs(float(loop.rest[-1])) / excess if excess > 0.0 else np.inf
 
 
 def margins(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> Margins:
@@ -303,9 +297,9 @@ def margins(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> Margins:
         phase, phase_omega = float(nearest[worst]), float(omega[worst])
         delay = float(np.min(lag / omega))
     if loop.neutral:
-        lead = (loop.b1[-1] if loop.b1.size > loop.degree else 0.0) * (1.0 + abs(c1))
-        lead += (loop.b2[-1] if loop.b2.size > loop.degree else 0.0) * (1.0 + abs(c2))
-        if abs(lead) >= abs(float(loop.rest[-1])):
+        # With a delay of its own, L enters the chain with all its parts in any phase.
+        _, b1, b2 = loop.highest_coefficients
+        if abs(b1 + b2) + abs(c1 * b1) + abs(c2 * b2) >= abs(float(loop.rest[-1])):
             delay = 0.0
     lower, upper, gain_omega = _gain_interval(loop, c1, c2)
     return Margins(
@@ -368,7 +362,10 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
     family = loop.at(1.0, 1.0).times_conjugate(pull)
     chain = _chain_limit(loop, d1, d2)
     scale = 1.0 / float(np.hypot(d1, d2))
-    reaches = scale * 10.0 ** np.arange(-9.0, 7.0)
+    nearby = scale * 1e-9
+    if start == BOUNDARY and int(unstable_roots(loop, 1.0 + nearby * d1, 1.0 + nearby * d2)):
+        return 0.0
+    reaches = scale * 100.0 ** np.arange(-4.0, 4.0)
     # Just below the limit of the chain, roots cross at ever higher frequency.
     closer = chain * np.array([1.0 - 1e-2, 1.0 - 1e-4, 1.0 - 1e-6])
     for top in [*reaches[reaches < closer[0]], *closer[np.isfinite(closer)]]:
@@ -381,8 +378,8 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
         # A boundary at (1, 1) itself is not a crossing beyond it.
         values = np.sort(values[(values > 1e-15 * scale) & (values <= top)])
         if values.size:
-            return _confirmed(loop, d1, d2, float(values[0]), start)
-    return _confirmed(loop, d1, d2, chain, start) if np.isfinite(chain) else np.inf
+            return _confirmed(loop, d1, d2, float(values[0]))
+    return _confirmed(loop, d1, d2, chain) if np.isfinite(chain) else np.inf
 
 
 def _ray_position(loop: Loop, d1: float, d2: float, omega: float) -> float:
@@ -412,10 +409,7 @@ def _chain_limit(loop: Loop, d1: float, d2: float) -> float:
     if not loop.neutral:
         return np.inf
 
-    def lead(p: FloatArray) -> float:
-        return abs(float(p[-1])) if p.size == loop.degree + 1 else 0.0
-
-    a, b1, b2 = lead(loop.a), lead(loop.b1), lead(loop.b2)
+    a, b1, b2 = (abs(value) for value in loop.highest_coefficients)
 
     def spare(eps: float) -> float:
         return a - abs(1.0 + eps * d1) * b1 - abs(1.0 + eps * d2) * b2
@@ -432,12 +426,10 @@ def _chain_limit(loop: Loop, d1: float, d2: float) -> float:
     return min(candidates, default=np.inf if spare(0.0) > 0.0 else 0.0)
 
 
-def _confirmed(loop: Loop, d1: float, d2: float, eps: float, start: int) -> float:
+def _confirmed(loop: Loop, d1: float, d2: float, eps: float) -> float:
     """Hold a critical perturbation against counts on its two sides."""
     before = int(unstable_roots(loop, 1.0 + 0.5 * eps * d1, 1.0 + 0.5 * eps * d2))
     if before != 0:
-        if start == BOUNDARY:
-            return 0.0
         raise CountError(
             f"stability along ({d1}, {d2}) is lost before {eps}, where no crossing was found",
             np.array([[1.0 + 0.5 * eps * d1, 1.0 + 0.5 * eps * d2]]),

@@ -276,8 +276,10 @@ def stability_chart(
         counts, singly, rows = turned[0].T, turned[1].T, np.empty(0, dtype=np.intp)
     else:
         counts, singly, rows = _chart_rows(system, xs[order_x], ys[order_y])
-    place = np.ix_(np.argsort(order_y), np.argsort(order_x))
-    return StabilityChart(system, xs, ys, counts[place], singly[place], np.sort(order_y[rows]))
+    if (np.diff(order_x) != 1).any() or (np.diff(order_y) != 1).any():
+        place = np.ix_(np.argsort(order_y), np.argsort(order_x))
+        counts, singly = counts[place], singly[place]
+    return StabilityChart(system, xs, ys, counts, singly, np.sort(order_y[rows]))
 
 
 def _chart_rows(
@@ -322,14 +324,11 @@ def _chart_rows(
 
 def _confined_up_to(system: CharacteristicFunction, y: FloatArray) -> FloatArray:
     """Return the |x| from which on the chain of a neutral loop is not confined."""
-
-    def lead(p: FloatArray) -> float:
-        return abs(float(p[-1])) if p.size == system.a.size else 0.0
-
-    left = np.maximum(lead(system.a) - np.abs(y) * lead(system.b2), 0.0)
-    if lead(system.b1) == 0.0:
+    a, b1, b2 = (abs(value) for value in system.highest_coefficients)
+    left = np.maximum(a - np.abs(y) * b2, 0.0)
+    if b1 == 0.0:
         return np.where(left > 0.0, np.inf, 0.0)
-    return np.asarray(left / lead(system.b1))
+    return np.asarray(left / b1)
 
 
 def _ends(values: FloatArray) -> tuple[float, float]:
