@@ -8,8 +8,8 @@ from armlock.characteristic import CharacteristicFunction
 from armlock.stability import unstable_roots
 from armlock.validation import FloatArray, positive_number
 
-# Halvings of the bracket: from a reach of some units to about 1e-10.
-_HALVINGS = 36
+# Halvings of the bracket: from a reach of some units to about 1e-9.
+_HALVINGS = 33
 
 
 def rays(number: int = 180, elongation: float = 5.0) -> FloatArray:

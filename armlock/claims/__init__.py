@@ -5,6 +5,7 @@ from armlock.claims.ledger import Claim, Finding, Ledger, Verdict, all_claims, c
 # In the order of the paper, which is the order of the register.
 from armlock.claims import table1  # isort: skip
 from armlock.claims import single_arm  # isort: skip
+from armlock.claims import common_arm  # isort: skip
 
 __all__ = [
     "Claim",
@@ -14,6 +15,7 @@ __all__ = [
     "all_claims",
     "check",
     "claim",
+    "common_arm",
     "single_arm",
     "table1",
 ]
