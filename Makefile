@@ -148,7 +148,8 @@ format: $(PACKAGE_READY) ## Format the code, and strip the notebooks' outputs
 
 lock: $(ENV_READY) ## Write environment.txt from pyproject.toml (UPGRADE=1: newest versions)
 	$(PY) -m uv pip compile pyproject.toml --all-extras \
-		--group build --group book --group test --group lint --group lock \
+		--group build --group book --group test --group browser --group lab --group lint \
+		--group lock \
 		--universal --python-version 3.11 --fork-strategy fewest --only-binary :all: \
 		--generate-hashes --no-emit-index-url --no-emit-find-links --quiet \
 		--custom-compile-command "make lock" $(if $(UPGRADE),--upgrade) -o environment.txt
