@@ -123,7 +123,9 @@ def winding(
             if approach > 0.0:
                 nearest = step if approach >= speed * step else approach / speed
             distance = abs(value + nearest * slope)
-            if 0.5 * _real_horner(bound, omega + step) * step * step <= SAFETY * distance:
+            # Rounding moves the tangent, too: closer than that to the origin nothing is certain.
+            apart = 0.5 * _real_horner(bound, omega + step) * step * step
+            if apart + _real_horner(noise, omega + step) <= SAFETY * distance:
                 break
             step *= 0.5
             if step <= 4.0 * EPSILON * omega or step < 1e-300:
@@ -160,7 +162,7 @@ def last_crossing_bound(
 ) -> float:
     """Frequency past which |A| > |x B1| + |y B2|, so that no root can cross; inf if none.
 
-    The three arguments hold |A|^2, |B1|^2, |B2|^2 at s = j omega as polynomials in
+    It is nan where a number overflows. The three arguments hold |A|^2, |B1|^2, |B2|^2 at s = j omega as polynomials in
     w = omega^2. With G = |A|^2 - |x B1|^2 - |y B2|^2 the inequality is G > 0 and
     Q = G^2 - 4 |x B1|^2 |y B2|^2 > 0. A shift of w after which every coefficient of Q is
     positive proves that Q has no root beyond it (Budan), and then G keeps its sign.
@@ -171,6 +173,8 @@ def last_crossing_bound(
     for i in range(size):
         for k in range(size):
             q[i + k] += g[i] * g[k] - 4.0 * (x * y) ** 2 * square_b1[i] * square_b2[k]
+    if not np.isfinite(q).all():
+        return np.nan
     lead = q[2 * size - 2]
     if g[size - 1] <= 0.0 or lead <= 0.0:
         return np.inf
@@ -245,6 +249,8 @@ def count_point(
         end = last_crossing_bound(squares[0], squares[1], squares[2], x, y)
         if end == np.inf:
             return UNCONFINED
+        if np.isnan(end):
+            return DOUBTFUL
     argument, value, clear = winding(coefficients, undelayed, phases, noise, end)
     if not clear:
         return BOUNDARY
@@ -254,6 +260,8 @@ def count_point(
         a = 0j
         for k in range(size - 1, -1, -1):
             a = a * end + parts[0, 0, k]
+        if a == 0.0:
+            return DOUBTFUL
         ratio = value / a
         # D / A winds no further past `end`; A itself does, in closed form.
         argument += _remaining_argument(roots, end) - np.arctan2(ratio.imag, ratio.real)
@@ -558,8 +566,8 @@ def resolved_grid(
 ) -> FloatArray:
     """Frequencies from 0 to `omega_end` between which the sum is nearly straight.
 
-    Over each step it stays within `tolerance` times its magnitude of its tangent, or the
-    step is as small as rounding allows.
+    Over each step it stays within `tolerance` times the tangent's distance from zero of its
+    tangent, or the step is as small as rounding allows.
     """
     bound = _curvature_bound(coefficients, sums, phases)
     grid = np.empty(1024)
@@ -571,8 +579,14 @@ def resolved_grid(
         value, slope = _evaluate(coefficients, sums, phases, omega)
         step = min(2.0 * step, omega_end - omega)
         smallest = max(1e-13 * omega, 1e-16 * omega_end)
+        speed = slope.real * slope.real + slope.imag * slope.imag
+        approach = -(value.real * slope.real + value.imag * slope.imag)
         while True:
-            nearest = min(abs(value), abs(value + step * slope))
+            # Where on the step the tangent passes closest to zero.
+            place = 0.0
+            if approach > 0.0:
+                place = step if approach >= speed * step else approach / speed
+            nearest = abs(value + place * slope)
             left = 0.5 * _real_horner(bound, omega + step) * step * step
             if left <= tolerance * nearest or step <= smallest:
                 break

@@ -65,7 +65,9 @@ def pseudospectral_roots(
     """
     form = realize(system, x, y)
     states = form.state.shape[0]
-    longest = max((term.delay for term in form.delayed), default=0.0)
+    # A term without effect would only add spurious eigenvalues.
+    delayed = [term for term in form.delayed if term.column.any() or term.direct != 0.0]
+    longest = max((term.delay for term in delayed), default=0.0)
     if longest == 0.0:
         eigenvalues = np.linalg.eigvals(form.state).astype(np.complex128)
         return eigenvalues[np.argsort(-eigenvalues.real)]
@@ -73,16 +75,16 @@ def pseudospectral_roots(
     history = 0.5 * longest * (points - 1.0)
     difference = difference * (2.0 / longest)
     interpolate = BarycentricInterpolator(history, np.eye(degree + 1))
-    rows = [interpolate(-term.delay) for term in form.delayed]
+    rows = [interpolate(-term.delay) for term in delayed]
     # xi(0) in terms of the states and the history behind it.
-    direct = sum((t.direct * row for t, row in zip(form.delayed, rows, strict=True)))
+    direct = sum((t.direct * row for t, row in zip(delayed, rows, strict=True)))
     present = np.zeros(states + degree)
     present[:1] = 1.0 if states else 0.0
     present[states:] += np.asarray(direct)[1:]
     present /= 1.0 - np.asarray(direct)[0]
     matrix = np.zeros((states + degree, states + degree))
     matrix[:states, :states] = form.state
-    for term, row in zip(form.delayed, rows, strict=True):
+    for term, row in zip(delayed, rows, strict=True):
         signal = row[0] * present
         signal[states:] += row[1:]
         matrix[:states] += np.outer(term.column, signal)
