@@ -162,8 +162,8 @@ def last_crossing_bound(
 ) -> float:
     """Frequency past which |A| > |x B1| + |y B2|, so that no root can cross; inf if none.
 
-    It is nan where a number overflows. The three arguments hold |A|^2, |B1|^2, |B2|^2 at s = j omega as polynomials in
-    w = omega^2. With G = |A|^2 - |x B1|^2 - |y B2|^2 the inequality is G > 0 and
+    It is nan where a number overflows. The three arguments hold |A|^2, |B1|^2, |B2|^2 at
+    s = j omega as polynomials in w = omega^2. With G = |A|^2 - |x B1|^2 - |y B2|^2 the inequality is G > 0 and
     Q = G^2 - 4 |x B1|^2 |y B2|^2 > 0. A shift of w after which every coefficient of Q is
     positive proves that Q has no root beyond it (Budan), and then G keeps its sign.
     """
