@@ -1,0 +1,171 @@
+"""Second opinions: the same quantities by other routes, sharing no code with armlock.
+
+Only the coefficients, delays and the step of a characteristic function are read from it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import lambertw
+
+
+def value(system, s, x, y):
+    """D(s; x, y), spelled out."""
+    s = np.asarray(s, dtype=complex)
+    z = np.exp(s * system.step) if system.step else s
+    return (
+        np.polyval(system.a[::-1], z)
+        - x * np.polyval(system.b1[::-1], z) * np.exp(-s * system.delay1)
+        - y * np.polyval(system.b2[::-1], z) * np.exp(-s * system.delay2)
+    )
+
+
+def hayes_roots(a, b, tau=1.0, branches=400):
+    """All roots of s = a + b exp(-s tau) near the origin, from the branches of Lambert W."""
+    if b == 0.0:
+        return np.array([complex(a)])
+    k = np.arange(-branches, branches + 1)
+    return a + lambertw(b * tau * np.exp(-a * tau), k) / tau
+
+
+def hayes_count(a, b, tau=1.0):
+    """Number of roots of the Hayes equation in the right half-plane."""
+    return int(np.count_nonzero(hayes_roots(a, b, tau).real > 0.0))
+
+
+def radius_of_unstable_roots(system, x, y):
+    """Radius past which |A| exceeds |x B1| + |y B2| in the right half-plane."""
+    bound = np.zeros(system.a.size)
+    bound[: system.a.size - 1] -= np.abs(system.a[:-1])
+    bound[-1] = abs(system.a[-1])
+    bound[: system.b1.size] -= abs(x) * np.abs(system.b1)
+    bound[: system.b2.size] -= abs(y) * np.abs(system.b2)
+    if bound[-1] <= 0.0:
+        raise ValueError("unstable roots are not confined")
+    radius = 1.0
+    while np.polyval(bound[::-1], radius) <= 0.0:
+        radius *= 2.0
+    return radius
+
+
+def rectangle_count(system, x, y, density=10.0):
+    """Unstable roots by the argument of D along a sampled rectangle around them.
+
+    Half of it, from 0 up the imaginary axis, right, and down to the real axis; halved
+    wherever the argument moves by more than 0.5 between two samples.
+    """
+    radius = radius_of_unstable_roots(system, x, y)
+    longest = max(system.delay1, system.delay2)
+    size = int(density * (radius * longest + 30.0))
+    side = np.linspace(0.0, radius, size)
+    near = np.geomspace(1e-9 * radius, radius, 400)
+    up = 1j * np.unique(np.concatenate((side, near)))
+    across = 1j * radius + np.linspace(0.0, radius, 400)
+    down = radius + 1j * radius * np.linspace(1.0, 0.0, size)
+    s = np.concatenate((up, across, down))
+    d = value(system, s, x, y)
+    for _ in range(50):
+        assert d.all(), "a root lies on the rectangle"
+        turn = np.angle(d[1:] / d[:-1])
+        wide = np.flatnonzero(np.abs(turn) > 0.5)
+        if wide.size == 0:
+            count = -turn.sum() / np.pi
+            assert abs(count - round(count)) < 1e-6
+            return round(count)
+        middle = 0.5 * (s[wide] + s[wide + 1])
+        s = np.insert(s, wide + 1, middle)
+        d = np.insert(d, wide + 1, value(system, middle, x, y))
+    raise AssertionError("a root lies on the rectangle")
+
+
+def generator_eigenvalues(system, x, y, nodes=80):
+    """Eigenvalues of the collocated delay equation in companion form (retarded only).
+
+    The state is (xi, xi', ...); polynomials of degree `nodes` on the longest delay, written
+    in Lagrange form with weights from products.
+    """
+    order = system.a.size - 1
+    now = np.diag(np.ones(order - 1), 1)
+    now[-1] = -system.a[:-1] / system.a[-1]
+    delayed = []
+    for parameter, b, delay in ((x, system.b1, system.delay1), (y, system.b2, system.delay2)):
+        last_row = np.zeros((order, order))
+        last_row[-1, : b.size] = parameter * b / system.a[-1]
+        if delay == 0.0:
+            now = now + last_row
+        else:
+            delayed.append((delay, last_row))
+    longest = max((delay for delay, _ in delayed), default=1.0)
+    theta = 0.5 * longest * (np.cos(np.pi * np.arange(nodes + 1) / nodes) - 1.0)
+    scaled = theta * (4.0 / longest)
+    gaps = scaled[:, None] - scaled[None, :] + np.eye(nodes + 1)
+    weights = 1.0 / gaps.prod(axis=1)
+    difference = (weights[None, :] / weights[:, None]) / gaps
+    np.fill_diagonal(difference, 0.0)
+    np.fill_diagonal(difference, -difference.sum(axis=1))
+    difference *= 4.0 / longest
+
+    def lagrange(at):
+        distance = at - theta
+        if np.abs(distance).min() == 0.0:
+            return (distance == 0.0).astype(float)
+        terms = weights / distance
+        return terms / terms.sum()
+
+    matrix = np.kron(difference, np.eye(order))
+    first = np.zeros((order, order * (nodes + 1)))
+    first[:, :order] = now
+    for delay, coupling in delayed:
+        first += np.kron(lagrange(-delay)[None, :], coupling)
+    matrix[:order] = first
+    return np.linalg.eigvals(matrix)
+
+
+def spectral_count(system, x, y, nodes=80):
+    """Unstable roots as eigenvalues of the collocated generator."""
+    return int(np.count_nonzero(generator_eigenvalues(system, x, y, nodes).real > 0.0))
+
+
+def held_map(system, x, y, step, order):
+    """Transition matrix of a first-order delay equation, from its closed-form integrals.
+
+    The state is (xi_i, xi_{i-1}, ..., xi_{i-r}).
+    """
+    c0, c1 = system.a
+    rate = -c0 / c1
+    gains = []
+    for parameter, b, delay in ((x, system.b1, system.delay1), (y, system.b2, system.delay2)):
+        if delay == 0.0:
+            rate += parameter * b[0] / c1
+        else:
+            gains.append((round(delay / step), parameter * b[0] / c1))
+    decay = np.exp(rate * step)
+    longest = max(back for back, _ in gains)
+    matrix = np.diag(np.ones(longest), -1)
+    matrix[0, 0] = decay
+    whole = np.expm1(rate * step) / rate
+    # Integral of (u / h) exp(rate (h - u)) over the step: the share of the newer sample.
+    newer = (np.expm1(rate * step) - rate * step) / (rate * rate * step)
+    for back, gain in gains:
+        if order == 0:
+            matrix[0, back] += gain * whole
+        else:
+            matrix[0, back] += gain * (whole - newer)
+            matrix[0, back - 1] += gain * newer
+    return matrix
+
+
+def map_eigenvalues(system, x, y):
+    """Roots of z^r D for a map, r the longest delay in steps, by a companion matrix."""
+    steps = [round(delay / system.step) for delay in (system.delay1, system.delay2)]
+    longest = max(steps)
+    polynomial = np.zeros(longest + system.a.size)
+    polynomial[longest : longest + system.a.size] += system.a
+    for parameter, b, back in zip((x, y), (system.b1, system.b2), steps, strict=True):
+        polynomial[longest - back : longest - back + b.size] -= parameter * b
+    return np.roots(polynomial[::-1])
+
+
+def map_count(system, x, y):
+    """Eigenvalues of a map outside the unit circle."""
+    return int(np.count_nonzero(np.abs(map_eigenvalues(system, x, y)) > 1.0))

@@ -1,0 +1,66 @@
+"""Characteristic functions of many kinds, for tests that should hold for all of them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from armlock import CharacteristicFunction, CommonArm, DualArm, HayesEquation, SingleArm
+
+
+def with_roots(*roots):
+    """Ascending coefficients of the monic real polynomial with these roots."""
+    return np.real(np.poly(roots))[::-1]
+
+
+RETARDED = {
+    "Hayes": HayesEquation(1.0),
+    "single arm": SingleArm(1.0, 20.1),
+    "common arm": CommonArm(),
+    "common arm, close gain": CommonArm(gain=0.05, tau1=3.0, tau2=7.0),
+    "dual arm": DualArm(gain=0.3),
+    "oscillator": CharacteristicFunction([2.0, 0.3, 1.0], [1.0], [0.0, 1.0], 1.0, 2.5),
+    "unstable oscillator": CharacteristicFunction(
+        [2.0, -0.3, 1.0], [1.0, 0.5], [0.7], 0.4, 1.3
+    ),
+    "double integrator": CharacteristicFunction([0.0, 0.0, 1.0], [-0.3, -1.1], [0.2], 0.5, 0.9),
+    "roots of A on the axis": CharacteristicFunction(
+        with_roots(1j, -1j, 0.0), [-0.4, 0.1, -0.9], [0.2, 0.3], 0.7, 1.1
+    ),
+    "third order, unstable A": CharacteristicFunction(
+        with_roots(0.4, -1.0, -2.0), [1.0, 0.2, 0.5], [0.6, -1.0], 1.0, 3.0
+    ),
+    "fourth order, two roots on the axis twice": CharacteristicFunction(
+        with_roots(2j, -2j, 2j, -2j), [0.5, -3.0, 0.0, 1.0], [1.0, 1.0], 0.3, 0.8
+    ),
+    "fifth order, mixed": CharacteristicFunction(
+        with_roots(0.1 + 1j, 0.1 - 1j, -1.0, -0.5 + 2j, -0.5 - 2j),
+        [1.0, 0.0, -1.0, 0.4],
+        [0.5, 1.0, 0.0, 0.0, 0.8],
+        2.0,
+        1.2,
+    ),
+    "no first parameter": CharacteristicFunction([1.0, 1.0], [0.0], [1.0], 1.0, 2.0),
+    "no second parameter": CharacteristicFunction([1.0, 0.2, 1.0], [1.0], [0.0], 1.0, 2.0),
+    "no parameter": CharacteristicFunction(with_roots(0.5, -1.0), [0.0], [0.0], 1.0, 2.0),
+    "undelayed first parameter": CharacteristicFunction(
+        [0.5, 0.1, 1.0], [1.0, 1.0], [1.0], 0.0, 1.5
+    ),
+    "equal delays": CharacteristicFunction([1.0, 0.5, 1.0], [1.0], [0.0, 1.0], 2.0, 2.0),
+    "zero of B1 on the axis": CharacteristicFunction(
+        [1.0, 2.0, 3.0, 1.0], [1.0, 0.0, 1.0], [1.0], 1.0, 2.0
+    ),
+    "zero of B1 at the origin": CharacteristicFunction(
+        [1.0, 2.0, 1.0], [0.0, 1.0], [1.5], 1.0, 2.0
+    ),
+}
+
+NEUTRAL = {
+    "first order": CharacteristicFunction([1.0, 1.0], [0.5, 1.0], [0.2, -0.5], 1.0, 1.7),
+    "integrator": CharacteristicFunction([0.0, 1.0], [-1.0, 0.8], [0.5], 1.0, 0.6),
+    "second order, one neutral term": CharacteristicFunction(
+        [1.0, -0.2, 1.0], [0.3, 0.1], [0.4, 0.0, 1.0], 2.0, 1.0
+    ),
+    "third order, unstable A": CharacteristicFunction(
+        with_roots(0.3, -1.0, -1.0), [1.0, 0.0, 0.0, 0.5], [0.0, 1.0, 0.0, 0.5], 0.8, 1.5
+    ),
+}

@@ -1,0 +1,124 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from armlock import CharacteristicFunction, CommonArm, HayesEquation, semi_discretization
+from tests import independent
+from tests.systems import NEUTRAL, RETARDED
+
+SYSTEMS = [*RETARDED.values(), *NEUTRAL.values()]
+reals = st.floats(-3.0, 3.0)
+frequencies = st.builds(complex, st.floats(-1.0, 1.0), st.floats(-5.0, 5.0))
+
+
+@given(st.sampled_from(SYSTEMS), frequencies, reals, reals)
+def test_value_is_the_definition(system, s, x, y):
+    a, b1, b2 = system.parts(s)
+    scale = abs(a) + abs(x * b1) + abs(y * b2)
+    assert abs(system(s, x, y) - independent.value(system, s, x, y)) <= 1e-13 * (1.0 + scale)
+    assert abs(system(s, x, y) - (a - x * b1 - y * b2)) <= 1e-13 * (1.0 + scale)
+
+
+@given(st.sampled_from(SYSTEMS), frequencies, reals, reals)
+def test_values_at_conjugate_arguments_are_conjugate(system, s, x, y):
+    assert system(s.conjugate(), x, y) == pytest.approx(np.conj(system(s, x, y)), rel=1e-13)
+
+
+@given(st.sampled_from(SYSTEMS), frequencies, reals, reals)
+def test_derivative_agrees_with_a_central_difference(system, s, x, y):
+    step = 1e-5
+    difference = (system(s + step, x, y) - system(s - step, x, y)) / (2.0 * step)
+    scale = sum(abs(part) for part in system.parts(s)) * (1.0 + system.longest_delay) ** 3
+    assert abs(system.derivative(s, x, y) - difference) <= 1e-8 * (scale + 10.0)
+
+
+@given(st.sampled_from(SYSTEMS), frequencies, reals, reals, st.floats(-0.5, 0.5))
+def test_shifting_moves_the_argument(system, s, x, y, sigma):
+    scale = sum(abs(part) for part in system.parts(s + sigma)) * (1.0 + abs(x) + abs(y))
+    moved = system.shifted(sigma)(s, x, y)
+    assert abs(moved - system(s + sigma, x, y)) <= 1e-12 * (1.0 + scale)
+
+
+@given(st.sampled_from(SYSTEMS), frequencies, reals, reals)
+def test_exchanging_swaps_the_parameters(system, s, x, y):
+    exchanged = system.exchanged()
+    assert exchanged(s, y, x) == pytest.approx(system(s, x, y), rel=1e-12, abs=1e-12)
+    assert exchanged.parameters == system.parameters[::-1]
+
+
+def test_a_map_shifts_and_differentiates_like_a_loop():
+    system = semi_discretization(CommonArm(tau1=2.0, tau2=1.5), 0.5, order=1)
+    s, step = 0.1 + 0.7j, 1e-6
+    assert system.shifted(0.2)(s, 0.4, 0.3) == pytest.approx(system(s + 0.2, 0.4, 0.3))
+    difference = (system(s + step, 0.4, 0.3) - system(s - step, 0.4, 0.3)) / (2.0 * step)
+    assert system.derivative(s, 0.4, 0.3) == pytest.approx(difference, rel=1e-8)
+
+
+@pytest.mark.parametrize("system", SYSTEMS, ids=repr)
+def test_exponential_sums_are_the_parts_on_the_axis(system):
+    omega = np.array([0.0, 0.3, 1.7, 11.0])
+    for piece, part in zip(system.on_boundary(), system.parts(1j * omega), strict=True):
+        groups = zip(piece.coefficients, piece.phases, strict=True)
+        value = sum(np.polyval(p[::-1], omega) * np.exp(1j * r * omega) for p, r in groups)
+        np.testing.assert_allclose(value, part, rtol=1e-12, atol=1e-12)
+
+
+def test_arguments_broadcast():
+    value = CommonArm()(1j * np.ones((4, 1, 1)), np.ones((3, 1)), np.ones(2))
+    assert value.shape == (4, 3, 2)
+
+
+def test_near_the_ideal_point_little_is_lost_to_cancellation():
+    # D(s; 1, 1) / s tends to 1 + g (tau1 + tau2) as s goes to zero.
+    s = 1e-13
+    assert CommonArm(gain=100.0)(s, 1.0, 1.0) / s == pytest.approx(4001.0, rel=1e-9)
+
+
+def test_degree_type_and_longest_delay():
+    assert CommonArm().degree == 1
+    assert not CommonArm().neutral
+    assert CommonArm().longest_delay == 20.1
+    assert all(system.neutral for system in NEUTRAL.values())
+    assert not any(system.neutral for system in RETARDED.values())
+
+
+def test_trailing_zeros_do_not_count_as_degree():
+    system = CharacteristicFunction([1.0, 1.0, 0.0], [1.0, 0.0, 0.0], [1.0], 1.0, 2.0)
+    assert system.degree == 1
+    assert not system.neutral
+
+
+def test_coefficients_cannot_be_changed():
+    with pytest.raises(ValueError, match="read-only"):
+        HayesEquation().a[0] = 1.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (([0.0], [1.0], [1.0], 1.0, 2.0), r"must not vanish"),
+        (([1.0, 1.0], [1.0, 1.0, 1.0], [1.0], 1.0, 2.0), r"^b1 must not exceed the degree"),
+        (([1.0, 1.0], [1.0], [1.0, 1.0, 1.0], 1.0, 2.0), r"^b2 must not exceed the degree"),
+        (([1.0, 1.0], [1.0], [1.0], -1.0, 2.0), r"^delay1 must not be negative, got -1\.0$"),
+        (([1.0, 1.0], [1.0], [1.0], 1.0, -2.0), r"^delay2 must not be negative, got -2\.0$"),
+        (([1.0, 1.0], [], [1.0], 1.0, 2.0), r"^b1 must hold at least one value"),
+        (([1.0, 1.0], [1.0], [[1.0]], 1.0, 2.0), r"^b2 must be one-dimensional"),
+        (([1.0, 1.0], [np.nan], [1.0], 1.0, 2.0), r"^b1 must be finite, got nan"),
+        (([1.0, 1.0], [1.0], [1.0], np.inf, 2.0), r"^delay1 must be finite, got inf$"),
+    ],
+)
+def test_what_makes_no_characteristic_function_is_named(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        CharacteristicFunction(*arguments)
+
+
+@pytest.mark.parametrize("bad", [[1j, 1.0], ["1"], [True], None])
+def test_coefficients_must_be_real_numbers(bad):
+    with pytest.raises(TypeError, match=r"^b1 must"):
+        CharacteristicFunction([1.0, 1.0], bad, [1.0], 1.0, 2.0)
+
+
+def test_the_shift_must_be_real():
+    with pytest.raises(TypeError, match=r"^sigma must be real, got the complex value 1j$"):
+        HayesEquation().shifted(1j)

@@ -1,0 +1,92 @@
+import numpy as np
+import pytest
+
+from armlock import CommonArm, HayesEquation, contour, stability_chart, unstable_roots
+from armlock.stability import last_crossing
+from tests import independent
+from tests.systems import NEUTRAL, RETARDED
+
+EPSILON = 2.0**-52
+
+
+def walk(coefficients, phases, omega_end):
+    coefficients = np.array(coefficients, dtype=complex)
+    phases = np.array(phases, dtype=float)
+    noise = np.zeros(coefficients.shape[1] + 1)
+    noise[0] = 8.0 * EPSILON * np.abs(coefficients).sum()
+    sums = coefficients.sum(axis=0)
+    return contour.winding(coefficients, sums, phases, noise, omega_end)
+
+
+def test_a_single_exponential_winds_at_its_rate():
+    argument, value, clear = walk([[1.0]], [-3.0], 100.0)
+    assert clear
+    assert argument == pytest.approx(-300.0, rel=1e-12)
+    assert value == pytest.approx(np.exp(-300j))
+
+
+@pytest.mark.parametrize("weight", [0.3, 0.99, 0.999999, 1.000001, 1.01, 3.0])
+def test_the_larger_of_two_exponentials_decides(weight):
+    # 1 + w exp(j omega) over whole turns: none for w < 1, all of them for w > 1.
+    argument, _, clear = walk([[1.0], [weight]], [0.0, 1.0], 40.0 * np.pi)
+    assert clear
+    assert argument == pytest.approx(0.0 if weight < 1.0 else 40.0 * np.pi, abs=1e-9)
+
+
+def test_a_zero_on_the_way_is_reported():
+    assert not walk([[1.0], [1.0]], [0.0, 1.0], 40.0)[2]
+    assert not walk([[-2.0, 1.0]], [0.0], 5.0)[2]
+
+
+def test_a_polynomial_gathers_the_angles_of_its_roots():
+    # (1 + j omega)^3, from 0 to 50.
+    argument, _, _ = walk([[1.0, 3j, -3.0, -1j]], [0.0], 50.0)
+    assert argument == pytest.approx(3.0 * np.arctan(50.0), rel=1e-12)
+
+
+@pytest.mark.parametrize("name", [*RETARDED, *NEUTRAL])
+def test_past_the_last_crossing_the_undelayed_term_prevails(name):
+    for systems in (RETARDED, NEUTRAL):
+        if name not in systems:
+            continue
+        system = systems[name]
+        for x, y in [(0.4, -0.4), (0.1, 0.05), (-0.3, 0.5)]:
+            end = float(last_crossing(system, x, y))
+            omega = end * np.linspace(1.0 + 1e-9, 50.0, 4000) + 1e-9
+            a, b1, b2 = (np.abs(part) for part in system.parts(1j * omega))
+            assert (a >= abs(x) * b1 + abs(y) * b2 - 1e-9 * a).all()
+
+
+def test_the_last_crossing_of_the_common_arm_is_known():
+    # omega^2 + 4 g^2 = g^2 (|c1| + |c2|)^2
+    ends = last_crossing(CommonArm(gain=3.0), [1.0, 1.5, -2.0, 3.0], [0.5, 1.5, 2.0, -3.0])
+    exact = 3.0 * np.sqrt([0.0, 5.0, 12.0, 32.0])
+    assert ends[0] == 0.0
+    assert (ends >= exact).all()
+    np.testing.assert_allclose(ends, exact, rtol=0.05)
+
+
+def test_a_row_knows_every_crossing_of_a_dense_sample():
+    system = CommonArm(gain=10.0)
+    x = np.linspace(-2.95, 2.95, 60)
+    for y in (-1.3, 0.2, 2.4):
+        counts = stability_chart(system, x, [y]).counts[0]
+        assert [independent.rectangle_count(system, p, y) for p in x[::20]] == (
+            counts[::20].tolist()
+        )
+
+
+def test_both_walks_agree_at_the_end_of_every_row():
+    chart = stability_chart(
+        CommonArm(gain=10.0), np.linspace(-3, 3, 61), np.linspace(-3, 3, 59)
+    )
+    assert chart.recounted_rows.size == 0
+    ends = unstable_roots(CommonArm(gain=10.0), np.array([-3.0, 3.0]), chart.y[:, None])
+    np.testing.assert_array_equal(chart.counts[:, [0, -1]], ends)
+
+
+def test_along_b_the_hayes_counts_change_monotonically_outward():
+    b = np.linspace(2.0, 40.0, 200)
+    counts = stability_chart(HayesEquation(), [-1.0], b).counts[:, 0]
+    assert (np.diff(counts) >= 0).all()
+    assert (np.diff(stability_chart(HayesEquation(), [-1.0], -b).counts[:, 0]) >= 0).all()

@@ -1,0 +1,168 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from armlock import (
+    CharacteristicFunction,
+    CommonArm,
+    DualArm,
+    HayesEquation,
+    d_curve,
+    d_curve_branches,
+    d_curve_line,
+    semi_discretization,
+    unstable_roots,
+)
+from tests import independent
+from tests.systems import NEUTRAL, RETARDED
+
+CURVED = {
+    name: system
+    for name, system in {**RETARDED, **NEUTRAL}.items()
+    if system.b1.any() and system.b2.any()
+}
+
+
+def test_hayes_curve_is_omega_cotangent():
+    omega = np.linspace(0.1, 40.0, 57)
+    tau = 0.7
+    a, b = d_curve(HayesEquation(tau), omega)
+    np.testing.assert_allclose(a, omega / np.tan(omega * tau), rtol=1e-11, atol=1e-12)
+    np.testing.assert_allclose(b, -omega / np.sin(omega * tau), rtol=1e-11)
+
+
+def test_hayes_line_is_b_equal_minus_a():
+    assert d_curve_line(HayesEquation(3.0)) == (1.0, 1.0, 0.0)
+
+
+def test_common_arm_curve_is_the_solution_by_cramers_rule():
+    g, tau1, tau2 = 2.0, 20.1, 19.9
+    omega = np.linspace(0.05, 12.0, 101)
+    c1, c2 = d_curve(CommonArm(g, tau1, tau2), omega)
+    # Real part: c1 cos1 + c2 cos2 = 2; imaginary part: c1 sin1 + c2 sin2 = -omega / g.
+    separation = np.sin(omega * (tau1 - tau2))
+    expected1 = (-2.0 * np.sin(omega * tau2) - omega / g * np.cos(omega * tau2)) / separation
+    expected2 = (2.0 * np.sin(omega * tau1) + omega / g * np.cos(omega * tau1)) / separation
+    np.testing.assert_allclose(c1, expected1, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(c2, expected2, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("gain", [0.1, 1.0, 1000.0])
+def test_common_arm_line_is_c1_plus_c2_equal_two(gain):
+    assert d_curve_line(CommonArm(gain)) == pytest.approx((1.0, 1.0, 2.0), rel=1e-15)
+
+
+def test_dual_arm_line_is_c1_equal_c2():
+    line = d_curve_line(DualArm())
+    assert line.value == pytest.approx(0.0, abs=1e-15)
+    assert line.weight_x == pytest.approx(-line.weight_y)
+
+
+@pytest.mark.parametrize("name", CURVED)
+def test_points_of_the_curve_have_a_root_on_the_axis(name):
+    system = CURVED[name]
+    omega = np.array([0.2, 0.9, 1.3, 2.7, 6.1])
+    x, y = d_curve(system, omega)
+    residual = independent.value(system, 1j * omega, x, y)
+    a, b1, b2 = system.parts(1j * omega)
+    assert (abs(residual) <= 1e-10 * (abs(a) + abs(x * b1) + abs(y * b2))).all()
+
+
+@pytest.mark.parametrize("name", CURVED)
+def test_the_line_has_a_root_at_zero(name):
+    system = CURVED[name]
+    wx, wy, value = d_curve_line(system)
+    x = value * wx / (wx * wx + wy * wy) + wy
+    y = value * wy / (wx * wx + wy * wy) - wx
+    assert abs(independent.value(system, 0.0, x, y)) < 1e-12
+    assert max(abs(wx), abs(wy)) == 1.0
+
+
+@given(st.sampled_from(list(CURVED)), st.floats(0.05, 20.0))
+def test_the_curve_is_even_in_frequency(name, omega):
+    assert d_curve(CURVED[name], -omega) == pytest.approx(
+        d_curve(CURVED[name], omega), rel=1e-9, abs=1e-9, nan_ok=True
+    )
+
+
+def test_crossing_the_curve_moves_a_pair_and_crossing_the_line_a_single_root():
+    system = HayesEquation()
+    a, b = d_curve(system, np.array([1.0, 2.0, 4.0, 8.0]))
+    before, after = (unstable_roots(system, a, b + shift) for shift in (-1e-4, 1e-4))
+    np.testing.assert_array_equal(np.abs(before - after), 2)
+    left, right = unstable_roots(system, np.array([-1.0, -1.0]), np.array([0.999, 1.001]))
+    assert abs(left - right) == 1
+
+
+def test_a_map_has_its_curve_on_the_unit_circle():
+    system = semi_discretization(CommonArm(tau1=2.0, tau2=1.5), 0.25, order=1)
+    omega = np.linspace(0.3, 11.0, 23)
+    x, y = d_curve(system, omega)
+    for w, p, q in zip(omega, x, y, strict=True):
+        z = independent.map_eigenvalues(system, p, q)
+        assert abs(z - np.exp(1j * w * 0.25)).min() < 1e-7
+
+
+def test_poles_and_zero_frequency_give_nan():
+    x, y = d_curve(CommonArm(), [0.0, np.pi / 0.1])
+    assert np.isnan(x[0])
+    assert np.isnan(y[0])
+    assert np.isnan(HayesEquation().tau * d_curve(HayesEquation(), 0.0)[0])
+
+
+@pytest.mark.parametrize("shape", [(), (1,), (4,), (2, 3), (0,)])
+def test_results_have_the_shape_of_omega(shape):
+    x, y = d_curve(CommonArm(), np.full(shape, 0.4))
+    assert np.shape(x) == np.shape(y) == shape
+
+
+def test_branches_of_the_common_arm_end_at_the_poles():
+    tau1, tau2 = 20.1, 19.9
+    branches = d_curve_branches(CommonArm(1.0, tau1, tau2), 60.0)
+    poles = np.pi / (tau1 - tau2) * np.arange(1, 4)
+    assert len(branches) == 4
+    edges = np.concatenate(([0.0], poles, [60.0]))
+    for branch, low, high in zip(branches, edges[:-1], edges[1:], strict=True):
+        assert low < branch.omega[0] < branch.omega[-1] < high
+        assert branch.omega[0] - low < 0.01
+        assert high - branch.omega[-1] < 0.01
+
+
+def test_branches_of_the_hayes_curve_end_at_multiples_of_pi():
+    branches = d_curve_branches(HayesEquation(), 10.0)
+    assert [int(branch.omega.mean() // np.pi) for branch in branches] == [0, 1, 2, 3]
+    for branch in branches:
+        # b = -omega / sin(omega) keeps its sign on a branch and changes it at the poles.
+        assert (np.sign(branch.y) == np.sign(branch.y[0])).all()
+
+
+@pytest.mark.parametrize("name", CURVED)
+def test_no_branch_has_a_pole_inside(name):
+    system = CURVED[name]
+    for branch in d_curve_branches(system, 8.0):
+        assert (np.diff(branch.omega) > 0.0).all()
+        assert np.isfinite(branch.x).all()
+        assert np.isfinite(branch.y).all()
+        _, b1, b2 = system.parts(1j * branch.omega)
+        determinant = np.imag(b1 * np.conj(b2))
+        assert (np.sign(determinant) == np.sign(determinant[0])).all()
+
+
+def test_more_points_per_turn_make_a_branch_denser():
+    sizes = [
+        d_curve_branches(CommonArm(), 3.0, points_per_turn=points)[0].omega.size
+        for points in (24, 48)
+    ]
+    assert sizes[1] == pytest.approx(2 * sizes[0], abs=2)
+
+
+def test_a_branch_of_a_map_ends_at_the_nyquist_frequency():
+    system = semi_discretization(CommonArm(tau1=2.0, tau2=1.5), 0.25)
+    assert d_curve_branches(system, 1e6)[-1].omega[-1] <= np.pi / 0.25
+
+
+def test_no_line_where_zero_frequency_does_not_depend_on_the_parameters():
+    system = CharacteristicFunction([1.0, 1.0, 1.0], [0.0, 1.0], [0.0, 1.0], 1.0, 2.0)
+    with pytest.raises(ValueError, match=r"^system must depend on a free parameter at s = 0"):
+        d_curve_line(system)

@@ -1,0 +1,172 @@
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from armlock import (
+    BOUNDARY,
+    CharacteristicFunction,
+    CommonArm,
+    HayesEquation,
+    SingleArm,
+    rightmost_root,
+    unstable_roots,
+)
+from armlock.roots import polish_root, pseudospectral_roots
+from tests import independent
+from tests.systems import RETARDED
+
+gains = st.floats(0.05, 3.0)
+delays = st.floats(0.2, 5.0)
+reals = st.floats(-3.0, 3.0)
+
+
+def test_acceptance_roots_of_the_hayes_equation(table):
+    for row in table("hayes_roots.csv"):
+        root = rightmost_root(HayesEquation(), float(row["a"]), float(row["b"]))
+        for text, found in (
+            (row["rightmost_real"], root.real),
+            (row["rightmost_imag"], root.imag),
+        ):
+            digits = len(text.partition(".")[2])
+            assert round(found, digits) == float(text)
+
+
+def test_acceptance_roots_of_the_common_arm(table):
+    for row in table("common_arm_roots.csv"):
+        root = rightmost_root(CommonArm(), float(row["c1"]), float(row["c2"]))
+        assert root.real == pytest.approx(float(row["rightmost_real"]), abs=1e-12)
+        assert root.imag == pytest.approx(float(row["rightmost_imag"]), abs=1e-12)
+
+
+@given(st.floats(-6.0, 3.0), st.floats(-8.0, 8.0), st.floats(0.1, 10.0))
+def test_hayes_root_is_the_principal_branch_of_lambert(a, b, tau):
+    assume(abs(b * tau * np.exp(1.0 - a) + 1.0) > 1e-3)  # away from the double root
+    assume(abs(b) > 1e-3)
+    root = rightmost_root(HayesEquation(tau), a / tau, b / tau)
+    roots = independent.hayes_roots(a / tau, b / tau, tau, branches=30)
+    expected = roots[np.argmax(roots.real)]
+    assert root.real == pytest.approx(expected.real, rel=1e-9, abs=1e-9 / tau)
+    assert root.imag == pytest.approx(abs(expected.imag), rel=1e-9, abs=1e-7 / tau)
+
+
+@given(gains, delays, delays, reals, reals)
+def test_sign_agrees_with_the_count(gain, tau1, tau2, c1, c2):
+    system = CommonArm(gain, tau1, tau2)
+    assume(abs(c1) + abs(c2) > 1e-3)
+    count = unstable_roots(system, c1, c2)
+    assume(count != BOUNDARY)
+    root = rightmost_root(system, c1, c2)
+    assert (root.real > 0.0) == (count > 0)
+    assert root.imag >= 0.0
+
+
+@given(gains, delays, delays, reals, reals)
+def test_root_is_a_zero_and_the_rightmost_of_an_independent_spectrum(gain, tau1, tau2, c1, c2):
+    system = CommonArm(gain, tau1, tau2)
+    assume(min(abs(c1), abs(c2)) > 0.05)
+    root = rightmost_root(system, c1, c2)
+    parts = np.abs(system.parts(root)) * [1.0, abs(c1), abs(c2)]
+    assert abs(independent.value(system, root, c1, c2)) <= 1e-12 * (parts.sum() + abs(root))
+    others = independent.generator_eigenvalues(system, c1, c2, 70)
+    assert others.real.max() == pytest.approx(root.real, abs=1e-6 * (1.0 + abs(root)))
+
+
+@given(gains, delays, delays, reals, reals, st.floats(0.05, 20.0))
+def test_scaling_time_scales_the_root(gain, tau1, tau2, c1, c2, k):
+    assume(abs(c1) + abs(c2) > 0.1)
+    one = rightmost_root(CommonArm(gain, tau1, tau2), c1, c2)
+    other = rightmost_root(CommonArm(k * gain, tau1 / k, tau2 / k), c1, c2)
+    assert other.real == pytest.approx(k * one.real, abs=1e-7 * k * (1.0 + abs(one)))
+
+
+@given(gains, delays, delays, reals, reals)
+def test_exchanging_the_arms_changes_nothing(gain, tau1, tau2, c1, c2):
+    assume(abs(c1) + abs(c2) > 0.1)
+    one = rightmost_root(CommonArm(gain, tau1, tau2), c1, c2)
+    other = rightmost_root(CommonArm(gain, tau2, tau1), c2, c1)
+    assert other.real == pytest.approx(one.real, abs=1e-7 * (1.0 + abs(one)))
+
+
+@pytest.mark.parametrize("name", [n for n in RETARDED if n != "no parameter"])
+def test_other_loops_agree_with_count_and_independent_spectrum(name):
+    system = RETARDED[name]
+    for x, y in [(0.4, -0.3), (-1.2, 0.8), (1.9, 1.1)]:
+        root = rightmost_root(system, x, y)
+        nodes = 40 if system.longest_delay < 5.0 else 100
+        others = independent.generator_eigenvalues(system, x, y, nodes)
+        assert others.real.max() == pytest.approx(root.real, abs=1e-7 * (1.0 + abs(root)))
+        assert (root.real > 0.0) == (unstable_roots(system, x, y) > 0)
+
+
+@pytest.mark.parametrize("gain", [1.0, 10.0, 100.0, 1000.0])
+def test_large_gains_have_a_certified_root(gain):
+    system = CommonArm(gain=gain)
+    for c1, c2 in [(3.0, 3.0), (-1.5, 1.4), (0.9, 1.05)]:
+        root = rightmost_root(system, c1, c2)
+        assert (root.real > 0.0) == (unstable_roots(system, c1, c2) > 0)
+        assert unstable_roots(system.shifted(root.real + 1e-6), c1, c2) == 0
+        assert unstable_roots(system.shifted(root.real - 1e-6), c1, c2) > 0
+
+
+def test_near_the_ideal_point_the_root_follows_its_expansion():
+    # D = s (1 + g (tau1 + tau2)) - g d to first order, with d = c1 + c2 - 2.
+    for gain in (1.0, 100.0):
+        for d in (-1e-6, -1e-9, 1e-9, 1e-6):
+            root = rightmost_root(CommonArm(gain=gain), 1.0 + d, 1.0)
+            expected = gain * ((1.0 + d) - 1.0) / (1.0 + gain * 40.0)
+            assert root.real == pytest.approx(expected, rel=2e-4, abs=1e-17)
+
+
+def test_on_the_boundary_the_root_lies_on_the_axis():
+    assert abs(rightmost_root(CommonArm(), 1.0, 1.0)) < 1e-15
+    assert abs(rightmost_root(HayesEquation(), 0.0, -np.pi / 2) - 0.5j * np.pi) < 1e-12
+
+
+def test_a_double_root_is_found_to_the_accuracy_it_has():
+    root = rightmost_root(HayesEquation(), 0.0, -np.exp(-1.0))
+    assert abs(root + 1.0) < 1e-5
+
+
+def test_without_delays_it_is_the_root_of_a_polynomial():
+    system = CharacteristicFunction([1.0, 0.0, 1.0], [1.0, 1.0], [1.0], 0.0, 0.0)
+    roots = np.roots([1.0, 1.0, 1.7])
+    assert rightmost_root(system, -1.0, 0.3) == pytest.approx(
+        complex(roots.real.max(), abs(roots.imag).max())
+    )
+
+
+def test_a_parameter_without_effect_does_not_move_the_root():
+    assert rightmost_root(SingleArm(1.0, 2.0), 0.5, 3.0) == pytest.approx(
+        rightmost_root(SingleArm(1.0, 2.0), 0.5, -3.0)
+    )
+
+
+def test_a_longer_delay_without_effect_does_not_hide_the_root():
+    system = CommonArm(1.0, tau1=0.25, tau2=4.0)
+    root = rightmost_root(system, -1.0, 0.0)
+    expected = independent.hayes_roots(-2.0, -1.0, 0.25)
+    assert root.real == pytest.approx(expected.real.max(), rel=1e-9)
+
+
+def test_results_broadcast_and_scalars_stay_scalars():
+    roots = rightmost_root(HayesEquation(), [[-1.0], [-2.0]], [-1.5, 0.5, 1.5])
+    assert roots.shape == (2, 3)
+    assert roots.dtype == complex
+    assert roots[1, 0] == rightmost_root(HayesEquation(), -2.0, -1.5)
+    assert type(rightmost_root(HayesEquation(), -1.0, -1.0)) is complex
+
+
+def test_pseudospectral_roots_converge_to_lambert():
+    expected = independent.hayes_roots(0.3, -2.0, branches=6)
+    expected = expected[np.argsort(-expected.real)][:6]
+    approximations = pseudospectral_roots(HayesEquation(), 0.3, -2.0, 60)
+    for root in expected:
+        assert abs(approximations - root).min() < 1e-9
+
+
+def test_newton_from_nearby_ends_at_the_root_and_states_its_error():
+    exact = independent.hayes_roots(0.0, -1.0, branches=0)[0]
+    root, error = polish_root(HayesEquation(), 0.0, -1.0, exact + 0.1 - 0.05j)
+    assert abs(root - exact) < 1e-14
+    assert error < 1e-12

@@ -1,0 +1,204 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from armlock import (
+    CharacteristicFunction,
+    CommonArm,
+    HayesEquation,
+    SingleArm,
+    rightmost_root,
+    semi_discretization,
+    spectral_radius,
+    stability_chart,
+    transition_matrix,
+    unstable_roots,
+)
+from tests import independent
+from tests.systems import RETARDED
+
+OSCILLATOR = CharacteristicFunction([2.0, 0.3, 1.0], [1.0], [0.0, 1.0], 1.0, 2.5)
+UNSTABLE = CharacteristicFunction([-0.5, 0.2, 1.0], [-1.0, -0.6], [0.7], 0.5, 1.5)
+THIRD = CharacteristicFunction([1.0, 2.0, 3.0, 1.0], [1.0, 0.0, 1.0], [1.0, 2.0], 1.0, 1.5)
+
+
+def test_published_spectral_radius_of_the_hayes_equation(table):
+    (row,) = [r for r in table("semidiscretization.csv") if r["system"].startswith("hayes")]
+    radius = spectral_radius(
+        HayesEquation(), -1.0, -1.0, step=float(row["h"]), order=int(row["order"])
+    )
+    # In 40 digits it is 0.94118937416656415; the published digits are that to 1.2e-15.
+    assert float(radius) == pytest.approx(0.94118937416656415, abs=2e-15)
+    assert float(radius) == pytest.approx(float(row["value"]), abs=3e-15)
+
+
+def test_spectral_radii_of_the_common_arm(table):
+    rows = [r for r in table("semidiscretization.csv") if r["system"].startswith("common")]
+    assert len(rows) == 2
+    for row in rows:
+        radius = spectral_radius(
+            CommonArm(), float(row["c1"]), float(row["c2"]), float(row["h"]), int(row["order"])
+        )
+        given_digits = len(row["value"].split("e")[0].strip("-").replace(".", ""))
+        excess = f"{float(radius) - 1.0:.{given_digits - 1}e}"
+        assert float(excess) == float(row["value"])
+
+
+@given(
+    st.floats(0.05, 3.0),
+    st.integers(1, 6),
+    st.integers(1, 6),
+    st.floats(-3.0, 3.0),
+    st.floats(-3.0, 3.0),
+    st.sampled_from([0, 1]),
+)
+def test_first_order_matrix_is_its_closed_form(gain, steps1, steps2, c1, c2, order):
+    system = CommonArm(gain, tau1=0.25 * steps1, tau2=0.25 * steps2)
+    matrix = transition_matrix(system, c1, c2, 0.25, order)
+    expected = independent.held_map(system, c1, c2, 0.25, order)
+    np.testing.assert_allclose(matrix, expected, rtol=1e-12, atol=1e-14)
+
+
+@given(st.floats(-3.0, 3.0).filter(lambda a: abs(a) > 1e-3), st.floats(-3.0, 3.0))
+def test_one_step_of_delay_gives_a_quadratic(a, b):
+    # z^2 - exp(a h) z - b (exp(a h) - 1) / a = 0 with tau = h = 1.
+    roots = np.roots([1.0, -np.exp(a), -b * np.expm1(a) / a])
+    radius = spectral_radius(HayesEquation(), a, b, step=1.0)
+    assert float(radius) == pytest.approx(np.abs(roots).max(), rel=1e-9, abs=1e-7)
+
+
+def test_an_integrator_with_one_step_of_delay_is_stable_up_to_gain_one():
+    # z^2 - z - b h = 0: Jury's conditions give -1 < b h < 0.
+    radius = spectral_radius(HayesEquation(), 0.0, [-0.999, -1.001, -0.001, 0.001], step=1.0)
+    np.testing.assert_array_equal(radius < 1.0, [True, False, True, False])
+
+
+@pytest.mark.parametrize("system", [OSCILLATOR, UNSTABLE, THIRD, CommonArm(tau1=2.5, tau2=1.0)])
+@pytest.mark.parametrize(("order", "observed"), [(0, 1.0), (1, 2.0)])
+def test_convergence_of_the_dominant_eigenvalue(system, order, observed):
+    exact = np.exp(rightmost_root(system, -0.4, 0.3).real)
+    steps = np.array([0.1, 0.05, 0.025])
+    errors = [
+        abs(float(spectral_radius(system, -0.4, 0.3, h, order)) ** (1.0 / h) - exact)
+        for h in steps
+    ]
+    slope = np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    assert slope == pytest.approx(observed, abs=0.2)
+
+
+def test_the_exact_flow_of_the_hayes_equation_is_approached():
+    exact = np.exp(0.1 * independent.hayes_roots(-1.0, -1.0).real.max())
+    assert exact == pytest.approx(0.941291800089, abs=1e-12)
+    fine = float(spectral_radius(HayesEquation(), -1.0, -1.0, 0.005, order=1)) ** 20
+    assert fine == pytest.approx(exact, abs=1e-6)
+
+
+@pytest.mark.parametrize("order", [0, 1])
+@pytest.mark.parametrize("system", [OSCILLATOR, UNSTABLE, THIRD, CommonArm(tau1=1.5, tau2=0.5)])
+def test_characteristic_function_of_the_map_has_the_eigenvalues_of_the_matrix(system, order):
+    sampled = semi_discretization(system, 0.25, order)
+    for x, y in [(0.4, -0.3), (1.7, 0.9), (-2.0, 1.1)]:
+        eigenvalues = np.linalg.eigvals(transition_matrix(system, x, y, 0.25, order))
+        eigenvalues = eigenvalues[abs(eigenvalues) > 0.1]
+        s = np.log(eigenvalues) / 0.25
+        scale = sum(abs(part) for part in sampled.parts(s)) * 3.0
+        assert (abs(sampled(s, x, y)) <= 1e-8 * scale).all()
+
+
+@pytest.mark.parametrize("order", [0, 1])
+@pytest.mark.parametrize("system", [OSCILLATOR, UNSTABLE, THIRD, CommonArm(tau1=1.5, tau2=0.5)])
+def test_counts_of_the_map_are_eigenvalues_outside_the_unit_circle(system, order):
+    sampled = semi_discretization(system, 0.25, order)
+    x, y = np.random.default_rng(3).uniform(-3.0, 3.0, (2, 40))
+    counts = unstable_roots(sampled, x, y)
+    for p, q, count in zip(x, y, counts, strict=True):
+        eigenvalues = np.linalg.eigvals(transition_matrix(system, p, q, 0.25, order))
+        assert count == np.count_nonzero(abs(eigenvalues) > 1.0)
+        assert count == independent.map_count(sampled, p, q)
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_counts_of_the_paper_map_are_eigenvalues_outside_the_unit_circle(order):
+    system = CommonArm()
+    sampled = semi_discretization(system, 0.1, order)
+    for x, y in [(0.9, 1.05), (0.5, 1.6), (-2.1, 2.5), (2.9, 0.2)]:
+        radii = abs(np.linalg.eigvals(transition_matrix(system, x, y, 0.1, order)))
+        assert unstable_roots(sampled, x, y) == np.count_nonzero(radii > 1.0)
+
+
+@pytest.mark.parametrize("order", [0, 1])
+@pytest.mark.parametrize("system", [OSCILLATOR, UNSTABLE, THIRD, CommonArm(tau1=1.5, tau2=0.5)])
+def test_chart_of_the_map_is_its_pointwise_count(system, order):
+    sampled = semi_discretization(system, 0.25, order)
+    rng = np.random.default_rng(4)
+    x, y = rng.uniform(-4.0, 4.0, 31), rng.uniform(-4.0, 4.0, 17)
+    chart = stability_chart(sampled, x, y)
+    np.testing.assert_array_equal(chart.counts, unstable_roots(sampled, x, y[:, None]))
+    assert chart.recounted_rows.size == 0
+
+
+def test_stability_of_the_map_agrees_with_its_spectral_radius_over_a_chart():
+    system = CommonArm(gain=2.0, tau1=1.5, tau2=1.0)
+    x, y = np.linspace(-2.9, 2.9, 18), np.linspace(-2.8, 2.8, 15)
+    chart = stability_chart(semi_discretization(system, 0.125), x, y)
+    radius = spectral_radius(system, x, y[:, None], 0.125)
+    np.testing.assert_array_equal(chart.stable, radius < 1.0)
+
+
+def test_the_exact_line_of_zero_frequency_survives_sampling():
+    # A constant is a solution of the map exactly where it is one of the equation.
+    for order in (0, 1):
+        sampled = semi_discretization(CommonArm(), 0.1, order)
+        np.testing.assert_array_equal(
+            unstable_roots(sampled, [1.0, 0.7, 1.0, 1.0], [1.0, 1.3, 1.0 - 1e-6, 1.0 + 1e-6]),
+            [-1, -1, 0, 1],
+        )
+
+
+def test_a_fine_map_counts_what_the_loop_has():
+    system = CommonArm(gain=0.3, tau1=2.0, tau2=1.0)
+    sampled = semi_discretization(system, 0.01, order=1)
+    x, y = np.random.default_rng(5).uniform(-6.0, 6.0, (2, 60))
+    np.testing.assert_array_equal(unstable_roots(sampled, x, y), unstable_roots(system, x, y))
+
+
+def test_a_parameter_without_effect_leaves_the_map_alone():
+    sampled = semi_discretization(SingleArm(1.0, 2.0), 0.5)
+    np.testing.assert_array_equal(unstable_roots(sampled, 0.9, [-5.0, 0.0, 5.0]), 0)
+
+
+def test_an_undelayed_parameter_is_part_of_the_flow():
+    matrix = transition_matrix(HayesEquation(), -0.7, 0.0, 0.5)
+    assert matrix[0, 0] == pytest.approx(np.exp(-0.35))
+
+
+def test_without_delayed_terms_the_matrix_is_the_flow():
+    system = CharacteristicFunction([2.0, 0.3, 1.0], [1.0], [0.0, 1.0], 0.0, 0.0)
+    eigenvalues = np.linalg.eigvals(transition_matrix(system, 0.5, -1.0, 0.5))
+    roots = np.roots([1.0, 1.3, 1.5])
+    np.testing.assert_allclose(
+        sorted(eigenvalues, key=np.imag), sorted(np.exp(0.5 * roots), key=np.imag), rtol=1e-12
+    )
+
+
+@pytest.mark.parametrize("name", ["single arm", "common arm", "dual arm"])
+def test_the_matrix_has_one_row_for_each_state_and_sample(name):
+    system = RETARDED[name]
+    size = system.degree + round(system.longest_delay / 0.1)
+    assert transition_matrix(system, 0.5, 0.5, 0.1).shape == (size, size)
+
+
+def test_delays_off_the_grid_by_rounding_alone_are_accepted():
+    # int(19.9 / 0.05) is 397.
+    assert transition_matrix(CommonArm(), 1.0, 1.0, 0.05).shape == (403, 403)
+    row = transition_matrix(CommonArm(), 1.0, 2.0, 0.05)[0]
+    assert np.flatnonzero(row).tolist() == [0, 398, 402]
+    assert row[398] == pytest.approx(2.0 * row[402])
+
+
+def test_spectral_radius_broadcasts():
+    radius = spectral_radius(HayesEquation(), np.zeros((2, 1)), [-1.0, -0.5, 0.5], 0.1)
+    assert radius.shape == (2, 3)
+    np.testing.assert_array_equal(radius[0], radius[1])
+    assert spectral_radius(HayesEquation(), -1.0, 0.0, 0.1).shape == ()

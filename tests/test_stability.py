@@ -1,0 +1,491 @@
+import itertools
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from scipy.optimize import minimize_scalar
+
+from armlock import (
+    BOUNDARY,
+    UNCONFINED,
+    CharacteristicFunction,
+    CommonArm,
+    CountError,
+    DualArm,
+    HayesEquation,
+    SingleArm,
+    d_curve,
+    stability_chart,
+    unstable_roots,
+)
+from tests import independent
+from tests.systems import NEUTRAL, RETARDED, with_roots
+
+RETARDED_AND_NEUTRAL = {**RETARDED, **{f"neutral {n}": s for n, s in NEUTRAL.items()}}
+
+reals = st.floats(-3.0, 3.0)
+gains = st.floats(0.01, 3.0)
+delays = st.floats(0.2, 5.0)
+
+
+def counts_agree(one, other):
+    """Whether two counts are the same, where neither is a boundary point."""
+    return one == other or BOUNDARY in (one, other)
+
+
+class TestHayes:
+    @given(
+        st.floats(-8.0, 8.0),
+        st.floats(-12.0, 12.0).filter(lambda b: abs(b) > 1e-9),
+        st.floats(0.05, 20.0),
+    )
+    @settings(max_examples=200)
+    def test_count_is_the_number_of_lambert_roots_on_the_right(self, a, b, tau):
+        system = HayesEquation(tau)
+        count = unstable_roots(system, a / tau, b / tau)
+        assume(count != BOUNDARY)
+        assert count == independent.hayes_count(a / tau, b / tau, tau)
+
+    def test_dense_sample_agrees_with_lambert_and_with_the_sampled_contour(self):
+        system = HayesEquation()
+        a, b = np.random.default_rng(1).uniform(-15.0, 15.0, (2, 300))
+        counts = unstable_roots(system, a, b)
+        expected = [independent.hayes_count(p, q) for p, q in zip(a, b, strict=True)]
+        np.testing.assert_array_equal(counts, expected)
+        sampled = [
+            independent.rectangle_count(system, p, q)
+            for p, q in zip(a[:60], b[:60], strict=True)
+        ]
+        np.testing.assert_array_equal(counts[:60], sampled)
+
+    def test_stable_region_is_the_known_one(self):
+        # a < 1/tau and a < -b < sqrt(omega^2 + a^2), omega tau the root of a = omega cot.
+        tau = 0.8
+        omega = np.linspace(0.01, np.pi - 0.01, 60) / tau
+        a, b = omega / np.tan(omega * tau), -omega / np.sin(omega * tau)
+        system = HayesEquation(tau)
+        np.testing.assert_array_equal(unstable_roots(system, a, b + 1e-6), 0)
+        np.testing.assert_array_equal(unstable_roots(system, a, b - 1e-6), 2)
+        edge = np.linspace(-9.0, 1.0 / tau - 0.02, 60)
+        np.testing.assert_array_equal(unstable_roots(system, edge, -edge - 1e-6), 0)
+        np.testing.assert_array_equal(unstable_roots(system, edge, -edge + 1e-6), 1)
+
+    def test_points_of_the_curve_and_of_the_line_are_boundary_points(self):
+        a, b = d_curve(HayesEquation(), np.linspace(0.05, 3.1, 400))
+        np.testing.assert_array_equal(unstable_roots(HayesEquation(), a, b), BOUNDARY)
+        a = np.linspace(-4.0, 4.0, 33)
+        np.testing.assert_array_equal(unstable_roots(HayesEquation(), a, -a), BOUNDARY)
+        b = -np.pi / 2.0 * np.array([1.0, -3.0, 5.0])
+        np.testing.assert_array_equal(unstable_roots(HayesEquation(), 0.0, b), BOUNDARY)
+
+    def test_number_of_roots_grows_by_two_from_ring_to_ring(self):
+        # On a = 0, pairs cross upward at b = -pi/2 - 2 pi n and b = 3 pi/2 + 2 pi n.
+        b = -np.pi / 2.0 - 2.0 * np.pi * np.arange(8)
+        np.testing.assert_array_equal(
+            unstable_roots(HayesEquation(), 0.0, b - 0.1), 2 * np.arange(1, 9)
+        )
+        b = 1.5 * np.pi + 2.0 * np.pi * np.arange(8)
+        np.testing.assert_array_equal(
+            unstable_roots(HayesEquation(), 0.0, b + 0.1), 2 * np.arange(1, 9) + 1
+        )
+
+    @given(st.floats(0.01, 50.0), st.floats(-0.999, 0.999))
+    def test_single_arm_is_stable_for_perturbations_below_one(self, gain, perturbation):
+        system = SingleArm(gain=gain)
+        assert unstable_roots(system, perturbation, 0.0) == 0
+        assert unstable_roots(system, 1.0, 0.0) == BOUNDARY
+
+    def test_single_arm_is_unstable_above_one_and_far_below_minus_one(self):
+        assert (unstable_roots(SingleArm(), [1.001, 2.0, -3.0], 0.0) > 0).all()
+
+
+class TestCommonArm:
+    def test_acceptance_counts(self, table):
+        for row in table("common_arm_roots.csv"):
+            c1, c2, count = float(row["c1"]), float(row["c2"]), int(row["unstable_roots"])
+            assert unstable_roots(CommonArm(), c1, c2) == count
+            assert independent.spectral_count(CommonArm(), c1, c2, 200) == count
+            assert independent.rectangle_count(CommonArm(), c1, c2) == count
+
+    @given(gains, delays, delays, reals, reals)
+    @settings(max_examples=150)
+    def test_count_agrees_with_two_other_methods(self, gain, tau1, tau2, c1, c2):
+        system = CommonArm(gain, tau1, tau2)
+        count = unstable_roots(system, c1, c2)
+        assume(count != BOUNDARY)
+        eigenvalues = independent.generator_eigenvalues(system, c1, c2, 90)
+        assume(abs(eigenvalues.real).min() > 1e-8)
+        assert count == np.count_nonzero(eigenvalues.real > 0.0)
+        assert count == independent.rectangle_count(system, c1, c2)
+
+    @given(
+        st.floats(0.01, 1000.0), delays, delays, st.floats(0.0, 0.9999), st.floats(-1.0, 1.0)
+    )
+    def test_the_diamond_is_stable_whatever_gain_and_delays(self, gain, tau1, tau2, size, way):
+        c1 = 2.0 * size * way
+        c2 = 2.0 * size * (1.0 - abs(way)) * (-1.0 if way > 0.3 else 1.0)
+        assert unstable_roots(CommonArm(gain, tau1, tau2), c1, c2) == 0
+
+    @given(gains, delays, delays, reals, reals)
+    def test_the_parity_of_the_count_is_the_sign_at_zero(self, gain, tau1, tau2, c1, c2):
+        count = unstable_roots(CommonArm(gain, tau1, tau2), c1, c2)
+        assume(count != BOUNDARY)
+        assert count % 2 == (1 if c1 + c2 > 2.0 else 0)
+
+    @given(gains, delays, delays, reals, reals)
+    def test_exchanging_the_arms_changes_nothing(self, gain, tau1, tau2, c1, c2):
+        one = unstable_roots(CommonArm(gain, tau1, tau2), c1, c2)
+        other = unstable_roots(CommonArm(gain, tau2, tau1), c2, c1)
+        assert counts_agree(one, other)
+
+    @given(gains, delays, delays, reals, reals, st.floats(0.01, 100.0))
+    def test_scaling_time_changes_nothing(self, gain, tau1, tau2, c1, c2, k):
+        one = unstable_roots(CommonArm(gain, tau1, tau2), c1, c2)
+        other = unstable_roots(CommonArm(k * gain, tau1 / k, tau2 / k), c1, c2)
+        assert counts_agree(one, other)
+
+    @given(gains, delays, reals, reals)
+    def test_equal_delays_make_it_a_hayes_equation(self, gain, tau, c1, c2):
+        count = unstable_roots(CommonArm(gain, tau, tau), c1, c2)
+        assume(count != BOUNDARY)
+        assert count == independent.hayes_count(-2.0 * gain, gain * (c1 + c2), tau)
+
+    @pytest.mark.parametrize("gain", [0.1, 1.0, 10.0, 100.0])
+    def test_large_gains_agree_with_a_sampled_contour(self, gain):
+        system = CommonArm(gain=gain)
+        x, y = np.random.default_rng(7).uniform(-3.0, 3.0, (2, 12 if gain < 50 else 2))
+        counts = unstable_roots(system, x, y)
+        sampled = [independent.rectangle_count(system, p, q) for p, q in zip(x, y, strict=True)]
+        np.testing.assert_array_equal(counts, sampled)
+
+    def test_the_ideal_point_and_its_line_are_boundary_points_at_any_gain(self):
+        c1 = np.linspace(-3.0, 3.0, 49)
+        for gain in (1e-3, 1.0, 10.0, 1000.0):
+            np.testing.assert_array_equal(
+                unstable_roots(CommonArm(gain=gain), c1, 2.0 - c1), BOUNDARY
+            )
+
+    @pytest.mark.parametrize("gain", [0.01, 1.0, 10.0, 1000.0])
+    @pytest.mark.parametrize("distance", [1e-4, 1e-7, 1e-10, 1e-12])
+    def test_sides_of_the_ideal_point_are_told_apart(self, gain, distance):
+        system = CommonArm(gain=gain)
+        for c1, c2 in [(1.0, 1.0), (0.6, 1.4)]:
+            assert unstable_roots(system, c1 - distance, c2) == 0
+            assert unstable_roots(system, c1 + distance, c2) == 1
+
+    def test_within_rounding_of_the_boundary_nothing_is_guessed(self):
+        # The sign of c1 + c2 - 2 is exact here: c2 = 1 + k eps, and c1 = 1.
+        k = np.arange(-400, 401)
+        counts = unstable_roots(CommonArm(), 1.0, 1.0 + k * np.finfo(float).eps)
+        truth = np.where(k > 0, 1, 0)
+        assert ((counts == truth) | (counts == BOUNDARY)).all()
+        assert (counts[abs(k) > 300] != BOUNDARY).all()
+        assert counts[400] == BOUNDARY
+
+    def test_near_the_curve_high_precision_decides(self):
+        system = CommonArm(gain=10.0)
+        omega = 4.5
+        c1, c2 = (float(c) for c in d_curve(system, omega))
+        for shift in (-1e-9, -1e-11, -1e-12, 1e-12, 1e-11, 1e-9):
+            with mpmath.workdps(40):
+                g, t1, t2 = mpmath.mpf(10), mpmath.mpf(20.1), mpmath.mpf(19.9)
+                p, q = mpmath.mpf(c1 + shift), mpmath.mpf(c2)
+
+                def value(s, g=g, t1=t1, t2=t2, p=p, q=q):
+                    return s + 2 * g - g * p * mpmath.exp(-s * t1) - g * q * mpmath.exp(-s * t2)
+
+                root = mpmath.findroot(value, mpmath.mpc(0, omega))
+            assert abs(root.imag - omega) < 1e-6
+            here = unstable_roots(system, c1 + shift, c2)
+            far = unstable_roots(system, c1 + np.copysign(1e-5, shift), c2)
+            assert counts_agree(here, far)
+            both = unstable_roots(system, c1 + np.array([-1e-5, 1e-5]), c2)
+            assert (root.real > 0) == (far == both.max())
+            if abs(shift) >= 1e-9:
+                assert here != BOUNDARY
+
+
+class TestOtherLoops:
+    @pytest.mark.parametrize("name", RETARDED)
+    def test_count_agrees_with_two_other_methods(self, name):
+        system = RETARDED[name]
+        nodes = 50 if system.longest_delay < 5.0 else 120
+        x, y = np.random.default_rng(2).uniform(-2.5, 2.5, (2, 8))
+        for p, q in zip(x, y, strict=True):
+            count = unstable_roots(system, p, q)
+            assert count == independent.rectangle_count(system, p, q)
+            assert count == independent.spectral_count(system, p, q, nodes)
+
+    @pytest.mark.parametrize("name", NEUTRAL)
+    def test_neutral_count_agrees_with_a_sampled_contour(self, name):
+        system = NEUTRAL[name]
+        x, y = np.random.default_rng(2).uniform(-0.55, 0.55, (2, 15))
+        for p, q in zip(x, y, strict=True):
+            count = unstable_roots(system, p, q)
+            assert count == independent.rectangle_count(system, p, q)
+
+    @pytest.mark.parametrize("name", NEUTRAL)
+    def test_a_neutral_chain_that_is_not_confined_has_no_count(self, name):
+        system = NEUTRAL[name]
+        leads = [abs(b[-1]) if b.size == system.a.size else 0.0 for b in (system.b1, system.b2)]
+        x, y = np.random.default_rng(2).uniform(-3.0, 3.0, (2, 200))
+        chain = abs(x) * leads[0] + abs(y) * leads[1]
+        counts = unstable_roots(system, x, y)
+        np.testing.assert_array_equal(counts == UNCONFINED, chain >= abs(system.a[-1]))
+
+    def test_a_neutral_chain_on_its_limit_has_no_count(self):
+        system = CharacteristicFunction([1.0, 1.0], [0.0, 1.0], [1.0], 1.0, 2.0)
+        np.testing.assert_array_equal(unstable_roots(system, [1.0, -1.0], 0.1), UNCONFINED)
+
+    @pytest.mark.parametrize(
+        ("roots", "count"),
+        [
+            ((-1.0, -2.0, -3.0), 0),
+            ((0.5,), 1),
+            ((0.5, 0.5, 0.5), 3),
+            ((1e-6 + 1j, 1e-6 - 1j, -1.0), 2),
+            ((1j, -1j, 1.0), BOUNDARY),
+            ((0.0, -1.0), BOUNDARY),
+            ((0.0, 0.0, 0.0, 0.0, 0.0), BOUNDARY),
+            ((2j, -2j, 2j, -2j), BOUNDARY),
+        ],
+    )
+    def test_without_parameters_the_roots_of_a_count(self, roots, count):
+        b1, b2 = [1.0], [0.5]
+        system = CharacteristicFunction(with_roots(*roots), b1, b2, 1.0, 2.0)
+        assert unstable_roots(system, 0.0, 0.0) == count
+
+    def test_without_delays_the_roots_of_a_polynomial_count(self):
+        system = CharacteristicFunction([2.0, 1.0, 3.0, 1.0], [1.0, 1.0], [0.0, 0.0, 1.0], 0, 0)
+        x, y = np.random.default_rng(3).uniform(-5.0, 5.0, (2, 50))
+        for p, q in zip(x, y, strict=True):
+            roots = np.roots([1.0, 3.0 - q, 1.0 - p, 2.0 - p])
+            assert unstable_roots(system, p, q) == np.count_nonzero(roots.real > 0.0)
+
+    @given(st.sampled_from(list(RETARDED)), reals, reals)
+    def test_the_parity_of_the_count_is_the_sign_at_zero(self, name, x, y):
+        system = RETARDED[name]
+        count = unstable_roots(system, x, y)
+        assume(count != BOUNDARY)
+        negative = independent.value(system, 0.0, x, y).real * system.a[-1] < 0.0
+        assert count % 2 == int(negative)
+
+    def test_exchanging_the_arms_of_the_dual_arm_changes_nothing(self):
+        x, y = np.random.default_rng(4).uniform(-3.0, 3.0, (2, 40))
+        one = unstable_roots(DualArm(1.0, 2.1, 1.9, 1.3), x, y)
+        other = unstable_roots(DualArm(1.0, 1.9, 2.1, 1.3), y, x)
+        np.testing.assert_array_equal(one, other)
+
+    def test_the_equal_diagonal_of_the_dual_arm_is_a_boundary(self):
+        c = np.linspace(-2.0, 2.0, 21)
+        np.testing.assert_array_equal(unstable_roots(DualArm(), c, c), BOUNDARY)
+
+    def test_scalars_and_arrays_keep_their_shapes(self):
+        assert unstable_roots(CommonArm(), 0.5, 0.5).shape == ()
+        assert unstable_roots(CommonArm(), [0.5], 0.5).shape == (1,)
+        assert unstable_roots(CommonArm(), [], 0.5).shape == (0,)
+        assert unstable_roots(CommonArm(), np.zeros((2, 1)), np.zeros(3)).shape == (2, 3)
+        assert unstable_roots(CommonArm(), 0.5, 0.5).dtype == np.int64
+
+    def test_integers_are_numbers(self):
+        np.testing.assert_array_equal(unstable_roots(CommonArm(), [3, 0], [3, 1]), [31, 0])
+
+    def test_parameters_that_underflow_are_not_guessed(self):
+        with pytest.raises(CountError):
+            unstable_roots(HayesEquation(), 0.0, 1e-200)
+
+    def test_counts_that_overflow_are_not_guessed(self):
+        for system, c1 in [(CommonArm(), 1e100), (CommonArm(), 1e200), (CommonArm(1e200), 1.5)]:
+            with pytest.raises(CountError) as caught:
+                unstable_roots(system, c1, 1.1)
+            np.testing.assert_array_equal(caught.value.points, [[c1, 1.1]])
+
+
+class TestChart:
+    @pytest.mark.parametrize("name", RETARDED_AND_NEUTRAL)
+    def test_every_point_is_the_count_at_that_point(self, name):
+        system = RETARDED_AND_NEUTRAL[name]
+        rng = np.random.default_rng(11)
+        x, y = rng.uniform(-2.5, 2.5, 41), rng.uniform(-2.5, 2.5, 23)
+        chart = stability_chart(system, x, y)
+        np.testing.assert_array_equal(chart.counts, unstable_roots(system, x, y[:, None]))
+
+    @pytest.mark.parametrize("name", NEUTRAL)
+    def test_neutral_charts_are_the_count_at_each_point_up_to_the_limit(self, name):
+        system = NEUTRAL[name]
+        x, y = np.linspace(-2.0, 2.0, 33), np.linspace(-2.0, 2.0, 17)
+        chart = stability_chart(system, x, y)
+        np.testing.assert_array_equal(chart.counts, unstable_roots(system, x, y[:, None]))
+
+    @pytest.mark.parametrize("gain", [0.01, 1.0, 10.0, 100.0])
+    def test_every_point_at_any_gain(self, gain):
+        system = CommonArm(gain=gain)
+        rng = np.random.default_rng(12)
+        x, y = rng.uniform(-3.0, 3.0, 30), rng.uniform(-3.0, 3.0, 30 if gain < 50 else 6)
+        chart = stability_chart(system, x, y)
+        np.testing.assert_array_equal(chart.counts, unstable_roots(system, x, y[:, None]))
+        assert chart.recounted_rows.size == 0
+        assert not chart.counted_singly.any()
+
+    @given(
+        st.lists(reals, min_size=1, max_size=6),
+        st.lists(reals, min_size=1, max_size=6),
+        gains,
+        delays,
+        delays,
+    )
+    def test_any_axes_give_the_pointwise_count(self, x, y, gain, tau1, tau2):
+        system = CommonArm(gain, tau1, tau2)
+        chart = stability_chart(system, x, y)
+        pointwise = unstable_roots(system, x, np.array(y)[:, None])
+        np.testing.assert_array_equal(chart.counts, pointwise)
+
+    def test_axes_may_be_unsorted_uneven_and_repeat(self):
+        x = np.array([2.0, -1.0, 0.3, 0.3, 2.9, -1.0, -2.999, 0.30000001])
+        y = np.array([1.7, 1.7, -2.0, 0.0])
+        chart = stability_chart(CommonArm(), x, y)
+        assert chart.counts.shape == (4, 8)
+        np.testing.assert_array_equal(chart.counts, unstable_roots(CommonArm(), x, y[:, None]))
+        np.testing.assert_array_equal(chart.x, x)
+        np.testing.assert_array_equal(chart.y, y)
+
+    @pytest.mark.parametrize("point", [(0.0, 0.0), (1.0, 1.0), (2.0, 2.0), (-3.0, 0.1)])
+    def test_an_axis_may_hold_a_single_value(self, point):
+        count = unstable_roots(CommonArm(), *point)
+        x, y = ([coordinate] for coordinate in point)
+        assert stability_chart(CommonArm(), x, y).counts.tolist() == [[count]]
+        assert stability_chart(CommonArm(), x * 3, y * 2).counts.tolist() == [[count] * 3] * 2
+
+    @pytest.mark.parametrize("width", [1e-9, 1e-12])
+    @pytest.mark.parametrize("centre", [(1.0, 1.0), (0.7, 1.3), (2.0, 0.0)])
+    def test_a_tiny_window_shows_the_line_through_it(self, centre, width):
+        offsets = width * np.arange(-4, 5)
+        x, y = centre[0] + offsets, centre[1] + offsets
+        system = CommonArm(gain=10.0)
+        chart = stability_chart(system, x, y)
+        np.testing.assert_array_equal(chart.counts, unstable_roots(system, x, y[:, None]))
+        side = np.add.outer(np.arange(-4, 5), np.arange(-4, 5))
+        np.testing.assert_array_equal(chart.counts[side < 0], 0)
+        np.testing.assert_array_equal(chart.counts[side > 0], 1)
+
+    def test_points_on_the_line_are_boundary_points(self):
+        c = np.linspace(0.0, 2.0, 33)
+        counts = stability_chart(CommonArm(), c, c).counts
+        np.testing.assert_array_equal(np.flipud(counts).diagonal(), BOUNDARY)
+        assert (counts == BOUNDARY).sum() == 33
+
+    @pytest.mark.parametrize("gain", [1.0, 10.0, 100.0])
+    def test_points_of_the_curve_are_boundary_points(self, gain):
+        system = CommonArm(gain=gain)
+        x, y = d_curve(system, np.linspace(0.01, 1.9 * gain, 4000))
+        near = (abs(x) < 4.0) & (abs(y) < 4.0)
+        assert near.sum() > 30
+        # The points themselves are rounded, a few of them by more than a count can see.
+        assert (unstable_roots(system, x[near], y[near]) == BOUNDARY).mean() > 0.995
+
+    def test_a_row_through_a_point_of_the_curve_reports_it(self):
+        system = CommonArm(gain=10.0)
+        x0, y0 = d_curve(system, 4.3)
+        x = np.array([x0 - 0.01, x0, x0 + 0.01])
+        counts = stability_chart(system, x, [y0]).counts[0]
+        assert counts[1] == BOUNDARY
+        assert abs(counts[2] - counts[0]) == 2
+
+    def test_stable_points_are_those_with_count_zero(self):
+        chart = stability_chart(CommonArm(), np.linspace(-3, 3, 25), np.linspace(-3, 3, 25))
+        np.testing.assert_array_equal(chart.stable, chart.counts == 0)
+        inside = np.add.outer(np.abs(chart.y), np.abs(chart.x)) < 2.0 - 1e-9
+        assert chart.stable[inside].all()
+
+    @given(gains, delays, delays, reals)
+    def test_counts_are_constant_between_crossings(self, gain, tau1, tau2, y):
+        system = CommonArm(gain, tau1, tau2)
+        omega = np.linspace(1e-4, 7.5 * gain, 4001)
+        # Along a row, D = 0 at x = (A - y B2) / B1 where that is real.
+        a, b1, b2 = system.parts(1j * omega)
+        ratio = (a - y * b2) / b1
+        change = np.flatnonzero(np.diff(np.sign(ratio.imag)) != 0)
+        gap = np.abs(np.diff(ratio)).max()
+        crossings = np.sort(np.append(ratio.real[change], 2.0 - y))
+        edges = np.concatenate(([-3.0], crossings[abs(crossings) < 3.0], [3.0]))
+        for low, high in itertools.pairwise(edges):
+            if high - low > 3.0 * gap:
+                x = np.linspace(low + gap, high - gap, 7)
+                assert np.unique(unstable_roots(system, x, y)).size == 1
+
+
+class TestTangentRows:
+    """Rows that touch the D-curve, where two crossings merge and vanish."""
+
+    @staticmethod
+    def extrema(system, lowest, highest, largest):
+        """Extrema of y along the curve, as (omega, x, y), resolved to rounding."""
+        omega = np.linspace(lowest, highest, 6000)
+        x, y = d_curve(system, omega)
+        turns = np.flatnonzero(np.diff(np.sign(np.diff(y))) != 0) + 1
+        found = []
+        for k in turns[(abs(y[turns]) < largest) & (abs(x[turns]) < largest)]:
+            sign = -np.sign(y[k] - y[k - 1])
+            best = minimize_scalar(
+                lambda w, sign=sign: sign * float(d_curve(system, w)[1]),
+                bounds=(omega[k - 1], omega[k + 1]),
+                method="bounded",
+                options={"xatol": 1e-13},
+            ).x
+            found.append((best, *(float(value) for value in d_curve(system, best))))
+        return found
+
+    CASES = (
+        (CommonArm(gain=10.0), 0.1, 30.0, 3.0),
+        (CommonArm(gain=100.0), 3.0, 12.0, 3.0),
+        (CommonArm(gain=1.0, tau1=2.0, tau2=0.7), 0.1, 12.0, 8.0),
+        (RETARDED["third order, unstable A"], 0.1, 6.0, 30.0),
+    )
+
+    @pytest.mark.parametrize("case", CASES, ids=lambda case: repr(case[0])[:60])
+    def test_rows_at_and_beside_an_extremum_are_counted_as_points_are(self, case):
+        extrema = self.extrema(*case)
+        assert len(extrema) >= 1
+        system = case[0]
+        offsets = np.array([0.0, 1e-12, 1e-9, 1e-7, 1e-5, 1e-3])
+        offsets = np.unique(np.concatenate((-offsets, offsets)))
+        shifts = np.array([-1e-9, -1e-12, 0.0, 1e-12, 1e-9])
+        for _, x0, y0 in extrema[:6]:
+            x = np.concatenate(([-2.9], x0 + offsets, [2.9]))
+            y = y0 + shifts
+            counts = stability_chart(system, x, y).counts
+            pointwise = unstable_roots(system, x, y[:, None])
+            np.testing.assert_array_equal(counts[[0, -1]], pointwise[[0, -1]])
+            differs = counts != pointwise
+            assert (np.minimum(counts, pointwise)[differs] == BOUNDARY).all()
+            # Away from the touching point, all five rows lie in the same regions.
+            clear = counts[:, [1, -2]]
+            assert (clear >= 0).all()
+            np.testing.assert_array_equal(clear, np.broadcast_to(clear[0], clear.shape))
+
+    @pytest.mark.parametrize("case", CASES[1:], ids=lambda case: repr(case[0])[:60])
+    def test_beside_an_extremum_a_sampled_contour_agrees(self, case):
+        system = case[0]
+        for _, x0, y0 in self.extrema(*case)[:2]:
+            for x in (x0 - 1e-3, x0 + 1e-3):
+                count = unstable_roots(system, x, y0)
+                assert count == independent.rectangle_count(system, x, y0)
+
+    @pytest.mark.parametrize("case", CASES, ids=lambda case: repr(case[0])[:60])
+    def test_a_pair_appears_between_two_close_crossings(self, case):
+        system = case[0]
+        (omega, x0, y0), *_ = self.extrema(*case)
+        nearby = d_curve(system, omega * (1.0 + np.array([-1e-4, 1e-4])))
+        side = np.sign(nearby[1] - y0).sum() / 2.0
+        assert abs(side) == 1.0
+        depth = np.abs(nearby[1] - y0).min()
+        y = y0 + side * np.array([-0.5, 0.5]) * depth
+        between = unstable_roots(system, x0, y)
+        outside = unstable_roots(system, x0 + np.array([[-1e-2], [1e-2]]) * abs(x0), y[1])
+        assert abs(between[1] - between[0]) in (0, 2)
+        chart = stability_chart(system, [x0 - 1e-2 * abs(x0), x0, x0 + 1e-2 * abs(x0)], y)
+        assert chart.counts[0, 1] == between[0]
+        assert chart.counts[1, 1] == between[1]
+        np.testing.assert_array_equal(chart.counts[1, [0, 2]], outside.ravel())
