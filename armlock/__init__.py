@@ -15,6 +15,7 @@ from armlock.controllers import Controller
 from armlock.dsubdivision import d_curve, d_curve_branches, d_curve_line
 from armlock.loops import CommonArm, DualArm, HayesEquation, Loop, SingleArm, paper_loop
 from armlock.margins import Margins, critical_perturbation, margins, modulus_margin
+from armlock.noise import LaserNoise, PerturbationNoise, ShapedNoise
 from armlock.nyquist import (
     AxisCrossings,
     NyquistCurve,
@@ -24,6 +25,15 @@ from armlock.nyquist import (
 )
 from armlock.roots import RootError, rightmost_root
 from armlock.semidiscretization import semi_discretization, spectral_radius, transition_matrix
+from armlock.simulation import (
+    DivergenceError,
+    Simulation,
+    sampled_open_loop,
+    save_series,
+    simulate,
+    simulate_blocks,
+)
+from armlock.spectra import Spectrum, SpectrumEstimator, amplitude_spectrum
 from armlock.stability import (
     BOUNDARY,
     UNCONFINED,
@@ -43,14 +53,22 @@ __all__ = [
     "CommonArm",
     "Controller",
     "CountError",
+    "DivergenceError",
     "DualArm",
     "HayesEquation",
+    "LaserNoise",
     "Loop",
     "Margins",
     "NyquistCurve",
+    "PerturbationNoise",
     "RootError",
+    "ShapedNoise",
+    "Simulation",
     "SingleArm",
+    "Spectrum",
+    "SpectrumEstimator",
     "StabilityChart",
+    "amplitude_spectrum",
     "axis_crossings",
     "critical_perturbation",
     "d_curve",
@@ -62,7 +80,11 @@ __all__ = [
     "nyquist",
     "paper_loop",
     "rightmost_root",
+    "sampled_open_loop",
+    "save_series",
     "semi_discretization",
+    "simulate",
+    "simulate_blocks",
     "spectral_radius",
     "stability_chart",
     "transition_matrix",

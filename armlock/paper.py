@@ -35,3 +35,16 @@ CONTROLLER_GAIN: Final = 5000.0
 TABLE_2_STAGE_1_POLE: Final = 2.0 * math.pi * 1e-6
 TABLE_2_ZEROS: Final = tuple(2.0 * math.pi * f for f in (1e-8, 5e-6, 5e-6, 5e-6))
 TABLE_2_POLES: Final = tuple(2.0 * math.pi * f for f in (1e-6, 5e-5, 4e-4, 5e-5))
+
+#: Frequency noise of the free-running laser at 1 Hz in Hz/sqrt(Hz); it falls as 1/f
+#: (Sec. IV.C).
+LASER_NOISE: Final = 30.0
+
+#: Sample rate in Hz and duration in s of the simulation (Sec. IV.C).
+SAMPLE_RATE: Final = 200.0
+DURATION: Final = 200_000.0
+
+#: Phase noise level in rad/sqrt(Hz) and its corner in Hz (Appendix, the spectrum taken for
+#: the perturbations).
+PHASE_NOISE_LEVEL: Final = 3.6e-5
+PHASE_NOISE_CORNER: Final = 2.8e-3

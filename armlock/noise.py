@@ -1,0 +1,351 @@
+"""Noise of a prescribed amplitude spectral density, from a seed, in blocks.
+
+White Gaussian samples go through a filter whose response has the prescribed magnitude, so
+that a series of any length can be drawn without ever being held as a whole. All spectral
+densities are one-sided.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+from numba.cpython.unsafe.tuple import tuple_setitem
+from scipy.linalg import solve_continuous_lyapunov
+
+from armlock import paper
+from armlock.sampled import Row, floats, real_system, sample, warped
+from armlock.validation import FloatArray, positive_number
+
+#: Half the number of samples over which the laser's noise is smoothed, see `LaserNoise`.
+_REACH = 12
+#: The band, as a share of half the sample rate, in which that smoothing is fitted.
+_FITTED = 0.96
+
+
+class ShapedNoise:
+    """White noise through a rational filter: the sampled form of one in continuous time.
+
+    Parameters
+    ----------
+    zeros, poles : sequence of complex
+        Of the filter, in rad/s.
+    gain : float
+        Its gain; its magnitude at s = j omega is the amplitude spectral density.
+    seed : int
+        Of the random numbers.
+    sample_rate : float, optional
+        In Hz.
+    at_rest : bool, optional
+        Whether the filter starts at rest, and the series at about zero, as a simulation that
+        is switched on would have it. By default it starts in the middle of its stationary
+        course.
+
+    Notes
+    -----
+    The trapezoidal rule makes the density at f that of the filter at
+    tan(pi f T) / (pi T), see `armlock.sampled.warped`. One draw and many give the same
+    series, bit by bit.
+    """
+
+    def __init__(
+        self,
+        zeros: tuple[complex, ...],
+        poles: tuple[complex, ...],
+        gain: float,
+        *,
+        seed: int,
+        sample_rate: float = 200.0,
+        at_rest: bool = False,
+    ) -> None:
+        self.sample_rate = positive_number("sample_rate", sample_rate)
+        if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+            raise ValueError(f"seed must be an integer from 0 on, got {seed!r}")
+        self._random = np.random.default_rng(seed)
+        continuous = real_system(zeros, poles, gain)
+        self._sampled = sample(continuous, self.sample_rate)
+        # White samples of variance one have the one-sided density 2 / sample_rate.
+        self._scale = math.sqrt(0.5 * self.sample_rate)
+        A, B, _, _ = continuous.as_floats()
+        self._state: Row = (0.0,) * len(A)
+        if not at_rest and len(A):
+            covariance = solve_continuous_lyapunov(A, -0.5 * B @ B.T)
+            # The trapezoidal rule keeps the covariance.
+            start = np.linalg.cholesky(0.5 * (covariance + covariance.T))
+            self._state = floats(start @ self._random.standard_normal(len(A)))
+
+    def draw(self, samples: int) -> FloatArray:
+        """Return the next samples of the series.
+
+        Parameters
+        ----------
+        samples : int
+            How many, zero or more.
+
+        Returns
+        -------
+        float array, shape (samples,)
+        """
+        white = self._random.standard_normal(_count("samples", samples))
+        white *= self._scale
+        sampled = self._sampled
+        self._state = _filter(
+            white, self._state, floats(sampled.change), floats(sampled.drive),
+            floats(sampled.output), float(sampled.direct[0]),
+        )  # fmt: skip
+        return white
+
+    def blocks(self, samples: int, size: int = 1 << 20) -> Iterator[FloatArray]:
+        """Yield the next samples in blocks.
+
+        Parameters
+        ----------
+        samples : int
+            How many in all.
+        size : int, optional
+            Largest size of a block.
+
+        Yields
+        ------
+        float array
+        """
+        left, size = _count("samples", samples), _count("size", size)
+        if size == 0:
+            raise ValueError("size must be at least 1, got 0")
+        while left > 0:
+            yield self.draw(min(size, left))
+            left -= size
+
+
+@njit(cache=True)
+def _filter(
+    series: FloatArray, state: Row, change: Row, drive: Row, output: Row, direct: float
+) -> Row:
+    """Replace a series by its filtered self, and return the new state.
+
+    `change` is a square matrix by rows. Flat tuples stay in registers.
+    """
+    n = len(state)
+    w = state
+    for i in range(series.size):
+        u = series[i]
+        y = direct * u
+        new = w
+        for j in range(n):
+            y += output[j] * w[j]
+            step = 0.0
+            for k in range(n):
+                step += change[n * j + k] * w[k]
+            new = tuple_setitem(new, j, w[j] + (step + drive[j] * u))
+        w = new
+        series[i] = y
+    return w
+
+
+def _count(name: str, value: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0:
+        raise ValueError(f"{name} must be an integer from 0 on, got {value!r}")
+    return int(value)
+
+
+def sample_count(duration: float, sample_rate: float = 200.0) -> int:
+    """Return the number of samples of a run.
+
+    Parameters
+    ----------
+    duration : float
+        In s, positive.
+    sample_rate : float, optional
+        In Hz, positive.
+
+    Returns
+    -------
+    int
+        The nearest whole number, at least one.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If one of the two is not positive and finite, or the run is shorter than a sample.
+    """
+    count = round(
+        positive_number("duration", duration) * positive_number("sample_rate", sample_rate)
+    )
+    if count < 1:
+        raise ValueError(f"duration must be at least one sample, got {duration} s")
+    return count
+
+
+class LaserNoise(ShapedNoise):
+    """Frequency noise of a free-running laser, of density level / sqrt(f^2 + cutoff^2).
+
+    Parameters
+    ----------
+    seed : int
+        Of the random numbers.
+    sample_rate : float, optional
+        In Hz.
+    level : float, optional
+        Density at 1 Hz, in Hz/sqrt(Hz); the paper's 30 by default.
+    cutoff : float, optional
+        Frequency in Hz below which the density is flat. The variance grows as 1 / cutoff.
+    at_rest : bool, optional
+        Whether the series starts at zero; see `ShapedNoise`.
+
+    Notes
+    -----
+    A 1/f density falls until half the sample rate, where the trapezoidal rule would give
+    none at all. So white noise is summed up with a leak, which gives a density too high by
+    x / sin x with x = pi f T, and smoothed over some samples by a filter fitted to
+    sin x / x. The density follows the formula within 0.1 percent up to 0.95 of half the
+    sample rate.
+    """
+
+    def __init__(
+        self,
+        seed: int,
+        sample_rate: float = 200.0,
+        *,
+        level: float = paper.LASER_NOISE,
+        cutoff: float = 1e-6,
+        at_rest: bool = False,
+    ) -> None:
+        self.level = positive_number("level", level)
+        self.cutoff = positive_number("cutoff", cutoff)
+        corner = 2.0 * math.pi * self.cutoff
+        super().__init__(
+            (), (-corner,), 2.0 * math.pi * self.level,
+            seed=seed, sample_rate=sample_rate, at_rest=at_rest,
+        )  # fmt: skip
+        # Read before the input enters, the sum has no zero at half the sample rate.
+        gain = float(self._sampled.output[0]) * (1.0 + 0.5 * corner / self.sample_rate)
+        self._sampled = self._sampled._replace(output=np.array([gain]), direct=np.zeros(1))
+        self._smoothing = _smoothing()
+        # Of white samples before the first one; at rest there were none.
+        past = np.zeros(2 * _REACH)
+        if not at_rest:
+            past = self._random.standard_normal(past.size)
+        self._past = past
+
+    def asd(self, frequency: npt.ArrayLike) -> FloatArray:
+        """Prescribed density at a frequency in Hz, in Hz/sqrt(Hz)."""
+        frequency = np.asarray(frequency, dtype=float)
+        return np.asarray(self.level / np.hypot(frequency, self.cutoff))
+
+    def sampled_asd(self, frequency: npt.ArrayLike) -> FloatArray:
+        """Density of the samples in closed form, at a frequency below half the rate."""
+        frequency = np.asarray(frequency, dtype=float)
+        x = np.pi * frequency / self.sample_rate
+        smooth = np.cos(2.0 * x[..., None] * np.arange(-_REACH, _REACH + 1)) @ self._smoothing
+        change, gain = float(self._sampled.change[0, 0]), float(self._sampled.output[0])
+        gain *= float(self._sampled.drive[0, 0])
+        below = np.sqrt(change**2 + (1.0 + change) * (2.0 * np.sin(x)) ** 2)
+        return np.asarray(gain * np.abs(smooth) / below)
+
+    def draw(self, samples: int) -> FloatArray:
+        """Return the next samples of the series; see `ShapedNoise.draw`."""
+        count = _count("samples", samples)
+        white = np.concatenate((self._past, self._random.standard_normal(count)))
+        self._past = white[count:].copy()
+        sampled = self._sampled
+        series = np.empty(count)
+        last = _smoothed_sum(
+            white, self._smoothing * self._scale, self._state[0],
+            float(sampled.change[0, 0]), float(sampled.drive[0, 0]),
+            float(sampled.output[0]), series,
+        )  # fmt: skip
+        self._state = (last,)
+        return series
+
+
+@njit(cache=True)
+def _smoothed_sum(
+    white: FloatArray,
+    weights: FloatArray,
+    state: float,
+    change: float,
+    drive: float,
+    output: float,
+    series: FloatArray,
+) -> float:
+    """Smooth white noise, sum it up with a leak, and return the last sum."""
+    reach = weights.size // 2
+    w = state
+    for i in range(series.size):
+        centre = i + reach
+        u = weights[reach] * white[centre]
+        for k in range(1, reach + 1):
+            u += weights[reach + k] * (white[centre - k] + white[centre + k])
+        w += change * w + drive * u
+        series[i] = output * w
+    return w
+
+
+def _smoothing() -> FloatArray:
+    """Return symmetric weights whose response is close to sin x / x, 2 x in rad a sample."""
+    x = 0.5 * np.pi * _FITTED * (np.arange(2000) + 0.5) / 2000
+    cosines = np.cos(2.0 * x[:, None] * np.arange(_REACH + 1))
+    # At rest the response is one: the weight in the middle follows from the others.
+    basis = cosines[:, 1:] - 1.0
+    sides = np.linalg.lstsq(basis, np.sinc(x / np.pi) - 1.0, rcond=None)[0]
+    return np.concatenate((0.5 * sides[::-1], [1.0 - sides.sum()], 0.5 * sides))
+
+
+class PerturbationNoise(ShapedNoise):
+    """Perturbation of c1 or c2 with the spectrum of the paper's appendix.
+
+    Parameters
+    ----------
+    seed : int
+        Of the random numbers.
+    sample_rate : float, optional
+        In Hz.
+    scale : float, optional
+        Factor before the spectrum as printed.
+    cutoff : float, optional
+        Frequency in Hz below which the density is flat. The standard deviation grows as
+        cutoff^(-3/2), so that this number decides it.
+    at_rest : bool, optional
+        Whether the series starts without what it would have built up before; see
+        `ShapedNoise`.
+
+    Notes
+    -----
+    With s = j omega and w0 = 2 pi 2.8 mHz, |s^2 + sqrt(2) w0 s + w0^2|^2 = omega^4 + w0^4.
+    So the density level sqrt(1 + (f0 / f)^4) is that of white noise through
+    (s^2 + sqrt(2) w0 s + w0^2) / (s + w_c)^2, but for the cut-off w_c.
+    """
+
+    def __init__(
+        self,
+        seed: int,
+        sample_rate: float = 200.0,
+        *,
+        scale: float = 1.0,
+        cutoff: float = 5e-6,
+        at_rest: bool = False,
+    ) -> None:
+        self.scale = positive_number("scale", scale)
+        self.cutoff = positive_number("cutoff", cutoff)
+        corner = 2.0 * math.pi * self.cutoff
+        root = 2.0 * math.pi * paper.PHASE_NOISE_CORNER * math.sqrt(0.5)
+        super().__init__(
+            (complex(-root, root), complex(-root, -root)), (-corner, -corner),
+            self.scale * paper.PHASE_NOISE_LEVEL,
+            seed=seed, sample_rate=sample_rate, at_rest=at_rest,
+        )  # fmt: skip
+
+    def asd(self, frequency: npt.ArrayLike) -> FloatArray:
+        """Prescribed density at a frequency in Hz, in 1/sqrt(Hz), cut-off included."""
+        frequency = np.asarray(frequency, dtype=float)
+        above = np.sqrt(frequency**4 + paper.PHASE_NOISE_CORNER**4)
+        below = frequency**2 + self.cutoff**2
+        return np.asarray(self.scale * paper.PHASE_NOISE_LEVEL * above / below)
+
+    def sampled_asd(self, frequency: npt.ArrayLike) -> FloatArray:
+        """Density of the samples in closed form, at a frequency below half the rate."""
+        omega = 2.0 * np.pi * np.asarray(frequency, dtype=float)
+        return self.asd(warped(omega, self.sample_rate) / (2.0 * np.pi))

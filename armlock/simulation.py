@@ -1,0 +1,709 @@
+"""The loop in the time domain, sample by sample, its delays exact and its loop closed exactly.
+
+With phi the frequency noise of the locked laser, every loop of `armlock.loops` reads
+
+    phi(t) = noise(t) - K [m1 u1 + m2 u2](t),    u_k(t) = phi(t) - c_k(t) phi(t - tau_k).
+
+Controller and sensor become one sampled state space with the inputs u1 and u2, see
+`armlock.sampled`: the trapezoidal rule, in first-order sections that keep what poles differ
+from one. The present phi is on both sides, with a weight of thousands; each sample solves
+for it. A rule that took the previous phi instead would be unstable by itself as soon as gain
+times step exceeds about one, and is not offered.
+
+Because s = j omega becomes (2 j / T) tan(omega T / 2) while the delays stay what they are,
+what is simulated has an open loop in closed form, `sampled_open_loop`.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple, TextIO
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+from numba.cpython.unsafe.tuple import tuple_setitem
+
+from armlock.loops import Loop
+from armlock.sampled import Row, SampledSystem, floats, real_system, sample, warped
+from armlock.validation import (
+    ComplexArray,
+    FloatArray,
+    positive_number,
+    real_array,
+    real_number,
+)
+
+#: Order of the Lagrange interpolation for delays that are not whole samples.
+INTERPOLATION_ORDER = 7
+#: Samples that are computed at a time; results do not depend on it.
+BLOCK = 1 << 16
+#: Runs from this many samples on show their progress on a terminal.
+LONG_RUN = 5_000_000
+#: The output counts as diverged when it exceeds the largest input so far by this factor.
+LIMIT = 1e6
+
+Matrices = tuple[Row, Row, Row, Row, Row]
+
+# Delays closer to whole samples than this, relatively, are whole.
+_WHOLE = 1e-9
+
+
+class DivergenceError(ArithmeticError):
+    """The locked laser's noise has left all bounds.
+
+    Attributes
+    ----------
+    time : float
+        When it began, in s: the last time at which the output was no larger than the largest
+        input so far.
+    detected : float
+        When the output exceeded that input by the limit, in s.
+    output : float array
+        What was computed up to then; every sample of it is finite.
+    """
+
+    def __init__(self, time: float, detected: float, output: FloatArray) -> None:
+        super().__init__(
+            f"the loop diverges: its output has exceeded all input since t = {time:.6g} s, "
+            f"and exceeds it beyond the limit at t = {detected:.6g} s"
+        )
+        self.time = time
+        self.detected = detected
+        self.output = output
+
+
+class Delay(NamedTuple):
+    """A delay in samples: phi(t - tau) = sum_k weights[k] phi[n - first - k]."""
+
+    first: int
+    weights: FloatArray
+
+
+def lagrange_delay(name: str, tau: float, sample_rate: float, order: int) -> Delay:
+    """Return the weights of a delay, a single one where it is whole samples.
+
+    Parameters
+    ----------
+    name : str
+        What messages call it.
+    tau : float
+        Delay in s.
+    sample_rate : float
+        In Hz.
+    order : int
+        Odd order of the polynomial through the nearest samples.
+
+    Returns
+    -------
+    Delay
+
+    Raises
+    ------
+    ValueError
+        If the delay is too short for the sample rate.
+
+    Notes
+    -----
+    With an odd order and the delay between the two middle samples, no frequency is amplified,
+    so that interpolation adds no instability of its own.
+    """
+    samples = tau * sample_rate
+    whole = round(samples)
+    if abs(samples - whole) <= _WHOLE * samples:
+        if whole < 1:
+            raise ValueError(
+                f"sample_rate must be at least 1 / {name} = {1.0 / tau} Hz, got {sample_rate}"
+            )
+        return Delay(whole, np.ones(1))
+    half = (order + 1) // 2
+    first = math.floor(samples) - half + 1
+    if first < 1:
+        raise ValueError(
+            f"sample_rate must be at least {half / tau} Hz to interpolate {name} = {tau} s to "
+            f"order {order}, got {sample_rate}"
+        )
+    x = samples - first
+    nodes = range(order + 1)
+    weights = [math.prod((x - j) / (k - j) for j in nodes if j != k) for k in nodes]
+    return Delay(first, np.array(weights))
+
+
+@njit(cache=True)
+def _advance(
+    phi: FloatArray,
+    start: int,
+    noise: FloatArray,
+    c1: FloatArray,
+    c2: FloatArray,
+    first1: int,
+    weights1: FloatArray,
+    first2: int,
+    weights2: FloatArray,
+    matrices: Matrices,
+    direct: Row,
+    entering: Row,
+    state: Row,
+    rest: float,
+    watch: FloatArray,
+    limit: float,
+    done: int,
+) -> tuple[Row, float, int]:
+    """Compute a block of phi behind its `start` samples of history.
+
+    `matrices` holds, all as flat tuples, which the compiler keeps in registers: the change of
+    the state, its lower triangle by rows and the entries right of the diagonal; how u1 and u2
+    drive it; and how it carries on into the next output. `state` is w, `rest` its share in
+    the present output, and `watch` the largest input so far and the number of the last sample
+    not above it. Returns the new state and share, and the index at which the output exceeds
+    `limit` times the largest input, or -1.
+    """
+    change, above, drive1, drive2, carried = matrices
+    n = len(drive1)
+    w = state
+    inverse = 1.0 / (1.0 + direct[0] + direct[1])
+    largest, calm = watch[0], watch[1]
+    stop = -1
+    for i in range(noise.size):
+        now = start + i
+        a1 = 0.0
+        for k in range(weights1.size):
+            a1 += weights1[k] * phi[now - first1 - k]
+        a2 = 0.0
+        for k in range(weights2.size):
+            a2 += weights2[k] * phi[now - first2 - k]
+        a1 *= c1[i]
+        a2 *= c2[i]
+        # phi = noise - rest - direct1 (phi - a1) - direct2 (phi - a2), solved for phi.
+        x = (noise[i] + (direct[0] * a1 + direct[1] * a2) - rest) * inverse
+        phi[now] = x
+        u1, u2 = x - a1, x - a2
+        # The next `rest` needs this sample's state only, and so does not wait for the new one.
+        rest = 0.0
+        for k in range(n):
+            rest += carried[k] * w[k]
+        rest += entering[0] * u1 + entering[1] * u2
+        new = w
+        m = 0
+        for j in range(n):
+            step = above[j] * w[(j + 1) % n]
+            for k in range(j + 1):
+                step += change[m] * w[k]
+                m += 1
+            new = tuple_setitem(new, j, w[j] + (step + (drive1[j] * u1 + drive2[j] * u2)))
+        w = new
+        size = abs(x)
+        largest = max(largest, abs(noise[i]))
+        if size <= largest:
+            calm = done + i
+        elif not size <= limit * largest:
+            stop = i
+            break
+    watch[0], watch[1] = largest, calm
+    return w, rest, stop
+
+
+def _as_rows(sampled: SampledSystem) -> Matrices:
+    """Return change, drives and carried shares as `_advance` takes them."""
+    change, drive, output = sampled.change, sampled.drive, sampled.output
+    if not output.size:
+        change, drive, output = np.zeros((1, 1)), np.zeros((1, 2)), np.zeros(1)
+    n = output.size
+    if np.triu(change, 2).any():
+        raise AssertionError("sections are chained in order, two states at most coupled")
+    rows = tuple(float(change[j, k]) for j in range(n) for k in range(j + 1))
+    above = np.append(np.diagonal(change, 1), 0.0)
+    carried = output + output @ change
+    drive1, drive2 = floats(drive[:, 0]), floats(drive[:, 1])
+    return rows, floats(above), drive1, drive2, floats(carried)
+
+
+def _checked_loop(loop: object) -> Loop:
+    if not isinstance(loop, Loop):
+        raise TypeError(f"loop must be an armlock.Loop, got {type(loop).__name__}")
+    return loop
+
+
+def _order(value: object) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or value < 1 or value % 2 == 0:
+        raise ValueError(f"interpolation must be an odd positive integer, got {value!r}")
+    return value
+
+
+def _series(name: str, value: object) -> FloatArray:
+    """Return a one-dimensional array of finite floats; no copy where it is one already."""
+    array = np.asarray(value)
+    if array.ndim != 1:
+        raise ValueError(f"{name} must be one-dimensional, got shape {array.shape}")
+    if array.dtype != np.float64:
+        return real_array(name, array)
+    for first in range(0, array.size, 1 << 20):
+        finite = np.isfinite(array[first : first + (1 << 20)])
+        if not finite.all():
+            at = first + int(np.argmin(finite))
+            raise ValueError(f"{name} must be finite, got {array[at]} at sample {at}")
+    return array
+
+
+def _parameter(name: str, value: object, like: FloatArray) -> float | FloatArray:
+    """Return c1 or c2 as a finite number, or as an array of the shape of the noise."""
+    if np.ndim(np.asarray(value)) == 0:
+        return real_number(name, value)
+    array = _series(name, value)
+    if array.shape != like.shape:
+        raise ValueError(
+            f"{name} must be a number or have the shape of noise, {like.shape}; got "
+            f"{array.shape}"
+        )
+    return array
+
+
+def sampled_open_loop(
+    loop: Loop,
+    omega: npt.ArrayLike,
+    c1: float = 1.0,
+    c2: float = 1.0,
+    sample_rate: float = 200.0,
+    *,
+    interpolation: int = INTERPOLATION_ORDER,
+) -> ComplexArray:
+    """Open loop of what is simulated, in closed form.
+
+    Parameters
+    ----------
+    loop : Loop
+        The loop.
+    omega : array_like of float
+        In rad/s, below pi times the sample rate.
+    c1, c2 : float, optional
+        Constant perturbations.
+    sample_rate : float, optional
+        In Hz.
+    interpolation : int, optional
+        As for `Simulation`.
+
+    Returns
+    -------
+    complex array, shaped like `omega`
+        K m_k at the warped frequency, times 1 - c_k exp(-j omega tau_k) at the true one.
+    """
+    loop, order = _checked_loop(loop), _order(interpolation)
+    omega = np.asarray(omega, dtype=float)
+    s = 1j * warped(omega, sample_rate)
+    m1, m2 = loop.mapping.weights(s)
+    result = np.zeros(omega.shape, dtype=np.complex128)
+    for m, c, name in ((m1, c1, "tau1"), (m2, c2, "tau2")):
+        delay = lagrange_delay(name, getattr(loop, name), sample_rate, order)
+        lags = delay.first + np.arange(delay.weights.size)
+        late = np.exp(-1j * omega[..., None] * lags / sample_rate) @ delay.weights
+        result += m * (1.0 - c * late)
+    return np.asarray(loop.controller(s) * result)
+
+
+class Simulation:
+    """A loop that is run block by block, and remembers where it is.
+
+    Parameters
+    ----------
+    loop : Loop
+        Any loop of `armlock.loops`.
+    sample_rate : float, optional
+        In Hz.
+    history : float or array_like, optional
+        The locked laser's noise before the first sample, the latest value last: a constant,
+        or at least `history_samples` values. Controller and sensor start at rest.
+    interpolation : int, optional
+        Odd order of the polynomial by which delays that are not whole samples are
+        interpolated. Whole ones are exact.
+    limit : float, optional
+        The run counts as diverged when the output exceeds the largest input so far by this
+        factor.
+
+    Attributes
+    ----------
+    samples : int
+        How many samples were computed.
+    history_samples : int
+        How many samples the longest delay reaches back.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If `loop` is no loop, the sample rate is too low for its delays, its poles and zeros,
+        or its feedback at high frequency, or the history is too short or not finite.
+
+    Notes
+    -----
+    One call and many give the same samples, bit by bit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from armlock import CommonArm, Simulation
+    >>> run = Simulation(CommonArm(gain=1.0), sample_rate=20.0)
+    >>> first, second = run.advance(np.ones(400)), run.advance(np.ones(400))
+    >>> run.time
+    40.0
+    """
+
+    def __init__(
+        self,
+        loop: Loop,
+        sample_rate: float = 200.0,
+        *,
+        history: npt.ArrayLike = 0.0,
+        interpolation: int = INTERPOLATION_ORDER,
+        limit: float = LIMIT,
+    ) -> None:
+        self.loop = _checked_loop(loop)
+        self.sample_rate = positive_number("sample_rate", sample_rate)
+        self.limit = positive_number("limit", limit)
+        self._check_rate()
+        order = _order(interpolation)
+        self._delays = [
+            lagrange_delay(name, getattr(loop, name), self.sample_rate, order)
+            for name in ("tau1", "tau2")
+        ]
+        self.history_samples = max(d.first + d.weights.size - 1 for d in self._delays)
+        self._sampled = sample(
+            real_system(
+                loop.controller.zeros,
+                loop.controller.poles,
+                loop.controller.gain,
+                (loop.mapping.numerator1, loop.mapping.numerator2),
+                loop.mapping.denominator,
+            ),
+            self.sample_rate,
+        )
+        self._check_closure()
+        self._matrices = _as_rows(self._sampled)
+        self._direct = floats(self._sampled.direct)
+        self._entering = floats(self._sampled.output @ self._sampled.drive)
+        self._state: Row = (0.0,) * len(self._matrices[1])
+        self._rest = 0.0
+        self._phi = np.zeros(self.history_samples + BLOCK)
+        self._phi[: self.history_samples] = self._checked_history(history)
+        start = float(np.abs(self._phi[: self.history_samples]).max())
+        self._watch = np.array([start, 0.0])
+        self._stopped: tuple[float, float] | None = None
+        self.samples = 0
+
+    @property
+    def time(self) -> float:
+        """How far the run has come, in s."""
+        return self.samples / self.sample_rate
+
+    def _check_rate(self) -> None:
+        """Refuse a rate at which a pole or zero would change its nature."""
+        mapping = np.trim_zeros(np.asarray(self.loop.mapping.denominator, dtype=float), "b")
+        roots = (
+            *self.loop.controller.zeros,
+            *self.loop.controller.poles,
+            *np.roots(mapping[::-1]),
+        )
+        fastest = max((abs(root) for root in roots), default=0.0)
+        if self.sample_rate <= fastest / 2.0:
+            raise ValueError(
+                f"sample_rate must exceed {fastest / 2.0} Hz, half of the loop's fastest pole "
+                f"or zero in rad/s, got {self.sample_rate}"
+            )
+
+    def _check_closure(self) -> None:
+        """Refuse a loop whose feedback changes sign between the sample rate and infinity."""
+        closed = 1.0 + float(self._sampled.direct.sum())
+        loop = self.loop
+        sizes = [p[loop.degree] if p.size > loop.degree else 0.0 for p in (loop.a, loop.rest)]
+        if not closed * sizes[0] * sizes[1] > 0.0:
+            raise ValueError(
+                f"sample_rate must be higher for this loop, got {self.sample_rate}: 1 + L "
+                f"without delays changes sign beyond it, a root that samples cannot show"
+            )
+
+    def _checked_history(self, history: npt.ArrayLike) -> float | FloatArray:
+        if np.ndim(np.asarray(history)) == 0:
+            return real_number("history", history)
+        array = _series("history", history)
+        if array.size < self.history_samples:
+            raise ValueError(
+                f"history must hold at least {self.history_samples} samples, as far as the "
+                f"longest delay reaches, got {array.size}"
+            )
+        return array[array.size - self.history_samples :]
+
+    def advance(
+        self, noise: npt.ArrayLike, c1: npt.ArrayLike = 1.0, c2: npt.ArrayLike = 1.0
+    ) -> FloatArray:
+        """Compute the next block.
+
+        Parameters
+        ----------
+        noise : array_like, shape (n,)
+            Free-running noise of the laser; the output has its unit.
+        c1, c2 : float or array_like of shape (n,), optional
+            Multiplicative perturbations.
+
+        Returns
+        -------
+        float array, shape (n,)
+            Noise of the locked laser.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If an argument is not finite and real, or of another shape; nothing is computed.
+        DivergenceError
+            If the output leaves all bounds. The run cannot be continued.
+        """
+        series = _series("noise", noise)
+        first, second = _parameter("c1", c1, series), _parameter("c2", c2, series)
+        output = np.empty_like(series)
+        self._fill(output, series, first, second, None)
+        return output
+
+    def _fill(
+        self,
+        output: FloatArray,
+        noise: FloatArray,
+        c1: float | FloatArray,
+        c2: float | FloatArray,
+        bar: _Bar | None,
+    ) -> None:
+        """Compute `output` from checked arguments, in blocks of a fixed size."""
+        if self._stopped is not None:
+            raise DivergenceError(*self._stopped, np.empty(0))
+        start = self.history_samples
+        delay1, delay2 = self._delays
+        for at in range(0, noise.size, BLOCK):
+            piece = slice(at, min(at + BLOCK, noise.size))
+            part = np.ascontiguousarray(noise[piece])
+            self._state, self._rest, stop = _advance(
+                self._phi,
+                start,
+                part,
+                _piece(c1, piece),
+                _piece(c2, piece),
+                delay1.first,
+                delay1.weights,
+                delay2.first,
+                delay2.weights,
+                self._matrices,
+                self._direct,
+                self._entering,
+                self._state,
+                self._rest,
+                self._watch,
+                self.limit,
+                self.samples,
+            )
+            if stop >= 0:
+                output[at : at + stop] = self._phi[start : start + stop]
+                self._stopped = (
+                    self._watch[1] / self.sample_rate,
+                    (self.samples + stop) / self.sample_rate,
+                )
+                raise DivergenceError(*self._stopped, output[: at + stop])
+            output[piece] = self._phi[start : start + part.size]
+            self._phi[:start] = self._phi[part.size : part.size + start].copy()
+            self.samples += part.size
+            if bar is not None:
+                bar.show(self.samples)
+
+
+def _piece(values: float | FloatArray, piece: slice) -> FloatArray:
+    if isinstance(values, float):
+        return np.full(piece.stop - piece.start, values)
+    return np.ascontiguousarray(values[piece])
+
+
+def simulate(
+    loop: Loop,
+    noise: npt.ArrayLike,
+    c1: npt.ArrayLike = 1.0,
+    c2: npt.ArrayLike = 1.0,
+    sample_rate: float = 200.0,
+    *,
+    history: npt.ArrayLike = 0.0,
+    interpolation: int = INTERPOLATION_ORDER,
+    limit: float = LIMIT,
+    progress: bool | None = None,
+) -> FloatArray:
+    """Run a loop, and return the frequency noise of the locked laser.
+
+    Parameters
+    ----------
+    loop : Loop
+        For instance `paper_loop()`.
+    noise : array_like, shape (n,)
+        Frequency noise of the free-running laser, for instance in Hz.
+    c1, c2 : float or array_like of shape (n,), optional
+        Multiplicative perturbations of the two arms, constant or sample by sample.
+    sample_rate : float, optional
+        In Hz.
+    history : float or array_like, optional
+        Output before the first sample, zero by default; see `Simulation`.
+    interpolation : int, optional
+        Order of interpolation for delays that are not whole samples; see `Simulation`.
+    limit : float, optional
+        Size of the output, in units of the largest input, that counts as diverged.
+    progress : bool, optional
+        Whether to show a bar on standard error. By default, on long runs on a terminal.
+
+    Returns
+    -------
+    float array, shape (n,)
+        In the unit of `noise`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument is unsuitable; before anything is computed.
+    DivergenceError
+        If the output leaves all bounds. It carries the time at which that began and the part
+        computed so far. An unstable loop that has not grown so far by the end of the run
+        returns its output.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from armlock import paper_loop, simulate
+    >>> step = simulate(paper_loop(), np.ones(2000))
+    >>> print(f"{step[0]:.4e}")
+    9.9991e-05
+    """
+    run = Simulation(
+        loop, sample_rate, history=history, interpolation=interpolation, limit=limit
+    )
+    series = _series("noise", noise)
+    first, second = _parameter("c1", c1, series), _parameter("c2", c2, series)
+    output = np.empty_like(series)
+    with _Bar(series.size, run.sample_rate, progress) as bar:
+        run._fill(output, series, first, second, bar)
+    return output
+
+
+def simulate_blocks(
+    loop: Loop,
+    blocks: Iterable[npt.ArrayLike | Sequence[npt.ArrayLike]],
+    sample_rate: float = 200.0,
+    *,
+    samples: int = 0,
+    history: npt.ArrayLike = 0.0,
+    interpolation: int = INTERPOLATION_ORDER,
+    limit: float = LIMIT,
+    progress: bool | None = None,
+) -> Iterator[FloatArray]:
+    """Run a loop over a stream of blocks; memory does not grow with the duration.
+
+    Parameters
+    ----------
+    loop : Loop
+        The loop.
+    blocks : iterable
+        Of arrays of noise, or of tuples (noise, c1, c2).
+    sample_rate : float, optional
+        In Hz.
+    samples : int, optional
+        How many there will be, for the progress bar.
+    history, interpolation, limit, progress
+        As for `simulate`.
+
+    Yields
+    ------
+    float array, shaped like the block's noise
+        The same samples as `simulate` gives for the whole.
+
+    Raises
+    ------
+    TypeError, ValueError, DivergenceError
+        As `simulate` does.
+    """
+    run = Simulation(
+        loop, sample_rate, history=history, interpolation=interpolation, limit=limit
+    )
+
+    def outputs() -> Iterator[FloatArray]:
+        with _Bar(samples, run.sample_rate, progress) as bar:
+            for block in blocks:
+                yield run.advance(*(block if isinstance(block, tuple) else (block,)))
+                bar.show(run.samples)
+
+    return outputs()
+
+
+def save_series(path: str | os.PathLike[str], blocks: Iterable[FloatArray]) -> int:
+    """Write a stream of blocks as one NumPy file that exists only when it is complete.
+
+    Parameters
+    ----------
+    path : path_like
+        Name of the file, which ends in .npy.
+    blocks : iterable of float arrays
+        For instance from `simulate_blocks`.
+
+    Returns
+    -------
+    int
+        Number of samples written.
+
+    Notes
+    -----
+    The blocks go to a file of another name in the same folder, which takes this one when the
+    last block is in. If anything stops the run, that file is removed, and what was at `path`
+    before stays.
+    """
+    path = Path(path)
+    count = 0
+    handle, temporary = tempfile.mkstemp(suffix=".part", prefix=path.name, dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            # The header's room for the length suffices for any: it is written again below.
+            _write_header(file, 0)
+            for block in blocks:
+                file.write(np.ascontiguousarray(block, dtype="<f8").tobytes())
+                count += block.size
+            file.seek(0)
+            _write_header(file, count)
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+    return count
+
+
+def _write_header(file: object, count: int) -> None:
+    description = {"descr": "<f8", "fortran_order": False, "shape": (count,)}
+    np.lib.format.write_array_header_1_0(file, description)  # type: ignore[arg-type]
+
+
+class _Bar:
+    """A progress bar on one line of standard error."""
+
+    def __init__(self, samples: int, sample_rate: float, progress: bool | None) -> None:
+        self.samples = samples
+        self.rate = sample_rate
+        self.stream: TextIO = sys.stderr
+        self.shown = -1
+        wanted = samples >= LONG_RUN and self.stream.isatty() if progress is None else progress
+        self.wanted = wanted and samples > 0
+
+    def __enter__(self) -> _Bar:
+        return self
+
+    def show(self, done: int) -> None:
+        """Draw the bar, at most a hundred times."""
+        share = 100 * done // max(self.samples, 1)
+        if self.wanted and share > self.shown:
+            self.shown = share
+            filled = "#" * (share * 40 // 100)
+            text = f"\r[{filled:40s}] {share:3d} %  {done / self.rate:.0f} s simulated"
+            self.stream.write(text)
+            self.stream.flush()
+
+    def __exit__(self, *stopped: object) -> None:
+        if self.wanted and self.shown >= 0:
+            self.stream.write("\n")

@@ -1,0 +1,344 @@
+"""Amplitude spectral densities over many decades, of series too long to hold.
+
+One resolution does not serve seven decades, and a spectrum that falls by ten orders over
+them leaks through the side lobes of the usual windows. So the series runs down a ladder of
+rates, each a quarter of the one before; at each the same short segments are transformed
+under a Kaiser window whose side lobes lie 150 dB below its peak; and their bins are averaged
+in bands of equal width on a logarithmic axis. Everything happens as the samples come in.
+All densities are one-sided.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+from scipy.signal import firwin, kaiser_beta, upfirdn
+from scipy.special import chdtri
+
+from armlock.validation import FloatArray, IntArray, positive_number, real_array
+
+#: Samples in a segment, and from one segment to the next.
+SEGMENT = 1024
+HOP = SEGMENT // 4
+#: Ratio of one rate to the next.
+FACTOR = 4
+#: Bins next to zero that the window's main lobe spoils.
+SPOILED = 8
+
+# Highest bin of a decimated series that its filter leaves alone.
+_HIGHEST = 368
+_STOPBAND = 120.0
+_TAPS = 113
+_BETA = 20.0
+# Segments below which a lower bin of a faster level is preferred to a higher one of this.
+_ENOUGH = 8
+_TRANSFORMS_AT_ONCE = 512
+
+_WINDOW = np.kaiser(SEGMENT + 1, _BETA)[:-1]
+_FILTER = firwin(_TAPS, 1.0 / FACTOR, window=("kaiser", kaiser_beta(_STOPBAND)))
+# Points a bin at which a given density is sampled for `Spectrum.expected`.
+_FINE = 8
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """An estimate of a one-sided amplitude spectral density.
+
+    Attributes
+    ----------
+    frequency : float array, shape (n,)
+        Centres of the bands in Hz.
+    asd : float array, shape (n,)
+        Estimate, in the series' unit per sqrt(Hz).
+    lower, upper : float arrays, shape (n,)
+        Confidence band: chi-squared, for Gaussian noise.
+    degrees : float array, shape (n,)
+        Degrees of freedom: twice the number of independent averages.
+    resolution : float array, shape (n,)
+        Width in Hz of a bin; the window is about three of them wide.
+    bins : int array, shape (n,)
+        Number of bins in a band.
+    """
+
+    frequency: FloatArray
+    asd: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    degrees: FloatArray
+    resolution: FloatArray
+    bins: IntArray
+
+    def expected(self, asd: Callable[[FloatArray], npt.ArrayLike]) -> FloatArray:
+        """Return what the estimator gives on average for a known density.
+
+        Parameters
+        ----------
+        asd : callable
+            The density as a function of the frequency in Hz.
+
+        Returns
+        -------
+        float array, shape (n,)
+            The density averaged over the band with the window's response, as the estimate is:
+            it differs from the density itself where that bends within the resolution.
+        """
+        spread, weights = _response()
+        result = np.empty(self.frequency.size)
+        for i, centre in enumerate(self.frequency):
+            half = 0.5 * (self.bins[i] - 1)
+            bins = centre / self.resolution[i] + np.arange(-half, half + 1.0)
+            points = np.abs(bins[:, None] + spread) * self.resolution[i]
+            power = np.asarray(asd(points), dtype=float) ** 2
+            result[i] = np.sqrt((power @ weights).mean())
+        return result
+
+    def within(self, low: float, high: float) -> Spectrum:
+        """Return the part between two frequencies in Hz, ends included."""
+        keep = (self.frequency >= low) & (self.frequency <= high)
+        return Spectrum(
+            self.frequency[keep],
+            self.asd[keep],
+            self.lower[keep],
+            self.upper[keep],
+            self.degrees[keep],
+            self.resolution[keep],
+            self.bins[keep],
+        )
+
+
+def _response() -> tuple[FloatArray, FloatArray]:
+    """Return offsets in bins, and the window's normalized power response there."""
+    offsets = np.arange(-SPOILED * _FINE, SPOILED * _FINE + 1) / _FINE
+    phases = np.exp(-2j * np.pi * np.outer(offsets, np.arange(SEGMENT)) / SEGMENT)
+    power = np.abs(phases @ _WINDOW) ** 2
+    return offsets, power / power.sum()
+
+
+def _overlaps() -> FloatArray:
+    """Squared correlation of two bins: rows the hops between segments, columns the bins."""
+    reach = SEGMENT // HOP
+    rows = []
+    for hops in range(reach):
+        shifted = np.zeros(SEGMENT)
+        shifted[: SEGMENT - hops * HOP] = _WINDOW[hops * HOP :]
+        rows.append(np.abs(np.fft.fft(_WINDOW * shifted))[: 2 * SPOILED] ** 2)
+    return np.array(rows) / float(np.sum(_WINDOW**2)) ** 2
+
+
+_OVERLAPS = _overlaps()
+
+
+def _degrees(segments: int, bins: int) -> float:
+    """Degrees of freedom of a mean over overlapping segments and neighbouring bins."""
+    hops = np.arange(min(segments, _OVERLAPS.shape[0]))
+    steps = np.arange(min(bins, _OVERLAPS.shape[1]))
+    weight1 = np.where(hops > 0, 2.0, 1.0) * (1.0 - hops / segments)
+    weight2 = np.where(steps > 0, 2.0, 1.0) * (1.0 - steps / bins)
+    variance = weight1 @ _OVERLAPS[: hops.size, : steps.size] @ weight2 / (segments * bins)
+    return float(2.0 / variance)
+
+
+class _Level:
+    """One rate of the ladder."""
+
+    def __init__(self, rate: float) -> None:
+        self.rate = rate
+        self.power = np.zeros(SEGMENT // 2 + 1)
+        self.segments = 0
+        self.waiting = np.empty(0)
+        self.unfiltered = np.empty(0)
+
+    def add(self, samples: FloatArray) -> FloatArray:
+        """Take in samples; return those of the next level."""
+        series = np.concatenate((self.waiting, samples))
+        if series.size >= SEGMENT:
+            windows = np.lib.stride_tricks.sliding_window_view(series, SEGMENT)[::HOP]
+            for first in range(0, len(windows), _TRANSFORMS_AT_ONCE):
+                batch = windows[first : first + _TRANSFORMS_AT_ONCE]
+                centred = (batch - batch.mean(axis=1, keepdims=True)) * _WINDOW
+                spectra = np.fft.rfft(centred)
+                self.power += (spectra.real**2 + spectra.imag**2).sum(axis=0)
+            self.segments += len(windows)
+            series = series[len(windows) * HOP :]
+        self.waiting = series.copy()
+        series = np.concatenate((self.unfiltered, samples))
+        count = max((series.size - _TAPS) // FACTOR + 1, 0)
+        if count:
+            skipped = (_TAPS - 1) // FACTOR
+            filtered = upfirdn(_FILTER, series, down=FACTOR)[skipped : skipped + count]
+        else:
+            filtered = np.empty(0)
+        self.unfiltered = series[count * FACTOR :].copy()
+        return np.asarray(filtered)
+
+    @cached_property
+    def scale(self) -> float:
+        """Factor from a squared transform to a one-sided density."""
+        return 2.0 / (self.rate * float(np.sum(_WINDOW**2)))
+
+
+class SpectrumEstimator:
+    """Estimates a density from samples as they come in.
+
+    Parameters
+    ----------
+    sample_rate : float
+        In Hz.
+
+    Notes
+    -----
+    Memory grows with the logarithm of the duration only. Segments overlap by three quarters;
+    the degrees of freedom of a band take the overlap, and the correlation of its bins, into
+    account. Estimates do not depend on how the series is cut into blocks, up to rounding.
+    """
+
+    def __init__(self, sample_rate: float) -> None:
+        self.sample_rate = positive_number("sample_rate", sample_rate)
+        self._levels = [_Level(self.sample_rate)]
+
+    def add(self, samples: npt.ArrayLike) -> None:
+        """Take in the next samples, a one-dimensional array of finite numbers."""
+        series = real_array("samples", samples)
+        if series.ndim != 1:
+            raise ValueError(f"samples must be one-dimensional, got shape {series.shape}")
+        depth = 0
+        while series.size:
+            if depth == len(self._levels):
+                self._levels.append(_Level(self.sample_rate / FACTOR**depth))
+            series = self._levels[depth].add(series)
+            depth += 1
+
+    def spectrum(self, *, bands: int = 12, confidence: float = 0.95) -> Spectrum:
+        """Return the estimate from what has come in so far.
+
+        Parameters
+        ----------
+        bands : int, optional
+            Bands a decade.
+        confidence : float, optional
+            Probability that a band's confidence interval holds the true density.
+
+        Returns
+        -------
+        Spectrum
+            From eight bins of the longest segments up to just below half the sample rate.
+
+        Raises
+        ------
+        ValueError
+            If fewer samples than one segment have come in, or an argument is out of range.
+        """
+        if bands < 1:
+            raise ValueError(f"bands must be at least 1, got {bands}")
+        if not 0.0 < confidence < 1.0:
+            raise ValueError(f"confidence must lie between 0 and 1, got {confidence}")
+        usable = [level for level in self._levels if level.segments]
+        if not usable:
+            raise ValueError(
+                f"series must hold at least {SEGMENT} samples, got "
+                f"{self._levels[0].waiting.size}"
+            )
+        rows = []
+        tops = [0.5 * self.sample_rate * (1.0 - 2.0 * SPOILED / SEGMENT)]
+        tops += [level.rate * _HIGHEST / SEGMENT for level in usable[1:]]
+        for depth, level in enumerate(usable):
+            low = level.rate * SPOILED / SEGMENT
+            if depth + 1 < len(usable):
+                below = usable[depth + 1]
+                low = max(low, tops[depth + 1]) if below.segments >= _ENOUGH else low
+            rows += self._bands(level, low, tops[depth], bands)
+        rows.sort()
+        table = np.array(rows)
+        frequency, power, degrees, resolution, count = table.T
+        tail = 0.5 * (1.0 - confidence)
+        return Spectrum(
+            frequency,
+            np.sqrt(power),
+            np.sqrt(power * degrees / chdtri(degrees, tail)),
+            np.sqrt(power * degrees / chdtri(degrees, 1.0 - tail)),
+            degrees,
+            resolution,
+            count.astype(np.int64),
+        )
+
+    def _bands(
+        self, level: _Level, low: float, high: float, bands: int
+    ) -> list[tuple[float, float, float, float, float]]:
+        """Average the bins of one level in bands; those of the level above go up to `low`."""
+        width = level.rate / SEGMENT
+        numbers = np.arange(int(np.ceil(low / width)), int(np.floor(high / width)) + 1)
+        if level is not self._levels[0]:
+            numbers = numbers[numbers <= _HIGHEST]
+        index = np.floor(bands * np.log10(numbers * width)).astype(int)
+        power = level.power * level.scale / level.segments
+        if level is not self._levels[0]:
+            power = power / self._passed(level)
+        rows = []
+        for band in np.unique(index):
+            chosen = numbers[index == band]
+            rows.append(
+                (
+                    float(chosen.mean() * width),
+                    float(power[chosen].mean()),
+                    _degrees(level.segments, chosen.size),
+                    width,
+                    float(chosen.size),
+                )
+            )
+        return rows
+
+    def _passed(self, level: _Level) -> FloatArray:
+        """Power response of all filters above a level, at its bins."""
+        frequency = np.arange(SEGMENT // 2 + 1) * level.rate / SEGMENT
+        response = np.ones(frequency.size)
+        rate = self.sample_rate
+        while rate > 1.5 * level.rate:
+            turns = np.exp(-2j * np.pi * np.outer(frequency / rate, np.arange(_TAPS)))
+            response *= np.abs(turns @ _FILTER) ** 2
+            rate /= FACTOR
+        return response
+
+
+def amplitude_spectrum(
+    series: npt.ArrayLike,
+    sample_rate: float,
+    *,
+    bands: int = 12,
+    confidence: float = 0.95,
+) -> Spectrum:
+    """Estimate the amplitude spectral density of a series.
+
+    Parameters
+    ----------
+    series : array_like, shape (n,)
+        At least 1024 samples.
+    sample_rate : float
+        In Hz.
+    bands, confidence
+        As for `SpectrumEstimator.spectrum`.
+
+    Returns
+    -------
+    Spectrum
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the series is too short, not one-dimensional or not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from armlock import amplitude_spectrum
+    >>> white = np.random.default_rng(1).standard_normal(100_000)
+    >>> estimate = amplitude_spectrum(white, sample_rate=2.0)
+    >>> bool(np.mean((estimate.lower < 1.0) & (estimate.upper > 1.0)) > 0.8)
+    True
+    """
+    estimator = SpectrumEstimator(sample_rate)
+    estimator.add(np.asarray(series))
+    return estimator.spectrum(bands=bands, confidence=confidence)
