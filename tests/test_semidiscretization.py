@@ -190,7 +190,7 @@ def test_the_matrix_has_one_row_for_each_state_and_sample(name):
 
 
 def test_delays_off_the_grid_by_rounding_alone_are_accepted():
-    # int(19.9 / 0.05) is 397.
+    # The quotient 19.9 / 0.05 lies below 398 in floating point.
     assert transition_matrix(CommonArm(), 1.0, 1.0, 0.05).shape == (403, 403)
     row = transition_matrix(CommonArm(), 1.0, 2.0, 0.05)[0]
     assert np.flatnonzero(row).tolist() == [0, 398, 402]
