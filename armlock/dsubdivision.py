@@ -185,6 +185,15 @@ def d_curve_branches(
     -----
     The poles are the zeros of the determinant of the 2 x 2 system, found with certified
     steps (`armlock.contour.sign_changes`).
+
+    Examples
+    --------
+    The curve of the Hayes equation has a pole wherever omega is a multiple of pi / tau.
+
+    >>> from armlock import HayesEquation, d_curve_branches
+    >>> branches = d_curve_branches(HayesEquation(tau=1.0), omega_max=9.0)
+    >>> [f"{branch.omega[0]:.2f} to {branch.omega[-1]:.2f}" for branch in branches]
+    ['0.00 to 3.14', '3.14 to 6.28', '6.28 to 9.00']
     """
     omega_max = positive_number("omega_max", omega_max)
     if system.step:

@@ -24,7 +24,18 @@ _DEGREES = (60, 120, 240, 480, 960)
 
 
 class RootError(RuntimeError):
-    """No root could be certified as the rightmost one; `estimate` is the best candidate."""
+    """No root could be certified as the rightmost one; `estimate` is the best candidate.
+
+    Examples
+    --------
+    >>> from armlock import CommonArm, RootError, rightmost_root
+    >>> try:
+    ...     root = rightmost_root(CommonArm(), 1.01, 1.0)
+    ... except RootError as error:
+    ...     root = error.estimate
+    >>> print(f"{root.real:.2e}")
+    2.43e-04
+    """
 
     def __init__(self, message: str, estimate: complex) -> None:
         super().__init__(message)

@@ -103,6 +103,18 @@ def transition_matrix(
     Notes
     -----
     Eq. (8) of the paper in its corrected form; see Insperger and Stepan, ch. 3.
+
+    Examples
+    --------
+    One state and ten samples of its past; without the delayed term the state decays by
+    exp(-h) a step.
+
+    >>> from armlock import HayesEquation, transition_matrix
+    >>> matrix = transition_matrix(HayesEquation(tau=1.0), -1.0, 0.0, step=0.1)
+    >>> matrix.shape
+    (11, 11)
+    >>> print(f"{matrix[0, 0]:.6f}")
+    0.904837
     """
     step, order = _checked(system, step, order)
     name1, name2 = system.parameters

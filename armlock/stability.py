@@ -27,7 +27,9 @@ from armlock.validation import (
     broadcast_pair,
 )
 
+#: What a count is where a root lies on the boundary of stability: -1.
 BOUNDARY = contour.BOUNDARY
+#: What a count is where infinitely many roots do not stay left of the boundary: -2.
 UNCONFINED = contour.UNCONFINED
 
 # How far outside a chart's axes its reference counts lie, in steps of the axis: no round
@@ -42,6 +44,16 @@ class CountError(RuntimeError):
     ----------
     points : float array, shape (n, 2)
         Where.
+
+    Examples
+    --------
+    >>> from armlock import CommonArm, CountError, unstable_roots
+    >>> try:
+    ...     count = int(unstable_roots(CommonArm(), 0.9, 1.05))
+    ... except CountError as error:
+    ...     print("undecided at", error.points)
+    >>> count
+    0
     """
 
     def __init__(self, message: str, points: FloatArray) -> None:
@@ -216,6 +228,16 @@ class StabilityChart:
     recounted_rows : int array
         Indices of rows whose crossings did not agree with the independent count at the far
         end, and which were counted point by point instead. Empty unless rounding interferes.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from armlock import HayesEquation, stability_chart
+    >>> chart = stability_chart(HayesEquation(), np.linspace(-2, 1, 4), np.linspace(-1, 1, 3))
+    >>> chart.counts.shape
+    (3, 4)
+    >>> chart.stable[1]
+    array([ True,  True, False, False])
     """
 
     system: CharacteristicFunction
