@@ -142,13 +142,6 @@ def test_a_parameter_without_effect_does_not_move_the_root():
     )
 
 
-def test_a_longer_delay_without_effect_does_not_hide_the_root():
-    system = CommonArm(1.0, tau1=0.25, tau2=4.0)
-    root = rightmost_root(system, -1.0, 0.0)
-    expected = independent.hayes_roots(-2.0, -1.0, 0.25)
-    assert root.real == pytest.approx(expected.real.max(), rel=1e-9)
-
-
 def test_results_broadcast_and_scalars_stay_scalars():
     roots = rightmost_root(HayesEquation(), [[-1.0], [-2.0]], [-1.5, 0.5, 1.5])
     assert roots.shape == (2, 3)
