@@ -411,9 +411,10 @@ def order_of_the_delays() -> Finding:
 def recurrence() -> Finding:
     """Run the printed and the derived recurrence at (1, 1)."""
     readings = printed_maps()
-    at_one = {name: excess(system, 1.0, 1.0) for name, system in readings.items()}
+    compared = ("derived", "both as printed")
+    at_one = {name: excess(readings[name], 1.0, 1.0) for name in compared}
     mid = {name: balanced_perturbation(system) for name, system in readings.items()}
-    stable_point = {name: excess(system, 0.9, 1.05) for name, system in readings.items()}
+    stable_point = {name: excess(readings[name], 0.9, 1.05) for name in compared}
     printed = at_one["both as printed"]
     package = float(spectral_radius(ARM, 0.9, 1.05, STEP)) - 1.0
     same = abs(package - stable_point["derived"]) < 1e-11
