@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import base64
+import html
+import io
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -274,3 +277,90 @@ def publish(
     figure.savefig(target / f"{name}.png", metadata={"Software": None})
     figure.savefig(target / f"{name}.svg", metadata={"Date": None})
     return Downloads(name, [f"{name}.{ending}" for ending in ("csv", "png", "svg")])
+
+
+class FrameSlider:
+    """Pictures of a sweep behind a slider, as HTML that needs neither network nor library.
+
+    Parameters
+    ----------
+    frames : sequence of bytes
+        The pictures as SVG, see `svg`.
+    labels : sequence of str
+        What the slider says at each frame, plain text.
+    name : str
+        Identifier, unique in the book; links can end in it.
+    slider : str
+        Name of the slider, for instance "Gain".
+    alt : str
+        What the pictures show, for those who do not see them.
+    start : int, optional
+        Frame shown at first, and where scripts do not run.
+
+    Raises
+    ------
+    ValueError
+        If there are no frames, not as many labels, or no frame `start`.
+    """
+
+    def __init__(
+        self,
+        frames: Sequence[bytes],
+        labels: Sequence[str],
+        *,
+        name: str,
+        slider: str,
+        alt: str,
+        start: int = 0,
+    ) -> None:
+        if not frames or len(frames) != len(labels):
+            raise ValueError(
+                f"frames and labels must be as many, at least one, got {len(frames)} and "
+                f"{len(labels)}"
+            )
+        if not 0 <= start < len(frames):
+            raise ValueError(f"start must be a frame from 0 to {len(frames) - 1}, got {start}")
+        self.frames, self.labels, self.start = list(frames), list(labels), start
+        self.name, self.slider, self.alt = name, slider, alt
+
+    def __repr__(self) -> str:
+        """Say how many frames there are."""
+        return f"FrameSlider({self.name!r}, {len(self.frames)} frames)"
+
+    def _repr_html_(self) -> str:
+        """Return pictures, slider and the few lines of script that join them."""
+        name, current = html.escape(self.name), html.escape(self.labels[self.start])
+        pictures = "".join(
+            f'<img src="data:image/svg+xml;base64,{base64.b64encode(frame).decode()}" '
+            f'alt="{html.escape(f"{self.alt} {label}")}" style="width: 100%; height: auto"'
+            f"{'' if index == self.start else ' hidden'}>"
+            for index, (frame, label) in enumerate(zip(self.frames, self.labels, strict=True))
+        )
+        labels = html.escape("|".join(self.labels))
+        return (
+            f'<figure id="{name}" class="frame-slider" data-labels="{labels}" '
+            f'style="margin: 1rem auto; max-width: 34rem">{pictures}'
+            f'<p><label for="{name}-range">{html.escape(self.slider)}: '
+            f'<output for="{name}-range">{current}</output></label>'
+            f'<input id="{name}-range" type="range" min="0" max="{len(self.frames) - 1}" '
+            f'step="1" value="{self.start}" aria-valuetext="{current}" '
+            f'style="width: 100%; min-height: 2rem; accent-color: {BLUE}"></p>'
+            "<script>(() => {"
+            f'const box = document.getElementById("{name}");'
+            'const labels = box.dataset.labels.split("|");'
+            'const pictures = box.querySelectorAll("img");'
+            'const range = box.querySelector("input"), text = box.querySelector("output");'
+            "const show = () => { const k = Number(range.value);"
+            "pictures.forEach((picture, i) => { picture.hidden = i !== k; });"
+            'text.textContent = labels[k]; range.setAttribute("aria-valuetext", labels[k]); };'
+            'range.addEventListener("input", show); show();'
+            "})();</script></figure>"
+        )
+
+
+def svg(figure: Figure) -> bytes:
+    """Return a figure as SVG, and close it."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="svg", metadata={"Date": None})
+    plt.close(figure)
+    return buffer.getvalue()
