@@ -6,6 +6,7 @@ from armlock.claims.ledger import Claim, Finding, Ledger, Verdict, all_claims, c
 from armlock.claims import table1  # isort: skip
 from armlock.claims import single_arm  # isort: skip
 from armlock.claims import common_arm  # isort: skip
+from armlock.claims import dual_arm  # isort: skip
 
 __all__ = [
     "Claim",
@@ -16,6 +17,7 @@ __all__ = [
     "check",
     "claim",
     "common_arm",
+    "dual_arm",
     "single_arm",
     "table1",
 ]
