@@ -1,0 +1,112 @@
+"""The claims on the controller: each verdict, and the number that decides it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from armlock import critical_perturbation, paper_loop, unstable_roots
+from armlock.claims import Verdict, check
+from armlock.claims import controller as chapter
+from armlock.sensors import dual
+
+DECIDED = {
+    "K1": (Verdict.IN_PART, 2.0, 0.0),
+    "K2": (Verdict.REPRODUCED, 2.0, 0.0),
+    "K3": (Verdict.REPRODUCED, 2.0, 0.0),
+    "K4": (Verdict.NOT_AS_WRITTEN, 2.0, 0.0),
+    "K5": (Verdict.REPRODUCED, 1.4643205e-6, 1e-12),
+    "K6": (Verdict.DIFFERS, 2740.7, 1.0),
+    "K7": (Verdict.NOT_AS_WRITTEN, 1.0, 0.0),
+    "K8": (Verdict.IN_PART, 0.194727, 1e-6),
+    "K9": (Verdict.REPRODUCED, 1e-6, 1e-18),
+    "K10": (Verdict.REPRODUCED, 0.869991, 1e-6),
+    "K11": (Verdict.OPEN, 973.24, 0.01),
+    "K12": (Verdict.IN_PART, 0.0, 0.0),
+    "K13": (Verdict.NOT_AS_WRITTEN, 1.0, 0.0),
+}
+
+
+@pytest.mark.parametrize("identifier", DECIDED)
+def test_verdict_and_deciding_number(identifier):
+    verdict, value, tolerance = DECIDED[identifier]
+    finding = check(identifier)[identifier]
+    assert finding.verdict == verdict
+    assert abs(finding.value - value) <= tolerance
+
+
+def test_three_methods_agree_on_every_reading():
+    table = chapter.readings()
+    assert len(table) == 18
+    for reading in table:
+        assert reading.winding == reading.encirclements == reading.found
+        assert (reading.rightmost.real > 0.0) == (reading.winding > 0)
+
+
+@pytest.mark.parametrize(
+    ("name", "actuator", "expected"),
+    [
+        ("Stage I", False, (2, 0, 0)),
+        ("Stage I", True, (1, 0, 0)),
+        ("Table II", False, (0, 0, 0)),
+        ("Table II", True, (1, 0, 0)),
+        ("Eq. (11)", False, (2, 2, 0)),
+        ("Eq. (11)", True, (1, 0, 0)),
+    ],
+)
+def test_counts_of_every_reading(name, actuator, expected):
+    assert tuple(chapter.counts_of(name, actuator=actuator).values()) == expected
+
+
+def test_a_disagreement_is_not_passed_over(monkeypatch):
+    table = chapter.readings()
+    wrong = (table[0]._replace(winding=5), *table[1:])
+    monkeypatch.setattr(chapter, "readings", lambda: wrong)
+    with pytest.raises(RuntimeError, match="methods disagree"):
+        chapter.counts_of("Stage I")
+
+
+def test_the_limit_depends_on_the_delay_difference():
+    """The critical perturbation is nearly proportional to the difference of the delays."""
+    half = paper_loop(tau1=20.05, tau2=19.95)
+    ratio = critical_perturbation(half, (1, -1)) / chapter.box_limit()
+    assert ratio == pytest.approx(0.5, abs=1e-4)
+
+
+def test_response_is_controller_times_sensor():
+    frequency = np.geomspace(1e-6, 1.0, 60)
+    s = 2j * np.pi * frequency
+    sensor = dual(2 * np.pi * 0.4, 20.1 - 19.9).response(s, 20.1, 19.9, 1.0, 1.0 - 1e-6)
+    expected = chapter.CONTROLLERS["Table II"](s) * sensor
+    np.testing.assert_allclose(
+        chapter.response(frequency, 1.0, 1.0 - 1e-6), expected, rtol=1e-6
+    )
+
+
+def test_the_corner_has_a_limit():
+    limit = chapter.highest_corner()
+    assert unstable_roots(paper_loop(corner=0.999 * limit), 1.0, 1.0) == 0
+    assert unstable_roots(paper_loop(corner=1.001 * limit), 1.0, 1.0) == 2
+
+
+@pytest.mark.parametrize("delay", [1e-6, 1e-3, 5e-3, 0.02])
+def test_any_further_delay_destabilises(delay):
+    root = chapter.delayed_root(delay)
+    # By another expression of the loop: sensor and controller, not the polynomials.
+    sensor = dual(2 * np.pi * 0.4, 20.1 - 19.9).response(root, 20.1, 19.9)
+    loop = chapter.CONTROLLERS["Table II"](root) * sensor * np.exp(-root * delay)
+    assert root.real > 0.0
+    assert abs(1.0 + loop) < 1e-2
+
+
+def test_further_delay_must_be_positive():
+    with pytest.raises(ValueError, match="delay must be positive"):
+        chapter.delayed_root(0.0)
+
+
+def test_unity_gain_frequency_has_unity_gain():
+    for point, c in chapter.POINTS.items():
+        at, phase = chapter.unity_gain(point)
+        value = complex(chapter.response(np.array([at]), *c)[0])
+        assert abs(value) == pytest.approx(1.0, abs=1e-9)
+        assert np.angle(value) == pytest.approx(phase, abs=1e-12)
