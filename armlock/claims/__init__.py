@@ -7,6 +7,7 @@ from armlock.claims import table1  # isort: skip
 from armlock.claims import single_arm  # isort: skip
 from armlock.claims import common_arm  # isort: skip
 from armlock.claims import dual_arm  # isort: skip
+from armlock.claims import controller  # isort: skip
 
 __all__ = [
     "Claim",
@@ -17,6 +18,7 @@ __all__ = [
     "check",
     "claim",
     "common_arm",
+    "controller",
     "dual_arm",
     "single_arm",
     "table1",
