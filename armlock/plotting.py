@@ -212,7 +212,7 @@ def chart_columns(
     return {
         names[0]: x.ravel(),
         names[1]: y.ravel(),
-        "unstable roots": counts.ravel().astype(float),
+        "unstable roots [1]": counts.ravel().astype(float),
     }
 
 
@@ -268,7 +268,8 @@ def publish(
     target.mkdir(parents=True, exist_ok=True)
     arrays = [np.ravel(np.asarray(column)) for column in columns.values()]
     length = max((array.size for array in arrays), default=0)
-    lines = [",".join(columns)]
+    # A name may hold a comma, and is quoted then.
+    lines = [",".join(f'"{head}"' if "," in head else head for head in columns)]
     lines += [
         ",".join(form % array[i] if i < array.size else "" for array in arrays)
         for i in range(length)
