@@ -499,7 +499,7 @@ def never_reached() -> Finding:
         f"gain in rad/s at which the corner is {PERTURBATION:g} away from (1, 1)",
         f"The corner is {at_ten:.3g} away at g = 10 and {at_controller:.3g} at the "
         f"controller's g = {CONTROLLER_GAIN:g}, {at_controller / PERTURBATION:.0f} times "
-        "the largest perturbation of the paper. It is the distance that falls as 1/g²; above the gain "
+        "the largest perturbation of the paper. The distance falls as 1/g²; above the gain "
         "named here the perturbations do reach it. The straight edge is reached at any gain.",
     )
 
