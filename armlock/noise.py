@@ -179,6 +179,26 @@ def sample_count(duration: float, sample_rate: float = 200.0) -> int:
     return count
 
 
+def band_rms(low: float, high: float) -> float:
+    """R.m.s. of the perturbations' spectrum, as printed, between two frequencies.
+
+    Parameters
+    ----------
+    low, high : float
+        In Hz, positive, the second one larger.
+
+    Returns
+    -------
+    float
+        Square root of the integral of level^2 (1 + (f0 / f)^4).
+    """
+    low, high = positive_number("low", low), positive_number("high", high)
+    if high <= low:
+        raise ValueError(f"high must exceed low = {low}, got {high}")
+    red = paper.PHASE_NOISE_CORNER**4 * (low**-3 - high**-3) / 3.0
+    return paper.PHASE_NOISE_LEVEL * math.sqrt(high - low + red)
+
+
 class LaserNoise(ShapedNoise):
     """Frequency noise of a free-running laser, of density level / sqrt(f^2 + cutoff^2).
 

@@ -134,7 +134,7 @@ def lagrange_delay(name: str, tau: float, sample_rate: float, order: int) -> Del
     return Delay(first, np.array(weights))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _advance(
     phi: FloatArray,
     start: int,

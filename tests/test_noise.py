@@ -1,0 +1,126 @@
+"""Shaped noise: density, start, blocks, seeds."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from armlock import LaserNoise, PerturbationNoise, ShapedNoise, paper
+from armlock.noise import band_rms, sample_count
+from armlock.spectra import SpectrumEstimator
+
+SOURCES = {
+    "laser": lambda seed, **more: LaserNoise(seed, **more),
+    "laser at rest": lambda seed, **more: LaserNoise(seed, at_rest=True, **more),
+    "perturbation": lambda seed, **more: PerturbationNoise(seed, **more),
+    "own filter": lambda seed, **more: ShapedNoise(
+        (-1.0,), (-3 + 9j, -3 - 9j), 4.0, seed=seed, **more
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SOURCES)
+def test_blocks_do_not_matter(name):
+    whole = SOURCES[name](7).draw(2000)
+    source = SOURCES[name](7)
+    parts = np.concatenate([source.draw(n) for n in (1, 0, 700, 1299)])
+    assert np.array_equal(whole, parts)
+    assert np.array_equal(whole, np.concatenate(list(SOURCES[name](7).blocks(2000, 333))))
+    assert not np.array_equal(whole, SOURCES[name](8).draw(2000))
+
+
+@pytest.mark.parametrize("name", ["laser", "perturbation"])
+def test_density_is_the_prescribed_one(name):
+    """Over five decades, within the statistical error of four million samples."""
+    source = SOURCES[name](21)
+    estimator = SpectrumEstimator(200.0)
+    for block in source.blocks(4_000_000):
+        estimator.add(block)
+    found = estimator.spectrum()
+    ratio = (found.asd / found.expected(source.sampled_asd)) ** 2
+    pull = (ratio - 1.0) * np.sqrt(0.5 * found.degrees)
+    assert np.abs(pull).max() < 4.5
+    assert 0.7 < pull.std() < 1.3
+    assert found.frequency[-1] / found.frequency[0] > 1e4
+    # At high frequency the error is below a part in a thousand, which settles the formula.
+    fast = found.frequency > 30.0
+    assert np.abs(ratio[fast] - 1.0).max() < 0.004
+    # And against the formula as printed, below the last tenth of the band.
+    ratio = (found.asd / found.expected(source.asd)) ** 2
+    pull = (ratio - 1.0) * np.sqrt(0.5 * found.degrees)
+    assert np.abs(pull)[found.frequency < 80.0].max() < 4.5
+
+
+def test_sampled_density_follows_the_formula():
+    frequency = np.geomspace(1e-7, 95.0, 300)
+    for source, error in ((LaserNoise(1), 1e-3), (PerturbationNoise(1), 1e-8)):
+        assert np.abs(source.sampled_asd(frequency) / source.asd(frequency) - 1.0).max() < error
+
+
+def test_formulas_of_the_paper():
+    frequency = np.geomspace(1e-3, 50.0, 50)
+    laser = LaserNoise(1, cutoff=1e-9)
+    assert laser.asd(frequency) == pytest.approx(30.0 / frequency, rel=1e-9)
+    eta = PerturbationNoise(1, cutoff=1e-9, scale=2.0)
+    printed = 2.0 * 3.6e-5 * np.sqrt(1.0 + (2.8e-3 / frequency) ** 4)
+    assert eta.asd(frequency) == pytest.approx(printed, rel=1e-9)
+
+
+def test_spectrum_factors_exactly():
+    omega = np.geomspace(1e-6, 1e3, 60)
+    corner = 2.0 * np.pi * paper.PHASE_NOISE_CORNER
+    s = 1j * omega
+    factor = s**2 + np.sqrt(2.0) * corner * s + corner**2
+    assert np.abs(factor) ** 2 == pytest.approx(omega**4 + corner**4, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["laser", "perturbation"])
+def test_variance_is_stationary_from_the_start(name):
+    start = np.array([SOURCES[name](seed, sample_rate=2.0, cutoff=1e-3).draw(2)[1]
+                      for seed in range(800)])  # fmt: skip
+    source = SOURCES[name](99, sample_rate=2.0, cutoff=1e-3)
+    later = source.draw(2_000_000).std()
+    assert start.std() == pytest.approx(later, rel=0.12)
+
+
+def test_at_rest_starts_at_zero():
+    quiet = LaserNoise(4, at_rest=True).draw(200)
+    full = LaserNoise(4).draw(200)
+    assert np.abs(quiet).max() < 100.0
+    assert np.abs(full).min() > 100.0
+
+
+def test_band_rms_is_the_integral():
+    def power(f):
+        return (3.6e-5) ** 2 * (1.0 + (2.8e-3 / f) ** 4)
+
+    edges = np.geomspace(5e-6, 100.0, 40)
+    total = sum(quad(power, a, b)[0] for a, b in pairwise(edges))
+    assert band_rms(5e-6, 100.0) == pytest.approx(np.sqrt(total), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: LaserNoise(-1), "seed must be"),
+        (lambda: LaserNoise(1.5), "seed must be"),
+        (lambda: LaserNoise(True), "seed must be"),
+        (lambda: LaserNoise(1, 0.0), "sample_rate must be positive"),
+        (lambda: LaserNoise(1, cutoff=-1.0), "cutoff must be positive"),
+        (lambda: PerturbationNoise(1, scale=np.nan), "scale must be finite"),
+        (lambda: LaserNoise(1).draw(-1), "samples must be"),
+        (lambda: list(LaserNoise(1).blocks(10, 0)), "size must be at least 1"),
+        (lambda: band_rms(1.0, 0.5), "high must exceed"),
+        (lambda: sample_count(-200_000.0), "duration must be positive"),
+        (lambda: sample_count(1e-9), "duration must be at least one sample"),
+        (lambda: sample_count(1.0, -200.0), "sample_rate must be positive"),
+    ],
+)
+def test_bad_arguments(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
+
+
+def test_paper_size():
+    assert sample_count(paper.DURATION, paper.SAMPLE_RATE) == 40_000_000

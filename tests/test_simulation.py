@@ -1,0 +1,407 @@
+"""The loop in time: accuracy, closed form, verdicts, blocks, divergence, bad input."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from armlock import (
+    CommonArm,
+    Controller,
+    DivergenceError,
+    DualArm,
+    HayesEquation,
+    LaserNoise,
+    Loop,
+    PerturbationNoise,
+    Simulation,
+    SingleArm,
+    paper_loop,
+    rightmost_root,
+    sampled_open_loop,
+    save_series,
+    simulate,
+    simulate_blocks,
+    unstable_roots,
+)
+from armlock.sensors import COMMON, SignalMapping
+from armlock.simulation import BLOCK, LONG_RUN
+from tests.extended import naive, reference
+
+RATE = 200.0
+
+
+@pytest.fixture(scope="module")
+def million():
+    """Inputs of 1.2 million samples with time-varying c1, c2, and the reference output."""
+    count = 1_200_000
+    noise = LaserNoise(1).draw(count)
+    c1, c2 = (1.0 + PerturbationNoise(seed, scale=1e-4).draw(count) for seed in (2, 3))
+    return noise, c1, c2, reference(noise, c1, c2)
+
+
+def relative_error(found, expected):
+    return np.abs(found - expected).max() / np.abs(expected).max()
+
+
+def test_accuracy_over_a_million_samples(million):
+    noise, c1, c2, expected = million
+    assert c1.std() > 1e-7
+    assert c2.std() > 1e-7
+    found = simulate(paper_loop(), noise, c1, c2)
+    assert relative_error(found, expected) < 1e-12
+    # Of each sample too, but for those that happen to be near zero.
+    assert np.quantile(np.abs(found / expected - 1.0), 0.99) < 1e-11
+
+
+def test_second_order_sections_are_not_accurate_enough(million):
+    """Do not simplify the state space to the usual cascade: it fails the requirement."""
+    noise, c1, c2, expected = million
+    assert relative_error(naive(noise, c1, c2), expected) > 1e-8
+
+
+LOOPS = {
+    "common": (Loop(Controller([], [-0.1], 0.2), COMMON, 20.1, 19.9), 10.0),
+    "fractional": (Loop(Controller([], [-0.1], 0.2), COMMON, 20.13, 19.957), 7.0),
+    "gain alone": (Loop(Controller([], [], 0.2), COMMON, 2.0, 1.5), 10.0),
+    "complex and repeated": (
+        Loop(
+            Controller([-1 + 2j, -1 - 2j, -3], [-0.5, -0.5, -0.3 + 0.4j, -0.3 - 0.4j], 0.002),
+            SignalMapping((1.0, 2.0, 1.5), (1.0, 0.0, -1.0), (1.0, 2.0, 1.0), "made up"),
+            5.1,
+            4.27,
+        ),
+        20.0,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_impulse_response_is_the_closed_form(name):
+    loop, rate = LOOPS[name]
+    c1, c2 = 0.8, -0.6
+    impulse = np.zeros(1 << 14)
+    impulse[0] = 1.0
+    output = simulate(loop, impulse, c1, c2, rate)
+    assert np.abs(output[-2000:]).max() < 1e-13
+    omega = 2.0 * np.pi * np.fft.rfftfreq(impulse.size, 1.0 / rate)[:-1]
+    # Next to zero, where a factor s of numerator and denominator would give 0 / 0.
+    expected = 1.0 / (1.0 + sampled_open_loop(loop, omega[1:], c1, c2, rate))
+    assert np.fft.rfft(output)[1:-1] == pytest.approx(expected, rel=1e-9, abs=1e-11)
+
+
+def test_sampled_loop_tends_to_the_continuous_one():
+    loop = paper_loop()
+    omega = np.geomspace(1e-4, 2.0 * np.pi, 80)
+    exact = loop.open_loop(1j * omega, 1.0, 1.0 - 1e-6)
+    closed = [
+        np.abs(sampled_open_loop(loop, omega, 1.0, 1.0 - 1e-6, rate) / exact - 1.0).max()
+        for rate in (100.0, 200.0)
+    ]
+    assert closed[1] < 1e-4
+    assert closed[0] / closed[1] == pytest.approx(4.0, rel=0.05)
+    # Interpolated delays are as good as whole ones at frequencies well below the rate.
+    whole = sampled_open_loop(loop, omega, 1.0, 1.0, 200.0)
+    between = sampled_open_loop(loop, omega, 1.0, 1.0, 203.0)
+    assert np.abs(between / whole - 1.0).max() < 1e-4
+
+
+def test_error_falls_with_the_square_of_the_step():
+    """A single arm with c1 = 0 driven by t^2: phi' + g phi = 2 t, known in closed form."""
+    gain, end = 0.7, 10.0
+    errors = []
+    for rate in (20.0, 40.0, 80.0):
+        t = np.arange(round(end * rate) + 1) / rate
+        found = simulate(SingleArm(gain), t**2, 0.0, 0.0, rate)
+        exact = 2 * t / gain - 2 / gain**2 * (1.0 - np.exp(-gain * t))
+        errors.append(np.abs(found - exact).max())
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.02)
+    assert errors[1] / errors[2] == pytest.approx(4.0, rel=0.02)
+
+
+def grows(loop, c1, c2, rate, duration):
+    """Verdict of a run: None where it is too short to tell, with its log-growth rate."""
+    impulse = np.zeros(round(duration * rate))
+    impulse[0] = 1.0
+    try:
+        output = simulate(loop, impulse, c1, c2, rate, limit=1e12)
+    except DivergenceError:
+        return True
+    window = round(3.0 * max(loop.tau1, loop.tau2) * rate)
+    thirds = [output[output.size // 3 :][:window], output[-window:]]
+    early, late = (np.log(np.abs(part).max() + 1e-300) for part in thirds)
+    if late < -200.0:
+        return False
+    if abs(late - early) < 1.0:
+        return None
+    return bool(late > early)
+
+
+def random_points(loop, number, low, high, seed):
+    random = np.random.default_rng(seed)
+    points = random.uniform(low, high, (4 * number, 2))
+    counts = unstable_roots(loop, points[:, 0], points[:, 1])
+    stable, unstable = points[counts == 0], points[counts > 0]
+    half = number // 2
+    assert len(stable) >= half
+    assert len(unstable) >= half
+    return [(*p, 0) for p in stable[:half]] + [(*p, 1) for p in unstable[:half]]
+
+
+@pytest.mark.parametrize(
+    ("loop", "low", "high", "number"),
+    [
+        (CommonArm(1.0), -1.6, 1.6, 40),
+        (CommonArm(10.0), 0.5, 1.5, 20),
+        (DualArm(10.0), 0.9, 1.06, 20),
+    ],
+    ids=["common, g = 1", "common, g = 10", "dual, g = 10"],
+)
+def test_verdicts_agree_with_the_count(loop, low, high, number):
+    """Random (c1, c2) on both sides; runs of 6000 s tell nearly all, and never wrongly."""
+    rate, duration = 100.0, 6000.0
+    undecided = []
+    for c1, c2, unstable in random_points(loop, number, low, high, seed=8):
+        verdict = grows(loop, c1, c2, rate, duration)
+        if verdict is None:
+            undecided.append(rightmost_root(loop, c1, c2).real)
+        else:
+            assert verdict == bool(unstable), (c1, c2)
+    assert len(undecided) <= number // 10
+    # Where the run is too short to tell, it is so because the rightmost root is slow.
+    assert all(abs(rate) * duration < 6.0 for rate in undecided)
+
+
+@pytest.mark.parametrize("difference", [-1e-4, -3e-5, 3e-5, 1e-4, 3e-4])
+def test_verdicts_of_the_paper_loop(difference):
+    """Near the ideal point, with runs of some growth times: up to 10^5 s, 2 10^7 samples."""
+    loop = paper_loop()
+    c2 = 1.0 - difference
+    rate = rightmost_root(loop, 1.0, c2).real if difference > 0 else 1e-4
+    samples = round(6.0 / rate * RATE)
+    impulse = np.zeros(samples)
+    # A step, which the slow roots see.
+    impulse[:] = 1.0
+    output = simulate(loop, impulse, 1.0, c2)
+    early, late = (np.abs(output[int(share * samples) :][:4000]).max() for share in (0.5, 0.95))
+    assert int(unstable_roots(loop, 1.0, c2)) == (2 if difference > 0 else 0)
+    grown = np.log(late / early)
+    assert (grown > 2.0) == (difference > 0)
+    if difference > 0:
+        assert grown == pytest.approx(0.45 * 6.0, rel=0.1)
+
+
+def test_integrating_actuator_at_the_papers_gain():
+    """Explicit forms are unstable by themselves there; this one is not."""
+    loop = CommonArm(5000.0)
+    noise = np.random.default_rng(1).standard_normal(40_000)
+    found = simulate(loop, noise, 0.9, 0.9)
+    assert np.abs(found).max() < 5.0
+    explicit = np.zeros(noise.size)
+    integral = 0.0
+    with np.errstate(over="ignore", invalid="ignore"):
+        for i in range(200):
+            explicit[i] = noise[i] - integral
+            integral += 5000.0 / RATE * 2.0 * explicit[i]
+    assert np.nanmax(np.abs(explicit[:200])) > 1e100
+
+
+def test_blocks_give_the_same_bits():
+    noise = LaserNoise(3).draw(BLOCK + 5000)
+    c1, c2 = (1.0 + PerturbationNoise(seed).draw(noise.size) for seed in (4, 5))
+    whole = simulate(paper_loop(), noise, c1, c2)
+    cuts = [0, 1, 2, 4019, 4020, 9000, BLOCK, noise.size]
+    pieces = [slice(a, b) for a, b in pairwise(cuts)]
+    run = Simulation(paper_loop())
+    parts = [run.advance(noise[p], c1[p], c2[p]) for p in pieces]
+    assert np.array_equal(np.concatenate(parts), whole)
+    assert run.samples == noise.size
+    stream = simulate_blocks(paper_loop(), ((noise[p], c1[p], c2[p]) for p in pieces))
+    assert np.array_equal(np.concatenate(list(stream)), whole)
+
+
+def test_streams_are_read_one_block_at_a_time():
+    drawn = []
+
+    def blocks():
+        for k in range(5):
+            drawn.append(k)
+            yield np.ones(1000)
+
+    stream = simulate_blocks(CommonArm(), blocks(), 10.0)
+    next(stream)
+    assert drawn == [0]
+
+
+def test_constant_parameters_equal_arrays():
+    noise = np.random.default_rng(1).standard_normal(9000)
+    full = np.full(noise.size, 1.0 - 1e-6)
+    assert np.array_equal(
+        simulate(paper_loop(), noise, 1.0, full), simulate(paper_loop(), noise, 1, 1.0 - 1e-6)
+    )
+    every_second = np.repeat(noise, 2)[::2]
+    assert np.array_equal(simulate(paper_loop(), every_second), simulate(paper_loop(), noise))
+
+
+def test_history_continues_a_run():
+    """A loop without states has no other memory than its delays."""
+    loop, rate = LOOPS["gain alone"]
+    noise = np.random.default_rng(1).standard_normal(500)
+    whole = simulate(loop, noise, 0.9, 0.8, rate)
+    later = simulate(loop, noise[200:], 0.9, 0.8, rate, history=whole[:200])
+    assert np.array_equal(whole[200:], later)
+
+
+def test_zero_history_unless_given():
+    quiet = simulate(CommonArm(), np.zeros(100), sample_rate=10.0)
+    assert not quiet.any()
+    filled = simulate(CommonArm(), np.zeros(100), sample_rate=10.0, history=1.0)
+    assert filled[0] > 0.0
+    assert Simulation(CommonArm(), 10.0).history_samples == 201
+
+
+def test_divergence_is_reported_with_its_time():
+    loop = CommonArm(1.0, tau1=1.2, tau2=0.8)
+    assert unstable_roots(loop, 1.2, 1.2) == 1
+    rate = rightmost_root(loop, 1.2, 1.2).real
+    noise = np.zeros(2_000_000)
+    noise[0] = 1.0
+    with pytest.raises(DivergenceError, match="exceeded all input since t = ") as caught:
+        simulate(loop, noise, 1.2, 1.2)
+    error = caught.value
+    assert np.isfinite(error.output).all()
+    assert error.output.size == round(error.detected * RATE)
+    began = round(error.time * RATE)
+    assert np.abs(error.output[began]) <= 1.0
+    assert np.abs(error.output[began + 1 :]).min() > 0.0
+    assert np.abs(error.output).max() <= 1e6
+    # It takes the limit's 14 e-folds from the one to the other.
+    assert error.detected - error.time == pytest.approx(np.log(1e6) / rate, rel=0.02)
+
+
+def test_divergence_does_not_depend_on_blocks():
+    noise = np.ones(400_000)
+    with pytest.raises(DivergenceError) as whole:
+        simulate(CommonArm(1.0), noise, 1.2, 1.2)
+    run = Simulation(CommonArm(1.0))
+    blocks = np.split(noise, 400)
+    with pytest.raises(DivergenceError) as parts:
+        [run.advance(block, 1.2, 1.2) for block in blocks]
+    assert (whole.value.time, whole.value.detected) == (parts.value.time, parts.value.detected)
+    with pytest.raises(DivergenceError):
+        run.advance(noise[:10])
+
+
+SHORT = np.zeros(100)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"noise": np.zeros((2, 50))}, r"noise must be one-dimensional, got shape \(2, 50\)"),
+        ({"noise": 3.0}, "noise must be one-dimensional"),
+        ({"noise": [0.0, np.nan]}, "noise must be finite, got nan at sample 1"),
+        ({"noise": [0.0, np.inf]}, "noise must be finite, got inf"),
+        ({"c1": np.ones(99)}, r"c1 must be a number or have the shape of noise, \(100,\)"),
+        ({"c2": np.ones((100, 1))}, "c2 must be one-dimensional"),
+        ({"c2": np.nan}, "c2 must be finite"),
+        ({"c1": [np.inf] * 100}, "c1 must be finite"),
+        ({"sample_rate": 0.0}, "sample_rate must be positive, got 0.0"),
+        ({"sample_rate": -200.0}, "sample_rate must be positive, got -200.0"),
+        ({"sample_rate": np.nan}, "sample_rate must be finite"),
+        ({"sample_rate": 1.0}, "sample_rate must exceed 1.25"),
+        ({"history": np.zeros(10)}, "history must hold at least 4020 samples"),
+        ({"history": np.nan}, "history must be finite"),
+        ({"interpolation": 2}, "interpolation must be an odd positive integer, got 2"),
+        ({"limit": 0.0}, "limit must be positive"),
+    ],
+)
+def test_bad_arguments(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        simulate(paper_loop(), **({"noise": SHORT} | arguments))
+
+
+@pytest.mark.parametrize(
+    ("loop", "arguments", "message"),
+    [
+        (CommonArm(), {"noise": ["a"]}, "noise must"),
+        (CommonArm(), {"noise": SHORT + 1j}, "noise must be real"),
+        (CommonArm(), {"c1": "x"}, "c1 must"),
+        (HayesEquation(), {}, "loop must be an armlock.Loop, got HayesEquation"),
+        (None, {}, "loop must be an armlock.Loop, got NoneType"),
+    ],
+)
+def test_bad_types(loop, arguments, message):
+    with pytest.raises(TypeError, match=message):
+        simulate(loop, **({"noise": SHORT} | arguments))
+
+
+def test_rates_too_low_for_the_delays():
+    short = Loop(Controller([], [-0.1], 0.2), COMMON, 0.01, 0.01)
+    with pytest.raises(ValueError, match=r"sample_rate must be .* to interpolate tau1"):
+        simulate(short, SHORT, sample_rate=130.0)
+    whole = simulate(short, np.ones(100), sample_rate=100.0)
+    assert np.isfinite(whole).all()
+
+
+def test_rates_too_low_for_the_feedback():
+    """With this gain 1 + K is negative at 2 / T and positive at infinity: a fast real root."""
+    loop = Loop(Controller([], [-1.0], -10.0), COMMON, 20.0, 20.0)
+    with pytest.raises(ValueError, match="sample_rate must be higher for this loop"):
+        simulate(loop, SHORT, sample_rate=5.0)
+    assert simulate(loop, SHORT, sample_rate=50.0).shape == SHORT.shape
+
+
+def test_nothing_is_computed_before_the_check(monkeypatch):
+    def fail(*_):
+        raise AssertionError("computed")
+
+    monkeypatch.setattr("armlock.simulation._advance", fail)
+    noise = np.zeros(300_000)
+    noise[-1] = np.nan
+    with pytest.raises(ValueError, match="at sample 299999"):
+        simulate(paper_loop(), noise)
+    with pytest.raises(ValueError, match="c2 must be finite"):
+        simulate(paper_loop(), np.zeros(300_000), 1.0, noise)
+
+
+def test_empty_runs_are_empty():
+    assert simulate(paper_loop(), np.empty(0)).shape == (0,)
+
+
+def test_saved_series_read_back(tmp_path):
+    noise = np.random.default_rng(1).standard_normal(5000)
+    target = tmp_path / "run.npy"
+    blocks = simulate_blocks(CommonArm(), np.split(noise, 10), 10.0)
+    assert save_series(target, blocks) == noise.size
+    assert np.array_equal(np.load(target), simulate(CommonArm(), noise, sample_rate=10.0))
+    assert [path.name for path in tmp_path.iterdir()] == ["run.npy"]
+
+
+@pytest.mark.parametrize("stop", [KeyboardInterrupt, DivergenceError(1.0, 2.0, SHORT)])
+def test_an_interrupted_run_leaves_no_file(tmp_path, stop):
+    def blocks():
+        yield np.ones(1000)
+        raise stop
+
+    fresh, old = tmp_path / "fresh.npy", tmp_path / "old.npy"
+    np.save(old, np.arange(3.0))
+    for target in (fresh, old):
+        with pytest.raises((KeyboardInterrupt, DivergenceError)):
+            save_series(target, simulate_blocks(CommonArm(), blocks(), 10.0))
+    assert [path.name for path in tmp_path.iterdir()] == ["old.npy"]
+    assert np.array_equal(np.load(old), np.arange(3.0))
+
+
+def test_progress_is_shown_when_asked(capsys):
+    noise = np.zeros(3 * BLOCK)
+    simulate(CommonArm(), noise, progress=True)
+    shown = capsys.readouterr().err
+    assert "100 %" in shown
+    assert shown.count("\r") == 3
+    assert shown.endswith("\n")
+    simulate(CommonArm(), noise, progress=False)
+    assert noise.size < LONG_RUN
+    simulate(CommonArm(), noise)
+    list(simulate_blocks(CommonArm(), [noise], samples=LONG_RUN))
+    assert capsys.readouterr().err == ""

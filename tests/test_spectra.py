@@ -1,0 +1,137 @@
+"""The estimator against known densities: level, scatter, leakage, lines, blocks."""
+
+import numpy as np
+import pytest
+from scipy.signal import welch
+
+from armlock import LaserNoise, Spectrum, SpectrumEstimator, amplitude_spectrum
+from armlock.spectra import HOP, SEGMENT
+
+
+def test_white_noise_has_its_level_and_its_scatter():
+    series = 3.0 * np.random.default_rng(5).standard_normal(3_000_000)
+    found = amplitude_spectrum(series, 50.0)
+    expected = 3.0 * np.sqrt(2.0 / 50.0)
+    pull = ((found.asd / expected) ** 2 - 1.0) * np.sqrt(0.5 * found.degrees)
+    assert np.abs(pull).max() < 4.5
+    assert 0.75 < pull.std() < 1.25
+    inside = (found.lower < expected) & (found.upper > expected)
+    assert inside.mean() > 0.85
+    assert found.frequency[-1] / found.frequency[0] > 3e4
+
+
+def test_confidence_band_holds_what_it_says():
+    """Many short series: the share of bands whose interval holds the truth is 95 percent."""
+    random = np.random.default_rng(11)
+    inside = []
+    for _ in range(120):
+        found = amplitude_spectrum(random.standard_normal(20_000), 2.0)
+        inside.append((found.lower < 1.0) & (found.upper > 1.0))
+    share = np.mean(inside)
+    assert share == pytest.approx(0.95, abs=0.012)
+    assert np.mean(inside, axis=0).min() > 0.85
+
+
+@pytest.mark.parametrize("power", [1, 2])
+def test_steep_spectra_do_not_leak(power):
+    """Noise falling as 1/f and 1/f^2 (in amplitude) over five decades, the latter summed."""
+    rate = 20.0
+    series = np.random.default_rng(power).standard_normal(2_000_000)
+    for _ in range(power):
+        series = np.cumsum(series)
+    found = amplitude_spectrum(series, rate)
+
+    def truth(f):
+        turn = 2.0 * np.sin(np.pi * np.maximum(np.minimum(f, rate - f), 1e-9) / rate)
+        return np.sqrt(2.0 / rate) / turn**power
+
+    fast = found.degrees > 200.0
+    assert np.abs(found.asd / found.expected(truth) - 1.0)[fast].max() < 0.2
+    assert found.asd[0] / found.asd[-1] > 2e3**power
+
+
+def test_a_hann_window_hides_what_this_one_shows():
+    """A notch of three orders under a red spectrum, below the leakage of the usual window."""
+    rate, count = 20.0, 1 << 20
+    red = np.cumsum(np.cumsum(np.random.default_rng(2).standard_normal(count)))
+    red /= np.abs(red).max()
+    floor = 1e-9 * np.random.default_rng(3).standard_normal(count)
+    # Slow part only, with a floor far below it.
+    spectrum = np.fft.rfft(red * np.kaiser(count, 40.0))
+    spectrum[np.fft.rfftfreq(count, 1 / rate) > 0.02] = 0.0
+    series = np.fft.irfft(spectrum, count) + floor
+    expected = 1e-9 * np.sqrt(2.0 / rate)
+    found = amplitude_spectrum(series, rate).within(0.5, 2.0)
+    assert found.asd == pytest.approx(np.full(found.asd.size, expected), rel=0.1)
+    frequency, power = welch(series, rate, "hann", SEGMENT)
+    hann = np.sqrt(power[(frequency > 0.5) & (frequency < 2.0)])
+    assert np.median(hann) > 3.0 * expected
+
+
+def test_decimation_keeps_a_line_and_adds_none():
+    """A sine shows at its frequency with its power, and nowhere else."""
+    rate, f0 = 200.0, 0.61
+    t = np.arange(4_000_000) / rate
+    found = amplitude_spectrum(np.sin(2 * np.pi * f0 * t), rate)
+    width = found.resolution * found.bins
+    near = np.abs(found.frequency - f0) < 0.6 * width + 8 * found.resolution
+    power = np.sum(found.asd[near] ** 2 * width[near])
+    assert power == pytest.approx(0.5, rel=0.05)
+    assert found.asd[~near].max() < 1e-5 * found.asd.max()
+
+
+def test_expectation_of_a_bent_density():
+    """Averaged over many series, the estimate is what `expected` says, near the low end too."""
+    found = [
+        amplitude_spectrum(LaserNoise(seed, 10.0, cutoff=1e-3).draw(30_000), 10.0)
+        for seed in range(60)
+    ]
+    mean = np.sqrt(np.mean([s.asd**2 for s in found], axis=0))
+    expected = found[0].expected(LaserNoise(0, 10.0, cutoff=1e-3).sampled_asd)
+    assert mean / expected == pytest.approx(np.ones(mean.size), abs=0.2)
+    assert np.abs(mean / expected - 1.0).mean() < 0.04
+
+
+def test_blocks_do_not_matter():
+    series = np.random.default_rng(1).standard_normal(50_000)
+    estimator = SpectrumEstimator(3.0)
+    for block in np.split(series, [1, 2, 1000, 1024, 30_001]):
+        estimator.add(block)
+    whole = amplitude_spectrum(series, 3.0)
+    parts = estimator.spectrum()
+    assert parts.asd == pytest.approx(whole.asd, rel=1e-12)
+    assert np.array_equal(parts.degrees, whole.degrees)
+
+
+def test_memory_does_not_grow_with_the_series():
+    estimator = SpectrumEstimator(200.0)
+    for _ in range(20):
+        estimator.add(np.zeros(100_000))
+    held = sum(level.waiting.size + level.unfiltered.size for level in estimator._levels)
+    assert held < 4 * SEGMENT * len(estimator._levels)
+    assert HOP < SEGMENT
+
+
+def test_parts_keep_their_bands():
+    found = amplitude_spectrum(np.random.default_rng(1).standard_normal(5000), 2.0)
+    part = found.within(0.1, 0.5)
+    assert isinstance(part, Spectrum)
+    assert part.frequency.min() >= 0.1
+    assert part.frequency.max() <= 0.5
+    assert part.asd.size == part.bins.size
+
+
+@pytest.mark.parametrize(
+    ("series", "rate", "more", "message"),
+    [
+        (np.zeros(1000), 1.0, {}, "at least 1024 samples, got 1000"),
+        (np.zeros((2, 2000)), 1.0, {}, "one-dimensional"),
+        ([0.0, np.inf] * 1000, 1.0, {}, "finite"),
+        (np.zeros(2000), -1.0, {}, "sample_rate must be positive"),
+        (np.zeros(2000), 1.0, {"bands": 0}, "bands must be"),
+        (np.zeros(2000), 1.0, {"confidence": 1.0}, "confidence must lie"),
+    ],
+)
+def test_bad_arguments(series, rate, more, message):
+    with pytest.raises(ValueError, match=message):
+        amplitude_spectrum(series, rate, **more)
