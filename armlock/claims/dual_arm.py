@@ -164,6 +164,23 @@ def outline(gain: float, number: int = 61) -> FloatArray:
 
 
 @cache
+def strip(gain: float, number: int = 121) -> FloatArray:
+    """Trace the far edge over the whole length of the strip.
+
+    Returns
+    -------
+    float array, shape (2, number)
+        (c1 + c2) / 2, from the lower to the upper end of the straight edge, and c2 - c1 at the
+        far or end edge, whichever is nearer.
+    """
+    loop = DualArm(gain)
+    lower = first_crossing(loop, (-0.5, -0.5), (-1.0, -1.0), stop=10.0).position
+    common = np.linspace(-0.5 - lower, 1.0 + edges(gain).corner, number + 2)[1:-1]
+    ends = [first_crossing(loop, (c, c), (-0.5, 0.5), stop=1.0).position for c in common]
+    return np.array([common, ends])
+
+
+@cache
 def window_area(gain: float, number: int = 61) -> float:
     """Area of the part of the stable region in which both parameters are in the window."""
     difference, top = outline(gain, number)

@@ -1,0 +1,169 @@
+"""The dual arm against independent counts, sampled loops, closed forms and symmetries."""
+
+import numpy as np
+import pytest
+
+from armlock import (
+    BOUNDARY,
+    CommonArm,
+    DualArm,
+    d_curve_line,
+    rightmost_root,
+    semi_discretization,
+    stability_chart,
+    unstable_roots,
+)
+from armlock.claims import dual_arm
+from armlock.sweeps import first_crossing, ray_crossings, sweep
+from tests.independent import generator_eigenvalues, rectangle_count, spectral_count
+
+SLOW = DualArm(gain=0.3, tau1=2.1, tau2=1.7, corner=1.5)
+
+
+@pytest.mark.parametrize("loop", [SLOW, DualArm(), DualArm(gain=0.4, difference=0.1)])
+def test_counts_agree_with_a_brute_force_winding_number(loop):
+    c1, c2 = np.random.default_rng(5).uniform(-1.5, 1.5, (2, 12))
+    counts = unstable_roots(loop, c1, c2)
+    assert counts.tolist() == [rectangle_count(loop, x, y) for x, y in zip(c1, c2, strict=True)]
+
+
+def test_counts_agree_with_a_collocated_generator():
+    c1, c2 = np.random.default_rng(6).uniform(-1.4, 1.4, (2, 20))
+    counts = unstable_roots(SLOW, c1, c2)
+    assert counts.tolist() == [spectral_count(SLOW, x, y) for x, y in zip(c1, c2, strict=True)]
+
+
+def test_rightmost_root_agrees_with_a_collocated_generator():
+    for point in ((0.8, 0.9), (1.0, 0.9), (0.9, 1.3)):
+        root = rightmost_root(SLOW, *point)
+        eigenvalues = generator_eigenvalues(SLOW, *point)
+        assert np.abs(eigenvalues - root).min() < 1e-9
+
+
+def test_semi_discretization_at_a_small_step_has_the_same_verdicts():
+    axis = np.linspace(0.9, 1.1, 41)[::3]
+    y = axis + 0.00217
+    exact = stability_chart(DualArm(), axis, y)
+    sampled = stability_chart(semi_discretization(DualArm(), 0.025, 1), axis, y)
+    assert exact.stable.sum() > 5
+    np.testing.assert_array_equal(exact.counts, sampled.counts)
+
+
+@pytest.mark.parametrize("gain", [0.1, 10.0, 1e4])
+@pytest.mark.parametrize("options", [{}, {"corner": 0.7}, {"difference": 0.1}])
+def test_straight_edge_is_where_both_perturbations_are_equal(gain, options):
+    loop = DualArm(gain, **options)
+    assert d_curve_line(loop) == (1.0, -1.0, 0.0)
+    c = np.array([-0.5, 0.2, 0.9, 1.0])
+    np.testing.assert_array_equal(unstable_roots(loop, c, c), BOUNDARY)
+    np.testing.assert_array_equal(unstable_roots(loop, c, c + 1e-9), 0)
+    np.testing.assert_array_equal(unstable_roots(loop, c, c - 1e-9), 1)
+
+
+def test_value_at_zero_is_proportional_to_gain_and_corner():
+    for gain, corner in ((2.0, 0.5), (10.0, 2.5)):
+        value = DualArm(gain, corner=corner)(0.0, 0.7, 1.1)
+        assert value == pytest.approx(gain * corner * 0.4, rel=1e-14)
+
+
+def test_exchanging_the_arms_mirrors_the_chart():
+    x, y = np.linspace(0.91, 1.09, 60), np.linspace(0.905, 1.085, 61)
+    chart = stability_chart(DualArm(tau1=20.1, tau2=19.9), x, y)
+    mirrored = stability_chart(DualArm(tau1=19.9, tau2=20.1), y, x)
+    np.testing.assert_array_equal(chart.counts, mirrored.counts.T)
+
+
+def test_a_negative_difference_keeps_the_line_and_turns_the_stable_side():
+    assert unstable_roots(DualArm(tau1=19.9, tau2=20.1), 1.0, [0.995, 1.005]).tolist() == [0, 1]
+
+
+def test_high_corner_is_a_pure_integral():
+    # p / (s + p) -> 1: roots far below p no longer depend on it.
+    one, other = (rightmost_root(DualArm(corner=p), 1.0, 1.01) for p in (1e4, 1e5))
+    assert abs(one - other) < 1e-5 * abs(one)
+
+
+def test_low_corner_is_a_common_arm_and_a_slow_root():
+    # E -> p / (s^2 dtau) -> 0 at fixed s: away from zero the roots are those of the common arm.
+    common = rightmost_root(CommonArm(gain=10.0), 1.05, 1.0)
+    dual = rightmost_root(DualArm(gain=10.0, corner=1e-12), 1.05, 1.0)
+    assert dual.real == pytest.approx(common.real, rel=1e-3)
+
+
+def test_half_the_difference_is_twice_the_integral():
+    s = np.array([0.01j, 0.2 + 1j])
+    whole, half = (DualArm(difference=d).mapping.weights(s) for d in (0.2, 0.1))
+    np.testing.assert_allclose(half[0] - 1.0, 2.0 * (whole[0] - 1.0), rtol=1e-12)
+
+
+@pytest.mark.parametrize("gain", [0.5, 10.0, 300.0])
+@pytest.mark.parametrize("difference", [None, 0.1])
+def test_corner_solves_its_closed_form_condition(gain, difference):
+    found = dual_arm.edges(gain, difference=difference)
+    omega, c = found.corner_omega, 1.0 + found.corner
+    theta, share = 0.1 * omega, 0.2 / (difference or 0.2)
+    p = dual_arm.DUAL_SENSOR_CORNER
+    response = 2.0 * np.cos(theta) - share * p / (p + 1j * omega) * np.sin(theta) / theta
+    assert abs(2.0 + 1j * omega / gain - c * np.exp(-20j * omega) * response) < 1e-9
+
+
+@pytest.mark.parametrize("gain", [1.0, 10.0, 300.0])
+def test_edges_are_where_the_count_changes(gain):
+    loop, found = DualArm(gain), dual_arm.edges(gain)
+    c = 1.0 + found.corner * np.array([1.0 - 1e-4, 1.0 + 1e-4])
+    assert unstable_roots(loop, c, c + 1e-9).tolist() == [0, 2]
+    d = found.width * np.array([1.0 - 1e-6, 1.0 + 1e-6])
+    assert unstable_roots(loop, 0.9 - d / 2, 0.9 + d / 2).tolist() == [0, 2]
+
+
+def test_crossings_along_a_ray_add_up_to_the_counts():
+    loop = DualArm()
+    start, direction = np.array([0.8, 1.2]), np.array([0.35, -0.4])
+    crossings = ray_crossings(loop, start, direction, 1.0)
+    assert (np.diff(crossings.position) >= 0.0).all()
+    t = np.linspace(0.013, 0.99, 40)
+    expected = int(unstable_roots(loop, *start)) + np.array(
+        [crossings.change[crossings.position < here].sum() for here in t]
+    )
+    along = start[:, None] + t * direction[:, None]
+    np.testing.assert_array_equal(unstable_roots(loop, *along), expected)
+    first = first_crossing(loop, start, direction, 1.0)
+    assert first.position == pytest.approx(crossings.position[0], rel=1e-12)
+
+
+def test_first_crossing_says_where_there_is_none():
+    found = first_crossing(CommonArm(), (0.0, 0.0), (1.0, 1.0), 0.9)
+    assert (found.position, found.change) == (np.inf, 0)
+    assert np.isnan(found.omega)
+
+
+@pytest.mark.parametrize(
+    ("start", "direction", "stop", "message"),
+    [
+        ((0.0,), (1.0, 1.0), 1.0, "^start must hold two numbers, got 1"),
+        ((0.0, 0.0), (1.0, 1.0, 1.0), 1.0, "^direction must hold two numbers, got 3"),
+        ((0.0, 0.0), (0.0, 0.0), 1.0, "^direction must not have length zero"),
+        ((0.0, 0.0), (1.0, 1.0), 0.0, "^stop must be positive, got 0"),
+    ],
+)
+def test_bad_rays_are_refused(start, direction, stop, message):
+    for function in (ray_crossings, first_crossing):
+        with pytest.raises(ValueError, match=message):
+            function(CommonArm(), start, direction, stop)
+
+
+def test_sweep_gathers_fields_and_uses_the_map_it_is_given():
+    seen = []
+
+    def backwards(function, points):
+        seen.extend(points)
+        return [function(point) for point in points]
+
+    gains = [1.0, 10.0]
+    found = sweep(dual_arm.edges, gains, mapper=backwards)
+    assert seen == gains
+    assert isinstance(found, dual_arm.Edges)
+    np.testing.assert_array_equal(found.gain, gains)
+    assert found.corner[1] == dual_arm.edges(10.0).corner
+    with pytest.raises(ValueError, match=r"^points must not be empty"):
+        sweep(dual_arm.edges, [])
