@@ -1,0 +1,220 @@
+"""Dual arm and controlled loop: charts, the critical perturbation, memory.
+
+The requirements: a 1000 x 1000 chart of the dual arm at g = 10 over [0.9, 1.1]^2 takes at
+most twice the common arm's time per crossing found; a 400 x 400 chart of the controlled loop
+over +-5e-6 takes at most 10 s; `critical_perturbation` is right to 1e-9 and takes at most
+1 s; none needs 1 GiB.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import fsolve
+
+from armlock import (
+    CharacteristicFunction,
+    CommonArm,
+    DualArm,
+    StabilityChart,
+    contour,
+    critical_perturbation,
+    paper_loop,
+    stability_chart,
+    unstable_roots,
+)
+from armlock.stability import last_crossing
+from armlock.validation import FloatArray
+from benchmarks import child
+from benchmarks.charts import comparison, memory_row, timed
+from benchmarks.report import Row, Topic
+
+GAIN = 10.0
+SECONDS_CHART = 10.0
+SECONDS_CRITICAL = 1.0
+ACCURACY = 1e-9
+RATIO = 2.0
+DIRECTIONS = ((1.0, -1.0), (0.0, -1.0), (1.0, 0.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0))
+SEED = 21
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How much is measured."""
+
+    side: int = 1000
+    controlled: int = 400
+    points: int = 2000
+    runs: int = 7
+
+
+QUICK = Sizes(side=20, controlled=20, points=30, runs=1)
+
+
+def window(half_width: float, side: int) -> FloatArray:
+    return 1.0 + np.linspace(-half_width, half_width, side)
+
+
+def chart_of(name: str, side: int) -> StabilityChart:
+    """Chart a loop made for this call: "common", "dual" or "controlled"."""
+    if name == "controlled":
+        return stability_chart(paper_loop(), window(5e-6, side), window(5e-6, side))
+    loop = CommonArm(GAIN) if name == "common" else DualArm(GAIN)
+    return stability_chart(loop, window(0.1, side), window(0.1, side))
+
+
+def crossings_found(system: CharacteristicFunction, y: FloatArray, right: float) -> int:
+    """How many frequencies a chart with rows y finds at which a root may cross in a row."""
+    a, b1, b2 = system.on_boundary()
+    rest = system.rest_on_boundary()
+    at_reference = rest.plus(b1.scaled(system.reference[0])).sums
+    fixed = a._replace(sums=at_reference).times_conjugate(b1)
+    varying = b2.times_conjugate(b1)
+    total = 0
+    for level in y:
+        # Delays left out, only the deviation from the reference remains.
+        sums = fixed.plus(varying.scaled(system.reference[1] - level)).sums
+        row = fixed.plus(varying.scaled(-level))
+        end = float(last_crossing(system, right, level))
+        total += contour.sign_changes(*row._replace(sums=sums), end, False)[0].size
+    return total
+
+
+def alone(name: str, side: int) -> dict[str, float]:
+    """Chart once to compile, then again; return the time and the peak memory."""
+    chart_of(name, side)
+    seconds, _ = timed(chart_of, name, side)
+    return {"seconds": seconds, "memory": child.peak_memory()}
+
+
+def chart_rows(topic: Topic, sizes: Sizes) -> None:
+    """Compare the dual arm's chart with the common arm's, and check its counts."""
+    side = sizes.side
+    y = window(0.1, side)
+    times: dict[str, list[float]] = {"common": [], "dual": []}
+    for name in times:
+        chart_of(name, side)
+    # In turn, so that a busy spell does not spoil one of them.
+    for _ in range(sizes.runs):
+        for name, of_name in times.items():
+            of_name.append(timed(chart_of, name, side)[0])
+    found = {
+        "common": crossings_found(CommonArm(GAIN), y, y[-1]),
+        "dual": crossings_found(DualArm(GAIN), y, y[-1]),
+    }
+    best = {name: min(of_name) for name, of_name in times.items()}
+    each = {name: best[name] / found[name] for name in best}
+    for name in best:
+        topic.rows.append(
+            Row(
+                f"{name} arm, g = {GAIN:g}: chart {side} x {side} over [0.9, 1.1]^2", best[name]
+            )
+        )
+    quotient = each["dual"] / each["common"]
+    topic.rows.append(
+        Row(
+            "the same, time per crossing found [a]: dual over common arm",
+            requirement=f"{quotient:.2f} <= {RATIO:g}",
+            met=quotient <= RATIO,
+        )
+    )
+    for name, system, count in (
+        ("dual", DualArm(GAIN), side),
+        ("controlled", paper_loop(), sizes.controlled),
+    ):
+        chart = chart_of(name, count)
+        rows, columns = np.random.default_rng(SEED).integers(0, count, (2, sizes.points))
+        single = unstable_roots(system, chart.x[columns], chart.y[rows])
+        differ = int((single != chart.counts[rows, columns]).sum())
+        topic.rows.append(
+            comparison(f"{name}: chart against single counts [b]", differ, sizes.points)
+        )
+    topic.data["charts"] = {"times": times, "crossings": found}
+
+
+def independent_crossing(direction: tuple[float, float], start: float) -> float:
+    """Critical perturbation by solving 1 + L = 0, real and imaginary part, near `start`.
+
+    With the factored loop, in units that make both unknowns of order one.
+    """
+    loop = paper_loop()
+    d1, d2 = direction
+    sensor = loop.mapping
+
+    def equation(unknown: FloatArray) -> list[float]:
+        s = 1e-5j * unknown[0]
+        m1, m2 = sensor.weights(s)
+        e1, e2 = -np.expm1(-s * loop.tau1), -np.expm1(-s * loop.tau2)
+        eps = start * unknown[1]
+        arms = m1 * (e1 - eps * d1 * (1.0 - e1)) + m2 * (e2 - eps * d2 * (1.0 - e2))
+        value = complex(1.0 + loop.controller(s) * arms)
+        return [value.real, value.imag]
+
+    solution = fsolve(equation, [2.0, 1.0], xtol=1e-12)
+    return float(start * solution[1])
+
+
+def critical_rows(topic: Topic, sizes: Sizes) -> None:
+    """Time `critical_perturbation`, and hold it against two other values."""
+    loop = paper_loop()
+    slowest, where = 0.0, DIRECTIONS[0]
+    values = {}
+    for direction in DIRECTIONS:
+        values[direction] = critical_perturbation(loop, direction)
+        best = min(
+            timed(critical_perturbation, paper_loop(), direction)[0] for _ in range(sizes.runs)
+        )
+        if best > slowest:
+            slowest, where = best, direction
+    topic.rows.append(
+        Row(
+            f"critical_perturbation, slowest of {len(DIRECTIONS)} directions {where}",
+            slowest,
+            requirement=f"at most {SECONDS_CRITICAL:g} s",
+            met=slowest <= SECONDS_CRITICAL,
+        )
+    )
+    errors = [abs(values[d] / independent_crossing(d, values[d]) - 1.0) for d in DIRECTIONS[:3]]
+    chain = 0.5 / loop.controller.gain
+    errors.append(abs(values[1.0, 1.0] / chain - 1.0))
+    topic.rows.append(
+        Row(
+            "critical_perturbation against other values [c], relative",
+            requirement=f"{max(errors):.1e} <= {ACCURACY:g}",
+            met=max(errors) <= ACCURACY,
+            correctness=True,
+        )
+    )
+    topic.data["critical perturbations"] = {str(d): value for d, value in values.items()}
+
+
+def run(*, quick: bool, folder: Path) -> Topic:
+    """Measure charts and limits of the dual arm and of the controlled loop."""
+    sizes = QUICK if quick else Sizes()
+    topic = Topic("Dual arm and controlled loop")
+    topic.data["sizes"] = asdict(sizes)
+    chart_rows(topic, sizes)
+    for name, side in (("dual", sizes.side), ("controlled", sizes.controlled)):
+        measured = child.call("benchmarks.loops", "alone", {}, name=name, side=side)
+        what = f"{name}: chart {side} x {side}"
+        if name == "controlled":
+            topic.rows.append(
+                Row(
+                    f"{what} over 1 +- 5e-6",
+                    measured["seconds"],
+                    requirement=f"at most {SECONDS_CHART:g} s",
+                    met=measured["seconds"] <= SECONDS_CHART,
+                )
+            )
+        topic.rows.append(memory_row(what, measured["memory"]))
+    critical_rows(topic, sizes)
+    topic.notes += [
+        f"[a] Best of {sizes.runs} runs in turn; crossings are the frequencies at which a root "
+        "may cross somewhere in a row of the chart.",
+        f"[b] Argument principle at {sizes.points} random points of the grid.",
+        "[c] 1 + L = 0 solved for frequency and perturbation with the factored loop; along "
+        "(1, 1) the closed form 1 / (2 g).",
+    ]
+    return topic
