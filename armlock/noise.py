@@ -17,6 +17,7 @@ from numba.cpython.unsafe.tuple import tuple_setitem
 from scipy.linalg import solve_continuous_lyapunov
 
 from armlock import paper
+from armlock.controllers import Controller
 from armlock.sampled import Row, floats, real_system, sample, warped
 from armlock.validation import FloatArray, positive_number
 
@@ -62,6 +63,7 @@ class ShapedNoise:
         at_rest: bool = False,
     ) -> None:
         self.sample_rate = positive_number("sample_rate", sample_rate)
+        self._filter = Controller(zeros, poles, gain)
         if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
             raise ValueError(f"seed must be an integer from 0 on, got {seed!r}")
         self._random = np.random.default_rng(seed)
@@ -76,6 +78,18 @@ class ShapedNoise:
             # The trapezoidal rule keeps the covariance.
             start = np.linalg.cholesky(0.5 * (covariance + covariance.T))
             self._state = floats(start @ self._random.standard_normal(len(A)))
+
+    def asd(self, frequency: npt.ArrayLike) -> FloatArray:
+        """Prescribed density at a frequency in Hz, in the series' unit per sqrt(Hz)."""
+        return self._density(2.0 * np.pi * np.asarray(frequency, dtype=float))
+
+    def sampled_asd(self, frequency: npt.ArrayLike) -> FloatArray:
+        """Density of the samples in closed form, at a frequency below half the rate."""
+        omega = 2.0 * np.pi * np.asarray(frequency, dtype=float)
+        return self._density(warped(omega, self.sample_rate))
+
+    def _density(self, omega: FloatArray) -> FloatArray:
+        return np.asarray(np.abs(self._filter(1j * omega)))
 
     def draw(self, samples: int) -> FloatArray:
         """Return the next samples of the series.
@@ -250,11 +264,6 @@ class LaserNoise(ShapedNoise):
             past = self._random.standard_normal(past.size)
         self._past = past
 
-    def asd(self, frequency: npt.ArrayLike) -> FloatArray:
-        """Prescribed density at a frequency in Hz, in Hz/sqrt(Hz)."""
-        frequency = np.asarray(frequency, dtype=float)
-        return np.asarray(self.level / np.hypot(frequency, self.cutoff))
-
     def sampled_asd(self, frequency: npt.ArrayLike) -> FloatArray:
         """Density of the samples in closed form, at a frequency below half the rate."""
         frequency = np.asarray(frequency, dtype=float)
@@ -357,15 +366,3 @@ class PerturbationNoise(ShapedNoise):
             self.scale * paper.PHASE_NOISE_LEVEL,
             seed=seed, sample_rate=sample_rate, at_rest=at_rest,
         )  # fmt: skip
-
-    def asd(self, frequency: npt.ArrayLike) -> FloatArray:
-        """Prescribed density at a frequency in Hz, in 1/sqrt(Hz), cut-off included."""
-        frequency = np.asarray(frequency, dtype=float)
-        above = np.sqrt(frequency**4 + paper.PHASE_NOISE_CORNER**4)
-        below = frequency**2 + self.cutoff**2
-        return np.asarray(self.scale * paper.PHASE_NOISE_LEVEL * above / below)
-
-    def sampled_asd(self, frequency: npt.ArrayLike) -> FloatArray:
-        """Density of the samples in closed form, at a frequency below half the rate."""
-        omega = 2.0 * np.pi * np.asarray(frequency, dtype=float)
-        return self.asd(warped(omega, self.sample_rate) / (2.0 * np.pi))

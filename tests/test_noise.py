@@ -1,6 +1,7 @@
 """Shaped noise: density, start, blocks, seeds."""
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from armlock import LaserNoise, PerturbationNoise, ShapedNoise, paper
 from armlock.noise import band_rms, sample_count
 from armlock.spectra import SpectrumEstimator
 
-SOURCES = {
+SOURCES: dict[str, Any] = {
     "laser": lambda seed, **more: LaserNoise(seed, **more),
     "laser at rest": lambda seed, **more: LaserNoise(seed, at_rest=True, **more),
     "perturbation": lambda seed, **more: PerturbationNoise(seed, **more),
@@ -104,7 +105,8 @@ def test_band_rms_is_the_integral():
     ("call", "message"),
     [
         (lambda: LaserNoise(-1), "seed must be"),
-        (lambda: LaserNoise(1.5), "seed must be"),
+        (lambda: LaserNoise(1.5),  # type: ignore[arg-type]
+          "seed must be"),
         (lambda: LaserNoise(True), "seed must be"),
         (lambda: LaserNoise(1, 0.0), "sample_rate must be positive"),
         (lambda: LaserNoise(1, cutoff=-1.0), "cutoff must be positive"),

@@ -160,11 +160,11 @@ def random_points(loop, number, low, high, seed):
 def test_verdicts_agree_with_the_count(loop, low, high, number):
     """Random (c1, c2) on both sides; runs of 6000 s tell nearly all, and never wrongly."""
     rate, duration = 100.0, 6000.0
-    undecided = []
+    undecided: list[float] = []
     for c1, c2, unstable in random_points(loop, number, low, high, seed=8):
         verdict = grows(loop, c1, c2, rate, duration)
         if verdict is None:
-            undecided.append(rightmost_root(loop, c1, c2).real)
+            undecided.append(complex(rightmost_root(loop, c1, c2)).real)
         else:
             assert verdict == bool(unstable), (c1, c2)
     assert len(undecided) <= number // 10
@@ -177,7 +177,7 @@ def test_verdicts_of_the_paper_loop(difference):
     """Near the ideal point, with runs of some growth times: up to 10^5 s, 2 10^7 samples."""
     loop = paper_loop()
     c2 = 1.0 - difference
-    rate = rightmost_root(loop, 1.0, c2).real if difference > 0 else 1e-4
+    rate = complex(rightmost_root(loop, 1.0, c2)).real if difference > 0 else 1e-4
     samples = round(6.0 / rate * RATE)
     impulse = np.zeros(samples)
     # A step, which the slow roots see.

@@ -8,6 +8,8 @@ from armlock.claims import single_arm  # isort: skip
 from armlock.claims import common_arm  # isort: skip
 from armlock.claims import dual_arm  # isort: skip
 from armlock.claims import controller  # isort: skip
+from armlock.claims import simulation  # isort: skip
+from armlock.claims import appendix  # isort: skip
 
 __all__ = [
     "Claim",
@@ -15,11 +17,13 @@ __all__ = [
     "Ledger",
     "Verdict",
     "all_claims",
+    "appendix",
     "check",
     "claim",
     "common_arm",
     "controller",
     "dual_arm",
+    "simulation",
     "single_arm",
     "table1",
 ]
