@@ -30,13 +30,13 @@ find-sources = $(shell find $(wildcard $(1)) -type f \
 	-not -name '*.pyc' -not -name '*.nbi' -not -name '*.nbc' -not -path '*/.*' | sort)
 PACKAGE_SOURCES := $(call find-sources,armlock)
 BOOK_SOURCES := $(PACKAGE_SOURCES) $(call find-sources,book notebooks) tools/check_html.py
-TEST_SOURCES := $(PACKAGE_SOURCES) $(call find-sources,notebooks tests benchmarks) \
-	pyproject.toml README.md
+TEST_SOURCES := $(PACKAGE_SOURCES) $(call find-sources,notebooks tests benchmarks book tools) \
+	$(call find-sources,binder) pyproject.toml environment.txt README.md codecheck.yml
 NOTEBOOKS := $(wildcard notebooks/*.ipynb)
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help env book test claims bench serve lint format strip lock clean distclean always
+.PHONY: help env book browser same lab test claims bench serve lint format strip lock clean distclean always
 
 help: ## List the targets
 	@echo "armlock: make TARGET, where TARGET is one of"
@@ -97,6 +97,15 @@ $(INDEX): $(PACKAGE_READY) $(BOOK_SOURCES) build/book-sources $(if $(FORCE),alwa
 	@ln -s ../html build/_build/html
 	@touch -r build/book-started $@
 
+browser: $(INDEX) ## Check every page of the book in Chromium, without network
+	$(PY) tools/check_browser.py build/html
+
+same: $(INDEX) $(TESTS_PASSED) ## Compare the data of all figures: two runs, equal byte for byte
+	$(PY) tools/check_same.py build/figures-of-tests build/html/figures
+
+lab: $(PACKAGE_READY) ## Open the notebooks in JupyterLab
+	$(VENV)/bin/jupyter-lab --notebook-dir notebooks
+
 serve: $(INDEX) ## Serve the book at http://localhost:PORT
 	@echo "The book is at http://localhost:$(PORT) until you press Ctrl-C."
 	@$(PY) -m http.server $(PORT) --bind 127.0.0.1 --directory build/html
@@ -110,7 +119,9 @@ test: $(TESTS_PASSED) ## Run all tests, notebooks included
 
 $(TESTS_PASSED): $(PACKAGE_READY) $(TEST_SOURCES) build/test-sources $(if $(FORCE),always)
 	@touch build/tests-started
-	$(PY) -m pytest --nbmake --numprocesses auto --maxprocesses 4 --dist worksteal
+	@rm -rf build/figures-of-tests
+	ARMLOCK_FIGURES="$(CURDIR)/build/figures-of-tests" \
+		$(PY) -m pytest --nbmake --numprocesses auto --maxprocesses 4 --dist worksteal
 	@date '+%Y-%m-%d %H:%M:%S' > $@
 	@touch -r build/tests-started $@
 	@touch build/tests-ran
@@ -134,17 +145,20 @@ always:
 
 ## Upkeep --------------------------------------------------------------------------------
 
-lint: $(PACKAGE_READY) ## Check style, types, and that notebooks hold no outputs
+lint: $(PACKAGE_READY) ## Check style, types, stripped notebooks, and what is written by tools
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
 	$(PY) -m mypy
 	$(if $(NOTEBOOKS),$(PY) -m nbstripout --verify --keep-id $(NOTEBOOKS))
 	$(PY) tools/check_lock.py
+	$(PY) tools/write_binder.py --check
+	$(PY) tools/write_codecheck.py --check
 
-format: $(PACKAGE_READY) ## Format the code, and strip the notebooks' outputs
+format: $(PACKAGE_READY) ## Format the code, strip the notebooks, list what they publish
 	$(PY) -m ruff check --fix .
 	$(PY) -m ruff format .
 	$(if $(NOTEBOOKS),$(PY) -m nbstripout --keep-id $(NOTEBOOKS))
+	$(PY) tools/write_codecheck.py
 
 lock: $(ENV_READY) ## Write environment.txt from pyproject.toml (UPGRADE=1: newest versions)
 	$(PY) -m uv pip compile pyproject.toml --all-extras \
@@ -153,6 +167,7 @@ lock: $(ENV_READY) ## Write environment.txt from pyproject.toml (UPGRADE=1: newe
 		--universal --python-version 3.11 --fork-strategy fewest --only-binary :all: \
 		--generate-hashes --no-emit-index-url --no-emit-find-links --quiet \
 		--custom-compile-command "make lock" $(if $(UPGRADE),--upgrade) -o environment.txt
+	$(PY) tools/write_binder.py
 	$(PY) tools/check_lock.py
 
 clean: ## Remove what was built

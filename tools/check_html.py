@@ -1,10 +1,13 @@
-"""Check that the built book asks nothing of the network.
+"""Check that the built book asks nothing of the network, and is not too large.
 
 Usage: python tools/check_html.py FOLDER
 
 Every script, style sheet, font, image, frame and other part that a page loads by itself must
 be a file in the folder, and must exist. Links that a reader may follow can lead anywhere,
 but those that stay within the book must lead to a page that exists.
+
+The book is to stay below 25 MB, parts of interactive figures not counted, a page with all it
+loads by itself below 6 MB, and a figure's SVG below 2 MB: dense curves are rasterised in it.
 """
 
 import re
@@ -30,6 +33,8 @@ LOADED = {
 }
 LINKS_NOT_LOADED = {"alternate", "author", "canonical", "help", "index", "license"}
 LINKS_NOT_LOADED |= {"next", "prev", "search"}
+LARGEST_BOOK, LARGEST_PAGE, LARGEST_FIGURE = 25e6, 6e6, 2e6  # bytes
+INTERACTIVE = re.compile(r"plotly|/interactive/", re.IGNORECASE)
 CSS_URL = re.compile(r"""@import\s+["']([^"']+)|url\(\s*["']?([^"')]+)""")
 
 
@@ -114,15 +119,46 @@ def check(folder: Path) -> list[str]:
     return problems
 
 
+def page_size(file: Path) -> int:
+    """Return the bytes of a page and of the files that it names as its parts."""
+    page = Page()
+    page.feed(file.read_text(encoding="utf-8"))
+    parts = {(file.parent / unquote(urlsplit(a).path)).resolve() for a in page.loaded}
+    return file.stat().st_size + sum(p.stat().st_size for p in parts if p.is_file())
+
+
+def sizes(folder: Path) -> list[str]:
+    """Return what is too large in a folder."""
+    problems = []
+    files = [file for file in folder.rglob("*") if file.is_file()]
+    static = [f for f in files if not INTERACTIVE.search(f.relative_to(folder).as_posix())]
+    found = [("the book", sum(f.stat().st_size for f in static), LARGEST_BOOK)]
+    found += [
+        (f"{f.relative_to(folder)}, with its parts,", page_size(f), LARGEST_PAGE)
+        for f in pages(folder)
+    ]
+    found += [
+        (str(f.relative_to(folder)), f.stat().st_size, LARGEST_FIGURE)
+        for f in files
+        if f.suffix == ".svg"
+    ]
+    for name, size, largest in found:
+        if size > largest:
+            problems.append(f"{name} has {size / 1e6:.1f} MB, more than {largest / 1e6:.0f}")
+    return problems
+
+
 def main() -> int:
     """Check the folder named on the command line."""
     folder = Path(sys.argv[1])
     if not (folder / "index.html").is_file():
         print(f"{folder} holds no index.html")
         return 1
-    problems = check(folder)
+    problems = check(folder) + sizes(folder)
     print(*problems, sep="\n", end="\n" if problems else "")
-    verdict = "need no network" if not problems else f"have {len(problems)} problems"
+    total = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file()) / 1e6
+    fine = f"need no network, {total:.1f} MB in all"
+    verdict = f"have {len(problems)} problems" if problems else fine
     print(f"{len(pages(folder))} pages in {folder} {verdict}")
     return 1 if problems else 0
 

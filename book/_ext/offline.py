@@ -4,6 +4,8 @@ Formulas: the package sphinx-mathjax-offline carries MathJax. Of its 24 MB, the 
 script, the fonts, and the TeX extensions that the script loads when a formula asks for them;
 those are copied. The package's own Sphinx extension stays unused: it copies everything.
 
+The source maps of the theme's scripts, 3.5 MB, serve only those who develop it. They go.
+
 Thebe, which Jupyter Book always adds, would run cells on a server elsewhere. It goes.
 """
 
@@ -40,6 +42,13 @@ def copy_mathjax(app, exception):
             shutil.copyfile(source, target)
 
 
+def drop_source_maps(app, exception):
+    """Take out what only a debugger would ask for."""
+    if exception is None and app.builder.format == "html":
+        for file in (Path(app.outdir) / "_static").rglob("*.map"):
+            file.unlink()
+
+
 def drop_thebe(app, config):
     """Take out the two steps that put Thebe into the pages."""
     steps = [init_thebe_core, update_thebe_context]
@@ -56,4 +65,5 @@ def setup(app):
     app.config.mathjax_path = SCRIPT
     app.connect("config-inited", drop_thebe)
     app.connect("build-finished", copy_mathjax)
+    app.connect("build-finished", drop_source_maps)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

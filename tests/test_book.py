@@ -1,0 +1,101 @@
+"""The book's build fails when it should, and gives the same data twice.
+
+A copy of the book with one small notebook is built, with the configuration of the book.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import nbformat
+import pytest
+
+ROOT = Path(__file__).parents[1]
+TEXT = "# A chapter\n\n{numref}`fig-small` shows a curve, see {doc}`/book/intro`."
+DRAW = """
+import numpy as np
+from matplotlib import pyplot as plt
+from armlock import HayesEquation, claims, d_curve, plotting
+
+omega = np.linspace(0.1, 3.0, 200)
+a, b = d_curve(HayesEquation(tau=1.0), omega)
+fig, ax = plt.subplots()
+ax.plot(a, b);
+"""
+PUBLISH = """
+plotting.publish(fig, "small", {"omega [rad/s]": omega, "a [1/s]": a, "b [1/s]": b})
+"""
+CHECK = 'assert claims.check("S3")["S3"].verdict.name == "REPRODUCED"'
+CHANGED = """
+from dataclasses import replace
+from armlock.claims import Verdict, ledger
+
+entry = ledger._REGISTER["S3"]
+finding = replace(entry.check(), verdict=Verdict.DIFFERS)
+ledger._REGISTER["S3"] = replace(entry, check=lambda: finding)
+"""
+FIGURE = {"figure": {"caption": "A curve.", "name": "fig-small"}, "image": {"alt": "A curve"}}
+
+
+def build(folder, *, text=TEXT, before_check=""):
+    """Build a copy of the book with one notebook; return the exit code, output and pages."""
+    (folder / "notebooks").mkdir(parents=True)
+    (folder / "book").mkdir()
+    for name in ("_config.yml", "_ext", "_static", "references.bib", "bibliography.md"):
+        source, target = ROOT / "book" / name, folder / "book" / name
+        (shutil.copytree if source.is_dir() else shutil.copyfile)(source, target)
+    (folder / "book" / "intro.md").write_text("# A book\n\n{cite:t}`shao_robustness`\n")
+    (folder / "book" / "_toc.yml").write_text(
+        "format: jb-book\nroot: book/intro\nchapters:\n"
+        "  - file: notebooks/small\n  - file: book/bibliography\n"
+    )
+    cells = [
+        nbformat.v4.new_markdown_cell(text),
+        nbformat.v4.new_code_cell(DRAW, metadata={"mystnb": FIGURE}),
+        nbformat.v4.new_code_cell(PUBLISH, metadata={"tags": ["remove-input"]}),
+        nbformat.v4.new_code_cell(before_check + "\n" + CHECK),
+    ]
+    kernel = {"kernelspec": {"name": "python3", "display_name": "Python 3"}}
+    notebook = nbformat.v4.new_notebook(cells=cells, metadata=kernel)
+    nbformat.write(notebook, folder / "notebooks" / "small.ipynb")
+    pages = folder / "build" / "_build" / "html"
+    command = [str(Path(sys.executable).with_name("jupyter-book")), "build", ".", "--all"]
+    command += ["--config", "book/_config.yml", "--toc", "book/_toc.yml"]
+    command += ["--path-output", "build", "-W", "-n", "--keep-going"]
+    environment = os.environ | {"ARMLOCK_FIGURES": str(pages / "figures")}
+    environment.pop("MPLBACKEND", None)  # the kernel chooses its own, which shows figures
+    result = subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300
+    )
+    logs = [log.read_text() for log in pages.rglob("*.err.log")]  # of cells that failed
+    return result.returncode, "\n".join([result.stdout, result.stderr, *logs]), pages
+
+
+def test_building_twice_gives_the_same_data_and_pages_that_need_no_network(tmp_path):
+    tables = []
+    for name in ("first", "second"):
+        code, output, pages = build(tmp_path / name)
+        assert code == 0, output[-3000:]
+        tables.append((pages / "figures" / "small.csv").read_bytes())
+    assert tables[0] == tables[1]
+    assert tables[0].startswith(b"omega [rad/s],a [1/s],b [1/s]\n")
+    check = [sys.executable, str(ROOT / "tools" / "check_html.py"), str(pages)]
+    assert subprocess.run(check, capture_output=True, timeout=60).returncode == 0
+
+
+FAULTS = {
+    "a failing cell": ({"before_check": "raise ValueError('on purpose')"}, "on purpose"),
+    "a changed verdict": ({"before_check": CHANGED}, "AssertionError"),
+    "a broken reference": ({"text": TEXT + " {numref}`fig-missing`"}, "fig-missing"),
+    "a broken link to a page": ({"text": TEXT + " {doc}`/book/missing`"}, "missing"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_the_build_fails_on(fault, tmp_path):
+    arguments, sign = FAULTS[fault]
+    code, output, _ = build(tmp_path / "book", **arguments)
+    assert code != 0
+    assert sign in output
