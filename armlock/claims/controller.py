@@ -585,6 +585,10 @@ def poles_below() -> Finding:
 )
 def phase_at_unity_gain() -> Finding:
     """Find that frequency at each perturbation, and the phase lead there."""
+
+    def shown(c2: float) -> str:
+        return f"c2 = 1 {c2 - 1.0:+.0e}" if c2 != 1.0 else "c2 = 1"
+
     found = {point: unity_gain(point) for point in POINTS}
     lead = {point: phase for point, (_, phase) in found.items()}
     worst = max(lead.values())
@@ -595,7 +599,7 @@ def phase_at_unity_gain() -> Finding:
         "largest phase lead at the unity-gain frequency, over pi",
         "The lead is "
         + ", ".join(
-            f"{phase / np.pi:.3f} pi at {at * 1e6:.2f} uHz for ({c[0]:g}, 1 {c[1] - 1:+.0e})"
+            f"{phase / np.pi:.3f} pi at {at * 1e6:.2f} uHz for {shown(c[1])}"
             for (at, phase), c in zip(found.values(), POINTS.values(), strict=True)
         )
         + ". Below pi means a phase margin of "
@@ -660,8 +664,8 @@ def robust() -> Finding:
         f"rad/s, one of {delays[1] * 1e3:g} ms (a sample at 200 Hz) at {roots[1].real:.3g} + "
         f"{roots[1].imag:.4g}j; the growth is slow, by a factor e in "
         f"{1 / roots[1].real / 86400:.2f} days. A real actuator rolls off, and has to "
-        f"be part of the model. In the same way the chain of roots at high frequency needs c1 + c2 < 2 + 1/g: both may "
-        f"rise by {chain:.4g} only.",
+        "be part of the model. In the same way the chain of roots at high frequency needs c1 + "
+        f"c2 < 2 + 1/g: both may rise by {chain:.4g} only.",
     )
 
 
