@@ -1,0 +1,292 @@
+"""What the paper leaves open, the value taken, and how much of the results hangs on it."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from armlock.claims.controller import highest_corner
+from armlock.controllers import table_two
+from armlock.loops import Loop, paper_loop
+from armlock.margins import modulus_margin
+from armlock.paper import (
+    CONTROLLER_GAIN,
+    DUAL_SENSOR_CORNER,
+    DURATION,
+    PERTURBATION,
+    PHASE_NOISE_CORNER,
+    PHASE_NOISE_LEVEL,
+    SAMPLE_RATE,
+    TAU1,
+    TAU2,
+)
+from armlock.roots import rightmost_root
+from armlock.stability import unstable_roots
+from armlock.validation import FloatArray
+
+#: The two meanings of dtau, in s: Sec. III.B and the source of Table I.
+DIFFERENCES = {"full": TAU1 - TAU2, "half": 0.5 * (TAU1 - TAU2)}
+
+
+def first_break(
+    loop: Loop,
+    direction: tuple[float, float] = (1.0, -1.0),
+    *,
+    smallest: float = 1e-9,
+    largest: float = 1e-2,
+) -> float:
+    """Smallest perturbation of (1, 1) along a direction at which counts find instability.
+
+    Parameters
+    ----------
+    loop : Loop
+        The loop.
+    direction : pair of float, optional
+        (d1, d2); the default raises arm 1 and lowers arm 2.
+    smallest, largest : float, optional
+        Ends of the range searched, on a logarithmic grid and then by bisection.
+
+    Returns
+    -------
+    float
+        0 if the loop is not stable at `smallest`, inf if it is stable throughout.
+
+    Examples
+    --------
+    >>> from armlock import paper_loop
+    >>> from armlock.claims.assumptions import first_break
+    >>> print(f"{first_break(paper_loop()):.4g}")
+    1.464e-06
+    """
+    sizes = np.geomspace(smallest, largest, 57)
+
+    def counts(eps: FloatArray) -> FloatArray:
+        return np.asarray(
+            unstable_roots(loop, 1.0 + eps * direction[0], 1.0 + eps * direction[1])
+        )
+
+    unstable = np.flatnonzero(counts(sizes) != 0)
+    if unstable.size == 0:
+        return np.inf
+    if unstable[0] == 0:
+        return 0.0
+    low, high = sizes[unstable[0] - 1], sizes[unstable[0]]
+    for _ in range(30):
+        middle = float(np.sqrt(low * high))
+        low, high = (middle, high) if counts(np.array([middle]))[0] == 0 else (low, middle)
+    return float(high)
+
+
+@cache
+def over_corners(points: int = 41) -> tuple[FloatArray, dict[str, FloatArray]]:
+    """Follow the controlled loop over two decades of p, for both meanings of dtau.
+
+    Returns
+    -------
+    corners : float array, shape (points,)
+        Corner frequency p in rad/s.
+    columns : dict of str to float array
+        For "full" and "half": first break along (1, -1), 0 where the loop is unstable at
+        (1, 1), and under "full margin" and "half margin" min |1 + L|, nan there.
+    """
+    corners = DUAL_SENSOR_CORNER * np.logspace(-1.0, 1.0, points)
+    columns: dict[str, FloatArray] = {}
+    for name, difference in DIFFERENCES.items():
+        loops = [paper_loop(float(p), difference=difference) for p in corners]
+        found = np.array([first_break(loop) for loop in loops])
+        columns[name] = found
+        columns[f"{name} margin"] = np.array(
+            [
+                modulus_margin(loop) if size > 0.0 else np.nan
+                for loop, size in zip(loops, found, strict=True)
+            ]
+        )
+    return corners, columns
+
+
+def eta_rms(low: float = 1.0 / DURATION, high: float = 0.5 * SAMPLE_RATE) -> float:
+    """R.m.s. of the appendix's spectrum, taken for eta at face value, between two Hz."""
+
+    def integral(f: float) -> float:
+        return f - PHASE_NOISE_CORNER**4 / (3.0 * f**3)
+
+    return float(PHASE_NOISE_LEVEL * np.sqrt(integral(high) - integral(low)))
+
+
+class Assumption(NamedTuple):
+    """Something the paper leaves open.
+
+    Attributes
+    ----------
+    name : str
+        What it is.
+    taken : str
+        The value or convention of this book.
+    why : str
+        Its reason.
+    sensitivity : str
+        What another choice would change; numbers in it are computed.
+    """
+
+    name: str
+    taken: str
+    why: str
+    sensitivity: str
+
+
+def _corner() -> Assumption:
+    tenth = first_break(paper_loop(0.1 * DUAL_SENSOR_CORNER))
+    here, limit = first_break(paper_loop()), highest_corner()
+    return Assumption(
+        "p, the corner frequency of the dual sensor",
+        f"{DUAL_SENSOR_CORNER:.4g} rad/s ({DUAL_SENSOR_CORNER / (2 * np.pi):.2g} Hz)",
+        "The paper gives none. A public arm-locking code for arms of this length has it.",
+        f"The loop first breaks at {here:.4g} along (1, -1), and at {tenth:.4g} with a tenth "
+        f"of p. But from p = {limit:.3g} rad/s on, {limit / DUAL_SENSOR_CORNER:.3g} times "
+        "the value taken, the loop is unstable without any perturbation.",
+    )
+
+
+def _difference() -> Assumption:
+    full, half = (first_break(paper_loop(difference=d)) for d in DIFFERENCES.values())
+    inside = "inside" if half < PERTURBATION else "outside"
+    return Assumption(
+        "Δτ in the dual sensor",
+        f"τ₁ - τ₂ = {DIFFERENCES['full']:.2g} s in the loop",
+        "Sec. III.B defines it so. Table I is right only with half of it (claims T2, T3).",
+        f"The loop first breaks at {full:.4g} along (1, -1) with the whole difference and at "
+        f"{half:.4g} with half of it, which is {inside} the ±{PERTURBATION:g} of the paper; "
+        f"min |1 + L| is {modulus_margin(paper_loop()):.3f} and "
+        f"{modulus_margin(paper_loop(difference=DIFFERENCES['half'])):.3f}.",
+    )
+
+
+def _actuator() -> Assumption:
+    points = 1.0 + PERTURBATION * np.array([-1.0, 0.0, 1.0])
+    without = unstable_roots(paper_loop(), 1.0, points)
+    within = unstable_roots(paper_loop(actuator=True), 1.0, points)
+    return Assumption(
+        "The integrating actuator 1/s in the controlled loop",
+        "Absent in Sec. IV, present in Secs. II and III",
+        "What the paper says of its controller fits only a loop without it (claim K13).",
+        f"At (1, 1 + ε) with ε = -{PERTURBATION:g}, 0, {PERTURBATION:g} there are "
+        f"{', '.join(map(str, without))} unstable roots without it and "
+        f"{', '.join(map(str, within))} with it.",
+    )
+
+
+def _denominator() -> Assumption:
+    printed = paper_loop(controller=table_two(denominator="printed"))
+    return Assumption(
+        "The last factor of the controller's denominator",
+        "s + p24, from Table II",
+        "Eq. (11) prints s + z24, which cancels a zero and leaves p24 without use.",
+        f"At (1, 1) there are {int(unstable_roots(paper_loop(), 1.0, 1.0))} unstable roots "
+        f"with p24 and {int(unstable_roots(printed, 1.0, 1.0))} with z24.",
+    )
+
+
+def _gain() -> Assumption:
+    turned = paper_loop(controller=table_two(2.0 * np.pi * CONTROLLER_GAIN))
+    lower = paper_loop(controller=table_two(CONTROLLER_GAIN / (2.0 * np.pi)))
+    count, other = (int(unstable_roots(loop, 1.0, 1.0)) for loop in (turned, lower))
+
+    def outcome(loop: Loop, unstable: int) -> str:
+        if unstable:
+            return f"{unstable} unstable roots at (1, 1)"
+        return f"a first break at {first_break(loop):.4g} along (1, -1)"
+
+    return Assumption(
+        "The unit of g",
+        "rad/s with the actuator, a plain number without it",
+        "The paper gives a number without unit; g/s is a rate over s in rad/s.",
+        f"Were it in Hz, g would be 2π times larger: {outcome(turned, count)}; 2π times "
+        f"smaller: {outcome(lower, other)}; as taken: {outcome(paper_loop(), 0)}.",
+    )
+
+
+def _order() -> Assumption:
+    up, down = first_break(paper_loop()), first_break(paper_loop(), (-1.0, 1.0))
+    return Assumption(
+        "Which arm is the longer",
+        f"Arm 1: τ₁ = {TAU1} s, τ₂ = {TAU2} s",
+        "The example and Fig. 4 have it so; the text of Sec. III.A says τ₁ < τ₂ (claim C4).",
+        f"The first break is at {up:.4g} along (1, -1) and at {down:.4g} along (-1, 1); with "
+        "the arms exchanged these two directions change places. A square box is symmetric, so "
+        "the verdict on it is the same.",
+    )
+
+
+def _history() -> Assumption:
+    days = []
+    for c2 in (1.0, 1.0 - PERTURBATION):
+        root = complex(np.asarray(rightmost_root(paper_loop(), 1.0, c2)))
+        days.append(-1.0 / root.real / 86400.0)
+    return Assumption(
+        "What the loop was doing before t = 0",
+        "At rest: all signals zero",
+        "The paper says nothing. It is what a simulation in blocks starts from by default.",
+        "The loop is linear: another history adds a transient that dies away by itself. Its "
+        f"slowest part falls by a factor e in {days[0]:.3g} days at (1, 1) and in "
+        f"{days[1]:.3g} days at (1, 1 - {PERTURBATION:g}), against the "
+        f"{DURATION / 86400.0:.3g} days of the paper's simulation. So the choice shows in any "
+        "long-term difference, and decides no claim on stability.",
+    )
+
+
+def _scale() -> Assumption:
+    rms = eta_rms()
+    slow = eta_rms(1.0 / DURATION, 1e-3)
+    return Assumption(
+        "The scale of η(t)",
+        "Both: the appendix's spectrum at face value, and scaled to the stated size",
+        f"The appendix takes a phase noise for η; Sec. IV.A limits η to {PERTURBATION:g}.",
+        f"From 1/({DURATION:g} s) to {0.5 * SAMPLE_RATE:g} Hz the spectrum has an r.m.s. of "
+        f"{rms:.3g} ({slow:.3g} below 1 mHz), {rms / PERTURBATION:.3g} times the limit.",
+    )
+
+
+_ALL: tuple[Callable[[], Assumption], ...] = (
+    _corner,
+    _difference,
+    _actuator,
+    _denominator,
+    _gain,
+    _order,
+    _history,
+    _scale,
+)
+
+
+class Assumptions:
+    """All assumptions, computed once, as blocks of text.
+
+    Examples
+    --------
+    >>> from armlock.claims.assumptions import Assumptions
+    >>> Assumptions([]).entries
+    []
+    """
+
+    def __init__(self, entries: Sequence[Assumption] | None = None) -> None:
+        chosen = [make() for make in _ALL] if entries is None else entries
+        self.entries = list(chosen)
+
+    def __repr__(self) -> str:
+        """Return them as text."""
+        return "\n".join(f"{e.name}: {e.taken}. {e.sensitivity}" for e in self.entries)
+
+    def _repr_html_(self) -> str:
+        """Return a definition list an assumption."""
+        return "".join(
+            f'<section class="erratum"><p><strong>{html.escape(entry.name)}</strong></p><dl>'
+            f"<dt>Taken</dt><dd>{html.escape(entry.taken)}</dd>"
+            f"<dt>Why</dt><dd>{html.escape(entry.why)}</dd>"
+            f"<dt>What depends on it</dt><dd>{html.escape(entry.sensitivity)}</dd>"
+            "</dl></section>"
+            for entry in self.entries
+        )

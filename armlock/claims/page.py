@@ -1,0 +1,330 @@
+"""The whole ledger as one page: a table that can be searched, and the errata.
+
+What this writes is plain HTML with one short script each, needs no network, and shows
+everything where no script runs.
+"""
+
+from __future__ import annotations
+
+import html
+import inspect
+import os
+from collections.abc import Sequence
+from importlib import metadata
+from pathlib import Path
+from typing import NamedTuple
+
+from armlock.claims.ledger import Claim, Finding, Ledger, Verdict
+
+#: Section of the paper, by the letter that a claim's identifier starts with.
+SECTIONS = {
+    "Z": "Sec. I and Table I",
+    "T": "Sec. I and Table I",
+    "S": "Sec. II, single arm",
+    "C": "Sec. III.A, common arm",
+    "D": "Sec. III.B, dual arm",
+    "N": "Sec. IV.A, frequency domain",
+    "K": "Sec. IV.B, controller",
+    "M": "Sec. IV.C, simulation",
+    "A": "Appendix",
+}
+
+
+class Source(NamedTuple):
+    """Where the check of a claim is written down.
+
+    Attributes
+    ----------
+    file : str
+        Relative to the project's root.
+    line : int
+        Where the function starts, its decorator included.
+    purpose : str
+        First line of its docstring: how the claim was examined.
+    text : str
+        The function.
+    """
+
+    file: str
+    line: int
+    purpose: str
+    text: str
+
+
+def section(claim: Claim) -> str:
+    """Return the paper's section that a claim belongs to.
+
+    Examples
+    --------
+    >>> from armlock.claims import check
+    >>> from armlock.claims.page import section
+    >>> [section(claim) for claim, _ in check("T1")]
+    ['Sec. I and Table I']
+    """
+    return SECTIONS.get(claim.identifier[:1], "Elsewhere")
+
+
+def source(claim: Claim) -> Source:
+    """Find the function that checks a claim.
+
+    Examples
+    --------
+    >>> from armlock.claims import check
+    >>> from armlock.claims.page import source
+    >>> [source(claim).file for claim, _ in check("T1")]
+    ['armlock/claims/table1.py']
+    """
+    function = inspect.unwrap(claim.check)
+    lines, first = inspect.getsourcelines(function)
+    root = Path(__file__).resolve().parents[2]
+    file = Path(inspect.getsourcefile(function) or "")
+    shown = file.relative_to(root).as_posix() if file.is_relative_to(root) else file.name
+    purpose = (inspect.getdoc(function) or "").partition("\n")[0]
+    return Source(shown, first, purpose, "".join(lines))
+
+
+def project_url() -> str | None:
+    """Return where the sources are published, if the package's metadata say so."""
+    try:
+        entries = metadata.metadata("armlock").get_all("Project-URL") or []
+    except metadata.PackageNotFoundError:
+        return None
+    addresses = {k.lower(): v for k, _, v in (entry.partition(", ") for entry in entries)}
+    found = [addresses[k] for k in ("source", "repository", "homepage") if k in addresses]
+    return found[0].rstrip("/") if found else None
+
+
+def chapter_link(claim: Claim, root: str = "") -> str:
+    """Return the address of a claim in its chapter's own table.
+
+    Parameters
+    ----------
+    claim : Claim
+        The claim.
+    root : str, optional
+        From the linking page to the folder of the chapters, empty for a chapter.
+    """
+    return f"{root}{claim.chapter}.html#claim-{claim.identifier}"
+
+
+class VerdictCounts:
+    """How many claims of a ledger met each verdict, as one line.
+
+    Examples
+    --------
+    >>> from armlock.claims import check
+    >>> from armlock.claims.page import VerdictCounts
+    >>> VerdictCounts(check("T1", "T2"))
+    1 reproduced, 1 not as written
+    """
+
+    def __init__(self, ledger: Ledger) -> None:
+        self.counts = ledger.counts()
+
+    def __repr__(self) -> str:
+        """Return the line as text."""
+        return ", ".join(f"{self.counts[v]} {v}" for v in Verdict if self.counts[v])
+
+    def _repr_html_(self) -> str:
+        """Return the line as HTML."""
+        parts = "".join(
+            f'<span class="verdict verdict-{v.name.lower()}">{self.counts[v]} {v}</span> '
+            for v in Verdict
+            if self.counts[v]
+        )
+        total = sum(self.counts.values())
+        return f'<p class="verdict-counts">{total} claims: {parts}</p>'
+
+
+class LedgerPage:
+    """A ledger as a table that a reader can filter by verdict, section and words.
+
+    Parameters
+    ----------
+    ledger : Ledger
+        The claims and their findings.
+
+    Notes
+    -----
+    The folder that the environment variable ARMLOCK_FIGURES names, if there is one, gets the
+    ledger as claims.csv and claims.json, which the page then links to.
+    """
+
+    def __init__(self, ledger: Ledger) -> None:
+        self.ledger = ledger
+        folder = os.environ.get("ARMLOCK_FIGURES")
+        self.files = [path.name for path in ledger.write(Path(folder))] if folder else []
+
+    def __repr__(self) -> str:
+        """Return the table as text."""
+        return repr(self.ledger)
+
+    def _repr_html_(self) -> str:
+        """Return controls, table and script."""
+        rows = "".join(_row(claim, finding) for claim, finding in self.ledger)
+        links = " · ".join(
+            f'<a href="../figures/{name}" download>{name}</a>' for name in self.files
+        )
+        downloads = f'<p class="figure-downloads">The ledger as data: {links}</p>'
+        return (
+            f'<div class="ledger">{_controls(self.ledger)}'
+            '<table class="claims"><thead><tr><th scope="col">Claim, verdict</th>'
+            '<th scope="col">What the paper says, the number that decides it, and why</th>'
+            f"</tr></thead><tbody>{rows}</tbody></table>{downloads if links else ''}</div>"
+            f"<script>{_SCRIPT}</script>"
+        )
+
+
+def _controls(ledger: Ledger) -> str:
+    """Return the form above the table, hidden until the script is there to serve it."""
+    counts = ledger.counts()
+    boxes = "".join(
+        f'<label><input type="checkbox" name="verdict" value="{v.name.lower()}" checked> '
+        f'<span class="verdict verdict-{v.name.lower()}">{v} ({counts[v]})</span></label>'
+        for v in Verdict
+        if counts[v]
+    )
+    sections = dict.fromkeys(section(claim) for claim, _ in ledger)
+    options = "".join(f"<option>{html.escape(name)}</option>" for name in sections)
+    return (
+        '<form class="ledger-filter" hidden><fieldset><legend>Verdicts</legend>'
+        f"{boxes}</fieldset>"
+        '<label>Section <select name="section"><option value="">all</option>'
+        f"{options}</select></label>"
+        '<label>Search <input type="search" name="words" autocomplete="off"></label>'
+        '<button type="reset">Show all</button>'
+        f'<p><output role="status">{len(ledger)} of {len(ledger)} claims</output></p></form>'
+    )
+
+
+def _row(claim: Claim, finding: Finding) -> str:
+    """Return one row of the table."""
+    escape = html.escape
+    place = source(claim)
+    url = project_url()
+    where = f"{place.file}, line {place.line}"
+    if url:
+        where = f'<a href="{escape(url)}/blob/main/{place.file}#L{place.line}">{where}</a>'
+    kind = finding.verdict.name.lower()
+    return (
+        f'<tr id="ledger-{escape(claim.identifier)}" data-verdict="{kind}" '
+        f'data-section="{escape(section(claim))}">'
+        f'<td><a href="{escape(chapter_link(claim))}">{escape(claim.identifier)}</a><br>'
+        f'<span class="verdict verdict-{kind}">{finding.verdict}</span>'
+        f"<br><small>{escape(claim.place)}</small></td>"
+        f"<td><p>{escape(claim.says)}</p>"
+        f"<p><strong>{finding.value:.6g}</strong>: {escape(finding.quantity)}.</p>"
+        f"<p>{escape(finding.note)}</p>"
+        f"<details><summary>Source of {escape(claim.identifier)}</summary><p>{where}</p>"
+        f'<pre tabindex="0">{escape(place.text)}</pre></details></td></tr>'
+    )
+
+
+def errata(ledger: Ledger, verdicts: Sequence[Verdict] = ()) -> ErrataTable:
+    """Return what is not as printed: every claim that was not simply reproduced.
+
+    Parameters
+    ----------
+    ledger : Ledger
+        The claims and their findings.
+    verdicts : sequence of Verdict, optional
+        Which ones to take; by default "not as written" and "differs".
+    """
+    chosen = verdicts or (Verdict.NOT_AS_WRITTEN, Verdict.DIFFERS)
+    return ErrataTable([entry for entry in ledger if entry[1].verdict in chosen], ledger)
+
+
+#: Claims whose verdict or number uses the formula or value that an erratum corrects.
+DEPENDS = {
+    "T2": ("T3", "T4"),
+    "T3": ("T2", "T4"),
+    "T4": ("Z1", "D1", "D2"),
+    "C5": ("C6", "C7"),
+    "C7": ("C8",),
+    "D1": ("D2", "D3"),
+    "K4": ("K5", "K10"),
+    "K7": ("M7",),
+    "S8": ("S9",),
+    "A3": ("N1", "M2", "A4", "A5"),
+    "M7": ("M1", "M4"),
+}
+
+
+class ErrataTable:
+    """Printed, derived, how the difference was found, and what depends on it."""
+
+    def __init__(self, entries: Sequence[tuple[Claim, Finding]], ledger: Ledger) -> None:
+        self.entries = list(entries)
+        self.known = {claim.identifier: (claim, finding) for claim, finding in ledger}
+
+    def __len__(self) -> int:
+        """Return how many errata there are."""
+        return len(self.entries)
+
+    def __repr__(self) -> str:
+        """Return the table as text."""
+        return "\n".join(
+            f"{c.identifier:4s} {c.place}: {f.value:.6g} ({f.quantity})"
+            for c, f in self.entries
+        )
+
+    def dependents(self, claim: Claim) -> list[tuple[Claim, Finding]]:
+        """Return the claims that the erratum bears on, as far as they are registered."""
+        named = DEPENDS.get(claim.identifier, ())
+        return [self.known[name] for name in named if name in self.known]
+
+    def _repr_html_(self) -> str:
+        """Return one block an erratum; a table of four columns would not fit a phone."""
+        return "".join(self._block(*entry) for entry in self.entries)
+
+    def _block(self, claim: Claim, finding: Finding) -> str:
+        escape = html.escape
+        depends = ", ".join(
+            f'<a href="{escape(chapter_link(c))}">{escape(c.identifier)}</a> ({f.verdict})'
+            for c, f in self.dependents(claim)
+        )
+        own = f'<a href="{escape(chapter_link(claim))}">{escape(claim.identifier)}</a>'
+        parts = {
+            "Printed": escape(claim.says),
+            "What follows": f"{escape(finding.note)} Deciding number: "
+            f"{finding.value:.6g} ({escape(finding.quantity)}).",
+            "How it was found": escape(source(claim).purpose),
+            "What depends on it": depends or "No other verdict of this ledger.",
+        }
+        items = "".join(f"<dt>{name}</dt><dd>{text}</dd>" for name, text in parts.items())
+        kind = finding.verdict.name.lower()
+        return (
+            f'<section class="erratum" id="erratum-{escape(claim.identifier)}">'
+            f"<p><strong>{own}, {escape(claim.place)}</strong> "
+            f'<span class="verdict verdict-{kind}">{finding.verdict}</span></p>'
+            f"<dl>{items}</dl></section>"
+        )
+
+
+_SCRIPT = """
+(function () {
+  const form = document.querySelector('.ledger-filter');
+  const rows = [...document.querySelectorAll('.ledger tbody tr')];
+  const texts = rows.map(row => row.textContent.toLowerCase());
+  function show() {
+    const data = new FormData(form);
+    const verdicts = data.getAll('verdict');
+    const section = data.get('section');
+    const words = data.get('words').toLowerCase().split(' ').filter(Boolean);
+    let count = 0;
+    rows.forEach((row, i) => {
+      const hit = verdicts.includes(row.dataset.verdict)
+        && (!section || row.dataset.section === section)
+        && words.every(word => texts[i].includes(word));
+      row.hidden = !hit;
+      count += hit;
+    });
+    form.querySelector('output').textContent = count + ' of ' + rows.length + ' claims';
+  }
+  form.hidden = false;
+  form.addEventListener('input', show);
+  form.addEventListener('submit', event => event.preventDefault());
+  form.addEventListener('reset', () => setTimeout(show));
+  show();
+})();
+"""

@@ -1,0 +1,161 @@
+"""The two conceptual diagrams: what takes part in arm locking, and its loop."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import schemdraw
+from matplotlib.axes import Axes
+from schemdraw import dsp as blocks
+
+from armlock.plotting import BLUE, ORANGE
+
+Point = tuple[float, float]
+#: Its elements have no types.
+dsp: Any = blocks
+
+
+def _drawing(ax: Axes) -> Any:
+    """Start a drawing in axes; its units are those of the axes."""
+    ax.set_axis_off()
+    ax.set_aspect("equal")
+    return schemdraw.Drawing(canvas=ax, show=False, unit=1.0, fontsize=9, lw=1.3)
+
+
+def _box(at: Point, width: float, height: float, label: str) -> Any:
+    """Return a box centred on a point."""
+    return (
+        dsp.Box(w=width, h=height)
+        .anchor("center")
+        .at(at)
+        .fill("white")
+        .label(label, loc="center")
+        .zorder(3)
+    )
+
+
+def _arrow(*points: Point, color: str = "black", style: str = "-", head: bool = True) -> Any:
+    """Return the pieces of a line through points, with a head at its end."""
+    last = len(points) - 2
+    return [
+        (dsp.Arrow() if head and k == last else dsp.Line())
+        .at(points[k])
+        .to(points[k + 1])
+        .color(color)
+        .linestyle(style)
+        for k in range(last + 1)
+    ]
+
+
+def plot_modules(ax: Axes) -> None:
+    """Draw the modules of arm locking on the two spacecraft (paper, Figs. 1 and 2a).
+
+    Light is drawn solid and orange, digital signals dashed and blue, and what acts from
+    outside black and dotted.
+
+    Parameters
+    ----------
+    ax : Axes
+        An empty drawing area.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> from armlock.diagrams import plot_modules
+    >>> ax = Figure().subplots()
+    >>> plot_modules(ax)
+    >>> len(ax.texts) > 3
+    True
+    """
+    drawing = _drawing(ax)
+    light: dict[str, Any] = {"color": ORANGE}
+    digital: dict[str, Any] = {"color": BLUE, "style": "--"}
+    parts = [
+        _box((3.0, 2.2), 6.6, 6.2, "").color("#999999").zorder(0),
+        _box((11.6, 2.2), 4.6, 6.2, "").color("#999999").zorder(0),
+        _box((1.6, 4.0), 2.2, 1.1, "laser"),
+        _box((4.6, 4.0), 2.2, 1.1, "optical\nbench"),
+        _box((4.6, 0.6), 2.2, 1.1, "phase-\nmeter"),
+        _box((1.6, 0.6), 2.2, 1.1, "arm-locking\ncontroller"),
+        _box((11.6, 4.0), 3.2, 1.1, "optical bench"),
+        _box((11.6, 0.6), 3.2, 1.1, "laser, phase-\nlocked loop"),
+        _box((8.0, -2.6), 5.4, 1.1, "telescope pointing, clocks, ..."),
+        *_arrow((2.7, 4.0), (3.5, 4.0), **light),
+        *_arrow((5.7, 4.25), (10.0, 4.25), **light),
+        *_arrow((10.0, 3.75), (5.7, 3.75), **light),
+        *_arrow((4.6, 3.45), (4.6, 1.15), **light),
+        *_arrow((12.2, 3.45), (12.2, 1.15), **light),
+        *_arrow((11.0, 1.15), (11.0, 3.45), **light),
+        *_arrow((3.5, 0.6), (2.7, 0.6), **digital),
+        *_arrow((1.6, 1.15), (1.6, 3.45), **digital),
+        *_arrow((6.8, -2.05), (5.3, 0.05), style=":"),
+        *_arrow((9.2, -2.05), (10.6, 0.05), style=":"),
+    ]
+    for part in parts:
+        drawing.add(part)
+    drawing.draw(show=False)
+    for x, text in ((3.0, "local spacecraft"), (11.6, "remote spacecraft")):
+        ax.text(x, 5.5, text, ha="center", va="bottom", fontsize=9)
+    ax.text(7.85, 4.45, r"out: $\varphi(t)$", ha="center", va="bottom", fontsize=9)
+    back = r"back: $c\,\varphi(t-\tau) + n$"
+    ax.text(7.85, 3.5, back, ha="center", va="top", fontsize=9)
+    ax.set(xlim=(-0.5, 14.1), ylim=(-3.3, 6.3))
+
+
+def plot_loop(ax: Axes) -> None:
+    """Draw the loop with its two perturbed delays as blocks (after the paper's Fig. 2b).
+
+    Parameters
+    ----------
+    ax : Axes
+        An empty drawing area.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> from armlock.diagrams import plot_loop
+    >>> ax = Figure().subplots()
+    >>> plot_loop(ax)
+    >>> len(ax.texts) > 3
+    True
+    """
+    drawing = _drawing(ax)
+    upper, lower = 0.0, -3.2
+    parts: list[Any] = [
+        *_arrow((-1.6, 1.6), (0.0, 1.6)),
+        dsp.SumSigma().anchor("center").at((0.45, 1.6)).fill("white"),
+        *_arrow((0.95, 1.6), (13.4, 1.6)),
+        dsp.Dot().at((12.4, 1.6)),
+        *_arrow((12.4, 1.6), (12.4, lower), head=False),
+    ]
+    for y, k in ((upper, 1), (lower, 2)):
+        parts += [
+            dsp.Dot().at((12.4, y)) if k == 1 else dsp.Dot(radius=0.02).at((12.4, y)),
+            *_arrow((12.4, y), (8.35, y)),
+            dsp.Dot().at((11.9, y)),
+            *_arrow((11.9, y), (11.9, y - 1.6), (11.25, y - 1.6)),
+            _box((10.2, y - 1.6), 2.1, 0.9, rf"$e^{{-s\tau_{k}}}$"),
+            *_arrow((9.15, y - 1.6), (9.0, y - 1.6), (7.9, y - 1.6), (7.9, y - 0.5)),
+            dsp.Sum().anchor("center").at((7.9, y)).fill("white"),
+            _box((5.7, y), 1.9, 0.9, f"$m_{k}(s)$"),
+            *_arrow((7.45, y), (6.65, y)),
+        ]
+    middle = 0.5 * (upper + lower)
+    parts += [
+        *_arrow((4.75, upper), (4.0, upper), (4.0, middle + 0.5)),
+        *_arrow((4.75, lower), (4.0, lower), (4.0, middle - 0.5)),
+        dsp.SumSigma().anchor("center").at((4.0, middle)).fill("white"),
+        *_arrow((3.5, middle), (2.5, middle)),
+        _box((1.6, middle), 1.8, 1.0, "$K(s)$"),
+        *_arrow((0.7, middle), (0.45, middle), (0.45, 1.1)),
+    ]
+    for part in parts:
+        drawing.add(part)
+    drawing.draw(show=False)
+    for y, k in ((upper, 1), (lower, 2)):
+        ax.text(8.5, y - 1.5, f"$c_{k}$", ha="center", va="bottom", fontsize=9)
+        ax.text(8.15, y - 0.75, "−", ha="left", va="center", fontsize=10)
+    ax.text(-1.6, 1.75, r"laser, $\varphi_0$", ha="left", va="bottom", fontsize=9)
+    ax.text(13.4, 1.75, r"$\varphi$", ha="right", va="bottom", fontsize=10)
+    ax.text(0.2, 0.75, "−", ha="right", va="center", fontsize=10)
+    ax.set(xlim=(-1.9, 13.7), ylim=(-5.6, 2.6))

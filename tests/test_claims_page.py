@@ -1,0 +1,91 @@
+import csv
+import json
+from html.parser import HTMLParser
+
+import pytest
+
+from armlock.claims import Verdict, check
+from armlock.claims.assumptions import DIFFERENCES, eta_rms, first_break, over_corners
+from armlock.claims.page import LedgerPage, VerdictCounts, errata, section, source
+from armlock.loops import CommonArm, paper_loop
+
+
+class Ids(HTMLParser):
+    def __init__(self, text):
+        super().__init__()
+        self.ids, self.open = [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.ids += [value for name, value in attrs if name == "id"]
+        if tag not in ("br", "input"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+@pytest.fixture
+def ledger():
+    return check("T1", "T2", "C2")
+
+
+def test_the_page_has_a_row_a_claim_with_its_chapter_and_source(ledger, monkeypatch):
+    monkeypatch.delenv("ARMLOCK_FIGURES", raising=False)
+    text = LedgerPage(ledger)._repr_html_()
+    page = Ids(text)
+    assert page.open == []
+    assert page.ids == ["ledger-T1", "ledger-T2", "ledger-C2"]
+    assert 'href="01_opening.html#claim-T1"' in text
+    assert "def common_row()" in text
+    assert "claims.csv" not in text
+    assert 'data-verdict="not_as_written"' in text
+
+
+def test_the_page_offers_the_ledger_as_data(ledger, monkeypatch, tmp_path):
+    monkeypatch.setenv("ARMLOCK_FIGURES", str(tmp_path))
+    text = LedgerPage(ledger)._repr_html_()
+    assert 'href="../figures/claims.csv"' in text
+    with (tmp_path / "claims.csv").open() as stream:
+        assert [row["claim"] for row in csv.DictReader(stream)] == ["T1", "T2", "C2"]
+    assert len(json.loads((tmp_path / "claims.json").read_text())) == 3
+
+
+def test_a_source_is_the_function_that_checks(ledger):
+    claim = next(iter(ledger))[0]
+    found = source(claim)
+    assert found.file == "armlock/claims/table1.py"
+    assert found.line > 1
+    assert "def single_row" in found.text
+    assert section(claim) == "Sec. I and Table I"
+
+
+def test_counts_name_only_verdicts_that_occur(ledger):
+    assert repr(VerdictCounts(ledger)) == "2 reproduced, 1 not as written"
+    assert "differs" not in VerdictCounts(ledger)._repr_html_()
+
+
+def test_errata_are_what_is_not_as_printed(ledger):
+    found = errata(ledger)
+    assert [claim.identifier for claim, _ in found.entries] == ["T2"]
+    assert Ids(found._repr_html_()).ids == ["erratum-T2"]
+    assert "Compare with 2 - e1 - e2" in found._repr_html_()
+    assert len(errata(ledger, [Verdict.REPRODUCED])) == 2
+
+
+def test_the_first_break_is_the_critical_perturbation():
+    assert first_break(paper_loop()) == pytest.approx(1.4643205e-06, rel=1e-6)
+    assert first_break(CommonArm(), (-1.0, -1.0), largest=1e-2) == float("inf")
+    assert first_break(CommonArm(), (1.0, 0.0)) == 0.0
+    half = first_break(paper_loop(difference=DIFFERENCES["half"]))
+    assert half == pytest.approx(6.3262e-07, rel=1e-4)
+
+
+def test_the_loop_is_lost_at_the_upper_end_of_two_decades():
+    corners, columns = over_corners(3)
+    assert corners[-1] == pytest.approx(100.0 * corners[0])
+    assert columns["full"][-1] == columns["half"][-1] == 0.0
+
+
+def test_the_spectrum_at_face_value_is_far_above_the_limit():
+    assert eta_rms() == pytest.approx(0.0145793, rel=1e-5)
