@@ -50,6 +50,16 @@ class ShapedNoise:
     The trapezoidal rule makes the density at f that of the filter at
     tan(pi f T) / (pi T), see `armlock.sampled.warped`. One draw and many give the same
     series, bit by bit.
+
+    Examples
+    --------
+    One draw and several give the same series:
+
+    >>> from armlock import ShapedNoise
+    >>> whole = ShapedNoise(zeros=[], poles=[-1.0], gain=1.0, seed=1, sample_rate=10.0).draw(6)
+    >>> parts = ShapedNoise(zeros=[], poles=[-1.0], gain=1.0, seed=1, sample_rate=10.0)
+    >>> [*parts.draw(2), *parts.draw(4)] == list(whole)
+    True
     """
 
     def __init__(
@@ -236,6 +246,13 @@ class LaserNoise(ShapedNoise):
     x / sin x with x = pi f T, and smoothed over some samples by a filter fitted to
     sin x / x. The density follows the formula within 0.1 percent up to 0.95 of half the
     sample rate.
+
+    Examples
+    --------
+    >>> from armlock import LaserNoise
+    >>> noise = LaserNoise(seed=1, sample_rate=10.0)
+    >>> noise.draw(10).shape
+    (10,)
     """
 
     def __init__(
@@ -346,6 +363,13 @@ class PerturbationNoise(ShapedNoise):
     With s = j omega and w0 = 2 pi 2.8 mHz, |s^2 + sqrt(2) w0 s + w0^2|^2 = omega^4 + w0^4.
     So the density level sqrt(1 + (f0 / f)^4) is that of white noise through
     (s^2 + sqrt(2) w0 s + w0^2) / (s + w_c)^2, but for the cut-off w_c.
+
+    Examples
+    --------
+    >>> from armlock import PerturbationNoise
+    >>> c1 = 1.0 + PerturbationNoise(seed=1, sample_rate=10.0, at_rest=True).draw(100)
+    >>> c1.shape
+    (100,)
     """
 
     def __init__(

@@ -66,6 +66,16 @@ class DivergenceError(ArithmeticError):
         When the output exceeded that input by the limit, in s.
     output : float array
         What was computed up to then; every sample of it is finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from armlock import DivergenceError, SingleArm, simulate
+    >>> try:
+    ...     locked = simulate(SingleArm(), np.ones(20_000), c1=3.0, limit=10.0)
+    ... except DivergenceError as error:
+    ...     print(error.time < error.detected, bool(np.isfinite(error.output).all()))
+    True True
     """
 
     def __init__(self, time: float, detected: float, output: FloatArray) -> None:
@@ -291,6 +301,16 @@ def sampled_open_loop(
     -------
     complex array, shaped like `omega`
         K m_k at the warped frequency, times 1 - c_k exp(-j omega tau_k) at the true one.
+
+    Examples
+    --------
+    Far below the sample rate it is the open loop itself.
+
+    >>> import numpy as np
+    >>> from armlock import paper_loop, sampled_open_loop
+    >>> loop, omega = paper_loop(), np.array([0.01])
+    >>> bool(np.allclose(sampled_open_loop(loop, omega), loop.open_loop(1j * omega), rtol=1e-5))
+    True
     """
     loop, order = _checked_loop(loop), _order(interpolation)
     omega = np.asarray(omega, dtype=float)
@@ -621,6 +641,14 @@ def simulate_blocks(
     ------
     TypeError, ValueError, DivergenceError
         As `simulate` does.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from armlock import paper_loop, simulate_blocks
+    >>> blocks = (np.ones(500) for _ in range(4))
+    >>> sum(locked.size for locked in simulate_blocks(paper_loop(), blocks))
+    2000
     """
     run = Simulation(
         loop, sample_rate, history=history, interpolation=interpolation, limit=limit
@@ -655,6 +683,19 @@ def save_series(path: str | os.PathLike[str], blocks: Iterable[FloatArray]) -> i
     The blocks go to a file of another name in the same folder, which takes this one when the
     last block is in. If anything stops the run, that file is removed, and what was at `path`
     before stays.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import numpy as np
+    >>> from armlock import paper_loop, save_series, simulate_blocks
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "locked.npy"
+    ...     blocks = simulate_blocks(paper_loop(), [np.ones(50), np.ones(50)])
+    ...     written = save_series(path, blocks)
+    ...     print(written, np.load(path).shape)
+    100 (100,)
     """
     path = Path(path)
     count = 0

@@ -62,6 +62,15 @@ class Spectrum:
         Width in Hz of a bin; the window is about three of them wide.
     bins : int array, shape (n,)
         Number of bins in a band.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from armlock import amplitude_spectrum
+    >>> white = np.random.default_rng(1).standard_normal(4096)
+    >>> spectrum = amplitude_spectrum(white, sample_rate=1.0)
+    >>> bool((spectrum.lower < spectrum.asd).all() and (spectrum.asd < spectrum.upper).all())
+    True
     """
 
     frequency: FloatArray
@@ -194,6 +203,17 @@ class SpectrumEstimator:
     Memory grows with the logarithm of the duration only. Segments overlap by three quarters;
     the degrees of freedom of a band take the overlap, and the correlation of its bins, into
     account. Estimates do not depend on how the series is cut into blocks, up to rounding.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from armlock import SpectrumEstimator
+    >>> estimator, rng = SpectrumEstimator(sample_rate=1.0), np.random.default_rng(1)
+    >>> for _ in range(4):
+    ...     estimator.add(rng.standard_normal(10_000))
+    >>> white = np.median(estimator.spectrum().asd)
+    >>> print(f"{white:.1f}, and sqrt(2) is expected")
+    1.4, and sqrt(2) is expected
     """
 
     def __init__(self, sample_rate: float) -> None:

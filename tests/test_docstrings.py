@@ -1,6 +1,9 @@
 import doctest
 import importlib
+import inspect
 import pkgutil
+import re
+from pathlib import Path
 
 import pytest
 
@@ -27,3 +30,22 @@ def test_the_examples_are_found():
         for example in test.examples
     ]
     assert len(examples) >= 15
+
+
+PUBLIC = [name for name in armlock.__all__ if callable(getattr(armlock, name))]
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_every_public_name_has_an_example(name):
+    thing = getattr(armlock, name)
+    section = inspect.cleandoc(thing.__doc__).partition("\nExamples\n")[2]
+    assert ">>>" in section
+    if inspect.isfunction(thing):
+        assert name in section
+
+
+def test_every_public_name_is_on_a_page_of_the_reference():
+    pages = (Path(__file__).parents[1] / "book" / "api").glob("*.md")
+    named = " ".join(re.findall(r"public:: (.*)", "\n".join(p.read_text() for p in pages)))
+    homes = {getattr(armlock, name).__module__ for name in PUBLIC}
+    assert homes - set(named.split()) == set()
