@@ -109,6 +109,16 @@ class CharacteristicFunction:
     -----
     The loop is of *retarded* type if B1 and B2 are of lower degree than A, and of *neutral*
     type (`neutral` is true) if one of them reaches it.
+
+    Examples
+    --------
+    An oscillator with two delayed forces, x'' + 0.2 x' + x = x1 x(t - 1) + x2 x(t - 2):
+
+    >>> from armlock import CharacteristicFunction, unstable_roots
+    >>> a, b1, b2 = [1.0, 0.2, 1.0], [1.0], [1.0]
+    >>> forced = CharacteristicFunction(a, b1, b2, delay1=1.0, delay2=2.0)
+    >>> unstable_roots(forced, [0.1, -0.5], 0.05)
+    array([0, 2])
     """
 
     def __init__(

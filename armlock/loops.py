@@ -170,6 +170,12 @@ class SingleArm(Loop):
     ------
     TypeError, ValueError
         If one of the two is not a positive finite number.
+
+    Examples
+    --------
+    >>> from armlock import SingleArm, unstable_roots
+    >>> unstable_roots(SingleArm(gain=1.0, tau=20.1), [0.99, 1.0, 1.01], 0.0)
+    array([ 0, -1,  1])
     """
 
     def __init__(self, gain: float = paper.COMMON_ARM_GAIN, tau: float = paper.TAU1) -> None:

@@ -49,6 +49,13 @@ class Margins:
     gain_omega, phase_omega, modulus_omega : float
         Where the upper gain margin, the phase margin and the modulus margin are taken, in
         rad/s; nan where there is none.
+
+    Examples
+    --------
+    >>> from armlock import margins, paper_loop
+    >>> found = margins(paper_loop())
+    >>> print(f"stable for gains from {found.gain_lower:.3f} to {found.gain_upper:.2f}")
+    stable for gains from 0.195 to 6.61
     """
 
     gain_lower: float
@@ -276,6 +283,13 @@ def margins(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> Margins:
     -----
     Phase and delay margins are taken over the crossovers up to the frequency past which L
     has settled to its limit; a neutral loop has crossovers without end.
+
+    Examples
+    --------
+    >>> import math
+    >>> from armlock import margins, paper_loop
+    >>> print(f"{math.degrees(margins(paper_loop()).phase):.1f} degrees")
+    36.0 degrees
     """
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
     _require_stable(loop, c1, c2)

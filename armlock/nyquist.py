@@ -65,6 +65,13 @@ class NyquistCurve:
         P, poles of L in the open right half-plane.
     closed_loop_roots : int
         Z = N + P, zeros of 1 + L in the right half-plane.
+
+    Examples
+    --------
+    >>> from armlock import SingleArm, nyquist
+    >>> curve = nyquist(SingleArm(), c1=0.999)
+    >>> curve.pole_order, curve.closed_loop_roots
+    (1, 0)
     """
 
     omega: FloatArray
@@ -87,6 +94,13 @@ class AxisCrossings:
         Ascending frequencies in rad/s.
     value : float array, shape (n,)
         L there, negative.
+
+    Examples
+    --------
+    >>> from armlock import axis_crossings, paper_loop
+    >>> crossings = axis_crossings(paper_loop(), omega_max=0.2)
+    >>> bool((crossings.value < 0).all())
+    True
     """
 
     omega: FloatArray
@@ -112,6 +126,14 @@ def frequency_response(
     control.FrequencyResponseData
         For `control.bode_plot` and its like. Take counts and margins from this package:
         python-control takes them from the samples alone.
+
+    Examples
+    --------
+    >>> import control
+    >>> from armlock import frequency_response, paper_loop
+    >>> response = frequency_response(paper_loop(), [0.01, 0.1])
+    >>> isinstance(response, control.FrequencyResponseData)
+    True
     """
     import control
 
@@ -354,6 +376,15 @@ def axis_crossings(
     Notes
     -----
     Zeros of Im L, found with certified steps: none is missed, however close to another.
+
+    Examples
+    --------
+    >>> from armlock import axis_crossings, paper_loop
+    >>> for omega, value in zip(*vars(axis_crossings(paper_loop(), omega_max=0.2)).values()):
+    ...     print(f"{omega:.2e} rad/s: {value:.2f}")
+    4.91e-06 rad/s: -0.15
+    5.63e-05 rad/s: -5.13
+    1.96e-04 rad/s: -113.07
     """
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
     if omega_max is None:
