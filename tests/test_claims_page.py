@@ -5,8 +5,16 @@ from html.parser import HTMLParser
 import pytest
 
 from armlock.claims import Verdict, check
+from armlock.claims import page as module
 from armlock.claims.assumptions import DIFFERENCES, eta_rms, first_break, over_corners
-from armlock.claims.page import LedgerPage, VerdictCounts, errata, section, source
+from armlock.claims.page import (
+    LedgerPage,
+    VerdictCounts,
+    errata,
+    section,
+    source,
+    whole_ledger,
+)
 from armlock.loops import CommonArm, paper_loop
 
 
@@ -49,6 +57,19 @@ def test_the_page_offers_the_ledger_as_data(ledger, monkeypatch, tmp_path):
     with (tmp_path / "claims.csv").open() as stream:
         assert [row["claim"] for row in csv.DictReader(stream)] == ["T1", "T2", "C2"]
     assert len(json.loads((tmp_path / "claims.json").read_text())) == 3
+
+
+def test_a_build_checks_the_claims_once(ledger, monkeypatch, tmp_path):
+    claims = [claim for claim, _ in ledger]
+    monkeypatch.setattr(module, "all_claims", lambda: claims)
+    monkeypatch.setenv("ARMLOCK_FIGURES", str(tmp_path))
+    first = whole_ledger()
+    monkeypatch.setattr(module, "Ledger", lambda none: type(first)(none) if not none else 1 / 0)
+    assert whole_ledger().entries == first.entries == ledger.entries
+    monkeypatch.undo()
+    monkeypatch.delenv("ARMLOCK_FIGURES", raising=False)
+    monkeypatch.setattr(module, "all_claims", lambda: claims[:1])
+    assert len(whole_ledger()) == 1
 
 
 def test_a_source_is_the_function_that_checks(ledger):
