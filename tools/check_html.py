@@ -123,7 +123,8 @@ def page_size(file: Path) -> int:
     """Return the bytes of a page and of the files that it names as its parts."""
     page = Page()
     page.feed(file.read_text(encoding="utf-8"))
-    parts = {(file.parent / unquote(urlsplit(a).path)).resolve() for a in page.loaded}
+    named = [address for address in page.loaded if not urlsplit(address).scheme]
+    parts = {(file.parent / unquote(urlsplit(a).path)).resolve() for a in named}
     return file.stat().st_size + sum(p.stat().st_size for p in parts if p.is_file())
 
 
