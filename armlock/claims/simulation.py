@@ -35,6 +35,8 @@ LOWEST = 1.0 / DURATION
 #: Factors before the spectrum of the perturbations at which System 1 is tried, as r.m.s.
 #: over the simulated band in units of the largest perturbation that the paper considers.
 SIZES = (1.0, 3.0, 10.0, 30.0, 100.0, 1000.0)
+#: Where the spectra after a start are taken, in s from it.
+SETTLED = (2_000.0, 22_000.0)
 #: A free-running laser of the kind used has about this density at 1 Hz, in Hz/sqrt(Hz).
 FREE_RUNNING = 30_000.0
 
@@ -263,13 +265,14 @@ class Start(NamedTuple):
 
 
 @cache
-def starts(duration: float = 0.1 * DURATION) -> tuple[Start, ...]:
-    """Spectra of the ideal loop after three ways to switch it on, at t = 0.
+def starts() -> tuple[Start, ...]:
+    """Spectra of the ideal loop after three ways to switch it on, once it has settled.
 
-    The laser's noise starts at zero, with nothing in the arms; or it is there at once, in the
-    middle of its course, with nothing in the arms; or it has filled them before.
+    They are taken over the seconds `SETTLED` from t = 0. The laser's noise starts at zero,
+    with nothing in the arms; or it is there at once, in the middle of its course, with nothing
+    in the arms; or it has filled them before.
     """
-    samples = sample_count(duration, SAMPLE_RATE)
+    settling, until = (sample_count(t, SAMPLE_RATE) for t in SETTLED)
     reach = Simulation(paper_loop(), SAMPLE_RATE).history_samples
     found = []
     for name, rest, filled in (
@@ -281,7 +284,8 @@ def starts(duration: float = 0.1 * DURATION) -> tuple[Start, ...]:
         history: FloatArray | float = laser.draw(reach) if filled else 0.0
         run = Simulation(paper_loop(), SAMPLE_RATE, history=history)
         estimator = SpectrumEstimator(SAMPLE_RATE)
-        for noise in laser.blocks(samples, _BLOCK):
+        run.advance(laser.draw(settling))
+        for noise in laser.blocks(until - settling, _BLOCK):
             estimator.add(run.advance(noise))
         found.append(Start(name, estimator.spectrum()))
     return tuple(found)

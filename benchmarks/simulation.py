@@ -1,0 +1,214 @@
+"""The simulation: against other ways to run the same loop, and against 106 bits.
+
+The requirement: at least as fast as a plain compiled loop of the same arithmetic, and a
+hundred times as fast as that loop in Python; a relative error of at most 1e-10.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import control
+import numpy as np
+from numba import njit
+
+from armlock import LaserNoise, Loop, PerturbationNoise, Simulation, paper_loop, simulate
+from armlock.paper import SAMPLE_RATE, TAU1, TAU2
+from armlock.validation import FloatArray
+from benchmarks import child
+from benchmarks.report import Row, Topic
+from tests.extended import naive, reference
+
+PYTHON_RATIO = 100.0
+ACCURACY = 1e-10
+MEMORY = 2 * 2**30
+CHAPTER = 90.0
+PADE_ORDER = 10
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How much is measured, in samples."""
+
+    samples: int = 40_000_000
+    python: int = 100_000
+    pade: int = 100_000
+    compared: int = 1_000_000
+    passes: int = 2
+    chapter: bool = True
+
+
+QUICK = Sizes(
+    samples=30_000, python=6_000, pade=5_000, compared=30_000, passes=1, chapter=False
+)
+
+
+def timed(function: Callable[[], Any]) -> tuple[float, Any]:
+    start = time.perf_counter()
+    result = function()
+    return time.perf_counter() - start, result
+
+
+def plain(
+    noise: FloatArray,
+    c1: FloatArray,
+    c2: FloatArray,
+    r1: int,
+    r2: int,
+    change: FloatArray,
+    drive: FloatArray,
+    output: FloatArray,
+    direct: FloatArray,
+    phi: FloatArray,
+) -> None:
+    """Run the loop as one would write it down: the same state space, sample by sample."""
+    n = output.size
+    w = np.zeros(n)
+    new = np.zeros(n)
+    for i in range(noise.size):
+        a1 = c1[i] * phi[i - r1] if i >= r1 else 0.0
+        a2 = c2[i] * phi[i - r2] if i >= r2 else 0.0
+        rest = 0.0
+        for k in range(n):
+            rest += output[k] * w[k]
+        x = (noise[i] + direct[0] * a1 + direct[1] * a2 - rest) / (1.0 + direct[0] + direct[1])
+        phi[i] = x
+        for j in range(n):
+            step = drive[j, 0] * (x - a1) + drive[j, 1] * (x - a2)
+            for k in range(j + 1):
+                step += change[j, k] * w[k]
+            new[j] = step
+        for j in range(n):
+            w[j] += new[j]
+
+
+compiled = njit(plain)
+
+
+def plain_arguments(loop: Loop) -> tuple[Any, ...]:
+    sampled = Simulation(loop)._sampled
+    delays = round(TAU1 * SAMPLE_RATE), round(TAU2 * SAMPLE_RATE)
+    return (*delays, sampled.change, sampled.drive, sampled.output, sampled.direct)
+
+
+def inputs(samples: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    noise = LaserNoise(1).draw(samples)
+    c1, c2 = (PerturbationNoise(seed, scale=1e-4).draw(samples) for seed in (2, 3))
+    c1 += 1.0
+    c2 += 1.0
+    return noise, c1, c2
+
+
+def pade_loop(loop: Loop) -> Any:
+    """Return the closed loop with Pade delays, constant c1 = c2 = 1, in discrete time."""
+    arms = [
+        1.0 - control.ss(control.tf(*control.pade(tau, PADE_ORDER))) for tau in (TAU1, TAU2)
+    ]
+    controller = control.ss(
+        control.zpk(
+            np.array(loop.controller.zeros[1:]).real,
+            np.array(loop.controller.poles).real,
+            loop.controller.gain,
+        )
+    )
+    p = loop.mapping.denominator[1] / loop.mapping.denominator[2]
+    low = control.ss(
+        control.tf([loop.mapping.numerator1[0] / loop.mapping.denominator[2]], [1, p])
+    )
+    # One zero at s = 0 of the controller goes to the sensor: s (u1 + u2) + low (u1 - u2).
+    high = control.ss(control.tf([1.0, 0.0], [1.0, p]))
+    lead = control.ss(control.tf([1.0, p], [1.0, 100.0 * p])) * (100.0 * p)
+    total, apart = arms[0] + arms[1], arms[0] - arms[1]
+    sensor = high * lead * total + low * apart
+    return control.c2d(control.feedback(1, controller * sensor), 1 / SAMPLE_RATE, "tustin")
+
+
+def chapter_run() -> tuple[float, int]:
+    """Run what the chapter of the simulation computes; return seconds and peak memory."""
+    from armlock.claims import check
+
+    start = time.perf_counter()
+    check(*(f"M{number}" for number in range(1, 9)))
+    return time.perf_counter() - start, child.peak_memory()
+
+
+def run(*, quick: bool, folder: Path) -> Topic:
+    """Measure speed, accuracy and memory of the simulation."""
+    sizes = QUICK if quick else Sizes()
+    topic = Topic(f"Simulation of the paper's loop, {sizes.samples:.3g} samples")
+    topic.data["sizes"] = asdict(sizes)
+    loop = paper_loop()
+    noise, c1, c2 = inputs(sizes.samples)
+    arguments = plain_arguments(loop)
+    phi = np.zeros(sizes.samples)
+    short = slice(0, 5000)
+    simulate(loop, noise[short], c1[short], c2[short])
+    compiled(noise[short], c1[short], c2[short], *arguments, phi)
+    ours, theirs = [], []
+    output = phi
+    for _ in range(sizes.passes):
+        seconds, output = timed(lambda: simulate(loop, noise, c1, c2))
+        ours.append(seconds)
+        theirs.append(timed(lambda: compiled(noise, c1, c2, *arguments, phi))[0])
+    python = slice(0, sizes.python)
+    slow = timed(lambda: plain(noise[python], c1[python], c2[python], *arguments,
+                               np.zeros(sizes.python)))[0] * sizes.samples / sizes.python  # fmt: skip
+    best, other = min(ours), min(theirs)
+    topic.rows += [
+        Row("simulate", best),
+        Row("plain compiled loop", other, other / best, "at least 1", other >= best),
+        Row("plain loop in Python [a]", slow, slow / best, f"at least {PYTHON_RATIO:g}",
+            slow / best >= PYTHON_RATIO),
+    ]  # fmt: skip
+    closed = pade_loop(loop)
+    steps = np.arange(sizes.pade) / SAMPLE_RATE
+    seconds = timed(lambda: control.forced_response(closed, steps, noise[: sizes.pade]))[0]
+    seconds *= sizes.samples / sizes.pade
+    topic.rows.append(
+        Row(f"python-control, Pade order {PADE_ORDER} [b]", seconds, seconds / best)
+    )
+    topic.rows += accuracy_rows(loop, noise, c1, c2, sizes.compared)
+    same = float(np.abs(output - phi).max() / np.abs(output).max())
+    topic.rows.append(Row(f"simulate and plain loop differ by {same:.1e}", None, None,
+                          "at most 1e-10", same <= ACCURACY, correctness=True))  # fmt: skip
+    topic.data.update(simulate=ours, plain=theirs, python=slow, pade=seconds, difference=same)
+    if sizes.chapter:
+        seconds, memory = child.call("benchmarks.simulation", "chapter_run", {})
+        topic.rows += [
+            Row("what the chapter computes, at full size", seconds, None,
+                f"at most {CHAPTER:g} s", seconds <= CHAPTER),
+            Row(f"its peak memory: {memory / 2**20:.0f} MiB", None, None,
+                f"at most {MEMORY / 2**20:.0f} MiB", memory <= MEMORY),
+        ]  # fmt: skip
+        topic.data.update(chapter=seconds, memory=memory)
+    topic.notes += [
+        f"[a] Extrapolated from {sizes.python} samples.",
+        f"[b] Extrapolated from {sizes.pade} samples. Constant c1 = c2 = 1, for it has no others; "
+        "delays by Pade approximants, so that the result is another one.",
+        "simulate and the plain loop are timed in turn, after compiling; the best of "
+        f"{sizes.passes} runs each.",
+    ]
+    return topic
+
+
+def accuracy_rows(
+    loop: Loop, noise: FloatArray, c1: FloatArray, c2: FloatArray, samples: int
+) -> list[Row]:
+    """Compare with the same loop in 106 bits, c1 and c2 varying."""
+    part = slice(0, samples)
+    series = noise[part], c1[part], c2[part]
+    exact = reference(*series)
+
+    def error(found: FloatArray) -> float:
+        return float(np.abs(found - exact).max() / np.abs(exact).max())
+
+    ours, usual = error(simulate(loop, *series)), error(naive(*series))
+    return [
+        Row(f"relative error over {samples:.3g} samples: {ours:.1e}", None, None,
+            f"at most {ACCURACY:g}", ours <= ACCURACY, correctness=True),
+        Row(f"that of second-order sections: {usual:.1e}"),
+    ]  # fmt: skip
