@@ -58,6 +58,15 @@ class ExponentialSum(NamedTuple):
             np.pad(sums, (0, size - sums.size)),
         )
 
+    def at(self, omega: FloatArray) -> ComplexArray:
+        """Evaluate the sum at real frequencies in rad/s; shaped like `omega`."""
+        omega = np.asarray(omega, dtype=np.float64)
+        value = poly.polyval(omega, self.sums)
+        for p, phase in zip(self.coefficients, self.phases, strict=True):
+            if phase:
+                value = value + poly.polyval(omega, p) * np.expm1(1j * omega * phase)
+        return np.asarray(value, dtype=np.complex128)
+
     def scaled(self, weight: float) -> ExponentialSum:
         """Return this sum times a number."""
         return ExponentialSum(weight * self.coefficients, self.phases, weight * self.sums)

@@ -150,7 +150,12 @@ class Loop(CharacteristicFunction):
         complex array, of the broadcast shape
         """
         s = np.asarray(s, dtype=np.complex128)
-        result: ComplexArray = self(s, c1, c2) / poly.polyval(s, self.rest) - 1.0
+        c1, c2 = np.asarray(c1), np.asarray(c2)
+        # Not D / rest - 1, which loses the digits of a small L.
+        arm1 = (1.0 - c1) - c1 * np.expm1(-s * self.tau1)
+        arm2 = (1.0 - c2) - c2 * np.expm1(-s * self.tau2)
+        above = poly.polyval(s, self.b1) * arm1 + poly.polyval(s, self.b2) * arm2
+        result: ComplexArray = above / poly.polyval(s, self.rest)
         return result
 
 

@@ -19,12 +19,9 @@ from armlock import contour
 from armlock.characteristic import ExponentialSum
 from armlock.controllers import Controller
 from armlock.loops import Loop
-from armlock.nyquist import loop_numerator, reach
+from armlock.nyquist import loop_numerator, reach, resolving_grid
 from armlock.stability import BOUNDARY, CountError, last_crossing, unstable_roots
 from armlock.validation import ComplexArray, FloatArray, axis, real_number
-
-# How straight a response must be between two samples, relative to its distance from zero.
-_STRAIGHT = 0.02
 
 
 @dataclass(frozen=True)
@@ -79,14 +76,13 @@ def _require_stable(loop: Loop, c1: float, c2: float) -> None:
         )
 
 
-def _tail_end(loop: Loop, c1: float, c2: float) -> float:
-    """Frequency past which L is its high-frequency limit, for minima over omega."""
+def _tail_end(loop: Loop, c1: float, c2: float, level: float) -> float:
+    """Frequency past which |L| < `level`, or past which a neutral L has settled."""
     end = float(last_crossing(loop, c1, c2))
     if not loop.neutral:
-        level = reach(loop, c1, c2, 0.1)
-        return max(2.0 * end, level, 10.0 / loop.longest_delay)
+        return max(2.0 * end, reach(loop, c1, c2, level), 10.0 / loop.longest_delay)
     period = 2.0 * np.pi / max(abs(loop.tau1 - loop.tau2), 1e-3 * loop.longest_delay)
-    return max(4.0 * end, 2.0 * period)
+    return max(4.0 * end, 4.25 * period)
 
 
 def _at_infinity(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
@@ -107,32 +103,44 @@ def _at_infinity(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
 def _smallest(
     distance: Callable[[FloatArray], FloatArray], grid: FloatArray
 ) -> tuple[float, float]:
-    """Minimum of a smooth function over omega > 0, refined between samples; and where."""
+    """Minimum over omega > 0 of a function that the grid resolves; and where."""
     grid = grid[grid > 0.0]
     values = distance(grid)
     inner = (values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:])
     candidates = np.flatnonzero(inner) + 1
-    candidates = candidates[values[candidates] <= 1.1 * values.min()]
+    candidates = candidates[values[candidates] <= 1.5 * values.min()]
     best = int(np.argmin(values))
     found = [(float(values[best]), float(grid[best]))]
     for k in candidates[np.argsort(values[candidates])][:200]:
-        low, high = np.log(grid[k - 1]), np.log(grid[k + 1])
+        low, width = float(grid[k - 1]), float(grid[k + 1] - grid[k - 1])
+
+        # Over the share of the bracket, because the optimizer's accuracy is relative.
+        def along(share: float, low: float = low, width: float = width) -> float:
+            return float(distance(np.array([low + share * width]))[0])
+
         result = minimize_scalar(
-            lambda u: float(distance(np.array([np.exp(u)]))[0]),
-            bounds=(low, high),
-            method="bounded",
-            options={"xatol": 1e-10},
+            along, bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-9}
         )
-        found.append((float(result.fun), float(np.exp(result.x))))
+        found.append((float(result.fun), low + float(result.x) * width))
     return min(found)
 
 
 def _grid(loop: Loop, c1: float, c2: float) -> FloatArray:
-    """Frequencies between which D is nearly straight, up to the loop's tail."""
-    grid: FloatArray = contour.resolved_grid(
-        *loop.at(c1, c2), _tail_end(loop, c1, c2), _STRAIGHT
-    )
+    """Frequencies that resolve 1 + L and 1 - L, up to where the tail cannot matter."""
+    plus, below = loop.at(c1, c2), loop.rest_on_boundary()
+    minus = below.scaled(2.0).plus(plus.scaled(-1.0))
+    for level in (0.9, 0.5, 0.1, 0.01, 0.001):
+        grid = resolving_grid((plus, minus, below), _tail_end(loop, c1, c2, level))
+        response = loop.open_loop(1j * grid[1:], c1, c2)
+        away, across = np.abs(1.0 + response).min(), _ratio(response).min()
+        if loop.neutral or (away <= 1.0 - level and across <= (1.0 - level) / (1.0 + level)):
+            break
     return grid
+
+
+def _ratio(response: ComplexArray) -> FloatArray:
+    """Return |1 + L| / |1 - L|."""
+    return np.asarray(np.abs(1.0 + response) / np.maximum(np.abs(1.0 - response), 1e-300))
 
 
 def _modulus(loop: Loop, c1: float, c2: float, grid: FloatArray) -> tuple[float, float]:
@@ -297,8 +305,7 @@ def margins(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> Margins:
     modulus, modulus_omega = _modulus(loop, c1, c2, grid)
 
     def ratio(omega: FloatArray) -> FloatArray:
-        response: ComplexArray = loop.open_loop(1j * omega, c1, c2)
-        return np.asarray(np.abs(1.0 + response) / np.maximum(np.abs(1.0 - response), 1e-300))
+        return _ratio(loop.open_loop(1j * omega, c1, c2))
 
     disk = 2.0 * min(_smallest(ratio, grid)[0], _at_infinity(loop, c1, c2)[1])
     omega = _crossovers(loop, c1, c2, float(grid[-1]))

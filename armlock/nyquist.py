@@ -7,7 +7,7 @@ the encirclements are then held against the count of unstable roots: Z = N + P.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import factorial
 from typing import TYPE_CHECKING
@@ -40,6 +40,9 @@ if TYPE_CHECKING:
 
 # Largest change of the argument of 1 + L between neighbouring samples, in rad.
 _TURN = 0.2
+# How straight numerator and denominator must be between the samples to start from, relative
+# to their distance from zero.
+_STRAIGHT = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,15 +162,23 @@ def _poles_at_zero(loop: Loop, c1: float, c2: float) -> int:
     order = int(np.flatnonzero(loop.rest)[0])
     if order == 0:
         return 0
-    # Taylor coefficients of B1 (1 - c1 exp(-s tau1)) + B2 (1 - c2 exp(-s tau2)).
-    taylor = np.zeros(order)
+    # Taylor coefficients of B1 (1 - c1 exp(-s tau1)) + B2 (1 - c2 exp(-s tau2)), and the
+    # magnitudes they are summed from.
+    taylor, size = np.zeros(order), np.zeros(order)
     for b, c, tau in ((loop.b1, c1, loop.tau1), (loop.b2, c2, loop.tau2)):
         arm = np.array([-c * (-tau) ** k / factorial(k) for k in range(order)])
         arm[0] += 1.0
         taylor += np.convolve(b, arm)[:order]
-    size = np.abs(loop.b1).max() + np.abs(loop.b2).max()
-    nonzero = np.flatnonzero(np.abs(taylor) > 1e-14 * size)
+        size += np.convolve(np.abs(b), np.abs(arm))[:order]
+    nonzero = np.flatnonzero(np.abs(taylor) > 1e-13 * size)
     return order - (int(nonzero[0]) if nonzero.size else order)
+
+
+def _poles_elsewhere(loop: Loop) -> ComplexArray:
+    """Poles of controller and sensor except those at s = 0."""
+    sensor = poly.polyroots(np.trim_zeros(np.asarray(loop.mapping.denominator), "f"))
+    poles = np.concatenate((np.asarray(loop.controller.poles), sensor))
+    return np.asarray(poles[np.abs(poles) > 0.0], dtype=np.complex128)
 
 
 def open_loop_poles(loop: Loop) -> int:
@@ -188,9 +199,7 @@ def open_loop_poles(loop: Loop) -> int:
         If L has poles on the imaginary axis elsewhere than at s = 0: the contour is indented
         there only.
     """
-    sensor = poly.polyroots(np.asarray(loop.mapping.denominator))
-    poles = np.concatenate((np.asarray(loop.controller.poles), sensor))
-    poles = poles[np.abs(poles) > 0.0]
+    poles = _poles_elsewhere(loop)
     on_axis = np.abs(poles.real) <= 1e-12 * np.abs(poles)
     if on_axis.any():
         raise ValueError(
@@ -218,6 +227,52 @@ def _refined(
         if points.size > 20_000_000:
             break
     raise CountError("the Nyquist curve passes through -1", np.empty((0, 2)))
+
+
+def resolving_grid(parts: Sequence[ExponentialSum], end: float) -> FloatArray:
+    """Frequencies from 0 to `end` between which no quotient of the sums can hide anything.
+
+    Between two of them each sum is nearly straight and turns by less than _TURN, so that
+    neither a turn of a quotient nor a dip of its magnitude fits in between.
+    """
+    grid = np.unique(
+        np.concatenate([contour.resolved_grid(*part, end, _STRAIGHT) for part in parts])
+    )
+    for _ in range(60):
+        wide = np.zeros(grid.size - 1, dtype=np.bool_)
+        for part in parts:
+            values = part.at(grid)
+            # A sum that vanishes at s = 0 has no argument there.
+            turn = np.angle(values[1:] * values[:-1].conj())
+            wide |= np.abs(turn) > _TURN
+        middles = 0.5 * (grid[:-1] + grid[1:])[wide]
+        middles = middles[(middles > grid[:-1][wide]) & (middles < grid[1:][wide])]
+        if middles.size == 0:
+            break
+        grid = np.sort(np.concatenate((grid, middles)))
+    # Points of different sums that all but coincide tell nothing, and mislead a bracket.
+    gaps = np.diff(grid, prepend=grid[0], append=grid[-1])
+    close = gaps[1:-1] < 1e-4 * np.maximum(gaps[:-2], gaps[2:])
+    return grid[np.concatenate(([True], ~close[:-1], [True]))]
+
+
+def _rectangle(loop: Loop, c1: float, c2: float, end: float) -> tuple[float, float]:
+    """Top and right side of a rectangle that holds every unstable root and pole.
+
+    Right of it the delayed terms have died out. Above it |A| > |c1 B1 e1| + |c2 B2 e2|:
+    the two sides' ratio has no poles there, and takes its maximum on the edge.
+    """
+    own = np.concatenate((_poles_elsewhere(loop), poly.polyroots(loop.a)))
+    largest = 2.0 * float(np.abs(own[own.real > 0.0]).max(initial=0.0))
+    top = max(end, largest)
+    for _ in range(60):
+        right = max(40.0 / min(loop.tau1, loop.tau2), top, largest)
+        s = 1j * top + np.linspace(0.0, right, 2000)
+        a, b1, b2 = loop.parts(s)
+        if (np.abs(a) > np.abs(c1 * b1) + np.abs(c2 * b2)).all():
+            break
+        top *= 1.5
+    return top, right
 
 
 def _between(start: complex, stop: complex) -> ComplexArray:
@@ -299,11 +354,10 @@ def nyquist(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> NyquistCurve:
 
     radius = _radius(loop, c1, c2, order)
     end = max(1.05 * end, 10.0 / loop.longest_delay, 10.0 * radius)
-    far = max(40.0 / min(loop.tau1, loop.tau2), end)
-    turn = 2.0 * np.pi / loop.longest_delay
-    low = np.geomspace(radius, max(turn, 2.0 * radius), 400)
-    high = np.arange(low[-1], end, turn / 16.0)[1:]
-    up, up_values = _refined(response, 1j * np.concatenate((low, high, [end])))
+    end, far = _rectangle(loop, c1, c2, end)
+    grid = resolving_grid((loop.at(c1, c2), loop.rest_on_boundary()), end)
+    inner = grid[(grid > radius) & (grid < end)]
+    up, up_values = _refined(response, 1j * np.concatenate(([radius], inner, [end])))
     _, across = _refined(response, _between(1j * end, 1j * end + far))
     _, down = _refined(response, _between(1j * end + far, far))
     argument = _turns(up_values) + _turns(across) + _turns(down)

@@ -1,0 +1,360 @@
+"""Encirclements, crossings and responses, against counts, brute force and many digits."""
+
+from __future__ import annotations
+
+import importlib
+
+import mpmath
+import numpy as np
+import pytest
+
+from armlock import (
+    CommonArm,
+    Controller,
+    CountError,
+    DualArm,
+    Loop,
+    SingleArm,
+    axis_crossings,
+    frequency_response,
+    nyquist,
+    paper_loop,
+    unstable_roots,
+)
+from armlock.controllers import table_two
+from armlock.nyquist import open_loop_poles, resolving_grid
+from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
+from tests import independent
+
+# The package has a function of the same name.
+module = importlib.import_module("armlock.nyquist")
+
+PRINTED = table_two(denominator="printed")
+
+# Loop, (c1, c2), unstable poles of L.
+CASES = {
+    "single arm, ideal": (SingleArm(), (1.0, 1.0), 0),
+    "single arm, unstable": (SingleArm(), (1.001, 1.0), 0),
+    "single arm, stable": (SingleArm(), (0.999, 1.0), 0),
+    "single arm, far below": (SingleArm(3.0, 2.0), (-1.7, 1.0), 0),
+    "common arm": (CommonArm(), (1.0, 1.001), 0),
+    "common arm, many roots": (CommonArm(), (1.3, 1.1), 0),
+    "common arm, a rounding away": (CommonArm(), (1.0, 1.0 + 1e-13), 0),
+    "dual arm, ideal": (DualArm(), (1.0, 1.0), 0),
+    "dual arm, Area 2": (DualArm(), (1.0, 0.995), 0),
+    "dual arm, Area 1": (DualArm(), (1.0, 1.005), 0),
+    "dual arm, many roots": (DualArm(gain=2.0), (1.2, 1.1), 0),
+    "Table II": (paper_loop(), (1.0, 1.0 - 1e-6), 0),
+    "Table II, unstable": (paper_loop(), (1.0, 1.0 - 4e-6), 0),
+    "Table II, actuator": (paper_loop(actuator=True), (1.0, 1.0 - 1e-6), 0),
+    "Eq. 11": (paper_loop(controller=PRINTED), (1.0, 1.0), 0),
+    "Eq. 11, actuator": (paper_loop(controller=PRINTED, actuator=True), (1.0, 1.0), 0),
+    "double integrator": (Loop(((-0.1,), (0, 0), 1.0), COMMON, 2.0, 1.5), (1.0, 0.99), 0),
+    "triple integrator": (
+        Loop(((-0.1, -0.1), (0, 0, 0), 1.0), COMMON, 2.0, 1.5),
+        (1.0, 1.01),
+        0,
+    ),
+    "one unstable pole": (Loop(((), (0.5,), 2.0), SINGLE, 2.0, 1.5), (0.9, 1.0), 1),
+    "far unstable pole": (Loop(((), (100.0,), 500.0), SINGLE, 2.0, 1.5), (0.9, 1.0), 1),
+    "unstable pair": (
+        Loop(((-1,), (0.2 + 2j, 0.2 - 2j), 0.7), COMMON, 2.0, 1.5),
+        (0.8, 0.9),
+        2,
+    ),
+    "fast unstable pair": (
+        Loop(((), (0.1 + 50j, 0.1 - 50j), 1.0), SINGLE, 2, 1.5),
+        (0.9, 1),
+        2,
+    ),
+    "unstable pole and integrator": (
+        Loop(((-1, -1), (0.0, 0.3, -5.0), 4.0), COMMON, 0.3, 0.2),
+        (0.2, 0.1),
+        1,
+    ),
+    "neutral, unstable pole": (Loop(((-3,), (1.0,), 0.2), COMMON, 2.0, 1.5), (0.9, 0.8), 1),
+    "neutral, constant": (Loop(((), (), 5.0), DIFFERENCE, 2.0, 1.5), (0.05, 0.1), 0),
+}
+# Poles so near to the axis that L turns within a millionth of its frequency.
+for real in (-1e-6, 1e-6, -1e-9, 1e-9):
+    for gain in (1e-4, 1e-7, 1e-11):
+        CASES[f"resonance at {real:+g}, gain {gain:g}"] = (
+            Loop(((), (real + 3j, real - 3j), gain), SINGLE, 2.0, 1.5),
+            (0.9, 1.0),
+            2 * (real > 0),
+        )
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_encirclements_and_open_loop_poles_give_the_closed_loop_roots(name):
+    loop, (c1, c2), poles = CASES[name]
+    curve = nyquist(loop, c1, c2)
+    assert curve.open_loop_poles == open_loop_poles(loop) == poles
+    assert curve.closed_loop_roots == curve.encirclements + poles
+    # On the boundary D has a root s = 0 that 1 + L has not.
+    assert max(int(unstable_roots(loop, c1, c2)), 0) == curve.closed_loop_roots
+    turns = np.abs(np.angle((1 + curve.response[1:]) / (1 + curve.response[:-1])))
+    assert turns.max() <= 0.2 + 1e-9
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_random_controllers_agree_with_a_rectangle_of_another_kind(seed):
+    rng = np.random.default_rng(seed)
+
+    def roots(number):
+        found: list[complex] = []
+        while len(found) < number:
+            size = 10.0 ** rng.uniform(-1.5, 0.8)
+            if number - len(found) >= 2 and rng.random() < 0.5:
+                z = size * np.exp(1j * rng.uniform(0.0, np.pi))
+                found += [z, z.conjugate()]
+            else:
+                found.append(size * rng.choice([-1.0, -1.0, 0.0, 1.0]))
+        return tuple(found)
+
+    order = int(rng.integers(1, 5))
+    controller = (roots(int(rng.integers(0, order))), roots(order), 10 ** rng.uniform(-2, 0.5))
+    mapping = [SINGLE, COMMON, DIFFERENCE, dual(2.0, 0.5)][seed % 4]
+    loop = Loop(controller, mapping, 2.0, 1.5)
+    c1, c2 = rng.normal(1.0, 0.3, 2)
+    curve = nyquist(loop, c1, c2)
+    expected = independent.rectangle_count(loop, c1, c2) if loop.a[0] else None
+    if expected is not None:
+        assert curve.closed_loop_roots == expected
+
+
+@pytest.mark.parametrize("samples", [2, 3, 5])
+def test_a_coarse_grid_changes_no_count(monkeypatch, samples):
+    def coarse(parts, end):
+        return np.linspace(0.0, end, samples)
+
+    monkeypatch.setattr(module, "resolving_grid", coarse)
+    for loop, c1, c2 in [
+        (SingleArm(), 1.001, 1.0),
+        (CommonArm(), 1.3, 1.1),
+        (DualArm(), 1.0, 0.995),
+        (paper_loop(), 1.0, 1.0 - 4e-6),
+    ]:
+        # Either refined all the same, or refused: never another count.
+        try:
+            count = nyquist(loop, c1, c2).closed_loop_roots
+        except CountError:
+            continue
+        assert count == unstable_roots(loop, c1, c2)
+
+
+def test_a_resonance_between_the_samples_is_refused_not_guessed(monkeypatch):
+    loop, (c1, c2), _ = CASES["resonance at -1e-06, gain 0.0001"]
+    assert nyquist(loop, c1, c2).closed_loop_roots == 2
+
+    def even(parts, end):
+        return np.linspace(0.0, end, 300)
+
+    monkeypatch.setattr(module, "resolving_grid", even)
+    with pytest.raises(CountError, match="against 2 roots"):
+        nyquist(loop, c1, c2)
+
+
+def test_no_step_of_the_users_enters_the_crossings():
+    few = frequency_response(CommonArm(), [0.1, 1.0], 1.0, 1.001)
+    assert few.omega.size == 2
+    every = axis_crossings(CommonArm(), 1.0, 1.001, omega_max=40.0)
+    part = axis_crossings(CommonArm(), 1.0, 1.001, omega_max=20.0)
+    np.testing.assert_allclose(every.omega[every.omega < 20.0], part.omega, rtol=1e-12)
+
+
+# ------------------------------------------------------------- contours wrong on purpose
+@pytest.mark.parametrize(
+    ("name", "wrong"),
+    [
+        ("indentation passes on the left", ("_indentation", -1.0)),
+        ("contour too short", ("last_crossing", 0.02)),
+        ("unstable pole forgotten", ("open_loop_poles", 0)),
+        ("order of the pole at zero one too high", ("_poles_at_zero", 3)),
+    ],
+)
+def test_a_wrong_contour_is_caught(monkeypatch, name, wrong):
+    attribute, value = wrong
+    loop: Loop = DualArm()
+    c1, c2 = 1.0, 0.995
+    if attribute == "_indentation":
+        turns = module._turns
+
+        def mirrored(values):
+            # The arc is the one piece on which |L| stays large.
+            return turns(values.conj() if np.abs(values).min() > 1e3 else values)
+
+        monkeypatch.setattr(module, "_turns", mirrored)
+    elif attribute == "last_crossing":
+        loop, c1, c2 = CommonArm(), 1.3, 1.1
+        end = float(module.last_crossing(loop, c1, c2))
+        monkeypatch.setattr(module, "last_crossing", lambda *_: np.array(value * end))
+        monkeypatch.setattr(module, "_rectangle", lambda *a: (a[3], 40.0 / loop.tau2))
+    elif attribute == "open_loop_poles":
+        loop, (c1, c2), _ = CASES["one unstable pole"]
+        monkeypatch.setattr(module, "open_loop_poles", lambda _: value)
+    else:
+        monkeypatch.setattr(module, "_poles_at_zero", lambda *_: value)
+        monkeypatch.setattr(module, "_radius", lambda *_: 1.0)
+    with pytest.raises(CountError, match=r"no Nyquist count at \(c1, c2\) = "):
+        nyquist(loop, c1, c2)
+
+
+# --------------------------------------------------------------------------- bad input
+@pytest.mark.parametrize("pole", [2j, 1e-3j, 50j])
+def test_poles_on_the_axis_are_refused_with_the_reason_and_counted_elsewhere(pole):
+    loop = Loop(((-1.0,), (pole, -pole, -1.0), 0.3), SINGLE, 2.0, 1.5)
+    with pytest.raises(ValueError, match=r"no pole on the imaginary axis except at s = 0, got"):
+        nyquist(loop, 0.9, 1.0)
+    assert unstable_roots(loop, 0.9, 1.0) == independent.rectangle_count(loop, 0.9, 1.0)
+
+
+def test_an_unconfined_chain_is_refused():
+    with pytest.raises(CountError, match="high-frequency chain of roots is not confined"):
+        nyquist(Loop(((), (), 5.0), SINGLE, 2.0, 1.5), 1.3, 1.0)
+
+
+@pytest.mark.parametrize("corner", [0.0, -1.0, np.nan, np.inf])
+def test_a_corner_must_be_positive(corner):
+    with pytest.raises(ValueError, match=r"^corner must be (positive|finite), got"):
+        paper_loop(corner=corner)
+    with pytest.raises(ValueError, match=r"^corner must be (positive|finite), got"):
+        DualArm(corner=corner)
+
+
+def test_an_improper_controller_is_refused():
+    with pytest.raises(ValueError, match="must be proper, got 2 zeros and 1 poles"):
+        Loop(((-1.0, -2.0), (-3.0,), 1.0), SINGLE, 2.0, 1.5)
+    # The integrator makes up for one zero too many.
+    assert Loop(((-1.0, -2.0), (-3.0, 0.0), 1.0), SINGLE, 2.0, 1.5).neutral
+
+
+@pytest.mark.parametrize(("mapping", "gain"), [(SINGLE, -1.0), (COMMON, -0.5)])
+def test_a_loop_that_is_not_well_posed_is_refused(mapping, gain):
+    with pytest.raises(ValueError, match="not well posed"):
+        Loop(((-1.0,), (-3.0,), gain), mapping, 2.0, 1.5)
+
+
+@pytest.mark.parametrize("omega", [0.0, -1.0, [1.0, 0.0]])
+def test_frequencies_must_be_positive(omega):
+    with pytest.raises(ValueError, match="omega must be positive"):
+        frequency_response(CommonArm(), omega)
+
+
+def test_a_loop_that_does_not_roll_off_needs_a_last_frequency():
+    with pytest.raises(ValueError, match="omega_max must be given"):
+        axis_crossings(paper_loop())
+    assert axis_crossings(paper_loop(), omega_max=1e-3).omega.size == 3
+
+
+# --------------------------------------------------------------------------- responses
+def exact_response(loop, omega, c1, c2):
+    with mpmath.workdps(50):
+        s = mpmath.mpc(0, omega)
+        value = mpmath.mpf(loop.controller.gain)
+        for zero in loop.controller.zeros:
+            value *= s - mpmath.mpc(zero)
+        for pole in loop.controller.poles:
+            value /= s - mpmath.mpc(pole)
+        m = loop.mapping
+        n1, n2, below = (
+            sum(mpmath.mpf(c) * s**k for k, c in enumerate(p))
+            for p in (m.numerator1, m.numerator2, m.denominator)
+        )
+        arm1 = 1 - mpmath.mpf(c1) * mpmath.exp(-s * mpmath.mpf(loop.tau1))
+        arm2 = 1 - mpmath.mpf(c2) * mpmath.exp(-s * mpmath.mpf(loop.tau2))
+        return complex(value * (n1 * arm1 + n2 * arm2) / below)
+
+
+@pytest.mark.parametrize(
+    "loop",
+    [SingleArm(), CommonArm(), DualArm(), paper_loop(), paper_loop(actuator=True)],
+    ids=["single", "common", "dual", "controlled", "controlled, actuator"],
+)
+@pytest.mark.parametrize("c2", [1.0, 1.0 - 1e-6])
+def test_a_tenth_of_a_nanohertz_is_as_exact_as_a_hertz(loop, c2):
+    frequency = np.array([1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 0.04, 0.26, 1.0])
+    omega = 2.0 * np.pi * frequency
+    response = frequency_response(loop, omega, 1.0, c2)
+    value = np.squeeze(response.frdata)
+    expected = np.array([exact_response(loop, w, 1.0, c2) for w in omega])
+    np.testing.assert_array_less(np.abs(value / expected - 1.0), 1e-12)
+
+
+def test_the_response_is_one_of_python_control():
+    import control
+
+    response = frequency_response(paper_loop(), np.geomspace(1e-9, 1e-3, 50))
+    assert isinstance(response, control.FrequencyResponseData)
+    magnitude = control.frequency_response(response, response.omega).magnitude
+    assert magnitude.shape == (50,)
+
+
+# --------------------------------------------------------------------------- crossings
+@pytest.mark.parametrize(
+    ("loop", "c1", "c2", "end"),
+    [
+        (SingleArm(), 1.001, 1.0, 20.0),
+        (SingleArm(), -1.5, 1.0, 20.0),
+        (CommonArm(), 1.0, 1.001, 130.0),
+        (CommonArm(), 1.2, 1.1, 20.0),
+        (DualArm(), 1.0, 1.005, 40.0),
+        (DualArm(), 1.01, 1.02, 40.0),
+        (paper_loop(), 1.0, 1.0 - 1e-6, 2.0),
+    ],
+)
+def test_no_crossing_is_missed_and_none_is_invented(loop, c1, c2, end):
+    crossings = axis_crossings(loop, c1, c2, omega_max=end)
+    omega = np.concatenate((np.geomspace(1e-9, 0.02, 40_000), np.linspace(0.02, end, 900_000)))
+    imaginary = np.imag(loop.open_loop(1j * omega, c1, c2))
+    places = np.flatnonzero(imaginary[1:] * imaginary[:-1] < 0.0)
+    middle = 0.5 * (omega[places] + omega[places + 1])
+    step = omega[places + 1] - omega[places]
+    negative = np.real(loop.open_loop(1j * middle, c1, c2)) < 0.0
+    assert crossings.omega.size == negative.sum() > 0
+    assert (np.abs(crossings.omega - middle[negative]) <= step[negative]).all()
+    value = loop.open_loop(1j * crossings.omega, c1, c2)
+    assert (np.abs(value.imag) <= 1e-9 * (np.abs(value) + np.abs(1e-3 / crossings.omega))).all()
+    np.testing.assert_array_equal(value.real, crossings.value)
+
+
+def test_the_single_arm_crosses_where_the_cosine_says():
+    loop, c1 = SingleArm(), 1.001
+    found = axis_crossings(loop, c1, omega_max=3.0)
+    delta = np.arccos(1.0 / c1)
+    k = np.arange(1, 10)
+    np.testing.assert_allclose(found.omega, (2 * np.pi * k - delta) / loop.tau, rtol=1e-12)
+    np.testing.assert_allclose(found.value, -np.sqrt(c1**2 - 1) / found.omega, rtol=1e-9)
+
+
+@pytest.mark.parametrize("loop", [SingleArm(), CommonArm(), DualArm()])
+def test_the_ideal_loops_cross_nowhere(loop):
+    assert axis_crossings(loop, 1.0, 1.0).omega.size == 0
+
+
+def test_the_grid_resolves_what_its_sums_do():
+    loop = CASES["resonance at -1e-09, gain 1e-07"][0]
+    parts = (loop.at(0.9, 1.0), loop.rest_on_boundary())
+    grid = resolving_grid(parts, 5.0)
+    for part in parts:
+        values = part.at(grid)
+        turn = np.angle(values[1:] / values[:-1])
+        assert np.abs(turn).max() < 0.45
+    assert (np.diff(grid) > 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("c1", "order"), [(1.0, 0), (1.0 + 4.5e-16, 1), (1.0 - 1e-12, 1), (0.5, 1)]
+)
+def test_the_pole_at_zero_cancels_only_where_it_does(c1, order):
+    assert nyquist(SingleArm(), c1).pole_order == order
+
+
+def test_tiny_corners_of_a_controller_do_not_hide_its_pole_at_zero():
+    loop = Loop(((-1e-8, -1e-8), (0.0, 0.0, -1.0), 1.0), SINGLE, 2.0, 1.5)
+    assert nyquist(loop, 0.5, 1.0).pole_order == 2
+
+
+def test_a_controllers_double_pole_meets_the_sensors():
+    loop = Loop(Controller((0.0, 0.0), (-1.0, -1.0), 2.0), dual(2.0, 0.5), 2.0, 1.5)
+    assert nyquist(loop, 0.9, 0.8).pole_order == 0
