@@ -95,7 +95,7 @@ class ChartExplorer:
         label = html.escape(self.name, quote=True)
         data = json.dumps(self.data(), separators=(",", ":"))
         return (
-            f'<div class="explorer" id="{key}">'
+            f'<div class="explorer" id="{key}" data-check="hover">'
             f'<canvas width="560" height="440" tabindex="0" role="application" '
             f'aria-label="{label}. Arrow keys move the point, with shift by ten steps." '
             f'aria-describedby="{key}-at"></canvas>'

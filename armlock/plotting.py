@@ -251,7 +251,7 @@ def publish(
         Stem of the files, unique in the book.
     columns : mapping of str to array_like
         Columns of the CSV, named with their units, for instance "omega [rad/s]". Shorter
-        columns are padded with empty fields.
+        columns are padded with empty fields. Empty for a drawing, which has no data.
     form : str, optional
         Format of the numbers.
 
@@ -274,10 +274,12 @@ def publish(
         ",".join(form % array[i] if i < array.size else "" for array in arrays)
         for i in range(length)
     ]
-    (target / f"{name}.csv").write_text("\n".join(lines) + "\n")
+    if columns:
+        (target / f"{name}.csv").write_text("\n".join(lines) + "\n")
     figure.savefig(target / f"{name}.png", metadata={"Software": None})
     figure.savefig(target / f"{name}.svg", metadata={"Date": None})
-    return Downloads(name, [f"{name}.{ending}" for ending in ("csv", "png", "svg")])
+    endings = ("csv", "png", "svg") if columns else ("png", "svg")
+    return Downloads(name, [f"{name}.{ending}" for ending in endings])
 
 
 class FrameSlider:

@@ -74,6 +74,12 @@ def test_publishing_writes_figure_and_data(ax, tmp_path, monkeypatch):
     assert "name.svg" in links._repr_html_()
 
 
+def test_a_drawing_has_no_data(ax, tmp_path, monkeypatch):
+    monkeypatch.setenv("ARMLOCK_FIGURES", str(tmp_path))
+    assert plotting.publish(ax.figure, "name", {}).files == ["name.png", "name.svg"]
+    assert not (tmp_path / "name.csv").exists()
+
+
 def test_publishing_without_a_folder_writes_nothing(ax, tmp_path, monkeypatch):
     monkeypatch.delenv("ARMLOCK_FIGURES", raising=False)
     monkeypatch.chdir(tmp_path)
