@@ -1,14 +1,12 @@
 """The check in a browser finds what it is there to find; the built book passes it."""
 
-import sys
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / "tools"))
+from tools import check_browser
 
-import check_browser  # noqa: E402
+ROOT = Path(__file__).parents[1]
 
 needs_chromium = pytest.mark.skipif(
     check_browser.find_chromium() is None,
