@@ -238,7 +238,8 @@ function (box, data) {
         Math.max(0, Math.min(n - 1, Math.round((v - a) / (b - a) * (n - 1))));
       const i = place(x, root.x), j = place(y, root.y), at = j * root.x[2] + i;
       text += Number.isNaN(re[at]) ? '; rightmost root not certified'
-        : '; rightmost root ' + re[at].toExponential(2).replace('-', '\\u2212')
+        : '; rightmost root ' + (Math.abs(re[at]) < 1e-12 ? '0'
+        : re[at].toExponential(2).replace('-', '\\u2212'))
         + (im[at] > 0 ? ' \\u00b1 ' + im[at].toPrecision(3) + 'j' : '') + ' rad/s (at '
         + format(value(...root.x, i)) + ', ' + format(value(...root.y, j)) + ')';
     }
