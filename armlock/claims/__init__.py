@@ -7,6 +7,7 @@ from armlock.claims import table1  # isort: skip
 from armlock.claims import single_arm  # isort: skip
 from armlock.claims import common_arm  # isort: skip
 from armlock.claims import dual_arm  # isort: skip
+from armlock.claims import nyquist_cases  # isort: skip
 from armlock.claims import controller  # isort: skip
 from armlock.claims import simulation  # isort: skip
 from armlock.claims import appendix  # isort: skip
@@ -23,6 +24,7 @@ __all__ = [
     "common_arm",
     "controller",
     "dual_arm",
+    "nyquist_cases",
     "simulation",
     "single_arm",
     "table1",
