@@ -152,9 +152,9 @@ def _advance(
     c1: FloatArray,
     c2: FloatArray,
     first1: int,
-    weights1: FloatArray,
+    weights1: Row,
     first2: int,
-    weights2: FloatArray,
+    weights2: Row,
     matrices: Matrices,
     direct: Row,
     entering: Row,
@@ -182,10 +182,10 @@ def _advance(
     for i in range(noise.size):
         now = start + i
         a1 = 0.0
-        for k in range(weights1.size):
+        for k in range(len(weights1)):
             a1 += weights1[k] * phi[now - first1 - k]
         a2 = 0.0
-        for k in range(weights2.size):
+        for k in range(len(weights2)):
             a2 += weights2[k] * phi[now - first2 - k]
         a1 *= c1[i]
         a2 *= c2[i]
@@ -508,9 +508,9 @@ class Simulation:
                 _piece(c1, piece),
                 _piece(c2, piece),
                 delay1.first,
-                delay1.weights,
+                floats(delay1.weights),
                 delay2.first,
-                delay2.weights,
+                floats(delay2.weights),
                 self._matrices,
                 self._direct,
                 self._entering,
@@ -523,7 +523,7 @@ class Simulation:
             if stop >= 0:
                 output[at : at + stop] = self._phi[start : start + stop]
                 self._stopped = (
-                    self._watch[1] / self.sample_rate,
+                    float(self._watch[1]) / self.sample_rate,
                     (self.samples + stop) / self.sample_rate,
                 )
                 raise DivergenceError(*self._stopped, output[: at + stop])

@@ -38,7 +38,7 @@ class Sizes:
     python: int = 100_000
     pade: int = 100_000
     compared: int = 1_000_000
-    passes: int = 2
+    passes: int = 4
     chapter: bool = True
 
 
@@ -108,23 +108,14 @@ def pade_loop(loop: Loop) -> Any:
     arms = [
         1.0 - control.ss(control.tf(*control.pade(tau, PADE_ORDER))) for tau in (TAU1, TAU2)
     ]
-    controller = control.ss(
-        control.zpk(
-            np.array(loop.controller.zeros[1:]).real,
-            np.array(loop.controller.poles).real,
-            loop.controller.gain,
-        )
-    )
-    p = loop.mapping.denominator[1] / loop.mapping.denominator[2]
-    low = control.ss(
-        control.tf([loop.mapping.numerator1[0] / loop.mapping.denominator[2]], [1, p])
-    )
-    # One zero at s = 0 of the controller goes to the sensor: s (u1 + u2) + low (u1 - u2).
-    high = control.ss(control.tf([1.0, 0.0], [1.0, p]))
-    lead = control.ss(control.tf([1.0, p], [1.0, 100.0 * p])) * (100.0 * p)
-    total, apart = arms[0] + arms[1], arms[0] - arms[1]
-    sensor = high * lead * total + low * apart
-    return control.c2d(control.feedback(1, controller * sensor), 1 / SAMPLE_RATE, "tustin")
+    zeros, poles, gain = loop.controller.zeros, loop.controller.poles, loop.controller.gain
+    whole = control.ss(control.zpk(np.real(zeros), np.real(poles), gain))
+    # One zero at s = 0 cancels the sensor's integrator.
+    less = control.ss(control.zpk(np.real(zeros[1:]), np.real(poles), gain))
+    p, scale = loop.mapping.denominator[1], loop.mapping.denominator[2]
+    low = control.ss(control.tf([loop.mapping.numerator1[0] / scale], [1.0, p / scale]))
+    opened = whole * (arms[0] + arms[1]) + less * low * (arms[0] - arms[1])
+    return control.c2d(control.feedback(1, opened), 1.0 / SAMPLE_RATE, "tustin")
 
 
 def chapter_run() -> tuple[float, int]:
@@ -154,9 +145,10 @@ def run(*, quick: bool, folder: Path) -> Topic:
         seconds, output = timed(lambda: simulate(loop, noise, c1, c2))
         ours.append(seconds)
         theirs.append(timed(lambda: compiled(noise, c1, c2, *arguments, phi))[0])
-    python = slice(0, sizes.python)
-    slow = timed(lambda: plain(noise[python], c1[python], c2[python], *arguments,
-                               np.zeros(sizes.python)))[0] * sizes.samples / sizes.python  # fmt: skip
+    part = slice(0, sizes.python)
+    few = noise[part], c1[part], c2[part]
+    slow = timed(lambda: plain(*few, *arguments, np.zeros(sizes.python)))[0]
+    slow *= sizes.samples / sizes.python
     best, other = min(ours), min(theirs)
     topic.rows += [
         Row("simulate", best),
@@ -187,8 +179,8 @@ def run(*, quick: bool, folder: Path) -> Topic:
         topic.data.update(chapter=seconds, memory=memory)
     topic.notes += [
         f"[a] Extrapolated from {sizes.python} samples.",
-        f"[b] Extrapolated from {sizes.pade} samples. Constant c1 = c2 = 1, for it has no others; "
-        "delays by Pade approximants, so that the result is another one.",
+        f"[b] Extrapolated from {sizes.pade} samples. Constant c1 = c2 = 1, for it has no "
+        "others; delays by Pade approximants, so that the result is another one.",
         "simulate and the plain loop are timed in turn, after compiling; the best of "
         f"{sizes.passes} runs each.",
     ]

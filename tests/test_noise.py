@@ -105,8 +105,10 @@ def test_band_rms_is_the_integral():
     ("call", "message"),
     [
         (lambda: LaserNoise(-1), "seed must be"),
-        (lambda: LaserNoise(1.5),  # type: ignore[arg-type]
-          "seed must be"),
+        (
+            lambda: LaserNoise(1.5),  # type: ignore[arg-type]
+            "seed must be",
+        ),
         (lambda: LaserNoise(True), "seed must be"),
         (lambda: LaserNoise(1, 0.0), "sample_rate must be positive"),
         (lambda: LaserNoise(1, cutoff=-1.0), "cutoff must be positive"),
