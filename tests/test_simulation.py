@@ -26,6 +26,7 @@ from armlock import (
 )
 from armlock.sensors import COMMON, SignalMapping
 from armlock.simulation import BLOCK, LONG_RUN
+from benchmarks.__main__ import main
 from tests.extended import naive, reference
 
 RATE = 200.0
@@ -405,3 +406,8 @@ def test_progress_is_shown_when_asked(capsys):
     simulate(CommonArm(), noise)
     list(simulate_blocks(CommonArm(), [noise], samples=LONG_RUN))
     assert capsys.readouterr().err == ""
+
+
+def test_the_benchmark_runs(tmp_path):
+    """It returns 1 if results disagree."""
+    assert main(["--quick", "--only", "simulation", "--output", str(tmp_path)]) == 0
