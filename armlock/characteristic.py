@@ -166,6 +166,12 @@ class CharacteristicFunction:
                     f"{name} must not exceed the degree of A ({self.degree}), "
                     f"got degree {b.size - 1}: the equation would be of advanced type"
                 )
+        for name, b, delay in (("b1", self.b1, self.delay1), ("b2", self.b2, self.delay2)):
+            if delay == 0.0 and b.size == self.a.size > 1 and not self.step:
+                raise ValueError(
+                    f"{name} without a delay must be of lower degree than A ({self.degree}), "
+                    f"or its parameter would change the order of the equation"
+                )
 
     @property
     def degree(self) -> int:
@@ -266,20 +272,19 @@ class CharacteristicFunction:
                 return np.asarray(p * np.exp(sigma * self.step * np.arange(p.size)))
             return _taylor_shift(p, sigma)
 
-        b1, b2 = move(self.b1), move(self.b2)
-        # What the two delays leave at the reference joins the undelayed rest.
-        left1 = -self.reference[0] * np.expm1(-sigma * self.delay1) * b1
-        left2 = -self.reference[1] * np.expm1(-sigma * self.delay2) * b2
-        rest = poly.polyadd(move(self.rest), poly.polyadd(left1, left2))
+        # The reference moves along, so that nothing has to cancel in `rest`.
         return CharacteristicFunction(
-            np.asarray(rest),
-            np.exp(-sigma * self.delay1) * b1,
-            np.exp(-sigma * self.delay2) * b2,
+            move(self.rest),
+            np.exp(-sigma * self.delay1) * move(self.b1),
+            np.exp(-sigma * self.delay2) * move(self.b2),
             self.delay1,
             self.delay2,
             step=self.step,
             parameters=self.parameters,
-            reference=self.reference,
+            reference=(
+                self.reference[0] * float(np.exp(sigma * self.delay1)),
+                self.reference[1] * float(np.exp(sigma * self.delay2)),
+            ),
         )
 
     def exchanged(self) -> CharacteristicFunction:
@@ -332,6 +337,15 @@ class CharacteristicFunction:
         return ExponentialSum((p * powers)[None, :], np.array([-delay]), p * powers)
 
 
+def checked_system(system: CharacteristicFunction) -> CharacteristicFunction:
+    """Return the system, or say what was given in its place."""
+    if not isinstance(system, CharacteristicFunction):
+        raise TypeError(
+            f"system must be a CharacteristicFunction, for instance CommonArm(), got {system!r}"
+        )
+    return system
+
+
 def _taylor_shift(p: FloatArray, sigma: float) -> FloatArray:
     """Return the coefficients of p(s + sigma) by repeated synthetic division."""
     shifted = p.copy()
@@ -357,4 +371,4 @@ def _delay(name: str, value: float) -> float:
     return delay
 
 
-__all__ = ["CharacteristicFunction", "ExponentialSum"]
+__all__ = ["CharacteristicFunction", "ExponentialSum", "checked_system"]

@@ -26,6 +26,9 @@ from armlock.validation import BoolArray, ComplexArray, FloatArray, IntArray
 EPSILON = 2.0**-52
 # Rounding errors of one evaluation, in units of EPSILON times the sum of magnitudes.
 ROUNDING = 8.0
+# The same for the crossings of a chart's row: wider, so that what is a boundary point by
+# itself is doubtful there, and counted by itself.
+CAUTION = 8.0 * ROUNDING
 # Share of a certified bound that a step may use up.
 SAFETY = 0.95
 
@@ -47,28 +50,37 @@ def _real_horner(p: FloatArray, omega: float) -> float:
 def _evaluate(
     coefficients: ComplexArray, sums: ComplexArray, phases: FloatArray, omega: float
 ) -> tuple[complex, complex]:
-    """Value and derivative of an exponential sum; `sums` holds the sum over its groups."""
+    """Value and derivative of an exponential sum; `sums` holds the sum over its groups.
+
+    Real and imaginary parts apart, since omega is real: this is the innermost loop.
+    """
     size = sums.size
-    value = 0j
-    slope = 0j
+    value_re, value_im, slope_re, slope_im = 0.0, 0.0, 0.0, 0.0
     for k in range(size - 1, -1, -1):
-        slope = slope * omega + value
-        value = value * omega + sums[k]
+        slope_re = slope_re * omega + value_re
+        slope_im = slope_im * omega + value_im
+        value_re = value_re * omega + sums[k].real
+        value_im = value_im * omega + sums[k].imag
     for g in range(phases.size):
         phase = phases[g]
         if phase == 0.0:
             continue
+        p_re, p_im, dp_re, dp_im = 0.0, 0.0, 0.0, 0.0
+        for k in range(size - 1, -1, -1):
+            dp_re = dp_re * omega + p_re
+            dp_im = dp_im * omega + p_im
+            p_re = p_re * omega + coefficients[g, k].real
+            p_im = p_im * omega + coefficients[g, k].imag
         half = 0.5 * phase * omega
         sine, cosine = np.sin(half), np.cos(half)
-        change = 2.0 * sine * complex(-sine, cosine)
-        p = 0j
-        dp = 0j
-        for k in range(size - 1, -1, -1):
-            dp = dp * omega + p
-            p = p * omega + coefficients[g, k]
-        value += p * change
-        slope += dp * change + p * (1j * phase) * (1.0 + change)
-    return value, slope
+        # exp(j omega phase) - 1, and phase times exp(j omega phase).
+        change_re, change_im = -2.0 * sine * sine, 2.0 * sine * cosine
+        turn_re, turn_im = phase * (1.0 + change_re), phase * change_im
+        value_re += p_re * change_re - p_im * change_im
+        value_im += p_re * change_im + p_im * change_re
+        slope_re += dp_re * change_re - dp_im * change_im - p_re * turn_im - p_im * turn_re
+        slope_im += dp_re * change_im + dp_im * change_re + p_re * turn_re - p_im * turn_im
+    return complex(value_re, value_im), complex(slope_re, slope_im)
 
 
 @njit(cache=True)
@@ -123,7 +135,7 @@ def winding(
             if approach > 0.0:
                 nearest = step if approach >= speed * step else approach / speed
             distance = abs(value + nearest * slope)
-            # Rounding moves the tangent, too: closer than that to the origin nothing is certain.
+            # Rounding moves the tangent, too: closer to the origin nothing is certain.
             apart = 0.5 * _real_horner(bound, omega + step) * step * step
             if apart + _real_horner(noise, omega + step) <= SAFETY * distance:
                 break
@@ -163,9 +175,10 @@ def last_crossing_bound(
     """Frequency past which |A| > |x B1| + |y B2|, so that no root can cross; inf if none.
 
     It is nan where a number overflows. The three arguments hold |A|^2, |B1|^2, |B2|^2 at
-    s = j omega as polynomials in w = omega^2. With G = |A|^2 - |x B1|^2 - |y B2|^2 the inequality is G > 0 and
-    Q = G^2 - 4 |x B1|^2 |y B2|^2 > 0. A shift of w after which every coefficient of Q is
-    positive proves that Q has no root beyond it (Budan), and then G keeps its sign.
+    s = j omega as polynomials in w = omega^2. With G = |A|^2 - |x B1|^2 - |y B2|^2 the
+    inequality is G > 0 and Q = G^2 - 4 |x B1|^2 |y B2|^2 > 0. A shift of w after which every
+    coefficient of Q is positive proves that Q has no root beyond it (Budan), and then G keeps
+    its sign.
     """
     size = square_a.size
     g = square_a - x * x * square_b1 - y * y * square_b2
@@ -361,6 +374,7 @@ def sign_changes(
     sums: ComplexArray,
     omega_end: float,
     is_map: bool,
+    rounding: float = ROUNDING,
 ) -> tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray]:
     """Zeros in [0, omega_end] of the imaginary part of an exponential sum.
 
@@ -378,9 +392,9 @@ def sign_changes(
     groups, size = coefficients.shape
     noise = np.zeros(size + 1)
     for k in range(size):
-        noise[k] += abs(sums[k].imag) * (ROUNDING * EPSILON)
+        noise[k] += abs(sums[k].imag) * (rounding * EPSILON)
         for g in range(groups):
-            noise[k + 1] += abs(coefficients[g, k] * phases[g]) * (ROUNDING * EPSILON)
+            noise[k + 1] += abs(coefficients[g, k] * phases[g]) * (rounding * EPSILON)
     bound = _curvature_bound(coefficients, sums, phases)
 
     zeros = np.empty((64, 4))
@@ -524,7 +538,12 @@ def fill_rows(
         for g in range(phases.size):
             magnitude += np.abs(coefficients[g])
         omegas, jumps, widths, values, slopes = sign_changes(
-            coefficients, phases, fixed_sums - deviation[i] * varying_sums, ends[i], is_map
+            coefficients,
+            phases,
+            fixed_sums - deviation[i] * varying_sums,
+            ends[i],
+            is_map,
+            CAUTION,
         )
         change = np.zeros(x.size + 1, dtype=np.int64)
         total = base[i]
@@ -536,7 +555,7 @@ def fill_rows(
                 continue
             position = values[k] / square
             steepness = (slopes[k] + abs(position) * abs(change_of_square)) / square
-            rounding = ROUNDING * EPSILON * (1.0 + fastest * omega) / square
+            rounding = CAUTION * EPSILON * (1.0 + fastest * omega) / square
             spread = 4.0 * steepness * widths[k] + rounding * _real_horner(magnitude, omega)
             if abs(position - lower[i]) <= spread or abs(position - upper[i]) <= spread:
                 trusted = False

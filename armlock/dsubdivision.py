@@ -15,7 +15,7 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
 from armlock import contour
-from armlock.characteristic import CharacteristicFunction
+from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.validation import FloatArray, positive_number, real_array
 
 _EPSILON = float(np.finfo(float).eps)
@@ -107,6 +107,7 @@ def d_curve(
     >>> bool(abs(a) < 1e-12), round(float(b), 12)
     (True, -1.570796326795)
     """
+    checked_system(system)
     omega = real_array("omega", omega)
     _require_two_parameters(system)
     z = np.exp(1j * omega * system.step) if system.step else 1j * omega

@@ -21,7 +21,7 @@ from armlock import paper, sensors
 from armlock.characteristic import CharacteristicFunction
 from armlock.controllers import Controller, integrating_actuator, table_two
 from armlock.sensors import SignalMapping
-from armlock.validation import ComplexArray, axis, positive_number
+from armlock.validation import ComplexArray, axis, positive_number, real_array, real_array
 
 
 class HayesEquation(CharacteristicFunction):
@@ -150,11 +150,12 @@ class Loop(CharacteristicFunction):
         complex array, of the broadcast shape
         """
         s = np.asarray(s, dtype=np.complex128)
-        c1, c2 = np.asarray(c1), np.asarray(c2)
+        arms = real_array("c1", c1), real_array("c2", c2)
         # Not D / rest - 1, which loses the digits of a small L.
-        arm1 = (1.0 - c1) - c1 * np.expm1(-s * self.tau1)
-        arm2 = (1.0 - c2) - c2 * np.expm1(-s * self.tau2)
-        above = poly.polyval(s, self.b1) * arm1 + poly.polyval(s, self.b2) * arm2
+        above = sum(
+            poly.polyval(s, b) * ((1.0 - c) - c * np.expm1(-s * tau))
+            for b, c, tau in zip((self.b1, self.b2), arms, (self.tau1, self.tau2), strict=True)
+        )
         result: ComplexArray = above / poly.polyval(s, self.rest)
         return result
 

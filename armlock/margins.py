@@ -31,7 +31,8 @@ class Margins:
     Attributes
     ----------
     gain_lower, gain_upper : float
-        The loop stays stable for every gain factor between the two; 0 and inf if unbounded.
+        The loop stays stable for every gain factor between the two; 0 and inf where nothing
+        between factors of 1e-6 and 1e6 bounds it.
     phase : float
         Smallest phase lag in rad at a gain crossover that makes the loop marginal; inf
         without a crossover.
@@ -104,7 +105,6 @@ def _smallest(
     distance: Callable[[FloatArray], FloatArray], grid: FloatArray
 ) -> tuple[float, float]:
     """Minimum over omega > 0 of a function that the grid resolves; and where."""
-    grid = grid[grid > 0.0]
     values = distance(grid)
     inner = (values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:])
     candidates = np.flatnonzero(inner) + 1
@@ -131,7 +131,9 @@ def _grid(loop: Loop, c1: float, c2: float) -> FloatArray:
     minus = below.scaled(2.0).plus(plus.scaled(-1.0))
     for level in (0.9, 0.5, 0.1, 0.01, 0.001):
         grid = resolving_grid((plus, minus, below), _tail_end(loop, c1, c2, level))
-        response = loop.open_loop(1j * grid[1:], c1, c2)
+        # In place of omega = 0, where L may have a pole.
+        grid[0] = 1e-6 * grid[1]
+        response = loop.open_loop(1j * grid, c1, c2)
         away, across = np.abs(1.0 + response).min(), _ratio(response).min()
         if loop.neutral or (away <= 1.0 - level and across <= (1.0 - level) / (1.0 + level)):
             break
@@ -239,23 +241,27 @@ def _gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, floa
     """
     crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
     lower, upper, where = 0.0, np.inf, np.nan
+    limit = _chain_gain(loop, c1, c2) if loop.neutral else np.inf
+    # A real root crosses at s = 0.
+    start, first = loop_numerator(loop, c1, c2).sums[0].real, float(loop.rest[0])
+    at_zero = [-first / start] if start * first < 0.0 else []
     for top in (10.0, 1e3, 1e6):
         factors = np.concatenate((np.geomspace(1e-6, 1.0, 13), np.geomspace(1.0, top, 13)))
+        if np.isfinite(limit):
+            # Just below the limit of the chain, roots cross at ever higher frequency.
+            factors = np.append(factors, limit * np.array([0.99, 1.0 - 1e-4, 1.0 - 1e-6]))
         ends = np.array([float(last_crossing(_scaled(loop, k), c1, c2)) for k in factors])
-        confined = np.isfinite(ends)
-        omega, jump, *_ = contour.sign_changes(*crossing, ends[confined].max(), False)
+        omega, jump, *_ = contour.sign_changes(*crossing, ends[np.isfinite(ends)].max(), False)
         omega = omega[(omega > 0.0) & (jump != 0)]
         value = loop.open_loop(1j * omega, c1, c2).real
-        factor = -1.0 / value[value < 0.0]
-        place = omega[value < 0.0]
+        factor = np.concatenate((at_zero, -1.0 / value[value < 0.0]))
+        place = np.concatenate((np.zeros(len(at_zero)), omega[value < 0.0]))
         lower = max(factor[factor < 1.0], default=0.0)
         if (factor > 1.0).any():
             best = int(np.argmin(np.where(factor > 1.0, factor, np.inf)))
             upper, where = float(factor[best]), float(place[best])
-        if not confined.all():
-            limit = _chain_gain(loop, c1, c2)
-            if limit < upper:
-                upper, where = limit, np.inf
+        if limit < upper:
+            upper, where = limit, np.inf
         if upper <= top:
             break
     return float(lower), float(upper), where
@@ -395,34 +401,49 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
             # |c1| and |c2| along the ray are smaller than these bounds.
             end = float(last_crossing(loop, 1.0 + top * d1, 1.0 + top * d2))
         omega, jump, *_ = contour.sign_changes(*family, end, False)
-        values = np.array([_ray_position(loop, d1, d2, float(w)) for w in omega[jump != 0]])
-        # A boundary at (1, 1) itself is not a crossing beyond it.
-        values = np.sort(values[(values > 1e-15 * scale) & (values <= top)])
-        if values.size:
-            return _confirmed(loop, d1, d2, float(values[0]))
+        # A boundary at (1, 1) itself, at the lower bound, is not a crossing beyond it.
+        eps = _first_on_ray(loop, d1, d2, omega[jump != 0], 1e-15 * scale, top)
+        if np.isfinite(eps):
+            return _confirmed(loop, d1, d2, eps)
     return _confirmed(loop, d1, d2, chain) if np.isfinite(chain) else np.inf
 
 
-def _ray_position(loop: Loop, d1: float, d2: float, omega: float) -> float:
-    """Eps at which j omega is a root, from the exact quotient near a frequency found.
+def _quotient(loop: Loop, d1: float, d2: float, omega: FloatArray) -> ComplexArray:
+    """Evaluate D(1, 1) / (d1 B1 e1 + d2 B2 e2) at j omega, exact where its parts cancel."""
+    s = 1j * omega
+    p1, p2 = d1 * loop.b1, d2 * loop.b2
+    pull = poly.polyval(s, poly.polyadd(p1, p2))
+    pull = pull + poly.polyval(s, p1) * np.expm1(-s * loop.tau1)
+    pull = pull + poly.polyval(s, p2) * np.expm1(-s * loop.tau2)
+    # nan where the direction does not act.
+    pull = np.where(pull == 0.0, np.nan, pull)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(loop(s, 1.0, 1.0) / pull)
 
-    nan where the direction does not act at this frequency.
+
+def _first_on_ray(
+    loop: Loop, d1: float, d2: float, omega: FloatArray, lowest: float, highest: float
+) -> float:
+    """Smallest eps between two bounds at which one of the frequencies found is a root's.
+
+    nan if there is none.
     """
+    eps = _quotient(loop, d1, d2, omega).real
+    within = np.flatnonzero((eps > lowest) & (eps <= highest))
+    if within.size == 0:
+        return np.nan
 
-    def quotient(w: float) -> complex:
-        s = 1j * w
-        p1 = d1 * loop.b1
-        p2 = d2 * loop.b2
-        pull = complex(poly.polyval(s, poly.polyadd(p1, p2)))
-        pull += complex(poly.polyval(s, p1) * np.expm1(-s * loop.tau1))
-        pull += complex(poly.polyval(s, p2) * np.expm1(-s * loop.tau2))
-        return complex(loop(s, 1.0, 1.0)) / pull if pull else complex(np.nan, np.nan)
+    def tilt(w: float) -> float:
+        return float(_quotient(loop, d1, d2, np.array(w)).imag)
 
-    if omega > 0.0:
-        low, high = omega * (1.0 - 1e-7), omega * (1.0 + 1e-7)
-        if quotient(low).imag * quotient(high).imag < 0.0:
-            omega = brentq(lambda w: quotient(w).imag, low, high, xtol=1e-300, rtol=1e-15)
-    return quotient(omega).real
+    polished = []
+    for k in within[np.argsort(eps[within])][:4]:
+        w = float(omega[k])
+        low, high = w * (1.0 - 1e-7), w * (1.0 + 1e-7)
+        if w > 0.0 and tilt(low) * tilt(high) < 0.0:
+            w = brentq(tilt, low, high, xtol=1e-300, rtol=1e-15)
+        polished.append(float(_quotient(loop, d1, d2, np.array(w)).real))
+    return min(polished)
 
 
 def _chain_limit(loop: Loop, d1: float, d2: float) -> float:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 from scipy.interpolate import BarycentricInterpolator
 
-from armlock.characteristic import CharacteristicFunction
+from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.realization import realize
 from armlock.stability import CountError, unstable_roots
 from armlock.validation import ComplexArray, FloatArray, broadcast_pair, real_number
@@ -164,6 +164,9 @@ def _certified(
     """Whether no root lies right of `root`, by more than its error."""
     scale = max(abs(root), 1.0 / max(system.longest_delay, _EPSILON))
     margin = max(1e-11 * scale, 10.0 * error)
+    # Farther left than this the shifted function overflows.
+    if -root.real * system.longest_delay > 600.0:
+        return False
     while margin <= 1e-6 * scale:
         try:
             count = int(unstable_roots(system.shifted(root.real + margin), x, y))
@@ -175,8 +178,33 @@ def _certified(
     return False
 
 
+def _effective(system: CharacteristicFunction, x: float, y: float) -> CharacteristicFunction:
+    """Return the system without the terms whose parameter is zero.
+
+    Far to the left their exponentials overflow, and zero times infinity is no number.
+    """
+    if system.step or (x != 0.0 and y != 0.0):
+        return system
+    x0, y0 = system.reference
+    rest, none = system.rest, np.zeros(1)
+    if x == 0.0:
+        rest = np.asarray(poly.polyadd(rest, x0 * system.b1))
+    if y == 0.0:
+        rest = np.asarray(poly.polyadd(rest, y0 * system.b2))
+    return CharacteristicFunction(
+        rest,
+        system.b1 if x else none,
+        system.b2 if y else none,
+        system.delay1 if x else 0.0,
+        system.delay2 if y else 0.0,
+        parameters=system.parameters,
+        reference=(x0 if x else 0.0, y0 if y else 0.0),
+    )
+
+
 def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
     """Find the rightmost root at one point, or raise `RootError`."""
+    system = _effective(system, x, y)
     best = complex(np.nan, np.nan)
     for degree in _DEGREES:
         starts = pseudospectral_roots(system, x, y, degree)
@@ -232,7 +260,7 @@ def rightmost_root(
     >>> print(f"{root:.10f}")
     -0.3181315052+1.3372357014j
     """
-    name1, name2 = system.parameters
+    name1, name2 = checked_system(system).parameters
     xs, ys = broadcast_pair(name1, x, name2, y)
     if xs.ndim == 0:
         return _rightmost(system, real_number(name1, xs[()]), real_number(name2, ys[()]))

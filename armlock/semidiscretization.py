@@ -17,7 +17,7 @@ from numpy.polynomial import polynomial as poly
 from scipy.linalg import expm
 from scipy.signal import ss2tf
 
-from armlock.characteristic import CharacteristicFunction
+from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.realization import Realization, realize
 from armlock.validation import FloatArray, broadcast_pair, positive_number, real_number
 
@@ -117,7 +117,7 @@ def transition_matrix(
     0.904837
     """
     step, order = _checked(system, step, order)
-    name1, name2 = system.parameters
+    name1, name2 = checked_system(system).parameters
     form = realize(system, real_number(name1, x), real_number(name2, y))
     flow, columns = _sampled(form, step, order)
     states = form.state.shape[0]
@@ -177,7 +177,7 @@ def spectral_radius(
     >>> print(round(float(spectral_radius(HayesEquation(), -1, -1, step=0.1, order=1)), 12))
     0.941189374167
     """
-    name1, name2 = system.parameters
+    name1, name2 = checked_system(system).parameters
     xs, ys = broadcast_pair(name1, x, name2, y)
     _checked(system, step, order)
     radii = [

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
 from armlock import contour
-from armlock.characteristic import CharacteristicFunction
+from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.validation import (
     BoolArray,
     ComplexArray,
@@ -136,7 +136,7 @@ def last_crossing(
         In rad/s: past it |A| > |x B1| + |y B2|, also for all smaller |x| and |y|. inf where a
         neutral loop's high-frequency chain of roots is not confined to the left half-plane.
     """
-    name1, name2 = system.parameters
+    name1, name2 = checked_system(system).parameters
     xs, ys = broadcast_pair(name1, x, name2, y)
     compiled = _compiled(system)
     if system.step:
@@ -206,7 +206,7 @@ def unstable_roots(
     >>> unstable_roots(CommonArm(), [0.9, 0.5, 1.0], [1.05, 1.6, 1.0])
     array([ 0,  5, -1])
     """
-    name1, name2 = system.parameters
+    name1, name2 = checked_system(system).parameters
     xs, ys = broadcast_pair(name1, x, name2, y)
     return _count(system, xs.ravel(), ys.ravel()).reshape(xs.shape)
 
@@ -289,7 +289,7 @@ def stability_chart(
     array([[ 0,  0, -1],
            [ 0,  9, 13]])
     """
-    name1, name2 = system.parameters
+    name1, name2 = checked_system(system).parameters
     xs, ys = axis(name1, x), axis(name2, y)
     order_x, order_y = np.argsort(xs, kind="stable"), np.argsort(ys, kind="stable")
     if not system.b1.any():

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from scipy.special import lambertw
 
 from armlock import (
     BOUNDARY,
@@ -163,3 +164,19 @@ def test_newton_from_nearby_ends_at_the_root_and_states_its_error():
     root, error = polish_root(HayesEquation(), 0.0, -1.0, exact + 0.1 - 0.05j)
     assert abs(root - exact) < 1e-14
     assert error < 1e-12
+
+
+class TestTermsWithoutEffect:
+    def test_a_longer_delay_without_effect_does_not_hide_the_root(self):
+        system = CommonArm(1.0, 0.25, 4.0)
+        root = rightmost_root(system, -1.0, 0.0)
+        # s + 2 + exp(-s / 4) = 0 has s = -2 + 4 W(-exp(1/2) / 4), with Lambert's W.
+        expected = -2.0 + 4.0 * lambertw(-np.exp(0.5) / 4.0)
+        assert abs(root - complex(expected.real, abs(expected.imag))) < 1e-12
+
+    @pytest.mark.parametrize("gain", [1.0, 20.0, 1000.0])
+    def test_without_any_delayed_signal_the_loop_has_one_root(self, gain):
+        assert rightmost_root(CommonArm(gain), 0.0, 0.0) == -2.0 * gain
+
+    def test_far_to_the_left_nothing_overflows(self):
+        assert rightmost_root(HayesEquation(), -800.0, 0.0) == -800.0
