@@ -21,7 +21,7 @@ from armlock import paper, sensors
 from armlock.characteristic import CharacteristicFunction
 from armlock.controllers import Controller, integrating_actuator, table_two
 from armlock.sensors import SignalMapping
-from armlock.validation import ComplexArray, axis, positive_number, real_array, real_array
+from armlock.validation import ComplexArray, axis, positive_number, real_array
 
 
 class HayesEquation(CharacteristicFunction):
@@ -152,10 +152,9 @@ class Loop(CharacteristicFunction):
         s = np.asarray(s, dtype=np.complex128)
         arms = real_array("c1", c1), real_array("c2", c2)
         # Not D / rest - 1, which loses the digits of a small L.
-        above = sum(
-            poly.polyval(s, b) * ((1.0 - c) - c * np.expm1(-s * tau))
-            for b, c, tau in zip((self.b1, self.b2), arms, (self.tau1, self.tau2), strict=True)
-        )
+        above: ComplexArray = np.zeros((), dtype=np.complex128)
+        for b, c, tau in zip((self.b1, self.b2), arms, (self.tau1, self.tau2), strict=True):
+            above = above + poly.polyval(s, b) * ((1.0 - c) - c * np.expm1(-s * tau))
         result: ComplexArray = above / poly.polyval(s, self.rest)
         return result
 
