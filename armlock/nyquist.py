@@ -302,7 +302,9 @@ def _radius(loop: Loop, c1: float, c2: float, order: int) -> float:
     return radius
 
 
-def nyquist(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> NyquistCurve:
+def nyquist(
+    loop: Loop, c1: float = 1.0, c2: float = 1.0, *, omega_max: float | None = None
+) -> NyquistCurve:
     """Trace the Nyquist curve and count its encirclements of -1.
 
     Parameters
@@ -311,6 +313,9 @@ def nyquist(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> NyquistCurve:
         The loop.
     c1, c2 : float, optional
         Multiplicative perturbations.
+    omega_max : float, optional
+        Trace at least up to this frequency in rad/s, with samples close enough to draw. The
+        count needs neither.
 
     Returns
     -------
@@ -354,8 +359,16 @@ def nyquist(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> NyquistCurve:
 
     radius = _radius(loop, c1, c2, order)
     end = max(1.05 * end, 10.0 / loop.longest_delay, 10.0 * radius)
+    if omega_max is not None:
+        end = max(end, positive_number("omega_max", omega_max))
     end, far = _rectangle(loop, c1, c2, end)
     grid = resolving_grid((loop.at(c1, c2), loop.rest_on_boundary()), end)
+    if omega_max is not None:
+        turn = 2.0 * np.pi / loop.longest_delay
+        # Finer at first, where L changes most.
+        low, high = np.geomspace(radius, end, 1000), np.arange(0.0, end, turn / 400.0)
+        first = np.arange(0.0, min(4.0 * turn, end), turn / 2000.0)
+        grid = np.unique(np.concatenate((grid, low, first, high)))
     inner = grid[(grid > radius) & (grid < end)]
     up, up_values = _refined(response, 1j * np.concatenate(([radius], inner, [end])))
     _, across = _refined(response, _between(1j * end, 1j * end + far))
@@ -429,7 +442,8 @@ def axis_crossings(
 
     Notes
     -----
-    Zeros of Im L, found with certified steps: none is missed, however close to another.
+    Zeros of Im L at omega > 0, found with certified steps: none is missed, however close to
+    another. Where L(0) is finite the whole curve also meets the axis there.
 
     Examples
     --------

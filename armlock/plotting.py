@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from scipy import ndimage
 
 from armlock.dsubdivision import Branch, Line
+from armlock.nyquist import NyquistCurve
 from armlock.stability import StabilityChart
 
 BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, BLACK = (
@@ -185,6 +186,119 @@ def plot_line(
         linestyle=linestyle,
         label=label,
     )
+
+
+def plot_nyquist(
+    ax: Axes,
+    curve: NyquistCurve,
+    *,
+    unit: float | None = 0.01,
+    outer: float = 1e6,
+    arrows: Sequence[float] = (),
+) -> None:
+    """Draw a Nyquist curve, both signs of omega, with -1 and the infinite branch.
+
+    Parameters
+    ----------
+    ax : Axes
+        Where to draw. In the compressed plane its axes are replaced by circles of |L|.
+    curve : NyquistCurve
+        From `nyquist` with `omega_max`, so that its samples are close.
+    unit : float, optional
+        L is drawn at log10(1 + |L| / unit) from the origin, in its own direction: linear
+        within about `unit`, logarithmic beyond. None keeps the plain complex plane.
+    outer : float, optional
+        Circle of the compressed plane that stands for infinity: the infinite branch runs
+        along it.
+    arrows : sequence of float, optional
+        Frequencies in rad/s at which an arrow points in the direction of rising omega.
+    """
+    forward, omega = curve.response, curve.omega
+    if unit is not None:
+        if curve.indentation.size:
+            # On to the branch, in the direction in which the curve leaves for it.
+            far = outer * forward[:1] / np.abs(forward[:1])
+            forward, omega = np.concatenate((far, forward)), np.concatenate(([0.0], omega))
+        inside = np.abs(forward) <= outer * (1.0 + 1e-9)
+        forward = np.where(inside, forward, outer * forward / np.abs(forward))
+    for values, width, label in (
+        (forward, 1.5, r"$\omega > 0$"),
+        (forward.conj(), 0.7, r"$\omega < 0$"),
+    ):
+        drawn = values if unit is None else _compressed(values, unit)
+        ax.plot(drawn.real, drawn.imag, color=BLUE, linestyle="-", linewidth=width, label=label)
+    for frequency in arrows:
+        index = int(np.searchsorted(omega, frequency))
+        ends = forward[[index, index + 1]]
+        _arrow(ax, ends if unit is None else _compressed(ends, unit), BLUE)
+    if unit is None:
+        ax.axhline(0.0, color="black", linewidth=0.6)
+        ax.axvline(0.0, color="black", linewidth=0.6)
+        ax.plot(-1.0, 0.0, "+", color="black", markersize=10, markeredgewidth=1.8)
+        ax.set(xlabel="Re $L$ [1]", ylabel="Im $L$ [1]")
+        return
+    if curve.indentation.size:
+        half = np.unwrap(np.angle(curve.indentation_response))
+        radius = float(np.log10(1.0 + outer / unit))
+        for angles in (-half[::-1], half):
+            arc = radius * np.exp(1j * angles)
+            ax.plot(
+                arc.real,
+                arc.imag,
+                color=ORANGE,
+                linestyle="--",
+                label=r"infinite branch, $\omega = 0$" if angles is half else "_",
+            )
+            middle = arc.size // 2
+            _arrow(ax, arc[[middle, middle + 1]], ORANGE)
+    _circles(ax, unit, outer)
+
+
+def _compressed(values: npt.NDArray[np.complex128], unit: float) -> npt.NDArray[np.complex128]:
+    """Move values radially, to log10(1 + |value| / unit) from the origin."""
+    size = np.abs(values)
+    # log1p(x) / x tends to one at the origin.
+    share = np.divide(np.log1p(size / unit), size, where=size > 0.0, out=np.ones_like(size))
+    return np.asarray(values * share / np.log(10.0))
+
+
+def _arrow(ax: Axes, ends: npt.NDArray[np.complex128], color: str) -> None:
+    """Draw an arrow head at the second of two points, seen from the first."""
+    start, stop = ((float(z.real), float(z.imag)) for z in ends)
+    arrow = {"arrowstyle": "-|>", "color": color, "mutation_scale": 13, "shrinkB": 0}
+    ax.annotate("", stop, start, arrowprops=arrow)
+
+
+def _circles(ax: Axes, unit: float, outer: float) -> None:
+    """Draw circles of |L|, the two axes and -1 in the compressed plane."""
+    ax.set_axis_off()
+    ax.set_aspect("equal")
+    turn = np.exp(2j * np.pi * np.linspace(0.0, 1.0, 181))
+    decades = np.arange(0, np.log10(outer) + 1e-9, 2.0)
+    for decade in decades:
+        radius = float(np.log10(1.0 + 10.0**decade / unit))
+        last = decade == decades[-1]
+        circle = radius * turn
+        ax.plot(circle.real, circle.imag, "-", color="0.8", linewidth=0.6, zorder=0)
+        text = r"$\infty$" if last else f"$10^{{{decade:.0f}}}$" if decade else "1"
+        place = radius * np.exp(0.25j * np.pi)
+        ax.text(
+            float(place.real),
+            float(place.imag),
+            text,
+            fontsize=8,
+            color="0.35",
+            ha="center",
+            va="center",
+            bbox={"fc": "white", "ec": "none", "pad": 0.8},
+            zorder=6,
+        )
+    reach = 1.06 * radius
+    ax.plot([-reach, reach], [0.0, 0.0], "-", color="0.6", linewidth=0.6, zorder=0)
+    ax.plot([0.0, 0.0], [-reach, reach], "-", color="0.6", linewidth=0.6, zorder=0)
+    ax.set(xlim=(-reach, reach), ylim=(-reach, reach))
+    point = -float(np.log10(1.0 + 1.0 / unit))
+    ax.plot(point, 0.0, "+", color="black", markersize=10, markeredgewidth=1.8, zorder=5)
 
 
 def chart_columns(

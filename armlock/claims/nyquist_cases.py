@@ -49,8 +49,8 @@ class Panel(NamedTuple):
 
 #: The four panels, in the paper's order.
 PANELS = (
-    Panel("a  single arm, c1 = 1", SINGLE, (1.0, 1.0)),
-    Panel("b  single arm, c1 = 1.001", SINGLE, SINGLE_POINT),
+    Panel("a  single arm, $c_1 = 1$", SINGLE, (1.0, 1.0)),
+    Panel("b  single arm, $c_1 = 1.001$", SINGLE, SINGLE_POINT),
     Panel("c  dual arm, (1, 1)", DUAL, (1.0, 1.0)),
     Panel("d  dual arm, (1, 0.995)", DUAL, DUAL_POINT),
 )
@@ -247,9 +247,9 @@ def single_arm_ideal() -> Finding:
         crossings,
         "crossings of the negative real axis",
         "At every multiple of 2π/τ the curve passes through the origin, horizontally, from "
-        f"left to right, and nowhere comes above the real axis (Im L ≤ {max(highest, 0.0):.0e} "
-        "for ω > 0). What it is tangent to is the real axis. 1 + L has no unstable root at any "
-        f"of {FACTORS.size} gains from {FACTORS[0]:g} to {FACTORS[-1]:g} rad/s.",
+        "left to right, and nowhere comes above the real axis for ω > 0. What it is tangent to "
+        f"is the real axis. 1 + L has no unstable root at any of {FACTORS.size} gains from "
+        f"{FACTORS[0]:g} to {FACTORS[-1]:g} rad/s.",
     )
 
 
