@@ -8,6 +8,8 @@ the right of it.
 
 from __future__ import annotations
 
+from typing import overload
+
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
@@ -222,6 +224,16 @@ def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
         f"candidate is {best}",
         best,
     )
+
+
+@overload
+def rightmost_root(system: CharacteristicFunction, x: float, y: float) -> complex: ...
+
+
+@overload
+def rightmost_root(
+    system: CharacteristicFunction, x: npt.ArrayLike, y: npt.ArrayLike
+) -> ComplexArray: ...
 
 
 def rightmost_root(

@@ -121,4 +121,4 @@ def test_coefficients_must_be_real_numbers(bad):
 
 def test_the_shift_must_be_real():
     with pytest.raises(TypeError, match=r"^sigma must be real, got the complex value 1j$"):
-        HayesEquation().shifted(1j)
+        HayesEquation().shifted(1j)  # type: ignore[arg-type]

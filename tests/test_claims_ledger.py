@@ -57,7 +57,7 @@ def test_tables_hold_verdict_number_and_note(calls):
 
 def test_an_identifier_is_taken_once(calls):
     with pytest.raises(ValueError, match=r"^identifier must be new, got 'X1'"):
-        claim("X1", place="", says="", chapter="")(lambda: None)
+        claim("X1", place="", says="", chapter="")(calls)
 
 
 def test_an_unknown_identifier_is_named(calls):
