@@ -88,6 +88,8 @@ book: $(INDEX) ## Run all notebooks and build the book, as HTML that needs no ne
 $(INDEX): $(PACKAGE_READY) $(BOOK_SOURCES) build/book-sources $(if $(FORCE),always)
 	@touch build/book-started
 	@rm -rf build/_build
+	@echo "Checking every claim of the paper: build/claims.txt ..."
+	@$(PY) -m armlock.claims build/_build/html/figures > build/claims.txt
 	ARMLOCK_FIGURES="$(CURDIR)/build/_build/html/figures" \
 		$(VENV)/bin/jupyter-book build . --all --config book/_config.yml --toc book/_toc.yml \
 		--path-output build -W -n --keep-going
@@ -120,6 +122,9 @@ test: $(TESTS_PASSED) ## Run all tests, notebooks included
 $(TESTS_PASSED): $(PACKAGE_READY) $(TEST_SOURCES) build/test-sources $(if $(FORCE),always)
 	@touch build/tests-started
 	@rm -rf build/figures-of-tests
+	@echo "Checking every claim of the paper: build/claims.txt ..."
+	@mkdir -p build
+	@$(PY) -m armlock.claims build/figures-of-tests > build/claims.txt
 	ARMLOCK_FIGURES="$(CURDIR)/build/figures-of-tests" \
 		$(PY) -m pytest --nbmake --numprocesses auto --maxprocesses 4 --dist worksteal
 	@date '+%Y-%m-%d %H:%M:%S' > $@

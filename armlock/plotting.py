@@ -353,7 +353,7 @@ class Downloads:
 
 
 def publish(
-    figure: Figure, name: str, columns: Mapping[str, npt.ArrayLike], *, form: str = "%.10g"
+    figure: Figure, name: str, columns: Mapping[str, npt.ArrayLike], *, form: str = "%.7g"
 ) -> Downloads:
     """Write a figure as PNG and SVG and its data as CSV, and link to them.
 

@@ -15,9 +15,11 @@ import html
 import json
 from collections import Counter
 from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
+from multiprocessing import get_context
 from pathlib import Path
 
 
@@ -215,3 +217,31 @@ def check(*identifiers: str) -> Ledger:
                 f"identifier must be one of {', '.join(_REGISTER)}; got {identifier!r}"
             )
     return Ledger([_REGISTER[identifier] for identifier in identifiers])
+
+
+def _check_chapter(chapter: str) -> dict[str, Finding]:
+    """Check the claims of one chapter, in a process of its own."""
+    import armlock.claims  # noqa: F401, a new process has an empty register
+
+    return {c.identifier: c.check() for c in _REGISTER.values() if c.chapter == chapter}
+
+
+def check_everything() -> Ledger:
+    """Check every registered claim, chapter by chapter on all cores.
+
+    Returns
+    -------
+    Ledger
+        The same as `Ledger(all_claims())`, sooner. Chapters share what their claims need,
+        such as one simulation, and so stay together.
+    """
+    claims = all_claims()
+    # The longest first: simulation and appendix stand at the end of the paper.
+    chapters = list(dict.fromkeys(entry.chapter for entry in reversed(claims)))
+    findings: dict[str, Finding] = {}
+    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+        for found in pool.map(_check_chapter, chapters):
+            findings |= found
+    ledger = Ledger([])
+    ledger.entries = [(entry, findings[entry.identifier]) for entry in claims]
+    return ledger

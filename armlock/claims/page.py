@@ -15,7 +15,14 @@ from importlib import metadata
 from pathlib import Path
 from typing import NamedTuple
 
-from armlock.claims.ledger import Claim, Finding, Ledger, Verdict, all_claims
+from armlock.claims.ledger import (
+    Claim,
+    Finding,
+    Ledger,
+    Verdict,
+    all_claims,
+    check_everything,
+)
 
 #: Section of the paper, by the letter that a claim's identifier starts with.
 SECTIONS = {
@@ -37,14 +44,14 @@ def whole_ledger() -> Ledger:
     Returns
     -------
     Ledger
-        All claims. In a build of the book, where the environment variable ARMLOCK_FIGURES
-        names a folder that starts out empty, the first page to ask checks them and leaves
-        claims.csv and claims.json there; the pages after it read that. Elsewhere each call
-        checks them, which takes a minute or two.
+        All claims. A build of the book checks them before its first page and leaves
+        claims.csv and claims.json in the folder that the environment variable
+        ARMLOCK_FIGURES names; the pages read that. Elsewhere each call checks them, which
+        takes most of a minute.
     """
     claims, folder = all_claims(), os.environ.get("ARMLOCK_FIGURES")
     if not folder:
-        return Ledger(claims)
+        return check_everything()
     file = Path(folder) / "claims.json"
     try:
         records = json.loads(file.read_text("utf-8"))
@@ -52,7 +59,7 @@ def whole_ledger() -> Ledger:
         records = []
     known = {record["claim"]: record for record in records}
     if list(known) != [claim.identifier for claim in claims]:
-        ledger = Ledger(claims)
+        ledger = check_everything()
         ledger.write(Path(folder))
         return ledger
     ledger = Ledger([])
