@@ -84,6 +84,17 @@ def _evaluate(
 
 
 @njit(cache=True)
+def _tangent_distance(value: complex, slope: complex, step: float) -> float:
+    """Smallest distance from zero of the tangent over a step."""
+    speed = slope.real * slope.real + slope.imag * slope.imag
+    approach = -(value.real * slope.real + value.imag * slope.imag)
+    place = 0.0
+    if approach > 0.0:
+        place = step if approach >= speed * step else approach / speed
+    return abs(value + place * slope)
+
+
+@njit(cache=True)
 def _curvature_bound(
     coefficients: ComplexArray, sums: ComplexArray, phases: FloatArray
 ) -> FloatArray:
@@ -128,13 +139,8 @@ def winding(
         return argument, value, False
     while omega < omega_end:
         step = min(4.0 * step, omega_end - omega)
-        speed = slope.real * slope.real + slope.imag * slope.imag
-        approach = -(value.real * slope.real + value.imag * slope.imag)
         while True:
-            nearest = 0.0
-            if approach > 0.0:
-                nearest = step if approach >= speed * step else approach / speed
-            distance = abs(value + nearest * slope)
+            distance = _tangent_distance(value, slope, step)
             # Rounding moves the tangent, too: closer to the origin nothing is certain.
             apart = 0.5 * _real_horner(bound, omega + step) * step * step
             if apart + _real_horner(noise, omega + step) <= SAFETY * distance:
@@ -598,14 +604,8 @@ def resolved_grid(
         value, slope = _evaluate(coefficients, sums, phases, omega)
         step = min(2.0 * step, omega_end - omega)
         smallest = max(1e-13 * omega, 1e-16 * omega_end)
-        speed = slope.real * slope.real + slope.imag * slope.imag
-        approach = -(value.real * slope.real + value.imag * slope.imag)
         while True:
-            # Where on the step the tangent passes closest to zero.
-            place = 0.0
-            if approach > 0.0:
-                place = step if approach >= speed * step else approach / speed
-            nearest = abs(value + place * slope)
+            nearest = _tangent_distance(value, slope, step)
             left = 0.5 * _real_horner(bound, omega + step) * step * step
             if left <= tolerance * nearest or step <= smallest:
                 break
