@@ -90,4 +90,4 @@ def test_publishing_without_a_folder_writes_nothing(ax, tmp_path, monkeypatch):
 def test_the_style_is_a_style_sheet_of_matplotlib():
     with plt.rc_context():
         plotting.use_style()
-        assert plt.rcParams["savefig.dpi"] == 220
+        assert plt.rcParams["savefig.dpi"] == 150
