@@ -219,28 +219,34 @@ def check(*identifiers: str) -> Ledger:
     return Ledger([_REGISTER[identifier] for identifier in identifiers])
 
 
-def _check_chapter(chapter: str) -> dict[str, Finding]:
-    """Check the claims of one chapter, in a process of its own."""
+def _check_together(identifiers: list[str]) -> dict[str, Finding]:
+    """Check some claims in a process of its own."""
     import armlock.claims  # noqa: F401, a new process has an empty register
 
-    return {c.identifier: c.check() for c in _REGISTER.values() if c.chapter == chapter}
+    return {identifier: _REGISTER[identifier].check() for identifier in identifiers}
 
 
-def check_everything() -> Ledger:
-    """Check every registered claim, chapter by chapter on all cores.
+def check_in_parallel(claims: list[Claim]) -> Ledger:
+    """Check claims chapter by chapter, on all cores.
+
+    Parameters
+    ----------
+    claims : list of Claim
+        Of this package; a process of its own knows no others.
 
     Returns
     -------
     Ledger
-        The same as `Ledger(all_claims())`, sooner. Chapters share what their claims need,
+        The same as `Ledger(claims)`, sooner. The claims of a chapter share what they need,
         such as one simulation, and so stay together.
     """
-    claims = all_claims()
+    chapters: dict[str, list[str]] = {}
     # The longest first: simulation and appendix stand at the end of the paper.
-    chapters = list(dict.fromkeys(entry.chapter for entry in reversed(claims)))
+    for entry in reversed(claims):
+        chapters.setdefault(entry.chapter, []).append(entry.identifier)
     findings: dict[str, Finding] = {}
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
-        for found in pool.map(_check_chapter, chapters):
+        for found in pool.map(_check_together, chapters.values()):
             findings |= found
     ledger = Ledger([])
     ledger.entries = [(entry, findings[entry.identifier]) for entry in claims]

@@ -21,7 +21,7 @@ from armlock.claims.ledger import (
     Ledger,
     Verdict,
     all_claims,
-    check_everything,
+    check_in_parallel,
 )
 
 #: Section of the paper, by the letter that a claim's identifier starts with.
@@ -51,7 +51,7 @@ def whole_ledger() -> Ledger:
     """
     claims, folder = all_claims(), os.environ.get("ARMLOCK_FIGURES")
     if not folder:
-        return check_everything()
+        return check_in_parallel(claims)
     file = Path(folder) / "claims.json"
     try:
         records = json.loads(file.read_text("utf-8"))
@@ -59,7 +59,7 @@ def whole_ledger() -> Ledger:
         records = []
     known = {record["claim"]: record for record in records}
     if list(known) != [claim.identifier for claim in claims]:
-        ledger = check_everything()
+        ledger = check_in_parallel(claims)
         ledger.write(Path(folder))
         return ledger
     ledger = Ledger([])
