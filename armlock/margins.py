@@ -233,19 +233,47 @@ def _scaled(loop: Loop, factor: float) -> Loop:
     )
 
 
-def _gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float]:
-    """Gain factors around one between which the loop stays stable, and the upper one's omega.
+def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float]:
+    """Find the gain factors around one between which a stable loop stays stable.
 
+    Parameters
+    ----------
+    loop : Loop
+        The loop.
+    c1, c2 : float
+        Multiplicative perturbations, at which the loop is stable.
+
+    Returns
+    -------
+    lower, upper, omega : float
+        The two factors, 0 and inf if unbounded, and where the upper one is taken, in rad/s.
+
+    Raises
+    ------
+    ValueError
+        If the loop is not stable there.
+
+    Notes
+    -----
     With a factor k, D is rest + k N with N the numerator of L: a root crosses where
     k = -rest / N is real. The highest gain is bounded by the chain of a neutral loop.
+
+    Examples
+    --------
+    >>> from armlock import DualArm
+    >>> from armlock.margins import gain_interval
+    >>> lower, upper, omega = gain_interval(DualArm(), 1.001, 1.002)
+    >>> print(f"{upper:.2f}")
+    29.58
     """
+    _require_stable(loop, c1, c2)
     crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
     lower, upper, where = 0.0, np.inf, np.nan
     limit = _chain_gain(loop, c1, c2) if loop.neutral else np.inf
     # A real root crosses at s = 0.
     start, first = loop_numerator(loop, c1, c2).sums[0].real, float(loop.rest[0])
     at_zero = [-first / start] if start * first < 0.0 else []
-    for top in (10.0, 1e3, 1e6):
+    for top in 10.0 ** np.arange(1.0, 7.0):
         factors = np.concatenate((np.geomspace(1e-6, 1.0, 13), np.geomspace(1.0, top, 13)))
         if np.isfinite(limit):
             # Just below the limit of the chain, roots cross at ever higher frequency.
@@ -328,7 +356,7 @@ def margins(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> Margins:
         _, b1, b2 = loop.highest_coefficients
         if abs(b1 + b2) + abs(c1 * b1) + abs(c2 * b2) >= abs(float(loop.rest[-1])):
             delay = 0.0
-    lower, upper, gain_omega = _gain_interval(loop, c1, c2)
+    lower, upper, gain_omega = gain_interval(loop, c1, c2)
     return Margins(
         lower, upper, phase, delay, modulus, disk, gain_omega, phase_omega, modulus_omega
     )

@@ -12,7 +12,7 @@ from scipy.optimize import minimize_scalar
 from armlock.claims.ledger import Finding, Verdict, claim
 from armlock.controllers import Controller
 from armlock.loops import CommonArm, DualArm, Loop, SingleArm
-from armlock.margins import margins
+from armlock.margins import gain_interval, margins
 from armlock.noise import band_rms
 from armlock.nyquist import AxisCrossings, NyquistCurve, axis_crossings, nyquist
 from armlock.paper import (
@@ -186,8 +186,8 @@ def dual_gain_margins(start: float = 1e-6, stop: float = 1e-2) -> tuple[GainMarg
     number = 1 + round(3 * np.log10(stop / start))
     found = []
     for size in np.geomspace(start, stop, number):
-        result = margins(DUAL, 1.0, 1.0 + float(size))
-        found.append(GainMargin(float(size), result.gain_upper, result.gain_omega))
+        _, upper, omega = gain_interval(DUAL, 1.0, 1.0 + float(size))
+        found.append(GainMargin(float(size), upper, omega))
     return tuple(found)
 
 
@@ -472,7 +472,7 @@ def dual_arm_gain_margin() -> Finding:
     exponent = float(np.polyfit(np.log(size[slow]), np.log(factor[slow]), 1)[0])
     ideal = [nyquist(at_gain(DUAL, k)).closed_loop_roots for k in FACTORS]
     bounded = axis_crossings(DUAL).omega.size > 0 or any(ideal)
-    lowered = margins(DUAL, 1.0 - 1e-3, 1.0).gain_upper
+    lowered = gain_interval(DUAL, 1.0 - 1e-3, 1.0)[1]
     fewest = fewest_roots(DUAL, *DUAL_POINT)
     everywhere = bounded and np.isfinite(lowered) and fewest == 0
     if not falls:
