@@ -160,7 +160,9 @@ class Ledger:
         table, tree = folder / "claims.csv", folder / "claims.json"
         with table.open("w", newline="", encoding="utf-8") as stream:
             writer = csv.DictWriter(stream, fieldnames=list(records[0]))
-            writer.writeheader()
+            # Each number has a unit of its own, in the column beside it.
+            names = {name: name for name in records[0]} | {"value": "value [as quantity says]"}
+            writer.writerow(names)
             writer.writerows(records)
         tree.write_text(json.dumps(records, indent=1, ensure_ascii=False) + "\n", "utf-8")
         return [table, tree]
