@@ -82,7 +82,7 @@ def first_break(
 
 
 @cache
-def over_corners(points: int = 41) -> tuple[FloatArray, dict[str, FloatArray]]:
+def over_corners(points: int = 31) -> tuple[FloatArray, dict[str, FloatArray]]:
     """Follow the controlled loop over two decades of p, for both meanings of dtau.
 
     Returns
