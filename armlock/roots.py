@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from typing import overload
 
+import mpmath
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
@@ -158,6 +159,72 @@ def polish_root(
     rounding = 64.0 * _EPSILON * (1.0 + abs(s) * system.longest_delay) * sum(parts)
     residual = abs(complex(system(s, x, y)))
     return s, float(move) if residual <= rounding else np.inf
+
+
+def extended_root(
+    system: CharacteristicFunction, x: float, y: float, start: complex, *, digits: int = 40
+) -> mpmath.mpc:
+    """Follow Newton's method in extended precision.
+
+    Two roots can agree to most digits of a double; their difference is then all rounding, and
+    not even the same in every run.
+
+    Parameters
+    ----------
+    system : CharacteristicFunction
+        The loop, or a map; its coefficients are taken as exact.
+    x, y : float
+        The free parameters.
+    start : complex
+        The root in double precision, in rad/s, for instance from `rightmost_root`.
+    digits : int, optional
+        Decimal digits to compute with.
+
+    Returns
+    -------
+    mpmath.mpc
+        The root, to about `digits` digits.
+
+    Raises
+    ------
+    RootError
+        If `start` is not close enough to a root for Newton's method to settle.
+
+    Examples
+    --------
+    >>> from armlock import HayesEquation
+    >>> from armlock.roots import extended_root
+    >>> print(extended_root(HayesEquation(), 0.0, -0.2, -0.26, digits=30).real)
+    -0.259171101819073745056651950282
+    """
+    with mpmath.workdps(digits):
+        s = mpmath.mpc(start)
+        for _ in range(60):
+            z, dz = s, mpmath.mpf(1)
+            if system.step:
+                z = mpmath.exp(s * system.step)
+                dz = system.step * z
+            # Both values at once: of the polynomial and of its derivative.
+            value, slope = mpmath.polyval(system.rest.tolist(), z, derivative=True, asc=True)
+            slope *= dz
+            terms = (
+                (system.b1, system.delay1, system.reference[0], x),
+                (system.b2, system.delay2, system.reference[1], y),
+            )
+            for b, delay, origin, here in terms:
+                p, change = mpmath.polyval(b.tolist(), z, derivative=True, asc=True)
+                late = here * mpmath.exp(-s * delay)
+                value += p * (origin - late)
+                slope += change * dz * (origin - late) + p * delay * late
+            if slope == 0:
+                break
+            move = value / slope
+            s -= move
+            if abs(move) <= mpmath.mpf(10) ** (5 - digits) * abs(s):
+                return +s
+    raise RootError(
+        f"start={start} is not close enough to a root of {system!r}", complex(start)
+    )
 
 
 def _certified(

@@ -1,3 +1,4 @@
+import mpmath
 import numpy as np
 import pytest
 from hypothesis import assume, given
@@ -9,11 +10,13 @@ from armlock import (
     CharacteristicFunction,
     CommonArm,
     HayesEquation,
+    RootError,
     SingleArm,
     rightmost_root,
     unstable_roots,
 )
-from armlock.roots import polish_root, pseudospectral_roots
+from armlock.roots import extended_root, polish_root, pseudospectral_roots
+from armlock.semidiscretization import semi_discretization
 from tests import independent
 from tests.systems import RETARDED
 
@@ -180,3 +183,35 @@ class TestTermsWithoutEffect:
 
     def test_far_to_the_left_nothing_overflows(self):
         assert rightmost_root(HayesEquation(), -800.0, 0.0) == -800.0
+
+
+def test_an_extended_root_is_lambert_to_all_its_digits():
+    with mpmath.workdps(60):
+        for branch in (0, 1, 2):
+            exact = mpmath.lambertw(mpmath.mpf(-3.0), branch)
+            found = extended_root(HayesEquation(), 0.0, -3.0, complex(exact), digits=50)
+            assert abs(found - exact) < mpmath.mpf(10) ** -44
+
+
+def test_an_extended_root_does_not_depend_on_the_last_digits_of_its_start():
+    loop = CommonArm()
+    start = rightmost_root(loop, 0.9, 1.05)
+    one, other = (extended_root(loop, 0.9, 1.05, start * (1 + d)) for d in (1e-15, -1e-12))
+    assert float(abs(one - other)) < 1e-33
+
+
+def test_an_extended_root_of_a_map_solves_its_recurrence():
+    step = 0.05
+    held = semi_discretization(CommonArm(), step)
+    root = extended_root(held, 0.9, 1.05, rightmost_root(CommonArm(), 0.9, 1.05))
+    with mpmath.workdps(40):
+        z, g = mpmath.exp(root * mpmath.mpf(step)), mpmath.mpf(1)
+        decay = mpmath.exp(-2 * g * step)
+        driven = (1 - decay) / 2 * (mpmath.mpf(0.9) * z**-402 + mpmath.mpf(1.05) * z**-398)
+        # The coefficients of the map are doubles, those here are not.
+        assert abs(z - decay - driven) < 1e-15
+
+
+def test_a_start_far_from_every_extended_root_is_refused():
+    with pytest.raises(RootError, match="not close enough"):
+        extended_root(HayesEquation(), 0.0, -0.2, -300.0)

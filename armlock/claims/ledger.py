@@ -163,7 +163,8 @@ class Ledger:
             # Each number has a unit of its own, in the column beside it.
             names = {name: name for name in records[0]} | {"value": "value [as quantity says]"}
             writer.writerow(names)
-            writer.writerows(records)
+            # As many digits as in the figures' tables: more would differ between machines.
+            writer.writerows(record | {"value": f"{record['value']:.7g}"} for record in records)
         tree.write_text(json.dumps(records, indent=1, ensure_ascii=False) + "\n", "utf-8")
         return [table, tree]
 
