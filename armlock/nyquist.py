@@ -238,18 +238,22 @@ def resolving_grid(parts: Sequence[ExponentialSum], end: float) -> FloatArray:
     grid = np.unique(
         np.concatenate([contour.resolved_grid(*part, end, _STRAIGHT) for part in parts])
     )
+    added, low, high = [grid], grid[:-1], grid[1:]
     for _ in range(60):
-        wide = np.zeros(grid.size - 1, dtype=np.bool_)
+        wide = np.zeros(low.size, dtype=np.bool_)
         for part in parts:
-            values = part.at(grid)
             # A sum that vanishes at s = 0 has no argument there.
-            turn = np.angle(values[1:] * values[:-1].conj())
-            wide |= np.abs(turn) > _TURN
-        middles = 0.5 * (grid[:-1] + grid[1:])[wide]
-        middles = middles[(middles > grid[:-1][wide]) & (middles < grid[1:][wide])]
-        if middles.size == 0:
+            wide |= np.abs(np.angle(part.at(high) * part.at(low).conj())) > _TURN
+        low, high = low[wide], high[wide]
+        middle = 0.5 * (low + high)
+        inside = (middle > low) & (middle < high)
+        if not inside.any():
             break
-        grid = np.sort(np.concatenate((grid, middles)))
+        low, middle, high = low[inside], middle[inside], high[inside]
+        added.append(middle)
+        # Only what was halved is looked at again.
+        low, high = np.concatenate((low, middle)), np.concatenate((middle, high))
+    grid = np.sort(np.concatenate(added))
     # Points of different sums that all but coincide tell nothing, and mislead a bracket.
     gaps = np.diff(grid, prepend=grid[0], append=grid[-1])
     close = gaps[1:-1] < 1e-4 * np.maximum(gaps[:-2], gaps[2:])
@@ -305,7 +309,13 @@ def _radius(loop: Loop, c1: float, c2: float, order: int) -> float:
 def nyquist(
     loop: Loop, c1: float = 1.0, c2: float = 1.0, *, omega_max: float | None = None
 ) -> NyquistCurve:
-    """Trace the Nyquist curve and count its encirclements of -1.
+    r"""Trace the Nyquist curve and count its encirclements of -1.
+
+    .. math::
+
+        Z = N + P , \quad N = -\frac{1}{2\pi} \oint \mathrm{d} \arg(1 + L) ,
+
+    with Z zeros and P poles of 1 + L inside the contour, which is passed clockwise.
 
     Parameters
     ----------
@@ -419,7 +429,11 @@ def reach(loop: Loop, c1: float, c2: float, level: float) -> float:
 def axis_crossings(
     loop: Loop, c1: float = 1.0, c2: float = 1.0, *, omega_max: float | None = None
 ) -> AxisCrossings:
-    """Find every crossing of the negative real axis by the Nyquist curve.
+    r"""Find every crossing of the negative real axis by the Nyquist curve.
+
+    .. math::
+
+        \mathrm{Im}\, L(\mathrm{j}\omega) = 0 , \qquad \mathrm{Re}\, L(\mathrm{j}\omega) < 0
 
     Parameters
     ----------

@@ -18,12 +18,14 @@ from scipy.interpolate import BarycentricInterpolator
 
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.realization import realize
-from armlock.stability import CountError, unstable_roots
+from armlock.stability import CountError, last_crossing, unstable_roots
 from armlock.validation import ComplexArray, FloatArray, broadcast_pair, real_number
 
 _EPSILON = float(np.finfo(float).eps)
 # Degrees of the Chebyshev polynomial that are tried, one after the other.
 _DEGREES = (60, 120, 240, 480, 960)
+# Most points of a line from which Newton's method starts.
+_POINTS_ALONG = 200_000
 
 
 class RootError(RuntimeError):
@@ -111,7 +113,11 @@ def pseudospectral_roots(
 def polish_root(
     system: CharacteristicFunction, x: float, y: float, start: complex
 ) -> tuple[complex, float]:
-    """Follow Newton's method on the exact characteristic function.
+    r"""Follow Newton's method on the exact characteristic function.
+
+    .. math::
+
+        s_{i+1} = s_i - \frac{D(s_i; x, y)}{D'(s_i; x, y)}
 
     Parameters
     ----------
@@ -192,10 +198,11 @@ def extended_root(
 
     Examples
     --------
+    >>> from mpmath import nstr
     >>> from armlock import HayesEquation
     >>> from armlock.roots import extended_root
-    >>> print(extended_root(HayesEquation(), 0.0, -0.2, -0.26, digits=30).real)
-    -0.259171101819073745056651950282
+    >>> print(nstr(extended_root(HayesEquation(), 0.0, -0.2, -0.26, digits=40).real, 30))
+    -0.259171101819073764476637135967
     """
     with mpmath.workdps(digits):
         s = mpmath.mpc(start)
@@ -227,12 +234,17 @@ def extended_root(
     )
 
 
+def _resolution(system: CharacteristicFunction, root: complex) -> float:
+    """Shift to the right of a root by which a count can tell it from others, in rad/s."""
+    return 1e-11 * max(abs(root), 1.0 / max(system.longest_delay, _EPSILON))
+
+
 def _certified(
     system: CharacteristicFunction, x: float, y: float, root: complex, error: float
 ) -> bool:
     """Whether no root lies right of `root`, by more than its error."""
-    scale = max(abs(root), 1.0 / max(system.longest_delay, _EPSILON))
-    margin = max(1e-11 * scale, 10.0 * error)
+    scale = 1e11 * _resolution(system, root)
+    margin = max(_resolution(system, root), 10.0 * error)
     # Farther left than this the shifted function overflows.
     if -root.real * system.longest_delay > 600.0:
         return False
@@ -271,20 +283,57 @@ def _effective(system: CharacteristicFunction, x: float, y: float) -> Characteri
     )
 
 
+def _starts_along(
+    system: CharacteristicFunction, x: float, y: float, sigma: float
+) -> ComplexArray:
+    """Roots near the line Re s = sigma, by Newton's method from its points.
+
+    The rightmost come first, and of those that a count cannot tell apart the slowest.
+
+    Roots far up a loop's high-frequency chain lie close to a line, and beyond what a polynomial
+    of affordable degree resolves.
+    """
+    spacing = 0.5 / max(system.longest_delay, _EPSILON)
+    end = min(float(last_crossing(system.shifted(sigma), x, y)), _POINTS_ALONG * spacing)
+    s = sigma + 1j * np.arange(0.0, end + 2.0 * spacing, spacing)
+    with np.errstate(all="ignore"):
+        for _ in range(12):
+            move = system(s, x, y) / system.derivative(s, x, y)
+            s = s - move
+        led = s[(np.abs(move) <= 1e-6 * spacing) & (s.imag >= 0.0)]
+    # A real root is approached from the side.
+    led = np.where(led.imag <= 1e-12 * np.abs(led.real), led.real, led)
+    led = led[np.argsort(led.imag)]
+    # Many points lead to the same root.
+    led = led[np.abs(np.diff(led, prepend=np.inf)) > 1e-3 * spacing]
+    top = led.real.max(initial=-np.inf)
+    behind = np.where(led.real >= top - 1e-11 * np.abs(led), 0.0, top - led.real)
+    return np.asarray(led[np.argsort(behind, kind="stable")], dtype=np.complex128)
+
+
 def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
     """Find the rightmost root at one point, or raise `RootError`."""
     system = _effective(system, x, y)
     best = complex(np.nan, np.nan)
     for degree in _DEGREES:
-        starts = pseudospectral_roots(system, x, y, degree)
-        starts = starts[starts.imag >= 0.0][:12]
-        polished = [polish_root(system, x, y, start) for start in starts]
-        found = [(root, error) for root, error in polished if np.isfinite(error)]
-        if not found:
-            continue
-        best, error = max(found, key=lambda pair: pair[0].real)
-        if _certified(system, x, y, best, error):
-            return complex(best.real, abs(best.imag))
+        eigenvalues = pseudospectral_roots(system, x, y, degree)
+        starts = eigenvalues[eigenvalues.imag >= 0.0][:12]
+        # Another round starts from the line through the best root so far.
+        for _ in range(4):
+            polished = [polish_root(system, x, y, start) for start in starts]
+            found = [(root, error) for root, error in polished if np.isfinite(error)]
+            if not found:
+                break
+            top = max(root.real for root, _ in found)
+            # The roots of a neutral chain differ by less than a count can tell: the slowest.
+            level = [(r, e) for r, e in found if r.real >= top - _resolution(system, r)]
+            root, error = min(level, key=lambda pair: abs(pair[0].imag))
+            if not root.real <= best.real:
+                best = root
+            if _certified(system, x, y, root, error):
+                turns = abs(root.imag) > _EPSILON * abs(root.real)
+                return complex(root.real, abs(root.imag) if turns else 0.0)
+            starts = _starts_along(system, x, y, best.real)[:24]
     name1, name2 = system.parameters
     raise RootError(
         f"no rightmost root could be certified at ({name1}, {name2}) = ({x}, {y}); the best "
@@ -306,7 +355,7 @@ def rightmost_root(
 def rightmost_root(
     system: CharacteristicFunction, x: npt.ArrayLike, y: npt.ArrayLike
 ) -> complex | ComplexArray:
-    """Return the characteristic root with the largest real part.
+    r"""Return the characteristic root with the largest real part.
 
     Parameters
     ----------
@@ -330,7 +379,15 @@ def rightmost_root(
     Notes
     -----
     Two checks: the residual |D(s)| is down to rounding, and the count of roots to the right
-    of Re s is zero, so that the result agrees with `unstable_roots`.
+    of Re s is zero, so that the result agrees with `unstable_roots`. Roots whose real parts
+    differ by less than 1e-11 |s|, which a count does not tell apart, as on the chain of a
+    neutral loop, count as equal; of them the one of lowest frequency is returned.
+
+    For the Hayes equation it is, with the principal branch of Lambert's function,
+
+    .. math::
+
+        s = a + \frac{1}{\tau} W_0 \left( b\, \tau\, e^{-a\tau} \right) .
 
     Examples
     --------

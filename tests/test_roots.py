@@ -9,9 +9,11 @@ from armlock import (
     BOUNDARY,
     CharacteristicFunction,
     CommonArm,
+    DualArm,
     HayesEquation,
     RootError,
     SingleArm,
+    paper_loop,
     rightmost_root,
     unstable_roots,
 )
@@ -215,3 +217,25 @@ def test_an_extended_root_of_a_map_solves_its_recurrence():
 def test_a_start_far_from_every_extended_root_is_refused():
     with pytest.raises(RootError, match="not close enough"):
         extended_root(HayesEquation(), 0.0, -0.2, -300.0)
+
+
+@pytest.mark.parametrize(
+    ("system", "point"),
+    [
+        (DualArm(gain=5000.0), (0.99, 1.0)),
+        (DualArm(gain=5000.0), (1.00005, 1.000051)),
+        (paper_loop(), (1.0 - 1e-6, 1.0)),
+    ],
+)
+def test_roots_far_up_the_chain_are_found_to_the_right_of_slow_ones(system, point):
+    root = rightmost_root(system, *point)
+    assert root.imag == pytest.approx(62.83, abs=0.01)
+    with mpmath.workdps(30):
+        exact = extended_root(system, *point, root, digits=30)
+        assert abs(exact - root) < 1e-13 * abs(root)
+    assert unstable_roots(system.shifted(root.real + 1e-8), *point) == 0
+    assert unstable_roots(system, *point) == 2 * (root.real > 0)
+
+
+def test_a_real_rightmost_root_has_no_imaginary_part():
+    assert rightmost_root(paper_loop(actuator=True), 1.0, 1.0).imag == 0.0
