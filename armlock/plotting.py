@@ -461,7 +461,7 @@ class FrameSlider:
         )
         labels = html.escape("|".join(self.labels))
         return (
-            f'<figure id="{name}" class="frame-slider" data-labels="{labels}" '
+            f'<div id="{name}" class="frame-slider" data-labels="{labels}" '
             f'style="margin: 1rem auto; max-width: 34rem">{pictures}'
             f'<p><label for="{name}-range">{html.escape(self.slider)}: '
             f'<output for="{name}-range">{current}</output></label>'
@@ -477,7 +477,7 @@ class FrameSlider:
             "pictures.forEach((picture, i) => { picture.hidden = i !== k; });"
             'text.textContent = labels[k]; range.setAttribute("aria-valuetext", labels[k]); };'
             'range.addEventListener("input", show); show();'
-            "})();</script></figure>"
+            "})();</script></div>"
         )
 
 

@@ -18,11 +18,13 @@ DRAW = """
 import numpy as np
 from matplotlib import pyplot as plt
 from armlock import HayesEquation, claims, d_curve, plotting
+from myst_nb import glue
 
 omega = np.linspace(0.1, 3.0, 200)
 a, b = d_curve(HayesEquation(tau=1.0), omega)
 fig, ax = plt.subplots()
-ax.plot(a, b);
+ax.plot(a, b)
+glue("points", omega.size, display=False)
 """
 PUBLISH = """
 plotting.publish(fig, "small", {"omega [rad/s]": omega, "a [1/s]": a, "b [1/s]": b})
@@ -36,10 +38,10 @@ entry = ledger._REGISTER["S3"]
 finding = replace(entry.check(), verdict=Verdict.DIFFERS)
 ledger._REGISTER["S3"] = replace(entry, check=lambda: finding)
 """
-FIGURE = {"figure": {"caption": "A curve.", "name": "fig-small"}, "image": {"alt": "A curve"}}
+ALT = "A curve of {points:.0f} points."
 
 
-def build(folder, *, text=TEXT, before_check=""):
+def build(folder, *, text=TEXT, alt=ALT, before_check=""):
     """Build a copy of the book with one notebook; return the exit code, output and pages."""
     (folder / "notebooks").mkdir(parents=True)
     (folder / "book").mkdir()
@@ -51,9 +53,11 @@ def build(folder, *, text=TEXT, before_check=""):
         "format: jb-book\nroot: book/intro\nchapters:\n"
         "  - file: notebooks/small\n  - file: book/bibliography\n"
     )
+    caption = {"caption": "A curve.", "name": "fig-small"}
+    figure = {"mystnb": {"figure": caption, "image": {"alt": alt}}}
     cells = [
         nbformat.v4.new_markdown_cell(text),
-        nbformat.v4.new_code_cell(DRAW, metadata={"mystnb": FIGURE}),
+        nbformat.v4.new_code_cell(DRAW, metadata=figure),
         nbformat.v4.new_code_cell(PUBLISH, metadata={"tags": ["remove-input"]}),
         nbformat.v4.new_code_cell(before_check + "\n" + CHECK),
     ]
@@ -80,6 +84,7 @@ def test_building_twice_gives_the_same_data_and_pages_that_need_no_network(tmp_p
         assert code == 0, output[-3000:]
         tables.append((pages / "figures" / "small.csv").read_bytes())
     assert tables[0] == tables[1]
+    assert 'alt="A curve of 200 points."' in (pages / "notebooks/small.html").read_text()
     assert tables[0].startswith(b"omega [rad/s],a [1/s],b [1/s]\n")
     check = [sys.executable, str(ROOT / "tools" / "check_html.py"), str(pages)]
     assert subprocess.run(check, capture_output=True, timeout=60).returncode == 0
@@ -89,6 +94,7 @@ FAULTS = {
     "a failing cell": ({"before_check": "raise ValueError('on purpose')"}, "on purpose"),
     "a changed verdict": ({"before_check": CHANGED}, "AssertionError"),
     "a broken reference": ({"text": TEXT + " {numref}`fig-missing`"}, "fig-missing"),
+    "an unknown number": ({"alt": "At {nowhere:.1f} Hz"}, "nothing is glued as 'nowhere'"),
     "a broken link to a page": ({"text": TEXT + " {doc}`/book/missing`"}, "missing"),
 }
 

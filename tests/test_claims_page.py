@@ -4,7 +4,7 @@ from html.parser import HTMLParser
 
 import pytest
 
-from armlock.claims import Verdict, check
+from armlock.claims import Verdict, all_claims, check
 from armlock.claims import page as module
 from armlock.claims.assumptions import DIFFERENCES, eta_rms, first_break, over_corners
 from armlock.claims.page import (
@@ -84,6 +84,13 @@ def test_a_source_is_the_function_that_checks(ledger):
 def test_counts_name_only_verdicts_that_occur(ledger):
     assert repr(VerdictCounts(ledger)) == "2 reproduced, 1 not as written"
     assert "differs" not in VerdictCounts(ledger)._repr_html_()
+
+
+def test_what_errata_bear_on_are_other_claims_of_the_ledger():
+    known = {claim.identifier for claim in all_claims()}
+    for erratum, bears_on in module.DEPENDS.items():
+        assert {erratum, *bears_on} <= known
+        assert erratum not in bears_on
 
 
 def test_errata_are_what_is_not_as_printed(ledger):
