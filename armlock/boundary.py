@@ -13,7 +13,13 @@ _HALVINGS = 33
 
 
 def rays(number: int = 180, elongation: float = 5.0) -> FloatArray:
-    """Directions from the origin, denser along x = -y.
+    r"""Directions from the origin, denser along x = -y.
+
+    With angles :math:`\alpha_i = 2\pi i / n` and the elongation e, before normalization
+
+    .. math::
+
+        (\sin\alpha_i + e \cos\alpha_i ,\; \sin\alpha_i - e \cos\alpha_i) .
 
     Parameters
     ----------
@@ -80,11 +86,21 @@ def outline(radius: FloatArray, directions: FloatArray) -> FloatArray:
 
 
 def enclosed_area(closed: FloatArray) -> float:
-    """Area inside a closed polygon of shape (2, n + 1), by the shoelace formula."""
+    r"""Area inside a closed polygon of shape (2, n + 1), by the shoelace formula.
+
+    .. math::
+
+        \frac{1}{2} \left| \sum_{i=0}^{n-1} (x_i\, y_{i+1} - x_{i+1}\, y_i) \right|
+    """
     x, y = closed
     return float(0.5 * abs(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])))
 
 
 def perimeter(closed: FloatArray) -> float:
-    """Length of a closed polygon of shape (2, n + 1)."""
+    r"""Length of a closed polygon of shape (2, n + 1).
+
+    .. math::
+
+        \sum_{i=0}^{n-1} \sqrt{(x_{i+1} - x_i)^2 + (y_{i+1} - y_i)^2}
+    """
     return float(np.hypot(*np.diff(closed, axis=1)).sum())

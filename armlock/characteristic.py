@@ -25,7 +25,17 @@ from armlock.validation import ComplexArray, FloatArray, axis, positive_number, 
 
 
 class ExponentialSum(NamedTuple):
-    """A function sum_g P_g(omega) exp(j omega phase_g) on the stability boundary.
+    r"""A function sum_g P_g(omega) exp(j omega phase_g) on the stability boundary.
+
+    With phase rates :math:`\alpha_g` it is
+
+    .. math::
+
+        f(\omega) &= \sum_g P_g(\omega)\, e^{\mathrm{j}\omega\alpha_g} \\
+        &= \sum_g P_g(\omega)
+        + \sum_g P_g(\omega) \left( e^{\mathrm{j}\omega\alpha_g} - 1 \right) ,
+
+    and the second form is the one that is evaluated.
 
     Attributes
     ----------
@@ -91,7 +101,18 @@ class ExponentialSum(NamedTuple):
 
 
 class CharacteristicFunction:
-    """D(s; x, y) = A - x B1 exp(-s delay1) - y B2 exp(-s delay2).
+    r"""D(s; x, y) = A - x B1 exp(-s delay1) - y B2 exp(-s delay2).
+
+    It is kept as its value R at a reference point, and the deviation from there:
+
+    .. math::
+
+        D(s; x, y) &= A - x\, B_1 e^{-s\theta_1} - y\, B_2 e^{-s\theta_2} \\
+        &= R + B_1 \left( x_0 - x\, e^{-s\theta_1} \right) \\
+        &\quad + B_2 \left( y_0 - y\, e^{-s\theta_2} \right) , \\
+        A &= R + x_0 B_1 + y_0 B_2 ,
+
+    with polynomials A, B1, B2 and R of s, and delays :math:`\theta_1, \theta_2`.
 
     Parameters
     ----------
@@ -239,7 +260,14 @@ class CharacteristicFunction:
         return result
 
     def derivative(self, s: npt.ArrayLike, x: npt.ArrayLike, y: npt.ArrayLike) -> ComplexArray:
-        """Evaluate dD/ds; the three arguments broadcast."""
+        r"""Evaluate dD/ds; the three arguments broadcast.
+
+        .. math::
+
+            \frac{\partial D}{\partial s} &= A'
+            - x \left( B_1' - \theta_1 B_1 \right) e^{-s\theta_1} \\
+            &\quad - y \left( B_2' - \theta_2 B_2 \right) e^{-s\theta_2}
+        """
         s = np.asarray(s, dtype=np.complex128)
         z = np.exp(s * self.step) if self.step else s
         dz = self.step * z if self.step else np.ones_like(s)

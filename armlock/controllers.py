@@ -19,7 +19,13 @@ from armlock.validation import ComplexArray, FloatArray, positive_number, real_n
 
 @dataclass(frozen=True)
 class Controller:
-    """A rational function K(s) = gain prod(s - zeros) / prod(s - poles).
+    r"""A rational function K(s) = gain prod(s - zeros) / prod(s - poles).
+
+    With zeros :math:`z_i`, poles :math:`p_i` and gain :math:`g`
+
+    .. math::
+
+        K(s) = g\, \frac{\prod_i (s - z_i)}{\prod_i (s - p_i)} .
 
     Parameters
     ----------
@@ -140,7 +146,11 @@ def _expanded(roots: tuple[complex, ...]) -> FloatArray:
 
 
 def integrating_actuator(gain: float = 1.0) -> Controller:
-    """Return K(s) = gain / s, the gain and actuator of the paper's Secs. II and III.
+    r"""Return K(s) = gain / s, the gain and actuator of the paper's Secs. II and III.
+
+    .. math::
+
+        K(s) = \frac{g}{s}
 
     Parameters
     ----------
@@ -151,13 +161,27 @@ def integrating_actuator(gain: float = 1.0) -> Controller:
 
 
 def stage_one(gain: float = paper.CONTROLLER_GAIN) -> Controller:
-    """Return G_L, the gain and two high-pass filters of the paper's Stage I (Eq. 11)."""
+    r"""Return G_L, the gain and two high-pass filters of the paper's Stage I (Eq. 11).
+
+    .. math::
+
+        G_L(s) = g \left( \frac{s}{s + p_{11}} \right)^2
+
+    Parameters
+    ----------
+    gain : float, optional
+        The paper's g.
+    """
     corner = paper.TABLE_2_STAGE_1_POLE
     return Controller((0.0, 0.0), (-corner, -corner), positive_number("gain", gain))
 
 
 def stage_two(*, denominator: str = "table") -> Controller:
-    """Return G_c, the phase-lead compensators of the paper's Stage II.
+    r"""Return G_c, the phase-lead compensators of the paper's Stage II.
+
+    .. math::
+
+        G_c(s) = \prod_{k=1}^{4} \frac{s + z_{2k}}{s + p_{2k}}
 
     Parameters
     ----------
@@ -180,7 +204,12 @@ def stage_two(*, denominator: str = "table") -> Controller:
 
 
 def table_two(gain: float = paper.CONTROLLER_GAIN, *, denominator: str = "table") -> Controller:
-    """Return the complete controller of Table II, Stage I times Stage II.
+    r"""Return the complete controller of Table II, Stage I times Stage II.
+
+    .. math::
+
+        C(s) = G_L\, G_c = g\, \frac{s^2}{(s + p_{11})^2}
+        \prod_{k=1}^{4} \frac{s + z_{2k}}{s + p_{2k}}
 
     Parameters
     ----------

@@ -68,7 +68,7 @@ def _require_two_parameters(system: CharacteristicFunction) -> None:
 def d_curve(
     system: CharacteristicFunction, omega: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray]:
-    """Parameters at which s = j omega is a characteristic root.
+    r"""Parameters at which s = j omega is a characteristic root.
 
     Parameters
     ----------
@@ -96,8 +96,37 @@ def d_curve(
 
     Notes
     -----
-    For the common arm this is Eq. (5a) of the paper, for the Hayes equation
-    a = omega cot(omega tau), b = -omega / sin(omega tau).
+    D = 0 is a real linear system of two equations at each frequency,
+
+    .. math::
+
+        \begin{pmatrix} \mathrm{Re}\, \beta_1 & \mathrm{Re}\, \beta_2 \\
+        \mathrm{Im}\, \beta_1 & \mathrm{Im}\, \beta_2 \end{pmatrix}
+        \begin{pmatrix} x \\ y \end{pmatrix} =
+        \begin{pmatrix} \mathrm{Re}\, A \\ \mathrm{Im}\, A \end{pmatrix}
+
+    with A and :math:`\beta_k = B_k e^{-s\theta_k}` taken at s = j omega. It is
+    solved by Cramer's rule:
+
+    .. math::
+
+        x = \frac{\mathrm{Im}(A \bar\beta_2)}{\mathrm{Im}(\beta_1 \bar\beta_2)} , \qquad
+        y = -\frac{\mathrm{Im}(A \bar\beta_1)}{\mathrm{Im}(\beta_1 \bar\beta_2)} .
+
+    For the Hayes equation this is
+
+    .. math::
+
+        a = \omega \cot \omega\tau , \qquad b = -\frac{\omega}{\sin \omega\tau} ,
+
+    and for the common arm Eq. (5a) of the paper,
+
+    .. math::
+
+        c_1 &= \frac{2 \sin \omega\tau_2 + (\omega / g) \cos \omega\tau_2}
+        {\sin \omega (\tau_2 - \tau_1)} , \\
+        c_2 &= -\frac{2 \sin \omega\tau_1 + (\omega / g) \cos \omega\tau_1}
+        {\sin \omega (\tau_2 - \tau_1)} .
 
     Examples
     --------
@@ -124,7 +153,11 @@ def d_curve(
 
 
 def d_curve_line(system: CharacteristicFunction) -> Line:
-    """Straight line on which s = 0 is a characteristic root, in closed form.
+    r"""Straight line on which s = 0 is a characteristic root, in closed form.
+
+    .. math::
+
+        x\, B_1(0) + y\, B_2(0) = A(0)
 
     Parameters
     ----------
@@ -161,7 +194,7 @@ def d_curve_line(system: CharacteristicFunction) -> Line:
 def d_curve_branches(
     system: CharacteristicFunction, omega_max: float, *, points_per_turn: int = 48
 ) -> list[Branch]:
-    """Sample the D-curve for 0 < omega < omega_max, cut at its poles.
+    r"""Sample the D-curve for 0 < omega < omega_max, cut at its poles.
 
     Parameters
     ----------
@@ -184,8 +217,14 @@ def d_curve_branches(
 
     Notes
     -----
-    The poles are the zeros of the determinant of the 2 x 2 system, found with certified
-    steps (`armlock.contour.sign_changes`).
+    The poles are the zeros of the determinant of the 2 x 2 system of `d_curve`,
+
+    .. math::
+
+        \mathrm{Im} \left[ B_1(\mathrm{j}\omega)\, \overline{B_2(\mathrm{j}\omega)}\,
+        e^{-\mathrm{j}\omega (\theta_1 - \theta_2)} \right] = 0 ,
+
+    found with certified steps (`armlock.contour.sign_changes`).
 
     Examples
     --------

@@ -25,9 +25,13 @@ from armlock.validation import ComplexArray, axis, positive_number, real_array
 
 
 class HayesEquation(CharacteristicFunction):
-    """The equation x'(t) = a x(t) + b x(t - tau), with free parameters (a, b).
+    r"""The equation x'(t) = a x(t) + b x(t - tau), with free parameters (a, b).
 
-    Its characteristic function is s - a - b exp(-s tau) (paper, Sec. II, after Eq. 3).
+    Its characteristic function is (paper, Sec. II, after Eq. 3)
+
+    .. math::
+
+        D(s; a, b) = s - a - b\, e^{-s\tau} .
 
     Parameters
     ----------
@@ -56,7 +60,20 @@ class HayesEquation(CharacteristicFunction):
 
 
 class Loop(CharacteristicFunction):
-    """An arm-locking loop, with free parameters (c1, c2).
+    r"""An arm-locking loop, with free parameters (c1, c2).
+
+    Of a controller K and a signal mapping with weights m1 and m2, its open loop and its
+    characteristic function are
+
+    .. math::
+
+        L(s) &= K \left[ m_1 \left( 1 - c_1 e^{-s\tau_1} \right)
+        + m_2 \left( 1 - c_2 e^{-s\tau_2} \right) \right] , \\
+        D(s) &= R \left( 1 + L \right)
+        = A - c_1 B_1 e^{-s\tau_1} - c_2 B_2 e^{-s\tau_2} , \\
+        B_k &= R K m_k , \qquad A = R + B_1 + B_2 ,
+
+    where R, a polynomial, is the common denominator of L.
 
     Parameters
     ----------
@@ -160,14 +177,19 @@ class Loop(CharacteristicFunction):
 
 
 class SingleArm(Loop):
-    """Single-arm locking with an integrating actuator (paper, Secs. II and IV.A).
+    r"""Single-arm locking with an integrating actuator (paper, Secs. II and IV.A).
+
+    .. math::
+
+        L(s) &= \frac{g}{s} \left( 1 - c_1 e^{-s\tau} \right) , \\
+        D(s) &= s + g - g\, c_1 e^{-s\tau} .
 
     The free parameter c1 is the paper's k2 and the gain its k1; c2 has no effect.
 
     Parameters
     ----------
     gain : float, optional
-        Loop gain in rad/s.
+        Loop gain g in rad/s.
     tau : float, optional
         Round-trip delay in s.
 
@@ -194,9 +216,13 @@ class SingleArm(Loop):
 
 
 class CommonArm(Loop):
-    """Common-arm locking with an integrating actuator (paper, Eq. 4).
+    r"""Common-arm locking with an integrating actuator (paper, Eq. 4).
 
-    Its characteristic function is s + 2 g - g c1 exp(-s tau1) - g c2 exp(-s tau2).
+    .. math::
+
+        L(s) &= \frac{g}{s}
+        \left( 2 - c_1 e^{-s\tau_1} - c_2 e^{-s\tau_2} \right) , \\
+        D(s) &= s + 2 g - g\, c_1 e^{-s\tau_1} - g\, c_2 e^{-s\tau_2} .
 
     Parameters
     ----------
@@ -232,7 +258,13 @@ class CommonArm(Loop):
 
 
 class DualArm(Loop):
-    """Dual-arm locking with an integrating actuator (paper, Sec. III.B).
+    r"""Dual-arm locking with an integrating actuator (paper, Sec. III.B).
+
+    .. math::
+
+        L(s) &= \frac{g}{s} \left[ (1 + E) \left( 1 - c_1 e^{-s\tau_1} \right) \right. \\
+        &\quad + \left. (1 - E) \left( 1 - c_2 e^{-s\tau_2} \right) \right] , \\
+        E(s) &= \frac{p}{(s + p)\, s\, \Delta\tau} .
 
     Parameters
     ----------
@@ -254,9 +286,14 @@ class DualArm(Loop):
     Notes
     -----
     With the actuator's pole at s = 0 the sensor's integral makes L of order 1/s^2 there, and
-    D(0) = g p (c2 - c1). On the line c1 = c2 one of the two poles of L at s = 0 cancels:
-    the root s = 0 that D has there is a hidden mode, not a zero of 1 + L. A count is
-    reported as a boundary point all the same, for the mode does not decay.
+
+    .. math::
+
+        D(0) = g\, p\, (c_2 - c_1) .
+
+    On the line c1 = c2 one of the two poles of L at s = 0 cancels: the root s = 0 that D has
+    there is a hidden mode, not a zero of 1 + L. A count is reported as a boundary point all
+    the same, for the mode does not decay.
 
     Examples
     --------
@@ -288,7 +325,15 @@ def paper_loop(
     actuator: bool = False,
     difference: float | None = None,
 ) -> Loop:
-    """Return the loop of the paper's Sec. IV: the controller of Table II on the dual sensor.
+    r"""Return the loop of the paper's Sec. IV: the controller of Table II on the dual sensor.
+
+    With C the controller, or C / s where the actuator is in the loop, it is
+
+    .. math::
+
+        L(s) &= C \left[ (1 + E) \left( 1 - c_1 e^{-s\tau_1} \right) \right. \\
+        &\quad + \left. (1 - E) \left( 1 - c_2 e^{-s\tau_2} \right) \right] , \\
+        E(s) &= \frac{p}{(s + p)\, s\, \Delta\tau} .
 
     Parameters
     ----------

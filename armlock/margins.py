@@ -26,7 +26,20 @@ from armlock.validation import ComplexArray, FloatArray, axis, real_number
 
 @dataclass(frozen=True)
 class Margins:
-    """Distances of a stable loop from instability.
+    r"""Distances of a stable loop from instability.
+
+    Gain and phase are taken where L is real and negative, and where its magnitude is one:
+
+    .. math::
+
+        \text{gain} &= -1 / L \quad \text{where } \mathrm{Im}\, L = 0 > \mathrm{Re}\, L , \\
+        \text{phase} &= \min_{|L| = 1} |\arg(-L)| , \quad -\pi < \arg \le \pi , \\
+        \text{delay} &= \min_{|L| = 1} \frac{\arg(-L)}{\omega} ,
+        \quad 0 \le \arg < 2\pi , \\
+        \text{modulus} &= \inf_\omega |1 + L| , \\
+        \text{disk} &= 2 \inf_\omega \frac{|1 + L|}{|1 - L|}
+
+    with L at s = j omega.
 
     Attributes
     ----------
@@ -34,8 +47,8 @@ class Margins:
         The loop stays stable for every gain factor between the two; 0 and inf where nothing
         between factors of 1e-6 and 1e6 bounds it.
     phase : float
-        Smallest phase lag in rad at a gain crossover that makes the loop marginal; inf
-        without a crossover.
+        Smallest turn in rad, lag or lead, at a gain crossover that makes the loop marginal;
+        inf without a crossover.
     delay : float
         Smallest additional loop delay in s that makes the loop unstable; inf if none does.
         0 where the loop does not roll off: an arbitrarily small delay then destabilises it
@@ -157,7 +170,13 @@ def _modulus(loop: Loop, c1: float, c2: float, grid: FloatArray) -> tuple[float,
 
 
 def modulus_margin(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> float:
-    """Smallest distance of the Nyquist curve from -1, min over omega of |1 + L|.
+    r"""Smallest distance of the Nyquist curve from -1, min over omega of |1 + L|.
+
+    .. math::
+
+        \inf_{\omega > 0} |1 + L(\mathrm{j}\omega; c_1, c_2)|
+
+    It is one over the peak of the sensitivity.
 
     Parameters
     ----------
@@ -234,7 +253,7 @@ def _scaled(loop: Loop, factor: float) -> Loop:
 
 
 def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float]:
-    """Find the gain factors around one between which a stable loop stays stable.
+    r"""Find the gain factors around one between which a stable loop stays stable.
 
     Parameters
     ----------
@@ -255,8 +274,13 @@ def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float
 
     Notes
     -----
-    With a factor k, D is rest + k N with N the numerator of L: a root crosses where
-    k = -rest / N is real. The highest gain is bounded by the chain of a neutral loop.
+    With a factor k, and L = N / R, a root is at s = j omega where
+
+    .. math::
+
+        R + k N = 0 , \qquad k = -\frac{1}{L} \text{ is real.}
+
+    The highest gain is bounded by the chain of a neutral loop.
 
     Examples
     --------
@@ -363,7 +387,7 @@ def margins(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> Margins:
 
 
 def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
-    """Return the smallest perturbation of (1, 1) in a direction that breaks the loop.
+    r"""Return the smallest perturbation of (1, 1) in a direction that breaks the loop.
 
     Parameters
     ----------
@@ -390,8 +414,14 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
 
     Notes
     -----
-    Along the ray, D = D(1, 1) - eps (d1 B1 + d2 B2), so that eps = Re D(1, 1) / (...) where
-    the quotient is real; these frequencies are found with certified steps.
+    Along the ray D is affine in eps, and a root is at s = j omega where
+
+    .. math::
+
+        \varepsilon = \frac{D(s; 1, 1)}
+        {d_1 B_1 e^{-s\tau_1} + d_2 B_2 e^{-s\tau_2}} \text{ is real.}
+
+    These frequencies are found with certified steps.
 
     Examples
     --------

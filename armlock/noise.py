@@ -28,7 +28,14 @@ _FITTED = 0.96
 
 
 class ShapedNoise:
-    """White noise through a rational filter: the sampled form of one in continuous time.
+    r"""White noise through a rational filter: the sampled form of one in continuous time.
+
+    With zeros :math:`z_i`, poles :math:`p_i` and gain :math:`g` the prescribed density is
+
+    .. math::
+
+        \text{asd}(f) &= |H(2\pi\mathrm{j} f)| , \\
+        H(s) &= g\, \frac{\prod_i (s - z_i)}{\prod_i (s - p_i)} .
 
     Parameters
     ----------
@@ -47,9 +54,13 @@ class ShapedNoise:
 
     Notes
     -----
-    The trapezoidal rule makes the density at f that of the filter at
-    tan(pi f T) / (pi T), see `armlock.sampled.warped`. One draw and many give the same
-    series, bit by bit.
+    With the sampling step T, the trapezoidal rule gives the samples the density
+
+    .. math::
+
+        \text{asd}_T(f) = \text{asd} \left( \frac{\tan \pi f T}{\pi T} \right) ,
+
+    see `armlock.sampled.warped`. One draw and many give the same series, bit by bit.
 
     Examples
     --------
@@ -204,7 +215,14 @@ def sample_count(duration: float, sample_rate: float = 200.0) -> int:
 
 
 def band_rms(low: float, high: float) -> float:
-    """R.m.s. of the perturbations' spectrum, as printed, between two frequencies.
+    r"""R.m.s. of the perturbations' spectrum, as printed, between two frequencies.
+
+    With level and corner :math:`f_0` of the paper's appendix
+
+    .. math::
+
+        \left[ \int_{\text{low}}^{\text{high}} \text{level}^2
+        \left( 1 + \left( \frac{f_0}{f} \right)^4 \right) \mathrm{d}f \right]^{1/2} .
 
     Parameters
     ----------
@@ -214,7 +232,7 @@ def band_rms(low: float, high: float) -> float:
     Returns
     -------
     float
-        Square root of the integral of level^2 (1 + (f0 / f)^4).
+        In closed form.
     """
     low, high = positive_number("low", low), positive_number("high", high)
     if high <= low:
@@ -224,7 +242,11 @@ def band_rms(low: float, high: float) -> float:
 
 
 class LaserNoise(ShapedNoise):
-    """Frequency noise of a free-running laser, of density level / sqrt(f^2 + cutoff^2).
+    r"""Frequency noise of a free-running laser, of density level / sqrt(f^2 + cutoff^2).
+
+    .. math::
+
+        \text{asd}(f) = \frac{\text{level}}{\sqrt{f^2 + \text{cutoff}^2}}
 
     Parameters
     ----------
@@ -341,7 +363,17 @@ def _smoothing() -> FloatArray:
 
 
 class PerturbationNoise(ShapedNoise):
-    """Perturbation of c1 or c2 with the spectrum of the paper's appendix.
+    r"""Perturbation of c1 or c2 with the spectrum of the paper's appendix.
+
+    The density as printed, and the one that is drawn, are
+
+    .. math::
+
+        \text{printed}(f) &= \text{level} \sqrt{1 + \left( \frac{f_0}{f} \right)^4} , \\
+        \text{asd}(f) &= \text{scale} \cdot \text{level}\,
+        \frac{\sqrt{f^4 + f_0^4}}{f^2 + \text{cutoff}^2} ,
+
+    with the level and the corner :math:`f_0` of `armlock.paper`.
 
     Parameters
     ----------
@@ -360,9 +392,18 @@ class PerturbationNoise(ShapedNoise):
 
     Notes
     -----
-    With s = j omega and w0 = 2 pi 2.8 mHz, |s^2 + sqrt(2) w0 s + w0^2|^2 = omega^4 + w0^4.
-    So the density level sqrt(1 + (f0 / f)^4) is that of white noise through
-    (s^2 + sqrt(2) w0 s + w0^2) / (s + w_c)^2, but for the cut-off w_c.
+    The filter is, with :math:`\omega_0 = 2\pi f_0` and :math:`\omega_c = 2\pi\,\text{cutoff}`
+
+    .. math::
+
+        H(s) = \text{scale} \cdot \text{level}\,
+        \frac{s^2 + \sqrt{2}\, \omega_0 s + \omega_0^2}{(s + \omega_c)^2} ,
+
+    because at s = j omega
+
+    .. math::
+
+        \left| s^2 + \sqrt{2}\, \omega_0 s + \omega_0^2 \right|^2 = \omega^4 + \omega_0^4 .
 
     Examples
     --------

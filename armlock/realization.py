@@ -34,7 +34,12 @@ class Realization(NamedTuple):
 
 
 def realize(system: CharacteristicFunction, x: float, y: float) -> Realization:
-    """Return the observer form of `system` at (x, y).
+    r"""Return the observer form of `system` at (x, y).
+
+    .. math::
+
+        \dot z(t) &= F z(t) + \sum_k G_k\, \xi(t - \theta_k) , \\
+        \xi(t) &= z_1(t) + \sum_k d_k\, \xi(t - \theta_k)
 
     Parameters
     ----------

@@ -77,7 +77,13 @@ def floats(values: FloatArray) -> Row:
 
 
 def warped(omega: npt.ArrayLike, sample_rate: float) -> FloatArray:
-    """Frequency at which a continuous system responds as the sampled one does at `omega`.
+    r"""Frequency at which a continuous system responds as the sampled one does at `omega`.
+
+    With the sampling step T it is
+
+    .. math::
+
+        \Omega = \frac{2}{T} \tan \frac{\omega T}{2} .
 
     Parameters
     ----------
@@ -89,7 +95,7 @@ def warped(omega: npt.ArrayLike, sample_rate: float) -> FloatArray:
     Returns
     -------
     float array, shaped like `omega`
-        (2 / T) tan(omega T / 2) in rad/s, with T the sampling step.
+        In rad/s.
     """
     step = 1.0 / positive_number("sample_rate", sample_rate)
     return np.asarray(2.0 / step * np.tan(0.5 * step * np.asarray(omega, dtype=float)))
@@ -197,7 +203,13 @@ def real_system(
     numerators: Sequence[Sequence[float]] = ((1.0,),),
     denominator: Sequence[float] = (1.0,),
 ) -> RealSystem:
-    """Realize gain prod(s - zeros) / prod(s - poles) times numerators over denominator.
+    r"""Realize gain prod(s - zeros) / prod(s - poles) times numerators over denominator.
+
+    From input k to the output that is, with the numerators n_k and the denominator d,
+
+    .. math::
+
+        g\, \frac{\prod_i (s - z_i)}{\prod_i (s - p_i)}\, \frac{n_k(s)}{d(s)} .
 
     Parameters
     ----------
@@ -337,7 +349,20 @@ def _solved(matrix: list[list[Fraction]], right: list[list[Fraction]]) -> list[l
 
 
 def sample(system: RealSystem, sample_rate: float) -> SampledSystem:
-    """Apply the trapezoidal rule.
+    r"""Apply the trapezoidal rule.
+
+    With the step T and
+
+    .. math::
+
+        Q = \left( I - \tfrac{T}{2} A \right)^{-1}
+
+    the result has
+
+    .. math::
+
+        \text{change} &= T A\, Q , & \text{drive} &= T\, Q B , \\
+        \text{output} &= C\, Q , & \text{direct} &= D + \tfrac{T}{2}\, C\, Q B .
 
     Parameters
     ----------

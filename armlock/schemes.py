@@ -25,7 +25,15 @@ def sampled_loop(
     lead: float = 1.0,
     newer: float = 0.0,
 ) -> CharacteristicFunction:
-    """Write a scheme of constant step as a map.
+    r"""Write a scheme of constant step as a map.
+
+    With the weights p = present, l = lead, n = newer, and w_1, w_2 = held,
+
+    .. math::
+
+        l\, \varphi_{i+1} &= p\, \varphi_i + \sum_{k=1}^{2} c_k
+        \left( w_k\, \varphi_{i-r_k} + n\, \varphi_{i-r_k+1} \right) , \\
+        r_k &= \tau_k / h .
 
     Parameters
     ----------
@@ -45,8 +53,7 @@ def sampled_loop(
     Returns
     -------
     CharacteristicFunction
-        Of lead phi_{i+1} = present phi_i + sum_k c_k (held_k phi_{i-r_k} + newer
-        phi_{i-r_k+1}), where r_k = tau_k / h.
+        With free parameters (c1, c2).
     """
     return CharacteristicFunction(
         (-present, lead),

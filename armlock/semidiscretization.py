@@ -74,7 +74,7 @@ def _sampled(
 def transition_matrix(
     system: CharacteristicFunction, x: float, y: float, step: float, order: int = 0
 ) -> FloatArray:
-    """Build the transition matrix of the semi-discretized loop.
+    r"""Build the transition matrix of the semi-discretized loop.
 
     Parameters
     ----------
@@ -102,7 +102,33 @@ def transition_matrix(
 
     Notes
     -----
-    Eq. (8) of the paper in its corrected form; see Insperger and Stepan, ch. 3.
+    In state space the loop is z' = F z + sum_k G_k xi(t - theta_k), where xi is the first
+    state, G_1 contains x and G_2 contains y, and what is not delayed is part of F. With
+    :math:`\theta_k = r_k h`, a step is
+
+    .. math::
+
+        z_{i+1} = e^{F h} z_i
+        + \sum_k \int_0^h e^{F (h - u)}\, G_k\, \hat\xi_k(u)\, \mathrm{d}u
+
+    where the delayed signal is replaced, to order 0 and 1, by
+
+    .. math::
+
+        \hat\xi_k(u) &= \xi_{i-r_k} , \\
+        \hat\xi_k(u) &= \left( 1 - \frac{u}{h} \right) \xi_{i-r_k}
+        + \frac{u}{h}\, \xi_{i-r_k+1} .
+
+    The matrix takes :math:`(z_i, \xi_{i-1}, \ldots, \xi_{i-r})` to the same a step later.
+
+    Of the common arm, order 0 makes Eq. (8) of the paper in its corrected form; see Insperger
+    and Stepan, ch. 3:
+
+    .. math::
+
+        \varphi_{i+1} &= e^{-2 g h} \varphi_i \\
+        &\quad + \frac{1 - e^{-2 g h}}{2}
+        \left( c_1 \varphi_{i-r_1} + c_2 \varphi_{i-r_2} \right)
 
     Examples
     --------
@@ -147,7 +173,13 @@ def spectral_radius(
     step: float,
     order: int = 0,
 ) -> FloatArray:
-    """Spectral radius of the semi-discretized loop, from dense eigenvalues.
+    r"""Spectral radius of the semi-discretized loop, from dense eigenvalues.
+
+    .. math::
+
+        \rho(\Phi) = \max_i |\lambda_i(\Phi)|
+
+    of the transition matrix.
 
     Parameters
     ----------
@@ -190,7 +222,7 @@ def spectral_radius(
 def semi_discretization(
     system: CharacteristicFunction, step: float, order: int = 0
 ) -> CharacteristicFunction:
-    """Characteristic function of the semi-discretized loop, affine like the loop's own.
+    r"""Characteristic function of the semi-discretized loop, affine like the loop's own.
 
     Parameters
     ----------
@@ -212,6 +244,27 @@ def semi_discretization(
     ValueError
         As `transition_matrix`, and if a free parameter stands before an undelayed signal:
         it then enters through exp(F h) and the map is not affine in it.
+
+    Notes
+    -----
+    With F and the G_k of `transition_matrix`, the latter for x = y = 1, the delays
+    :math:`\theta_k = r_k h`, and :math:`z = e^{s h}`
+
+    .. math::
+
+        D &= \det \left( z - e^{F h} \right)
+        - x\, B_1 z^{-r_1} - y\, B_2 z^{-r_2} , \\
+        B_k &= \left[ \mathrm{adj} \left( z - e^{F h} \right)
+        \left( V_k + z\, W_k \right) \right]_1 ,
+
+    where the older and the newer sample enter with the columns
+
+    .. math::
+
+        V_k &= \int_0^h e^{F (h - u)}\, G_k\, \mathrm{d}u - W_k , \\
+        W_k &= \int_0^h e^{F (h - u)}\, G_k\, \frac{u}{h}\, \mathrm{d}u
+
+    to order 1. To order 0 the newer sample does not enter, W_k = 0.
 
     Examples
     --------

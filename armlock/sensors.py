@@ -19,7 +19,14 @@ from armlock.validation import ComplexArray, positive_number, real_number
 
 
 class SignalMapping(NamedTuple):
-    """Weights m1 = numerator1 / denominator and m2 = numerator2 / denominator.
+    r"""Weights m1 = numerator1 / denominator and m2 = numerator2 / denominator.
+
+    The response of the sensor is
+
+    .. math::
+
+        P(s) = m_1 \left( 1 - c_1 e^{-s\tau_1} \right)
+        + m_2 \left( 1 - c_2 e^{-s\tau_2} \right) .
 
     Attributes
     ----------
@@ -75,15 +82,34 @@ class SignalMapping(NamedTuple):
 
 
 #: One arm alone.
+#:
+#: .. math::
+#:
+#:     P_s(s) = 1 - c_1 e^{-s\tau_1}
 SINGLE = SignalMapping((1.0,), (0.0,), (1.0,), "single")
 #: The sum of both arms.
+#:
+#: .. math::
+#:
+#:     P_+(s) = 2 - c_1 e^{-s\tau_1} - c_2 e^{-s\tau_2}
 COMMON = SignalMapping((1.0,), (1.0,), (1.0,), "common")
 #: Arm 2 minus arm 1, so that arm 1 is the longer one where the response is P_- of Table I.
+#:
+#: .. math::
+#:
+#:     P_-(s) = c_1 e^{-s\tau_1} - c_2 e^{-s\tau_2}
 DIFFERENCE = SignalMapping((-1.0,), (1.0,), (1.0,), "difference")
 
 
 def dual(corner: float, difference: float) -> SignalMapping:
-    """Return the dual sensor: common arm, and difference arm integrated below its corner.
+    r"""Return the dual sensor: common arm, and difference arm integrated below its corner.
+
+    .. math::
+
+        P_d(s) &= P_+(s) - E(s)\, P_-(s) \\
+        &= (1 + E) \left( 1 - c_1 e^{-s\tau_1} \right) \\
+        &\quad + (1 - E) \left( 1 - c_2 e^{-s\tau_2} \right) , \\
+        E(s) &= \frac{p}{(s + p)\, s\, \Delta\tau}
 
     Parameters
     ----------
@@ -96,7 +122,7 @@ def dual(corner: float, difference: float) -> SignalMapping:
     Returns
     -------
     SignalMapping
-        m1 = 1 + E, m2 = 1 - E with E(s) = p / ((s + p) s dtau).
+        With the weights m1 = 1 + E and m2 = 1 - E.
 
     Raises
     ------

@@ -96,7 +96,15 @@ class Delay(NamedTuple):
 
 
 def lagrange_delay(name: str, tau: float, sample_rate: float, order: int) -> Delay:
-    """Return the weights of a delay, a single one where it is whole samples.
+    r"""Return the weights of a delay, a single one where it is whole samples.
+
+    Otherwise they are those of Lagrange's polynomial of order m,
+
+    .. math::
+
+        \ell_i = \prod_{j \ne i} \frac{x - j}{i - j} , \qquad i, j = 0, \ldots, m ,
+
+    with x the delay in samples, less `first`.
 
     Parameters
     ----------
@@ -282,7 +290,23 @@ def sampled_open_loop(
     *,
     interpolation: int = INTERPOLATION_ORDER,
 ) -> ComplexArray:
-    """Open loop of what is simulated, in closed form.
+    r"""Open loop of what is simulated, in closed form.
+
+    With the sampling step T, and the weights :math:`\ell_{k,i}` that interpolate delay k from
+    the samples :math:`f_k + i` back, it is
+
+    .. math::
+
+        L_T(\omega) &= K(\mathrm{j}\Omega) \sum_{k=1}^{2} m_k(\mathrm{j}\Omega)
+        \left( 1 - c_k H_k(\omega) \right) , \\
+        \Omega &= \frac{2}{T} \tan \frac{\omega T}{2} , \\
+        H_k(\omega) &= \sum_i \ell_{k,i}\, e^{-\mathrm{j}\omega (f_k + i) T} ,
+
+    where a delay of whole samples has
+
+    .. math::
+
+        H_k(\omega) = e^{-\mathrm{j}\omega\tau_k} .
 
     Parameters
     ----------
@@ -300,7 +324,7 @@ def sampled_open_loop(
     Returns
     -------
     complex array, shaped like `omega`
-        K m_k at the warped frequency, times 1 - c_k exp(-j omega tau_k) at the true one.
+        Controller and sensor at the warped frequency, delays at the true one.
 
     Examples
     --------
@@ -326,7 +350,7 @@ def sampled_open_loop(
 
 
 class Simulation:
-    """A loop that is run block by block, and remembers where it is.
+    r"""A loop that is run block by block, and remembers where it is.
 
     Parameters
     ----------
@@ -359,6 +383,19 @@ class Simulation:
 
     Notes
     -----
+    With :math:`\varphi_0` the noise of the free-running laser, a sample is
+
+    .. math::
+
+        a_k[n] &= c_k[n] \sum_i \ell_{k,i}\, \varphi[n - f_k - i] , \\
+        \varphi[n] &= \frac{\varphi_0[n] - C w[n] + d_1 a_1[n] + d_2 a_2[n]}
+        {1 + d_1 + d_2} , \\
+        w[n+1] &= w[n] + E w[n] + \sum_{k=1}^{2} F_k (\varphi[n] - a_k[n]) .
+
+    The late light a_k is interpolated as for `sampled_open_loop`; w is the state of controller
+    and sensor, sampled by the trapezoidal rule, with change E, drives F_k, output C and direct
+    shares d_k (`armlock.sampled`). So the loop is closed within the sample.
+
     One call and many give the same samples, bit by bit.
 
     Examples
@@ -552,7 +589,16 @@ def simulate(
     limit: float = LIMIT,
     progress: bool | None = None,
 ) -> FloatArray:
-    """Run a loop, and return the frequency noise of the locked laser.
+    r"""Run a loop, and return the frequency noise of the locked laser.
+
+    From the noise :math:`\varphi_0` of the free-running laser it computes the solution of
+
+    .. math::
+
+        \varphi(t) &= \varphi_0(t) - K \left[ m_1 u_1 + m_2 u_2 \right](t) , \\
+        u_k(t) &= \varphi(t) - c_k(t)\, \varphi(t - \tau_k) ,
+
+    sampled as `Simulation` describes it.
 
     Parameters
     ----------

@@ -46,7 +46,22 @@ _FINE = 8
 
 @dataclass(frozen=True)
 class Spectrum:
-    """An estimate of a one-sided amplitude spectral density.
+    r"""An estimate of a one-sided amplitude spectral density.
+
+    The square of the density integrates to the variance,
+
+    .. math::
+
+        \mathrm{var}(x) = \int_0^{f_s / 2} \text{asd}^2(f)\, \mathrm{d}f ,
+
+    and a confidence interval that holds it with probability :math:`1 - \alpha` is
+
+    .. math::
+
+        \text{lower} &= \text{asd} \sqrt{\frac{\nu}{\chi^2_{\nu}(1 - \alpha / 2)}} , \\
+        \text{upper} &= \text{asd} \sqrt{\frac{\nu}{\chi^2_{\nu}(\alpha / 2)}} ,
+
+    with the quantiles of the chi-squared distribution of :math:`\nu` degrees of freedom.
 
     Attributes
     ----------
@@ -82,7 +97,15 @@ class Spectrum:
     bins: IntArray
 
     def expected(self, asd: Callable[[FloatArray], npt.ArrayLike]) -> FloatArray:
-        """Return what the estimator gives on average for a known density.
+        r"""Return what the estimator gives on average for a known density.
+
+        For a band of m bins k, of width :math:`\Delta f`, it is the square root of
+
+        .. math::
+
+            \frac{1}{m} \sum_k \sum_\delta W(\delta)\, \text{asd}^2(|k + \delta|\, \Delta f)
+
+        with the window's power response W at offsets :math:`\delta` in bins, of sum one.
 
         Parameters
         ----------
@@ -191,7 +214,7 @@ class _Level:
 
 
 class SpectrumEstimator:
-    """Estimates a density from samples as they come in.
+    r"""Estimates a density from samples as they come in.
 
     Parameters
     ----------
@@ -200,9 +223,30 @@ class SpectrumEstimator:
 
     Notes
     -----
-    Memory grows with the logarithm of the duration only. Segments overlap by three quarters;
-    the degrees of freedom of a band take the overlap, and the correlation of its bins, into
-    account. Estimates do not depend on how the series is cut into blocks, up to rounding.
+    At a rate :math:`f_s`, from n segments of N samples x each, the estimate in a band of m bins
+    is
+
+    .. math::
+
+        \text{asd}^2 &= \frac{2}{f_s \sum_i w_i^2}\, \frac{1}{n\, m}
+        \sum_{\text{segments}} \sum_{k} |X_k|^2 , \\
+        X_k &= \sum_{i=0}^{N-1} w_i\, (x_i - \bar x)\, e^{-2\pi\mathrm{j}\, i k / N} ,
+
+    with a Kaiser window w; at the lower rates it is corrected for the filters before them.
+
+    Segments overlap by three quarters, H = N / 4 being the way from one to the next. The
+    degrees of freedom of a band take the overlap, and the correlation of its bins, into
+    account:
+
+    .. math::
+
+        \frac{2}{\nu} &= \frac{1}{n\, m} \sum_{|i| < n} \sum_{|k| < m}
+        \left( 1 - \frac{|i|}{n} \right) \left( 1 - \frac{|k|}{m} \right) \rho_{ik} , \\
+        \rho_{ik} &= \left| \sum_l w_l\, w_{l + |i| H}\, e^{-2\pi\mathrm{j}\, l k / N} \right|^2
+        \left( \sum_l w_l^2 \right)^{-2} .
+
+    Memory grows with the logarithm of the duration only. Estimates do not depend on how the
+    series is cut into blocks, up to rounding.
 
     Examples
     --------

@@ -169,7 +169,7 @@ def _count(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -> IntA
 def unstable_roots(
     system: CharacteristicFunction, x: npt.ArrayLike, y: npt.ArrayLike
 ) -> IntArray:
-    """Count the characteristic roots with positive real part.
+    r"""Count the characteristic roots with positive real part.
 
     Parameters
     ----------
@@ -197,8 +197,29 @@ def unstable_roots(
 
     Notes
     -----
-    Argument principle on s = j omega, up to the frequency past which
-    |A| > |x B1| + |y B2|; each step is bounded by the curvature of D over it.
+    By the argument principle. With n the degree of A,
+
+    .. math::
+
+        N = \frac{n}{2} - \frac{1}{\pi}\,
+        \Delta\!\arg_{0 \le \omega < \infty} D(\mathrm{j}\omega; x, y) ,
+
+    which holds for retarded loops, and for neutral ones whose coefficients of the highest
+    power of s satisfy
+
+    .. math::
+
+        |x\, b_1| + |y\, b_2| < |a| .
+
+    For a map of step h the boundary ends at pi / h, and
+
+    .. math::
+
+        N = n - \frac{1}{\pi}\,
+        \Delta\!\arg_{0 \le \omega \le \pi / h} D(\mathrm{j}\omega; x, y) .
+
+    The argument is followed up to the frequency past which |A| > |x B1| + |y B2|; each
+    step is bounded by the curvature of D over it.
 
     Examples
     --------
@@ -256,7 +277,7 @@ class StabilityChart:
 def stability_chart(
     system: CharacteristicFunction, x: npt.ArrayLike, y: npt.ArrayLike
 ) -> StabilityChart:
-    """Count the unstable roots over a grid.
+    r"""Count the unstable roots over a grid.
 
     Parameters
     ----------
@@ -279,7 +300,15 @@ def stability_chart(
 
     Notes
     -----
-    Crossings along each row with their root tendency (D-subdivision). The counts at the two
+    D-subdivision along each row. With y fixed, a root is at s = j omega where
+
+    .. math::
+
+        x = q , \qquad \mathrm{Im}\, q = 0 , \qquad
+        q = \frac{A - y\, B_2\, e^{-s\theta_2}}{B_1\, e^{-s\theta_1}} .
+
+    Past it, towards larger x, a conjugate pair has become unstable if Im q ascends with omega
+    there, and stable if it descends; at omega = 0 one root. The counts at the two
     ends of all rows come from two columns, those of the columns from four single counts.
 
     Examples

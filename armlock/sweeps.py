@@ -129,7 +129,7 @@ def ray_crossings(
     direction: npt.ArrayLike,
     stop: float,
 ) -> Crossings:
-    """Find every crossing of the imaginary axis along a ray.
+    r"""Find every crossing of the imaginary axis along a ray.
 
     Parameters
     ----------
@@ -154,6 +154,13 @@ def ray_crossings(
 
     Notes
     -----
+    With D0 the characteristic function at the start, and (d1, d2) the direction, a root is
+    at s = j omega where
+
+    .. math::
+
+        t = \frac{D_0}{d_1 B_1 e^{-s\theta_1} + d_2 B_2 e^{-s\theta_2}} \text{ is real.}
+
     A root that lies at s = 0 along the whole ray crosses nowhere and is not reported.
 
     Examples
