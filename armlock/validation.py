@@ -13,9 +13,14 @@ ComplexArray = npt.NDArray[np.complex128]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
+# Kinds of dtype that are numbers; a timedelta64 counts as one among NumPy's own classes.
+_REAL = "iuf"
+
 
 def _array(name: str, value: object) -> npt.NDArray[Any]:
     """Return `value` as an array, or say that nested lists differ in length."""
+    if isinstance(value, np.ma.MaskedArray):
+        raise TypeError(f"{name} must be an ordinary array, got a masked array")
     try:
         return np.asarray(value)
     except ValueError:
@@ -27,7 +32,7 @@ def real_number(name: str, value: object) -> float:
     array = _array(name, value)
     if np.iscomplexobj(array):
         raise TypeError(f"{name} must be real, got the complex value {value!r}")
-    if array.ndim != 0 or array.dtype == np.bool_ or not np.issubdtype(array.dtype, np.number):
+    if array.ndim != 0 or array.dtype.kind not in _REAL:
         raise TypeError(f"{name} must be a real number, got {value!r}")
     number = float(array)
     if not math.isfinite(number):
@@ -43,12 +48,33 @@ def positive_number(name: str, value: object) -> float:
     return number
 
 
+def whole_number(name: str, value: object, lowest: int, highest: int | None = None) -> int:
+    """Return a Python or NumPy integer between two bounds, ends included, or raise."""
+    end = "on" if highest is None else f"to {highest}"
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, int | np.integer)
+        or np.asarray(value).dtype.kind == "m"
+        or value < lowest
+        or (highest is not None and value > highest)
+    ):
+        raise ValueError(f"{name} must be an integer from {lowest} {end}, got {value!r}")
+    return int(value)
+
+
+def switch(name: str, value: object) -> bool:
+    """Return True or False, or say what was given in its place."""
+    if not isinstance(value, bool | np.bool_):
+        raise TypeError(f"{name} must be True or False, got {value!r}")
+    return bool(value)
+
+
 def real_array(name: str, value: object) -> FloatArray:
     """Return `value` as a finite float array of any shape, or raise."""
     array = _array(name, value)
     if np.iscomplexobj(array):
         raise TypeError(f"{name} must be real, got complex values (dtype {array.dtype})")
-    if array.dtype == np.bool_ or not np.issubdtype(array.dtype, np.number):
+    if array.dtype.kind not in _REAL:
         raise TypeError(f"{name} must hold real numbers, got dtype {array.dtype}")
     array = array.astype(np.float64)
     finite = np.isfinite(array)

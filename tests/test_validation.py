@@ -17,7 +17,15 @@ from armlock import (
     transition_matrix,
     unstable_roots,
 )
-from armlock.validation import axis, broadcast_pair, positive_number, real_array, real_number
+from armlock.validation import (
+    axis,
+    broadcast_pair,
+    positive_number,
+    real_array,
+    real_number,
+    switch,
+    whole_number,
+)
 
 CONSTRUCTORS = {
     "gain": lambda value: CommonArm(gain=value),
@@ -222,3 +230,35 @@ def test_a_number_too_large_for_a_float_is_refused_by_name():
         CommonArm(gain=10**400)
     with pytest.raises((TypeError, ValueError), match=r"^c1 must"):
         unstable_roots(CommonArm(), 10**400, 1.0)
+
+
+def test_durations_and_masked_arrays_are_not_numbers():
+    with pytest.raises(TypeError, match=r"^x must hold real numbers, got dtype timedelta64"):
+        real_array("x", np.array([1, 2], dtype="m8[s]"))
+    with pytest.raises(TypeError, match=r"^x must be a real number, got np.timedelta64"):
+        real_number("x", np.timedelta64(3, "s"))
+    masked = np.ma.masked_array([1.0, 2.0], mask=[True, False])
+    for check in (real_array, real_number, axis):
+        with pytest.raises(
+            TypeError, match=r"^x must be an ordinary array, got a masked array$"
+        ):
+            check("x", masked)
+
+
+@pytest.mark.parametrize("value", [True, 1.0, 0, 6, "3", None, np.timedelta64(3, "s")])
+def test_whole_numbers_are_python_or_numpy_integers(value):
+    message = rf"^n must be an integer from 1 to 5, got {re.escape(repr(value))}$"
+    with pytest.raises(ValueError, match=message):
+        whole_number("n", value, 1, 5)
+    assert type(whole_number("n", np.uint8(3), 1)) is int
+    with pytest.raises(ValueError, match=r"^n must be an integer from 1 on, got 0$"):
+        whole_number("n", 0, 1)
+
+
+@pytest.mark.parametrize("value", ["no", 1, None, np.array([True])])
+def test_a_switch_is_true_or_false(value):
+    with pytest.raises(
+        TypeError, match=rf"^x must be True or False, got {re.escape(repr(value))}$"
+    ):
+        switch("x", value)
+    assert switch("x", np.True_) is True
