@@ -10,13 +10,13 @@ from armlock.claims import Verdict, check
 from armlock.claims import dual_arm as chapter
 
 DECIDED = {
-    "D1": (Verdict.NOT_AS_WRITTEN, 1.375733, 1e-5),
+    "D1": (Verdict.NOT_AS_WRITTEN, 1.375746, 1e-6),
     "D2": (Verdict.REPRODUCED, 0.0, 0.0),
     "D3": (Verdict.REPRODUCED, -2.0014925, 1e-6),
     "D4": (Verdict.IN_PART, 29.5759064, 1e-6),
     "D5": (Verdict.REPRODUCED, 1.254005934812, 1e-11),
     "D6": (Verdict.IN_PART, 0.5206778, 1e-6),
-    "D7": (Verdict.REPRODUCED, 22204.68, 0.01),
+    "D7": (Verdict.IN_PART, 22204.68, 0.01),
     "D8": (Verdict.IN_PART, 0.0098137, 1e-6),
     "D9": (Verdict.OPEN, 7.249457, 1e-5),
     "D10": (Verdict.NOT_AS_WRITTEN, 2.0, 1e-9),
@@ -77,6 +77,53 @@ def test_infinite_gain_margin_below_and_finite_above():
     assert unstable_roots(DualArm(1e4), 1.001, 1.002) > 0
 
 
+def test_part_of_the_strip_below_the_sum_of_two_is_lost_too():
+    c1, c2 = chapter.SLIVER
+    assert c1 + c2 < 2.0
+    factor = chapter.gain_factors(c1, c2)[1]
+    assert factor == pytest.approx(953.6414, rel=1e-6)
+    counts = [int(unstable_roots(DualArm(10.0 * factor * k), c1, c2)) for k in (0.999, 1.001)]
+    assert counts == [0, 2]
+    assert rightmost_root(DualArm(10.1 * factor), c1, c2).real > 0.0
+    assert chapter.lost_from(c1, c2) == pytest.approx(10.0 * factor, rel=1e-3)
+
+
+@pytest.mark.parametrize("difference", [1e-4, 0.004, 0.016])
+def test_edge_for_infinite_gain(difference):
+    """From a walk along the axis, from the two weights at 10 Hz, and by counts."""
+    end = chapter.limit_end(difference)
+    assert 2.0 - end == pytest.approx(chapter.sensor_weight() * difference, rel=1e-6)
+    for gap, stable in ((1e-3, True), (-1e-3, False)):
+        mean = 0.5 * end - gap * (1.0 - 0.5 * end)
+        point = mean - 0.5 * difference, mean + 0.5 * difference
+        assert (unstable_roots(chapter.high_gain_limit(), *point) == 0) == stable
+        assert np.isinf(chapter.gain_factors(*point)[1]) == stable
+        assert np.isinf(chapter.lost_from(*point)) == stable
+
+
+def test_upper_edge_is_one_piece_at_medium_gains():
+    for gain, omega in ((10.0, 3.7747), (30.0, 30.607), (100.0, 31.251)):
+        pieces, low, high = chapter.upper_edge(gain)
+        assert pieces == 1
+        assert low == pytest.approx(omega, abs=1e-3)
+        assert high == pytest.approx(omega, abs=1e-3)
+
+
+def test_outline_ends_where_the_count_changes():
+    for gain in (10.0, 100.0, 1e5):
+        difference, common, _ = chapter.outline(gain, 21, low=0.88)
+        for shift, stable in ((-1e-9, True), (1e-9, False)):
+            mean = common + shift
+            counts = unstable_roots(DualArm(gain), mean - difference / 2, mean + difference / 2)
+            assert ((counts == 0) == stable).all()
+
+
+def test_perturbations_reach_the_upper_edge_for_a_high_corner_frequency():
+    found = chapter.highest_corner(away=1e-6)
+    assert found < chapter.highest_corner()
+    assert chapter.edges(5000.0, found).corner == pytest.approx(1e-6, rel=1e-3)
+
+
 def test_above_the_highest_corner_the_ideal_loop_is_unstable():
     limit = chapter.highest_corner()
     for corner, stable in ((0.99 * limit, True), (1.01 * limit, False)):
@@ -86,9 +133,9 @@ def test_above_the_highest_corner_the_ideal_loop_is_unstable():
 
 
 def test_strip_is_stable_inside_and_unstable_outside():
-    common, width = chapter.strip(10.0, 31)
+    boundary, middle = chapter.strip(10.0, 31), np.array([[0.0], [0.012]])
+    assert boundary[1, [0, -1]].tolist() == [0.0, 0.0]
     for share, stable in ((0.5, True), (0.999, True), (1.001, False)):
-        counts = unstable_roots(
-            DualArm(), common - 0.5 * share * width, common + 0.5 * share * width
-        )
+        mean, difference = middle + share * (boundary - middle)
+        counts = unstable_roots(DualArm(), mean - 0.5 * difference, mean + 0.5 * difference)
         assert ((counts == 0) == stable).all()

@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
+from armlock.characteristic import CharacteristicFunction
 from armlock.claims.ledger import Finding, Verdict, claim
 from armlock.dsubdivision import d_curve_line
 from armlock.loops import DualArm
@@ -45,6 +46,13 @@ GAINS = np.logspace(-1.0, 5.0, 61)
 #: 99.5 periods. At twice this, 10 Hz, both are whole numbers of periods.
 BEAT = 2.0 * np.pi / DELAY_DIFFERENCE
 RESONANCE = 2.0 * BEAT
+#: Points of the strip on either side of c1 + c2 = 2, and one of the sliver below that line
+#: which a high gain takes as well.
+ABOVE = ((1.0, 1.0 + PERTURBATION), (1.001, 1.002), (1.1, 1.105))
+SLIVER = (0.99198, 1.00798)
+BELOW = ((0.999, 1.0), (0.9, 0.905))
+#: Point at which the printed open loop is compared with the derived one.
+PRINTED_AT = (1.01, 0.98)
 #: Points of both kinds at which every verdict is taken twice.
 POINTS = ((0.95, 0.955), (1.0, 1.005), (1.0, 0.995), (1.0, 1.03), (1.2, 1.21), (1.3, 1.31))
 
@@ -125,6 +133,51 @@ def corner_estimate(
     return omega**2 / (8.0 * gain**2) + detuned
 
 
+def sensor_weight(
+    corner: float = DUAL_SENSOR_CORNER,
+    difference: float = DELAY_DIFFERENCE,
+    periods: int = 2,
+) -> float:
+    """Return -Re E at 5 Hz times `periods`: the sensor weighs the arms 1 + E and 1 - E."""
+    omega = periods * BEAT
+    return float(corner / ((corner**2 + omega**2) * difference))
+
+
+def lost_from(c1: float, c2: float) -> float:
+    """Estimate the gain in rad/s from which a point of the strip is unstable; inf for never.
+
+    The estimate is `corner_estimate` with the weights 1 + E and 1 - E of the two arms, which
+    differ for the sensor's integral; near 5 Hz or at 10 Hz, whichever is the lower.
+    """
+    excess = 0.5 * (c1 + c2) - 1.0
+    gains = [np.inf]
+    for periods in (1, 2):
+        weight = sensor_weight(periods=periods)
+        left = excess + 0.5 * weight * (c2 - c1) - corner_estimate(np.inf, periods)
+        if left > 0.0:
+            gains.append(periods * BEAT / np.sqrt(8.0 * left))
+    return float(min(gains))
+
+
+@cache
+def high_gain_limit() -> CharacteristicFunction:
+    """Return D / g of the dual arm for g to infinity.
+
+    It is neutral. Where it has no root on the axis past some frequency, no gain has, because
+    |2 + j omega / g| is least at infinite gain.
+    """
+    one, two = DualArm(1.0), DualArm(2.0)
+    a = two.a - one.a  # D is affine in the gain, and B1 and B2 are proportional to it
+    return CharacteristicFunction(a, one.b1, one.b2, TAU1, TAU2, parameters=one.parameters)
+
+
+def limit_end(difference: float) -> float:
+    """Return c1 + c2 at the upper edge for an infinite gain, at a given c2 - c1."""
+    low, half = WINDOW[0], 0.5 * difference
+    found = first_crossing(high_gain_limit(), (low - half, low + half), (1.0, 1.0), stop=0.2)
+    return 2.0 * (low + found.position)
+
+
 def width_estimate(common: npt.ArrayLike, share: float = 1.0) -> Any:
     """Estimate c2 - c1 at the far edge, for a high gain and frequencies far below p.
 
@@ -141,49 +194,85 @@ def width_estimate(common: npt.ArrayLike, share: float = 1.0) -> Any:
     return 2.0 * ratio * x * np.sqrt(1.0 - cosine**2) / share
 
 
-@cache
-def outline(gain: float, number: int = 61) -> FloatArray:
-    """Trace the stable strip from its diagonal across the window's lower corner upwards.
+class Outline(NamedTuple):
+    """Far and upper edge of the strip, from the straight edge round to the far edge.
 
-    Returns
-    -------
-    float array, shape (2, number)
-        For evenly spread c2 - c1, from the straight edge to the far edge at the window's
-        lower end: the difference, and the (c1 + c2) / 2 up to which the loop is stable.
+    Attributes
+    ----------
+    difference : float array, shape (n,)
+        c2 - c1, ascending.
+    common : float array, shape (n,)
+        (c1 + c2) / 2 up to which the loop is stable.
+    omega : float array, shape (n,)
+        Frequency in rad/s of the root that crosses there.
     """
+
+    difference: FloatArray
+    common: FloatArray
+    omega: FloatArray
+
+
+@cache
+def outline(gain: float, number: int = 61, low: float = WINDOW[0]) -> Outline:
+    """Trace the strip upwards from c1 + c2 = 2 low, along evenly spread rays c2 - c1."""
     loop = DualArm(gain)
-    low = WINDOW[0]
     # The strip narrows upwards, so that every such ray starts inside and leaves once.
-    widest = edges(gain).width
+    widest = first_crossing(loop, (low, low), (-0.5, 0.5), stop=1.0).position
     difference = widest * (np.arange(number) + 0.5) / number
     ends = [
-        first_crossing(loop, (low - 0.5 * d, low + 0.5 * d), (1.0, 1.0), stop=10.0).position
+        first_crossing(loop, (low - 0.5 * d, low + 0.5 * d), (1.0, 1.0), stop=10.0)
         for d in difference
     ]
-    return np.array([difference, low + np.array(ends)])
+    common = low + np.array([end.position for end in ends])
+    return Outline(difference, common, np.array([end.omega for end in ends]))
+
+
+def upper_edge(gain: float) -> tuple[int, float, float]:
+    """Return of how many pieces the upper edge is, and their least and largest frequency.
+
+    Along one piece of a D-curve the frequency, in rad/s, hardly changes; from one to another
+    it jumps, and from the upper to the slow far edge most of all.
+    """
+    omega = outline(gain, 201).omega
+    jumps = np.flatnonzero(np.abs(np.diff(np.log(omega))) > 0.02)
+    fast = omega[: jumps[-1] + 1]
+    return jumps.size, float(fast.min()), float(fast.max())
 
 
 @cache
-def strip(gain: float, number: int = 121) -> FloatArray:
-    """Trace the far edge over the whole length of the strip.
+def strip(gain: float, number: int = 61) -> FloatArray:
+    """Trace the boundary of the strip but for its straight edge.
 
     Returns
     -------
-    float array, shape (2, number)
-        (c1 + c2) / 2, from the lower to the upper end of the straight edge, and c2 - c1 at the
-        far or end edge, whichever is nearer.
+    float array, shape (2, 3 number)
+        (c1 + c2) / 2 and c2 - c1, from the lower end of the straight edge along the lower,
+        the far and the upper edge to its upper end.
     """
     loop = DualArm(gain)
-    lower = first_crossing(loop, (-0.5, -0.5), (-1.0, -1.0), stop=10.0).position
-    common = np.linspace(-0.5 - lower, 1.0 + edges(gain).corner, number + 2)[1:-1]
-    ends = [first_crossing(loop, (c, c), (-0.5, 0.5), stop=1.0).position for c in common]
-    return np.array([common, ends])
+    lowest = -0.5 - first_crossing(loop, (-0.5, -0.5), (-1.0, -1.0), stop=10.0).position
+    low, high = 0.96 * lowest, WINDOW[0]  # from these lines every ray leaves by an end
+
+    def far(common: float) -> float:
+        return first_crossing(loop, (common, common), (-0.5, 0.5), stop=1.0).position
+
+    def end(start: float, sign: float) -> FloatArray:
+        difference = far(start) * np.linspace(0.0, 1.0 - 1e-6, number)
+        along = [
+            first_crossing(loop, (start - 0.5 * d, start + 0.5 * d), (sign, sign), stop=10.0)
+            for d in difference
+        ]
+        return np.array([[start + sign * ray.position for ray in along], difference])
+
+    middle = np.linspace(low, high, number)
+    between = np.array([middle, [far(common) for common in middle]])
+    return np.concatenate((end(low, -1.0), between, end(high, 1.0)[:, ::-1]), axis=1)
 
 
 @cache
 def window_area(gain: float, number: int = 61) -> float:
     """Area of the part of the stable region in which both parameters are in the window."""
-    difference, top = outline(gain, number)
+    difference, top, _ = outline(gain, number)
     low, high = WINDOW
     # Both c1 = common - d / 2 and c2 = common + d / 2 are to be inside.
     length = np.minimum(top, high - 0.5 * difference) - (low + 0.5 * difference)
@@ -205,12 +294,15 @@ def area_excess() -> tuple[FloatArray, FloatArray]:
 
 
 @cache
-def highest_corner(gain: float = CONTROLLER_GAIN, difference: float | None = None) -> float:
-    """Corner frequency p in rad/s up to which (1, 1) is on the edge of the stable region."""
+def highest_corner(
+    gain: float = CONTROLLER_GAIN, difference: float | None = None, away: float = 0.0
+) -> float:
+    """Corner frequency p in rad/s up to which the upper edge is `away` from (1, 1)."""
 
     def beyond(log_p: float) -> float:
         # A power, so that the root is not hidden by the scale.
-        return float(np.arcsinh(1e6 * edges(gain, float(np.exp(log_p)), difference).corner))
+        corner = edges(gain, float(np.exp(log_p)), difference).corner
+        return float(np.arcsinh(1e6 * (corner - away)))
 
     start = np.log(DUAL_SENSOR_CORNER)
     return float(np.exp(brentq(beyond, start, start + np.log(10.0), xtol=1e-7)))
@@ -260,6 +352,24 @@ def printed_open_loop(
     return first + sign * g * p / (w + p) * arms / (omega**2 * DELAY_DIFFERENCE)
 
 
+def printed_deviation(c1: float, c2: float, **options: Any) -> tuple[float, float]:
+    """Return the printed loop's largest relative deviation, and its frequency in rad/s.
+
+    Searched from 1 mHz to 10 Hz; the options are those of `printed_open_loop`.
+    """
+
+    def off(log_omega: Any) -> Any:
+        omega = np.exp(log_omega)
+        truth = DualArm().open_loop(1j * omega, c1, c2)
+        return np.abs(printed_open_loop(omega, c1, c2, **options) / truth - 1.0)
+
+    grid = np.log(2.0 * np.pi * np.logspace(-3.0, 1.0, 40_001))
+    best = grid[np.argmax(off(grid))]
+    around = best + (grid[1] - grid[0]) * np.array([-1.0, 1.0])
+    found = minimize_scalar(lambda x: -float(off(x)), bounds=tuple(around), method="bounded")
+    return -float(found.fun), float(np.exp(found.x))
+
+
 @cache
 def stable_both_ways() -> tuple[tuple[int, float], ...]:
     """Count and real part of the rightmost root in 1/s at each of `POINTS`."""
@@ -274,14 +384,28 @@ def stable_both_ways() -> tuple[tuple[int, float], ...]:
 def gain_factors(c1: float, c2: float) -> tuple[float, float]:
     """Largest gain factor below one and smallest above it at which a root is on the axis.
 
-    They are the inverses of -L where L is real and negative. All such frequencies are
-    searched that any gain up to 10^5 times `DUAL_ARM_GAIN` needs.
+    They are the inverses of -L where L is real and negative: 0 and inf where there is none.
+    Every frequency is searched at which a root can cross: at any gain if both perturbations
+    together are below 2, and otherwise at gains up to the factor that is returned.
     """
-    end = float(last_crossing(DualArm(1e5 * DUAL_ARM_GAIN), c1, c2))
-    crossings = axis_crossings(DualArm(), c1, c2, omega_max=min(end, 4.0 * RESONANCE))
-    factors = -1.0 / crossings.value
-    lower = max(factors[factors < 1.0], default=0.0)
-    return float(lower), float(min(factors[factors > 1.0], default=np.inf))
+    end = float(last_crossing(high_gain_limit(), c1, c2))
+    if np.isfinite(end):
+        factors = _axis_factors(c1, c2, end)
+        return max(factors[factors < 1.0], default=0.0), min(
+            factors[factors > 1.0], default=np.inf
+        )
+    for largest in 10.0 ** np.arange(1, 7):
+        end = float(last_crossing(DualArm(largest * DUAL_ARM_GAIN), c1, c2))
+        factors = _axis_factors(c1, c2, end)
+        beyond = factors[(factors > 1.0) & (factors <= largest)]
+        if beyond.size:
+            return max(factors[factors < 1.0], default=0.0), float(beyond.min())
+    raise ValueError(f"(c1, c2) must be lost at a factor of at most {largest:g}, got {c1, c2}")
+
+
+def _axis_factors(c1: float, c2: float, end: float) -> FloatArray:
+    """Return every gain factor that puts a root on the axis below a frequency in rad/s."""
+    return np.asarray(-1.0 / axis_crossings(DualArm(), c1, c2, omega_max=end).value)
 
 
 @cache
@@ -314,23 +438,21 @@ def inner_corner(gain: float) -> float:
 )
 def open_loop_as_printed() -> Finding:
     """Evaluate the printed formula, with and without the missing j, against Table I."""
-    omega = 2.0 * np.pi * np.logspace(-3.0, 1.0, 4001)
-    c1, c2 = 1.01, 0.98
-    truth = DualArm().open_loop(1j * omega, c1, c2)
-
-    def off(**options: Any) -> float:
-        return float(np.max(np.abs(printed_open_loop(omega, c1, c2, **options) / truth - 1.0)))
-
-    printed, mended = off(), off(restored=True)
-    turned = off(restored=True, sign=-1.0)
+    point, ideal = PRINTED_AT, (1.0, 1.0)
+    (printed, omega), (at_ideal, _) = printed_deviation(*point), printed_deviation(*ideal)
+    mended, _ = printed_deviation(*point, restored=True)
+    turned, _ = printed_deviation(*point, restored=True, sign=-1.0)
     return Finding(
         Verdict.NOT_AS_WRITTEN if mended < 1e-9 < printed else Verdict.REPRODUCED,
         printed,
-        "largest relative deviation from the loop built from Table I, 1 mHz to 10 Hz",
-        "Three times a j is missing in the second line: in ω + p and in both exponents. With "
-        f"them it is the dual sensor with the low-pass p/(s+p), to {mended:.0e}; the plus sign "
-        "is right, since 1/(jω)² = -1/ω² takes up the minus of Table I (with a minus sign the "
-        f"deviation would be {turned:.2g}). Δτ is the whole difference here, see D10.",
+        f"largest relative deviation from the loop built from Table I at (c1, c2) = {point}, "
+        "1 mHz to 10 Hz",
+        f"It is largest at {omega / (2.0 * np.pi):.3f} Hz; at (1, 1) it reaches "
+        f"{at_ideal:.3f}. Three times a j is missing in the second line: in ω + p and in both "
+        "exponents. With them the formula is the dual sensor with the low-pass p/(s+p), to "
+        f"{mended:.0e}. Its plus sign is right, since 1/(jω)² = -1/ω² takes up the minus of "
+        f"Table I; with a minus sign the deviation would be {turned:.3f}. Δτ is the whole "
+        f"difference of the delays here, p = {DUAL_SENSOR_CORNER:.3f} rad/s our assumption.",
     )
 
 
@@ -403,31 +525,35 @@ def edges_against_gain() -> Finding:
 )
 def finite_gain_margin() -> Finding:
     """Find every crossing of the negative real axis at stable points on both sides of A."""
-    above = {point: gain_factors(*point) for point in ((1.001, 1.002), (1.1, 1.105))}
-    below = {point: gain_factors(*point) for point in ((0.999, 1.0), (0.9, 0.905))}
-    near = gain_factors(1.0, 1.0 + PERTURBATION)[1]
-    finite = all(np.isfinite(upper) for _, upper in above.values())
-    unbounded = all(np.isinf(upper) for _, upper in below.values())
+    above = {point: gain_factors(*point)[1] for point in ABOVE}
+    below = {point: gain_factors(*point)[1] for point in BELOW}
+    finite = all(np.isfinite(factor) for factor in above.values())
+    unbounded = all(np.isinf(factor) for factor in below.values())
     if finite and unbounded:
         verdict = Verdict.IN_PART
     else:
         verdict = Verdict.REPRODUCED if finite else Verdict.DIFFERS
-    first = above[1.001, 1.002][1]
-    beyond = unstable_roots(DualArm(DUAL_ARM_GAIN * first * np.float64(1.001)), 1.001, 1.002)
-    still = unstable_roots(DualArm(1e4 * DUAL_ARM_GAIN), 0.999, 1.0)
+    near, first, far = above.values()
+    beyond = unstable_roots(DualArm(DUAL_ARM_GAIN * first * np.float64(1.001)), *ABOVE[1])
+    still = [int(unstable_roots(high_gain_limit(), *point)) for point in BELOW]
+    sliver = gain_factors(*SLIVER)[1]
     low, high = gain_factors(0.99, 1.0045)
     return Finding(
         verdict,
         first,
-        "gain factor at (1.001, 1.002), from g = 10, at which a root reaches the axis",
-        f"There a crossing at -1/{first:.1f} limits the gain; just beyond it {beyond} roots "
-        f"are unstable. At (1.1, 1.105) the factor is {above[1.1, 1.105][1]:.3g}, at (1, 1 + "
-        f"{PERTURBATION:g}) {near:.3g}. So it is where c1 + c2 > 2. At points with c1 + c2 < 2 "
-        "the curve does not cross the axis between -1 and 0 at all, and the gain margin is "
-        f"infinite: {still} unstable roots at (0.999, 1) with "
-        f"the gain raised 10⁴ times. Nearer the far edge, at (0.99, 1.0045), the loop is "
-        f"conditionally stable: it needs a factor above {low:.2g} and takes "
-        f"{'any' if np.isinf(high) else f'up to {high:.3g}'}.",
+        f"gain factor at (c1, c2) = {ABOVE[1]}, from g = 10, at which a root reaches the axis",
+        f"There the Nyquist curve crosses the negative axis at -1/{first:.1f}, which limits "
+        f"the gain: just beyond it {beyond} roots are unstable. At {ABOVE[2]} the factor is "
+        f"{far:.3g}, at (1, 1 + {PERTURBATION:g}) {near:.3g}. So it is where c1 + c2 > 2, and "
+        f"in a sliver below that line: down to c1 + c2 = 2 - {sensor_weight():.5f} (c2 - c1) "
+        "a root crosses at 10 Hz, where the sensor weighs arm 2 a little more; the point "
+        f"{SLIVER} is lost at a factor of {sliver:.1f}. Below the sliver the curve does not "
+        "cross the axis between -1 and 0 at all, and the gain margin is infinite: at "
+        f"{BELOW[0]} and {BELOW[1]} no crossing at any frequency, and {still[0]} and "
+        f"{still[1]} unstable roots for infinite gain. Near the strip's far edge, at (0.99, "
+        f"1.0045), the loop is conditionally stable: it needs a factor above {low:.2g} and "
+        f"takes {'any' if np.isinf(high) else f'up to {high:.3g}'}. All with p = "
+        f"{DUAL_SENSOR_CORNER:.3f} rad/s, our assumption.",
     )
 
 
@@ -448,17 +574,21 @@ def exact_upper_edge() -> Finding:
     )
     inner, sampled = inner_corner(DUAL_ARM_GAIN), sampled_corner(DUAL_ARM_GAIN)
     off = sampled / inner - 1.0
+    pieces = {gain: upper_edge(gain) for gain in (DUAL_ARM_GAIN, 30.0, 100.0)}
     verified = before == 0 and after == 2
     return Finding(
         Verdict.REPRODUCED if verified and abs(off) > 1e-4 else Verdict.DIFFERS,
         c,
         "c1 = c2 at the upper end of the straight edge, g = 10, exact",
         f"A pair with ω = {exact.corner_omega:.4f} rad/s crosses there: {before} unstable "
-        f"roots 10⁻⁵ below, {after} above. Between the straight and the far edge the upper "
-        "edge consists of many short pieces of the D-curve; all of them are found along rays. "
-        "Semi-discretization with the step of the common-arm figure, h = "
-        f"{STEP:g} s, puts the edge {100 * off:.2g} % further from (1, 1), and at higher gain "
-        "fails (D8).",
+        f"roots 10⁻⁵ below, {after} above. From the straight edge to the far edge, where a "
+        f"slow oscillation is lost, the upper edge is {pieces[DUAL_ARM_GAIN][0]} piece of the "
+        f"D-curve, with ω from {pieces[DUAL_ARM_GAIN][1]:.4f} to "
+        f"{pieces[DUAL_ARM_GAIN][2]:.4f} rad/s; at g = 30 and 100 it is {pieces[30.0][0]} "
+        f"and {pieces[100.0][0]} piece near {pieces[30.0][1]:.2f} and {pieces[100.0][1]:.2f} "
+        f"rad/s. Semi-discretization with the step of the common-arm figure, h = {STEP:g} s, "
+        f"puts the edge {100 * off:.2g} % further from (1, 1), and at g = 100 misses it by a "
+        "large factor (claim D8).",
     )
 
 
@@ -478,6 +608,8 @@ def shrinking_region() -> Finding:
     point = (WINDOW[0] - 0.5 * middle, WINDOW[0] + 0.5 * middle)
     gained = [int(unstable_roots(DualArm(float(g)), *point)) for g in GAINS[[0, -1]]]
     slope = exponent(*area_excess())
+    sliver = 0.5 * (SLIVER[1] - SLIVER[0])
+    end = limit_end(2.0 * sliver)
     shrinks = bool((np.diff(area) < 0.0).all())
     if not shrinks:
         verdict = Verdict.DIFFERS
@@ -490,12 +622,14 @@ def shrinking_region() -> Finding:
         area[-1] / area[0],
         f"stable area within [{WINDOW[0]:g}, {WINDOW[1]:g}]², at g = 10⁵ over that at g = 10",
         f"The area falls from {area[0]:.3g} through {area[1]:.3g} and {area[2]:.3g} (g = 100 "
-        f"and 1000) to {area[3]:.3g}, but not to zero: what lies below c1 + c2 = 2 stays. The "
-        f"excess falls with g to the power {slope:.2f}. The region is not nested: its far edge "
-        f"moves outwards with the gain, from c2 - c1 = {width[0]:.4f} at g = {GAINS[0]:g} to "
-        f"{width[-1]:.4f} (at c1 + c2 = {2 * WINDOW[0]:g}), so that ({point[0]:.4f}, "
-        f"{point[1]:.4f}) has {gained[0]} unstable roots at g = {GAINS[0]:g} and {gained[1]} "
-        f"at g = {GAINS[-1]:g}.",
+        f"and 1000) to {area[3]:.3g}, but not to zero: what lies below c1 + c2 = 2 - "
+        f"{sensor_weight():.5f} (c2 - c1) is stable at every higher gain, up to infinity "
+        f"(at c2 - c1 = {2 * sliver:g} the limit is at c1 + c2 = {end:.7f}, computed for "
+        f"infinite gain). The excess falls with g to the power {slope:.2f}. The region is not "
+        "nested: its far edge, where a slow oscillation is lost, moves outwards with the "
+        f"gain, from c2 - c1 = {width[0]:.4f} at g = {GAINS[0]:g} to {width[-1]:.4f} (at c1 + "
+        f"c2 = {2 * WINDOW[0]:g}), so that ({point[0]:.4f}, {point[1]:.4f}) has {gained[0]} "
+        f"unstable roots at g = {GAINS[0]:g} and {gained[1]} at g = {GAINS[-1]:g}.",
     )
 
 
@@ -508,16 +642,27 @@ def shrinking_region() -> Finding:
 def never_reached() -> Finding:
     """Compare the corner's distance with the largest perturbation, over the gain."""
     at_ten, at_controller = edges(DUAL_ARM_GAIN).corner, edges(CONTROLLER_GAIN).corner
-    limit = gain_at_perturbation()
+    limit, corner = gain_at_perturbation(), highest_corner(away=PERTURBATION)
+    half = highest_corner(difference=0.5 * DELAY_DIFFERENCE, away=PERTURBATION)
     inside = min(at_ten, at_controller) > PERTURBATION
+    reached = float(edges(float(GAINS[-1])).corner) < PERTURBATION
+    if inside:
+        verdict = Verdict.IN_PART if reached else Verdict.REPRODUCED
+    else:
+        verdict = Verdict.DIFFERS
     return Finding(
-        Verdict.REPRODUCED if inside else Verdict.DIFFERS,
+        verdict,
         limit,
-        f"gain in rad/s at which the corner is {PERTURBATION:g} away from (1, 1)",
-        f"The corner is {at_ten:.3g} away at g = 10 and {at_controller:.3g} at the "
-        f"controller's g = {CONTROLLER_GAIN:g}, {at_controller / PERTURBATION:.0f} times "
-        "the largest perturbation of the paper. The distance falls as 1/g²; above the gain "
-        "named here the perturbations do reach it. The straight edge is reached at any gain.",
+        "gain g in rad/s from which the upper edge is within the largest perturbation, "
+        f"{PERTURBATION:g}, of (1, 1)",
+        f"True at the paper's gains with our p = {DUAL_SENSOR_CORNER:.3f} rad/s: along c1 = "
+        f"c2 the upper edge is {at_ten:.3g} away at g = 10 and {at_controller:.3g} at the "
+        f"controller's g = {CONTROLLER_GAIN:g}, {at_controller / PERTURBATION:.0f} times the "
+        f"largest perturbation of the paper. It is not true in general. The distance falls as "
+        f"1/g², and from g = {limit:.3g} rad/s on the perturbations do reach it. And it "
+        f"depends on p, which the paper does not give: at g = {CONTROLLER_GAIN:g} they reach "
+        f"it from p = {corner:.2f} rad/s on ({half:.2f} if Δτ is half the difference of the "
+        "delays). The straight edge, c1 = c2, is reached at any gain.",
     )
 
 
@@ -572,8 +717,8 @@ def unknown_corner_frequency() -> Finding:
         f"straight edge ends at {1 + low.corner:.3f}, {1 + here.corner:.3f}, "
         f"{1 + high.corner:.3f}, and the strip is {low.width:.4f}, {here.width:.4f}, "
         f"{high.width:.4f} wide. The straight line does not depend on p. Whether A is on the "
-        f"edge of the region does, at high gain: above the p named here, {limit / p:.2f} times "
-        f"ours, a pair near 5 Hz is unstable there (closed-form limit {estimate:.2f} "
+        f"edge of the region does, at high gain: above p = {limit:.2f} rad/s, {limit / p:.2f} "
+        f"times ours, a pair near 5 Hz is unstable there (closed-form limit {estimate:.2f} "
         f"rad/s for g → ∞; {beside} unstable roots at (1, 1 + {PERTURBATION:g}) with p = "
         f"{1.5 * limit:.1f} rad/s).",
     )
