@@ -122,7 +122,8 @@ class CharacteristicFunction:
     delay1, delay2 : float
         Delays in s, zero or positive.
     step : float, optional
-        Zero (default) for polynomials in s; the sampling step in s for a map.
+        Zero (default) for polynomials in s; the sampling step in s for a map, which must
+        divide both delays.
     parameters : pair of str, optional
         Names of the two free parameters, used in messages and on axes.
     reference : pair of float, optional
@@ -132,8 +133,9 @@ class CharacteristicFunction:
     Raises
     ------
     TypeError, ValueError
-        If a coefficient is not finite and real, a delay is negative, A is zero, or B1 or
-        B2 has a higher degree than A (an advanced equation has no stable region).
+        If a coefficient is not finite and real, a delay is negative or not a whole number of
+        steps, A is zero, or B1 or B2 has a higher degree than A (an advanced equation has no
+        stable region).
 
     Notes
     -----
@@ -174,7 +176,10 @@ class CharacteristicFunction:
         self.a = _polynomial("a", np.asarray(poly.polyadd(self.rest, at_reference)))
         self.delay1 = _delay("delay1", delay1)
         self.delay2 = _delay("delay2", delay2)
-        self.step = 0.0 if step == 0.0 else positive_number("step", step)
+        self.step = _step(step)
+        if self.step:
+            for name, delay in (("delay1", self.delay1), ("delay2", self.delay2)):
+                whole_steps(name, delay, self.step)
         self.parameters = parameters
         if not self.a.any():
             raise ValueError(
@@ -365,6 +370,18 @@ class CharacteristicFunction:
         return ExponentialSum((p * powers)[None, :], np.array([-delay]), p * powers)
 
 
+def whole_steps(name: str, delay: float, step: float) -> int:
+    """Return delay / step, or raise if it is not a whole number but for rounding."""
+    steps = delay / step
+    # Within a part in 1e9 of the delay, and always within a thousandth of a step.
+    if not steps < 1e15 or abs(steps - round(steps)) > min(1e-9 * steps, 1e-3):
+        raise ValueError(
+            f"step must divide every delay, got step={step} for {name}={delay} "
+            f"({steps:g} steps)"
+        )
+    return round(steps)
+
+
 def checked_system(system: CharacteristicFunction) -> CharacteristicFunction:
     """Return the system, or say what was given in its place."""
     if not isinstance(system, CharacteristicFunction):
@@ -391,6 +408,12 @@ def _polynomial(name: str, coefficients: Sequence[float] | FloatArray) -> FloatA
     return trimmed
 
 
+def _step(value: float) -> float:
+    """Return a finite step that is zero or positive."""
+    step = real_number("step", value)
+    return 0.0 if step == 0.0 else positive_number("step", step)
+
+
 def _delay(name: str, value: float) -> float:
     """Return a finite delay that is zero or positive."""
     delay = real_number(name, value)
@@ -399,4 +422,4 @@ def _delay(name: str, value: float) -> float:
     return delay
 
 
-__all__ = ["CharacteristicFunction", "ExponentialSum", "checked_system"]
+__all__ = ["CharacteristicFunction", "ExponentialSum", "checked_system", "whole_steps"]

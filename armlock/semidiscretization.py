@@ -17,28 +17,28 @@ from numpy.polynomial import polynomial as poly
 from scipy.linalg import expm
 from scipy.signal import ss2tf
 
-from armlock.characteristic import CharacteristicFunction, checked_system
+from armlock.characteristic import CharacteristicFunction, checked_system, whole_steps
 from armlock.realization import Realization, realize
-from armlock.validation import FloatArray, broadcast_pair, positive_number, real_number
+from armlock.validation import (
+    FloatArray,
+    broadcast_pair,
+    positive_number,
+    real_number,
+    whole_number,
+)
 
-
-def _whole_steps(name: str, delay: float, step: float) -> int:
-    """Return delay / step, or raise if it is not a whole number."""
-    steps = round(delay / step)
-    if steps < 1 or abs(steps * step - delay) > 1e-9 * delay:
-        raise ValueError(
-            f"step must divide every delay, got step={step} for {name}={delay} "
-            f"({delay / step:g} steps)"
-        )
-    return steps
+#: Largest transition matrix, in rows: half a gigabyte.
+LARGEST = 8192
 
 
 def _checked(system: CharacteristicFunction, step: float, order: int) -> tuple[float, int]:
     """Return the step and the order, or raise for what cannot be semi-discretized."""
     step = positive_number("step", step)
-    if isinstance(order, bool) or order not in (0, 1):
-        raise ValueError(f"order must be 0 or 1, got {order!r}")
-    if system.step:
+    try:
+        order = whole_number("order", order, 0, 1)
+    except ValueError:
+        raise ValueError(f"order must be 0 or 1, got {order!r}") from None
+    if checked_system(system).step:
         raise ValueError(
             f"system must be in continuous time, got a map with step {system.step}"
         )
@@ -48,9 +48,19 @@ def _checked(system: CharacteristicFunction, step: float, order: int) -> tuple[f
             "itself, which semi-discretization does not smooth"
         )
     for name, delay in (("delay1", system.delay1), ("delay2", system.delay2)):
-        if delay > 0.0:
-            _whole_steps(name, delay, step)
-    return step, int(order)
+        whole_steps(name, delay, step)
+    return step, order
+
+
+def _check_size(system: CharacteristicFunction, step: float) -> None:
+    """Refuse a transition matrix too large to hold, before anything is allocated."""
+    rows = system.degree + round(system.longest_delay / step)
+    if rows > LARGEST:
+        raise ValueError(
+            f"step must be at least about {system.longest_delay / LARGEST:.2g} s, got {step}: "
+            f"the transition matrix would have {rows} rows and take {8e-9 * rows**2:.3g} GB; "
+            f"unstable_roots counts the roots of semi_discretization at any step"
+        )
 
 
 def _sampled(
@@ -60,12 +70,14 @@ def _sampled(
     states = form.state.shape[0]
     columns = []
     for term in form.delayed:
-        # exp of this block matrix holds the integrals of exp(F u) G and of u exp(F u) G.
+        # exp of this block matrix holds the integrals of exp(F u) G and of u exp(F u) G, the
+        # latter scaled, so that parameters of any size do not enter the exponential.
+        size = float(np.abs(term.column).max(initial=0.0)) or 1.0
         block = np.zeros((states + 2, states + 2))
         block[:states, :states] = form.state
-        block[:states, states] = term.column
+        block[:states, states] = term.column / size
         block[states, states + 1] = 1.0 / step
-        integrals = expm(block * step)[:states, states:]
+        integrals = size * expm(block * step)[:states, states:]
         held, ramp = integrals[:, 0], integrals[:, 1]
         columns.append((held, np.zeros(states)) if order == 0 else (held - ramp, ramp))
     return np.asarray(expm(form.state * step)), columns
@@ -98,7 +110,7 @@ def transition_matrix(
     ------
     TypeError, ValueError
         If x or y is not a finite real number, the step does not divide a delay, the order is
-        not 0 or 1, or the loop is neutral.
+        not 0 or 1, the loop is neutral, or the matrix would have more than `LARGEST` rows.
 
     Notes
     -----
@@ -143,11 +155,12 @@ def transition_matrix(
     0.904837
     """
     step, order = _checked(system, step, order)
-    name1, name2 = checked_system(system).parameters
+    _check_size(system, step)
+    name1, name2 = system.parameters
     form = realize(system, real_number(name1, x), real_number(name2, y))
     flow, columns = _sampled(form, step, order)
     states = form.state.shape[0]
-    steps = [_whole_steps("delay", term.delay, step) for term in form.delayed]
+    steps = [whole_steps("delay", term.delay, step) for term in form.delayed]
     longest = max(steps, default=0)
     matrix = np.zeros((states + longest, states + longest))
     matrix[:states, :states] = flow
@@ -201,7 +214,8 @@ def spectral_radius(
     ------
     TypeError, ValueError
         If x or y is not finite and real or the two do not broadcast, if the step does not
-        divide a delay, if the order is not 0 or 1, or if the loop is neutral.
+        divide a delay, if the order is not 0 or 1, if the loop is neutral, or if the matrix
+        would have more than `LARGEST` rows.
 
     Examples
     --------
@@ -211,12 +225,24 @@ def spectral_radius(
     """
     name1, name2 = checked_system(system).parameters
     xs, ys = broadcast_pair(name1, x, name2, y)
-    _checked(system, step, order)
+    step, order = _checked(system, step, order)
+    _check_size(system, step)
     radii = [
-        np.abs(np.linalg.eigvals(transition_matrix(system, p, q, step, order))).max()
+        _radius(transition_matrix(system, p, q, step, order), system.degree)
         for p, q in zip(xs.flat, ys.flat, strict=True)
     ]
     return np.array(radii, dtype=np.float64).reshape(xs.shape)
+
+
+def _radius(matrix: FloatArray, states: int) -> float:
+    """Spectral radius of a transition matrix, past samples scaled where weights are large."""
+    past = matrix.shape[0] - states
+    largest = float(np.abs(matrix[:states, states:]).max(initial=0.0))
+    if largest > 1.0:
+        # The eigenvalues grow as this root; without it their error does as the weight itself.
+        scale = np.append(np.ones(states), largest ** (np.arange(1, past + 1) / past))
+        matrix = matrix * (scale[:, None] / scale)
+    return float(np.abs(np.linalg.eigvals(matrix)).max())
 
 
 def semi_discretization(

@@ -122,3 +122,19 @@ def test_coefficients_must_be_real_numbers(bad):
 def test_the_shift_must_be_real():
     with pytest.raises(TypeError, match=r"^sigma must be real, got the complex value 1j$"):
         HayesEquation().shifted(1j)  # type: ignore[arg-type]
+
+
+def test_the_delays_of_a_map_are_whole_steps():
+    def made(delay1, delay2, step=0.1):
+        return CharacteristicFunction([-0.5, 1.0], [0.1], [0.1], delay1, delay2, step=step)
+
+    message = r"^step must divide every delay, got step=0\.1 for delay1=0\.25 \(2\.5 steps\)$"
+    with pytest.raises(ValueError, match=message):
+        made(0.25, 0.2)
+    with pytest.raises(ValueError, match=r"for delay2=0\.15 \(1\.5 steps\)$"):
+        made(0.2, 0.15)
+    with pytest.raises(ValueError, match=r"for delay1=0\.2 \(inf steps\)$"):
+        made(0.2, 0.2, 1e-320)
+    # Off by rounding alone: 0.3 / 0.1 lies below 3. Without a delay, it is no step.
+    assert made(0.3, 0.0).step == 0.1
+    assert made(0.25, 0.15, 0.0).step == 0.0

@@ -1,7 +1,12 @@
+from decimal import Decimal
+from fractions import Fraction
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.optimize import brentq
 
 from armlock import (
     CharacteristicFunction,
@@ -202,3 +207,60 @@ def test_spectral_radius_broadcasts():
     assert radius.shape == (2, 3)
     np.testing.assert_array_equal(radius[0], radius[1])
     assert spectral_radius(HayesEquation(), -1.0, 0.0, 0.1).shape == ()
+
+
+@pytest.mark.parametrize("function", [spectral_radius, transition_matrix])
+def test_matrices_too_large_to_hold_are_refused_with_their_size(function, monkeypatch):
+    monkeypatch.setattr(np, "zeros", lambda *_: pytest.fail("allocated"))
+    message = (
+        r"^step must be at least about 0\.0025 s, got 0\.001: .* 20101 rows and take 3\.23 GB"
+    )
+    with pytest.raises(ValueError, match=message):
+        function(CommonArm(), 1.0, 1.0, 1e-3)
+    with pytest.raises(ValueError, match=r"^step must divide every delay, got step=1e-300"):
+        function(CommonArm(), 1.0, 1.0, 1e-300)
+
+
+def test_a_step_too_fine_for_a_matrix_still_counts():
+    sampled = semi_discretization(CommonArm(), 1e-3)
+    assert unstable_roots(sampled, [0.9, 1.2], 1.05).tolist() == [0, 7]
+    assert unstable_roots(CommonArm(), [0.9, 1.2], 1.05).tolist() == [0, 7]
+
+
+def test_the_order_is_a_python_or_numpy_integer():
+    order: Any
+    for order in (np.int64(1), np.uint8(1)):
+        assert spectral_radius(CommonArm(), 1.0, 1.0, 0.1, order) == spectral_radius(
+            CommonArm(), 1.0, 1.0, 0.1, 1
+        )
+    for order in (np.True_, 1.0, Decimal(1), np.array([0, 1])):
+        with pytest.raises(ValueError, match=r"^order must be 0 or 1, got "):
+            transition_matrix(CommonArm(), 1.0, 1.0, 0.1, order)
+
+
+@pytest.mark.parametrize("function", [spectral_radius, transition_matrix])
+def test_what_is_no_system_is_refused(function):
+    with pytest.raises(TypeError, match=r"^system must be a CharacteristicFunction"):
+        function("loop", 1.0, 1.0, 0.1)
+    with pytest.raises(TypeError, match=r"^system must be a CharacteristicFunction"):
+        semi_discretization(CommonArm, 0.1)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("value", [Decimal("0.1"), Fraction(1, 10)])
+def test_numbers_of_other_kinds_are_refused_by_name(value):
+    with pytest.raises(TypeError, match=r"^step must be a real number, got (Decimal|Fraction)"):
+        spectral_radius(CommonArm(), 1.0, 1.0, value)
+    with pytest.raises(TypeError, match=r"^c1 must hold real numbers, got dtype object"):
+        spectral_radius(CommonArm(), value, 1.0, 0.1)
+
+
+@pytest.mark.parametrize("exponent", [2, 10, 16, 40, 300])
+def test_large_parameters_do_not_spoil_the_spectral_radius(exponent):
+    """The largest eigenvalue is real, and solves z^201 (z - p) = c b (1 + z^2)."""
+    flow = np.exp(-0.2)
+    weight = exponent * np.log(10.0) + np.log(0.5 * (1.0 - flow))
+    expected = brentq(
+        lambda z: 201.0 * np.log(z) + np.log(z - flow) - weight - np.log1p(z * z), 1.0001, 1e3
+    )
+    found = spectral_radius(CommonArm(), 10.0**exponent, 10.0**exponent, 0.1)
+    assert float(found) == pytest.approx(expected, rel=1e-12)
