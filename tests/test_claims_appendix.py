@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
-from armlock import claims
+from armlock import LaserNoise, PerturbationNoise, claims
 from armlock.claims import Verdict, appendix
 
 EXPECTED = {
-    "A1": (Verdict.REPRODUCED, 2.00666e-6, 1e-9),
+    "A1": (Verdict.REPRODUCED, 1.999996e-6, 1e-12),
     "A2": (Verdict.DIFFERS, 0.39334, 1e-4),
     "A3": (Verdict.DIFFERS, 14579.3, 0.1),
     "A4": (Verdict.IN_PART, 0.0, 0.05),
@@ -47,3 +50,68 @@ def test_error_to_first_order():
     eta = appendix.MISMATCH[1] - appendix.MISMATCH[0]
     first = 0.5 * eta * np.sin(2.0 * phase)
     assert appendix.phase_error(phase) == pytest.approx(first, abs=10.0 * eta**2)
+
+
+def test_slope_at_zero_is_the_limit_of_the_error():
+    for mismatch in (appendix.MISMATCH, (0.02, -0.05)):
+        eta, phase = mismatch[1] - mismatch[0], 1e-5
+        ratio = float(appendix.phase_error(phase, mismatch)) / (eta * phase)
+        assert abs(ratio - 1.0) == pytest.approx(appendix.slope_error(mismatch), rel=1e-3)
+
+
+def test_the_error_vanishes_on_average():
+    """Also for unequal channels far beyond the first order, and not by a sum over a grid."""
+    for mismatch in (appendix.MISMATCH, (0.02, -0.05)):
+        eta = abs(mismatch[1] - mismatch[0])
+        assert abs(appendix.mean_over_turn(mismatch)) < 1e-13 * eta
+        # A quarter turn alone has a mean of eta / pi, to first order.
+        quarter = quad(appendix.phase_error, 0.0, 0.5 * np.pi, args=(mismatch,))[0]
+        assert abs(quarter) == pytest.approx(0.5 * eta, rel=2.0 * eta + 1e-5)
+
+
+def test_phase_of_the_laser_is_the_integral_of_its_frequency():
+    """By integration of the density on a logarithmic axis, and from a series."""
+
+    def density(log_frequency):
+        f = np.exp(log_frequency)
+        # phi = integral of 2 pi nu dt: in rad, 2 pi / (2 pi f) times that of the frequency.
+        return (2.0 * np.pi / (2.0 * np.pi * f) * 30.0 / f) ** 2 * f
+
+    power = quad(density, np.log(5e-6), np.log(100.0), epsabs=0.0, epsrel=1e-11, limit=400)[0]
+    assert appendix.laser_phase_rms() == pytest.approx(np.sqrt(power), rel=1e-9)
+    assert appendix.laser_phase_rms() == pytest.approx(1.54919e9, rel=1e-5)
+    # A series of frequency, summed to a phase in rad: its density at one frequency.
+    rate, samples = 16.0, 1 << 16
+    window = np.hanning(samples)
+    power = 0.0
+    for seed in range(40):
+        phase = 2.0 * np.pi * np.cumsum(LaserNoise(seed, rate).draw(samples)) / rate
+        # Differences of two second sums leave no slow drift to leak.
+        second = phase[2:] - 2.0 * phase[1:-1] + phase[:-2]
+        power += np.abs(np.fft.rfft(second * window[1:-1]))[4096] ** 2 / 40
+    f = 4096 * rate / (samples - 2)
+    gain = (2.0 * np.sin(np.pi * f / rate)) ** 2
+    asd = np.sqrt(2.0 * power / (rate * (window**2).sum())) / gain
+    assert asd == pytest.approx(30.0 / f**2, rel=0.2)
+
+
+@pytest.mark.parametrize("frequency", [0.0, 1e-4, 1e-2, 0.1, 0.3, 1.0])
+def test_convolution_against_adaptive_integration(frequency):
+    phase, eta = appendix._phase_source(11, 4.0), PerturbationNoise(12, 4.0, cutoff=2e-4)
+
+    def two_sided(source, f):
+        f = min(abs((f + 2.0) % 4.0 - 2.0), 1.99999)
+        return 0.5 * float(source.sampled_asd(f)) ** 2
+
+    def product(x):
+        return two_sided(phase, x) * two_sided(eta, frequency - x)
+
+    centres = {0.0, 0.3, -0.3, frequency, frequency - 0.3, frequency + 0.3}
+    edges = {c + d for c in centres for d in (0.0, 1e-4, -1e-4, 1e-3, -1e-3, 0.01, -0.01)}
+    edges = sorted({-2.0, 2.0} | {e for e in edges if -2.0 < e < 2.0})
+    total = sum(
+        quad(product, a, b, epsabs=0.0, epsrel=1e-8, limit=200)[0] for a, b in pairwise(edges)
+    )
+    assert appendix.convolved_density(np.array([frequency]))[0] == pytest.approx(
+        np.sqrt(2.0 * total), rel=1e-5
+    )
