@@ -30,7 +30,7 @@ from armlock.paper import (
 from armlock.roots import rightmost_root
 from armlock.semidiscretization import semi_discretization
 from armlock.stability import BOUNDARY, last_crossing, stability_chart, unstable_roots
-from armlock.sweeps import first_crossing, sweep
+from armlock.sweeps import Crossing, first_crossing, sweep
 from armlock.validation import FloatArray
 
 CHAPTER = "04_dual_arm"
@@ -84,6 +84,11 @@ class Edges(NamedTuple):
     width_omega: float
 
 
+def far_edge(loop: DualArm, common: float) -> Crossing:
+    """Find the far edge at a given (c1 + c2) / 2; its position is c2 - c1."""
+    return first_crossing(loop, (common, common), (-0.5, 0.5), stop=1.0)
+
+
 @cache
 def edges(
     gain: float, corner: float = DUAL_SENSOR_CORNER, difference: float | None = None
@@ -91,7 +96,7 @@ def edges(
     """Compute the exact edges for one gain, corner frequency and dtau."""
     loop = DualArm(gain, TAU1, TAU2, corner, difference=difference)
     upper = first_crossing(loop, (0.5, 0.5), (1.0, 1.0), stop=10.0)
-    far = first_crossing(loop, (WINDOW[0], WINDOW[0]), (-0.5, 0.5), stop=1.0)
+    far = far_edge(loop, WINDOW[0])
     return Edges(gain, upper.position - 0.5, upper.omega, far.position, far.omega)
 
 
@@ -217,8 +222,7 @@ def outline(gain: float, number: int = 61, low: float = WINDOW[0]) -> Outline:
     """Trace the strip upwards from c1 + c2 = 2 low, along evenly spread rays c2 - c1."""
     loop = DualArm(gain)
     # The strip narrows upwards, so that every such ray starts inside and leaves once.
-    widest = first_crossing(loop, (low, low), (-0.5, 0.5), stop=1.0).position
-    difference = widest * (np.arange(number) + 0.5) / number
+    difference = far_edge(loop, low).position * (np.arange(number) + 0.5) / number
     ends = [
         first_crossing(loop, (low - 0.5 * d, low + 0.5 * d), (1.0, 1.0), stop=10.0)
         for d in difference
@@ -253,11 +257,8 @@ def strip(gain: float, number: int = 61) -> FloatArray:
     lowest = -0.5 - first_crossing(loop, (-0.5, -0.5), (-1.0, -1.0), stop=10.0).position
     low, high = 0.96 * lowest, WINDOW[0]  # from these lines every ray leaves by an end
 
-    def far(common: float) -> float:
-        return first_crossing(loop, (common, common), (-0.5, 0.5), stop=1.0).position
-
     def end(start: float, sign: float) -> FloatArray:
-        difference = far(start) * np.linspace(0.0, 1.0 - 1e-6, number)
+        difference = far_edge(loop, start).position * np.linspace(0.0, 1.0 - 1e-6, number)
         along = [
             first_crossing(loop, (start - 0.5 * d, start + 0.5 * d), (sign, sign), stop=10.0)
             for d in difference
@@ -265,7 +266,7 @@ def strip(gain: float, number: int = 61) -> FloatArray:
         return np.array([[start + sign * ray.position for ray in along], difference])
 
     middle = np.linspace(low, high, number)
-    between = np.array([middle, [far(common) for common in middle]])
+    between = np.array([middle, [far_edge(loop, common).position for common in middle]])
     return np.concatenate((end(low, -1.0), between, end(high, 1.0)[:, ::-1]), axis=1)
 
 
