@@ -344,11 +344,13 @@ class ErrataTable:
         own = f'<a href="{escape(chapter_link(claim))}">{escape(claim.identifier)}</a>'
         parts = {
             "Printed": escape(claim.says),
-            "What follows": f"{escape(finding.note)} Deciding number: "
-            f"{finding.value:.6g} ({escape(finding.quantity)}).",
+            "Deciding number": f"<strong>{finding.value:.6g}</strong>: "
+            f"{escape(finding.quantity)}.",
+            "What follows": escape(finding.note),
             "How it was found": escape(source(claim).purpose),
-            "What depends on it": depends or "No other verdict of this ledger.",
         }
+        if depends:
+            parts["What depends on it"] = depends
         items = "".join(f"<dt>{name}</dt><dd>{text}</dd>" for name, text in parts.items())
         kind = finding.verdict.name.lower()
         return (
