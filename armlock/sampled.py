@@ -15,6 +15,7 @@ the present output depends on the present input.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from fractions import Fraction
 from typing import NamedTuple
@@ -22,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from armlock.validation import FloatArray, positive_number
+from armlock.validation import FloatArray, positive_number, real_array
 
 #: Numbers in the form that compiled functions keep in registers.
 Row = tuple[float, ...]
@@ -76,6 +77,40 @@ def floats(values: FloatArray) -> Row:
     return tuple(float(value) for value in values.flat)
 
 
+def checked_frequency(name: str, value: npt.ArrayLike, highest: float, unit: str) -> FloatArray:
+    """Return frequencies from zero up to a highest one, which rounding may exceed.
+
+    Parameters
+    ----------
+    name : str
+        What messages call them.
+    value : array_like of float
+        The frequencies.
+    highest : float
+        The last one that makes sense; it may be infinite.
+    unit : str
+        Of both, for messages.
+
+    Returns
+    -------
+    float array, shaped like `value`
+
+    Raises
+    ------
+    TypeError, ValueError
+        If one is not real and finite, negative, or too high.
+    """
+    frequency = real_array(name, value)
+    for wrong in frequency[(frequency < 0.0) | (frequency > highest * (1.0 + 1e-12))]:
+        end = (
+            ""
+            if math.isinf(highest)
+            else f" and at most {highest} {unit}, half the sample rate"
+        )
+        raise ValueError(f"{name} must not be negative{end}, got {wrong}")
+    return np.asarray(np.minimum(frequency, highest))
+
+
 def warped(omega: npt.ArrayLike, sample_rate: float) -> FloatArray:
     r"""Frequency at which a continuous system responds as the sampled one does at `omega`.
 
@@ -88,7 +123,8 @@ def warped(omega: npt.ArrayLike, sample_rate: float) -> FloatArray:
     Parameters
     ----------
     omega : array_like of float
-        In rad/s, below pi times the sample rate.
+        In rad/s, from zero up to pi times the sample rate, where the result is infinite but
+        for rounding.
     sample_rate : float
         In Hz.
 
@@ -96,9 +132,16 @@ def warped(omega: npt.ArrayLike, sample_rate: float) -> FloatArray:
     -------
     float array, shaped like `omega`
         In rad/s.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a frequency is not finite and real, negative, or above half the sample rate.
     """
-    step = 1.0 / positive_number("sample_rate", sample_rate)
-    return np.asarray(2.0 / step * np.tan(0.5 * step * np.asarray(omega, dtype=float)))
+    rate = positive_number("sample_rate", sample_rate)
+    omega = checked_frequency("omega", omega, math.pi * rate, "rad/s")
+    # Rounding must not carry the tangent beyond its pole.
+    return np.asarray(2.0 * rate * np.tan(np.minimum(0.5 * omega / rate, 0.5 * math.pi)))
 
 
 class _Cascade:

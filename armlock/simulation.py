@@ -18,8 +18,8 @@ from __future__ import annotations
 
 import math
 import os
+import secrets
 import sys
-import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple, TextIO
@@ -30,13 +30,23 @@ from numba import njit
 from numba.cpython.unsafe.tuple import tuple_setitem
 
 from armlock.loops import Loop
-from armlock.sampled import Row, SampledSystem, floats, real_system, sample, warped
+from armlock.sampled import (
+    Row,
+    SampledSystem,
+    checked_frequency,
+    floats,
+    real_system,
+    sample,
+    warped,
+)
 from armlock.validation import (
     ComplexArray,
     FloatArray,
     positive_number,
-    real_array,
     real_number,
+    series,
+    switch,
+    whole_number,
 )
 
 #: Order of the Lagrange interpolation for delays that are not whole samples.
@@ -47,11 +57,16 @@ BLOCK = 1 << 16
 LONG_RUN = 5_000_000
 #: The output counts as diverged when it exceeds the largest input so far by this factor.
 LIMIT = 1e6
+#: Longest delay in samples: half a gigabyte of history.
+LONGEST = 1 << 26
+#: Highest order of interpolation.
+HIGHEST_ORDER = 99
 
 Matrices = tuple[Row, Row, Row, Row, Row]
 
 # Delays closer to whole samples than this, relatively, are whole.
 _WHOLE = 1e-9
+_LARGEST_FLOAT = sys.float_info.max
 
 
 class DivergenceError(ArithmeticError):
@@ -65,7 +80,8 @@ class DivergenceError(ArithmeticError):
     detected : float
         When the output exceeded that input by the limit, in s.
     output : float array
-        What was computed up to then; every sample of it is finite.
+        What was computed up to then, the sample that exceeds the limit left out; every sample
+        of it is finite. Empty where a run that has stopped is asked to go on.
 
     Examples
     --------
@@ -86,6 +102,10 @@ class DivergenceError(ArithmeticError):
         self.time = time
         self.detected = detected
         self.output = output
+
+    def __reduce__(self) -> tuple[type[DivergenceError], tuple[float, float, FloatArray]]:
+        """Return what makes the same error again, in another process too."""
+        return type(self), (self.time, self.detected, self.output)
 
 
 class Delay(NamedTuple):
@@ -124,7 +144,7 @@ def lagrange_delay(name: str, tau: float, sample_rate: float, order: int) -> Del
     Raises
     ------
     ValueError
-        If the delay is too short for the sample rate.
+        If the delay is too short for the sample rate, or longer than `LONGEST` samples.
 
     Notes
     -----
@@ -132,6 +152,12 @@ def lagrange_delay(name: str, tau: float, sample_rate: float, order: int) -> Del
     so that interpolation adds no instability of its own.
     """
     samples = tau * sample_rate
+    if samples > LONGEST:
+        raise ValueError(
+            f"sample_rate must be at most {LONGEST / tau:.4g} Hz for {name} = {tau} s, got "
+            f"{sample_rate}: the history would be {samples:.4g} samples, "
+            f"{8e-9 * samples:.3g} GB"
+        )
     whole = round(samples)
     if abs(samples - whole) <= _WHOLE * samples:
         if whole < 1:
@@ -219,7 +245,7 @@ def _advance(
         largest = max(largest, abs(noise[i]))
         if size <= largest:
             calm = done + i
-        elif not size <= limit * largest:
+        elif not (size <= limit * largest and size <= _LARGEST_FLOAT):
             stop = i
             break
     watch[0], watch[1] = largest, calm
@@ -248,31 +274,41 @@ def _checked_loop(loop: object) -> Loop:
 
 
 def _order(value: object) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or value < 1 or value % 2 == 0:
-        raise ValueError(f"interpolation must be an odd positive integer, got {value!r}")
-    return value
+    message = f"interpolation must be an odd integer from 1 to {HIGHEST_ORDER}, got {value!r}"
+    try:
+        order = whole_number("interpolation", value, 1, HIGHEST_ORDER)
+    except ValueError:
+        raise ValueError(message) from None
+    if order % 2 == 0:
+        raise ValueError(message)
+    return order
 
 
-def _series(name: str, value: object) -> FloatArray:
-    """Return a one-dimensional array of finite floats; no copy where it is one already."""
-    array = np.asarray(value)
-    if array.ndim != 1:
-        raise ValueError(f"{name} must be one-dimensional, got shape {array.shape}")
-    if array.dtype != np.float64:
-        return real_array(name, array)
-    for first in range(0, array.size, 1 << 20):
-        finite = np.isfinite(array[first : first + (1 << 20)])
-        if not finite.all():
-            at = first + int(np.argmin(finite))
-            raise ValueError(f"{name} must be finite, got {array[at]} at sample {at}")
-    return array
+def _check_rate(loop: Loop, sample_rate: float) -> None:
+    """Refuse a rate at which a pole or zero would change its nature."""
+    mapping = np.trim_zeros(np.asarray(loop.mapping.denominator, dtype=float), "b")
+    roots = (*loop.controller.zeros, *loop.controller.poles, *np.roots(mapping[::-1]))
+    fastest = max((abs(root) for root in roots), default=0.0)
+    if sample_rate <= fastest / 2.0:
+        raise ValueError(
+            f"sample_rate must exceed {fastest / 2.0} Hz, half of the loop's fastest pole "
+            f"or zero in rad/s, got {sample_rate}"
+        )
+
+
+def _single(value: object) -> bool:
+    """Whether a value is one thing, and not a sequence of them."""
+    try:
+        return np.ndim(value) == 0  # type: ignore[arg-type]
+    except ValueError:
+        return False
 
 
 def _parameter(name: str, value: object, like: FloatArray) -> float | FloatArray:
     """Return c1 or c2 as a finite number, or as an array of the shape of the noise."""
-    if np.ndim(np.asarray(value)) == 0:
+    if _single(value):
         return real_number(name, value)
-    array = _series(name, value)
+    array = series(name, value)
     if array.shape != like.shape:
         raise ValueError(
             f"{name} must be a number or have the shape of noise, {like.shape}; got "
@@ -313,7 +349,7 @@ def sampled_open_loop(
     loop : Loop
         The loop.
     omega : array_like of float
-        In rad/s, below pi times the sample rate.
+        In rad/s, positive and at most pi times the sample rate.
     c1, c2 : float, optional
         Constant perturbations.
     sample_rate : float, optional
@@ -326,6 +362,12 @@ def sampled_open_loop(
     complex array, shaped like `omega`
         Controller and sensor at the warped frequency, delays at the true one.
 
+    Raises
+    ------
+    TypeError, ValueError
+        If a frequency is not finite and real, not positive, or above half the sample rate,
+        or `Simulation` would refuse the sample rate for the loop's delays, poles and zeros.
+
     Examples
     --------
     Far below the sample rate it is the open loop itself.
@@ -337,14 +379,21 @@ def sampled_open_loop(
     True
     """
     loop, order = _checked_loop(loop), _order(interpolation)
-    omega = np.asarray(omega, dtype=float)
-    s = 1j * warped(omega, sample_rate)
+    rate = positive_number("sample_rate", sample_rate)
+    _check_rate(loop, rate)
+    c1, c2 = real_number("c1", c1), real_number("c2", c2)
+    omega = checked_frequency("omega", omega, math.pi * rate, "rad/s")
+    if not omega.all():
+        raise ValueError(
+            "omega must be positive, got 0.0: controller or sensor has a pole there"
+        )
+    s = 1j * warped(omega, rate)
     m1, m2 = loop.mapping.weights(s)
     result = np.zeros(omega.shape, dtype=np.complex128)
     for m, c, name in ((m1, c1, "tau1"), (m2, c2, "tau2")):
-        delay = lagrange_delay(name, getattr(loop, name), sample_rate, order)
+        delay = lagrange_delay(name, getattr(loop, name), rate, order)
         lags = delay.first + np.arange(delay.weights.size)
-        late = np.exp(-1j * omega[..., None] * lags / sample_rate) @ delay.weights
+        late = np.exp(-1j * omega[..., None] * lags / rate) @ delay.weights
         result += m * (1.0 - c * late)
     return np.asarray(loop.controller(s) * result)
 
@@ -362,11 +411,11 @@ class Simulation:
         The locked laser's noise before the first sample, the latest value last: a constant,
         or at least `history_samples` values. Controller and sensor start at rest.
     interpolation : int, optional
-        Odd order of the polynomial by which delays that are not whole samples are
+        Odd order, up to 99, of the polynomial by which delays that are not whole samples are
         interpolated. Whole ones are exact.
     limit : float, optional
         The run counts as diverged when the output exceeds the largest input so far by this
-        factor.
+        factor, one at least.
 
     Attributes
     ----------
@@ -379,7 +428,8 @@ class Simulation:
     ------
     TypeError, ValueError
         If `loop` is no loop, the sample rate is too low for its delays, its poles and zeros,
-        or its feedback at high frequency, or the history is too short or not finite.
+        or its feedback at high frequency, or so high that its delays are more than `LONGEST`
+        samples, or the history is too short or not finite.
 
     Notes
     -----
@@ -420,10 +470,12 @@ class Simulation:
         self.loop = _checked_loop(loop)
         self.sample_rate = positive_number("sample_rate", sample_rate)
         self.limit = positive_number("limit", limit)
-        self._check_rate()
-        order = _order(interpolation)
+        if self.limit < 1.0:
+            raise ValueError(f"limit must be at least 1, got {self.limit}")
+        _check_rate(self.loop, self.sample_rate)
+        self.interpolation = _order(interpolation)
         self._delays = [
-            lagrange_delay(name, getattr(loop, name), self.sample_rate, order)
+            lagrange_delay(name, getattr(loop, name), self.sample_rate, self.interpolation)
             for name in ("tau1", "tau2")
         ]
         self.history_samples = max(d.first + d.weights.size - 1 for d in self._delays)
@@ -445,30 +497,23 @@ class Simulation:
         self._rest = 0.0
         self._phi = np.zeros(self.history_samples + BLOCK)
         self._phi[: self.history_samples] = self._checked_history(history)
-        start = float(np.abs(self._phi[: self.history_samples]).max())
+        before = self._phi[: self.history_samples]
+        start = max(float(before.max()), -float(before.min()))
         self._watch = np.array([start, 0.0])
         self._stopped: tuple[float, float] | None = None
         self.samples = 0
+
+    def __repr__(self) -> str:
+        """Name the arguments, and how far the run has come."""
+        return (
+            f"Simulation({self.loop!r}, sample_rate={self.sample_rate}, "
+            f"interpolation={self.interpolation}, limit={self.limit}; {self.samples} samples)"
+        )
 
     @property
     def time(self) -> float:
         """How far the run has come, in s."""
         return self.samples / self.sample_rate
-
-    def _check_rate(self) -> None:
-        """Refuse a rate at which a pole or zero would change its nature."""
-        mapping = np.trim_zeros(np.asarray(self.loop.mapping.denominator, dtype=float), "b")
-        roots = (
-            *self.loop.controller.zeros,
-            *self.loop.controller.poles,
-            *np.roots(mapping[::-1]),
-        )
-        fastest = max((abs(root) for root in roots), default=0.0)
-        if self.sample_rate <= fastest / 2.0:
-            raise ValueError(
-                f"sample_rate must exceed {fastest / 2.0} Hz, half of the loop's fastest pole "
-                f"or zero in rad/s, got {self.sample_rate}"
-            )
 
     def _check_closure(self) -> None:
         """Refuse a loop whose feedback changes sign between the sample rate and infinity."""
@@ -482,9 +527,9 @@ class Simulation:
             )
 
     def _checked_history(self, history: npt.ArrayLike) -> float | FloatArray:
-        if np.ndim(np.asarray(history)) == 0:
+        if _single(history):
             return real_number("history", history)
-        array = _series("history", history)
+        array = series("history", history)
         if array.size < self.history_samples:
             raise ValueError(
                 f"history must hold at least {self.history_samples} samples, as far as the "
@@ -516,10 +561,10 @@ class Simulation:
         DivergenceError
             If the output leaves all bounds. The run cannot be continued.
         """
-        series = _series("noise", noise)
-        first, second = _parameter("c1", c1, series), _parameter("c2", c2, series)
-        output = np.empty_like(series)
-        self._fill(output, series, first, second, None)
+        given = series("noise", noise)
+        first, second = _parameter("c1", c1, given), _parameter("c2", c2, given)
+        output = np.empty_like(given)
+        self._fill(output, given, first, second, None)
         return output
 
     def _fill(
@@ -537,7 +582,7 @@ class Simulation:
         delay1, delay2 = self._delays
         for at in range(0, noise.size, BLOCK):
             piece = slice(at, min(at + BLOCK, noise.size))
-            part = np.ascontiguousarray(noise[piece])
+            part = _piece(noise, piece)
             self._state, self._rest, stop = _advance(
                 self._phi,
                 start,
@@ -563,7 +608,8 @@ class Simulation:
                     float(self._watch[1]) / self.sample_rate,
                     (self.samples + stop) / self.sample_rate,
                 )
-                raise DivergenceError(*self._stopped, output[: at + stop])
+                # A copy, so that the error does not hold all the memory of the run.
+                raise DivergenceError(*self._stopped, output[: at + stop].copy())
             output[piece] = self._phi[start : start + part.size]
             self._phi[:start] = self._phi[part.size : part.size + start].copy()
             self.samples += part.size
@@ -574,7 +620,9 @@ class Simulation:
 def _piece(values: float | FloatArray, piece: slice) -> FloatArray:
     if isinstance(values, float):
         return np.full(piece.stop - piece.start, values)
-    return np.ascontiguousarray(values[piece])
+    part = np.ascontiguousarray(values[piece])
+    # Read-only arrays are another type to the compiler.
+    return part if part.flags.writeable else part.copy()
 
 
 def simulate(
@@ -644,11 +692,11 @@ def simulate(
     run = Simulation(
         loop, sample_rate, history=history, interpolation=interpolation, limit=limit
     )
-    series = _series("noise", noise)
-    first, second = _parameter("c1", c1, series), _parameter("c2", c2, series)
-    output = np.empty_like(series)
-    with _Bar(series.size, run.sample_rate, progress) as bar:
-        run._fill(output, series, first, second, bar)
+    given = series("noise", noise)
+    first, second = _parameter("c1", c1, given), _parameter("c2", c2, given)
+    with _Bar(given.size, run.sample_rate, progress) as bar:
+        output = np.empty_like(given)
+        run._fill(output, given, first, second, bar)
     return output
 
 
@@ -670,7 +718,8 @@ def simulate_blocks(
     loop : Loop
         The loop.
     blocks : iterable
-        Of arrays of noise, or of tuples (noise, c1, c2).
+        Of arrays of noise, or of tuples (noise, c1, c2). Their lengths may differ, zero
+        included.
     sample_rate : float, optional
         In Hz.
     samples : int, optional
@@ -700,10 +749,20 @@ def simulate_blocks(
         loop, sample_rate, history=history, interpolation=interpolation, limit=limit
     )
 
+    bar = _Bar(whole_number("samples", samples, 0), run.sample_rate, progress)
+    if not isinstance(blocks, Iterable):
+        raise TypeError(f"blocks must be an iterable of arrays, got {blocks!r}")
+
     def outputs() -> Iterator[FloatArray]:
-        with _Bar(samples, run.sample_rate, progress) as bar:
+        with bar:
             for block in blocks:
-                yield run.advance(*(block if isinstance(block, tuple) else (block,)))
+                parts = block if isinstance(block, tuple) else (block,)
+                if not 1 <= len(parts) <= 3:
+                    raise ValueError(
+                        f"blocks must hold arrays or tuples (noise, c1, c2), got a tuple of "
+                        f"{len(parts)}"
+                    )
+                yield run.advance(*parts)
                 bar.show(run.samples)
 
     return outputs()
@@ -717,18 +776,26 @@ def save_series(path: str | os.PathLike[str], blocks: Iterable[FloatArray]) -> i
     path : path_like
         Name of the file, which ends in .npy.
     blocks : iterable of float arrays
-        For instance from `simulate_blocks`.
+        Each one-dimensional and finite, for instance from `simulate_blocks`.
 
     Returns
     -------
     int
         Number of samples written.
 
+    Raises
+    ------
+    TypeError, ValueError
+        If the name does not end in .npy, or a block is not a one-dimensional series of finite
+        real numbers.
+    OSError
+        If `path` is a folder, or its folder does not exist.
+
     Notes
     -----
     The blocks go to a file of another name in the same folder, which takes this one when the
     last block is in. If anything stops the run, that file is removed, and what was at `path`
-    before stays.
+    before stays. A process that is killed leaves the file, whose name ends in .part.
 
     Examples
     --------
@@ -744,20 +811,32 @@ def save_series(path: str | os.PathLike[str], blocks: Iterable[FloatArray]) -> i
     100 (100,)
     """
     path = Path(path)
+    if path.suffix != ".npy":
+        raise ValueError(f"path must end in .npy, got {str(path)!r}")
+    if path.is_dir():
+        raise IsADirectoryError(f"path must be a file, got the folder {str(path)!r}")
+    if not path.parent.is_dir():
+        raise FileNotFoundError(f"path must lie in a folder that exists, got {str(path)!r}")
+    if not isinstance(blocks, Iterable):
+        raise TypeError(f"blocks must be an iterable of arrays, got {blocks!r}")
+    temporary = path.with_name(f"{path.name}.{secrets.token_hex(4)}.part")
     count = 0
-    handle, temporary = tempfile.mkstemp(suffix=".part", prefix=path.name, dir=path.parent)
     try:
-        with os.fdopen(handle, "wb") as file:
+        with temporary.open("xb") as file:
             # The header's room for the length suffices for any: it is written again below.
             _write_header(file, 0)
-            for block in blocks:
-                file.write(np.ascontiguousarray(block, dtype="<f8").tobytes())
-                count += block.size
+            for number, block in enumerate(blocks):
+                values = series(f"blocks[{number}]", block)
+                file.write(np.ascontiguousarray(values, dtype="<f8").tobytes())
+                count += values.size
             file.seek(0)
             _write_header(file, count)
-        Path(temporary).replace(path)
+            file.flush()
+            # On the disk before the name is.
+            os.fsync(file.fileno())
+        temporary.replace(path)
     except BaseException:
-        Path(temporary).unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
         raise
     return count
 
@@ -775,7 +854,10 @@ class _Bar:
         self.rate = sample_rate
         self.stream: TextIO = sys.stderr
         self.shown = -1
-        wanted = samples >= LONG_RUN and self.stream.isatty() if progress is None else progress
+        if progress is None:
+            wanted = samples >= LONG_RUN and self.stream.isatty()
+        else:
+            wanted = switch("progress", progress)
         self.wanted = wanted and samples > 0
 
     def __enter__(self) -> _Bar:

@@ -84,6 +84,26 @@ def real_array(name: str, value: object) -> FloatArray:
     return array
 
 
+def series(name: str, value: object) -> FloatArray:
+    """Return a one-dimensional array of finite floats; no copy where it is one already."""
+    array = _array(name, value)
+    if np.iscomplexobj(array):
+        raise TypeError(f"{name} must be real, got complex values (dtype {array.dtype})")
+    if array.dtype.kind not in _REAL:
+        raise TypeError(f"{name} must hold real numbers, got dtype {array.dtype}")
+    if array.ndim != 1:
+        raise ValueError(f"{name} must be one-dimensional, got shape {array.shape}")
+    with np.errstate(over="ignore"):
+        array = array.astype(np.float64, copy=False)
+    # In parts, so that long series are not doubled in memory.
+    for first in range(0, array.size, 1 << 20):
+        finite = np.isfinite(array[first : first + (1 << 20)])
+        if not finite.all():
+            at = first + int(np.argmin(finite))
+            raise ValueError(f"{name} must be finite, got {array[at]} at sample {at}")
+    return array
+
+
 def broadcast_pair(
     name1: str, value1: object, name2: str, value2: object
 ) -> tuple[FloatArray, FloatArray]:

@@ -77,3 +77,31 @@ def test_common_factors_at_zero_drop_out():
 def test_improper_systems_are_refused():
     with pytest.raises(ValueError, match="more zeros than poles"):
         real_system((-1.0, -2.0), (-3.0,), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("omega", "rate", "error", "message"),
+    [
+        (-1.0, 2.0, ValueError, r"omega must not be negative and at most 6\.28.* got -1\.0$"),
+        (
+            [1.0, 6.3],
+            2.0,
+            ValueError,
+            r"at most 6\.28\d+ rad/s, half the sample rate, got 6\.3$",
+        ),
+        (np.nan, 2.0, ValueError, "omega must be finite, got nan"),
+        (1j, 2.0, TypeError, "omega must be real"),
+        (1.0, 0.0, ValueError, r"sample_rate must be positive, got 0\.0"),
+        (1.0, np.nan, ValueError, "sample_rate must be finite, got nan"),
+        (1.0, True, TypeError, "sample_rate must be a real number, got True"),
+    ],
+)
+def test_frequencies_beyond_half_the_rate_have_no_counterpart(omega, rate, error, message):
+    with pytest.raises(error, match=message):
+        warped(omega, rate)
+
+
+def test_half_the_rate_stands_for_infinity():
+    for rate in (0.3, 7.0, 200.0, 1e5 / 3):
+        assert warped([0.0, np.pi * rate], rate)[0] == 0.0
+        assert warped(np.nextafter(np.pi * rate, np.inf), rate) > 1e15 * rate

@@ -1,9 +1,16 @@
 """The loop in time: accuracy, closed form, verdicts, blocks, divergence, bad input."""
 
+import copy
+import pickle
+import stat
+from decimal import Decimal
+from fractions import Fraction
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 
 from armlock import (
     CommonArm,
@@ -25,7 +32,7 @@ from armlock import (
     unstable_roots,
 )
 from armlock.sensors import COMMON, SignalMapping
-from armlock.simulation import BLOCK, LONG_RUN
+from armlock.simulation import BLOCK, LONG_RUN, LONGEST
 from benchmarks.__main__ import main
 from tests.extended import naive, reference
 
@@ -294,6 +301,7 @@ def test_divergence_does_not_depend_on_blocks():
 
 
 SHORT = np.zeros(100)
+MASKED = np.ma.masked_array(SHORT, mask=SHORT == 0.0)
 
 
 @pytest.mark.parametrize(
@@ -313,8 +321,13 @@ SHORT = np.zeros(100)
         ({"sample_rate": 1.0}, "sample_rate must exceed 1.25"),
         ({"history": np.zeros(10)}, "history must hold at least 4020 samples"),
         ({"history": np.nan}, "history must be finite"),
-        ({"interpolation": 2}, "interpolation must be an odd positive integer, got 2"),
+        ({"interpolation": 2}, "interpolation must be an odd integer from 1 to 99, got 2"),
+        ({"interpolation": 3.0}, r"interpolation must be an odd integer .*, got 3\.0$"),
+        ({"interpolation": True}, "interpolation must be an odd integer .*, got True$"),
+        ({"interpolation": 101}, "interpolation must be an odd integer .*, got 101$"),
         ({"limit": 0.0}, "limit must be positive"),
+        ({"limit": 0.5}, "limit must be at least 1, got 0.5"),
+        ({"noise": SHORT + 0.0, "c1": np.ones(1)}, r"c1 must .* shape of noise, \(100,\); got"),
     ],
 )
 def test_bad_arguments(arguments, message):
@@ -328,6 +341,23 @@ def test_bad_arguments(arguments, message):
         (CommonArm(), {"noise": ["a"]}, "noise must"),
         (CommonArm(), {"noise": SHORT + 1j}, "noise must be real"),
         (CommonArm(), {"c1": "x"}, "c1 must"),
+        (CommonArm(), {"noise": "abc"}, "noise must hold real numbers"),
+        (CommonArm(), {"noise": None}, "noise must hold real numbers, got dtype object"),
+        (CommonArm(), {"noise": SHORT > 0.0}, "noise must hold real numbers, got dtype bool"),
+        (CommonArm(), {"noise": SHORT.astype("m8[s]")}, "noise .*, got dtype timedelta64"),
+        (CommonArm(), {"c1": SHORT.astype("m8[s]")}, "c1 .*, got dtype timedelta64"),
+        (CommonArm(), {"noise": MASKED}, "noise must be an ordinary array, got a masked"),
+        (CommonArm(), {"c2": MASKED}, "c2 must be an ordinary array, got a masked array"),
+        (CommonArm(), {"c1": np.ma.masked}, "c1 must be an ordinary array, got a masked"),
+        (CommonArm(), {"history": MASKED}, "history must be an ordinary array, got a masked"),
+        (CommonArm(), {"noise": [Decimal(1)] * 100}, "noise must hold real numbers"),
+        (
+            CommonArm(),
+            {"c1": Fraction(1, 2)},
+            r"c1 must be a real number, got Fraction\(1, 2\)",
+        ),
+        (CommonArm(), {"sample_rate": Decimal(20)}, r"sample_rate .*, got Decimal\('20'\)$"),
+        (CommonArm(), {"progress": "no"}, "progress must be True or False, got 'no'"),
         (HayesEquation(), {}, "loop must be an armlock.Loop, got HayesEquation"),
         (None, {}, "loop must be an armlock.Loop, got NoneType"),
     ],
@@ -406,6 +436,273 @@ def test_progress_is_shown_when_asked(capsys):
     simulate(CommonArm(), noise)
     list(simulate_blocks(CommonArm(), [noise], samples=LONG_RUN))
     assert capsys.readouterr().err == ""
+
+
+FREQUENCIES = [
+    (
+        [0.01, -0.01],
+        ValueError,
+        r"omega must not be negative and at most 628\.3.*, got -0\.01$",
+    ),
+    ([0.01, 0.0], ValueError, r"omega must be positive, got 0\.0"),
+    ([0.01, 700.0], ValueError, r"at most 628\.3\d+ rad/s, half the sample rate, got 700\.0$"),
+    (np.nan, ValueError, "omega must be finite, got nan"),
+    ([np.inf], ValueError, "omega must be finite, got inf"),
+    ([1j], TypeError, "omega must be real"),
+    ("1", TypeError, "omega must hold real numbers"),
+    ([True], TypeError, "omega must hold real numbers, got dtype bool"),
+]
+
+
+@pytest.mark.parametrize(("omega", "error", "message"), FREQUENCIES)
+def test_the_sampled_loop_is_for_frequencies_below_half_the_rate(omega, error, message):
+    with pytest.raises(error, match=message):
+        sampled_open_loop(paper_loop(), omega)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"sample_rate": -1.0}, "sample_rate must be positive"),
+        ({"sample_rate": 1.0}, r"sample_rate must exceed 1\.25"),
+        ({"sample_rate": 1e9}, r"sample_rate must be at most 3\.339e\+06 Hz"),
+        ({"c1": np.nan}, "c1 must be finite"),
+        ({"interpolation": 2}, "interpolation must be an odd integer"),
+    ],
+)
+def test_the_sampled_loop_is_for_what_can_be_simulated(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        sampled_open_loop(paper_loop(), [0.01], **arguments)
+    with pytest.raises(TypeError, match=r"c1 must be a real number, got array"):
+        sampled_open_loop(paper_loop(), [0.01, 0.02], np.ones(2))  # type: ignore[arg-type]
+
+
+def test_half_the_rate_itself_is_allowed():
+    """There the controller is what it is at infinity."""
+    loop = CommonArm(1.0)
+    assert abs(sampled_open_loop(loop, np.pi * RATE)) < 1e-12
+    gain = Loop(Controller([], [], 0.2), COMMON, 2.0, 1.5)
+    expected = 0.2 * (2.0 - 0.8 * np.cos(400.0 * np.pi) + 0.6 * np.cos(300.0 * np.pi))
+    found = sampled_open_loop(gain, np.pi * RATE, 0.8, -0.6)
+    assert complex(found) == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("rate", [1e9, 1e300])
+def test_rates_beyond_all_memory_are_refused_with_the_estimate(rate, monkeypatch):
+    monkeypatch.setattr(np, "zeros", lambda *_: pytest.fail("allocated"))
+    message = r"sample_rate must be at most 3\.339e\+06 Hz for tau1 = 20\.1 s, got .*history"
+    with pytest.raises(ValueError, match=message) as caught:
+        Simulation(paper_loop(), rate)
+    if rate == 1e9:
+        assert "2.01e+10 samples, 161 GB" in str(caught.value)
+    assert LONGEST * 8 == 1 << 29
+
+
+VIEWS = {
+    "read-only": lambda a: (b := a.copy(), b.setflags(write=False))[0],
+    "backwards": lambda a: a[::-1].copy()[::-1],
+    "every third": lambda a: np.repeat(a, 3)[::3],
+    "column": lambda a: np.stack([a, 2.0 * a], axis=1)[:, 0],
+    "big-endian": lambda a: a.astype(">f8"),
+    "list": list,
+}
+
+
+@pytest.mark.parametrize("name", VIEWS)
+def test_the_layout_of_arrays_does_not_matter(name):
+    random = np.random.default_rng(5)
+    noise, c1, c2 = random.standard_normal((3, 700))
+    loop, rate = LOOPS["fractional"]
+    view = VIEWS[name]
+    expected = simulate(loop, noise, 0.1 * c1, 0.1 * c2, rate, history=c1)
+    found = simulate(loop, view(noise), view(0.1 * c1), view(0.1 * c2), rate, history=view(c1))
+    assert np.array_equal(found, expected)
+
+
+def test_integers_and_short_floats_are_numbers():
+    counts = np.arange(-50, 50)
+    expected = simulate(CommonArm(), counts.astype(float), sample_rate=10.0)
+    for dtype in (np.int8, np.int64, np.float32, np.float16, np.longdouble):
+        found = simulate(CommonArm(), counts.astype(dtype), sample_rate=10.0)
+        assert found.dtype == np.float64
+        assert np.array_equal(found, expected)
+
+
+def test_numpy_integers_are_integers():
+    loop, rate = LOOPS["fractional"]
+    noise = np.ones(300)
+    assert np.array_equal(
+        simulate(loop, noise, sample_rate=rate, interpolation=np.int64(3)),  # type: ignore[arg-type]
+        simulate(loop, noise, sample_rate=rate, interpolation=3),
+    )
+    blocks = simulate_blocks(loop, [noise], rate, samples=np.int32(300))  # type: ignore[arg-type]
+    assert next(blocks).size == 300
+
+
+PARTITION = st.lists(st.sampled_from([0, 1, 2, 3, 7, 64, 139, 140, 141, 400]), max_size=12)
+
+
+@given(st.sampled_from(sorted(LOOPS)), PARTITION, st.booleans())
+@example("fractional", [1] * 30, True)
+@settings(max_examples=40)
+def test_any_partition_gives_the_same_bits(name, sizes, constant):
+    loop, rate = LOOPS[name]
+    noise, c1, c2 = np.random.default_rng(9).standard_normal((3, sum(sizes)))
+    first, second = (0.7, -0.2) if constant else (c1, c2)
+    whole = simulate(loop, noise, first, second, rate, history=0.5, limit=1e30)
+    run = Simulation(loop, rate, history=0.5, limit=1e30)
+    ends = np.cumsum([0, *sizes])
+    parts = [
+        run.advance(noise[a:b], *((first, second) if constant else (c1[a:b], c2[a:b])))
+        for a, b in pairwise(ends)
+    ]
+    assert [part.size for part in parts] == sizes
+    assert np.array_equal(np.concatenate([np.empty(0), *parts]), whole)
+    assert run.samples == noise.size
+
+
+def test_a_refused_block_leaves_the_run_where_it_is():
+    noise = np.random.default_rng(2).standard_normal(500)
+    whole = simulate(CommonArm(), noise, sample_rate=10.0)
+    run = Simulation(CommonArm(), 10.0)
+    first = run.advance(noise[:200])
+    for bad in ((noise[200:], noise[:10]), (noise[200:], 1.0, np.nan), ([np.inf],), (3.0,)):
+        with pytest.raises(ValueError, match=r"^(c1|c2|noise) must"):
+            run.advance(*bad)
+    with pytest.raises(ValueError, match=r"^c1 must be .* shape of noise, \(0,\); got \(1,\)$"):
+        run.advance([], [1.0])
+    assert np.array_equal(np.concatenate([first, run.advance(noise[200:])]), whole)
+
+
+def test_a_copied_run_goes_on_by_itself():
+    noise = np.random.default_rng(2).standard_normal(500)
+    whole = simulate(CommonArm(), noise, sample_rate=10.0)
+    run = Simulation(CommonArm(), 10.0)
+    run.advance(noise[:200])
+    for other in (copy.deepcopy(run), pickle.loads(pickle.dumps(run))):
+        assert np.array_equal(other.advance(noise[200:]), whole[200:])
+    assert run.samples == 200
+    assert np.array_equal(run.advance(noise[200:]), whole[200:])
+
+
+def test_a_run_says_what_it_is():
+    run = Simulation(CommonArm(1.0, 2.1, 1.9), 20.0)
+    run.advance(np.ones(7))
+    assert repr(run) == (
+        "Simulation(CommonArm(gain=1.0, tau1=2.1, tau2=1.9), sample_rate=20.0, "
+        "interpolation=7, limit=1000000.0; 7 samples)"
+    )
+
+
+@pytest.mark.parametrize(
+    ("blocks", "error", "message"),
+    [
+        (None, TypeError, "blocks must be an iterable of arrays, got None"),
+        (3.0, TypeError, "blocks must be an iterable of arrays, got 3.0"),
+        ([(np.ones(3), 1.0, 1.0, 1.0)], ValueError, "got a tuple of 4"),
+        ([()], ValueError, "got a tuple of 0"),
+        ([(np.ones(3), np.ones(2))], ValueError, r"c1 must .* of noise, \(3,\); got \(2,\)"),
+        (np.ones(3), ValueError, r"noise must be one-dimensional, got shape \(\)"),
+    ],
+)
+def test_bad_streams(blocks, error, message):
+    with pytest.raises(error, match=message):
+        list(simulate_blocks(CommonArm(), blocks, 10.0))
+    with pytest.raises(ValueError, match="samples must be an integer from 0 on, got 'a'"):
+        simulate_blocks(CommonArm(), [], 10.0, samples="a")  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="progress must be True or False, got 1"):
+        simulate_blocks(CommonArm(), [], 10.0, progress=1)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("limit", [1e6, 1e12])
+def test_overflow_is_divergence_and_leaves_only_numbers(limit):
+    """The limit times the largest input is no number here."""
+    with pytest.raises(DivergenceError) as caught:
+        simulate(SingleArm(), np.full(60_000, 1e303), 3.0, sample_rate=20.0, limit=limit)
+    error = caught.value
+    assert error.output.size == round(error.detected * 20.0)
+    assert np.isfinite(error.output).all()
+    assert np.abs(error.output[-1]) > 1e308
+
+
+def test_the_error_travels():
+    with pytest.raises(DivergenceError) as caught:
+        simulate(SingleArm(), np.ones(20_000), 3.0, limit=10.0)
+    error = caught.value
+    assert error.output.base is None
+    for other in (pickle.loads(pickle.dumps(error)), copy.copy(error)):
+        assert type(other) is DivergenceError
+        assert str(other) == str(error)
+        assert (other.time, other.detected) == (error.time, error.detected)
+        assert np.array_equal(other.output, error.output)
+
+
+@pytest.mark.parametrize(
+    ("blocks", "error", "message"),
+    [
+        ([np.ones(2), np.array([1j])], TypeError, r"blocks\[1\] must be real, got complex"),
+        ([np.array([True])], TypeError, r"blocks\[0\] must hold real numbers, got dtype bool"),
+        (
+            [np.array([1.0, np.nan])],
+            ValueError,
+            r"blocks\[0\] must be finite, got nan at sample",
+        ),
+        ([np.ones((2, 2))], ValueError, r"blocks\[0\] must be one-dimensional, got shape"),
+        (np.ones(3), ValueError, r"blocks\[0\] must be one-dimensional, got shape \(\)"),
+        (["12"], TypeError, r"blocks\[0\] must hold real numbers"),
+        ([MASKED], TypeError, r"blocks\[0\] must be an ordinary array"),
+        (None, TypeError, "blocks must be an iterable of arrays, got None"),
+    ],
+)
+def test_what_is_no_series_is_not_saved(tmp_path, blocks, error, message):
+    with pytest.raises(error, match=message):
+        save_series(tmp_path / "run.npy", blocks)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_numbers_of_any_kind_are_saved_as_floats(tmp_path):
+    target = tmp_path / "run.npy"
+    blocks = [[1, 2], np.array([3], "i2"), np.array([4.5, 0.0, 5.5], "f4")[::2], np.empty(0)]
+    assert save_series(target, blocks) == 5  # type: ignore[arg-type]
+    assert np.load(target).tolist() == [1.0, 2.0, 3.0, 4.5, 5.5]
+    assert save_series(str(target), []) == 0
+    assert np.load(target).shape == (0,)
+
+
+def test_saved_series_are_files_like_others(tmp_path):
+    save_series(tmp_path / "run.npy", [np.ones(2)])
+    np.save(tmp_path / "other.npy", np.ones(2))
+    modes = [stat.S_IMODE(path.stat().st_mode) for path in tmp_path.iterdir()]
+    assert modes[0] == modes[1]
+
+
+def test_bad_names_are_refused_before_anything_is_computed(tmp_path):
+    def blocks():
+        yield pytest.fail("computed")
+
+    (tmp_path / "folder.npy").mkdir()
+    for name, error, message in (
+        ("run", ValueError, "path must end in .npy, got "),
+        ("run.txt", ValueError, "path must end in .npy, got "),
+        ("folder.npy", IsADirectoryError, "path must be a file, got the folder"),
+        ("none/run.npy", FileNotFoundError, "path must lie in a folder that exists"),
+    ):
+        with pytest.raises(error, match=message):
+            save_series(tmp_path / name, blocks())
+
+
+def test_a_file_being_written_does_not_look_whole(tmp_path):
+    """What another process sees in the meantime has another name, and no samples."""
+    seen = []
+
+    def blocks():
+        for _ in range(3):
+            seen.append(sorted(path.suffix for path in tmp_path.iterdir()))
+            yield np.ones(10_000)
+
+    save_series(tmp_path / "run.npy", blocks())
+    assert seen == [[".part"]] * 3
+    assert [path.name for path in tmp_path.iterdir()] == ["run.npy"]
 
 
 def test_the_benchmark_runs(tmp_path):
