@@ -12,10 +12,10 @@ from armlock.sensors import dual
 
 DECIDED = {
     "K1": (Verdict.IN_PART, 2.0, 0.0),
-    "K2": (Verdict.REPRODUCED, 2.0, 0.0),
+    "K2": (Verdict.IN_PART, 2.0, 0.0),
     "K3": (Verdict.REPRODUCED, 2.0, 0.0),
     "K4": (Verdict.NOT_AS_WRITTEN, 2.0, 0.0),
-    "K5": (Verdict.REPRODUCED, 1.4643205e-6, 1e-12),
+    "K5": (Verdict.IN_PART, 1.4643205e-6, 1e-12),
     "K6": (Verdict.DIFFERS, 2740.7, 1.0),
     "K7": (Verdict.NOT_AS_WRITTEN, 1.0, 0.0),
     "K8": (Verdict.IN_PART, 0.194727, 1e-6),

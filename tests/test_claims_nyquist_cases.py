@@ -118,3 +118,18 @@ def test_claims_stand_in_the_register():
         (entry, _), *_ = list(check(identifier))
         assert entry.chapter == chapter.CHAPTER
         assert entry.place.startswith("Sec. IV.A")
+
+
+def test_the_lower_gain_margin_starts_at_its_threshold():
+    """And holds on both sides: below it, a slow pair of roots is unstable."""
+    threshold = chapter.low_gain_threshold()
+    assert threshold == pytest.approx(0.00976, rel=1e-3)
+    low = chapter.at_gain(chapter.DUAL, 1e-7)
+    assert unstable_roots(low, 1.0, 1.0 + threshold * (1.0 - 1e-3)) == 0
+    assert unstable_roots(low, 1.0, 1.0 + threshold * (1.0 + 1e-3)) == 2
+    last = chapter.dual_gain_margins()[-1]
+    assert last.lower == pytest.approx(2.0075e-4, rel=1e-4)
+    for share, count in ((1.0 - 1e-4, 2), (1.0 + 1e-4, 0)):
+        loop = chapter.at_gain(chapter.DUAL, last.lower * share)
+        assert unstable_roots(loop, 1.0, 1.0 + last.size) == count
+    assert all(row.lower == 0.0 for row in chapter.dual_gain_margins()[:-1])

@@ -304,12 +304,12 @@ def convolution_of_spectra() -> Finding:
         close,
         "largest relative difference between the product's spectrum and the convolution, in "
         "bands with at least 1000 averages",
-        f"The convolution is right, for independent stationary signals (with fewer averages "
+        "The convolution is right, for independent stationary signals (with fewer averages "
         f"the scatter is up to {100 * worst:.0f} percent). Its consequence is stronger than "
         "the paper says: a perturbation of a slow phase is amplified by the phase's r.m.s., "
         f"which for the laser noise of the simulation is {factor:.1e} rad, so that η must be "
-        f"{np.log10(factor):.1f} orders below δφ. And the paper then takes η as large as δφ, "
-        "not smaller.",
+        f"about {np.log10(factor):.0f} orders below δφ. And the paper then takes η as large "
+        "as δφ, not smaller.",
     )
 
 

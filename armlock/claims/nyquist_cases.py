@@ -16,6 +16,7 @@ from armlock.margins import gain_interval, margins
 from armlock.noise import band_rms
 from armlock.nyquist import AxisCrossings, NyquistCurve, axis_crossings, nyquist
 from armlock.paper import (
+    DUAL_SENSOR_CORNER,
     DURATION,
     PERTURBATION,
     PHASE_NOISE_CORNER,
@@ -151,6 +152,16 @@ def at_gain(loop: Loop, factor: float) -> Loop:
     )
 
 
+def low_gain_threshold() -> float:
+    """Smallest c2 - 1 from which on the dual arm also has a lower gain margin, at c1 = 1.
+
+    At low gain 1 + L has the roots of s^2 + g (a s + b) with the first terms b / s^2 + a / s
+    of the loop per gain; they are stable as long as a is positive.
+    """
+    spread = TAU1 - TAU2
+    return 1.0 / (1.0 + TAU2 / spread + 1.0 / (DUAL_SENSOR_CORNER * spread))
+
+
 def fewest_roots(loop: Loop, c1: float, c2: float) -> int:
     """Return the smallest number of unstable roots of 1 + L over all gains tried."""
     return min(nyquist(at_gain(loop, factor), c1, c2).closed_loop_roots for factor in FACTORS)
@@ -173,21 +184,22 @@ def common_threshold() -> float:
 
 
 class GainMargin(NamedTuple):
-    """Upper gain margin of the dual arm at (1, 1 + size), and where it is taken."""
+    """Gain margins of the dual arm at (1, 1 + size), and where the upper one is taken."""
 
     size: float
     factor: float
     omega: float
+    lower: float
 
 
 @cache
 def dual_gain_margins(start: float = 1e-6, stop: float = 1e-2) -> tuple[GainMargin, ...]:
-    """Return the upper gain margin on the stable side, three sizes a decade."""
+    """Return the gain margins on the stable side, three sizes a decade."""
     number = 1 + round(3 * np.log10(stop / start))
     found = []
     for size in np.geomspace(start, stop, number):
-        _, upper, omega = gain_interval(DUAL, 1.0, 1.0 + float(size))
-        found.append(GainMargin(float(size), upper, omega))
+        lower, upper, omega = gain_interval(DUAL, 1.0, 1.0 + float(size))
+        found.append(GainMargin(float(size), upper, omega, lower))
     return tuple(found)
 
 
@@ -214,10 +226,11 @@ def size_of_perturbations() -> Finding:
         verdict if agrees else Verdict.OPEN,
         rms,
         f"r.m.s. of the appendix's spectrum from {low:g} Hz to {high:g} Hz",
-        f"That is {rms / PERTURBATION:.0f} times 10⁻⁶. Even its flat part alone, "
-        f"{PHASE_NOISE_LEVEL:g}/√Hz, reaches 10⁻⁶ in a band of {1e3 * band:.1f} mHz. So 10⁻⁶ "
-        "is an assumption, and the appendix does not support it. This chapter does not depend "
-        "on it.",
+        f"That is {rms / PERTURBATION:.0f} times 10⁻⁶. Even where the spectrum is flat, at "
+        f"{PHASE_NOISE_LEVEL:g}/√Hz, a band of {1e3 * band:.1f} mHz is enough for 10⁻⁶. So "
+        "10⁻⁶ is an assumption, and the appendix does not support it. The Nyquist plots do not "
+        "depend on it: they have perturbations of a thousandth. Claim A3 has the same from the "
+        "side of the appendix.",
     )
 
 
@@ -247,9 +260,9 @@ def single_arm_ideal() -> Finding:
         crossings,
         "crossings of the negative real axis",
         "At every multiple of 2π/τ the curve passes through the origin, horizontally, from "
-        "left to right, and nowhere comes above the real axis for ω > 0. What it is tangent to "
-        f"is the real axis. 1 + L has no unstable root at any of {FACTORS.size} gains from "
-        f"{FACTORS[0]:g} to {FACTORS[-1]:g} rad/s.",
+        "left to right, and nowhere comes above the real axis for ω > 0. What it is tangent "
+        "to is the real axis. With the open loop L, 1 + L has no unstable root at any of "
+        f"{FACTORS.size} gains from {FACTORS[0]:g} to {FACTORS[-1]:g} rad/s.",
     )
 
 
@@ -307,7 +320,7 @@ def value_at_full_turn() -> Finding:
         verdict,
         phase / np.pi,
         "phase of the open loop at 2π/τ, in units of π",
-        f"With the factor g/s of the formula one line above, L = {value.imag:.3g}j at "
+        f"With the factor g/s that the paper's P_s has, the open loop is {value.imag:.3g}j at "
         f"c₁ = {c1:g}: on the positive imaginary axis. {without.real:.3g} is the value of "
         "1 - c₁ exp(-jωτ) alone, without g/s.",
     )
@@ -341,12 +354,13 @@ def single_arm_crossing() -> Finding:
     return Finding(
         verdict,
         value,
-        f"L where the curve first crosses the negative real axis, at c₁ = {c1:g}",
-        f"At ω = {omega:.5f} rad/s, {100.0 * (1.0 - omega / turn):.2f} % below 2π/τ; in closed "
-        f"form -g√(c₁² - 1)/ω. A gain {factor:.3f} times higher puts it on -1, and the count "
-        f"goes from {sides[0]} to {sides[1]}. But this is no margin: at every gain there is at "
-        f"least {fewest} unstable root, and no gain makes the loop stable. What moves with the "
-        "perturbation is the gain at which a further pair becomes unstable.",
+        f"the open loop where its curve first crosses the negative real axis, at c₁ = {c1:g}",
+        f"At ω = {omega:.5f} rad/s, {100.0 * (1.0 - omega / turn):.2f} % below 2π/τ; in "
+        f"closed form -g√(c₁² - 1)/ω. A gain {factor:.3f} times higher puts it on -1, and the "
+        f"number of unstable roots goes from {sides[0]} to {sides[1]}. But this is no margin: "
+        f"at every gain there is at least {fewest} unstable root, and no gain makes the loop "
+        "stable. What moves with the perturbation is the gain at which a further pair becomes "
+        "unstable.",
     )
 
 
@@ -382,13 +396,13 @@ def common_arm_alike() -> Finding:
         threshold,
         "c₂ - 1 from which on the curve crosses the negative real axis near 2π over the mean "
         "delay",
-        f"The branch is as in the single arm, with {curve.encirclements} encirclement at "
-        f"(1, {COMMON_POINT[1]:g}). But the two delays never complete a turn together: the "
-        f"ideal curve passes below the origin at a distance of {miss:.1e} (g = "
-        f"{COMMON.gain:g}/s), and a smaller perturbation leaves it on that side. At (1, 1 + "
-        f"10⁻⁶) the first crossing is at {small[0]:.2f} rad/s, where L = {small[1]:.2e}. At "
-        f"(1, {COMMON_POINT[1]:g}) there is at least {fewest} unstable root at every gain, as "
-        "in the single arm.",
+        f"The branch is as in the single arm, with {curve.encirclements} encirclement at (1, "
+        f"{COMMON_POINT[1]:g}). But the two delays never complete a turn together: the ideal "
+        f"curve passes below the origin at a distance of {miss:.1e} (g = {COMMON.gain:g} "
+        "rad/s), and a smaller perturbation leaves it on that side. At (1, 1 + 10⁻⁶) the "
+        f"first crossing is at {small[0]:.2f} rad/s, where the open loop is {small[1]:.2e}. "
+        f"At (1, {COMMON_POINT[1]:g}) there is at least {fewest} unstable root at every gain, "
+        "as in the single arm.",
     )
 
 
@@ -407,11 +421,12 @@ def dual_arm_ideal() -> Finding:
     return Finding(
         Verdict.REPRODUCED if fits else Verdict.DIFFERS,
         curve.closed_loop_roots,
-        "zeros of 1 + L in the right half-plane at (1, 1)",
-        f"{sides[0]} unstable roots at (1, 1 + 10⁻⁶), {sides[2]} at (1, 1 - 10⁻⁶), and between "
-        "the two D has a root s = 0. That root belongs to the sensor's integral, not to 1 + L: "
-        f"L has a simple pole at s = 0 there, order {curve.pole_order}, its curve does not "
-        f"encircle -1, and the slowest root of 1 + L is at {root.real:.3g}/s.",
+        "zeros of 1 + L in the right half-plane at (1, 1), with the open loop L",
+        f"{sides[0]} unstable roots at (1, 1 + 10⁻⁶), {sides[2]} at (1, 1 - 10⁻⁶), and "
+        "between the two the characteristic function D has a root s = 0. That root belongs to "
+        "the sensor's integral, not to 1 + L: L has a simple pole at s = 0 there, order "
+        f"{curve.pole_order}, its curve does not encircle -1, and the slowest root of 1 + L "
+        f"is at {root.real:.3g}/s.",
     )
 
 
@@ -447,12 +462,14 @@ def dual_arm_branch() -> Finding:
         turns,
         "turns of the infinite branch around the origin, counter-clockwise positive",
         f"Unstable, with {curve.closed_loop_roots} root at "
-        f"{rightmost_of_loop(DUAL, c1, c2).real:.4g}/s, and L → {leading:.3g}/s². One turn, "
-        "but clockwise, when the contour passes s = 0 on the right as in the claim on the "
-        "single arm: N = 1, P = 0, Z = 1. Counter-clockwise it is only for a contour that "
-        f"passes on the left ({other:+.0f} turn); then the double pole lies inside, P = "
-        f"{curve.pole_order}, N = {inside}, and Z = {inside + curve.pole_order} again. "
-        "Counter-clockwise with P = 0 would mean a negative number of roots.",
+        f"{rightmost_of_loop(DUAL, c1, c2).real:.4g}/s, and near s = 0 the open loop is "
+        f"{leading:.3g}/s². One turn, but clockwise, when the contour passes s = 0 on the "
+        "right, as the paper has it for the single arm: N = 1 encirclement of -1, P = 0 "
+        "open-loop poles and Z = N + P = 1 root in the right half-plane. Counter-clockwise it "
+        f"is only for a contour that passes on the left ({other:+.0f} turn); then the double "
+        f"pole lies inside, P = {curve.pole_order}, N = {inside}, and Z = "
+        f"{inside + curve.pole_order} again. Counter-clockwise with P = 0 would mean a "
+        "negative number of roots.",
     )
 
 
@@ -486,17 +503,24 @@ def dual_arm_gain_margin() -> Finding:
         f"{DUAL.gain:g} rad/s",
         f"On the stable side with c₁ + c₂ > 2 it is so: {factor[0]:.0f} at (1, 1 + "
         f"{size[0]:g}), {factor[-1]:.1f} at (1, 1 + {size[-1]:g}), at first falling as the "
-        f"perturbation to the power {exponent:.2f}. At (1, 1) the curve crosses the negative "
-        "real axis nowhere, and 1 + L has "
+        f"perturbation to the power {exponent:.2f}. From (1, 1 + {low_gain_threshold():.2g}) "
+        f"on there is a lower limit as well, a factor {table[-1].lower:.1e} at (1, 1 + "
+        f"{size[-1]:g}). At (1, 1) the Nyquist curve crosses the negative real axis nowhere, "
+        "and at "
         + (
-            "unstable roots at some gains"
+            "some gains there are unstable roots"
             if any(ideal)
-            else "no unstable root at any gain tried"
+            else "no gain tried there is an unstable root"
         )
-        + f". At (0.999, 1) the margin is {lowered:g}: perturbations that weaken the arms give "
-        f"no crossing. At the paper's (1, {DUAL_POINT[1]:g}) there is no margin to speak of: "
-        f"at least {fewest} unstable root at every gain.",
+        + f". At (0.999, 1) the margin is {_number(lowered)}: perturbations that weaken the "
+        f"arms give no crossing. At the paper's (1, {DUAL_POINT[1]:g}) there is no margin to "
+        f"speak of: at least {fewest} unstable root at every gain.",
     )
+
+
+def _number(value: float) -> str:
+    """Write a factor, or that it is infinite."""
+    return f"{value:.4g}" if np.isfinite(value) else "infinite"
 
 
 @claim(
@@ -528,7 +552,7 @@ def margins_near_ideal() -> Finding:
         f"falls {gains:.0f}-fold, but from thousands; the modulus margin stays at "
         f"{found[0].modulus:.2f} and the phase margin between {phases.min():.1f} and "
         f"{phases.max():.1f} degrees. The margins do not announce the boundary: it is crossed "
-        "at s = 0, where L is infinite.",
+        "at s = 0, where the open loop is infinite.",
     )
 
 

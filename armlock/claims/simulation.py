@@ -639,8 +639,8 @@ def suppression_reached() -> Finding:
     return Finding(
         verdict,
         low,
-        f"orders of magnitude, |1 + L| of System 2 at {1e3 * BAND[0]:g} mHz, where it is "
-        "smallest in the band",
+        "orders of magnitude, |1 + L| of System 2, with the open loop L, at "
+        f"{1e3 * BAND[0]:g} mHz, where it is smallest in the band",
         f"For System 2 it holds: |1 + L| lies between {low:.2f} and {high:.2f} orders, and "
         f"the run has {orders(float(second.measured[0])):.2f} in its lowest band, at "
         f"{1e3 * second.frequency[0]:.2g} mHz. System 1 comes down to {varying:.2f} orders "
@@ -693,13 +693,13 @@ def long_times() -> Finding:
         share,
         "r.m.s. of the difference of the outputs, relative to the output of System 2",
         f"In the first twentieth of the run it is {start:.1e}. The reason is the loop below "
-        f"{1e6 * bode_difference():.0f} µHz, where |L| is about one or less, the laser's noise "
-        "passes, and by how much depends on c₁ - c₂: from (1, 1) to (1, 1 - 10⁻⁶) the closed "
-        f"loop's 1/|1 + L| grows up to {most.ratio:.2f}-fold (at {1e6 * most.at:.1f} µHz) and "
-        f"its phase moves by up to {np.degrees(most.phase):.0f} degrees (at "
-        f"{1e6 * most.phase_at:.1f} µHz). A period there lasts for days, so the outputs part "
-        "slowly. The paper names small phase shifts that accumulate; but the gain changes more "
-        "than the phase, and in a stable loop nothing accumulates.",
+        f"{1e6 * bode_difference():.0f} µHz, where the open loop's gain |L| is about one or "
+        "less, the laser's noise passes, and by how much depends on c₁ - c₂: from (1, 1) to "
+        f"(1, 1 - 10⁻⁶) the closed loop's 1/|1 + L| grows up to {most.ratio:.2f}-fold (at "
+        f"{1e6 * most.at:.1f} µHz) and its phase moves by up to {np.degrees(most.phase):.0f} "
+        f"degrees (at {1e6 * most.phase_at:.1f} µHz). A period there lasts for days, so the "
+        "outputs part slowly. The paper names small phase shifts that accumulate; but the "
+        "gain changes more than the phase, and in a stable loop nothing accumulates.",
     )
 
 
@@ -720,7 +720,8 @@ def agreement_with_theory() -> Finding:
     return Finding(
         Verdict.REPRODUCED if agrees else Verdict.DIFFERS,
         float(deviation[worst]),
-        "largest relative deviation of the measured suppression from |1 + L|, over all bands",
+        "largest relative deviation of the measured suppression from |1 + L|, with the open "
+        "loop L, over all bands",
         f"{found.frequency.size} bands from {1e3 * BAND[0]:g} mHz to {BAND[1]:g} Hz. The "
         f"largest is at {1e3 * found.frequency[worst]:.2g} mHz, where few averages enter; "
         f"from 1 mHz on none exceeds {100.0 * above:.1f} percent. {100.0 * inside:.0f} percent "
