@@ -122,29 +122,31 @@ def plot_loop(ax: Axes) -> None:
     drawing = _drawing(ax)
     upper, lower = 0.0, -3.2
     parts: list[Any] = [
-        *_arrow((-1.6, 1.6), (0.0, 1.6)),
-        dsp.SumSigma().anchor("center").at((0.45, 1.6)).fill("white"),
-        *_arrow((0.95, 1.6), (13.4, 1.6)),
-        dsp.Dot().at((12.4, 1.6)),
-        *_arrow((12.4, 1.6), (12.4, lower), head=False),
+        *_arrow((-1.6, 1.6), (-0.05, 1.6)),
+        dsp.Sum().anchor("center").at((0.45, 1.6)).fill("white"),
+        *_arrow((0.95, 1.6), (14.4, 1.6)),
+        dsp.Dot().at((13.4, 1.6)),
+        *_arrow((13.4, 1.6), (13.4, lower), head=False),
     ]
     for y, k in ((upper, 1), (lower, 2)):
         parts += [
-            dsp.Dot().at((12.4, y)) if k == 1 else dsp.Dot(radius=0.02).at((12.4, y)),
-            *_arrow((12.4, y), (8.35, y)),
-            dsp.Dot().at((11.9, y)),
-            *_arrow((11.9, y), (11.9, y - 1.6), (11.25, y - 1.6)),
-            _box((10.2, y - 1.6), 2.1, 0.9, rf"$e^{{-s\tau_{k}}}$"),
-            *_arrow((9.15, y - 1.6), (9.0, y - 1.6), (7.9, y - 1.6), (7.9, y - 0.5)),
+            dsp.Dot().at((13.4, y)) if k == 1 else dsp.Dot(radius=0.02).at((13.4, y)),
+            *_arrow((13.4, y), (8.4, y)),
+            dsp.Dot().at((12.9, y)),
+            *_arrow((12.9, y), (12.9, y - 1.6), (12.3, y - 1.6)),
+            _box((11.4, y - 1.6), 1.8, 0.9, rf"$e^{{-s\tau_{k}}}$"),
+            *_arrow((10.5, y - 1.6), (9.9, y - 1.6)),
+            _box((9.3, y - 1.6), 1.2, 0.9, f"$c_{k}$"),
+            *_arrow((8.7, y - 1.6), (7.9, y - 1.6), (7.9, y - 0.5)),
             dsp.Sum().anchor("center").at((7.9, y)).fill("white"),
             _box((5.7, y), 1.9, 0.9, f"$m_{k}(s)$"),
-            *_arrow((7.45, y), (6.65, y)),
+            *_arrow((7.4, y), (6.65, y)),
         ]
     middle = 0.5 * (upper + lower)
     parts += [
         *_arrow((4.75, upper), (4.0, upper), (4.0, middle + 0.5)),
         *_arrow((4.75, lower), (4.0, lower), (4.0, middle - 0.5)),
-        dsp.SumSigma().anchor("center").at((4.0, middle)).fill("white"),
+        dsp.Sum().anchor("center").at((4.0, middle)).fill("white"),
         *_arrow((3.5, middle), (2.5, middle)),
         _box((1.6, middle), 1.8, 1.0, "$K(s)$"),
         *_arrow((0.7, middle), (0.45, middle), (0.45, 1.1)),
@@ -152,10 +154,9 @@ def plot_loop(ax: Axes) -> None:
     for part in parts:
         drawing.add(part)
     drawing.draw(show=False)
-    for y, k in ((upper, 1), (lower, 2)):
-        ax.text(8.5, y - 1.5, f"$c_{k}$", ha="center", va="bottom", fontsize=9)
+    for y in (upper, lower):
         ax.text(8.15, y - 0.75, "−", ha="left", va="center", fontsize=10)
     ax.text(-1.6, 1.75, r"laser, $\varphi_0$", ha="left", va="bottom", fontsize=9)
-    ax.text(13.4, 1.75, r"$\varphi$", ha="right", va="bottom", fontsize=10)
+    ax.text(14.4, 1.75, r"$\varphi$", ha="right", va="bottom", fontsize=10)
     ax.text(0.2, 0.75, "−", ha="right", va="center", fontsize=10)
-    ax.set(xlim=(-1.9, 13.7), ylim=(-5.6, 2.6))
+    ax.set(xlim=(-1.9, 14.7), ylim=(-5.6, 2.6))

@@ -18,7 +18,7 @@ EXPECTED = {
     "S5": (Verdict.IN_PART, -1.011031041661212, 1e-12),
     "S6": (Verdict.REPRODUCED, np.degrees(np.pi / 4 - np.arctan(0.5)), 1e-9),
     "S7": (Verdict.IN_PART, 1.0 + TAU1, 1e-6),
-    "S8": (Verdict.NOT_AS_WRITTEN, -1.76031004, 1e-6),
+    "S8": (Verdict.NOT_AS_WRITTEN, 0.434699287, 1e-8),
     "S9": (Verdict.IN_PART, 2.0 * np.pi / 3.0 / np.sqrt(3.0), 1e-12),
     "S10": (Verdict.REPRODUCED, -0.0020258541171, 1e-12),
     "S11": (Verdict.IN_PART, 1.0, 1e-6),
