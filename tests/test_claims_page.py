@@ -6,7 +6,8 @@ import pytest
 
 from armlock.claims import Verdict, all_claims, check
 from armlock.claims import page as module
-from armlock.claims.assumptions import DIFFERENCES, eta_rms, first_break, over_corners
+from armlock.claims.assumptions import DIFFERENCES, Assumptions, first_break, over_corners
+from armlock.claims.controller import highest_corner
 from armlock.claims.page import (
     LedgerPage,
     VerdictCounts,
@@ -115,5 +116,21 @@ def test_the_loop_is_lost_at_the_upper_end_of_two_decades():
     assert columns["full"][-1] == columns["half"][-1] == 0.0
 
 
-def test_the_spectrum_at_face_value_is_far_above_the_limit():
-    assert eta_rms() == pytest.approx(0.0145793, rel=1e-5)
+def test_the_loop_is_lost_just_above_the_highest_corner():
+    corners, columns = over_corners(3)
+    for name, difference in DIFFERENCES.items():
+        limit = highest_corner(difference)
+        stable = corners[columns[name] > 0.0]
+        assert stable.max() == pytest.approx(limit * (1.0 - 1e-3))
+        assert columns[f"{name} margin"][corners == stable.max()] < 0.01
+        lost = corners[columns[name] == 0.0]
+        assert lost.min() == pytest.approx(limit * (1.0 + 1e-3))
+
+
+def test_the_assumptions_hold_computed_numbers():
+    entries = {entry.name: entry.sensitivity for entry in Assumptions().entries}
+    assert len(entries) == 13
+    assert "1.46e+04 times the limit" in entries["The scale of η(t)"]
+    assert "at 1.464e-06" in entries["p, the corner frequency of the dual sensor"]
+    assert "inside the ±1e-06" in entries["Δτ in the dual sensor"]
+    assert "miss it" in entries["The basic noise requirement that g = 5000 meets"]

@@ -9,22 +9,39 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armlock.claims.controller import highest_corner
+from armlock.claims.controller import (
+    SUPPRESSION_BAND,
+    assumed_requirement,
+    free_running,
+    highest_corner,
+    suppression,
+)
+from armlock.claims.simulation import (
+    DRAWS,
+    FREE_RUNNING,
+    LOWEST,
+    PERTURBATION_SEEDS,
+    face_value_rms,
+    growing_probability,
+    leaving_probability,
+    stable_up_to,
+)
 from armlock.controllers import table_two
 from armlock.loops import Loop, paper_loop
 from armlock.margins import modulus_margin
+from armlock.noise import LaserNoise, band_rms
 from armlock.paper import (
     CONTROLLER_GAIN,
     DUAL_SENSOR_CORNER,
     DURATION,
+    LASER_NOISE,
     PERTURBATION,
-    PHASE_NOISE_CORNER,
-    PHASE_NOISE_LEVEL,
     SAMPLE_RATE,
     TAU1,
     TAU2,
 )
 from armlock.roots import rightmost_root
+from armlock.simulation import sampled_open_loop
 from armlock.stability import unstable_roots
 from armlock.validation import FloatArray
 
@@ -85,15 +102,24 @@ def first_break(
 def over_corners(points: int = 31) -> tuple[FloatArray, dict[str, FloatArray]]:
     """Follow the controlled loop over two decades of p, for both meanings of dtau.
 
+    Parameters
+    ----------
+    points : int, optional
+        Number of corner frequencies on a logarithmic grid; more are put where the loop is
+        about to become unstable.
+
     Returns
     -------
-    corners : float array, shape (points,)
-        Corner frequency p in rad/s.
+    corners : float array, shape (n,)
+        Corner frequency p in rad/s, rising.
     columns : dict of str to float array
         For "full" and "half": first break along (1, -1), 0 where the loop is unstable at
         (1, 1), and under "full margin" and "half margin" min |1 + L|, nan there.
     """
-    corners = DUAL_SENSOR_CORNER * np.logspace(-1.0, 1.0, points)
+    grid = DUAL_SENSOR_CORNER * np.logspace(-1.0, 1.0, points)
+    close = 1.0 - np.append(np.linspace(0.24, 0.02, 12), [1e-3, -1e-3])
+    near = [highest_corner(difference) * close for difference in DIFFERENCES.values()]
+    corners = np.unique(np.concatenate((grid, *near)))
     columns: dict[str, FloatArray] = {}
     for name, difference in DIFFERENCES.items():
         loops = [paper_loop(float(p), difference=difference) for p in corners]
@@ -106,15 +132,6 @@ def over_corners(points: int = 31) -> tuple[FloatArray, dict[str, FloatArray]]:
             ]
         )
     return corners, columns
-
-
-def eta_rms(low: float = 1.0 / DURATION, high: float = 0.5 * SAMPLE_RATE) -> float:
-    """R.m.s. of the appendix's spectrum, taken for eta at face value, between two Hz."""
-
-    def integral(f: float) -> float:
-        return f - PHASE_NOISE_CORNER**4 / (3.0 * f**3)
-
-    return float(PHASE_NOISE_LEVEL * np.sqrt(integral(high) - integral(low)))
 
 
 class Assumption(NamedTuple):
@@ -141,13 +158,15 @@ class Assumption(NamedTuple):
 def _corner() -> Assumption:
     tenth = first_break(paper_loop(0.1 * DUAL_SENSOR_CORNER))
     here, limit = first_break(paper_loop()), highest_corner()
+    half = highest_corner(DIFFERENCES["half"])
     return Assumption(
         "p, the corner frequency of the dual sensor",
         f"{DUAL_SENSOR_CORNER:.4g} rad/s ({DUAL_SENSOR_CORNER / (2 * np.pi):.2g} Hz)",
         "The paper gives none. A public arm-locking code for arms of this length has it.",
-        f"The loop first breaks at {here:.4g} along (1, -1), and at {tenth:.4g} with a tenth "
-        f"of p. But from p = {limit:.3g} rad/s on, {limit / DUAL_SENSOR_CORNER:.3g} times "
-        "the value taken, the loop is unstable without any perturbation.",
+        f"The first break along (1, -1) is at {here:.4g}, and with a tenth of p at "
+        f"{tenth:.4g}. But from p = {limit:.3g} rad/s on, {limit / DUAL_SENSOR_CORNER:.3g} "
+        "times the value taken, the loop is unstable without any perturbation, and with half "
+        f"of Δτ from {half:.3g} rad/s on.",
     )
 
 
@@ -158,7 +177,7 @@ def _difference() -> Assumption:
         "Δτ in the dual sensor",
         f"τ₁ - τ₂ = {DIFFERENCES['full']:.2g} s in the loop",
         "Sec. III.B defines it so. Table I is right only with half of it (claims T2, T3).",
-        f"The loop first breaks at {full:.4g} along (1, -1) with the whole difference and at "
+        f"The first break along (1, -1) is at {full:.4g} with the whole difference and at "
         f"{half:.4g} with half of it, which is {inside} the ±{PERTURBATION:g} of the paper; "
         f"min |1 + L| is {modulus_margin(paper_loop()):.3f} and "
         f"{modulus_margin(paper_loop(difference=DIFFERENCES['half'])):.3f}.",
@@ -198,7 +217,7 @@ def _gain() -> Assumption:
     def outcome(loop: Loop, unstable: int) -> str:
         if unstable:
             return f"{unstable} unstable roots at (1, 1)"
-        return f"a first break at {first_break(loop):.4g} along (1, -1)"
+        return f"the first break along (1, -1) at {first_break(loop):.4g}"
 
     return Assumption(
         "The unit of g",
@@ -239,14 +258,97 @@ def _history() -> Assumption:
 
 
 def _scale() -> Assumption:
-    rms = eta_rms()
-    slow = eta_rms(1.0 / DURATION, 1e-3)
+    rms = face_value_rms()
     return Assumption(
         "The scale of η(t)",
-        "Both: the appendix's spectrum at face value, and scaled to the stated size",
-        f"The appendix takes a phase noise for η; Sec. IV.A limits η to {PERTURBATION:g}.",
-        f"From 1/({DURATION:g} s) to {0.5 * SAMPLE_RATE:g} Hz the spectrum has an r.m.s. of "
-        f"{rms:.3g} ({slow:.3g} below 1 mHz), {rms / PERTURBATION:.3g} times the limit.",
+        "Both: the appendix's spectrum at face value, and reduced to an r.m.s. of "
+        f"{PERTURBATION:g} (System 1)",
+        f"The appendix takes a phase noise for η; Sec. IV.A limits η to {PERTURBATION:g}, and "
+        "does not say whether that is an r.m.s. or a bound.",
+        f"From {LOWEST:g} to {0.5 * SAMPLE_RATE:g} Hz the printed spectrum has an r.m.s. of "
+        f"{rms:.3g}, {rms / PERTURBATION:.3g} times the limit. Of random courses reduced to "
+        f"the limit, {100 * leaving_probability():.0f} % leave the stable region for a time "
+        f"(c₁ - c₂ above {stable_up_to():.3g}); reduced to a third of it, "
+        f"{100 * leaving_probability(1.0 / 3.0):.1f} %.",
+    )
+
+
+def _lowest() -> Assumption:
+    total = band_rms(LOWEST, 0.5 * SAMPLE_RATE)
+    sizes = ", ".join(
+        f"{band_rms(low, 0.5 * SAMPLE_RATE):.2g} from {1e3 * low:g} mHz on"
+        for low in (1e-4, 1e-3)
+    )
+    earlier = band_rms(0.1 * LOWEST, 0.5 * SAMPLE_RATE)
+    return Assumption(
+        "Where the spectrum of η(t) ends at low frequency",
+        f"At {LOWEST:g} Hz, one over the duration; flat below",
+        "The printed spectrum rises as 1/f² without end. A run cannot hold slower parts.",
+        f"The slowest parts are nearly all of it: the r.m.s. is {total:.2g}, {sizes}, and "
+        f"{earlier:.2g} if it ended ten times lower. At face value the end decides whether "
+        "System 1 is lost (claim M2).",
+    )
+
+
+def _laser() -> Assumption:
+    cutoff = LaserNoise(0).cutoff
+    low = SUPPRESSION_BAND[0]
+    change = 1.0 - 1.0 / np.sqrt(1.0 + (cutoff / low) ** 2)
+    rms = LASER_NOISE * np.sqrt(0.5 * np.pi / cutoff)
+    return Assumption(
+        "Where the laser's 30/f spectrum ends at low frequency",
+        f"At {cutoff:g} Hz; flat below",
+        "1/f has an infinite variance. The end lies below all that a run of "
+        f"{DURATION:g} s resolves.",
+        f"At {1e3 * low:g} mHz, where the suppression is measured from, the density is lower "
+        f"by {change:.1g} of itself. The r.m.s. of the input, {rms:.3g} Hz, and the slow "
+        "wandering of input and outputs in the time series grow as one over the root of the "
+        "cut-off: √10 times larger for one ten times lower.",
+    )
+
+
+def _seeds() -> Assumption:
+    return Assumption(
+        "The random numbers of the simulation",
+        f"One draw, with seeds {PERTURBATION_SEEDS[0]} and {PERTURBATION_SEEDS[1]} for c₁, c₂",
+        "The paper shows one draw and gives no seed.",
+        f"Of {DRAWS} other draws of System 1, {100 * leaving_probability():.0f} % leave the "
+        "region in which the loop with constant c₁, c₂ is stable, for a time; "
+        f"{100 * growing_probability():.1f} % stay outside for long enough to grow by a "
+        "factor e.",
+    )
+
+
+def _requirement() -> Assumption:
+    frequency = np.geomspace(*SUPPRESSION_BAND, 20_001)
+    allowed = assumed_requirement(frequency) * suppression(frequency)
+    spare = float(np.min(allowed / free_running(frequency)))
+    free = float(np.min(allowed * frequency / FREE_RUNNING))
+    return Assumption(
+        "The basic noise requirement that g = 5000 meets",
+        "30 √(1 + (2.8 mHz / f)⁴) Hz/√Hz for the locked laser",
+        "The paper names none. Missions of this kind ask about that of a laser before "
+        "time-delay interferometry.",
+        f"The paper's 30/f Hz/√Hz meets it {spare:.3g} times over. A free-running laser of "
+        f"{FREE_RUNNING:g}/f Hz/√Hz would have {free:.2g} times what it needs, and so "
+        f"{'meet' if free > 1.0 else 'miss'} it.",
+    )
+
+
+def _rule() -> Assumption:
+    frequency = np.geomspace(*SUPPRESSION_BAND, 20_001)
+    omega = 2.0 * np.pi * frequency
+    sampled = np.abs(1.0 + sampled_open_loop(paper_loop(), omega, sample_rate=SAMPLE_RATE))
+    coarse = np.abs(1.0 + sampled_open_loop(paper_loop(), omega, sample_rate=20.0))
+    exact = suppression(frequency)
+    change, other = (float(np.max(np.abs(x / exact - 1.0))) for x in (sampled, coarse))
+    return Assumption(
+        "How the loop is made discrete",
+        f"By the trapezoidal rule at {SAMPLE_RATE:g} Hz; delays exact, in whole samples",
+        "The paper names a program, but no rule. This one keeps a stable loop stable.",
+        f"From {1e3 * SUPPRESSION_BAND[0]:g} mHz to {SUPPRESSION_BAND[1]:g} Hz the sampled "
+        f"loop's |1 + L| is within {100 * change:.2g} % of the exact one (at 20 Hz it would "
+        f"be within {100 * other:.2g} %), far less than what a run of this length can tell.",
     )
 
 
@@ -259,6 +361,11 @@ _ALL: tuple[Callable[[], Assumption], ...] = (
     _order,
     _history,
     _scale,
+    _lowest,
+    _laser,
+    _seeds,
+    _requirement,
+    _rule,
 )
 
 

@@ -194,15 +194,20 @@ def all_margins(point: tuple[float, float]) -> Margins:
 
 
 @cache
-def highest_corner() -> float:
+def highest_corner(difference: float | None = None) -> float:
     """Highest corner frequency p in rad/s at which the loop is stable at (1, 1).
 
     By bisection from the assumed one up.
+
+    Parameters
+    ----------
+    difference : float, optional
+        The sensor's dtau in s; tau1 - tau2 by default.
     """
     low, high = DUAL_SENSOR_CORNER, 100.0 * DUAL_SENSOR_CORNER
     for _ in range(24):
         middle = float(np.sqrt(low * high))
-        if unstable_roots(paper_loop(corner=middle), 1.0, 1.0) == 0:
+        if unstable_roots(paper_loop(middle, difference=difference), 1.0, 1.0) == 0:
             low = middle
         else:
             high = middle
