@@ -26,9 +26,10 @@ from sphinx.util.docutils import SphinxDirective
 import armlock
 
 BUILD_TOOLS = ["jupyter-book", "sphinx", "myst-nb", "ipykernel"]
-INLINE = re.compile(r"(``.+?``|:[\w:]+:`[^`]+`)")
+# Code, a role with its text, a name in single backticks; what lies between is plain text.
+INLINE = re.compile(r"(``.+?``|:[\w:]+:`[^`]+`|`[^`]+`(?!_))")
 TRAILING_UNDERSCORE = re.compile(r"(?<=\w)_(?!\w)")
-NAME = re.compile(r"(?<![`:\w])`([^`]+)`(?![`_])")
+SHARED = re.compile(r"(\w+(?:, \w+)+)( : .*)")
 
 
 def comments(module):
@@ -144,22 +145,43 @@ class Versions(SphinxDirective):
         return self.parse_text_to_nodes("\n".join(text))
 
 
-def link_or_code(match):
+def link_or_code(piece):
     """Turn a name in backticks into a link, or into code."""
-    name = match[1]
+    name = piece.strip("`")
     bare = name.removesuffix("()").removeprefix("armlock.")
     if bare.split(".")[0] in armlock.__all__:
         return f":py:obj:`~armlock.{bare}`"
     return f"``{name}``"
 
 
-def escaped(text):
-    """Escape what would be markup: the bars of |L|, the end of P_."""
-    return TRAILING_UNDERSCORE.sub(r"\\_", text.replace("|", r"\|"))
+def inline(piece):
+    """Escape plain text, whose bars and trailing underscores would be markup; link names."""
+    if not INLINE.fullmatch(piece):
+        return TRAILING_UNDERSCORE.sub(r"\\_", piece.replace("|", r"\|"))
+    return link_or_code(piece) if re.match(r"`[^`]", piece) else piece
+
+
+def separated(lines):
+    """Give attributes that share a line one each: Napoleon does so for parameters only."""
+    done, inside, at = [], False, 0
+    while at < len(lines):
+        if at + 1 < len(lines) and lines[at + 1].startswith("---"):
+            inside = lines[at] == "Attributes"
+        end = at + 1
+        if inside and (shared := SHARED.fullmatch(lines[at])):
+            while end < len(lines) and lines[end].startswith(" "):
+                end += 1
+            for name in shared[1].split(", "):
+                done += [name + shared[2], *lines[at + 1 : end]]
+        else:
+            done.append(lines[at])
+        at = end
+    return done
 
 
 def prepare(app, what, name, thing, options, lines):
     """Prepare a docstring, outside its formulas and examples."""
+    lines[:] = separated(lines)
     skip = None
     for number, line in enumerate(lines):
         indent = len(line) - len(line.lstrip())
@@ -168,10 +190,7 @@ def prepare(app, what, name, thing, options, lines):
         skip = indent if line.lstrip().startswith(".. math::") else None
         if skip is not None or line.lstrip().startswith((">>>", "...")):
             continue
-        pieces = INLINE.split(NAME.sub(link_or_code, line))
-        lines[number] = "".join(
-            piece if INLINE.fullmatch(piece) else escaped(piece) for piece in pieces
-        )
+        lines[number] = "".join(map(inline, INLINE.split(line)))
 
 
 def plain_type(app, env, node, contnode):
