@@ -37,6 +37,11 @@ FAULTS = {
     "pale text": ('<p style="color: #ddd; background: #fff">pale</p>', "contrast"),
     "a dead slider": ('<figure><input type="range" aria-label="x"></figure>', "a slider"),
     "nothing under the pointer": ('<p data-check="hover">still</p>', "to the pointer"),
+    "nothing under a finger": (
+        '<p data-check="hover" onpointermove="if (event.pointerType === \'mouse\') '
+        "this.textContent = 'here'\">Move over this.</p>",
+        "to a finger",
+    ),
 }
 
 

@@ -8,7 +8,8 @@ broken link or anchor, describe every image, not scroll sideways, have no seriou
 axe, and be readable in time; what it loads must not weigh too much. Search must find
 something, downloads must open, and what reacts to the pointer must react:
 
-- `data-check="hover"` on an element: its text must change while the pointer crosses it;
+- `data-check="hover"` on an element: its text must change while the pointer crosses it, and
+  where a finger taps it;
 - a slider (`input type=range`): the figure around it, or the element that its `aria-controls`
   names, must change when an arrow key is pressed;
 - figures of Plotly: a label must appear under the pointer, and sliders must change the figure.
@@ -134,6 +135,8 @@ class Book:
         self.requests: set[str] = set()
         context = chromium.new_context(viewport=WIDE, offline=True, reduced_motion="reduce")
         self.page = context.new_page()
+        telephone = chromium.new_context(viewport=NARROW, offline=True, has_touch=True)
+        self.telephone = telephone.new_page()
         self.page.on("request", lambda request: self.requests.add(request.url))
         self.page.on("pageerror", lambda error: self.report(f"script error: {error}"))
         self.page.on("console", self.read_console)
@@ -171,6 +174,8 @@ class Book:
             for problem in self.page.evaluate(script):
                 self.report(problem)
         self.check_interaction()
+        if self.page.locator("[data-check=hover]").count():
+            self.check_touch(file)
         self.check_axe("light", {})
         self.page.evaluate("() => { document.documentElement.dataset.theme = 'dark' }")
         self.page.wait_for_timeout(50)
@@ -236,6 +241,20 @@ class Book:
             page.wait_for_timeout(100)
             if before is None or slider.evaluate(CONTROLLED) == before:
                 self.report(f"a slider changes nothing: {slider.get_attribute('id')}")
+
+    def check_touch(self, file: Path) -> None:
+        """Tap on what reacts to the pointer."""
+        self.telephone.goto(file.as_uri(), wait_until="load")
+        for element in self.telephone.locator("[data-check=hover]").all():
+            element.scroll_into_view_if_needed()
+            before, box = element.inner_text(), element.bounding_box()
+            for share in (0.3, 0.5, 0.7):
+                self.telephone.touchscreen.tap(
+                    box["x"] + share * box["width"], box["y"] + 0.4 * box["height"]
+                )
+            self.telephone.wait_for_timeout(60)
+            if element.inner_text() == before:
+                self.report("an element that should react to a finger does not")
 
     def sweep(self, element: Any, reacts: Any) -> bool:
         """Move the pointer across an element until something reacts."""
