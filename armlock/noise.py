@@ -8,7 +8,8 @@ densities are one-sided.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import warnings
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -18,13 +19,15 @@ from scipy.linalg import solve_continuous_lyapunov
 
 from armlock import paper
 from armlock.controllers import Controller
-from armlock.sampled import Row, floats, real_system, sample, warped
-from armlock.validation import FloatArray, positive_number
+from armlock.sampled import Row, checked_frequency, floats, real_system, sample, warped
+from armlock.validation import FloatArray, positive_number, real_number, switch, whole_number
 
 #: Half the number of samples over which the laser's noise is smoothed, see `LaserNoise`.
 _REACH = 12
 #: The band, as a share of half the sample rate, in which that smoothing is fitted.
 _FITTED = 0.96
+#: Largest cutoff of the laser's noise, as a share of the sample rate; see `LaserNoise`.
+_LARGEST_CUTOFF = 0.01
 
 
 class ShapedNoise:
@@ -40,9 +43,9 @@ class ShapedNoise:
     Parameters
     ----------
     zeros, poles : sequence of complex
-        Of the filter, in rad/s.
+        Of the filter, in rad/s; all poles in the left half-plane.
     gain : float
-        Its gain; its magnitude at s = j omega is the amplitude spectral density.
+        Its gain, not zero; its magnitude at s = j omega is the amplitude spectral density.
     seed : int
         Of the random numbers.
     sample_rate : float, optional
@@ -51,6 +54,13 @@ class ShapedNoise:
         Whether the filter starts at rest, and the series at about zero, as a simulation that
         is switched on would have it. By default it starts in the middle of its stationary
         course.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument is not finite, complex factors do not come in conjugate pairs, there are
+        more zeros than poles, or a pole lies on the imaginary axis or right of it, so that the
+        noise has no density.
 
     Notes
     -----
@@ -75,8 +85,8 @@ class ShapedNoise:
 
     def __init__(
         self,
-        zeros: tuple[complex, ...],
-        poles: tuple[complex, ...],
+        zeros: Sequence[complex],
+        poles: Sequence[complex],
         gain: float,
         *,
         seed: int,
@@ -84,30 +94,79 @@ class ShapedNoise:
         at_rest: bool = False,
     ) -> None:
         self.sample_rate = positive_number("sample_rate", sample_rate)
+        if real_number("gain", gain) == 0.0:
+            raise ValueError(f"gain must not be zero, got {gain}")
         self._filter = Controller(zeros, poles, gain)
-        if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-            raise ValueError(f"seed must be an integer from 0 on, got {seed!r}")
-        self._random = np.random.default_rng(seed)
-        continuous = real_system(zeros, poles, gain)
+        for pole in self._filter.poles:
+            if pole.real >= 0.0:
+                raise ValueError(f"poles must lie in the left half-plane, got {pole} rad/s")
+        self.seed = whole_number("seed", seed, 0)
+        self.at_rest = switch("at_rest", at_rest)
+        self._random = np.random.default_rng(self.seed)
+        continuous = real_system(self._filter.zeros, self._filter.poles, self._filter.gain)
         self._sampled = sample(continuous, self.sample_rate)
         # White samples of variance one have the one-sided density 2 / sample_rate.
         self._scale = math.sqrt(0.5 * self.sample_rate)
         A, B, _, _ = continuous.as_floats()
         self._state: Row = (0.0,) * len(A)
-        if not at_rest and len(A):
-            covariance = solve_continuous_lyapunov(A, -0.5 * B @ B.T)
+        if not self.at_rest and len(A):
             # The trapezoidal rule keeps the covariance.
-            start = np.linalg.cholesky(0.5 * (covariance + covariance.T))
+            start = _root_of_covariance(A, B)
             self._state = floats(start @ self._random.standard_normal(len(A)))
 
+    def __repr__(self) -> str:
+        """Name the class and its arguments."""
+        return (
+            f"{type(self).__name__}(zeros={self._filter.zeros}, poles={self._filter.poles}, "
+            f"gain={self._filter.gain}, {self._common()})"
+        )
+
+    def _common(self) -> str:
+        """Return the arguments that all noises share, for their names."""
+        return f"seed={self.seed}, sample_rate={self.sample_rate}, at_rest={self.at_rest}"
+
     def asd(self, frequency: npt.ArrayLike) -> FloatArray:
-        """Prescribed density at a frequency in Hz, in the series' unit per sqrt(Hz)."""
-        return self._density(2.0 * np.pi * np.asarray(frequency, dtype=float))
+        """Prescribed density at a frequency in Hz, in the series' unit per sqrt(Hz).
+
+        Parameters
+        ----------
+        frequency : array_like of float
+            In Hz, not negative.
+
+        Returns
+        -------
+        float array, shaped like `frequency`
+
+        Raises
+        ------
+        TypeError, ValueError
+            If a frequency is negative, or not finite and real.
+        """
+        frequency = checked_frequency("frequency", frequency, math.inf, "Hz")
+        return self._density(2.0 * np.pi * frequency)
 
     def sampled_asd(self, frequency: npt.ArrayLike) -> FloatArray:
-        """Density of the samples in closed form, at a frequency below half the rate."""
-        omega = 2.0 * np.pi * np.asarray(frequency, dtype=float)
-        return self._density(warped(omega, self.sample_rate))
+        """Density of the samples in closed form.
+
+        Parameters
+        ----------
+        frequency : array_like of float
+            In Hz, not negative and at most half the sample rate.
+
+        Returns
+        -------
+        float array, shaped like `frequency`
+
+        Raises
+        ------
+        TypeError, ValueError
+            If a frequency is negative, above half the sample rate, or not finite and real.
+        """
+        frequency = self._below_half_rate(frequency)
+        return self._density(warped(2.0 * np.pi * frequency, self.sample_rate))
+
+    def _below_half_rate(self, frequency: npt.ArrayLike) -> FloatArray:
+        return checked_frequency("frequency", frequency, 0.5 * self.sample_rate, "Hz")
 
     def _density(self, omega: FloatArray) -> FloatArray:
         return np.asarray(np.abs(self._filter(1j * omega)))
@@ -124,7 +183,7 @@ class ShapedNoise:
         -------
         float array, shape (samples,)
         """
-        white = self._random.standard_normal(_count("samples", samples))
+        white = self._random.standard_normal(whole_number("samples", samples, 0))
         white *= self._scale
         sampled = self._sampled
         self._state = _filter(
@@ -141,18 +200,34 @@ class ShapedNoise:
         samples : int
             How many in all.
         size : int, optional
-            Largest size of a block.
+            Largest size of a block, one or more.
 
         Yields
         ------
         float array
         """
-        left, size = _count("samples", samples), _count("size", size)
-        if size == 0:
-            raise ValueError("size must be at least 1, got 0")
-        while left > 0:
-            yield self.draw(min(size, left))
-            left -= size
+        left, most = whole_number("samples", samples, 0), whole_number("size", size, 1)
+
+        def parts() -> Iterator[FloatArray]:
+            for first in range(0, left, most):
+                yield self.draw(min(most, left - first))
+
+        return parts()
+
+
+def _root_of_covariance(A: FloatArray, B: FloatArray) -> FloatArray:
+    """Return R with R R^T the covariance of the stationary state, or say that it has none."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", RuntimeWarning)
+            covariance = solve_continuous_lyapunov(A, -0.5 * B @ B.T)
+        root = np.linalg.cholesky(0.5 * (covariance + covariance.T))
+    except (RuntimeWarning, np.linalg.LinAlgError):
+        raise ValueError(
+            "poles must not lie so close to the imaginary axis that the variance is lost in "
+            "rounding; a series that starts at rest does without it, at_rest=True"
+        ) from None
+    return np.asarray(root)
 
 
 @njit(cache=True)
@@ -180,12 +255,6 @@ def _filter(
     return w
 
 
-def _count(name: str, value: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0:
-        raise ValueError(f"{name} must be an integer from 0 on, got {value!r}")
-    return int(value)
-
-
 def sample_count(duration: float, sample_rate: float = 200.0) -> int:
     """Return the number of samples of a run.
 
@@ -206,12 +275,12 @@ def sample_count(duration: float, sample_rate: float = 200.0) -> int:
     TypeError, ValueError
         If one of the two is not positive and finite, or the run is shorter than a sample.
     """
-    count = round(
-        positive_number("duration", duration) * positive_number("sample_rate", sample_rate)
-    )
-    if count < 1:
+    count = positive_number("duration", duration) * positive_number("sample_rate", sample_rate)
+    if not math.isfinite(count):
+        raise ValueError(f"duration must be a finite number of samples, got {duration} s")
+    if round(count) < 1:
         raise ValueError(f"duration must be at least one sample, got {duration} s")
-    return count
+    return round(count)
 
 
 def band_rms(low: float, high: float) -> float:
@@ -257,7 +326,8 @@ class LaserNoise(ShapedNoise):
     level : float, optional
         Density at 1 Hz, in Hz/sqrt(Hz); the paper's 30 by default.
     cutoff : float, optional
-        Frequency in Hz below which the density is flat. The variance grows as 1 / cutoff.
+        Frequency in Hz below which the density is flat, at most a hundredth of the sample
+        rate. The variance grows as 1 / cutoff.
     at_rest : bool, optional
         Whether the series starts at zero; see `ShapedNoise`.
 
@@ -266,7 +336,7 @@ class LaserNoise(ShapedNoise):
     A 1/f density falls until half the sample rate, where the trapezoidal rule would give
     none at all. So white noise is summed up with a leak, which gives a density too high by
     x / sin x with x = pi f T, and smoothed over some samples by a filter fitted to
-    sin x / x. The density follows the formula within 0.1 percent up to 0.95 of half the
+    sin x / x. The density follows the formula within 0.13 percent up to 0.95 of half the
     sample rate.
 
     Examples
@@ -288,6 +358,12 @@ class LaserNoise(ShapedNoise):
     ) -> None:
         self.level = positive_number("level", level)
         self.cutoff = positive_number("cutoff", cutoff)
+        highest = _LARGEST_CUTOFF * positive_number("sample_rate", sample_rate)
+        if self.cutoff > highest:
+            raise ValueError(
+                f"cutoff must be at most {highest} Hz, a hundredth of the sample rate, got "
+                f"{self.cutoff}"
+            )
         corner = 2.0 * math.pi * self.cutoff
         super().__init__(
             (), (-corner,), 2.0 * math.pi * self.level,
@@ -303,9 +379,13 @@ class LaserNoise(ShapedNoise):
             past = self._random.standard_normal(past.size)
         self._past = past
 
+    def __repr__(self) -> str:
+        """Name the class and its arguments."""
+        return f"LaserNoise({self._common()}, level={self.level}, cutoff={self.cutoff})"
+
     def sampled_asd(self, frequency: npt.ArrayLike) -> FloatArray:
-        """Density of the samples in closed form, at a frequency below half the rate."""
-        frequency = np.asarray(frequency, dtype=float)
+        """Density of the samples in closed form; see `ShapedNoise.sampled_asd`."""
+        frequency = self._below_half_rate(frequency)
         x = np.pi * frequency / self.sample_rate
         smooth = np.cos(2.0 * x[..., None] * np.arange(-_REACH, _REACH + 1)) @ self._smoothing
         change, gain = float(self._sampled.change[0, 0]), float(self._sampled.output[0])
@@ -315,7 +395,7 @@ class LaserNoise(ShapedNoise):
 
     def draw(self, samples: int) -> FloatArray:
         """Return the next samples of the series; see `ShapedNoise.draw`."""
-        count = _count("samples", samples)
+        count = whole_number("samples", samples, 0)
         white = np.concatenate((self._past, self._random.standard_normal(count)))
         self._past = white[count:].copy()
         sampled = self._sampled
@@ -431,3 +511,7 @@ class PerturbationNoise(ShapedNoise):
             self.scale * paper.PHASE_NOISE_LEVEL,
             seed=seed, sample_rate=sample_rate, at_rest=at_rest,
         )  # fmt: skip
+
+    def __repr__(self) -> str:
+        """Name the class and its arguments."""
+        return f"PerturbationNoise({self._common()}, scale={self.scale}, cutoff={self.cutoff})"

@@ -42,9 +42,9 @@ from armlock.sampled import (
 from armlock.validation import (
     ComplexArray,
     FloatArray,
+    finite_series,
     positive_number,
     real_number,
-    series,
     switch,
     whole_number,
 )
@@ -308,7 +308,7 @@ def _parameter(name: str, value: object, like: FloatArray) -> float | FloatArray
     """Return c1 or c2 as a finite number, or as an array of the shape of the noise."""
     if _single(value):
         return real_number(name, value)
-    array = series(name, value)
+    array = finite_series(name, value)
     if array.shape != like.shape:
         raise ValueError(
             f"{name} must be a number or have the shape of noise, {like.shape}; got "
@@ -529,7 +529,7 @@ class Simulation:
     def _checked_history(self, history: npt.ArrayLike) -> float | FloatArray:
         if _single(history):
             return real_number("history", history)
-        array = series("history", history)
+        array = finite_series("history", history)
         if array.size < self.history_samples:
             raise ValueError(
                 f"history must hold at least {self.history_samples} samples, as far as the "
@@ -561,7 +561,7 @@ class Simulation:
         DivergenceError
             If the output leaves all bounds. The run cannot be continued.
         """
-        given = series("noise", noise)
+        given = finite_series("noise", noise)
         first, second = _parameter("c1", c1, given), _parameter("c2", c2, given)
         output = np.empty_like(given)
         self._fill(output, given, first, second, None)
@@ -692,7 +692,7 @@ def simulate(
     run = Simulation(
         loop, sample_rate, history=history, interpolation=interpolation, limit=limit
     )
-    given = series("noise", noise)
+    given = finite_series("noise", noise)
     first, second = _parameter("c1", c1, given), _parameter("c2", c2, given)
     with _Bar(given.size, run.sample_rate, progress) as bar:
         output = np.empty_like(given)
@@ -826,7 +826,7 @@ def save_series(path: str | os.PathLike[str], blocks: Iterable[FloatArray]) -> i
             # The header's room for the length suffices for any: it is written again below.
             _write_header(file, 0)
             for number, block in enumerate(blocks):
-                values = series(f"blocks[{number}]", block)
+                values = finite_series(f"blocks[{number}]", block)
                 file.write(np.ascontiguousarray(values, dtype="<f8").tobytes())
                 count += values.size
             file.seek(0)

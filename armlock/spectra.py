@@ -10,6 +10,7 @@ All densities are one-sided.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,7 +20,15 @@ import numpy.typing as npt
 from scipy.signal import firwin, kaiser_beta, upfirdn
 from scipy.special import chdtri
 
-from armlock.validation import FloatArray, IntArray, positive_number, real_array
+from armlock.validation import (
+    FloatArray,
+    IntArray,
+    finite_series,
+    positive_number,
+    real_array,
+    real_number,
+    whole_number,
+)
 
 #: Samples in a segment, and from one segment to the next.
 SEGMENT = 1024
@@ -28,6 +37,10 @@ HOP = SEGMENT // 4
 FACTOR = 4
 #: Bins next to zero that the window's main lobe spoils.
 SPOILED = 8
+#: Largest number of bands a decade; there are no more than 512 bins between two of them.
+MOST_BANDS = 1000
+#: Bounds between which the squares of samples neither overflow nor vanish.
+SMALLEST, LARGEST = 1e-120, 1e120
 
 # Highest bin of a decimated series that its filter leaves alone.
 _HIGHEST = 368
@@ -44,7 +57,7 @@ _FILTER = firwin(_TAPS, 1.0 / FACTOR, window=("kaiser", kaiser_beta(_STOPBAND)))
 _FINE = 8
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Spectrum:
     r"""An estimate of a one-sided amplitude spectral density.
 
@@ -96,6 +109,15 @@ class Spectrum:
     resolution: FloatArray
     bins: IntArray
 
+    def __repr__(self) -> str:
+        """Say how many bands there are, and where."""
+        if not self.frequency.size:
+            return "Spectrum(0 bands)"
+        return (
+            f"Spectrum({self.frequency.size} bands, {self.frequency[0]:.6g} to "
+            f"{self.frequency[-1]:.6g} Hz)"
+        )
+
     def expected(self, asd: Callable[[FloatArray], npt.ArrayLike]) -> FloatArray:
         r"""Return what the estimator gives on average for a known density.
 
@@ -117,19 +139,52 @@ class Spectrum:
         float array, shape (n,)
             The density averaged over the band with the window's response, as the estimate is:
             it differs from the density itself where that bends within the resolution.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If `asd` is not callable, or does not return finite real numbers, one for each
+            frequency from zero to half the sample rate.
         """
+        if not callable(asd):
+            raise TypeError(f"asd must be a function of the frequency, got {asd!r}")
         spread, weights = _response()
         result = np.empty(self.frequency.size)
         for i, centre in enumerate(self.frequency):
             half = 0.5 * (self.bins[i] - 1)
             bins = centre / self.resolution[i] + np.arange(-half, half + 1.0)
             points = np.abs(bins[:, None] + spread) * self.resolution[i]
-            power = np.asarray(asd(points), dtype=float) ** 2
+            density = real_array("asd(frequency)", asd(points))
+            if density.shape not in (points.shape, ()):
+                raise ValueError(
+                    f"asd must return one value for each frequency, got shape {density.shape} "
+                    f"for {points.shape}"
+                )
+            power = np.broadcast_to(density, points.shape) ** 2
             result[i] = np.sqrt((power @ weights).mean())
         return result
 
     def within(self, low: float, high: float) -> Spectrum:
-        """Return the part between two frequencies in Hz, ends included."""
+        """Return the part between two frequencies in Hz, ends included.
+
+        Parameters
+        ----------
+        low, high : float
+            In Hz, the second one not below the first; infinite for no bound.
+
+        Returns
+        -------
+        Spectrum
+            It may be empty.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If the two are not real numbers in this order.
+        """
+        low, high = _edge("low", low), _edge("high", high)
+        if high < low:
+            raise ValueError(f"high must not lie below low = {low}, got {high}")
         keep = (self.frequency >= low) & (self.frequency <= high)
         return Spectrum(
             self.frequency[keep],
@@ -140,6 +195,13 @@ class Spectrum:
             self.resolution[keep],
             self.bins[keep],
         )
+
+
+def _edge(name: str, value: float) -> float:
+    """Return the end of a range: a real number, or an infinite one."""
+    if isinstance(value, float) and math.isinf(value):
+        return value
+    return real_number(name, value)
 
 
 def _response() -> tuple[FloatArray, FloatArray]:
@@ -263,17 +325,43 @@ class SpectrumEstimator:
     def __init__(self, sample_rate: float) -> None:
         self.sample_rate = positive_number("sample_rate", sample_rate)
         self._levels = [_Level(self.sample_rate)]
+        self._largest = 0.0
+        self.samples = 0
+
+    def __repr__(self) -> str:
+        """Name the argument, and how many samples have come in."""
+        return f"SpectrumEstimator(sample_rate={self.sample_rate}; {self.samples} samples)"
 
     def add(self, samples: npt.ArrayLike) -> None:
-        """Take in the next samples, a one-dimensional array of finite numbers."""
-        series = real_array("samples", samples)
-        if series.ndim != 1:
-            raise ValueError(f"samples must be one-dimensional, got shape {series.shape}")
+        """Take in the next samples.
+
+        Parameters
+        ----------
+        samples : array_like of float, one-dimensional
+            Finite, and of a magnitude whose square can be held: below 1e120.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If they are not; none of them is taken in.
+        """
+        self._take("samples", samples)
+
+    def _take(self, name: str, samples: npt.ArrayLike) -> None:
+        """Take in samples that messages call by `name`."""
+        given = finite_series(name, samples)
+        if not given.size:
+            return
+        largest = max(float(given.max()), -float(given.min()))
+        if largest > LARGEST:
+            raise ValueError(f"{name} must not exceed {LARGEST} in magnitude, got {largest}")
+        self._largest = max(self._largest, largest)
+        self.samples += given.size
         depth = 0
-        while series.size:
+        while given.size:
             if depth == len(self._levels):
                 self._levels.append(_Level(self.sample_rate / FACTOR**depth))
-            series = self._levels[depth].add(series)
+            given = self._levels[depth].add(given)
             depth += 1
 
     def spectrum(self, *, bands: int = 12, confidence: float = 0.95) -> Spectrum:
@@ -282,22 +370,24 @@ class SpectrumEstimator:
         Parameters
         ----------
         bands : int, optional
-            Bands a decade.
+            Bands a decade, from 1 to 1000.
         confidence : float, optional
             Probability that a band's confidence interval holds the true density.
 
         Returns
         -------
         Spectrum
-            From eight bins of the longest segments up to just below half the sample rate.
+            From eight bins of the longest segments up to just below half the sample rate. A
+            constant series has the density zero, but for rounding.
 
         Raises
         ------
         ValueError
-            If fewer samples than one segment have come in, or an argument is out of range.
+            If fewer samples than one segment have come in, all of them are smaller than
+            1e-120, where squares vanish, or an argument is out of range.
         """
-        if bands < 1:
-            raise ValueError(f"bands must be at least 1, got {bands}")
+        bands = whole_number("bands", bands, 1, MOST_BANDS)
+        confidence = real_number("confidence", confidence)
         if not 0.0 < confidence < 1.0:
             raise ValueError(f"confidence must lie between 0 and 1, got {confidence}")
         usable = [level for level in self._levels if level.segments]
@@ -306,15 +396,22 @@ class SpectrumEstimator:
                 f"series must hold at least {SEGMENT} samples, got "
                 f"{self._levels[0].waiting.size}"
             )
+        if 0.0 < self._largest < SMALLEST:
+            raise ValueError(
+                f"series must reach {SMALLEST} in magnitude unless it is zero, got "
+                f"{self._largest}"
+            )
         rows = []
-        tops = [0.5 * self.sample_rate * (1.0 - 2.0 * SPOILED / SEGMENT)]
-        tops += [level.rate * _HIGHEST / SEGMENT for level in usable[1:]]
+        # A level's bins from `first` to `last`; the next level has those below, in its own.
+        last = SEGMENT // 2 - SPOILED
         for depth, level in enumerate(usable):
-            low = level.rate * SPOILED / SEGMENT
+            first, after = SPOILED, 0
             if depth + 1 < len(usable):
-                below = usable[depth + 1]
-                low = max(low, tops[depth + 1]) if below.segments >= _ENOUGH else low
-            rows += self._bands(level, low, tops[depth], bands)
+                if usable[depth + 1].segments >= _ENOUGH:
+                    first = max(first, _HIGHEST // FACTOR)
+                after = min(_HIGHEST, FACTOR * first - 1)
+            rows += self._bands(level, np.arange(first, last + 1), bands)
+            last = after
         rows.sort()
         table = np.array(rows)
         frequency, power, degrees, resolution, count = table.T
@@ -330,13 +427,10 @@ class SpectrumEstimator:
         )
 
     def _bands(
-        self, level: _Level, low: float, high: float, bands: int
+        self, level: _Level, numbers: IntArray, bands: int
     ) -> list[tuple[float, float, float, float, float]]:
-        """Average the bins of one level in bands; those of the level above go up to `low`."""
+        """Average bins of one level in bands."""
         width = level.rate / SEGMENT
-        numbers = np.arange(int(np.ceil(low / width)), int(np.floor(high / width)) + 1)
-        if level is not self._levels[0]:
-            numbers = numbers[numbers <= _HIGHEST]
         index = np.floor(bands * np.log10(numbers * width)).astype(int)
         power = level.power * level.scale / level.segments
         if level is not self._levels[0]:
@@ -392,7 +486,8 @@ def amplitude_spectrum(
     Raises
     ------
     TypeError, ValueError
-        If the series is too short, not one-dimensional or not finite.
+        If the series is too short, not one-dimensional, not finite, or of a magnitude beyond
+        1e-120 to 1e120, whose squares overflow or vanish.
 
     Examples
     --------
@@ -404,5 +499,5 @@ def amplitude_spectrum(
     True
     """
     estimator = SpectrumEstimator(sample_rate)
-    estimator.add(np.asarray(series))
+    estimator._take("series", series)
     return estimator.spectrum(bands=bands, confidence=confidence)

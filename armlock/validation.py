@@ -84,7 +84,7 @@ def real_array(name: str, value: object) -> FloatArray:
     return array
 
 
-def series(name: str, value: object) -> FloatArray:
+def finite_series(name: str, value: object) -> FloatArray:
     """Return a one-dimensional array of finite floats; no copy where it is one already."""
     array = _array(name, value)
     if np.iscomplexobj(array):

@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from armlock import LaserNoise, PerturbationNoise, ShapedNoise, paper
@@ -54,9 +56,99 @@ def test_density_is_the_prescribed_one(name):
 
 
 def test_sampled_density_follows_the_formula():
-    frequency = np.geomspace(1e-7, 95.0, 300)
-    for source, error in ((LaserNoise(1), 1e-3), (PerturbationNoise(1), 1e-8)):
+    frequency = np.concatenate((np.geomspace(1e-7, 1.0, 300), np.linspace(1.0, 95.0, 3000)))
+    largest = LaserNoise(1, cutoff=2.0)
+    for source, error in (
+        (LaserNoise(1), 1.3e-3), (largest, 1.3e-3), (PerturbationNoise(1), 1e-8),
+    ):  # fmt: skip
         assert np.abs(source.sampled_asd(frequency) / source.asd(frequency) - 1.0).max() < error
+
+
+FREQUENCIES: list[tuple[Any, type[Exception], str]] = [
+    (-1.0, ValueError, r"frequency must not be negative.*, got -1\.0$"),
+    ([1.0, np.nan], ValueError, "frequency must be finite, got nan"),
+    (np.inf, ValueError, "frequency must be finite, got inf"),
+    ("a", TypeError, "frequency must hold real numbers"),
+    (1j, TypeError, "frequency must be real"),
+    (True, TypeError, "frequency must hold real numbers, got dtype bool"),
+    (None, TypeError, "frequency must hold real numbers, got dtype object"),
+    (np.ma.masked_array([1.0], [True]), TypeError, "frequency must be an ordinary array"),
+]
+
+
+@pytest.mark.parametrize("name", SOURCES)
+@pytest.mark.parametrize(("frequency", "error", "message"), FREQUENCIES)
+def test_densities_are_for_frequencies_that_make_sense(name, frequency, error, message):
+    source = SOURCES[name](1, sample_rate=10.0)
+    for density in (source.asd, source.sampled_asd):
+        with pytest.raises(error, match=message):
+            density(frequency)
+
+
+@pytest.mark.parametrize("name", SOURCES)
+def test_sampled_densities_end_at_half_the_rate(name):
+    source = SOURCES[name](1, sample_rate=10.0)
+    message = r"frequency must not be negative and at most 5\.0 Hz, half the .* got 5\.001$"
+    with pytest.raises(ValueError, match=message):
+        source.sampled_asd([1.0, 5.001, 9.0])
+    assert source.asd([9.0, 5e3]).shape == (2,)
+    # Both ends belong to the band, up to rounding, and are no jump.
+    ends = source.sampled_asd([0.0, 1e-12, 5.0 - 1e-9, 5.0, np.nextafter(5.0, 6.0)])
+    assert ends[0] == pytest.approx(ends[1], rel=1e-9) == pytest.approx(source.asd(0.0))
+    scale = source.sampled_asd(1.0)
+    assert ends[3] / scale == pytest.approx(ends[2] / scale, abs=1e-8)
+    assert ends[4] == pytest.approx(ends[3], rel=1e-12, abs=1e-12 * scale)
+
+
+@pytest.mark.parametrize("pole", [1.0, 0.0, 1e-12])
+@pytest.mark.parametrize("at_rest", [False, True])
+def test_unstable_filters_have_no_density(pole, at_rest):
+    message = r"poles must lie in the left half-plane, got "
+    with pytest.raises(ValueError, match=message):
+        ShapedNoise([], [-1.0, pole], 1.0, seed=1, at_rest=at_rest)
+    with pytest.raises(ValueError, match=message):
+        ShapedNoise([], [0.0 + 1j, -1j], 1.0, seed=1, at_rest=at_rest)
+
+
+def test_filters_that_cannot_be_drawn_are_refused():
+    with pytest.raises(ValueError, match="must be proper, got more zeros than poles"):
+        ShapedNoise([-1.0], [], 1.0, seed=1)
+    with pytest.raises(ValueError, match=r"gain must not be zero, got 0\.0"):
+        ShapedNoise([], [-1.0], 0.0, seed=1)
+    with pytest.raises(ValueError, match="variance is lost in rounding"):
+        PerturbationNoise(1, cutoff=1e-20)
+    assert np.isfinite(PerturbationNoise(1, cutoff=1e-20, at_rest=True).draw(10)).all()
+    with pytest.raises(TypeError, match="at_rest must be True or False, got 'no'"):
+        LaserNoise(1, at_rest="no")  # type: ignore[arg-type]
+
+
+@given(
+    st.sampled_from(sorted(SOURCES)),
+    st.lists(st.sampled_from([0, 1, 2, 3, 11, 24, 25, 100]), max_size=10),
+)
+def test_any_partition_gives_the_same_bits(name, sizes):
+    whole = SOURCES[name](3).draw(np.int64(sum(sizes)))
+    source = SOURCES[name](3)
+    parts = [source.draw(size) for size in sizes]
+    assert [part.size for part in parts] == sizes
+    assert np.array_equal(np.concatenate([np.empty(0), *parts]), whole)
+
+
+def test_noises_say_what_they_are():
+    """As the call that makes the same one again."""
+    sources = (
+        LaserNoise(3, 20.0, level=2.0, cutoff=1e-4, at_rest=True),
+        PerturbationNoise(np.int64(4), scale=0.5),  # type: ignore[arg-type]
+        ShapedNoise([-1], [-3 + 9j, -3 - 9j], 4, seed=5, sample_rate=50),
+    )
+    for source in sources:
+        again = eval(repr(source))
+        assert type(again) is type(source)
+        assert repr(again) == repr(source)
+        assert np.array_equal(again.draw(50), source.draw(50))
+    assert repr(sources[0]) == (
+        "LaserNoise(seed=3, sample_rate=20.0, at_rest=True, level=2.0, cutoff=0.0001)"
+    )
 
 
 def test_formulas_of_the_paper():
@@ -114,7 +206,18 @@ def test_band_rms_is_the_integral():
         (lambda: LaserNoise(1, cutoff=-1.0), "cutoff must be positive"),
         (lambda: PerturbationNoise(1, scale=np.nan), "scale must be finite"),
         (lambda: LaserNoise(1).draw(-1), "samples must be"),
-        (lambda: list(LaserNoise(1).blocks(10, 0)), "size must be at least 1"),
+        (
+            lambda: LaserNoise(1).draw(1.5),  # type: ignore[arg-type]
+            "samples must be an integer from 0 on, got 1.5",
+        ),
+        (lambda: LaserNoise(1).draw(True), "samples must be an integer from 0 on, got True"),
+        (lambda: LaserNoise(1).blocks(10, 0), "size must be an integer from 1 on, got 0"),
+        (lambda: LaserNoise(1, cutoff=3.0), r"cutoff must be at most 2\.0 Hz.* got 3\.0"),
+        (lambda: LaserNoise(1, 1e-5), r"cutoff must be at most 1\.0\S* Hz"),
+        (
+            lambda: sample_count(1e308),
+            r"duration must be a finite number of samples, got 1e\+308",
+        ),
         (lambda: band_rms(1.0, 0.5), "high must exceed"),
         (lambda: sample_count(-200_000.0), "duration must be positive"),
         (lambda: sample_count(1e-9), "duration must be at least one sample"),

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.signal import welch
 
 from armlock import LaserNoise, Spectrum, SpectrumEstimator, amplitude_spectrum
@@ -128,10 +130,140 @@ def test_parts_keep_their_bands():
         (np.zeros((2, 2000)), 1.0, {}, "one-dimensional"),
         ([0.0, np.inf] * 1000, 1.0, {}, "finite"),
         (np.zeros(2000), -1.0, {}, "sample_rate must be positive"),
+        ([0.0, np.nan] * 1000, 1.0, {}, "series must be finite, got nan at sample 1"),
+        (np.empty(0), 1.0, {}, "at least 1024 samples, got 0"),
+        (3.0, 1.0, {}, r"series must be one-dimensional, got shape \(\)"),
+        (np.full(2000, 1e200), 1.0, {}, r"series must not exceed 1e\+120 in magnitude, got 1e"),
+        (np.full(2000, 1e-200), 1.0, {}, "series must reach 1e-120 in magnitude"),
         (np.zeros(2000), 1.0, {"bands": 0}, "bands must be"),
+        (np.zeros(2000), 1.0, {"bands": 1.5}, r"bands must be an integer .* got 1\.5"),
+        (np.zeros(2000), 1.0, {"bands": np.nan}, "bands must be an integer .* got nan"),
+        (np.zeros(2000), 1.0, {"bands": "a"}, "bands must be an integer .* got 'a'"),
+        (np.zeros(2000), 1.0, {"bands": True}, "bands must be an integer .* got True"),
+        (np.zeros(2000), 1.0, {"bands": 10**30}, "bands must be an integer from 1 to 1000"),
         (np.zeros(2000), 1.0, {"confidence": 1.0}, "confidence must lie"),
+        (np.zeros(2000), 1.0, {"confidence": 0.0}, "confidence must lie"),
+        (np.zeros(2000), 1.0, {"confidence": np.nan}, "confidence must be finite"),
     ],
 )
 def test_bad_arguments(series, rate, more, message):
     with pytest.raises(ValueError, match=message):
         amplitude_spectrum(series, rate, **more)
+
+
+@pytest.mark.parametrize(
+    ("series", "rate", "more", "message"),
+    [
+        (np.zeros(2000) + 1j, 1.0, {}, "series must be real"),
+        (np.zeros(2000) > 0.0, 1.0, {}, "series must hold real numbers, got dtype bool"),
+        (np.ma.masked_array(np.zeros(2000), True), 1.0, {}, "series must be an ordinary array"),
+        (
+            np.zeros(2000, "m8[s]"),
+            1.0,
+            {},
+            "series must hold real numbers, got dtype timedelta",
+        ),
+        ("abc", 1.0, {}, "series must hold real numbers"),
+        (np.zeros(2000), True, {}, "sample_rate must be a real number, got True"),
+        (np.zeros(2000), 1.0, {"confidence": "a"}, "confidence must be a real number, got 'a'"),
+        (np.zeros(2000), 1.0, {"confidence": True}, "confidence must be a real number"),
+    ],
+)
+def test_bad_types(series, rate, more, message):
+    with pytest.raises(TypeError, match=message):
+        amplitude_spectrum(series, rate, **more)
+
+
+@pytest.mark.parametrize("constant", [0.0, 1.0, 0.1, -3e7])
+def test_a_constant_has_no_density(constant):
+    found = amplitude_spectrum(np.full(200_000, constant), 10.0)
+    assert found.asd.size > 20
+    assert found.asd.max() <= 1e-13 * abs(constant)
+
+
+@pytest.mark.parametrize("exponent", [-390, 390])
+def test_the_scale_does_not_matter(exponent):
+    """Powers of two, up to 1e117 and down to 1e-117, change no digit."""
+    series = np.random.default_rng(1).standard_normal(20_000)
+    usual = amplitude_spectrum(series, 2.0)
+    scaled = amplitude_spectrum(np.ldexp(series, exponent), 2.0)
+    assert np.array_equal(scaled.asd, np.ldexp(usual.asd, exponent))
+    assert np.array_equal(scaled.upper, np.ldexp(usual.upper, exponent))
+
+
+@pytest.mark.parametrize("bands", [1, 3, np.int64(40), 1000])
+def test_bands_share_out_the_same_power(bands):
+    """Whatever their number, the bins are the same, and each is in one band."""
+    series = np.random.default_rng(4).standard_normal(5000)
+    found = amplitude_spectrum(series, 2.0, bands=bands)
+    usual = amplitude_spectrum(series, 2.0)
+    for one in (found, usual):
+        assert (np.diff(one.frequency) > 0.0).all()
+    power, expected = (np.sum(s.asd**2 * s.bins * s.resolution) for s in (found, usual))
+    assert power == pytest.approx(expected, rel=1e-12)
+    assert np.sum(found.bins * found.resolution) == pytest.approx(
+        np.sum(usual.bins * usual.resolution), rel=1e-12
+    )
+
+
+@given(st.lists(st.sampled_from([0, 1, 2, 3, 255, 256, 257, 1023, 1500]), max_size=14))
+@settings(max_examples=30)
+def test_any_partition_gives_the_same_estimate(sizes):
+    series = np.random.default_rng(1).standard_normal(sum(sizes) + 1100)
+    estimator = SpectrumEstimator(3.0)
+    for block in np.split(series, np.cumsum(sizes)):
+        estimator.add(block)
+    whole, parts = amplitude_spectrum(series, 3.0), estimator.spectrum()
+    assert estimator.samples == series.size
+    np.testing.assert_allclose(parts.asd, whole.asd, rtol=1e-12)
+    assert np.array_equal(parts.degrees, whole.degrees)
+
+
+def test_a_refused_block_is_not_taken_in():
+    series = np.random.default_rng(1).standard_normal(5000)
+    estimator = SpectrumEstimator(3.0)
+    estimator.add(series[:3000])
+    for bad in ([np.nan], np.zeros((2, 2)), [1e300]):
+        with pytest.raises(ValueError, match=r"^samples must"):
+            estimator.add(bad)
+    estimator.add(series[3000:])
+    whole = amplitude_spectrum(series, 3.0)
+    assert estimator.spectrum().asd == pytest.approx(whole.asd, rel=1e-12)
+
+
+def test_the_part_between_two_frequencies_needs_them_in_order():
+    found = amplitude_spectrum(np.random.default_rng(1).standard_normal(5000), 2.0)
+    assert found.within(0.0, np.inf).asd.size == found.within(-np.inf, 1.0).asd.size
+    assert found.within(0.0, np.inf).asd.size == found.asd.size
+    assert repr(found.within(2.0, 3.0)) == "Spectrum(0 bands)"
+    with pytest.raises(ValueError, match=r"high must not lie below low = 0\.5, got 0\.1"):
+        found.within(0.5, 0.1)
+    with pytest.raises(ValueError, match="low must be finite, got nan"):
+        found.within(np.nan, 1.0)
+    with pytest.raises(TypeError, match="high must be a real number, got '1'"):
+        found.within(0.0, "1")  # type: ignore[arg-type]
+
+
+def test_a_density_to_compare_with_is_a_function():
+    found = amplitude_spectrum(np.random.default_rng(1).standard_normal(5000), 2.0)
+    assert found.expected(lambda f: 2.0) == pytest.approx(np.full(found.asd.size, 2.0))
+    with pytest.raises(TypeError, match=r"asd must be a function of the frequency, got 1\.0"):
+        found.expected(1.0)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=r"asd\(frequency\) must be finite, got nan"):
+        found.expected(lambda f: np.full(f.shape, np.nan))
+    with pytest.raises(TypeError, match=r"asd\(frequency\) must be real"):
+        found.expected(lambda f: f + 1j)
+    with pytest.raises(ValueError, match=r"asd must return one value for each frequency"):
+        found.expected(lambda f: f[0])
+
+
+def test_spectra_say_what_they_are():
+    estimator = SpectrumEstimator(2)
+    estimator.add(np.random.default_rng(1).standard_normal(5000))
+    assert repr(estimator) == "SpectrumEstimator(sample_rate=2.0; 5000 samples)"
+    found = estimator.spectrum()
+    expected = f"Spectrum({found.asd.size} bands, {found.frequency[0]:.6g} to "
+    assert repr(found).startswith(expected)
+    # Not compared array by array, which has no truth value.
+    assert found == found
+    assert found != estimator.spectrum()
