@@ -33,8 +33,9 @@ BOUNDARY = contour.BOUNDARY
 UNCONFINED = contour.UNCONFINED
 
 # How far outside a chart's axes its reference counts lie, in steps of the axis: no round
-# number, so that no reference point falls on a line a user would choose.
-_OUTSIDE = 0.38196601125
+# numbers, and not the same for both axes, so that no reference point falls on a line that a
+# user would choose, or on one along which a square chart has its diagonal.
+_OUTSIDE = (0.38196601125, 0.27639320225)
 
 
 class CountError(RuntimeError):
@@ -337,8 +338,8 @@ def _chart_rows(
     system: CharacteristicFunction, x: FloatArray, y: FloatArray
 ) -> tuple[IntArray, BoolArray, npt.NDArray[np.intp]]:
     """Chart ascending axes; return counts, points counted singly, rows counted singly."""
-    left, right = _ends(x)
-    low, high = _ends(y)
+    left, right = _ends(x, _OUTSIDE[0])
+    low, high = _ends(y, _OUTSIDE[1])
     lower, upper = np.full(y.size, left), np.full(y.size, right)
     confined = np.ones((y.size, x.size), dtype=np.bool_)
     if system.neutral:
@@ -382,10 +383,10 @@ def _confined_up_to(system: CharacteristicFunction, y: FloatArray) -> FloatArray
     return np.asarray(left / b1)
 
 
-def _ends(values: FloatArray) -> tuple[float, float]:
+def _ends(values: FloatArray, outside: float) -> tuple[float, float]:
     """Return points just outside an ascending axis."""
     span = float(values[-1] - values[0])
-    margin = _OUTSIDE * (span / (values.size - 1) if span else max(abs(float(values[0])), 1e-3))
+    margin = outside * (span / (values.size - 1) if span else max(abs(float(values[0])), 1e-3))
     return float(values[0]) - margin, float(values[-1]) + margin
 
 
