@@ -1,4 +1,4 @@
-"""How long each notebook takes, from the start of its kernel to its last cell."""
+"""Time and memory of each notebook, from the start of its kernel to its last cell."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from benchmarks import child
 from benchmarks.report import Row, Topic
 
 LIMIT = 60.0
+MEMORY = 2 * 2**30
 CORES = 2
 
 
@@ -32,7 +33,8 @@ def execute(path: str) -> dict[str, Any]:
         client.execute()
     except nbclient.exceptions.CellExecutionError as failure:
         error = f"{failure.ename}: {failure.evalue}"
-    return {"seconds": time.perf_counter() - start, "error": error}
+    seconds = time.perf_counter() - start
+    return {"seconds": seconds, "memory": child.peak_memory_of_children(), "error": error}
 
 
 def run(*, quick: bool, folder: Path, notebooks: Path = child.ROOT / "notebooks") -> Topic:
@@ -44,7 +46,10 @@ def run(*, quick: bool, folder: Path, notebooks: Path = child.ROOT / "notebooks"
     for path in paths[: 1 if quick else None]:
         environment = {"JUPYTER_PREFER_ENV_PATH": "1"}
         result = child.call("benchmarks.notebooks", "execute", environment, path=str(path))
-        requirement = f"< {LIMIT:.0f} s on {CORES} cores"
+        requirement = (
+            f"< {LIMIT:.0f} s on {CORES} cores; {result['memory'] / 2**20:.0f} MiB "
+            f"< {MEMORY / 2**20:.0f} MiB"
+        )
         if result["error"]:
             requirement += ", but it FAILED"
             topic.notes.append(f"{path.name} failed: {result['error']}")
@@ -53,10 +58,13 @@ def run(*, quick: bool, folder: Path, notebooks: Path = child.ROOT / "notebooks"
                 path.name,
                 result["seconds"],
                 requirement=requirement,
-                met=not result["error"] and result["seconds"] < LIMIT,
+                met=not result["error"]
+                and result["seconds"] < LIMIT
+                and result["memory"] < MEMORY,
             )
         )
     topic.notes.append(
-        "Each runs in a new kernel, whose start counts; compiled loops come from the cache."
+        "Each runs in a new kernel, whose start counts; compiled loops come from the cache. "
+        "The memory is the peak of the largest process."
     )
     return topic

@@ -5,7 +5,7 @@ import json
 import nbformat
 import pytest
 
-from benchmarks import charts, notebooks, report
+from benchmarks import charts, child, notebooks, report
 from benchmarks.__main__ import main, topic_names
 
 
@@ -53,6 +53,14 @@ def test_notebooks_are_timed(tmp_path, source, met):
     topic = notebooks.run(quick=True, folder=tmp_path, notebooks=tmp_path)
     assert [row.met for row in topic.rows] == [met]
     assert any("ZeroDivisionError" in note for note in topic.notes) is not met
+
+
+def test_memory_of_a_notebook_is_that_of_its_kernel(tmp_path):
+    source = "import numpy as np; a = np.ones(50_000_000)"
+    cell = nbformat.v4.new_code_cell(source)
+    nbformat.write(nbformat.v4.new_notebook(cells=[cell]), tmp_path / "some.ipynb")
+    found = child.call("benchmarks.notebooks", "execute", {}, path=str(tmp_path / "some.ipynb"))
+    assert 400e6 < found["memory"] < 700e6
 
 
 def test_exponents_are_fitted():
