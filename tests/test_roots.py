@@ -231,7 +231,7 @@ def test_roots_far_up_the_chain_are_found_to_the_right_of_slow_ones(system, poin
     root = rightmost_root(system, *point)
     assert root.imag == pytest.approx(62.83, abs=0.01)
     with mpmath.workdps(30):
-        exact = extended_root(system, *point, root, digits=30)
+        exact = extended_root(system, point[0], point[1], root, digits=30)
         assert abs(exact - root) < 1e-13 * abs(root)
     assert unstable_roots(system.shifted(root.real + 1e-8), *point) == 0
     assert unstable_roots(system, *point) == 2 * (root.real > 0)
