@@ -391,22 +391,24 @@ def gain_factors(c1: float, c2: float) -> tuple[float, float]:
     """
     end = float(last_crossing(high_gain_limit(), c1, c2))
     if np.isfinite(end):
-        factors = _axis_factors(c1, c2, end)
-        return max(factors[factors < 1.0], default=0.0), min(
-            factors[factors > 1.0], default=np.inf
-        )
+        return _next_to_one(_axis_factors(c1, c2, end))
     for largest in 10.0 ** np.arange(1, 7):
         end = float(last_crossing(DualArm(largest * DUAL_ARM_GAIN), c1, c2))
-        factors = _axis_factors(c1, c2, end)
-        beyond = factors[(factors > 1.0) & (factors <= largest)]
-        if beyond.size:
-            return max(factors[factors < 1.0], default=0.0), float(beyond.min())
+        lower, upper = _next_to_one(_axis_factors(c1, c2, end))
+        if upper <= largest:
+            return lower, upper
     raise ValueError(f"(c1, c2) must be lost at a factor of at most {largest:g}, got {c1, c2}")
 
 
 def _axis_factors(c1: float, c2: float, end: float) -> FloatArray:
     """Return every gain factor that puts a root on the axis below a frequency in rad/s."""
     return np.asarray(-1.0 / axis_crossings(DualArm(), c1, c2, omega_max=end).value)
+
+
+def _next_to_one(factors: FloatArray) -> tuple[float, float]:
+    """Return the largest factor below one and the smallest above it."""
+    below, above = factors[factors < 1.0], factors[factors > 1.0]
+    return float(below.max(initial=0.0)), float(above.min(initial=np.inf))
 
 
 @cache
@@ -484,8 +486,8 @@ def chart_at_gain_ten() -> Finding:
         f"{PERTURBATION:g} to either side of A there are {sides[0]} and {sides[2]} unstable "
         f"roots; winding count and polished rightmost root agree at {len(both)} points. Area 1 "
         f"is a strip {found.width:.4f} wide in c2 - c1 that ends at c1 = c2 = "
-        f"{1.0 + found.corner:.4f}. At A itself D has the root s = 0, which 1 + L has not: its "
-        f"Nyquist curve counts {closed} unstable zeros.",
+        f"{1.0 + found.corner:.4f}. At A itself the root s = 0 comes from clearing a "
+        f"denominator: the loop's Nyquist curve counts {closed} unstable zeros there.",
     )
 
 
@@ -507,12 +509,14 @@ def edges_against_gain() -> Finding:
     return Finding(
         Verdict.REPRODUCED if inwards and len(lines) == 1 else Verdict.DIFFERS,
         slope,
-        "exponent with which the corner's distance from (1, 1) falls with g, from 10⁴ rad/s on",
-        f"Along c1 = c2 the edge moves from {1 + corner[0]:.3f} at g = {GAINS[0]:g} through "
-        f"{1 + edges(DUAL_ARM_GAIN).corner:.4f} at g = 10 to 1 + {corner[-1]:.3g} at g = "
-        f"{GAINS[-1]:g}, at every step inwards. At high gain c - 1 = ω²/(8 g²) with ω = 2π · "
-        f"{RESONANCE / (2 * np.pi):g} Hz, the first frequency at which both round trips are "
-        f"whole numbers of periods (exact over estimate: {ratio:.4f}). The line c1 = c2 is the "
+        "exponent with which the distance from (1, 1) to the straight edge's upper end falls "
+        "with g, from 10⁴ rad/s on",
+        f"Along c1 = c2 = c the upper edge moves from {1 + corner[0]:.3f} at g = "
+        f"{GAINS[0]:g} through {1 + edges(DUAL_ARM_GAIN).corner:.4f} at g = 10 to 1 + "
+        f"{corner[-1]:.3g} at g = {GAINS[-1]:g}, at every step inwards. At high gain "
+        f"c - 1 = ω²/(8 g²) with ω = 2π · {RESONANCE / (2 * np.pi):g} Hz, the first frequency "
+        "at which both round trips are whole numbers of periods (exact over estimate: "
+        f"{ratio:.4f}). The line c1 = c2 is the "
         "same for every g, but the part of it that bounds the region ends at that corner.",
     )
 
@@ -583,13 +587,13 @@ def exact_upper_edge() -> Finding:
         "c1 = c2 at the upper end of the straight edge, g = 10, exact",
         f"A pair with ω = {exact.corner_omega:.4f} rad/s crosses there: {before} unstable "
         f"roots 10⁻⁵ below, {after} above. From the straight edge to the far edge, where a "
-        f"slow oscillation is lost, the upper edge is {pieces[DUAL_ARM_GAIN][0]} piece of the "
-        f"D-curve, with ω from {pieces[DUAL_ARM_GAIN][1]:.4f} to "
-        f"{pieces[DUAL_ARM_GAIN][2]:.4f} rad/s; at g = 30 and 100 it is {pieces[30.0][0]} "
-        f"and {pieces[100.0][0]} piece near {pieces[30.0][1]:.2f} and {pieces[100.0][1]:.2f} "
-        f"rad/s. Semi-discretization with the step of the common-arm figure, h = {STEP:g} s, "
-        f"puts the edge {100 * off:.2g} % further from (1, 1), and at g = 100 misses it by a "
-        "large factor (claim D8).",
+        f"slow oscillation is lost, the upper edge is made of {pieces[DUAL_ARM_GAIN][0]} "
+        f"piece of the D-curve, with ω from {pieces[DUAL_ARM_GAIN][1]:.4f} to "
+        f"{pieces[DUAL_ARM_GAIN][2]:.4f} rad/s; at g = 30 of {pieces[30.0][0]} near "
+        f"{pieces[30.0][1]:.2f} and at g = 100 of {pieces[100.0][0]} near "
+        f"{pieces[100.0][1]:.2f} rad/s. Semi-discretization with the step of the common-arm "
+        f"figure, h = {STEP:g} s, puts the edge {100 * off:.2g} % further from (1, 1), and at "
+        "g = 100 misses it by a large factor (claim D8).",
     )
 
 
@@ -751,7 +755,7 @@ def convention_of_difference() -> Finding:
         f"{'stays' if lines[0] == lines[1] else 'moves'}; at g = 10 it ends at "
         f"{1 + one.corner:.4f} with the whole difference and at {1 + other.corner:.4f} with "
         f"half of it, and the strip is {one.width:.4f} and {other.width:.4f} wide. At g = 10⁵ "
-        f"the corners agree to {100 * abs(high_half.corner / high.corner - 1):.1g} %.",
+        f"the two ends agree to {100 * abs(high_half.corner / high.corner - 1):.1g} %.",
     )
 
 
