@@ -220,6 +220,26 @@ def full_run() -> Run:
     )
 
 
+def envelope(trace: Trace, length: int = 500) -> tuple[FloatArray, FloatArray]:
+    """Return the largest magnitude in stretches of a series, for a figure.
+
+    Parameters
+    ----------
+    trace : Trace
+        With a value every second.
+    length : int, optional
+        Of a stretch, in s.
+
+    Returns
+    -------
+    time, size : float arrays
+        Middle of each stretch in s, and the largest magnitude in it.
+    """
+    number = trace.series.size // length
+    parts = np.abs(trace.series[: number * length]).reshape(number, length)
+    return (np.arange(number) + 0.5) * length, np.asarray(parts.max(axis=1))
+
+
 class Suppression(NamedTuple):
     """Suppression of the laser's noise, measured and expected, with a confidence band.
 
@@ -504,6 +524,12 @@ def chain_decay() -> float:
     gain = 2.0 * abs(float(paper_loop().controller.gain))
     delay = 0.5 * (paper_loop().tau1 + paper_loop().tau2)
     return delay / float(np.log1p(1.0 / gain))
+
+
+def filled_from(factor: float = 2.0) -> float:
+    """Frequency in Hz from which filled arms leave more noise than empty ones, by a factor."""
+    quiet, _, filled = (start.spectrum for start in starts())
+    return float(quiet.frequency[filled.asd > factor * quiet.asd].min())
 
 
 def orders(ratio: float) -> float:
