@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from armlock.characteristic import CharacteristicFunction
+from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.roots import RootError, rightmost_root
 from armlock.stability import CountError, StabilityChart
+from armlock.validation import even_axis
 
 _NUMBER = itertools.count(1)
 
@@ -23,10 +24,22 @@ _NUMBER = itertools.count(1)
 class RootGrid:
     """Rightmost roots on a coarse grid.
 
+    Parameters
+    ----------
+    system : CharacteristicFunction
+        In continuous time.
+    x, y : array_like of float, one-dimensional
+        Values of the two free parameters, ascending in equal steps.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an axis is not finite and real, empty, or does not ascend in equal steps.
+
     Attributes
     ----------
     x, y : float array
-        Values of the two free parameters, ascending and evenly spaced.
+        The two axes.
     roots : complex array, shape (y.size, x.size)
         nan where no root could be certified.
 
@@ -42,7 +55,8 @@ class RootGrid:
     def __init__(
         self, system: CharacteristicFunction, x: npt.ArrayLike, y: npt.ArrayLike
     ) -> None:
-        self.x, self.y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+        name1, name2 = checked_system(system).parameters
+        self.x, self.y = even_axis(name1, x, least=1), even_axis(name2, y, least=1)
         self.roots = np.full((self.y.size, self.x.size), np.nan, dtype=np.complex128)
         for row, column in np.ndindex(self.roots.shape):
             try:
@@ -51,6 +65,11 @@ class RootGrid:
                 continue
             self.roots[row, column] = complex(root)
 
+    def __repr__(self) -> str:
+        """Say how many roots there are, and how many of them were certified."""
+        found = int(np.isfinite(self.roots).sum())
+        return f"RootGrid({self.x.size} by {self.y.size} points, {found} roots certified)"
+
 
 class ChartExplorer:
     """A chart that tells what is under the pointer; see `chart_explorer`."""
@@ -58,6 +77,17 @@ class ChartExplorer:
     def __init__(
         self, chart: StabilityChart, rightmost: RootGrid | None, units: Sequence[str], name: str
     ) -> None:
+        if not isinstance(chart, StabilityChart):
+            raise TypeError(f"chart must be a StabilityChart, got {chart!r}")
+        if rightmost is not None and not isinstance(rightmost, RootGrid):
+            raise TypeError(f"rightmost must be a RootGrid, got {rightmost!r}")
+        # The script finds its place from the ends of the axes.
+        for kind, grid in (("chart", chart), ("rightmost", rightmost)):
+            if grid is not None:
+                even_axis(f"{kind}.x", grid.x)
+                even_axis(f"{kind}.y", grid.y)
+        if isinstance(units, str) or len(units) != 2:
+            raise ValueError(f"units must be two texts, got {units!r}")
         self.chart = chart
         self.rightmost = rightmost
         self.units = tuple(units)
@@ -129,6 +159,12 @@ def chart_explorer(
     -------
     ChartExplorer
         Self-contained HTML: needs no network and no running kernel.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If there is no chart, an axis does not ascend in equal steps, or there are not two
+        units.
 
     Examples
     --------

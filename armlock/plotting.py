@@ -22,6 +22,7 @@ from scipy import ndimage
 from armlock.dsubdivision import Branch, Line
 from armlock.nyquist import NyquistCurve
 from armlock.stability import StabilityChart
+from armlock.validation import even_axis, positive_number, real_number, whole_number
 
 BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, BLACK = (
     "#0072B2",
@@ -52,7 +53,13 @@ def plot_stable_region(ax: Axes, chart: StabilityChart, color: str = STABLE) -> 
         With ascending, evenly spaced axes.
     color : str, optional
         Fill of the region.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If there is no chart, or its axes do not ascend in equal steps.
     """
+    _checked_chart(chart)
     _image(ax, chart, np.where(chart.stable, 1.0, np.nan), ListedColormap([color]))
 
 
@@ -67,11 +74,28 @@ def plot_counts(ax: Axes, chart: StabilityChart, largest: int = 12) -> None:
         With ascending, evenly spaced axes.
     largest : int, optional
         Counts above this share one colour.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If there is no chart, its axes do not ascend in equal steps, or `largest` is not a
+        positive integer.
     """
+    largest = whole_number("largest", largest, 1)
+    _checked_chart(chart)
     shades = plt.get_cmap("Oranges")(np.linspace(0.08, 0.75, largest))
     colors = ListedColormap([STABLE, *shades])
     values = np.where(chart.counts < 0, np.nan, np.minimum(chart.counts, largest))
     _image(ax, chart, values, colors, 0.0, float(largest))
+
+
+def _checked_chart(chart: object) -> StabilityChart:
+    """Return a chart that a picture shows as it is."""
+    if not isinstance(chart, StabilityChart):
+        raise TypeError(f"chart must be a StabilityChart, got {chart!r}")
+    even_axis("chart.x", chart.x)
+    even_axis("chart.y", chart.y)
+    return chart
 
 
 def _image(
@@ -83,8 +107,8 @@ def _image(
     high: float | None = None,
 ) -> None:
     """Draw a grid of values, cells centred on the axes' points."""
-    half_x = 0.5 * (chart.x[-1] - chart.x[0]) / max(chart.x.size - 1, 1)
-    half_y = 0.5 * (chart.y[-1] - chart.y[0]) / max(chart.y.size - 1, 1)
+    half_x = 0.5 * (chart.x[-1] - chart.x[0]) / (chart.x.size - 1)
+    half_y = 0.5 * (chart.y[-1] - chart.y[0]) / (chart.y.size - 1)
     ax.imshow(
         values,
         origin="lower",
@@ -126,8 +150,10 @@ def label_regions(ax: Axes, chart: StabilityChart, smallest: float = 0.002) -> N
     chart : StabilityChart
         Any chart.
     smallest : float, optional
-        Regions below this share of the chart stay without a label.
+        Regions below this share of the chart, from 0 to 1, stay without a label.
     """
+    if not 0.0 <= real_number("smallest", smallest) <= 1.0:
+        raise ValueError(f"smallest must lie between 0 and 1, got {smallest}")
     for count in np.unique(chart.counts[chart.counts >= 0]):
         regions, number = ndimage.label(chart.counts == count)
         for index in range(1, number + 1):
@@ -214,8 +240,25 @@ def plot_nyquist(
         along it.
     arrows : sequence of float, optional
         Frequencies in rad/s at which an arrow points in the direction of rising omega.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If there is no curve, `unit` or `outer` is not positive, or an arrow lies beyond the
+        curve's frequencies.
     """
+    if not isinstance(curve, NyquistCurve):
+        raise TypeError(f"curve must be a NyquistCurve, got {curve!r}")
+    if unit is not None:
+        unit = positive_number("unit", unit)
+    outer = positive_number("outer", outer)
     forward, omega = curve.response, curve.omega
+    for frequency in arrows:
+        if not 0.0 < real_number("arrows", frequency) <= omega[-2]:
+            raise ValueError(
+                f"arrows must lie above 0 and up to {omega[-2]} rad/s, the curve's last sample "
+                f"but one, got {frequency}"
+            )
     if unit is not None:
         if curve.indentation.size:
             # On to the branch, in the direction in which the curve leaves for it.
@@ -321,7 +364,13 @@ def chart_columns(
     -------
     dict of str to array
         The two free parameters and the number of unstable roots.
+
+    Raises
+    ------
+    ValueError
+        If `every` is not a positive integer.
     """
+    every = whole_number("every", every, 1)
     x, y = np.meshgrid(chart.x[::every], chart.y[::every])
     names = [f"{p} [{u}]" for p, u in zip(chart.system.parameters, units, strict=True)]
     counts = chart.counts[::every, ::every]
@@ -376,7 +425,14 @@ def publish(
     Downloads
         Shows links in a notebook. The files go to the folder named by the environment
         variable ARMLOCK_FIGURES, which the book's build sets; without it none are written.
+
+    Raises
+    ------
+    ValueError
+        If the name is empty or holds a folder.
     """
+    if not name or Path(name).name != name:
+        raise ValueError(f"name must be the stem of a file, without a folder, got {name!r}")
     folder = os.environ.get("ARMLOCK_FIGURES")
     if not folder:
         return Downloads(name, [])

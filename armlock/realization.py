@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armlock.characteristic import CharacteristicFunction
-from armlock.validation import FloatArray
+from armlock.characteristic import CharacteristicFunction, checked_system
+from armlock.validation import FloatArray, real_number
 
 
 class DelayedTerm(NamedTuple):
@@ -55,9 +55,12 @@ def realize(system: CharacteristicFunction, x: float, y: float) -> Realization:
 
     Raises
     ------
-    ValueError
-        If the terms without delay cancel the highest power, so that no state form exists.
+    TypeError, ValueError
+        If x or y is not a finite real number, the system is a map, or the terms without delay
+        cancel the highest power, so that no state form exists.
     """
+    name1, name2 = checked_system(system).parameters
+    x, y = real_number(name1, x), real_number(name2, y)
     if system.step:
         raise ValueError(
             f"system must be in continuous time, got a map with step {system.step}"

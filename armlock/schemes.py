@@ -10,10 +10,19 @@ import control
 import numpy as np
 from numpy.polynomial import polynomial as poly
 
-from armlock.characteristic import CharacteristicFunction
+from armlock.characteristic import CharacteristicFunction, checked_system, whole_steps
 from armlock.loops import CommonArm
 from armlock.semidiscretization import semi_discretization
-from armlock.validation import ComplexArray
+from armlock.validation import ComplexArray, positive_number, real_number, whole_number
+
+#: Highest order of the Padé approximants; beyond, their coefficients lose their digits.
+HIGHEST_ORDER = 60
+
+
+def _common_arm(loop: object) -> CommonArm:
+    if not isinstance(loop, CommonArm):
+        raise TypeError(f"loop must be a CommonArm, got {loop!r}")
+    return loop
 
 
 def sampled_loop(
@@ -54,14 +63,25 @@ def sampled_loop(
     -------
     CharacteristicFunction
         With free parameters (c1, c2).
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the loop is no common arm, a weight is not finite and real, or the step is not
+        positive or does not divide both delays.
     """
+    loop = _common_arm(loop)
+    present, lead, newer = (
+        real_number(name, value)
+        for name, value in (("present", present), ("lead", lead), ("newer", newer))
+    )
     return CharacteristicFunction(
         (-present, lead),
-        (held[0], newer),
-        (held[1], newer),
+        (real_number("held[0]", held[0]), newer),
+        (real_number("held[1]", held[1]), newer),
         loop.tau1,
         loop.tau2,
-        step=step,
+        step=positive_number("step", step),
         parameters=loop.parameters,
     )
 
@@ -80,8 +100,14 @@ def standard_schemes(loop: CommonArm, step: float) -> dict[str, CharacteristicFu
     -------
     dict of str to CharacteristicFunction
         Maps by name.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the loop is no common arm, or the step is not positive or does not divide both
+        delays.
     """
-    gain = loop.gain * step
+    gain = _common_arm(loop).gain * positive_number("step", step)
     stages = sum((-2.0 * gain) ** k / f for k, f in enumerate((1.0, 1.0, 2.0, 6.0, 24.0)))
     driven = 0.5 * (1.0 - stages)
     return {
@@ -111,8 +137,20 @@ def map_eigenvalues(system: CharacteristicFunction, x: float, y: float) -> Compl
     Returns
     -------
     complex array, shape (degree + longest delay / step,)
+
+    Raises
+    ------
+    TypeError, ValueError
+        If x or y is not a finite real number, or the system is no map.
     """
-    back = [round(delay / system.step) for delay in (system.delay1, system.delay2)]
+    name1, name2 = checked_system(system).parameters
+    x, y = real_number(name1, x), real_number(name2, y)
+    if not system.step:
+        raise ValueError(f"system must be a map, got {system!r} in continuous time")
+    back = [
+        whole_steps(name, delay, system.step)
+        for name, delay in (("delay1", system.delay1), ("delay2", system.delay2))
+    ]
     longest = max(back)
     powers = np.zeros(longest + system.a.size)
     powers[longest:] = system.a
@@ -131,12 +169,21 @@ def pade_poles(loop: CommonArm, x: float, y: float, order: int) -> ComplexArray:
     x, y : float
         c1 and c2.
     order : int
-        Order of both approximants.
+        Order of both approximants, from 1 to 60.
 
     Returns
     -------
     complex array, shape (2 order + 1,)
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the loop is no common arm, x or y is not a finite real number, or the order is out
+        of range.
     """
+    loop = _common_arm(loop)
+    x, y = real_number("c1", x), real_number("c2", y)
+    order = whole_number("order", order, 1, HIGHEST_ORDER)
     arms = [
         control.ss(control.tf(*control.pade(delay, order))) for delay in (loop.tau1, loop.tau2)
     ]

@@ -128,3 +128,19 @@ def axis(name: str, value: object) -> FloatArray:
     if array.size == 0:
         raise ValueError(f"{name} must hold at least one value, got an empty array")
     return array
+
+
+def even_axis(name: str, value: object, least: int = 2) -> FloatArray:
+    """Return an axis whose values ascend in equal steps, or raise."""
+    values = axis(name, value)
+    if values.size < least:
+        raise ValueError(f"{name} must hold at least {least} values, got {values.size}")
+    if values.size > 1:
+        steps = np.diff(values)
+        # Close to the ideal point, rounding is a visible share of a step.
+        if not (np.abs(steps - steps.mean()) < 1e-2 * steps.mean()).all():
+            raise ValueError(
+                f"{name} must ascend in equal steps, got steps from {steps.min()} to "
+                f"{steps.max()}"
+            )
+    return values

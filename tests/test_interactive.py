@@ -54,3 +54,35 @@ def test_two_charts_on_a_page_have_their_own_names(chart):
     first, second = (chart_explorer(chart)._repr_html_() for _ in range(2))
     names = [re.findall(r'id="([^"]+)"', text) for text in (first, second)]
     assert not set(names[0]) & set(names[1])
+
+
+def test_a_chart_with_uneven_axes_is_refused():
+    """The script would find another point than the one that is shown."""
+    even = np.linspace(-1, 1, 5)
+    for bad in (np.geomspace(0.1, 1.0, 5), even[::-1], [0.5]):
+        with pytest.raises(ValueError, match=r"^chart\.x must "):
+            chart_explorer(stability_chart(CommonArm(), bad, even))
+        with pytest.raises(ValueError, match=r"^chart\.y must "):
+            chart_explorer(stability_chart(CommonArm(), even, bad))
+    with pytest.raises(ValueError, match=r"^c1 must ascend in equal steps"):
+        RootGrid(CommonArm(), [0.0, 1.0, 3.0], [1.0])
+    with pytest.raises(ValueError, match=r"^c2 must be finite, got nan"):
+        RootGrid(CommonArm(), [1.0], [np.nan])
+
+
+def test_what_is_no_chart_is_refused(chart):
+    with pytest.raises(TypeError, match=r"^chart must be a StabilityChart, got 3"):
+        chart_explorer(3)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match=r"^rightmost must be a RootGrid, got array"):
+        chart_explorer(chart, np.ones(3))  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=r"^rightmost\.y must hold at least 2 values, got 1"):
+        chart_explorer(chart, RootGrid(CommonArm(), [0.9, 1.0], [1.0]))
+    with pytest.raises(ValueError, match=r"^units must be two texts, got 'rad'"):
+        chart_explorer(chart, units="rad")
+    with pytest.raises(ValueError, match=r"^units must be two texts, got \('1',\)"):
+        chart_explorer(chart, units=("1",))
+
+
+def test_a_grid_says_how_many_roots_it_has():
+    grid = RootGrid(CommonArm(), [0.9, 1.1], [1.0])
+    assert repr(grid) == "RootGrid(2 by 1 points, 2 roots certified)"

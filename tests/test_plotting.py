@@ -2,7 +2,14 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from armlock import CommonArm, d_curve_branches, d_curve_line, plotting, stability_chart
+from armlock import (
+    CommonArm,
+    d_curve_branches,
+    d_curve_line,
+    nyquist,
+    plotting,
+    stability_chart,
+)
 
 
 @pytest.fixture
@@ -91,3 +98,42 @@ def test_the_style_is_a_style_sheet_of_matplotlib():
     with plt.rc_context():
         plotting.use_style()
         assert plt.rcParams["savefig.dpi"] == 150
+
+
+@pytest.mark.parametrize("draw", [plotting.plot_stable_region, plotting.plot_counts])
+def test_charts_with_uneven_axes_are_no_pictures(ax, draw):
+    even = np.linspace(-1, 1, 5)
+    for bad in ([0.0, 0.1, 1.0], even[::-1], [0.5]):
+        with pytest.raises(ValueError, match=r"^chart\.x must "):
+            draw(ax, stability_chart(CommonArm(), bad, even))
+        with pytest.raises(ValueError, match=r"^chart\.y must "):
+            draw(ax, stability_chart(CommonArm(), even, bad))
+    with pytest.raises(TypeError, match=r"^chart must be a StabilityChart, got array"):
+        draw(ax, np.ones((3, 3)))
+    assert not ax.images
+
+
+def test_options_of_figures_are_checked(ax, chart):
+    curve = nyquist(CommonArm(), 0.9, 0.9, omega_max=3.0)
+    last = curve.omega[-1]
+    for call, message in (
+        (lambda: plotting.plot_counts(ax, chart, 0), "largest must be an integer from 1 on"),
+        (lambda: plotting.label_regions(ax, chart, -1.0), "smallest must lie between 0 and 1"),
+        (lambda: plotting.chart_columns(chart, every=0), "every must be an integer from 1 on"),
+        (lambda: plotting.chart_columns(chart, every=-2), "every must be an integer from 1 on"),
+        (lambda: plotting.plot_nyquist(ax, curve, unit=0.0), "unit must be positive"),
+        (lambda: plotting.plot_nyquist(ax, curve, outer=-1.0), "outer must be positive"),
+        (
+            lambda: plotting.plot_nyquist(ax, curve, arrows=[last]),
+            "arrows must lie above 0 and",
+        ),
+        (lambda: plotting.plot_nyquist(ax, curve, arrows=[np.nan]), "arrows must be finite"),
+        (lambda: plotting.publish(ax.figure, "a/b", {}), "name must be the stem of a file"),
+        (lambda: plotting.publish(ax.figure, "", {}), "name must be the stem of a file"),
+    ):
+        with pytest.raises(ValueError, match=f"^{message}"):
+            call()
+    with pytest.raises(TypeError, match=r"^curve must be a NyquistCurve, got CommonArm"):
+        plotting.plot_nyquist(ax, CommonArm())  # type: ignore[arg-type]
+    assert not ax.lines
+    plotting.plot_nyquist(ax, curve, arrows=[curve.omega[-2]])

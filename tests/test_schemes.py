@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from armlock import CommonArm, rightmost_root, spectral_radius, unstable_roots
-from armlock.schemes import map_eigenvalues, pade_poles, standard_schemes
+from armlock import CommonArm, DualArm, rightmost_root, spectral_radius, unstable_roots
+from armlock.schemes import map_eigenvalues, pade_poles, sampled_loop, standard_schemes
 
 LOOP = CommonArm(1.0, 2.2, 1.8)
 STEP = 0.1
@@ -90,3 +90,43 @@ def test_pade_poles_approach_the_slow_roots_and_miss_the_fast_ones():
     assert near[1] < near[0] / 100
     unstable = int((pade_poles(CommonArm(), 3.0, 3.0, 10).real > 1e-9).sum())
     assert unstable < unstable_roots(CommonArm(), 3.0, 3.0)
+
+
+def test_the_step_of_a_scheme_divides_both_delays():
+    for build in (standard_schemes, lambda loop, step: sampled_loop(loop, step, 0.5, (0, 0))):
+        with pytest.raises(ValueError, match=r"^step must divide every delay, got step=0\.15"):
+            build(LOOP, 0.15)
+        for step in (0.0, -0.1):
+            with pytest.raises(ValueError, match=rf"^step must be positive, got {step}$"):
+                build(LOOP, step)
+        with pytest.raises(TypeError, match=r"^loop must be a CommonArm, got DualArm\("):
+            build(DualArm(), 0.1)  # type: ignore[arg-type]
+
+
+def test_weights_of_a_scheme_are_named():
+    with pytest.raises(ValueError, match=r"^held\[1\] must be finite, got nan$"):
+        sampled_loop(LOOP, STEP, 1.0, (0.0, np.nan))
+    with pytest.raises(TypeError, match=r"^present must be a real number, got 'a'$"):
+        sampled_loop(LOOP, STEP, "a", (0.0, 0.0))  # type: ignore[arg-type]
+
+
+def test_eigenvalues_are_those_of_a_map():
+    with pytest.raises(ValueError, match=r"^system must be a map, got CommonArm\(.*continuous"):
+        map_eigenvalues(LOOP, 1.0, 1.0)
+    with pytest.raises(TypeError, match=r"^system must be a CharacteristicFunction"):
+        map_eigenvalues(3, 1.0, 1.0)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=r"^c2 must be finite, got nan$"):
+        map_eigenvalues(standard_schemes(LOOP, STEP)[NAMES[0]], 1.0, np.nan)
+
+
+@pytest.mark.parametrize("order", [0, 61, 2.0, True, "4"])
+def test_orders_of_pade_approximants_are_bounded(order):
+    with pytest.raises(ValueError, match=r"^order must be an integer from 1 to 60, got "):
+        pade_poles(LOOP, 1.0, 1.0, order)
+
+
+def test_pade_poles_of_the_highest_order_are_still_right():
+    found = pade_poles(LOOP, 0.9, 1.05, np.int64(60))  # type: ignore[arg-type]
+    assert found.size == 121
+    assert np.abs(found - rightmost_root(LOOP, 0.9, 1.05)).min() < 1e-10
+    assert found.real.max() < 0.0

@@ -20,6 +20,7 @@ from armlock import (
     transition_matrix,
     unstable_roots,
 )
+from armlock.realization import realize
 from tests import independent
 from tests.systems import RETARDED
 
@@ -264,3 +265,14 @@ def test_large_parameters_do_not_spoil_the_spectral_radius(exponent):
     )
     found = spectral_radius(CommonArm(), 10.0**exponent, 10.0**exponent, 0.1)
     assert float(found) == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_realization_is_of_a_system_in_continuous_time_at_a_point():
+    with pytest.raises(
+        TypeError, match=r"^system must be a CharacteristicFunction, .* got 'x'"
+    ):
+        realize("x", 1.0, 1.0)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=r"^c2 must be finite, got nan$"):
+        realize(CommonArm(), 1.0, np.nan)
+    with pytest.raises(ValueError, match=r"^system must be in continuous time, got a map"):
+        realize(semi_discretization(CommonArm(), 0.1), 1.0, 1.0)

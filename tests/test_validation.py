@@ -20,6 +20,7 @@ from armlock import (
 from armlock.validation import (
     axis,
     broadcast_pair,
+    even_axis,
     positive_number,
     real_array,
     real_number,
@@ -262,3 +263,13 @@ def test_a_switch_is_true_or_false(value):
     ):
         switch("x", value)
     assert switch("x", np.True_) is True
+
+
+def test_an_even_axis_ascends_in_equal_steps():
+    assert even_axis("x", 1.0 + np.linspace(-1e-9, 1e-9, 200)).size == 200
+    assert even_axis("x", [3], least=1).tolist() == [3.0]
+    for values in ([1.0, 0.0, -1.0], [0.0, 1.0, 1.0], [0.0, 1.0, 10.0], [2.0, 2.0]):
+        with pytest.raises(ValueError, match=r"^x must ascend in equal steps, got steps from "):
+            even_axis("x", values)
+    with pytest.raises(ValueError, match=r"^x must hold at least 2 values, got 1$"):
+        even_axis("x", [1.0])
