@@ -340,7 +340,7 @@ def parametric_curve() -> Finding:
         f"Both lines hold with their signs as printed, at {omega.size} frequencies up to "
         f"{omega[-1]:g} rad/s and for either order of the arms; with the sign of one line "
         f"turned, the median residual is {min(wrong):.2g}. The package's own curve agrees to a "
-        f"relative {apart:.1g}.",
+        f"relative {max(apart, 1e-15):.0e}.",
     )
 
 
@@ -482,8 +482,9 @@ def recurrence() -> Finding:
         "spectral radius less one at (1, 1), h = 0.05 s, both weights as printed (exact: 0)",
         "The exponent of the integral needs t_(i+1) - ν: as printed it grows, and R is "
         f"{gain:.4f} times too large. With R = c (1 - exp(-2 g h)) / 2 for both arms, as the "
-        "matrix of Eq. (8) suggests, the spectral radius at (1, 1) exceeds 1 by "
-        f"{at_one['derived']:.1g} and the line c₁ + c₂ = 2 is exact for every h. As printed, "
+        "matrix of Eq. (8) suggests, the spectral radius at (1, 1) is 1 to "
+        f"{max(abs(at_one['derived']), 1e-15):.0e} and the line c₁ + c₂ = 2 is "
+        "exact for every h. As printed, "
         f"the line meets c₁ = c₂ at {mid['both as printed']:.4f}; with only the integral as "
         f"printed at {mid['integral as printed']:.4f}, with only g h c₂ at "
         f"{mid['g h c2 as printed']:.4f} (exact: {mid['derived']:.4f}). The stable point (0.9, "

@@ -289,8 +289,8 @@ def difference_row() -> Finding:
         verdict,
         ratio,
         "printed response over the true one at 0.1 mHz, with Δτ = τ₁ - τ₂",
-        "As for the common arm, Δτ must be half the difference of the round trips; then the "
-        f"row is exact (to {exact:.0e}). It is arm 2 less arm 1, arm 1 being the longer: "
+        "Δτ must be half the difference of the round trips, as in the common arm's row; then "
+        f"the row is exact (to {exact:.0e}). It is arm 2 less arm 1, arm 1 being the longer: "
         f"arm 1 less arm 2 has the opposite sign and is up to {opposite:.3g} away.",
     )
 
