@@ -604,10 +604,8 @@ class Simulation:
             )
             if stop >= 0:
                 output[at : at + stop] = self._phi[start : start + stop]
-                self._stopped = (
-                    float(self._watch[1]) / self.sample_rate,
-                    (self.samples + stop) / self.sample_rate,
-                )
+                self.samples += stop
+                self._stopped = float(self._watch[1]) / self.sample_rate, self.time
                 # A copy, so that the error does not hold all the memory of the run.
                 raise DivergenceError(*self._stopped, output[: at + stop].copy())
             output[piece] = self._phi[start : start + part.size]

@@ -247,12 +247,13 @@ def test_what_is_no_system_is_refused(function):
         semi_discretization(CommonArm, 0.1)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("value", [Decimal("0.1"), Fraction(1, 10)])
-def test_numbers_of_other_kinds_are_refused_by_name(value):
-    with pytest.raises(TypeError, match=r"^step must be a real number, got (Decimal|Fraction)"):
-        spectral_radius(CommonArm(), 1.0, 1.0, value)
-    with pytest.raises(TypeError, match=r"^c1 must hold real numbers, got dtype object"):
-        spectral_radius(CommonArm(), value, 1.0, 0.1)
+def test_fractions_and_decimals_are_numbers():
+    step: Any
+    x: Any = [Fraction(1, 2)]
+    y: Any = Decimal("0.75")
+    expected = spectral_radius(CommonArm(), 0.5, 0.75, 0.1)
+    for step in (Decimal("0.1"), Fraction(1, 10)):
+        assert spectral_radius(CommonArm(), x, y, step).tolist() == [float(expected)]
 
 
 @pytest.mark.parametrize("exponent", [2, 10, 16, 40, 300])
