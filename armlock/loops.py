@@ -21,7 +21,7 @@ from armlock import paper, sensors
 from armlock.characteristic import CharacteristicFunction
 from armlock.controllers import Controller, integrating_actuator, table_two
 from armlock.sensors import SignalMapping
-from armlock.validation import ComplexArray, axis, positive_number, real_array
+from armlock.validation import ComplexArray, axis, positive_number, real_array, switch
 
 
 class HayesEquation(CharacteristicFunction):
@@ -366,7 +366,7 @@ def paper_loop(
     array([0, 0])
     """
     chosen = table_two() if controller is None else controller
-    if actuator:
+    if switch("actuator", actuator):
         chosen = chosen * integrating_actuator()
     return Loop(chosen, _dual_mapping(tau1, tau2, corner, difference), tau1, tau2)
 

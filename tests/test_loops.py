@@ -80,3 +80,10 @@ def test_equal_delays_are_fine_where_only_roots_are_counted():
 def test_equal_delays_are_refused_by_the_dual_arm():
     with pytest.raises(ValueError, match=r"^tau1 and tau2 must differ, got 20\.0 for both"):
         DualArm(tau1=20.0, tau2=20.0)
+
+
+@pytest.mark.parametrize("value", ["no", 1, None, "integrating"])
+def test_the_actuator_is_there_or_not(value):
+    with pytest.raises(TypeError, match=rf"^actuator must be True or False, got {value!r}$"):
+        paper_loop(actuator=value)
+    assert paper_loop(actuator=np.True_).degree == paper_loop(actuator=True).degree  # type: ignore[arg-type]
