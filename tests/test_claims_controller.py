@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mpmath
 import numpy as np
 import pytest
 
@@ -110,3 +111,44 @@ def test_unity_gain_frequency_has_unity_gain():
         value = complex(chapter.response(np.array([at]), *c)[0])
         assert abs(value) == pytest.approx(1.0, abs=1e-9)
         assert np.angle(value) == pytest.approx(phase, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", ["Stage I", "Table II", "Eq. (11)"])
+@pytest.mark.parametrize("actuator", [False, True])
+@pytest.mark.parametrize("c2", [1.0 - 1e-6, 1.0, 1.0 + 1e-6])
+def test_roots_next_to_zero_are_roots_of_the_printed_loop(name, actuator, c2):
+    """1 + L vanishes there, with L from controller and sensor in 80 digits."""
+    controller = chapter.CONTROLLERS[name]
+    found = chapter.expanded_roots(
+        paper_loop(controller=controller, actuator=actuator), 1.0, c2
+    )
+    # In Eq. (11) as printed a pole cancels a zero; the 1/s cancels one of the two high-passes.
+    assert len(found) == {"Stage I": 2, "Table II": 6, "Eq. (11)": 5}[name] - actuator
+    with mpmath.workdps(80):
+        tau1, tau2, p = mpmath.mpf(20.1), mpmath.mpf(19.9), mpmath.mpf(2.0 * np.pi * 0.4)
+        # The loop takes this difference in doubles.
+        spread = mpmath.mpf(20.1 - 19.9)
+        for root in found:
+
+            def one_plus(s):
+                e = p / ((s + p) * s * spread)
+                late1, late2 = mpmath.exp(-s * tau1), mpmath.exp(-s * tau2)
+                sensor = (1 + e) * (1 - late1) + (1 - e) * (1 - mpmath.mpf(c2) * late2)
+                value = mpmath.mpf(controller.gain) * sensor / (s if actuator else 1)
+                for zero in controller.zeros:
+                    value *= s - zero
+                for pole in controller.poles:
+                    value /= s - pole
+                return 1 + value
+
+            # A secant through two points near the root, which is then a step of Newton's.
+            ends = [mpmath.mpc(root) * (1 + shift) for shift in (-1e-7, 1e-7)]
+            slope = (one_plus(ends[1]) - one_plus(ends[0])) / (ends[1] - ends[0])
+            assert abs(one_plus(mpmath.mpc(root)) / slope) < 1e-9 * abs(root)
+
+
+def test_slow_roots_are_the_same_in_every_call():
+    loop = paper_loop(controller=chapter.CONTROLLERS["Table II"], actuator=True)
+    first, second = (chapter.slow_roots(loop, 1.0, 1.0)[:5] for _ in range(2))
+    assert np.array_equal(first, second)
+    assert first[0].real == pytest.approx(-7.1018371e-9, rel=1e-7)

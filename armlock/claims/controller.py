@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import NamedTuple
 
+import mpmath
 import numpy as np
 
 from armlock.claims.ledger import Finding, Verdict, claim
@@ -36,6 +37,9 @@ POINTS = {
 }
 #: The corner of the box of perturbations that comes nearest to instability.
 WORST_CORNER = (1.0 + PERTURBATION, 1.0 - PERTURBATION)
+#: Up to here in rad/s roots are found from an expansion of the delays, in such units.
+NEAR_ZERO = 1e-3
+EXPANSION_SCALE = 1e-6
 #: Up to here in Hz the controller shapes the loop; the delays act from about 1/tau on.
 LOW_FREQUENCY = 1e-3
 #: The band in Hz in which the paper's Sec. IV.B wants |L| constant, and the science band.
@@ -60,7 +64,8 @@ def slow_roots(loop: Loop, c1: float, c2: float, degree: int = 60) -> ComplexArr
     """Characteristic roots of low frequency, by another method than winding.
 
     Eigenvalues of the loop's Chebyshev discretization, each followed by Newton's method to a
-    root of the exact characteristic function.
+    root of the exact characteristic function. Next to zero rounding hides the eigenvalues, and
+    `expanded_roots` takes their place.
 
     Returns
     -------
@@ -68,12 +73,60 @@ def slow_roots(loop: Loop, c1: float, c2: float, degree: int = 60) -> ComplexArr
         Distinct roots in rad/s, rightmost first. Roots of magnitude up to about
         degree / delay are resolved; those of the high-frequency chain are not among them.
     """
-    found: list[complex] = []
+    found = list(expanded_roots(loop, c1, c2))
     for start in pseudospectral_roots(loop, c1, c2, degree)[:16]:
+        if abs(start) < NEAR_ZERO:
+            continue
         root, error = polish_root(loop, c1, c2, complex(start))
         if np.isfinite(error) and all(abs(root - r) > 1e-9 * abs(r) for r in found):
             found.append(root)
     return np.array(sorted(found, key=lambda r: -r.real))
+
+
+def expanded_roots(loop: Loop, c1: float, c2: float, order: int = 8) -> list[complex]:
+    """Roots of D with its delays expanded in powers of s, nearer to zero than `NEAR_ZERO`.
+
+    Parameters
+    ----------
+    loop : Loop
+        The loop.
+    c1, c2 : float
+        The point.
+    order : int, optional
+        Last power of a delay times s. With the default what is left out is below rounding.
+
+    Returns
+    -------
+    list of complex
+        In rad/s, to rounding; found in extended precision, because of D only the difference
+        of terms many orders larger remains.
+    """
+    with mpmath.workdps(60):
+        size = max(loop.rest.size, loop.b1.size, loop.b2.size) + order
+        total = [mpmath.mpf(0)] * size
+        for coefficients, delay, origin, here in (
+            (loop.rest, 0.0, 1.0, 0.0),
+            (loop.b1, loop.delay1, loop.reference[0], c1),
+            (loop.b2, loop.delay2, loop.reference[1], c2),
+        ):
+            for k in range(order + 1):
+                part = (origin if k == 0 else 0) - here * (
+                    (-mpmath.mpf(delay)) ** k / mpmath.factorial(k)
+                )
+                for m, b in enumerate(coefficients.tolist()):
+                    total[m + k] += b * part
+        # In units of the controller's frequencies, for which doubles serve as starts.
+        scaled = [float(b * mpmath.mpf(EXPANSION_SCALE) ** m) for m, b in enumerate(total)]
+        found = []
+        for start in np.polynomial.polynomial.polyroots(scaled) * EXPANSION_SCALE:
+            if abs(start) > NEAR_ZERO:
+                continue
+            root = mpmath.mpc(complex(start))
+            for _ in range(8):
+                value, slope = mpmath.polyval(total, root, derivative=True, asc=True)
+                root -= value / slope if slope else 0
+            found.append(complex(root))
+    return found
 
 
 class Reading(NamedTuple):
@@ -88,7 +141,7 @@ class Reading(NamedTuple):
     encirclements : int
         Clockwise turns of the Nyquist curve around -1.
     rightmost : complex
-        Rightmost of the polished slow roots, in rad/s.
+        Rightmost of the polished slow roots, in rad/s; of a pair, the upper one.
     found : int
         How many of them lie in the right half-plane.
     """
@@ -118,7 +171,7 @@ def readings() -> tuple[Reading, ...]:
                         point,
                         int(unstable_roots(loop, c1, c2)),
                         nyquist(loop, c1, c2).encirclements,
-                        complex(roots[0]),
+                        complex(roots[0].real, abs(roots[0].imag)),
                         int((roots.real > 0.0).sum()),
                     )
                 )

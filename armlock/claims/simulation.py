@@ -237,7 +237,8 @@ def envelope(trace: Trace, length: int = 500) -> tuple[FloatArray, FloatArray]:
     """
     number = trace.series.size // length
     parts = np.abs(trace.series[: number * length]).reshape(number, length)
-    return (np.arange(number) + 0.5) * length, np.asarray(parts.max(axis=1))
+    middle = length * (np.arange(number, dtype=np.float64) + 0.5)
+    return np.asarray(middle), np.asarray(parts.max(axis=1))
 
 
 class Suppression(NamedTuple):
