@@ -1,7 +1,15 @@
 import numpy as np
 import pytest
 
-from armlock import CommonArm, DualArm, HayesEquation, Loop, SingleArm, unstable_roots
+from armlock import (
+    CommonArm,
+    DualArm,
+    HayesEquation,
+    Loop,
+    SingleArm,
+    paper_loop,
+    unstable_roots,
+)
 from armlock.controllers import integrating_actuator
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
 
@@ -86,4 +94,5 @@ def test_equal_delays_are_refused_by_the_dual_arm():
 def test_the_actuator_is_there_or_not(value):
     with pytest.raises(TypeError, match=rf"^actuator must be True or False, got {value!r}$"):
         paper_loop(actuator=value)
-    assert paper_loop(actuator=np.True_).degree == paper_loop(actuator=True).degree  # type: ignore[arg-type]
+    assert paper_loop(actuator=False).neutral
+    assert not paper_loop(actuator=np.True_).neutral  # type: ignore[arg-type]
