@@ -186,6 +186,8 @@ class ShapedNoise:
         white = self._random.standard_normal(whole_number("samples", samples, 0))
         white *= self._scale
         sampled = self._sampled
+        if not self._state:
+            return white * float(sampled.direct[0])
         self._state = _filter(
             white, self._state, floats(sampled.change), floats(sampled.drive),
             floats(sampled.output), float(sampled.direct[0]),
@@ -224,8 +226,9 @@ def _root_of_covariance(A: FloatArray, B: FloatArray) -> FloatArray:
         root = np.linalg.cholesky(0.5 * (covariance + covariance.T))
     except (RuntimeWarning, np.linalg.LinAlgError):
         raise ValueError(
-            "poles must not lie so close to the imaginary axis that the variance is lost in "
-            "rounding; a series that starts at rest does without it, at_rest=True"
+            "poles and gain must leave a variance that floats can hold: the poles lie too "
+            "close to the imaginary axis, or the gain is too large or too small; a series "
+            "that starts at rest does without it, at_rest=True"
         ) from None
     return np.asarray(root)
 
@@ -306,6 +309,10 @@ def band_rms(low: float, high: float) -> float:
     low, high = positive_number("low", low), positive_number("high", high)
     if high <= low:
         raise ValueError(f"high must exceed low = {low}, got {high}")
+    if low < 1e-100:
+        raise ValueError(
+            f"low must be at least 1e-100 Hz, where its cube can be held, got {low}"
+        )
     red = paper.PHASE_NOISE_CORNER**4 * (low**-3 - high**-3) / 3.0
     return paper.PHASE_NOISE_LEVEL * math.sqrt(high - low + red)
 

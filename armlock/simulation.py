@@ -64,8 +64,9 @@ HIGHEST_ORDER = 99
 
 Matrices = tuple[Row, Row, Row, Row, Row]
 
-# Delays closer to whole samples than this, relatively, are whole.
-_WHOLE = 1e-9
+# Delays closer to whole samples than this, relatively, and never further than this share of a
+# sample, are whole.
+_WHOLE, _SHARE = 1e-9, 1e-6
 _LARGEST_FLOAT = sys.float_info.max
 
 
@@ -159,7 +160,7 @@ def lagrange_delay(name: str, tau: float, sample_rate: float, order: int) -> Del
             f"{8e-9 * samples:.3g} GB"
         )
     whole = round(samples)
-    if abs(samples - whole) <= _WHOLE * samples:
+    if abs(samples - whole) <= min(_WHOLE * samples, _SHARE):
         if whole < 1:
             raise ValueError(
                 f"sample_rate must be at least 1 / {name} = {1.0 / tau} Hz, got {sample_rate}"

@@ -1,5 +1,6 @@
 """Shaped noise: density, start, blocks, seeds."""
 
+import pickle
 from itertools import pairwise
 from typing import Any
 
@@ -115,8 +116,10 @@ def test_filters_that_cannot_be_drawn_are_refused():
         ShapedNoise([-1.0], [], 1.0, seed=1)
     with pytest.raises(ValueError, match=r"gain must not be zero, got 0\.0"):
         ShapedNoise([], [-1.0], 0.0, seed=1)
-    with pytest.raises(ValueError, match="variance is lost in rounding"):
+    with pytest.raises(ValueError, match="must leave a variance that floats can hold"):
         PerturbationNoise(1, cutoff=1e-20)
+    with pytest.raises(ValueError, match="must leave a variance that floats can hold"):
+        ShapedNoise([], [-1.0], 1e300, seed=1)
     assert np.isfinite(PerturbationNoise(1, cutoff=1e-20, at_rest=True).draw(10)).all()
     with pytest.raises(TypeError, match="at_rest must be True or False, got 'no'"):
         LaserNoise(1, at_rest="no")  # type: ignore[arg-type]
@@ -132,6 +135,23 @@ def test_any_partition_gives_the_same_bits(name, sizes):
     parts = [source.draw(size) for size in sizes]
     assert [part.size for part in parts] == sizes
     assert np.array_equal(np.concatenate([np.empty(0), *parts]), whole)
+
+
+def test_a_filter_without_poles_leaves_white_noise():
+    source = ShapedNoise([], [], -2.0, seed=1, sample_rate=50.0)
+    found = source.draw(200_000)
+    white = np.random.default_rng(1).standard_normal(found.size)
+    # One-sided, over half the rate: the variance is 2^2 times 25.
+    assert found == pytest.approx(-10.0 * white, rel=1e-14)
+    assert source.sampled_asd([0.0, 25.0]).tolist() == [2.0, 2.0]
+
+
+def test_a_copied_noise_goes_on_by_itself():
+    for make in SOURCES.values():
+        source = make(5)
+        source.draw(37)
+        other = pickle.loads(pickle.dumps(source))
+        assert np.array_equal(other.draw(50), source.draw(50))
 
 
 def test_noises_say_what_they_are():
@@ -219,6 +239,7 @@ def test_band_rms_is_the_integral():
             r"duration must be a finite number of samples, got 1e\+308",
         ),
         (lambda: band_rms(1.0, 0.5), "high must exceed"),
+        (lambda: band_rms(1e-300, 0.5), "low must be at least 1e-100 Hz"),
         (lambda: sample_count(-200_000.0), "duration must be positive"),
         (lambda: sample_count(1e-9), "duration must be at least one sample"),
         (lambda: sample_count(1.0, -200.0), "sample_rate must be positive"),

@@ -32,7 +32,7 @@ from armlock import (
     unstable_roots,
 )
 from armlock.sensors import COMMON, SignalMapping
-from armlock.simulation import BLOCK, LONG_RUN, LONGEST
+from armlock.simulation import BLOCK, LONG_RUN, LONGEST, lagrange_delay
 from benchmarks.__main__ import main
 from tests.extended import naive, reference
 
@@ -492,6 +492,16 @@ def test_rates_beyond_all_memory_are_refused_with_the_estimate(rate, monkeypatch
     if rate == 1e9:
         assert "2.01e+10 samples, 161 GB" in str(caught.value)
     assert LONGEST * 8 == 1 << 29
+
+
+def test_a_share_of_a_sample_is_seen_at_any_rate():
+    """0.04 samples are less than a part in 1e9 of a long delay, and no rounding error."""
+    assert lagrange_delay("tau", 20.0 + 1e-9, 1e6, 1).weights.size == 2
+    found = lagrange_delay("tau", 5e7 + 0.04, 1.0, 1)
+    assert found.first == 50_000_000
+    assert found.weights == pytest.approx([0.96, 0.04], abs=1e-7)
+    # The last digit of 20.1 * 1e5 = 2010000.0000000002 is.
+    assert lagrange_delay("tau", 20.1, 1e5, 7).weights.tolist() == [1.0]
 
 
 VIEWS = {
