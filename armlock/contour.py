@@ -18,6 +18,9 @@ frequency.
 
 from __future__ import annotations
 
+import os
+from typing import Any
+
 import numpy as np
 from numba import njit, prange
 
@@ -36,6 +39,29 @@ SAFETY = 0.95
 BOUNDARY = -1
 UNCONFINED = -2
 DOUBTFUL = -3
+TOO_LONG = -4
+UNTRIED = -5
+
+# Most steps of one walk, about ten a turn of the longest delay: some ten seconds.
+MOST_STEPS = 100_000_000
+# Most zeros and samples that a walk keeps: about a gigabyte.
+MOST_ZEROS = 30_000_000
+MOST_SAMPLES = 10_000_000
+# Products below this have lost digits, and are about to vanish.
+_TINY = 1e-280
+
+# Whether this process was forked: GNU OpenMP ends a forked process that starts its threads
+# again, so that the loops over points and rows run on one core there.
+_forked = False
+
+
+def _note_fork() -> None:
+    global _forked
+    _forked = True
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_note_fork)
 
 
 @njit(cache=True, inline="always")
@@ -128,8 +154,10 @@ def winding(
     """Argument gathered by an exponential sum as omega goes from 0 to `omega_end`.
 
     Returns the argument, the last value, and whether the sum stays clear of zero.
-    `noise` is the polynomial in omega that bounds its rounding error.
+    `noise` is the polynomial in omega that bounds its rounding error. The argument is nan
+    where the walk would take more than MOST_STEPS steps.
     """
+    steps = 0
     bound = _curvature_bound(coefficients, sums, phases)
     omega = 0.0
     value, slope = _evaluate(coefficients, sums, phases, omega)
@@ -138,6 +166,9 @@ def winding(
     if abs(value) <= _real_horner(noise, 0.0):
         return argument, value, False
     while omega < omega_end:
+        steps += 1
+        if steps > MOST_STEPS:
+            return np.nan, value, True
         step = min(4.0 * step, omega_end - omega)
         while True:
             distance = _tangent_distance(value, slope, step)
@@ -176,27 +207,55 @@ def _taylor_signs_positive(q: FloatArray, shift: float) -> bool:
 
 @njit(cache=True)
 def last_crossing_bound(
-    square_a: FloatArray, square_b1: FloatArray, square_b2: FloatArray, x: float, y: float
+    squares: FloatArray, leads: FloatArray, unit: float, x: float, y: float
 ) -> float:
     """Frequency past which |A| > |x B1| + |y B2|, so that no root can cross; inf if none.
 
-    It is nan where a number overflows. The three arguments hold |A|^2, |B1|^2, |B2|^2 at
-    s = j omega as polynomials in w = omega^2. With G = |A|^2 - |x B1|^2 - |y B2|^2 the
+    It is nan where a number overflows or underflows. `squares` holds |A|^2, |B1|^2 and
+    |B2|^2 at s = j omega as polynomials in w = (omega / unit)^2, and `leads` the magnitudes
+    of the highest coefficients of A, B1 and B2. With G = |A|^2 - |x B1|^2 - |y B2|^2 the
     inequality is G > 0 and Q = G^2 - 4 |x B1|^2 |y B2|^2 > 0. A shift of w after which every
     coefficient of Q is positive proves that Q has no root beyond it (Budan), and then G keeps
     its sign.
     """
-    size = square_a.size
-    g = square_a - x * x * square_b1 - y * y * square_b2
-    q = np.zeros(2 * size - 1)
+    first, second = abs(x) * leads[1], abs(y) * leads[2]
+    spare = leads[0] - first - second
+    if not np.isfinite(spare):
+        return np.nan
+    if spare <= 16.0 * EPSILON * leads[0]:
+        return np.inf
+    size = squares.shape[1]
+    g, b1, b2 = squares[0].copy(), x * x * squares[1], y * y * squares[2]
+    for i in range(size):
+        # What vanishes next to a number of ordinary size does not matter.
+        largest = max(abs(squares[0, i]), abs(b1[i]), abs(b2[i]))
+        lost = (x != 0.0 and squares[1, i] != 0.0 and abs(b1[i]) < _TINY) or (
+            y != 0.0 and squares[2, i] != 0.0 and abs(b2[i]) < _TINY
+        )
+        if lost and largest < _TINY:
+            return np.nan
+        g[i] -= b1[i] + b2[i]
+    size_of_g = np.abs(squares[0]) + np.abs(b1) + np.abs(b2)
+    q, magnitude = np.zeros(2 * size - 1), np.zeros(2 * size - 1)
+    acts = np.zeros(2 * size - 1, dtype=np.bool_)
     for i in range(size):
         for k in range(size):
-            q[i + k] += g[i] * g[k] - 4.0 * (x * y) ** 2 * square_b1[i] * square_b2[k]
-    if not np.isfinite(q).all():
+            q[i + k] += g[i] * g[k] - 4.0 * b1[i] * b2[k]
+            magnitude[i + k] += size_of_g[i] * size_of_g[k]
+            if size_of_g[i] > 0.0 and size_of_g[k] > 0.0:
+                acts[i + k] = True
+    if not np.isfinite(q).all() or (acts & (magnitude < _TINY)).any():
         return np.nan
+    # Without the digits that the sum above has lost near the limit of the chain.
+    share = q[2 * size - 2] / magnitude[2 * size - 2]
+    if share < 1e-3:
+        scale = squares[0, size - 1] ** 0.5 / leads[0]
+        lead = spare * scale * (leads[0] + first + second) * scale
+        lead *= (leads[0] + first - second) * scale * (leads[0] - first + second) * scale
+        q[2 * size - 2] = lead
     lead = q[2 * size - 2]
-    if g[size - 1] <= 0.0 or lead <= 0.0:
-        return np.inf
+    if not lead > 0.0:
+        return np.nan
     if _taylor_signs_positive(q, 0.0):
         return 0.0
     upper = 0.0
@@ -216,7 +275,38 @@ def last_crossing_bound(
             upper = middle
         else:
             lower = middle
-    return float(np.sqrt(upper))
+    return float(np.sqrt(upper) * unit)
+
+
+@njit(cache=True)
+def _needs_too_long(coefficients: ComplexArray, phases: FloatArray, omega_end: float) -> bool:
+    """Whether a walk over an exponential sum takes more than MOST_STEPS steps.
+
+    With S the sum of the delayed terms' magnitudes, and as long as the undelayed one is no
+    larger, the sum is at most 2 S, and half its second derivative grows to the mean of
+    phase^2, weighted by the terms, times S: no step is longer than 2 over its square root.
+    """
+    fastest = np.abs(phases).max()
+    omega = 2.0 * MOST_STEPS / fastest if fastest > 0.0 else np.inf
+    while omega < omega_end:
+        undelayed, total, weighted = 0j, 0.0, 0.0
+        for g in range(phases.size):
+            value = 0j
+            for k in range(coefficients.shape[1] - 1, -1, -1):
+                value = value * omega + coefficients[g, k]
+            if phases[g] == 0.0:
+                undelayed += value
+            else:
+                total += abs(value)
+                weighted += abs(value) * (phases[g] / fastest) ** 2
+        if not np.isfinite(weighted):
+            return True
+        if abs(undelayed) > total:
+            return False
+        if omega * fastest * np.sqrt(weighted / total) > 2.0 * MOST_STEPS:
+            return True
+        omega *= 4.0
+    return False
 
 
 @njit(cache=True)
@@ -232,24 +322,18 @@ def _remaining_argument(roots: ComplexArray, omega: float) -> float:
 
 
 @njit(cache=True)
-def count_point(
-    parts: ComplexArray,
-    sums: ComplexArray,
-    reference: FloatArray,
-    phases: FloatArray,
-    roots: ComplexArray,
-    squares: FloatArray,
-    omega_end: float,
-    x: float,
-    y: float,
-) -> int:
+def count_point(model: tuple[Any, ...], x: float, y: float) -> int:
     """Return the number of unstable roots at one point, or a status code below zero.
 
     By the argument principle: degree / 2 less the argument over pi, gathered from 0 to
     infinity, for a polynomial in s (`omega_end` is zero); degree less the argument over pi,
-    gathered from 0 to `omega_end`, for a map, whose boundary ends there.
+    gathered from 0 to `omega_end`, for a map, whose boundary ends there. The model is what
+    `armlock.stability` makes of a characteristic function.
     """
+    parts, sums, reference, phases, roots, squares, leads, unit, omega_end = model
     coefficients = parts[0] - x * parts[1] - y * parts[2]
+    if not np.isfinite(coefficients).all():
+        return DOUBTFUL
     size = coefficients.shape[1]
     dx, dy = x - reference[0], y - reference[1]
     undelayed = sums[0] - dx * sums[1] - dy * sums[2]
@@ -265,14 +349,18 @@ def count_point(
     is_map = omega_end > 0.0
     end = omega_end
     if not is_map:
-        end = last_crossing_bound(squares[0], squares[1], squares[2], x, y)
+        end = last_crossing_bound(squares, leads, unit, x, y)
         if end == np.inf:
             return UNCONFINED
         if np.isnan(end):
             return DOUBTFUL
+        if _needs_too_long(coefficients, phases, end):
+            return TOO_LONG
     argument, value, clear = winding(coefficients, undelayed, phases, noise, end)
     if not clear:
         return BOUNDARY
+    if np.isnan(argument):
+        return TOO_LONG
     if is_map:
         count = roots.size - argument / np.pi
     else:
@@ -285,30 +373,45 @@ def count_point(
         # D / A winds no further past `end`; A itself does, in closed form.
         argument += _remaining_argument(roots, end) - np.arctan2(ratio.imag, ratio.real)
         count = 0.5 * roots.size - argument / np.pi
-    nearest = int(np.round(count))
+    nearest = int(np.round(count)) if np.isfinite(count) else -1
     if abs(count - nearest) > 1e-3 or nearest < 0:
         return DOUBTFUL
     return nearest
 
 
+@njit(cache=True)
+def _count_into(
+    counts: IntArray, i: int, model: tuple[Any, ...], x: float, y: float, stop: BoolArray
+) -> None:
+    """Count at point i, unless a walk elsewhere has proved too long."""
+    counts[i] = UNTRIED if stop[0] else count_point(model, x, y)
+    if counts[i] == TOO_LONG:
+        stop[0] = True
+
+
 @njit(cache=True, parallel=True)
-def count_points(
-    parts: ComplexArray,
-    sums: ComplexArray,
-    reference: FloatArray,
-    phases: FloatArray,
-    roots: ComplexArray,
-    squares: FloatArray,
-    omega_end: float,
-    x: FloatArray,
-    y: FloatArray,
-) -> IntArray:
-    """`count_point` over one-dimensional arrays x and y of the same length."""
-    counts = np.empty(x.size, dtype=np.int64)
+def _count_on_all_cores(model: tuple[Any, ...], x: FloatArray, y: FloatArray) -> IntArray:
+    counts, stop = np.empty(x.size, dtype=np.int64), np.zeros(1, dtype=np.bool_)
     for i in prange(x.size):
-        counts[i] = count_point(
-            parts, sums, reference, phases, roots, squares, omega_end, x[i], y[i]
-        )
+        _count_into(counts, i, model, x[i], y[i], stop)
+    return counts
+
+
+@njit(cache=True)
+def _count_on_one_core(model: tuple[Any, ...], x: FloatArray, y: FloatArray) -> IntArray:
+    counts, stop = np.empty(x.size, dtype=np.int64), np.zeros(1, dtype=np.bool_)
+    for i in range(x.size):
+        _count_into(counts, i, model, x[i], y[i], stop)
+    return counts
+
+
+def count_points(model: tuple[Any, ...], x: FloatArray, y: FloatArray) -> IntArray:
+    """`count_point` over one-dimensional arrays x and y of the same length.
+
+    After the first point that takes too long no further one is tried.
+    """
+    count = _count_on_one_core if _forked else _count_on_all_cores
+    counts: IntArray = count(model, x, y)
     return counts
 
 
@@ -381,11 +484,12 @@ def sign_changes(
     omega_end: float,
     is_map: bool,
     rounding: float = ROUNDING,
-) -> tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray]:
+) -> tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray, bool]:
     """Zeros in [0, omega_end] of the imaginary part of an exponential sum.
 
     Where the imaginary part is odd in omega, as it is for a row of a chart, omega = 0 is one
-    of them. Returns five arrays, an entry a zero:
+    of them. Returns five arrays, an entry a zero, and whether they are all (they are not if
+    there are more than MOST_ZEROS, or the walk would take more than MOST_STEPS steps):
 
     - `omega`, polished;
     - `jump`, twice the direction of the sign change (a conjugate pair crosses); once at
@@ -422,7 +526,11 @@ def sign_changes(
     doubtful = sign == 0
     last_clear = 0.0
     step = omega_end
+    steps = 0
     while omega < omega_end:
+        steps += 1
+        if steps > MOST_STEPS or found > MOST_ZEROS:
+            break
         step = min(2.0 * step, omega_end - omega)
         curvature = _real_horner(bound, omega + step)
         if curvature > 0.0:
@@ -487,7 +595,8 @@ def sign_changes(
         jumps[found] = -sign
         found += 1
     zeros = zeros[:found]
-    return zeros[:, 0], jumps[:found], zeros[:, 1], zeros[:, 2], zeros[:, 3]
+    complete = omega >= omega_end
+    return zeros[:, 0], jumps[:found], zeros[:, 1], zeros[:, 2], zeros[:, 3], complete
 
 
 @njit(cache=True)
@@ -508,16 +617,104 @@ def _squared(
     return value, slope
 
 
-@njit(cache=True, parallel=True)
-def fill_rows(
-    fixed: ComplexArray,
-    varying: ComplexArray,
-    fixed_sums: ComplexArray,
-    varying_sums: ComplexArray,
-    phases: FloatArray,
-    norm: FloatArray,
+@njit(cache=True)
+def _fill_row(
+    counts: IntArray,
+    doubtful: BoolArray,
+    last: IntArray,
+    i: int,
+    model: tuple[Any, ...],
     ends: FloatArray,
-    is_map: bool,
+    y: FloatArray,
+    deviation: FloatArray,
+    base: IntArray,
+    x: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+) -> None:
+    """Fill row i of a chart, see `fill_rows`."""
+    fixed, varying, fixed_sums, varying_sums, phases, norm, is_map = model
+    fastest = np.abs(phases).max()
+    coefficients = fixed - y[i] * varying
+    magnitude = np.zeros(coefficients.shape[1])
+    for g in range(phases.size):
+        magnitude += np.abs(coefficients[g])
+    omegas, jumps, widths, values, slopes, complete = sign_changes(
+        coefficients,
+        phases,
+        fixed_sums - deviation[i] * varying_sums,
+        ends[i],
+        is_map,
+        CAUTION,
+    )
+    change = np.zeros(x.size + 1, dtype=np.int64)
+    total = base[i]
+    trusted = complete and base[i] >= 0
+    for k in range(omegas.size):
+        omega = omegas[k]
+        square, change_of_square = _squared(norm, omega, ends[i], is_map)
+        if square <= 0.0:
+            continue
+        position = values[k] / square
+        steepness = (slopes[k] + abs(position) * abs(change_of_square)) / square
+        rounding = CAUTION * EPSILON * (1.0 + fastest * omega) / square
+        spread = 4.0 * steepness * widths[k] + rounding * _real_horner(magnitude, omega)
+        if abs(position - lower[i]) <= spread or abs(position - upper[i]) <= spread:
+            trusted = False
+        if lower[i] < position < upper[i]:
+            total += jumps[k]
+            change[np.searchsorted(x, position)] += jumps[k]
+        if position + spread >= x[0] and position - spread <= x[-1]:
+            near = np.searchsorted(x, position - spread)
+            while near < x.size and x[near] <= position + spread:
+                doubtful[i, near] = True
+                near += 1
+    running = base[i]
+    for k in range(x.size):
+        running += change[k]
+        counts[i, k] = running
+    last[i] = total if trusted else BOUNDARY
+
+
+@njit(cache=True, parallel=True)
+def _fill_on_all_cores(
+    counts: IntArray,
+    doubtful: BoolArray,
+    last: IntArray,
+    model: tuple[Any, ...],
+    ends: FloatArray,
+    y: FloatArray,
+    deviation: FloatArray,
+    base: IntArray,
+    x: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+) -> None:
+    for i in prange(y.size):
+        _fill_row(counts, doubtful, last, i, model, ends, y, deviation, base, x, lower, upper)
+
+
+@njit(cache=True)
+def _fill_on_one_core(
+    counts: IntArray,
+    doubtful: BoolArray,
+    last: IntArray,
+    model: tuple[Any, ...],
+    ends: FloatArray,
+    y: FloatArray,
+    deviation: FloatArray,
+    base: IntArray,
+    x: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+) -> None:
+    for i in range(y.size):
+        _fill_row(counts, doubtful, last, i, model, ends, y, deviation, base, x, lower, upper)
+
+
+def fill_rows(
+    model: tuple[Any, ...],
+    ends: FloatArray,
     y: FloatArray,
     deviation: FloatArray,
     base: IntArray,
@@ -527,57 +724,19 @@ def fill_rows(
 ) -> tuple[IntArray, BoolArray, IntArray]:
     """Fill rows of a chart with counts, from the crossings of each row.
 
-    A row is x = N / M. `fixed` - y `varying` holds N conj(M); its sum over the groups is
-    `fixed_sums` - deviation `varying_sums`, where the deviation is that of y from the
-    reference. `norm` holds |M|^2 as real coefficients: of powers of omega, or, for a map, of
-    cosines of multiples of pi omega / omega_end. Row i starts with the count base[i] at
-    x = lower[i]. Returns the counts, which of them lie too near a crossing to be trusted, and
-    the count at x = upper[i] (-1 where a crossing lies too near one of the two ends).
+    A row is x = N / M. The model holds, in this order: `fixed` and `varying`, with
+    N conj(M) = `fixed` - y `varying`; their sums over the groups, to be weighted by the
+    deviation of y from the reference; the phase rates; |M|^2 as real coefficients, of powers
+    of omega, or, for a map, of cosines of multiples of pi omega / omega_end; and whether it
+    is a map. Row i starts with the count base[i] at x = lower[i]. Returns the counts, which
+    of them lie too near a crossing to be trusted, and the count at x = upper[i] (-1 where a
+    crossing lies too near one of the two ends, or there are more than can be found).
     """
     counts = np.empty((y.size, x.size), dtype=np.int64)
     doubtful = np.zeros((y.size, x.size), dtype=np.bool_)
     last = np.empty(y.size, dtype=np.int64)
-    fastest = np.abs(phases).max()
-    for i in prange(y.size):
-        coefficients = fixed - y[i] * varying
-        magnitude = np.zeros(coefficients.shape[1])
-        for g in range(phases.size):
-            magnitude += np.abs(coefficients[g])
-        omegas, jumps, widths, values, slopes = sign_changes(
-            coefficients,
-            phases,
-            fixed_sums - deviation[i] * varying_sums,
-            ends[i],
-            is_map,
-            CAUTION,
-        )
-        change = np.zeros(x.size + 1, dtype=np.int64)
-        total = base[i]
-        trusted = base[i] >= 0
-        for k in range(omegas.size):
-            omega = omegas[k]
-            square, change_of_square = _squared(norm, omega, ends[i], is_map)
-            if square <= 0.0:
-                continue
-            position = values[k] / square
-            steepness = (slopes[k] + abs(position) * abs(change_of_square)) / square
-            rounding = CAUTION * EPSILON * (1.0 + fastest * omega) / square
-            spread = 4.0 * steepness * widths[k] + rounding * _real_horner(magnitude, omega)
-            if abs(position - lower[i]) <= spread or abs(position - upper[i]) <= spread:
-                trusted = False
-            if lower[i] < position < upper[i]:
-                total += jumps[k]
-                change[np.searchsorted(x, position)] += jumps[k]
-            if position + spread >= x[0] and position - spread <= x[-1]:
-                near = np.searchsorted(x, position - spread)
-                while near < x.size and x[near] <= position + spread:
-                    doubtful[i, near] = True
-                    near += 1
-        running = base[i]
-        for k in range(x.size):
-            running += change[k]
-            counts[i, k] = running
-        last[i] = total if trusted else BOUNDARY
+    fill = _fill_on_one_core if _forked else _fill_on_all_cores
+    fill(counts, doubtful, last, model, ends, y, deviation, base, x, lower, upper)
     return counts, doubtful, last
 
 
@@ -592,7 +751,8 @@ def resolved_grid(
     """Frequencies from 0 to `omega_end` between which the sum is nearly straight.
 
     Over each step it stays within `tolerance` times the tangent's distance from zero of its
-    tangent, or the step is as small as rounding allows.
+    tangent, or the step is as small as rounding allows. The grid ends before `omega_end` if
+    it would take more than MOST_SAMPLES.
     """
     bound = _curvature_bound(coefficients, sums, phases)
     grid = np.empty(1024)
@@ -600,7 +760,7 @@ def resolved_grid(
     omega = 0.0
     grid[0] = omega
     step = omega_end
-    while omega < omega_end:
+    while omega < omega_end and found < MOST_SAMPLES:
         value, slope = _evaluate(coefficients, sums, phases, omega)
         step = min(2.0 * step, omega_end - omega)
         smallest = max(1e-13 * omega, 1e-16 * omega_end)

@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
-from armlock import contour
 from armlock.characteristic import CharacteristicFunction, checked_system
+from armlock.stability import sign_changes
 from armlock.validation import FloatArray, positive_number, real_array
 
 _EPSILON = float(np.finfo(float).eps)
@@ -242,7 +242,7 @@ def d_curve_branches(
     _require_two_parameters(system)
     _, b1, b2 = system.on_boundary()
     determinant = b1.times_conjugate(b2)
-    poles = contour.sign_changes(*determinant, omega_max, bool(system.step))[0]
+    poles, _ = sign_changes(determinant, omega_max, is_map=system.step > 0.0)
     edges = np.unique(np.concatenate(([0.0], poles, [omega_max])))
     branches = []
     for start, stop in pairwise(edges):

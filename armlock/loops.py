@@ -176,6 +176,13 @@ class Loop(CharacteristicFunction):
         return result
 
 
+def checked_loop(loop: Loop) -> Loop:
+    """Return the loop, or say what was given in its place."""
+    if not isinstance(loop, Loop):
+        raise TypeError(f"loop must be a Loop, for instance CommonArm(), got {loop!r:.200}")
+    return loop
+
+
 class SingleArm(Loop):
     r"""Single-arm locking with an integrating actuator (paper, Secs. II and IV.A).
 

@@ -15,12 +15,18 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 from scipy.optimize import brentq, minimize_scalar
 
-from armlock import contour
 from armlock.characteristic import ExponentialSum
 from armlock.controllers import Controller
-from armlock.loops import Loop
+from armlock.loops import Loop, checked_loop
 from armlock.nyquist import loop_numerator, reach, resolving_grid
-from armlock.stability import BOUNDARY, CountError, last_crossing, unstable_roots
+from armlock.stability import (
+    BOUNDARY,
+    CountError,
+    last_crossing,
+    sign_changes,
+    unstable_roots,
+)
+from armlock.sweeps import Ray
 from armlock.validation import ComplexArray, FloatArray, axis, real_number
 
 
@@ -194,9 +200,10 @@ def modulus_margin(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> float:
     Raises
     ------
     TypeError, ValueError
-        If c1 or c2 is not finite and real.
+        If `loop` is no `Loop`, or c1 or c2 is not finite and real.
     CountError
-        If the chain of a neutral loop is not confined.
+        If the chain of a neutral loop is not confined, or gain times delay is too large to
+        follow.
 
     Examples
     --------
@@ -204,6 +211,7 @@ def modulus_margin(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> float:
     >>> print(f"{modulus_margin(paper_loop()):.4f}")
     0.6156
     """
+    checked_loop(loop)
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
     _require_confined(loop, c1, c2)
     return _modulus(loop, c1, c2, _grid(loop, c1, c2))[0]
@@ -211,7 +219,12 @@ def modulus_margin(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> float:
 
 def _require_confined(loop: Loop, c1: float, c2: float) -> None:
     """Raise where a neutral loop's chain of roots is not confined."""
-    if not np.isfinite(last_crossing(loop, c1, c2)):
+    end = float(last_crossing(loop, c1, c2))
+    if np.isnan(end):
+        raise CountError(
+            f"no margin at (c1, c2) = ({c1}, {c2}): a number overflows", np.array([[c1, c2]])
+        )
+    if end == np.inf:
         raise CountError(
             f"no margin at (c1, c2) = ({c1}, {c2}): the loop's high-frequency chain of roots "
             f"is not confined to the left half-plane",
@@ -226,7 +239,7 @@ def _crossovers(loop: Loop, c1: float, c2: float, end: float) -> FloatArray:
     excess = above.times_conjugate(above).plus(below.times_conjugate(below).scaled(-1.0))
     # sign_changes looks at the imaginary part.
     turned = ExponentialSum(1j * excess.coefficients, excess.phases, 1j * excess.sums)
-    omega, jump, *_ = contour.sign_changes(*turned, end, False)
+    omega, jump = sign_changes(turned, end)
     omega = omega[(omega > 0.0) & (jump != 0)]
 
     def excess_at(u: float) -> float:
@@ -269,8 +282,11 @@ def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float
 
     Raises
     ------
-    ValueError
-        If the loop is not stable there.
+    TypeError, ValueError
+        If `loop` is no `Loop`, or c1 or c2 is not finite and real, or the loop is not stable
+        there.
+    CountError
+        If gain times delay is too large to follow.
 
     Notes
     -----
@@ -280,7 +296,7 @@ def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float
 
         R + k N = 0 , \qquad k = -\frac{1}{L} \text{ is real.}
 
-    The highest gain is bounded by the chain of a neutral loop.
+    The chain of a neutral loop bounds the gain, too.
 
     Examples
     --------
@@ -290,10 +306,12 @@ def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float
     >>> print(f"{upper:.2f}")
     29.58
     """
+    checked_loop(loop)
+    c1, c2 = real_number("c1", c1), real_number("c2", c2)
     _require_stable(loop, c1, c2)
     crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
     lower, upper, where = 0.0, np.inf, np.nan
-    limit = _chain_gain(loop, c1, c2) if loop.neutral else np.inf
+    floor, limit = _chain_gains(loop, c1, c2) if loop.neutral else (0.0, np.inf)
     # A real root crosses at s = 0.
     start, first = loop_numerator(loop, c1, c2).sums[0].real, float(loop.rest[0])
     at_zero = [-first / start] if start * first < 0.0 else []
@@ -302,13 +320,16 @@ def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float
         if np.isfinite(limit):
             # Just below the limit of the chain, roots cross at ever higher frequency.
             factors = np.append(factors, limit * np.array([0.99, 1.0 - 1e-4, 1.0 - 1e-6]))
+        factors = np.append(factors, floor * np.array([1.01, 1.0 + 1e-4, 1.0 + 1e-6]))
+        # Beyond its limits the chain is lost all the same.
+        factors = factors[(factors > floor) & (factors < limit)]
         ends = np.array([float(last_crossing(_scaled(loop, k), c1, c2)) for k in factors])
-        omega, jump, *_ = contour.sign_changes(*crossing, ends[np.isfinite(ends)].max(), False)
+        omega, jump = sign_changes(crossing, float(ends[~np.isposinf(ends)].max()))
         omega = omega[(omega > 0.0) & (jump != 0)]
         value = loop.open_loop(1j * omega, c1, c2).real
         factor = np.concatenate((at_zero, -1.0 / value[value < 0.0]))
         place = np.concatenate((np.zeros(len(at_zero)), omega[value < 0.0]))
-        lower = max(factor[factor < 1.0], default=0.0)
+        lower = max([floor, *factor[factor < 1.0]])
         if (factor > 1.0).any():
             best = int(np.argmin(np.where(factor > 1.0, factor, np.inf)))
             upper, where = float(factor[best]), float(place[best])
@@ -319,11 +340,23 @@ def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float
     return float(lower), float(upper), where
 
 
-def _chain_gain(loop: Loop, c1: float, c2: float) -> float:
-    """Gain factor from which on the chain of a neutral loop is not confined."""
+def _chain_gains(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
+    r"""Gain factors around one between which the chain of a neutral loop is confined.
+
+    With r, b1 and b2 the highest coefficients of R, B1 and B2, and a factor k, where
+
+    .. math::
+
+        |r + k (b_1 + b_2)| > k \left( |c_1 b_1| + |c_2 b_2| \right) .
+    """
     _, b1, b2 = loop.highest_coefficients
-    excess = abs(c1 * b1) + abs(c2 * b2) - abs(b1 + b2)
-    return abs(float(loop.rest[-1])) / excess if excess > 0.0 else np.inf
+    open_lead = float(loop.rest[-1])
+    # Relative to r, so that the left-hand side is |1 + k sum|.
+    together, apart = (b1 + b2) / open_lead, (abs(c1 * b1) + abs(c2 * b2)) / abs(open_lead)
+    # 1 + k sum = k spread, and -(1 + k sum) = k spread.
+    limits = [1.0 / rate for rate in (apart - together, -together - apart) if rate > 0.0]
+    lower = max((k for k in limits if k < 1.0), default=0.0)
+    return lower, min((k for k in limits if k > 1.0), default=np.inf)
 
 
 def margins(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> Margins:
@@ -343,7 +376,10 @@ def margins(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> Margins:
     Raises
     ------
     TypeError, ValueError
-        If c1 or c2 is not finite and real, or the loop is not stable there.
+        If `loop` is no `Loop`, c1 or c2 is not finite and real, or the loop is not stable
+        there.
+    CountError
+        If gain times delay is too large to follow.
 
     Notes
     -----
@@ -357,6 +393,7 @@ def margins(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> Margins:
     >>> print(f"{math.degrees(margins(paper_loop()).phase):.1f} degrees")
     36.0 degrees
     """
+    checked_loop(loop)
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
     _require_stable(loop, c1, c2)
     grid = _grid(loop, c1, c2)
@@ -401,16 +438,19 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
     float
         Smallest eps > 0 such that the loop at (1, 1) + eps (d1, d2) is not stable: a root
         reaches the imaginary axis there, or a neutral loop's high-frequency chain does. 0 if
-        it is unstable from the start, inf if no eps breaks it.
+        it is unstable from the start, inf if no eps breaks it: that is, if the direction has
+        no effect.
 
     Raises
     ------
     TypeError, ValueError
-        If the direction is not two finite real numbers, or has length zero.
+        If `loop` is no `Loop`, or the direction is not two finite real numbers, has length
+        zero, or is so long or short that the result is no ordinary float.
     ValueError
         If the loop is unstable at (1, 1) itself.
     CountError
-        If the counts on the two sides of the result contradict it.
+        If the counts on the two sides of the result contradict it, or gain times delay is too
+        large to follow.
 
     Notes
     -----
@@ -421,7 +461,8 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
         \varepsilon = \frac{D(s; 1, 1)}
         {d_1 B_1 e^{-s\tau_1} + d_2 B_2 e^{-s\tau_2}} \text{ is real.}
 
-    These frequencies are found with certified steps.
+    These frequencies are found with certified steps, up to ever larger eps: in a direction
+    with an effect the delayed terms end up larger than all others, and break the loop.
 
     Examples
     --------
@@ -429,11 +470,11 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
     >>> print(f"{critical_perturbation(paper_loop(), (0, -1)):.4e}")
     2.9286e-06
     """
+    checked_loop(loop)
     vector = axis("direction", direction)
     if vector.size != 2:
         raise ValueError(f"direction must hold two numbers, got {vector.size}")
-    d1, d2 = float(vector[0]), float(vector[1])
-    if d1 == 0.0 and d2 == 0.0:
+    if not vector.any():
         raise ValueError("direction must not have length zero, got (0, 0)")
     start = int(unstable_roots(loop, 1.0, 1.0))
     if start not in (0, BOUNDARY):
@@ -441,67 +482,53 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
             f"the loop must be stable at (1, 1) to lose stability, but unstable_roots gives "
             f"{start} there"
         )
-    pull = loop.deviation(d1, d2)
-    if not pull.coefficients.any():
+    # Components without effect would hide the size of the others.
+    vector = np.where([loop.b1.any(), loop.b2.any()], vector, 0.0)
+    if _without_effect(loop, vector):
         return np.inf
-    family = loop.at(1.0, 1.0).times_conjugate(pull)
-    chain = _chain_limit(loop, d1, d2)
+    # By a power of two, which rounds nothing.
+    exponent = int(np.frexp(np.abs(vector).max())[1])
+    eps = _critical(loop, start, *(float(part) for part in np.ldexp(vector, -exponent)))
+    with np.errstate(over="ignore", under="ignore"):
+        found = float(np.ldexp(eps, -exponent))
+    if eps != 0.0 and not np.finfo(float).tiny <= found < np.inf:
+        raise ValueError(
+            f"direction must be of a size for which the result is a float, got "
+            f"{tuple(vector.tolist())}: it is {eps} times 2**{-exponent}"
+        )
+    return found
+
+
+def _without_effect(loop: Loop, vector: FloatArray) -> bool:
+    """Whether D stays what it is along a direction."""
+    if loop.tau1 != loop.tau2:
+        return not vector.any()
+    scale = np.abs(vector).max()
+    return not (scale and poly.polyadd(*(vector / scale * [loop.b1, loop.b2])).any())
+
+
+def _critical(loop: Loop, start: int, d1: float, d2: float) -> float:
+    """`critical_perturbation` for a direction of ordinary size that acts on the loop."""
     scale = 1.0 / float(np.hypot(d1, d2))
     nearby = scale * 1e-9
     if start == BOUNDARY and int(unstable_roots(loop, 1.0 + nearby * d1, 1.0 + nearby * d2)):
         return 0.0
-    reaches = scale * 100.0 ** np.arange(-4.0, 4.0)
+    ray = Ray(loop, (1.0, 1.0), (d1, d2))
+    chain = _chain_limit(loop, d1, d2)
+    reaches = scale * 10.0 ** np.array([-8.0, -6.0, -4.0, -2.0, *np.arange(0.0, 150.0)])
     # Just below the limit of the chain, roots cross at ever higher frequency.
     closer = chain * np.array([1.0 - 1e-2, 1.0 - 1e-4, 1.0 - 1e-6])
     for top in [*reaches[reaches < closer[0]], *closer[np.isfinite(closer)]]:
-        end = float(last_crossing(loop, 1.0 + top * abs(d1), 1.0 + top * abs(d2)))
-        if not np.isfinite(end):
-            # |c1| and |c2| along the ray are smaller than these bounds.
-            end = float(last_crossing(loop, 1.0 + top * d1, 1.0 + top * d2))
-        omega, jump, *_ = contour.sign_changes(*family, end, False)
         # A boundary at (1, 1) itself, at the lower bound, is not a crossing beyond it.
-        eps = _first_on_ray(loop, d1, d2, omega[jump != 0], 1e-15 * scale, top)
-        if np.isfinite(eps):
-            return _confirmed(loop, d1, d2, eps)
-    return _confirmed(loop, d1, d2, chain) if np.isfinite(chain) else np.inf
-
-
-def _quotient(loop: Loop, d1: float, d2: float, omega: FloatArray) -> ComplexArray:
-    """Evaluate D(1, 1) / (d1 B1 e1 + d2 B2 e2) at j omega, exact where its parts cancel."""
-    s = 1j * omega
-    p1, p2 = d1 * loop.b1, d2 * loop.b2
-    pull = poly.polyval(s, poly.polyadd(p1, p2))
-    pull = pull + poly.polyval(s, p1) * np.expm1(-s * loop.tau1)
-    pull = pull + poly.polyval(s, p2) * np.expm1(-s * loop.tau2)
-    # nan where the direction does not act.
-    pull = np.where(pull == 0.0, np.nan, pull)
-    with np.errstate(invalid="ignore"):
-        return np.asarray(loop(s, 1.0, 1.0) / pull)
-
-
-def _first_on_ray(
-    loop: Loop, d1: float, d2: float, omega: FloatArray, lowest: float, highest: float
-) -> float:
-    """Smallest eps between two bounds at which one of the frequencies found is a root's.
-
-    nan if there is none.
-    """
-    eps = _quotient(loop, d1, d2, omega).real
-    within = np.flatnonzero((eps > lowest) & (eps <= highest))
-    if within.size == 0:
-        return np.nan
-
-    def tilt(w: float) -> float:
-        return float(_quotient(loop, d1, d2, np.array(w)).imag)
-
-    polished = []
-    for k in within[np.argsort(eps[within])][:4]:
-        w = float(omega[k])
-        low, high = w * (1.0 - 1e-7), w * (1.0 + 1e-7)
-        if w > 0.0 and tilt(low) * tilt(high) < 0.0:
-            w = brentq(tilt, low, high, xtol=1e-300, rtol=1e-15)
-        polished.append(float(_quotient(loop, d1, d2, np.array(w)).real))
-    return min(polished)
+        found = ray.crossings(float(top), first=True, lowest=1e-15 * scale)
+        if found.position.size:
+            return _confirmed(loop, d1, d2, float(found.position[0]))
+    if np.isfinite(chain):
+        return _confirmed(loop, d1, d2, chain)
+    # What acts on a loop with delays breaks it once it is large enough.
+    raise CountError(
+        f"no crossing up to {reaches[-1]} along ({d1}, {d2})", np.array([[d1, d2]])
+    )
 
 
 def _chain_limit(loop: Loop, d1: float, d2: float) -> float:

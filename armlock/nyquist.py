@@ -18,18 +18,20 @@ from numpy.polynomial import polynomial as poly
 
 from armlock import contour
 from armlock.characteristic import ExponentialSum
-from armlock.loops import Loop
+from armlock.loops import Loop, checked_loop
 from armlock.stability import (
     BOUNDARY,
     UNCONFINED,
     CountError,
     last_crossing,
-    squared_magnitude,
+    sign_changes,
+    squares_and_leads,
     unstable_roots,
 )
 from armlock.validation import (
     ComplexArray,
     FloatArray,
+    affordable,
     positive_number,
     real_array,
     real_number,
@@ -130,6 +132,12 @@ def frequency_response(
         For `control.bode_plot` and its like. Take counts and margins from this package:
         python-control takes them from the samples alone.
 
+    Raises
+    ------
+    TypeError, ValueError
+        If `loop` is no `Loop`, omega is not positive and one-dimensional, or c1 or c2 is not
+        finite and real.
+
     Examples
     --------
     >>> import control
@@ -140,7 +148,10 @@ def frequency_response(
     """
     import control
 
+    checked_loop(loop)
     omega = np.atleast_1d(real_array("omega", omega))
+    if omega.ndim != 1:
+        raise ValueError(f"omega must be one-dimensional, got shape {omega.shape}")
     if (omega <= 0.0).any():
         raise ValueError(f"omega must be positive, got {omega.min()} among its values")
     response = loop.open_loop(1j * omega, real_number("c1", c1), real_number("c2", c2))
@@ -233,11 +244,17 @@ def resolving_grid(parts: Sequence[ExponentialSum], end: float) -> FloatArray:
     """Frequencies from 0 to `end` between which no quotient of the sums can hide anything.
 
     Between two of them each sum is nearly straight and turns by less than _TURN, so that
-    neither a turn of a quotient nor a dip of its magnitude fits in between.
+    neither a turn of a quotient nor a dip of its magnitude fits in between. Raises a
+    `CountError` where they are too many.
     """
-    grid = np.unique(
-        np.concatenate([contour.resolved_grid(*part, end, _STRAIGHT) for part in parts])
-    )
+    resolved = [contour.resolved_grid(*part, end, _STRAIGHT) for part in parts]
+    if any(found[-1] < end for found in resolved):
+        raise CountError(
+            f"no samples up to omega = {end} rad/s: more than {contour.MOST_SAMPLES:.0e}, "
+            f"because gain times delay is too large",
+            np.empty((0, 2)),
+        )
+    grid = np.unique(np.concatenate(resolved))
     added, low, high = [grid], grid[:-1], grid[1:]
     for _ in range(60):
         wide = np.zeros(low.size, dtype=np.bool_)
@@ -333,8 +350,10 @@ def nyquist(
 
     Raises
     ------
-    ValueError
-        If L has poles on the imaginary axis elsewhere than at s = 0.
+    TypeError, ValueError
+        If `loop` is no `Loop`, an argument is not finite and real, `omega_max` is not positive
+        or too large for the memory, or L has poles on the imaginary axis elsewhere than at
+        s = 0.
     CountError
         If the curve passes through -1, the loop's high-frequency chain is not confined, or
         the encirclements and the independent count of roots disagree.
@@ -353,10 +372,16 @@ def nyquist(
     >>> curve.encirclements, curve.open_loop_poles, curve.closed_loop_roots
     (1, 0, 1)
     """
+    checked_loop(loop)
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
     poles = open_loop_poles(loop)
     order = _poles_at_zero(loop, c1, c2)
     end = float(last_crossing(loop, c1, c2))
+    if np.isnan(end):
+        raise CountError(
+            f"no Nyquist count at (c1, c2) = ({c1}, {c2}): a number overflows",
+            np.array([[c1, c2]]),
+        )
     if not np.isfinite(end):
         raise CountError(
             f"no Nyquist count at (c1, c2) = ({c1}, {c2}): the loop's high-frequency chain of "
@@ -375,6 +400,7 @@ def nyquist(
     grid = resolving_grid((loop.at(c1, c2), loop.rest_on_boundary()), end)
     if omega_max is not None:
         turn = 2.0 * np.pi / loop.longest_delay
+        affordable("omega_max", (int(min(400.0 * end / turn, 1e18)),), 256)
         # Finer at first, where L changes most.
         low, high = np.geomspace(radius, end, 1000), np.arange(0.0, end, turn / 400.0)
         first = np.arange(0.0, min(4.0 * turn, end), turn / 2000.0)
@@ -415,11 +441,7 @@ def nyquist(
 def reach(loop: Loop, c1: float, c2: float, level: float) -> float:
     """Frequency past which |L| stays below `level`; inf if it does not."""
     bound: float = contour.last_crossing_bound(
-        squared_magnitude(np.pad(loop.rest, (0, loop.degree + 1 - loop.rest.size))),
-        *(
-            squared_magnitude(np.pad(b, (0, loop.degree + 1 - b.size)))
-            for b in (loop.b1, loop.b2)
-        ),
+        *squares_and_leads(loop.rest, loop.b1, loop.b2),
         (1.0 + abs(c1)) / level,
         (1.0 + abs(c2)) / level,
     )
@@ -451,8 +473,11 @@ def axis_crossings(
 
     Raises
     ------
-    ValueError
-        If `omega_max` is not given and |L| does not fall below 1e-3.
+    TypeError, ValueError
+        If `loop` is no `Loop`, an argument is not finite and real, or `omega_max` is not
+        positive, or not given where |L| does not fall below 1e-3.
+    CountError
+        If there are too many crossings to be found.
 
     Notes
     -----
@@ -468,6 +493,7 @@ def axis_crossings(
     5.63e-05 rad/s: -5.13
     1.96e-04 rad/s: -113.07
     """
+    checked_loop(loop)
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
     if omega_max is None:
         omega_max = reach(loop, c1, c2, 1e-3)
@@ -478,7 +504,7 @@ def axis_crossings(
             )
     omega_max = positive_number("omega_max", omega_max)
     crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
-    omega, jump, *_ = contour.sign_changes(*crossing, omega_max, False)
+    omega, jump = sign_changes(crossing, omega_max)
     omega = omega[(omega > 0.0) & (jump != 0)]
     value = loop.open_loop(1j * omega, c1, c2).real
     return AxisCrossings(omega[value < 0.0], value[value < 0.0])

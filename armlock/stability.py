@@ -17,12 +17,13 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
 from armlock import contour
-from armlock.characteristic import CharacteristicFunction, checked_system
+from armlock.characteristic import CharacteristicFunction, ExponentialSum, checked_system
 from armlock.validation import (
     BoolArray,
     ComplexArray,
     FloatArray,
     IntArray,
+    affordable,
     axis,
     broadcast_pair,
 )
@@ -36,6 +37,10 @@ UNCONFINED = contour.UNCONFINED
 # numbers, and not the same for both axes, so that no reference point falls on a line that a
 # user would choose, or on one along which a square chart has its diagonal.
 _OUTSIDE = (0.38196601125, 0.27639320225)
+
+# Memory that a chart takes for each point: counts, flags, and a copy of them.
+_BYTES_A_POINT = 32
+_NO_POINTS = np.empty((0, 2))
 
 
 class CountError(RuntimeError):
@@ -61,9 +66,59 @@ class CountError(RuntimeError):
         super().__init__(message)
         self.points = points
 
+    def __reduce__(self) -> tuple[type[CountError], tuple[str, FloatArray]]:
+        """Pickle the points along, so that the error passes from process to process."""
+        return type(self), (str(self), self.points)
+
+
+class _Balanced(NamedTuple):
+    """A characteristic function with coefficients of ordinary size, and weights of x and y.
+
+    Its value at (weight_x x, weight_y y) is that of the one it was made of, up to a factor.
+    """
+
+    system: CharacteristicFunction
+    weight_x: float
+    weight_y: float
+
+
+@lru_cache(maxsize=64)
+def _balanced(system: CharacteristicFunction) -> _Balanced:
+    """Scale A, B1 and B2 by powers of two, which rounds nothing; what is ordinary stays."""
+    names = ("rest", "b1", "b2")
+    polynomials = (system.rest, system.b1, system.b2)
+    own = (system.a, system.b1, system.b2)
+    shifts = [-int(np.frexp(np.abs(p).max())[1]) for p in own]
+    with np.errstate(over="ignore", under="ignore"):
+        scaled = [np.ldexp(p, k) for p, k in zip(polynomials, shifts, strict=True)]
+        weights = [float(np.ldexp(1.0, shifts[0] - k)) for k in shifts[1:]]
+        reference = [x * w for x, w in zip(system.reference, weights, strict=True)]
+        whole = np.ldexp(system.a, shifts[0])
+    exact = all(
+        np.array_equal(np.ldexp(q, -k), p)
+        for p, q, k in zip(
+            (*polynomials, system.a), (*scaled, whole), (*shifts, shifts[0]), strict=True
+        )
+    ) and all(0.0 < w < np.inf for w in weights)
+    if not exact or max(map(abs, shifts)) < 100:
+        return _Balanced(system, 1.0, 1.0)
+    balanced = CharacteristicFunction(
+        **dict(zip(names, scaled, strict=True)),
+        delay1=system.delay1,
+        delay2=system.delay2,
+        step=system.step,
+        parameters=system.parameters,
+        reference=(reference[0], reference[1]),
+    )
+    return _Balanced(balanced, *weights)
+
 
 class _Compiled(NamedTuple):
-    """A characteristic function in the form the compiled walks take."""
+    """A characteristic function in the form the compiled walks take.
+
+    `squares` holds |A|^2, |B1|^2 and |B2|^2 as polynomials in (omega / unit)^2, `leads` the
+    magnitudes of the coefficients of the highest power.
+    """
 
     parts: ComplexArray
     sums: ComplexArray
@@ -71,6 +126,8 @@ class _Compiled(NamedTuple):
     phases: FloatArray
     roots: ComplexArray
     squares: FloatArray
+    leads: FloatArray
+    unit: float
     omega_end: float
 
 
@@ -90,19 +147,80 @@ def _compiled(system: CharacteristicFunction) -> _Compiled:
     rest = system.rest_on_boundary().sums
     sums[0] = 0.0
     sums[0, : rest.size] = rest
-    squares = np.zeros((3, system.degree + 1))
-    for k, polynomial in enumerate((system.a, system.b1, system.b2)):
-        square = squared_magnitude(polynomial)
-        squares[k, : square.size] = square
+    try:
+        roots = poly.polyroots(system.a).astype(np.complex128)
+    except np.linalg.LinAlgError:
+        # Beyond the range of doubles; no count comes of them.
+        roots = np.full(system.degree, np.nan, dtype=np.complex128)
     return _Compiled(
         parts,
         sums,
         np.array(system.reference),
         phases,
-        poly.polyroots(system.a).astype(np.complex128),
-        squares,
+        roots,
+        *squares_and_leads(system.a, system.b1, system.b2),
         np.pi / system.step if system.step else 0.0,
     )
+
+
+def squares_and_leads(
+    a: FloatArray, b1: FloatArray, b2: FloatArray
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return |A|^2, |B1|^2, |B2|^2 in units of frequency, their leads, and the unit.
+
+    In this unit, a power of two in rad/s, the lowest and the highest coefficient of A are of
+    the same size, which leaves its powers most room.
+    """
+    degree = a.size - 1
+    lowest = int(np.flatnonzero(a)[0])
+    turn = np.log2(abs(a[lowest])) - np.log2(abs(a[degree]))
+    exponent = round(turn / (degree - lowest)) if degree > lowest else 0
+    squares, leads = np.zeros((3, degree + 1)), np.zeros(3)
+    with np.errstate(over="ignore", under="ignore"):
+        powers = exponent * np.arange(degree + 1) - round(0.5 * exponent * (degree + lowest))
+        for k, polynomial in enumerate((a, b1, b2)):
+            scaled = np.ldexp(polynomial, powers[: polynomial.size])
+            square = squared_magnitude(scaled)
+            # Rounded to nothing, and nothing else there: no bound comes of it.
+            gone = (polynomial != 0.0) & (scaled * scaled < np.finfo(float).tiny)
+            squares[k, : square.size] = np.where(gone, np.nan, square)
+            leads[k] = abs(polynomial[degree]) if polynomial.size > degree else 0.0
+    return squares, leads, float(np.ldexp(1.0, exponent))
+
+
+def _scaled_points(
+    system: CharacteristicFunction, x: FloatArray, y: FloatArray
+) -> tuple[CharacteristicFunction, FloatArray, FloatArray]:
+    """Return a balanced system and its parameters, nan where these leave the doubles."""
+    balanced, *weights = _balanced(system)
+    scaled = []
+    for values, weight in zip((x, y), weights, strict=True):
+        with np.errstate(over="ignore", under="ignore"):
+            found = values * weight
+            kept = np.isfinite(found) & (found / weight == values)
+        scaled.append(np.where(kept, found, np.nan))
+    return balanced, scaled[0], scaled[1]
+
+
+def _constant_confined(
+    system: CharacteristicFunction, x: npt.ArrayLike, y: npt.ArrayLike
+) -> BoolArray:
+    """Whether the chain of an equation of order zero is confined to the left half-plane.
+
+    Without a delay a term adds to A, with its sign.
+    """
+    undelayed, delayed = np.array(system.a[0]), np.zeros(())
+    for b, delay, here in ((system.b1, system.delay1, x), (system.b2, system.delay2, y)):
+        term = np.asarray(here) * b[0]
+        if delay:
+            delayed = delayed + np.abs(term)
+        else:
+            undelayed = undelayed - term
+    return np.asarray(np.abs(undelayed) > delayed)
+
+
+def _of_order_zero(system: CharacteristicFunction) -> bool:
+    return system.degree == 0 and not system.step
 
 
 def squared_magnitude(p: FloatArray) -> FloatArray:
@@ -139,25 +257,64 @@ def last_crossing(
     """
     name1, name2 = checked_system(system).parameters
     xs, ys = broadcast_pair(name1, x, name2, y)
-    compiled = _compiled(system)
     if system.step:
-        return np.full(xs.shape, compiled.omega_end)
+        return np.full(xs.shape, np.pi / system.step)
+    if _of_order_zero(system):
+        return np.where(_constant_confined(system, xs, ys), 0.0, np.inf)
+    system, xs, ys = _scaled_points(system, xs, ys)
+    compiled = _compiled(system)
     ends = [
-        contour.last_crossing_bound(*compiled.squares, p, q)
+        contour.last_crossing_bound(
+            compiled.squares, compiled.leads, compiled.unit, float(p), float(q)
+        )
         for p, q in zip(xs.flat, ys.flat, strict=True)
     ]
     return np.array(ends, dtype=np.float64).reshape(xs.shape)
 
 
+def sign_changes(
+    whole: ExponentialSum, end: float, *, is_map: bool = False
+) -> tuple[FloatArray, IntArray]:
+    """Zeros in [0, end] of the imaginary part of an exponential sum, and their jumps.
+
+    As `armlock.contour.sign_changes`: the jump is 0 where rounding hides whether there is one.
+
+    Raises
+    ------
+    CountError
+        If there are too many of them, or a number overflows.
+    """
+    if not np.isfinite(end):
+        raise CountError(f"no crossings up to omega = {end}: a number overflows", _NO_POINTS)
+    omega, jump, *_, complete = contour.sign_changes(*whole, end, is_map)
+    if not complete:
+        raise CountError(
+            f"no crossings up to omega = {end} rad/s: more than {contour.MOST_STEPS:.0e} steps "
+            f"or {contour.MOST_ZEROS:.0e} crossings, because gain times delay is too large",
+            _NO_POINTS,
+        )
+    return omega, jump
+
+
 def _count(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -> IntArray:
     """Count at flat arrays of points; raise where rounding spoils it."""
-    counts: IntArray = contour.count_points(
-        *_compiled(system), np.ascontiguousarray(x), np.ascontiguousarray(y)
+    if _of_order_zero(system):
+        return np.where(_constant_confined(system, x, y), 0, UNCONFINED).astype(np.int64)
+    balanced, xs, ys = _scaled_points(system, x, y)
+    counts = contour.count_points(
+        tuple(_compiled(balanced)), np.ascontiguousarray(xs), np.ascontiguousarray(ys)
     )
-    bad = counts == contour.DOUBTFUL
+    bad = (counts == contour.DOUBTFUL) | (counts == contour.TOO_LONG)
     if bad.any():
         points = np.column_stack((x[bad], y[bad]))
         name1, name2 = system.parameters
+        if (counts == contour.TOO_LONG).any():
+            raise CountError(
+                f"no count at ({name1}, {name2}) = ({points[0, 0]}, {points[0, 1]}): following "
+                f"D takes more than {contour.MOST_STEPS:.0e} steps, because the gain, with "
+                f"these parameters, times the delay is too large",
+                points,
+            )
         raise CountError(
             f"no count at ({name1}, {name2}) = ({points[0, 0]}, {points[0, 1]}) and "
             f"{len(points) - 1} further points: the argument of D does not add up to a whole "
@@ -321,6 +478,12 @@ def stability_chart(
     """
     name1, name2 = checked_system(system).parameters
     xs, ys = axis(name1, x), axis(name2, y)
+    affordable(f"{name1} and {name2}", (ys.size, xs.size), _BYTES_A_POINT)
+    if _of_order_zero(system):
+        grid = np.where(_constant_confined(system, xs, ys[:, None]), 0, UNCONFINED)
+        singly = np.zeros(grid.shape, dtype=np.bool_)
+        none = np.empty(0, dtype=np.intp)
+        return StabilityChart(system, xs, ys, grid.astype(np.int64), singly, none)
     order_x, order_y = np.argsort(xs, kind="stable"), np.argsort(ys, kind="stable")
     if not system.b1.any():
         # Without B1 nothing crosses along a row: walk along the columns instead.
@@ -399,6 +562,11 @@ def _walk(
     upper: FloatArray,
 ) -> tuple[IntArray, BoolArray, IntArray]:
     """Fill rows from their crossings, starting with the counts `base` at x = lower."""
+    balanced = _balanced(system).system
+    columns = _scaled_points(system, x, np.zeros(1))[1]
+    lower, upper = (_scaled_points(system, ends, y)[1] for ends in (lower, upper))
+    _, _, y = _scaled_points(system, np.zeros(1), y)
+    system = balanced
     a, b1, b2 = system.on_boundary()
     rest = system.rest_on_boundary()
     # Delays left out, N = A - y B2 is rest + x0 B1 at the reference, exactly.
@@ -418,20 +586,19 @@ def _walk(
     ends = last_crossing(system, np.maximum(np.abs(lower), np.abs(upper)), y)
     # A row that is nowhere confined has nothing to count.
     ends = np.where(np.isfinite(ends), ends, 0.0)
-    filled: tuple[IntArray, BoolArray, IntArray] = contour.fill_rows(
+    model = (
         fixed.coefficients,
         varying_only.coefficients,
         fixed.sums,
         varying_only.sums,
         fixed.phases,
         norm,
-        ends,
         system.step > 0.0,
-        np.ascontiguousarray(y),
-        y - system.reference[1],
-        np.ascontiguousarray(base),
-        np.ascontiguousarray(x),
-        lower,
-        upper,
     )
+    y, x = np.ascontiguousarray(y), np.ascontiguousarray(columns)
+    deviation = y - system.reference[1]
+    filled = contour.fill_rows(
+        model, ends, y, deviation, np.ascontiguousarray(base), x, lower, upper
+    )
+    filled[1][:, np.isnan(columns)] = True
     return filled

@@ -15,9 +15,8 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 from scipy.optimize import brentq
 
-from armlock import contour
-from armlock.characteristic import CharacteristicFunction
-from armlock.stability import last_crossing
+from armlock.characteristic import CharacteristicFunction, checked_system
+from armlock.stability import CountError, last_crossing, sign_changes
 from armlock.validation import ComplexArray, FloatArray, IntArray, axis, positive_number
 
 P = TypeVar("P")
@@ -55,13 +54,13 @@ class Crossing(NamedTuple):
     change: int
 
 
-class _Ray:
+class Ray:
     """A ray, and the characteristic function along it."""
 
     def __init__(
         self, system: CharacteristicFunction, start: npt.ArrayLike, direction: npt.ArrayLike
     ) -> None:
-        self.system = system
+        self.system = checked_system(system)
         self.start, self.direction = axis("start", start), axis("direction", direction)
         for name, value in (("start", self.start), ("direction", self.direction)):
             if value.size != 2:
@@ -72,9 +71,19 @@ class _Ray:
         self.family = system.at(*self.start).times_conjugate(pull)
 
     def end(self, t: float) -> float:
-        """Frequency past which no root crosses between 0 and t."""
-        largest = np.maximum(np.abs(self.start), np.abs(self.start + t * self.direction))
-        return float(last_crossing(self.system, *largest))
+        """Frequency past which no root crosses between 0 and t.
+
+        |x B1| + |y B2| is convex along the ray, and thus largest at one of the two ends.
+        """
+        ends = np.stack((self.start, self.start + t * self.direction))
+        return float(last_crossing(self.system, *ends.T).max())
+
+    def unconfined(self, stop: float) -> ValueError:
+        """Return the error for a ray on which a neutral loop's chain is lost."""
+        return ValueError(
+            f"the ray must stay where the high-frequency chain of roots is confined, but "
+            f"{self.system!r} loses it before t = {stop}"
+        )
 
     def quotient(self, omega: npt.ArrayLike) -> ComplexArray:
         """D0 / M at s = j omega, shaped like `omega`; nan where the direction does not act."""
@@ -100,25 +109,27 @@ class _Ray:
             return float(brentq(excess, low, high, xtol=1e-300, rtol=1e-15))
         return omega
 
-    def crossings(self, stop: float, *, first: bool = False) -> Crossings:
-        """Find all crossings with 0 < t <= stop, or the first one and what ties with it."""
+    def crossings(self, stop: float, *, first: bool = False, lowest: float = 0.0) -> Crossings:
+        """Find crossings with `lowest` < t <= stop: all, or the first and what ties with it."""
         end = self.end(stop)
-        if not np.isfinite(end):
-            raise ValueError(
-                f"the ray must stay where the high-frequency chain of roots is confined, but "
-                f"{self.system!r} loses it before t = {stop}"
+        if end == np.inf:
+            raise self.unconfined(stop)
+        if np.isnan(end):
+            raise CountError(
+                f"no crossings up to t = {stop}: a number overflows",
+                np.array([self.start + stop * self.direction]),
             )
-        omega, change, *_ = contour.sign_changes(*self.family, end, self.system.step > 0.0)
+        omega, change = sign_changes(self.family, end, is_map=self.system.step > 0.0)
         omega, change = omega[change != 0], change[change != 0]
         # Only those in reach are worth polishing.
         rough = self.quotient(omega).real
-        near = (rough > 0.0) & (rough <= stop * (1.0 + 1e-6))
+        near = (rough > lowest) & (rough <= stop * (1.0 + 1e-6))
         if first and near.any():
             near &= rough <= rough[near].min() * (1.0 + 1e-6)
         omega = np.array([self.polished(float(w)) for w in omega[near]])
         change = change[near]
         position = self.quotient(omega).real
-        kept = np.flatnonzero((position > 0.0) & (position <= stop))
+        kept = np.flatnonzero((position > lowest) & (position <= stop))
         kept = kept[np.argsort(position[kept], kind="stable")]
         return Crossings(position[kept], omega[kept], change[kept])
 
@@ -171,7 +182,7 @@ def ray_crossings(
     >>> found.position.round(4), found.omega.round(4), found.change
     (array([3.3333, 3.3738]), array([0.    , 0.3071]), array([1, 2]))
     """
-    return _Ray(system, start, direction).crossings(positive_number("stop", stop))
+    return Ray(system, start, direction).crossings(positive_number("stop", stop))
 
 
 def first_crossing(
@@ -215,7 +226,7 @@ def first_crossing(
     >>> print(f"{edge.position:.6f} {edge.omega:.4f} {edge.change}")
     0.254006 3.7746 2
     """
-    ray, stop = _Ray(system, start, direction), positive_number("stop", stop)
+    ray, stop = Ray(system, start, direction), positive_number("stop", stop)
     limit = ray.end(0.0)
     limit = _LONGER * limit if 0.0 < limit < np.inf else 1.0 / system.longest_delay
     last = 0.0
@@ -236,7 +247,7 @@ def first_crossing(
     return Crossing(np.inf, np.nan, 0)
 
 
-def _reach(ray: _Ray, limit: float, stop: float) -> float:
+def _reach(ray: Ray, limit: float, stop: float) -> float:
     """Return a t up to which no root crosses at a frequency above `limit`."""
     if ray.end(stop) <= limit:
         return stop

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
+from decimal import Decimal
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -22,9 +25,31 @@ def _array(name: str, value: object) -> npt.NDArray[Any]:
     if isinstance(value, np.ma.MaskedArray):
         raise TypeError(f"{name} must be an ordinary array, got a masked array")
     try:
-        return np.asarray(value)
+        array = np.asarray(value)
     except ValueError:
         raise ValueError(f"{name} must be a rectangular array, got {value!r}") from None
+    if array.dtype.kind in "iufc" and _holds_a_switch(value):
+        raise TypeError(f"{name} must hold numbers, got True or False among its values")
+    if array.dtype == object and array.size and all(map(_is_exact_number, array.flat)):
+        # Fractions, decimals and integers of any length.
+        try:
+            return array.astype(np.float64)
+        except (OverflowError, ValueError):
+            raise ValueError(
+                f"{name} must be finite and within the range of a float, got {value!r:.60}"
+            ) from None
+    return array
+
+
+def _is_exact_number(value: object) -> bool:
+    return isinstance(value, Real | Decimal) and not isinstance(value, bool | np.bool_)
+
+
+def _holds_a_switch(value: object) -> bool:
+    """Whether a list holds True or False, which NumPy would take for 1 and 0."""
+    if isinstance(value, list | tuple):
+        return any(map(_holds_a_switch, value))
+    return isinstance(value, bool | np.bool_)
 
 
 def real_number(name: str, value: object) -> float:
@@ -34,7 +59,8 @@ def real_number(name: str, value: object) -> float:
         raise TypeError(f"{name} must be real, got the complex value {value!r}")
     if array.ndim != 0 or array.dtype.kind not in _REAL:
         raise TypeError(f"{name} must be a real number, got {value!r}")
-    number = float(array)
+    with np.errstate(over="ignore"):
+        number = float(array)
     if not math.isfinite(number):
         raise ValueError(f"{name} must be finite, got {number}")
     return number
@@ -76,7 +102,22 @@ def real_array(name: str, value: object) -> FloatArray:
         raise TypeError(f"{name} must be real, got complex values (dtype {array.dtype})")
     if array.dtype.kind not in _REAL:
         raise TypeError(f"{name} must hold real numbers, got dtype {array.dtype}")
-    array = array.astype(np.float64)
+    with np.errstate(over="ignore"):
+        array = array.astype(np.float64)
+    finite = np.isfinite(array)
+    if not finite.all():
+        first = array[~finite].ravel()[0]
+        raise ValueError(f"{name} must be finite, got {first} among its {array.size} values")
+    return array
+
+
+def complex_array(name: str, value: object) -> ComplexArray:
+    """Return `value` as a finite complex array of any shape, or raise."""
+    array = _array(name, value)
+    if array.dtype.kind not in _REAL + "c":
+        raise TypeError(f"{name} must hold numbers, got dtype {array.dtype}")
+    with np.errstate(over="ignore"):
+        array = np.asarray(array, dtype=np.complex128)
     finite = np.isfinite(array)
     if not finite.all():
         first = array[~finite].ravel()[0]
@@ -104,20 +145,36 @@ def finite_series(name: str, value: object) -> FloatArray:
     return array
 
 
+def affordable(name: str, shape: tuple[int, ...], bytes_each: int) -> None:
+    """Raise if so many values would take more than half of the machine's memory."""
+    try:
+        memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, OSError, ValueError):
+        memory = 8 << 30
+    needed = math.prod(shape) * bytes_each
+    if needed > memory // 2:
+        times = " x ".join(str(size) for size in shape)
+        raise ValueError(
+            f"{name} must be of a size that memory holds, got {times} points: about "
+            f"{needed / 2**30:.3g} GiB, with {memory / 2**30:.3g} GiB in the machine"
+        )
+
+
 def broadcast_pair(
     name1: str, value1: object, name2: str, value2: object
 ) -> tuple[FloatArray, FloatArray]:
     """Return two finite real arrays of one shape, or name both shapes and raise."""
     first, second = real_array(name1, value1), real_array(name2, value2)
     try:
-        first, second = np.broadcast_arrays(first, second)
+        shape = np.broadcast_shapes(first.shape, second.shape)
     except ValueError:
         raise ValueError(
             f"{name1} and {name2} must broadcast together, got shapes "
             f"{first.shape} and {second.shape}"
         ) from None
+    affordable(f"{name1} and {name2}", shape, 48)
     # Copies, because broadcast views are not to be written to.
-    return first.copy(), second.copy()
+    return np.broadcast_to(first, shape).copy(), np.broadcast_to(second, shape).copy()
 
 
 def axis(name: str, value: object) -> FloatArray:
