@@ -43,7 +43,7 @@ TOO_LONG = -4
 UNTRIED = -5
 
 # Most steps of one walk, about ten a turn of the longest delay: some ten seconds.
-MOST_STEPS = 100_000_000
+MOST_STEPS = 50_000_000
 # Most zeros and samples that a walk keeps: about a gigabyte.
 MOST_ZEROS = 30_000_000
 MOST_SAMPLES = 10_000_000

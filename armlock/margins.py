@@ -438,8 +438,8 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
     float
         Smallest eps > 0 such that the loop at (1, 1) + eps (d1, d2) is not stable: a root
         reaches the imaginary axis there, or a neutral loop's high-frequency chain does. 0 if
-        it is unstable from the start, inf if no eps breaks it: that is, if the direction has
-        no effect.
+        it is not stable from the start on, inf if no eps breaks it: that is, if the direction
+        has no effect.
 
     Raises
     ------
@@ -485,7 +485,7 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
     # Components without effect would hide the size of the others.
     vector = np.where([loop.b1.any(), loop.b2.any()], vector, 0.0)
     if _without_effect(loop, vector):
-        return np.inf
+        return np.inf if start == 0 else 0.0
     # By a power of two, which rounds nothing.
     exponent = int(np.frexp(np.abs(vector).max())[1])
     eps = _critical(loop, start, *(float(part) for part in np.ldexp(vector, -exponent)))
@@ -501,10 +501,10 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
 
 def _without_effect(loop: Loop, vector: FloatArray) -> bool:
     """Whether D stays what it is along a direction."""
-    if loop.tau1 != loop.tau2:
+    if loop.tau1 != loop.tau2 or not vector.any():
         return not vector.any()
-    scale = np.abs(vector).max()
-    return not (scale and poly.polyadd(*(vector / scale * [loop.b1, loop.b2])).any())
+    share1, share2 = vector / np.abs(vector).max()
+    return not poly.polyadd(share1 * loop.b1, share2 * loop.b2).any()
 
 
 def _critical(loop: Loop, start: int, d1: float, d2: float) -> float:

@@ -396,11 +396,12 @@ def nyquist(
     end = max(1.05 * end, 10.0 / loop.longest_delay, 10.0 * radius)
     if omega_max is not None:
         end = max(end, positive_number("omega_max", omega_max))
+        turns = end * loop.longest_delay / (2.0 * np.pi)
+        affordable("omega_max", (int(min(400.0 * turns, 1e18)),), 256)
     end, far = _rectangle(loop, c1, c2, end)
     grid = resolving_grid((loop.at(c1, c2), loop.rest_on_boundary()), end)
     if omega_max is not None:
         turn = 2.0 * np.pi / loop.longest_delay
-        affordable("omega_max", (int(min(400.0 * end / turn, 1e18)),), 256)
         # Finer at first, where L changes most.
         low, high = np.geomspace(radius, end, 1000), np.arange(0.0, end, turn / 400.0)
         first = np.arange(0.0, min(4.0 * turn, end), turn / 2000.0)
