@@ -15,13 +15,25 @@ instead of s, so that both are one class here and one set of algorithms above.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
-from armlock.validation import ComplexArray, FloatArray, axis, positive_number, real_number
+from armlock.validation import (
+    ComplexArray,
+    FloatArray,
+    axis,
+    broadcast_shape,
+    complex_array,
+    positive_number,
+    real_array,
+    real_number,
+)
+
+# Past this an exponential is no float.
+_LARGEST_EXPONENT = 700.0
 
 
 class ExponentialSum(NamedTuple):
@@ -139,6 +151,9 @@ class CharacteristicFunction:
 
     Notes
     -----
+    It cannot be changed once it is made, because results are kept with it; its arrays are
+    read-only.
+
     The loop is of *retarded* type if B1 and B2 are of lower degree than A, and of *neutral*
     type (`neutral` is true) if one of them reaches it.
 
@@ -168,10 +183,10 @@ class CharacteristicFunction:
         self.rest = _polynomial("rest", rest)
         self.b1 = _polynomial("b1", b1)
         self.b2 = _polynomial("b2", b2)
-        self.reference = (
-            real_number("reference[0]", reference[0]),
-            real_number("reference[1]", reference[1]),
-        )
+        pair = axis("reference", reference)
+        if pair.size != 2:
+            raise ValueError(f"reference must hold two numbers, got {pair.size}")
+        self.reference = (float(pair[0]), float(pair[1]))
         at_reference = poly.polyadd(self.reference[0] * self.b1, self.reference[1] * self.b2)
         self.a = _polynomial("a", np.asarray(poly.polyadd(self.rest, at_reference)))
         self.delay1 = _delay("delay1", delay1)
@@ -180,7 +195,7 @@ class CharacteristicFunction:
         if self.step:
             for name, delay in (("delay1", self.delay1), ("delay2", self.delay2)):
                 whole_steps(name, delay, self.step)
-        self.parameters = parameters
+        self.parameters = _names(parameters)
         if not self.a.any():
             raise ValueError(
                 f"A = rest + {self.reference[0]} B1 + {self.reference[1]} B2 must not vanish, "
@@ -198,6 +213,27 @@ class CharacteristicFunction:
                     f"{name} without a delay must be of lower degree than A ({self.degree}), "
                     f"or its parameter would change the order of the equation"
                 )
+        self._sealed = True
+
+    def __setattr__(self, name: str, value: object) -> None:
+        """Refuse changes: results are kept with the system they belong to."""
+        if "_sealed" in self.__dict__:
+            raise AttributeError(
+                f"a {type(self).__name__} cannot be changed, got {name} = {value!r:.60}: make "
+                f"a new one instead (a subclass sets its attributes before super().__init__)"
+            )
+        super().__setattr__(name, value)
+
+    def __delattr__(self, name: str) -> None:
+        """Refuse changes."""
+        raise AttributeError(f"a {type(self).__name__} cannot be changed, got del {name}")
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take the attributes of a copied or pickled system; its arrays stay read-only."""
+        self.__dict__.update(state)
+        for value in state.values():
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
 
     @property
     def degree(self) -> int:
@@ -227,11 +263,16 @@ class CharacteristicFunction:
         return max(self.delay1, self.delay2)
 
     def __repr__(self) -> str:
-        """Name the class and its three polynomials."""
-        return (
-            f"{type(self).__name__}(a={self.a.tolist()}, b1={self.b1.tolist()}, "
-            f"b2={self.b2.tolist()}, delay1={self.delay1}, delay2={self.delay2})"
-        )
+        """Name the class and its arguments, as they are written to make it again."""
+        shown = [
+            f"{name}={np.asarray(getattr(self, name)).tolist()}"
+            for name in ("rest", "b1", "b2", "delay1", "delay2")
+        ]
+        defaults = {"step": 0.0, "parameters": ("x", "y"), "reference": (0.0, 0.0)}
+        for name, default in defaults.items():
+            if getattr(self, name) != default:
+                shown.append(f"{name}={getattr(self, name)!r}")
+        return f"{type(self).__name__}({', '.join(shown)})"
 
     def parts(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """Evaluate A, B1 exp(-s delay1) and B2 exp(-s delay2).
@@ -244,8 +285,13 @@ class CharacteristicFunction:
         Returns
         -------
         tuple of three complex arrays, shaped like `s`
+
+        Raises
+        ------
+        TypeError, ValueError
+            If s does not hold finite numbers.
         """
-        s = np.asarray(s, dtype=np.complex128)
+        s = complex_array("s", s)
         z = np.exp(s * self.step) if self.step else s
         return (
             np.asarray(poly.polyval(z, self.a), dtype=np.complex128),
@@ -254,9 +300,29 @@ class CharacteristicFunction:
         )
 
     def __call__(self, s: npt.ArrayLike, x: npt.ArrayLike, y: npt.ArrayLike) -> ComplexArray:
-        """Evaluate D(s; x, y); the three arguments broadcast."""
-        s = np.asarray(s, dtype=np.complex128)
-        x, y = np.asarray(x), np.asarray(y)
+        """Evaluate D(s; x, y); the three arguments broadcast.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If s does not hold finite numbers, x or y is not finite and real, or the three do
+            not broadcast.
+        """
+        return self._value(*self._checked(s, x, y))
+
+    def _checked(
+        self, s: npt.ArrayLike, x: npt.ArrayLike, y: npt.ArrayLike
+    ) -> tuple[ComplexArray, FloatArray, FloatArray]:
+        """Return s, x and y as arrays that broadcast, or raise."""
+        name1, name2 = self.parameters
+        arrays = complex_array("s", s), real_array(name1, x), real_array(name2, y)
+        broadcast_shape(("s", name1, name2), arrays)
+        return arrays
+
+    def _value(
+        self, s: ComplexArray, x: float | FloatArray, y: float | FloatArray
+    ) -> ComplexArray:
+        """Evaluate D(s; x, y) unchecked."""
         z = np.exp(s * self.step) if self.step else s
         b1, b2 = poly.polyval(z, self.b1), poly.polyval(z, self.b2)
         arm1 = (self.reference[0] - x) - x * np.expm1(-s * self.delay1)
@@ -272,15 +338,24 @@ class CharacteristicFunction:
             \frac{\partial D}{\partial s} &= A'
             - x \left( B_1' - \theta_1 B_1 \right) e^{-s\theta_1} \\
             &\quad - y \left( B_2' - \theta_2 B_2 \right) e^{-s\theta_2}
+
+        Raises
+        ------
+        TypeError, ValueError
+            As a call does.
         """
-        s = np.asarray(s, dtype=np.complex128)
+        return self._slope(*self._checked(s, x, y))
+
+    def _slope(
+        self, s: ComplexArray, x: float | FloatArray, y: float | FloatArray
+    ) -> ComplexArray:
+        """Evaluate dD/ds unchecked."""
         z = np.exp(s * self.step) if self.step else s
         dz = self.step * z if self.step else np.ones_like(s)
 
         def term(
-            p: FloatArray, delay: float, start: float, here: npt.ArrayLike
+            p: FloatArray, delay: float, start: float, here: float | FloatArray
         ) -> ComplexArray:
-            here = np.asarray(here)
             arm = (start - here) - here * np.expm1(-s * delay)
             change = here * delay * np.exp(-s * delay)
             slope = poly.polyval(z, poly.polyder(p)) * dz
@@ -297,8 +372,19 @@ class CharacteristicFunction:
         """Return the function s -> D(s + sigma), whose roots lie `sigma` further left.
 
         Counting its unstable roots counts the roots of D to the right of Re s = sigma.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If sigma is not finite and real, or so large that exp(sigma delay) is not.
         """
         sigma = real_number("sigma", sigma)
+        reach = abs(sigma) * max(self.longest_delay, self.step * self.degree)
+        if reach > _LARGEST_EXPONENT:
+            raise ValueError(
+                f"sigma must be at most {_LARGEST_EXPONENT:.0f} over the longest delay in "
+                f"magnitude, got {sigma}: its exponential is no float"
+            )
 
         def move(p: FloatArray) -> FloatArray:
             if self.step:
@@ -406,6 +492,14 @@ def _polynomial(name: str, coefficients: Sequence[float] | FloatArray) -> FloatA
     trimmed = np.array(poly.polytrim(values, tol=0.0), dtype=np.float64)
     trimmed.setflags(write=False)
     return trimmed
+
+
+def _names(value: tuple[str, str]) -> tuple[str, str]:
+    """Return the names of the two parameters, or raise."""
+    names = tuple(value) if isinstance(value, tuple | list) else (value,)
+    if len(names) != 2 or not all(isinstance(name, str) for name in names):
+        raise TypeError(f"parameters must be a pair of names, got {value!r}")
+    return names[0], names[1]
 
 
 def _step(value: float) -> float:

@@ -14,7 +14,13 @@ import numpy as np
 import numpy.typing as npt
 
 from armlock import paper
-from armlock.validation import ComplexArray, FloatArray, positive_number, real_number
+from armlock.validation import (
+    ComplexArray,
+    FloatArray,
+    complex_array,
+    positive_number,
+    real_number,
+)
 
 
 @dataclass(frozen=True)
@@ -77,7 +83,10 @@ class Controller:
             return controller
         if isinstance(controller, tuple) and len(controller) == 3:
             return cls(*controller)
-        if not all(hasattr(controller, name) for name in ("num", "den", "zeros", "poles")):
+        if isinstance(controller, type) or not all(
+            hasattr(controller, name)
+            for name in ("num", "den", "zeros", "poles", "ninputs", "noutputs", "dt")
+        ):
             raise TypeError(
                 "controller must be a Controller, a control.TransferFunction or a triple "
                 f"(zeros, poles, gain), got {type(controller).__name__}"
@@ -109,7 +118,7 @@ class Controller:
 
     def __call__(self, s: npt.ArrayLike) -> ComplexArray:
         """Evaluate K(s), factor by factor; `s` in rad/s, any shape."""
-        s = np.asarray(s, dtype=np.complex128)
+        s = complex_array("s", s)
         value = np.full(s.shape, self.gain, dtype=np.complex128)
         # In turn, so that the product neither overflows nor underflows on the way.
         for k in range(max(len(self.zeros), len(self.poles))):
@@ -130,9 +139,9 @@ class Controller:
 
 def _factors(name: str, values: Sequence[complex]) -> tuple[complex, ...]:
     """Return finite roots as a tuple, complex ones checked to come in pairs."""
-    roots = np.atleast_1d(np.asarray(values, dtype=np.complex128))
-    if roots.ndim != 1 or not np.isfinite(roots).all():
-        raise ValueError(f"{name} must be a sequence of finite numbers, got {values!r}")
+    roots = np.atleast_1d(complex_array(name, values))
+    if roots.ndim != 1:
+        raise ValueError(f"{name} must be one-dimensional, got shape {roots.shape}")
     upper = np.sort_complex(roots[roots.imag > 0.0])
     lower = np.sort_complex(roots[roots.imag < 0.0].conj())
     if upper.size != lower.size or not np.allclose(upper, lower, rtol=1e-12, atol=0.0):

@@ -21,7 +21,7 @@ from armlock import paper, sensors
 from armlock.characteristic import CharacteristicFunction
 from armlock.controllers import Controller, integrating_actuator, table_two
 from armlock.sensors import SignalMapping
-from armlock.validation import ComplexArray, axis, positive_number, real_array, switch
+from armlock.validation import ComplexArray, positive_number, real_number, switch
 
 
 class HayesEquation(CharacteristicFunction):
@@ -112,26 +112,34 @@ class Loop(CharacteristicFunction):
         self.tau1 = positive_number("tau1", tau1)
         self.tau2 = positive_number("tau2", tau2)
         self.controller = Controller.of(controller)
+        if not isinstance(mapping, SignalMapping):
+            raise TypeError(
+                f"mapping must be a SignalMapping, for instance armlock.sensors.COMMON, got "
+                f"{mapping!r}"
+            )
         self.mapping = mapping
+        if not any(mapping.numerator1) and not any(mapping.numerator2):
+            raise ValueError("mapping must not be zero: there would be no loop")
         above = self.controller.numerator
-        b1 = np.convolve(above, axis("mapping.numerator1", mapping.numerator1))
-        b2 = np.convolve(above, axis("mapping.numerator2", mapping.numerator2))
-        below = np.convolve(
-            self.controller.denominator, axis("mapping.denominator", mapping.denominator)
-        )
-        while below.size > 1 and below[0] == b1[0] == b2[0] == 0.0:
-            below, b1, b2 = below[1:], b1[1:], b2[1:]
+        b1, b2 = (np.convolve(above, m) for m in (mapping.numerator1, mapping.numerator2))
+        below = np.convolve(self.controller.denominator, mapping.denominator)
         order = below.size - 1
         for name, b in (("1", b1), ("2", b2)):
-            if np.trim_zeros(b, "b").size - 1 > order:
+            zeros = np.trim_zeros(b, "b").size - 1
+            if zeros > order:
                 raise ValueError(
                     f"controller times signal mapping m{name} must be proper, got "
-                    f"{b.size - 1} zeros and {order} poles"
+                    f"{zeros} zeros and {order} poles"
                 )
-        highest = sum(b[order] if b.size > order else 0.0 for b in (b1, b2)) + below[order]
-        if abs(highest) <= 1e-12 * abs(below[order]):
+        b1, b2 = (np.pad(b, (0, max(order + 1 - b.size, 0)))[: order + 1] for b in (b1, b2))
+        # As many poles at s = 0 as all three have zeros there.
+        common = int(np.flatnonzero((below != 0.0) | (b1 != 0.0) | (b2 != 0.0))[0])
+        below, b1, b2 = below[common:], b1[common:], b2[common:]
+        highest = b1[-1] + b2[-1] + below[-1]
+        if abs(highest) <= 1e-12 * abs(below[-1]):
             raise ValueError(
-                "the loop is not well posed: 1 + K (m1 + m2) vanishes at high frequency"
+                f"the loop is not well posed: 1 + K (m1 + m2) must not vanish at high "
+                f"frequency, got {highest / below[-1]}"
             )
         super().__init__(
             below,
@@ -144,9 +152,9 @@ class Loop(CharacteristicFunction):
         )
 
     def __repr__(self) -> str:
-        """Name the sensor, the controller and the delays."""
+        """Name the class and its arguments, as they are written to make it again."""
         return (
-            f"{type(self).__name__}({self.controller!r}, mapping={self.mapping.name!r}, "
+            f"{type(self).__name__}(controller={self.controller!r}, mapping={self.mapping!r}, "
             f"tau1={self.tau1}, tau2={self.tau2})"
         )
 
@@ -165,9 +173,14 @@ class Loop(CharacteristicFunction):
         Returns
         -------
         complex array, of the broadcast shape
+
+        Raises
+        ------
+        TypeError, ValueError
+            If s does not hold finite numbers, c1 or c2 is not finite and real, or the three
+            do not broadcast.
         """
-        s = np.asarray(s, dtype=np.complex128)
-        arms = real_array("c1", c1), real_array("c2", c2)
+        s, *arms = self._checked(s, c1, c2)
         # Not D / rest - 1, which loses the digits of a small L.
         above: ComplexArray = np.zeros((), dtype=np.complex128)
         for b, c, tau in zip((self.b1, self.b2), arms, (self.tau1, self.tau2), strict=True):
@@ -319,8 +332,17 @@ class DualArm(Loop):
         difference: float | None = None,
     ) -> None:
         self.gain = positive_number("gain", gain)
-        mapping = _dual_mapping(tau1, tau2, corner, difference)
+        self.corner = positive_number("corner", corner)
+        self.difference = _delay_difference(tau1, tau2, difference)
+        mapping = sensors.dual(self.corner, self.difference)
         super().__init__(integrating_actuator(self.gain), mapping, tau1, tau2)
+
+    def __repr__(self) -> str:
+        """Name the class and its arguments."""
+        return (
+            f"DualArm(gain={self.gain}, tau1={self.tau1}, tau2={self.tau2}, "
+            f"corner={self.corner}, difference={self.difference})"
+        )
 
 
 def paper_loop(
@@ -328,7 +350,7 @@ def paper_loop(
     tau1: float = paper.TAU1,
     tau2: float = paper.TAU2,
     *,
-    controller: Controller | None = None,
+    controller: Any = None,
     actuator: bool = False,
     difference: float | None = None,
 ) -> Loop:
@@ -348,7 +370,7 @@ def paper_loop(
         Corner frequency p of the sensor in rad/s. The paper gives none.
     tau1, tau2 : float, optional
         Round-trip delays in s; they must differ.
-    controller : Controller, optional
+    controller : Controller, control.TransferFunction, or (zeros, poles, gain), optional
         Table II by default; `armlock.controllers` has its stages and the printed variant.
     actuator : bool, optional
         Whether the integrating actuator 1/s of Secs. II and III is in the loop. Without it,
@@ -372,21 +394,21 @@ def paper_loop(
     >>> unstable_roots(paper_loop(), 1.0, [1.0, 1.0 - 1e-6])
     array([0, 0])
     """
-    chosen = table_two() if controller is None else controller
+    chosen = table_two() if controller is None else Controller.of(controller)
     if switch("actuator", actuator):
         chosen = chosen * integrating_actuator()
-    return Loop(chosen, _dual_mapping(tau1, tau2, corner, difference), tau1, tau2)
+    mapping = sensors.dual(corner, _delay_difference(tau1, tau2, difference))
+    return Loop(chosen, mapping, tau1, tau2)
 
 
-def _dual_mapping(
-    tau1: float, tau2: float, corner: float, difference: float | None
-) -> SignalMapping:
-    """Return the dual sensor, with dtau = tau1 - tau2 unless it is given."""
-    if difference is None:
-        difference = positive_number("tau1", tau1) - positive_number("tau2", tau2)
-        if difference == 0.0:
-            raise ValueError(
-                f"tau1 and tau2 must differ, got {tau1} for both: the dual sensor divides by "
-                f"their difference"
-            )
-    return sensors.dual(corner, difference)
+def _delay_difference(tau1: float, tau2: float, difference: float | None) -> float:
+    """Return the dtau of the dual sensor, tau1 - tau2 unless it is given."""
+    if difference is not None:
+        return real_number("difference", difference)
+    between = positive_number("tau1", tau1) - positive_number("tau2", tau2)
+    if between == 0.0:
+        raise ValueError(
+            f"tau1 and tau2 must differ, got {tau1} for both: the dual sensor divides by "
+            f"their difference"
+        )
+    return between

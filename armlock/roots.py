@@ -19,7 +19,14 @@ from scipy.interpolate import BarycentricInterpolator
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.realization import realize
 from armlock.stability import CountError, last_crossing, unstable_roots
-from armlock.validation import ComplexArray, FloatArray, broadcast_pair, real_number
+from armlock.validation import (
+    ComplexArray,
+    FloatArray,
+    broadcast_pair,
+    complex_array,
+    real_number,
+    whole_number,
+)
 
 _EPSILON = float(np.finfo(float).eps)
 # Degrees of the Chebyshev polynomial that are tried, one after the other.
@@ -45,6 +52,10 @@ class RootError(RuntimeError):
     def __init__(self, message: str, estimate: complex) -> None:
         super().__init__(message)
         self.estimate = estimate
+
+    def __reduce__(self) -> tuple[type[RootError], tuple[str, complex]]:
+        """Pickle the estimate along, so that the error passes from process to process."""
+        return type(self), (str(self), self.estimate)
 
 
 def _chebyshev(degree: int) -> tuple[FloatArray, FloatArray]:
@@ -78,8 +89,15 @@ def pseudospectral_roots(
     -------
     complex array, shape (degree + order of the equation,)
         Eigenvalues in descending order of real part: approximations, some of them spurious.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If x or y is not finite and real, or `degree` is no integer from 2 on.
     """
-    form = realize(system, x, y)
+    degree = whole_number("degree", degree, 2)
+    name1, name2 = checked_system(system).parameters
+    form = realize(system, real_number(name1, x), real_number(name2, y))
     states = form.state.shape[0]
     # A term without effect would only add spurious eigenvalues.
     delayed = [term for term in form.delayed if term.column.any() or term.direct != 0.0]
@@ -135,15 +153,22 @@ def polish_root(
     error : float
         Length of the last Newton step, an estimate of its error; inf if the residual
         |D(root)| is not down to rounding.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If x or y is not finite and real, or `start` not finite.
     """
-    s = complex(start)
+    name1, name2 = checked_system(system).parameters
+    x, y = real_number(name1, x), real_number(name2, y)
+    s = complex(complex_array("start", start)[()])
     scale = 1.0 / max(system.longest_delay, _EPSILON)
     move = np.inf
     for _ in range(60):
         # A step far to the left overflows; such a start is given up below.
         with np.errstate(over="ignore", invalid="ignore"):
-            value = complex(system(s, x, y))
-            slope = complex(system.derivative(s, x, y))
+            value = complex(system._value(np.asarray(s), x, y))
+            slope = complex(system._slope(np.asarray(s), x, y))
         if value == 0.0:
             return s, 0.0
         if slope == 0.0 or not np.isfinite(value):
@@ -154,16 +179,17 @@ def polish_root(
         s -= value / slope
         if move <= _EPSILON * abs(s):
             break
-    parts = [
-        abs(poly.polyval(abs(s), np.abs(p))) * np.exp(-s.real * delay)
-        for p, delay in (
-            (system.a, 0.0),
-            (x * system.b1, system.delay1),
-            (y * system.b2, system.delay2),
-        )
-    ]
-    rounding = 64.0 * _EPSILON * (1.0 + abs(s) * system.longest_delay) * sum(parts)
-    residual = abs(complex(system(s, x, y)))
+    with np.errstate(over="ignore", invalid="ignore"):
+        parts = [
+            abs(poly.polyval(abs(s), np.abs(p))) * np.exp(-s.real * delay)
+            for p, delay in (
+                (system.a, 0.0),
+                (x * system.b1, system.delay1),
+                (y * system.b2, system.delay2),
+            )
+        ]
+        rounding = 64.0 * _EPSILON * (1.0 + abs(s) * system.longest_delay) * sum(parts)
+        residual = abs(complex(system._value(np.asarray(s), x, y)))
     return s, float(move) if residual <= rounding else np.inf
 
 
@@ -193,6 +219,8 @@ def extended_root(
 
     Raises
     ------
+    TypeError, ValueError
+        If x or y is not finite and real, `start` not finite, or `digits` no positive integer.
     RootError
         If `start` is not close enough to a root for Newton's method to settle.
 
@@ -204,8 +232,10 @@ def extended_root(
     >>> print(nstr(extended_root(HayesEquation(), 0.0, -0.2, -0.26, digits=40).real, 30))
     -0.259171101819073764476637135967
     """
-    with mpmath.workdps(digits):
-        s = mpmath.mpc(start)
+    name1, name2 = checked_system(system).parameters
+    x, y = real_number(name1, x), real_number(name2, y)
+    with mpmath.workdps(whole_number("digits", digits, 1)):
+        s = mpmath.mpc(complex(complex_array("start", start)[()]))
         for _ in range(60):
             z, dz = s, mpmath.mpf(1)
             if system.step:
@@ -251,7 +281,8 @@ def _certified(
     while margin <= 1e-6 * scale:
         try:
             count = int(unstable_roots(system.shifted(root.real + margin), x, y))
-        except CountError:
+        except (CountError, ValueError):
+            # Shifted so far, the coefficients may leave the range of floats.
             return False
         if count >= 0:
             return count == 0
@@ -294,11 +325,17 @@ def _starts_along(
     of affordable degree resolves.
     """
     spacing = 0.5 / max(system.longest_delay, _EPSILON)
-    end = min(float(last_crossing(system.shifted(sigma), x, y)), _POINTS_ALONG * spacing)
-    s = sigma + 1j * np.arange(0.0, end + 2.0 * spacing, spacing)
+    try:
+        last = float(last_crossing(system.shifted(sigma), x, y))
+    except ValueError:
+        # So far out the shifted coefficients leave the range of floats.
+        return np.empty(0, dtype=np.complex128)
+    end = float(np.fmin(last, _POINTS_ALONG * spacing))
+    along = np.arange(0.0, end + 2.0 * spacing, spacing)
+    s = np.asarray(sigma + 1j * along, dtype=np.complex128)
     with np.errstate(all="ignore"):
         for _ in range(12):
-            move = system(s, x, y) / system.derivative(s, x, y)
+            move = system._value(s, x, y) / system._slope(s, x, y)
             s = s - move
         led = s[(np.abs(move) <= 1e-6 * spacing) & (s.imag >= 0.0)]
     # A real root is approached from the side.

@@ -9,16 +9,24 @@ rational functions m1(s) and m2(s), so that the sensor's response is
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass, fields
 
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
-from armlock.validation import ComplexArray, positive_number, real_number
+from armlock.validation import (
+    ComplexArray,
+    axis,
+    complex_array,
+    positive_number,
+    real_array,
+    real_number,
+)
 
 
-class SignalMapping(NamedTuple):
+@dataclass(frozen=True)
+class SignalMapping:
     r"""Weights m1 = numerator1 / denominator and m2 = numerator2 / denominator.
 
     The response of the sensor is
@@ -28,12 +36,28 @@ class SignalMapping(NamedTuple):
         P(s) = m_1 \left( 1 - c_1 e^{-s\tau_1} \right)
         + m_2 \left( 1 - c_2 e^{-s\tau_2} \right) .
 
-    Attributes
+    Parameters
     ----------
     numerator1, numerator2, denominator : sequence of float
-        Polynomial coefficients in ascending powers of s.
+        Polynomial coefficients in ascending powers of s. They are kept as tuples, without
+        zeros in front of the highest power.
     name : str
         What the configuration is called.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a coefficient is not finite and real, the denominator is zero, or the name is none.
+
+    Examples
+    --------
+    Arm 1 seen through a low-pass filter of 1 rad/s, arm 2 as it is:
+
+    >>> from armlock.sensors import SignalMapping
+    >>> mapping = SignalMapping([1.0], [1.0, 1.0], [1.0, 1.0], "filtered")
+    >>> m1, m2 = mapping.weights(1j)
+    >>> print(f"{abs(m1):.4f} {abs(m2):.4f}")
+    0.7071 1.0000
     """
 
     numerator1: Sequence[float]
@@ -41,9 +65,19 @@ class SignalMapping(NamedTuple):
     denominator: Sequence[float]
     name: str
 
+    def __post_init__(self) -> None:
+        """Check the polynomials, and keep them where nobody changes them."""
+        for field in fields(self)[:3]:
+            trimmed = poly.polytrim(axis(field.name, getattr(self, field.name)), tol=0.0)
+            object.__setattr__(self, field.name, tuple(float(value) for value in trimmed))
+        if not any(self.denominator):
+            raise ValueError(f"denominator must not be zero, got {self.denominator}")
+        if not isinstance(self.name, str):
+            raise TypeError(f"name must be a string, got {self.name!r}")
+
     def weights(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """Evaluate (m1, m2) at complex s, in rad/s; both are shaped like `s`."""
-        s = np.asarray(s, dtype=np.complex128)
+        s = complex_array("s", s)
         below: ComplexArray = poly.polyval(s, np.asarray(self.denominator, dtype=float))
         return (
             poly.polyval(s, np.asarray(self.numerator1, dtype=float)) / below,
@@ -55,8 +89,8 @@ class SignalMapping(NamedTuple):
         s: npt.ArrayLike,
         tau1: float,
         tau2: float,
-        c1: float = 1.0,
-        c2: float = 1.0,
+        c1: npt.ArrayLike = 1.0,
+        c2: npt.ArrayLike = 1.0,
     ) -> ComplexArray:
         """Evaluate the sensor's response P(s).
 
@@ -66,19 +100,24 @@ class SignalMapping(NamedTuple):
             Laplace variable in rad/s.
         tau1, tau2 : float
             Round-trip delays in s.
-        c1, c2 : float, optional
-            Multiplicative perturbations of the two arms, 1 where there are none.
+        c1, c2 : array_like of float, optional
+            Multiplicative perturbations of the two arms, 1 where there are none. They
+            broadcast with `s`.
 
         Returns
         -------
-        complex array, shaped like `s`
+        complex array, of the broadcast shape
+
+        Raises
+        ------
+        TypeError, ValueError
+            If an argument does not hold finite numbers, or a delay is not positive.
         """
         tau1, tau2 = positive_number("tau1", tau1), positive_number("tau2", tau2)
-        s = np.asarray(s, dtype=np.complex128)
+        s, k1, k2 = complex_array("s", s), real_array("c1", c1), real_array("c2", c2)
         m1, m2 = self.weights(s)
-        response: ComplexArray = m1 * (1.0 - c1 * np.exp(-s * tau1))
-        response += m2 * (1.0 - c2 * np.exp(-s * tau2))
-        return response
+        response: ComplexArray = m1 * (1.0 - k1 * np.exp(-s * tau1))
+        return response + m2 * (1.0 - k2 * np.exp(-s * tau2))
 
 
 #: One arm alone.
@@ -126,7 +165,7 @@ def dual(corner: float, difference: float) -> SignalMapping:
 
     Raises
     ------
-    ValueError
+    TypeError, ValueError
         If the corner is not positive and finite, or the difference is zero.
     """
     p = positive_number("corner", corner)

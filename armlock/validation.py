@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Sequence
 from decimal import Decimal
 from numbers import Real
 from typing import Any
@@ -160,18 +161,31 @@ def affordable(name: str, shape: tuple[int, ...], bytes_each: int) -> None:
         )
 
 
+def broadcast_shape(
+    names: tuple[str, ...], arrays: tuple[npt.NDArray[Any], ...]
+) -> tuple[int, ...]:
+    """Return the shape that arrays broadcast to, or name all shapes and raise."""
+    shapes = [array.shape for array in arrays]
+    try:
+        return np.broadcast_shapes(*shapes)
+    except ValueError:
+        raise ValueError(
+            f"{_listed(names)} must broadcast together, got shapes {_listed(shapes)}"
+        ) from None
+
+
+def _listed(items: Sequence[object]) -> str:
+    """Return words joined by commas and an and."""
+    words = [str(item) for item in items]
+    return ", ".join(words[:-1]) + " and " + words[-1]
+
+
 def broadcast_pair(
     name1: str, value1: object, name2: str, value2: object
 ) -> tuple[FloatArray, FloatArray]:
     """Return two finite real arrays of one shape, or name both shapes and raise."""
     first, second = real_array(name1, value1), real_array(name2, value2)
-    try:
-        shape = np.broadcast_shapes(first.shape, second.shape)
-    except ValueError:
-        raise ValueError(
-            f"{name1} and {name2} must broadcast together, got shapes "
-            f"{first.shape} and {second.shape}"
-        ) from None
+    shape = broadcast_shape((name1, name2), (first, second))
     affordable(f"{name1} and {name2}", shape, 48)
     # Copies, because broadcast views are not to be written to.
     return np.broadcast_to(first, shape).copy(), np.broadcast_to(second, shape).copy()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import control
 import numpy as np
 import pytest
+import scipy.signal
 
 from armlock import Controller, Loop, unstable_roots
 from armlock.controllers import integrating_actuator, stage_one, stage_two, table_two
@@ -62,7 +63,21 @@ def test_a_numerator_of_python_control_may_start_with_zeros():
         (((), (0.0,), np.nan), ValueError, "gain must be finite"),
         (((), (1j,), 1.0), ValueError, "poles must be real or in conjugate pairs"),
         (((1 + 1j, 1 - 2j), (0.0, 0.0), 1.0), ValueError, "zeros must be real or in conj"),
-        (((np.inf,), (0.0,), 1.0), ValueError, "zeros must be a sequence of finite numbers"),
+        (((True,), (0.0,), 1.0), TypeError, "zeros must hold numbers, got dtype bool"),
+        ((None, (0.0,), 1.0), TypeError, "zeros must hold numbers, got dtype object"),
+        (("abc", (0.0,), 1.0), TypeError, "zeros must hold numbers, got dtype <U3"),
+        ((((1.0,), (1.0, 2.0)), (), 1.0), ValueError, "zeros must be a rectangular array"),
+        (
+            ((), ((0.0,),), 1.0),
+            ValueError,
+            r"poles must be one-dimensional, got shape \(1, 1\)",
+        ),
+        (
+            scipy.signal.TransferFunction([1.0], [1.0, 1.0]),
+            TypeError,
+            "got TransferFunctionCon",
+        ),
+        (((np.inf,), (0.0,), 1.0), ValueError, r"zeros must be finite, got \(inf"),
     ],
 )
 def test_what_is_no_controller_is_refused(given, error, message):
