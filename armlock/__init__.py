@@ -2,6 +2,10 @@
 
 The reproducible companion to "Robustness Analysis and Controller Design of Arm-locking
 System in Space-based Gravitational Wave Detectors".
+
+The loops over points and rows run on all cores. Spread over processes of one's own they are
+best started with the method "spawn" or "forkserver" (`armlock.sweeps.sweep` has an example):
+the threads of a process do not survive a fork, and a forked process works on one core.
 """
 
 import os

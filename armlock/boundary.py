@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from armlock.characteristic import CharacteristicFunction
 from armlock.stability import unstable_roots
-from armlock.validation import FloatArray, positive_number
+from armlock.validation import FloatArray, positive_number, real_array, whole_number
 
 # Halvings of the bracket: from a reach of some units to about 1e-9.
 _HALVINGS = 33
@@ -32,15 +33,30 @@ def rays(number: int = 180, elongation: float = 5.0) -> FloatArray:
     -------
     float array, shape (2, number)
         Unit vectors.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If `number` is no integer from 1 on, or `elongation` not positive and finite.
     """
+    number = whole_number("number", number, 1)
+    elongation = positive_number("elongation", elongation)
     angle = 2.0 * np.pi * np.arange(number) / number
     along, across = elongation * np.cos(angle), np.sin(angle)
     vectors = np.stack((across + along, across - along))
     return np.asarray(vectors / np.hypot(*vectors))
 
 
+def _vectors(name: str, value: npt.ArrayLike) -> FloatArray:
+    """Return a finite float array of shape (2, n), or raise."""
+    array = real_array(name, value)
+    if array.ndim != 2 or array.shape[0] != 2 or array.shape[1] == 0:
+        raise ValueError(f"{name} must be of shape (2, n), got {array.shape}")
+    return array
+
+
 def boundary_radius(
-    system: CharacteristicFunction, directions: FloatArray, reach: float = 11.0
+    system: CharacteristicFunction, directions: npt.ArrayLike, reach: float = 11.0
 ) -> FloatArray:
     """Distance from the origin to the boundary of the stable region.
 
@@ -61,10 +77,12 @@ def boundary_radius(
 
     Raises
     ------
-    ValueError
-        If the origin is not stable, or a point at distance `reach` is.
+    TypeError, ValueError
+        If `directions` is no pair of rows of finite numbers, the origin is not stable, or a
+        point at distance `reach` is.
     """
     reach = positive_number("reach", reach)
+    directions = _vectors("directions", directions)
     inside = np.zeros(directions.shape[1])
     outside = np.full(directions.shape[1], reach)
     if unstable_roots(system, 0.0, 0.0) != 0:
@@ -79,28 +97,40 @@ def boundary_radius(
     return np.asarray(0.5 * (inside + outside))
 
 
-def outline(radius: FloatArray, directions: FloatArray) -> FloatArray:
-    """Return the corners radius * directions as a closed polygon, shape (2, n + 1)."""
-    corners = radius * directions
+def outline(radius: npt.ArrayLike, directions: npt.ArrayLike) -> FloatArray:
+    """Return the corners radius * directions as a closed polygon, shape (2, n + 1).
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument does not hold finite numbers, or the two do not match in length.
+    """
+    vectors, lengths = _vectors("directions", directions), real_array("radius", radius)
+    if lengths.shape not in ((), vectors.shape[1:]):
+        raise ValueError(
+            f"radius must hold one number for each of the {vectors.shape[1]} directions, got "
+            f"shape {lengths.shape}"
+        )
+    corners = lengths * vectors
     return np.concatenate((corners, corners[:, :1]), axis=1)
 
 
-def enclosed_area(closed: FloatArray) -> float:
+def enclosed_area(closed: npt.ArrayLike) -> float:
     r"""Area inside a closed polygon of shape (2, n + 1), by the shoelace formula.
 
     .. math::
 
         \frac{1}{2} \left| \sum_{i=0}^{n-1} (x_i\, y_{i+1} - x_{i+1}\, y_i) \right|
     """
-    x, y = closed
+    x, y = _vectors("closed", closed)
     return float(0.5 * abs(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])))
 
 
-def perimeter(closed: FloatArray) -> float:
+def perimeter(closed: npt.ArrayLike) -> float:
     r"""Length of a closed polygon of shape (2, n + 1).
 
     .. math::
 
         \sum_{i=0}^{n-1} \sqrt{(x_{i+1} - x_i)^2 + (y_{i+1} - y_i)^2}
     """
-    return float(np.hypot(*np.diff(closed, axis=1)).sum())
+    return float(np.hypot(*np.diff(_vectors("closed", closed), axis=1)).sum())

@@ -16,9 +16,11 @@ from numpy.polynomial import polynomial as poly
 
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.stability import sign_changes
-from armlock.validation import FloatArray, positive_number, real_array
+from armlock.validation import ComplexArray, FloatArray, affordable, positive_number, real_array
 
 _EPSILON = float(np.finfo(float).eps)
+# Phase in rad up to which a frequency next to a pole counts as the pole, in rounding errors.
+_MANY_TURNS = 1e3
 
 
 class Line(NamedTuple):
@@ -65,6 +67,34 @@ def _require_two_parameters(system: CharacteristicFunction) -> None:
             )
 
 
+def _split(value: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return two halves of the digits of each value, which add up to it (Veltkamp)."""
+    high = value * 134217729.0
+    high = high - (high - value)
+    return high, value - high
+
+
+def _turned(omega: FloatArray, delay: float) -> ComplexArray:
+    """Return exp(j omega delay) - 1 for the exact product, however many turns it is."""
+    product = omega * delay
+    # What rounding has taken off the product (Dekker).
+    high1, low1 = _split(omega)
+    high2, low2 = _split(np.asarray(delay))
+    lost = ((high1 * high2 - product) + high1 * low2 + low1 * high2) + low1 * low2
+    whole, rest = np.expm1(1j * product), np.expm1(1j * lost)
+    return np.asarray(whole + rest + whole * rest)
+
+
+def _turned_apart(omega: FloatArray, system: CharacteristicFunction) -> ComplexArray:
+    """Return exp(-j omega (delay1 - delay2)) - 1 for the exact product."""
+    separation = system.delay1 - system.delay2
+    # What rounding has taken off the difference (Knuth).
+    back = separation - system.delay1
+    lost = (system.delay1 - (separation - back)) - (system.delay2 + back)
+    whole, rest = _turned(omega, -separation), _turned(omega, -lost)
+    return np.asarray(whole + rest + whole * rest)
+
+
 def d_curve(
     system: CharacteristicFunction, omega: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray]:
@@ -86,8 +116,9 @@ def d_curve(
     Raises
     ------
     TypeError, ValueError
-        If omega is not finite and real, or the system does not determine both parameters
-        (equal delays, or a free parameter without effect).
+        If omega is not finite and real, or so large or small that the curve leaves the range
+        of floats; or the system does not determine both parameters (equal delays, or a free
+        parameter without effect).
 
     See Also
     --------
@@ -139,16 +170,33 @@ def d_curve(
     checked_system(system)
     omega = real_array("omega", omega)
     _require_two_parameters(system)
-    z = np.exp(1j * omega * system.step) if system.step else 1j * omega
-    a = poly.polyval(z, system.a)
-    b1, b2 = poly.polyval(z, system.b1), poly.polyval(z, system.b2)
-    # Only the difference of the delays enters here, which keeps low frequencies exact.
-    separation = system.delay1 - system.delay2
-    determinant = np.imag(b1 * np.conj(b2) * np.exp(-1j * omega * separation))
-    rounding = 4.0 * _EPSILON * np.abs(omega * separation) * np.abs(b1) * np.abs(b2)
-    determinant = np.where(np.abs(determinant) <= rounding, np.nan, determinant)
-    x = np.imag(a * np.conj(b2) * np.exp(1j * omega * system.delay2)) / determinant
-    y = -np.imag(a * np.conj(b1) * np.exp(1j * omega * system.delay1)) / determinant
+    x0, y0 = system.reference
+    with np.errstate(over="ignore", under="ignore", invalid="ignore", divide="ignore"):
+        z = 1.0 + _turned(omega, system.step) if system.step else 1j * omega
+        b1, b2 = poly.polyval(z, system.b1), poly.polyval(z, system.b2)
+        late1, late2 = _turned(omega, -system.delay1), _turned(omega, -system.delay2)
+        # D at the reference, where nothing cancels; from there both parameters are solved for.
+        known = poly.polyval(z, system.rest) - b1 * x0 * late1 - b2 * y0 * late2
+        across = b1 * np.conj(b2)
+        # Only the difference of the delays enters here, which keeps low frequencies exact.
+        determinant = np.imag(across) + np.imag(across * _turned_apart(omega, system))
+        rounding = np.minimum(np.abs(omega * (system.delay1 - system.delay2)), _MANY_TURNS)
+        rounding = 4.0 * _EPSILON * rounding * np.abs(across)
+        pole = np.abs(determinant) <= rounding
+        # Not where only the range of floats makes it look like one.
+        size1, size2 = (poly.polyval(np.abs(z), np.abs(b)) for b in (system.b1, system.b2))
+        pole &= np.isfinite(rounding)
+        pole &= size1 * size2 * np.minimum(1.0, np.abs(omega)) > np.finfo(float).tiny
+        pole |= omega == 0.0
+        determinant = np.where(pole, np.nan, determinant)
+        x = x0 + np.imag(known * np.conj(b2 * (1.0 + late2))) / determinant
+        y = y0 - np.imag(known * np.conj(b1 * (1.0 + late1))) / determinant
+    beyond = ~pole & ~(np.isfinite(x) & np.isfinite(y))
+    if beyond.any():
+        raise ValueError(
+            f"omega must be of a size for which the curve is within the range of floats, got "
+            f"{omega[beyond].ravel()[0]} rad/s"
+        )
     return x, y
 
 
@@ -172,8 +220,8 @@ def d_curve_line(system: CharacteristicFunction) -> Line:
 
     Raises
     ------
-    ValueError
-        If D(0) depends on neither parameter, so that there is no line.
+    TypeError, ValueError
+        If `system` is none, or D(0) depends on neither parameter, so that there is no line.
 
     Examples
     --------
@@ -182,6 +230,7 @@ def d_curve_line(system: CharacteristicFunction) -> Line:
     >>> d_curve_line(CommonArm())
     Line(weight_x=1.0, weight_y=1.0, value=2.0)
     """
+    checked_system(system)
     a, b1, b2 = (float(part.real) for part in system.parts(0.0))
     scale = b1 if abs(b1) >= abs(b2) else b2
     if scale == 0.0:
@@ -213,7 +262,10 @@ def d_curve_branches(
     Raises
     ------
     TypeError, ValueError
-        As `d_curve`, or if an argument is not positive.
+        As `d_curve`, or if an argument is not positive, or the samples do not fit into the
+        memory.
+    CountError
+        If there are too many poles to be found.
 
     Notes
     -----
@@ -235,11 +287,14 @@ def d_curve_branches(
     >>> [f"{branch.omega[0]:.2f} to {branch.omega[-1]:.2f}" for branch in branches]
     ['0.00 to 3.14', '3.14 to 6.28', '6.28 to 9.00']
     """
+    checked_system(system)
     omega_max = positive_number("omega_max", omega_max)
     if system.step:
         omega_max = min(omega_max, np.pi / system.step)
     density = positive_number("points_per_turn", points_per_turn)
     _require_two_parameters(system)
+    turns = omega_max * system.longest_delay / (2.0 * np.pi)
+    affordable("omega_max", (int(min(density * turns, 1e18)),), 256)
     _, b1, b2 = system.on_boundary()
     determinant = b1.times_conjugate(b2)
     poles, _ = sign_changes(determinant, omega_max, is_map=system.step > 0.0)

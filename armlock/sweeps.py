@@ -26,6 +26,8 @@ R = TypeVar("R", bound=tuple[Any, ...])
 _LONGER = 4.0
 # Halvings by which the end of a walk is placed on its ray.
 _HALVINGS = 40
+# Delay in s that stands in for none.
+_SHORTEST = 1e-12
 
 
 class Crossings(NamedTuple):
@@ -162,6 +164,8 @@ def ray_crossings(
     TypeError, ValueError
         If start or direction is not two finite real numbers, the direction has length zero,
         stop is not positive, or a neutral loop's chain of roots is lost on the way.
+    CountError
+        If a number overflows, or gain times delay is too large to follow.
 
     Notes
     -----
@@ -210,7 +214,10 @@ def first_crossing(
     Raises
     ------
     TypeError, ValueError
-        As `ray_crossings` does.
+        As `ray_crossings` does; the loss of a neutral loop's chain only if no root crosses
+        before it.
+    CountError
+        If a number overflows, or gain times delay is too large to follow.
 
     Notes
     -----
@@ -227,11 +234,14 @@ def first_crossing(
     0.254006 3.7746 2
     """
     ray, stop = Ray(system, start, direction), positive_number("stop", stop)
+    if ray.end(0.0) == np.inf:
+        raise ray.unconfined(0.0)
+    within = _confined_until(ray, stop)
     limit = ray.end(0.0)
-    limit = _LONGER * limit if 0.0 < limit < np.inf else 1.0 / system.longest_delay
+    limit = _LONGER * limit if limit > 0.0 else 1.0 / max(system.longest_delay, _SHORTEST)
     last = 0.0
-    while last < stop:
-        top = _reach(ray, limit, stop)
+    while last < within:
+        top = _reach(ray, limit, within)
         if top > last:
             found = ray.crossings(top, first=True)
             if found.position.size:
@@ -240,11 +250,21 @@ def first_crossing(
                 )
             last = top
         limit *= _LONGER
-        if limit > 1e12:
-            # Nothing crosses below the limit of a neutral loop's chain; beyond it nothing can
-            # be said.
-            break
+    if within < stop:
+        raise ray.unconfined(stop)
     return Crossing(np.inf, np.nan, 0)
+
+
+def _confined_until(ray: Ray, stop: float) -> float:
+    """Return a t up to which a neutral loop's chain is confined, close to the largest."""
+    if ray.end(stop) != np.inf:
+        return stop
+    low, high = 0.0, stop
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if ray.end(middle) == np.inf else (middle, high)
+    # Closer to the limit roots cross at ever higher frequency.
+    return low * (1.0 - 1e-6)
 
 
 def _reach(ray: Ray, limit: float, stop: float) -> float:
@@ -282,6 +302,10 @@ def sweep(
         an engine's map spreads a long sweep over processes or machines; `result` must then be
         a function that can be pickled.
 
+        A pool of processes is best made with the start method "spawn" or "forkserver", which
+        every system has. In a forked process the loops over points and rows run on one core,
+        because the threads of a process do not survive a fork.
+
     Returns
     -------
     named tuple
@@ -299,6 +323,17 @@ def sweep(
     >>> def upper_edge(gain):
     ...     return first_crossing(CommonArm(gain), (0.0, 0.0), (1.0, 1.0), stop=3.0)
     >>> sweep(upper_edge, [1.0, 10.0]).position
+    array([1., 1.])
+
+    Over two processes. They import what they call, so that it stands in a module: here in
+    this one. In a script the pool stands under `if __name__ == "__main__":`.
+
+    >>> from functools import partial
+    >>> from multiprocessing import get_context
+    >>> edge = partial(first_crossing, start=(0.0, 0.0), direction=(1.0, 1.0), stop=3.0)
+    >>> with get_context("spawn").Pool(2) as pool:
+    ...     found = sweep(edge, [CommonArm(1.0), CommonArm(10.0)], mapper=pool.map)
+    >>> found.position
     array([1., 1.])
     """
     found = list(mapper(result, points))
