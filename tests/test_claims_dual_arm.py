@@ -101,6 +101,22 @@ def test_edge_for_infinite_gain(difference):
         assert np.isinf(chapter.lost_from(*point)) == stable
 
 
+def test_what_a_high_gain_leaves_of_the_strip():
+    """Random stable points at g = 10 are kept between two lines, and lost beyond them."""
+    rng = np.random.default_rng(4)
+    mean, difference = rng.uniform(-1.25, 1.2, 200), rng.uniform(0.0, 0.036, 200)
+    c1, c2 = mean - 0.5 * difference, mean + 0.5 * difference
+    stable = unstable_roots(DualArm(), c1, c2) == 0
+    c1, c2 = c1[stable], c2[stable]
+    line = 2.0 - chapter.sensor_weight() * (c2 - c1)
+    kept = (c1 + c2 > -2.0) & (c1 + c2 < line)
+    assert 20 < kept.sum() < kept.size - 20
+    assert (unstable_roots(chapter.high_gain_limit(), c1[kept], c2[kept]) == 0).all()
+    far = np.abs(np.abs(c1 + c2) - 2.0) > 0.02
+    at_high_gain = unstable_roots(DualArm(1000.0), c1[far], c2[far]) == 0
+    np.testing.assert_array_equal(at_high_gain, kept[far])
+
+
 def test_upper_edge_is_one_piece_at_medium_gains():
     for gain, omega in ((10.0, 3.7747), (30.0, 30.607), (100.0, 31.251)):
         pieces, low, high = chapter.upper_edge(gain)

@@ -149,7 +149,7 @@ def sensor_weight(
 
 
 def lost_from(c1: float, c2: float) -> float:
-    """Estimate the gain in rad/s from which a point of the strip is unstable; inf for never.
+    """Estimate the gain in rad/s that takes a point of the upper strip; inf for none.
 
     The estimate is `corner_estimate` with the weights 1 + E and 1 - E of the two arms, which
     differ for the sensor's integral; near 5 Hz or at 10 Hz, whichever is the lower.
@@ -552,7 +552,8 @@ def finite_gain_margin() -> Finding:
         f"{far:.3g}, at (1, 1 + {PERTURBATION:g}) {near:.3g}. So it is where c1 + c2 > 2, and "
         f"in a sliver below that line: down to c1 + c2 = 2 - {sensor_weight():.5f} (c2 - c1) "
         "a root crosses at 10 Hz, where the sensor weighs arm 2 a little more; the point "
-        f"{SLIVER} is lost at a factor of {sliver:.1f}. Below the sliver the curve does not "
+        f"{SLIVER} is lost at a factor of {sliver:.1f}. (The far end of the strip, c1 + c2 < "
+        "-2, is lost in the same way.) In between the curve does not "
         "cross the axis between -1 and 0 at all, and the gain margin is infinite: at "
         f"{BELOW[0]} and {BELOW[1]} no crossing at any frequency, and {still[0]} and "
         f"{still[1]} unstable roots for infinite gain. Near the strip's far edge, at (0.99, "
@@ -627,9 +628,9 @@ def shrinking_region() -> Finding:
         area[-1] / area[0],
         f"stable area within [{WINDOW[0]:g}, {WINDOW[1]:g}]², at g = 10⁵ over that at g = 10",
         f"The area falls from {area[0]:.3g} through {area[1]:.3g} and {area[2]:.3g} (g = 100 "
-        f"and 1000) to {area[3]:.3g}, but not to zero: what lies below c1 + c2 = 2 - "
-        f"{sensor_weight():.5f} (c2 - c1) is stable at every higher gain, up to infinity "
-        f"(at c2 - c1 = {2 * sliver:g} the limit is at c1 + c2 = {end:.7f}, computed for "
+        f"and 1000) to {area[3]:.3g}, but not to zero: what lies between c1 + c2 = -2 "
+        f"and 2 - {sensor_weight():.5f} (c2 - c1) is stable at every higher gain, up to "
+        f"infinity (at c2 - c1 = {2 * sliver:g} the limit is at c1 + c2 = {end:.7f}, computed for "
         f"infinite gain). The excess falls with g to the power {slope:.2f}. The region is not "
         "nested: its far edge, where a slow oscillation is lost, moves outwards with the "
         f"gain, from c2 - c1 = {width[0]:.4f} at g = {GAINS[0]:g} to {width[-1]:.4f} (at c1 + "
