@@ -630,12 +630,13 @@ def shrinking_region() -> Finding:
         f"The area falls from {area[0]:.3g} through {area[1]:.3g} and {area[2]:.3g} (g = 100 "
         f"and 1000) to {area[3]:.3g}, but not to zero: what lies between c1 + c2 = -2 "
         f"and 2 - {sensor_weight():.5f} (c2 - c1) is stable at every higher gain, up to "
-        f"infinity (at c2 - c1 = {2 * sliver:g} the limit is at c1 + c2 = {end:.7f}, computed for "
-        f"infinite gain). The excess falls with g to the power {slope:.2f}. The region is not "
-        "nested: its far edge, where a slow oscillation is lost, moves outwards with the "
-        f"gain, from c2 - c1 = {width[0]:.4f} at g = {GAINS[0]:g} to {width[-1]:.4f} (at c1 + "
-        f"c2 = {2 * WINDOW[0]:g}), so that ({point[0]:.4f}, {point[1]:.4f}) has {gained[0]} "
-        f"unstable roots at g = {GAINS[0]:g} and {gained[1]} at g = {GAINS[-1]:g}.",
+        f"infinity (at c2 - c1 = {2 * sliver:g} the limit is at c1 + c2 = {end:.7f}, "
+        f"computed for infinite gain). The excess falls with g to the power {slope:.2f}. The "
+        "region is not nested: its far edge, where a slow oscillation is lost, moves outwards "
+        f"with the gain, from c2 - c1 = {width[0]:.4f} at g = {GAINS[0]:g} to {width[-1]:.4f} "
+        f"(at c1 + c2 = {2 * WINDOW[0]:g}), so that ({point[0]:.4f}, {point[1]:.4f}) has "
+        f"{gained[0]} unstable roots at g = {GAINS[0]:g} and {gained[1]} at g = "
+        f"{GAINS[-1]:g}.",
     )
 
 
