@@ -517,7 +517,7 @@ def edges_against_gain() -> Finding:
         f"c - 1 = ω²/(8 g²) with ω = 2π · {RESONANCE / (2 * np.pi):g} Hz, the first frequency "
         "at which both round trips are whole numbers of periods (exact over estimate: "
         f"{ratio:.4f}). The line c1 = c2 is the "
-        "same for every g, but the part of it that bounds the region ends at that corner.",
+        "same for every g, but the part of it that bounds the region ends there.",
     )
 
 
@@ -552,7 +552,7 @@ def finite_gain_margin() -> Finding:
         f"{far:.3g}, at (1, 1 + {PERTURBATION:g}) {near:.3g}. So it is where c1 + c2 > 2, and "
         f"in a sliver below that line: down to c1 + c2 = 2 - {sensor_weight():.5f} (c2 - c1) "
         "a root crosses at 10 Hz, where the sensor weighs arm 2 a little more; the point "
-        f"{SLIVER} is lost at a factor of {sliver:.1f}. (The far end of the strip, c1 + c2 < "
+        f"{SLIVER} is lost at a factor of {sliver:.1f}. (The lower end of the strip, c1 + c2 < "
         "-2, is lost in the same way.) In between the curve does not "
         "cross the axis between -1 and 0 at all, and the gain margin is infinite: at "
         f"{BELOW[0]} and {BELOW[1]} no crossing at any frequency, and {still[0]} and "
@@ -628,8 +628,8 @@ def shrinking_region() -> Finding:
         area[-1] / area[0],
         f"stable area within [{WINDOW[0]:g}, {WINDOW[1]:g}]², at g = 10⁵ over that at g = 10",
         f"The area falls from {area[0]:.3g} through {area[1]:.3g} and {area[2]:.3g} (g = 100 "
-        f"and 1000) to {area[3]:.3g}, but not to zero: what lies between c1 + c2 = -2 "
-        f"and 2 - {sensor_weight():.5f} (c2 - c1) is stable at every higher gain, up to "
+        f"and 1000) to {area[3]:.3g}, but not to zero: what of it is between c1 + c2 = "
+        f"-2 and 2 - {sensor_weight():.5f} (c2 - c1) stays stable at every gain, up to "
         f"infinity (at c2 - c1 = {2 * sliver:g} the limit is at c1 + c2 = {end:.7f}, "
         f"computed for infinite gain). The excess falls with g to the power {slope:.2f}. The "
         "region is not nested: its far edge, where a slow oscillation is lost, moves outwards "
