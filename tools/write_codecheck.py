@@ -56,7 +56,11 @@ def published(notebook: Path) -> list[tuple[str, str]]:
 
 def first_sentence(text: str) -> str:
     """Return the first sentence of a caption, on one line."""
-    return re.split(r"(?<!Fig)(?<!Eq)(?<!Sec)\.\s", " ".join(text.split()) + " ", maxsplit=1)[0]
+    return re.split(
+        r"(?<!Fig)(?<!Figs)(?<!Eq)(?<!Eqs)(?<!Sec)(?<!Secs)\.\s",
+        " ".join(text.split()) + " ",
+        maxsplit=1,
+    )[0]
 
 
 def manifest() -> str:
