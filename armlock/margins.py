@@ -517,7 +517,7 @@ def _critical(loop: Loop, start: int, d1: float, d2: float) -> float:
     chain = _chain_limit(loop, d1, d2)
     reaches = scale * 10.0 ** np.array([-8.0, -6.0, -4.0, -2.0, *np.arange(0.0, 150.0)])
     # Just below the limit of the chain, roots cross at ever higher frequency.
-    closer = chain * np.array([1.0 - 1e-2, 1.0 - 1e-4, 1.0 - 1e-6])
+    closer = chain * np.array([1.0 - 1e-2, 1.0 - 1e-4, 1.0 - 1e-6, 1.0 - 1e-8, 1.0 - 1e-10])
     for top in [*reaches[reaches < closer[0]], *closer[np.isfinite(closer)]]:
         # A boundary at (1, 1) itself, at the lower bound, is not a crossing beyond it.
         found = ray.crossings(float(top), first=True, lowest=1e-15 * scale)

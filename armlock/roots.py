@@ -273,6 +273,12 @@ def _certified(
     system: CharacteristicFunction, x: float, y: float, root: complex, error: float
 ) -> bool:
     """Whether no root lies right of `root`, by more than its error."""
+    # So far to the right of the axis a delayed term is nothing, and its factor no float.
+    x, y = (
+        0.0 if root.real * delay > 600.0 and abs(value) < 1e100 else value
+        for value, delay in ((x, system.delay1), (y, system.delay2))
+    )
+    system = _effective(system, x, y)
     scale = 1e11 * _resolution(system, root)
     margin = max(_resolution(system, root), 10.0 * error)
     # Farther left than this the shifted function overflows.

@@ -147,20 +147,39 @@ def _compiled(system: CharacteristicFunction) -> _Compiled:
     rest = system.rest_on_boundary().sums
     sums[0] = 0.0
     sums[0, : rest.size] = rest
-    try:
-        roots = poly.polyroots(system.a).astype(np.complex128)
-    except np.linalg.LinAlgError:
-        # Beyond the range of doubles; no count comes of them.
-        roots = np.full(system.degree, np.nan, dtype=np.complex128)
     return _Compiled(
         parts,
         sums,
         np.array(system.reference),
         phases,
-        roots,
+        _certain_roots(system.a),
         *squares_and_leads(system.a, system.b1, system.b2),
         np.pi / system.step if system.step else 0.0,
     )
+
+
+def _certain_roots(p: FloatArray) -> ComplexArray:
+    """Roots of a polynomial, or nan where they do not multiply out to it.
+
+    Of coefficients that differ by many orders of magnitude the eigenvalues of the companion
+    matrix may be anything.
+    """
+    nothing = np.full(p.size - 1, np.nan, dtype=np.complex128)
+    with np.errstate(all="ignore"):
+        try:
+            roots = poly.polyroots(p).astype(np.complex128)
+        except np.linalg.LinAlgError:
+            return nothing
+        for _ in range(3):
+            value, slope = poly.polyval(roots, p), poly.polyval(roots, poly.polyder(p))
+            poor = np.abs(value) > 1e-6 * poly.polyval(np.abs(roots), np.abs(p))
+            roots = np.where(poor, roots - value / slope, roots)
+        product, magnitude = np.array([p[-1]], dtype=np.complex128), np.abs(p[-1:])
+        for root in roots[np.argsort(np.abs(roots))]:
+            product = np.convolve(product, [-root, 1.0])
+            magnitude = np.convolve(magnitude, [abs(root), 1.0])
+        agrees = np.abs(product - p) <= 1e-6 * magnitude
+    return roots if agrees.all() else nothing
 
 
 def squares_and_leads(
