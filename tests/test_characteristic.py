@@ -1,9 +1,25 @@
+import copy
+import pickle
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from armlock import CharacteristicFunction, CommonArm, HayesEquation, semi_discretization
+import armlock
+from armlock import (
+    CharacteristicFunction,
+    CommonArm,
+    Controller,
+    DualArm,
+    HayesEquation,
+    Loop,
+    SingleArm,
+    paper_loop,
+    semi_discretization,
+    unstable_roots,
+)
+from armlock.sensors import DIFFERENCE, SignalMapping
 from tests import independent
 from tests.systems import NEUTRAL, RETARDED
 
@@ -138,3 +154,109 @@ def test_the_delays_of_a_map_are_whole_steps():
     # Off by rounding alone: 0.3 / 0.1 lies below 3. Without a delay, it is no step.
     assert made(0.3, 0.0).step == 0.1
     assert made(0.25, 0.15, 0.0).step == 0.0
+
+
+SYSTEMS_OF_ALL_KINDS = [
+    HayesEquation(0.7),
+    SingleArm(0.3, 2.0),
+    CommonArm(0.5, 2.1, 1.9),
+    DualArm(0.5, 2.1, 1.9, 1.3, difference=0.4),
+    paper_loop(),
+    Loop(Controller([-0.02], [0.0, -0.1 + 1j, -0.1 - 1j], 2.0), DIFFERENCE, 20.1, 19.9),
+    semi_discretization(CommonArm(tau1=2.0, tau2=1.5), 0.5),
+    CommonArm().exchanged(),
+    CharacteristicFunction([1.0, 0.2, 1.0], [1.0], [0.5], 1.0, 2.0, parameters=("k", "d")),
+]
+
+
+@pytest.mark.parametrize("system", SYSTEMS_OF_ALL_KINDS, ids=lambda system: repr(system)[:40])
+class TestSystemsAreValues:
+    def test_a_representation_makes_the_same_system_again(self, system):
+        again = eval(repr(system), vars(armlock) | {"SignalMapping": SignalMapping})
+        assert type(again) is type(system)
+        assert vars(again).keys() == vars(system).keys()
+        assert repr(again) == repr(system)
+        s = 0.1 + 0.3j
+        assert again(s, 0.9, 1.05) == system(s, 0.9, 1.05)
+        assert again.step == system.step
+        assert again.parameters == system.parameters
+
+    def test_attributes_cannot_be_changed(self, system):
+        for name in (*vars(system), "anything"):
+            with pytest.raises(AttributeError, match=rf"cannot be changed, got {name} = 3\.0"):
+                setattr(system, name, 3.0)
+        with pytest.raises(AttributeError, match="cannot be changed, got del delay1"):
+            del system.delay1
+
+    @pytest.mark.parametrize(
+        "copied",
+        [
+            lambda system: system,
+            copy.copy,
+            copy.deepcopy,
+            lambda system: pickle.loads(pickle.dumps(system)),
+        ],
+    )
+    def test_copies_count_the_same_and_are_read_only(self, system, copied):
+        expected = unstable_roots(system, 0.9, 1.05)
+        again = copied(system)
+        assert unstable_roots(again, 0.9, 1.05) == expected
+        assert repr(again) == repr(system)
+        for name in ("a", "rest", "b1", "b2"):
+            with pytest.raises(ValueError, match="read-only"):
+                getattr(again, name)[0] = 7.0
+        with pytest.raises(AttributeError, match="cannot be changed"):
+            again.delay1 = 3.0
+
+
+def test_a_list_given_for_a_polynomial_may_change_afterwards():
+    b1 = [0.1, 0.0]
+    reused = np.array([1.0, 1.0])
+    system = CharacteristicFunction(reused, b1, [0.1], 1.0, 2.0)
+    b1[0], reused[0] = 50.0, -3.0
+    assert system.b1.tolist() == [0.1]
+    assert system.rest.tolist() == [1.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        ({"parameters": "a"}, TypeError, r"^parameters must be a pair of names, got 'a'$"),
+        ({"parameters": ("a", 1)}, TypeError, r"^parameters must be a pair of names"),
+        ({"parameters": ("a", "b", "c")}, TypeError, r"^parameters must be a pair of names"),
+        ({"reference": (1.0,)}, ValueError, r"^reference must hold two numbers, got 1$"),
+        ({"reference": None}, TypeError, r"^reference must hold real numbers"),
+        ({"reference": (np.nan, 0.0)}, ValueError, r"^reference must be finite"),
+    ],
+)
+def test_names_and_reference_are_checked(arguments, error, message):
+    with pytest.raises(error, match=message):
+        CharacteristicFunction([1.0, 1.0], [1.0], [1.0], 1.0, 2.0, **arguments)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        (("j", 1.0, 1.0), TypeError, "^s must hold numbers, got dtype <U1$"),
+        ((np.inf, 1.0, 1.0), ValueError, r"^s must be finite, got \(inf\+0j\) among"),
+        ((1j, "a", 1.0), TypeError, "^c1 must hold real numbers, got dtype <U1$"),
+        ((1j, 1.0, np.nan), ValueError, "^c2 must be finite, got nan"),
+        ((1j, 1.0, 1j), TypeError, "^c2 must be real, got complex values"),
+        ((1j, True, 1.0), TypeError, "^c1 must hold real numbers, got dtype bool$"),
+        (
+            (np.ones(3), [1.0, 2.0], 1.0),
+            ValueError,
+            r"^s, c1 and c2 must broadcast together, got shapes \(3,\), \(2,\) and \(\)$",
+        ),
+    ],
+)
+def test_what_is_evaluated_is_checked(arguments, error, message):
+    loop = CommonArm()
+    for function in (loop, loop.open_loop, loop.derivative):
+        with pytest.raises(error, match=message):
+            function(*arguments)
+
+
+def test_a_shift_beyond_the_floats_is_refused():
+    with pytest.raises(ValueError, match=r"^sigma must be at most 700 over the longest delay"):
+        CommonArm().shifted(-50.0)

@@ -8,10 +8,12 @@ import pytest
 
 from armlock import (
     BOUNDARY,
+    UNCONFINED,
     CommonArm,
     Controller,
     CountError,
     DualArm,
+    HayesEquation,
     Loop,
     SingleArm,
     critical_perturbation,
@@ -20,6 +22,7 @@ from armlock import (
     paper_loop,
     unstable_roots,
 )
+from armlock.margins import gain_interval
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE
 from tests import independent
 
@@ -365,3 +368,96 @@ def test_an_unstable_loop_has_no_margins_and_nothing_to_lose():
 def test_an_unconfined_chain_has_no_margin():
     with pytest.raises(CountError, match="not confined to the left half-plane"):
         modulus_margin(Loop(((), (), 5.0), SINGLE, 2.0, 1.5), 1.3, 1.0)
+
+
+@pytest.mark.parametrize("gain", [1e-5, 1e-7, 1e-8, 1e-12, 1e-60])
+def test_a_weak_loop_breaks_far_away(gain):
+    # s + 1 + k (1 - c1 e1) has the real root 0 where k c1 = 1 + k.
+    one = Loop(((), (-1.0,), gain), SINGLE, 20.0, 20.0)
+    assert critical_perturbation(one, (1.0, 0.0)) == pytest.approx(1.0 / gain, rel=1e-9)
+    both = Loop(((), (-1.0,), gain), COMMON, 20.0, 19.0)
+    eps = critical_perturbation(both, (1.0, 0.0))
+    assert eps == pytest.approx(1.0 / gain, rel=1e-9)
+    assert unstable_roots(both, 1.0 + 0.999 * eps, 1.0) == 0
+    assert unstable_roots(both, 1.0 + 1.001 * eps, 1.0) > 0
+
+
+@pytest.mark.parametrize("size", [1e-310, 1e-300, 1e-150, 1e-8, 1e150, 1e300])
+@pytest.mark.parametrize("direction", [(1.0, 0.0), (0.5, -1.0)])
+def test_the_size_of_the_direction_does_not_matter(direction, size):
+    scaled_direction = tuple(size * d for d in direction)
+    ratio = np.abs(scaled_direction).max() / np.abs(direction).max()
+    expected = critical_perturbation(paper_loop(), direction) / ratio
+    assert critical_perturbation(paper_loop(), scaled_direction) == pytest.approx(
+        expected, rel=1e-9
+    )
+
+
+def test_a_component_without_effect_does_not_hide_the_other():
+    loop = Loop(((), (-1.0,), 0.3), SINGLE, 2.0, 1.5)
+    one = critical_perturbation(loop, (1.0, 0.0))
+    assert critical_perturbation(loop, (1e-200, 1e200)) == pytest.approx(one * 1e200, rel=1e-9)
+
+
+def test_a_result_beyond_all_floats_is_no_infinity():
+    loop = Loop(((), (-1.0,), 1e-8), COMMON, 20.0, 19.0)
+    with pytest.raises(ValueError, match="direction must be of a size for which the result is"):
+        critical_perturbation(loop, (1e-305, 0.0))
+    with pytest.raises(ValueError, match="direction must be of a size for which the result is"):
+        critical_perturbation(paper_loop(), (1e306, 0.0))
+
+
+def test_opposite_perturbations_of_equal_delays_cancel():
+    loop = Loop(((), (-1.0,), 0.3), COMMON, 20.0, 20.0)
+    assert critical_perturbation(loop, (1.0, -1.0)) == np.inf
+    # On the boundary from the start, and along it.
+    assert critical_perturbation(CommonArm(1.0, 20.0, 20.0), (1.0, -1.0)) == 0.0
+
+
+def test_roots_that_cross_just_below_the_limit_of_the_chain_come_first():
+    loop = paper_loop(0.19514549562262062 / 0.16687092308813156, 14.207314169676076, 14.04)
+    for direction in [(0.2, 1.04), (1.0, 1.0), (0.3, 1.0)]:
+        eps = critical_perturbation(loop, direction)
+        tries = eps * (1.0 - np.array([1e-5, 1e-6, 3e-7]))
+        counts = unstable_roots(loop, 1.0 + tries * direction[0], 1.0 + tries * direction[1])
+        assert (counts <= 0).all()
+        assert counts[0] == 0
+
+
+def test_a_negative_gain_has_the_limit_of_its_chain():
+    """1 - 0.2 k (2 - u - v) with |u|, |v| <= 1 vanishes first at k = 1 / 0.8."""
+    loop = Loop(Controller([], [], -0.2), COMMON, 20.1, 19.9)
+    lower, upper, omega = gain_interval(loop, 1.0, 1.0)
+    assert (lower, upper, omega) == (0.0, pytest.approx(1.25, rel=1e-12), np.inf)
+    assert unstable_roots(scaled(loop, 1.2499), 1.0, 1.0) == 0
+    assert unstable_roots(scaled(loop, 1.2501), 1.0, 1.0) == UNCONFINED
+
+
+def test_a_large_negative_gain_is_bounded_from_below():
+    """1 - 5 k (2 - 0.1 u - 0.1 v) has no zero where 9 k > 1, and has some just below."""
+    loop = Loop(Controller([], [], -5.0), COMMON, 20.1, 19.9)
+    lower, upper, _ = gain_interval(loop, 0.1, 0.1)
+    assert lower == pytest.approx(1.0 / 9.0, rel=1e-12)
+    assert upper == np.inf
+    for factor, expected in ((0.112, 0), (1.0, 0), (100.0, 0), (0.11, UNCONFINED)):
+        assert unstable_roots(scaled(loop, factor), 0.1, 0.1) == expected
+
+
+@pytest.mark.parametrize("wrong", [HayesEquation(), "loop", None, CommonArm, paper_loop, 3.0])
+@pytest.mark.parametrize(
+    "function",
+    [
+        margins,
+        modulus_margin,
+        lambda loop: critical_perturbation(loop, (1.0, 0.0)),
+        lambda loop: gain_interval(loop, 1.0, 1.0),
+    ],
+)
+def test_what_is_no_loop_has_no_margins(function, wrong):
+    with pytest.raises(TypeError, match=r"^loop must be a Loop, for instance CommonArm\(\), "):
+        function(wrong)
+
+
+def test_what_takes_too_long_to_follow_is_refused():
+    with pytest.raises(CountError, match="gain times delay is too large"):
+        modulus_margin(CommonArm(1e9), 0.9, 1.05)
