@@ -1,3 +1,4 @@
+import mpmath
 import numpy as np
 import pytest
 from hypothesis import given
@@ -8,9 +9,11 @@ from armlock import (
     CommonArm,
     DualArm,
     HayesEquation,
+    Loop,
     d_curve,
     d_curve_branches,
     d_curve_line,
+    paper_loop,
     semi_discretization,
     unstable_roots,
 )
@@ -166,3 +169,85 @@ def test_no_line_where_zero_frequency_does_not_depend_on_the_parameters():
     system = CharacteristicFunction([1.0, 1.0, 1.0], [0.0, 1.0], [0.0, 1.0], 1.0, 2.0)
     with pytest.raises(ValueError, match=r"^system must depend on a free parameter at s = 0"):
         d_curve_line(system)
+
+
+def exact_curve(system, omega):
+    """The point of the curve at a double taken as exact, with as many digits as it takes."""
+    with mpmath.workdps(40 + 2 * int(abs(np.log10(omega)))):
+        s = mpmath.mpc(0, mpmath.mpf(float(omega)))
+        z = mpmath.exp(s * mpmath.mpf(system.step)) if system.step else s
+        polynomials = system.rest, system.b1, system.b2
+        inverse = mpmath.mpf(1)
+        if isinstance(system, Loop):
+            # Its controller is given by zeros and poles.
+            k, m = system.controller, system.mapping
+            polynomials = m.denominator, m.numerator1, m.numerator2
+            inverse /= k.gain
+            for root in k.poles:
+                inverse *= s - mpmath.mpc(root)
+            for root in k.zeros:
+                inverse /= s - mpmath.mpc(root)
+        rest, b1, b2 = (
+            mpmath.polyval([mpmath.mpf(float(c)) for c in p], z, asc=True) for p in polynomials
+        )
+        rest *= inverse
+        x0, y0 = system.reference
+        a = rest + x0 * b1 + y0 * b2
+        late1 = b1 * mpmath.exp(-s * mpmath.mpf(system.delay1))
+        late2 = b2 * mpmath.exp(-s * mpmath.mpf(system.delay2))
+        determinant = mpmath.im(late1 * mpmath.conj(late2))
+        x = mpmath.im(a * mpmath.conj(late2)) / determinant
+        y = -mpmath.im(a * mpmath.conj(late1)) / determinant
+        return float(x), float(y), float(abs(determinant) / abs(late1 * late2))
+
+
+@pytest.mark.parametrize(
+    "system",
+    [
+        CommonArm(),
+        CommonArm(1.0, 20.1, 0.3),
+        DualArm(),
+        paper_loop(),
+        HayesEquation(0.7),
+        semi_discretization(CommonArm(), 0.1),
+    ],
+    ids=lambda system: type(system).__name__,
+)
+def test_the_curve_is_right_at_every_frequency(system):
+    rng = np.random.default_rng(5)
+    for omega in 10.0 ** rng.uniform(-9.0, 25.0, 80):
+        x, y = d_curve(system, omega)
+        exact_x, exact_y, sine = exact_curve(system, omega)
+        # The coefficients' own rounding is magnified next to a pole, beyond low frequencies.
+        allowed = 1e-11 if omega < 1e-2 else 1e-13 / sine
+        assert x == pytest.approx(exact_x, rel=allowed, abs=allowed)
+        assert y == pytest.approx(exact_y, rel=allowed, abs=allowed)
+
+
+@pytest.mark.parametrize(("system", "omega"), [(paper_loop(), 1e200), (paper_loop(), 1e-280)])
+def test_a_curve_beyond_the_floats_is_refused(system, omega):
+    with pytest.raises(ValueError, match=r"^omega must be of a size for which the curve is"):
+        d_curve(system, [1.0, omega])
+
+
+@pytest.mark.parametrize("wrong", ["x", None, CommonArm, 3.0])
+def test_what_is_no_system_has_no_curve(wrong):
+    for function in (
+        d_curve_line,
+        lambda s: d_curve(s, 1.0),
+        lambda s: d_curve_branches(s, 1.0),
+    ):
+        with pytest.raises(TypeError, match=r"^system must be a CharacteristicFunction"):
+            function(wrong)
+
+
+def test_more_samples_than_memory_holds_are_refused():
+    with pytest.raises(ValueError, match=r"^omega_max must be of a size that memory holds"):
+        d_curve_branches(CommonArm(), 1e12)
+
+
+def test_where_a_parameter_has_no_effect_the_curve_has_a_pole():
+    system = CharacteristicFunction([1.0, 1.0, 1.0], [4.0, 0.0, 1.0], [1.0], 1.0, 2.5)
+    x, y = d_curve(system, [1.9, 2.0, 2.1])
+    np.testing.assert_array_equal(np.isfinite(x), [True, False, True])
+    np.testing.assert_array_equal(np.isfinite(y), [True, False, True])

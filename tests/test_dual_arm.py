@@ -6,8 +6,12 @@ import pytest
 from armlock import (
     BOUNDARY,
     CommonArm,
+    Controller,
     DualArm,
+    Loop,
+    critical_perturbation,
     d_curve_line,
+    paper_loop,
     rightmost_root,
     semi_discretization,
     stability_chart,
@@ -15,6 +19,7 @@ from armlock import (
 )
 from armlock.claims import dual_arm
 from armlock.paper import DUAL_SENSOR_CORNER
+from armlock.sensors import COMMON
 from armlock.sweeps import first_crossing, ray_crossings, sweep
 from tests.independent import generator_eigenvalues, rectangle_count, spectral_count
 
@@ -136,6 +141,23 @@ def test_first_crossing_says_where_there_is_none():
     found = first_crossing(CommonArm(), (0.0, 0.0), (1.0, 1.0), 0.9)
     assert (found.position, found.change) == (np.inf, 0)
     assert np.isnan(found.omega)
+
+
+def test_a_lost_chain_is_not_passed_over():
+    """1 + 0.3 (2 - x u - y v): stable up to 0.3 (|x| + |y|) = 1.6, and lost from there on."""
+    loop = Loop(Controller([], [], 0.3), COMMON, 20.1, 19.9)
+    for function in (ray_crossings, first_crossing):
+        with pytest.raises(ValueError, match=r"^the ray must stay where the high-frequency"):
+            function(loop, (0.0, 0.0), (1.0, -1.0), 3.0)
+        with pytest.raises(ValueError, match=r"^the ray must stay where the high-frequency"):
+            function(loop, (6.0, 0.0), (0.0, 1.0), 1.0)
+    assert first_crossing(loop, (0.0, 0.0), (1.0, -1.0), 2.5).position == np.inf
+
+
+def test_a_crossing_before_the_chain_is_lost_is_found():
+    loop = paper_loop()
+    found = first_crossing(loop, (1.0, 1.0), (1.0, 0.0), 1.0)
+    assert found.position == pytest.approx(critical_perturbation(loop, (1.0, 0.0)), rel=1e-9)
 
 
 @pytest.mark.parametrize(

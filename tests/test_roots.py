@@ -1,3 +1,6 @@
+import pickle
+from typing import Any
+
 import mpmath
 import numpy as np
 import pytest
@@ -239,3 +242,70 @@ def test_roots_far_up_the_chain_are_found_to_the_right_of_slow_ones(system, poin
 
 def test_a_real_rightmost_root_has_no_imaginary_part():
     assert rightmost_root(paper_loop(actuator=True), 1.0, 1.0).imag == 0.0
+
+
+def test_a_root_so_far_right_that_delayed_terms_vanish_is_certified():
+    # Its chain is lost, but confined left of it: the real root is that of A alone.
+    a = [-0.3585, -0.0848, -0.4575, -2.4528, 0.02115]
+    b1, b2 = [0.1308, 0.238, -0.497, 0.172, 0.10785], [-0.884, -1.101, 0.238, -0.477, 0.5011]
+    system = CharacteristicFunction(a, b1, b2, 8.848, 3.975)
+    expected = np.roots(a[::-1]).real.max()
+    assert rightmost_root(system, 2.14, -0.5827) == pytest.approx(expected, rel=1e-12)
+
+
+def test_of_order_zero_the_chain_has_a_rightmost_root():
+    # 1 - x - y exp(-s), x = -5: exp(-s) = 6 / y.
+    system = CharacteristicFunction([1.0], [1.0], [1.0], 0.0, 1.0)
+    assert rightmost_root(system, -5.0, 2.0) == pytest.approx(-np.log(3.0), rel=1e-12)
+
+
+def test_where_numbers_overflow_it_is_a_root_error():
+    with pytest.raises(RootError) as caught:
+        rightmost_root(HayesEquation(), 0.0, 1e100)
+    again = pickle.loads(pickle.dumps(caught.value))
+    assert type(again) is RootError
+    assert str(again) == str(caught.value)
+    assert again.estimate == caught.value.estimate
+
+
+WRONG: dict[str, Any] = {"text": "1", "half": 2.5, "integer": np.int64(20)}
+
+
+@pytest.mark.parametrize(
+    ("function", "error", "message"),
+    [
+        (
+            lambda: polish_root(HayesEquation(), 0.0, WRONG["text"], 1j),
+            TypeError,
+            "^b must be a real number, got '1'",
+        ),
+        (
+            lambda: polish_root(HayesEquation(), 0.0, 1.0, np.nan),
+            ValueError,
+            "^start must be finite",
+        ),
+        (
+            lambda: polish_root(WRONG["text"], 0.0, 1.0, 1j),
+            TypeError,
+            "^system must be a CharacteristicFunction",
+        ),
+        (
+            lambda: pseudospectral_roots(HayesEquation(), 0.0, 1.0, WRONG["half"]),
+            ValueError,
+            r"^degree must be an integer from 2 on, got 2\.5",
+        ),
+        (
+            lambda: extended_root(HayesEquation(), 0.0, 1.0, 0.5, digits=0),
+            ValueError,
+            "^digits must be an integer from 1 on, got 0",
+        ),
+    ],
+)
+def test_bad_arguments_of_the_steps_are_named(function, error, message):
+    with pytest.raises(error, match=message):
+        function()
+
+
+def test_numpy_integers_are_integers():
+    found = pseudospectral_roots(HayesEquation(), 0.0, -1.0, WRONG["integer"])
+    np.testing.assert_array_equal(found, pseudospectral_roots(HayesEquation(), 0.0, -1.0, 20))

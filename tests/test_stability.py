@@ -1,4 +1,9 @@
 import itertools
+import os
+import pickle
+import subprocess
+import sys
+import time
 
 import mpmath
 import numpy as np
@@ -487,3 +492,118 @@ class TestTangentRows:
         assert chart.counts[0, 1] == between[0]
         assert chart.counts[1, 1] == between[1]
         np.testing.assert_array_equal(chart.counts[1, [0, 2]], outside.ravel())
+
+
+class TestExtremes:
+    """Coefficients, parameters and requests at the end of what doubles and machines hold."""
+
+    @pytest.mark.parametrize("scale", [1e-300, 1e-90, 1e-81, 1e-79, 1e-20, 1e80, 1e200, 1e300])
+    def test_a_common_factor_changes_no_count(self, scale):
+        x, y = np.array([1.0, 20.0, 5.0, -20.0, -35.0]), np.array([1.0, -3.0])
+        plain = CharacteristicFunction([1.0, 1.0], [0.1], [0.1], 1.0, 2.0)
+        system = CharacteristicFunction([scale, scale], [0.1 * scale], [0.1 * scale], 1.0, 2.0)
+        expected = unstable_roots(plain, x, y[:, None])
+        assert set(expected.ravel()) == {0, 1, 2}
+        np.testing.assert_array_equal(unstable_roots(system, x, y[:, None]), expected)
+        np.testing.assert_array_equal(stability_chart(system, x, y).counts, expected)
+
+    @pytest.mark.parametrize("small", [1e-200, 1e-60, 1e60, 1e200])
+    def test_a_parameter_takes_up_the_size_of_its_polynomial(self, small):
+        plain = CharacteristicFunction([1.0, 1.0], [0.1], [0.1], 1.0, 2.0)
+        system = CharacteristicFunction([1.0, 1.0], [0.1 * small], [0.1], 1.0, 2.0)
+        x, y = np.array([1.0, 20.0, 5.0, -20.0]), np.array([1.0, -30.0])
+        expected = unstable_roots(plain, x, y[:, None])
+        np.testing.assert_array_equal(unstable_roots(system, x / small, y[:, None]), expected)
+        np.testing.assert_array_equal(stability_chart(system, x / small, y).counts, expected)
+
+    @pytest.mark.parametrize("small", [1e-10, 1e-20, 1e-60, 1e-90, 1e-150, 1e-250])
+    @pytest.mark.parametrize("sign", [1, -1])
+    def test_a_tiny_highest_coefficient_adds_its_root(self, small, sign):
+        # Next to the roots without it, one at about -1 / (sign small).
+        plain = CharacteristicFunction([1.0, 1.0], [0.1], [0.1], 1.0, 2.0)
+        system = CharacteristicFunction([1.0, 1.0, sign * small], [0.1], [0.1], 1.0, 2.0)
+        for x in (1.0, 20.0, 5.0, -20.0):
+            expected = unstable_roots(plain, x, 1.0) + (sign < 0)
+            if small > 1e-100:
+                assert unstable_roots(system, x, 1.0) == expected
+            else:
+                with pytest.raises(CountError):
+                    unstable_roots(system, x, 1.0)
+
+    def test_without_a_delay_a_term_of_order_zero_has_its_sign(self):
+        # 1 - x - y exp(-s): all roots at Re s = log |y / (1 - x)|.
+        system = CharacteristicFunction([1.0], [1.0], [1.0], 0.0, 1.0)
+        x, y = np.array([-5.0, 0.0, 1.0, 1.9, 4.0]), np.array([-7.0, 0.5, 2.0, 6.1])
+        with np.errstate(divide="ignore"):
+            confined = np.log(np.abs(y[:, None] / (1.0 - x))) < 0.0
+        expected = np.where(confined, 0, UNCONFINED)
+        np.testing.assert_array_equal(unstable_roots(system, x, y[:, None]), expected)
+        np.testing.assert_array_equal(stability_chart(system, x, y).counts, expected)
+        assert set(expected.ravel()) == {0, UNCONFINED}
+
+    def test_a_delayed_term_of_order_zero_has_no_sign(self):
+        system = CharacteristicFunction([1.0], [1.0], [1.0], 1.0, 2.0)
+        counts = unstable_roots(system, [0.4, -0.4, -5.0, 0.5], [0.4, 0.5, 2.0, 0.5])
+        np.testing.assert_array_equal(counts, [0, 0, UNCONFINED, UNCONFINED])
+
+    @pytest.mark.parametrize(
+        ("system", "point"),
+        [
+            (HayesEquation(), (0.3, -1e9)),
+            (HayesEquation(), (0.3, -1e40)),
+            (CommonArm(1e10), (1.2, 1.05)),
+            (CommonArm(1e30), (1.2, 1.05)),
+        ],
+    )
+    def test_what_takes_too_long_is_refused_at_once(self, system, point):
+        stability_chart(HayesEquation(), [0.0], [0.5])
+        started = time.perf_counter()
+        with pytest.raises(CountError, match="times the delay is too large") as caught:
+            unstable_roots(system, *point)
+        np.testing.assert_array_equal(caught.value.points, [point])
+        with pytest.raises(CountError, match="times the delay is too large"):
+            stability_chart(system, [point[0], 0.0], [point[1], 0.0])
+        assert time.perf_counter() - started < 10.0
+
+    def test_a_large_undelayed_term_is_no_reason_to_refuse(self):
+        assert unstable_roots(HayesEquation(), -1e12, 1.0) == 0
+        assert unstable_roots(HayesEquation(), 1e9, 1.0) == 1
+        assert unstable_roots(CommonArm(1e12), 0.9, 1.05) == 0
+
+    def test_after_one_point_that_takes_too_long_no_other_is_tried(self):
+        with pytest.raises(CountError, match="too large") as caught:
+            unstable_roots(HayesEquation(), 0.3, np.full(100, -1e9))
+        assert 1 <= len(caught.value.points) <= 100
+
+    def test_requests_beyond_the_memory_are_refused_with_an_estimate(self):
+        many = np.linspace(-3.0, 3.0, 200_000)
+        message = r"^c1 and c2 must be of a size that memory holds, got 200000 x 200000 points"
+        with pytest.raises(ValueError, match=message):
+            stability_chart(CommonArm(), many, many)
+        with pytest.raises(ValueError, match=message):
+            unstable_roots(CommonArm(), many, many[:, None])
+
+    def test_the_error_passes_from_process_to_process(self):
+        again = pickle.loads(pickle.dumps(CountError("why", np.array([[1.0, 2.0]]))))
+        assert str(again) == "why"
+        np.testing.assert_array_equal(again.points, [[1.0, 2.0]])
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="only where processes fork")
+def test_forked_processes_count_after_threads_have():
+    code = """
+import multiprocessing, sys, warnings
+warnings.simplefilter("ignore")
+import numpy as np
+from armlock import CommonArm, stability_chart, unstable_roots
+x = np.linspace(-2.0, 2.0, 50)
+def both(_):
+    chart = stability_chart(CommonArm(), x, x).counts
+    return chart.tolist(), unstable_roots(CommonArm(), x, 0.3).tolist()
+expected = both(0)
+with multiprocessing.get_context("fork").Pool(2) as pool:
+    found = pool.map_async(both, range(4)).get(timeout=240)
+sys.exit(0 if found == [expected] * 4 else 3)
+"""
+    done = subprocess.run([sys.executable, "-c", code], timeout=300, capture_output=True)
+    assert done.returncode == 0, done.stderr.decode()

@@ -1,4 +1,6 @@
 import re
+from decimal import Decimal
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -18,8 +20,10 @@ from armlock import (
     unstable_roots,
 )
 from armlock.validation import (
+    affordable,
     axis,
     broadcast_pair,
+    complex_array,
     even_axis,
     positive_number,
     real_array,
@@ -273,3 +277,75 @@ def test_an_even_axis_ascends_in_equal_steps():
             even_axis("x", values)
     with pytest.raises(ValueError, match=r"^x must hold at least 2 values, got 1$"):
         even_axis("x", [1.0])
+
+
+@pytest.mark.parametrize("value", [Fraction(1, 2), Decimal("0.5"), np.float32(0.5)])
+def test_exact_numbers_are_numbers(value):
+    assert real_number("x", value) == 0.5
+    assert real_array("x", [value, 1]).tolist() == [0.5, 1.0]
+    assert complex_array("x", value)[()] == 0.5
+    assert CommonArm(gain=value).gain == 0.5
+
+
+def test_an_integer_of_any_length_is_a_number():
+    assert real_number("x", 10**30) == 1e30
+    assert unstable_roots(HayesEquation(), -(10**25), 1) == 0
+    with pytest.raises(ValueError, match=r"^x must be finite and within the range of a float"):
+        real_number("x", 10**400)
+    with pytest.raises(ValueError, match=r"^x must be finite, got inf$"):
+        real_number("x", np.longdouble("1e400"))
+    with pytest.raises(ValueError, match=r"^x must be finite, got nan$"):
+        real_number("x", Decimal("nan"))
+
+
+@pytest.mark.parametrize("value", [[True, 1.0], [1.0, np.False_], [[1.0], [True]], (2, True)])
+def test_true_and_false_do_not_hide_among_numbers(value):
+    for check in (real_array, complex_array):
+        with pytest.raises(TypeError, match=r"^x must hold numbers, got True or False among"):
+            check("x", value)
+
+
+def test_masked_arrays_are_refused_wherever_an_array_enters():
+    masked = np.ma.masked_array([0.9, 99.0], mask=[False, True])
+    for name, function in EVALUATIONS.items():
+        with pytest.raises(TypeError, match=f"^{name.split()[0]} must be an ordinary array"):
+            function(masked)
+    with pytest.raises(TypeError, match=r"^s must be an ordinary array"):
+        CommonArm()(masked, 1.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "message"),
+    [
+        ("1", TypeError, "^s must hold numbers, got dtype <U1$"),
+        (None, TypeError, "^s must hold numbers, got dtype object$"),
+        (True, TypeError, "^s must hold numbers, got dtype bool$"),
+        (
+            np.timedelta64(3, "s"),
+            TypeError,
+            r"^s must hold numbers, got dtype timedelta64\[s\]$",
+        ),
+        (np.datetime64("2020"), TypeError, r"^s must hold numbers, got dtype datetime64\[Y\]$"),
+        ([1.0, complex("nan")], ValueError, r"^s must be finite, got \(nan\+0j\) among its 2"),
+        ([[1.0], [1.0, 2.0]], ValueError, "^s must be a rectangular array"),
+    ],
+)
+def test_complex_arrays_hold_finite_numbers(value, error, message):
+    with pytest.raises(error, match=message):
+        complex_array("s", value)
+
+
+def test_dates_are_not_numbers():
+    for check in (real_number, real_array):
+        with pytest.raises(
+            TypeError, match=r"^x must (be a real number|hold real numbers), got"
+        ):
+            check("x", np.datetime64("2020-01-01"))
+
+
+def test_what_memory_does_not_hold_is_refused():
+    affordable("x", (1000, 1000), 8)
+    with pytest.raises(
+        ValueError, match=r"^x must be of a size that memory holds, got 10000000 x"
+    ):
+        affordable("x", (10_000_000, 10_000_000), 8)
