@@ -1,3 +1,5 @@
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -11,8 +13,9 @@ from armlock import (
     unstable_roots,
 )
 from armlock.controllers import integrating_actuator
-from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
+from armlock.sensors import COMMON, DIFFERENCE, SINGLE, SignalMapping, dual
 
+WRONG: dict[str, Any] = {"text": "no", "none": None}
 S = np.array([0.01j, 0.3 + 0.2j, -0.1 + 2j, 1.5])
 
 
@@ -96,3 +99,70 @@ def test_the_actuator_is_there_or_not(value):
         paper_loop(actuator=value)
     assert paper_loop(actuator=False).neutral
     assert not paper_loop(actuator=np.True_).neutral  # type: ignore[arg-type]
+
+
+def test_a_dual_arm_shows_corner_and_difference():
+    assert repr(DualArm(10.0, 20.1, 19.9, 2.5, difference=0.1)) == (
+        "DualArm(gain=10.0, tau1=20.1, tau2=19.9, corner=2.5, difference=0.1)"
+    )
+    assert DualArm().difference == 20.1 - 19.9
+
+
+def test_polynomials_of_different_length_share_their_zeros_at_zero():
+    # s / s in arm 1, nothing in arm 2: the same as a gain in arm 1 alone.
+    cancelled = SignalMapping((0.0, 1.0), (0.0,), (0.0, 1.0), "cancelled")
+    one, other = (
+        Loop(((), (-1.0,), 0.5), mapping, 2.0, 1.5) for mapping in (cancelled, SINGLE)
+    )
+    for name in ("rest", "b1", "b2"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+
+
+def test_zeros_in_front_of_a_denominator_do_not_make_a_loop_proper():
+    padded = SignalMapping((0.0, 1.0), (0.0,), (1.0, 0.0), "padded")
+    with pytest.raises(ValueError, match=r"m1 must be proper, got 1 zeros and 0 poles"):
+        Loop(((), (), 1.0), padded, 2.0, 1.5)
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "message"),
+    [
+        (
+            lambda k: Loop(k, WRONG["text"], 2.0, 1.5),
+            TypeError,
+            "^mapping must be a SignalMapping, ",
+        ),
+        (lambda k: Loop(k, WRONG["none"], 2.0, 1.5), TypeError, r"^mapping must .*, got None$"),
+        (
+            lambda k: Loop(k, SignalMapping([0.0], [0.0], [1.0], "none"), 2.0, 1.5),
+            ValueError,
+            "^mapping must not be zero: there would be no loop$",
+        ),
+        (
+            lambda k: Loop(k, COMMON, -2.0, 1.5),
+            ValueError,
+            r"^tau1 must be positive, got -2\.0$",
+        ),
+        (
+            lambda k: Loop(k, COMMON, 2.0, WRONG["text"]),
+            TypeError,
+            "^tau2 must be a real number, got 'no'$",
+        ),
+        (lambda k: Loop(((), (), -0.5), COMMON, 2.0, 1.5), ValueError, "not well posed"),
+        (lambda k: paper_loop(controller=3), TypeError, "^controller must be a Controller, "),
+        (
+            lambda k: paper_loop(actuator=WRONG["text"]),
+            TypeError,
+            "^actuator must be True or False",
+        ),
+    ],
+)
+def test_what_makes_no_loop_is_named(make, error, message):
+    with pytest.raises(error, match=message):
+        make(((), (-1.0,), 0.5))
+
+
+def test_a_controller_given_as_a_triple_takes_the_actuator():
+    one = paper_loop(controller=((), (-1.0,), 2.0), actuator=True)
+    other = paper_loop(controller=((), (-1.0, 0.0), 2.0))
+    np.testing.assert_array_equal(one.open_loop(S), other.open_loop(S))

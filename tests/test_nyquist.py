@@ -13,6 +13,7 @@ from armlock import (
     Controller,
     CountError,
     DualArm,
+    HayesEquation,
     Loop,
     SingleArm,
     axis_crossings,
@@ -358,3 +359,31 @@ def test_tiny_corners_of_a_controller_do_not_hide_its_pole_at_zero():
 def test_a_controllers_double_pole_meets_the_sensors():
     loop = Loop(Controller((0.0, 0.0), (-1.0, -1.0), 2.0), dual(2.0, 0.5), 2.0, 1.5)
     assert nyquist(loop, 0.9, 0.8).pole_order == 0
+
+
+@pytest.mark.parametrize("wrong", [HayesEquation(), "loop", None, CommonArm, paper_loop])
+@pytest.mark.parametrize(
+    "function", [nyquist, axis_crossings, lambda loop: frequency_response(loop, [1.0])]
+)
+def test_what_is_no_loop_has_no_open_loop(function, wrong):
+    with pytest.raises(TypeError, match=r"^loop must be a Loop, for instance CommonArm\(\), "):
+        function(wrong)
+
+
+def test_a_frequency_response_is_one_row():
+    with pytest.raises(
+        ValueError, match=r"^omega must be one-dimensional, got shape \(2, 2\)$"
+    ):
+        frequency_response(CommonArm(), np.ones((2, 2)))
+    one = frequency_response(CommonArm(), 0.3)
+    assert complex(one(0.3j)) == pytest.approx(complex(CommonArm().open_loop(0.3j)), rel=1e-12)
+
+
+def test_more_of_a_curve_than_memory_holds_is_refused():
+    with pytest.raises(ValueError, match=r"^omega_max must be of a size that memory holds"):
+        nyquist(CommonArm(), 0.9, 1.05, omega_max=1e12)
+
+
+def test_a_curve_that_takes_too_many_samples_is_refused():
+    with pytest.raises(CountError, match="gain times delay is too large"):
+        nyquist(CommonArm(1e9), 1.2, 1.05)

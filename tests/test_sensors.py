@@ -1,3 +1,5 @@
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -79,3 +81,46 @@ def test_delays_of_a_response_must_be_positive(name):
     arguments = {"tau1": 1.0, "tau2": 2.0, name: 0.0}
     with pytest.raises(ValueError, match=f"^{name} must be positive, got 0.0$"):
         sensors.COMMON.response(1j, **arguments)
+
+
+def test_a_mapping_keeps_what_it_was_given():
+    weights = [1.0, 2.0]
+    array: Any = np.array([1.0])
+    mapping = sensors.SignalMapping(weights, array, [1.0, 0.5, 0.0], "own")
+    weights[0] = 50.0
+    assert mapping.numerator1 == (1.0, 2.0)
+    assert mapping.denominator == (1.0, 0.5)
+    assert eval(repr(mapping), {"SignalMapping": sensors.SignalMapping}) == mapping
+    with pytest.raises(AttributeError, match="cannot assign"):
+        mapping.numerator1 = (3.0,)  # type: ignore[misc]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        (
+            ([1.0], [1.0], [0.0], "own"),
+            ValueError,
+            r"^denominator must not be zero, got \(0\.0,\)",
+        ),
+        (([1.0], [], [1.0], "own"), ValueError, "^numerator2 must hold at least one value"),
+        (("abc", [1.0], [1.0], "own"), TypeError, "^numerator1 must hold real numbers"),
+        (([np.nan], [1.0], [1.0], "own"), ValueError, "^numerator1 must be finite, got nan"),
+        (([1.0], [1.0], [1.0], 3), TypeError, "^name must be a string, got 3"),
+    ],
+)
+def test_what_is_no_mapping_is_named(arguments, error, message):
+    with pytest.raises(error, match=message):
+        sensors.SignalMapping(*arguments)
+
+
+def test_a_response_broadcasts_and_checks_its_perturbations():
+    c1 = np.array([[0.5], [0.9]])
+    response = sensors.COMMON.response(S, TAU1, TAU2, c1=c1)
+    assert response.shape == (2, 3)
+    expected = sensors.COMMON.response(S, TAU1, TAU2, c1=0.9)
+    np.testing.assert_array_equal(response[1], expected)
+    with pytest.raises(ValueError, match=r"^c1 must be finite, got nan"):
+        sensors.COMMON.response(S, TAU1, TAU2, c1=np.nan)
+    with pytest.raises(TypeError, match=r"^s must hold numbers"):
+        sensors.COMMON.weights("s")

@@ -289,7 +289,7 @@ def test_exact_numbers_are_numbers(value):
 
 def test_an_integer_of_any_length_is_a_number():
     assert real_number("x", 10**30) == 1e30
-    assert unstable_roots(HayesEquation(), -(10**25), 1) == 0
+    assert real_array("x", [10**30, 1]).tolist() == [1e30, 1.0]
     with pytest.raises(ValueError, match=r"^x must be finite and within the range of a float"):
         real_number("x", 10**400)
     with pytest.raises(ValueError, match=r"^x must be finite, got inf$"):
