@@ -33,6 +33,8 @@ _EPSILON = float(np.finfo(float).eps)
 _DEGREES = (60, 120, 240, 480, 960)
 # Most points of a line from which Newton's method starts.
 _POINTS_ALONG = 200_000
+# Digits that extended precision keeps besides those that are asked for.
+_GUARD_DIGITS = 40
 
 
 class RootError(RuntimeError):
@@ -162,7 +164,6 @@ def polish_root(
     name1, name2 = checked_system(system).parameters
     x, y = real_number(name1, x), real_number(name2, y)
     s = complex(complex_array("start", start)[()])
-    scale = 1.0 / max(system.longest_delay, _EPSILON)
     move = np.inf
     for _ in range(60):
         # A step far to the left overflows; such a start is given up below.
@@ -174,7 +175,8 @@ def polish_root(
         if slope == 0.0 or not np.isfinite(value):
             return s, np.inf
         before, move = move, abs(value / slope)
-        if move >= before and move < 1e-6 * max(abs(s), scale):
+        # Close to a multiple root the steps stop shrinking at the root of the rounding.
+        if move >= before and move < 1e-6 * abs(s):
             break
         s -= value / slope
         if move <= _EPSILON * abs(s):
@@ -234,7 +236,9 @@ def extended_root(
     """
     name1, name2 = checked_system(system).parameters
     x, y = real_number(name1, x), real_number(name2, y)
-    with mpmath.workdps(whole_number("digits", digits, 1)):
+    digits = whole_number("digits", digits, 1)
+    # Next to s = 0 the terms of D cancel, and take as many digits with them.
+    with mpmath.workdps(digits + _GUARD_DIGITS):
         s = mpmath.mpc(complex(complex_array("start", start)[()]))
         for _ in range(60):
             z, dz = s, mpmath.mpf(1)
@@ -257,8 +261,9 @@ def extended_root(
                 break
             move = value / slope
             s -= move
-            if abs(move) <= mpmath.mpf(10) ** (5 - digits) * abs(s):
-                return +s
+            if abs(move) <= mpmath.mpf(10) ** -digits * abs(s):
+                with mpmath.workdps(digits):
+                    return +s
     raise RootError(
         f"start={start} is not close enough to a root of {system!r}", complex(start)
     )
@@ -358,7 +363,9 @@ def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
     """Find the rightmost root at one point, or raise `RootError`."""
     system = _effective(system, x, y)
     best = complex(np.nan, np.nan)
-    for degree in _DEGREES:
+    # Where counts overflow no further degree leads to a certificate.
+    hopeless = np.isnan(last_crossing(system, x, y))
+    for degree in _DEGREES[:1] if hopeless else _DEGREES:
         eigenvalues = pseudospectral_roots(system, x, y, degree)
         starts = eigenvalues[eigenvalues.imag >= 0.0][:12]
         # Another round starts from the line through the best root so far.

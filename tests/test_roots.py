@@ -309,3 +309,27 @@ def test_bad_arguments_of_the_steps_are_named(function, error, message):
 def test_numpy_integers_are_integers():
     found = pseudospectral_roots(HayesEquation(), 0.0, -1.0, WRONG["integer"])
     np.testing.assert_array_equal(found, pseudospectral_roots(HayesEquation(), 0.0, -1.0, 20))
+
+
+def test_a_root_next_to_zero_is_that_of_the_factored_loop():
+    # Of the controlled loop with the actuator, in factors and forty digits.
+    loop = paper_loop(actuator=True)
+    with mpmath.workdps(60):
+        tau1, tau2, corner = (mpmath.mpf(v) for v in (20.1, 19.9, 2.0 * np.pi * 0.4))
+
+        def one_plus_open_loop(s):
+            controller = loop.controller
+            value = mpmath.mpf(float(controller.gain)) / s
+            for zero, pole in zip(controller.zeros, controller.poles, strict=True):
+                value *= (s - mpmath.mpc(zero)) / (s - mpmath.mpc(pole))
+            low_pass = corner / ((s + corner) * s * (tau1 - tau2))
+            late1, late2 = 1 - mpmath.exp(-s * tau1), 1 - mpmath.exp(-s * tau2)
+            return 1 + value * ((1 + low_pass) * late1 + (1 - low_pass) * late2)
+
+        exact = complex(mpmath.findroot(one_plus_open_loop, -7.1e-9))
+    for found in (
+        rightmost_root(loop, 1.0, 1.0),
+        polish_root(loop, 1.0, 1.0, -1e-8)[0],
+        complex(extended_root(loop, 1.0, 1.0, -7e-9)),
+    ):
+        assert abs(found - exact) < 1e-9 * abs(exact)
