@@ -29,6 +29,10 @@ from armlock.stability import (
 from armlock.sweeps import Ray
 from armlock.validation import ComplexArray, FloatArray, axis, real_number
 
+# Closer than 1e-6 to the limit of a chain the first crossing is looked for up to so many turns
+# of the longest delay, about a tenth of a second.
+_TURNS_BELOW_CHAIN = 50_000
+
 
 @dataclass(frozen=True)
 class Margins:
@@ -464,6 +468,10 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
     These frequencies are found with certified steps, up to ever larger eps: in a direction
     with an effect the delayed terms end up larger than all others, and break the loop.
 
+    Below the limit of a chain roots cross at ever higher frequency. Where the first of them
+    crosses closer to the limit than 1e-6 of it, and at more than 50 000 turns of the longest
+    delay, the limit is returned instead.
+
     Examples
     --------
     >>> from armlock import critical_perturbation, paper_loop
@@ -517,8 +525,11 @@ def _critical(loop: Loop, start: int, d1: float, d2: float) -> float:
     chain = _chain_limit(loop, d1, d2)
     reaches = scale * 10.0 ** np.array([-8.0, -6.0, -4.0, -2.0, *np.arange(0.0, 150.0)])
     # Just below the limit of the chain, roots cross at ever higher frequency.
-    closer = chain * np.array([1.0 - 1e-2, 1.0 - 1e-4, 1.0 - 1e-6, 1.0 - 1e-8, 1.0 - 1e-10])
+    closer = chain * (1.0 - np.array([1e-2, 1e-4, 1e-6, 1e-8, 1e-10]))
     for top in [*reaches[reaches < closer[0]], *closer[np.isfinite(closer)]]:
+        turns = ray.end(float(top)) * loop.longest_delay / (2.0 * np.pi)
+        if top > closer[2] and turns > _TURNS_BELOW_CHAIN:
+            break
         # A boundary at (1, 1) itself, at the lower bound, is not a crossing beyond it.
         found = ray.crossings(float(top), first=True, lowest=1e-15 * scale)
         if found.position.size:
