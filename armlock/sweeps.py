@@ -26,6 +26,8 @@ R = TypeVar("R", bound=tuple[Any, ...])
 _LONGER = 4.0
 # Halvings by which the end of a walk is placed on its ray.
 _HALVINGS = 40
+# The same into several parts.
+_DIVISIONS, _PARTS = 10, 16
 # Delay in s that stands in for none.
 _SHORTEST = 1e-12
 
@@ -69,6 +71,7 @@ class Ray:
                 raise ValueError(f"{name} must hold two numbers, got {value.size}")
         if not self.direction.any():
             raise ValueError("direction must not have length zero, got (0, 0)")
+        self.start_end = float(last_crossing(system, *self.start))
         pull = system.deviation(*self.direction)
         self.family = system.at(*self.start).times_conjugate(pull)
 
@@ -77,8 +80,12 @@ class Ray:
 
         |x B1| + |y B2| is convex along the ray, and thus largest at one of the two ends.
         """
-        ends = np.stack((self.start, self.start + t * self.direction))
-        return float(last_crossing(self.system, *ends.T).max())
+        return float(self.ends(np.array([t]))[0])
+
+    def ends(self, t: FloatArray) -> FloatArray:
+        """`end` at several t."""
+        points = self.start + t[:, None] * self.direction
+        return np.asarray(np.maximum(self.start_end, last_crossing(self.system, *points.T)))
 
     def unconfined(self, stop: float) -> ValueError:
         """Return the error for a ray on which a neutral loop's chain is lost."""
@@ -268,18 +275,27 @@ def _confined_until(ray: Ray, stop: float) -> float:
 
 
 def _reach(ray: Ray, limit: float, stop: float) -> float:
-    """Return a t up to which no root crosses at a frequency above `limit`."""
+    """Return a t up to which no root crosses at a frequency above `limit`.
+
+    It is within 1e-6 of the largest: what is left belongs to the next portion.
+    """
     if ray.end(stop) <= limit:
         return stop
     low, high = 0.0, stop
-    if ray.end(low) > limit:
+    if ray.start_end > limit:
         return 0.0
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        if ray.end(middle) <= limit:
-            low = middle
-        else:
-            high = middle
+    # Several at once, because a call costs as much as a dozen bounds.
+    shares = np.arange(1, _PARTS) / _PARTS
+    for _ in range(_DIVISIONS):
+        tried = low + (high - low) * shares
+        good = ray.ends(tried) <= limit
+        number = int(np.argmin(good)) if not good.all() else good.size
+        if number < good.size:
+            high = float(tried[number])
+        if number > 0:
+            low = float(tried[number - 1])
+        if high - low <= 1e-6 * low:
+            break
     return low
 
 
