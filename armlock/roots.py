@@ -164,6 +164,10 @@ def polish_root(
     name1, name2 = checked_system(system).parameters
     x, y = real_number(name1, x), real_number(name2, y)
     s = complex(complex_array("start", start)[()])
+    # Towards a root at s = 0 the steps would only end where the numbers do.
+    zero = 0.0
+    if system._value(np.zeros((), dtype=np.complex128), x, y) == 0.0:
+        zero = _EPSILON**2 / max(system.longest_delay, _EPSILON)
     move = np.inf
     for _ in range(60):
         # A step far to the left overflows; such a start is given up below.
@@ -179,6 +183,8 @@ def polish_root(
         if move >= before and move < 1e-6 * abs(s):
             break
         s -= value / slope
+        if abs(s) <= zero:
+            return 0j, 0.0
         if move <= _EPSILON * abs(s):
             break
     with np.errstate(over="ignore", invalid="ignore"):

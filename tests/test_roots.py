@@ -334,3 +334,10 @@ def test_a_root_next_to_zero_is_that_of_the_factored_loop():
         complex(extended_root(loop, 1.0, 1.0, -7e-9)),
     ):
         assert abs(found - exact) < 1e-9 * abs(exact)
+
+
+@pytest.mark.parametrize("start", [1e-9, -1e-7 + 1e-8j, 1e-3j, -3e-15])
+def test_a_root_at_zero_is_zero(start):
+    # Where the arms differ by nothing, the sensor's integral has its root at s = 0.
+    assert polish_root(DualArm(), 1.0, 1.0, start) == (0.0, 0.0)
+    assert rightmost_root(DualArm(), 1.0, 1.0) == 0.0
