@@ -241,7 +241,7 @@ function (box, data) {
     pen.fillStyle = pen.strokeStyle = style.color;
     pen.font = '13px sans-serif';
     const near = Math.max(Math.abs(x1 - 1), Math.abs(x0 - 1)) < 0.01;
-    const tick = v => near ? (v - 1 === 0 ? '0' : (v - 1).toExponential(0))
+    const tick = v => near ? (v - 1 === 0 ? '0' : (v - 1).toExponential(1).replace('.0e', 'e'))
       : String(+v.toPrecision(3));
     for (let k = 0; k < 5; k++) {
       pen.textAlign = 'center'; pen.textBaseline = 'top';
