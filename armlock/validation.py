@@ -96,19 +96,29 @@ def switch(name: str, value: object) -> bool:
     return bool(value)
 
 
-def real_array(name: str, value: object) -> FloatArray:
-    """Return `value` as a finite float array of any shape, or raise."""
+def _floats(name: str, value: object, *, copy: bool) -> FloatArray:
+    """Return `value` as a float array of any shape, finite or not, or raise."""
     array = _array(name, value)
     if np.iscomplexobj(array):
         raise TypeError(f"{name} must be real, got complex values (dtype {array.dtype})")
     if array.dtype.kind not in _REAL:
         raise TypeError(f"{name} must hold real numbers, got dtype {array.dtype}")
     with np.errstate(over="ignore"):
-        array = array.astype(np.float64)
+        return array.astype(np.float64, copy=copy)
+
+
+def _require_finite(name: str, array: npt.NDArray[Any]) -> None:
+    """Raise where a value is infinite or nan."""
     finite = np.isfinite(array)
     if not finite.all():
         first = array[~finite].ravel()[0]
         raise ValueError(f"{name} must be finite, got {first} among its {array.size} values")
+
+
+def real_array(name: str, value: object) -> FloatArray:
+    """Return `value` as a finite float array of any shape, or raise."""
+    array = _floats(name, value, copy=True)
+    _require_finite(name, array)
     return array
 
 
@@ -119,24 +129,15 @@ def complex_array(name: str, value: object) -> ComplexArray:
         raise TypeError(f"{name} must hold numbers, got dtype {array.dtype}")
     with np.errstate(over="ignore"):
         array = np.asarray(array, dtype=np.complex128)
-    finite = np.isfinite(array)
-    if not finite.all():
-        first = array[~finite].ravel()[0]
-        raise ValueError(f"{name} must be finite, got {first} among its {array.size} values")
+    _require_finite(name, array)
     return array
 
 
 def finite_series(name: str, value: object) -> FloatArray:
     """Return a one-dimensional array of finite floats; no copy where it is one already."""
-    array = _array(name, value)
-    if np.iscomplexobj(array):
-        raise TypeError(f"{name} must be real, got complex values (dtype {array.dtype})")
-    if array.dtype.kind not in _REAL:
-        raise TypeError(f"{name} must hold real numbers, got dtype {array.dtype}")
+    array = _floats(name, value, copy=False)
     if array.ndim != 1:
         raise ValueError(f"{name} must be one-dimensional, got shape {array.shape}")
-    with np.errstate(over="ignore"):
-        array = array.astype(np.float64, copy=False)
     # In parts, so that long series are not doubled in memory.
     for first in range(0, array.size, 1 << 20):
         finite = np.isfinite(array[first : first + (1 << 20)])
