@@ -619,20 +619,11 @@ def _squared(
 
 @njit(cache=True)
 def _fill_row(
-    counts: IntArray,
-    doubtful: BoolArray,
-    last: IntArray,
-    i: int,
-    model: tuple[Any, ...],
-    ends: FloatArray,
-    y: FloatArray,
-    deviation: FloatArray,
-    base: IntArray,
-    x: FloatArray,
-    lower: FloatArray,
-    upper: FloatArray,
+    filled: tuple[Any, ...], model: tuple[Any, ...], rows: tuple[Any, ...], i: int
 ) -> None:
     """Fill row i of a chart, see `fill_rows`."""
+    counts, doubtful, last = filled
+    ends, y, deviation, base, x, lower, upper = rows
     fixed, varying, fixed_sums, varying_sums, phases, norm, is_map = model
     fastest = np.abs(phases).max()
     coefficients = fixed - y[i] * varying
@@ -678,38 +669,18 @@ def _fill_row(
 
 @njit(cache=True, parallel=True)
 def _fill_on_all_cores(
-    counts: IntArray,
-    doubtful: BoolArray,
-    last: IntArray,
-    model: tuple[Any, ...],
-    ends: FloatArray,
-    y: FloatArray,
-    deviation: FloatArray,
-    base: IntArray,
-    x: FloatArray,
-    lower: FloatArray,
-    upper: FloatArray,
+    filled: tuple[Any, ...], model: tuple[Any, ...], rows: tuple[Any, ...]
 ) -> None:
-    for i in prange(y.size):
-        _fill_row(counts, doubtful, last, i, model, ends, y, deviation, base, x, lower, upper)
+    for i in prange(rows[0].size):
+        _fill_row(filled, model, rows, i)
 
 
 @njit(cache=True)
 def _fill_on_one_core(
-    counts: IntArray,
-    doubtful: BoolArray,
-    last: IntArray,
-    model: tuple[Any, ...],
-    ends: FloatArray,
-    y: FloatArray,
-    deviation: FloatArray,
-    base: IntArray,
-    x: FloatArray,
-    lower: FloatArray,
-    upper: FloatArray,
+    filled: tuple[Any, ...], model: tuple[Any, ...], rows: tuple[Any, ...]
 ) -> None:
-    for i in range(y.size):
-        _fill_row(counts, doubtful, last, i, model, ends, y, deviation, base, x, lower, upper)
+    for i in range(rows[0].size):
+        _fill_row(filled, model, rows, i)
 
 
 def fill_rows(
@@ -736,7 +707,7 @@ def fill_rows(
     doubtful = np.zeros((y.size, x.size), dtype=np.bool_)
     last = np.empty(y.size, dtype=np.int64)
     fill = _fill_on_one_core if _forked else _fill_on_all_cores
-    fill(counts, doubtful, last, model, ends, y, deviation, base, x, lower, upper)
+    fill((counts, doubtful, last), model, (ends, y, deviation, base, x, lower, upper))
     return counts, doubtful, last
 
 
