@@ -81,6 +81,21 @@ class _Balanced(NamedTuple):
     weight_x: float
     weight_y: float
 
+    def x(self, values: FloatArray) -> FloatArray:
+        """Return values of x in its parameter, nan where they leave the doubles."""
+        return _weighted(values, self.weight_x)
+
+    def y(self, values: FloatArray) -> FloatArray:
+        """Return values of y in its parameter, nan where they leave the doubles."""
+        return _weighted(values, self.weight_y)
+
+
+def _weighted(values: FloatArray, weight: float) -> FloatArray:
+    with np.errstate(over="ignore", under="ignore"):
+        found = values * weight
+        kept = np.isfinite(found) & (found / weight == values)
+    return np.where(kept, found, np.nan)
+
 
 @lru_cache(maxsize=64)
 def _balanced(system: CharacteristicFunction) -> _Balanced:
@@ -207,20 +222,6 @@ def squares_and_leads(
     return squares, leads, float(np.ldexp(1.0, exponent))
 
 
-def _scaled_points(
-    system: CharacteristicFunction, x: FloatArray, y: FloatArray
-) -> tuple[CharacteristicFunction, FloatArray, FloatArray]:
-    """Return a balanced system and its parameters, nan where these leave the doubles."""
-    balanced, *weights = _balanced(system)
-    scaled = []
-    for values, weight in zip((x, y), weights, strict=True):
-        with np.errstate(over="ignore", under="ignore"):
-            found = values * weight
-            kept = np.isfinite(found) & (found / weight == values)
-        scaled.append(np.where(kept, found, np.nan))
-    return balanced, scaled[0], scaled[1]
-
-
 def _constant_confined(
     system: CharacteristicFunction, x: npt.ArrayLike, y: npt.ArrayLike
 ) -> BoolArray:
@@ -280,13 +281,13 @@ def last_crossing(
         return np.full(xs.shape, np.pi / system.step)
     if _of_order_zero(system):
         return np.where(_constant_confined(system, xs, ys), 0.0, np.inf)
-    system, xs, ys = _scaled_points(system, xs, ys)
-    compiled = _compiled(system)
+    balanced = _balanced(system)
+    compiled = _compiled(balanced.system)
     ends = [
         contour.last_crossing_bound(
             compiled.squares, compiled.leads, compiled.unit, float(p), float(q)
         )
-        for p, q in zip(xs.flat, ys.flat, strict=True)
+        for p, q in zip(balanced.x(xs).flat, balanced.y(ys).flat, strict=True)
     ]
     return np.array(ends, dtype=np.float64).reshape(xs.shape)
 
@@ -319,10 +320,9 @@ def _count(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -> IntA
     """Count at flat arrays of points; raise where rounding spoils it."""
     if _of_order_zero(system):
         return np.where(_constant_confined(system, x, y), 0, UNCONFINED).astype(np.int64)
-    balanced, xs, ys = _scaled_points(system, x, y)
-    counts = contour.count_points(
-        tuple(_compiled(balanced)), np.ascontiguousarray(xs), np.ascontiguousarray(ys)
-    )
+    balanced = _balanced(system)
+    model = tuple(_compiled(balanced.system))
+    counts = contour.count_points(model, balanced.x(x), balanced.y(y))
     bad = (counts == contour.DOUBTFUL) | (counts == contour.TOO_LONG)
     if bad.any():
         points = np.column_stack((x[bad], y[bad]))
@@ -581,11 +581,9 @@ def _walk(
     upper: FloatArray,
 ) -> tuple[IntArray, BoolArray, IntArray]:
     """Fill rows from their crossings, starting with the counts `base` at x = lower."""
-    balanced = _balanced(system).system
-    columns = _scaled_points(system, x, np.zeros(1))[1]
-    lower, upper = (_scaled_points(system, ends, y)[1] for ends in (lower, upper))
-    _, _, y = _scaled_points(system, np.zeros(1), y)
-    system = balanced
+    balanced = _balanced(system)
+    system, y = balanced.system, balanced.y(y)
+    x, lower, upper = (balanced.x(values) for values in (x, lower, upper))
     a, b1, b2 = system.on_boundary()
     rest = system.rest_on_boundary()
     # Delays left out, N = A - y B2 is rest + x0 B1 at the reference, exactly.
@@ -614,10 +612,9 @@ def _walk(
         norm,
         system.step > 0.0,
     )
-    y, x = np.ascontiguousarray(y), np.ascontiguousarray(columns)
     deviation = y - system.reference[1]
     filled = contour.fill_rows(
         model, ends, y, deviation, np.ascontiguousarray(base), x, lower, upper
     )
-    filled[1][:, np.isnan(columns)] = True
+    filled[1][:, np.isnan(x)] = True
     return filled
