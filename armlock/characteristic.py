@@ -299,6 +299,29 @@ class CharacteristicFunction:
             np.asarray(poly.polyval(z, self.b2) * np.exp(-s * self.delay2)),
         )
 
+    def values_up_to_a_factor(
+        self, z: ComplexArray
+    ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        """Evaluate `rest`, B1 and B2 as polynomials, up to a factor that all three share.
+
+        A root does not depend on the factor, so that a subclass may divide by what rounding
+        would spoil.
+
+        Parameters
+        ----------
+        z : complex array
+            The frequency s, or exp(s step) for a map.
+
+        Returns
+        -------
+        tuple of three complex arrays, shaped like `z`
+        """
+        rest, b1, b2 = (
+            np.asarray(poly.polyval(z, p), dtype=np.complex128)
+            for p in (self.rest, self.b1, self.b2)
+        )
+        return rest, b1, b2
+
     def __call__(self, s: npt.ArrayLike, x: npt.ArrayLike, y: npt.ArrayLike) -> ComplexArray:
         """Evaluate D(s; x, y); the three arguments broadcast.
 

@@ -12,11 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numpy.polynomial import polynomial as poly
 
 from armlock.characteristic import CharacteristicFunction, checked_system
-from armlock.controllers import Controller
-from armlock.loops import Loop
 from armlock.stability import sign_changes
 from armlock.validation import ComplexArray, FloatArray, affordable, positive_number, real_array
 
@@ -97,31 +94,6 @@ def _turned_apart(omega: FloatArray, system: CharacteristicFunction) -> ComplexA
     return np.asarray(whole + rest + whole * rest)
 
 
-def _terms(
-    system: CharacteristicFunction, omega: FloatArray
-) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """Evaluate `rest`, B1 and B2 at j omega, for a loop divided by its controller's numerator.
-
-    As factors the controller is known to rounding, where its coefficients are not.
-    """
-    z = np.asarray(1.0 + _turned(omega, system.step) if system.step else 1j * omega)
-    polynomials = system.rest, system.b1, system.b2
-    own: list[ComplexArray] = [np.asarray(poly.polyval(z, p)) for p in polynomials]
-    if not isinstance(system, Loop):
-        return own[0], own[1], own[2]
-    k, m = system.controller, system.mapping
-    # At a zero of the controller only the product tells.
-    apart = np.isin(z, k.zeros) | ~np.isfinite(z)
-    inverse = Controller(k.poles, k.zeros, 1.0)(np.where(apart, 1.0, z)) / k.gain
-    divided = (
-        inverse * poly.polyval(z, np.array(m.denominator)),
-        poly.polyval(z, np.array(m.numerator1)),
-        poly.polyval(z, np.array(m.numerator2)),
-    )
-    rest, b1, b2 = (np.where(apart, p, q) for p, q in zip(own, divided, strict=True))
-    return rest, b1, b2
-
-
 def d_curve(
     system: CharacteristicFunction, omega: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray]:
@@ -199,7 +171,8 @@ def d_curve(
     _require_two_parameters(system)
     x0, y0 = system.reference
     with np.errstate(over="ignore", under="ignore", invalid="ignore", divide="ignore"):
-        rest, b1, b2 = _terms(system, omega)
+        z = np.asarray(1.0 + _turned(omega, system.step) if system.step else 1j * omega)
+        rest, b1, b2 = system.values_up_to_a_factor(z)
         late1, late2 = _turned(omega, -system.delay1), _turned(omega, -system.delay2)
         # D at the reference, where nothing cancels; from there both parameters are solved for.
         known = rest - b1 * x0 * late1 - b2 * y0 * late2

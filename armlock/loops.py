@@ -158,6 +158,35 @@ class Loop(CharacteristicFunction):
             f"tau1={self.tau1}, tau2={self.tau2})"
         )
 
+    def values_up_to_a_factor(
+        self, z: ComplexArray
+    ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        """Evaluate `rest`, B1 and B2, divided by the controller's numerator.
+
+        As factors the controller is known to rounding, where its coefficients are not.
+
+        Parameters
+        ----------
+        z : complex array
+            In rad/s.
+
+        Returns
+        -------
+        tuple of three complex arrays, shaped like `z`
+        """
+        own = super().values_up_to_a_factor(z)
+        k, m = self.controller, self.mapping
+        # At a zero of the controller only the product tells.
+        apart = np.isin(z, k.zeros) | ~np.isfinite(z)
+        inverse = Controller(k.poles, k.zeros, 1.0)(np.where(apart, 1.0, z)) / k.gain
+        divided = (
+            inverse * poly.polyval(z, np.array(m.denominator)),
+            poly.polyval(z, np.array(m.numerator1)),
+            poly.polyval(z, np.array(m.numerator2)),
+        )
+        rest, b1, b2 = (np.where(apart, p, q) for p, q in zip(own, divided, strict=True))
+        return rest, b1, b2
+
     def open_loop(
         self, s: npt.ArrayLike, c1: npt.ArrayLike = 1.0, c2: npt.ArrayLike = 1.0
     ) -> ComplexArray:
