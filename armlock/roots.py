@@ -167,7 +167,7 @@ def polish_root(
     # Towards a root at s = 0 the steps would only end where the numbers do.
     zero = 0.0
     if system._value(np.zeros((), dtype=np.complex128), x, y) == 0.0:
-        zero = _EPSILON**2 / max(system.longest_delay, _EPSILON)
+        zero = _EPSILON**2 * _per_delay(system)
     move = np.inf
     for _ in range(60):
         # A step far to the left overflows; such a start is given up below.
@@ -275,9 +275,14 @@ def extended_root(
     )
 
 
+def _per_delay(system: CharacteristicFunction) -> float:
+    """One over the longest delay, in rad/s; a large number where there is none."""
+    return 1.0 / max(system.longest_delay, _EPSILON)
+
+
 def _resolution(system: CharacteristicFunction, root: complex) -> float:
     """Shift to the right of a root by which a count can tell it from others, in rad/s."""
-    return 1e-11 * max(abs(root), 1.0 / max(system.longest_delay, _EPSILON))
+    return 1e-11 * max(abs(root), _per_delay(system))
 
 
 def _certified(
@@ -290,12 +295,12 @@ def _certified(
         for value, delay in ((x, system.delay1), (y, system.delay2))
     )
     system = _effective(system, x, y)
-    scale = 1e11 * _resolution(system, root)
-    margin = max(_resolution(system, root), 10.0 * error)
+    resolution = _resolution(system, root)
+    margin = max(resolution, 10.0 * error)
     # Farther left than this the shifted function overflows.
     if -root.real * system.longest_delay > 600.0:
         return False
-    while margin <= 1e-6 * scale:
+    while margin <= 1e5 * resolution:
         try:
             count = int(unstable_roots(system.shifted(root.real + margin), x, y))
         except (CountError, ValueError):
@@ -341,7 +346,7 @@ def _starts_along(
     Roots far up a loop's high-frequency chain lie close to a line, and beyond what a polynomial
     of affordable degree resolves.
     """
-    spacing = 0.5 / max(system.longest_delay, _EPSILON)
+    spacing = 0.5 * _per_delay(system)
     try:
         last = float(last_crossing(system.shifted(sigma), x, y))
     except ValueError:

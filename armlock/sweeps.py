@@ -241,10 +241,10 @@ def first_crossing(
     0.254006 3.7746 2
     """
     ray, stop = Ray(system, start, direction), positive_number("stop", stop)
-    if ray.end(0.0) == np.inf:
+    limit = ray.start_end
+    if limit == np.inf:
         raise ray.unconfined(0.0)
     within = _confined_until(ray, stop)
-    limit = ray.end(0.0)
     limit = _LONGER * limit if limit > 0.0 else 1.0 / max(system.longest_delay, _SHORTEST)
     last = 0.0
     while last < within:
