@@ -11,9 +11,8 @@ import numpy as np
 
 from armlock.claims.controller import (
     SUPPRESSION_BAND,
-    assumed_requirement,
-    free_running,
     highest_corner,
+    noise_to_spare,
     suppression,
 )
 from armlock.claims.simulation import (
@@ -321,9 +320,8 @@ def _seeds() -> Assumption:
 
 def _requirement() -> Assumption:
     frequency = np.geomspace(*SUPPRESSION_BAND, 20_001)
-    allowed = assumed_requirement(frequency) * suppression(frequency)
-    spare = float(np.min(allowed / free_running(frequency)))
-    free = float(np.min(allowed * frequency / FREE_RUNNING))
+    spare = float(np.min(noise_to_spare(frequency)))
+    free = spare * LASER_NOISE / FREE_RUNNING
     return Assumption(
         "The basic noise requirement that g = 5000 meets",
         "30 √(1 + (2.8 mHz / f)⁴) Hz/√Hz for the locked laser",

@@ -16,6 +16,7 @@ from armlock.nyquist import AxisCrossings, axis_crossings, nyquist
 from armlock.paper import (
     CONTROLLER_GAIN,
     DUAL_SENSOR_CORNER,
+    LASER_NOISE,
     PERTURBATION,
     TABLE_2_POLES,
     TABLE_2_STAGE_1_POLE,
@@ -358,7 +359,7 @@ def unity_gain(point: str) -> tuple[float, float]:
 
 def free_running(frequency: FloatArray) -> FloatArray:
     """Amplitude spectral density of the free-running laser in Hz/sqrt(Hz), Sec. IV.C."""
-    return 30.0 / frequency
+    return LASER_NOISE / frequency
 
 
 def assumed_requirement(frequency: FloatArray) -> FloatArray:
@@ -369,6 +370,11 @@ def assumed_requirement(frequency: FloatArray) -> FloatArray:
 def suppression(frequency: FloatArray, c1: float = 1.0, c2: float = 1.0) -> FloatArray:
     """Return |1 + L|, by which the controlled loop divides the laser's noise."""
     return np.asarray(np.abs(1.0 + response(frequency, c1, c2)))
+
+
+def noise_to_spare(frequency: FloatArray) -> FloatArray:
+    """Return how many times the locked laser meets `assumed_requirement`, at c1 = c2 = 1."""
+    return assumed_requirement(frequency) * suppression(frequency) / free_running(frequency)
 
 
 def shape(frequency: float) -> complex:
@@ -695,7 +701,7 @@ def basic_requirement() -> Finding:
     frequency = _dense(SUPPRESSION_BAND)
     low, high = SUPPRESSION_BAND
     divided = suppression(frequency)
-    spare = assumed_requirement(frequency) * divided / free_running(frequency)
+    spare = noise_to_spare(frequency)
     k = int(spare.argmin())
     science = suppression(_dense(SCIENCE_BAND))
     return Finding(
