@@ -287,8 +287,8 @@ def _order(value: object) -> int:
 
 def _check_rate(loop: Loop, sample_rate: float) -> None:
     """Refuse a rate at which a pole or zero would change its nature."""
-    mapping = np.trim_zeros(np.asarray(loop.mapping.denominator, dtype=float), "b")
-    roots = (*loop.controller.zeros, *loop.controller.poles, *np.roots(mapping[::-1]))
+    mapping = np.roots(loop.mapping.denominator[::-1])
+    roots = (*loop.controller.zeros, *loop.controller.poles, *mapping)
     fastest = max((abs(root) for root in roots), default=0.0)
     if sample_rate <= fastest / 2.0:
         raise ValueError(
