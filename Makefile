@@ -30,7 +30,7 @@ empty :=
 space := $(empty) $(empty)
 find-sources = $(shell find $(wildcard $(1)) -type f \
 	-not -name '*.pyc' -not -name '*.nbi' -not -name '*.nbc' -not -path '*/.*' | sort)
-PACKAGE_SOURCES := $(call find-sources,armlock)
+PACKAGE_SOURCES := $(call find-sources,armlock book/companion)
 BOOK_SOURCES := $(PACKAGE_SOURCES) $(call find-sources,book notebooks) tools/check_html.py
 TEST_SOURCES := $(PACKAGE_SOURCES) $(call find-sources,notebooks tests benchmarks book tools) \
 	$(call find-sources,binder) pyproject.toml environment.txt README.md codecheck.yml
@@ -91,7 +91,7 @@ $(INDEX): $(PACKAGE_READY) $(BOOK_SOURCES) build/book-sources $(if $(FORCE),alwa
 	@touch build/book-started
 	@rm -rf build/_build
 	@echo "Checking every claim of the paper: build/claims.txt ..."
-	@$(PY) -m armlock.claims build/_build/html/figures > build/claims.txt
+	@$(PY) -m book.companion.claims build/_build/html/figures > build/claims.txt
 	ARMLOCK_FIGURES="$(CURDIR)/build/_build/html/figures" \
 		$(VENV)/bin/jupyter-book build . --all --config book/_config.yml --toc book/_toc.yml \
 		--path-output build -W -n --keep-going
@@ -126,7 +126,7 @@ $(TESTS_PASSED): $(PACKAGE_READY) $(TEST_SOURCES) build/test-sources $(if $(FORC
 	@rm -rf build/figures-of-tests
 	@echo "Checking every claim of the paper: build/claims.txt ..."
 	@mkdir -p build
-	@$(PY) -m armlock.claims build/figures-of-tests > build/claims.txt
+	@$(PY) -m book.companion.claims build/figures-of-tests > build/claims.txt
 	ARMLOCK_FIGURES="$(CURDIR)/build/figures-of-tests" \
 		$(PY) -m pytest --nbmake --numprocesses auto --maxprocesses 4 --dist worksteal
 	@date '+%Y-%m-%d %H:%M:%S' > $@
@@ -134,7 +134,7 @@ $(TESTS_PASSED): $(PACKAGE_READY) $(TEST_SOURCES) build/test-sources $(if $(FORC
 	@touch build/tests-ran
 
 claims: $(PACKAGE_READY) ## Check every claim; print the ledger, write it as CSV and JSON
-	$(PY) -m armlock.claims build/claims
+	$(PY) -m book.companion.claims build/claims
 
 bench: $(PACKAGE_READY) ## Measure speed and memory, and print a table
 	$(PY) -m benchmarks

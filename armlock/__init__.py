@@ -4,7 +4,7 @@ The reproducible companion to "Robustness Analysis and Controller Design of Arm-
 System in Space-based Gravitational Wave Detectors".
 
 The loops over points and rows run on all cores. Spread over processes of one's own they are
-best started with the method "spawn" or "forkserver" (`armlock.sweeps.sweep` has an example):
+best started with the method "spawn" or "forkserver" (`armlock.rays.sweep` has an example):
 the threads of a process do not survive a fork, and a forked process works on one core.
 """
 
@@ -16,7 +16,7 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 from armlock.characteristic import CharacteristicFunction
 from armlock.controllers import Controller
-from armlock.dsubdivision import d_curve, d_curve_branches, d_curve_line
+from armlock.dcurve import d_curve, d_curve_branches, d_curve_line
 from armlock.loops import CommonArm, DualArm, HayesEquation, Loop, SingleArm, paper_loop
 from armlock.margins import Margins, critical_perturbation, margins, modulus_margin
 from armlock.noise import LaserNoise, PerturbationNoise, ShapedNoise

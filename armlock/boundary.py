@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from armlock.characteristic import CharacteristicFunction
+from armlock.checks import FloatArray, positive_number, real_array, whole_number
 from armlock.stability import unstable_roots
-from armlock.validation import FloatArray, positive_number, real_array, whole_number
 
 # Halvings of the bracket: from a reach of some units to about 1e-9.
 _HALVINGS = 33

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numba import njit, prange
 
-from armlock.validation import BoolArray, ComplexArray, FloatArray, IntArray
+from armlock.checks import BoolArray, ComplexArray, FloatArray, IntArray
 
 EPSILON = 2.0**-52
 # Rounding errors of one evaluation, in units of EPSILON times the sum of magnitudes.

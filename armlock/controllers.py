@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from armlock import paper
-from armlock.validation import (
+from armlock.checks import (
     ComplexArray,
     FloatArray,
     complex_array,

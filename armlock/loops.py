@@ -19,9 +19,9 @@ from numpy.polynomial import polynomial as poly
 
 from armlock import paper, sensors
 from armlock.characteristic import CharacteristicFunction
+from armlock.checks import ComplexArray, positive_number, real_number, true_or_false
 from armlock.controllers import Controller, integrating_actuator, table_two
 from armlock.sensors import SignalMapping
-from armlock.validation import ComplexArray, positive_number, real_number, switch
 
 
 class HayesEquation(CharacteristicFunction):
@@ -424,7 +424,7 @@ def paper_loop(
     array([0, 0])
     """
     chosen = table_two() if controller is None else Controller.of(controller)
-    if switch("actuator", actuator):
+    if true_or_false("actuator", actuator):
         chosen = chosen * integrating_actuator()
     mapping = sensors.dual(corner, _delay_difference(tau1, tau2, difference))
     return Loop(chosen, mapping, tau1, tau2)

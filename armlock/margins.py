@@ -16,9 +16,11 @@ from numpy.polynomial import polynomial as poly
 from scipy.optimize import brentq, minimize_scalar
 
 from armlock.characteristic import ExponentialSum
+from armlock.checks import ComplexArray, FloatArray, axis, real_number
 from armlock.controllers import Controller
 from armlock.loops import Loop, checked_loop
 from armlock.nyquist import loop_numerator, reach, resolving_grid
+from armlock.rays import Ray
 from armlock.stability import (
     BOUNDARY,
     CountError,
@@ -26,8 +28,6 @@ from armlock.stability import (
     sign_changes,
     unstable_roots,
 )
-from armlock.sweeps import Ray
-from armlock.validation import ComplexArray, FloatArray, axis, real_number
 
 # Closer than 1e-6 to the limit of a chain the first crossing is looked for up to so many turns
 # of the longest delay, about a tenth of a second.

@@ -18,9 +18,9 @@ from numba.cpython.unsafe.tuple import tuple_setitem
 from scipy.linalg import solve_continuous_lyapunov
 
 from armlock import paper
+from armlock.checks import FloatArray, positive_number, real_number, true_or_false, whole_number
 from armlock.controllers import Controller
-from armlock.sampled import Row, checked_frequency, floats, real_system, sample, warped
-from armlock.validation import FloatArray, positive_number, real_number, switch, whole_number
+from armlock.discretize import Row, checked_frequency, floats, real_system, sample, warped
 
 #: Half the number of samples over which the laser's noise is smoothed, see `LaserNoise`.
 _REACH = 12
@@ -70,7 +70,7 @@ class ShapedNoise:
 
         \text{asd}_T(f) = \text{asd} \left( \frac{\tan \pi f T}{\pi T} \right) ,
 
-    see `armlock.sampled.warped`. One draw and many give the same series, bit by bit.
+    see `armlock.discretize.warped`. One draw and many give the same series, bit by bit.
 
     Examples
     --------
@@ -101,7 +101,7 @@ class ShapedNoise:
             if pole.real >= 0.0:
                 raise ValueError(f"poles must lie in the left half-plane, got {pole} rad/s")
         self.seed = whole_number("seed", seed, 0)
-        self.at_rest = switch("at_rest", at_rest)
+        self.at_rest = true_or_false("at_rest", at_rest)
         self._random = np.random.default_rng(self.seed)
         continuous = real_system(self._filter.zeros, self._filter.poles, self._filter.gain)
         self._sampled = sample(continuous, self.sample_rate)

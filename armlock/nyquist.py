@@ -18,6 +18,14 @@ from numpy.polynomial import polynomial as poly
 
 from armlock import contour
 from armlock.characteristic import ExponentialSum
+from armlock.checks import (
+    ComplexArray,
+    FloatArray,
+    check_memory,
+    positive_number,
+    real_array,
+    real_number,
+)
 from armlock.loops import Loop, checked_loop
 from armlock.stability import (
     BOUNDARY,
@@ -27,14 +35,6 @@ from armlock.stability import (
     sign_changes,
     squares_and_leads,
     unstable_roots,
-)
-from armlock.validation import (
-    ComplexArray,
-    FloatArray,
-    affordable,
-    positive_number,
-    real_array,
-    real_number,
 )
 
 if TYPE_CHECKING:
@@ -397,7 +397,7 @@ def nyquist(
     if omega_max is not None:
         end = max(end, positive_number("omega_max", omega_max))
         turns = end * loop.longest_delay / (2.0 * np.pi)
-        affordable("omega_max", (int(min(400.0 * turns, 1e18)),), 256)
+        check_memory("omega_max", (int(min(400.0 * turns, 1e18)),), 256)
     end, far = _rectangle(loop, c1, c2, end)
     grid = resolving_grid((loop.at(c1, c2), loop.rest_on_boundary()), end)
     if omega_max is not None:

@@ -17,9 +17,7 @@ from numpy.polynomial import polynomial as poly
 from scipy.interpolate import BarycentricInterpolator
 
 from armlock.characteristic import CharacteristicFunction, checked_system
-from armlock.realization import realize
-from armlock.stability import CountError, last_crossing, unstable_roots
-from armlock.validation import (
+from armlock.checks import (
     ComplexArray,
     FloatArray,
     broadcast_pair,
@@ -27,6 +25,8 @@ from armlock.validation import (
     real_number,
     whole_number,
 )
+from armlock.stability import CountError, last_crossing, unstable_roots
+from armlock.statespace import realize
 
 _EPSILON = float(np.finfo(float).eps)
 # Degrees of the Chebyshev polynomial that are tried, one after the other.

@@ -18,14 +18,14 @@ from scipy.linalg import expm
 from scipy.signal import ss2tf
 
 from armlock.characteristic import CharacteristicFunction, checked_system, whole_steps
-from armlock.realization import Realization, realize
-from armlock.validation import (
+from armlock.checks import (
     FloatArray,
     broadcast_pair,
     positive_number,
     real_number,
     whole_number,
 )
+from armlock.statespace import Realization, realize
 
 #: Largest transition matrix, in rows: half a gigabyte.
 LARGEST = 8192

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
-from armlock.validation import (
+from armlock.checks import (
     ComplexArray,
     axis,
     complex_array,

@@ -5,7 +5,7 @@ With phi the frequency noise of the locked laser, every loop of `armlock.loops` 
     phi(t) = noise(t) - K [m1 u1 + m2 u2](t),    u_k(t) = phi(t) - c_k(t) phi(t - tau_k).
 
 Controller and sensor become one sampled state space with the inputs u1 and u2, see
-`armlock.sampled`: the trapezoidal rule, in first-order sections that keep what poles differ
+`armlock.discretize`: the trapezoidal rule, in first-order sections that keep what poles differ
 from one. The present phi is on both sides, with a weight of thousands; each sample solves
 for it. A rule that took the previous phi instead would be unstable by itself as soon as gain
 times step exceeds about one, and is not offered.
@@ -29,8 +29,16 @@ import numpy.typing as npt
 from numba import njit
 from numba.cpython.unsafe.tuple import tuple_setitem
 
-from armlock.loops import Loop
-from armlock.sampled import (
+from armlock.checks import (
+    ComplexArray,
+    FloatArray,
+    finite_series,
+    positive_number,
+    real_number,
+    true_or_false,
+    whole_number,
+)
+from armlock.discretize import (
     Row,
     SampledSystem,
     checked_frequency,
@@ -39,15 +47,7 @@ from armlock.sampled import (
     sample,
     warped,
 )
-from armlock.validation import (
-    ComplexArray,
-    FloatArray,
-    finite_series,
-    positive_number,
-    real_number,
-    switch,
-    whole_number,
-)
+from armlock.loops import Loop
 
 #: Order of the Lagrange interpolation for delays that are not whole samples.
 INTERPOLATION_ORDER = 7
@@ -445,7 +445,7 @@ class Simulation:
 
     The late light a_k is interpolated as for `sampled_open_loop`; w is the state of controller
     and sensor, sampled by the trapezoidal rule, with change E, drives F_k, output C and direct
-    shares d_k (`armlock.sampled`). So the loop is closed within the sample.
+    shares d_k (`armlock.discretize`). So the loop is closed within the sample.
 
     One call and many give the same samples, bit by bit.
 
@@ -856,7 +856,7 @@ class _Bar:
         if progress is None:
             wanted = samples >= LONG_RUN and self.stream.isatty()
         else:
-            wanted = switch("progress", progress)
+            wanted = true_or_false("progress", progress)
         self.wanted = wanted and samples > 0
 
     def __enter__(self) -> _Bar:

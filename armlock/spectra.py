@@ -20,7 +20,7 @@ import numpy.typing as npt
 from scipy.signal import firwin, kaiser_beta, upfirdn
 from scipy.special import chdtri
 
-from armlock.validation import (
+from armlock.checks import (
     FloatArray,
     IntArray,
     finite_series,

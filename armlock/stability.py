@@ -18,14 +18,14 @@ from numpy.polynomial import polynomial as poly
 
 from armlock import contour
 from armlock.characteristic import CharacteristicFunction, ExponentialSum, checked_system
-from armlock.validation import (
+from armlock.checks import (
     BoolArray,
     ComplexArray,
     FloatArray,
     IntArray,
-    affordable,
     axis,
     broadcast_pair,
+    check_memory,
 )
 
 #: What a count is where a root lies on the boundary of stability: -1.
@@ -497,7 +497,7 @@ def stability_chart(
     """
     name1, name2 = checked_system(system).parameters
     xs, ys = axis(name1, x), axis(name2, y)
-    affordable(f"{name1} and {name2}", (ys.size, xs.size), _BYTES_A_POINT)
+    check_memory(f"{name1} and {name2}", (ys.size, xs.size), _BYTES_A_POINT)
     if _of_order_zero(system):
         grid = np.where(_constant_confined(system, xs, ys[:, None]), 0, UNCONFINED)
         singly = np.zeros(grid.shape, dtype=np.bool_)

@@ -19,8 +19,8 @@ from matplotlib.figure import Figure
 
 import armlock
 from armlock import CommonArm, StabilityChart, stability_chart, unstable_roots
+from armlock.checks import FloatArray
 from armlock.semidiscretization import semi_discretization, transition_matrix
-from armlock.validation import FloatArray
 from benchmarks import child
 from benchmarks.report import Row, Series, Topic, fit_series
 

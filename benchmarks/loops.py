@@ -25,8 +25,8 @@ from armlock import (
     stability_chart,
     unstable_roots,
 )
+from armlock.checks import FloatArray
 from armlock.stability import last_crossing
-from armlock.validation import FloatArray
 from benchmarks import child
 from benchmarks.charts import comparison, memory_row, timed
 from benchmarks.report import Row, Topic

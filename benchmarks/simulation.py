@@ -17,8 +17,8 @@ import numpy as np
 from numba import njit
 
 from armlock import LaserNoise, Loop, PerturbationNoise, Simulation, paper_loop, simulate
+from armlock.checks import FloatArray
 from armlock.paper import SAMPLE_RATE, TAU1, TAU2
-from armlock.validation import FloatArray
 from benchmarks import child
 from benchmarks.report import Row, Topic
 from tests.extended import naive, reference
@@ -129,7 +129,7 @@ def pade_loop(loop: Loop) -> Any:
 
 def chapter_run() -> tuple[float, int]:
     """Run what the chapter of the simulation computes; return seconds and peak memory."""
-    from armlock.claims import check
+    from book.companion.claims import check
 
     start = time.perf_counter()
     check(*(f"M{number}" for number in range(1, 9)))

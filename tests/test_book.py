@@ -17,7 +17,8 @@ TEXT = "# A chapter\n\n{numref}`fig-small` shows a curve, see {doc}`/book/intro`
 DRAW = """
 import numpy as np
 from matplotlib import pyplot as plt
-from armlock import HayesEquation, claims, d_curve, plotting
+from armlock import HayesEquation, d_curve, plotting
+from book.companion import claims, figures
 from myst_nb import glue
 
 omega = np.linspace(0.1, 3.0, 200)
@@ -27,12 +28,12 @@ ax.plot(a, b)
 glue("points", omega.size, display=False)
 """
 PUBLISH = """
-plotting.publish(fig, "small", {"omega [rad/s]": omega, "a [1/s]": a, "b [1/s]": b})
+figures.publish(fig, "small", {"omega [rad/s]": omega, "a [1/s]": a, "b [1/s]": b})
 """
 CHECK = 'assert claims.check("S3")["S3"].verdict.name == "REPRODUCED"'
 CHANGED = """
 from dataclasses import replace
-from armlock.claims import Verdict, ledger
+from book.companion.claims import Verdict, ledger
 
 entry = ledger._REGISTER["S3"]
 finding = replace(entry.check(), verdict=Verdict.DIFFERS)

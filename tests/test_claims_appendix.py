@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from armlock import LaserNoise, PerturbationNoise, claims
-from armlock.claims import Verdict, appendix
+from armlock import LaserNoise, PerturbationNoise
+from book.companion import claims
+from book.companion.claims import Verdict, appendix
 
 EXPECTED = {
     "A1": (Verdict.REPRODUCED, 1.999996e-6, 1e-12),

@@ -7,10 +7,10 @@ import pytest
 
 from armlock import CommonArm, semi_discretization, spectral_radius, unstable_roots
 from armlock.boundary import boundary_radius, enclosed_area, outline, perimeter, rays
-from armlock.claims import Verdict, check
-from armlock.claims import common_arm as chapter
-from armlock.dsubdivision import d_curve, d_curve_line
-from armlock.schemes import map_eigenvalues, pade_poles, standard_schemes
+from armlock.dcurve import d_curve, d_curve_line
+from book.companion.claims import Verdict, check
+from book.companion.claims import common_arm as chapter
+from book.companion.schemes import map_eigenvalues, pade_poles, standard_schemes
 
 DECIDED = {
     "C1": (Verdict.REPRODUCED, 0.0, 1e-11),

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from armlock import critical_perturbation, paper_loop, unstable_roots
-from armlock.claims import Verdict, check
-from armlock.claims import controller as chapter
 from armlock.sensors import dual
+from book.companion.claims import Verdict, check
+from book.companion.claims import controller as chapter
 
 DECIDED = {
     "K1": (Verdict.IN_PART, 2.0, 0.0),

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from armlock import DualArm, rightmost_root, unstable_roots
-from armlock.claims import Verdict, check
-from armlock.claims import dual_arm as chapter
+from book.companion.claims import Verdict, check
+from book.companion.claims import dual_arm as chapter
 
 DECIDED = {
     "D1": (Verdict.NOT_AS_WRITTEN, 1.375746, 1e-6),

@@ -1,7 +1,7 @@
 import pytest
 
-from armlock.claims import Finding, Ledger, Verdict, all_claims, check, claim
-from armlock.claims import ledger as module
+from book.companion.claims import Finding, Ledger, Verdict, all_claims, check, claim
+from book.companion.claims import ledger as module
 
 
 @pytest.fixture

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from armlock import critical_perturbation, margins, unstable_roots
-from armlock.claims import Verdict, check
-from armlock.claims import nyquist_cases as chapter
 from armlock.roots import polish_root, pseudospectral_roots
+from book.companion.claims import Verdict, check
+from book.companion.claims import nyquist_cases as chapter
 from tests import independent
 
 DECIDED = {

@@ -4,11 +4,17 @@ from html.parser import HTMLParser
 
 import pytest
 
-from armlock.claims import Verdict, all_claims, check
-from armlock.claims import page as module
-from armlock.claims.assumptions import DIFFERENCES, Assumptions, first_break, over_corners
-from armlock.claims.controller import highest_corner
-from armlock.claims.page import (
+from armlock.loops import CommonArm, paper_loop
+from book.companion.claims import Verdict, all_claims, check
+from book.companion.claims import page as module
+from book.companion.claims.assumptions import (
+    DIFFERENCES,
+    Assumptions,
+    first_break,
+    over_corners,
+)
+from book.companion.claims.controller import highest_corner
+from book.companion.claims.page import (
     LedgerPage,
     VerdictCounts,
     errata,
@@ -16,7 +22,6 @@ from armlock.claims.page import (
     source,
     whole_ledger,
 )
-from armlock.loops import CommonArm, paper_loop
 
 
 class Ids(HTMLParser):
@@ -76,7 +81,7 @@ def test_a_build_checks_the_claims_once(ledger, monkeypatch, tmp_path):
 def test_a_source_is_the_function_that_checks(ledger):
     claim = next(iter(ledger))[0]
     found = source(claim)
-    assert found.file == "armlock/claims/table1.py"
+    assert found.file == "book/companion/claims/table1.py"
     assert found.line > 1
     assert "def single_row" in found.text
     assert section(claim) == "Sec. I and Table I"

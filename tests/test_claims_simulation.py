@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from armlock import claims, critical_perturbation, paper_loop, rightmost_root
-from armlock.claims import Verdict
-from armlock.claims import simulation as claimed
-from armlock.claims.appendix import perturbation_series
+from armlock import critical_perturbation, paper_loop, rightmost_root
 from armlock.noise import PerturbationNoise
 from armlock.paper import DURATION, PERTURBATION, SAMPLE_RATE
 from armlock.roots import polish_root
 from armlock.simulation import LIMIT
+from book.companion import claims
+from book.companion.claims import Verdict
+from book.companion.claims import simulation as claimed
+from book.companion.claims.appendix import perturbation_series
 
 EXPECTED = {
     "M1": (Verdict.REPRODUCED, 0.0, 0.0),

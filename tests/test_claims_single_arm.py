@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from armlock import HayesEquation, SingleArm, claims, rightmost_root, unstable_roots
-from armlock.claims import Verdict, single_arm
+from armlock import HayesEquation, SingleArm, rightmost_root, unstable_roots
 from armlock.paper import TAU1
+from book.companion import claims
+from book.companion.claims import Verdict, single_arm
 
 # The first two are errors of rounding and of quadrature, zero within the tolerance.
 EXPECTED = {

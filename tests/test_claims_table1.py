@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from armlock import DualArm, claims, paper, sensors, unstable_roots
-from armlock.claims import Verdict, table1
+from armlock import DualArm, paper, sensors, unstable_roots
+from book.companion import claims
+from book.companion.claims import Verdict, table1
 
 EXPECTED = {
     "Z1": (Verdict.IN_PART, 2.0),

@@ -1,7 +1,7 @@
 import matplotlib.pyplot as plt
 import pytest
 
-from armlock import diagrams
+from book.companion import diagrams
 
 
 @pytest.mark.parametrize(

@@ -17,10 +17,10 @@ from armlock import (
     stability_chart,
     unstable_roots,
 )
-from armlock.claims import dual_arm
 from armlock.paper import DUAL_SENSOR_CORNER
+from armlock.rays import first_crossing, ray_crossings, sweep
 from armlock.sensors import COMMON
-from armlock.sweeps import first_crossing, ray_crossings, sweep
+from book.companion.claims import dual_arm
 from tests.independent import generator_eigenvalues, rectangle_count, spectral_count
 
 SLOW = DualArm(gain=0.3, tau1=2.1, tau2=1.7, corner=1.5)

@@ -3,7 +3,7 @@ import re
 import pytest
 from matplotlib import pyplot as plt
 
-from armlock.plotting import FrameSlider, svg
+from book.companion.figures import FrameSlider, svg
 
 
 def test_slider_shows_one_frame_and_names_each():

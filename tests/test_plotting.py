@@ -10,6 +10,7 @@ from armlock import (
     plotting,
     stability_chart,
 )
+from book.companion import figures
 
 
 @pytest.fixture
@@ -71,7 +72,7 @@ def test_labels_stand_in_regions_of_their_count(ax, chart):
 
 def test_publishing_writes_figure_and_data(ax, tmp_path, monkeypatch):
     monkeypatch.setenv("ARMLOCK_FIGURES", str(tmp_path))
-    links = plotting.publish(ax.figure, "name", {"omega [rad/s]": [1.0, 2.0], "y": [0.5]})
+    links = figures.publish(ax.figure, "name", {"omega [rad/s]": [1.0, 2.0], "y": [0.5]})
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "name.csv",
         "name.png",
@@ -83,14 +84,14 @@ def test_publishing_writes_figure_and_data(ax, tmp_path, monkeypatch):
 
 def test_a_drawing_has_no_data(ax, tmp_path, monkeypatch):
     monkeypatch.setenv("ARMLOCK_FIGURES", str(tmp_path))
-    assert plotting.publish(ax.figure, "name", {}).files == ["name.png", "name.svg"]
+    assert figures.publish(ax.figure, "name", {}).files == ["name.png", "name.svg"]
     assert not (tmp_path / "name.csv").exists()
 
 
 def test_publishing_without_a_folder_writes_nothing(ax, tmp_path, monkeypatch):
     monkeypatch.delenv("ARMLOCK_FIGURES", raising=False)
     monkeypatch.chdir(tmp_path)
-    assert not plotting.publish(ax.figure, "name", {"x": [1.0]}).files
+    assert not figures.publish(ax.figure, "name", {"x": [1.0]}).files
     assert list(tmp_path.iterdir()) == []
 
 
@@ -119,8 +120,8 @@ def test_options_of_figures_are_checked(ax, chart):
     for call, message in (
         (lambda: plotting.plot_counts(ax, chart, 0), "largest must be an integer from 1 on"),
         (lambda: plotting.label_regions(ax, chart, -1.0), "smallest must lie between 0 and 1"),
-        (lambda: plotting.chart_columns(chart, every=0), "every must be an integer from 1 on"),
-        (lambda: plotting.chart_columns(chart, every=-2), "every must be an integer from 1 on"),
+        (lambda: figures.chart_columns(chart, every=0), "every must be an integer from 1 on"),
+        (lambda: figures.chart_columns(chart, every=-2), "every must be an integer from 1 on"),
         (lambda: plotting.plot_nyquist(ax, curve, unit=0.0), "unit must be positive"),
         (lambda: plotting.plot_nyquist(ax, curve, outer=-1.0), "outer must be positive"),
         (
@@ -128,8 +129,8 @@ def test_options_of_figures_are_checked(ax, chart):
             "arrows must lie above 0 and",
         ),
         (lambda: plotting.plot_nyquist(ax, curve, arrows=[np.nan]), "arrows must be finite"),
-        (lambda: plotting.publish(ax.figure, "a/b", {}), "name must be the stem of a file"),
-        (lambda: plotting.publish(ax.figure, "", {}), "name must be the stem of a file"),
+        (lambda: figures.publish(ax.figure, "a/b", {}), "name must be the stem of a file"),
+        (lambda: figures.publish(ax.figure, "", {}), "name must be the stem of a file"),
     ):
         with pytest.raises(ValueError, match=f"^{message}"):
             call()

@@ -3,7 +3,7 @@ import pytest
 from scipy.signal import lfilter
 
 from armlock import CommonArm, DualArm, rightmost_root, spectral_radius, unstable_roots
-from armlock.schemes import map_eigenvalues, pade_poles, sampled_loop, standard_schemes
+from book.companion.schemes import map_eigenvalues, pade_poles, sampled_loop, standard_schemes
 
 LOOP = CommonArm(1.0, 2.2, 1.8)
 STEP = 0.1

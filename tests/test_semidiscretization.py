@@ -20,7 +20,7 @@ from armlock import (
     transition_matrix,
     unstable_roots,
 )
-from armlock.realization import realize
+from armlock.statespace import realize
 from tests import independent
 from tests.systems import RETARDED
 

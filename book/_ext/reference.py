@@ -80,7 +80,7 @@ def described(path, thing, module, lines):
 
 
 def modules(names):
-    """Return the modules that are named; "armlock.claims.*" stands for all that it imports."""
+    """Return the modules that are named; "package.*" stands for all that it imports."""
     if not names.endswith(".*"):
         return names.split()
     package = importlib.import_module(names.removesuffix(".*"))

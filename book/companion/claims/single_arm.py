@@ -10,14 +10,14 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import lambertw
 
-from armlock.claims.ledger import Finding, Verdict, claim
-from armlock.dsubdivision import d_curve, d_curve_line
+from armlock.checks import FloatArray, positive_number, real_number
+from armlock.dcurve import d_curve, d_curve_line
 from armlock.loops import HayesEquation, SingleArm
 from armlock.paper import PERTURBATION, TAU1
 from armlock.roots import rightmost_root
 from armlock.semidiscretization import spectral_radius
 from armlock.stability import stability_chart, unstable_roots
-from armlock.validation import FloatArray, positive_number, real_number
+from book.companion.claims.ledger import Finding, Verdict, claim
 
 CHAPTER = "02_hayes"
 

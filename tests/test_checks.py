@@ -19,16 +19,16 @@ from armlock import (
     transition_matrix,
     unstable_roots,
 )
-from armlock.validation import (
-    affordable,
+from armlock.checks import (
     axis,
     broadcast_pair,
+    check_memory,
     complex_array,
     even_axis,
     positive_number,
     real_array,
     real_number,
-    switch,
+    true_or_false,
     whole_number,
 )
 
@@ -265,8 +265,8 @@ def test_a_switch_is_true_or_false(value):
     with pytest.raises(
         TypeError, match=rf"^x must be True or False, got {re.escape(repr(value))}$"
     ):
-        switch("x", value)
-    assert switch("x", np.True_) is True
+        true_or_false("x", value)
+    assert true_or_false("x", np.True_) is True
 
 
 def test_an_even_axis_ascends_in_equal_steps():
@@ -344,8 +344,8 @@ def test_dates_are_not_numbers():
 
 
 def test_what_memory_does_not_hold_is_refused():
-    affordable("x", (1000, 1000), 8)
+    check_memory("x", (1000, 1000), 8)
     with pytest.raises(
         ValueError, match=r"^x must be of a size that memory holds, got 10000000 x"
     ):
-        affordable("x", (10_000_000, 10_000_000), 8)
+        check_memory("x", (10_000_000, 10_000_000), 8)

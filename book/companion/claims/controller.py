@@ -8,7 +8,7 @@ from typing import NamedTuple
 import mpmath
 import numpy as np
 
-from armlock.claims.ledger import Finding, Verdict, claim
+from armlock.checks import ComplexArray, FloatArray, positive_number
 from armlock.controllers import Controller, stage_one, table_two
 from armlock.loops import Loop, paper_loop
 from armlock.margins import Margins, critical_perturbation, margins, modulus_margin
@@ -25,7 +25,7 @@ from armlock.paper import (
 )
 from armlock.roots import polish_root, pseudospectral_roots
 from armlock.stability import StabilityChart, stability_chart, unstable_roots
-from armlock.validation import ComplexArray, FloatArray, positive_number
+from book.companion.claims.ledger import Finding, Verdict, claim
 
 CHAPTER = "06_controller"
 TURN = 2.0 * np.pi

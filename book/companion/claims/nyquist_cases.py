@@ -9,7 +9,6 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.optimize import minimize_scalar
 
-from armlock.claims.ledger import Finding, Verdict, claim
 from armlock.controllers import Controller
 from armlock.loops import CommonArm, DualArm, Loop, SingleArm
 from armlock.margins import gain_interval, margins
@@ -27,6 +26,7 @@ from armlock.paper import (
 )
 from armlock.roots import rightmost_root
 from armlock.stability import unstable_roots
+from book.companion.claims.ledger import Finding, Verdict, claim
 
 CHAPTER = "05_nyquist"
 

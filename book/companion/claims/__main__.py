@@ -1,4 +1,4 @@
-"""Check every claim, print the ledger and write it: python -m armlock.claims FOLDER."""
+"""Check every claim, print the ledger and write it: python -m book.companion.claims FOLDER."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import sys
 import textwrap
 from pathlib import Path
 
-from armlock.claims.ledger import all_claims, check_in_parallel
+from book.companion.claims.ledger import all_claims, check_in_parallel
 
 
 def main(folder: Path) -> None:

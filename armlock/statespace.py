@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from armlock.characteristic import CharacteristicFunction, checked_system
-from armlock.validation import FloatArray, real_number
+from armlock.checks import FloatArray, real_number
 
 
 class DelayedTerm(NamedTuple):

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armlock.claims.ledger import Finding, Verdict, claim
+from armlock.checks import ComplexArray, FloatArray
 from armlock.loops import paper_loop
 from armlock.margins import critical_perturbation
 from armlock.noise import LaserNoise, PerturbationNoise, band_rms, sample_count
@@ -21,7 +21,7 @@ from armlock.roots import rightmost_root
 from armlock.simulation import LIMIT, DivergenceError, Simulation, sampled_open_loop
 from armlock.spectra import Spectrum, SpectrumEstimator
 from armlock.stability import unstable_roots
-from armlock.validation import ComplexArray, FloatArray
+from book.companion.claims.ledger import Finding, Verdict, claim
 
 CHAPTER = "07_simulation"
 
@@ -419,7 +419,7 @@ def leaving_probability(size: float = 1.0) -> float:
 
     Examples
     --------
-    >>> from armlock.claims.simulation import leaving_probability
+    >>> from book.companion.claims.simulation import leaving_probability
     >>> print(f"{leaving_probability():.1f}")
     0.4
     """

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.polynomial import polynomial as poly
 
 from armlock.characteristic import CharacteristicFunction, checked_system, whole_steps
+from armlock.checks import ComplexArray, positive_number, real_number, whole_number
 from armlock.loops import CommonArm
 from armlock.semidiscretization import semi_discretization
-from armlock.validation import ComplexArray, positive_number, real_number, whole_number
 
 #: Highest order of the Padé approximants; beyond, their coefficients lose their digits.
 HIGHEST_ORDER = 60

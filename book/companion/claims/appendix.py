@@ -10,8 +10,7 @@ import numpy.typing as npt
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from armlock.claims.ledger import Finding, Verdict, claim
-from armlock.claims.simulation import LOWEST, PERTURBATION_SEEDS, face_value_rms
+from armlock.checks import FloatArray
 from armlock.noise import PerturbationNoise, ShapedNoise, band_rms, sample_count
 from armlock.paper import (
     DURATION,
@@ -22,7 +21,8 @@ from armlock.paper import (
     SAMPLE_RATE,
 )
 from armlock.spectra import Spectrum, SpectrumEstimator
-from armlock.validation import FloatArray
+from book.companion.claims.ledger import Finding, Verdict, claim
+from book.companion.claims.simulation import LOWEST, PERTURBATION_SEEDS, face_value_rms
 
 CHAPTER = "08_perturbations"
 

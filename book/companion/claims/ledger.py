@@ -224,7 +224,7 @@ def check(*identifiers: str) -> Ledger:
 
 def _check_together(identifiers: list[str]) -> dict[str, Finding]:
     """Check some claims in a process of its own."""
-    import armlock.claims  # noqa: F401, a new process has an empty register
+    import book.companion.claims  # noqa: F401, a new process has an empty register
 
     return {identifier: _REGISTER[identifier].check() for identifier in identifiers}
 

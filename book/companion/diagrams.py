@@ -61,7 +61,7 @@ def plot_modules(ax: Axes) -> None:
     Examples
     --------
     >>> from matplotlib.figure import Figure
-    >>> from armlock.diagrams import plot_modules
+    >>> from book.companion.diagrams import plot_modules
     >>> ax = Figure().subplots()
     >>> plot_modules(ax)
     >>> len(ax.texts) > 3
@@ -113,7 +113,7 @@ def plot_loop(ax: Axes) -> None:
     Examples
     --------
     >>> from matplotlib.figure import Figure
-    >>> from armlock.diagrams import plot_loop
+    >>> from book.companion.diagrams import plot_loop
     >>> ax = Figure().subplots()
     >>> plot_loop(ax)
     >>> len(ax.texts) > 3

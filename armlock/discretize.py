@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from armlock.validation import FloatArray, positive_number, real_array
+from armlock.checks import FloatArray, positive_number, real_array
 
 #: Numbers in the form that compiled functions keep in registers.
 Row = tuple[float, ...]

@@ -16,8 +16,8 @@ from numpy.polynomial import polynomial as poly
 from scipy.optimize import brentq
 
 from armlock.characteristic import CharacteristicFunction, checked_system
+from armlock.checks import ComplexArray, FloatArray, IntArray, axis, positive_number
 from armlock.stability import CountError, last_crossing, sign_changes
-from armlock.validation import ComplexArray, FloatArray, IntArray, axis, positive_number
 
 P = TypeVar("P")
 R = TypeVar("R", bound=tuple[Any, ...])
@@ -188,7 +188,7 @@ def ray_crossings(
     Examples
     --------
     >>> from armlock import CommonArm
-    >>> from armlock.sweeps import ray_crossings
+    >>> from armlock.rays import ray_crossings
     >>> found = ray_crossings(CommonArm(), (0.0, 0.0), (0.2, 0.4), 3.4)
     >>> found.position.round(4), found.omega.round(4), found.change
     (array([3.3333, 3.3738]), array([0.    , 0.3071]), array([1, 2]))
@@ -235,7 +235,7 @@ def first_crossing(
     Examples
     --------
     >>> from armlock import DualArm
-    >>> from armlock.sweeps import first_crossing
+    >>> from armlock.rays import first_crossing
     >>> edge = first_crossing(DualArm(gain=10.0), (1.0, 1.0), (1.0, 1.0), stop=3.0)
     >>> print(f"{edge.position:.6f} {edge.omega:.4f} {edge.change}")
     0.254006 3.7746 2
@@ -335,7 +335,7 @@ def sweep(
     Examples
     --------
     >>> from armlock import CommonArm
-    >>> from armlock.sweeps import first_crossing, sweep
+    >>> from armlock.rays import first_crossing, sweep
     >>> def upper_edge(gain):
     ...     return first_crossing(CommonArm(gain), (0.0, 0.0), (1.0, 1.0), stop=3.0)
     >>> sweep(upper_edge, [1.0, 10.0]).position

@@ -15,7 +15,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import NamedTuple
 
-from armlock.claims.ledger import (
+from book.companion.claims.ledger import (
     Claim,
     Finding,
     Ledger,
@@ -105,8 +105,8 @@ def section(claim: Claim) -> str:
 
     Examples
     --------
-    >>> from armlock.claims import check
-    >>> from armlock.claims.page import section
+    >>> from book.companion.claims import check
+    >>> from book.companion.claims.page import section
     >>> [section(claim) for claim, _ in check("T1")]
     ['Sec. I and Table I']
     """
@@ -118,14 +118,14 @@ def source(claim: Claim) -> Source:
 
     Examples
     --------
-    >>> from armlock.claims import check
-    >>> from armlock.claims.page import source
+    >>> from book.companion.claims import check
+    >>> from book.companion.claims.page import source
     >>> [source(claim).file for claim, _ in check("T1")]
-    ['armlock/claims/table1.py']
+    ['book/companion/claims/table1.py']
     """
     function = inspect.unwrap(claim.check)
     lines, first = inspect.getsourcelines(function)
-    root = Path(__file__).resolve().parents[2]
+    root = Path(__file__).resolve().parents[3]
     file = Path(inspect.getsourcefile(function) or "")
     shown = file.relative_to(root).as_posix() if file.is_relative_to(root) else file.name
     purpose = (inspect.getdoc(function) or "").partition("\n")[0]
@@ -161,8 +161,8 @@ class VerdictCounts:
 
     Examples
     --------
-    >>> from armlock.claims import check
-    >>> from armlock.claims.page import VerdictCounts
+    >>> from book.companion.claims import check
+    >>> from book.companion.claims.page import VerdictCounts
     >>> VerdictCounts(check("T1", "T2"))
     1 reproduced, 1 not as written
     """

@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from armlock.characteristic import CharacteristicFunction, checked_system
+from armlock.checks import ComplexArray, FloatArray, check_memory, positive_number, real_array
 from armlock.stability import sign_changes
-from armlock.validation import ComplexArray, FloatArray, affordable, positive_number, real_array
 
 _EPSILON = float(np.finfo(float).eps)
 # Phase in rad up to which a frequency next to a pole counts as the pole, in rounding errors.
@@ -225,7 +225,7 @@ def d_curve_line(system: CharacteristicFunction) -> Line:
     Examples
     --------
     >>> from armlock import CommonArm
-    >>> from armlock.dsubdivision import d_curve_line
+    >>> from armlock.dcurve import d_curve_line
     >>> d_curve_line(CommonArm())
     Line(weight_x=1.0, weight_y=1.0, value=2.0)
     """
@@ -293,7 +293,7 @@ def d_curve_branches(
     density = positive_number("points_per_turn", points_per_turn)
     _require_two_parameters(system)
     turns = omega_max * system.longest_delay / (2.0 * np.pi)
-    affordable("omega_max", (int(min(density * turns, 1e18)),), 256)
+    check_memory("omega_max", (int(min(density * turns, 1e18)),), 256)
     _, b1, b2 = system.on_boundary()
     determinant = b1.times_conjugate(b2)
     poles, _ = sign_changes(determinant, omega_max, is_map=system.step > 0.0)

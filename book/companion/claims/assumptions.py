@@ -9,22 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armlock.claims.controller import (
-    SUPPRESSION_BAND,
-    highest_corner,
-    noise_to_spare,
-    suppression,
-)
-from armlock.claims.simulation import (
-    DRAWS,
-    FREE_RUNNING,
-    LOWEST,
-    PERTURBATION_SEEDS,
-    face_value_rms,
-    growing_probability,
-    leaving_probability,
-    stable_up_to,
-)
+from armlock.checks import FloatArray
 from armlock.controllers import table_two
 from armlock.loops import Loop, paper_loop
 from armlock.margins import modulus_margin
@@ -42,7 +27,22 @@ from armlock.paper import (
 from armlock.roots import rightmost_root
 from armlock.simulation import sampled_open_loop
 from armlock.stability import unstable_roots
-from armlock.validation import FloatArray
+from book.companion.claims.controller import (
+    SUPPRESSION_BAND,
+    highest_corner,
+    noise_to_spare,
+    suppression,
+)
+from book.companion.claims.simulation import (
+    DRAWS,
+    FREE_RUNNING,
+    LOWEST,
+    PERTURBATION_SEEDS,
+    face_value_rms,
+    growing_probability,
+    leaving_probability,
+    stable_up_to,
+)
 
 #: The two meanings of dtau, in s: Sec. III.B and the source of Table I.
 DIFFERENCES = {"full": TAU1 - TAU2, "half": 0.5 * (TAU1 - TAU2)}
@@ -74,7 +74,7 @@ def first_break(
     Examples
     --------
     >>> from armlock import paper_loop
-    >>> from armlock.claims.assumptions import first_break
+    >>> from book.companion.claims.assumptions import first_break
     >>> print(f"{first_break(paper_loop()):.4g}")
     1.464e-06
     """
@@ -372,7 +372,7 @@ class Assumptions:
 
     Examples
     --------
-    >>> from armlock.claims.assumptions import Assumptions
+    >>> from book.companion.claims.assumptions import Assumptions
     >>> Assumptions([]).entries
     []
     """

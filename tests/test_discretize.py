@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from armlock import paper, paper_loop
-from armlock.sampled import real_system, sample, warped
+from armlock.discretize import real_system, sample, warped
 
 RATE = 200.0
 OMEGA = np.geomspace(1e-3, 0.9 * np.pi * RATE, 25)

@@ -10,9 +10,8 @@ import numpy.typing as npt
 from scipy.constants import speed_of_light
 
 from armlock import sensors
-from armlock.claims.ledger import Finding, Verdict, claim
 from armlock.controllers import Controller, integrating_actuator
-from armlock.dsubdivision import d_curve_line
+from armlock.dcurve import d_curve_line
 from armlock.loops import CommonArm, Loop, SingleArm
 from armlock.paper import (
     CONTROLLER_GAIN,
@@ -25,6 +24,7 @@ from armlock.paper import (
 )
 from armlock.roots import rightmost_root
 from armlock.stability import unstable_roots
+from book.companion.claims.ledger import Finding, Verdict, claim
 
 ComplexArray = npt.NDArray[np.complex128]
 

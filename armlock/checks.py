@@ -89,7 +89,7 @@ def whole_number(name: str, value: object, lowest: int, highest: int | None = No
     return int(value)
 
 
-def switch(name: str, value: object) -> bool:
+def true_or_false(name: str, value: object) -> bool:
     """Return True or False, or say what was given in its place."""
     if not isinstance(value, bool | np.bool_):
         raise TypeError(f"{name} must be True or False, got {value!r}")
@@ -147,7 +147,7 @@ def finite_series(name: str, value: object) -> FloatArray:
     return array
 
 
-def affordable(name: str, shape: tuple[int, ...], bytes_each: int) -> None:
+def check_memory(name: str, shape: tuple[int, ...], bytes_each: int) -> None:
     """Raise if so many values would take more than half of the machine's memory."""
     try:
         memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
@@ -187,7 +187,7 @@ def broadcast_pair(
     """Return two finite real arrays of one shape, or name both shapes and raise."""
     first, second = real_array(name1, value1), real_array(name2, value2)
     shape = broadcast_shape((name1, name2), (first, second))
-    affordable(f"{name1} and {name2}", shape, 48)
+    check_memory(f"{name1} and {name2}", shape, 48)
     # Copies, because broadcast views are not to be written to.
     return np.broadcast_to(first, shape).copy(), np.broadcast_to(second, shape).copy()
 

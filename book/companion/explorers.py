@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from armlock.characteristic import CharacteristicFunction, checked_system
+from armlock.checks import even_axis
 from armlock.roots import RootError, rightmost_root
 from armlock.stability import CountError, StabilityChart
-from armlock.validation import even_axis
 
 _NUMBER = itertools.count(1)
 
@@ -46,7 +46,7 @@ class RootGrid:
     Examples
     --------
     >>> from armlock import CommonArm
-    >>> from armlock.interactive import RootGrid
+    >>> from book.companion.explorers import RootGrid
     >>> grid = RootGrid(CommonArm(), [0.9, 1.1], [1.0])
     >>> (grid.roots.real > 0).tolist()
     [[False, True]]
@@ -170,7 +170,7 @@ def chart_explorer(
     --------
     >>> import numpy as np
     >>> from armlock import CommonArm, stability_chart
-    >>> from armlock.interactive import chart_explorer
+    >>> from book.companion.explorers import chart_explorer
     >>> axis = np.linspace(-3, 3, 7)
     >>> chart_explorer(stability_chart(CommonArm(), axis, axis))
     Number of unstable roots: (7, 7) points; open the book to point at it

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from armlock import CommonArm, rightmost_root, stability_chart
-from armlock.interactive import RootGrid, chart_explorer
+from book.companion.explorers import RootGrid, chart_explorer
 
 
 @pytest.fixture

@@ -11,15 +11,15 @@ from scipy.optimize import brentq, minimize_scalar
 
 from armlock.boundary import boundary_radius, enclosed_area, outline, perimeter, rays
 from armlock.characteristic import CharacteristicFunction
-from armlock.claims.ledger import Finding, Verdict, claim
-from armlock.dsubdivision import Branch, d_curve, d_curve_branches, d_curve_line
+from armlock.checks import FloatArray
+from armlock.dcurve import Branch, d_curve, d_curve_branches, d_curve_line
 from armlock.loops import CommonArm
 from armlock.paper import COMMON_ARM_GAIN, STEP, TAU1, TAU2
 from armlock.roots import extended_root, polish_root, pseudospectral_roots, rightmost_root
-from armlock.schemes import pade_poles, sampled_loop, standard_schemes
 from armlock.semidiscretization import semi_discretization, spectral_radius, transition_matrix
 from armlock.stability import StabilityChart, stability_chart, unstable_roots
-from armlock.validation import FloatArray
+from book.companion.claims.ledger import Finding, Verdict, claim
+from book.companion.schemes import pade_poles, sampled_loop, standard_schemes
 
 CHAPTER = "03_common_arm"
 

@@ -14,8 +14,8 @@ import numpy.typing as npt
 from scipy.optimize import brentq, minimize_scalar
 
 from armlock.characteristic import CharacteristicFunction
-from armlock.claims.ledger import Finding, Verdict, claim
-from armlock.dsubdivision import d_curve_line
+from armlock.checks import FloatArray
+from armlock.dcurve import d_curve_line
 from armlock.loops import DualArm
 from armlock.nyquist import axis_crossings, nyquist
 from armlock.paper import (
@@ -27,11 +27,11 @@ from armlock.paper import (
     TAU1,
     TAU2,
 )
+from armlock.rays import Crossing, first_crossing, sweep
 from armlock.roots import rightmost_root
 from armlock.semidiscretization import semi_discretization
 from armlock.stability import BOUNDARY, last_crossing, stability_chart, unstable_roots
-from armlock.sweeps import Crossing, first_crossing, sweep
-from armlock.validation import FloatArray
+from book.companion.claims.ledger import Finding, Verdict, claim
 
 CHAPTER = "04_dual_arm"
 

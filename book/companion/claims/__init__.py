@@ -1,0 +1,39 @@
+"""The paper's claims as executable checks, one module a section of the paper."""
+
+from book.companion.claims.ledger import (
+    Claim,
+    Finding,
+    Ledger,
+    Verdict,
+    all_claims,
+    check,
+    claim,
+)
+
+# In the order of the paper, which is the order of the register.
+from book.companion.claims import table1  # isort: skip
+from book.companion.claims import single_arm  # isort: skip
+from book.companion.claims import common_arm  # isort: skip
+from book.companion.claims import dual_arm  # isort: skip
+from book.companion.claims import nyquist_cases  # isort: skip
+from book.companion.claims import controller  # isort: skip
+from book.companion.claims import simulation  # isort: skip
+from book.companion.claims import appendix  # isort: skip
+
+__all__ = [
+    "Claim",
+    "Finding",
+    "Ledger",
+    "Verdict",
+    "all_claims",
+    "appendix",
+    "check",
+    "claim",
+    "common_arm",
+    "controller",
+    "dual_arm",
+    "nyquist_cases",
+    "simulation",
+    "single_arm",
+    "table1",
+]
