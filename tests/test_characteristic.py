@@ -74,9 +74,12 @@ def test_a_map_shifts_and_differentiates_like_a_loop():
 @pytest.mark.parametrize("system", SYSTEMS, ids=repr)
 def test_exponential_sums_are_the_parts_on_the_axis(system):
     omega = np.array([0.0, 0.3, 1.7, 11.0])
-    for piece, part in zip(system.on_boundary(), system.parts(1j * omega), strict=True):
-        groups = zip(piece.coefficients, piece.phases, strict=True)
-        value = sum(np.polyval(p[::-1], omega) * np.exp(1j * r * omega) for p, r in groups)
+    for term, part in zip(system.on_boundary(), system.parts(1j * omega), strict=True):
+        value = sum(
+            weight * np.polyval(p.coefficients[::-1], 1j * omega) * np.exp(1j * phase * omega)
+            for row, phase in zip(term.weights, term.phases, strict=True)
+            for weight, p in zip(row, term.polynomials, strict=True)
+        )
         np.testing.assert_allclose(value, part, rtol=1e-12, atol=1e-12)
 
 
