@@ -39,9 +39,13 @@ def positive_number(name: str, value: object) -> float:
 
 def whole_number(name: str, value: object, lowest: int, highest: int | None = None) -> int:
     """Return a Python or NumPy integer between two bounds, ends included, or raise."""
-    fits = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not fits or not lowest <= int(value) <= (math.inf if highest is None else highest):
-        end = "on" if highest is None else f"to {highest}"
+    end = "on" if highest is None else f"to {highest}"
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, int | np.integer)
+        or value < lowest
+        or (highest is not None and value > highest)
+    ):
         raise ValueError(f"{name} must be an integer from {lowest} {end}, got {value!r}")
     return int(value)
 
