@@ -4,9 +4,11 @@ A copy of the book with one small notebook is built, with the configuration of t
 """
 
 import os
+import re
 import shutil
 import subprocess
 import sys
+from importlib.metadata import requires, version
 from pathlib import Path
 
 import nbformat
@@ -39,20 +41,28 @@ entry = ledger._REGISTER["S3"]
 finding = replace(entry.check(), verdict=Verdict.DIFFERS)
 ledger._REGISTER["S3"] = replace(entry, check=lambda: finding)
 """
+PAGES = ("bibliography.md", "status.md")
+ADDRESS = "https://github.com/someone/something"
+LINKS = {
+    "book/bibliography.html": f'href="{ADDRESS}"',
+    "notebooks/small.html": "https://mybinder.org/v2/gh/someone/something/main?urlpath=lab",
+    "book/status.html": f"git clone {ADDRESS}",
+}
 ALT = "A curve of {points:.0f} points."
 
 
-def build(folder, *, text=TEXT, alt=ALT, before_check=""):
+def build(folder, *, text=TEXT, alt=ALT, before_check="", address=None):
     """Build a copy of the book with one notebook; return the exit code, output and pages."""
     (folder / "notebooks").mkdir(parents=True)
     (folder / "book").mkdir()
-    for name in ("_config.yml", "_ext", "_static", "references.bib", "bibliography.md"):
+    for name in ("_config.yml", "_ext", "_static", "references.bib", *PAGES):
         source, target = ROOT / "book" / name, folder / "book" / name
         (shutil.copytree if source.is_dir() else shutil.copyfile)(source, target)
     (folder / "book" / "intro.md").write_text("# A book\n\n{cite:t}`shao_robustness`\n")
     (folder / "book" / "_toc.yml").write_text(
         "format: jb-book\nroot: book/intro\nchapters:\n"
-        "  - file: notebooks/small\n  - file: book/bibliography\n"
+        "  - file: notebooks/small\n"
+        + "".join(f"  - file: book/{name.removesuffix('.md')}\n" for name in PAGES)
     )
     caption = {"caption": "A curve.", "name": "fig-small"}
     figure = {"mystnb": {"figure": caption, "image": {"alt": alt}}}
@@ -71,6 +81,16 @@ def build(folder, *, text=TEXT, alt=ALT, before_check=""):
     command += ["--path-output", "build", "-W", "-n", "--keep-going"]
     environment = os.environ | {"ARMLOCK_FIGURES": str(pages / "figures")}
     environment.pop("MPLBACKEND", None)  # the kernel chooses its own, which shows figures
+    if address is not None:
+        metadata = folder / "first" / f"armlock-{version('armlock')}.dist-info" / "METADATA"
+        metadata.parent.mkdir(parents=True)
+        metadata.write_text(
+            f"Metadata-Version: 2.1\nName: armlock\nVersion: {version('armlock')}\n"
+            f"Project-URL: repository, {address}\n"
+            + "".join(f"Requires-Dist: {line}\n" for line in requires("armlock"))
+        )
+        paths = [metadata.parents[1], os.environ.get("PYTHONPATH", "")]
+        environment["PYTHONPATH"] = os.pathsep.join(map(str, filter(None, paths)))
     result = subprocess.run(
         command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300
     )
@@ -80,10 +100,14 @@ def build(folder, *, text=TEXT, alt=ALT, before_check=""):
 
 def test_building_twice_gives_the_same_data_and_pages_that_need_no_network(tmp_path):
     tables = []
-    for name in ("first", "second"):
-        code, output, pages = build(tmp_path / name)
+    for name, address in (("first", None), ("second", ADDRESS)):
+        code, output, pages = build(tmp_path / name, address=address)
         assert code == 0, output[-3000:]
         tables.append((pages / "figures" / "small.csv").read_bytes())
+        # Links to the repository are there if its address is, and only then.
+        for page, link in LINKS.items():
+            text = (pages / page).read_text()
+            assert link in text if address else not re.search("github.com|mybinder|colab", text)
     assert tables[0] == tables[1]
     assert 'alt="A curve of 200 points."' in (pages / "notebooks/small.html").read_text()
     assert tables[0].startswith(b"omega [rad/s],a [1/s],b [1/s]\n")
