@@ -31,7 +31,8 @@ space := $(empty) $(empty)
 find-sources = $(shell find $(wildcard $(1)) -type f \
 	-not -name '*.pyc' -not -name '*.nbi' -not -name '*.nbc' -not -path '*/.*' | sort)
 PACKAGE_SOURCES := $(call find-sources,armlock book/companion)
-BOOK_SOURCES := $(PACKAGE_SOURCES) $(call find-sources,book notebooks) tools/check_html.py
+BOOK_SOURCES := $(PACKAGE_SOURCES) $(call find-sources,book notebooks) tools/check_html.py \
+	tools/write_codecheck.py codecheck.yml
 TEST_SOURCES := $(PACKAGE_SOURCES) $(call find-sources,notebooks tests benchmarks book tools) \
 	$(call find-sources,binder) pyproject.toml environment.txt README.md codecheck.yml
 NOTEBOOKS := $(wildcard notebooks/*.ipynb)
@@ -96,6 +97,7 @@ $(INDEX): $(PACKAGE_READY) $(BOOK_SOURCES) build/book-sources $(if $(FORCE),alwa
 		$(VENV)/bin/jupyter-book build . --all --config book/_config.yml --toc book/_toc.yml \
 		--path-output build -W -n --keep-going
 	$(PY) tools/check_html.py build/_build/html
+	$(PY) tools/write_codecheck.py --check build/_build/html
 	@rm -rf build/html
 	@mv build/_build/html build/html
 	@ln -s ../html build/_build/html

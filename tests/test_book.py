@@ -87,7 +87,7 @@ def build(folder, *, text=TEXT, alt=ALT, before_check="", address=None):
         metadata.write_text(
             f"Metadata-Version: 2.1\nName: armlock\nVersion: {version('armlock')}\n"
             f"Project-URL: repository, {address}\n"
-            + "".join(f"Requires-Dist: {line}\n" for line in requires("armlock"))
+            + "".join(f"Requires-Dist: {line}\n" for line in requires("armlock") or [])
         )
         paths = [metadata.parents[1], os.environ.get("PYTHONPATH", "")]
         environment["PYTHONPATH"] = os.pathsep.join(map(str, filter(None, paths)))
