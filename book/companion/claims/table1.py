@@ -136,6 +136,7 @@ def _every_reading(gain: float) -> list[tuple[str, float, Loop]]:
     "boundary of their stable region, which makes them sensitive to multiplicative "
     "perturbations.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 2.0, 0.0),
 )
 def ideal_point_on_boundary() -> Finding:
     """Locate (1, 1) against the omega = 0 line, and count the roots on both sides of it."""
@@ -216,6 +217,7 @@ def ideal_point_on_boundary() -> Finding:
     place="Table I, first row",
     says="The single arm responds with 2i sin(τω) exp(-iωτ).",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 0.0, 1e-12),
 )
 def single_row() -> Finding:
     """Compare with 1 - exp(-s round trip) for both meanings of tau."""
@@ -241,6 +243,8 @@ def single_row() -> Finding:
     place="Table I, second row",
     says="The common arm responds with 2 (1 - cos(Δτ ω) exp(-iω τ̄)).",
     chapter=CHAPTER,
+    pinned=(Verdict.NOT_AS_WRITTEN, 1.0, 1e-6),
+    affects=("T3", "T4"),
 )
 def common_row() -> Finding:
     """Compare with 2 - e1 - e2 for both meanings of the difference and of the mean."""
@@ -272,6 +276,8 @@ def common_row() -> Finding:
     place="Table I, third row",
     says="The difference arm responds with -2i sin(Δτ ω) exp(-iω τ̄).",
     chapter=CHAPTER,
+    pinned=(Verdict.NOT_AS_WRITTEN, 2.0, 1e-6),
+    affects=("T2", "T4"),
 )
 def difference_row() -> Finding:
     """Compare with both signs of the difference of the arms, for both meanings of dtau."""
@@ -301,6 +307,8 @@ def difference_row() -> Finding:
     says="The dual arm responds with P₊ - p/(1+p) · 1/(iωΔτ) · P₋, where P₊ and P₋ are the "
     "responses of the common and the difference arm.",
     chapter=CHAPTER,
+    pinned=(Verdict.NOT_AS_WRITTEN, 0.7210738, 1e-6),
+    affects=("Z1", "D1", "D2"),
 )
 def dual_row() -> Finding:
     """Evaluate the sensor at the common arm's first null, where P_- has to fill in."""
@@ -358,6 +366,7 @@ def dual_row() -> Finding:
     says="The modified dual arm responds with P₊ H₊ - P₋ H₋, where P₊ and P₋ are the responses "
     "of the common and the difference arm.",
     chapter=CHAPTER,
+    pinned=(Verdict.OPEN, 2011.602, 1e-3),
 )
 def modified_dual_row() -> Finding:
     """Show that the row says nothing before H_+ and H_- are given."""
@@ -386,6 +395,7 @@ def modified_dual_row() -> Finding:
     place="Sec. III.A, example",
     says="Round trips of 20.1 s and 19.9 s are those of Taiji's arms.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 0.0691807, 1e-7),
 )
 def round_trips() -> Finding:
     """Turn the delays into arm lengths."""
