@@ -215,6 +215,7 @@ def laser_phase_rms() -> float:
     says="Unequal gains 1 + ε_I and 1 + ε_Q of the phasemeter's I and Q channels give the "
     "measured phase (1 + η)φ, with η = ε_Q - ε_I.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 1.999996e-6, 1e-12),
 )
 def gain_mismatch() -> Finding:
     """Slope of the exact arctangent at zero phase against the linear model."""
@@ -238,6 +239,8 @@ def gain_mismatch() -> Finding:
     place="Appendix, Eq. (A4)",
     says="The measured phase is (1 + η)φ, for a phase φ of any size.",
     chapter=CHAPTER,
+    pinned=(Verdict.DIFFERS, 0.39334, 1e-4),
+    affects=("A3", "A4"),
 )
 def any_phase() -> Finding:
     """Phase up to which the linear model holds, and the error's mean and largest value."""
@@ -263,6 +266,8 @@ def any_phase() -> Finding:
     says="The spectrum of the phase noise requirement, taken for η, stands for perturbations "
     "of at most 10⁻⁶.",
     chapter=CHAPTER,
+    pinned=(Verdict.DIFFERS, 14579.3, 0.1),
+    affects=("N1", "M2", "A4", "A5"),
 )
 def size_of_spectrum() -> Finding:
     """Integrate the spectrum over the simulated band."""
@@ -290,6 +295,7 @@ def size_of_spectrum() -> Finding:
     "so that η must be one or several orders below the additive phase noise δφ to give an "
     "error as large.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 0.0, 0.05),
 )
 def convolution_of_spectra() -> Finding:
     """Multiply series and convolve spectra; find the factor for the paper's laser."""
@@ -318,6 +324,7 @@ def convolution_of_spectra() -> Finding:
     place="Appendix, Fig. 11",
     says="c₁(t) and c₂(t) are generated from the spectrum.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 0.0, 0.03),
 )
 def generated_series() -> Finding:
     """Compare the spectrum of the series with the formula, and see what makes its size."""

@@ -318,6 +318,7 @@ def ideal_root() -> float:
     place="Eq. (5a)",
     says="The two parametric equations give the parameters at which jω is a root.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 0.0, 1e-11),
 )
 def parametric_curve() -> Finding:
     """Put Eq. (5a), line by line, into the characteristic equation."""
@@ -349,6 +350,7 @@ def parametric_curve() -> Finding:
     place="Eq. (5b)",
     says="At ω = 0 the boundary is the straight line c₁ + c₂ = 2.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 0.0, 0.0),
 )
 def straight_line() -> Finding:
     """Compare the line with D(0) = 0, for several gains, and count across it."""
@@ -378,6 +380,7 @@ def straight_line() -> Finding:
     says="The D-curves, with branches, cusps and rings, separate regions that differ in their "
     "number of unstable roots.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 0.0, 0.0),
 )
 def shape_of_the_curve() -> Finding:
     """Count branches, turns and cusps, and count unstable roots on both sides."""
@@ -435,6 +438,8 @@ def curve_jumps(window: float = WINDOW, number: int = 2000) -> FloatArray:
     place="Sec. III.A, first paragraph and the example of Fig. 4(a)",
     says="Delay 1 is the shorter one (text); it is 20.1 s against 19.9 s (example).",
     chapter=CHAPTER,
+    pinned=(Verdict.NOT_AS_WRITTEN, 0.10536, 1e-4),
+    affects=("D1", "D10"),
 )
 def order_of_the_delays() -> Finding:
     """Compare the charts of both orders."""
@@ -462,6 +467,8 @@ def order_of_the_delays() -> Finding:
     says="The recurrence weighs the delayed samples with R and g h c₂, R being an integral of "
     "g c exp(-2 g (t_i - ν)) over a step; the matrix holds R₁ and R₂.",
     chapter=CHAPTER,
+    pinned=(Verdict.NOT_AS_WRITTEN, 1.82965e-4, 1e-8),
+    affects=("C6", "C7"),
 )
 def recurrence() -> Finding:
     """Run the printed and the derived recurrence at (1, 1)."""
@@ -513,6 +520,7 @@ def excess(system: CharacteristicFunction, x: float, y: float) -> float:
     place="below Eq. (8)",
     says="The system is stable if and only if the spectral radius of its matrix is below one.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 0.0, 0.0),
 )
 def spectral_radius_decides() -> Finding:
     """Compare dense eigenvalues with the exact count of the map's unstable roots."""
@@ -542,6 +550,7 @@ def spectral_radius_decides() -> Finding:
     place="Fig. 4(b)",
     says="With h = 0.05 s, semi-discretization gives the stable region and its boundary.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 0.02800, 5e-5),
 )
 def region_at_the_step() -> Finding:
     """Measure how far the boundary is off at the paper's step, and how this falls with h."""
@@ -580,6 +589,7 @@ def region_at_the_step() -> Finding:
     place="Sec. III.A, before Eq. (6)",
     says="Semi-discretization guarantees that the whole stable region is covered.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 0.0026588, 1e-6),
 )
 def covers_the_region() -> Finding:
     """Compare the charts of map and loop point by point."""
@@ -608,6 +618,7 @@ def covers_the_region() -> Finding:
     place="Fig. 4(c)",
     says="Near (1, 1) the boundary is the line c₁ + c₂ = 2.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 0.0171888, 1e-6),
 )
 def local_boundary() -> Finding:
     """Count on both sides of the line, and find the nearest other curve."""
@@ -633,6 +644,7 @@ def local_boundary() -> Finding:
     place="Sec. III.A, last paragraph",
     says="The ideal point c₁ = c₂ = 1 lies exactly on the boundary.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 0.0, 0.0),
 )
 def ideal_point() -> Finding:
     """Evaluate D and its derivative at s = 0, and count around the point."""
@@ -659,6 +671,7 @@ def ideal_point() -> Finding:
     place="Sec. III.A, before Eq. (6)",
     says="Semi-discretization is more accurate than standard discretisations of delay systems.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 1642.8, 2.0),
 )
 def more_accurate() -> Finding:
     """Compare errors of roots and boundary with other schemes of equal step or size."""
@@ -708,6 +721,7 @@ def more_accurate() -> Finding:
     says="The criterion on the matrix, a spectral radius below one, decides the stability of "
     "the delayed loop.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 4.416e-6, 1e-8),
 )
 def map_and_loop() -> Finding:
     """Look for a point at which the map's verdict is wrong for the loop."""
@@ -746,6 +760,7 @@ def map_and_loop() -> Finding:
     says="D-subdivision alone may miss part of the boundary, for it is sampled over a finite "
     "range and in finite precision.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 0.0761516, 1e-6),
 )
 def d_subdivision_alone() -> Finding:
     """Draw the curve from few samples, and walk it with certified steps against counts."""
@@ -784,6 +799,7 @@ def d_subdivision_alone() -> Finding:
     place="Sec. III.A, last paragraph",
     says="The analytical stability boundary of the common arm is the line c₁ + c₂ = 2.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 0.40351, 1e-4),
 )
 def whole_boundary() -> Finding:
     """Measure the stable region and the share of its perimeter that lies on the line."""

@@ -391,6 +391,7 @@ def shape(frequency: float) -> complex:
     says="Two high-pass filters (Stage I of the controller) remove the infinite branch at low "
     "frequency; the loop behaves as O(-s) near zero and is still unstable.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 2.0, 0.0),
 )
 def stage_one_unstable() -> Finding:
     """Count at the three perturbations; follow L towards s = 0."""
@@ -441,6 +442,7 @@ def stage_one_unstable() -> Finding:
     says="The phase lead of the two high-pass filters (Stage I of the controller) makes the "
     "Nyquist curve encircle -1 clockwise.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 2.0, 0.0),
 )
 def stage_one_encircles() -> Finding:
     """Count encirclements at the three perturbations."""
@@ -470,6 +472,7 @@ def stage_one_encircles() -> Finding:
     says="The lead compensators (Stage II of the controller) add two crossings of the negative "
     "real axis, and the Nyquist curve no longer encloses -1.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 2.0, 0.0),
 )
 def stage_two_crossings() -> Finding:
     """Count the crossings before and after, and the encirclements."""
@@ -501,6 +504,8 @@ def stage_two_crossings() -> Finding:
     place="Eq. (11) and Table II",
     says="The controller has s + z24 in its denominator (the equation) or s + p24 (the table).",
     chapter=CHAPTER,
+    pinned=(Verdict.NOT_AS_WRITTEN, 2.0, 0.0),
+    affects=("K5", "K10"),
 )
 def which_denominator() -> Finding:
     """Run both."""
@@ -525,6 +530,7 @@ def which_denominator() -> Finding:
     place="Sec. IV.B, below Eq. (11)",
     says="The controlled loop is stable for every perturbation of c₁ and c₂ within ±10⁻⁶.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 1.4643205e-6, 1e-12),
 )
 def stable_over_the_box() -> Finding:
     """Chart the box, find the largest stable square, and the margins at the worst corner."""
@@ -566,6 +572,8 @@ def stable_over_the_box() -> Finding:
     place="Sec. IV.B, below Eq. (11)",
     says="The open loop's gain |L| is virtually constant from 0.01 mHz to 1 Hz.",
     chapter=CHAPTER,
+    pinned=(Verdict.DIFFERS, 2740.7, 1.0),
+    affects=("K8", "M3"),
 )
 def constant_gain() -> Finding:
     """Compute the range of |L| over the band, and over the science band."""
@@ -590,6 +598,7 @@ def constant_gain() -> Finding:
     place="Caption of Fig. 9",
     says="Points of Area 1 and of Area 2 are shown, with coordinates.",
     chapter=CHAPTER,
+    pinned=(Verdict.NOT_AS_WRITTEN, 1.0, 0.0),
 )
 def same_point_twice() -> Finding:
     """Count unstable roots of the uncontrolled dual arm on both sides of the ideal point."""
@@ -613,6 +622,7 @@ def same_point_twice() -> Finding:
     says="The controller acts mainly below 0.1 mHz, so that it does not touch the science band "
     "from 1 mHz to 1 Hz.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 0.194727, 1e-6),
 )
 def acts_below() -> Finding:
     """Compare C(s) with its gain at 0.1 mHz and in the science band."""
@@ -641,6 +651,7 @@ def acts_below() -> Finding:
     place="Sec. IV.B, Stage I; Table II",
     says="The poles of the high-pass filters (Stage I of the controller) lie below 0.1 mHz.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 1e-6, 1e-18),
 )
 def poles_below() -> Finding:
     """Read them off Table II."""
@@ -661,6 +672,7 @@ def poles_below() -> Finding:
     place="Sec. IV.B, Stage II",
     says="With the lead compensators, the phase at the unity-gain frequency stays below π.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 0.869991, 1e-6),
 )
 def phase_at_unity_gain() -> Finding:
     """Find that frequency at each perturbation, and the phase lead there."""
@@ -695,6 +707,7 @@ def phase_at_unity_gain() -> Finding:
     place="Sec. IV.B, first paragraph",
     says="A gain of g = 5000 meets the basic requirement on noise suppression.",
     chapter=CHAPTER,
+    pinned=(Verdict.OPEN, 973.24, 0.01),
 )
 def basic_requirement() -> Finding:
     """Compute |1 + L|, and hold the residual noise against an assumed requirement."""
@@ -727,6 +740,7 @@ def basic_requirement() -> Finding:
     place="Introduction and Sec. V",
     says="The controller makes the loop robust, with margin for what the modules around it do.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 0.0, 0.0),
 )
 def robust() -> Finding:
     """Take every margin, that against further delay included."""
@@ -758,6 +772,8 @@ def robust() -> Finding:
     says="The controlled open loop is C(s) P_d(s), with the controller C and the dual arm's "
     "P_d of Sec. III.B.",
     chapter=CHAPTER,
+    pinned=(Verdict.NOT_AS_WRITTEN, 1.0, 0.0),
+    affects=("K5", "K10", "M1"),
 )
 def which_open_loop() -> Finding:
     """Put the actuator's 1/s of Sec. III into the loop, and leave it out."""

@@ -438,6 +438,8 @@ def inner_corner(gain: float) -> float:
     says="The open loop is g/(jω) times the common arm plus g p/(ω+p) · 1/(ω²Δτ) times the "
     "difference of the two delayed signals.",
     chapter=CHAPTER,
+    pinned=(Verdict.NOT_AS_WRITTEN, 1.375746, 1e-6),
+    affects=("D2", "D3"),
 )
 def open_loop_as_printed() -> Finding:
     """Evaluate the printed formula, with and without the missing j, against Table I."""
@@ -464,6 +466,7 @@ def open_loop_as_printed() -> Finding:
     place="Fig. 5",
     says="At g = 10 the stable region (Area 1) has the ideal point A = (1, 1) on its edge.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 0.0, 0.0),
 )
 def chart_at_gain_ten() -> Finding:
     """Locate A against D(0) = 0, and take verdicts on both sides by two methods."""
@@ -496,6 +499,7 @@ def chart_at_gain_ten() -> Finding:
     place="Fig. 6",
     says="As g grows, the upper-right edge moves inwards and the straight edge stays.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, -2.0014925, 1e-6),
 )
 def edges_against_gain() -> Finding:
     """Follow the corner over six decades of gain."""
@@ -527,6 +531,7 @@ def edges_against_gain() -> Finding:
     says="The region shrinks because perturbations make the Nyquist curve cross the negative "
     "real axis, so that the gain margin is finite.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 29.5759064, 1e-6),
 )
 def finite_gain_margin() -> Finding:
     """Find every crossing of the negative real axis at stable points on both sides of A."""
@@ -568,6 +573,7 @@ def finite_gain_margin() -> Finding:
     place="Fig. 6, caption",
     says="The upper edge shown is not the exact limit of stability; it was not computed.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 1.254005934812, 1e-11),
 )
 def exact_upper_edge() -> Finding:
     """Compute the upper edge, verify it, and see what semi-discretization makes of it."""
@@ -603,6 +609,7 @@ def exact_upper_edge() -> Finding:
     place="Sec. III.B, last paragraph",
     says="The stable region shrinks as the gain increases.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 0.5206778, 1e-6),
 )
 def shrinking_region() -> Finding:
     """Follow area and far edge, and look for a point that only a high gain makes stable."""
@@ -645,6 +652,7 @@ def shrinking_region() -> Finding:
     place="Fig. 6, caption",
     says="The parameters of an arm lock never reach the upper edge.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 22204.68, 0.01),
 )
 def never_reached() -> Finding:
     """Compare the corner's distance with the largest perturbation, over the gain."""
@@ -678,6 +686,7 @@ def never_reached() -> Finding:
     place="Sec. III.B, before Fig. 5",
     says="D-subdivision with semi-discretization carries over from the common to the dual arm.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 0.0098137, 1e-6),
 )
 def sampled_framework() -> Finding:
     """Compare the edge of the map with the exact one, at two gains."""
@@ -707,6 +716,7 @@ def sampled_framework() -> Finding:
     place="Sec. III.B, below the open loop",
     says="p is the corner frequency; no value is given.",
     chapter=CHAPTER,
+    pinned=(Verdict.OPEN, 7.249457, 1e-5),
 )
 def unknown_corner_frequency() -> Finding:
     """Vary p by factors of four, and find the p at which A leaves the edge."""
@@ -736,6 +746,8 @@ def unknown_corner_frequency() -> Finding:
     place="Sec. III.B, Δτ = τ₁ - τ₂, against Table I",
     says="The loop uses the dual sensor of Table I, with Δτ the difference of the delays.",
     chapter=CHAPTER,
+    pinned=(Verdict.NOT_AS_WRITTEN, 2.0, 1e-9),
+    affects=("K5", "K13"),
 )
 def convention_of_difference() -> Finding:
     """Compare the two meanings of dtau: weight of the integral, and edges."""

@@ -208,6 +208,8 @@ def dual_gain_margins(start: float = 1e-6, stop: float = 1e-2) -> tuple[GainMarg
     place="Sec. IV.A, first paragraph",
     says="The perturbations are no larger than 10⁻⁶, for which the appendix gives the reason.",
     chapter=CHAPTER,
+    pinned=(Verdict.DIFFERS, 0.0145793, 1e-6),
+    affects=("N10", "K5"),
 )
 def size_of_perturbations() -> Finding:
     """Integrate the appendix's spectrum over the simulated band."""
@@ -240,6 +242,7 @@ def size_of_perturbations() -> Finding:
     says="At c₁ = 1 the single arm's Nyquist curve is tangent at the origin, and its gain "
     "margin is infinite.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 0.0, 0.0),
 )
 def single_arm_ideal() -> Finding:
     """Look at the curve around 2 pi / tau, for crossings, and at counts over all gains."""
@@ -272,6 +275,7 @@ def single_arm_ideal() -> Finding:
     says="For c₁ slightly above 1 there is an infinite branch at ω = 0, along which the phase "
     "goes from -π/2 at ω = 0⁻ to π/2 at ω = 0⁺ around the left half-plane.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, -1.0, 1e-3),
 )
 def single_arm_branch() -> Finding:
     """Follow the phase of L along the indentation, on both sides of c1 = 1."""
@@ -301,6 +305,8 @@ def single_arm_branch() -> Finding:
     place="Sec. IV.A, after Fig. 7b",
     says="For c₁ > 1 the open loop at ω = 2π/τ is 1 - c₁, a negative number.",
     chapter=CHAPTER,
+    pinned=(Verdict.NOT_AS_WRITTEN, 0.5, 1e-9),
+    affects=("N5", "N6"),
 )
 def value_at_full_turn() -> Finding:
     """Evaluate the loop with and without the integrating actuator at 2 pi / tau."""
@@ -332,6 +338,7 @@ def value_at_full_turn() -> Finding:
     says="For c₁ > 1 the curve no longer meets the real axis at the origin but on its negative "
     "half, so that the gain margin is finite and depends on the perturbation.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, -0.1441254, 1e-6),
 )
 def single_arm_crossing() -> Finding:
     """Find the crossing, compare it with its closed form, and count over all gains."""
@@ -371,6 +378,7 @@ def single_arm_crossing() -> Finding:
     "branch makes it unstable, and a crossing of the negative real axis reduces the gain "
     "margin.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 9.87346e-4, 1e-8),
 )
 def common_arm_alike() -> Finding:
     """Measure how far the ideal curve misses the origin, and what the crossing needs."""
@@ -411,6 +419,7 @@ def common_arm_alike() -> Finding:
     place="Sec. IV.A, Fig. 7c",
     says="Without perturbations the dual arm stands precisely on the boundary of stability.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 0.0, 0.0),
 )
 def dual_arm_ideal() -> Finding:
     """Count at (1, 1) and on both sides of it; find the root of 1 + L."""
@@ -436,6 +445,8 @@ def dual_arm_ideal() -> Finding:
     says="At (1, 0.995) the dual arm is unstable: its open loop is of order 1/s² near s = 0, "
     "and the infinite branch encircles the origin once, counter-clockwise, as ω passes zero.",
     chapter=CHAPTER,
+    pinned=(Verdict.NOT_AS_WRITTEN, -1.0, 1e-3),
+    affects=("D4", "N11"),
 )
 def dual_arm_branch() -> Finding:
     """Follow the phase of L along the indentation, right and left of the pole."""
@@ -478,6 +489,7 @@ def dual_arm_branch() -> Finding:
     place="Sec. IV.A, on the dual arm",
     says="The dual arm has only a finite gain margin, which shrinks as the perturbation grows.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 3134.6589, 1e-3),
 )
 def dual_arm_gain_margin() -> Finding:
     """Compute the margin on the stable side, and look for one at the paper's points."""
@@ -528,6 +540,7 @@ def _number(value: float) -> str:
     place="Sec. IV.A, end of the paragraph on the dual arm",
     says="Even small deviations of c₁ and c₂ can change the stability margins significantly.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 0.309175, 1e-4),
 )
 def margins_near_ideal() -> Finding:
     """Compare modulus and phase margin on the stable side, near (1, 1) and further off."""
@@ -561,6 +574,7 @@ def margins_near_ideal() -> Finding:
     place="Sec. IV.A, on the single and the common arm",
     says="It is the infinite branch at ω = 0 that causes the instability.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 4.0, 0.0),
 )
 def branch_decides() -> Finding:
     """Look for stable loops with an infinite branch, and at the side it is on."""

@@ -21,20 +21,22 @@ from book.companion.claims.ledger import (
     Ledger,
     Verdict,
     all_claims,
+    badge,
     check_in_parallel,
+    explanation,
+    table_of_claims,
 )
 
-#: Section of the paper, by the letter that a claim's identifier starts with.
+#: Section of the paper that a chapter with claims is about.
 SECTIONS = {
-    "Z": "Sec. I and Table I",
-    "T": "Sec. I and Table I",
-    "S": "Sec. II, single arm",
-    "C": "Sec. III.A, common arm",
-    "D": "Sec. III.B, dual arm",
-    "N": "Sec. IV.A, frequency domain",
-    "K": "Sec. IV.B, controller",
-    "M": "Sec. IV.C, simulation",
-    "A": "Appendix",
+    "01_opening": "Sec. I and Table I",
+    "02_hayes": "Sec. II, single arm",
+    "03_common_arm": "Sec. III.A, common arm",
+    "04_dual_arm": "Sec. III.B, dual arm",
+    "05_nyquist": "Sec. IV.A, frequency domain",
+    "06_controller": "Sec. IV.B, controller",
+    "07_simulation": "Sec. IV.C, simulation",
+    "08_perturbations": "Appendix",
 }
 
 
@@ -49,34 +51,25 @@ def whole_ledger() -> Ledger:
         ARMLOCK_FIGURES names; the pages read that. Elsewhere each call checks them, which
         takes most of a minute.
     """
-    claims, folder = all_claims(), os.environ.get("ARMLOCK_FIGURES")
+    folder = os.environ.get("ARMLOCK_FIGURES")
     if not folder:
-        return check_in_parallel(claims)
-    file = Path(folder) / "claims.json"
+        return check_in_parallel()
     try:
-        records = json.loads(file.read_text("utf-8"))
+        records = json.loads((Path(folder) / "claims.json").read_text("utf-8"))
     except (FileNotFoundError, json.JSONDecodeError):  # not there, or just being written
         records = []
-    known = {record["claim"]: record for record in records}
-    if list(known) != [claim.identifier for claim in claims]:
-        ledger = check_in_parallel(claims)
+    found = {
+        record["claim"]: Finding(
+            Verdict(record["verdict"]), record["value"], record["quantity"], record["note"]
+        )
+        for record in records
+    }
+    claims = all_claims()
+    if list(found) != [claim.identifier for claim in claims]:
+        ledger = check_in_parallel()
         ledger.write(Path(folder))
         return ledger
-    ledger = Ledger([])
-    for claim in claims:
-        record = known[claim.identifier]
-        ledger.entries.append(
-            (
-                claim,
-                Finding(
-                    Verdict(record["verdict"]),
-                    record["value"],
-                    record["quantity"],
-                    record["note"],
-                ),
-            )
-        )
-    return ledger
+    return Ledger((claim, found[claim.identifier]) for claim in claims)
 
 
 class Source(NamedTuple):
@@ -110,7 +103,7 @@ def section(claim: Claim) -> str:
     >>> [section(claim) for claim, _ in check("T1")]
     ['Sec. I and Table I']
     """
-    return SECTIONS.get(claim.identifier[:1], "Elsewhere")
+    return SECTIONS[claim.chapter]
 
 
 def source(claim: Claim) -> Source:
@@ -177,9 +170,7 @@ class VerdictCounts:
     def _repr_html_(self) -> str:
         """Return the line as HTML."""
         parts = "".join(
-            f'<span class="verdict verdict-{v.name.lower()}">{self.counts[v]} {v}</span> '
-            for v in Verdict
-            if self.counts[v]
+            badge(v, f"{self.counts[v]} {v}") + " " for v in Verdict if self.counts[v]
         )
         total = sum(self.counts.values())
         return f'<p class="verdict-counts">{total} claims: {parts}</p>'
@@ -217,9 +208,7 @@ class LedgerPage:
         downloads = f'<p class="figure-downloads">The ledger as data: {links}</p>'
         return (
             f'<div class="ledger">{_controls(self.ledger)}'
-            '<table class="claims"><thead><tr><th scope="col">Claim, verdict</th>'
-            '<th scope="col">What the paper says, the number that decides it, and why</th>'
-            f"</tr></thead><tbody>{rows}</tbody></table>{downloads if links else ''}</div>"
+            f"{table_of_claims(rows)}{downloads if links else ''}</div>"
             f"<script>{_SCRIPT}</script>"
         )
 
@@ -229,7 +218,7 @@ def _controls(ledger: Ledger) -> str:
     counts = ledger.counts()
     boxes = "".join(
         f'<label><input type="checkbox" name="verdict" value="{v.name.lower()}" checked> '
-        f'<span class="verdict verdict-{v.name.lower()}">{v} ({counts[v]})</span></label>'
+        f"{badge(v, f'{v} ({counts[v]})')}</label>"
         for v in Verdict
         if counts[v]
     )
@@ -254,16 +243,13 @@ def _row(claim: Claim, finding: Finding) -> str:
     where = f"{place.file}, line {place.line}"
     if url:
         where = f'<a href="{escape(url)}/blob/main/{place.file}#L{place.line}">{where}</a>'
-    kind = finding.verdict.name.lower()
     return (
-        f'<tr id="ledger-{escape(claim.identifier)}" data-verdict="{kind}" '
+        f'<tr id="ledger-{escape(claim.identifier)}" '
+        f'data-verdict="{finding.verdict.name.lower()}" '
         f'data-section="{escape(section(claim))}">'
         f'<td><a href="{escape(chapter_link(claim))}">{escape(claim.identifier)}</a><br>'
-        f'<span class="verdict verdict-{kind}">{finding.verdict}</span>'
-        f"<br><small>{escape(claim.place)}</small></td>"
-        f"<td><p>{escape(claim.says)}</p>"
-        f"<p><strong>{finding.value:.6g}</strong>: {escape(finding.quantity)}.</p>"
-        f"<p>{escape(finding.note)}</p>"
+        f"{badge(finding.verdict, finding.verdict)}"
+        f"<br><small>{escape(claim.place)}</small></td><td>{explanation(claim, finding)}"
         f"<details><summary>Source of {escape(claim.identifier)}</summary><p>{where}</p>"
         f'<pre tabindex="0">{escape(place.text)}</pre></details></td></tr>'
     )
@@ -281,29 +267,6 @@ def errata(ledger: Ledger, verdicts: Sequence[Verdict] = ()) -> ErrataTable:
     """
     chosen = verdicts or (Verdict.NOT_AS_WRITTEN, Verdict.DIFFERS)
     return ErrataTable([entry for entry in ledger if entry[1].verdict in chosen], ledger)
-
-
-#: Claims whose verdict or number uses the formula or value that an erratum corrects.
-DEPENDS = {
-    "T2": ("T3", "T4"),
-    "T3": ("T2", "T4"),
-    "T4": ("Z1", "D1", "D2"),
-    "C4": ("D1", "D10"),
-    "C5": ("C6", "C7"),
-    "C7": ("C8",),
-    "D1": ("D2", "D3"),
-    "D10": ("K5", "K13"),
-    "N1": ("N10", "K5"),
-    "N4": ("N5", "N6"),
-    "N8": ("D4", "N11"),
-    "K4": ("K5", "K10"),
-    "K6": ("K8", "M3"),
-    "K13": ("K5", "K10", "M1"),
-    "S8": ("S9",),
-    "A2": ("A3", "A4"),
-    "A3": ("N1", "M2", "A4", "A5"),
-    "M7": ("M1", "M4"),
-}
 
 
 class ErrataTable:
@@ -326,8 +289,7 @@ class ErrataTable:
 
     def dependents(self, claim: Claim) -> list[tuple[Claim, Finding]]:
         """Return the claims that the erratum bears on, as far as they are registered."""
-        named = DEPENDS.get(claim.identifier, ())
-        return [self.known[name] for name in named if name in self.known]
+        return [self.known[name] for name in claim.affects if name in self.known]
 
     def _repr_html_(self) -> str:
         """Return one block an erratum; a table of four columns would not fit a phone."""
@@ -350,12 +312,10 @@ class ErrataTable:
         if depends:
             parts["What depends on it"] = depends
         items = "".join(f"<dt>{name}</dt><dd>{text}</dd>" for name, text in parts.items())
-        kind = finding.verdict.name.lower()
         return (
             f'<section class="erratum" id="erratum-{escape(claim.identifier)}">'
             f"<p><strong>{own}, {escape(claim.place)}</strong> "
-            f'<span class="verdict verdict-{kind}">{finding.verdict}</span></p>'
-            f"<dl>{items}</dl></section>"
+            f"{badge(finding.verdict, finding.verdict)}</p><dl>{items}</dl></section>"
         )
 
 

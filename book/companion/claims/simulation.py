@@ -565,6 +565,7 @@ def _spectrum(name: str) -> Spectrum:
     says="With the controller, the loop is stable at the constant perturbation (c₁, c₂) = "
     "(1, 1 - 10⁻⁶).",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 0.0, 0.0),
 )
 def constant_perturbation() -> Finding:
     """Count, and look at the run."""
@@ -587,6 +588,7 @@ def constant_perturbation() -> Finding:
     place="Sec. IV.C, Fig. 10a",
     says="The loop stays stable with time-varying c₁, c₂ of the appendix's spectrum.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 9031.8, 1.0),
 )
 def varying_perturbation() -> Finding:
     """Run the spectrum at face value and at other sizes; compare with frozen loops."""
@@ -649,6 +651,7 @@ def _grown(size: float) -> float:
     says="The loop reduces the laser's noise by about three to four orders from 0.1 mHz to "
     "1 Hz, under time-varying perturbations (System 1) and constant ones (System 2).",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 2.98832, 1e-5),
 )
 def suppression_reached() -> Finding:
     """Compute |1 + L| over the band, and measure the suppression of both systems."""
@@ -682,6 +685,7 @@ def suppression_reached() -> Finding:
     says="The spectra of System 1 (time-varying c₁, c₂) and System 2 (constant ones) are "
     "nearly alike, because the Bode plots differ below 1 µHz only.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 5.0068e-4, 1e-6),
 )
 def spectra_alike() -> Finding:
     """From which frequency on the spectra agree, and the Bode plots."""
@@ -706,6 +710,7 @@ def spectra_alike() -> Finding:
     says="Over long times the outputs of System 1 (time-varying c₁, c₂) and System 2 (constant "
     "ones) differ noticeably.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 0.2192, 1e-3),
 )
 def long_times() -> Finding:
     """R.m.s. of the difference of the outputs, relative to the output, over the run."""
@@ -735,6 +740,7 @@ def long_times() -> Finding:
     place="Sec. IV.C, Fig. 10c",
     says="The simulated spectrum of System 2 (constant c₁, c₂) agrees with the theory.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 0.05787, 1e-4),
 )
 def agreement_with_theory() -> Finding:
     """Compare measured suppression with |1 + L|, band by band."""
@@ -763,6 +769,8 @@ def agreement_with_theory() -> Finding:
     says="System 2 stands at (1, 1 - 10⁻⁶) by the caption of Fig. 10(a), at (1, 1) by that of "
     "Fig. 10(c).",
     chapter=CHAPTER,
+    pinned=(Verdict.NOT_AS_WRITTEN, 3.879e-4, 5e-6),
+    affects=("M1", "M4"),
 )
 def which_point() -> Finding:
     """Whether the figure's spectrum could tell the two points apart."""
@@ -791,6 +799,7 @@ def which_point() -> Finding:
     place="Sec. IV.C",
     says="The input is laser frequency noise of 30/f Hz/√Hz.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 0.0, 0.03),
 )
 def laser_input() -> Finding:
     """Compare the spectrum of the run's input with the formula."""

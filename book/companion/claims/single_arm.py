@@ -128,6 +128,7 @@ def _test_points() -> npt.NDArray[np.complex128]:
     says="With an integrating actuator and a plain gain, differentiating Eq. (2) gives the "
     "delay equation (3).",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 0.0, 1e-8),
 )
 def differentiated_equation() -> Finding:
     """Put phi = exp(s t) into both equations, the integral of (2) done by quadrature."""
@@ -163,6 +164,7 @@ def differentiated_equation() -> Finding:
     place="Sec. II, after Eq. (3)",
     says="Eq. (3) is the Hayes equation with a = -k₁ and b = k₁k₂, so that k₂ = -b/a.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 0.0, 1e-10),
 )
 def hayes_correspondence() -> Finding:
     """Compare characteristic functions, and roots in three ways."""
@@ -200,6 +202,7 @@ def _counts_across(gain_delay: float, width: float) -> list[int]:
     place="Sec. II, after Eq. (3)",
     says="k₂ = 1, no perturbation, lies exactly on the stability boundary, whatever k₁ is.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 0.0, 0.0),
 )
 def ideal_line() -> Finding:
     """Count on both sides of k2 = 1, for positive gains and for negative ones."""
@@ -232,6 +235,7 @@ def ideal_line() -> Finding:
     place="Sec. II, after Eq. (3)",
     says="For k₂ > 1 the loop is unstable.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 1.0, 0.0),
 )
 def above_one() -> Finding:
     """Count above k2 = 1, and see the real root that D(0) < 0 < D(infinity) forces."""
@@ -262,6 +266,7 @@ def above_one() -> Finding:
     place="Sec. II, after Eq. (3)",
     says="For k₂ < 1 the loop is stable.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, -1.011031041661212, 1e-12),
 )
 def below_one() -> Finding:
     """Find the lower limit of k2 from the Hayes boundary and count on both sides of it."""
@@ -302,6 +307,7 @@ def below_one() -> Finding:
     says="Lowering k₂ below 1 turns the line of the loop counter-clockwise into the stable "
     "region.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, np.degrees(np.pi / 4 - np.arctan(0.5)), 1e-9),
 )
 def turning_line() -> Finding:
     """Measure the angle of the half line (-k1, k1 k2) as k2 falls, and count along it."""
@@ -337,6 +343,7 @@ def _roots_near_zero(function: Any, radius: float) -> int:
     says="Eq. (3) has an additional root at s = 0 that Eq. (2) does not have, because it was "
     "differentiated.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 1.0 + TAU1, 1e-6),
 )
 def additional_root() -> Finding:
     """Compare the roots of s (1 + L) with those of 1 + L, on and off k2 = 1."""
@@ -381,6 +388,8 @@ def additional_root() -> Finding:
     place="Sec. II, after Eq. (2); caption of Fig. 2",
     says="n is the additive noise of Eq. (1), and also the deviation of the gain, k₁ = 1 + n.",
     chapter=CHAPTER,
+    pinned=(Verdict.NOT_AS_WRITTEN, 0.434699287, 1e-8),
+    affects=("S9",),
 )
 def symbols() -> Finding:
     """Take n as a gain and follow the slowest root; take it as a signal and run the loop."""
@@ -436,6 +445,7 @@ def _separation(gain: float, k2: float, n: float) -> float:
     says="Stability is decided mainly by the multiplicative perturbation; changes of k₁ do not "
     "affect it directly.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 2.0 * np.pi / 3.0 / np.sqrt(3.0), 1e-12),
 )
 def gain_matters() -> Finding:
     """Look for a k2 at which the verdict depends on the gain."""
@@ -469,6 +479,7 @@ def gain_matters() -> Finding:
     says="The additional root does not affect stability: the line k₂ = 1 bounds the region "
     "analytically without a root of the loop on the imaginary axis.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, -0.0020258541171, 1e-12),
 )
 def ideal_loop_is_stable() -> Finding:
     """Find the rightmost root of 1 + L at k2 = 1, and count those to its right."""
@@ -503,6 +514,7 @@ def ideal_loop_is_stable() -> Finding:
     says="The red line of slope -1 through the origin is the ideal condition, and the boundary "
     "of the stable region.",
     chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 1.0, 1e-6),
 )
 def end_of_line() -> Finding:
     """Follow b = -a into a > 0, and find where the region below it ends."""
@@ -538,6 +550,7 @@ def end_of_line() -> Finding:
     place="Sec. III.A, after Eq. (5)",
     says="For a single arm D-subdivision yields the whole stable region directly.",
     chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 0.0, 0.0),
 )
 def closed_form_region() -> Finding:
     """Compare the closed form's region with a chart, and a sample with two other methods."""
