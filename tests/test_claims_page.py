@@ -13,7 +13,7 @@ from book.companion.claims.assumptions import (
     first_break,
     over_corners,
 )
-from book.companion.claims.controller import highest_corner
+from book.companion.claims.controller import highest_stable_corner
 from book.companion.claims.page import (
     LedgerPage,
     VerdictCounts,
@@ -117,7 +117,7 @@ def test_the_loop_is_lost_at_the_upper_end_of_two_decades():
 def test_the_loop_is_lost_just_above_the_highest_corner():
     corners, columns = over_corners(3)
     for name, difference in DIFFERENCES.items():
-        limit = highest_corner(difference)
+        limit = highest_stable_corner(difference)
         stable = corners[columns[name] > 0.0]
         assert stable.max() == pytest.approx(limit * (1.0 - 1e-3))
         assert columns[f"{name} margin"][corners == stable.max()] < 0.01

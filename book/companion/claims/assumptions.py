@@ -29,7 +29,7 @@ from armlock.simulation import sampled_open_loop
 from armlock.stability import unstable_roots
 from book.companion.claims.controller import (
     SUPPRESSION_BAND,
-    highest_corner,
+    highest_stable_corner,
     noise_to_spare,
     suppression,
 )
@@ -117,7 +117,7 @@ def over_corners(points: int = 31) -> tuple[FloatArray, dict[str, FloatArray]]:
     """
     grid = DUAL_SENSOR_CORNER * np.logspace(-1.0, 1.0, points)
     close = 1.0 - np.append(np.linspace(0.24, 0.02, 12), [1e-3, -1e-3])
-    near = [highest_corner(difference) * close for difference in DIFFERENCES.values()]
+    near = [highest_stable_corner(difference) * close for difference in DIFFERENCES.values()]
     corners = np.unique(np.concatenate((grid, *near)))
     columns: dict[str, FloatArray] = {}
     for name, difference in DIFFERENCES.items():
@@ -156,8 +156,8 @@ class Assumption(NamedTuple):
 
 def _corner() -> Assumption:
     tenth = first_break(paper_loop(0.1 * DUAL_SENSOR_CORNER))
-    here, limit = first_break(paper_loop()), highest_corner()
-    half = highest_corner(DIFFERENCES["half"])
+    here, limit = first_break(paper_loop()), highest_stable_corner()
+    half = highest_stable_corner(DIFFERENCES["half"])
     return Assumption(
         "p, the corner frequency of the dual sensor",
         f"{DUAL_SENSOR_CORNER:.4g} rad/s ({DUAL_SENSOR_CORNER / (2 * np.pi):.2g} Hz)",
