@@ -50,6 +50,15 @@ def test_checks_run_once_and_only_when_asked_for(calls):
     assert calls == ["X1"]
 
 
+def test_what_a_build_has_found_is_not_computed_again(calls, monkeypatch, tmp_path):
+    (entry,) = [entry for entry in all_claims() if entry.identifier == "X1"]
+    found = Finding(Verdict.OPEN, 3.0, "m", "found at the start of the build")
+    Ledger([(entry, found)]).write(tmp_path)
+    monkeypatch.setenv("ARMLOCK_FIGURES", str(tmp_path))
+    assert check("X1", "X2")["X1"] == found
+    assert calls == []
+
+
 def test_findings_are_looked_up_by_identifier(calls):
     ledger = check("X2", "X1")
     assert ledger["X1"].verdict is Verdict.REPRODUCED

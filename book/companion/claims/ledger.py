@@ -16,6 +16,7 @@ from __future__ import annotations
 import csv
 import html
 import json
+import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
@@ -253,7 +254,10 @@ class Ledger:
             writer.writerow(names)
             # As many digits as in the figures' tables: more would differ between machines.
             writer.writerows(record | {"value": f"{record['value']:.7g}"} for record in records)
-        tree.write_text(json.dumps(records, indent=1, ensure_ascii=False) + "\n", "utf-8")
+        # Other processes read this one: it is there as a whole, or not at all.
+        part = tree.with_suffix(".part")
+        part.write_text(json.dumps(records, indent=1, ensure_ascii=False) + "\n", "utf-8")
+        part.replace(tree)
         return [table, tree]
 
     def __repr__(self) -> str:
@@ -297,8 +301,26 @@ def table_of_claims(rows: str) -> str:
     )
 
 
+def findings_of_the_build() -> dict[str, Finding]:
+    """Return what the claims' check at the start of a build or of the tests has found.
+
+    Both check every claim on all cores, before the first page or test, and leave claims.json
+    in the folder that the environment variable ARMLOCK_FIGURES names. Elsewhere this is empty.
+    """
+    folder = os.environ.get("ARMLOCK_FIGURES")
+    file = Path(folder) / "claims.json" if folder else None
+    if file is None or not file.exists():
+        return {}
+    return {
+        record["claim"]: Finding(
+            Verdict(record["verdict"]), record["value"], record["quantity"], record["note"]
+        )
+        for record in json.loads(file.read_text("utf-8"))
+    }
+
+
 def check(*identifiers: str) -> Ledger:
-    """Check claims by identifier.
+    """Check claims by identifier, those that a build has not checked already.
 
     Parameters
     ----------
@@ -320,7 +342,8 @@ def check(*identifiers: str) -> Ledger:
                 f"identifier must be one of {', '.join(_REGISTER)}; got {identifier!r}"
             )
     chosen = [_REGISTER[identifier] for identifier in identifiers]
-    return Ledger((entry, entry.check()) for entry in chosen)
+    found = findings_of_the_build()
+    return Ledger((entry, found.get(entry.identifier) or entry.check()) for entry in chosen)
 
 
 def chapter_claims(chapter: str) -> Ledger:

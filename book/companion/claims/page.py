@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import html
 import inspect
-import json
 import os
 from collections.abc import Sequence
 from importlib import metadata
@@ -22,8 +21,10 @@ from book.companion.claims.ledger import (
     Verdict,
     all_claims,
     badge,
+    check,
     check_in_parallel,
     explanation,
+    findings_of_the_build,
     table_of_claims,
 )
 
@@ -46,30 +47,16 @@ def whole_ledger() -> Ledger:
     Returns
     -------
     Ledger
-        All claims. A build of the book checks them before its first page and leaves
-        claims.csv and claims.json in the folder that the environment variable
-        ARMLOCK_FIGURES names; the pages read that. Elsewhere each call checks them, which
-        takes most of a minute.
+        All claims. A build of the book has checked them before its first page; elsewhere
+        each call checks them, which takes most of a minute.
     """
-    folder = os.environ.get("ARMLOCK_FIGURES")
-    if not folder:
-        return check_in_parallel()
-    try:
-        records = json.loads((Path(folder) / "claims.json").read_text("utf-8"))
-    except (FileNotFoundError, json.JSONDecodeError):  # not there, or just being written
-        records = []
-    found = {
-        record["claim"]: Finding(
-            Verdict(record["verdict"]), record["value"], record["quantity"], record["note"]
-        )
-        for record in records
-    }
-    claims = all_claims()
-    if list(found) != [claim.identifier for claim in claims]:
-        ledger = check_in_parallel()
+    names = [claim.identifier for claim in all_claims()]
+    if findings_of_the_build().keys() >= set(names):
+        return check(*names)
+    ledger = check_in_parallel()
+    if folder := os.environ.get("ARMLOCK_FIGURES"):
         ledger.write(Path(folder))
-        return ledger
-    return Ledger((claim, found[claim.identifier]) for claim in claims)
+    return ledger
 
 
 class Source(NamedTuple):
