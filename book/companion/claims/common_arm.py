@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from scipy.optimize import bisect, brentq, minimize_scalar
 
 from armlock.boundary import boundary_radius, enclosed_area, outline, perimeter, rays
@@ -18,10 +19,11 @@ from armlock.paper import COMMON_ARM_GAIN, STEP, TAU1, TAU2
 from armlock.roots import extended_root, polish_root, pseudospectral_roots, rightmost_root
 from armlock.semidiscretization import semi_discretization, spectral_radius, transition_matrix
 from armlock.stability import StabilityChart, stability_chart, unstable_roots
-from book.companion.claims.ledger import Finding, Verdict, claim, decide
+from book.companion.claims import ledger
+from book.companion.claims.ledger import Finding, Verdict, decide
 from book.companion.schemes import pade_poles, sampled_loop, standard_schemes
 
-CHAPTER = "03_common_arm"
+claim = partial(ledger.claim, chapter="03_common_arm")
 
 #: Half-width of a window that holds the whole stable region, and of one that shows branches.
 WINDOW = 7.0
@@ -302,9 +304,9 @@ def scheme_errors(step: float = STEP) -> dict[str, MapErrors]:
     return {name: errors_of(system) for name, system in standard_schemes(ARM, step).items()}
 
 
-def order_of(steps: FloatArray, errors: FloatArray) -> float:
-    """Observed order: slope of log(error) against log(step), by least squares."""
-    return float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
+def exponent(x: npt.ArrayLike, y: npt.ArrayLike) -> float:
+    """Slope of log(y) against log(x), by least squares: an observed order."""
+    return float(np.polyfit(np.log(x), np.log(y), 1)[0])
 
 
 @cache
@@ -343,7 +345,6 @@ def ideal_root() -> float:
     "C1",
     place="Eq. (5a)",
     says="The two parametric equations give the parameters at which jω is a root.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, 0.0, 1e-11),
 )
 def parametric_curve() -> Finding:
@@ -376,7 +377,6 @@ def parametric_curve() -> Finding:
     "C2",
     place="Eq. (5b)",
     says="At ω = 0 the boundary is the straight line c₁ + c₂ = 2.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, 0.0, 0.0),
 )
 def straight_line() -> Finding:
@@ -402,7 +402,6 @@ def straight_line() -> Finding:
     place="Fig. 4(a) and the text below Eq. (5b)",
     says="The D-curves, with branches, cusps and rings, separate regions that differ in their "
     "number of unstable roots.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 0.0, 0.0),
 )
 def shape_of_the_curve() -> Finding:
@@ -438,7 +437,6 @@ def shape_of_the_curve() -> Finding:
     "C4",
     place="Sec. III.A, first paragraph and the example of Fig. 4(a)",
     says="Delay 1 is the shorter one (text); it is 20.1 s against 19.9 s (example).",
-    chapter=CHAPTER,
     pinned=(Verdict.NOT_AS_WRITTEN, 0.10536, 1e-4),
     affects=("D1", "D10"),
 )
@@ -465,7 +463,6 @@ def order_of_the_delays() -> Finding:
     place="Eq. (7), the integral below it, and Eq. (8)",
     says="The recurrence weighs the delayed samples with R and g h c₂, R being an integral of "
     "g c exp(-2 g (t_i - ν)) over a step; the matrix holds R₁ and R₂.",
-    chapter=CHAPTER,
     pinned=(Verdict.NOT_AS_WRITTEN, 1.82965e-4, 1e-8),
     affects=("C6", "C7"),
 )
@@ -503,7 +500,6 @@ def recurrence() -> Finding:
     "C6",
     place="below Eq. (8)",
     says="The system is stable if and only if the spectral radius of its matrix is below one.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, 0.0, 0.0),
 )
 def spectral_radius_decides() -> Finding:
@@ -534,13 +530,12 @@ def spectral_radius_decides() -> Finding:
     "C7",
     place="Fig. 4(b)",
     says="With h = 0.05 s, semi-discretization gives the stable region and its boundary.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, 0.02800, 5e-5),
 )
 def region_at_the_step() -> Finding:
     """Measure how far the boundary is off at the paper's step, and how this falls with h."""
     roots, shifts = zip(*(convergence(order) for order in (0, 1)), strict=True)
-    orders = [order_of(np.array(STEPS), errors) for errors in (*roots, *shifts)]
+    orders = [exponent(STEPS, errors) for errors in (*roots, *shifts)]
     along, reach = rays(RAYS), float(exact_radius().max())
     mapped = boundary_radius(semi_discretization(ARM, STEP), along)
     own, exact = (enclosed_area(outline(r, along)) for r in (mapped, exact_radius()))
@@ -559,7 +554,7 @@ def region_at_the_step() -> Finding:
         "roots by a term of order h, and the envelopes that form the round ends not at all: "
         "these move with the amplitude, of order h². Along the lower edge, which one turn of "
         "the curve forms, order 0 converges with "
-        f"{order_of(np.array(STEPS), low):.2f} only, from an error of {low[0]:.1e}.",
+        f"{exponent(STEPS, low):.2f} only, from an error of {low[0]:.1e}.",
     )
 
 
@@ -567,7 +562,6 @@ def region_at_the_step() -> Finding:
     "C8",
     place="Sec. III.A, before Eq. (6)",
     says="Semi-discretization guarantees that the whole stable region is covered.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 0.0026588, 1e-6),
 )
 def covers_the_region() -> Finding:
@@ -594,7 +588,6 @@ def covers_the_region() -> Finding:
     "C9",
     place="Fig. 4(c)",
     says="Near (1, 1) the boundary is the line c₁ + c₂ = 2.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, 0.0171888, 1e-6),
 )
 def local_boundary() -> Finding:
@@ -619,7 +612,6 @@ def local_boundary() -> Finding:
     "C10",
     place="Sec. III.A, last paragraph",
     says="The ideal point c₁ = c₂ = 1 lies exactly on the boundary.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, 0.0, 0.0),
 )
 def ideal_point() -> Finding:
@@ -644,7 +636,6 @@ def ideal_point() -> Finding:
     "C11",
     place="Sec. III.A, before Eq. (6)",
     says="Semi-discretization is more accurate than standard discretisations of delay systems.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 1642.8, 2.0),
 )
 def more_accurate() -> Finding:
@@ -684,7 +675,6 @@ def more_accurate() -> Finding:
     place="below Eq. (8)",
     says="The criterion on the matrix, a spectral radius below one, decides the stability of "
     "the delayed loop.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 4.416e-6, 1e-8),
 )
 def map_and_loop() -> Finding:
@@ -717,7 +707,6 @@ def map_and_loop() -> Finding:
     place="Sec. III.A, after the example",
     says="D-subdivision alone may miss part of the boundary, for it is sampled over a finite "
     "range and in finite precision.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 0.0761516, 1e-6),
 )
 def d_subdivision_alone() -> Finding:
@@ -750,7 +739,6 @@ def d_subdivision_alone() -> Finding:
     "C14",
     place="Sec. III.A, last paragraph",
     says="The analytical stability boundary of the common arm is the line c₁ + c₂ = 2.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 0.40351, 1e-4),
 )
 def whole_boundary() -> Finding:
