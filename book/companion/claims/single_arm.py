@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,9 +18,10 @@ from armlock.paper import PERTURBATION, TAU1
 from armlock.roots import rightmost_root
 from armlock.semidiscretization import spectral_radius
 from armlock.stability import stability_chart, unstable_roots
-from book.companion.claims.ledger import Finding, Verdict, claim, decide
+from book.companion.claims import ledger
+from book.companion.claims.ledger import Finding, Verdict, decide
 
-CHAPTER = "02_hayes"
+claim = partial(ledger.claim, chapter="02_hayes")
 
 #: Nominal gain of Sec. II in rad/s (k1 = 1 + n with n = 0).
 NOMINAL_GAIN = 1.0
@@ -111,7 +113,6 @@ def _test_points() -> ComplexArray:
     place="Sec. II, Eqs. (2) and (3)",
     says="With an integrating actuator and a plain gain, differentiating Eq. (2) gives the "
     "delay equation (3).",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, 0.0, 1e-8),
 )
 def differentiated_equation() -> Finding:
@@ -142,7 +143,6 @@ def differentiated_equation() -> Finding:
     "S2",
     place="Sec. II, after Eq. (3)",
     says="Eq. (3) is the Hayes equation with a = -k₁ and b = k₁k₂, so that k₂ = -b/a.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, 0.0, 1e-10),
 )
 def hayes_correspondence() -> Finding:
@@ -170,7 +170,6 @@ def hayes_correspondence() -> Finding:
     "S3",
     place="Sec. II, after Eq. (3)",
     says="k₂ = 1, no perturbation, lies exactly on the stability boundary, whatever k₁ is.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, 0.0, 0.0),
 )
 def ideal_line() -> Finding:
@@ -201,7 +200,6 @@ def ideal_line() -> Finding:
     "S4",
     place="Sec. II, after Eq. (3)",
     says="For k₂ > 1 the loop is unstable.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, 1.0, 0.0),
 )
 def above_one() -> Finding:
@@ -228,7 +226,6 @@ def above_one() -> Finding:
     "S5",
     place="Sec. II, after Eq. (3)",
     says="For k₂ < 1 the loop is stable.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, -1.011031041661212, 1e-12),
 )
 def below_one() -> Finding:
@@ -257,7 +254,6 @@ def below_one() -> Finding:
     place="Sec. II, after Eq. (3)",
     says="Lowering k₂ below 1 turns the line of the loop counter-clockwise into the stable "
     "region.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, np.degrees(np.pi / 4 - np.arctan(0.5)), 1e-9),
 )
 def turning_line() -> Finding:
@@ -284,7 +280,6 @@ def turning_line() -> Finding:
     place="Sec. II, Remark",
     says="Eq. (3) has an additional root at s = 0 that Eq. (2) does not have, because it was "
     "differentiated.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 1.0 + TAU1, 1e-6),
 )
 def additional_root() -> Finding:
@@ -323,7 +318,6 @@ def _turns(values: ComplexArray) -> int:
     "S8",
     place="Sec. II, after Eq. (2); caption of Fig. 2",
     says="n is the additive noise of Eq. (1), and also the deviation of the gain, k₁ = 1 + n.",
-    chapter=CHAPTER,
     pinned=(Verdict.NOT_AS_WRITTEN, 0.434699287, 1e-8),
     affects=("S9",),
 )
@@ -375,7 +369,6 @@ def _separation(gain: float, k2: float, n: float) -> float:
     place="Sec. II, after Eq. (3)",
     says="Stability is decided mainly by the multiplicative perturbation; changes of k₁ do not "
     "affect it directly.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 2.0 * np.pi / 3.0 / np.sqrt(3.0), 1e-12),
 )
 def gain_matters() -> Finding:
@@ -403,7 +396,6 @@ def gain_matters() -> Finding:
     place="Sec. II, Remark",
     says="The additional root does not affect stability: the line k₂ = 1 bounds the region "
     "analytically without a root of the loop on the imaginary axis.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, -0.0020258541171, 1e-12),
 )
 def ideal_loop_is_stable() -> Finding:
@@ -435,7 +427,6 @@ def ideal_loop_is_stable() -> Finding:
     place="Fig. 3 and its caption",
     says="The red line of slope -1 through the origin is the ideal condition, and the boundary "
     "of the stable region.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 1.0, 1e-6),
 )
 def end_of_line() -> Finding:
@@ -462,7 +453,6 @@ def end_of_line() -> Finding:
     "S12",
     place="Sec. III.A, after Eq. (5)",
     says="For a single arm D-subdivision yields the whole stable region directly.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, 0.0, 0.0),
 )
 def closed_form_region() -> Finding:

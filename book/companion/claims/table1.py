@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,9 +25,10 @@ from armlock.paper import (
 )
 from armlock.roots import rightmost_root
 from armlock.stability import unstable_roots
-from book.companion.claims.ledger import Finding, Verdict, claim, decide
+from book.companion.claims import ledger
+from book.companion.claims.ledger import Finding, Verdict, decide
 
-CHAPTER = "01_opening"
+claim = partial(ledger.claim, chapter="01_opening")
 
 #: The paper's own difference of the delays (Sec. III.B), and half of it, in s.
 FULL_DIFFERENCE = TAU1 - TAU2
@@ -88,7 +90,6 @@ def _on_edge(name: str, loop: Loop) -> bool:
     says="Without perturbations the single, the common and the dual arm all sit on the "
     "boundary of their stable region, which makes them sensitive to multiplicative "
     "perturbations.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 2.0, 0.0),
 )
 def ideal_point_on_boundary() -> Finding:
@@ -185,7 +186,6 @@ def _largest(values: Any) -> float:
     "T1",
     place="Table I, first row",
     says="The single arm responds with 2i sin(τω) exp(-iωτ).",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, 0.0, 1e-12),
 )
 def single_row() -> Finding:
@@ -208,7 +208,6 @@ def single_row() -> Finding:
     "T2",
     place="Table I, second row",
     says="The common arm responds with 2 (1 - cos(Δτ ω) exp(-iω τ̄)).",
-    chapter=CHAPTER,
     pinned=(Verdict.NOT_AS_WRITTEN, 1.0, 1e-6),
     affects=("T3", "T4"),
 )
@@ -233,7 +232,6 @@ def common_row() -> Finding:
     "T3",
     place="Table I, third row",
     says="The difference arm responds with -2i sin(Δτ ω) exp(-iω τ̄).",
-    chapter=CHAPTER,
     pinned=(Verdict.NOT_AS_WRITTEN, 2.0, 1e-6),
     affects=("T2", "T4"),
 )
@@ -259,7 +257,6 @@ def difference_row() -> Finding:
     place="Table I, fourth row",
     says="The dual arm responds with P₊ - p/(1+p) · 1/(iωΔτ) · P₋, where P₊ and P₋ are the "
     "responses of the common and the difference arm.",
-    chapter=CHAPTER,
     pinned=(Verdict.NOT_AS_WRITTEN, 0.7210738, 1e-6),
     affects=("Z1", "D1", "D2"),
 )
@@ -301,7 +298,6 @@ def dual_row() -> Finding:
     place="Table I, fifth row",
     says="The modified dual arm responds with P₊ H₊ - P₋ H₋, where P₊ and P₋ are the responses "
     "of the common and the difference arm.",
-    chapter=CHAPTER,
     pinned=(Verdict.OPEN, 2011.602, 1e-3),
 )
 def modified_dual_row() -> Finding:
@@ -328,7 +324,6 @@ def modified_dual_row() -> Finding:
     "T6",
     place="Sec. III.A, example",
     says="Round trips of 20.1 s and 19.9 s are those of Taiji's arms.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, 0.0691807, 1e-7),
 )
 def round_trips() -> Finding:
