@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from armlock.nyquist import NyquistCurve
     from armlock.stability import StabilityChart
 
+#: Colours of the figures, which the colour-blind tell apart too (Okabe and Ito).
 BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, BLACK = (
     "#0072B2",
     "#D55E00",

@@ -11,7 +11,7 @@ from schemdraw import dsp as blocks
 from armlock.plotting import BLUE, ORANGE
 
 Point = tuple[float, float]
-#: Its elements have no types.
+# Its elements have no types.
 dsp: Any = blocks
 
 
