@@ -166,10 +166,9 @@ def size_of_perturbations() -> Finding:
         rms,
         f"r.m.s. of the appendix's spectrum from {low:g} Hz to {high:g} Hz",
         f"That is {rms / PERTURBATION:.0f} times 10⁻⁶. Even where the spectrum is flat, at "
-        f"{PHASE_NOISE_LEVEL:g}/√Hz, a band of {1e3 * flat:.1f} mHz is enough for 10⁻⁶. So "
-        "10⁻⁶ is an assumption, and the appendix does not support it. The Nyquist plots do not "
-        "depend on it: they have perturbations of a thousandth. Claim A3 has the same from the "
-        "side of the appendix.",
+        f"{PHASE_NOISE_LEVEL:g}/√Hz, a band of {1e3 * flat:.1f} mHz is enough for 10⁻⁶, which "
+        "therefore is an assumption. The Nyquist plots do not depend on it: they have "
+        "perturbations of a thousandth.",
     )
 
 
@@ -192,10 +191,9 @@ def single_arm_ideal() -> Finding:
         decide(tangent, crossings == 0 and highest == 0),
         crossings,
         "crossings of the negative real axis",
-        "At every multiple of 2π/τ the curve passes through the origin, horizontally, from "
-        "left to right, and nowhere comes above the real axis for ω > 0. What it is tangent "
-        "to is the real axis. With the open loop L, 1 + L has no unstable root at any of "
-        f"{FACTORS.size} gains from {FACTORS[0]:g} to {FACTORS[-1]:g} rad/s.",
+        "At every multiple of 2π/τ the curve passes through the origin, horizontally; what it "
+        "is tangent to is the real axis. 1 + L, with the open loop L, has no unstable root at "
+        f"any of {FACTORS.size} gains from {FACTORS[0]:g} to {FACTORS[-1]:g} rad/s.",
     )
 
 
@@ -217,12 +215,11 @@ def single_arm_branch() -> Finding:
         change / np.pi,
         "change of the phase from ω = 0⁻ to 0⁺, in units of π",
         f"From {start / np.pi:.2f} π down to {(start + change) / np.pi:.2f} π, which is the "
-        "same direction as +π/2: clockwise through the negative real axis, if the contour "
-        f"passes the pole at s = 0 on its right. That gives {curve.encirclements} "
-        f"encirclement of -1 and {curve.closed_loop_roots} unstable root. At c₁ = "
-        f"{2.0 - SINGLE_POINT[0]:g} there is such a branch as well, from "
-        f"{other_start / np.pi:.2f} π by {other_change / np.pi:.0f} π through the "
-        f"right half-plane, with {other.encirclements} encirclements.",
+        "direction of +π/2, if the contour passes the pole at s = 0 on its right. That gives "
+        f"{curve.encirclements} encirclement of -1 and {curve.closed_loop_roots} unstable "
+        f"root. At c₁ = {2.0 - SINGLE_POINT[0]:g} there is such a branch as well, from "
+        f"{other_start / np.pi:.2f} π by {other_change / np.pi:.0f} π through the right "
+        f"half-plane, with {other.encirclements} encirclements.",
     )
 
 
@@ -276,11 +273,9 @@ def single_arm_crossing() -> Finding:
         value,
         f"the open loop where its curve first crosses the negative real axis, at c₁ = {c1:g}",
         f"At ω = {omega:.5f} rad/s, {100.0 * (1.0 - omega / turn):.2f} % below 2π/τ; in "
-        f"closed form -g√(c₁² - 1)/ω. A gain {factor:.3f} times higher puts it on -1, and the "
-        f"number of unstable roots goes from {below} to {above}. But this is no margin: "
-        f"at every gain there is at least {fewest} unstable root, and no gain makes the loop "
-        "stable. What moves with the perturbation is the gain at which a further pair becomes "
-        "unstable.",
+        f"closed form -g√(c₁² - 1)/ω. At {factor:.3f} times the gain it reaches -1, and the "
+        f"number of unstable roots goes from {below} to {above}. But no gain makes the loop "
+        f"stable: at every one there is at least {fewest} unstable root, so this is no margin.",
     )
 
 
@@ -316,9 +311,9 @@ def common_arm_alike() -> Finding:
         f"{COMMON_POINT[1]:g}). But the two delays never complete a turn together: the ideal "
         f"curve passes below the origin at a distance of {miss:.1e} (g = {COMMON.gain:g} "
         "rad/s), and a smaller perturbation leaves it on that side. At (1, 1 + 10⁻⁶) the "
-        f"first crossing is at {small[0]:.2f} rad/s, where the open loop is {small[1]:.2e}. "
-        f"At (1, {COMMON_POINT[1]:g}) there is at least {fewest} unstable root at every gain, "
-        "as in the single arm.",
+        f"outermost crossing is at {small[0]:.2f} rad/s, where the open loop is "
+        f"{small[1]:.2e}. As in the single arm, at least {fewest} root is unstable at every "
+        "gain.",
     )
 
 
@@ -338,11 +333,9 @@ def dual_arm_ideal() -> Finding:
         decide((above, at, below) == (0, -1, 1) and curve.closed_loop_roots == 0),
         curve.closed_loop_roots,
         "zeros of 1 + L in the right half-plane at (1, 1), with the open loop L",
-        f"{above} unstable roots at (1, 1 + 10⁻⁶), {below} at (1, 1 - 10⁻⁶), and "
-        "between the two the characteristic function D has a root s = 0. That root belongs to "
-        "the sensor's integral, not to 1 + L: L has a simple pole at s = 0 there, order "
-        f"{curve.pole_order}, its curve does not encircle -1, and the slowest root of 1 + L "
-        f"is at {root.real:.3g}/s.",
+        f"{above} unstable roots at (1, 1 + 10⁻⁶), {below} at (1, 1 - 10⁻⁶), and between the "
+        "two the characteristic function D has a root s = 0. It is one of the sensor's "
+        f"integral, not of 1 + L, whose slowest root is at {root.real:.3g}/s.",
     )
 
 
@@ -378,12 +371,10 @@ def dual_arm_branch() -> Finding:
         f"Unstable, with {curve.closed_loop_roots} root at "
         f"{rightmost_of_loop(DUAL, c1, c2).real:.4g}/s, and near s = 0 the open loop is "
         f"{leading:.3g}/s². One turn, but clockwise, when the contour passes s = 0 on the "
-        "right, as the paper has it for the single arm: N = 1 encirclement of -1, P = 0 "
-        "open-loop poles and Z = N + P = 1 root in the right half-plane. Counter-clockwise it "
-        f"is only for a contour that passes on the left ({other:+.0f} turn); then the double "
-        f"pole lies inside, P = {curve.pole_order}, N = {inside}, and Z = "
-        f"{inside + curve.pole_order} again. Counter-clockwise with P = 0 would mean a "
-        "negative number of roots.",
+        "right, as for the single arm: N = 1 encirclement of -1, P = 0 open-loop poles and Z = "
+        "N + P = 1 root in the right half-plane. It is counter-clockwise only for a contour on "
+        f"the left ({other:+.0f} turn), with the double pole inside: P = {curve.pole_order}, "
+        f"N = {inside}.",
     )
 
 
@@ -408,15 +399,13 @@ def dual_arm_gain_margin() -> Finding:
         float(factor[0]),
         f"gain factor up to which the dual arm stays stable at (1, 1 + {SIZES[0]:g}), g = "
         f"{DUAL.gain:g} rad/s",
-        f"On the stable side with c₁ + c₂ > 2 it is so: {factor[0]:.0f} at (1, 1 + "
-        f"{SIZES[0]:g}), {factor[-1]:.1f} at (1, 1 + {SIZES[-1]:g}), at first falling as the "
-        f"perturbation to the power {exponent:.2f}. From (1, 1 + {low_gain_threshold():.2g}) "
-        f"on there is a lower limit as well, a factor {dual_margins()[-1].gain_lower:.1e} at "
-        f"(1, 1 + {SIZES[-1]:g}). At (1, 1) the Nyquist curve crosses the negative real axis "
-        "nowhere, and at no gain tried there is an unstable root. At (0.999, 1) the margin is "
-        "infinite: perturbations that weaken the arms give no crossing. At the paper's (1, "
-        f"{DUAL_POINT[1]:g}) there is no margin to speak of: at least {fewest} unstable root "
-        "at every gain.",
+        f"On the stable side it is so: {factor[0]:.0f} at (1, 1 + {SIZES[0]:g}), "
+        f"{factor[-1]:.1f} at (1, 1 + {SIZES[-1]:g}), at first as the perturbation to the "
+        f"power {exponent:.2f}. From (1, 1 + {low_gain_threshold():.2g}) on there is a lower "
+        f"limit as well, a factor {dual_margins()[-1].gain_lower:.1e} at (1, 1 + "
+        f"{SIZES[-1]:g}). At (1, 1) and (0.999, 1) the Nyquist curve crosses the negative real "
+        f"axis nowhere, and the margin is infinite. At the paper's (1, {DUAL_POINT[1]:g}) at "
+        f"least {fewest} root is unstable at every gain: there is no margin.",
     )
 
 
@@ -443,10 +432,10 @@ def margins_near_ideal() -> Finding:
         f"{sizes[-1]:g})",
         f"To the side c₁ > c₂, 10⁻⁶ is enough for {count} unstable root, which grows by a "
         f"factor e in {1.0 / rate / 86400.0:.1f} days. To the other side the upper gain margin "
-        f"falls {gains:.0f}-fold, but from thousands; the modulus margin stays at "
+        f"falls {gains:.0f}-fold, from thousands; the modulus margin stays at "
         f"{found[0].modulus:.2f} and the phase margin between {phases.min():.1f} and "
-        f"{phases.max():.1f} degrees. The margins do not announce the boundary: it is crossed "
-        "at s = 0, where the open loop is infinite.",
+        f"{phases.max():.1f} degrees. They do not announce the boundary, which is crossed at "
+        "s = 0, where the open loop is infinite.",
     )
 
 
