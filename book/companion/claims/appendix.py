@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -21,10 +21,11 @@ from armlock.paper import (
     SAMPLE_RATE,
 )
 from armlock.spectra import Spectrum, SpectrumEstimator
-from book.companion.claims.ledger import Finding, Verdict, claim, decide
+from book.companion.claims import ledger
+from book.companion.claims.ledger import Finding, Verdict, decide
 from book.companion.claims.simulation import LOWEST, PERTURBATION_SEEDS, face_value_rms
 
-CHAPTER = "08_perturbations"
+claim = partial(ledger.claim, chapter="08_perturbations")
 
 #: Gain errors of the two channels at which the model is tried, and their difference.
 MISMATCH = (2e-6, -1e-6)
@@ -197,7 +198,6 @@ def laser_phase_rms() -> float:
     place="Appendix, Eqs. (A2) to (A4)",
     says="Unequal gains 1 + ε_I and 1 + ε_Q of the phasemeter's I and Q channels give the "
     "measured phase (1 + η)φ, with η = ε_Q - ε_I.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, 1.999996e-6, 1e-12),
 )
 def gain_mismatch() -> Finding:
@@ -221,7 +221,6 @@ def gain_mismatch() -> Finding:
     "A2",
     place="Appendix, Eq. (A4)",
     says="The measured phase is (1 + η)φ, for a phase φ of any size.",
-    chapter=CHAPTER,
     pinned=(Verdict.DIFFERS, 0.39334, 1e-4),
     affects=("A3", "A4"),
 )
@@ -246,7 +245,6 @@ def any_phase() -> Finding:
     place="Appendix, Eq. (A5), and Sec. IV.A",
     says="The spectrum of the phase noise requirement, taken for η, stands for perturbations "
     "of at most 10⁻⁶.",
-    chapter=CHAPTER,
     pinned=(Verdict.DIFFERS, 14579.3, 0.1),
     affects=("N1", "M2", "A4", "A5"),
 )
@@ -275,7 +273,6 @@ def size_of_spectrum() -> Finding:
     says="The spectrum of the error ηφ is the convolution of those of phase and perturbation, "
     "so that η must be one or several orders below the additive phase noise δφ to give an "
     "error as large.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 0.0, 0.05),
 )
 def convolution_of_spectra() -> Finding:
@@ -307,7 +304,6 @@ def convolution_of_spectra() -> Finding:
     "A5",
     place="Appendix, Fig. 11",
     says="c₁(t) and c₂(t) are generated from the spectrum.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, 0.0, 0.03),
 )
 def generated_series() -> Finding:

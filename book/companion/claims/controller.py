@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -25,9 +25,10 @@ from armlock.paper import (
 )
 from armlock.roots import rightmost_root
 from armlock.stability import StabilityChart, stability_chart, unstable_roots
-from book.companion.claims.ledger import Finding, Verdict, claim, decide
+from book.companion.claims import ledger
+from book.companion.claims.ledger import Finding, Verdict, decide
 
-CHAPTER = "06_controller"
+claim = partial(ledger.claim, chapter="06_controller")
 TURN = 2.0 * np.pi
 
 #: The three perturbations of the paper's Bode plot, as its text means them (claim K7).
@@ -304,7 +305,6 @@ def relative_gain(frequency: float) -> complex:
     place="Sec. IV.B, Stage I",
     says="Two high-pass filters (Stage I of the controller) remove the infinite branch at low "
     "frequency; the loop behaves as O(-s) near zero and is still unstable.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 2.0, 0.0),
 )
 def stage_one_unstable() -> Finding:
@@ -337,7 +337,6 @@ def stage_one_unstable() -> Finding:
     place="Sec. IV.B, Stage I; Fig. 8(a)",
     says="The phase lead of the two high-pass filters (Stage I of the controller) makes the "
     "Nyquist curve encircle -1 clockwise.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 2.0, 0.0),
 )
 def stage_one_encircles() -> Finding:
@@ -363,7 +362,6 @@ def stage_one_encircles() -> Finding:
     place="Sec. IV.B, Stage II; Fig. 8(b)",
     says="The lead compensators (Stage II of the controller) add two crossings of the negative "
     "real axis, and the Nyquist curve no longer encloses -1.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, 2.0, 0.0),
 )
 def stage_two_crossings() -> Finding:
@@ -393,7 +391,6 @@ def stage_two_crossings() -> Finding:
     "K4",
     place="Eq. (11) and Table II",
     says="The controller has s + z24 in its denominator (the equation) or s + p24 (the table).",
-    chapter=CHAPTER,
     pinned=(Verdict.NOT_AS_WRITTEN, 2.0, 0.0),
     affects=("K5", "K10"),
 )
@@ -418,7 +415,6 @@ def which_denominator() -> Finding:
     "K5",
     place="Sec. IV.B, below Eq. (11)",
     says="The controlled loop is stable for every perturbation of c₁ and c₂ within ±10⁻⁶.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 1.4643205e-6, 1e-12),
 )
 def stable_over_the_box() -> Finding:
@@ -459,7 +455,6 @@ def stable_over_the_box() -> Finding:
     "K6",
     place="Sec. IV.B, below Eq. (11)",
     says="The open loop's gain |L| is virtually constant from 0.01 mHz to 1 Hz.",
-    chapter=CHAPTER,
     pinned=(Verdict.DIFFERS, 2740.7, 1.0),
     affects=("K8", "M3"),
 )
@@ -483,7 +478,6 @@ def constant_gain() -> Finding:
     "K7",
     place="Caption of Fig. 9",
     says="Points of Area 1 and of Area 2 are shown, with coordinates.",
-    chapter=CHAPTER,
     pinned=(Verdict.NOT_AS_WRITTEN, 1.0, 0.0),
 )
 def same_point_twice() -> Finding:
@@ -505,7 +499,6 @@ def same_point_twice() -> Finding:
     place="Sec. IV.B, first paragraph",
     says="The controller acts mainly below 0.1 mHz, so that it does not touch the science band "
     "from 1 mHz to 1 Hz.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 0.194727, 1e-6),
 )
 def acts_below() -> Finding:
@@ -529,7 +522,6 @@ def acts_below() -> Finding:
     "K9",
     place="Sec. IV.B, Stage I; Table II",
     says="The poles of the high-pass filters (Stage I of the controller) lie below 0.1 mHz.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, 1e-6, 1e-18),
 )
 def poles_below() -> Finding:
@@ -550,7 +542,6 @@ def poles_below() -> Finding:
     "K10",
     place="Sec. IV.B, Stage II",
     says="With the lead compensators, the phase at the unity-gain frequency stays below π.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, 0.869991, 1e-6),
 )
 def phase_at_unity_gain() -> Finding:
@@ -580,7 +571,6 @@ def phase_at_unity_gain() -> Finding:
     "K11",
     place="Sec. IV.B, first paragraph",
     says="A gain of g = 5000 meets the basic requirement on noise suppression.",
-    chapter=CHAPTER,
     pinned=(Verdict.OPEN, 973.24, 0.01),
 )
 def basic_requirement() -> Finding:
@@ -612,7 +602,6 @@ def basic_requirement() -> Finding:
     "K12",
     place="Introduction and Sec. V",
     says="The controller makes the loop robust, with margin for what the modules around it do.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 0.0, 0.0),
 )
 def robust() -> Finding:
@@ -643,7 +632,6 @@ def robust() -> Finding:
     place="Sec. IV.B, Eq. (11) with Sec. III.B",
     says="The controlled open loop is C(s) P_d(s), with the controller C and the dual arm's "
     "P_d of Sec. III.B.",
-    chapter=CHAPTER,
     pinned=(Verdict.NOT_AS_WRITTEN, 1.0, 0.0),
     affects=("K5", "K10", "M1"),
 )

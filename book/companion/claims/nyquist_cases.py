@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -23,9 +23,10 @@ from armlock.paper import (
 )
 from armlock.roots import rightmost_root
 from armlock.stability import unstable_roots
-from book.companion.claims.ledger import Finding, Verdict, claim, decide
+from book.companion.claims import ledger
+from book.companion.claims.ledger import Finding, Verdict, decide
 
-CHAPTER = "05_nyquist"
+claim = partial(ledger.claim, chapter="05_nyquist")
 Arm = SingleArm | CommonArm | DualArm
 
 #: The loops of the section, at the gains of the paper's charts.
@@ -152,7 +153,6 @@ def dual_margins() -> tuple[Margins, ...]:
     "N1",
     place="Sec. IV.A, first paragraph",
     says="The perturbations are no larger than 10⁻⁶, for which the appendix gives the reason.",
-    chapter=CHAPTER,
     pinned=(Verdict.DIFFERS, 0.0145793, 1e-6),
     affects=("N10", "K5"),
 )
@@ -177,7 +177,6 @@ def size_of_perturbations() -> Finding:
     place="Sec. IV.A, Fig. 7a",
     says="At c₁ = 1 the single arm's Nyquist curve is tangent at the origin, and its gain "
     "margin is infinite.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, 0.0, 0.0),
 )
 def single_arm_ideal() -> Finding:
@@ -202,7 +201,6 @@ def single_arm_ideal() -> Finding:
     place="Sec. IV.A, Fig. 7b",
     says="For c₁ slightly above 1 there is an infinite branch at ω = 0, along which the phase "
     "goes from -π/2 at ω = 0⁻ to π/2 at ω = 0⁺ around the left half-plane.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, -1.0, 1e-3),
 )
 def single_arm_branch() -> Finding:
@@ -227,7 +225,6 @@ def single_arm_branch() -> Finding:
     "N4",
     place="Sec. IV.A, after Fig. 7b",
     says="For c₁ > 1 the open loop at ω = 2π/τ is 1 - c₁, a negative number.",
-    chapter=CHAPTER,
     pinned=(Verdict.NOT_AS_WRITTEN, 0.5, 1e-9),
     affects=("N5", "N6"),
 )
@@ -252,7 +249,6 @@ def value_at_full_turn() -> Finding:
     place="Sec. IV.A, after Fig. 7b",
     says="For c₁ > 1 the curve no longer meets the real axis at the origin but on its negative "
     "half, so that the gain margin is finite and depends on the perturbation.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, -0.1441254, 1e-6),
 )
 def single_arm_crossing() -> Finding:
@@ -285,7 +281,6 @@ def single_arm_crossing() -> Finding:
     says="The common arm behaves alike: its curve is tangent at the origin, the infinite "
     "branch makes it unstable, and a crossing of the negative real axis reduces the gain "
     "margin.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 9.87346e-4, 1e-8),
 )
 def common_arm_alike() -> Finding:
@@ -321,7 +316,6 @@ def common_arm_alike() -> Finding:
     "N7",
     place="Sec. IV.A, Fig. 7c",
     says="Without perturbations the dual arm stands precisely on the boundary of stability.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, 0.0, 0.0),
 )
 def dual_arm_ideal() -> Finding:
@@ -344,7 +338,6 @@ def dual_arm_ideal() -> Finding:
     place="Sec. IV.A, Fig. 7d",
     says="At (1, 0.995) the dual arm is unstable: its open loop is of order 1/s² near s = 0, "
     "and the infinite branch encircles the origin once, counter-clockwise, as ω passes zero.",
-    chapter=CHAPTER,
     pinned=(Verdict.NOT_AS_WRITTEN, -1.0, 1e-3),
     affects=("D4", "N11"),
 )
@@ -382,7 +375,6 @@ def dual_arm_branch() -> Finding:
     "N9",
     place="Sec. IV.A, on the dual arm",
     says="The dual arm has only a finite gain margin, which shrinks as the perturbation grows.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 3134.6589, 1e-3),
 )
 def dual_arm_gain_margin() -> Finding:
@@ -413,7 +405,6 @@ def dual_arm_gain_margin() -> Finding:
     "N10",
     place="Sec. IV.A, end of the paragraph on the dual arm",
     says="Even small deviations of c₁ and c₂ can change the stability margins significantly.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 0.309175, 1e-4),
 )
 def margins_near_ideal() -> Finding:
@@ -443,7 +434,6 @@ def margins_near_ideal() -> Finding:
     "N11",
     place="Sec. IV.A, on the single and the common arm",
     says="It is the infinite branch at ω = 0 that causes the instability.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 4.0, 0.0),
 )
 def branch_decides() -> Finding:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -22,9 +22,10 @@ from armlock.roots import rightmost_root
 from armlock.simulation import LIMIT, DivergenceError, Simulation, sampled_open_loop
 from armlock.spectra import Spectrum, SpectrumEstimator
 from armlock.stability import unstable_roots
-from book.companion.claims.ledger import Finding, Verdict, claim, decide
+from book.companion.claims import ledger
+from book.companion.claims.ledger import Finding, Verdict, decide
 
-CHAPTER = "07_simulation"
+claim = partial(ledger.claim, chapter="07_simulation")
 
 #: Band in Hz over which the paper states the suppression.
 BAND = (1e-4, 1.0)
@@ -535,7 +536,6 @@ def alike_from(run: Run) -> float:
     place="Sec. IV.C, Fig. 10a",
     says="With the controller, the loop is stable at the constant perturbation (c₁, c₂) = "
     "(1, 1 - 10⁻⁶).",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, 0.0, 0.0),
 )
 def constant_perturbation() -> Finding:
@@ -558,7 +558,6 @@ def constant_perturbation() -> Finding:
     "M2",
     place="Sec. IV.C, Fig. 10a",
     says="The loop stays stable with time-varying c₁, c₂ of the appendix's spectrum.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 9031.8, 1.0),
 )
 def varying_perturbation() -> Finding:
@@ -610,7 +609,6 @@ def _outcome(trace: Trace) -> str:
     place="Sec. IV.C, Figs. 10b and 10c",
     says="The loop reduces the laser's noise by about three to four orders from 0.1 mHz to "
     "1 Hz, under time-varying perturbations (System 1) and constant ones (System 2).",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 2.98832, 1e-5),
 )
 def suppression_reached() -> Finding:
@@ -644,7 +642,6 @@ def suppression_reached() -> Finding:
     place="Sec. IV.C, Figs. 9, 10b and 10c",
     says="The spectra of System 1 (time-varying c₁, c₂) and System 2 (constant ones) are "
     "nearly alike, because the Bode plots differ below 1 µHz only.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 5.0068e-4, 1e-6),
 )
 def spectra_alike() -> Finding:
@@ -671,7 +668,6 @@ def spectra_alike() -> Finding:
     place="Sec. IV.C, Fig. 10a",
     says="Over long times the outputs of System 1 (time-varying c₁, c₂) and System 2 (constant "
     "ones) differ noticeably.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, 0.2192, 1e-3),
 )
 def long_times() -> Finding:
@@ -702,7 +698,6 @@ def long_times() -> Finding:
     "M6",
     place="Sec. IV.C, Fig. 10c",
     says="The simulated spectrum of System 2 (constant c₁, c₂) agrees with the theory.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, 0.05787, 1e-4),
 )
 def agreement_with_theory() -> Finding:
@@ -730,7 +725,6 @@ def agreement_with_theory() -> Finding:
     place="Captions of Figs. 10(a) and 10(c)",
     says="System 2 stands at (1, 1 - 10⁻⁶) by the caption of Fig. 10(a), at (1, 1) by that of "
     "Fig. 10(c).",
-    chapter=CHAPTER,
     pinned=(Verdict.NOT_AS_WRITTEN, 3.879e-4, 5e-6),
     affects=("M1", "M4"),
 )
@@ -759,7 +753,6 @@ def which_point() -> Finding:
     "M8",
     place="Sec. IV.C",
     says="The input is laser frequency noise of 30/f Hz/√Hz.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, 0.0, 0.03),
 )
 def laser_input() -> Finding:
