@@ -16,10 +16,9 @@ from book.companion.claims.assumptions import (
 )
 from book.companion.claims.controller import highest_stable_corner
 from book.companion.claims.page import (
+    Errata,
     LedgerPage,
     VerdictCounts,
-    errata,
-    section,
     source,
     whole_ledger,
 )
@@ -55,6 +54,7 @@ def test_the_page_has_a_row_a_claim_with_its_chapter_and_source(ledger, monkeypa
     assert "def common_row()" in text
     assert "claims.csv" not in text
     assert 'data-verdict="not_as_written"' in text
+    assert 'data-section="Sec. I and Table I"' in text
 
 
 def test_the_page_offers_the_ledger_as_data(ledger, monkeypatch, tmp_path):
@@ -91,7 +91,6 @@ def test_a_source_is_the_function_that_checks(ledger):
     assert found.file == "book/companion/claims/table1.py"
     assert found.line > 1
     assert "def single_row" in found.text
-    assert section(claim) == "Sec. I and Table I"
 
 
 def test_counts_name_only_verdicts_that_occur(ledger):
@@ -100,11 +99,11 @@ def test_counts_name_only_verdicts_that_occur(ledger):
 
 
 def test_errata_are_what_is_not_as_printed(ledger):
-    found = errata(ledger)
+    found = Errata(ledger)
     assert [claim.identifier for claim, _ in found.entries] == ["T2"]
     assert Ids(found._repr_html_()).ids == ["erratum-T2"]
     assert "Compare with 2 - e1 - e2" in found._repr_html_()
-    assert len(errata(ledger, [Verdict.REPRODUCED])) == 2
+    assert len(Errata(ledger, Verdict.REPRODUCED)) == 2
 
 
 @pytest.mark.parametrize("name", DIFFERENCES)
