@@ -211,9 +211,8 @@ def gain_mismatch() -> Finding:
         decide(agrees and off < 1e-5),
         off,
         "relative difference of the exact error and ηφ, as φ goes to zero",
-        f"For ε_I = {MISMATCH[0]:g} and ε_Q = {MISMATCH[1]:g}: the slope is η/(1 + ε_I). "
-        "At any phase the error is (η/2) sin 2φ to first order, which is ηφ only next to "
-        "φ = 0.",
+        f"For ε_I = {MISMATCH[0]:g} and ε_Q = {MISMATCH[1]:g}: the slope is η/(1 + ε_I). At "
+        "any phase the error is (η/2) sin 2φ to first order, which is ηφ only next to φ = 0.",
     )
 
 
@@ -232,10 +231,9 @@ def any_phase() -> Finding:
         decide(not stays_small),
         linear_up_to(0.1),
         "rad, phase up to which the error is ηφ within 10 percent",
-        "Unequal gains of the phasemeter's two channels give an error of (η/2) sin 2φ: at no "
-        f"phase is it larger than {largest:.3f} η, and over whole turns its mean is zero. A "
-        f"phase that runs through many turns, as a laser's does ({laser_phase_rms():.1e} rad "
-        "r.m.s. over the simulated band, for the paper's laser noise), is measured without "
+        f"The error is (η/2) sin 2φ: at no phase is it larger than {largest:.3f} η, and over "
+        "whole turns its mean is zero. A phase that runs through many turns, as a laser's does "
+        f"({laser_phase_rms():.1e} rad r.m.s. over the simulated band), is measured without "
         "any gain error.",
     )
 
@@ -259,11 +257,10 @@ def size_of_spectrum() -> Finding:
         decide(rms <= 2.0 * PERTURBATION),
         rms / PERTURBATION,
         "r.m.s. of the spectrum over the simulated band, in units of 10⁻⁶",
-        f"The band is from {LOWEST:g} Hz, one over the duration, to {0.5 * SAMPLE_RATE:g} Hz, "
-        f"half the sample rate. Where the spectrum is flat, above {1e3 * PHASE_NOISE_CORNER:g} "
-        f"mHz, it alone has {white:.1e}; the part that rises towards low frequency stays "
-        f"within 10⁻⁶ only if it ends at {1e3 * lowest:.1f} mHz. Claim N1 has the same from "
-        "the side of Sec. IV.A, which refers to the appendix for its limit.",
+        f"The band is from {LOWEST:g} Hz, one over the duration, to {0.5 * SAMPLE_RATE:g} Hz. "
+        f"Where the spectrum is flat, above {1e3 * PHASE_NOISE_CORNER:g} mHz, it alone has "
+        f"{white:.1e}; the part that rises towards low frequency stays within 10⁻⁶ only if it "
+        f"ends at {1e3 * lowest:.1f} mHz. Claim N1 is the same from the side of Sec. IV.A.",
     )
 
 
@@ -291,12 +288,11 @@ def convolution_of_spectra() -> Finding:
         close,
         "largest relative difference between the product's spectrum and the convolution, in "
         "bands with at least 1000 averages",
-        "The convolution is right, for independent stationary signals (with fewer averages "
-        f"the scatter is up to {100 * worst:.0f} percent). Its consequence is stronger than "
-        "the paper says: a perturbation of a slow phase is amplified by the phase's r.m.s., "
-        f"which for the laser noise of the simulation is {factor:.1e} rad, so that η must be "
-        f"about {np.log10(factor):.0f} orders below δφ. And the paper then takes η as large "
-        "as δφ, not smaller.",
+        "The convolution is right, for independent stationary signals (with fewer averages the "
+        f"scatter is up to {100 * worst:.0f} percent). Its consequence is stronger than the "
+        "paper says: a perturbation of a slow phase is amplified by the phase's r.m.s., for "
+        f"the laser noise of the simulation {factor:.1e} rad, so that η must be about "
+        f"{np.log10(factor):.0f} orders below δφ. The paper then takes η as large as δφ.",
     )
 
 
@@ -323,9 +319,9 @@ def generated_series() -> Finding:
         "largest relative deviation of the series' spectrum from the formula, where it is "
         "known to 1 %",
         f"{100 * inside:.0f} percent of all bands hold the formula in their 95 percent "
-        "interval. The lowest frequencies decide what the series look like: "
-        f"{100 * slow:.1f} percent of the variance over the simulated band lies below 0.1 mHz, "
-        "and it grows as the inverse cube of the frequency at which the spectrum is cut, which "
-        f"the paper does not give. Here the spectrum is flat below {LOWEST:g} Hz, one over the "
-        f"duration, and the two series drawn have an r.m.s. of {rms[0]:.3f} and {rms[1]:.3f}.",
+        f"interval. {100 * slow:.1f} percent of the variance over the simulated band lies "
+        "below 0.1 mHz, and it grows as the inverse cube of the frequency at which the "
+        f"spectrum is cut, which the paper does not give. Here that is {LOWEST:g} Hz, one over "
+        f"the duration, and the two series drawn have an r.m.s. of {rms[0]:.3f} and "
+        f"{rms[1]:.3f}.",
     )

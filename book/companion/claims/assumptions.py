@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+from collections.abc import Callable
 from functools import cache
 from typing import NamedTuple
 
@@ -121,6 +122,16 @@ class Assumption(NamedTuple):
     sensitivity: str
 
 
+_MAKERS: list[Callable[[], Assumption]] = []
+
+
+def assumption(make: Callable[[], Assumption]) -> Callable[[], Assumption]:
+    """Put the decorated function's assumption on the page, in the order of this file."""
+    _MAKERS.append(make)
+    return make
+
+
+@assumption
 def _corner() -> Assumption:
     tenth = first_break(paper_loop(0.1 * DUAL_SENSOR_CORNER))
     here, limit = first_break(paper_loop()), highest_stable_corner()
@@ -136,6 +147,7 @@ def _corner() -> Assumption:
     )
 
 
+@assumption
 def _difference() -> Assumption:
     loops = [paper_loop(difference=d) for d in DIFFERENCES.values()]
     full, half = (first_break(loop) for loop in loops)
@@ -150,6 +162,7 @@ def _difference() -> Assumption:
     )
 
 
+@assumption
 def _actuator() -> Assumption:
     points = 1.0 + PERTURBATION * np.array([-1.0, 0.0, 1.0])
     without = unstable_roots(paper_loop(), 1.0, points)
@@ -164,6 +177,7 @@ def _actuator() -> Assumption:
     )
 
 
+@assumption
 def _denominator() -> Assumption:
     printed = paper_loop(controller=table_two(denominator="printed"))
     return Assumption(
@@ -175,6 +189,7 @@ def _denominator() -> Assumption:
     )
 
 
+@assumption
 def _gain() -> Assumption:
     higher = first_break(paper_loop(controller=table_two(2.0 * np.pi * CONTROLLER_GAIN)))
     lower = paper_loop(controller=table_two(CONTROLLER_GAIN / (2.0 * np.pi)))
@@ -189,6 +204,7 @@ def _gain() -> Assumption:
     )
 
 
+@assumption
 def _order() -> Assumption:
     up, down = first_break(paper_loop()), first_break(paper_loop(), (-1.0, 1.0))
     return Assumption(
@@ -201,6 +217,7 @@ def _order() -> Assumption:
     )
 
 
+@assumption
 def _history() -> Assumption:
     days = []
     for c2 in (1.0, 1.0 - PERTURBATION):
@@ -218,6 +235,7 @@ def _history() -> Assumption:
     )
 
 
+@assumption
 def _scale() -> Assumption:
     rms = face_value_rms()
     return Assumption(
@@ -234,6 +252,7 @@ def _scale() -> Assumption:
     )
 
 
+@assumption
 def _lowest() -> Assumption:
     total = band_rms(LOWEST, 0.5 * SAMPLE_RATE)
     sizes = ", ".join(
@@ -251,6 +270,7 @@ def _lowest() -> Assumption:
     )
 
 
+@assumption
 def _laser() -> Assumption:
     cutoff = LaserNoise(0).cutoff
     low = SUPPRESSION_BAND[0]
@@ -268,6 +288,7 @@ def _laser() -> Assumption:
     )
 
 
+@assumption
 def _seeds() -> Assumption:
     return Assumption(
         "The random numbers of the simulation",
@@ -280,6 +301,7 @@ def _seeds() -> Assumption:
     )
 
 
+@assumption
 def _requirement() -> Assumption:
     frequency = np.geomspace(*SUPPRESSION_BAND, 20_001)
     spare = float(np.min(noise_to_spare(frequency)))
@@ -294,6 +316,7 @@ def _requirement() -> Assumption:
     )
 
 
+@assumption
 def _rule() -> Assumption:
     frequency = np.geomspace(*SUPPRESSION_BAND, 20_001)
     omega = 2.0 * np.pi * frequency
@@ -311,28 +334,11 @@ def _rule() -> Assumption:
     )
 
 
-_ALL = (
-    _corner,
-    _difference,
-    _actuator,
-    _denominator,
-    _gain,
-    _order,
-    _history,
-    _scale,
-    _lowest,
-    _laser,
-    _seeds,
-    _requirement,
-    _rule,
-)
-
-
 class Assumptions:
     """All assumptions, computed once, as blocks of text."""
 
     def __init__(self) -> None:
-        self.entries = [make() for make in _ALL]
+        self.entries = [make() for make in _MAKERS]
 
     def __repr__(self) -> str:
         """Return them as text."""

@@ -489,8 +489,8 @@ def same_point_twice() -> Finding:
         float(area2),
         "unstable roots of the uncontrolled dual arm (g = 10) at (c₁, c₂) = (1, 1 - 10⁻⁶)",
         "The caption gives (1, 1 - 10⁻⁶) for both areas of the paper's Fig. 5. That point lies "
-        f"in the unstable Area 2; its mirror image (1, 1 + 10⁻⁶) has {area1} unstable roots "
-        "and lies in the stable Area 1, and is what we take for it.",
+        f"in the unstable Area 2; its mirror image (1, 1 + 10⁻⁶) has {area1} unstable roots, "
+        "lies in the stable Area 1, and is what we take for it.",
     )
 
 
