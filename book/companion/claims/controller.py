@@ -322,13 +322,12 @@ def stage_one_unstable() -> Finding:
         counts["Area 2"],
         "unstable roots with Stage I alone at (c₁, c₂) = (1, 1 - 10⁻⁶), without the "
         "integrating actuator 1/s",
-        f"The pole of the open loop L of order {bare} at s = 0 is gone. At (1, 1 - 10⁻⁶) L "
-        f"behaves as -s^{slopes['Area 2']:.2f} near zero, as the paper says, and the loop is "
-        f"unstable. At (1, 1) L is of order s^{slopes['A']:.2f} and at (1, 1 + 10⁻⁶) its sign "
-        f"is the other one: there {counts['A']} and {counts['Area 1']} roots are unstable, "
-        f"though at (1, 1) the slowest decay takes {years:.0f} years. With the actuator L is "
-        f"finite at zero, not O(-s), and {other['Area 2']}, {other['A']} and {other['Area 1']} "
-        "roots are unstable at the three points.",
+        f"The pole of L of order {bare} at s = 0 is gone. At (1, 1 - 10⁻⁶) L behaves as "
+        f"-s^{slopes['Area 2']:.2f} near zero, and the loop is unstable; at (1, 1) and (1, 1 + "
+        f"10⁻⁶) {counts['A']} and {counts['Area 1']} roots are, though at (1, 1) the slowest "
+        f"decay takes {years:.0f} years. With the actuator L is finite at zero, not O(-s), and "
+        f"{other['Area 2']}, {other['A']} and {other['Area 1']} roots are unstable at the "
+        "three points.",
     )
 
 
@@ -380,10 +379,9 @@ def stage_two_crossings() -> Finding:
         added["Area 2"],
         "crossings of the negative real axis added below 1 mHz, at (c₁, c₂) = (1, 1 - 10⁻⁶)",
         f"There are now {here.omega.size}: {places}. The first lies to the right of -1 and the "
-        "other two to its left, in opposite directions, so -1 is not enclosed. At (1, 1 + "
-        f"10⁻⁶) the number of crossings goes from {before['Area 1'].omega.size} to "
-        f"{after['Area 1'].omega.size}, at (1, 1) from {before['A'].omega.size} to "
-        f"{after['A'].omega.size}.",
+        "other two to its left, in opposite directions. At (1, 1 + 10⁻⁶) the number of "
+        f"crossings goes from {before['Area 1'].omega.size} to {after['Area 1'].omega.size}, "
+        f"at (1, 1) from {before['A'].omega.size} to {after['A'].omega.size}.",
     )
 
 
@@ -397,17 +395,14 @@ def stage_two_crossings() -> Finding:
 def which_denominator() -> Finding:
     """Run both."""
     table, printed = counts_of("Table II"), counts_of("Eq. (11)")
-    root = rightmost_of("Eq. (11)", "A")
     return Finding(
         decide(printed["A"] == 0, corrected=not any(table.values())),
         printed["A"],
         "unstable roots at (1, 1) with the denominator that Eq. (11) prints",
-        "As printed, s + z24 cancels the last zero, and p24 of Table II is not used. The loop "
-        f"then has {printed['Area 2']}, {printed['A']} and {printed['Area 1']} unstable roots "
-        "at (c₁, c₂) = (1, 1 - 10⁻⁶), (1, 1) and (1, 1 + 10⁻⁶), the rightmost at (1, 1) at "
-        f"{root.real:.3g} ± {root.imag:.3g}j rad/s. With p24 there are {table['Area 2']}, "
-        f"{table['A']} and {table['Area 1']}: the equation has a misprint, and all other "
-        "claims are checked with p24.",
+        "As printed, s + z24 cancels the last zero, and p24 of Table II is not used. "
+        f"{printed['Area 2']}, {printed['A']} and {printed['Area 1']} roots are then unstable "
+        f"at (1, 1 - 10⁻⁶), (1, 1) and (1, 1 + 10⁻⁶), with p24 {table['Area 2']}, {table['A']} "
+        f"and {table['Area 1']}: a misprint. All other claims are checked with p24.",
     )
 
 
@@ -436,18 +431,16 @@ def stable_over_the_box() -> Finding:
         limit,
         "half-width of the largest square around (1, 1) in which the loop is stable, for "
         "constant c₁, c₂, in the one reading of the paper in which it holds",
-        "It holds for the controller of Table II, without the actuator 1/s, and with Δτ = τ₁ - "
-        f"τ₂ in the dual sensor: all {box.x.size} x {box.y.size} points of a grid over the "
-        "square are stable, and the first perturbation along (1, -1) that breaks the loop is "
-        f"{limit / PERTURBATION:.3f} times the square's corner. The worst point is (1 "
-        f"{c1 - 1.0:+.0e}, 1 {c2 - 1.0:+.0e}), where the open loop L comes as near to -1 as "
-        f"{modulus:.3f}, against {modulus_margin(LOOP):.3f} at (1, 1); the phase margin there "
-        f"is {np.degrees(left.phase):.1f} degrees, and the gain may change by factors from "
-        f"{left.gain_lower:.3f} to {left.gain_upper:.3f}. It does not hold with half of τ₁ - "
-        f"τ₂ in the sensor, as in the source of Table I (the limit is {halved:.3g}); with the "
-        f"actuator, as in Sec. III.B ({integrating['Area 2']} unstable root at (1, 1 - 10⁻⁶)); "
-        f"with the denominator of Eq. (11) ({printed['A']} at (1, 1)); or if the sensor's "
-        f"corner frequency p, which the paper does not give, exceeds 2π · {corner:.2f} rad/s.",
+        "It holds with Table II, without the actuator 1/s, and with Δτ = τ₁ - τ₂ in the dual "
+        f"sensor: the first break along (1, -1) is at {limit / PERTURBATION:.3f} times the "
+        f"square's corner. At the worst point, (1 {c1 - 1.0:+.0e}, 1 {c2 - 1.0:+.0e}), the "
+        f"modulus margin is {modulus:.3f}, the phase margin {np.degrees(left.phase):.1f} "
+        f"degrees, and the gain may change by factors from {left.gain_lower:.3f} to "
+        f"{left.gain_upper:.3f}. It does not hold with half of τ₁ - τ₂, as in the source of "
+        f"Table I (the limit is {halved:.3g}); with the actuator, as in Sec. III.B "
+        f"({integrating['Area 2']} unstable root at (1, 1 - 10⁻⁶)); with the denominator of "
+        f"Eq. (11) ({printed['A']} at (1, 1)); or if the sensor's corner p, which the paper "
+        f"does not give, exceeds 2π · {corner:.2f} rad/s.",
     )
 
 
@@ -468,9 +461,9 @@ def constant_gain() -> Finding:
         high / low,
         "largest over smallest |L| from 0.01 mHz to 1 Hz at c₁ = c₂ = 1",
         f"|L| rises from {low:.3g} at 0.01 mHz over {tenth:.3g} at 0.1 mHz to {one:.4g} at 1 "
-        f"mHz. From there to 1 Hz it lies between {low_science:.4g} and {high_science:.4g}, a "
-        f"factor {high_science / low_science:.2g}, without nulls: it is constant within that "
-        "factor from about 1 mHz on, two decades later than stated.",
+        f"mHz. From there on it lies between {low_science:.4g} and {high_science:.4g}, a "
+        f"factor {high_science / low_science:.2g}, without nulls: constant within that factor, "
+        "two decades later than stated.",
     )
 
 
@@ -546,24 +539,19 @@ def poles_below() -> Finding:
 )
 def phase_at_unity_gain() -> Finding:
     """Find that frequency at each perturbation, and the phase lead there."""
-    unity = {point: unity_gain(point) for point in POINTS}
-    leads = [phase for _, phase in unity.values()]
-    shown = {"Area 2": "c₂ = 1 - 10⁻⁶", "A": "c₂ = 1", "Area 1": "c₂ = 1 + 10⁻⁶"}
+    unity = [unity_gain(point) for point in POINTS]
+    leads = np.array([phase for _, phase in unity])
+    shown = ", ".join(f"{lead / np.pi:.3f} π at {1e6 * at:.2f} µHz" for at, lead in unity)
+    left = np.degrees(all_margins(WORST_CORNER).phase)
     return Finding(
-        decide(min(leads) > 0.0 and max(leads) < np.pi),
-        max(leads) / np.pi,
+        decide(leads.min() > 0.0 and leads.max() < np.pi),
+        float(leads.max()) / np.pi,
         "largest phase lead at the unity-gain frequency, over π",
-        "With c₁ = 1 the lead is "
-        + ", ".join(
-            f"{phase / np.pi:.3f} π at {at * 1e6:.2f} µHz for {shown[point]}"
-            for point, (at, phase) in unity.items()
-        )
-        + ". Below π means a phase margin of "
-        + ", ".join(f"{180 - np.degrees(phase):.0f}" for phase in leads)
-        + " degrees; at (1 + 10⁻⁶, 1 - 10⁻⁶), the worst of the perturbations considered, "
-        f"{np.degrees(all_margins(WORST_CORNER).phase):.0f} remain. It decides nothing alone: "
-        "where the gain exceeds one, the Nyquist curve crosses the negative real axis twice "
-        "more, and lowering the gain can break the loop as well as raising it.",
+        f"With c₁ = 1 the lead is {shown} for c₂ = 1 - 10⁻⁶, 1 and 1 + 10⁻⁶: a phase margin of "
+        f"at least {180 - np.degrees(leads.max()):.0f} degrees. At (1 + 10⁻⁶, 1 - 10⁻⁶) "
+        f"{left:.0f} remain. It decides nothing alone: where the gain exceeds one, the Nyquist "
+        "curve crosses the negative real axis twice more, and lowering the gain can break the "
+        "loop as well as raising it.",
     )
 
 
@@ -586,14 +574,12 @@ def basic_requirement() -> Finding:
         float(divided.min()),
         f"smallest noise suppression |1 + L|, with the open loop L, from {1e3 * low:g} mHz to "
         f"{high:g} Hz, at c₁ = c₂ = 1",
-        "The paper names no requirement. In that band, which is the one of its simulation, the "
-        f"loop divides the laser's noise by at least {divided.min():.4g} (at "
-        f"{frequency[divided.argmin()] * 1e3:.2g} mHz), from 1 mHz on by at least "
-        f"{science.min():.4g}. We hold it against 30 √(1 + (2.8 mHz / f)⁴) Hz/√Hz, the usual "
-        "level of a pre-stabilised laser with the corner of Eq. (A5), which is an assumption: "
-        f"the free-running 30/f Hz/√Hz is suppressed with {spare[k]:.3g} times to spare, the "
-        f"least at {frequency[k] * 1e3:.2g} mHz. About g = {CONTROLLER_GAIN / spare[k]:.0f} "
-        "would do for that, but stability at (1, 1) is lost below g = "
+        "The paper names no requirement. From 1 mHz on the noise is divided by at least "
+        f"{science.min():.4g}. Against 30 √(1 + (2.8 mHz / f)⁴) Hz/√Hz, the usual level of a "
+        "pre-stabilised laser with the corner of Eq. (A5), the free-running 30/f Hz/√Hz is "
+        f"suppressed with {spare[k]:.3g} times to spare, the least at {frequency[k] * 1e3:.2g} "
+        f"mHz. About g = {CONTROLLER_GAIN / spare[k]:.0f} would do for that, but stability at "
+        "(1, 1) is lost below g = "
         f"{CONTROLLER_GAIN * all_margins(POINTS['A']).gain_lower:.0f}.",
     )
 
@@ -616,14 +602,12 @@ def robust() -> Finding:
         "delay margin in s at c₁ = c₂ = 1: the further loop delay that the loop tolerates",
         "Against perturbations of c₁ and c₂ it is, in the reading of claim K5, and at (1, 1) "
         f"the gain may change by factors from {nominal.gain_lower:.3f} to "
-        f"{nominal.gain_upper:.2f}. But the open loop does not roll off, and any further "
-        "delay, however small, turns its phase by π at some high frequency and makes it "
-        f"unstable: one of {delays[0] * 1e6:g} µs puts a root at {roots[0].real:.3g} + "
-        f"{roots[0].imag:.4g}j rad/s, one of {delays[1] * 1e3:g} ms (a sample at 200 Hz) at "
-        f"{roots[1].real:.3g} + {roots[1].imag:.4g}j, which grows by a factor e in "
-        f"{1 / roots[1].real / 86400:.2f} days. A real actuator rolls off, and has to be part "
-        "of the model. In the same way the neutral root chain needs c₁ + c₂ < 2 + 1/g: both "
-        f"may rise by {chain:.4g} only.",
+        f"{nominal.gain_upper:.2f}. But the open loop does not roll off, and any further delay "
+        f"turns its phase by π at some high frequency: {delays[0] * 1e6:g} µs put a root at "
+        f"{roots[0].real:.3g} + {roots[0].imag:.4g}j rad/s, {delays[1] * 1e3:g} ms (a sample "
+        f"at 200 Hz) one at {roots[1].real:.3g} + {roots[1].imag:.4g}j. A real actuator rolls "
+        "off, and has to be part of the model. The neutral root chain needs c₁ + c₂ < 2 + 1/g: "
+        f"both may rise by {chain:.4g} only.",
     )
 
 
@@ -643,10 +627,10 @@ def which_open_loop() -> Finding:
         decide(not any(integrating.values()), corrected=not any(bare.values())),
         integrating["Area 2"],
         "unstable roots at (c₁, c₂) = (1, 1 - 10⁻⁶) with P_d as in Sec. III.B",
-        "There P_d contains the gain and the integrating actuator, g/s. With the 1/s in it the "
-        f"controlled loop has {integrating['Area 2']}, {integrating['A']} and "
-        f"{integrating['Area 1']} unstable roots at (1, 1 - 10⁻⁶), (1, 1) and (1, 1 + 10⁻⁶), "
-        f"the rightmost at {root.real:.3g} rad/s; with the dual sensor of Table I alone, "
-        f"{bare['Area 2']}, {bare['A']} and {bare['Area 1']}. The O(-s) after Stage I (claim "
-        "K1) and stability (claim K5) both need the loop without.",
+        "There P_d contains the integrating actuator, g/s. With it the loop has "
+        f"{integrating['Area 2']}, {integrating['A']} and {integrating['Area 1']} unstable "
+        f"roots at (1, 1 - 10⁻⁶), (1, 1) and (1, 1 + 10⁻⁶), the rightmost at {root.real:.3g} "
+        f"rad/s; with the dual sensor of Table I alone, {bare['Area 2']}, {bare['A']} and "
+        f"{bare['Area 1']}. The O(-s) after Stage I (claim K1) and stability (claim K5) need "
+        "the loop without.",
     )

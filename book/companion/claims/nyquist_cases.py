@@ -212,12 +212,12 @@ def single_arm_branch() -> Finding:
         decide(starts_as_the_single_arm(curve)),
         change / np.pi,
         "change of the phase from ω = 0⁻ to 0⁺, in units of π",
-        f"From {start / np.pi:.2f} π down to {(start + change) / np.pi:.2f} π, which is the "
-        "direction of +π/2, if the contour passes the pole at s = 0 on its right. That gives "
-        f"{curve.encirclements} encirclement of -1 and {curve.closed_loop_roots} unstable "
-        f"root. At c₁ = {2.0 - SINGLE_POINT[0]:g} there is such a branch as well, from "
-        f"{other_start / np.pi:.2f} π by {other_change / np.pi:.0f} π through the right "
-        f"half-plane, with {other.encirclements} encirclements.",
+        f"From {start / np.pi:.2f} π clockwise to {(start + change) / np.pi:.2f} π, the "
+        "direction of +π/2, if the contour passes the pole at s = 0 on its right: "
+        f"{curve.encirclements} encirclement of -1. At c₁ = {2.0 - SINGLE_POINT[0]:g} there is "
+        f"such a branch as well, from {other_start / np.pi:.2f} π by "
+        f"{other_change / np.pi:.0f} π through the right half-plane, with "
+        f"{other.encirclements} encirclements.",
     )
 
 
@@ -302,13 +302,11 @@ def common_arm_alike() -> Finding:
         threshold,
         "c₂ - 1 from which on the curve crosses the negative real axis near 2π over the mean "
         "delay",
-        f"The branch is as in the single arm, with {curve.encirclements} encirclement at (1, "
-        f"{COMMON_POINT[1]:g}). But the two delays never complete a turn together: the ideal "
-        f"curve passes below the origin at a distance of {miss:.1e} (g = {COMMON.gain:g} "
-        "rad/s), and a smaller perturbation leaves it on that side. At (1, 1 + 10⁻⁶) the "
-        f"outermost crossing is at {small[0]:.2f} rad/s, where the open loop is "
-        f"{small[1]:.2e}. As in the single arm, at least {fewest} root is unstable at every "
-        "gain.",
+        "The branch is as in the single arm. But the two delays never complete a turn "
+        f"together: the ideal curve passes below the origin at a distance of {miss:.1e} (g = "
+        f"{COMMON.gain:g} rad/s), and a smaller perturbation leaves it on that side. At (1, 1 "
+        f"+ 10⁻⁶) the outermost crossing is at {small[0]:.2f} rad/s, where the open loop is "
+        f"{small[1]:.2e}. At least {fewest} root is unstable at every gain.",
     )
 
 
@@ -361,13 +359,11 @@ def dual_arm_branch() -> Finding:
         decide(unstable, of_order_two, not clockwise, corrected=clockwise),
         turns,
         "turns of the infinite branch around the origin, counter-clockwise positive",
-        f"Unstable, with {curve.closed_loop_roots} root at "
-        f"{rightmost_of_loop(DUAL, c1, c2).real:.4g}/s, and near s = 0 the open loop is "
-        f"{leading:.3g}/s². One turn, but clockwise, when the contour passes s = 0 on the "
-        "right, as for the single arm: N = 1 encirclement of -1, P = 0 open-loop poles and Z = "
-        "N + P = 1 root in the right half-plane. It is counter-clockwise only for a contour on "
-        f"the left ({other:+.0f} turn), with the double pole inside: P = {curve.pole_order}, "
-        f"N = {inside}.",
+        f"Unstable, with a root at {rightmost_of_loop(DUAL, c1, c2).real:.4g}/s, and near s = "
+        f"0 the open loop is {leading:.3g}/s². But the turn is clockwise when the contour "
+        "passes s = 0 on the right, as for the single arm: N = 1, P = 0 and Z = N + P = 1. It "
+        f"is counter-clockwise only for a contour on the left ({other:+.0f} turn), with the "
+        f"double pole inside: P = {curve.pole_order}, N = {inside}.",
     )
 
 
@@ -391,13 +387,12 @@ def dual_arm_gain_margin() -> Finding:
         float(factor[0]),
         f"gain factor up to which the dual arm stays stable at (1, 1 + {SIZES[0]:g}), g = "
         f"{DUAL.gain:g} rad/s",
-        f"On the stable side it is so: {factor[0]:.0f} at (1, 1 + {SIZES[0]:g}), "
-        f"{factor[-1]:.1f} at (1, 1 + {SIZES[-1]:g}), at first as the perturbation to the "
-        f"power {exponent:.2f}. From (1, 1 + {low_gain_threshold():.2g}) on there is a lower "
-        f"limit as well, a factor {dual_margins()[-1].gain_lower:.1e} at (1, 1 + "
-        f"{SIZES[-1]:g}). At (1, 1) and (0.999, 1) the Nyquist curve crosses the negative real "
-        f"axis nowhere, and the margin is infinite. At the paper's (1, {DUAL_POINT[1]:g}) at "
-        f"least {fewest} root is unstable at every gain: there is no margin.",
+        f"On the stable side it is so: {factor[-1]:.1f} at (1, 1 + {SIZES[-1]:g}), at first as "
+        f"the perturbation to the power {exponent:.2f}. From (1, 1 + "
+        f"{low_gain_threshold():.2g}) on there is a lower limit as well. At (1, 1) and (0.999, "
+        "1) the Nyquist curve crosses the negative real axis nowhere, and the margin is "
+        f"infinite. At the paper's (1, {DUAL_POINT[1]:g}) at least {fewest} root is unstable "
+        "at every gain.",
     )
 
 
@@ -424,9 +419,9 @@ def margins_near_ideal() -> Finding:
         f"To the side c₁ > c₂, 10⁻⁶ is enough for {count} unstable root, which grows by a "
         f"factor e in {1.0 / rate / 86400.0:.1f} days. To the other side the upper gain margin "
         f"falls {gains:.0f}-fold, from thousands; the modulus margin stays at "
-        f"{found[0].modulus:.2f} and the phase margin between {phases.min():.1f} and "
-        f"{phases.max():.1f} degrees. They do not announce the boundary, which is crossed at "
-        "s = 0, where the open loop is infinite.",
+        f"{found[0].modulus:.2f}, the phase margin between {phases.min():.1f} and "
+        f"{phases.max():.1f} degrees. They do not announce the boundary, which is crossed at s "
+        "= 0.",
     )
 
 
