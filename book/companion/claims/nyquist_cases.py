@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import bisect, minimize_scalar
 
+from armlock.checks import FloatArray
 from armlock.loops import CommonArm, DualArm, Loop, SingleArm
-from armlock.margins import Margins, margins
+from armlock.margins import gain_interval, margins
 from armlock.noise import band_rms
 from armlock.nyquist import AxisCrossings, NyquistCurve, axis_crossings, nyquist
 from armlock.paper import (
@@ -144,9 +145,9 @@ def low_gain_threshold() -> float:
 
 
 @cache
-def dual_margins() -> tuple[Margins, ...]:
-    """Return the margins of the dual arm at (1, 1 + size), on the stable side."""
-    return tuple(margins(DUAL, 1.0, 1.0 + float(size)) for size in SIZES)
+def dual_gains() -> FloatArray:
+    """Return the lower and upper gain margin of the dual arm at (1, 1 + size), a row a size."""
+    return np.array([gain_interval(DUAL, 1.0, 1.0 + float(size))[:2] for size in SIZES])
 
 
 @claim(
@@ -375,12 +376,12 @@ def dual_arm_branch() -> Finding:
 )
 def dual_arm_gain_margin() -> Finding:
     """Compute the margin on the stable side, and look for one at the paper's points."""
-    factor = np.array([found.gain_upper for found in dual_margins()])
+    factor = dual_gains()[:, 1]
     slow = SIZES < 3e-5
     exponent = float(np.polyfit(np.log(SIZES[slow]), np.log(factor[slow]), 1)[0])
     falls = bool(np.isfinite(factor).all() and (np.diff(factor) < 0.0).all())
     bounded = axis_crossings(DUAL).omega.size > 0
-    lowered = margins(DUAL, 1.0 - 1e-3, 1.0).gain_upper
+    lowered = gain_interval(DUAL, 1.0 - 1e-3, 1.0)[1]
     fewest = fewest_roots(DUAL, *DUAL_POINT)
     return Finding(
         decide(falls, bounded, np.isfinite(lowered), fewest == 0),
