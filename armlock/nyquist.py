@@ -90,7 +90,19 @@ class NyquistCurve:
     closed_loop_roots: int
 
     def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
-        """Draw the curve; options as in `armlock.plotting.plot_nyquist`."""
+        """Draw the curve, both signs of omega, with -1 and the infinite branch.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+            Where to draw; the current ones by default.
+        **options
+            As `armlock.plotting.plot_nyquist` takes them.
+
+        Returns
+        -------
+        matplotlib Axes
+        """
         from armlock.plotting import plot_nyquist
 
         return plot_nyquist(self, ax, **options)

@@ -80,6 +80,15 @@ def plot_chart(
     ------
     ValueError
         If an axis does not ascend in equal steps, or `largest` is not a positive integer.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from armlock import CommonArm, stability_chart
+    >>> axis = np.linspace(-3, 3, 61)
+    >>> ax = stability_chart(CommonArm(), axis, axis).plot(labels=0.01)
+    >>> ax.texts[0].get_text()
+    '0'
     """
     ax = plt.gca() if ax is None else ax
     largest = whole_number("largest", largest, 1)
@@ -212,6 +221,13 @@ def plot_nyquist(
     ------
     ValueError
         If `unit` is not positive, or an arrow lies beyond the curve's frequencies.
+
+    Examples
+    --------
+    >>> from armlock import SingleArm, nyquist
+    >>> ax = nyquist(SingleArm(), omega_max=1.0).plot(unit=None)
+    >>> ax.get_xlabel()
+    'Re $L$ [1]'
     """
     ax = plt.gca() if ax is None else ax
     forward, omega, last = curve.response, curve.omega, curve.omega[-2]

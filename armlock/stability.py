@@ -454,7 +454,19 @@ class StabilityChart:
         return np.asarray(self.counts == 0)
 
     def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
-        """Colour the chart by its counts; options as in `armlock.plotting.plot_chart`."""
+        """Colour the chart by its counts, the stable region apart.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+            Where to draw; the current ones by default.
+        **options
+            As `armlock.plotting.plot_chart` takes them.
+
+        Returns
+        -------
+        matplotlib Axes
+        """
         from armlock.plotting import plot_chart
 
         return plot_chart(self, ax, **options)

@@ -15,11 +15,14 @@ Point = tuple[float, float]
 dsp: Any = blocks
 
 
-def _drawing(ax: Axes) -> Any:
-    """Start a drawing in axes; its units are those of the axes."""
+def _draw(ax: Axes, parts: list[Any]) -> None:
+    """Draw elements in axes, whose units are theirs."""
     ax.set_axis_off()
     ax.set_aspect("equal")
-    return schemdraw.Drawing(canvas=ax, show=False, unit=1.0, fontsize=9, lw=1.3)
+    drawing: Any = schemdraw.Drawing(canvas=ax, show=False, unit=1.0, fontsize=9, lw=1.3)
+    for part in parts:
+        drawing.add(part)
+    drawing.draw(show=False)
 
 
 def _box(at: Point, width: float, height: float, label: str) -> Any:
@@ -67,7 +70,6 @@ def plot_modules(ax: Axes) -> None:
     >>> len(ax.texts) > 3
     True
     """
-    drawing = _drawing(ax)
     light: dict[str, Any] = {"color": ORANGE}
     digital: dict[str, Any] = {"color": BLUE, "style": "--"}
     parts = [
@@ -91,9 +93,7 @@ def plot_modules(ax: Axes) -> None:
         *_arrow((6.8, -2.05), (5.3, 0.05), style=":"),
         *_arrow((9.2, -2.05), (10.6, 0.05), style=":"),
     ]
-    for part in parts:
-        drawing.add(part)
-    drawing.draw(show=False)
+    _draw(ax, parts)
     for x, text in ((3.0, "local spacecraft"), (11.6, "remote spacecraft")):
         ax.text(x, 5.5, text, ha="center", va="bottom", fontsize=9)
     ax.text(7.85, 4.45, r"out: $\varphi(t)$", ha="center", va="bottom", fontsize=9)
@@ -119,7 +119,6 @@ def plot_loop(ax: Axes) -> None:
     >>> len(ax.texts) > 3
     True
     """
-    drawing = _drawing(ax)
     upper, lower = 0.0, -3.2
     parts: list[Any] = [
         *_arrow((-1.6, 1.6), (-0.05, 1.6)),
@@ -151,9 +150,7 @@ def plot_loop(ax: Axes) -> None:
         _box((1.6, middle), 1.8, 1.0, "$K(s)$"),
         *_arrow((0.7, middle), (0.45, middle), (0.45, 1.1)),
     ]
-    for part in parts:
-        drawing.add(part)
-    drawing.draw(show=False)
+    _draw(ax, parts)
     for y in (upper, lower):
         ax.text(8.15, y - 0.75, "−", ha="left", va="center", fontsize=10)
     ax.text(-1.6, 1.75, r"laser, $\varphi_0$", ha="left", va="bottom", fontsize=9)

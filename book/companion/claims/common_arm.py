@@ -57,11 +57,8 @@ def charts(points: int = 401) -> tuple[StabilityChart, StabilityChart, Stability
     """Chart the whole stable region: of the loop, and of the maps of order 0 and 1."""
     axis = np.linspace(-WINDOW, WINDOW, points)
     held, linear = (semi_discretization(ARM, STEP, order) for order in (0, 1))
-    return (
-        stability_chart(ARM, axis, axis),
-        stability_chart(held, axis, axis),
-        stability_chart(linear, axis, axis),
-    )
+    exact, *maps = (stability_chart(system, axis, axis) for system in (ARM, held, linear))
+    return exact, maps[0], maps[1]
 
 
 def stable_by_magnitude(chart: StabilityChart) -> float:
@@ -148,11 +145,8 @@ def cusp_conditions(omega_max: float = OMEGA_SEARCHED) -> tuple[FloatArray, Floa
             lag = np.arctan2(omega * other, 1.0 + 2.0 * ARM.gain * other)
             return float(omega * tau + lag - np.pi * turns)
 
-        last = int(phase(omega_max) / np.pi)
-        found = [
-            brentq(phase, 0.0, omega_max, args=(k,), xtol=1e-13) for k in range(1, last + 1)
-        ]
-        return np.array(found)
+        turns = range(1, int(phase(omega_max) / np.pi) + 1)
+        return np.array([brentq(phase, 0.0, omega_max, args=(k,), xtol=1e-13) for k in turns])
 
     return solve(ARM.tau1, ARM.tau2), solve(ARM.tau2, ARM.tau1)
 
@@ -212,13 +206,11 @@ def sharpest_turn(half_width: float = WIDE_WINDOW) -> tuple[float, float]:
 def curve_jumps(window: float = WINDOW, number: int = 2000) -> FloatArray:
     """Change of the count across the D-curve, at points spread over a window."""
     branches = d_curve_branches(ARM, ARM.gain * np.sqrt(4.0 * window**2 - 4.0))
-    x, y = (np.concatenate([b[k] for b in branches]) for k in (1, 2))
-    omega = np.concatenate([b.omega for b in branches])
+    omega, x, y = (np.concatenate(parts) for parts in zip(*branches, strict=True))
     inside = np.flatnonzero((np.abs(x) < window) & (np.abs(y) < window))
     inside = inside[:: max(1, inside.size // number)]
-    shift = 1e-6
-    ahead, behind = (d_curve(ARM, omega[inside] + d) for d in (shift, -shift))
-    along = np.stack((ahead[0] - behind[0], ahead[1] - behind[1]))
+    ahead, behind = (np.array(d_curve(ARM, omega[inside] + d)) for d in (1e-6, -1e-6))
+    along = ahead - behind
     normal = 1e-9 * np.stack((-along[1], along[0])) / np.hypot(*along)
     here = np.stack((x[inside], y[inside]))
     left, right = (unstable_roots(ARM, *(here + s * normal)) for s in (1, -1))

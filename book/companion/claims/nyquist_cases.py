@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import bisect, minimize_scalar
 
+from armlock.checks import FloatArray
 from armlock.loops import CommonArm, DualArm, Loop, SingleArm
-from armlock.margins import Margins, margins
+from armlock.margins import gain_interval, margins
 from armlock.noise import band_rms
 from armlock.nyquist import AxisCrossings, NyquistCurve, axis_crossings, nyquist
 from armlock.paper import (
@@ -23,9 +24,10 @@ from armlock.paper import (
 )
 from armlock.roots import rightmost_root
 from armlock.stability import unstable_roots
-from book.companion.claims.ledger import Finding, Verdict, claim, decide
+from book.companion.claims import ledger
+from book.companion.claims.ledger import Finding, Verdict, decide
 
-CHAPTER = "05_nyquist"
+claim = partial(ledger.claim, chapter="05_nyquist")
 Arm = SingleArm | CommonArm | DualArm
 
 #: The loops of the section, at the gains of the paper's charts.
@@ -143,16 +145,15 @@ def low_gain_threshold() -> float:
 
 
 @cache
-def dual_margins() -> tuple[Margins, ...]:
-    """Return the margins of the dual arm at (1, 1 + size), on the stable side."""
-    return tuple(margins(DUAL, 1.0, 1.0 + float(size)) for size in SIZES)
+def dual_gains() -> FloatArray:
+    """Return the lower and upper gain margin of the dual arm at (1, 1 + size), a row a size."""
+    return np.array([gain_interval(DUAL, 1.0, 1.0 + float(size))[:2] for size in SIZES])
 
 
 @claim(
     "N1",
     place="Sec. IV.A, first paragraph",
     says="The perturbations are no larger than 10⁻⁶, for which the appendix gives the reason.",
-    chapter=CHAPTER,
     pinned=(Verdict.DIFFERS, 0.0145793, 1e-6),
     affects=("N10", "K5"),
 )
@@ -166,10 +167,9 @@ def size_of_perturbations() -> Finding:
         rms,
         f"r.m.s. of the appendix's spectrum from {low:g} Hz to {high:g} Hz",
         f"That is {rms / PERTURBATION:.0f} times 10⁻⁶. Even where the spectrum is flat, at "
-        f"{PHASE_NOISE_LEVEL:g}/√Hz, a band of {1e3 * flat:.1f} mHz is enough for 10⁻⁶. So "
-        "10⁻⁶ is an assumption, and the appendix does not support it. The Nyquist plots do not "
-        "depend on it: they have perturbations of a thousandth. Claim A3 has the same from the "
-        "side of the appendix.",
+        f"{PHASE_NOISE_LEVEL:g}/√Hz, a band of {1e3 * flat:.1f} mHz is enough for 10⁻⁶, which "
+        "therefore is an assumption. The Nyquist plots do not depend on it: they have "
+        "perturbations of a thousandth.",
     )
 
 
@@ -178,7 +178,6 @@ def size_of_perturbations() -> Finding:
     place="Sec. IV.A, Fig. 7a",
     says="At c₁ = 1 the single arm's Nyquist curve is tangent at the origin, and its gain "
     "margin is infinite.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, 0.0, 0.0),
 )
 def single_arm_ideal() -> Finding:
@@ -192,10 +191,9 @@ def single_arm_ideal() -> Finding:
         decide(tangent, crossings == 0 and highest == 0),
         crossings,
         "crossings of the negative real axis",
-        "At every multiple of 2π/τ the curve passes through the origin, horizontally, from "
-        "left to right, and nowhere comes above the real axis for ω > 0. What it is tangent "
-        "to is the real axis. With the open loop L, 1 + L has no unstable root at any of "
-        f"{FACTORS.size} gains from {FACTORS[0]:g} to {FACTORS[-1]:g} rad/s.",
+        "At every multiple of 2π/τ the curve passes through the origin, horizontally; what it "
+        "is tangent to is the real axis. 1 + L, with the open loop L, has no unstable root at "
+        f"any of {FACTORS.size} gains from {FACTORS[0]:g} to {FACTORS[-1]:g} rad/s.",
     )
 
 
@@ -204,7 +202,6 @@ def single_arm_ideal() -> Finding:
     place="Sec. IV.A, Fig. 7b",
     says="For c₁ slightly above 1 there is an infinite branch at ω = 0, along which the phase "
     "goes from -π/2 at ω = 0⁻ to π/2 at ω = 0⁺ around the left half-plane.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, -1.0, 1e-3),
 )
 def single_arm_branch() -> Finding:
@@ -216,13 +213,12 @@ def single_arm_branch() -> Finding:
         decide(starts_as_the_single_arm(curve)),
         change / np.pi,
         "change of the phase from ω = 0⁻ to 0⁺, in units of π",
-        f"From {start / np.pi:.2f} π down to {(start + change) / np.pi:.2f} π, which is the "
-        "same direction as +π/2: clockwise through the negative real axis, if the contour "
-        f"passes the pole at s = 0 on its right. That gives {curve.encirclements} "
-        f"encirclement of -1 and {curve.closed_loop_roots} unstable root. At c₁ = "
-        f"{2.0 - SINGLE_POINT[0]:g} there is such a branch as well, from "
-        f"{other_start / np.pi:.2f} π by {other_change / np.pi:.0f} π through the "
-        f"right half-plane, with {other.encirclements} encirclements.",
+        f"From {start / np.pi:.2f} π clockwise to {(start + change) / np.pi:.2f} π, the "
+        "direction of +π/2, if the contour passes the pole at s = 0 on its right: "
+        f"{curve.encirclements} encirclement of -1. At c₁ = {2.0 - SINGLE_POINT[0]:g} there is "
+        f"such a branch as well, from {other_start / np.pi:.2f} π by "
+        f"{other_change / np.pi:.0f} π through the right half-plane, with "
+        f"{other.encirclements} encirclements.",
     )
 
 
@@ -230,7 +226,6 @@ def single_arm_branch() -> Finding:
     "N4",
     place="Sec. IV.A, after Fig. 7b",
     says="For c₁ > 1 the open loop at ω = 2π/τ is 1 - c₁, a negative number.",
-    chapter=CHAPTER,
     pinned=(Verdict.NOT_AS_WRITTEN, 0.5, 1e-9),
     affects=("N5", "N6"),
 )
@@ -255,7 +250,6 @@ def value_at_full_turn() -> Finding:
     place="Sec. IV.A, after Fig. 7b",
     says="For c₁ > 1 the curve no longer meets the real axis at the origin but on its negative "
     "half, so that the gain margin is finite and depends on the perturbation.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, -0.1441254, 1e-6),
 )
 def single_arm_crossing() -> Finding:
@@ -276,11 +270,9 @@ def single_arm_crossing() -> Finding:
         value,
         f"the open loop where its curve first crosses the negative real axis, at c₁ = {c1:g}",
         f"At ω = {omega:.5f} rad/s, {100.0 * (1.0 - omega / turn):.2f} % below 2π/τ; in "
-        f"closed form -g√(c₁² - 1)/ω. A gain {factor:.3f} times higher puts it on -1, and the "
-        f"number of unstable roots goes from {below} to {above}. But this is no margin: "
-        f"at every gain there is at least {fewest} unstable root, and no gain makes the loop "
-        "stable. What moves with the perturbation is the gain at which a further pair becomes "
-        "unstable.",
+        f"closed form -g√(c₁² - 1)/ω. At {factor:.3f} times the gain it reaches -1, and the "
+        f"number of unstable roots goes from {below} to {above}. But no gain makes the loop "
+        f"stable: at every one there is at least {fewest} unstable root, so this is no margin.",
     )
 
 
@@ -290,7 +282,6 @@ def single_arm_crossing() -> Finding:
     says="The common arm behaves alike: its curve is tangent at the origin, the infinite "
     "branch makes it unstable, and a crossing of the negative real axis reduces the gain "
     "margin.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 9.87346e-4, 1e-8),
 )
 def common_arm_alike() -> Finding:
@@ -312,13 +303,11 @@ def common_arm_alike() -> Finding:
         threshold,
         "c₂ - 1 from which on the curve crosses the negative real axis near 2π over the mean "
         "delay",
-        f"The branch is as in the single arm, with {curve.encirclements} encirclement at (1, "
-        f"{COMMON_POINT[1]:g}). But the two delays never complete a turn together: the ideal "
-        f"curve passes below the origin at a distance of {miss:.1e} (g = {COMMON.gain:g} "
-        "rad/s), and a smaller perturbation leaves it on that side. At (1, 1 + 10⁻⁶) the "
-        f"first crossing is at {small[0]:.2f} rad/s, where the open loop is {small[1]:.2e}. "
-        f"At (1, {COMMON_POINT[1]:g}) there is at least {fewest} unstable root at every gain, "
-        "as in the single arm.",
+        "The branch is as in the single arm. But the two delays never complete a turn "
+        f"together: the ideal curve passes below the origin at a distance of {miss:.1e} (g = "
+        f"{COMMON.gain:g} rad/s), and a smaller perturbation leaves it on that side. At (1, 1 "
+        f"+ 10⁻⁶) the outermost crossing is at {small[0]:.2f} rad/s, where the open loop is "
+        f"{small[1]:.2e}. At least {fewest} root is unstable at every gain.",
     )
 
 
@@ -326,7 +315,6 @@ def common_arm_alike() -> Finding:
     "N7",
     place="Sec. IV.A, Fig. 7c",
     says="Without perturbations the dual arm stands precisely on the boundary of stability.",
-    chapter=CHAPTER,
     pinned=(Verdict.REPRODUCED, 0.0, 0.0),
 )
 def dual_arm_ideal() -> Finding:
@@ -338,11 +326,9 @@ def dual_arm_ideal() -> Finding:
         decide((above, at, below) == (0, -1, 1) and curve.closed_loop_roots == 0),
         curve.closed_loop_roots,
         "zeros of 1 + L in the right half-plane at (1, 1), with the open loop L",
-        f"{above} unstable roots at (1, 1 + 10⁻⁶), {below} at (1, 1 - 10⁻⁶), and "
-        "between the two the characteristic function D has a root s = 0. That root belongs to "
-        "the sensor's integral, not to 1 + L: L has a simple pole at s = 0 there, order "
-        f"{curve.pole_order}, its curve does not encircle -1, and the slowest root of 1 + L "
-        f"is at {root.real:.3g}/s.",
+        f"{above} unstable roots at (1, 1 + 10⁻⁶), {below} at (1, 1 - 10⁻⁶), and between the "
+        "two the characteristic function D has a root s = 0. It is one of the sensor's "
+        f"integral, not of 1 + L, whose slowest root is at {root.real:.3g}/s.",
     )
 
 
@@ -351,7 +337,6 @@ def dual_arm_ideal() -> Finding:
     place="Sec. IV.A, Fig. 7d",
     says="At (1, 0.995) the dual arm is unstable: its open loop is of order 1/s² near s = 0, "
     "and the infinite branch encircles the origin once, counter-clockwise, as ω passes zero.",
-    chapter=CHAPTER,
     pinned=(Verdict.NOT_AS_WRITTEN, -1.0, 1e-3),
     affects=("D4", "N11"),
 )
@@ -375,15 +360,11 @@ def dual_arm_branch() -> Finding:
         decide(unstable, of_order_two, not clockwise, corrected=clockwise),
         turns,
         "turns of the infinite branch around the origin, counter-clockwise positive",
-        f"Unstable, with {curve.closed_loop_roots} root at "
-        f"{rightmost_of_loop(DUAL, c1, c2).real:.4g}/s, and near s = 0 the open loop is "
-        f"{leading:.3g}/s². One turn, but clockwise, when the contour passes s = 0 on the "
-        "right, as the paper has it for the single arm: N = 1 encirclement of -1, P = 0 "
-        "open-loop poles and Z = N + P = 1 root in the right half-plane. Counter-clockwise it "
-        f"is only for a contour that passes on the left ({other:+.0f} turn); then the double "
-        f"pole lies inside, P = {curve.pole_order}, N = {inside}, and Z = "
-        f"{inside + curve.pole_order} again. Counter-clockwise with P = 0 would mean a "
-        "negative number of roots.",
+        f"Unstable, with a root at {rightmost_of_loop(DUAL, c1, c2).real:.4g}/s, and near s = "
+        f"0 the open loop is {leading:.3g}/s². But the turn is clockwise when the contour "
+        "passes s = 0 on the right, as for the single arm: N = 1, P = 0 and Z = N + P = 1. It "
+        f"is counter-clockwise only for a contour on the left ({other:+.0f} turn), with the "
+        f"double pole inside: P = {curve.pole_order}, N = {inside}.",
     )
 
 
@@ -391,31 +372,27 @@ def dual_arm_branch() -> Finding:
     "N9",
     place="Sec. IV.A, on the dual arm",
     says="The dual arm has only a finite gain margin, which shrinks as the perturbation grows.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 3134.6589, 1e-3),
 )
 def dual_arm_gain_margin() -> Finding:
     """Compute the margin on the stable side, and look for one at the paper's points."""
-    factor = np.array([found.gain_upper for found in dual_margins()])
+    factor = dual_gains()[:, 1]
     slow = SIZES < 3e-5
     exponent = float(np.polyfit(np.log(SIZES[slow]), np.log(factor[slow]), 1)[0])
     falls = bool(np.isfinite(factor).all() and (np.diff(factor) < 0.0).all())
     bounded = axis_crossings(DUAL).omega.size > 0
-    lowered = margins(DUAL, 1.0 - 1e-3, 1.0).gain_upper
+    lowered = gain_interval(DUAL, 1.0 - 1e-3, 1.0)[1]
     fewest = fewest_roots(DUAL, *DUAL_POINT)
     return Finding(
         decide(falls, bounded, np.isfinite(lowered), fewest == 0),
         float(factor[0]),
         f"gain factor up to which the dual arm stays stable at (1, 1 + {SIZES[0]:g}), g = "
         f"{DUAL.gain:g} rad/s",
-        f"On the stable side with c₁ + c₂ > 2 it is so: {factor[0]:.0f} at (1, 1 + "
-        f"{SIZES[0]:g}), {factor[-1]:.1f} at (1, 1 + {SIZES[-1]:g}), at first falling as the "
-        f"perturbation to the power {exponent:.2f}. From (1, 1 + {low_gain_threshold():.2g}) "
-        f"on there is a lower limit as well, a factor {dual_margins()[-1].gain_lower:.1e} at "
-        f"(1, 1 + {SIZES[-1]:g}). At (1, 1) the Nyquist curve crosses the negative real axis "
-        "nowhere, and at no gain tried there is an unstable root. At (0.999, 1) the margin is "
-        "infinite: perturbations that weaken the arms give no crossing. At the paper's (1, "
-        f"{DUAL_POINT[1]:g}) there is no margin to speak of: at least {fewest} unstable root "
+        f"On the stable side it is so: {factor[-1]:.1f} at (1, 1 + {SIZES[-1]:g}), at first as "
+        f"the perturbation to the power {exponent:.2f}. From (1, 1 + "
+        f"{low_gain_threshold():.2g}) on there is a lower limit as well. At (1, 1) and (0.999, "
+        "1) the Nyquist curve crosses the negative real axis nowhere, and the margin is "
+        f"infinite. At the paper's (1, {DUAL_POINT[1]:g}) at least {fewest} root is unstable "
         "at every gain.",
     )
 
@@ -424,7 +401,6 @@ def dual_arm_gain_margin() -> Finding:
     "N10",
     place="Sec. IV.A, end of the paragraph on the dual arm",
     says="Even small deviations of c₁ and c₂ can change the stability margins significantly.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 0.309175, 1e-4),
 )
 def margins_near_ideal() -> Finding:
@@ -443,10 +419,10 @@ def margins_near_ideal() -> Finding:
         f"{sizes[-1]:g})",
         f"To the side c₁ > c₂, 10⁻⁶ is enough for {count} unstable root, which grows by a "
         f"factor e in {1.0 / rate / 86400.0:.1f} days. To the other side the upper gain margin "
-        f"falls {gains:.0f}-fold, but from thousands; the modulus margin stays at "
-        f"{found[0].modulus:.2f} and the phase margin between {phases.min():.1f} and "
-        f"{phases.max():.1f} degrees. The margins do not announce the boundary: it is crossed "
-        "at s = 0, where the open loop is infinite.",
+        f"falls {gains:.0f}-fold, from thousands; the modulus margin stays at "
+        f"{found[0].modulus:.2f}, the phase margin between {phases.min():.1f} and "
+        f"{phases.max():.1f} degrees. They do not announce the boundary, which is crossed at s "
+        "= 0.",
     )
 
 
@@ -454,7 +430,6 @@ def margins_near_ideal() -> Finding:
     "N11",
     place="Sec. IV.A, on the single and the common arm",
     says="It is the infinite branch at ω = 0 that causes the instability.",
-    chapter=CHAPTER,
     pinned=(Verdict.IN_PART, 4.0, 0.0),
 )
 def branch_decides() -> Finding:

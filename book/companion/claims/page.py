@@ -9,7 +9,6 @@ from __future__ import annotations
 import html
 import inspect
 import os
-from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import NamedTuple
@@ -80,19 +79,6 @@ class Source(NamedTuple):
     text: str
 
 
-def section(claim: Claim) -> str:
-    """Return the paper's section that a claim belongs to.
-
-    Examples
-    --------
-    >>> from book.companion.claims import check
-    >>> from book.companion.claims.page import section
-    >>> [section(claim) for claim, _ in check("T1")]
-    ['Sec. I and Table I']
-    """
-    return SECTIONS[claim.chapter]
-
-
 def source(claim: Claim) -> Source:
     """Find the function that checks a claim.
 
@@ -123,17 +109,10 @@ def project_url() -> str | None:
     return found[0].rstrip("/") if found else None
 
 
-def chapter_link(claim: Claim, root: str = "") -> str:
-    """Return the address of a claim in its chapter's own table.
-
-    Parameters
-    ----------
-    claim : Claim
-        The claim.
-    root : str, optional
-        From the linking page to the folder of the chapters, empty for a chapter.
-    """
-    return f"{root}{claim.chapter}.html#claim-{claim.identifier}"
+def link_to_chapter(claim: Claim) -> str:
+    """Return a link from another chapter to a claim in its own chapter's table."""
+    name = html.escape(claim.identifier)
+    return f'<a href="{claim.chapter}.html#claim-{name}">{name}</a>'
 
 
 class VerdictCounts:
@@ -209,7 +188,7 @@ def _controls(ledger: Ledger) -> str:
         for v in Verdict
         if counts[v]
     )
-    sections = dict.fromkeys(section(claim) for claim, _ in ledger)
+    sections = dict.fromkeys(SECTIONS[claim.chapter] for claim, _ in ledger)
     options = "".join(f"<option>{html.escape(name)}</option>" for name in sections)
     return (
         '<form class="ledger-filter" hidden><fieldset><legend>Verdicts</legend>'
@@ -224,43 +203,35 @@ def _controls(ledger: Ledger) -> str:
 
 def _row(claim: Claim, finding: Finding) -> str:
     """Return one row of the table."""
-    escape = html.escape
-    place = source(claim)
-    url = project_url()
+    escape, name = html.escape, html.escape(claim.identifier)
+    place, url = source(claim), project_url()
     where = f"{place.file}, line {place.line}"
     if url:
         where = f'<a href="{escape(url)}/blob/main/{place.file}#L{place.line}">{where}</a>'
     return (
-        f'<tr id="ledger-{escape(claim.identifier)}" '
-        f'data-verdict="{finding.verdict.name.lower()}" '
-        f'data-section="{escape(section(claim))}">'
-        f'<td><a href="{escape(chapter_link(claim))}">{escape(claim.identifier)}</a><br>'
-        f"{badge(finding.verdict, finding.verdict)}"
+        f'<tr id="ledger-{name}" data-verdict="{finding.verdict.name.lower()}" '
+        f'data-section="{escape(SECTIONS[claim.chapter])}">'
+        f"<td>{link_to_chapter(claim)}<br>{badge(finding.verdict, finding.verdict)}"
         f"<br><small>{escape(claim.place)}</small></td><td>{explanation(claim, finding)}"
-        f"<details><summary>Source of {escape(claim.identifier)}</summary><p>{where}</p>"
+        f"<details><summary>Source of {name}</summary><p>{where}</p>"
         f'<pre tabindex="0">{escape(place.text)}</pre></details></td></tr>'
     )
 
 
-def errata(ledger: Ledger, verdicts: Sequence[Verdict] = ()) -> ErrataTable:
-    """Return what is not as printed: every claim that was not simply reproduced.
+class Errata:
+    """What was not simply reproduced: printed, derived, how it was found, what it affects.
 
     Parameters
     ----------
     ledger : Ledger
         The claims and their findings.
-    verdicts : sequence of Verdict, optional
+    *verdicts : Verdict
         Which ones to take; by default "not as written" and "differs".
     """
-    chosen = verdicts or (Verdict.NOT_AS_WRITTEN, Verdict.DIFFERS)
-    return ErrataTable([entry for entry in ledger if entry[1].verdict in chosen], ledger)
 
-
-class ErrataTable:
-    """Printed, derived, how the difference was found, and what depends on it."""
-
-    def __init__(self, entries: Sequence[tuple[Claim, Finding]], ledger: Ledger) -> None:
-        self.entries = list(entries)
+    def __init__(self, ledger: Ledger, *verdicts: Verdict) -> None:
+        chosen = verdicts or (Verdict.NOT_AS_WRITTEN, Verdict.DIFFERS)
+        self.entries = [entry for entry in ledger if entry[1].verdict in chosen]
         self.known = {claim.identifier: (claim, finding) for claim, finding in ledger}
 
     def __len__(self) -> int:
@@ -274,34 +245,27 @@ class ErrataTable:
             for c, f in self.entries
         )
 
-    def dependents(self, claim: Claim) -> list[tuple[Claim, Finding]]:
-        """Return the claims that the erratum bears on, as far as they are registered."""
-        return [self.known[name] for name in claim.affects if name in self.known]
-
     def _repr_html_(self) -> str:
         """Return one block an erratum; a table of four columns would not fit a phone."""
         return "".join(self._block(*entry) for entry in self.entries)
 
     def _block(self, claim: Claim, finding: Finding) -> str:
-        escape = html.escape
-        depends = ", ".join(
-            f'<a href="{escape(chapter_link(c))}">{escape(c.identifier)}</a> ({f.verdict})'
-            for c, f in self.dependents(claim)
-        )
-        own = f'<a href="{escape(chapter_link(claim))}">{escape(claim.identifier)}</a>'
+        known = [self.known[name] for name in claim.affects if name in self.known]
+        affects = ", ".join(f"{link_to_chapter(c)} ({f.verdict})" for c, f in known)
         parts = {
-            "Printed": escape(claim.says),
+            "Printed": html.escape(claim.says),
             "Deciding number": f"<strong>{finding.value:.6g}</strong>: "
-            f"{escape(finding.quantity)}.",
-            "What follows": escape(finding.note),
-            "How it was found": escape(source(claim).purpose),
+            f"{html.escape(finding.quantity)}.",
+            "What follows": html.escape(finding.note),
+            "How it was found": html.escape(source(claim).purpose),
+            "What depends on it": affects,
         }
-        if depends:
-            parts["What depends on it"] = depends
-        items = "".join(f"<dt>{name}</dt><dd>{text}</dd>" for name, text in parts.items())
+        items = "".join(
+            f"<dt>{name}</dt><dd>{text}</dd>" for name, text in parts.items() if text
+        )
         return (
-            f'<section class="erratum" id="erratum-{escape(claim.identifier)}">'
-            f"<p><strong>{own}, {escape(claim.place)}</strong> "
+            f'<section class="erratum" id="erratum-{claim.identifier}">'
+            f"<p><strong>{link_to_chapter(claim)}, {html.escape(claim.place)}</strong> "
             f"{badge(finding.verdict, finding.verdict)}</p><dl>{items}</dl></section>"
         )
 
