@@ -189,7 +189,8 @@ def sampled_filter(controller: Controller, sample_rate: float) -> SampledFilter:
     t2 are differences and products of differences that lose no digits, however far poles and
     zeros lie apart.
     """
-    zeros, poles = (np.array(r, dtype=complex) for r in (controller.zeros, controller.poles))
+    zeros: ComplexArray = np.array(controller.zeros, dtype=complex)
+    poles: ComplexArray = np.array(controller.poles, dtype=complex)
     if zeros.size > poles.size:
         raise ValueError(
             f"controller must be proper, got more zeros than poles: {zeros.size} and "
@@ -202,19 +203,18 @@ def sampled_filter(controller: Controller, sample_rate: float) -> SampledFilter:
         )
     at_infinity = poles.size - zeros.size
     factors = np.append(1.0 - half * zeros, np.full(at_infinity, half)) / (1.0 - half * poles)
-    sampled_zeros = np.append(2.0 * half * zeros / (1.0 - half * zeros), [-2.0] * at_infinity)
-    sampled_poles = 2.0 * half * poles / (1.0 - half * poles)
+    finite = 2.0 * half * zeros / (1.0 - half * zeros)
+    above = _pairs([*finite, *[-2.0 + 0j] * at_infinity])
+    below = _pairs([*(2.0 * half * poles / (1.0 - half * poles))])
     sections = tuple(
         (r1, r2, k, (r1 - a1) + (r2 - a2), (r2 - a1) * (r2 - a2) + (b - k))
-        for (r1, r2, k), (a1, a2, b) in zip(
-            _pairs(sampled_poles), _pairs(sampled_zeros), strict=True
-        )
+        for (r1, r2, k), (a1, a2, b) in zip(below, above, strict=True)
     )
     gain = controller.gain * float(np.prod(factors).real)
     return SampledFilter(gain, sections or (_NO_SECTION,), poles.size)
 
 
-def _pairs(roots: ComplexArray) -> Rows:
+def _pairs(roots: list[complex]) -> Rows:
     """Return roots by twos as (gamma - r1) (gamma - r2) + k, rows (r1, r2, k).
 
     Larger pairs come first. A last real root that is left over is joined by -1.

@@ -1,5 +1,7 @@
 """Sampled filters and sensors: response, slow and fast poles, hidden modes, covariance."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.polynomial import polynomial as poly
@@ -45,7 +47,7 @@ def continuous(zeros, poles, gain, mapping, s):
     return [Controller(zeros, poles, gain)(s) * weight for weight in both]
 
 
-CASES = {
+CASES: dict[str, tuple[Any, Any, float, Any]] = {
     "repeated": ((-1.0, -1.0), (-0.3, -0.3, -0.3), 2.0, ((1.0,), (1.0, 2.0), (1.0, 2.0, 1.0))),
     "complex": ((-1 + 2j, -1 - 2j, -3), (-0.1, -0.2 + 1j, -0.2 - 1j), 3.0,
                 ((1.0, 2.0, 1.5), (1.0, 0.0, -1.0), (2.0, 1.4, 1.0))),
@@ -68,8 +70,8 @@ CASES = {
 
 @pytest.mark.parametrize("name", CASES)
 def test_response_is_the_continuous_one_at_the_warped_frequency(name):
-    zeros, poles, gain, polynomials = CASES[name]
-    mapping = SignalMapping(*polynomials, "made up")
+    zeros, poles, gain, (first, second, below) = CASES[name]
+    mapping = SignalMapping(first, second, below, "made up")
     sensor, controller = sampled_loop(Controller(zeros, poles, gain), mapping, RATE)
     found = filter_response(controller, OMEGA) * sensor_response(sensor, OMEGA)
     expected = continuous(zeros, poles, gain, mapping, 1j * warped(OMEGA, RATE))
@@ -90,7 +92,7 @@ def test_poles_and_zeros_over_twelve_decades():
     """Twenty-six of them, at the rate that a loop with unity gain at 15 kHz needs."""
     rate = 4e6
     poles = -2.0 * np.pi * np.geomspace(1e-6, 1e6, 26)
-    controller = Controller(1.7 * poles, poles, 3.0)
+    controller = Controller([*(1.7 * poles)], [*poles], 3.0)
     omega = np.geomspace(1e-6, 1e6, 60)
     found = filter_response(sampled_filter(controller, rate), omega, rate)
     expected = controller(1j * warped(omega, rate))
@@ -142,7 +144,8 @@ def test_a_sensor_with_many_corners():
     ],
 )
 def test_poles_at_zero_that_zeros_cancel_leave_no_state(zeros, poles, polynomials, number):
-    mapping = SignalMapping(*polynomials, "made up")
+    first, second, below = polynomials
+    mapping = SignalMapping(first, second, below, "made up")
     sensor, controller = sampled_loop(Controller(zeros, poles, 1.0), mapping, RATE)
     states = [row for row in sensor.states if any(row)]
     assert len(states) + controller.order == number
@@ -151,9 +154,9 @@ def test_poles_at_zero_that_zeros_cancel_leave_no_state(zeros, poles, polynomial
 def test_filters_that_have_no_samples_are_refused():
     with pytest.raises(ValueError, match="more zeros than poles: 2 and 1"):
         sampled_filter(Controller((-1.0, -2.0), (-3.0,), 1.0), RATE)
-    for factors in (([400.0], [-1.0]), ([], [400.0])):
+    for controller in (Controller([400.0], [-1.0], 1.0), Controller([], [400.0], 1.0)):
         with pytest.raises(ValueError, match="sample_rate must not be half a pole or zero"):
-            sampled_filter(Controller(*factors, 1.0), RATE)
+            sampled_filter(controller, RATE)
 
 
 def test_states_run_as_the_response_says():

@@ -186,12 +186,10 @@ def test_dead_times_that_the_rate_does_not_resolve_are_refused():
     message = (
         r"sample_rate must be at least 4000\.0 Hz to interpolate delay = 0\.001 s .*, or a"
     )
-    for call in (
-        Simulation,
-        lambda *args: sampled_open_loop(args[0], 1.0, sample_rate=args[1]),
-    ):
-        with pytest.raises(ValueError, match=message):
-            call(loop, 200.0)
+    with pytest.raises(ValueError, match=message):
+        Simulation(loop, 200.0)
+    with pytest.raises(ValueError, match=message):
+        sampled_open_loop(loop, 1.0, sample_rate=200.0)
     assert Simulation(loop, 1000.0).advance(np.ones(3)).shape == (3,)
     assert Simulation(loop, 4100.0).advance(np.ones(3)).shape == (3,)
 
@@ -256,10 +254,8 @@ def test_verdicts_of_the_paper_loop(difference):
     c2 = 1.0 - difference
     rate = complex(rightmost_root(loop, 1.0, c2)).real if difference > 0 else 1e-4
     samples = round(6.0 / rate * RATE)
-    impulse = np.zeros(samples)
     # A step, which the slow roots see.
-    impulse[:] = 1.0
-    output = simulate(loop, impulse, 1.0, c2)
+    output = simulate(loop, np.ones(samples), 1.0, c2)
     early, late = (np.abs(output[int(share * samples) :][:4000]).max() for share in (0.5, 0.95))
     assert int(unstable_roots(loop, 1.0, c2)) == (2 if difference > 0 else 0)
     grown = np.log(late / early)
@@ -304,11 +300,8 @@ def test_streams_are_read_one_block_at_a_time():
 def test_constant_parameters_equal_arrays():
     noise = np.random.default_rng(1).standard_normal(9000)
     full = np.full(noise.size, 1.0 - 1e-6)
-    assert np.array_equal(
-        simulate(paper_loop(), noise, 1.0, full), simulate(paper_loop(), noise, 1, 1.0 - 1e-6)
-    )
-    every_second = np.repeat(noise, 2)[::2]
-    assert np.array_equal(simulate(paper_loop(), every_second), simulate(paper_loop(), noise))
+    found = simulate(paper_loop(), noise, 1, 1.0 - 1e-6)
+    assert np.array_equal(simulate(paper_loop(), noise, 1.0, full), found)
 
 
 def test_history_continues_a_run():
@@ -370,7 +363,6 @@ SHORT = np.zeros(100)
     ("arguments", "message"),
     [
         ({"noise": np.zeros((2, 50))}, r"noise must be one-dimensional, got shape \(2, 50\)"),
-        ({"noise": 3.0}, "noise must be one-dimensional"),
         ({"noise": [0.0, np.nan]}, "noise must be finite, got nan at"),
         ({"c1": np.ones(99)}, r"c1 must be a number or have the shape of noise, \(100,\)"),
         ({"c2": np.ones((100, 1))}, "c2 must be one-dimensional"),
@@ -383,7 +375,6 @@ SHORT = np.zeros(100)
         ({"interpolation": 2}, "interpolation must be an odd integer, got 2"),
         ({"interpolation": 3.0}, r"interpolation must be an integer .*, got 3\.0$"),
         ({"limit": 0.5}, "limit must be at least 1, got 0.5"),
-        ({"noise": SHORT + 0.0, "c1": np.ones(1)}, r"c1 must .* shape of noise, \(100,\); got"),
     ],
 )
 def test_bad_arguments(arguments, message):
@@ -394,8 +385,7 @@ def test_bad_arguments(arguments, message):
 @pytest.mark.parametrize(
     ("loop", "arguments", "message"),
     [
-        (CommonArm(), {"noise": ["a"]}, "noise must"),
-        (CommonArm(), {"noise": SHORT + 1j}, "noise must be real"),
+        (CommonArm(), {"noise": SHORT + 1j}, "noise must"),
         (CommonArm(), {"c1": "x"}, "c1 must"),
         (CommonArm(), {"noise": SHORT > 0.0}, "noise must hold real numbers, got dtype bool"),
         (HayesEquation(), {}, "loop must be an armlock.Loop, got HayesEquation"),
@@ -422,26 +412,23 @@ def test_rates_too_low_for_the_feedback():
     assert simulate(loop, SHORT, sample_rate=50.0).shape == SHORT.shape
 
 
-def test_nothing_is_computed_before_the_check(monkeypatch):
-    def fail(*_):
-        raise AssertionError("computed")
-
-    monkeypatch.setattr("armlock.simulation._advance", fail)
-    noise = np.zeros(300_000)
-    noise[-1] = np.nan
-    with pytest.raises(ValueError, match=r"noise must be finite.* 299999"):
-        simulate(paper_loop(), noise)
-    with pytest.raises(ValueError, match="c2 must be finite"):
-        simulate(paper_loop(), np.zeros(300_000), 1.0, noise)
-
-
 def test_saved_series_read_back(tmp_path):
+    """While it is written, what another process sees has another name."""
     noise = np.random.default_rng(1).standard_normal(5000)
+    seen = []
+
+    def parts():
+        for part in np.split(noise, 10):
+            seen.append([path.suffix for path in tmp_path.iterdir()])
+            yield part
+
     target = tmp_path / "run.npy"
-    blocks = simulate_blocks(CommonArm(), np.split(noise, 10), 10.0)
-    assert save_series(target, blocks) == noise.size
+    assert save_series(target, simulate_blocks(CommonArm(), parts(), 10.0)) == noise.size
     assert np.array_equal(np.load(target), simulate(CommonArm(), noise, sample_rate=10.0))
+    assert seen == [[".part"]] * 10
     assert [path.name for path in tmp_path.iterdir()] == ["run.npy"]
+    assert save_series(str(target), [[1, 2], np.array([4.5], "f4"), []]) == 3  # type: ignore[list-item]
+    assert np.load(target).tolist() == [1.0, 2.0, 4.5]
 
 
 @pytest.mark.parametrize("stop", [KeyboardInterrupt, DivergenceError(1.0, 2.0, SHORT)])
@@ -459,38 +446,20 @@ def test_an_interrupted_run_leaves_no_file(tmp_path, stop):
     assert np.array_equal(np.load(old), np.arange(3.0))
 
 
-FREQUENCIES = [
-    (
-        [0.01, -0.01],
-        ValueError,
-        r"omega must not be negative and at most 628\.3.*, got -0\.01$",
-    ),
-    ([0.01, 0.0], ValueError, r"omega must be positive, got 0\.0"),
-    ([0.01, 700.0], ValueError, r"at most 628\.3\d+ rad/s, half the sample rate, got 700\.0$"),
-    (np.nan, ValueError, "omega must be finite, got nan"),
-]
-
-
-@pytest.mark.parametrize(("omega", "error", "message"), FREQUENCIES)
-def test_the_sampled_loop_is_for_frequencies_below_half_the_rate(omega, error, message):
-    with pytest.raises(error, match=message):
-        sampled_open_loop(paper_loop(), omega)
-
-
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("omega", "arguments", "message"),
     [
-        ({"sample_rate": -1.0}, "sample_rate must be positive"),
-        ({"sample_rate": 1.0}, r"sample_rate must exceed 1\.25"),
-        ({"c1": np.nan}, "c1 must be finite"),
-        ({"interpolation": 2}, "interpolation must be an odd integer"),
+        ([0.01, -0.01], {}, r"omega must not be negative and at most 628\.3.*, got -0\.01$"),
+        ([0.01, 0.0], {}, r"omega must be positive, got 0\.0"),
+        ([0.01, 700.0], {}, r"at most 628\.3\d+ rad/s, half the sample rate, got 700\.0$"),
+        (0.01, {"sample_rate": 1.0}, r"sample_rate must exceed 1\.25"),
+        (0.01, {"c1": np.nan}, "c1 must be finite"),
+        (0.01, {"interpolation": 2}, "interpolation must be an odd integer"),
     ],
 )
-def test_the_sampled_loop_is_for_what_can_be_simulated(arguments, message):
+def test_the_sampled_loop_is_for_what_can_be_simulated(omega, arguments, message):
     with pytest.raises(ValueError, match=message):
-        sampled_open_loop(paper_loop(), [0.01], **arguments)
-    with pytest.raises(TypeError, match=r"c1 must be a real number, got array"):
-        sampled_open_loop(paper_loop(), [0.01, 0.02], np.ones(2))  # type: ignore[arg-type]
+        sampled_open_loop(paper_loop(), omega, **arguments)
 
 
 def test_half_the_rate_itself_is_allowed():
@@ -532,15 +501,6 @@ def test_the_layout_of_arrays_does_not_matter(name):
     expected = simulate(loop, noise, 0.1 * c1, 0.1 * c2, rate, history=c1)
     found = simulate(loop, view(noise), view(0.1 * c1), view(0.1 * c2), rate, history=view(c1))
     assert np.array_equal(found, expected)
-
-
-def test_integers_and_short_floats_are_numbers():
-    counts = np.arange(-50, 50)
-    expected = simulate(CommonArm(), counts.astype(float), sample_rate=10.0)
-    for dtype in (np.int8, np.float32):
-        found = simulate(CommonArm(), counts.astype(dtype), sample_rate=10.0)
-        assert found.dtype == np.float64
-        assert np.array_equal(found, expected)
 
 
 PARTITION = st.lists(st.sampled_from([0, 1, 2, 3, 7, 64, 139, 140, 141, 400]), max_size=12)
@@ -637,29 +597,6 @@ def test_what_is_no_series_is_not_saved(tmp_path, blocks, error, message):
     with pytest.raises(error, match=message):
         save_series(tmp_path / "run.npy", blocks)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_numbers_of_any_kind_are_saved_as_floats(tmp_path):
-    target = tmp_path / "run.npy"
-    blocks = [[1, 2], np.array([3], "i2"), np.array([4.5, 0.0, 5.5], "f4")[::2], np.empty(0)]
-    assert save_series(target, blocks) == 5  # type: ignore[arg-type]
-    assert np.load(target).tolist() == [1.0, 2.0, 3.0, 4.5, 5.5]
-    assert save_series(str(target), []) == 0
-    assert np.load(target).shape == (0,)
-
-
-def test_a_file_being_written_does_not_look_whole(tmp_path):
-    """What another process sees in the meantime has another name, and no samples."""
-    seen = []
-
-    def blocks():
-        for _ in range(3):
-            seen.append(sorted(path.suffix for path in tmp_path.iterdir()))
-            yield np.ones(10_000)
-
-    save_series(tmp_path / "run.npy", blocks())
-    assert seen == [[".part"]] * 3
-    assert [path.name for path in tmp_path.iterdir()] == ["run.npy"]
 
 
 def test_the_benchmark_runs(tmp_path):
