@@ -261,12 +261,12 @@ def _checked(
         *loop.controller.poles,
         *np.roots(loop.mapping.denominator[::-1]),
     )
-    # Beyond twice the sample rate the trapezoidal rule moves real ones across infinity.
-    fastest = max((abs(root) for root in roots), default=0.0)
+    # Beyond twice the sample rate the trapezoidal rule moves them across infinity.
+    fastest = max((root.real for root in roots if root.imag == 0.0), default=0.0)
     if rate <= fastest / 2.0:
         raise ValueError(
-            f"sample_rate must exceed {fastest / 2.0} Hz, half of the loop's fastest pole "
-            f"or zero in rad/s, got {rate}"
+            f"sample_rate must exceed {fastest / 2.0} Hz, half of the loop's fastest real pole "
+            f"or zero in the right half-plane, in rad/s, got {rate}"
         )
     tau1, tau2, dead = (
         lagrange_delay(name, getattr(loop, name), rate, order)
