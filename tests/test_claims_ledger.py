@@ -1,3 +1,4 @@
+import inspect
 import itertools
 from pathlib import Path
 
@@ -158,3 +159,11 @@ def test_a_claim_affects_other_claims():
     known = {entry.identifier for entry in all_claims()}
     for entry in all_claims():
         assert set(entry.affects) <= known - {entry.identifier}
+
+
+def test_every_module_with_claims_is_imported():
+    there = {file.stem for file in Path(module.__file__).parent.glob("*.py")}
+    known = {
+        inspect.unwrap(entry.check).__module__.rpartition(".")[2] for entry in all_claims()
+    }
+    assert there - known == {"__init__", "__main__", "assumptions", "ledger", "page"}

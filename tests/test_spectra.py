@@ -260,7 +260,7 @@ def test_a_density_to_compare_with_is_a_function():
         found.expected(1.0)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match=r"asd\(frequency\) must be finite, got nan"):
         found.expected(lambda f: np.full(f.shape, np.nan))
-    with pytest.raises(TypeError, match=r"asd\(frequency\) must be real"):
+    with pytest.raises(TypeError, match=r"asd\(frequency\) must hold real numbers"):
         found.expected(lambda f: f + 1j)
     with pytest.raises(ValueError, match=r"asd must return one value for each frequency"):
         found.expected(lambda f: f[0])
