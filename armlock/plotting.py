@@ -260,7 +260,7 @@ def plot_nyquist(
     return ax
 
 
-def _radius(size: float, unit: float) -> float:
+def _compressed_radius(size: float, unit: float) -> float:
     """Return where a value of this size lies in the compressed plane."""
     return float(np.log10(1.0 + size / unit))
 
@@ -285,7 +285,7 @@ def _infinite_branch(ax: Axes, curve: NyquistCurve, unit: float) -> None:
     label = r"infinite branch, $\omega = 0$"
     for angles, name in ((-half[::-1], "_"), (half, label)):
         if angles.size:
-            arc = _radius(INFINITY, unit) * np.exp(1j * angles)
+            arc = _compressed_radius(INFINITY, unit) * np.exp(1j * angles)
             ax.plot(arc.real, arc.imag, color=ORANGE, linestyle="--", label=name)
             _arrow(ax, arc[arc.size // 2], arc[arc.size // 2 + 1], ORANGE)
 
@@ -301,9 +301,9 @@ def _circles(ax: Axes, unit: float) -> None:
         (1e4, "$10^{4}$"),
         (INFINITY, r"$\infty$"),
     ):
-        circle = _radius(size, unit) * turn
+        circle = _compressed_radius(size, unit) * turn
         ax.plot(circle.real, circle.imag, "-", color="0.8", linewidth=0.6, zorder=0)
-        place = _radius(size, unit) * np.exp(0.25j * np.pi)
+        place = _compressed_radius(size, unit) * np.exp(0.25j * np.pi)
         ax.text(
             place.real,
             place.imag,
@@ -315,9 +315,9 @@ def _circles(ax: Axes, unit: float) -> None:
             bbox={"fc": "white", "ec": "none", "pad": 0.8},
             zorder=6,
         )
-    reach = 1.06 * _radius(INFINITY, unit)
+    reach = 1.06 * _compressed_radius(INFINITY, unit)
     for x, y in (([-reach, reach], [0.0, 0.0]), ([0.0, 0.0], [-reach, reach])):
         ax.plot(x, y, "-", color="0.6", linewidth=0.6, zorder=0)
     ax.set(xlim=(-reach, reach), ylim=(-reach, reach))
-    minus_one = -_radius(1.0, unit)
+    minus_one = -_compressed_radius(1.0, unit)
     ax.plot(minus_one, 0.0, "+", color="black", markersize=10, markeredgewidth=1.8, zorder=5)

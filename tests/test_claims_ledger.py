@@ -16,7 +16,7 @@ from book.companion.claims import (
     decide,
 )
 from book.companion.claims import ledger as module
-from book.companion.claims.page import whole_ledger
+from book.companion.claims.page import SECTIONS, whole_ledger
 
 NOTEBOOKS = Path(__file__).parents[1] / "notebooks"
 
@@ -151,6 +151,7 @@ def test_a_chapter_shows_its_claims_and_confirms_them(chapter):
     lines = [line for cell in cells for line in cell]
     assert f'ledger = chapter_claims("{chapter}")' in lines
     assert "ledger.confirm()" in lines
+    assert chapter in SECTIONS
     # The last line of a cell is what the page shows.
     assert any(cell and cell[-1] == "ledger" for cell in cells)
 

@@ -11,7 +11,7 @@ from book.companion.claims import page as module
 from book.companion.claims.assumptions import (
     DIFFERENCES,
     Assumptions,
-    first_break,
+    break_along,
     over_corners,
 )
 from book.companion.claims.controller import highest_stable_corner
@@ -109,7 +109,7 @@ def test_errata_are_what_is_not_as_printed(ledger):
 @pytest.mark.parametrize("name", DIFFERENCES)
 def test_the_first_break_is_where_counts_find_the_first_unstable_root(name):
     loop = paper_loop(difference=DIFFERENCES[name])
-    found = first_break(loop)
+    found = break_along(loop)
     sizes = found * np.append(np.geomspace(1e-3, 1.0 - 1e-7, 40), 1.0 + 1e-7)
     assert (unstable_roots(loop, 1.0 + sizes, 1.0 - sizes) == 0).tolist() == [True] * 40 + [
         False
@@ -117,7 +117,7 @@ def test_the_first_break_is_where_counts_find_the_first_unstable_root(name):
 
 
 def test_a_loop_that_is_unstable_has_no_first_break():
-    assert first_break(CommonArm(), (1.0, 0.0)) == 0.0
+    assert break_along(CommonArm(), (1.0, 0.0)) == 0.0
 
 
 def test_the_loop_is_lost_at_the_highest_stable_corner():

@@ -48,7 +48,7 @@ from book.companion.claims.simulation import (
 DIFFERENCES = {"full": TAU1 - TAU2, "half": 0.5 * (TAU1 - TAU2)}
 
 
-def first_break(loop: Loop, direction: tuple[float, float] = (1.0, -1.0)) -> float:
+def break_along(loop: Loop, direction: tuple[float, float] = (1.0, -1.0)) -> float:
     """Smallest perturbation of (1, 1) along a direction that makes a loop unstable.
 
     Returns
@@ -59,8 +59,8 @@ def first_break(loop: Loop, direction: tuple[float, float] = (1.0, -1.0)) -> flo
     Examples
     --------
     >>> from armlock import paper_loop
-    >>> from book.companion.claims.assumptions import first_break
-    >>> print(f"{first_break(paper_loop()):.4g}")
+    >>> from book.companion.claims.assumptions import break_along
+    >>> print(f"{break_along(paper_loop()):.4g}")
     1.464e-06
     """
     if unstable_roots(loop, 1.0, 1.0):
@@ -93,7 +93,7 @@ def over_corners(points: int = 31) -> tuple[FloatArray, dict[str, FloatArray]]:
     columns: dict[str, FloatArray] = {}
     for name, difference in DIFFERENCES.items():
         loops = [paper_loop(float(p), difference=difference) for p in corners]
-        breaks = [first_break(loop) for loop in loops]
+        breaks = [break_along(loop) for loop in loops]
         left = [
             modulus_margin(k) if at else np.nan for k, at in zip(loops, breaks, strict=True)
         ]
@@ -133,8 +133,8 @@ def assumption(make: Callable[[], Assumption]) -> Callable[[], Assumption]:
 
 @assumption
 def _corner() -> Assumption:
-    tenth = first_break(paper_loop(0.1 * DUAL_SENSOR_CORNER))
-    here, limit = first_break(paper_loop()), highest_stable_corner()
+    tenth = break_along(paper_loop(0.1 * DUAL_SENSOR_CORNER))
+    here, limit = break_along(paper_loop()), highest_stable_corner()
     half = highest_stable_corner(DIFFERENCES["half"])
     return Assumption(
         "p, the corner frequency of the dual sensor",
@@ -150,7 +150,7 @@ def _corner() -> Assumption:
 @assumption
 def _difference() -> Assumption:
     loops = [paper_loop(difference=d) for d in DIFFERENCES.values()]
-    full, half = (first_break(loop) for loop in loops)
+    full, half = (break_along(loop) for loop in loops)
     modulus, half_modulus = (modulus_margin(loop) for loop in loops)
     return Assumption(
         "Δτ in the dual sensor",
@@ -191,7 +191,7 @@ def _denominator() -> Assumption:
 
 @assumption
 def _gain() -> Assumption:
-    higher = first_break(paper_loop(controller=table_two(2.0 * np.pi * CONTROLLER_GAIN)))
+    higher = break_along(paper_loop(controller=table_two(2.0 * np.pi * CONTROLLER_GAIN)))
     lower = paper_loop(controller=table_two(CONTROLLER_GAIN / (2.0 * np.pi)))
     return Assumption(
         "The unit of g",
@@ -200,13 +200,13 @@ def _gain() -> Assumption:
         "Were it in Hz, g would be 2π times larger: the first break along (1, -1) at "
         f"{higher:.4g}; 2π times smaller: {int(unstable_roots(lower, 1.0, 1.0))} unstable "
         "roots at (1, 1); as taken: the first break along (1, -1) at "
-        f"{first_break(paper_loop()):.4g}.",
+        f"{break_along(paper_loop()):.4g}.",
     )
 
 
 @assumption
 def _order() -> Assumption:
-    up, down = first_break(paper_loop()), first_break(paper_loop(), (-1.0, 1.0))
+    up, down = break_along(paper_loop()), break_along(paper_loop(), (-1.0, 1.0))
     return Assumption(
         "Which arm is the longer",
         f"Arm 1: τ₁ = {TAU1} s, τ₂ = {TAU2} s",

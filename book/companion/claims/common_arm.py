@@ -296,7 +296,7 @@ def scheme_errors(step: float = STEP) -> dict[str, MapErrors]:
     return {name: errors_of(system) for name, system in standard_schemes(ARM, step).items()}
 
 
-def exponent(x: npt.ArrayLike, y: npt.ArrayLike) -> float:
+def log_slope(x: npt.ArrayLike, y: npt.ArrayLike) -> float:
     """Slope of log(y) against log(x), by least squares: an observed order."""
     return float(np.polyfit(np.log(x), np.log(y), 1)[0])
 
@@ -527,7 +527,7 @@ def spectral_radius_decides() -> Finding:
 def region_at_the_step() -> Finding:
     """Measure how far the boundary is off at the paper's step, and how this falls with h."""
     roots, shifts = zip(*(convergence(order) for order in (0, 1)), strict=True)
-    orders = [exponent(STEPS, errors) for errors in (*roots, *shifts)]
+    orders = [log_slope(STEPS, errors) for errors in (*roots, *shifts)]
     along, reach = rays(RAYS), float(exact_radius().max())
     mapped = boundary_radius(semi_discretization(ARM, STEP), along)
     own, exact = (enclosed_area(outline(r, along)) for r in (mapped, exact_radius()))
@@ -546,7 +546,7 @@ def region_at_the_step() -> Finding:
         "roots by a term of order h, and the envelopes that form the round ends not at all: "
         "these move with the amplitude, of order h². Along the lower edge, which one turn of "
         "the curve forms, order 0 converges with "
-        f"{exponent(STEPS, low):.2f} only, from an error of {low[0]:.1e}.",
+        f"{log_slope(STEPS, low):.2f} only, from an error of {low[0]:.1e}.",
     )
 
 

@@ -33,7 +33,7 @@ from armlock.roots import rightmost_root
 from armlock.semidiscretization import semi_discretization
 from armlock.stability import BOUNDARY, stability_chart, unstable_roots
 from book.companion.claims import ledger
-from book.companion.claims.common_arm import exponent
+from book.companion.claims.common_arm import log_slope
 from book.companion.claims.ledger import Finding, Verdict, decide
 from book.companion.claims.table1 import FULL_DIFFERENCE, HALF_DIFFERENCE, MEAN_DELAY
 
@@ -481,7 +481,7 @@ def edges_against_gain() -> Finding:
     corner = np.asarray(gain_sweep().corner)
     lines = {d_curve_line(DualArm(float(gain))) for gain in GAINS}
     high = GAINS >= 1e4
-    slope = exponent(GAINS[high], corner[high])
+    slope = log_slope(GAINS[high], corner[high])
     ratio = float(corner[-1] / corner_estimate(GAINS[-1], 2))
     return Finding(
         decide((np.diff(corner) < 0.0).all() and len(lines) == 1),
@@ -574,7 +574,7 @@ def shrinking_region() -> Finding:
     middle = 0.5 * (width[0] + width[-1])
     point = (WINDOW[0] - 0.5 * middle, WINDOW[0] + 0.5 * middle)
     gained = [int(unstable_roots(DualArm(float(g)), *point)) for g in GAINS[[0, -1]]]
-    slope = exponent(*area_excess())
+    slope = log_slope(*area_excess())
     sliver = 0.5 * (SLIVER[1] - SLIVER[0])
     end = limit_end(2.0 * sliver)
     widens = bool((np.diff(width) > 0.0).all()) and gained[1] == 0 < gained[0]

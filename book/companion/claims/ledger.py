@@ -1,10 +1,11 @@
 """How a claim of the paper is written down, decided, checked and shown.
 
-A claim is a function without arguments that computes a `Finding`. The decorator `claim`
-holds all the rest, and enters it in the register:
+A claim is a function without arguments that computes a `Finding`. The decorator holds all the
+rest, and enters it in the register. A module names its chapter once:
 
-    @claim("C2", place="Eq. (5b)", says="...", chapter="03_common_arm",
-           pinned=(Verdict.REPRODUCED, 0.0, 1e-12))
+    claim = partial(ledger.claim, chapter="03_common_arm")
+
+    @claim("C2", place="Eq. (5b)", says="...", pinned=(Verdict.REPRODUCED, 0.0, 1e-12))
     def straight_line() -> Finding:
         ...
 

@@ -23,7 +23,7 @@ from armlock.paper import (
     TAU2,
 )
 from armlock.roots import rightmost_root
-from armlock.stability import unstable_roots
+from armlock.stability import BOUNDARY, unstable_roots
 from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, decide
 
@@ -61,9 +61,8 @@ PANELS = (
 
 def rightmost_of_loop(loop: Loop, c1: float, c2: float) -> complex:
     """Return the rightmost root of 1 + L in rad/s, leaving out a root s = 0 that only D has."""
-    root = complex(rightmost_root(loop, c1, c2))
-    if root != 0.0:
-        return root
+    if unstable_roots(loop, c1, c2) != BOUNDARY:
+        return rightmost_root(loop, c1, c2)
 
     def others(exponent: float) -> float:
         # Roots right of Re s = -10^exponent, besides s = 0.

@@ -38,6 +38,8 @@ SECTIONS = {
     "07_simulation": "Sec. IV.C, simulation",
     "08_perturbations": "Appendix",
 }
+#: What makes the table's filter work.
+SCRIPT = Path(__file__).with_name("ledger.js")
 
 
 def whole_ledger() -> Ledger:
@@ -175,7 +177,7 @@ class LedgerPage:
         return (
             f'<div class="ledger">{_controls(self.ledger)}'
             f"{table_of_claims(rows)}{downloads if links else ''}</div>"
-            f"<script>{_SCRIPT}</script>"
+            f"<script>{SCRIPT.read_text('utf-8')}</script>"
         )
 
 
@@ -268,32 +270,3 @@ class Errata:
             f"<p><strong>{link_to_chapter(claim)}, {html.escape(claim.place)}</strong> "
             f"{badge(finding.verdict, finding.verdict)}</p><dl>{items}</dl></section>"
         )
-
-
-_SCRIPT = """
-(function () {
-  const form = document.querySelector('.ledger-filter');
-  const rows = [...document.querySelectorAll('.ledger tbody tr')];
-  const texts = rows.map(row => row.textContent.toLowerCase());
-  function show() {
-    const data = new FormData(form);
-    const verdicts = data.getAll('verdict');
-    const section = data.get('section');
-    const words = data.get('words').toLowerCase().split(' ').filter(Boolean);
-    let count = 0;
-    rows.forEach((row, i) => {
-      const hit = verdicts.includes(row.dataset.verdict)
-        && (!section || row.dataset.section === section)
-        && words.every(word => texts[i].includes(word));
-      row.hidden = !hit;
-      count += hit;
-    });
-    form.querySelector('output').textContent = count + ' of ' + rows.length + ' claims';
-  }
-  form.hidden = false;
-  form.addEventListener('input', show);
-  form.addEventListener('submit', event => event.preventDefault());
-  form.addEventListener('reset', () => setTimeout(show));
-  show();
-})();
-"""

@@ -287,8 +287,8 @@ class SensitivityChange(NamedTuple):
     ----------
     ratio, ratio_at : float
         Largest ratio of the magnitudes, and its frequency in Hz.
-    phase, phase_at : float
-        Largest difference of the phases in rad, and its frequency in Hz.
+    phase : float
+        Largest difference of the phases in rad.
     differs_below : float
         Frequency in Hz below which the magnitudes differ by more than a tenth.
     """
@@ -296,7 +296,6 @@ class SensitivityChange(NamedTuple):
     ratio: float
     ratio_at: float
     phase: float
-    phase_at: float
     differs_below: float
 
 
@@ -304,13 +303,12 @@ def sensitivity_change() -> SensitivityChange:
     """Return where, and by how much, the constant perturbation changes the closed loop."""
     frequency = np.geomspace(1e-8, 1e-3, 4000)
     ratio = sensitivity(frequency, *STRONG) / sensitivity(frequency, *IDEAL)
-    size, phase = np.abs(ratio), np.abs(np.angle(ratio))
-    first, second = int(size.argmax()), int(phase.argmax())
+    size = np.abs(ratio)
+    most = int(size.argmax())
     return SensitivityChange(
-        float(size[first]),
-        float(frequency[first]),
-        float(phase[second]),
-        float(frequency[second]),
+        float(size[most]),
+        float(frequency[most]),
+        float(np.abs(np.angle(ratio)).max()),
         float(frequency[np.abs(size - 1.0) > 0.1].max()),
     )
 
@@ -367,17 +365,10 @@ def exponent(run: Run, size: float) -> float:
     return float(growth_rate(run.difference(size)).sum() * _EVERY / SAMPLE_RATE)
 
 
-class Sizes(NamedTuple):
-    """R.m.s. about zero and largest magnitude of c1 - 1 and of c2 - 1, each shape (2,)."""
-
-    rms: FloatArray
-    peak: FloatArray
-
-
-def drawn_sizes(run: Run) -> Sizes:
-    """Return how large the perturbations of System 1 are that a run has drawn."""
+def drawn_sizes(run: Run) -> tuple[FloatArray, FloatArray]:
+    """Return the r.m.s. and the peak of c1 - 1 and of c2 - 1 of System 1, each shape (2,)."""
     eta = run.perturbations * unit_size()
-    return Sizes(np.sqrt(np.mean(eta**2, axis=1)), np.abs(eta).max(axis=1))
+    return np.sqrt(np.mean(eta**2, axis=1)), np.abs(eta).max(axis=1)
 
 
 @cache
@@ -478,15 +469,8 @@ def chain_exponent(run: Run, until: float) -> float:
     return float((course - np.minimum.accumulate(course)).max())
 
 
-class Start(NamedTuple):
-    """A way to switch the loop on, and the locked laser's spectrum after it."""
-
-    name: str
-    spectrum: Spectrum
-
-
 @cache
-def starts() -> tuple[Start, ...]:
+def starts() -> dict[str, Spectrum]:
     """Spectra of the ideal loop after three ways to switch it on, once it has settled.
 
     They are taken over the seconds `SETTLED` from t = 0. The laser's noise starts at zero,
@@ -495,7 +479,7 @@ def starts() -> tuple[Start, ...]:
     """
     settling, until = (sample_count(t, SAMPLE_RATE) for t in SETTLED)
     reach = Simulation(paper_loop(), SAMPLE_RATE).history_samples
-    found = []
+    found = {}
     for name, rest, filled in (
         ("noise starts at zero", True, False),
         ("noise is there, arms empty", False, False),
@@ -508,8 +492,8 @@ def starts() -> tuple[Start, ...]:
         run.advance(laser.draw(settling))
         for noise in laser.blocks(until - settling, _BLOCK):
             estimator.add(run.advance(noise))
-        found.append(Start(name, estimator.spectrum()))
-    return tuple(found)
+        found[name] = estimator.spectrum()
+    return found
 
 
 def chain_decay() -> float:
@@ -521,7 +505,7 @@ def chain_decay() -> float:
 
 def filled_from() -> float:
     """Frequency in Hz from which filled arms leave twice the noise that empty ones do."""
-    quiet, _, filled = (start.spectrum for start in starts())
+    quiet, _, filled = starts().values()
     return float(quiet.frequency[filled.asd > 2.0 * quiet.asd].min())
 
 
@@ -670,10 +654,10 @@ def long_times() -> Finding:
         f"In the first twentieth of the run it is {start:.1e}. The reason is the loop below "
         f"{1e6 * most.differs_below:.0f} µHz, where the laser's noise passes: from (1, 1) to "
         f"(1, 1 - 10⁻⁶) the closed loop's 1/|1 + L| grows up to {most.ratio:.2f}-fold (at "
-        f"{1e6 * most.ratio_at:.1f} µHz) and its phase moves by up to "
-        f"{np.degrees(most.phase):.0f} degrees (at {1e6 * most.phase_at:.1f} µHz). A period "
-        "there lasts for days, so the outputs part slowly; the phase shifts that the paper "
-        "names do not accumulate in a stable loop.",
+        f"{1e6 * most.ratio_at:.1f} µHz), and its phase moves by up to "
+        f"{np.degrees(most.phase):.0f} degrees. A period there lasts for days, so the outputs "
+        "part slowly; the phase shifts that the paper names do not accumulate in a stable "
+        "loop.",
     )
 
 

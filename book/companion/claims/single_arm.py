@@ -290,8 +290,8 @@ def additional_root() -> Finding:
     for k2 in (0.9, 1.0, 1.1):
         # L has a simple pole at zero where its integrand does not vanish there.
         pole = int(abs(loop.open_loop(1e-12, k2)) > 1e6)
-        roots_of_loop = _turns(1.0 + loop.open_loop(s, k2)) + pole
-        extra[k2] = _turns(loop(s, k2, 0.0)) - roots_of_loop
+        roots_of_loop = _winding(1.0 + loop.open_loop(s, k2)) + pole
+        extra[k2] = _winding(loop(s, k2, 0.0)) - roots_of_loop
     at_zero = float(np.real(1.0 + loop.open_loop(1e-12, 1.0)))
     root = complex(rightmost_root(loop, near, 0.0))
     residual = abs(complex(1.0 + loop.open_loop(root, near)))
@@ -308,7 +308,7 @@ def additional_root() -> Finding:
     )
 
 
-def _turns(values: ComplexArray) -> int:
+def _winding(values: ComplexArray) -> int:
     """Return how often values along a circle go around zero: zeros less poles inside."""
     angle = np.unwrap(np.angle(values))
     return round(float(angle[-1] - angle[0]) / (2.0 * np.pi))

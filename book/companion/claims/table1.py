@@ -57,7 +57,7 @@ def perturbed(name: str, size: npt.ArrayLike) -> tuple[Any, Any]:
     return 1.0 + size * OUTWARD[name][0], 1.0 + size * OUTWARD[name][1]
 
 
-def growth_rate(name: str, size: npt.ArrayLike) -> FloatArray:
+def growth_beside_ideal(name: str, size: npt.ArrayLike) -> FloatArray:
     """Return the real part of the rightmost root, in 1/s, `size` away from (1, 1)."""
     return np.real(np.asarray(rightmost_root(LOOPS[name], *perturbed(name, size))))
 
@@ -102,7 +102,9 @@ def ideal_point_on_boundary() -> Finding:
     strip = 1e-5
     right = {int(unstable_roots(loop.shifted(-strip), 1.0, 1.0)) for loop in LOOPS.values()}
     least = min(abs(complex(1.0 + loop.open_loop(1e-8))) for loop in LOOPS.values())
-    days = {name: 1.0 / float(growth_rate(name, PERTURBATION)) / 86400.0 for name in LOOPS}
+    days = {
+        name: 1.0 / float(growth_beside_ideal(name, PERTURBATION)) / 86400.0 for name in LOOPS
+    }
     plain = Controller((), (), DUAL_ARM_GAIN)
     left = [
         name
@@ -119,20 +121,20 @@ def ideal_point_on_boundary() -> Finding:
         "leaves no unstable root, and to the other side one or more. True of the dual arm as "
         f"well, with p = {DUAL_SENSOR_CORNER:.2f} rad/s, our assumption, or four times lower, "
         "and with Δτ the whole or half the difference of the delays. But at the controller's "
-        f"gain, g = {_listed(gain for *_, gain in off)} rad/s, it is not with p = "
-        f"{_listed(p for _, p, _ in off)} rad/s: there (1, 1) is outside (claim D9 has the "
+        f"gain, g = {_in_words(gain for *_, gain in off)} rad/s, it is not with p = "
+        f"{_in_words(p for _, p, _ in off)} rad/s: there (1, 1) is outside (claim D9 has the "
         "limit). On the edge is not the same as sensitive: at the gains of the paper's charts, "
         f"a perturbation of {PERTURBATION:g} grows by a factor e in {days['single']:.0f} days "
         f"(single), {days['common']:.0f} days (common) and {days['dual']:.1f} days (dual). At "
-        f"(1, 1) itself D has {_listed(right)} root right of Re s = -{strip:g}/s, at s = 0; it "
-        "comes from clearing the denominator of 1 + L, L being the open loop, and |1 + L| is "
-        f"at least {least:.2g} there. This is for the integrating actuator of Secs. II and "
+        f"(1, 1) itself D has {_in_words(right)} root right of Re s = -{strip:g}/s, at s = 0; "
+        "it comes from clearing the denominator of 1 + L, L being the open loop, and |1 + L| "
+        f"is at least {least:.2g} there. This is for the integrating actuator of Secs. II and "
         f"III. Without its 1/s, at gain {DUAL_ARM_GAIN:g}, the same perturbation leaves the "
         f"stable region only in the {' and the '.join(left)} arm.",
     )
 
 
-def _listed(values: Any) -> str:
+def _in_words(values: Any) -> str:
     """Return the different values of a list, in words."""
     return " or ".join(f"{value:.4g}" for value in sorted(set(values)))
 
