@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from scipy.signal import bilinear_zpk, zpk2tf
+from scipy.signal import bilinear_zpk, lfilter, zpk2tf
 
 from armlock import (
     CommonArm,
@@ -64,7 +64,7 @@ def test_accuracy_over_a_million_samples(million):
 LOOPS = {
     "common": (Loop(Controller([], [-0.1], 0.2), COMMON, 20.1, 19.9), 10.0),
     "fractional": (Loop(Controller([], [-0.1], 0.2), COMMON, 20.13, 19.957), 7.0),
-    "gain alone": (Loop(Controller([], [], 0.2), COMMON, 2.0, 1.5), 10.0),
+    "neutral": (Loop(Controller([-0.3], [-0.1], 0.2), COMMON, 2.0, 1.5), 10.0),
     "dead time": (Loop(Controller([], [-0.1], 0.2), COMMON, 20.1, 19.9, 0.3), 10.0),
     "dead time between samples": (
         Loop(Controller([-9.0], [-0.1], 0.02), COMMON, 20.13, 19.957, 0.633),
@@ -289,16 +289,20 @@ def test_constant_parameters_equal_arrays():
     assert np.array_equal(simulate(paper_loop(), noise, 1.0, full), found)
 
 
-def test_history_continues_a_run():
-    """A loop without states has no other memory than its delays."""
-    loop, rate = LOOPS["gain alone"]
-    noise = np.random.default_rng(1).standard_normal(500)
-    whole = simulate(loop, noise, 0.9, 0.8, rate)
-    later = simulate(loop, noise[200:], 0.9, 0.8, rate, history=whole[:200])
-    assert np.array_equal(whole[200:], later)
-    assert not simulate(loop, np.zeros(100), sample_rate=rate).any()
-    assert simulate(loop, np.zeros(100), sample_rate=rate, history=1.0)[0] > 0.0
-    assert Simulation(loop, rate).history_samples == 20
+def test_history_acts_like_noise_behind_the_controller():
+    """What is in the arms when a run starts comes back, and goes through the controller."""
+    loop = Loop(Controller([], [-0.1], 0.2), COMMON, 2.0, 1.5)
+    assert Simulation(loop, 10.0).history_samples == 20
+    noise, past = np.random.default_rng(1).standard_normal((2, 300))
+    late = np.zeros(300)
+    late[:20] += 0.9 * past[-20:]
+    late[:15] += 0.8 * past[-15:]
+    above, below = zpk2tf(*bilinear_zpk([], [-0.1], 0.2, 10.0))
+    expected = simulate(loop, noise + lfilter(above, below, late), 0.9, 0.8, 10.0)
+    found = simulate(loop, noise, 0.9, 0.8, 10.0, history=past)
+    assert found == pytest.approx(expected, rel=1e-11)
+    constant = simulate(loop, noise, 0.9, 0.8, 10.0, history=0.5)
+    assert np.array_equal(constant, simulate(loop, noise, 0.9, 0.8, 10.0, history=[0.5] * 20))
 
 
 def test_divergence_is_reported_with_its_time():
@@ -454,7 +458,7 @@ def test_half_the_rate_itself_is_allowed():
     """There the controller is what it is at infinity."""
     loop = CommonArm(1.0)
     assert abs(sampled_open_loop(loop, np.pi * RATE)) < 1e-12
-    gain = Loop(Controller([], [], 0.2), COMMON, 2.0, 1.5)
+    gain = Loop(Controller([-0.3], [-0.1], 0.2), COMMON, 2.0, 1.5)
     expected = 0.2 * (2.0 - 0.8 * np.cos(400.0 * np.pi) + 0.6 * np.cos(300.0 * np.pi))
     found = sampled_open_loop(gain, np.pi * RATE, 0.8, -0.6)
     assert complex(found) == pytest.approx(expected, abs=1e-9)
