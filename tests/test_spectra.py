@@ -133,7 +133,9 @@ def test_a_constant_has_no_density(constant):
 LEVELS = {
     # Samples, and the first and last bin at each rate, from the highest rate down.
     1024: [(8, 504)],
-    6000: [(8, 504), (8, 31)],
+    # The second rate has seven segments, and eight.
+    11_372: [(8, 504), (8, 31)],
+    11_373: [(92, 504), (8, 367)],
     20_000: [(92, 504), (8, 367), (8, 31)],
     400_000: [(92, 504), (92, 367), (92, 367), (8, 367), (8, 31)],
 }
