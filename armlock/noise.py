@@ -287,7 +287,7 @@ class LaserNoise(ShapedNoise):
     give none at all. Zeros at 2.37 and 7.87 and a pole at 6.03 times the sample rate, in
     rad/s, make up for that, but for 0.02 percent at a tenth of the sample rate (20 Hz at
     200 Hz), 0.7 percent at a quarter and 1.6 percent at most up to half of it.
-    `sampled_asd` is exact.
+    That holds for cutoffs far below the sample rate; `sampled_asd` is exact for all.
 
     Examples
     --------
