@@ -1,3 +1,5 @@
+from decimal import Decimal
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -232,7 +234,7 @@ def test_the_order_is_a_python_or_numpy_integer():
         assert spectral_radius(CommonArm(), 1.0, 1.0, 0.1, order) == spectral_radius(
             CommonArm(), 1.0, 1.0, 0.1, 1
         )
-    for order in (np.True_, 1.0, np.array([0, 1])):
+    for order in (np.True_, 1.0, Decimal(1), np.array([0, 1])):
         with pytest.raises(ValueError, match=r"^order must be 0 or 1, got "):
             transition_matrix(CommonArm(), 1.0, 1.0, 0.1, order)
 
@@ -243,6 +245,15 @@ def test_what_is_no_system_is_refused(function):
         function("loop", 1.0, 1.0, 0.1)
     with pytest.raises(TypeError, match=r"^system must be a CharacteristicFunction"):
         semi_discretization(CommonArm, 0.1)  # type: ignore[arg-type]
+
+
+def test_fractions_and_decimals_are_numbers():
+    step: Any
+    x: Any = [Fraction(1, 2)]
+    y: Any = Decimal("0.75")
+    expected = spectral_radius(CommonArm(), 0.5, 0.75, 0.1)
+    for step in (Decimal("0.1"), Fraction(1, 10)):
+        assert spectral_radius(CommonArm(), x, y, step).tolist() == [float(expected)]
 
 
 @pytest.mark.parametrize("exponent", [2, 10, 16, 40, 300])
