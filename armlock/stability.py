@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -31,6 +31,9 @@ from armlock.checks import (
     broadcast_pair,
     check_memory,
 )
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 #: What a count is where a root lies on the boundary of stability: -1.
 BOUNDARY = contour.BOUNDARY
@@ -350,6 +353,24 @@ class StabilityChart:
     def stable(self) -> BoolArray:
         """Where all roots lie in the open left half-plane."""
         return np.asarray(self.counts == 0)
+
+    def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
+        """Colour the chart by its counts, the stable region apart.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+            Where to draw; the current ones by default.
+        **options
+            As `armlock.plotting.plot_chart` takes them.
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        from armlock.plotting import plot_chart
+
+        return plot_chart(self, ax, **options)
 
 
 def stability_chart(

@@ -139,7 +139,7 @@ def test_coefficients_must_be_real_numbers(bad):
 
 
 def test_the_shift_must_be_real():
-    with pytest.raises(TypeError, match=r"^sigma must be real, got the complex value 1j$"):
+    with pytest.raises(TypeError, match=r"^sigma must be a real number, got 1j$"):
         HayesEquation().shifted(1j)  # type: ignore[arg-type]
 
 
@@ -241,15 +241,15 @@ def test_names_and_reference_are_checked(arguments, error, message):
     ("arguments", "error", "message"),
     [
         (("j", 1.0, 1.0), TypeError, "^s must hold numbers, got dtype <U1$"),
-        ((np.inf, 1.0, 1.0), ValueError, r"^s must be finite, got \(inf\+0j\) among"),
+        ((np.inf, 1.0, 1.0), ValueError, "^s must be finite, got inf$"),
         ((1j, "a", 1.0), TypeError, "^c1 must hold real numbers, got dtype <U1$"),
         ((1j, 1.0, np.nan), ValueError, "^c2 must be finite, got nan"),
-        ((1j, 1.0, 1j), TypeError, "^c2 must be real, got complex values"),
+        ((1j, 1.0, 1j), TypeError, "^c2 must hold real numbers, got dtype complex"),
         ((1j, True, 1.0), TypeError, "^c1 must hold real numbers, got dtype bool$"),
         (
             (np.ones(3), [1.0, 2.0], 1.0),
             ValueError,
-            r"^s, c1 and c2 must broadcast together, got shapes \(3,\), \(2,\) and \(\)$",
+            r"^s and c1 and c2 must broadcast together, got shapes \(3,\) and \(2,\) and \(\)$",
         ),
     ],
 )
