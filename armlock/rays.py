@@ -176,10 +176,16 @@ class Ray:
 
     def reaches(self, stop: float, chain: float) -> Iterator[float]:
         """Yield growing t up to `stop`, or ever closer to the limit of the chain."""
-        t = 1e-12 * stop
-        while t < min(stop, 0.5 * chain):
+        t, far = 1e-12 * stop, min(stop, 0.5 * chain)
+        while t < far:
             yield t
-            t *= _LONGER
+            # A near crossing is found at low frequency: go no further than that takes.
+            here, low, high = self.end(t), t, min(_LONGER * t, far)
+            limit = _LONGER * max(here, 1.0 / max(self.system.longest_delay, 1e-12))
+            while self.end(high) > limit and high - low > 1e-9 * high:
+                middle = 0.5 * (low + high)
+                low, high = (middle, high) if self.end(middle) <= limit else (low, middle)
+            t = low if self.end(low) > 2.0 * here else max(high, _LONGER * t)
         if stop < chain:
             yield stop
         else:
