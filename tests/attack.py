@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import inspect
+import signal
 import sys
 import time
 from collections import Counter
@@ -193,6 +194,10 @@ def draw_arm(rng):
 # ---------------------------------------------------------------------------- what is checked
 
 
+def _too_late(*_):
+    raise TimeoutError
+
+
 @dataclass
 class Tally:
     """Calls, refusals and findings of a run."""
@@ -203,19 +208,29 @@ class Tally:
     skipped: Counter = field(default_factory=Counter)
     where: object = None
     worst: dict = field(default_factory=dict)
+    patient: bool = hasattr(signal, "alarm")
 
     def ask(self, name, function, *arguments):
         """Call armlock; None if it refuses."""
         start = time.perf_counter()
         self.calls[name] += 1
+        if self.patient:
+            signal.signal(signal.SIGALRM, _too_late)
+            signal.alarm(int(4.0 * LATEST))
         try:
             answer = function(*arguments)
+        except (TimeoutError, SystemError):
+            self.note(name, arguments[1:], f"none within {4.0 * LATEST:.0f} s", "within 10 s")
+            return None
         except (CountError, RootError, ValueError, ArithmeticError) as error:
             spent = time.perf_counter() - start
             self.refused.append((name, self.where, arguments[1:], f"{error!r:.300}", spent))
             if spent > LATEST:
                 self.note(name, arguments[1:], f"refused after {spent:.1f} s", "within 5 s")
             return None
+        finally:
+            if self.patient:
+                signal.alarm(0)
         spent = time.perf_counter() - start
         if spent > 2.0 * LATEST:
             self.note(name, arguments[1:], f"answered after {spent:.1f} s", "within 10 s")
