@@ -19,6 +19,8 @@ import numpy as np
 
 TOL = 1e-7
 MOST_CELLS = 120_000
+# Cells that are looked at together.
+CHUNK = 20_000
 GAINS = 1e6
 NAMES = ("modulus", "disk", "phase", "delay", "gain_upper", "gain_lower")
 
@@ -114,8 +116,9 @@ class View:
         for z, p, _, w in self.terms:
             corners += [abs(v) for v in (*z, *p) if v != 0.0]
             start = abs(self.start(*w))
-            if start:
-                corners.append(start / np.dot(np.abs(w), np.abs(self.c) * self.tau))
+            pull = np.dot(np.abs(w), np.abs(self.c) * self.tau)
+            if start and pull:
+                corners.append(start / pull)
         self.corners = np.array(corners)
         self.low = 1e-8 * float(self.corners.min())
         for _ in range(60):
@@ -233,12 +236,17 @@ class View:
             return abs(centre) + radius < 1.0
         return abs(1.0 + centre) > radius
 
-    def cells(self, high):
+    def cells(self, high, free_above=np.inf):
         """Cells from `low` to `high`, ten a decade and one for each corner."""
+        if not 0.0 < self.low < high < np.inf:
+            raise Undecided("no range of frequencies")
         count = int(np.ceil(10 * np.log10(high / self.low))) + 1
         edges = np.geomspace(self.low, high, count)
         inner = self.corners[(self.corners > self.low) & (self.corners < high)]
-        edges = np.unique(np.concatenate((edges, 0.99 * inner, 1.01 * inner)))
+        edges = np.concatenate((edges, 0.99 * inner, 1.01 * inner))
+        if self.low < free_above < high:
+            edges = np.append(edges, free_above)
+        edges = np.unique(edges)
         return edges[:-1], edges[1:]
 
 
@@ -383,8 +391,11 @@ def zeros_of(view, a, b, excess):
     return m
 
 
-def margins(sketch, c1, c2, stable=True):
-    """All margins; of a loop that is not stable the modulus and the disk only."""
+def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
+    """All margins; of a loop that is not stable the modulus and the disk only.
+
+    Above `free_above`, in rad/s, both arms' phases are free: L fills a disc.
+    """
     view = View(sketch, c1, c2)
     best = Verdict()
     centre, radius = view.limit()
@@ -483,29 +494,47 @@ def margins(sketch, c1, c2, stable=True):
         best.unsure = tuple(name for name, is_open in zip(NAMES, undecided, strict=True) if is_open)
         return best
 
+    def examine(a, b):
+        """Leave out cells on which nothing smaller can lie; return the others, cut."""
+        best.used += a.size
+        m, h = 0.5 * (a + b), 0.5 * (b - a)
+        value, slope, rest, middle, radius = view.enclose(m, h)
+        free = a >= free_above
+        improve(np.clip(m + to_segment(-1.0, value, slope, h)[1], a, b)[~free])
+        improve(m[~free])
+        if stable:
+            cross(a[~free], b[~free])
+        keep = kept(value, slope, rest, h, a, b) | free
+        if free.any():
+            centre, size = view.enclose(m[free], 0.0 * m[free])[3:]
+            improve_free(best, m[free], centre, size, stable)
+        keep &= kept(middle, 0.0 * m, radius, h, a, b)
+        if best.used > most / 2:
+            # Nulls of L ask for ever larger gains: leave the cells to the others.
+            opened[4:] |= keep[4:].any(axis=1)
+            keep[4:] = False
+        # As close as floats are: what is open there stays open.
+        fine = (b - a) < 3e-14 * b
+        rows = keep[:, fine].any(axis=1)
+        some = keep.any(axis=0) & ~fine
+        return rows, keep[:, some].any(axis=1), *cut(a[some], b[some])
+
     low, high = view.low, 10.0 * float(view.corners.max())
-    a, b = view.cells(high)
+    high = max(high, 2.0 * free_above) if np.isfinite(free_above) else high
+    a, b = view.cells(high, free_above)
     opened = np.zeros(len(NAMES), dtype=bool)
     while True:
-        while a.size:
-            best.used += a.size
-            m, h = 0.5 * (a + b), 0.5 * (b - a)
-            value, slope, rest, middle, radius = view.enclose(m, h)
-            improve(np.clip(m + to_segment(-1.0, value, slope, h)[1], a, b))
-            improve(m)
-            if stable:
-                cross(a, b)
-            keep = kept(value, slope, rest, h, a, b)
-            none = np.zeros(m.size)
-            keep &= kept(middle, none, radius, h, a, b)
-            # As close as floats are: what is open there stays open.
-            fine = (b - a) < 3e-14 * b
-            opened |= keep[:, fine].any(axis=1)
-            if best.used > MOST_CELLS:
-                return done(opened | keep.any(axis=1))
-            keep = keep.any(axis=0) & ~fine
-            a, b = a[keep], b[keep]
-            a, b = cut(a, b)
+        pending = [(np.ones(len(NAMES), dtype=bool), a, b)]
+        while pending:
+            rows, a, b = pending.pop()
+            if a.size > CHUNK:
+                pending.append((rows, a[CHUNK:], b[CHUNK:]))
+            fine, rows, a, b = examine(a[:CHUNK], b[:CHUNK])
+            opened |= fine
+            if a.size:
+                pending.append((rows, a, b))
+            if best.used > most:
+                return done(np.any([opened, *(entry[0] for entry in pending)], axis=0))
         centre, radius = view.tail(high)
         one, end = np.array([1.0]), np.array([np.inf])
         keep = kept(centre * one + 0j, 0j * one, radius * one, 0.0 * one, high * one, end)
@@ -515,3 +544,31 @@ def margins(sketch, c1, c2, stable=True):
         if high > 1e30 * view.corners.max():
             return done(opened | keep[:, 0])
         a, b = np.array([low]), np.array([high])
+
+
+def improve_free(best, omega, centre, radius, stable):
+    """Take in what the discs of L hold, with both arms' phases free."""
+    best.modulus = min(best.modulus, float(np.maximum(np.abs(1.0 + centre) - radius, 0.0).min()))
+    # (1 + L) / (1 - L) = 2 / (1 - L) - 1 takes the disc to a disc, or to the outside of one.
+    power = np.abs(1.0 - centre) ** 2 - radius**2
+    image, size = 2.0 * np.conj(1.0 - centre) / power - 1.0, 2.0 * radius / np.abs(power)
+    gap = np.where(power > 0.0, np.abs(image) - size, size - np.abs(image))
+    best.disk = min(best.disk, float(np.maximum(gap, 0.0).min()))
+    if not stable:
+        return
+    with np.errstate(all="ignore"):
+        cosine = (1.0 + np.abs(centre) ** 2 - radius**2) / (2.0 * np.abs(centre))
+    met = cosine <= 1.0
+    half = np.arccos(np.clip(cosine[met], -1.0, 1.0))
+    turn, omega = lag(centre[met]), omega[met]
+    nearest = np.maximum(np.minimum(turn, 2.0 * np.pi - turn) - half, 0.0)
+    best.phase = min(best.phase, float(nearest.min(initial=np.inf)))
+    first = np.where((turn > half) & (turn + half < 2.0 * np.pi), turn - half, 0.0)
+    best.delay = min(best.delay, float((first / omega).min(initial=np.inf)))
+    on_axis = np.abs(centre.imag) <= radius
+    half = np.sqrt(radius[on_axis] ** 2 - centre[on_axis].imag ** 2)
+    for left, right in zip(centre[on_axis].real - half, centre[on_axis].real + half, strict=True):
+        if -1.0 < left < 0.0:
+            best.gain_upper = min(best.gain_upper, float(-1.0 / left))
+        if right < -1.0:
+            best.gain_lower = max(best.gain_lower, float(-1.0 / right))
