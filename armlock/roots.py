@@ -25,7 +25,7 @@ from armlock.checks import (
     real_number,
     whole_number,
 )
-from armlock.stability import CountError, last_crossing, unstable_roots
+from armlock.stability import CountError, last_frequency, unstable_roots
 from armlock.statespace import realize
 
 _EPSILON = float(np.finfo(float).eps)
@@ -348,7 +348,7 @@ def _starts_along(
     """
     spacing = 0.5 * _per_delay(system)
     try:
-        last = float(last_crossing(system.shifted(sigma), x, y))
+        last = float(last_frequency(system.shifted(sigma), x, y))
     except ValueError:
         # So far out the shifted coefficients leave the range of floats.
         return np.empty(0, dtype=np.complex128)
@@ -375,7 +375,7 @@ def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
     system = _effective(system, x, y)
     best = complex(np.nan, np.nan)
     # Where counts overflow no further degree leads to a certificate.
-    hopeless = np.isnan(last_crossing(system, x, y))
+    hopeless = np.isnan(last_frequency(system, x, y))
     for degree in _DEGREES[:1] if hopeless else _DEGREES:
         eigenvalues = pseudospectral_roots(system, x, y, degree)
         starts = eigenvalues[eigenvalues.imag >= 0.0][:12]
