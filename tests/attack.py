@@ -41,7 +41,7 @@ from armlock.semidiscretization import semi_discretization
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
 from tests import attack_judge as judge
 from tests import independent
-from tests.attack_judge import Sketch, Undecided, View
+from tests.attack_judge import Sketch, UndecidedError, View
 
 #: What a number may be off, relative.
 EXACT = 1e-5
@@ -113,7 +113,9 @@ def turns(sketch):
     """About how many turns of the longest delay lie where |L| is not small."""
     longest = max(sketch.tau1, sketch.tau2)
     highest = max([1.0 / longest, *map(abs, (*sketch.zeros, *sketch.poles))])
-    omega = np.geomspace(1e-3 / longest, 3.0 * highest if sketch.neutral else 1e9 * highest, 3000)
+    omega = np.geomspace(
+        1e-3 / longest, 3.0 * highest if sketch.neutral else 1e9 * highest, 3000
+    )
     size = np.zeros(omega.size)
     for z, p, gain, w in sketch.terms():
         jw = 1j * omega[:, None]
@@ -172,8 +174,12 @@ def draw_paper(rng):
     from armlock import paper_loop
 
     k = paper_loop(actuator=bool(rng.random() < 0.3)).controller
-    tau1, tau2 = (20.1, 19.9) if rng.random() < 0.5 else (between(rng, 5, 40), between(rng, 5, 40))
-    moved = [[complex(r * 10.0 ** rng.normal(0.0, 0.05)) for r in rs] for rs in (k.zeros, k.poles)]
+    tau1, tau2 = (
+        (20.1, 19.9) if rng.random() < 0.5 else (between(rng, 5, 40), between(rng, 5, 40))
+    )
+    moved = [
+        [complex(r * 10.0 ** rng.normal(0.0, 0.05)) for r in rs] for rs in (k.zeros, k.poles)
+    ]
     gain = k.gain * between(rng, 0.3, 3.0)
     delay = between(rng, 1e-6, 1e-2) if DEAD_TIMES and rng.random() < 0.3 else 0.0
     point = (1.0, 1.0) if rng.random() < 0.5 else tuple(1 + rng.normal(0.0, 3e-7, 2))
@@ -245,7 +251,11 @@ class Tally:
         """Compare a number with the judge's, or with its bound on one side."""
         if unsure:
             self.skipped[f"{name}: one-sided"] += 1
-            good = got >= expected * (1 - EXACT) if upward else got <= expected * (1 + EXACT) + 1e-9
+            good = (
+                got >= expected * (1 - EXACT)
+                if upward
+                else got <= expected * (1 + EXACT) + 1e-9
+            )
         elif np.isfinite(expected) and np.isfinite(got):
             off = abs(got - expected) / max(abs(expected), 1e-4)
             self.worst[name] = max(self.worst.get(name, 0.0), off)
@@ -259,7 +269,7 @@ class Tally:
         """Compare a count with the judge's."""
         try:
             expected = judge.count(sketch, *point)
-        except Undecided:
+        except UndecidedError:
             expected = -1
         if expected == -1 and got >= 0:
             self.skipped[f"{name}: judge undecided"] += 1
@@ -280,7 +290,7 @@ def check_counts(tally, rng, sketch, loop, point):
 def check_margins(tally, rng, sketch, loop, point):
     try:
         number = judge.count(sketch, *point)
-    except Undecided:
+    except UndecidedError:
         return
     if number in (-1, -2):
         return
@@ -300,7 +310,12 @@ def check_margins(tally, rng, sketch, loop, point):
         if name == "gain_lower":
             got, expected = (0.0 if v < 1.0 / judge.GAINS else v for v in (got, expected))
         tally.near(
-            f"margins.{name}", point, got, expected, name in verdict.unsure, name == "gain_lower"
+            f"margins.{name}",
+            point,
+            got,
+            expected,
+            name in verdict.unsure,
+            name == "gain_lower",
         )
     low, high = max(found.gain_lower, 1e-6), min(found.gain_upper, 1e6)
     inside = [low * 1.00001, high * 0.99999, *(low * (high / low) ** rng.random(2))]
@@ -310,11 +325,37 @@ def check_margins(tally, rng, sketch, loop, point):
             continue
         try:
             counts = judge.count(sketch.scaled(factor), *point)
-        except Undecided:
+        except UndecidedError:
             tally.skipped["gain interval: judge undecided"] += 1
             continue
         if (counts == 0) != stable and counts != -1:
-            tally.note("gain interval", (*point, factor), f"{found.gain_lower, found.gain_upper}", counts)
+            tally.note(
+                "gain interval",
+                (*point, factor),
+                f"{found.gain_lower, found.gain_upper}",
+                counts,
+            )
+
+
+def check_free(tally, rng, sketch, loop, point):
+    """Margins with both arms' phases free above a frequency."""
+    above = between(rng, 1e-2, 1e3) / max(sketch.tau1, sketch.tau2)
+    try:
+        if judge.count(sketch, *point) != 0:
+            return
+        verdict = judge.margins(sketch, *point, free_above=above)
+    except UndecidedError:
+        return
+    found = tally.ask("margins, free", margins, loop, *point, above)
+    if verdict.modulus <= 0.0:
+        # Some phases make it unstable: whatever is said then, no margin may be left.
+        if found is not None and found.modulus > 1e-9:
+            tally.note("margins.modulus, free", (*point, above), found.modulus, 0.0)
+        return
+    for name in judge.NAMES[:4] if found is not None else ():
+        unsure = name in verdict.unsure
+        got, expected = getattr(found, name), getattr(verdict, name)
+        tally.near(f"margins.{name}, free", (*point, above), got, expected, unsure)
 
 
 def confined_until(sketch, start, way, stop):
@@ -337,7 +378,9 @@ def confined_until(sketch, start, way, stop):
 def check_rays(tally, rng, sketch, loop, point):
     start = np.array(point if rng.random() < 0.5 else draw_point(rng))
     angle = rng.uniform(0.0, 2.0 * np.pi)
-    way = np.array([np.cos(angle), np.sin(angle)]) if rng.random() < 0.7 else np.array([1.0, 1.0])
+    way = (
+        np.array([np.cos(angle), np.sin(angle)]) if rng.random() < 0.7 else np.array([1.0, 1.0])
+    )
     stop = confined_until(sketch, start, way, between(rng, 0.01, 3.0))
     if stop < 1e-9:
         return
@@ -347,7 +390,9 @@ def check_rays(tally, rng, sketch, loop, point):
     try:
         first, last = (judge.count(sketch, *(start + t * way)) for t in (0.0, stop))
         if first >= 0 and last >= 0 and first + found.change.sum() != last:
-            tally.note("ray_crossings", (start, way, stop), found.change.tolist(), (first, last))
+            tally.note(
+                "ray_crossings", (start, way, stop), found.change.tolist(), (first, last)
+            )
         for t in rng.permutation(found.position)[:2]:
             near = 1e-7 * t
             if near < 1e-10 * np.hypot(*start):
@@ -356,7 +401,7 @@ def check_rays(tally, rng, sketch, loop, point):
             window = np.abs(found.position - t) < near
             if min(counts) >= 0 and counts[1] - counts[0] != found.change[window].sum():
                 tally.note("ray_crossings", (start, way, stop, t), found.change[window], counts)
-    except Undecided:
+    except UndecidedError:
         tally.skipped["ray_crossings: judge undecided"] += 1
     one = tally.ask("first_crossing", first_crossing, loop, start, way, stop)
     expected = found.position[0] if found.position.size else np.inf
@@ -385,7 +430,7 @@ def check_critical(tally, rng, sketch, loop, point):
         counts = judge.count(sketch, *(1.0 + (1.0 + 1e-6) * eps * way))
         if counts == 0:
             tally.note("critical_perturbation", (way, 1.0 + 1e-6), eps, counts)
-    except Undecided:
+    except UndecidedError:
         tally.skipped["critical_perturbation: judge undecided"] += 1
 
 
@@ -413,9 +458,11 @@ def check_root(tally, rng, sketch, loop, point):
             other = independent.generator_eigenvalues(loop, *point, nodes=40)
             best = other[np.argmin(np.abs(other - root) + np.abs(other - np.conj(root)))]
             tally.calls["collocation"] += 1
-            if np.abs(root) * longest < 20.0 and min(abs(best - root), abs(best - np.conj(root))) > 1e-3 * (abs(root) + 1.0 / longest):
+            if np.abs(root) * longest < 20.0 and min(
+                abs(best - root), abs(best - np.conj(root))
+            ) > 1e-3 * (abs(root) + 1.0 / longest):
                 tally.skipped["rightmost_root: collocation elsewhere"] += 1
-    except Undecided:
+    except UndecidedError:
         tally.skipped["rightmost_root: judge undecided"] += 1
 
 
@@ -485,6 +532,7 @@ def check_maps(tally, rng, sketch, loop, point):
 CHECKS = {
     "counts": (check_counts, 1.0),
     "margins": (check_margins, 1.0),
+    "free": (check_free, 0.3),
     "rays": (check_rays, 0.3),
     "critical": (check_critical, 0.5),
     "roots": (check_root, 0.3),
@@ -561,10 +609,16 @@ def attack_fixed(tally):
     # With equal delays D does not change along (1, -1), however far.
     for zeros in ((), (-0.5,)):
         sketch = Sketch(zeros, (-1.0,), 0.2, "common", 20.0, 20.0)
-        tally.where, loop, way = ("equal delays", sketch), to_loop(sketch), np.array([1.0, -1.0])
+        tally.where, loop, way = (
+            ("equal delays", sketch),
+            to_loop(sketch),
+            np.array([1.0, -1.0]),
+        )
         eps = tally.ask("critical_perturbation", critical_perturbation, loop, way)
         far = [int(unstable_roots(loop, *(1.0 + t * way))) for t in (0.5, 2.0, 100.0, 1e4)]
-        agree = all((t < eps) == (n == 0) for t, n in zip((0.5, 2.0, 100.0, 1e4), far, strict=True))
+        agree = all(
+            (t < eps) == (n == 0) for t, n in zip((0.5, 2.0, 100.0, 1e4), far, strict=True)
+        )
         if not agree:
             tally.note("critical_perturbation", way, eps, f"counts {far} at 0.5, 2, 100, 1e4")
     # A point 1e-10 off a boundary, far from the reference, has a count.
@@ -577,7 +631,9 @@ def attack_fixed(tally):
                 tally.note("unstable_roots", (x, y), got, "odd" if x + y > 2.0 else "even")
     # Dual arms at (1, 1): the root at s = 0 of the sensor's integral, twice the same.
     for k in range(25):
-        gain, tau1, corner = (between(rng, *ends) for ends in ((0.01, 100), (0.5, 40), (0.05, 20)))
+        gain, tau1, corner = (
+            between(rng, *ends) for ends in ((0.01, 100), (0.5, 40), (0.05, 20))
+        )
         tau2 = tau1 * (1.0 - between(rng, 1e-6, 0.9))
         arm = DualArm(gain, tau1, tau2, corner)
         sketch = Sketch((), (0j,), gain, "dual", tau1, tau2, 0.0, corner, tau1 - tau2)
@@ -585,9 +641,13 @@ def attack_fixed(tally):
         roots = [tally.ask("rightmost_root", rightmost_root, arm, 1.0, 1.0) for _ in range(2)]
         if None in roots:
             continue
-        right = judge.count(sketch, 1.0, 1.0, roots[0].real + 1e-7 * (abs(roots[0]) + 1e-3 / tau1))
+        right = judge.count(
+            sketch, 1.0, 1.0, roots[0].real + 1e-7 * (abs(roots[0]) + 1e-3 / tau1)
+        )
         if roots[0] != roots[1] or roots[0].real < -1e-9 or right > 0:
-            tally.note("rightmost_root", (1.0, 1.0), roots, f"twice the same; {right} right of it")
+            tally.note(
+                "rightmost_root", (1.0, 1.0), roots, f"twice the same; {right} right of it"
+            )
 
 
 def attack(seed, loops, kinds=tuple(CHECKS), tally=None, progress=False):
@@ -599,7 +659,7 @@ def attack(seed, loops, kinds=tuple(CHECKS), tally=None, progress=False):
         try:
             sketch, point = maker(rng)
             loop = to_loop(sketch)
-        except (ValueError, Undecided):
+        except (ValueError, UndecidedError):
             tally.skipped["no such loop"] += 1
             continue
         tally.where = (index, sketch)
@@ -611,7 +671,10 @@ def attack(seed, loops, kinds=tuple(CHECKS), tally=None, progress=False):
         if progress:
             report(tally, *before)
             if index % 100 == 99:
-                print(f"... {index + 1}: {len(tally.wrong)} wrong, {len(tally.refused)} refused", flush=True)
+                print(
+                    f"... {index + 1}: {len(tally.wrong)} wrong, {len(tally.refused)} refused",
+                    flush=True,
+                )
     return tally
 
 
@@ -655,7 +718,9 @@ def main():
     print("largest deviations:", {k: f"{v:.1e}" for k, v in tally.worst.items()})
     print("wrong:", len(tally.wrong), dict(Counter(entry[0] for entry in tally.wrong)))
     calls = sum(tally.calls.values()) - tally.calls["loops"]
-    print("refused:", len(tally.refused), "of", calls, dict(Counter(e[0] for e in tally.refused)))
+    print(
+        "refused:", len(tally.refused), "of", calls, dict(Counter(e[0] for e in tally.refused))
+    )
     return int(bool(tally.wrong) or len(tally.refused) > 1e-3 * calls)
 
 

@@ -25,7 +25,7 @@ GAINS = 1e6
 NAMES = ("modulus", "disk", "phase", "delay", "gain_upper", "gain_lower")
 
 
-class Undecided(RuntimeError):
+class UndecidedError(RuntimeError):
     """The cells did not suffice."""
 
 
@@ -47,7 +47,7 @@ class Sketch:
         return replace(self, gain=self.gain * factor)
 
     def terms(self):
-        """L = sum of W (alpha1 (1 - c1 e1) + alpha2 (1 - c2 e2)): zeros, poles, gain, alphas."""
+        """Zeros, poles, gain and a1, a2 of terms W (a1 (1 - c1 e1) + a2 (1 - c2 e2)) of L."""
         z, p = (np.array(sorted(r, key=abs), complex) for r in (self.zeros, self.poles))
         common = np.count_nonzero(z == 0.0), np.count_nonzero(p == 0.0)
         z0, p0 = (k - min(common) for k in common)
@@ -198,7 +198,9 @@ class View:
                 moved = np.minimum(x * np.exp(np.minimum(x, 700.0)), np.inf)
                 largest = quotient(az + hh, ap - hh)
                 largest = np.where((ap > hh).all(1), abs(gain) * largest, np.inf)
-                free_rest += np.where(h > 0.0, np.minimum(av * moved, largest + av) * whole, 0.0)
+                free_rest += np.where(
+                    h > 0.0, np.minimum(av * moved, largest + av) * whole, 0.0
+                )
             radius = np.abs(arms[0] * self.c[0]) + np.abs(arms[1] * self.c[1]) + free_rest
         rest = np.where(np.isnan(rest), np.inf, rest)
         radius = np.where(np.isnan(radius), np.inf, radius)
@@ -239,7 +241,7 @@ class View:
     def cells(self, high, free_above=np.inf):
         """Cells from `low` to `high`, ten a decade and one for each corner."""
         if not 0.0 < self.low < high < np.inf:
-            raise Undecided("no range of frequencies")
+            raise UndecidedError("no range of frequencies")
         count = int(np.ceil(10 * np.log10(high / self.low))) + 1
         edges = np.geomspace(self.low, high, count)
         inner = self.corners[(self.corners > self.low) & (self.corners < high)]
@@ -285,14 +287,14 @@ def count(sketch, c1, c2, sigma=0.0):
             break
         high *= 4.0
         if high > 1e40:
-            raise Undecided("no end")
+            raise UndecidedError("no end")
     a, b = view.cells(high)
     turn, used = 0.0, 0
     ends = 1.0 + view.at(np.array([a[0], b[-1]]))
     while a.size:
         used += a.size
         if used > MOST_CELLS:
-            raise Undecided("count")
+            raise UndecidedError("count")
         m, h = 0.5 * (a + b), 0.5 * (b - a)
         value, slope, rest, centre, radius = view.enclose(m, h)
         clear = to_segment(-1.0, value, slope, h)[0] > rest
@@ -315,7 +317,7 @@ def count(sketch, c1, c2, sigma=0.0):
     turn += phase - start
     number = 0.5 * poles.size - turn / np.pi
     if abs(number - round(number)) > 1e-3:
-        raise Undecided(f"count {number}")
+        raise UndecidedError(f"count {number}")
     return round(number)
 
 
@@ -384,7 +386,11 @@ def zeros_of(view, a, b, excess):
         m = np.where(np.isnan(m), 0.5 * (a + b), m)
         fm = excess(view.at(m))
         same = (fm > 0.0) == (fa > 0.0)
-        a, fa, fb = np.where(same, m, a), np.where(same, fm, 0.5 * fa), np.where(same, 0.5 * fb, fm)
+        a, fa, fb = (
+            np.where(same, m, a),
+            np.where(same, fm, 0.5 * fa),
+            np.where(same, 0.5 * fb, fm),
+        )
         b = np.where(same, b, m)
         if (np.abs(fm) < 1e-13).all():
             break
@@ -443,7 +449,9 @@ def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
         if not stable:
             return keep
         spread = np.abs(slope) * h + rest
-        turn = np.where(best.phase < np.pi, best.phase * (1.0 - TOL), np.pi) * np.ones(value.size)
+        turn = np.where(best.phase < np.pi, best.phase * (1.0 - TOL), np.pi) * np.ones(
+            value.size
+        )
         keep[2] = to_arc(value * np.exp(1j * turn), 2.0 * turn) <= spread
         with np.errstate(invalid="ignore"):
             turn = np.minimum(best.delay * (1.0 - TOL) * b, 2.0 * np.pi)
@@ -491,7 +499,9 @@ def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
 
     def done(undecided):
         best.disk *= 2.0
-        best.unsure = tuple(name for name, is_open in zip(NAMES, undecided, strict=True) if is_open)
+        best.unsure = tuple(
+            name for name, is_open in zip(NAMES, undecided, strict=True) if is_open
+        )
         return best
 
     def examine(a, b):
@@ -548,7 +558,9 @@ def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
 
 def improve_free(best, omega, centre, radius, stable):
     """Take in what the discs of L hold, with both arms' phases free."""
-    best.modulus = min(best.modulus, float(np.maximum(np.abs(1.0 + centre) - radius, 0.0).min()))
+    best.modulus = min(
+        best.modulus, float(np.maximum(np.abs(1.0 + centre) - radius, 0.0).min())
+    )
     # (1 + L) / (1 - L) = 2 / (1 - L) - 1 takes the disc to a disc, or to the outside of one.
     power = np.abs(1.0 - centre) ** 2 - radius**2
     image, size = 2.0 * np.conj(1.0 - centre) / power - 1.0, 2.0 * radius / np.abs(power)
@@ -567,7 +579,9 @@ def improve_free(best, omega, centre, radius, stable):
     best.delay = min(best.delay, float((first / omega).min(initial=np.inf)))
     on_axis = np.abs(centre.imag) <= radius
     half = np.sqrt(radius[on_axis] ** 2 - centre[on_axis].imag ** 2)
-    for left, right in zip(centre[on_axis].real - half, centre[on_axis].real + half, strict=True):
+    for left, right in zip(
+        centre[on_axis].real - half, centre[on_axis].real + half, strict=True
+    ):
         if -1.0 < left < 0.0:
             best.gain_upper = min(best.gain_upper, float(-1.0 / left))
         if right < -1.0:

@@ -18,7 +18,7 @@ settings.register_profile(
     max_examples=60,
     phases=[Phase.explicit, Phase.generate, Phase.shrink],
 )
-# Other examples in every run, and more of them: pytest --hypothesis-profile=random. A failure is
+# Other examples in every run, and more: pytest --hypothesis-profile=random. A failure is
 # printed with what makes it again (@reproduce_failure).
 settings.register_profile(
     "random",

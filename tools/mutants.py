@@ -135,7 +135,9 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as place:
         tree, warm = Path(place, "tree"), Path(place, "warm")
         for name in ("armlock", "book", "tests", "benchmarks"):
-            shutil.copytree(ROOT / name, tree / name, ignore=shutil.ignore_patterns("__pycache__"))
+            shutil.copytree(
+                ROOT / name, tree / name, ignore=shutil.ignore_patterns("__pycache__")
+            )
         shutil.copy(ROOT / "pyproject.toml", tree)
         if not all(passes(tree, tests, warm, given.limit) for tests in stages if tests):
             print("the tests fail without any change")
