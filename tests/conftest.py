@@ -18,6 +18,16 @@ settings.register_profile(
     max_examples=60,
     phases=[Phase.explicit, Phase.generate, Phase.shrink],
 )
+# Other examples in every run, and more: pytest --hypothesis-profile=random. A failure is
+# printed with what makes it again (@reproduce_failure).
+settings.register_profile(
+    "random",
+    settings.get_profile("armlock"),
+    derandomize=False,
+    database=None,
+    max_examples=500,
+    print_blob=True,
+)
 settings.load_profile("armlock")
 
 DATA = Path(__file__).with_name("data")

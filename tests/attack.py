@@ -1,0 +1,728 @@
+"""Random loops of every kind, held against computations that share no code with armlock.
+
+    python -m tests.attack [--loops N] [--seed S] [--first I] [--kinds counts margins ...]
+
+Loop I of seed S is the same in every run. Each is drawn from all kinds at once: retarded or
+neutral; up to 12 poles (one in twenty: up to 30) over many decades, lightly damped pairs far
+above the delays' frequencies, unstable ones, ones at 0; any sensor; equal, nearly equal and
+commensurate delays; c from 1e-6 to 3, at and around (1, 1); dead times. `tests.attack_judge` says
+what is right. Refusals are counted: at most one in a thousand, none later than 5 s.
+"""
+
+from __future__ import annotations
+
+import argparse
+import inspect
+import signal
+import sys
+import time
+from collections import Counter
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from armlock import (
+    CommonArm,
+    Controller,
+    CountError,
+    DualArm,
+    Loop,
+    RootError,
+    critical_perturbation,
+    d_curve,
+    margins,
+    modulus_margin,
+    rightmost_root,
+    stability_chart,
+    unstable_roots,
+)
+from armlock.rays import first_crossing, ray_crossings
+from armlock.semidiscretization import semi_discretization
+from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
+from tests import attack_judge as judge
+from tests import independent
+from tests.attack_judge import Sketch, UndecidedError, View
+
+#: What a number may be off, relative.
+EXACT = 1e-5
+#: A refusal later than this, or an answer later than twice this, is a finding, in s.
+LATEST = 5.0
+DEAD_TIMES = "delay" in inspect.signature(Loop).parameters
+
+
+def to_loop(sketch):
+    """The armlock loop of a sketch."""
+    mapping = {"single": SINGLE, "common": COMMON, "difference": DIFFERENCE}.get(sketch.sensor)
+    if mapping is None:
+        mapping = dual(sketch.corner, sketch.difference)
+    more = {"delay": sketch.delay} if sketch.delay else {}
+    controller = Controller(sketch.zeros, sketch.poles, sketch.gain)
+    return Loop(controller, mapping, sketch.tau1, sketch.tau2, **more)
+
+
+# ---------------------------------------------------------------------------- random loops
+
+
+def between(rng, low, high):
+    return float(10.0 ** rng.uniform(np.log10(low), np.log10(high)))
+
+
+def roots(rng, count, low, high, unstable):
+    """Real roots and pairs, most of them in the left half-plane."""
+    found = []
+    while len(found) < count:
+        size = between(rng, low, high)
+        side = 1.0 if rng.random() < unstable else -1.0
+        if len(found) + 2 <= count and rng.random() < 0.35:
+            damping = between(rng, 1e-4, 1.0) if rng.random() < 0.6 else rng.uniform(0.1, 1.0)
+            root = size * complex(side * damping, np.sqrt(max(1.0 - damping**2, 1e-6)))
+            found += [root, root.conjugate()]
+        else:
+            found.append(complex(side * size))
+    return found
+
+
+def draw_delays(rng):
+    tau1 = between(rng, 0.1, 40.0)
+    kind = rng.choice(["equal", "near", "commensurate", "free", "paper"])
+    if kind == "equal":
+        return tau1, tau1
+    if kind == "near":
+        return tau1, tau1 * (1.0 - between(rng, 1e-9, 1e-2))
+    if kind == "commensurate":
+        return tau1, tau1 * int(rng.integers(1, 6)) / int(rng.integers(1, 6))
+    return (20.1, 19.9) if kind == "paper" else (tau1, between(rng, 0.1, 40.0))
+
+
+def draw_point(rng):
+    kind = rng.choice(["one", "close", "closer", "small", "any", "large"])
+    if kind == "one":
+        return 1.0, 1.0
+    if kind == "close":
+        return tuple(1.0 + rng.choice([-1, 1]) * between(rng, 1e-9, 1e-2) for _ in range(2))
+    if kind == "closer":
+        step = rng.choice([-1, 1]) * between(rng, 1e-6, 1e-1)
+        return (1.0 + step, 1.0) if rng.random() < 0.5 else (1.0 + step, 1.0 + step)
+    if kind == "small":
+        return tuple(between(rng, 1e-6, 1.0) for _ in range(2))
+    size = 1.3 if kind == "any" else 3.0
+    return tuple(float(v) for v in rng.uniform(-size, size, 2))
+
+
+def turns(sketch):
+    """About how many turns of the longest delay lie where |L| is not small."""
+    longest = max(sketch.tau1, sketch.tau2)
+    highest = max([1.0 / longest, *map(abs, (*sketch.zeros, *sketch.poles))])
+    omega = np.geomspace(
+        1e-3 / longest, 3.0 * highest if sketch.neutral else 1e9 * highest, 3000
+    )
+    size = np.zeros(omega.size)
+    for z, p, gain, w in sketch.terms():
+        jw = 1j * omega[:, None]
+        size += np.abs(gain * judge.quotient(jw - z, jw - p)) * np.abs(w).sum()
+    return float((np.diff(omega) * (size[1:] > 0.15)).sum() * longest / (2.0 * np.pi))
+
+
+def draw(rng):
+    """A loop of any kind and a point, with a gain that brute force can follow."""
+    tau1, tau2 = draw_delays(rng)
+    longest = max(tau1, tau2)
+    sensor = str(rng.choice(["single", "common", "common", "difference", "dual", "dual"]))
+    corner = between(rng, 0.05, 20.0) if rng.random() < 0.7 else 2.0 * np.pi * 0.4
+    difference = (tau1 - tau2 or longest) * float(rng.choice([1.0, 0.5]))
+    count = int(rng.integers(13, 31)) if rng.random() < 0.05 else int(rng.integers(1, 13))
+    span = between(rng, 3.0, 1e5)
+    highest = between(rng, 1e-1, 3e4) * (100.0 if rng.random() < 0.02 else 1.0) / longest
+    centre = highest / span
+    unstable = 0.15 if rng.random() < 0.25 else 0.0
+    poles = roots(rng, count, centre / span, centre * span, unstable)
+    neutral = rng.random() < 0.4
+    zeros_count = count if neutral else int(rng.integers(0, count))
+    zeros = roots(rng, zeros_count, centre / span, centre * span, 0.15)
+    for k in range(int(rng.integers(1, 3)) if rng.random() < 0.4 else 0):
+        if k < count and isinstance(poles[k], complex) and poles[k].imag == 0.0:
+            poles[k] = 0j
+    for k in range(int(rng.integers(1, 3)) if rng.random() < 0.25 else 0):
+        if k < zeros_count and zeros[k].imag == 0.0:
+            zeros[k] = 0j
+    delay = between(rng, 1e-6, 1.0) if DEAD_TIMES and rng.random() < 0.4 else 0.0
+    sketch = Sketch(
+        tuple(zeros), tuple(poles), 1.0, sensor, tau1, tau2, delay, corner, difference
+    )
+    point = draw_point(rng)
+    sketch = sketch.scaled(between(rng, 0.03, 1.0) if neutral else between(rng, 1e-3, 1e6))
+    if not neutral:
+        # |K| of ordinary size at a frequency of the delays or of the loop.
+        at = between(rng, 0.1, 100.0) / longest if rng.random() < 0.7 else centre
+        size = abs(View(sketch, 0.3, -0.2).at(np.array([at]))[0])
+        sketch = sketch.scaled(between(rng, 0.01, 30.0) / size)
+    sketch = sketch.scaled(-1.0) if rng.random() < 0.15 else sketch
+    for _ in range(60):
+        if turns(sketch) < 2000.0:
+            break
+        sketch = sketch.scaled(0.3)
+    # Most by far are unstable; less gain makes some of them stable.
+    for _ in range(4):
+        if rng.random() < 0.2 or judge.count(sketch, *point) == 0:
+            break
+        sketch = sketch.scaled(0.2)
+    return sketch, point
+
+
+def draw_paper(rng):
+    """The paper's loop, its numbers a little moved."""
+    from armlock import paper_loop
+
+    k = paper_loop(actuator=bool(rng.random() < 0.3)).controller
+    tau1, tau2 = (
+        (20.1, 19.9) if rng.random() < 0.5 else (between(rng, 5, 40), between(rng, 5, 40))
+    )
+    moved = [
+        [complex(r * 10.0 ** rng.normal(0.0, 0.05)) for r in rs] for rs in (k.zeros, k.poles)
+    ]
+    gain = k.gain * between(rng, 0.3, 3.0)
+    delay = between(rng, 1e-6, 1e-2) if DEAD_TIMES and rng.random() < 0.3 else 0.0
+    point = (1.0, 1.0) if rng.random() < 0.5 else tuple(1 + rng.normal(0.0, 3e-7, 2))
+    return (
+        Sketch(*map(tuple, moved), gain, "dual", tau1, tau2, delay, 2.5, tau1 - tau2),
+        (float(point[0]), float(point[1])),
+    )
+
+
+def draw_arm(rng):
+    """Single, common or dual arm with an integrator and gains over decades."""
+    sensor = str(rng.choice(["single", "common", "dual"]))
+    tau1, tau2 = draw_delays(rng)
+    gain = between(rng, 1e-3, 1e3) / max(tau1, tau2)
+    delay = between(rng, 1e-6, 1.0) if DEAD_TIMES and rng.random() < 0.3 else 0.0
+    difference = tau1 - tau2 or tau1
+    return Sketch((), (0j,), gain, sensor, tau1, tau2, delay, 2.5, difference), draw_point(rng)
+
+
+# ---------------------------------------------------------------------------- what is checked
+
+
+def _too_late(*_):
+    raise TimeoutError
+
+
+@dataclass
+class Tally:
+    """Calls, refusals and findings of a run."""
+
+    calls: Counter = field(default_factory=Counter)
+    refused: list = field(default_factory=list)
+    wrong: list = field(default_factory=list)
+    skipped: Counter = field(default_factory=Counter)
+    where: object = None
+    worst: dict = field(default_factory=dict)
+    patient: bool = hasattr(signal, "setitimer")
+
+    def ask(self, name, function, *arguments):
+        """Call armlock; None if it refuses."""
+        start = time.process_time()
+        self.calls[name] += 1
+        if self.patient:
+            signal.signal(signal.SIGPROF, _too_late)
+            signal.setitimer(signal.ITIMER_PROF, 4.0 * LATEST)
+        try:
+            answer = function(*arguments)
+        except (TimeoutError, SystemError):
+            self.note(name, arguments[1:], f"none within {4.0 * LATEST:.0f} s", "within 10 s")
+            return None
+        except (CountError, RootError, ValueError, ArithmeticError) as error:
+            spent = time.process_time() - start
+            self.refused.append((name, self.where, arguments[1:], f"{error!r:.300}", spent))
+            if spent > LATEST:
+                self.note(name, arguments[1:], f"refused after {spent:.1f} s", "within 5 s")
+            return None
+        finally:
+            if self.patient:
+                signal.setitimer(signal.ITIMER_PROF, 0.0)
+        spent = time.process_time() - start
+        if spent > 2.0 * LATEST:
+            self.note(name, arguments[1:], f"answered after {spent:.1f} s", "within 10 s")
+        return answer
+
+    def note(self, name, arguments, got, expected):
+        self.wrong.append((name, self.where, arguments, got, expected))
+
+    def near(self, name, arguments, got, expected, unsure=False, upward=False):
+        """Compare a number with the judge's, or with its bound on one side."""
+        if unsure:
+            self.skipped[f"{name}: one-sided"] += 1
+            good = (
+                got >= expected * (1 - EXACT)
+                if upward
+                else got <= expected * (1 + EXACT) + 1e-9
+            )
+        elif np.isfinite(expected) and np.isfinite(got):
+            off = abs(got - expected) / max(abs(expected), 1e-4)
+            self.worst[name] = max(self.worst.get(name, 0.0), off)
+            good = off <= EXACT
+        else:
+            good = got == expected
+        if not good:
+            self.note(name, arguments, got, f"{expected!r}{' or beyond' if unsure else ''}")
+
+    def same(self, name, sketch, point, got):
+        """Compare a count with the judge's."""
+        try:
+            expected = judge.count(sketch, *point)
+        except UndecidedError:
+            expected = -1
+        if expected == -1 and got >= 0:
+            self.skipped[f"{name}: judge undecided"] += 1
+        elif got == -1 != expected:
+            if expected == -2 or judge.distance(sketch, *point) > 1e-10:
+                self.note(name, point, got, expected)
+        elif got != expected:
+            self.note(name, point, int(got), expected)
+
+
+def check_counts(tally, rng, sketch, loop, point):
+    points = [point, draw_point(rng), draw_point(rng)]
+    got = tally.ask("unstable_roots", unstable_roots, loop, *np.array(points).T)
+    for here, count in zip(points, [] if got is None else got, strict=False):
+        tally.same("unstable_roots", sketch, here, count)
+
+
+def check_margins(tally, rng, sketch, loop, point):
+    try:
+        number = judge.count(sketch, *point)
+    except UndecidedError:
+        return
+    if number in (-1, -2):
+        return
+    verdict = judge.margins(sketch, *point, stable=number == 0)
+    got = tally.ask("modulus_margin", modulus_margin, loop, *point)
+    if got is not None:
+        tally.near("modulus_margin", point, got, verdict.modulus, "modulus" in verdict.unsure)
+    if number != 0:
+        return
+    found = tally.ask("margins", margins, loop, *point)
+    if found is None:
+        return
+    for name in judge.NAMES:
+        got, expected = getattr(found, name), getattr(verdict, name)
+        if name == "gain_upper":
+            got, expected = (np.inf if v > judge.GAINS else v for v in (got, expected))
+        if name == "gain_lower":
+            got, expected = (0.0 if v < 1.0 / judge.GAINS else v for v in (got, expected))
+        tally.near(
+            f"margins.{name}",
+            point,
+            got,
+            expected,
+            name in verdict.unsure,
+            name == "gain_lower",
+        )
+    low, high = max(found.gain_lower, 1e-6), min(found.gain_upper, 1e6)
+    inside = [low * 1.00001, high * 0.99999, *(low * (high / low) ** rng.random(2))]
+    outside = [found.gain_lower * 0.99999, found.gain_upper * 1.00001]
+    for factor, stable in [*((k, True) for k in inside), *((k, False) for k in outside)]:
+        if not 1e-6 <= factor <= 1e6 or turns(sketch.scaled(factor)) > 5e4:
+            continue
+        try:
+            counts = judge.count(sketch.scaled(factor), *point)
+        except UndecidedError:
+            tally.skipped["gain interval: judge undecided"] += 1
+            continue
+        if (counts == 0) != stable and counts != -1:
+            tally.note(
+                "gain interval",
+                (*point, factor),
+                f"{found.gain_lower, found.gain_upper}",
+                counts,
+            )
+
+
+def check_free(tally, rng, sketch, loop, point):
+    """Margins with both arms' phases free above a frequency."""
+    above = between(rng, 1e-2, 1e3) / max(sketch.tau1, sketch.tau2)
+    try:
+        if judge.count(sketch, *point) != 0:
+            return
+        verdict = judge.margins(sketch, *point, free_above=above)
+    except UndecidedError:
+        return
+    found = tally.ask("margins, free", margins, loop, *point, above)
+    if verdict.modulus <= 0.0:
+        # Some phases make it unstable: whatever is said then, no margin may be left.
+        if found is not None and found.modulus > 1e-9:
+            tally.note("margins.modulus, free", (*point, above), found.modulus, 0.0)
+        return
+    for name in judge.NAMES[:4] if found is not None else ():
+        unsure = name in verdict.unsure
+        got, expected = getattr(found, name), getattr(verdict, name)
+        tally.near(f"margins.{name}, free", (*point, above), got, expected, unsure)
+
+
+def confined_until(sketch, start, way, stop):
+    """A t before which the neutral chain stays left, nine tenths of the largest."""
+
+    def good(t):
+        return View(sketch, *(start + t * way)).confined()
+
+    if not sketch.neutral or good(stop):
+        return stop
+    if not good(0.0):
+        return 0.0
+    low, high = 0.0, stop
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if good(middle) else (low, middle)
+    return 0.9 * low
+
+
+def check_rays(tally, rng, sketch, loop, point):
+    start = np.array(point if rng.random() < 0.5 else draw_point(rng))
+    angle = rng.uniform(0.0, 2.0 * np.pi)
+    way = (
+        np.array([np.cos(angle), np.sin(angle)]) if rng.random() < 0.7 else np.array([1.0, 1.0])
+    )
+    stop = confined_until(sketch, start, way, between(rng, 0.01, 3.0))
+    if stop < 1e-9:
+        return
+    found = tally.ask("ray_crossings", ray_crossings, loop, start, way, stop)
+    if found is None:
+        return
+    try:
+        first, last = (judge.count(sketch, *(start + t * way)) for t in (0.0, stop))
+        if first >= 0 and last >= 0 and first + found.change.sum() != last:
+            tally.note(
+                "ray_crossings", (start, way, stop), found.change.tolist(), (first, last)
+            )
+        for t in rng.permutation(found.position)[:2]:
+            near = 1e-7 * t
+            if near < 1e-10 * np.hypot(*start):
+                continue
+            counts = [judge.count(sketch, *(start + s * way)) for s in (t - near, t + near)]
+            window = np.abs(found.position - t) < near
+            if min(counts) >= 0 and counts[1] - counts[0] != found.change[window].sum():
+                tally.note("ray_crossings", (start, way, stop, t), found.change[window], counts)
+    except UndecidedError:
+        tally.skipped["ray_crossings: judge undecided"] += 1
+    one = tally.ask("first_crossing", first_crossing, loop, start, way, stop)
+    expected = found.position[0] if found.position.size else np.inf
+    if one is not None and not np.isclose(one.position, expected, rtol=1e-9):
+        tally.note("first_crossing", (start, way, stop), one.position, expected)
+
+
+def check_critical(tally, rng, sketch, loop, point):
+    try:
+        if judge.count(sketch, 1.0, 1.0) != 0:
+            return
+        angle = rng.uniform(0.0, 2.0 * np.pi)
+        way = np.array([np.cos(angle), np.sin(angle)]) * between(rng, 1e-3, 1e3)
+        eps = tally.ask("critical_perturbation", critical_perturbation, loop, way)
+        if eps is None:
+            return
+        if np.isinf(eps):
+            if sketch.sensor != "single" or way[0] * loop.b1.any():
+                tally.note("critical_perturbation", way, eps, "finite")
+            return
+        for share in (1e-3, *rng.random(3), 1.0 - 1e-6):
+            counts = judge.count(sketch, *(1.0 + share * eps * way))
+            if counts not in (0, -1):
+                tally.note("critical_perturbation", (way, share), eps, counts)
+                return
+        counts = judge.count(sketch, *(1.0 + (1.0 + 1e-6) * eps * way))
+        if counts == 0:
+            tally.note("critical_perturbation", (way, 1.0 + 1e-6), eps, counts)
+    except UndecidedError:
+        tally.skipped["critical_perturbation: judge undecided"] += 1
+
+
+def check_root(tally, rng, sketch, loop, point):
+    try:
+        number = judge.count(sketch, *point)
+        if number == -2:
+            return
+        root = tally.ask("rightmost_root", rightmost_root, loop, *point)
+        if root is None:
+            return
+        longest = max(sketch.tau1, sketch.tau2)
+        near = 1e-7 * (abs(root) + 1e-3 / longest)
+        off = root.real < -near if number == -1 else (root.real > 0.0) != (number > 0)
+        if off and abs(root.real) > near:
+            tally.note("rightmost_root", point, root, f"count {number}")
+            return
+        if not np.isfinite(root) or -root.real * longest > 300.0:
+            tally.skipped["rightmost_root: far left"] += 1
+            return
+        right, left = (judge.count(sketch, *point, root.real + d) for d in (near, -near))
+        if right > 0 or left == 0:
+            tally.note("rightmost_root", point, root, f"{right} right, {left} with it")
+        if len(sketch.poles) < 4 and not sketch.neutral and not sketch.delay:
+            other = independent.generator_eigenvalues(loop, *point, nodes=40)
+            best = other[np.argmin(np.abs(other - root) + np.abs(other - np.conj(root)))]
+            tally.calls["collocation"] += 1
+            if np.abs(root) * longest < 20.0 and min(
+                abs(best - root), abs(best - np.conj(root))
+            ) > 1e-3 * (abs(root) + 1.0 / longest):
+                tally.skipped["rightmost_root: collocation elsewhere"] += 1
+    except UndecidedError:
+        tally.skipped["rightmost_root: judge undecided"] += 1
+
+
+def check_chart(tally, rng, sketch, loop, point):
+    x = np.array(point)[0] + rng.uniform(-0.3, 0.3, 7) * between(rng, 1e-6, 10.0)
+    y = np.array(point)[1] + rng.uniform(-0.3, 0.3, 5) * between(rng, 1e-6, 10.0)
+    if max(np.abs(x).max(), np.abs(y).max()) > 4.0:
+        return
+    chart = tally.ask("stability_chart", stability_chart, loop, x, y)
+    single = tally.ask("unstable_roots", unstable_roots, loop, *np.meshgrid(x, y))
+    if chart is None or single is None:
+        return
+    for j, i in np.argwhere(chart.counts != single):
+        tally.note("stability_chart", (x[i], y[j]), chart.counts[j, i], single[j, i])
+    for _ in range(2):
+        i, j = rng.integers(x.size), rng.integers(y.size)
+        tally.same("stability_chart", sketch, (x[i], y[j]), chart.counts[j, i])
+
+
+def check_dcurve(tally, rng, sketch, loop, point):
+    if sketch.tau1 == sketch.tau2 or sketch.sensor == "single":
+        return
+    longest = max(sketch.tau1, sketch.tau2)
+    omega = np.array([between(rng, 1e-5, 1e3) for _ in range(8)]) / longest
+    found = tally.ask("d_curve", d_curve, loop, omega)
+    if found is None:
+        return
+    for w, x, y in zip(omega, *found, strict=True):
+        if not np.isfinite(x + y):
+            continue
+        view, size, jw = View(sketch, x, y), 1.0, np.array([[1j * w]])
+        for z, p, gain, (w1, w2) in view.terms:
+            whole = abs(w1) * (1.0 + abs(x)) + abs(w2) * (1.0 + abs(y))
+            size += whole * abs(gain * judge.quotient(jw - z, jw - p)[0])
+        off = abs(1.0 + view.at(np.array([w]))[0]) / size
+        if off > 1e-9:
+            tally.note("d_curve", w, (x, y), f"|1 + L| = {off:.1e} of its terms")
+
+
+def check_maps(tally, rng, sketch, loop, point):
+    if sketch.neutral or sketch.delay or len(sketch.poles) > 4:
+        return
+    parts = int(rng.integers(2, 40))
+    step = sketch.tau1 / parts
+    if max(abs(p) for p in sketch.poles) * step > 5.0:
+        return
+    sketch = replace(sketch, tau2=step * int(rng.integers(1, 40)), difference=sketch.difference)
+    order = int(rng.integers(2))
+    plane = tally.ask("semi_discretization", semi_discretization, to_loop(sketch), step, order)
+    if plane is None:
+        return
+    x, y = rng.uniform(-3.0, 3.0, (2, 4))
+    got = tally.ask("map counts", unstable_roots, plane, x, y)
+    chart = tally.ask("map chart", stability_chart, plane, x, y)
+    if got is None or chart is None:
+        return
+    for k in range(4):
+        size = np.abs(independent.map_eigenvalues(plane, x[k], y[k]))
+        if np.abs(size - 1.0).min() < 1e-5:
+            continue
+        expected = int(np.count_nonzero(size > 1.0))
+        for name, count in (("map counts", got[k]), ("map chart", chart.counts[k, k])):
+            if count != expected:
+                tally.note(name, (step, order, x[k], y[k]), int(count), expected)
+
+
+CHECKS = {
+    "counts": (check_counts, 1.0),
+    "margins": (check_margins, 1.0),
+    "free": (check_free, 0.3),
+    "rays": (check_rays, 0.3),
+    "critical": (check_critical, 0.5),
+    "roots": (check_root, 0.3),
+    "charts": (check_chart, 0.3),
+    "dcurve": (check_dcurve, 0.3),
+    "maps": (check_maps, 0.3),
+}
+
+
+#: What was wrong once: a loop, a point, and what is right there where brute force takes long:
+#: 4e7 cells, a quarter of an hour.
+FIXED = {
+    "a zero far above the neutral chain": (
+        Sketch((-1.01e5,), (-1e3,), 0.2, "common", 20.1, 19.9),
+        (1.0, 1.0),
+        {
+            "modulus": 0.28939025667,
+            "disk": 0.299310722618,
+            "phase": 0.298149424673,
+            "delay": 1.78674003931e-5,
+        },
+    ),
+    "a factor of 2.1": (
+        Sketch((0.2,), (-1.0, -2.0, -7.0), -10.0, "single", 20.1, 20.1),
+        (0.01, 0.0),
+        {"gain_upper": 2.1057216476},
+    ),
+    "unity gain at 14.7 kHz": (
+        Sketch((), (0j,), np.pi * 14.7e3, "common", 33.6, 33.1),
+        (0.999, 0.999),
+        {
+            "modulus": 0.044711663436,
+            "disk": 0.0447341982395,
+            "delay": 5.5152126654e-6,
+        },
+    ),
+    "small and rippled": (Sketch((), (0j,), 0.181, "common", 0.3566, 0.3565), (1e-6, 0.04), {}),
+}
+
+
+def compile_all():
+    """Call everything once, so that no call's time is that of the compiler."""
+    loop = to_loop(Sketch((-2.0,), (-1.0, -3.0), 0.3, "dual", 2.0, 1.0, 0.0, 1.0, 1.0))
+    for system in (loop, to_loop(Sketch((-2.0,), (-1.0,), 0.3, "common", 2.0, 1.0))):
+        point = 0.8, 0.9
+        margins(system, *point)
+        modulus_margin(system, *point)
+        ray_crossings(system, point, (1.0, 0.5), 0.1)
+        first_crossing(system, point, (1.0, 0.5), 0.1)
+        critical_perturbation(to_loop(Sketch((), (-1.0,), 0.3, "common", 2.0, 1.0)), (1.0, 0.3))
+        rightmost_root(system, *point)
+        stability_chart(system, [0.7, 0.9], [0.6, 0.8])
+        d_curve(system, [0.5, 1.0])
+    plane = semi_discretization(CommonArm(), 0.1, 1)
+    stability_chart(plane, [0.7, 0.9], [0.6, 0.8])
+
+
+def attack_fixed(tally):
+    """Hold the loops of FIXED, and calls that were wrong once, against what is right."""
+    rng = np.random.default_rng(0)
+    for name, (sketch, point, known) in FIXED.items():
+        tally.where, loop = (name, sketch), to_loop(sketch)
+        check_margins(tally, rng, sketch, loop, point)
+        found = tally.ask("margins", margins, loop, *point)
+        for margin, expected in known.items():
+            if found is not None:
+                tally.near(f"margins.{margin}", point, getattr(found, margin), expected)
+    # A map has finitely many eigenvalues, and no neutral chain.
+    plane = semi_discretization(CommonArm(gain=10.0), 0.05, 1)
+    expected = independent.map_count(plane, 3.0, 3.0)
+    for got in (unstable_roots(plane, 3.0, 3.0), stability_chart(plane, [3.0], [3.0]).counts):
+        if int(np.ravel(got)[0]) != expected:
+            tally.note("map", (3.0, 3.0), got, expected)
+    # With equal delays D does not change along (1, -1), however far.
+    for zeros in ((), (-0.5,)):
+        sketch = Sketch(zeros, (-1.0,), 0.2, "common", 20.0, 20.0)
+        tally.where, loop, way = (
+            ("equal delays", sketch),
+            to_loop(sketch),
+            np.array([1.0, -1.0]),
+        )
+        eps = tally.ask("critical_perturbation", critical_perturbation, loop, way)
+        far = [int(unstable_roots(loop, *(1.0 + t * way))) for t in (0.5, 2.0, 100.0, 1e4)]
+        agree = all(
+            (t < eps) == (n == 0) for t, n in zip((0.5, 2.0, 100.0, 1e4), far, strict=True)
+        )
+        if not agree:
+            tally.note("critical_perturbation", way, eps, f"counts {far} at 0.5, 2, 100, 1e4")
+    # A point 1e-10 off a boundary, far from the reference, has a count.
+    tally.where = ("far from the reference", FIXED["small and rippled"][0])
+    for x in (3.0, 1e2, 1e4):
+        for off in (-1e-10, 1e-10):
+            y = 2.0 + off * x - x
+            got = int(unstable_roots(CommonArm(), x, y))
+            if got < 0 or got % 2 != int(x + y > 2.0):
+                tally.note("unstable_roots", (x, y), got, "odd" if x + y > 2.0 else "even")
+    # Dual arms at (1, 1): the root at s = 0 of the sensor's integral, twice the same.
+    for k in range(25):
+        gain, tau1, corner = (
+            between(rng, *ends) for ends in ((0.01, 100), (0.5, 40), (0.05, 20))
+        )
+        tau2 = tau1 * (1.0 - between(rng, 1e-6, 0.9))
+        arm = DualArm(gain, tau1, tau2, corner)
+        sketch = Sketch((), (0j,), gain, "dual", tau1, tau2, 0.0, corner, tau1 - tau2)
+        tally.where = (f"dual arm {k}", sketch)
+        roots = [tally.ask("rightmost_root", rightmost_root, arm, 1.0, 1.0) for _ in range(2)]
+        if None in roots:
+            continue
+        right = judge.count(
+            sketch, 1.0, 1.0, roots[0].real + 1e-7 * (abs(roots[0]) + 1e-3 / tau1)
+        )
+        if roots[0] != roots[1] or roots[0].real < -1e-9 or right > 0:
+            tally.note(
+                "rightmost_root", (1.0, 1.0), roots, f"twice the same; {right} right of it"
+            )
+
+
+def attack(seed, loops, kinds=tuple(CHECKS), tally=None, progress=False):
+    """Check the loops of these indices; return the tally."""
+    tally = tally or Tally()
+    for index in loops:
+        rng = np.random.default_rng([seed, index])
+        maker = rng.choice([draw, draw, draw, draw, draw_paper, draw_arm])
+        try:
+            sketch, point = maker(rng)
+            loop = to_loop(sketch)
+        except (ValueError, UndecidedError):
+            tally.skipped["no such loop"] += 1
+            continue
+        tally.where = (index, sketch)
+        tally.calls["loops"] += 1
+        before = len(tally.wrong), len(tally.refused)
+        for kind, (check, share) in CHECKS.items():
+            if kind in kinds and rng.random() < share:
+                check(tally, rng, sketch, loop, point)
+        if progress:
+            report(tally, *before)
+            if index % 100 == 99:
+                print(
+                    f"... {index + 1}: {len(tally.wrong)} wrong, {len(tally.refused)} refused",
+                    flush=True,
+                )
+    return tally
+
+
+def short(sketch):
+    """A loop in a line; its number makes it again."""
+    kind = "neutral" if sketch.neutral else "retarded"
+    dead = f", dead time {sketch.delay:.3g}" if sketch.delay else ""
+    return (
+        f"{kind} {sketch.sensor}, {len(sketch.zeros)} zeros, {len(sketch.poles)} poles, "
+        f"gain {sketch.gain:.3g}, delays {sketch.tau1:.6g} {sketch.tau2:.6g}{dead}"
+    )
+
+
+def report(tally, wrong=0, refused=0):
+    """Print what is new."""
+    for name, (index, sketch), arguments, got, expected in tally.wrong[wrong:]:
+        print(f"WRONG {name}, loop {index} ({short(sketch)})", flush=True)
+        print(f"   at {arguments}: got {got}, expected {expected}", flush=True)
+    for name, (index, sketch), arguments, error, spent in tally.refused[refused:]:
+        print(f"REFUSED {name}, loop {index} ({short(sketch)})", flush=True)
+        print(f"   at {arguments}: {error:.160} ({spent:.1f} s)", flush=True)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--loops", type=int, default=10_000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--first", type=int, default=0, help="index of the first loop")
+    parser.add_argument("--kinds", nargs="*", default=list(CHECKS), choices=list(CHECKS))
+    given = parser.parse_args()
+    np.seterr(all="ignore")
+    start = time.perf_counter()
+    numbers = range(given.first, given.first + given.loops)
+    compile_all()
+    tally = Tally()
+    attack_fixed(tally)
+    report(tally)
+    attack(given.seed, numbers, tuple(given.kinds), tally, progress=True)
+    print(f"\nin {time.perf_counter() - start:.0f} s:", dict(tally.calls))
+    print("not decided by the judge:", dict(tally.skipped))
+    print("largest deviations:", {k: f"{v:.1e}" for k, v in tally.worst.items()})
+    print("wrong:", len(tally.wrong), dict(Counter(entry[0] for entry in tally.wrong)))
+    calls = sum(tally.calls.values()) - tally.calls["loops"]
+    print(
+        "refused:", len(tally.refused), "of", calls, dict(Counter(e[0] for e in tally.refused))
+    )
+    return int(bool(tally.wrong) or len(tally.refused) > 1e-3 * calls)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

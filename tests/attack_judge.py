@@ -1,0 +1,588 @@
+"""Margins and counts of a loop by branch and bound, sharing no code with armlock.
+
+A loop is held as factors. On a cell of frequencies of centre m and half-width h its open loop
+is enclosed: L(m + t) = L0 + L1 t + e with |e| <= R for |t| <= h. The remainder R comes of the
+second derivative of log K (a sum over zeros and poles, each bounded by its distance less h)
+and of the exponentials (delay squared). A second enclosure leaves the phases of both arms
+free: a disc, which needs no resolution of the delays. A cell is left out only if one of the two
+shows that nothing on it can be below the smallest value found so far, less a part in 1e7;
+every other one is cut in four. So the smallest value found is the infimum to 1e-7, whatever
+the function does between samples. Past the highest corner a disc bounds all that follows.
+Rounding is not enclosed: it is some 1e-13 of the terms.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+TOL = 1e-7
+MOST_CELLS = 120_000
+# Cells that are looked at together.
+CHUNK = 20_000
+GAINS = 1e6
+NAMES = ("modulus", "disk", "phase", "delay", "gain_upper", "gain_lower")
+
+
+class UndecidedError(RuntimeError):
+    """The cells did not suffice."""
+
+
+@dataclass(frozen=True)
+class Sketch:
+    """A loop in factors: K of zeros, poles and gain; a sensor; delays; a dead time."""
+
+    zeros: tuple
+    poles: tuple
+    gain: float
+    sensor: str
+    tau1: float
+    tau2: float
+    delay: float = 0.0
+    corner: float = 1.0
+    difference: float = 1.0
+
+    def scaled(self, factor):
+        return replace(self, gain=self.gain * factor)
+
+    def terms(self):
+        """Zeros, poles, gain and a1, a2 of terms W (a1 (1 - c1 e1) + a2 (1 - c2 e2)) of L."""
+        z, p = (np.array(sorted(r, key=abs), complex) for r in (self.zeros, self.poles))
+        common = np.count_nonzero(z == 0.0), np.count_nonzero(p == 0.0)
+        z0, p0 = (k - min(common) for k in common)
+        z = np.concatenate((np.zeros(z0), z[z != 0.0]))
+        p = np.concatenate((np.zeros(p0), p[p != 0.0]))
+        weights = {
+            "single": (1.0, 0.0),
+            "common": (1.0, 1.0),
+            "difference": (-1.0, 1.0),
+            "dual": (1.0, 1.0),
+        }
+        found = [(z, p, self.gain, weights[self.sensor])]
+        if self.sensor == "dual":
+            ze, pe = (z[1:], p) if z0 else (z, np.append(0.0, p))
+            pe = np.array(sorted(np.append(pe, -self.corner), key=abs))
+            gain = self.gain * self.corner / self.difference
+            found.append((ze, pe, gain, (1.0, -1.0)))
+        return found
+
+    def open_poles(self):
+        """Roots of the common denominator R of L."""
+        p = list(self.poles)
+        if self.sensor == "dual":
+            p += [0.0, -self.corner]
+        for z in self.zeros:
+            if z == 0.0 and 0.0 in p:
+                p.remove(0.0)
+        return np.array(p, complex)
+
+    @property
+    def neutral(self):
+        return len(self.zeros) == len(self.poles)
+
+
+def quotient(above, below):
+    """Product over the last axis of one array over that of another, factor by factor."""
+    size = max(above.shape[1], below.shape[1])
+    above, below = (
+        np.concatenate((d, np.ones((d.shape[0], size - d.shape[1]))), axis=1)
+        for d in (above, below)
+    )
+    return np.prod(above / below, axis=1)
+
+
+@dataclass
+class View:
+    """L(sigma + j omega; c1, c2), its enclosures and its ends."""
+
+    sketch: Sketch
+    c1: float
+    c2: float
+    sigma: float = 0.0
+    terms: list = field(init=False)
+
+    def __post_init__(self):
+        s, sigma = self.sketch, self.sigma
+        decay = np.exp(-sigma * s.delay)
+        self.terms = [(z - sigma, p - sigma, g * decay, w) for z, p, g, w in s.terms()]
+        self.tau = np.array([s.tau1, s.tau2])
+        given = np.array([self.c1, self.c2])
+        self.c = given * np.exp(-sigma * self.tau)
+        self.miss = (1.0 - given) - given * np.expm1(-sigma * self.tau)
+        corners = [1.0 / s.tau1, 1.0 / s.tau2]
+        if s.tau1 != s.tau2 and s.sensor != "single":
+            corners.append(1.0 / abs(s.tau1 - s.tau2))
+        for z, p, _, w in self.terms:
+            corners += [abs(v) for v in (*z, *p) if v != 0.0]
+            start = abs(self.start(*w))
+            pull = np.dot(np.abs(w), np.abs(self.c) * self.tau)
+            if start and pull:
+                corners.append(start / pull)
+        self.corners = np.array(corners)
+        self.low = 1e-8 * float(self.corners.min())
+        for _ in range(60):
+            one, two = np.abs(self.at(self.low * np.array([1.0, 0.5])))
+            if one == 0.0 or two < 1.4 * one or one > 1e3 * GAINS:
+                break
+            self.low *= 0.1
+        # L there is a single power of s to some 1e-8.
+        self.power = int(np.round(np.log2(two / one))) if one else 0
+
+    def start(self, w1, w2):
+        """Weights times 1 - c_k exp(-sigma tau_k), summed."""
+        if w1 != -w2 or self.sigma:
+            return w1 * self.miss[0] + w2 * self.miss[1]
+        return w1 * (self.c2 - self.c1)
+
+    def at(self, omega):
+        """L at real frequencies."""
+        omega = np.asarray(omega, float)
+        jw, s, total = 1j * omega[:, None], self.sketch, 0j
+        late2 = np.exp(-1j * omega * s.tau2)
+        turned = [-np.expm1(-1j * omega * t) for t in self.tau]
+        apart = late2 * -np.expm1(-1j * omega * (s.tau1 - s.tau2))
+        for z, p, gain, (w1, w2) in self.terms:
+            a1, a2 = w1 * self.c[0], w2 * self.c[1]
+            arms = self.start(w1, w2) + (a1 + a2) * turned[0] - a2 * apart
+            if w1 != -w2:
+                arms = self.start(w1, w2) + a1 * turned[0] + a2 * turned[1]
+            total = total + gain * quotient(jw - z, jw - p) * arms
+        return total * np.exp(-1j * omega * s.delay)
+
+    def enclose(self, m, h):
+        """L0, L1, R; and a disc with both arms' phases free: centre and radius."""
+        s = self.sketch
+        jm, b = 1j * m[:, None], m + h
+        value = slope = 0j
+        rest = np.zeros(m.size)
+        late = [np.exp(-1j * m * t) for t in self.tau]
+        turned = [-np.expm1(-1j * m * t) for t in self.tau]
+        apart = late[1] * -np.expm1(-1j * m * (s.tau1 - s.tau2))
+        arms = [np.zeros(m.size, complex), np.zeros(m.size, complex)]
+        free_rest = np.zeros(m.size)
+        hh = h[:, None]
+        with np.errstate(all="ignore"):
+            for z, p, gain, (w1, w2) in self.terms:
+                dz, dp = jm - z, jm - p
+                v = gain * quotient(dz, dp) * np.exp(-1j * m * s.delay)
+                log_slope = (1j / dz).sum(1) - (1j / dp).sum(1) - 1j * s.delay
+                az, ap = np.abs(dz), np.abs(dp)
+                near = (1.0 / np.maximum(az - hh, 0.0) ** 2).sum(1)
+                near = near + (1.0 / np.maximum(ap - hh, 0.0) ** 2).sum(1)
+                bend = np.where(h > 0.0, 0.5 * h * h * near, 0.0)
+                x = np.abs(log_slope) * h + bend
+                e = bend + 0.5 * x * x * np.exp(np.minimum(x, 700.0))
+                a1, a2 = w1 * self.c[0], w2 * self.c[1]
+                start = self.start(w1, w2)
+                if w1 == -w2:
+                    # (1 - c1 e1) - (1 - c2 e2), without losing digits where the two are close.
+                    p0 = start + (a1 + a2) * turned[0] - a2 * apart
+                    far = np.minimum(2.0, b * abs(s.tau1 - s.tau2))
+                    curve = abs(a1 * s.tau1**2 + a2 * s.tau2**2) + abs(a2) * s.tau2**2 * far
+                else:
+                    p0 = start + a1 * turned[0] + a2 * turned[1]
+                    curve = abs(a1) * s.tau1**2 + abs(a2) * s.tau2**2
+                p1 = 1j * (a1 * s.tau1 * late[0] + a2 * s.tau2 * late[1])
+                rp = 0.5 * h * h * curve
+                ap0, ap1, al, av = np.abs(p0), np.abs(p1), np.abs(log_slope), np.abs(v)
+                value = value + v * p0
+                slope = slope + v * (p1 + log_slope * p0)
+                rest = rest + av * (
+                    al * ap1 * h * h + (ap0 + ap1 * h) * e + (1.0 + al * h) * rp + e * rp
+                )
+                arms[0] += w1 * v
+                arms[1] += w2 * v
+                whole = abs(w1) + abs(w2) + abs(a1) + abs(a2)
+                # |W / W(m) - 1| on the cell, or how large W is at all.
+                moved = np.minimum(x * np.exp(np.minimum(x, 700.0)), np.inf)
+                largest = quotient(az + hh, ap - hh)
+                largest = np.where((ap > hh).all(1), abs(gain) * largest, np.inf)
+                free_rest += np.where(
+                    h > 0.0, np.minimum(av * moved, largest + av) * whole, 0.0
+                )
+            radius = np.abs(arms[0] * self.c[0]) + np.abs(arms[1] * self.c[1]) + free_rest
+        rest = np.where(np.isnan(rest), np.inf, rest)
+        radius = np.where(np.isnan(radius), np.inf, radius)
+        return value, slope, rest, arms[0] + arms[1], radius
+
+    def limit(self):
+        """Centre and radius of the disc of L at infinity; turning if there is a dead time."""
+        centre, radius = 0.0, 0.0
+        z, p, gain, (w1, w2) = self.terms[0]
+        if z.size == p.size:
+            centre = gain * (w1 + w2)
+            radius = abs(gain) * (abs(w1 * self.c[0]) + abs(w2 * self.c[1]))
+        return centre, radius
+
+    def tail(self, omega):
+        """Centre and radius of a disc that holds L at all frequencies past `omega`."""
+        centre, radius = self.limit()
+        for k, (z, p, gain, (w1, w2)) in enumerate(self.terms):
+            whole = abs(w1) + abs(w2) + abs(w1 * self.c[0]) + abs(w2 * self.c[1])
+            if omega <= 1.01 * np.abs(p).max(initial=0.0):
+                return 0.0, np.inf
+            grown = np.sum(np.log1p(np.abs(z) / omega)) - np.sum(np.log1p(-np.abs(p) / omega))
+            if k == 0 and z.size == p.size:
+                radius += abs(gain) * np.expm1(grown) * whole
+            else:
+                radius += abs(gain) * np.exp(grown + (z.size - p.size) * np.log(omega)) * whole
+        if self.sketch.delay:
+            return 0.0, abs(centre) + radius
+        return centre, radius
+
+    def confined(self):
+        """Whether the neutral root chain stays left, dead time and delays a little changed."""
+        centre, radius = self.limit()
+        if self.sketch.delay:
+            return abs(centre) + radius < 1.0
+        return abs(1.0 + centre) > radius
+
+    def cells(self, high, free_above=np.inf):
+        """Cells from `low` to `high`, ten a decade and one for each corner."""
+        if not 0.0 < self.low < high < np.inf:
+            raise UndecidedError("no range of frequencies")
+        count = int(np.ceil(10 * np.log10(high / self.low))) + 1
+        edges = np.geomspace(self.low, high, count)
+        inner = self.corners[(self.corners > self.low) & (self.corners < high)]
+        edges = np.concatenate((edges, 0.99 * inner, 1.01 * inner))
+        if self.low < free_above < high:
+            edges = np.append(edges, free_above)
+        edges = np.unique(edges)
+        return edges[:-1], edges[1:]
+
+
+def cut(a, b, parts=4):
+    share = np.arange(parts + 1) / parts
+    edges = a[:, None] + (b - a)[:, None] * share
+    edges[:, -1] = b
+    return edges[:, :-1].ravel(), edges[:, 1:].ravel()
+
+
+def to_segment(point, value, slope, h):
+    """Distance of a point to the segment value + slope t, |t| <= h; and the nearest t."""
+    speed = np.abs(slope) ** 2
+    away = point - value
+    with np.errstate(all="ignore"):
+        t = np.where(speed > 0.0, (away * np.conj(slope)).real / speed, 0.0)
+    t = np.clip(t, -h, h)
+    return np.abs(away - slope * t), t
+
+
+def count(sketch, c1, c2, sigma=0.0):
+    """Roots of D right of Re s = sigma; -1 on the line (to rounding), -2 unconfined.
+
+    N = n/2 - (turn of arg D) / pi, with arg D = arg R + arg(1 + L); the turn of 1 + L over a
+    cell whose enclosure leaves out -1 is the angle between its ends.
+    """
+    view = View(sketch, c1, c2, sigma)
+    if sketch.neutral and not view.confined():
+        return -2
+    poles = sketch.open_poles() - sigma
+    high = 10.0 * float(view.corners.max())
+    goal = 1.0 if sketch.delay else 1.0 + view.limit()[0]
+    while True:
+        centre, radius = view.tail(high)
+        if abs(1.0 + centre) > radius:
+            break
+        high *= 4.0
+        if high > 1e40:
+            raise UndecidedError("no end")
+    a, b = view.cells(high)
+    turn, used = 0.0, 0
+    ends = 1.0 + view.at(np.array([a[0], b[-1]]))
+    while a.size:
+        used += a.size
+        if used > MOST_CELLS:
+            raise UndecidedError("count")
+        m, h = 0.5 * (a + b), 0.5 * (b - a)
+        value, slope, rest, centre, radius = view.enclose(m, h)
+        clear = to_segment(-1.0, value, slope, h)[0] > rest
+        clear |= np.abs(1.0 + centre) > radius
+        one, two = 1.0 + view.at(a[clear]), 1.0 + view.at(b[clear])
+        turn += float(np.angle(two / one).sum())
+        a, b = a[~clear], b[~clear]
+        if a.size and ((b - a) < 1e-13 * b).any():
+            return -1
+        a, b = cut(a, b)
+    turn += float(np.angle(goal / ends[1]))
+    # arg R from the lowest frequency to infinity, factor by factor.
+    first = 1j * view.low - poles
+    turn += float(sum(np.angle(1j / d) for d in first))
+    # From omega = 0, where D is real, to the lowest frequency.
+    phase = float(np.angle(ends[0]) + np.angle(first).sum())
+    start = np.pi * round(phase / np.pi)
+    if abs(phase - start) > 1e-3:
+        return -1
+    turn += phase - start
+    number = 0.5 * poles.size - turn / np.pi
+    if abs(number - round(number)) > 1e-3:
+        raise UndecidedError(f"count {number}")
+    return round(number)
+
+
+def distance(sketch, c1, c2):
+    """Smallest |1 + L| over the size of its terms: how near a root is to the axis."""
+    view = View(sketch, c1, c2)
+    omega = np.geomspace(view.low, 1e2 * view.corners.max(), 20001)
+    value, _, _, centre, radius = view.enclose(omega, 0.0 * omega)
+    return float((np.abs(1.0 + value) / (1.0 + np.abs(centre) + radius)).min())
+
+
+@dataclass
+class Verdict:
+    """The infima, and those of which cells ran out: bounds on one side only."""
+
+    modulus: float = np.inf
+    disk: float = np.inf
+    phase: float = np.inf
+    delay: float = np.inf
+    gain_upper: float = np.inf
+    gain_lower: float = 0.0
+    unsure: tuple = ()
+    used: int = 0
+
+
+def chain_gains(view):
+    """Gain factors at which the neutral root chain is lost."""
+    centre, radius = view.limit()
+    if view.sketch.delay:
+        return 0.0, 1.0 / (abs(centre) + radius)
+    limits = [1.0 / r for r in (radius - centre, -centre - radius) if r > 0.0]
+    return max([k for k in limits if k < 1.0], default=0.0), min(
+        [k for k in limits if k > 1.0], default=np.inf
+    )
+
+
+def apollonius(k):
+    """Where |1 + L| < k |1 - L|: inside a disc (k < 1) or outside one."""
+    k = min(max(k, 1e-300), 1e300)
+    if k == 1.0:
+        k = 1.0 - 1e-15
+    return -(1.0 + k * k) / (1.0 - k * k), abs(2.0 * k / (1.0 - k * k)), k < 1.0
+
+
+def ratio(value):
+    return np.abs(1.0 + value) / np.maximum(np.abs(1.0 - value), 1e-300)
+
+
+def lag(value):
+    return np.mod(np.angle(-value), 2.0 * np.pi)
+
+
+def to_arc(value, turn):
+    """Distance to the arc -exp(j psi), 0 <= psi <= turn, of the unit circle."""
+    ends = np.minimum(np.abs(value + 1.0), np.abs(value + np.exp(1j * turn)))
+    return np.where(lag(value) <= turn, np.abs(np.abs(value) - 1.0), ends)
+
+
+def zeros_of(view, a, b, excess):
+    """Zeros of `excess(L)` in cells at whose ends its sign differs, by the Illinois rule."""
+    fa, fb = excess(view.at(a)), excess(view.at(b))
+    a, b = a.copy(), b.copy()
+    for _ in range(14):
+        with np.errstate(all="ignore"):
+            m = np.clip(np.where(fa != fb, (a * fb - b * fa) / (fb - fa), a), a, b)
+        m = np.where(np.isnan(m), 0.5 * (a + b), m)
+        fm = excess(view.at(m))
+        same = (fm > 0.0) == (fa > 0.0)
+        a, fa, fb = (
+            np.where(same, m, a),
+            np.where(same, fm, 0.5 * fa),
+            np.where(same, 0.5 * fb, fm),
+        )
+        b = np.where(same, b, m)
+        if (np.abs(fm) < 1e-13).all():
+            break
+    return m
+
+
+def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
+    """All margins; of a loop that is not stable the modulus and the disk only.
+
+    Above `free_above`, in rad/s, both arms' phases are free: L fills a disc.
+    """
+    view = View(sketch, c1, c2)
+    best = Verdict()
+    centre, radius = view.limit()
+    # The limits, first.
+    if sketch.neutral:
+        if sketch.delay:
+            near = -(abs(centre) + radius)
+            best.modulus, best.disk = 1.0 + near, abs(float(ratio(near)))
+            reach = abs(centre) + radius
+        else:
+            best.modulus = abs(1.0 + centre) - radius
+            # The ratio is a Moebius map: its least value on the disc is on the real axis or
+            # where a circle of constant ratio touches, which by symmetry is there, too.
+            best.disk = float(ratio(np.array([centre - radius, centre + radius])).min())
+            reach = abs(centre) + radius
+        best.gain_lower, best.gain_upper = chain_gains(view)
+        if reach >= 1.0:
+            best.delay = 0.0
+            if not sketch.delay and centre > 0.0 and abs(centre) - radius <= 1.0:
+                cosine = (radius**2 - 1.0 - centre**2) / (2.0 * centre)
+                best.phase = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    else:
+        best.modulus = best.disk = 1.0
+    first = view.at(np.array([view.low]))
+    best.modulus = min(best.modulus, float(np.abs(1.0 + first[0])))
+    best.disk = min(best.disk, float(ratio(first)[0]))
+    if view.power == 0 and first[0].real < 0.0:
+        k = -1.0 / first[0].real
+        if k > 1.0:
+            best.gain_upper = min(best.gain_upper, k)
+        else:
+            best.gain_lower = max(best.gain_lower, k)
+
+    def kept(value, slope, rest, h, a, b):
+        """For each margin, the cells on which a smaller one may lie."""
+        away, _ = to_segment(-1.0, value, slope, h)
+        keep = np.zeros((len(NAMES), value.size), dtype=bool)
+        keep[0] = away <= best.modulus * (1.0 - TOL) + rest
+        at, size, inside = apollonius(best.disk * (1.0 - TOL))
+        if inside:
+            keep[1] = to_segment(at, value, slope, h)[0] <= size + rest
+        else:
+            far = np.maximum(np.abs(value - slope * h - at), np.abs(value + slope * h - at))
+            keep[1] = far >= size - rest
+        if not stable:
+            return keep
+        spread = np.abs(slope) * h + rest
+        turn = np.where(best.phase < np.pi, best.phase * (1.0 - TOL), np.pi) * np.ones(
+            value.size
+        )
+        keep[2] = to_arc(value * np.exp(1j * turn), 2.0 * turn) <= spread
+        with np.errstate(invalid="ignore"):
+            turn = np.minimum(best.delay * (1.0 - TOL) * b, 2.0 * np.pi)
+        keep[3] = (to_arc(value, turn) <= spread) & (turn > 0.0)
+        real = np.abs(value.imag) <= np.abs(slope.imag) * h + rest
+        half = np.abs(slope.real) * h + rest
+        smallest, largest = value.real - half, value.real + half
+        top = min(best.gain_upper * (1.0 - TOL), GAINS * 1.01)
+        bottom = max(best.gain_lower * (1.0 + TOL), 0.99 / GAINS)
+        keep[4] = real & (largest > -1.0) & (smallest < -1.0 / top) & (top > 1.0)
+        keep[5] = real & (smallest < -1.0) & (largest > -1.0 / bottom) & (bottom < 1.0)
+        return keep
+
+    def improve(omega):
+        value = view.at(omega)
+        best.modulus = min(best.modulus, float(np.abs(1.0 + value).min(initial=np.inf)))
+        best.disk = min(best.disk, float(ratio(value).min(initial=np.inf)))
+
+    def cross(a, b):
+        """Crossovers in cells whose ends differ, the most promising of them."""
+        at_a, at_b = view.at(a), view.at(b)
+        over = np.flatnonzero((np.abs(at_a) > 1.0) != (np.abs(at_b) > 1.0))
+        if over.size:
+            turn = lag(0.5 * (at_a[over] + at_b[over]))
+            some = np.argsort(np.minimum(turn, 2.0 * np.pi - turn))[:9]
+            some = over[np.union1d(some, np.argsort(turn / b[over])[:9])]
+            omega = zeros_of(view, a[some], b[some], lambda v: np.log(np.abs(v)))
+            value = view.at(omega)
+            omega, turns = (q[np.abs(np.abs(value) - 1.0) < 1e-10] for q in (omega, lag(value)))
+            for turn, place in zip(turns, omega, strict=True):
+                best.phase = min(best.phase, float(min(turn, 2.0 * np.pi - turn)))
+                best.delay = min(best.delay, float(turn / place))
+        over = np.flatnonzero((at_a.imag > 0.0) != (at_b.imag > 0.0))
+        middle = 0.5 * (at_a[over] + at_b[over]).real
+        some = over[np.argsort(np.abs(middle + 1.0))[:12]]
+        if some.size:
+            omega = zeros_of(view, a[some], b[some], lambda v: v.imag / np.abs(v))
+            value = view.at(omega)
+            value = value[(np.abs(value.imag) < 1e-10 * np.abs(value)) & (value.real < 0.0)]
+            for k in -1.0 / value.real:
+                if k > 1.0:
+                    best.gain_upper = min(best.gain_upper, float(k))
+                else:
+                    best.gain_lower = max(best.gain_lower, float(k))
+
+    def done(undecided):
+        best.disk *= 2.0
+        best.unsure = tuple(
+            name for name, is_open in zip(NAMES, undecided, strict=True) if is_open
+        )
+        return best
+
+    def examine(a, b):
+        """Leave out cells on which nothing smaller can lie; return the others, cut."""
+        best.used += a.size
+        m, h = 0.5 * (a + b), 0.5 * (b - a)
+        value, slope, rest, middle, radius = view.enclose(m, h)
+        free = a >= free_above
+        improve(np.clip(m + to_segment(-1.0, value, slope, h)[1], a, b)[~free])
+        improve(m[~free])
+        if stable:
+            cross(a[~free], b[~free])
+        keep = kept(value, slope, rest, h, a, b) | free
+        if free.any():
+            centre, size = view.enclose(m[free], 0.0 * m[free])[3:]
+            improve_free(best, m[free], centre, size, stable)
+        keep &= kept(middle, 0.0 * m, radius, h, a, b)
+        if best.used > most / 2:
+            # Nulls of L ask for ever larger gains: leave the cells to the others.
+            opened[4:] |= keep[4:].any(axis=1)
+            keep[4:] = False
+        # As close as floats are: what is open there stays open.
+        fine = (b - a) < 3e-14 * b
+        rows = keep[:, fine].any(axis=1)
+        some = keep.any(axis=0) & ~fine
+        return rows, keep[:, some].any(axis=1), *cut(a[some], b[some])
+
+    low, high = view.low, 10.0 * float(view.corners.max())
+    high = max(high, 2.0 * free_above) if np.isfinite(free_above) else high
+    a, b = view.cells(high, free_above)
+    opened = np.zeros(len(NAMES), dtype=bool)
+    while True:
+        pending = [(np.ones(len(NAMES), dtype=bool), a, b)]
+        while pending:
+            rows, a, b = pending.pop()
+            if a.size > CHUNK:
+                pending.append((rows, a[CHUNK:], b[CHUNK:]))
+            fine, rows, a, b = examine(a[:CHUNK], b[:CHUNK])
+            opened |= fine
+            if a.size:
+                pending.append((rows, a, b))
+            if best.used > most:
+                return done(np.any([opened, *(entry[0] for entry in pending)], axis=0))
+        centre, radius = view.tail(high)
+        one, end = np.array([1.0]), np.array([np.inf])
+        keep = kept(centre * one + 0j, 0j * one, radius * one, 0.0 * one, high * one, end)
+        if not keep.any():
+            return done(opened)
+        low, high = high, 4.0 * high
+        if high > 1e30 * view.corners.max():
+            return done(opened | keep[:, 0])
+        a, b = np.array([low]), np.array([high])
+
+
+def improve_free(best, omega, centre, radius, stable):
+    """Take in what the discs of L hold, with both arms' phases free."""
+    best.modulus = min(
+        best.modulus, float(np.maximum(np.abs(1.0 + centre) - radius, 0.0).min())
+    )
+    # (1 + L) / (1 - L) = 2 / (1 - L) - 1 takes the disc to a disc, or to the outside of one.
+    power = np.abs(1.0 - centre) ** 2 - radius**2
+    image, size = 2.0 * np.conj(1.0 - centre) / power - 1.0, 2.0 * radius / np.abs(power)
+    gap = np.where(power > 0.0, np.abs(image) - size, size - np.abs(image))
+    best.disk = min(best.disk, float(np.maximum(gap, 0.0).min()))
+    if not stable:
+        return
+    with np.errstate(all="ignore"):
+        cosine = (1.0 + np.abs(centre) ** 2 - radius**2) / (2.0 * np.abs(centre))
+    met = cosine <= 1.0
+    half = np.arccos(np.clip(cosine[met], -1.0, 1.0))
+    turn, omega = lag(centre[met]), omega[met]
+    nearest = np.maximum(np.minimum(turn, 2.0 * np.pi - turn) - half, 0.0)
+    best.phase = min(best.phase, float(nearest.min(initial=np.inf)))
+    first = np.where((turn > half) & (turn + half < 2.0 * np.pi), turn - half, 0.0)
+    best.delay = min(best.delay, float((first / omega).min(initial=np.inf)))
+    on_axis = np.abs(centre.imag) <= radius
+    half = np.sqrt(radius[on_axis] ** 2 - centre[on_axis].imag ** 2)
+    for left, right in zip(
+        centre[on_axis].real - half, centre[on_axis].real + half, strict=True
+    ):
+        if -1.0 < left < 0.0:
+            best.gain_upper = min(best.gain_upper, float(-1.0 / left))
+        if right < -1.0:
+            best.gain_lower = max(best.gain_lower, float(-1.0 / right))

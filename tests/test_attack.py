@@ -1,0 +1,29 @@
+"""A few of the random loops of `tests.attack`; `make attack` takes ten thousand."""
+
+import numpy as np
+import pytest
+
+from tests import attack
+
+
+def listed(tally):
+    return [(*entry[:1], entry[1][0], *entry[2:]) for entry in (*tally.wrong, *tally.refused)]
+
+
+@pytest.fixture(autouse=True)
+def quiet():
+    with np.errstate(all="ignore"):
+        yield
+
+
+def test_what_was_wrong_once_is_right():
+    tally = attack.Tally(patient=False)
+    attack.attack_fixed(tally)
+    assert listed(tally) == []
+
+
+@pytest.mark.parametrize("kind", list(attack.CHECKS))
+def test_random_loops_agree_with_brute_force(kind):
+    tally = attack.attack(7, range(10), (kind,), attack.Tally(patient=False))
+    assert tally.calls.total() > tally.calls["loops"]
+    assert listed(tally) == []
