@@ -20,7 +20,7 @@ from armlock import (
     rightmost_root,
     unstable_roots,
 )
-from armlock.roots import extended_root, polish_root, pseudospectral_roots
+from armlock.roots import extended_root, pseudospectral_roots
 from armlock.semidiscretization import semi_discretization
 from tests import independent
 from tests.systems import RETARDED
@@ -74,6 +74,8 @@ def test_sign_agrees_with_the_count(gain, tau1, tau2, c1, c2):
 def test_root_is_a_zero_and_the_rightmost_of_an_independent_spectrum(gain, tau1, tau2, c1, c2):
     system = CommonArm(gain, tau1, tau2)
     assume(min(abs(c1), abs(c2)) > 0.05)
+    # Delayed terms that cancel leave no spectrum to collocate.
+    assume(tau1 != tau2 or abs(c1 + c2) > 0.05)
     root = rightmost_root(system, c1, c2)
     parts = np.abs(system.parts(root)) * [1.0, abs(c1), abs(c2)]
     assert abs(independent.value(system, root, c1, c2)) <= 1e-12 * (parts.sum() + abs(root))
