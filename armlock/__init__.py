@@ -2,17 +2,7 @@
 
 The reproducible companion to "Robustness Analysis and Controller Design of Arm-locking
 System in Space-based Gravitational Wave Detectors".
-
-The loops over points and rows run on all cores. Spread over processes of one's own they are
-best started with the method "spawn" or "forkserver" (`armlock.rays.sweep` has an example):
-the threads of a process do not survive a fork, and a forked process works on one core.
 """
-
-import os
-
-# Waiting threads of the compiled loops sleep instead of spinning, which on a busy machine
-# slows everything else down. It must be set before numba starts its threads.
-os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 from armlock.characteristic import CharacteristicFunction
 from armlock.controllers import Controller

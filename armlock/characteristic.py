@@ -2,11 +2,12 @@
 
 Whatever the sensor and the controller, clearing denominators of 1 + L(s) leaves
 
-    D(s; x, y) = A(s) - x B1(s) exp(-s delay1) - y B2(s) exp(-s delay2)
+    D(s; x, y) = R + exp(-s delay) [ B1 (x0 - x exp(-s delay1)) + B2 (y0 - y exp(-s delay2)) ]
 
-with real polynomials A, B1, B2: affine in the two free parameters. It is kept as what it is
-at a reference point plus the deviation from there, because near the ideal point (1, 1) of an
-arm-locking loop A, B1 and B2 are many orders of magnitude larger than what remains of them.
+with real polynomials R, B1, B2 of s: affine in the two free parameters x and y. The dead time
+`delay` is zero unless the loop has one. The constants x0 and y0 are the parameters at which
+the brackets vanish with s, (1, 1) for an arm-locking loop. Written in this way, no large terms
+cancel near that point.
 
 The semi-discretized loop has the same form with polynomials in z = exp(s step)
 instead of s, so that both are one class here and one set of algorithms above.
@@ -27,135 +28,192 @@ from armlock.checks import (
     axis,
     broadcast_shape,
     complex_array,
-    positive_number,
     real_array,
     real_number,
 )
 
+EPSILON = 2.0**-52
+#: Up to this degree a polynomial is evaluated from its coefficients, beyond from its roots.
+LOW_DEGREE = 20
 # Past this an exponential is no float.
 _LARGEST_EXPONENT = 700.0
 
 
-class ExponentialSum(NamedTuple):
-    r"""A function sum_g P_g(omega) exp(j omega phase_g) on the stability boundary.
+class Polynomial(NamedTuple):
+    """A real polynomial of s: its coefficients in ascending powers, and its roots."""
 
-    With phase rates :math:`\alpha_g` it is
+    coefficients: FloatArray
+    roots: ComplexArray
+
+    @classmethod
+    def of(cls, coefficients: FloatArray) -> Polynomial:
+        """Return the polynomial with these coefficients."""
+        return cls(coefficients, poly.polyroots(coefficients).astype(np.complex128))
+
+    def over(self, other: Polynomial, s: ComplexArray) -> ComplexArray:
+        """Evaluate p(s) / q(s), factor by factor."""
+        value = np.full(s.shape, self.coefficients[-1] / other.coefficients[-1], dtype=complex)
+        # In turn, so that the product neither overflows nor underflows on the way.
+        for k in range(max(self.roots.size, other.roots.size)):
+            if k < self.roots.size:
+                value *= s - self.roots[k]
+            if k < other.roots.size:
+                value /= s - other.roots[k]
+        return value
+
+    def times_conjugate(self, other: Polynomial) -> Polynomial:
+        """Return p q*, where q*(j omega) is the complex conjugate of q(j omega)."""
+        # The coefficients are real: q*(s) = q(-s).
+        signs = (-1.0) ** np.arange(other.coefficients.size)
+        with np.errstate(over="ignore", invalid="ignore"):
+            product = np.convolve(self.coefficients, signs * other.coefficients)
+        return Polynomial(product, np.concatenate((self.roots, -other.roots)))
+
+
+class ExponentialSum(NamedTuple):
+    r"""A function of s = j omega: polynomials times exponentials, added up.
+
+    With polynomials p_k and phase rates :math:`\alpha_g` it is
 
     .. math::
 
-        f(\omega) &= \sum_g P_g(\omega)\, e^{\mathrm{j}\omega\alpha_g} \\
-        &= \sum_g P_g(\omega)
-        + \sum_g P_g(\omega) \left( e^{\mathrm{j}\omega\alpha_g} - 1 \right) ,
+        f(\omega) &= \sum_g \sum_k w_{gk}\, p_k\, e^{\mathrm{j}\omega\alpha_g} \\
+        &= \sum_k W_k\, p_k
+        + \sum_g \sum_k w_{gk}\, p_k \left( e^{\mathrm{j}\omega\alpha_g} - 1 \right) ,
 
     and the second form is the one that is evaluated.
 
     Attributes
     ----------
-    coefficients : complex array, shape (groups, degree + 1)
-        Polynomials in omega, ascending powers.
+    polynomials : tuple of Polynomial
+        The p_k.
+    weights : float array, shape (groups, polynomials)
+        The w_gk.
     phases : float array, shape (groups,)
         Phase rates, in s.
-    sums : complex array, shape (degree + 1,)
-        The sum of all P_g. It is carried along, and not summed up, because the P_g may
-        cancel to many digits.
+    sums : float array, shape (polynomials,)
+        The W_k, the sums of the weights over all groups. They are carried along, and not
+        summed up, because the weights may cancel to many digits.
     """
 
-    coefficients: ComplexArray
+    polynomials: tuple[Polynomial, ...]
+    weights: FloatArray
     phases: FloatArray
-    sums: ComplexArray
+    sums: FloatArray
 
     def times_conjugate(self, other: ExponentialSum) -> ExponentialSum:
         """Return this sum times the complex conjugate of `other`, at real omega."""
-        sums = np.convolve(self.sums, other.sums.conj())
-        size = max(self.coefficients.shape[1] + other.coefficients.shape[1] - 1, sums.size)
-        rows: dict[float, ComplexArray] = {}
-        for p, phase in zip(self.coefficients, self.phases, strict=True):
-            for q, other_phase in zip(other.coefficients, other.phases, strict=True):
-                product = np.convolve(p, q.conj())
-                row = rows.setdefault(phase - other_phase, np.zeros(size, dtype=np.complex128))
-                row[: product.size] += product
-        return ExponentialSum(
-            np.array(list(rows.values())),
-            np.array(list(rows)),
-            np.pad(sums, (0, size - sums.size)),
+        products = tuple(
+            p.times_conjugate(q) for p in self.polynomials for q in other.polynomials
         )
-
-    def at(self, omega: FloatArray) -> ComplexArray:
-        """Evaluate the sum at real frequencies in rad/s; shaped like `omega`."""
-        omega = np.asarray(omega, dtype=np.float64)
-        value = poly.polyval(omega, self.sums)
-        for p, phase in zip(self.coefficients, self.phases, strict=True):
-            if phase:
-                value = value + poly.polyval(omega, p) * np.expm1(1j * omega * phase)
-        return np.asarray(value, dtype=np.complex128)
+        pairs = [
+            (np.outer(w, v).ravel(), phase - other_phase)
+            for w, phase in zip(self.weights, self.phases, strict=True)
+            for v, other_phase in zip(other.weights, other.phases, strict=True)
+        ]
+        phases = np.array(sorted({phase for _, phase in pairs}))
+        weights = np.zeros((phases.size, len(products)))
+        for weight, phase in pairs:
+            weights[np.searchsorted(phases, phase)] += weight
+        return ExponentialSum(
+            products, weights, phases, np.outer(self.sums, other.sums).ravel()
+        )
 
     def scaled(self, weight: float) -> ExponentialSum:
         """Return this sum times a number."""
-        return ExponentialSum(weight * self.coefficients, self.phases, weight * self.sums)
+        return self._replace(weights=weight * self.weights, sums=weight * self.sums)
 
     def plus(self, other: ExponentialSum) -> ExponentialSum:
-        """Return this sum plus another one, over the groups of both."""
-        size = max(
-            self.sums.size,
-            other.sums.size,
-            self.coefficients.shape[1],
-            other.coefficients.shape[1],
+        """Return this sum plus another one of the same polynomials, over the groups of both."""
+        return ExponentialSum(
+            self.polynomials,
+            np.concatenate((self.weights, other.weights)),
+            np.concatenate((self.phases, other.phases)),
+            self.sums + other.sums,
         )
 
-        def padded(p: ComplexArray) -> ComplexArray:
-            return np.pad(p, [(0, 0)] * (p.ndim - 1) + [(0, size - p.shape[-1])])
+    def turned(self) -> ExponentialSum:
+        """Return this sum times j, whose imaginary part is the real part of this one."""
+        return self._replace(weights=1j * self.weights, sums=1j * self.sums)
 
-        return ExponentialSum(
-            np.concatenate((padded(self.coefficients), padded(other.coefficients))),
-            np.concatenate((self.phases, other.phases)),
-            padded(self.sums) + padded(other.sums),
+    def compiled(self) -> tuple[Any, ...]:
+        """Return the polynomials as `armlock.contour` takes them.
+
+        Coefficients in powers of omega, shape (polynomials, degree + 1), without rows where a
+        degree exceeds `LOW_DEGREE`; real roots and the upper halves of pairs, polynomial after
+        polynomial; where each one's begin; and the highest coefficients.
+        """
+        degree = max(p.coefficients.size for p in self.polynomials) - 1
+        kept = [np.sort_complex(p.roots[p.roots.imag >= 0.0]) for p in self.polynomials]
+        whole = np.zeros((len(self.polynomials), degree + 1), dtype=np.complex128)
+        # Powers of j, so that each coefficient stays exactly real or exactly imaginary.
+        turns = np.array([1.0, 1.0j, -1.0, -1.0j])[np.arange(degree + 1) % 4]
+        for row, p in zip(whole, self.polynomials, strict=True):
+            size = p.coefficients.size
+            row.real[:size] = p.coefficients * turns.real[:size]
+            row.imag[:size] = p.coefficients * turns.imag[:size]
+        return (
+            whole if degree <= LOW_DEGREE else whole[:0],
+            np.concatenate(kept),
+            np.cumsum([0, *(roots.size for roots in kept)]),
+            np.array([p.coefficients[-1] for p in self.polynomials]),
         )
 
 
 class CharacteristicFunction:
-    r"""D(s; x, y) = A - x B1 exp(-s delay1) - y B2 exp(-s delay2).
-
-    It is kept as its value R at a reference point, and the deviation from there:
+    r"""A characteristic function that is affine in two free parameters x and y.
 
     .. math::
 
-        D(s; x, y) &= A - x\, B_1 e^{-s\theta_1} - y\, B_2 e^{-s\theta_2} \\
-        &= R + B_1 \left( x_0 - x\, e^{-s\theta_1} \right) \\
-        &\quad + B_2 \left( y_0 - y\, e^{-s\theta_2} \right) , \\
-        A &= R + x_0 B_1 + y_0 B_2 ,
+        D(s; x, y) = R + e^{-s\delta} \left[ B_1 \left( x_0 - x\, e^{-s\theta_1} \right)
+        + B_2 \left( y_0 - y\, e^{-s\theta_2} \right) \right]
 
-    with polynomials A, B1, B2 and R of s, and delays :math:`\theta_1, \theta_2`.
+    with polynomials R, B1 and B2 of s, a dead time :math:`\delta` and delays
+    :math:`\theta_1, \theta_2`. Sorted by delays it is
+
+    .. math::
+
+        D(s; x, y) = A + C\, e^{-s\delta} - x\, B_1 e^{-s(\delta + \theta_1)}
+        - y\, B_2 e^{-s(\delta + \theta_2)} ,
+
+    where C = x0 B1 + y0 B2 and A = R. Without a dead time C counts as a part of A.
 
     Parameters
     ----------
     rest, b1, b2 : sequence of float
-        Polynomial coefficients in ascending powers of s (of z = exp(s step) for a map).
-        With the reference at (0, 0), `rest` is A itself.
+        Coefficients of R, B1 and B2 in ascending powers of s (of z = exp(s step) for a map).
     delay1, delay2 : float
         Delays in s, zero or positive.
+    delay : float, optional
+        Dead time in s, zero or positive.
     step : float, optional
         Zero (default) for polynomials in s; the sampling step in s for a map, which must
-        divide both delays.
+        divide all delays.
     parameters : pair of str, optional
         Names of the two free parameters, used in messages and on axes.
     reference : pair of float, optional
-        The point (x0, y0) at which D is `rest` when both delays are left out, so that
-        A = rest + x0 B1 + y0 B2. For a loop it is (1, 1), and `rest` the denominator of L.
+        The constants (x0, y0); (1, 1) for a loop, where R is the denominator of L.
+
+    Attributes
+    ----------
+    a, c : float array
+        The coefficients of A and C above; c is zero without a dead time.
 
     Raises
     ------
     TypeError, ValueError
         If a coefficient is not finite and real, a delay is negative or not a whole number of
-        steps, A is zero, or B1 or B2 has a higher degree than A (an advanced equation has no
-        stable region).
+        steps, A is zero, or another term has a higher degree than A (an advanced equation has
+        no stable region).
 
     Notes
     -----
     It cannot be changed once it is made, because results are kept with it; its arrays are
     read-only.
 
-    The loop is of *retarded* type if B1 and B2 are of lower degree than A, and of *neutral*
-    type (`neutral` is true) if one of them reaches it.
+    The equation is of *retarded* type if all delayed terms are of lower degree than A, and of
+    *neutral* type (`neutral` is true) if one of them reaches it. The roots of a neutral
+    equation at high frequency form the *neutral root chain*, see `chain_reserve`.
 
     Examples
     --------
@@ -176,6 +234,7 @@ class CharacteristicFunction:
         delay1: float,
         delay2: float,
         *,
+        delay: float = 0.0,
         step: float = 0.0,
         parameters: tuple[str, str] = ("x", "y"),
         reference: tuple[float, float] = (0.0, 0.0),
@@ -187,32 +246,41 @@ class CharacteristicFunction:
         if pair.size != 2:
             raise ValueError(f"reference must hold two numbers, got {pair.size}")
         self.reference = (float(pair[0]), float(pair[1]))
-        at_reference = poly.polyadd(self.reference[0] * self.b1, self.reference[1] * self.b2)
-        self.a = _polynomial("a", np.asarray(poly.polyadd(self.rest, at_reference)))
-        self.delay1 = _delay("delay1", delay1)
-        self.delay2 = _delay("delay2", delay2)
-        self.step = _step(step)
+        self.delay = _not_negative("delay", delay)
+        self.delay1 = _not_negative("delay1", delay1)
+        self.delay2 = _not_negative("delay2", delay2)
+        self.step = _not_negative("step", step)
         if self.step:
-            for name, delay in (("delay1", self.delay1), ("delay2", self.delay2)):
-                whole_steps(name, delay, self.step)
+            for name in ("delay", "delay1", "delay2"):
+                whole_steps(name, getattr(self, name), self.step)
         self.parameters = _names(parameters)
+        c = poly.polyadd(self.reference[0] * self.b1, self.reference[1] * self.b2)
+        if self.delay == 0.0:
+            self.a = _polynomial("a", np.asarray(poly.polyadd(self.rest, c)))
+            self.c = _polynomial("c", [0.0])
+        else:
+            self.a, self.c = self.rest, _polynomial("c", np.asarray(c))
         if not self.a.any():
             raise ValueError(
-                f"A = rest + {self.reference[0]} B1 + {self.reference[1]} B2 must not vanish, "
-                f"got rest={self.rest.tolist()}"
+                f"A, the term without a delay, must not vanish, got rest={self.rest.tolist()}"
             )
-        for name, b in (("b1", self.b1), ("b2", self.b2)):
+        for name, b in (("b1", self.b1), ("b2", self.b2), ("c", self.c)):
             if b.size > self.a.size:
                 raise ValueError(
                     f"{name} must not exceed the degree of A ({self.degree}), "
                     f"got degree {b.size - 1}: the equation would be of advanced type"
                 )
-        for name, b, delay in (("b1", self.b1, self.delay1), ("b2", self.b2, self.delay2)):
-            if delay == 0.0 and b.size == self.a.size > 1 and not self.step:
+        for name, b, lag in (("b1", self.b1, self.delay1), ("b2", self.b2, self.delay2)):
+            if lag + self.delay == 0.0 and b.size == self.a.size and not self.step:
                 raise ValueError(
                     f"{name} without a delay must be of lower degree than A ({self.degree}), "
                     f"or its parameter would change the order of the equation"
                 )
+        if self.degree == 0 and not self.step:
+            raise ValueError(
+                "rest must be at least of first degree: an equation of order zero has nothing "
+                f"but its neutral root chain, got rest={self.rest.tolist()}"
+            )
         self._sealed = True
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -243,24 +311,60 @@ class CharacteristicFunction:
     @property
     def neutral(self) -> bool:
         """Whether a delayed term is of the same order as A."""
-        return any(
-            b.size == self.a.size and delay > 0.0
-            for b, delay in ((self.b1, self.delay1), (self.b2, self.delay2))
-        )
+        if self.step:
+            return False
+        return any(b.size == self.a.size for b in (self.b1, self.b2, self.c))
 
     @property
-    def highest_coefficients(self) -> tuple[float, float, float]:
-        """Coefficients of the highest power of A in A, B1 and B2."""
+    def highest_coefficients(self) -> tuple[float, float, float, float]:
+        """Coefficients of the highest power of A in A, B1, B2 and C."""
+        a, b1, b2, c = (
+            float(p[-1]) if p.size == self.a.size else 0.0
+            for p in (self.a, self.b1, self.b2, self.c)
+        )
+        return a, b1, b2, c
 
-        def highest(p: FloatArray) -> float:
-            return float(p[-1]) if p.size == self.a.size else 0.0
+    def chain_reserve(self, x: npt.ArrayLike, y: npt.ArrayLike) -> FloatArray:
+        r"""How far the neutral root chain is from reaching the imaginary axis.
 
-        return highest(self.a), highest(self.b1), highest(self.b2)
+        At high frequency D is its highest power of s times
+
+        .. math::
+
+            a + c\, e^{-s\delta} - x\, b_1 e^{-s(\delta + \theta_1)}
+            - y\, b_2 e^{-s(\delta + \theta_2)} ,
+
+        with the highest coefficients of A, C, B1 and B2. The roots of this sum repeat along
+        the imaginary axis for ever: they are the neutral root chain. The chain stays in the
+        left half-plane, for these delays and for all small changes of them, where
+
+        .. math::
+
+            |a| > |c| + |x\, b_1| + |y\, b_2| .
+
+        Parameters
+        ----------
+        x, y : array_like of float
+            The free parameters; they broadcast.
+
+        Returns
+        -------
+        float array, of the broadcast shape
+            Left less right side over \|a\|, and zero where rounding hides the sign. Negative or
+            zero: the chain is not confined to the left half-plane. One for a retarded
+            equation and for a map, which has no such chain.
+        """
+        x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+        if self.step:
+            return np.ones(np.broadcast_shapes(x.shape, y.shape))
+        a, b1, b2, c = (abs(value) for value in self.highest_coefficients)
+        reserve = (a - c - np.abs(x) * b1 - np.abs(y) * b2) / a
+        return np.asarray(np.where(np.abs(reserve) <= 16.0 * EPSILON, 0.0, reserve))
 
     @property
     def longest_delay(self) -> float:
-        """The longer of the two delays, in s."""
-        return max(self.delay1, self.delay2)
+        """The longest time in s by which a term is delayed, dead time included."""
+        return self.delay + max(self.delay1, self.delay2)
 
     def __repr__(self) -> str:
         """Name the class and its arguments, as they are written to make it again."""
@@ -268,14 +372,19 @@ class CharacteristicFunction:
             f"{name}={np.asarray(getattr(self, name)).tolist()}"
             for name in ("rest", "b1", "b2", "delay1", "delay2")
         ]
-        defaults = {"step": 0.0, "parameters": ("x", "y"), "reference": (0.0, 0.0)}
+        defaults = {
+            "delay": 0.0,
+            "step": 0.0,
+            "parameters": ("x", "y"),
+            "reference": (0.0, 0.0),
+        }
         for name, default in defaults.items():
             if getattr(self, name) != default:
                 shown.append(f"{name}={getattr(self, name)!r}")
         return f"{type(self).__name__}({', '.join(shown)})"
 
     def parts(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Evaluate A, B1 exp(-s delay1) and B2 exp(-s delay2).
+        """Evaluate the three terms of D, which is the first less x, y times the others.
 
         Parameters
         ----------
@@ -285,6 +394,7 @@ class CharacteristicFunction:
         Returns
         -------
         tuple of three complex arrays, shaped like `s`
+            A + C exp(-s delay), B1 exp(-s (delay + delay1)) and B2 exp(-s (delay + delay2)).
 
         Raises
         ------
@@ -293,34 +403,12 @@ class CharacteristicFunction:
         """
         s = complex_array("s", s)
         z = np.exp(s * self.step) if self.step else s
+        dead = np.exp(-s * self.delay)
         return (
-            np.asarray(poly.polyval(z, self.a), dtype=np.complex128),
-            np.asarray(poly.polyval(z, self.b1) * np.exp(-s * self.delay1)),
-            np.asarray(poly.polyval(z, self.b2) * np.exp(-s * self.delay2)),
+            np.asarray(poly.polyval(z, self.a) + poly.polyval(z, self.c) * dead),
+            np.asarray(poly.polyval(z, self.b1) * np.exp(-s * self.delay1) * dead),
+            np.asarray(poly.polyval(z, self.b2) * np.exp(-s * self.delay2) * dead),
         )
-
-    def values_up_to_a_factor(
-        self, z: ComplexArray
-    ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Evaluate `rest`, B1 and B2 as polynomials, up to a factor that all three share.
-
-        A root does not depend on the factor, so that a subclass may divide by what rounding
-        would spoil.
-
-        Parameters
-        ----------
-        z : complex array
-            The frequency s, or exp(s step) for a map.
-
-        Returns
-        -------
-        tuple of three complex arrays, shaped like `z`
-        """
-        rest, b1, b2 = (
-            np.asarray(poly.polyval(z, p), dtype=np.complex128)
-            for p in (self.rest, self.b1, self.b2)
-        )
-        return rest, b1, b2
 
     def __call__(self, s: npt.ArrayLike, x: npt.ArrayLike, y: npt.ArrayLike) -> ComplexArray:
         """Evaluate D(s; x, y); the three arguments broadcast.
@@ -350,7 +438,8 @@ class CharacteristicFunction:
         b1, b2 = poly.polyval(z, self.b1), poly.polyval(z, self.b2)
         arm1 = (self.reference[0] - x) - x * np.expm1(-s * self.delay1)
         arm2 = (self.reference[1] - y) - y * np.expm1(-s * self.delay2)
-        result: ComplexArray = poly.polyval(z, self.rest) + b1 * arm1 + b2 * arm2
+        dead = np.exp(-s * self.delay)
+        result: ComplexArray = poly.polyval(z, self.rest) + dead * (b1 * arm1 + b2 * arm2)
         return result
 
     def derivative(self, s: npt.ArrayLike, x: npt.ArrayLike, y: npt.ArrayLike) -> ComplexArray:
@@ -358,9 +447,11 @@ class CharacteristicFunction:
 
         .. math::
 
-            \frac{\partial D}{\partial s} &= A'
-            - x \left( B_1' - \theta_1 B_1 \right) e^{-s\theta_1} \\
-            &\quad - y \left( B_2' - \theta_2 B_2 \right) e^{-s\theta_2}
+            \frac{\partial D}{\partial s} &= R' + e^{-s\delta} \sum_k \left[
+            \left( B_k' - \delta B_k \right) \left( x_{0k} - x_k\, e^{-s\theta_k} \right)
+            + x_k\, \theta_k B_k e^{-s\theta_k} \right]
+
+        with :math:`(x_1, x_2) = (x, y)`.
 
         Raises
         ------
@@ -377,16 +468,17 @@ class CharacteristicFunction:
         dz = self.step * z if self.step else np.ones_like(s)
 
         def term(
-            p: FloatArray, delay: float, start: float, here: float | FloatArray
+            p: FloatArray, lag: float, start: float, here: float | FloatArray
         ) -> ComplexArray:
-            arm = (start - here) - here * np.expm1(-s * delay)
-            change = here * delay * np.exp(-s * delay)
-            slope = poly.polyval(z, poly.polyder(p)) * dz
-            return np.asarray(slope * arm + poly.polyval(z, p) * change)
+            arm = (start - here) - here * np.expm1(-s * lag)
+            value = poly.polyval(z, p)
+            slope = poly.polyval(z, poly.polyder(p)) * dz - self.delay * value
+            return np.asarray(slope * arm + value * here * lag * np.exp(-s * lag))
 
-        result: ComplexArray = (
-            poly.polyval(z, poly.polyder(self.rest)) * dz
-            + term(self.b1, self.delay1, self.reference[0], x)
+        result: ComplexArray = poly.polyval(z, poly.polyder(self.rest)) * dz + np.exp(
+            -s * self.delay
+        ) * (
+            term(self.b1, self.delay1, self.reference[0], x)
             + term(self.b2, self.delay2, self.reference[1], y)
         )
         return result
@@ -415,12 +507,14 @@ class CharacteristicFunction:
             return _taylor_shift(p, sigma)
 
         # The reference moves along, so that nothing has to cancel in `rest`.
+        dead = np.exp(-sigma * self.delay)
         return CharacteristicFunction(
             move(self.rest),
-            np.exp(-sigma * self.delay1) * move(self.b1),
-            np.exp(-sigma * self.delay2) * move(self.b2),
+            dead * np.exp(-sigma * self.delay1) * move(self.b1),
+            dead * np.exp(-sigma * self.delay2) * move(self.b2),
             self.delay1,
             self.delay2,
+            delay=self.delay,
             step=self.step,
             parameters=self.parameters,
             reference=(
@@ -437,46 +531,81 @@ class CharacteristicFunction:
             self.b1,
             self.delay2,
             self.delay1,
+            delay=self.delay,
             step=self.step,
             parameters=self.parameters[::-1],
             reference=self.reference[::-1],
         )
 
+    def polynomials(self) -> tuple[Polynomial, Polynomial, Polynomial]:
+        """Return R, B1 and B2 with their roots."""
+        return Polynomial.of(self.rest), Polynomial.of(self.b1), Polynomial.of(self.b2)
+
     def on_boundary(self) -> tuple[ExponentialSum, ExponentialSum, ExponentialSum]:
-        """Return A, B1 and B2 (with their delays) at s = j omega as exponential sums."""
+        """Return the three terms of `parts` at s = j omega as exponential sums."""
+        x0, y0 = self.reference
+        lags = self.delay + self.delay1, self.delay + self.delay2
+        if self.step:
+            return self._of_map(lags)
+        polynomials = self.polynomials()
         return (
-            self._sum(self.a, 0.0),
-            self._sum(self.b1, self.delay1),
-            self._sum(self.b2, self.delay2),
+            ExponentialSum(
+                polynomials,
+                np.array([[1.0, 0.0, 0.0], [0.0, x0, y0]]),
+                np.array([0.0, -self.delay]),
+                np.array([1.0, x0, y0]),
+            ),
+            ExponentialSum(
+                polynomials,
+                np.array([[0.0, 1.0, 0.0]]),
+                np.array([-lags[0]]),
+                np.array([0.0, 1.0, 0.0]),
+            ),
+            ExponentialSum(
+                polynomials,
+                np.array([[0.0, 0.0, 1.0]]),
+                np.array([-lags[1]]),
+                np.array([0.0, 0.0, 1.0]),
+            ),
         )
+
+    def _of_map(
+        self, lags: tuple[float, float]
+    ) -> tuple[ExponentialSum, ExponentialSum, ExponentialSum]:
+        """`on_boundary` of a map: each power of z is an exponential, and the polynomial is 1."""
+        one = Polynomial(np.ones(1), np.zeros(0, dtype=np.complex128))
+
+        def term(p: FloatArray, lag: float) -> ExponentialSum:
+            phases = self.step * np.arange(p.size) - lag
+            return ExponentialSum((one,), p[:, None], phases, np.array([p.sum()]))
+
+        first = term(self.a, 0.0).plus(term(self.c, self.delay))
+        return first, term(self.b1, lags[0]), term(self.b2, lags[1])
 
     def at(self, x: float, y: float) -> ExponentialSum:
         """Return D(j omega; x, y) at one point as an exponential sum."""
-        _, b1, b2 = self.on_boundary()
-        # Delays left out, `deviation` is what the point adds to `rest`.
-        deviation = b1.scaled(self.reference[0] - x).plus(b2.scaled(self.reference[1] - y))
-        combined = self._sum(self.a, 0.0).plus(b1.scaled(-x)).plus(b2.scaled(-y))
-        return combined._replace(sums=self.rest_on_boundary().plus(deviation).sums)
+        x0, y0 = self.reference
+        undelayed, b1, b2 = self.on_boundary()
+        combined = undelayed.plus(b1.scaled(-x)).plus(b2.scaled(-y))
+        # What is left where all exponentials are one, without the digits lost by cancelling.
+        left = self.rest_on_boundary().sums + (x0 - x) * b1.sums + (y0 - y) * b2.sums
+        return combined._replace(sums=left)
 
     def deviation(self, x: float, y: float) -> ExponentialSum:
-        """Return x B1 exp(-s delay1) + y B2 exp(-s delay2) at s = j omega."""
+        """Return what x and y take off D at s = j omega, as an exponential sum."""
         _, b1, b2 = self.on_boundary()
         return b1.scaled(x).plus(b2.scaled(y))
 
     def rest_on_boundary(self) -> ExponentialSum:
         """Return `rest` at s = j omega as an exponential sum."""
-        return self._sum(self.rest, 0.0)
-
-    def _sum(self, p: FloatArray, delay: float) -> ExponentialSum:
-        """Return p exp(-s delay) at s = j omega as an exponential sum."""
+        undelayed, _, _ = self.on_boundary()
         if self.step:
-            rates = np.asarray(self.step * np.arange(p.size) - delay, dtype=np.float64)
-            terms = p[:, None].astype(np.complex128)
-            return ExponentialSum(terms, rates, terms.sum(axis=0))
-        powers = 1j ** (np.arange(p.size) % 4)
-        # Each coefficient is kept exactly real or exactly imaginary.
-        powers = np.round(powers.real) + 1j * np.round(powers.imag)
-        return ExponentialSum((p * powers)[None, :], np.array([-delay]), p * powers)
+            phases = self.step * np.arange(self.rest.size)
+            return undelayed._replace(
+                weights=self.rest[:, None], phases=phases, sums=np.array([self.rest.sum()])
+            )
+        only = np.array([1.0, 0.0, 0.0])
+        return undelayed._replace(weights=only[None, :], phases=np.zeros(1), sums=only)
 
 
 def whole_steps(name: str, delay: float, step: float) -> int:
@@ -525,18 +654,12 @@ def _names(value: tuple[str, str]) -> tuple[str, str]:
     return names[0], names[1]
 
 
-def _step(value: float) -> float:
-    """Return a finite step that is zero or positive."""
-    step = real_number("step", value)
-    return 0.0 if step == 0.0 else positive_number("step", step)
-
-
-def _delay(name: str, value: float) -> float:
-    """Return a finite delay that is zero or positive."""
-    delay = real_number(name, value)
-    if delay < 0.0:
-        raise ValueError(f"{name} must not be negative, got {delay}")
-    return delay
+def _not_negative(name: str, value: float) -> float:
+    """Return a finite number that is zero or positive."""
+    number = real_number(name, value)
+    if number < 0.0:
+        raise ValueError(f"{name} must not be negative, got {number}")
+    return number
 
 
 __all__ = ["CharacteristicFunction", "ExponentialSum", "checked_system", "whole_steps"]

@@ -1,7 +1,7 @@
-"""Compiled walks along the stability boundary s = j omega.
+"""Compiled walks along the boundary of stability, s = j omega.
 
-Both walks take steps that are certified, not chosen: with a bound M on the second
-derivative over a step, the function stays within M step^2 / 2 of its tangent. So
+The walks take steps that are certified, not chosen. With a bound M on the second derivative
+over a step, a function stays within M step^2 / 2 of its tangent. So
 
 - `winding` never steps past the origin on the wrong side, and the argument it adds up is
   exact up to rounding;
@@ -9,24 +9,28 @@ derivative over a step, the function stays within M step^2 / 2 of its tangent. S
 
 Where rounding makes a value indistinguishable from zero, the walks say so.
 
-All functions here work on exponential sums sum_g P_g(omega) exp(j omega phase_g), see
-`armlock.characteristic.ExponentialSum`. They are evaluated as
-sum_g P_g + sum_g P_g (exp(j omega phase_g) - 1) with the first sum given, which keeps its
-relative accuracy where the undelayed parts cancel, as they do at (c1, c2) = (1, 1) and low
-frequency.
+All functions here work on exponential sums, see `armlock.characteristic.ExponentialSum`:
+
+    f(omega) = sum_k sums_k p_k + sum_g sum_k weights_gk p_k (exp(j omega phase_g) - 1)
+
+with polynomials p_k of s = j omega. Polynomials of low degree are one expansion in powers of
+omega. Those of high degree are expanded anew in each *piece* of the axis, from their roots:
+over many decades of frequency one expansion would lose its digits.
 """
 
 from __future__ import annotations
 
-import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import config, njit
 
+from armlock.characteristic import EPSILON, LOW_DEGREE
 from armlock.checks import BoolArray, ComplexArray, FloatArray, IntArray
 
-EPSILON = 2.0**-52
 # Rounding errors of one evaluation, in units of EPSILON times the sum of magnitudes.
 ROUNDING = 8.0
 # The same for the crossings of a chart's row: wider, so that what is a boundary point by
@@ -35,7 +39,8 @@ CAUTION = 8.0 * ROUNDING
 # Share of a certified bound that a step may use up.
 SAFETY = 0.95
 
-# Status codes of `count_points`, below every count.
+# What `count_point` returns where it is no number of roots. The first two mean what
+# `armlock.stability.unstable_roots` says; the others become errors there.
 BOUNDARY = -1
 UNCONFINED = -2
 DOUBTFUL = -3
@@ -44,59 +49,216 @@ UNTRIED = -5
 
 # Most steps of one walk, about ten a turn of the longest delay: some ten seconds.
 MOST_STEPS = 50_000_000
-# Most zeros and samples that a walk keeps: about a gigabyte.
+# Most zeros that a walk keeps: about a gigabyte.
 MOST_ZEROS = 30_000_000
+# Most samples of a grid.
 MOST_SAMPLES = 10_000_000
-# Products below this have lost digits, and are about to vanish.
-_TINY = 1e-280
-
-# Whether this process was forked: GNU OpenMP ends a forked process that starts its threads
-# again, so that the loops over points and rows run on one core there.
-_forked = False
+# How many roots, each weighed by reach / (reach + distance), a piece may have around it. Then
+# LOW_DEGREE powers hold its polynomials to rounding.
+_CROWD = 1.5
 
 
-def _note_fork() -> None:
-    global _forked
-    _forked = True
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_note_fork)
-
-
-@njit(cache=True, inline="always")
-def _real_horner(p: FloatArray, omega: float) -> float:
+@njit(cache=True)
+def real_horner(p: FloatArray, u: float) -> float:
+    """Value of a real polynomial with ascending coefficients."""
     value = 0.0
     for k in range(p.size - 1, -1, -1):
-        value = value * omega + p[k]
+        value = value * u + p[k]
     return value
 
 
 @njit(cache=True)
-def _evaluate(
-    coefficients: ComplexArray, sums: ComplexArray, phases: FloatArray, omega: float
+def _from_roots(
+    roots: ComplexArray, starts: IntArray, leads: FloatArray, omega: float, reach: float
+) -> tuple[ComplexArray, FloatArray, FloatArray]:
+    """Expand polynomials about j omega, in powers of u = (change of omega) / reach.
+
+    Polynomial k has the highest coefficient leads[k], and its real roots and the upper halves
+    of its pairs are roots[starts[k] : starts[k + 1]]. All are divided by one power of two.
+    Returns the coefficients and their magnitudes for rounding, shape (k, LOW_DEGREE + 1), and
+    bounds on what the higher powers add up to where 0 <= u <= 1.
+    """
+    size = LOW_DEGREE + 1
+    found = np.zeros((leads.size, size), dtype=np.complex128)
+    sizes = np.zeros((leads.size, size))
+    left_out = np.zeros(leads.size)
+    exponents = np.zeros(leads.size, dtype=np.int64)
+    largest = -(1 << 60)
+    for k in range(leads.size):
+        found[k, 0], sizes[k, 0], total = leads[k], abs(leads[k]), abs(leads[k])
+        for i in range(starts[k], starts[k + 1]):
+            root = roots[i]
+            below = 1j * omega - root
+            q0, q1, q2 = below, 1j * reach, 0j
+            m0, m1, m2 = abs(below), reach, 0.0
+            if root.imag != 0.0:
+                above = 1j * omega - root.conjugate()
+                q0, q1, q2 = below * above, 1j * reach * (below + above), complex(-(reach**2))
+                m0, m1 = abs(below) * abs(above), reach * (abs(below) + abs(above))
+                m2 = reach * reach
+            total *= m0 + m1 + m2
+            scale = 1.0
+            if total > 1e60 or 0.0 < total < 1e-60:
+                exponent = int(np.floor(np.log2(total)))
+                exponents[k] += exponent
+                scale = 2.0**-exponent
+                total *= scale
+            for m in range(size - 1, -1, -1):
+                new, most = q0 * found[k, m], m0 * sizes[k, m]
+                if m > 0:
+                    new, most = new + q1 * found[k, m - 1], most + m1 * sizes[k, m - 1]
+                if m > 1:
+                    new, most = new + q2 * found[k, m - 2], most + m2 * sizes[k, m - 2]
+                found[k, m], sizes[k, m] = scale * new, scale * most
+        factors = starts[k + 1] - starts[k]
+        held = 0.0
+        for m in range(size):
+            held += sizes[k, m]
+            # The products above round, too.
+            sizes[k, m] *= 1.0 + 0.5 * factors
+        left_out[k] = max(total - held, 0.0) + factors * EPSILON * total
+        largest = max(largest, exponents[k])
+    for k in range(leads.size):
+        scale = 2.0 ** max(exponents[k] - largest, -1000)
+        left_out[k] *= scale
+        for m in range(size):
+            found[k, m] *= scale
+            sizes[k, m] *= scale
+    return found, sizes, left_out
+
+
+@njit(cache=True)
+def _reach(roots: ComplexArray, omega: float, longest: float) -> float:
+    """Length of a piece from omega on that the expansion from roots holds."""
+    reach = longest
+    while True:
+        crowd = 0.0
+        for root in roots:
+            for distance in (abs(1j * omega - root), abs(1j * omega - root.conjugate())):
+                if distance > 0.0:
+                    crowd += reach / (reach + distance)
+                if root.imag == 0.0:
+                    break
+        if crowd <= _CROWD:
+            return reach
+        reach *= 0.5
+
+
+@njit(cache=True)
+def _shifted(
+    whole: ComplexArray, omega: float, reach: float
+) -> tuple[ComplexArray, FloatArray, FloatArray]:
+    """Expand polynomials in omega about another omega; see `_from_roots`."""
+    found, sizes = whole.copy(), np.abs(whole)
+    for k in range(whole.shape[0]):
+        if omega == 0.0 and reach == 1.0:
+            break
+        for i in range(whole.shape[1] - 1):
+            for m in range(whole.shape[1] - 2, i - 1, -1):
+                found[k, m] += omega * found[k, m + 1]
+                sizes[k, m] += omega * sizes[k, m + 1]
+        scale = 1.0
+        for m in range(whole.shape[1]):
+            found[k, m] *= scale
+            sizes[k, m] *= scale
+            scale *= reach
+    return found, sizes, np.zeros(whole.shape[0])
+
+
+@njit(cache=True)
+def piece(
+    polynomials: tuple[Any, ...],
+    weights: FloatArray,
+    sums: FloatArray,
+    omega: float,
+    longest: float,
+) -> tuple[float, float, ComplexArray, FloatArray]:
+    """Expand an exponential sum over the piece of the axis that starts at omega.
+
+    `polynomials` is what `armlock.characteristic.compiled` makes of them; weights, shape
+    (groups, k), and sums, shape (k,), are those of the sum. A piece is no longer than
+    `longest`; if that is infinite, polynomials of low degree are one piece from zero on.
+    Returns `start` and `reach`, with u = (omega - start) / reach from 0 to 1 over the piece;
+    the coefficients in powers of u of the sum, then of each group, shape (1 + groups, n); and
+    magnitudes for rounding, shape (1 + groups, n + 1), the last one for what is left out.
+    """
+    whole, roots, starts, leads = polynomials
+    start, reach = omega, longest
+    if whole.shape[0] == 0:
+        reach = _reach(roots, omega, min(longest, 1e300))
+        coefficients, magnitudes, left_out = _from_roots(roots, starts, leads, start, reach)
+    else:
+        if longest == np.inf:
+            start, reach = 0.0, 1.0
+        coefficients, magnitudes, left_out = _shifted(whole, start, reach)
+    number, size = coefficients.shape
+    groups = weights.shape[0]
+    local = np.zeros((1 + groups, size), dtype=np.complex128)
+    sizes = np.zeros((1 + groups, size + 1))
+    for g in range(1 + groups):
+        for k in range(number):
+            weight = sums[k] if g == 0 else weights[g - 1, k]
+            if weight != 0.0:
+                for m in range(size):
+                    local[g, m] += weight * coefficients[k, m]
+                    sizes[g, m] += abs(weight) * magnitudes[k, m]
+                sizes[g, size] += abs(weight) * left_out[k] / EPSILON
+    if reach == 1.0 and start == 0.0:
+        return start, reach, local, sizes
+    # Powers that rounding hides are not worth their time.
+    total = 0.0
+    for g in range(1 + groups):
+        for m in range(size):
+            total += sizes[g, m]
+    used, dropped = size, 0.0
+    while used > 1:
+        for g in range(1 + groups):
+            dropped += sizes[g, used - 1]
+        if dropped > 1e-3 * EPSILON * total:
+            break
+        used -= 1
+    kept = np.zeros((1 + groups, used + 1))
+    shorter = np.zeros((1 + groups, used), dtype=np.complex128)
+    for g in range(1 + groups):
+        kept[g, used] = sizes[g, size]
+        for m in range(size):
+            if m < used:
+                kept[g, m], shorter[g, m] = sizes[g, m], local[g, m]
+            else:
+                kept[g, used] += sizes[g, m] / EPSILON
+    return start, reach, shorter, kept
+
+
+@njit(cache=True)
+def evaluate(
+    start: float, reach: float, local: ComplexArray, phases: FloatArray, omega: float
 ) -> tuple[complex, complex]:
-    """Value and derivative of an exponential sum; `sums` holds the sum over its groups.
+    """Value and derivative of an exponential sum within a piece.
 
     Real and imaginary parts apart, since omega is real: this is the innermost loop.
     """
-    size = sums.size
+    size = local.shape[1]
+    u = (omega - start) / reach
     value_re, value_im, slope_re, slope_im = 0.0, 0.0, 0.0, 0.0
     for k in range(size - 1, -1, -1):
-        slope_re = slope_re * omega + value_re
-        slope_im = slope_im * omega + value_im
-        value_re = value_re * omega + sums[k].real
-        value_im = value_im * omega + sums[k].imag
+        slope_re = slope_re * u + value_re
+        slope_im = slope_im * u + value_im
+        value_re = value_re * u + local[0, k].real
+        value_im = value_im * u + local[0, k].imag
+    slope_re /= reach
+    slope_im /= reach
     for g in range(phases.size):
         phase = phases[g]
         if phase == 0.0:
             continue
         p_re, p_im, dp_re, dp_im = 0.0, 0.0, 0.0, 0.0
         for k in range(size - 1, -1, -1):
-            dp_re = dp_re * omega + p_re
-            dp_im = dp_im * omega + p_im
-            p_re = p_re * omega + coefficients[g, k].real
-            p_im = p_im * omega + coefficients[g, k].imag
+            dp_re = dp_re * u + p_re
+            dp_im = dp_im * u + p_im
+            p_re = p_re * u + local[g + 1, k].real
+            p_im = p_im * u + local[g + 1, k].imag
+        dp_re /= reach
+        dp_im /= reach
         half = 0.5 * phase * omega
         sine, cosine = np.sin(half), np.cos(half)
         # exp(j omega phase) - 1, and phase times exp(j omega phase).
@@ -110,7 +272,7 @@ def _evaluate(
 
 
 @njit(cache=True)
-def _tangent_distance(value: complex, slope: complex, step: float) -> float:
+def tangent_distance(value: complex, slope: complex, step: float) -> float:
     """Smallest distance from zero of the tangent over a step."""
     speed = slope.real * slope.real + slope.imag * slope.imag
     approach = -(value.real * slope.real + value.imag * slope.imag)
@@ -121,146 +283,137 @@ def _tangent_distance(value: complex, slope: complex, step: float) -> float:
 
 
 @njit(cache=True)
-def _curvature_bound(
-    coefficients: ComplexArray, sums: ComplexArray, phases: FloatArray
+def curvature_bound(
+    start: float, reach: float, local: ComplexArray, phases: FloatArray
 ) -> FloatArray:
-    """Polynomial in omega that bounds the second derivative of an exponential sum.
+    """Polynomial in u that bounds the second derivative of an exponential sum in a piece.
 
-    Where the polynomials are differentiated twice, |exp(j omega phase) - 1| is at most
-    omega |phase|, once at most |phase|.
+    Where a polynomial is differentiated twice, |exp(j omega phase) - 1| is at most
+    |phase| (start + reach u), and at most 2.
     """
-    groups, size = coefficients.shape
+    groups, size = local.shape
     bound = np.zeros(size)
     for k in range(2, size):
-        bound[k - 2] += abs(sums[k]) * k * (k - 1.0)
-    for g in range(groups):
-        phase = abs(phases[g])
+        bound[k - 2] += abs(local[0, k]) * k * (k - 1.0) / reach**2
+    for g in range(1, groups):
+        phase = abs(phases[g - 1])
+        begun = min(phase * start, 2.0)
         for k in range(size):
-            magnitude = abs(coefficients[g, k])
+            magnitude = abs(local[g, k])
             bound[k] += magnitude * phase * phase
             if k >= 1:
-                bound[k - 1] += magnitude * phase * (2.0 * k + k * (k - 1.0))
+                bound[k - 1] += magnitude * phase * (2.0 * k + k * (k - 1.0)) / reach
+            if k >= 2:
+                bound[k - 2] += magnitude * begun * k * (k - 1.0) / reach**2
+    return bound
+
+
+@njit(cache=True)
+def rounding_bound(
+    start: float, reach: float, sizes: FloatArray, phases: FloatArray, rounding: float
+) -> FloatArray:
+    """Polynomial in u that bounds the rounding error of an exponential sum in a piece."""
+    groups, size = sizes.shape
+    bound = np.zeros(size + 1)
+    for k in range(size):
+        bound[k] += rounding * EPSILON * sizes[0, k]
+        for g in range(1, groups):
+            error = rounding * EPSILON * sizes[g, k] * abs(phases[g - 1])
+            bound[k] += error * start
+            bound[k + 1] += error * reach
     return bound
 
 
 @njit(cache=True)
 def winding(
-    coefficients: ComplexArray,
-    sums: ComplexArray,
+    polynomials: tuple[Any, ...],
+    weights: FloatArray,
+    sums: FloatArray,
     phases: FloatArray,
-    noise: FloatArray,
+    uncertain: FloatArray,
     omega_end: float,
 ) -> tuple[float, complex, bool]:
     """Argument gathered by an exponential sum as omega goes from 0 to `omega_end`.
 
-    Returns the argument, the last value, and whether the sum stays clear of zero.
-    `noise` is the polynomial in omega that bounds its rounding error. The argument is nan
+    `uncertain` holds how far the entries of `sums` may be off. Returns the argument, the last
+    value up to a positive factor, and whether the sum stays clear of zero. The argument is nan
     where the walk would take more than MOST_STEPS steps.
     """
-    steps = 0
-    bound = _curvature_bound(coefficients, sums, phases)
-    omega = 0.0
-    value, slope = _evaluate(coefficients, sums, phases, omega)
-    argument = 0.0
-    step = omega_end
-    if abs(value) <= _real_horner(noise, 0.0):
-        return argument, value, False
-    while omega < omega_end:
-        steps += 1
-        if steps > MOST_STEPS:
-            return np.nan, value, True
-        step = min(4.0 * step, omega_end - omega)
-        while True:
-            distance = _tangent_distance(value, slope, step)
-            # Rounding moves the tangent, too: closer to the origin nothing is certain.
-            apart = 0.5 * _real_horner(bound, omega + step) * step * step
-            if apart + _real_horner(noise, omega + step) <= SAFETY * distance:
-                break
-            step *= 0.5
-            if step <= 4.0 * EPSILON * omega or step < 1e-300:
-                return argument, value, False
-        following = omega_end if step == omega_end - omega else omega + step
-        next_value, next_slope = _evaluate(coefficients, sums, phases, following)
-        if abs(next_value) <= _real_horner(noise, following):
-            return argument, next_value, False
-        # Along the tangent, then from its end to the curve: both parts are principal values.
-        tangent = value + step * slope
-        along = tangent * value.conjugate()
-        across = next_value * tangent.conjugate()
-        argument += np.arctan2(along.imag, along.real) + np.arctan2(across.imag, across.real)
-        omega, value, slope = following, next_value, next_slope
+    steps, argument, omega, step = 0, 0.0, 0.0, omega_end
+    value, slope = 0j, 0j
+    while omega < omega_end or value == 0j:
+        start, reach, local, sizes = piece(polynomials, weights, sums, omega, np.inf)
+        end = omega_end if polynomials[0].shape[0] > 0 else min(omega + reach, omega_end)
+        bound = curvature_bound(start, reach, local, phases)
+        error = rounding_bound(start, reach, sizes, phases, ROUNDING)
+        off = piece(polynomials, weights, uncertain, omega, np.inf)[3]
+        for k in range(min(off.shape[1], error.size)):
+            error[k] += off[0, k]
+        value, slope = evaluate(start, reach, local, phases, omega)
+        if abs(value) <= real_horner(error, (omega - start) / reach):
+            return argument, value, False
+        while omega < end:
+            steps += 1
+            if steps > MOST_STEPS:
+                return np.nan, value, True
+            step = min(4.0 * step, end - omega)
+            while True:
+                u = (omega + step - start) / reach
+                distance = tangent_distance(value, slope, step)
+                # Rounding moves the tangent, too: closer to the origin nothing is certain.
+                apart = 0.5 * real_horner(bound, u) * step * step
+                if apart + real_horner(error, u) <= SAFETY * distance:
+                    break
+                step *= 0.5
+                if step <= 4.0 * EPSILON * omega or step < 1e-300:
+                    return argument, value, False
+            following = end if step == end - omega else omega + step
+            next_value, next_slope = evaluate(start, reach, local, phases, following)
+            if abs(next_value) <= real_horner(error, (following - start) / reach):
+                return argument, next_value, False
+            # Along the tangent, then from its end to the curve: both parts are principal.
+            tangent = value + step * slope
+            along = tangent * value.conjugate()
+            across = next_value * tangent.conjugate()
+            argument += np.arctan2(along.imag, along.real)
+            argument += np.arctan2(across.imag, across.real)
+            omega, value, slope = following, next_value, next_slope
     return argument, value, True
 
 
 @njit(cache=True)
 def _taylor_signs_positive(q: FloatArray, shift: float) -> bool:
     """Whether all coefficients of q(w + shift) are positive beyond rounding, or zero."""
-    size = q.size
-    p = q.copy()
-    magnitude = np.abs(q)
-    for i in range(size - 1):
-        for k in range(size - 2, i - 1, -1):
+    p, magnitude = q.copy(), np.abs(q)
+    for i in range(q.size - 1):
+        for k in range(q.size - 2, i - 1, -1):
             p[k] += shift * p[k + 1]
             magnitude[k] += shift * magnitude[k + 1]
-    return bool(np.all(p >= 1e-13 * magnitude))
+        if not p[i] >= 1e-13 * magnitude[i]:
+            return False
+    return bool(p[q.size - 1] >= 0.0)
 
 
 @njit(cache=True)
-def last_crossing_bound(
-    squares: FloatArray, leads: FloatArray, unit: float, x: float, y: float
-) -> float:
-    """Frequency past which |A| > |x B1| + |y B2|, so that no root can cross; inf if none.
+def last_root_bound(q: FloatArray) -> float:
+    """Bound past which a real polynomial is positive, or zero throughout; inf if there is none.
 
-    It is nan where a number overflows or underflows. `squares` holds |A|^2, |B1|^2 and
-    |B2|^2 at s = j omega as polynomials in w = (omega / unit)^2, and `leads` the magnitudes
-    of the highest coefficients of A, B1 and B2. With G = |A|^2 - |x B1|^2 - |y B2|^2 the
-    inequality is G > 0 and Q = G^2 - 4 |x B1|^2 |y B2|^2 > 0. A shift of w after which every
-    coefficient of Q is positive proves that Q has no root beyond it (Budan), and then G keeps
-    its sign.
+    A shift of the variable after which all coefficients are positive proves it.
     """
-    first, second = abs(x) * leads[1], abs(y) * leads[2]
-    spare = leads[0] - first - second
-    if not np.isfinite(spare):
-        return np.nan
-    if spare <= 16.0 * EPSILON * leads[0]:
-        return np.inf
-    size = squares.shape[1]
-    g, b1, b2 = squares[0].copy(), x * x * squares[1], y * y * squares[2]
-    for i in range(size):
-        # What vanishes next to a number of ordinary size does not matter.
-        largest = max(abs(squares[0, i]), abs(b1[i]), abs(b2[i]))
-        lost = (x != 0.0 and squares[1, i] != 0.0 and abs(b1[i]) < _TINY) or (
-            y != 0.0 and squares[2, i] != 0.0 and abs(b2[i]) < _TINY
-        )
-        if lost and largest < _TINY:
+    top = q.size - 1
+    while top > 0 and q[top] == 0.0:
+        top -= 1
+    q = q[: top + 1].copy()
+    for value in q:
+        if not np.isfinite(value):
             return np.nan
-        g[i] -= b1[i] + b2[i]
-    size_of_g = np.abs(squares[0]) + np.abs(b1) + np.abs(b2)
-    q, magnitude = np.zeros(2 * size - 1), np.zeros(2 * size - 1)
-    acts = np.zeros(2 * size - 1, dtype=np.bool_)
-    for i in range(size):
-        for k in range(size):
-            q[i + k] += g[i] * g[k] - 4.0 * b1[i] * b2[k]
-            magnitude[i + k] += size_of_g[i] * size_of_g[k]
-            if size_of_g[i] > 0.0 and size_of_g[k] > 0.0:
-                acts[i + k] = True
-    if not np.isfinite(q).all() or (acts & (magnitude < _TINY)).any():
-        return np.nan
-    # Without the digits that the sum above has lost near the limit of the chain.
-    share = q[2 * size - 2] / magnitude[2 * size - 2]
-    if share < 1e-3:
-        scale = squares[0, size - 1] ** 0.5 / leads[0]
-        lead = spare * scale * (leads[0] + first + second) * scale
-        lead *= (leads[0] + first - second) * scale * (leads[0] - first + second) * scale
-        q[2 * size - 2] = lead
-    lead = q[2 * size - 2]
-    if not lead > 0.0:
-        return np.nan
     if _taylor_signs_positive(q, 0.0):
         return 0.0
+    if not q[top] > 0.0:
+        return np.inf
     upper = 0.0
     for k in range(1, q.size):
-        upper = max(upper, 2.0 * (abs(q[q.size - 1 - k]) / lead) ** (1.0 / k))
+        upper = max(upper, 2.0 * (abs(q[top - k]) / q[top]) ** (1.0 / k))
     for _ in range(60):
         if _taylor_signs_positive(q, upper):
             break
@@ -275,38 +428,48 @@ def last_crossing_bound(
             upper = middle
         else:
             lower = middle
-    return float(np.sqrt(upper) * unit)
+    return upper
 
 
 @njit(cache=True)
-def _needs_too_long(coefficients: ComplexArray, phases: FloatArray, omega_end: float) -> bool:
-    """Whether a walk over an exponential sum takes more than MOST_STEPS steps.
+def last_frequency(
+    squares: FloatArray, unit: float, factors: FloatArray, reserve: float
+) -> float:
+    """Frequency past which |A| exceeds the other terms of D together, so that no root crosses.
 
-    With S the sum of the delayed terms' magnitudes, and as long as the undelayed one is no
-    larger, the sum is at most 2 S, and half its second derivative grows to the mean of
-    phase^2, weighted by the terms, times S: no step is longer than 2 over its square root.
+    `squares` holds |A|^2 and the squares of the other terms T_i at s = j omega, as polynomials
+    in w = (omega / unit)^2; `factors` are f_i >= 0, and `reserve` is the share of A's highest
+    power that sum f_i |T_i| leaves: inf is returned where that is not positive.
+
+    By Cauchy and Schwarz (sum f_i |T_i|)^2 <= (sum a_i) (sum f_i^2 |T_i|^2 / a_i) for all
+    a_i > 0, with equality where a_i is f_i |T_i|. So |A|^2 less the right-hand side is a
+    polynomial in w, and `last_root_bound` applies.
     """
-    fastest = np.abs(phases).max()
-    omega = 2.0 * MOST_STEPS / fastest if fastest > 0.0 else np.inf
-    while omega < omega_end:
-        undelayed, total, weighted = 0j, 0.0, 0.0
-        for g in range(phases.size):
-            value = 0j
-            for k in range(coefficients.shape[1] - 1, -1, -1):
-                value = value * omega + coefficients[g, k]
-            if phases[g] == 0.0:
-                undelayed += value
-            else:
-                total += abs(value)
-                weighted += abs(value) * (phases[g] / fastest) ** 2
-        if not np.isfinite(weighted):
-            return True
-        if abs(undelayed) > total:
-            return False
-        if omega * fastest * np.sqrt(weighted / total) > 2.0 * MOST_STEPS:
-            return True
-        omega *= 4.0
-    return False
+    if not reserve > 0.0:
+        return np.inf
+    top = squares.shape[1] - 1
+    lead = np.sqrt(squares[0, top])
+    shares = np.zeros(factors.size)
+    whole = 0.0
+    for i in range(factors.size):
+        size = 0.0
+        for m in range(top + 1):
+            size += abs(squares[i + 1, m])
+        shares[i] = factors[i] * np.sqrt(size)
+        whole += shares[i]
+    together = 0.0
+    for i in range(factors.size):
+        if whole > 0.0:
+            shares[i] *= 0.5 * reserve * lead / whole
+        shares[i] += factors[i] * np.sqrt(squares[i + 1, top])
+        together += shares[i]
+    q = squares[0].copy()
+    for i in range(factors.size):
+        if shares[i] > 0.0:
+            weight = together * factors[i] ** 2 / shares[i]
+            for m in range(top + 1):
+                q[m] -= weight * squares[i + 1, m]
+    return float(np.sqrt(last_root_bound(q)) * unit)
 
 
 @njit(cache=True)
@@ -322,41 +485,28 @@ def _remaining_argument(roots: ComplexArray, omega: float) -> float:
 
 
 @njit(cache=True)
-def count_point(model: tuple[Any, ...], x: float, y: float) -> int:
+def count_point(model: tuple[Any, ...], x: float, y: float, end: float) -> int:
     """Return the number of unstable roots at one point, or a status code below zero.
 
     By the argument principle: degree / 2 less the argument over pi, gathered from 0 to
-    infinity, for a polynomial in s (`omega_end` is zero); degree less the argument over pi,
-    gathered from 0 to `omega_end`, for a map, whose boundary ends there. The model is what
-    `armlock.stability` makes of a characteristic function.
+    infinity, for polynomials in s; degree less the argument over pi, gathered from 0 to `end`,
+    for a map. `end` is the frequency of `last_frequency`, where a map's boundary ends. The
+    model is what `armlock.stability` makes of a characteristic function.
     """
-    parts, sums, reference, phases, roots, squares, leads, unit, omega_end = model
-    coefficients = parts[0] - x * parts[1] - y * parts[2]
-    if not np.isfinite(coefficients).all():
+    polynomials, weights, sums, reference, phases, undelayed, roots, is_map = model
+    if end == np.inf:
+        return UNCONFINED
+    if np.isnan(end):
         return DOUBTFUL
-    size = coefficients.shape[1]
     dx, dy = x - reference[0], y - reference[1]
-    undelayed = sums[0] - dx * sums[1] - dy * sums[2]
-    noise = np.zeros(size + 1)
-    for k in range(size):
-        b1, b2 = abs(sums[1, k]), abs(sums[2, k])
-        noise[k] += EPSILON * ROUNDING * (abs(sums[0, k]) + abs(dx) * b1 + abs(dy) * b2)
-        # The parameters themselves are rounded numbers.
-        noise[k] += EPSILON * (abs(x) * b1 + abs(y) * b2)
+    here, uncertain, total = np.zeros_like(sums[0]), np.zeros_like(sums[0]), weights[0].copy()
+    for k in range(here.size):
+        here[k] = sums[0, k] - dx * sums[1, k] - dy * sums[2, k]
+        # The parameters are rounded numbers themselves.
+        uncertain[k] = EPSILON * (abs(x * sums[1, k]) + abs(y * sums[2, k]))
         for g in range(phases.size):
-            magnitude = abs(coefficients[g, k] * phases[g])
-            noise[k + 1] += EPSILON * ROUNDING * magnitude
-    is_map = omega_end > 0.0
-    end = omega_end
-    if not is_map:
-        end = last_crossing_bound(squares, leads, unit, x, y)
-        if end == np.inf:
-            return UNCONFINED
-        if np.isnan(end):
-            return DOUBTFUL
-        if _needs_too_long(coefficients, phases, end):
-            return TOO_LONG
-    argument, value, clear = winding(coefficients, undelayed, phases, noise, end)
+            total[g, k] -= x * weights[1, g, k] + y * weights[2, g, k]
+    argument, value, clear = winding(polynomials, total, here, phases, uncertain, end)
     if not clear:
         return BOUNDARY
     if np.isnan(argument):
@@ -364,13 +514,12 @@ def count_point(model: tuple[Any, ...], x: float, y: float) -> int:
     if is_map:
         count = roots.size - argument / np.pi
     else:
-        a = 0j
-        for k in range(size - 1, -1, -1):
-            a = a * end + parts[0, 0, k]
-        if a == 0.0:
-            return DOUBTFUL
-        ratio = value / a
-        # D / A winds no further past `end`; A itself does, in closed form.
+        # From `end` on D / A stays close to 1, and A itself is known by its roots.
+        start, reach, local, _ = piece(
+            polynomials, np.zeros((0, here.size)), undelayed, end, 1e-3
+        )
+        a = evaluate(start, reach, local, np.zeros(0), end)[0]
+        ratio = value * a.conjugate()
         argument += _remaining_argument(roots, end) - np.arctan2(ratio.imag, ratio.real)
         count = 0.5 * roots.size - argument / np.pi
     nearest = int(np.round(count)) if np.isfinite(count) else -1
@@ -379,62 +528,78 @@ def count_point(model: tuple[Any, ...], x: float, y: float) -> int:
     return nearest
 
 
-@njit(cache=True)
-def _count_into(
-    counts: IntArray, i: int, model: tuple[Any, ...], x: float, y: float, stop: BoolArray
+@njit(cache=True, nogil=True)
+def _count_range(
+    first: int,
+    last: int,
+    model: tuple[Any, ...],
+    x: FloatArray,
+    y: FloatArray,
+    ends: FloatArray,
+    counts: IntArray,
+    stop: BoolArray,
 ) -> None:
-    """Count at point i, unless a walk elsewhere has proved too long."""
-    counts[i] = UNTRIED if stop[0] else count_point(model, x, y)
-    if counts[i] == TOO_LONG:
-        stop[0] = True
+    """Count at points `first` to `last`, until one of them takes too long."""
+    for i in range(first, last):
+        counts[i] = UNTRIED if stop[0] else count_point(model, x[i], y[i], ends[i])
+        if counts[i] == TOO_LONG:
+            stop[0] = True
 
 
-@njit(cache=True, parallel=True)
-def _count_on_all_cores(model: tuple[Any, ...], x: FloatArray, y: FloatArray) -> IntArray:
-    counts, stop = np.empty(x.size, dtype=np.int64), np.zeros(1, dtype=np.bool_)
-    for i in prange(x.size):
-        _count_into(counts, i, model, x[i], y[i], stop)
-    return counts
-
-
-@njit(cache=True)
-def _count_on_one_core(model: tuple[Any, ...], x: FloatArray, y: FloatArray) -> IntArray:
-    counts, stop = np.empty(x.size, dtype=np.int64), np.zeros(1, dtype=np.bool_)
-    for i in range(x.size):
-        _count_into(counts, i, model, x[i], y[i], stop)
-    return counts
-
-
-def count_points(model: tuple[Any, ...], x: FloatArray, y: FloatArray) -> IntArray:
-    """`count_point` over one-dimensional arrays x and y of the same length.
+def count_points(
+    model: tuple[Any, ...], x: FloatArray, y: FloatArray, ends: FloatArray
+) -> IntArray:
+    """`count_point` over one-dimensional arrays of the same length, on all cores.
 
     After the first point that takes too long no further one is tried.
     """
-    count = _count_on_one_core if _forked else _count_on_all_cores
-    counts: IntArray = count(model, x, y)
+    counts, stop = np.empty(x.size, dtype=np.int64), np.zeros(1, dtype=np.bool_)
+    _on_all_cores(_count_range, x.size, model, x, y, ends, counts, stop)
     return counts
+
+
+def _on_all_cores(function: Callable[..., None], size: int, *arguments: object) -> None:
+    """Call function(first, last, ...) for ranges that cover `size`, in a thread each.
+
+    The function is compiled to release the interpreter's lock. Ranges are short, because some
+    points or rows take much longer than others.
+    """
+    cores = config.NUMBA_NUM_THREADS
+    if size < 2 or cores < 2:
+        function(0, size, *arguments)
+        return
+    edges = np.unique(np.linspace(0, size, 16 * cores + 1).astype(int))
+    with ThreadPoolExecutor(cores) as pool:
+        parts = [
+            pool.submit(function, int(first), int(last), *arguments)
+            for first, last in pairwise(edges)
+        ]
+        for part in parts:
+            part.result()
 
 
 @njit(cache=True)
 def _polish(
-    coefficients: ComplexArray,
-    sums: ComplexArray,
+    start: float,
+    reach: float,
+    local: ComplexArray,
     phases: FloatArray,
     bound: FloatArray,
-    lower: float,
-    upper: float,
-    start: float,
-    sign_lower: int,
-) -> tuple[float, complex, complex]:
+    bracket: tuple[float, float],
+    guess: float,
+    sign: int,
+) -> tuple[float, float]:
     """Zero of the imaginary part in a bracket, by Newton steps kept inside it.
 
-    Returns the zero, and value and slope there.
+    `sign` is that of the imaginary part at the lower end. Returns the zero, and the slope of
+    the imaginary part there.
     """
-    omega = start
-    value, slope = 0j, 0j
+    lower, upper = bracket
+    omega = guess
+    slope = 0j
     for _ in range(80):
-        value, slope = _evaluate(coefficients, sums, phases, omega)
-        if (value.imag > 0.0) == (sign_lower > 0):
+        value, slope = evaluate(start, reach, local, phases, omega)
+        if (value.imag > 0.0) == (sign > 0):
             lower = omega
         else:
             upper = omega
@@ -446,11 +611,10 @@ def _polish(
             continue
         omega += move
         # What is left after a Newton step is at most curvature move^2 / (2 slope).
-        left = 0.5 * _real_horner(bound, upper) * move * move
+        left = 0.5 * real_horner(bound, (upper - start) / reach) * move * move
         if left <= 2.0 * EPSILON * upper * abs(slope.imag):
-            value += slope * move
             break
-    return omega, value, slope
+    return omega, slope.imag
 
 
 @njit(cache=True)
@@ -477,144 +641,161 @@ def _cubic_zero(step: float, h0: float, dh0: float, h1: float, dh1: float) -> fl
 
 
 @njit(cache=True)
-def sign_changes(
-    coefficients: ComplexArray,
-    phases: FloatArray,
-    sums: ComplexArray,
-    omega_end: float,
-    is_map: bool,
-    rounding: float = ROUNDING,
-) -> tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray, bool]:
-    """Zeros in [0, omega_end] of the imaginary part of an exponential sum.
+def _safe_step(h: float, dh: float, curvature: float, error: float) -> float:
+    """Step over which a real function has one zero at most.
 
-    Where the imaginary part is odd in omega, as it is for a row of a chart, omega = 0 is one
-    of them. Returns five arrays, an entry a zero, and whether they are all (they are not if
-    there are more than MOST_ZEROS, or the walk would take more than MOST_STEPS steps):
-
-    - `omega`, polished;
-    - `jump`, twice the direction of the sign change (a conjugate pair crosses); once at
-      omega = 0 and, for a map, at `omega_end` (a real root crosses); 0 where rounding hides
-      whether there is one;
-    - `width`, how far rounding lets the zero move: for a zero that is not simple, half the
-      stretch in which the sign is doubtful;
-    - `value` and `slope`, the real part there and the magnitude of its slope.
+    Over |dh| / curvature it is monotonic; over the other length it keeps its sign.
     """
-    groups, size = coefficients.shape
-    noise = np.zeros(size + 1)
-    for k in range(size):
-        noise[k] += abs(sums[k].imag) * (rounding * EPSILON)
-        for g in range(groups):
-            noise[k + 1] += abs(coefficients[g, k] * phases[g]) * (rounding * EPSILON)
-    bound = _curvature_bound(coefficients, sums, phases)
+    certified = abs(dh) / curvature
+    if abs(h) > error:
+        toward = dh if h > 0.0 else -dh
+        root = np.sqrt(dh * dh + 2.0 * curvature * abs(h))
+        certified = max(certified, (toward + root) / curvature)
+    return SAFETY * certified
 
-    zeros = np.empty((64, 4))
-    jumps = np.empty(64, dtype=np.int64)
-    found = 0
 
-    omega = 0.0
-    value, slope = _evaluate(coefficients, sums, phases, 0.0)
-    at_zero = value.real
-    h, dh = value.imag, slope.imag
-    sign = 0
-    if abs(h) > noise[0]:
-        sign = 1 if h > 0.0 else -1
-    elif abs(dh) > noise[1]:
-        sign = 1 if dh > 0.0 else -1
-        zeros[0, 0], zeros[0, 1], zeros[0, 2], zeros[0, 3] = 0.0, 0.0, at_zero, abs(slope)
-        jumps[0] = sign
-        found = 1
-    doubtful = sign == 0
-    last_clear = 0.0
-    step = omega_end
-    steps = 0
-    while omega < omega_end:
-        steps += 1
-        if steps > MOST_STEPS or found > MOST_ZEROS:
-            break
-        step = min(2.0 * step, omega_end - omega)
-        curvature = _real_horner(bound, omega + step)
-        if curvature > 0.0:
-            # Monotonic over the first, of one sign over the second: one zero at most.
-            certified = abs(dh) / curvature
-            error = _real_horner(noise, omega)
-            if abs(h) > error:
-                toward = dh if h > 0.0 else -dh
-                root = np.sqrt(dh * dh + 2.0 * curvature * abs(h))
-                certified = max(certified, (toward + root) / curvature)
-            certified *= SAFETY
-            if doubtful:
-                # Nothing can be resolved here; leave the stretch, in proportion to it.
-                unresolved = 0.5 * np.sqrt(2.0 * error / curvature)
-                stretch = 0.25 * (omega - last_clear)
-                certified = max(certified, unresolved, stretch, 1e-14 * omega_end)
-            step = min(step, certified)
-        following = omega_end if step >= omega_end - omega else omega + step
-        old_h, old_dh = h, dh
-        value, slope = _evaluate(coefficients, sums, phases, following)
-        h, dh = value.imag, slope.imag
-        if abs(h) > _real_horner(noise, following):
-            now = 1 if h > 0.0 else -1
-            if now != sign or doubtful:
-                if found == jumps.size:
-                    zeros = np.concatenate((zeros, np.empty_like(zeros)))
-                    jumps = np.concatenate((jumps, np.empty_like(jumps)))
-                middle = 0.5 * (last_clear + following)
-                width = 0.5 * (following - last_clear)
-                if sign == 0:
-                    jumps[found] = now
-                    middle, width = 0.0, following
-                    there, rate = complex(at_zero), slope
-                elif now != sign:
-                    jumps[found] = 2 * now
-                    if not doubtful:
-                        middle = omega + _cubic_zero(following - omega, old_h, old_dh, h, dh)
-                    middle, there, rate = _polish(
-                        coefficients, sums, phases, bound, last_clear, following, middle, sign
-                    )
-                    error = _real_horner(noise, middle)
-                    if abs(rate.imag) * width > error:
-                        width = error / abs(rate.imag)
-                else:
-                    jumps[found] = 0
-                    there, rate = _evaluate(coefficients, sums, phases, middle)
-                zeros[found, 0], zeros[found, 1] = middle, width
-                zeros[found, 2], zeros[found, 3] = there.real, abs(rate)
-                found += 1
-            sign = now
-            last_clear = following
-            doubtful = False
-        else:
-            doubtful = True
-        omega = following
-    if is_map and sign != 0:
-        if found == jumps.size:
-            zeros = np.concatenate((zeros, np.empty_like(zeros)))
-            jumps = np.concatenate((jumps, np.empty_like(jumps)))
-        zeros[found, 0], zeros[found, 1] = omega_end, 0.0
-        zeros[found, 2], zeros[found, 3] = value.real, abs(slope)
-        jumps[found] = -sign
-        found += 1
-    zeros = zeros[:found]
-    complete = omega >= omega_end
-    return zeros[:, 0], jumps[:found], zeros[:, 1], zeros[:, 2], zeros[:, 3], complete
+# Columns of what `sign_changes` returns.
+OMEGA, JUMP, WIDTH, POSITION, SPREAD = 0, 1, 2, 3, 4
 
 
 @njit(cache=True)
-def _squared(
-    norm: FloatArray, omega: float, omega_end: float, is_map: bool
-) -> tuple[float, float]:
-    """Value and slope of |M|^2, given as a polynomial or, for a map, a cosine series."""
-    value, slope = 0.0, 0.0
-    if is_map:
-        for k in range(norm.size):
-            rate = k * np.pi / omega_end
-            value += norm[k] * np.cos(rate * omega)
-            slope -= norm[k] * rate * np.sin(rate * omega)
-    else:
-        for k in range(norm.size - 1, -1, -1):
-            slope = slope * omega + value
-            value = value * omega + norm[k]
-    return value, slope
+def _place(
+    zeros: FloatArray,
+    start: float,
+    reach: float,
+    local: ComplexArray,
+    phases: FloatArray,
+    square: ComplexArray,
+    square_phases: FloatArray,
+    sizes: FloatArray,
+) -> None:
+    """Fill in POSITION and SPREAD of zeros that lie in one piece."""
+    fastest = np.abs(phases).max()
+    magnitude = np.zeros(sizes.shape[1])
+    for g in range(1, sizes.shape[0]):
+        for m in range(sizes.shape[1]):
+            magnitude[m] += sizes[g, m]
+    for zero in zeros:
+        omega = zero[OMEGA]
+        value, slope = evaluate(start, reach, local, phases, omega)
+        measured, change = evaluate(start, reach, square, square_phases, omega)
+        zero[POSITION], zero[SPREAD] = np.nan, 0.0
+        if measured.real > 0.0:
+            position = value.real / measured.real
+            steepness = (abs(slope) + abs(position) * abs(change.real)) / measured.real
+            rounding = CAUTION * EPSILON * (1.0 + fastest * omega) / measured.real
+            rounding *= real_horner(magnitude, (omega - start) / reach)
+            zero[POSITION], zero[SPREAD] = position, 4.0 * steepness * zero[WIDTH] + rounding
+
+
+@njit(cache=True)
+def sign_changes(
+    polynomials: tuple[Any, ...],
+    function: tuple[Any, ...],
+    measure: tuple[Any, ...],
+    omega_end: float,
+    is_map: bool,
+    rounding: float,
+) -> tuple[FloatArray, bool]:
+    """Zeros in [0, omega_end] of the imaginary part of an exponential sum.
+
+    `function` and `measure` are weights, sums and phases of two exponential sums, the measure
+    being positive: |M|^2 for a row x = N / M, whose `function` is N conj(M). Where the
+    imaginary part is odd in omega, as it is for a row of a chart, omega = 0 is one of the
+    zeros. Returns a row for each zero, and whether these are all (they are not if there are
+    more than MOST_ZEROS, or the walk would take more than MOST_STEPS steps). Its columns:
+
+    - OMEGA, polished;
+    - JUMP, twice the direction of the sign change (a conjugate pair crosses); once at
+      omega = 0 and, for a map, at `omega_end` (a real root crosses); 0 where rounding hides
+      whether there is one;
+    - WIDTH, how far rounding lets the zero move: for a zero that is not simple, half the
+      stretch in which the sign is doubtful;
+    - POSITION, the real part over the measure, nan where that vanishes;
+    - SPREAD, how far rounding lets the position move.
+    """
+    weights, sums, phases = function
+    zeros = np.empty((64, 5))
+    found, steps, sign = 0, 0, 0
+    omega, last_clear, step = 0.0, 0.0, omega_end
+    doubtful = True
+    while omega < omega_end and steps <= MOST_STEPS and found <= MOST_ZEROS:
+        start, reach, local, sizes = piece(polynomials, weights, sums, omega, np.inf)
+        end = omega_end if polynomials[0].shape[0] > 0 else min(omega + reach, omega_end)
+        bound = curvature_bound(start, reach, local, phases)
+        if reach == 1.0 and start == 0.0:
+            # The coefficients are real or imaginary: only the latter enter the imaginary part.
+            for m in range(local.shape[1]):
+                sizes[0, m] = abs(local[0, m].imag)
+        error = rounding_bound(start, reach, sizes, phases, rounding)
+        first = found
+        value, slope = evaluate(start, reach, local, phases, omega)
+        h, dh = value.imag, slope.imag
+        if omega == 0.0:
+            if abs(h) > error[0]:
+                sign, doubtful = (1 if h > 0.0 else -1), False
+            elif abs(dh) > error[1] / reach:
+                sign, doubtful = (1 if dh > 0.0 else -1), False
+                zeros[0, OMEGA], zeros[0, JUMP], zeros[0, WIDTH] = 0.0, sign, 0.0
+                found = 1
+        while omega < end and steps <= MOST_STEPS and found <= MOST_ZEROS:
+            steps += 1
+            step = min(2.0 * step, end - omega)
+            curvature = real_horner(bound, (omega + step - start) / reach)
+            if curvature > 0.0:
+                uncertain = real_horner(error, (omega - start) / reach)
+                certified = _safe_step(h, dh, curvature, uncertain)
+                if doubtful:
+                    # Nothing can be resolved here; leave the stretch, in proportion to it.
+                    unresolved = 0.5 * np.sqrt(2.0 * uncertain / curvature)
+                    stretch = 0.25 * (omega - last_clear)
+                    certified = max(certified, unresolved, stretch, 1e-14 * omega_end)
+                step = min(step, certified)
+            following = end if step >= end - omega else omega + step
+            old_h, old_dh = h, dh
+            value, slope = evaluate(start, reach, local, phases, following)
+            h, dh = value.imag, slope.imag
+            if abs(h) > real_horner(error, (following - start) / reach):
+                now = 1 if h > 0.0 else -1
+                if now != sign or doubtful:
+                    if found == zeros.shape[0]:
+                        zeros = np.concatenate((zeros, np.empty_like(zeros)))
+                    middle = 0.5 * (last_clear + following)
+                    width = 0.5 * (following - last_clear)
+                    jump = 0
+                    if sign == 0:
+                        # At omega = 0 itself the sign was hidden.
+                        middle, width, jump = 0.0, following, now
+                    elif now != sign:
+                        jump = 2 * now
+                        if not doubtful:
+                            middle = omega + _cubic_zero(
+                                following - omega, old_h, old_dh, h, dh
+                            )
+                        middle, rate = _polish(
+                            start, reach, local, phases, bound, (last_clear, following), middle,
+                            sign,
+                        )  # fmt: skip
+                        uncertain = real_horner(error, (middle - start) / reach)
+                        if abs(rate) * width > uncertain:
+                            width = uncertain / abs(rate)
+                    zeros[found, OMEGA] = middle
+                    zeros[found, JUMP], zeros[found, WIDTH] = jump, width
+                    found += 1
+                sign, last_clear, doubtful = now, following, False
+            else:
+                doubtful = True
+            omega = following
+        if is_map and omega >= omega_end and sign != 0:
+            if found == zeros.shape[0]:
+                zeros = np.concatenate((zeros, np.empty_like(zeros)))
+            zeros[found, OMEGA] = omega_end
+            zeros[found, JUMP], zeros[found, WIDTH] = -sign, 0.0
+            found += 1
+        if measure[0].shape[0] > 0:
+            square = piece(polynomials, measure[0], measure[1], start, np.inf)[2]
+            _place(zeros[first:found], start, reach, local, phases, square, measure[2], sizes)
+    return zeros[:found], omega >= omega_end
 
 
 @njit(cache=True)
@@ -624,37 +805,21 @@ def _fill_row(
     """Fill row i of a chart, see `fill_rows`."""
     counts, doubtful, last = filled
     ends, y, deviation, base, x, lower, upper = rows
-    fixed, varying, fixed_sums, varying_sums, phases, norm, is_map = model
-    fastest = np.abs(phases).max()
-    coefficients = fixed - y[i] * varying
-    magnitude = np.zeros(coefficients.shape[1])
-    for g in range(phases.size):
-        magnitude += np.abs(coefficients[g])
-    omegas, jumps, widths, values, slopes, complete = sign_changes(
-        coefficients,
-        phases,
-        fixed_sums - deviation[i] * varying_sums,
-        ends[i],
-        is_map,
-        CAUTION,
-    )
+    polynomials, fixed, varying, fixed_sums, varying_sums, phases, measure, is_map = model
+    function = (fixed - y[i] * varying, fixed_sums - deviation[i] * varying_sums, phases)
+    zeros, complete = sign_changes(polynomials, function, measure, ends[i], is_map, CAUTION)
     change = np.zeros(x.size + 1, dtype=np.int64)
     total = base[i]
     trusted = complete and base[i] >= 0
-    for k in range(omegas.size):
-        omega = omegas[k]
-        square, change_of_square = _squared(norm, omega, ends[i], is_map)
-        if square <= 0.0:
+    for zero in zeros:
+        jump, position, spread = int(zero[JUMP]), zero[POSITION], zero[SPREAD]
+        if np.isnan(position):
             continue
-        position = values[k] / square
-        steepness = (slopes[k] + abs(position) * abs(change_of_square)) / square
-        rounding = CAUTION * EPSILON * (1.0 + fastest * omega) / square
-        spread = 4.0 * steepness * widths[k] + rounding * _real_horner(magnitude, omega)
         if abs(position - lower[i]) <= spread or abs(position - upper[i]) <= spread:
             trusted = False
         if lower[i] < position < upper[i]:
-            total += jumps[k]
-            change[np.searchsorted(x, position)] += jumps[k]
+            total += jump
+            change[np.searchsorted(x, position)] += jump
         if position + spread >= x[0] and position - spread <= x[-1]:
             near = np.searchsorted(x, position - spread)
             while near < x.size and x[near] <= position + spread:
@@ -664,22 +829,18 @@ def _fill_row(
     for k in range(x.size):
         running += change[k]
         counts[i, k] = running
-    last[i] = total if trusted else BOUNDARY
+    last[i] = total if trusted else DOUBTFUL
 
 
-@njit(cache=True, parallel=True)
-def _fill_on_all_cores(
-    filled: tuple[Any, ...], model: tuple[Any, ...], rows: tuple[Any, ...]
+@njit(cache=True, nogil=True)
+def _fill_range(
+    first: int,
+    last: int,
+    filled: tuple[Any, ...],
+    model: tuple[Any, ...],
+    rows: tuple[Any, ...],
 ) -> None:
-    for i in prange(rows[0].size):
-        _fill_row(filled, model, rows, i)
-
-
-@njit(cache=True)
-def _fill_on_one_core(
-    filled: tuple[Any, ...], model: tuple[Any, ...], rows: tuple[Any, ...]
-) -> None:
-    for i in range(rows[0].size):
+    for i in range(first, last):
         _fill_row(filled, model, rows, i)
 
 
@@ -695,55 +856,54 @@ def fill_rows(
 ) -> tuple[IntArray, BoolArray, IntArray]:
     """Fill rows of a chart with counts, from the crossings of each row.
 
-    A row is x = N / M. The model holds, in this order: `fixed` and `varying`, with
-    N conj(M) = `fixed` - y `varying`; their sums over the groups, to be weighted by the
-    deviation of y from the reference; the phase rates; |M|^2 as real coefficients, of powers
-    of omega, or, for a map, of cosines of multiples of pi omega / omega_end; and whether it
-    is a map. Row i starts with the count base[i] at x = lower[i]. Returns the counts, which
-    of them lie too near a crossing to be trusted, and the count at x = upper[i] (-1 where a
-    crossing lies too near one of the two ends, or there are more than can be found).
+    A row is x = N / M. The model holds, in this order: the polynomials; the weights `fixed`
+    and `varying`, with N conj(M) = `fixed` - y `varying`, and their sums, the latter to be
+    weighted by the deviation of y from the reference; the phases of both; weights, sums and
+    phases of |M|^2; and whether it is a map. Row i starts with the count base[i] at
+    x = lower[i]. Returns the counts, which of them lie too near a crossing to be trusted, and
+    the count at x = upper[i] (DOUBTFUL where a crossing lies too near one of the two ends, or
+    there are more than can be found).
     """
     counts = np.empty((y.size, x.size), dtype=np.int64)
     doubtful = np.zeros((y.size, x.size), dtype=np.bool_)
     last = np.empty(y.size, dtype=np.int64)
-    fill = _fill_on_one_core if _forked else _fill_on_all_cores
-    fill((counts, doubtful, last), model, (ends, y, deviation, base, x, lower, upper))
+    rows = ends, y, deviation, base, x, lower, upper
+    _on_all_cores(_fill_range, y.size, (counts, doubtful, last), model, rows)
     return counts, doubtful, last
 
 
 @njit(cache=True)
 def resolved_grid(
-    coefficients: ComplexArray,
-    phases: FloatArray,
-    sums: ComplexArray,
-    omega_end: float,
-    tolerance: float,
+    polynomials: tuple[Any, ...], function: tuple[Any, ...], omega_end: float, tolerance: float
 ) -> FloatArray:
-    """Frequencies from 0 to `omega_end` between which the sum is nearly straight.
+    """Frequencies from 0 to `omega_end` between which an exponential sum is nearly straight.
 
     Over each step it stays within `tolerance` times the tangent's distance from zero of its
     tangent, or the step is as small as rounding allows. The grid ends before `omega_end` if
     it would take more than MOST_SAMPLES.
     """
-    bound = _curvature_bound(coefficients, sums, phases)
+    weights, sums, phases = function
     grid = np.empty(1024)
-    found = 1
-    omega = 0.0
+    found, omega, step = 1, 0.0, omega_end
     grid[0] = omega
-    step = omega_end
     while omega < omega_end and found < MOST_SAMPLES:
-        value, slope = _evaluate(coefficients, sums, phases, omega)
-        step = min(2.0 * step, omega_end - omega)
-        smallest = max(1e-13 * omega, 1e-16 * omega_end)
-        while True:
-            nearest = _tangent_distance(value, slope, step)
-            left = 0.5 * _real_horner(bound, omega + step) * step * step
-            if left <= tolerance * nearest or step <= smallest:
-                break
-            step *= 0.5
-        omega = omega_end if step >= omega_end - omega else omega + step
-        if found == grid.size:
-            grid = np.concatenate((grid, np.empty_like(grid)))
-        grid[found] = omega
-        found += 1
+        start, reach, local, _ = piece(polynomials, weights, sums, omega, np.inf)
+        end = omega_end if polynomials[0].shape[0] > 0 else min(omega + reach, omega_end)
+        bound = curvature_bound(start, reach, local, phases)
+        while omega < end and found < MOST_SAMPLES:
+            value, slope = evaluate(start, reach, local, phases, omega)
+            step = min(2.0 * step, end - omega)
+            smallest = max(1e-13 * omega, 1e-16 * omega_end)
+            while True:
+                nearest = tangent_distance(value, slope, step)
+                u = (omega + step - start) / reach
+                left = 0.5 * real_horner(bound, u) * step * step
+                if left <= tolerance * nearest or step <= smallest:
+                    break
+                step *= 0.5
+            omega = end if step >= end - omega else omega + step
+            if found == grid.size:
+                grid = np.concatenate((grid, np.empty_like(grid)))
+            grid[found] = omega
+            found += 1
     return grid[:found]

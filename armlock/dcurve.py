@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from armlock.characteristic import CharacteristicFunction, checked_system
+from armlock.characteristic import CharacteristicFunction, Polynomial, checked_system
 from armlock.checks import ComplexArray, FloatArray, check_memory, positive_number, real_array
 from armlock.stability import sign_changes
 
@@ -66,34 +66,6 @@ def _require_two_parameters(system: CharacteristicFunction) -> None:
             )
 
 
-def _split(value: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return two halves of the digits of each value, which add up to it (Veltkamp)."""
-    high = value * 134217729.0
-    high = high - (high - value)
-    return high, value - high
-
-
-def _turned(omega: FloatArray, delay: float) -> ComplexArray:
-    """Return exp(j omega delay) - 1 for the exact product, however many turns it is."""
-    product = omega * delay
-    # What rounding has taken off the product (Dekker).
-    high1, low1 = _split(omega)
-    high2, low2 = _split(np.asarray(delay))
-    lost = ((high1 * high2 - product) + high1 * low2 + low1 * high2) + low1 * low2
-    whole, rest = np.expm1(1j * product), np.expm1(1j * lost)
-    return np.asarray(whole + rest + whole * rest)
-
-
-def _turned_apart(omega: FloatArray, system: CharacteristicFunction) -> ComplexArray:
-    """Return exp(-j omega (delay1 - delay2)) - 1 for the exact product."""
-    separation = system.delay1 - system.delay2
-    # What rounding has taken off the difference (Knuth).
-    back = separation - system.delay1
-    lost = (system.delay1 - (separation - back)) - (system.delay2 + back)
-    whole, rest = _turned(omega, -separation), _turned(omega, -lost)
-    return np.asarray(whole + rest + whole * rest)
-
-
 def d_curve(
     system: CharacteristicFunction, omega: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray]:
@@ -135,7 +107,8 @@ def d_curve(
         \begin{pmatrix} x \\ y \end{pmatrix} =
         \begin{pmatrix} \mathrm{Re}\, A \\ \mathrm{Im}\, A \end{pmatrix}
 
-    with A and :math:`\beta_k = B_k e^{-s\theta_k}` taken at s = j omega. It is
+    with :math:`A = R\, e^{s\delta} + x_0 B_1 + y_0 B_2` and :math:`\beta_k = B_k e^{-s\theta_k}`,
+    taken at s = j omega. It is
     solved by Cramer's rule:
 
     .. math::
@@ -170,33 +143,39 @@ def d_curve(
     omega = real_array("omega", omega)
     _require_two_parameters(system)
     x0, y0 = system.reference
+    s = 1j * omega
+    late1, late2 = np.expm1(-s * system.delay1), np.expm1(-s * system.delay2)
+    apart = np.expm1(-s * (system.delay1 - system.delay2))
     with np.errstate(over="ignore", under="ignore", invalid="ignore", divide="ignore"):
-        z = np.asarray(1.0 + _turned(omega, system.step) if system.step else 1j * omega)
-        rest, b1, b2 = system.values_up_to_a_factor(z)
-        late1, late2 = _turned(omega, -system.delay1), _turned(omega, -system.delay2)
+        rest, b1, b2 = _values(system, np.exp(s * system.step) if system.step else s)
         # D at the reference, where nothing cancels; from there both parameters are solved for.
-        known = rest - b1 * x0 * late1 - b2 * y0 * late2
+        known = rest * np.exp(s * system.delay) - b1 * x0 * late1 - b2 * y0 * late2
         across = b1 * np.conj(b2)
         # Only the difference of the delays enters here, which keeps low frequencies exact.
-        determinant = np.imag(across) + np.imag(across * _turned_apart(omega, system))
-        rounding = np.minimum(np.abs(omega * (system.delay1 - system.delay2)), _MANY_TURNS)
-        rounding = 4.0 * _EPSILON * rounding * np.abs(across)
-        pole = np.abs(determinant) <= rounding
-        # Not where only the range of floats makes it look like one.
-        pole &= np.isfinite(rounding)
-        pole &= np.abs(across) * np.minimum(1.0, np.abs(omega)) > np.finfo(float).tiny
-        pole |= (np.abs(omega) > 1e-30) & ((b1 == 0.0) | (b2 == 0.0))
-        pole |= omega == 0.0
-        determinant = np.where(pole, np.nan, determinant)
+        determinant = np.imag(across) + np.imag(across * apart)
+        turns = np.minimum(np.abs(omega * (system.delay1 - system.delay2)), _MANY_TURNS)
+        pole = np.abs(determinant) <= 4.0 * _EPSILON * turns * np.abs(across)
+        determinant = np.where(pole | (omega == 0.0), np.nan, determinant)
         x = x0 + np.imag(known * np.conj(b2 * (1.0 + late2))) / determinant
         y = y0 - np.imag(known * np.conj(b1 * (1.0 + late1))) / determinant
-    beyond = ~pole & ~(np.isfinite(x) & np.isfinite(y))
+    beyond = ~np.isnan(determinant) & ~(np.isfinite(x) & np.isfinite(y))
     if beyond.any():
         raise ValueError(
             f"omega must be of a size for which the curve is within the range of floats, got "
             f"{omega[beyond].ravel()[0]} rad/s"
         )
     return x, y
+
+
+def _values(system: CharacteristicFunction, z: ComplexArray) -> list[ComplexArray]:
+    """R, B1 and B2, divided by a polynomial without roots on the axis that suits their size."""
+    polynomials = system.polynomials()
+    if system.step:
+        return [np.polynomial.polynomial.polyval(z, p.coefficients) for p in polynomials]
+    size = np.abs(polynomials[0].roots)
+    size[size == 0.0] = 1.0 / system.longest_delay
+    common = Polynomial(polynomials[0].coefficients, -size.astype(np.complex128))
+    return [p.over(common, z) for p in polynomials]
 
 
 def d_curve_line(system: CharacteristicFunction) -> Line:

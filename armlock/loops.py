@@ -2,15 +2,16 @@
 
 The open loop of every configuration is
 
-    L(s; c1, c2) = K(s) [m1(s) (1 - c1 exp(-s tau1)) + m2(s) (1 - c2 exp(-s tau2))]
+    L(s; c1, c2) = K exp(-s delay) [m1 (1 - c1 exp(-s tau1)) + m2 (1 - c2 exp(-s tau2))],
 
-with K the controller and actuator and m1, m2 the signal mapping. Clearing the denominators
-of 1 + L gives the characteristic function of `armlock.characteristic`. The Hayes equation,
-which has no sensor, is one more characteristic function.
+the product of the controller and actuator K, a dead time, and the signal of the two arms in
+the signal mapping m1, m2. Clearing the denominators of 1 + L gives the characteristic function
+of `armlock.characteristic`. The Hayes equation, which has no sensor, is one more.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,8 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
 from armlock import paper, sensors
-from armlock.characteristic import CharacteristicFunction
-from armlock.checks import ComplexArray, positive_number, real_number, true_or_false
+from armlock.characteristic import CharacteristicFunction, Polynomial
+from armlock.checks import ComplexArray, complex_array, positive_number, real_number
 from armlock.controllers import Controller, integrating_actuator, table_two
 from armlock.sensors import SignalMapping
 
@@ -67,13 +68,11 @@ class Loop(CharacteristicFunction):
 
     .. math::
 
-        L(s) &= K \left[ m_1 \left( 1 - c_1 e^{-s\tau_1} \right)
+        L(s) &= K e^{-s\delta} \left[ m_1 \left( 1 - c_1 e^{-s\tau_1} \right)
         + m_2 \left( 1 - c_2 e^{-s\tau_2} \right) \right] , \\
-        D(s) &= R \left( 1 + L \right)
-        = A - c_1 B_1 e^{-s\tau_1} - c_2 B_2 e^{-s\tau_2} , \\
-        B_k &= R K m_k , \qquad A = R + B_1 + B_2 ,
+        D(s) &= R \left( 1 + L \right) , \qquad B_k = R K m_k ,
 
-    where R, a polynomial, is the common denominator of L.
+    where R, a polynomial, is the common denominator of L, and :math:`\delta` its dead time.
 
     Parameters
     ----------
@@ -83,12 +82,15 @@ class Loop(CharacteristicFunction):
         The sensor, for instance `armlock.sensors.COMMON`.
     tau1, tau2 : float
         Round-trip delays of the two arms, in s.
+    delay : float, optional
+        Dead time of the loop in s (actuator, phasemeter, transponder), zero or positive.
 
     Raises
     ------
     TypeError, ValueError
-        If a delay is not a positive finite number, a polynomial is not finite and real, the
-        open loop has more zeros than poles, or 1 + L vanishes at high frequency.
+        If tau1 or tau2 is not a positive finite number, `delay` is negative, a polynomial is
+        not finite and real, the open loop has more zeros than poles, or 1 + L vanishes at high
+        frequency.
 
     Notes
     -----
@@ -107,7 +109,12 @@ class Loop(CharacteristicFunction):
     """
 
     def __init__(
-        self, controller: Any, mapping: SignalMapping, tau1: float, tau2: float
+        self,
+        controller: Any,
+        mapping: SignalMapping,
+        tau1: float,
+        tau2: float,
+        delay: float = 0.0,
     ) -> None:
         self.tau1 = positive_number("tau1", tau1)
         self.tau2 = positive_number("tau2", tau2)
@@ -136,7 +143,7 @@ class Loop(CharacteristicFunction):
         common = int(np.flatnonzero((below != 0.0) | (b1 != 0.0) | (b2 != 0.0))[0])
         below, b1, b2 = below[common:], b1[common:], b2[common:]
         highest = b1[-1] + b2[-1] + below[-1]
-        if abs(highest) <= 1e-12 * abs(below[-1]):
+        if not delay and abs(highest) <= 1e-12 * abs(below[-1]):
             raise ValueError(
                 f"the loop is not well posed: 1 + K (m1 + m2) must not vanish at high "
                 f"frequency, got {highest / below[-1]}"
@@ -147,6 +154,7 @@ class Loop(CharacteristicFunction):
             b2,
             self.tau1,
             self.tau2,
+            delay=delay,
             parameters=("c1", "c2"),
             reference=(1.0, 1.0),
         )
@@ -155,37 +163,49 @@ class Loop(CharacteristicFunction):
         """Name the class and its arguments, as they are written to make it again."""
         return (
             f"{type(self).__name__}(controller={self.controller!r}, mapping={self.mapping!r}, "
-            f"tau1={self.tau1}, tau2={self.tau2})"
+            f"tau1={self.tau1}, tau2={self.tau2}{self._dead_time()})"
         )
 
-    def values_up_to_a_factor(
-        self, z: ComplexArray
-    ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Evaluate `rest`, B1 and B2, divided by the controller's numerator.
+    def _dead_time(self) -> str:
+        """Return the dead time as it stands among the arguments, nothing where it is zero."""
+        return f", delay={self.delay}" if self.delay else ""
 
-        As factors the controller is known to rounding, where its coefficients are not.
+    def polynomials(self) -> tuple[Polynomial, Polynomial, Polynomial]:
+        """Return R, B1 and B2 with their roots: those of controller and signal mapping."""
+        k, m = self.controller, self.mapping
+
+        def roots(own: Sequence[complex], p: Sequence[float]) -> ComplexArray:
+            return np.concatenate((own, poly.polyroots(np.asarray(p)))).astype(np.complex128)
+
+        # What has cancelled are roots at s = 0.
+        found = [
+            roots(k.poles, m.denominator),
+            roots(k.zeros, m.numerator1),
+            roots(k.zeros, m.numerator2),
+        ]
+        kept = []
+        for p, all_roots in zip((self.rest, self.b1, self.b2), found, strict=True):
+            others = all_roots[all_roots != 0.0]
+            at_zero = max(p.size - 1 - others.size, 0)
+            kept.append(Polynomial(p, np.concatenate((others, np.zeros(at_zero)))))
+        return kept[0], kept[1], kept[2]
+
+    def arm_responses(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
+        """Evaluate K m1 exp(-s delay) and K m2 exp(-s delay), factor by factor.
 
         Parameters
         ----------
-        z : complex array
-            In rad/s.
+        s : array_like of complex
+            Laplace variable in rad/s, any shape.
 
         Returns
         -------
-        tuple of three complex arrays, shaped like `z`
+        tuple of two complex arrays, shaped like `s`
         """
-        own = super().values_up_to_a_factor(z)
-        k, m = self.controller, self.mapping
-        # At a zero of the controller only the product tells.
-        apart = np.isin(z, k.zeros) | ~np.isfinite(z)
-        inverse = Controller(k.poles, k.zeros, 1.0)(np.where(apart, 1.0, z)) / k.gain
-        divided = (
-            inverse * poly.polyval(z, np.array(m.denominator)),
-            poly.polyval(z, np.array(m.numerator1)),
-            poly.polyval(z, np.array(m.numerator2)),
-        )
-        rest, b1, b2 = (np.where(apart, p, q) for p, q in zip(own, divided, strict=True))
-        return rest, b1, b2
+        s = complex_array("s", s)
+        rest, b1, b2 = self.polynomials()
+        dead = np.exp(-s * self.delay)
+        return b1.over(rest, s) * dead, b2.over(rest, s) * dead
 
     def open_loop(
         self, s: npt.ArrayLike, c1: npt.ArrayLike = 1.0, c2: npt.ArrayLike = 1.0
@@ -210,12 +230,10 @@ class Loop(CharacteristicFunction):
             do not broadcast.
         """
         s, *arms = self._checked(s, c1, c2)
-        # Not D / rest - 1, which loses the digits of a small L.
-        above: ComplexArray = np.zeros((), dtype=np.complex128)
-        for b, c, tau in zip((self.b1, self.b2), arms, (self.tau1, self.tau2), strict=True):
-            above = above + poly.polyval(s, b) * ((1.0 - c) - c * np.expm1(-s * tau))
-        result: ComplexArray = above / poly.polyval(s, self.rest)
-        return result
+        first, second = self.arm_responses(s)
+        c1, c2 = arms
+        result: ComplexArray = first * ((1.0 - c1) - c1 * np.expm1(-s * self.tau1))
+        return result + second * ((1.0 - c2) - c2 * np.expm1(-s * self.tau2))
 
 
 def checked_loop(loop: Loop) -> Loop:
@@ -241,6 +259,8 @@ class SingleArm(Loop):
         Loop gain g in rad/s.
     tau : float, optional
         Round-trip delay in s.
+    delay : float, optional
+        Dead time in s, see `Loop`.
 
     Raises
     ------
@@ -254,14 +274,19 @@ class SingleArm(Loop):
     array([ 0, -1,  1])
     """
 
-    def __init__(self, gain: float = paper.COMMON_ARM_GAIN, tau: float = paper.TAU1) -> None:
+    def __init__(
+        self,
+        gain: float = paper.COMMON_ARM_GAIN,
+        tau: float = paper.TAU1,
+        delay: float = 0.0,
+    ) -> None:
         self.gain = positive_number("gain", gain)
         self.tau = positive_number("tau", tau)
-        super().__init__(integrating_actuator(self.gain), sensors.SINGLE, tau, tau)
+        super().__init__(integrating_actuator(self.gain), sensors.SINGLE, tau, tau, delay)
 
     def __repr__(self) -> str:
         """Name the class and its arguments."""
-        return f"SingleArm(gain={self.gain}, tau={self.tau})"
+        return f"SingleArm(gain={self.gain}, tau={self.tau}{self._dead_time()})"
 
 
 class CommonArm(Loop):
@@ -279,6 +304,8 @@ class CommonArm(Loop):
         Loop gain g in rad/s.
     tau1, tau2 : float, optional
         Round-trip delays in s.
+    delay : float, optional
+        Dead time in s, see `Loop`.
 
     Raises
     ------
@@ -297,13 +324,17 @@ class CommonArm(Loop):
         gain: float = paper.COMMON_ARM_GAIN,
         tau1: float = paper.TAU1,
         tau2: float = paper.TAU2,
+        delay: float = 0.0,
     ) -> None:
         self.gain = positive_number("gain", gain)
-        super().__init__(integrating_actuator(self.gain), sensors.COMMON, tau1, tau2)
+        super().__init__(integrating_actuator(self.gain), sensors.COMMON, tau1, tau2, delay)
 
     def __repr__(self) -> str:
         """Name the class and its arguments."""
-        return f"CommonArm(gain={self.gain}, tau1={self.tau1}, tau2={self.tau2})"
+        return (
+            f"CommonArm(gain={self.gain}, tau1={self.tau1}, tau2={self.tau2}"
+            f"{self._dead_time()})"
+        )
 
 
 class DualArm(Loop):
@@ -326,6 +357,8 @@ class DualArm(Loop):
     difference : float, optional
         The dtau that scales the sensor's integral, in s: tau1 - tau2 by default, as in
         Sec. III.B. The source of Table I takes half of it.
+    delay : float, optional
+        Dead time in s, see `Loop`.
 
     Raises
     ------
@@ -359,18 +392,19 @@ class DualArm(Loop):
         corner: float = paper.DUAL_SENSOR_CORNER,
         *,
         difference: float | None = None,
+        delay: float = 0.0,
     ) -> None:
         self.gain = positive_number("gain", gain)
         self.corner = positive_number("corner", corner)
         self.difference = _delay_difference(tau1, tau2, difference)
         mapping = sensors.dual(self.corner, self.difference)
-        super().__init__(integrating_actuator(self.gain), mapping, tau1, tau2)
+        super().__init__(integrating_actuator(self.gain), mapping, tau1, tau2, delay)
 
     def __repr__(self) -> str:
         """Name the class and its arguments."""
         return (
             f"DualArm(gain={self.gain}, tau1={self.tau1}, tau2={self.tau2}, "
-            f"corner={self.corner}, difference={self.difference})"
+            f"corner={self.corner}, difference={self.difference}{self._dead_time()})"
         )
 
 
@@ -382,6 +416,7 @@ def paper_loop(
     controller: Any = None,
     actuator: bool = False,
     difference: float | None = None,
+    delay: float = 0.0,
 ) -> Loop:
     r"""Return the loop of the paper's Sec. IV: the controller of Table II on the dual sensor.
 
@@ -406,6 +441,8 @@ def paper_loop(
         the default, the paper's claims on the controller come true.
     difference : float, optional
         The dtau of the sensor in s, tau1 - tau2 by default.
+    delay : float, optional
+        Dead time in s, see `Loop`.
 
     Returns
     -------
@@ -424,10 +461,10 @@ def paper_loop(
     array([0, 0])
     """
     chosen = table_two() if controller is None else Controller.of(controller)
-    if true_or_false("actuator", actuator):
+    if actuator:
         chosen = chosen * integrating_actuator()
     mapping = sensors.dual(corner, _delay_difference(tau1, tau2, difference))
-    return Loop(chosen, mapping, tau1, tau2)
+    return Loop(chosen, mapping, tau1, tau2, delay)
 
 
 def _delay_difference(tau1: float, tau2: float, difference: float | None) -> float:

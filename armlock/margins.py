@@ -1,13 +1,13 @@
 """How far a loop is from instability: margins, and the first perturbation that breaks it.
 
-Every minimum is taken over frequencies between which the loop's response is known to be
-nearly straight, and every crossing is found with certified steps, so that no grid of the
-user's enters a number.
+No grid enters a number. Distances from -1 come from the certified walk of `armlock.infimum`,
+crossings from that of `armlock.contour`. Each walk ends at a frequency past which nothing
+smaller, or no crossing, is possible; at high frequency the limit is known in closed form.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,23 +15,27 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 from scipy.optimize import brentq, minimize_scalar
 
-from armlock.characteristic import ExponentialSum
-from armlock.checks import ComplexArray, FloatArray, axis, real_number
-from armlock.controllers import Controller
+from armlock import contour, infimum
+from armlock.checks import FloatArray, axis, positive_number, real_number
 from armlock.loops import Loop, checked_loop
-from armlock.nyquist import loop_numerator, reach, resolving_grid
-from armlock.rays import Ray
+from armlock.nyquist import loop_numerator
+from armlock.rays import first_break
 from armlock.stability import (
-    BOUNDARY,
     CountError,
-    last_crossing,
     sign_changes,
+    squared_magnitudes,
     unstable_roots,
 )
 
-# Closer than 1e-6 to the limit of a chain the first crossing is looked for up to so many turns
-# of the longest delay, about a tenth of a second.
-_TURNS_BELOW_CHAIN = 50_000
+#: Relative accuracy of the certificate for modulus and disk margins.
+TOLERANCE = 1e-6
+#: Gain factors up to this, and down to one over it, are looked at.
+LARGEST_GAIN = 1e6
+# Share of their limits within which the disc of a neutral loop must have come for its
+# crossovers to be those of the limit.
+_SETTLED = 1e-4
+# Crossovers that are polished: those with the smallest margins.
+_POLISHED = 8
 
 
 @dataclass(frozen=True)
@@ -69,7 +73,7 @@ class Margins:
         Symmetric disk margin: 2 min |1 + L| / |1 - L|.
     gain_omega, phase_omega, modulus_omega : float
         Where the upper gain margin, the phase margin and the modulus margin are taken, in
-        rad/s; nan where there is none.
+        rad/s; inf where it is the limit at high frequency, nan where there is none.
 
     Examples
     --------
@@ -90,93 +94,116 @@ class Margins:
     modulus_omega: float
 
 
-def _require_stable(loop: Loop, c1: float, c2: float) -> None:
-    """Raise unless 1 + L has all its zeros in the open left half-plane."""
-    count = int(unstable_roots(loop, c1, c2))
-    if count != 0:
-        raise ValueError(
-            f"the loop must be stable at (c1, c2) = ({c1}, {c2}) to have margins, but "
-            f"unstable_roots gives {count}"
-        )
+def _limit_disc(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
+    """Centre and radius of the disc that L fills at high frequency, for all small changes
+    of the delays.
+    """
+    r = float(loop.rest[-1])
+    b1, b2 = (float(b[-1]) if b.size == loop.rest.size else 0.0 for b in (loop.b1, loop.b2))
+    arms = (abs(c1 * b1) + abs(c2 * b2)) / abs(r)
+    if loop.delay:
+        return 0.0, abs(b1 + b2) / abs(r) + arms
+    return (b1 + b2) / r, arms
 
 
-def _tail_end(loop: Loop, c1: float, c2: float, level: float) -> float:
-    """Frequency past which |L| < `level`, or past which a neutral L has settled."""
-    end = float(last_crossing(loop, c1, c2))
-    if not loop.neutral:
-        return max(2.0 * end, reach(loop, c1, c2, level), 10.0 / loop.longest_delay)
-    period = 2.0 * np.pi / max(abs(loop.tau1 - loop.tau2), 1e-3 * loop.longest_delay)
-    return max(4.0 * end, 4.25 * period)
+def _limit(loop: Loop, c1: float, c2: float, symmetric: bool) -> float:
+    """Distance of L from -1 at high frequency, see `armlock.infimum.excluded_disc`."""
+    centre, radius = _limit_disc(loop, c1, c2)
+    if not symmetric:
+        return abs(1.0 + centre) - radius
+    # A circle around a real centre becomes one; its real points are nearest and farthest.
+    ends = [point for point in (centre - radius, centre + radius) if point != 1.0]
+    return min(abs(1.0 + point) / abs(1.0 - point) for point in ends)
 
 
-def _at_infinity(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
-    """Infima of |1 + L| and of |1 + L| / |1 - L| as omega goes to infinity."""
-    if not loop.neutral:
-        return 1.0, 1.0
+def _clear_from(loop: Loop, c1: float, c2: float, centre: float, radius: float) -> float:
+    """Frequency past which L stays outside a disc around a negative centre; inf if it does not.
 
-    _, b1, b2 = loop.highest_coefficients
-    open_lead = float(loop.rest[-1])
-    # L fills the disk b1 (1 - c1 u) + b2 (1 - c2 v), |u| = |v| = 1, divided by open_lead.
-    centre, radius = (b1 + b2) / open_lead, (abs(c1 * b1) + abs(c2 * b2)) / abs(open_lead)
-    angles = np.exp(1j * np.linspace(0.0, np.pi, 4001))
-    edge = centre + radius * angles
-    closest = max(abs(1.0 + centre) - radius, 0.0)
-    return closest, float(np.min(np.abs(1.0 + edge) / np.maximum(np.abs(1.0 - edge), 1e-300)))
+    Past it |B1 + B2 - centre R| > radius |R| + |c1 B1| + |c2 B2|; with a dead time B1 + B2
+    turns, and stands on the other side.
+    """
+    c = poly.polyadd(loop.b1, loop.b2)
+    factors = [radius, abs(c1), abs(c2), 0.0]
+    first = -centre * loop.rest
+    if loop.delay:
+        factors[3] = 1.0
+    else:
+        first = poly.polyadd(first, c)
+    others = (loop.rest, loop.b1, loop.b2, c)
+    return last_larger(first, others, np.array(factors))
+
+
+def last_larger(
+    first: FloatArray, others: tuple[FloatArray, ...], factors: FloatArray
+) -> float:
+    """Frequency past which a polynomial is larger than the sum of others; inf if it is not."""
+    degree = max(p.size for p in others)
+    lead = abs(float(first[-1])) if first.size >= degree else 0.0
+    if lead == 0.0:
+        return np.inf
+    tops = [abs(float(p[-1])) if p.size == first.size else 0.0 for p in others]
+    reserve = (lead - float(factors @ np.array(tops))) / lead
+    squares, unit = squared_magnitudes((first, *others))
+    found: float = contour.last_frequency(squares, unit, factors, reserve)
+    return found
 
 
 def _smallest(
-    distance: Callable[[FloatArray], FloatArray], grid: FloatArray
+    loop: Loop, c1: float, c2: float, *, symmetric: bool, highest: float = np.inf
 ) -> tuple[float, float]:
-    """Minimum over omega > 0 of a function that the grid resolves; and where."""
-    values = distance(grid)
-    inner = (values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:])
-    candidates = np.flatnonzero(inner) + 1
-    candidates = candidates[values[candidates] <= 1.5 * values.min()]
-    best = int(np.argmin(values))
-    found = [(float(values[best]), float(grid[best]))]
-    for k in candidates[np.argsort(values[candidates])][:200]:
-        low, width = float(grid[k - 1]), float(grid[k + 1] - grid[k - 1])
+    """Smallest distance of L from -1 up to `highest`, and where; inf where it is the limit.
 
-        # Over the share of the bracket, because the optimizer's accuracy is relative.
-        def along(share: float, low: float = low, width: float = width) -> float:
-            return float(distance(np.array([low + share * width]))[0])
+    A walk with a wide tolerance comes close to the smallest value; polished, it lets the walk
+    with the final tolerance step over nearly everything.
+    """
+    limit = _limit(loop, c1, c2, symmetric)
+    if not limit > 0.0:
+        raise _unconfined(c1, c2)
+    if symmetric:
+        limit = min(limit, 1.0)
+    end = _clear_from(
+        loop, c1, c2, *infimum.excluded_disc(limit * (1.0 - TOLERANCE), symmetric)
+    )
+    if not np.isfinite(end):
+        raise _unconfined(c1, c2)
+    numerator = loop_numerator(loop, c1, c2)
 
-        result = minimize_scalar(
-            along, bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-9}
+    def distance(omega: float) -> float:
+        response = complex(loop.open_loop(1j * omega, c1, c2))
+        below = abs(1.0 - response) if symmetric else 1.0
+        return abs(1.0 + response) / below if below else np.inf
+
+    best, where = limit, np.inf
+    for tolerance in (0.05, TOLERANCE, TOLERANCE):
+        found, omega, width, complete = infimum.smallest_distance(
+            numerator.compiled(),
+            (numerator.weights, numerator.sums, numerator.phases),
+            np.array([abs(c1), abs(c2)]),
+            np.array([-loop.delay]),
+            symmetric,
+            min(end, highest),
+            loop.longest_delay,
+            best,
+            tolerance,
         )
-        found.append((float(result.fun), low + float(result.x) * width))
-    return min(found)
-
-
-def _grid(loop: Loop, c1: float, c2: float) -> FloatArray:
-    """Frequencies that resolve 1 + L and 1 - L, up to where the tail cannot matter."""
-    plus, below = loop.at(c1, c2), loop.rest_on_boundary()
-    minus = below.scaled(2.0).plus(plus.scaled(-1.0))
-    for level in (0.9, 0.5, 0.1, 0.01, 0.001):
-        grid = resolving_grid((plus, minus, below), _tail_end(loop, c1, c2, level))
-        # In place of omega = 0, where L may have a pole.
-        grid[0] = 1e-6 * grid[1]
-        response = loop.open_loop(1j * grid, c1, c2)
-        away, across = np.abs(1.0 + response).min(), _ratio(response).min()
-        if loop.neutral or (away <= 1.0 - level and across <= (1.0 - level) / (1.0 + level)):
-            break
-    return grid
-
-
-def _ratio(response: ComplexArray) -> FloatArray:
-    """Return |1 + L| / |1 - L|."""
-    return np.asarray(np.abs(1.0 + response) / np.maximum(np.abs(1.0 - response), 1e-300))
-
-
-def _modulus(loop: Loop, c1: float, c2: float, grid: FloatArray) -> tuple[float, float]:
-    """Smallest |1 + L| and where."""
-
-    def distance(omega: FloatArray) -> FloatArray:
-        return np.abs(1.0 + loop.open_loop(1j * omega, c1, c2))
-
-    value, omega = _smallest(distance, grid)
-    limit, _ = _at_infinity(loop, c1, c2)
-    return (value, omega) if value <= limit else (limit, np.inf)
+        if not complete:
+            raise CountError(
+                f"no margin at (c1, c2) = ({c1}, {c2}): following L takes more than "
+                f"{contour.MOST_STEPS:.0e} steps, because gain times delay is too large",
+                np.array([[c1, c2]]),
+            )
+        if found >= best:
+            if tolerance == TOLERANCE:
+                break
+            continue
+        best, where = found, omega
+        sides = max(omega - width, 0.5 * omega), omega + width
+        nearby = minimize_scalar(
+            distance, bounds=sides, method="bounded", options={"xatol": 1e-9 * width}
+        )
+        if nearby.fun < best:
+            best, where = float(nearby.fun), float(nearby.x)
+    return best, where
 
 
 def modulus_margin(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> float:
@@ -198,16 +225,15 @@ def modulus_margin(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> float:
     Returns
     -------
     float
-        The infimum over all omega > 0, the limit at high frequency included. For a neutral
-        loop that limit is taken over all small changes of the two delays.
+        The infimum over all omega > 0, the limit at high frequency included, to a part in a
+        million. For a neutral loop that limit is taken over all small changes of the delays.
 
     Raises
     ------
     TypeError, ValueError
         If `loop` is no `Loop`, or c1 or c2 is not finite and real.
     CountError
-        If the chain of a neutral loop is not confined, or gain times delay is too large to
-        follow.
+        If the neutral root chain is not confined, or gain times delay is too large to follow.
 
     Examples
     --------
@@ -217,59 +243,160 @@ def modulus_margin(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> float:
     """
     checked_loop(loop)
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
-    _require_confined(loop, c1, c2)
-    return _modulus(loop, c1, c2, _grid(loop, c1, c2))[0]
+    return _smallest(loop, c1, c2, symmetric=False)[0]
 
 
-def _require_confined(loop: Loop, c1: float, c2: float) -> None:
-    """Raise where a neutral loop's chain of roots is not confined."""
-    end = float(last_crossing(loop, c1, c2))
-    if np.isnan(end):
-        raise CountError(
-            f"no margin at (c1, c2) = ({c1}, {c2}): a number overflows", np.array([[c1, c2]])
-        )
-    if end == np.inf:
-        raise CountError(
-            f"no margin at (c1, c2) = ({c1}, {c2}): the loop's high-frequency chain of roots "
-            f"is not confined to the left half-plane",
-            np.array([[c1, c2]]),
+def _unconfined(c1: float, c2: float) -> CountError:
+    return CountError(
+        f"no margin at (c1, c2) = ({c1}, {c2}): the neutral root chain is not confined to the "
+        f"left half-plane",
+        np.array([[c1, c2]]),
+    )
+
+
+def _require_stable(loop: Loop, c1: float, c2: float) -> None:
+    """Raise unless 1 + L has all its zeros in the open left half-plane."""
+    count = int(unstable_roots(loop, c1, c2))
+    if count != 0:
+        raise ValueError(
+            f"the loop must be stable at (c1, c2) = ({c1}, {c2}) to have margins, but "
+            f"unstable_roots gives {count}"
         )
 
 
 def _crossovers(loop: Loop, c1: float, c2: float, end: float) -> FloatArray:
-    """Frequencies with |L| = 1, ascending."""
-    above = loop_numerator(loop, c1, c2)
-    below = loop.rest_on_boundary()
-    excess = above.times_conjugate(above).plus(below.times_conjugate(below).scaled(-1.0))
-    # sign_changes looks at the imaginary part.
-    turned = ExponentialSum(1j * excess.coefficients, excess.phases, 1j * excess.sums)
-    omega, jump = sign_changes(turned, end)
-    omega = omega[(omega > 0.0) & (jump != 0)]
-
-    def excess_at(u: float) -> float:
-        return float(np.log(np.abs(loop.open_loop(1j * np.exp(u), c1, c2))))
-
-    polished = []
-    for w in omega:
-        low, high = np.log(w) - 1e-6, np.log(w) + 1e-6
-        if excess_at(low) * excess_at(high) < 0.0:
-            w = np.exp(brentq(excess_at, low, high, xtol=1e-14, rtol=1e-14))
-        polished.append(float(w))
-    return np.array(polished)
+    """Frequencies with |L| = 1 up to `end`, ascending."""
+    above, below = loop_numerator(loop, c1, c2), loop.rest_on_boundary()
+    squares = above.times_conjugate(above).plus(below.times_conjugate(below).scaled(-1.0))
+    omega, jump = sign_changes(squares.turned(), end)
+    return omega[(omega > 0.0) & (jump != 0)]
 
 
-def _scaled(loop: Loop, factor: float) -> Loop:
-    """Return the loop with its gain multiplied by a factor."""
-    controller = loop.controller
-    return Loop(
-        Controller(controller.zeros, controller.poles, controller.gain * factor),
-        loop.mapping,
-        loop.tau1,
-        loop.tau2,
+def _phase_and_delay(
+    loop: Loop, c1: float, c2: float, highest: float
+) -> tuple[float, float, float]:
+    """Phase margin, delay margin, and the frequency of the former, up to `highest`.
+
+    A neutral loop may have crossovers without end. Then its delay margin is zero, and its
+    phase margin may be that of the disc that L fills at high frequency.
+    """
+    phase, delay, where = np.inf, np.inf, np.nan
+    c = poly.polyadd(loop.b1, loop.b2)
+    end = last_larger(loop.rest, (c, loop.b1, loop.b2), np.array([1.0, abs(c1), abs(c2)]))
+    if not np.isfinite(end) and np.isfinite(highest):
+        end = highest
+    elif not np.isfinite(end):
+        phase, delay, where = _limit_phase(*_limit_disc(loop, c1, c2)), 0.0, np.inf
+        end = _settled_from(loop)
+    omega = _crossovers(loop, c1, c2, min(end, highest))
+
+    def lags(at: FloatArray) -> FloatArray:
+        turned = np.angle(loop.open_loop(1j * at, c1, c2)) + np.pi
+        return np.asarray(np.mod(turned, 2.0 * np.pi))
+
+    if omega.size:
+        lag = lags(omega)
+        # A lag turns L clockwise; a lead may reach -1 sooner.
+        nearest = np.minimum(lag, 2.0 * np.pi - lag)
+        chosen = np.unique(
+            np.concatenate(
+                (np.argsort(nearest)[:_POLISHED], np.argsort(lag / omega)[:_POLISHED])
+            )
+        )
+        at = np.array([_polished(loop, c1, c2, float(w)) for w in omega[chosen]])
+        lag = lags(at)
+        nearest = np.minimum(lag, 2.0 * np.pi - lag)
+        worst = int(np.argmin(nearest))
+        if nearest[worst] < phase:
+            phase, where = float(nearest[worst]), float(at[worst])
+        delay = min(delay, float(np.min(lag / at)))
+    return phase, delay, where
+
+
+def _polished(loop: Loop, c1: float, c2: float, omega: float) -> float:
+    """Return a crossover near one that was found on the expanded sums."""
+
+    def excess(u: float) -> float:
+        return float(np.log(np.abs(loop.open_loop(1j * math.exp(u), c1, c2))))
+
+    low, high = math.log(omega) - 1e-6, math.log(omega) + 1e-6
+    # Not past the next null of an arm.
+    span = 0.01 / loop.longest_delay
+    low, high = (
+        max(low, math.log(max(omega - span, 0.5 * omega))),
+        min(high, math.log(omega + span)),
     )
+    if excess(low) * excess(high) < 0.0:
+        return math.exp(brentq(excess, low, high, xtol=1e-14, rtol=1e-14))
+    return omega
 
 
-def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float]:
+def _limit_phase(centre: float, radius: float) -> float:
+    """Smallest phase margin on the part of the unit circle inside a disc; inf if there is none.
+
+    The unit circle enters the disc at the angles with cos = (1 + centre^2 - radius^2) / (2
+    centre).
+    """
+    if centre == 0.0:
+        return 0.0 if radius >= 1.0 else np.inf
+    cosine = (1.0 + centre * centre - radius * radius) / (2.0 * centre)
+    if abs(cosine) > 1.0:
+        return np.inf
+    return math.pi - math.acos(cosine)
+
+
+def _settled_from(loop: Loop) -> float:
+    """Frequency past which the disc of a neutral loop is close to its limit."""
+    r = float(loop.rest[-1])
+    ends = []
+    for b in (loop.b1, loop.b2):
+        share = float(b[-1]) / r if b.size == loop.rest.size else 0.0
+        left = poly.polysub(b, share * loop.rest)[: loop.rest.size - 1]
+        scale = max(abs(share), 1.0) * _SETTLED
+        ends.append(last_larger(loop.rest, (left,), np.array([1.0 / scale])))
+    return max(ends)
+
+
+def _chain_gains(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
+    """Gain factors around one between which the neutral root chain is confined.
+
+    A factor k multiplies the disc of L at high frequency; the chain is confined while that
+    stays clear of -1.
+    """
+    centre, radius = _limit_disc(loop, c1, c2)
+    limits = [-1.0 / end for end in (centre - radius, centre + radius) if end < 0.0]
+    lower = max((k for k in limits if k < 1.0), default=0.0)
+    return lower, min((k for k in limits if k > 1.0), default=np.inf)
+
+
+def _no_crossing_from(loop: Loop, c1: float, c2: float, low: float, high: float) -> float:
+    r"""Frequency past which no gain factor from `low` to `high` takes a root across the axis.
+
+    With t = 1 / k from 1 / high to 1 / low, and S = |c1 B1| + |c2 B2|, the square of
+    |t R + C| - S must stay positive. \|t R + C\|^2 is convex in t. If it ascends at the lower
+    end of the interval, it is smallest there; if it descends at the upper end, there.
+    """
+    c = poly.polyadd(loop.b1, loop.b2)
+    arms = np.array([abs(c1), abs(c2)])
+    found = [last_larger(loop.rest, (c, loop.b1, loop.b2), np.array([high, *(high * arms)]))]
+    if not loop.delay:
+        for t, sign in ((1.0 / high, 1.0), (1.0 / low, -1.0)):
+            ascends = math.sqrt(contour.last_root_bound(_ascent(loop.rest, c, t, sign)))
+            first = poly.polyadd(t * loop.rest, c)
+            found.append(max(ascends, last_larger(first, (loop.b1, loop.b2), arms)))
+    return min(found)
+
+
+def _ascent(rest: FloatArray, c: FloatArray, t: float, sign: float) -> FloatArray:
+    """Half the slope of |t R + C|^2 in t, times a sign, as a polynomial in omega^2."""
+    whole = poly.polyadd(t * rest, c)
+    product = np.convolve(whole, rest * (-1.0) ** np.arange(rest.size))[::2]
+    return np.asarray(sign * product * (-1.0) ** np.arange(product.size))
+
+
+def gain_interval(
+    loop: Loop, c1: float, c2: float, *, highest: float = np.inf
+) -> tuple[float, float, float]:
     r"""Find the gain factors around one between which a stable loop stays stable.
 
     Parameters
@@ -278,11 +405,14 @@ def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float
         The loop.
     c1, c2 : float
         Multiplicative perturbations, at which the loop is stable.
+    highest : float, optional
+        Only crossings up to this angular frequency, in rad/s, are looked for.
 
     Returns
     -------
     lower, upper, omega : float
-        The two factors, 0 and inf if unbounded, and where the upper one is taken, in rad/s.
+        The two factors, and where the upper one is taken, in rad/s; 0, inf and nan where
+        nothing between factors of 1e-6 and 1e6 bounds them.
 
     Raises
     ------
@@ -300,7 +430,7 @@ def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float
 
         R + k N = 0 , \qquad k = -\frac{1}{L} \text{ is real.}
 
-    The chain of a neutral loop bounds the gain, too.
+    The neutral root chain bounds the gain, too.
 
     Examples
     --------
@@ -313,58 +443,102 @@ def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float
     checked_loop(loop)
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
     _require_stable(loop, c1, c2)
-    crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
-    lower, upper, where = 0.0, np.inf, np.nan
-    floor, limit = _chain_gains(loop, c1, c2) if loop.neutral else (0.0, np.inf)
+    numerator, rest = loop_numerator(loop, c1, c2), loop.rest_on_boundary()
+    crossing = numerator.times_conjugate(rest)
+    floor, limit = _chain_gains(loop, c1, c2)
     # A real root crosses at s = 0.
-    start, first = loop_numerator(loop, c1, c2).sums[0].real, float(loop.rest[0])
+    start, first = float(loop.b1[0] * (1.0 - c1) + loop.b2[0] * (1.0 - c2)), float(loop.rest[0])
     at_zero = [-first / start] if start * first < 0.0 else []
-    for top in 10.0 ** np.arange(1.0, 7.0):
-        factors = np.concatenate((np.geomspace(1e-6, 1.0, 13), np.geomspace(1.0, top, 13)))
-        if np.isfinite(limit):
-            # Just below the limit of the chain, roots cross at ever higher frequency.
-            factors = np.append(factors, limit * np.array([0.99, 1.0 - 1e-4, 1.0 - 1e-6]))
-        factors = np.append(factors, floor * np.array([1.01, 1.0 + 1e-4, 1.0 + 1e-6]))
-        # Beyond its limits the chain is lost all the same.
-        factors = factors[(factors > floor) & (factors < limit)]
-        ends = np.array([float(last_crossing(_scaled(loop, k), c1, c2)) for k in factors])
-        omega, jump = sign_changes(crossing, float(ends[~np.isposinf(ends)].max()))
+
+    def factors(low: float, high: float) -> tuple[FloatArray, FloatArray]:
+        """Factors that take a root to the axis, and where."""
+        end = min(_no_crossing_from(loop, c1, c2, low, high), highest)
+        omega, jump = sign_changes(crossing, end)
         omega = omega[(omega > 0.0) & (jump != 0)]
         value = loop.open_loop(1j * omega, c1, c2).real
-        factor = np.concatenate((at_zero, -1.0 / value[value < 0.0]))
-        place = np.concatenate((np.zeros(len(at_zero)), omega[value < 0.0]))
-        lower = max([floor, *factor[factor < 1.0]])
-        if (factor > 1.0).any():
-            best = int(np.argmin(np.where(factor > 1.0, factor, np.inf)))
-            upper, where = float(factor[best]), float(place[best])
-        if limit < upper:
-            upper, where = limit, np.inf
+        negative = value < 0.0
+        found = np.concatenate((at_zero, -1.0 / value[negative]))
+        return found, np.concatenate((np.zeros(len(at_zero)), omega[negative]))
+
+    # Just inside the limits of the chain, roots cross at ever higher frequency.
+    found, _ = factors(max(floor * (1.0 + 1e-6), 1.0 / LARGEST_GAIN), 1.0)
+    lower = max([floor, *found[found < 1.0]])
+    upper, where = limit, (np.inf if np.isfinite(limit) else np.nan)
+    for top in 10.0 ** np.arange(1.0, math.log10(LARGEST_GAIN) + 0.5):
+        high = min(top, limit * (1.0 - 1e-6))
+        found, omega = factors(1.0, high)
+        above = np.flatnonzero((found > 1.0) & (found < upper))
+        if above.size:
+            best = above[np.argmin(found[above])]
+            upper, where = float(found[best]), float(omega[best])
         if upper <= top:
             break
-    return float(lower), float(upper), where
+    if lower < 1.0 / LARGEST_GAIN:
+        lower = 0.0
+    return (
+        (float(lower), upper, where)
+        if upper <= LARGEST_GAIN
+        else (float(lower), np.inf, np.nan)
+    )
 
 
-def _chain_gains(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
-    r"""Gain factors around one between which the chain of a neutral loop is confined.
+def _free_margins(
+    loop: Loop, c1: float, c2: float, lowest: float
+) -> tuple[FloatArray, FloatArray]:
+    """Margins over all phases of the two arms, from a frequency on, and where they are met.
 
-    With r, b1 and b2 the highest coefficients of R, B1 and B2, and a factor k, where
-
-    .. math::
-
-        |r + k (b_1 + b_2)| > k \left( |c_1 b_1| + |c_2 b_2| \right) .
+    In the order of `armlock.infimum.free_margins_at`. A coarse sample gives values that occur.
+    The certified walk then steps over what cannot hold smaller ones.
     """
-    _, b1, b2 = loop.highest_coefficients
-    open_lead = float(loop.rest[-1])
-    # Relative to r, so that the left-hand side is |1 + k sum|.
-    together, apart = (b1 + b2) / open_lead, (abs(c1 * b1) + abs(c2 * b2)) / abs(open_lead)
-    # 1 + k sum = k spread, and -(1 + k sum) = k spread.
-    limits = [1.0 / rate for rate in (apart - together, -together - apart) if rate > 0.0]
-    lower = max((k for k in limits if k < 1.0), default=0.0)
-    return lower, min((k for k in limits if k > 1.0), default=np.inf)
+    c = poly.polyadd(loop.b1, loop.b2)
+    arms = np.array([abs(c1), abs(c2)])
+    centre, radius = _limit_disc(loop, c1, c2)
+    if radius >= abs(1.0 + centre):
+        raise _unconfined(c1, c2)
+    limit = infimum.free_margins_at(complex(centre), radius, np.inf)
+    # Past it no gain factor up to the largest one takes L to -1, and nothing has a phase.
+    largest = np.array([1.0, *arms]) * LARGEST_GAIN
+    end = last_larger(loop.rest, (c, loop.b1, loop.b2), largest)
+    if not np.isfinite(end):
+        end = _settled_from(loop)
+    for symmetric in (False, True):
+        level = min(_limit(loop, c1, c2, symmetric), 1.0) * (1.0 - TOLERANCE)
+        end = max(end, _clear_from(loop, c1, c2, *infimum.excluded_disc(level, symmetric)))
+    end = max(end, 2.0 * lowest)
+
+    def at(u: float) -> FloatArray:
+        omega = math.exp(u)
+        first, second = (complex(k) for k in loop.arm_responses(1j * omega))
+        spread = abs(c1 * first) + abs(c2 * second)
+        return infimum.free_margins_at(first + second, spread, omega)
+
+    u = np.linspace(math.log(lowest), math.log(end), 400)
+    sampled = np.array([at(value) for value in u])
+    best, where = limit.copy(), np.full(limit.size, np.inf)
+    for k in range(best.size):
+        nearest = int(np.argmin(sampled[:, k]))
+        if not sampled[nearest, k] < best[k]:
+            continue
+        best[k], where[k] = sampled[nearest, k], math.exp(u[nearest])
+        sides = u[max(nearest - 1, 0)], u[min(nearest + 1, u.size - 1)]
+        found = minimize_scalar(lambda v, k=k: at(v)[k], bounds=sides, method="bounded")
+        if found.fun < best[k]:
+            best[k], where[k] = float(found.fun), math.exp(float(found.x))
+    smaller, places, complete = infimum.free_margins(
+        loop.rest_on_boundary().compiled(), arms, loop.delay, lowest, end, best, 1e-5
+    )
+    if not complete:
+        raise CountError(
+            f"no margins for free phases at (c1, c2) = ({c1}, {c2}) from {lowest} rad/s on",
+            np.array([[c1, c2]]),
+        )
+    return smaller, np.where(np.isnan(places), where, places)
 
 
-def margins(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> Margins:
-    """Compute all margins of a stable loop.
+def margins(
+    loop: Loop, c1: float = 1.0, c2: float = 1.0, free_above: float | None = None
+) -> Margins:
+    r"""Compute all margins of a stable loop.
 
     Parameters
     ----------
@@ -372,6 +546,11 @@ def margins(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> Margins:
         The loop.
     c1, c2 : float, optional
         Multiplicative perturbations.
+    free_above : float, optional
+        Angular frequency in rad/s above which the phases of both arms are taken as free, as
+        they are once the arms have drifted by a fraction of the modulation's wavelength: the
+        margins then hold for all of them. By default the phases are those of the delays, at
+        all frequencies.
 
     Returns
     -------
@@ -380,15 +559,29 @@ def margins(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> Margins:
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no `Loop`, c1 or c2 is not finite and real, or the loop is not stable
-        there.
+        If `loop` is no `Loop`, c1 or c2 is not finite and real, `free_above` is not positive,
+        or the loop is not stable there.
     CountError
         If gain times delay is too large to follow.
 
     Notes
     -----
-    Phase and delay margins are taken over the crossovers up to the frequency past which L
-    has settled to its limit; a neutral loop has crossovers without end.
+    Phase and delay margins are taken over all crossovers. A neutral loop may have crossovers
+    without end; they then approach those of the disc below, and the phase margin is certified
+    to 1e-4 rad.
+
+    With free phases, L fills a disc: with the sensor's weights m1 and m2
+
+    .. math::
+
+        \left| L - K e^{-s\delta} (m_1 + m_2) \right|
+        \le |K| \left( |c_1 m_1| + |c_2 m_2| \right) .
+
+    The distances of this disc from -1, and of its share of the unit circle and of the real
+    axis, are known in closed form at each frequency. A disc that holds -1 has margins of zero.
+    With equal weights m and c1 = c2 = 1 the disc is that around K m exp(-s delay) times two
+    whose edge runs through the origin: it stays clear of -1, for arms of any lengths, where
+    Re [K m exp(-s delay)] > -1/4.
 
     Examples
     --------
@@ -399,32 +592,25 @@ def margins(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> Margins:
     """
     checked_loop(loop)
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
+    highest = np.inf if free_above is None else positive_number("free_above", free_above)
     _require_stable(loop, c1, c2)
-    grid = _grid(loop, c1, c2)
-    modulus, modulus_omega = _modulus(loop, c1, c2, grid)
-
-    def ratio(omega: FloatArray) -> FloatArray:
-        return _ratio(loop.open_loop(1j * omega, c1, c2))
-
-    disk = 2.0 * min(_smallest(ratio, grid)[0], _at_infinity(loop, c1, c2)[1])
-    omega = _crossovers(loop, c1, c2, float(grid[-1]))
-    phase, delay, phase_omega = np.inf, np.inf, np.nan
-    if omega.size:
-        lag = np.mod(np.angle(loop.open_loop(1j * omega, c1, c2)) + np.pi, 2.0 * np.pi)
-        # A lag turns L clockwise; a lead may reach -1 sooner.
-        nearest = np.minimum(lag, 2.0 * np.pi - lag)
-        worst = int(np.argmin(nearest))
-        phase, phase_omega = float(nearest[worst]), float(omega[worst])
-        delay = float(np.min(lag / omega))
-    if loop.neutral:
-        # With a delay of its own, L enters the chain with all its parts in any phase.
-        _, b1, b2 = loop.highest_coefficients
-        if abs(b1 + b2) + abs(c1 * b1) + abs(c2 * b2) >= abs(float(loop.rest[-1])):
-            delay = 0.0
-    lower, upper, gain_omega = gain_interval(loop, c1, c2)
-    return Margins(
-        lower, upper, phase, delay, modulus, disk, gain_omega, phase_omega, modulus_omega
-    )
+    modulus, modulus_omega = _smallest(loop, c1, c2, symmetric=False, highest=highest)
+    ratio, _ = _smallest(loop, c1, c2, symmetric=True, highest=highest)
+    phase, delay, phase_omega = _phase_and_delay(loop, c1, c2, highest)
+    lower, upper, gain_omega = gain_interval(loop, c1, c2, highest=highest)
+    if free_above is not None:
+        free, where = _free_margins(loop, c1, c2, highest)
+        if free[infimum.MODULUS] < modulus:
+            modulus, modulus_omega = free[infimum.MODULUS], where[infimum.MODULUS]
+        if free[infimum.PHASE] < phase:
+            phase, phase_omega = free[infimum.PHASE], where[infimum.PHASE]
+        if free[infimum.GAIN] < upper:
+            upper, gain_omega = free[infimum.GAIN], where[infimum.GAIN]
+        ratio, delay = min(ratio, free[infimum.RATIO]), min(delay, free[infimum.DELAY])
+        lower = max(lower, 1.0 / free[infimum.INVERSE_GAIN])
+    numbers = lower, upper, phase, delay, modulus, 2.0 * ratio
+    places = gain_omega, phase_omega, modulus_omega
+    return Margins(*(float(value) for value in (*numbers, *places)))
 
 
 def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
@@ -440,21 +626,22 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
     Returns
     -------
     float
-        Smallest eps > 0 such that the loop at (1, 1) + eps (d1, d2) is not stable: a root
-        reaches the imaginary axis there, or a neutral loop's high-frequency chain does. 0 if
-        it is not stable from the start on, inf if no eps breaks it: that is, if the direction
-        has no effect.
+        Smallest eps > 0 such that `unstable_roots` at (1, 1) + eps (d1, d2) is not zero: a
+        root reaches the imaginary axis there, or the neutral root chain does. 0 if it is not
+        stable next to (1, 1), inf if no eps breaks it, up to parameters of 1e9.
 
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no `Loop`, or the direction is not two finite real numbers, has length
-        zero, or is so long or short that the result is no ordinary float.
-    ValueError
-        If the loop is unstable at (1, 1) itself.
+        If `loop` is no `Loop`, the direction is not two finite real numbers or has length
+        zero, or the loop is unstable at (1, 1) itself.
     CountError
         If the counts on the two sides of the result contradict it, or gain times delay is too
         large to follow.
+
+    See Also
+    --------
+    armlock.rays.first_break : from other points, and with the frequency.
 
     Notes
     -----
@@ -462,15 +649,8 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
 
     .. math::
 
-        \varepsilon = \frac{D(s; 1, 1)}
+        \varepsilon = \frac{D(s; 1, 1)\, e^{s\delta}}
         {d_1 B_1 e^{-s\tau_1} + d_2 B_2 e^{-s\tau_2}} \text{ is real.}
-
-    These frequencies are found with certified steps, up to ever larger eps: in a direction
-    with an effect the delayed terms end up larger than all others, and break the loop.
-
-    Below the limit of a chain roots cross at ever higher frequency. Where the first of them
-    crosses closer to the limit than 1e-6 of it, and at more than 50 000 turns of the longest
-    delay, the limit is returned instead.
 
     Examples
     --------
@@ -478,105 +658,4 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
     >>> print(f"{critical_perturbation(paper_loop(), (0, -1)):.4e}")
     2.9286e-06
     """
-    checked_loop(loop)
-    vector = axis("direction", direction)
-    if vector.size != 2:
-        raise ValueError(f"direction must hold two numbers, got {vector.size}")
-    if not vector.any():
-        raise ValueError("direction must not have length zero, got (0, 0)")
-    start = int(unstable_roots(loop, 1.0, 1.0))
-    if start not in (0, BOUNDARY):
-        raise ValueError(
-            f"the loop must be stable at (1, 1) to lose stability, but unstable_roots gives "
-            f"{start} there"
-        )
-    # Components without effect would hide the size of the others.
-    vector = np.where([loop.b1.any(), loop.b2.any()], vector, 0.0)
-    if _without_effect(loop, vector):
-        return np.inf if start == 0 else 0.0
-    # By a power of two, which rounds nothing.
-    exponent = int(np.frexp(np.abs(vector).max())[1])
-    eps = _critical(loop, start, *(float(part) for part in np.ldexp(vector, -exponent)))
-    with np.errstate(over="ignore", under="ignore"):
-        found = float(np.ldexp(eps, -exponent))
-    if eps != 0.0 and not np.finfo(float).tiny <= found < np.inf:
-        raise ValueError(
-            f"direction must be of a size for which the result is a float, got "
-            f"{tuple(vector.tolist())}: it is {eps} times 2**{-exponent}"
-        )
-    return found
-
-
-def _without_effect(loop: Loop, vector: FloatArray) -> bool:
-    """Whether D stays what it is along a direction."""
-    if loop.tau1 != loop.tau2 or not vector.any():
-        return not vector.any()
-    share1, share2 = vector / np.abs(vector).max()
-    return not poly.polyadd(share1 * loop.b1, share2 * loop.b2).any()
-
-
-def _critical(loop: Loop, start: int, d1: float, d2: float) -> float:
-    """`critical_perturbation` for a direction of ordinary size that acts on the loop."""
-    scale = 1.0 / float(np.hypot(d1, d2))
-    nearby = scale * 1e-9
-    if start == BOUNDARY and int(unstable_roots(loop, 1.0 + nearby * d1, 1.0 + nearby * d2)):
-        return 0.0
-    ray = Ray(loop, (1.0, 1.0), (d1, d2))
-    chain = _chain_limit(loop, d1, d2)
-    reaches = scale * 10.0 ** np.array([-8.0, -6.0, -4.0, -2.0, *np.arange(0.0, 150.0)])
-    # Just below the limit of the chain, roots cross at ever higher frequency.
-    closer = chain * (1.0 - np.array([1e-2, 1e-4, 1e-6, 1e-8, 1e-10]))
-    for top in [*reaches[reaches < closer[0]], *closer[np.isfinite(closer)]]:
-        turns = ray.end(float(top)) * loop.longest_delay / (2.0 * np.pi)
-        if top > closer[2] and turns > _TURNS_BELOW_CHAIN:
-            break
-        # A boundary at (1, 1) itself, at the lower bound, is not a crossing beyond it.
-        found = ray.crossings(float(top), first=True, lowest=1e-15 * scale)
-        if found.position.size:
-            return _confirmed(loop, d1, d2, float(found.position[0]))
-    if np.isfinite(chain):
-        return _confirmed(loop, d1, d2, chain)
-    # What acts on a loop with delays breaks it once it is large enough.
-    raise CountError(
-        f"no crossing up to {reaches[-1]} along ({d1}, {d2})", np.array([[d1, d2]])
-    )
-
-
-def _chain_limit(loop: Loop, d1: float, d2: float) -> float:
-    """Smallest eps > 0 at which the chain of a neutral loop ceases to be confined."""
-    if not loop.neutral:
-        return np.inf
-
-    a, b1, b2 = (abs(value) for value in loop.highest_coefficients)
-
-    def spare(eps: float) -> float:
-        return a - abs(1.0 + eps * d1) * b1 - abs(1.0 + eps * d2) * b2
-
-    # Piecewise linear and concave: one zero beyond the last kink.
-    kinks = [0.0, *(-1.0 / d for d in (d1, d2) if d < 0.0)]
-    slope = -(abs(d1) * b1 + abs(d2) * b2)
-    candidates = []
-    for low, high in zip(sorted(kinks), [*sorted(kinks)[1:], np.inf], strict=True):
-        if spare(low) > 0.0 and np.isfinite(high) and spare(high) <= 0.0:
-            candidates.append(brentq(spare, low, high, xtol=1e-300, rtol=1e-15))
-        elif spare(low) > 0.0 and not np.isfinite(high) and slope < 0.0:
-            candidates.append(low - spare(low) / slope)
-    return min(candidates, default=np.inf if spare(0.0) > 0.0 else 0.0)
-
-
-def _confirmed(loop: Loop, d1: float, d2: float, eps: float) -> float:
-    """Hold a critical perturbation against counts on its two sides."""
-    before = int(unstable_roots(loop, 1.0 + 0.5 * eps * d1, 1.0 + 0.5 * eps * d2))
-    if before != 0:
-        raise CountError(
-            f"stability along ({d1}, {d2}) is lost before {eps}, where no crossing was found",
-            np.array([[1.0 + 0.5 * eps * d1, 1.0 + 0.5 * eps * d2]]),
-        )
-    beyond = 1.0 + 1e-6
-    after = int(unstable_roots(loop, 1.0 + beyond * eps * d1, 1.0 + beyond * eps * d2))
-    if after == 0:
-        raise CountError(
-            f"the loop is stable beyond the crossing at {eps} along ({d1}, {d2})",
-            np.array([[1.0 + beyond * eps * d1, 1.0 + beyond * eps * d2]]),
-        )
-    return eps
+    return first_break(checked_loop(loop), (1.0, 1.0), axis("direction", direction)).position

@@ -7,7 +7,7 @@ the encirclements are then held against the count of unstable roots: Z = N + P.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import factorial
 from typing import TYPE_CHECKING
@@ -31,9 +31,9 @@ from armlock.stability import (
     BOUNDARY,
     UNCONFINED,
     CountError,
-    last_crossing,
+    last_frequency,
     sign_changes,
-    squares_and_leads,
+    squared_magnitudes,
     unstable_roots,
 )
 
@@ -159,13 +159,8 @@ def frequency_response(
 
 
 def loop_numerator(loop: Loop, c1: float, c2: float) -> ExponentialSum:
-    """Return the numerator of L, B1 (1 - c1 e1) + B2 (1 - c2 e2), as an exponential sum."""
-    _, b1, b2 = loop.on_boundary()
-    whole = ExponentialSum(b1.coefficients, np.zeros(1), b1.sums).plus(
-        ExponentialSum(b2.coefficients, np.zeros(1), b2.sums)
-    )
-    undelayed = b1.scaled(1.0 - c1).plus(b2.scaled(1.0 - c2)).sums
-    return whole.plus(loop.deviation(-c1, -c2))._replace(sums=undelayed)
+    """Return the numerator N of L = N / R at s = j omega as an exponential sum."""
+    return loop.at(c1, c2).plus(loop.rest_on_boundary().scaled(-1.0))
 
 
 def _poles_at_zero(loop: Loop, c1: float, c2: float) -> int:
@@ -187,9 +182,8 @@ def _poles_at_zero(loop: Loop, c1: float, c2: float) -> int:
 
 def _poles_elsewhere(loop: Loop) -> ComplexArray:
     """Poles of controller and sensor except those at s = 0."""
-    sensor = poly.polyroots(np.trim_zeros(np.asarray(loop.mapping.denominator), "f"))
-    poles = np.concatenate((np.asarray(loop.controller.poles), sensor))
-    return np.asarray(poles[np.abs(poles) > 0.0], dtype=np.complex128)
+    roots = loop.polynomials()[0].roots
+    return roots[np.abs(roots) > 0.0]
 
 
 def open_loop_poles(loop: Loop) -> int:
@@ -240,41 +234,19 @@ def _refined(
     raise CountError("the Nyquist curve passes through -1", np.empty((0, 2)))
 
 
-def resolving_grid(parts: Sequence[ExponentialSum], end: float) -> FloatArray:
-    """Frequencies from 0 to `end` between which no quotient of the sums can hide anything.
-
-    Between two of them each sum is nearly straight and turns by less than _TURN, so that
-    neither a turn of a quotient nor a dip of its magnitude fits in between. Raises a
-    `CountError` where they are too many.
-    """
-    resolved = [contour.resolved_grid(*part, end, _STRAIGHT) for part in parts]
-    if any(found[-1] < end for found in resolved):
+def _resolving_grid(loop: Loop, c1: float, c2: float, end: float) -> FloatArray:
+    """Frequencies from 0 to `end` between which neither D nor R turns by much."""
+    grids = []
+    for part in (loop.at(c1, c2), loop.rest_on_boundary()):
+        function = part.weights, part.sums, part.phases
+        grids.append(contour.resolved_grid(part.compiled(), function, end, _STRAIGHT))
+    if any(grid[-1] < end for grid in grids):
         raise CountError(
             f"no samples up to omega = {end} rad/s: more than {contour.MOST_SAMPLES:.0e}, "
             f"because gain times delay is too large",
             np.empty((0, 2)),
         )
-    grid = np.unique(np.concatenate(resolved))
-    added, low, high = [grid], grid[:-1], grid[1:]
-    for _ in range(60):
-        wide = np.zeros(low.size, dtype=np.bool_)
-        for part in parts:
-            # A sum that vanishes at s = 0 has no argument there.
-            wide |= np.abs(np.angle(part.at(high) * part.at(low).conj())) > _TURN
-        low, high = low[wide], high[wide]
-        middle = 0.5 * (low + high)
-        inside = (middle > low) & (middle < high)
-        if not inside.any():
-            break
-        low, middle, high = low[inside], middle[inside], high[inside]
-        added.append(middle)
-        # Only what was halved is looked at again.
-        low, high = np.concatenate((low, middle)), np.concatenate((middle, high))
-    grid = np.sort(np.concatenate(added))
-    # Points of different sums that all but coincide tell nothing, and mislead a bracket.
-    gaps = np.diff(grid, prepend=grid[0], append=grid[-1])
-    close = gaps[1:-1] < 1e-4 * np.maximum(gaps[:-2], gaps[2:])
-    return grid[np.concatenate(([True], ~close[:-1], [True]))]
+    return np.unique(np.concatenate(grids))
 
 
 def _rectangle(loop: Loop, c1: float, c2: float, end: float) -> tuple[float, float]:
@@ -376,7 +348,7 @@ def nyquist(
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
     poles = open_loop_poles(loop)
     order = _poles_at_zero(loop, c1, c2)
-    end = float(last_crossing(loop, c1, c2))
+    end = float(last_frequency(loop, c1, c2))
     if np.isnan(end):
         raise CountError(
             f"no Nyquist count at (c1, c2) = ({c1}, {c2}): a number overflows",
@@ -399,7 +371,7 @@ def nyquist(
         turns = end * loop.longest_delay / (2.0 * np.pi)
         check_memory("omega_max", (int(min(400.0 * turns, 1e18)),), 256)
     end, far = _rectangle(loop, c1, c2, end)
-    grid = resolving_grid((loop.at(c1, c2), loop.rest_on_boundary()), end)
+    grid = _resolving_grid(loop, c1, c2, end)
     if omega_max is not None:
         turn = 2.0 * np.pi / loop.longest_delay
         # Finer at first, where L changes most.
@@ -439,14 +411,16 @@ def nyquist(
     )
 
 
-def reach(loop: Loop, c1: float, c2: float, level: float) -> float:
+def frequency_above(loop: Loop, c1: float, c2: float, level: float) -> float:
     """Frequency past which |L| stays below `level`; inf if it does not."""
-    bound: float = contour.last_crossing_bound(
-        *squares_and_leads(loop.rest, loop.b1, loop.b2),
-        (1.0 + abs(c1)) / level,
-        (1.0 + abs(c2)) / level,
+    b1, b2 = loop.b1, loop.b2
+    squares, unit = squared_magnitudes((loop.rest, b1, b2))
+    factors = np.array([1.0 + abs(c1), 1.0 + abs(c2)]) / level
+    leads = [abs(b[-1] / loop.rest[-1]) if b.size == loop.rest.size else 0.0 for b in (b1, b2)]
+    found: float = contour.last_frequency(
+        squares, unit, factors, 1.0 - float(factors @ np.array(leads))
     )
-    return bound
+    return found
 
 
 def axis_crossings(
@@ -497,7 +471,7 @@ def axis_crossings(
     checked_loop(loop)
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
     if omega_max is None:
-        omega_max = reach(loop, c1, c2, 1e-3)
+        omega_max = frequency_above(loop, c1, c2, 1e-3)
         if not np.isfinite(omega_max):
             raise ValueError(
                 "omega_max must be given for a loop whose |L| does not fall to zero at high "

@@ -1,4 +1,4 @@
-"""Along a ray of the parameter plane: every crossing of the axis; and sweeps of any result.
+"""Along a ray of the parameter plane: every crossing of the axis, and the first break.
 
 On a ray (x, y) = start + t direction the characteristic function is D0 - t M, with D0 its
 value at the start. A root lies on the imaginary axis where t = D0 / M is real, so that the
@@ -7,7 +7,7 @@ crossings of a whole ray are the zeros of Im(D0 conj(M)): one certified walk fin
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -17,19 +17,18 @@ from scipy.optimize import brentq
 
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import ComplexArray, FloatArray, IntArray, axis, positive_number
-from armlock.stability import CountError, last_crossing, sign_changes
+from armlock.stability import CountError, last_frequency, sign_changes, unstable_roots
 
 P = TypeVar("P")
 R = TypeVar("R", bound=tuple[Any, ...])
 
-# How much longer, in frequency, each further walk is than the one before.
-_LONGER = 4.0
-# Halvings by which the end of a walk is placed on its ray.
-_HALVINGS = 40
-# The same into several parts.
-_DIVISIONS, _PARTS = 10, 16
-# Delay in s that stands in for none.
-_SHORTEST = 1e-12
+#: Parameters this many times the length of the start and the direction are not looked at.
+FARTHEST = 1e9
+# Each further walk along a ray is so many times as long as the one before.
+_LONGER = 16.0
+# Next to the limit of the neutral root chain, roots cross at ever higher frequency. They are
+# followed up to so many turns of the longest delay, about a tenth of a second.
+_TURNS_NEXT_TO_THE_CHAIN = 50_000
 
 
 class Crossings(NamedTuple):
@@ -51,7 +50,11 @@ class Crossings(NamedTuple):
 
 
 class Crossing(NamedTuple):
-    """One crossing as in `Crossings`; (inf, nan, 0) where there is none."""
+    """One crossing as in `Crossings`; (inf, nan, 0) where there is none.
+
+    Where the neutral root chain is lost first, `position` is its limit, `omega` is inf, and
+    `change` is 0.
+    """
 
     position: float
     omega: float
@@ -71,40 +74,65 @@ class Ray:
                 raise ValueError(f"{name} must hold two numbers, got {value.size}")
         if not self.direction.any():
             raise ValueError("direction must not have length zero, got (0, 0)")
-        self.start_end = float(last_crossing(system, *self.start))
-        pull = system.deviation(*self.direction)
-        self.family = system.at(*self.start).times_conjugate(pull)
+        self.family = system.at(*self.start).times_conjugate(system.deviation(*self.direction))
+
+    def at(self, t: float) -> tuple[float, float]:
+        """Return the point start + t direction."""
+        x, y = self.start + t * self.direction
+        return float(x), float(y)
 
     def end(self, t: float) -> float:
         """Frequency past which no root crosses between 0 and t.
 
-        |x B1| + |y B2| is convex along the ray, and thus largest at one of the two ends.
+        The terms with x and y are convex along the ray, and thus largest at one of its ends.
         """
-        return float(self.ends(np.array([t]))[0])
+        points = np.array([self.at(0.0), self.at(t)])
+        return float(last_frequency(self.system, *points.T).max())
 
-    def ends(self, t: FloatArray) -> FloatArray:
-        """`end` at several t."""
-        points = self.start + t[:, None] * self.direction
-        return np.asarray(np.maximum(self.start_end, last_crossing(self.system, *points.T)))
+    def chain_limit(self) -> float:
+        """Smallest t > 0 at which the neutral root chain is not confined, inf if there is none.
 
-    def unconfined(self, stop: float) -> ValueError:
-        """Return the error for a ray on which a neutral loop's chain is lost."""
-        return ValueError(
-            f"the ray must stay where the high-frequency chain of roots is confined, but "
-            f"{self.system!r} loses it before t = {stop}"
-        )
+        The reserve of the chain is concave in t, and linear between the zeros of x and y.
+        """
+
+        def reserve(t: float) -> float:
+            return float(self.system.chain_reserve(*self.at(t)))
+
+        if reserve(0.0) <= 0.0:
+            return 0.0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            kinks = -self.start / self.direction
+        last = max([1.0, *kinks[np.isfinite(kinks) & (kinks > 0.0)]])
+        slope = (reserve(2.0 * last) - reserve(last)) / last
+        if slope < 0.0:
+            beyond = last - reserve(last) / slope
+            if beyond >= last:
+                return float(beyond)
+        edges = sorted({0.0, last, *kinks[(kinks > 0.0) & (kinks < last)]})
+        for low, high in zip(edges, edges[1:], strict=False):
+            if reserve(high) <= 0.0:
+                return float(low + (high - low) * reserve(low) / (reserve(low) - reserve(high)))
+        return np.inf
+
+    def acts(self) -> bool:
+        """Whether D changes along the ray."""
+        system, (d1, d2) = self.system, self.direction
+        if system.delay1 != system.delay2:
+            return bool((d1 * system.b1).any() or (d2 * system.b2).any())
+        return bool(poly.polyadd(d1 * system.b1, d2 * system.b2).any())
 
     def quotient(self, omega: npt.ArrayLike) -> ComplexArray:
-        """D0 / M at s = j omega, shaped like `omega`; nan where the direction does not act."""
+        """D0 / M at s = j omega, shaped like `omega`; nan where M vanishes."""
         system, s = self.system, 1j * np.asarray(omega, dtype=float)
         z = np.exp(s * system.step) if system.step else s
         p1, p2 = self.direction[0] * system.b1, self.direction[1] * system.b2
-        pull = np.asarray(poly.polyval(z, poly.polyadd(p1, p2)), dtype=np.complex128)
-        pull = pull + poly.polyval(z, p1) * np.expm1(-s * system.delay1)
-        pull = pull + poly.polyval(z, p2) * np.expm1(-s * system.delay2)
+        effect = np.asarray(poly.polyval(z, poly.polyadd(p1, p2)), dtype=np.complex128)
+        effect = effect + poly.polyval(z, p1) * np.expm1(-s * system.delay1)
+        effect = effect + poly.polyval(z, p2) * np.expm1(-s * system.delay2)
+        effect = effect * np.exp(-s * system.delay)
         value = system(s, *self.start)
-        acts = pull != 0.0
-        result: ComplexArray = np.where(acts, value / np.where(acts, pull, 1.0), np.nan)
+        acts = effect != 0.0
+        result: ComplexArray = np.where(acts, value / np.where(acts, effect, 1.0), np.nan)
         return result
 
     def polished(self, omega: float) -> float:
@@ -122,12 +150,16 @@ class Ray:
         """Find crossings with `lowest` < t <= stop: all, or the first and what ties with it."""
         end = self.end(stop)
         if end == np.inf:
-            raise self.unconfined(stop)
+            raise ValueError(
+                f"the ray must stay where the neutral root chain is confined, but "
+                f"{self.system!r} loses it before t = {stop}"
+            )
         if np.isnan(end):
             raise CountError(
-                f"no crossings up to t = {stop}: a number overflows",
-                np.array([self.start + stop * self.direction]),
+                f"no crossings up to t = {stop}: a number overflows", np.array([self.at(stop)])
             )
+        if not self.acts():
+            return Crossings(np.empty(0), np.empty(0), np.empty(0, dtype=np.int64))
         omega, change = sign_changes(self.family, end, is_map=self.system.step > 0.0)
         omega, change = omega[change != 0], change[change != 0]
         # Only those in reach are worth polishing.
@@ -141,6 +173,17 @@ class Ray:
         kept = np.flatnonzero((position > lowest) & (position <= stop))
         kept = kept[np.argsort(position[kept], kind="stable")]
         return Crossings(position[kept], omega[kept], change[kept])
+
+    def reaches(self, stop: float, chain: float) -> Iterator[float]:
+        """Yield growing t up to `stop`, or ever closer to the limit of the chain."""
+        t = 1e-12 * stop
+        while t < min(stop, 0.5 * chain):
+            yield t
+            t *= _LONGER
+        if stop < chain:
+            yield stop
+        else:
+            yield from (chain * (1.0 - share) for share in (0.5, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10))
 
 
 def ray_crossings(
@@ -170,7 +213,7 @@ def ray_crossings(
     ------
     TypeError, ValueError
         If start or direction is not two finite real numbers, the direction has length zero,
-        stop is not positive, or a neutral loop's chain of roots is lost on the way.
+        stop is not positive, or the neutral root chain is lost on the way.
     CountError
         If a number overflows, or gain times delay is too large to follow.
 
@@ -181,7 +224,8 @@ def ray_crossings(
 
     .. math::
 
-        t = \frac{D_0}{d_1 B_1 e^{-s\theta_1} + d_2 B_2 e^{-s\theta_2}} \text{ is real.}
+        t = \frac{D_0\, e^{s\delta}}
+        {d_1 B_1 e^{-s\theta_1} + d_2 B_2 e^{-s\theta_2}} \text{ is real.}
 
     A root that lies at s = 0 along the whole ray crosses nowhere and is not reported.
 
@@ -200,9 +244,9 @@ def first_crossing(
     system: CharacteristicFunction,
     start: npt.ArrayLike,
     direction: npt.ArrayLike,
-    stop: float,
+    stop: float | None = None,
 ) -> Crossing:
-    """Find the first crossing of the imaginary axis along a ray.
+    """Find where a root first reaches the imaginary axis along a ray.
 
     Parameters
     ----------
@@ -210,27 +254,30 @@ def first_crossing(
         The loop.
     start, direction : array_like of two floats
         The ray start + t direction in the plane of the free parameters.
-    stop : float
-        Largest t that is looked at.
+    stop : float, optional
+        Largest t that is looked at; by default one at which the parameters are 1e9 times as
+        large as the start, or as one.
 
     Returns
     -------
     Crossing
-        The one of smallest t > 0.
+        The one of smallest t > 0. A root that lies on the axis at the start itself counts as
+        a crossing only where it comes back to it.
 
     Raises
     ------
     TypeError, ValueError
-        As `ray_crossings` does; the loss of a neutral loop's chain only if no root crosses
-        before it.
+        If start or direction is not two finite real numbers, the direction has length zero, or
+        stop is not positive.
     CountError
         If a number overflows, or gain times delay is too large to follow.
 
     Notes
     -----
-    The frequencies that have to be searched grow with t. They are searched in portions, each
-    up to the t before which no higher frequency can cross, so that a near crossing is found
-    at once, however far `stop` is.
+    Walks reach further and further along the ray, so that a near crossing is found at once.
+    Below the limit of the neutral root chain, roots cross at ever higher frequency. Where the
+    first of them crosses closer to the limit than a part in a million, and at more than
+    50 000 turns of the longest delay, the limit is returned in its place.
 
     Examples
     --------
@@ -240,63 +287,103 @@ def first_crossing(
     >>> print(f"{edge.position:.6f} {edge.omega:.4f} {edge.change}")
     0.254006 3.7746 2
     """
-    ray, stop = Ray(system, start, direction), positive_number("stop", stop)
-    limit = ray.start_end
-    if limit == np.inf:
-        raise ray.unconfined(0.0)
-    within = _confined_until(ray, stop)
-    limit = _LONGER * limit if limit > 0.0 else 1.0 / max(system.longest_delay, _SHORTEST)
-    last = 0.0
-    while last < within:
-        top = _reach(ray, limit, within)
-        if top > last:
-            found = ray.crossings(top, first=True)
-            if found.position.size:
-                return Crossing(
-                    float(found.position[0]), float(found.omega[0]), int(found.change[0])
-                )
-            last = top
-        limit *= _LONGER
-    if within < stop:
-        raise ray.unconfined(stop)
-    return Crossing(np.inf, np.nan, 0)
-
-
-def _confined_until(ray: Ray, stop: float) -> float:
-    """Return a t up to which a neutral loop's chain is confined, close to the largest."""
-    if ray.end(stop) != np.inf:
-        return stop
-    low, high = 0.0, stop
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if ray.end(middle) == np.inf else (middle, high)
-    # Closer to the limit roots cross at ever higher frequency.
-    return low * (1.0 - 1e-6)
-
-
-def _reach(ray: Ray, limit: float, stop: float) -> float:
-    """Return a t up to which no root crosses at a frequency above `limit`.
-
-    It is within 1e-6 of the largest: what is left belongs to the next portion.
-    """
-    if ray.end(stop) <= limit:
-        return stop
-    low, high = 0.0, stop
-    if ray.start_end > limit:
-        return 0.0
-    # Several at once, because a call costs as much as a dozen bounds.
-    shares = np.arange(1, _PARTS) / _PARTS
-    for _ in range(_DIVISIONS):
-        tried = low + (high - low) * shares
-        good = ray.ends(tried) <= limit
-        number = int(np.argmin(good)) if not good.all() else good.size
-        if number < good.size:
-            high = float(tried[number])
-        if number > 0:
-            low = float(tried[number - 1])
-        if high - low <= 1e-6 * low:
+    ray = Ray(system, start, direction)
+    scale = max(1.0, float(np.hypot(*ray.start))) / float(np.hypot(*ray.direction))
+    stop = FARTHEST * scale if stop is None else positive_number("stop", stop)
+    chain = ray.chain_limit()
+    for t in ray.reaches(stop, chain):
+        turns = ray.end(t) * system.longest_delay / (2.0 * np.pi)
+        if t > (1.0 - 1e-6) * chain and turns > _TURNS_NEXT_TO_THE_CHAIN:
             break
-    return low
+        # A boundary at the start itself, known to rounding, is not a crossing beyond it.
+        found = ray.crossings(t, first=True, lowest=1e-15 * scale)
+        if found.position.size:
+            return Crossing(
+                float(found.position[0]), float(found.omega[0]), int(found.change[0])
+            )
+    return Crossing(chain, np.inf, 0) if chain <= stop else Crossing(np.inf, np.nan, 0)
+
+
+def first_break(
+    system: CharacteristicFunction, start: npt.ArrayLike, direction: npt.ArrayLike
+) -> Crossing:
+    """Find where a stable system ceases to be stable along a ray.
+
+    Parameters
+    ----------
+    system : CharacteristicFunction
+        The loop, stable at the start or on its boundary of stability there.
+    start, direction : array_like of two floats
+        The ray start + t direction in the plane of the free parameters.
+
+    Returns
+    -------
+    Crossing
+        Its `position` is the smallest t > 0 at which `unstable_roots` is not zero: the first
+        crossing, or the limit of the neutral root chain. It is 0 where the system is not
+        stable next to the start.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As `first_crossing` does, or if the system is unstable at the start.
+    CountError
+        As `first_crossing` does, or if the counts on the two sides of the result contradict
+        it.
+
+    Examples
+    --------
+    >>> from armlock import CommonArm
+    >>> from armlock.rays import first_break
+    >>> print(f"{first_break(CommonArm(), (0.0, 0.0), (1.0, 1.0)).position:.6f}")
+    1.000000
+    """
+    ray = Ray(system, start, direction)
+    count = int(unstable_roots(system, *ray.start))
+    if count > 0 or count == -2:
+        raise ValueError(
+            f"start must be stable to lose stability, but unstable_roots gives {count} at "
+            f"{ray.at(0.0)}"
+        )
+    scale = max(1.0, float(np.hypot(*ray.start))) / float(np.hypot(*ray.direction))
+    if count != 0 and int(unstable_roots(system, *ray.at(1e-9 * scale))) != 0:
+        return Crossing(0.0, np.nan, 0)
+    found = first_crossing(system, start, direction)
+    if not np.isfinite(found.position):
+        return found
+    for share, stable in ((0.5, True), (1.0 + 1e-6, False)):
+        point = ray.at(share * found.position)
+        if (int(unstable_roots(system, *point)) == 0) != stable:
+            raise CountError(
+                f"the first crossing along {tuple(ray.direction.tolist())} lies at t = "
+                f"{found.position}, but the count at {point} contradicts it",
+                np.array([point]),
+            )
+    return found
+
+
+def boundary_radius(system: CharacteristicFunction, directions: npt.ArrayLike) -> FloatArray:
+    """Distance from the origin to the boundary of the stable region.
+
+    Parameters
+    ----------
+    system : CharacteristicFunction
+        A loop or a map, stable at the origin.
+    directions : float array, shape (2, n)
+        Unit vectors in the plane of the free parameters.
+
+    Returns
+    -------
+    float array, shape (n,)
+        Where each ray first meets the boundary.
+
+    Raises
+    ------
+    TypeError, ValueError, CountError
+        As `first_break` does.
+    """
+    vectors = np.asarray(directions, dtype=float).T
+    return np.array([first_break(system, (0.0, 0.0), v).position for v in vectors])
 
 
 def sweep(
@@ -318,9 +405,8 @@ def sweep(
         an engine's map spreads a long sweep over processes or machines; `result` must then be
         a function that can be pickled.
 
-        A pool of processes is best made with the start method "spawn" or "forkserver", which
-        every system has. In a forked process the loops over points and rows run on one core,
-        because the threads of a process do not survive a fork.
+        A pool of processes is made with the start method "spawn" or "forkserver": the threads
+        of a process do not survive a fork.
 
     Returns
     -------
@@ -358,4 +444,12 @@ def sweep(
     return type(found[0])(*(np.array(column) for column in zip(*found, strict=True)))
 
 
-__all__ = ["Crossing", "Crossings", "first_crossing", "ray_crossings", "sweep"]
+__all__ = [
+    "Crossing",
+    "Crossings",
+    "boundary_radius",
+    "first_break",
+    "first_crossing",
+    "ray_crossings",
+    "sweep",
+]

@@ -15,11 +15,10 @@ from typing import overload
 import mpmath
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 from numpy.polynomial import polynomial as poly
 from scipy.interpolate import BarycentricInterpolator
 
-from armlock.characteristic import CharacteristicFunction, ExponentialSum, checked_system
+from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import (
     ComplexArray,
     FloatArray,
@@ -28,8 +27,8 @@ from armlock.checks import (
     real_number,
     whole_number,
 )
-from armlock.contour import EPSILON, _curvature_bound, _evaluate, _real_horner
-from armlock.stability import BOUNDARY, CountError, last_crossing, unstable_roots
+from armlock.contour import EPSILON, resolved_grid
+from armlock.stability import BOUNDARY, CountError, last_frequency, unstable_roots
 from armlock.statespace import realize
 
 # Real parts that differ by less count as equal; relative to |s| or one over the longest delay.
@@ -202,11 +201,13 @@ def extended_root(
             # Both values at once: of the polynomial and of its derivative.
             value, slope = mpmath.polyval(system.rest.tolist(), z, derivative=True, asc=True)
             slope *= dz
+            dead = mpmath.exp(-s * system.delay)
             for b, delay, origin, here in terms:
                 p, change = mpmath.polyval(b.tolist(), z, derivative=True, asc=True)
                 late = here * mpmath.exp(-s * delay)
-                value += p * (origin - late)
-                slope += change * dz * (origin - late) + p * delay * late
+                value += dead * p * (origin - late)
+                slope += dead * (change * dz - system.delay * p) * (origin - late)
+                slope += dead * p * delay * late
             if value == 0:
                 return +s
             if slope == 0:
@@ -224,39 +225,6 @@ def extended_root(
     )
 
 
-@njit(cache=True)
-def _starts(line: ExponentialSum, end: float) -> ComplexArray:
-    """Return where Newton's method leads in one step from the points of a line next to roots.
-
-    They are those points from 0 to `end` at which that step is locally shortest. Over each
-    step of the walk the curvature leaves either D or its slope nearly as it is, so that no
-    root close to the line falls between two points.
-    """
-    bound = _curvature_bound(line.coefficients, line.sums, line.phases)
-    starts = np.empty(64, dtype=np.complex128)
-    found = 0
-    omega, step, target, shortest, approaching = 0.0, end, 0j, np.inf, True
-    while True:
-        value, slope = _evaluate(line.coefficients, line.sums, line.phases, omega)
-        move = value / slope if slope != 0.0 else complex(np.inf, 0.0)
-        if approaching and abs(move) >= shortest:
-            if found == starts.size:
-                starts = np.concatenate((starts, np.empty_like(starts)))
-            starts[found] = target
-            found += 1
-        approaching = abs(move) < shortest
-        target, shortest = 1j * (omega - move), abs(move)
-        if omega >= end:
-            # A root may lie at the end of the line, or past it.
-            return np.append(starts[:found], target)
-        step = min(4.0 * step, end - omega)
-        curvature = _real_horner(bound, omega + step)
-        if curvature > 0.0:
-            straight = max(abs(slope), np.sqrt(abs(value) * curvature)) / curvature
-            step = min(step, max(0.5 * straight, 1e-8 * omega, 1e-16 * end))
-        omega = end if step >= end - omega else omega + step
-
-
 def _acting(
     system: CharacteristicFunction, x: float, y: float, sigma: float
 ) -> tuple[CharacteristicFunction, float, float]:
@@ -268,22 +236,25 @@ def _acting(
     (x0, y0), (b1, b2) = system.reference, (system.b1, system.b2)
     terms = [(b1, system.delay1, x0, x), (b2, system.delay2, y0, y)]
     if system.delay1 == system.delay2:
-        delayed, rest = (poly.polyadd(p * b1, q * b2) for p, q in ((x, y), (x0 - x, y0 - y)))
-        terms = [(delayed, system.delay1, 1.0, 1.0), (rest, 0.0, 1.0, 0.0)]
-    rest, kept = system.rest, []
-    for b, delay, origin, here in terms:
-        if here != 0.0 and b.any() and sigma * delay <= _VANISHED:
-            kept.append((b, delay, origin, here))
-        else:
-            rest = np.asarray(poly.polyadd(rest, origin * b))
-            kept.append((np.zeros(1), 0.0, 0.0, 0.0))
-    (b1, delay1, x0, x), (b2, delay2, y0, y) = kept
+        delayed, left = (
+            np.asarray(poly.polyadd(p * b1, q * b2)) for p, q in ((x, y), (x0 - x, y0 - y))
+        )
+        terms = [(delayed, system.delay1, 1.0, 1.0), (left, 0.0, 1.0, 0.0)]
+    rest = system.rest
+    for k, (b, delay, origin, here) in enumerate(terms):
+        if here == 0.0 or not b.any() or sigma * delay > _VANISHED:
+            terms[k] = (b, 0.0, origin, 0.0)
+            if system.delay == 0.0:
+                rest = np.asarray(poly.polyadd(rest, origin * b))
+                terms[k] = (np.zeros(1), 0.0, 0.0, 0.0)
+    (b1, delay1, x0, x), (b2, delay2, y0, y) = terms
     acting = CharacteristicFunction(
         rest,
         b1,
         b2,
         delay1,
         delay2,
+        delay=system.delay,
         step=system.step,
         parameters=system.parameters,
         reference=(x0, y0),
@@ -309,7 +280,7 @@ class _Line:
         self.turn = 2.0 * np.pi / system.longest_delay
         try:
             self.shifted = self.system.shifted(sigma)
-            self.turns = float(last_crossing(self.shifted, self.x, self.y)) / self.turn
+            self.turns = float(last_frequency(self.shifted, self.x, self.y)) / self.turn
         except ValueError:
             self.turns = np.inf
         self.short = self.turns <= _LONGEST_WALK
@@ -323,6 +294,14 @@ class _Line:
         except CountError:
             return BOUNDARY
 
+    def _step(self, s: ComplexArray) -> tuple[ComplexArray, FloatArray]:
+        """Return where a step of Newton's method leads from each s, and its length."""
+        with np.errstate(all="ignore"):
+            value = self.system._value(s, self.x, self.y)
+            move = np.where(value == 0.0, 0.0, value / self.system._slope(s, self.x, self.y))
+        length = np.abs(move)
+        return s - move, np.where(np.isnan(length), np.inf, length)
+
     def rightmost(self) -> tuple[complex, float] | None:
         """Return the rightmost root near the line, and how far a faster one is ahead of it.
 
@@ -332,15 +311,18 @@ class _Line:
             return None
         # Left of the line there may be roots some turns further up; a map has no further up.
         end = (self.turns + 4.0 * (not self.system.step)) * self.turn
-        starts = _starts(self.shifted.at(self.x, self.y), end)
-        starts = starts[np.argsort(-starts.real, kind="stable")][:_MOST_STARTS]
-        found = np.asarray(self.sigma + starts, dtype=np.complex128)
-        with np.errstate(all="ignore"):
-            for _ in range(12):
-                value = self.system._value(found, self.x, self.y)
-                move = value / self.system._slope(found, self.x, self.y)
-                found = found - np.where(value == 0.0, 0.0, move)
-            found = found[(np.abs(move) <= 1e-5 * self.turn) | (value == 0.0)]
+        whole = self.shifted.at(self.x, self.y)
+        function = whole.weights, whole.sums, whole.phases
+        s = self.sigma + 1j * resolved_grid(whole.compiled(), function, end, 1.0)
+        # From where a step of Newton's method is locally shortest: no root close to the line
+        # lies between two of its points.
+        s, length = self._step(s)
+        wider = np.pad(length, 1, constant_values=np.inf)
+        s = s[(length <= wider[:-2]) & (length < wider[2:])]
+        s = s[np.argsort(-s.real, kind="stable")][:_MOST_STARTS]
+        for _ in range(12):
+            s, length = self._step(s)
+        found = s[length <= 1e-5 * self.turn]
         found = found.real + 1j * np.abs(found.imag)
         for top in sorted(found, key=lambda s: -s.real)[:_MOST_TRIED]:
             level = found[found.real >= top.real - _EQUAL * max(abs(top), self.turn)]

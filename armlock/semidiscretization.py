@@ -47,8 +47,8 @@ def _checked(system: CharacteristicFunction, step: float, order: int) -> tuple[f
             "system must be of retarded type: a neutral loop feeds back the delayed signal "
             "itself, which semi-discretization does not smooth"
         )
-    for name, delay in (("delay1", system.delay1), ("delay2", system.delay2)):
-        whole_steps(name, delay, step)
+    for name in ("delay", "delay1", "delay2"):
+        whole_steps(name, getattr(system, name), step)
     return step, order
 
 
@@ -95,7 +95,7 @@ def transition_matrix(
     x, y : float
         The free parameters.
     step : float
-        Sampling step h in s; it must divide both delays.
+        Sampling step h in s; it must divide all delays.
     order : {0, 1}, optional
         0 holds the delayed sample xi(t_{i-r}) over the step, as the paper does; 1
         interpolates linearly to the next one.
@@ -201,7 +201,7 @@ def spectral_radius(
     x, y : array_like of float
         The free parameters; they broadcast.
     step : float
-        Sampling step h in s; it must divide both delays.
+        Sampling step h in s; it must divide all delays.
     order : {0, 1}, optional
         As for `transition_matrix`.
 
@@ -255,7 +255,7 @@ def semi_discretization(
     system : CharacteristicFunction
         A retarded loop in which both free parameters stand before a delayed signal.
     step : float
-        Sampling step h in s; it must divide both delays.
+        Sampling step h in s; it must divide all delays.
     order : {0, 1}, optional
         As for `transition_matrix`.
 
@@ -301,7 +301,7 @@ def semi_discretization(
     """
     step, order = _checked(system, step, order)
     for name, delay in zip(system.parameters, (system.delay1, system.delay2), strict=True):
-        if delay == 0.0:
+        if system.delay + delay == 0.0:
             raise ValueError(
                 f"the free parameter {name} of {system!r} stands before an undelayed signal, "
                 f"so that the map is not affine in it; use transition_matrix or "
@@ -314,7 +314,8 @@ def semi_discretization(
             _numerator(flow, older),
             np.append(0.0, _numerator(flow, newer)),
         )
-        for older, newer in columns
+        # Those before x and y; with a dead time there is a third one, x0 B1 + y0 B2.
+        for older, newer in columns[-2:]
     )
     return CharacteristicFunction(
         np.asarray(np.poly(flow)[::-1], dtype=np.float64),
@@ -322,8 +323,11 @@ def semi_discretization(
         np.asarray(b2, dtype=np.float64),
         system.delay1,
         system.delay2,
+        delay=system.delay,
         step=step,
         parameters=system.parameters,
+        # Without a dead time x0 B1 + y0 B2 is a part of the flow.
+        reference=system.reference if system.delay else (0.0, 0.0),
     )
 
 

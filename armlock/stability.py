@@ -1,16 +1,20 @@
 """How many characteristic roots are unstable: at points, and over charts.
 
 Points are counted by the argument principle along s = j omega, with certified steps up to
-a frequency past which no root can cross. Charts are counted row by row: with y fixed, roots
-cross the axis where Im[(A - y B2) / B1] = 0, at x = Re[(A - y B2) / B1]; a crossing upward
+a frequency past which no root can cross. With D = N - x M, charts are counted row by row: with
+y fixed, roots cross the axis where Im(N / M) = 0, at x = Re(N / M); a crossing upward
 adds unstable roots. Each row is checked against an independent count at its far end.
+
+The walks are those of `armlock.contour`. What makes a point a boundary point stands there, in
+`winding`: D is no larger somewhere on the axis than its rounding error, `rounding_bound`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -71,196 +75,92 @@ class CountError(RuntimeError):
         return type(self), (str(self), self.points)
 
 
-class _Balanced(NamedTuple):
-    """A characteristic function with coefficients of ordinary size, and weights of x and y.
-
-    Its value at (weight_x x, weight_y y) is that of the one it was made of, up to a factor.
-    """
-
-    system: CharacteristicFunction
-    weight_x: float
-    weight_y: float
-
-    def x(self, values: FloatArray) -> FloatArray:
-        """Return values of x in its parameter, nan where they leave the doubles."""
-        return _weighted(values, self.weight_x)
-
-    def y(self, values: FloatArray) -> FloatArray:
-        """Return values of y in its parameter, nan where they leave the doubles."""
-        return _weighted(values, self.weight_y)
-
-
-def _weighted(values: FloatArray, weight: float) -> FloatArray:
-    with np.errstate(over="ignore", under="ignore"):
-        found = values * weight
-        kept = np.isfinite(found) & (found / weight == values)
-    return np.where(kept, found, np.nan)
-
-
 @lru_cache(maxsize=64)
-def _balanced(system: CharacteristicFunction) -> _Balanced:
-    """Scale A, B1 and B2 by powers of two, which rounds nothing; what is ordinary stays."""
-    names = ("rest", "b1", "b2")
-    polynomials = (system.rest, system.b1, system.b2)
-    own = (system.a, system.b1, system.b2)
-    shifts = [-int(np.frexp(np.abs(p).max())[1]) for p in own]
-    with np.errstate(over="ignore", under="ignore"):
-        scaled = [np.ldexp(p, k) for p, k in zip(polynomials, shifts, strict=True)]
-        weights = [float(np.ldexp(1.0, shifts[0] - k)) for k in shifts[1:]]
-        reference = [x * w for x, w in zip(system.reference, weights, strict=True)]
-        whole = np.ldexp(system.a, shifts[0])
-    exact = all(
-        np.array_equal(np.ldexp(q, -k), p)
-        for p, q, k in zip(
-            (*polynomials, system.a), (*scaled, whole), (*shifts, shifts[0]), strict=True
-        )
-    ) and all(0.0 < w < np.inf for w in weights)
-    if not exact or max(map(abs, shifts)) < 100:
-        return _Balanced(system, 1.0, 1.0)
-    balanced = CharacteristicFunction(
-        **dict(zip(names, scaled, strict=True)),
-        delay1=system.delay1,
-        delay2=system.delay2,
-        step=system.step,
-        parameters=system.parameters,
-        reference=(reference[0], reference[1]),
-    )
-    return _Balanced(balanced, *weights)
+def _compiled(system: CharacteristicFunction) -> tuple[Any, ...]:
+    """Return a system in the form that `armlock.contour.count_point` takes.
 
-
-class _Compiled(NamedTuple):
-    """A characteristic function in the form the compiled walks take.
-
-    `squares` holds |A|^2, |B1|^2 and |B2|^2 as polynomials in (omega / unit)^2, `leads` the
-    magnitudes of the coefficients of the highest power.
+    The polynomials; the weights of the three terms of D over all their exponentials; their
+    sums where all exponentials are one, at the reference; the reference; the phase rates; the
+    weights of A alone; the roots of A; and whether it is a map.
     """
-
-    parts: ComplexArray
-    sums: ComplexArray
-    reference: FloatArray
-    phases: FloatArray
-    roots: ComplexArray
-    squares: FloatArray
-    leads: FloatArray
-    unit: float
-    omega_end: float
-
-
-@lru_cache(maxsize=64)
-def _compiled(system: CharacteristicFunction) -> _Compiled:
-    pieces = system.on_boundary()
-    size = max(piece.sums.size for piece in pieces)
-    phases = np.concatenate([piece.phases for piece in pieces])
-    parts = np.zeros((3, phases.size, size), dtype=np.complex128)
-    sums = np.zeros((3, size), dtype=np.complex128)
+    terms = system.on_boundary()
+    phases = np.concatenate([term.phases for term in terms])
+    weights = np.zeros((3, phases.size, len(terms[0].polynomials)))
     first = 0
-    for k, piece in enumerate(pieces):
-        groups, width = piece.coefficients.shape
-        parts[k, first : first + groups, :width] = piece.coefficients
-        sums[k, :width] = piece.sums
-        first += groups
+    for k, term in enumerate(terms):
+        last = first + term.phases.size
+        weights[k, first:last] = term.weights
+        first = last
     rest = system.rest_on_boundary().sums
-    sums[0] = 0.0
-    sums[0, : rest.size] = rest
-    return _Compiled(
-        parts,
-        sums,
+    a = rest if system.delay else terms[0].sums
+    return (
+        terms[0].compiled(),
+        weights,
+        np.array([rest, terms[1].sums, terms[2].sums]),
         np.array(system.reference),
         phases,
-        _certain_roots(system.a),
-        *squares_and_leads(system.a, system.b1, system.b2),
-        np.pi / system.step if system.step else 0.0,
+        a,
+        _roots_of_a(system),
+        system.step > 0.0,
     )
 
 
-def _certain_roots(p: FloatArray) -> ComplexArray:
-    """Roots of a polynomial, or nan where they do not multiply out to it.
+def _roots_of_a(system: CharacteristicFunction) -> ComplexArray:
+    """Roots of A; raise where rounding makes them those of another polynomial."""
+    if system.delay and not system.step:
+        return system.polynomials()[0].roots
+    roots = poly.polyroots(system.a).astype(np.complex128)
+    product, magnitude = np.array([system.a[-1]], dtype=np.complex128), np.abs(system.a[-1:])
+    for root in roots[np.argsort(np.abs(roots))]:
+        product = np.convolve(product, [-root, 1.0])
+        magnitude = np.convolve(magnitude, [abs(root), 1.0])
+    if not (np.abs(product - system.a) <= 1e-6 * magnitude).all():
+        raise CountError(
+            f"no count for {system!r}: the coefficients of A differ by more orders of "
+            f"magnitude than doubles resolve",
+            _NO_POINTS,
+        )
+    return roots
 
-    Of coefficients that differ by many orders of magnitude the eigenvalues of the companion
-    matrix may be anything.
+
+@lru_cache(maxsize=64)
+def _squares(system: CharacteristicFunction) -> tuple[FloatArray, float]:
+    """Return |A|^2, |B1|^2, |B2|^2, |C|^2 at s = j omega, and their unit of frequency.
+
+    They are polynomials in (omega / unit)^2. In this unit, a power of two in rad/s, the lowest
+    and the highest coefficient of A are of the same size.
     """
-    nothing = np.full(p.size - 1, np.nan, dtype=np.complex128)
-    with np.errstate(all="ignore"):
-        try:
-            roots = poly.polyroots(p).astype(np.complex128)
-        except np.linalg.LinAlgError:
-            return nothing
-        for _ in range(3):
-            value, slope = poly.polyval(roots, p), poly.polyval(roots, poly.polyder(p))
-            poor = np.abs(value) > 1e-6 * poly.polyval(np.abs(roots), np.abs(p))
-            roots = np.where(poor, roots - value / slope, roots)
-        product, magnitude = np.array([p[-1]], dtype=np.complex128), np.abs(p[-1:])
-        for root in roots[np.argsort(np.abs(roots))]:
-            product = np.convolve(product, [-root, 1.0])
-            magnitude = np.convolve(magnitude, [abs(root), 1.0])
-        agrees = np.abs(product - p) <= 1e-6 * magnitude
-    return roots if agrees.all() else nothing
+    return squared_magnitudes((system.a, system.b1, system.b2, system.c))
 
 
-def squares_and_leads(
-    a: FloatArray, b1: FloatArray, b2: FloatArray
-) -> tuple[FloatArray, FloatArray, float]:
-    """Return |A|^2, |B1|^2, |B2|^2 in units of frequency, their leads, and the unit.
+def squared_magnitudes(polynomials: Sequence[FloatArray]) -> tuple[FloatArray, float]:
+    """Return |p(j omega)|^2 as polynomials in (omega / unit)^2, and the unit in rad/s.
 
-    In this unit, a power of two in rad/s, the lowest and the highest coefficient of A are of
-    the same size, which leaves its powers most room.
+    The first polynomial is of the highest degree. In this unit, a power of two, its lowest and
+    highest coefficients are of the same size.
     """
-    degree = a.size - 1
-    lowest = int(np.flatnonzero(a)[0])
-    turn = np.log2(abs(a[lowest])) - np.log2(abs(a[degree]))
+    first = polynomials[0]
+    degree, lowest = first.size - 1, int(np.flatnonzero(first)[0])
+    turn = np.log2(abs(first[lowest])) - np.log2(abs(first[degree]))
     exponent = round(turn / (degree - lowest)) if degree > lowest else 0
-    squares, leads = np.zeros((3, degree + 1)), np.zeros(3)
-    with np.errstate(over="ignore", under="ignore"):
-        powers = exponent * np.arange(degree + 1) - round(0.5 * exponent * (degree + lowest))
-        for k, polynomial in enumerate((a, b1, b2)):
-            scaled = np.ldexp(polynomial, powers[: polynomial.size])
-            square = squared_magnitude(scaled)
-            # Rounded to nothing, and nothing else there: no bound comes of it.
-            gone = (polynomial != 0.0) & (scaled * scaled < np.finfo(float).tiny)
-            squares[k, : square.size] = np.where(gone, np.nan, square)
-            leads[k] = abs(polynomial[degree]) if polynomial.size > degree else 0.0
-    return squares, leads, float(np.ldexp(1.0, exponent))
+    powers = exponent * np.arange(degree + 1) - round(0.5 * exponent * (degree + lowest))
+    squares = np.zeros((len(polynomials), degree + 1))
+    for row, p in zip(squares, polynomials, strict=True):
+        scaled = np.ldexp(p, powers[: p.size])
+        # Powers of s two apart have opposite signs at s = j omega.
+        even, odd = scaled[0::2].copy(), scaled[1::2].copy()
+        even[1::2] *= -1.0
+        odd[1::2] *= -1.0
+        row[: 2 * even.size - 1] += np.convolve(even, even)
+        if odd.size:
+            row[1 : 2 * odd.size] += np.convolve(odd, odd)
+    return squares, float(np.ldexp(1.0, exponent))
 
 
-def _constant_confined(
-    system: CharacteristicFunction, x: npt.ArrayLike, y: npt.ArrayLike
-) -> BoolArray:
-    """Whether the chain of an equation of order zero is confined to the left half-plane.
-
-    Without a delay a term adds to A, with its sign.
-    """
-    undelayed, delayed = np.array(system.a[0]), np.zeros(())
-    for b, delay, here in ((system.b1, system.delay1, x), (system.b2, system.delay2, y)):
-        term = np.asarray(here) * b[0]
-        if delay:
-            delayed = delayed + np.abs(term)
-        else:
-            undelayed = undelayed - term
-    return np.asarray(np.abs(undelayed) > delayed)
-
-
-def _of_order_zero(system: CharacteristicFunction) -> bool:
-    return system.degree == 0 and not system.step
-
-
-def squared_magnitude(p: FloatArray) -> FloatArray:
-    """Return |p(j omega)|^2 as a polynomial in omega^2, ascending."""
-    even, odd = p[0::2].copy(), p[1::2].copy()
-    even[1::2] *= -1.0
-    odd[1::2] *= -1.0
-    square = np.zeros(p.size)
-    even_square = np.convolve(even, even)
-    square[: even_square.size] += even_square
-    if odd.size:
-        odd_square = np.convolve(odd, odd)
-        square[1 : 1 + odd_square.size] += odd_square
-    return square
-
-
-def last_crossing(
+def last_frequency(
     system: CharacteristicFunction, x: npt.ArrayLike, y: npt.ArrayLike
 ) -> FloatArray:
-    """Frequency past which no root can cross the imaginary axis.
+    """Return a frequency past which no root lies on the imaginary axis.
 
     Parameters
     ----------
@@ -272,22 +172,19 @@ def last_crossing(
     Returns
     -------
     float array, of the broadcast shape
-        In rad/s: past it |A| > |x B1| + |y B2|, also for all smaller |x| and |y|. inf where a
-        neutral loop's high-frequency chain of roots is not confined to the left half-plane.
+        In rad/s, a bound: past it |A| > |C| + |x B1| + |y B2|, also for all smaller |x| and
+        |y|. inf where the neutral root chain is not confined to the left half-plane, and nan
+        where numbers overflow.
     """
     name1, name2 = checked_system(system).parameters
     xs, ys = broadcast_pair(name1, x, name2, y)
     if system.step:
         return np.full(xs.shape, np.pi / system.step)
-    if _of_order_zero(system):
-        return np.where(_constant_confined(system, xs, ys), 0.0, np.inf)
-    balanced = _balanced(system)
-    compiled = _compiled(balanced.system)
+    squares, unit = _squares(system)
+    reserve = system.chain_reserve(xs, ys)
     ends = [
-        contour.last_crossing_bound(
-            compiled.squares, compiled.leads, compiled.unit, float(p), float(q)
-        )
-        for p, q in zip(balanced.x(xs).flat, balanced.y(ys).flat, strict=True)
+        contour.last_frequency(squares, unit, np.array([abs(p), abs(q), 1.0]), float(r))
+        for p, q, r in zip(xs.flat, ys.flat, reserve.flat, strict=True)
     ]
     return np.array(ends, dtype=np.float64).reshape(xs.shape)
 
@@ -306,38 +203,38 @@ def sign_changes(
     """
     if not np.isfinite(end):
         raise CountError(f"no crossings up to omega = {end}: a number overflows", _NO_POINTS)
-    omega, jump, *_, complete = contour.sign_changes(*whole, end, is_map)
+    function = whole.weights, whole.sums, whole.phases
+    nothing = np.zeros((0, whole.sums.size)), np.zeros(whole.sums.size), np.zeros(0)
+    zeros, complete = contour.sign_changes(
+        whole.compiled(), function, nothing, end, is_map, contour.ROUNDING
+    )
     if not complete:
         raise CountError(
             f"no crossings up to omega = {end} rad/s: more than {contour.MOST_STEPS:.0e} steps "
             f"or {contour.MOST_ZEROS:.0e} crossings, because gain times delay is too large",
             _NO_POINTS,
         )
-    return omega, jump
+    return zeros[:, contour.OMEGA], zeros[:, contour.JUMP].astype(np.int64)
 
 
 def _count(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -> IntArray:
     """Count at flat arrays of points; raise where rounding spoils it."""
-    if _of_order_zero(system):
-        return np.where(_constant_confined(system, x, y), 0, UNCONFINED).astype(np.int64)
-    balanced = _balanced(system)
-    model = tuple(_compiled(balanced.system))
-    counts = contour.count_points(model, balanced.x(x), balanced.y(y))
+    ends = last_frequency(system, x, y)
+    counts: IntArray = contour.count_points(_compiled(system), x, y, ends)
     bad = (counts == contour.DOUBTFUL) | (counts == contour.TOO_LONG)
     if bad.any():
         points = np.column_stack((x[bad], y[bad]))
         name1, name2 = system.parameters
+        at = f"no count at ({name1}, {name2}) = ({points[0, 0]}, {points[0, 1]})"
         if (counts == contour.TOO_LONG).any():
             raise CountError(
-                f"no count at ({name1}, {name2}) = ({points[0, 0]}, {points[0, 1]}): following "
-                f"D takes more than {contour.MOST_STEPS:.0e} steps, because the gain, with "
-                f"these parameters, times the delay is too large",
+                f"{at}: following D takes more than {contour.MOST_STEPS:.0e} steps, because "
+                f"the gain, with these parameters, times the delay is too large",
                 points,
             )
         raise CountError(
-            f"no count at ({name1}, {name2}) = ({points[0, 0]}, {points[0, 1]}) and "
-            f"{len(points) - 1} further points: the argument of D does not add up to a whole "
-            f"number of turns",
+            f"{at} and {len(points) - 1} further points: the argument of D does not add up to "
+            f"a whole number of turns",
             points,
         )
     return counts
@@ -360,10 +257,11 @@ def unstable_roots(
     int array, of the broadcast shape
         Number of unstable roots, multiplicity included. The point is stable, with all roots
         in the open left half-plane, where it is 0. `BOUNDARY` (-1) where a root lies on the
-        imaginary axis, or nearer to it than rounding can tell. `UNCONFINED` (-2) where a
-        neutral loop has |x b1| + |y b2| >= |a| in its highest powers: there the chain of
-        roots at high frequency reaches the right half-plane, at the latest after an
-        arbitrarily small change of the delays, and no finite count would tell.
+        imaginary axis, or nearer to it than rounding can tell. `UNCONFINED` (-2) where the
+        neutral root chain is not confined to the left half-plane
+        (`CharacteristicFunction.chain_reserve` is not positive): at the latest after an
+        arbitrarily small change of the delays it reaches the right half-plane, and no finite
+        count would tell.
 
     Raises
     ------
@@ -381,12 +279,7 @@ def unstable_roots(
         N = \frac{n}{2} - \frac{1}{\pi}\,
         \Delta\!\arg_{0 \le \omega < \infty} D(\mathrm{j}\omega; x, y) ,
 
-    which holds for retarded loops, and for neutral ones whose coefficients of the highest
-    power of s satisfy
-
-    .. math::
-
-        |x\, b_1| + |y\, b_2| < |a| .
+    which holds for retarded loops, and for neutral ones whose root chain is confined.
 
     For a map of step h the boundary ends at pi / h, and
 
@@ -395,8 +288,8 @@ def unstable_roots(
         N = n - \frac{1}{\pi}\,
         \Delta\!\arg_{0 \le \omega \le \pi / h} D(\mathrm{j}\omega; x, y) .
 
-    The argument is followed up to the frequency past which |A| > |x B1| + |y B2|; each
-    step is bounded by the curvature of D over it.
+    The argument is followed up to the frequency past which |A| > |C| + |x B1| + |y B2|;
+    each step is bounded by the curvature of D over it.
 
     Examples
     --------
@@ -498,11 +391,6 @@ def stability_chart(
     name1, name2 = checked_system(system).parameters
     xs, ys = axis(name1, x), axis(name2, y)
     check_memory(f"{name1} and {name2}", (ys.size, xs.size), _BYTES_A_POINT)
-    if _of_order_zero(system):
-        grid = np.where(_constant_confined(system, xs, ys[:, None]), 0, UNCONFINED)
-        singly = np.zeros(grid.shape, dtype=np.bool_)
-        none = np.empty(0, dtype=np.intp)
-        return StabilityChart(system, xs, ys, grid.astype(np.int64), singly, none)
     order_x, order_y = np.argsort(xs, kind="stable"), np.argsort(ys, kind="stable")
     if not system.b1.any():
         # Without B1 nothing crosses along a row: walk along the columns instead.
@@ -525,12 +413,13 @@ def _chart_rows(
     lower, upper = np.full(y.size, left), np.full(y.size, right)
     confined = np.ones((y.size, x.size), dtype=np.bool_)
     if system.neutral:
-        limit = _confined_up_to(system, y)
-        confined = np.abs(x) < limit[:, None]
-        # Rows end half-way between their last confined point and the limit.
+        # Rows end half-way between their last confined point and the limit of the chain.
+        confined = system.chain_reserve(x, y[:, None]) > 0.0
         inside = np.where(confined, np.abs(x), 0.0).max(axis=1)
-        ends_at = np.where(np.isfinite(limit), 0.5 * (inside + limit), np.inf)
-        lower, upper = np.maximum(lower, -ends_at), np.minimum(upper, ends_at)
+        b1 = abs(system.highest_coefficients[1] / system.highest_coefficients[0])
+        if b1 > 0.0:
+            ends_at = inside + 0.5 * system.chain_reserve(inside, y) / b1
+            lower, upper = np.maximum(lower, -ends_at), np.minimum(upper, ends_at)
         base, top = _count(system, lower, y), _count(system, upper, y)
     elif system.b2.any():
         sides = np.array([left, right])
@@ -556,15 +445,6 @@ def _chart_rows(
     return counts, singly, np.flatnonzero(failed)
 
 
-def _confined_up_to(system: CharacteristicFunction, y: FloatArray) -> FloatArray:
-    """Return the |x| from which on the chain of a neutral loop is not confined."""
-    a, b1, b2 = (abs(value) for value in system.highest_coefficients)
-    left = np.maximum(a - np.abs(y) * b2, 0.0)
-    if b1 == 0.0:
-        return np.where(left > 0.0, np.inf, 0.0)
-    return np.asarray(left / b1)
-
-
 def _ends(values: FloatArray, outside: float) -> tuple[float, float]:
     """Return points just outside an ascending axis."""
     span = float(values[-1] - values[0])
@@ -581,40 +461,29 @@ def _walk(
     upper: FloatArray,
 ) -> tuple[IntArray, BoolArray, IntArray]:
     """Fill rows from their crossings, starting with the counts `base` at x = lower."""
-    balanced = _balanced(system)
-    system, y = balanced.system, balanced.y(y)
-    x, lower, upper = (balanced.x(values) for values in (x, lower, upper))
-    a, b1, b2 = system.on_boundary()
-    rest = system.rest_on_boundary()
-    # Delays left out, N = A - y B2 is rest + x0 B1 at the reference, exactly.
-    at_reference = rest.plus(b1.scaled(system.reference[0])).sums
-    fixed = a._replace(sums=at_reference).times_conjugate(b1)
+    undelayed, b1, b2 = system.on_boundary()
+    x0, y0 = system.reference
+    # Where all exponentials are one, N = A + C - y B2 is R + x0 B1 at y = y0, exactly.
+    at_reference = system.rest_on_boundary().sums + x0 * b1.sums
+    fixed = undelayed._replace(sums=at_reference).times_conjugate(b1)
     varying = b2.times_conjugate(b1)
-    # Both over the groups of both, so that they add with a weight.
-    varying_only = fixed.scaled(0.0).plus(varying)
-    fixed = fixed.plus(varying.scaled(0.0))
-    if system.step:
-        norm = np.correlate(system.b1, system.b1, "full")[system.b1.size - 1 :]
-        norm[1:] *= 2.0
-    else:
-        square = squared_magnitude(system.b1)
-        norm = np.zeros(2 * square.size - 1)
-        norm[0::2] = square
-    ends = last_crossing(system, np.maximum(np.abs(lower), np.abs(upper)), y)
+    square = b1.times_conjugate(b1)
+    # Both over the exponentials of both, so that they add with a weight.
+    whole = fixed.plus(varying.scaled(0.0))
+    apart = fixed.scaled(0.0).plus(varying)
+    ends = last_frequency(system, np.maximum(np.abs(lower), np.abs(upper)), y)
     # A row that is nowhere confined has nothing to count.
     ends = np.where(np.isfinite(ends), ends, 0.0)
     model = (
-        fixed.coefficients,
-        varying_only.coefficients,
-        fixed.sums,
-        varying_only.sums,
-        fixed.phases,
-        norm,
+        whole.compiled(),
+        whole.weights,
+        apart.weights,
+        whole.sums,
+        apart.sums,
+        whole.phases,
+        (square.weights, square.sums, square.phases),
         system.step > 0.0,
     )
-    deviation = y - system.reference[1]
-    filled = contour.fill_rows(
-        model, ends, y, deviation, np.ascontiguousarray(base), x, lower, upper
+    return contour.fill_rows(
+        model, ends, y, y - y0, np.ascontiguousarray(base), x, lower, upper
     )
-    filled[1][:, np.isnan(x)] = True
-    return filled

@@ -26,7 +26,7 @@ from armlock import (
     unstable_roots,
 )
 from armlock.checks import FloatArray
-from armlock.stability import last_crossing
+from armlock.stability import last_frequency
 from benchmarks import child
 from benchmarks.charts import comparison, memory_row, timed
 from benchmarks.report import Row, Topic
@@ -77,7 +77,7 @@ def crossings_found(system: CharacteristicFunction, y: FloatArray, right: float)
         # Delays left out, only the deviation from the reference remains.
         sums = fixed.plus(varying.scaled(system.reference[1] - level)).sums
         row = fixed.plus(varying.scaled(-level))
-        end = float(last_crossing(system, right, level))
+        end = float(last_frequency(system, right, level))
         total += contour.sign_changes(*row._replace(sums=sums), end, False)[0].size
     return total
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from armlock import CommonArm, HayesEquation, contour, stability_chart, unstable_roots
-from armlock.stability import last_crossing
+from armlock.stability import last_frequency
 from tests import independent
 from tests.systems import NEUTRAL, RETARDED
 
@@ -51,7 +51,7 @@ def test_past_the_last_crossing_the_undelayed_term_prevails(name):
             continue
         system = systems[name]
         for x, y in [(0.4, -0.4), (0.1, 0.05), (-0.3, 0.5)]:
-            end = float(last_crossing(system, x, y))
+            end = float(last_frequency(system, x, y))
             omega = end * np.linspace(1.0 + 1e-9, 50.0, 4000) + 1e-9
             a, b1, b2 = (np.abs(part) for part in system.parts(1j * omega))
             assert (a >= abs(x) * b1 + abs(y) * b2 - 1e-9 * a).all()
@@ -59,7 +59,7 @@ def test_past_the_last_crossing_the_undelayed_term_prevails(name):
 
 def test_the_last_crossing_of_the_common_arm_is_known():
     # omega^2 + 4 g^2 = g^2 (|c1| + |c2|)^2
-    ends = last_crossing(CommonArm(gain=3.0), [1.0, 1.5, -2.0, 3.0], [0.5, 1.5, 2.0, -3.0])
+    ends = last_frequency(CommonArm(gain=3.0), [1.0, 1.5, -2.0, 3.0], [0.5, 1.5, 2.0, -3.0])
     exact = 3.0 * np.sqrt([0.0, 5.0, 12.0, 32.0])
     assert ends[0] == 0.0
     assert (ends >= exact).all()

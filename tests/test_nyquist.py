@@ -23,7 +23,7 @@ from armlock import (
     unstable_roots,
 )
 from armlock.controllers import table_two
-from armlock.nyquist import open_loop_poles, resolving_grid
+from armlock.nyquist import open_loop_poles
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
 from tests import independent
 
@@ -169,7 +169,7 @@ def test_no_step_of_the_users_enters_the_crossings():
     ("name", "wrong"),
     [
         ("indentation passes on the left", ("_indentation", -1.0)),
-        ("contour too short", ("last_crossing", 0.02)),
+        ("contour too short", ("last_frequency", 0.02)),
         ("unstable pole forgotten", ("open_loop_poles", 0)),
         ("order of the pole at zero one too high", ("_poles_at_zero", 3)),
     ],
@@ -186,10 +186,10 @@ def test_a_wrong_contour_is_caught(monkeypatch, name, wrong):
             return turns(values.conj() if np.abs(values).min() > 1e3 else values)
 
         monkeypatch.setattr(module, "_turns", mirrored)
-    elif attribute == "last_crossing":
+    elif attribute == "last_frequency":
         loop, c1, c2 = CommonArm(), 1.3, 1.1
-        end = float(module.last_crossing(loop, c1, c2))
-        monkeypatch.setattr(module, "last_crossing", lambda *_: np.array(value * end))
+        end = float(module.last_frequency(loop, c1, c2))
+        monkeypatch.setattr(module, "last_frequency", lambda *_: np.array(value * end))
         monkeypatch.setattr(module, "_rectangle", lambda *a: (a[3], 40.0 / loop.tau2))
     elif attribute == "open_loop_poles":
         loop, (c1, c2), _ = CASES["one unstable pole"]

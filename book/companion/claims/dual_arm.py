@@ -30,7 +30,7 @@ from armlock.paper import (
 from armlock.rays import Crossing, first_crossing, sweep
 from armlock.roots import rightmost_root
 from armlock.semidiscretization import semi_discretization
-from armlock.stability import BOUNDARY, last_crossing, stability_chart, unstable_roots
+from armlock.stability import BOUNDARY, last_frequency, stability_chart, unstable_roots
 from book.companion.claims.ledger import Finding, Verdict, claim
 
 CHAPTER = "04_dual_arm"
@@ -389,11 +389,11 @@ def gain_factors(c1: float, c2: float) -> tuple[float, float]:
     Every frequency is searched at which a root can cross: at any gain if both perturbations
     together are below 2, and otherwise at gains up to the factor that is returned.
     """
-    end = float(last_crossing(high_gain_limit(), c1, c2))
+    end = float(last_frequency(high_gain_limit(), c1, c2))
     if np.isfinite(end):
         return _next_to_one(_axis_factors(c1, c2, end))
     for largest in 10.0 ** np.arange(1, 7):
-        end = float(last_crossing(DualArm(largest * DUAL_ARM_GAIN), c1, c2))
+        end = float(last_frequency(DualArm(largest * DUAL_ARM_GAIN), c1, c2))
         lower, upper = _next_to_one(_axis_factors(c1, c2, end))
         if upper <= largest:
             return lower, upper

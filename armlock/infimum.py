@@ -1,0 +1,294 @@
+"""Compiled: the smallest distance of an open loop from -1 over all frequencies, certified.
+
+With L = N / R the walk looks for the smallest |1 + L|, or the smallest |1 + L| / |1 - L|. It
+keeps the smallest value found so far, and steps over what cannot hold a smaller one:
+
+- a step of the walk, where the tangents of N and R, and bounds on their second derivatives,
+  leave no room for it;
+- a whole piece of the axis, where L with free phases of its arms, which fills a disc, stays
+  clear of the disc in which a smaller value would have to lie. At high frequency the phases
+  turn much faster than anything else changes, and this spares most of the work.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from armlock.checks import ComplexArray, FloatArray
+from armlock.contour import (
+    MOST_STEPS,
+    ROUNDING,
+    curvature_bound,
+    evaluate,
+    piece,
+    real_horner,
+    rounding_bound,
+    tangent_distance,
+)
+
+# Turns of the longest delay in a piece.
+_TURNS = 32.0
+
+
+@njit(cache=True)
+def excluded_disc(value: float, symmetric: bool) -> tuple[float, float]:
+    """Centre and radius of the disc in which the distance of L from -1 is below a value.
+
+    The distance is |1 + L|, or, if `symmetric`, |1 + L| / |1 - L|, whose level lines are the
+    circles of Apollonius.
+    """
+    if not symmetric:
+        return -1.0, value
+    square = value * value
+    return -(1.0 + square) / (1.0 - square), 2.0 * value / (1.0 - square)
+
+
+@njit(cache=True)
+def _distance(n: complex, r: complex, symmetric: bool) -> float:
+    """|1 + L|, or |1 + L| / |1 - L|, of L = n / r."""
+    below = abs(r - n) if symmetric else abs(r)
+    return abs(r + n) / below if below > 0.0 else np.inf
+
+
+@njit(cache=True)
+def _combined(
+    local: ComplexArray, sizes: FloatArray, weights: FloatArray, sums: FloatArray
+) -> tuple[ComplexArray, FloatArray]:
+    """Sum polynomials, given as rows 1 to 3, as `armlock.contour.piece` does."""
+    rows = 1 + weights.shape[0]
+    found = np.zeros((rows, local.shape[1]), dtype=np.complex128)
+    most = np.zeros((rows, sizes.shape[1]))
+    for g in range(rows):
+        for k in range(sums.size):
+            weight = sums[k] if g == 0 else weights[g - 1, k]
+            found[g] += weight * local[k + 1]
+            most[g] += abs(weight) * sizes[k + 1]
+    return found, most
+
+
+@njit(cache=True)
+def _clear(
+    local: ComplexArray,
+    sizes: FloatArray,
+    start: float,
+    reach: float,
+    arms: FloatArray,
+    dead_time: FloatArray,
+    disc: tuple[float, float],
+) -> bool:
+    """Whether L stays outside a disc over a whole piece, whatever the phases of the arms.
+
+    With centre a and radius r, and `local` rows R, B1 and B2, that is
+    |(B1 + B2) exp(-s delay) - a R| > r |R| + |c1 B1| + |c2 B2|.
+    """
+    centre, radius = disc
+    weights = np.array([[0.0, 1.0, 1.0]])
+    apart, most = _combined(local, sizes, weights, np.array([-centre, 1.0, 1.0]))
+    bound = curvature_bound(start, reach, apart, dead_time)
+    error = rounding_bound(start, reach, most, dead_time, ROUNDING)
+    value, slope = evaluate(start, reach, apart, dead_time, start)
+    if value == 0.0:
+        return False
+    # |value + slope t| >= |value| (1 + t Re(slope / value)), and alike from above: the linear
+    # parts of all terms add up, and what is left is of second order.
+    begin = abs(value)
+    change = reach * (slope * value.conjugate()).real / begin
+    left = 0.5 * real_horner(bound, 1.0) * reach * reach + real_horner(error, 1.0)
+    for k, weight in ((1, radius), (2, arms[0]), (3, arms[1])):
+        size = abs(local[k, 0])
+        if size == 0.0:
+            left += weight * np.abs(local[k]).sum()
+            continue
+        begin -= weight * size
+        higher = 0.0
+        if local.shape[1] > 1:
+            first = local[k, 1] * local[k, 0].conjugate() / size
+            change -= weight * first.real
+            higher = abs(local[k, 1])
+        beyond = np.abs(local[k, 2:]).sum()
+        left += weight * (beyond + 0.5 * (higher + beyond) ** 2 / size)
+    return bool(min(begin, begin + change) > left)
+
+
+@njit(cache=True)
+def smallest_distance(
+    polynomials: tuple[Any, ...],
+    numerator: tuple[Any, ...],
+    arms: FloatArray,
+    dead_time: FloatArray,
+    symmetric: bool,
+    omega_end: float,
+    longest_delay: float,
+    best: float,
+    tolerance: float,
+) -> tuple[float, float, float, bool]:
+    """Smallest distance of L from -1 for 0 < omega <= omega_end.
+
+    `polynomials` are R, B1 and B2, `numerator` weights, sums and phases of N, `arms` |c1| and
+    |c2|, and `dead_time` the phase rate of the dead time. Only distances below `best` are
+    looked for. Returns the smallest one that was met, or `best`; where; the length of the step
+    there; and whether the walk came to its end. No distance is smaller than the result by more
+    than the share `tolerance`.
+    """
+    weights, sums, phases = numerator
+    unit, nothing, none = np.eye(3), np.zeros((0, 3)), np.zeros(0)
+    only_r = np.array([1.0, 0.0, 0.0])
+    where, width, omega, steps = np.nan, 0.0, 0.0, 0
+    turn = 2.0 * np.pi / longest_delay
+    longest = turn
+    while omega < omega_end:
+        start, reach, local, sizes = piece(
+            polynomials, unit, np.zeros(3), omega, min(longest, max(omega_end, turn))
+        )
+        end = min(omega + reach, omega_end)
+        disc = excluded_disc(best * (1.0 - tolerance), symmetric)
+        if _clear(local, sizes, start, reach, arms, dead_time, disc):
+            omega = end
+            longest = 4.0 * reach
+            continue
+        if reach > 1.01 * _TURNS * turn:
+            # Too long to be followed in one piece: where it is clear, and where not?
+            longest = 0.25 * reach
+            continue
+        longest = _TURNS * turn
+        n, n_sizes = _combined(local, sizes, weights, sums)
+        r, r_sizes = _combined(local, sizes, nothing, only_r)
+        n_bound = curvature_bound(start, reach, n, phases)
+        r_bound = curvature_bound(start, reach, r, none)
+        n_error = rounding_bound(start, reach, n_sizes, phases, ROUNDING)
+        r_error = rounding_bound(start, reach, r_sizes, none, ROUNDING)
+        value, slope = evaluate(start, reach, n, phases, omega)
+        below, change = evaluate(start, reach, r, none, omega)
+        step = end - omega
+        while omega < end:
+            steps += 1
+            if steps > MOST_STEPS:
+                return best, where, width, False
+            step = min(2.0 * step, end - omega)
+            while True:
+                following = end if step >= end - omega else omega + step
+                new_value, new_slope = evaluate(start, reach, n, phases, following)
+                new_below, new_change = evaluate(start, reach, r, none, following)
+                here = _distance(new_value, new_below, symmetric)
+                u = (following - start) / reach
+                bent = 0.5 * step * step * real_horner(r_bound, u)
+                both = 0.5 * step * step * real_horner(n_bound, u) + bent
+                error = real_horner(n_error, u) + real_horner(r_error, u)
+                least = tangent_distance(below + value, change + slope, step) - both - error
+                if symmetric:
+                    most = max(abs(below - value), abs(new_below - new_value)) + 2.0 * both
+                else:
+                    most = max(abs(below), abs(new_below)) + 2.0 * bent
+                most += error
+                if least >= (1.0 - tolerance) * min(best, here) * most:
+                    break
+                step *= 0.5
+                if step <= 1e-15 * omega or step < 1e-300:
+                    # Rounding hides more: the loop touches -1 here.
+                    return min(best, max(least / most, 0.0)), omega, step, True
+            if here < best:
+                best, where, width = here, following, step
+            omega, value, slope = following, new_value, new_slope
+            below, change = new_below, new_change
+    return best, where, width, True
+
+
+#: Places in what `free_margins_at` returns.
+MODULUS, RATIO, PHASE, DELAY, GAIN, INVERSE_GAIN = 0, 1, 2, 3, 4, 5
+
+
+@njit(cache=True)
+def free_margins_at(centre: complex, radius: float, omega: float) -> FloatArray:
+    """Smallest margins of all L in a disc, at one frequency.
+
+    Returns the distance from -1, |1 + L| / |1 - L|, the phase in rad and the delay in s of the
+    disc's share of the unit circle, and the gain factor above one, and one over that below
+    one, of its share of the negative real axis; inf where there is no share.
+    """
+    found = np.full(6, np.inf)
+    modulus = abs(1.0 + centre) - radius
+    if modulus <= 0.0:
+        return np.array([0.0, 0.0, 0.0, 0.0, 1.0, 1.0])
+    found[MODULUS] = modulus
+    # w = (1 + L) / (1 - L) takes the disc to a disc, or to the outside of one.
+    below = abs(1.0 - centre) ** 2 - radius**2
+    if below == 0.0:
+        found[RATIO] = modulus / (2.0 * radius)
+    else:
+        image = abs(((1.0 + centre) * (1.0 - centre).conjugate() + radius**2) / below)
+        found[RATIO] = abs(image - abs(2.0 * radius / below))
+    size = abs(centre)
+    if abs(size - 1.0) <= radius:
+        half = np.pi
+        if size > 0.0:
+            half = np.arccos(min(max((1.0 + size**2 - radius**2) / (2.0 * size), -1.0), 1.0))
+        angle = np.arctan2(centre.imag, centre.real)
+        lag = (angle - half + np.pi) % (2.0 * np.pi)
+        lead = (np.pi - angle - half) % (2.0 * np.pi)
+        found[PHASE], found[DELAY] = min(lag, lead), lag / omega
+    if abs(centre.imag) <= radius:
+        width = np.sqrt(radius**2 - centre.imag**2)
+        left, right = centre.real - width, centre.real + width
+        if -1.0 < left < 0.0:
+            found[GAIN] = -1.0 / left
+        if right < -1.0:
+            found[INVERSE_GAIN] = -right
+    return found
+
+
+@njit(cache=True)
+def free_margins(
+    polynomials: tuple[Any, ...],
+    arms: FloatArray,
+    delay: float,
+    omega: float,
+    omega_end: float,
+    best: FloatArray,
+    tolerance: float,
+) -> tuple[FloatArray, FloatArray, bool]:
+    """Smallest margins of the disc that L fills with free phases, from omega to `omega_end`.
+
+    `polynomials` are R, B1 and B2, and `arms` \\|c1\\| and \\|c2\\|. `best` holds values that are
+    known to occur, or inf. Returns the smallest values, where they were met (nan for those of
+    `best`), and whether the walk came to its end. None is smaller than the result by more than
+    the share `tolerance`.
+    """
+    unit, best, where = np.eye(3), best.copy(), np.full(6, np.nan)
+    step = omega_end
+    for _ in range(MOST_STEPS // 50):
+        start, reach, local, _ = piece(
+            polynomials, unit, np.zeros(3), omega, min(step, omega_end - omega)
+        )
+        r, b1, b2, c = local[1], local[2], local[3], local[2] + local[3]
+        # What the polynomials change over the piece, relative to the start.
+        moved_r = np.abs(r[1:]).sum() / abs(r[0])
+        if moved_r < 0.5:
+            end, turn = omega + reach, delay * reach
+            centre = c[0] / r[0] * np.exp(-1j * omega * delay)
+            radius = (arms[0] * abs(b1[0]) + arms[1] * abs(b2[0])) / abs(r[0])
+            here = free_margins_at(centre, radius, omega)
+            for k in range(6):
+                if here[k] < best[k]:
+                    best[k], where[k] = here[k], omega
+            wide = arms[0] * np.abs(b1).sum() + arms[1] * np.abs(b2).sum()
+            wide += np.abs(c[1:]).sum() + abs(c[0]) * min(moved_r + turn, 1.0)
+            wide /= abs(r[0]) * (1.0 - moved_r)
+            if moved_r + turn >= 1.0:
+                # The centre may have turned anywhere.
+                centre = 0j
+            wide += abs(centre) * moved_r * moved_r / (1.0 - moved_r)
+            least = free_margins_at(centre, wide, end)
+            if (least >= (1.0 - tolerance) * best).all():
+                if end >= omega_end * (1.0 - 1e-15):
+                    return best, where, True
+                omega, step = end, 4.0 * reach
+                continue
+            if reach <= 1e-9 * omega:
+                # So close to each other the values at both ends are the same to rounding.
+                omega, step = end, 4.0 * reach
+                continue
+        step = 0.25 * reach
+    return best, where, False
