@@ -204,10 +204,11 @@ def extended_root(
             dead = mpmath.exp(-s * system.delay)
             for b, delay, origin, here in terms:
                 p, change = mpmath.polyval(b.tolist(), z, derivative=True, asc=True)
-                late = here * mpmath.exp(-s * delay)
-                value += dead * p * (origin - late)
-                slope += dead * (change * dz - system.delay * p) * (origin - late)
-                slope += dead * p * delay * late
+                late = mpmath.expm1(-s * delay)
+                arm = mpmath.mpf(origin) - here - here * late
+                value += dead * p * arm
+                slope += dead * (change * dz - system.delay * p) * arm
+                slope += dead * p * delay * here * (1 + late)
             if value == 0:
                 return +s
             if slope == 0:
@@ -277,7 +278,7 @@ class _Line:
     ) -> None:
         self.system, self.x, self.y = _acting(system, x, y, sigma)
         self.sigma = sigma
-        self.turn = 2.0 * np.pi / system.longest_delay
+        self.turn = 2.0 * np.pi / (self.system.longest_delay or system.longest_delay)
         try:
             self.shifted = self.system.shifted(sigma)
             self.turns = float(last_frequency(self.shifted, self.x, self.y)) / self.turn
