@@ -303,15 +303,15 @@ class _Line:
         length = np.abs(move)
         return s - move, np.where(np.isnan(length), np.inf, length)
 
-    def rightmost(self) -> tuple[complex, float] | None:
+    def rightmost(self, further: float) -> tuple[complex, float] | None:
         """Return the rightmost root near the line, and how far a faster one is ahead of it.
 
-        Of roots that count as equal it is the slowest.
+        Of roots that count as equal it is the slowest. Left of the line they may lie further
+        up than right of it; as many turns further they are looked for.
         """
         if not self.short:
             return None
-        # Left of the line there may be roots some turns further up; a map has no further up.
-        end = (self.turns + 4.0 * (not self.system.step)) * self.turn
+        end = (self.turns + further) * self.turn
         whole = self.shifted.at(self.x, self.y)
         function = whole.weights, whole.sums, whole.phases
         s = self.sigma + 1j * resolved_grid(whole.compiled(), function, end, 1.0)
@@ -367,10 +367,13 @@ def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
     best = complex(np.nan, np.nan)
     # There are roots right of `low`, as far as can be told, and none right of `high`.
     low, high, sigma, width, walked = -np.inf, np.inf, 0.0, unit, 0.0
+    # A map has nothing above its last frequency.
+    further = 0.0 if acting.step else 4.0
     while walked < _ALL_WALKS and sigma not in (low, high):
         line = _Line(acting, p, q, sigma)
-        walked += 2.0 * min(line.turns, _LONGEST_WALK) * line.short + _WALK_AT_LEAST
-        found = line.rightmost()
+        walked += 2.0 * min(line.turns, _LONGEST_WALK) * line.short + further + _WALK_AT_LEAST
+        found = line.rightmost(further)
+        further = min(2.0 * further, _LONGEST_WALK)
         if found is not None and not found[0].real <= low:
             best, ahead = found
             nearest = _EQUAL * max(abs(best), unit)
