@@ -23,7 +23,7 @@ from armlock.paper import (
     TAU1,
     TAU2,
 )
-from armlock.roots import polish_root, pseudospectral_roots
+from armlock.roots import RootError, extended_root, pseudospectral_roots
 from armlock.stability import StabilityChart, stability_chart, unstable_roots
 from book.companion.claims.ledger import Finding, Verdict, claim
 
@@ -78,8 +78,11 @@ def slow_roots(loop: Loop, c1: float, c2: float, degree: int = 60) -> ComplexArr
     for start in pseudospectral_roots(loop, c1, c2, degree)[:16]:
         if abs(start) < NEAR_ZERO:
             continue
-        root, error = polish_root(loop, c1, c2, complex(start))
-        if np.isfinite(error) and all(abs(root - r) > 1e-9 * abs(r) for r in found):
+        try:
+            root = complex(extended_root(loop, c1, c2, start, digits=20))
+        except RootError:
+            continue
+        if all(abs(root - r) > 1e-9 * abs(r) for r in found):
             found.append(root)
     return np.array(sorted(found, key=lambda r: -r.real))
 
