@@ -39,7 +39,7 @@ _FARTHEST = 1e-6
 # all walks for one root may take, at least so many a line: half a second, and three.
 _LONGEST_WALK = 2e5
 _ALL_WALKS = 1e6
-_WALK_AT_LEAST = 2e3
+_WALK_AT_LEAST = 1e4
 # Most points of a line from which Newton's method starts, and most of its steps in extended
 # precision: at a multiple root they only shrink by a share.
 _MOST_STARTS = 4096
