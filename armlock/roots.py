@@ -18,7 +18,7 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 from scipy.interpolate import BarycentricInterpolator
 
-from armlock.characteristic import CharacteristicFunction, checked_system
+from armlock.characteristic import EPSILON, CharacteristicFunction, checked_system
 from armlock.checks import (
     ComplexArray,
     FloatArray,
@@ -27,7 +27,7 @@ from armlock.checks import (
     real_number,
     whole_number,
 )
-from armlock.contour import EPSILON, resolved_grid
+from armlock.contour import resolved_grid
 from armlock.stability import BOUNDARY, CountError, last_frequency, unstable_roots
 from armlock.statespace import realize
 
@@ -238,7 +238,8 @@ def _acting(
     terms = [(b1, system.delay1, x0, x), (b2, system.delay2, y0, y)]
     if system.delay1 == system.delay2:
         delayed, left = (
-            np.asarray(poly.polyadd(p * b1, q * b2)) for p, q in ((x, y), (x0 - x, y0 - y))
+            np.asarray(poly.polyadd(p * b1, q * b2), dtype=np.float64)
+            for p, q in ((x, y), (x0 - x, y0 - y))
         )
         terms = [(delayed, system.delay1, 1.0, 1.0), (left, 0.0, 1.0, 0.0)]
     rest = system.rest
