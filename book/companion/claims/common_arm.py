@@ -16,7 +16,7 @@ from armlock.checks import FloatArray
 from armlock.dcurve import Branch, d_curve, d_curve_branches, d_curve_line
 from armlock.loops import CommonArm
 from armlock.paper import COMMON_ARM_GAIN, STEP, TAU1, TAU2
-from armlock.roots import extended_root, polish_root, pseudospectral_roots, rightmost_root
+from armlock.roots import extended_root, pseudospectral_roots, rightmost_root
 from armlock.semidiscretization import semi_discretization, spectral_radius, transition_matrix
 from armlock.stability import StabilityChart, stability_chart, unstable_roots
 from book.companion.claims import ledger
@@ -239,14 +239,8 @@ def printed_maps(step: float = STEP) -> dict[str, CharacteristicFunction]:
 
 
 def excess(system: CharacteristicFunction, x: float, y: float) -> float:
-    """Spectral radius of a map less one, where its largest eigenvalue is real and near one.
-
-    The eigenvalue is found from a start at one, and certified by a count of the others.
-    """
-    root, _ = polish_root(system, x, y, 0.0)
-    if not np.isfinite(root) or unstable_roots(system.shifted(root.real + 1e-9), x, y):
-        raise RuntimeError(f"the largest eigenvalue at ({x}, {y}) is not the one near one")
-    return float(np.expm1(root.real * system.step))
+    """Spectral radius of a map less one."""
+    return float(np.expm1(rightmost_root(system, x, y).real * system.step))
 
 
 def balanced_perturbation(system: CharacteristicFunction) -> float:

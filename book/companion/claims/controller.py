@@ -23,7 +23,7 @@ from armlock.paper import (
     TAU1,
     TAU2,
 )
-from armlock.roots import polish_root, rightmost_root
+from armlock.roots import extended_root, rightmost_root
 from armlock.stability import StabilityChart, stability_chart, unstable_roots
 from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, decide
@@ -208,7 +208,7 @@ def delayed_root(delay: float) -> complex:
     null = TURN / abs(0.5 * (TAU1 - TAU2))
     omega = null * max(1, round(np.pi / delay / null))
     start = 1j * omega - np.exp(1j * omega * delay) / (CONTROLLER_GAIN * (TAU1 + TAU2))
-    return polish_root(paper_loop(delay=delay), 1.0, 1.0, complex(start))[0]
+    return complex(extended_root(paper_loop(delay=delay), 1.0, 1.0, complex(start)))
 
 
 # Responses ----------------------------------------------------------------------------------
