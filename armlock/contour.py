@@ -879,8 +879,8 @@ def resolved_grid(
     """Frequencies from 0 to `omega_end` between which an exponential sum is nearly straight.
 
     Over each step it moves by no more than twice `tolerance` times its distance from zero, and
-    stays as close to its tangent, or the step is as small as rounding allows. The grid ends before `omega_end` if
-    it would take more than MOST_SAMPLES.
+    stays as close to its tangent, or the step is as small as rounding allows. The grid ends
+    before `omega_end` if it would take more than MOST_SAMPLES.
     """
     weights, sums, phases = function
     grid = np.empty(1024)

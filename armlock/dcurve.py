@@ -109,9 +109,8 @@ def d_curve(
         \begin{pmatrix} x \\ y \end{pmatrix} =
         \begin{pmatrix} \mathrm{Re}\, A \\ \mathrm{Im}\, A \end{pmatrix}
 
-    with :math:`A = R\, e^{s\delta} + x_0 B_1 + y_0 B_2` and :math:`\beta_k = B_k e^{-s\theta_k}`,
-    taken at s = j omega. It is
-    solved by Cramer's rule:
+    with :math:`A = R\, e^{s\delta} + x_0 B_1 + y_0 B_2` and
+    :math:`\beta_k = B_k e^{-s\theta_k}` taken at s = j omega. It is solved by Cramer's rule:
 
     .. math::
 
@@ -147,8 +146,8 @@ def d_curve(
     highest = _MOST_RADIANS / system.longest_delay
     if (np.abs(omega) > highest).any():
         raise ValueError(
-            f"omega must be at most {highest:.3g} rad/s, where the phase over the longest delay "
-            f"is still known to 1e-7 rad, got {np.abs(omega).max()}"
+            f"omega must be at most {highest:.3g} rad/s, where the phase of the delays is still "
+            f"known to 1e-7 rad, got {np.abs(omega).max()}"
         )
     x0, y0 = system.reference
     s = 1j * omega

@@ -8,6 +8,7 @@ crossings of a whole ray are the zeros of Im(D0 conj(M)): one certified walk fin
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from itertools import pairwise
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -109,7 +110,7 @@ class Ray:
             if beyond >= last:
                 return float(beyond)
         edges = sorted({0.0, last, *kinks[(kinks > 0.0) & (kinks < last)]})
-        for low, high in zip(edges, edges[1:], strict=False):
+        for low, high in pairwise(edges):
             if reserve(high) <= 0.0:
                 return float(low + (high - low) * reserve(low) / (reserve(low) - reserve(high)))
         return np.inf
