@@ -87,19 +87,19 @@ class ExponentialSum(NamedTuple):
     ----------
     polynomials : tuple of Polynomial
         The p_k.
-    weights : float array, shape (groups, polynomials)
+    weights : float or complex array, shape (groups, polynomials)
         The w_gk.
     phases : float array, shape (groups,)
         Phase rates, in s.
-    sums : float array, shape (polynomials,)
+    sums : float or complex array, shape (polynomials,)
         The W_k, the sums of the weights over all groups. They are carried along, and not
         summed up, because the weights may cancel to many digits.
     """
 
     polynomials: tuple[Polynomial, ...]
-    weights: FloatArray
+    weights: npt.NDArray[Any]
     phases: FloatArray
-    sums: FloatArray
+    sums: npt.NDArray[Any]
 
     def times_conjugate(self, other: ExponentialSum) -> ExponentialSum:
         """Return this sum times the complex conjugate of `other`, at real omega."""
@@ -134,7 +134,7 @@ class ExponentialSum(NamedTuple):
 
     def turned(self) -> ExponentialSum:
         """Return this sum times j, whose imaginary part is the real part of this one."""
-        return self._replace(weights=1j * self.weights, sums=1j * self.sums)
+        return ExponentialSum(self.polynomials, 1j * self.weights, self.phases, 1j * self.sums)
 
     def compiled(self) -> tuple[Any, ...]:
         """Return the polynomials as `armlock.contour` takes them.

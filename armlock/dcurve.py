@@ -146,15 +146,16 @@ def d_curve(
     highest = _MOST_RADIANS / system.longest_delay
     if (np.abs(omega) > highest).any():
         raise ValueError(
-            f"omega must be at most {highest:.3g} rad/s, where the phase of the delays is still "
-            f"known to 1e-7 rad, got {np.abs(omega).max()}"
+            f"omega must be at most {highest:.3g} rad/s, where the phase of the delays is "
+            f"still known to 1e-7 rad, got {np.abs(omega).max()}"
         )
     x0, y0 = system.reference
     s = 1j * omega
     late1, late2 = np.expm1(-s * system.delay1), np.expm1(-s * system.delay2)
     apart = np.expm1(-s * (system.delay1 - system.delay2))
     with np.errstate(over="ignore", under="ignore", invalid="ignore", divide="ignore"):
-        rest, b1, b2 = _values(system, np.exp(s * system.step) if system.step else s)
+        z = np.asarray(np.exp(s * system.step) if system.step else s, dtype=np.complex128)
+        rest, b1, b2 = _values(system, z)
         # D at the reference, where nothing cancels; from there both parameters are solved for.
         known = rest * np.exp(s * system.delay) - b1 * x0 * late1 - b2 * y0 * late2
         across = b1 * np.conj(b2)
@@ -176,7 +177,10 @@ def _values(system: CharacteristicFunction, z: ComplexArray) -> list[ComplexArra
     """R, B1 and B2, divided by a polynomial without roots on the axis that suits their size."""
     polynomials = system.polynomials()
     if system.step:
-        return [np.polynomial.polynomial.polyval(z, p.coefficients) for p in polynomials]
+        return [
+            np.asarray(np.polyval(p.coefficients[::-1], z), dtype=np.complex128)
+            for p in polynomials
+        ]
     size = np.abs(polynomials[0].roots)
     size[size == 0.0] = 1.0 / system.longest_delay
     common = Polynomial(polynomials[0].coefficients, -size.astype(np.complex128))

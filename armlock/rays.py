@@ -369,30 +369,6 @@ def first_break(
     return found
 
 
-def boundary_radius(system: CharacteristicFunction, directions: npt.ArrayLike) -> FloatArray:
-    """Distance from the origin to the boundary of the stable region.
-
-    Parameters
-    ----------
-    system : CharacteristicFunction
-        A loop or a map, stable at the origin.
-    directions : float array, shape (2, n)
-        Unit vectors in the plane of the free parameters.
-
-    Returns
-    -------
-    float array, shape (n,)
-        Where each ray first meets the boundary.
-
-    Raises
-    ------
-    TypeError, ValueError, CountError
-        As `first_break` does.
-    """
-    vectors = np.asarray(directions, dtype=float).T
-    return np.array([first_break(system, (0.0, 0.0), v).position for v in vectors])
-
-
 def sweep(
     result: Callable[[P], R],
     points: Iterable[P],
@@ -454,7 +430,6 @@ def sweep(
 __all__ = [
     "Crossing",
     "Crossings",
-    "boundary_radius",
     "first_break",
     "first_crossing",
     "ray_crossings",

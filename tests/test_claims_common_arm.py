@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import inspect
+
 import numpy as np
 import pytest
 
-from armlock import CommonArm, spectral_radius
+from armlock import CommonArm, spectral_radius, unstable_roots
 from armlock.dcurve import d_curve, d_curve_line
 from book.companion.claims import Verdict, check
 from book.companion.claims import common_arm as chapter
@@ -16,7 +18,7 @@ from tests.test_schemes import map_eigenvalues
 def test_a_wrong_sign_in_the_curve_is_noticed(monkeypatch):
     right = chapter.printed_d_curve
     monkeypatch.setattr(chapter, "printed_d_curve", lambda *arms: (right(*arms)[0],) * 2)
-    assert chapter.parametric_curve.__wrapped__().verdict is Verdict.DIFFERS
+    assert inspect.unwrap(chapter.parametric_curve)().verdict is Verdict.DIFFERS
 
 
 def test_cusp_conditions_are_where_they_say():
@@ -67,7 +69,7 @@ def test_spectral_radius_of_a_map_is_that_of_its_largest_eigenvalue():
 def test_the_straight_edge_ends_where_the_stable_region_does():
     for c1, inwards in zip(chapter.straight_edge(), (1e-6, -1e-6), strict=True):
         below = CommonArm(), np.array([c1 + inwards, c1 - inwards])
-        counts = chapter.unstable_roots(*below, 2.0 - below[1] - 1e-9)
+        counts = unstable_roots(*below, 2.0 - below[1] - 1e-9)
         assert (counts > 0).tolist() == [False, True]
 
 

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from armlock import CommonArm, rightmost_root, stability_chart
+from armlock import CommonArm, RootError, rightmost_root, stability_chart
 from book.companion import explorers
 from book.companion.explorers import ChartExplorer
 
@@ -40,7 +40,7 @@ def test_roots_are_those_of_the_loop_at_every_so_many_points(explorer):
 
 def test_a_root_that_is_not_certified_is_not_shown(chart, monkeypatch):
     def refuse(*point):
-        raise explorers.RootError("no", 0j)
+        raise RootError("no", 0j)
 
     monkeypatch.setattr(explorers, "rightmost_root", refuse)
     assert np.isnan(ChartExplorer(chart, every=60, name="A").roots).all()

@@ -1,6 +1,7 @@
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgba
 
 from armlock import (
     CommonArm,
@@ -29,7 +30,7 @@ def test_the_shaded_region_is_the_stable_one(ax, chart):
     assert chart.plot(counts=False) is ax
     (image,) = ax.images
     np.testing.assert_array_equal(~np.ma.getmaskarray(image.get_array()), chart.stable)
-    assert image.cmap(0) == plt.matplotlib.colors.to_rgba(plotting.STABLE)
+    assert image.cmap(0) == to_rgba(plotting.STABLE)
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("$c_{1}$", "$c_{2}$")
 
 

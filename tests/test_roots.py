@@ -289,10 +289,10 @@ def test_an_integrator_with_nothing_but_dead_time_is_lambert(gain, delay):
 @pytest.mark.parametrize("kind", [CommonArm, DualArm])
 @pytest.mark.parametrize("point", [(0.9, 1.05), (0.0, 1.0), (1.0, 0.0), (-1.4, 0.8)])
 def test_with_a_dead_time_the_root_is_that_of_the_collocated_loop(kind, point):
-    loop = kind(0.3, 3.0, 2.0, delay=0.7)
-    root = rightmost_root(loop, *point)
-    assert pseudospectral_roots(loop, *point, 80)[0].real == pytest.approx(root.real, abs=1e-9)
-    assert (root.real > 0.0) == (unstable_roots(loop, *point) > 0)
+    loop, (x, y) = kind(0.3, 3.0, 2.0, delay=0.7), point
+    root = rightmost_root(loop, x, y)
+    assert pseudospectral_roots(loop, x, y, 80)[0].real == pytest.approx(root.real, abs=1e-9)
+    assert (root.real > 0.0) == (unstable_roots(loop, x, y) > 0)
 
 
 def test_a_dead_time_sets_the_growth_of_a_neutral_loop():

@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import bisect, brentq, minimize_scalar
 
-from armlock.boundary import boundary_radius, enclosed_area, outline, perimeter, rays
 from armlock.characteristic import CharacteristicFunction
 from armlock.checks import FloatArray
 from armlock.dcurve import Branch, d_curve, d_curve_branches, d_curve_line
@@ -21,6 +20,7 @@ from armlock.semidiscretization import semi_discretization, spectral_radius, tra
 from armlock.stability import StabilityChart, stability_chart, unstable_roots
 from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, decide
+from book.companion.outline import boundary_radius, enclosed_area, outline, perimeter, rays
 from book.companion.schemes import pade_poles, sampled_loop, standard_schemes
 
 claim = partial(ledger.claim, chapter="03_common_arm")

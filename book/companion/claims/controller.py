@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import bisect, brentq
 
-from armlock.checks import ComplexArray, FloatArray, positive_number
+from armlock.checks import ComplexArray, FloatArray
 from armlock.controllers import Controller, stage_one, table_two
 from armlock.loops import DualArm, Loop, paper_loop
 from armlock.margins import Margins, critical_perturbation, margins, modulus_margin
@@ -23,7 +23,7 @@ from armlock.paper import (
     TAU1,
     TAU2,
 )
-from armlock.roots import extended_root, rightmost_root
+from armlock.roots import rightmost_root
 from armlock.stability import StabilityChart, stability_chart, unstable_roots
 from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, decide
