@@ -114,18 +114,38 @@ def _clear(
 
 
 @njit(cache=True)
+def _stays_above(
+    over: complex, over_slope: complex, under: complex, under_slope: complex, level: float,
+    step: float,
+) -> float:  # fmt: skip
+    """Bound from below on |over + slope t| - level |under + slope t| for 0 <= t <= step.
+
+    |v + v' t| lies between |v| (1 + t Re(v' / v)) and that plus (|v'| t)^2 / (2 |v|), so that
+    what both change by in proportion does not count.
+    """
+    if over == 0.0 or under == 0.0:
+        return -np.inf
+    begin = abs(over) - level * abs(under)
+    rate = (over_slope * over.conjugate()).real / abs(over)
+    rate -= level * (under_slope * under.conjugate()).real / abs(under)
+    second = 0.5 * level * (abs(under_slope) * step) ** 2 / abs(under)
+    return min(begin, begin + rate * step) - second
+
+
+@njit(cache=True)
 def smallest_distance(
     polynomials: tuple[Any, ...],
     numerator: tuple[Any, ...],
     arms: FloatArray,
     dead_time: FloatArray,
     symmetric: bool,
+    omega: float,
     omega_end: float,
     longest_delay: float,
     best: float,
     tolerance: float,
 ) -> tuple[float, float, float, bool]:
-    """Smallest distance of L from -1 for 0 < omega <= omega_end.
+    """Smallest distance of L from -1 from omega to omega_end.
 
     `polynomials` are R, B1 and B2, `numerator` weights, sums and phases of N, `arms` |c1| and
     |c2|, and `dead_time` the phase rate of the dead time. Only distances below `best` are
@@ -136,7 +156,7 @@ def smallest_distance(
     weights, sums, phases = numerator
     unit, nothing, none = np.eye(3), np.zeros((0, 3)), np.zeros(0)
     only_r = np.array([1.0, 0.0, 0.0])
-    where, width, omega, steps = np.nan, 0.0, 0.0, 0
+    where, width, steps = np.nan, 0.0, 0
     turn = 2.0 * np.pi / longest_delay
     longest = turn
     while omega < omega_end:
@@ -177,13 +197,18 @@ def smallest_distance(
                 bent = 0.5 * step * step * real_horner(r_bound, u)
                 both = 0.5 * step * step * real_horner(n_bound, u) + bent
                 error = real_horner(n_error, u) + real_horner(r_error, u)
-                least = tangent_distance(below + value, change + slope, step) - both - error
+                over, over_slope = below + value, change + slope
+                under, under_slope, under_bent = below, change, bent
                 if symmetric:
-                    most = max(abs(below - value), abs(new_below - new_value)) + 2.0 * both
-                else:
-                    most = max(abs(below), abs(new_below)) + 2.0 * bent
-                most += error
-                if least >= (1.0 - tolerance) * min(best, here) * most:
+                    under, under_slope, under_bent = below - value, change - slope, both
+                least = tangent_distance(over, over_slope, step) - both - error
+                most = max(abs(under), abs(under + step * under_slope)) + under_bent + error
+                level = (1.0 - tolerance) * min(best, here)
+                if least >= level * most:
+                    break
+                if _stays_above(over, over_slope, under, under_slope, level, step) >= (
+                    both + level * under_bent + (1.0 + level) * error
+                ):
                     break
                 step *= 0.5
                 if step <= 1e-15 * omega or step < 1e-300:

@@ -18,7 +18,7 @@ from scipy.optimize import brentq, minimize_scalar
 from armlock import contour, infimum
 from armlock.checks import FloatArray, axis, positive_number, real_number
 from armlock.loops import Loop, checked_loop
-from armlock.nyquist import loop_numerator
+from armlock.nyquist import leading_radius, loop_numerator
 from armlock.rays import first_break
 from armlock.stability import (
     CountError,
@@ -33,7 +33,9 @@ TOLERANCE = 1e-6
 LARGEST_GAIN = 1e6
 # Share of their limits within which the disc of a neutral loop must have come for its
 # crossovers to be those of the limit.
-_SETTLED = 1e-4
+_SETTLED = 1e-3
+# Share of its limits up to which the neutral root chain lets gain factors be looked at.
+_NEXT_TO_THE_CHAIN = 1e-4
 # Crossovers that are polished: those with the smallest margins.
 _POLISHED = 8
 
@@ -179,7 +181,12 @@ def _smallest(
         below = abs(1.0 - response) if symmetric else 1.0
         return abs(1.0 + response) / below if below else np.inf
 
+    # Below it L is a single power of s, up to a part in ten million.
+    lowest = 1e-4 * leading_radius(loop, c1, c2)
     best, where = limit, np.inf
+    at_lowest = distance(lowest)
+    if at_lowest < best:
+        best, where = at_lowest, lowest
     for tolerance in (0.05, TOLERANCE, TOLERANCE):
         found, omega, width, complete = infimum.smallest_distance(
             numerator.compiled(),
@@ -187,6 +194,7 @@ def _smallest(
             np.array([abs(c1), abs(c2)]),
             np.array([-loop.delay]),
             symmetric,
+            lowest,
             min(end, highest),
             loop.longest_delay,
             best,
@@ -203,7 +211,7 @@ def _smallest(
                 break
             continue
         best, where = found, omega
-        sides = max(omega - width, 0.5 * omega), omega + width
+        sides = max(omega - width, lowest), omega + width
         nearby = minimize_scalar(
             distance, bounds=sides, method="bounded", options={"xatol": 1e-9 * width}
         )
@@ -436,7 +444,8 @@ def gain_interval(
 
         R + k N = 0 , \qquad k = -\frac{1}{L} \text{ is real.}
 
-    The neutral root chain bounds the gain, too.
+    The neutral root chain bounds the gain, too. Just inside its limits roots cross at ever
+    higher frequency: a factor that lies within 1e-4 of a limit may be given as the limit.
 
     Examples
     --------
@@ -467,11 +476,11 @@ def gain_interval(
         return found, np.concatenate((np.zeros(len(at_zero)), omega[negative]))
 
     # Just inside the limits of the chain, roots cross at ever higher frequency.
-    found, _ = factors(max(floor * (1.0 + 1e-6), 1.0 / LARGEST_GAIN), 1.0)
+    found, _ = factors(max(floor * (1.0 + _NEXT_TO_THE_CHAIN), 1.0 / LARGEST_GAIN), 1.0)
     lower = max([floor, *found[found < 1.0]])
     upper, where = limit, (np.inf if np.isfinite(limit) else np.nan)
     for top in 10.0 ** np.arange(1.0, math.log10(LARGEST_GAIN) + 0.5):
-        high = min(top, limit * (1.0 - 1e-6))
+        high = min(top, limit * (1.0 - _NEXT_TO_THE_CHAIN))
         found, omega = factors(1.0, high)
         above = np.flatnonzero((found > 1.0) & (found < upper))
         if above.size:
@@ -575,7 +584,7 @@ def margins(
     -----
     Phase and delay margins are taken over all crossovers. A neutral loop may have crossovers
     without end; they then approach those of the disc below, and the phase margin is certified
-    to 1e-4 rad.
+    to 1e-3 rad.
 
     With free phases, L fills a disc: with the sensor's weights m1 and m2
 

@@ -298,9 +298,10 @@ def _turns(values: ComplexArray) -> float:
     return float(np.angle(moved[1:] / moved[:-1]).sum())
 
 
-def _radius(loop: Loop, c1: float, c2: float, order: int) -> float:
-    """Radius of an indentation within which L is its leading term at s = 0."""
-    scales = [abs(p) for p in (*loop.controller.poles, *loop.controller.zeros) if abs(p) > 0.0]
+def leading_radius(loop: Loop, c1: float, c2: float) -> float:
+    """Radius within which L is its leading term at s = 0, a power of s, to a part in 1000."""
+    order = _poles_at_zero(loop, c1, c2)
+    scales = [float(size) for p in loop.polynomials() for size in np.abs(p.roots) if size > 0.0]
     radius = 1e-3 * min([*scales, 1.0 / loop.longest_delay])
     for _ in range(40):
         near, nearer = (complex(loop.open_loop(r, c1, c2)) for r in (radius, 0.5 * radius))
@@ -383,7 +384,7 @@ def nyquist(
     def response(s: ComplexArray) -> ComplexArray:
         return loop.open_loop(s, c1, c2)
 
-    radius = _radius(loop, c1, c2, order)
+    radius = leading_radius(loop, c1, c2)
     end = max(1.05 * end, 10.0 / loop.longest_delay, 10.0 * radius)
     if omega_max is not None:
         end = max(end, positive_number("omega_max", omega_max))

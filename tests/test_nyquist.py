@@ -196,7 +196,7 @@ def test_a_wrong_contour_is_caught(monkeypatch, name, wrong):
         monkeypatch.setattr(module, "open_loop_poles", lambda _: value)
     else:
         monkeypatch.setattr(module, "_poles_at_zero", lambda *_: value)
-        monkeypatch.setattr(module, "_radius", lambda *_: 1.0)
+        monkeypatch.setattr(module, "leading_radius", lambda *_: 1.0)
     with pytest.raises(CountError, match=r"no Nyquist count at \(c1, c2\) = "):
         nyquist(loop, c1, c2)
 
