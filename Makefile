@@ -30,15 +30,16 @@ empty :=
 space := $(empty) $(empty)
 find-sources = $(shell find $(wildcard $(1)) -type f \
 	-not -name '*.pyc' -not -name '*.nbi' -not -name '*.nbc' -not -path '*/.*' | sort)
-PACKAGE_SOURCES := $(call find-sources,armlock book/companion)
-BOOK_SOURCES := $(PACKAGE_SOURCES) $(call find-sources,book notebooks) tools/check_html.py
-TEST_SOURCES := $(PACKAGE_SOURCES) $(call find-sources,notebooks tests benchmarks book tools) \
-	$(call find-sources,binder) pyproject.toml environment.txt README.md codecheck.yml
+# What the book is made from, its companion package included.
+BOOK_SOURCES := $(call find-sources,armlock book notebooks) tools/check_html.py \
+	tools/write_codecheck.py codecheck.yml
+TEST_SOURCES := $(call find-sources,armlock book notebooks tests benchmarks tools binder) \
+	pyproject.toml environment.txt README.md codecheck.yml
 NOTEBOOKS := $(wildcard notebooks/*.ipynb)
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help env book browser same lab test claims bench serve lint format strip lock clean distclean always
+.PHONY: help env book browser same lab test claims attack bench serve lint format strip lock clean distclean always
 
 help: ## List the targets
 	@echo "armlock: make TARGET, where TARGET is one of"
@@ -96,6 +97,7 @@ $(INDEX): $(PACKAGE_READY) $(BOOK_SOURCES) build/book-sources $(if $(FORCE),alwa
 		$(VENV)/bin/jupyter-book build . --all --config book/_config.yml --toc book/_toc.yml \
 		--path-output build -W -n --keep-going
 	$(PY) tools/check_html.py build/_build/html
+	$(PY) tools/write_codecheck.py --check build/_build/html
 	@rm -rf build/html
 	@mv build/_build/html build/html
 	@ln -s ../html build/_build/html
@@ -124,9 +126,9 @@ test: $(TESTS_PASSED) ## Run all tests, notebooks included
 $(TESTS_PASSED): $(PACKAGE_READY) $(TEST_SOURCES) build/test-sources $(if $(FORCE),always)
 	@touch build/tests-started
 	@rm -rf build/figures-of-tests
-	@echo "Checking every claim of the paper: build/claims.txt ..."
 	@mkdir -p build
-	@$(PY) -m book.companion.claims build/figures-of-tests > build/claims.txt
+	@echo "Checking every claim of the paper: build/claims-of-tests.txt ..."
+	@$(PY) -m book.companion.claims build/figures-of-tests > build/claims-of-tests.txt
 	ARMLOCK_FIGURES="$(CURDIR)/build/figures-of-tests" \
 		$(PY) -m pytest --nbmake --numprocesses auto --maxprocesses 4 --dist worksteal
 	@date '+%Y-%m-%d %H:%M:%S' > $@
@@ -135,6 +137,9 @@ $(TESTS_PASSED): $(PACKAGE_READY) $(TEST_SOURCES) build/test-sources $(if $(FORC
 
 claims: $(PACKAGE_READY) ## Check every claim; print the ledger, write it as CSV and JSON
 	$(PY) -m book.companion.claims build/claims
+
+attack: $(PACKAGE_READY) ## Hold margins, counts and roots of random loops against brute force
+	$(PY) -m tests.attack
 
 bench: $(PACKAGE_READY) ## Measure speed and memory, and print a table
 	$(PY) -m benchmarks

@@ -87,19 +87,19 @@ class ExponentialSum(NamedTuple):
     ----------
     polynomials : tuple of Polynomial
         The p_k.
-    weights : float array, shape (groups, polynomials)
+    weights : float or complex array, shape (groups, polynomials)
         The w_gk.
     phases : float array, shape (groups,)
         Phase rates, in s.
-    sums : float array, shape (polynomials,)
+    sums : float or complex array, shape (polynomials,)
         The W_k, the sums of the weights over all groups. They are carried along, and not
         summed up, because the weights may cancel to many digits.
     """
 
     polynomials: tuple[Polynomial, ...]
-    weights: FloatArray
+    weights: npt.NDArray[Any]
     phases: FloatArray
-    sums: FloatArray
+    sums: npt.NDArray[Any]
 
     def times_conjugate(self, other: ExponentialSum) -> ExponentialSum:
         """Return this sum times the complex conjugate of `other`, at real omega."""
@@ -134,7 +134,7 @@ class ExponentialSum(NamedTuple):
 
     def turned(self) -> ExponentialSum:
         """Return this sum times j, whose imaginary part is the real part of this one."""
-        return self._replace(weights=1j * self.weights, sums=1j * self.sums)
+        return ExponentialSum(self.polynomials, 1j * self.weights, self.phases, 1j * self.sums)
 
     def compiled(self) -> tuple[Any, ...]:
         """Return the polynomials as `armlock.contour` takes them.
@@ -276,11 +276,6 @@ class CharacteristicFunction:
                     f"{name} without a delay must be of lower degree than A ({self.degree}), "
                     f"or its parameter would change the order of the equation"
                 )
-        if self.degree == 0 and not self.step:
-            raise ValueError(
-                "rest must be at least of first degree: an equation of order zero has nothing "
-                f"but its neutral root chain, got rest={self.rest.tolist()}"
-            )
         self._sealed = True
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -572,15 +567,23 @@ class CharacteristicFunction:
     def _of_map(
         self, lags: tuple[float, float]
     ) -> tuple[ExponentialSum, ExponentialSum, ExponentialSum]:
-        """`on_boundary` of a map: each power of z is an exponential, and the polynomial is 1."""
-        one = Polynomial(np.ones(1), np.zeros(0, dtype=np.complex128))
+        """`on_boundary` of a map: each power of z is an exponential, its polynomial is 1.
 
-        def term(p: FloatArray, lag: float) -> ExponentialSum:
-            phases = self.step * np.arange(p.size) - lag
-            return ExponentialSum((one,), p[:, None], phases, np.array([p.sum()]))
+        Each coefficient keeps a polynomial of its own, so that its rounding is not forgotten.
+        """
+        parts = self.rest, self.b1, self.b2
+        sizes = [p.size for p in parts]
+        ones = (Polynomial(np.ones(1), np.zeros(0, dtype=np.complex128)),) * sum(sizes)
+        places = np.split(np.eye(len(ones)), np.cumsum(sizes)[:-1])
 
-        first = term(self.a, 0.0).plus(term(self.c, self.delay))
-        return first, term(self.b1, lags[0]), term(self.b2, lags[1])
+        def term(k: int, lag: float, weight: float = 1.0) -> ExponentialSum:
+            p = weight * parts[k]
+            phases = np.asarray(self.step * np.arange(p.size) - lag, dtype=np.float64)
+            return ExponentialSum(ones, p[:, None] * places[k], phases, p @ places[k])
+
+        x0, y0 = self.reference
+        first = term(0, 0.0).plus(term(1, self.delay, x0)).plus(term(2, self.delay, y0))
+        return first, term(1, lags[0]), term(2, lags[1])
 
     def at(self, x: float, y: float) -> ExponentialSum:
         """Return D(j omega; x, y) at one point as an exponential sum."""
@@ -600,9 +603,11 @@ class CharacteristicFunction:
         """Return `rest` at s = j omega as an exponential sum."""
         undelayed, _, _ = self.on_boundary()
         if self.step:
-            phases = self.step * np.arange(self.rest.size)
+            size = self.rest.size
             return undelayed._replace(
-                weights=self.rest[:, None], phases=phases, sums=np.array([self.rest.sum()])
+                weights=undelayed.weights[:size],
+                phases=undelayed.phases[:size],
+                sums=np.concatenate((self.rest, np.zeros(undelayed.sums.size - size))),
             )
         only = np.array([1.0, 0.0, 0.0])
         return undelayed._replace(weights=only[None, :], phases=np.zeros(1), sums=only)

@@ -878,9 +878,9 @@ def resolved_grid(
 ) -> FloatArray:
     """Frequencies from 0 to `omega_end` between which an exponential sum is nearly straight.
 
-    Over each step it stays within `tolerance` times the tangent's distance from zero of its
-    tangent, or the step is as small as rounding allows. The grid ends before `omega_end` if
-    it would take more than MOST_SAMPLES.
+    Over each step it moves by no more than twice `tolerance` times its distance from zero, and
+    stays as close to its tangent, or the step is as small as rounding allows. The grid ends
+    before `omega_end` if it would take more than MOST_SAMPLES.
     """
     weights, sums, phases = function
     grid = np.empty(1024)
@@ -898,7 +898,8 @@ def resolved_grid(
                 nearest = tangent_distance(value, slope, step)
                 u = (omega + step - start) / reach
                 left = 0.5 * real_horner(bound, u) * step * step
-                if left <= tolerance * nearest or step <= smallest:
+                moved = 0.5 * step * abs(slope)
+                if max(left, moved) <= tolerance * nearest or step <= smallest:
                     break
                 step *= 0.5
             omega = end if step >= end - omega else omega + step

@@ -20,6 +20,8 @@ from armlock.stability import sign_changes
 _EPSILON = float(np.finfo(float).eps)
 # Phase in rad up to which a frequency next to a pole counts as the pole, in rounding errors.
 _MANY_TURNS = 1e3
+# Beyond this phase in rad rounding leaves too little of it.
+_MOST_RADIANS = 1e9
 
 
 class Line(NamedTuple):
@@ -87,8 +89,8 @@ def d_curve(
     Raises
     ------
     TypeError, ValueError
-        If omega is not finite and real, or so large or small that the curve leaves the range
-        of floats; or the system does not determine both parameters (equal delays, or a free
+        If omega is not finite and real, or so large that doubles do not hold the phase of the
+        delays; or the system does not determine both parameters (equal delays, or a free
         parameter without effect).
 
     See Also
@@ -107,9 +109,8 @@ def d_curve(
         \begin{pmatrix} x \\ y \end{pmatrix} =
         \begin{pmatrix} \mathrm{Re}\, A \\ \mathrm{Im}\, A \end{pmatrix}
 
-    with :math:`A = R\, e^{s\delta} + x_0 B_1 + y_0 B_2` and :math:`\beta_k = B_k e^{-s\theta_k}`,
-    taken at s = j omega. It is
-    solved by Cramer's rule:
+    with :math:`A = R\, e^{s\delta} + x_0 B_1 + y_0 B_2` and
+    :math:`\beta_k = B_k e^{-s\theta_k}` taken at s = j omega. It is solved by Cramer's rule:
 
     .. math::
 
@@ -142,12 +143,19 @@ def d_curve(
     checked_system(system)
     omega = real_array("omega", omega)
     _require_two_parameters(system)
+    highest = _MOST_RADIANS / system.longest_delay
+    if (np.abs(omega) > highest).any():
+        raise ValueError(
+            f"omega must be at most {highest:.3g} rad/s, where the phase of the delays is "
+            f"still known to 1e-7 rad, got {np.abs(omega).max()}"
+        )
     x0, y0 = system.reference
     s = 1j * omega
     late1, late2 = np.expm1(-s * system.delay1), np.expm1(-s * system.delay2)
     apart = np.expm1(-s * (system.delay1 - system.delay2))
     with np.errstate(over="ignore", under="ignore", invalid="ignore", divide="ignore"):
-        rest, b1, b2 = _values(system, np.exp(s * system.step) if system.step else s)
+        z = np.asarray(np.exp(s * system.step) if system.step else s, dtype=np.complex128)
+        rest, b1, b2 = _values(system, z)
         # D at the reference, where nothing cancels; from there both parameters are solved for.
         known = rest * np.exp(s * system.delay) - b1 * x0 * late1 - b2 * y0 * late2
         across = b1 * np.conj(b2)
@@ -155,15 +163,13 @@ def d_curve(
         determinant = np.imag(across) + np.imag(across * apart)
         turns = np.minimum(np.abs(omega * (system.delay1 - system.delay2)), _MANY_TURNS)
         pole = np.abs(determinant) <= 4.0 * _EPSILON * turns * np.abs(across)
+        # Where a parameter has no effect, rounding leaves it some.
+        for b in (system.b1, system.b2):
+            value, size = np.polyval(b[::-1], s), np.polyval(np.abs(b[::-1]), np.abs(s))
+            pole |= (not system.step) & (np.abs(value) <= 4.0 * _EPSILON * size)
         determinant = np.where(pole | (omega == 0.0), np.nan, determinant)
         x = x0 + np.imag(known * np.conj(b2 * (1.0 + late2))) / determinant
         y = y0 - np.imag(known * np.conj(b1 * (1.0 + late1))) / determinant
-    beyond = ~np.isnan(determinant) & ~(np.isfinite(x) & np.isfinite(y))
-    if beyond.any():
-        raise ValueError(
-            f"omega must be of a size for which the curve is within the range of floats, got "
-            f"{omega[beyond].ravel()[0]} rad/s"
-        )
     return x, y
 
 
@@ -171,7 +177,10 @@ def _values(system: CharacteristicFunction, z: ComplexArray) -> list[ComplexArra
     """R, B1 and B2, divided by a polynomial without roots on the axis that suits their size."""
     polynomials = system.polynomials()
     if system.step:
-        return [np.polynomial.polynomial.polyval(z, p.coefficients) for p in polynomials]
+        return [
+            np.asarray(np.polyval(p.coefficients[::-1], z), dtype=np.complex128)
+            for p in polynomials
+        ]
     size = np.abs(polynomials[0].roots)
     size[size == 0.0] = 1.0 / system.longest_delay
     common = Polynomial(polynomials[0].coefficients, -size.astype(np.complex128))

@@ -1,80 +1,91 @@
-"""A rational function of s as a state space in samples, kept exact until the last rounding.
-
-Poles at 1e-6 rad/s lie 1e-8 from z = 1 at 200 Hz, where polynomials in z say nothing any
-more. So the factors are kept: a cascade of first-order sections (second-order ones for
-complex pairs only), between which the inputs enter, is put together in rational numbers,
-made discrete in rational numbers, and rounded once. What is rounded are the *changes* from
-one sample to the next, of the size of pole times step, and not numbers close to one.
+r"""Rational functions of s in samples, written so that slow poles keep all their digits.
 
 The discretization is the trapezoidal rule, s -> (2 / T) (z - 1) / (z + 1), known as
 Tustin's or the bilinear map. It takes the left half-plane into the unit disc and s = 0 to
 z = 1, so that it adds no instability and keeps behaviour at rest; and the frequency response
 at omega is the continuous one at (2 / T) tan(omega T / 2), see `warped`. It is implicit:
 the present output depends on the present input.
+
+At 200 Hz a pole at 1e-6 rad/s lies 1e-8 from z = 1, and a number close to one cannot hold it
+well. So all is written in the change gamma = z - 1 from one sample to the next (the delta
+operator). A pole or zero p becomes gamma = T p / (1 - T p / 2), which is as precise as p, and
+a zero at infinity becomes gamma = -2. From these factors filters are built in sections of two
+poles and two zeros (`SampledFilter`). The sensor, whose polynomials are given expanded, is one
+section of its own with two inputs (`SampledSensor`).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from numba import njit
+from numpy.polynomial import polynomial as poly
 
-from armlock.checks import FloatArray, positive_number, real_array
+from armlock.checks import ComplexArray, FloatArray, positive_number, real_array
+from armlock.controllers import Controller
+from armlock.sensors import SignalMapping
 
-#: Numbers in the form that compiled functions keep in registers.
-Row = tuple[float, ...]
-
-# A signal as a linear form: coefficients of the states so far, and of the inputs.
-_Form = tuple[list[Fraction], list[Fraction]]
+#: Rows of numbers, in the form that lets the compiler unroll loops over them.
+Rows = tuple[tuple[float, ...], ...]
 
 
-class SampledSystem(NamedTuple):
-    """State space w[n+1] = w[n] + change w[n] + drive u[n], y = output w + direct u.
+# A section whose pole and zero at z = 0 cancel, for a filter without poles.
+_NO_SECTION = (-1.0, -1.0, 0.0, 0.0, 0.0)
+
+
+class SampledFilter(NamedTuple):
+    r"""A chain of sections of second order, times a gain.
+
+    With the change :math:`\gamma = z - 1`, a section from v to y is
+
+    .. math::
+
+        \gamma w_1 &= r_1 w_1 - k w_2 + v , \\
+        \gamma w_2 &= r_2 w_2 + w_1 , \\
+        y &= v + t_1 w_1 + t_2 w_2 .
+
+    Two real poles are r1 and r2, with k = 0; a complex pair is r1 +- j sqrt(k), with r1 = r2.
 
     Attributes
     ----------
-    change : float array, shape (states, states)
-        Block lower triangular.
-    drive : float array, shape (states, inputs)
-        How the inputs enter.
-    output : float array, shape (states,)
-        How the states make the output.
-    direct : float array, shape (inputs,)
-        The share of the present input in the present output.
+    gain : float
+        The factor, which is also the share of the present input in the present output.
+    sections : tuple of tuples
+        Rows (r1, r2, k, t1, t2), one at least.
+    order : int
+        Number of poles. If it is less than twice the number of sections, the last states
+        are not read.
     """
 
-    change: FloatArray
-    drive: FloatArray
-    output: FloatArray
-    direct: FloatArray
+    gain: float
+    sections: Rows
+    order: int
 
 
-class RealSystem(NamedTuple):
-    """State space x' = A x + B u, y = C x + D u, in rational numbers."""
+class SampledSensor(NamedTuple):
+    r"""A proper rational function with two inputs, in observer form.
 
-    A: list[list[Fraction]]
-    B: list[list[Fraction]]
-    C: list[Fraction]
-    D: list[Fraction]
+    With the states :math:`w_0` to :math:`w_m`, and :math:`w_{-1} = 0`
 
-    def as_floats(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Return the four matrices, rounded."""
-        n, inputs = len(self.A), len(self.D)
-        return (
-            np.array(self.A, dtype=float).reshape(n, n),
-            np.array(self.B, dtype=float).reshape(n, inputs),
-            np.array(self.C, dtype=float),
-            np.array(self.D, dtype=float),
-        )
+    .. math::
 
+        \gamma w_i &= w_{i-1} - q_i w_m + b_{i,1} u_1 + b_{i,2} u_2 , \\
+        v &= w_m + d_1 u_1 + d_2 u_2 .
 
-def floats(values: FloatArray) -> Row:
-    """Return an array's values, row by row, as a flat tuple."""
-    return tuple(float(value) for value in values.flat)
+    Attributes
+    ----------
+    states : tuple of tuples
+        Rows (q, b1, b2), one at least. The q are the coefficients of the denominator.
+    direct : tuple of float
+        The shares (d1, d2) of the present inputs in the present output.
+    """
+
+    states: Rows
+    direct: tuple[float, float]
 
 
 def checked_frequency(name: str, value: npt.ArrayLike, highest: float, unit: str) -> FloatArray:
@@ -144,131 +155,28 @@ def warped(omega: npt.ArrayLike, sample_rate: float) -> FloatArray:
     return np.asarray(2.0 * rate * np.tan(np.minimum(0.5 * omega / rate, 0.5 * math.pi)))
 
 
-class _Cascade:
-    """A chain of sections, the inputs entering between them."""
+def sampled_filter(controller: Controller, sample_rate: float) -> SampledFilter:
+    r"""Apply the trapezoidal rule to zeros, poles and gain.
 
-    def __init__(self, inputs: int) -> None:
-        self.inputs = inputs
-        self.A: list[list[Fraction]] = []
-        self.B: list[list[Fraction]] = []
-
-    def nothing(self) -> _Form:
-        return [Fraction(0)] * len(self.A), [Fraction(0)] * self.inputs
-
-    def state(self, index: int) -> _Form:
-        states, inputs = self.nothing()
-        states[index] = Fraction(1)
-        return states, inputs
-
-    def mixed(self, *terms: tuple[Fraction, _Form]) -> _Form:
-        """Return a sum of signals, each with its weight."""
-        states, inputs = self.nothing()
-        for weight, (some, entering) in terms:
-            for k, value in enumerate(some):
-                states[k] += weight * value
-            for k, value in enumerate(entering):
-                inputs[k] += weight * value
-        return states, inputs
-
-    def add(self, *rates: _Form) -> None:
-        """Append states with these derivatives, given over the enlarged state."""
-        self.A += [list(states) for states, _ in rates]
-        self.B += [list(inputs) for _, inputs in rates]
-        for row in self.A:
-            row += [Fraction(0)] * (len(self.A) - len(row))
-
-    def low_pass(self, factor: complex, carry: _Form, slope: list[Fraction]) -> _Form:
-        """Append 1 / (s - p), or 1 / |s - p|^2 for a pair, driven by `carry`.
-
-        For a pair the inputs may enter multiplied by s - Re p too, with weights `slope`.
-        """
-        sigma, omega = Fraction(factor.real), Fraction(factor.imag)
-        new = len(self.A)
-        if omega == 0:
-            self.add(self._widened(carry, {new: sigma}))
-            return self.state(new)
-        # x1 = (s - sigma) v / q and x2 = v / q: two equal sections where omega vanishes.
-        self.add(
-            self._widened(carry, {new: sigma, new + 1: -omega * omega}),
-            self._widened(([], slope), {new: Fraction(1), new + 1: sigma}),
-        )
-        return self.state(new + 1)
-
-    def _widened(self, form: _Form, extra: dict[int, Fraction]) -> _Form:
-        states = form[0] + [Fraction(0)] * (max(extra) + 1 - len(form[0]))
-        for index, value in extra.items():
-            states[index] += value
-        return states, list(form[1])
-
-
-def _quadratic(factor: complex) -> list[Fraction]:
-    """Return s - p, or |s - p|^2 for a complex one, ascending."""
-    sigma, omega = Fraction(factor.real), Fraction(factor.imag)
-    if omega == 0:
-        return [-sigma, Fraction(1)]
-    return [sigma * sigma + omega * omega, -2 * sigma, Fraction(1)]
-
-
-def _divided(p: list[Fraction], q: list[Fraction]) -> tuple[list[Fraction], list[Fraction]]:
-    """Return quotient and remainder of polynomials, the divisor with leading coefficient 1."""
-    remainder, degree = list(p), len(q) - 1
-    quotient = [Fraction(0)] * max(len(p) - degree, 0)
-    for k in range(len(quotient) - 1, -1, -1):
-        quotient[k] = remainder[k + degree]
-        for i, value in enumerate(q):
-            remainder[k + i] -= quotient[k] * value
-    remainder = remainder[:degree]
-    return quotient, remainder + [Fraction(0)] * (degree - len(remainder))
-
-
-def _times(p: list[Fraction], q: list[Fraction]) -> list[Fraction]:
-    product = [Fraction(0)] * (len(p) + len(q) - 1)
-    for i, a in enumerate(p):
-        for k, b in enumerate(q):
-            product[i + k] += a * b
-    return product
-
-
-def _single(roots: Sequence[complex]) -> list[complex]:
-    """Return real roots and the upper one of each pair, largest magnitude first."""
-    chosen = [complex(root) for root in roots if complex(root).imag >= 0.0]
-    return sorted(chosen, key=abs, reverse=True)
-
-
-def _order(roots: Sequence[complex]) -> int:
-    return sum(2 if root.imag else 1 for root in roots)
-
-
-def real_system(
-    zeros: Sequence[complex],
-    poles: Sequence[complex],
-    gain: float,
-    numerators: Sequence[Sequence[float]] = ((1.0,),),
-    denominator: Sequence[float] = (1.0,),
-) -> RealSystem:
-    r"""Realize gain prod(s - zeros) / prod(s - poles) times numerators over denominator.
-
-    From input k to the output that is, with the numerators n_k and the denominator d,
+    With h half the sampling step T, each pole or zero p becomes
 
     .. math::
 
-        g\, \frac{\prod_i (s - z_i)}{\prod_i (s - p_i)}\, \frac{n_k(s)}{d(s)} .
+        \gamma = \frac{T p}{1 - h p} ,
+
+    the zeros at infinity become -2, and the gain is multiplied by 1 - h z for each zero z, by
+    1 / (1 - h p) for each pole p, and by h for each zero at infinity.
 
     Parameters
     ----------
-    zeros, poles : sequence of complex
-        In rad/s; complex ones in conjugate pairs.
-    gain : float
-        Factor in front.
-    numerators : sequence of polynomials
-        One for each input, ascending powers of s.
-    denominator : sequence of float
-        Shared by all inputs, ascending powers of s.
+    controller : Controller
+        Zeros, poles and gain, with no more zeros than poles.
+    sample_rate : float
+        In Hz.
 
     Returns
     -------
-    RealSystem
-        Of one output. Factors s that all numerators share with the denominators drop out.
+    SampledFilter
 
     Raises
     ------
@@ -277,170 +185,215 @@ def real_system(
 
     Notes
     -----
-    Polynomials are divided by the factors of the denominator one after the other; what
-    remains is the weight with which an input enters between two sections. Nothing is
-    expanded in partial fractions, and poles may repeat.
+    Poles are paired with neighbours in magnitude, the larger one first. In this order t1 and
+    t2 are differences and products of differences that lose no digits, however far poles and
+    zeros lie apart.
     """
-    above = [[Fraction(float(c)) for c in numerator] for numerator in numerators]
-    below = np.trim_zeros(np.asarray(denominator, dtype=float), "b")
-    scale = Fraction(float(gain)) / Fraction(float(below[-1]))
-    at_zero = int(np.flatnonzero(below)[0])
-    left_zeros = _single(list(zeros))
-    left_poles = _single(poles)
-    roots = _single(list(np.roots(below[at_zero:][::-1]))) + [0j] * at_zero
-    for shared in (roots, left_poles):
-        while 0j in shared:
-            if 0j in left_zeros:
-                left_zeros.remove(0j)
-            elif all(p[0] == 0 for p in above):
-                above = [p[1:] or [Fraction(0)] for p in above]
-            else:
-                break
-            shared.remove(0j)
-    above = [[scale * c for c in p] for p in above]
-    # Poles of the controller join the sensor's until its part is proper; zeros do so where
-    # the controller's own poles leave no room for them.
-    taken: list[complex] = []
-    while True:
-        degree = max((k for p in above for k, c in enumerate(p) if c), default=0)
-        by_size = sorted(left_poles, key=lambda pole: (pole.imag == 0.0, -abs(pole)))
-        while _order(roots) + _order(taken) < degree and by_size:
-            taken.append(by_size.pop())
-            left_poles.remove(taken[-1])
-        pairs = [zero for zero in left_zeros if zero.imag]
-        single = [zero for zero in left_zeros if not zero.imag]
-        if len(pairs) > sum(1 for pole in left_poles if pole.imag):
-            zero = pairs[-1]
-        elif _order(left_zeros) > _order(left_poles):
-            zero = (single or pairs)[-1]
-        else:
-            break
-        left_zeros.remove(zero)
-        above = [_times(p, _quadratic(zero)) for p in above]
-    factors = roots + taken
-    return _assembled(above, factors, left_zeros, left_poles)
+    zeros: ComplexArray = np.array(controller.zeros, dtype=complex)
+    poles: ComplexArray = np.array(controller.poles, dtype=complex)
+    if zeros.size > poles.size:
+        raise ValueError(
+            f"controller must be proper, got more zeros than poles: {zeros.size} and "
+            f"{poles.size}"
+        )
+    half = 0.5 / positive_number("sample_rate", sample_rate)
+    if (half * np.append(zeros, poles) == 1.0).any():
+        raise ValueError(
+            f"sample_rate must not be half a pole or zero in rad/s, got {sample_rate}"
+        )
+    at_infinity = poles.size - zeros.size
+    factors = np.append(1.0 - half * zeros, np.full(at_infinity, half)) / (1.0 - half * poles)
+    finite = 2.0 * half * zeros / (1.0 - half * zeros)
+    above = _pairs([*finite, *[-2.0 + 0j] * at_infinity])
+    below = _pairs([*(2.0 * half * poles / (1.0 - half * poles))])
+    sections = tuple(
+        (r1, r2, k, (r1 - a1) + (r2 - a2), (r2 - a1) * (r2 - a2) + (b - k))
+        for (r1, r2, k), (a1, a2, b) in zip(below, above, strict=True)
+    )
+    gain = controller.gain * float(np.prod(factors).real)
+    return SampledFilter(gain, sections or (_NO_SECTION,), poles.size)
 
 
-def _assembled(
-    above: list[list[Fraction]],
-    factors: list[complex],
-    zeros: list[complex],
-    poles: list[complex],
-) -> RealSystem:
-    """Chain the sections: those of `factors` with the inputs between, then zeros over poles."""
-    inputs = len(above)
-    chain = _Cascade(inputs)
-    carry = chain.nothing()
-    for factor in factors:
-        q = _quadratic(factor)
-        parts = [_divided(p, q) for p in above]
-        above = [quotient for quotient, _ in parts]
-        rests = [rest for _, rest in parts]
-        slope = [rest[1] if len(rest) > 1 else Fraction(0) for rest in rests]
-        sigma = Fraction(factor.real)
-        entering = [rest[0] + sigma * c for rest, c in zip(rests, slope, strict=True)]
-        if len(q) == 2:
-            entering = [rest[0] for rest in rests]
-        driven = chain.mixed((Fraction(1), carry), (Fraction(1), ([], entering)))
-        carry = chain.low_pass(factor, driven, slope)
-    if any(c for p in above for c in p[1:]):
-        raise ValueError("the system must be proper, got more zeros than poles")
-    direct = [p[0] if p else Fraction(0) for p in above]
-    carry = chain.mixed((Fraction(1), carry), (Fraction(1), ([], direct)))
-    for pole in poles:
-        carry = _section(chain, carry, pole, zeros)
-    return RealSystem(chain.A, chain.B, carry[0], carry[1])
+def _pairs(roots: list[complex]) -> Rows:
+    """Return roots by twos as (gamma - r1) (gamma - r2) + k, rows (r1, r2, k).
+
+    Larger pairs come first. A last real root that is left over is joined by -1.
+    """
+    upper = [root for root in roots if root.imag > 0.0]
+    pairs = [(float(root.real), float(root.real), float(root.imag) ** 2) for root in upper]
+    real = sorted((float(r.real) for r in roots if r.imag == 0.0), key=abs, reverse=True)
+    pairs += [(r1, r2, 0.0) for r1, r2 in zip(real[::2], real[1::2], strict=False)]
+    pairs.sort(key=lambda pair: math.hypot(pair[0], math.sqrt(pair[2])), reverse=True)
+    left = [(real[-1], -1.0, 0.0)] if len(real) % 2 else []
+    return tuple(pairs + left)
 
 
-def _section(chain: _Cascade, carry: _Form, pole: complex, zeros: list[complex]) -> _Form:
-    """Append one section of the controller, with as many of the zeros as it has room for."""
-    room = _order([pole])
-    above = [Fraction(1)]
-    # The nearest zeros, so that a section changes little; pairs first, for they need pairs.
-    for zero in sorted(zeros, key=lambda root: (root.imag == 0.0, abs(root - pole))):
-        if len(above) - 1 + _order([zero]) <= room:
-            above = _times(above, _quadratic(zero))
-            zeros.remove(zero)
-    whole, rest = _divided(above, _quadratic(pole))
-    new = len(chain.A)
-    low = chain.low_pass(pole, carry, [Fraction(0)] * chain.inputs)
-    terms = [(whole[0] if whole else Fraction(0), carry)]
-    if room == 1:
-        terms.append((rest[0], low))
-    else:
-        sigma = Fraction(pole.real)
-        terms += [(rest[1], chain.state(new)), (rest[0] + sigma * rest[1], low)]
-    return chain.mixed(*terms)
+@njit(cache=True)
+def through(sections: Rows, state: FloatArray, v: float) -> float:
+    """Return what the sections of a filter, without its gain, make of a sample.
+
+    `state` holds two values for each section, and moves on to the next sample.
+    """
+    for j in range(len(sections)):
+        r1, r2, k, t1, t2 = sections[j]
+        w1, w2 = state[2 * j], state[2 * j + 1]
+        y = v + (t1 * w1 + t2 * w2)
+        state[2 * j] = w1 + (r1 * w1 - k * w2 + v)
+        state[2 * j + 1] = w2 + (r2 * w2 + w1)
+        v = y
+    return v
 
 
-def _solved(matrix: list[list[Fraction]], right: list[list[Fraction]]) -> list[list[Fraction]]:
-    """Solve matrix X = right exactly, by elimination."""
-    n = len(matrix)
-    rows = [list(a) + list(b) for a, b in zip(matrix, right, strict=True)]
-    for k in range(n):
-        pivot = next((i for i in range(k, n) if rows[i][k]), None)
-        if pivot is None:
-            raise ValueError("sample_rate meets a pole at twice its value in rad/s")
-        rows[k], rows[pivot] = rows[pivot], rows[k]
-        head = rows[k][k]
-        rows[k] = [value / head for value in rows[k]]
-        for i in range(n):
-            if i != k and rows[i][k]:
-                weight = rows[i][k]
-                rows[i] = [a - weight * b for a, b in zip(rows[i], rows[k], strict=True)]
-    return [row[n:] for row in rows]
-
-
-def sample(system: RealSystem, sample_rate: float) -> SampledSystem:
-    r"""Apply the trapezoidal rule.
-
-    With the step T and
-
-    .. math::
-
-        Q = \left( I - \tfrac{T}{2} A \right)^{-1}
-
-    the result has
-
-    .. math::
-
-        \text{change} &= T A\, Q , & \text{drive} &= T\, Q B , \\
-        \text{output} &= C\, Q , & \text{direct} &= D + \tfrac{T}{2}\, C\, Q B .
+def stationary_root(sampled: SampledFilter) -> FloatArray:
+    """Return a square root of the covariance of a filter's states under white noise.
 
     Parameters
     ----------
-    system : RealSystem
-        In continuous time.
+    sampled : SampledFilter
+        With stable poles.
+
+    Returns
+    -------
+    float array, shape (order, order)
+        A lower triangular R: the states' covariance is R R^T where the input's variance is
+        one. States that depend on those before them have zeros on its diagonal.
+
+    Raises
+    ------
+    ValueError
+        If the covariance exceeds what floats hold.
+    """
+    n = 2 * len(sampled.sections)
+    change, drive, carried = np.zeros((n, n)), np.zeros(n), np.zeros(n)
+    for j, (r1, r2, k, t1, t2) in enumerate(sampled.sections):
+        here, drive[2 * j] = slice(2 * j, 2 * j + 2), 1.0
+        change[2 * j] = carried
+        change[here, here] = [[r1, -k], [1.0, r2]]
+        carried[here] = t1, t2
+    change, drive = change[: sampled.order, : sampled.order], drive[: sampled.order]
+    # P(2 n) = P(n) + A^n P(n) A^n^T for n = 1, 2, 4, ...: sums of squares, so that nothing
+    # cancels; with A^n - 1 in place of A^n, which slow poles need.
+    covariance = np.outer(drive, drive)
+    while True:
+        with np.errstate(over="ignore", invalid="ignore"):
+            half = covariance + change @ covariance
+            total = covariance + half + half @ change.T
+            change = 2.0 * change + change @ change
+        if not np.isfinite(total).all():
+            raise ValueError(
+                "poles must leave a variance that floats can hold, got one too close to the "
+                "imaginary axis; a series that starts at rest does without it, at_rest=True"
+            )
+        if np.array_equal(total, covariance):
+            break
+        covariance = total
+    root = np.zeros_like(covariance)
+    for j in range(len(root)):
+        column = covariance[j:, j] - root[j:, :j] @ root[j, :j]
+        # Less is rounding, where a pole and a zero cancel.
+        if column[0] > 1e-12 * covariance[j, j]:
+            root[j:, j] = column / math.sqrt(column[0])
+    return root
+
+
+def sampled_sensor(
+    numerators: Sequence[FloatArray], denominator: FloatArray, sample_rate: float
+) -> SampledSensor:
+    r"""Apply the trapezoidal rule to a proper function given by polynomials.
+
+    A polynomial of degree up to m, multiplied by the same power of 2 + gamma for all, becomes
+
+    .. math::
+
+        \sum_i n_i s^i \to \sum_i n_i \left( \frac{2 \gamma}{T} \right)^i
+        \left( 2 + \gamma \right)^{m - i} .
+
+    Parameters
+    ----------
+    numerators : two float arrays
+        Coefficients in ascending powers of s.
+    denominator : float array
+        Likewise; its degree m is not exceeded by the numerators'.
     sample_rate : float
         In Hz.
 
     Returns
     -------
-    SampledSystem
-        Its state is w[n] = (I - A T / 2) x[n] - B u[n] T / 2.
+    SampledSensor
     """
-    step = 1 / Fraction(positive_number("sample_rate", sample_rate))
-    A, B, C, D = system
-    n, inputs = len(A), len(D)
-    unit = [[Fraction(int(i == k)) for k in range(n)] for i in range(n)]
-    implicit = [[unit[i][k] - step / 2 * A[i][k] for k in range(n)] for i in range(n)]
-    # R = (I - A T / 2)^-1, and R B next to it.
-    solved = _solved(implicit, [unit[i] + B[i] for i in range(n)])
-    R = [row[:n] for row in solved]
-    RB = [row[n:] for row in solved]
-    change = [
-        [step * sum((A[i][m] * R[m][k] for m in range(n)), Fraction(0)) for k in range(n)]
-        for i in range(n)
-    ]
-    drive = [[step * value for value in row] for row in RB]
-    output = [sum((C[m] * R[m][k] for m in range(n)), Fraction(0)) for k in range(n)]
-    direct = [
-        D[k] + step / 2 * sum((C[m] * RB[m][k] for m in range(n)), Fraction(0))
-        for k in range(inputs)
-    ]
-    return SampledSystem(
-        np.array(change, dtype=float).reshape(n, n),
-        np.array(drive, dtype=float).reshape(n, inputs),
-        np.array(output, dtype=float),
-        np.array(direct, dtype=float),
-    )
+    order = denominator.size - 1
+    slope = np.array([0.0, 2.0 * sample_rate])
+
+    def changed(polynomial: FloatArray) -> FloatArray:
+        """Return the coefficients in powers of gamma, `order` + 1 of them."""
+        total = np.zeros(order + 1)
+        for i, coefficient in enumerate(polynomial):
+            bent = poly.polymul(poly.polypow(slope, i), poly.polypow([2.0, 1.0], order - i))
+            total[: bent.size] += coefficient * bent
+        return total
+
+    below = changed(denominator)
+    above = np.array([changed(numerator) for numerator in numerators]).T
+    direct = above[-1] / below[-1]
+    drive = (above[:-1] - below[:-1, None] * direct) / below[-1]
+    rows = np.column_stack((below[:-1] / below[-1], drive)).tolist()
+    states = tuple((q, b1, b2) for q, b1, b2 in rows)
+    return SampledSensor(states or ((0.0, 0.0, 0.0),), (float(direct[0]), float(direct[1])))
+
+
+def sampled_loop(
+    controller: Controller, mapping: SignalMapping, sample_rate: float
+) -> tuple[SampledSensor, SampledFilter]:
+    """Return sensor and controller in samples, one behind the other.
+
+    Poles at s = 0 drop out where zeros cancel them, in whichever of the two these are: a
+    hidden state would not decay. A part that is then improper takes factors of the other.
+
+    Parameters
+    ----------
+    controller : Controller
+        Controller and actuator.
+    mapping : SignalMapping
+        The sensor; its product with the controller is proper.
+    sample_rate : float
+        In Hz.
+
+    Returns
+    -------
+    tuple of SampledSensor and SampledFilter
+    """
+    zeros, poles = list(controller.zeros), list(controller.poles)
+    numerators = [np.array(n) for n in (mapping.numerator1, mapping.numerator2)]
+    denominator = np.array(mapping.denominator)
+    while (0.0 in zeros or not any(n[0] for n in numerators)) and (
+        0.0 in poles or denominator[0] == 0.0
+    ):
+        if 0.0 in zeros:
+            zeros.remove(0.0)
+        else:
+            numerators = [np.append(n[1:], 0.0) for n in numerators]
+        if 0.0 in poles:
+            poles.remove(0.0)
+        else:
+            denominator = denominator[1:]
+    numerators = [poly.polytrim(n, tol=0.0) for n in numerators]
+    while True:
+        if len(zeros) > len(poles):
+            factor = _slowest(zeros)
+            numerators = [poly.polymul(n, factor) for n in numerators]
+        elif max(n.size for n in numerators) > denominator.size:
+            denominator = poly.polymul(denominator, _slowest(poles))
+        else:
+            break
+    filtered = sampled_filter(Controller(zeros, poles, controller.gain), sample_rate)
+    return sampled_sensor(numerators, denominator, sample_rate), filtered
+
+
+def _slowest(roots: list[complex]) -> FloatArray:
+    """Take the smallest root, or pair, out of a list; return its polynomial."""
+    root = min(roots, key=abs)
+    roots.remove(root)
+    if root.imag == 0.0:
+        return np.array([-root.real, 1.0])
+    roots.remove(min(roots, key=lambda other: abs(other - root.conjugate())))
+    return np.array([abs(root) ** 2, -2.0 * root.real, 1.0])

@@ -251,7 +251,7 @@ def free_margins(
 ) -> tuple[FloatArray, FloatArray, bool]:
     """Smallest margins of the disc that L fills with free phases, from omega to `omega_end`.
 
-    `polynomials` are R, B1 and B2, and `arms` \\|c1\\| and \\|c2\\|. `best` holds values that are
+    `polynomials` are R, B1 and B2, `arms` the sizes of c1 and c2. `best` holds values that are
     known to occur, or inf. Returns the smallest values, where they were met (nan for those of
     `best`), and whether the walk came to its end. None is smaller than the result by more than
     the share `tolerance`.
@@ -259,7 +259,7 @@ def free_margins(
     unit, best, where = np.eye(3), best.copy(), np.full(6, np.nan)
     step = omega_end
     for _ in range(MOST_STEPS // 50):
-        start, reach, local, _ = piece(
+        _, reach, local, _ = piece(
             polynomials, unit, np.zeros(3), omega, min(step, omega_end - omega)
         )
         r, b1, b2, c = local[1], local[2], local[3], local[2] + local[3]

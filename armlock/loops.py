@@ -20,7 +20,13 @@ from numpy.polynomial import polynomial as poly
 
 from armlock import paper, sensors
 from armlock.characteristic import CharacteristicFunction, Polynomial
-from armlock.checks import ComplexArray, complex_array, positive_number, real_number
+from armlock.checks import (
+    ComplexArray,
+    complex_array,
+    positive_number,
+    real_number,
+    true_or_false,
+)
 from armlock.controllers import Controller, integrating_actuator, table_two
 from armlock.sensors import SignalMapping
 
@@ -461,7 +467,7 @@ def paper_loop(
     array([0, 0])
     """
     chosen = table_two() if controller is None else Controller.of(controller)
-    if actuator:
+    if true_or_false("actuator", actuator):
         chosen = chosen * integrating_actuator()
     mapping = sensors.dual(corner, _delay_difference(tau1, tau2, difference))
     return Loop(chosen, mapping, tau1, tau2, delay)

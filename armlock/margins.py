@@ -94,9 +94,15 @@ class Margins:
     modulus_omega: float
 
 
+def _plus(p: FloatArray, q: FloatArray) -> FloatArray:
+    """Return the sum of two polynomials."""
+    return np.asarray(poly.polyadd(p, q), dtype=np.float64)
+
+
 def _limit_disc(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
-    """Centre and radius of the disc that L fills at high frequency, for all small changes
-    of the delays.
+    """Centre and radius of the disc that L fills at high frequency.
+
+    It is that of all phases that small changes of the delays can make.
     """
     r = float(loop.rest[-1])
     b1, b2 = (float(b[-1]) if b.size == loop.rest.size else 0.0 for b in (loop.b1, loop.b2))
@@ -122,13 +128,13 @@ def _clear_from(loop: Loop, c1: float, c2: float, centre: float, radius: float) 
     Past it |B1 + B2 - centre R| > radius |R| + |c1 B1| + |c2 B2|; with a dead time B1 + B2
     turns, and stands on the other side.
     """
-    c = poly.polyadd(loop.b1, loop.b2)
+    c = _plus(loop.b1, loop.b2)
     factors = [radius, abs(c1), abs(c2), 0.0]
     first = -centre * loop.rest
     if loop.delay:
         factors[3] = 1.0
     else:
-        first = poly.polyadd(first, c)
+        first = _plus(first, c)
     others = (loop.rest, loop.b1, loop.b2, c)
     return last_larger(first, others, np.array(factors))
 
@@ -269,7 +275,7 @@ def _crossovers(loop: Loop, c1: float, c2: float, end: float) -> FloatArray:
     above, below = loop_numerator(loop, c1, c2), loop.rest_on_boundary()
     squares = above.times_conjugate(above).plus(below.times_conjugate(below).scaled(-1.0))
     omega, jump = sign_changes(squares.turned(), end)
-    return omega[(omega > 0.0) & (jump != 0)]
+    return np.asarray(omega[(omega > 0.0) & (jump != 0)])
 
 
 def _phase_and_delay(
@@ -281,7 +287,7 @@ def _phase_and_delay(
     phase margin may be that of the disc that L fills at high frequency.
     """
     phase, delay, where = np.inf, np.inf, np.nan
-    c = poly.polyadd(loop.b1, loop.b2)
+    c = _plus(loop.b1, loop.b2)
     end = last_larger(loop.rest, (c, loop.b1, loop.b2), np.array([1.0, abs(c1), abs(c2)]))
     if not np.isfinite(end) and np.isfinite(highest):
         end = highest
@@ -351,7 +357,7 @@ def _settled_from(loop: Loop) -> float:
     ends = []
     for b in (loop.b1, loop.b2):
         share = float(b[-1]) / r if b.size == loop.rest.size else 0.0
-        left = poly.polysub(b, share * loop.rest)[: loop.rest.size - 1]
+        left = _plus(b, -share * loop.rest)[: loop.rest.size - 1]
         scale = max(abs(share), 1.0) * _SETTLED
         ends.append(last_larger(loop.rest, (left,), np.array([1.0 / scale])))
     return max(ends)
@@ -376,20 +382,20 @@ def _no_crossing_from(loop: Loop, c1: float, c2: float, low: float, high: float)
     |t R + C| - S must stay positive. \|t R + C\|^2 is convex in t. If it ascends at the lower
     end of the interval, it is smallest there; if it descends at the upper end, there.
     """
-    c = poly.polyadd(loop.b1, loop.b2)
+    c = _plus(loop.b1, loop.b2)
     arms = np.array([abs(c1), abs(c2)])
     found = [last_larger(loop.rest, (c, loop.b1, loop.b2), np.array([high, *(high * arms)]))]
     if not loop.delay:
         for t, sign in ((1.0 / high, 1.0), (1.0 / low, -1.0)):
             ascends = math.sqrt(contour.last_root_bound(_ascent(loop.rest, c, t, sign)))
-            first = poly.polyadd(t * loop.rest, c)
+            first = _plus(t * loop.rest, c)
             found.append(max(ascends, last_larger(first, (loop.b1, loop.b2), arms)))
     return min(found)
 
 
 def _ascent(rest: FloatArray, c: FloatArray, t: float, sign: float) -> FloatArray:
     """Half the slope of |t R + C|^2 in t, times a sign, as a polynomial in omega^2."""
-    whole = poly.polyadd(t * rest, c)
+    whole = _plus(t * rest, c)
     product = np.convolve(whole, rest * (-1.0) ** np.arange(rest.size))[::2]
     return np.asarray(sign * product * (-1.0) ** np.arange(product.size))
 
@@ -490,7 +496,7 @@ def _free_margins(
     In the order of `armlock.infimum.free_margins_at`. A coarse sample gives values that occur.
     The certified walk then steps over what cannot hold smaller ones.
     """
-    c = poly.polyadd(loop.b1, loop.b2)
+    c = _plus(loop.b1, loop.b2)
     arms = np.array([abs(c1), abs(c2)])
     centre, radius = _limit_disc(loop, c1, c2)
     if radius >= abs(1.0 + centre):
@@ -510,7 +516,8 @@ def _free_margins(
         omega = math.exp(u)
         first, second = (complex(k) for k in loop.arm_responses(1j * omega))
         spread = abs(c1 * first) + abs(c2 * second)
-        return infimum.free_margins_at(first + second, spread, omega)
+        found: FloatArray = infimum.free_margins_at(first + second, spread, omega)
+        return found
 
     u = np.linspace(math.log(lowest), math.log(end), 400)
     sampled = np.array([at(value) for value in u])

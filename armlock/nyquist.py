@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import factorial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -39,6 +39,7 @@ from armlock.stability import (
 
 if TYPE_CHECKING:
     import control
+    from matplotlib.axes import Axes
 
 # Largest change of the argument of 1 + L between neighbouring samples, in rad.
 _TURN = 0.2
@@ -87,6 +88,24 @@ class NyquistCurve:
     encirclements: int
     open_loop_poles: int
     closed_loop_roots: int
+
+    def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
+        """Draw the curve, both signs of omega, with -1 and the infinite branch.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+            Where to draw; the current ones by default.
+        **options
+            As `armlock.plotting.plot_nyquist` takes them.
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        from armlock.plotting import plot_nyquist
+
+        return plot_nyquist(self, ax, **options)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,22 +1,30 @@
-"""Figures: one style, charts with labelled regions, curves cut at their poles, downloads."""
+"""How results are drawn: the book's style, charts, D-curves and Nyquist curves.
+
+Results draw themselves, `chart.plot()` and `nyquist(...).plot()`, by the functions here. They
+import this module when they are first drawn, and nothing here imports them.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import matplotlib.pyplot as plt
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from scipy import ndimage
 
-from armlock.checks import even_axis, positive_number, real_number, whole_number
-from armlock.dcurve import Branch, Line
-from armlock.nyquist import NyquistCurve
-from armlock.stability import StabilityChart
+from armlock.checks import ComplexArray, even_axis, positive_number, whole_number
 
+if TYPE_CHECKING:
+    from armlock.dcurve import Branch, Line
+    from armlock.nyquist import NyquistCurve
+    from armlock.stability import StabilityChart
+
+#: Colours of the figures, which the colour-blind tell apart too (Okabe and Ito).
 BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, BLACK = (
     "#0072B2",
     "#D55E00",
@@ -28,6 +36,8 @@ BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, BLACK = (
 )
 #: Fill of the stable region.
 STABLE = "#B8C4CE"
+#: The circle |L| that stands for infinity in a compressed Nyquist plot.
+INFINITY = 1e6
 
 
 def use_style() -> None:
@@ -35,118 +45,83 @@ def use_style() -> None:
     plt.style.use(Path(__file__).with_name("armlock.mplstyle"))
 
 
-def plot_stable_region(ax: Axes, chart: StabilityChart, color: str = STABLE) -> None:
-    """Shade the stable region of a chart and label the axes.
-
-    Parameters
-    ----------
-    ax : Axes
-        Where to draw.
-    chart : StabilityChart
-        With ascending, evenly spaced axes.
-    color : str, optional
-        Fill of the region.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If there is no chart, or its axes do not ascend in equal steps.
-    """
-    _checked_chart(chart)
-    _image(ax, chart, np.where(chart.stable, 1.0, np.nan), ListedColormap([color]))
+# Charts and D-curves ------------------------------------------------------------------------
 
 
-def plot_counts(ax: Axes, chart: StabilityChart, largest: int = 12) -> None:
+def plot_chart(
+    chart: StabilityChart,
+    ax: Axes | None = None,
+    *,
+    counts: bool = True,
+    largest: int = 12,
+    labels: float | None = None,
+) -> Axes:
     """Colour a chart by its number of unstable roots, the stable region apart.
 
     Parameters
     ----------
-    ax : Axes
-        Where to draw.
     chart : StabilityChart
-        With ascending, evenly spaced axes.
+        With ascending, evenly spaced axes. Points with a root on the boundary stay white.
+    ax : Axes, optional
+        Where to draw; matplotlib's current axes by default.
+    counts : bool, optional
+        False shades the stable region alone.
     largest : int, optional
         Counts above this share one colour.
+    labels : float, optional
+        Regions of at least this share of the chart, from 0 to 1, are labelled with their
+        count. By default none are.
+
+    Returns
+    -------
+    Axes
 
     Raises
     ------
-    TypeError, ValueError
-        If there is no chart, its axes do not ascend in equal steps, or `largest` is not a
-        positive integer.
+    ValueError
+        If an axis does not ascend in equal steps, or `largest` is not a positive integer.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from armlock import CommonArm, stability_chart
+    >>> axis = np.linspace(-3, 3, 61)
+    >>> ax = stability_chart(CommonArm(), axis, axis).plot(labels=0.01)
+    >>> ax.texts[0].get_text()
+    '0'
     """
+    ax = plt.gca() if ax is None else ax
     largest = whole_number("largest", largest, 1)
-    _checked_chart(chart)
-    shades = plt.get_cmap("Oranges")(np.linspace(0.08, 0.75, largest))
-    colors = ListedColormap([STABLE, *shades])
-    values = np.where(chart.counts < 0, np.nan, np.minimum(chart.counts, largest))
-    _image(ax, chart, values, colors, 0.0, float(largest))
-
-
-def _checked_chart(chart: object) -> StabilityChart:
-    """Return a chart that a picture shows as it is."""
-    if not isinstance(chart, StabilityChart):
-        raise TypeError(f"chart must be a StabilityChart, got {chart!r}")
     even_axis("chart.x", chart.x)
     even_axis("chart.y", chart.y)
-    return chart
-
-
-def _image(
-    ax: Axes,
-    chart: StabilityChart,
-    values: npt.NDArray[np.float64],
-    colors: ListedColormap,
-    low: float | None = None,
-    high: float | None = None,
-) -> None:
-    """Draw a grid of values, cells centred on the axes' points."""
-    half_x = 0.5 * (chart.x[-1] - chart.x[0]) / (chart.x.size - 1)
-    half_y = 0.5 * (chart.y[-1] - chart.y[0]) / (chart.y.size - 1)
+    shown = chart.counts >= 0 if counts else chart.stable
+    # Cells are centred on the points.
+    half_x, half_y = (0.5 * (v[-1] - v[0]) / (v.size - 1) for v in (chart.x, chart.y))
     ax.imshow(
-        values,
-        origin="lower",
-        aspect="auto",
-        interpolation="nearest",
-        cmap=colors,
-        vmin=low,
-        vmax=high,
+        np.where(shown, np.minimum(chart.counts, largest), np.nan),
+        cmap=ListedColormap(
+            [STABLE, *plt.get_cmap("Oranges")(np.linspace(0.08, 0.75, largest))]
+        ),
+        vmin=0.0,
+        vmax=largest,
         extent=(
             chart.x[0] - half_x,
             chart.x[-1] + half_x,
             chart.y[0] - half_y,
             chart.y[-1] + half_y,
         ),
+        origin="lower",
+        aspect="auto",
+        interpolation="nearest",
     )
     label_parameters(ax, chart.system.parameters)
+    if labels is not None:
+        _label_regions(ax, chart, labels)
+    return ax
 
 
-def label_parameters(ax: Axes, parameters: tuple[str, str]) -> None:
-    """Label both axes with the names of the free parameters."""
-    ax.set_xlabel(_as_math(parameters[0]))
-    ax.set_ylabel(_as_math(parameters[1]))
-
-
-def _as_math(name: str) -> str:
-    """Set a parameter's name as TeX, its digits as subscript."""
-    letter = name.rstrip("0123456789")
-    digits = name[len(letter) :]
-    return f"${letter}_{{{digits}}}$" if digits else f"${letter}$"
-
-
-def label_regions(ax: Axes, chart: StabilityChart, smallest: float = 0.002) -> None:
-    """Write the number of unstable roots into each region of a chart.
-
-    Parameters
-    ----------
-    ax : Axes
-        Where to write.
-    chart : StabilityChart
-        Any chart.
-    smallest : float, optional
-        Regions below this share of the chart, from 0 to 1, stay without a label.
-    """
-    if not 0.0 <= real_number("smallest", smallest) <= 1.0:
-        raise ValueError(f"smallest must lie between 0 and 1, got {smallest}")
+def _label_regions(ax: Axes, chart: StabilityChart, smallest: float) -> None:
+    """Write the count into each region, at its point that is farthest from the edges."""
     for count in np.unique(chart.counts[chart.counts >= 0]):
         regions, number = ndimage.label(chart.counts == count)
         for index in range(1, number + 1):
@@ -166,16 +141,22 @@ def label_regions(ax: Axes, chart: StabilityChart, smallest: float = 0.002) -> N
             )
 
 
+def label_parameters(ax: Axes, parameters: tuple[str, str]) -> None:
+    """Label both axes with the names of the free parameters, digits as subscripts."""
+    x, y = (re.sub(r"(\d+)$", r"_{\1}", name) for name in parameters)
+    ax.set(xlabel=f"${x}$", ylabel=f"${y}$")
+
+
 def plot_branches(
-    ax: Axes,
     branches: Sequence[Branch],
+    ax: Axes | None = None,
     *,
     color: str = BLUE,
     linewidth: float = 0.8,
     label: str | None = None,
-    rasterized: bool = True,
-) -> None:
-    """Draw the branches of a D-curve, none joined to the next."""
+) -> Axes:
+    """Draw the branches of a D-curve, as `d_curve_branches` returns them, none joined."""
+    ax = plt.gca() if ax is None else ax
     for index, branch in enumerate(branches):
         ax.plot(
             branch.x,
@@ -184,145 +165,148 @@ def plot_branches(
             linestyle="-",
             linewidth=linewidth,
             label=label if index == 0 else None,
-            rasterized=rasterized,
+            rasterized=True,
         )
+    return ax
 
 
 def plot_line(
-    ax: Axes,
     line: Line,
+    ax: Axes | None = None,
     *,
     color: str = ORANGE,
     linestyle: str = "--",
     label: str | None = None,
-) -> None:
-    """Draw the straight line of omega = 0 across the axes, keeping their limits."""
+) -> Axes:
+    """Draw the line of omega = 0, from `d_curve_line`, across the axes and their limits."""
+    ax = plt.gca() if ax is None else ax
     normal = np.array([line.weight_x, line.weight_y])
     foot = line.value * normal / (normal @ normal)
     along = foot + np.array([line.weight_y, -line.weight_x])
-    ax.axline(
-        (float(foot[0]), float(foot[1])),
-        (float(along[0]), float(along[1])),
-        color=color,
-        linestyle=linestyle,
-        label=label,
-    )
+    ax.axline(tuple(foot), tuple(along), color=color, linestyle=linestyle, label=label)
+    return ax
+
+
+# Nyquist curves -----------------------------------------------------------------------------
 
 
 def plot_nyquist(
-    ax: Axes,
     curve: NyquistCurve,
+    ax: Axes | None = None,
     *,
     unit: float | None = 0.01,
-    outer: float = 1e6,
-    arrows: Sequence[float] = (),
-) -> None:
+    arrows: Iterable[float] = (),
+) -> Axes:
     """Draw a Nyquist curve, both signs of omega, with -1 and the infinite branch.
 
     Parameters
     ----------
-    ax : Axes
-        Where to draw. In the compressed plane its axes are replaced by circles of |L|.
     curve : NyquistCurve
         From `nyquist` with `omega_max`, so that its samples are close.
+    ax : Axes, optional
+        Where to draw; matplotlib's current axes by default. In the compressed plane they are
+        replaced by circles of |L|.
     unit : float, optional
         L is drawn at log10(1 + |L| / unit) from the origin, in its own direction: linear
-        within about `unit`, logarithmic beyond. None keeps the plain complex plane.
-    outer : float, optional
-        Circle of the compressed plane that stands for infinity: the infinite branch runs
-        along it.
-    arrows : sequence of float, optional
+        within about `unit`, logarithmic beyond, and no further out than the circle that
+        stands for infinity. None keeps the plain complex plane.
+    arrows : iterable of float, optional
         Frequencies in rad/s at which an arrow points in the direction of rising omega.
+
+    Returns
+    -------
+    Axes
 
     Raises
     ------
-    TypeError, ValueError
-        If there is no curve, `unit` or `outer` is not positive, or an arrow lies beyond the
-        curve's frequencies.
+    ValueError
+        If `unit` is not positive, or an arrow lies beyond the curve's frequencies.
+
+    Examples
+    --------
+    >>> from armlock import SingleArm, nyquist
+    >>> ax = nyquist(SingleArm(), omega_max=1.0).plot(unit=None)
+    >>> ax.get_xlabel()
+    'Re $L$ [1]'
     """
-    if not isinstance(curve, NyquistCurve):
-        raise TypeError(f"curve must be a NyquistCurve, got {curve!r}")
+    ax = plt.gca() if ax is None else ax
+    forward, omega, last = curve.response, curve.omega, curve.omega[-2]
     if unit is not None:
         unit = positive_number("unit", unit)
-    outer = positive_number("outer", outer)
-    forward, omega = curve.response, curve.omega
-    for frequency in arrows:
-        if not 0.0 < real_number("arrows", frequency) <= omega[-2]:
-            raise ValueError(
-                f"arrows must lie above 0 and up to {omega[-2]} rad/s, the curve's last sample "
-                f"but one, got {frequency}"
-            )
-    if unit is not None:
         if curve.indentation.size:
-            # On to the branch, in the direction in which the curve leaves for it.
-            far = outer * forward[:1] / np.abs(forward[:1])
-            forward, omega = np.concatenate((far, forward)), np.concatenate(([0.0], omega))
-        inside = np.abs(forward) <= outer * (1.0 + 1e-9)
-        forward = np.where(inside, forward, outer * forward / np.abs(forward))
-    for values, width, label in (
-        (forward, 1.5, r"$\omega > 0$"),
-        (forward.conj(), 0.7, r"$\omega < 0$"),
-    ):
-        drawn = values if unit is None else _compressed(values, unit)
-        ax.plot(drawn.real, drawn.imag, color=BLUE, linestyle="-", linewidth=width, label=label)
+            # On to the infinite branch, in the direction in which the curve leaves for it.
+            far = INFINITY * forward[:1] / np.abs(forward[:1])
+            forward, omega = np.append(far, forward), np.append(0.0, omega)
+        forward = _compressed(forward, unit)
+    positive, negative = r"$\omega > 0$", r"$\omega < 0$"
+    ax.plot(forward.real, forward.imag, "-", color=BLUE, linewidth=1.5, label=positive)
+    ax.plot(forward.real, -forward.imag, "-", color=BLUE, linewidth=0.7, label=negative)
     for frequency in arrows:
+        if not 0.0 < frequency <= last:
+            raise ValueError(
+                f"arrows must lie above 0 and up to {last} rad/s, the curve's last sample but "
+                f"one, got {frequency}"
+            )
         index = int(np.searchsorted(omega, frequency))
-        ends = forward[[index, index + 1]]
-        _arrow(ax, ends if unit is None else _compressed(ends, unit), BLUE)
+        _arrow(ax, forward[index], forward[index + 1], BLUE)
     if unit is None:
         ax.axhline(0.0, color="black", linewidth=0.6)
         ax.axvline(0.0, color="black", linewidth=0.6)
         ax.plot(-1.0, 0.0, "+", color="black", markersize=10, markeredgewidth=1.8)
         ax.set(xlabel="Re $L$ [1]", ylabel="Im $L$ [1]")
-        return
-    if curve.indentation.size:
-        half = np.unwrap(np.angle(curve.indentation_response))
-        radius = float(np.log10(1.0 + outer / unit))
-        for angles in (-half[::-1], half):
-            arc = radius * np.exp(1j * angles)
-            ax.plot(
-                arc.real,
-                arc.imag,
-                color=ORANGE,
-                linestyle="--",
-                label=r"infinite branch, $\omega = 0$" if angles is half else "_",
-            )
-            middle = arc.size // 2
-            _arrow(ax, arc[[middle, middle + 1]], ORANGE)
-    _circles(ax, unit, outer)
+    else:
+        _infinite_branch(ax, curve, unit)
+        _circles(ax, unit)
+    return ax
 
 
-def _compressed(values: npt.NDArray[np.complex128], unit: float) -> npt.NDArray[np.complex128]:
-    """Move values radially, to log10(1 + |value| / unit) from the origin."""
+def _compressed_radius(size: float, unit: float) -> float:
+    """Return where a value of this size lies in the compressed plane."""
+    return float(np.log10(1.0 + size / unit))
+
+
+def _compressed(values: ComplexArray, unit: float) -> ComplexArray:
+    """Move values radially into the compressed plane, those beyond infinity onto it."""
     size = np.abs(values)
-    # log1p(x) / x tends to one at the origin.
-    share = np.divide(np.log1p(size / unit), size, where=size > 0.0, out=np.ones_like(size))
-    return np.asarray(values * share / np.log(10.0))
+    scale = np.divide(1.0, size, where=size > 0.0, out=np.zeros_like(size))
+    return np.asarray(values * scale * np.log10(1.0 + np.minimum(size, INFINITY) / unit))
 
 
-def _arrow(ax: Axes, ends: npt.NDArray[np.complex128], color: str) -> None:
+def _arrow(ax: Axes, start: complex, stop: complex, color: str) -> None:
     """Draw an arrow head at the second of two points, seen from the first."""
-    start, stop = ((float(z.real), float(z.imag)) for z in ends)
     arrow = {"arrowstyle": "-|>", "color": color, "mutation_scale": 13, "shrinkB": 0}
-    ax.annotate("", stop, start, arrowprops=arrow)
+    ends = (stop.real, stop.imag), (start.real, start.imag)
+    ax.annotate("", *ends, arrowprops=arrow)
 
 
-def _circles(ax: Axes, unit: float, outer: float) -> None:
+def _infinite_branch(ax: Axes, curve: NyquistCurve, unit: float) -> None:
+    """Draw the image of the indentation around s = 0, if there is one, at infinity."""
+    half = np.unwrap(np.angle(curve.indentation_response))
+    label = r"infinite branch, $\omega = 0$"
+    for angles, name in ((-half[::-1], "_"), (half, label)):
+        if angles.size:
+            arc = _compressed_radius(INFINITY, unit) * np.exp(1j * angles)
+            ax.plot(arc.real, arc.imag, color=ORANGE, linestyle="--", label=name)
+            _arrow(ax, arc[arc.size // 2], arc[arc.size // 2 + 1], ORANGE)
+
+
+def _circles(ax: Axes, unit: float) -> None:
     """Draw circles of |L|, the two axes and -1 in the compressed plane."""
     ax.set_axis_off()
     ax.set_aspect("equal")
     turn = np.exp(2j * np.pi * np.linspace(0.0, 1.0, 181))
-    decades = np.arange(0, np.log10(outer) + 1e-9, 2.0)
-    for decade in decades:
-        radius = float(np.log10(1.0 + 10.0**decade / unit))
-        last = decade == decades[-1]
-        circle = radius * turn
+    for size, text in (
+        (1.0, "1"),
+        (1e2, "$10^{2}$"),
+        (1e4, "$10^{4}$"),
+        (INFINITY, r"$\infty$"),
+    ):
+        circle = _compressed_radius(size, unit) * turn
         ax.plot(circle.real, circle.imag, "-", color="0.8", linewidth=0.6, zorder=0)
-        text = r"$\infty$" if last else f"$10^{{{decade:.0f}}}$" if decade else "1"
-        place = radius * np.exp(0.25j * np.pi)
+        place = _compressed_radius(size, unit) * np.exp(0.25j * np.pi)
         ax.text(
-            float(place.real),
-            float(place.imag),
+            place.real,
+            place.imag,
             text,
             fontsize=8,
             color="0.35",
@@ -331,9 +315,9 @@ def _circles(ax: Axes, unit: float, outer: float) -> None:
             bbox={"fc": "white", "ec": "none", "pad": 0.8},
             zorder=6,
         )
-    reach = 1.06 * radius
-    ax.plot([-reach, reach], [0.0, 0.0], "-", color="0.6", linewidth=0.6, zorder=0)
-    ax.plot([0.0, 0.0], [-reach, reach], "-", color="0.6", linewidth=0.6, zorder=0)
+    reach = 1.06 * _compressed_radius(INFINITY, unit)
+    for x, y in (([-reach, reach], [0.0, 0.0]), ([0.0, 0.0], [-reach, reach])):
+        ax.plot(x, y, "-", color="0.6", linewidth=0.6, zorder=0)
     ax.set(xlim=(-reach, reach), ylim=(-reach, reach))
-    point = -float(np.log10(1.0 + 1.0 / unit))
-    ax.plot(point, 0.0, "+", color="black", markersize=10, markeredgewidth=1.8, zorder=5)
+    minus_one = -_compressed_radius(1.0, unit)
+    ax.plot(minus_one, 0.0, "+", color="black", markersize=10, markeredgewidth=1.8, zorder=5)

@@ -8,6 +8,7 @@ crossings of a whole ray are the zeros of Im(D0 conj(M)): one certified walk fin
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from itertools import pairwise
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -109,7 +110,7 @@ class Ray:
             if beyond >= last:
                 return float(beyond)
         edges = sorted({0.0, last, *kinks[(kinks > 0.0) & (kinks < last)]})
-        for low, high in zip(edges, edges[1:], strict=False):
+        for low, high in pairwise(edges):
             if reserve(high) <= 0.0:
                 return float(low + (high - low) * reserve(low) / (reserve(low) - reserve(high)))
         return np.inf
@@ -176,10 +177,16 @@ class Ray:
 
     def reaches(self, stop: float, chain: float) -> Iterator[float]:
         """Yield growing t up to `stop`, or ever closer to the limit of the chain."""
-        t = 1e-12 * stop
-        while t < min(stop, 0.5 * chain):
+        t, far = 1e-12 * stop, min(stop, 0.5 * chain)
+        while t < far:
             yield t
-            t *= _LONGER
+            # A near crossing is found at low frequency: go no further than that takes.
+            here, low, high = self.end(t), t, min(_LONGER * t, far)
+            limit = _LONGER * max(here, 1.0 / max(self.system.longest_delay, 1e-12))
+            while self.end(high) > limit and high - low > 1e-9 * high:
+                middle = 0.5 * (low + high)
+                low, high = (middle, high) if self.end(middle) <= limit else (low, middle)
+            t = low if self.end(low) > 2.0 * here else max(high, _LONGER * t)
         if stop < chain:
             yield stop
         else:
@@ -362,30 +369,6 @@ def first_break(
     return found
 
 
-def boundary_radius(system: CharacteristicFunction, directions: npt.ArrayLike) -> FloatArray:
-    """Distance from the origin to the boundary of the stable region.
-
-    Parameters
-    ----------
-    system : CharacteristicFunction
-        A loop or a map, stable at the origin.
-    directions : float array, shape (2, n)
-        Unit vectors in the plane of the free parameters.
-
-    Returns
-    -------
-    float array, shape (n,)
-        Where each ray first meets the boundary.
-
-    Raises
-    ------
-    TypeError, ValueError, CountError
-        As `first_break` does.
-    """
-    vectors = np.asarray(directions, dtype=float).T
-    return np.array([first_break(system, (0.0, 0.0), v).position for v in vectors])
-
-
 def sweep(
     result: Callable[[P], R],
     points: Iterable[P],
@@ -447,7 +430,6 @@ def sweep(
 __all__ = [
     "Crossing",
     "Crossings",
-    "boundary_radius",
     "first_break",
     "first_crossing",
     "ray_crossings",

@@ -1,9 +1,11 @@
 """Characteristic roots: the rightmost one, found, polished and certified.
 
-Candidates are eigenvalues of a Chebyshev discretization of the solution operator's
-generator (Breda, Maset and Vermiglio). Each is polished by Newton's method on the exact
-characteristic function; the rightmost is then certified by counting that no root lies to
-the right of it.
+How many roots lie right of a line Re s = sigma is the count of `unstable_roots` for
+D(s + sigma). So the rightmost root is enclosed between a line with roots right of it and one
+without. Newton's method finds it from the points of such a line that are nearest to a root,
+and goes on in extended precision; a last count says that no root lies further right.
+
+`pseudospectral_roots` approximates many roots at once, for comparison.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 from scipy.interpolate import BarycentricInterpolator
 
-from armlock.characteristic import CharacteristicFunction, checked_system
+from armlock.characteristic import EPSILON, CharacteristicFunction, checked_system
 from armlock.checks import (
     ComplexArray,
     FloatArray,
@@ -25,14 +27,27 @@ from armlock.checks import (
     real_number,
     whole_number,
 )
-from armlock.stability import CountError, last_frequency, unstable_roots
+from armlock.contour import resolved_grid
+from armlock.stability import BOUNDARY, CountError, last_frequency, unstable_roots
 from armlock.statespace import realize
 
-_EPSILON = float(np.finfo(float).eps)
-# Degrees of the Chebyshev polynomial that are tried, one after the other.
-_DEGREES = (60, 120, 240, 480, 960)
-# Most points of a line from which Newton's method starts.
-_POINTS_ALONG = 200_000
+# Real parts that differ by less count as equal; relative to |s| or one over the longest delay.
+_EQUAL = 1e-11
+# How far right of its root the last count may stand, relative to |Re s| or the same.
+_FARTHEST = 1e-6
+# Longest walk along a line, in turns of the longest delay's exponential, and how many turns
+# all walks for one root may take, at least so many a line: half a second, and three.
+_LONGEST_WALK = 2e5
+_ALL_WALKS = 1e6
+_WALK_AT_LEAST = 1e4
+# Most points of a line from which Newton's method starts, and most of its steps in extended
+# precision: at a multiple root they only shrink by a share.
+_MOST_STARTS = 4096
+_MOST_STEPS = 100
+# Most roots near a line that are tried in extended precision.
+_MOST_TRIED = 8
+# Past this a delayed term is nothing right of a line, and its factor no float.
+_VANISHED = 600.0
 # Digits that extended precision keeps besides those that are asked for.
 _GUARD_DIGITS = 40
 
@@ -130,84 +145,12 @@ def pseudospectral_roots(
     return eigenvalues[np.argsort(-eigenvalues.real)]
 
 
-def polish_root(
-    system: CharacteristicFunction, x: float, y: float, start: complex
-) -> tuple[complex, float]:
-    r"""Follow Newton's method on the exact characteristic function.
-
-    .. math::
-
-        s_{i+1} = s_i - \frac{D(s_i; x, y)}{D'(s_i; x, y)}
-
-    Parameters
-    ----------
-    system : CharacteristicFunction
-        The loop.
-    x, y : float
-        The free parameters.
-    start : complex
-        Where to start, in rad/s.
-
-    Returns
-    -------
-    root : complex
-        The root.
-    error : float
-        Length of the last Newton step, an estimate of its error; inf if the residual
-        |D(root)| is not down to rounding.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If x or y is not finite and real, or `start` not finite.
-    """
-    name1, name2 = checked_system(system).parameters
-    x, y = real_number(name1, x), real_number(name2, y)
-    s = complex(complex_array("start", start)[()])
-    # Towards a root at s = 0 the steps would only end where the numbers do.
-    zero = 0.0
-    if system._value(np.zeros((), dtype=np.complex128), x, y) == 0.0:
-        zero = _EPSILON**2 * _per_delay(system)
-    move = np.inf
-    for _ in range(60):
-        # A step far to the left overflows; such a start is given up below.
-        with np.errstate(over="ignore", invalid="ignore"):
-            value = complex(system._value(np.asarray(s), x, y))
-            slope = complex(system._slope(np.asarray(s), x, y))
-        if value == 0.0:
-            return s, 0.0
-        if slope == 0.0 or not np.isfinite(value):
-            return s, np.inf
-        before, move = move, abs(value / slope)
-        # Close to a multiple root the steps stop shrinking at the root of the rounding.
-        if move >= before and move < 1e-6 * abs(s):
-            break
-        s -= value / slope
-        if abs(s) <= zero:
-            return 0j, 0.0
-        if move <= _EPSILON * abs(s):
-            break
-    with np.errstate(over="ignore", invalid="ignore"):
-        parts = [
-            abs(poly.polyval(abs(s), np.abs(p))) * np.exp(-s.real * delay)
-            for p, delay in (
-                (system.a, 0.0),
-                (x * system.b1, system.delay1),
-                (y * system.b2, system.delay2),
-            )
-        ]
-        rounding = 64.0 * _EPSILON * (1.0 + abs(s) * system.longest_delay) * sum(parts)
-        residual = abs(complex(system._value(np.asarray(s), x, y)))
-    return s, float(move) if residual <= rounding else np.inf
-
-
 def extended_root(
     system: CharacteristicFunction, x: float, y: float, start: complex, *, digits: int = 40
 ) -> mpmath.mpc:
     """Follow Newton's method in extended precision.
 
-    Two roots can agree to most digits of a double; their difference is then all rounding, and
-    not even the same in every run.
+    Two roots can agree to most digits of a double; their difference is then all rounding.
 
     Parameters
     ----------
@@ -216,7 +159,7 @@ def extended_root(
     x, y : float
         The free parameters.
     start : complex
-        The root in double precision, in rad/s, for instance from `rightmost_root`.
+        Where to start, in rad/s.
     digits : int, optional
         Decimal digits to compute with.
 
@@ -243,10 +186,14 @@ def extended_root(
     name1, name2 = checked_system(system).parameters
     x, y = real_number(name1, x), real_number(name2, y)
     digits = whole_number("digits", digits, 1)
+    terms = (
+        (system.b1, system.delay1, system.reference[0], x),
+        (system.b2, system.delay2, system.reference[1], y),
+    )
     # Next to s = 0 the terms of D cancel, and take as many digits with them.
     with mpmath.workdps(digits + _GUARD_DIGITS):
         s = mpmath.mpc(complex(complex_array("start", start)[()]))
-        for _ in range(60):
+        for _ in range(_MOST_STEPS):
             z, dz = s, mpmath.mpf(1)
             if system.step:
                 z = mpmath.exp(s * system.step)
@@ -254,20 +201,24 @@ def extended_root(
             # Both values at once: of the polynomial and of its derivative.
             value, slope = mpmath.polyval(system.rest.tolist(), z, derivative=True, asc=True)
             slope *= dz
-            terms = (
-                (system.b1, system.delay1, system.reference[0], x),
-                (system.b2, system.delay2, system.reference[1], y),
-            )
+            dead = mpmath.exp(-s * system.delay)
             for b, delay, origin, here in terms:
                 p, change = mpmath.polyval(b.tolist(), z, derivative=True, asc=True)
-                late = here * mpmath.exp(-s * delay)
-                value += p * (origin - late)
-                slope += change * dz * (origin - late) + p * delay * late
+                late = mpmath.expm1(-s * delay)
+                arm = mpmath.mpf(origin) - here - here * late
+                value += dead * p * arm
+                slope += dead * (change * dz - system.delay * p) * arm
+                slope += dead * p * delay * here * (1 + late)
+            if value == 0:
+                return +s
             if slope == 0:
                 break
             move = value / slope
             s -= move
-            if abs(move) <= mpmath.mpf(10) ** -digits * abs(s):
+            # To a root at zero, of which the digits never settle, the method goes straight.
+            if abs(s) < mpmath.eps**2:
+                s = mpmath.mpc(0)
+            elif abs(move) <= mpmath.mpf(10) ** -digits * abs(s):
                 with mpmath.workdps(digits):
                     return +s
     raise RootError(
@@ -275,126 +226,178 @@ def extended_root(
     )
 
 
-def _per_delay(system: CharacteristicFunction) -> float:
-    """One over the longest delay, in rad/s; a large number where there is none."""
-    return 1.0 / max(system.longest_delay, _EPSILON)
-
-
-def _resolution(system: CharacteristicFunction, root: complex) -> float:
-    """Shift to the right of a root by which a count can tell it from others, in rad/s."""
-    return 1e-11 * max(abs(root), _per_delay(system))
-
-
-def _certified(
-    system: CharacteristicFunction, x: float, y: float, root: complex, error: float
-) -> bool:
-    """Whether no root lies right of `root`, by more than its error."""
-    # So far to the right of the axis a delayed term is nothing, and its factor no float.
-    x, y = (
-        0.0 if root.real * delay > 600.0 and abs(value) < 1e100 else value
-        for value, delay in ((x, system.delay1), (y, system.delay2))
-    )
-    system = _effective(system, x, y)
-    resolution = _resolution(system, root)
-    margin = max(resolution, 10.0 * error)
-    # Farther left than this the shifted function overflows.
-    if -root.real * system.longest_delay > 600.0:
-        return False
-    while margin <= 1e5 * resolution:
-        try:
-            count = int(unstable_roots(system.shifted(root.real + margin), x, y))
-        except (CountError, ValueError):
-            # Shifted so far, the coefficients may leave the range of floats.
-            return False
-        if count >= 0:
-            return count == 0
-        margin *= 10.0
-    return False
-
-
-def _effective(system: CharacteristicFunction, x: float, y: float) -> CharacteristicFunction:
-    """Return the system without the terms whose parameter is zero.
-
-    Far to the left their exponentials overflow, and zero times infinity is no number.
-    """
-    if system.step or (x != 0.0 and y != 0.0):
-        return system
-    x0, y0 = system.reference
-    rest, none = system.rest, np.zeros(1)
-    if x == 0.0:
-        rest = np.asarray(poly.polyadd(rest, x0 * system.b1))
-    if y == 0.0:
-        rest = np.asarray(poly.polyadd(rest, y0 * system.b2))
-    return CharacteristicFunction(
-        rest,
-        system.b1 if x else none,
-        system.b2 if y else none,
-        system.delay1 if x else 0.0,
-        system.delay2 if y else 0.0,
-        parameters=system.parameters,
-        reference=(x0 if x else 0.0, y0 if y else 0.0),
-    )
-
-
-def _starts_along(
+def _acting(
     system: CharacteristicFunction, x: float, y: float, sigma: float
-) -> ComplexArray:
-    """Roots near the line Re s = sigma, by Newton's method from its points.
+) -> tuple[CharacteristicFunction, float, float]:
+    """Return system and parameters without the delays that do not matter right of a line.
 
-    The rightmost come first, and of those that a count cannot tell apart the slowest.
-
-    Roots far up a loop's high-frequency chain lie close to a line, and beyond what a polynomial
-    of affordable degree resolves.
+    Their exponentials may be no floats, and zero times infinity is no number. Terms of equal
+    delays are one term, in which they may cancel.
     """
-    spacing = 0.5 * _per_delay(system)
-    try:
-        last = float(last_frequency(system.shifted(sigma), x, y))
-    except ValueError:
-        # So far out the shifted coefficients leave the range of floats.
-        return np.empty(0, dtype=np.complex128)
-    end = float(np.fmin(last, _POINTS_ALONG * spacing))
-    along = np.arange(0.0, end + 2.0 * spacing, spacing)
-    s = np.asarray(sigma + 1j * along, dtype=np.complex128)
-    with np.errstate(all="ignore"):
+    (x0, y0), (b1, b2) = system.reference, (system.b1, system.b2)
+    terms = [(b1, system.delay1, x0, x), (b2, system.delay2, y0, y)]
+    if system.delay1 == system.delay2:
+        delayed, left = (
+            np.asarray(poly.polyadd(p * b1, q * b2), dtype=np.float64)
+            for p, q in ((x, y), (x0 - x, y0 - y))
+        )
+        terms = [(delayed, system.delay1, 1.0, 1.0), (left, 0.0, 1.0, 0.0)]
+    rest = system.rest
+    for k, (b, delay, origin, here) in enumerate(terms):
+        if here == 0.0 or not b.any() or sigma * delay > _VANISHED:
+            terms[k] = (b, 0.0, origin, 0.0)
+            if system.delay == 0.0:
+                rest = np.asarray(poly.polyadd(rest, origin * b))
+                terms[k] = (np.zeros(1), 0.0, 0.0, 0.0)
+    (b1, delay1, x0, x), (b2, delay2, y0, y) = terms
+    acting = CharacteristicFunction(
+        rest,
+        b1,
+        b2,
+        delay1,
+        delay2,
+        delay=system.delay,
+        step=system.step,
+        parameters=system.parameters,
+        reference=(x0, y0),
+    )
+    return acting, x, y
+
+
+class _Line:
+    """The line Re s = sigma: how many roots lie right of it, and which lie near it.
+
+    Attributes
+    ----------
+    turns : float
+        How far up roots can lie right of the line, in turns of the longest delay's
+        exponential; inf past the limit of a neutral root chain, or where a number overflows.
+    """
+
+    def __init__(
+        self, system: CharacteristicFunction, x: float, y: float, sigma: float
+    ) -> None:
+        self.system, self.x, self.y = _acting(system, x, y, sigma)
+        self.sigma = sigma
+        self.turn = 2.0 * np.pi / (self.system.longest_delay or system.longest_delay)
+        try:
+            self.shifted = self.system.shifted(sigma)
+            self.turns = float(last_frequency(self.shifted, self.x, self.y)) / self.turn
+        except ValueError:
+            self.turns = np.inf
+        self.short = self.turns <= _LONGEST_WALK
+
+    def count(self) -> int:
+        """Count the roots right of the line; below zero where that cannot be told."""
+        if not self.short:
+            return BOUNDARY
+        try:
+            return int(unstable_roots(self.shifted, self.x, self.y))
+        except CountError:
+            return BOUNDARY
+
+    def _step(self, s: ComplexArray) -> tuple[ComplexArray, FloatArray]:
+        """Return where a step of Newton's method leads from each s, and its length."""
+        with np.errstate(all="ignore"):
+            value = self.system._value(s, self.x, self.y)
+            move = np.where(value == 0.0, 0.0, value / self.system._slope(s, self.x, self.y))
+        length = np.abs(move)
+        return s - move, np.where(np.isnan(length), np.inf, length)
+
+    def rightmost(self, further: float) -> tuple[complex, float] | None:
+        """Return the rightmost root near the line, and how far a faster one is ahead of it.
+
+        Of roots that count as equal it is the slowest. Left of the line they may lie further
+        up than right of it; as many turns further they are looked for.
+        """
+        if not self.short:
+            return None
+        end = (self.turns + further) * self.turn
+        whole = self.shifted.at(self.x, self.y)
+        function = whole.weights, whole.sums, whole.phases
+        s = self.sigma + 1j * resolved_grid(whole.compiled(), function, end, 1.0)
+        # From where a step of Newton's method is locally shortest: no root close to the line
+        # lies between two of its points.
+        s, length = self._step(s)
+        wider = np.pad(length, 1, constant_values=np.inf)
+        s = s[(length <= wider[:-2]) & (length < wider[2:])]
+        s = s[np.argsort(-s.real, kind="stable")][:_MOST_STARTS]
         for _ in range(12):
-            move = system._value(s, x, y) / system._slope(s, x, y)
-            s = s - move
-        led = s[(np.abs(move) <= 1e-6 * spacing) & (s.imag >= 0.0)]
-    # A real root is approached from the side.
-    led = np.where(led.imag <= 1e-12 * np.abs(led.real), led.real, led)
-    led = led[np.argsort(led.imag)]
-    # Many points lead to the same root.
-    led = led[np.abs(np.diff(led, prepend=np.inf)) > 1e-3 * spacing]
-    top = led.real.max(initial=-np.inf)
-    behind = np.where(led.real >= top - 1e-11 * np.abs(led), 0.0, top - led.real)
-    return np.asarray(led[np.argsort(behind, kind="stable")], dtype=np.complex128)
+            s, length = self._step(s)
+        found = s[length <= 1e-5 * self.turn]
+        found = found.real + 1j * np.abs(found.imag)
+        for top in sorted(found, key=lambda s: -s.real)[:_MOST_TRIED]:
+            level = found[found.real >= top.real - _EQUAL * max(abs(top), self.turn)]
+            slowest = level[np.argmin(level.imag)]
+            try:
+                root = _polished(self.system, self.x, self.y, slowest)
+            except RootError:
+                continue
+            return root, float(top.real - slowest.real)
+        return None
+
+
+def _polished(system: CharacteristicFunction, x: float, y: float, start: complex) -> complex:
+    """Return a root to the last bit, the same for every start; of a pair the upper one."""
+    # From a start on the real axis the method would never lead to a pair next to it.
+    root = complex(extended_root(system, x, y, start * (1.0 + 1e-9j), digits=20))
+    turns = abs(root.imag) > EPSILON * abs(root.real)
+    return complex(root.real, abs(root.imag) if turns else 0.0)
+
+
+def _without_delay(system: CharacteristicFunction, x: float, y: float) -> complex:
+    """Return the rightmost root where no delay acts."""
+    p = poly.polysub(poly.polysub(system.a, x * system.b1), y * system.b2)
+    roots = poly.polyroots(p).astype(np.complex128)
+    if system.step:
+        roots = np.log(roots[roots != 0.0]) / system.step
+    if roots.size == 0:
+        name1, name2 = system.parameters
+        raise ValueError(
+            f"{name1} and {name2} must leave a loop with roots, got ({x}, {y}): D is {p} there"
+        )
+    return _polished(system, x, y, roots[np.argmax(roots.real)])
 
 
 def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
     """Find the rightmost root at one point, or raise `RootError`."""
-    system = _effective(system, x, y)
+    acting, p, q = _acting(system, x, y, 0.0)
+    if acting.longest_delay == 0.0:
+        return _without_delay(acting, p, q)
+    unit = 1.0 / acting.longest_delay
     best = complex(np.nan, np.nan)
-    # Where counts overflow no further degree leads to a certificate.
-    hopeless = np.isnan(last_frequency(system, x, y))
-    for degree in _DEGREES[:1] if hopeless else _DEGREES:
-        eigenvalues = pseudospectral_roots(system, x, y, degree)
-        starts = eigenvalues[eigenvalues.imag >= 0.0][:12]
-        # Another round starts from the line through the best root so far.
-        for _ in range(4):
-            polished = [polish_root(system, x, y, start) for start in starts]
-            found = [(root, error) for root, error in polished if np.isfinite(error)]
-            if not found:
-                break
-            top = max(root.real for root, _ in found)
-            # The roots of a neutral chain differ by less than a count can tell: the slowest.
-            level = [(r, e) for r, e in found if r.real >= top - _resolution(system, r)]
-            root, error = min(level, key=lambda pair: abs(pair[0].imag))
-            if not root.real <= best.real:
-                best = root
-            if _certified(system, x, y, root, error):
-                turns = abs(root.imag) > _EPSILON * abs(root.real)
-                return complex(root.real, abs(root.imag) if turns else 0.0)
-            starts = _starts_along(system, x, y, best.real)[:24]
+    # There are roots right of `low`, as far as can be told, and none right of `high`.
+    low, high, sigma, width, walked = -np.inf, np.inf, 0.0, unit, 0.0
+    # A map has nothing above its last frequency.
+    further = 0.0 if acting.step else 4.0
+    while walked < _ALL_WALKS and sigma not in (low, high):
+        line = _Line(acting, p, q, sigma)
+        walked += 2.0 * min(line.turns, _LONGEST_WALK) * line.short + further + _WALK_AT_LEAST
+        found = line.rightmost(further)
+        further = min(2.0 * further, _LONGEST_WALK)
+        if found is not None and not found[0].real <= low:
+            best, ahead = found
+            nearest = _EQUAL * max(abs(best), unit)
+            farthest = max(nearest, _FARTHEST * max(abs(best.real), unit))
+            for margin in np.geomspace(nearest, farthest, 6):
+                behind = _Line(acting, p, q, best.real + ahead + margin)
+                walked += min(behind.turns, _LONGEST_WALK) * behind.short
+                count = behind.count()
+                if count == 0:
+                    return best
+                if count > 0:
+                    break
+            low = best.real
+        if sigma > low:
+            if line.count() == 0:
+                high = sigma
+            else:
+                low = sigma
+        if low > -np.inf and high < np.inf:
+            sigma = 0.5 * (low + high)
+        else:
+            sigma = low + width if low > -np.inf else high - width
+            width *= 4.0
     name1, name2 = system.parameters
     raise RootError(
         f"no rightmost root could be certified at ({name1}, {name2}) = ({x}, {y}); the best "
@@ -421,28 +424,33 @@ def rightmost_root(
     Parameters
     ----------
     system : CharacteristicFunction
-        The loop, for instance `CommonArm()`.
+        The loop, for instance `CommonArm()`, or a map.
     x, y : array_like of float
         The free parameters; they broadcast.
 
     Returns
     -------
     complex, or complex array of the broadcast shape
-        In rad/s; of a conjugate pair the one with Im >= 0.
+        In rad/s, rounded from extended precision; of a conjugate pair the one with Im >= 0.
 
     Raises
     ------
     TypeError, ValueError
-        If x or y is not finite and real, or the two do not broadcast.
+        If x or y is not finite and real, the two do not broadcast, or D has no root at all
+        there because it is constant.
     RootError
-        If no root passes both checks; its `estimate` carries the best candidate.
+        If no root can be certified within a few seconds; its `estimate` is the best candidate,
+        nan if there is none.
 
     Notes
     -----
-    Two checks: the residual |D(s)| is down to rounding, and the count of roots to the right
-    of Re s is zero, so that the result agrees with `unstable_roots`. Roots whose real parts
-    differ by less than 1e-11 |s|, which a count does not tell apart, as on the chain of a
-    neutral loop, count as equal; of them the one of lowest frequency is returned.
+    Certified means that `unstable_roots` counts no root right of Re s + m, with m from 1e-11
+    up to 1e-6 times |Re s| or one over the longest delay, whichever is larger; the smallest
+    for which there is a count. Roots whose real parts differ by less than 1e-11 of |s| or one
+    over the longest delay count as equal, and the one of lowest frequency is returned.
+
+    The real parts on a neutral root chain may tend to a limit that none of them reaches. Where
+    no root lies right of it, a root up to m left of the limit is returned.
 
     For the Hayes equation it is, with the principal branch of Lambert's function,
 

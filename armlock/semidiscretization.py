@@ -34,10 +34,7 @@ LARGEST = 8192
 def _checked(system: CharacteristicFunction, step: float, order: int) -> tuple[float, int]:
     """Return the step and the order, or raise for what cannot be semi-discretized."""
     step = positive_number("step", step)
-    try:
-        order = whole_number("order", order, 0, 1)
-    except ValueError:
-        raise ValueError(f"order must be 0 or 1, got {order!r}") from None
+    order = whole_number("order", order, 0, 1)
     if checked_system(system).step:
         raise ValueError(
             f"system must be in continuous time, got a map with step {system.step}"
@@ -47,8 +44,8 @@ def _checked(system: CharacteristicFunction, step: float, order: int) -> tuple[f
             "system must be of retarded type: a neutral loop feeds back the delayed signal "
             "itself, which semi-discretization does not smooth"
         )
-    for name, delay in (("delay1", system.delay1), ("delay2", system.delay2)):
-        whole_steps(name, delay, step)
+    for name in ("delay", "delay1", "delay2"):
+        whole_steps(name, getattr(system, name), step)
     return step, order
 
 
@@ -70,14 +67,12 @@ def _sampled(
     states = form.state.shape[0]
     columns = []
     for term in form.delayed:
-        # exp of this block matrix holds the integrals of exp(F u) G and of u exp(F u) G, the
-        # latter scaled, so that parameters of any size do not enter the exponential.
-        size = float(np.abs(term.column).max(initial=0.0)) or 1.0
+        # exp of this block matrix holds the integrals of exp(F u) G and of u exp(F u) G.
         block = np.zeros((states + 2, states + 2))
         block[:states, :states] = form.state
-        block[:states, states] = term.column / size
+        block[:states, states] = term.column
         block[states, states + 1] = 1.0 / step
-        integrals = size * expm(block * step)[:states, states:]
+        integrals = expm(block * step)[:states, states:]
         held, ramp = integrals[:, 0], integrals[:, 1]
         columns.append((held, np.zeros(states)) if order == 0 else (held - ramp, ramp))
     return np.asarray(expm(form.state * step)), columns
@@ -95,7 +90,7 @@ def transition_matrix(
     x, y : float
         The free parameters.
     step : float
-        Sampling step h in s; it must divide both delays.
+        Sampling step h in s; it must divide all delays.
     order : {0, 1}, optional
         0 holds the delayed sample xi(t_{i-r}) over the step, as the paper does; 1
         interpolates linearly to the next one.
@@ -201,7 +196,7 @@ def spectral_radius(
     x, y : array_like of float
         The free parameters; they broadcast.
     step : float
-        Sampling step h in s; it must divide both delays.
+        Sampling step h in s; it must divide all delays.
     order : {0, 1}, optional
         As for `transition_matrix`.
 
@@ -228,21 +223,10 @@ def spectral_radius(
     step, order = _checked(system, step, order)
     _check_size(system, step)
     radii = [
-        _radius(transition_matrix(system, p, q, step, order), system.degree)
+        np.abs(np.linalg.eigvals(transition_matrix(system, p, q, step, order))).max()
         for p, q in zip(xs.flat, ys.flat, strict=True)
     ]
     return np.array(radii, dtype=np.float64).reshape(xs.shape)
-
-
-def _radius(matrix: FloatArray, states: int) -> float:
-    """Spectral radius of a transition matrix, past samples scaled where weights are large."""
-    past = matrix.shape[0] - states
-    largest = float(np.abs(matrix[:states, states:]).max(initial=0.0))
-    if largest > 1.0:
-        # The eigenvalues grow as this root; without it their error does as the weight itself.
-        scale = np.append(np.ones(states), largest ** (np.arange(1, past + 1) / past))
-        matrix = matrix * (scale[:, None] / scale)
-    return float(np.abs(np.linalg.eigvals(matrix)).max())
 
 
 def semi_discretization(
@@ -255,7 +239,7 @@ def semi_discretization(
     system : CharacteristicFunction
         A retarded loop in which both free parameters stand before a delayed signal.
     step : float
-        Sampling step h in s; it must divide both delays.
+        Sampling step h in s; it must divide all delays.
     order : {0, 1}, optional
         As for `transition_matrix`.
 
@@ -301,7 +285,7 @@ def semi_discretization(
     """
     step, order = _checked(system, step, order)
     for name, delay in zip(system.parameters, (system.delay1, system.delay2), strict=True):
-        if delay == 0.0:
+        if system.delay + delay == 0.0:
             raise ValueError(
                 f"the free parameter {name} of {system!r} stands before an undelayed signal, "
                 f"so that the map is not affine in it; use transition_matrix or "
@@ -314,7 +298,8 @@ def semi_discretization(
             _numerator(flow, older),
             np.append(0.0, _numerator(flow, newer)),
         )
-        for older, newer in columns
+        # Those before x and y; with a dead time there is a third one, x0 B1 + y0 B2.
+        for older, newer in columns[-2:]
     )
     return CharacteristicFunction(
         np.asarray(np.poly(flow)[::-1], dtype=np.float64),
@@ -322,8 +307,11 @@ def semi_discretization(
         np.asarray(b2, dtype=np.float64),
         system.delay1,
         system.delay2,
+        delay=system.delay,
         step=step,
         parameters=system.parameters,
+        # Without a dead time x0 B1 + y0 B2 is a part of the flow.
+        reference=system.reference if system.delay else (0.0, 0.0),
     )
 
 

@@ -2,12 +2,12 @@
 
 With phi the frequency noise of the locked laser, every loop of `armlock.loops` reads
 
-    phi(t) = noise(t) - K [m1 u1 + m2 u2](t),    u_k(t) = phi(t) - c_k(t) phi(t - tau_k).
+    phi(t) = noise(t) - K [m1 u1 + m2 u2](t - delay),
+    u_k(t) = phi(t) - c_k(t) phi(t - tau_k).
 
-Controller and sensor become one sampled state space with the inputs u1 and u2, see
-`armlock.discretize`: the trapezoidal rule, in first-order sections that keep what poles differ
-from one. The present phi is on both sides, with a weight of thousands; each sample solves
-for it. A rule that took the previous phi instead would be unstable by itself as soon as gain
+Sensor and controller are sampled by the trapezoidal rule, see `armlock.discretize`. Without a
+dead time the present phi is on both sides, with a weight of thousands; each sample solves for
+it. A rule that took the previous phi instead would be unstable by itself as soon as gain
 times step exceeds about one, and is not offered.
 
 Because s = j omega becomes (2 j / T) tan(omega T / 2) while the delays stay what they are,
@@ -19,32 +19,28 @@ from __future__ import annotations
 import math
 import os
 import secrets
-import sys
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple, TextIO
+from typing import BinaryIO
 
 import numpy as np
 import numpy.typing as npt
 from numba import njit
-from numba.cpython.unsafe.tuple import tuple_setitem
 
 from armlock.checks import (
     ComplexArray,
     FloatArray,
+    check_memory,
     finite_series,
     positive_number,
     real_number,
-    true_or_false,
     whole_number,
 )
 from armlock.discretize import (
-    Row,
-    SampledSystem,
+    SampledFilter,
+    SampledSensor,
     checked_frequency,
-    floats,
-    real_system,
-    sample,
+    sampled_loop,
     warped,
 )
 from armlock.loops import Loop
@@ -53,21 +49,14 @@ from armlock.loops import Loop
 INTERPOLATION_ORDER = 7
 #: Samples that are computed at a time; results do not depend on it.
 BLOCK = 1 << 16
-#: Runs from this many samples on show their progress on a terminal.
-LONG_RUN = 5_000_000
 #: The output counts as diverged when it exceeds the largest input so far by this factor.
 LIMIT = 1e6
-#: Longest delay in samples: half a gigabyte of history.
-LONGEST = 1 << 26
-#: Highest order of interpolation.
-HIGHEST_ORDER = 99
 
-Matrices = tuple[Row, Row, Row, Row, Row]
+#: A delay in samples, phi(t - tau) = sum_k weights[k] phi[n - first - k]: (first, weights).
+Delay = tuple[int, tuple[float, ...]]
 
-# Delays closer to whole samples than this, relatively, and never further than this share of a
-# sample, are whole.
-_WHOLE, _SHARE = 1e-9, 1e-6
-_LARGEST_FLOAT = sys.float_info.max
+# Delays closer to whole samples than this, in samples, are whole.
+_WHOLE = 1e-6
 
 
 class DivergenceError(ArithmeticError):
@@ -109,13 +98,6 @@ class DivergenceError(ArithmeticError):
         return type(self), (self.time, self.detected, self.output)
 
 
-class Delay(NamedTuple):
-    """A delay in samples: phi(t - tau) = sum_k weights[k] phi[n - first - k]."""
-
-    first: int
-    weights: FloatArray
-
-
 def lagrange_delay(name: str, tau: float, sample_rate: float, order: int) -> Delay:
     r"""Return the weights of a delay, a single one where it is whole samples.
 
@@ -132,7 +114,7 @@ def lagrange_delay(name: str, tau: float, sample_rate: float, order: int) -> Del
     name : str
         What messages call it.
     tau : float
-        Delay in s.
+        Delay in s, zero included.
     sample_rate : float
         In Hz.
     order : int
@@ -140,12 +122,15 @@ def lagrange_delay(name: str, tau: float, sample_rate: float, order: int) -> Del
 
     Returns
     -------
-    Delay
+    first : int
+        The smallest delay in samples that has a weight.
+    weights : tuple of float
+        Of this delay, and of those that follow sample by sample.
 
     Raises
     ------
     ValueError
-        If the delay is too short for the sample rate, or longer than `LONGEST` samples.
+        If the delay is too short for the sample rate.
 
     Notes
     -----
@@ -153,162 +138,147 @@ def lagrange_delay(name: str, tau: float, sample_rate: float, order: int) -> Del
     so that interpolation adds no instability of its own.
     """
     samples = tau * sample_rate
-    if samples > LONGEST:
-        raise ValueError(
-            f"sample_rate must be at most {LONGEST / tau:.4g} Hz for {name} = {tau} s, got "
-            f"{sample_rate}: the history would be {samples:.4g} samples, "
-            f"{8e-9 * samples:.3g} GB"
-        )
     whole = round(samples)
-    if abs(samples - whole) <= min(_WHOLE * samples, _SHARE):
-        if whole < 1:
-            raise ValueError(
-                f"sample_rate must be at least 1 / {name} = {1.0 / tau} Hz, got {sample_rate}"
-            )
-        return Delay(whole, np.ones(1))
     half = (order + 1) // 2
     first = math.floor(samples) - half + 1
+    if tau == 0.0 or (whole > 0 and abs(samples - whole) <= _WHOLE):
+        return whole, (1.0,)
     if first < 1:
         raise ValueError(
             f"sample_rate must be at least {half / tau} Hz to interpolate {name} = {tau} s to "
-            f"order {order}, got {sample_rate}"
+            f"order {order}, or a multiple of {1.0 / tau} Hz, got {sample_rate}"
         )
     x = samples - first
     nodes = range(order + 1)
     weights = [math.prod((x - j) / (k - j) for j in nodes if j != k) for k in nodes]
-    return Delay(first, np.array(weights))
+    return first, tuple(weights)
+
+
+@njit(cache=True)
+def _late(signal: FloatArray, now: int, delay: Delay) -> float:
+    """Return a signal as it was a delay ago."""
+    first, weights = delay
+    value = 0.0
+    for k in range(len(weights)):
+        value += weights[k] * signal[now - first - k]
+    return value
 
 
 @njit(cache=True, nogil=True)
 def _advance(
     phi: FloatArray,
+    sent: FloatArray,
     start: int,
     noise: FloatArray,
     c1: FloatArray,
     c2: FloatArray,
-    first1: int,
-    weights1: Row,
-    first2: int,
-    weights2: Row,
-    matrices: Matrices,
-    direct: Row,
-    entering: Row,
-    state: Row,
-    rest: float,
+    delays: tuple[Delay, Delay, Delay],
+    sensor: SampledSensor,
+    controller: SampledFilter,
+    state: FloatArray,
     watch: FloatArray,
     limit: float,
     done: int,
-) -> tuple[Row, float, int]:
-    """Compute a block of phi behind its `start` samples of history.
+) -> int:
+    """Compute a block of phi, and of what the controller sends, behind `start` samples.
 
-    `matrices` holds, all as flat tuples, which the compiler keeps in registers: the change of
-    the state, its lower triangle by rows and the entries right of the diagonal; how u1 and u2
-    drive it; and how it carries on into the next output. `state` is w, `rest` its share in
-    the present output, and `watch` the largest input so far and the number of the last sample
-    not above it. Returns the new state and share, and the index at which the output exceeds
-    `limit` times the largest input, or -1.
+    `delays` are those of both arms and the dead time. `state` holds the states of sensor and
+    controller, and last what they send with the next sample if no input comes. `watch` holds
+    the largest input so far, and the number of the last sample not above it. Returns the
+    index at which the output exceeds `limit` times the largest input, or -1.
     """
-    change, above, drive1, drive2, carried = matrices
-    n = len(drive1)
-    w = state
-    inverse = 1.0 / (1.0 + direct[0] + direct[1])
+    arm1, arm2, dead = delays
+    rows, sections, gain = sensor.states, controller.sections, controller.gain
+    m, n = len(rows), len(sections)
+    # What an input adds to the present output, and by way of the states to the next.
+    direct1, direct2 = sensor.direct
+    _, next1, next2 = rows[m - 1]
+    for j in range(n):
+        next1 += direct1 * sections[j][3]
+        next2 += direct2 * sections[j][3]
+    now1, now2, next1, next2 = gain * direct1, gain * direct2, gain * next1, gain * next2
+    implicit = dead[0] == 0
+    inverse = 1.0 / (1.0 + now1 + now2)
+    rest = state[-1]
     largest, calm = watch[0], watch[1]
     stop = -1
     for i in range(noise.size):
         now = start + i
-        a1 = 0.0
-        for k in range(len(weights1)):
-            a1 += weights1[k] * phi[now - first1 - k]
-        a2 = 0.0
-        for k in range(len(weights2)):
-            a2 += weights2[k] * phi[now - first2 - k]
-        a1 *= c1[i]
-        a2 *= c2[i]
-        # phi = noise - rest - direct1 (phi - a1) - direct2 (phi - a2), solved for phi.
-        x = (noise[i] + (direct[0] * a1 + direct[1] * a2) - rest) * inverse
+        a1 = c1[i] * _late(phi, now, arm1)
+        a2 = c2[i] * _late(phi, now, arm2)
+        if implicit:
+            # phi = noise - rest - now1 (phi - a1) - now2 (phi - a2), solved for phi.
+            x = (noise[i] + (now1 * a1 + now2 * a2) - rest) * inverse
+        else:
+            x = noise[i] - _late(sent, now, dead)
         phi[now] = x
         u1, u2 = x - a1, x - a2
-        # The next `rest` needs this sample's state only, and so does not wait for the new one.
-        rest = 0.0
-        for k in range(n):
-            rest += carried[k] * w[k]
-        rest += entering[0] * u1 + entering[1] * u2
-        new = w
-        m = 0
+        if not implicit:
+            sent[now] = rest + (now1 * u1 + now2 * u2)
+        # The states move on; what they send next does not wait for what u1 and u2 do to them.
+        top, below, ready = state[m - 1], 0.0, 0.0
+        for j in range(m):
+            q, b1, b2 = rows[j]
+            old = state[j]
+            ready = old + (below - q * top)
+            state[j] = ready + (b1 * u1 + b2 * u2)
+            below = old
+        v, direct = top, direct1 * u1 + direct2 * u2
         for j in range(n):
-            step = above[j] * w[(j + 1) % n]
-            for k in range(j + 1):
-                step += change[m] * w[k]
-                m += 1
-            new = tuple_setitem(new, j, w[j] + (step + (drive1[j] * u1 + drive2[j] * u2)))
-        w = new
+            r1, r2, k, t1, t2 = sections[j]
+            at = m + 2 * j
+            w1, w2 = state[at], state[at + 1]
+            new1 = w1 + (r1 * w1 - k * w2 + v)
+            new2 = w2 + (r2 * w2 + w1)
+            ready += t1 * new1 + t2 * new2
+            v += t1 * w1 + t2 * w2
+            state[at], state[at + 1] = new1 + direct, new2
+        rest = gain * ready + (next1 * u1 + next2 * u2)
         size = abs(x)
         largest = max(largest, abs(noise[i]))
         if size <= largest:
             calm = done + i
-        elif not (size <= limit * largest and size <= _LARGEST_FLOAT):
+        elif not size <= limit * largest:
             stop = i
             break
+    state[-1] = rest
     watch[0], watch[1] = largest, calm
-    return w, rest, stop
+    return stop
 
 
-def _as_rows(sampled: SampledSystem) -> Matrices:
-    """Return change, drives and carried shares as `_advance` takes them."""
-    change, drive, output = sampled.change, sampled.drive, sampled.output
-    if not output.size:
-        change, drive, output = np.zeros((1, 1)), np.zeros((1, 2)), np.zeros(1)
-    n = output.size
-    if np.triu(change, 2).any():
-        raise AssertionError("sections are chained in order, two states at most coupled")
-    rows = tuple(float(change[j, k]) for j in range(n) for k in range(j + 1))
-    above = np.append(np.diagonal(change, 1), 0.0)
-    carried = output + output @ change
-    drive1, drive2 = floats(drive[:, 0]), floats(drive[:, 1])
-    return rows, floats(above), drive1, drive2, floats(carried)
-
-
-def _checked_loop(loop: object) -> Loop:
+def _checked(
+    loop: Loop, sample_rate: float, interpolation: int
+) -> tuple[float, tuple[Delay, Delay, Delay]]:
+    """Return sample rate and delays of a loop that can be simulated, or raise."""
     if not isinstance(loop, Loop):
         raise TypeError(f"loop must be an armlock.Loop, got {type(loop).__name__}")
-    return loop
-
-
-def _order(value: object) -> int:
-    message = f"interpolation must be an odd integer from 1 to {HIGHEST_ORDER}, got {value!r}"
-    try:
-        order = whole_number("interpolation", value, 1, HIGHEST_ORDER)
-    except ValueError:
-        raise ValueError(message) from None
+    rate = positive_number("sample_rate", sample_rate)
+    order = whole_number("interpolation", interpolation, 1)
     if order % 2 == 0:
-        raise ValueError(message)
-    return order
-
-
-def _check_rate(loop: Loop, sample_rate: float) -> None:
-    """Refuse a rate at which a pole or zero would change its nature."""
-    mapping = np.roots(loop.mapping.denominator[::-1])
-    roots = (*loop.controller.zeros, *loop.controller.poles, *mapping)
-    fastest = max((abs(root) for root in roots), default=0.0)
-    if sample_rate <= fastest / 2.0:
+        raise ValueError(f"interpolation must be an odd integer, got {order}")
+    roots = (
+        *loop.controller.zeros,
+        *loop.controller.poles,
+        *np.roots(loop.mapping.denominator[::-1]),
+    )
+    # Beyond twice the sample rate the trapezoidal rule moves them across infinity.
+    fastest = max((root.real for root in roots if root.imag == 0.0), default=0.0)
+    if rate <= fastest / 2.0:
         raise ValueError(
-            f"sample_rate must exceed {fastest / 2.0} Hz, half of the loop's fastest pole "
-            f"or zero in rad/s, got {sample_rate}"
+            f"sample_rate must exceed {fastest / 2.0} Hz, half of the loop's fastest real pole "
+            f"or zero in the right half-plane, in rad/s, got {rate}"
         )
+    tau1, tau2, dead = (
+        lagrange_delay(name, getattr(loop, name), rate, order)
+        for name in ("tau1", "tau2", "delay")
+    )
+    return rate, (tau1, tau2, dead)
 
 
-def _single(value: object) -> bool:
-    """Whether a value is one thing, and not a sequence of them."""
-    try:
-        return np.ndim(value) == 0  # type: ignore[arg-type]
-    except ValueError:
-        return False
-
-
-def _parameter(name: str, value: object, like: FloatArray) -> float | FloatArray:
-    """Return c1 or c2 as a finite number, or as an array of the shape of the noise."""
-    if _single(value):
-        return real_number(name, value)
+def _series(name: str, value: npt.ArrayLike, like: FloatArray) -> FloatArray:
+    """Return c1 or c2, a finite number or a series, with the shape of the noise."""
+    if not isinstance(value, Sequence) and np.ndim(value) == 0:
+        return np.broadcast_to(real_number(name, value), like.shape)
     array = finite_series(name, value)
     if array.shape != like.shape:
         raise ValueError(
@@ -334,12 +304,13 @@ def sampled_open_loop(
 
     .. math::
 
-        L_T(\omega) &= K(\mathrm{j}\Omega) \sum_{k=1}^{2} m_k(\mathrm{j}\Omega)
+        L_T(\omega) &= H_0(\omega)\, K(\mathrm{j}\Omega)
+        \sum_{k=1}^{2} m_k(\mathrm{j}\Omega)
         \left( 1 - c_k H_k(\omega) \right) , \\
         \Omega &= \frac{2}{T} \tan \frac{\omega T}{2} , \\
         H_k(\omega) &= \sum_i \ell_{k,i}\, e^{-\mathrm{j}\omega (f_k + i) T} ,
 
-    where a delay of whole samples has
+    where k = 0 is the dead time. A delay of whole samples has
 
     .. math::
 
@@ -379,24 +350,21 @@ def sampled_open_loop(
     >>> bool(np.allclose(sampled_open_loop(loop, omega), loop.open_loop(1j * omega), rtol=1e-5))
     True
     """
-    loop, order = _checked_loop(loop), _order(interpolation)
-    rate = positive_number("sample_rate", sample_rate)
-    _check_rate(loop, rate)
+    rate, delays = _checked(loop, sample_rate, interpolation)
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
     omega = checked_frequency("omega", omega, math.pi * rate, "rad/s")
     if not omega.all():
         raise ValueError(
             "omega must be positive, got 0.0: controller or sensor has a pole there"
         )
+    late1, late2, dead = (
+        np.exp(-1j * omega[..., None] * (first + np.arange(len(weights))) / rate) @ weights
+        for first, weights in delays
+    )
     s = 1j * warped(omega, rate)
     m1, m2 = loop.mapping.weights(s)
-    result = np.zeros(omega.shape, dtype=np.complex128)
-    for m, c, name in ((m1, c1, "tau1"), (m2, c2, "tau2")):
-        delay = lagrange_delay(name, getattr(loop, name), rate, order)
-        lags = delay.first + np.arange(delay.weights.size)
-        late = np.exp(-1j * omega[..., None] * lags / rate) @ delay.weights
-        result += m * (1.0 - c * late)
-    return np.asarray(loop.controller(s) * result)
+    sensor = m1 * (1.0 - c1 * late1) + m2 * (1.0 - c2 * late2)
+    return np.asarray(dead * loop.controller(s) * sensor)
 
 
 class Simulation:
@@ -412,7 +380,7 @@ class Simulation:
         The locked laser's noise before the first sample, the latest value last: a constant,
         or at least `history_samples` values. Controller and sensor start at rest.
     interpolation : int, optional
-        Odd order, up to 99, of the polynomial by which delays that are not whole samples are
+        Odd order of the polynomial by which delays that are not whole samples are
         interpolated. Whole ones are exact.
     limit : float, optional
         The run counts as diverged when the output exceeds the largest input so far by this
@@ -428,9 +396,9 @@ class Simulation:
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no loop, the sample rate is too low for its delays, its poles and zeros,
-        or its feedback at high frequency, or so high that its delays are more than `LONGEST`
-        samples, or the history is too short or not finite.
+        If `loop` is no loop, the sample rate is too low for its delays (the dead time
+        included), its poles and zeros, or its feedback at high frequency, or the history is
+        too short, not finite, or longer than memory holds.
 
     Notes
     -----
@@ -439,13 +407,18 @@ class Simulation:
     .. math::
 
         a_k[n] &= c_k[n] \sum_i \ell_{k,i}\, \varphi[n - f_k - i] , \\
-        \varphi[n] &= \frac{\varphi_0[n] - C w[n] + d_1 a_1[n] + d_2 a_2[n]}
-        {1 + d_1 + d_2} , \\
-        w[n+1] &= w[n] + E w[n] + \sum_{k=1}^{2} F_k (\varphi[n] - a_k[n]) .
+        y[n] &= r[n] + g \sum_{k=1}^{2} d_k \left( \varphi[n] - a_k[n] \right) , \\
+        \varphi[n] &= \varphi_0[n] - \sum_i \ell_{0,i}\, y[n - f_0 - i] .
 
-    The late light a_k is interpolated as for `sampled_open_loop`; w is the state of controller
-    and sensor, sampled by the trapezoidal rule, with change E, drives F_k, output C and direct
-    shares d_k (`armlock.discretize`). So the loop is closed within the sample.
+    Here y is what the controller sends, of gain g behind the sensor's direct shares d_k, and r
+    what their states make of earlier samples (`armlock.discretize`). The late light a_k and
+    the dead time, k = 0, are interpolated as for `sampled_open_loop`. Without a dead time
+    y[n] enters its own sample, and the loop is closed within it:
+
+    .. math::
+
+        \varphi[n] = \frac{\varphi_0[n] - r[n] + g \left( d_1 a_1[n] + d_2 a_2[n] \right)}
+        {1 + g \left( d_1 + d_2 \right)} .
 
     One call and many give the same samples, bit by bit.
 
@@ -468,39 +441,25 @@ class Simulation:
         interpolation: int = INTERPOLATION_ORDER,
         limit: float = LIMIT,
     ) -> None:
-        self.loop = _checked_loop(loop)
-        self.sample_rate = positive_number("sample_rate", sample_rate)
+        self.sample_rate, self._delays = _checked(loop, sample_rate, interpolation)
+        self.loop, self.interpolation = loop, interpolation
         self.limit = positive_number("limit", limit)
         if self.limit < 1.0:
             raise ValueError(f"limit must be at least 1, got {self.limit}")
-        _check_rate(self.loop, self.sample_rate)
-        self.interpolation = _order(interpolation)
-        self._delays = [
-            lagrange_delay(name, getattr(loop, name), self.sample_rate, self.interpolation)
-            for name in ("tau1", "tau2")
-        ]
-        self.history_samples = max(d.first + d.weights.size - 1 for d in self._delays)
-        self._sampled = sample(
-            real_system(
-                loop.controller.zeros,
-                loop.controller.poles,
-                loop.controller.gain,
-                (loop.mapping.numerator1, loop.mapping.numerator2),
-                loop.mapping.denominator,
-            ),
-            self.sample_rate,
+        self._sensor, self._controller = sampled_loop(
+            loop.controller, loop.mapping, self.sample_rate
         )
         self._check_closure()
-        self._matrices = _as_rows(self._sampled)
-        self._direct = floats(self._sampled.direct)
-        self._entering = floats(self._sampled.output @ self._sampled.drive)
-        self._state: Row = (0.0,) * len(self._matrices[1])
-        self._rest = 0.0
+        self.history_samples = max(first + len(weights) - 1 for first, weights in self._delays)
+        check_memory("history", (self.history_samples,), 16)
+        # The output, and what the controller sends: each with its past in front.
         self._phi = np.zeros(self.history_samples + BLOCK)
-        self._phi[: self.history_samples] = self._checked_history(history)
+        self._sent = np.zeros_like(self._phi)
         before = self._phi[: self.history_samples]
-        start = max(float(before.max()), -float(before.min()))
-        self._watch = np.array([start, 0.0])
+        before[:] = self._checked_history(history)
+        numbers = len(self._sensor.states) + 2 * len(self._controller.sections) + 1
+        self._state = np.zeros(numbers)
+        self._watch = np.array([np.abs(before).max(), 0.0])
         self._stopped: tuple[float, float] | None = None
         self.samples = 0
 
@@ -518,17 +477,20 @@ class Simulation:
 
     def _check_closure(self) -> None:
         """Refuse a loop whose feedback changes sign between the sample rate and infinity."""
-        closed = 1.0 + float(self._sampled.direct.sum())
-        loop = self.loop
-        sizes = [p[loop.degree] if p.size > loop.degree else 0.0 for p in (loop.a, loop.rest)]
-        if not closed * sizes[0] * sizes[1] > 0.0:
+        if self.loop.delay > 0.0:
+            return
+        controller, mapping = self.loop.controller, self.loop.mapping
+        excess = len(controller.poles) + len(mapping.denominator) - len(controller.zeros)
+        highest = [n[-1] for n in (mapping.numerator1, mapping.numerator2) if len(n) == excess]
+        at_infinity = 1.0 + controller.gain * sum(highest) / mapping.denominator[-1]
+        if (1.0 + self._controller.gain * sum(self._sensor.direct)) * at_infinity <= 0.0:
             raise ValueError(
                 f"sample_rate must be higher for this loop, got {self.sample_rate}: 1 + L "
                 f"without delays changes sign beyond it, a root that samples cannot show"
             )
 
     def _checked_history(self, history: npt.ArrayLike) -> float | FloatArray:
-        if _single(history):
+        if not isinstance(history, Sequence) and np.ndim(history) == 0:
             return real_number("history", history)
         array = finite_series("history", history)
         if array.size < self.history_samples:
@@ -563,65 +525,42 @@ class Simulation:
             If the output leaves all bounds. The run cannot be continued.
         """
         given = finite_series("noise", noise)
-        first, second = _parameter("c1", c1, given), _parameter("c2", c2, given)
-        output = np.empty_like(given)
-        self._fill(output, given, first, second, None)
-        return output
-
-    def _fill(
-        self,
-        output: FloatArray,
-        noise: FloatArray,
-        c1: float | FloatArray,
-        c2: float | FloatArray,
-        bar: _Bar | None,
-    ) -> None:
-        """Compute `output` from checked arguments, in blocks of a fixed size."""
+        inputs = given, _series("c1", c1, given), _series("c2", c2, given)
         if self._stopped is not None:
             raise DivergenceError(*self._stopped, np.empty(0))
+        output = np.empty_like(given)
         start = self.history_samples
-        delay1, delay2 = self._delays
-        for at in range(0, noise.size, BLOCK):
-            piece = slice(at, min(at + BLOCK, noise.size))
-            part = _piece(noise, piece)
-            self._state, self._rest, stop = _advance(
+        for at in range(0, given.size, BLOCK):
+            # Contiguous and writable, as the compiled loop takes them.
+            block = [
+                np.require(values[at : at + BLOCK], requirements=["C", "W"])
+                for values in inputs
+            ]
+            count = block[0].size
+            stop = _advance(
                 self._phi,
+                self._sent,
                 start,
-                part,
-                _piece(c1, piece),
-                _piece(c2, piece),
-                delay1.first,
-                floats(delay1.weights),
-                delay2.first,
-                floats(delay2.weights),
-                self._matrices,
-                self._direct,
-                self._entering,
+                *block,
+                self._delays,
+                self._sensor,
+                self._controller,
                 self._state,
-                self._rest,
                 self._watch,
                 self.limit,
                 self.samples,
             )
             if stop >= 0:
-                output[at : at + stop] = self._phi[start : start + stop]
-                self.samples += stop
+                count = stop
+            output[at : at + count] = self._phi[start : start + count]
+            self.samples += count
+            if stop >= 0:
                 self._stopped = float(self._watch[1]) / self.sample_rate, self.time
                 # A copy, so that the error does not hold all the memory of the run.
                 raise DivergenceError(*self._stopped, output[: at + stop].copy())
-            output[piece] = self._phi[start : start + part.size]
-            self._phi[:start] = self._phi[part.size : part.size + start].copy()
-            self.samples += part.size
-            if bar is not None:
-                bar.show(self.samples)
-
-
-def _piece(values: float | FloatArray, piece: slice) -> FloatArray:
-    if isinstance(values, float):
-        return np.full(piece.stop - piece.start, values)
-    part = np.ascontiguousarray(values[piece])
-    # Read-only arrays are another type to the compiler.
-    return part if part.flags.writeable else part.copy()
+            for signal in (self._phi, self._sent):
+                signal[:start] = signal[count : count + start].copy()
+        return output
 
 
 def simulate(
@@ -634,7 +573,6 @@ def simulate(
     history: npt.ArrayLike = 0.0,
     interpolation: int = INTERPOLATION_ORDER,
     limit: float = LIMIT,
-    progress: bool | None = None,
 ) -> FloatArray:
     r"""Run a loop, and return the frequency noise of the locked laser.
 
@@ -663,8 +601,6 @@ def simulate(
         Order of interpolation for delays that are not whole samples; see `Simulation`.
     limit : float, optional
         Size of the output, in units of the largest input, that counts as diverged.
-    progress : bool, optional
-        Whether to show a bar on standard error. By default, on long runs on a terminal.
 
     Returns
     -------
@@ -691,12 +627,7 @@ def simulate(
     run = Simulation(
         loop, sample_rate, history=history, interpolation=interpolation, limit=limit
     )
-    given = finite_series("noise", noise)
-    first, second = _parameter("c1", c1, given), _parameter("c2", c2, given)
-    with _Bar(given.size, run.sample_rate, progress) as bar:
-        output = np.empty_like(given)
-        run._fill(output, given, first, second, bar)
-    return output
+    return run.advance(noise, c1, c2)
 
 
 def simulate_blocks(
@@ -704,11 +635,9 @@ def simulate_blocks(
     blocks: Iterable[npt.ArrayLike | Sequence[npt.ArrayLike]],
     sample_rate: float = 200.0,
     *,
-    samples: int = 0,
     history: npt.ArrayLike = 0.0,
     interpolation: int = INTERPOLATION_ORDER,
     limit: float = LIMIT,
-    progress: bool | None = None,
 ) -> Iterator[FloatArray]:
     """Run a loop over a stream of blocks; memory does not grow with the duration.
 
@@ -721,9 +650,7 @@ def simulate_blocks(
         included.
     sample_rate : float, optional
         In Hz.
-    samples : int, optional
-        How many there will be, for the progress bar.
-    history, interpolation, limit, progress
+    history, interpolation, limit
         As for `simulate`.
 
     Yields
@@ -747,24 +674,10 @@ def simulate_blocks(
     run = Simulation(
         loop, sample_rate, history=history, interpolation=interpolation, limit=limit
     )
-
-    bar = _Bar(whole_number("samples", samples, 0), run.sample_rate, progress)
     if not isinstance(blocks, Iterable):
         raise TypeError(f"blocks must be an iterable of arrays, got {blocks!r}")
-
-    def outputs() -> Iterator[FloatArray]:
-        with bar:
-            for block in blocks:
-                parts = block if isinstance(block, tuple) else (block,)
-                if not 1 <= len(parts) <= 3:
-                    raise ValueError(
-                        f"blocks must hold arrays or tuples (noise, c1, c2), got a tuple of "
-                        f"{len(parts)}"
-                    )
-                yield run.advance(*parts)
-                bar.show(run.samples)
-
-    return outputs()
+    parts = (block if isinstance(block, tuple) else (block,) for block in blocks)
+    return (run.advance(*part) for part in parts)
 
 
 def save_series(path: str | os.PathLike[str], blocks: Iterable[FloatArray]) -> int:
@@ -773,7 +686,7 @@ def save_series(path: str | os.PathLike[str], blocks: Iterable[FloatArray]) -> i
     Parameters
     ----------
     path : path_like
-        Name of the file, which ends in .npy.
+        Name of the file, for instance one that ends in .npy.
     blocks : iterable of float arrays
         Each one-dimensional and finite, for instance from `simulate_blocks`.
 
@@ -785,10 +698,9 @@ def save_series(path: str | os.PathLike[str], blocks: Iterable[FloatArray]) -> i
     Raises
     ------
     TypeError, ValueError
-        If the name does not end in .npy, or a block is not a one-dimensional series of finite
-        real numbers.
+        If a block is not a one-dimensional series of finite real numbers.
     OSError
-        If `path` is a folder, or its folder does not exist.
+        If the file cannot be written.
 
     Notes
     -----
@@ -810,19 +722,13 @@ def save_series(path: str | os.PathLike[str], blocks: Iterable[FloatArray]) -> i
     100 (100,)
     """
     path = Path(path)
-    if path.suffix != ".npy":
-        raise ValueError(f"path must end in .npy, got {str(path)!r}")
-    if path.is_dir():
-        raise IsADirectoryError(f"path must be a file, got the folder {str(path)!r}")
-    if not path.parent.is_dir():
-        raise FileNotFoundError(f"path must lie in a folder that exists, got {str(path)!r}")
     if not isinstance(blocks, Iterable):
         raise TypeError(f"blocks must be an iterable of arrays, got {blocks!r}")
     temporary = path.with_name(f"{path.name}.{secrets.token_hex(4)}.part")
     count = 0
     try:
         with temporary.open("xb") as file:
-            # The header's room for the length suffices for any: it is written again below.
+            # The header has room for any length: it is written again below.
             _write_header(file, 0)
             for number, block in enumerate(blocks):
                 values = finite_series(f"blocks[{number}]", block)
@@ -830,9 +736,6 @@ def save_series(path: str | os.PathLike[str], blocks: Iterable[FloatArray]) -> i
                 count += values.size
             file.seek(0)
             _write_header(file, count)
-            file.flush()
-            # On the disk before the name is.
-            os.fsync(file.fileno())
         temporary.replace(path)
     except BaseException:
         temporary.unlink(missing_ok=True)
@@ -840,38 +743,6 @@ def save_series(path: str | os.PathLike[str], blocks: Iterable[FloatArray]) -> i
     return count
 
 
-def _write_header(file: object, count: int) -> None:
+def _write_header(file: BinaryIO, count: int) -> None:
     description = {"descr": "<f8", "fortran_order": False, "shape": (count,)}
-    np.lib.format.write_array_header_1_0(file, description)  # type: ignore[arg-type]
-
-
-class _Bar:
-    """A progress bar on one line of standard error."""
-
-    def __init__(self, samples: int, sample_rate: float, progress: bool | None) -> None:
-        self.samples = samples
-        self.rate = sample_rate
-        self.stream: TextIO = sys.stderr
-        self.shown = -1
-        if progress is None:
-            wanted = samples >= LONG_RUN and self.stream.isatty()
-        else:
-            wanted = true_or_false("progress", progress)
-        self.wanted = wanted and samples > 0
-
-    def __enter__(self) -> _Bar:
-        return self
-
-    def show(self, done: int) -> None:
-        """Draw the bar, at most a hundred times."""
-        share = 100 * done // max(self.samples, 1)
-        if self.wanted and share > self.shown:
-            self.shown = share
-            filled = "#" * (share * 40 // 100)
-            text = f"\r[{filled:40s}] {share:3d} %  {done / self.rate:.0f} s simulated"
-            self.stream.write(text)
-            self.stream.flush()
-
-    def __exit__(self, *stopped: object) -> None:
-        if self.wanted and self.shown >= 0:
-            self.stream.write("\n")
+    np.lib.format.write_array_header_1_0(file, description)

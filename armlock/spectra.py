@@ -10,10 +10,9 @@ All densities are one-sided.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +29,9 @@ from armlock.checks import (
     whole_number,
 )
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 #: Samples in a segment, and from one segment to the next.
 SEGMENT = 1024
 HOP = SEGMENT // 4
@@ -37,18 +39,14 @@ HOP = SEGMENT // 4
 FACTOR = 4
 #: Bins next to zero that the window's main lobe spoils.
 SPOILED = 8
-#: Largest number of bands a decade; there are no more than 512 bins between two of them.
-MOST_BANDS = 1000
-#: Bounds between which the squares of samples neither overflow nor vanish.
-SMALLEST, LARGEST = 1e-120, 1e120
 
-# Highest bin of a decimated series that its filter leaves alone.
-_HIGHEST = 368
+# Below this bin the next level takes over, whose filter leaves alone what is below `FACTOR`
+# times it; but above `SPOILED` only if the next level has so many segments.
+_TAKEN_OVER = 92
+_ENOUGH = 8
 _STOPBAND = 120.0
 _TAPS = 113
 _BETA = 20.0
-# Segments below which a lower bin of a faster level is preferred to a higher one of this.
-_ENOUGH = 8
 _TRANSFORMS_AT_ONCE = 512
 
 _WINDOW = np.kaiser(SEGMENT + 1, _BETA)[:-1]
@@ -180,28 +178,46 @@ class Spectrum:
         Raises
         ------
         TypeError, ValueError
-            If the two are not real numbers in this order.
+            If the two are not numbers in this order.
         """
-        low, high = _edge("low", low), _edge("high", high)
-        if high < low:
+        if not low <= high:
             raise ValueError(f"high must not lie below low = {low}, got {high}")
         keep = (self.frequency >= low) & (self.frequency <= high)
-        return Spectrum(
-            self.frequency[keep],
-            self.asd[keep],
-            self.lower[keep],
-            self.upper[keep],
-            self.degrees[keep],
-            self.resolution[keep],
-            self.bins[keep],
+        return Spectrum(*(getattr(self, field.name)[keep] for field in fields(self)))
+
+    def plot(self, ax: Axes | None = None, *, unit: str = "Hz", **style: Any) -> Axes:
+        """Draw the density with its confidence band, on logarithmic axes.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+            Where to draw; the current ones by default.
+        unit : str, optional
+            Of the series, for the label.
+        **style
+            For the line, as `matplotlib.axes.Axes.plot` takes it: a label, a colour.
+
+        Returns
+        -------
+        matplotlib Axes
+
+        Examples
+        --------
+        >>> from armlock import LaserNoise, amplitude_spectrum
+        >>> spectrum = amplitude_spectrum(LaserNoise(1, 10.0).draw(20_000), 10.0)
+        >>> spectrum.plot(label="laser").get_ylabel()
+        'amplitude spectral density [Hz/√Hz]'
+        """
+        import matplotlib.pyplot as plt
+
+        ax = plt.gca() if ax is None else ax
+        (line,) = ax.loglog(self.frequency, self.asd, **style)
+        ax.fill_between(
+            self.frequency, self.lower, self.upper, color=line.get_color(), alpha=0.3, lw=0
         )
-
-
-def _edge(name: str, value: float) -> float:
-    """Return the end of a range: a real number, or an infinite one."""
-    if isinstance(value, float) and math.isinf(value):
-        return value
-    return real_number(name, value)
+        ax.set_xlabel("frequency [Hz]")
+        ax.set_ylabel(f"amplitude spectral density [{unit}/√Hz]")
+        return ax
 
 
 def _response() -> tuple[FloatArray, FloatArray]:
@@ -237,14 +253,21 @@ def _degrees(segments: int, bins: int) -> float:
 
 
 class _Level:
-    """One rate of the ladder."""
+    """One rate of the ladder, so many filters below the first."""
 
-    def __init__(self, rate: float) -> None:
-        self.rate = rate
+    def __init__(self, sample_rate: float, depth: int) -> None:
+        self.width = sample_rate / FACTOR**depth / SEGMENT
         self.power = np.zeros(SEGMENT // 2 + 1)
         self.segments = 0
         self.waiting = np.empty(0)
         self.unfiltered = np.empty(0)
+        # What the filters above let through, at this level's bins.
+        self.passed = np.ones(SEGMENT // 2 + 1)
+        for k in range(1, depth + 1):
+            turns = np.outer(
+                np.arange(SEGMENT // 2 + 1) / SEGMENT / FACTOR**k, np.arange(_TAPS)
+            )
+            self.passed *= np.abs(np.exp(-2j * np.pi * turns) @ _FILTER) ** 2
 
     def add(self, samples: FloatArray) -> FloatArray:
         """Take in samples; return those of the next level."""
@@ -261,18 +284,15 @@ class _Level:
         self.waiting = series.copy()
         series = np.concatenate((self.unfiltered, samples))
         count = max((series.size - _TAPS) // FACTOR + 1, 0)
-        if count:
-            skipped = (_TAPS - 1) // FACTOR
-            filtered = upfirdn(_FILTER, series, down=FACTOR)[skipped : skipped + count]
-        else:
-            filtered = np.empty(0)
+        skipped = (_TAPS - 1) // FACTOR
+        filtered = upfirdn(_FILTER, series, down=FACTOR)[skipped : skipped + count]
         self.unfiltered = series[count * FACTOR :].copy()
         return np.asarray(filtered)
 
-    @cached_property
-    def scale(self) -> float:
-        """Factor from a squared transform to a one-sided density."""
-        return 2.0 / (self.rate * float(np.sum(_WINDOW**2)))
+    def density(self) -> FloatArray:
+        """Return the squared density at each bin, one-sided."""
+        scale = 0.5 * self.segments * self.width * SEGMENT * np.sum(_WINDOW**2)
+        return np.asarray(self.power / scale / self.passed)
 
 
 class SpectrumEstimator:
@@ -324,8 +344,7 @@ class SpectrumEstimator:
 
     def __init__(self, sample_rate: float) -> None:
         self.sample_rate = positive_number("sample_rate", sample_rate)
-        self._levels = [_Level(self.sample_rate)]
-        self._largest = 0.0
+        self._levels = [_Level(self.sample_rate, 0)]
         self.samples = 0
 
     def __repr__(self) -> str:
@@ -338,29 +357,19 @@ class SpectrumEstimator:
         Parameters
         ----------
         samples : array_like of float, one-dimensional
-            Finite, and of a magnitude whose square can be held: below 1e120.
+            Finite.
 
         Raises
         ------
         TypeError, ValueError
             If they are not; none of them is taken in.
         """
-        self._take("samples", samples)
-
-    def _take(self, name: str, samples: npt.ArrayLike) -> None:
-        """Take in samples that messages call by `name`."""
-        given = finite_series(name, samples)
-        if not given.size:
-            return
-        largest = max(float(given.max()), -float(given.min()))
-        if largest > LARGEST:
-            raise ValueError(f"{name} must not exceed {LARGEST} in magnitude, got {largest}")
-        self._largest = max(self._largest, largest)
+        given = finite_series("samples", samples)
         self.samples += given.size
         depth = 0
         while given.size:
             if depth == len(self._levels):
-                self._levels.append(_Level(self.sample_rate / FACTOR**depth))
+                self._levels.append(_Level(self.sample_rate, depth))
             given = self._levels[depth].add(given)
             depth += 1
 
@@ -370,7 +379,7 @@ class SpectrumEstimator:
         Parameters
         ----------
         bands : int, optional
-            Bands a decade, from 1 to 1000.
+            Bands a decade.
         confidence : float, optional
             Probability that a band's confidence interval holds the true density.
 
@@ -383,10 +392,9 @@ class SpectrumEstimator:
         Raises
         ------
         ValueError
-            If fewer samples than one segment have come in, all of them are smaller than
-            1e-120, where squares vanish, or an argument is out of range.
+            If fewer samples than one segment have come in, or an argument is out of range.
         """
-        bands = whole_number("bands", bands, 1, MOST_BANDS)
+        bands = whole_number("bands", bands, 1)
         confidence = real_number("confidence", confidence)
         if not 0.0 < confidence < 1.0:
             raise ValueError(f"confidence must lie between 0 and 1, got {confidence}")
@@ -396,25 +404,16 @@ class SpectrumEstimator:
                 f"series must hold at least {SEGMENT} samples, got "
                 f"{self._levels[0].waiting.size}"
             )
-        if 0.0 < self._largest < SMALLEST:
-            raise ValueError(
-                f"series must reach {SMALLEST} in magnitude unless it is zero, got "
-                f"{self._largest}"
-            )
-        rows = []
-        # A level's bins from `first` to `last`; the next level has those below, in its own.
-        last = SEGMENT // 2 - SPOILED
-        for depth, level in enumerate(usable):
-            first, after = SPOILED, 0
-            if depth + 1 < len(usable):
-                if usable[depth + 1].segments >= _ENOUGH:
-                    first = max(first, _HIGHEST // FACTOR)
-                after = min(_HIGHEST, FACTOR * first - 1)
-            rows += self._bands(level, np.arange(first, last + 1), bands)
-            last = after
-        rows.sort()
-        table = np.array(rows)
-        frequency, power, degrees, resolution, count = table.T
+        rows: list[tuple[float, ...]] = []
+        # Of each level the bins from `first` on and below `end`, the next level's `end` being
+        # this one's `first`.
+        end = SEGMENT // 2 - SPOILED + 1
+        for level, slower in zip(usable, [*usable[1:], None], strict=True):
+            settled = slower is not None and slower.segments >= _ENOUGH
+            first = _TAKEN_OVER if settled else SPOILED
+            rows += _banded(level, np.arange(first, end), bands)
+            end = FACTOR * first
+        frequency, power, degrees, resolution, count = np.array(sorted(rows)).T
         tail = 0.5 * (1.0 - confidence)
         return Spectrum(
             frequency,
@@ -426,39 +425,21 @@ class SpectrumEstimator:
             count.astype(np.int64),
         )
 
-    def _bands(
-        self, level: _Level, numbers: IntArray, bands: int
-    ) -> list[tuple[float, float, float, float, float]]:
-        """Average bins of one level in bands."""
-        width = level.rate / SEGMENT
-        index = np.floor(bands * np.log10(numbers * width)).astype(int)
-        power = level.power * level.scale / level.segments
-        if level is not self._levels[0]:
-            power = power / self._passed(level)
-        rows = []
-        for band in np.unique(index):
-            chosen = numbers[index == band]
-            rows.append(
-                (
-                    float(chosen.mean() * width),
-                    float(power[chosen].mean()),
-                    _degrees(level.segments, chosen.size),
-                    width,
-                    float(chosen.size),
-                )
-            )
-        return rows
 
-    def _passed(self, level: _Level) -> FloatArray:
-        """Power response of all filters above a level, at its bins."""
-        frequency = np.arange(SEGMENT // 2 + 1) * level.rate / SEGMENT
-        response = np.ones(frequency.size)
-        rate = self.sample_rate
-        while rate > 1.5 * level.rate:
-            turns = np.exp(-2j * np.pi * np.outer(frequency / rate, np.arange(_TAPS)))
-            response *= np.abs(turns @ _FILTER) ** 2
-            rate /= FACTOR
-        return response
+def _banded(level: _Level, numbers: IntArray, bands: int) -> list[tuple[float, ...]]:
+    """Average some bins of a level in bands: frequency, power, degrees, width, how many."""
+    density = level.density()
+    index = np.floor(bands * np.log10(numbers * level.width))
+    return [
+        (
+            float(chosen.mean() * level.width),
+            float(density[chosen].mean()),
+            _degrees(level.segments, chosen.size),
+            level.width,
+            float(chosen.size),
+        )
+        for chosen in (numbers[index == band] for band in np.unique(index))
+    ]
 
 
 def amplitude_spectrum(
@@ -486,8 +467,7 @@ def amplitude_spectrum(
     Raises
     ------
     TypeError, ValueError
-        If the series is too short, not one-dimensional, not finite, or of a magnitude beyond
-        1e-120 to 1e120, whose squares overflow or vanish.
+        If the series is too short, not one-dimensional or not finite.
 
     Examples
     --------
@@ -499,5 +479,5 @@ def amplitude_spectrum(
     True
     """
     estimator = SpectrumEstimator(sample_rate)
-    estimator._take("series", series)
+    estimator.add(finite_series("series", series))
     return estimator.spectrum(bands=bands, confidence=confidence)

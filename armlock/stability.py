@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -31,6 +31,9 @@ from armlock.checks import (
     broadcast_pair,
     check_memory,
 )
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 #: What a count is where a root lies on the boundary of stability: -1.
 BOUNDARY = contour.BOUNDARY
@@ -92,7 +95,7 @@ def _compiled(system: CharacteristicFunction) -> tuple[Any, ...]:
         weights[k, first:last] = term.weights
         first = last
     rest = system.rest_on_boundary().sums
-    a = rest if system.delay else terms[0].sums
+    a = rest if system.delay else terms[0].sums  # not used for a map
     return (
         terms[0].compiled(),
         weights,
@@ -106,15 +109,23 @@ def _compiled(system: CharacteristicFunction) -> tuple[Any, ...]:
 
 
 def _roots_of_a(system: CharacteristicFunction) -> ComplexArray:
-    """Roots of A; raise where rounding makes them those of another polynomial."""
+    """Roots of A, each polished; raise where they are not those of A beyond doubt.
+
+    They enter a count through the argument of A alone, past the last frequency.
+    """
     if system.delay and not system.step:
         return system.polynomials()[0].roots
-    roots = poly.polyroots(system.a).astype(np.complex128)
-    product, magnitude = np.array([system.a[-1]], dtype=np.complex128), np.abs(system.a[-1:])
+    a, slope = system.a, poly.polyder(system.a)
+    roots = poly.polyroots(a).astype(np.complex128)
+    for _ in range(3):
+        value, rate = poly.polyval(roots, a), poly.polyval(roots, slope)
+        off = np.abs(value) > 1e-10 * poly.polyval(np.abs(roots), np.abs(a))
+        roots = np.where(off & (rate != 0.0), roots - value / np.where(rate, rate, 1.0), roots)
+    product, magnitude = np.array([a[-1]], dtype=np.complex128), np.abs(a[-1:])
     for root in roots[np.argsort(np.abs(roots))]:
         product = np.convolve(product, [-root, 1.0])
         magnitude = np.convolve(magnitude, [abs(root), 1.0])
-    if not (np.abs(product - system.a) <= 1e-6 * magnitude).all():
+    if not (np.abs(product - a) <= 1e-6 * magnitude).all():
         raise CountError(
             f"no count for {system!r}: the coefficients of A differ by more orders of "
             f"magnitude than doubles resolve",
@@ -342,6 +353,24 @@ class StabilityChart:
     def stable(self) -> BoolArray:
         """Where all roots lie in the open left half-plane."""
         return np.asarray(self.counts == 0)
+
+    def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
+        """Colour the chart by its counts, the stable region apart.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+            Where to draw; the current ones by default.
+        **options
+            As `armlock.plotting.plot_chart` takes them.
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        from armlock.plotting import plot_chart
+
+        return plot_chart(self, ax, **options)
 
 
 def stability_chart(

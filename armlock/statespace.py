@@ -1,11 +1,15 @@
 """State space of a delay equation, in which a single signal is delayed.
 
-D xi = 0 reads A xi = x B1 xi(t - delay1) + y B2 xi(t - delay2). In observer form that is
+With C and A as in `armlock.characteristic.CharacteristicFunction`, D xi = 0 reads
 
-    z'(t) = F z(t) + x G1 xi(t - delay1) + y G2 xi(t - delay2)
-    xi(t) = z_1(t) + x d1 xi(t - delay1) + y d2 xi(t - delay2)
+    A xi = -C xi(t - delay) + x B1 xi(t - delay - delay1) + y B2 xi(t - delay - delay2).
 
-with as many states as D has degree, and d1 = d2 = 0 for retarded equations.
+In observer form, with a delayed term k for each of the three, that is
+
+    z'(t) = F z(t) + sum_k G_k xi(t - theta_k)
+    xi(t) = z_1(t) + sum_k d_k xi(t - theta_k)
+
+with as many states as D has degree, and d_k = 0 for retarded equations.
 """
 
 from __future__ import annotations
@@ -56,8 +60,7 @@ def realize(system: CharacteristicFunction, x: float, y: float) -> Realization:
     Raises
     ------
     TypeError, ValueError
-        If x or y is not a finite real number, the system is a map, or the terms without delay
-        cancel the highest power, so that no state form exists.
+        If x or y is not a finite real number, or the system is a map.
     """
     name1, name2 = checked_system(system).parameters
     x, y = real_number(name1, x), real_number(name2, y)
@@ -67,26 +70,22 @@ def realize(system: CharacteristicFunction, x: float, y: float) -> Realization:
         )
     undelayed = system.a.copy()
     terms = []
-    for parameter, b, delay in (
-        (x, system.b1, system.delay1),
-        (y, system.b2, system.delay2),
+    for weight, b, delay in (
+        (-1.0, system.c, system.delay),
+        (x, system.b1, system.delay + system.delay1),
+        (y, system.b2, system.delay + system.delay2),
     ):
         padded = np.zeros_like(undelayed)
-        padded[: b.size] = parameter * b
+        padded[: b.size] = weight * b
         if delay == 0.0:
             undelayed -= padded
         else:
             terms.append((delay, padded))
-    lead = undelayed[-1]
-    if lead == 0.0:
-        raise ValueError(
-            f"the loop {system!r} is not well posed at ({x}, {y}): its highest power cancels"
-        )
     # Descending powers below the highest one, as the observer form lists them.
+    lead = undelayed[-1]
     below = undelayed[-2::-1] / lead
-    state = np.diag(np.ones(system.degree - 1), 1) if system.degree else np.zeros((0, 0))
-    if system.degree:
-        state[:, 0] = -below
+    state = np.diag(np.ones(system.degree - 1), 1)
+    state[:, 0] = -below
     delayed = []
     for delay, b in terms:
         direct = float(b[-1] / lead)

@@ -16,8 +16,9 @@ import control
 import numpy as np
 from numba import njit
 
-from armlock import LaserNoise, Loop, PerturbationNoise, Simulation, paper_loop, simulate
+from armlock import LaserNoise, Loop, PerturbationNoise, paper_loop, simulate
 from armlock.checks import FloatArray
+from armlock.discretize import sampled_loop
 from armlock.paper import SAMPLE_RATE, TAU1, TAU2
 from benchmarks import child
 from benchmarks.report import Row, Topic
@@ -59,31 +60,37 @@ def plain(
     c2: FloatArray,
     r1: int,
     r2: int,
-    change: FloatArray,
-    drive: FloatArray,
-    output: FloatArray,
+    sensor: FloatArray,
     direct: FloatArray,
+    sections: FloatArray,
+    gain: float,
     phi: FloatArray,
 ) -> None:
-    """Run the loop as one would write it down: the same state space, sample by sample."""
-    n = output.size
-    w = np.zeros(n)
-    new = np.zeros(n)
+    """Run the loop as one would write it down: the same sections, sample by sample."""
+    w = np.zeros(len(sensor))
+    v = np.zeros((len(sections), 2))
     for i in range(noise.size):
         a1 = c1[i] * phi[i - r1] if i >= r1 else 0.0
         a2 = c2[i] * phi[i - r2] if i >= r2 else 0.0
-        rest = 0.0
-        for k in range(n):
-            rest += output[k] * w[k]
-        x = (noise[i] + direct[0] * a1 + direct[1] * a2 - rest) / (1.0 + direct[0] + direct[1])
+        rest = w[-1]
+        for j in range(len(sections)):
+            rest += sections[j, 3] * v[j, 0] + sections[j, 4] * v[j, 1]
+        x = noise[i] + gain * (direct[0] * a1 + direct[1] * a2 - rest)
+        x /= 1.0 + gain * (direct[0] + direct[1])
         phi[i] = x
-        for j in range(n):
-            step = drive[j, 0] * (x - a1) + drive[j, 1] * (x - a2)
-            for k in range(j + 1):
-                step += change[j, k] * w[k]
-            new[j] = step
-        for j in range(n):
-            w[j] += new[j]
+        y = w[-1]
+        before = 0.0
+        for j in range(len(sensor)):
+            change = before - sensor[j, 0] * y
+            before = w[j]
+            w[j] += change + sensor[j, 1] * (x - a1) + sensor[j, 2] * (x - a2)
+        y += direct[0] * (x - a1) + direct[1] * (x - a2)
+        for j in range(len(sections)):
+            passed = y + sections[j, 3] * v[j, 0] + sections[j, 4] * v[j, 1]
+            change = sections[j, 0] * v[j, 0] - sections[j, 2] * v[j, 1] + y
+            v[j, 1] += sections[j, 1] * v[j, 1] + v[j, 0]
+            v[j, 0] += change
+            y = passed
 
 
 compiled = njit(plain)
@@ -99,9 +106,10 @@ def plain_output(
 
 
 def plain_arguments(loop: Loop) -> tuple[Any, ...]:
-    sampled = Simulation(loop)._sampled
+    sensor, controller = sampled_loop(loop.controller, loop.mapping, SAMPLE_RATE)
     delays = round(TAU1 * SAMPLE_RATE), round(TAU2 * SAMPLE_RATE)
-    return (*delays, sampled.change, sampled.drive, sampled.output, sampled.direct)
+    arrays = (np.array(part) for part in (sensor.states, sensor.direct, controller.sections))
+    return (*delays, *arrays, controller.gain)
 
 
 def inputs(samples: int) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -5,9 +5,8 @@
 Loop I of seed S is the same in every run. Each is drawn from all kinds at once: retarded or
 neutral; up to 12 poles (one in twenty: up to 30) over many decades, lightly damped pairs far
 above the delays' frequencies, unstable ones, ones at 0; any sensor; equal, nearly equal and
-commensurate delays; c from 1e-6 to 3, at and around (1, 1); dead times.
-`tests.attack_judge` says what is right. Refusals are counted: at most one in a thousand, none
-later than 5 s.
+commensurate delays; c from 1e-6 to 3, at and around (1, 1); dead times. `tests.attack_judge`
+says what is right. Refusals are counted: at most one in a thousand, none later than 5 s.
 """
 
 from __future__ import annotations

@@ -4,13 +4,14 @@ A copy of the book with one small notebook is built, with the configuration of t
 """
 
 import os
+import re
 import shutil
 import subprocess
 import sys
+from importlib.metadata import requires, version
 from pathlib import Path
 
 import nbformat
-import pytest
 
 ROOT = Path(__file__).parents[1]
 TEXT = "# A chapter\n\n{numref}`fig-small` shows a curve, see {doc}`/book/intro`."
@@ -30,7 +31,7 @@ glue("points", omega.size, display=False)
 PUBLISH = """
 figures.publish(fig, "small", {"omega [rad/s]": omega, "a [1/s]": a, "b [1/s]": b})
 """
-CHECK = 'assert claims.check("S3")["S3"].verdict.name == "REPRODUCED"'
+CHECK = 'claims.check("S3").confirm()'
 CHANGED = """
 from dataclasses import replace
 from book.companion.claims import Verdict, ledger
@@ -39,21 +40,18 @@ entry = ledger._REGISTER["S3"]
 finding = replace(entry.check(), verdict=Verdict.DIFFERS)
 ledger._REGISTER["S3"] = replace(entry, check=lambda: finding)
 """
+PAGES = ("bibliography.md", "status.md")
+ADDRESS = "https://github.com/someone/something"
+LINKS = {
+    "book/bibliography.html": f'href="{ADDRESS}"',
+    "notebooks/small.html": "https://mybinder.org/v2/gh/someone/something/main?urlpath=lab",
+    "book/status.html": f"git clone {ADDRESS}",
+}
 ALT = "A curve of {points:.0f} points."
 
 
-def build(folder, *, text=TEXT, alt=ALT, before_check=""):
-    """Build a copy of the book with one notebook; return the exit code, output and pages."""
-    (folder / "notebooks").mkdir(parents=True)
-    (folder / "book").mkdir()
-    for name in ("_config.yml", "_ext", "_static", "references.bib", "bibliography.md"):
-        source, target = ROOT / "book" / name, folder / "book" / name
-        (shutil.copytree if source.is_dir() else shutil.copyfile)(source, target)
-    (folder / "book" / "intro.md").write_text("# A book\n\n{cite:t}`shao_robustness`\n")
-    (folder / "book" / "_toc.yml").write_text(
-        "format: jb-book\nroot: book/intro\nchapters:\n"
-        "  - file: notebooks/small\n  - file: book/bibliography\n"
-    )
+def small(*, text=TEXT, alt=ALT, before_check=""):
+    """Return a notebook with a figure, its data, and the check of a claim."""
     caption = {"caption": "A curve.", "name": "fig-small"}
     figure = {"mystnb": {"figure": caption, "image": {"alt": alt}}}
     cells = [
@@ -63,14 +61,41 @@ def build(folder, *, text=TEXT, alt=ALT, before_check=""):
         nbformat.v4.new_code_cell(before_check + "\n" + CHECK),
     ]
     kernel = {"kernelspec": {"name": "python3", "display_name": "Python 3"}}
-    notebook = nbformat.v4.new_notebook(cells=cells, metadata=kernel)
-    nbformat.write(notebook, folder / "notebooks" / "small.ipynb")
+    return nbformat.v4.new_notebook(cells=cells, metadata=kernel)
+
+
+def build(folder, notebooks, address=None):
+    """Build a copy of the book with other notebooks; return exit code, output and pages."""
+    (folder / "notebooks").mkdir(parents=True)
+    (folder / "book").mkdir()
+    for name in ("_config.yml", "_ext", "_static", "references.bib", *PAGES):
+        source, target = ROOT / "book" / name, folder / "book" / name
+        (shutil.copytree if source.is_dir() else shutil.copyfile)(source, target)
+    (folder / "book" / "intro.md").write_text("# A book\n\n{cite:t}`shao_robustness`\n")
+    chapters = [f"notebooks/{name}" for name in notebooks] + [f"book/{name}" for name in PAGES]
+    (folder / "book" / "_toc.yml").write_text(
+        "format: jb-book\nroot: book/intro\nchapters:\n"
+        + "".join(f"  - file: {chapter.removesuffix('.md')}\n" for chapter in chapters)
+    )
+    for name, notebook in notebooks.items():
+        nbformat.write(notebook, folder / "notebooks" / f"{name}.ipynb")
     pages = folder / "build" / "_build" / "html"
     command = [str(Path(sys.executable).with_name("jupyter-book")), "build", ".", "--all"]
     command += ["--config", "book/_config.yml", "--toc", "book/_toc.yml"]
     command += ["--path-output", "build", "-W", "-n", "--keep-going"]
     environment = os.environ | {"ARMLOCK_FIGURES": str(pages / "figures")}
     environment.pop("MPLBACKEND", None)  # the kernel chooses its own, which shows figures
+    if address is not None:
+        # The metadata of the package as they are with an address in pyproject.toml.
+        metadata = folder / "first" / f"armlock-{version('armlock')}.dist-info" / "METADATA"
+        metadata.parent.mkdir(parents=True)
+        metadata.write_text(
+            f"Metadata-Version: 2.1\nName: armlock\nVersion: {version('armlock')}\n"
+            f"Project-URL: repository, {address}\n"
+            + "".join(f"Requires-Dist: {line}\n" for line in requires("armlock") or [])
+        )
+        paths = [metadata.parents[1], os.environ.get("PYTHONPATH", "")]
+        environment["PYTHONPATH"] = os.pathsep.join(map(str, filter(None, paths)))
     result = subprocess.run(
         command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300
     )
@@ -78,31 +103,39 @@ def build(folder, *, text=TEXT, alt=ALT, before_check=""):
     return result.returncode, "\n".join([result.stdout, result.stderr, *logs]), pages
 
 
-def test_building_twice_gives_the_same_data_and_pages_that_need_no_network(tmp_path):
-    tables = []
-    for name in ("first", "second"):
-        code, output, pages = build(tmp_path / name)
-        assert code == 0, output[-3000:]
-        tables.append((pages / "figures" / "small.csv").read_bytes())
-    assert tables[0] == tables[1]
+def test_a_book_has_its_data_numbers_and_links_and_needs_no_network(tmp_path):
+    code, output, pages = build(tmp_path, {"small": small()}, ADDRESS)
+    assert code == 0, output[-3000:]
+    table = (pages / "figures" / "small.csv").read_bytes()
+    assert table.startswith(b"omega [rad/s],a [1/s],b [1/s]\n")
     assert 'alt="A curve of 200 points."' in (pages / "notebooks/small.html").read_text()
-    assert tables[0].startswith(b"omega [rad/s],a [1/s],b [1/s]\n")
+    for page, link in LINKS.items():
+        assert link in (pages / page).read_text()
     check = [sys.executable, str(ROOT / "tools" / "check_html.py"), str(pages)]
     assert subprocess.run(check, capture_output=True, timeout=60).returncode == 0
 
 
-FAULTS = {
-    "a failing cell": ({"before_check": "raise ValueError('on purpose')"}, "on purpose"),
-    "a changed verdict": ({"before_check": CHANGED}, "AssertionError"),
-    "a broken reference": ({"text": TEXT + " {numref}`fig-missing`"}, "fig-missing"),
-    "an unknown number": ({"alt": "At {nowhere:.1f} Hz"}, "nothing is glued as 'nowhere'"),
-    "a broken link to a page": ({"text": TEXT + " {doc}`/book/missing`"}, "missing"),
-}
-
-
-@pytest.mark.parametrize("fault", FAULTS)
-def test_the_build_fails_on(fault, tmp_path):
-    arguments, sign = FAULTS[fault]
-    code, output, _ = build(tmp_path / "book", **arguments)
+def test_a_build_fails_on_each_fault(tmp_path):
+    """Each fault is a warning about its notebook, and every warning fails the build."""
+    missing = TEXT + " {numref}`fig-missing` {doc}`/book/missing`"
+    faulty = {
+        "cell": small(before_check="raise ValueError('on purpose')"),
+        "verdict": small(before_check=CHANGED),
+        "link": small(text=missing, alt="At {nowhere:.1f} Hz"),
+    }
+    code, output, pages = build(tmp_path, faulty)
     assert code != 0
-    assert sign in output
+    warnings = "\n".join(line for line in output.splitlines() if "WARNING: " in line)
+    for name, sign in (
+        ("cell", "Executing notebook failed"),
+        ("verdict", "Executing notebook failed"),
+        ("link", "nothing is glued as 'nowhere'"),
+        ("link", "fig-missing"),
+        ("link", "/book/missing"),
+    ):
+        assert re.search(rf"notebooks/{name}\.ipynb.*{sign}", warnings), (name, sign, output)
+    assert ": on purpose" in output
+    assert ": S3 is pinned as reproduced" in output
+    # Nothing links to a repository whose address is not known.
+    for page in pages.rglob("*.html"):
+        assert not re.search("github.com|mybinder|colab", page.read_text()), page

@@ -74,9 +74,12 @@ def test_a_map_shifts_and_differentiates_like_a_loop():
 @pytest.mark.parametrize("system", SYSTEMS, ids=repr)
 def test_exponential_sums_are_the_parts_on_the_axis(system):
     omega = np.array([0.0, 0.3, 1.7, 11.0])
-    for piece, part in zip(system.on_boundary(), system.parts(1j * omega), strict=True):
-        groups = zip(piece.coefficients, piece.phases, strict=True)
-        value = sum(np.polyval(p[::-1], omega) * np.exp(1j * r * omega) for p, r in groups)
+    for term, part in zip(system.on_boundary(), system.parts(1j * omega), strict=True):
+        value = sum(
+            weight * np.polyval(p.coefficients[::-1], 1j * omega) * np.exp(1j * phase * omega)
+            for row, phase in zip(term.weights, term.phases, strict=True)
+            for weight, p in zip(row, term.polynomials, strict=True)
+        )
         np.testing.assert_allclose(value, part, rtol=1e-12, atol=1e-12)
 
 
@@ -136,7 +139,7 @@ def test_coefficients_must_be_real_numbers(bad):
 
 
 def test_the_shift_must_be_real():
-    with pytest.raises(TypeError, match=r"^sigma must be real, got the complex value 1j$"):
+    with pytest.raises(TypeError, match=r"^sigma must be a real number, got 1j$"):
         HayesEquation().shifted(1j)  # type: ignore[arg-type]
 
 
@@ -238,15 +241,15 @@ def test_names_and_reference_are_checked(arguments, error, message):
     ("arguments", "error", "message"),
     [
         (("j", 1.0, 1.0), TypeError, "^s must hold numbers, got dtype <U1$"),
-        ((np.inf, 1.0, 1.0), ValueError, r"^s must be finite, got \(inf\+0j\) among"),
+        ((np.inf, 1.0, 1.0), ValueError, "^s must be finite, got inf$"),
         ((1j, "a", 1.0), TypeError, "^c1 must hold real numbers, got dtype <U1$"),
         ((1j, 1.0, np.nan), ValueError, "^c2 must be finite, got nan"),
-        ((1j, 1.0, 1j), TypeError, "^c2 must be real, got complex values"),
+        ((1j, 1.0, 1j), TypeError, "^c2 must hold real numbers, got dtype complex"),
         ((1j, True, 1.0), TypeError, "^c1 must hold real numbers, got dtype bool$"),
         (
             (np.ones(3), [1.0, 2.0], 1.0),
             ValueError,
-            r"^s, c1 and c2 must broadcast together, got shapes \(3,\), \(2,\) and \(\)$",
+            r"^s and c1 and c2 must broadcast together, got shapes \(3,\) and \(2,\) and \(\)$",
         ),
     ],
 )

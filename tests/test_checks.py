@@ -1,6 +1,6 @@
 import re
-from decimal import Decimal
-from fractions import Fraction
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,6 +8,7 @@ import pytest
 from armlock import (
     CharacteristicFunction,
     CommonArm,
+    Controller,
     HayesEquation,
     SingleArm,
     d_curve,
@@ -25,6 +26,7 @@ from armlock.checks import (
     check_memory,
     complex_array,
     even_axis,
+    finite_series,
     positive_number,
     real_array,
     real_number,
@@ -32,227 +34,64 @@ from armlock.checks import (
     whole_number,
 )
 
-CONSTRUCTORS = {
-    "gain": lambda value: CommonArm(gain=value),
-    "tau1": lambda value: CommonArm(tau1=value),
-    "tau2": lambda value: CommonArm(tau2=value),
-    "tau": lambda value: HayesEquation(tau=value),
-    "gain of a single arm": lambda value: SingleArm(gain=value),
-    "tau of a single arm": lambda value: SingleArm(tau=value),
-    "step": lambda value: spectral_radius(CommonArm(), 1.0, 1.0, value),
-    "step of a map": lambda value: semi_discretization(CommonArm(), value),
-    "omega_max": lambda value: d_curve_branches(CommonArm(), value),
-}
-
-NOT_REAL = [True, np.True_, "1", b"1", None, [1.0], np.array([1.0, 2.0])]
-
-
-@pytest.mark.parametrize("name", CONSTRUCTORS)
-@pytest.mark.parametrize("value", [0.0, -1.0, -1e-300])
-def test_what_must_be_positive_is_named_with_its_value(name, value):
-    message = f"^{name.split()[0]} must be positive, got {value}$"
-    with pytest.raises(ValueError, match=message):
-        CONSTRUCTORS[name](value)
+# What is wrong with a number and with an array: the value, the error, and what it says after
+# the argument's name.
+NUMBERS: list[tuple[Any, type[Exception], str]] = [
+    (True, TypeError, "must be a real number, got True"),
+    ("1", TypeError, "must be a real number, got '1'"),
+    (None, TypeError, "must be a real number, got None"),
+    ([1.0], TypeError, "must be a real number, got [1.0]"),
+    (1 + 0j, TypeError, "must be a real number, got (1+0j)"),
+    ([[1.0], [1.0, 2.0]], ValueError, "must be a rectangular array, got [[1.0], [1.0, 2.0]]"),
+    (np.inf, ValueError, "must be finite, got inf"),
+]
+ARRAYS: list[tuple[Any, type[Exception], str]] = [
+    ([True, False], TypeError, "must hold real numbers, got dtype bool"),
+    (["1.0"], TypeError, "must hold real numbers, got dtype <U3"),
+    ([None, 1.0], TypeError, "must hold real numbers, got dtype object"),
+    ([0.5, 1j], TypeError, "must hold real numbers, got dtype complex128"),
+    ([[1.0], [1.0, 2.0]], ValueError, "must be a rectangular array, got [[1.0], [1.0, 2.0]]"),
+    ([0.0, np.nan, 1.0], ValueError, "must be finite, got nan at index 1"),
+]
 
 
-@pytest.mark.parametrize("name", CONSTRUCTORS)
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-def test_what_must_be_finite_is_named_with_its_value(name, value):
-    with pytest.raises(ValueError, match=f"^{name.split()[0]} must be finite, got {value}$"):
-        CONSTRUCTORS[name](value)
+def exactly(name, message):
+    return f"^{re.escape(f'{name} {message}')}$"
 
 
-@pytest.mark.parametrize("name", CONSTRUCTORS)
-@pytest.mark.parametrize("value", NOT_REAL, ids=repr)
-def test_what_must_be_a_number_is_named_with_its_value(name, value):
-    message = f"^{name.split()[0]} must be a real number, got {re.escape(repr(value))}$"
-    with pytest.raises(TypeError, match=message):
-        CONSTRUCTORS[name](value)
+@pytest.mark.parametrize(("value", "error", "message"), NUMBERS)
+def test_what_is_no_number_is_refused_by_name(value, error, message):
+    for check in (real_number, positive_number):
+        with pytest.raises(error, match=exactly("x", message)):
+            check("x", value)
 
 
-@pytest.mark.parametrize("name", CONSTRUCTORS)
-def test_a_complex_number_is_refused_even_with_imaginary_part_zero(name):
-    message = rf"^{name.split()[0]} must be real, got the complex value \(1\+0j\)$"
-    with pytest.raises(TypeError, match=message):
-        CONSTRUCTORS[name](1.0 + 0.0j)
+@pytest.mark.parametrize(("value", "error", "message"), ARRAYS)
+def test_what_is_no_array_of_numbers_is_refused_by_name(value, error, message):
+    for check in (real_array, axis, finite_series):
+        with pytest.raises(error, match=exactly("x", message)):
+            check("x", value)
+    if 1j not in value:
+        with pytest.raises(error, match=exactly("x", message.replace("real ", ""))):
+            complex_array("x", value)
 
 
-EVALUATIONS = {
-    "c1 of unstable_roots": lambda value: unstable_roots(CommonArm(), value, 1.0),
-    "c2 of unstable_roots": lambda value: unstable_roots(CommonArm(), 1.0, value),
-    "c1 of rightmost_root": lambda value: rightmost_root(CommonArm(), value, 1.0),
-    "c2 of rightmost_root": lambda value: rightmost_root(CommonArm(), 1.0, value),
-    "c1 of spectral_radius": lambda value: spectral_radius(CommonArm(), value, 1.0, 0.1),
-    "c2 of spectral_radius": lambda value: spectral_radius(CommonArm(), 1.0, value, 0.1),
-    "c1 of stability_chart": lambda value: stability_chart(CommonArm(), value, [1.0]),
-    "c2 of stability_chart": lambda value: stability_chart(CommonArm(), [1.0], value),
-    "a of unstable_roots": lambda value: unstable_roots(HayesEquation(), value, 1.0),
-    "omega of d_curve": lambda value: d_curve(CommonArm(), value),
-}
-
-
-@pytest.mark.parametrize("name", EVALUATIONS)
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_arrays_must_be_finite(name, bad):
-    message = f"^{name.split()[0]} must be finite, got {bad} among its 3 values$"
-    with pytest.raises(ValueError, match=message):
-        EVALUATIONS[name]([0.0, bad, 1.0])
-
-
-@pytest.mark.parametrize("name", EVALUATIONS)
-def test_arrays_must_be_real(name):
-    message = rf"^{name.split()[0]} must be real, got complex values \(dtype complex128\)$"
-    with pytest.raises(TypeError, match=message):
-        EVALUATIONS[name]([0.5 + 0j, 1j])
-
-
-@pytest.mark.parametrize("name", EVALUATIONS)
-@pytest.mark.parametrize(
-    ("value", "dtype"),
-    [([True, False], "bool"), (["1.0"], "<U3"), (None, "object"), ([None, 1.0], "object")],
-)
-def test_arrays_must_hold_numbers(name, value, dtype):
-    message = f"^{name.split()[0]} must hold real numbers, got dtype {dtype}$"
-    with pytest.raises(TypeError, match=message):
-        EVALUATIONS[name](value)
-
-
-@pytest.mark.parametrize("name", EVALUATIONS)
-def test_ragged_lists_are_refused_by_name(name):
-    with pytest.raises(ValueError, match=f"^{name.split()[0]} must be a rectangular array"):
-        EVALUATIONS[name]([[1.0], [1.0, 2.0]])
-
-
-@pytest.mark.parametrize("function", [unstable_roots, rightmost_root])
-def test_shapes_that_do_not_broadcast_are_both_named(function):
-    message = r"^c1 and c2 must broadcast together, got shapes \(2,\) and \(3,\)$"
-    with pytest.raises(ValueError, match=message):
-        function(CommonArm(), [1.0, 2.0], [1.0, 2.0, 3.0])
-    with pytest.raises(ValueError, match=r"^a and b must broadcast together"):
-        function(HayesEquation(), np.zeros((2, 2)), np.zeros(3))
-
-
-def test_shapes_that_do_not_broadcast_are_named_by_spectral_radius():
-    message = r"^c1 and c2 must broadcast together, got shapes \(2,\) and \(3,\)$"
-    with pytest.raises(ValueError, match=message):
-        spectral_radius(CommonArm(), [1.0, 2.0], [1.0, 2.0, 3.0], 0.1)
-
-
-@pytest.mark.parametrize("empty", [[], np.empty(0), ()])
-def test_an_empty_grid_is_refused(empty):
-    with pytest.raises(ValueError, match=r"^c1 must hold at least one value, got an empty"):
-        stability_chart(CommonArm(), empty, [1.0])
-    with pytest.raises(ValueError, match=r"^c2 must hold at least one value, got an empty"):
-        stability_chart(CommonArm(), [1.0], empty)
-
-
-def test_axes_of_a_chart_must_be_one_dimensional():
-    with pytest.raises(ValueError, match=r"^c1 must be one-dimensional, got shape \(2, 2\)$"):
-        stability_chart(CommonArm(), np.eye(2), [1.0])
-    with pytest.raises(ValueError, match=r"^c2 must be one-dimensional, got shape \(\)$"):
-        stability_chart(CommonArm(), [1.0], 1.0)
-
-
-def test_equal_delays_are_refused_where_the_theory_needs_a_difference():
-    arms = CommonArm(tau1=20.0, tau2=20.0)
-    for function in (d_curve, d_curve_branches):
-        with pytest.raises(ValueError, match=r"^delay1 and delay2 must differ, got 20\.0"):
-            function(arms, 1.0)
-
-
-def test_a_parameter_without_effect_leaves_no_d_curve():
-    with pytest.raises(ValueError, match=r"SingleArm\(.*\) does not depend on c2"):
-        d_curve(SingleArm(), 1.0)
-
-
-@pytest.mark.parametrize("function", [spectral_radius, transition_matrix])
-def test_a_step_must_divide_both_delays(function):
-    message = r"^step must divide every delay, got step=0\.2 for delay1=20\.1 \(100\.5 steps\)$"
-    with pytest.raises(ValueError, match=message):
-        function(CommonArm(), 1.0, 1.0, 0.2)
-    with pytest.raises(ValueError, match=r"got step=30\.0 for delay1=20\.1"):
-        function(CommonArm(), 1.0, 1.0, 30.0)
-    with pytest.raises(ValueError, match=r"got step=0\.1 for delay2=19\.95"):
-        function(CommonArm(tau2=19.95), 1.0, 1.0, 0.1)
-
-
-@pytest.mark.parametrize("order", [2, -1, 0.5, "0", None, True, [0, 1]])
-def test_the_order_must_be_zero_or_one(order):
-    message = f"^order must be 0 or 1, got {re.escape(repr(order))}$"
-    for function in (spectral_radius, transition_matrix):
-        with pytest.raises(ValueError, match=message):
-            function(CommonArm(), 1.0, 1.0, 0.1, order)
-    with pytest.raises(ValueError, match=message):
-        semi_discretization(CommonArm(), 0.1, order)
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_a_transition_matrix_needs_finite_parameters(value):
-    with pytest.raises(ValueError, match=f"^c1 must be finite, got {value}$"):
-        transition_matrix(CommonArm(), value, 1.0, 0.1)
-    with pytest.raises(ValueError, match=f"^c2 must be finite, got {value}$"):
-        transition_matrix(CommonArm(), 1.0, value, 0.1)
-
-
-@pytest.mark.parametrize("value", ["1", None, True, [1.0]])
-def test_a_transition_matrix_needs_single_numbers(value):
-    with pytest.raises(TypeError, match=r"^c2 must be a real number, got "):
-        transition_matrix(CommonArm(), 1.0, value, 0.1)
-
-
-def test_semi_discretization_is_for_retarded_loops_in_continuous_time():
-    neutral = CharacteristicFunction([1.0, 1.0], [0.0, 0.3], [0.1], 1.0, 2.0)
-    with pytest.raises(ValueError, match=r"^system must be of retarded type"):
-        spectral_radius(neutral, 0.1, 0.1, 0.1)
-    sampled = semi_discretization(CommonArm(), 0.1)
-    message = r"^system must be in continuous time, got a map with step 0\.1$"
-    with pytest.raises(ValueError, match=message):
-        spectral_radius(sampled, 0.1, 0.1, 0.1)
-    with pytest.raises(ValueError, match=message):
-        rightmost_root(sampled, 0.1, 0.1)
-
-
-def test_a_map_needs_both_parameters_before_a_delay():
-    with pytest.raises(ValueError, match=r"^the free parameter a of HayesEquation\(tau=1\.0\)"):
-        semi_discretization(HayesEquation(), 0.1)
-
-
-def test_the_checks_return_plain_floats():
-    assert real_number("x", np.float32(0.5)) == 0.5
+def test_the_checks_return_floats_in_arrays_of_their_own():
+    given = np.array([1.0, 2.0])
+    for check in (real_array, axis):
+        check("x", given)[0] = 7.0
+    assert given[0] == 1.0
+    assert finite_series("x", given) is given
     assert type(real_number("x", np.int64(3))) is float
     assert type(positive_number("x", np.array(2))) is float
-    assert real_array("x", [1, 2]).dtype == np.float64
     assert axis("x", range(3)).tolist() == [0.0, 1.0, 2.0]
+    assert complex_array("x", 1)[()] == 1 + 0j
+    assert finite_series("x", []).size == 0
 
 
-def test_broadcasting_gives_one_shape():
-    first, second = broadcast_pair("x", [[1], [2]], "y", [1, 2, 3])
-    assert first.shape == second.shape == (2, 3)
-
-
-def test_a_number_too_large_for_a_float_is_refused_by_name():
-    with pytest.raises((TypeError, ValueError), match=r"^gain must be"):
-        CommonArm(gain=10**400)
-    with pytest.raises((TypeError, ValueError), match=r"^c1 must"):
-        unstable_roots(CommonArm(), 10**400, 1.0)
-
-
-def test_durations_and_masked_arrays_are_not_numbers():
-    with pytest.raises(TypeError, match=r"^x must hold real numbers, got dtype timedelta64"):
-        real_array("x", np.array([1, 2], dtype="m8[s]"))
-    with pytest.raises(TypeError, match=r"^x must be a real number, got np.timedelta64"):
-        real_number("x", np.timedelta64(3, "s"))
-    masked = np.ma.masked_array([1.0, 2.0], mask=[True, False])
-    for check in (real_array, real_number, axis):
-        with pytest.raises(
-            TypeError, match=r"^x must be an ordinary array, got a masked array$"
-        ):
-            check("x", masked)
-
-
-@pytest.mark.parametrize("value", [True, 1.0, 0, 6, "3", None, np.timedelta64(3, "s")])
+@pytest.mark.parametrize("value", [True, 1.0, 0, 6, "3", None])
 def test_whole_numbers_are_python_or_numpy_integers(value):
-    message = rf"^n must be an integer from 1 to 5, got {re.escape(repr(value))}$"
+    message = exactly("n", f"must be an integer from 1 to 5, got {value!r}")
     with pytest.raises(ValueError, match=message):
         whole_number("n", value, 1, 5)
     assert type(whole_number("n", np.uint8(3), 1)) is int
@@ -260,13 +99,17 @@ def test_whole_numbers_are_python_or_numpy_integers(value):
         whole_number("n", 0, 1)
 
 
-@pytest.mark.parametrize("value", ["no", 1, None, np.array([True])])
-def test_a_switch_is_true_or_false(value):
-    with pytest.raises(
-        TypeError, match=rf"^x must be True or False, got {re.escape(repr(value))}$"
-    ):
-        true_or_false("x", value)
+def test_a_word_is_not_taken_for_true():
+    with pytest.raises(TypeError, match=r"^x must be True or False, got 'no'$"):
+        true_or_false("x", "no")
     assert true_or_false("x", np.True_) is True
+
+
+def test_an_axis_has_one_dimension_and_values():
+    with pytest.raises(ValueError, match=r"^x must be one-dimensional, got shape \(2, 2\)$"):
+        axis("x", np.eye(2))
+    with pytest.raises(ValueError, match=r"^x must hold at least one value, got 0$"):
+        axis("x", [])
 
 
 def test_an_even_axis_ascends_in_equal_steps():
@@ -279,73 +122,60 @@ def test_an_even_axis_ascends_in_equal_steps():
         even_axis("x", [1.0])
 
 
-@pytest.mark.parametrize("value", [Fraction(1, 2), Decimal("0.5"), np.float32(0.5)])
-def test_exact_numbers_are_numbers(value):
-    assert real_number("x", value) == 0.5
-    assert real_array("x", [value, 1]).tolist() == [0.5, 1.0]
-    assert complex_array("x", value)[()] == 0.5
-    assert CommonArm(gain=value).gain == 0.5
-
-
-def test_an_integer_of_any_length_is_a_number():
-    assert real_number("x", 10**30) == 1e30
-    assert real_array("x", [10**30, 1]).tolist() == [1e30, 1.0]
-    with pytest.raises(ValueError, match=r"^x must be finite and within the range of a float"):
-        real_number("x", 10**400)
-    with pytest.raises(ValueError, match=r"^x must be finite, got inf$"):
-        real_number("x", np.longdouble("1e400"))
-    with pytest.raises(ValueError, match=r"^x must be finite, got nan$"):
-        real_number("x", Decimal("nan"))
-
-
-@pytest.mark.parametrize("value", [[True, 1.0], [1.0, np.False_], [[1.0], [True]], (2, True)])
-def test_true_and_false_do_not_hide_among_numbers(value):
-    for check in (real_array, complex_array):
-        with pytest.raises(TypeError, match=r"^x must hold numbers, got True or False among"):
-            check("x", value)
-
-
-def test_masked_arrays_are_refused_wherever_an_array_enters():
-    masked = np.ma.masked_array([0.9, 99.0], mask=[False, True])
-    for name, function in EVALUATIONS.items():
-        with pytest.raises(TypeError, match=f"^{name.split()[0]} must be an ordinary array"):
-            function(masked)
-    with pytest.raises(TypeError, match=r"^s must be an ordinary array"):
-        CommonArm()(masked, 1.0, 1.0)
-
-
-@pytest.mark.parametrize(
-    ("value", "error", "message"),
-    [
-        ("1", TypeError, "^s must hold numbers, got dtype <U1$"),
-        (None, TypeError, "^s must hold numbers, got dtype object$"),
-        (True, TypeError, "^s must hold numbers, got dtype bool$"),
-        (
-            np.timedelta64(3, "s"),
-            TypeError,
-            r"^s must hold numbers, got dtype timedelta64\[s\]$",
-        ),
-        (np.datetime64("2020"), TypeError, r"^s must hold numbers, got dtype datetime64\[Y\]$"),
-        ([1.0, complex("nan")], ValueError, r"^s must be finite, got \(nan\+0j\) among its 2"),
-        ([[1.0], [1.0, 2.0]], ValueError, "^s must be a rectangular array"),
-    ],
-)
-def test_complex_arrays_hold_finite_numbers(value, error, message):
-    with pytest.raises(error, match=message):
-        complex_array("s", value)
-
-
-def test_dates_are_not_numbers():
-    for check in (real_number, real_array):
-        with pytest.raises(
-            TypeError, match=r"^x must (be a real number|hold real numbers), got"
-        ):
-            check("x", np.datetime64("2020-01-01"))
+def test_arrays_broadcast_to_one_shape_or_are_refused():
+    first, second = broadcast_pair("x", [[1], [2]], "y", [1, 2, 3])
+    assert first.shape == second.shape == (2, 3)
+    with pytest.raises(
+        ValueError, match=r"^x and y must broadcast together, got shapes \(2,\) and \(3,\)$"
+    ):
+        broadcast_pair("x", [1.0, 2.0], "y", [1.0, 2.0, 3.0])
 
 
 def test_what_memory_does_not_hold_is_refused():
     check_memory("x", (1000, 1000), 8)
-    with pytest.raises(
-        ValueError, match=r"^x must be of a size that memory holds, got 10000000 x"
-    ):
+    message = r"^x must be of a size that memory holds, got 10000000 x 10000000 points: about "
+    with pytest.raises(ValueError, match=message):
         check_memory("x", (10_000_000, 10_000_000), 8)
+
+
+ARMS = CommonArm()
+NEUTRAL = CharacteristicFunction([1.0, 1.0], [0.0, 0.3], [0.1], 1.0, 2.0)
+# Each argument of the package's functions is checked under its own name.
+REFUSED: list[tuple[Callable[..., object], tuple[Any, ...], str]] = [
+    (CommonArm, (0.0,), "gain must be positive, got 0.0"),
+    (CommonArm, (1.0, -1.0), "tau1 must be positive, got -1.0"),
+    (CommonArm, (1.0, 1.0, "1"), "tau2 must be a real number, got '1'"),
+    (HayesEquation, (np.nan,), "tau must be finite, got nan"),
+    (SingleArm, (-1.0,), "gain must be positive, got -1.0"),
+    (SingleArm, (1.0, 0.0), "tau must be positive, got 0.0"),
+    (Controller, ((), (0.0,), "1"), "gain must be a real number, got '1'"),
+    (ARMS, ("j", 1.0, 1.0), "s must hold numbers, got dtype <U1"),
+    (unstable_roots, (ARMS, np.nan, 1), "c1 must be finite, got nan"),
+    (unstable_roots, (ARMS, 1, None), "c2 must hold real numbers, got dtype object"),
+    (unstable_roots, (HayesEquation(), 1j, 1), "a must hold real numbers, got dtype complex"),
+    (unstable_roots, (ARMS, [1, 2], [1, 2, 3]), "c1 and c2 must broadcast together"),
+    (rightmost_root, (ARMS, np.inf, 1), "c1 must be finite, got inf"),
+    (rightmost_root, (ARMS, 1, True), "c2 must hold real numbers, got dtype bool"),
+    (rightmost_root, (ARMS, [1, 2], [1, 2, 3]), "c1 and c2 must broadcast together"),
+    (stability_chart, (ARMS, [], [1]), "c1 must hold at least one value, got 0"),
+    (stability_chart, (ARMS, [1], 1), "c2 must be one-dimensional, got shape ()"),
+    (d_curve, (ARMS, ["1"]), "omega must hold real numbers, got dtype <U1"),
+    (d_curve, (SingleArm(), 1), "system must depend on both free parameters"),
+    (d_curve, (CommonArm(1, 20, 20), 1), "delay1 and delay2 must differ, got 20.0"),
+    (d_curve_branches, (ARMS, 0), "omega_max must be positive, got 0.0"),
+    (spectral_radius, (ARMS, 1, [1, np.nan], 0.1), "c2 must be finite, got nan at index 1"),
+    (spectral_radius, (ARMS, [1, 2], [1, 2, 3], 0.1), "c1 and c2 must broadcast together"),
+    (spectral_radius, (ARMS, 1, 1, 0.2), "step must divide every delay, got step=0.2"),
+    (spectral_radius, (ARMS, 1, 1, 0.1, 2), "order must be 0 or 1, got 2"),
+    (spectral_radius, (NEUTRAL, 0, 0, 0.1), "system must be of retarded type"),
+    (transition_matrix, (ARMS, 1, [1], 0.1), "c2 must be a real number, got [1]"),
+    (transition_matrix, (ARMS, 1, 1, 30), "step must divide every delay"),
+    (semi_discretization, (ARMS, 0), "step must be positive, got 0.0"),
+    (semi_discretization, (ARMS, 0.1, True), "order must be 0 or 1, got True"),
+]
+
+
+@pytest.mark.parametrize(("call", "arguments", "message"), REFUSED)
+def test_an_argument_is_refused_by_its_name(call, arguments, message):
+    with pytest.raises((TypeError, ValueError), match=f"^{re.escape(message)}"):
+        call(*arguments)

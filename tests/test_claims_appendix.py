@@ -1,4 +1,4 @@
-"""Verdicts and deciding numbers of the claims of the appendix, and what they stand on."""
+"""What the claims of the appendix stand on, by other methods."""
 
 from __future__ import annotations
 
@@ -8,49 +8,22 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from armlock import LaserNoise, PerturbationNoise
-from book.companion import claims
-from book.companion.claims import Verdict, appendix
-
-EXPECTED = {
-    "A1": (Verdict.REPRODUCED, 1.999996e-6, 1e-12),
-    "A2": (Verdict.DIFFERS, 0.39334, 1e-4),
-    "A3": (Verdict.DIFFERS, 14579.3, 0.1),
-    "A4": (Verdict.IN_PART, 0.0, 0.05),
-    "A5": (Verdict.REPRODUCED, 0.0, 0.03),
-}
+from armlock import PerturbationNoise
+from book.companion.claims import appendix
 
 
-@pytest.mark.parametrize("identifier", EXPECTED)
-def test_verdict_and_number(identifier):
-    finding = claims.check(identifier)[identifier]
-    verdict, value, tolerance = EXPECTED[identifier]
-    assert finding.verdict is verdict
-    assert abs(finding.value - value) <= tolerance
-    assert finding.note
-    assert finding.quantity
-
-
-def test_phase_error_is_that_of_the_arctangent():
+@pytest.mark.parametrize("phase", [-1.5, -0.1, 0.3, 1.2, 7.0, 20.0])
+def test_phase_error_is_that_of_the_arctangent(phase):
     mismatch = (0.02, -0.05)
-    phase = np.linspace(-1.5, 1.5, 101)
-    ratio = (1.0 + mismatch[1]) * np.sin(phase) / ((1.0 + mismatch[0]) * np.cos(phase))
-    assert appendix.measured_phase(phase, mismatch) == pytest.approx(
-        np.arctan(ratio), abs=1e-15
-    )
-    wide = np.linspace(-20.0, 20.0, 999)
-    turned = appendix.measured_phase(wide, mismatch)
-    assert np.tan(turned) == pytest.approx(
-        (1.0 + mismatch[1]) / (1.0 + mismatch[0]) * np.tan(wide), rel=1e-9
-    )
-    assert np.abs(turned - wide).max() < 0.5 * np.pi
+    measured = phase + float(appendix.phase_error(phase, mismatch))
+    assert np.tan(measured) == pytest.approx((0.95 / 1.02) * np.tan(phase), rel=1e-9)
+    assert abs(measured - phase) < 0.5 * np.pi
 
 
 def test_error_to_first_order():
     phase = np.linspace(0.0, 10.0, 500)
-    eta = appendix.MISMATCH[1] - appendix.MISMATCH[0]
-    first = 0.5 * eta * np.sin(2.0 * phase)
-    assert appendix.phase_error(phase) == pytest.approx(first, abs=10.0 * eta**2)
+    first = 0.5 * appendix.ETA * np.sin(2.0 * phase)
+    assert appendix.phase_error(phase) == pytest.approx(first, abs=10.0 * appendix.ETA**2)
 
 
 def test_slope_at_zero_is_the_limit_of_the_error():
@@ -71,7 +44,7 @@ def test_the_error_vanishes_on_average():
 
 
 def test_phase_of_the_laser_is_the_integral_of_its_frequency():
-    """By integration of the density on a logarithmic axis, and from a series."""
+    """By integration of the density on a logarithmic axis."""
 
     def density(log_frequency):
         f = np.exp(log_frequency)
@@ -80,20 +53,6 @@ def test_phase_of_the_laser_is_the_integral_of_its_frequency():
 
     power = quad(density, np.log(5e-6), np.log(100.0), epsabs=0.0, epsrel=1e-11, limit=400)[0]
     assert appendix.laser_phase_rms() == pytest.approx(np.sqrt(power), rel=1e-9)
-    assert appendix.laser_phase_rms() == pytest.approx(1.54919e9, rel=1e-5)
-    # A series of frequency, summed to a phase in rad: its density at one frequency.
-    rate, samples = 16.0, 1 << 16
-    window = np.hanning(samples)
-    power = 0.0
-    for seed in range(40):
-        phase = 2.0 * np.pi * np.cumsum(LaserNoise(seed, rate).draw(samples)) / rate
-        # Differences of two second sums leave no slow drift to leak.
-        second = phase[2:] - 2.0 * phase[1:-1] + phase[:-2]
-        power += np.abs(np.fft.rfft(second * window[1:-1]))[4096] ** 2 / 40
-    f = 4096 * rate / (samples - 2)
-    gain = (2.0 * np.sin(np.pi * f / rate)) ** 2
-    asd = np.sqrt(2.0 * power / (rate * (window**2).sum())) / gain
-    assert asd == pytest.approx(30.0 / f**2, rel=0.2)
 
 
 @pytest.mark.parametrize("frequency", [0.0, 1e-4, 1e-2, 0.1, 0.3, 1.0])

@@ -6,16 +6,19 @@ from armlock.stability import last_frequency
 from tests import independent
 from tests.systems import NEUTRAL, RETARDED
 
-EPSILON = 2.0**-52
-
 
 def walk(coefficients, phases, omega_end):
-    coefficients = np.array(coefficients, dtype=complex)
-    phases = np.array(phases, dtype=float)
-    noise = np.zeros(coefficients.shape[1] + 1)
-    noise[0] = 8.0 * EPSILON * np.abs(coefficients).sum()
-    sums = coefficients.sum(axis=0)
-    return contour.winding(coefficients, sums, phases, noise, omega_end)
+    """Wind a sum of polynomials in omega, one a row, times exponentials."""
+    whole = np.array(coefficients, dtype=complex)
+    nothing = np.zeros(0, dtype=complex), np.zeros(1, dtype=np.int64), np.zeros(0)
+    return contour.winding(
+        (whole, *nothing),
+        np.eye(len(whole)),
+        np.ones(len(whole)),
+        np.array(phases, dtype=float),
+        np.zeros(len(whole)),
+        omega_end,
+    )
 
 
 def test_a_single_exponential_winds_at_its_rate():

@@ -77,7 +77,7 @@ def test_a_numerator_of_python_control_may_start_with_zeros():
             TypeError,
             "got TransferFunctionCon",
         ),
-        (((np.inf,), (0.0,), 1.0), ValueError, r"zeros must be finite, got \(inf"),
+        (((np.inf,), (0.0,), 1.0), ValueError, "zeros must be finite, got inf at index 0"),
     ],
 )
 def test_what_is_no_controller_is_refused(given, error, message):

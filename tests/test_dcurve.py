@@ -215,19 +215,19 @@ def exact_curve(system, omega):
 )
 def test_the_curve_is_right_at_every_frequency(system):
     rng = np.random.default_rng(5)
-    for omega in 10.0 ** rng.uniform(-9.0, 25.0, 80):
+    for omega in 10.0 ** rng.uniform(-9.0, 7.0, 80):
         x, y = d_curve(system, omega)
         exact_x, exact_y, sine = exact_curve(system, omega)
         # The coefficients' own rounding is magnified next to a pole, beyond low frequencies.
-        allowed = 1e-11 if omega < 1e-2 else 1e-13 / sine
+        turns = 1.0 + omega * system.longest_delay
+        allowed = 1e-11 if omega < 1e-2 else 1e-12 * turns / sine
         assert x == pytest.approx(exact_x, rel=allowed, abs=allowed)
         assert y == pytest.approx(exact_y, rel=allowed, abs=allowed)
 
 
-@pytest.mark.parametrize(("system", "omega"), [(paper_loop(), 1e200), (paper_loop(), 1e-280)])
-def test_a_curve_beyond_the_floats_is_refused(system, omega):
-    with pytest.raises(ValueError, match=r"^omega must be of a size for which the curve is"):
-        d_curve(system, [1.0, omega])
+def test_a_phase_that_doubles_do_not_hold_is_refused():
+    with pytest.raises(ValueError, match=r"^omega must be at most 4.98e\+07 rad/s"):
+        d_curve(paper_loop(), [1.0, 1e8])
 
 
 @pytest.mark.parametrize("wrong", ["x", None, CommonArm, 3.0])

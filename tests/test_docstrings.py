@@ -1,3 +1,4 @@
+import ast
 import doctest
 import importlib
 import inspect
@@ -9,6 +10,7 @@ import pytest
 
 import armlock
 
+ROOT = Path(__file__).parents[1]
 MODULES = [
     "armlock",
     *sorted(m.name for m in pkgutil.walk_packages(armlock.__path__, "armlock.")),
@@ -44,8 +46,21 @@ def test_every_public_name_has_an_example(name):
         assert name in section
 
 
+PAGES = "\n".join(p.read_text() for p in sorted((ROOT / "book" / "api").glob("*.md")))
+
+
 def test_every_public_name_is_on_a_page_of_the_reference():
-    pages = (Path(__file__).parents[1] / "book" / "api").glob("*.md")
-    named = " ".join(re.findall(r"public:: (.*)", "\n".join(p.read_text() for p in pages)))
+    named = " ".join(re.findall(r"public:: (.*)", PAGES))
     homes = {getattr(armlock, name).__module__ for name in PUBLIC}
     assert homes - set(named.split()) == set()
+
+
+@pytest.mark.parametrize("name", re.findall(r"public:: (armlock\.\w+)\n +:all:", PAGES))
+def test_a_constant_of_the_reference_has_a_comment_of_its_own(name):
+    """Without `#:` in the line above, a sensor would be left out of the page."""
+    source = inspect.getsource(importlib.import_module(name))
+    lines = source.splitlines()
+    for node in ast.parse(source).body:
+        if isinstance(node, ast.Assign | ast.AnnAssign):
+            public = re.match(r"[A-Za-z]", lines[node.lineno - 1])
+            assert not public or lines[node.lineno - 2].startswith("#:"), lines[node.lineno - 1]

@@ -347,7 +347,7 @@ def test_a_direction_that_does_nothing_never_breaks_the_loop():
         ((1.0,), ValueError, "direction must hold two numbers, got 1"),
         ((1.0, 2.0, 3.0), ValueError, "direction must hold two numbers, got 3"),
         ((np.nan, 1.0), ValueError, "direction must be finite"),
-        ((1j, 1.0), TypeError, "direction must be real"),
+        ((1j, 1.0), TypeError, "direction must hold real numbers"),
         ("up", TypeError, "direction must hold real numbers"),
     ],
 )

@@ -24,14 +24,19 @@ SOURCES: dict[str, Any] = {
 }
 
 
-@pytest.mark.parametrize("name", SOURCES)
-def test_blocks_do_not_matter(name):
-    whole = SOURCES[name](7).draw(2000)
-    source = SOURCES[name](7)
-    parts = np.concatenate([source.draw(n) for n in (1, 0, 700, 1299)])
-    assert np.array_equal(whole, parts)
-    assert np.array_equal(whole, np.concatenate(list(SOURCES[name](7).blocks(2000, 333))))
-    assert not np.array_equal(whole, SOURCES[name](8).draw(2000))
+@given(
+    st.sampled_from(sorted(SOURCES)),
+    st.lists(st.sampled_from([0, 1, 2, 3, 11, 24, 25, 100]), max_size=10),
+)
+def test_any_partition_gives_the_same_bits(name, sizes):
+    whole = SOURCES[name](3).draw(np.int64(sum(sizes)))
+    source = SOURCES[name](3)
+    parts = [source.draw(size) for size in sizes]
+    assert [part.size for part in parts] == sizes
+    assert np.array_equal(np.concatenate([np.empty(0), *parts]), whole)
+    blocks = list(SOURCES[name](3).blocks(whole.size, 33))
+    assert np.array_equal(np.concatenate([np.empty(0), *blocks]), whole)
+    assert not whole.size or not np.array_equal(whole, SOURCES[name](8).draw(whole.size))
 
 
 @pytest.mark.parametrize("name", ["laser", "perturbation"])
@@ -50,40 +55,39 @@ def test_density_is_the_prescribed_one(name):
     # At high frequency the error is below a part in a thousand, which settles the formula.
     fast = found.frequency > 30.0
     assert np.abs(ratio[fast] - 1.0).max() < 0.004
-    # And against the formula as printed, below the last tenth of the band.
+    # And against the formula as printed, where the docstring promises it.
     ratio = (found.asd / found.expected(source.asd)) ** 2
     pull = (ratio - 1.0) * np.sqrt(0.5 * found.degrees)
-    assert np.abs(pull)[found.frequency < 80.0].max() < 4.5
+    assert np.abs(pull)[found.frequency < 20.0].max() < 4.5
 
 
-def test_sampled_density_follows_the_formula():
-    frequency = np.concatenate((np.geomspace(1e-7, 1.0, 300), np.linspace(1.0, 95.0, 3000)))
-    largest = LaserNoise(1, cutoff=2.0)
-    for source, error in (
-        (LaserNoise(1), 1.3e-3), (largest, 1.3e-3), (PerturbationNoise(1), 1e-8),
-    ):  # fmt: skip
-        assert np.abs(source.sampled_asd(frequency) / source.asd(frequency) - 1.0).max() < error
+@pytest.mark.parametrize(
+    ("share", "error"), [(0.005, 1e-7), (0.1, 2e-4), (0.25, 7e-3), (0.4999, 1.6e-2)]
+)
+def test_the_laser_is_as_close_to_the_formula_as_the_docstring_says(share, error):
+    for rate in (200.0, 7.0):
+        source = LaserNoise(1, rate, cutoff=1e-6 * rate)
+        frequency = (
+            np.append(np.geomspace(1e-9, 1e-3, 50), np.linspace(1e-3, share, 500)) * rate
+        )
+        ratio = source.sampled_asd(frequency) / source.asd(frequency)
+        assert np.abs(ratio - 1.0).max() < error
 
 
-FREQUENCIES: list[tuple[Any, type[Exception], str]] = [
-    (-1.0, ValueError, r"frequency must not be negative.*, got -1\.0$"),
-    ([1.0, np.nan], ValueError, "frequency must be finite, got nan"),
-    (np.inf, ValueError, "frequency must be finite, got inf"),
-    ("a", TypeError, "frequency must hold real numbers"),
-    (1j, TypeError, "frequency must be real"),
-    (True, TypeError, "frequency must hold real numbers, got dtype bool"),
-    (None, TypeError, "frequency must hold real numbers, got dtype object"),
-    (np.ma.masked_array([1.0], [True]), TypeError, "frequency must be an ordinary array"),
-]
+def test_the_perturbations_follow_the_formula_up_to_the_end():
+    frequency = np.geomspace(1e-7, 95.0, 300)
+    source = PerturbationNoise(1)
+    assert source.sampled_asd(frequency) == pytest.approx(source.asd(frequency), rel=1e-8)
 
 
-@pytest.mark.parametrize("name", SOURCES)
-@pytest.mark.parametrize(("frequency", "error", "message"), FREQUENCIES)
-def test_densities_are_for_frequencies_that_make_sense(name, frequency, error, message):
+@pytest.mark.parametrize("name", ["laser", "perturbation"])
+def test_densities_are_for_frequencies_that_make_sense(name):
     source = SOURCES[name](1, sample_rate=10.0)
     for density in (source.asd, source.sampled_asd):
-        with pytest.raises(error, match=message):
-            density(frequency)
+        with pytest.raises(ValueError, match=r"frequency must not be negative.*, got -1\.0$"):
+            density(-1.0)
+        with pytest.raises(ValueError, match="frequency must be finite, got nan"):
+            density([1.0, np.nan])
 
 
 @pytest.mark.parametrize("name", SOURCES)
@@ -101,40 +105,49 @@ def test_sampled_densities_end_at_half_the_rate(name):
     assert ends[4] == pytest.approx(ends[3], rel=1e-12, abs=1e-12 * scale)
 
 
-@pytest.mark.parametrize("pole", [1.0, 0.0, 1e-12])
-@pytest.mark.parametrize("at_rest", [False, True])
-def test_unstable_filters_have_no_density(pole, at_rest):
-    message = r"poles must lie in the left half-plane, got "
-    with pytest.raises(ValueError, match=message):
-        ShapedNoise([], [-1.0, pole], 1.0, seed=1, at_rest=at_rest)
-    with pytest.raises(ValueError, match=message):
-        ShapedNoise([], [0.0 + 1j, -1j], 1.0, seed=1, at_rest=at_rest)
+@pytest.mark.parametrize("poles", [[-1.0, 1.0], [-1.0, 0.0], [1j, -1j]])
+def test_unstable_filters_have_no_density(poles):
+    with pytest.raises(ValueError, match="poles must lie in the left half-plane, got "):
+        ShapedNoise([], poles, 1.0, seed=1, at_rest=True)
 
 
 def test_filters_that_cannot_be_drawn_are_refused():
     with pytest.raises(ValueError, match="must be proper, got more zeros than poles"):
         ShapedNoise([-1.0], [], 1.0, seed=1)
-    with pytest.raises(ValueError, match=r"gain must not be zero, got 0\.0"):
+    with pytest.raises(ValueError, match="gain must not be zero"):
         ShapedNoise([], [-1.0], 0.0, seed=1)
     with pytest.raises(ValueError, match="must leave a variance that floats can hold"):
-        PerturbationNoise(1, cutoff=1e-20)
-    with pytest.raises(ValueError, match="must leave a variance that floats can hold"):
-        ShapedNoise([], [-1.0], 1e300, seed=1)
-    assert np.isfinite(PerturbationNoise(1, cutoff=1e-20, at_rest=True).draw(10)).all()
+        PerturbationNoise(1, cutoff=1e-150)
+    assert np.isfinite(PerturbationNoise(1, cutoff=1e-150, at_rest=True).draw(10)).all()
     with pytest.raises(TypeError, match="at_rest must be True or False, got 'no'"):
         LaserNoise(1, at_rest="no")  # type: ignore[arg-type]
 
 
-@given(
-    st.sampled_from(sorted(SOURCES)),
-    st.lists(st.sampled_from([0, 1, 2, 3, 11, 24, 25, 100]), max_size=10),
+@pytest.mark.parametrize("at_rest", [False, True])
+@pytest.mark.parametrize("near", [0.0, 1e-15, 1e-7])
+def test_a_pole_and_a_zero_may_cancel(near, at_rest):
+    """What is left has the density, and the variance, of the filter without the two."""
+    factors = ([-0.5 - near, -3.0], [-2.0, -0.5, -7.0])
+    source = ShapedNoise(*factors, 4.0, seed=1, sample_rate=20.0, at_rest=at_rest)
+    alone = ShapedNoise([-3.0], [-2.0, -7.0], 4.0, seed=2, sample_rate=20.0)
+    found, expected = (one.draw(200_000) for one in (source, alone))
+    assert found.std() == pytest.approx(expected.std(), rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("zeros", "poles"), [([], [-2.0, -0.3]), ([-5.0], [-1 + 9j, -1 - 9j, -4.0])]
 )
-def test_any_partition_gives_the_same_bits(name, sizes):
-    whole = SOURCES[name](3).draw(np.int64(sum(sizes)))
-    source = SOURCES[name](3)
-    parts = [source.draw(size) for size in sizes]
-    assert [part.size for part in parts] == sizes
-    assert np.array_equal(np.concatenate([np.empty(0), *parts]), whole)
+def test_a_series_starts_in_the_middle_of_its_course(zeros, poles):
+    """Covariance of the first samples, over many seeds, is that of samples much later."""
+
+    def source(seed):
+        return ShapedNoise(zeros, poles, 1.0, seed=seed, sample_rate=10.0)
+
+    first = np.array([source(seed).draw(4) for seed in range(3000)])
+    later = source(5000).draw(2_000_000)
+    expected = [float(np.mean(later[: later.size - k] * later[k:])) for k in range(4)]
+    found = [np.mean(first[:, 0] * first[:, k]) for k in range(4)]
+    assert found == pytest.approx(expected, abs=0.1 * expected[0])
 
 
 def test_a_filter_without_poles_leaves_white_noise():
@@ -158,17 +171,13 @@ def test_noises_say_what_they_are():
     """As the call that makes the same one again."""
     sources = (
         LaserNoise(3, 20.0, level=2.0, cutoff=1e-4, at_rest=True),
-        PerturbationNoise(np.int64(4), scale=0.5),  # type: ignore[arg-type]
+        PerturbationNoise(4, scale=0.5),
         ShapedNoise([-1], [-3 + 9j, -3 - 9j], 4, seed=5, sample_rate=50),
     )
     for source in sources:
         again = eval(repr(source))
-        assert type(again) is type(source)
         assert repr(again) == repr(source)
         assert np.array_equal(again.draw(50), source.draw(50))
-    assert repr(sources[0]) == (
-        "LaserNoise(seed=3, sample_rate=20.0, at_rest=True, level=2.0, cutoff=0.0001)"
-    )
 
 
 def test_formulas_of_the_paper():
@@ -178,23 +187,6 @@ def test_formulas_of_the_paper():
     eta = PerturbationNoise(1, cutoff=1e-9, scale=2.0)
     printed = 2.0 * 3.6e-5 * np.sqrt(1.0 + (2.8e-3 / frequency) ** 4)
     assert eta.asd(frequency) == pytest.approx(printed, rel=1e-9)
-
-
-def test_spectrum_factors_exactly():
-    omega = np.geomspace(1e-6, 1e3, 60)
-    corner = 2.0 * np.pi * paper.PHASE_NOISE_CORNER
-    s = 1j * omega
-    factor = s**2 + np.sqrt(2.0) * corner * s + corner**2
-    assert np.abs(factor) ** 2 == pytest.approx(omega**4 + corner**4, rel=1e-12)
-
-
-@pytest.mark.parametrize("name", ["laser", "perturbation"])
-def test_variance_is_stationary_from_the_start(name):
-    start = np.array([SOURCES[name](seed, sample_rate=2.0, cutoff=1e-3).draw(2)[1]
-                      for seed in range(800)])  # fmt: skip
-    source = SOURCES[name](99, sample_rate=2.0, cutoff=1e-3)
-    later = source.draw(2_000_000).std()
-    assert start.std() == pytest.approx(later, rel=0.12)
 
 
 def test_at_rest_starts_at_zero():
@@ -221,7 +213,6 @@ def test_band_rms_is_the_integral():
             lambda: LaserNoise(1.5),  # type: ignore[arg-type]
             "seed must be",
         ),
-        (lambda: LaserNoise(True), "seed must be"),
         (lambda: LaserNoise(1, 0.0), "sample_rate must be positive"),
         (lambda: LaserNoise(1, cutoff=-1.0), "cutoff must be positive"),
         (lambda: PerturbationNoise(1, scale=np.nan), "scale must be finite"),
@@ -230,16 +221,10 @@ def test_band_rms_is_the_integral():
             lambda: LaserNoise(1).draw(1.5),  # type: ignore[arg-type]
             "samples must be an integer from 0 on, got 1.5",
         ),
-        (lambda: LaserNoise(1).draw(True), "samples must be an integer from 0 on, got True"),
+        (lambda: LaserNoise(1).draw(10**13), "samples must be of a size that memory holds"),
+        (lambda: PerturbationNoise(1).draw(10**13), "samples must be of a size that"),
         (lambda: LaserNoise(1).blocks(10, 0), "size must be an integer from 1 on, got 0"),
-        (lambda: LaserNoise(1, cutoff=3.0), r"cutoff must be at most 2\.0 Hz.* got 3\.0"),
-        (lambda: LaserNoise(1, 1e-5), r"cutoff must be at most 1\.0\S* Hz"),
-        (
-            lambda: sample_count(1e308),
-            r"duration must be a finite number of samples, got 1e\+308",
-        ),
         (lambda: band_rms(1.0, 0.5), "high must exceed"),
-        (lambda: band_rms(1e-300, 0.5), "low must be at least 1e-100 Hz"),
         (lambda: sample_count(-200_000.0), "duration must be positive"),
         (lambda: sample_count(1e-9), "duration must be at least one sample"),
         (lambda: sample_count(1.0, -200.0), "sample_rate must be positive"),

@@ -126,10 +126,10 @@ def test_random_controllers_agree_with_a_rectangle_of_another_kind(seed):
 
 @pytest.mark.parametrize("samples", [2, 3, 5])
 def test_a_coarse_grid_changes_no_count(monkeypatch, samples):
-    def coarse(parts, end):
+    def coarse(loop, c1, c2, end):
         return np.linspace(0.0, end, samples)
 
-    monkeypatch.setattr(module, "resolving_grid", coarse)
+    monkeypatch.setattr(module, "_resolving_grid", coarse)
     for loop, c1, c2 in [
         (SingleArm(), 1.001, 1.0),
         (CommonArm(), 1.3, 1.1),
@@ -148,10 +148,10 @@ def test_a_resonance_between_the_samples_is_refused_not_guessed(monkeypatch):
     loop, (c1, c2), _ = CASES["resonance at -1e-06, gain 0.0001"]
     assert nyquist(loop, c1, c2).closed_loop_roots == 2
 
-    def even(parts, end):
+    def even(loop, c1, c2, end):
         return np.linspace(0.0, end, 300)
 
-    monkeypatch.setattr(module, "resolving_grid", even)
+    monkeypatch.setattr(module, "_resolving_grid", even)
     with pytest.raises(CountError, match="against 2 roots"):
         nyquist(loop, c1, c2)
 
@@ -335,10 +335,9 @@ def test_the_ideal_loops_cross_nowhere(loop):
 
 def test_the_grid_resolves_what_its_sums_do():
     loop = CASES["resonance at -1e-09, gain 1e-07"][0]
-    parts = (loop.at(0.9, 1.0), loop.rest_on_boundary())
-    grid = resolving_grid(parts, 5.0)
-    for part in parts:
-        values = part.at(grid)
+    grid = module._resolving_grid(loop, 0.9, 1.0, 5.0)
+    s = 1j * grid
+    for values in (loop(s, 0.9, 1.0), np.polyval(loop.rest[::-1], s)):
         turn = np.angle(values[1:] / values[:-1])
         assert np.abs(turn).max() < 0.45
     assert (np.diff(grid) > 0.0).all()

@@ -20,7 +20,7 @@ from armlock import (
 )
 from armlock.controllers import table_two
 from armlock.paper import TABLE_2_POLES, TABLE_2_STAGE_1_POLE, TABLE_2_ZEROS
-from armlock.roots import polish_root, pseudospectral_roots
+from armlock.roots import RootError, extended_root, pseudospectral_roots
 
 LOOP = paper_loop()
 E = 1e-6
@@ -34,8 +34,11 @@ def roots_right(loop, c1, c2, degree):
     for start in pseudospectral_roots(loop, c1, c2, degree):
         if start.real < -1e-3:
             continue
-        root, error = polish_root(loop, c1, c2, complex(start))
-        if np.isfinite(error) and root.real > 0.0:
+        try:
+            root = complex(extended_root(loop, c1, c2, start, digits=20))
+        except RootError:
+            continue
+        if root.real > 0.0:
             found += [root] * all(abs(root - r) > 1e-9 * abs(r) for r in found)
     return found
 

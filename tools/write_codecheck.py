@@ -1,10 +1,11 @@
 """Write codecheck.yml, the CODECHECK manifest: what the book computes, file by file.
 
-Usage: python tools/write_codecheck.py [--check]
+Usage: python tools/write_codecheck.py [--check [FOLDER]]
 
-The data of every figure that a notebook publishes is listed with the first sentence of its
-caption, and so is the ledger of claims. With --check nothing is written, and a manifest that
-is out of date is an error.
+Every figure that a notebook publishes is listed with the first sentence of its caption: its
+data, or the picture itself where it is a drawing without data. So is the ledger of claims. With
+--check nothing is written, and a manifest that is out of date is an error. FOLDER is a built
+book: it must hold what is listed, and no other tables.
 """
 
 import ast
@@ -15,8 +16,8 @@ from pathlib import Path
 
 MANIFEST = Path("codecheck.yml")
 HEAD = """\
-# CODECHECK manifest, written by tools/write_codecheck.py: `make book` and `make claims` compute
-# these files from nothing.
+# CODECHECK manifest, written by tools/write_codecheck.py: `make book` computes these files from
+# nothing.
 ---
 version: https://codecheck.org.uk/spec/config/1.0/
 paper:
@@ -30,14 +31,15 @@ paper:
     - name: Ming Xin
 manifest:
 """
+BOOK = "build/html"
 CLAIMS = {
-    "build/claims/claims.csv": "Every claim with its verdict and the number that decides it",
-    "build/claims/claims.json": "The same as JSON",
+    "claims.csv": "Every claim with its verdict and the number that decides it",
+    "claims.json": "The same as JSON",
 }
 
 
 def published(notebook: Path) -> list[tuple[str, str]]:
-    """Return name and caption of the figures that a notebook publishes."""
+    """Return the files that a notebook publishes, each with the caption of its figure."""
     found, caption = [], ""
     for cell in json.loads(notebook.read_text(encoding="utf-8"))["cells"]:
         if cell["cell_type"] != "code":
@@ -45,12 +47,11 @@ def published(notebook: Path) -> list[tuple[str, str]]:
         figure = cell["metadata"].get("mystnb", {}).get("figure", {})
         caption = figure.get("caption", caption)
         for node in ast.walk(ast.parse("".join(cell["source"]))):
-            if isinstance(node, ast.Call) and ast.unparse(node.func).endswith("publish"):
-                found += [
-                    (argument.value, first_sentence(caption))
-                    for argument in node.args
-                    if isinstance(argument, ast.Constant) and isinstance(argument.value, str)
-                ]
+            if isinstance(node, ast.Call) and ast.unparse(node.func) == "figures.publish":
+                _, name, columns = node.args
+                drawing = isinstance(columns, ast.Dict) and not columns.keys
+                file = f"{ast.literal_eval(name)}.{'svg' if drawing else 'csv'}"
+                found.append((file, first_sentence(caption)))
     return found
 
 
@@ -63,29 +64,43 @@ def first_sentence(text: str) -> str:
     )[0]
 
 
-def manifest() -> str:
+def listed() -> dict[str, str]:
+    """Return the files in the folder of figures, each with what it holds."""
+    notebooks = sorted(Path("notebooks").glob("*.ipynb"))
+    return CLAIMS | {file: text for notebook in notebooks for file, text in published(notebook)}
+
+
+def manifest(files: dict[str, str]) -> str:
     """Return the text of the manifest."""
-    files = {
-        f"build/html/figures/{name}.csv": comment
-        for notebook in sorted(Path("notebooks").glob("*.ipynb"))
-        for name, comment in published(notebook)
-    }
     entries = [
-        f"  - file: {file}\n    comment: {json.dumps(comment, ensure_ascii=False)}\n"
-        for file, comment in (CLAIMS | files).items()
+        f"  - file: {BOOK}/figures/{file}\n"
+        f"    comment: {json.dumps(comment, ensure_ascii=False)}\n"
+        for file, comment in files.items()
     ]
     return HEAD + "".join(entries)
 
 
+def differences(files: dict[str, str], book: Path) -> list[str]:
+    """Return how the list differs from what is in a built book."""
+    there = {file.name for file in (book / "figures").iterdir()}
+    tables = {name for name in there if name.endswith(".csv")}
+    missing = [f"{name} is listed, and nothing writes it" for name in files.keys() - there]
+    return sorted(missing) + [f"{name} is not listed" for name in sorted(tables - files.keys())]
+
+
 def main() -> int:
     """Write or check the manifest in the current folder."""
-    text = manifest()
+    files = listed()
+    text = manifest(files)
     if "--check" not in sys.argv:
         MANIFEST.write_text(text, encoding="utf-8")
-    elif not MANIFEST.exists() or MANIFEST.read_text(encoding="utf-8") != text:
-        print(f"{MANIFEST} does not list what the notebooks publish: make format writes it")
-        return 1
-    return 0
+        return 0
+    problems = [differences(files, Path(folder)) for folder in sys.argv[2:]]
+    lines = [f"{MANIFEST}: {line}" for problem in problems for line in problem]
+    if not MANIFEST.exists() or MANIFEST.read_text(encoding="utf-8") != text:
+        lines.append(f"{MANIFEST} does not list what the notebooks publish: make format does")
+    print(*lines, sep="\n", end="\n" if lines else "")
+    return 1 if lines else 0
 
 
 if __name__ == "__main__":

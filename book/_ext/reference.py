@@ -1,9 +1,10 @@
-"""The reference of the package, from its docstrings, and the versions it was built with.
+"""The reference of package and companion, from docstrings, and the versions they ran with.
 
-`public` describes what the package offers of some modules: the names in `armlock.__all__`
-under the name they are imported by, `armlock.Loop`, and with the option `all` also those that
-are reached through the module, `armlock.sensors.COMMON`. `public-index` lists all names of
-`armlock.__all__`. `versions` is a table of the packages that the book was computed with.
+`public` describes what some modules offer: the names in `armlock.__all__` under the name they
+are imported by, `armlock.Loop`, and with the option `all` also those that are reached through
+the module, `armlock.sensors.COMMON`. A constant is described by a comment (`#:`) above it.
+`public-index` lists all names of `armlock.__all__`. `versions` is a table of the packages that
+the book was computed with.
 
 Docstrings are written to be read in a terminal too. What reStructuredText would take for
 markup there, such as the bars of an absolute value, is escaped; `name` in backticks becomes a
@@ -12,6 +13,7 @@ link if it is something that the package offers, and code otherwise.
 
 import importlib
 import inspect
+import pkgutil
 import platform
 import re
 import sys
@@ -40,7 +42,7 @@ def comments(module):
     analyzer = ModuleAnalyzer.for_module(module.__name__)
     found = analyzer.find_attr_docs()
     documented, lines = {}, None
-    for name in sorted(analyzer.tagorder, key=analyzer.tagorder.get):
+    for name in sorted(analyzer.tagorder, key=lambda name: analyzer.tagorder[name]):
         if ("", name) in found:
             lines = found["", name][:]
             prepare(None, "data", name, None, None, lines)
@@ -80,10 +82,16 @@ def described(path, thing, module, lines):
 
 
 def modules(names):
-    """Return the modules that are named; "package.*" stands for all that it imports."""
+    """Return the modules that are named; "package.*" stands for all in a package.
+
+    They are in the order in which the package imports them, the others last.
+    """
     if not names.endswith(".*"):
         return names.split()
     package = importlib.import_module(names.removesuffix(".*"))
+    for info in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
+        if not info.name.endswith("__main__"):
+            importlib.import_module(info.name)
     inner = [m.__name__ for m in vars(package).values() if inspect.ismodule(m)]
     return [name for name in inner if name.startswith(f"{package.__name__}.")]
 
@@ -97,12 +105,12 @@ class Public(SphinxDirective):
 
     def run(self):
         """Return the descriptions."""
-        text = [".. currentmodule:: armlock", ""]
+        text = []
         for module_name in modules(self.arguments[0]):
             module = importlib.import_module(module_name)
             if self.arguments[0].endswith(".*"):
-                text += [f".. rubric:: {module.__doc__.splitlines()[0]}", ""]
-            self.env.note_dependency(module.__file__)
+                text += [f".. rubric:: {str(module.__doc__).splitlines()[0]}", ""]
+            self.env.note_dependency(inspect.getfile(module))
             documented = comments(module)
             own = [name for name in armlock.__all__ if home(name) == module_name]
             for name in own:
@@ -136,7 +144,7 @@ class Versions(SphinxDirective):
 
     def run(self):
         """Return a table."""
-        direct = {Requirement(line).name for line in requires("armlock")}
+        direct = {Requirement(line).name for line in requires("armlock") or []}
         names = ["armlock", *sorted(direct), *BUILD_TOOLS]
         rows = [("Python", platform.python_version())] + [(n, version(n)) for n in names]
         text = [".. list-table::", "   :header-rows: 1", "", "   * - Package", "     - Version"]

@@ -11,15 +11,18 @@ from schemdraw import dsp as blocks
 from armlock.plotting import BLUE, ORANGE
 
 Point = tuple[float, float]
-#: Its elements have no types.
+# Its elements have no types.
 dsp: Any = blocks
 
 
-def _drawing(ax: Axes) -> Any:
-    """Start a drawing in axes; its units are those of the axes."""
+def _draw(ax: Axes, parts: list[Any]) -> None:
+    """Draw elements in axes, whose units are theirs."""
     ax.set_axis_off()
     ax.set_aspect("equal")
-    return schemdraw.Drawing(canvas=ax, show=False, unit=1.0, fontsize=9, lw=1.3)
+    drawing: Any = schemdraw.Drawing(canvas=ax, show=False, unit=1.0, fontsize=9, lw=1.3)
+    for part in parts:
+        drawing.add(part)
+    drawing.draw(show=False)
 
 
 def _box(at: Point, width: float, height: float, label: str) -> Any:
@@ -34,7 +37,7 @@ def _box(at: Point, width: float, height: float, label: str) -> Any:
     )
 
 
-def _arrow(*points: Point, color: str = "black", style: str = "-", head: bool = True) -> Any:
+def _path(*points: Point, color: str = "black", style: str = "-", head: bool = True) -> Any:
     """Return the pieces of a line through points, with a head at its end."""
     last = len(points) - 2
     return [
@@ -67,7 +70,6 @@ def plot_modules(ax: Axes) -> None:
     >>> len(ax.texts) > 3
     True
     """
-    drawing = _drawing(ax)
     light: dict[str, Any] = {"color": ORANGE}
     digital: dict[str, Any] = {"color": BLUE, "style": "--"}
     parts = [
@@ -80,20 +82,18 @@ def plot_modules(ax: Axes) -> None:
         _box((11.6, 4.0), 3.2, 1.1, "optical bench"),
         _box((11.6, 0.6), 3.2, 1.1, "laser, phase-\nlocked loop"),
         _box((8.0, -2.6), 5.4, 1.1, "telescope pointing, clocks, ..."),
-        *_arrow((2.7, 4.0), (3.5, 4.0), **light),
-        *_arrow((5.7, 4.25), (10.0, 4.25), **light),
-        *_arrow((10.0, 3.75), (5.7, 3.75), **light),
-        *_arrow((4.6, 3.45), (4.6, 1.15), **light),
-        *_arrow((12.2, 3.45), (12.2, 1.15), **light),
-        *_arrow((11.0, 1.15), (11.0, 3.45), **light),
-        *_arrow((3.5, 0.6), (2.7, 0.6), **digital),
-        *_arrow((1.6, 1.15), (1.6, 3.45), **digital),
-        *_arrow((6.8, -2.05), (5.3, 0.05), style=":"),
-        *_arrow((9.2, -2.05), (10.6, 0.05), style=":"),
+        *_path((2.7, 4.0), (3.5, 4.0), **light),
+        *_path((5.7, 4.25), (10.0, 4.25), **light),
+        *_path((10.0, 3.75), (5.7, 3.75), **light),
+        *_path((4.6, 3.45), (4.6, 1.15), **light),
+        *_path((12.2, 3.45), (12.2, 1.15), **light),
+        *_path((11.0, 1.15), (11.0, 3.45), **light),
+        *_path((3.5, 0.6), (2.7, 0.6), **digital),
+        *_path((1.6, 1.15), (1.6, 3.45), **digital),
+        *_path((6.8, -2.05), (5.3, 0.05), style=":"),
+        *_path((9.2, -2.05), (10.6, 0.05), style=":"),
     ]
-    for part in parts:
-        drawing.add(part)
-    drawing.draw(show=False)
+    _draw(ax, parts)
     for x, text in ((3.0, "local spacecraft"), (11.6, "remote spacecraft")):
         ax.text(x, 5.5, text, ha="center", va="bottom", fontsize=9)
     ax.text(7.85, 4.45, r"out: $\varphi(t)$", ha="center", va="bottom", fontsize=9)
@@ -119,41 +119,38 @@ def plot_loop(ax: Axes) -> None:
     >>> len(ax.texts) > 3
     True
     """
-    drawing = _drawing(ax)
     upper, lower = 0.0, -3.2
     parts: list[Any] = [
-        *_arrow((-1.6, 1.6), (-0.05, 1.6)),
+        *_path((-1.6, 1.6), (-0.05, 1.6)),
         dsp.Sum().anchor("center").at((0.45, 1.6)).fill("white"),
-        *_arrow((0.95, 1.6), (14.4, 1.6)),
+        *_path((0.95, 1.6), (14.4, 1.6)),
         dsp.Dot().at((13.4, 1.6)),
-        *_arrow((13.4, 1.6), (13.4, lower), head=False),
+        *_path((13.4, 1.6), (13.4, lower), head=False),
     ]
     for y, k in ((upper, 1), (lower, 2)):
         parts += [
             dsp.Dot().at((13.4, y)) if k == 1 else dsp.Dot(radius=0.02).at((13.4, y)),
-            *_arrow((13.4, y), (8.4, y)),
+            *_path((13.4, y), (8.4, y)),
             dsp.Dot().at((12.9, y)),
-            *_arrow((12.9, y), (12.9, y - 1.6), (12.3, y - 1.6)),
+            *_path((12.9, y), (12.9, y - 1.6), (12.3, y - 1.6)),
             _box((11.4, y - 1.6), 1.8, 0.9, rf"$e^{{-s\tau_{k}}}$"),
-            *_arrow((10.5, y - 1.6), (9.9, y - 1.6)),
+            *_path((10.5, y - 1.6), (9.9, y - 1.6)),
             _box((9.3, y - 1.6), 1.2, 0.9, f"$c_{k}$"),
-            *_arrow((8.7, y - 1.6), (7.9, y - 1.6), (7.9, y - 0.5)),
+            *_path((8.7, y - 1.6), (7.9, y - 1.6), (7.9, y - 0.5)),
             dsp.Sum().anchor("center").at((7.9, y)).fill("white"),
             _box((5.7, y), 1.9, 0.9, f"$m_{k}(s)$"),
-            *_arrow((7.4, y), (6.65, y)),
+            *_path((7.4, y), (6.65, y)),
         ]
     middle = 0.5 * (upper + lower)
     parts += [
-        *_arrow((4.75, upper), (4.0, upper), (4.0, middle + 0.5)),
-        *_arrow((4.75, lower), (4.0, lower), (4.0, middle - 0.5)),
+        *_path((4.75, upper), (4.0, upper), (4.0, middle + 0.5)),
+        *_path((4.75, lower), (4.0, lower), (4.0, middle - 0.5)),
         dsp.Sum().anchor("center").at((4.0, middle)).fill("white"),
-        *_arrow((3.5, middle), (2.5, middle)),
+        *_path((3.5, middle), (2.5, middle)),
         _box((1.6, middle), 1.8, 1.0, "$K(s)$"),
-        *_arrow((0.7, middle), (0.45, middle), (0.45, 1.1)),
+        *_path((0.7, middle), (0.45, middle), (0.45, 1.1)),
     ]
-    for part in parts:
-        drawing.add(part)
-    drawing.draw(show=False)
+    _draw(ax, parts)
     for y in (upper, lower):
         ax.text(8.15, y - 0.75, "−", ha="left", va="center", fontsize=10)
     ax.text(-1.6, 1.75, r"laser, $\varphi_0$", ha="left", va="bottom", fontsize=9)

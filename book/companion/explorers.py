@@ -6,92 +6,61 @@ import base64
 import html
 import itertools
 import json
-import zlib
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from armlock.characteristic import CharacteristicFunction, checked_system
-from armlock.checks import even_axis
+from armlock.checks import ComplexArray, even_axis, whole_number
 from armlock.roots import RootError, rightmost_root
 from armlock.stability import CountError, StabilityChart
 
 _NUMBER = itertools.count(1)
 
 
-class RootGrid:
-    """Rightmost roots on a coarse grid.
+class ChartExplorer:
+    """A chart that a reader can point at, as HTML that needs neither network nor kernel.
 
     Parameters
     ----------
-    system : CharacteristicFunction
-        In continuous time.
-    x, y : array_like of float, one-dimensional
-        Values of the two free parameters, ascending in equal steps.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If an axis is not finite and real, empty, or does not ascend in equal steps.
+    chart : StabilityChart
+        With ascending, evenly spaced axes.
+    every : int
+        The rightmost root is computed at every so many points along each axis, and the
+        nearest is shown.
+    name : str
+        What the chart shows, for readers who do not see it.
 
     Attributes
     ----------
-    x, y : float array
-        The two axes.
-    roots : complex array, shape (y.size, x.size)
-        nan where no root could be certified.
+    roots : complex array, shape (rows, columns)
+        The rightmost roots in rad/s, nan where none could be certified.
+
+    Raises
+    ------
+    ValueError
+        If an axis does not ascend in equal steps, or `every` is not a positive integer.
 
     Examples
     --------
-    >>> from armlock import CommonArm
-    >>> from book.companion.explorers import RootGrid
-    >>> grid = RootGrid(CommonArm(), [0.9, 1.1], [1.0])
-    >>> (grid.roots.real > 0).tolist()
-    [[False, True]]
+    >>> import numpy as np
+    >>> from armlock import CommonArm, stability_chart
+    >>> from book.companion.explorers import ChartExplorer
+    >>> axis = np.linspace(-3, 3, 7)
+    >>> chart = stability_chart(CommonArm(), axis, axis)
+    >>> ChartExplorer(chart, every=3, name="Unstable roots")
+    Unstable roots: (7, 7) points; open the book to point at it
     """
 
-    def __init__(
-        self, system: CharacteristicFunction, x: npt.ArrayLike, y: npt.ArrayLike
-    ) -> None:
-        name1, name2 = checked_system(system).parameters
-        self.x, self.y = even_axis(name1, x, least=1), even_axis(name2, y, least=1)
-        self.roots = np.full((self.y.size, self.x.size), np.nan, dtype=np.complex128)
-        for row, column in np.ndindex(self.roots.shape):
-            try:
-                root = rightmost_root(system, float(self.x[column]), float(self.y[row]))
-            except (RootError, CountError):
-                continue
-            self.roots[row, column] = complex(root)
-
-    def __repr__(self) -> str:
-        """Say how many roots there are, and how many of them were certified."""
-        found = int(np.isfinite(self.roots).sum())
-        return f"RootGrid({self.x.size} by {self.y.size} points, {found} roots certified)"
-
-
-class ChartExplorer:
-    """A chart that tells what is under the pointer; see `chart_explorer`."""
-
-    def __init__(
-        self, chart: StabilityChart, rightmost: RootGrid | None, units: Sequence[str], name: str
-    ) -> None:
-        if not isinstance(chart, StabilityChart):
-            raise TypeError(f"chart must be a StabilityChart, got {chart!r}")
-        if rightmost is not None and not isinstance(rightmost, RootGrid):
-            raise TypeError(f"rightmost must be a RootGrid, got {rightmost!r}")
+    def __init__(self, chart: StabilityChart, *, every: int, name: str) -> None:
         # The script finds its place from the ends of the axes.
-        for kind, grid in (("chart", chart), ("rightmost", rightmost)):
-            if grid is not None:
-                even_axis(f"{kind}.x", grid.x)
-                even_axis(f"{kind}.y", grid.y)
-        if isinstance(units, str) or len(units) != 2:
-            raise ValueError(f"units must be two texts, got {units!r}")
-        self.chart = chart
-        self.rightmost = rightmost
-        self.units = tuple(units)
-        self.name = name
+        even_axis("chart.x", chart.x)
+        even_axis("chart.y", chart.y)
+        self.chart, self.name = chart, name
+        self.every = whole_number("every", every, 1)
+        self.roots: ComplexArray = np.array(
+            [[_root(chart, x, y) for x in chart.x[::every]] for y in chart.y[::every]]
+        )
 
     def __repr__(self) -> str:
         """Say what it is."""
@@ -102,27 +71,19 @@ class ChartExplorer:
         chart = self.chart
         # One byte a point: 255 for boundary points, counts above 250 as 250.
         counts = np.where(chart.counts < 0, 255, np.minimum(chart.counts, 250))
-        found: dict[str, Any] = {
+        return {
             "names": chart.system.parameters,
-            "units": self.units,
-            "x": [float(chart.x[0]), float(chart.x[-1]), int(chart.x.size)],
-            "y": [float(chart.y[0]), float(chart.y[-1]), int(chart.y.size)],
-            "counts": _runs(counts.astype(np.uint8)),
+            "x": [float(chart.x[0]), float(chart.x[-1]), chart.x.size],
+            "y": [float(chart.y[0]), float(chart.y[-1]), chart.y.size],
+            "counts": _encoded(_runs(counts), "<u2"),
+            "every": self.every,
+            "re": _encoded(self.roots.real, "<f4"),
+            "im": _encoded(np.abs(self.roots.imag), "<f4"),
         }
-        grid = self.rightmost
-        if grid is not None:
-            found["root"] = {
-                "x": [float(grid.x[0]), float(grid.x[-1]), int(grid.x.size)],
-                "y": [float(grid.y[0]), float(grid.y[-1]), int(grid.y.size)],
-                "re": _floats(grid.roots.real),
-                "im": _floats(np.abs(grid.roots.imag)),
-            }
-        return found
 
     def _repr_html_(self) -> str:
         """Return the canvas, a line that speaks, and the script."""
-        key = f"explorer-{zlib.crc32(self.name.encode()):08x}-{next(_NUMBER)}"
-        label = html.escape(self.name, quote=True)
+        key, label = f"explorer-{next(_NUMBER)}", html.escape(self.name)
         data = json.dumps(self.data(), separators=(",", ":"))
         return (
             f'<div class="explorer" id="{key}" data-check="hover">'
@@ -135,64 +96,24 @@ class ChartExplorer:
         )
 
 
-def chart_explorer(
-    chart: StabilityChart,
-    rightmost: RootGrid | None = None,
-    *,
-    name: str = "Number of unstable roots",
-    units: Sequence[str] = ("", ""),
-) -> ChartExplorer:
-    """Return a chart that a reader can point at, for a notebook.
-
-    Parameters
-    ----------
-    chart : StabilityChart
-        With ascending, evenly spaced axes.
-    rightmost : RootGrid, optional
-        Rightmost roots on a grid, usually a coarser one; the nearest is shown.
-    name : str, optional
-        What the chart shows, for readers who do not see it.
-    units : pair of str, optional
-        Units of the two parameters.
-
-    Returns
-    -------
-    ChartExplorer
-        Self-contained HTML: needs no network and no running kernel.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If there is no chart, an axis does not ascend in equal steps, or there are not two
-        units.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from armlock import CommonArm, stability_chart
-    >>> from book.companion.explorers import chart_explorer
-    >>> axis = np.linspace(-3, 3, 7)
-    >>> chart_explorer(stability_chart(CommonArm(), axis, axis))
-    Number of unstable roots: (7, 7) points; open the book to point at it
-    """
-    return ChartExplorer(chart, rightmost, units, name)
+def _root(chart: StabilityChart, x: float, y: float) -> complex:
+    """Return the rightmost root at a point, nan where none can be certified."""
+    try:
+        return complex(rightmost_root(chart.system, x, y))
+    except (RootError, CountError):
+        return complex(np.nan, np.nan)
 
 
-def _floats(values: npt.NDArray[np.float64]) -> str:
-    return base64.b64encode(values.astype("<f4").tobytes()).decode()
-
-
-def _runs(values: npt.NDArray[np.uint8]) -> str:
-    """Return the array row by row as pairs (run length in 16 bits, value), little endian."""
+def _runs(values: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Return pairs (length, value) of the runs of equal values, broken at the ends of rows."""
     flat = values.ravel()
-    starts = np.concatenate(([0], np.flatnonzero(np.diff(flat)) + 1))
-    lengths = np.diff(np.concatenate((starts, [flat.size])))
-    pairs = [
-        (min(65535, int(rest)), int(flat[start]))
-        for start, length in zip(starts, lengths, strict=True)
-        for rest in range(int(length), 0, -65535)
-    ]
-    return base64.b64encode(np.array(pairs, dtype="<u2").tobytes()).decode()
+    rows = np.arange(0, flat.size, values.shape[1])
+    starts = np.union1d(np.flatnonzero(np.diff(flat)) + 1, rows)
+    return np.stack((np.diff(starts, append=flat.size), flat[starts]), axis=1)
+
+
+def _encoded(values: npt.NDArray[Any], kind: str) -> str:
+    return base64.b64encode(values.astype(kind).tobytes()).decode()
 
 
 _SCRIPT = """
@@ -204,9 +125,8 @@ function (box, data) {
   for (let i = 0, at = 0; i < runs.length; i += 2) {
     counts.fill(runs[i + 1], at, at + runs[i]); at += runs[i];
   }
-  const root = data.root;
-  const re = root && new Float32Array(bytes(root.re));
-  const im = root && new Float32Array(bytes(root.im));
+  const every = data.every, columns = Math.ceil(nx / every), rows = Math.ceil(ny / every);
+  const re = new Float32Array(bytes(data.re)), im = new Float32Array(bytes(data.im));
   const canvas = box.querySelector('canvas'), out = box.querySelector('output');
   const pen = canvas.getContext('2d');
   const left = 62, bottom = 46, top = 8, right = 14;
@@ -249,8 +169,7 @@ function (box, data) {
       pen.textAlign = 'right'; pen.textBaseline = 'middle';
       pen.fillText(tick(value(y0, y1, 5, k)), left - 6, top + high * (1 - k / 4));
     }
-    const label = k => data.names[k] + (near ? ' \\u2212 1' : '')
-      + (data.units[k] ? ' [' + data.units[k] + ']' : '');
+    const label = k => data.names[k] + (near ? ' \\u2212 1' : '');
     pen.textAlign = 'center'; pen.textBaseline = 'bottom';
     pen.fillText(label(0), left + wide / 2, canvas.height - 2);
     pen.save(); pen.translate(12, top + high / 2); pen.rotate(-Math.PI / 2);
@@ -269,16 +188,14 @@ function (box, data) {
     let text = data.names[0] + ' = ' + format(x) + ', ' + data.names[1] + ' = ' + format(y)
       + ': ' + (c === 0 ? 'stable' : c === 255 ? 'on the boundary'
       : c + ' unstable root' + (c > 1 ? 's' : ''));
-    if (root) {
-      const place = (v, [a, b, n]) =>
-        Math.max(0, Math.min(n - 1, Math.round((v - a) / (b - a) * (n - 1))));
-      const i = place(x, root.x), j = place(y, root.y), at = j * root.x[2] + i;
-      text += Number.isNaN(re[at]) ? '; rightmost root not certified'
-        : '; rightmost root ' + (Math.abs(re[at]) < 1e-12 ? '0'
-        : re[at].toExponential(2).replace('-', '\\u2212'))
-        + (im[at] > 0 ? ' \\u00b1 ' + im[at].toPrecision(3) + 'j' : '') + ' rad/s (at '
-        + format(value(...root.x, i)) + ', ' + format(value(...root.y, j)) + ')';
-    }
+    const i = Math.min(Math.round(ix / every), columns - 1);
+    const j = Math.min(Math.round(iy / every), rows - 1), at = j * columns + i;
+    text += Number.isNaN(re[at]) ? '; rightmost root not certified'
+      : '; rightmost root ' + (Math.abs(re[at]) < 1e-12 ? '0'
+      : re[at].toExponential(2).replace('-', '\\u2212'))
+      + (im[at] > 0 ? ' \\u00b1 ' + im[at].toPrecision(3) + 'j' : '') + ' rad/s (at '
+      + format(value(x0, x1, nx, i * every)) + ', '
+      + format(value(y0, y1, ny, j * every)) + ')';
     out.textContent = text;
     draw();
   }

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import base64
+import csv
 import html
 import io
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -15,7 +18,6 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 from PIL import Image
 
-from armlock.checks import whole_number
 from armlock.plotting import BLUE
 from armlock.stability import StabilityChart
 
@@ -38,13 +40,7 @@ def chart_columns(
     -------
     dict of str to array
         The two free parameters and the number of unstable roots.
-
-    Raises
-    ------
-    ValueError
-        If `every` is not a positive integer.
     """
-    every = whole_number("every", every, 1)
     x, y = np.meshgrid(chart.x[::every], chart.y[::every])
     names = [f"{p} [{u}]" for p, u in zip(chart.system.parameters, units, strict=True)]
     counts = chart.counts[::every, ::every]
@@ -55,12 +51,12 @@ def chart_columns(
     }
 
 
+@dataclass(frozen=True, repr=False)
 class Downloads:
     """Links to a figure's files, shown below it in the book."""
 
-    def __init__(self, name: str, files: Sequence[str]) -> None:
-        self.name = name
-        self.files = files
+    name: str
+    files: Sequence[str]
 
     def __repr__(self) -> str:
         """Name the files."""
@@ -99,82 +95,68 @@ def publish(
     Downloads
         Shows links in a notebook. The files go to the folder named by the environment
         variable ARMLOCK_FIGURES, which the book's build sets; without it none are written.
-
-    Raises
-    ------
-    ValueError
-        If the name is empty or holds a folder.
     """
-    if not name or Path(name).name != name:
-        raise ValueError(f"name must be the stem of a file, without a folder, got {name!r}")
-    folder = os.environ.get("ARMLOCK_FIGURES")
-    if not folder:
+    if not os.environ.get("ARMLOCK_FIGURES"):
         return Downloads(name, [])
-    target = Path(folder)
-    target.mkdir(parents=True, exist_ok=True)
-    arrays = [np.ravel(np.asarray(column)) for column in columns.values()]
-    length = max((array.size for array in arrays), default=0)
-    # A name may hold a comma, and is quoted then.
-    lines = [",".join(f'"{head}"' if "," in head else head for head in columns)]
-    lines += [
-        ",".join(form % array[i] if i < array.size else "" for array in arrays)
-        for i in range(length)
-    ]
+    stem = Path(os.environ["ARMLOCK_FIGURES"]) / name
+    stem.parent.mkdir(parents=True, exist_ok=True)
     if columns:
-        (target / f"{name}.csv").write_text("\n".join(lines) + "\n")
+        with stem.with_suffix(".csv").open("w", newline="") as stream:
+            table = csv.writer(stream, lineterminator="\n")
+            table.writerow(columns)
+            written = ([form % value for value in np.ravel(c)] for c in columns.values())
+            table.writerows(zip_longest(*written, fillvalue=""))
     # A palette of 128 colours is all a figure needs, at a third of the size.
     pixels = io.BytesIO()
     figure.savefig(pixels, format="png")
     image = Image.open(pixels).convert("RGB").quantize(128, dither=Image.Dither.NONE)
-    image.save(target / f"{name}.png", optimize=True)
-    figure.savefig(target / f"{name}.svg", metadata={"Date": None})
+    image.save(stem.with_suffix(".png"), optimize=True)
+    figure.savefig(stem.with_suffix(".svg"), metadata={"Date": None})
     endings = ("csv", "png", "svg") if columns else ("png", "svg")
     return Downloads(name, [f"{name}.{ending}" for ending in endings])
 
 
+# Shows the picture that the slider stands at, and says its label.
+_SLIDE = """(box => {
+  const labels = box.dataset.labels.split("|"), pictures = box.querySelectorAll("img");
+  const range = box.querySelector("input"), text = box.querySelector("output");
+  const show = () => {
+    const k = Number(range.value);
+    pictures.forEach((picture, i) => { picture.hidden = i !== k; });
+    text.textContent = labels[k];
+    range.setAttribute("aria-valuetext", labels[k]);
+  };
+  range.addEventListener("input", show);
+  show();  // a browser may have kept the slider's place
+})"""
+
+
+@dataclass(frozen=True, repr=False)
 class FrameSlider:
     """Pictures of a sweep behind a slider, as HTML that needs neither network nor library.
 
-    Parameters
+    Attributes
     ----------
     frames : sequence of bytes
         The pictures as SVG, see `svg`.
     labels : sequence of str
-        What the slider says at each frame, plain text.
+        What the slider says at each frame, plain text without a vertical bar.
     name : str
         Identifier, unique in the book; links can end in it.
     slider : str
         Name of the slider, for instance "Gain".
     alt : str
         What the pictures show, for those who do not see them.
-    start : int, optional
+    start : int
         Frame shown at first, and where scripts do not run.
-
-    Raises
-    ------
-    ValueError
-        If there are no frames, not as many labels, or no frame `start`.
     """
 
-    def __init__(
-        self,
-        frames: Sequence[bytes],
-        labels: Sequence[str],
-        *,
-        name: str,
-        slider: str,
-        alt: str,
-        start: int = 0,
-    ) -> None:
-        if not frames or len(frames) != len(labels):
-            raise ValueError(
-                f"frames and labels must be as many, at least one, got {len(frames)} and "
-                f"{len(labels)}"
-            )
-        if not 0 <= start < len(frames):
-            raise ValueError(f"start must be a frame from 0 to {len(frames) - 1}, got {start}")
-        self.frames, self.labels, self.start = list(frames), list(labels), start
-        self.name, self.slider, self.alt = name, slider, alt
+    frames: Sequence[bytes]
+    labels: Sequence[str]
+    name: str
+    slider: str
+    alt: str
+    start: int
 
     def __repr__(self) -> str:
         """Say how many frames there are."""
@@ -198,16 +180,7 @@ class FrameSlider:
             f'<input id="{name}-range" type="range" min="0" max="{len(self.frames) - 1}" '
             f'step="1" value="{self.start}" aria-valuetext="{current}" '
             f'style="width: 100%; min-height: 2rem; accent-color: {BLUE}"></p>'
-            "<script>(() => {"
-            f'const box = document.getElementById("{name}");'
-            'const labels = box.dataset.labels.split("|");'
-            'const pictures = box.querySelectorAll("img");'
-            'const range = box.querySelector("input"), text = box.querySelector("output");'
-            "const show = () => { const k = Number(range.value);"
-            "pictures.forEach((picture, i) => { picture.hidden = i !== k; });"
-            'text.textContent = labels[k]; range.setAttribute("aria-valuetext", labels[k]); };'
-            'range.addEventListener("input", show); show();'
-            "})();</script></div>"
+            f'<script>{_SLIDE}(document.getElementById("{name}"));</script></div>'
         )
 
 

@@ -8,21 +8,11 @@ from __future__ import annotations
 
 import control
 import numpy as np
-from numpy.polynomial import polynomial as poly
 
-from armlock.characteristic import CharacteristicFunction, checked_system, whole_steps
-from armlock.checks import ComplexArray, positive_number, real_number, whole_number
+from armlock.characteristic import CharacteristicFunction
+from armlock.checks import ComplexArray
 from armlock.loops import CommonArm
 from armlock.semidiscretization import semi_discretization
-
-#: Highest order of the Padé approximants; beyond, their coefficients lose their digits.
-HIGHEST_ORDER = 60
-
-
-def _common_arm(loop: object) -> CommonArm:
-    if not isinstance(loop, CommonArm):
-        raise TypeError(f"loop must be a CommonArm, got {loop!r}")
-    return loop
 
 
 def sampled_loop(
@@ -63,100 +53,45 @@ def sampled_loop(
     -------
     CharacteristicFunction
         With free parameters (c1, c2).
-
-    Raises
-    ------
-    TypeError, ValueError
-        If the loop is no common arm, a weight is not finite and real, or the step is not
-        positive or does not divide both delays.
     """
-    loop = _common_arm(loop)
-    present, lead, newer = (
-        real_number(name, value)
-        for name, value in (("present", present), ("lead", lead), ("newer", newer))
-    )
     return CharacteristicFunction(
         (-present, lead),
-        (real_number("held[0]", held[0]), newer),
-        (real_number("held[1]", held[1]), newer),
+        (held[0], newer),
+        (held[1], newer),
         loop.tau1,
         loop.tau2,
-        step=positive_number("step", step),
+        step=step,
         parameters=loop.parameters,
     )
 
 
 def standard_schemes(loop: CommonArm, step: float) -> dict[str, CharacteristicFunction]:
-    """Return semi-discretization and standard schemes of one step.
+    """Return the maps of semi-discretization and of standard schemes, by name.
 
     Parameters
     ----------
     loop : CommonArm
         The loop.
     step : float
-        Sampling step h in s; it must divide both delays.
-
-    Returns
-    -------
-    dict of str to CharacteristicFunction
-        Maps by name.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If the loop is no common arm, or the step is not positive or does not divide both
-        delays.
+        Sampling step h in s, which divides both delays.
     """
-    gain = _common_arm(loop).gain * positive_number("step", step)
+    gain = loop.gain * step
+    # Runge-Kutta's polynomial for exp(-2 g h), the delayed signals constant over the step.
     stages = sum((-2.0 * gain) ** k / f for k, f in enumerate((1.0, 1.0, 2.0, 6.0, 24.0)))
     driven = 0.5 * (1.0 - stages)
+    half = 0.5 * gain
     return {
         "semi-discretization, order 0": semi_discretization(loop, step, 0),
         "semi-discretization, order 1": semi_discretization(loop, step, 1),
         "Runge-Kutta 4, delays held": sampled_loop(loop, step, stages, (driven, driven)),
         "trapezoidal rule": sampled_loop(
-            loop, step, 1 - gain, (gain / 2, gain / 2), lead=1 + gain, newer=gain / 2
+            loop, step, 1.0 - gain, (half, half), lead=1.0 + gain, newer=half
         ),
-        "explicit Euler": sampled_loop(loop, step, 1 - 2 * gain, (gain, gain)),
+        "explicit Euler": sampled_loop(loop, step, 1.0 - 2.0 * gain, (gain, gain)),
         "implicit Euler": sampled_loop(
-            loop, step, 1.0, (0.0, 0.0), lead=1 + 2 * gain, newer=gain
+            loop, step, 1.0, (0.0, 0.0), lead=1.0 + 2.0 * gain, newer=gain
         ),
     }
-
-
-def map_eigenvalues(system: CharacteristicFunction, x: float, y: float) -> ComplexArray:
-    """Eigenvalues of a map, from its companion matrix.
-
-    Parameters
-    ----------
-    system : CharacteristicFunction
-        A map, whose step divides both delays.
-    x, y : float
-        The free parameters.
-
-    Returns
-    -------
-    complex array, shape (degree + longest delay / step,)
-
-    Raises
-    ------
-    TypeError, ValueError
-        If x or y is not a finite real number, or the system is no map.
-    """
-    name1, name2 = checked_system(system).parameters
-    x, y = real_number(name1, x), real_number(name2, y)
-    if not system.step:
-        raise ValueError(f"system must be a map, got {system!r} in continuous time")
-    back = [
-        whole_steps(name, delay, system.step)
-        for name, delay in (("delay1", system.delay1), ("delay2", system.delay2))
-    ]
-    longest = max(back)
-    powers = np.zeros(longest + system.a.size)
-    powers[longest:] = system.a
-    for value, b, steps in zip((x, y), (system.b1, system.b2), back, strict=True):
-        powers[longest - steps : longest - steps + b.size] -= value * b
-    return np.asarray(poly.polyroots(powers), dtype=np.complex128)
 
 
 def pade_poles(loop: CommonArm, x: float, y: float, order: int) -> ComplexArray:
@@ -169,24 +104,15 @@ def pade_poles(loop: CommonArm, x: float, y: float, order: int) -> ComplexArray:
     x, y : float
         c1 and c2.
     order : int
-        Order of both approximants, from 1 to 60.
+        Order of both approximants; beyond 60 their coefficients lose their digits.
 
     Returns
     -------
     complex array, shape (2 order + 1,)
-
-    Raises
-    ------
-    TypeError, ValueError
-        If the loop is no common arm, x or y is not a finite real number, or the order is out
-        of range.
     """
-    loop = _common_arm(loop)
-    x, y = real_number("c1", x), real_number("c2", y)
-    order = whole_number("order", order, 1, HIGHEST_ORDER)
-    arms = [
+    arm1, arm2 = (
         control.ss(control.tf(*control.pade(delay, order))) for delay in (loop.tau1, loop.tau2)
-    ]
+    )
     actuator = control.ss(control.tf([loop.gain], [1.0, 0.0]))
-    closed = control.feedback(actuator * (2.0 - x * arms[0] - y * arms[1]), 1.0)
+    closed = control.feedback(actuator * (2.0 - x * arm1 - y * arm2), 1.0)
     return np.asarray(closed.poles(), dtype=np.complex128)

@@ -6,8 +6,10 @@ from book.companion.claims.ledger import (
     Ledger,
     Verdict,
     all_claims,
+    chapter_claims,
     check,
     claim,
+    decide,
 )
 
 # In the order of the paper, which is the order of the register.
@@ -27,10 +29,12 @@ __all__ = [
     "Verdict",
     "all_claims",
     "appendix",
+    "chapter_claims",
     "check",
     "claim",
     "common_arm",
     "controller",
+    "decide",
     "dual_arm",
     "nyquist_cases",
     "simulation",

@@ -6,12 +6,12 @@ import sys
 import textwrap
 from pathlib import Path
 
-from book.companion.claims.ledger import all_claims, check_in_parallel
+from book.companion.claims.ledger import check_in_parallel
 
 
 def main(folder: Path) -> None:
-    """Print the ledger and write claims.csv and claims.json into a folder."""
-    ledger = check_in_parallel(all_claims())
+    """Print the ledger, write claims.csv and claims.json into a folder, and hold the pins."""
+    ledger = check_in_parallel()
     for entry, finding in ledger:
         print(f"{entry.identifier:4s} {finding.verdict.upper()}   ({entry.place})")
         for line in (entry.says, f"{finding.value:.6g}: {finding.quantity}", finding.note):
@@ -21,6 +21,7 @@ def main(folder: Path) -> None:
     print(f"{len(ledger)} claims: " + ", ".join(f"{n} {v}" for v, n in counts.items()))
     for path in ledger.write(folder):
         print(f"written: {path}")
+    ledger.confirm()
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -21,19 +21,19 @@ from armlock.paper import (
     SAMPLE_RATE,
 )
 from armlock.spectra import Spectrum, SpectrumEstimator
-from book.companion.claims.ledger import Finding, Verdict, claim
+from book.companion.claims import ledger
+from book.companion.claims.ledger import Finding, Verdict, decide
 from book.companion.claims.simulation import LOWEST, PERTURBATION_SEEDS, face_value_rms
 
-CHAPTER = "08_perturbations"
+claim = partial(ledger.claim, chapter="08_perturbations")
 
-#: Gain errors of the two channels at which the model is tried.
+#: Gain errors of the two channels at which the model is tried, and their difference.
 MISMATCH = (2e-6, -1e-6)
+ETA = MISMATCH[1] - MISMATCH[0]
 
 
-def measured_phase(
-    phase: npt.ArrayLike, mismatch: tuple[float, float] = MISMATCH
-) -> FloatArray:
-    """Phase that unequal I and Q channels give, continued over whole turns.
+def phase_error(phase: npt.ArrayLike, mismatch: tuple[float, float] = MISMATCH) -> FloatArray:
+    """Measured minus true phase in rad, for unequal I and Q channels.
 
     Parameters
     ----------
@@ -45,29 +45,17 @@ def measured_phase(
     Returns
     -------
     float array, shaped like `phase`
-        arctan of the ratio of the channels, on the branch next to the true phase.
+        Of the arctangent of the ratio of the channels, on the branch next to the true phase.
     """
-    return np.asarray(phase, dtype=float) + phase_error(phase, mismatch)
-
-
-def phase_error(phase: npt.ArrayLike, mismatch: tuple[float, float] = MISMATCH) -> FloatArray:
-    """Measured minus true phase in rad, without rounding the difference away."""
-    phase = np.asarray(phase, dtype=float)
-    in_phase, quadrature = (1.0 + error for error in mismatch)
     # tan of a difference: no two nearly equal angles are subtracted.
     sine, cosine = np.sin(phase), np.cos(phase)
-    change = mismatch[1] - mismatch[0]
-    above = change * sine * cosine
-    return np.asarray(np.arctan2(above, in_phase * cosine**2 + quadrature * sine**2))
-
-
-def linear_error(phase: npt.ArrayLike, mismatch: tuple[float, float] = MISMATCH) -> FloatArray:
-    """Error eta phi of the linear model (1 + eta) phi, eta the difference of the errors."""
-    return np.asarray((mismatch[1] - mismatch[0]) * np.asarray(phase, dtype=float))
+    above = (mismatch[1] - mismatch[0]) * sine * cosine
+    below = (1.0 + mismatch[0]) * cosine**2 + (1.0 + mismatch[1]) * sine**2
+    return np.asarray(np.arctan2(above, below))
 
 
 def slope_error(mismatch: tuple[float, float] = MISMATCH) -> float:
-    """Relative difference of the exact error and the linear model's as the phase goes to zero.
+    """Relative difference of the exact error and eta phi as the phase goes to zero.
 
     The slope of the arctangent's argument there is eta / (1 + epsilon_I).
     """
@@ -88,10 +76,10 @@ def mean_over_turn(mismatch: tuple[float, float] = MISMATCH) -> float:
 
 
 def linear_up_to(tolerance: float) -> float:
-    """Phase in rad up to which the linear model's error is right within a tolerance."""
+    """Phase in rad up to which the error is eta phi within a relative tolerance."""
 
     def excess(phase: float) -> float:
-        return 1.0 - float(phase_error(phase) / linear_error(phase)) - tolerance
+        return 1.0 - float(phase_error(phase)) / (ETA * phase) - tolerance
 
     return float(brentq(excess, 1e-3, 0.5 * np.pi))
 
@@ -154,14 +142,10 @@ def convolution(rate: float = 4.0, samples: int = 16_000_000) -> Convolution:
         for estimator, series in zip(estimators, (phase * eta, phase, eta), strict=True):
             estimator.add(series)
         power += float(np.sum(phase**2))
-    measured, *factors = (estimator.spectrum() for estimator in estimators)
-    return Convolution(
-        measured,
-        measured.expected(lambda f: convolved_density(f, rate)),
-        factors[0],
-        factors[1],
-        float(np.sqrt(power / samples)),
-    )
+    product, phase_spectrum, eta_spectrum = (estimator.spectrum() for estimator in estimators)
+    expected = product.expected(lambda f: convolved_density(f, rate))
+    rms = float(np.sqrt(power / samples))
+    return Convolution(product, expected, phase_spectrum, eta_spectrum, rms)
 
 
 class Series(NamedTuple):
@@ -214,22 +198,21 @@ def laser_phase_rms() -> float:
     place="Appendix, Eqs. (A2) to (A4)",
     says="Unequal gains 1 + ε_I and 1 + ε_Q of the phasemeter's I and Q channels give the "
     "measured phase (1 + η)φ, with η = ε_Q - ε_I.",
-    chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 1.999996e-6, 1e-12),
 )
 def gain_mismatch() -> Finding:
     """Slope of the exact arctangent at zero phase against the linear model."""
     small = 1e-4
     off = slope_error()
     # The next term of the series is -2/3 phase^2.
-    found = float(phase_error(small) / linear_error(small))
-    agrees = abs(found - (1.0 - off) * (1.0 - 2.0 * small**2 / 3.0)) < 1e-12
+    series = (1.0 - off) * (1.0 - 2.0 * small**2 / 3.0)
+    agrees = abs(float(phase_error(small)) / (ETA * small) - series) < 1e-12
     return Finding(
-        Verdict.REPRODUCED if agrees and off < 1e-5 else Verdict.DIFFERS,
+        decide(agrees and off < 1e-5),
         off,
         "relative difference of the exact error and ηφ, as φ goes to zero",
-        f"For ε_I = {MISMATCH[0]:g} and ε_Q = {MISMATCH[1]:g}: the slope is η/(1 + ε_I). "
-        "At any phase the error is (η/2) sin 2φ to first order, which is ηφ only next to "
-        "φ = 0.",
+        f"For ε_I = {MISMATCH[0]:g} and ε_Q = {MISMATCH[1]:g}: the slope is η/(1 + ε_I). At "
+        "any phase the error is (η/2) sin 2φ to first order, which is ηφ only next to φ = 0.",
     )
 
 
@@ -237,22 +220,20 @@ def gain_mismatch() -> Finding:
     "A2",
     place="Appendix, Eq. (A4)",
     says="The measured phase is (1 + η)φ, for a phase φ of any size.",
-    chapter=CHAPTER,
+    pinned=(Verdict.DIFFERS, 0.39334, 1e-4),
+    affects=("A3", "A4"),
 )
 def any_phase() -> Finding:
     """Phase up to which the linear model holds, and the error's mean and largest value."""
-    phase = np.linspace(0.0, np.pi, 100_001)
-    eta = abs(MISMATCH[1] - MISMATCH[0])
-    largest = float(np.abs(phase_error(phase)).max() / eta)
-    vanishes = abs(mean_over_turn()) < 1e-12 * eta
+    largest = float(np.abs(phase_error(np.linspace(0.0, np.pi, 100_001)) / ETA).max())
+    stays_small = abs(mean_over_turn()) < 1e-12 * abs(ETA) and largest < 1.0
     return Finding(
-        Verdict.DIFFERS if vanishes and largest < 1.0 else Verdict.OPEN,
+        decide(not stays_small),
         linear_up_to(0.1),
         "rad, phase up to which the error is ηφ within 10 percent",
-        "Unequal gains of the phasemeter's two channels give an error of (η/2) sin 2φ: at no "
-        f"phase is it larger than {largest:.3f} η, and over whole turns its mean is zero. A "
-        f"phase that runs through many turns, as a laser's does ({laser_phase_rms():.1e} rad "
-        "r.m.s. over the simulated band, for the paper's laser noise), is measured without "
+        f"The error is (η/2) sin 2φ: at no phase is it larger than {largest:.3f} η, and over "
+        "whole turns its mean is zero. A phase that runs through many turns, as a laser's does "
+        f"({laser_phase_rms():.1e} rad r.m.s. over the simulated band), is measured without "
         "any gain error.",
     )
 
@@ -262,7 +243,8 @@ def any_phase() -> Finding:
     place="Appendix, Eq. (A5), and Sec. IV.A",
     says="The spectrum of the phase noise requirement, taken for η, stands for perturbations "
     "of at most 10⁻⁶.",
-    chapter=CHAPTER,
+    pinned=(Verdict.DIFFERS, 14579.3, 0.1),
+    affects=("N1", "M2", "A4", "A5"),
 )
 def size_of_spectrum() -> Finding:
     """Integrate the spectrum over the simulated band."""
@@ -272,14 +254,13 @@ def size_of_spectrum() -> Finding:
         1.0 / 3.0
     )
     return Finding(
-        Verdict.DIFFERS if rms > 2.0 * PERTURBATION else Verdict.REPRODUCED,
+        decide(rms <= 2.0 * PERTURBATION),
         rms / PERTURBATION,
         "r.m.s. of the spectrum over the simulated band, in units of 10⁻⁶",
-        f"The band is from {LOWEST:g} Hz, one over the duration, to {0.5 * SAMPLE_RATE:g} Hz, "
-        f"half the sample rate. Where the spectrum is flat, above {1e3 * PHASE_NOISE_CORNER:g} "
-        f"mHz, it alone has {white:.1e}; the part that rises towards low frequency stays "
-        f"within 10⁻⁶ only if it ends at {1e3 * lowest:.1f} mHz. Claim N1 has the same from "
-        "the side of Sec. IV.A, which refers to the appendix for its limit.",
+        f"The band is from {LOWEST:g} Hz, one over the duration, to {0.5 * SAMPLE_RATE:g} Hz. "
+        f"Where the spectrum is flat, above {1e3 * PHASE_NOISE_CORNER:g} mHz, it alone has "
+        f"{white:.1e}; the part that rises towards low frequency stays within 10⁻⁶ only if it "
+        f"ends at {1e3 * lowest:.1f} mHz. Claim N1 is the same from the side of Sec. IV.A.",
     )
 
 
@@ -289,27 +270,29 @@ def size_of_spectrum() -> Finding:
     says="The spectrum of the error ηφ is the convolution of those of phase and perturbation, "
     "so that η must be one or several orders below the additive phase noise δφ to give an "
     "error as large.",
-    chapter=CHAPTER,
+    pinned=(Verdict.IN_PART, 0.0, 0.05),
 )
 def convolution_of_spectra() -> Finding:
     """Multiply series and convolve spectra; find the factor for the paper's laser."""
     found = convolution()
+    deviation = np.abs(found.measured.asd / found.expected - 1.0)
     # A band's scatter exceeds the chi-squared one where the product is not Gaussian.
-    worst = float(np.abs(found.measured.asd / found.expected - 1.0).max())
-    sharp = found.measured.degrees > 2000.0
-    close = float(np.abs(found.measured.asd / found.expected - 1.0)[sharp].max())
+    worst, close = (
+        float(deviation.max()),
+        float(deviation[found.measured.degrees > 2000.0].max()),
+    )
     factor = laser_phase_rms()
+    # By this factor eta must lie below the additive noise: one or several orders, it says.
     return Finding(
-        Verdict.IN_PART if close < 0.05 else Verdict.DIFFERS,
+        decide(close < 0.05, factor < 1e3),
         close,
         "largest relative difference between the product's spectrum and the convolution, in "
         "bands with at least 1000 averages",
-        "The convolution is right, for independent stationary signals (with fewer averages "
-        f"the scatter is up to {100 * worst:.0f} percent). Its consequence is stronger than "
-        "the paper says: a perturbation of a slow phase is amplified by the phase's r.m.s., "
-        f"which for the laser noise of the simulation is {factor:.1e} rad, so that η must be "
-        f"about {np.log10(factor):.0f} orders below δφ. And the paper then takes η as large "
-        "as δφ, not smaller.",
+        "The convolution is right, for independent stationary signals (with fewer averages the "
+        f"scatter is up to {100 * worst:.0f} percent). Its consequence is stronger than the "
+        "paper says: a perturbation of a slow phase is amplified by the phase's r.m.s., for "
+        f"the laser noise of the simulation {factor:.1e} rad, so that η must be about "
+        f"{np.log10(factor):.0f} orders below δφ. The paper then takes η as large as δφ.",
     )
 
 
@@ -317,7 +300,7 @@ def convolution_of_spectra() -> Finding:
     "A5",
     place="Appendix, Fig. 11",
     says="c₁(t) and c₂(t) are generated from the spectrum.",
-    chapter=CHAPTER,
+    pinned=(Verdict.REPRODUCED, 0.0, 0.03),
 )
 def generated_series() -> Finding:
     """Compare the spectrum of the series with the formula, and see what makes its size."""
@@ -331,14 +314,14 @@ def generated_series() -> Finding:
     rms = np.sqrt(np.mean(series.eta**2, axis=1))
     slow = 1.0 - (band_rms(1e-4, 0.5 * SAMPLE_RATE) / face_value_rms()) ** 2
     return Finding(
-        Verdict.REPRODUCED if worst < 0.03 and inside > 0.85 else Verdict.DIFFERS,
+        decide(worst < 0.03 and inside > 0.85),
         worst,
         "largest relative deviation of the series' spectrum from the formula, where it is "
         "known to 1 %",
         f"{100 * inside:.0f} percent of all bands hold the formula in their 95 percent "
-        "interval. The lowest frequencies decide what the series look like: "
-        f"{100 * slow:.1f} percent of the variance over the simulated band lies below 0.1 mHz, "
-        "and it grows as the inverse cube of the frequency at which the spectrum is cut, which "
-        f"the paper does not give. Here the spectrum is flat below {LOWEST:g} Hz, one over the "
-        f"duration, and the two series drawn have an r.m.s. of {rms[0]:.3f} and {rms[1]:.3f}.",
+        f"interval. {100 * slow:.1f} percent of the variance over the simulated band lies "
+        "below 0.1 mHz, and it grows as the inverse cube of the frequency at which the "
+        f"spectrum is cut, which the paper does not give. Here that is {LOWEST:g} Hz, one over "
+        f"the duration, and the two series drawn have an r.m.s. of {rms[0]:.3f} and "
+        f"{rms[1]:.3f}.",
     )

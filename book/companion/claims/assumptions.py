@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cache
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ import numpy as np
 from armlock.checks import FloatArray
 from armlock.controllers import table_two
 from armlock.loops import Loop, paper_loop
-from armlock.margins import modulus_margin
+from armlock.margins import critical_perturbation, modulus_margin
 from armlock.noise import LaserNoise, band_rms
 from armlock.paper import (
     CONTROLLER_GAIN,
@@ -29,7 +29,7 @@ from armlock.simulation import sampled_open_loop
 from armlock.stability import unstable_roots
 from book.companion.claims.controller import (
     SUPPRESSION_BAND,
-    highest_corner,
+    highest_stable_corner,
     noise_to_spare,
     suppression,
 )
@@ -48,53 +48,24 @@ from book.companion.claims.simulation import (
 DIFFERENCES = {"full": TAU1 - TAU2, "half": 0.5 * (TAU1 - TAU2)}
 
 
-def first_break(
-    loop: Loop,
-    direction: tuple[float, float] = (1.0, -1.0),
-    *,
-    smallest: float = 1e-9,
-    largest: float = 1e-2,
-) -> float:
-    """Smallest perturbation of (1, 1) along a direction at which counts find instability.
-
-    Parameters
-    ----------
-    loop : Loop
-        The loop.
-    direction : pair of float, optional
-        (d1, d2); the default raises arm 1 and lowers arm 2.
-    smallest, largest : float, optional
-        Ends of the range searched, on a logarithmic grid and then by bisection.
+def break_along(loop: Loop, direction: tuple[float, float] = (1.0, -1.0)) -> float:
+    """Smallest perturbation of (1, 1) along a direction that makes a loop unstable.
 
     Returns
     -------
     float
-        0 if the loop is not stable at `smallest`, inf if it is stable throughout.
+        0 if the loop is unstable at (1, 1) itself.
 
     Examples
     --------
     >>> from armlock import paper_loop
-    >>> from book.companion.claims.assumptions import first_break
-    >>> print(f"{first_break(paper_loop()):.4g}")
+    >>> from book.companion.claims.assumptions import break_along
+    >>> print(f"{break_along(paper_loop()):.4g}")
     1.464e-06
     """
-    sizes = np.geomspace(smallest, largest, 57)
-
-    def counts(eps: FloatArray) -> FloatArray:
-        return np.asarray(
-            unstable_roots(loop, 1.0 + eps * direction[0], 1.0 + eps * direction[1])
-        )
-
-    unstable = np.flatnonzero(counts(sizes) != 0)
-    if unstable.size == 0:
-        return np.inf
-    if unstable[0] == 0:
+    if unstable_roots(loop, 1.0, 1.0):
         return 0.0
-    low, high = sizes[unstable[0] - 1], sizes[unstable[0]]
-    for _ in range(30):
-        middle = float(np.sqrt(low * high))
-        low, high = (middle, high) if counts(np.array([middle]))[0] == 0 else (low, middle)
-    return float(high)
+    return critical_perturbation(loop, direction)
 
 
 @cache
@@ -117,19 +88,16 @@ def over_corners(points: int = 31) -> tuple[FloatArray, dict[str, FloatArray]]:
     """
     grid = DUAL_SENSOR_CORNER * np.logspace(-1.0, 1.0, points)
     close = 1.0 - np.append(np.linspace(0.24, 0.02, 12), [1e-3, -1e-3])
-    near = [highest_corner(difference) * close for difference in DIFFERENCES.values()]
+    near = [highest_stable_corner(difference) * close for difference in DIFFERENCES.values()]
     corners = np.unique(np.concatenate((grid, *near)))
     columns: dict[str, FloatArray] = {}
     for name, difference in DIFFERENCES.items():
         loops = [paper_loop(float(p), difference=difference) for p in corners]
-        found = np.array([first_break(loop) for loop in loops])
-        columns[name] = found
-        columns[f"{name} margin"] = np.array(
-            [
-                modulus_margin(loop) if size > 0.0 else np.nan
-                for loop, size in zip(loops, found, strict=True)
-            ]
-        )
+        breaks = [break_along(loop) for loop in loops]
+        left = [
+            modulus_margin(k) if at else np.nan for k, at in zip(loops, breaks, strict=True)
+        ]
+        columns |= {name: np.array(breaks), f"{name} margin": np.array(left)}
     return corners, columns
 
 
@@ -154,10 +122,20 @@ class Assumption(NamedTuple):
     sensitivity: str
 
 
+_MAKERS: list[Callable[[], Assumption]] = []
+
+
+def assumption(make: Callable[[], Assumption]) -> Callable[[], Assumption]:
+    """Put the decorated function's assumption on the page, in the order of this file."""
+    _MAKERS.append(make)
+    return make
+
+
+@assumption
 def _corner() -> Assumption:
-    tenth = first_break(paper_loop(0.1 * DUAL_SENSOR_CORNER))
-    here, limit = first_break(paper_loop()), highest_corner()
-    half = highest_corner(DIFFERENCES["half"])
+    tenth = break_along(paper_loop(0.1 * DUAL_SENSOR_CORNER))
+    here, limit = break_along(paper_loop()), highest_stable_corner()
+    half = highest_stable_corner(DIFFERENCES["half"])
     return Assumption(
         "p, the corner frequency of the dual sensor",
         f"{DUAL_SENSOR_CORNER:.4g} rad/s ({DUAL_SENSOR_CORNER / (2 * np.pi):.2g} Hz)",
@@ -169,20 +147,22 @@ def _corner() -> Assumption:
     )
 
 
+@assumption
 def _difference() -> Assumption:
-    full, half = (first_break(paper_loop(difference=d)) for d in DIFFERENCES.values())
-    inside = "inside" if half < PERTURBATION else "outside"
+    loops = [paper_loop(difference=d) for d in DIFFERENCES.values()]
+    full, half = (break_along(loop) for loop in loops)
+    modulus, half_modulus = (modulus_margin(loop) for loop in loops)
     return Assumption(
         "Δτ in the dual sensor",
         f"τ₁ - τ₂ = {DIFFERENCES['full']:.2g} s in the loop",
         "Sec. III.B defines it so. Table I is right only with half of it (claims T2, T3).",
         f"The first break along (1, -1) is at {full:.4g} with the whole difference and at "
-        f"{half:.4g} with half of it, which is {inside} the ±{PERTURBATION:g} of the paper; "
-        f"min |1 + L| is {modulus_margin(paper_loop()):.3f} and "
-        f"{modulus_margin(paper_loop(difference=DIFFERENCES['half'])):.3f}.",
+        f"{half:.4g} with half of it, which is inside the ±{PERTURBATION:g} of the paper; "
+        f"min |1 + L| is {modulus:.3f} and {half_modulus:.3f}.",
     )
 
 
+@assumption
 def _actuator() -> Assumption:
     points = 1.0 + PERTURBATION * np.array([-1.0, 0.0, 1.0])
     without = unstable_roots(paper_loop(), 1.0, points)
@@ -197,6 +177,7 @@ def _actuator() -> Assumption:
     )
 
 
+@assumption
 def _denominator() -> Assumption:
     printed = paper_loop(controller=table_two(denominator="printed"))
     return Assumption(
@@ -208,27 +189,24 @@ def _denominator() -> Assumption:
     )
 
 
+@assumption
 def _gain() -> Assumption:
-    turned = paper_loop(controller=table_two(2.0 * np.pi * CONTROLLER_GAIN))
+    higher = break_along(paper_loop(controller=table_two(2.0 * np.pi * CONTROLLER_GAIN)))
     lower = paper_loop(controller=table_two(CONTROLLER_GAIN / (2.0 * np.pi)))
-    count, other = (int(unstable_roots(loop, 1.0, 1.0)) for loop in (turned, lower))
-
-    def outcome(loop: Loop, unstable: int) -> str:
-        if unstable:
-            return f"{unstable} unstable roots at (1, 1)"
-        return f"the first break along (1, -1) at {first_break(loop):.4g}"
-
     return Assumption(
         "The unit of g",
         "rad/s with the actuator, a plain number without it",
         "The paper gives a number without unit; g/s is a rate over s in rad/s.",
-        f"Were it in Hz, g would be 2π times larger: {outcome(turned, count)}; 2π times "
-        f"smaller: {outcome(lower, other)}; as taken: {outcome(paper_loop(), 0)}.",
+        "Were it in Hz, g would be 2π times larger: the first break along (1, -1) at "
+        f"{higher:.4g}; 2π times smaller: {int(unstable_roots(lower, 1.0, 1.0))} unstable "
+        "roots at (1, 1); as taken: the first break along (1, -1) at "
+        f"{break_along(paper_loop()):.4g}.",
     )
 
 
+@assumption
 def _order() -> Assumption:
-    up, down = first_break(paper_loop()), first_break(paper_loop(), (-1.0, 1.0))
+    up, down = break_along(paper_loop()), break_along(paper_loop(), (-1.0, 1.0))
     return Assumption(
         "Which arm is the longer",
         f"Arm 1: τ₁ = {TAU1} s, τ₂ = {TAU2} s",
@@ -239,10 +217,11 @@ def _order() -> Assumption:
     )
 
 
+@assumption
 def _history() -> Assumption:
     days = []
     for c2 in (1.0, 1.0 - PERTURBATION):
-        root = complex(np.asarray(rightmost_root(paper_loop(), 1.0, c2)))
+        root = rightmost_root(paper_loop(), 1.0, c2)
         days.append(-1.0 / root.real / 86400.0)
     return Assumption(
         "What the loop was doing before t = 0",
@@ -256,6 +235,7 @@ def _history() -> Assumption:
     )
 
 
+@assumption
 def _scale() -> Assumption:
     rms = face_value_rms()
     return Assumption(
@@ -272,6 +252,7 @@ def _scale() -> Assumption:
     )
 
 
+@assumption
 def _lowest() -> Assumption:
     total = band_rms(LOWEST, 0.5 * SAMPLE_RATE)
     sizes = ", ".join(
@@ -289,6 +270,7 @@ def _lowest() -> Assumption:
     )
 
 
+@assumption
 def _laser() -> Assumption:
     cutoff = LaserNoise(0).cutoff
     low = SUPPRESSION_BAND[0]
@@ -306,6 +288,7 @@ def _laser() -> Assumption:
     )
 
 
+@assumption
 def _seeds() -> Assumption:
     return Assumption(
         "The random numbers of the simulation",
@@ -318,6 +301,7 @@ def _seeds() -> Assumption:
     )
 
 
+@assumption
 def _requirement() -> Assumption:
     frequency = np.geomspace(*SUPPRESSION_BAND, 20_001)
     spare = float(np.min(noise_to_spare(frequency)))
@@ -328,11 +312,11 @@ def _requirement() -> Assumption:
         "The paper names none. Missions of this kind ask about that of a laser before "
         "time-delay interferometry.",
         f"The paper's 30/f Hz/√Hz meets it {spare:.3g} times over. A free-running laser of "
-        f"{FREE_RUNNING:g}/f Hz/√Hz would have {free:.2g} times what it needs, and so "
-        f"{'meet' if free > 1.0 else 'miss'} it.",
+        f"{FREE_RUNNING:g}/f Hz/√Hz would have {free:.2g} times what it needs, and so miss it.",
     )
 
 
+@assumption
 def _rule() -> Assumption:
     frequency = np.geomspace(*SUPPRESSION_BAND, 20_001)
     omega = 2.0 * np.pi * frequency
@@ -350,36 +334,11 @@ def _rule() -> Assumption:
     )
 
 
-_ALL: tuple[Callable[[], Assumption], ...] = (
-    _corner,
-    _difference,
-    _actuator,
-    _denominator,
-    _gain,
-    _order,
-    _history,
-    _scale,
-    _lowest,
-    _laser,
-    _seeds,
-    _requirement,
-    _rule,
-)
-
-
 class Assumptions:
-    """All assumptions, computed once, as blocks of text.
+    """All assumptions, computed once, as blocks of text."""
 
-    Examples
-    --------
-    >>> from book.companion.claims.assumptions import Assumptions
-    >>> Assumptions([]).entries
-    []
-    """
-
-    def __init__(self, entries: Sequence[Assumption] | None = None) -> None:
-        chosen = [make() for make in _ALL] if entries is None else entries
-        self.entries = list(chosen)
+    def __init__(self) -> None:
+        self.entries = [make() for make in _MAKERS]
 
     def __repr__(self) -> str:
         """Return them as text."""

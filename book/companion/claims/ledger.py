@@ -1,11 +1,15 @@
-"""How a claim of the paper is written down, checked and shown.
+"""How a claim of the paper is written down, decided, checked and shown.
 
-A claim is a function without arguments that computes a `Finding`. The decorator `claim`
-says where it stands and what it says, in our words, and enters it in the register:
+A claim is a function without arguments that computes a `Finding`. The decorator holds all the
+rest, and enters it in the register. A module names its chapter once:
 
-    @claim("C2", place="Eq. (5b)", says="...", chapter="03_common_arm")
+    claim = partial(ledger.claim, chapter="03_common_arm")
+
+    @claim("C2", place="Eq. (5b)", says="...", pinned=(Verdict.REPRODUCED, 0.0, 1e-12))
     def straight_line() -> Finding:
         ...
+
+The chapter shows `chapter_claims("03_common_arm")`, and calls its `confirm`.
 """
 
 from __future__ import annotations
@@ -13,14 +17,18 @@ from __future__ import annotations
 import csv
 import html
 import json
+import os
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
 from multiprocessing import get_context
 from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
 
 
 class Verdict(StrEnum):
@@ -31,6 +39,42 @@ class Verdict(StrEnum):
     DIFFERS = "differs"
     NOT_AS_WRITTEN = "not as written"
     OPEN = "cannot be settled from the paper"
+
+
+def decide(
+    *holds: bool | np.bool_, corrected: bool | np.bool_ = False, settled: bool = True
+) -> Verdict:
+    """Return the verdict that follows from which parts of a claim hold.
+
+    Parameters
+    ----------
+    *holds : bool
+        For each part of the claim, whether it holds as the paper has it.
+    corrected : bool, optional
+        Whether the claim holds with a slip in the paper mended.
+    settled : bool, optional
+        False if the answer hangs on something that the paper does not say.
+
+    Returns
+    -------
+    Verdict
+        All parts hold: reproduced. Otherwise, if the mended claim holds: not as written.
+        Otherwise some parts hold: reproduced in part; none: differs.
+
+    Examples
+    --------
+    >>> decide(True, False)
+    <Verdict.IN_PART: 'reproduced in part'>
+    >>> decide(False, corrected=True)
+    <Verdict.NOT_AS_WRITTEN: 'not as written'>
+    """
+    if not settled:
+        return Verdict.OPEN
+    if all(holds):
+        return Verdict.REPRODUCED
+    if corrected:
+        return Verdict.NOT_AS_WRITTEN
+    return Verdict.IN_PART if any(holds) else Verdict.DIFFERS
 
 
 @dataclass(frozen=True)
@@ -55,14 +99,29 @@ class Finding:
     note: str
 
 
+class Pin(NamedTuple):
+    """What the check of a claim must find: verdict, number, and its absolute tolerance."""
+
+    verdict: Verdict
+    value: float
+    tolerance: float
+
+    def admits(self, finding: Finding) -> bool:
+        """Tell whether a finding is as pinned."""
+        near = abs(finding.value - self.value) <= self.tolerance
+        return finding.verdict is self.verdict and bool(near)
+
+
 @dataclass(frozen=True)
 class Claim:
-    """One claim of the paper: identifier, place, our wording, chapter and check."""
+    """One claim of the paper; the attributes are the arguments of `claim`."""
 
     identifier: str
     place: str
     says: str
     chapter: str
+    pinned: Pin
+    affects: tuple[str, ...]
     check: Callable[[], Finding]
 
 
@@ -70,7 +129,13 @@ _REGISTER: dict[str, Claim] = {}
 
 
 def claim(
-    identifier: str, *, place: str, says: str, chapter: str
+    identifier: str,
+    *,
+    place: str,
+    says: str,
+    chapter: str,
+    pinned: tuple[Verdict, float, float],
+    affects: tuple[str, ...] = (),
 ) -> Callable[[Callable[[], Finding]], Callable[[], Finding]]:
     """Enter the decorated check in the register of claims.
 
@@ -84,6 +149,10 @@ def claim(
         What it says, in our words.
     chapter : str
         Stem of the notebook that shows it.
+    pinned : (Verdict, float, float)
+        The verdict, the number that decides it, and the absolute tolerance of that number.
+    affects : tuple of str, optional
+        Claims whose verdict or number uses what this one corrects, for the errata.
 
     Raises
     ------
@@ -95,7 +164,9 @@ def claim(
         if identifier in _REGISTER:
             raise ValueError(f"identifier must be new, got {identifier!r} a second time")
         remembered = cache(check)
-        _REGISTER[identifier] = Claim(identifier, place, says, chapter, remembered)
+        _REGISTER[identifier] = Claim(
+            identifier, place, says, chapter, Pin(*pinned), affects, remembered
+        )
         return remembered
 
     return enter
@@ -106,24 +177,26 @@ def all_claims() -> list[Claim]:
     return list(_REGISTER.values())
 
 
+def badge(verdict: Verdict, text: str) -> str:
+    """Return a text as HTML in the colour of a verdict."""
+    return f'<span class="verdict verdict-{verdict.name.lower()}">{text}</span>'
+
+
 class Ledger:
     """Claims with their findings, shown as a table.
 
     Parameters
     ----------
-    claims : list of Claim
-        They are checked here, in this order.
+    entries : iterable of (Claim, Finding)
+        In the order of the table.
     """
 
-    def __init__(self, claims: list[Claim]) -> None:
-        self.entries = [(entry, entry.check()) for entry in claims]
+    def __init__(self, entries: Iterable[tuple[Claim, Finding]]) -> None:
+        self.entries = list(entries)
 
     def __getitem__(self, identifier: str) -> Finding:
         """Return the finding of one claim."""
-        for entry, finding in self.entries:
-            if entry.identifier == identifier:
-                return finding
-        raise KeyError(identifier)
+        return {entry.identifier: finding for entry, finding in self.entries}[identifier]
 
     def __iter__(self) -> Iterator[tuple[Claim, Finding]]:
         """Iterate over (claim, finding)."""
@@ -132,6 +205,23 @@ class Ledger:
     def __len__(self) -> int:
         """Return how many claims there are."""
         return len(self.entries)
+
+    def confirm(self) -> None:
+        """Make sure that every finding is as its claim pins it.
+
+        Raises
+        ------
+        AssertionError
+            If one is not: which, what was found and what is pinned.
+        """
+        wrong = [
+            f"{entry.identifier} is pinned as {entry.pinned.verdict}, {entry.pinned.value!r} "
+            f"within {entry.pinned.tolerance:g}; found {finding.verdict}, {finding.value!r}"
+            for entry, finding in self.entries
+            if not entry.pinned.admits(finding)
+        ]
+        if wrong:
+            raise AssertionError("\n".join(wrong))
 
     def counts(self) -> Counter[Verdict]:
         """Return how many claims met each verdict."""
@@ -165,7 +255,10 @@ class Ledger:
             writer.writerow(names)
             # As many digits as in the figures' tables: more would differ between machines.
             writer.writerows(record | {"value": f"{record['value']:.7g}"} for record in records)
-        tree.write_text(json.dumps(records, indent=1, ensure_ascii=False) + "\n", "utf-8")
+        # Other processes read this one: it is there as a whole, or not at all.
+        part = tree.with_suffix(".part")
+        part.write_text(json.dumps(records, indent=1, ensure_ascii=False) + "\n", "utf-8")
+        part.replace(tree)
         return [table, tree]
 
     def __repr__(self) -> str:
@@ -182,23 +275,53 @@ class Ledger:
             f'<tr id="claim-{html.escape(c.identifier)}" '
             'style="vertical-align: top; text-align: left">'
             '<td style="padding-right: 1em">'
-            f"<strong>{html.escape(c.identifier)}</strong><br>"
-            f'<span class="verdict verdict-{f.verdict.name.lower()}">{f.verdict}</span>'
+            f"<strong>{html.escape(c.identifier)}</strong><br>{badge(f.verdict, f.verdict)}"
             f"<br><small>{html.escape(c.place)}</small></td>"
-            f"<td><p>{html.escape(c.says)}</p>"
-            f"<p><strong>{f.value:.6g}</strong>: {html.escape(f.quantity)}.</p>"
-            f"<p>{html.escape(f.note)}</p></td></tr>"
+            f"<td>{explanation(c, f)}</td></tr>"
             for c, f in self.entries
         )
-        return (
-            '<table class="claims"><thead><tr style="text-align: left"><th>Claim, verdict</th>'
-            "<th>What the paper says, the number that decides it, and why</th></tr></thead>"
-            f"<tbody>{rows}</tbody></table>"
+        return table_of_claims(rows)
+
+
+def explanation(claim: Claim, finding: Finding) -> str:
+    """Return as HTML what a claim says, the number that decides it, and why."""
+    return (
+        f"<p>{html.escape(claim.says)}</p>"
+        f"<p><strong>{finding.value:.6g}</strong>: {html.escape(finding.quantity)}.</p>"
+        f"<p>{html.escape(finding.note)}</p>"
+    )
+
+
+def table_of_claims(rows: str) -> str:
+    """Return rows of two cells as an HTML table with a heading."""
+    return (
+        '<table class="claims"><thead><tr style="text-align: left">'
+        '<th scope="col">Claim, verdict</th>'
+        '<th scope="col">What the paper says, the number that decides it, and why</th>'
+        f"</tr></thead><tbody>{rows}</tbody></table>"
+    )
+
+
+def findings_of_the_build() -> dict[str, Finding]:
+    """Return what the claims' check at the start of a build or of the tests has found.
+
+    Both check every claim on all cores, before the first page or test, and leave claims.json
+    in the folder that the environment variable ARMLOCK_FIGURES names. Elsewhere this is empty.
+    """
+    folder = os.environ.get("ARMLOCK_FIGURES")
+    file = Path(folder) / "claims.json" if folder else None
+    if file is None or not file.exists():
+        return {}
+    return {
+        record["claim"]: Finding(
+            Verdict(record["verdict"]), record["value"], record["quantity"], record["note"]
         )
+        for record in json.loads(file.read_text("utf-8"))
+    }
 
 
 def check(*identifiers: str) -> Ledger:
-    """Check claims by identifier.
+    """Check claims by identifier, those that a build has not checked already.
 
     Parameters
     ----------
@@ -219,38 +342,54 @@ def check(*identifiers: str) -> Ledger:
             raise ValueError(
                 f"identifier must be one of {', '.join(_REGISTER)}; got {identifier!r}"
             )
-    return Ledger([_REGISTER[identifier] for identifier in identifiers])
+    chosen = [_REGISTER[identifier] for identifier in identifiers]
+    found = findings_of_the_build()
+    return Ledger((entry, found.get(entry.identifier) or entry.check()) for entry in chosen)
 
 
-def _check_together(identifiers: list[str]) -> dict[str, Finding]:
-    """Check some claims in a process of its own."""
-    import book.companion.claims  # noqa: F401, a new process has an empty register
-
-    return {identifier: _REGISTER[identifier].check() for identifier in identifiers}
-
-
-def check_in_parallel(claims: list[Claim]) -> Ledger:
-    """Check claims chapter by chapter, on all cores.
+def chapter_claims(chapter: str) -> Ledger:
+    """Check every claim that a chapter has to show.
 
     Parameters
     ----------
-    claims : list of Claim
-        Of this package; a process of its own knows no others.
+    chapter : str
+        Stem of its notebook, for instance "03_common_arm".
 
     Returns
     -------
     Ledger
-        The same as `Ledger(claims)`, sooner. The claims of a chapter share what they need,
-        such as one simulation, and so stay together.
+
+    Raises
+    ------
+    ValueError
+        If no claim names this chapter.
     """
-    chapters: dict[str, list[str]] = {}
+    names = [entry.identifier for entry in all_claims() if entry.chapter == chapter]
+    if not names:
+        known = ", ".join(dict.fromkeys(entry.chapter for entry in all_claims()))
+        raise ValueError(f"chapter must be one of {known}; got {chapter!r}")
+    return check(*names)
+
+
+def _check_chapter(chapter: str) -> dict[str, Finding]:
+    """Check the claims of a chapter in a process of its own."""
+    import book.companion.claims  # noqa: F401, a new process has an empty register
+
+    return {entry.identifier: finding for entry, finding in chapter_claims(chapter)}
+
+
+def check_in_parallel() -> Ledger:
+    """Check every claim, chapter by chapter, on all cores.
+
+    Returns
+    -------
+    Ledger
+        All claims. Those of a chapter share what they need, such as one simulation, and so
+        stay together.
+    """
     # The longest first: simulation and appendix stand at the end of the paper.
-    for entry in reversed(claims):
-        chapters.setdefault(entry.chapter, []).append(entry.identifier)
-    findings: dict[str, Finding] = {}
+    chapters = dict.fromkeys(entry.chapter for entry in reversed(all_claims()))
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
-        for found in pool.map(_check_together, chapters.values()):
-            findings |= found
-    ledger = Ledger([])
-    ledger.entries = [(entry, findings[entry.identifier]) for entry in claims]
-    return ledger
+        parts = pool.map(_check_chapter, chapters)
+        found = {name: finding for part in parts for name, finding in part.items()}
+    return Ledger((entry, found[entry.identifier]) for entry in all_claims())

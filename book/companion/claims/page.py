@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import html
 import inspect
-import json
 import os
-from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import NamedTuple
@@ -21,21 +19,27 @@ from book.companion.claims.ledger import (
     Ledger,
     Verdict,
     all_claims,
+    badge,
+    check,
     check_in_parallel,
+    explanation,
+    findings_of_the_build,
+    table_of_claims,
 )
 
-#: Section of the paper, by the letter that a claim's identifier starts with.
+#: Section of the paper that a chapter with claims is about.
 SECTIONS = {
-    "Z": "Sec. I and Table I",
-    "T": "Sec. I and Table I",
-    "S": "Sec. II, single arm",
-    "C": "Sec. III.A, common arm",
-    "D": "Sec. III.B, dual arm",
-    "N": "Sec. IV.A, frequency domain",
-    "K": "Sec. IV.B, controller",
-    "M": "Sec. IV.C, simulation",
-    "A": "Appendix",
+    "01_opening": "Sec. I and Table I",
+    "02_hayes": "Sec. II, single arm",
+    "03_common_arm": "Sec. III.A, common arm",
+    "04_dual_arm": "Sec. III.B, dual arm",
+    "05_nyquist": "Sec. IV.A, frequency domain",
+    "06_controller": "Sec. IV.B, controller",
+    "07_simulation": "Sec. IV.C, simulation",
+    "08_perturbations": "Appendix",
 }
+#: What makes the table's filter work.
+SCRIPT = Path(__file__).with_name("ledger.js")
 
 
 def whole_ledger() -> Ledger:
@@ -44,38 +48,15 @@ def whole_ledger() -> Ledger:
     Returns
     -------
     Ledger
-        All claims. A build of the book checks them before its first page and leaves
-        claims.csv and claims.json in the folder that the environment variable
-        ARMLOCK_FIGURES names; the pages read that. Elsewhere each call checks them, which
-        takes most of a minute.
+        All claims. A build of the book has checked them before its first page; elsewhere
+        each call checks them, which takes most of a minute.
     """
-    claims, folder = all_claims(), os.environ.get("ARMLOCK_FIGURES")
-    if not folder:
-        return check_in_parallel(claims)
-    file = Path(folder) / "claims.json"
-    try:
-        records = json.loads(file.read_text("utf-8"))
-    except (FileNotFoundError, json.JSONDecodeError):  # not there, or just being written
-        records = []
-    known = {record["claim"]: record for record in records}
-    if list(known) != [claim.identifier for claim in claims]:
-        ledger = check_in_parallel(claims)
+    names = [claim.identifier for claim in all_claims()]
+    if findings_of_the_build().keys() >= set(names):
+        return check(*names)
+    ledger = check_in_parallel()
+    if folder := os.environ.get("ARMLOCK_FIGURES"):
         ledger.write(Path(folder))
-        return ledger
-    ledger = Ledger([])
-    for claim in claims:
-        record = known[claim.identifier]
-        ledger.entries.append(
-            (
-                claim,
-                Finding(
-                    Verdict(record["verdict"]),
-                    record["value"],
-                    record["quantity"],
-                    record["note"],
-                ),
-            )
-        )
     return ledger
 
 
@@ -98,19 +79,6 @@ class Source(NamedTuple):
     line: int
     purpose: str
     text: str
-
-
-def section(claim: Claim) -> str:
-    """Return the paper's section that a claim belongs to.
-
-    Examples
-    --------
-    >>> from book.companion.claims import check
-    >>> from book.companion.claims.page import section
-    >>> [section(claim) for claim, _ in check("T1")]
-    ['Sec. I and Table I']
-    """
-    return SECTIONS.get(claim.identifier[:1], "Elsewhere")
 
 
 def source(claim: Claim) -> Source:
@@ -143,17 +111,10 @@ def project_url() -> str | None:
     return found[0].rstrip("/") if found else None
 
 
-def chapter_link(claim: Claim, root: str = "") -> str:
-    """Return the address of a claim in its chapter's own table.
-
-    Parameters
-    ----------
-    claim : Claim
-        The claim.
-    root : str, optional
-        From the linking page to the folder of the chapters, empty for a chapter.
-    """
-    return f"{root}{claim.chapter}.html#claim-{claim.identifier}"
+def link_to_chapter(claim: Claim) -> str:
+    """Return a link from another chapter to a claim in its own chapter's table."""
+    name = html.escape(claim.identifier)
+    return f'<a href="{claim.chapter}.html#claim-{name}">{name}</a>'
 
 
 class VerdictCounts:
@@ -177,9 +138,7 @@ class VerdictCounts:
     def _repr_html_(self) -> str:
         """Return the line as HTML."""
         parts = "".join(
-            f'<span class="verdict verdict-{v.name.lower()}">{self.counts[v]} {v}</span> '
-            for v in Verdict
-            if self.counts[v]
+            badge(v, f"{self.counts[v]} {v}") + " " for v in Verdict if self.counts[v]
         )
         total = sum(self.counts.values())
         return f'<p class="verdict-counts">{total} claims: {parts}</p>'
@@ -217,10 +176,8 @@ class LedgerPage:
         downloads = f'<p class="figure-downloads">The ledger as data: {links}</p>'
         return (
             f'<div class="ledger">{_controls(self.ledger)}'
-            '<table class="claims"><thead><tr><th scope="col">Claim, verdict</th>'
-            '<th scope="col">What the paper says, the number that decides it, and why</th>'
-            f"</tr></thead><tbody>{rows}</tbody></table>{downloads if links else ''}</div>"
-            f"<script>{_SCRIPT}</script>"
+            f"{table_of_claims(rows)}{downloads if links else ''}</div>"
+            f"<script>{SCRIPT.read_text('utf-8')}</script>"
         )
 
 
@@ -229,11 +186,11 @@ def _controls(ledger: Ledger) -> str:
     counts = ledger.counts()
     boxes = "".join(
         f'<label><input type="checkbox" name="verdict" value="{v.name.lower()}" checked> '
-        f'<span class="verdict verdict-{v.name.lower()}">{v} ({counts[v]})</span></label>'
+        f"{badge(v, f'{v} ({counts[v]})')}</label>"
         for v in Verdict
         if counts[v]
     )
-    sections = dict.fromkeys(section(claim) for claim, _ in ledger)
+    sections = dict.fromkeys(SECTIONS[claim.chapter] for claim, _ in ledger)
     options = "".join(f"<option>{html.escape(name)}</option>" for name in sections)
     return (
         '<form class="ledger-filter" hidden><fieldset><legend>Verdicts</legend>'
@@ -248,69 +205,35 @@ def _controls(ledger: Ledger) -> str:
 
 def _row(claim: Claim, finding: Finding) -> str:
     """Return one row of the table."""
-    escape = html.escape
-    place = source(claim)
-    url = project_url()
+    escape, name = html.escape, html.escape(claim.identifier)
+    place, url = source(claim), project_url()
     where = f"{place.file}, line {place.line}"
     if url:
         where = f'<a href="{escape(url)}/blob/main/{place.file}#L{place.line}">{where}</a>'
-    kind = finding.verdict.name.lower()
     return (
-        f'<tr id="ledger-{escape(claim.identifier)}" data-verdict="{kind}" '
-        f'data-section="{escape(section(claim))}">'
-        f'<td><a href="{escape(chapter_link(claim))}">{escape(claim.identifier)}</a><br>'
-        f'<span class="verdict verdict-{kind}">{finding.verdict}</span>'
-        f"<br><small>{escape(claim.place)}</small></td>"
-        f"<td><p>{escape(claim.says)}</p>"
-        f"<p><strong>{finding.value:.6g}</strong>: {escape(finding.quantity)}.</p>"
-        f"<p>{escape(finding.note)}</p>"
-        f"<details><summary>Source of {escape(claim.identifier)}</summary><p>{where}</p>"
+        f'<tr id="ledger-{name}" data-verdict="{finding.verdict.name.lower()}" '
+        f'data-section="{escape(SECTIONS[claim.chapter])}">'
+        f"<td>{link_to_chapter(claim)}<br>{badge(finding.verdict, finding.verdict)}"
+        f"<br><small>{escape(claim.place)}</small></td><td>{explanation(claim, finding)}"
+        f"<details><summary>Source of {name}</summary><p>{where}</p>"
         f'<pre tabindex="0">{escape(place.text)}</pre></details></td></tr>'
     )
 
 
-def errata(ledger: Ledger, verdicts: Sequence[Verdict] = ()) -> ErrataTable:
-    """Return what is not as printed: every claim that was not simply reproduced.
+class Errata:
+    """What was not simply reproduced: printed, derived, how it was found, what it affects.
 
     Parameters
     ----------
     ledger : Ledger
         The claims and their findings.
-    verdicts : sequence of Verdict, optional
+    *verdicts : Verdict
         Which ones to take; by default "not as written" and "differs".
     """
-    chosen = verdicts or (Verdict.NOT_AS_WRITTEN, Verdict.DIFFERS)
-    return ErrataTable([entry for entry in ledger if entry[1].verdict in chosen], ledger)
 
-
-#: Claims whose verdict or number uses the formula or value that an erratum corrects.
-DEPENDS = {
-    "T2": ("T3", "T4"),
-    "T3": ("T2", "T4"),
-    "T4": ("Z1", "D1", "D2"),
-    "C4": ("D1", "D10"),
-    "C5": ("C6", "C7"),
-    "C7": ("C8",),
-    "D1": ("D2", "D3"),
-    "D10": ("K5", "K13"),
-    "N1": ("N10", "K5"),
-    "N4": ("N5", "N6"),
-    "N8": ("D4", "N11"),
-    "K4": ("K5", "K10"),
-    "K6": ("K8", "M3"),
-    "K13": ("K5", "K10", "M1"),
-    "S8": ("S9",),
-    "A2": ("A3", "A4"),
-    "A3": ("N1", "M2", "A4", "A5"),
-    "M7": ("M1", "M4"),
-}
-
-
-class ErrataTable:
-    """Printed, derived, how the difference was found, and what depends on it."""
-
-    def __init__(self, entries: Sequence[tuple[Claim, Finding]], ledger: Ledger) -> None:
-        self.entries = list(entries)
+    def __init__(self, ledger: Ledger, *verdicts: Verdict) -> None:
+        chosen = verdicts or (Verdict.NOT_AS_WRITTEN, Verdict.DIFFERS)
+        self.entries = [entry for entry in ledger if entry[1].verdict in chosen]
         self.known = {claim.identifier: (claim, finding) for claim, finding in ledger}
 
     def __len__(self) -> int:
@@ -324,65 +247,26 @@ class ErrataTable:
             for c, f in self.entries
         )
 
-    def dependents(self, claim: Claim) -> list[tuple[Claim, Finding]]:
-        """Return the claims that the erratum bears on, as far as they are registered."""
-        named = DEPENDS.get(claim.identifier, ())
-        return [self.known[name] for name in named if name in self.known]
-
     def _repr_html_(self) -> str:
         """Return one block an erratum; a table of four columns would not fit a phone."""
         return "".join(self._block(*entry) for entry in self.entries)
 
     def _block(self, claim: Claim, finding: Finding) -> str:
-        escape = html.escape
-        depends = ", ".join(
-            f'<a href="{escape(chapter_link(c))}">{escape(c.identifier)}</a> ({f.verdict})'
-            for c, f in self.dependents(claim)
-        )
-        own = f'<a href="{escape(chapter_link(claim))}">{escape(claim.identifier)}</a>'
+        known = [self.known[name] for name in claim.affects if name in self.known]
+        affects = ", ".join(f"{link_to_chapter(c)} ({f.verdict})" for c, f in known)
         parts = {
-            "Printed": escape(claim.says),
+            "Printed": html.escape(claim.says),
             "Deciding number": f"<strong>{finding.value:.6g}</strong>: "
-            f"{escape(finding.quantity)}.",
-            "What follows": escape(finding.note),
-            "How it was found": escape(source(claim).purpose),
+            f"{html.escape(finding.quantity)}.",
+            "What follows": html.escape(finding.note),
+            "How it was found": html.escape(source(claim).purpose),
+            "What depends on it": affects,
         }
-        if depends:
-            parts["What depends on it"] = depends
-        items = "".join(f"<dt>{name}</dt><dd>{text}</dd>" for name, text in parts.items())
-        kind = finding.verdict.name.lower()
-        return (
-            f'<section class="erratum" id="erratum-{escape(claim.identifier)}">'
-            f"<p><strong>{own}, {escape(claim.place)}</strong> "
-            f'<span class="verdict verdict-{kind}">{finding.verdict}</span></p>'
-            f"<dl>{items}</dl></section>"
+        items = "".join(
+            f"<dt>{name}</dt><dd>{text}</dd>" for name, text in parts.items() if text
         )
-
-
-_SCRIPT = """
-(function () {
-  const form = document.querySelector('.ledger-filter');
-  const rows = [...document.querySelectorAll('.ledger tbody tr')];
-  const texts = rows.map(row => row.textContent.toLowerCase());
-  function show() {
-    const data = new FormData(form);
-    const verdicts = data.getAll('verdict');
-    const section = data.get('section');
-    const words = data.get('words').toLowerCase().split(' ').filter(Boolean);
-    let count = 0;
-    rows.forEach((row, i) => {
-      const hit = verdicts.includes(row.dataset.verdict)
-        && (!section || row.dataset.section === section)
-        && words.every(word => texts[i].includes(word));
-      row.hidden = !hit;
-      count += hit;
-    });
-    form.querySelector('output').textContent = count + ' of ' + rows.length + ' claims';
-  }
-  form.hidden = false;
-  form.addEventListener('input', show);
-  form.addEventListener('submit', event => event.preventDefault());
-  form.addEventListener('reset', () => setTimeout(show));
-  show();
-})();
-"""
+        return (
+            f'<section class="erratum" id="erratum-{claim.identifier}">'
+            f"<p><strong>{link_to_chapter(claim)}, {html.escape(claim.place)}</strong> "
+            f"{badge(finding.verdict, finding.verdict)}</p><dl>{items}</dl></section>"
+        )

@@ -3,7 +3,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from armlock import CommonArm, HayesEquation, boundary, stability_chart
+from armlock import CommonArm, HayesEquation, stability_chart
+from book.companion import outline as boundary
 
 WRONG: dict[str, Any] = {"half": 2.5, "integer": np.int64(12)}
 DIAGONAL = np.full((2, 1), np.sqrt(0.5))

@@ -1,0 +1,47 @@
+"""Links to the repository, once its address is known.
+
+The address stands in one place, `[project.urls]` of pyproject.toml. Until it does, no page
+links to a repository, and chapters have no buttons that launch them elsewhere. Once it does,
+pages have both, and the directive `published` shows its content, with ADDRESS replaced.
+"""
+
+from sphinx.util.docutils import SphinxDirective
+
+from book.companion.claims.page import project_url
+
+# Links that a reader may follow; nothing is asked of these servers before.
+LAUNCHERS = {
+    "binderhub_url": "https://mybinder.org",
+    "colab_url": "https://colab.research.google.com",
+    "notebook_interface": "jupyterlab",
+}
+
+
+class Published(SphinxDirective):
+    """Show the content if the book has an address, and nothing otherwise."""
+
+    has_content = True
+
+    def run(self):
+        """Return the content with the address in it."""
+        address = project_url()
+        if address is None:
+            return []
+        return self.parse_text_to_nodes("\n".join(self.content).replace("ADDRESS", address))
+
+
+def show_links(app, config):
+    """Give the theme the address."""
+    if address := project_url():
+        config.html_theme_options |= {
+            "repository_url": address,
+            "use_repository_button": True,
+            "launch_buttons": LAUNCHERS,
+        }
+
+
+def setup(app):
+    """Register with Sphinx."""
+    app.add_directive("published", Published)
+    app.connect("config-inited", show_links)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
