@@ -279,6 +279,9 @@ def count(sketch, c1, c2, sigma=0.0):
     if sketch.neutral and not view.confined():
         return -2
     poles = sketch.open_poles() - sigma
+    # D is R at s = 0 to a power: with one left over, a root lies there.
+    if np.count_nonzero(poles == 0.0) > max(view.power, 0):
+        return -1
     high = 10.0 * float(view.corners.max())
     goal = 1.0 if sketch.delay else 1.0 + view.limit()[0]
     while True:
