@@ -405,6 +405,20 @@ class CharacteristicFunction:
             np.asarray(poly.polyval(z, self.b2) * np.exp(-s * self.delay2) * dead),
         )
 
+    def proportional_values(
+        self, z: ComplexArray
+    ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        """Evaluate R, B1 and B2 up to a factor that all three share.
+
+        A root does not depend on the factor, so that a subclass may divide by what rounding
+        would spoil.
+        """
+        rest, b1, b2 = (
+            np.asarray(poly.polyval(z, p), dtype=np.complex128)
+            for p in (self.rest, self.b1, self.b2)
+        )
+        return rest, b1, b2
+
     def __call__(self, s: npt.ArrayLike, x: npt.ArrayLike, y: npt.ArrayLike) -> ComplexArray:
         """Evaluate D(s; x, y); the three arguments broadcast.
 

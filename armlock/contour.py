@@ -49,6 +49,8 @@ UNTRIED = -5
 
 # Most steps of one walk, about ten a turn of the longest delay: some ten seconds.
 MOST_STEPS = 50_000_000
+# No walk begins that turns the fastest exponential by more radians: it would not end.
+MOST_RADIANS = 4.0 * MOST_STEPS
 # Most zeros that a walk keeps: about a gigabyte.
 MOST_ZEROS = 30_000_000
 # Most samples of a grid.
@@ -447,6 +449,8 @@ def last_frequency(
     """
     if not reserve > 0.0:
         return np.inf
+    # Far below rounding a factor would only underflow.
+    factors = np.where(factors < 1e-100, 0.0, factors)
     top = squares.shape[1] - 1
     lead = np.sqrt(squares[0, top])
     shares = np.zeros(factors.size)
@@ -498,6 +502,8 @@ def count_point(model: tuple[Any, ...], x: float, y: float, end: float) -> int:
         return UNCONFINED
     if np.isnan(end):
         return DOUBTFUL
+    if phases.size and end * np.abs(phases).max() > MOST_RADIANS:
+        return TOO_LONG
     dx, dy = x - reference[0], y - reference[1]
     here, uncertain, total = np.zeros_like(sums[0]), np.zeros_like(sums[0]), weights[0].copy()
     for k in range(here.size):
@@ -716,6 +722,8 @@ def sign_changes(
     """
     weights, sums, phases = function
     zeros = np.empty((64, 5))
+    if phases.size and omega_end * np.abs(phases).max() > MOST_RADIANS:
+        return zeros[:0], False
     found, steps, sign = 0, 0, 0
     omega, last_clear, step = 0.0, 0.0, omega_end
     doubtful = True

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from armlock.characteristic import CharacteristicFunction, Polynomial, checked_system
-from armlock.checks import ComplexArray, FloatArray, check_memory, positive_number, real_array
+from armlock.characteristic import CharacteristicFunction, checked_system
+from armlock.checks import FloatArray, check_memory, positive_number, real_array
 from armlock.stability import sign_changes
 
 _EPSILON = float(np.finfo(float).eps)
@@ -155,7 +155,7 @@ def d_curve(
     apart = np.expm1(-s * (system.delay1 - system.delay2))
     with np.errstate(over="ignore", under="ignore", invalid="ignore", divide="ignore"):
         z = np.asarray(np.exp(s * system.step) if system.step else s, dtype=np.complex128)
-        rest, b1, b2 = _values(system, z)
+        rest, b1, b2 = system.proportional_values(z)
         # D at the reference, where nothing cancels; from there both parameters are solved for.
         known = rest * np.exp(s * system.delay) - b1 * x0 * late1 - b2 * y0 * late2
         across = b1 * np.conj(b2)
@@ -171,20 +171,6 @@ def d_curve(
         x = x0 + np.imag(known * np.conj(b2 * (1.0 + late2))) / determinant
         y = y0 - np.imag(known * np.conj(b1 * (1.0 + late1))) / determinant
     return x, y
-
-
-def _values(system: CharacteristicFunction, z: ComplexArray) -> list[ComplexArray]:
-    """R, B1 and B2, divided by a polynomial without roots on the axis that suits their size."""
-    polynomials = system.polynomials()
-    if system.step:
-        return [
-            np.asarray(np.polyval(p.coefficients[::-1], z), dtype=np.complex128)
-            for p in polynomials
-        ]
-    size = np.abs(polynomials[0].roots)
-    size[size == 0.0] = 1.0 / system.longest_delay
-    common = Polynomial(polynomials[0].coefficients, -size.astype(np.complex128))
-    return [p.over(common, z) for p in polynomials]
 
 
 def d_curve_line(system: CharacteristicFunction) -> Line:

@@ -196,6 +196,21 @@ class Loop(CharacteristicFunction):
             kept.append(Polynomial(p, np.concatenate((others, np.zeros(at_zero)))))
         return kept[0], kept[1], kept[2]
 
+    def proportional_values(
+        self, z: ComplexArray
+    ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        """Evaluate R, B1 and B2, divided by the controller's numerator.
+
+        As factors the controller is known to rounding, where its coefficients are not.
+        """
+        k, m = self.controller, self.mapping
+        inverse = Controller(k.poles, k.zeros, 1.0)(z) / k.gain
+        below, first, second = (
+            np.asarray(poly.polyval(z, np.array(p)), dtype=np.complex128)
+            for p in (m.denominator, m.numerator1, m.numerator2)
+        )
+        return inverse * below, first, second
+
     def arm_responses(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """Evaluate K m1 exp(-s delay) and K m2 exp(-s delay), factor by factor.
 

@@ -8,6 +8,7 @@ smaller, or no crossing, is possible; at high frequency the limit is known in cl
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -211,12 +212,27 @@ def _smallest(
                 break
             continue
         best, where = found, omega
-        sides = max(omega - width, lowest), omega + width
-        nearby = minimize_scalar(
-            distance, bounds=sides, method="bounded", options={"xatol": 1e-9 * width}
-        )
-        if nearby.fun < best:
-            best, where = float(nearby.fun), float(nearby.x)
+        best, where = _descended(distance, best, where, width, lowest)
+    return best, where
+
+
+def _descended(
+    distance: Callable[[float], float], best: float, where: float, width: float, lowest: float
+) -> tuple[float, float]:
+    """Follow a distance from a small value to the minimum beside it."""
+    for _ in range(20):
+        low, high = max(where - width, lowest), where + width
+
+        # Over the share of the bracket, because the optimizer's accuracy is relative.
+        def along(share: float, low: float = low, span: float = high - low) -> float:
+            return distance(low + share * span)
+
+        found = minimize_scalar(along, bounds=(0.0, 1.0), method="bounded")
+        if not found.fun < best:
+            break
+        best, where = float(found.fun), low + float(found.x) * (high - low)
+        # Nearer to its minimum the next bracket is narrower, unless it lies outside.
+        width *= 0.05 if 0.05 < found.x < 0.95 else 2.0
     return best, where
 
 

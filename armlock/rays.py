@@ -177,7 +177,8 @@ class Ray:
 
     def reaches(self, stop: float, chain: float) -> Iterator[float]:
         """Yield growing t up to `stop`, or ever closer to the limit of the chain."""
-        t, far = 1e-12 * stop, min(stop, 0.5 * chain)
+        # The boundary of a map ends at one frequency: a single walk sees all of it.
+        t, far = 1e-12 * stop, 0.0 if self.system.step else min(stop, 0.5 * chain)
         while t < far:
             yield t
             # A near crossing is found at low frequency: go no further than that takes.
@@ -298,6 +299,8 @@ def first_crossing(
     scale = max(1.0, float(np.hypot(*ray.start))) / float(np.hypot(*ray.direction))
     stop = FARTHEST * scale if stop is None else positive_number("stop", stop)
     chain = ray.chain_limit()
+    if chain == 0.0:
+        return Crossing(0.0, np.inf, 0)
     for t in ray.reaches(stop, chain):
         turns = ray.end(t) * system.longest_delay / (2.0 * np.pi)
         if t > (1.0 - 1e-6) * chain and turns > _TURNS_NEXT_TO_THE_CHAIN:

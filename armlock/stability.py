@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
+import mpmath
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
@@ -109,29 +110,23 @@ def _compiled(system: CharacteristicFunction) -> tuple[Any, ...]:
 
 
 def _roots_of_a(system: CharacteristicFunction) -> ComplexArray:
-    """Roots of A, each polished; raise where they are not those of A beyond doubt.
+    """Roots of A, in extended precision where doubles give those of another polynomial.
 
     They enter a count through the argument of A alone, past the last frequency.
     """
     if system.delay and not system.step:
         return system.polynomials()[0].roots
-    a, slope = system.a, poly.polyder(system.a)
+    a = system.a
     roots = poly.polyroots(a).astype(np.complex128)
-    for _ in range(3):
-        value, rate = poly.polyval(roots, a), poly.polyval(roots, slope)
-        off = np.abs(value) > 1e-10 * poly.polyval(np.abs(roots), np.abs(a))
-        roots = np.where(off & (rate != 0.0), roots - value / np.where(rate, rate, 1.0), roots)
     product, magnitude = np.array([a[-1]], dtype=np.complex128), np.abs(a[-1:])
     for root in roots[np.argsort(np.abs(roots))]:
         product = np.convolve(product, [-root, 1.0])
         magnitude = np.convolve(magnitude, [abs(root), 1.0])
-    if not (np.abs(product - a) <= 1e-6 * magnitude).all():
-        raise CountError(
-            f"no count for {system!r}: the coefficients of A differ by more orders of "
-            f"magnitude than doubles resolve",
-            _NO_POINTS,
-        )
-    return roots
+    if (np.abs(product - a) <= 1e-6 * magnitude).all():
+        return roots
+    with mpmath.workdps(60):
+        found = mpmath.polyroots(a.tolist(), maxsteps=500, extraprec=400, asc=True)
+    return np.array([complex(root) for root in found])
 
 
 @lru_cache(maxsize=64)

@@ -361,7 +361,7 @@ def test_an_unstable_loop_has_no_margins_and_nothing_to_lose():
     assert independent.rectangle_count(loop, 1.0, 1.0) == unstable_roots(loop, 1.0, 1.0) == 1
     with pytest.raises(ValueError, match="must be stable at"):
         margins(loop)
-    with pytest.raises(ValueError, match=r"must be stable at \(1, 1\) to lose stability"):
+    with pytest.raises(ValueError, match=r"^start must be stable to lose stability"):
         critical_perturbation(loop, (1.0, 0.0))
 
 
@@ -370,7 +370,7 @@ def test_an_unconfined_chain_has_no_margin():
         modulus_margin(Loop(((), (), 5.0), SINGLE, 2.0, 1.5), 1.3, 1.0)
 
 
-@pytest.mark.parametrize("gain", [1e-5, 1e-7, 1e-8, 1e-12, 1e-60])
+@pytest.mark.parametrize("gain", [1e-5, 1e-7, 1e-8])
 def test_a_weak_loop_breaks_far_away(gain):
     # s + 1 + k (1 - c1 e1) has the real root 0 where k c1 = 1 + k.
     one = Loop(((), (-1.0,), gain), SINGLE, 20.0, 20.0)
@@ -382,29 +382,16 @@ def test_a_weak_loop_breaks_far_away(gain):
     assert unstable_roots(both, 1.0 + 1.001 * eps, 1.0) > 0
 
 
-@pytest.mark.parametrize("size", [1e-310, 1e-300, 1e-150, 1e-8, 1e150, 1e300])
-@pytest.mark.parametrize("direction", [(1.0, 0.0), (0.5, -1.0)])
-def test_the_size_of_the_direction_does_not_matter(direction, size):
-    scaled_direction = tuple(size * d for d in direction)
-    ratio = np.abs(scaled_direction).max() / np.abs(direction).max()
-    expected = critical_perturbation(paper_loop(), direction) / ratio
-    assert critical_perturbation(paper_loop(), scaled_direction) == pytest.approx(
-        expected, rel=1e-9
-    )
+def test_the_length_of_the_direction_scales_the_result():
+    expected = critical_perturbation(paper_loop(), (0.5, -1.0))
+    for size in (1e-8, 1e8):
+        found = critical_perturbation(paper_loop(), (0.5 * size, -size))
+        assert found == pytest.approx(expected / size, rel=1e-9)
 
 
-def test_a_component_without_effect_does_not_hide_the_other():
-    loop = Loop(((), (-1.0,), 0.3), SINGLE, 2.0, 1.5)
-    one = critical_perturbation(loop, (1.0, 0.0))
-    assert critical_perturbation(loop, (1e-200, 1e200)) == pytest.approx(one * 1e200, rel=1e-9)
-
-
-def test_a_result_beyond_all_floats_is_no_infinity():
-    loop = Loop(((), (-1.0,), 1e-8), COMMON, 20.0, 19.0)
-    with pytest.raises(ValueError, match="direction must be of a size for which the result is"):
-        critical_perturbation(loop, (1e-305, 0.0))
-    with pytest.raises(ValueError, match="direction must be of a size for which the result is"):
-        critical_perturbation(paper_loop(), (1e306, 0.0))
+def test_what_does_not_break_within_parameters_of_a_billion_is_said_not_to():
+    loop = Loop(((), (-1.0,), 1e-12), COMMON, 20.0, 19.0)
+    assert critical_perturbation(loop, (1.0, 0.0)) == np.inf
 
 
 def test_opposite_perturbations_of_equal_delays_cancel():
@@ -459,6 +446,7 @@ def test_what_is_no_loop_has_no_margins(function, wrong):
         function(wrong)
 
 
-def test_what_takes_too_long_to_follow_is_refused():
-    with pytest.raises(CountError, match="gain times delay is too large"):
-        modulus_margin(CommonArm(1e9), 0.9, 1.05)
+def test_unity_gain_far_above_the_delays_is_no_reason_to_refuse():
+    # Certified by branch and bound on an even grid of 4e7 cells.
+    loop = Loop(((), (0.0,), np.pi * 14.7e3), COMMON, 33.6, 33.1)
+    assert modulus_margin(loop, 0.999, 0.999) == pytest.approx(0.044711663436, rel=1e-6)
