@@ -75,6 +75,8 @@ class Ray:
                 raise ValueError(f"{name} must hold two numbers, got {value.size}")
         if not self.direction.any():
             raise ValueError("direction must not have length zero, got (0, 0)")
+        #: The t at which the parameters are about as far from the start as it is from zero.
+        self.scale = max(1.0, float(np.hypot(*self.start))) / float(np.hypot(*self.direction))
         self.family = system.at(*self.start).times_conjugate(system.deviation(*self.direction))
 
     def at(self, t: float) -> tuple[float, float]:
@@ -178,7 +180,10 @@ class Ray:
     def reaches(self, stop: float, chain: float) -> Iterator[float]:
         """Yield growing t up to `stop`, or ever closer to the limit of the chain."""
         # The boundary of a map ends at one frequency: a single walk sees all of it.
-        t, far = 1e-12 * stop, 0.0 if self.system.step else min(stop, 0.5 * chain)
+        t, far = (
+            1e-4 * min(stop, self.scale),
+            0.0 if self.system.step else min(stop, 0.5 * chain),
+        )
         while t < far:
             yield t
             # A near crossing is found at low frequency: go no further than that takes.
@@ -296,8 +301,7 @@ def first_crossing(
     0.254006 3.7746 2
     """
     ray = Ray(system, start, direction)
-    scale = max(1.0, float(np.hypot(*ray.start))) / float(np.hypot(*ray.direction))
-    stop = FARTHEST * scale if stop is None else positive_number("stop", stop)
+    stop = FARTHEST * ray.scale if stop is None else positive_number("stop", stop)
     chain = ray.chain_limit()
     if chain == 0.0:
         return Crossing(0.0, np.inf, 0)
@@ -306,7 +310,7 @@ def first_crossing(
         if t > (1.0 - 1e-6) * chain and turns > _TURNS_NEXT_TO_THE_CHAIN:
             break
         # A boundary at the start itself, known to rounding, is not a crossing beyond it.
-        found = ray.crossings(t, first=True, lowest=1e-15 * scale)
+        found = ray.crossings(t, first=True, lowest=1e-15 * ray.scale)
         if found.position.size:
             return Crossing(
                 float(found.position[0]), float(found.omega[0]), int(found.change[0])
@@ -355,8 +359,7 @@ def first_break(
             f"start must be stable to lose stability, but unstable_roots gives {count} at "
             f"{ray.at(0.0)}"
         )
-    scale = max(1.0, float(np.hypot(*ray.start))) / float(np.hypot(*ray.direction))
-    if count != 0 and int(unstable_roots(system, *ray.at(1e-9 * scale))) != 0:
+    if count != 0 and int(unstable_roots(system, *ray.at(1e-9 * ray.scale))) != 0:
         return Crossing(0.0, np.nan, 0)
     found = first_crossing(system, start, direction)
     if not np.isfinite(found.position):
