@@ -506,11 +506,9 @@ def gain_interval(
             break
     if lower < 1.0 / LARGEST_GAIN:
         lower = 0.0
-    return (
-        (float(lower), upper, where)
-        if upper <= LARGEST_GAIN
-        else (float(lower), np.inf, np.nan)
-    )
+    if upper > LARGEST_GAIN:
+        upper, where = np.inf, np.nan
+    return float(lower), float(upper), float(where)
 
 
 def _free_margins(
