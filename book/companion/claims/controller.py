@@ -103,8 +103,12 @@ def readings() -> tuple[Reading, ...]:
 
 
 def counts_of(controller: str, *, actuator: bool = False) -> dict[str, int]:
-    """Return the counts of one reading by perturbation."""
-    return {r.point: r.winding for r in readings() if r[:2] == (controller, actuator)}
+    """Return the counts of one reading by perturbation; the methods must agree."""
+    chosen = [r for r in readings() if r[:2] == (controller, actuator)]
+    for reading in chosen:
+        if not reading.agree:
+            raise RuntimeError(f"the methods disagree: {reading}")
+    return {reading.point: reading.winding for reading in chosen}
 
 
 def rightmost_of(controller: str, point: str, *, actuator: bool = False) -> complex:
