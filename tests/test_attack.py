@@ -24,8 +24,8 @@ def test_what_was_wrong_once_is_right():
 
 @pytest.mark.parametrize("kind", list(attack.CHECKS))
 def test_random_loops_agree_with_brute_force(kind):
-    # Few random loops are stable at (1, 1), as a critical perturbation needs.
-    number = 60 if kind == "critical" else 10
-    tally = attack.attack(7, range(number), (kind,), attack.Tally(patient=False))
+    # Few random loops are stable at (1, 1), as a critical perturbation needs: seed 8 has one.
+    seed = 8 if kind == "critical" else 7
+    tally = attack.attack(seed, range(10), (kind,), attack.Tally(patient=False))
     assert tally.calls.total() > tally.calls["loops"]
     assert listed(tally) == []
