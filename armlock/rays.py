@@ -189,7 +189,7 @@ class Ray:
             # A near crossing is found at low frequency: go no further than that takes.
             here, low, high = self.end(t), t, min(_LONGER * t, far)
             limit = _LONGER * max(here, 1.0 / max(self.system.longest_delay, 1e-12))
-            while self.end(high) > limit and high - low > 1e-2 * high:
+            while self.end(high) > limit and high - low > 1e-9 * high:
                 middle = 0.5 * (low + high)
                 low, high = (middle, high) if self.end(middle) <= limit else (low, middle)
             t = low if self.end(low) > 2.0 * here else max(high, _LONGER * t)
