@@ -23,8 +23,8 @@ from armlock.nyquist import leading_radius, loop_numerator
 from armlock.rays import first_break
 from armlock.stability import (
     CountError,
+    last_larger,
     sign_changes,
-    squared_magnitudes,
     unstable_roots,
 )
 
@@ -140,21 +140,6 @@ def _clear_from(loop: Loop, c1: float, c2: float, centre: float, radius: float) 
         first = _plus(first, c)
     others = (loop.rest, loop.b1, loop.b2, c)
     return last_larger(first, others, np.array(factors))
-
-
-def last_larger(
-    first: FloatArray, others: tuple[FloatArray, ...], factors: FloatArray
-) -> float:
-    """Frequency past which a polynomial is larger than the sum of others; inf if it is not."""
-    degree = max(p.size for p in others)
-    lead = abs(float(first[-1])) if first.size >= degree else 0.0
-    if lead == 0.0:
-        return np.inf
-    tops = [abs(float(p[-1])) if p.size == first.size else 0.0 for p in others]
-    reserve = (lead - float(factors @ np.array(tops))) / lead
-    squares, unit = squared_magnitudes((first, *others))
-    found: float = contour.last_frequency(squares, unit, factors, reserve)
-    return found
 
 
 def _smallest(

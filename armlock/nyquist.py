@@ -32,8 +32,8 @@ from armlock.stability import (
     UNCONFINED,
     CountError,
     last_frequency,
+    last_larger,
     sign_changes,
-    squared_magnitudes,
     unstable_roots,
 )
 
@@ -433,14 +433,8 @@ def nyquist(
 
 def frequency_above(loop: Loop, c1: float, c2: float, level: float) -> float:
     """Frequency past which |L| stays below `level`; inf if it does not."""
-    b1, b2 = loop.b1, loop.b2
-    squares, unit = squared_magnitudes((loop.rest, b1, b2))
     factors = np.array([1.0 + abs(c1), 1.0 + abs(c2)]) / level
-    leads = [abs(b[-1] / loop.rest[-1]) if b.size == loop.rest.size else 0.0 for b in (b1, b2)]
-    found: float = contour.last_frequency(
-        squares, unit, factors, 1.0 - float(factors @ np.array(leads))
-    )
-    return found
+    return last_larger(loop.rest, (loop.b1, loop.b2), factors)
 
 
 def axis_crossings(

@@ -163,6 +163,21 @@ def squared_magnitudes(polynomials: Sequence[FloatArray]) -> tuple[FloatArray, f
     return squares, float(np.ldexp(1.0, exponent))
 
 
+def last_larger(
+    first: FloatArray, others: tuple[FloatArray, ...], factors: FloatArray
+) -> float:
+    """Frequency past which a polynomial is larger than the sum of others; inf if it is not."""
+    degree = max(p.size for p in others)
+    lead = abs(float(first[-1])) if first.size >= degree else 0.0
+    if lead == 0.0:
+        return np.inf
+    tops = [abs(float(p[-1])) if p.size == first.size else 0.0 for p in others]
+    reserve = (lead - float(factors @ np.array(tops))) / lead
+    squares, unit = squared_magnitudes((first, *others))
+    found: float = contour.last_frequency(squares, unit, factors, reserve)
+    return found
+
+
 def last_frequency(
     system: CharacteristicFunction, x: npt.ArrayLike, y: npt.ArrayLike
 ) -> FloatArray:
