@@ -9,6 +9,7 @@ from book.companion.claims import (
     Finding,
     Ledger,
     Verdict,
+    Weight,
     all_claims,
     chapter_claims,
     check,
@@ -16,6 +17,7 @@ from book.companion.claims import (
     decide,
 )
 from book.companion.claims import ledger as module
+from book.companion.claims.ledger import typeset
 from book.companion.claims.page import SECTIONS, whole_ledger
 
 NOTEBOOKS = Path(__file__).parents[1] / "notebooks"
@@ -78,6 +80,23 @@ def test_verdicts_are_counted(calls):
     assert chapter_claims("00").counts() == {Verdict.REPRODUCED: 1, Verdict.DIFFERS: 1}
 
 
+def test_claims_with_one_finding_count_once(calls):
+    claim("X3", place="", says="", chapter="00", pinned=(Verdict.OPEN, 0.0, 0.0), same_as="X1")(
+        lambda: Finding(Verdict.OPEN, 0.0, "", "")
+    )
+    ledger = check("X1", "X2", "X3")
+    assert ledger.counts(Weight.PHYSICS).total() == 2
+    assert ledger.counts(Weight.WORDING).total() == 0
+
+
+def test_formulas_are_typeset_and_claims_linked():
+    text = typeset("$c₁ < 10⁻⁶$ at 2.5e-07, see claims K5 and C7; $exp(-s τ₂)$")
+    assert r"\(c_{1} &lt; 10^{-6}\) at \(2.5 \times 10^{-7}\)" in text
+    assert r"\(\exp (-s τ_{2})\)" in text
+    for name in ("K5", "C7"):
+        assert f'<a href="09_ledger.html#ledger-{name}">{name}</a>' in text
+
+
 def test_tables_hold_verdict_number_and_note(calls):
     ledger = check("X1")
     assert "reproduced: 1.52 (s). it is so" in repr(ledger)
@@ -121,6 +140,8 @@ def test_a_verdict_follows_from_the_parts_that_hold():
         mended = decide(*parts, corrected=True)
         assert mended is (Verdict.REPRODUCED if all(parts) else Verdict.NOT_AS_WRITTEN)
         assert decide(*parts, settled=False) is Verdict.OPEN
+        limited = decide(*parts, beyond=False)
+        assert limited is (Verdict.WHERE_USED if all(parts) else expected)
 
 
 # The claims of the book ----------------------------------------------------------------
@@ -156,10 +177,10 @@ def test_a_chapter_shows_its_claims_and_confirms_them(chapter):
     assert any(cell and cell[-1] == "ledger" for cell in cells)
 
 
-def test_a_claim_affects_other_claims():
+def test_a_claim_names_other_claims():
     known = {entry.identifier for entry in all_claims()}
     for entry in all_claims():
-        assert set(entry.affects) <= known - {entry.identifier}
+        assert {*entry.affects, entry.same_as} <= {*known, ""} - {entry.identifier}
 
 
 def test_every_module_with_claims_is_imported():

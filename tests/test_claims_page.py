@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from armlock import CommonArm, paper_loop, unstable_roots
-from book.companion.claims import Verdict, check
+from book.companion.claims import Weight, check
 from book.companion.claims import page as module
 from book.companion.claims.assumptions import (
     DIFFERENCES,
@@ -54,6 +54,7 @@ def test_the_page_has_a_row_a_claim_with_its_chapter_and_source(ledger, monkeypa
     assert "def common_row()" in text
     assert "claims.csv" not in text
     assert 'data-verdict="not_as_written"' in text
+    assert 'data-weight="derivation"' in text
     assert 'data-section="Sec. I and Table I"' in text
 
 
@@ -93,17 +94,26 @@ def test_a_source_is_the_function_that_checks(ledger):
     assert "def single_row" in found.text
 
 
-def test_counts_name_only_verdicts_that_occur(ledger):
-    assert repr(VerdictCounts(ledger)) == "2 reproduced, 1 not as written"
-    assert "differs" not in VerdictCounts(ledger)._repr_html_()
+def test_counts_are_of_physics_and_name_only_verdicts_that_occur():
+    counts = VerdictCounts(check("T1", "T6"))
+    assert repr(counts).startswith("1 finding of physics: 1 reproduced; and 1 of derivation")
+    assert "differs" not in counts._repr_html_()
 
 
 def test_errata_are_what_is_not_as_printed(ledger):
     found = Errata(ledger)
     assert [claim.identifier for claim, _ in found.entries] == ["T2"]
     assert Ids(found._repr_html_()).ids == ["erratum-T2"]
-    assert "Compare with 2 - e1 - e2" in found._repr_html_()
-    assert len(Errata(ledger, Verdict.REPRODUCED)) == 2
+    assert "<dt>Printed</dt>" in found._repr_html_()
+    assert len(Errata(ledger, Weight.PHYSICS)) == 0
+
+
+def test_claims_with_one_finding_share_an_erratum():
+    found = Errata(check("T2", "T3"))
+    assert [claim.identifier for claim, _ in found.entries] == ["T2"]
+    assert '<dt>The same finding</dt><dd><a href="09_ledger.html#ledger-T3">' in (
+        found._repr_html_()
+    )
 
 
 @pytest.mark.parametrize("name", DIFFERENCES)

@@ -7,18 +7,19 @@ import textwrap
 from pathlib import Path
 
 from book.companion.claims.ledger import check_in_parallel
+from book.companion.claims.page import VerdictCounts
 
 
 def main(folder: Path) -> None:
     """Print the ledger, write claims.csv and claims.json into a folder, and hold the pins."""
     ledger = check_in_parallel()
     for entry, finding in ledger:
-        print(f"{entry.identifier:4s} {finding.verdict.upper()}   ({entry.place})")
+        about = f"{entry.weight}; {entry.place}"
+        print(f"{entry.identifier:4s} {finding.verdict.upper()}   ({about})")
         for line in (entry.says, f"{finding.value:.6g}: {finding.quantity}", finding.note):
-            print(textwrap.indent(textwrap.fill(line, 92), "     "))
+            print(textwrap.indent(textwrap.fill(line.replace("$", ""), 92), "     "))
         print()
-    counts = ledger.counts()
-    print(f"{len(ledger)} claims: " + ", ".join(f"{n} {v}" for v, n in counts.items()))
+    print(VerdictCounts(ledger))
     for path in ledger.write(folder):
         print(f"written: {path}")
     ledger.confirm()

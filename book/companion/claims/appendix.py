@@ -22,7 +22,7 @@ from armlock.paper import (
 )
 from armlock.spectra import Spectrum, SpectrumEstimator
 from book.companion.claims import ledger
-from book.companion.claims.ledger import Finding, Verdict, decide
+from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 from book.companion.claims.simulation import LOWEST, PERTURBATION_SEEDS, face_value_rms
 
 claim = partial(ledger.claim, chapter="08_perturbations")
@@ -199,6 +199,7 @@ def laser_phase_rms() -> float:
     says="Unequal gains 1 + ε_I and 1 + ε_Q of the phasemeter's I and Q channels give the "
     "measured phase (1 + η)φ, with η = ε_Q - ε_I.",
     pinned=(Verdict.REPRODUCED, 1.999996e-6, 1e-12),
+    weight=Weight.DERIVATION,
 )
 def gain_mismatch() -> Finding:
     """Slope of the exact arctangent at zero phase against the linear model."""
@@ -245,6 +246,7 @@ def any_phase() -> Finding:
     "of at most 10⁻⁶.",
     pinned=(Verdict.DIFFERS, 14579.3, 0.1),
     affects=("N1", "M2", "A4", "A5"),
+    same_as="N1",
 )
 def size_of_spectrum() -> Finding:
     """Integrate the spectrum over the simulated band."""
@@ -271,6 +273,7 @@ def size_of_spectrum() -> Finding:
     "so that η must be one or several orders below the additive phase noise δφ to give an "
     "error as large.",
     pinned=(Verdict.IN_PART, 0.0, 0.05),
+    weight=Weight.DERIVATION,
 )
 def convolution_of_spectra() -> Finding:
     """Multiply series and convolve spectra; find the factor for the paper's laser."""
@@ -301,6 +304,7 @@ def convolution_of_spectra() -> Finding:
     place="Appendix, Fig. 11",
     says="c₁(t) and c₂(t) are generated from the spectrum.",
     pinned=(Verdict.REPRODUCED, 0.0, 0.03),
+    weight=Weight.DERIVATION,
 )
 def generated_series() -> Finding:
     """Compare the spectrum of the series with the formula, and see what makes its size."""

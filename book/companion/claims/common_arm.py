@@ -19,7 +19,7 @@ from armlock.roots import extended_root, pseudospectral_roots, rightmost_root
 from armlock.semidiscretization import semi_discretization, spectral_radius, transition_matrix
 from armlock.stability import StabilityChart, stability_chart, unstable_roots
 from book.companion.claims import ledger
-from book.companion.claims.ledger import Finding, Verdict, decide
+from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 from book.companion.outline import boundary_radius, enclosed_area, outline, perimeter, rays
 from book.companion.schemes import pade_poles, sampled_loop, standard_schemes
 
@@ -332,6 +332,7 @@ def ideal_root() -> float:
     place="Eq. (5a)",
     says="The two parametric equations give the parameters at which jω is a root.",
     pinned=(Verdict.REPRODUCED, 0.0, 1e-11),
+    weight=Weight.DERIVATION,
 )
 def parametric_curve() -> Finding:
     """Put Eq. (5a), line by line, into the characteristic equation."""
@@ -364,6 +365,7 @@ def parametric_curve() -> Finding:
     place="Eq. (5b)",
     says="At ω = 0 the boundary is the straight line c₁ + c₂ = 2.",
     pinned=(Verdict.REPRODUCED, 0.0, 0.0),
+    weight=Weight.DERIVATION,
 )
 def straight_line() -> Finding:
     """Compare the line with D(0) = 0, for several gains, and count across it."""
@@ -389,6 +391,7 @@ def straight_line() -> Finding:
     says="The D-curves, with branches, cusps and rings, separate regions that differ in their "
     "number of unstable roots.",
     pinned=(Verdict.IN_PART, 0.0, 0.0),
+    weight=Weight.DERIVATION,
 )
 def shape_of_the_curve() -> Finding:
     """Count branches, turns and cusps, and count unstable roots on both sides."""
@@ -425,6 +428,7 @@ def shape_of_the_curve() -> Finding:
     says="Delay 1 is the shorter one (text); it is 20.1 s against 19.9 s (example).",
     pinned=(Verdict.NOT_AS_WRITTEN, 0.10536, 1e-4),
     affects=("D1", "D10"),
+    weight=Weight.WORDING,
 )
 def order_of_the_delays() -> Finding:
     """Compare the charts of both orders."""
@@ -451,6 +455,7 @@ def order_of_the_delays() -> Finding:
     "g c exp(-2 g (t_i - ν)) over a step; the matrix holds R₁ and R₂.",
     pinned=(Verdict.NOT_AS_WRITTEN, 1.82965e-4, 1e-8),
     affects=("C6", "C7"),
+    weight=Weight.DERIVATION,
 )
 def recurrence() -> Finding:
     """Run the printed and the derived recurrence at (1, 1)."""
@@ -487,6 +492,7 @@ def recurrence() -> Finding:
     place="below Eq. (8)",
     says="The system is stable if and only if the spectral radius of its matrix is below one.",
     pinned=(Verdict.REPRODUCED, 0.0, 0.0),
+    weight=Weight.DERIVATION,
 )
 def spectral_radius_decides() -> Finding:
     """Compare dense eigenvalues with the exact count of the map's unstable roots."""
@@ -517,6 +523,7 @@ def spectral_radius_decides() -> Finding:
     place="Fig. 4(b)",
     says="With h = 0.05 s, semi-discretization gives the stable region and its boundary.",
     pinned=(Verdict.REPRODUCED, 0.02800, 5e-5),
+    weight=Weight.DERIVATION,
 )
 def region_at_the_step() -> Finding:
     """Measure how far the boundary is off at the paper's step, and how this falls with h."""
@@ -549,6 +556,7 @@ def region_at_the_step() -> Finding:
     place="Sec. III.A, before Eq. (6)",
     says="Semi-discretization guarantees that the whole stable region is covered.",
     pinned=(Verdict.IN_PART, 0.0026588, 1e-6),
+    weight=Weight.DERIVATION,
 )
 def covers_the_region() -> Finding:
     """Compare the charts of map and loop point by point."""
@@ -623,6 +631,7 @@ def ideal_point() -> Finding:
     place="Sec. III.A, before Eq. (6)",
     says="Semi-discretization is more accurate than standard discretisations of delay systems.",
     pinned=(Verdict.IN_PART, 1642.8, 2.0),
+    weight=Weight.DERIVATION,
 )
 def more_accurate() -> Finding:
     """Compare errors of roots and boundary with other schemes of equal step or size."""
@@ -662,6 +671,7 @@ def more_accurate() -> Finding:
     says="The criterion on the matrix, a spectral radius below one, decides the stability of "
     "the delayed loop.",
     pinned=(Verdict.IN_PART, 4.416e-6, 1e-8),
+    weight=Weight.DERIVATION,
 )
 def map_and_loop() -> Finding:
     """Look for a point at which the map's verdict is wrong for the loop."""
@@ -694,6 +704,7 @@ def map_and_loop() -> Finding:
     says="D-subdivision alone may miss part of the boundary, for it is sampled over a finite "
     "range and in finite precision.",
     pinned=(Verdict.IN_PART, 0.0761516, 1e-6),
+    weight=Weight.DERIVATION,
 )
 def d_subdivision_alone() -> Finding:
     """Draw the curve from few samples, and walk it with certified steps against counts."""

@@ -26,7 +26,7 @@ from armlock.paper import (
 from armlock.roots import rightmost_root
 from armlock.stability import StabilityChart, stability_chart, unstable_roots
 from book.companion.claims import ledger
-from book.companion.claims.ledger import Finding, Verdict, decide
+from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 
 claim = partial(ledger.claim, chapter="06_controller")
 TURN = 2.0 * np.pi
@@ -350,6 +350,7 @@ def stage_two_crossings() -> Finding:
     says="The controller has s + z24 in its denominator (the equation) or s + p24 (the table).",
     pinned=(Verdict.NOT_AS_WRITTEN, 2.0, 0.0),
     affects=("K5", "K10"),
+    weight=Weight.WORDING,
 )
 def which_denominator() -> Finding:
     """Run both."""
@@ -431,6 +432,7 @@ def constant_gain() -> Finding:
     place="Caption of Fig. 9",
     says="Points of Area 1 and of Area 2 are shown, with coordinates.",
     pinned=(Verdict.NOT_AS_WRITTEN, 1.0, 0.0),
+    weight=Weight.WORDING,
 )
 def same_point_twice() -> Finding:
     """Count unstable roots of the uncontrolled dual arm on both sides of the ideal point."""
@@ -475,6 +477,7 @@ def acts_below() -> Finding:
     place="Sec. IV.B, Stage I; Table II",
     says="The poles of the high-pass filters (Stage I of the controller) lie below 0.1 mHz.",
     pinned=(Verdict.REPRODUCED, 1e-6, 1e-18),
+    weight=Weight.WORDING,
 )
 def poles_below() -> Finding:
     """Read them off Table II."""
@@ -578,6 +581,7 @@ def robust() -> Finding:
     "P_d of Sec. III.B.",
     pinned=(Verdict.NOT_AS_WRITTEN, 1.0, 0.0),
     affects=("K5", "K10", "M1"),
+    weight=Weight.DERIVATION,
 )
 def which_open_loop() -> Finding:
     """Put the actuator's 1/s of Sec. III into the loop, and leave it out."""

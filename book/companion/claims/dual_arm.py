@@ -34,7 +34,7 @@ from armlock.semidiscretization import semi_discretization
 from armlock.stability import BOUNDARY, stability_chart, unstable_roots
 from book.companion.claims import ledger
 from book.companion.claims.common_arm import log_slope
-from book.companion.claims.ledger import Finding, Verdict, decide
+from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 from book.companion.claims.table1 import FULL_DIFFERENCE, HALF_DIFFERENCE, MEAN_DELAY
 
 claim = partial(ledger.claim, chapter="04_dual_arm")
@@ -420,6 +420,7 @@ def sampled_ratio(gain: float, step: float = STEP, order: int = 0) -> float:
     "difference of the two delayed signals.",
     pinned=(Verdict.NOT_AS_WRITTEN, 1.375746, 1e-6),
     affects=("D2", "D3"),
+    weight=Weight.WORDING,
 )
 def open_loop_as_printed() -> Finding:
     """Evaluate the printed formula, with and without the missing j, against Table I."""
@@ -537,6 +538,7 @@ def finite_gain_margin() -> Finding:
     place="Fig. 6, caption",
     says="The upper edge shown is not the exact limit of stability; it was not computed.",
     pinned=(Verdict.REPRODUCED, 1.254005934812, 1e-11),
+    weight=Weight.DERIVATION,
 )
 def exact_upper_edge() -> Finding:
     """Compute the upper edge, verify it, and see what semi-discretization makes of it."""
@@ -629,6 +631,7 @@ def never_reached() -> Finding:
     place="Sec. III.B, before Fig. 5",
     says="D-subdivision with semi-discretization carries over from the common to the dual arm.",
     pinned=(Verdict.IN_PART, 0.0098137, 1e-6),
+    weight=Weight.DERIVATION,
 )
 def sampled_framework() -> Finding:
     """Compare the edge of the map with the exact one, at two gains."""
@@ -681,6 +684,8 @@ def unknown_corner_frequency() -> Finding:
     says="The loop uses the dual sensor of Table I, with Δτ the difference of the delays.",
     pinned=(Verdict.NOT_AS_WRITTEN, 2.0, 1e-9),
     affects=("K5", "K13"),
+    weight=Weight.DERIVATION,
+    same_as="T2",
 )
 def convention_of_difference() -> Finding:
     """Compare the two meanings of dtau: weight of the integral, and edges."""

@@ -10,6 +10,9 @@ rest, and enters it in the register. A module names its chapter once:
         ...
 
 The chapter shows `chapter_claims("03_common_arm")`, and calls its `confirm`.
+
+Texts are plain, with formulas between dollar signs. What a terminal shows as it is, such as
+c₁ or 10⁻⁶, becomes TeX on a page (`typeset`); TeX may be written as well.
 """
 
 from __future__ import annotations
@@ -18,6 +21,7 @@ import csv
 import html
 import json
 import os
+import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
@@ -35,21 +39,36 @@ class Verdict(StrEnum):
     """What became of a claim."""
 
     REPRODUCED = "reproduced"
+    WHERE_USED = "holds where the paper uses it"
     IN_PART = "reproduced in part"
     DIFFERS = "differs"
     NOT_AS_WRITTEN = "not as written"
     OPEN = "cannot be settled from the paper"
 
 
+class Weight(StrEnum):
+    """What a claim is about: what loops do, how the paper gets there, or a slip in print."""
+
+    PHYSICS = "physics"
+    DERIVATION = "derivation"
+    WORDING = "wording"
+
+
 def decide(
-    *holds: bool | np.bool_, corrected: bool | np.bool_ = False, settled: bool = True
+    *holds: bool | np.bool_,
+    beyond: bool | np.bool_ = True,
+    corrected: bool | np.bool_ = False,
+    settled: bool | np.bool_ = True,
 ) -> Verdict:
     """Return the verdict that follows from which parts of a claim hold.
 
     Parameters
     ----------
     *holds : bool
-        For each part of the claim, whether it holds as the paper has it.
+        For each part of the claim, whether it holds in the range in which the paper uses it,
+        in the reading most favourable to the paper.
+    beyond : bool, optional
+        Whether it holds outside that range as well.
     corrected : bool, optional
         Whether the claim holds with a slip in the paper mended.
     settled : bool, optional
@@ -58,20 +77,22 @@ def decide(
     Returns
     -------
     Verdict
-        All parts hold: reproduced. Otherwise, if the mended claim holds: not as written.
-        Otherwise some parts hold: reproduced in part; none: differs.
+        All parts hold: reproduced, or where the paper uses it. Otherwise, if the mended claim
+        holds: not as written. Otherwise some parts hold: reproduced in part; none: differs.
 
     Examples
     --------
     >>> decide(True, False)
     <Verdict.IN_PART: 'reproduced in part'>
+    >>> decide(True, beyond=False)
+    <Verdict.WHERE_USED: 'holds where the paper uses it'>
     >>> decide(False, corrected=True)
     <Verdict.NOT_AS_WRITTEN: 'not as written'>
     """
     if not settled:
         return Verdict.OPEN
     if all(holds):
-        return Verdict.REPRODUCED
+        return Verdict.REPRODUCED if beyond else Verdict.WHERE_USED
     if corrected:
         return Verdict.NOT_AS_WRITTEN
     return Verdict.IN_PART if any(holds) else Verdict.DIFFERS
@@ -90,7 +111,8 @@ class Finding:
     quantity : str
         What that number is, unit included.
     note : str
-        Why the verdict follows, and under which reading; numbers in it are computed.
+        Why the verdict follows, and under which reading, in three sentences at most; numbers
+        in it are computed.
     """
 
     verdict: Verdict
@@ -122,6 +144,9 @@ class Claim:
     chapter: str
     pinned: Pin
     affects: tuple[str, ...]
+    weight: Weight
+    printed: str
+    same_as: str
     check: Callable[[], Finding]
 
 
@@ -136,6 +161,9 @@ def claim(
     chapter: str,
     pinned: tuple[Verdict, float, float],
     affects: tuple[str, ...] = (),
+    weight: Weight = Weight.PHYSICS,
+    printed: str = "",
+    same_as: str = "",
 ) -> Callable[[Callable[[], Finding]], Callable[[], Finding]]:
     """Enter the decorated check in the register of claims.
 
@@ -153,6 +181,12 @@ def claim(
         The verdict, the number that decides it, and the absolute tolerance of that number.
     affects : tuple of str, optional
         Claims whose verdict or number uses what this one corrects, for the errata.
+    weight : Weight, optional
+        What the claim is about.
+    printed : str, optional
+        The formula, or the few words, as the paper prints them.
+    same_as : str, optional
+        The claim with the same finding, which then counts once.
 
     Raises
     ------
@@ -165,8 +199,9 @@ def claim(
             raise ValueError(f"identifier must be new, got {identifier!r} a second time")
         remembered = cache(check)
         _REGISTER[identifier] = Claim(
-            identifier, place, says, chapter, Pin(*pinned), affects, remembered
-        )
+            identifier, place, says, chapter, Pin(*pinned), affects, weight, printed, same_as,
+            remembered,
+        )  # fmt: skip
         return remembered
 
     return enter
@@ -175,11 +210,6 @@ def claim(
 def all_claims() -> list[Claim]:
     """Return every registered claim, in the order of the paper's sections."""
     return list(_REGISTER.values())
-
-
-def badge(verdict: Verdict, text: str) -> str:
-    """Return a text as HTML in the colour of a verdict."""
-    return f'<span class="verdict verdict-{verdict.name.lower()}">{text}</span>'
 
 
 class Ledger:
@@ -223,9 +253,13 @@ class Ledger:
         if wrong:
             raise AssertionError("\n".join(wrong))
 
-    def counts(self) -> Counter[Verdict]:
-        """Return how many claims met each verdict."""
-        return Counter(finding.verdict for _, finding in self.entries)
+    def counts(self, *weights: Weight) -> Counter[Verdict]:
+        """Return how many findings met each verdict; of some weights, or of all."""
+        return Counter(
+            finding.verdict
+            for entry, finding in self.entries
+            if not entry.same_as and entry.weight in (weights or Weight)
+        )
 
     def records(self) -> list[dict[str, str | float]]:
         """Return the ledger as one flat record a claim."""
@@ -234,7 +268,9 @@ class Ledger:
                 "claim": entry.identifier,
                 "place": entry.place,
                 "says": entry.says,
+                "printed": entry.printed,
                 "chapter": entry.chapter,
+                "weight": str(entry.weight),
                 "verdict": str(finding.verdict),
                 "value": finding.value,
                 "quantity": finding.quantity,
@@ -266,38 +302,89 @@ class Ledger:
         return "\n".join(
             f"{c.identifier:4s} {f.verdict}: {f.value:.6g} ({f.quantity}). {f.note}"
             for c, f in self.entries
-        )
+        ).replace("$", "")
 
     def _repr_html_(self) -> str:
         """Return the table as HTML, for notebooks."""
-        # Two columns, so that the table also fits a narrow screen.
         rows = "".join(
-            f'<tr id="claim-{html.escape(c.identifier)}" '
-            'style="vertical-align: top; text-align: left">'
-            '<td style="padding-right: 1em">'
-            f"<strong>{html.escape(c.identifier)}</strong><br>{badge(f.verdict, f.verdict)}"
-            f"<br><small>{html.escape(c.place)}</small></td>"
-            f"<td>{explanation(c, f)}</td></tr>"
+            row(c, f, f'id="claim-{c.identifier}"', ledger_link(c.identifier))
             for c, f in self.entries
         )
-        return table_of_claims(rows)
+        return table(rows)
 
 
-def explanation(claim: Claim, finding: Finding) -> str:
-    """Return as HTML what a claim says, the number that decides it, and why."""
+# HTML ----------------------------------------------------------------------------------------
+
+#: A text that names claims: "claim K5", "claims C7, C8 and C11".
+NAMING = re.compile(r"\b[Cc]laims?\s+[A-Z]\d+(?:(?:,\s+and|,|\s+and|\s+to)\s+[A-Z]\d+)*")
+#: One of the names in it.
+NAME = re.compile(r"[A-Z]\d+")
+_POWER = re.compile(r"(?<![\w.])([-+]?\d+(?:\.\d+)?)e([-+]\d+)")
+_RAISED = re.compile("[⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻]+")
+_LOWERED = re.compile("[₀₁₂₃₄₅₆₇₈₉₊₋]+")
+_FUNCTION = re.compile(r"(?<!\\)\b(exp|sin|cos|cot|ln|min|max)\b")
+_LEVEL = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻₀₁₂₃₄₅₆₇₈₉₊₋", "0123456789+-" * 2)
+
+
+def typeset(text: str) -> str:
+    r"""Return a text of the ledger as HTML, with formulas and links to the claims it names.
+
+    Examples
+    --------
+    >>> from book.companion.claims.ledger import typeset
+    >>> print(typeset("$c₁$ is 1.5e-06 here: $c₁ ≥ 10⁻⁶$"))
+    \(c_{1}\) is \(1.5 \times 10^{-6}\) here: \(c_{1} ≥ 10^{-6}\)
+    """
+
+    def power(found: re.Match[str]) -> str:
+        return rf"{found[1]} \times 10^{{{int(found[2])}}}"
+
+    def level(mark: str) -> Callable[[re.Match[str]], str]:
+        return lambda found: f"{mark}{{{found[0].translate(_LEVEL)}}}"
+
+    parts = html.escape(text).split("$")
+    for k, part in enumerate(parts):
+        if k % 2:
+            formula = _FUNCTION.sub(r"\\\1 ", _POWER.sub(power, part))
+            formula = _LOWERED.sub(level("_"), _RAISED.sub(level("^"), formula))
+            parts[k] = rf"\({formula}\)"
+        else:
+            part = _POWER.sub(lambda found: rf"\({power(found)}\)", part)
+            parts[k] = NAMING.sub(
+                lambda found: NAME.sub(lambda name: ledger_link(name[0]), found[0]), part
+            )
+    return "".join(parts)
+
+
+def ledger_link(identifier: str) -> str:
+    """Return a link from a chapter to a claim's row in the ledger."""
+    return f'<a href="09_ledger.html#ledger-{identifier}">{identifier}</a>'
+
+
+def badge(verdict: Verdict, text: str = "") -> str:
+    """Return a text as HTML in the colour of a verdict; by default the verdict in short."""
+    name = verdict.name.lower()
+    return f'<span class="verdict verdict-{name}">{text or name.replace("_", " ")}</span>'
+
+
+def row(claim: Claim, finding: Finding, attributes: str, link: str, more: str = "") -> str:
+    """Return a claim as a row of `table`: one line, and what unfolds below it."""
+    printed = f"<p>Printed ({typeset(claim.place)}): {typeset(claim.printed)}.</p>"
+    place = f"<p>{typeset(claim.place)}, in our words.</p>"
     return (
-        f"<p>{html.escape(claim.says)}</p>"
-        f"<p><strong>{finding.value:.6g}</strong>: {html.escape(finding.quantity)}.</p>"
-        f"<p>{html.escape(finding.note)}</p>"
+        f"<tr {attributes}><td>{link}</td><td>{badge(finding.verdict)}</td>"
+        f"<td>{claim.weight}</td><td><details><summary>{typeset(claim.says)}</summary>"
+        f"{printed if claim.printed else place}<p>{badge(finding.verdict, finding.verdict)}"
+        f"<strong>{typeset(f'{finding.value:.6g}')}</strong>: {typeset(finding.quantity)}.</p>"
+        f"<p>{typeset(finding.note)}</p>{more}</details></td></tr>"
     )
 
 
-def table_of_claims(rows: str) -> str:
-    """Return rows of two cells as an HTML table with a heading."""
+def table(rows: str) -> str:
+    """Return rows of claims as an HTML table with a heading."""
+    heads = "".join(f'<th scope="col">{name}</th>' for name in ("Claim", "Verdict", "About"))
     return (
-        '<table class="claims"><thead><tr style="text-align: left">'
-        '<th scope="col">Claim, verdict</th>'
-        '<th scope="col">What the paper says, the number that decides it, and why</th>'
+        f'<table class="claims"><thead><tr>{heads}<th scope="col">What the paper says</th>'
         f"</tr></thead><tbody>{rows}</tbody></table>"
     )
 

@@ -25,7 +25,7 @@ from armlock.paper import (
 from armlock.roots import rightmost_root
 from armlock.stability import BOUNDARY, unstable_roots
 from book.companion.claims import ledger
-from book.companion.claims.ledger import Finding, Verdict, decide
+from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 
 claim = partial(ledger.claim, chapter="05_nyquist")
 Arm = SingleArm | CommonArm | DualArm
@@ -202,6 +202,7 @@ def single_arm_ideal() -> Finding:
     says="For c₁ slightly above 1 there is an infinite branch at ω = 0, along which the phase "
     "goes from -π/2 at ω = 0⁻ to π/2 at ω = 0⁺ around the left half-plane.",
     pinned=(Verdict.REPRODUCED, -1.0, 1e-3),
+    weight=Weight.DERIVATION,
 )
 def single_arm_branch() -> Finding:
     """Follow the phase of L along the indentation, on both sides of c1 = 1."""
@@ -227,6 +228,7 @@ def single_arm_branch() -> Finding:
     says="For c₁ > 1 the open loop at ω = 2π/τ is 1 - c₁, a negative number.",
     pinned=(Verdict.NOT_AS_WRITTEN, 0.5, 1e-9),
     affects=("N5", "N6"),
+    weight=Weight.WORDING,
 )
 def value_at_full_turn() -> Finding:
     """Evaluate the loop with and without the integrating actuator at 2 pi / tau."""
@@ -338,6 +340,7 @@ def dual_arm_ideal() -> Finding:
     "and the infinite branch encircles the origin once, counter-clockwise, as ω passes zero.",
     pinned=(Verdict.NOT_AS_WRITTEN, -1.0, 1e-3),
     affects=("D4", "N11"),
+    weight=Weight.DERIVATION,
 )
 def dual_arm_branch() -> Finding:
     """Follow the phase of L along the indentation, right and left of the pole."""

@@ -9,6 +9,8 @@ from __future__ import annotations
 import html
 import inspect
 import os
+from collections import Counter
+from collections.abc import Callable, Iterable
 from importlib import metadata
 from pathlib import Path
 from typing import NamedTuple
@@ -18,13 +20,16 @@ from book.companion.claims.ledger import (
     Finding,
     Ledger,
     Verdict,
+    Weight,
     all_claims,
     badge,
     check,
     check_in_parallel,
-    explanation,
     findings_of_the_build,
-    table_of_claims,
+    ledger_link,
+    row,
+    table,
+    typeset,
 )
 
 #: Section of the paper that a chapter with claims is about.
@@ -38,7 +43,7 @@ SECTIONS = {
     "07_simulation": "Sec. IV.C, simulation",
     "08_perturbations": "Appendix",
 }
-#: What makes the table's filter work.
+#: What filters and sorts the table.
 SCRIPT = Path(__file__).with_name("ledger.js")
 
 
@@ -69,15 +74,12 @@ class Source(NamedTuple):
         Relative to the project's root.
     line : int
         Where the function starts, its decorator included.
-    purpose : str
-        First line of its docstring: how the claim was examined.
     text : str
         The function.
     """
 
     file: str
     line: int
-    purpose: str
     text: str
 
 
@@ -96,8 +98,7 @@ def source(claim: Claim) -> Source:
     root = Path(__file__).resolve().parents[3]
     file = Path(inspect.getsourcefile(function) or "")
     shown = file.relative_to(root).as_posix() if file.is_relative_to(root) else file.name
-    purpose = (inspect.getdoc(function) or "").partition("\n")[0]
-    return Source(shown, first, purpose, "".join(lines))
+    return Source(shown, first, "".join(lines))
 
 
 def project_url() -> str | None:
@@ -111,41 +112,42 @@ def project_url() -> str | None:
     return found[0].rstrip("/") if found else None
 
 
-def link_to_chapter(claim: Claim) -> str:
-    """Return a link from another chapter to a claim in its own chapter's table."""
-    name = html.escape(claim.identifier)
-    return f'<a href="{claim.chapter}.html#claim-{name}">{name}</a>'
-
-
 class VerdictCounts:
-    """How many claims of a ledger met each verdict, as one line.
+    """How many findings of physics met each verdict, and how many others there are.
+
+    Claims with the same finding count once.
 
     Examples
     --------
     >>> from book.companion.claims import check
     >>> from book.companion.claims.page import VerdictCounts
-    >>> VerdictCounts(check("T1", "T2"))
-    1 reproduced, 1 not as written
+    >>> VerdictCounts(check("T2", "T6"))
+    1 finding of physics: 1 reproduced; and 1 of derivation, 0 of wording
     """
 
     def __init__(self, ledger: Ledger) -> None:
-        self.counts = ledger.counts()
+        self.physics = ledger.counts(Weight.PHYSICS)
+        number = self.physics.total()
+        self.head = f"{number} finding{'s' * (number != 1)} of physics: "
+        self.others = "; and " + ", ".join(
+            f"{ledger.counts(weight).total()} of {weight}" for weight in list(Weight)[1:]
+        )
+
+    def _joined(self, shown: Callable[[Verdict, str], str], between: str) -> str:
+        parts = (shown(v, f"{self.physics[v]} {v}") for v in Verdict if self.physics[v])
+        return self.head + between.join(parts) + self.others
 
     def __repr__(self) -> str:
         """Return the line as text."""
-        return ", ".join(f"{self.counts[v]} {v}" for v in Verdict if self.counts[v])
+        return self._joined(lambda verdict, text: text, ", ")
 
     def _repr_html_(self) -> str:
         """Return the line as HTML."""
-        parts = "".join(
-            badge(v, f"{self.counts[v]} {v}") + " " for v in Verdict if self.counts[v]
-        )
-        total = sum(self.counts.values())
-        return f'<p class="verdict-counts">{total} claims: {parts}</p>'
+        return f'<p class="verdict-counts">{self._joined(badge, " ")}.</p>'
 
 
 class LedgerPage:
-    """A ledger as a table that a reader can filter by verdict, section and words.
+    """A ledger as a table that a reader can sort, and filter by verdict, weight and words.
 
     Parameters
     ----------
@@ -175,26 +177,31 @@ class LedgerPage:
         )
         downloads = f'<p class="figure-downloads">The ledger as data: {links}</p>'
         return (
-            f'<div class="ledger">{_controls(self.ledger)}'
-            f"{table_of_claims(rows)}{downloads if links else ''}</div>"
-            f"<script>{SCRIPT.read_text('utf-8')}</script>"
+            f'<div class="ledger">{_controls(self.ledger)}{table(rows)}'
+            f"{downloads if links else ''}</div><script>{SCRIPT.read_text('utf-8')}</script>"
         )
 
 
 def _controls(ledger: Ledger) -> str:
     """Return the form above the table, hidden until the script is there to serve it."""
-    counts = ledger.counts()
-    boxes = "".join(
-        f'<label><input type="checkbox" name="verdict" value="{v.name.lower()}" checked> '
-        f"{badge(v, f'{v} ({counts[v]})')}</label>"
-        for v in Verdict
-        if counts[v]
-    )
+    verdicts = Counter(finding.verdict for _, finding in ledger)
+    weights = Counter(claim.weight for claim, _ in ledger)
+
+    def boxes(name: str, values: Iterable[tuple[str, str]]) -> str:
+        return "".join(
+            f'<label><input type="checkbox" name="{name}" value="{value}" checked> {text}'
+            "</label>"
+            for value, text in values
+        )
+
+    shown = [(v.name.lower(), badge(v, f"{v} ({verdicts[v]})")) for v in Verdict if verdicts[v]]
+    kinds = [(w.name.lower(), f"{w} ({weights[w]})") for w in Weight if weights[w]]
     sections = dict.fromkeys(SECTIONS[claim.chapter] for claim, _ in ledger)
     options = "".join(f"<option>{html.escape(name)}</option>" for name in sections)
     return (
-        '<form class="ledger-filter" hidden><fieldset><legend>Verdicts</legend>'
-        f"{boxes}</fieldset>"
+        '<form class="ledger-filter" hidden><fieldset><legend>Verdict</legend>'
+        f"{boxes('verdict', shown)}</fieldset><fieldset><legend>About</legend>"
+        f"{boxes('weight', kinds)}</fieldset>"
         '<label>Section <select name="section"><option value="">all</option>'
         f"{options}</select></label>"
         '<label>Search <input type="search" name="words" autocomplete="off"></label>'
@@ -204,37 +211,43 @@ def _controls(ledger: Ledger) -> str:
 
 
 def _row(claim: Claim, finding: Finding) -> str:
-    """Return one row of the table."""
-    escape, name = html.escape, html.escape(claim.identifier)
-    place, url = source(claim), project_url()
+    """Return one row of the table, with the source of the check."""
+    name, place, url = claim.identifier, source(claim), project_url()
     where = f"{place.file}, line {place.line}"
     if url:
-        where = f'<a href="{escape(url)}/blob/main/{place.file}#L{place.line}">{where}</a>'
-    return (
-        f'<tr id="ledger-{name}" data-verdict="{finding.verdict.name.lower()}" '
-        f'data-section="{escape(SECTIONS[claim.chapter])}">'
-        f"<td>{link_to_chapter(claim)}<br>{badge(finding.verdict, finding.verdict)}"
-        f"<br><small>{escape(claim.place)}</small></td><td>{explanation(claim, finding)}"
-        f"<details><summary>Source of {name}</summary><p>{where}</p>"
-        f'<pre tabindex="0">{escape(place.text)}</pre></details></td></tr>'
+        where = f'<a href="{html.escape(url)}/blob/main/{place.file}#L{place.line}">{where}</a>'
+    attributes = (
+        f'id="ledger-{name}" data-verdict="{finding.verdict.name.lower()}" '
+        f'data-weight="{claim.weight}" data-section="{html.escape(SECTIONS[claim.chapter])}"'
     )
+    code = (
+        f'<p>Shown in its <a href="{claim.chapter}.html#claim-{name}">chapter</a>.</p>'
+        f"<details><summary>Source of {name}</summary><p>{where}</p>"
+        f'<pre tabindex="0">{html.escape(place.text)}</pre></details>'
+    )
+    return row(claim, finding, attributes, ledger_link(name), code)
 
 
 class Errata:
-    """What was not simply reproduced: printed, derived, how it was found, what it affects.
+    """What is printed and does not follow: printed, what follows, and what depends on it.
 
     Parameters
     ----------
     ledger : Ledger
         The claims and their findings.
-    *verdicts : Verdict
-        Which ones to take; by default "not as written" and "differs".
+    *weights : Weight
+        Which ones to take; by default all.
     """
 
-    def __init__(self, ledger: Ledger, *verdicts: Verdict) -> None:
-        chosen = verdicts or (Verdict.NOT_AS_WRITTEN, Verdict.DIFFERS)
-        self.entries = [entry for entry in ledger if entry[1].verdict in chosen]
-        self.known = {claim.identifier: (claim, finding) for claim, finding in ledger}
+    def __init__(self, ledger: Ledger, *weights: Weight) -> None:
+        self.entries = [
+            (claim, finding)
+            for claim, finding in ledger
+            if finding.verdict in (Verdict.NOT_AS_WRITTEN, Verdict.DIFFERS)
+            and claim.weight in (weights or Weight)
+            and not claim.same_as
+        ]
+        self.ledger = ledger
 
     def __len__(self) -> int:
         """Return how many errata there are."""
@@ -245,28 +258,32 @@ class Errata:
         return "\n".join(
             f"{c.identifier:4s} {c.place}: {f.value:.6g} ({f.quantity})"
             for c, f in self.entries
-        )
+        ).replace("$", "")
 
     def _repr_html_(self) -> str:
         """Return one block an erratum; a table of four columns would not fit a phone."""
         return "".join(self._block(*entry) for entry in self.entries)
 
     def _block(self, claim: Claim, finding: Finding) -> str:
-        known = [self.known[name] for name in claim.affects if name in self.known]
-        affects = ", ".join(f"{link_to_chapter(c)} ({f.verdict})" for c, f in known)
+        name = claim.identifier
+        affected = ((c, f) for c, f in self.ledger if c.identifier in claim.affects)
+        same = (ledger_link(c.identifier) for c, _ in self.ledger if c.same_as == name)
         parts = {
-            "Printed": html.escape(claim.says),
-            "Deciding number": f"<strong>{finding.value:.6g}</strong>: "
-            f"{html.escape(finding.quantity)}.",
-            "What follows": html.escape(finding.note),
-            "How it was found": html.escape(source(claim).purpose),
-            "What depends on it": affects,
+            "Printed" if claim.printed else "In our words": typeset(
+                claim.printed or claim.says
+            ),
+            "What follows": f"<strong>{typeset(f'{finding.value:.6g}')}</strong>: "
+            f"{typeset(finding.quantity)}. {typeset(finding.note)}",
+            "What depends on it": ", ".join(
+                f"{ledger_link(c.identifier)} ({f.verdict})" for c, f in affected
+            ),
+            "The same finding": ", ".join(same),
         }
         items = "".join(
-            f"<dt>{name}</dt><dd>{text}</dd>" for name, text in parts.items() if text
+            f"<dt>{term}</dt><dd>{text}</dd>" for term, text in parts.items() if text
         )
         return (
-            f'<section class="erratum" id="erratum-{claim.identifier}">'
-            f"<p><strong>{link_to_chapter(claim)}, {html.escape(claim.place)}</strong> "
-            f"{badge(finding.verdict, finding.verdict)}</p><dl>{items}</dl></section>"
+            f'<section class="erratum" id="erratum-{name}"><p><strong>{ledger_link(name)}, '
+            f"{typeset(claim.place)}</strong> {badge(finding.verdict, finding.verdict)}</p>"
+            f"<dl>{items}</dl></section>"
         )

@@ -23,7 +23,7 @@ from armlock.simulation import DivergenceError, Simulation, sampled_open_loop
 from armlock.spectra import Spectrum, SpectrumEstimator
 from armlock.stability import unstable_roots
 from book.companion.claims import ledger
-from book.companion.claims.ledger import Finding, Verdict, decide
+from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 
 claim = partial(ledger.claim, chapter="07_simulation")
 
@@ -694,6 +694,7 @@ def agreement_with_theory() -> Finding:
     "Fig. 10(c).",
     pinned=(Verdict.NOT_AS_WRITTEN, 3.879e-4, 5e-6),
     affects=("M1", "M4"),
+    weight=Weight.WORDING,
 )
 def which_point() -> Finding:
     """Whether the figure's spectrum could tell the two points apart."""
@@ -720,6 +721,7 @@ def which_point() -> Finding:
     place="Sec. IV.C",
     says="The input is laser frequency noise of 30/f Hz/√Hz.",
     pinned=(Verdict.REPRODUCED, 0.0, 0.03),
+    weight=Weight.DERIVATION,
 )
 def laser_input() -> Finding:
     """Compare the spectrum of the run's input with the formula."""

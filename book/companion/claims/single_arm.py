@@ -19,7 +19,7 @@ from armlock.roots import rightmost_root
 from armlock.semidiscretization import spectral_radius
 from armlock.stability import stability_chart, unstable_roots
 from book.companion.claims import ledger
-from book.companion.claims.ledger import Finding, Verdict, decide
+from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 
 claim = partial(ledger.claim, chapter="02_hayes")
 
@@ -114,6 +114,7 @@ def _test_points() -> ComplexArray:
     says="With an integrating actuator and a plain gain, differentiating Eq. (2) gives the "
     "delay equation (3).",
     pinned=(Verdict.REPRODUCED, 0.0, 1e-8),
+    weight=Weight.DERIVATION,
 )
 def differentiated_equation() -> Finding:
     """Put phi = exp(s t) into both equations, the integral of (2) done by quadrature."""
@@ -144,6 +145,7 @@ def differentiated_equation() -> Finding:
     place="Sec. II, after Eq. (3)",
     says="Eq. (3) is the Hayes equation with a = -k₁ and b = k₁k₂, so that k₂ = -b/a.",
     pinned=(Verdict.REPRODUCED, 0.0, 1e-10),
+    weight=Weight.DERIVATION,
 )
 def hayes_correspondence() -> Finding:
     """Compare characteristic functions, and roots in three ways."""
@@ -255,6 +257,7 @@ def below_one() -> Finding:
     says="Lowering k₂ below 1 turns the line of the loop counter-clockwise into the stable "
     "region.",
     pinned=(Verdict.REPRODUCED, np.degrees(np.pi / 4 - np.arctan(0.5)), 1e-9),
+    weight=Weight.DERIVATION,
 )
 def turning_line() -> Finding:
     """Measure the angle of the half line (-k1, k1 k2) as k2 falls, and count along it."""
@@ -281,6 +284,7 @@ def turning_line() -> Finding:
     says="Eq. (3) has an additional root at s = 0 that Eq. (2) does not have, because it was "
     "differentiated.",
     pinned=(Verdict.IN_PART, 1.0 + TAU1, 1e-6),
+    weight=Weight.DERIVATION,
 )
 def additional_root() -> Finding:
     """Compare the roots of s (1 + L) with those of 1 + L, on and off k2 = 1."""
@@ -320,6 +324,7 @@ def _winding(values: ComplexArray) -> int:
     says="n is the additive noise of Eq. (1), and also the deviation of the gain, k₁ = 1 + n.",
     pinned=(Verdict.NOT_AS_WRITTEN, 0.434699287, 1e-8),
     affects=("S9",),
+    weight=Weight.WORDING,
 )
 def symbols() -> Finding:
     """Take n as a gain and follow the slowest root; take it as a signal and run the loop."""
@@ -428,6 +433,7 @@ def ideal_loop_is_stable() -> Finding:
     says="The red line of slope -1 through the origin is the ideal condition, and the boundary "
     "of the stable region.",
     pinned=(Verdict.IN_PART, 1.0, 1e-6),
+    weight=Weight.DERIVATION,
 )
 def end_of_line() -> Finding:
     """Follow b = -a into a > 0, and find where the region below it ends."""
@@ -454,6 +460,7 @@ def end_of_line() -> Finding:
     place="Sec. III.A, after Eq. (5)",
     says="For a single arm D-subdivision yields the whole stable region directly.",
     pinned=(Verdict.REPRODUCED, 0.0, 0.0),
+    weight=Weight.DERIVATION,
 )
 def closed_form_region() -> Finding:
     """Compare the closed form's region with a chart, and a sample with two other methods."""

@@ -26,7 +26,7 @@ from armlock.paper import (
 from armlock.roots import rightmost_root
 from armlock.stability import unstable_roots
 from book.companion.claims import ledger
-from book.companion.claims.ledger import Finding, Verdict, decide
+from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 
 claim = partial(ledger.claim, chapter="01_opening")
 
@@ -189,6 +189,7 @@ def _largest(values: Any) -> float:
     place="Table I, first row",
     says="The single arm responds with 2i sin(τω) exp(-iωτ).",
     pinned=(Verdict.REPRODUCED, 0.0, 1e-12),
+    weight=Weight.DERIVATION,
 )
 def single_row() -> Finding:
     """Compare with 1 - exp(-s round trip) for both meanings of tau."""
@@ -211,7 +212,9 @@ def single_row() -> Finding:
     place="Table I, second row",
     says="The common arm responds with 2 (1 - cos(Δτ ω) exp(-iω τ̄)).",
     pinned=(Verdict.NOT_AS_WRITTEN, 1.0, 1e-6),
-    affects=("T3", "T4"),
+    affects=("T4", "K5"),
+    printed="$P₊(ω) = 2(1 - cos(Δτ ω) e^{-iω\\bar{τ}})$",
+    weight=Weight.DERIVATION,
 )
 def common_row() -> Finding:
     """Compare with 2 - e1 - e2 for both meanings of the difference and of the mean."""
@@ -236,6 +239,8 @@ def common_row() -> Finding:
     says="The difference arm responds with -2i sin(Δτ ω) exp(-iω τ̄).",
     pinned=(Verdict.NOT_AS_WRITTEN, 2.0, 1e-6),
     affects=("T2", "T4"),
+    weight=Weight.DERIVATION,
+    same_as="T2",
 )
 def difference_row() -> Finding:
     """Compare with both signs of the difference of the arms, for both meanings of dtau."""
@@ -261,6 +266,7 @@ def difference_row() -> Finding:
     "responses of the common and the difference arm.",
     pinned=(Verdict.NOT_AS_WRITTEN, 0.7210738, 1e-6),
     affects=("Z1", "D1", "D2"),
+    weight=Weight.WORDING,
 )
 def dual_row() -> Finding:
     """Evaluate the sensor at the common arm's first null, where P_- has to fill in."""
@@ -301,6 +307,7 @@ def dual_row() -> Finding:
     says="The modified dual arm responds with P₊ H₊ - P₋ H₋, where P₊ and P₋ are the responses "
     "of the common and the difference arm.",
     pinned=(Verdict.OPEN, 2011.602, 1e-3),
+    weight=Weight.DERIVATION,
 )
 def modified_dual_row() -> Finding:
     """Show that the row says nothing before H_+ and H_- are given."""
