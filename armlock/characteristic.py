@@ -5,12 +5,11 @@ Whatever the sensor and the controller, clearing denominators of 1 + L(s) leaves
     D(s; x, y) = R + exp(-s delay) [ B1 (x0 - x exp(-s delay1)) + B2 (y0 - y exp(-s delay2)) ]
 
 with real polynomials R, B1, B2 of s: affine in the two free parameters x and y. The dead time
-`delay` is zero unless the loop has one. The constants x0 and y0 are the parameters at which
-the brackets vanish with s, (1, 1) for an arm-locking loop. Written in this way, no large terms
-cancel near that point.
+`delay` is zero unless the loop has one. At x = x0 and y = y0, which is (1, 1) for an
+arm-locking loop, both parentheses are zero at s = 0. Near that point no large terms cancel.
 
-The semi-discretized loop has the same form with polynomials in z = exp(s step)
-instead of s, so that both are one class here and one set of algorithms above.
+The semi-discretized loop has the same form with polynomials in z = exp(s step) instead of s.
+So both are one class here, and one set of algorithms serves both.
 """
 
 from __future__ import annotations
@@ -137,11 +136,13 @@ class ExponentialSum(NamedTuple):
         return ExponentialSum(self.polynomials, 1j * self.weights, self.phases, 1j * self.sums)
 
     def compiled(self) -> tuple[Any, ...]:
-        """Return the polynomials as `armlock.contour` takes them.
+        """Return the polynomials as `armlock.contour` takes them, in four arrays.
 
-        Coefficients in powers of omega, shape (polynomials, degree + 1), without rows where a
-        degree exceeds `LOW_DEGREE`; real roots and the upper halves of pairs, polynomial after
-        polynomial; where each one's begin; and the highest coefficients.
+        1. Coefficients in powers of omega, shape (polynomials, degree + 1). There are no rows
+           where a degree exceeds `LOW_DEGREE`.
+        2. Roots with an imaginary part of zero or above, polynomial after polynomial.
+        3. The index of each polynomial's first root.
+        4. The highest coefficients.
         """
         degree = max(p.coefficients.size for p in self.polynomials) - 1
         kept = [np.sort_complex(p.roots[p.roots.imag >= 0.0]) for p in self.polynomials]
@@ -176,7 +177,7 @@ class CharacteristicFunction:
         D(s; x, y) = A + C\, e^{-s\delta} - x\, B_1 e^{-s(\delta + \theta_1)}
         - y\, B_2 e^{-s(\delta + \theta_2)} ,
 
-    where C = x0 B1 + y0 B2 and A = R. Without a dead time C counts as a part of A.
+    With a dead time A = R and C = x0 B1 + y0 B2. Without one A = R + x0 B1 + y0 B2 and C = 0.
 
     Parameters
     ----------
@@ -602,29 +603,32 @@ class CharacteristicFunction:
     def at(self, x: float, y: float) -> ExponentialSum:
         """Return D(j omega; x, y) at one point as an exponential sum."""
         x0, y0 = self.reference
-        undelayed, b1, b2 = self.on_boundary()
-        combined = undelayed.plus(b1.scaled(-x)).plus(b2.scaled(-y))
+        constant, b1, b2 = self.on_boundary()
+        combined = constant.plus(b1.scaled(-x)).plus(b2.scaled(-y))
         # What is left where all exponentials are one, without the digits lost by cancelling.
         left = self.rest_on_boundary().sums + (x0 - x) * b1.sums + (y0 - y) * b2.sums
         return combined._replace(sums=left)
 
     def deviation(self, x: float, y: float) -> ExponentialSum:
-        """Return what x and y take off D at s = j omega, as an exponential sum."""
+        """Return x B1 exp(-s (delay + delay1)) + y B2 exp(-s (delay + delay2)) at s = j omega.
+
+        That is what D subtracts from its first term.
+        """
         _, b1, b2 = self.on_boundary()
         return b1.scaled(x).plus(b2.scaled(y))
 
     def rest_on_boundary(self) -> ExponentialSum:
         """Return `rest` at s = j omega as an exponential sum."""
-        undelayed, _, _ = self.on_boundary()
+        constant, _, _ = self.on_boundary()
         if self.step:
             size = self.rest.size
-            return undelayed._replace(
-                weights=undelayed.weights[:size],
-                phases=undelayed.phases[:size],
-                sums=np.concatenate((self.rest, np.zeros(undelayed.sums.size - size))),
+            return constant._replace(
+                weights=constant.weights[:size],
+                phases=constant.phases[:size],
+                sums=np.concatenate((self.rest, np.zeros(constant.sums.size - size))),
             )
         only = np.array([1.0, 0.0, 0.0])
-        return undelayed._replace(weights=only[None, :], phases=np.zeros(1), sums=only)
+        return constant._replace(weights=only[None, :], phases=np.zeros(1), sums=only)
 
 
 def whole_steps(name: str, delay: float, step: float) -> int:
