@@ -55,8 +55,8 @@ MOST_RADIANS = 4.0 * MOST_STEPS
 MOST_ZEROS = 30_000_000
 # Most samples of a grid.
 MOST_SAMPLES = 10_000_000
-# How many roots, each weighed by reach / (reach + distance), a piece may have around it. Then
-# LOW_DEGREE powers hold its polynomials to rounding.
+# How many roots of a polynomial, each weighed by reach / (reach + distance), a piece may have
+# around it. Then LOW_DEGREE powers hold the polynomial to rounding.
 _CROWD = 1.5
 
 
@@ -130,20 +130,31 @@ def _from_roots(
 
 
 @njit(cache=True)
-def _reach(roots: ComplexArray, omega: float, longest: float) -> float:
-    """Length of a piece from omega on that the expansion from roots holds."""
-    reach = longest
-    while True:
-        crowd = 0.0
-        for root in roots:
-            for distance in (abs(1j * omega - root), abs(1j * omega - root.conjugate())):
-                if distance > 0.0:
-                    crowd += reach / (reach + distance)
-                if root.imag == 0.0:
-                    break
-        if crowd <= _CROWD:
-            return reach
-        reach *= 0.5
+def _reach(roots: ComplexArray, starts: IntArray, omega: float, longest: float) -> float:
+    """Length of a piece from omega on that the expansion from roots holds.
+
+    Around each polynomial the crowd, the sum of reach / (reach + distance), is concave in the
+    reach: Newton's method from below never passes the length at which it is _CROWD.
+    """
+    shortest = longest
+    for k in range(starts.size - 1):
+        reach = 0.0
+        for _ in range(6):
+            crowd, rate = 0.0, 0.0
+            for root in roots[starts[k] : starts[k + 1]]:
+                for above in (omega - root.imag, omega + root.imag):
+                    distance = np.hypot(root.real, above)
+                    if distance > 0.0:
+                        crowd += reach / (reach + distance)
+                        rate += distance / (reach + distance) ** 2
+                    if root.imag == 0.0:
+                        break
+            if rate * (shortest - reach) <= _CROWD - crowd:
+                reach = shortest
+                break
+            reach += (_CROWD - crowd) / rate
+        shortest = min(shortest, reach)
+    return shortest
 
 
 @njit(cache=True)
@@ -187,7 +198,7 @@ def piece(
     whole, roots, starts, leads = polynomials
     start, reach = omega, longest
     if whole.shape[0] == 0:
-        reach = _reach(roots, omega, min(longest, 1e300))
+        reach = _reach(roots, starts, omega, min(longest, 1e300))
         coefficients, magnitudes, left_out = _from_roots(roots, starts, leads, start, reach)
     else:
         if longest == np.inf:

@@ -579,6 +579,7 @@ def compile_all():
     for system in (loop, to_loop(Sketch((-2.0,), (-1.0,), 0.3, "common", 2.0, 1.0))):
         point = 0.8, 0.9
         margins(system, *point)
+        margins(system, *point, 1.0)
         modulus_margin(system, *point)
         ray_crossings(system, point, (1.0, 0.5), 0.1)
         first_crossing(system, point, (1.0, 0.5), 0.1)
