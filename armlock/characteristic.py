@@ -15,7 +15,7 @@ So both are one class here, and one set of algorithms serves both.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -30,135 +30,10 @@ from armlock.checks import (
     real_array,
     real_number,
 )
+from armlock.exponentials import EPSILON, ExponentialSum, Polynomial
 
-EPSILON = 2.0**-52
-#: Up to this degree a polynomial is evaluated from its coefficients, beyond from its roots.
-LOW_DEGREE = 20
 # Past this an exponential is no float.
 _LARGEST_EXPONENT = 700.0
-
-
-class Polynomial(NamedTuple):
-    """A real polynomial of s: its coefficients in ascending powers, and its roots."""
-
-    coefficients: FloatArray
-    roots: ComplexArray
-
-    @classmethod
-    def of(cls, coefficients: FloatArray) -> Polynomial:
-        """Return the polynomial with these coefficients."""
-        return cls(coefficients, poly.polyroots(coefficients).astype(np.complex128))
-
-    def over(self, other: Polynomial, s: ComplexArray) -> ComplexArray:
-        """Evaluate p(s) / q(s), factor by factor."""
-        value = np.full(s.shape, self.coefficients[-1] / other.coefficients[-1], dtype=complex)
-        # In turn, so that the product neither overflows nor underflows on the way.
-        for k in range(max(self.roots.size, other.roots.size)):
-            if k < self.roots.size:
-                value *= s - self.roots[k]
-            if k < other.roots.size:
-                value /= s - other.roots[k]
-        return value
-
-    def times_conjugate(self, other: Polynomial) -> Polynomial:
-        """Return p q*, where q*(j omega) is the complex conjugate of q(j omega)."""
-        # The coefficients are real: q*(s) = q(-s).
-        signs = (-1.0) ** np.arange(other.coefficients.size)
-        with np.errstate(over="ignore", invalid="ignore"):
-            product = np.convolve(self.coefficients, signs * other.coefficients)
-        return Polynomial(product, np.concatenate((self.roots, -other.roots)))
-
-
-class ExponentialSum(NamedTuple):
-    r"""A function of s = j omega: polynomials times exponentials, added up.
-
-    With polynomials p_k and phase rates :math:`\alpha_g` it is
-
-    .. math::
-
-        f(\omega) &= \sum_g \sum_k w_{gk}\, p_k\, e^{\mathrm{j}\omega\alpha_g} \\
-        &= \sum_k W_k\, p_k
-        + \sum_g \sum_k w_{gk}\, p_k \left( e^{\mathrm{j}\omega\alpha_g} - 1 \right) ,
-
-    and the second form is the one that is evaluated.
-
-    Attributes
-    ----------
-    polynomials : tuple of Polynomial
-        The p_k.
-    weights : float or complex array, shape (groups, polynomials)
-        The w_gk.
-    phases : float array, shape (groups,)
-        Phase rates, in s.
-    sums : float or complex array, shape (polynomials,)
-        The W_k, the sums of the weights over all groups. They are carried along, and not
-        summed up, because the weights may cancel to many digits.
-    """
-
-    polynomials: tuple[Polynomial, ...]
-    weights: npt.NDArray[Any]
-    phases: FloatArray
-    sums: npt.NDArray[Any]
-
-    def times_conjugate(self, other: ExponentialSum) -> ExponentialSum:
-        """Return this sum times the complex conjugate of `other`, at real omega."""
-        products = tuple(
-            p.times_conjugate(q) for p in self.polynomials for q in other.polynomials
-        )
-        pairs = [
-            (np.outer(w, v).ravel(), phase - other_phase)
-            for w, phase in zip(self.weights, self.phases, strict=True)
-            for v, other_phase in zip(other.weights, other.phases, strict=True)
-        ]
-        phases = np.array(sorted({phase for _, phase in pairs}))
-        weights = np.zeros((phases.size, len(products)))
-        for weight, phase in pairs:
-            weights[np.searchsorted(phases, phase)] += weight
-        return ExponentialSum(
-            products, weights, phases, np.outer(self.sums, other.sums).ravel()
-        )
-
-    def scaled(self, weight: float) -> ExponentialSum:
-        """Return this sum times a number."""
-        return self._replace(weights=weight * self.weights, sums=weight * self.sums)
-
-    def plus(self, other: ExponentialSum) -> ExponentialSum:
-        """Return this sum plus another one of the same polynomials, over the groups of both."""
-        return ExponentialSum(
-            self.polynomials,
-            np.concatenate((self.weights, other.weights)),
-            np.concatenate((self.phases, other.phases)),
-            self.sums + other.sums,
-        )
-
-    def turned(self) -> ExponentialSum:
-        """Return this sum times j, whose imaginary part is the real part of this one."""
-        return ExponentialSum(self.polynomials, 1j * self.weights, self.phases, 1j * self.sums)
-
-    def compiled(self) -> tuple[Any, ...]:
-        """Return the polynomials as `armlock.contour` takes them, in four arrays.
-
-        1. Coefficients in powers of omega, shape (polynomials, degree + 1). There are no rows
-           where a degree exceeds `LOW_DEGREE`.
-        2. Roots with an imaginary part of zero or above, polynomial after polynomial.
-        3. The index of each polynomial's first root.
-        4. The highest coefficients.
-        """
-        degree = max(p.coefficients.size for p in self.polynomials) - 1
-        kept = [np.sort_complex(p.roots[p.roots.imag >= 0.0]) for p in self.polynomials]
-        whole = np.zeros((len(self.polynomials), degree + 1), dtype=np.complex128)
-        # Powers of j, so that each coefficient stays exactly real or exactly imaginary.
-        turns = np.array([1.0, 1.0j, -1.0, -1.0j])[np.arange(degree + 1) % 4]
-        for row, p in zip(whole, self.polynomials, strict=True):
-            size = p.coefficients.size
-            row.real[:size] = p.coefficients * turns.real[:size]
-            row.imag[:size] = p.coefficients * turns.imag[:size]
-        return (
-            whole if degree <= LOW_DEGREE else whole[:0],
-            np.concatenate(kept),
-            np.cumsum([0, *(roots.size for roots in kept)]),
-            np.array([p.coefficients[-1] for p in self.polynomials]),
-        )
 
 
 class CharacteristicFunction:

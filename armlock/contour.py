@@ -5,17 +5,11 @@ over a step, a function stays within M step^2 / 2 of its tangent. So
 
 - `winding` never steps past the origin on the wrong side, and the argument it adds up is
   exact up to rounding;
-- `sign_changes` never steps over two zeros at once, so that none is missed.
+- `imaginary_zeros` never steps over two zeros at once, so that none is missed.
 
 Where rounding makes a value indistinguishable from zero, the walks say so.
 
-All functions here work on exponential sums, see `armlock.characteristic.ExponentialSum`:
-
-    f(omega) = sum_k sums_k p_k + sum_g sum_k weights_gk p_k (exp(j omega phase_g) - 1)
-
-with polynomials p_k of s = j omega. Polynomials of low degree are one expansion in powers of
-omega. Those of high degree are expanded anew in each *piece* of the axis, from their roots:
-over many decades of frequency one expansion would lose its digits.
+All functions here work on exponential sums, piece by piece, see `armlock.exponentials`.
 """
 
 from __future__ import annotations
@@ -28,19 +22,28 @@ from typing import Any
 import numpy as np
 from numba import config, njit
 
-from armlock.characteristic import EPSILON, LOW_DEGREE
 from armlock.checks import BoolArray, ComplexArray, FloatArray, IntArray
+from armlock.exponentials import (
+    EPSILON,
+    ROUNDING,
+    curvature_bound,
+    evaluate,
+    piece,
+    real_horner,
+    rounding_bound,
+    tangent_distance,
+)
 
-# Rounding errors of one evaluation, in units of EPSILON times the sum of magnitudes.
-ROUNDING = 8.0
-# The same for the crossings of a chart's row: wider, so that what is a boundary point by
+# ROUNDING for the crossings of a chart's row: wider, so that what is a boundary point by
 # itself is doubtful there, and counted by itself.
 CAUTION = 8.0 * ROUNDING
 # Share of a certified bound that a step may use up.
 SAFETY = 0.95
 
 # What `count_point` returns where it is no number of roots. The first two mean what
-# `armlock.stability.unstable_roots` says; the others become errors there.
+# `armlock.stability.unstable_roots` says: BOUNDARY where `winding` finds the sum no larger than
+# its rounding error, UNCONFINED where `armlock.bounds.last_frequency` is infinite, because the
+# neutral root chain is not confined. The others become errors there.
 BOUNDARY = -1
 UNCONFINED = -2
 DOUBTFUL = -3
@@ -55,286 +58,6 @@ MOST_RADIANS = 4.0 * MOST_STEPS
 MOST_ZEROS = 30_000_000
 # Most samples of a grid.
 MOST_SAMPLES = 10_000_000
-# How many roots of a polynomial, each weighed by reach / (reach + distance), a piece may have
-# around it. Then LOW_DEGREE powers hold the polynomial to rounding.
-_CROWD = 1.5
-
-
-@njit(cache=True)
-def real_horner(p: FloatArray, u: float) -> float:
-    """Value of a real polynomial with ascending coefficients."""
-    value = 0.0
-    for k in range(p.size - 1, -1, -1):
-        value = value * u + p[k]
-    return value
-
-
-@njit(cache=True)
-def _from_roots(
-    roots: ComplexArray, starts: IntArray, leads: FloatArray, omega: float, reach: float
-) -> tuple[ComplexArray, FloatArray, FloatArray]:
-    """Expand polynomials about j omega, in powers of u = (change of omega) / reach.
-
-    Polynomial k has the highest coefficient leads[k], and its real roots and the upper halves
-    of its pairs are roots[starts[k] : starts[k + 1]]. All are divided by one power of two.
-    Returns the coefficients and their magnitudes for rounding, shape (k, LOW_DEGREE + 1), and
-    bounds on what the higher powers add up to where 0 <= u <= 1.
-    """
-    size = LOW_DEGREE + 1
-    found = np.zeros((leads.size, size), dtype=np.complex128)
-    sizes = np.zeros((leads.size, size))
-    left_out = np.zeros(leads.size)
-    exponents = np.zeros(leads.size, dtype=np.int64)
-    largest = -(1 << 60)
-    for k in range(leads.size):
-        found[k, 0], sizes[k, 0], total = leads[k], abs(leads[k]), abs(leads[k])
-        for i in range(starts[k], starts[k + 1]):
-            root = roots[i]
-            below = 1j * omega - root
-            q0, q1, q2 = below, 1j * reach, 0j
-            m0, m1, m2 = abs(below), reach, 0.0
-            if root.imag != 0.0:
-                above = 1j * omega - root.conjugate()
-                q0, q1, q2 = below * above, 1j * reach * (below + above), complex(-(reach**2))
-                m0, m1 = abs(below) * abs(above), reach * (abs(below) + abs(above))
-                m2 = reach * reach
-            total *= m0 + m1 + m2
-            scale = 1.0
-            if total > 1e60 or 0.0 < total < 1e-60:
-                exponent = int(np.floor(np.log2(total)))
-                exponents[k] += exponent
-                scale = 2.0**-exponent
-                total *= scale
-            for m in range(size - 1, -1, -1):
-                new, most = q0 * found[k, m], m0 * sizes[k, m]
-                if m > 0:
-                    new, most = new + q1 * found[k, m - 1], most + m1 * sizes[k, m - 1]
-                if m > 1:
-                    new, most = new + q2 * found[k, m - 2], most + m2 * sizes[k, m - 2]
-                found[k, m], sizes[k, m] = scale * new, scale * most
-        factors = starts[k + 1] - starts[k]
-        held = 0.0
-        for m in range(size):
-            held += sizes[k, m]
-            # The products above round, too.
-            sizes[k, m] *= 1.0 + 0.5 * factors
-        left_out[k] = max(total - held, 0.0) + factors * EPSILON * total
-        largest = max(largest, exponents[k])
-    for k in range(leads.size):
-        scale = 2.0 ** max(exponents[k] - largest, -1000)
-        left_out[k] *= scale
-        for m in range(size):
-            found[k, m] *= scale
-            sizes[k, m] *= scale
-    return found, sizes, left_out
-
-
-@njit(cache=True)
-def _reach(roots: ComplexArray, starts: IntArray, omega: float, longest: float) -> float:
-    """Length of a piece from omega on that the expansion from roots holds.
-
-    Around each polynomial the crowd, the sum of reach / (reach + distance), is concave in the
-    reach: Newton's method from below never passes the length at which it is _CROWD.
-    """
-    shortest = longest
-    for k in range(starts.size - 1):
-        reach = 0.0
-        for _ in range(6):
-            crowd, rate = 0.0, 0.0
-            for root in roots[starts[k] : starts[k + 1]]:
-                for above in (omega - root.imag, omega + root.imag):
-                    distance = np.hypot(root.real, above)
-                    if distance > 0.0:
-                        crowd += reach / (reach + distance)
-                        rate += distance / (reach + distance) ** 2
-                    if root.imag == 0.0:
-                        break
-            if rate * (shortest - reach) <= _CROWD - crowd:
-                reach = shortest
-                break
-            reach += (_CROWD - crowd) / rate
-        shortest = min(shortest, reach)
-    return shortest
-
-
-@njit(cache=True)
-def _shifted(
-    whole: ComplexArray, omega: float, reach: float
-) -> tuple[ComplexArray, FloatArray, FloatArray]:
-    """Expand polynomials in omega about another omega; see `_from_roots`."""
-    found, sizes = whole.copy(), np.abs(whole)
-    for k in range(whole.shape[0]):
-        if omega == 0.0 and reach == 1.0:
-            break
-        for i in range(whole.shape[1] - 1):
-            for m in range(whole.shape[1] - 2, i - 1, -1):
-                found[k, m] += omega * found[k, m + 1]
-                sizes[k, m] += omega * sizes[k, m + 1]
-        scale = 1.0
-        for m in range(whole.shape[1]):
-            found[k, m] *= scale
-            sizes[k, m] *= scale
-            scale *= reach
-    return found, sizes, np.zeros(whole.shape[0])
-
-
-@njit(cache=True)
-def piece(
-    polynomials: tuple[Any, ...],
-    weights: FloatArray,
-    sums: FloatArray,
-    omega: float,
-    longest: float,
-) -> tuple[float, float, ComplexArray, FloatArray]:
-    """Expand an exponential sum over the piece of the axis that starts at omega.
-
-    `polynomials` is what `armlock.characteristic.compiled` makes of them; weights, shape
-    (groups, k), and sums, shape (k,), are those of the sum. A piece is no longer than
-    `longest`; if that is infinite, polynomials of low degree are one piece from zero on.
-    Returns `start` and `reach`, with u = (omega - start) / reach from 0 to 1 over the piece;
-    the coefficients in powers of u of the sum, then of each group, shape (1 + groups, n); and
-    magnitudes for rounding, shape (1 + groups, n + 1), the last one for what is left out.
-    """
-    whole, roots, starts, leads = polynomials
-    start, reach = omega, longest
-    if whole.shape[0] == 0:
-        reach = _reach(roots, starts, omega, min(longest, 1e300))
-        coefficients, magnitudes, left_out = _from_roots(roots, starts, leads, start, reach)
-    else:
-        if longest == np.inf:
-            start, reach = 0.0, 1.0
-        coefficients, magnitudes, left_out = _shifted(whole, start, reach)
-    number, size = coefficients.shape
-    groups = weights.shape[0]
-    local = np.zeros((1 + groups, size), dtype=np.complex128)
-    sizes = np.zeros((1 + groups, size + 1))
-    for g in range(1 + groups):
-        for k in range(number):
-            weight = sums[k] if g == 0 else weights[g - 1, k]
-            if weight != 0.0:
-                for m in range(size):
-                    local[g, m] += weight * coefficients[k, m]
-                    sizes[g, m] += abs(weight) * magnitudes[k, m]
-                sizes[g, size] += abs(weight) * left_out[k] / EPSILON
-    if reach == 1.0 and start == 0.0:
-        return start, reach, local, sizes
-    # Powers that rounding hides are not worth their time.
-    total = 0.0
-    for g in range(1 + groups):
-        for m in range(size):
-            total += sizes[g, m]
-    used, dropped = size, 0.0
-    while used > 1:
-        for g in range(1 + groups):
-            dropped += sizes[g, used - 1]
-        if dropped > 1e-3 * EPSILON * total:
-            break
-        used -= 1
-    kept = np.zeros((1 + groups, used + 1))
-    shorter = np.zeros((1 + groups, used), dtype=np.complex128)
-    for g in range(1 + groups):
-        kept[g, used] = sizes[g, size]
-        for m in range(size):
-            if m < used:
-                kept[g, m], shorter[g, m] = sizes[g, m], local[g, m]
-            else:
-                kept[g, used] += sizes[g, m] / EPSILON
-    return start, reach, shorter, kept
-
-
-@njit(cache=True)
-def evaluate(
-    start: float, reach: float, local: ComplexArray, phases: FloatArray, omega: float
-) -> tuple[complex, complex]:
-    """Value and derivative of an exponential sum within a piece.
-
-    Real and imaginary parts apart, since omega is real: this is the innermost loop.
-    """
-    size = local.shape[1]
-    u = (omega - start) / reach
-    value_re, value_im, slope_re, slope_im = 0.0, 0.0, 0.0, 0.0
-    for k in range(size - 1, -1, -1):
-        slope_re = slope_re * u + value_re
-        slope_im = slope_im * u + value_im
-        value_re = value_re * u + local[0, k].real
-        value_im = value_im * u + local[0, k].imag
-    slope_re /= reach
-    slope_im /= reach
-    for g in range(phases.size):
-        phase = phases[g]
-        if phase == 0.0:
-            continue
-        p_re, p_im, dp_re, dp_im = 0.0, 0.0, 0.0, 0.0
-        for k in range(size - 1, -1, -1):
-            dp_re = dp_re * u + p_re
-            dp_im = dp_im * u + p_im
-            p_re = p_re * u + local[g + 1, k].real
-            p_im = p_im * u + local[g + 1, k].imag
-        dp_re /= reach
-        dp_im /= reach
-        half = 0.5 * phase * omega
-        sine, cosine = np.sin(half), np.cos(half)
-        # exp(j omega phase) - 1, and phase times exp(j omega phase).
-        change_re, change_im = -2.0 * sine * sine, 2.0 * sine * cosine
-        turn_re, turn_im = phase * (1.0 + change_re), phase * change_im
-        value_re += p_re * change_re - p_im * change_im
-        value_im += p_re * change_im + p_im * change_re
-        slope_re += dp_re * change_re - dp_im * change_im - p_re * turn_im - p_im * turn_re
-        slope_im += dp_re * change_im + dp_im * change_re + p_re * turn_re - p_im * turn_im
-    return complex(value_re, value_im), complex(slope_re, slope_im)
-
-
-@njit(cache=True)
-def tangent_distance(value: complex, slope: complex, step: float) -> float:
-    """Smallest distance from zero of the tangent over a step."""
-    speed = slope.real * slope.real + slope.imag * slope.imag
-    approach = -(value.real * slope.real + value.imag * slope.imag)
-    place = 0.0
-    if approach > 0.0:
-        place = step if approach >= speed * step else approach / speed
-    return abs(value + place * slope)
-
-
-@njit(cache=True)
-def curvature_bound(
-    start: float, reach: float, local: ComplexArray, phases: FloatArray
-) -> FloatArray:
-    """Polynomial in u that bounds the second derivative of an exponential sum in a piece.
-
-    Where a polynomial is differentiated twice, |exp(j omega phase) - 1| is at most
-    |phase| (start + reach u), and at most 2.
-    """
-    groups, size = local.shape
-    bound = np.zeros(size)
-    for k in range(2, size):
-        bound[k - 2] += abs(local[0, k]) * k * (k - 1.0) / reach**2
-    for g in range(1, groups):
-        phase = abs(phases[g - 1])
-        begun = min(phase * start, 2.0)
-        for k in range(size):
-            magnitude = abs(local[g, k])
-            bound[k] += magnitude * phase * phase
-            if k >= 1:
-                bound[k - 1] += magnitude * phase * (2.0 * k + k * (k - 1.0)) / reach
-            if k >= 2:
-                bound[k - 2] += magnitude * begun * k * (k - 1.0) / reach**2
-    return bound
-
-
-@njit(cache=True)
-def rounding_bound(
-    start: float, reach: float, sizes: FloatArray, phases: FloatArray, rounding: float
-) -> FloatArray:
-    """Polynomial in u that bounds the rounding error of an exponential sum in a piece."""
-    groups, size = sizes.shape
-    bound = np.zeros(size + 1)
-    for k in range(size):
-        bound[k] += rounding * EPSILON * sizes[0, k]
-        for g in range(1, groups):
-            error = rounding * EPSILON * sizes[g, k] * abs(phases[g - 1])
-            bound[k] += error * start
-            bound[k + 1] += error * reach
-    return bound
 
 
 @njit(cache=True)
@@ -359,6 +82,7 @@ def winding(
         end = omega_end if polynomials[0].shape[0] > 0 else min(omega + reach, omega_end)
         bound = curvature_bound(start, reach, local, phases)
         error = rounding_bound(start, reach, sizes, phases, ROUNDING)
+        # What the uncertainty of `sums` adds to the error: the magnitudes in row 0.
         off = piece(polynomials, weights, uncertain, omega, np.inf)[3]
         for k in range(min(off.shape[1], error.size)):
             error[k] += off[0, k]
@@ -395,99 +119,6 @@ def winding(
 
 
 @njit(cache=True)
-def _taylor_signs_positive(q: FloatArray, shift: float) -> bool:
-    """Whether all coefficients of q(w + shift) are positive beyond rounding, or zero."""
-    p, magnitude = q.copy(), np.abs(q)
-    for i in range(q.size - 1):
-        for k in range(q.size - 2, i - 1, -1):
-            p[k] += shift * p[k + 1]
-            magnitude[k] += shift * magnitude[k + 1]
-        if not p[i] >= 1e-13 * magnitude[i]:
-            return False
-    return bool(p[q.size - 1] >= 0.0)
-
-
-@njit(cache=True)
-def last_root_bound(q: FloatArray) -> float:
-    """Bound past which a real polynomial is positive, or zero throughout; inf if there is none.
-
-    A shift of the variable after which all coefficients are positive proves it.
-    """
-    top = q.size - 1
-    while top > 0 and q[top] == 0.0:
-        top -= 1
-    q = q[: top + 1].copy()
-    for value in q:
-        if not np.isfinite(value):
-            return np.nan
-    if _taylor_signs_positive(q, 0.0):
-        return 0.0
-    if not q[top] > 0.0:
-        return np.inf
-    upper = 0.0
-    for k in range(1, q.size):
-        upper = max(upper, 2.0 * (abs(q[top - k]) / q[top]) ** (1.0 / k))
-    for _ in range(60):
-        if _taylor_signs_positive(q, upper):
-            break
-        upper *= 2.0
-    lower = 0.5 * upper
-    while lower > 1e-60 * upper and _taylor_signs_positive(q, lower):
-        upper = lower
-        lower *= 0.5
-    for _ in range(6):
-        middle = np.sqrt(lower * upper)
-        if _taylor_signs_positive(q, middle):
-            upper = middle
-        else:
-            lower = middle
-    return upper
-
-
-@njit(cache=True)
-def last_frequency(
-    squares: FloatArray, unit: float, factors: FloatArray, reserve: float
-) -> float:
-    """Frequency past which |A| exceeds the other terms of D together, so that no root crosses.
-
-    `squares` holds |A|^2 and the squares of the other terms T_i at s = j omega, as polynomials
-    in w = (omega / unit)^2; `factors` are f_i >= 0, and `reserve` is the share of A's highest
-    power that sum f_i |T_i| leaves: inf is returned where that is not positive.
-
-    By Cauchy and Schwarz (sum f_i |T_i|)^2 <= (sum a_i) (sum f_i^2 |T_i|^2 / a_i) for all
-    a_i > 0, with equality where a_i is f_i |T_i|. So |A|^2 less the right-hand side is a
-    polynomial in w, and `last_root_bound` applies.
-    """
-    if not reserve > 0.0:
-        return np.inf
-    # Far below rounding a factor would only underflow.
-    factors = np.where(factors < 1e-100, 0.0, factors)
-    top = squares.shape[1] - 1
-    lead = np.sqrt(squares[0, top])
-    shares = np.zeros(factors.size)
-    whole = 0.0
-    for i in range(factors.size):
-        size = 0.0
-        for m in range(top + 1):
-            size += abs(squares[i + 1, m])
-        shares[i] = factors[i] * np.sqrt(size)
-        whole += shares[i]
-    together = 0.0
-    for i in range(factors.size):
-        if whole > 0.0:
-            shares[i] *= 0.5 * reserve * lead / whole
-        shares[i] += factors[i] * np.sqrt(squares[i + 1, top])
-        together += shares[i]
-    q = squares[0].copy()
-    for i in range(factors.size):
-        if shares[i] > 0.0:
-            weight = together * factors[i] ** 2 / shares[i]
-            for m in range(top + 1):
-                q[m] -= weight * squares[i + 1, m]
-    return float(np.sqrt(last_root_bound(q)) * unit)
-
-
-@njit(cache=True)
 def _remaining_argument(roots: ComplexArray, omega: float) -> float:
     """Argument that the polynomial with these roots gathers from j omega to infinity."""
     argument = 0.0
@@ -505,10 +136,11 @@ def count_point(model: tuple[Any, ...], x: float, y: float, end: float) -> int:
 
     By the argument principle: degree / 2 less the argument over pi, gathered from 0 to
     infinity, for polynomials in s; degree less the argument over pi, gathered from 0 to `end`,
-    for a map. `end` is the frequency of `last_frequency`, where a map's boundary ends. The
-    model is what `armlock.stability` makes of a characteristic function.
+    for a map. `end` is what `armlock.bounds.last_frequency` gives: past it no root crosses; for
+    a map it is pi / step, and inf where the neutral root chain is not confined. The model is
+    what `armlock.stability` makes of a characteristic function.
     """
-    polynomials, weights, sums, reference, phases, undelayed, roots, is_map = model
+    polynomials, weights, sums, reference, phases, a_sums, roots, is_map = model
     if end == np.inf:
         return UNCONFINED
     if np.isnan(end):
@@ -531,10 +163,9 @@ def count_point(model: tuple[Any, ...], x: float, y: float, end: float) -> int:
     if is_map:
         count = roots.size - argument / np.pi
     else:
-        # From `end` on D / A stays close to 1, and A itself is known by its roots.
-        start, reach, local, _ = piece(
-            polynomials, np.zeros((0, here.size)), undelayed, end, 1e-3
-        )
+        # From `end` on |D / A - 1| < 1, so that D / A does not go around zero: its argument at
+        # `end` is taken back. That of A is known from its roots.
+        start, reach, local, _ = piece(polynomials, np.zeros((0, here.size)), a_sums, end, 1e-3)
         a = evaluate(start, reach, local, np.zeros(0), end)[0]
         ratio = value * a.conjugate()
         argument += _remaining_argument(roots, end) - np.arctan2(ratio.imag, ratio.real)
@@ -671,7 +302,7 @@ def _safe_step(h: float, dh: float, curvature: float, error: float) -> float:
     return SAFETY * certified
 
 
-# Columns of what `sign_changes` returns.
+# Columns of what `imaginary_zeros` returns.
 OMEGA, JUMP, WIDTH, POSITION, SPREAD = 0, 1, 2, 3, 4
 
 
@@ -706,7 +337,7 @@ def _place(
 
 
 @njit(cache=True)
-def sign_changes(
+def imaginary_zeros(
     polynomials: tuple[Any, ...],
     function: tuple[Any, ...],
     measure: tuple[Any, ...],
@@ -826,7 +457,7 @@ def _fill_row(
     ends, y, deviation, base, x, lower, upper = rows
     polynomials, fixed, varying, fixed_sums, varying_sums, phases, measure, is_map = model
     function = (fixed - y[i] * varying, fixed_sums - deviation[i] * varying_sums, phases)
-    zeros, complete = sign_changes(polynomials, function, measure, ends[i], is_map, CAUTION)
+    zeros, complete = imaginary_zeros(polynomials, function, measure, ends[i], is_map, CAUTION)
     change = np.zeros(x.size + 1, dtype=np.int64)
     total = base[i]
     trusted = complete and base[i] >= 0

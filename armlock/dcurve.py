@@ -249,7 +249,7 @@ def d_curve_branches(
         \mathrm{Im} \left[ B_1(\mathrm{j}\omega)\, \overline{B_2(\mathrm{j}\omega)}\,
         e^{-\mathrm{j}\omega (\theta_1 - \theta_2)} \right] = 0 ,
 
-    found with certified steps (`armlock.contour.sign_changes`).
+    found with certified steps (`armlock.contour.imaginary_zeros`).
 
     Examples
     --------

@@ -18,8 +18,8 @@ import numpy as np
 from numba import njit
 
 from armlock.checks import ComplexArray, FloatArray
-from armlock.contour import (
-    MOST_STEPS,
+from armlock.contour import MOST_STEPS
+from armlock.exponentials import (
     ROUNDING,
     curvature_bound,
     evaluate,
@@ -57,7 +57,7 @@ def _distance(n: complex, r: complex, symmetric: bool) -> float:
 def _combined(
     local: ComplexArray, sizes: FloatArray, weights: FloatArray, sums: FloatArray
 ) -> tuple[ComplexArray, FloatArray]:
-    """Sum polynomials, given as rows 1 to 3, as `armlock.contour.piece` does."""
+    """Sum polynomials, given as rows 1 to 3, as `armlock.exponentials.piece` does."""
     rows = 1 + weights.shape[0]
     found = np.zeros((rows, local.shape[1]), dtype=np.complex128)
     most = np.zeros((rows, sizes.shape[1]))

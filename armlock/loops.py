@@ -19,7 +19,7 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
 from armlock import paper, sensors
-from armlock.characteristic import CharacteristicFunction, Polynomial
+from armlock.characteristic import CharacteristicFunction
 from armlock.checks import (
     ComplexArray,
     complex_array,
@@ -28,6 +28,7 @@ from armlock.checks import (
     true_or_false,
 )
 from armlock.controllers import Controller, integrating_actuator, table_two
+from armlock.exponentials import Polynomial
 from armlock.sensors import SignalMapping
 
 

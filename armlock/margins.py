@@ -17,13 +17,13 @@ from numpy.polynomial import polynomial as poly
 from scipy.optimize import brentq, minimize_scalar
 
 from armlock import contour, infimum
+from armlock.bounds import last_larger, last_root_bound
 from armlock.checks import FloatArray, axis, positive_number, real_number
 from armlock.loops import Loop, checked_loop
 from armlock.nyquist import leading_radius, loop_numerator
 from armlock.rays import first_break
 from armlock.stability import (
     CountError,
-    last_larger,
     sign_changes,
     unstable_roots,
 )
@@ -396,7 +396,7 @@ def _no_crossing_from(loop: Loop, c1: float, c2: float, low: float, high: float)
     found = [last_larger(loop.rest, (c, loop.b1, loop.b2), np.array([high, *(high * arms)]))]
     if not loop.delay:
         for t, sign in ((1.0 / high, 1.0), (1.0 / low, -1.0)):
-            ascends = math.sqrt(contour.last_root_bound(_ascent(loop.rest, c, t, sign)))
+            ascends = math.sqrt(last_root_bound(_ascent(loop.rest, c, t, sign)))
             first = _plus(t * loop.rest, c)
             found.append(max(ascends, last_larger(first, (loop.b1, loop.b2), arms)))
     return min(found)

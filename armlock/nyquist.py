@@ -17,7 +17,7 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
 from armlock import contour
-from armlock.characteristic import ExponentialSum
+from armlock.bounds import last_frequency, last_larger
 from armlock.checks import (
     ComplexArray,
     FloatArray,
@@ -26,13 +26,12 @@ from armlock.checks import (
     real_array,
     real_number,
 )
+from armlock.exponentials import ExponentialSum
 from armlock.loops import Loop, checked_loop
 from armlock.stability import (
     BOUNDARY,
     UNCONFINED,
     CountError,
-    last_frequency,
-    last_larger,
     sign_changes,
     unstable_roots,
 )

@@ -16,9 +16,10 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 from scipy.optimize import brentq
 
+from armlock.bounds import last_frequency
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import ComplexArray, FloatArray, IntArray, axis, positive_number
-from armlock.stability import CountError, last_frequency, sign_changes, unstable_roots
+from armlock.stability import UNCONFINED, CountError, sign_changes, unstable_roots
 
 P = TypeVar("P")
 R = TypeVar("R", bound=tuple[Any, ...])
@@ -354,7 +355,7 @@ def first_break(
     """
     ray = Ray(system, start, direction)
     count = int(unstable_roots(system, *ray.start))
-    if count > 0 or count == -2:
+    if count > 0 or count == UNCONFINED:
         raise ValueError(
             f"start must be stable to lose stability, but unstable_roots gives {count} at "
             f"{ray.at(0.0)}"

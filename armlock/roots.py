@@ -18,7 +18,8 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 from scipy.interpolate import BarycentricInterpolator
 
-from armlock.characteristic import EPSILON, CharacteristicFunction, checked_system
+from armlock.bounds import last_frequency
+from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import (
     ComplexArray,
     FloatArray,
@@ -28,7 +29,8 @@ from armlock.checks import (
     whole_number,
 )
 from armlock.contour import resolved_grid
-from armlock.stability import BOUNDARY, CountError, last_frequency, unstable_roots
+from armlock.exponentials import EPSILON
+from armlock.stability import BOUNDARY, CountError, unstable_roots
 from armlock.statespace import realize
 
 # Real parts that differ by less count as equal; relative to |s| or one over the longest delay.

@@ -6,12 +6,12 @@ y fixed, roots cross the axis where Im(N / M) = 0, at x = Re(N / M); a crossing 
 adds unstable roots. Each row is checked against an independent count at its far end.
 
 The walks are those of `armlock.contour`. What makes a point a boundary point stands there, in
-`winding`: D is no larger somewhere on the axis than its rounding error, `rounding_bound`.
+`winding`: D is no larger somewhere on the axis than its rounding error, to which that of x and
+y contributes (`count_point`), or no step of the walk can be certified.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -22,7 +22,8 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
 from armlock import contour
-from armlock.characteristic import CharacteristicFunction, ExponentialSum, checked_system
+from armlock.bounds import last_frequency
+from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import (
     BoolArray,
     ComplexArray,
@@ -32,6 +33,7 @@ from armlock.checks import (
     broadcast_pair,
     check_memory,
 )
+from armlock.exponentials import ROUNDING, ExponentialSum
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -129,93 +131,13 @@ def _roots_of_a(system: CharacteristicFunction) -> ComplexArray:
     return np.array([complex(root) for root in found])
 
 
-@lru_cache(maxsize=64)
-def _squares(system: CharacteristicFunction) -> tuple[FloatArray, float]:
-    """Return |A|^2, |B1|^2, |B2|^2, |C|^2 at s = j omega, and their unit of frequency.
-
-    They are polynomials in (omega / unit)^2. In this unit, a power of two in rad/s, the lowest
-    and the highest coefficient of A are of the same size.
-    """
-    return squared_magnitudes((system.a, system.b1, system.b2, system.c))
-
-
-def squared_magnitudes(polynomials: Sequence[FloatArray]) -> tuple[FloatArray, float]:
-    """Return |p(j omega)|^2 as polynomials in (omega / unit)^2, and the unit in rad/s.
-
-    The first polynomial is of the highest degree. In this unit, a power of two, its lowest and
-    highest coefficients are of the same size.
-    """
-    first = polynomials[0]
-    degree, lowest = first.size - 1, int(np.flatnonzero(first)[0])
-    turn = np.log2(abs(first[lowest])) - np.log2(abs(first[degree]))
-    exponent = round(turn / (degree - lowest)) if degree > lowest else 0
-    powers = exponent * np.arange(degree + 1) - round(0.5 * exponent * (degree + lowest))
-    squares = np.zeros((len(polynomials), degree + 1))
-    for row, p in zip(squares, polynomials, strict=True):
-        scaled = np.ldexp(p, powers[: p.size])
-        # Powers of s two apart have opposite signs at s = j omega.
-        even, odd = scaled[0::2].copy(), scaled[1::2].copy()
-        even[1::2] *= -1.0
-        odd[1::2] *= -1.0
-        row[: 2 * even.size - 1] += np.convolve(even, even)
-        if odd.size:
-            row[1 : 2 * odd.size] += np.convolve(odd, odd)
-    return squares, float(np.ldexp(1.0, exponent))
-
-
-def last_larger(
-    first: FloatArray, others: tuple[FloatArray, ...], factors: FloatArray
-) -> float:
-    """Frequency past which a polynomial is larger than the sum of others; inf if it is not."""
-    degree = max(p.size for p in others)
-    lead = abs(float(first[-1])) if first.size >= degree else 0.0
-    if lead == 0.0:
-        return np.inf
-    tops = [abs(float(p[-1])) if p.size == first.size else 0.0 for p in others]
-    reserve = (lead - float(factors @ np.array(tops))) / lead
-    squares, unit = squared_magnitudes((first, *others))
-    found: float = contour.last_frequency(squares, unit, factors, reserve)
-    return found
-
-
-def last_frequency(
-    system: CharacteristicFunction, x: npt.ArrayLike, y: npt.ArrayLike
-) -> FloatArray:
-    """Return a frequency past which no root lies on the imaginary axis.
-
-    Parameters
-    ----------
-    system : CharacteristicFunction
-        The loop.
-    x, y : array_like of float
-        The free parameters; they broadcast.
-
-    Returns
-    -------
-    float array, of the broadcast shape
-        In rad/s, a bound: past it |A| > |C| + |x B1| + |y B2|, also for all smaller |x| and
-        |y|. inf where the neutral root chain is not confined to the left half-plane, and nan
-        where numbers overflow.
-    """
-    name1, name2 = checked_system(system).parameters
-    xs, ys = broadcast_pair(name1, x, name2, y)
-    if system.step:
-        return np.full(xs.shape, np.pi / system.step)
-    squares, unit = _squares(system)
-    reserve = system.chain_reserve(xs, ys)
-    ends = [
-        contour.last_frequency(squares, unit, np.array([abs(p), abs(q), 1.0]), float(r))
-        for p, q, r in zip(xs.flat, ys.flat, reserve.flat, strict=True)
-    ]
-    return np.array(ends, dtype=np.float64).reshape(xs.shape)
-
-
 def sign_changes(
     whole: ExponentialSum, end: float, *, is_map: bool = False
 ) -> tuple[FloatArray, IntArray]:
     """Zeros in [0, end] of the imaginary part of an exponential sum, and their jumps.
 
-    As `armlock.contour.sign_changes`: the jump is 0 where rounding hides whether there is one.
+    As `armlock.contour.imaginary_zeros`: the jump is 0 where rounding hides whether there is
+    one.
 
     Raises
     ------
@@ -226,8 +148,8 @@ def sign_changes(
         raise CountError(f"no crossings up to omega = {end}: a number overflows", _NO_POINTS)
     function = whole.weights, whole.sums, whole.phases
     nothing = np.zeros((0, whole.sums.size)), np.zeros(whole.sums.size), np.zeros(0)
-    zeros, complete = contour.sign_changes(
-        whole.compiled(), function, nothing, end, is_map, contour.ROUNDING
+    zeros, complete = contour.imaginary_zeros(
+        whole.compiled(), function, nothing, end, is_map, ROUNDING
     )
     if not complete:
         raise CountError(
@@ -500,11 +422,11 @@ def _walk(
     upper: FloatArray,
 ) -> tuple[IntArray, BoolArray, IntArray]:
     """Fill rows from their crossings, starting with the counts `base` at x = lower."""
-    undelayed, b1, b2 = system.on_boundary()
+    constant, b1, b2 = system.on_boundary()
     x0, y0 = system.reference
     # Where all exponentials are one, N = A + C - y B2 is R + x0 B1 at y = y0, exactly.
     at_reference = system.rest_on_boundary().sums + x0 * b1.sums
-    fixed = undelayed._replace(sums=at_reference).times_conjugate(b1)
+    fixed = constant._replace(sums=at_reference).times_conjugate(b1)
     varying = b2.times_conjugate(b1)
     square = b1.times_conjugate(b1)
     # Both over the exponentials of both, so that they add with a weight.

@@ -19,14 +19,14 @@ from armlock import (
     CommonArm,
     DualArm,
     StabilityChart,
-    contour,
     critical_perturbation,
     paper_loop,
     stability_chart,
     unstable_roots,
 )
+from armlock.bounds import last_frequency
 from armlock.checks import FloatArray
-from armlock.stability import last_frequency
+from armlock.stability import sign_changes
 from benchmarks import child
 from benchmarks.charts import comparison, memory_row, timed
 from benchmarks.report import Row, Topic
@@ -78,7 +78,7 @@ def crossings_found(system: CharacteristicFunction, y: FloatArray, right: float)
         sums = fixed.plus(varying.scaled(system.reference[1] - level)).sums
         row = fixed.plus(varying.scaled(-level))
         end = float(last_frequency(system, right, level))
-        total += contour.sign_changes(*row._replace(sums=sums), end, False)[0].size
+        total += sign_changes(row._replace(sums=sums), end)[0].size
     return total
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from armlock import CommonArm, HayesEquation, contour, stability_chart, unstable_roots
-from armlock.stability import last_frequency
+from armlock.bounds import last_frequency
 from tests import independent
 from tests.systems import NEUTRAL, RETARDED
 

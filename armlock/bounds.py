@@ -1,0 +1,190 @@
+"""The frequency past which no root can lie on the imaginary axis.
+
+There A exceeds all other terms of D together. Every walk along the axis ends there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from armlock.characteristic import CharacteristicFunction, checked_system
+from armlock.checks import FloatArray, broadcast_pair
+
+
+@njit(cache=True)
+def _taylor_signs_positive(q: FloatArray, shift: float) -> bool:
+    """Whether all coefficients of q(w + shift) are positive beyond rounding, or zero."""
+    p, magnitude = q.copy(), np.abs(q)
+    for i in range(q.size - 1):
+        for k in range(q.size - 2, i - 1, -1):
+            p[k] += shift * p[k + 1]
+            magnitude[k] += shift * magnitude[k + 1]
+        if not p[i] >= 1e-13 * magnitude[i]:
+            return False
+    return bool(p[q.size - 1] >= 0.0)
+
+
+@njit(cache=True)
+def last_root_bound(q: FloatArray) -> float:
+    """Bound past which a real polynomial is positive, or zero throughout; inf if there is none.
+
+    A shift of the variable after which all coefficients are positive proves it.
+    """
+    top = q.size - 1
+    while top > 0 and q[top] == 0.0:
+        top -= 1
+    q = q[: top + 1].copy()
+    for value in q:
+        if not np.isfinite(value):
+            return np.nan
+    if _taylor_signs_positive(q, 0.0):
+        return 0.0
+    if not q[top] > 0.0:
+        return np.inf
+    upper = 0.0
+    for k in range(1, q.size):
+        upper = max(upper, 2.0 * (abs(q[top - k]) / q[top]) ** (1.0 / k))
+    for _ in range(60):
+        if _taylor_signs_positive(q, upper):
+            break
+        upper *= 2.0
+    lower = 0.5 * upper
+    while lower > 1e-60 * upper and _taylor_signs_positive(q, lower):
+        upper = lower
+        lower *= 0.5
+    for _ in range(6):
+        middle = np.sqrt(lower * upper)
+        if _taylor_signs_positive(q, middle):
+            upper = middle
+        else:
+            lower = middle
+    return upper
+
+
+@njit(cache=True)
+def _last_frequency(
+    squares: FloatArray, unit: float, factors: FloatArray, reserve: float
+) -> float:
+    """Frequency past which |A| exceeds the other terms together.
+
+    `squares` holds |A|^2 and the squares of the other terms T_i at s = j omega, as polynomials
+    in w = (omega / unit)^2; `factors` are f_i >= 0, and `reserve` is the share of A's highest
+    power that sum f_i |T_i| leaves: inf is returned where that is not positive.
+
+    By Cauchy and Schwarz (sum f_i |T_i|)^2 <= (sum a_i) (sum f_i^2 |T_i|^2 / a_i) for all
+    a_i > 0, with equality where a_i is f_i |T_i|. So |A|^2 less the right-hand side is a
+    polynomial in w, and `last_root_bound` applies.
+    """
+    if not reserve > 0.0:
+        return np.inf
+    # Far below rounding a factor would only underflow.
+    factors = np.where(factors < 1e-100, 0.0, factors)
+    top = squares.shape[1] - 1
+    lead = np.sqrt(squares[0, top])
+    shares = np.zeros(factors.size)
+    whole = 0.0
+    for i in range(factors.size):
+        size = 0.0
+        for m in range(top + 1):
+            size += abs(squares[i + 1, m])
+        shares[i] = factors[i] * np.sqrt(size)
+        whole += shares[i]
+    together = 0.0
+    for i in range(factors.size):
+        if whole > 0.0:
+            shares[i] *= 0.5 * reserve * lead / whole
+        shares[i] += factors[i] * np.sqrt(squares[i + 1, top])
+        together += shares[i]
+    q = squares[0].copy()
+    for i in range(factors.size):
+        if shares[i] > 0.0:
+            weight = together * factors[i] ** 2 / shares[i]
+            for m in range(top + 1):
+                q[m] -= weight * squares[i + 1, m]
+    return float(np.sqrt(last_root_bound(q)) * unit)
+
+
+def squared_magnitudes(polynomials: Sequence[FloatArray]) -> tuple[FloatArray, float]:
+    """Return |p(j omega)|^2 as polynomials in (omega / unit)^2, and the unit in rad/s.
+
+    The first polynomial is of the highest degree. In this unit, a power of two, its lowest and
+    highest coefficients are of the same size.
+    """
+    first = polynomials[0]
+    degree, lowest = first.size - 1, int(np.flatnonzero(first)[0])
+    turn = np.log2(abs(first[lowest])) - np.log2(abs(first[degree]))
+    exponent = round(turn / (degree - lowest)) if degree > lowest else 0
+    powers = exponent * np.arange(degree + 1) - round(0.5 * exponent * (degree + lowest))
+    squares = np.zeros((len(polynomials), degree + 1))
+    for row, p in zip(squares, polynomials, strict=True):
+        scaled = np.ldexp(p, powers[: p.size])
+        # Powers of s two apart have opposite signs at s = j omega.
+        even, odd = scaled[0::2].copy(), scaled[1::2].copy()
+        even[1::2] *= -1.0
+        odd[1::2] *= -1.0
+        row[: 2 * even.size - 1] += np.convolve(even, even)
+        if odd.size:
+            row[1 : 2 * odd.size] += np.convolve(odd, odd)
+    return squares, float(np.ldexp(1.0, exponent))
+
+
+@lru_cache(maxsize=64)
+def _squares(system: CharacteristicFunction) -> tuple[FloatArray, float]:
+    """Return |A|^2, |B1|^2, |B2|^2, |C|^2 at s = j omega, and their unit of frequency.
+
+    They are polynomials in (omega / unit)^2. In this unit, a power of two in rad/s, the lowest
+    and the highest coefficient of A are of the same size.
+    """
+    return squared_magnitudes((system.a, system.b1, system.b2, system.c))
+
+
+def last_frequency(
+    system: CharacteristicFunction, x: npt.ArrayLike, y: npt.ArrayLike
+) -> FloatArray:
+    """Return a frequency past which no root lies on the imaginary axis.
+
+    Parameters
+    ----------
+    system : CharacteristicFunction
+        The loop.
+    x, y : array_like of float
+        The free parameters; they broadcast.
+
+    Returns
+    -------
+    float array, of the broadcast shape
+        In rad/s, a bound: past it |A| > |C| + |x B1| + |y B2|, also for all smaller |x| and
+        |y|. inf where the neutral root chain is not confined to the left half-plane, and nan
+        where numbers overflow.
+    """
+    name1, name2 = checked_system(system).parameters
+    xs, ys = broadcast_pair(name1, x, name2, y)
+    if system.step:
+        return np.full(xs.shape, np.pi / system.step)
+    squares, unit = _squares(system)
+    reserve = system.chain_reserve(xs, ys)
+    ends = [
+        _last_frequency(squares, unit, np.array([abs(p), abs(q), 1.0]), float(r))
+        for p, q, r in zip(xs.flat, ys.flat, reserve.flat, strict=True)
+    ]
+    return np.array(ends, dtype=np.float64).reshape(xs.shape)
+
+
+def last_larger(
+    first: FloatArray, others: tuple[FloatArray, ...], factors: FloatArray
+) -> float:
+    """Frequency past which a polynomial is larger than the sum of others; inf if it is not."""
+    degree = max(p.size for p in others)
+    lead = abs(float(first[-1])) if first.size >= degree else 0.0
+    if lead == 0.0:
+        return np.inf
+    tops = [abs(float(p[-1])) if p.size == first.size else 0.0 for p in others]
+    reserve = (lead - float(factors @ np.array(tops))) / lead
+    squares, unit = squared_magnitudes((first, *others))
+    found: float = _last_frequency(squares, unit, factors, reserve)
+    return found

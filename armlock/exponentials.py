@@ -1,0 +1,435 @@
+"""Polynomials times exponentials on the imaginary axis, with bounds on all that is uncertain.
+
+D, its terms and their products are exponential sums at s = j omega,
+
+    f(omega) = sum_k sums_k p_k + sum_g sum_k weights_gk p_k (exp(j omega phase_g) - 1)
+
+with polynomials p_k of s. Polynomials of low degree are one expansion in powers of omega.
+Those of high degree are expanded anew in each *piece* of the axis, from their roots: over many
+decades of frequency one expansion would lose its digits.
+
+Within a piece a sum has a value and a derivative, a bound on its second derivative, and a
+bound on its rounding error. The walks of `armlock.contour` and `armlock.infimum` need no more.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+from numpy.polynomial import polynomial as poly
+
+from armlock.checks import ComplexArray, FloatArray, IntArray
+
+EPSILON = 2.0**-52
+#: Up to this degree a polynomial is evaluated from its coefficients, beyond from its roots.
+LOW_DEGREE = 20
+# Rounding errors of one evaluation, in units of EPSILON times the sum of magnitudes. This is
+# the tolerance of a boundary point: where D is no larger, a count is -1.
+ROUNDING = 8.0
+# How many roots of a polynomial, each weighed by reach / (reach + distance), a piece may have
+# around it. Then LOW_DEGREE powers hold the polynomial to rounding.
+_CROWD = 1.5
+
+
+class Polynomial(NamedTuple):
+    """A real polynomial of s: its coefficients in ascending powers, and its roots."""
+
+    coefficients: FloatArray
+    roots: ComplexArray
+
+    @classmethod
+    def of(cls, coefficients: FloatArray) -> Polynomial:
+        """Return the polynomial with these coefficients."""
+        return cls(coefficients, poly.polyroots(coefficients).astype(np.complex128))
+
+    def over(self, other: Polynomial, s: ComplexArray) -> ComplexArray:
+        """Evaluate p(s) / q(s), factor by factor."""
+        value = np.full(s.shape, self.coefficients[-1] / other.coefficients[-1], dtype=complex)
+        # In turn, so that the product neither overflows nor underflows on the way.
+        for k in range(max(self.roots.size, other.roots.size)):
+            if k < self.roots.size:
+                value *= s - self.roots[k]
+            if k < other.roots.size:
+                value /= s - other.roots[k]
+        return value
+
+    def times_conjugate(self, other: Polynomial) -> Polynomial:
+        """Return p q*, where q*(j omega) is the complex conjugate of q(j omega)."""
+        # The coefficients are real: q*(s) = q(-s).
+        signs = (-1.0) ** np.arange(other.coefficients.size)
+        with np.errstate(over="ignore", invalid="ignore"):
+            product = np.convolve(self.coefficients, signs * other.coefficients)
+        return Polynomial(product, np.concatenate((self.roots, -other.roots)))
+
+
+class ExponentialSum(NamedTuple):
+    r"""A function of s = j omega: polynomials times exponentials, added up.
+
+    With polynomials p_k and phase rates :math:`\alpha_g` it is
+
+    .. math::
+
+        f(\omega) &= \sum_g \sum_k w_{gk}\, p_k\, e^{\mathrm{j}\omega\alpha_g} \\
+        &= \sum_k W_k\, p_k
+        + \sum_g \sum_k w_{gk}\, p_k \left( e^{\mathrm{j}\omega\alpha_g} - 1 \right) ,
+
+    and the second form is the one that is evaluated.
+
+    Attributes
+    ----------
+    polynomials : tuple of Polynomial
+        The p_k.
+    weights : float or complex array, shape (groups, polynomials)
+        The w_gk.
+    phases : float array, shape (groups,)
+        Phase rates, in s.
+    sums : float or complex array, shape (polynomials,)
+        The W_k, the sums of the weights over all groups. They are carried along, and not
+        summed up, because the weights may cancel to many digits.
+    """
+
+    polynomials: tuple[Polynomial, ...]
+    weights: npt.NDArray[Any]
+    phases: FloatArray
+    sums: npt.NDArray[Any]
+
+    def times_conjugate(self, other: ExponentialSum) -> ExponentialSum:
+        """Return this sum times the complex conjugate of `other`, at real omega."""
+        products = tuple(
+            p.times_conjugate(q) for p in self.polynomials for q in other.polynomials
+        )
+        pairs = [
+            (np.outer(w, v).ravel(), phase - other_phase)
+            for w, phase in zip(self.weights, self.phases, strict=True)
+            for v, other_phase in zip(other.weights, other.phases, strict=True)
+        ]
+        phases = np.array(sorted({phase for _, phase in pairs}))
+        weights = np.zeros((phases.size, len(products)))
+        for weight, phase in pairs:
+            weights[np.searchsorted(phases, phase)] += weight
+        return ExponentialSum(
+            products, weights, phases, np.outer(self.sums, other.sums).ravel()
+        )
+
+    def scaled(self, weight: float) -> ExponentialSum:
+        """Return this sum times a number."""
+        return self._replace(weights=weight * self.weights, sums=weight * self.sums)
+
+    def plus(self, other: ExponentialSum) -> ExponentialSum:
+        """Return this sum plus another one of the same polynomials, over the groups of both."""
+        return ExponentialSum(
+            self.polynomials,
+            np.concatenate((self.weights, other.weights)),
+            np.concatenate((self.phases, other.phases)),
+            self.sums + other.sums,
+        )
+
+    def turned(self) -> ExponentialSum:
+        """Return this sum times j, whose imaginary part is the real part of this one."""
+        return ExponentialSum(self.polynomials, 1j * self.weights, self.phases, 1j * self.sums)
+
+    def compiled(self) -> tuple[Any, ...]:
+        """Return the polynomials as compiled functions take them, in four arrays.
+
+        1. Coefficients in powers of omega, shape (polynomials, degree + 1). There are no rows
+           where a degree exceeds `LOW_DEGREE`.
+        2. Roots with an imaginary part of zero or above, polynomial after polynomial.
+        3. The index of each polynomial's first root.
+        4. The highest coefficients.
+        """
+        degree = max(p.coefficients.size for p in self.polynomials) - 1
+        kept = [np.sort_complex(p.roots[p.roots.imag >= 0.0]) for p in self.polynomials]
+        whole = np.zeros((len(self.polynomials), degree + 1), dtype=np.complex128)
+        # Powers of j, so that each coefficient stays exactly real or exactly imaginary.
+        turns = np.array([1.0, 1.0j, -1.0, -1.0j])[np.arange(degree + 1) % 4]
+        for row, p in zip(whole, self.polynomials, strict=True):
+            size = p.coefficients.size
+            row.real[:size] = p.coefficients * turns.real[:size]
+            row.imag[:size] = p.coefficients * turns.imag[:size]
+        return (
+            whole if degree <= LOW_DEGREE else whole[:0],
+            np.concatenate(kept),
+            np.cumsum([0, *(roots.size for roots in kept)]),
+            np.array([p.coefficients[-1] for p in self.polynomials]),
+        )
+
+
+@njit(cache=True)
+def real_horner(p: FloatArray, u: float) -> float:
+    """Value of a real polynomial with ascending coefficients."""
+    value = 0.0
+    for k in range(p.size - 1, -1, -1):
+        value = value * u + p[k]
+    return value
+
+
+@njit(cache=True)
+def _from_roots(
+    roots: ComplexArray, starts: IntArray, leads: FloatArray, omega: float, reach: float
+) -> tuple[ComplexArray, FloatArray, FloatArray]:
+    """Expand polynomials about j omega, in powers of u = (change of omega) / reach.
+
+    Polynomial k has the highest coefficient leads[k], and its real roots and the upper halves
+    of its pairs are roots[starts[k] : starts[k + 1]]. All are divided by one power of two.
+    Returns the coefficients and their magnitudes for rounding, shape (k, LOW_DEGREE + 1), and
+    bounds on what the higher powers add up to where 0 <= u <= 1.
+    """
+    size = LOW_DEGREE + 1
+    found = np.zeros((leads.size, size), dtype=np.complex128)
+    sizes = np.zeros((leads.size, size))
+    left_out = np.zeros(leads.size)
+    exponents = np.zeros(leads.size, dtype=np.int64)
+    largest = -(1 << 60)
+    for k in range(leads.size):
+        found[k, 0], sizes[k, 0], total = leads[k], abs(leads[k]), abs(leads[k])
+        for i in range(starts[k], starts[k + 1]):
+            root = roots[i]
+            below = 1j * omega - root
+            q0, q1, q2 = below, 1j * reach, 0j
+            m0, m1, m2 = abs(below), reach, 0.0
+            if root.imag != 0.0:
+                above = 1j * omega - root.conjugate()
+                q0, q1, q2 = below * above, 1j * reach * (below + above), complex(-(reach**2))
+                m0, m1 = abs(below) * abs(above), reach * (abs(below) + abs(above))
+                m2 = reach * reach
+            total *= m0 + m1 + m2
+            scale = 1.0
+            if total > 1e60 or 0.0 < total < 1e-60:
+                exponent = int(np.floor(np.log2(total)))
+                exponents[k] += exponent
+                scale = 2.0**-exponent
+                total *= scale
+            for m in range(size - 1, -1, -1):
+                new, most = q0 * found[k, m], m0 * sizes[k, m]
+                if m > 0:
+                    new, most = new + q1 * found[k, m - 1], most + m1 * sizes[k, m - 1]
+                if m > 1:
+                    new, most = new + q2 * found[k, m - 2], most + m2 * sizes[k, m - 2]
+                found[k, m], sizes[k, m] = scale * new, scale * most
+        factors = starts[k + 1] - starts[k]
+        held = 0.0
+        for m in range(size):
+            held += sizes[k, m]
+            # The products above round, too.
+            sizes[k, m] *= 1.0 + 0.5 * factors
+        left_out[k] = max(total - held, 0.0) + factors * EPSILON * total
+        largest = max(largest, exponents[k])
+    for k in range(leads.size):
+        scale = 2.0 ** max(exponents[k] - largest, -1000)
+        left_out[k] *= scale
+        for m in range(size):
+            found[k, m] *= scale
+            sizes[k, m] *= scale
+    return found, sizes, left_out
+
+
+@njit(cache=True)
+def _reach(roots: ComplexArray, starts: IntArray, omega: float, longest: float) -> float:
+    """How far from omega the expansion of `_from_roots` is accurate.
+
+    Around each polynomial the crowd, the sum of reach / (reach + distance), is concave in the
+    reach: Newton's method from below never passes the length at which it is _CROWD.
+    """
+    shortest = longest
+    for k in range(starts.size - 1):
+        reach = 0.0
+        for _ in range(6):
+            crowd, rate = 0.0, 0.0
+            for root in roots[starts[k] : starts[k + 1]]:
+                for above in (omega - root.imag, omega + root.imag):
+                    distance = np.hypot(root.real, above)
+                    if distance > 0.0:
+                        crowd += reach / (reach + distance)
+                        rate += distance / (reach + distance) ** 2
+                    if root.imag == 0.0:
+                        break
+            if rate * (shortest - reach) <= _CROWD - crowd:
+                reach = shortest
+                break
+            reach += (_CROWD - crowd) / rate
+        shortest = min(shortest, reach)
+    return shortest
+
+
+@njit(cache=True)
+def _shifted(
+    whole: ComplexArray, omega: float, reach: float
+) -> tuple[ComplexArray, FloatArray, FloatArray]:
+    """Expand polynomials in omega about another omega; see `_from_roots`."""
+    found, sizes = whole.copy(), np.abs(whole)
+    for k in range(whole.shape[0]):
+        if omega == 0.0 and reach == 1.0:
+            break
+        for i in range(whole.shape[1] - 1):
+            for m in range(whole.shape[1] - 2, i - 1, -1):
+                found[k, m] += omega * found[k, m + 1]
+                sizes[k, m] += omega * sizes[k, m + 1]
+        scale = 1.0
+        for m in range(whole.shape[1]):
+            found[k, m] *= scale
+            sizes[k, m] *= scale
+            scale *= reach
+    return found, sizes, np.zeros(whole.shape[0])
+
+
+@njit(cache=True)
+def piece(
+    polynomials: tuple[Any, ...],
+    weights: FloatArray,
+    sums: FloatArray,
+    omega: float,
+    longest: float,
+) -> tuple[float, float, ComplexArray, FloatArray]:
+    """Expand an exponential sum over the piece of the axis that starts at omega.
+
+    `polynomials` is what `ExponentialSum.compiled` returns; weights, shape
+    (groups, k), and sums, shape (k,), are those of the sum. A piece is no longer than
+    `longest`; if that is infinite, polynomials of low degree are one piece from zero on.
+    Returns `start` and `reach`, with u = (omega - start) / reach from 0 to 1 over the piece;
+    the coefficients in powers of u of the sum, then of each group, shape (1 + groups, n); and
+    magnitudes for rounding, shape (1 + groups, n + 1). The last column bounds the powers that
+    are left out, over EPSILON, by which `rounding_bound` multiplies it.
+    """
+    whole, roots, starts, leads = polynomials
+    start, reach = omega, longest
+    if whole.shape[0] == 0:
+        reach = _reach(roots, starts, omega, min(longest, 1e300))
+        coefficients, magnitudes, left_out = _from_roots(roots, starts, leads, start, reach)
+    else:
+        if longest == np.inf:
+            start, reach = 0.0, 1.0
+        coefficients, magnitudes, left_out = _shifted(whole, start, reach)
+    number, size = coefficients.shape
+    groups = weights.shape[0]
+    local = np.zeros((1 + groups, size), dtype=np.complex128)
+    sizes = np.zeros((1 + groups, size + 1))
+    for g in range(1 + groups):
+        for k in range(number):
+            weight = sums[k] if g == 0 else weights[g - 1, k]
+            if weight != 0.0:
+                for m in range(size):
+                    local[g, m] += weight * coefficients[k, m]
+                    sizes[g, m] += abs(weight) * magnitudes[k, m]
+                sizes[g, size] += abs(weight) * left_out[k] / EPSILON
+    if reach == 1.0 and start == 0.0:
+        return start, reach, local, sizes
+    # Powers that rounding hides are not worth their time.
+    total = 0.0
+    for g in range(1 + groups):
+        for m in range(size):
+            total += sizes[g, m]
+    used, dropped = size, 0.0
+    while used > 1:
+        for g in range(1 + groups):
+            dropped += sizes[g, used - 1]
+        if dropped > 1e-3 * EPSILON * total:
+            break
+        used -= 1
+    kept = np.zeros((1 + groups, used + 1))
+    shorter = np.zeros((1 + groups, used), dtype=np.complex128)
+    for g in range(1 + groups):
+        kept[g, used] = sizes[g, size]
+        for m in range(size):
+            if m < used:
+                kept[g, m], shorter[g, m] = sizes[g, m], local[g, m]
+            else:
+                kept[g, used] += sizes[g, m] / EPSILON
+    return start, reach, shorter, kept
+
+
+@njit(cache=True)
+def evaluate(
+    start: float, reach: float, local: ComplexArray, phases: FloatArray, omega: float
+) -> tuple[complex, complex]:
+    """Value and derivative of an exponential sum within a piece.
+
+    Real and imaginary parts apart, since omega is real: this is the innermost loop.
+    """
+    size = local.shape[1]
+    u = (omega - start) / reach
+    value_re, value_im, slope_re, slope_im = 0.0, 0.0, 0.0, 0.0
+    for k in range(size - 1, -1, -1):
+        slope_re = slope_re * u + value_re
+        slope_im = slope_im * u + value_im
+        value_re = value_re * u + local[0, k].real
+        value_im = value_im * u + local[0, k].imag
+    slope_re /= reach
+    slope_im /= reach
+    for g in range(phases.size):
+        phase = phases[g]
+        if phase == 0.0:
+            continue
+        p_re, p_im, dp_re, dp_im = 0.0, 0.0, 0.0, 0.0
+        for k in range(size - 1, -1, -1):
+            dp_re = dp_re * u + p_re
+            dp_im = dp_im * u + p_im
+            p_re = p_re * u + local[g + 1, k].real
+            p_im = p_im * u + local[g + 1, k].imag
+        dp_re /= reach
+        dp_im /= reach
+        half = 0.5 * phase * omega
+        sine, cosine = np.sin(half), np.cos(half)
+        # exp(j omega phase) - 1, and phase times exp(j omega phase).
+        change_re, change_im = -2.0 * sine * sine, 2.0 * sine * cosine
+        turn_re, turn_im = phase * (1.0 + change_re), phase * change_im
+        value_re += p_re * change_re - p_im * change_im
+        value_im += p_re * change_im + p_im * change_re
+        slope_re += dp_re * change_re - dp_im * change_im - p_re * turn_im - p_im * turn_re
+        slope_im += dp_re * change_im + dp_im * change_re + p_re * turn_re - p_im * turn_im
+    return complex(value_re, value_im), complex(slope_re, slope_im)
+
+
+@njit(cache=True)
+def tangent_distance(value: complex, slope: complex, step: float) -> float:
+    """Smallest distance from zero of the tangent over a step."""
+    speed = slope.real * slope.real + slope.imag * slope.imag
+    approach = -(value.real * slope.real + value.imag * slope.imag)
+    place = 0.0
+    if approach > 0.0:
+        place = step if approach >= speed * step else approach / speed
+    return abs(value + place * slope)
+
+
+@njit(cache=True)
+def curvature_bound(
+    start: float, reach: float, local: ComplexArray, phases: FloatArray
+) -> FloatArray:
+    """Polynomial in u that bounds the second derivative of an exponential sum in a piece.
+
+    Where a polynomial is differentiated twice, |exp(j omega phase) - 1| is at most
+    |phase| (start + reach u), and at most 2.
+    """
+    groups, size = local.shape
+    bound = np.zeros(size)
+    for k in range(2, size):
+        bound[k - 2] += abs(local[0, k]) * k * (k - 1.0) / reach**2
+    for g in range(1, groups):
+        phase = abs(phases[g - 1])
+        begun = min(phase * start, 2.0)
+        for k in range(size):
+            magnitude = abs(local[g, k])
+            bound[k] += magnitude * phase * phase
+            if k >= 1:
+                bound[k - 1] += magnitude * phase * (2.0 * k + k * (k - 1.0)) / reach
+            if k >= 2:
+                bound[k - 2] += magnitude * begun * k * (k - 1.0) / reach**2
+    return bound
+
+
+@njit(cache=True)
+def rounding_bound(
+    start: float, reach: float, sizes: FloatArray, phases: FloatArray, rounding: float
+) -> FloatArray:
+    """Polynomial in u that bounds the rounding error of an exponential sum in a piece."""
+    groups, size = sizes.shape
+    bound = np.zeros(size + 1)
+    for k in range(size):
+        bound[k] += rounding * EPSILON * sizes[0, k]
+        for g in range(1, groups):
+            error = rounding * EPSILON * sizes[g, k] * abs(phases[g - 1])
+            bound[k] += error * start
+            bound[k + 1] += error * reach
+    return bound
