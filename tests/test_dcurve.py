@@ -1,8 +1,6 @@
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from armlock import (
     CharacteristicFunction,
@@ -56,16 +54,10 @@ def test_common_arm_line_is_c1_plus_c2_equal_two(gain):
     assert d_curve_line(CommonArm(gain)) == pytest.approx((1.0, 1.0, 2.0), rel=1e-15)
 
 
-def test_dual_arm_line_is_c1_equal_c2():
-    line = d_curve_line(DualArm())
-    assert line.value == pytest.approx(0.0, abs=1e-15)
-    assert line.weight_x == pytest.approx(-line.weight_y)
-
-
 @pytest.mark.parametrize("name", CURVED)
 def test_points_of_the_curve_have_a_root_on_the_axis(name):
     system = CURVED[name]
-    omega = np.array([0.2, 0.9, 1.3, 2.7, 6.1])
+    omega = np.array([-2.7, -0.9, 0.2, 0.9, 1.3, 2.7, 6.1])
     x, y = d_curve(system, omega)
     residual = independent.value(system, 1j * omega, x, y)
     a, b1, b2 = system.parts(1j * omega)
@@ -80,13 +72,6 @@ def test_the_line_has_a_root_at_zero(name):
     y = value * wy / (wx * wx + wy * wy) - wx
     assert abs(independent.value(system, 0.0, x, y)) < 1e-12
     assert max(abs(wx), abs(wy)) == 1.0
-
-
-@given(st.sampled_from(list(CURVED)), st.floats(0.05, 20.0))
-def test_the_curve_is_even_in_frequency(name, omega):
-    assert d_curve(CURVED[name], -omega) == pytest.approx(
-        d_curve(CURVED[name], omega), rel=1e-9, abs=1e-9, nan_ok=True
-    )
 
 
 def test_crossing_the_curve_moves_a_pair_and_crossing_the_line_a_single_root():
@@ -112,12 +97,6 @@ def test_poles_and_zero_frequency_give_nan():
     assert np.isnan(x[0])
     assert np.isnan(y[0])
     assert np.isnan(HayesEquation().tau * d_curve(HayesEquation(), 0.0)[0])
-
-
-@pytest.mark.parametrize("shape", [(), (1,), (4,), (2, 3), (0,)])
-def test_results_have_the_shape_of_omega(shape):
-    x, y = d_curve(CommonArm(), np.full(shape, 0.4))
-    assert np.shape(x) == np.shape(y) == shape
 
 
 def test_branches_of_the_common_arm_end_at_the_poles():
@@ -163,12 +142,6 @@ def test_more_points_per_turn_make_a_branch_denser():
 def test_a_branch_of_a_map_ends_at_the_nyquist_frequency():
     system = semi_discretization(CommonArm(tau1=2.0, tau2=1.5), 0.25)
     assert d_curve_branches(system, 1e6)[-1].omega[-1] <= np.pi / 0.25
-
-
-def test_no_line_where_zero_frequency_does_not_depend_on_the_parameters():
-    system = CharacteristicFunction([1.0, 1.0, 1.0], [0.0, 1.0], [0.0, 1.0], 1.0, 2.0)
-    with pytest.raises(ValueError, match=r"^system must depend on a free parameter at s = 0"):
-        d_curve_line(system)
 
 
 def exact_curve(system, omega):
@@ -223,27 +196,6 @@ def test_the_curve_is_right_at_every_frequency(system):
         allowed = 1e-11 if omega < 1e-2 else 1e-12 * turns / sine
         assert x == pytest.approx(exact_x, rel=allowed, abs=allowed)
         assert y == pytest.approx(exact_y, rel=allowed, abs=allowed)
-
-
-def test_a_phase_that_doubles_do_not_hold_is_refused():
-    with pytest.raises(ValueError, match=r"^omega must be at most 4.98e\+07 rad/s"):
-        d_curve(paper_loop(), [1.0, 1e8])
-
-
-@pytest.mark.parametrize("wrong", ["x", None, CommonArm, 3.0])
-def test_what_is_no_system_has_no_curve(wrong):
-    for function in (
-        d_curve_line,
-        lambda s: d_curve(s, 1.0),
-        lambda s: d_curve_branches(s, 1.0),
-    ):
-        with pytest.raises(TypeError, match=r"^system must be a CharacteristicFunction"):
-            function(wrong)
-
-
-def test_more_samples_than_memory_holds_are_refused():
-    with pytest.raises(ValueError, match=r"^omega_max must be of a size that memory holds"):
-        d_curve_branches(CommonArm(), 1e12)
 
 
 def test_where_a_parameter_has_no_effect_the_curve_has_a_pole():

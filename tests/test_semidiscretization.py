@@ -8,7 +8,6 @@ from armlock import (
     CommonArm,
     DualArm,
     HayesEquation,
-    SingleArm,
     rightmost_root,
     semi_discretization,
     spectral_radius,
@@ -18,7 +17,6 @@ from armlock import (
 )
 from armlock.statespace import realize
 from tests import independent
-from tests.systems import RETARDED
 
 OSCILLATOR = CharacteristicFunction([2.0, 0.3, 1.0], [1.0], [0.0, 1.0], 1.0, 2.5)
 UNSTABLE = CharacteristicFunction([-0.5, 0.2, 1.0], [-1.0, -0.6], [0.7], 0.5, 1.5)
@@ -165,11 +163,6 @@ def test_a_fine_map_counts_what_the_loop_has():
     np.testing.assert_array_equal(unstable_roots(sampled, x, y), unstable_roots(system, x, y))
 
 
-def test_a_parameter_without_effect_leaves_the_map_alone():
-    sampled = semi_discretization(SingleArm(1.0, 2.0), 0.5)
-    np.testing.assert_array_equal(unstable_roots(sampled, 0.9, [-5.0, 0.0, 5.0]), 0)
-
-
 def test_without_delayed_terms_the_matrix_is_the_flow():
     system = CharacteristicFunction([2.0, 0.3, 1.0], [1.0], [0.0, 1.0], 0.0, 0.0)
     eigenvalues = np.linalg.eigvals(transition_matrix(system, 0.5, -1.0, 0.5))
@@ -179,26 +172,12 @@ def test_without_delayed_terms_the_matrix_is_the_flow():
     )
 
 
-@pytest.mark.parametrize("name", ["single arm", "common arm", "dual arm"])
-def test_the_matrix_has_one_row_for_each_state_and_sample(name):
-    system = RETARDED[name]
-    size = system.degree + round(system.longest_delay / 0.1)
-    assert transition_matrix(system, 0.5, 0.5, 0.1).shape == (size, size)
-
-
 def test_delays_off_the_grid_by_rounding_alone_are_accepted():
     # The quotient 19.9 / 0.05 lies below 398 in floating point.
     assert transition_matrix(CommonArm(), 1.0, 1.0, 0.05).shape == (403, 403)
     row = transition_matrix(CommonArm(), 1.0, 2.0, 0.05)[0]
     assert np.flatnonzero(row).tolist() == [0, 398, 402]
     assert row[398] == pytest.approx(2.0 * row[402])
-
-
-def test_spectral_radius_broadcasts():
-    radius = spectral_radius(HayesEquation(), np.zeros((2, 1)), [-1.0, -0.5, 0.5], 0.1)
-    assert radius.shape == (2, 3)
-    np.testing.assert_array_equal(radius[0], radius[1])
-    assert spectral_radius(HayesEquation(), -1.0, 0.0, 0.1).shape == ()
 
 
 @pytest.mark.parametrize("function", [spectral_radius, transition_matrix])
@@ -217,14 +196,6 @@ def test_a_step_too_fine_for_a_matrix_still_counts():
     sampled = semi_discretization(CommonArm(), 1e-3)
     assert unstable_roots(sampled, [0.9, 1.2], 1.05).tolist() == [0, 7]
     assert unstable_roots(CommonArm(), [0.9, 1.2], 1.05).tolist() == [0, 7]
-
-
-@pytest.mark.parametrize("function", [spectral_radius, transition_matrix])
-def test_what_is_no_system_is_refused(function):
-    with pytest.raises(TypeError, match=r"^system must be a CharacteristicFunction"):
-        function("loop", 1.0, 1.0, 0.1)
-    with pytest.raises(TypeError, match=r"^system must be a CharacteristicFunction"):
-        semi_discretization(CommonArm, 0.1)  # type: ignore[arg-type]
 
 
 def test_a_realization_is_of_a_system_in_continuous_time_at_a_point():
@@ -252,9 +223,3 @@ def test_a_dead_time_is_a_further_delay_of_the_map(order):
     assert fine == pytest.approx(exact, rel=1e-2 if order == 0 else 1e-5)
     with pytest.raises(ValueError, match=r"^step must divide every delay, .* for delay=0.5"):
         semi_discretization(loop, 0.2)
-
-
-@pytest.mark.parametrize("order", [2, 1.0])
-def test_the_order_is_zero_or_one(order):
-    with pytest.raises(ValueError, match=r"^order must be an integer from 0 to 1, got "):
-        transition_matrix(CommonArm(), 1.0, 1.0, 0.1, order)
