@@ -9,18 +9,25 @@ import numpy as np
 from scipy.special import lambertw
 
 
+def delayed_terms(system, x, y):
+    """What D holds beside A: coefficients and delay of each term."""
+    return (
+        (system.c, system.delay),
+        (-x * system.b1, system.delay + system.delay1),
+        (-y * system.b2, system.delay + system.delay2),
+    )
+
+
 def value(system, s, x, y):
     """D(s; x, y), spelled out."""
     s = np.asarray(s, dtype=complex)
     z = np.exp(s * system.step) if system.step else s
-    return (
-        np.polyval(system.a[::-1], z)
-        - x * np.polyval(system.b1[::-1], z) * np.exp(-s * system.delay1)
-        - y * np.polyval(system.b2[::-1], z) * np.exp(-s * system.delay2)
+    return np.polyval(system.a[::-1], z) + sum(
+        np.polyval(b[::-1], z) * np.exp(-s * delay) for b, delay in delayed_terms(system, x, y)
     )
 
 
-def hayes_roots(a, b, tau=1.0, branches=400):
+def hayes_roots(a, b, tau=1.0, branches=60):
     """All roots of s = a + b exp(-s tau) near the origin, from the branches of Lambert W."""
     if b == 0.0:
         return np.array([complex(a)])
@@ -34,12 +41,11 @@ def hayes_count(a, b, tau=1.0):
 
 
 def radius_of_unstable_roots(system, x, y):
-    """Radius past which |A| exceeds |x B1| + |y B2| in the right half-plane."""
-    bound = np.zeros(system.a.size)
-    bound[: system.a.size - 1] -= np.abs(system.a[:-1])
+    """Radius past which |A| exceeds the delayed terms in the right half-plane."""
+    bound = -np.abs(system.a)
     bound[-1] = abs(system.a[-1])
-    bound[: system.b1.size] -= abs(x) * np.abs(system.b1)
-    bound[: system.b2.size] -= abs(y) * np.abs(system.b2)
+    for b, _ in delayed_terms(system, x, y):
+        bound[: b.size] -= np.abs(b)
     if bound[-1] <= 0.0:
         raise ValueError("unstable roots are not confined")
     radius = 1.0
@@ -55,7 +61,7 @@ def rectangle_count(system, x, y, density=10.0):
     wherever the argument moves by more than 0.5 between two samples.
     """
     radius = radius_of_unstable_roots(system, x, y)
-    longest = max(system.delay1, system.delay2)
+    longest = system.delay + max(system.delay1, system.delay2)
     size = int(density * (radius * longest + 30.0))
     side = np.linspace(0.0, radius, size)
     near = np.geomspace(1e-9 * radius, radius, 400)
@@ -88,9 +94,9 @@ def generator_eigenvalues(system, x, y, nodes=80):
     now = np.diag(np.ones(order - 1), 1)
     now[-1] = -system.a[:-1] / system.a[-1]
     delayed = []
-    for parameter, b, delay in ((x, system.b1, system.delay1), (y, system.b2, system.delay2)):
+    for b, delay in delayed_terms(system, x, y):
         last_row = np.zeros((order, order))
-        last_row[-1, : b.size] = parameter * b / system.a[-1]
+        last_row[-1, : b.size] = -b / system.a[-1]
         if delay == 0.0:
             now = now + last_row
         else:
@@ -134,11 +140,11 @@ def held_map(system, x, y, step, order):
     c0, c1 = system.a
     rate = -c0 / c1
     gains = []
-    for parameter, b, delay in ((x, system.b1, system.delay1), (y, system.b2, system.delay2)):
+    for b, delay in delayed_terms(system, x, y):
         if delay == 0.0:
-            rate += parameter * b[0] / c1
+            rate -= b[0] / c1
         else:
-            gains.append((round(delay / step), parameter * b[0] / c1))
+            gains.append((round(delay / step), -b[0] / c1))
     decay = np.exp(rate * step)
     longest = max(back for back, _ in gains)
     matrix = np.diag(np.ones(longest), -1)
@@ -157,13 +163,17 @@ def held_map(system, x, y, step, order):
 
 def map_eigenvalues(system, x, y):
     """Roots of z^r D for a map, r the longest delay in steps, by a companion matrix."""
-    steps = [round(delay / system.step) for delay in (system.delay1, system.delay2)]
-    longest = max(steps)
-    polynomial = np.zeros(longest + system.a.size)
-    polynomial[longest : longest + system.a.size] += system.a
-    for parameter, b, back in zip((x, y), (system.b1, system.b2), steps, strict=True):
-        polynomial[longest - back : longest - back + b.size] -= parameter * b
-    return np.roots(polynomial[::-1])
+    return np.roots(map_polynomial(system, x, y)[::-1])
+
+
+def map_polynomial(system, x, y):
+    """Coefficients of z^r D in ascending powers of z."""
+    terms = [(system.a, 0.0), *delayed_terms(system, x, y)]
+    steps = [round(delay / system.step) for _, delay in terms]
+    polynomial = np.zeros(max(steps) + system.a.size)
+    for (b, _), back in zip(terms, steps, strict=True):
+        polynomial[max(steps) - back : max(steps) - back + b.size] += b
+    return polynomial
 
 
 def map_count(system, x, y):

@@ -4,7 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from armlock import CharacteristicFunction, CommonArm, DualArm, HayesEquation, SingleArm
+from armlock import (
+    CharacteristicFunction,
+    CommonArm,
+    Controller,
+    DualArm,
+    HayesEquation,
+    Loop,
+    SingleArm,
+)
+from armlock.sensors import COMMON
 
 
 def with_roots(*roots):
@@ -18,6 +27,8 @@ RETARDED = {
     "common arm": CommonArm(),
     "common arm, close gain": CommonArm(gain=0.05, tau1=3.0, tau2=7.0),
     "dual arm": DualArm(gain=0.3),
+    "common arm, dead time": CommonArm(0.4, 3.0, 2.1, delay=0.7),
+    "dual arm, dead time": DualArm(0.3, 2.1, 1.7, 1.5, delay=0.4),
     "oscillator": CharacteristicFunction([2.0, 0.3, 1.0], [1.0], [0.0, 1.0], 1.0, 2.5),
     "unstable oscillator": CharacteristicFunction(
         [2.0, -0.3, 1.0], [1.0, 0.5], [0.7], 0.4, 1.3
@@ -63,4 +74,5 @@ NEUTRAL = {
     "third order, unstable A": CharacteristicFunction(
         with_roots(0.3, -1.0, -1.0), [1.0, 0.0, 0.0, 0.5], [0.0, 1.0, 0.0, 0.5], 0.8, 1.5
     ),
+    "dead time": Loop(Controller([-0.3], [0.2], 0.2), COMMON, 2.0, 1.5, 0.6),
 }

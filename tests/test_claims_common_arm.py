@@ -12,7 +12,7 @@ from armlock.dcurve import d_curve, d_curve_line
 from book.companion.claims import Verdict, check
 from book.companion.claims import common_arm as chapter
 from book.companion.schemes import standard_schemes
-from tests.test_schemes import map_eigenvalues
+from tests.independent import map_eigenvalues
 
 
 def test_a_wrong_sign_in_the_curve_is_noticed(monkeypatch):

@@ -18,9 +18,10 @@ from armlock import (
 from tests import independent
 from tests.systems import NEUTRAL, RETARDED
 
+MAP = semi_discretization(CommonArm(tau1=2.0, tau2=1.5), 0.25, order=1)
 CURVED = {
     name: system
-    for name, system in {**RETARDED, **NEUTRAL}.items()
+    for name, system in {**RETARDED, **NEUTRAL, "map": MAP}.items()
     if system.b1.any() and system.b2.any()
 }
 
@@ -31,10 +32,6 @@ def test_hayes_curve_is_omega_cotangent():
     a, b = d_curve(HayesEquation(tau), omega)
     np.testing.assert_allclose(a, omega / np.tan(omega * tau), rtol=1e-11, atol=1e-12)
     np.testing.assert_allclose(b, -omega / np.sin(omega * tau), rtol=1e-11)
-
-
-def test_hayes_line_is_b_equal_minus_a():
-    assert d_curve_line(HayesEquation(3.0)) == (1.0, 1.0, 0.0)
 
 
 def test_common_arm_curve_is_the_solution_by_cramers_rule():
@@ -59,9 +56,11 @@ def test_points_of_the_curve_have_a_root_on_the_axis(name):
     system = CURVED[name]
     omega = np.array([-2.7, -0.9, 0.2, 0.9, 1.3, 2.7, 6.1])
     x, y = d_curve(system, omega)
-    residual = independent.value(system, 1j * omega, x, y)
+    residual = [
+        independent.value(system, 1j * w, p, q) for w, p, q in zip(omega, x, y, strict=True)
+    ]
     a, b1, b2 = system.parts(1j * omega)
-    assert (abs(residual) <= 1e-10 * (abs(a) + abs(x * b1) + abs(y * b2))).all()
+    assert (np.abs(residual) <= 1e-10 * (abs(a) + abs(x * b1) + abs(y * b2))).all()
 
 
 @pytest.mark.parametrize("name", CURVED)
@@ -84,12 +83,23 @@ def test_crossing_the_curve_moves_a_pair_and_crossing_the_line_a_single_root():
 
 
 def test_a_map_has_its_curve_on_the_unit_circle():
-    system = semi_discretization(CommonArm(tau1=2.0, tau2=1.5), 0.25, order=1)
     omega = np.linspace(0.3, 11.0, 23)
-    x, y = d_curve(system, omega)
+    x, y = d_curve(MAP, omega)
     for w, p, q in zip(omega, x, y, strict=True):
-        z = independent.map_eigenvalues(system, p, q)
+        z = independent.map_eigenvalues(MAP, p, q)
         assert abs(z - np.exp(1j * w * 0.25)).min() < 1e-7
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1e6])
+def test_the_units_of_the_parameters_move_no_pole(factor):
+    """Both parameters in other units: the same curve, with the same poles, at another scale."""
+    plain = CharacteristicFunction([1.0, 0.5, 1.0], [1.0], [0.0, 2.0], 2.0, 1.0)
+    scaled = CharacteristicFunction([1.0, 0.5, 1.0], [factor], [0.0, 2.0 * factor], 2.0, 1.0)
+    # The determinant is -2 omega cos(omega): poles at odd multiples of pi / 2.
+    omega = np.linspace(0.0, 6.0 * np.pi, 25)
+    expected = np.array(d_curve(plain, omega))
+    assert np.flatnonzero(np.isnan(expected[0])).tolist() == [0, 2, 6, 10, 14, 18, 22]
+    np.testing.assert_allclose(factor * np.array(d_curve(scaled, omega)), expected, rtol=1e-9)
 
 
 def test_poles_and_zero_frequency_give_nan():
@@ -140,8 +150,11 @@ def test_more_points_per_turn_make_a_branch_denser():
 
 
 def test_a_branch_of_a_map_ends_at_the_nyquist_frequency():
-    system = semi_discretization(CommonArm(tau1=2.0, tau2=1.5), 0.25)
-    assert d_curve_branches(system, 1e6)[-1].omega[-1] <= np.pi / 0.25
+    nyquist_frequency = np.pi / MAP.step
+    for asked in (nyquist_frequency, 1e6):
+        last = d_curve_branches(MAP, asked)[-1].omega[-1]
+        assert 0.99 * nyquist_frequency < last <= nyquist_frequency
+    assert 0.99 * 5.0 < d_curve_branches(MAP, 5.0)[-1].omega[-1] <= 5.0
 
 
 def exact_curve(system, omega):

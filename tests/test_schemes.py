@@ -1,29 +1,15 @@
 import numpy as np
 import pytest
-from numpy.polynomial import polynomial as poly
 from scipy.signal import lfilter
 
 from armlock import CommonArm, rightmost_root, spectral_radius, unstable_roots
 from book.companion.schemes import pade_poles, standard_schemes
+from tests import independent
 
 LOOP = CommonArm(1.0, 2.2, 1.8)
 STEP = 0.1
 POINTS = [(0.9, 1.05), (1.2, 0.9), (-0.5, -0.8), (2.0, 1.5)]
 NAMES = list(standard_schemes(LOOP, STEP))
-
-
-def map_polynomial(system, x, y):
-    """Coefficients of a map in ascending powers of z, both delays whole steps."""
-    back = [round(delay / system.step) for delay in (system.delay1, system.delay2)]
-    powers = np.zeros(max(back) + system.a.size)
-    powers[max(back) :] = system.a
-    for value, b, steps in zip((x, y), (system.b1, system.b2), back, strict=True):
-        powers[max(back) - steps : max(back) - steps + b.size] -= value * b
-    return powers
-
-
-def map_eigenvalues(system, x, y):
-    return poly.polyroots(map_polynomial(system, x, y))
 
 
 def recurrence(name, point, samples):
@@ -66,13 +52,13 @@ def test_the_map_is_the_textbook_scheme(name, point):
     system = standard_schemes(LOOP, STEP)[name]
     steps = 60
     # The impulse response of 1 / D(z), in powers of 1/z.
-    powers = map_polynomial(system, *point)[::-1]
+    powers = independent.map_polynomial(system, *point)[::-1]
     impulse = np.zeros(steps)
     impulse[0] = powers[0]
     expected = recurrence(name, point, steps)[:steps]
     response = lfilter([1.0], powers, impulse)
     np.testing.assert_allclose(response, expected, rtol=1e-11, atol=1e-13)
-    outside = int((np.abs(map_eigenvalues(system, *point)) > 1.0).sum())
+    outside = int((np.abs(independent.map_eigenvalues(system, *point)) > 1.0).sum())
     assert unstable_roots(system, *point) == outside
 
 
@@ -80,7 +66,7 @@ def test_eigenvalues_of_the_map_are_those_of_the_transition_matrix():
     for order in (0, 1):
         system = standard_schemes(LOOP, STEP)[f"semi-discretization, order {order}"]
         for point in POINTS:
-            radius = np.abs(map_eigenvalues(system, *point)).max()
+            radius = np.abs(independent.map_eigenvalues(system, *point)).max()
             expected = float(spectral_radius(LOOP, *point, STEP, order))
             assert radius == pytest.approx(expected, rel=1e-12)
 

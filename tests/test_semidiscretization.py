@@ -15,7 +15,6 @@ from armlock import (
     transition_matrix,
     unstable_roots,
 )
-from armlock.statespace import realize
 from tests import independent
 
 OSCILLATOR = CharacteristicFunction([2.0, 0.3, 1.0], [1.0], [0.0, 1.0], 1.0, 2.5)
@@ -68,12 +67,6 @@ def test_one_step_of_delay_gives_a_quadratic(a, b):
     assert float(radius) == pytest.approx(np.abs(roots).max(), rel=1e-9, abs=1e-7)
 
 
-def test_an_integrator_with_one_step_of_delay_is_stable_up_to_gain_one():
-    # z^2 - z - b h = 0: Jury's conditions give -1 < b h < 0.
-    radius = spectral_radius(HayesEquation(), 0.0, [-0.999, -1.001, -0.001, 0.001], step=1.0)
-    np.testing.assert_array_equal(radius < 1.0, [True, False, True, False])
-
-
 @pytest.mark.parametrize("system", [OSCILLATOR, UNSTABLE, THIRD, CommonArm(tau1=2.5, tau2=1.0)])
 @pytest.mark.parametrize(("order", "observed"), [(0, 1.0), (1, 2.0)])
 def test_convergence_of_the_dominant_eigenvalue(system, order, observed):
@@ -85,13 +78,6 @@ def test_convergence_of_the_dominant_eigenvalue(system, order, observed):
     ]
     slope = np.polyfit(np.log(steps), np.log(errors), 1)[0]
     assert slope == pytest.approx(observed, abs=0.2)
-
-
-def test_the_exact_flow_of_the_hayes_equation_is_approached():
-    exact = np.exp(0.1 * independent.hayes_roots(-1.0, -1.0).real.max())
-    assert exact == pytest.approx(0.941291800089, abs=1e-12)
-    fine = float(spectral_radius(HayesEquation(), -1.0, -1.0, 0.005, order=1)) ** 20
-    assert fine == pytest.approx(exact, abs=1e-6)
 
 
 @pytest.mark.parametrize("order", [0, 1])
@@ -119,15 +105,6 @@ def test_counts_of_the_map_are_eigenvalues_outside_the_unit_circle(system, order
 
 
 @pytest.mark.parametrize("order", [0, 1])
-def test_counts_of_the_paper_map_are_eigenvalues_outside_the_unit_circle(order):
-    system = CommonArm()
-    sampled = semi_discretization(system, 0.1, order)
-    for x, y in [(0.9, 1.05), (0.5, 1.6), (-2.1, 2.5), (2.9, 0.2)]:
-        radii = abs(np.linalg.eigvals(transition_matrix(system, x, y, 0.1, order)))
-        assert unstable_roots(sampled, x, y) == np.count_nonzero(radii > 1.0)
-
-
-@pytest.mark.parametrize("order", [0, 1])
 @pytest.mark.parametrize("system", [OSCILLATOR, UNSTABLE, THIRD, CommonArm(tau1=1.5, tau2=0.5)])
 def test_chart_of_the_map_is_its_pointwise_count(system, order):
     sampled = semi_discretization(system, 0.25, order)
@@ -136,14 +113,6 @@ def test_chart_of_the_map_is_its_pointwise_count(system, order):
     chart = stability_chart(sampled, x, y)
     np.testing.assert_array_equal(chart.counts, unstable_roots(sampled, x, y[:, None]))
     assert chart.recounted_rows.size == 0
-
-
-def test_stability_of_the_map_agrees_with_its_spectral_radius_over_a_chart():
-    system = CommonArm(gain=2.0, tau1=1.5, tau2=1.0)
-    x, y = np.linspace(-2.9, 2.9, 18), np.linspace(-2.8, 2.8, 15)
-    chart = stability_chart(semi_discretization(system, 0.125), x, y)
-    radius = spectral_radius(system, x, y[:, None], 0.125)
-    np.testing.assert_array_equal(chart.stable, radius < 1.0)
 
 
 def test_the_exact_line_of_zero_frequency_survives_sampling():
@@ -196,17 +165,6 @@ def test_a_step_too_fine_for_a_matrix_still_counts():
     sampled = semi_discretization(CommonArm(), 1e-3)
     assert unstable_roots(sampled, [0.9, 1.2], 1.05).tolist() == [0, 7]
     assert unstable_roots(CommonArm(), [0.9, 1.2], 1.05).tolist() == [0, 7]
-
-
-def test_a_realization_is_of_a_system_in_continuous_time_at_a_point():
-    with pytest.raises(
-        TypeError, match=r"^system must be a CharacteristicFunction, .* got 'x'"
-    ):
-        realize("x", 1.0, 1.0)  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match=r"^c2 must be finite, got nan$"):
-        realize(CommonArm(), 1.0, np.nan)
-    with pytest.raises(ValueError, match=r"^system must be in continuous time, got a map"):
-        realize(semi_discretization(CommonArm(), 0.1), 1.0, 1.0)
 
 
 @pytest.mark.parametrize("order", [0, 1])

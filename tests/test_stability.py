@@ -1,14 +1,10 @@
-import itertools
-import os
 import pickle
-import subprocess
-import sys
 import time
 
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.optimize import minimize_scalar
 
@@ -18,7 +14,6 @@ from armlock import (
     CharacteristicFunction,
     CommonArm,
     CountError,
-    DualArm,
     HayesEquation,
     SingleArm,
     d_curve,
@@ -47,24 +42,11 @@ class TestHayes:
         st.floats(-12.0, 12.0).filter(lambda b: abs(b) > 1e-9),
         st.floats(0.05, 20.0),
     )
-    @settings(max_examples=200)
     def test_count_is_the_number_of_lambert_roots_on_the_right(self, a, b, tau):
         system = HayesEquation(tau)
         count = unstable_roots(system, a / tau, b / tau)
         assume(count != BOUNDARY)
         assert count == independent.hayes_count(a / tau, b / tau, tau)
-
-    def test_dense_sample_agrees_with_lambert_and_with_the_sampled_contour(self):
-        system = HayesEquation()
-        a, b = np.random.default_rng(1).uniform(-15.0, 15.0, (2, 300))
-        counts = unstable_roots(system, a, b)
-        expected = [independent.hayes_count(p, q) for p, q in zip(a, b, strict=True)]
-        np.testing.assert_array_equal(counts, expected)
-        sampled = [
-            independent.rectangle_count(system, p, q)
-            for p, q in zip(a[:60], b[:60], strict=True)
-        ]
-        np.testing.assert_array_equal(counts[:60], sampled)
 
     def test_stable_region_is_the_known_one(self):
         # a < 1/tau and a < -b < sqrt(omega^2 + a^2), omega tau the root of a = omega cot.
@@ -86,25 +68,11 @@ class TestHayes:
         b = -np.pi / 2.0 * np.array([1.0, -3.0, 5.0])
         np.testing.assert_array_equal(unstable_roots(HayesEquation(), 0.0, b), BOUNDARY)
 
-    def test_number_of_roots_grows_by_two_from_ring_to_ring(self):
-        # On a = 0, pairs cross upward at b = -pi/2 - 2 pi n and b = 3 pi/2 + 2 pi n.
-        b = -np.pi / 2.0 - 2.0 * np.pi * np.arange(8)
-        np.testing.assert_array_equal(
-            unstable_roots(HayesEquation(), 0.0, b - 0.1), 2 * np.arange(1, 9)
-        )
-        b = 1.5 * np.pi + 2.0 * np.pi * np.arange(8)
-        np.testing.assert_array_equal(
-            unstable_roots(HayesEquation(), 0.0, b + 0.1), 2 * np.arange(1, 9) + 1
-        )
-
     @given(st.floats(0.01, 50.0), st.floats(-0.999, 0.999))
     def test_single_arm_is_stable_for_perturbations_below_one(self, gain, perturbation):
         system = SingleArm(gain=gain)
         assert unstable_roots(system, perturbation, 0.0) == 0
         assert unstable_roots(system, 1.0, 0.0) == BOUNDARY
-
-    def test_single_arm_is_unstable_above_one_and_far_below_minus_one(self):
-        assert (unstable_roots(SingleArm(), [1.001, 2.0, -3.0], 0.0) > 0).all()
 
 
 class TestCommonArm:
@@ -116,7 +84,6 @@ class TestCommonArm:
             assert independent.rectangle_count(CommonArm(), c1, c2) == count
 
     @given(gains, delays, delays, reals, reals)
-    @settings(max_examples=150)
     def test_count_agrees_with_two_other_methods(self, gain, tau1, tau2, c1, c2):
         system = CommonArm(gain, tau1, tau2)
         count = unstable_roots(system, c1, c2)
@@ -133,12 +100,6 @@ class TestCommonArm:
         c1 = 2.0 * size * way
         c2 = 2.0 * size * (1.0 - abs(way)) * (-1.0 if way > 0.3 else 1.0)
         assert unstable_roots(CommonArm(gain, tau1, tau2), c1, c2) == 0
-
-    @given(gains, delays, delays, reals, reals)
-    def test_the_parity_of_the_count_is_the_sign_at_zero(self, gain, tau1, tau2, c1, c2):
-        count = unstable_roots(CommonArm(gain, tau1, tau2), c1, c2)
-        assume(count != BOUNDARY)
-        assert count % 2 == (1 if c1 + c2 > 2.0 else 0)
 
     @given(gains, delays, delays, reals, reals)
     def test_exchanging_the_arms_changes_nothing(self, gain, tau1, tau2, c1, c2):
@@ -235,15 +196,16 @@ class TestOtherLoops:
     @pytest.mark.parametrize("name", NEUTRAL)
     def test_a_neutral_chain_that_is_not_confined_has_no_count(self, name):
         system = NEUTRAL[name]
-        leads = [abs(b[-1]) if b.size == system.a.size else 0.0 for b in (system.b1, system.b2)]
+        polynomials = system.b1, system.b2, system.c
+        leads = [abs(p[-1]) if p.size == system.a.size else 0.0 for p in polynomials]
+        room = abs(system.a[-1]) - leads.pop()
         x, y = np.random.default_rng(2).uniform(-3.0, 3.0, (2, 200))
-        chain = abs(x) * leads[0] + abs(y) * leads[1]
         counts = unstable_roots(system, x, y)
-        np.testing.assert_array_equal(counts == UNCONFINED, chain >= abs(system.a[-1]))
-
-    def test_a_neutral_chain_on_its_limit_has_no_count(self):
-        system = CharacteristicFunction([1.0, 1.0], [0.0, 1.0], [1.0], 1.0, 2.0)
-        np.testing.assert_array_equal(unstable_roots(system, [1.0, -1.0], 0.1), UNCONFINED)
+        chain = abs(x) * leads[0] + abs(y) * leads[1]
+        np.testing.assert_array_equal(counts == UNCONFINED, chain >= room)
+        limit = room / max(leads)
+        on_it = (limit, 0.0) if leads[0] else (0.0, limit)
+        assert unstable_roots(system, *on_it) == UNCONFINED
 
     @pytest.mark.parametrize(
         ("roots", "count"),
@@ -279,31 +241,12 @@ class TestOtherLoops:
         negative = independent.value(system, 0.0, x, y).real * system.a[-1] < 0.0
         assert count % 2 == int(negative)
 
-    def test_exchanging_the_arms_of_the_dual_arm_changes_nothing(self):
-        x, y = np.random.default_rng(4).uniform(-3.0, 3.0, (2, 40))
-        one = unstable_roots(DualArm(1.0, 2.1, 1.9, 1.3), x, y)
-        other = unstable_roots(DualArm(1.0, 1.9, 2.1, 1.3), y, x)
-        np.testing.assert_array_equal(one, other)
-
-    def test_the_equal_diagonal_of_the_dual_arm_is_a_boundary(self):
-        c = np.linspace(-2.0, 2.0, 21)
-        np.testing.assert_array_equal(unstable_roots(DualArm(), c, c), BOUNDARY)
-
     def test_scalars_and_arrays_keep_their_shapes(self):
         assert unstable_roots(CommonArm(), 0.5, 0.5).shape == ()
         assert unstable_roots(CommonArm(), [0.5], 0.5).shape == (1,)
         assert unstable_roots(CommonArm(), [], 0.5).shape == (0,)
         assert unstable_roots(CommonArm(), np.zeros((2, 1)), np.zeros(3)).shape == (2, 3)
         assert unstable_roots(CommonArm(), 0.5, 0.5).dtype == np.int64
-
-    def test_integers_are_numbers(self):
-        np.testing.assert_array_equal(unstable_roots(CommonArm(), [3, 0], [3, 1]), [31, 0])
-
-    def test_counts_that_overflow_are_not_guessed(self):
-        for system, c1 in [(CommonArm(), 1e20), (CommonArm(1e20), 1.5)]:
-            with pytest.raises(CountError) as caught:
-                unstable_roots(system, c1, 1.1)
-            np.testing.assert_array_equal(caught.value.points, [[c1, 1.1]])
 
 
 class TestChart:
@@ -312,13 +255,6 @@ class TestChart:
         system = RETARDED_AND_NEUTRAL[name]
         rng = np.random.default_rng(11)
         x, y = rng.uniform(-2.5, 2.5, 41), rng.uniform(-2.5, 2.5, 23)
-        chart = stability_chart(system, x, y)
-        np.testing.assert_array_equal(chart.counts, unstable_roots(system, x, y[:, None]))
-
-    @pytest.mark.parametrize("name", NEUTRAL)
-    def test_neutral_charts_are_the_count_at_each_point_up_to_the_limit(self, name):
-        system = NEUTRAL[name]
-        x, y = np.linspace(-2.0, 2.0, 33), np.linspace(-2.0, 2.0, 17)
         chart = stability_chart(system, x, y)
         np.testing.assert_array_equal(chart.counts, unstable_roots(system, x, y[:, None]))
 
@@ -354,13 +290,6 @@ class TestChart:
         np.testing.assert_array_equal(chart.x, x)
         np.testing.assert_array_equal(chart.y, y)
 
-    @pytest.mark.parametrize("point", [(0.0, 0.0), (1.0, 1.0), (2.0, 2.0), (-3.0, 0.1)])
-    def test_an_axis_may_hold_a_single_value(self, point):
-        count = unstable_roots(CommonArm(), *point)
-        x, y = ([coordinate] for coordinate in point)
-        assert stability_chart(CommonArm(), x, y).counts.tolist() == [[count]]
-        assert stability_chart(CommonArm(), x * 3, y * 2).counts.tolist() == [[count] * 3] * 2
-
     @pytest.mark.parametrize("width", [1e-9, 1e-12])
     @pytest.mark.parametrize("centre", [(1.0, 1.0), (0.7, 1.3), (2.0, 0.0)])
     def test_a_tiny_window_shows_the_line_through_it(self, centre, width):
@@ -373,16 +302,10 @@ class TestChart:
         np.testing.assert_array_equal(chart.counts[side < 0], 0)
         np.testing.assert_array_equal(chart.counts[side > 0], 1)
 
-    def test_points_on_the_line_are_boundary_points(self):
-        c = np.linspace(0.0, 2.0, 33)
-        counts = stability_chart(CommonArm(), c, c).counts
-        np.testing.assert_array_equal(np.flipud(counts).diagonal(), BOUNDARY)
-        assert (counts == BOUNDARY).sum() == 33
-
-    @pytest.mark.parametrize("gain", [1.0, 10.0, 100.0])
+    @pytest.mark.parametrize("gain", [1.0, 10.0])
     def test_points_of_the_curve_are_boundary_points(self, gain):
         system = CommonArm(gain=gain)
-        x, y = d_curve(system, np.linspace(0.01, 1.9 * gain, 4000))
+        x, y = d_curve(system, np.linspace(0.01, 1.9 * gain, 2000))
         near = (abs(x) < 4.0) & (abs(y) < 4.0)
         assert near.sum() > 30
         # The points themselves are rounded, some of them by more than a count can see.
@@ -395,28 +318,6 @@ class TestChart:
         counts = stability_chart(system, x, [y0]).counts[0]
         assert counts[1] == BOUNDARY
         assert abs(counts[2] - counts[0]) == 2
-
-    def test_stable_points_are_those_with_count_zero(self):
-        chart = stability_chart(CommonArm(), np.linspace(-3, 3, 25), np.linspace(-3, 3, 25))
-        np.testing.assert_array_equal(chart.stable, chart.counts == 0)
-        inside = np.add.outer(np.abs(chart.y), np.abs(chart.x)) < 2.0 - 1e-9
-        assert chart.stable[inside].all()
-
-    @given(gains, delays, delays, reals)
-    def test_counts_are_constant_between_crossings(self, gain, tau1, tau2, y):
-        system = CommonArm(gain, tau1, tau2)
-        omega = np.linspace(1e-4, 7.5 * gain, 4001)
-        # Along a row, D = 0 at x = (A - y B2) / B1 where that is real.
-        a, b1, b2 = system.parts(1j * omega)
-        ratio = (a - y * b2) / b1
-        change = np.flatnonzero(np.diff(np.sign(ratio.imag)) != 0)
-        gap = np.abs(np.diff(ratio)).max()
-        crossings = np.sort(np.append(ratio.real[change], 2.0 - y))
-        edges = np.concatenate(([-3.0], crossings[abs(crossings) < 3.0], [3.0]))
-        for low, high in itertools.pairwise(edges):
-            if high - low > 3.0 * gap:
-                x = np.linspace(low + gap, high - gap, 7)
-                assert np.unique(unstable_roots(system, x, y)).size == 1
 
 
 class TestTangentRows:
@@ -442,7 +343,6 @@ class TestTangentRows:
 
     CASES = (
         (CommonArm(gain=10.0), 0.1, 30.0, 3.0),
-        (CommonArm(gain=100.0), 3.0, 12.0, 3.0),
         (CommonArm(gain=1.0, tau1=2.0, tau2=0.7), 0.1, 12.0, 8.0),
         (RETARDED["third order, unstable A"], 0.1, 6.0, 30.0),
     )
@@ -474,28 +374,11 @@ class TestTangentRows:
                 count = unstable_roots(system, x, y0)
                 assert count == independent.rectangle_count(system, x, y0)
 
-    @pytest.mark.parametrize("case", CASES, ids=lambda case: repr(case[0])[:60])
-    def test_a_pair_appears_between_two_close_crossings(self, case):
-        system = case[0]
-        (omega, x0, y0), *_ = self.extrema(*case)
-        nearby = d_curve(system, omega * (1.0 + np.array([-1e-4, 1e-4])))
-        side = np.sign(nearby[1] - y0).sum() / 2.0
-        assert abs(side) == 1.0
-        depth = np.abs(nearby[1] - y0).min()
-        y = y0 + side * np.array([-0.5, 0.5]) * depth
-        between = unstable_roots(system, x0, y)
-        outside = unstable_roots(system, x0 + np.array([[-1e-2], [1e-2]]) * abs(x0), y[1])
-        assert abs(between[1] - between[0]) in (0, 2)
-        chart = stability_chart(system, [x0 - 1e-2 * abs(x0), x0, x0 + 1e-2 * abs(x0)], y)
-        assert chart.counts[0, 1] == between[0]
-        assert chart.counts[1, 1] == between[1]
-        np.testing.assert_array_equal(chart.counts[1, [0, 2]], outside.ravel())
 
+class TestLimits:
+    """What changes nothing, and what is refused."""
 
-class TestExtremes:
-    """Coefficients, parameters and requests at the end of what doubles and machines hold."""
-
-    @pytest.mark.parametrize("scale", [1e-90, 1e-20, 1e80])
+    @pytest.mark.parametrize("scale", [1e-20, 1e20])
     def test_a_common_factor_changes_no_count(self, scale):
         x, y = np.array([1.0, 20.0, 5.0, -20.0, -35.0]), np.array([1.0, -3.0])
         plain = CharacteristicFunction([1.0, 1.0], [0.1], [0.1], 1.0, 2.0)
@@ -504,15 +387,6 @@ class TestExtremes:
         assert set(expected.ravel()) == {0, 1, 2}
         np.testing.assert_array_equal(unstable_roots(system, x, y[:, None]), expected)
         np.testing.assert_array_equal(stability_chart(system, x, y).counts, expected)
-
-    @pytest.mark.parametrize("small", [1e-60, 1e60])
-    def test_a_parameter_takes_up_the_size_of_its_polynomial(self, small):
-        plain = CharacteristicFunction([1.0, 1.0], [0.1], [0.1], 1.0, 2.0)
-        system = CharacteristicFunction([1.0, 1.0], [0.1 * small], [0.1], 1.0, 2.0)
-        x, y = np.array([1.0, 20.0, 5.0, -20.0]), np.array([1.0, -30.0])
-        expected = unstable_roots(plain, x, y[:, None])
-        np.testing.assert_array_equal(unstable_roots(system, x / small, y[:, None]), expected)
-        np.testing.assert_array_equal(stability_chart(system, x / small, y).counts, expected)
 
     def test_a_delayed_term_of_order_zero_has_no_sign(self):
         system = CharacteristicFunction([1.0], [1.0], [1.0], 1.0, 2.0)
@@ -535,44 +409,10 @@ class TestExtremes:
         with pytest.raises(CountError, match="times the delay is too large"):
             stability_chart(system, [point[0], 0.0], [point[1], 0.0])
         assert time.perf_counter() - started < 10.0
-
-    def test_a_large_undelayed_term_is_no_reason_to_refuse(self):
+        # A large undelayed term is no reason to refuse.
         assert unstable_roots(CommonArm(1e12), 0.9, 1.05) == 0
-
-    def test_after_one_point_that_takes_too_long_no_other_is_tried(self):
-        with pytest.raises(CountError, match="too large") as caught:
-            unstable_roots(HayesEquation(), 0.3, np.full(100, -1e9))
-        assert 1 <= len(caught.value.points) <= 100
-
-    def test_requests_beyond_the_memory_are_refused_with_an_estimate(self):
-        many = np.linspace(-3.0, 3.0, 200_000)
-        message = r"^c1 and c2 must be of a size that memory holds, got 200000 x 200000 points"
-        with pytest.raises(ValueError, match=message):
-            stability_chart(CommonArm(), many, many)
-        with pytest.raises(ValueError, match=message):
-            unstable_roots(CommonArm(), many, many[:, None])
 
     def test_the_error_passes_from_process_to_process(self):
         again = pickle.loads(pickle.dumps(CountError("why", np.array([[1.0, 2.0]]))))
         assert str(again) == "why"
         np.testing.assert_array_equal(again.points, [[1.0, 2.0]])
-
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="only where processes fork")
-def test_forked_processes_count_after_threads_have():
-    code = """
-import multiprocessing, sys, warnings
-warnings.simplefilter("ignore")
-import numpy as np
-from armlock import CommonArm, stability_chart, unstable_roots
-x = np.linspace(-2.0, 2.0, 50)
-def both(_):
-    chart = stability_chart(CommonArm(), x, x).counts
-    return chart.tolist(), unstable_roots(CommonArm(), x, 0.3).tolist()
-expected = both(0)
-with multiprocessing.get_context("fork").Pool(2) as pool:
-    found = pool.map_async(both, range(4)).get(timeout=240)
-sys.exit(0 if found == [expected] * 4 else 3)
-"""
-    done = subprocess.run([sys.executable, "-c", code], timeout=300, capture_output=True)
-    assert done.returncode == 0, done.stderr.decode()
