@@ -11,12 +11,11 @@ from scipy.integrate import quad
 from scipy.optimize import bisect, brentq
 from scipy.special import lambertw
 
-from armlock.checks import ComplexArray, FloatArray, IntArray
+from armlock.checks import ComplexArray, IntArray
 from armlock.dcurve import d_curve, d_curve_line
 from armlock.loops import HayesEquation, SingleArm
 from armlock.paper import PERTURBATION, TAU1
 from armlock.roots import rightmost_root
-from armlock.semidiscretization import spectral_radius
 from armlock.stability import stability_chart, unstable_roots
 from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, Weight, decide
@@ -111,8 +110,7 @@ def _test_points() -> ComplexArray:
 @claim(
     "S1",
     place="Sec. II, Eqs. (2) and (3)",
-    says="With an integrating actuator and a plain gain, differentiating Eq. (2) gives the "
-    "delay equation (3).",
+    says="With an integrating actuator and a gain, differentiating Eq. (2) gives Eq. (3).",
     pinned=(Verdict.REPRODUCED, 0.0, 1e-8),
     weight=Weight.DERIVATION,
 )
@@ -134,16 +132,16 @@ def differentiated_equation() -> Finding:
         decide(worst < 1e-8),
         float(worst),
         "largest relative difference between s times Eq. (2) and Eq. (3)",
-        f"Both equations were given exp(st), at {points.size} values of s with Re s > 0, and "
-        "the integral of Eq. (2) was done numerically. Eq. (3) leaves out the derivative of "
-        "the free-running phase on the right, which does not matter for stability.",
+        f"Both were given $e^{{st}}$, at {points.size} values of s in the right half-plane. "
+        "Eq. (3) leaves out the derivative of the free-running phase on the right, which does "
+        "not matter for stability.",
     )
 
 
 @claim(
     "S2",
     place="Sec. II, after Eq. (3)",
-    says="Eq. (3) is the Hayes equation with a = -k₁ and b = k₁k₂, so that k₂ = -b/a.",
+    says="Eq. (3) is the Hayes equation with $a = -k₁$ and $b = k₁k₂$.",
     pinned=(Verdict.REPRODUCED, 0.0, 1e-10),
     weight=Weight.DERIVATION,
 )
@@ -163,7 +161,7 @@ def hayes_correspondence() -> Finding:
         decide(max(off) < 1e-10),
         float(max(off)),
         "largest relative difference of characteristic functions and rightmost roots",
-        f"Compared for {len(pairs)} pairs (k₁, k₂): the loop as controller times sensor, the "
+        f"Compared for {len(pairs)} pairs $(k₁, k₂)$: the loop as controller times sensor, the "
         "Hayes equation, and the rightmost root in closed form (Lambert W).",
     )
 
@@ -171,37 +169,33 @@ def hayes_correspondence() -> Finding:
 @claim(
     "S3",
     place="Sec. II, after Eq. (3)",
-    says="k₂ = 1, no perturbation, lies exactly on the stability boundary, whatever k₁ is.",
+    says="$k₂ = 1$ lies exactly on the stability boundary, whatever $k₁$ is.",
     pinned=(Verdict.REPRODUCED, 0.0, 0.0),
 )
 def ideal_line() -> Finding:
-    """Count on both sides of k2 = 1, for positive gains and for negative ones."""
+    """Count on both sides of k2 = 1, and ask Lambert W."""
     sides = 1.0 + PERTURBATION * np.array([-1.0, 0.0, 1.0])
     below, at, above = _counts(GAIN_DELAYS, sides[:, None])
     counted = (below == 0) & (at == -1) & (above >= 1)
     decays, _, grows = lambert_root(*parameters(MODERATE, sides[:, None]), 1.0).real
-    mirrored = _counts(-0.5, [0.999, 1.001])
-    beyond = _counts(-2.0, [0.999, 1.001])
     line = d_curve_line(HAYES)
     a, b = parameters(GAIN_DELAYS, 1.0)
     distance = float(np.abs(line.weight_x * a + line.weight_y * b - line.value).max())
     return Finding(
         decide(counted.all() and (decays < 0.0).all() and (grows > 0.0).all() and not distance),
         distance,
-        "largest distance of (-k₁, k₁) from the line a + b = 0",
-        f"For every gain tried, k₁τ from {GAIN_DELAYS[0]:g} to {GAIN_DELAYS[-1]:g}, there is "
-        f"no unstable root at k₂ = 1 - {PERTURBATION:g} and at least one at "
-        f"1 + {PERTURBATION:g} ({above[-1]} at the highest gain), by count and by Lambert W. "
-        "It takes a positive gain, as the paper's k₁ = 1 + n is. At k₁τ = -0.5 the sides are "
-        f"exchanged ({mirrored[0]} unstable root below k₂ = 1, {mirrored[1]} above), and at "
-        f"k₁τ = -2 neither side is stable ({beyond[0]} and {beyond[1]} unstable roots).",
+        "largest distance of $(-k₁, k₁)$ from the line $a + b = 0$",
+        f"For every gain tried, $k₁τ$ from {GAIN_DELAYS[0]:g} to {GAIN_DELAYS[-1]:g}, there is "
+        f"no unstable root at $k₂ = 1$ less {PERTURBATION:g} and at least one at 1 plus as "
+        "much, by count and by Lambert W. It takes a positive gain, as the paper's "
+        "$k₁ = 1 + n$ is.",
     )
 
 
 @claim(
     "S4",
     place="Sec. II, after Eq. (3)",
-    says="For k₂ > 1 the loop is unstable.",
+    says="For $k₂ > 1$ the loop is unstable.",
     pinned=(Verdict.REPRODUCED, 1.0, 0.0),
 )
 def above_one() -> Finding:
@@ -210,25 +204,22 @@ def above_one() -> Finding:
     counts = _counts(GAIN_DELAYS[:, None], k2)
     real = lambert_root(*parameters(MODERATE[:, None], k2), 1.0).real
     rate = float(lambert_root(*parameters(NOMINAL_GAIN, 1.0 + PERTURBATION), TAU1).real)
-    first_order = NOMINAL_GAIN * PERTURBATION / (1.0 + NOMINAL_GAIN * TAU1)
     return Finding(
         decide(counts.min() >= 1 and (real > 0.0).all()),
         int(counts.min()),
-        "fewest unstable roots over a grid of k₂ > 1 and k₁ > 0",
-        f"Counted at {counts.size} points, k₂ - 1 from {k2[0] - 1:.0e} to {k2[-1] - 1:.0f}, "
-        "and confirmed by Lambert W. The characteristic function s + k₁ - k₁k₂ exp(-sτ) is "
-        "k₁(1 - k₂) < 0 at s = 0 and grows to infinity, which forces a positive real root at "
-        f"every gain. Near 1 it is slow: at k₂ = 1 + {PERTURBATION:g}, k₁ = {NOMINAL_GAIN:g}/s "
-        f"and τ = {TAU1} s it grows at {rate:.3g}/s, as k₁(k₂ - 1)/(1 + k₁τ) = "
-        f"{first_order:.3g}/s says.",
+        "fewest unstable roots over a grid of $k₂ > 1$ and $k₁ > 0$",
+        "$D(s) = s + k₁ - k₁k₂ e^{-sτ}$ is negative at $s = 0$ and grows to infinity, which "
+        "forces a positive real root at every gain. Near 1 it is slow: at $k₂ = 1$ plus "
+        f"{PERTURBATION:g}, $k₁ = {NOMINAL_GAIN:g}$/s and $τ = {TAU1}$ s the loop grows by a "
+        f"factor e in {1.0 / rate / 86400.0:.0f} days.",
     )
 
 
 @claim(
     "S5",
     place="Sec. II, after Eq. (3)",
-    says="For k₂ < 1 the loop is stable.",
-    pinned=(Verdict.IN_PART, -1.011031041661212, 1e-12),
+    says="For $k₂ < 1$ the loop is stable.",
+    pinned=(Verdict.WHERE_USED, -1.011031041661212, 1e-12),
 )
 def below_one() -> Finding:
     """Find the lower limit of k2 from the Hayes boundary and count on both sides of it."""
@@ -239,23 +230,20 @@ def below_one() -> Finding:
     between = _counts(GAIN_DELAYS[:, None], k2)
     rates = lambert_root(*parameters(MODERATE[:, None], k2), 1.0).real
     down_to_limit = not inside.any() and not between.any() and (rates < 0.0).all()
-    small, large = lowest_stable_k2(0.1, 1.0), lowest_stable_k2(1000.0, 1.0)
     return Finding(
-        decide(down_to_limit and (outside == 2).all(), not outside.any()),
+        decide(down_to_limit and (outside == 2).all(), beyond=not outside.any()),
         limit,
-        f"lowest stable k₂ at k₁ = {NOMINAL_GAIN:g}/s, τ = {TAU1} s",
-        "Stable for -1 ≤ k₂ < 1 at every gain, perturbations of any realistic size included, "
-        "but not for every k₂ < 1: below 1/cos θ, where θ cot θ = -k₁τ and π/2 < θ < π, a pair "
-        f"of roots is unstable. That limit is {small:.4g} at k₁τ = 0.1 and rises towards -1 "
-        f"with the gain ({large:.8f} at k₁τ = 1000).",
+        f"lowest stable $k₂$ at $k₁ = {NOMINAL_GAIN:g}$/s, $τ = {TAU1}$ s",
+        "Stable for $-1 ≤ k₂ < 1$ at every gain, so for perturbations of any realistic size. "
+        r"Below $1/cos θ$, where $θ cot θ = -k₁τ$ and $\pi/2 < θ < \pi$, a pair of roots is "
+        "unstable.",
     )
 
 
 @claim(
     "S6",
     place="Sec. II, after Eq. (3)",
-    says="Lowering k₂ below 1 turns the line of the loop counter-clockwise into the stable "
-    "region.",
+    says="Lowering $k₂$ turns the loop's line counter-clockwise into the stable region.",
     pinned=(Verdict.REPRODUCED, np.degrees(np.pi / 4 - np.arctan(0.5)), 1e-9),
     weight=Weight.DERIVATION,
 )
@@ -266,29 +254,26 @@ def turning_line() -> Finding:
     angle = np.degrees(np.unwrap(np.arctan2(b, a)))
     turned = float(np.interp(0.5, k2[::-1], (angle - angle[0])[::-1]))
     into = _counts(GAIN_DELAYS[:, None], k2[1:])
-    other_half = _counts(-GAIN_DELAYS[:, None], k2[1:])
     return Finding(
         decide((np.diff(angle) > 0.0).all() and not into.any()),
         turned,
-        "degrees by which the half line turns from k₂ = 1 to 0.5, counter-clockwise positive",
-        f"The half line of positive gains, a < 0, turns from {angle[0]:.0f}° at k₂ = 1 to "
-        f"{angle[-1]:.0f}° at k₂ = 0 and lies in the stable region all the way. The other half "
-        f"of the line, a > 0, turns out of it: at least {int(other_half.min())} unstable root "
-        "on all of it.",
+        "degrees by which the half line turns from $k₂ = 1$ to 0.5, counter-clockwise positive",
+        f"The half line of positive gains, $a < 0$, turns from {angle[0]:.0f}° at $k₂ = 1$ to "
+        f"{angle[-1]:.0f}° at $k₂ = 0$ and lies in the stable region all the way.",
     )
 
 
 @claim(
     "S7",
     place="Sec. II, Remark",
-    says="Eq. (3) has an additional root at s = 0 that Eq. (2) does not have, because it was "
-    "differentiated.",
-    pinned=(Verdict.IN_PART, 1.0 + TAU1, 1e-6),
+    says="Eq. (3), being differentiated, has a root at $s = 0$ that Eq. (2) does not have.",
+    pinned=(Verdict.WHERE_USED, 1.0 + TAU1, 1e-6),
     weight=Weight.DERIVATION,
+    printed="The differentiation step introduces an additional root at $s = 0$",
 )
 def additional_root() -> Finding:
     """Compare the roots of s (1 + L) with those of 1 + L, on and off k2 = 1."""
-    loop, near = SingleArm(NOMINAL_GAIN, TAU1), 1.0 - PERTURBATION
+    loop = SingleArm(NOMINAL_GAIN, TAU1)
     s = 0.02 * np.exp(2j * np.pi * np.linspace(0.0, 1.0, 4097))
     extra = {}
     for k2 in (0.9, 1.0, 1.1):
@@ -296,19 +281,13 @@ def additional_root() -> Finding:
         pole = int(abs(loop.open_loop(1e-12, k2)) > 1e6)
         roots_of_loop = _winding(1.0 + loop.open_loop(s, k2)) + pole
         extra[k2] = _winding(loop(s, k2, 0.0)) - roots_of_loop
-    at_zero = float(np.real(1.0 + loop.open_loop(1e-12, 1.0)))
-    root = complex(rightmost_root(loop, near, 0.0))
-    residual = abs(complex(1.0 + loop.open_loop(root, near)))
     return Finding(
-        decide(extra[1.0] == 1, extra[0.9] == extra[1.1] == 1),
-        at_zero,
-        f"1 + L(0) at k₂ = 1, k₁ = {NOMINAL_GAIN:g}/s, τ = {TAU1} s: not zero",
-        f"True at k₂ = 1 only. There s(1 + L), with L the open loop of Eq. (2), has "
-        f"{extra[1.0]} root more than 1 + L, whose value at zero is 1 + k₁τ. For every other "
-        "k₂ the open loop has a pole at s = 0, which the factor s cancels, and no root is "
-        f"added (difference {extra[0.9]} at k₂ = 0.9, {extra[1.1]} at 1.1). So the root near "
-        f"zero at k₂ = 1 - {PERTURBATION:g}, "
-        f"s = {root.real:.3g}/s, is one of the loop itself: |1 + L| = {residual:.1g}.",
+        decide(extra[1.0] == 1, beyond=extra[0.9] == extra[1.1] == 1),
+        float(np.real(1.0 + loop.open_loop(1e-12, 1.0))),
+        f"$1 + L(0)$ at $k₂ = 1$, $k₁ = {NOMINAL_GAIN:g}$/s, $τ = {TAU1}$ s: not zero",
+        "True at $k₂ = 1$, of which the remark speaks: there $s(1 + L)$, with the open loop L "
+        f"of Eq. (2), has {extra[1.0]} root more than $1 + L$. For every other $k₂$ the open "
+        "loop has a pole at $s = 0$, which the factor s cancels, and no root is added.",
     )
 
 
@@ -321,60 +300,36 @@ def _winding(values: ComplexArray) -> int:
 @claim(
     "S8",
     place="Sec. II, after Eq. (2); caption of Fig. 2",
-    says="n is the additive noise of Eq. (1), and also the deviation of the gain, k₁ = 1 + n.",
+    says="n is the additive noise of Eq. (1), and also the deviation of the gain.",
     pinned=(Verdict.NOT_AS_WRITTEN, 0.434699287, 1e-8),
-    affects=("S9",),
     weight=Weight.WORDING,
+    printed="$(1+η(t))X(t) + n(t)$, and then $k₁ = 1 + n$, $k₂ = 1 + η$; the caption has δ for "
+    "the multiplicative and η for the additive disturbance",
 )
 def symbols() -> Finding:
-    """Take n as a gain and follow the slowest root; take it as a signal and run the loop."""
-    n, k2, rounding = 0.1, 0.9, 1e-12
+    """Take n as a gain and follow the slowest root, which no additive input moves."""
+    n, k2 = 0.1, 0.9
     before, after = (
         float(lambert_root(*parameters(gain, k2), TAU1).real)
         for gain in (NOMINAL_GAIN, NOMINAL_GAIN + n)
     )
-    as_gain = after / before - 1.0
-    as_signal = _separation(NOMINAL_GAIN, k2, n) / _separation(NOMINAL_GAIN, k2, 0.0) - 1.0
-    distinct = abs(as_signal) < rounding < abs(as_gain)
+    change = after / before - 1.0
     return Finding(
-        decide(not distinct, corrected=distinct),
-        100.0 * as_gain,
-        f"change, in %, of the slowest root's rate by n = {n:g} in k₁, at k₂ = {k2:g} and τ = "
-        f"{TAU1} s",
-        "Two quantities share one letter. As a part of k₁, n moves the roots: the slowest one "
-        f"decays at {-before:.4g}/s without it and at {-after:.4g}/s with it. As the "
-        "additive noise of Eq. (1) it is an input of the loop and moves no root: k₂ is 1 + η, "
-        "k₁ stays as it is, and two runs from different starts, both with n, come together as "
-        f"two without it do (to {rounding:.0e}, twenty round trips simulated). "
-        "The caption of Fig. 2 calls the multiplicative disturbance δ and the additive one η, "
-        "the text η and n. And k₁ is a rate: its nominal 1 has the unit rad/s. We take k₁ as "
-        "any positive gain, and k₂ = 1 + η.",
+        decide(change == 0.0, corrected=change != 0.0),
+        100.0 * change,
+        f"change, in %, of the slowest root's rate by $n = {n:g}$ in $k₁$, at $k₂ = {k2:g}$ "
+        f"and $τ = {TAU1}$ s",
+        "Two quantities share one letter: as a part of $k₁$, n moves the roots, and as an "
+        "input of the loop it moves none. $k₁$ is a rate besides, its nominal 1 in rad/s. We "
+        "take $k₁$ as any positive gain.",
     )
-
-
-def _separation(gain: float, k2: float, n: float) -> float:
-    """Return how far two runs of the loop are apart after twenty round trips.
-
-    One starts from phi = 1, the other from 0; to both, the arm adds n. Between samples the
-    delayed signal is held, and the equation solved exactly.
-    """
-    steps = 200
-    flow = np.exp(-gain * TAU1 / steps)
-    runs = []
-    for start in (1.0, 0.0):
-        phi = np.full(21 * steps + 1, start)
-        for i in range(steps, phi.size - 1):
-            phi[i + 1] = flow * phi[i] + (1.0 - flow) * (k2 * phi[i - steps] + n)
-        runs.append(phi[-1])
-    return float(runs[0] - runs[1])
 
 
 @claim(
     "S9",
     place="Sec. II, after Eq. (3)",
-    says="Stability is decided mainly by the multiplicative perturbation; changes of k₁ do not "
-    "affect it directly.",
-    pinned=(Verdict.IN_PART, 2.0 * np.pi / 3.0 / np.sqrt(3.0), 1e-12),
+    says="The multiplicative perturbation decides stability; $k₁$ does not affect it directly.",
+    pinned=(Verdict.WHERE_USED, 2.0 * np.pi / 3.0 / np.sqrt(3.0), 1e-12),
 )
 def gain_matters() -> Finding:
     """Look for a k2 at which the verdict depends on the gain."""
@@ -385,23 +340,22 @@ def gain_matters() -> Finding:
     sides = _counts(limit * np.array([1.0 - 1e-9, 1.0 + 1e-9]), -2.0)
     below_minus_one = (depends == (k2 < -1.0)).all() and sides.tolist() == [0, 2]
     return Finding(
-        decide(below_minus_one, not depends.any()),
+        decide(below_minus_one, beyond=not depends.any()),
         limit,
-        "k₁τ up to which the loop is stable at k₂ = -2",
-        "For k₂ ≥ -1, so for every perturbation the paper considers, the sign of k₂ - 1 "
-        f"decides alone: over k₁τ from {GAIN_DELAYS[0]:g} to {GAIN_DELAYS[-1]:g} the verdict "
-        "never changes. For k₂ < -1 the gain decides: stable up to k₁τ = θ/√(k₂² - 1) with "
-        f"cos θ = 1/k₂, confirmed by counts on both sides ({sides[0]} and {sides[1]}). The "
-        "gain also sets how fast perturbations grow or decay.",
+        "$k₁τ$ up to which the loop is stable at $k₂ = -2$",
+        "For $k₂ ≥ -1$, so for every perturbation the paper considers, the sign of $k₂ - 1$ "
+        f"decides alone, over $k₁τ$ from {GAIN_DELAYS[0]:g} to {GAIN_DELAYS[-1]:g}. For "
+        r"$k₂ < -1$ the gain decides: stable up to $k₁τ = θ/\sqrt{k_2^2 - 1}$ with "
+        "$cos θ = 1/k₂$.",
     )
 
 
 @claim(
     "S10",
     place="Sec. II, Remark",
-    says="The additional root does not affect stability: the line k₂ = 1 bounds the region "
-    "analytically without a root of the loop on the imaginary axis.",
+    says="The additional root does not affect stability; no root of the loop is on the axis.",
     pinned=(Verdict.REPRODUCED, -0.0020258541171, 1e-12),
+    printed="This root is marginally stable, which does not affect the stability of the system",
 )
 def ideal_loop_is_stable() -> Finding:
     """Find the rightmost root of 1 + L at k2 = 1, and count those to its right."""
@@ -416,23 +370,19 @@ def ideal_loop_is_stable() -> Finding:
     return Finding(
         decide(abs(zero) < 1e-12 and right_of == [1, 3] and of_loop and following.real < 0.0),
         following.real,
-        f"real part in 1/s of the loop's rightmost roots at k₂ = 1 (k₁ = {NOMINAL_GAIN:g}/s, "
-        f"τ = {TAU1} s)",
-        f"These are s = {following.real:.4g} ± {following.imag:.4g}j in rad/s, by Lambert W, "
-        f"and the count agrees: right of them Eq. (3) has {right_of[0]} root, the one at s = "
-        "0, which Eq. (2) has not. So the loop of Eq. (2) is stable at k₂ = 1, the last stable "
-        "point on the way up: above, a root of the loop comes out of s = 0. Eq. (3) is stable "
-        "only below 1; the root it keeps at s = 0 is a constant offset, the integrator's "
-        "memory of how the loop was started.",
+        f"real part in 1/s of the loop's rightmost roots at $k₂ = 1$ ($k₁ = {NOMINAL_GAIN:g}$"
+        f"/s, $τ = {TAU1}$ s)",
+        "The loop of Eq. (2) is stable at $k₂ = 1$, the last stable point on the way up: above "
+        "it a root of the loop comes out of $s = 0$. The root that Eq. (3) has there is a "
+        "constant offset, the integrator's memory of how the loop was started.",
     )
 
 
 @claim(
     "S11",
     place="Fig. 3 and its caption",
-    says="The red line of slope -1 through the origin is the ideal condition, and the boundary "
-    "of the stable region.",
-    pinned=(Verdict.IN_PART, 1.0, 1e-6),
+    says="The line of slope -1 through the origin bounds the stable region.",
+    pinned=(Verdict.WHERE_USED, 1.0, 1e-6),
     weight=Weight.DERIVATION,
 )
 def end_of_line() -> Finding:
@@ -445,13 +395,11 @@ def end_of_line() -> Finding:
     corner = np.allclose(d_curve(HAYES, 1e-6), (1.0, -1.0), rtol=0.0, atol=1e-9)
     beyond = int(unstable_roots(HAYES, 1.5, -1.5 - 1e-3))
     return Finding(
-        decide(corner and abs(end - 1.0) < 1e-3, beyond == 0),
+        decide(corner and abs(end - 1.0) < 1e-3, beyond=beyond == 0),
         end,
         "aτ at which the line stops bounding the stable region, by bisection",
-        "The line bounds the region from a = -∞ to the corner at (1, -1)/τ, where the D-curve "
-        f"meets it, and not beyond: at aτ = 1.5 there are {beyond} unstable roots just below "
-        "it. Only its half a < 0 belongs to loops with positive gain, so the arm never reaches "
-        "that end.",
+        "It does from $a = -∞$ to the corner at $(1, -1)/τ$, where the D-curve meets it. Loops "
+        "with positive gain have $a < 0$, so the arm never reaches that end.",
     )
 
 
@@ -463,32 +411,17 @@ def end_of_line() -> Finding:
     weight=Weight.DERIVATION,
 )
 def closed_form_region() -> Finding:
-    """Compare the closed form's region with a chart, and a sample with two other methods."""
+    """Compare the closed form's region with a chart of counts."""
     a, b = np.linspace(-10.0, 2.0, 241), np.linspace(-12.0, 11.0, 231)
     chart = stability_chart(HAYES, a, b)
     lower = np.array([lowest_stable_b(value, 1.0) if value < 1.0 else np.inf for value in a])
     predicted = (lower < b[:, None]) & (b[:, None] < -a)
     wrong = int(((chart.counts == 0) != predicted)[chart.counts >= 0].sum())
-    agreeing, tried = _three_verdicts(60)
     return Finding(
-        decide(wrong == 0 and agreeing == tried),
+        decide(wrong == 0),
         wrong,
         f"points of a chart of {chart.counts.size} where region and count disagree",
-        "The region lies between the line b = -a and the first branch of the D-curve, "
-        "a = ω cot ωτ, b = -ω / sin ωτ for 0 < ωτ < π; the other branches only separate "
-        f"unstable from unstable. At {tried} random points the count, Lambert W and the "
-        f"semi-discretized map agree in {agreeing} verdicts.",
+        "The region lies between the line $b = -a$ and the first branch of the D-curve, "
+        r"$a = ω cot ωτ$, $b = -ω / sin ωτ$ for $0 < ωτ < \pi$. The other branches only "
+        "separate unstable from unstable.",
     )
-
-
-def _three_verdicts(number: int) -> tuple[int, int]:
-    """Return at how many random points three methods agree, and how many were tried."""
-    rng = np.random.default_rng(11)
-    a, b = rng.uniform(-4.0, 1.5, number), rng.uniform(-5.0, 4.0, number)
-    rate: FloatArray = lambert_root(a, b, 1.0).real
-    # The map's own error at this step; nearer to the boundary it cannot decide.
-    a, b, rate = (values[np.abs(rate) > 0.02] for values in (a, b, rate))
-    counted = unstable_roots(HAYES, a, b) == 0
-    mapped = spectral_radius(HAYES, a, b, step=0.02, order=1) < 1.0
-    same = (counted == (rate < 0.0)) & (counted == mapped)
-    return int(same.sum()), int(same.size)
