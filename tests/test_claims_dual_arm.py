@@ -9,16 +9,12 @@ from armlock import DualArm, rightmost_root, unstable_roots
 from book.companion.claims import dual_arm as chapter
 
 
-def test_each_missing_j_matters_and_the_sign_does_too():
+def test_each_missing_j_matters():
     omega = 2.0 * np.pi * np.logspace(-3.0, 1.0, 101)
     truth = DualArm().open_loop(1j * omega, 1.01, 0.98)
     mended = chapter.printed_open_loop(omega, 1.01, 0.98, restored=True)
     np.testing.assert_allclose(mended, truth, rtol=1e-12)
-    for wrong in (
-        chapter.printed_open_loop(omega, 1.01, 0.98),
-        chapter.printed_open_loop(omega, 1.01, 0.98, restored=True, sign=-1.0),
-    ):
-        assert np.abs(wrong / truth - 1.0).max() > 0.5
+    assert np.abs(chapter.printed_open_loop(omega, 1.01, 0.98) / truth - 1.0).max() > 0.5
 
 
 def test_estimates_approach_the_exact_edges():

@@ -122,14 +122,14 @@ class VerdictCounts:
     >>> from book.companion.claims import check
     >>> from book.companion.claims.page import VerdictCounts
     >>> VerdictCounts(check("T2", "T6"))
-    1 finding of physics: 1 reproduced; and 1 of derivation, 0 of wording
+    1 finding of physics: 1 reproduced. Besides 1 of derivation, 0 of wording
     """
 
     def __init__(self, ledger: Ledger) -> None:
         self.physics = ledger.counts(Weight.PHYSICS)
         number = self.physics.total()
         self.head = f"{number} finding{'s' * (number != 1)} of physics: "
-        self.others = "; and " + ", ".join(
+        self.others = ". Besides " + ", ".join(
             f"{ledger.counts(weight).total()} of {weight}" for weight in list(Weight)[1:]
         )
 
