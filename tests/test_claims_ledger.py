@@ -1,5 +1,6 @@
 import inspect
 import itertools
+import re
 from pathlib import Path
 
 import nbformat
@@ -181,6 +182,14 @@ def test_a_claim_names_other_claims():
     known = {entry.identifier for entry in all_claims()}
     for entry in all_claims():
         assert {*entry.affects, entry.same_as} <= {*known, ""} - {entry.identifier}
+
+
+def test_an_erratum_quotes_the_paper_and_a_note_is_short(everything):
+    for entry, finding in everything:
+        if finding.verdict in (Verdict.NOT_AS_WRITTEN, Verdict.DIFFERS):
+            assert entry.printed, entry.identifier
+        sentences = re.split(r"(?<!Sec)(?<!Fig)[.?!] (?=[A-Z$])", finding.note)
+        assert len(sentences) <= 3, (entry.identifier, finding.note)
 
 
 def test_every_module_with_claims_is_imported():

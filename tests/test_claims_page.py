@@ -96,7 +96,9 @@ def test_a_source_is_the_function_that_checks(ledger):
 
 def test_counts_are_of_physics_and_name_only_verdicts_that_occur():
     counts = VerdictCounts(check("T1", "T6"))
-    assert repr(counts).startswith("1 finding of physics: 1 reproduced. Besides 1 of derivation")
+    assert repr(counts).startswith(
+        "1 finding of physics: 1 reproduced. Besides 1 of derivation"
+    )
     assert "differs" not in counts._repr_html_()
 
 

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from armlock import CommonArm, rightmost_root, spectral_radius, unstable_roots
-from book.companion.schemes import pade_poles, standard_schemes
+from armlock import CommonArm, spectral_radius, unstable_roots
+from book.companion.schemes import standard_schemes
 from tests import independent
 
 LOOP = CommonArm(1.0, 2.2, 1.8)
@@ -69,17 +69,6 @@ def test_eigenvalues_of_the_map_are_those_of_the_transition_matrix():
             radius = np.abs(independent.map_eigenvalues(system, *point)).max()
             expected = float(spectral_radius(LOOP, *point, STEP, order))
             assert radius == pytest.approx(expected, rel=1e-12)
-
-
-def test_pade_poles_approach_the_slow_roots_and_miss_the_fast_ones():
-    root = rightmost_root(LOOP, 0.9, 1.05)
-    found = {order: pade_poles(LOOP, 0.9, 1.05, order) for order in (2, 6, 60)}
-    near = {order: np.abs(poles - root).min() for order, poles in found.items()}
-    assert near[6] < near[2] / 100
-    assert near[60] < 1e-10
-    assert found[60].size == 121
-    unstable = int((pade_poles(CommonArm(), 3.0, 3.0, 10).real > 1e-9).sum())
-    assert unstable < unstable_roots(CommonArm(), 3.0, 3.0)
 
 
 def test_the_step_of_a_scheme_divides_both_delays():

@@ -6,11 +6,7 @@ With a constant step that divides both delays, each of them is a map that is aff
 
 from __future__ import annotations
 
-import control
-import numpy as np
-
 from armlock.characteristic import CharacteristicFunction
-from armlock.checks import ComplexArray
 from armlock.loops import CommonArm
 from armlock.semidiscretization import semi_discretization
 
@@ -92,27 +88,3 @@ def standard_schemes(loop: CommonArm, step: float) -> dict[str, CharacteristicFu
             loop, step, 1.0, (0.0, 0.0), lead=1.0 + 2.0 * gain, newer=gain
         ),
     }
-
-
-def pade_poles(loop: CommonArm, x: float, y: float, order: int) -> ComplexArray:
-    """Poles of the closed loop with both delays replaced by Padé approximants.
-
-    Parameters
-    ----------
-    loop : CommonArm
-        The loop.
-    x, y : float
-        c1 and c2.
-    order : int
-        Order of both approximants; beyond 60 their coefficients lose their digits.
-
-    Returns
-    -------
-    complex array, shape (2 order + 1,)
-    """
-    arm1, arm2 = (
-        control.ss(control.tf(*control.pade(delay, order))) for delay in (loop.tau1, loop.tau2)
-    )
-    actuator = control.ss(control.tf([loop.gain], [1.0, 0.0]))
-    closed = control.feedback(actuator * (2.0 - x * arm1 - y * arm2), 1.0)
-    return np.asarray(closed.poles(), dtype=np.complex128)

@@ -618,10 +618,10 @@ def spectra_alike() -> Finding:
         decide(constant, settled=not constant or start < 1.5 * BAND[0]),
         start,
         "Hz, frequency from which the two spectra agree within 10 percent",
-        "With constant $c₁$, $c₂$ the closed loops at (1, 1) and $(1, 1 - 10⁻⁶)$ differ by more "
-        f"than 10 percent below {differs_below:.1e} Hz only. What System 1 adds depends on the "
-        "scale and the end of its spectrum, which the paper does not give: with ours it is "
-        f"{ratio:.1f} times noisier at {first.frequency[0]:.1e} Hz.",
+        "With constant $c₁$, $c₂$ the closed loops at (1, 1) and $(1, 1 - 10⁻⁶)$ differ by "
+        f"more than 10 percent below {differs_below:.1e} Hz only. What System 1 adds depends "
+        "on the scale and the end of its spectrum, which the paper does not give: ours makes "
+        f"it {ratio:.1f} times noisier at {first.frequency[0]:.1e} Hz.",
     )
 
 
@@ -668,8 +668,8 @@ def agreement_with_theory() -> Finding:
         decide(deviation[worst] < 0.1 and above < 0.02 and inside >= 0.95),
         float(deviation[worst]),
         "largest relative deviation of the measured suppression from $|1 + L|$, over all bands",
-        f"It is at {1e3 * found.frequency[worst]:.2g} mHz, where few averages enter; from 1 mHz "
-        f"on no band is off by more than {100.0 * above:.1f} percent.",
+        f"It is at {1e3 * found.frequency[worst]:.2g} mHz, where few averages enter. From 1 mHz"
+        f" on no band is off by more than {100.0 * above:.1f} percent.",
     )
 
 
@@ -680,8 +680,8 @@ def agreement_with_theory() -> Finding:
     pinned=(Verdict.NOT_AS_WRITTEN, 3.879e-4, 5e-6),
     affects=("M1", "M4"),
     weight=Weight.WORDING,
-    printed="strong constant perturbation $(c_1,c_2)=(1,1-10^{-6})$, and parameter perturbation "
-    "$(c_1,c_2)=(1,1)$",
+    printed="strong constant perturbation $(c_1,c_2)=(1,1-10^{-6})$, and parameter "
+    "perturbation $(c_1,c_2)=(1,1)$",
 )
 def which_point() -> Finding:
     """Whether the figure's spectrum could tell the two points apart."""
@@ -695,8 +695,8 @@ def which_point() -> Finding:
         f"largest relative difference of the spectra at the two points, {1e3 * BAND[0]:g} mHz "
         f"to {BAND[1]:g} Hz",
         "The text speaks of a constant perturbation of System 2, so we simulate it at "
-        "$(1, 1 - 10⁻⁶)$. Panel (c) itself cannot tell: the spectra agree to less than a line's "
-        "width.",
+        "$(1, 1 - 10⁻⁶)$. Panel (c) itself cannot tell: "
+        "the spectra agree to less than a line's width.",
     )
 
 
