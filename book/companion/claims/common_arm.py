@@ -8,13 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import bisect, brentq, minimize_scalar
+from scipy.optimize import brentq, minimize_scalar
 
 from armlock.characteristic import CharacteristicFunction
 from armlock.checks import FloatArray
 from armlock.dcurve import Branch, d_curve, d_curve_branches, d_curve_line
 from armlock.loops import CommonArm
 from armlock.paper import COMMON_ARM_GAIN, STEP, TAU1, TAU2
+from armlock.rays import first_crossing
 from armlock.roots import extended_root, pseudospectral_roots, rightmost_root
 from armlock.semidiscretization import semi_discretization, spectral_radius, transition_matrix
 from armlock.stability import StabilityChart, stability_chart, unstable_roots
@@ -77,11 +78,11 @@ def stable_by_magnitude(chart: StabilityChart) -> float:
 
 def straight_edge() -> tuple[float, float]:
     """Return c1 at both ends of the part of c1 + c2 = 2 that bounds the stable region."""
-
-    def stable(c1: float) -> float:
-        return 0.5 - float(unstable_roots(ARM, c1, 2.0 - c1 - 1e-9) > 0)
-
-    return tuple(bisect(stable, 1.0, end, xtol=1e-14) for end in (-WINDOW, WINDOW))
+    left, right = (
+        first_crossing(ARM, (1.0, 1.0 - 1e-9), (sign, -sign), stop=WINDOW).position
+        for sign in (-1.0, 1.0)
+    )
+    return 1.0 - left, 1.0 + right
 
 
 # The D-curve -------------------------------------------------------------------------------
