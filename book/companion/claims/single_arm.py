@@ -303,8 +303,7 @@ def _winding(values: ComplexArray) -> int:
     says="n is the additive noise of Eq. (1), and also the deviation of the gain.",
     pinned=(Verdict.NOT_AS_WRITTEN, 0.434699287, 1e-8),
     weight=Weight.WORDING,
-    printed="$(1+η(t))X(t) + n(t)$, and then $k₁ = 1 + n$, $k₂ = 1 + η$; the caption has δ for "
-    "the multiplicative and η for the additive disturbance",
+    printed="$(1+η(t))X(t) + n(t)$, and then $k₁ = 1 + n$, $k₂ = 1 + η$",
 )
 def symbols() -> Finding:
     """Take n as a gain and follow the slowest root, which no additive input moves."""
@@ -319,9 +318,10 @@ def symbols() -> Finding:
         100.0 * change,
         f"change, in %, of the slowest root's rate by $n = {n:g}$ in $k₁$, at $k₂ = {k2:g}$ "
         f"and $τ = {TAU1}$ s",
-        "Two quantities share one letter: as a part of $k₁$, n moves the roots, and as an "
-        "input of the loop it moves none. $k₁$ is a rate besides, its nominal 1 in rad/s. We "
-        "take $k₁$ as any positive gain.",
+        "Two quantities share one letter: as a part of $k₁$, a rate, n moves the roots, and "
+        "as an input of the loop it moves none. The caption of Fig. 2 has δ for the "
+        "multiplicative disturbance and η for the additive one. We take $k₁$ as any positive "
+        "gain.",
     )
 
 
