@@ -4,9 +4,11 @@ The reproducible companion to "Robustness Analysis and Controller Design of Arm-
 System in Space-based Gravitational Wave Detectors".
 """
 
+from armlock.budget import NoiseBudget, noise_budget
 from armlock.characteristic import CharacteristicFunction
 from armlock.controllers import Controller
 from armlock.dcurve import d_curve, d_curve_branches, d_curve_line
+from armlock.flight import flight_loop, published_loops
 from armlock.loops import CommonArm, DualArm, HayesEquation, Loop, SingleArm, paper_loop
 from armlock.margins import Margins, critical_perturbation, margins, modulus_margin
 from armlock.noise import LaserNoise, PerturbationNoise, ShapedNoise
@@ -17,6 +19,7 @@ from armlock.nyquist import (
     frequency_response,
     nyquist,
 )
+from armlock.pulling import pulling
 from armlock.roots import RootError, rightmost_root
 from armlock.semidiscretization import semi_discretization, spectral_radius, transition_matrix
 from armlock.simulation import (
@@ -36,6 +39,7 @@ from armlock.stability import (
     stability_chart,
     unstable_roots,
 )
+from armlock.transfer import closed_loop, transfer
 
 __version__ = "0.1.0"
 
@@ -53,6 +57,7 @@ __all__ = [
     "LaserNoise",
     "Loop",
     "Margins",
+    "NoiseBudget",
     "NyquistCurve",
     "PerturbationNoise",
     "RootError",
@@ -64,15 +69,20 @@ __all__ = [
     "StabilityChart",
     "amplitude_spectrum",
     "axis_crossings",
+    "closed_loop",
     "critical_perturbation",
     "d_curve",
     "d_curve_branches",
     "d_curve_line",
+    "flight_loop",
     "frequency_response",
     "margins",
     "modulus_margin",
+    "noise_budget",
     "nyquist",
     "paper_loop",
+    "published_loops",
+    "pulling",
     "rightmost_root",
     "sampled_open_loop",
     "save_series",
@@ -81,6 +91,7 @@ __all__ = [
     "simulate_blocks",
     "spectral_radius",
     "stability_chart",
+    "transfer",
     "transition_matrix",
     "unstable_roots",
 ]

@@ -6,10 +6,13 @@ rad/s, the factors stay exact where expanded coefficients do not.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Self
 
+import mpmath
 import numpy as np
 import numpy.typing as npt
 
@@ -21,6 +24,9 @@ from armlock.checks import (
     positive_number,
     real_number,
 )
+
+# Decimal digits in which the zeros of parallel branches are found.
+_DIGITS = 80
 
 
 @dataclass(frozen=True)
@@ -136,6 +142,27 @@ class Controller:
             self.zeros + other.zeros, self.poles + other.poles, self.gain * other.gain
         )
 
+    def __add__(self, other: Controller) -> Controller:
+        """Return the two in parallel, as zeros, poles and gain again.
+
+        The zeros of the sum are found in extended precision, from the factors of both.
+        """
+        if not isinstance(other, Controller):
+            return NotImplemented
+        # Poles that both have are not doubled.
+        mine, yours = Counter(self.poles), Counter(other.poles)
+        only_mine, only_yours = (tuple(p.elements()) for p in (mine - yours, yours - mine))
+        with mpmath.workdps(_DIGITS):
+            first = _precise(self.zeros + only_yours, self.gain)
+            second = _precise(other.zeros + only_mine, other.gain)
+            longer = max(len(first), len(second))
+            first, second = ([0] * (longer - len(p)) + p for p in (first, second))
+            total = [mpmath.re(a + b) for a, b in zip(first, second, strict=True)]
+            lead = next((k for k, value in enumerate(total) if value), longer - 1)
+            zeros = mpmath.polyroots(total[lead:], maxsteps=500, extraprec=400)
+            poles = self.poles + only_yours
+            return Controller([complex(z) for z in zeros], poles, float(total[lead]))
+
 
 def _factors(name: str, values: Sequence[complex]) -> tuple[complex, ...]:
     """Return finite roots as a tuple, complex ones checked to come in pairs."""
@@ -152,6 +179,17 @@ def _factors(name: str, values: Sequence[complex]) -> tuple[complex, ...]:
 def _expanded(roots: tuple[complex, ...]) -> FloatArray:
     """Return the coefficients of prod(s - roots), ascending."""
     return np.ascontiguousarray(np.atleast_1d(np.poly(np.array(roots))).real[::-1])
+
+
+def _precise(roots: tuple[complex, ...], gain: float) -> list[Any]:
+    """Return the coefficients of gain prod(s - roots), descending, in extended precision."""
+    coefficients = [mpmath.mpf(gain)]
+    for root in map(mpmath.mpc, roots):
+        shifted = [*coefficients, mpmath.mpf(0)]
+        for k, value in enumerate(coefficients, 1):
+            shifted[k] -= root * value
+        coefficients = shifted
+    return coefficients
 
 
 def integrating_actuator(gain: float = 1.0) -> Controller:
@@ -228,3 +266,49 @@ def table_two(gain: float = paper.CONTROLLER_GAIN, *, denominator: str = "table"
         As for `stage_two`.
     """
     return stage_one(gain) * stage_two(denominator=denominator)
+
+
+@lru_cache
+def _parallel_branches() -> Controller:
+    """Return the low-pass filter of the white paper and the nine branches beside it."""
+    turn = 2.0 * np.pi
+    low, high = turn * 3e-3, turn * 0.238
+    total = Controller((), (-low, -high), low * high)
+    gains = (1.3e-3, 3.7e-3, 4.2e-3, 16e-3, 30e-3, 69e-3, 0.11, 0.33, 0.70)
+    for k, gain in enumerate(gains, 1):
+        total = total + Controller((), (-turn * 3.0 * 10.0 ** (k - 4),), gain)
+    return total
+
+
+def white_paper(gain: float = 40.0) -> Controller:
+    r"""Return the controller of the LISA Frequency Control White Paper, G*(s).
+
+    .. math::
+
+        G^*(s) &= \left( \frac{s}{s + p_1} \right)^3 \frac{g_2\, s}{s + p_2}
+        \left( \frac{g_3 (s + z_3)}{s + p_3} \right)^5 \\
+        &\quad \cdot \left[ \frac{g_4}{(s + p_{41})(s + p_{42})}
+        + \sum_{k=1}^{9} \frac{g_{5k}}{s + p_{5k}} \right]
+
+    with corners, in Hz, of 0.8e-6 (p1), 210e-6 (p2), 36.6e-6 (z3), 185e-6 (p3), 3e-3 (p41),
+    0.238 (p42) and 3 10^(k-4) (p5k); g3 = p3 / z3 and g4 = p41 p42.
+
+    Parameters
+    ----------
+    gain : float, optional
+        The source's g2, which it does not print. At 40 the loop of `flight_loop` has the gain
+        at 3 mHz and the lower unity-gain frequency that are printed.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the gain is not positive and finite.
+
+    References
+    ----------
+    LISA Frequency Control White Paper (2009), Sec. 3.
+    """
+    p1, p2, z3, p3 = (2.0 * np.pi * f for f in (0.8e-6, 210e-6, 36.6e-6, 185e-6))
+    high_pass = Controller((0.0,) * 4, (-p1, -p1, -p1, -p2), positive_number("gain", gain))
+    lead = Controller((-z3,) * 5, (-p3,) * 5, (p3 / z3) ** 5)
+    return high_pass * lead * _parallel_branches()

@@ -174,3 +174,67 @@ def dual(corner: float, difference: float) -> SignalMapping:
         raise ValueError("difference must not be zero: the dual sensor divides by it")
     below = (0.0, p * dtau, dtau)
     return SignalMapping((p, p * dtau, dtau), (-p, p * dtau, dtau), below, "dual")
+
+
+def modified_dual(
+    mean_delay: float, half_difference: float, corner: float = 2.0 * np.pi * 0.4
+) -> SignalMapping:
+    r"""Return the modified dual sensor: common arm at low frequency, dual arm in the band.
+
+    .. math::
+
+        P_M &= H_+ P_+ - H_- P_- , \quad m_1 = H_+ + H_- , \quad m_2 = H_+ - H_- , \\
+        H_+ &= F_C + F_D , \quad H_- = \frac{\omega_0}{s + \omega_0}\,
+        \frac{F_D}{s\, \Delta\tau} , \\
+        F_C &= \frac{p_b}{z_b\, \bar\tau}\, \frac{s + z_b}{s\, (s + p_b)} , \quad
+        F_D = \frac{s^4}{(s + p_c)(s + p_d)(s + p_e)^2}
+
+    with :math:`z_b = 2\pi \cdot 5 / (13 \bar\tau)`,
+    :math:`p_b = 2\pi \cdot 5 / (2 \bar\tau)`, :math:`p_c = 7 / (5 \bar\tau)`,
+    :math:`p_d = 11 / (20 \bar\tau)` and :math:`p_e = 2\pi / (90 \bar\tau)`.
+
+    Parameters
+    ----------
+    mean_delay : float
+        Mean round-trip delay of the two arms in s.
+    half_difference : float
+        Half the difference of the round-trip delays, (tau1 - tau2) / 2, in s; negative where
+        arm 2 is the longer one.
+    corner : float, optional
+        Corner :math:`\omega_0` of the difference arm's filter in rad/s. The source prints none;
+        the default is that of a public arm-locking code.
+
+    Returns
+    -------
+    SignalMapping
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the mean delay or the corner is not positive and finite, or the half difference is
+        zero: the sensor divides by it.
+
+    References
+    ----------
+    LISA Frequency Control White Paper (2009), Sec. 3; K. McKenzie, R. E. Spero and
+    D. A. Shaddock, Phys. Rev. D 80, 102003 (2009).
+    """
+    mean = positive_number("mean_delay", mean_delay)
+    half = real_number("half_difference", half_difference)
+    if half == 0.0:
+        raise ValueError(
+            "half_difference must not be zero: the modified dual sensor divides by it"
+        )
+    w0 = positive_number("corner", corner)
+    zb, pb = 2.0 * np.pi * 5.0 / (13.0 * mean), 2.0 * np.pi * 5.0 / (2.0 * mean)
+    pe = 2.0 * np.pi / (90.0 * mean)
+    slow = poly.polyfromroots([0.0, -pb])
+    fast = poly.polyfromroots([-7.0 / (5.0 * mean), -11.0 / (20.0 * mean), -pe, -pe])
+    filtered = np.array([w0, 1.0])
+    common = poly.polymul(pb / (zb * mean) * np.array([zb, 1.0]), fast)
+    dual_part = poly.polymul([0.0, 0.0, 0.0, 0.0, 1.0], slow)
+    plus = poly.polymul(poly.polyadd(common, dual_part), filtered)
+    minus = poly.polymul([0.0, 0.0, 0.0, w0 / half], slow)
+    below = poly.polymul(poly.polymul(slow, fast), filtered)
+    first, second = poly.polyadd(plus, minus), poly.polysub(plus, minus)
+    return SignalMapping(first.tolist(), second.tolist(), below.tolist(), "modified dual")

@@ -1,0 +1,212 @@
+"""What noise is left on the locked laser, source by source.
+
+Levels are those of the LISA Frequency Control White Paper (2009), Sec. 3. Each source reaches
+the laser through the closed-form responses of `armlock.transfer`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from armlock.checks import FloatArray, axis, broadcast_shape, real_array
+from armlock.loops import Loop
+from armlock.transfer import transfer
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+#: Shot noise of one link in cycles/sqrt(Hz); a round trip has two, independent.
+SHOT_NOISE = 10e-6
+#: Fractional frequency noise of a clock at 1 Hz in 1/sqrt(Hz); it falls as 1/sqrt(f).
+CLOCK_NOISE = 2.4e-12
+#: Doppler shifts of the two arms' beat notes in Hz, which the clock noise comes with.
+BEAT_NOTES = (15e6, -14e6)
+#: Motion of a spacecraft along one arm in cycles/sqrt(Hz), at low frequency.
+SPACECRAFT_MOTION = 2.5e-3
+#: Corner in Hz of the roll-off 1/sqrt(1 + (f / corner)^4) of that motion.
+MOTION_CORNER = 0.3
+
+
+def free_running(frequency: FloatArray) -> FloatArray:
+    """Return the noise of a free-running laser in Hz/sqrt(Hz): 30 kHz at 1 Hz, as 1/f."""
+    return 3e4 / frequency
+
+
+def cavity(frequency: FloatArray) -> FloatArray:
+    """Return the noise of a cavity-stabilised laser in Hz/sqrt(Hz)."""
+    return 30.0 * np.sqrt(1.0 + (3e-3 / frequency) ** 4)
+
+
+def tdi_capability(frequency: FloatArray) -> FloatArray:
+    """Return the laser noise in Hz/sqrt(Hz) that time-delay interferometry can remove."""
+    return 300.0 * (1.0 + (3e-3 / frequency) ** 2)
+
+
+#: Laser noises by name, as functions of the frequency in Hz.
+LASERS: dict[str, Callable[[FloatArray], FloatArray]] = {
+    "free-running": free_running,
+    "cavity": cavity,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseBudget:
+    """Amplitude spectral densities at the locked laser, one-sided, in Hz/sqrt(Hz).
+
+    Attributes
+    ----------
+    frequency : float array, shape (n,)
+        In Hz.
+    sources : dict of str to float array, shape (n,)
+        What each source leaves on the locked laser: "laser", "shot", "clock", "motion".
+    requirement : float array, shape (n,)
+        What the total is held against.
+
+    Examples
+    --------
+    >>> from armlock import NoiseBudget, flight_loop, noise_budget
+    >>> isinstance(noise_budget(flight_loop(), [1e-3, 1e-2]), NoiseBudget)
+    True
+    """
+
+    frequency: FloatArray
+    sources: dict[str, FloatArray]
+    requirement: FloatArray
+
+    @property
+    def total(self) -> FloatArray:
+        """All sources together: they are independent."""
+        return np.asarray(np.sqrt(sum(asd**2 for asd in self.sources.values())))
+
+    @property
+    def factor(self) -> FloatArray:
+        """How many times the total lies below the requirement."""
+        return self.requirement / self.total
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the sources, the total and the requirement over frequency.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+            Where to draw; the current ones by default.
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        import matplotlib.pyplot as plt
+
+        ax = plt.gca() if ax is None else ax
+        for line, (name, asd) in zip(("-", "--", "-.", ":"), self.sources.items(), strict=True):
+            ax.loglog(self.frequency, asd, line, linewidth=0.9, label=name)
+        ax.loglog(self.frequency, self.total, color="black", linewidth=1.4, label="total")
+        ax.loglog(
+            self.frequency, self.requirement, color="0.5", dashes=(6, 2), label="required"
+        )
+        ax.set(xlabel="frequency [Hz]", ylabel=r"frequency noise [Hz/$\sqrt{\mathrm{Hz}}$]")
+        return ax
+
+
+def _densities(name: str, value: npt.ArrayLike, frequency: FloatArray) -> FloatArray:
+    """Return densities at the frequencies, or raise."""
+    asd = real_array(name, value)
+    if broadcast_shape((name, "frequency"), (asd, frequency)) != frequency.shape:
+        raise ValueError(f"{name} must hold a value a frequency, got shape {asd.shape}")
+    if (asd < 0.0).any():
+        raise ValueError(f"{name} must not be negative, got {asd.min()} among its values")
+    return np.asarray(np.broadcast_to(asd, frequency.shape))
+
+
+def noise_budget(
+    loop: Loop,
+    frequency: npt.ArrayLike,
+    laser: str | npt.ArrayLike = "free-running",
+    requirement: npt.ArrayLike | None = None,
+) -> NoiseBudget:
+    r"""Compute what noise is left on the locked laser.
+
+    .. math::
+
+        \phi = S\, \phi_L + Y_1 N_1 + Y_2 N_2 , \qquad
+        N_k = N_{S,k} + N_{C,k} + N_{X,k}
+
+    with S and Y of `transfer`, and, in cycles,
+
+    .. math::
+
+        N_{S,k} &= \text{two links of } 10^{-5} / \sqrt{\mathrm{Hz}} , \\
+        N_{C,k} &= \Delta_k \frac{y_0 + y_k}{2\pi f} , \quad
+        y = 2.4 \cdot 10^{-12} f^{-1/2} / \sqrt{\mathrm{Hz}} , \\
+        N_{X,k} &= X_0 \left( 1 + e^{-s\tau_k} \right) + 2 X_k .
+
+    The clock and the motion of the spacecraft with the laser, index 0, act on both arms.
+
+    Parameters
+    ----------
+    loop : Loop
+        The loop, at c1 = c2 = 1.
+    frequency : array_like of float, one-dimensional
+        In Hz, positive.
+    laser : {"free-running", "cavity"} or array_like of float, optional
+        Noise of the laser before it is locked, in Hz/sqrt(Hz): by name, or a value a frequency.
+    requirement : array_like of float, optional
+        What the total is held against, a value a frequency in Hz/sqrt(Hz); by default the
+        capability of time-delay interferometry, 300 (1 + (3 mHz / f)^2).
+
+    Returns
+    -------
+    NoiseBudget
+
+    Raises
+    ------
+    TypeError, ValueError
+        If `loop` is no `Loop`, the frequencies are not positive and one-dimensional, there is
+        no laser of that name, or densities are negative or not of the frequencies' shape.
+
+    References
+    ----------
+    LISA Frequency Control White Paper (2009), Sec. 3.
+
+    Examples
+    --------
+    >>> from armlock import flight_loop, noise_budget
+    >>> found = noise_budget(flight_loop(), [3e-3])
+    >>> print(f"{found.total[0]:.0f} Hz/sqrt(Hz), {found.factor[0]:.1f} times below")
+    113 Hz/sqrt(Hz), 5.3 times below
+    """
+    f = axis("frequency", frequency)
+    if (f <= 0.0).any():
+        raise ValueError(f"frequency must be positive, got {f.min()} among its values")
+    if isinstance(laser, str):
+        if laser not in LASERS:
+            raise ValueError(f"laser must be one of {', '.join(LASERS)}; got {laser!r}")
+        laser = LASERS[laser](f)
+    omega = 2.0 * np.pi * f
+    suppression, first, second = (
+        transfer(loop, source, 1j * omega) for source in ("laser", "arm 1", "arm 2")
+    )
+    both = np.abs([first, second])
+    # From cycles to Hz: times 2 pi f.
+    shot = omega * SHOT_NOISE * np.sqrt(2.0) * np.hypot(*both)
+    clock = CLOCK_NOISE / np.sqrt(f)
+    own = np.abs(BEAT_NOTES[0] * first + BEAT_NOTES[1] * second)
+    far = np.hypot(BEAT_NOTES[0] * both[0], BEAT_NOTES[1] * both[1])
+    moving = omega * SPACECRAFT_MOTION / np.sqrt(1.0 + (f / MOTION_CORNER) ** 4)
+    here = np.abs(
+        first * (1.0 + np.exp(-1j * omega * loop.tau1))
+        + second * (1.0 + np.exp(-1j * omega * loop.tau2))
+    )
+    sources: dict[str, Any] = {
+        "laser": np.abs(suppression) * _densities("laser", laser, f),
+        "shot": shot,
+        "clock": clock * np.hypot(own, far),
+        "motion": moving * np.hypot(here, 2.0 * np.hypot(*both)),
+    }
+    required = tdi_capability(f) if requirement is None else requirement
+    return NoiseBudget(f, sources, _densities("requirement", required, f))

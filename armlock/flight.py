@@ -1,0 +1,127 @@
+"""Published loops, ready to use: the white paper's, which could fly, and others beside it."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from armlock.checks import positive_number, real_number
+from armlock.controllers import Controller, white_paper
+from armlock.loops import Loop, paper_loop
+from armlock.sensors import COMMON, SINGLE, modified_dual
+
+_HALF = Controller((), (), 0.5)
+
+
+def flight_loop(
+    mean_delay: float = 33.6,
+    half_difference: float = 0.255,
+    g2: float = 40.0,
+    corner: float = 2.0 * math.pi * 0.4,
+    delay: float = 0.0,
+) -> Loop:
+    r"""Return the loop of the LISA Frequency Control White Paper, arm 1 the longer.
+
+    The controller `armlock.controllers.white_paper` on the sensor
+    `armlock.sensors.modified_dual`:
+
+    .. math::
+
+        L(s) = \tfrac12\, G^*(s)\, P_M(s)\, e^{-s\delta}
+
+    Parameters
+    ----------
+    mean_delay : float, optional
+        Mean round-trip delay in s.
+    half_difference : float, optional
+        Half the difference of the round-trip delays in s, below the mean in magnitude. If it
+        is negative, arm 2 is the longer one.
+    g2 : float, optional
+        Gain of the controller, which the source does not print.
+    corner : float, optional
+        Corner of the difference arm's filter in rad/s, which the source does not print.
+    delay : float, optional
+        Dead time in s. The source has 5 us for the actuator, 2 us for the phasemeter, and
+        1 / (2 pi 30 kHz) for the transponder, 12.3 us in all.
+
+    Returns
+    -------
+    Loop
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a number is not finite; the mean delay, g2 or the corner is not positive; the half
+        difference is zero or not below the mean; or the dead time is negative.
+
+    References
+    ----------
+    LISA Frequency Control White Paper (2009), Sec. 3; K. McKenzie, R. E. Spero and
+    D. A. Shaddock, Phys. Rev. D 80, 102003 (2009).
+
+    Examples
+    --------
+    >>> from armlock import flight_loop, unstable_roots
+    >>> unstable_roots(flight_loop(), [1.0, 1.02], [1.0, 0.98])
+    array([0, 2])
+    """
+    mean = positive_number("mean_delay", mean_delay)
+    half = real_number("half_difference", half_difference)
+    if abs(half) >= mean:
+        raise ValueError(f"half_difference must be below mean_delay ({mean}), got {half}")
+    mapping = modified_dual(mean, half, corner)
+    return Loop(_HALF * white_paper(g2), mapping, mean + half, mean - half, delay)
+
+
+class Published(NamedTuple):
+    """A published loop, and where it comes from.
+
+    Attributes
+    ----------
+    loop : Loop
+        The loop, without a dead time.
+    source : str
+        Its source, and what had to be assumed.
+    """
+
+    loop: Loop
+    source: str
+
+
+def published_loops() -> dict[str, Published]:
+    """Return the published loops by name.
+
+    Returns
+    -------
+    dict of str to Published
+
+    Examples
+    --------
+    >>> from armlock import published_loops
+    >>> for name, (loop, source) in published_loops().items():
+    ...     print(f"{name}: {loop.mapping.name}")
+    white paper: modified dual
+    Table II: dual
+    PI: common
+    high-gain single arm: single
+    """
+    gain, corner = 1e4, 100.0
+    proportional_integral = Controller((-corner,), (0.0,), gain)
+    code = "quickTDI, module TJ_lock: gain 1e4, integral below 100 rad/s; "
+    return {
+        "white paper": Published(
+            flight_loop(),
+            "LISA Frequency Control White Paper (2009), Sec. 3; g2 and the sensor's corner are "
+            "assumed",
+        ),
+        "Table II": Published(
+            paper_loop(),
+            "Y. Shao, X. Zhao, L. Ma and M. Xin, Table II; the sensor's corner is assumed",
+        ),
+        "PI": Published(
+            Loop(proportional_integral, COMMON, 20.1, 19.9), code + "arms of 20.1 s and 19.9 s"
+        ),
+        "high-gain single arm": Published(
+            Loop(proportional_integral, SINGLE, 20.0, 20.0), code + "an arm of 20 s"
+        ),
+    }
