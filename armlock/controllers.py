@@ -158,10 +158,15 @@ class Controller:
             longer = max(len(first), len(second))
             first, second = ([0] * (longer - len(p)) + p for p in (first, second))
             total = [mpmath.re(a + b) for a, b in zip(first, second, strict=True)]
-            lead = next((k for k, value in enumerate(total) if value), longer - 1)
-            zeros = mpmath.polyroots(total[lead:], maxsteps=500, extraprec=400)
+            while total[0] == 0 and len(total) > 1:
+                del total[0]
+            exact = (
+                mpmath.polyroots(total[::-1], maxsteps=500, extraprec=400, asc=True)
+                if total[0]
+                else []
+            )
             poles = self.poles + only_yours
-            return Controller([complex(z) for z in zeros], poles, float(total[lead]))
+            return Controller([complex(z) for z in exact], poles, float(total[0]))
 
 
 def _factors(name: str, values: Sequence[complex]) -> tuple[complex, ...]:

@@ -80,7 +80,7 @@ def pulling(
     >>> from armlock import flight_loop, pulling
     >>> day = 86400.0
     >>> print(f"{pulling(flight_loop(), 4 * day, common=(1e3, 0.0, 0.0)) / 1e6:.3f} MHz")
-    0.089 MHz
+    0.074 MHz
     """
     checked_loop(loop)
     t = real_array("time", time)

@@ -1,0 +1,128 @@
+"""Closed-loop responses, noise budget and pulling, by other ways to the same numbers."""
+
+from __future__ import annotations
+
+import control
+import numpy as np
+import pytest
+
+from armlock import (
+    Controller,
+    Loop,
+    SingleArm,
+    closed_loop,
+    flight_loop,
+    noise_budget,
+    pulling,
+    transfer,
+)
+from armlock.budget import MOTION_CORNER, tdi_capability
+from armlock.sensors import SINGLE
+
+FLIGHT = flight_loop()
+DAY = 86400.0
+
+
+def test_responses_solve_the_loop_equation():
+    """phi = phi_L - K [m1 (phi (1 - e1) + n1) + m2 (phi (1 - e2) + n2)], an input at a time."""
+    s = 2j * np.pi * np.geomspace(1e-7, 1e3, 40)
+    first, second = FLIGHT.arm_responses(s)
+    arms = [1.0 - np.exp(-s * tau) for tau in (FLIGHT.tau1, FLIGHT.tau2)]
+    inputs = {
+        "laser": (1.0, 0.0, 0.0),
+        "arm 1": (0.0, 1.0, 0.0),
+        "arm 2": (0.0, 0.0, 1.0),
+        "common": (0.0, 0.5, 0.5),
+        "differential": (0.0, 0.5, -0.5),
+    }
+    for name, (laser, n1, n2) in inputs.items():
+        phi = transfer(FLIGHT, name, s)
+        back = first * (phi * arms[0] + n1) + second * (phi * arms[1] + n2)
+        scale = np.abs(phi) + np.abs(first) + np.abs(second)
+        assert (np.abs(phi - (laser - back)) < 1e-9 * scale).all()
+
+
+def test_all_responses_are_one_object_of_python_control():
+    response = closed_loop(FLIGHT, [0.01, 0.1])
+    assert isinstance(response, control.FrequencyResponseData)
+    assert (response.ninputs, response.noutputs) == (5, 1)
+    expected = [transfer(FLIGHT, name, 0.1j) for name in response.input_labels]
+    np.testing.assert_allclose(response(0.1j)[0], expected, rtol=1e-12)
+
+
+def test_one_arm_of_high_gain_leaves_the_noise_of_the_arm():
+    """Without rate limits the laser repeats what the arm adds, over |1 - exp(-s tau)|."""
+    tau, f = 20.0, np.array([1e-3, 3e-3, 0.012])
+    budget = noise_budget(Loop(Controller((), (), 1e9), SINGLE, tau, tau), f)
+    arm = 2.0 * np.abs(np.sin(np.pi * f * tau))
+    w = 2.0 * np.pi * f
+    np.testing.assert_allclose(budget.sources["shot"], w * 1e-5 * np.sqrt(2) / arm, rtol=1e-6)
+    clock = 15e6 * 2.4e-12 / np.sqrt(f) * np.sqrt(2) / arm
+    np.testing.assert_allclose(budget.sources["clock"], clock, rtol=1e-6)
+    moved = 2.5e-3 * w / np.sqrt(1 + (f / MOTION_CORNER) ** 4)
+    moved *= np.hypot(2.0 * np.cos(np.pi * f * tau), 2.0) / arm
+    np.testing.assert_allclose(budget.sources["motion"], moved, rtol=1e-6)
+    squares = sum(asd**2 for asd in budget.sources.values())
+    np.testing.assert_allclose(budget.total, np.sqrt(squares), rtol=1e-12)
+
+
+def test_the_budget_is_held_against_a_requirement_and_draws_itself():
+    f = np.geomspace(1e-4, 1.0, 30)
+    budget = noise_budget(FLIGHT, f)
+    np.testing.assert_allclose(budget.factor, tdi_capability(f) / budget.total, rtol=1e-12)
+    same = noise_budget(FLIGHT, f, laser=3e4 / f, requirement=tdi_capability(f))
+    np.testing.assert_array_equal(same.total, budget.total)
+    assert noise_budget(FLIGHT, f, laser="cavity").total[20] < budget.total[20]
+    assert len(budget.plot().lines) == len(budget.sources) + 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"frequency": [0.0, 1.0]}, "frequency must be positive"),
+        ({"frequency": [[1.0]]}, "frequency must be one-dimensional"),
+        ({"laser": "maser"}, "laser must be one of free-running, cavity"),
+        ({"laser": [1.0, 2.0, 3.0]}, "laser and frequency must broadcast together"),
+        ({"laser": -1.0}, "laser must not be negative"),
+        ({"requirement": [1.0, 2.0, 3.0]}, "requirement and frequency must broadcast together"),
+        ({"requirement": [[1.0], [2.0]]}, "requirement must hold a value a frequency"),
+    ],
+)
+def test_bad_budgets_are_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        noise_budget(FLIGHT, **{"frequency": [0.1, 0.2], **arguments})
+
+
+@pytest.mark.parametrize("error", [(1.0, 0.0, 0.0), (0.0, 1e-3, 0.0), (0.0, 0.0, 1e-8)])
+def test_both_ways_to_the_pulling_agree(error):
+    time = np.array([0.3, 1.0, 4.0, 10.0, 20.0]) * DAY
+    for errors in ((error, (0.0, 0.0, 0.0)), ((0.0, 0.0, 0.0), error)):
+        one, other = (pulling(FLIGHT, time, *errors, method=m) for m in ("roots", "laplace"))
+        np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-6 * np.abs(other).max())
+
+
+def test_a_single_arm_is_pulled_without_end():
+    """By nu0 / tau a second, in steps of nu0: 100 kHz and 33.4 s make 1 GHz in 4 days."""
+    loop = SingleArm(gain=100.0, tau=33.4)
+    both = (1e5, 0.0, 0.0)
+    found = pulling(loop, [2 * DAY, 4 * DAY], both, both)
+    assert (found[1] - found[0]) / (2 * DAY) == pytest.approx(-1e5 / 33.4, abs=1.0)
+    assert found[1] == pytest.approx(-1.03e9, rel=5e-3)
+
+
+def test_pulling_ends_where_the_loop_has_no_gain_at_zero():
+    assert np.abs(pulling(FLIGHT, 60 * DAY)) < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"time": [0.0, 1.0]}, "time must be positive"),
+        ({"common": (1.0,)}, "common must hold nu0, gamma and alpha"),
+        ({"differential": (1.0, np.nan, 0.0)}, "differential must be finite"),
+        ({"method": "guess"}, "method must be 'roots' or 'laplace'"),
+    ],
+)
+def test_bad_errors_are_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        pulling(FLIGHT, **{"time": 1.0, **arguments})
