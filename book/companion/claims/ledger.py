@@ -374,7 +374,7 @@ def row(claim: Claim, finding: Finding, attributes: str, link: str, more: str = 
     return (
         f"<tr {attributes}><td>{link}</td><td>{badge(finding.verdict)}</td>"
         f"<td>{claim.weight}</td><td><details><summary>{typeset(claim.says)}</summary>"
-        f"{printed if claim.printed else place}<p>{badge(finding.verdict, finding.verdict)}"
+        f"{printed if claim.printed else place}<p>{badge(finding.verdict, finding.verdict)} "
         f"<strong>{typeset(f'{finding.value:.6g}')}</strong>: {typeset(finding.quantity)}.</p>"
         f"<p>{typeset(finding.note)}</p>{more}</details></td></tr>"
     )
