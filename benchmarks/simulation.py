@@ -15,14 +15,15 @@ from typing import Any
 import control
 import numpy as np
 from numba import njit
+from scipy.signal import bilinear_zpk, zpk2sos
 
-from armlock import LaserNoise, Loop, PerturbationNoise, paper_loop, simulate
+from armlock import LaserNoise, Loop, PerturbationNoise, paper, paper_loop, simulate
 from armlock.checks import FloatArray
 from armlock.discretize import sampled_loop
 from armlock.paper import SAMPLE_RATE, TAU1, TAU2
 from benchmarks import child
 from benchmarks.report import Row, Topic
-from tests.extended import naive, reference
+from tests.extended import reference
 
 PYTHON_RATIO = 100.0
 ACCURACY = 1e-10
@@ -110,6 +111,52 @@ def plain_arguments(loop: Loop) -> tuple[Any, ...]:
     delays = round(TAU1 * SAMPLE_RATE), round(TAU2 * SAMPLE_RATE)
     arrays = (np.array(part) for part in (sensor.states, sensor.direct, controller.sections))
     return (*delays, *arrays, controller.gain)
+
+
+@njit
+def _sections(sos: Any, state: FloatArray, v: float, move: bool) -> float:
+    for i in range(sos.shape[0]):
+        y = sos[i, 0] * v + state[i, 0]
+        if move:
+            state[i, 0] = sos[i, 1] * v - sos[i, 4] * y + state[i, 1]
+            state[i, 1] = sos[i, 2] * v - sos[i, 5] * y
+        v = y
+    return v
+
+
+@njit
+def _naive(
+    noise: FloatArray, c1: FloatArray, c2: FloatArray, r1: int, r2: int, sos1: Any, sos2: Any
+) -> FloatArray:
+    phi = np.zeros(noise.size)
+    s1, s2 = np.zeros((sos1.shape[0], 2)), np.zeros((sos2.shape[0], 2))
+    f1, f2 = 1.0, 1.0
+    for i in range(sos1.shape[0]):
+        f1 *= sos1[i, 0]
+    for i in range(sos2.shape[0]):
+        f2 *= sos2[i, 0]
+    for i in range(noise.size):
+        a1 = c1[i] * phi[i - r1] if i >= r1 else 0.0
+        a2 = c2[i] * phi[i - r2] if i >= r2 else 0.0
+        rest = _sections(sos1, s1, 0.0, False) + _sections(sos2, s2, 0.0, False)
+        right = noise[i] - rest + f1 * (a1 + a2) + f2 * (a1 - a2)
+        x = right / (1.0 + 2.0 * f1)
+        phi[i] = x
+        _sections(sos1, s1, 2.0 * x - a1 - a2, True)
+        _sections(sos2, s2, a2 - a1, True)
+    return phi
+
+
+def naive(noise: FloatArray, c1: FloatArray, c2: FloatArray, rate: float = SAMPLE_RATE) -> Any:
+    """Return it from second-order sections, as scipy stores them, the loop closed exactly."""
+    stage, zeros = -paper.TABLE_2_STAGE_1_POLE, [-z for z in paper.TABLE_2_ZEROS]
+    poles = [stage, stage, *(-p for p in paper.TABLE_2_POLES)]
+    corner, gain = paper.DUAL_SENSOR_CORNER, paper.CONTROLLER_GAIN
+    scale = corner / (TAU1 - TAU2)
+    sum_path = zpk2sos(*bilinear_zpk([0.0, 0.0, *zeros], poles, gain, rate))
+    apart = zpk2sos(*bilinear_zpk([0.0, *zeros], [*poles, -corner], gain * scale, rate))
+    r1, r2 = round(TAU1 * rate), round(TAU2 * rate)
+    return _naive(noise, c1, c2, r1, r2, sum_path, apart)
 
 
 def inputs(samples: int) -> tuple[FloatArray, FloatArray, FloatArray]:

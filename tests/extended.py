@@ -1,4 +1,4 @@
-"""The paper's loop in 106 bits, by other formulas than the package's, and in naive form.
+"""The paper's loop in 106 bits, by other formulas than the package's.
 
 Numbers are unevaluated sums of two doubles (Dekker, Knuth). Controller and sensor are two
 paths, K on the sum of both arms and K E on their difference, each a product of sections that
@@ -11,7 +11,6 @@ from fractions import Fraction
 
 import numpy as np
 from numba import njit
-from scipy.signal import bilinear_zpk, zpk2sos
 
 from armlock import paper
 
@@ -139,47 +138,3 @@ def reference(noise, c1, c2, rate=200.0):
     r1, r2 = round(paper.TAU1 * rate), round(paper.TAU2 * rate)
     one, two = paper_paths(rate)
     return _run(noise, c1, c2, r1, r2, *one, *two)
-
-
-@njit
-def _sections(sos, state, v, move):
-    for i in range(sos.shape[0]):
-        y = sos[i, 0] * v + state[i, 0]
-        if move:
-            state[i, 0] = sos[i, 1] * v - sos[i, 4] * y + state[i, 1]
-            state[i, 1] = sos[i, 2] * v - sos[i, 5] * y
-        v = y
-    return v
-
-
-@njit
-def _naive(noise, c1, c2, r1, r2, sos1, sos2):
-    phi = np.zeros(noise.size)
-    s1, s2 = np.zeros((sos1.shape[0], 2)), np.zeros((sos2.shape[0], 2))
-    f1, f2 = 1.0, 1.0
-    for i in range(sos1.shape[0]):
-        f1 *= sos1[i, 0]
-    for i in range(sos2.shape[0]):
-        f2 *= sos2[i, 0]
-    for i in range(noise.size):
-        a1 = c1[i] * phi[i - r1] if i >= r1 else 0.0
-        a2 = c2[i] * phi[i - r2] if i >= r2 else 0.0
-        rest = _sections(sos1, s1, 0.0, False) + _sections(sos2, s2, 0.0, False)
-        right = noise[i] - rest + f1 * (a1 + a2) + f2 * (a1 - a2)
-        x = right / (1.0 + 2.0 * f1)
-        phi[i] = x
-        _sections(sos1, s1, 2.0 * x - a1 - a2, True)
-        _sections(sos2, s2, a2 - a1, True)
-    return phi
-
-
-def naive(noise, c1, c2, rate=200.0):
-    """Return the same in second-order sections and doubles, the loop closed as exactly."""
-    stage, zeros = -paper.TABLE_2_STAGE_1_POLE, [-z for z in paper.TABLE_2_ZEROS]
-    poles = [stage, stage, *(-p for p in paper.TABLE_2_POLES)]
-    corner, gain = paper.DUAL_SENSOR_CORNER, paper.CONTROLLER_GAIN
-    scale = corner / (paper.TAU1 - paper.TAU2)
-    sum_path = zpk2sos(*bilinear_zpk([0.0, 0.0, *zeros], poles, gain, rate))
-    apart = zpk2sos(*bilinear_zpk([0.0, *zeros], [*poles, -corner], gain * scale, rate))
-    r1, r2 = round(paper.TAU1 * rate), round(paper.TAU2 * rate)
-    return _naive(noise, c1, c2, r1, r2, sum_path, apart)

@@ -129,9 +129,3 @@ def test_publishing_without_a_folder_writes_nothing(ax, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert "written by make book" in repr(figures.publish(ax.figure, "name", {"x": [1.0]}))
     assert list(tmp_path.iterdir()) == []
-
-
-def test_the_style_is_a_style_sheet_of_matplotlib():
-    with plt.rc_context():
-        plotting.use_style()
-        assert plt.rcParams["savefig.dpi"] == 150
