@@ -56,7 +56,7 @@ RETARDED = {
     "undelayed first parameter": CharacteristicFunction(
         [0.5, 0.1, 1.0], [1.0, 1.0], [1.0], 0.0, 1.5
     ),
-    "equal delays": CharacteristicFunction([1.0, 0.5, 1.0], [1.0], [0.0, 1.0], 2.0, 2.0),
+    "equal delays": CharacteristicFunction([1.0, 0.5, 1.0], [1.0, 0.2], [0.3, 1.0], 2.0, 2.0),
     "zero of B1 on the axis": CharacteristicFunction(
         [1.0, 2.0, 3.0, 1.0], [1.0, 0.0, 1.0], [1.0], 1.0, 2.0
     ),

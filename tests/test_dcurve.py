@@ -146,7 +146,8 @@ def test_more_points_per_turn_make_a_branch_denser():
         d_curve_branches(CommonArm(), 3.0, points_per_turn=points)[0].omega.size
         for points in (24, 48)
     ]
-    assert sizes[1] == pytest.approx(2 * sizes[0], abs=2)
+    turns = 3.0 * CommonArm().tau1 / (2.0 * np.pi)
+    assert sizes == pytest.approx([24 * turns, 48 * turns], abs=1)
 
 
 def test_a_branch_of_a_map_ends_at_the_nyquist_frequency():
