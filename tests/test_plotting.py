@@ -109,23 +109,50 @@ def test_options_are_checked(ax, chart):
             curve.plot(ax, arrows=[beyond])
 
 
-def test_publishing_writes_figure_and_data(ax, tmp_path, monkeypatch):
+def test_publishing_writes_figure_and_data(ax, chart, tmp_path, monkeypatch):
     monkeypatch.setenv("ARMLOCK_FIGURES", str(tmp_path))
-    links = figures.publish(ax.figure, "name", {"omega [rad/s]": [1.0, 2.0], "y, y": [0.5]})
+    ax.plot([1.0, 2.0], [0.5, 0.25], label="$c_1$")
+    ax.plot([1.0, 2.0], [3.0, 4.0])
+    ax.axhline(7.0)
+    ax.fill([0.0, 1.0, 1.0], [0.0, 0.0, 1.0], label="area")
+    ax.set(xlabel=r"$\omega$ [rad/s]", ylabel="gain, $g$ [1]")
+    links = figures.publish(ax.figure, "name")
     assert {path.name for path in tmp_path.iterdir()} == {"name.csv", "name.png", "name.svg"}
-    assert (tmp_path / "name.csv").read_text() == 'omega [rad/s],"y, y"\n1,0.5\n2,\n'
+    head, *rows = (tmp_path / "name.csv").read_text().splitlines()
+    assert head.startswith('"c_1, omega [rad/s]","c_1, gain, g [1]","2, gain, g [1]"')
+    assert rows[0].startswith("1,0.5,3")
+    assert rows[1].startswith("2,0.25,4")
+    assert "7" not in rows[0] + rows[1]
     assert "name.svg" in links._repr_html_()
+
+
+def test_the_data_of_a_chart_are_its_counts_at_its_points(chart):
+    ax = chart.plot(plt.figure().add_subplot(), largest=50)
+    table = figures.drawn(ax.figure)
+    x, y, colour = table.values()
+    for at_x, at_y, shown in zip(x, y, colour, strict=True):
+        row, column = np.abs(chart.y - at_y).argmin(), np.abs(chart.x - at_x).argmin()
+        assert abs(chart.y[row] - at_y) + abs(chart.x[column] - at_x) < 1e-9
+        count = chart.counts[row, column]
+        assert np.isnan(shown) if count < 0 else shown == count
+
+
+def test_long_curves_are_thinned_for_the_table(ax):
+    ax.plot(np.arange(100_000.0), np.arange(100_000.0))
+    sizes = {column.size for column in figures.drawn(ax.figure).values()}
+    assert max(sizes) <= 1500
 
 
 def test_a_drawing_has_no_data(ax, tmp_path, monkeypatch):
     monkeypatch.setenv("ARMLOCK_FIGURES", str(tmp_path))
-    links = figures.publish(ax.figure, "name", {})
-    assert "name.csv" not in links._repr_html_()
+    ax.plot([0.0, 1.0], [0.0, 1.0])
+    ax.set_axis_off()
+    assert "name.csv" not in figures.publish(ax.figure, "name")._repr_html_()
     assert not (tmp_path / "name.csv").exists()
 
 
 def test_publishing_without_a_folder_writes_nothing(ax, tmp_path, monkeypatch):
     monkeypatch.delenv("ARMLOCK_FIGURES", raising=False)
     monkeypatch.chdir(tmp_path)
-    assert "written by make book" in repr(figures.publish(ax.figure, "name", {"x": [1.0]}))
+    assert "written by make book" in repr(figures.publish(ax.figure, "name"))
     assert list(tmp_path.iterdir()) == []

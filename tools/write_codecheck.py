@@ -2,10 +2,9 @@
 
 Usage: python tools/write_codecheck.py [--check [FOLDER]]
 
-Every figure that a notebook publishes is listed with the first sentence of its caption: its
-data, or the picture itself where it is a drawing without data. So is the ledger of claims. With
---check nothing is written, and a manifest that is out of date is an error. FOLDER is a built
-book: it must hold what is listed, and no other tables.
+Every figure that a notebook publishes is listed with the first sentence of its caption. So is
+the ledger of claims. With --check nothing is written, and a manifest that is out of date is an
+error. FOLDER is a built book: it must hold what is listed, and no other figures.
 """
 
 import ast
@@ -48,10 +47,8 @@ def published(notebook: Path) -> list[tuple[str, str]]:
         caption = figure.get("caption", caption)
         for node in ast.walk(ast.parse("".join(cell["source"]))):
             if isinstance(node, ast.Call) and ast.unparse(node.func) == "figures.publish":
-                _, name, columns = node.args
-                drawing = isinstance(columns, ast.Dict) and not columns.keys
-                file = f"{ast.literal_eval(name)}.{'svg' if drawing else 'csv'}"
-                found.append((file, first_sentence(caption)))
+                name = ast.literal_eval(node.args[1])
+                found.append((f"{name}.svg", first_sentence(caption)))
     return found
 
 
@@ -83,9 +80,11 @@ def manifest(files: dict[str, str]) -> str:
 def differences(files: dict[str, str], book: Path) -> list[str]:
     """Return how the list differs from what is in a built book."""
     there = {file.name for file in (book / "figures").iterdir()}
-    tables = {name for name in there if name.endswith(".csv")}
+    figures = {name for name in there if name.endswith(".svg")}
     missing = [f"{name} is listed, and nothing writes it" for name in files.keys() - there]
-    return sorted(missing) + [f"{name} is not listed" for name in sorted(tables - files.keys())]
+    return sorted(missing) + [
+        f"{name} is not listed" for name in sorted(figures - files.keys())
+    ]
 
 
 def main() -> int:

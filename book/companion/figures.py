@@ -7,48 +7,95 @@ import csv
 import html
 import io
 import os
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
+from string import ascii_lowercase
 
 import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from PIL import Image
 
 from armlock.plotting import BLUE
-from armlock.stability import StabilityChart
+
+# Longer curves are thinned for the tables, and charts along both axes.
+_MOST_POINTS = 1500
+_MOST_CELLS = 60
 
 
-def chart_columns(
-    chart: StabilityChart, *, every: int = 1, units: tuple[str, str] = ("1", "1")
-) -> dict[str, npt.NDArray[np.float64]]:
-    """Return a chart as columns for `publish`, a row a point.
+def _plain(label: str) -> str:
+    """Return an axis label without the marks of its typesetting."""
+    return re.sub(r"[$\\{}]|mathrm", "", label)
+
+
+def drawn(figure: Figure) -> dict[str, npt.NDArray[np.float64]]:
+    """Return the data that a figure shows, as columns of a table.
 
     Parameters
     ----------
-    chart : StabilityChart
-        Any chart.
-    every : int, optional
-        Take every so many points along each axis.
-    units : pair of str, optional
-        Units of the two free parameters.
+    figure : Figure
+        Its columns are named after the panel (a, b, ... where there are several), the label
+        of the curve, and the label of the axis.
 
     Returns
     -------
     dict of str to array
-        The two free parameters and the number of unstable roots.
+        Of each curve its two coordinates, a first one that several curves share being given
+        once; of each filled area its outline; of each chart a row a point. Lines across the
+        whole panel and single marks are left out.
     """
-    x, y = np.meshgrid(chart.x[::every], chart.y[::every])
-    names = [f"{p} [{u}]" for p, u in zip(chart.system.parameters, units, strict=True)]
-    counts = chart.counts[::every, ::every]
-    return {
-        names[0]: x.ravel(),
-        names[1]: y.ravel(),
-        "unstable roots [1]": counts.ravel().astype(float),
-    }
+    columns: dict[str, npt.NDArray[np.float64]] = {}
+    for letter, ax in zip(ascii_lowercase, figure.axes, strict=False):
+        if not ax.axison:
+            continue  # a drawing
+        panel = f"{letter}: " if len(figure.axes) > 1 else ""
+        across, up = _plain(ax.get_xlabel()) or "x", _plain(ax.get_ylabel()) or "y"
+        shared = np.empty(0)
+        for number, artist in enumerate([*ax.lines, *ax.collections], 1):
+            if artist.get_transform() != ax.transData:
+                continue
+            label = str(artist.get_label())
+            name = panel + (f"{number}" if label.startswith("_") else _plain(label))
+            if isinstance(artist, Line2D):
+                x, y = np.array(artist.get_data(orig=False), dtype=np.float64)
+            else:
+                x, y = np.concatenate([path.vertices for path in artist.get_paths()]).T
+            if x.size < 2:
+                continue
+            every = slice(None, None, -(-x.size // _MOST_POINTS))
+            if not np.array_equal(x, shared):
+                columns[f"{name}, {across}"] = x[every]
+            columns[f"{name}, {up}"] = y[every]
+            shared = x
+        for image in ax.images:
+            values = np.ma.filled(image.get_array(), np.nan)
+            left, right, low, high = image.get_extent()
+            rows, cells = (np.arange(0, n, -(-n // _MOST_CELLS)) for n in values.shape)
+            x = left + (right - left) * (cells + 0.5) / values.shape[1]
+            y = low + (high - low) * (rows + 0.5) / values.shape[0]
+            places = np.meshgrid(x, y)
+            columns[f"{panel}chart, {across}"], columns[f"{panel}chart, {up}"] = places
+            columns[f"{panel}chart, colour"] = values[np.ix_(rows, cells)]
+    return {name: np.ravel(column) for name, column in columns.items()}
+
+
+def glue(**numbers: float) -> None:
+    """Make numbers available to the chapter's prose, under their names.
+
+    Parameters
+    ----------
+    **numbers : float
+        What the prose and the alternative texts refer to.
+    """
+    from myst_nb import glue as glue_one
+
+    for name, number in numbers.items():
+        glue_one(name, float(number), display=False)
 
 
 @dataclass(frozen=True, repr=False)
@@ -73,9 +120,7 @@ class Downloads:
         return f'<p class="figure-downloads">Download this figure: {links}</p>'
 
 
-def publish(
-    figure: Figure, name: str, columns: Mapping[str, npt.ArrayLike], *, form: str = "%.7g"
-) -> Downloads:
+def publish(figure: Figure, name: str, **numbers: float) -> Downloads:
     """Write a figure as PNG and SVG and its data as CSV, and link to them.
 
     Parameters
@@ -84,11 +129,8 @@ def publish(
         The figure.
     name : str
         Stem of the files, unique in the book.
-    columns : mapping of str to array_like
-        Columns of the CSV, named with their units, for instance "omega [rad/s]". Shorter
-        columns are padded with empty fields. Empty for a drawing, which has no data.
-    form : str, optional
-        Format of the numbers.
+    **numbers : float
+        For the prose around the figure, as `glue` takes them.
 
     Returns
     -------
@@ -96,15 +138,17 @@ def publish(
         Shows links in a notebook. The files go to the folder named by the environment
         variable ARMLOCK_FIGURES, which the book's build sets; without it none are written.
     """
+    glue(**numbers)
     if not os.environ.get("ARMLOCK_FIGURES"):
         return Downloads(name, [])
     stem = Path(os.environ["ARMLOCK_FIGURES"]) / name
     stem.parent.mkdir(parents=True, exist_ok=True)
+    columns = drawn(figure)
     if columns:
         with stem.with_suffix(".csv").open("w", newline="") as stream:
             table = csv.writer(stream, lineterminator="\n")
             table.writerow(columns)
-            written = ([form % value for value in np.ravel(c)] for c in columns.values())
+            written = ([f"{value:.12g}" for value in column] for column in columns.values())
             table.writerows(zip_longest(*written, fillvalue=""))
     # A palette of 128 colours is all a figure needs, at a third of the size.
     pixels = io.BytesIO()
