@@ -17,6 +17,7 @@ from string import ascii_lowercase
 import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
+from matplotlib.collections import Collection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from PIL import Image
@@ -60,11 +61,17 @@ def drawn(figure: Figure) -> dict[str, npt.NDArray[np.float64]]:
             if artist.get_transform() != ax.transData:
                 continue
             label = str(artist.get_label())
-            name = panel + (f"{number}" if label.startswith("_") else _plain(label))
+            # Matplotlib's own labels begin with an underscore.
+            name = panel + ("" if label.startswith("_") else _plain(label))
+            if name == panel or f"{name}, {up}" in columns:
+                name = f"{name}{number}"
             if isinstance(artist, Line2D):
                 x, y = np.array(artist.get_data(orig=False), dtype=np.float64)
+            elif isinstance(artist, Collection):
+                outline = [np.empty((0, 2)), *(path.vertices for path in artist.get_paths())]
+                x, y = np.concatenate(outline).T
             else:
-                x, y = np.concatenate([path.vertices for path in artist.get_paths()]).T
+                continue
             if x.size < 2:
                 continue
             every = slice(None, None, -(-x.size // _MOST_POINTS))
@@ -73,7 +80,9 @@ def drawn(figure: Figure) -> dict[str, npt.NDArray[np.float64]]:
             columns[f"{name}, {up}"] = y[every]
             shared = x
         for image in ax.images:
-            values = np.ma.filled(image.get_array(), np.nan)
+            values: npt.NDArray[np.float64] = np.ma.filled(
+                np.ma.asarray(image.get_array()), np.nan
+            )
             left, right, low, high = image.get_extent()
             rows, cells = (np.arange(0, n, -(-n // _MOST_CELLS)) for n in values.shape)
             x = left + (right - left) * (cells + 0.5) / values.shape[1]
