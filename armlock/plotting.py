@@ -36,6 +36,8 @@ BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, BLACK = (
 )
 #: Fill of the stable region.
 STABLE = "#B8C4CE"
+# Half the width of a count written into a region, over the width of the chart.
+_ROOM = 0.025
 #: The circle |L| that stands for infinity in a compressed Nyquist plot.
 INFINITY = 1e6
 
@@ -54,7 +56,7 @@ def plot_chart(
     *,
     counts: bool = True,
     largest: int = 12,
-    labels: float | None = None,
+    labels: bool = False,
 ) -> Axes:
     """Colour a chart by its number of unstable roots, the stable region apart.
 
@@ -68,9 +70,8 @@ def plot_chart(
         False shades the stable region alone.
     largest : int, optional
         Counts above this share one colour.
-    labels : float, optional
-        Regions of at least this share of the chart, from 0 to 1, are labelled with their
-        count. By default none are.
+    labels : bool, optional
+        Write the count into each region that has room for it.
 
     Returns
     -------
@@ -86,7 +87,7 @@ def plot_chart(
     >>> import numpy as np
     >>> from armlock import CommonArm, stability_chart
     >>> axis = np.linspace(-3, 3, 61)
-    >>> ax = stability_chart(CommonArm(), axis, axis).plot(labels=0.01)
+    >>> ax = stability_chart(CommonArm(), axis, axis).plot(labels=True)
     >>> ax.texts[0].get_text()
     '0'
     """
@@ -115,21 +116,20 @@ def plot_chart(
         interpolation="nearest",
     )
     label_parameters(ax, chart.system.parameters)
-    if labels is not None:
-        _label_regions(ax, chart, labels)
+    if labels:
+        _label_regions(ax, chart)
     return ax
 
 
-def _label_regions(ax: Axes, chart: StabilityChart, smallest: float) -> None:
+def _label_regions(ax: Axes, chart: StabilityChart) -> None:
     """Write the count into each region, at its point that is farthest from the edges."""
+    room = _ROOM * min(chart.counts.shape)
     for count in np.unique(chart.counts[chart.counts >= 0]):
-        regions, number = ndimage.label(chart.counts == count)
-        for index in range(1, number + 1):
-            region = np.pad(regions == index, 1)
-            if region.sum() < smallest * chart.counts.size:
+        depth = ndimage.distance_transform_edt(np.pad(chart.counts == count, 1))
+        regions, number = ndimage.label(depth)
+        for row, column in ndimage.maximum_position(depth, regions, range(1, number + 1)):
+            if depth[row, column] < room:
                 continue
-            depth = ndimage.distance_transform_edt(region)
-            row, column = np.unravel_index(np.argmax(depth), depth.shape)
             ax.text(
                 chart.x[column - 1],
                 chart.y[row - 1],
@@ -144,7 +144,9 @@ def _label_regions(ax: Axes, chart: StabilityChart, smallest: float) -> None:
 def label_parameters(ax: Axes, parameters: tuple[str, str]) -> None:
     """Label both axes with the names of the free parameters, digits as subscripts."""
     x, y = (re.sub(r"(\d+)$", r"_{\1}", name) for name in parameters)
-    ax.set(xlabel=f"${x}$", ylabel=f"${y}$")
+    # The perturbations of a loop are numbers; of other parameters the unit is not known here.
+    unit = " [1]" if parameters == ("c1", "c2") else ""
+    ax.set(xlabel=f"${x}${unit}", ylabel=f"${y}${unit}")
 
 
 def plot_branches(

@@ -14,7 +14,7 @@ from pathlib import Path
 import nbformat
 
 ROOT = Path(__file__).parents[1]
-TEXT = "# A chapter\n\n{numref}`fig-small` shows a curve, see {doc}`/book/intro`."
+TEXT = "# A chapter\n\n{numref}`fig-small`: {glue:text}`points:.1e` points. {doc}`/book/intro`"
 DRAW = """
 import numpy as np
 from matplotlib import pyplot as plt
@@ -107,7 +107,9 @@ def test_a_book_has_its_data_numbers_and_links_and_needs_no_network(tmp_path):
     assert code == 0, output[-3000:]
     table = (pages / "figures" / "small.csv").read_bytes()
     assert table.startswith(b'"D-curve, a [1/s]","D-curve, b [1/s]"\n')
-    assert 'alt="A curve of 200 points."' in (pages / "notebooks/small.html").read_text()
+    page = (pages / "notebooks/small.html").read_text()
+    assert 'alt="A curve of 200 points."' in page
+    assert r"\(2.0 \times 10^{2}\)" in page
     for page, link in LINKS.items():
         assert link in (pages / page).read_text()
     check = [sys.executable, str(ROOT / "tools" / "check_html.py"), str(pages)]

@@ -31,7 +31,7 @@ def test_the_shaded_region_is_the_stable_one(ax, chart):
     (image,) = ax.images
     np.testing.assert_array_equal(~np.ma.getmaskarray(image.get_array()), chart.stable)
     assert image.cmap(0) == to_rgba(plotting.STABLE)
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$c_{1}$", "$c_{2}$")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$c_{1}$ [1]", "$c_{2}$ [1]")
 
 
 def test_large_counts_share_a_colour_and_boundary_points_have_none(ax, chart):
@@ -44,7 +44,7 @@ def test_large_counts_share_a_colour_and_boundary_points_have_none(ax, chart):
 
 
 def test_labels_stand_in_regions_of_their_count(ax, chart):
-    chart.plot(ax, labels=0.002)
+    chart.plot(ax, labels=True)
     assert len(ax.texts) >= 2
     for text in ax.texts:
         x, y = text.get_position()
@@ -128,6 +128,7 @@ def test_publishing_writes_figure_and_data(ax, chart, tmp_path, monkeypatch):
 
 def test_the_data_of_a_chart_are_its_counts_at_its_points(chart):
     ax = chart.plot(plt.figure().add_subplot(), largest=50)
+    ax.figure.colorbar(ax.images[0], ax=ax)
     table = figures.drawn(ax.figure)
     x, y, colour = table.values()
     for at_x, at_y, shown in zip(x, y, colour, strict=True):

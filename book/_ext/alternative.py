@@ -1,4 +1,7 @@
-"""Numbers in alternative texts come from the run, as those of the prose do.
+"""Numbers of the run: in alternative texts as well, and with their powers of ten typeset.
+
+What the prose takes from the run as 1.5e-06 is shown as a formula; an alternative text, which
+is spoken, has 1.5 times 10 to the -6 instead.
 
 An alternative text may hold `{name:format}`, where `name` was glued in the same notebook; it
 is replaced by the number in that format. An unknown name is a warning, which fails the build.
@@ -10,8 +13,18 @@ from docutils import nodes
 from myst_nb.ext.glue.crossref import read_glue_cache
 from sphinx.util import logging
 
+POWER = re.compile(r"([-+]?[\d.]+)e([-+]\d+)")
 PLACE = re.compile(r"\{(\w+):([^{}]*)\}")
 LOGGER = logging.getLogger(__name__)
+
+
+def typeset(app, doctree):
+    """Typeset the powers of ten that the prose of a page has from the run."""
+    for node in list(doctree.findall(nodes.inline)):
+        power = POWER.fullmatch(node.astext())
+        if power and "pasted-text" in node["classes"]:
+            formula = rf"{power[1]} \times 10^{{{int(power[2])}}}"
+            node.replace_self(nodes.math(formula, formula))
 
 
 def fill(app, doctree):
@@ -26,12 +39,14 @@ def fill(app, doctree):
             if name not in glued:
                 LOGGER.warning("nothing is glued as %r", name, location=image)
                 return place[0]
-            return format(float(glued[name]["data"]["text/plain"]), form)
+            text = format(float(glued[name]["data"]["text/plain"]), form)
+            return POWER.sub(lambda power: f"{power[1]} times 10 to the {int(power[2])}", text)
 
         image["alt"] = PLACE.sub(number, image["alt"])
 
 
 def setup(app):
     """Register with Sphinx."""
+    app.connect("doctree-read", typeset)
     app.connect("doctree-read", fill)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -51,10 +51,10 @@ def drawn(figure: Figure) -> dict[str, npt.NDArray[np.float64]]:
         whole panel and single marks are left out.
     """
     columns: dict[str, npt.NDArray[np.float64]] = {}
-    for letter, ax in zip(ascii_lowercase, figure.axes, strict=False):
-        if not ax.axison:
-            continue  # a drawing
-        panel = f"{letter}: " if len(figure.axes) > 1 else ""
+    # Drawings and colour bars hold no data.
+    panels = [ax for ax in figure.axes if ax.axison and ax.get_label() != "<colorbar>"]
+    for letter, ax in zip(ascii_lowercase, panels, strict=False):
+        panel = f"{letter}: " if len(panels) > 1 else ""
         across, up = _plain(ax.get_xlabel()) or "x", _plain(ax.get_ylabel()) or "y"
         shared = np.empty(0)
         for number, artist in enumerate([*ax.lines, *ax.collections], 1):
