@@ -198,6 +198,9 @@ def plot_nyquist(
     *,
     unit: float | None = 0.01,
     arrows: Iterable[float] = (),
+    omega_max: float = np.inf,
+    color: str = BLUE,
+    label: str | None = None,
 ) -> Axes:
     """Draw a Nyquist curve, both signs of omega, with -1 and the infinite branch.
 
@@ -214,6 +217,12 @@ def plot_nyquist(
         stands for infinity. None keeps the plain complex plane.
     arrows : iterable of float, optional
         Frequencies in rad/s at which an arrow points in the direction of rising omega.
+    omega_max : float, optional
+        Frequency in rad/s up to which the curve is drawn.
+    color : str, optional
+        Of the curve.
+    label : str, optional
+        Name of the curve in a legend; by default its two halves are named by the sign of omega.
 
     Returns
     -------
@@ -232,7 +241,9 @@ def plot_nyquist(
     'Re $L$ [1]'
     """
     ax = plt.gca() if ax is None else ax
-    forward, omega, last = curve.response, curve.omega, curve.omega[-2]
+    drawn = curve.omega <= omega_max
+    forward, omega = curve.response[drawn], curve.omega[drawn]
+    last = omega[-2]
     if unit is not None:
         unit = positive_number("unit", unit)
         if curve.indentation.size:
@@ -240,9 +251,9 @@ def plot_nyquist(
             far = INFINITY * forward[:1] / np.abs(forward[:1])
             forward, omega = np.append(far, forward), np.append(0.0, omega)
         forward = _compressed(forward, unit)
-    positive, negative = r"$\omega > 0$", r"$\omega < 0$"
-    ax.plot(forward.real, forward.imag, "-", color=BLUE, linewidth=1.5, label=positive)
-    ax.plot(forward.real, -forward.imag, "-", color=BLUE, linewidth=0.7, label=negative)
+    positive, negative = (r"$\omega > 0$", r"$\omega < 0$") if label is None else (label, "_")
+    ax.plot(forward.real, forward.imag, "-", color=color, linewidth=1.5, label=positive)
+    ax.plot(forward.real, -forward.imag, "-", color=color, linewidth=0.7, label=negative)
     for frequency in arrows:
         if not 0.0 < frequency <= last:
             raise ValueError(
@@ -250,7 +261,7 @@ def plot_nyquist(
                 f"one, got {frequency}"
             )
         index = int(np.searchsorted(omega, frequency))
-        _arrow(ax, forward[index], forward[index + 1], BLUE)
+        _arrow(ax, forward[index], forward[index + 1], color)
     if unit is None:
         ax.axhline(0.0, color="black", linewidth=0.6)
         ax.axvline(0.0, color="black", linewidth=0.6)

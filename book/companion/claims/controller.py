@@ -127,22 +127,6 @@ def chart(half_width: float, points: int = 401) -> StabilityChart:
 
 
 @cache
-def first_breaks(number: int = 24) -> tuple[FloatArray, FloatArray]:
-    """First perturbation of (1, 1) that breaks the loop, in directions all the way around.
-
-    Returns
-    -------
-    angle : float array, shape (number,)
-        Of the direction (cos, sin) in the (c1, c2) plane, in rad.
-    length : float array, shape (number,)
-        Length of the perturbation.
-    """
-    angle = TURN * np.arange(number) / number
-    vectors = np.round(np.column_stack((np.cos(angle), np.sin(angle))), 15)
-    return angle, np.array([critical_perturbation(LOOP, vector) for vector in vectors])
-
-
-@cache
 def largest_stable_square() -> float:
     """Half-width of the largest square around (1, 1) in which the loop is stable.
 
