@@ -309,7 +309,7 @@ def _circles(ax: Axes, unit: float) -> None:
     ax.set_aspect("equal")
     turn = np.exp(2j * np.pi * np.linspace(0.0, 1.0, 181))
     for size, text in (
-        (1.0, "1"),
+        (1.0, ""),  # through -1, where a label would hide the curve
         (1e2, "$10^{2}$"),
         (1e4, "$10^{4}$"),
         (INFINITY, r"$\infty$"),
