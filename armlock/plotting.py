@@ -231,7 +231,8 @@ def plot_nyquist(
     Raises
     ------
     ValueError
-        If `unit` is not positive, or an arrow lies beyond the curve's frequencies.
+        If `unit` is not positive, `omega_max` leaves less than two samples, or an arrow lies
+        beyond the frequencies that are drawn.
 
     Examples
     --------
@@ -241,6 +242,11 @@ def plot_nyquist(
     'Re $L$ [1]'
     """
     ax = plt.gca() if ax is None else ax
+    if not omega_max > curve.omega[1]:
+        raise ValueError(
+            f"omega_max must lie above {curve.omega[1]} rad/s, the curve's second sample, got "
+            f"{omega_max}"
+        )
     drawn = curve.omega <= omega_max
     forward, omega = curve.response[drawn], curve.omega[drawn]
     last = omega[-2]
@@ -257,8 +263,8 @@ def plot_nyquist(
     for frequency in arrows:
         if not 0.0 < frequency <= last:
             raise ValueError(
-                f"arrows must lie above 0 and up to {last} rad/s, the curve's last sample but "
-                f"one, got {frequency}"
+                f"arrows must lie above 0 and up to {last} rad/s, the last sample but one that "
+                f"is drawn, got {frequency}"
             )
         index = int(np.searchsorted(omega, frequency))
         _arrow(ax, forward[index], forward[index + 1], color)

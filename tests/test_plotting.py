@@ -86,6 +86,17 @@ def test_the_plain_nyquist_plane_shows_the_response_and_its_mirror_image(ax):
     np.testing.assert_array_equal(negative.get_ydata(), -curve.response.imag)
 
 
+def test_a_curve_can_be_drawn_in_part_and_under_a_name(ax):
+    curve = nyquist(CommonArm(), 0.9, 0.9, omega_max=3.0)
+    curve.plot(ax, unit=None, omega_max=1.0, color=plotting.GREEN, label="part")
+    positive, negative = ax.lines[:2]
+    shown = curve.response[curve.omega <= 1.0]
+    np.testing.assert_array_equal(positive.get_xdata(), shown.real)
+    np.testing.assert_array_equal(negative.get_ydata(), -shown.imag)
+    assert positive.get_color() == negative.get_color() == plotting.GREEN
+    assert ax.get_legend_handles_labels()[1] == ["part"]
+
+
 def test_the_compressed_plane_keeps_directions_and_ends_at_infinity(ax):
     curve = nyquist(CommonArm(), 0.9, 0.9, omega_max=3.0)
     curve.plot(ax, unit=0.1, arrows=[curve.omega[-2]])
@@ -104,6 +115,9 @@ def test_options_are_checked(ax, chart):
         chart.plot(ax, largest=0)
     with pytest.raises(ValueError, match=r"^unit must be positive"):
         curve.plot(ax, unit=0.0)
+    for low in (0.0, curve.omega[1], np.nan):
+        with pytest.raises(ValueError, match=r"^omega_max must lie above"):
+            curve.plot(ax, omega_max=low)
     for beyond in (0.0, curve.omega[-1], np.nan):
         with pytest.raises(ValueError, match=r"^arrows must lie above 0 and"):
             curve.plot(ax, arrows=[beyond])
