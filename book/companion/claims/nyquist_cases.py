@@ -98,15 +98,6 @@ def crossing_near(loop: Loop, c1: float, c2: float, omega: float) -> AxisCrossin
     return AxisCrossings(found.omega[kept], found.value[kept])
 
 
-def outermost_crossing(
-    loop: Loop, c1: float, c2: float, omega_max: float
-) -> tuple[float, float]:
-    """Return (omega, L) of the crossing of the negative real axis that is furthest out."""
-    found = axis_crossings(loop, c1, c2, omega_max=omega_max)
-    k = int(np.argmin(found.value))
-    return float(found.omega[k]), float(found.value[k])
-
-
 def at_gain(loop: Arm, factor: float) -> Arm:
     """Return one of the section's loops with its gain times a factor."""
     return type(loop)(loop.gain * factor)
