@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from armlock import CommonArm, HayesEquation, contour, stability_chart, unstable_roots
+from armlock import CommonArm, contour, stability_chart, unstable_roots
 from armlock.bounds import last_frequency
 from tests import independent
 from tests.systems import NEUTRAL, RETARDED
@@ -86,10 +86,3 @@ def test_both_walks_agree_at_the_end_of_every_row():
     assert chart.recounted_rows.size == 0
     ends = unstable_roots(CommonArm(gain=10.0), np.array([-3.0, 3.0]), chart.y[:, None])
     np.testing.assert_array_equal(chart.counts[:, [0, -1]], ends)
-
-
-def test_along_b_the_hayes_counts_change_monotonically_outward():
-    b = np.linspace(2.0, 40.0, 200)
-    counts = stability_chart(HayesEquation(), [-1.0], b).counts[:, 0]
-    assert (np.diff(counts) >= 0).all()
-    assert (np.diff(stability_chart(HayesEquation(), [-1.0], -b).counts[:, 0]) >= 0).all()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_lyapunov
 
-from armlock import Controller, paper, paper_loop
+from armlock import Controller
 from armlock.controllers import table_two
 from armlock.discretize import (
     sampled_filter,
@@ -15,7 +15,7 @@ from armlock.discretize import (
     through,
     warped,
 )
-from armlock.sensors import COMMON, SignalMapping, dual
+from armlock.sensors import SignalMapping, dual
 from tests.systems import with_roots
 
 RATE = 200.0
@@ -82,15 +82,6 @@ def test_response_is_the_continuous_one_at_the_warped_frequency(name):
     expected = continuous(zeros, poles, gain, mapping, 1j * warped(OMEGA, RATE))
     for one, other in zip(found, expected, strict=True):
         assert one == pytest.approx(other, rel=1e-9, abs=1e-12 * np.abs(other).max())
-
-
-def test_poles_are_kept_as_what_they_differ_from_one():
-    sections = sampled_filter(table_two(), RATE).sections
-    found = np.sort([pole for section in sections for pole in section[:2]])
-    p = np.array([paper.TABLE_2_STAGE_1_POLE] * 2 + [*paper.TABLE_2_POLES])
-    expected = np.sort(-p / RATE / (1.0 + 0.5 * p / RATE))
-    assert found == pytest.approx(expected, rel=1e-15)
-    assert np.abs(found).min() < 4e-8
 
 
 def test_poles_and_zeros_over_twelve_decades():
@@ -169,28 +160,7 @@ def test_stationary_states_have_the_covariance_of_white_noise(zeros, poles):
     assert root @ root.T == pytest.approx(expected, rel=1e-9)
 
 
-@pytest.mark.parametrize("rest", [0.0, 1e-15, 1e-9])
-def test_states_of_which_one_follows_the_others_have_a_covariance(rest):
-    sampled = sampled_filter(Controller([-0.5 - rest], [-2.0, -0.5], 1.0), 10.0)
-    root = stationary_root(sampled)
-    assert np.isfinite(root).all()
-    _, _, _, t1, t2 = sampled.sections[0]
-    # What the filter makes of them is what it would be without the two factors.
-    alone = sampled_filter(Controller([], [-2.0], 1.0), 10.0)
-    spread = alone.sections[0][3] * stationary_root(alone)[0, 0]
-    assert np.linalg.norm(np.array([t1, t2]) @ root) == pytest.approx(abs(spread), rel=1e-6)
-
-
 def test_half_the_rate_stands_for_infinity():
     for rate in (0.3, 7.0, 200.0, 1e5 / 3):
         assert warped([0.0, np.pi * rate], rate)[0] == 0.0
         assert warped(np.nextafter(np.pi * rate, np.inf), rate) > 1e15 * rate
-
-
-def test_the_paper_loop_has_seven_states():
-    """One s of the controller takes the sensor's integrator, and a pole joins the sensor."""
-    loop = paper_loop()
-    sensor, controller = sampled_loop(loop.controller, loop.mapping, RATE)
-    assert (len(sensor.states), controller.order) == (2, 5)
-    common = sampled_loop(loop.controller, COMMON, RATE)
-    assert common[1].order == 6

@@ -123,26 +123,6 @@ def test_random_controllers_agree_with_a_rectangle_of_another_kind(seed):
         assert curve.closed_loop_roots == expected
 
 
-@pytest.mark.parametrize("samples", [2, 3, 5])
-def test_a_coarse_grid_changes_no_count(monkeypatch, samples):
-    def coarse(loop, c1, c2, end):
-        return np.linspace(0.0, end, samples)
-
-    monkeypatch.setattr(module, "_resolving_grid", coarse)
-    for loop, c1, c2 in [
-        (SingleArm(), 1.001, 1.0),
-        (CommonArm(), 1.3, 1.1),
-        (DualArm(), 1.0, 0.995),
-        (paper_loop(), 1.0, 1.0 - 4e-6),
-    ]:
-        # Either refined all the same, or refused: never another count.
-        try:
-            count = nyquist(loop, c1, c2).closed_loop_roots
-        except CountError:
-            continue
-        assert count == unstable_roots(loop, c1, c2)
-
-
 def test_a_resonance_between_the_samples_is_refused_not_guessed(monkeypatch):
     loop, (c1, c2), _ = CASES["resonance at -1e-06, gain 0.0001"]
     assert nyquist(loop, c1, c2).closed_loop_roots == 2

@@ -125,13 +125,6 @@ def test_the_exact_line_of_zero_frequency_survives_sampling():
         )
 
 
-def test_a_fine_map_counts_what_the_loop_has():
-    system = CommonArm(gain=0.3, tau1=2.0, tau2=1.0)
-    sampled = semi_discretization(system, 0.01, order=1)
-    x, y = np.random.default_rng(5).uniform(-6.0, 6.0, (2, 60))
-    np.testing.assert_array_equal(unstable_roots(sampled, x, y), unstable_roots(system, x, y))
-
-
 def test_without_delayed_terms_the_matrix_is_the_flow():
     system = CharacteristicFunction([2.0, 0.3, 1.0], [1.0], [0.0, 1.0], 0.0, 0.0)
     eigenvalues = np.linalg.eigvals(transition_matrix(system, 0.5, -1.0, 0.5))

@@ -175,18 +175,6 @@ def test_any_partition_gives_the_same_estimate(sizes):
     assert np.array_equal(parts.degrees, whole.degrees)
 
 
-def test_a_refused_block_is_not_taken_in():
-    series = np.random.default_rng(1).standard_normal(5000)
-    estimator = SpectrumEstimator(3.0)
-    estimator.add(series[:3000])
-    for bad in ([np.nan], np.zeros((2, 2))):
-        with pytest.raises(ValueError, match=r"^samples must"):
-            estimator.add(bad)
-    estimator.add(series[3000:])
-    whole = amplitude_spectrum(series, 3.0)
-    assert estimator.spectrum().asd == pytest.approx(whole.asd, rel=1e-12)
-
-
 def test_the_part_between_two_frequencies_needs_them_in_order():
     found = amplitude_spectrum(np.random.default_rng(1).standard_normal(5000), 2.0)
     assert found.within(0.0, np.inf).asd.size == found.within(-np.inf, 1.0).asd.size
