@@ -1,0 +1,215 @@
+"""The book's live pages count as the package does: loop.js in Chromium against armlock."""
+
+from __future__ import annotations
+
+import cmath
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armlock import (
+    CommonArm,
+    CountError,
+    DualArm,
+    critical_perturbation,
+    margins,
+    paper_loop,
+    rightmost_root,
+    stability_chart,
+    unstable_roots,
+)
+from tests.attack import between, draw_arm, draw_delays, draw_paper, draw_point, roots, to_loop
+from tests.attack_judge import Sketch, View
+from tests.test_browser import needs_chromium
+from tools import check_browser
+
+LIVE = Path(__file__).parents[1] / "book" / "_static" / "live"
+#: What a count in a browser is where it is no number of roots, as `loop.js` has it.
+BOUNDARY, UNCONFINED, UNSURE = -1, -2, -3
+
+pytestmark = needs_chromium
+
+
+@pytest.fixture(scope="module")
+def page():
+    with check_browser.browser() as chromium:
+        page = chromium.new_page()
+        page.add_script_tag(path=LIVE / "loop.js")
+        page.evaluate("() => { window.live = armlockLoop(); }")
+        yield page
+
+
+def pairs(roots):
+    return [[complex(root).real, complex(root).imag] for root in roots]
+
+
+def of_sketch(sketch):
+    """The description of a loop that `loop.js` takes."""
+    return {
+        "sensor": sketch.sensor,
+        "tau1": sketch.tau1,
+        "tau2": sketch.tau2,
+        "delay": sketch.delay,
+        "zeros": pairs(sketch.zeros),
+        "poles": pairs(sketch.poles),
+        "gain": sketch.gain,
+        "corner": sketch.corner,
+        "difference": sketch.difference,
+    }
+
+
+def of_loop(loop, corner=0.0, difference=0.0):
+    """The same of a loop of the package."""
+    return {
+        "sensor": loop.mapping.name,
+        "tau1": loop.tau1,
+        "tau2": loop.tau2,
+        "delay": loop.delay,
+        "zeros": pairs(loop.controller.zeros),
+        "poles": pairs(loop.controller.poles),
+        "gain": loop.controller.gain,
+        "corner": corner,
+        "difference": difference,
+    }
+
+
+PAPER = of_loop(paper_loop(), 2.0 * np.pi * 0.4, 20.1 - 19.9)
+COMMON = of_loop(CommonArm())
+DUAL = of_loop(DualArm(), 2.0 * np.pi * 0.4, 20.1 - 19.9)
+
+
+def draw_any(rng):
+    """A loop of any sensor and up to eight poles, and a point."""
+    tau1, tau2 = draw_delays(rng)
+    longest = max(tau1, tau2)
+    low, high = 1e-4 / longest, 30.0 / longest
+    count, neutral = int(rng.integers(1, 9)), rng.random() < 0.4
+    poles = roots(rng, count, low, high, 0.15 if rng.random() < 0.3 else 0.0)
+    zeros = roots(rng, count if neutral else int(rng.integers(0, count)), low, high, 0.15)
+    for found in (zeros, poles):
+        if found and found[0].imag == 0.0 and rng.random() < 0.3:
+            found[0] = 0j
+    sketch = Sketch(
+        tuple(zeros), tuple(poles), 1.0,
+        str(rng.choice(["single", "common", "difference", "dual"])), tau1, tau2,
+        between(rng, 1e-3, 1.0) if rng.random() < 0.3 else 0.0,
+        between(rng, 0.05, 20.0), tau1 - tau2 or longest,
+    )  # fmt: skip
+    size = 1.0
+    if not neutral:
+        at = between(rng, 0.1, 30.0) / longest
+        size = abs(View(sketch, 0.3, -0.2).at(np.array([at]))[0])
+    sign = -1.0 if rng.random() < 0.15 else 1.0
+    return sketch.scaled(sign * between(rng, 0.01, 3.0) / size), draw_point(rng)
+
+
+#: Loops and points of each kind.
+PAIRS = {draw_any: 2000, draw_paper: 1000, draw_arm: 2000}
+
+
+def test_no_count_of_5000_differs_off_the_boundary(page):
+    """The walks share no code: other polynomials, other bounds, another end of the axis."""
+    rng = np.random.default_rng(20260)
+    cases, counts = [], []
+    for make, number in PAIRS.items():
+        for _ in range(number):
+            sketch, point = make(rng)
+            if make is draw_paper and 0.0 in sketch.poles:
+                # With a dead time these have tens of thousands of unstable roots.
+                sketch = replace(sketch, delay=0.0)
+            try:
+                counts.append(int(unstable_roots(to_loop(sketch), *point)))
+            except CountError:
+                continue
+            cases.append([of_sketch(sketch), *map(float, point)])
+    found = []
+    for first in range(0, len(cases), 500):
+        found += page.evaluate(
+            "cases => cases.map(([spec, c1, c2]) => live.count(live.make(spec), c1, c2))",
+            cases[first : first + 500],
+        )
+    hers, ours = np.array(found), np.array(counts)
+    undecided = (hers == UNSURE) | (hers == BOUNDARY) | (ours == BOUNDARY)
+    differs = np.flatnonzero((hers != ours) & ~undecided)
+    assert [(cases[k], hers[k], ours[k]) for k in differs] == []
+    # Where one of the two says that it cannot tell, the other may be able to.
+    assert ((hers == UNSURE) | ((hers == BOUNDARY) & (ours != BOUNDARY))).mean() < 0.01
+    assert len(cases) >= 4990
+    # All kinds are among them.
+    assert min((ours == 0).sum(), (ours > 0).sum(), (ours == UNCONFINED).sum()) > 100
+
+
+@pytest.mark.parametrize(
+    ("spec", "loop", "low", "high"),
+    [
+        (COMMON, CommonArm(), -3.0, 3.0),
+        (DUAL, DualArm(), 0.7, 1.3),
+        (PAPER, paper_loop(), 1.0 - 3e-6, 1.0 + 3e-6),
+        (PAPER, paper_loop(), -1.2, 1.2),
+    ],
+)
+def test_a_chart_is_that_of_the_package_to_a_pixel(page, spec, loop, low, high):
+    size = 60
+    axis = low + (high - low) * np.arange(size) / (size - 1)
+    expected = stability_chart(loop, axis, axis).counts
+    call = "([spec, a, b, n]) => [...live.chart(live.make(spec), a, b, n, a, b, n).counts]"
+    found = np.array(page.evaluate(call, [spec, low, high, size])).reshape(size, size)
+    # A crossing between two pixels may be placed on the other side of one.
+    near = [
+        np.roll(expected, shift, axis)[1:-1, 1:-1]
+        for axis in (0, 1)
+        for shift in (-1, 0, 1)
+    ]
+    inner = found[1:-1, 1:-1]
+    sure = inner != UNSURE
+    assert sure.mean() > 0.95
+    within = (np.min(near, axis=0) <= inner) & (inner <= np.max(near, axis=0))
+    assert within[sure].all()
+    assert (found == expected)[1:-1, 1:-1][sure].mean() > 0.97
+
+
+def test_break_margins_and_roots_are_those_of_the_package(page):
+    loop = paper_loop()
+    half = paper_loop(difference=0.1)
+    call = "spec => live.firstBreak(live.make(spec), 1, -1)"
+    assert page.evaluate(call, PAPER) == pytest.approx(
+        critical_perturbation(loop, (1, -1)), rel=1e-7
+    )
+    assert page.evaluate(call, {**PAPER, "difference": 0.1}) == pytest.approx(
+        critical_perturbation(half, (1, -1)), rel=1e-7
+    )
+    found, expected = page.evaluate("spec => live.margins(spec, 1, 1)", PAPER), margins(loop)
+    assert found["lower"] == pytest.approx(expected.gain_lower, rel=1e-6)
+    assert found["upper"] == pytest.approx(expected.gain_upper, rel=1e-6)
+    assert found["phase"] == pytest.approx(expected.phase, rel=1e-6)
+    assert found["modulus"] == pytest.approx(expected.modulus, rel=1e-3)
+    for spec, own, point in (
+        (PAPER, loop, (1.0, 1.0)),
+        (COMMON, CommonArm(), (0.5, 1.6)),
+        (COMMON, CommonArm(), (-0.5, 0.8)),
+        (DUAL, DualArm(), (1.0, 1.001)),
+    ):
+        root = page.evaluate("([spec, x, y]) => live.rightmost(spec, x, y)", [spec, *point])
+        certified = complex(rightmost_root(own, *point))
+        assert cmath.isclose(
+            complex(root[0], abs(root[1])), complex(certified.real, abs(certified.imag)),
+            rel_tol=1e-6,
+        )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"tau1": 0}, "tau1 must be a positive number, got 0"),
+        ({"delay": -1}, "dead time must be zero or positive"),
+        ({"gain": 0}, "gain must be a number other than zero"),
+        ({"zeros": [[-1, 0]] * 9}, "9 zeros and 6 poles"),
+        ({"poles": [[-1, 2], [-2, 0]]}, "in conjugate pairs"),
+        ({"difference": 0}, "dtau must be a number other than zero"),
+    ],
+)
+def test_a_loop_that_is_none_is_refused_in_words(page, change, message):
+    call = "spec => { try { live.make(spec); } catch (error) { return error.message; } }"
+    assert message in page.evaluate(call, {**PAPER, **change})
