@@ -549,14 +549,20 @@ print(unstable_roots(loop, ${c1}, ${c2}))
     constructor(label) {
       this.id = `live-${++number}`;
       this.desk = new Desk(["point", "chart", "breaks", "margins", "plots", "root", "check"]);
-      this.out = element("output", { role: "status", "aria-live": "polite" },
-        "Point at the chart, touch it, or move with the arrow keys.");
+      this.out = element("output", { role: "status", "aria-live": "polite" });
       this.note = element("p", { class: "live-note" });
       this.numbers = element("dl", { class: "live-numbers" });
       this.chart = new Chart(label, () => this.redraw(), point => this.tell(point));
       this.figure = element("div", { class: "live-chart", "data-check": "hover" },
         this.chart.canvas, this.out);
+      this.forget();
+    }
+
+    /* Nobody has pointed at a place yet. */
+    forget() {
+      this.chart.marked = null;
       this.shown = [1, 1];
+      this.out.textContent = "Point at the chart, touch it, or move with the arrow keys.";
     }
 
     /* Take another loop. */
@@ -772,8 +778,7 @@ print(unstable_roots(loop, ${c1}, ${c2}))
       name => {
         const [spec, centre, half] = PRESETS[name];
         put(spec);
-        live.chart.marked = null;
-        live.shown = [1, 1];
+        live.forget();
         live.spec = null;
         live.chart.show([centre, centre], half);
         take();
