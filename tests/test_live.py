@@ -195,6 +195,7 @@ def test_break_margins_and_roots_are_those_of_the_package(page):
         (PAPER, loop, (1.0, 1.0)),
         (COMMON, CommonArm(), (0.5, 1.6)),
         (COMMON, CommonArm(), (-0.5, 0.8)),
+        ({**COMMON, "delay": 0.1}, CommonArm(delay=0.1), (0.5, 1.2)),
         (DUAL, DualArm(), (1.0, 1.001)),
     ):
         root = page.evaluate("([spec, x, y]) => live.rightmost(spec, x, y)", [spec, *point])
