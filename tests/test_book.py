@@ -25,7 +25,7 @@ omega = np.linspace(0.1, 3.0, 200)
 a, b = d_curve(HayesEquation(tau=1.0), omega)
 fig, ax = plt.subplots()
 ax.plot(a, b, label="D-curve")
-ax.set(xlabel="a [1/s]", ylabel="b [1/s]")
+ax.set(xlabel="a [1/s]", ylabel="b [1/s]");
 """
 PUBLISH = """
 figures.publish(fig, "small", points=omega.size)
