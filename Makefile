@@ -14,6 +14,7 @@ PY := $(VENV)/bin/python
 ENV_READY := $(VENV)/.environment-complete
 PACKAGE_READY := $(VENV)/.package-complete
 INDEX := build/html/index.html
+NOTEBOOKS_RAN := build/notebooks-ran
 TESTS_PASSED := build/tests-passed
 
 # What the reader has set up for other projects must not reach this one.
@@ -30,9 +31,10 @@ empty :=
 space := $(empty) $(empty)
 find-sources = $(shell find $(wildcard $(1)) -type f \
 	-not -name '*.pyc' -not -name '*.nbi' -not -name '*.nbc' -not -path '*/.*' | sort)
-# What the book is made from, its companion package included.
-BOOK_SOURCES := $(call find-sources,armlock book notebooks) tools/check_html.py \
-	tools/write_codecheck.py codecheck.yml
+# What the notebooks depend on, and the book besides.
+RUN_SOURCES := $(call find-sources,armlock book/companion notebooks)
+BOOK_SOURCES := $(call find-sources,book) tools/check_html.py tools/write_codecheck.py \
+	tools/cache_notebooks.py codecheck.yml
 TEST_SOURCES := $(call find-sources,armlock book notebooks tests benchmarks tools binder) \
 	pyproject.toml environment.txt README.md codecheck.yml
 NOTEBOOKS := $(wildcard notebooks/*.ipynb)
@@ -79,20 +81,40 @@ $(PACKAGE_READY): $(ENV_READY) pyproject.toml
 	@$(PY) -m pip check
 	@touch $@
 
+## Notebooks -----------------------------------------------------------------------------
+
+# nbmake runs them once, on all cores, for the tests and for the book: a copy, which keeps the
+# outputs. The claims are checked before, once for all notebooks and tests.
+PYTEST := $(PY) -m pytest --numprocesses auto --maxprocesses 4 --dist worksteal
+run-notebooks = rm -rf $(1) $(2); \
+	echo "Checking every claim of the paper: build/claims.txt ..."; \
+	$(PY) -m book.companion.claims $(1) > build/claims.txt && cp -R notebooks $(2) && \
+	ARMLOCK_FIGURES="$(CURDIR)/$(1)" $(PYTEST) --nbmake --overwrite $(2)/*.ipynb
+
+$(NOTEBOOKS_RAN): $(PACKAGE_READY) $(RUN_SOURCES) build/run-sources $(if $(FORCE),always)
+	@touch build/notebooks-started
+	@$(call run-notebooks,build/figures,build/executed)
+	@touch -r build/notebooks-started $@
+
+same: $(NOTEBOOKS_RAN) ## Run all notebooks again: the data of all figures, equal byte for byte
+	@$(call run-notebooks,build/figures-again,build/executed-again)
+	$(PY) tools/check_same.py build/figures build/figures-again
+
 ## Book ----------------------------------------------------------------------------------
 
 book: $(INDEX) ## Run all notebooks and build the book, as HTML that needs no network
 	@echo "The book is ready. Open it in a browser: file://$(subst $(space),%20,$(CURDIR))/$(INDEX)"
 
-# Every page is built and every notebook run anew: Sphinx does not see that the package has
-# changed. The new book replaces the old one only when it is complete, and is as old as the
-# start of its build, so that a source saved meanwhile counts as newer. The link keeps the path
-# right that Jupyter Book has printed.
-$(INDEX): $(PACKAGE_READY) $(BOOK_SOURCES) build/book-sources $(if $(FORCE),always)
+# Every page is built anew: Sphinx does not see that the package has changed. Notebooks come
+# from the cache, which holds the last run and nothing older. The new book replaces the old one
+# only when it is complete, and is as old as the start of its build, so that a source saved
+# meanwhile counts as newer. The link keeps the path right that Jupyter Book has printed.
+$(INDEX): $(NOTEBOOKS_RAN) $(BOOK_SOURCES) build/book-sources $(if $(FORCE),always)
 	@touch build/book-started
 	@rm -rf build/_build
-	@echo "Checking every claim of the paper: build/claims.txt ..."
-	@$(PY) -m book.companion.claims build/_build/html/figures > build/claims.txt
+	@mkdir -p build/_build/html
+	@cp -R build/figures build/_build/html/figures
+	@$(PY) tools/cache_notebooks.py build/_build/.jupyter_cache build/executed/*.ipynb
 	ARMLOCK_FIGURES="$(CURDIR)/build/_build/html/figures" \
 		$(VENV)/bin/jupyter-book build . --all --config book/_config.yml --toc book/_toc.yml \
 		--path-output build -W -n --keep-going
@@ -105,9 +127,6 @@ $(INDEX): $(PACKAGE_READY) $(BOOK_SOURCES) build/book-sources $(if $(FORCE),alwa
 
 browser: $(INDEX) ## Check every page of the book in Chromium, without network
 	$(PY) tools/check_browser.py build/html
-
-same: $(INDEX) $(TESTS_PASSED) ## Compare the data of all figures: two runs, equal byte for byte
-	$(PY) tools/check_same.py build/figures-of-tests build/html/figures
 
 lab: $(PACKAGE_READY) ## Open the notebooks in JupyterLab
 	$(VENV)/bin/jupyter-lab --notebook-dir notebooks
@@ -123,14 +142,9 @@ test: $(TESTS_PASSED) ## Run all tests, notebooks included
 		"nothing has changed since; make test FORCE=1 runs them again."; }
 	@rm -f build/tests-ran
 
-$(TESTS_PASSED): $(PACKAGE_READY) $(TEST_SOURCES) build/test-sources $(if $(FORCE),always)
+$(TESTS_PASSED): $(NOTEBOOKS_RAN) $(TEST_SOURCES) build/test-sources $(if $(FORCE),always)
 	@touch build/tests-started
-	@rm -rf build/figures-of-tests
-	@mkdir -p build
-	@echo "Checking every claim of the paper: build/claims-of-tests.txt ..."
-	@$(PY) -m book.companion.claims build/figures-of-tests > build/claims-of-tests.txt
-	ARMLOCK_FIGURES="$(CURDIR)/build/figures-of-tests" \
-		$(PY) -m pytest --nbmake --numprocesses auto --maxprocesses 4 --dist worksteal
+	ARMLOCK_FIGURES="$(CURDIR)/build/figures" $(PYTEST) tests
 	@date '+%Y-%m-%d %H:%M:%S' > $@
 	@touch -r build/tests-started $@
 	@touch build/tests-ran
@@ -148,6 +162,10 @@ bench: $(PACKAGE_READY) ## Measure speed and memory, and print a table
 	$(PY) -m benchmarks
 
 # The lists of sources change when a file comes or goes, which no file's date would tell.
+build/run-sources: always
+	@mkdir -p build
+	@echo $(RUN_SOURCES) | cmp -s - $@ || echo $(RUN_SOURCES) > $@
+
 build/book-sources: always
 	@mkdir -p build
 	@echo $(BOOK_SOURCES) | cmp -s - $@ || echo $(BOOK_SOURCES) > $@

@@ -2,8 +2,8 @@
 
 Usage: python tools/check_same.py FOLDER FOLDER
 
-The tests run every notebook, and so does the book; each run writes the CSV files of its
-figures. Both must have written the same.
+`make same` runs all notebooks a second time; each run writes the CSV files of its figures. Both
+must have written the same.
 """
 
 import sys
