@@ -21,8 +21,8 @@ from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import ComplexArray, FloatArray, IntArray, axis, positive_number
 from armlock.stability import UNCONFINED, CountError, sign_changes, unstable_roots
 
-P = TypeVar("P")
-R = TypeVar("R", bound=tuple[Any, ...])
+_Point = TypeVar("_Point")
+_Result = TypeVar("_Result", bound=tuple[Any, ...])
 
 #: Parameters this many times the length of the start and the direction are not looked at.
 FARTHEST = 1e9
@@ -377,11 +377,11 @@ def first_break(
 
 
 def sweep(
-    result: Callable[[P], R],
-    points: Iterable[P],
+    result: Callable[[_Point], _Result],
+    points: Iterable[_Point],
     *,
-    mapper: Callable[[Callable[[P], R], Iterable[P]], Iterable[R]] = map,
-) -> R:
+    mapper: Callable[[Callable[[_Point], _Result], Iterable[_Point]], Iterable[_Result]] = map,
+) -> _Result:
     """Evaluate a function at many points and gather its results field by field.
 
     Parameters
