@@ -22,6 +22,7 @@ from book.companion.claims import nyquist_cases  # isort: skip
 from book.companion.claims import controller  # isort: skip
 from book.companion.claims import simulation  # isort: skip
 from book.companion.claims import appendix  # isort: skip
+from book.companion.claims import flight  # isort: skip
 
 __all__ = [
     "Claim",
@@ -38,6 +39,7 @@ __all__ = [
     "controller",
     "decide",
     "dual_arm",
+    "flight",
     "nyquist_cases",
     "simulation",
     "single_arm",

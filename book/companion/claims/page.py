@@ -42,6 +42,8 @@ SECTIONS = {
     "06_controller": "Sec. IV.B, controller",
     "07_simulation": "Sec. IV.C, simulation",
     "08_perturbations": "Appendix",
+    "08a_flight": "White paper, the loop",
+    "08b_noise_and_pulling": "White paper, noise and pulling",
 }
 #: What filters and sorts the table.
 SCRIPT = Path(__file__).with_name("ledger.js")
