@@ -14,6 +14,7 @@ from numba import njit
 
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import FloatArray, broadcast_pair
+from armlock.exponentials import real_horner
 
 
 @njit(cache=True)
@@ -87,26 +88,37 @@ def _last_frequency(
     top = squares.shape[1] - 1
     lead = np.sqrt(squares[0, top])
     shares = np.zeros(factors.size)
-    whole = 0.0
     for i in range(factors.size):
         size = 0.0
         for m in range(top + 1):
             size += abs(squares[i + 1, m])
         shares[i] = factors[i] * np.sqrt(size)
-        whole += shares[i]
-    together = 0.0
+    whole = shares.sum()
+    if whole > 0.0:
+        shares *= 0.5 * reserve * lead / whole
     for i in range(factors.size):
-        if whole > 0.0:
-            shares[i] *= 0.5 * reserve * lead / whole
         shares[i] += factors[i] * np.sqrt(squares[i + 1, top])
-        together += shares[i]
+    bound = _outgrown_from(squares, factors, shares)
+    if 0.0 < bound < np.inf:
+        # Nearer to equality, and to the frequency: the shares that the terms have there.
+        for i in range(factors.size):
+            shares[i] = factors[i] * np.sqrt(max(real_horner(squares[i + 1], bound), 0.0))
+        nearer = _outgrown_from(squares, factors, shares)
+        bound = min(bound, nearer) if nearer >= 0.0 else bound
+    return float(np.sqrt(bound) * unit)
+
+
+@njit(cache=True)
+def _outgrown_from(squares: FloatArray, factors: FloatArray, shares: FloatArray) -> float:
+    """Bound in w for `_last_frequency`, with the shares as a_i."""
+    together = shares.sum()
     q = squares[0].copy()
     for i in range(factors.size):
         if shares[i] > 0.0:
-            weight = together * factors[i] ** 2 / shares[i]
-            for m in range(top + 1):
-                q[m] -= weight * squares[i + 1, m]
-    return float(np.sqrt(last_root_bound(q)) * unit)
+            q -= together * factors[i] ** 2 / shares[i] * squares[i + 1]
+        elif factors[i] > 0.0 and squares[i + 1].any():
+            return np.inf
+    return float(last_root_bound(q))
 
 
 def squared_magnitudes(polynomials: Sequence[FloatArray]) -> tuple[FloatArray, float]:

@@ -27,6 +27,7 @@ from armlock.exponentials import (
     EPSILON,
     ROUNDING,
     curvature_bound,
+    curvature_from_zero,
     evaluate,
     piece,
     real_horner,
@@ -50,10 +51,10 @@ DOUBTFUL = -3
 TOO_LONG = -4
 UNTRIED = -5
 
-# Most steps of one walk, about ten a turn of the longest delay: some ten seconds.
-MOST_STEPS = 50_000_000
+# Most steps of one walk, about ten a turn of the longest delay: some five seconds.
+MOST_STEPS = 20_000_000
 # No walk begins that turns the fastest exponential by more radians: it would not end.
-MOST_RADIANS = 4.0 * MOST_STEPS
+MOST_RADIANS = 10.0 * MOST_STEPS
 # Most zeros that a walk keeps: about a gigabyte.
 MOST_ZEROS = 30_000_000
 # Most samples of a grid.
@@ -369,10 +370,15 @@ def imaginary_zeros(
     found, steps, sign = 0, 0, 0
     omega, last_clear, step = 0.0, 0.0, omega_end
     doubtful = True
+    fastest = np.abs(phases).max() if phases.size else 0.0
     while omega < omega_end and steps <= MOST_STEPS and found <= MOST_ZEROS:
         start, reach, local, sizes = piece(polynomials, weights, sums, omega, np.inf)
         end = omega_end if polynomials[0].shape[0] > 0 else min(omega + reach, omega_end)
-        bound = curvature_bound(start, reach, local, phases)
+        only = local.copy()
+        for m in range(local.shape[1]):
+            only[0, m] = only[0, m].imag
+        far = curvature_bound(start, reach, only, phases)
+        near = curvature_from_zero(reach, local, phases) if start == 0.0 else far
         if reach == 1.0 and start == 0.0:
             # The coefficients are real or imaginary: only the latter enter the imaginary part.
             for m in range(local.shape[1]):
@@ -391,6 +397,7 @@ def imaginary_zeros(
         while omega < end and steps <= MOST_STEPS and found <= MOST_ZEROS:
             steps += 1
             step = min(2.0 * step, end - omega)
+            bound = near if fastest * (omega + step) < 1.0 else far
             curvature = real_horner(bound, (omega + step - start) / reach)
             if curvature > 0.0:
                 uncertain = real_horner(error, (omega - start) / reach)

@@ -420,6 +420,29 @@ def curvature_bound(
 
 
 @njit(cache=True)
+def curvature_from_zero(reach: float, local: ComplexArray, phases: FloatArray) -> FloatArray:
+    """Bound the second derivative of an imaginary part, in a piece that starts at omega = 0.
+
+    A polynomial in u. With c = a + j b, Im[c (exp(j x) - 1)] = a sin x + b (cos x - 1), where
+    |sin x| <= x and 1 - cos x <= x^2 / 2: next to zero, where the real part may be larger by
+    orders of magnitude, this bound vanishes with the imaginary part.
+    """
+    groups, size = local.shape
+    bound = np.zeros(size + 2)
+    for k in range(2, size):
+        bound[k - 2] += abs(local[0, k].imag) * k * (k - 1.0)
+    for g in range(1, groups):
+        turn = abs(phases[g - 1]) * reach
+        for k in range(size):
+            a, b = abs(local[g, k].real), abs(local[g, k].imag)
+            if k >= 1:
+                bound[k - 1] += a * turn * k * (k + 1.0)
+            bound[k + 1] += a * turn**3
+            bound[k] += b * turn**2 * (0.5 * k * (k - 1.0) + 2.0 * k + 1.0)
+    return bound / reach**2
+
+
+@njit(cache=True)
 def rounding_bound(
     start: float, reach: float, sizes: FloatArray, phases: FloatArray, rounding: float
 ) -> FloatArray:

@@ -150,8 +150,8 @@ def smallest_distance(
     `polynomials` are R, B1 and B2, `numerator` weights, sums and phases of N, `arms` |c1| and
     |c2|, and `dead_time` the phase rate of the dead time. Only distances below `best` are
     looked for. Returns the smallest one that was met, or `best`; where; the length of the step
-    there; and whether the walk came to its end. No distance is smaller than the result by more
-    than the share `tolerance`.
+    there; and whether the walk came to its end, which it does not if it is too long or rounding
+    hides L. No distance is smaller than the result by more than the share `tolerance`.
     """
     weights, sums, phases = numerator
     unit, nothing, none = np.eye(3), np.zeros((0, 3)), np.zeros(0)
@@ -212,8 +212,9 @@ def smallest_distance(
                     break
                 step *= 0.5
                 if step <= 1e-15 * omega or step < 1e-300:
-                    # Rounding hides more: the loop touches -1 here.
-                    return min(best, max(least / most, 0.0)), omega, step, True
+                    # Rounding hides more: the loop touches -1 here, or nothing is certain.
+                    certain = (1.0 + level) * error <= 1e-6 * most
+                    return min(best, max(least / most, 0.0)), omega, step, certain
             if here < best:
                 best, where, width = here, following, step
             omega, value, slope = following, new_value, new_slope
@@ -222,21 +223,20 @@ def smallest_distance(
 
 
 #: Places in what `free_margins_at` returns.
-MODULUS, RATIO, PHASE, DELAY, GAIN, INVERSE_GAIN = 0, 1, 2, 3, 4, 5
+MODULUS, RATIO, PHASE, DELAY = 0, 1, 2, 3
 
 
 @njit(cache=True)
 def free_margins_at(centre: complex, radius: float, omega: float) -> FloatArray:
     """Smallest margins of all L in a disc, at one frequency.
 
-    Returns the distance from -1, |1 + L| / |1 - L|, the phase in rad and the delay in s of the
-    disc's share of the unit circle, and the gain factor above one, and one over that below
-    one, of its share of the negative real axis; inf where there is no share.
+    Returns the distance from -1, |1 + L| / |1 - L|, and the phase in rad and the delay in s of
+    the disc's share of the unit circle; inf where there is no share.
     """
-    found = np.full(6, np.inf)
+    found = np.full(4, np.inf)
     modulus = abs(1.0 + centre) - radius
     if modulus <= 0.0:
-        return np.array([0.0, 0.0, 0.0, 0.0, 1.0, 1.0])
+        return np.zeros(4)
     found[MODULUS] = modulus
     # w = (1 + L) / (1 - L) takes the disc to a disc, or to the outside of one.
     below = abs(1.0 - centre) ** 2 - radius**2
@@ -254,13 +254,6 @@ def free_margins_at(centre: complex, radius: float, omega: float) -> FloatArray:
         lag = (angle - half + np.pi) % (2.0 * np.pi)
         lead = (np.pi - angle - half) % (2.0 * np.pi)
         found[PHASE], found[DELAY] = min(lag, lead), lag / omega
-    if abs(centre.imag) <= radius:
-        width = np.sqrt(radius**2 - centre.imag**2)
-        left, right = centre.real - width, centre.real + width
-        if -1.0 < left < 0.0:
-            found[GAIN] = -1.0 / left
-        if right < -1.0:
-            found[INVERSE_GAIN] = -right
     return found
 
 
@@ -281,39 +274,56 @@ def free_margins(
     `best`), and whether the walk came to its end. None is smaller than the result by more than
     the share `tolerance`.
     """
-    unit, best, where = np.eye(3), best.copy(), np.full(6, np.nan)
+    unit, best, where = np.eye(3), best.copy(), np.full(4, np.nan)
     step = omega_end
-    for _ in range(MOST_STEPS // 50):
+    for _ in range(MOST_STEPS // 8):
+        if best[MODULUS] == 0.0:
+            # Some phases take L to -1.
+            return best, where, True
         _, reach, local, _ = piece(
             polynomials, unit, np.zeros(3), omega, min(step, omega_end - omega)
         )
-        r, b1, b2, c = local[1], local[2], local[3], local[2] + local[3]
-        # What the polynomials change over the piece, relative to the start.
+        r, b, other = local[1], local[2], local[3]
+        arm, other_arm = arms[0], arms[1]
+        if abs(b[0]) < abs(other[0]):
+            b, other, arm, other_arm = other, b, other_arm, arm
         moved_r = np.abs(r[1:]).sum() / abs(r[0])
-        if moved_r < 0.5:
-            end, turn = omega + reach, delay * reach
-            centre = c[0] / r[0] * np.exp(-1j * omega * delay)
-            radius = (arms[0] * abs(b1[0]) + arms[1] * abs(b2[0])) / abs(r[0])
+        moved_b = np.abs(b[1:]).sum() / abs(b[0])
+        if max(moved_r, moved_b) < 0.5:
+            end, first = omega + reach, b[0] / r[0] * np.exp(-1j * omega * delay)
+            centre = first * (1.0 + other[0] / b[0])
+            radius = abs(first) * (arm + other_arm * abs(other[0] / b[0]))
             here = free_margins_at(centre, radius, omega)
-            for k in range(6):
+            for k in range(4):
                 if here[k] < best[k]:
                     best[k], where[k] = here[k], omega
-            wide = arms[0] * np.abs(b1).sum() + arms[1] * np.abs(b2).sum()
-            wide += np.abs(c[1:]).sum() + abs(c[0]) * min(moved_r + turn, 1.0)
-            wide /= abs(r[0]) * (1.0 - moved_r)
-            if moved_r + turn >= 1.0:
-                # The centre may have turned anywhere.
-                centre = 0j
-            wide += abs(centre) * moved_r * moved_r / (1.0 - moved_r)
-            least = free_margins_at(centre, wide, end)
+            # Over the piece L is the disc times one factor, that of the first arm without the
+            # phases, times a little more where the second arm changes otherwise.
+            apart = np.abs(other * b[0] - b * other[0]).sum() / abs(b[0]) ** 2
+            wide = radius + abs(first) * (1.0 + other_arm) * apart / (1.0 - moved_b)
+            factor = np.abs(b[1:] / b[0] - r[1:] / r[0]).sum() + delay * reach * (1.0 + moved_b)
+            factor = min(factor / (1.0 - moved_r), 0.9)
+            # With a factor f, |1 + f L| = |f| |1 / f + L|: what matters is how far f takes L,
+            # or -1 if that is less.
+            moved = factor * (abs(centre) + wide)
+            least = free_margins_at(centre, wide + min(moved, factor / (1.0 - factor)), end)
+            if moved > factor:
+                near = free_margins_at(centre, wide, end)
+                least[MODULUS] = (1.0 - factor) * near[MODULUS] - factor
+                # As |1 + L| + |1 - L| >= 2, 1 / |1 - L| is at most half of one plus the ratio.
+                more = 0.5 * factor * (1.0 + near[RATIO])
+                least[RATIO] = ((1.0 - factor) * near[RATIO] - more) / (1.0 + factor + more)
             if (least >= (1.0 - tolerance) * best).all():
                 if end >= omega_end * (1.0 - 1e-15):
                     return best, where, True
-                omega, step = end, 4.0 * reach
+                omega, step = end, 2.0 * reach
                 continue
-            if reach <= 1e-9 * omega:
-                # So close to each other the values at both ends are the same to rounding.
-                omega, step = end, 4.0 * reach
+            if reach <= 1e-12 * omega:
+                # The share of the unit circle of a small disc may begin and end within it.
+                for k in range(4):
+                    if least[k] < best[k]:
+                        best[k], where[k] = max(least[k], 0.0), omega
+                omega, step = end, 2.0 * reach
                 continue
-        step = 0.25 * reach
+        step = 0.5 * reach
     return best, where, False

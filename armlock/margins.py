@@ -62,7 +62,7 @@ class Margins:
     ----------
     gain_lower, gain_upper : float
         The loop stays stable for every gain factor between the two; 0 and inf where nothing
-        between factors of 1e-6 and 1e6 bounds it.
+        between factors of 1e-6 and 1e6 bounds it; nan where the arms' phases are free.
     phase : float
         Smallest turn in rad, lag or lead, at a gain crossover that makes the loop marginal;
         inf without a crossover.
@@ -167,8 +167,13 @@ def _smallest(
         below = abs(1.0 - response) if symmetric else 1.0
         return abs(1.0 + response) / below if below else np.inf
 
-    # Below it L is a single power of s, up to a part in ten million.
-    lowest = 1e-4 * leading_radius(loop, c1, c2)
+    # Below it L is a single power of s, up to a part in ten million; or, if it is large there
+    # and no positive power, it is large below.
+    radius = leading_radius(loop, c1, c2)
+    lowest, higher = 1e-4 * radius, 1e-2 * radius
+    size = abs(complex(loop.open_loop(1j * higher, c1, c2)))
+    if size > 1e7 and abs(complex(loop.open_loop(1j * lowest, c1, c2))) > 0.9 * size:
+        lowest = higher
     best, where = limit, np.inf
     at_lowest = distance(lowest)
     if at_lowest < best:
@@ -188,8 +193,8 @@ def _smallest(
         )
         if not complete:
             raise CountError(
-                f"no margin at (c1, c2) = ({c1}, {c2}): following L takes more than "
-                f"{contour.MOST_STEPS:.0e} steps, because gain times delay is too large",
+                f"no margin at (c1, c2) = ({c1}, {c2}): rounding hides L at {omega} rad/s, or "
+                f"following it takes more than {contour.MOST_STEPS:.0e} steps",
                 np.array([[c1, c2]]),
             )
         if found >= best:
@@ -409,9 +414,7 @@ def _ascent(rest: FloatArray, c: FloatArray, t: float, sign: float) -> FloatArra
     return np.asarray(sign * product * (-1.0) ** np.arange(product.size))
 
 
-def gain_interval(
-    loop: Loop, c1: float, c2: float, *, highest: float = np.inf
-) -> tuple[float, float, float]:
+def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float]:
     r"""Find the gain factors around one between which a stable loop stays stable.
 
     Parameters
@@ -420,8 +423,6 @@ def gain_interval(
         The loop.
     c1, c2 : float
         Multiplicative perturbations, at which the loop is stable.
-    highest : float, optional
-        Only crossings up to this angular frequency, in rad/s, are looked for.
 
     Returns
     -------
@@ -468,7 +469,7 @@ def gain_interval(
 
     def factors(low: float, high: float) -> tuple[FloatArray, FloatArray]:
         """Factors that take a root to the axis, and where."""
-        end = min(_no_crossing_from(loop, c1, c2, low, high), highest)
+        end = _no_crossing_from(loop, c1, c2, low, high)
         omega, jump = sign_changes(crossing, end)
         omega = omega[(omega > 0.0) & (jump != 0)]
         value = loop.open_loop(1j * omega, c1, c2).real
@@ -480,15 +481,16 @@ def gain_interval(
     found, _ = factors(max(floor * (1.0 + _NEXT_TO_THE_CHAIN), 1.0 / LARGEST_GAIN), 1.0)
     lower = max([floor, *found[found < 1.0]])
     upper, where = limit, (np.inf if np.isfinite(limit) else np.nan)
-    for top in 10.0 ** np.arange(1.0, math.log10(LARGEST_GAIN) + 0.5):
-        high = min(top, limit * (1.0 - _NEXT_TO_THE_CHAIN))
-        found, omega = factors(1.0, high)
+    # A walk is as long as its gain is large. What one meets by chance bounds the next.
+    most = min(LARGEST_GAIN, limit * (1.0 - _NEXT_TO_THE_CHAIN))
+    top = 1.0
+    while top < min(most, upper):
+        top = min(4.0 * top, most, upper)
+        found, omega = factors(1.0, top)
         above = np.flatnonzero((found > 1.0) & (found < upper))
         if above.size:
             best = above[np.argmin(found[above])]
             upper, where = float(found[best]), float(omega[best])
-        if upper <= top:
-            break
     if lower < 1.0 / LARGEST_GAIN:
         lower = 0.0
     if upper > LARGEST_GAIN:
@@ -497,12 +499,13 @@ def gain_interval(
 
 
 def _free_margins(
-    loop: Loop, c1: float, c2: float, lowest: float
+    loop: Loop, c1: float, c2: float, lowest: float, known: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Margins over all phases of the two arms, from a frequency on, and where they are met.
 
-    In the order of `armlock.infimum.free_margins_at`. A coarse sample gives values that occur.
-    The certified walk then steps over what cannot hold smaller ones.
+    In the order of `armlock.infimum.free_margins_at`; only those below `known` are looked for.
+    A coarse sample gives values that occur. The certified walk then steps over what cannot hold
+    smaller ones.
     """
     c = _plus(loop.b1, loop.b2)
     arms = np.array([abs(c1), abs(c2)])
@@ -510,9 +513,8 @@ def _free_margins(
     if radius >= abs(1.0 + centre):
         raise _unconfined(c1, c2)
     limit = infimum.free_margins_at(complex(centre), radius, np.inf)
-    # Past it no gain factor up to the largest one takes L to -1, and nothing has a phase.
-    largest = np.array([1.0, *arms]) * LARGEST_GAIN
-    end = last_larger(loop.rest, (c, loop.b1, loop.b2), largest)
+    # Past it nothing has a phase.
+    end = last_larger(loop.rest, (c, loop.b1, loop.b2), np.array([1.0, *arms]))
     if not np.isfinite(end):
         end = _settled_from(loop)
     for symmetric in (False, True):
@@ -520,23 +522,23 @@ def _free_margins(
         end = max(end, _clear_from(loop, c1, c2, *infimum.excluded_disc(level, symmetric)))
     end = max(end, 2.0 * lowest)
 
-    def at(u: float) -> FloatArray:
-        omega = math.exp(u)
-        first, second = (complex(k) for k in loop.arm_responses(1j * omega))
-        spread = abs(c1 * first) + abs(c2 * second)
-        found: FloatArray = infimum.free_margins_at(first + second, spread, omega)
-        return found
+    def at(u: npt.ArrayLike) -> FloatArray:
+        omega = np.exp(np.atleast_1d(np.asarray(u, dtype=float)))
+        first, second = loop.arm_responses(1j * omega)
+        spread = abs(c1) * np.abs(first) + abs(c2) * np.abs(second)
+        discs = zip(first + second, spread, omega, strict=True)
+        return np.array([infimum.free_margins_at(*disc) for disc in discs])
 
-    u = np.linspace(math.log(lowest), math.log(end), 400)
-    sampled = np.array([at(value) for value in u])
-    best, where = limit.copy(), np.full(limit.size, np.inf)
+    u = np.linspace(math.log(lowest), math.log(end), 200)
+    sampled = at(u)
+    best, where = np.minimum(limit, known), np.full(limit.size, np.inf)
     for k in range(best.size):
         nearest = int(np.argmin(sampled[:, k]))
         if not sampled[nearest, k] < best[k]:
             continue
         best[k], where[k] = sampled[nearest, k], math.exp(u[nearest])
         sides = u[max(nearest - 1, 0)], u[min(nearest + 1, u.size - 1)]
-        found = minimize_scalar(lambda v, k=k: at(v)[k], bounds=sides, method="bounded")
+        found = minimize_scalar(lambda v, k=k: at(v)[0, k], bounds=sides, method="bounded")
         if found.fun < best[k]:
             best[k], where[k] = float(found.fun), math.exp(float(found.x))
     smaller, places, complete = infimum.free_margins(
@@ -592,8 +594,9 @@ def margins(
         \left| L - K e^{-s\delta} (m_1 + m_2) \right|
         \le |K| \left( |c_1 m_1| + |c_2 m_2| \right) .
 
-    The distances of this disc from -1, and of its share of the unit circle and of the real
-    axis, are known in closed form at each frequency. A disc that holds -1 has margins of zero.
+    The distances from -1 of this disc, and of its share of the unit circle, are known in closed
+    form at each frequency. A disc that holds -1 has margins of zero. A gain interval is not
+    given: the edge of such a disc may run along the real axis.
     With equal weights m and c1 = c2 = 1 the disc is that around K m exp(-s delay) times two
     whose edge runs through the origin: it stays clear of -1, for arms of any lengths, where
     Re [K m exp(-s delay)] > -1/4.
@@ -612,17 +615,17 @@ def margins(
     modulus, modulus_omega = _smallest(loop, c1, c2, symmetric=False, highest=highest)
     ratio, _ = _smallest(loop, c1, c2, symmetric=True, highest=highest)
     phase, delay, phase_omega = _phase_and_delay(loop, c1, c2, highest)
-    lower, upper, gain_omega = gain_interval(loop, c1, c2, highest=highest)
-    if free_above is not None:
-        free, where = _free_margins(loop, c1, c2, highest)
+    if free_above is None:
+        lower, upper, gain_omega = gain_interval(loop, c1, c2)
+    else:
+        lower, upper, gain_omega = np.nan, np.nan, np.nan
+        known = np.array([modulus, ratio, phase, delay])
+        free, where = _free_margins(loop, c1, c2, highest, known)
         if free[infimum.MODULUS] < modulus:
             modulus, modulus_omega = free[infimum.MODULUS], where[infimum.MODULUS]
         if free[infimum.PHASE] < phase:
             phase, phase_omega = free[infimum.PHASE], where[infimum.PHASE]
-        if free[infimum.GAIN] < upper:
-            upper, gain_omega = free[infimum.GAIN], where[infimum.GAIN]
         ratio, delay = min(ratio, free[infimum.RATIO]), min(delay, free[infimum.DELAY])
-        lower = max(lower, 1.0 / free[infimum.INVERSE_GAIN])
     numbers = lower, upper, phase, delay, modulus, 2.0 * ratio
     places = gain_omega, phase_omega, modulus_omega
     return Margins(*(float(value) for value in (*numbers, *places)))

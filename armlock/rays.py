@@ -7,9 +7,10 @@ crossings of a whole ray are the zeros of Im(D0 conj(M)): one certified walk fin
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+import math
+from collections.abc import Iterator
 from itertools import pairwise
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -21,13 +22,10 @@ from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import ComplexArray, FloatArray, IntArray, axis, positive_number
 from armlock.stability import UNCONFINED, CountError, sign_changes, unstable_roots
 
-_Point = TypeVar("_Point")
-_Result = TypeVar("_Result", bound=tuple[Any, ...])
-
 #: Parameters this many times the length of the start and the direction are not looked at.
 FARTHEST = 1e9
-# Each further walk along a ray is so many times as long as the one before.
-_LONGER = 16.0
+# Each further walk along a ray goes so many times as far up in frequency.
+_LONGER = 4.0
 # Next to the limit of the neutral root chain, roots cross at ever higher frequency. They are
 # followed up to so many turns of the longest delay, about a tenth of a second.
 _TURNS_NEXT_TO_THE_CHAIN = 50_000
@@ -181,19 +179,20 @@ class Ray:
     def reaches(self, stop: float, chain: float) -> Iterator[float]:
         """Yield growing t up to `stop`, or ever closer to the limit of the chain."""
         # The boundary of a map ends at one frequency: a single walk sees all of it.
-        t, far = (
-            1e-4 * min(stop, self.scale),
-            0.0 if self.system.step else min(stop, 0.5 * chain),
-        )
+        t = 1e-4 * min(stop, self.scale)
+        far = 0.0 if self.system.step else min(stop, 0.5 * chain)
         while t < far:
             yield t
             # A near crossing is found at low frequency: go no further than that takes.
-            here, low, high = self.end(t), t, min(_LONGER * t, far)
-            limit = _LONGER * max(here, 1.0 / max(self.system.longest_delay, 1e-12))
-            while self.end(high) > limit and high - low > 1e-9 * high:
-                middle = 0.5 * (low + high)
+            lowest = 1.0 / max(self.system.longest_delay, 1e-12)
+            limit = _LONGER * max(self.end(t), lowest)
+            if self.end(far) <= limit:
+                break
+            low, high = t, far
+            while high > 1.1 * low:
+                middle = math.sqrt(low * high)
                 low, high = (middle, high) if self.end(middle) <= limit else (low, middle)
-            t = low if self.end(low) > 2.0 * here else max(high, _LONGER * t)
+            t = high
         if stop < chain:
             yield stop
         else:
@@ -376,69 +375,10 @@ def first_break(
     return found
 
 
-def sweep(
-    result: Callable[[_Point], _Result],
-    points: Iterable[_Point],
-    *,
-    mapper: Callable[[Callable[[_Point], _Result], Iterable[_Point]], Iterable[_Result]] = map,
-) -> _Result:
-    """Evaluate a function at many points and gather its results field by field.
-
-    Parameters
-    ----------
-    result : callable
-        A plain function of one point that returns a named tuple of numbers.
-    points : iterable
-        Its arguments: gains, corner frequencies, pairs of either.
-    mapper : callable, optional
-        Applies a function to every point, in order, as the built-in `map` does. A pool's or
-        an engine's map spreads a long sweep over processes or machines; `result` must then be
-        a function that can be pickled.
-
-        A pool of processes is made with the start method "spawn" or "forkserver": the threads
-        of a process do not survive a fork.
-
-    Returns
-    -------
-    named tuple
-        Of the same kind, each field an array over the points.
-
-    Raises
-    ------
-    ValueError
-        If there are no points.
-
-    Examples
-    --------
-    >>> from armlock import CommonArm
-    >>> from armlock.rays import first_crossing, sweep
-    >>> def upper_edge(gain):
-    ...     return first_crossing(CommonArm(gain), (0.0, 0.0), (1.0, 1.0), stop=3.0)
-    >>> sweep(upper_edge, [1.0, 10.0]).position
-    array([1., 1.])
-
-    Over two processes. They import what they call, so that it stands in a module: here in
-    this one. In a script the pool stands under `if __name__ == "__main__":`.
-
-    >>> from functools import partial
-    >>> from multiprocessing import get_context
-    >>> edge = partial(first_crossing, start=(0.0, 0.0), direction=(1.0, 1.0), stop=3.0)
-    >>> with get_context("spawn").Pool(2) as pool:
-    ...     found = sweep(edge, [CommonArm(1.0), CommonArm(10.0)], mapper=pool.map)
-    >>> found.position
-    array([1., 1.])
-    """
-    found = list(mapper(result, points))
-    if not found:
-        raise ValueError("points must not be empty")
-    return type(found[0])(*(np.array(column) for column in zip(*found, strict=True)))
-
-
 __all__ = [
     "Crossing",
     "Crossings",
     "first_break",
     "first_crossing",
     "ray_crossings",
-    "sweep",
 ]

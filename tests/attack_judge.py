@@ -5,8 +5,8 @@ is enclosed: L(m + t) = L0 + L1 t + e with |e| <= R for |t| <= h. The remainder 
 second derivative of log K (a sum over zeros and poles, each bounded by its distance less h)
 and of the exponentials (delay squared). A second enclosure leaves the phases of both arms
 free: a disc, which needs no resolution of the delays. A cell is left out only if one of the two
-shows that nothing on it can be below the smallest value found so far, less a part in 1e7;
-every other one is cut in four. So the smallest value found is the infimum to 1e-7, whatever
+shows that nothing on it can be below the smallest value found so far, less a part in 1e6;
+every other one is cut in eight. So the smallest value found is the infimum to 1e-6, whatever
 the function does between samples. Past the highest corner a disc bounds all that follows.
 Rounding is not enclosed: it is some 1e-13 of the terms.
 """
@@ -17,8 +17,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-TOL = 1e-7
-MOST_CELLS = 120_000
+TOL = 1e-6
+MOST_CELLS = 40_000
 # Cells that are looked at together.
 CHUNK = 20_000
 GAINS = 1e6
@@ -252,7 +252,7 @@ class View:
         return edges[:-1], edges[1:]
 
 
-def cut(a, b, parts=4):
+def cut(a, b, parts=8):
     share = np.arange(parts + 1) / parts
     edges = a[:, None] + (b - a)[:, None] * share
     edges[:, -1] = b

@@ -1,7 +1,15 @@
 import numpy as np
 import pytest
+from numpy.polynomial.polynomial import polyval
 
-from armlock import CommonArm, contour, stability_chart, unstable_roots
+from armlock import (
+    CommonArm,
+    contour,
+    exponentials,
+    paper_loop,
+    stability_chart,
+    unstable_roots,
+)
 from armlock.bounds import last_frequency
 from tests import independent
 from tests.systems import NEUTRAL, RETARDED
@@ -86,3 +94,44 @@ def test_both_walks_agree_at_the_end_of_every_row():
     assert chart.recounted_rows.size == 0
     ends = unstable_roots(CommonArm(gain=10.0), np.array([-3.0, 3.0]), chart.y[:, None])
     np.testing.assert_array_equal(chart.counts[:, [0, -1]], ends)
+
+
+@pytest.mark.parametrize("number", [2, 12, 40])
+def test_a_piece_reaches_as_far_as_equal_roots_allow(number):
+    # Of n roots at distance d, n reach / (reach + d) counts: 1.5 at reach = 1.5 d / (n - 1.5).
+    roots, starts = np.full(number, -3.0 + 0j), np.array([0, number])
+    expected = 1.5 * 5.0 / (number - 1.5)
+    assert exponentials._reach(roots, starts, 4.0, np.inf) == pytest.approx(expected, rel=1e-2)
+    # Another polynomial's roots do not count.
+    both = np.concatenate((roots, roots)), np.array([0, number, 2 * number])
+    assert exponentials._reach(*both, 4.0, np.inf) == pytest.approx(expected, rel=1e-2)
+
+
+def test_the_last_frequency_is_close_to_where_one_term_outgrows_the_others():
+    loop = paper_loop(actuator=True, delay=2e-5)
+    omega = np.geomspace(1.0, 1e6, 200_001)
+    sizes = [abs(polyval(1j * omega, p)) for p in (loop.a, loop.c, loop.b1, loop.b2)]
+    below = omega[sizes[0] <= sizes[1] + sizes[2] + sizes[3]].max()
+    assert below <= last_frequency(loop, 1.0, 1.0) <= 1.1 * below
+
+
+def test_a_walk_leaves_a_zero_of_high_order_at_once(monkeypatch):
+    # Im f = omega^5 (cos omega - 2) beside Re f = omega^2: next to zero only the former counts.
+    whole = np.zeros((2, 6), dtype=complex)
+    whole[0, 2], whole[1, 5] = 1.0, 1.0j
+    polynomials = whole, np.zeros(0, dtype=complex), np.zeros(1, dtype=np.int64), np.zeros(0)
+    weights, phases = np.array([[0.0, 0.5], [0.0, 0.5]]), np.array([1.0, -1.0])
+    function = weights, np.array([1.0, -1.0]), phases
+    nothing = np.zeros((0, 2)), np.zeros(2), np.zeros(0)
+    steps = []
+
+    def counted(*at):
+        steps.append(at)
+        return exponentials.evaluate(*at)
+
+    inner = contour.imaginary_zeros.py_func
+    monkeypatch.setitem(inner.__globals__, "evaluate", counted)
+    zeros, complete = inner(polynomials, function, nothing, 50.0, False, exponentials.ROUNDING)
+    assert complete
+    assert zeros[:, contour.OMEGA].tolist() == [0.0]
+    assert len(steps) < 500

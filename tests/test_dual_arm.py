@@ -16,7 +16,7 @@ from armlock import (
     unstable_roots,
 )
 from armlock.paper import DUAL_SENSOR_CORNER
-from armlock.rays import first_crossing, ray_crossings, sweep
+from armlock.rays import first_crossing, ray_crossings
 from armlock.sensors import COMMON
 from book.companion.claims import dual_arm
 from tests.independent import generator_eigenvalues, rectangle_count, spectral_count
@@ -118,20 +118,3 @@ def test_a_crossing_before_the_chain_is_lost_is_found():
     loop = paper_loop()
     found = first_crossing(loop, (1.0, 1.0), (1.0, 0.0), 1.0)
     assert found.position == pytest.approx(critical_perturbation(loop, (1.0, 0.0)), rel=1e-9)
-
-
-def test_sweep_gathers_fields_and_uses_the_map_it_is_given():
-    seen = []
-
-    def backwards(function, points):
-        seen.extend(points)
-        return [function(point) for point in points]
-
-    gains = [1.0, 10.0]
-    found = sweep(dual_arm.edges, gains, mapper=backwards)
-    assert seen == gains
-    assert isinstance(found, dual_arm.Edges)
-    np.testing.assert_array_equal(found.gain, gains)
-    assert np.asarray(found.corner)[1] == dual_arm.edges(10.0).corner
-    with pytest.raises(ValueError, match=r"^points must not be empty"):
-        sweep(dual_arm.edges, [])

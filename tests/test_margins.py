@@ -450,3 +450,25 @@ def test_unity_gain_far_above_the_delays_is_no_reason_to_refuse():
     # Certified by branch and bound on an even grid of 4e7 cells.
     loop = Loop(((), (0.0,), np.pi * 14.7e3), COMMON, 33.6, 33.1)
     assert modulus_margin(loop, 0.999, 0.999) == pytest.approx(0.044711663436, rel=1e-6)
+
+
+@pytest.mark.parametrize("lowest", [1e-2, 1.0])
+def test_free_phases_of_a_common_arm_have_margins_in_closed_form(lowest):
+    # L fills a disc around -j a of radius c a, with a = 2 gain / omega: it comes closest to -1
+    # at a = c / sqrt(1 - c^2), and its share of the unit circle at a = 1 / sqrt(1 - c^2).
+    c = 0.999
+    nearest = np.sqrt(1.0 - c * c)
+    loop = Loop(((), (0.0,), np.pi * 14.7e3), COMMON, 33.6, 33.1)
+    found = margins(loop, c, c, lowest)
+    assert found.modulus == pytest.approx(nearest, rel=1e-5)
+    assert found.phase == pytest.approx(np.arcsin(nearest), rel=1e-5)
+    assert found.modulus_omega == pytest.approx(2.0 * np.pi * 14.7e3 * nearest / c, rel=1e-2)
+    assert np.isnan([found.gain_lower, found.gain_upper, found.gain_omega]).all()
+
+
+def test_a_dead_time_with_free_phases_takes_the_phase_it_should():
+    # With c = 0 the disc is the point K exp(-s delay): phase and delay margin are textbook's.
+    loop = Loop(((), (0.0,), 3.0), SINGLE, 2.0, 1.0, delay=0.1)
+    found = margins(loop, 0.0, 0.0, 0.01)
+    assert found.phase == pytest.approx(0.5 * np.pi - 0.3, rel=1e-5)
+    assert found.delay == pytest.approx((0.5 * np.pi - 0.3) / 3.0, rel=1e-5)
