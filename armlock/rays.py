@@ -164,8 +164,10 @@ class Ray:
             return Crossings(np.empty(0), np.empty(0), np.empty(0, dtype=np.int64))
         omega, change = sign_changes(self.family, end, is_map=self.system.step > 0.0)
         omega, change = omega[change != 0], change[change != 0]
-        # Only those in reach are worth polishing.
-        rough = self.quotient(omega).real
+        # Only those in reach are worth polishing. Where M vanishes the quotient is not real: a
+        # root is there at infinite t only.
+        q = self.quotient(omega)
+        rough = np.where(np.abs(q.imag) <= np.abs(q.real) + self.scale, q.real, np.inf)
         near = (rough > lowest) & (rough <= stop * (1.0 + 1e-6))
         if first and near.any():
             near &= rough <= rough[near].min() * (1.0 + 1e-6)

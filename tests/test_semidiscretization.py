@@ -15,6 +15,7 @@ from armlock import (
     transition_matrix,
     unstable_roots,
 )
+from armlock.rays import first_crossing
 from tests import independent
 
 OSCILLATOR = CharacteristicFunction([2.0, 0.3, 1.0], [1.0], [0.0, 1.0], 1.0, 2.5)
@@ -174,3 +175,11 @@ def test_a_dead_time_is_a_further_delay_of_the_map(order):
     assert fine == pytest.approx(exact, rel=1e-2 if order == 0 else 1e-5)
     with pytest.raises(ValueError, match=r"^step must divide every delay, .* for delay=0.5"):
         semi_discretization(loop, 0.2)
+
+
+def test_a_frequency_at_which_the_direction_has_no_effect_is_no_crossing():
+    """Along (1, -1) the delayed terms cancel at z = -1, where D is real."""
+    system = semi_discretization(CommonArm(gain=1.0), 0.1)
+    edge = first_crossing(system, (0.0, 0.0), (1.0, -1.0), stop=10.0).position
+    around = edge * np.array([1.0 - 1e-9, 1.0 + 1e-9])
+    assert unstable_roots(system, around, -around).tolist() == [0, 2]
