@@ -70,7 +70,8 @@ def flight_loop(
     if abs(half) >= mean:
         raise ValueError(f"half_difference must be below mean_delay ({mean}), got {half}")
     mapping = modified_dual(mean, half, corner)
-    return Loop(_HALF * white_paper(g2), mapping, mean + half, mean - half, delay)
+    controller = _HALF * white_paper(positive_number("g2", g2))
+    return Loop(controller, mapping, mean + half, mean - half, delay)
 
 
 class Published(NamedTuple):

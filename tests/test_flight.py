@@ -127,7 +127,7 @@ def test_bad_parallel_branches_are_refused():
         ({"half_difference": 33.6}, "half_difference must be below mean_delay"),
         ({"delay": -1e-6}, "delay must not be negative"),
         ({"corner": 0.0}, "corner must be positive"),
-        ({"g2": -1.0}, "gain must be positive"),
+        ({"g2": -1.0}, "g2 must be positive"),
     ],
 )
 def test_bad_arguments_are_refused(arguments, message):

@@ -149,7 +149,7 @@ def phase_margins() -> Finding:
         here,
         f"phase margin in degrees at the crossing of {null:.4f} Hz, beside the null where both "
         "arms are in phase again",
-        f"It is {low:.1f} degrees at the lower unity gain. At the null it is {here:.2f}, and "
+        f"It is {low:.1f} degrees at the lower unity gain, but {here:.2f} at the null, and "
         f"{late:.2f} with the dead time. From 10 Hz up the smallest over all phases of both "
         f"arms is {free:.1f} degrees, dead time included, as a sample of frequencies has it. "
         "E(s) is not printed: with a corner of 0.8 instead of 0.4 Hz the margin at the null is "
