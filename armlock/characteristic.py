@@ -332,7 +332,7 @@ class CharacteristicFunction:
 
         .. math::
 
-            \frac{\partial D}{\partial s} &= R' + e^{-s\delta} \sum_k \left[
+            \frac{\partial D}{\partial s} = R' + e^{-s\delta} \sum_k \left[
             \left( B_k' - \delta B_k \right) \left( x_{0k} - x_k\, e^{-s\theta_k} \right)
             + x_k\, \theta_k B_k e^{-s\theta_k} \right]
 

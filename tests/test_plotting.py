@@ -155,7 +155,7 @@ def test_the_data_of_a_chart_are_its_counts_at_its_points(chart):
 def test_long_curves_are_thinned_for_the_table(ax):
     ax.plot(np.arange(100_000.0), np.arange(100_000.0))
     sizes = {column.size for column in figures.drawn(ax.figure).values()}
-    assert max(sizes) <= 1500
+    assert max(sizes) <= 1000
 
 
 def test_a_drawing_has_no_data(ax, tmp_path, monkeypatch):

@@ -48,7 +48,8 @@ RAW = r"""() => {
   const skip = 'script, style, noscript, pre, code, mjx-container, .math-raw-allowed, svg';
   const marks = [/\\[()\[\]]/, /\\(begin|frac|mathrm|omega|tau|left|right|cdot|sqrt|text)\b/,
                  /\$[^$\n]*[\\^_][^$\n]*\$/, /\{[a-z:]+\}`/];
-  const found = [...document.querySelectorAll('mjx-merror')].map(e => 'formula: ' + e.title);
+  const found = [...document.querySelectorAll('mjx-merror')].map(
+    e => 'formula: ' + e.getAttribute('data-mjx-error'));
   const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   while (walker.nextNode()) {
     const text = walker.currentNode.textContent;

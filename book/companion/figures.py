@@ -25,8 +25,8 @@ from PIL import Image
 from armlock.plotting import BLUE
 
 # Longer curves are thinned for the tables, and charts along both axes.
-_MOST_POINTS = 1500
-_MOST_CELLS = 60
+_MOST_POINTS = 1000
+_MOST_CELLS = 50
 
 
 def _plain(label: str) -> str:
@@ -55,7 +55,9 @@ def drawn(figure: Figure) -> dict[str, npt.NDArray[np.float64]]:
     panels = [ax for ax in figure.axes if ax.axison and ax.get_label() != "<colorbar>"]
     for letter, ax in zip(ascii_lowercase, panels, strict=False):
         panel = f"{letter}: " if len(panels) > 1 else ""
-        across, up = _plain(ax.get_xlabel()) or "x", _plain(ax.get_ylabel()) or "y"
+        below = [other.get_xlabel() for other in ax.get_shared_x_axes().get_siblings(ax)]
+        across = _plain(ax.get_xlabel() or max(below)) or "x"
+        up = _plain(ax.get_ylabel()) or "y"
         shared = np.empty(0)
         for number, artist in enumerate([*ax.lines, *ax.collections], 1):
             if artist.get_transform() != ax.transData:
@@ -89,7 +91,7 @@ def drawn(figure: Figure) -> dict[str, npt.NDArray[np.float64]]:
             y = low + (high - low) * (rows + 0.5) / values.shape[0]
             places = np.meshgrid(x, y)
             columns[f"{panel}chart, {across}"], columns[f"{panel}chart, {up}"] = places
-            columns[f"{panel}chart, colour"] = values[np.ix_(rows, cells)]
+            columns[f"{panel}chart, colour [1]"] = values[np.ix_(rows, cells)]
     return {name: np.ravel(column) for name, column in columns.items()}
 
 
@@ -157,7 +159,7 @@ def publish(figure: Figure, name: str, **numbers: float) -> Downloads:
         with stem.with_suffix(".csv").open("w", newline="") as stream:
             table = csv.writer(stream, lineterminator="\n")
             table.writerow(columns)
-            written = ([f"{value:.12g}" for value in column] for column in columns.values())
+            written = ([f"{value:.9g}" for value in column] for column in columns.values())
             table.writerows(zip_longest(*written, fillvalue=""))
     # A palette of 128 colours is all a figure needs, at a third of the size.
     pixels = io.BytesIO()
