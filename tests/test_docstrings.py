@@ -6,6 +6,7 @@ import pkgutil
 import re
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import pytest
 
 import armlock
@@ -19,6 +20,8 @@ MODULES = [
 
 @pytest.mark.parametrize("name", MODULES)
 def test_every_example_of_a_docstring_gives_what_it_shows(name):
+    # An example draws in the current axes, which must not be those of another.
+    plt.close("all")
     failures, _ = doctest.testmod(importlib.import_module(name))
     assert failures == 0
 
