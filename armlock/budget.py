@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from armlock.checks import FloatArray, axis, broadcast_shape, real_array
+from armlock.checks import FloatArray, axis, broadcast_shape, positive_array, real_array
 from armlock.loops import Loop
 from armlock.transfer import transfer
 
@@ -180,9 +180,7 @@ def noise_budget(
     >>> print(f"{found.total[0]:.0f} Hz/sqrt(Hz), {found.factor[0]:.1f} times below")
     113 Hz/sqrt(Hz), 5.3 times below
     """
-    f = axis("frequency", frequency)
-    if (f <= 0.0).any():
-        raise ValueError(f"frequency must be positive, got {f.min()} among its values")
+    f = axis("frequency", positive_array("frequency", frequency))
     if isinstance(laser, str):
         if laser not in LASERS:
             raise ValueError(f"laser must be one of {', '.join(LASERS)}; got {laser!r}")

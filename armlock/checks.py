@@ -62,6 +62,14 @@ def real_array(name: str, value: object) -> FloatArray:
     return _real_array(name, value).copy()
 
 
+def positive_array(name: str, value: object) -> FloatArray:
+    """Return a copy of `value` as a finite float array above zero, of any shape, or raise."""
+    array = real_array(name, value)
+    if (array <= 0.0).any():
+        raise ValueError(f"{name} must be positive, got {array.min()} among its values")
+    return array
+
+
 def complex_array(name: str, value: object) -> ComplexArray:
     """Return `value` as a finite complex array of any shape, or raise."""
     array = _array(name, value)

@@ -21,9 +21,10 @@ from armlock.bounds import last_frequency, last_larger
 from armlock.checks import (
     ComplexArray,
     FloatArray,
+    axis,
     check_memory,
+    positive_array,
     positive_number,
-    real_array,
     real_number,
 )
 from armlock.exponentials import ExponentialSum
@@ -167,11 +168,7 @@ def frequency_response(
     import control
 
     checked_loop(loop)
-    omega = np.atleast_1d(real_array("omega", omega))
-    if omega.ndim != 1:
-        raise ValueError(f"omega must be one-dimensional, got shape {omega.shape}")
-    if (omega <= 0.0).any():
-        raise ValueError(f"omega must be positive, got {omega.min()} among its values")
+    omega = axis("omega", np.atleast_1d(positive_array("omega", omega)))
     response = loop.open_loop(1j * omega, real_number("c1", c1), real_number("c2", c2))
     return control.frd(response, omega, name=type(loop).__name__)
 

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import AAA
 
-from armlock.checks import ComplexArray, FloatArray, axis, real_array
+from armlock.checks import ComplexArray, FloatArray, axis, positive_array
 from armlock.loops import Loop, checked_loop
 from armlock.transfer import transfer
 
@@ -83,18 +83,17 @@ def pulling(
     0.074 MHz
     """
     checked_loop(loop)
-    t = real_array("time", time)
-    if (t <= 0.0).any():
-        raise ValueError(f"time must be positive, got {t.min()} among its values")
+    t = positive_array("time", time)
     if method not in ("roots", "laplace"):
         raise ValueError(f"method must be 'roots' or 'laplace', got {method!r}")
     errors = [_error("common", common), _error("differential", differential)]
     if method == "laplace":
         return _inverted(loop, t, errors)
+    roots = slow_roots(loop)
     total = np.zeros(t.shape)
     for source, error in zip(("common", "differential"), errors, strict=True):
         if error.any():
-            total += _residues(loop, t, source, error)
+            total += _residues(loop, roots, t, source, error)
     return total
 
 
@@ -128,7 +127,7 @@ def slow_roots(loop: Loop) -> ComplexArray:
     fitted = AAA(s, transfer(loop, "laser", s), rtol=1e-11, max_terms=60).poles()
     slow = fitted[(np.abs(fitted) < 5.0 / tau) & (np.abs(fitted) > 1e-7 / tau)]
     lines = 2j * np.pi / tau * np.arange(0.75, _LINES, 0.25)
-    found, last_step, _ = _newton(loop, np.concatenate((slow, lines)))
+    found, last_step = _newton(loop, np.concatenate((slow, lines)))
     found = found[(last_step < 1e-9) & (found.real < 0.0) & (np.abs(found) > 1e-7 / tau)]
     found = np.where(np.abs(found.imag) < 1e-9 * np.abs(found), found.real, found)
     found = found.real + 1j * np.abs(found.imag)
@@ -139,17 +138,21 @@ def slow_roots(loop: Loop) -> ComplexArray:
     return np.array(kept, dtype=np.complex128)
 
 
-def _newton(loop: Loop, s: ComplexArray) -> tuple[ComplexArray, FloatArray, ComplexArray]:
-    """Follow 1 + L to zeros; return them, the last steps' relative lengths, and dL/ds."""
+def _slope(loop: Loop, s: ComplexArray) -> ComplexArray:
+    """Return dL/ds as a central difference."""
+    near = 1e-5 * np.minimum(np.abs(s), 1.0 / max(loop.tau1, loop.tau2))
+    return (_open_loop(loop, s + near) - _open_loop(loop, s - near)) / (2.0 * near)
+
+
+def _newton(loop: Loop, s: ComplexArray) -> tuple[ComplexArray, FloatArray]:
+    """Follow 1 + L to zeros; return them, and the last steps' relative lengths."""
     tau = max(loop.tau1, loop.tau2)
     with np.errstate(all="ignore"):
         for _ in range(50):
-            near = 1e-5 * np.minimum(np.abs(s), 1.0 / tau)
-            slope = (_open_loop(loop, s + near) - _open_loop(loop, s - near)) / (2.0 * near)
-            step = (1.0 + _open_loop(loop, s)) / slope
+            step = (1.0 + _open_loop(loop, s)) / _slope(loop, s)
             longest = 0.05 * np.minimum(np.abs(s), 1.0 / tau)
             s = s - step * np.minimum(1.0, longest / np.abs(step))
-    return s, np.abs(step / s), slope
+    return s, np.abs(step / s)
 
 
 def _open_loop(loop: Loop, s: ComplexArray) -> ComplexArray:
@@ -165,13 +168,13 @@ def _input(error: FloatArray, s: Any) -> Any:
     return error[0] / s + error[1] / s**2 + error[2] / s**3
 
 
-def _residues(loop: Loop, t: FloatArray, source: str, error: FloatArray) -> FloatArray:
+def _residues(
+    loop: Loop, roots: ComplexArray, t: FloatArray, source: str, error: FloatArray
+) -> FloatArray:
     """Add up the residues of Y(s) nu(s) exp(s t) at s = 0 and at the loop's own roots."""
-    roots = slow_roots(loop)
-    _, _, slope = _newton(loop, roots)
     first, second = loop.arm_responses(roots)
     over = 0.5 * (first + second if source == "common" else first - second)
-    residue = -over / slope * _input(error, roots)
+    residue = -over / _slope(loop, roots) * _input(error, roots)
     # Laurent coefficients at s = 0, inside of the smallest root.
     radius = 0.3 * float(np.abs(roots).min(initial=1e-3 / max(loop.tau1, loop.tau2)))
     circle = radius * np.exp(2j * np.pi * (np.arange(_CIRCLE) + 0.5) / _CIRCLE)

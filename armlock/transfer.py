@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from armlock.checks import ComplexArray, real_array
+from armlock.checks import ComplexArray, axis, positive_array
 from armlock.loops import Loop, checked_loop
 
 if TYPE_CHECKING:
@@ -120,9 +120,7 @@ def closed_loop(
     import control
 
     checked_loop(loop)
-    omega = np.atleast_1d(real_array("omega", omega))
-    if omega.ndim != 1 or (omega <= 0.0).any():
-        raise ValueError(f"omega must be positive and one-dimensional, got {omega}")
+    omega = axis("omega", np.atleast_1d(positive_array("omega", omega)))
     responses = [transfer(loop, source, 1j * omega, c1, c2) for source in INPUTS]
     return control.frd(
         np.array([responses]), omega, inputs=list(INPUTS), outputs=["locked laser"]
