@@ -17,7 +17,7 @@ from numpy.polynomial import polynomial as poly
 from scipy.optimize import brentq, minimize_scalar
 
 from armlock import contour, infimum
-from armlock.bounds import last_larger, last_root_bound
+from armlock.bounds import last_larger
 from armlock.checks import FloatArray, axis, positive_number, real_number
 from armlock.loops import Loop, checked_loop
 from armlock.nyquist import leading_radius, loop_numerator
@@ -37,6 +37,10 @@ LARGEST_GAIN = 1e6
 _SETTLED = 1e-3
 # Share of its limits up to which the neutral root chain lets gain factors be looked at.
 _NEXT_TO_THE_CHAIN = 1e-4
+# Turns of the longest delay that a walk along the axis takes at once, for a range of gain
+# factors; unless the range, as the logarithm of a ratio, is already as short as this.
+_MOST_TURNS = 1e6
+_SHORTEST_RANGE = 1e-3
 # Crossovers that are polished: those with the smallest margins.
 _POLISHED = 8
 
@@ -389,29 +393,61 @@ def _chain_gains(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
     return lower, min((k for k in limits if k > 1.0), default=np.inf)
 
 
-def _no_crossing_from(loop: Loop, c1: float, c2: float, low: float, high: float) -> float:
-    r"""Frequency past which no gain factor from `low` to `high` takes a root across the axis.
+def _gains_between(
+    loop: Loop, c1: float, c2: float, low: float, high: float, most_turns: float
+) -> tuple[FloatArray, FloatArray] | None:
+    """Find the gain factors from `low` to `high` that take a root to the axis, and where.
 
-    With t = 1 / k from 1 / high to 1 / low, and S = |c1 B1| + |c2 B2|, the square of
-    |t R + C| - S must stay positive. \|t R + C\|^2 is convex in t. If it ascends at the lower
-    end of the interval, it is smallest there; if it descends at the upper end, there.
+    Only where L, with free phases of the arms, may meet -1 / high to -1 / low is it followed;
+    not at all, and None is returned, if that is more than `most_turns` of the longest delay.
     """
-    c = _plus(loop.b1, loop.b2)
-    arms = np.array([abs(c1), abs(c2)])
-    found = [last_larger(loop.rest, (c, loop.b1, loop.b2), np.array([high, *(high * arms)]))]
-    if not loop.delay:
-        for t, sign in ((1.0 / high, 1.0), (1.0 / low, -1.0)):
-            ascends = math.sqrt(last_root_bound(_ascent(loop.rest, c, t, sign)))
-            first = _plus(t * loop.rest, c)
-            found.append(max(ascends, last_larger(first, (loop.b1, loop.b2), arms)))
-    return min(found)
+    numerator, rest = loop_numerator(loop, c1, c2), loop.rest_on_boundary()
+    disc = -0.5 * (1.0 / low + 1.0 / high), 0.5 * (1.0 / low - 1.0 / high)
+    intervals = infimum.meeting_intervals(
+        rest.compiled(),
+        np.array([abs(c1), abs(c2)]),
+        np.array([-loop.delay]),
+        disc,
+        _clear_from(loop, c1, c2, *disc),
+        loop.longest_delay,
+    )
+    if np.diff(intervals).sum() * loop.longest_delay > 2.0 * np.pi * most_turns:
+        return None
+    crossing = numerator.times_conjugate(rest)
+    found = [np.empty(0)]
+    for start, end in intervals:
+        omega, jump = sign_changes(crossing, float(end), start=float(start))
+        found.append(omega[(omega > 0.0) & (jump != 0)])
+    omega = np.concatenate(found)
+    with np.errstate(divide="ignore"):
+        factor = -1.0 / loop.open_loop(1j * omega, c1, c2).real
+    kept = (factor >= low) & (factor <= high)
+    return factor[kept], omega[kept]
 
 
-def _ascent(rest: FloatArray, c: FloatArray, t: float, sign: float) -> FloatArray:
-    """Half the slope of |t R + C|^2 in t, times a sign, as a polynomial in omega^2."""
-    whole = _plus(t * rest, c)
-    product = np.convolve(whole, rest * (-1.0) ** np.arange(rest.size))[::2]
-    return np.asarray(sign * product * (-1.0) ** np.arange(product.size))
+def _nearest_gain(loop: Loop, c1: float, c2: float, last: float) -> tuple[float, float]:
+    """Find the gain factor next to one, on the side of `last`, that takes a root to the axis.
+
+    Returns `last` and nan if there is none up to it.
+    """
+    near, step = 1.0, math.log(4.0)
+    way = 1.0 if last > 1.0 else -1.0
+    while near != last:
+        far = near * math.exp(way * step)
+        if (last - far) * way <= 0.0:
+            far = last
+        # Where too much of the axis is to be followed, a shorter range of factors needs less.
+        most = _MOST_TURNS if step > _SHORTEST_RANGE else np.inf
+        found = _gains_between(loop, c1, c2, min(near, far), max(near, far), most)
+        if found is None:
+            step *= 0.5
+            continue
+        factor, omega = found
+        if factor.size:
+            nearest = int(np.argmin(np.abs(factor - 1.0)))
+            return float(factor[nearest]), float(omega[nearest])
+        near, step = far, min(2.0 * step, math.log(4.0))
+    return last, np.nan
 
 
 def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float]:
@@ -460,42 +496,24 @@ def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float
     checked_loop(loop)
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
     _require_stable(loop, c1, c2)
-    numerator, rest = loop_numerator(loop, c1, c2), loop.rest_on_boundary()
-    crossing = numerator.times_conjugate(rest)
     floor, limit = _chain_gains(loop, c1, c2)
+    # Just inside the limits of the chain, roots cross at ever higher frequency.
+    least = max(floor * (1.0 + _NEXT_TO_THE_CHAIN), 1.0 / LARGEST_GAIN)
+    most = min(limit * (1.0 - _NEXT_TO_THE_CHAIN), LARGEST_GAIN)
+    lower, _ = _nearest_gain(loop, c1, c2, least) if least < 1.0 else (least, np.nan)
+    upper, where = _nearest_gain(loop, c1, c2, most) if most > 1.0 else (most, np.nan)
+    if lower == least:
+        lower = floor if floor >= 1.0 / LARGEST_GAIN else 0.0
+    if upper == most:
+        upper, where = (limit, np.inf) if limit <= LARGEST_GAIN else (np.inf, np.nan)
     # A real root crosses at s = 0.
     start, first = float(loop.b1[0] * (1.0 - c1) + loop.b2[0] * (1.0 - c2)), float(loop.rest[0])
-    at_zero = [-first / start] if start * first < 0.0 else []
-
-    def factors(low: float, high: float) -> tuple[FloatArray, FloatArray]:
-        """Factors that take a root to the axis, and where."""
-        end = _no_crossing_from(loop, c1, c2, low, high)
-        omega, jump = sign_changes(crossing, end)
-        omega = omega[(omega > 0.0) & (jump != 0)]
-        value = loop.open_loop(1j * omega, c1, c2).real
-        negative = value < 0.0
-        found = np.concatenate((at_zero, -1.0 / value[negative]))
-        return found, np.concatenate((np.zeros(len(at_zero)), omega[negative]))
-
-    # Just inside the limits of the chain, roots cross at ever higher frequency.
-    found, _ = factors(max(floor * (1.0 + _NEXT_TO_THE_CHAIN), 1.0 / LARGEST_GAIN), 1.0)
-    lower = max([floor, *found[found < 1.0]])
-    upper, where = limit, (np.inf if np.isfinite(limit) else np.nan)
-    # A walk is as long as its gain is large. What one meets by chance bounds the next.
-    most = min(LARGEST_GAIN, limit * (1.0 - _NEXT_TO_THE_CHAIN))
-    top = 1.0
-    while top < min(most, upper):
-        top = min(4.0 * top, most, upper)
-        found, omega = factors(1.0, top)
-        above = np.flatnonzero((found > 1.0) & (found < upper))
-        if above.size:
-            best = above[np.argmin(found[above])]
-            upper, where = float(found[best]), float(omega[best])
-    if lower < 1.0 / LARGEST_GAIN:
-        lower = 0.0
-    if upper > LARGEST_GAIN:
-        upper, where = np.inf, np.nan
-    return float(lower), float(upper), float(where)
+    if start * first < 0.0:
+        at_zero = -first / start
+        lower = max(lower, at_zero) if at_zero < 1.0 else lower
+        if 1.0 < at_zero < upper:
+            upper, where = at_zero, 0.0
+    return lower, upper, where
 
 
 def _free_margins(
@@ -517,19 +535,22 @@ def _free_margins(
     end = last_larger(loop.rest, (c, loop.b1, loop.b2), np.array([1.0, *arms]))
     if not np.isfinite(end):
         end = _settled_from(loop)
-    for symmetric in (False, True):
-        level = min(_limit(loop, c1, c2, symmetric), 1.0) * (1.0 - TOLERANCE)
-        end = max(end, _clear_from(loop, c1, c2, *infimum.excluded_disc(level, symmetric)))
     end = max(end, 2.0 * lowest)
+
+    found = loop.polynomials()
+    roots = [p.roots for p in found]
+    factors = (
+        np.concatenate(roots),
+        np.cumsum([0, *(p.size for p in roots)]),
+        np.array([p.coefficients[-1] for p in found]),
+    )
 
     def at(u: npt.ArrayLike) -> FloatArray:
         omega = np.exp(np.atleast_1d(np.asarray(u, dtype=float)))
-        first, second = loop.arm_responses(1j * omega)
-        spread = abs(c1) * np.abs(first) + abs(c2) * np.abs(second)
-        discs = zip(first + second, spread, omega, strict=True)
-        return np.array([infimum.free_margins_at(*disc) for disc in discs])
+        return np.asarray(infimum.free_margins_over(factors, arms, loop.delay, omega))
 
-    u = np.linspace(math.log(lowest), math.log(end), 200)
+    # The smallest distances may lie past the last crossover, where L turns most.
+    u = np.linspace(math.log(lowest), math.log(10.0 * end), 300)
     sampled = at(u)
     best, where = np.minimum(limit, known), np.full(limit.size, np.inf)
     for k in range(best.size):
@@ -538,11 +559,15 @@ def _free_margins(
             continue
         best[k], where[k] = sampled[nearest, k], math.exp(u[nearest])
         sides = u[max(nearest - 1, 0)], u[min(nearest + 1, u.size - 1)]
-        found = minimize_scalar(lambda v, k=k: at(v)[0, k], bounds=sides, method="bounded")
-        if found.fun < best[k]:
-            best[k], where[k] = float(found.fun), math.exp(float(found.x))
+        lower = minimize_scalar(lambda v, k=k: at(v)[0, k], bounds=sides, method="bounded")
+        if lower.fun < best[k]:
+            best[k], where[k] = float(lower.fun), math.exp(float(lower.x))
+    # Past it L stays clear of where smaller values would be.
+    for k, symmetric in ((infimum.MODULUS, False), (infimum.RATIO, True)):
+        level = best[k] * (1.0 - TOLERANCE)
+        end = max(end, _clear_from(loop, c1, c2, *infimum.excluded_disc(level, symmetric)))
     smaller, places, complete = infimum.free_margins(
-        loop.rest_on_boundary().compiled(), arms, loop.delay, lowest, end, best, 1e-5
+        factors, arms, loop.delay, lowest, end, best, 1e-5
     )
     if not complete:
         raise CountError(

@@ -33,7 +33,7 @@ from armlock.checks import (
     broadcast_pair,
     check_memory,
 )
-from armlock.exponentials import ROUNDING, ExponentialSum
+from armlock.exponentials import ROUNDING, ExponentialSum, without_unused
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -132,9 +132,9 @@ def _roots_of_a(system: CharacteristicFunction) -> ComplexArray:
 
 
 def sign_changes(
-    whole: ExponentialSum, end: float, *, is_map: bool = False
+    whole: ExponentialSum, end: float, *, start: float = 0.0, is_map: bool = False
 ) -> tuple[FloatArray, IntArray]:
-    """Zeros in [0, end] of the imaginary part of an exponential sum, and their jumps.
+    """Zeros in [start, end] of the imaginary part of an exponential sum, and their jumps.
 
     As `armlock.contour.imaginary_zeros`: the jump is 0 where rounding hides whether there is
     one.
@@ -146,10 +146,11 @@ def sign_changes(
     """
     if not np.isfinite(end):
         raise CountError(f"no crossings up to omega = {end}: a number overflows", _NO_POINTS)
+    (whole,) = without_unused(whole)
     function = whole.weights, whole.sums, whole.phases
     nothing = np.zeros((0, whole.sums.size)), np.zeros(whole.sums.size), np.zeros(0)
     zeros, complete = contour.imaginary_zeros(
-        whole.compiled(), function, nothing, end, is_map, ROUNDING
+        whole.compiled(), function, nothing, start, end, is_map, ROUNDING
     )
     if not complete:
         raise CountError(
@@ -426,9 +427,11 @@ def _walk(
     x0, y0 = system.reference
     # Where all exponentials are one, N = A + C - y B2 is R + x0 B1 at y = y0, exactly.
     at_reference = system.rest_on_boundary().sums + x0 * b1.sums
-    fixed = constant._replace(sums=at_reference).times_conjugate(b1)
-    varying = b2.times_conjugate(b1)
-    square = b1.times_conjugate(b1)
+    fixed, varying, square = without_unused(
+        constant._replace(sums=at_reference).times_conjugate(b1),
+        b2.times_conjugate(b1),
+        b1.times_conjugate(b1),
+    )
     # Both over the exponentials of both, so that they add with a weight.
     whole = fixed.plus(varying.scaled(0.0))
     apart = fixed.scaled(0.0).plus(varying)
