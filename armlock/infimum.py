@@ -20,6 +20,7 @@ from numba import njit
 from armlock.checks import ComplexArray, FloatArray
 from armlock.contour import MOST_STEPS
 from armlock.exponentials import (
+    EPSILON,
     ROUNDING,
     curvature_bound,
     evaluate,
@@ -224,27 +225,71 @@ def smallest_distance(
 
 
 @njit(cache=True)
+def _turned(
+    local: ComplexArray,
+    start: float,
+    reach: float,
+    dead_time: FloatArray,
+    point: float,
+    sign: float,
+) -> bool:
+    """Whether sign Re(M - point) > 0 over a piece, for the centre M of the disc of L.
+
+    With `local` rows R, B1 and B2, M is (B1 + B2) exp(-s delay) / R. Multiplied by |R|^2 it is
+    a polynomial, up to the second order of what the dead time turns over the piece.
+    """
+    below, size = local[1], local.shape[1]
+    turn = 1j * dead_time[0] * reach
+    centre = (local[2] + local[3]) * np.exp(1j * dead_time[0] * start)
+    left = 0.5 * np.abs(centre).sum() * abs(turn) ** 2
+    above = np.zeros(size + 1, dtype=np.complex128)
+    above[:size] = centre - point * below
+    above[1:] += turn * centre
+    product = np.zeros(2 * size)
+    for k in range(size + 1):
+        for m in range(size):
+            product[k + m] += sign * (above[k] * below[m].conjugate()).real
+    left += 64.0 * EPSILON * np.abs(above).sum()
+    left = left * np.abs(below).sum() + np.abs(product[2:]).sum()
+    return bool(min(product[0], product[0] + product[1]) > left)
+
+
+@njit(cache=True)
 def meeting_intervals(
     polynomials: tuple[Any, ...],
     arms: FloatArray,
     dead_time: FloatArray,
-    disc: tuple[float, float],
+    near: float,
+    far: float,
     omega_end: float,
     longest_delay: float,
 ) -> FloatArray:
-    """Intervals of [0, omega_end], shape (n, 2), outside which L stays clear of a disc.
+    """Intervals of [0, omega_end], shape (n, 2), outside which L meets no point of a segment.
 
     `polynomials` are R, B1 and B2, `arms` |c1| and |c2|, and `dead_time` the phase rate of the
-    dead time. The disc, of centre and radius, is clear of L whatever the phases of the arms.
+    dead time. The segment is that from `far` to `near` on the negative real axis; L, with any
+    phases of its arms, fills a disc. This is clear of the segment if it is clear of the
+    disc around it, or of the end that is nearest to its centre.
     """
+    around = 0.5 * (near + far), 0.5 * (near - far)
     found = np.empty((64, 2))
     unit, number, omega = np.eye(3), 0, 0.0
     longest = np.inf
     while omega < omega_end:
-        shortest = max(_TURNS * 2.0 * np.pi / longest_delay, 0.01 * omega)
+        shortest = max(_TURNS * 2.0 * np.pi / longest_delay, 3e-3 * omega)
         longest = max(min(longest, omega_end), shortest)
         start, reach, local, sizes = piece(polynomials, unit, np.zeros(3), omega, longest)
-        clear = _clear(local, sizes, start, reach, arms, dead_time, disc)
+        clear = (
+            _clear(local, sizes, start, reach, arms, dead_time, around)
+            or (
+                _turned(local, start, reach, dead_time, near, 1.0)
+                and _clear(local, sizes, start, reach, arms, dead_time, (near, 0.0))
+            )
+            or (
+                _turned(local, start, reach, dead_time, far, -1.0)
+                and _clear(local, sizes, start, reach, arms, dead_time, (far, 0.0))
+            )
+        )
         if not clear and reach > 1.01 * shortest:
             longest = 0.25 * reach
             continue

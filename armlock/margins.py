@@ -17,7 +17,7 @@ from numpy.polynomial import polynomial as poly
 from scipy.optimize import brentq, minimize_scalar
 
 from armlock import contour, infimum
-from armlock.bounds import last_larger
+from armlock.bounds import last_larger, last_root_bound
 from armlock.checks import FloatArray, axis, positive_number, real_number
 from armlock.loops import Loop, checked_loop
 from armlock.nyquist import leading_radius, loop_numerator
@@ -37,9 +37,11 @@ LARGEST_GAIN = 1e6
 _SETTLED = 1e-3
 # Share of its limits up to which the neutral root chain lets gain factors be looked at.
 _NEXT_TO_THE_CHAIN = 1e-4
-# Turns of the longest delay that a walk along the axis takes at once, for a range of gain
-# factors; unless the range, as the logarithm of a ratio, is already as short as this.
+# Turns of the longest delay that a walk along the axis can take at once, for a range of gain
+# factors, and how many are no reason to look for a shorter range.
 _MOST_TURNS = 1e6
+_FEW_TURNS = 1e4
+# The shortest such range, as the logarithm of a ratio.
 _SHORTEST_RANGE = 1e-3
 # Crossovers that are polished: those with the smallest margins.
 _POLISHED = 8
@@ -129,6 +131,15 @@ def _limit(loop: Loop, c1: float, c2: float, symmetric: bool) -> float:
     return min(abs(1.0 + point) / abs(1.0 - point) for point in ends)
 
 
+def _arm_weights(loop: Loop, c1: float, c2: float) -> FloatArray:
+    """Return |c1| and |c2|; arms of the same delay and response count together, as one."""
+    if loop.tau1 == loop.tau2 and loop.b1.any():
+        ratio = float(loop.b2[-1] / loop.b1[-1])
+        if np.array_equal(loop.b2, ratio * loop.b1):
+            return np.array([abs(c1 + c2 * ratio), 0.0])
+    return np.array([abs(c1), abs(c2)])
+
+
 def _clear_from(loop: Loop, c1: float, c2: float, centre: float, radius: float) -> float:
     """Frequency past which L stays outside a disc around a negative centre; inf if it does not.
 
@@ -136,7 +147,7 @@ def _clear_from(loop: Loop, c1: float, c2: float, centre: float, radius: float) 
     turns, and stands on the other side.
     """
     c = _plus(loop.b1, loop.b2)
-    factors = [radius, abs(c1), abs(c2), 0.0]
+    factors = [radius, *_arm_weights(loop, c1, c2), 0.0]
     first = -centre * loop.rest
     if loop.delay:
         factors[3] = 1.0
@@ -186,7 +197,7 @@ def _smallest(
         found, omega, width, complete = infimum.smallest_distance(
             numerator.compiled(),
             (numerator.weights, numerator.sums, numerator.phases),
-            np.array([abs(c1), abs(c2)]),
+            _arm_weights(loop, c1, c2),
             np.array([-loop.delay]),
             symmetric,
             lowest,
@@ -306,7 +317,9 @@ def _phase_and_delay(
     """
     phase, delay, where = np.inf, np.inf, np.nan
     c = _plus(loop.b1, loop.b2)
-    end = last_larger(loop.rest, (c, loop.b1, loop.b2), np.array([1.0, abs(c1), abs(c2)]))
+    end = last_larger(
+        loop.rest, (c, loop.b1, loop.b2), np.array([1.0, *_arm_weights(loop, c1, c2)])
+    )
     if not np.isfinite(end) and np.isfinite(highest):
         end = highest
     elif not np.isfinite(end):
@@ -393,60 +406,91 @@ def _chain_gains(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
     return lower, min((k for k in limits if k > 1.0), default=np.inf)
 
 
-def _gains_between(
-    loop: Loop, c1: float, c2: float, low: float, high: float, most_turns: float
-) -> tuple[FloatArray, FloatArray] | None:
-    """Find the gain factors from `low` to `high` that take a root to the axis, and where.
+def _no_crossing_from(loop: Loop, c1: float, c2: float, low: float, high: float) -> float:
+    r"""Frequency past which no gain factor from `low` to `high` takes a root across the axis.
 
-    Only where L, with free phases of the arms, may meet -1 / high to -1 / low is it followed;
-    not at all, and None is returned, if that is more than `most_turns` of the longest delay.
+    With t = 1 / k from 1 / high to 1 / low, and S = |c1 B1| + |c2 B2|, the square of
+    |t R + C| - S must stay positive. \|t R + C\|^2 is convex in t. If it ascends at the lower
+    end of the interval, it is smallest there; if it descends at the upper end, there.
     """
-    numerator, rest = loop_numerator(loop, c1, c2), loop.rest_on_boundary()
-    disc = -0.5 * (1.0 / low + 1.0 / high), 0.5 * (1.0 / low - 1.0 / high)
-    intervals = infimum.meeting_intervals(
-        rest.compiled(),
-        np.array([abs(c1), abs(c2)]),
-        np.array([-loop.delay]),
-        disc,
-        _clear_from(loop, c1, c2, *disc),
-        loop.longest_delay,
-    )
-    if np.diff(intervals).sum() * loop.longest_delay > 2.0 * np.pi * most_turns:
-        return None
-    crossing = numerator.times_conjugate(rest)
-    found = [np.empty(0)]
-    for start, end in intervals:
-        omega, jump = sign_changes(crossing, float(end), start=float(start))
-        found.append(omega[(omega > 0.0) & (jump != 0)])
-    omega = np.concatenate(found)
-    with np.errstate(divide="ignore"):
-        factor = -1.0 / loop.open_loop(1j * omega, c1, c2).real
-    kept = (factor >= low) & (factor <= high)
-    return factor[kept], omega[kept]
+    c, arms = _plus(loop.b1, loop.b2), _arm_weights(loop, c1, c2)
+    found = [last_larger(loop.rest, (c, loop.b1, loop.b2), np.array([high, *(high * arms)]))]
+    if not loop.delay:
+        for t, sign in ((1.0 / high, 1.0), (1.0 / low, -1.0)):
+            ascends = math.sqrt(last_root_bound(_ascent(loop.rest, c, t, sign)))
+            first = _plus(t * loop.rest, c)
+            found.append(max(ascends, last_larger(first, (loop.b1, loop.b2), arms)))
+    return min(found)
+
+
+def _ascent(rest: FloatArray, c: FloatArray, t: float, sign: float) -> FloatArray:
+    """Half the slope of |t R + C|^2 in t, times a sign, as a polynomial in omega^2."""
+    whole = _plus(t * rest, c)
+    product = np.convolve(whole, rest * (-1.0) ** np.arange(rest.size))[::2]
+    return np.asarray(sign * product * (-1.0) ** np.arange(product.size))
+
+
+def _range_of_gains(
+    loop: Loop, c1: float, c2: float, near: float, last: float
+) -> tuple[float, FloatArray]:
+    """Choose a range of gain factors from `near` towards `last`, and where to look for them.
+
+    Returns the end of the range, and the intervals of the axis where L, with free phases of the
+    arms, may meet what the range takes to -1. A shorter range needs less of the axis. Chosen is
+    the one that needs least for its length, among those that can be followed.
+    """
+    step, rest = math.log(4.0), loop.rest_on_boundary().compiled()
+    arms, dead_time = _arm_weights(loop, c1, c2), np.array([-loop.delay])
+    least, chosen = (True, np.inf), (last, np.empty((0, 2)))
+    while step > _SHORTEST_RANGE:
+        far = near * math.exp(math.copysign(step, last - near))
+        if (last - far) * (last - near) <= 0.0:
+            far = last
+        ends = -1.0 / min(near, far), -1.0 / max(near, far)
+        around = 0.5 * (ends[0] + ends[1]), 0.5 * (ends[1] - ends[0])
+        # Past it L is too small, or stays clear of the disc around all that is looked for.
+        end = _no_crossing_from(loop, c1, c2, min(near, far), max(near, far))
+        end = min(end, _clear_from(loop, c1, c2, *around))
+        if not np.isfinite(end):
+            step *= 0.5
+            continue
+        intervals = infimum.meeting_intervals(
+            rest, arms, dead_time, ends[1], ends[0], end, loop.longest_delay
+        )
+        turns = float(np.diff(intervals).sum()) * loop.longest_delay / (2.0 * np.pi)
+        cost = turns > _MOST_TURNS, turns / abs(math.log(far / near))
+        if cost < least:
+            least, chosen = cost, (far, intervals)
+        elif not least[0]:
+            break
+        if turns <= _FEW_TURNS:
+            break
+        step *= 0.5
+    return chosen
 
 
 def _nearest_gain(loop: Loop, c1: float, c2: float, last: float) -> tuple[float, float]:
     """Find the gain factor next to one, on the side of `last`, that takes a root to the axis.
 
-    Returns `last` and nan if there is none up to it.
+    Returns it, and at which frequency; `last` and nan if there is none up to it.
     """
-    near, step = 1.0, math.log(4.0)
-    way = 1.0 if last > 1.0 else -1.0
+    crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
+    near = 1.0
     while near != last:
-        far = near * math.exp(way * step)
-        if (last - far) * way <= 0.0:
-            far = last
-        # Where too much of the axis is to be followed, a shorter range of factors needs less.
-        most = _MOST_TURNS if step > _SHORTEST_RANGE else np.inf
-        found = _gains_between(loop, c1, c2, min(near, far), max(near, far), most)
-        if found is None:
-            step *= 0.5
-            continue
-        factor, omega = found
-        if factor.size:
+        far, intervals = _range_of_gains(loop, c1, c2, near, last)
+        found = [np.empty(0)]
+        for start, end in intervals:
+            omega, jump = sign_changes(crossing, float(end), start=float(start))
+            found.append(omega[(omega > 0.0) & (jump != 0)])
+        omega = np.concatenate(found)
+        with np.errstate(divide="ignore"):
+            factor = -1.0 / loop.open_loop(1j * omega, c1, c2).real
+        between = (factor >= min(near, far)) & (factor <= max(near, far))
+        if between.any():
+            factor, omega = factor[between], omega[between]
             nearest = int(np.argmin(np.abs(factor - 1.0)))
             return float(factor[nearest]), float(omega[nearest])
-        near, step = far, min(2.0 * step, math.log(4.0))
+        near = far
     return last, np.nan
 
 
