@@ -401,7 +401,7 @@ def free_margins(
     omega: float,
     omega_end: float,
     best: FloatArray,
-    tolerance: float,
+    tolerance: FloatArray,
 ) -> tuple[FloatArray, FloatArray, bool]:
     """Smallest margins of the disc that L fills with free phases, from omega to `omega_end`.
 
@@ -409,7 +409,7 @@ def free_margins(
     the highest coefficients. `arms` are the sizes of c1 and c2. `best` holds values that are
     known to occur, or inf. Returns the smallest values, where they were met (nan for those of
     `best`), and whether the walk came to its end. None is smaller than the result by more than
-    the share `tolerance`.
+    its share `tolerance`.
     """
     best, where = best.copy(), np.full(4, np.nan)
     step = omega_end

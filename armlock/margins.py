@@ -30,6 +30,9 @@ from armlock.stability import (
 
 #: Relative accuracy of the certificate for modulus and disk margins.
 TOLERANCE = 1e-6
+# The same with free phases, in the order of `armlock.infimum.free_margins_at`. The disk margin
+# may be flat over decades of frequency, where a finer one would take too long.
+_FREE_TOLERANCES = np.array([1e-5, 1e-4, 1e-5, 1e-5])
 #: Gain factors up to this, and down to one over it, are looked at.
 LARGEST_GAIN = 1e6
 # Share of their limits within which the disc of a neutral loop must have come for its
@@ -611,7 +614,7 @@ def _free_margins(
         level = best[k] * (1.0 - TOLERANCE)
         end = max(end, _clear_from(loop, c1, c2, *infimum.excluded_disc(level, symmetric)))
     smaller, places, complete = infimum.free_margins(
-        factors, arms, loop.delay, lowest, end, best, 1e-5
+        factors, arms, loop.delay, lowest, end, best, _FREE_TOLERANCES
     )
     if not complete:
         raise CountError(
@@ -664,7 +667,8 @@ def margins(
         \le |K| \left( |c_1 m_1| + |c_2 m_2| \right) .
 
     The distances from -1 of this disc, and of its share of the unit circle, are known in closed
-    form at each frequency. A disc that holds -1 has margins of zero. A gain interval is not
+    form at each frequency; their minima over frequency are certified to 1e-5, the disk margin
+    to 1e-4. A disc that holds -1 has margins of zero. A gain interval is not
     given: the edge of such a disc may run along the real axis.
     With equal weights m and c1 = c2 = 1 the disc is that around K m exp(-s delay) times two
     whose edge runs through the origin: it stays clear of -1, for arms of any lengths, where
