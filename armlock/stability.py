@@ -201,7 +201,10 @@ def unstable_roots(
     int array, of the broadcast shape
         Number of unstable roots, multiplicity included. The point is stable, with all roots
         in the open left half-plane, where it is 0. `BOUNDARY` (-1) where a root lies on the
-        imaginary axis, or nearer to it than rounding can tell. `UNCONFINED` (-2) where the
+        imaginary axis, or nearer to it than rounding can tell. That of the phase omega tau is
+        the largest: a point within some 8 EPSILON omega tau of the boundary, relative to its
+        parameters, may be given as -1 (3e-10 where a root crosses at 1e4 rad/s, with 20 s).
+        `UNCONFINED` (-2) where the
         neutral root chain is not confined to the left half-plane
         (`CharacteristicFunction.chain_reserve` is not positive): at the latest after an
         arbitrarily small change of the delays it reaches the right half-plane, and no finite
