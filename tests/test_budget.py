@@ -10,14 +10,18 @@ from armlock import (
     Controller,
     Loop,
     SingleArm,
+    amplitude_spectrum,
     closed_loop,
     flight_loop,
     noise_budget,
     pulling,
+    sampled_open_loop,
+    simulate,
     transfer,
 )
-from armlock.budget import MOTION_CORNER, tdi_capability
+from armlock.budget import MOTION_CORNER, SOURCES, noise_series, tdi_capability
 from armlock.sensors import SINGLE
+from book.companion.claims import flight
 
 FLIGHT = flight_loop()
 DAY = 86400.0
@@ -91,6 +95,31 @@ def test_the_budget_is_held_against_a_requirement_and_draws_itself():
 def test_bad_budgets_are_refused(arguments, message):
     with pytest.raises(ValueError, match=message):
         noise_budget(FLIGHT, **{"frequency": [0.1, 0.2], **arguments})
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_the_simulation_driven_by_a_source_has_its_density(source):
+    locked = simulate(FLIGHT, noise_series(FLIGHT, source, 1_500_000, seed=1))
+    found = amplitude_spectrum(locked[400_000:], 200.0).within(0.0, 1.4)
+    expected = found.expected(flight.density(source))
+    assert np.mean((found.lower < expected) & (expected < found.upper)) > 0.8
+    spread = np.log(found.asd / expected) * np.sqrt(2.0 * found.degrees)
+    assert np.abs(spread).max() < 4.5
+    assert abs(spread.mean()) < 0.6
+
+
+def test_samples_and_dead_time_hardly_change_the_loop_below_the_first_null():
+    f = np.concatenate((np.geomspace(1e-4, 1.4, 2000), np.arange(0.01, 1.4, 1e-4)))
+    sampled = 1.0 / (1.0 + sampled_open_loop(FLIGHT, 2.0 * np.pi * f))
+    late = transfer(flight.DELAYED, "laser", 2j * np.pi * f)
+    for other, most in ((sampled, 1.3e-4), (late, 2e-6)):
+        change = np.abs(other / transfer(FLIGHT, "laser", 2j * np.pi * f)) - 1.0
+        assert np.abs(change).max() < most
+
+
+def test_a_series_of_no_known_source_is_refused():
+    with pytest.raises(ValueError, match="source must be one of laser, shot, clock, motion"):
+        noise_series(FLIGHT, "maser", 10, seed=1)
 
 
 @pytest.mark.parametrize("error", [(1.0, 0.0, 0.0), (0.0, 1e-3, 0.0), (0.0, 0.0, 1e-8)])

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache, partial
 
 import numpy as np
 from scipy.optimize import brentq
 
-from armlock.budget import NoiseBudget, noise_budget
+from armlock.budget import FREE_RUNNING, NoiseBudget, noise_budget
 from armlock.checks import FloatArray
 from armlock.flight import flight_loop
 from armlock.infimum import MODULUS, PHASE, free_margins_at
 from armlock.loops import Loop, SingleArm
+from armlock.noise import LaserNoise
 from armlock.pulling import pulling
 from armlock.sensors import modified_dual
 from armlock.stability import unstable_roots
@@ -85,6 +87,20 @@ def budget(laser: str = "free-running") -> NoiseBudget:
     """Return the noise budget from 0.1 mHz to 2 Hz, with many points to an echo."""
     low, high = np.geomspace(1e-4, 0.03, 500), np.arange(0.03, 2.0, 1.0 / 33.6 / 60.0)
     return noise_budget(LOOP, np.concatenate((low, high)), laser=laser)
+
+
+def density(source: str) -> Callable[[FloatArray], FloatArray]:
+    """Return the density of one source at the locked laser as a function of frequency in Hz.
+
+    As `Spectrum.expected` takes it: from zero on, where the drawn noise of the laser is flat.
+    """
+
+    def asd(frequency: FloatArray) -> FloatArray:
+        f = np.maximum(frequency.ravel(), 1e-9)
+        found = noise_budget(LOOP, f, laser=LaserNoise(seed=0, level=FREE_RUNNING).asd(f))
+        return found.sources[source].reshape(frequency.shape)
+
+    return asd
 
 
 @cache
