@@ -85,7 +85,7 @@ def test_the_budget_is_held_against_a_requirement_and_draws_itself():
     [
         ({"frequency": [0.0, 1.0]}, "frequency must be positive"),
         ({"frequency": [[1.0]]}, "frequency must be one-dimensional"),
-        ({"laser": "maser"}, "laser must be one of free-running, cavity"),
+        ({"laser": "maser"}, "laser must be one of free-running, Mach-Zehnder, cavity"),
         ({"laser": [1.0, 2.0, 3.0]}, "laser and frequency must broadcast together"),
         ({"laser": -1.0}, "laser must not be negative"),
         ({"requirement": [1.0, 2.0, 3.0]}, "requirement and frequency must broadcast together"),
