@@ -387,7 +387,7 @@ def equal_arms() -> Finding:
         minutes,
         "minutes for which clocks, motion and shot noise exceed the capability at 3 mHz",
         f"That is below 2 Δτ = {2e6 * half:.0f} µs, which passes at {rate:.1e} s/s, the "
-        "largest difference of the Doppler shifts; at half that rate it takes twice as long. The "
-        "clocks make the noise, in inverse proportion to the mismatch. Near 1 Hz the laser's "
-        "own lines exceed the capability at far larger mismatches (claim W6).",
+        "largest difference of the Doppler shifts; at half that rate it takes twice as long. "
+        "The clocks make the noise, in inverse proportion to the mismatch. Near 1 Hz the "
+        "laser's own lines exceed the capability at far larger mismatches (claim W6).",
     )
