@@ -24,7 +24,7 @@ from armlock.checks import (
 from armlock.controllers import Controller
 from armlock.loops import Loop, checked_loop
 from armlock.noise import LaserNoise, ShapedNoise
-from armlock.transfer import transfer
+from armlock.transfer import responses
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -221,9 +221,8 @@ def noise_budget(
             raise ValueError(f"laser must be one of {', '.join(LASERS)}; got {laser!r}")
         laser = LASERS[laser](f)
     omega = 2.0 * np.pi * f
-    suppression, first, second = (
-        transfer(loop, source, 1j * omega) for source in ("laser", "arm 1", "arm 2")
-    )
+    found = responses(loop, 1j * omega)
+    first, second = found["arm 1"], found["arm 2"]
     both = np.abs([first, second])
     # From cycles to Hz: times 2 pi f.
     shot = omega * SHOT_NOISE * np.sqrt(2.0) * np.hypot(*both)
@@ -236,7 +235,7 @@ def noise_budget(
         + second * (1.0 + np.exp(-1j * omega * loop.tau2))
     )
     sources: dict[str, Any] = {
-        "laser": np.abs(suppression) * _densities("laser", laser, f),
+        "laser": np.abs(found["laser"]) * _densities("laser", laser, f),
         "shot": shot,
         "clock": clock * np.hypot(own, far),
         "motion": moving * np.hypot(here, 2.0 * np.hypot(*both)),
