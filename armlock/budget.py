@@ -16,7 +16,6 @@ import numpy.typing as npt
 from armlock.checks import (
     FloatArray,
     axis,
-    broadcast_shape,
     positive_array,
     real_array,
     whole_number,
@@ -151,8 +150,11 @@ class NoiseBudget:
 def _densities(name: str, value: npt.ArrayLike, frequency: FloatArray) -> FloatArray:
     """Return densities at the frequencies, or raise."""
     asd = real_array(name, value)
-    if broadcast_shape((name, "frequency"), (asd, frequency)) != frequency.shape:
-        raise ValueError(f"{name} must hold a value a frequency, got shape {asd.shape}")
+    if asd.shape not in ((), frequency.shape):
+        raise ValueError(
+            f"{name} must be one number or hold one a frequency, {frequency.size} of them; got "
+            f"shape {asd.shape}"
+        )
     if (asd < 0.0).any():
         raise ValueError(f"{name} must not be negative, got {asd.min()} among its values")
     return np.asarray(np.broadcast_to(asd, frequency.shape))
@@ -277,7 +279,9 @@ def noise_series(
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no `Loop`, there is no such source, or a number is out of range.
+        If `loop` is no `Loop`, there is no such source, a number is out of range, an open-loop
+        pole lies at s = 0 or right of it, or the open loop does not roll off, which shot noise
+        needs. The laser's noise asks nothing of the loop.
 
     Notes
     -----
@@ -300,6 +304,11 @@ def noise_series(
         laser = LaserNoise(streams[0], sample_rate, level=FREE_RUNNING, at_rest=True)
         return laser.draw(count)
     rest, *arms = loop.polynomials()
+    if (rest.roots.real >= 0.0).any():
+        raise ValueError(
+            f"loop must have no open-loop pole at s = 0 or right of it, or {source} noise that "
+            f"has gone through it grows without end; got {rest.roots.real.max()} rad/s"
+        )
     total = np.zeros(count)
     for b, tau, beat, own in zip(
         arms, (loop.tau1, loop.tau2), BEAT_NOTES, streams[1:], strict=True

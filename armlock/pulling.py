@@ -69,8 +69,8 @@ def pulling(
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no `Loop`, a time is not positive, an error does not hold three finite
-        numbers, or there is no such method.
+        If `loop` is no `Loop` or unstable, a time is not positive, an error does not hold
+        three finite numbers, or there is no such method.
 
     Notes
     -----
@@ -90,6 +90,9 @@ def pulling(
     t = positive_array("time", time)
     if method not in ("roots", "laplace"):
         raise ValueError(f"method must be 'roots' or 'laplace', got {method!r}")
+    unstable = int(unstable_roots(loop, 1.0, 1.0))
+    if unstable > 0:
+        raise ValueError(f"loop must be stable at c1 = c2 = 1, got {unstable} unstable roots")
     errors = [_error("common", common), _error("differential", differential)]
     if method == "laplace":
         return _inverted(loop, t, errors)

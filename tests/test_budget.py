@@ -23,7 +23,7 @@ from armlock import (
 )
 from armlock.budget import MOTION_CORNER, SOURCES, noise_series, tdi_capability
 from armlock.pulling import _complete_up_to, slow_roots
-from armlock.sensors import SINGLE
+from armlock.sensors import SINGLE, modified_dual
 from book.companion.claims import flight
 
 FLIGHT = flight_loop()
@@ -89,10 +89,10 @@ def test_the_budget_is_held_against_a_requirement_and_draws_itself():
         ({"frequency": [0.0, 1.0]}, "frequency must be positive"),
         ({"frequency": [[1.0]]}, "frequency must be one-dimensional"),
         ({"laser": "maser"}, "laser must be one of free-running, Mach-Zehnder, cavity"),
-        ({"laser": [1.0, 2.0, 3.0]}, "laser and frequency must broadcast together"),
+        ({"laser": [1.0, 2.0, 3.0]}, "laser must be one number or hold one a frequency, 2 of"),
         ({"laser": -1.0}, "laser must not be negative"),
-        ({"requirement": [1.0, 2.0, 3.0]}, "requirement and frequency must broadcast together"),
-        ({"requirement": [[1.0], [2.0]]}, "requirement must hold a value a frequency"),
+        ({"requirement": [1.0]}, "requirement must be one number or hold one a frequency"),
+        ({"requirement": [[1.0], [2.0]]}, "requirement must be one number or hold one a"),
     ],
 )
 def test_bad_budgets_are_refused(arguments, message):
@@ -123,6 +123,8 @@ def test_samples_and_dead_time_hardly_change_the_loop_below_the_first_null():
 def test_a_series_of_no_known_source_is_refused():
     with pytest.raises(ValueError, match="source must be one of laser, shot, clock, motion"):
         noise_series(FLIGHT, "maser", 10, seed=1)
+    with pytest.raises(ValueError, match="loop must have no open-loop pole at s = 0"):
+        noise_series(published_loops()["PI"].loop, "shot", 10, seed=1)
 
 
 @pytest.mark.parametrize("error", [(1.0, 0.0, 0.0), (0.0, 1e-3, 0.0), (0.0, 0.0, 1e-8)])
@@ -160,6 +162,18 @@ def test_a_single_arm_is_pulled_without_end():
 
 def test_pulling_ends_where_the_loop_has_no_gain_at_zero():
     assert np.abs(pulling(FLIGHT, 60 * DAY)) < 1e-5
+
+
+def test_densities_are_real_numbers():
+    for name in ("laser", "requirement"):
+        with pytest.raises(TypeError, match=f"{name} must hold real numbers"):
+            noise_budget(FLIGHT, [0.1, 0.2], **{name: [1.0j, 2.0]})
+
+
+def test_what_an_unstable_loop_does_is_no_pulling():
+    turned = Loop(FLIGHT.controller, modified_dual(33.6, -0.255), FLIGHT.tau1, FLIGHT.tau2)
+    with pytest.raises(ValueError, match="loop must be stable at c1 = c2 = 1, got 38 unstable"):
+        pulling(turned, 1.0)
 
 
 @pytest.mark.parametrize(
