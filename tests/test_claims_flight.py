@@ -37,3 +37,23 @@ def test_margins_for_all_phases_hold_in_a_nyquist_curve():
     omega = np.linspace(12.2, 12.3, 400_001)
     nearest = np.abs(1.0 + flight.LOOP.open_loop(1j * omega)).min()
     assert nearest == pytest.approx(found.modulus, rel=1e-3)
+
+
+def test_arms_of_keplerian_orbits_swing_once_and_thrice_a_year():
+    length, unit, n = 5e9, flight.ASTRONOMICAL_UNIT, 360
+    e = length / (2.0 * np.sqrt(3.0) * unit)
+    places = []
+    for turn in 2.0 * np.pi * np.arange(3) / 3.0:
+        mean = 2.0 * np.pi * np.arange(n) / n - turn
+        psi = mean.copy()
+        for _ in range(30):
+            psi = mean - e * np.sin(psi)
+        along, across = unit * (np.cos(psi) + e), unit * np.sqrt(1 - e * e) * np.sin(psi)
+        flat = along * np.cos(np.sqrt(3.0) * e)
+        x = flat * np.cos(turn) - across * np.sin(turn)
+        y = flat * np.sin(turn) + across * np.cos(turn)
+        places.append(np.array([x, y, along * np.sin(np.sqrt(3.0) * e)]))
+    arms = sum(np.linalg.norm(places[0] - other, axis=0) for other in places[1:])
+    once, _, thrice = 2.0 * np.abs(np.fft.rfft(arms))[1:4] / n
+    shifts = 2.0 * flight.YEARLY * np.array([once, 3.0 * thrice]) / flight.WAVELENGTH
+    np.testing.assert_allclose(shifts, flight.orbit_shifts(), rtol=0.01)
