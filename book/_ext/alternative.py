@@ -4,8 +4,8 @@ What the prose takes from the run as 1.5e-06 is shown as a formula; an alternati
 is spoken, has 1.5 times 10 to the -6 instead.
 
 An alternative text may hold `{name:format}`, where `name` was glued in the same notebook; it
-is replaced by the number in that format. An unknown name is a warning, which fails the build, and
-so is a picture without an alternative text.
+is replaced by the number in that format. An unknown name is a warning, which fails the build.
+So is a picture without an alternative text.
 """
 
 import re
