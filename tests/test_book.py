@@ -123,6 +123,7 @@ def test_a_build_fails_on_each_fault(tmp_path):
         "cell": small(before_check="raise ValueError('on purpose')"),
         "verdict": small(before_check=CHANGED),
         "link": small(text=missing, alt="At {nowhere:.1f} Hz"),
+        "silent": small(alt=""),
     }
     code, output, pages = build(tmp_path, faulty)
     assert code != 0
@@ -131,6 +132,7 @@ def test_a_build_fails_on_each_fault(tmp_path):
         ("cell", "Executing notebook failed"),
         ("verdict", "Executing notebook failed"),
         ("link", "nothing is glued as 'nowhere'"),
+        ("silent", "a picture has no alternative text"),
         ("link", "fig-missing"),
         ("link", "/book/missing"),
     ):

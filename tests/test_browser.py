@@ -29,7 +29,19 @@ FAULTS = {
     "an error of a script": ("<script>missing()</script>", "script error"),
     "an error on the console": ("<script>console.error('no')</script>", "console: no"),
     "the network": ('<script src="http://192.0.2.1/x.js"></script>', "asks the network"),
+    "text that is pale in the dark": (
+        '<style>[data-theme="dark"] p { background: #fff; color: #ccc }</style><p>pale</p>',
+        "axe, dark",
+    ),
     "a wide page": ('<div style="width: 900px">wide</div>', "scrolls sideways"),
+    "cut code": (
+        '<pre style="overflow: auto">' + 200 * "wide" + "</pre>",
+        "cut without a hint",
+    ),
+    "a cut table": (
+        '<div style="overflow: hidden"><table><td>' + 200 * "wide" + "</table></div>",
+        "cut without a hint",
+    ),
     "pale text": ('<p style="color: #ddd; background: #fff">pale</p>', "contrast"),
     "a dead slider": ('<figure><input type="range" aria-label="x"></figure>', "a slider"),
     "nothing under the pointer": ('<p data-check="hover">still</p>', "to the pointer"),

@@ -102,6 +102,12 @@ def test_counts_are_of_physics_and_name_only_verdicts_that_occur():
     assert "differs" not in counts._repr_html_()
 
 
+def test_claims_of_the_white_paper_count_by_themselves():
+    counts = VerdictCounts(check("T6", "W7"))
+    assert "1 finding of physics: 1 reproduced" in repr(counts)
+    assert repr(counts).endswith(". Of the white paper 1: 1 reproduced")
+
+
 def test_errata_are_what_is_not_as_printed(ledger):
     found = Errata(ledger)
     assert [claim.identifier for claim, _ in found.entries] == ["T2"]

@@ -207,6 +207,32 @@ def test_break_margins_and_roots_are_those_of_the_package(page):
 
 
 @pytest.mark.parametrize(
+    ("spec", "loop", "centre", "half", "number"),
+    [
+        (COMMON, CommonArm(), 0.0, 7.0, 1000),
+        (DUAL, DualArm(), 1.0, 0.1, 960),
+        (PAPER, paper_loop(), 1.0, 3e-6, 40),
+    ],
+)
+def test_root_and_count_at_2000_places_of_the_chapters_do_not_contradict(
+    page, spec, loop, centre, half, number
+):
+    points = centre + half * np.random.default_rng(10).uniform(-1.0, 1.0, (number, 2))
+    call = """([spec, points]) => points.map(
+        ([x, y]) => [live.count(live.make(spec), x, y), live.rightmost(spec, x, y)])"""
+    told = page.evaluate(call, [spec, points.tolist()])
+    counts = unstable_roots(loop, *points.T)
+    assert [count for count, _ in told] == counts.tolist()
+    shown = np.array([root is not None for _, root in told])
+    assert shown.mean() > 0.7
+    real = np.array([root[0] if root else np.nan for _, root in told])
+    assert ((real > 0) == (counts > 0))[shown].all()
+    some = np.flatnonzero(shown)[:20]
+    roots = rightmost_root(loop, *points[some].T)
+    np.testing.assert_allclose(real[some], roots.real, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
     ("change", "message"),
     [
         ({"tau1": 0}, "tau1 must be a positive number, got 0"),

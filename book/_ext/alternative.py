@@ -5,6 +5,7 @@ is spoken, has 1.5 times 10 to the -6 instead.
 
 An alternative text may hold `{name:format}`, where `name` was glued in the same notebook; it
 is replaced by the number in that format. An unknown name is a warning, which fails the build.
+So is a picture without an alternative text.
 """
 
 import re
@@ -30,6 +31,8 @@ def typeset(app, doctree):
 def fill(app, doctree):
     """Put the numbers into the alternative texts of a page that was just read."""
     for image in doctree.findall(nodes.image):
+        if not image.get("alt", "").strip():
+            LOGGER.warning("a picture has no alternative text", location=image)
         if not PLACE.search(image.get("alt", "")):
             continue
         glued = read_glue_cache(app.env.mystnb_config.output_folder, app.env.docname)

@@ -3,3 +3,21 @@
 if (location.protocol === "file:" && typeof DOCUMENTATION_OPTIONS !== "undefined") {
   DOCUMENTATION_OPTIONS.SHOW_SEARCH_SUMMARY = false;
 }
+
+// Code, tables and formulas that are wider than the text can be scrolled, with the keys as well,
+// and fade at the right as long as there is more.
+const WIDE = ".bd-article :is(pre, div.math, .text_html, .pst-scrollable-table-container)";
+addEventListener("load", () => {
+  const look = part => {
+    const cut = part.scrollWidth > part.clientWidth + 1;
+    const more = part.scrollWidth - part.clientWidth - part.scrollLeft > 2;
+    part.toggleAttribute("data-more", cut && more);
+    if (cut) part.tabIndex = 0;
+  };
+  const sizes = new ResizeObserver(entries => entries.forEach(entry => look(
+    entry.target.matches(WIDE) ? entry.target : entry.target.parentElement)));
+  for (const part of document.querySelectorAll(WIDE)) {
+    part.addEventListener("scroll", () => look(part), {passive: true});
+    for (const one of [part, ...part.children]) sizes.observe(one);
+  }
+});

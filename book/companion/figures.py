@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
 from string import ascii_lowercase
+from typing import SupportsFloat
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -95,18 +96,19 @@ def drawn(figure: Figure) -> dict[str, npt.NDArray[np.float64]]:
     return {name: np.ravel(column) for name, column in columns.items()}
 
 
-def glue(**numbers: float) -> None:
-    """Make numbers available to the chapter's prose, under their names.
+def glue(**values: object) -> None:
+    """Make numbers and pictures available to the chapter's prose, under their names.
 
     Parameters
     ----------
-    **numbers : float
-        What the prose and the alternative texts refer to.
+    **values : object
+        What the prose and the alternative texts refer to: numbers, and what has a picture.
     """
     from myst_nb import glue as glue_one
 
-    for name, number in numbers.items():
-        glue_one(name, float(number), display=False)
+    for name, value in values.items():
+        plain = float(value) if isinstance(value, SupportsFloat) else value
+        glue_one(name, plain, display=False)
 
 
 @dataclass(frozen=True, repr=False)
@@ -131,7 +133,7 @@ class Downloads:
         return f'<p class="figure-downloads">Download this figure: {links}</p>'
 
 
-def publish(figure: Figure, name: str, **numbers: float) -> Downloads:
+def publish(figure: Figure, name: str, **values: object) -> Downloads:
     """Write a figure as PNG and SVG and its data as CSV, and link to them.
 
     Parameters
@@ -140,7 +142,7 @@ def publish(figure: Figure, name: str, **numbers: float) -> Downloads:
         The figure.
     name : str
         Stem of the files, unique in the book.
-    **numbers : float
+    **values : object
         For the prose around the figure, as `glue` takes them.
 
     Returns
@@ -149,7 +151,7 @@ def publish(figure: Figure, name: str, **numbers: float) -> Downloads:
         Shows links in a notebook. The files go to the folder named by the environment
         variable ARMLOCK_FIGURES, which the book's build sets; without it none are written.
     """
-    glue(**numbers)
+    glue(**values)
     if not os.environ.get("ARMLOCK_FIGURES"):
         return Downloads(name, [])
     stem = Path(os.environ["ARMLOCK_FIGURES"]) / name

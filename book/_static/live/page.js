@@ -285,6 +285,15 @@
         pen.strokeRect(px(1 - SQUARE), py(1 + SQUARE), px(1 + SQUARE) - px(1 - SQUARE),
           py(1 - SQUARE) - py(1 + SQUARE));
       }
+      // The ideal point.
+      pen.strokeStyle = "#000";
+      pen.lineWidth = 1.5;
+      pen.beginPath();
+      for (const [dx, dy] of [[7, 0], [0, 7]]) {
+        pen.moveTo(px(1) - dx, py(1) - dy);
+        pen.lineTo(px(1) + dx, py(1) + dy);
+      }
+      pen.stroke();
       if (this.broken > 0 && this.broken < Infinity) {
         pen.fillStyle = "#000";
         pen.strokeStyle = "#fff";
@@ -548,7 +557,7 @@ print(unstable_roots(loop, ${c1}, ${c2}))
   class Live {
     constructor(label) {
       this.id = `live-${++number}`;
-      this.desk = new Desk(["point", "chart", "breaks", "margins", "plots", "root", "check"]);
+      this.desk = new Desk(["point", "chart", "root", "breaks", "margins", "plots", "check"]);
       this.out = element("output", { role: "status", "aria-live": "polite" });
       this.note = element("p", { class: "live-note" });
       this.numbers = element("dl", { class: "live-numbers" });
@@ -713,6 +722,40 @@ print(unstable_roots(loop, ${c1}, ${c2}))
     update();
   }
 
+  function save(name, blob) {
+    const link = element("a", { href: URL.createObjectURL(blob), download: name });
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  }
+
+  /* The chart of a chapter: one of the presets in the window that the page asks for. */
+  function chapter(place) {
+    const { live: name, centre, half } = place.dataset;
+    const live = new Live(`${name}: number of unstable roots over c1 and c2.`);
+    const colour = (text, shown) =>
+      element("span", { class: "live-key" }, element("i", { style: `background: ${shown}` }), text);
+    const legend = element("p", { class: "live-note" }, colour("stable", "rgb(184,196,206)"),
+      colour("unstable, darker with more roots", "rgb(232,163,129)"), "+ the ideal point (1, 1)");
+    if (half < 1e-4)
+      legend.append("; square: the paper\u2019s perturbations; dot: first to break along (1, \u22121)");
+    const button = (text, done) => element("button", { type: "button", onclick: done }, text);
+    const file = name.toLowerCase().replace(/\W+/g, "-");
+    const counts = () => {
+      const { counts, n, x0, x1, y0, y1 } = live.chart.grid;
+      const at = (low, high, i) => low + (high - low) * i / (n - 1);
+      const rows = Array.from(counts, (count, k) =>
+        `${at(x0, x1, k % n)},${at(y0, y1, Math.floor(k / n))},${count}\n`);
+      save(`${file}.csv`, new Blob(["c1 [1],c2 [1],unstable roots [1]\n", ...rows]));
+    };
+    const tools = element("p", { class: "live-buttons" },
+      button("Zoom in", () => live.chart.zoom(0.5)), button("Zoom out", () => live.chart.zoom(2)),
+      button("Download CSV", counts),
+      button("Download PNG", () => live.chart.canvas.toBlob(blob => save(`${file}.png`, blob))));
+    place.replaceChildren(element("div", { class: "live-one" }, live.figure, legend, tools, live.note));
+    live.chart.show([Number(centre), Number(centre)], Number(half));
+    live.set(PRESETS[name][0]);
+  }
+
   /* Your own loop. */
   function own(place) {
     const live = new Live("Number of unstable roots over c1 and c2.");
@@ -842,7 +885,7 @@ print(unstable_roots(loop, ${c1}, ${c2}))
 
   function start() {
     for (const place of document.querySelectorAll("[data-live]"))
-      (place.dataset.live === "front" ? front : own)(place);
+      ({ front, loop: own }[place.dataset.live] || chapter)(place);
   }
   if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", start);
   else start();

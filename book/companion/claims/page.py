@@ -45,6 +45,8 @@ SECTIONS = {
     "08a_flight": "White paper, the loop",
     "08b_noise_and_pulling": "White paper, noise and pulling",
 }
+#: Those of them that are about the paper; the others are about the white paper.
+OF_THE_PAPER = [name for name, part in SECTIONS.items() if not part.startswith("White")]
 #: What filters and sorts the table.
 SCRIPT = Path(__file__).with_name("ledger.js")
 
@@ -117,7 +119,7 @@ def project_url() -> str | None:
 class VerdictCounts:
     """How many findings of physics met each verdict, and how many others there are.
 
-    Claims with the same finding count once.
+    Claims with the same finding count once, those of the white paper by themselves.
 
     Examples
     --------
@@ -128,16 +130,24 @@ class VerdictCounts:
     """
 
     def __init__(self, ledger: Ledger) -> None:
-        self.physics = ledger.counts(Weight.PHYSICS)
-        number = self.physics.total()
-        self.head = f"{number} finding{'s' * (number != 1)} of physics: "
-        self.others = ". Besides " + ", ".join(
-            f"{ledger.counts(weight).total()} of {weight}" for weight in list(Weight)[1:]
-        )
+        entries: dict[bool, list[tuple[Claim, Finding]]] = {True: [], False: []}
+        for claim, finding in ledger:
+            entries[claim.chapter in OF_THE_PAPER].append((claim, finding))
+        paper = Ledger(entries[True])
+        physics, white = paper.counts(Weight.PHYSICS), Ledger(entries[False]).counts()
+        number = physics.total()
+        head = f"{number} finding{'s' * (number != 1)} of physics"
+        others = ", ".join(f"{paper.counts(w).total()} of {w}" for w in list(Weight)[1:])
+        #: What is counted, how many met each verdict, and what is said after that.
+        self.lines = [(head, physics, f". Besides {others}")]
+        if white:
+            self.lines.append((f". Of the white paper {white.total()}", white, ""))
 
     def _joined(self, shown: Callable[[Verdict, str], str], between: str) -> str:
-        parts = (shown(v, f"{self.physics[v]} {v}") for v in Verdict if self.physics[v])
-        return self.head + between.join(parts) + self.others
+        return "".join(
+            f"{head}: {between.join(shown(v, f'{met[v]} {v}') for v in Verdict if met[v])}{end}"
+            for head, met, end in self.lines
+        )
 
     def __repr__(self) -> str:
         """Return the line as text."""
