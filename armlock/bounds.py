@@ -10,10 +10,10 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import FloatArray, broadcast_pair
+from armlock.compiled import njit
 from armlock.exponentials import real_horner
 
 

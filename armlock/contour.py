@@ -20,9 +20,10 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numba import config, njit
+from numba import config
 
 from armlock.checks import BoolArray, ComplexArray, FloatArray, IntArray
+from armlock.compiled import njit
 from armlock.exponentials import (
     EPSILON,
     ROUNDING,

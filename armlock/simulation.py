@@ -25,7 +25,6 @@ from typing import BinaryIO
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from armlock.checks import (
     ComplexArray,
@@ -36,6 +35,7 @@ from armlock.checks import (
     real_number,
     whole_number,
 )
+from armlock.compiled import njit
 from armlock.discretize import (
     SampledFilter,
     SampledSensor,
