@@ -6,7 +6,8 @@ NUMBA_CACHE_DIR says. What is different here, for all modules of the package:
 - where nothing can be written, the functions are compiled in each process, with a word;
 - what cannot be read, or has changed on the disk, is compiled anew;
 - a change of any module counts, because a compiled function holds those that it calls;
-- a line on the terminal says that something is being compiled, while it lasts.
+- a line on the terminal says that something is being compiled, while it lasts;
+- a few calls of short functions are done in Python, sooner than compiled (`soon`).
 """
 
 from __future__ import annotations
@@ -17,14 +18,19 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 import numba
+import numpy as np
 from numba.core import caching
 
 _SOURCES = hashlib.sha256()
 for _module in sorted(Path(__file__).parent.glob("*.py")):
     _SOURCES.update(_module.read_bytes())
+
+# How many calls of a function are plain Python, and then no more, if it may be.
+_PLAIN_CALLS = 5
 
 # How many functions are being compiled: one, and those that it calls.
 _compiling = 0
@@ -57,6 +63,50 @@ def njit(*, cache: bool, nogil: bool = False) -> Callable[[Callable[..., Any]], 
         return dispatcher
 
     return decorate
+
+
+def soon(function: Any, *, unless: object = None, **limits: object) -> Callable[..., Any]:
+    """Return a compiled function whose first calls are plain Python.
+
+    Compiling takes some seconds, which many calls should share. Both ways give the same result
+    but for rounding.
+
+    Parameters
+    ----------
+    function : callable
+        What `njit` has made.
+    unless : object, optional
+        A result after which the call is repeated, compiled.
+    **limits
+        Other values for constants of its module, for Python's slower calls.
+
+    Returns
+    -------
+    callable
+    """
+    plain, left = _plain(function, limits), [_PLAIN_CALLS]
+
+    def call(*arguments: Any) -> Any:
+        if left[0] > 0:
+            left[0] -= 1
+            # Python raises where compiled functions go on with inf or nan.
+            with np.errstate(all="ignore"), suppress(ArithmeticError):
+                result = plain(*arguments)
+                if result != unless:
+                    return result
+        return function(*arguments)
+
+    return call
+
+
+def _plain(function: Any, limits: dict[str, object]) -> Callable[..., Any]:
+    """Return a compiled function as plain Python, and those that it calls."""
+    original = getattr(function, "py_func", function)
+    names = {**original.__globals__, **limits}
+    for name in original.__code__.co_names:
+        if hasattr(names.get(name), "py_func"):
+            names[name] = _plain(names[name], limits)
+    return FunctionType(original.__code__, names)
 
 
 class _Cache(caching.FunctionCache):  # type: ignore[misc]
