@@ -41,7 +41,7 @@ NOTEBOOKS := $(wildcard notebooks/*.ipynb)
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help env book browser same lab test claims attack mutants bench serve lint format strip lock clean distclean always
+.PHONY: help env book browser same lab test claims attack mutants bench dist serve lint format strip lock clean distclean always
 
 help: ## List the targets
 	@echo "armlock: make TARGET, where TARGET is one of"
@@ -176,6 +176,10 @@ build/test-sources: always
 
 always:
 
+dist: $(PACKAGE_READY) ## Build the source archive and the wheel into dist/, and check them
+	$(PY) tools/build_dist.py dist
+	$(PY) -m twine check --strict dist/*
+
 ## Upkeep --------------------------------------------------------------------------------
 
 lint: $(PACKAGE_READY) ## Check style, types, stripped notebooks, and what is written by tools
@@ -195,8 +199,8 @@ format: $(PACKAGE_READY) ## Format the code, strip the notebooks, list what they
 
 lock: $(ENV_READY) ## Write environment.txt from pyproject.toml (UPGRADE=1: newest versions)
 	$(PY) -m uv pip compile pyproject.toml --all-extras \
-		--group build --group book --group test --group browser --group lab --group lint \
-		--group lock \
+		--group build --group test --group browser --group lab --group lint \
+		--group dist --group lock \
 		--universal --python-version 3.11 --fork-strategy fewest --only-binary :all: \
 		--generate-hashes --no-emit-index-url --no-emit-find-links --quiet \
 		--custom-compile-command "make lock" $(if $(UPGRADE),--upgrade) -o environment.txt
@@ -204,7 +208,7 @@ lock: $(ENV_READY) ## Write environment.txt from pyproject.toml (UPGRADE=1: newe
 	$(PY) tools/check_lock.py
 
 clean: ## Remove what was built
-	rm -rf build .pytest_cache .ruff_cache .mypy_cache .hypothesis
+	rm -rf build dist .pytest_cache .ruff_cache .mypy_cache .hypothesis
 	find . -name __pycache__ -not -path './$(VENV)/*' -prune -exec rm -rf {} +
 
 distclean: clean ## Remove the environment as well
