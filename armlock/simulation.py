@@ -175,6 +175,7 @@ def _advance(
     noise: FloatArray,
     c1: FloatArray,
     c2: FloatArray,
+    strides: tuple[int, int, int],
     count: int,
     delays: tuple[Delay, Delay, Delay],
     sensor: SampledSensor,
@@ -187,7 +188,7 @@ def _advance(
 
     Runs go side by side in lanes, so that one instruction works on several of them; the length
     of `lanes` is their number, for the compiler to know. phi and sent hold all lanes of one
-    sample, then those of the next; noise, c1 and c2 have a row for each lane.
+    sample, then those of the next; in noise, c1 and c2 the next sample is `strides` further on.
 
     `delays` are those of both arms and the dead time. `work` holds, each for all lanes: the
     states of sensor and controller; what they send with the next sample if no input comes; for
@@ -217,15 +218,16 @@ def _advance(
     implicit = dead[0] == 0
     inverse = 1.0 / (1.0 + now1 + now2)
     for i in range(count):
-        now, at = start + i, np.uintp(i * size)
+        now = start + i
+        at0, at1, at2 = i * strides[0], i * strides[1], i * strides[2]
         for w in range(size):
             late = _late(phi, now * size + w, size, arm1)
-            work[light1 + np.uintp(w)] = c1[at + np.uintp(w)] * late
+            work[light1 + np.uintp(w)] = c1[np.uintp(at1 + w)] * late
         for w in range(size):
             late = _late(phi, now * size + w, size, arm2)
-            work[light2 + np.uintp(w)] = c2[at + np.uintp(w)] * late
+            work[light2 + np.uintp(w)] = c2[np.uintp(at2 + w)] * late
         for w in range(size):
-            work[free + np.uintp(w)] = noise[at + np.uintp(w)]
+            work[free + np.uintp(w)] = noise[np.uintp(at0 + w)]
         if not implicit:
             for w in range(size):
                 work[output + np.uintp(w)] = _late(sent, now * size + w, size, dead)
@@ -621,15 +623,15 @@ class _Lanes:
         done = run.samples
         for at in range(0, noise.shape[1], self.block):
             count = min(self.block, noise.shape[1] - at)
-            block = [
-                self._interleaved(series[:, at : at + count]) for series in (noise, c1, c2)
-            ]
+            parts = (series[:, at : at + count] for series in (noise, c1, c2))
+            block, strides = zip(*map(self._interleaved, parts), strict=True)
             stop = _advance(
                 (0,) * self.lanes,
                 self.phi.ravel(),
                 self.sent.ravel(),
                 self.past,
                 *block,
+                strides,
                 count,
                 run._delays,
                 run._sensor,
@@ -649,11 +651,22 @@ class _Lanes:
                 signal[: self.past] = signal[count : count + self.past].copy()
         return noise.shape[1], math.inf
 
-    def _interleaved(self, series: FloatArray) -> FloatArray:
-        """Return the same sample of all lanes side by side; idle lanes repeat the last run."""
-        if len(series) < self.lanes:
-            series = series[np.minimum(np.arange(self.lanes), len(series) - 1)]
-        return np.require(series.T.ravel(), requirements=["C", "W"])
+    def _interleaved(self, series: FloatArray) -> tuple[FloatArray, int]:
+        """Return an array with the lanes of a sample side by side, and the way to the next one.
+
+        Nothing is copied of an array in Fortran order, and of a single run. A lane without a
+        run of its own repeats the last one.
+        """
+        step, way = (stride // series.itemsize for stride in series.strides)
+        beside = len(series) == self.lanes and (step == 1 or self.lanes == 1)
+        if beside and way > 0 and series.flags.writeable:
+            length = (series.shape[1] - 1) * way + self.lanes
+            flat = np.lib.stride_tricks.as_strided(series, (length,), (series.itemsize,))
+            return flat, way
+        if way == 0:
+            series = series[:, :1]
+        rows = np.minimum(np.arange(self.lanes), len(series) - 1)
+        return np.ascontiguousarray(series[rows].T).ravel(), self.lanes if way else 0
 
 
 def simulate(
