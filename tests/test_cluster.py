@@ -1,7 +1,10 @@
 """Sweeps on a Dask cluster of two processes."""
 
 import os
+import re
 import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -10,6 +13,7 @@ import pytest
 
 from armlock import CommonArm, LaserNoise, simulate, stability_chart, sweep
 
+ROOT = Path(__file__).parents[1]
 distributed = pytest.importorskip("distributed")
 
 # Dask warns of ports that are taken and of workers that restart: neither is a failure here.
@@ -58,3 +62,22 @@ def test_a_worker_that_is_killed_costs_no_result(executor, tmp_path):
     found = sweep(draw_or_die, [(seed, str(place)) for seed in range(12)], executor=executor)
     assert place.exists()
     assert np.array_equal(found, [draw(seed) for seed in range(12)])
+
+
+def test_the_lines_of_the_page_run(tmp_path):
+    """As a script, whose workers import it again. The second time all results are there."""
+    script = re.findall(
+        r"```python\n(.*?)```", (ROOT / "book/cluster.md").read_text(), re.DOTALL
+    )[0]
+    (tmp_path / "page.py").write_text(script.replace("200)", "6)"))
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    for _ in range(2):
+        done = subprocess.run(
+            [sys.executable, "page.py"],
+            cwd=tmp_path,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert re.fullmatch(r"between \d+\.\d+ and \d+\.\d+\n", done.stdout)
