@@ -18,10 +18,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 from numpy.polynomial import polynomial as poly
 
 from armlock.checks import ComplexArray, FloatArray, IntArray
+from armlock.compiled import njit
 
 EPSILON = 2.0**-52
 #: Up to this degree a polynomial is evaluated from its coefficients, beyond from its roots.

@@ -15,9 +15,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from armlock.checks import ComplexArray, FloatArray
+from armlock.compiled import njit
 from armlock.contour import MOST_STEPS
 from armlock.exponentials import (
     EPSILON,

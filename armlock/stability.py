@@ -12,8 +12,9 @@ y contributes (`count_point`), or no step of the walk can be certified.
 
 from __future__ import annotations
 
+from concurrent.futures import Executor
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
 import mpmath
@@ -34,6 +35,7 @@ from armlock.checks import (
     check_memory,
 )
 from armlock.exponentials import ROUNDING, ExponentialSum, without_unused
+from armlock.sweep import sweep
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,6 +52,8 @@ _OUTSIDE = (0.38196601125, 0.27639320225)
 
 # Memory that a chart takes for each point: counts, flags, and a copy of them.
 _BYTES_A_POINT = 32
+# Most tiles, of whole rows, into which a chart is cut for an executor.
+_TILES = 64
 _NO_POINTS = np.empty((0, 2))
 
 
@@ -310,7 +314,11 @@ class StabilityChart:
 
 
 def stability_chart(
-    system: CharacteristicFunction, x: npt.ArrayLike, y: npt.ArrayLike
+    system: CharacteristicFunction,
+    x: npt.ArrayLike,
+    y: npt.ArrayLike,
+    *,
+    executor: Executor | None = None,
 ) -> StabilityChart:
     r"""Count the unstable roots over a grid.
 
@@ -320,6 +328,8 @@ def stability_chart(
         The loop, for instance `CommonArm()`.
     x, y : array_like of float, one-dimensional
         Axes of the two free parameters, in any order and spacing.
+    executor : concurrent.futures.Executor, optional
+        What computes the rows, in tiles, as for `armlock.sweep.sweep`; the same chart.
 
     Returns
     -------
@@ -356,6 +366,20 @@ def stability_chart(
     name1, name2 = checked_system(system).parameters
     xs, ys = axis(name1, x), axis(name2, y)
     check_memory(f"{name1} and {name2}", (ys.size, xs.size), _BYTES_A_POINT)
+    if executor is not None:
+        tiles = np.array_split(ys, min(ys.size, _TILES))
+        charts = sweep(partial(stability_chart, system, xs), tiles, executor=executor)
+        firsts = np.cumsum([0, *(tile.size for tile in tiles[:-1])])
+        return StabilityChart(
+            system,
+            xs,
+            ys,
+            np.vstack([chart.counts for chart in charts]),
+            np.vstack([chart.counted_singly for chart in charts]),
+            np.concatenate(
+                [c.recounted_rows + at for c, at in zip(charts, firsts, strict=True)]
+            ),
+        )
     order_x, order_y = np.argsort(xs, kind="stable"), np.argsort(ys, kind="stable")
     if not system.b1.any():
         # Without B1 nothing crosses along a row: walk along the columns instead.
