@@ -37,7 +37,9 @@ _compiling = 0
 _warned = False
 
 
-def njit(*, cache: bool, nogil: bool = False) -> Callable[[Callable[..., Any]], Any]:
+def njit(
+    *, cache: bool, nogil: bool = False, error_model: str = "python"
+) -> Callable[[Callable[..., Any]], Any]:
     """Compile a function when it is first called with arguments of these types.
 
     Parameters
@@ -46,6 +48,8 @@ def njit(*, cache: bool, nogil: bool = False) -> Callable[[Callable[..., Any]], 
         Whether the result is kept for other processes.
     nogil : bool, optional
         Whether other threads run while the function does.
+    error_model : str, optional
+        What a division by zero does: it raises, or with "numpy" gives inf or nan.
 
     Returns
     -------
@@ -54,7 +58,9 @@ def njit(*, cache: bool, nogil: bool = False) -> Callable[[Callable[..., Any]], 
     """
 
     def decorate(function: Callable[..., Any]) -> Any:
-        dispatcher = numba.njit(nogil=nogil, no_cfunc_wrapper=True)(function)
+        dispatcher = numba.njit(nogil=nogil, error_model=error_model, no_cfunc_wrapper=True)(
+            function
+        )
         if cache:
             try:
                 dispatcher._cache = _Cache(function)

@@ -271,7 +271,7 @@ def meeting_intervals(
     phases of its arms, fills a disc. This is clear of the segment if it is clear of the
     disc around it, or of the end that is nearest to its centre.
     """
-    around = 0.5 * (near + far), 0.5 * (near - far)
+    discs = ((0.5 * (near + far), 0.5 * (near - far)), (near, 0.0), (far, 0.0))
     found = np.empty((64, 2))
     unit, number, omega = np.eye(3), 0, 0.0
     longest = np.inf
@@ -279,17 +279,14 @@ def meeting_intervals(
         shortest = max(_TURNS * 2.0 * np.pi / longest_delay, 3e-3 * omega)
         longest = max(min(longest, omega_end), shortest)
         start, reach, local, sizes = piece(polynomials, unit, np.zeros(3), omega, longest)
-        clear = (
-            _clear(local, sizes, start, reach, arms, dead_time, around)
-            or (
-                _turned(local, start, reach, dead_time, near, 1.0)
-                and _clear(local, sizes, start, reach, arms, dead_time, (near, 0.0))
+        clear = False
+        for k in range(3):
+            turned = k == 0 or _turned(
+                local, start, reach, dead_time, discs[k][0], 1.0 if k == 1 else -1.0
             )
-            or (
-                _turned(local, start, reach, dead_time, far, -1.0)
-                and _clear(local, sizes, start, reach, arms, dead_time, (far, 0.0))
-            )
-        )
+            if turned and _clear(local, sizes, start, reach, arms, dead_time, discs[k]):
+                clear = True
+                break
         if not clear and reach > 1.01 * shortest:
             longest = 0.25 * reach
             continue
