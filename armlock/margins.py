@@ -18,7 +18,14 @@ from scipy.optimize import brentq, minimize_scalar
 
 from armlock import contour, infimum
 from armlock.bounds import last_larger, last_root_bound
-from armlock.checks import FloatArray, axis, positive_number, real_number
+from armlock.checks import (
+    ComplexArray,
+    FloatArray,
+    IntArray,
+    axis,
+    positive_number,
+    real_number,
+)
 from armlock.loops import Loop, checked_loop
 from armlock.nyquist import leading_radius, loop_numerator
 from armlock.rays import first_break
@@ -160,6 +167,33 @@ def _clear_from(loop: Loop, c1: float, c2: float, centre: float, radius: float) 
     return last_larger(first, others, np.array(factors))
 
 
+def _factors(loop: Loop) -> tuple[ComplexArray, IntArray, FloatArray]:
+    """Return R, B1 and B2 as `armlock.infimum.free_margins` takes them."""
+    found = loop.polynomials()
+    return (
+        np.concatenate([p.roots for p in found]),
+        np.cumsum([0, *(p.roots.size for p in found)]),
+        np.array([p.coefficients[-1] for p in found]),
+    )
+
+
+def _likely(
+    loop: Loop, c1: float, c2: float, lowest: float, highest: float, place: int
+) -> FloatArray:
+    """Frequencies some of which have a small distance from -1, of many turns of the delays.
+
+    They lie where the disc of free phases comes closest, and spare a walk most of its way. None
+    where that is within a thousand turns, which a walk does as fast.
+    """
+    omega = np.geomspace(lowest, highest, 400)
+    arms = np.array([abs(c1), abs(c2)])
+    nearest = infimum.free_margins_over(_factors(loop), arms, loop.delay, omega)[:, place]
+    at, turn = float(omega[np.argmin(nearest)]), 2.0 * np.pi / loop.longest_delay
+    if at < 1e3 * turn:
+        return np.empty(0)
+    return np.linspace(at - 100.0 * turn, min(at + 100.0 * turn, highest), 4001)
+
+
 def _smallest(
     loop: Loop, c1: float, c2: float, *, symmetric: bool, highest: float = np.inf
 ) -> tuple[float, float]:
@@ -180,10 +214,13 @@ def _smallest(
         raise _unconfined(c1, c2)
     numerator = loop_numerator(loop, c1, c2)
 
+    def distances(omega: FloatArray) -> FloatArray:
+        response = loop.open_loop(1j * omega, c1, c2)
+        with np.errstate(divide="ignore"):
+            return np.abs(1.0 + response) / (np.abs(1.0 - response) if symmetric else 1.0)
+
     def distance(omega: float) -> float:
-        response = complex(loop.open_loop(1j * omega, c1, c2))
-        below = abs(1.0 - response) if symmetric else 1.0
-        return abs(1.0 + response) / below if below else np.inf
+        return float(distances(np.array([omega]))[0])
 
     # Below it L is a single power of s, up to a part in ten million; or, if it is large there
     # and no positive power, it is large below.
@@ -196,6 +233,13 @@ def _smallest(
     at_lowest = distance(lowest)
     if at_lowest < best:
         best, where = at_lowest, lowest
+    place = infimum.RATIO if symmetric else infimum.MODULUS
+    likely = _likely(loop, c1, c2, lowest, max(lowest, min(end, highest)), place)
+    if likely.size:
+        near = distances(likely)
+        nearest = int(np.argmin(near))
+        if near[nearest] < best:
+            best, where = float(near[nearest]), float(likely[nearest])
     for tolerance in (0.05, TOLERANCE, TOLERANCE):
         found, omega, width, complete = infimum.smallest_distance(
             numerator.compiled(),
@@ -307,7 +351,14 @@ def _crossovers(loop: Loop, c1: float, c2: float, end: float) -> FloatArray:
     above, below = loop_numerator(loop, c1, c2), loop.rest_on_boundary()
     squares = above.times_conjugate(above).plus(below.times_conjugate(below).scaled(-1.0))
     omega, jump = sign_changes(squares.turned(), end)
-    return np.asarray(omega[(omega > 0.0) & (jump != 0)])
+    hidden = omega[(omega > 0.0) & (jump == 0)]
+    if hidden.size:
+        raise CountError(
+            f"no margin at (c1, c2) = ({c1}, {c2}): rounding hides whether |L| comes to one "
+            f"around {hidden[0]} rad/s",
+            np.array([[c1, c2]]),
+        )
+    return np.asarray(omega[omega > 0.0])
 
 
 def _phase_and_delay(
@@ -359,15 +410,13 @@ def _polished(loop: Loop, c1: float, c2: float, omega: float) -> float:
     def excess(u: float) -> float:
         return float(np.log(np.abs(loop.open_loop(1j * math.exp(u), c1, c2))))
 
-    low, high = math.log(omega) - 1e-6, math.log(omega) + 1e-6
     # Not past the next null of an arm.
-    span = 0.01 / loop.longest_delay
-    low, high = (
-        max(low, math.log(max(omega - span, 0.5 * omega))),
-        min(high, math.log(omega + span)),
-    )
-    if excess(low) * excess(high) < 0.0:
-        return math.exp(brentq(excess, low, high, xtol=1e-14, rtol=1e-14))
+    span = min(0.01 / loop.longest_delay, 0.5 * omega)
+    for width in (1e-6, 1e-5, 1e-4, 1e-3):
+        low = math.log(max(omega * (1.0 - width), omega - span))
+        high = math.log(min(omega * (1.0 + width), omega + span))
+        if excess(low) * excess(high) < 0.0:
+            return math.exp(brentq(excess, low, high, xtol=1e-14, rtol=1e-14))
     return omega
 
 
@@ -578,19 +627,16 @@ def _free_margins(
     if radius >= abs(1.0 + centre):
         raise _unconfined(c1, c2)
     limit = infimum.free_margins_at(complex(centre), radius, np.inf)
+    if abs(centre) + radius >= 1.0:
+        # L does not roll off: any delay more destabilises it at high frequency.
+        limit[infimum.DELAY] = 0.0
     # Past it nothing has a phase.
     end = last_larger(loop.rest, (c, loop.b1, loop.b2), np.array([1.0, *arms]))
     if not np.isfinite(end):
         end = _settled_from(loop)
     end = max(end, 2.0 * lowest)
 
-    found = loop.polynomials()
-    roots = [p.roots for p in found]
-    factors = (
-        np.concatenate(roots),
-        np.cumsum([0, *(p.size for p in roots)]),
-        np.array([p.coefficients[-1] for p in found]),
-    )
+    factors = _factors(loop)
 
     def at(u: npt.ArrayLike) -> FloatArray:
         omega = np.exp(np.atleast_1d(np.asarray(u, dtype=float)))

@@ -157,6 +157,8 @@ def draw(rng):
         size = abs(View(sketch, 0.3, -0.2).at(np.array([at]))[0])
         sketch = sketch.scaled(between(rng, 0.01, 30.0) / size)
     sketch = sketch.scaled(-1.0) if rng.random() < 0.15 else sketch
+    if sensor == "difference" and tau1 == tau2 and point[0] == point[1]:
+        raise UndecidedError("the difference of equal arms is zero")
     lowest = np.array([1e-10, 1e-9]) / longest
     sizes = np.abs(View(sketch, *point).at(lowest))
     if sizes[1] > 0.1 and sizes[1] > 5.0 * sizes[0]:
