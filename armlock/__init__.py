@@ -8,7 +8,7 @@ from armlock.budget import NoiseBudget, noise_budget
 from armlock.characteristic import CharacteristicFunction
 from armlock.controllers import Controller
 from armlock.dcurve import d_curve, d_curve_branches, d_curve_line
-from armlock.design import buildable_loop, robust_loop
+from armlock.design import Design, buildable_loop, design, robust_loop
 from armlock.flight import flight_loop, published_loops
 from armlock.loops import CommonArm, DualArm, HayesEquation, Loop, SingleArm, paper_loop
 from armlock.margins import Margins, critical_perturbation, margins, modulus_margin
@@ -53,6 +53,7 @@ __all__ = [
     "CommonArm",
     "Controller",
     "CountError",
+    "Design",
     "DivergenceError",
     "DualArm",
     "HayesEquation",
@@ -77,6 +78,7 @@ __all__ = [
     "d_curve",
     "d_curve_branches",
     "d_curve_line",
+    "design",
     "flight_loop",
     "frequency_response",
     "margins",
