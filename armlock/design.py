@@ -153,6 +153,13 @@ class Design:
         The objective at the start, by samples; nan if the start is not stable.
     evaluations : int
         Candidates that were judged.
+
+    Examples
+    --------
+    >>> from armlock import design, robust_loop
+    >>> found = design(robust_loop(), "modulus", {"suppression": -0.1}, generations=0)
+    >>> found.counts.tolist(), found.crossings
+    ([0, 0, 0, 0, 0], 0)
     """
 
     loop: Loop

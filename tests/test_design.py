@@ -156,7 +156,7 @@ def test_the_buildable_loop_has_its_margins_uniformly_and_exactly():
     loop = buildable_loop()
     for d in BOX[:2]:
         c = tuple(1.0 + PERTURBATION * x for x in d)
-        phase = np.degrees(margins(loop, *c, free_above=TURN * 2.0).phase)
+        phase = np.degrees(margins(loop, c[0], c[1], free_above=TURN * 2.0).phase)
         assert phase > (25.0 if any(d) else 30.0)
     # Above 2 Hz, on a plain grid: the disc's share of the unit circle.
     frequency = np.geomspace(2.0, 1e6, 400_001)
