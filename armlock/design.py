@@ -425,7 +425,8 @@ def design(
     -----
     The measures are certified, with three exceptions that are taken from samples: unity gain,
     pulling, and the dead time where the arms' phases are free.
-    Nothing says that there is no better controller.
+    Counts and walks hold at the box's centre and corners, and on the rays between; a chart shows
+    the rest of the box. Nothing says that there is no better controller.
 
     Examples
     --------
