@@ -425,8 +425,8 @@ def design(
     -----
     The measures are certified, with three exceptions that are taken from samples: unity gain,
     pulling, and the dead time where the arms' phases are free.
-    Counts and walks hold at the box's centre and corners, and on the rays between; a chart shows
-    the rest of the box. Nothing says that there is no better controller.
+    The count is made at the centre of the box, at its corners, and on the rays between them;
+    the rest of the box is not counted. Nothing says that there is no better controller.
 
     Examples
     --------
