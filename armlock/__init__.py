@@ -8,6 +8,7 @@ from armlock.budget import NoiseBudget, noise_budget
 from armlock.characteristic import CharacteristicFunction
 from armlock.controllers import Controller
 from armlock.dcurve import d_curve, d_curve_branches, d_curve_line
+from armlock.design import Design, buildable_loop, design, robust_loop
 from armlock.flight import flight_loop, published_loops
 from armlock.loops import CommonArm, DualArm, HayesEquation, Loop, SingleArm, paper_loop
 from armlock.margins import Margins, critical_perturbation, margins, modulus_margin
@@ -52,6 +53,7 @@ __all__ = [
     "CommonArm",
     "Controller",
     "CountError",
+    "Design",
     "DivergenceError",
     "DualArm",
     "HayesEquation",
@@ -70,11 +72,13 @@ __all__ = [
     "StabilityChart",
     "amplitude_spectrum",
     "axis_crossings",
+    "buildable_loop",
     "closed_loop",
     "critical_perturbation",
     "d_curve",
     "d_curve_branches",
     "d_curve_line",
+    "design",
     "flight_loop",
     "frequency_response",
     "margins",
@@ -85,6 +89,7 @@ __all__ = [
     "published_loops",
     "pulling",
     "rightmost_root",
+    "robust_loop",
     "sampled_open_loop",
     "save_series",
     "semi_discretization",

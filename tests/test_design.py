@@ -1,0 +1,267 @@
+"""The two loops that were found: certified, and again from their numbers on plain grids."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from armlock import (
+    Controller,
+    buildable_loop,
+    critical_perturbation,
+    design,
+    margins,
+    modulus_margin,
+    paper_loop,
+    robust_loop,
+    unstable_roots,
+)
+from armlock.paper import CONTROLLER_GAIN, PERTURBATION
+from armlock.rays import ray_crossings
+
+TURN = 2.0 * np.pi
+CORNER = TURN * 0.4
+DIFFERENCE = 0.2
+DELAYS = (20.1, 19.9)
+# The loops depend almost on c1 - c2 alone.
+BOX = [(0, 0), (1, -1), (-1, 1)]
+LOOPS = {"robust": robust_loop, "buildable": buildable_loop}
+
+
+def gain(frequency, *, rolls_off=False):
+    """The controllers, spelled out; corners in Hz."""
+    f = 1j * np.asarray(frequency)
+    k = 5000.0 * f**2 / (f + 0.25e-6) / (f + 0.108e-6)
+    k = k * (f + 0.37e-6) * (f + 16.75e-6) ** 3 / (f + 114.7e-6) ** 4
+    if rolls_off:
+        for zero in (0.111, 4.67, 29.5, 186.0, 1266.0, 15450.0):
+            k = k * (1.0 + f / zero)
+        for pole in (0.0059, 0.82, 8.91, 54.6, 342.0, 2228.0, 40e3):
+            k = k / (1.0 + f / pole)
+        k = k * np.exp(-TURN * f * 12.3e-6)
+    return k
+
+
+def arms(frequency, **options):
+    """K m1 and K m2 of the dual sensor."""
+    s = 1j * TURN * np.asarray(frequency)
+    e = CORNER / ((s + CORNER) * s * DIFFERENCE)
+    k = gain(frequency, **options)
+    return k * (1.0 + e), k * (1.0 - e)
+
+
+def response(frequency, c1=1.0, c2=1.0, **options):
+    s = 1j * TURN * np.asarray(frequency)
+    first, second = arms(frequency, **options)
+    return first * (1.0 - c1 * np.exp(-s * DELAYS[0])) + second * (
+        1.0 - c2 * np.exp(-s * DELAYS[1])
+    )
+
+
+def table_two_gain(frequency):
+    f = 1j * np.asarray(frequency)
+    k = 5000.0 * (f / (f + 1e-6)) ** 2 * (f + 1e-8) * (f + 5e-6) ** 3
+    return k / ((f + 1e-6) * (f + 5e-5) ** 2 * (f + 4e-4))
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_the_loops_are_what_their_numbers_say(name):
+    loop, options = LOOPS[name](), {"rolls_off": name == "buildable"}
+    assert (loop.tau1, loop.tau2, loop.mapping) == (*DELAYS, paper_loop().mapping)
+    assert loop.delay == (12.3e-6 if name == "buildable" else 0.0)
+    frequency = np.geomspace(1e-8, 1.0, 60)
+    found = loop.open_loop(1j * TURN * frequency, 1.0 + 1e-6, 1.0 - 1e-6)
+    expected = response(frequency, 1.0 + 1e-6, 1.0 - 1e-6, **options)
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
+def test_the_robust_controller_has_the_factors_and_the_gain_of_table_two():
+    ours, theirs = robust_loop().controller, paper_loop().controller
+    assert ours.gain == theirs.gain == CONTROLLER_GAIN
+    assert len(ours.zeros) == len(ours.poles) == len(theirs.poles) == 6
+    assert ours.zeros.count(0.0) == theirs.zeros.count(0.0) == 2
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_every_point_of_the_box_is_stable(name):
+    loop, options = LOOPS[name](), {"rolls_off": name == "buildable"}
+    corners = 1.0 + PERTURBATION * np.array(BOX)
+    assert unstable_roots(loop, *corners.T).tolist() == [0, 0, 0]
+    for direction in BOX[1:3]:
+        assert ray_crossings(loop, (1.0, 1.0), direction, PERTURBATION).position.size == 0
+    # No perturbation of the box can take 1 + L to zero, whatever the phases of the arms:
+    # |1 + L| exceeds what it can add. Above 5 mHz L goes around a circle, once each 20 s.
+    low = np.geomspace(1e-10, 5e-3, 200_001)
+    away = np.abs(1.0 + response(low, **options))
+    assert (away > 2.0 * PERTURBATION * np.abs(arms(low, **options)).sum(axis=0)).all()
+    high = np.geomspace(5e-3, 1e6, 200_001)
+    first, second = arms(high, **options)
+    radius = np.abs(first + second * np.exp(1j * TURN * high * DIFFERENCE))
+    added = PERTURBATION * (np.abs(first) + np.abs(second))
+    assert (np.abs(1.0 + first + second) - radius > added).all()
+
+
+def test_the_robust_loop_withstands_nearly_three_times_the_papers_perturbation():
+    robust = robust_loop()
+    limit = critical_perturbation(robust, (1.0, -1.0))
+    assert limit == pytest.approx(4.375132e-6, rel=1e-6)
+    assert limit > 2.9 * critical_perturbation(paper_loop(), (1.0, -1.0))
+    d = limit * np.array([1.0 - 1e-3, 1.0 + 1e-3])
+    assert unstable_roots(robust, 1.0 + d, 1.0 - d).tolist() == [0, 2]
+    # Where L along the ray is -1, on a plain grid: the first real eps > 0.
+    frequency = np.geomspace(1e-9, 1e-3, 400_001)
+    eps = _along(frequency)
+    changes = np.flatnonzero(np.diff(np.sign(eps.imag)))
+    at = eps.real[changes]
+    assert at[at > 0.0].min() == pytest.approx(limit, rel=1e-4)
+
+
+def _along(frequency):
+    """The eps at which 1 + L = 0 along (1, -1), complex where there is none."""
+    plain = response(frequency)
+    slope = (response(frequency, 1.0 + 1e-3, 1.0 - 1e-3) - plain) / 1e-3
+    return -(1.0 + plain) / slope
+
+
+def test_the_robust_loop_keeps_the_papers_suppression():
+    frequency = np.geomspace(1e-4, 1.0, 200_001)
+    change = 20.0 * np.log10(np.abs(gain(frequency) / table_two_gain(frequency)))
+    assert change.min() > -0.05
+    ours, theirs = (
+        np.abs(1.0 + loop.open_loop(1j * TURN * frequency[:60_000]))
+        for loop in (robust_loop(), paper_loop())
+    )
+    # The same for |1 + L| up to the sensor's first null.
+    below = frequency[:60_000] < 1e-3
+    assert 20.0 * np.log10((ours / theirs)[below]).min() > -0.05
+
+
+@pytest.mark.parametrize(
+    ("point", "expected"), [((0, 0), 0.704243), ((1, -1), 0.481682), ((-1, 1), 0.945637)]
+)
+def test_modulus_margins_of_the_robust_loop(point, expected):
+    c = tuple(1.0 + PERTURBATION * d for d in point)
+    certified = modulus_margin(robust_loop(), *c)
+    assert certified == pytest.approx(expected, abs=2e-6)
+    # At (-1, 1) it is taken at high frequency, elsewhere where the gain is low.
+    low = np.abs(1.0 + response(np.geomspace(1e-9, 5e-3, 400_001), *c)).min()
+    assert low > certified * (1.0 - 1e-6)
+    if point != (-1, 1):
+        assert low == pytest.approx(certified, rel=1e-6)
+
+
+def test_the_buildable_loop_has_its_margins_uniformly_and_exactly():
+    loop = buildable_loop()
+    for d in BOX[:2]:
+        c = tuple(1.0 + PERTURBATION * x for x in d)
+        phase = np.degrees(margins(loop, c[0], c[1], free_above=TURN * 2.0).phase)
+        assert phase > (25.0 if any(d) else 30.0)
+    # Above 2 Hz, on a plain grid: the disc's share of the unit circle.
+    frequency = np.geomspace(2.0, 1e6, 400_001)
+    first, second = arms(frequency, rolls_off=True)
+    centre, radius = first + second, np.abs(first) + np.abs(second)
+    size = np.abs(centre)
+    crosses = np.abs(size - 1.0) <= radius
+    half = np.arccos((1.0 + size**2 - radius**2)[crosses] / (2.0 * size[crosses]))
+    away = np.pi - np.abs(np.angle(centre[crosses])) - half
+    assert np.degrees(away.min()) > 30.0
+    # Below 2 Hz the gain is one near the lower end only.
+    low = np.geomspace(1e-9, 5e-3, 400_001)
+    size = np.abs(response(low, rolls_off=True))
+    at = np.flatnonzero(np.diff(np.sign(size - 1.0)))
+    lead = np.degrees(np.angle(response(low[at], rolls_off=True)))
+    assert (180.0 - np.abs(lead) > 25.0).all()
+    middle = np.geomspace(5e-3, 2.0, 100_001)
+    first, second = arms(middle, rolls_off=True)
+    radius = np.abs(first + second * np.exp(1j * TURN * middle * DIFFERENCE))
+    assert (np.abs(first + second) - radius > 1.0).all()
+
+
+def test_the_buildable_loop_has_its_gain_and_rolls_off():
+    band = np.geomspace(1e-4, 1e-2, 2001)
+    assert (np.abs(gain(band, rolls_off=True)) > 0.5 * np.abs(table_two_gain(band))).all()
+    assert abs(gain(1.0, rolls_off=True)) > 150.0
+    above = np.geomspace(15e3, 1e6, 2001)
+    # The largest |L| that any phases of the arms give.
+    first, second = arms(above, rolls_off=True)
+    assert (np.abs(first + second) + np.abs(first) + np.abs(second) < 1.0).all()
+    assert not buildable_loop().neutral
+
+
+BOUNDS = {"suppression": -0.05, "modulus": 0.70, "modulus in the box": 0.45}
+
+
+def goal():
+    frequency = np.geomspace(1e-4, 1.0, 60)
+    return frequency, np.abs(table_two_gain(frequency))
+
+
+def plain_start():
+    """The factors of the robust controller at round places."""
+    u = -TURN * 1e-6
+    poles = (0.5 * u, 0.2 * u, *[100.0 * u] * 4)
+    return paper_loop(controller=Controller((0.0, 0.0, u, *[10.0 * u] * 3), poles, 5000.0))
+
+
+def test_a_search_from_round_numbers_finds_as_much_again():
+    found = design(plain_start(), "critical perturbation", BOUNDS, goal=goal(), generations=50)
+    assert found.measures["critical perturbation"] > 2.9 * 1.4643205e-6
+    assert not found.counts.any()
+    assert found.crossings == 0
+    assert modulus_margin(found.loop) == pytest.approx(found.measures["modulus"], rel=1e-9)
+    assert found.measures["modulus"] >= 0.70
+    frequency = np.geomspace(1e-4, 1.0, 20_001)
+    ours = np.abs(found.controller(1j * TURN * frequency))
+    assert 20.0 * np.log10((ours / np.abs(table_two_gain(frequency))).min()) > -0.051
+    s = 1e-3j
+    assert complex(found.transfer_function(s)) == pytest.approx(
+        complex(found.controller(s)), rel=1e-9
+    )
+
+
+def test_the_executor_does_not_change_what_is_found():
+    options = {"goal": goal(), "generations": 2, "seed": 3}
+    alone = design(robust_loop(), "critical perturbation", {"modulus": 0.6}, **options)
+    with ThreadPoolExecutor(2) as executor:
+        shared = design(
+            robust_loop(),
+            "critical perturbation",
+            {"modulus": 0.6},
+            executor=executor,
+            **options,
+        )
+    assert alone.controller == shared.controller
+    assert alone.measures == shared.measures
+
+
+def test_contradictory_constraints_say_which_was_missed_and_by_how_much():
+    with pytest.raises(ValueError, match=r"modulus 0\.\d+ in place of 1\.5"):
+        design(robust_loop(), "suppression", {"modulus": 1.5}, generations=0)
+
+
+RIGHT = Controller((0.0, 0.0), (1.0, -2.0), 0.1)
+COMPLEX = Controller((0.0, 0.0), (-1.0 + 1.0j, -1.0 - 1.0j), 0.1)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"objective": "beauty"}, "a measure must be one of .*'beauty'"),
+        ({"constraints": {"beauty": 1.0}}, "a measure must be one of .*'beauty'"),
+        ({"constraints": {"modulus": 0.5}}, "objective must not be among constraints"),
+        ({"constraints": {"phase": np.nan}}, "phase must be finite"),
+        ({"structure": paper_loop(controller=RIGHT)}, "structure must have .* none positive"),
+        ({"structure": paper_loop(controller=COMPLEX)}, "structure must have .* real zeros"),
+        ({"goal": ([1e-30], [1.0])}, "goal must lie between"),
+        ({"goal": ([1e9], [1.0])}, "goal must lie between"),
+        ({"goal": ([1e-3, 1e-2], [1.0])}, "goal must hold as many gains as frequencies"),
+        ({"generations": -1}, "generations must be"),
+        ({"decades": 0.0}, "decades must be positive"),
+    ],
+)
+def test_what_cannot_be_searched_is_refused(changes, message):
+    arguments = {"structure": robust_loop(), "objective": "modulus", "constraints": {}}
+    with pytest.raises(ValueError, match=message):
+        design(**{**arguments, **changes})
