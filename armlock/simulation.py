@@ -731,7 +731,7 @@ def simulate(
     >>> print(f"{step[0]:.4e}")
     9.9991e-05
     """
-    given = noise if isinstance(noise, np.ndarray) else np.asarray(noise)
+    given = finite_series("noise", noise, 1, 2)
     run = Simulation(
         loop,
         sample_rate,

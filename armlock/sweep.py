@@ -62,7 +62,8 @@ def sweep(
     Raises
     ------
     TypeError
-        If `executor` is none, for instance a Dask client itself.
+        If `function` cannot be called, `points` is no iterable, or `executor` no executor, for
+        instance a Dask client itself.
     ValueError
         If the file is that of another sweep: of other points, function, attributes, or
         version of this package.
@@ -97,6 +98,10 @@ def sweep(
     With processes, `executor` is
     ``ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn"))``.
     """
+    if not callable(function):
+        raise TypeError(f"function must be callable, got {function!r}")
+    if not isinstance(points, Iterable):
+        raise TypeError(f"points must be an iterable, got {points!r}")
     if executor is not None and not isinstance(executor, Executor):
         raise TypeError(
             f"executor must be a concurrent.futures.Executor, which client.get_executor() of a "
