@@ -118,10 +118,10 @@ def _outgrown_from(squares: FloatArray, factors: FloatArray, shares: FloatArray)
         together += share
     q = squares[0].copy()
     for i in range(factors.size):
-        weight = together * factors[i] ** 2 / shares[i] if shares[i] > 0.0 else 0.0
         for m in range(q.size):
-            q[m] -= weight * squares[i + 1, m]
-            if not shares[i] > 0.0 and factors[i] > 0.0 and squares[i + 1, m] != 0.0:
+            if shares[i] > 0.0:
+                q[m] -= together * factors[i] ** 2 / shares[i] * squares[i + 1, m]
+            elif factors[i] > 0.0 and squares[i + 1, m] != 0.0:
                 return np.inf
     return float(last_root_bound(q))
 

@@ -100,13 +100,14 @@ def even_axis(name: str, value: object, least: int = 2) -> FloatArray:
     return values
 
 
-def finite_series(name: str, value: object, dimensions: int = 1) -> FloatArray:
-    """Return a finite float array of one dimension or of so many; a long one is not copied."""
+def finite_series(name: str, value: object, *dimensions: int) -> FloatArray:
+    """Return a finite float array of one dimension, or of those given; it is not copied."""
     array = _real_array(name, value)
-    if dimensions == 1:
+    if dimensions in ((), (1,)):
         return _one_dimensional(name, array)
-    if array.ndim != dimensions:
-        raise ValueError(f"{name} must have {dimensions} dimensions, got shape {array.shape}")
+    if array.ndim not in dimensions:
+        many = " or ".join(map(str, dimensions))
+        raise ValueError(f"{name} must have {many} dimensions, got shape {array.shape}")
     return array
 
 

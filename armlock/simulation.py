@@ -50,7 +50,7 @@ INTERPOLATION_ORDER = 7
 #: Samples that are computed at a time, of all runs; results do not depend on it.
 BLOCK = 1 << 16
 #: Runs of an ensemble that go side by side. Fewer than half as many go one by one.
-LANES = 16
+LANES = 32
 #: The output counts as diverged when it exceeds the largest input so far by this factor.
 LIMIT = 1e6
 
@@ -600,8 +600,8 @@ class _Lanes:
     ) -> None:
         self.rows, self.lanes = rows, lanes
         self.past = run.history_samples
-        # At least as long as the past, which each block moves.
-        self.block = max(BLOCK // lanes, self.past)
+        # Some times as long as the past, which each block moves.
+        self.block = max(BLOCK // lanes, 4 * self.past)
         # The output, and what the controller sends: each with its past in front.
         self.phi = np.zeros((self.past + self.block, lanes))
         self.sent = np.zeros_like(self.phi)
@@ -647,8 +647,9 @@ class _Lanes:
                 size = np.abs(self.phi[self.past + stop])
                 left = np.argmin(size <= run.limit * self.work[-2])
                 return at + stop, float(self.work[-1, left])
-            for signal in (self.phi, self.sent):
-                signal[: self.past] = signal[count : count + self.past].copy()
+            # Without a dead time nothing is read of what was sent before.
+            for signal in (self.phi, self.sent)[: 2 if run.loop.delay else 1]:
+                signal[: self.past] = signal[count : count + self.past]
         return noise.shape[1], math.inf
 
     def _interleaved(self, series: FloatArray) -> tuple[FloatArray, int]:
@@ -730,7 +731,7 @@ def simulate(
     >>> print(f"{step[0]:.4e}")
     9.9991e-05
     """
-    given = noise if isinstance(noise, np.ndarray) else np.asarray(noise)
+    given = finite_series("noise", noise, 1, 2)
     run = Simulation(
         loop,
         sample_rate,

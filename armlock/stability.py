@@ -329,7 +329,7 @@ def stability_chart(
     x, y : array_like of float, one-dimensional
         Axes of the two free parameters, in any order and spacing.
     executor : concurrent.futures.Executor, optional
-        What computes the rows, in tiles, as for `armlock.sweep.sweep`; the same chart.
+        What computes the rows, in tiles, as for `armlock.sweep`; the same chart.
 
     Returns
     -------

@@ -15,22 +15,22 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-P = TypeVar("P")
-R = TypeVar("R")
+_P = TypeVar("_P")
+_R = TypeVar("_R")
 
 #: Most tasks of a sweep. Of more points than this, a task takes several, one after the other.
 TASKS = 4096
 
 
 def sweep(
-    function: Callable[[P], R],
-    points: Iterable[P],
+    function: Callable[[_P], _R],
+    points: Iterable[_P],
     *,
     executor: Executor | None = None,
     progress: bool = False,
     store: str | os.PathLike[str] | None = None,
     about: Mapping[str, Any] | None = None,
-) -> list[R]:
+) -> list[_R]:
     """Call a function at each point, and return the results in the order of the points.
 
     Parameters
@@ -62,7 +62,8 @@ def sweep(
     Raises
     ------
     TypeError
-        If `executor` is none, for instance a Dask client itself.
+        If `function` cannot be called, `points` is no iterable, or `executor` no executor, for
+        instance a Dask client itself.
     ValueError
         If the file is that of another sweep: of other points, function, attributes, or
         version of this package.
@@ -97,6 +98,10 @@ def sweep(
     With processes, `executor` is
     ``ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn"))``.
     """
+    if not callable(function):
+        raise TypeError(f"function must be callable, got {function!r}")
+    if not isinstance(points, Iterable):
+        raise TypeError(f"points must be an iterable, got {points!r}")
     if executor is not None and not isinstance(executor, Executor):
         raise TypeError(
             f"executor must be a concurrent.futures.Executor, which client.get_executor() of a "
@@ -125,11 +130,11 @@ def sweep(
 
 
 def _computed(
-    function: Callable[[P], R],
-    points: Sequence[P],
+    function: Callable[[_P], _R],
+    points: Sequence[_P],
     left: Sequence[int],
     executor: Executor | None,
-) -> Iterator[tuple[Sequence[int], list[R]]]:
+) -> Iterator[tuple[Sequence[int], list[_R]]]:
     """Yield the results at `left` as they come: which points, and what came."""
     size = -(-len(left) // TASKS)
     parts = [left[at : at + size] for at in range(0, len(left), max(size, 1))]
@@ -148,7 +153,7 @@ def _computed(
             future.cancel()
 
 
-def _several(function: Callable[[P], R], points: list[P]) -> list[R]:
+def _several(function: Callable[[_P], _R], points: list[_P]) -> list[_R]:
     return [function(point) for point in points]
 
 

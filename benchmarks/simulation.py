@@ -261,7 +261,7 @@ def ensemble_rows(
     loop: Loop, noise: FloatArray, c1: FloatArray, c2: FloatArray, passes: int
 ) -> list[Row]:
     """Compare an ensemble with its runs one by one, in turn."""
-    shape = noise.size // DRAWS, DRAWS
+    shape = min(noise.size // DRAWS, 100_000), DRAWS
     # The same sample of all draws side by side, as `Simulation` would have it.
     together = [part[: shape[0] * DRAWS].reshape(shape).T for part in (noise, c1, c2)]
     singly = [np.ascontiguousarray(part) for part in together]
@@ -272,7 +272,7 @@ def ensemble_rows(
             timed(lambda: simulate(loop, *together).size)[0],
             timed(lambda: [simulate(loop, *row).size for row in rows])[0],
         )
-        for _ in range(2 * passes)
+        for _ in range(5 * passes)
     ]
     best, other = (min(part) for part in zip(*times, strict=True))
     return [

@@ -120,7 +120,7 @@ def test_what_an_argument_cannot_be_is_refused_by_its_name(function):
 def test_every_public_function_is_called_above():
     called = {getattr(function, "__name__", "") for function in CALLS}
     public = {name for name in armlock.__all__ if inspect.isfunction(getattr(armlock, name))}
-    assert public - called == {"published_loops", "save_series", "simulate_blocks"}
+    assert public - called == {"published_loops", "save_series", "simulate_blocks", "sweep"}
 
 
 # Beyond that, what each argument must be: one value past the constraint.
