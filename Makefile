@@ -125,8 +125,9 @@ $(INDEX): $(NOTEBOOKS_RAN) $(BOOK_SOURCES) build/book-sources $(if $(FORCE),alwa
 	@ln -s ../html build/_build/html
 	@touch -r build/book-started $@
 
-browser: $(INDEX) ## Check every page of the book in Chromium, without network
+browser: $(INDEX) ## Check every page in Chromium, without network; run the code as it shows it
 	$(PY) tools/check_browser.py build/html
+	$(PY) tools/check_cells.py build/html
 
 lab: $(PACKAGE_READY) ## Open the notebooks in JupyterLab
 	$(VENV)/bin/jupyter-lab --notebook-dir notebooks
