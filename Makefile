@@ -27,6 +27,10 @@ export IPYTHONDIR := $(CURDIR)/$(VENV)/ipython
 export OPENBLAS_NUM_THREADS := 1
 unexport PYTHONPATH PYTHONHOME VIRTUAL_ENV MPLBACKEND
 
+# Two makes in one folder must not build the same files: the second waits for the first.
+alone = mkdir -p build; $(or $(PYTHON),python3) tools/alone.py build/lock \
+	$(MAKE) --no-print-directory
+
 empty :=
 space := $(empty) $(empty)
 find-sources = $(shell find $(wildcard $(1)) -type f \
@@ -41,7 +45,7 @@ NOTEBOOKS := $(wildcard notebooks/*.ipynb)
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help env book browser same lab test claims attack mutants bench serve lint format strip lock clean distclean always
+.PHONY: help env book pdf browser same lab test claims attack mutants bench dist print serve lint format strip lock clean distclean always
 
 help: ## List the targets
 	@echo "armlock: make TARGET, where TARGET is one of"
@@ -51,7 +55,8 @@ help: ## List the targets
 
 ## Environment ---------------------------------------------------------------------------
 
-env: $(PACKAGE_READY) ## Make .venv with every package of environment.txt, and this one
+env: ## Make .venv with every package of environment.txt, and this one
+	+@$(alone) $(PACKAGE_READY)
 	@echo "The environment is ready: $(VENV)"
 
 # Both stamps are written last, so an interrupted install starts over. The kernel's log level
@@ -96,13 +101,15 @@ $(NOTEBOOKS_RAN): $(PACKAGE_READY) $(RUN_SOURCES) build/run-sources $(if $(FORCE
 	@$(call run-notebooks,build/figures,build/executed)
 	@touch -r build/notebooks-started $@
 
-same: $(NOTEBOOKS_RAN) ## Run all notebooks again: the data of all figures, equal byte for byte
+same: ## Run all notebooks again: the data of all figures, equal byte for byte
+	+@$(alone) $(NOTEBOOKS_RAN)
 	@$(call run-notebooks,build/figures-again,build/executed-again)
 	$(PY) tools/check_same.py build/figures build/figures-again
 
 ## Book ----------------------------------------------------------------------------------
 
-book: $(INDEX) ## Run all notebooks and build the book, as HTML that needs no network
+book: ## Run all notebooks and build the book, as HTML that needs no network
+	+@$(alone) $(INDEX)
 	@echo "The book is ready. Open it in a browser: file://$(subst $(space),%20,$(CURDIR))/$(INDEX)"
 
 # Every page is built anew: Sphinx does not see that the package has changed. Notebooks come
@@ -125,20 +132,37 @@ $(INDEX): $(NOTEBOOKS_RAN) $(BOOK_SOURCES) build/book-sources $(if $(FORCE),alwa
 	@ln -s ../html build/_build/html
 	@touch -r build/book-started $@
 
-browser: $(INDEX) ## Check every page in Chromium, without network; run the code as it shows it
+# All pages as one, printed by the browser that is there; the pages then link to the result.
+pdf: ## Print the book with Chromium: build/html/armlock.pdf
+	+@$(alone) print
+
+print: $(INDEX)
+	@rm -rf build/print
+	@mkdir -p build/print/_build/singlehtml
+	@cp -R build/html/figures build/print/_build/singlehtml/figures
+	@$(PY) tools/cache_notebooks.py build/print/_build/.jupyter_cache build/executed/*.ipynb
+	ARMLOCK_FIGURES="$(CURDIR)/build/print/_build/singlehtml/figures" \
+		$(VENV)/bin/jupyter-book build . --all --config book/_config.yml --toc book/_toc.yml \
+		--path-output build/print --builder custom --custom-builder singlehtml --quiet
+	$(PY) -m tools.print_book build/print/_build/singlehtml build/html
+
+browser: ## Check every page in Chromium, without network; run the code as it shows it
+	+@$(alone) $(INDEX)
 	$(PY) tools/check_browser.py build/html
 	$(PY) tools/check_cells.py build/html
 
 lab: $(PACKAGE_READY) ## Open the notebooks in JupyterLab
 	$(VENV)/bin/jupyter-lab --notebook-dir notebooks
 
-serve: $(INDEX) ## Serve the book at http://localhost:PORT
+serve: ## Serve the book at http://localhost:PORT
+	+@$(alone) $(INDEX)
 	@echo "The book is at http://localhost:$(PORT) until you press Ctrl-C."
 	@$(PY) -m http.server $(PORT) --bind 127.0.0.1 --directory build/html
 
 ## Tests ---------------------------------------------------------------------------------
 
-test: $(TESTS_PASSED) ## Run all tests, notebooks included
+test: ## Run all tests, notebooks included
+	+@$(alone) $(TESTS_PASSED)
 	@test -e build/tests-ran || { echo "Tests passed at $$(cat $(TESTS_PASSED)), and" \
 		"nothing has changed since; make test FORCE=1 runs them again."; }
 	@rm -f build/tests-ran
@@ -177,6 +201,10 @@ build/test-sources: always
 
 always:
 
+dist: $(PACKAGE_READY) ## Build the source archive and the wheel into dist/, and check them
+	$(PY) tools/build_dist.py dist
+	$(PY) -m twine check --strict dist/*
+
 ## Upkeep --------------------------------------------------------------------------------
 
 lint: $(PACKAGE_READY) ## Check style, types, stripped notebooks, and what is written by tools
@@ -196,8 +224,8 @@ format: $(PACKAGE_READY) ## Format the code, strip the notebooks, list what they
 
 lock: $(ENV_READY) ## Write environment.txt from pyproject.toml (UPGRADE=1: newest versions)
 	$(PY) -m uv pip compile pyproject.toml --all-extras \
-		--group build --group book --group test --group browser --group lab --group lint \
-		--group lock \
+		--group build --group test --group browser --group lab --group lint \
+		--group dist --group lock \
 		--universal --python-version 3.11 --fork-strategy fewest --only-binary :all: \
 		--generate-hashes --no-emit-index-url --no-emit-find-links --quiet \
 		--custom-compile-command "make lock" $(if $(UPGRADE),--upgrade) -o environment.txt
@@ -205,7 +233,7 @@ lock: $(ENV_READY) ## Write environment.txt from pyproject.toml (UPGRADE=1: newe
 	$(PY) tools/check_lock.py
 
 clean: ## Remove what was built
-	rm -rf build .pytest_cache .ruff_cache .mypy_cache .hypothesis
+	rm -rf build dist .pytest_cache .ruff_cache .mypy_cache .hypothesis
 	find . -name __pycache__ -not -path './$(VENV)/*' -prune -exec rm -rf {} +
 
 distclean: clean ## Remove the environment as well

@@ -39,6 +39,7 @@ from armlock.stability import (
     stability_chart,
     unstable_roots,
 )
+from armlock.sweep import sweep
 from armlock.transfer import closed_loop, transfer
 
 __version__ = "0.1.0"
@@ -91,6 +92,7 @@ __all__ = [
     "simulate_blocks",
     "spectral_radius",
     "stability_chart",
+    "sweep",
     "transfer",
     "transition_matrix",
     "unstable_roots",

@@ -10,10 +10,10 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import FloatArray, broadcast_pair
+from armlock.compiled import njit, soon
 from armlock.exponentials import real_horner
 
 
@@ -83,20 +83,22 @@ def _last_frequency(
     """
     if not reserve > 0.0:
         return np.inf
-    # Far below rounding a factor would only underflow.
-    factors = np.where(factors < 1e-100, 0.0, factors)
+    # Loops, because each array operation takes longer to compile than all of this.
     top = squares.shape[1] - 1
     lead = np.sqrt(squares[0, top])
-    shares = np.zeros(factors.size)
+    factors, shares, whole = factors.copy(), np.zeros(factors.size), 0.0
     for i in range(factors.size):
+        if factors[i] < 1e-100:
+            # Far below rounding a factor would only underflow.
+            factors[i] = 0.0
         size = 0.0
         for m in range(top + 1):
             size += abs(squares[i + 1, m])
         shares[i] = factors[i] * np.sqrt(size)
-    whole = shares.sum()
-    if whole > 0.0:
-        shares *= 0.5 * reserve * lead / whole
+        whole += shares[i]
+    scale = 0.5 * reserve * lead / whole if whole > 0.0 else 1.0
     for i in range(factors.size):
+        shares[i] *= scale
         shares[i] += factors[i] * np.sqrt(squares[i + 1, top])
     bound = _outgrown_from(squares, factors, shares)
     if 0.0 < bound < np.inf:
@@ -111,13 +113,16 @@ def _last_frequency(
 @njit(cache=True)
 def _outgrown_from(squares: FloatArray, factors: FloatArray, shares: FloatArray) -> float:
     """Bound in w for `_last_frequency`, with the shares as a_i."""
-    together = shares.sum()
+    together = 0.0
+    for share in shares:
+        together += share
     q = squares[0].copy()
     for i in range(factors.size):
-        if shares[i] > 0.0:
-            q -= together * factors[i] ** 2 / shares[i] * squares[i + 1]
-        elif factors[i] > 0.0 and squares[i + 1].any():
-            return np.inf
+        weight = together * factors[i] ** 2 / shares[i] if shares[i] > 0.0 else 0.0
+        for m in range(q.size):
+            q[m] -= weight * squares[i + 1, m]
+            if not shares[i] > 0.0 and factors[i] > 0.0 and squares[i + 1, m] != 0.0:
+                return np.inf
     return float(last_root_bound(q))
 
 
@@ -143,6 +148,9 @@ def squared_magnitudes(polynomials: Sequence[FloatArray]) -> tuple[FloatArray, f
         if odd.size:
             row[1 : 2 * odd.size] += np.convolve(odd, odd)
     return squares, float(np.ldexp(1.0, exponent))
+
+
+_last_frequency_soon = soon(_last_frequency)
 
 
 @lru_cache(maxsize=64)
@@ -181,7 +189,7 @@ def last_frequency(
     squares, unit = _squares(system)
     reserve = system.chain_reserve(xs, ys)
     ends = [
-        _last_frequency(squares, unit, np.array([abs(p), abs(q), 1.0]), float(r))
+        _last_frequency_soon(squares, unit, np.array([abs(p), abs(q), 1.0]), float(r))
         for p, q, r in zip(xs.flat, ys.flat, reserve.flat, strict=True)
     ]
     return np.array(ends, dtype=np.float64).reshape(xs.shape)

@@ -13,9 +13,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from armlock.checks import FloatArray, axis, broadcast_shape, positive_array, real_array
-from armlock.loops import Loop
-from armlock.transfer import transfer
+from armlock.checks import (
+    FloatArray,
+    axis,
+    positive_array,
+    real_array,
+    whole_number,
+)
+from armlock.controllers import Controller
+from armlock.loops import Loop, checked_loop
+from armlock.noise import LaserNoise, ShapedNoise
+from armlock.transfer import responses
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,14 +40,39 @@ SPACECRAFT_MOTION = 2.5e-3
 MOTION_CORNER = 0.3
 
 
+#: Noise of a free-running laser at 1 Hz in Hz/sqrt(Hz); it falls as 1/f.
+FREE_RUNNING = 3e4
+#: What disturbs the locked laser.
+SOURCES = ("laser", "shot", "clock", "motion")
+
+_LADDER = [2.0 * np.pi * 10.0 ** (0.5 * k - 6.0) for k in range(20)]
+_CORNER = 2.0 * np.pi * MOTION_CORNER * np.exp(0.75j * np.pi)
+# Rational functions of s with the densities of an arm's noises, in Hz/sqrt(Hz).
+_SHOT = Controller((0.0,), (), np.sqrt(2.0) * SHOT_NOISE)
+_CLOCK = Controller([-(10.0**0.25) * p for p in _LADDER], [-p for p in _LADDER], 1.0)
+_CLOCK = _CLOCK * Controller((), (), CLOCK_NOISE / abs(complex(_CLOCK(2j * np.pi))))
+_MOTION = Controller(
+    (0.0,), (_CORNER, _CORNER.conjugate()), SPACECRAFT_MOTION * abs(_CORNER) ** 2
+)
+
+
 def free_running(frequency: FloatArray) -> FloatArray:
     """Return the noise of a free-running laser in Hz/sqrt(Hz): 30 kHz at 1 Hz, as 1/f."""
-    return 3e4 / frequency
+    return FREE_RUNNING / frequency
 
 
 def cavity(frequency: FloatArray) -> FloatArray:
     """Return the noise of a cavity-stabilised laser in Hz/sqrt(Hz)."""
     return 30.0 * np.sqrt(1.0 + (3e-3 / frequency) ** 4)
+
+
+def mach_zehnder(frequency: FloatArray) -> FloatArray:
+    """Return the noise of a laser stabilised to a Mach-Zehnder interferometer in Hz/sqrt(Hz).
+
+    Two readouts of 1 pm/sqrt(Hz), over a path difference of 0.5 m; as the source has it in
+    Sec. 2.5 but for its loop, of 20 Hz, which gives the free-running laser back above.
+    """
+    return 800.0 * np.sqrt(1.0 + (2.8e-3 / frequency) ** 4)
 
 
 def tdi_capability(frequency: FloatArray) -> FloatArray:
@@ -50,6 +83,7 @@ def tdi_capability(frequency: FloatArray) -> FloatArray:
 #: Laser noises by name, as functions of the frequency in Hz.
 LASERS: dict[str, Callable[[FloatArray], FloatArray]] = {
     "free-running": free_running,
+    "Mach-Zehnder": mach_zehnder,
     "cavity": cavity,
 }
 
@@ -116,8 +150,11 @@ class NoiseBudget:
 def _densities(name: str, value: npt.ArrayLike, frequency: FloatArray) -> FloatArray:
     """Return densities at the frequencies, or raise."""
     asd = real_array(name, value)
-    if broadcast_shape((name, "frequency"), (asd, frequency)) != frequency.shape:
-        raise ValueError(f"{name} must hold a value a frequency, got shape {asd.shape}")
+    if asd.shape not in ((), frequency.shape):
+        raise ValueError(
+            f"{name} must be one number or hold one a frequency, {frequency.size} of them; got "
+            f"shape {asd.shape}"
+        )
     if (asd < 0.0).any():
         raise ValueError(f"{name} must not be negative, got {asd.min()} among its values")
     return np.asarray(np.broadcast_to(asd, frequency.shape))
@@ -153,7 +190,7 @@ def noise_budget(
         The loop, at c1 = c2 = 1.
     frequency : array_like of float, one-dimensional
         In Hz, positive.
-    laser : {"free-running", "cavity"} or array_like of float, optional
+    laser : {"free-running", "Mach-Zehnder", "cavity"} or array_like of float, optional
         Noise of the laser before it is locked, in Hz/sqrt(Hz): by name, or a value a frequency.
     requirement : array_like of float, optional
         What the total is held against, a value a frequency in Hz/sqrt(Hz); by default the
@@ -186,9 +223,8 @@ def noise_budget(
             raise ValueError(f"laser must be one of {', '.join(LASERS)}; got {laser!r}")
         laser = LASERS[laser](f)
     omega = 2.0 * np.pi * f
-    suppression, first, second = (
-        transfer(loop, source, 1j * omega) for source in ("laser", "arm 1", "arm 2")
-    )
+    found = responses(loop, 1j * omega)
+    first, second = found["arm 1"], found["arm 2"]
     both = np.abs([first, second])
     # From cycles to Hz: times 2 pi f.
     shot = omega * SHOT_NOISE * np.sqrt(2.0) * np.hypot(*both)
@@ -201,10 +237,101 @@ def noise_budget(
         + second * (1.0 + np.exp(-1j * omega * loop.tau2))
     )
     sources: dict[str, Any] = {
-        "laser": np.abs(suppression) * _densities("laser", laser, f),
+        "laser": np.abs(found["laser"]) * _densities("laser", laser, f),
         "shot": shot,
         "clock": clock * np.hypot(own, far),
         "motion": moving * np.hypot(here, 2.0 * np.hypot(*both)),
     }
     required = tdi_capability(f) if requirement is None else requirement
     return NoiseBudget(f, sources, _densities("requirement", required, f))
+
+
+def noise_series(
+    loop: Loop, source: str, samples: int, seed: int, sample_rate: float = 200.0
+) -> FloatArray:
+    r"""Draw one source of the budget, as a noise of the laser that drives a simulation.
+
+    With N_1 and N_2 as in `noise_budget`, what adds to the arms acts as a laser's noise that
+    has gone through the controller and the sensor's weights,
+
+    .. math::
+
+        \phi_L = -K m_1 N_1 - K m_2 N_2 .
+
+    Parameters
+    ----------
+    loop : Loop
+        The loop; its dead time is left out of K.
+    source : {"laser", "shot", "clock", "motion"}
+        The source; the laser is the free-running one.
+    samples : int
+        How many.
+    seed : int
+        Of the random numbers; sources with the same seed are independent.
+    sample_rate : float, optional
+        In Hz.
+
+    Returns
+    -------
+    float array, shape (samples,)
+        In Hz, for `armlock.simulate`, from rest at time zero.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If `loop` is no `Loop`, there is no such source, a number is out of range, an open-loop
+        pole lies at s = 0 or right of it, or the open loop does not roll off, which shot noise
+        needs. The laser's noise asks nothing of the loop.
+
+    Notes
+    -----
+    All filters are rational but for the clocks' 1/sqrt(f), which twenty pairs of poles and
+    zeros from 1 uHz on follow to 4e-4 between 0.1 mHz and 10 Hz.
+
+    Examples
+    --------
+    >>> from armlock import flight_loop, simulate
+    >>> from armlock.budget import noise_series
+    >>> loop = flight_loop()
+    >>> locked = simulate(loop, noise_series(loop, "clock", 10_000, seed=1))
+    """
+    checked_loop(loop)
+    count, seed = whole_number("samples", samples, 0), whole_number("seed", seed, 0)
+    if source not in SOURCES:
+        raise ValueError(f"source must be one of {', '.join(SOURCES)}; got {source!r}")
+    streams = np.random.SeedSequence([seed, SOURCES.index(source)]).generate_state(3).tolist()
+    if source == "laser":
+        laser = LaserNoise(streams[0], sample_rate, level=FREE_RUNNING, at_rest=True)
+        return laser.draw(count)
+    rest, *arms = loop.polynomials()
+    if (rest.roots.real >= 0.0).any():
+        raise ValueError(
+            f"loop must have no open-loop pole at s = 0 or right of it, or {source} noise that "
+            f"has gone through it grows without end; got {rest.roots.real.max()} rad/s"
+        )
+    total = np.zeros(count)
+    for b, tau, beat, own in zip(
+        arms, (loop.tau1, loop.tau2), BEAT_NOTES, streams[1:], strict=True
+    ):
+        gain = -float(b.coefficients[-1] / rest.coefficients[-1])
+        if not gain:
+            continue
+        arm = Controller(b.roots.tolist(), rest.roots.tolist(), gain)
+
+        def drawn(shape: Controller, stream: int, arm: Controller = arm) -> FloatArray:
+            whole = shape * arm
+            noise = ShapedNoise(
+                whole.zeros, whole.poles, whole.gain,
+                seed=stream, sample_rate=sample_rate, at_rest=True,
+            )  # fmt: skip
+            return noise.draw(count)
+
+        if source == "shot":
+            total += drawn(_SHOT, own)
+        elif source == "clock":
+            total += beat * (drawn(_CLOCK, streams[0]) + drawn(_CLOCK, own))
+        else:
+            here, late = drawn(_MOTION, streams[0]), round(tau * sample_rate)
+            total += here + 2.0 * drawn(_MOTION, own)
+            total[late:] += here[: count - late]
+    return total

@@ -100,9 +100,14 @@ def even_axis(name: str, value: object, least: int = 2) -> FloatArray:
     return values
 
 
-def finite_series(name: str, value: object) -> FloatArray:
-    """Return a one-dimensional finite float array; a long one is not copied."""
-    return _one_dimensional(name, _real_array(name, value))
+def finite_series(name: str, value: object, dimensions: int = 1) -> FloatArray:
+    """Return a finite float array of one dimension or of so many; a long one is not copied."""
+    array = _real_array(name, value)
+    if dimensions == 1:
+        return _one_dimensional(name, array)
+    if array.ndim != dimensions:
+        raise ValueError(f"{name} must have {dimensions} dimensions, got shape {array.shape}")
+    return array
 
 
 def broadcast_shape(
@@ -168,6 +173,11 @@ def _one_dimensional(name: str, array: FloatArray) -> FloatArray:
 
 def _require_finite(name: str, array: npt.NDArray[Any]) -> None:
     """Raise where a value is infinite or nan."""
+    if array.dtype == np.float64 and array.flags.forc:
+        flat = array.ravel(order="K")
+        # The fastest of all sums; where it overflows, a closer look decides.
+        if math.isfinite(np.dot(flat, flat)):
+            return
     finite = np.isfinite(array)
     if not finite.all():
         first = tuple(int(at) for at in np.argwhere(~finite)[0])

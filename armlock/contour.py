@@ -20,9 +20,10 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numba import config, njit
+from numba import config
 
 from armlock.checks import BoolArray, ComplexArray, FloatArray, IntArray
+from armlock.compiled import njit, soon
 from armlock.exponentials import (
     EPSILON,
     ROUNDING,
@@ -51,6 +52,8 @@ DOUBTFUL = -3
 TOO_LONG = -4
 UNTRIED = -5
 
+# Turns of the longest delay after which `winding` tries again to follow the slow terms alone.
+_BLOCK = 32.0
 # Most steps of one walk, about ten a turn of the longest delay: some five seconds.
 MOST_STEPS = 20_000_000
 # No walk begins that turns the fastest exponential by more radians: it would not end.
@@ -59,6 +62,83 @@ MOST_RADIANS = 10.0 * MOST_STEPS
 MOST_ZEROS = 30_000_000
 # Most samples of a grid.
 MOST_SAMPLES = 10_000_000
+
+
+@njit(cache=True)
+def _follow(
+    local: ComplexArray,
+    phases: FloatArray,
+    bound: FloatArray,
+    error: FloatArray,
+    span: tuple[float, float],
+    omega: float,
+    end: float,
+    step: float,
+    shortest: float,
+) -> tuple[float, float, float, int]:
+    """Argument gathered by an exponential sum from omega to `end`, within one piece.
+
+    `span` is the piece's start and reach; `bound` and `error` are polynomials that bound the
+    second derivative and how far the values may be off. Returns the argument, the frequency
+    up to which it is certain, the last step, and the number of steps. It is not certain up to
+    `end` where that takes a step below `shortest`.
+    """
+    start, reach = span
+    argument, steps = 0.0, 0
+    value, slope = evaluate(start, reach, local, phases, omega)
+    if abs(value) <= real_horner(error, (omega - start) / reach):
+        return argument, omega, step, steps
+    while omega < end and steps <= MOST_STEPS:
+        steps += 1
+        step = min(4.0 * step, end - omega)
+        while True:
+            u = (omega + step - start) / reach
+            distance = tangent_distance(value, slope, step)
+            # Rounding moves the tangent, too: closer to the origin nothing is certain.
+            apart = 0.5 * real_horner(bound, u) * step * step
+            if apart + real_horner(error, u) <= SAFETY * distance:
+                break
+            step *= 0.5
+            if step <= max(shortest, 4.0 * EPSILON * omega) or step < 1e-300:
+                return argument, omega, step, steps
+        following = end if step == end - omega else omega + step
+        next_value, next_slope = evaluate(start, reach, local, phases, following)
+        if abs(next_value) <= real_horner(error, (following - start) / reach):
+            return argument, omega, step, steps
+        # Along the tangent, then from its end to the curve: both parts are principal.
+        tangent = value + step * slope
+        argument += _angle(tangent, value) + _angle(next_value, tangent)
+        omega, value, slope = following, next_value, next_slope
+    return argument, omega, step, steps
+
+
+@njit(cache=True)
+def _angle(value: complex, other: complex) -> float:
+    """Principal argument of value / other."""
+    ratio = value * other.conjugate()
+    return float(np.arctan2(ratio.imag, ratio.real))
+
+
+@njit(cache=True)
+def _slow_terms(
+    local: ComplexArray, sizes: FloatArray, phases: FloatArray
+) -> tuple[ComplexArray, FloatArray, FloatArray, FloatArray]:
+    """Split the terms that turn fast off an exponential sum, within one piece.
+
+    Fast are exponentials of at least a tenth of the longest delay. Returns what is left: its
+    rows, the magnitudes for rounding and the phase rates; and a polynomial in u that bounds
+    what the fast terms add up to.
+    """
+    fastest = np.abs(phases).max()
+    slow, magnitudes, rates = local.copy(), sizes.copy(), phases.copy()
+    fast = np.zeros(local.shape[1])
+    for g in range(phases.size):
+        if abs(phases[g]) >= 0.1 * fastest:
+            slow[0] -= local[g + 1]
+            magnitudes[0] += sizes[g + 1]
+            fast += np.abs(local[g + 1])
+            slow[g + 1], magnitudes[g + 1], rates[g] = 0.0, 0.0, 0.0
+    return slow, magnitudes, rates, fast
 
 
 @njit(cache=True)
@@ -72,50 +152,66 @@ def winding(
 ) -> tuple[float, complex, bool]:
     """Argument gathered by an exponential sum as omega goes from 0 to `omega_end`.
 
+    Where the terms that turn slowly exceed the others together, the sum's argument stays within
+    a quarter of a turn of theirs, and only theirs is followed: in long steps, however fast the
+    others turn.
+
     `uncertain` holds how far the entries of `sums` may be off. Returns the argument, the last
     value up to a positive factor, and whether the sum stays clear of zero. The argument is nan
     where the walk would take more than MOST_STEPS steps.
     """
     steps, argument, omega, step = 0, 0.0, 0.0, omega_end
-    value, slope = 0j, 0j
+    value = 0j
+    block = np.inf
+    if phases.size and phases.any():
+        block = _BLOCK * 2.0 * np.pi / np.abs(phases).max()
     while omega < omega_end or value == 0j:
         start, reach, local, sizes = piece(polynomials, weights, sums, omega, np.inf)
         end = omega_end if polynomials[0].shape[0] > 0 else min(omega + reach, omega_end)
+        span = start, reach
         bound = curvature_bound(start, reach, local, phases)
         error = rounding_bound(start, reach, sizes, phases, ROUNDING)
         # What the uncertainty of `sums` adds to the error: the magnitudes in row 0.
         off = piece(polynomials, weights, uncertain, omega, np.inf)[3]
         for k in range(min(off.shape[1], error.size)):
             error[k] += off[0, k]
-        value, slope = evaluate(start, reach, local, phases, omega)
+        value = evaluate(start, reach, local, phases, omega)[0]
         if abs(value) <= real_horner(error, (omega - start) / reach):
             return argument, value, False
+        many = end - omega > 2.0 * block
+        if many:
+            slow, sizes, rates, fast = _slow_terms(local, sizes, phases)
+            slow_bound = curvature_bound(start, reach, slow, rates)
+            slow_error = rounding_bound(start, reach, sizes, rates, ROUNDING)
+            for k in range(fast.size):
+                slow_error[k] += fast[k]
+            for k in range(min(off.shape[1], slow_error.size)):
+                slow_error[k] += off[0, k]
         while omega < end:
-            steps += 1
+            if many and end - omega > block:
+                turned, following, _, more = _follow(
+                    slow, rates, slow_bound, slow_error, span, omega, end, end - omega, block
+                )
+                steps += more + 1
+                if following > omega:
+                    before = evaluate(start, reach, slow, rates, omega)[0]
+                    after = evaluate(start, reach, slow, rates, following)[0]
+                    argument -= _angle(value, before)
+                    value = evaluate(start, reach, local, phases, following)[0]
+                    argument += turned + _angle(value, after)
+                    omega = following
+            until = min(end, omega + block)
+            turned, following, step, more = _follow(
+                local, phases, bound, error, span, omega, until, step, 0.0
+            )
+            steps += more
             if steps > MOST_STEPS:
                 return np.nan, value, True
-            step = min(4.0 * step, end - omega)
-            while True:
-                u = (omega + step - start) / reach
-                distance = tangent_distance(value, slope, step)
-                # Rounding moves the tangent, too: closer to the origin nothing is certain.
-                apart = 0.5 * real_horner(bound, u) * step * step
-                if apart + real_horner(error, u) <= SAFETY * distance:
-                    break
-                step *= 0.5
-                if step <= 4.0 * EPSILON * omega or step < 1e-300:
-                    return argument, value, False
-            following = end if step == end - omega else omega + step
-            next_value, next_slope = evaluate(start, reach, local, phases, following)
-            if abs(next_value) <= real_horner(error, (following - start) / reach):
-                return argument, next_value, False
-            # Along the tangent, then from its end to the curve: both parts are principal.
-            tangent = value + step * slope
-            along = tangent * value.conjugate()
-            across = next_value * tangent.conjugate()
-            argument += np.arctan2(along.imag, along.real)
-            argument += np.arctan2(across.imag, across.real)
-            omega, value, slope = following, next_value, next_slope
+            value = evaluate(start, reach, local, phases, following)[0]
+            argument += turned
+            if following < until:
+                return argument, value, False
+            omega = following
     return argument, value, True
 
 
@@ -146,8 +242,9 @@ def count_point(model: tuple[Any, ...], x: float, y: float, end: float) -> int:
         return UNCONFINED
     if np.isnan(end):
         return DOUBTFUL
-    if phases.size and end * np.abs(phases).max() > MOST_RADIANS:
-        return TOO_LONG
+    for phase in phases:
+        if end * abs(phase) > MOST_RADIANS:
+            return TOO_LONG
     dx, dy = x - reference[0], y - reference[1]
     here, uncertain, total = np.zeros_like(sums[0]), np.zeros_like(sums[0]), weights[0].copy()
     for k in range(here.size):
@@ -171,10 +268,14 @@ def count_point(model: tuple[Any, ...], x: float, y: float, end: float) -> int:
         ratio = value * a.conjugate()
         argument += _remaining_argument(roots, end) - np.arctan2(ratio.imag, ratio.real)
         count = 0.5 * roots.size - argument / np.pi
-    nearest = int(np.round(count)) if np.isfinite(count) else -1
+    nearest = int(np.floor(count + 0.5)) if np.isfinite(count) else -1
     if abs(count - nearest) > 1e-3 or nearest < 0:
         return DOUBTFUL
     return nearest
+
+
+# In Python a step takes some 50 microseconds.
+_count_soon = soon(count_point, unless=TOO_LONG, MOST_STEPS=2000)
 
 
 @njit(cache=True, nogil=True)
@@ -202,6 +303,8 @@ def count_points(
 
     After the first point that takes too long no further one is tried.
     """
+    if x.size == 1:
+        return np.array([_count_soon(model, x[0], y[0], ends[0])])
     counts, stop = np.empty(x.size, dtype=np.int64), np.zeros(1, dtype=np.bool_)
     _on_all_cores(_count_range, x.size, model, x, y, ends, counts, stop)
     return counts
@@ -342,11 +445,12 @@ def imaginary_zeros(
     polynomials: tuple[Any, ...],
     function: tuple[Any, ...],
     measure: tuple[Any, ...],
+    omega_start: float,
     omega_end: float,
     is_map: bool,
     rounding: float,
 ) -> tuple[FloatArray, bool]:
-    """Zeros in [0, omega_end] of the imaginary part of an exponential sum.
+    """Zeros in [omega_start, omega_end] of the imaginary part of an exponential sum.
 
     `function` and `measure` are weights, sums and phases of two exponential sums, the measure
     being positive: |M|^2 for a row x = N / M, whose `function` is N conj(M). Where the
@@ -357,7 +461,7 @@ def imaginary_zeros(
     - OMEGA, polished;
     - JUMP, twice the direction of the sign change (a conjugate pair crosses); once at
       omega = 0 and, for a map, at `omega_end` (a real root crosses); 0 where rounding hides
-      whether there is one;
+      whether there is one, or the sign at `omega_start`;
     - WIDTH, how far rounding lets the zero move: for a zero that is not simple, half the
       stretch in which the sign is doubtful;
     - POSITION, the real part over the measure, nan where that vanishes;
@@ -365,10 +469,10 @@ def imaginary_zeros(
     """
     weights, sums, phases = function
     zeros = np.empty((64, 5))
-    if phases.size and omega_end * np.abs(phases).max() > MOST_RADIANS:
+    if phases.size and (omega_end - omega_start) * np.abs(phases).max() > MOST_RADIANS:
         return zeros[:0], False
     found, steps, sign = 0, 0, 0
-    omega, last_clear, step = 0.0, 0.0, omega_end
+    omega, last_clear, step = omega_start, omega_start, omega_end
     doubtful = True
     fastest = np.abs(phases).max() if phases.size else 0.0
     while omega < omega_end and steps <= MOST_STEPS and found <= MOST_ZEROS:
@@ -387,10 +491,10 @@ def imaginary_zeros(
         first = found
         value, slope = evaluate(start, reach, local, phases, omega)
         h, dh = value.imag, slope.imag
-        if omega == 0.0:
-            if abs(h) > error[0]:
+        if omega == omega_start:
+            if abs(h) > real_horner(error, (omega - start) / reach):
                 sign, doubtful = (1 if h > 0.0 else -1), False
-            elif abs(dh) > error[1] / reach:
+            elif omega == 0.0 and abs(dh) > error[1] / reach:
                 sign, doubtful = (1 if dh > 0.0 else -1), False
                 zeros[0, OMEGA], zeros[0, JUMP], zeros[0, WIDTH] = 0.0, sign, 0.0
                 found = 1
@@ -421,8 +525,9 @@ def imaginary_zeros(
                     width = 0.5 * (following - last_clear)
                     jump = 0
                     if sign == 0:
-                        # At omega = 0 itself the sign was hidden.
-                        middle, width, jump = 0.0, following, now
+                        # At the start itself the sign was hidden.
+                        middle, width = omega_start, following - omega_start
+                        jump = now if omega_start == 0.0 else 0
                     elif now != sign:
                         jump = 2 * now
                         if not doubtful:
@@ -464,7 +569,9 @@ def _fill_row(
     ends, y, deviation, base, x, lower, upper = rows
     polynomials, fixed, varying, fixed_sums, varying_sums, phases, measure, is_map = model
     function = (fixed - y[i] * varying, fixed_sums - deviation[i] * varying_sums, phases)
-    zeros, complete = imaginary_zeros(polynomials, function, measure, ends[i], is_map, CAUTION)
+    zeros, complete = imaginary_zeros(
+        polynomials, function, measure, 0.0, ends[i], is_map, CAUTION
+    )
     change = np.zeros(x.size + 1, dtype=np.int64)
     total = base[i]
     trusted = complete and base[i] >= 0

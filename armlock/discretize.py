@@ -22,10 +22,10 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 from numpy.polynomial import polynomial as poly
 
 from armlock.checks import ComplexArray, FloatArray, positive_number, real_array
+from armlock.compiled import njit
 from armlock.controllers import Controller
 from armlock.sensors import SignalMapping
 

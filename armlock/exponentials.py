@@ -18,10 +18,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 from numpy.polynomial import polynomial as poly
 
 from armlock.checks import ComplexArray, FloatArray, IntArray
+from armlock.compiled import njit
 
 EPSILON = 2.0**-52
 #: Up to this degree a polynomial is evaluated from its coefficients, beyond from its roots.
@@ -32,6 +32,31 @@ ROUNDING = 8.0
 # How many roots of a polynomial, each weighed by reach / (reach + distance), a piece may have
 # around it. Then LOW_DEGREE powers hold the polynomial to rounding.
 _CROWD = 1.5
+
+
+@njit(cache=True, error_model="numpy")
+def quotient(zeros: ComplexArray, poles: ComplexArray, lead: complex, s: complex) -> complex:
+    """Evaluate `lead` times the product of s - zeros over that of s - poles."""
+    value = lead
+    # In turn, so that the product neither overflows nor underflows on the way.
+    for k in range(max(zeros.size, poles.size)):
+        if k < zeros.size:
+            value *= s - zeros[k]
+        if k < poles.size:
+            value /= s - poles[k]
+    return value
+
+
+@njit(cache=True)
+def _quotients(
+    zeros: ComplexArray,
+    poles: ComplexArray,
+    lead: complex,
+    s: ComplexArray,
+    found: ComplexArray,
+) -> None:
+    for i in range(s.size):
+        found[i] = quotient(zeros, poles, lead, s[i])
 
 
 class Polynomial(NamedTuple):
@@ -47,14 +72,10 @@ class Polynomial(NamedTuple):
 
     def over(self, other: Polynomial, s: ComplexArray) -> ComplexArray:
         """Evaluate p(s) / q(s), factor by factor."""
-        value = np.full(s.shape, self.coefficients[-1] / other.coefficients[-1], dtype=complex)
-        # In turn, so that the product neither overflows nor underflows on the way.
-        for k in range(max(self.roots.size, other.roots.size)):
-            if k < self.roots.size:
-                value *= s - self.roots[k]
-            if k < other.roots.size:
-                value /= s - other.roots[k]
-        return value
+        lead = complex(self.coefficients[-1] / other.coefficients[-1])
+        found = np.empty(s.size, dtype=np.complex128)
+        _quotients(self.roots, other.roots, lead, np.ravel(s), found)
+        return found.reshape(s.shape)
 
     def times_conjugate(self, other: Polynomial) -> Polynomial:
         """Return p q*, where q*(j omega) is the complex conjugate of q(j omega)."""
@@ -155,6 +176,15 @@ class ExponentialSum(NamedTuple):
             np.cumsum([0, *(roots.size for roots in kept)]),
             np.array([p.coefficients[-1] for p in self.polynomials]),
         )
+
+
+def without_unused(*sums: ExponentialSum) -> tuple[ExponentialSum, ...]:
+    """Return sums of the same polynomials without those that have no weight in any of them."""
+    used = np.any([np.any(s.weights, axis=0) | (s.sums != 0.0) for s in sums], axis=0)
+    polynomials = tuple(p for p, kept in zip(sums[0].polynomials, used, strict=True) if kept)
+    return tuple(
+        ExponentialSum(polynomials, s.weights[:, used], s.phases, s.sums[used]) for s in sums
+    )
 
 
 @njit(cache=True)

@@ -15,15 +15,17 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from armlock.checks import ComplexArray, FloatArray
+from armlock.compiled import njit
 from armlock.contour import MOST_STEPS
 from armlock.exponentials import (
+    EPSILON,
     ROUNDING,
     curvature_bound,
     evaluate,
     piece,
+    quotient,
     real_horner,
     rounding_bound,
     tangent_distance,
@@ -222,6 +224,85 @@ def smallest_distance(
     return best, where, width, True
 
 
+@njit(cache=True)
+def _turned(
+    local: ComplexArray,
+    start: float,
+    reach: float,
+    dead_time: FloatArray,
+    point: float,
+    sign: float,
+) -> bool:
+    """Whether sign Re(M - point) > 0 over a piece, for the centre M of the disc of L.
+
+    With `local` rows R, B1 and B2, M is (B1 + B2) exp(-s delay) / R. Multiplied by |R|^2 it is
+    a polynomial, up to the second order of what the dead time turns over the piece.
+    """
+    below, size = local[1], local.shape[1]
+    turn = 1j * dead_time[0] * reach
+    centre = (local[2] + local[3]) * np.exp(1j * dead_time[0] * start)
+    left = 0.5 * np.abs(centre).sum() * abs(turn) ** 2
+    above = np.zeros(size + 1, dtype=np.complex128)
+    above[:size] = centre - point * below
+    above[1:] += turn * centre
+    product = np.zeros(2 * size)
+    for k in range(size + 1):
+        for m in range(size):
+            product[k + m] += sign * (above[k] * below[m].conjugate()).real
+    left += 64.0 * EPSILON * np.abs(above).sum()
+    left = left * np.abs(below).sum() + np.abs(product[2:]).sum()
+    return bool(min(product[0], product[0] + product[1]) > left)
+
+
+@njit(cache=True)
+def meeting_intervals(
+    polynomials: tuple[Any, ...],
+    arms: FloatArray,
+    dead_time: FloatArray,
+    near: float,
+    far: float,
+    omega_end: float,
+    longest_delay: float,
+) -> FloatArray:
+    """Intervals of [0, omega_end], shape (n, 2), outside which L meets no point of a segment.
+
+    `polynomials` are R, B1 and B2, `arms` |c1| and |c2|, and `dead_time` the phase rate of the
+    dead time. The segment is that from `far` to `near` on the negative real axis; L, with any
+    phases of its arms, fills a disc. This is clear of the segment if it is clear of the
+    disc around it, or of the end that is nearest to its centre.
+    """
+    discs = ((0.5 * (near + far), 0.5 * (near - far)), (near, 0.0), (far, 0.0))
+    found = np.empty((64, 2))
+    unit, number, omega = np.eye(3), 0, 0.0
+    longest = np.inf
+    while omega < omega_end:
+        shortest = max(_TURNS * 2.0 * np.pi / longest_delay, 3e-3 * omega)
+        longest = max(min(longest, omega_end), shortest)
+        start, reach, local, sizes = piece(polynomials, unit, np.zeros(3), omega, longest)
+        clear = False
+        for k in range(3):
+            turned = k == 0 or _turned(
+                local, start, reach, dead_time, discs[k][0], 1.0 if k == 1 else -1.0
+            )
+            if turned and _clear(local, sizes, start, reach, arms, dead_time, discs[k]):
+                clear = True
+                break
+        if not clear and reach > 1.01 * shortest:
+            longest = 0.25 * reach
+            continue
+        end = min(omega + reach, omega_end)
+        if not clear and number and found[number - 1, 1] == omega:
+            found[number - 1, 1] = end
+        elif not clear:
+            if number == found.shape[0]:
+                found = np.concatenate((found, np.empty_like(found)))
+            found[number, 0], found[number, 1] = omega, end
+            number += 1
+        omega = end
+        longest = 4.0 * reach
+    return found[:number]
+
+
 #: Places in what `free_margins_at` returns.
 MODULUS, RATIO, PHASE, DELAY = 0, 1, 2, 3
 
@@ -258,72 +339,132 @@ def free_margins_at(centre: complex, radius: float, omega: float) -> FloatArray:
 
 
 @njit(cache=True)
+def _arms(factors: tuple[Any, ...], omega: float) -> ComplexArray:
+    """Return B1 / R and B2 / R at s = j omega."""
+    roots, starts, leads = factors
+    values, poles = np.empty(2, dtype=np.complex128), roots[: starts[1]]
+    for k in range(2):
+        zeros = roots[starts[k + 1] : starts[k + 2]]
+        values[k] = quotient(zeros, poles, complex(leads[k + 1] / leads[0]), 1j * omega)
+    return values
+
+
+@njit(cache=True)
+def _logarithms(
+    factors: tuple[Any, ...], omega: float
+) -> tuple[ComplexArray, FloatArray, float]:
+    """How the logarithms of R, B1 and B2 change at s = j omega.
+
+    Returns their derivatives in omega; the sums of 1 / distance^2 over their roots; and the
+    distance of the nearest root. Over a step each leaves its tangent by at most step^2 / 2
+    times the sum, over 1 - step / nearest, because |log(1 + x) - x| <= |x|^2 / (2 (1 - |x|)).
+    """
+    roots, starts, _ = factors
+    rates, squares, nearest = np.zeros(3, dtype=np.complex128), np.zeros(3), np.inf
+    for k in range(3):
+        for i in range(starts[k], starts[k + 1]):
+            away = 1j * omega - roots[i]
+            square = away.real * away.real + away.imag * away.imag
+            if square == 0.0:
+                return rates, squares, 0.0
+            rates[k] += 1j * away.conjugate() / square
+            squares[k] += 1.0 / square
+            nearest = min(nearest, square)
+    return rates, squares, np.sqrt(nearest)
+
+
+@njit(cache=True)
+def free_margins_over(
+    factors: tuple[Any, ...], arms: FloatArray, delay: float, omega: FloatArray
+) -> FloatArray:
+    """Smallest margins of the disc that L fills with free phases, at given frequencies.
+
+    A row of `free_margins_at` for each.
+    """
+    found = np.empty((omega.size, 4))
+    for i, w in enumerate(omega):
+        values = _arms(factors, w)
+        centre = (values[0] + values[1]) * np.exp(-1j * w * delay)
+        radius = arms[0] * abs(values[0]) + arms[1] * abs(values[1])
+        found[i] = free_margins_at(centre, radius, w)
+    return found
+
+
+@njit(cache=True)
 def free_margins(
-    polynomials: tuple[Any, ...],
+    factors: tuple[Any, ...],
     arms: FloatArray,
     delay: float,
     omega: float,
     omega_end: float,
     best: FloatArray,
-    tolerance: float,
+    tolerance: FloatArray,
 ) -> tuple[FloatArray, FloatArray, bool]:
     """Smallest margins of the disc that L fills with free phases, from omega to `omega_end`.
 
-    `polynomials` are R, B1 and B2, `arms` the sizes of c1 and c2. `best` holds values that are
+    `factors` are the roots of R, B1 and B2, one after the other; where those of each begin; and
+    the highest coefficients. `arms` are the sizes of c1 and c2. `best` holds values that are
     known to occur, or inf. Returns the smallest values, where they were met (nan for those of
     `best`), and whether the walk came to its end. None is smaller than the result by more than
-    the share `tolerance`.
+    its share `tolerance`.
     """
-    unit, best, where = np.eye(3), best.copy(), np.full(4, np.nan)
+    best, where = best.copy(), np.full(4, np.nan)
     step = omega_end
     for _ in range(MOST_STEPS // 8):
+        values = _arms(factors, omega)
+        rates, squares, nearest = _logarithms(factors, omega)
+        k = 0 if abs(values[0]) >= abs(values[1]) else 1
+        arm, other_arm = arms[k], arms[1 - k]
+        first = values[k] * np.exp(-1j * omega * delay)
+        ratio = values[1 - k] / values[k]
+        centre = first * (1.0 + ratio)
+        radius = abs(first) * (arm + other_arm * abs(ratio))
+        here = free_margins_at(centre, radius, omega)
+        for m in range(4):
+            if here[m] < best[m]:
+                best[m], where[m] = here[m], omega
         if best[MODULUS] == 0.0:
             # Some phases take L to -1.
             return best, where, True
-        _, reach, local, _ = piece(
-            polynomials, unit, np.zeros(3), omega, min(step, omega_end - omega)
-        )
-        r, b, other = local[1], local[2], local[3]
-        arm, other_arm = arms[0], arms[1]
-        if abs(b[0]) < abs(other[0]):
-            b, other, arm, other_arm = other, b, other_arm, arm
-        moved_r = np.abs(r[1:]).sum() / abs(r[0])
-        moved_b = np.abs(b[1:]).sum() / abs(b[0])
-        if max(moved_r, moved_b) < 0.5:
-            end, first = omega + reach, b[0] / r[0] * np.exp(-1j * omega * delay)
-            centre = first * (1.0 + other[0] / b[0])
-            radius = abs(first) * (arm + other_arm * abs(other[0] / b[0]))
-            here = free_margins_at(centre, radius, omega)
-            for k in range(4):
-                if here[k] < best[k]:
-                    best[k], where[k] = here[k], omega
-            # Over the piece L is the disc times one factor, that of the first arm without the
-            # phases, times a little more where the second arm changes otherwise.
-            apart = np.abs(other * b[0] - b * other[0]).sum() / abs(b[0]) ** 2
-            wide = radius + abs(first) * (1.0 + other_arm) * apart / (1.0 - moved_b)
-            factor = np.abs(b[1:] / b[0] - r[1:] / r[0]).sum() + delay * reach * (1.0 + moved_b)
-            factor = min(factor / (1.0 - moved_r), 0.9)
-            # With a factor f, |1 + f L| = |f| |1 / f + L|: what matters is how far f takes L,
-            # or -1 if that is less.
-            moved = factor * (abs(centre) + wide)
-            least = free_margins_at(centre, wide + min(moved, factor / (1.0 - factor)), end)
-            if moved > factor:
-                near = free_margins_at(centre, wide, end)
-                least[MODULUS] = (1.0 - factor) * near[MODULUS] - factor
-                # As |1 + L| + |1 - L| >= 2, 1 / |1 - L| is at most half of one plus the ratio.
-                more = 0.5 * factor * (1.0 + near[RATIO])
-                least[RATIO] = ((1.0 - factor) * near[RATIO] - more) / (1.0 + factor + more)
-            if (least >= (1.0 - tolerance) * best).all():
-                if end >= omega_end * (1.0 - 1e-15):
-                    return best, where, True
-                omega, step = end, 2.0 * reach
-                continue
-            if reach <= 1e-12 * omega:
-                # The share of the unit circle of a small disc may begin and end within it.
-                for k in range(4):
-                    if least[k] < best[k]:
-                        best[k], where[k] = max(least[k], 0.0), omega
-                omega, step = end, 2.0 * reach
-                continue
-        step = 0.5 * reach
+        # Rates and bounds on second derivatives of what turns the first arm, and of the ratio.
+        speed, bend = abs(rates[k + 1] - rates[0] - 1j * delay), squares[k + 1] + squares[0]
+        other_speed, other_bend = abs(rates[2 - k] - rates[k + 1]), squares[1] + squares[2]
+        step = min(2.0 * step, 0.5 * nearest, omega_end - omega)
+        if step <= 1e-15 * omega:
+            return best, where, False
+        while True:
+            end = omega + step
+            second = 0.5 * step * step / (1.0 - step / nearest)
+            turned = speed * step + bend * second
+            bent = other_speed * step + other_bend * second
+            # Over the step L is the disc times one factor, that of the first arm without the
+            # phases; the second arm adds what it changes otherwise.
+            if max(turned, bent) < 0.5:
+                factor = np.expm1(turned)
+                wide = radius + abs(first) * (1.0 + other_arm) * abs(ratio) * np.expm1(bent)
+                # With a factor f, |1 + f L| = |f| |1 / f + L|: what matters is how far f takes
+                # L, or -1 if that is less.
+                moved = factor * (abs(centre) + wide)
+                less = min(moved, factor / (1.0 - factor))
+                least = free_margins_at(centre, wide + less, end)
+                if moved > factor:
+                    near = free_margins_at(centre, wide, end)
+                    least[MODULUS] = (1.0 - factor) * near[MODULUS] - factor
+                    # As |1 + L| + |1 - L| >= 2, 1 / |1 - L| is at most half of one plus the
+                    # ratio.
+                    more = 0.5 * factor * (1.0 + near[RATIO])
+                    least[RATIO] = (1.0 - factor) * near[RATIO] - more
+                    least[RATIO] /= 1.0 + factor + more
+                if (least >= (1.0 - tolerance) * best).all():
+                    break
+                if step <= 1e-12 * omega:
+                    # The share of the unit circle of a small disc may begin and end within it.
+                    for m in range(4):
+                        if least[m] < best[m]:
+                            best[m], where[m] = max(least[m], 0.0), omega
+                    break
+            step *= 0.5
+        if end >= omega_end * (1.0 - 1e-15):
+            return best, where, True
+        omega = end
     return best, where, False

@@ -12,6 +12,7 @@ of `armlock.characteristic`. The Hayes equation, which has no sensor, is one mor
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -179,6 +180,10 @@ class Loop(CharacteristicFunction):
 
     def polynomials(self) -> tuple[Polynomial, Polynomial, Polynomial]:
         """Return R, B1 and B2 with their roots: those of controller and signal mapping."""
+        return self._factored
+
+    @cached_property
+    def _factored(self) -> tuple[Polynomial, Polynomial, Polynomial]:
         k, m = self.controller, self.mapping
 
         def roots(own: Sequence[complex], p: Sequence[float]) -> ComplexArray:

@@ -30,6 +30,9 @@ from armlock.stability import (
 
 #: Relative accuracy of the certificate for modulus and disk margins.
 TOLERANCE = 1e-6
+# The same with free phases, in the order of `armlock.infimum.free_margins_at`. The disk margin
+# may be flat over decades of frequency, where a finer one would take too long.
+_FREE_TOLERANCES = np.array([1e-5, 1e-4, 1e-5, 1e-5])
 #: Gain factors up to this, and down to one over it, are looked at.
 LARGEST_GAIN = 1e6
 # Share of their limits within which the disc of a neutral loop must have come for its
@@ -37,6 +40,12 @@ LARGEST_GAIN = 1e6
 _SETTLED = 1e-3
 # Share of its limits up to which the neutral root chain lets gain factors be looked at.
 _NEXT_TO_THE_CHAIN = 1e-4
+# Turns of the longest delay that a walk along the axis can take at once, for a range of gain
+# factors, and how many are no reason to look for a shorter range.
+_MOST_TURNS = 1e6
+_FEW_TURNS = 1e4
+# The shortest such range, as the logarithm of a ratio.
+_SHORTEST_RANGE = 1e-3
 # Crossovers that are polished: those with the smallest margins.
 _POLISHED = 8
 
@@ -125,6 +134,15 @@ def _limit(loop: Loop, c1: float, c2: float, symmetric: bool) -> float:
     return min(abs(1.0 + point) / abs(1.0 - point) for point in ends)
 
 
+def _arm_weights(loop: Loop, c1: float, c2: float) -> FloatArray:
+    """Return |c1| and |c2|; arms of the same delay and response count together, as one."""
+    if loop.tau1 == loop.tau2 and loop.b1.any():
+        ratio = float(loop.b2[-1] / loop.b1[-1])
+        if np.array_equal(loop.b2, ratio * loop.b1):
+            return np.array([abs(c1 + c2 * ratio), 0.0])
+    return np.array([abs(c1), abs(c2)])
+
+
 def _clear_from(loop: Loop, c1: float, c2: float, centre: float, radius: float) -> float:
     """Frequency past which L stays outside a disc around a negative centre; inf if it does not.
 
@@ -132,7 +150,7 @@ def _clear_from(loop: Loop, c1: float, c2: float, centre: float, radius: float) 
     turns, and stands on the other side.
     """
     c = _plus(loop.b1, loop.b2)
-    factors = [radius, abs(c1), abs(c2), 0.0]
+    factors = [radius, *_arm_weights(loop, c1, c2), 0.0]
     first = -centre * loop.rest
     if loop.delay:
         factors[3] = 1.0
@@ -182,7 +200,7 @@ def _smallest(
         found, omega, width, complete = infimum.smallest_distance(
             numerator.compiled(),
             (numerator.weights, numerator.sums, numerator.phases),
-            np.array([abs(c1), abs(c2)]),
+            _arm_weights(loop, c1, c2),
             np.array([-loop.delay]),
             symmetric,
             lowest,
@@ -302,7 +320,9 @@ def _phase_and_delay(
     """
     phase, delay, where = np.inf, np.inf, np.nan
     c = _plus(loop.b1, loop.b2)
-    end = last_larger(loop.rest, (c, loop.b1, loop.b2), np.array([1.0, abs(c1), abs(c2)]))
+    end = last_larger(
+        loop.rest, (c, loop.b1, loop.b2), np.array([1.0, *_arm_weights(loop, c1, c2)])
+    )
     if not np.isfinite(end) and np.isfinite(highest):
         end = highest
     elif not np.isfinite(end):
@@ -396,8 +416,7 @@ def _no_crossing_from(loop: Loop, c1: float, c2: float, low: float, high: float)
     |t R + C| - S must stay positive. \|t R + C\|^2 is convex in t. If it ascends at the lower
     end of the interval, it is smallest there; if it descends at the upper end, there.
     """
-    c = _plus(loop.b1, loop.b2)
-    arms = np.array([abs(c1), abs(c2)])
+    c, arms = _plus(loop.b1, loop.b2), _arm_weights(loop, c1, c2)
     found = [last_larger(loop.rest, (c, loop.b1, loop.b2), np.array([high, *(high * arms)]))]
     if not loop.delay:
         for t, sign in ((1.0 / high, 1.0), (1.0 / low, -1.0)):
@@ -412,6 +431,70 @@ def _ascent(rest: FloatArray, c: FloatArray, t: float, sign: float) -> FloatArra
     whole = _plus(t * rest, c)
     product = np.convolve(whole, rest * (-1.0) ** np.arange(rest.size))[::2]
     return np.asarray(sign * product * (-1.0) ** np.arange(product.size))
+
+
+def _range_of_gains(
+    loop: Loop, c1: float, c2: float, near: float, last: float
+) -> tuple[float, FloatArray]:
+    """Choose a range of gain factors from `near` towards `last`, and where to look for them.
+
+    Returns the end of the range, and the intervals of the axis where L, with free phases of the
+    arms, may meet what the range takes to -1. A shorter range needs less of the axis. Chosen is
+    the one that needs least for its length, among those that can be followed.
+    """
+    step, rest = math.log(4.0), loop.rest_on_boundary().compiled()
+    arms, dead_time = _arm_weights(loop, c1, c2), np.array([-loop.delay])
+    least, chosen = (True, np.inf), (last, np.empty((0, 2)))
+    while step > _SHORTEST_RANGE:
+        far = near * math.exp(math.copysign(step, last - near))
+        if (last - far) * (last - near) <= 0.0:
+            far = last
+        ends = -1.0 / min(near, far), -1.0 / max(near, far)
+        around = 0.5 * (ends[0] + ends[1]), 0.5 * (ends[1] - ends[0])
+        # Past it L is too small, or stays clear of the disc around all that is looked for.
+        end = _no_crossing_from(loop, c1, c2, min(near, far), max(near, far))
+        end = min(end, _clear_from(loop, c1, c2, *around))
+        if not np.isfinite(end):
+            step *= 0.5
+            continue
+        intervals = infimum.meeting_intervals(
+            rest, arms, dead_time, ends[1], ends[0], end, loop.longest_delay
+        )
+        turns = float(np.diff(intervals).sum()) * loop.longest_delay / (2.0 * np.pi)
+        cost = turns > _MOST_TURNS, turns / abs(math.log(far / near))
+        if cost < least:
+            least, chosen = cost, (far, intervals)
+        elif not least[0]:
+            break
+        if turns <= _FEW_TURNS:
+            break
+        step *= 0.5
+    return chosen
+
+
+def _nearest_gain(loop: Loop, c1: float, c2: float, last: float) -> tuple[float, float]:
+    """Find the gain factor next to one, on the side of `last`, that takes a root to the axis.
+
+    Returns it, and at which frequency; `last` and nan if there is none up to it.
+    """
+    crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
+    near = 1.0
+    while near != last:
+        far, intervals = _range_of_gains(loop, c1, c2, near, last)
+        found = [np.empty(0)]
+        for start, end in intervals:
+            omega, jump = sign_changes(crossing, float(end), start=float(start))
+            found.append(omega[(omega > 0.0) & (jump != 0)])
+        omega = np.concatenate(found)
+        with np.errstate(divide="ignore"):
+            factor = -1.0 / loop.open_loop(1j * omega, c1, c2).real
+        between = (factor >= min(near, far)) & (factor <= max(near, far))
+        if between.any():
+            factor, omega = factor[between], omega[between]
+            nearest = int(np.argmin(np.abs(factor - 1.0)))
+            return float(factor[nearest]), float(omega[nearest])
+        near = far
+    return last, np.nan
 
 
 def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float]:
@@ -460,42 +543,24 @@ def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float
     checked_loop(loop)
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
     _require_stable(loop, c1, c2)
-    numerator, rest = loop_numerator(loop, c1, c2), loop.rest_on_boundary()
-    crossing = numerator.times_conjugate(rest)
     floor, limit = _chain_gains(loop, c1, c2)
+    # Just inside the limits of the chain, roots cross at ever higher frequency.
+    least = max(floor * (1.0 + _NEXT_TO_THE_CHAIN), 1.0 / LARGEST_GAIN)
+    most = min(limit * (1.0 - _NEXT_TO_THE_CHAIN), LARGEST_GAIN)
+    lower, _ = _nearest_gain(loop, c1, c2, least) if least < 1.0 else (least, np.nan)
+    upper, where = _nearest_gain(loop, c1, c2, most) if most > 1.0 else (most, np.nan)
+    if lower == least:
+        lower = floor if floor >= 1.0 / LARGEST_GAIN else 0.0
+    if upper == most:
+        upper, where = (limit, np.inf) if limit <= LARGEST_GAIN else (np.inf, np.nan)
     # A real root crosses at s = 0.
     start, first = float(loop.b1[0] * (1.0 - c1) + loop.b2[0] * (1.0 - c2)), float(loop.rest[0])
-    at_zero = [-first / start] if start * first < 0.0 else []
-
-    def factors(low: float, high: float) -> tuple[FloatArray, FloatArray]:
-        """Factors that take a root to the axis, and where."""
-        end = _no_crossing_from(loop, c1, c2, low, high)
-        omega, jump = sign_changes(crossing, end)
-        omega = omega[(omega > 0.0) & (jump != 0)]
-        value = loop.open_loop(1j * omega, c1, c2).real
-        negative = value < 0.0
-        found = np.concatenate((at_zero, -1.0 / value[negative]))
-        return found, np.concatenate((np.zeros(len(at_zero)), omega[negative]))
-
-    # Just inside the limits of the chain, roots cross at ever higher frequency.
-    found, _ = factors(max(floor * (1.0 + _NEXT_TO_THE_CHAIN), 1.0 / LARGEST_GAIN), 1.0)
-    lower = max([floor, *found[found < 1.0]])
-    upper, where = limit, (np.inf if np.isfinite(limit) else np.nan)
-    # A walk is as long as its gain is large. What one meets by chance bounds the next.
-    most = min(LARGEST_GAIN, limit * (1.0 - _NEXT_TO_THE_CHAIN))
-    top = 1.0
-    while top < min(most, upper):
-        top = min(4.0 * top, most, upper)
-        found, omega = factors(1.0, top)
-        above = np.flatnonzero((found > 1.0) & (found < upper))
-        if above.size:
-            best = above[np.argmin(found[above])]
-            upper, where = float(found[best]), float(omega[best])
-    if lower < 1.0 / LARGEST_GAIN:
-        lower = 0.0
-    if upper > LARGEST_GAIN:
-        upper, where = np.inf, np.nan
-    return float(lower), float(upper), float(where)
+    if start * first < 0.0:
+        at_zero = -first / start
+        lower = max(lower, at_zero) if at_zero < 1.0 else lower
+        if 1.0 < at_zero < upper:
+            upper, where = at_zero, 0.0
+    return lower, upper, where
 
 
 def _free_margins(
@@ -517,19 +582,22 @@ def _free_margins(
     end = last_larger(loop.rest, (c, loop.b1, loop.b2), np.array([1.0, *arms]))
     if not np.isfinite(end):
         end = _settled_from(loop)
-    for symmetric in (False, True):
-        level = min(_limit(loop, c1, c2, symmetric), 1.0) * (1.0 - TOLERANCE)
-        end = max(end, _clear_from(loop, c1, c2, *infimum.excluded_disc(level, symmetric)))
     end = max(end, 2.0 * lowest)
+
+    found = loop.polynomials()
+    roots = [p.roots for p in found]
+    factors = (
+        np.concatenate(roots),
+        np.cumsum([0, *(p.size for p in roots)]),
+        np.array([p.coefficients[-1] for p in found]),
+    )
 
     def at(u: npt.ArrayLike) -> FloatArray:
         omega = np.exp(np.atleast_1d(np.asarray(u, dtype=float)))
-        first, second = loop.arm_responses(1j * omega)
-        spread = abs(c1) * np.abs(first) + abs(c2) * np.abs(second)
-        discs = zip(first + second, spread, omega, strict=True)
-        return np.array([infimum.free_margins_at(*disc) for disc in discs])
+        return np.asarray(infimum.free_margins_over(factors, arms, loop.delay, omega))
 
-    u = np.linspace(math.log(lowest), math.log(end), 200)
+    # The smallest distances may lie past the last crossover, where L turns most.
+    u = np.linspace(math.log(lowest), math.log(10.0 * end), 300)
     sampled = at(u)
     best, where = np.minimum(limit, known), np.full(limit.size, np.inf)
     for k in range(best.size):
@@ -538,11 +606,15 @@ def _free_margins(
             continue
         best[k], where[k] = sampled[nearest, k], math.exp(u[nearest])
         sides = u[max(nearest - 1, 0)], u[min(nearest + 1, u.size - 1)]
-        found = minimize_scalar(lambda v, k=k: at(v)[0, k], bounds=sides, method="bounded")
-        if found.fun < best[k]:
-            best[k], where[k] = float(found.fun), math.exp(float(found.x))
+        lower = minimize_scalar(lambda v, k=k: at(v)[0, k], bounds=sides, method="bounded")
+        if lower.fun < best[k]:
+            best[k], where[k] = float(lower.fun), math.exp(float(lower.x))
+    # Past it L stays clear of where smaller values would be.
+    for k, symmetric in ((infimum.MODULUS, False), (infimum.RATIO, True)):
+        level = best[k] * (1.0 - TOLERANCE)
+        end = max(end, _clear_from(loop, c1, c2, *infimum.excluded_disc(level, symmetric)))
     smaller, places, complete = infimum.free_margins(
-        loop.rest_on_boundary().compiled(), arms, loop.delay, lowest, end, best, 1e-5
+        factors, arms, loop.delay, lowest, end, best, _FREE_TOLERANCES
     )
     if not complete:
         raise CountError(
@@ -595,7 +667,8 @@ def margins(
         \le |K| \left( |c_1 m_1| + |c_2 m_2| \right) .
 
     The distances from -1 of this disc, and of its share of the unit circle, are known in closed
-    form at each frequency. A disc that holds -1 has margins of zero. A gain interval is not
+    form at each frequency; their minima over frequency are certified to 1e-5, the disk margin
+    to 1e-4. A disc that holds -1 has margins of zero. A gain interval is not
     given: the edge of such a disc may run along the real axis.
     With equal weights m and c1 = c2 = 1 the disc is that around K m exp(-s delay) times two
     whose edge runs through the origin: it stays clear of -1, for arms of any lengths, where

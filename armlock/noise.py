@@ -12,7 +12,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from armlock import paper
 from armlock.checks import (
@@ -22,6 +21,7 @@ from armlock.checks import (
     true_or_false,
     whole_number,
 )
+from armlock.compiled import njit
 from armlock.controllers import Controller
 from armlock.discretize import (
     Rows,

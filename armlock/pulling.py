@@ -8,19 +8,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import mpmath
 import numpy as np
 import numpy.typing as npt
+from numpy.polynomial import polynomial as poly
 from scipy.interpolate import AAA
 
+from armlock.characteristic import CharacteristicFunction
 from armlock.checks import ComplexArray, FloatArray, axis, positive_array
 from armlock.loops import Loop, checked_loop
+from armlock.stability import CountError, unstable_roots
 from armlock.transfer import transfer
 
 # Multiples of 1 / tau up to which the roots are taken.
-_LINES = 40
+_LINES = 600
 # Points on the circle around s = 0 from which the Laurent coefficients there are taken.
 _CIRCLE = 64
 # Highest order of a pole at s = 0.
@@ -65,15 +69,15 @@ def pulling(
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no `Loop`, a time is not positive, an error does not hold three finite
-        numbers, or there is no such method.
+        If `loop` is no `Loop` or unstable, a time is not positive, an error does not hold
+        three finite numbers, or there is no such method.
 
     Notes
     -----
-    Neither method is certified; they share nothing but the transfer function. Both leave out
-    what the arms' echoes add at high frequency, lines near multiples of 1/tau: the roots
-    beyond 40/tau, Talbot's method beyond some 8/t. In a sensor with nulls there the lines
-    decay slowly, and are of the size of nu0.
+    The two methods share nothing but the transfer function. The first adds up residues at the
+    roots of `slow_roots`, which tells how far these are certified to be all: what is left out
+    decays faster than its `rate`. Talbot's method is not certified; it leaves out what the
+    arms' echoes add beyond some 8/t.
 
     Examples
     --------
@@ -86,10 +90,13 @@ def pulling(
     t = positive_array("time", time)
     if method not in ("roots", "laplace"):
         raise ValueError(f"method must be 'roots' or 'laplace', got {method!r}")
+    unstable = int(unstable_roots(loop, 1.0, 1.0))
+    if unstable > 0:
+        raise ValueError(f"loop must be stable at c1 = c2 = 1, got {unstable} unstable roots")
     errors = [_error("common", common), _error("differential", differential)]
     if method == "laplace":
         return _inverted(loop, t, errors)
-    roots = slow_roots(loop)
+    roots = _found(loop)
     total = np.zeros(t.shape)
     for source, error in zip(("common", "differential"), errors, strict=True):
         if error.any():
@@ -105,11 +112,23 @@ def _error(name: str, values: Sequence[float]) -> FloatArray:
     return error
 
 
-def slow_roots(loop: Loop) -> ComplexArray:
-    """Find the loop's roots below `_LINES` / tau, of pairs those with Im s > 0.
+class SlowRoots(NamedTuple):
+    """Roots of a loop, and how far they are all of them.
 
-    A rational function fitted to the response on the imaginary axis has poles near the slow
-    roots; the others lie near multiples of 1 / tau. Newton's method polishes both.
+    Attributes
+    ----------
+    roots : complex array, shape (n,)
+        In rad/s, ascending in magnitude, of pairs those with Im s > 0; without those at s = 0.
+    rate : float
+        No other root has Re s > -rate, in rad/s: a certified count. 0 if that is not known.
+    """
+
+    roots: ComplexArray
+    rate: float
+
+
+def slow_roots(loop: Loop) -> SlowRoots:
+    """Find the loop's roots below `_LINES` / tau, and count whether they are complete.
 
     Parameters
     ----------
@@ -118,8 +137,26 @@ def slow_roots(loop: Loop) -> ComplexArray:
 
     Returns
     -------
-    complex array, shape (n,)
-        In rad/s, ascending in magnitude; those at s = 0 are left out.
+    SlowRoots
+
+    Examples
+    --------
+    >>> from armlock import flight_loop
+    >>> from armlock.pulling import slow_roots
+    >>> roots, rate = slow_roots(flight_loop())
+    >>> print(f"{len(roots)} roots, all that decay slower than in {1 / rate:.0f} s")
+    571 roots, all that decay slower than in 2716 s
+    """
+    roots = _found(checked_loop(loop))
+    return SlowRoots(roots, _complete_up_to(loop, roots))
+
+
+@lru_cache(maxsize=16)
+def _found(loop: Loop) -> ComplexArray:
+    """Find roots below `_LINES` / tau.
+
+    A rational function fitted to the response on the imaginary axis has poles near the slow
+    ones; the others lie near multiples of 1 / tau. Newton's method polishes both.
     """
     tau = max(loop.tau1, loop.tau2)
     omega = np.geomspace(1e-6 / tau, 4.0 / tau, 1200)
@@ -136,6 +173,50 @@ def slow_roots(loop: Loop) -> ComplexArray:
         if all(abs(root - other) > 1e-7 * abs(root) for other in kept):
             kept.append(complex(root))
     return np.array(kept, dtype=np.complex128)
+
+
+def _complete_up_to(loop: Loop, roots: ComplexArray) -> float:
+    """Return the rate up to which a certified count finds no other roots, or 0."""
+    circle = loop(_circle(loop, roots), 1.0, 1.0)
+    turns = np.angle(np.roll(circle, -1) / circle).sum() / (2.0 * np.pi)
+    decays = np.unique(-roots.real)
+    rates = np.sqrt(decays[:-1] * decays[1:])
+    # Of faster ones there are too many, far up the axis.
+    rates = rates[rates < 0.02 / max(loop.tau1, loop.tau2)]
+    known, unknown = -1, rates.size
+    while unknown - known > 1:
+        middle = (known + unknown) // 2
+        slower = roots[-roots.real < rates[middle]]
+        expected = round(turns) + np.where(slower.imag > 0.0, 2, 1).sum()
+        if _slower_than(loop, rates[middle]) == expected:
+            known = middle
+        else:
+            unknown = middle
+    return float(rates[known]) if known >= 0 else 0.0
+
+
+def _slower_than(loop: Loop, rate: float) -> int:
+    """Count the roots with Re s > -rate, the unstable ones of D(s - rate); -1 if in doubt."""
+    scales = 1.0, math.exp(rate * loop.delay), math.exp(rate * loop.delay)
+    rest, b1, b2 = (
+        np.array(scale * p.coefficients[-1] * poly.polyfromroots(p.roots + rate).real)
+        for scale, p in zip(scales, loop.polynomials(), strict=True)
+    )
+    system = CharacteristicFunction(
+        rest, b1, b2, loop.tau1, loop.tau2, delay=loop.delay, reference=(1.0, 1.0)
+    )
+    try:
+        return int(
+            unstable_roots(system, math.exp(rate * loop.tau1), math.exp(rate * loop.tau2))
+        )
+    except CountError:
+        return -1
+
+
+def _circle(loop: Loop, roots: ComplexArray) -> ComplexArray:
+    """Return points around s = 0, inside of the smallest root."""
+    radius = 0.3 * float(np.abs(roots).min(initial=1e-3 / max(loop.tau1, loop.tau2)))
+    return np.asarray(radius * np.exp(2j * np.pi * (np.arange(_CIRCLE) + 0.5) / _CIRCLE))
 
 
 def _slope(loop: Loop, s: ComplexArray) -> ComplexArray:
@@ -175,9 +256,9 @@ def _residues(
     first, second = loop.arm_responses(roots)
     over = 0.5 * (first + second if source == "common" else first - second)
     residue = -over / _slope(loop, roots) * _input(error, roots)
-    # Laurent coefficients at s = 0, inside of the smallest root.
-    radius = 0.3 * float(np.abs(roots).min(initial=1e-3 / max(loop.tau1, loop.tau2)))
-    circle = radius * np.exp(2j * np.pi * (np.arange(_CIRCLE) + 0.5) / _CIRCLE)
+    # Laurent coefficients at s = 0.
+    circle = _circle(loop, roots)
+    radius = abs(circle[0])
     around = transfer(loop, source, circle) * _input(error, circle)
     laurent = np.array([(around * circle**k).mean().real for k in range(1, _ORDER + 1)])
     size = np.abs(around).max() * radius ** np.arange(1, _ORDER + 1)

@@ -25,7 +25,6 @@ from typing import BinaryIO
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from armlock.checks import (
     ComplexArray,
@@ -36,6 +35,7 @@ from armlock.checks import (
     real_number,
     whole_number,
 )
+from armlock.compiled import njit
 from armlock.discretize import (
     SampledFilter,
     SampledSensor,
@@ -47,8 +47,10 @@ from armlock.loops import Loop
 
 #: Order of the Lagrange interpolation for delays that are not whole samples.
 INTERPOLATION_ORDER = 7
-#: Samples that are computed at a time; results do not depend on it.
+#: Samples that are computed at a time, of all runs; results do not depend on it.
 BLOCK = 1 << 16
+#: Runs of an ensemble that go side by side. Fewer than half as many go one by one.
+LANES = 16
 #: The output counts as diverged when it exceeds the largest input so far by this factor.
 LIMIT = 1e6
 
@@ -155,41 +157,57 @@ def lagrange_delay(name: str, tau: float, sample_rate: float, order: int) -> Del
 
 
 @njit(cache=True)
-def _late(signal: FloatArray, now: int, delay: Delay) -> float:
-    """Return a signal as it was a delay ago."""
+def _late(signal: FloatArray, at: int, lanes: int, delay: Delay) -> float:
+    """Return a signal as it was a delay before the sample at this place."""
     first, weights = delay
     value = 0.0
     for k in range(len(weights)):
-        value += weights[k] * signal[now - first - k]
+        value += weights[k] * signal[np.uintp(at - (first + k) * lanes)]
     return value
 
 
 @njit(cache=True, nogil=True)
 def _advance(
+    lanes: tuple[int, ...],
     phi: FloatArray,
     sent: FloatArray,
     start: int,
     noise: FloatArray,
     c1: FloatArray,
     c2: FloatArray,
+    strides: tuple[int, int, int],
+    count: int,
     delays: tuple[Delay, Delay, Delay],
     sensor: SampledSensor,
     controller: SampledFilter,
-    state: FloatArray,
-    watch: FloatArray,
+    work: FloatArray,
     limit: float,
     done: int,
 ) -> int:
-    """Compute a block of phi, and of what the controller sends, behind `start` samples.
+    """Compute `count` samples of phi, and of what the controller sends, behind `start` others.
 
-    `delays` are those of both arms and the dead time. `state` holds the states of sensor and
-    controller, and last what they send with the next sample if no input comes. `watch` holds
-    the largest input so far, and the number of the last sample not above it. Returns the
-    index at which the output exceeds `limit` times the largest input, or -1.
+    Runs go side by side in lanes, so that one instruction works on several of them; the length
+    of `lanes` is their number, for the compiler to know. phi and sent hold all lanes of one
+    sample, then those of the next; in noise, c1 and c2 the next sample is `strides` further on.
+
+    `delays` are those of both arms and the dead time. `work` holds, each for all lanes: the
+    states of sensor and controller; what they send with the next sample if no input comes; for
+    one sample the light of both arms, the input, and the output; the largest input so far, and
+    the number of the last output not above it. Returns the index of the sample at which an
+    output exceeds `limit` times the largest input, or -1.
     """
     arm1, arm2, dead = delays
     rows, sections, gain = sensor.states, controller.sections, controller.gain
-    m, n = len(rows), len(sections)
+    m, n, size = len(rows), len(sections), len(lanes)
+    # Unsigned, because a negative index would count from the end, which takes time to check.
+    rest = np.uintp((m + 2 * n) * size)
+    row = np.uintp(size)
+    light1 = rest + row
+    light2 = light1 + row
+    free = light2 + row
+    output = free + row
+    most = output + row
+    calm = most + row
     # What an input adds to the present output, and by way of the states to the next.
     direct1, direct2 = sensor.direct
     _, next1, next2 = rows[m - 1]
@@ -199,51 +217,71 @@ def _advance(
     now1, now2, next1, next2 = gain * direct1, gain * direct2, gain * next1, gain * next2
     implicit = dead[0] == 0
     inverse = 1.0 / (1.0 + now1 + now2)
-    rest = state[-1]
-    largest, calm = watch[0], watch[1]
-    stop = -1
-    for i in range(noise.size):
+    for i in range(count):
         now = start + i
-        a1 = c1[i] * _late(phi, now, arm1)
-        a2 = c2[i] * _late(phi, now, arm2)
-        if implicit:
-            # phi = noise - rest - now1 (phi - a1) - now2 (phi - a2), solved for phi.
-            x = (noise[i] + (now1 * a1 + now2 * a2) - rest) * inverse
-        else:
-            x = noise[i] - _late(sent, now, dead)
-        phi[now] = x
-        u1, u2 = x - a1, x - a2
+        at0, at1, at2 = i * strides[0], i * strides[1], i * strides[2]
+        for w in range(size):
+            late = _late(phi, now * size + w, size, arm1)
+            work[light1 + np.uintp(w)] = c1[np.uintp(at1 + w)] * late
+        for w in range(size):
+            late = _late(phi, now * size + w, size, arm2)
+            work[light2 + np.uintp(w)] = c2[np.uintp(at2 + w)] * late
+        for w in range(size):
+            work[free + np.uintp(w)] = noise[np.uintp(at0 + w)]
         if not implicit:
-            sent[now] = rest + (now1 * u1 + now2 * u2)
-        # The states move on; what they send next does not wait for what u1 and u2 do to them.
-        top, below, ready = state[m - 1], 0.0, 0.0
-        for j in range(m):
-            q, b1, b2 = rows[j]
-            old = state[j]
-            ready = old + (below - q * top)
-            state[j] = ready + (b1 * u1 + b2 * u2)
-            below = old
-        v, direct = top, direct1 * u1 + direct2 * u2
-        for j in range(n):
-            r1, r2, k, t1, t2 = sections[j]
-            at = m + 2 * j
-            w1, w2 = state[at], state[at + 1]
-            new1 = w1 + (r1 * w1 - k * w2 + v)
-            new2 = w2 + (r2 * w2 + w1)
-            ready += t1 * new1 + t2 * new2
-            v += t1 * w1 + t2 * w2
-            state[at], state[at + 1] = new1 + direct, new2
-        rest = gain * ready + (next1 * u1 + next2 * u2)
-        size = abs(x)
-        largest = max(largest, abs(noise[i]))
-        if size <= largest:
-            calm = done + i
-        elif not size <= limit * largest:
-            stop = i
-            break
-    state[-1] = rest
-    watch[0], watch[1] = largest, calm
-    return stop
+            for w in range(size):
+                work[output + np.uintp(w)] = _late(sent, now * size + w, size, dead)
+        place = np.uintp(now * size)
+        if not implicit:
+            for w in range(size):
+                lane = np.uintp(w)
+                x = work[free + lane] - work[output + lane]
+                u1, u2 = x - work[light1 + lane], x - work[light2 + lane]
+                sent[place + lane] = work[rest + lane] + (now1 * u1 + now2 * u2)
+        for w in range(size):
+            lane = np.uintp(w)
+            a1, a2 = work[light1 + lane], work[light2 + lane]
+            if implicit:
+                # phi = noise - rest - now1 (phi - a1) - now2 (phi - a2), solved for phi.
+                x = (work[free + lane] + (now1 * a1 + now2 * a2) - work[rest + lane]) * inverse
+            else:
+                x = work[free + lane] - work[output + lane]
+            work[output + lane] = x
+            u1, u2 = x - a1, x - a2
+            # The states move on; what they send next does not wait for what u1 and u2 do.
+            top, below, ready = work[np.uintp((m - 1) * size) + lane], 0.0, 0.0
+            for j in range(m):
+                q, b1, b2 = rows[j]
+                state = np.uintp(j * size) + lane
+                old = work[state]
+                ready = old + (below - q * top)
+                work[state] = ready + (b1 * u1 + b2 * u2)
+                below = old
+            v, direct = top, direct1 * u1 + direct2 * u2
+            for j in range(n):
+                r1, r2, k, t1, t2 = sections[j]
+                state = np.uintp((m + 2 * j) * size) + lane
+                w1, w2 = work[state], work[state + row]
+                new1 = w1 + (r1 * w1 - k * w2 + v)
+                new2 = w2 + (r2 * w2 + w1)
+                ready += t1 * new1 + t2 * new2
+                v += t1 * w1 + t2 * w2
+                work[state], work[state + row] = new1 + direct, new2
+            work[rest + lane] = gain * ready + (next1 * u1 + next2 * u2)
+        for w in range(size):
+            phi[place + np.uintp(w)] = work[output + np.uintp(w)]
+        number, exceeded = float(done + i), 0
+        for w in range(size):
+            lane = np.uintp(w)
+            amount, given = abs(work[output + lane]), abs(work[free + lane])
+            largest = work[most + lane]
+            largest = given if given > largest else largest
+            work[most + lane] = largest
+            work[calm + lane] = number if amount <= largest else work[calm + lane]
+            exceeded += 0 if amount <= limit * largest else 1
+        if exceeded:
+            return i
+    return -1
 
 
 def _checked(
@@ -279,7 +317,7 @@ def _series(name: str, value: npt.ArrayLike, like: FloatArray) -> FloatArray:
     """Return c1 or c2, a finite number or a series, with the shape of the noise."""
     if not isinstance(value, Sequence) and np.ndim(value) == 0:
         return np.broadcast_to(real_number(name, value), like.shape)
-    array = finite_series(name, value)
+    array = finite_series(name, value, like.ndim)
     if array.shape != like.shape:
         raise ValueError(
             f"{name} must be a number or have the shape of noise, {like.shape}; got "
@@ -385,6 +423,8 @@ class Simulation:
     limit : float, optional
         The run counts as diverged when the output exceeds the largest input so far by this
         factor, one at least.
+    draws : int, optional
+        Runs an ensemble of so many, side by side: noise, c1 and c2 have a row for each.
 
     Attributes
     ----------
@@ -420,7 +460,10 @@ class Simulation:
         \varphi[n] = \frac{\varphi_0[n] - r[n] + g \left( d_1 a_1[n] + d_2 a_2[n] \right)}
         {1 + g \left( d_1 + d_2 \right)} .
 
-    One call and many give the same samples, bit by bit.
+    One call and many give the same samples, bit by bit, and so do an ensemble and its runs one
+    by one. An ensemble takes `LANES` runs at a time, whose samples the processor's vector units
+    compute together. Of arrays in Fortran order, where the same sample of all runs stands side
+    by side, nothing has to be copied.
 
     Examples
     --------
@@ -440,6 +483,7 @@ class Simulation:
         history: npt.ArrayLike = 0.0,
         interpolation: int = INTERPOLATION_ORDER,
         limit: float = LIMIT,
+        draws: int | None = None,
     ) -> None:
         self.sample_rate, self._delays = _checked(loop, sample_rate, interpolation)
         self.loop, self.interpolation = loop, interpolation
@@ -451,15 +495,17 @@ class Simulation:
         )
         self._check_closure()
         self.history_samples = max(first + len(weights) - 1 for first, weights in self._delays)
-        check_memory("history", (self.history_samples,), 16)
-        # The output, and what the controller sends: each with its past in front.
-        self._phi = np.zeros(self.history_samples + BLOCK)
-        self._sent = np.zeros_like(self._phi)
-        before = self._phi[: self.history_samples]
-        before[:] = self._checked_history(history)
-        numbers = len(self._sensor.states) + 2 * len(self._controller.sections) + 1
-        self._state = np.zeros(numbers)
-        self._watch = np.array([np.abs(before).max(), 0.0])
+        self.draws = None if draws is None else whole_number("draws", draws, 1)
+        runs = self.draws or 1
+        check_memory("history", (self.history_samples, runs), 16)
+        before = self._checked_history(history)
+        self._runs: list[_Lanes] = []
+        for first in range(0, runs, LANES):
+            # The last ones may be few, and are then faster one by one.
+            left = min(runs - first, LANES)
+            lanes, step = (1, 1) if 2 * left < LANES else (LANES, left)
+            for at in range(first, first + left, step):
+                self._runs.append(_Lanes(slice(at, at + step), lanes, self, before))
         self._stopped: tuple[float, float] | None = None
         self.samples = 0
 
@@ -507,14 +553,14 @@ class Simulation:
 
         Parameters
         ----------
-        noise : array_like, shape (n,)
+        noise : array_like, shape (n,), or (draws, n) for an ensemble
             Free-running noise of the laser; the output has its unit.
-        c1, c2 : float or array_like of shape (n,), optional
+        c1, c2 : float or array_like of the same shape, optional
             Multiplicative perturbations.
 
         Returns
         -------
-        float array, shape (n,)
+        float array, of the same shape
             Noise of the locked laser.
 
         Raises
@@ -524,43 +570,103 @@ class Simulation:
         DivergenceError
             If the output leaves all bounds. The run cannot be continued.
         """
-        given = finite_series("noise", noise)
+        given = finite_series("noise", noise, 1 if self.draws is None else 2)
+        if self.draws not in (None, len(given)):
+            raise ValueError(f"noise must have {self.draws} rows, got shape {given.shape}")
         inputs = given, _series("c1", c1, given), _series("c2", c2, given)
         if self._stopped is not None:
-            raise DivergenceError(*self._stopped, np.empty(0))
-        output = np.empty_like(given)
-        start = self.history_samples
-        for at in range(0, given.size, BLOCK):
-            # Contiguous and writable, as the compiled loop takes them.
-            block = [
-                np.require(values[at : at + BLOCK], requirements=["C", "W"])
-                for values in inputs
-            ]
-            count = block[0].size
+            raise DivergenceError(*self._stopped, np.empty((*given.shape[:-1], 0)))
+        rows = [np.atleast_2d(series) for series in inputs]
+        output = np.empty_like(rows[0])
+        stops = [
+            run.advance(self, *(r[run.rows] for r in (*rows, output))) for run in self._runs
+        ]
+        stop, calm = min(stops)
+        shaped = output.reshape(given.shape)
+        if stop < given.shape[-1]:
+            self.samples += stop
+            self._stopped = calm / self.sample_rate, self.time
+            # A copy, so that the error does not hold all the memory of the run.
+            raise DivergenceError(*self._stopped, shaped[..., :stop].copy())
+        self.samples += given.shape[-1]
+        return shaped
+
+
+class _Lanes:
+    """Some runs of a simulation, side by side, and where they are."""
+
+    def __init__(
+        self, rows: slice, lanes: int, run: Simulation, history: float | FloatArray
+    ) -> None:
+        self.rows, self.lanes = rows, lanes
+        self.past = run.history_samples
+        # At least as long as the past, which each block moves.
+        self.block = max(BLOCK // lanes, self.past)
+        # The output, and what the controller sends: each with its past in front.
+        self.phi = np.zeros((self.past + self.block, lanes))
+        self.sent = np.zeros_like(self.phi)
+        self.phi[: self.past] = np.reshape(history, (-1, 1))
+        numbers = len(run._sensor.states) + 2 * len(run._controller.sections)
+        # See `_advance`: behind the states, five rows, the largest input, the last calm sample.
+        self.work = np.zeros((numbers + 7, lanes))
+        self.work[-2] = np.abs(self.phi[: self.past]).max()
+
+    def advance(
+        self,
+        run: Simulation,
+        noise: FloatArray,
+        c1: FloatArray,
+        c2: FloatArray,
+        output: FloatArray,
+    ) -> tuple[int, float]:
+        """Fill a part of the output; return where it stops, and the last calm sample before."""
+        done = run.samples
+        for at in range(0, noise.shape[1], self.block):
+            count = min(self.block, noise.shape[1] - at)
+            parts = (series[:, at : at + count] for series in (noise, c1, c2))
+            block, strides = zip(*map(self._interleaved, parts), strict=True)
             stop = _advance(
-                self._phi,
-                self._sent,
-                start,
+                (0,) * self.lanes,
+                self.phi.ravel(),
+                self.sent.ravel(),
+                self.past,
                 *block,
-                self._delays,
-                self._sensor,
-                self._controller,
-                self._state,
-                self._watch,
-                self.limit,
-                self.samples,
+                strides,
+                count,
+                run._delays,
+                run._sensor,
+                run._controller,
+                self.work.ravel(),
+                run.limit,
+                done + at,
             )
+            count = count if stop < 0 else stop
+            new = self.phi[self.past : self.past + count, : len(output)]
+            output[:, at : at + count] = new.T
             if stop >= 0:
-                count = stop
-            output[at : at + count] = self._phi[start : start + count]
-            self.samples += count
-            if stop >= 0:
-                self._stopped = float(self._watch[1]) / self.sample_rate, self.time
-                # A copy, so that the error does not hold all the memory of the run.
-                raise DivergenceError(*self._stopped, output[: at + stop].copy())
-            for signal in (self._phi, self._sent):
-                signal[:start] = signal[count : count + start].copy()
-        return output
+                size = np.abs(self.phi[self.past + stop])
+                left = np.argmin(size <= run.limit * self.work[-2])
+                return at + stop, float(self.work[-1, left])
+            for signal in (self.phi, self.sent):
+                signal[: self.past] = signal[count : count + self.past].copy()
+        return noise.shape[1], math.inf
+
+    def _interleaved(self, series: FloatArray) -> tuple[FloatArray, int]:
+        """Return an array with the lanes of a sample side by side, and the way to the next one.
+
+        Nothing is copied of an array in Fortran order, and of a single run. A lane without a
+        run of its own repeats the last one.
+        """
+        step, way = (stride // series.itemsize for stride in series.strides)
+        beside = len(series) == self.lanes and (step == 1 or self.lanes == 1)
+        if beside and way > 0 and series.flags.writeable:
+            length = (series.shape[1] - 1) * way + self.lanes
+            flat = np.lib.stride_tricks.as_strided(series, (length,), (series.itemsize,))
+            return flat, way
+        if way == 0:
+            series = series[:, :1]
+        rows = np.minimum(np.arange(self.lanes), len(series) - 1)
+        return np.ascontiguousarray(series[rows].T).ravel(), self.lanes if way else 0
 
 
 def simulate(
@@ -589,9 +695,9 @@ def simulate(
     ----------
     loop : Loop
         For instance `paper_loop()`.
-    noise : array_like, shape (n,)
+    noise : array_like, shape (n,), or (draws, n) for an ensemble
         Frequency noise of the free-running laser, for instance in Hz.
-    c1, c2 : float or array_like of shape (n,), optional
+    c1, c2 : float or array_like of the same shape, optional
         Multiplicative perturbations of the two arms, constant or sample by sample.
     sample_rate : float, optional
         In Hz.
@@ -604,17 +710,17 @@ def simulate(
 
     Returns
     -------
-    float array, shape (n,)
-        In the unit of `noise`.
+    float array, of the same shape
+        In the unit of `noise`. Each row of an ensemble equals a run of its own, bit by bit.
 
     Raises
     ------
     TypeError, ValueError
         If an argument is unsuitable; before anything is computed.
     DivergenceError
-        If the output leaves all bounds. It carries the time at which that began and the part
-        computed so far. An unstable loop that has not grown so far by the end of the run
-        returns its output.
+        If the output leaves all bounds, in an ensemble that of the first run to do so. It
+        carries the time at which that began and the part computed so far. An unstable loop
+        that has not grown so far by the end of the run returns its output.
 
     Examples
     --------
@@ -624,10 +730,16 @@ def simulate(
     >>> print(f"{step[0]:.4e}")
     9.9991e-05
     """
+    given = noise if isinstance(noise, np.ndarray) else np.asarray(noise)
     run = Simulation(
-        loop, sample_rate, history=history, interpolation=interpolation, limit=limit
+        loop,
+        sample_rate,
+        history=history,
+        interpolation=interpolation,
+        limit=limit,
+        draws=len(given) if given.ndim == 2 else None,
     )
-    return run.advance(noise, c1, c2)
+    return run.advance(given, c1, c2)
 
 
 def simulate_blocks(

@@ -12,8 +12,9 @@ y contributes (`count_point`), or no step of the walk can be certified.
 
 from __future__ import annotations
 
+from concurrent.futures import Executor
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
 import mpmath
@@ -33,7 +34,8 @@ from armlock.checks import (
     broadcast_pair,
     check_memory,
 )
-from armlock.exponentials import ROUNDING, ExponentialSum
+from armlock.exponentials import ROUNDING, ExponentialSum, without_unused
+from armlock.sweep import sweep
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,6 +52,8 @@ _OUTSIDE = (0.38196601125, 0.27639320225)
 
 # Memory that a chart takes for each point: counts, flags, and a copy of them.
 _BYTES_A_POINT = 32
+# Most tiles, of whole rows, into which a chart is cut for an executor.
+_TILES = 64
 _NO_POINTS = np.empty((0, 2))
 
 
@@ -132,9 +136,9 @@ def _roots_of_a(system: CharacteristicFunction) -> ComplexArray:
 
 
 def sign_changes(
-    whole: ExponentialSum, end: float, *, is_map: bool = False
+    whole: ExponentialSum, end: float, *, start: float = 0.0, is_map: bool = False
 ) -> tuple[FloatArray, IntArray]:
-    """Zeros in [0, end] of the imaginary part of an exponential sum, and their jumps.
+    """Zeros in [start, end] of the imaginary part of an exponential sum, and their jumps.
 
     As `armlock.contour.imaginary_zeros`: the jump is 0 where rounding hides whether there is
     one.
@@ -146,10 +150,11 @@ def sign_changes(
     """
     if not np.isfinite(end):
         raise CountError(f"no crossings up to omega = {end}: a number overflows", _NO_POINTS)
+    (whole,) = without_unused(whole)
     function = whole.weights, whole.sums, whole.phases
     nothing = np.zeros((0, whole.sums.size)), np.zeros(whole.sums.size), np.zeros(0)
     zeros, complete = contour.imaginary_zeros(
-        whole.compiled(), function, nothing, end, is_map, ROUNDING
+        whole.compiled(), function, nothing, start, end, is_map, ROUNDING
     )
     if not complete:
         raise CountError(
@@ -200,7 +205,10 @@ def unstable_roots(
     int array, of the broadcast shape
         Number of unstable roots, multiplicity included. The point is stable, with all roots
         in the open left half-plane, where it is 0. `BOUNDARY` (-1) where a root lies on the
-        imaginary axis, or nearer to it than rounding can tell. `UNCONFINED` (-2) where the
+        imaginary axis, or nearer to it than rounding can tell. That of the phase omega tau is
+        the largest: a point within some 8 EPSILON omega tau of the boundary, relative to its
+        parameters, may be given as -1 (3e-10 where a root crosses at 1e4 rad/s, with 20 s).
+        `UNCONFINED` (-2) where the
         neutral root chain is not confined to the left half-plane
         (`CharacteristicFunction.chain_reserve` is not positive): at the latest after an
         arbitrarily small change of the delays it reaches the right half-plane, and no finite
@@ -306,7 +314,11 @@ class StabilityChart:
 
 
 def stability_chart(
-    system: CharacteristicFunction, x: npt.ArrayLike, y: npt.ArrayLike
+    system: CharacteristicFunction,
+    x: npt.ArrayLike,
+    y: npt.ArrayLike,
+    *,
+    executor: Executor | None = None,
 ) -> StabilityChart:
     r"""Count the unstable roots over a grid.
 
@@ -316,6 +328,8 @@ def stability_chart(
         The loop, for instance `CommonArm()`.
     x, y : array_like of float, one-dimensional
         Axes of the two free parameters, in any order and spacing.
+    executor : concurrent.futures.Executor, optional
+        What computes the rows, in tiles, as for `armlock.sweep.sweep`; the same chart.
 
     Returns
     -------
@@ -352,6 +366,20 @@ def stability_chart(
     name1, name2 = checked_system(system).parameters
     xs, ys = axis(name1, x), axis(name2, y)
     check_memory(f"{name1} and {name2}", (ys.size, xs.size), _BYTES_A_POINT)
+    if executor is not None:
+        tiles = np.array_split(ys, min(ys.size, _TILES))
+        charts = sweep(partial(stability_chart, system, xs), tiles, executor=executor)
+        firsts = np.cumsum([0, *(tile.size for tile in tiles[:-1])])
+        return StabilityChart(
+            system,
+            xs,
+            ys,
+            np.vstack([chart.counts for chart in charts]),
+            np.vstack([chart.counted_singly for chart in charts]),
+            np.concatenate(
+                [c.recounted_rows + at for c, at in zip(charts, firsts, strict=True)]
+            ),
+        )
     order_x, order_y = np.argsort(xs, kind="stable"), np.argsort(ys, kind="stable")
     if not system.b1.any():
         # Without B1 nothing crosses along a row: walk along the columns instead.
@@ -426,9 +454,11 @@ def _walk(
     x0, y0 = system.reference
     # Where all exponentials are one, N = A + C - y B2 is R + x0 B1 at y = y0, exactly.
     at_reference = system.rest_on_boundary().sums + x0 * b1.sums
-    fixed = constant._replace(sums=at_reference).times_conjugate(b1)
-    varying = b2.times_conjugate(b1)
-    square = b1.times_conjugate(b1)
+    fixed, varying, square = without_unused(
+        constant._replace(sums=at_reference).times_conjugate(b1),
+        b2.times_conjugate(b1),
+        b1.times_conjugate(b1),
+    )
     # Both over the exponentials of both, so that they add with a weight.
     whole = fixed.plus(varying.scaled(0.0))
     apart = fixed.scaled(0.0).plus(varying)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from armlock.checks import ComplexArray, axis, positive_array
+from armlock.checks import ComplexArray, axis, positive_array, real_number
 from armlock.loops import Loop, checked_loop
 
 if TYPE_CHECKING:
@@ -69,20 +69,35 @@ def transfer(
     >>> print(f"{abs(transfer(flight_loop(), 'laser', 2j * 3.141592653589793 * 3e-3)):.2e}")
     1.13e-05
     """
-    checked_loop(loop)
     if source not in INPUTS:
         raise ValueError(f"source must be one of {', '.join(INPUTS)}; got {source!r}")
-    sensitivity: ComplexArray = 1.0 / (1.0 + loop.open_loop(s, c1, c2))
-    if source == "laser":
-        return sensitivity
+    return responses(loop, s, c1, c2)[source]
+
+
+def responses(
+    loop: Loop, s: npt.ArrayLike, c1: npt.ArrayLike = 1.0, c2: npt.ArrayLike = 1.0
+) -> dict[str, ComplexArray]:
+    """Evaluate the responses to all inputs at once, as `transfer` gives them one by one.
+
+    Parameters
+    ----------
+    loop, s, c1, c2
+        As for `transfer`.
+
+    Returns
+    -------
+    dict of str to complex array, of the broadcast shape
+    """
+    sensitivity = 1.0 / (1.0 + checked_loop(loop).open_loop(s, c1, c2))
     first, second = loop.arm_responses(s)
-    error = {
+    errors = {
         "arm 1": first,
         "arm 2": second,
         "common": 0.5 * (first + second),
         "differential": 0.5 * (first - second),
-    }[source]
-    return np.asarray(-error * sensitivity)
+    }
+    found = {name: np.asarray(-error * sensitivity) for name, error in errors.items()}
+    return {"laser": np.asarray(sensitivity), **found}
 
 
 def closed_loop(
@@ -119,9 +134,8 @@ def closed_loop(
     """
     import control
 
-    checked_loop(loop)
     omega = axis("omega", np.atleast_1d(positive_array("omega", omega)))
-    responses = [transfer(loop, source, 1j * omega, c1, c2) for source in INPUTS]
+    found = responses(loop, 1j * omega, real_number("c1", c1), real_number("c2", c2))
     return control.frd(
-        np.array([responses]), omega, inputs=list(INPUTS), outputs=["locked laser"]
+        np.array([[*found.values()]]), omega, inputs=list(INPUTS), outputs=["locked laser"]
     )

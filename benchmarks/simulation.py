@@ -26,10 +26,12 @@ from benchmarks.report import Row, Topic
 from tests.extended import reference
 
 PYTHON_RATIO = 100.0
+ENSEMBLE_RATIO = 2.5
 ACCURACY = 1e-10
 MEMORY = 2 * 2**30
 CHAPTER = 90.0
 PADE_ORDER = 10
+DRAWS = 32
 
 
 @dataclass(frozen=True)
@@ -225,6 +227,7 @@ def run(*, quick: bool, folder: Path) -> Topic:
     topic.rows.append(
         Row(f"python-control, Pade order {PADE_ORDER} [b]", seconds, seconds / best)
     )
+    topic.rows += ensemble_rows(loop, noise, c1, c2, sizes.passes)
     topic.rows += accuracy_rows(loop, noise, c1, c2, sizes.compared)
     compared = slice(0, 4 * sizes.compared)
     output = simulate(loop, noise[compared], c1[compared], c2[compared])
@@ -249,8 +252,34 @@ def run(*, quick: bool, folder: Path) -> Topic:
         "simulate and the plain loop each make their output, and are timed in turn after "
         "compiling; the best of "
         f"{sizes.passes} runs each.",
+        "[c] The ratio is that to the same runs one by one, on one core, in turn.",
     ]
     return topic
+
+
+def ensemble_rows(
+    loop: Loop, noise: FloatArray, c1: FloatArray, c2: FloatArray, passes: int
+) -> list[Row]:
+    """Compare an ensemble with its runs one by one, in turn."""
+    shape = noise.size // DRAWS, DRAWS
+    # The same sample of all draws side by side, as `Simulation` would have it.
+    together = [part[: shape[0] * DRAWS].reshape(shape).T for part in (noise, c1, c2)]
+    singly = [np.ascontiguousarray(part) for part in together]
+    rows = list(zip(*singly, strict=True))
+    same = np.array_equal(simulate(loop, *together), [simulate(loop, *row) for row in rows])
+    times = [
+        (
+            timed(lambda: simulate(loop, *together).size)[0],
+            timed(lambda: [simulate(loop, *row).size for row in rows])[0],
+        )
+        for _ in range(2 * passes)
+    ]
+    best, other = (min(part) for part in zip(*times, strict=True))
+    return [
+        Row(f"ensemble of {DRAWS}, {shape[0]:.3g} samples each [c]", best, other / best,
+            f"at least {ENSEMBLE_RATIO:g}", other / best >= ENSEMBLE_RATIO),
+        Row("ensemble and single runs agree", None, None, "bit by bit", same, correctness=True),
+    ]  # fmt: skip
 
 
 def accuracy_rows(

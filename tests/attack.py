@@ -157,6 +157,10 @@ def draw(rng):
         size = abs(View(sketch, 0.3, -0.2).at(np.array([at]))[0])
         sketch = sketch.scaled(between(rng, 0.01, 30.0) / size)
     sketch = sketch.scaled(-1.0) if rng.random() < 0.15 else sketch
+    lowest = np.array([1e-10, 1e-9]) / longest
+    sizes = np.abs(View(sketch, *point).at(lowest))
+    if sizes[1] > 0.1 and sizes[1] > 5.0 * sizes[0]:
+        raise UndecidedError("L ascends to unity gain below what the judge looks at")
     most = between(rng, 10.0, 2000.0)
     for _ in range(60):
         if turns(sketch) < most:
@@ -530,7 +534,10 @@ def check_maps(tally, rng, sketch, loop, point):
             continue
         expected = int(np.count_nonzero(size > 1.0))
         for name, count in (("map counts", got[k]), ("map chart", chart.counts[k, k])):
-            if count != expected:
+            if count == -1 and np.abs(size - 1.0).min() < 1e-3:
+                # Slow poles lie together next to z = 1, where rounding hides them.
+                tally.skipped[f"{name}: next to z = 1"] += 1
+            elif count != expected:
                 tally.note(name, (step, order, x[k], y[k]), int(count), expected)
 
 

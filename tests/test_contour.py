@@ -1,3 +1,7 @@
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from numpy.polynomial.polynomial import polyval
@@ -42,6 +46,20 @@ def test_the_larger_of_two_exponentials_decides(weight):
     argument, _, clear = walk([[1.0], [weight]], [0.0, 1.0], 40.0 * np.pi)
     assert clear
     assert argument == pytest.approx(0.0 if weight < 1.0 else 40.0 * np.pi, abs=1e-9)
+
+
+def test_where_slow_terms_prevail_the_others_are_not_followed():
+    # 1 + 0.7 exp(-j omega / 1000) stays larger than 0.2, over 2e9 turns of the last term.
+    end = 1e7
+    argument, value, clear = walk([[1.0], [0.7], [0.2]], [0.0, -1e-3, -2e3], end)
+    exact = 1.0 + 0.7 * np.exp(-1e-3j * end) + 0.2 * np.exp(-2e3j * end)
+    assert clear
+    assert value == pytest.approx(exact, abs=1e-5)
+    assert argument == pytest.approx(np.angle(exact), abs=1e-5)
+    # Where they do not prevail, the last term decides: 0.2 + 0.7 < 1.
+    argument, _, clear = walk([[0.2], [0.7], [1.0]], [0.0, -1e-3, -20.0], 1e3 * np.pi)
+    assert clear
+    assert argument == pytest.approx(-2e4 * np.pi, abs=np.pi)
 
 
 def test_a_zero_on_the_way_is_reported():
@@ -115,23 +133,31 @@ def test_the_last_frequency_is_close_to_where_one_term_outgrows_the_others():
     assert below <= last_frequency(loop, 1.0, 1.0) <= 1.1 * below
 
 
-def test_a_walk_leaves_a_zero_of_high_order_at_once(monkeypatch):
-    # Im f = omega^5 (cos omega - 2) beside Re f = omega^2: next to zero only the former counts.
-    whole = np.zeros((2, 6), dtype=complex)
-    whole[0, 2], whole[1, 5] = 1.0, 1.0j
-    polynomials = whole, np.zeros(0, dtype=complex), np.zeros(1, dtype=np.int64), np.zeros(0)
-    weights, phases = np.array([[0.0, 0.5], [0.0, 0.5]]), np.array([1.0, -1.0])
-    function = weights, np.array([1.0, -1.0]), phases
-    nothing = np.zeros((0, 2)), np.zeros(2), np.zeros(0)
-    steps = []
+# Im f = omega^5 (cos omega - 2) beside Re f = omega^2: next to zero only the former counts.
+HIGH_ORDER = """
+import numpy as np
+from armlock import contour, exponentials
 
-    def counted(*at):
-        steps.append(at)
-        return exponentials.evaluate(*at)
+whole = np.zeros((2, 6), dtype=complex)
+whole[0, 2], whole[1, 5] = 1.0, 1.0j
+polynomials = whole, np.zeros(0, dtype=complex), np.zeros(1, dtype=np.int64), np.zeros(0)
+weights, phases = np.array([[0.0, 0.5], [0.0, 0.5]]), np.array([1.0, -1.0])
+function = weights, np.array([1.0, -1.0]), phases
+nothing = np.zeros((0, 2)), np.zeros(2), np.zeros(0)
+steps = []
+contour.evaluate = lambda *at: steps.append(at) or exponentials.evaluate(*at)
+zeros, complete = contour.imaginary_zeros(
+    polynomials, function, nothing, 0.0, 50.0, False, exponentials.ROUNDING
+)
+print(complete, zeros[:, contour.OMEGA].tolist(), len(steps))
+"""
 
-    inner = contour.imaginary_zeros.py_func
-    monkeypatch.setitem(inner.__globals__, "evaluate", counted)
-    zeros, complete = inner(polynomials, function, nothing, 50.0, False, exponentials.ROUNDING)
-    assert complete
-    assert zeros[:, contour.OMEGA].tolist() == [0.0]
-    assert len(steps) < 500
+
+def test_a_walk_leaves_a_zero_of_high_order_at_once():
+    # Uncompiled, so that the steps can be counted.
+    plain = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+    command = [sys.executable, "-c", HIGH_ORDER]
+    run = subprocess.run(command, env=plain, capture_output=True, text=True, check=True)
+    complete, zeros, steps = run.stdout.split()
+    assert (complete, zeros) == ("True", "[0.0]")
+    assert int(steps) < 500

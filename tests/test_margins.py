@@ -40,6 +40,7 @@ STABLE = {
     "resonance": (Loop(((-1,), (-1e-6 + 3j, -1e-6 - 3j), 1e-7), SINGLE, 2, 1.5), (0.9, 1.0)),
     "weak": (Loop(((), (-1.0,), 1e-3), SINGLE, 2.0, 1.5), (0.9, 1.0)),
     "unstable pole": (Loop(((-2.0,), (0.2, -3.0), 1.5), COMMON, 0.3, 0.2), (0.1, 0.2)),
+    "dead time": (Loop(((), (0.0,), 3.0), COMMON, 20.1, 19.9, delay=0.03), (1.0, 0.999)),
     "neutral": (Loop(((-3.0,), (-1.0,), 0.2), COMMON, 2.0, 1.5), (0.9, 1.0)),
     "neutral, opposed": (Loop(((-3.0,), (-1.0,), 0.2), DIFFERENCE, 2.0, 1.5), (0.9, 1.0)),
 }
@@ -48,7 +49,7 @@ STABLE = {
 def scaled(loop, factor):
     k = loop.controller
     changed = Controller(k.zeros, k.poles, k.gain * factor)
-    return Loop(changed, loop.mapping, loop.tau1, loop.tau2)
+    return Loop(changed, loop.mapping, loop.tau1, loop.tau2, delay=loop.delay)
 
 
 def dense(loop, c1, c2, end):

@@ -4,6 +4,7 @@ import copy
 import pickle
 from itertools import pairwise
 from math import factorial
+from typing import Any
 
 import numpy as np
 import pytest
@@ -29,7 +30,7 @@ from armlock import (
     unstable_roots,
 )
 from armlock.sensors import COMMON, SINGLE, SignalMapping
-from armlock.simulation import BLOCK, lagrange_delay
+from armlock.simulation import BLOCK, LANES, lagrange_delay
 from benchmarks.__main__ import main
 from tests.extended import reference
 
@@ -398,3 +399,44 @@ def test_the_error_travels():
 def test_the_benchmark_runs(tmp_path):
     """It returns 1 if results disagree."""
     assert main(["--quick", "--only", "simulation", "--output", str(tmp_path)]) == 0
+
+
+@pytest.mark.parametrize("draws", [1, LANES // 2 - 1, LANES // 2, 2 * LANES + 3])
+@pytest.mark.parametrize("name", sorted(LOOPS))
+def test_an_ensemble_is_its_runs_bit_by_bit(name, draws):
+    loop, rate = LOOPS[name]
+    noise, c1, c2 = np.random.default_rng(4).standard_normal((3, draws, 700))
+    c1, c2 = 0.5 + 0.1 * c1, np.asfortranarray(0.5 + 0.1 * c2)
+    arguments: dict[str, Any] = {"sample_rate": rate, "history": 0.25, "limit": 1e30}
+    found = simulate(loop, noise, c1, c2, **arguments)
+    one_by_one = [simulate(loop, *row, **arguments) for row in zip(noise, c1, c2, strict=True)]
+    assert np.array_equal(found, one_by_one)
+    run = Simulation(loop, rate, history=0.25, limit=1e30, draws=draws)
+    parts = [
+        run.advance(np.asfortranarray(noise[:, a:b]), c1[:, a:b], c2[:, a:b])
+        for a, b in pairwise([0, 1, 400, 700])
+    ]
+    assert np.array_equal(np.hstack(parts), found)
+
+
+def test_an_ensemble_stops_with_the_first_run_that_diverges():
+    noise = np.ones((LANES + 2, 20_000))
+    c1 = np.full_like(noise, 0.5)
+    c1[3], c1[LANES] = 3.0, 2.0
+    with pytest.raises(DivergenceError) as alone:
+        simulate(SingleArm(), noise[3], c1[3], limit=10.0)
+    with pytest.raises(DivergenceError) as caught:
+        simulate(SingleArm(), noise, c1, limit=10.0)
+    assert (caught.value.time, caught.value.detected) == (
+        alone.value.time,
+        alone.value.detected,
+    )
+    assert np.array_equal(caught.value.output[3], alone.value.output)
+    assert caught.value.output.shape == (len(noise), alone.value.output.size)
+
+
+def test_an_ensemble_refuses_other_shapes():
+    noise = np.ones((3, 50))
+    for wrong in ((noise, noise[0]), (noise[:2],), (noise[0],), (noise[None],)):
+        with pytest.raises(ValueError, match=r"^(c1|noise) must"):
+            Simulation(CommonArm(), 10.0, draws=3).advance(*wrong)

@@ -20,7 +20,8 @@ from packaging.utils import canonicalize_name
 def requirements(project: dict[str, Any]) -> list[Requirement]:
     """Return the direct dependencies, those of the groups and of the build included."""
     lines = [*project["project"]["dependencies"], *project["build-system"]["requires"]]
-    for group in project["dependency-groups"].values():
+    extras = project["project"].get("optional-dependencies", {})
+    for group in (*extras.values(), *project["dependency-groups"].values()):
         lines += group
     return [Requirement(line) for line in lines]
 

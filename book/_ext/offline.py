@@ -6,10 +6,13 @@ those are copied. The package's own Sphinx extension stays unused: it copies eve
 
 The source maps of the theme's scripts, 3.5 MB, serve only those who develop it. They go.
 
+The licences of all that the pages ship stand in `_static/licenses`.
+
 Thebe, which Jupyter Book always adds, would run cells on a server elsewhere. It goes.
 """
 
 import shutil
+from importlib.metadata import files
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -17,6 +20,17 @@ from sphinx_thebe import init_thebe_core, update_thebe_context
 
 SCRIPT = "mathjax/tex-mml-chtml.js"
 NEEDED = ["tex-mml-chtml.js", "output/chtml/fonts", "input/tex/extensions"]
+# Packages that put files of their own into the pages. That of MathJax has no licence text:
+# book/_static/licenses holds it.
+SHIPPED = [
+    "myst-nb",
+    "pydata-sphinx-theme",
+    "sphinx",
+    "sphinx-book-theme",
+    "sphinx-copybutton",
+    "sphinx-design",
+    "sphinx-togglebutton",
+]
 
 
 def mathjax_folder():
@@ -42,6 +56,17 @@ def copy_mathjax(app, exception):
             shutil.copyfile(source, target)
 
 
+def copy_licenses(app, exception):
+    """Copy the licences of the packages whose files the pages load."""
+    if exception is not None or app.builder.format != "html":
+        return
+    target = Path(app.outdir) / "_static" / "licenses"
+    target.mkdir(parents=True, exist_ok=True)
+    for name in SHIPPED:
+        text = next(file for file in files(name) or [] if "LICEN" in file.name.upper())
+        shutil.copyfile(text.locate(), target / f"{name}.txt")
+
+
 def drop_source_maps(app, exception):
     """Take out what only a debugger would ask for."""
     if exception is None and app.builder.format == "html":
@@ -65,5 +90,6 @@ def setup(app):
     app.config.mathjax_path = SCRIPT
     app.connect("config-inited", drop_thebe)
     app.connect("build-finished", copy_mathjax)
+    app.connect("build-finished", copy_licenses)
     app.connect("build-finished", drop_source_maps)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

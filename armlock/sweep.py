@@ -1,0 +1,224 @@
+"""One function at many points: on one core, on all cores, or on many machines."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, as_completed
+from functools import partial
+from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+P = TypeVar("P")
+R = TypeVar("R")
+
+#: Most tasks of a sweep. Of more points than this, a task takes several, one after the other.
+TASKS = 4096
+
+
+def sweep(
+    function: Callable[[P], R],
+    points: Iterable[P],
+    *,
+    executor: Executor | None = None,
+    progress: bool = False,
+    store: str | os.PathLike[str] | None = None,
+    about: Mapping[str, Any] | None = None,
+) -> list[R]:
+    """Call a function at each point, and return the results in the order of the points.
+
+    Parameters
+    ----------
+    function : callable
+        Of one point. Processes and machines get it by pickling: it stands in a module, or is
+        a `functools.partial` of one that does. What is random in it comes from its point, for
+        instance a seed.
+    points : iterable
+        Where it is called.
+    executor : concurrent.futures.Executor, optional
+        What calls it: of processes, of threads, or `client.get_executor()` of a Dask client.
+        Without one, the calls are made here, one by one. The results are the same, bit by
+        bit, on processors of one kind.
+    progress : bool, optional
+        Whether a line on standard error says how far it is.
+    store : path_like, optional
+        HDF5 file that takes results as they come. A sweep that was interrupted, and is called
+        again, goes on where it was. All results are numbers or arrays of one shape and type;
+        with a file they are returned as those of NumPy. It takes the package h5py.
+    about : mapping, optional
+        Attributes of the file, such as the names and units of axes, and the seed.
+
+    Returns
+    -------
+    list
+        Of the results.
+
+    Raises
+    ------
+    TypeError
+        If `executor` is none, for instance a Dask client itself.
+    ValueError
+        If the file is that of another sweep: of other points, function, attributes, or
+        version of this package.
+    ImportError
+        If there is a file to write and no h5py.
+
+    Notes
+    -----
+    A task is one point, or as many as make `TASKS` tasks of all. A worker holds its task's
+    points and results, and what the function takes. An error of the function ends the sweep.
+
+    The file holds the datasets `points` (as numbers, or else as text), `results`, and `done`,
+    which is true where there is a result. The attributes `function` and `armlock`, the version,
+    join those given. It has its full size from the first result on, and then no change of
+    structure, so that a process that is killed leaves a file in order.
+
+    A pool of processes starts them by `spawn`, because a forked process may hang where the
+    parent had threads. The program that makes one starts under ``if __name__ == "__main__":``.
+
+    Examples
+    --------
+    >>> from concurrent.futures import ThreadPoolExecutor
+    >>> from functools import partial
+    >>> from armlock import CommonArm, critical_perturbation, sweep
+    >>> critical = partial(critical_perturbation, CommonArm())
+    >>> directions = [(-1.0, -1.0), (-1.0, -0.5), (1.0, -1.0)]
+    >>> with ThreadPoolExecutor(2) as executor:
+    ...     found = sweep(critical, directions, executor=executor)
+    >>> found == [critical(direction) for direction in directions]
+    True
+
+    With processes, `executor` is
+    ``ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn"))``.
+    """
+    if executor is not None and not isinstance(executor, Executor):
+        raise TypeError(
+            f"executor must be a concurrent.futures.Executor, which client.get_executor() of a "
+            f"Dask client is, got {executor!r}"
+        )
+    given = list(points)
+    results: list[Any] = [None] * len(given)
+    left: Sequence[int] = range(len(given))
+    kept = None
+    if store is not None and given:
+        kept = _Kept(Path(store), given, {"function": _name(function), **(about or {})})
+        left = kept.missing()
+    begin, done = time.monotonic(), 0
+    for part, values in _computed(function, given, left, executor):
+        if kept is not None:
+            kept.write(part, values)
+        else:
+            for i, value in zip(part, values, strict=True):
+                results[i] = value
+        done += len(part)
+        if progress:
+            rest = (time.monotonic() - begin) / done * (len(left) - done)
+            line = f"\r{done + len(given) - len(left)} of {len(given)}, {rest:.0f} s left   "
+            print(line, end="\n" if done == len(left) else "", file=sys.stderr, flush=True)
+    return results if kept is None else kept.results()
+
+
+def _computed(
+    function: Callable[[P], R],
+    points: Sequence[P],
+    left: Sequence[int],
+    executor: Executor | None,
+) -> Iterator[tuple[Sequence[int], list[R]]]:
+    """Yield the results at `left` as they come: which points, and what came."""
+    size = -(-len(left) // TASKS)
+    parts = [left[at : at + size] for at in range(0, len(left), max(size, 1))]
+    if executor is None:
+        for part in parts:
+            yield part, _several(function, [points[i] for i in part])
+        return
+    running = {
+        executor.submit(_several, function, [points[i] for i in part]): part for part in parts
+    }
+    try:
+        for future in as_completed(list(running)):
+            yield running.pop(future), future.result()
+    finally:
+        for future in running:
+            future.cancel()
+
+
+def _several(function: Callable[[P], R], points: list[P]) -> list[R]:
+    return [function(point) for point in points]
+
+
+def _name(function: Callable[..., Any]) -> str:
+    """Return what a function is called, in every process the same."""
+    if isinstance(function, partial):
+        return f"{_name(function.func)} of {function.args} {function.keywords}"
+    return f"{function.__module__}.{getattr(function, '__qualname__', repr(function))}"
+
+
+class _Kept:
+    """The file of a sweep."""
+
+    def __init__(self, path: Path, points: Sequence[Any], about: dict[str, Any]) -> None:
+        try:
+            self._h5py = import_module("h5py")
+        except ImportError as error:
+            raise ImportError("store needs h5py: pip install 'armlock[cluster]'") from error
+        self._path = path
+        self._about = {**about, "armlock": version("armlock")}
+        self._points = np.array([repr(point) for point in points], dtype="S")
+        try:
+            numbers = np.asarray(points)
+        except ValueError:
+            return
+        if numbers.dtype.kind in "biufc":
+            self._points = numbers
+
+    def missing(self) -> Sequence[int]:
+        """Return the points without a result; raise if the file belongs to another sweep."""
+        if not self._path.exists():
+            return range(len(self._points))
+        with self._h5py.File(self._path) as file:
+            wrong = [
+                name
+                for name, value in self._about.items()
+                if not np.array_equal(file.attrs.get(name), value)
+            ]
+            if not np.array_equal(file["points"][...], self._points):
+                wrong.append("points")
+            if wrong:
+                raise ValueError(
+                    f"store must be the file of this very sweep, or of none; {self._path} "
+                    f"has another {wrong[0]}"
+                )
+            return [int(i) for i in np.flatnonzero(~file["done"][...])]
+
+    def write(self, part: Sequence[int], values: Sequence[Any]) -> None:
+        """Write the results of some points, which ascend."""
+        if not self._path.exists():
+            self._create(np.asarray(values[0]))
+        with self._h5py.File(self._path, "r+") as file:
+            file["results"][list(part)] = values
+            # What is said to be done is in the file before.
+            file.flush()
+            file["done"][list(part)] = True
+
+    def results(self) -> list[Any]:
+        with self._h5py.File(self._path) as file:
+            return list(file["results"][...])
+
+    def _create(self, first: np.ndarray[Any, Any]) -> None:
+        """Make the file at its full size, complete from the moment at which it has its name."""
+        count = len(self._points)
+        early = self._h5py.h5p.create(self._h5py.h5p.DATASET_CREATE)
+        early.set_alloc_time(self._h5py.h5d.ALLOC_TIME_EARLY)
+        temporary = self._path.with_name(self._path.name + ".part")
+        with self._h5py.File(temporary, "w") as file:
+            file.attrs.update(self._about)
+            file["points"] = self._points
+            file.create_dataset("done", (count,), dtype=bool, dcpl=early)
+            file.create_dataset("results", (count, *first.shape), first.dtype, dcpl=early)
+        temporary.replace(self._path)

@@ -1,0 +1,83 @@
+"""Sweeps on a Dask cluster of two processes."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armlock import CommonArm, LaserNoise, simulate, stability_chart, sweep
+
+ROOT = Path(__file__).parents[1]
+distributed = pytest.importorskip("distributed")
+
+# Dask warns of ports that are taken and of workers that restart: neither is a failure here.
+pytestmark = pytest.mark.filterwarnings("default")
+
+
+def draw(seed):
+    return simulate(CommonArm(), LaserNoise(seed, 10.0).draw(500), sample_rate=10.0)
+
+
+def draw_or_die(task):
+    """Kill the process that computes one of the tasks, the first time."""
+    seed, place = task
+    if seed == 3 and not Path(place).exists():
+        Path(place).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    time.sleep(0.05)
+    return draw(seed)
+
+
+@pytest.fixture(scope="module")
+def executor():
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address=None
+        ) as c,
+        distributed.Client(c) as client,
+    ):
+        yield client.get_executor()
+
+
+def test_a_cluster_gives_the_serial_results(executor, tmp_path, capsys):
+    expected = [draw(seed) for seed in range(8)]
+    assert np.array_equal(sweep(draw, range(8), executor=executor, progress=True), expected)
+    assert "8 of 8" in capsys.readouterr().err
+    pytest.importorskip("h5py")
+    found = sweep(draw, range(8), executor=executor, store=tmp_path / "draws.h5")
+    assert np.array_equal(found, expected)
+    x, y = np.linspace(-3.0, 3.0, 31), np.linspace(-3.0, 3.0, 130)
+    tiled = stability_chart(CommonArm(), x, y, executor=executor)
+    assert np.array_equal(tiled.counts, stability_chart(CommonArm(), x, y).counts)
+
+
+def test_a_worker_that_is_killed_costs_no_result(executor, tmp_path):
+    place = tmp_path / "killed"
+    found = sweep(draw_or_die, [(seed, str(place)) for seed in range(12)], executor=executor)
+    assert place.exists()
+    assert np.array_equal(found, [draw(seed) for seed in range(12)])
+
+
+def test_the_lines_of_the_page_run(tmp_path):
+    """As a script, whose workers import it again. The second time all results are there."""
+    script = re.findall(
+        r"```python\n(.*?)```", (ROOT / "book/cluster.md").read_text(), re.DOTALL
+    )[0]
+    (tmp_path / "page.py").write_text(script.replace("200)", "6)"))
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    for _ in range(2):
+        done = subprocess.run(
+            [sys.executable, "page.py"],
+            cwd=tmp_path,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert re.fullmatch(r"between \d+\.\d+ and \d+\.\d+\n", done.stdout)

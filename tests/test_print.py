@@ -1,0 +1,57 @@
+"""The printed book, and two makes in one folder."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tools.check_browser import find_chromium
+from tools.print_book import main
+
+ROOT = Path(__file__).parents[1]
+PAGE = """<html><head><link rel="stylesheet" href="../_static/a.css"></head><body><article>
+<p id="id2">first</p> <a href="notebooks/00_front.html#fig">Fig. 1</a> <a href="#id2">[A]</a>
+<a href="../figures/a.csv">CSV</a> <a href="https://example.org">out</a> {link}
+<a href="#document-notebooks/00_front">front</a>
+<figure id="fig"></figure><div class="citation" id="id2">A</div></article></body></html>"""
+FOOT = "<p>Code: MIT License.</p>"
+
+
+@pytest.mark.skipif(find_chromium() is None, reason="needs Chromium")
+@pytest.mark.parametrize("broken", [False, True])
+def test_references_of_the_printed_book_lead_somewhere(tmp_path, monkeypatch, capsys, broken):
+    single, book = tmp_path / "single", tmp_path / "book"
+    (single / "notebooks").mkdir(parents=True)
+    (book / "notebooks").mkdir(parents=True)
+    link = '<a href="notebooks/00_front.html#nowhere">Fig. 2</a>' if broken else ""
+    (single / "notebooks" / "00_front.html").write_text(PAGE.format(link=link))
+    (book / "notebooks" / "01.html").write_text(FOOT)
+    monkeypatch.setattr(sys, "argv", ["print_book", str(single), str(book)])
+    assert main() == broken
+    assert ("nowhere" in capsys.readouterr().out) == broken
+    assert (book / "armlock.pdf").read_bytes().startswith(b"%PDF")
+    assert '<a href="../armlock.pdf">' in (book / "notebooks" / "01.html").read_text()
+
+
+def test_a_second_make_waits_for_the_first(tmp_path):
+    command = [sys.executable, str(ROOT / "tools" / "alone.py"), str(tmp_path / "lock")]
+    first = subprocess.Popen([*command, "sleep", "3"])
+    time.sleep(1.0)
+    second = subprocess.run([*command, "echo", "done"], capture_output=True, text=True)
+    assert first.poll() == 0
+    assert second.stdout == "Another make is building here: waiting for it ...\ndone\n"
+
+
+def test_a_folder_that_the_locale_cannot_name_is_refused(tmp_path):
+    folder = tmp_path / "größe"
+    folder.mkdir()
+    for setting, code in (("C", 1), ("C.UTF-8", 0)):
+        command = [sys.executable, str(ROOT / "tools" / "alone.py"), "lock", "true"]
+        done = subprocess.run(
+            command, cwd=folder, env=os.environ | {"LC_ALL": setting}, capture_output=True
+        )
+        assert done.returncode == code
+        assert (b"set LC_ALL=C.UTF-8" in done.stderr) == (code == 1)
