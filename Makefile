@@ -146,9 +146,10 @@ print: $(INDEX)
 		--path-output build/print --builder custom --custom-builder singlehtml --quiet
 	$(PY) -m tools.print_book build/print/_build/singlehtml build/html
 
-browser: ## Check every page of the book in Chromium, without network
+browser: ## Check every page in Chromium, without network; run the code as it shows it
 	+@$(alone) $(INDEX)
 	$(PY) tools/check_browser.py build/html
+	$(PY) tools/check_cells.py build/html
 
 lab: $(PACKAGE_READY) ## Open the notebooks in JupyterLab
 	$(VENV)/bin/jupyter-lab --notebook-dir notebooks

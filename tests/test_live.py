@@ -147,6 +147,16 @@ def test_no_count_of_5000_differs_off_the_boundary(page):
     assert min((ours == 0).sum(), (ours > 0).sum(), (ours == UNCONFINED).sum()) > 100
 
 
+def test_no_line_of_a_chart_is_wrong_where_a_crossing_passes_its_begin(page):
+    """At this size, one line of 400 was off by two from end to end."""
+    axis = -7.0 + 14.0 * np.arange(400) / 399
+    rows = slice(335, 338)
+    call = "([spec, n]) => [...live.chart(live.make(spec), -7, 7, n, -7, 7, n).counts]"
+    found = np.array(page.evaluate(call, [COMMON, 400])).reshape(400, 400)[rows]
+    expected = stability_chart(CommonArm(), axis, axis[rows]).counts
+    assert ((found != expected).sum(axis=1) < 20).all()
+
+
 @pytest.mark.parametrize(
     ("spec", "loop", "low", "high"),
     [

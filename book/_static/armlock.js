@@ -10,7 +10,7 @@ const WIDE = ".bd-article :is(pre, div.math, .text_html, .pst-scrollable-table-c
 addEventListener("load", () => {
   const look = part => {
     const cut = part.scrollWidth > part.clientWidth + 1;
-    const more = part.scrollWidth - part.clientWidth - part.scrollLeft > 2;
+    const more = part.scrollWidth - part.clientWidth - part.scrollLeft > 1;
     part.toggleAttribute("data-more", cut && more);
     if (cut) part.tabIndex = 0;
   };

@@ -512,15 +512,16 @@ function armlockLoop() {
     }
   }
 
-  /* The crossing before sample i of a line e = 0: chords, kept off the ends, and halvings. */
-  function placed(lines, i) {
-    const [omega, h0] = lines.columns;
-    if (i === 0) return lines.zero[3];
-    let [a, ha, b, hb, x] = [omega[i - 1], h0[i - 1], omega[i], h0[i], NaN];
+  /* The crossing before sample i of a line: chords, kept off the ends, and halvings. */
+  function placed(lines, i, e = 0) {
+    const [omega, h0, h1] = lines.columns;
+    if (i === 0) return lines.zero[3] - e * lines.zero[4];
+    let [a, ha, b, hb, x] = [omega[i - 1], h0[i - 1] - e * h1[i - 1],
+      omega[i], h0[i] - e * h1[i], NaN];
     for (let k = 0; k < 60 && b - a > 1e-15 * b; k++) {
       const share = k % 3 === 2 ? 0.5 : clamp(ha / (ha - hb), 0.01, 0.99), w = a + (b - a) * share;
-      const row = lines.exactly(w), h = row[1];
-      x = row[3];
+      const row = lines.exactly(w), h = row[1] - e * row[2];
+      x = row[3] - e * row[4];
       if (h === 0) break;
       if (h < 0 === ha < 0) [a, ha] = [w, h]; else [b, hb] = [w, h];
     }
@@ -546,25 +547,28 @@ function armlockLoop() {
     if (base < 0) return { counts: counts.fill(base), complete: base === UNCONFINED, from };
     const ends = (low, step, n, begin) =>
       [Math.min(low, begin), Math.max(low + (n - 1) * step, begin), step];
-    const walk = (lines, e, low, step, n, begin, write) => {
+    const walk = (lines, e, low, step, n, begin, reach, write) => {
       const change = new Int32Array(n + 1);
       let total = 0;
-      crossings(lines, e, (x, jump) => {
+      crossings(lines, e, (sampled, jump, i) => {
+        // What is within reach of the begin decides where a whole line starts.
+        const exact = Math.abs(sampled - begin) < reach ? placed(lines, i, e) : NaN;
+        const x = Number.isFinite(exact) ? exact : sampled;
         if (x < begin) total -= jump;
-        const i = Math.ceil((x - low) / step);
-        if (i <= n) change[Math.max(i, 0)] += jump;
+        const k = Math.ceil((x - low) / step);
+        if (k <= n) change[Math.max(k, 0)] += jump;
       });
       for (let i = 0; i < n; i++) write(i, total += change[i]);
     };
     const starts = new Int32Array(ny).fill(base);
     if (loop.second || loop.difference)
       walk(refined(family(from, 0, 1), bx - 1, bx - 1, ...ends(y0 - 1, py, ny, by - 1)),
-        bx - 1, y0 - 1, py, ny, by - 1, (j, extra) => { starts[j] = base + extra; });
+        bx - 1, y0 - 1, py, ny, by - 1, Infinity, (j, extra) => { starts[j] = base + extra; });
     const rows = refined(family(from, 1, 0), y0 - 1, y1 - 1, ...ends(x0 - 1, px, nx, bx - 1));
     const leads = chainLeads(loop);
     for (let j = 0; j < ny; j++) {
       const y = y0 + j * py;
-      walk(rows, y - 1, x0 - 1, px, nx, bx - 1, (i, extra) => {
+      walk(rows, y - 1, x0 - 1, px, nx, bx - 1, 8 * px, (i, extra) => {
         const x = x0 + i * px;
         const share = (Math.abs(x) * leads[1] + Math.abs(y) * leads[2]) / leads[0];
         const n = starts[j] + extra;
