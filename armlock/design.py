@@ -58,7 +58,8 @@ _UNSTABLE = 1e3
 #: Dead time in s of actuator, phasemeter and transponder in the white paper.
 FLIGHT_DELAY: Final = 12.3e-6
 
-# What searches found, rounded, in Hz; the tests find them again.
+# What searches found, rounded, in Hz. `design` finds one like the first from round numbers, and
+# refines the second, which a search outside of this module began.
 _ROBUST_POLES = (0.25e-6, 0.108e-6)
 _ROBUST_LEADS = ((0.37e-6, 1), (16.75e-6, 3)), ((114.7e-6, 4),)
 _ROLL_OFF_ZEROS = (0.111, 4.67, 29.5, 186.0, 1266.0, 15450.0)
