@@ -275,7 +275,7 @@ def count_point(model: tuple[Any, ...], x: float, y: float, end: float) -> int:
 
 
 # In Python a step takes some 50 microseconds.
-_count_soon = soon(count_point, unless=TOO_LONG, MOST_STEPS=2000)
+_count_soon = soon(count_point, unless=TOO_LONG, MOST_STEPS=800)
 
 
 @njit(cache=True, nogil=True)

@@ -521,22 +521,29 @@ def _range_of_gains(
     return chosen
 
 
+def _gains_at(
+    loop: Loop, c1: float, c2: float, intervals: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Find the gain factors that take a root to the axis on intervals of it, and where."""
+    crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
+    found = [np.empty(0)]
+    for start, end in intervals:
+        omega, jump = sign_changes(crossing, float(end), start=float(start))
+        found.append(omega[(omega > 0.0) & (jump != 0)])
+    omega = np.concatenate(found)
+    with np.errstate(divide="ignore"):
+        return -1.0 / loop.open_loop(1j * omega, c1, c2).real, omega
+
+
 def _nearest_gain(loop: Loop, c1: float, c2: float, last: float) -> tuple[float, float]:
     """Find the gain factor next to one, on the side of `last`, that takes a root to the axis.
 
     Returns it, and at which frequency; `last` and nan if there is none up to it.
     """
-    crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
     near = 1.0
     while near != last:
         far, intervals = _range_of_gains(loop, c1, c2, near, last)
-        found = [np.empty(0)]
-        for start, end in intervals:
-            omega, jump = sign_changes(crossing, float(end), start=float(start))
-            found.append(omega[(omega > 0.0) & (jump != 0)])
-        omega = np.concatenate(found)
-        with np.errstate(divide="ignore"):
-            factor = -1.0 / loop.open_loop(1j * omega, c1, c2).real
+        factor, omega = _gains_at(loop, c1, c2, intervals)
         between = (factor >= min(near, far)) & (factor <= max(near, far))
         if between.any():
             factor, omega = factor[between], omega[between]
@@ -544,6 +551,34 @@ def _nearest_gain(loop: Loop, c1: float, c2: float, last: float) -> tuple[float,
             return float(factor[nearest]), float(omega[nearest])
         near = far
     return last, np.nan
+
+
+def _likely_gain(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
+    """Return a gain factor above one that takes a root to the axis, and where, or inf and nan.
+
+    It spares the search most of its way where the smallest one lies at many turns of the
+    delays: roots cross next to the frequency at which free phases would let them first.
+    """
+    arms, turn = np.array([abs(c1), abs(c2)]), 2.0 * np.pi / loop.longest_delay
+    top = _clear_from(loop, c1, c2, *infimum.excluded_disc(1.0 - 1e-3, False))
+    if not 2e3 * turn < top < np.inf:
+        return np.inf, np.nan
+    omega = np.geomspace(1e3 * turn, top, 400)
+    first, second = loop.arm_responses(1j * omega)
+    centre, spread = first + second, arms[0] * np.abs(first) + arms[1] * np.abs(second)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        # The left end of what the disc covers of the real axis.
+        left = centre.real - np.sqrt(spread**2 - centre.imag**2)
+        factor = np.where((left > -1.0) & (left < 0.0), -1.0 / left, np.inf)
+    if factor.min() == np.inf:
+        return np.inf, np.nan
+    at = float(omega[np.argmin(factor)])
+    found, where = _gains_at(loop, c1, c2, np.array([[at - 100.0 * turn, at + 100.0 * turn]]))
+    above = np.flatnonzero(found > 1.0)
+    if not above.size:
+        return np.inf, np.nan
+    nearest = above[np.argmin(found[above])]
+    return float(found[nearest]), float(where[nearest])
 
 
 def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float]:
@@ -597,10 +632,15 @@ def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float
     least = max(floor * (1.0 + _NEXT_TO_THE_CHAIN), 1.0 / LARGEST_GAIN)
     most = min(limit * (1.0 - _NEXT_TO_THE_CHAIN), LARGEST_GAIN)
     lower, _ = _nearest_gain(loop, c1, c2, least) if least < 1.0 else (least, np.nan)
-    upper, where = _nearest_gain(loop, c1, c2, most) if most > 1.0 else (most, np.nan)
+    likely, at = _likely_gain(loop, c1, c2)
+    upper, where = most, np.nan
+    if most > 1.0:
+        upper, where = _nearest_gain(loop, c1, c2, min(most, likely))
     if lower == least:
         lower = floor if floor >= 1.0 / LARGEST_GAIN else 0.0
-    if upper == most:
+    if upper == likely:
+        where = at
+    elif upper == most:
         upper, where = (limit, np.inf) if limit <= LARGEST_GAIN else (np.inf, np.nan)
     # A real root crosses at s = 0.
     start, first = float(loop.b1[0] * (1.0 - c1) + loop.b2[0] * (1.0 - c2)), float(loop.rest[0])

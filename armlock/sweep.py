@@ -95,8 +95,8 @@ def sweep(
     >>> found == [critical(direction) for direction in directions]
     True
 
-    With processes, `executor` is
-    ``ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn"))``.
+    With processes, `executor` is a ``ProcessPoolExecutor`` whose ``mp_context`` is
+    ``multiprocessing.get_context("spawn")``.
     """
     if not callable(function):
         raise TypeError(f"function must be callable, got {function!r}")
