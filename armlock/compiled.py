@@ -100,6 +100,8 @@ def soon(function: Any, *, unless: object = None, **limits: object) -> Callable[
                 result = plain(*arguments)
                 if result != unless:
                     return result
+            # Compiled now, it is the faster way from here on.
+            left[0] = 0
         return function(*arguments)
 
     return call
