@@ -94,9 +94,11 @@ def test_the_first_calls_are_plain_python():
             compiled.append(x)
             return x
 
-    call = soon(Other(), LIMIT=10)
-    assert [call(x) for x in (1, 20, 3, 4, 5, 6)] == [1, 20, 3, 4, 5, 6]
-    assert compiled == [20, 6]
+    for calls, left in (((1, 2, 3, 4, 5, 6), [6]), ((1, 20, 3), [20, 3])):
+        compiled.clear()
+        call = soon(Other(), LIMIT=10)
+        assert tuple(call(x) for x in calls) == calls
+        assert compiled == left
 
 
 LIMIT = 2
