@@ -7,7 +7,7 @@ millisecond each. What it found is then judged again, by the certified counts an
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
@@ -342,14 +342,6 @@ def _cost(
     return 30.0 * missed - (value if MEASURES[objective] else -value)
 
 
-def _several(
-    function: Callable[[FloatArray], float],
-    points: Iterable[FloatArray],
-    executor: Executor | None,
-) -> list[float]:
-    return sweep(function, points, executor=executor)
-
-
 def design(
     structure: Loop,
     objective: str,
@@ -494,7 +486,7 @@ def design(
             x0=judge.x,
             polish=False,
             updating="deferred",
-            workers=partial(_several, executor=executor),
+            workers=partial(sweep, executor=executor),
             callback=report,
         )
         x, evaluations = found.x, int(found.nfev)

@@ -493,7 +493,8 @@ def _range_of_gains(
     """
     step, rest = math.log(4.0), loop.rest_on_boundary().compiled()
     arms, dead_time = _arm_weights(loop, c1, c2), np.array([-loop.delay])
-    least, chosen = (True, np.inf), (last, np.empty((0, 2)))
+    # Where no range has an end on the axis, all of it, which is refused when it is walked.
+    least, chosen = (True, np.inf), (last, np.array([[0.0, np.inf]]))
     while step > _SHORTEST_RANGE:
         far = near * math.exp(math.copysign(step, last - near))
         if (last - far) * (last - near) <= 0.0:

@@ -14,9 +14,7 @@ from typing import Any, NamedTuple
 import mpmath
 import numpy as np
 import numpy.typing as npt
-from numpy.polynomial import polynomial as poly
 
-from armlock.characteristic import CharacteristicFunction
 from armlock.checks import ComplexArray, FloatArray, axis, positive_array
 from armlock.loops import Loop, checked_loop
 from armlock.stability import CountError, unstable_roots
@@ -192,18 +190,8 @@ def _complete_up_to(loop: Loop, roots: ComplexArray) -> float:
 
 def _slower_than(loop: Loop, rate: float) -> int:
     """Count the roots with Re s > -rate, the unstable ones of D(s - rate); -1 if in doubt."""
-    scales = 1.0, math.exp(rate * loop.delay), math.exp(rate * loop.delay)
-    rest, b1, b2 = (
-        np.array(scale * p.coefficients[-1] * poly.polyfromroots(p.roots + rate).real)
-        for scale, p in zip(scales, loop.polynomials(), strict=True)
-    )
-    system = CharacteristicFunction(
-        rest, b1, b2, loop.tau1, loop.tau2, delay=loop.delay, reference=(1.0, 1.0)
-    )
     try:
-        return int(
-            unstable_roots(system, math.exp(rate * loop.tau1), math.exp(rate * loop.tau2))
-        )
+        return int(unstable_roots(loop.shifted(-rate), 1.0, 1.0))
     except CountError:
         return -1
 
