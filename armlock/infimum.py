@@ -25,14 +25,16 @@ from armlock.exponentials import (
     curvature_bound,
     evaluate,
     piece,
-    quotient,
     real_horner,
     rounding_bound,
     tangent_distance,
 )
 
-# Turns of the longest delay in a piece.
+# Turns of the longest delay that are followed at least, where the disc does not help.
 _TURNS = 32.0
+
+#: Places of the four margins in what `free_margins_at` returns, and in levels.
+MODULUS, RATIO, PHASE, DELAY = 0, 1, 2, 3
 
 
 @njit(cache=True)
@@ -57,7 +59,7 @@ def _distance(n: complex, r: complex, symmetric: bool) -> float:
 
 @njit(cache=True)
 def _combined(
-    local: ComplexArray, sizes: FloatArray, weights: FloatArray, sums: FloatArray
+    local: ComplexArray, sizes: FloatArray, weights: FloatArray, sums: FloatArray | ComplexArray
 ) -> tuple[ComplexArray, FloatArray]:
     """Sum polynomials, given as rows 1 to 3, as `armlock.exponentials.piece` does."""
     rows = 1 + weights.shape[0]
@@ -72,47 +74,181 @@ def _combined(
 
 
 @njit(cache=True)
-def _clear(
-    local: ComplexArray,
-    sizes: FloatArray,
-    start: float,
-    reach: float,
-    arms: FloatArray,
-    dead_time: FloatArray,
-    disc: tuple[float, float],
-) -> bool:
-    """Whether L stays outside a disc over a whole piece, whatever the phases of the arms.
+def _disc(factors: tuple[Any, ...], arms: FloatArray, omega: float) -> tuple[Any, ...]:
+    """Return the disc that L fills at s = j omega, and how it changes with omega.
 
-    With centre a and radius r, and `local` rows R, B1 and B2, that is
-    |(B1 + B2) exp(-s delay) - a R| > r |R| + |c1 B1| + |c2 B2|.
+    L is M less c1 F1 exp(-s tau1) + c2 F2 exp(-s tau2), where F1 and F2 are the responses to
+    the two arms, dead time included, and M = F1 + F2. With the phases free it fills a disc
+    around M. Next to omega = 0 the phase between two arms of nearly the same length is known;
+    only their common one is free then.
+
+    `factors` are the roots of F1 and F2, their powers in each, and the highest coefficients.
+    `arms` are c1, c2, tau2 - tau1 (nan where both phases are free at all frequencies) and the
+    dead time. Returned are, for the larger response F and the other one, G:
+
+    - F, and G / F;
+    - the rate at which log F changes with omega, and a bound on its second derivative;
+    - the same two for log(G / F);
+    - c of the larger one; c G / F of the other, turned against it; and its logarithm's rate;
+    - the distance of the nearest root, up to which the bounds hold: within a step they are
+      divided by 1 - step / nearest, because |log(1 + x) - x| <= |x|^2 / (2 (1 - |x|)).
     """
-    centre, radius = disc
-    weights = np.array([[0.0, 1.0, 1.0]])
-    apart, most = _combined(local, sizes, weights, np.array([-centre, 1.0, 1.0]))
-    bound = curvature_bound(start, reach, apart, dead_time)
-    error = rounding_bound(start, reach, most, dead_time, ROUNDING)
-    value, slope = evaluate(start, reach, apart, dead_time, start)
-    if value == 0.0:
-        return False
-    # |value + slope t| >= |value| (1 + t Re(slope / value)), and alike from above: the linear
-    # parts of all terms add up, and what is left is of second order.
-    begin = abs(value)
-    change = reach * (slope * value.conjugate()).real / begin
-    left = 0.5 * real_horner(bound, 1.0) * reach * reach + real_horner(error, 1.0)
-    for k, weight in ((1, radius), (2, arms[0]), (3, arms[1])):
-        size = abs(local[k, 0])
-        if size == 0.0:
-            left += weight * np.abs(local[k]).sum()
+    roots, powers, leads = factors
+    value1, value2 = complex(leads[0]), complex(leads[1])
+    rate1, rate2, nearest = 0j, 0j, np.inf
+    bend1, bend2, bend = 0.0, 0.0, 0.0
+    for i in range(roots.size):
+        away = 1j * omega - roots[i]
+        square = away.real * away.real + away.imag * away.imag
+        if square == 0.0:
+            nearest = 0.0
             continue
-        begin -= weight * size
-        higher = 0.0
-        if local.shape[1] > 1:
-            first = local[k, 1] * local[k, 0].conjugate() / size
-            change -= weight * first.real
-            higher = abs(local[k, 1])
-        beyond = np.abs(local[k, 2:]).sum()
-        left += weight * (beyond + 0.5 * (higher + beyond) ** 2 / size)
-    return bool(min(begin, begin + change) > left)
+        n1, n2 = powers[0, i], powers[1, i]
+        # Powers alternate, so that the products neither overflow nor underflow on the way.
+        for _ in range(n1):
+            value1 *= away
+        for _ in range(-n1):
+            value1 /= away
+        for _ in range(n2):
+            value2 *= away
+        for _ in range(-n2):
+            value2 /= away
+        rate = 1j * away.conjugate() / square
+        rate1, rate2 = rate1 + n1 * rate, rate2 + n2 * rate
+        bend1, bend2 = bend1 + abs(n1) / square, bend2 + abs(n2) / square
+        bend += abs(n2 - n1) / square
+        nearest = min(nearest, square)
+    c1, c2, apart, delay = arms
+    if abs(value1) < abs(value2):
+        value1, value2, rate1, rate2 = value2, value1, rate2, rate1
+        bend1, c1, c2, apart = bend2, c2, c1, -apart
+    turn, ratio = np.exp(-1j * omega * delay), value2 / value1 if value2 != 0.0 else 0j
+    between = rate2 - rate1 if value2 != 0.0 else 0j
+    held, swung, swing = complex(abs(c1)), complex(abs(c2 * ratio)), complex(between.real)
+    if abs(apart) * omega < 1.0:
+        held, swung = complex(c1), c2 * ratio * np.exp(-1j * omega * apart)
+        swing = between - 1j * apart
+    return (
+        value1 * turn, ratio, rate1 - 1j * delay, bend1, between, bend,
+        held, swung, swing, np.sqrt(nearest),
+    )  # fmt: skip
+
+
+@njit(cache=True)
+def _centre_and_radius(disc: tuple[Any, ...]) -> tuple[complex, float]:
+    first, ratio, held, swung = disc[0], disc[1], disc[6], disc[7]
+    return first * (1.0 + ratio), abs(first) * abs(held + swung)
+
+
+@njit(cache=True)
+def _beyond_first_order(rate: complex, bend: float, step: float) -> float:
+    """Bound on |exp(z) - 1 - rate step|, where |z - rate step| <= bend."""
+    size = abs(rate) * step + bend
+    return float(bend + 0.5 * size * size * np.exp(size))
+
+
+@njit(cache=True)
+def _ahead(disc: tuple[Any, ...], step: float) -> tuple[float, float, float, float, float]:
+    """How the parts of a disc change over a step.
+
+    Returned are the slope of the radius over |F|, bounded from above; what F, as a factor, and
+    the rest over |F| change by beyond first order; and how much log F and G / F change at most.
+    """
+    _, ratio, rate, bend, between, other, held, swung, swing, nearest = disc
+    second = 0.5 * step * step / (1.0 - step / nearest)
+    # Up to higher orders |held + swung| is convex, and below its chord.
+    slope = (abs(held + swung + swung * swing * step) - abs(held + swung)) / step
+    own = _beyond_first_order(rate, bend * second, step)
+    left = abs(ratio) * _beyond_first_order(between, other * second, step)
+    left += abs(swung) * _beyond_first_order(swing, other * second, step)
+    turned = abs(rate) * step + bend * second
+    return slope, own, left, turned, abs(ratio) * np.expm1(abs(between) * step + other * second)
+
+
+@njit(cache=True)
+def _clear(
+    disc: tuple[Any, ...], ahead: tuple[Any, ...], step: float, point: complex, radius: float
+) -> bool:
+    """Whether L stays outside a disc around `point` over a step, whatever the free phases.
+
+    Divided by what F changes by, L keeps its size to first order, however large it is, and the
+    other disc moves: that is what the distance of the two is made of here. Only what is beyond
+    first order counts against it. |v + v' t| is at least |v| (1 + t Re(v' / v)).
+    """
+    first, ratio, rate, between = disc[0], disc[1], disc[2], disc[4]
+    centre, spread = _centre_and_radius(disc)
+    slope, own, left, _, _ = ahead
+    away = centre - point
+    distance = abs(away)
+    if distance == 0.0:
+        return False
+    begin = distance - spread - radius
+    change = first * ratio * between + point * rate
+    total = (change * away.conjugate()).real / distance - abs(first) * slope
+    total += radius * rate.real
+    beyond = (abs(point) + radius) * own + abs(first) * left
+    rounding = 64.0 * EPSILON * (abs(centre) + spread + abs(point) + radius)
+    return bool(min(begin, begin + total * step) > beyond + rounding)
+
+
+@njit(cache=True)
+def _nothing_smaller(
+    disc: tuple[Any, ...], omega: float, step: float, levels: FloatArray
+) -> bool:
+    """Whether no margin is below its level over a step, whatever the free phases.
+
+    Levels of zero are not looked at.
+    """
+    ahead = _ahead(disc, step)
+    if levels[MODULUS] > 0.0 and not _clear(disc, ahead, step, -1.0 + 0j, levels[MODULUS]):
+        return False
+    if levels[RATIO] > 0.0:
+        point, radius = excluded_disc(levels[RATIO], True)
+        if not _clear(disc, ahead, step, complex(point), radius):
+            return False
+    if levels[PHASE] <= 0.0 and levels[DELAY] <= 0.0:
+        return True
+    # Nothing has a phase if the disc stays outside the unit circle, or inside.
+    if _clear(disc, ahead, step, 0j, 1.0):
+        return True
+    first, ratio = disc[0], disc[1]
+    slope, _, left, turned, changed = ahead
+    centre, spread = _centre_and_radius(disc)
+    most = abs(centre) + spread + abs(first) * (changed + max(slope * step, 0.0) + left)
+    if most * np.exp(turned) < 1.0:
+        return True
+    lead = min(levels[PHASE], np.pi)
+    lag = max(lead, levels[DELAY] * (omega + step))
+    if lead + lag >= 2.0 * np.pi:
+        return False
+    # The disc covers the circle around its own direction. It may come to the arc that holds
+    # smaller margins over an end of it, or by turning there.
+    for end in (-np.exp(-1j * lead), -np.exp(1j * lag)):
+        if not _clear(disc, ahead, step, end, 0.0):
+            return False
+    if changed >= abs(1.0 + ratio):
+        return False
+    own = np.arctan2(-centre.imag, -centre.real) % (2.0 * np.pi)
+    turned += np.arcsin(changed / abs(1.0 + ratio))
+    return bool(min(own - lag, 2.0 * np.pi - lead - own) > turned)
+
+
+@njit(cache=True)
+def _misses_segment(disc: tuple[Any, ...], step: float, near: float, far: float) -> bool:
+    """Whether L stays off a segment of the negative real axis, whatever the free phases.
+
+    It does if it stays off the disc around it, or off the end that is nearest to its centre.
+    """
+    ahead = _ahead(disc, step)
+    if _clear(disc, ahead, step, complex(0.5 * (near + far)), 0.5 * (near - far)):
+        return True
+    centre, (turned, changed) = _centre_and_radius(disc)[0], ahead[3:]
+    moved = abs(centre) * np.expm1(turned) + abs(disc[0]) * changed * np.exp(turned)
+    if centre.real - moved > near:
+        return bool(_clear(disc, ahead, step, complex(near), 0.0))
+    if centre.real + moved < far:
+        return bool(_clear(disc, ahead, step, complex(far), 0.0))
+    return False
 
 
 @njit(cache=True)
@@ -138,8 +274,8 @@ def _stays_above(
 def smallest_distance(
     polynomials: tuple[Any, ...],
     numerator: tuple[Any, ...],
+    factors: tuple[Any, ...],
     arms: FloatArray,
-    dead_time: FloatArray,
     symmetric: bool,
     omega: float,
     omega_end: float,
@@ -149,33 +285,31 @@ def smallest_distance(
 ) -> tuple[float, float, float, bool]:
     """Smallest distance of L from -1 from omega to omega_end.
 
-    `polynomials` are R, B1 and B2, `numerator` weights, sums and phases of N, `arms` |c1| and
-    |c2|, and `dead_time` the phase rate of the dead time. Only distances below `best` are
-    looked for. Returns the smallest one that was met, or `best`; where; the length of the step
-    there; and whether the walk came to its end, which it does not if it is too long or rounding
-    hides L. No distance is smaller than the result by more than the share `tolerance`.
+    `polynomials` are R, B1 and B2, `numerator` weights, sums and phases of N, `factors` and
+    `arms` what `_disc` takes. Only distances below `best` are looked for. Returns the smallest
+    one that was met, or `best`; where; the length of the step there; and whether the walk came
+    to its end, which it does not if it is too long or rounding hides L. No distance is smaller
+    than the result by more than the share `tolerance`.
     """
     weights, sums, phases = numerator
     unit, nothing, none = np.eye(3), np.zeros((0, 3)), np.zeros(0)
     only_r = np.array([1.0, 0.0, 0.0])
     where, width, steps = np.nan, 0.0, 0
-    turn = 2.0 * np.pi / longest_delay
-    longest = turn
+    turn, skip = 2.0 * np.pi / longest_delay, omega_end
+    block, levels = _TURNS * turn, np.zeros(4)
     while omega < omega_end:
+        levels[RATIO if symmetric else MODULUS] = best * (1.0 - tolerance)
+        disc = _disc(factors, arms, omega)
+        skip = min(4.0 * skip, 0.5 * disc[-1], omega_end - omega)
+        while skip > block and not _nothing_smaller(disc, omega, skip, levels):
+            skip *= 0.5
+        if skip > block:
+            omega += skip
+            continue
         start, reach, local, sizes = piece(
-            polynomials, unit, np.zeros(3), omega, min(longest, max(omega_end, turn))
+            polynomials, unit, np.zeros(3), omega, min(block, max(omega_end, turn))
         )
         end = min(omega + reach, omega_end)
-        disc = excluded_disc(best * (1.0 - tolerance), symmetric)
-        if _clear(local, sizes, start, reach, arms, dead_time, disc):
-            omega = end
-            longest = 4.0 * reach
-            continue
-        if reach > 1.01 * _TURNS * turn:
-            # Too long to be followed in one piece: where it is clear, and where not?
-            longest = 0.25 * reach
-            continue
-        longest = _TURNS * turn
         n, n_sizes = _combined(local, sizes, weights, sums)
         r, r_sizes = _combined(local, sizes, nothing, only_r)
         n_bound = curvature_bound(start, reach, n, phases)
@@ -225,72 +359,38 @@ def smallest_distance(
 
 
 @njit(cache=True)
-def _turned(
-    local: ComplexArray,
-    start: float,
-    reach: float,
-    dead_time: FloatArray,
-    point: float,
-    sign: float,
-) -> bool:
-    """Whether sign Re(M - point) > 0 over a piece, for the centre M of the disc of L.
-
-    With `local` rows R, B1 and B2, M is (B1 + B2) exp(-s delay) / R. Multiplied by |R|^2 it is
-    a polynomial, up to the second order of what the dead time turns over the piece.
-    """
-    below, size = local[1], local.shape[1]
-    turn = 1j * dead_time[0] * reach
-    centre = (local[2] + local[3]) * np.exp(1j * dead_time[0] * start)
-    left = 0.5 * np.abs(centre).sum() * abs(turn) ** 2
-    above = np.zeros(size + 1, dtype=np.complex128)
-    above[:size] = centre - point * below
-    above[1:] += turn * centre
-    product = np.zeros(2 * size)
-    for k in range(size + 1):
-        for m in range(size):
-            product[k + m] += sign * (above[k] * below[m].conjugate()).real
-    left += 64.0 * EPSILON * np.abs(above).sum()
-    left = left * np.abs(below).sum() + np.abs(product[2:]).sum()
-    return bool(min(product[0], product[0] + product[1]) > left)
-
-
-@njit(cache=True)
 def meeting_intervals(
-    polynomials: tuple[Any, ...],
+    factors: tuple[Any, ...],
     arms: FloatArray,
-    dead_time: FloatArray,
-    near: float,
-    far: float,
-    omega_end: float,
+    segment: FloatArray,
+    levels: FloatArray,
+    span: tuple[float, float],
     longest_delay: float,
 ) -> FloatArray:
-    """Intervals of [0, omega_end], shape (n, 2), outside which L meets no point of a segment.
+    """Intervals, shape (n, 2), of a span of the axis outside which L does not meet a target.
 
-    `polynomials` are R, B1 and B2, `arms` |c1| and |c2|, and `dead_time` the phase rate of the
-    dead time. The segment is that from `far` to `near` on the negative real axis; L, with any
-    phases of its arms, fills a disc. This is clear of the segment if it is clear of the
-    disc around it, or of the end that is nearest to its centre.
+    `factors` and `arms` are what `_disc` takes. The target is a segment of the negative real
+    axis, given by its nearer and its farther end; or, where that is empty, all that has margins
+    below `levels`.
     """
-    discs = ((0.5 * (near + far), 0.5 * (near - far)), (near, 0.0), (far, 0.0))
-    found = np.empty((64, 2))
-    unit, number, omega = np.eye(3), 0, 0.0
-    longest = np.inf
+    found, number = np.empty((64, 2)), 0
+    omega, omega_end = span
+    step, turn = omega_end, 2.0 * np.pi / longest_delay
     while omega < omega_end:
-        shortest = max(_TURNS * 2.0 * np.pi / longest_delay, 3e-3 * omega)
-        longest = max(min(longest, omega_end), shortest)
-        start, reach, local, sizes = piece(polynomials, unit, np.zeros(3), omega, longest)
+        # Next to zero whole turns are too long.
+        shortest = max(min(_TURNS * turn, 0.03 * omega), 3e-4 * omega, 1e-3 * turn)
+        disc = _disc(factors, arms, omega)
+        step = min(4.0 * step, 0.5 * disc[-1], omega_end - omega)
         clear = False
-        for k in range(3):
-            turned = k == 0 or _turned(
-                local, start, reach, dead_time, discs[k][0], 1.0 if k == 1 else -1.0
-            )
-            if turned and _clear(local, sizes, start, reach, arms, dead_time, discs[k]):
-                clear = True
-                break
-        if not clear and reach > 1.01 * shortest:
-            longest = 0.25 * reach
-            continue
-        end = min(omega + reach, omega_end)
+        while step > shortest and not clear:
+            if segment.size:
+                clear = _misses_segment(disc, step, segment[0], segment[1])
+            else:
+                clear = _nothing_smaller(disc, omega, step, levels)
+            if not clear:
+                step *= 0.5
+        step = step if clear else shortest
+        end = min(omega + step, omega_end)
         if not clear and number and found[number - 1, 1] == omega:
             found[number - 1, 1] = end
         elif not clear:
@@ -299,12 +399,7 @@ def meeting_intervals(
             found[number, 0], found[number, 1] = omega, end
             number += 1
         omega = end
-        longest = 4.0 * reach
     return found[:number]
-
-
-#: Places in what `free_margins_at` returns.
-MODULUS, RATIO, PHASE, DELAY = 0, 1, 2, 3
 
 
 @njit(cache=True)
@@ -339,43 +434,8 @@ def free_margins_at(centre: complex, radius: float, omega: float) -> FloatArray:
 
 
 @njit(cache=True)
-def _arms(factors: tuple[Any, ...], omega: float) -> ComplexArray:
-    """Return B1 / R and B2 / R at s = j omega."""
-    roots, starts, leads = factors
-    values, poles = np.empty(2, dtype=np.complex128), roots[: starts[1]]
-    for k in range(2):
-        zeros = roots[starts[k + 1] : starts[k + 2]]
-        values[k] = quotient(zeros, poles, complex(leads[k + 1] / leads[0]), 1j * omega)
-    return values
-
-
-@njit(cache=True)
-def _logarithms(
-    factors: tuple[Any, ...], omega: float
-) -> tuple[ComplexArray, FloatArray, float]:
-    """How the logarithms of R, B1 and B2 change at s = j omega.
-
-    Returns their derivatives in omega; the sums of 1 / distance^2 over their roots; and the
-    distance of the nearest root. Over a step each leaves its tangent by at most step^2 / 2
-    times the sum, over 1 - step / nearest, because |log(1 + x) - x| <= |x|^2 / (2 (1 - |x|)).
-    """
-    roots, starts, _ = factors
-    rates, squares, nearest = np.zeros(3, dtype=np.complex128), np.zeros(3), np.inf
-    for k in range(3):
-        for i in range(starts[k], starts[k + 1]):
-            away = 1j * omega - roots[i]
-            square = away.real * away.real + away.imag * away.imag
-            if square == 0.0:
-                return rates, squares, 0.0
-            rates[k] += 1j * away.conjugate() / square
-            squares[k] += 1.0 / square
-            nearest = min(nearest, square)
-    return rates, squares, np.sqrt(nearest)
-
-
-@njit(cache=True)
 def free_margins_over(
-    factors: tuple[Any, ...], arms: FloatArray, delay: float, omega: FloatArray
+    factors: tuple[Any, ...], arms: FloatArray, omega: FloatArray
 ) -> FloatArray:
     """Smallest margins of the disc that L fills with free phases, at given frequencies.
 
@@ -383,9 +443,7 @@ def free_margins_over(
     """
     found = np.empty((omega.size, 4))
     for i, w in enumerate(omega):
-        values = _arms(factors, w)
-        centre = (values[0] + values[1]) * np.exp(-1j * w * delay)
-        radius = arms[0] * abs(values[0]) + arms[1] * abs(values[1])
+        centre, radius = _centre_and_radius(_disc(factors, arms, w))
         found[i] = free_margins_at(centre, radius, w)
     return found
 
@@ -394,7 +452,6 @@ def free_margins_over(
 def free_margins(
     factors: tuple[Any, ...],
     arms: FloatArray,
-    delay: float,
     omega: float,
     omega_end: float,
     best: FloatArray,
@@ -402,69 +459,40 @@ def free_margins(
 ) -> tuple[FloatArray, FloatArray, bool]:
     """Smallest margins of the disc that L fills with free phases, from omega to `omega_end`.
 
-    `factors` are the roots of R, B1 and B2, one after the other; where those of each begin; and
-    the highest coefficients. `arms` are the sizes of c1 and c2. `best` holds values that are
-    known to occur, or inf. Returns the smallest values, where they were met (nan for those of
-    `best`), and whether the walk came to its end. None is smaller than the result by more than
-    its share `tolerance`.
+    `factors` and `arms` are what `_disc` takes. `best` holds values that are known to occur,
+    or inf. Returns the smallest values, where they were met (nan for those of `best`), and
+    whether the walk came to its end. None is smaller than the result by more than its share
+    `tolerance`.
     """
     best, where = best.copy(), np.full(4, np.nan)
     step = omega_end
     for _ in range(MOST_STEPS // 8):
-        values = _arms(factors, omega)
-        rates, squares, nearest = _logarithms(factors, omega)
-        k = 0 if abs(values[0]) >= abs(values[1]) else 1
-        arm, other_arm = arms[k], arms[1 - k]
-        first = values[k] * np.exp(-1j * omega * delay)
-        ratio = values[1 - k] / values[k]
-        centre = first * (1.0 + ratio)
-        radius = abs(first) * (arm + other_arm * abs(ratio))
-        here = free_margins_at(centre, radius, omega)
-        for m in range(4):
-            if here[m] < best[m]:
-                best[m], where[m] = here[m], omega
-        if best[MODULUS] == 0.0:
-            # Some phases take L to -1.
-            return best, where, True
-        # Rates and bounds on second derivatives of what turns the first arm, and of the ratio.
-        speed, bend = abs(rates[k + 1] - rates[0] - 1j * delay), squares[k + 1] + squares[0]
-        other_speed, other_bend = abs(rates[2 - k] - rates[k + 1]), squares[1] + squares[2]
-        step = min(2.0 * step, 0.5 * nearest, omega_end - omega)
-        if step <= 1e-15 * omega:
-            return best, where, False
+        disc = _disc(factors, arms, omega)
+        centre, radius = _centre_and_radius(disc)
+        step = min(2.0 * step, 0.5 * disc[-1], omega_end - omega)
+        grown = 0.0
         while True:
-            end = omega + step
-            second = 0.5 * step * step / (1.0 - step / nearest)
-            turned = speed * step + bend * second
-            bent = other_speed * step + other_bend * second
-            # Over the step L is the disc times one factor, that of the first arm without the
-            # phases; the second arm adds what it changes otherwise.
-            if max(turned, bent) < 0.5:
-                factor = np.expm1(turned)
-                wide = radius + abs(first) * (1.0 + other_arm) * abs(ratio) * np.expm1(bent)
-                # With a factor f, |1 + f L| = |f| |1 / f + L|: what matters is how far f takes
-                # L, or -1 if that is less.
-                moved = factor * (abs(centre) + wide)
-                less = min(moved, factor / (1.0 - factor))
-                least = free_margins_at(centre, wide + less, end)
-                if moved > factor:
-                    near = free_margins_at(centre, wide, end)
-                    least[MODULUS] = (1.0 - factor) * near[MODULUS] - factor
-                    # As |1 + L| + |1 - L| >= 2, 1 / |1 - L| is at most half of one plus the
-                    # ratio.
-                    more = 0.5 * factor * (1.0 + near[RATIO])
-                    least[RATIO] = (1.0 - factor) * near[RATIO] - more
-                    least[RATIO] /= 1.0 + factor + more
-                if (least >= (1.0 - tolerance) * best).all():
-                    break
-                if step <= 1e-12 * omega:
-                    # The share of the unit circle of a small disc may begin and end within it.
-                    for m in range(4):
-                        if least[m] < best[m]:
-                            best[m], where[m] = max(least[m], 0.0), omega
-                    break
-            step *= 0.5
-        if end >= omega_end * (1.0 - 1e-15):
+            here = free_margins_at(centre, radius + grown * (abs(centre) + radius), omega)
+            for m in range(PHASE if grown else MODULUS, 4):
+                if here[m] < best[m]:
+                    best[m], where[m] = here[m], omega
+            if best[MODULUS] == 0.0:
+                # Some phases take L to -1.
+                return best, where, True
+            levels = (1.0 - tolerance) * best
+            while step > 1e-12 * omega and not _nothing_smaller(disc, omega, step, levels):
+                step *= 0.5
+            if step > 1e-12 * omega or grown > 0.0:
+                break
+            # The disc may touch the unit circle next to here. It then covers a short arc of it,
+            # and a little later a longer one.
+            grown, step = 1e-9, 1e-9 * omega
+        if omega + step >= omega_end * (1.0 - 1e-15):
             return best, where, True
-        omega = end
+        if not step > 1e-12 * omega:
+            levels[PHASE], levels[DELAY] = 0.0, 0.0
+            step = 1e-12 * omega
+            if not _nothing_smaller(disc, omega, step, levels):
+                return best, where, False
+        omega += step
     return best, where, False

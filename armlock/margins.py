@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import zip_longest
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,7 @@ from scipy.optimize import brentq, minimize_scalar
 from armlock import contour, infimum
 from armlock.bounds import last_larger, last_root_bound
 from armlock.checks import (
+    BoolArray,
     ComplexArray,
     FloatArray,
     IntArray,
@@ -42,14 +44,11 @@ TOLERANCE = 1e-6
 _FREE_TOLERANCES = np.array([1e-5, 1e-4, 1e-5, 1e-5])
 #: Gain factors up to this, and down to one over it, are looked at.
 LARGEST_GAIN = 1e6
-# Share of their limits within which the disc of a neutral loop must have come for its
-# crossovers to be those of the limit.
-_SETTLED = 1e-3
 # Share of its limits up to which the neutral root chain lets gain factors be looked at.
 _NEXT_TO_THE_CHAIN = 1e-4
 # Turns of the longest delay that a walk along the axis can take at once, for a range of gain
 # factors, and how many are no reason to look for a shorter range.
-_MOST_TURNS = 1e6
+_MOST_TURNS = 1.5e6
 _FEW_TURNS = 1e4
 # The shortest such range, as the logarithm of a ratio.
 _SHORTEST_RANGE = 1e-3
@@ -70,7 +69,7 @@ class Margins:
         \text{delay} &= \min_{|L| = 1} \frac{\arg(-L)}{\omega} ,
         \quad 0 \le \arg < 2\pi , \\
         \text{modulus} &= \inf_\omega |1 + L| , \\
-        \text{disk} &= 2 \inf_\omega \frac{|1 + L|}{|1 - L|}
+        \text{disk} &= 2 \min \left( 1, \inf_\omega \frac{|1 + L|}{|1 - L|} \right)
 
     with L at s = j omega.
 
@@ -89,7 +88,8 @@ class Margins:
     modulus : float
         Smallest |1 + L|.
     disk : float
-        Symmetric disk margin: 2 min |1 + L| / |1 - L|.
+        Symmetric disk margin: 2 min |1 + L| / |1 - L|. At most 2, where no gain factor and no
+        turn up to 90 degrees makes the loop unstable.
     gain_omega, phase_omega, modulus_omega : float
         Where the upper gain margin, the phase margin and the modulus margin are taken, in
         rad/s; inf where it is the limit at high frequency, nan where there is none.
@@ -168,13 +168,40 @@ def _clear_from(loop: Loop, c1: float, c2: float, centre: float, radius: float) 
 
 
 def _factors(loop: Loop) -> tuple[ComplexArray, IntArray, FloatArray]:
-    """Return R, B1 and B2 as `armlock.infimum.free_margins` takes them."""
-    found = loop.polynomials()
+    """Return the responses to the two arms as `armlock.infimum` takes them.
+
+    The roots of their factors, the powers of these in both, shape (2, roots), and the highest
+    coefficients.
+    """
+    rest, *arms = loop.polynomials()
+    leads = np.array([float(p.coefficients[-1] / rest.coefficients[-1]) for p in arms])
+    powers: dict[complex, list[int]] = {}
+    for k in range(2):
+        # A response of zero takes part in nothing; as the other one's multiple it costs least.
+        zeros = arms[k if leads[k] else 1 - k].roots
+        for roots, change in ((zeros, 1), (rest.roots, -1)):
+            for root in roots:
+                powers.setdefault(complex(root), [0, 0])[k] += change
+    kept = [(root, n) for root, n in powers.items() if any(n)]
+    up = [entry for entry in kept if entry[1][0] > 0 or entry[1][1] > 0]
+    down = [entry for entry in kept if entry not in up]
+    # In turn, so that no product overflows.
+    kept = [one for pair in zip_longest(up, down) for one in pair if one is not None]
     return (
-        np.concatenate([p.roots for p in found]),
-        np.cumsum([0, *(p.roots.size for p in found)]),
-        np.array([p.coefficients[-1] for p in found]),
+        np.array([root for root, _ in kept], dtype=np.complex128),
+        np.array([n for _, n in kept], dtype=np.int64).reshape(-1, 2).T.copy(),
+        leads,
     )
+
+
+def _arms(loop: Loop, c1: float, c2: float) -> FloatArray:
+    """Return what `armlock.infimum` needs of the arms beside their responses."""
+    return np.array([c1, c2, loop.tau2 - loop.tau1, loop.delay])
+
+
+def _free_arms(loop: Loop, c1: float, c2: float) -> FloatArray:
+    """Return the same for arms both phases of which are free."""
+    return np.array([c1, c2, np.nan, loop.delay])
 
 
 def _likely(
@@ -186,8 +213,7 @@ def _likely(
     where that is within a thousand turns, which a walk does as fast.
     """
     omega = np.geomspace(lowest, highest, 400)
-    arms = np.array([abs(c1), abs(c2)])
-    nearest = infimum.free_margins_over(_factors(loop), arms, loop.delay, omega)[:, place]
+    nearest = infimum.free_margins_over(_factors(loop), _arms(loop, c1, c2), omega)[:, place]
     at, turn = float(omega[np.argmin(nearest)]), 2.0 * np.pi / loop.longest_delay
     if at < 1e3 * turn:
         return np.empty(0)
@@ -207,10 +233,13 @@ def _smallest(
         raise _unconfined(c1, c2)
     if symmetric:
         limit = min(limit, 1.0)
-    end = _clear_from(
-        loop, c1, c2, *infimum.excluded_disc(limit * (1.0 - TOLERANCE), symmetric)
-    )
-    if not np.isfinite(end):
+
+    def end(best: float, tolerance: float) -> float:
+        """Frequency past which nothing is smaller, or `highest`."""
+        disc = infimum.excluded_disc(best * (1.0 - tolerance), symmetric)
+        return min(_clear_from(loop, c1, c2, *disc), highest)
+
+    if not np.isfinite(end(limit, TOLERANCE)):
         raise _unconfined(c1, c2)
     numerator = loop_numerator(loop, c1, c2)
 
@@ -234,7 +263,7 @@ def _smallest(
     if at_lowest < best:
         best, where = at_lowest, lowest
     place = infimum.RATIO if symmetric else infimum.MODULUS
-    likely = _likely(loop, c1, c2, lowest, max(lowest, min(end, highest)), place)
+    likely = _likely(loop, c1, c2, lowest, max(lowest, end(best, 0.05)), place)
     if likely.size:
         near = distances(likely)
         nearest = int(np.argmin(near))
@@ -244,11 +273,11 @@ def _smallest(
         found, omega, width, complete = infimum.smallest_distance(
             numerator.compiled(),
             (numerator.weights, numerator.sums, numerator.phases),
-            _arm_weights(loop, c1, c2),
-            np.array([-loop.delay]),
+            _factors(loop),
+            _arms(loop, c1, c2),
             symmetric,
             lowest,
-            min(end, highest),
+            end(best, tolerance),
             loop.longest_delay,
             best,
             tolerance,
@@ -346,19 +375,19 @@ def _require_stable(loop: Loop, c1: float, c2: float) -> None:
         )
 
 
-def _crossovers(loop: Loop, c1: float, c2: float, end: float) -> FloatArray:
-    """Frequencies with |L| = 1 up to `end`, ascending."""
+def _crossovers(
+    loop: Loop, c1: float, c2: float, intervals: npt.ArrayLike
+) -> tuple[FloatArray, BoolArray]:
+    """Frequencies with |L| = 1 on intervals of the axis, and where rounding hides if it is."""
     above, below = loop_numerator(loop, c1, c2), loop.rest_on_boundary()
     squares = above.times_conjugate(above).plus(below.times_conjugate(below).scaled(-1.0))
-    omega, jump = sign_changes(squares.turned(), end)
-    hidden = omega[(omega > 0.0) & (jump == 0)]
-    if hidden.size:
-        raise CountError(
-            f"no margin at (c1, c2) = ({c1}, {c2}): rounding hides whether |L| comes to one "
-            f"around {hidden[0]} rad/s",
-            np.array([[c1, c2]]),
-        )
-    return np.asarray(omega[omega > 0.0])
+    found = [
+        sign_changes(squares.turned(), float(end), start=float(start))
+        for start, end in np.reshape(intervals, (-1, 2))
+    ]
+    omega = np.concatenate([np.empty(0), *(zeros for zeros, _ in found)])
+    jump = np.concatenate([np.empty(0), *(jumps for _, jumps in found)])
+    return omega[omega > 0.0], jump[omega > 0.0] == 0
 
 
 def _phase_and_delay(
@@ -368,40 +397,72 @@ def _phase_and_delay(
 
     A neutral loop may have crossovers without end. Then its delay margin is zero, and its
     phase margin may be that of the disc that L fills at high frequency.
+
+    First come crossovers that are likely to have the smallest margins: those of the first
+    turns of the delays, and those next to where free phases would have them. The others are
+    looked for only where free phases would allow smaller ones.
     """
     phase, delay, where = np.inf, np.inf, np.nan
-    c = _plus(loop.b1, loop.b2)
-    end = last_larger(
-        loop.rest, (c, loop.b1, loop.b2), np.array([1.0, *_arm_weights(loop, c1, c2)])
-    )
-    if not np.isfinite(end) and np.isfinite(highest):
-        end = highest
-    elif not np.isfinite(end):
+    c, arms = _plus(loop.b1, loop.b2), _arm_weights(loop, c1, c2)
+    end = last_larger(loop.rest, (c, loop.b1, loop.b2), np.array([1.0, *arms]))
+    if not np.isfinite(end) and not np.isfinite(highest):
         phase, delay, where = _limit_phase(*_limit_disc(loop, c1, c2)), 0.0, np.inf
-        end = _settled_from(loop)
-    omega = _crossovers(loop, c1, c2, min(end, highest))
-
-    def lags(at: FloatArray) -> FloatArray:
-        turned = np.angle(loop.open_loop(1j * at, c1, c2)) + np.pi
-        return np.asarray(np.mod(turned, 2.0 * np.pi))
-
-    if omega.size:
-        lag = lags(omega)
-        # A lag turns L clockwise; a lead may reach -1 sooner.
-        nearest = np.minimum(lag, 2.0 * np.pi - lag)
-        chosen = np.unique(
-            np.concatenate(
-                (np.argsort(nearest)[:_POLISHED], np.argsort(lag / omega)[:_POLISHED])
+        end = _settled_from(loop, c1, c2, phase)
+    end, turn = min(end, highest), 2.0 * np.pi / loop.longest_delay
+    first = min(end, 1e3 * turn)
+    intervals = np.array([[0.0, first]])
+    if end > first:
+        omega = np.geomspace(first, end, 400)
+        free = infimum.free_margins_over(_factors(loop), _arms(loop, c1, c2), omega)
+        nearest = omega[np.argmin(free[:, [infimum.PHASE, infimum.DELAY]], axis=0)]
+        likely = np.column_stack((nearest - 300.0 * turn, nearest + 300.0 * turn))
+        intervals = np.concatenate((intervals, np.clip(likely, first, end)))
+    for last in (False, True):
+        omega, hidden = _crossovers(loop, c1, c2, intervals)
+        found = _least_lags(loop, c1, c2, omega[~hidden])
+        perhaps = _least_lags(loop, c1, c2, omega[hidden])
+        if perhaps[0] < min(phase, found[0]) or perhaps[1] < min(delay, found[1]):
+            raise CountError(
+                f"no margin at (c1, c2) = ({c1}, {c2}): rounding hides whether |L| comes to "
+                f"one around {perhaps[2]} rad/s",
+                np.array([[c1, c2]]),
             )
+        if found[0] < phase:
+            phase, where = found[0], found[2]
+        delay = min(delay, found[1])
+        if last or end == first:
+            break
+        intervals = infimum.meeting_intervals(
+            _factors(loop),
+            _arms(loop, c1, c2),
+            np.empty(0),
+            np.array([0.0, 0.0, phase, delay]),
+            (first, end),
+            loop.longest_delay,
         )
-        at = np.array([_polished(loop, c1, c2, float(w)) for w in omega[chosen]])
-        lag = lags(at)
-        nearest = np.minimum(lag, 2.0 * np.pi - lag)
-        worst = int(np.argmin(nearest))
-        if nearest[worst] < phase:
-            phase, where = float(nearest[worst]), float(at[worst])
-        delay = min(delay, float(np.min(lag / at)))
     return phase, delay, where
+
+
+def _least_lags(
+    loop: Loop, c1: float, c2: float, omega: FloatArray
+) -> tuple[float, float, float]:
+    """Smallest phase and delay margins at crossovers, and where the former is taken."""
+
+    def lags(at: FloatArray) -> tuple[FloatArray, FloatArray]:
+        lag = np.mod(np.angle(loop.open_loop(1j * at, c1, c2)) + np.pi, 2.0 * np.pi)
+        # A lag turns L clockwise; a lead may reach -1 sooner.
+        return lag, np.minimum(lag, 2.0 * np.pi - lag)
+
+    if not omega.size:
+        return np.inf, np.inf, np.nan
+    lag, nearest = lags(omega)
+    chosen = np.concatenate(
+        (np.argsort(nearest)[:_POLISHED], np.argsort(lag / omega)[:_POLISHED])
+    )
+    at = np.array([_polished(loop, c1, c2, float(w)) for w in omega[np.unique(chosen)]])
+    lag, nearest = lags(at)
+    worst = int(np.argmin(nearest))
+    return float(nearest[worst]), float(np.min(lag / at)), float(at[worst])
 
 
 def _polished(loop: Loop, c1: float, c2: float, omega: float) -> float:
@@ -434,16 +495,26 @@ def _limit_phase(centre: float, radius: float) -> float:
     return math.pi - math.acos(cosine)
 
 
-def _settled_from(loop: Loop) -> float:
-    """Frequency past which the disc of a neutral loop is close to its limit."""
-    r = float(loop.rest[-1])
-    ends = []
-    for b in (loop.b1, loop.b2):
-        share = float(b[-1]) / r if b.size == loop.rest.size else 0.0
-        left = _plus(b, -share * loop.rest)[: loop.rest.size - 1]
-        scale = max(abs(share), 1.0) * _SETTLED
-        ends.append(last_larger(loop.rest, (left,), np.array([1.0 / scale])))
-    return max(ends)
+def _settled_from(loop: Loop, c1: float, c2: float, phase: float) -> float:
+    """Frequency past which no phase margin of a neutral loop is below a number.
+
+    Past it the disc of L is so close to its limit that what it may hold of the unit circle
+    does not come closer to -1, by more than the share TOLERANCE.
+    """
+    centre, radius = _limit_disc(loop, c1, c2)
+    near = 1e-3
+    while _limit_phase(centre, radius + near) < (1.0 - TOLERANCE) * phase and near > 1e-12:
+        near *= 0.1
+    shares = [
+        float(b[-1] / loop.rest[-1]) if b.size == loop.rest.size else 0.0
+        for b in (loop.b1, loop.b2)
+    ]
+    left = [
+        _plus(b, -share * loop.rest)[: loop.rest.size - 1]
+        for b, share in zip((loop.b1, loop.b2), shares, strict=True)
+    ]
+    weights = 1.0 + np.array([abs(c1), abs(c2)])
+    return last_larger(loop.rest, (left[0], left[1]), weights / near)
 
 
 def _chain_gains(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
@@ -491,14 +562,12 @@ def _range_of_gains(
     arms, may meet what the range takes to -1. A shorter range needs less of the axis. Chosen is
     the one that needs least for its length, among those that can be followed.
     """
-    step, rest = math.log(4.0), loop.rest_on_boundary().compiled()
-    arms, dead_time = _arm_weights(loop, c1, c2), np.array([-loop.delay])
+    whole, factors, arms = abs(math.log(last / near)), _factors(loop), _arms(loop, c1, c2)
+    step = whole
     # Where no range has an end on the axis, all of it, which is refused when it is walked.
     least, chosen = (True, np.inf), (last, np.array([[0.0, np.inf]]))
     while step > _SHORTEST_RANGE:
-        far = near * math.exp(math.copysign(step, last - near))
-        if (last - far) * (last - near) <= 0.0:
-            far = last
+        far = last if step == whole else near * math.exp(math.copysign(step, last - near))
         ends = -1.0 / min(near, far), -1.0 / max(near, far)
         around = 0.5 * (ends[0] + ends[1]), 0.5 * (ends[1] - ends[0])
         # Past it L is too small, or stays clear of the disc around all that is looked for.
@@ -508,7 +577,12 @@ def _range_of_gains(
             step *= 0.5
             continue
         intervals = infimum.meeting_intervals(
-            rest, arms, dead_time, ends[1], ends[0], end, loop.longest_delay
+            factors,
+            arms,
+            np.array([ends[1], ends[0]]),
+            np.zeros(4),
+            (0.0, end),
+            loop.longest_delay,
         )
         turns = float(np.diff(intervals).sum()) * loop.longest_delay / (2.0 * np.pi)
         cost = turns > _MOST_TURNS, turns / abs(math.log(far / near))
@@ -561,7 +635,7 @@ def _likely_gain(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
     delays: roots cross next to the frequency at which free phases would let them first.
     """
     arms, turn = np.array([abs(c1), abs(c2)]), 2.0 * np.pi / loop.longest_delay
-    top = _clear_from(loop, c1, c2, *infimum.excluded_disc(1.0 - 1e-3, False))
+    top = _no_crossing_from(loop, c1, c2, 1.0, LARGEST_GAIN)
     if not 2e3 * turn < top < np.inf:
         return np.inf, np.nan
     omega = np.geomspace(1e3 * turn, top, 400)
@@ -674,14 +748,14 @@ def _free_margins(
     # Past it nothing has a phase.
     end = last_larger(loop.rest, (c, loop.b1, loop.b2), np.array([1.0, *arms]))
     if not np.isfinite(end):
-        end = _settled_from(loop)
+        end = _settled_from(loop, c1, c2, float(limit[infimum.PHASE]))
     end = max(end, 2.0 * lowest)
 
-    factors = _factors(loop)
+    factors, free = _factors(loop), _free_arms(loop, c1, c2)
 
     def at(u: npt.ArrayLike) -> FloatArray:
         omega = np.exp(np.atleast_1d(np.asarray(u, dtype=float)))
-        return np.asarray(infimum.free_margins_over(factors, arms, loop.delay, omega))
+        return np.asarray(infimum.free_margins_over(factors, free, omega))
 
     # The smallest distances may lie past the last crossover, where L turns most.
     u = np.linspace(math.log(lowest), math.log(10.0 * end), 300)
@@ -701,7 +775,7 @@ def _free_margins(
         level = best[k] * (1.0 - TOLERANCE)
         end = max(end, _clear_from(loop, c1, c2, *infimum.excluded_disc(level, symmetric)))
     smaller, places, complete = infimum.free_margins(
-        factors, arms, loop.delay, lowest, end, best, _FREE_TOLERANCES
+        factors, free, lowest, end, best, _FREE_TOLERANCES
     )
     if not complete:
         raise CountError(

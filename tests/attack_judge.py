@@ -501,7 +501,7 @@ def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
                     best.gain_lower = max(best.gain_lower, float(k))
 
     def done(undecided):
-        best.disk *= 2.0
+        best.disk = 2.0 * min(best.disk, 1.0)
         best.unsure = tuple(
             name for name, is_open in zip(NAMES, undecided, strict=True) if is_open
         )
