@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
-from scipy.optimize import brentq
+from scipy.optimize import elementwise
 
 from armlock.bounds import last_frequency
 from armlock.characteristic import CharacteristicFunction, checked_system
@@ -137,15 +137,18 @@ class Ray:
         result: ComplexArray = np.where(acts, value / np.where(acts, effect, 1.0), np.nan)
         return result
 
-    def polished(self, omega: float) -> float:
-        """Return a zero of Im(D0 / M) near one that was found on the expanded sums."""
+    def polished(self, omega: FloatArray) -> FloatArray:
+        """Return zeros of Im(D0 / M) next to those that were found on the expanded sums."""
 
-        def excess(w: float) -> float:
-            return float(self.quotient(w).imag)
+        def excess(w: FloatArray) -> FloatArray:
+            return np.asarray(self.quotient(w).imag)
 
         low, high = omega * (1.0 - 1e-7), omega * (1.0 + 1e-7)
-        if low < high and excess(low) * excess(high) < 0.0:
-            return float(brentq(excess, low, high, xtol=1e-300, rtol=1e-15))
+        enclosed = excess(low) * excess(high) < 0.0
+        if enclosed.any():
+            ends, exact = (low[enclosed], high[enclosed]), {"xatol": 0.0, "xrtol": 1e-15}
+            omega = omega.copy()
+            omega[enclosed] = elementwise.find_root(excess, ends, tolerances=exact).x
         return omega
 
     def crossings(self, stop: float, *, first: bool = False, lowest: float = 0.0) -> Crossings:
@@ -171,7 +174,7 @@ class Ray:
         near = (rough > lowest) & (rough <= stop * (1.0 + 1e-6))
         if first and near.any():
             near &= rough <= rough[near].min() * (1.0 + 1e-6)
-        omega = np.array([self.polished(float(w)) for w in omega[near]])
+        omega = self.polished(omega[near])
         change = change[near]
         position = self.quotient(omega).real
         kept = np.flatnonzero((position > lowest) & (position <= stop))

@@ -131,7 +131,9 @@ def _roots_of_a(system: CharacteristicFunction) -> ComplexArray:
     if (np.abs(product - a) <= 1e-6 * magnitude).all():
         return roots
     with mpmath.workdps(60):
-        found = mpmath.polyroots(a.tolist(), maxsteps=500, extraprec=400, asc=True)
+        found = mpmath.polyroots(
+            a.tolist(), maxsteps=500, extraprec=400, asc=True, roots_init=roots.tolist()
+        )
     return np.array([complex(root) for root in found])
 
 
