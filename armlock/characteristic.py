@@ -15,7 +15,6 @@ So both are one class here, and one set of algorithms serves both.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +23,7 @@ from numpy.polynomial import polynomial as poly
 from armlock.checks import (
     ComplexArray,
     FloatArray,
+    as_written,
     axis,
     broadcast_shape,
     complex_array,
@@ -163,17 +163,6 @@ class CharacteristicFunction:
             )
         super().__setattr__(name, value)
 
-    def __delattr__(self, name: str) -> None:
-        """Refuse changes."""
-        raise AttributeError(f"a {type(self).__name__} cannot be changed, got del {name}")
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Take the attributes of a copied or pickled system; its arrays stay read-only."""
-        self.__dict__.update(state)
-        for value in state.values():
-            if isinstance(value, np.ndarray):
-                value.setflags(write=False)
-
     @property
     def degree(self) -> int:
         """Degree of A, the order of the equation."""
@@ -239,20 +228,7 @@ class CharacteristicFunction:
 
     def __repr__(self) -> str:
         """Name the class and its arguments, as they are written to make it again."""
-        shown = [
-            f"{name}={np.asarray(getattr(self, name)).tolist()}"
-            for name in ("rest", "b1", "b2", "delay1", "delay2")
-        ]
-        defaults = {
-            "delay": 0.0,
-            "step": 0.0,
-            "parameters": ("x", "y"),
-            "reference": (0.0, 0.0),
-        }
-        for name, default in defaults.items():
-            if getattr(self, name) != default:
-                shown.append(f"{name}={getattr(self, name)!r}")
-        return f"{type(self).__name__}({', '.join(shown)})"
+        return as_written(self)
 
     def parts(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """Evaluate the three terms of D, which is the first less x, y times the others.
@@ -389,7 +365,7 @@ class CharacteristicFunction:
         def move(p: FloatArray) -> FloatArray:
             if self.step:
                 return np.asarray(p * np.exp(sigma * self.step * np.arange(p.size)))
-            return _taylor_shift(p, sigma)
+            return np.asarray(poly.Polynomial(p)(poly.Polynomial([sigma, 1.0])).coef)
 
         # The reference moves along, so that nothing has to cancel in `rest`.
         dead = np.exp(-sigma * self.delay)
@@ -525,15 +501,6 @@ def checked_system(system: CharacteristicFunction) -> CharacteristicFunction:
             f"system must be a CharacteristicFunction, for instance CommonArm(), got {system!r}"
         )
     return system
-
-
-def _taylor_shift(p: FloatArray, sigma: float) -> FloatArray:
-    """Return the coefficients of p(s + sigma) by repeated synthetic division."""
-    shifted = p.copy()
-    for i in range(shifted.size - 1):
-        for k in range(shifted.size - 2, i - 1, -1):
-            shifted[k] += sigma * shifted[k + 1]
-    return shifted
 
 
 def _polynomial(name: str, coefficients: Sequence[float] | FloatArray) -> FloatArray:

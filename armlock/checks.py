@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import os
 from typing import Any
@@ -48,6 +49,16 @@ def whole_number(name: str, value: object, lowest: int, highest: int | None = No
     ):
         raise ValueError(f"{name} must be an integer from {lowest} {end}, got {value!r}")
     return int(value)
+
+
+def as_written(thing: object) -> str:
+    """Return the call that makes a thing again; its attributes are named like its arguments."""
+    shown = []
+    for name in inspect.signature(type(thing)).parameters:
+        # A subclass need not keep all that it was given.
+        value = getattr(thing, name, "...")
+        shown.append(f"{name}={value.tolist() if isinstance(value, np.ndarray) else value!r}")
+    return f"{type(thing).__name__}({', '.join(shown)})"
 
 
 def true_or_false(name: str, value: object) -> bool:
