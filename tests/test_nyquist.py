@@ -10,7 +10,6 @@ import pytest
 
 from armlock import (
     CommonArm,
-    Controller,
     CountError,
     DualArm,
     Loop,
@@ -245,16 +244,6 @@ def test_the_ideal_loops_cross_nowhere(loop):
     assert axis_crossings(loop, 1.0, 1.0).omega.size == 0
 
 
-def test_the_grid_resolves_what_its_sums_do():
-    loop = CASES["resonance at -1e-09, gain 1e-07"][0]
-    grid = module._resolving_grid(loop, 0.9, 1.0, 5.0)
-    s = 1j * grid
-    for values in (loop(s, 0.9, 1.0), np.polyval(loop.rest[::-1], s)):
-        turn = np.angle(values[1:] / values[:-1])
-        assert np.abs(turn).max() < 0.45
-    assert (np.diff(grid) > 0.0).all()
-
-
 @pytest.mark.parametrize(
     ("c1", "order"), [(1.0, 0), (1.0 + 4.5e-16, 1), (1.0 - 1e-12, 1), (0.5, 1)]
 )
@@ -265,11 +254,6 @@ def test_the_pole_at_zero_cancels_only_where_it_does(c1, order):
 def test_tiny_corners_of_a_controller_do_not_hide_its_pole_at_zero():
     loop = Loop(((-1e-8, -1e-8), (0.0, 0.0, -1.0), 1.0), SINGLE, 2.0, 1.5)
     assert nyquist(loop, 0.5, 1.0).pole_order == 2
-
-
-def test_a_controllers_double_pole_meets_the_sensors():
-    loop = Loop(Controller((0.0, 0.0), (-1.0, -1.0), 2.0), dual(2.0, 0.5), 2.0, 1.5)
-    assert nyquist(loop, 0.9, 0.8).pole_order == 0
 
 
 def test_a_curve_that_takes_too_many_samples_is_refused():
