@@ -129,7 +129,7 @@ class CharacteristicFunction:
         if self.step:
             for name in ("delay", "delay1", "delay2"):
                 whole_steps(name, getattr(self, name), self.step)
-        self.parameters = _names(parameters)
+        self.parameters = parameters
         c = poly.polyadd(self.reference[0] * self.b1, self.reference[1] * self.b2)
         if self.delay == 0.0:
             self.a = _polynomial("a", np.asarray(poly.polyadd(self.rest, c)))
@@ -509,14 +509,6 @@ def _polynomial(name: str, coefficients: Sequence[float] | FloatArray) -> FloatA
     trimmed = np.array(poly.polytrim(values, tol=0.0), dtype=np.float64)
     trimmed.setflags(write=False)
     return trimmed
-
-
-def _names(value: tuple[str, str]) -> tuple[str, str]:
-    """Return the names of the two parameters, or raise."""
-    names = tuple(value) if isinstance(value, tuple | list) else (value,)
-    if len(names) != 2 or not all(isinstance(name, str) for name in names):
-        raise TypeError(f"parameters must be a pair of names, got {value!r}")
-    return names[0], names[1]
 
 
 def _not_negative(name: str, value: float) -> float:

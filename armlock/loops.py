@@ -26,7 +26,6 @@ from armlock.checks import (
     complex_array,
     positive_number,
     real_number,
-    true_or_false,
 )
 from armlock.controllers import Controller, integrating_actuator, table_two
 from armlock.exponentials import Polynomial
@@ -455,7 +454,7 @@ def paper_loop(
     array([0, 0])
     """
     chosen = table_two() if controller is None else Controller.of(controller)
-    if true_or_false("actuator", actuator):
+    if actuator:
         chosen = chosen * integrating_actuator()
     mapping = sensors.dual(corner, _delay_difference(tau1, tau2, difference))
     return Loop(chosen, mapping, tau1, tau2, delay)

@@ -19,7 +19,6 @@ from armlock.checks import (
     as_written,
     check_memory,
     positive_number,
-    true_or_false,
     whole_number,
 )
 from armlock.compiled import njit
@@ -108,7 +107,7 @@ class ShapedNoise:
             if pole.real >= 0.0:
                 raise ValueError(f"poles must lie in the left half-plane, got {pole} rad/s")
         self.seed = whole_number("seed", seed, 0)
-        self.at_rest = true_or_false("at_rest", at_rest)
+        self.at_rest = at_rest
         self._random = np.random.default_rng(self.seed)
         self._sampled = sampled_filter(self._filter, self.sample_rate)
         # White samples of variance one have the one-sided density 2 / sample_rate.
@@ -188,13 +187,9 @@ class ShapedNoise:
         ------
         float array
         """
-        left, most = whole_number("samples", samples, 0), whole_number("size", size, 1)
-
-        def parts() -> Iterator[FloatArray]:
-            for first in range(0, left, most):
-                yield self.draw(min(most, left - first))
-
-        return parts()
+        most = whole_number("size", size, 1)
+        for first in range(0, whole_number("samples", samples, 0), most):
+            yield self.draw(min(most, samples - first))
 
 
 @njit(cache=True)

@@ -25,15 +25,7 @@ if TYPE_CHECKING:
     from armlock.stability import StabilityChart
 
 #: Colours of the figures, which the colour-blind tell apart too (Okabe and Ito).
-BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, BLACK = (
-    "#0072B2",
-    "#D55E00",
-    "#009E73",
-    "#CC79A7",
-    "#56B4E9",
-    "#E69F00",
-    "#000000",
-)
+BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9"
 #: Fill of the stable region.
 STABLE = "#B8C4CE"
 # Half the width of a count written into a region, over the width of the chart.

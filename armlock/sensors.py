@@ -47,7 +47,7 @@ class SignalMapping:
     Raises
     ------
     TypeError, ValueError
-        If a coefficient is not finite and real, the denominator is zero, or the name is none.
+        If a coefficient is not finite and real, or the denominator is zero.
 
     Examples
     --------
@@ -72,8 +72,6 @@ class SignalMapping:
             object.__setattr__(self, field.name, tuple(float(value) for value in trimmed))
         if not any(self.denominator):
             raise ValueError(f"denominator must not be zero, got {self.denominator}")
-        if not isinstance(self.name, str):
-            raise TypeError(f"name must be a string, got {self.name!r}")
 
     def weights(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """Evaluate (m1, m2) at complex s, in rad/s; both are shaped like `s`."""
