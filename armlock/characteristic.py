@@ -517,6 +517,3 @@ def _not_negative(name: str, value: float) -> float:
     if number < 0.0:
         raise ValueError(f"{name} must not be negative, got {number}")
     return number
-
-
-__all__ = ["CharacteristicFunction", "ExponentialSum", "checked_system", "whole_steps"]

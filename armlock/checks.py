@@ -83,25 +83,12 @@ def complex_array(name: str, value: object) -> ComplexArray:
     return array.astype(np.complex128, copy=False)
 
 
-def axis(name: str, value: object, least: int = 1) -> FloatArray:
+def axis(name: str, value: object) -> FloatArray:
     """Return a copy of `value` as a one-dimensional finite float array, or raise."""
     array = _one_dimensional(name, real_array(name, value))
-    if array.size < least:
-        values = "one value" if least == 1 else f"{least} values"
-        raise ValueError(f"{name} must hold at least {values}, got {array.size}")
+    if array.size == 0:
+        raise ValueError(f"{name} must hold at least one value, got 0")
     return array
-
-
-def even_axis(name: str, value: object, least: int = 2) -> FloatArray:
-    """Return an axis whose values ascend in equal steps, or raise."""
-    values = axis(name, value, least)
-    steps = np.diff(values)
-    # Close to the ideal point, rounding is a visible share of a step.
-    if steps.size and not (np.abs(steps - steps.mean()) < 1e-2 * steps.mean()).all():
-        raise ValueError(
-            f"{name} must ascend in equal steps, got steps from {steps.min()} to {steps.max()}"
-        )
-    return values
 
 
 def finite_series(name: str, value: object, *dimensions: int) -> FloatArray:

@@ -33,11 +33,7 @@ def _checked(system: CharacteristicFunction, step: float, order: int) -> tuple[f
     """Return the step and the order, or raise for what cannot be semi-discretized."""
     step = positive_number("step", step)
     order = whole_number("order", order, 0, 1)
-    if checked_system(system).step:
-        raise ValueError(
-            f"system must be in continuous time, got a map with step {system.step}"
-        )
-    if system.neutral:
+    if checked_system(system).neutral:
         raise ValueError(
             "system must be of retarded type: a neutral loop feeds back the delayed signal "
             "itself, which semi-discretization does not smooth"

@@ -13,7 +13,7 @@ import scipy.signal
 
 import armlock
 from armlock import CharacteristicFunction, CommonArm, HayesEquation, SingleArm, paper_loop
-from armlock.checks import axis, check_memory, even_axis, finite_series, real_array
+from armlock.checks import axis, check_memory, finite_series, real_array
 from armlock.controllers import integrating_actuator, stage_one, table_two
 from armlock.discretize import warped
 from armlock.noise import band_rms, sample_count
@@ -160,6 +160,7 @@ WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
     (armlock.axis_crossings, "omega_max", None, "be given"),
     (armlock.frequency_response, "omega", [1.0, 0.0], "be positive"),
     (armlock.spectral_radius, "system", NEUTRAL["integrator"], "be of retarded type"),
+    (armlock.spectral_radius, "system", armlock.semi_discretization(ARMS, 0.1), "be in contin"),
     (armlock.transition_matrix, "step", 1e-6, "be of a size that memory holds"),
     (armlock.semi_discretization, "order", 2, "be an integer from 0 to 1, got 2"),
     (armlock.simulate, "noise", [0.0, np.nan], "be finite, got nan at index 1"),
@@ -215,13 +216,6 @@ def test_what_is_checked_is_a_copy_but_for_a_long_series():
         check("x", given)[0] = 7.0
     assert given[0] == 1.0
     assert finite_series("x", given) is given
-
-
-def test_an_even_axis_ascends_in_equal_steps():
-    assert even_axis("x", 1.0 + np.linspace(-1e-9, 1e-9, 200)).size == 200
-    for values in ([1.0, 0.0, -1.0], [0.0, 1.0, 1.0], [0.0, 1.0, 10.0], [2.0, 2.0]):
-        with pytest.raises(ValueError, match=r"^x must ascend in equal steps, got steps from "):
-            even_axis("x", values)
 
 
 def test_what_memory_does_not_hold_is_refused():
