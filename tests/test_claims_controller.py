@@ -12,6 +12,7 @@ from armlock import (
 )
 from armlock.sensors import dual
 from book.companion.claims import controller as chapter
+from tests import independent
 
 
 def test_three_methods_agree_on_every_reading():
@@ -51,24 +52,13 @@ def test_rightmost_roots_are_roots_of_the_printed_loop(index):
     """1 + L vanishes there, with L from controller and sensor in 80 digits."""
     reading = chapter.readings()[index]
     controller, root = chapter.CONTROLLERS[reading.controller], reading.rightmost
+    loop = paper_loop(controller=controller, actuator=reading.actuator)
     c2 = chapter.POINTS[reading.point][1]
     with mpmath.workdps(80):
-        tau1, tau2, p = mpmath.mpf(20.1), mpmath.mpf(19.9), mpmath.mpf(2.0 * np.pi * 0.4)
-        # The loop takes this difference in doubles.
-        spread = mpmath.mpf(20.1 - 19.9)
-
-        def one_plus(s):
-            e = p / ((s + p) * s * spread)
-            late1, late2 = mpmath.exp(-s * tau1), mpmath.exp(-s * tau2)
-            sensor = (1 + e) * (1 - late1) + (1 - e) * (1 - mpmath.mpf(c2) * late2)
-            value = mpmath.mpf(controller.gain) * sensor / (s if reading.actuator else 1)
-            for zero in controller.zeros:
-                value *= s - zero
-            for pole in controller.poles:
-                value /= s - pole
-            return 1 + value
-
         # A secant through two points near the root, which is then a step of Newton's.
         ends = [mpmath.mpc(root) * (1 + shift) for shift in (-1e-7, 1e-7)]
-        slope = (one_plus(ends[1]) - one_plus(ends[0])) / (ends[1] - ends[0])
-        assert abs(one_plus(mpmath.mpc(root)) / slope) < 1e-9 * abs(root)
+        left, here, right = (
+            independent.exact(loop, s, 1.0, c2) for s in (ends[0], root, ends[1])
+        )
+        slope = (right - left) / (ends[1] - ends[0])
+        assert abs(here / slope) < 1e-9 * abs(root)

@@ -145,13 +145,10 @@ class TestCommonArm:
         c1, c2 = (float(c) for c in d_curve(system, omega))
         for shift in (-1e-9, -1e-11, -1e-12, 1e-12, 1e-11, 1e-9):
             with mpmath.workdps(40):
-                g, t1, t2 = mpmath.mpf(10), mpmath.mpf(20.1), mpmath.mpf(19.9)
-                p, q = mpmath.mpf(c1 + shift), mpmath.mpf(c2)
-
-                def value(s, g=g, t1=t1, t2=t2, p=p, q=q):
-                    return s + 2 * g - g * p * mpmath.exp(-s * t1) - g * q * mpmath.exp(-s * t2)
-
-                root = mpmath.findroot(value, mpmath.mpc(0, omega))
+                root = mpmath.findroot(
+                    lambda s, x=c1 + shift: independent.exact(system, s, x, c2),
+                    mpmath.mpc(0, omega),
+                )
             assert abs(root.imag - omega) < 1e-6
             here = unstable_roots(system, c1 + shift, c2)
             far = unstable_roots(system, c1 + np.copysign(1e-5, shift), c2)
