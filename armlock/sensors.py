@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
+from armlock import paper
 from armlock.checks import (
     ComplexArray,
     axis,
@@ -175,7 +176,7 @@ def dual(corner: float, difference: float) -> SignalMapping:
 
 
 def modified_dual(
-    mean_delay: float, half_difference: float, corner: float = 2.0 * np.pi * 0.4
+    mean_delay: float, half_difference: float, corner: float = paper.DUAL_SENSOR_CORNER
 ) -> SignalMapping:
     r"""Return the modified dual sensor: common arm at low frequency, dual arm in the band.
 
