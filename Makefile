@@ -104,7 +104,8 @@ $(NOTEBOOKS_RAN): $(PACKAGE_READY) $(RUN_SOURCES) build/run-sources $(if $(FORCE
 same: ## Run all notebooks again: the data of all figures, equal byte for byte
 	+@$(alone) $(NOTEBOOKS_RAN)
 	@$(call run-notebooks,build/figures-again,build/executed-again)
-	$(PY) tools/check_same.py build/figures build/figures-again
+	diff --recursive --brief --exclude='*.json' --exclude='*.png' --exclude='*.svg' \
+		build/figures build/figures-again
 
 ## Book ----------------------------------------------------------------------------------
 

@@ -15,7 +15,6 @@ So both are one class here, and one set of algorithms serves both.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +23,7 @@ from numpy.polynomial import polynomial as poly
 from armlock.checks import (
     ComplexArray,
     FloatArray,
+    as_written,
     axis,
     broadcast_shape,
     complex_array,
@@ -129,7 +129,7 @@ class CharacteristicFunction:
         if self.step:
             for name in ("delay", "delay1", "delay2"):
                 whole_steps(name, getattr(self, name), self.step)
-        self.parameters = _names(parameters)
+        self.parameters = parameters
         c = poly.polyadd(self.reference[0] * self.b1, self.reference[1] * self.b2)
         if self.delay == 0.0:
             self.a = _polynomial("a", np.asarray(poly.polyadd(self.rest, c)))
@@ -162,17 +162,6 @@ class CharacteristicFunction:
                 f"a new one instead (a subclass sets its attributes before super().__init__)"
             )
         super().__setattr__(name, value)
-
-    def __delattr__(self, name: str) -> None:
-        """Refuse changes."""
-        raise AttributeError(f"a {type(self).__name__} cannot be changed, got del {name}")
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Take the attributes of a copied or pickled system; its arrays stay read-only."""
-        self.__dict__.update(state)
-        for value in state.values():
-            if isinstance(value, np.ndarray):
-                value.setflags(write=False)
 
     @property
     def degree(self) -> int:
@@ -239,20 +228,7 @@ class CharacteristicFunction:
 
     def __repr__(self) -> str:
         """Name the class and its arguments, as they are written to make it again."""
-        shown = [
-            f"{name}={np.asarray(getattr(self, name)).tolist()}"
-            for name in ("rest", "b1", "b2", "delay1", "delay2")
-        ]
-        defaults = {
-            "delay": 0.0,
-            "step": 0.0,
-            "parameters": ("x", "y"),
-            "reference": (0.0, 0.0),
-        }
-        for name, default in defaults.items():
-            if getattr(self, name) != default:
-                shown.append(f"{name}={getattr(self, name)!r}")
-        return f"{type(self).__name__}({', '.join(shown)})"
+        return as_written(self)
 
     def parts(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """Evaluate the three terms of D, which is the first less x, y times the others.
@@ -389,7 +365,7 @@ class CharacteristicFunction:
         def move(p: FloatArray) -> FloatArray:
             if self.step:
                 return np.asarray(p * np.exp(sigma * self.step * np.arange(p.size)))
-            return _taylor_shift(p, sigma)
+            return np.asarray(poly.Polynomial(p)(poly.Polynomial([sigma, 1.0])).coef)
 
         # The reference moves along, so that nothing has to cancel in `rest`.
         dead = np.exp(-sigma * self.delay)
@@ -527,15 +503,6 @@ def checked_system(system: CharacteristicFunction) -> CharacteristicFunction:
     return system
 
 
-def _taylor_shift(p: FloatArray, sigma: float) -> FloatArray:
-    """Return the coefficients of p(s + sigma) by repeated synthetic division."""
-    shifted = p.copy()
-    for i in range(shifted.size - 1):
-        for k in range(shifted.size - 2, i - 1, -1):
-            shifted[k] += sigma * shifted[k + 1]
-    return shifted
-
-
 def _polynomial(name: str, coefficients: Sequence[float] | FloatArray) -> FloatArray:
     """Return trimmed, read-only coefficients with at least one entry."""
     values = axis(name, coefficients)
@@ -544,20 +511,9 @@ def _polynomial(name: str, coefficients: Sequence[float] | FloatArray) -> FloatA
     return trimmed
 
 
-def _names(value: tuple[str, str]) -> tuple[str, str]:
-    """Return the names of the two parameters, or raise."""
-    names = tuple(value) if isinstance(value, tuple | list) else (value,)
-    if len(names) != 2 or not all(isinstance(name, str) for name in names):
-        raise TypeError(f"parameters must be a pair of names, got {value!r}")
-    return names[0], names[1]
-
-
 def _not_negative(name: str, value: float) -> float:
     """Return a finite number that is zero or positive."""
     number = real_number(name, value)
     if number < 0.0:
         raise ValueError(f"{name} must not be negative, got {number}")
     return number
-
-
-__all__ = ["CharacteristicFunction", "ExponentialSum", "checked_system", "whole_steps"]

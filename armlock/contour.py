@@ -216,7 +216,7 @@ def winding(
 
 
 @njit(cache=True)
-def _remaining_argument(roots: ComplexArray, omega: float) -> float:
+def remaining_argument(roots: ComplexArray, omega: float) -> float:
     """Argument that the polynomial with these roots gathers from j omega to infinity."""
     argument = 0.0
     for root in roots:
@@ -266,7 +266,7 @@ def count_point(model: tuple[Any, ...], x: float, y: float, end: float) -> int:
         start, reach, local, _ = piece(polynomials, np.zeros((0, here.size)), a_sums, end, 1e-3)
         a = evaluate(start, reach, local, np.zeros(0), end)[0]
         ratio = value * a.conjugate()
-        argument += _remaining_argument(roots, end) - np.arctan2(ratio.imag, ratio.real)
+        argument += remaining_argument(roots, end) - np.arctan2(ratio.imag, ratio.real)
         count = 0.5 * roots.size - argument / np.pi
     nearest = int(np.floor(count + 0.5)) if np.isfinite(count) else -1
     if abs(count - nearest) > 1e-3 or nearest < 0:

@@ -15,9 +15,9 @@ import numpy.typing as npt
 
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import FloatArray, check_memory, positive_number, real_array
+from armlock.exponentials import EPSILON
 from armlock.stability import sign_changes
 
-_EPSILON = float(np.finfo(float).eps)
 # Phase in rad up to which a frequency next to a pole counts as the pole, in rounding errors.
 _MANY_TURNS = 1e3
 # Beyond this phase in rad rounding leaves too little of it.
@@ -59,7 +59,7 @@ def _require_two_parameters(system: CharacteristicFunction) -> None:
     if system.delay1 == system.delay2:
         ratio = system.b1[-1] / system.b2[-1]
         if system.b1.size == system.b2.size and np.allclose(
-            system.b1, ratio * system.b2, rtol=4 * _EPSILON, atol=0.0
+            system.b1, ratio * system.b2, rtol=4 * EPSILON, atol=0.0
         ):
             raise ValueError(
                 f"delay1 and delay2 must differ, got {system.delay1} for both: only one "
@@ -162,11 +162,11 @@ def d_curve(
         # Only the difference of the delays enters here, which keeps low frequencies exact.
         determinant = np.imag(across) + np.imag(across * apart)
         turns = np.minimum(np.abs(omega * (system.delay1 - system.delay2)), _MANY_TURNS)
-        pole = np.abs(determinant) <= 4.0 * _EPSILON * turns * np.abs(across)
+        pole = np.abs(determinant) <= 4.0 * EPSILON * turns * np.abs(across)
         # Where a parameter has no effect, rounding leaves it some.
         for b in (system.b1, system.b2):
             value, size = np.polyval(b[::-1], s), np.polyval(np.abs(b[::-1]), np.abs(s))
-            pole |= (not system.step) & (np.abs(value) <= 4.0 * _EPSILON * size)
+            pole |= (not system.step) & (np.abs(value) <= 4.0 * EPSILON * size)
         determinant = np.where(pole | (omega == 0.0), np.nan, determinant)
         x = x0 + np.imag(known * np.conj(b2 * (1.0 + late2))) / determinant
         y = y0 - np.imag(known * np.conj(b1 * (1.0 + late1))) / determinant

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
+from armlock import paper
 from armlock.checks import positive_number, real_number
 from armlock.controllers import Controller, white_paper
 from armlock.loops import Loop, paper_loop
@@ -17,7 +17,7 @@ def flight_loop(
     mean_delay: float = 33.6,
     half_difference: float = 0.255,
     g2: float = 40.0,
-    corner: float = 2.0 * math.pi * 0.4,
+    corner: float = paper.DUAL_SENSOR_CORNER,
     delay: float = 0.0,
 ) -> Loop:
     r"""Return the loop of the LISA Frequency Control White Paper, arm 1 the longer.

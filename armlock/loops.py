@@ -26,7 +26,6 @@ from armlock.checks import (
     complex_array,
     positive_number,
     real_number,
-    true_or_false,
 )
 from armlock.controllers import Controller, integrating_actuator, table_two
 from armlock.exponentials import Polynomial
@@ -62,10 +61,6 @@ class HayesEquation(CharacteristicFunction):
     def __init__(self, tau: float = 1.0) -> None:
         self.tau = positive_number("tau", tau)
         super().__init__((0.0, 1.0), (1.0,), (1.0,), 0.0, self.tau, parameters=("a", "b"))
-
-    def __repr__(self) -> str:
-        """Name the class and its delay."""
-        return f"HayesEquation(tau={self.tau})"
 
 
 class Loop(CharacteristicFunction):
@@ -166,17 +161,6 @@ class Loop(CharacteristicFunction):
             parameters=("c1", "c2"),
             reference=(1.0, 1.0),
         )
-
-    def __repr__(self) -> str:
-        """Name the class and its arguments, as they are written to make it again."""
-        return (
-            f"{type(self).__name__}(controller={self.controller!r}, mapping={self.mapping!r}, "
-            f"tau1={self.tau1}, tau2={self.tau2}{self._dead_time()})"
-        )
-
-    def _dead_time(self) -> str:
-        """Return the dead time as it stands among the arguments, nothing where it is zero."""
-        return f", delay={self.delay}" if self.delay else ""
 
     def polynomials(self) -> tuple[Polynomial, Polynomial, Polynomial]:
         """Return R, B1 and B2 with their roots: those of controller and signal mapping."""
@@ -311,10 +295,6 @@ class SingleArm(Loop):
         self.tau = positive_number("tau", tau)
         super().__init__(integrating_actuator(self.gain), sensors.SINGLE, tau, tau, delay)
 
-    def __repr__(self) -> str:
-        """Name the class and its arguments."""
-        return f"SingleArm(gain={self.gain}, tau={self.tau}{self._dead_time()})"
-
 
 class CommonArm(Loop):
     r"""Common-arm locking with an integrating actuator (paper, Eq. 4).
@@ -355,13 +335,6 @@ class CommonArm(Loop):
     ) -> None:
         self.gain = positive_number("gain", gain)
         super().__init__(integrating_actuator(self.gain), sensors.COMMON, tau1, tau2, delay)
-
-    def __repr__(self) -> str:
-        """Name the class and its arguments."""
-        return (
-            f"CommonArm(gain={self.gain}, tau1={self.tau1}, tau2={self.tau2}"
-            f"{self._dead_time()})"
-        )
 
 
 class DualArm(Loop):
@@ -427,13 +400,6 @@ class DualArm(Loop):
         mapping = sensors.dual(self.corner, self.difference)
         super().__init__(integrating_actuator(self.gain), mapping, tau1, tau2, delay)
 
-    def __repr__(self) -> str:
-        """Name the class and its arguments."""
-        return (
-            f"DualArm(gain={self.gain}, tau1={self.tau1}, tau2={self.tau2}, "
-            f"corner={self.corner}, difference={self.difference}{self._dead_time()})"
-        )
-
 
 def paper_loop(
     corner: float = paper.DUAL_SENSOR_CORNER,
@@ -488,7 +454,7 @@ def paper_loop(
     array([0, 0])
     """
     chosen = table_two() if controller is None else Controller.of(controller)
-    if true_or_false("actuator", actuator):
+    if actuator:
         chosen = chosen * integrating_actuator()
     mapping = sensors.dual(corner, _delay_difference(tau1, tau2, difference))
     return Loop(chosen, mapping, tau1, tau2, delay)

@@ -16,9 +16,9 @@ import numpy.typing as npt
 from armlock import paper
 from armlock.checks import (
     FloatArray,
+    as_written,
     check_memory,
     positive_number,
-    true_or_false,
     whole_number,
 )
 from armlock.compiled import njit
@@ -101,11 +101,13 @@ class ShapedNoise:
     ) -> None:
         self.sample_rate = positive_number("sample_rate", sample_rate)
         self._filter = Controller(zeros, poles, gain)
-        for pole in self._filter.poles:
+        self.zeros, self.poles = self._filter.zeros, self._filter.poles
+        self.gain = self._filter.gain
+        for pole in self.poles:
             if pole.real >= 0.0:
                 raise ValueError(f"poles must lie in the left half-plane, got {pole} rad/s")
         self.seed = whole_number("seed", seed, 0)
-        self.at_rest = true_or_false("at_rest", at_rest)
+        self.at_rest = at_rest
         self._random = np.random.default_rng(self.seed)
         self._sampled = sampled_filter(self._filter, self.sample_rate)
         # White samples of variance one have the one-sided density 2 / sample_rate.
@@ -117,15 +119,8 @@ class ShapedNoise:
             self._state[:order] = self._scale * start
 
     def __repr__(self) -> str:
-        """Name the class and its arguments."""
-        return (
-            f"{type(self).__name__}(zeros={self._filter.zeros}, poles={self._filter.poles}, "
-            f"gain={self._filter.gain}, {self._common()})"
-        )
-
-    def _common(self) -> str:
-        """Return the arguments that all noises share, for their names."""
-        return f"seed={self.seed}, sample_rate={self.sample_rate}, at_rest={self.at_rest}"
+        """Name the class and its arguments, as they are written to make it again."""
+        return as_written(self)
 
     def asd(self, frequency: npt.ArrayLike) -> FloatArray:
         """Prescribed density at a frequency in Hz, in the series' unit per sqrt(Hz).
@@ -192,13 +187,9 @@ class ShapedNoise:
         ------
         float array
         """
-        left, most = whole_number("samples", samples, 0), whole_number("size", size, 1)
-
-        def parts() -> Iterator[FloatArray]:
-            for first in range(0, left, most):
-                yield self.draw(min(most, left - first))
-
-        return parts()
+        most = whole_number("size", size, 1)
+        for first in range(0, whole_number("samples", samples, 0), most):
+            yield self.draw(min(most, samples - first))
 
 
 @njit(cache=True)
@@ -318,10 +309,6 @@ class LaserNoise(ShapedNoise):
             seed=seed, sample_rate=rate, at_rest=at_rest,
         )  # fmt: skip
 
-    def __repr__(self) -> str:
-        """Name the class and its arguments."""
-        return f"LaserNoise({self._common()}, level={self.level}, cutoff={self.cutoff})"
-
     def asd(self, frequency: npt.ArrayLike) -> FloatArray:
         """Prescribed density; see `ShapedNoise.asd`."""
         frequency = checked_frequency("frequency", frequency, math.inf, "Hz")
@@ -397,7 +384,3 @@ class PerturbationNoise(ShapedNoise):
             self.scale * paper.PHASE_NOISE_LEVEL,
             seed=seed, sample_rate=sample_rate, at_rest=at_rest,
         )  # fmt: skip
-
-    def __repr__(self) -> str:
-        """Name the class and its arguments."""
-        return f"PerturbationNoise({self._common()}, scale={self.scale}, cutoff={self.cutoff})"

@@ -1,8 +1,9 @@
 """The open loop on the imaginary axis: Nyquist curve, encirclements, crossings.
 
-The contour is a rectangle in the right half-plane, indented to the right around the pole of
-L at s = 0. It is sampled so finely that the argument of 1 + L is known without doubt, and
-the encirclements are then held against the count of unstable roots: Z = N + P.
+The contour goes up the imaginary axis, indented to the right around the pole of L at s = 0,
+and back at infinity. It is sampled so finely that the argument of 1 + L is known without doubt,
+up to where no root lies on the axis; what 1 + L gathers from there on follows from poles. The
+encirclements are then held against the count of unstable roots: Z = N + P.
 """
 
 from __future__ import annotations
@@ -14,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-from numpy.polynomial import polynomial as poly
 
 from armlock import contour
 from armlock.bounds import last_frequency, last_larger
@@ -27,12 +27,13 @@ from armlock.checks import (
     positive_number,
     real_number,
 )
-from armlock.exponentials import ExponentialSum
+from armlock.exponentials import ExponentialSum, Polynomial
 from armlock.loops import Loop, checked_loop
 from armlock.stability import (
     BOUNDARY,
     UNCONFINED,
     CountError,
+    roots_of_a,
     sign_changes,
     unstable_roots,
 )
@@ -264,28 +265,19 @@ def _resolving_grid(loop: Loop, c1: float, c2: float, end: float) -> FloatArray:
     return np.unique(np.concatenate(grids))
 
 
-def _rectangle(loop: Loop, c1: float, c2: float, end: float) -> tuple[float, float]:
-    """Top and right side of a rectangle that holds every unstable root and pole.
+def _turn_beyond(loop: Loop, last: complex, end: float) -> float:
+    """Argument that 1 + L gathers from j `end`, where it is `last`, to infinity and back.
 
-    Right of it the delayed terms have died out. Above it |A| > |c1 B1 e1| + |c2 B2 e2|:
-    the two sides' ratio has no poles there, and takes its maximum on the edge.
+    1 + L is D / A times A / R. From `end` on |D / A - 1| < 1, up the axis and along the arc at
+    infinity, on which D / A tends to one: its argument at `end` is taken back. Those of A and R
+    are known from their roots, and the two turn alike along the arc.
     """
-    own = np.concatenate((_poles_elsewhere(loop), poly.polyroots(loop.a)))
-    largest = 2.0 * float(np.abs(own[own.real > 0.0]).max(initial=0.0))
-    top = max(end, largest)
-    for _ in range(60):
-        right = max(40.0 / min(loop.tau1, loop.tau2), top, largest)
-        s = 1j * top + np.linspace(0.0, right, 2000)
-        a, b1, b2 = loop.parts(s)
-        if (np.abs(a) > np.abs(c1 * b1) + np.abs(c2 * b2)).all():
-            break
-        top *= 1.5
-    return top, right
-
-
-def _between(start: complex, stop: complex) -> ComplexArray:
-    """Return evenly spaced points of a straight piece of the contour."""
-    return np.asarray(start + (stop - start) * np.linspace(0.0, 1.0, 200))
+    rest = loop.polynomials()[0]
+    undelayed = Polynomial(loop.a, roots_of_a(loop))
+    ratio = undelayed.over(rest, np.array(1j * end))
+    gathered = contour.remaining_argument(undelayed.roots, end)
+    gathered -= contour.remaining_argument(rest.roots, end)
+    return float(gathered - np.angle(last / complex(ratio)))
 
 
 def _turns(values: ComplexArray) -> float:
@@ -348,9 +340,8 @@ def nyquist(
 
     Notes
     -----
-    Up to the frequency past which no root can cross, on to where the delays have died out,
-    and back to the real axis. At (c1, c2) where L loses a pole at s = 0 by cancellation, D
-    has a root s = 0 that 1 + L has not; Z counts the zeros of 1 + L.
+    At (c1, c2) where L loses a pole at s = 0 by cancellation, D has a root s = 0 that 1 + L
+    has not; Z counts the zeros of 1 + L.
 
     Examples
     --------
@@ -386,7 +377,6 @@ def nyquist(
         end = max(end, positive_number("omega_max", omega_max))
         turns = end * loop.longest_delay / (2.0 * np.pi)
         check_memory("omega_max", (int(min(400.0 * turns, 1e18)),), 256)
-    end, far = _rectangle(loop, c1, c2, end)
     grid = _resolving_grid(loop, c1, c2, end)
     if omega_max is not None:
         turn = 2.0 * np.pi / loop.longest_delay
@@ -396,9 +386,7 @@ def nyquist(
         grid = np.unique(np.concatenate((grid, low, first, high)))
     inner = grid[(grid > radius) & (grid < end)]
     up, up_values = _refined(response, 1j * np.concatenate(([radius], inner, [end])))
-    _, across = _refined(response, _between(1j * end, 1j * end + far))
-    _, down = _refined(response, _between(1j * end + far, far))
-    argument = _turns(up_values) + _turns(across) + _turns(down)
+    argument = _turns(up_values) + _turn_beyond(loop, 1.0 + up_values[-1], end)
     quarter = radius * np.exp(1j * np.linspace(0.0, 0.5 * np.pi, 64))
     arc, arc_values = _refined(response, quarter)
     argument += _turns(arc_values)
@@ -425,12 +413,6 @@ def nyquist(
         poles,
         count,
     )
-
-
-def frequency_above(loop: Loop, c1: float, c2: float, level: float) -> float:
-    """Frequency past which |L| stays below `level`; inf if it does not."""
-    factors = np.array([1.0 + abs(c1), 1.0 + abs(c2)]) / level
-    return last_larger(loop.rest, (loop.b1, loop.b2), factors)
 
 
 def axis_crossings(
@@ -481,7 +463,8 @@ def axis_crossings(
     checked_loop(loop)
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
     if omega_max is None:
-        omega_max = frequency_above(loop, c1, c2, 1e-3)
+        factors = np.array([1.0 + abs(c1), 1.0 + abs(c2)]) / 1e-3
+        omega_max = last_larger(loop.rest, (loop.b1, loop.b2), factors)
         if not np.isfinite(omega_max):
             raise ValueError(
                 "omega_max must be given for a loop whose |L| does not fall to zero at high "

@@ -17,7 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from scipy import ndimage
 
-from armlock.checks import ComplexArray, even_axis, positive_number, whole_number
+from armlock.checks import ComplexArray, FloatArray, positive_number, whole_number
 
 if TYPE_CHECKING:
     from armlock.dcurve import Branch, Line
@@ -25,15 +25,7 @@ if TYPE_CHECKING:
     from armlock.stability import StabilityChart
 
 #: Colours of the figures, which the colour-blind tell apart too (Okabe and Ito).
-BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, BLACK = (
-    "#0072B2",
-    "#D55E00",
-    "#009E73",
-    "#CC79A7",
-    "#56B4E9",
-    "#E69F00",
-    "#000000",
-)
+BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9"
 #: Fill of the stable region.
 STABLE = "#B8C4CE"
 # Half the width of a count written into a region, over the width of the chart.
@@ -93,11 +85,8 @@ def plot_chart(
     """
     ax = plt.gca() if ax is None else ax
     largest = whole_number("largest", largest, 1)
-    even_axis("chart.x", chart.x)
-    even_axis("chart.y", chart.y)
     shown = chart.counts >= 0 if counts else chart.stable
-    # Cells are centred on the points.
-    half_x, half_y = (0.5 * (v[-1] - v[0]) / (v.size - 1) for v in (chart.x, chart.y))
+    half_x, half_y = _half_cell("chart.x", chart.x), _half_cell("chart.y", chart.y)
     ax.imshow(
         np.where(shown, np.minimum(chart.counts, largest), np.nan),
         cmap=ListedColormap(
@@ -119,6 +108,15 @@ def plot_chart(
     if labels:
         _label_regions(ax, chart)
     return ax
+
+
+def _half_cell(name: str, axis: FloatArray) -> float:
+    """Return half the step of an even axis, by which cells reach beyond the points."""
+    steps = np.diff(axis)
+    # Close to the ideal point, rounding is a visible share of a step.
+    if not (steps.size and (np.abs(steps - steps.mean()) < 1e-2 * steps.mean()).all()):
+        raise ValueError(f"{name} must ascend in equal steps, got {axis}")
+    return float(0.5 * (axis[-1] - axis[0]) / steps.size)
 
 
 def _label_regions(ax: Axes, chart: StabilityChart) -> None:

@@ -77,18 +77,6 @@ class RootError(RuntimeError):
         return type(self), (str(self), self.estimate)
 
 
-def _chebyshev(degree: int) -> tuple[FloatArray, FloatArray]:
-    """Return the Chebyshev points on [-1, 1], from 1 down, and the differentiation matrix."""
-    points = np.cos(np.pi * np.arange(degree + 1) / degree)
-    weights = np.ones(degree + 1)
-    weights[[0, -1]] = 2.0
-    weights *= (-1.0) ** np.arange(degree + 1)
-    difference = points[:, None] - points[None, :] + np.eye(degree + 1)
-    matrix = np.outer(weights, 1.0 / weights) / difference
-    matrix -= np.diag(matrix.sum(axis=1))
-    return points, matrix
-
-
 def pseudospectral_roots(
     system: CharacteristicFunction, x: float, y: float, degree: int
 ) -> ComplexArray:
@@ -124,10 +112,10 @@ def pseudospectral_roots(
     if longest == 0.0:
         eigenvalues = np.linalg.eigvals(form.state).astype(np.complex128)
         return eigenvalues[np.argsort(-eigenvalues.real)]
-    points, difference = _chebyshev(degree)
-    history = 0.5 * longest * (points - 1.0)
-    difference = difference * (2.0 / longest)
+    # Chebyshev points from the present back to the longest delay.
+    history = 0.5 * longest * (np.cos(np.pi * np.arange(degree + 1) / degree) - 1.0)
     interpolate = BarycentricInterpolator(history, np.eye(degree + 1))
+    difference = interpolate.derivative(history)
     rows = [interpolate(-term.delay) for term in delayed]
     # xi(0) in terms of the states and the history behind it.
     direct = sum((t.direct * row for t, row in zip(delayed, rows, strict=True)))

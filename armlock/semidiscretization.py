@@ -21,25 +21,19 @@ from armlock.characteristic import CharacteristicFunction, checked_system, whole
 from armlock.checks import (
     FloatArray,
     broadcast_pair,
+    check_memory,
     positive_number,
     real_number,
     whole_number,
 )
 from armlock.statespace import Realization, realize
 
-#: Largest transition matrix, in rows: half a gigabyte.
-LARGEST = 8192
-
 
 def _checked(system: CharacteristicFunction, step: float, order: int) -> tuple[float, int]:
     """Return the step and the order, or raise for what cannot be semi-discretized."""
     step = positive_number("step", step)
     order = whole_number("order", order, 0, 1)
-    if checked_system(system).step:
-        raise ValueError(
-            f"system must be in continuous time, got a map with step {system.step}"
-        )
-    if system.neutral:
+    if checked_system(system).neutral:
         raise ValueError(
             "system must be of retarded type: a neutral loop feeds back the delayed signal "
             "itself, which semi-discretization does not smooth"
@@ -47,17 +41,6 @@ def _checked(system: CharacteristicFunction, step: float, order: int) -> tuple[f
     for name in ("delay", "delay1", "delay2"):
         whole_steps(name, getattr(system, name), step)
     return step, order
-
-
-def _check_size(system: CharacteristicFunction, step: float) -> None:
-    """Refuse a transition matrix too large to hold, before anything is allocated."""
-    rows = system.degree + round(system.longest_delay / step)
-    if rows > LARGEST:
-        raise ValueError(
-            f"step must be at least about {system.longest_delay / LARGEST:.2g} s, got {step}: "
-            f"the transition matrix would have {rows} rows and take {8e-9 * rows**2:.3g} GB; "
-            f"unstable_roots counts the roots of semi_discretization at any step"
-        )
 
 
 def _sampled(
@@ -105,7 +88,7 @@ def transition_matrix(
     ------
     TypeError, ValueError
         If x or y is not a finite real number, the step does not divide a delay, the order is
-        not 0 or 1, the loop is neutral, or the matrix would have more than `LARGEST` rows.
+        not 0 or 1, the loop is neutral, or the matrix does not fit into the memory.
 
     Notes
     -----
@@ -150,7 +133,8 @@ def transition_matrix(
     0.904837
     """
     step, order = _checked(system, step, order)
-    _check_size(system, step)
+    # The matrix, and what its eigenvalues take.
+    check_memory("step", (system.degree + round(system.longest_delay / step),) * 2, 24)
     name1, name2 = system.parameters
     form = realize(system, real_number(name1, x), real_number(name2, y))
     flow, columns = _sampled(form, step, order)
@@ -210,7 +194,7 @@ def spectral_radius(
     TypeError, ValueError
         If x or y is not finite and real or the two do not broadcast, if the step does not
         divide a delay, if the order is not 0 or 1, if the loop is neutral, or if the matrix
-        would have more than `LARGEST` rows.
+        does not fit into the memory.
 
     Examples
     --------
@@ -220,8 +204,6 @@ def spectral_radius(
     """
     name1, name2 = checked_system(system).parameters
     xs, ys = broadcast_pair(name1, x, name2, y)
-    step, order = _checked(system, step, order)
-    _check_size(system, step)
     radii = [
         np.abs(np.linalg.eigvals(transition_matrix(system, p, q, step, order))).max()
         for p, q in zip(xs.flat, ys.flat, strict=True)

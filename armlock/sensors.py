@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
+from armlock import paper
 from armlock.checks import (
     ComplexArray,
     axis,
@@ -47,7 +48,7 @@ class SignalMapping:
     Raises
     ------
     TypeError, ValueError
-        If a coefficient is not finite and real, the denominator is zero, or the name is none.
+        If a coefficient is not finite and real, or the denominator is zero.
 
     Examples
     --------
@@ -72,8 +73,6 @@ class SignalMapping:
             object.__setattr__(self, field.name, tuple(float(value) for value in trimmed))
         if not any(self.denominator):
             raise ValueError(f"denominator must not be zero, got {self.denominator}")
-        if not isinstance(self.name, str):
-            raise TypeError(f"name must be a string, got {self.name!r}")
 
     def weights(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """Evaluate (m1, m2) at complex s, in rad/s; both are shaped like `s`."""
@@ -177,7 +176,7 @@ def dual(corner: float, difference: float) -> SignalMapping:
 
 
 def modified_dual(
-    mean_delay: float, half_difference: float, corner: float = 2.0 * np.pi * 0.4
+    mean_delay: float, half_difference: float, corner: float = paper.DUAL_SENSOR_CORNER
 ) -> SignalMapping:
     r"""Return the modified dual sensor: common arm at low frequency, dual arm in the band.
 

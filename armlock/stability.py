@@ -110,12 +110,12 @@ def _compiled(system: CharacteristicFunction) -> tuple[Any, ...]:
         np.array(system.reference),
         phases,
         a,
-        _roots_of_a(system),
+        roots_of_a(system),
         system.step > 0.0,
     )
 
 
-def _roots_of_a(system: CharacteristicFunction) -> ComplexArray:
+def roots_of_a(system: CharacteristicFunction) -> ComplexArray:
     """Roots of A, in extended precision where doubles give those of another polynomial.
 
     They enter a count through the argument of A alone, past the last frequency.

@@ -46,7 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         topics[name].data["seconds"] = time.perf_counter() - start
     about["load"].append(report.load())
     report.write(folder, about, topics)
-    print(report.as_text(about, topics))
+    print(report.as_markdown(about, topics))
     print(f"Written: report.md, report.json and figures in {folder}")
     return 0 if report.agree(topics) else 1
 

@@ -1,4 +1,4 @@
-"""What a topic measures, and how it is printed: as text, as Markdown and as JSON."""
+"""What a topic measures, and how it is printed: as Markdown and as JSON."""
 
 from __future__ import annotations
 
@@ -168,27 +168,15 @@ def agree(topics: dict[str, Topic]) -> bool:
     return all(row.met for topic in topics.values() for row in topic.rows if row.correctness)
 
 
-def as_text(about: dict[str, Any], topics: dict[str, Topic]) -> str:
-    lines = [machine_line(about)]
-    for topic in topics.values():
-        for heading, rows in tables(topic):
-            widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
-            lines += ["", heading, "-" * (sum(widths) + 2 * len(widths) - 2)]
-            lines += [
-                "  ".join(c.ljust(w) for c, w in zip(r, widths, strict=True)).rstrip()
-                for r in rows
-            ]
-        lines += ["", *(f"* {note}" for note in topic.notes)] if topic.notes else []
-    return "\n".join([*lines, "", closing_line(topics)])
-
-
 def as_markdown(about: dict[str, Any], topics: dict[str, Topic]) -> str:
     lines = ["# Benchmark report", "", machine_line(about)]
     for topic in topics.values():
         for heading, rows in tables(topic):
             lines += ["", f"## {heading}", ""]
-            bars = [f"| {' | '.join(row)} |" for row in rows]
-            lines += [bars[0], "|---" * len(rows[0]) + "|", *bars[1:]]
+            widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
+            head, *body = ([c.ljust(w) for c, w in zip(r, widths, strict=True)] for r in rows)
+            rule = ["-" * width for width in widths]
+            lines += [f"| {' | '.join(row)} |" for row in (head, rule, *body)]
         lines += ["", *(f"![{topic.title}]({name})" for name in topic.figures)]
         lines += ["", *(f"- {note}" for note in topic.notes)] if topic.notes else []
     return "\n".join([*lines, "", closing_line(topics), ""])

@@ -1,10 +1,12 @@
 """Second opinions: the same quantities by other routes, sharing no code with armlock.
 
-Only the coefficients, delays and the step of a characteristic function are read from it.
+Only the coefficients, delays and the step of a characteristic function are read from it, and
+the factors of a loop.
 """
 
 from __future__ import annotations
 
+import mpmath
 import numpy as np
 from scipy.special import lambertw
 
@@ -25,6 +27,28 @@ def value(system, s, x, y):
     return np.polyval(system.a[::-1], z) + sum(
         np.polyval(b[::-1], z) * np.exp(-s * delay) for b, delay in delayed_terms(system, x, y)
     )
+
+
+def exact(system, s, x, y):
+    """D(s; x, y) in mpmath's precision; of a loop 1 + L, from its controller and sensor."""
+    s = mpmath.mpc(s)
+    if hasattr(system, "controller"):
+        k, m = system.controller, system.mapping
+        gain = k.gain * mpmath.fprod(s - mpmath.mpc(zero) for zero in k.zeros)
+        gain /= mpmath.fprod(s - mpmath.mpc(pole) for pole in k.poles)
+        first, second, below = (
+            mpmath.polyval(list(p), s, asc=True)
+            for p in (m.numerator1, m.numerator2, m.denominator)
+        )
+        rest, b1, b2 = 1, gain * first / below, gain * second / below
+    else:
+        z = mpmath.exp(s * system.step) if system.step else s
+        polynomials = system.rest, system.b1, system.b2
+        rest, b1, b2 = (mpmath.polyval(p.tolist(), z, asc=True) for p in polynomials)
+    x0, y0 = system.reference
+    arms = b1 * (x0 - x * mpmath.exp(-s * system.delay1))
+    arms += b2 * (y0 - y * mpmath.exp(-s * system.delay2))
+    return rest + mpmath.exp(-s * system.delay) * arms
 
 
 def hayes_roots(a, b, tau=1.0, branches=60):

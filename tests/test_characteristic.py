@@ -124,8 +124,6 @@ class TestSystemsAreValues:
         for name in (*vars(system), "anything"):
             with pytest.raises(AttributeError, match=rf"cannot be changed, got {name} = 3\.0"):
                 setattr(system, name, 3.0)
-        with pytest.raises(AttributeError, match="cannot be changed, got del delay1"):
-            del system.delay1
 
     @pytest.mark.parametrize(
         "copied",
@@ -136,14 +134,11 @@ class TestSystemsAreValues:
             lambda system: pickle.loads(pickle.dumps(system)),
         ],
     )
-    def test_copies_count_the_same_and_are_read_only(self, system, copied):
+    def test_copies_count_the_same_and_cannot_be_changed(self, system, copied):
         expected = unstable_roots(system, 0.9, 1.05)
         again = copied(system)
         assert unstable_roots(again, 0.9, 1.05) == expected
         assert repr(again) == repr(system)
-        for name in ("a", "rest", "b1", "b2"):
-            with pytest.raises(ValueError, match="read-only"):
-                getattr(again, name)[0] = 7.0
         with pytest.raises(AttributeError, match="cannot be changed"):
             again.delay1 = 3.0
 

@@ -13,11 +13,12 @@ import scipy.signal
 
 import armlock
 from armlock import CharacteristicFunction, CommonArm, HayesEquation, SingleArm, paper_loop
-from armlock.checks import axis, check_memory, even_axis, finite_series, real_array
+from armlock.checks import axis, check_memory, finite_series, real_array
 from armlock.controllers import integrating_actuator, stage_one, table_two
 from armlock.discretize import warped
 from armlock.noise import band_rms, sample_count
 from armlock.rays import ray_crossings
+from armlock.roots import extended_root, pseudospectral_roots
 from armlock.sensors import COMMON, SignalMapping, dual
 from tests.systems import NEUTRAL
 
@@ -30,18 +31,18 @@ LOOP: dict[str, Any] = {"tau1": 20.1, "tau2": 19.9, "delay": 0.0}
 POINT: dict[str, Any] = {"c1": 1.0, "c2": 1.0}
 AT: dict[str, Any] = {"x": 1.0, "y": 1.0}
 SHAPE: dict[str, Any] = {"zeros": [], "poles": [-1.0], "gain": 1.0}
-NOISE: dict[str, Any] = {"seed": 1, "sample_rate": 10.0, "cutoff": 1e-3, "at_rest": False}
+NOISE: dict[str, Any] = {"seed": 1, "sample_rate": 10.0, "cutoff": 1e-3}
 
 # A call of everything that takes arguments, with sensible ones.
 CALLS: dict[Callable[..., object], dict[str, Any]] = {
     CharacteristicFunction: {"rest": [1.0, 1.0], "b1": [1.0], "b2": [1.0], "delay1": 1.0,
                              "delay2": 2.0, "delay": 0.0, "step": 0.0,
-                             "parameters": ("x", "y"), "reference": (0.0, 0.0)},
+                             "reference": (0.0, 0.0)},
     HayesEquation: {"tau": 1.0},
     SingleArm: {"gain": 1.0, "tau": 1.0, "delay": 0.0},
     CommonArm: {"gain": 1.0} | LOOP,
     armlock.DualArm: {"gain": 1.0, "corner": 2.0, "difference": 0.1} | LOOP,
-    paper_loop: {"corner": 2.0, "controller": table_two(), "actuator": True,
+    paper_loop: {"corner": 2.0, "controller": table_two(),
                  "difference": 0.1} | LOOP,
     armlock.Loop: {"controller": table_two(), "mapping": COMMON} | LOOP,
     armlock.Controller: SHAPE,
@@ -59,6 +60,8 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     armlock.unstable_roots: {"system": ARMS} | AT,
     armlock.stability_chart: {"system": ARMS, "x": [1.0], "y": [1.0]},
     armlock.rightmost_root: {"system": ARMS} | AT,
+    extended_root: {"system": ARMS, "start": 0.0, "digits": 20} | AT,
+    pseudospectral_roots: {"system": ARMS, "degree": 8} | AT,
     armlock.d_curve: {"system": ARMS, "omega": 1.0},
     armlock.d_curve_line: {"system": ARMS},
     armlock.d_curve_branches: {"system": ARMS, "omega_max": 1.0, "points_per_turn": 24},
@@ -79,15 +82,13 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     warped: {"omega": 1.0, "sample_rate": 10.0},
     armlock.LaserNoise: {"level": 30.0} | NOISE,
     armlock.PerturbationNoise: {"scale": 1.0} | NOISE,
-    armlock.ShapedNoise: {"seed": 1, "sample_rate": 10.0, "at_rest": False} | SHAPE,
+    armlock.ShapedNoise: {"seed": 1, "sample_rate": 10.0} | SHAPE,
     LASER.draw: {"samples": 3},
-    LASER.blocks: {"samples": 3, "size": 2},
     LASER.asd: {"frequency": 3.0},
     LASER.sampled_asd: {"frequency": 3.0},
     band_rms: {"low": 0.5, "high": 1.0},
     sample_count: {"duration": 1.0, "sample_rate": 10.0},
-    armlock.amplitude_spectrum: {"series": np.ones(2000), "sample_rate": 1.0, "bands": 12,
-                                 "confidence": 0.95},
+    armlock.amplitude_spectrum: {"series": np.ones(2000), "sample_rate": 1.0, "bands": 12},
     armlock.flight_loop: {"mean_delay": 33.6, "half_difference": 0.255, "g2": 40.0,
                           "corner": 2.0, "delay": 0.0},
     armlock.transfer: {"loop": ARMS, "source": "laser", "s": 1j} | POINT,
@@ -110,7 +111,7 @@ def test_what_an_argument_cannot_be_is_refused_by_its_name(function):
     arguments = CALLS[function]
     function(**arguments)
     for name, junk in itertools.product(arguments, JUNK):
-        if (name, junk) != ("name", "text"):
+        if name != "name":
             with pytest.raises(
                 (TypeError, ValueError), match=f"^{SHOWN.get(name, name)} must "
             ):
@@ -133,7 +134,6 @@ WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
     (CharacteristicFunction, "delay1", -1.0, "not be negative, got -1.0"),
     (CharacteristicFunction, "delay", -1.0, "not be negative, got -1.0"),
     (CharacteristicFunction, "step", 0.3, "divide every delay, got step=0.3 for delay1"),
-    (CharacteristicFunction, "parameters", ("x", 1), "be a pair of names"),
     (CharacteristicFunction, "reference", (1.0,), "hold two numbers, got 1"),
     (CommonArm, "gain", 0.0, "be positive, got 0.0"),
     (armlock.Controller, "gain", 0.0, "not be zero"),
@@ -145,7 +145,6 @@ WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
     (armlock.Loop, "controller", scipy.signal.TransferFunction([1.0], [1.0, 1.0]), "be a"),
     (armlock.Loop, "mapping", SignalMapping([0.0], [0.0], [1.0], "none"), "not be zero"),
     (SignalMapping, "denominator", [0.0], "not be zero, got (0.0,)"),
-    (SignalMapping, "name", 3, "be a string, got 3"),
     (dual, "difference", 0.0, "not be zero"),
     (table_two, "denominator", "x", "be 'table' or 'printed', got 'x'"),
     (ARMS.shifted, "sigma", -50.0, "be at most 700 over the longest delay"),
@@ -161,6 +160,8 @@ WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
     (armlock.axis_crossings, "omega_max", None, "be given"),
     (armlock.frequency_response, "omega", [1.0, 0.0], "be positive"),
     (armlock.spectral_radius, "system", NEUTRAL["integrator"], "be of retarded type"),
+    (armlock.spectral_radius, "system", armlock.semi_discretization(ARMS, 0.1), "be in contin"),
+    (armlock.transition_matrix, "step", 1e-6, "be of a size that memory holds"),
     (armlock.semi_discretization, "order", 2, "be an integer from 0 to 1, got 2"),
     (armlock.simulate, "noise", [0.0, np.nan], "be finite, got nan at index 1"),
     (armlock.simulate, "c1", np.ones(8), "be a number or have the shape of noise, (9,)"),
@@ -182,8 +183,16 @@ WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
         np.ones(1000),
         "hold at least 1024 samples, got 1000",
     ),
+    (armlock.flight_loop, "half_difference", 0.0, "not be zero"),
+    (armlock.flight_loop, "half_difference", 33.6, "be below mean_delay"),
+    (armlock.noise_budget, "frequency", [0.0, 1.0], "be positive"),
+    (armlock.noise_budget, "laser", "maser", "be one of free-running, Mach-Zehnder, cavity"),
+    (armlock.noise_budget, "laser", [1.0, 2.0], "be one number or hold one a frequency, 1 of"),
+    (armlock.noise_budget, "requirement", -1.0, "not be negative"),
+    (armlock.pulling, "time", [0.0, 1.0], "be positive"),
+    (armlock.pulling, "common", (1.0,), "hold nu0, gamma and alpha"),
+    (armlock.pulling, "method", "guess", "be 'roots' or 'laplace'"),
     (armlock.amplitude_spectrum, "bands", 0, "be an integer from 1 on"),
-    (armlock.amplitude_spectrum, "confidence", 1.0, "lie between 0 and 1"),
 ]
 
 
@@ -207,13 +216,6 @@ def test_what_is_checked_is_a_copy_but_for_a_long_series():
         check("x", given)[0] = 7.0
     assert given[0] == 1.0
     assert finite_series("x", given) is given
-
-
-def test_an_even_axis_ascends_in_equal_steps():
-    assert even_axis("x", 1.0 + np.linspace(-1e-9, 1e-9, 200)).size == 200
-    for values in ([1.0, 0.0, -1.0], [0.0, 1.0, 1.0], [0.0, 1.0, 10.0], [2.0, 2.0]):
-        with pytest.raises(ValueError, match=r"^x must ascend in equal steps, got steps from "):
-            even_axis("x", values)
 
 
 def test_what_memory_does_not_hold_is_refused():

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from armlock import PerturbationNoise
 from book.companion.claims import appendix
 
 
@@ -57,7 +56,7 @@ def test_phase_of_the_laser_is_the_integral_of_its_frequency():
 
 @pytest.mark.parametrize("frequency", [0.0, 1e-4, 1e-2, 0.1, 0.3, 1.0])
 def test_convolution_against_adaptive_integration(frequency):
-    phase, eta = appendix._phase_source(11, 4.0), PerturbationNoise(12, 4.0, cutoff=2e-4)
+    phase, eta = appendix.sources()
 
     def two_sided(source, f):
         f = min(abs((f + 2.0) % 4.0 - 2.0), 1.99999)

@@ -60,12 +60,6 @@ def test_derived_and_printed_recurrence_by_dense_eigenvalues():
     assert abs(radius - 1.0 - check("C5")["C5"].value) < 1e-10
 
 
-def test_spectral_radius_of_a_map_is_that_of_its_largest_eigenvalue():
-    derived = chapter.printed_maps()["derived"]
-    radius = np.abs(map_eigenvalues(derived, -3.0, -2.9)).max()
-    assert chapter.excess(derived, -3.0, -2.9) == pytest.approx(radius - 1.0, rel=1e-9)
-
-
 def test_the_straight_edge_ends_where_the_stable_region_does():
     for c1, inwards in zip(chapter.straight_edge(), (1e-6, -1e-6), strict=True):
         below = CommonArm(), np.array([c1 + inwards, c1 - inwards])

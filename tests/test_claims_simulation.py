@@ -43,18 +43,6 @@ def test_a_trace_without_spectrum_is_named():
         claimed.full_run(duration=10.0).spectrum("face value")
 
 
-@pytest.mark.parametrize(
-    ("name", "point"), [("system 2", claimed.STRONG), ("ideal", claimed.IDEAL)]
-)
-def test_suppression_agrees_with_theory(run, name, point):
-    found = claimed.measured_suppression(run, name, point)
-    assert found.frequency[0] < 1.2e-4
-    assert found.frequency[-1] > 0.9
-    inside = (found.lower < found.expected) & (found.upper > found.expected)
-    assert inside.mean() >= 0.95
-    assert np.abs(found.measured / found.expected - 1.0)[found.frequency > 1e-3].max() < 0.02
-
-
 def test_stability_is_lost_where_the_frozen_loop_loses_it(run):
     """Only sizes whose c1 - c2 leaves the stable region grow, and the more the longer."""
     edge = critical_perturbation(paper_loop(), (0.0, -1.0))

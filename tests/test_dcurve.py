@@ -7,7 +7,6 @@ from armlock import (
     CommonArm,
     DualArm,
     HayesEquation,
-    Loop,
     d_curve,
     d_curve_branches,
     d_curve_line,
@@ -161,27 +160,10 @@ def test_a_branch_of_a_map_ends_at_the_nyquist_frequency():
 def exact_curve(system, omega):
     """The point of the curve at a double taken as exact, with as many digits as it takes."""
     with mpmath.workdps(40 + 2 * int(abs(np.log10(omega)))):
-        s = mpmath.mpc(0, mpmath.mpf(float(omega)))
-        z = mpmath.exp(s * mpmath.mpf(system.step)) if system.step else s
-        polynomials = system.rest, system.b1, system.b2
-        inverse = mpmath.mpf(1)
-        if isinstance(system, Loop):
-            # Its controller is given by zeros and poles.
-            k, m = system.controller, system.mapping
-            polynomials = m.denominator, m.numerator1, m.numerator2
-            inverse /= k.gain
-            for root in k.poles:
-                inverse *= s - mpmath.mpc(root)
-            for root in k.zeros:
-                inverse /= s - mpmath.mpc(root)
-        rest, b1, b2 = (
-            mpmath.polyval([mpmath.mpf(float(c)) for c in p], z, asc=True) for p in polynomials
-        )
-        rest *= inverse
-        x0, y0 = system.reference
-        a = rest + x0 * b1 + y0 * b2
-        late1 = b1 * mpmath.exp(-s * mpmath.mpf(system.delay1))
-        late2 = b2 * mpmath.exp(-s * mpmath.mpf(system.delay2))
+        s = mpmath.mpc(0, float(omega))
+        # Without both signals, and by how much each of them lowers that.
+        a, one, other = (independent.exact(system, s, *c) for c in ((0, 0), (1, 0), (0, 1)))
+        late1, late2 = a - one, a - other
         determinant = mpmath.im(late1 * mpmath.conj(late2))
         x = mpmath.im(a * mpmath.conj(late2)) / determinant
         y = -mpmath.im(a * mpmath.conj(late1)) / determinant

@@ -17,8 +17,8 @@ from armlock import (
     unstable_roots,
 )
 from armlock.controllers import table_two
-from armlock.paper import TABLE_2_POLES, TABLE_2_STAGE_1_POLE, TABLE_2_ZEROS
 from armlock.roots import RootError, extended_root, pseudospectral_roots
+from tests import independent
 
 LOOP = paper_loop()
 E = 1e-6
@@ -124,23 +124,10 @@ def test_large_chart_is_consistent():
 def reference_crossing(direction, start):
     """Solve 1 + L(j omega) = 0 for omega and eps, with 40 digits and the factored loop."""
     with mpmath.workdps(40):
-        d1, d2 = direction
-        tau1, tau2, p = mpmath.mpf(20.1), mpmath.mpf(19.9), mpmath.mpf(2 * np.pi * 0.4)
-        dtau = mpmath.mpf(20.1 - 19.9)
-        zeros = [mpmath.mpf(z) for z in TABLE_2_ZEROS]
-        poles = [mpmath.mpf(q) for q in (*TABLE_2_POLES, *[TABLE_2_STAGE_1_POLE] * 2)]
 
         def equation(omega, eps):
-            s = mpmath.mpc(0, omega)
-            value = 5000 * s**2
-            for z in zeros:
-                value *= s + z
-            for q in poles:
-                value /= s + q
-            integral = p / ((s + p) * s * dtau)
-            arm1 = 1 - (1 + eps * d1) * mpmath.exp(-s * tau1)
-            arm2 = 1 - (1 + eps * d2) * mpmath.exp(-s * tau2)
-            value = 1 + value * ((1 + integral) * arm1 + (1 - integral) * arm2)
+            point = (1 + eps * d for d in direction)
+            value = independent.exact(LOOP, mpmath.mpc(0, omega), *point)
             return value.real, value.imag
 
         omega, eps = mpmath.findroot(equation, start, tol=1e-60)

@@ -54,12 +54,14 @@ def test_labels_stand_in_regions_of_their_count(ax, chart):
 
 def test_charts_with_uneven_axes_are_no_pictures(ax):
     even = np.linspace(-1, 1, 5)
-    for bad in ([0.0, 0.1, 1.0], even[::-1]):
-        with pytest.raises(ValueError, match=r"^chart\.x must "):
+    for bad in ([0.0, 0.1, 1.0], even[::-1], [1.0, 1.0], [1.0]):
+        with pytest.raises(ValueError, match=r"^chart\.x must ascend in equal steps, got "):
             stability_chart(CommonArm(), bad, even).plot(ax)
         with pytest.raises(ValueError, match=r"^chart\.y must "):
             stability_chart(CommonArm(), even, bad).plot(ax)
     assert not ax.images
+    near = 1.0 + np.linspace(-1e-9, 1e-9, 200)
+    stability_chart(CommonArm(), near, near).plot(ax)
 
 
 def test_no_two_branches_are_joined(ax):

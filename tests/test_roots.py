@@ -1,6 +1,5 @@
 import pickle
 import time
-from typing import Any
 
 import mpmath
 import numpy as np
@@ -82,22 +81,6 @@ def test_root_is_a_zero_and_the_rightmost_of_an_independent_spectrum(gain, tau1,
     assert abs(independent.value(system, root, c1, c2)) <= 1e-12 * (parts.sum() + abs(root))
     others = independent.generator_eigenvalues(system, c1, c2, 70)
     assert others.real.max() == pytest.approx(root.real, abs=1e-6 * (1.0 + abs(root)))
-
-
-@given(gains, delays, delays, reals, reals, st.floats(0.05, 20.0))
-def test_scaling_time_scales_the_root(gain, tau1, tau2, c1, c2, k):
-    assume(abs(c1) + abs(c2) > 0.1)
-    one = rightmost_root(CommonArm(gain, tau1, tau2), c1, c2)
-    other = rightmost_root(CommonArm(k * gain, tau1 / k, tau2 / k), c1, c2)
-    assert other.real == pytest.approx(k * one.real, abs=1e-7 * k * (1.0 + abs(one)))
-
-
-@given(gains, delays, delays, reals, reals)
-def test_exchanging_the_arms_changes_nothing(gain, tau1, tau2, c1, c2):
-    assume(abs(c1) + abs(c2) > 0.1)
-    one = rightmost_root(CommonArm(gain, tau1, tau2), c1, c2)
-    other = rightmost_root(CommonArm(gain, tau2, tau1), c2, c1)
-    assert other.real == pytest.approx(one.real, abs=1e-7 * (1.0 + abs(one)))
 
 
 @pytest.mark.parametrize("name", [n for n in RETARDED if n != "no parameter"])
@@ -192,13 +175,6 @@ def test_an_extended_root_is_lambert_to_all_its_digits():
             exact = mpmath.lambertw(mpmath.mpf(-3.0), branch)
             found = extended_root(HayesEquation(), 0.0, -3.0, complex(exact), digits=50)
             assert abs(found - exact) < mpmath.mpf(10) ** -44
-
-
-def test_an_extended_root_does_not_depend_on_the_last_digits_of_its_start():
-    loop = CommonArm()
-    start = rightmost_root(loop, 0.9, 1.05)
-    one, other = (extended_root(loop, 0.9, 1.05, start * (1 + d)) for d in (1e-15, -1e-12))
-    assert float(abs(one - other)) < 1e-33
 
 
 def test_an_extended_root_of_a_map_solves_its_recurrence():
@@ -322,44 +298,6 @@ def test_random_dual_arms_have_a_certified_root(seed):
 
 def test_equal_delays_are_one_in_which_both_terms_may_cancel():
     assert rightmost_root(CommonArm(20.0, 3.0, 3.0), 1.25, -1.25) == -40.0
-
-
-WRONG: dict[str, Any] = {"text": "1", "half": 2.5}
-
-
-@pytest.mark.parametrize(
-    ("function", "error", "message"),
-    [
-        (
-            lambda: extended_root(HayesEquation(), 0.0, WRONG["text"], 1j),
-            TypeError,
-            "^b must be a real number, got '1'",
-        ),
-        (
-            lambda: extended_root(HayesEquation(), 0.0, 1.0, np.nan),
-            ValueError,
-            "^start must be finite",
-        ),
-        (
-            lambda: extended_root(WRONG["text"], 0.0, 1.0, 1j),
-            TypeError,
-            "^system must be a CharacteristicFunction",
-        ),
-        (
-            lambda: pseudospectral_roots(HayesEquation(), 0.0, 1.0, WRONG["half"]),
-            ValueError,
-            r"^degree must be an integer from 2 on, got 2\.5",
-        ),
-        (
-            lambda: extended_root(HayesEquation(), 0.0, 1.0, 0.5, digits=0),
-            ValueError,
-            "^digits must be an integer from 1 on, got 0",
-        ),
-    ],
-)
-def test_bad_arguments_of_the_steps_are_named(function, error, message):
-    with pytest.raises(error, match=message):
-        function()
 
 
 def test_a_root_next_to_zero_is_that_of_the_factored_loop():

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from armlock import CommonArm, spectral_radius, unstable_roots
+from armlock import CommonArm, unstable_roots
 from book.companion.schemes import standard_schemes
 from tests import independent
 
@@ -60,15 +60,6 @@ def test_the_map_is_the_textbook_scheme(name, point):
     np.testing.assert_allclose(response, expected, rtol=1e-11, atol=1e-13)
     outside = int((np.abs(independent.map_eigenvalues(system, *point)) > 1.0).sum())
     assert unstable_roots(system, *point) == outside
-
-
-def test_eigenvalues_of_the_map_are_those_of_the_transition_matrix():
-    for order in (0, 1):
-        system = standard_schemes(LOOP, STEP)[f"semi-discretization, order {order}"]
-        for point in POINTS:
-            radius = np.abs(independent.map_eigenvalues(system, *point)).max()
-            expected = float(spectral_radius(LOOP, *point, STEP, order))
-            assert radius == pytest.approx(expected, rel=1e-12)
 
 
 def test_the_step_of_a_scheme_divides_both_delays():

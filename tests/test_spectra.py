@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.signal import welch
 
 from armlock import LaserNoise, Spectrum, SpectrumEstimator, amplitude_spectrum
 from armlock.spectra import SEGMENT
@@ -51,24 +50,6 @@ def test_steep_spectra_do_not_leak(power):
     fast = found.degrees > 200.0
     assert np.abs(found.asd / found.expected(truth) - 1.0)[fast].max() < 0.2
     assert found.asd[0] / found.asd[-1] > 2e3**power
-
-
-def test_a_hann_window_hides_what_this_one_shows():
-    """A notch of three orders under a red spectrum, below the leakage of the usual window."""
-    rate, count = 20.0, 1 << 20
-    red = np.cumsum(np.cumsum(np.random.default_rng(2).standard_normal(count)))
-    red /= np.abs(red).max()
-    floor = 1e-9 * np.random.default_rng(3).standard_normal(count)
-    # Slow part only, with a floor far below it.
-    spectrum = np.fft.rfft(red * np.kaiser(count, 40.0))
-    spectrum[np.fft.rfftfreq(count, 1 / rate) > 0.02] = 0.0
-    series = np.fft.irfft(spectrum, count) + floor
-    expected = 1e-9 * np.sqrt(2.0 / rate)
-    found = amplitude_spectrum(series, rate).within(0.5, 2.0)
-    assert found.asd == pytest.approx(np.full(found.asd.size, expected), rel=0.1)
-    frequency, power = welch(series, rate, "hann", SEGMENT)
-    hann = np.sqrt(power[(frequency > 0.5) & (frequency < 2.0)])
-    assert np.median(hann) > 3.0 * expected
 
 
 def test_decimation_keeps_a_line_and_adds_none():
@@ -168,14 +149,13 @@ def test_any_partition_gives_the_same_estimate(sizes):
     for block in np.split(series, np.cumsum(sizes)):
         estimator.add(block)
     whole, parts = amplitude_spectrum(series, 3.0), estimator.spectrum()
-    assert estimator.samples == series.size
     held = sum(level.waiting.size + level.unfiltered.size for level in estimator._levels)
     assert held < 2 * SEGMENT * len(estimator._levels)
     np.testing.assert_allclose(parts.asd, whole.asd, rtol=1e-12)
     assert np.array_equal(parts.degrees, whole.degrees)
 
 
-def test_the_part_between_two_frequencies_needs_them_in_order():
+def test_a_part_of_a_spectrum_lies_between_two_frequencies():
     found = amplitude_spectrum(np.random.default_rng(1).standard_normal(5000), 2.0)
     assert found.within(0.0, np.inf).asd.size == found.within(-np.inf, 1.0).asd.size
     assert found.within(0.0, np.inf).asd.size == found.asd.size
@@ -185,20 +165,12 @@ def test_the_part_between_two_frequencies_needs_them_in_order():
     assert np.array_equal(part.upper, found.upper[inside])
     assert np.array_equal(part.bins, found.bins[inside])
     assert repr(found.within(2.0, 3.0)) == "Spectrum(0 bands)"
-    with pytest.raises(ValueError, match=r"high must not lie below low = 0\.5, got 0\.1"):
-        found.within(0.5, 0.1)
-    with pytest.raises(ValueError, match="high must not lie below low = nan"):
-        found.within(np.nan, 1.0)
 
 
 def test_a_density_to_compare_with_is_a_function():
     found = amplitude_spectrum(np.random.default_rng(1).standard_normal(5000), 2.0)
     assert found.expected(lambda f: 2.0) == pytest.approx(np.full(found.asd.size, 2.0))
-    with pytest.raises(TypeError, match=r"asd must be a function of the frequency, got 1\.0"):
-        found.expected(1.0)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match=r"asd\(frequency\) must be finite, got nan"):
         found.expected(lambda f: np.full(f.shape, np.nan))
     with pytest.raises(TypeError, match=r"asd\(frequency\) must hold real numbers"):
         found.expected(lambda f: f + 1j)
-    with pytest.raises(ValueError, match=r"asd must return one value for each frequency"):
-        found.expected(lambda f: f[0])

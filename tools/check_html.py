@@ -6,8 +6,8 @@ Every script, style sheet, font, image, frame and other part that a page loads b
 be a file in the folder, and must exist. Links that a reader may follow can lead anywhere,
 but those that stay within the book must lead to a page that exists.
 
-The book is to stay below 25 MB, parts of interactive figures not counted, a page with all it
-loads by itself below 6 MB, and a figure's SVG below 2 MB: dense curves are rasterised in it.
+The book is to stay below 25 MB, and a figure's SVG below 2 MB: dense curves are rasterised in
+it. What each page weighs is checked in a browser.
 """
 
 import re
@@ -17,24 +17,11 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 # Attributes that a browser fetches without being asked. (A link's rel decides: see below.)
-LOADED = {
-    "audio": ["src"],
-    "embed": ["src"],
-    "iframe": ["src"],
-    "image": ["href", "xlink:href"],
-    "img": ["src", "srcset"],
-    "input": ["src"],
-    "object": ["data"],
-    "script": ["src"],
-    "source": ["src", "srcset"],
-    "track": ["src"],
-    "use": ["href", "xlink:href"],
-    "video": ["src", "poster"],
-}
+LOADED = {"src", "srcset", "poster"}
+DRAWN = {"image", "use"}  # of SVG: they load what their href names
 LINKS_NOT_LOADED = {"alternate", "author", "canonical", "help", "index", "license"}
 LINKS_NOT_LOADED |= {"next", "prev", "search"}
-LARGEST_BOOK, LARGEST_PAGE, LARGEST_FIGURE = 25e6, 6e6, 2e6  # bytes
-INTERACTIVE = re.compile(r"plotly|/interactive/", re.IGNORECASE)
+LARGEST_BOOK, LARGEST_FIGURE = 25e6, 2e6  # bytes
 CSS_URL = re.compile(r"""@import\s+["']([^"']+)|url\(\s*["']?([^"')]+)""")
 
 
@@ -57,10 +44,13 @@ class Page(HTMLParser):
             rel = set(values.get("rel", "").lower().split())
             if not rel & LINKS_NOT_LOADED:
                 self.loaded.append(values["href"])
-        for name in LOADED.get(tag, []):
-            if name in values:
-                parts = values[name].split(",") if name == "srcset" else [values[name]]
-                self.loaded += [part.split()[0] for part in parts if part.strip()]
+        if tag == "object" and "data" in values:
+            self.loaded.append(values["data"])
+        if tag in DRAWN:
+            self.loaded += [values[k] for k in ("href", "xlink:href") if k in values]
+        for name in LOADED & values.keys():
+            parts = values[name].split(",") if name == "srcset" else [values[name]]
+            self.loaded += [part.split()[0] for part in parts if part.strip()]
         if "style" in values:
             self.loaded += css_urls(values["style"])
 
@@ -119,25 +109,11 @@ def check(folder: Path) -> list[str]:
     return problems
 
 
-def page_size(file: Path) -> int:
-    """Return the bytes of a page and of the files that it names as its parts."""
-    page = Page()
-    page.feed(file.read_text(encoding="utf-8"))
-    named = [address for address in page.loaded if not urlsplit(address).scheme]
-    parts = {(file.parent / unquote(urlsplit(a).path)).resolve() for a in named}
-    return file.stat().st_size + sum(p.stat().st_size for p in parts if p.is_file())
-
-
 def sizes(folder: Path) -> list[str]:
     """Return what is too large in a folder."""
     problems = []
     files = [file for file in folder.rglob("*") if file.is_file()]
-    static = [f for f in files if not INTERACTIVE.search(f.relative_to(folder).as_posix())]
-    found = [("the book", sum(f.stat().st_size for f in static), LARGEST_BOOK)]
-    found += [
-        (f"{f.relative_to(folder)}, with its parts,", page_size(f), LARGEST_PAGE)
-        for f in pages(folder)
-    ]
+    found = [("the book", sum(f.stat().st_size for f in files), LARGEST_BOOK)]
     found += [
         (str(f.relative_to(folder)), f.stat().st_size, LARGEST_FIGURE)
         for f in files

@@ -30,6 +30,8 @@ claim = partial(ledger.claim, chapter="08_perturbations")
 #: Gain errors of the two channels at which the model is tried, and their difference.
 MISMATCH = (2e-6, -1e-6)
 ETA = MISMATCH[1] - MISMATCH[0]
+#: Sample rate in Hz at which the error's spectrum is held against the convolution.
+RATE = 4.0
 
 
 def phase_error(phase: npt.ArrayLike, mismatch: tuple[float, float] = MISMATCH) -> FloatArray:
@@ -94,56 +96,50 @@ class Convolution(NamedTuple):
     phase_rms: float
 
 
-def _phase_source(seed: int, rate: float) -> ShapedNoise:
-    """Return a stationary phase in rad: a line of finite width above a red part."""
+def sources() -> tuple[ShapedNoise, ShapedNoise]:
+    """Return a stationary phase in rad, a line above a red part, and a perturbation."""
     turn = 2.0 * np.pi
     pair = complex(-0.004 * turn, 0.3 * turn)
-    return ShapedNoise(
-        (-0.2 * turn,), (-0.02 * turn, pair, pair.conjugate()), 3.0,
-        seed=seed, sample_rate=rate,
-    )  # fmt: skip
+    phase = ShapedNoise(
+        (-0.2 * turn,), (-0.02 * turn, pair, pair.conjugate()), 3.0, seed=11, sample_rate=RATE
+    )
+    return phase, PerturbationNoise(12, RATE, cutoff=2e-4)
 
 
-def _eta_source(seed: int, rate: float) -> PerturbationNoise:
-    return PerturbationNoise(seed, rate, cutoff=2e-4)
-
-
-def convolved_density(frequency: FloatArray, rate: float = 4.0) -> FloatArray:
+def convolved_density(frequency: FloatArray) -> FloatArray:
     """Density of the product of phase and perturbation, by convolution, in rad/sqrt(Hz).
 
     On a grid fine enough for the narrowest of their features: that of a periodic function
     without a kink, the sum then is the integral but for rounding.
     """
     points = 1 << 18
-    grid = np.fft.fftshift(np.fft.fftfreq(points, 1.0 / rate))
-    magnitude = np.minimum(np.abs(grid), 0.4999 * rate)
+    grid = np.fft.fftshift(np.fft.fftfreq(points, 1.0 / RATE))
+    magnitude = np.minimum(np.abs(grid), 0.4999 * RATE)
     both = [
         np.fft.fft(np.fft.ifftshift(0.5 * source.sampled_asd(magnitude) ** 2))
-        for source in (_phase_source(11, rate), _eta_source(12, rate))
+        for source in sources()
     ]
     # Of sampled series, the convolution goes around the sampling band.
-    whole = np.fft.fftshift(np.fft.ifft(both[0] * both[1]).real) * (rate / points)
+    whole = np.fft.fftshift(np.fft.ifft(both[0] * both[1]).real) * (RATE / points)
     half = grid >= 0.0
     return np.sqrt(2.0 * np.interp(frequency, grid[half], whole[half]))
 
 
 @cache
-def convolution(rate: float = 4.0, samples: int = 16_000_000) -> Convolution:
+def convolution() -> Convolution:
     """Multiply a phase by an independent perturbation, and compare spectra.
 
     Both are stationary Gaussian series of known density. The density of the product is
     estimated from the samples, and computed from the two densities by convolution.
     """
-    sources = _phase_source(11, rate), _eta_source(12, rate)
-    estimators = [SpectrumEstimator(rate) for _ in range(3)]
-    power, size = 0.0, 1 << 20
-    for first in range(0, samples, size):
-        phase, eta = (source.draw(min(size, samples - first)) for source in sources)
+    samples, power = 16_000_000, 0.0
+    estimators = [SpectrumEstimator(RATE) for _ in range(3)]
+    for phase, eta in zip(*(source.blocks(samples) for source in sources()), strict=True):
         for estimator, series in zip(estimators, (phase * eta, phase, eta), strict=True):
             estimator.add(series)
         power += float(np.sum(phase**2))
     product, phase_spectrum, eta_spectrum = (estimator.spectrum() for estimator in estimators)
-    expected = product.expected(lambda f: convolved_density(f, rate))
+    expected = product.expected(convolved_density)
     rms = float(np.sqrt(power / samples))
     return Convolution(product, expected, phase_spectrum, eta_spectrum, rms)
 

@@ -178,8 +178,8 @@ def drawn_radius(samples: int, omega_max: float) -> FloatArray:
     return np.array(found)
 
 
-def sharpest_turn(half_width: float = WIDE_WINDOW) -> tuple[float, float]:
-    """Return the least radius of curvature of the D-curve in a window, and its frequency.
+def sharpest_turn() -> tuple[float, float]:
+    """Return the least radius of curvature of the D-curve in the wide window, and its omega.
 
     The turns of the first branch sharpen towards low frequency, as they grow; the first one
     that lies inside the window is the sharpest.
@@ -190,17 +190,16 @@ def sharpest_turn(half_width: float = WIDE_WINDOW) -> tuple[float, float]:
     bend = x1 * np.gradient(y1, omega) - y1 * np.gradient(x1, omega)
     radius = np.hypot(x1, y1) ** 3 / np.abs(bend)
     # The end on the line, at omega = 0, is no turn.
-    inside = (largest_parameter(x, y) < half_width) & (omega > np.pi / ARM.tau1)
+    inside = (largest_parameter(x, y) < WIDE_WINDOW) & (omega > np.pi / ARM.tau1)
     best = int(np.argmin(np.where(inside, radius, np.inf)))
     return float(radius[best]), float(omega[best])
 
 
-def curve_jumps(window: float = WINDOW, number: int = 2000) -> FloatArray:
-    """Change of the count across the D-curve, at points spread over a window."""
-    branches = d_curve_branches(ARM, ARM.gain * np.sqrt(4.0 * window**2 - 4.0))
+def curve_jumps() -> FloatArray:
+    """Change of the count across the D-curve, at points spread over the window."""
+    branches = d_curve_branches(ARM, ARM.gain * np.sqrt(4.0 * WINDOW**2 - 4.0))
     omega, x, y = (np.concatenate(parts) for parts in zip(*branches, strict=True))
-    inside = np.flatnonzero((np.abs(x) < window) & (np.abs(y) < window))
-    inside = inside[:: max(1, inside.size // number)]
+    inside = largest_parameter(x, y) < WINDOW
     ahead, behind = (np.array(d_curve(ARM, omega[inside] + d)) for d in (1e-6, -1e-6))
     along = ahead - behind
     normal = 1e-9 * np.stack((-along[1], along[0])) / np.hypot(*along)

@@ -73,15 +73,12 @@ class Edges(NamedTuple):
         Frequency in rad/s of the root that crosses there.
     width : float
         c2 - c1 at the far edge, where c1 + c2 = 2 WINDOW[0].
-    width_omega : float
-        Frequency in rad/s of the root that crosses there.
     """
 
     gain: float
     corner: float
     corner_omega: float
     width: float
-    width_omega: float
 
 
 def upper_end(
@@ -116,7 +113,7 @@ def edges(
     """Compute the exact edges for one gain, corner frequency and dtau."""
     loop = DualArm(gain, TAU1, TAU2, corner, difference=difference)
     upper, far = upper_end(loop, 0.0, low=0.5), far_edge(loop, WINDOW[0])
-    return Edges(gain, upper.position - 0.5, upper.omega, far.position, far.omega)
+    return Edges(gain, upper.position - 0.5, upper.omega, far.position)
 
 
 @cache

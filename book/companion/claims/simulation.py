@@ -238,21 +238,20 @@ def full_run(duration: float = DURATION, seed: int = SEED) -> Run:
     return Run(time, np.stack(perturbations), traces)
 
 
-def envelope(trace: Trace, length: int = 500) -> tuple[FloatArray, FloatArray]:
-    """Return the largest magnitude in stretches of a series, for a figure.
+def envelope(trace: Trace) -> tuple[FloatArray, FloatArray]:
+    """Return the largest magnitude in stretches of 500 s of a series, for a figure.
 
     Parameters
     ----------
     trace : Trace
         With a value every second.
-    length : int, optional
-        Of a stretch, in s.
 
     Returns
     -------
     time, size : float arrays
         Middle of each stretch in s, and the largest magnitude in it.
     """
+    length = 500
     number = trace.series.size // length
     parts = np.abs(trace.series[: number * length]).reshape(number, length)
     middle = length * (np.arange(number, dtype=np.float64) + 0.5)
@@ -413,15 +412,13 @@ def leaving_probability(size: float = 1.0) -> float:
     return float((size * drawn_differences().max(axis=1) > stable_up_to()).mean())
 
 
-def growing_probability(size: float = 1.0, growth: float = 1.0) -> float:
-    """Probability that the unstable root of the frozen loop grows by more than e^growth.
+def growing_probability(size: float = 1.0) -> float:
+    """Probability that the unstable root of the frozen loop grows by more than a factor e.
 
     Parameters
     ----------
     size : float, optional
         Factor before the perturbations of System 1.
-    growth : float, optional
-        Rate of the unstable root, integrated over the run.
 
     Returns
     -------
@@ -429,7 +426,7 @@ def growing_probability(size: float = 1.0, growth: float = 1.0) -> float:
         Share of the draws of `drawn_differences`.
     """
     grown = growth_rate(size * drawn_differences()).sum(axis=1) / _DRAW_RATE
-    return float((grown > growth).mean())
+    return float((grown > 1.0).mean())
 
 
 def reduction_quantile(share: float) -> float:
