@@ -395,7 +395,9 @@ def constant_gain() -> Finding:
     says="Points of Area 1 and of Area 2 are shown, with coordinates.",
     pinned=(Verdict.NOT_AS_WRITTEN, 1.0, 0.0),
     weight=Weight.WORDING,
-    printed="$(1, 1 - 10^{-6})$ in Area 2 and $(1, 1 - 10^{-6})$ in Area 1",
+    printed="The red line represents the perturbed parameter $(c_1,c_2)=(1,1-10^{-6})$ in "
+    "Area2 ... The green line represents the perturbed parameter $(c_1,c_2)=(1,1-10^{-6})$ "
+    "in Area1",
 )
 def same_point_twice() -> Finding:
     """Count unstable roots of the uncontrolled dual arm on both sides of the ideal point."""
@@ -526,7 +528,7 @@ def robust() -> Finding:
     affects=("K1", "K5", "K10", "M1"),
     weight=Weight.DERIVATION,
     printed=r"the dual arm-locking systems $C(s)P_d(s)$, and in Sec. III.B "
-    r"$P_d = \frac{g}{jω}(2 - c_1 e^{-τ_1jω} - c_2 e^{-τ_2jω}) + \dots$",
+    r"$P_d(jω) = \frac{g}{jω}(2 - c_1 e^{-τ_1jω} - c_2 e^{-τ_2jω}) + \dots$",
 )
 def which_open_loop() -> Finding:
     """Put the actuator's 1/s of Sec. III into the loop, and leave it out."""
