@@ -26,7 +26,7 @@ def test_svg_closes_its_figure():
 
 
 def test_glue_names_the_parts_of_a_value(monkeypatch):
-    glued = {}
+    glued: dict[str, object] = {}
     monkeypatch.setattr("myst_nb.glue", lambda *named, display: glued.update([named]))
     glue(one=np.array(4), edge=[1, 2], bar={"area": (3,)}, upper=Crossing(0.5, 2.0, 1))
     found = {"one": 4, "edge_0": 1, "edge_1": 2, "bar_area_0": 3}
