@@ -146,7 +146,7 @@ class Versions(SphinxDirective):
     def run(self):
         """Return a table."""
         direct = {Requirement(line).name for line in requires("armlock") or []}
-        names = ["armlock", *sorted(direct), *BUILD_TOOLS]
+        names = ["armlock", *sorted(direct.union(BUILD_TOOLS))]
         rows = [("Python", platform.python_version())] + [(n, version(n)) for n in names]
         text = [".. list-table::", "   :header-rows: 1", "", "   * - Package", "     - Version"]
         for row in rows:
