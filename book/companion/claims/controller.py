@@ -461,13 +461,13 @@ def poles_below() -> Finding:
 def phase_at_unity_gain() -> Finding:
     """Find that frequency at each perturbation, and the phase lead there."""
     unity = [unity_gain(point) for point in POINTS]
-    leads = np.array([phase for _, phase in unity])
+    at, leads = np.array(unity).T
     left = np.degrees(all_margins(WORST_CORNER).phase)
     return Finding(
         decide(leads.min() > 0.0 and leads.max() < np.pi),
         float(leads.max()) / np.pi,
         r"largest phase lead at the unity-gain frequency, over $\pi$",
-        f"With $c₁ = 1$ that is at {1e6 * unity[0][0]:.2f} to {1e6 * unity[-1][0]:.2f} µHz, "
+        f"With $c₁ = 1$ that is at {1e6 * at.min():.2f} to {1e6 * at.max():.2f} µHz, "
         f"with a phase margin of at least {180 - np.degrees(leads.max()):.0f} degrees; at "
         f"$(1 + 10⁻⁶, 1 - 10⁻⁶)$ {left:.0f} remain. It decides nothing alone, since lowering "
         "the gain can break this loop as well as raising it.",
