@@ -96,16 +96,17 @@ def test_a_source_is_the_function_that_checks(ledger):
 
 def test_counts_are_of_physics_and_name_only_verdicts_that_occur():
     counts = VerdictCounts(check("T1", "T6"))
-    assert repr(counts).startswith(
-        "1 finding of physics: 1 reproduced. Besides 1 of derivation"
-    )
+    assert repr(counts).splitlines() == [
+        "1 finding of physics: 1 reproduced",
+        "besides, 1 of derivation and 0 of wording",
+    ]
     assert "differs" not in counts._repr_html_()
 
 
 def test_claims_of_the_white_paper_count_by_themselves():
     counts = VerdictCounts(check("T6", "W7"))
     assert "1 finding of physics: 1 reproduced" in repr(counts)
-    assert repr(counts).endswith(". Of the white paper 1: 1 reproduced")
+    assert "1 of the white paper: 1 reproduced" in repr(counts)
 
 
 def test_errata_are_what_is_not_as_printed(ledger):

@@ -22,6 +22,7 @@ from typing import ClassVar
 
 from docutils.parsers.rst import directives
 from packaging.requirements import Requirement
+from sphinx.ext import autosummary
 from sphinx.pycode import ModuleAnalyzer
 from sphinx.util.docutils import SphinxDirective
 
@@ -145,7 +146,7 @@ class Versions(SphinxDirective):
     def run(self):
         """Return a table."""
         direct = {Requirement(line).name for line in requires("armlock") or []}
-        names = ["armlock", *sorted(direct), *BUILD_TOOLS]
+        names = ["armlock", *sorted(direct.union(BUILD_TOOLS))]
         rows = [("Python", platform.python_version())] + [(n, version(n)) for n in names]
         text = [".. list-table::", "   :header-rows: 1", "", "   * - Package", "     - Version"]
         for row in rows:
@@ -212,6 +213,9 @@ def setup(app):
     """Register with Sphinx."""
     app.setup_extension("sphinx.ext.autodoc")
     app.setup_extension("sphinx.ext.autosummary")
+    # A summary does not end behind one of these.
+    more = ("Eq.", "Sec.", "Secs.", "Fig.")
+    autosummary.WELL_KNOWN_ABBREVIATIONS += more  # type: ignore[assignment]
     app.setup_extension("sphinx.ext.napoleon")
     app.setup_extension("sphinx.ext.viewcode")
     app.add_directive("public", Public)

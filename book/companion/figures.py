@@ -8,7 +8,7 @@ import html
 import io
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
@@ -96,6 +96,21 @@ def drawn(figure: Figure) -> dict[str, npt.NDArray[np.float64]]:
     return {name: np.ravel(column) for name, column in columns.items()}
 
 
+def _numbers(name: str, value: object) -> Iterator[tuple[str, object]]:
+    """Yield what a value holds, each part under a name of its own."""
+    if hasattr(value, "_asdict"):
+        value = value._asdict()
+    if isinstance(value, Mapping):
+        parts = list(value.items())
+    elif isinstance(value, (list, tuple)) or (isinstance(value, np.ndarray) and value.ndim):
+        parts = list(enumerate(value))
+    else:
+        yield name, float(value) if isinstance(value, SupportsFloat) else value
+        return
+    for key, part in parts:
+        yield from _numbers(f"{name}_{key}", part)
+
+
 def glue(**values: object) -> None:
     """Make numbers and pictures available to the chapter's prose, under their names.
 
@@ -103,12 +118,14 @@ def glue(**values: object) -> None:
     ----------
     **values : object
         What the prose and the alternative texts refer to: numbers, and what has a picture.
+        Of a sequence, a mapping or a named tuple called `edge` the parts are called `edge_0`,
+        or `edge_` and the key.
     """
     from myst_nb import glue as glue_one
 
     for name, value in values.items():
-        plain = float(value) if isinstance(value, SupportsFloat) else value
-        glue_one(name, plain, display=False)
+        for part, number in _numbers(name, value):
+            glue_one(part, number, display=False)
 
 
 @dataclass(frozen=True, repr=False)

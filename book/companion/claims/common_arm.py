@@ -639,7 +639,8 @@ def map_and_loop() -> Finding:
     pinned=(Verdict.REPRODUCED, 0.0761516, 1e-6),
     weight=Weight.DERIVATION,
     printed="its practical application suffers from numerical implementation, such as the "
-    "sampling, numerical precision, finite domain, which may fail",
+    "sampling, numerical precision, finite domain, which may fail to accurately obtain the "
+    "complete stability boundary",
 )
 def d_subdivision_alone() -> Finding:
     """Draw the curve from few samples and from many."""

@@ -392,7 +392,9 @@ def constant_gain() -> Finding:
     says="Points of Area 1 and of Area 2 are shown, with coordinates.",
     pinned=(Verdict.NOT_AS_WRITTEN, 1.0, 0.0),
     weight=Weight.WORDING,
-    printed="$(1, 1 - 10^{-6})$ in Area 2 and $(1, 1 - 10^{-6})$ in Area 1",
+    printed="The red line represents the perturbed parameter $(c_1,c_2)=(1,1-10^{-6})$ in "
+    "Area2 ... The green line represents the perturbed parameter $(c_1,c_2)=(1,1-10^{-6})$ "
+    "in Area1",
 )
 def same_point_twice() -> Finding:
     """Count unstable roots of the uncontrolled dual arm on both sides of the ideal point."""
@@ -456,13 +458,13 @@ def poles_below() -> Finding:
 def phase_at_unity_gain() -> Finding:
     """Find that frequency at each perturbation, and the phase lead there."""
     unity = [unity_gain(point) for point in POINTS]
-    leads = np.array([phase for _, phase in unity])
+    at, leads = np.array(unity).T
     left = np.degrees(all_margins(WORST_CORNER).phase)
     return Finding(
         decide(leads.min() > 0.0 and leads.max() < np.pi),
         float(leads.max()) / np.pi,
         r"largest phase lead at the unity-gain frequency, over $\pi$",
-        f"With $c₁ = 1$ that is at {1e6 * unity[0][0]:.2f} to {1e6 * unity[-1][0]:.2f} µHz, "
+        f"With $c₁ = 1$ that is at {1e6 * at.min():.2f} to {1e6 * at.max():.2f} µHz, "
         f"with a phase margin of at least {180 - np.degrees(leads.max()):.0f} degrees; at "
         f"$(1 + 10⁻⁶, 1 - 10⁻⁶)$ {left:.0f} remain. It decides nothing alone, since lowering "
         "the gain can break this loop as well as raising it.",
@@ -523,7 +525,7 @@ def robust() -> Finding:
     affects=("K1", "K5", "K10", "M1"),
     weight=Weight.DERIVATION,
     printed=r"the dual arm-locking systems $C(s)P_d(s)$, and in Sec. III.B "
-    r"$P_d = \frac{g}{jω}(2 - c_1 e^{-τ_1jω} - c_2 e^{-τ_2jω}) + \dots$",
+    r"$P_d(jω) = \frac{g}{jω}(2 - c_1 e^{-τ_1jω} - c_2 e^{-τ_2jω}) + \dots$",
 )
 def which_open_loop() -> Finding:
     """Put the actuator's 1/s of Sec. III into the loop, and leave it out."""

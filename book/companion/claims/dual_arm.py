@@ -390,6 +390,20 @@ def gain_factors(c1: float, c2: float) -> tuple[float, float]:
     return gain_interval(DualArm(), c1, c2)[:2]
 
 
+def sliver() -> dict[str, object]:
+    """Return what the chapter tells of the sliver between the edge and c1 + c2 = 2."""
+    (c1, c2), weight = SLIVER, sensor_weight()
+    return {
+        "weight": weight,
+        "at": SLIVER,
+        "sum": c1 + c2,
+        "gain": 10.0 * gain_factors(c1, c2)[1],
+        "estimate": lost_from(c1, c2),
+        "most": weight * far_edge(DualArm(), 1.0).position,
+        "off": abs((2.0 - limit_end(c2 - c1)) / (weight * (c2 - c1)) - 1.0),
+    }
+
+
 def middle_corner(system: CharacteristicFunction) -> float:
     """Return (c1 + c2) / 2 - 1 at the upper edge in the strip's middle.
 

@@ -126,7 +126,8 @@ class VerdictCounts:
     >>> from book.companion.claims import check
     >>> from book.companion.claims.page import VerdictCounts
     >>> VerdictCounts(check("T2", "T6"))
-    1 finding of physics: 1 reproduced. Besides 1 of derivation, 0 of wording
+    1 finding of physics: 1 reproduced
+    besides, 1 of derivation and 0 of wording
     """
 
     def __init__(self, ledger: Ledger) -> None:
@@ -136,26 +137,30 @@ class VerdictCounts:
         paper = Ledger(entries[True])
         physics, white = paper.counts(Weight.PHYSICS), Ledger(entries[False]).counts()
         number = physics.total()
-        head = f"{number} finding{'s' * (number != 1)} of physics"
-        others = ", ".join(f"{paper.counts(w).total()} of {w}" for w in list(Weight)[1:])
-        #: What is counted, how many met each verdict, and what is said after that.
-        self.lines = [(head, physics, f". Besides {others}")]
+        others = " and ".join(f"{paper.counts(w).total()} of {w}" for w in list(Weight)[1:])
+        #: What is counted, and how many met each verdict.
+        self.lines = [(f"{number} finding{'s' * (number != 1)} of physics", physics)]
         if white:
-            self.lines.append((f". Of the white paper {white.total()}", white, ""))
+            self.lines.append((f"{white.total()} of the white paper", white))
+        #: What is said below that.
+        self.others = f"besides, {others}"
 
-    def _joined(self, shown: Callable[[Verdict, str], str], between: str) -> str:
-        return "".join(
-            f"{head}: {between.join(shown(v, f'{met[v]} {v}') for v in Verdict if met[v])}{end}"
-            for head, met, end in self.lines
-        )
+    def _met(self, shown: Callable[[Verdict, str], str]) -> list[tuple[str, list[str]]]:
+        return [
+            (head, [shown(v, f"{met[v]} {v}") for v in Verdict if met[v]])
+            for head, met in self.lines
+        ]
 
     def __repr__(self) -> str:
-        """Return the line as text."""
-        return self._joined(lambda verdict, text: text, ", ")
+        """Return the lines as text."""
+        lines = self._met(lambda verdict, text: text)
+        found = [f"{head}: {', '.join(verdicts)}" for head, verdicts in lines]
+        return "\n".join([*found, self.others])
 
     def _repr_html_(self) -> str:
-        """Return the line as HTML."""
-        return f'<p class="verdict-counts">{self._joined(badge, " ")}.</p>'
+        """Return the lines as HTML."""
+        found = [f"{head}: {' '.join(badges)}" for head, badges in self._met(badge)]
+        return f'<p class="verdict-counts">{"<br>".join([*found, self.others])}</p>'
 
 
 class LedgerPage:
