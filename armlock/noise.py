@@ -201,7 +201,7 @@ class ShapedNoise:
         return parts()
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _shape(series: FloatArray, gain: float, sections: Rows, state: FloatArray) -> None:
     """Replace a series by its filtered self."""
     for i in range(series.size):
