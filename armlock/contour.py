@@ -274,8 +274,8 @@ def count_point(model: tuple[Any, ...], x: float, y: float, end: float) -> int:
     return nearest
 
 
-# In Python a step takes some 50 microseconds.
-_count_soon = soon(count_point, unless=TOO_LONG, MOST_STEPS=800)
+# In Python a step takes some 50 microseconds, and a second is shorter than compiling.
+_count_soon = soon(count_point, unless=TOO_LONG, MOST_STEPS=20_000)
 
 
 @njit(cache=True, nogil=True)

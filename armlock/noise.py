@@ -192,7 +192,7 @@ class ShapedNoise:
             yield self.draw(min(most, samples - first))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _shape(series: FloatArray, gain: float, sections: Rows, state: FloatArray) -> None:
     """Replace a series by its filtered self."""
     for i in range(series.size):

@@ -573,6 +573,10 @@ class Simulation:
         given = finite_series("noise", noise, 1 if self.draws is None else 2)
         if self.draws not in (None, len(given)):
             raise ValueError(f"noise must have {self.draws} rows, got shape {given.shape}")
+        return self._advance(given, c1, c2)
+
+    def _advance(self, given: FloatArray, c1: npt.ArrayLike, c2: npt.ArrayLike) -> FloatArray:
+        """Compute the next block, of noise that is checked."""
         inputs = given, _series("c1", c1, given), _series("c2", c2, given)
         if self._stopped is not None:
             raise DivergenceError(*self._stopped, np.empty((*given.shape[:-1], 0)))
@@ -740,7 +744,7 @@ def simulate(
         limit=limit,
         draws=len(given) if given.ndim == 2 else None,
     )
-    return run.advance(given, c1, c2)
+    return run._advance(given, c1, c2)
 
 
 def simulate_blocks(

@@ -38,6 +38,17 @@ def test_another_seed_gives_another_run():
     assert not np.allclose(one.traces["ideal"].series, other.traces["ideal"].series)
 
 
+def test_the_ensembles_first_draw_is_the_run(run):
+    drawn, length = claimed.ensemble(duration=2000.0), 2000
+    assert drawn.series.shape == (claimed.ENSEMBLE, length)
+    assert np.array_equal(drawn.series[0], run.traces["system 1"].series[:length])
+    assert np.array_equal(drawn.difference[0], run.difference()[:length:100])
+    for size, largest in drawn.largest.items():
+        trace = run.traces[claimed.size_name(size)].series[:length]
+        assert largest[0] == np.abs(trace).max()
+    assert len(np.unique(drawn.difference)) == drawn.difference.size
+
+
 def test_a_trace_without_spectrum_is_named():
     with pytest.raises(ValueError, match="a trace with a spectrum, got 'face value'"):
         claimed.full_run(duration=10.0).spectrum("face value")

@@ -7,13 +7,16 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from armlock import CommonArm, LaserNoise, simulate, stability_chart, sweep
+from armlock import CommonArm, LaserNoise, paper_loop, simulate, stability_chart, sweep
 
 ROOT = Path(__file__).parents[1]
+#: The lines of the book's page, piece by piece.
+PAGE = re.findall(r"```python\n(.*?)```", (ROOT / "book/cluster.md").read_text(), re.DOTALL)
 distributed = pytest.importorskip("distributed")
 
 # Dask warns of ports that are taken and of workers that restart: neither is a failure here.
@@ -66,9 +69,7 @@ def test_a_worker_that_is_killed_costs_no_result(executor, tmp_path):
 
 def test_the_lines_of_the_page_run(tmp_path):
     """As a script, whose workers import it again. The second time all results are there."""
-    script = re.findall(
-        r"```python\n(.*?)```", (ROOT / "book/cluster.md").read_text(), re.DOTALL
-    )[0]
+    script = PAGE[0]
     (tmp_path / "page.py").write_text(script.replace("200)", "6)"))
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     for _ in range(2):
@@ -81,3 +82,13 @@ def test_the_lines_of_the_page_run(tmp_path):
             check=True,
         )
         assert re.fullmatch(r"between \d+\.\d+ and \d+\.\d+\n", done.stdout)
+
+
+def test_the_full_draws_of_the_page_are_single_runs():
+    function = PAGE[1].partition("\n\n\nfound")[0].replace("2000", "2").replace("20_000", "500")
+    names: dict[str, Any] = {"np": np}
+    exec(function, names)
+    loop = paper_loop()
+    for k, peak in enumerate(names["largest"](7)[:3]):
+        single = simulate(loop, LaserNoise(7 + k, at_rest=True).draw(1000))
+        assert peak == np.abs(single).max()

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache, partial
+from time import process_time
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ from armlock.noise import LaserNoise, PerturbationNoise, band_rms, sample_count
 from armlock.paper import DURATION, LASER_NOISE, PERTURBATION, SAMPLE_RATE
 from armlock.roots import rightmost_root
 from armlock.simulation import DivergenceError, Simulation, sampled_open_loop
-from armlock.spectra import Spectrum, SpectrumEstimator
+from armlock.spectra import Spectrum, SpectrumEstimator, amplitude_spectrum
 from armlock.stability import unstable_roots
 from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, Weight, decide
@@ -49,9 +50,13 @@ SEED = 1
 PERTURBATION_SEEDS = (SEED + 1, SEED + 2)
 #: Number of random draws of c1 and c2.
 DRAWS = 4000
+#: Number of those that run in time, as many as two cores do in a minute; and their sizes.
+ENSEMBLE, ENSEMBLE_SIZES = 32, (1.0, 3.0)
 # Series are kept once a second.
 _EVERY = int(SAMPLE_RATE)
 _BLOCK = 1 << 18
+# Numbers in a line of the processor's cache: as many draws are written at a time.
+_LINE = 8
 # The sample rate of the random draws in Hz: what is faster passes long before the loop follows.
 _DRAW_RATE = 0.01
 
@@ -439,6 +444,95 @@ def reduction_quantile(share: float) -> float:
     """
     widest = float(np.quantile(drawn_differences().max(axis=1), share))
     return widest / stable_up_to() / unit_size()
+
+
+@dataclass(frozen=True, eq=False)
+class Ensemble:
+    """Random draws of c1 and c2 at the real rate, on the laser's noise of `full_run`.
+
+    Attributes
+    ----------
+    difference : float array, shape (draws, m)
+        c1 - c2 at System 1's size, every 100 s.
+    series : float array, shape (draws, n)
+        Output at System 1's size in Hz, once a second.
+    largest : dict of float to float array, shape (draws,)
+        Largest output in Hz, by the size of the perturbations.
+    seconds : float
+        Time of all processors together, in s.
+    """
+
+    difference: FloatArray
+    series: FloatArray
+    largest: dict[float, FloatArray]
+    seconds: float
+
+    def predicted(self, size: float) -> FloatArray:
+        """Return the factors of e by which the frozen loop grows in each draw."""
+        return np.asarray(growth_rate(size * self.difference).sum(axis=1) / _DRAW_RATE)
+
+    def suppression(self, free: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return frequencies in `BAND`, up to 10 mHz, and the suppression of each draw.
+
+        Parameters
+        ----------
+        free : float array, shape (n,)
+            The laser's noise in Hz, once a second.
+        """
+        free_running, *locked = (
+            amplitude_spectrum(row, 1.0).within(BAND[0], 1e-2) for row in (free, *self.series)
+        )
+        return free_running.frequency, np.array([free_running.asd / one.asd for one in locked])
+
+
+def ensemble_sources() -> list[list[PerturbationNoise]]:
+    """Return the sources of c1 - 1 and c2 - 1 of each draw, the first as in `full_run`."""
+    return [_sources(SEED + 2 * draw, LOWEST) for draw in range(ENSEMBLE)]
+
+
+@cache
+def ensemble(duration: float = DURATION) -> Ensemble:
+    """Run System 1, and larger sizes, with many draws of c1 and c2 side by side.
+
+    Parameters
+    ----------
+    duration : float, optional
+        In s, a multiple of 100 s.
+    """
+    begun = process_time()
+    laser, sources = LaserNoise(SEED, SAMPLE_RATE, at_rest=True), ensemble_sources()
+    # Above all growth: one draw that diverges would stop the others.
+    runs = {
+        size: Simulation(paper_loop(), SAMPLE_RATE, limit=1e100, draws=ENSEMBLE)
+        for size in ENSEMBLE_SIZES
+    }
+    largest = {size: np.zeros(ENSEMBLE) for size in runs}
+    # All draws of a sample side by side, as the loop takes them.
+    eta = np.empty((2, 100 * _EVERY, ENSEMBLE))
+    perturbed = {size: np.empty_like(eta) for size in runs}
+    gaps, outputs = [], []
+
+    def draw(first: int) -> None:
+        few = slice(first, first + _LINE)
+        for k in (0, 1):
+            eta[k, :, few] = np.array([pair[k].draw(eta.shape[1]) for pair in sources[few]]).T
+
+    def advance(size: float, noise: FloatArray) -> FloatArray:
+        np.multiply(eta, size * unit_size(), out=perturbed[size])
+        c1, c2 = np.add(perturbed[size], 1.0, out=perturbed[size])
+        kept = runs[size].advance(noise.T, c1.T, c2.T)[:, ::_EVERY].copy()
+        np.maximum(largest[size], np.abs(kept).max(axis=1), out=largest[size])
+        return kept
+
+    with ThreadPoolExecutor() as threads:
+        for noise in laser.blocks(sample_count(duration, SAMPLE_RATE), eta.shape[1]):
+            list(threads.map(draw, range(0, ENSEMBLE, _LINE)))
+            alike = np.repeat(noise[:, None], ENSEMBLE, axis=1)
+            first, *_ = threads.map(partial(advance, noise=alike), runs)
+            outputs.append(first)
+            gaps.append(unit_size() * (eta[0, 0] - eta[1, 0]))
+    series = np.concatenate(outputs, axis=1)
+    return Ensemble(np.array(gaps).T, series, largest, process_time() - begun)
 
 
 def chain_exponent(run: Run, until: float) -> float:
