@@ -151,8 +151,18 @@ class Ray:
             omega[enclosed] = elementwise.find_root(excess, ends, tolerances=exact).x
         return omega
 
-    def crossings(self, stop: float, *, first: bool = False, lowest: float = 0.0) -> Crossings:
-        """Find crossings with `lowest` < t <= stop: all, or the first and what ties with it."""
+    def crossings(
+        self,
+        stop: float,
+        *,
+        first: bool = False,
+        lowest: float = 0.0,
+        highest: float = np.inf,
+    ) -> Crossings:
+        """Find crossings with `lowest` < t <= stop: all, or the first and what ties with it.
+
+        Only those up to the frequency `highest` are looked for.
+        """
         end = self.end(stop)
         if end == np.inf:
             raise ValueError(
@@ -165,6 +175,7 @@ class Ray:
             )
         if not self.acts():
             return Crossings(np.empty(0), np.empty(0), np.empty(0, dtype=np.int64))
+        end = min(end, highest)
         omega, change = sign_changes(self.family, end, is_map=self.system.step > 0.0)
         omega, change = omega[change != 0], change[change != 0]
         # Only those in reach are worth polishing. Where M vanishes the quotient is not real: a
