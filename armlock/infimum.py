@@ -234,12 +234,33 @@ def _nothing_smaller(
 
 
 @njit(cache=True)
+def _on_one_side(disc: tuple[Any, ...], ahead: tuple[Any, ...], step: float) -> bool:
+    """Whether L stays on one side of the real axis over a step, whatever the free phases.
+
+    Divided by what F changes by it is the axis that turns, against the phase of F.
+    """
+    first, ratio, rate, between = disc[0], disc[1], disc[2], disc[4]
+    centre, spread = _centre_and_radius(disc)
+    slope, own, left, turned, changed = ahead
+    normal = 1j if centre.imag > 0.0 else -1j
+    begin = abs(centre.imag) - spread
+    change = first * ratio * between + 1j * centre * rate.imag
+    total = (change * normal.conjugate()).real - abs(first) * slope
+    beyond = abs(centre) * own + abs(first) * (left + changed * turned)
+    rounding = 64.0 * EPSILON * (abs(centre) + spread)
+    return bool(min(begin, begin + total * step) > beyond + rounding)
+
+
+@njit(cache=True)
 def _misses_segment(disc: tuple[Any, ...], step: float, near: float, far: float) -> bool:
     """Whether L stays off a segment of the negative real axis, whatever the free phases.
 
-    It does if it stays off the disc around it, or off the end that is nearest to its centre.
+    It does if it stays off the axis, off the disc around the segment, or off the end that is
+    nearest to its centre.
     """
     ahead = _ahead(disc, step)
+    if _on_one_side(disc, ahead, step):
+        return True
     if _clear(disc, ahead, step, complex(0.5 * (near + far)), 0.5 * (near - far)):
         return True
     centre, (turned, changed) = _centre_and_radius(disc)[0], ahead[3:]

@@ -18,7 +18,7 @@ from numpy.polynomial import polynomial as poly
 from scipy.optimize import brentq, minimize_scalar
 
 from armlock import contour, infimum
-from armlock.bounds import last_larger, last_root_bound
+from armlock.bounds import last_larger
 from armlock.checks import (
     BoolArray,
     ComplexArray,
@@ -46,12 +46,8 @@ _FREE_TOLERANCES = np.array([1e-5, 1e-4, 1e-5, 1e-5])
 LARGEST_GAIN = 1e6
 # Share of its limits up to which the neutral root chain lets gain factors be looked at.
 _NEXT_TO_THE_CHAIN = 1e-4
-# Turns of the longest delay that a walk along the axis can take at once, for a range of gain
-# factors, and how many are no reason to look for a shorter range.
+# Turns of the longest delay that a walk along the axis can take.
 _MOST_TURNS = 1.5e6
-_FEW_TURNS = 1e4
-# The shortest such range, as the logarithm of a ratio.
-_SHORTEST_RANGE = 1e-3
 # Crossovers that are polished: those with the smallest margins.
 _POLISHED = 8
 
@@ -529,80 +525,13 @@ def _chain_gains(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
     return lower, min((k for k in limits if k > 1.0), default=np.inf)
 
 
-def _no_crossing_from(loop: Loop, c1: float, c2: float, low: float, high: float) -> float:
-    r"""Frequency past which no gain factor from `low` to `high` takes a root across the axis.
-
-    With t = 1 / k from 1 / high to 1 / low, and S = |c1 B1| + |c2 B2|, the square of
-    |t R + C| - S must stay positive. \|t R + C\|^2 is convex in t. If it ascends at the lower
-    end of the interval, it is smallest there; if it descends at the upper end, there.
-    """
-    c, arms = _plus(loop.b1, loop.b2), _arm_weights(loop, c1, c2)
-    found = [last_larger(loop.rest, (c, loop.b1, loop.b2), np.array([high, *(high * arms)]))]
-    if not loop.delay:
-        for t, sign in ((1.0 / high, 1.0), (1.0 / low, -1.0)):
-            ascends = math.sqrt(last_root_bound(_ascent(loop.rest, c, t, sign)))
-            first = _plus(t * loop.rest, c)
-            found.append(max(ascends, last_larger(first, (loop.b1, loop.b2), arms)))
-    return min(found)
-
-
-def _ascent(rest: FloatArray, c: FloatArray, t: float, sign: float) -> FloatArray:
-    """Half the slope of |t R + C|^2 in t, times a sign, as a polynomial in omega^2."""
-    whole = _plus(t * rest, c)
-    product = np.convolve(whole, rest * (-1.0) ** np.arange(rest.size))[::2]
-    return np.asarray(sign * product * (-1.0) ** np.arange(product.size))
-
-
-def _range_of_gains(
-    loop: Loop, c1: float, c2: float, near: float, last: float
-) -> tuple[float, FloatArray]:
-    """Choose a range of gain factors from `near` towards `last`, and where to look for them.
-
-    Returns the end of the range, and the intervals of the axis where L, with free phases of the
-    arms, may meet what the range takes to -1. A shorter range needs less of the axis. Chosen is
-    the one that needs least for its length, among those that can be followed.
-    """
-    whole, factors, arms = abs(math.log(last / near)), _factors(loop), _arms(loop, c1, c2)
-    step = whole
-    # Where no range has an end on the axis, all of it, which is refused when it is walked.
-    least, chosen = (True, np.inf), (last, np.array([[0.0, np.inf]]))
-    while step > _SHORTEST_RANGE:
-        far = last if step == whole else near * math.exp(math.copysign(step, last - near))
-        ends = -1.0 / min(near, far), -1.0 / max(near, far)
-        around = 0.5 * (ends[0] + ends[1]), 0.5 * (ends[1] - ends[0])
-        # Past it L is too small, or stays clear of the disc around all that is looked for.
-        end = _no_crossing_from(loop, c1, c2, min(near, far), max(near, far))
-        end = min(end, _clear_from(loop, c1, c2, *around))
-        if not np.isfinite(end):
-            step *= 0.5
-            continue
-        intervals = infimum.meeting_intervals(
-            factors,
-            arms,
-            np.array([ends[1], ends[0]]),
-            np.zeros(4),
-            (0.0, end),
-            loop.longest_delay,
-        )
-        turns = float(np.diff(intervals).sum()) * loop.longest_delay / (2.0 * np.pi)
-        cost = turns > _MOST_TURNS, turns / abs(math.log(far / near))
-        if cost < least:
-            least, chosen = cost, (far, intervals)
-        elif not least[0]:
-            break
-        if turns <= _FEW_TURNS:
-            break
-        step *= 0.5
-    return chosen
-
-
-def _gains_at(
-    loop: Loop, c1: float, c2: float, intervals: FloatArray
+def _gains(
+    loop: Loop, c1: float, c2: float, intervals: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray]:
     """Find the gain factors that take a root to the axis on intervals of it, and where."""
     crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
     found = [np.empty(0)]
-    for start, end in intervals:
+    for start, end in np.reshape(intervals, (-1, 2)):
         omega, jump = sign_changes(crossing, float(end), start=float(start))
         found.append(omega[(omega > 0.0) & (jump != 0)])
     omega = np.concatenate(found)
@@ -610,50 +539,67 @@ def _gains_at(
         return -1.0 / loop.open_loop(1j * omega, c1, c2).real, omega
 
 
-def _nearest_gain(loop: Loop, c1: float, c2: float, last: float) -> tuple[float, float]:
-    """Find the gain factor next to one, on the side of `last`, that takes a root to the axis.
+def _free_gains(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArray:
+    """Gain factors next to one, below and above, for some phases; shape (omega, 2).
 
-    Returns it, and at which frequency; `last` and nan if there is none up to it.
+    They belong to the ends of what the disc of L covers of the negative real axis.
     """
-    near = 1.0
-    while near != last:
-        far, intervals = _range_of_gains(loop, c1, c2, near, last)
-        factor, omega = _gains_at(loop, c1, c2, intervals)
-        between = (factor >= min(near, far)) & (factor <= max(near, far))
-        if between.any():
-            factor, omega = factor[between], omega[between]
-            nearest = int(np.argmin(np.abs(factor - 1.0)))
-            return float(factor[nearest]), float(omega[nearest])
-        near = far
-    return last, np.nan
-
-
-def _likely_gain(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
-    """Return a gain factor above one that takes a root to the axis, and where, or inf and nan.
-
-    It spares the search most of its way where the smallest one lies at many turns of the
-    delays: roots cross next to the frequency at which free phases would let them first.
-    """
-    arms, turn = np.array([abs(c1), abs(c2)]), 2.0 * np.pi / loop.longest_delay
-    top = _no_crossing_from(loop, c1, c2, 1.0, LARGEST_GAIN)
-    if not 2e3 * turn < top < np.inf:
-        return np.inf, np.nan
-    omega = np.geomspace(1e3 * turn, top, 400)
     first, second = loop.arm_responses(1j * omega)
-    centre, spread = first + second, arms[0] * np.abs(first) + arms[1] * np.abs(second)
+    centre, spread = first + second, np.abs(c1 * first) + np.abs(c2 * second)
     with np.errstate(invalid="ignore", divide="ignore"):
-        # The left end of what the disc covers of the real axis.
-        left = centre.real - np.sqrt(spread**2 - centre.imag**2)
-        factor = np.where((left > -1.0) & (left < 0.0), -1.0 / left, np.inf)
-    if factor.min() == np.inf:
-        return np.inf, np.nan
-    at = float(omega[np.argmin(factor)])
-    found, where = _gains_at(loop, c1, c2, np.array([[at - 100.0 * turn, at + 100.0 * turn]]))
-    above = np.flatnonzero(found > 1.0)
-    if not above.size:
-        return np.inf, np.nan
-    nearest = above[np.argmin(found[above])]
-    return float(found[nearest]), float(where[nearest])
+        half = np.sqrt(spread**2 - centre.imag**2)
+        factors = -1.0 / np.column_stack((centre.real + half, centre.real - half))
+    lower = np.where((factors > 0.0) & (factors < 1.0), factors, 0.0).max(axis=1)
+    upper = np.where(factors > 1.0, factors, np.inf).min(axis=1)
+    return np.column_stack((lower, upper))
+
+
+def _gains_around_one(
+    loop: Loop, c1: float, c2: float, least: float, most: float
+) -> tuple[float, float, float]:
+    """Gain factors next to one that take a root to the axis, and where the upper one does.
+
+    `least` and `most` where there are none between them. As for phases, likely ones come first.
+    """
+    turn = 2.0 * np.pi / loop.longest_delay
+
+    def end(lower: float, upper: float) -> float:
+        """Frequency past which L stays clear of discs around all that is looked for."""
+        return max(
+            _clear_from(loop, c1, c2, -0.5 * (1.0 / k + 1.0), 0.5 * abs(1.0 - 1.0 / k))
+            for k in (lower, upper)
+        )
+
+    def meeting(lower: float, upper: float, span: tuple[float, float]) -> FloatArray:
+        segment = np.array([-1.0 / upper, -1.0 / lower])
+        found: FloatArray = infimum.meeting_intervals(
+            _factors(loop), _arms(loop, c1, c2), segment, np.zeros(4), span, loop.longest_delay
+        )
+        return found
+
+    lower, upper, where = least, most, np.nan
+    first = min(end(lower, upper), 1e3 * turn)
+    intervals, wide, complete = meeting(lower, upper, (0.0, first)), 300.0, False
+    while True:
+        factor, omega = _gains(loop, c1, c2, intervals)
+        below = factor[(factor >= lower) & (factor <= 1.0)]
+        lower = float(below.max(initial=lower))
+        above = np.flatnonzero((factor > 1.0) & (factor <= upper))
+        if above.size:
+            nearest = above[np.argmin(factor[above])]
+            upper, where = float(factor[nearest]), float(omega[nearest])
+        last = end(lower, upper)
+        if complete or last <= first:
+            return lower, upper, where
+        intervals = meeting(lower, upper, (first, last))
+        complete = float(np.diff(intervals).sum()) < _MOST_TURNS * turn or wide > _MOST_TURNS
+        if not complete:
+            # Too many turns: around where free phases would have the nearest gains.
+            omega = np.geomspace(first, last, 400)
+            free = _free_gains(loop, c1, c2, omega)
+            at = omega[[np.argmax(free[:, 0]), np.argmin(free[:, 1])]]
+            intervals = np.column_stack((at - wide * turn, at + wide * turn)).clip(first, last)
+            wide *= 30.0
 
 
 def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float]:
@@ -706,16 +652,11 @@ def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float
     # Just inside the limits of the chain, roots cross at ever higher frequency.
     least = max(floor * (1.0 + _NEXT_TO_THE_CHAIN), 1.0 / LARGEST_GAIN)
     most = min(limit * (1.0 - _NEXT_TO_THE_CHAIN), LARGEST_GAIN)
-    lower, _ = _nearest_gain(loop, c1, c2, least) if least < 1.0 else (least, np.nan)
-    likely, at = _likely_gain(loop, c1, c2)
-    upper, where = most, np.nan
-    if most > 1.0:
-        upper, where = _nearest_gain(loop, c1, c2, min(most, likely))
+    least, most = min(least, 1.0), max(most, 1.0)
+    lower, upper, where = _gains_around_one(loop, c1, c2, least, most)
     if lower == least:
         lower = floor if floor >= 1.0 / LARGEST_GAIN else 0.0
-    if upper == likely:
-        where = at
-    elif upper == most:
+    if upper == most:
         upper, where = (limit, np.inf) if limit <= LARGEST_GAIN else (np.inf, np.nan)
     # A real root crosses at s = 0.
     start, first = float(loop.b1[0] * (1.0 - c1) + loop.b2[0] * (1.0 - c2)), float(loop.rest[0])

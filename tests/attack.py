@@ -592,6 +592,8 @@ def compile_all():
     loop = to_loop(Sketch((-2.0,), (-1.0, -3.0), 0.3, "dual", 2.0, 1.0, 0.0, 1.0, 1.0))
     for system in (loop, to_loop(Sketch((-2.0,), (-1.0,), 0.3, "common", 2.0, 1.0))):
         point = 0.8, 0.9
+        for _ in range(10):  # the first ones may be plain Python
+            unstable_roots(system, *point)
         margins(system, *point)
         margins(system, *point, 1.0)
         modulus_margin(system, *point)
