@@ -199,32 +199,6 @@ def _shape(series: FloatArray, gain: float, sections: Rows, state: FloatArray) -
         series[i] = gain * through(sections, state, series[i])
 
 
-def sample_count(duration: float, sample_rate: float = 200.0) -> int:
-    """Return the number of samples of a run.
-
-    Parameters
-    ----------
-    duration : float
-        In s, positive.
-    sample_rate : float, optional
-        In Hz, positive.
-
-    Returns
-    -------
-    int
-        The nearest whole number, at least one.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If one of the two is not positive and finite, or the run is shorter than a sample.
-    """
-    count = positive_number("duration", duration) * positive_number("sample_rate", sample_rate)
-    if round(count) < 1:
-        raise ValueError(f"duration must be at least one sample, got {duration} s")
-    return round(count)
-
-
 def band_rms(low: float, high: float) -> float:
     r"""R.m.s. of the perturbations' spectrum, as printed, between two frequencies.
 

@@ -356,20 +356,18 @@ def nyquist(
     poles = open_loop_poles(loop)
     order = _poles_at_zero(loop, c1, c2)
     end = float(last_frequency(loop, c1, c2))
-    if np.isnan(end):
-        raise CountError(
-            f"no Nyquist count at (c1, c2) = ({c1}, {c2}): a number overflows",
-            np.array([[c1, c2]]),
-        )
-    if not np.isfinite(end):
-        raise CountError(
-            f"no Nyquist count at (c1, c2) = ({c1}, {c2}): the loop's high-frequency chain of "
-            f"roots is not confined",
-            np.array([[c1, c2]]),
-        )
+
+    def refused(why: str) -> CountError:
+        where = f"(c1, c2) = ({c1}, {c2})"
+        return CountError(f"no Nyquist count at {where}: {why}", np.array([[c1, c2]]))
 
     def response(s: ComplexArray) -> ComplexArray:
         return loop.open_loop(s, c1, c2)
+
+    if np.isnan(end):
+        raise refused("a number overflows")
+    if end == np.inf:
+        raise refused("the loop's high-frequency chain of roots is not confined")
 
     radius = leading_radius(loop, c1, c2)
     end = max(1.05 * end, 10.0 / loop.longest_delay, 10.0 * radius)
@@ -398,10 +396,9 @@ def nyquist(
     if expected == BOUNDARY:
         expected = int(unstable_roots(loop.shifted(radius), c1, c2))
     if abs(turns + encirclements) > 1e-3 or (expected != UNCONFINED and expected != count):
-        raise CountError(
-            f"no Nyquist count at (c1, c2) = ({c1}, {c2}): {encirclements} encirclements and "
-            f"{poles} open-loop poles against {expected} roots",
-            np.array([[c1, c2]]),
+        raise refused(
+            f"{encirclements} encirclements and {poles} open-loop poles against {expected} "
+            "roots"
         )
     return NyquistCurve(
         up.imag,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from armlock import HayesEquation, rightmost_root, unstable_roots
+from armlock import HayesEquation, unstable_roots
 from armlock.paper import TAU1
 from book.companion.claims import Verdict, single_arm
 
@@ -31,15 +31,6 @@ def test_limits_at_their_ends():
     assert single_arm.lowest_stable_b(1.0 - 1e-9, 1.0) == pytest.approx(-1.0, abs=1e-8)
     assert single_arm.lowest_stable_b(0.0, 1.0) == pytest.approx(-np.pi / 2)
     assert single_arm.lowest_stable_b(0.0, TAU1) == pytest.approx(-np.pi / 2 / TAU1)
-
-
-def test_lambert_root_is_the_rightmost_root():
-    rng = np.random.default_rng(5)
-    a, b = rng.uniform(-3.0, 2.0, 25), rng.uniform(-4.0, 4.0, 25)
-    closed = single_arm.lambert_root(a, b, 1.0)
-    found = np.asarray(rightmost_root(HayesEquation(1.0), a, b))
-    assert np.allclose(closed.real, found.real, rtol=1e-10, atol=1e-12)
-    assert np.allclose(np.abs(closed.imag), found.imag, rtol=1e-10, atol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from armlock import LaserNoise, PerturbationNoise, ShapedNoise, paper
-from armlock.noise import band_rms, sample_count
+from armlock import LaserNoise, PerturbationNoise, ShapedNoise
+from armlock.noise import band_rms
 from armlock.spectra import SpectrumEstimator
 
 SOURCES: dict[str, Any] = {
@@ -185,7 +185,3 @@ def test_band_rms_is_the_integral():
     edges = np.geomspace(5e-6, 100.0, 40)
     total = sum(quad(power, a, b)[0] for a, b in pairwise(edges))
     assert band_rms(5e-6, 100.0) == pytest.approx(np.sqrt(total), rel=1e-6)
-
-
-def test_paper_size():
-    assert sample_count(paper.DURATION, paper.SAMPLE_RATE) == 40_000_000

@@ -11,7 +11,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from armlock.checks import FloatArray
-from armlock.noise import PerturbationNoise, ShapedNoise, band_rms, sample_count
+from armlock.noise import PerturbationNoise, ShapedNoise, band_rms
 from armlock.paper import (
     DURATION,
     LASER_NOISE,
@@ -155,7 +155,7 @@ class Series(NamedTuple):
 @cache
 def perturbation_series() -> Series:
     """Draw both perturbations at full length, as the simulation has them."""
-    samples = sample_count(DURATION, SAMPLE_RATE)
+    samples = round(DURATION * SAMPLE_RATE)
     every = int(SAMPLE_RATE)
     estimator = SpectrumEstimator(SAMPLE_RATE)
     kept = []

@@ -17,7 +17,7 @@ import numpy as np
 from armlock.checks import ComplexArray, FloatArray
 from armlock.loops import paper_loop
 from armlock.margins import critical_perturbation
-from armlock.noise import LaserNoise, PerturbationNoise, band_rms, sample_count
+from armlock.noise import LaserNoise, PerturbationNoise, band_rms
 from armlock.paper import DURATION, LASER_NOISE, PERTURBATION, SAMPLE_RATE
 from armlock.roots import rightmost_root
 from armlock.simulation import DivergenceError, Simulation, sampled_open_loop
@@ -224,7 +224,7 @@ def full_run(duration: float = DURATION, seed: int = SEED) -> Run:
         systems[cutoff_name(cutoff)] = _System(IDEAL, (1.0, 1.0), sources=own)
     estimator = SpectrumEstimator(SAMPLE_RATE)
     kept: list[FloatArray] = []
-    samples = sample_count(duration, SAMPLE_RATE)
+    samples = round(duration * SAMPLE_RATE)
     with ThreadPoolExecutor() as threads:
         for noise in laser.blocks(samples, _BLOCK // _EVERY * _EVERY):
             eta = [source.draw(noise.size) for source in sources]
@@ -385,7 +385,7 @@ def drawn_differences() -> FloatArray:
         One value every 100 s. Stretches of one long series, as far from each other as they
         are long: many times the time over which the series forgets.
     """
-    length = sample_count(DURATION, _DRAW_RATE)
+    length = round(DURATION * _DRAW_RATE)
     first, second = (
         PerturbationNoise(seed, _DRAW_RATE, cutoff=LOWEST)
         .draw(2 * DRAWS * length)
@@ -525,7 +525,7 @@ def ensemble(duration: float = DURATION) -> Ensemble:
         return kept
 
     with ThreadPoolExecutor() as threads:
-        for noise in laser.blocks(sample_count(duration, SAMPLE_RATE), eta.shape[1]):
+        for noise in laser.blocks(round(duration * SAMPLE_RATE), eta.shape[1]):
             list(threads.map(draw, range(0, ENSEMBLE, _LINE)))
             alike = np.repeat(noise[:, None], ENSEMBLE, axis=1)
             first, *_ = threads.map(partial(advance, noise=alike), runs)
@@ -568,7 +568,7 @@ def starts() -> dict[str, Spectrum]:
     with nothing in the arms; or it is there at once, in the middle of its course, with nothing
     in the arms; or it has filled them before.
     """
-    settling, until = (sample_count(t, SAMPLE_RATE) for t in SETTLED)
+    settling, until = (round(t * SAMPLE_RATE) for t in SETTLED)
     reach = Simulation(paper_loop(), SAMPLE_RATE).history_samples
     found = {}
     for name, rest, filled in (
