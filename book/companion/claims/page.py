@@ -127,7 +127,7 @@ class VerdictCounts:
     >>> from book.companion.claims.page import VerdictCounts
     >>> VerdictCounts(check("T2", "T6"))
     1 finding of physics: 1 reproduced
-    besides, 1 of derivation and 0 of wording
+    Besides, 1 of derivation and 0 of wording
     """
 
     def __init__(self, ledger: Ledger) -> None:
@@ -143,7 +143,7 @@ class VerdictCounts:
         if white:
             self.lines.append((f"{white.total()} of the white paper", white))
         #: What is said below that.
-        self.others = f"besides, {others}"
+        self.others = f"Besides, {others}"
 
     def _met(self, shown: Callable[[Verdict, str], str]) -> list[tuple[str, list[str]]]:
         return [
