@@ -273,8 +273,7 @@ class Errata:
     def __repr__(self) -> str:
         """Return the table as text."""
         return "\n".join(
-            f"{c.identifier:4s} {c.place}: {f.value:.6g} ({f.quantity})"
-            for c, f in self.entries
+            f"{c.identifier:4s} {c.place}: {f.shown} ({f.quantity})" for c, f in self.entries
         ).replace("$", "")
 
     def _repr_html_(self) -> str:
@@ -289,7 +288,7 @@ class Errata:
             "Printed" if claim.printed else "In our words": typeset(
                 claim.printed or claim.says
             ),
-            "What follows": f"<strong>{typeset(f'{finding.value:.6g}')}</strong>: "
+            "What follows": f"<strong>{typeset(finding.shown)}</strong>: "
             f"{typeset(finding.quantity)}. {typeset(finding.note)}",
             "What depends on it": ", ".join(
                 f"{ledger_link(c.identifier)} ({f.verdict})" for c, f in affected
