@@ -98,7 +98,7 @@ def test_counts_are_of_physics_and_name_only_verdicts_that_occur():
     counts = VerdictCounts(check("T1", "T6"))
     assert repr(counts).splitlines() == [
         "1 finding of physics: 1 reproduced",
-        "besides, 1 of derivation and 0 of wording",
+        "Besides, 1 of derivation and 0 of wording",
     ]
     assert "differs" not in counts._repr_html_()
 

@@ -16,7 +16,7 @@ def main(folder: Path) -> None:
     for entry, finding in ledger:
         about = f"{entry.weight}; {entry.place}"
         print(f"{entry.identifier:4s} {finding.verdict.upper()}   ({about})")
-        for line in (entry.says, f"{finding.value:.6g}: {finding.quantity}", finding.note):
+        for line in (entry.says, f"{finding.shown}: {finding.quantity}", finding.note):
             print(textwrap.indent(textwrap.fill(line.replace("$", ""), 92), "     "))
         print()
     print(VerdictCounts(ledger))

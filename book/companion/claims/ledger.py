@@ -120,6 +120,11 @@ class Finding:
     quantity: str
     note: str
 
+    @property
+    def shown(self) -> str:
+        """The number as a reader sees it; "0 to rounding" where only rounding is left."""
+        return "0 to rounding" if 0.0 < abs(self.value) < 1e-11 else f"{self.value:.6g}"
+
 
 class Pin(NamedTuple):
     """What the check of a claim must find: verdict, number, and its absolute tolerance."""
@@ -300,7 +305,7 @@ class Ledger:
     def __repr__(self) -> str:
         """Return the table as text."""
         return "\n".join(
-            f"{c.identifier:4s} {f.verdict}: {f.value:.6g} ({f.quantity}). {f.note}"
+            f"{c.identifier:4s} {f.verdict}: {f.shown} ({f.quantity}). {f.note}"
             for c, f in self.entries
         ).replace("$", "")
 
@@ -375,7 +380,7 @@ def row(claim: Claim, finding: Finding, attributes: str, link: str, more: str = 
         f"<tr {attributes}><td>{link}</td><td>{badge(finding.verdict)}</td>"
         f"<td>{claim.weight}</td><td><details><summary>{typeset(claim.says)}</summary>"
         f"{printed if claim.printed else place}<p>{badge(finding.verdict, finding.verdict)} "
-        f"<strong>{typeset(f'{finding.value:.6g}')}</strong>: {typeset(finding.quantity)}.</p>"
+        f"<strong>{typeset(finding.shown)}</strong>: {typeset(finding.quantity)}.</p>"
         f"<p>{typeset(finding.note)}</p>{more}</details></td></tr>"
     )
 

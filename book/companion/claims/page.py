@@ -127,7 +127,7 @@ class VerdictCounts:
     >>> from book.companion.claims.page import VerdictCounts
     >>> VerdictCounts(check("T2", "T6"))
     1 finding of physics: 1 reproduced
-    besides, 1 of derivation and 0 of wording
+    Besides, 1 of derivation and 0 of wording
     """
 
     def __init__(self, ledger: Ledger) -> None:
@@ -143,7 +143,7 @@ class VerdictCounts:
         if white:
             self.lines.append((f"{white.total()} of the white paper", white))
         #: What is said below that.
-        self.others = f"besides, {others}"
+        self.others = f"Besides, {others}"
 
     def _met(self, shown: Callable[[Verdict, str], str]) -> list[tuple[str, list[str]]]:
         return [
@@ -273,8 +273,7 @@ class Errata:
     def __repr__(self) -> str:
         """Return the table as text."""
         return "\n".join(
-            f"{c.identifier:4s} {c.place}: {f.value:.6g} ({f.quantity})"
-            for c, f in self.entries
+            f"{c.identifier:4s} {c.place}: {f.shown} ({f.quantity})" for c, f in self.entries
         ).replace("$", "")
 
     def _repr_html_(self) -> str:
@@ -289,7 +288,7 @@ class Errata:
             "Printed" if claim.printed else "In our words": typeset(
                 claim.printed or claim.says
             ),
-            "What follows": f"<strong>{typeset(f'{finding.value:.6g}')}</strong>: "
+            "What follows": f"<strong>{typeset(finding.shown)}</strong>: "
             f"{typeset(finding.quantity)}. {typeset(finding.note)}",
             "What depends on it": ", ".join(
                 f"{ledger_link(c.identifier)} ({f.verdict})" for c, f in affected
