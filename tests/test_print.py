@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from tools.check_browser import find_chromium
-from tools.print_book import main
+from tools.check_browser import browser, find_chromium
+from tools.print_book import LINKS, STYLE, main
 
 ROOT = Path(__file__).parents[1]
 PAGE = """<html><head><link rel="stylesheet" href="../_static/a.css"></head><body><article>
@@ -34,6 +34,21 @@ def test_references_of_the_printed_book_lead_somewhere(tmp_path, monkeypatch, ca
     assert ("nowhere" in capsys.readouterr().out) == broken
     assert (book / "armlock.pdf").read_bytes().startswith(b"%PDF")
     assert '<a href="../armlock.pdf">' in (book / "notebooks" / "01.html").read_text()
+
+
+@pytest.mark.skipif(find_chromium() is None, reason="needs Chromium")
+def test_what_a_page_keeps_folded_is_printed():
+    with browser() as chromium:
+        page = chromium.new_page()
+        page.set_content(
+            "<article><div class='claims'><details><summary>line</summary>more</details></div>"
+            "<div class='ledger'><div class='claims'><details><summary>claim</summary>verdict"
+            "</details></div></div>"
+            "<details class='hide'><summary>Show code</summary>code</details></article>"
+        )
+        page.add_style_tag(content=STYLE)
+        page.evaluate(LINKS, "front")
+        assert page.inner_text("article").split() == ["line", "claim", "verdict", "code"]
 
 
 def test_a_second_make_waits_for_the_first(tmp_path):

@@ -22,13 +22,14 @@ NUMBER = (
 STYLE = """
 .bd-header, .bd-header-article, .bd-sidebar, .bd-sidebar-secondary, .bd-footer, .headerlink,
 .prev-next-footer, .search-button, .live, .copybtn, .skip-link, .pst-async-banner-revealer,
-.bd-header-announcement, #pst-back-to-top, .figure-downloads, footer, noscript, script
+.bd-header-announcement, #pst-back-to-top, .figure-downloads, .ledger-filter, footer, noscript,
+script, details.hide > summary, details details, .toggle-button
   { display: none !important; }
 .bd-page-width, .bd-main, .bd-content, .bd-article-container, .bd-container, .bd-article
   { max-width: none !important; display: block !important; width: auto !important;
     padding: 0 !important; margin: 0 !important; }
 [id^="document-"] + section { break-before: page; }
-details > summary { display: none !important; }
+summary { list-style: none; }
 figure, .cell_output table tr, pre { break-inside: avoid; }
 pre { white-space: pre-wrap !important; overflow-wrap: anywhere; }
 .math, mjx-container, .cell_output, table { overflow: visible !important; }
@@ -40,7 +41,9 @@ LINKS = """FRONT => {
   document.querySelector("article").id = "document-" + FRONT;
   for (const entry of document.querySelectorAll("div.citation[id]"))
     entry.id = "cite-" + entry.id;
-  for (const cell of document.querySelectorAll("details.hide")) cell.open = true;
+  // A chapter's table of claims stays one of lines: the ledger has the rest.
+  for (const folded of document.querySelectorAll("details"))
+    folded.open = folded.closest(".ledger") || !folded.closest(".claims");
   const broken = [];
   for (const link of document.querySelectorAll("a[href]")) {
     const href = link.getAttribute("href");
