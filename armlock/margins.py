@@ -18,7 +18,7 @@ from numpy.polynomial import polynomial as poly
 from scipy.optimize import brentq, minimize_scalar
 
 from armlock import contour, infimum
-from armlock.bounds import last_larger
+from armlock.bounds import last_larger, last_root_bound
 from armlock.checks import (
     BoolArray,
     ComplexArray,
@@ -45,7 +45,7 @@ _FREE_TOLERANCES = np.array([1e-5, 1e-4, 1e-5, 1e-5])
 #: Gain factors up to this, and down to one over it, are looked at.
 LARGEST_GAIN = 1e6
 # Share of its limits up to which the neutral root chain lets gain factors be looked at.
-_NEXT_TO_THE_CHAIN = 1e-4
+_NEXT_TO_THE_CHAIN = 1e-5
 # Turns of the longest delay that a walk along the axis can take.
 _MOST_TURNS = 1.5e6
 # Crossovers that are polished: those with the smallest margins.
@@ -525,6 +525,30 @@ def _chain_gains(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
     return lower, min((k for k in limits if k > 1.0), default=np.inf)
 
 
+def _no_crossing_from(loop: Loop, c1: float, c2: float, low: float, high: float) -> float:
+    r"""Frequency past which no gain factor from `low` to `high` takes a root across the axis.
+
+    With t = 1 / k from 1 / high to 1 / low, and S = |c1 B1| + |c2 B2|, the square of
+    |t R + C| - S must stay positive. \|t R + C\|^2 is convex in t. If it ascends at the lower
+    end of the interval, it is smallest there; if it descends at the upper end, there.
+    """
+    c, arms = _plus(loop.b1, loop.b2), _arm_weights(loop, c1, c2)
+    found = [last_larger(loop.rest, (c, loop.b1, loop.b2), np.array([high, *(high * arms)]))]
+    if not loop.delay:
+        for t, sign in ((1.0 / high, 1.0), (1.0 / low, -1.0)):
+            ascends = math.sqrt(last_root_bound(_ascent(loop.rest, c, t, sign)))
+            first = _plus(t * loop.rest, c)
+            found.append(max(ascends, last_larger(first, (loop.b1, loop.b2), arms)))
+    return min(found)
+
+
+def _ascent(rest: FloatArray, c: FloatArray, t: float, sign: float) -> FloatArray:
+    """Half the slope of |t R + C|^2 in t, times a sign, as a polynomial in omega^2."""
+    whole = _plus(t * rest, c)
+    product = np.convolve(whole, rest * (-1.0) ** np.arange(rest.size))[::2]
+    return np.asarray(sign * product * (-1.0) ** np.arange(product.size))
+
+
 def _gains(
     loop: Loop, c1: float, c2: float, intervals: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray]:
@@ -564,11 +588,12 @@ def _gains_around_one(
     turn = 2.0 * np.pi / loop.longest_delay
 
     def end(lower: float, upper: float) -> float:
-        """Frequency past which L stays clear of discs around all that is looked for."""
-        return max(
+        """Frequency past which no factor between the two takes a root to the axis."""
+        clear = max(
             _clear_from(loop, c1, c2, -0.5 * (1.0 / k + 1.0), 0.5 * abs(1.0 - 1.0 / k))
             for k in (lower, upper)
         )
+        return min(clear, _no_crossing_from(loop, c1, c2, lower, upper))
 
     def meeting(lower: float, upper: float, span: tuple[float, float]) -> FloatArray:
         segment = np.array([-1.0 / upper, -1.0 / lower])
