@@ -184,7 +184,7 @@ def roll_off(first: float, last: float, pairs: int, slope: float = 2.0 / 3.0) ->
     >>> from armlock.design import roll_off
     >>> shallow = roll_off(1e-2, 1e4, 6)
     >>> print(f"{abs(complex(shallow(2j * math.pi * 10.0))):.4f}")
-    0.0102
+    0.0079
     """
     first, last = positive_number("first", first), positive_number("last", last)
     slope, pairs = positive_number("slope", slope), whole_number("pairs", pairs, 1)
