@@ -310,6 +310,14 @@ def edge_crossings(loop: Loop, size: float, free_above: float | None = None) -> 
     )
 
 
+def _clear_above(loop: Loop, most: Sequence[float] | FloatArray, free_above: float) -> bool:
+    """Whether no phases above a frequency let a root cross, for |c1| and |c2| up to `most`."""
+    c1, c2 = most
+    stable = int(unstable_roots(loop, c1, c2)) == 0
+    # Where it is not stable the margins do not tell.
+    return stable and margins(loop, c1, c2, free_above).modulus > 0.0
+
+
 def _stays_clear(loop: Loop, c1: float, c2: float, half: float) -> bool:
     """Whether no point of a box has a root on the imaginary axis, as far as one walk tells."""
     end = float(last_frequency(loop, abs(c1) + half, abs(c2) + half))
@@ -322,6 +330,51 @@ def _stays_clear(loop: Loop, c1: float, c2: float, half: float) -> bool:
         whole.compiled(), whole.weights, whole.sums, whole.phases, uncertain, end
     )
     return bool(clear) and not math.isnan(argument)
+
+
+def quick_critical_perturbation(
+    loop: Loop, direction: npt.ArrayLike, free_above: float | None
+) -> float:
+    """Return what `critical_perturbation` does, for a loop that rolls off in less time.
+
+    Parameters
+    ----------
+    loop : Loop
+        The loop.
+    direction : array_like of two floats
+        (d1, d2), as there.
+    free_above : float or None
+        Angular frequency in rad/s up to which a first crossing is looked for. It is the result
+        if no phases of the arms let a root cross above it for so small a perturbation;
+        otherwise, and with None, all frequencies are walked.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    TypeError, ValueError, CountError
+        As there; or if `free_above` is not positive.
+
+    Examples
+    --------
+    >>> import math
+    >>> from armlock import robust_loop
+    >>> from armlock.design import quick_critical_perturbation
+    >>> print(f"{quick_critical_perturbation(robust_loop(), (1, -1), 4 * math.pi):.3e}")
+    4.375e-06
+    """
+    if free_above is not None:
+        highest = positive_number("free_above", free_above)
+        ray = Ray(checked_loop(loop), (1.0, 1.0), direction)
+        stop = min(ray.scale, 0.5 * ray.chain_limit())
+        at = ray.crossings(stop, first=True, highest=highest).position
+        if at.size and int(unstable_roots(loop, 1.0, 1.0)) == 0:
+            most = 1.0 + float(at[0]) * np.abs(ray.direction)
+            if _clear_above(loop, most, highest):
+                return float(at[0])
+    return critical_perturbation(loop, direction)
 
 
 @dataclass(frozen=True, eq=False)
@@ -793,26 +846,6 @@ def _require(bounds: Mapping[str, float], found: Mapping[str, float]) -> None:
         )
 
 
-def _clear_above(loop: Loop, most: Sequence[float] | FloatArray, free_above: float) -> bool:
-    """Whether no phases above a frequency let a root cross, for |c1| and |c2| up to `most`."""
-    c1, c2 = most
-    stable = int(unstable_roots(loop, c1, c2)) == 0
-    # Where it is not stable the margins do not tell.
-    return stable and margins(loop, c1, c2, free_above).modulus > 0.0
-
-
-def _critical(judge: _Judge, loop: Loop, guess: float) -> float:
-    """Return the critical perturbation, by walks up to `free_above` if they are enough."""
-    if judge.free_above is not None:
-        ray = Ray(loop, (1.0, 1.0), judge.direction)
-        at = ray.crossings(1.1 * guess, first=True, highest=judge.free_above).position
-        if at.size:
-            most = 1.0 + float(at[0]) * np.abs(judge.direction)
-            if _clear_above(loop, most, judge.free_above):
-                return float(at[0])
-    return critical_perturbation(loop, judge.direction)
-
-
 def _certified(
     name: str,
     judge: _Judge,
@@ -822,7 +855,7 @@ def _certified(
 ) -> float:
     """Return a measure of a loop; `found` holds its margins at (1, 1) and in the corners."""
     if name == "critical perturbation":
-        return _critical(judge, loop, sampled[name])
+        return quick_critical_perturbation(loop, judge.direction, judge.free_above)
     if name == "unity gain":
         both = np.asarray(poly.polyadd(loop.b1, loop.b2), dtype=np.float64)
         end = last_larger(loop.rest, (both, loop.b1, loop.b2), np.ones(3))

@@ -22,7 +22,13 @@ from armlock import (
     robust_loop,
     unstable_roots,
 )
-from armlock.design import FLIGHT_DELAY, box_counts, edge_crossings, roll_off
+from armlock.design import (
+    FLIGHT_DELAY,
+    box_counts,
+    edge_crossings,
+    quick_critical_perturbation,
+    roll_off,
+)
 from armlock.paper import CONTROLLER_GAIN, PERTURBATION
 
 TURN = 2.0 * np.pi
@@ -142,6 +148,12 @@ def _along(frequency):
     plain = response(frequency)
     slope = (response(frequency, 1.0 + 1e-3, 1.0 - 1e-3) - plain) / 1e-3
     return -(1.0 + plain) / slope
+
+
+def test_a_roll_off_hardly_changes_the_critical_perturbation():
+    loop = buildable_loop()
+    quick = quick_critical_perturbation(loop, (1.0, -1.0), TURN * 2.0)
+    assert quick == pytest.approx(critical_perturbation(loop, (1.0, -1.0)), rel=1e-12)
 
 
 def test_the_robust_loop_keeps_the_papers_suppression():
