@@ -15,8 +15,8 @@ from pathlib import Path
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-# Beside the package's own dependencies: the chapters glue numbers into their text.
-ALSO = ["ipykernel", "myst-nb"]
+# Beside the package's own dependencies: the chapters glue numbers, draw and write figures.
+ALSO = ["ipykernel", "myst-nb", "pillow", "schemdraw"]
 FILE = Path("binder/requirements.txt")
 HEAD = "# Written by `make lock` from pyproject.toml and environment.txt.\n"
 
