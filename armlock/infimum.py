@@ -59,7 +59,7 @@ def _distance(n: complex, r: complex, symmetric: bool) -> float:
 
 @njit(cache=True)
 def _combined(
-    local: ComplexArray, sizes: FloatArray, weights: FloatArray, sums: FloatArray | ComplexArray
+    local: ComplexArray, sizes: FloatArray, weights: FloatArray, sums: FloatArray
 ) -> tuple[ComplexArray, FloatArray]:
     """Sum polynomials, given as rows 1 to 3, as `armlock.exponentials.piece` does."""
     rows = 1 + weights.shape[0]

@@ -660,7 +660,7 @@ def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float
         R + k N = 0 , \qquad k = -\frac{1}{L} \text{ is real.}
 
     The neutral root chain bounds the gain, too. Just inside its limits roots cross at ever
-    higher frequency: a factor that lies within 1e-4 of a limit may be given as the limit.
+    higher frequency: a factor that lies within 1e-5 of a limit may be given as the limit.
 
     Examples
     --------
@@ -784,7 +784,7 @@ def margins(
     -----
     Phase and delay margins are taken over all crossovers. A neutral loop may have crossovers
     without end; they then approach those of the disc below, and the phase margin is certified
-    to 1e-3 rad.
+    to a part in a million.
 
     With free phases, L fills a disc: with the sensor's weights m1 and m2
 
