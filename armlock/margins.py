@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import zip_longest
 
 import numpy as np
@@ -163,6 +164,7 @@ def _clear_from(loop: Loop, c1: float, c2: float, centre: float, radius: float) 
     return last_larger(first, others, np.array(factors))
 
 
+@lru_cache(maxsize=64)
 def _factors(loop: Loop) -> tuple[ComplexArray, IntArray, FloatArray]:
     """Return the responses to the two arms as `armlock.infimum` takes them.
 
@@ -190,14 +192,41 @@ def _factors(loop: Loop) -> tuple[ComplexArray, IntArray, FloatArray]:
     )
 
 
-def _arms(loop: Loop, c1: float, c2: float) -> FloatArray:
-    """Return what `armlock.infimum` needs of the arms beside their responses."""
-    return np.array([c1, c2, loop.tau2 - loop.tau1, loop.delay])
+def _arms(loop: Loop, c1: float, c2: float, *, free: bool = False) -> FloatArray:
+    """Return what `armlock.infimum` needs of the arms beside their responses.
+
+    If `free`, both phases are free at all frequencies.
+    """
+    return np.array([c1, c2, np.nan if free else loop.tau2 - loop.tau1, loop.delay])
 
 
-def _free_arms(loop: Loop, c1: float, c2: float) -> FloatArray:
-    """Return the same for arms both phases of which are free."""
-    return np.array([c1, c2, np.nan, loop.delay])
+def _meeting(
+    loop: Loop,
+    c1: float,
+    c2: float,
+    span: tuple[float, float],
+    *,
+    segment: tuple[float, ...] = (),
+    levels: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
+) -> FloatArray:
+    """Intervals of a span of the axis outside which free phases keep L off a target.
+
+    The target is that of `armlock.infimum.meeting_intervals`.
+    """
+    found: FloatArray = infimum.meeting_intervals(
+        _factors(loop),
+        _arms(loop, c1, c2),
+        np.array(segment),
+        np.array(levels),
+        span,
+        loop.longest_delay,
+    )
+    return found
+
+
+def _around(omega: FloatArray, reach: float, span: tuple[float, float]) -> FloatArray:
+    """Intervals around frequencies, cut to a span of the axis."""
+    return np.column_stack((omega - reach, omega + reach)).clip(*span)
 
 
 def _likely(
@@ -238,6 +267,7 @@ def _smallest(
     if not np.isfinite(end(limit, TOLERANCE)):
         raise _unconfined(c1, c2)
     numerator = loop_numerator(loop, c1, c2)
+    polynomials = numerator.compiled()
 
     def distances(omega: FloatArray) -> FloatArray:
         response = loop.open_loop(1j * omega, c1, c2)
@@ -267,7 +297,7 @@ def _smallest(
             best, where = float(near[nearest]), float(likely[nearest])
     for tolerance in (0.05, TOLERANCE, TOLERANCE):
         found, omega, width, complete = infimum.smallest_distance(
-            numerator.compiled(),
+            polynomials,
             (numerator.weights, numerator.sums, numerator.phases),
             _factors(loop),
             _arms(loop, c1, c2),
@@ -377,8 +407,9 @@ def _crossovers(
     """Frequencies with |L| = 1 on intervals of the axis, and where rounding hides if it is."""
     above, below = loop_numerator(loop, c1, c2), loop.rest_on_boundary()
     squares = above.times_conjugate(above).plus(below.times_conjugate(below).scaled(-1.0))
+    excess = squares.turned()
     found = [
-        sign_changes(squares.turned(), float(end), start=float(start))
+        sign_changes(excess, float(end), start=float(start))
         for start, end in np.reshape(intervals, (-1, 2))
     ]
     omega = np.concatenate([np.empty(0), *(zeros for zeros, _ in found)])
@@ -411,8 +442,8 @@ def _phase_and_delay(
         omega = np.geomspace(first, end, 400)
         free = infimum.free_margins_over(_factors(loop), _arms(loop, c1, c2), omega)
         nearest = omega[np.argmin(free[:, [infimum.PHASE, infimum.DELAY]], axis=0)]
-        likely = np.column_stack((nearest - 300.0 * turn, nearest + 300.0 * turn))
-        intervals = np.concatenate((intervals, np.clip(likely, first, end)))
+        likely = _around(nearest, 300.0 * turn, (first, end))
+        intervals = np.concatenate((intervals, likely))
     for last in (False, True):
         omega, hidden = _crossovers(loop, c1, c2, intervals)
         found = _least_lags(loop, c1, c2, omega[~hidden])
@@ -428,14 +459,8 @@ def _phase_and_delay(
         delay = min(delay, found[1])
         if last or end == first:
             break
-        intervals = infimum.meeting_intervals(
-            _factors(loop),
-            _arms(loop, c1, c2),
-            np.empty(0),
-            np.array([0.0, 0.0, phase, delay]),
-            (first, end),
-            loop.longest_delay,
-        )
+        levels = 0.0, 0.0, phase, delay
+        intervals = _meeting(loop, c1, c2, (first, end), levels=levels)
     return phase, delay, where
 
 
@@ -596,11 +621,7 @@ def _gains_around_one(
         return min(clear, _no_crossing_from(loop, c1, c2, lower, upper))
 
     def meeting(lower: float, upper: float, span: tuple[float, float]) -> FloatArray:
-        segment = np.array([-1.0 / upper, -1.0 / lower])
-        found: FloatArray = infimum.meeting_intervals(
-            _factors(loop), _arms(loop, c1, c2), segment, np.zeros(4), span, loop.longest_delay
-        )
-        return found
+        return _meeting(loop, c1, c2, span, segment=(-1.0 / upper, -1.0 / lower))
 
     lower, upper, where = least, most, np.nan
     first = min(end(lower, upper), 1e3 * turn)
@@ -623,7 +644,7 @@ def _gains_around_one(
             omega = np.geomspace(first, last, 400)
             free = _free_gains(loop, c1, c2, omega)
             at = omega[[np.argmax(free[:, 0]), np.argmin(free[:, 1])]]
-            intervals = np.column_stack((at - wide * turn, at + wide * turn)).clip(first, last)
+            intervals = _around(at, wide * turn, (first, last))
             wide *= 30.0
 
 
@@ -717,7 +738,7 @@ def _free_margins(
         end = _settled_from(loop, c1, c2, float(limit[infimum.PHASE]))
     end = max(end, 2.0 * lowest)
 
-    factors, free = _factors(loop), _free_arms(loop, c1, c2)
+    factors, free = _factors(loop), _arms(loop, c1, c2, free=True)
 
     def at(u: npt.ArrayLike) -> FloatArray:
         omega = np.exp(np.atleast_1d(np.asarray(u, dtype=float)))

@@ -115,6 +115,7 @@ def _compiled(system: CharacteristicFunction) -> tuple[Any, ...]:
     )
 
 
+@lru_cache(maxsize=64)
 def roots_of_a(system: CharacteristicFunction) -> ComplexArray:
     """Roots of A, in extended precision where doubles give those of another polynomial.
 
