@@ -60,10 +60,14 @@ def _quotients(
 
 
 class Polynomial(NamedTuple):
-    """A real polynomial of s: its coefficients in ascending powers, and its roots."""
+    """A real polynomial of s: its coefficients in ascending powers, and its roots.
+
+    A product p q* keeps p and q.
+    """
 
     coefficients: FloatArray
     roots: ComplexArray
+    factors: tuple[Polynomial, ...] = ()
 
     @classmethod
     def of(cls, coefficients: FloatArray) -> Polynomial:
@@ -83,7 +87,7 @@ class Polynomial(NamedTuple):
         signs = (-1.0) ** np.arange(other.coefficients.size)
         with np.errstate(over="ignore", invalid="ignore"):
             product = np.convolve(self.coefficients, signs * other.coefficients)
-        return Polynomial(product, np.concatenate((self.roots, -other.roots)))
+        return Polynomial(product, np.concatenate((self.roots, -other.roots)), (self, other))
 
 
 class ExponentialSum(NamedTuple):
@@ -153,16 +157,16 @@ class ExponentialSum(NamedTuple):
         return ExponentialSum(self.polynomials, 1j * self.weights, self.phases, 1j * self.sums)
 
     def compiled(self) -> tuple[Any, ...]:
-        """Return the polynomials as compiled functions take them, in four arrays.
+        """Return the polynomials as compiled functions take them, in five arrays.
 
         1. Coefficients in powers of omega, shape (polynomials, degree + 1). There are no rows
-           where a degree exceeds `LOW_DEGREE`.
-        2. Roots with an imaginary part of zero or above, polynomial after polynomial.
-        3. The index of each polynomial's first root.
-        4. The highest coefficients.
+           where a degree exceeds `LOW_DEGREE`: the others are for that case.
+        2. Roots with an imaginary part of zero or above, factor after factor.
+        3. The index of each factor's first root.
+        4. The factors' highest coefficients.
+        5. Which two factors each polynomial p q* has, shape (polynomials, 2); -1 for no second.
         """
         degree = max(p.coefficients.size for p in self.polynomials) - 1
-        kept = [np.sort_complex(p.roots[p.roots.imag >= 0.0]) for p in self.polynomials]
         whole = np.zeros((len(self.polynomials), degree + 1), dtype=np.complex128)
         # Powers of j, so that each coefficient stays exactly real or exactly imaginary.
         turns = np.array([1.0, 1.0j, -1.0, -1.0j])[np.arange(degree + 1) % 4]
@@ -170,11 +174,19 @@ class ExponentialSum(NamedTuple):
             size = p.coefficients.size
             row.real[:size] = p.coefficients * turns.real[:size]
             row.imag[:size] = p.coefficients * turns.imag[:size]
+        factors = {id(f): f for p in self.polynomials for f in p.factors or (p,)}
+        place = {key: k for k, key in enumerate(factors)}
+        pairs = np.full((len(self.polynomials), 2), -1)
+        for pair, p in zip(pairs, self.polynomials, strict=True):
+            for m, f in enumerate(p.factors or (p,)):
+                pair[m] = place[id(f)]
+        kept = [np.sort_complex(f.roots[f.roots.imag >= 0.0]) for f in factors.values()]
         return (
             whole if degree <= LOW_DEGREE else whole[:0],
             np.concatenate(kept),
             np.cumsum([0, *(roots.size for roots in kept)]),
-            np.array([p.coefficients[-1] for p in self.polynomials]),
+            np.array([f.coefficients[-1] for f in factors.values()]),
+            pairs,
         )
 
 
@@ -204,8 +216,8 @@ def _from_roots(
 
     Polynomial k has the highest coefficient leads[k], and its real roots and the upper halves
     of its pairs are roots[starts[k] : starts[k + 1]]. All are divided by one power of two.
-    Returns the coefficients and their magnitudes for rounding, shape (k, LOW_DEGREE + 1), and
-    bounds on what the higher powers add up to where 0 <= u <= 1.
+    Returns the coefficients and their magnitudes, shape (k, LOW_DEGREE + 1), and bounds on what
+    the higher powers add up to where 0 <= u <= 1.
     """
     size = LOW_DEGREE + 1
     found = np.zeros((leads.size, size), dtype=np.complex128)
@@ -215,6 +227,7 @@ def _from_roots(
     largest = -(1 << 60)
     for k in range(leads.size):
         found[k, 0], sizes[k, 0], total = leads[k], abs(leads[k]), abs(leads[k])
+        degree = 0
         for i in range(starts[k], starts[k + 1]):
             root = roots[i]
             below = 1j * omega - root
@@ -232,7 +245,8 @@ def _from_roots(
                 exponents[k] += exponent
                 scale = 2.0**-exponent
                 total *= scale
-            for m in range(size - 1, -1, -1):
+            degree += 1 if root.imag == 0.0 else 2
+            for m in range(min(degree, size - 1), -1, -1):
                 new, most = q0 * found[k, m], m0 * sizes[k, m]
                 if m > 0:
                     new, most = new + q1 * found[k, m - 1], most + m1 * sizes[k, m - 1]
@@ -243,8 +257,6 @@ def _from_roots(
         held = 0.0
         for m in range(size):
             held += sizes[k, m]
-            # The products above round, too.
-            sizes[k, m] *= 1.0 + 0.5 * factors
         left_out[k] = max(total - held, 0.0) + factors * EPSILON * total
         largest = max(largest, exponents[k])
     for k in range(leads.size):
@@ -257,11 +269,46 @@ def _from_roots(
 
 
 @njit(cache=True)
-def _reach(roots: ComplexArray, starts: IntArray, omega: float, longest: float) -> float:
+def _multiplied(
+    found: ComplexArray,
+    sizes: FloatArray,
+    left_out: FloatArray,
+    starts: IntArray,
+    pairs: IntArray,
+) -> tuple[ComplexArray, FloatArray, FloatArray]:
+    """Multiply expansions of `_from_roots` to those of products p q*, up to as many powers.
+
+    What is returned has the same form. The magnitudes are those for rounding: they count the
+    roots, since each multiplication rounds.
+    """
+    number, size = pairs.shape[0], found.shape[1]
+    product = np.zeros((number, size), dtype=np.complex128)
+    most, left = np.zeros((number, size)), np.zeros(number)
+    for k in range(number):
+        p, q = pairs[k]
+        factors = starts[p + 1] - starts[p]
+        if q < 0:
+            product[k], most[k], left[k] = found[p], sizes[p], left_out[p]
+        else:
+            factors += starts[q + 1] - starts[q]
+            for m in range(size):
+                for i in range(m + 1):
+                    product[k, m] += found[p, i] * found[q, m - i].conjugate()
+                    most[k, m] += sizes[p, i] * sizes[q, m - i]
+            total = (sizes[p].sum() + left_out[p]) * (sizes[q].sum() + left_out[q])
+            left[k] = max(total - most[k].sum(), 0.0) + EPSILON * total
+        most[k] *= 1.0 + 0.5 * factors
+    return product, most, left
+
+
+@njit(cache=True)
+def _reach(
+    roots: ComplexArray, starts: IntArray, omega: float, longest: float, most: float
+) -> float:
     """How far from omega the expansion of `_from_roots` is accurate.
 
     Around each polynomial the crowd, the sum of reach / (reach + distance), is concave in the
-    reach: Newton's method from below never passes the length at which it is _CROWD.
+    reach: Newton's method from below never passes the length at which it is `most`.
     """
     shortest = longest
     for k in range(starts.size - 1):
@@ -276,10 +323,10 @@ def _reach(roots: ComplexArray, starts: IntArray, omega: float, longest: float) 
                         rate += distance / (reach + distance) ** 2
                     if root.imag == 0.0:
                         break
-            if rate * (shortest - reach) <= _CROWD - crowd:
+            if rate * (shortest - reach) <= most - crowd:
                 reach = shortest
                 break
-            reach += (_CROWD - crowd) / rate
+            reach += (most - crowd) / rate
         shortest = min(shortest, reach)
     return shortest
 
@@ -323,11 +370,13 @@ def piece(
     magnitudes for rounding, shape (1 + groups, n + 1). The last column bounds the powers that
     are left out, over EPSILON, by which `rounding_bound` multiplies it.
     """
-    whole, roots, starts, leads = polynomials
+    whole, roots, starts, leads, pairs = polynomials
     start, reach = omega, longest
     if whole.shape[0] == 0:
-        reach = _reach(roots, starts, omega, min(longest, 1e300))
-        coefficients, magnitudes, left_out = _from_roots(roots, starts, leads, start, reach)
+        crowd = 0.5 * _CROWD if pairs[:, 1].max() >= 0 else _CROWD
+        reach = _reach(roots, starts, omega, min(longest, 1e300), crowd)
+        found, most, beyond = _from_roots(roots, starts, leads, start, reach)
+        coefficients, magnitudes, left_out = _multiplied(found, most, beyond, starts, pairs)
     else:
         if longest == np.inf:
             start, reach = 0.0, 1.0

@@ -10,11 +10,13 @@ from armlock import (
     CommonArm,
     contour,
     exponentials,
+    flight_loop,
     paper_loop,
     stability_chart,
     unstable_roots,
 )
 from armlock.bounds import last_frequency
+from armlock.nyquist import loop_numerator
 from tests import independent
 from tests.systems import NEUTRAL, RETARDED
 
@@ -23,8 +25,9 @@ def walk(coefficients, phases, omega_end):
     """Wind a sum of polynomials in omega, one a row, times exponentials."""
     whole = np.array(coefficients, dtype=complex)
     nothing = np.zeros(0, dtype=complex), np.zeros(1, dtype=np.int64), np.zeros(0)
+    pairs = np.column_stack((np.arange(len(whole)), np.full(len(whole), -1)))
     return contour.winding(
-        (whole, *nothing),
+        (whole, *nothing, pairs),
         np.eye(len(whole)),
         np.ones(len(whole)),
         np.array(phases, dtype=float),
@@ -119,10 +122,33 @@ def test_a_piece_reaches_as_far_as_equal_roots_allow(number):
     # Of n roots at distance d, n reach / (reach + d) counts: 1.5 at reach = 1.5 d / (n - 1.5).
     roots, starts = np.full(number, -3.0 + 0j), np.array([0, number])
     expected = 1.5 * 5.0 / (number - 1.5)
-    assert exponentials._reach(roots, starts, 4.0, np.inf) == pytest.approx(expected, rel=1e-2)
+    assert exponentials._reach(roots, starts, 4.0, np.inf, 1.5) == pytest.approx(
+        expected, rel=1e-2
+    )
     # Another polynomial's roots do not count.
     both = np.concatenate((roots, roots)), np.array([0, number, 2 * number])
-    assert exponentials._reach(*both, 4.0, np.inf) == pytest.approx(expected, rel=1e-2)
+    assert exponentials._reach(*both, 4.0, np.inf, 1.5) == pytest.approx(expected, rel=1e-2)
+
+
+@pytest.mark.parametrize("omega", [1e-6, 1e-2, 3.0, 1e3, 1e5])
+def test_products_of_high_degree_have_the_values_of_their_factors(omega):
+    # L = N / R = N R* / |R|^2, whose factors have 26 roots.
+    loop = flight_loop(delay=1e-6)
+    below = loop.rest_on_boundary()
+    values = []
+    for product in (
+        loop_numerator(loop, 0.9, 1.1).times_conjugate(below),
+        below.times_conjugate(below),
+    ):
+        polynomials = product.compiled()
+        assert polynomials[0].shape[0] == 0
+        start, reach, local, _ = exponentials.piece(
+            polynomials, product.weights, product.sums, omega, np.inf
+        )
+        at = start + 0.7 * reach
+        values.append(exponentials.evaluate(start, reach, local, product.phases, at)[0])
+    expected = complex(loop.open_loop(1j * at, 0.9, 1.1))
+    assert values[0] / values[1] == pytest.approx(expected, rel=1e-9)
 
 
 def test_the_last_frequency_is_close_to_where_one_term_outgrows_the_others():
@@ -140,7 +166,8 @@ from armlock import contour, exponentials
 
 whole = np.zeros((2, 6), dtype=complex)
 whole[0, 2], whole[1, 5] = 1.0, 1.0j
-polynomials = whole, np.zeros(0, dtype=complex), np.zeros(1, dtype=np.int64), np.zeros(0)
+none = np.zeros(0, dtype=complex), np.zeros(1, dtype=np.int64), np.zeros(0)
+polynomials = whole, *none, np.array([[0, -1], [1, -1]])
 weights, phases = np.array([[0.0, 0.5], [0.0, 0.5]]), np.array([1.0, -1.0])
 function = weights, np.array([1.0, -1.0]), phases
 nothing = np.zeros((0, 2)), np.zeros(2), np.zeros(0)
