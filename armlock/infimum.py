@@ -1,7 +1,7 @@
 """Compiled: the smallest distance of an open loop from -1 over all frequencies, certified.
 
-With L = N / R the walk looks for the smallest |1 + L|, or the smallest |1 + L| / |1 - L|. It
-keeps the smallest value found so far, and steps over what cannot hold a smaller one:
+With L = N / R the walk looks for the smallest |1 + L| and the smallest |1 + L| / |1 - L|. It
+keeps the smallest values found so far, and steps over what cannot hold smaller ones:
 
 - a step of the walk, where the tangents of N and R, and bounds on their second derivatives,
   leave no room for it;
@@ -292,34 +292,63 @@ def _stays_above(
 
 
 @njit(cache=True)
-def smallest_distance(
+def _downhill(
+    curves: tuple[Any, ...], symmetric: bool, omega: float, step: float, end: float
+) -> tuple[float, float]:
+    """Follow a distance of L from -1 down to a minimum next to omega, within one piece.
+
+    `curves` are start and reach of the piece, N and its phases, R and none. Returns the
+    distance, and where.
+    """
+    start, reach, n, phases, r, none = curves
+    least, shortest = np.inf, 1e-9 * step
+    at = omega
+    while step > shortest:
+        if start <= at <= end:
+            value = evaluate(start, reach, n, phases, at)[0]
+            here = _distance(value, evaluate(start, reach, r, none, at)[0], symmetric)
+            if here < least:
+                omega, least = at, here
+                at = omega + step
+                continue
+        # First on the one side, then on the other, then closer.
+        if at > omega:
+            at = omega - step
+        else:
+            step *= 0.5
+            at = omega + step
+    return least, omega
+
+
+@njit(cache=True)
+def smallest_distances(
     polynomials: tuple[Any, ...],
     numerator: tuple[Any, ...],
     factors: tuple[Any, ...],
     arms: FloatArray,
-    symmetric: bool,
     omega: float,
     omega_end: float,
     longest_delay: float,
-    best: float,
+    best: FloatArray,
     tolerance: float,
-) -> tuple[float, float, float, bool]:
-    """Smallest distance of L from -1 from omega to omega_end.
+) -> tuple[FloatArray, FloatArray, bool]:
+    """Smallest |1 + L|, and |1 + L| / |1 - L|, from omega to omega_end.
 
     `polynomials` are R, B1 and B2, `numerator` weights, sums and phases of N, `factors` and
-    `arms` what `_disc` takes. Only distances below `best` are looked for. Returns the smallest
-    one that was met, or `best`; where; the length of the step there; and whether the walk came
-    to its end, which it does not if it is too long or rounding hides L. No distance is smaller
-    than the result by more than the share `tolerance`.
+    `arms` what `_disc` takes. `best` holds a value of each that occurs: only smaller ones are
+    looked for, and none where it is zero. Returns the smallest ones; where they are, nan for
+    those of `best`; and whether the walk came to its end, which it does not if it is too long
+    or rounding hides L. None is smaller than the result by more than the share `tolerance`, or
+    by more than rounding, of 1e-6 at most.
     """
     weights, sums, phases = numerator
     unit, nothing, none = np.eye(3), np.zeros((0, 3)), np.zeros(0)
     only_r = np.array([1.0, 0.0, 0.0])
-    where, width, steps = np.nan, 0.0, 0
+    best, where, steps = best.copy(), np.full(2, np.nan), 0
     turn, skip = 2.0 * np.pi / longest_delay, omega_end
-    block, levels = _TURNS * turn, np.zeros(4)
+    block, levels, here = _TURNS * turn, np.zeros(4), np.zeros(2)
     while omega < omega_end:
-        levels[RATIO if symmetric else MODULUS] = best * (1.0 - tolerance)
+        levels[:2] = best * (1.0 - tolerance)
         disc = _disc(factors, arms, omega)
         skip = min(4.0 * skip, 0.5 * disc[-1], omega_end - omega)
         while skip > block and not _nothing_smaller(disc, omega, skip, levels):
@@ -343,40 +372,50 @@ def smallest_distance(
         while omega < end:
             steps += 1
             if steps > MOST_STEPS:
-                return best, where, width, False
+                return best, where, False
             step = min(2.0 * step, end - omega)
             while True:
                 following = end if step >= end - omega else omega + step
                 new_value, new_slope = evaluate(start, reach, n, phases, following)
                 new_below, new_change = evaluate(start, reach, r, none, following)
-                here = _distance(new_value, new_below, symmetric)
                 u = (following - start) / reach
                 bent = 0.5 * step * step * real_horner(r_bound, u)
                 both = 0.5 * step * step * real_horner(n_bound, u) + bent
                 error = real_horner(n_error, u) + real_horner(r_error, u)
                 over, over_slope = below + value, change + slope
-                under, under_slope, under_bent = below, change, bent
-                if symmetric:
-                    under, under_slope, under_bent = below - value, change - slope, both
                 least = tangent_distance(over, over_slope, step) - both - error
-                most = max(abs(under), abs(under + step * under_slope)) + under_bent + error
-                level = (1.0 - tolerance) * min(best, here)
-                if least >= level * most:
+                certain = True
+                for m in range(2):
+                    if best[m] == 0.0:
+                        continue
+                    here[m] = _distance(new_value, new_below, m == RATIO)
+                    under, under_slope, under_bent = below, change, bent
+                    if m == RATIO:
+                        under, under_slope, under_bent = below - value, change - slope, both
+                    most = max(abs(under), abs(under + step * under_slope))
+                    most += under_bent + error
+                    level = (1.0 - tolerance) * min(best[m], here[m])
+                    # By so much rounding may move what was met already: no step avoids that.
+                    unknown = (1.0 + level) * error
+                    allowed = 2.0 * unknown if unknown <= 1e-6 * most else 0.0
+                    if least + allowed >= level * most:
+                        continue
+                    apart = _stays_above(over, over_slope, under, under_slope, level, step)
+                    if apart + allowed < both + level * under_bent + unknown:
+                        certain = False
+                        break
+                if certain:
                     break
-                if _stays_above(over, over_slope, under, under_slope, level, step) >= (
-                    both + level * under_bent + (1.0 + level) * error
-                ):
-                    break
-                step *= 0.5
                 if step <= 1e-15 * omega or step < 1e-300:
-                    # Rounding hides more: the loop touches -1 here, or nothing is certain.
-                    certain = (1.0 + level) * error <= 1e-6 * most
-                    return min(best, max(least / most, 0.0)), omega, step, certain
-            if here < best:
-                best, where, width = here, following, step
+                    return best, where, False
+                step *= 0.5
+            for m in range(2):
+                if here[m] < best[m]:
+                    curves = start, reach, n, phases, r, none
+                    best[m], where[m] = _downhill(curves, m == RATIO, following, step, end)
             omega, value, slope = following, new_value, new_slope
             below, change = new_below, new_change
-    return best, where, width, True
+    return best, where, True
 
 
 @njit(cache=True)

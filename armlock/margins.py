@@ -8,7 +8,6 @@ smaller, or no crossing, is possible; at high frequency the limit is known in cl
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import zip_longest
@@ -16,7 +15,7 @@ from itertools import zip_longest
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import minimize_scalar
 
 from armlock import contour, infimum
 from armlock.bounds import last_larger, last_root_bound
@@ -34,6 +33,7 @@ from armlock.nyquist import leading_radius, loop_numerator
 from armlock.rays import first_break
 from armlock.stability import (
     CountError,
+    polished,
     sign_changes,
     unstable_roots,
 )
@@ -229,53 +229,39 @@ def _around(omega: FloatArray, reach: float, span: tuple[float, float]) -> Float
     return np.column_stack((omega - reach, omega + reach)).clip(*span)
 
 
-def _likely(
-    loop: Loop, c1: float, c2: float, lowest: float, highest: float, place: int
-) -> FloatArray:
-    """Frequencies some of which have a small distance from -1, of many turns of the delays.
-
-    They lie where the disc of free phases comes closest, and spare a walk most of its way. None
-    where that is within a thousand turns, which a walk does as fast.
-    """
-    omega = np.geomspace(lowest, highest, 400)
-    nearest = infimum.free_margins_over(_factors(loop), _arms(loop, c1, c2), omega)[:, place]
-    at, turn = float(omega[np.argmin(nearest)]), 2.0 * np.pi / loop.longest_delay
-    if at < 1e3 * turn:
-        return np.empty(0)
-    return np.linspace(at - 100.0 * turn, min(at + 100.0 * turn, highest), 4001)
-
-
 def _smallest(
-    loop: Loop, c1: float, c2: float, *, symmetric: bool, highest: float = np.inf
-) -> tuple[float, float]:
-    """Smallest distance of L from -1 up to `highest`, and where; inf where it is the limit.
+    loop: Loop, c1: float, c2: float, *, disk: bool, highest: float = np.inf
+) -> tuple[FloatArray, FloatArray]:
+    """Smallest |1 + L| up to `highest`, and |1 + L| / |1 - L| if `disk`; and where.
 
-    A walk with a wide tolerance comes close to the smallest value; polished, it lets the walk
-    with the final tolerance step over nearly everything.
+    That is inf where it is the limit.
     """
-    limit = _limit(loop, c1, c2, symmetric)
-    if not limit > 0.0:
+    best = np.array([_limit(loop, c1, c2, symmetric) for symmetric in (False, True)])
+    if not best.min() > 0.0:
         raise _unconfined(c1, c2)
-    if symmetric:
-        limit = min(limit, 1.0)
+    best[infimum.RATIO] = min(best[infimum.RATIO], 1.0) if disk else 0.0
+    where = np.full(2, np.inf)
 
-    def end(best: float, tolerance: float) -> float:
+    def end() -> float:
         """Frequency past which nothing is smaller, or `highest`."""
-        disc = infimum.excluded_disc(best * (1.0 - tolerance), symmetric)
-        return min(_clear_from(loop, c1, c2, *disc), highest)
+        discs = [
+            infimum.excluded_disc(value * (1.0 - TOLERANCE), m == infimum.RATIO)
+            for m, value in enumerate(best)
+            if value
+        ]
+        return min(max(_clear_from(loop, c1, c2, *disc) for disc in discs), highest)
 
-    if not np.isfinite(end(limit, TOLERANCE)):
+    if not np.isfinite(end()):
         raise _unconfined(c1, c2)
-    numerator = loop_numerator(loop, c1, c2)
-    polynomials = numerator.compiled()
 
-    def distances(omega: FloatArray) -> FloatArray:
+    def improve(omega: FloatArray) -> None:
+        """Take the smallest distances at given frequencies if they are smaller."""
         response = loop.open_loop(1j * omega, c1, c2)
         with np.errstate(divide="ignore"):
-            return np.abs(1.0 + response) / (np.abs(1.0 - response) if symmetric else 1.0)
-
-    def distance(omega: float) -> float:
-        return float(distances(np.array([omega]))[0])
+            distances = np.abs(1.0 + response) / [np.ones(omega.size), np.abs(1.0 - response)]
+        for m, nearest in enumerate(np.argmin(distances, axis=1)):
+            if distances[m, nearest] < best[m]:
+                best[m], where[m] = distances[m, nearest], omega[nearest]
 
     # Below it L is a single power of s, up to a part in ten million; or, if it is large there
     # and no positive power, it is large below.
@@ -284,63 +270,35 @@ def _smallest(
     size = abs(complex(loop.open_loop(1j * higher, c1, c2)))
     if size > 1e7 and abs(complex(loop.open_loop(1j * lowest, c1, c2))) > 0.9 * size:
         lowest = higher
-    best, where = limit, np.inf
-    at_lowest = distance(lowest)
-    if at_lowest < best:
-        best, where = at_lowest, lowest
-    place = infimum.RATIO if symmetric else infimum.MODULUS
-    likely = _likely(loop, c1, c2, lowest, max(lowest, end(best, 0.05)), place)
-    if likely.size:
-        near = distances(likely)
-        nearest = int(np.argmin(near))
-        if near[nearest] < best:
-            best, where = float(near[nearest]), float(likely[nearest])
-    for tolerance in (0.05, TOLERANCE, TOLERANCE):
-        found, omega, width, complete = infimum.smallest_distance(
-            polynomials,
-            (numerator.weights, numerator.sums, numerator.phases),
-            _factors(loop),
-            _arms(loop, c1, c2),
-            symmetric,
-            lowest,
-            end(best, tolerance),
-            loop.longest_delay,
-            best,
-            tolerance,
+    improve(np.array([lowest]))
+    # Small distances are likely where the disc of free phases comes closest. They spare the
+    # walk most of its way; within a thousand turns of the delays it does without.
+    turn, last = 2.0 * np.pi / loop.longest_delay, end()
+    if last > 1e3 * turn:
+        omega = np.geomspace(lowest, last, 400)
+        free = infimum.free_margins_over(_factors(loop), _arms(loop, c1, c2), omega)
+        for at in omega[np.argmin(free[:, :2], axis=0)]:
+            if at > 1e3 * turn:
+                improve(np.linspace(at - 100.0 * turn, min(at + 100.0 * turn, last), 4001))
+    numerator = loop_numerator(loop, c1, c2)
+    found, places, complete = infimum.smallest_distances(
+        numerator.compiled(),
+        (numerator.weights, numerator.sums, numerator.phases),
+        _factors(loop),
+        _arms(loop, c1, c2),
+        lowest,
+        end(),
+        loop.longest_delay,
+        best,
+        TOLERANCE,
+    )
+    if not complete:
+        raise CountError(
+            f"no margin at (c1, c2) = ({c1}, {c2}): rounding hides L, or following it takes "
+            f"more than {contour.MOST_STEPS:.0e} steps",
+            np.array([[c1, c2]]),
         )
-        if not complete:
-            raise CountError(
-                f"no margin at (c1, c2) = ({c1}, {c2}): rounding hides L at {omega} rad/s, or "
-                f"following it takes more than {contour.MOST_STEPS:.0e} steps",
-                np.array([[c1, c2]]),
-            )
-        if found >= best:
-            if tolerance == TOLERANCE:
-                break
-            continue
-        best, where = found, omega
-        best, where = _descended(distance, best, where, width, lowest)
-    return best, where
-
-
-def _descended(
-    distance: Callable[[float], float], best: float, where: float, width: float, lowest: float
-) -> tuple[float, float]:
-    """Follow a distance from a small value to the minimum beside it."""
-    for _ in range(20):
-        low, high = max(where - width, lowest), where + width
-
-        # Over the share of the bracket, because the optimizer's accuracy is relative.
-        def along(share: float, low: float = low, span: float = high - low) -> float:
-            return distance(low + share * span)
-
-        found = minimize_scalar(along, bounds=(0.0, 1.0), method="bounded")
-        if not found.fun < best:
-            break
-        best, where = float(found.fun), low + float(found.x) * (high - low)
-        # Nearer to its minimum the next bracket is narrower, unless it lies outside.
-        width *= 0.05 if 0.05 < found.x < 0.95 else 2.0
-    return best, where
+    return found, np.where(np.isnan(places), where, places)
 
 
 def modulus_margin(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> float:
@@ -363,7 +321,8 @@ def modulus_margin(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> float:
     -------
     float
         The infimum over all omega > 0, the limit at high frequency included, to a part in a
-        million. For a neutral loop that limit is taken over all small changes of the delays.
+        million, or 1e-6 where rounding hides more. For a neutral loop that limit is taken over
+        all small changes of the delays.
 
     Raises
     ------
@@ -380,7 +339,8 @@ def modulus_margin(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> float:
     """
     checked_loop(loop)
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
-    return _smallest(loop, c1, c2, symmetric=False)[0]
+    (modulus, _), _ = _smallest(loop, c1, c2, disk=False)
+    return float(modulus)
 
 
 def _unconfined(c1: float, c2: float) -> CountError:
@@ -480,26 +440,14 @@ def _least_lags(
     chosen = np.concatenate(
         (np.argsort(nearest)[:_POLISHED], np.argsort(lag / omega)[:_POLISHED])
     )
-    at = np.array([_polished(loop, c1, c2, float(w)) for w in omega[np.unique(chosen)]])
+    at = omega[np.unique(chosen)]
+    # Not past the next null of an arm.
+    span = np.minimum(0.01 / loop.longest_delay, 0.5 * at)
+    reaches = [np.minimum(share * at, span) for share in (1e-6, 1e-5, 1e-4, 1e-3)]
+    at = polished(lambda w: np.log(np.abs(loop.open_loop(1j * w, c1, c2))), at, reaches)
     lag, nearest = lags(at)
     worst = int(np.argmin(nearest))
     return float(nearest[worst]), float(np.min(lag / at)), float(at[worst])
-
-
-def _polished(loop: Loop, c1: float, c2: float, omega: float) -> float:
-    """Return a crossover near one that was found on the expanded sums."""
-
-    def excess(u: float) -> float:
-        return float(np.log(np.abs(loop.open_loop(1j * math.exp(u), c1, c2))))
-
-    # Not past the next null of an arm.
-    span = min(0.01 / loop.longest_delay, 0.5 * omega)
-    for width in (1e-6, 1e-5, 1e-4, 1e-3):
-        low = math.log(max(omega * (1.0 - width), omega - span))
-        high = math.log(min(omega * (1.0 + width), omega + span))
-        if excess(low) * excess(high) < 0.0:
-            return math.exp(brentq(excess, low, high, xtol=1e-14, rtol=1e-14))
-    return omega
 
 
 def _limit_phase(centre: float, radius: float) -> float:
@@ -833,8 +781,7 @@ def margins(
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
     highest = np.inf if free_above is None else positive_number("free_above", free_above)
     _require_stable(loop, c1, c2)
-    modulus, modulus_omega = _smallest(loop, c1, c2, symmetric=False, highest=highest)
-    ratio, _ = _smallest(loop, c1, c2, symmetric=True, highest=highest)
+    (modulus, ratio), (modulus_omega, _) = _smallest(loop, c1, c2, disk=True, highest=highest)
     phase, delay, phase_omega = _phase_and_delay(loop, c1, c2, highest)
     if free_above is None:
         lower, upper, gain_omega = gain_interval(loop, c1, c2)

@@ -15,12 +15,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
-from scipy.optimize import elementwise
 
 from armlock.bounds import last_frequency
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import ComplexArray, FloatArray, IntArray, axis, positive_number
-from armlock.stability import UNCONFINED, CountError, sign_changes, unstable_roots
+from armlock.stability import UNCONFINED, CountError, polished, sign_changes, unstable_roots
 
 #: Parameters this many times the length of the start and the direction are not looked at.
 FARTHEST = 1e9
@@ -137,20 +136,6 @@ class Ray:
         result: ComplexArray = np.where(acts, value / np.where(acts, effect, 1.0), np.nan)
         return result
 
-    def polished(self, omega: FloatArray) -> FloatArray:
-        """Return zeros of Im(D0 / M) next to those that were found on the expanded sums."""
-
-        def excess(w: FloatArray) -> FloatArray:
-            return np.asarray(self.quotient(w).imag)
-
-        low, high = omega * (1.0 - 1e-7), omega * (1.0 + 1e-7)
-        enclosed = excess(low) * excess(high) < 0.0
-        if enclosed.any():
-            ends, exact = (low[enclosed], high[enclosed]), {"xatol": 0.0, "xrtol": 1e-15}
-            omega = omega.copy()
-            omega[enclosed] = elementwise.find_root(excess, ends, tolerances=exact).x
-        return omega
-
     def crossings(
         self,
         stop: float,
@@ -185,8 +170,8 @@ class Ray:
         near = (rough > lowest) & (rough <= stop * (1.0 + 1e-6))
         if first and near.any():
             near &= rough <= rough[near].min() * (1.0 + 1e-6)
-        omega = self.polished(omega[near])
-        change = change[near]
+        omega, change = omega[near], change[near]
+        omega = polished(lambda w: self.quotient(w).imag, omega, (1e-7 * omega,))
         position = self.quotient(omega).real
         kept = np.flatnonzero((position > lowest) & (position <= stop))
         kept = kept[np.argsort(position[kept], kind="stable")]

@@ -12,6 +12,7 @@ y contributes (`count_point`), or no step of the walk can be certified.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import lru_cache, partial
@@ -21,6 +22,7 @@ import mpmath
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
+from scipy.optimize import elementwise
 
 from armlock import contour
 from armlock.bounds import last_frequency
@@ -166,6 +168,28 @@ def sign_changes(
             _NO_POINTS,
         )
     return zeros[:, contour.OMEGA], zeros[:, contour.JUMP].astype(np.int64)
+
+
+def polished(
+    function: Callable[[FloatArray], FloatArray],
+    omega: FloatArray,
+    reaches: Iterable[FloatArray],
+) -> FloatArray:
+    """Zeros of a function next to those that `sign_changes` found on the expanded sums.
+
+    Each is looked for within the first of the reaches around it over which the sign changes,
+    and stays as it is where there is none.
+    """
+    omega, left = omega.copy(), np.arange(omega.size)
+    for reach in reaches:
+        low, high = omega[left] - reach[left], omega[left] + reach[left]
+        enclosed = function(low) * function(high) < 0.0
+        if enclosed.any():
+            ends, exact = (low[enclosed], high[enclosed]), {"xatol": 0.0, "xrtol": 1e-15}
+            found = elementwise.find_root(function, ends, tolerances=exact)
+            omega[left[enclosed]] = found.x
+        left = left[~enclosed]
+    return omega
 
 
 def _count(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -> IntArray:

@@ -76,7 +76,7 @@ def test_modulus_and_disk_margin_against_brute_force(name):
         if np.isfinite(found.modulus_omega):
             there = abs(1.0 + loop.open_loop(1j * found.modulus_omega, c1, c2))
             assert there == pytest.approx(found.modulus, rel=1e-9)
-    assert modulus_margin(loop, c1, c2) == found.modulus
+    assert modulus_margin(loop, c1, c2) == pytest.approx(found.modulus, rel=1e-9)
 
 
 def test_the_limit_of_a_neutral_loop_is_that_of_its_chain():
