@@ -128,14 +128,19 @@ def _limit_disc(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
     return (b1 + b2) / r, arms
 
 
-def _limit(loop: Loop, c1: float, c2: float, symmetric: bool) -> float:
-    """Distance of L from -1 at high frequency, see `armlock.infimum.excluded_disc`."""
+def _limit(loop: Loop, c1: float, c2: float) -> FloatArray:
+    """Margins of the disc that L fills at high frequency, see `infimum.free_margins_at`.
+
+    Raises
+    ------
+    CountError
+        If it holds -1: the neutral root chain is not confined.
+    """
     centre, radius = _limit_disc(loop, c1, c2)
-    if not symmetric:
-        return abs(1.0 + centre) - radius
-    # A circle around a real centre becomes one; its real points are nearest and farthest.
-    ends = [point for point in (centre - radius, centre + radius) if point != 1.0]
-    return min(abs(1.0 + point) / abs(1.0 - point) for point in ends)
+    found: FloatArray = infimum.free_margins_at(complex(centre), radius, np.inf)
+    if not found[infimum.MODULUS] > 0.0:
+        raise _unconfined(c1, c2)
+    return found
 
 
 def _arm_weights(loop: Loop, c1: float, c2: float) -> FloatArray:
@@ -236,9 +241,7 @@ def _smallest(
 
     That is inf where it is the limit.
     """
-    best = np.array([_limit(loop, c1, c2, symmetric) for symmetric in (False, True)])
-    if not best.min() > 0.0:
-        raise _unconfined(c1, c2)
+    best = _limit(loop, c1, c2)[:2]
     best[infimum.RATIO] = min(best[infimum.RATIO], 1.0) if disk else 0.0
     where = np.full(2, np.inf)
 
@@ -393,7 +396,7 @@ def _phase_and_delay(
     c, arms = _plus(loop.b1, loop.b2), _arm_weights(loop, c1, c2)
     end = last_larger(loop.rest, (c, loop.b1, loop.b2), np.array([1.0, *arms]))
     if not np.isfinite(end) and not np.isfinite(highest):
-        phase, delay, where = _limit_phase(*_limit_disc(loop, c1, c2)), 0.0, np.inf
+        phase, delay, where = float(_limit(loop, c1, c2)[infimum.PHASE]), 0.0, np.inf
         end = _settled_from(loop, c1, c2, phase)
     end, turn = min(end, highest), 2.0 * np.pi / loop.longest_delay
     first = min(end, 1e3 * turn)
@@ -450,20 +453,6 @@ def _least_lags(
     return float(nearest[worst]), float(np.min(lag / at)), float(at[worst])
 
 
-def _limit_phase(centre: float, radius: float) -> float:
-    """Smallest phase margin on the part of the unit circle inside a disc; inf if there is none.
-
-    The unit circle enters the disc at the angles with cos = (1 + centre^2 - radius^2) / (2
-    centre).
-    """
-    if centre == 0.0:
-        return 0.0 if radius >= 1.0 else np.inf
-    cosine = (1.0 + centre * centre - radius * radius) / (2.0 * centre)
-    if abs(cosine) > 1.0:
-        return np.inf
-    return math.pi - math.acos(cosine)
-
-
 def _settled_from(loop: Loop, c1: float, c2: float, phase: float) -> float:
     """Frequency past which no phase margin of a neutral loop is below a number.
 
@@ -471,8 +460,13 @@ def _settled_from(loop: Loop, c1: float, c2: float, phase: float) -> float:
     does not come closer to -1, by more than the share TOLERANCE.
     """
     centre, radius = _limit_disc(loop, c1, c2)
+
+    def nearby(near: float) -> float:
+        limit = infimum.free_margins_at(complex(centre), radius + near, np.inf)
+        return float(limit[infimum.PHASE])
+
     near = 1e-3
-    while _limit_phase(centre, radius + near) < (1.0 - TOLERANCE) * phase and near > 1e-12:
+    while nearby(near) < (1.0 - TOLERANCE) * phase and near > 1e-12:
         near *= 0.1
     shares = [
         float(b[-1] / loop.rest[-1]) if b.size == loop.rest.size else 0.0
@@ -673,10 +667,8 @@ def _free_margins(
     """
     c = _plus(loop.b1, loop.b2)
     arms = np.array([abs(c1), abs(c2)])
+    limit = _limit(loop, c1, c2)
     centre, radius = _limit_disc(loop, c1, c2)
-    if radius >= abs(1.0 + centre):
-        raise _unconfined(c1, c2)
-    limit = infimum.free_margins_at(complex(centre), radius, np.inf)
     if abs(centre) + radius >= 1.0:
         # L does not roll off: any delay more destabilises it at high frequency.
         limit[infimum.DELAY] = 0.0
