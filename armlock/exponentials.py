@@ -215,9 +215,9 @@ def _from_roots(
     """Expand polynomials about j omega, in powers of u = (change of omega) / reach.
 
     Polynomial k has the highest coefficient leads[k], and its real roots and the upper halves
-    of its pairs are roots[starts[k] : starts[k + 1]]. All are divided by one power of two.
-    Returns the coefficients and their magnitudes, shape (k, LOW_DEGREE + 1), and bounds on what
-    the higher powers add up to where 0 <= u <= 1.
+    of its pairs are roots[starts[k] : starts[k + 1]]. All are divided by one power of two, so
+    that the largest is about one. Returns the coefficients and their magnitudes, shape
+    (k, LOW_DEGREE + 1), and bounds on what the higher powers add up to where 0 <= u <= 1.
     """
     size = LOW_DEGREE + 1
     found = np.zeros((leads.size, size), dtype=np.complex128)
@@ -258,7 +258,8 @@ def _from_roots(
         for m in range(size):
             held += sizes[k, m]
         left_out[k] = max(total - held, 0.0) + factors * EPSILON * total
-        largest = max(largest, exponents[k])
+        if total > 0.0:
+            largest = max(largest, exponents[k] + int(np.floor(np.log2(total))))
     for k in range(leads.size):
         scale = 2.0 ** max(exponents[k] - largest, -1000)
         left_out[k] *= scale
