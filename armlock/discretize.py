@@ -23,6 +23,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
+from scipy.linalg import solve_continuous_lyapunov
 
 from armlock.checks import ComplexArray, FloatArray, positive_number, real_array
 from armlock.compiled import njit
@@ -88,40 +89,6 @@ class SampledSensor(NamedTuple):
     direct: tuple[float, float]
 
 
-def checked_frequency(name: str, value: npt.ArrayLike, highest: float, unit: str) -> FloatArray:
-    """Return frequencies from zero up to a highest one, which rounding may exceed.
-
-    Parameters
-    ----------
-    name : str
-        What messages call them.
-    value : array_like of float
-        The frequencies.
-    highest : float
-        The last one that makes sense; it may be infinite.
-    unit : str
-        Of both, for messages.
-
-    Returns
-    -------
-    float array, shaped like `value`
-
-    Raises
-    ------
-    TypeError, ValueError
-        If one is not real and finite, negative, or too high.
-    """
-    frequency = real_array(name, value)
-    for wrong in frequency[(frequency < 0.0) | (frequency > highest * (1.0 + 1e-12))]:
-        end = (
-            ""
-            if math.isinf(highest)
-            else f" and at most {highest} {unit}, half the sample rate"
-        )
-        raise ValueError(f"{name} must not be negative{end}, got {wrong}")
-    return np.asarray(np.minimum(frequency, highest))
-
-
 def warped(omega: npt.ArrayLike, sample_rate: float) -> FloatArray:
     r"""Frequency at which a continuous system responds as the sampled one does at `omega`.
 
@@ -134,8 +101,8 @@ def warped(omega: npt.ArrayLike, sample_rate: float) -> FloatArray:
     Parameters
     ----------
     omega : array_like of float
-        In rad/s, from zero up to pi times the sample rate, where the result is infinite but
-        for rounding.
+        In rad/s. At pi times the sample rate the result is infinite but for rounding, and past
+        it that of the frequency it is an alias of.
     sample_rate : float
         In Hz.
 
@@ -147,12 +114,10 @@ def warped(omega: npt.ArrayLike, sample_rate: float) -> FloatArray:
     Raises
     ------
     TypeError, ValueError
-        If a frequency is not finite and real, negative, or above half the sample rate.
+        If a frequency is not finite and real, or the sample rate not positive.
     """
     rate = positive_number("sample_rate", sample_rate)
-    omega = checked_frequency("omega", omega, math.pi * rate, "rad/s")
-    # Rounding must not carry the tangent beyond its pole.
-    return np.asarray(2.0 * rate * np.tan(np.minimum(0.5 * omega / rate, 0.5 * math.pi)))
+    return np.asarray(2.0 * rate * np.tan(0.5 * real_array("omega", omega) / rate))
 
 
 def sampled_filter(controller: Controller, sample_rate: float) -> SampledFilter:
@@ -197,10 +162,6 @@ def sampled_filter(controller: Controller, sample_rate: float) -> SampledFilter:
             f"{poles.size}"
         )
     half = 0.5 / positive_number("sample_rate", sample_rate)
-    if (half * np.append(zeros, poles) == 1.0).any():
-        raise ValueError(
-            f"sample_rate must not be half a pole or zero in rad/s, got {sample_rate}"
-        )
     at_infinity = poles.size - zeros.size
     factors = np.append(1.0 - half * zeros, np.full(at_infinity, half)) / (1.0 - half * poles)
     finite = 2.0 * half * zeros / (1.0 - half * zeros)
@@ -256,12 +217,7 @@ def stationary_root(sampled: SampledFilter) -> FloatArray:
     -------
     float array, shape (order, order)
         A lower triangular R: the states' covariance is R R^T where the input's variance is
-        one. States that depend on those before them have zeros on its diagonal.
-
-    Raises
-    ------
-    ValueError
-        If the covariance exceeds what floats hold.
+        one.
     """
     n = 2 * len(sampled.sections)
     change, drive, carried = np.zeros((n, n)), np.zeros(n), np.zeros(n)
@@ -271,29 +227,13 @@ def stationary_root(sampled: SampledFilter) -> FloatArray:
         change[here, here] = [[r1, -k], [1.0, r2]]
         carried[here] = t1, t2
     change, drive = change[: sampled.order, : sampled.order], drive[: sampled.order]
-    # P(2 n) = P(n) + A^n P(n) A^n^T for n = 1, 2, 4, ...: sums of squares, so that nothing
-    # cancels; with A^n - 1 in place of A^n, which slow poles need.
-    covariance = np.outer(drive, drive)
-    while True:
-        with np.errstate(over="ignore", invalid="ignore"):
-            half = covariance + change @ covariance
-            total = covariance + half + half @ change.T
-            change = 2.0 * change + change @ change
-        if not np.isfinite(total).all():
-            raise ValueError(
-                "poles must leave a variance that floats can hold, got one too close to the "
-                "imaginary axis; a series that starts at rest does without it, at_rest=True"
-            )
-        if np.array_equal(total, covariance):
-            break
-        covariance = total
-    root = np.zeros_like(covariance)
-    for j in range(len(root)):
-        column = covariance[j:, j] - root[j:, :j] @ root[j, :j]
-        # Less is rounding, where a pole and a zero cancel.
-        if column[0] > 1e-12 * covariance[j, j]:
-            root[j:, j] = column / math.sqrt(column[0])
-    return root
+    # The trapezoidal rule undone: the continuous system whose samples these are.
+    undone = np.linalg.inv(np.eye(sampled.order) + 0.5 * change)
+    noise = undone @ drive
+    covariance = solve_continuous_lyapunov(undone @ change, -np.outer(noise, noise))
+    deviation = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(deviation, deviation)
+    return np.asarray(deviation[:, None] * np.linalg.cholesky(correlation))
 
 
 def sampled_sensor(

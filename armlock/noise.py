@@ -17,15 +17,14 @@ from armlock import paper
 from armlock.checks import (
     FloatArray,
     as_written,
-    check_memory,
     positive_number,
+    real_array,
     whole_number,
 )
 from armlock.compiled import njit
 from armlock.controllers import Controller
 from armlock.discretize import (
     Rows,
-    checked_frequency,
     sampled_filter,
     stationary_root,
     through,
@@ -66,7 +65,7 @@ class ShapedNoise:
     TypeError, ValueError
         If an argument is not finite, complex factors do not come in conjugate pairs, there are
         more zeros than poles, or a pole lies on the imaginary axis or right of it, so that the
-        noise has no density, or so close to it that floats cannot hold the variance.
+        noise has no density.
 
     Notes
     -----
@@ -128,7 +127,7 @@ class ShapedNoise:
         Parameters
         ----------
         frequency : array_like of float
-            In Hz, not negative.
+            In Hz.
 
         Returns
         -------
@@ -137,15 +136,14 @@ class ShapedNoise:
         Raises
         ------
         TypeError, ValueError
-            If a frequency is negative, or not finite and real.
+            If a frequency is not finite and real.
         """
-        frequency = checked_frequency("frequency", frequency, math.inf, "Hz")
-        return self._density(2.0 * np.pi * frequency)
+        return self._density(2.0 * np.pi * real_array("frequency", frequency))
 
     def sampled_asd(self, frequency: npt.ArrayLike) -> FloatArray:
-        """Density of the samples in closed form, up to half the sample rate; see `asd`."""
-        frequency = checked_frequency("frequency", frequency, 0.5 * self.sample_rate, "Hz")
-        return self._density(warped(2.0 * np.pi * frequency, self.sample_rate))
+        """Density of the samples in closed form; see `asd`."""
+        omega = 2.0 * np.pi * real_array("frequency", frequency)
+        return self._density(warped(omega, self.sample_rate))
 
     def _density(self, omega: FloatArray) -> FloatArray:
         return np.asarray(np.abs(self._filter(1j * omega)))
@@ -165,10 +163,9 @@ class ShapedNoise:
         Raises
         ------
         ValueError
-            If `samples` is not a whole number, negative, or more than memory holds.
+            If `samples` is not a whole number, or negative.
         """
         count = whole_number("samples", samples, 0)
-        check_memory("samples", (count,), 8)
         series = self._scale * self._random.standard_normal(count)
         _shape(series, self._sampled.gain, self._sampled.sections, self._state)
         return series
@@ -285,8 +282,9 @@ class LaserNoise(ShapedNoise):
 
     def asd(self, frequency: npt.ArrayLike) -> FloatArray:
         """Prescribed density; see `ShapedNoise.asd`."""
-        frequency = checked_frequency("frequency", frequency, math.inf, "Hz")
-        return np.asarray(self.level / np.hypot(frequency, self.cutoff))
+        return np.asarray(
+            self.level / np.hypot(real_array("frequency", frequency), self.cutoff)
+        )
 
 
 class PerturbationNoise(ShapedNoise):

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import math
 import os
-import secrets
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import BinaryIO
@@ -29,26 +28,20 @@ import numpy.typing as npt
 from armlock.checks import (
     ComplexArray,
     FloatArray,
-    check_memory,
     finite_series,
+    positive_array,
     positive_number,
     real_number,
     whole_number,
 )
 from armlock.compiled import njit
-from armlock.discretize import (
-    SampledFilter,
-    SampledSensor,
-    checked_frequency,
-    sampled_loop,
-    warped,
-)
-from armlock.loops import Loop
+from armlock.discretize import SampledFilter, SampledSensor, sampled_loop, warped
+from armlock.loops import Loop, checked_loop
 
-#: Order of the Lagrange interpolation for delays that are not whole samples.
+#: Order of the Lagrange interpolation for delays that are not whole samples: odd.
 INTERPOLATION_ORDER = 7
-#: Samples that are computed at a time, of all runs; results do not depend on it.
-BLOCK = 1 << 16
+#: Samples that are computed at a time; results do not depend on it.
+BLOCK = 1 << 14
 #: Runs of an ensemble that go side by side. Fewer than half as many go one by one.
 LANES = 32
 #: The output counts as diverged when it exceeds the largest input so far by this factor.
@@ -100,10 +93,10 @@ class DivergenceError(ArithmeticError):
         return type(self), (self.time, self.detected, self.output)
 
 
-def lagrange_delay(name: str, tau: float, sample_rate: float, order: int) -> Delay:
+def lagrange_delay(name: str, tau: float, sample_rate: float) -> Delay:
     r"""Return the weights of a delay, a single one where it is whole samples.
 
-    Otherwise they are those of Lagrange's polynomial of order m,
+    Otherwise they are those of Lagrange's polynomial of order m, `INTERPOLATION_ORDER`,
 
     .. math::
 
@@ -119,8 +112,6 @@ def lagrange_delay(name: str, tau: float, sample_rate: float, order: int) -> Del
         Delay in s, zero included.
     sample_rate : float
         In Hz.
-    order : int
-        Odd order of the polynomial through the nearest samples.
 
     Returns
     -------
@@ -141,42 +132,49 @@ def lagrange_delay(name: str, tau: float, sample_rate: float, order: int) -> Del
     """
     samples = tau * sample_rate
     whole = round(samples)
-    half = (order + 1) // 2
+    half = (INTERPOLATION_ORDER + 1) // 2
     first = math.floor(samples) - half + 1
     if tau == 0.0 or (whole > 0 and abs(samples - whole) <= _WHOLE):
         return whole, (1.0,)
     if first < 1:
         raise ValueError(
-            f"sample_rate must be at least {half / tau} Hz to interpolate {name} = {tau} s to "
-            f"order {order}, or a multiple of {1.0 / tau} Hz, got {sample_rate}"
+            f"sample_rate must be at least {half / tau} Hz to interpolate {name} = {tau} s, "
+            f"or a multiple of {1.0 / tau} Hz, got {sample_rate}"
         )
     x = samples - first
-    nodes = range(order + 1)
+    nodes = range(INTERPOLATION_ORDER + 1)
     weights = [math.prod((x - j) / (k - j) for j in nodes if j != k) for k in nodes]
     return first, tuple(weights)
 
 
+def _sampled_delays(loop: Loop, sample_rate: float) -> tuple[Delay, Delay, Delay]:
+    """Return the delays of both arms and the dead time, or say why they have no samples."""
+    tau1, tau2, dead = (
+        lagrange_delay(name, getattr(loop, name), sample_rate)
+        for name in ("tau1", "tau2", "delay")
+    )
+    return tau1, tau2, dead
+
+
 @njit(cache=True)
-def _late(signal: FloatArray, at: int, lanes: int, delay: Delay) -> float:
-    """Return a signal as it was a delay before the sample at this place."""
+def _late(signal: FloatArray, row: int, column: int, delay: Delay) -> float:
+    """Return a column of a signal as it was a delay before a row."""
     first, weights = delay
     value = 0.0
     for k in range(len(weights)):
-        value += weights[k] * signal[np.uintp(at - (first + k) * lanes)]
+        value += weights[k] * signal[np.uintp(row - first - k), column]
     return value
 
 
 @njit(cache=True, nogil=True)
 def _advance(
     lanes: tuple[int, ...],
+    first: int,
     phi: FloatArray,
     sent: FloatArray,
-    start: int,
     noise: FloatArray,
     c1: FloatArray,
     c2: FloatArray,
-    strides: tuple[int, int, int],
-    count: int,
     delays: tuple[Delay, Delay, Delay],
     sensor: SampledSensor,
     controller: SampledFilter,
@@ -184,24 +182,26 @@ def _advance(
     limit: float,
     done: int,
 ) -> int:
-    """Compute `count` samples of phi, and of what the controller sends, behind `start` others.
+    """Compute the last rows of phi, and of what the controller sends, from those before.
 
-    Runs go side by side in lanes, so that one instruction works on several of them; the length
-    of `lanes` is their number, for the compiler to know. phi and sent hold all lanes of one
-    sample, then those of the next; in noise, c1 and c2 the next sample is `strides` further on.
+    Arrays hold a sample in each row and a run in each column; of c1 and c2 a single row is for
+    all samples. The runs from column `first` on go side by side in lanes, so that one
+    instruction works on several of them; the length of `lanes` is their number, for the
+    compiler to know.
 
     `delays` are those of both arms and the dead time. `work` holds, each for all lanes: the
     states of sensor and controller; what they send with the next sample if no input comes; for
     one sample the light of both arms, the input, and the output; the largest input so far, and
     the number of the last output not above it. Returns the index of the sample at which an
-    output exceeds `limit` times the largest input, or -1.
+    output exceeds `limit` times the largest input, or how many there are.
     """
     arm1, arm2, dead = delays
     rows, sections, gain = sensor.states, controller.sections, controller.gain
     m, n, size = len(rows), len(sections), len(lanes)
     # Unsigned, because a negative index would count from the end, which takes time to check.
-    rest = np.uintp((m + 2 * n) * size)
+    # One array, because the compiler would have to check that several do not overlap.
     row = np.uintp(size)
+    rest = np.uintp((m + 2 * n) * size)
     light1 = rest + row
     light2 = light1 + row
     free = light2 + row
@@ -217,37 +217,28 @@ def _advance(
     now1, now2, next1, next2 = gain * direct1, gain * direct2, gain * next1, gain * next2
     implicit = dead[0] == 0
     inverse = 1.0 / (1.0 + now1 + now2)
-    for i in range(count):
-        now = start + i
-        at0, at1, at2 = i * strides[0], i * strides[1], i * strides[2]
+    varies1, varies2 = len(c1) > 1, len(c2) > 1
+    for i in range(len(noise)):
+        now = len(phi) - len(noise) + i
+        at, at1, at2 = np.uintp(i), np.uintp(i * varies1), np.uintp(i * varies2)
         for w in range(size):
-            late = _late(phi, now * size + w, size, arm1)
-            work[light1 + np.uintp(w)] = c1[np.uintp(at1 + w)] * late
-        for w in range(size):
-            late = _late(phi, now * size + w, size, arm2)
-            work[light2 + np.uintp(w)] = c2[np.uintp(at2 + w)] * late
-        for w in range(size):
-            work[free + np.uintp(w)] = noise[np.uintp(at0 + w)]
-        if not implicit:
-            for w in range(size):
-                work[output + np.uintp(w)] = _late(sent, now * size + w, size, dead)
-        place = np.uintp(now * size)
-        if not implicit:
-            for w in range(size):
-                lane = np.uintp(w)
-                x = work[free + lane] - work[output + lane]
-                u1, u2 = x - work[light1 + lane], x - work[light2 + lane]
-                sent[place + lane] = work[rest + lane] + (now1 * u1 + now2 * u2)
-        for w in range(size):
-            lane = np.uintp(w)
-            a1, a2 = work[light1 + lane], work[light2 + lane]
+            lane, column = np.uintp(w), np.uintp(first + w)
+            a1 = c1[at1, column] * _late(phi, now, column, arm1)
+            a2 = c2[at2, column] * _late(phi, now, column, arm2)
+            x = noise[at, column]
+            work[free + lane] = x
             if implicit:
                 # phi = noise - rest - now1 (phi - a1) - now2 (phi - a2), solved for phi.
-                x = (work[free + lane] + (now1 * a1 + now2 * a2) - work[rest + lane]) * inverse
+                x = (x + (now1 * a1 + now2 * a2) - work[rest + lane]) * inverse
             else:
-                x = work[free + lane] - work[output + lane]
-            work[output + lane] = x
-            u1, u2 = x - a1, x - a2
+                x -= _late(sent, now, column, dead)
+                sending = now1 * (x - a1) + now2 * (x - a2)
+                sent[np.uintp(now), column] = work[rest + lane] + sending
+            work[light1 + lane], work[light2 + lane], work[output + lane] = a1, a2, x
+        for w in range(size):
+            lane = np.uintp(w)
+            x = work[output + lane]
+            u1, u2 = x - work[light1 + lane], x - work[light2 + lane]
             # The states move on; what they send next does not wait for what u1 and u2 do.
             top, below, ready = work[np.uintp((m - 1) * size) + lane], 0.0, 0.0
             for j in range(m):
@@ -268,8 +259,6 @@ def _advance(
                 v += t1 * w1 + t2 * w2
                 work[state], work[state + row] = new1 + direct, new2
             work[rest + lane] = gain * ready + (next1 * u1 + next2 * u2)
-        for w in range(size):
-            phi[place + np.uintp(w)] = work[output + np.uintp(w)]
         number, exceeded = float(done + i), 0
         for w in range(size):
             lane = np.uintp(w)
@@ -279,51 +268,29 @@ def _advance(
             work[most + lane] = largest
             work[calm + lane] = number if amount <= largest else work[calm + lane]
             exceeded += 0 if amount <= limit * largest else 1
+        for w in range(size):
+            phi[np.uintp(now), np.uintp(first + w)] = work[output + np.uintp(w)]
         if exceeded:
             return i
-    return -1
-
-
-def _checked(
-    loop: Loop, sample_rate: float, interpolation: int
-) -> tuple[float, tuple[Delay, Delay, Delay]]:
-    """Return sample rate and delays of a loop that can be simulated, or raise."""
-    if not isinstance(loop, Loop):
-        raise TypeError(f"loop must be an armlock.Loop, got {type(loop).__name__}")
-    rate = positive_number("sample_rate", sample_rate)
-    order = whole_number("interpolation", interpolation, 1)
-    if order % 2 == 0:
-        raise ValueError(f"interpolation must be an odd integer, got {order}")
-    roots = (
-        *loop.controller.zeros,
-        *loop.controller.poles,
-        *np.roots(loop.mapping.denominator[::-1]),
-    )
-    # Beyond twice the sample rate the trapezoidal rule moves them across infinity.
-    fastest = max((root.real for root in roots if root.imag == 0.0), default=0.0)
-    if rate <= fastest / 2.0:
-        raise ValueError(
-            f"sample_rate must exceed {fastest / 2.0} Hz, half of the loop's fastest real pole "
-            f"or zero in the right half-plane, in rad/s, got {rate}"
-        )
-    tau1, tau2, dead = (
-        lagrange_delay(name, getattr(loop, name), rate, order)
-        for name in ("tau1", "tau2", "delay")
-    )
-    return rate, (tau1, tau2, dead)
+    return len(noise)
 
 
 def _series(name: str, value: npt.ArrayLike, like: FloatArray) -> FloatArray:
-    """Return c1 or c2, a finite number or a series, with the shape of the noise."""
-    if not isinstance(value, Sequence) and np.ndim(value) == 0:
-        return np.broadcast_to(real_number(name, value), like.shape)
-    array = finite_series(name, value, like.ndim)
-    if array.shape != like.shape:
+    """Return c1 or c2, a number or shaped like the noise, with a sample in each row."""
+    array = finite_series(name, value, 0, like.ndim)
+    if array.shape not in ((), like.shape):
         raise ValueError(
             f"{name} must be a number or have the shape of noise, {like.shape}; got "
             f"{array.shape}"
         )
-    return array
+    return np.atleast_2d(array).T
+
+
+def _in_columns(series: FloatArray, number: int) -> FloatArray:
+    """Return samples in rows, as compiled code takes them, the last run repeated at the end."""
+    if series.shape[1] < number:
+        series = series[:, np.minimum(np.arange(number), series.shape[1] - 1)]
+    return np.require(series, requirements=["C", "W"])
 
 
 def sampled_open_loop(
@@ -332,8 +299,6 @@ def sampled_open_loop(
     c1: float = 1.0,
     c2: float = 1.0,
     sample_rate: float = 200.0,
-    *,
-    interpolation: int = INTERPOLATION_ORDER,
 ) -> ComplexArray:
     r"""Open loop of what is simulated, in closed form.
 
@@ -359,13 +324,11 @@ def sampled_open_loop(
     loop : Loop
         The loop.
     omega : array_like of float
-        In rad/s, positive and at most pi times the sample rate.
+        In rad/s, positive.
     c1, c2 : float, optional
         Constant perturbations.
     sample_rate : float, optional
         In Hz.
-    interpolation : int, optional
-        As for `Simulation`.
 
     Returns
     -------
@@ -375,8 +338,8 @@ def sampled_open_loop(
     Raises
     ------
     TypeError, ValueError
-        If a frequency is not finite and real, not positive, or above half the sample rate,
-        or `Simulation` would refuse the sample rate for the loop's delays, poles and zeros.
+        If a frequency is not finite, real and positive, or the sample rate is too low for a
+        delay, as for `Simulation`.
 
     Examples
     --------
@@ -388,13 +351,10 @@ def sampled_open_loop(
     >>> bool(np.allclose(sampled_open_loop(loop, omega), loop.open_loop(1j * omega), rtol=1e-5))
     True
     """
-    rate, delays = _checked(loop, sample_rate, interpolation)
+    rate = positive_number("sample_rate", sample_rate)
+    delays = _sampled_delays(checked_loop(loop), rate)
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
-    omega = checked_frequency("omega", omega, math.pi * rate, "rad/s")
-    if not omega.all():
-        raise ValueError(
-            "omega must be positive, got 0.0: controller or sensor has a pole there"
-        )
+    omega = positive_array("omega", omega)
     late1, late2, dead = (
         np.exp(-1j * omega[..., None] * (first + np.arange(len(weights))) / rate) @ weights
         for first, weights in delays
@@ -417,12 +377,9 @@ class Simulation:
     history : float or array_like, optional
         The locked laser's noise before the first sample, the latest value last: a constant,
         or at least `history_samples` values. Controller and sensor start at rest.
-    interpolation : int, optional
-        Odd order of the polynomial by which delays that are not whole samples are
-        interpolated. Whole ones are exact.
     limit : float, optional
         The run counts as diverged when the output exceeds the largest input so far by this
-        factor, one at least.
+        factor.
     draws : int, optional
         Runs an ensemble of so many, side by side: noise, c1 and c2 have a row for each.
 
@@ -437,8 +394,7 @@ class Simulation:
     ------
     TypeError, ValueError
         If `loop` is no loop, the sample rate is too low for its delays (the dead time
-        included), its poles and zeros, or its feedback at high frequency, or the history is
-        too short, not finite, or longer than memory holds.
+        included), or the history is too short or not finite.
 
     Notes
     -----
@@ -481,70 +437,50 @@ class Simulation:
         sample_rate: float = 200.0,
         *,
         history: npt.ArrayLike = 0.0,
-        interpolation: int = INTERPOLATION_ORDER,
         limit: float = LIMIT,
         draws: int | None = None,
     ) -> None:
-        self.sample_rate, self._delays = _checked(loop, sample_rate, interpolation)
-        self.loop, self.interpolation = loop, interpolation
+        self.loop = checked_loop(loop)
+        self.sample_rate = positive_number("sample_rate", sample_rate)
         self.limit = positive_number("limit", limit)
-        if self.limit < 1.0:
-            raise ValueError(f"limit must be at least 1, got {self.limit}")
+        self.draws = None if draws is None else whole_number("draws", draws, 1)
+        self._delays = _sampled_delays(loop, self.sample_rate)
         self._sensor, self._controller = sampled_loop(
             loop.controller, loop.mapping, self.sample_rate
         )
-        self._check_closure()
         self.history_samples = max(first + len(weights) - 1 for first, weights in self._delays)
-        self.draws = None if draws is None else whole_number("draws", draws, 1)
-        runs = self.draws or 1
-        check_memory("history", (self.history_samples, runs), 16)
-        before = self._checked_history(history)
-        self._runs: list[_Lanes] = []
-        for first in range(0, runs, LANES):
-            # The last ones may be few, and are then faster one by one.
-            left = min(runs - first, LANES)
-            lanes, step = (1, 1) if 2 * left < LANES else (LANES, left)
-            for at in range(first, first + left, step):
-                self._runs.append(_Lanes(slice(at, at + step), lanes, self, before))
+        before = finite_series("history", history, 0, 1)
+        if before.ndim and before.size < self.history_samples:
+            raise ValueError(
+                f"history must hold at least {self.history_samples} samples, as far as the "
+                f"longest delay reaches, got {before.size}"
+            )
+        full, left = divmod(self.draws or 1, LANES)
+        # The last runs may be few, and are then faster one by one.
+        groups = [LANES] * full + ([1] * left if 2 * left < LANES else [LANES])
+        # See `_advance`: behind the states, five rows, the largest input, the last calm sample.
+        rows = len(self._sensor.states) + 2 * len(self._controller.sections) + 7
+        self._groups = [np.zeros((rows, lanes)) for lanes in groups]
+        # As far back as delays reach, the output, and what the controller has sent; without a
+        # dead time nothing is read of that.
+        self._past = np.zeros((2 if loop.delay else 1, self.history_samples, sum(groups)))
+        self._past[0] = before[-self.history_samples :, None] if before.ndim else before
+        for work in self._groups:
+            work[-2] = np.abs(self._past).max()
         self._stopped: tuple[float, float] | None = None
         self.samples = 0
 
     def __repr__(self) -> str:
         """Name the arguments, and how far the run has come."""
         return (
-            f"Simulation({self.loop!r}, sample_rate={self.sample_rate}, "
-            f"interpolation={self.interpolation}, limit={self.limit}; {self.samples} samples)"
+            f"Simulation({self.loop!r}, sample_rate={self.sample_rate}, limit={self.limit}; "
+            f"{self.samples} samples)"
         )
 
     @property
     def time(self) -> float:
         """How far the run has come, in s."""
         return self.samples / self.sample_rate
-
-    def _check_closure(self) -> None:
-        """Refuse a loop whose feedback changes sign between the sample rate and infinity."""
-        if self.loop.delay > 0.0:
-            return
-        controller, mapping = self.loop.controller, self.loop.mapping
-        excess = len(controller.poles) + len(mapping.denominator) - len(controller.zeros)
-        highest = [n[-1] for n in (mapping.numerator1, mapping.numerator2) if len(n) == excess]
-        at_infinity = 1.0 + controller.gain * sum(highest) / mapping.denominator[-1]
-        if (1.0 + self._controller.gain * sum(self._sensor.direct)) * at_infinity <= 0.0:
-            raise ValueError(
-                f"sample_rate must be higher for this loop, got {self.sample_rate}: 1 + L "
-                f"without delays changes sign beyond it, a root that samples cannot show"
-            )
-
-    def _checked_history(self, history: npt.ArrayLike) -> float | FloatArray:
-        if not isinstance(history, Sequence) and np.ndim(history) == 0:
-            return real_number("history", history)
-        array = finite_series("history", history)
-        if array.size < self.history_samples:
-            raise ValueError(
-                f"history must hold at least {self.history_samples} samples, as far as the "
-                f"longest delay reaches, got {array.size}"
-            )
-        return array[array.size - self.history_samples :]
 
     def advance(
         self, noise: npt.ArrayLike, c1: npt.ArrayLike = 1.0, c2: npt.ArrayLike = 1.0
@@ -573,105 +509,52 @@ class Simulation:
         given = finite_series("noise", noise, 1 if self.draws is None else 2)
         if self.draws not in (None, len(given)):
             raise ValueError(f"noise must have {self.draws} rows, got shape {given.shape}")
-        return self._advance(given, c1, c2)
-
-    def _advance(self, given: FloatArray, c1: npt.ArrayLike, c2: npt.ArrayLike) -> FloatArray:
-        """Compute the next block, of noise that is checked."""
-        inputs = given, _series("c1", c1, given), _series("c2", c2, given)
-        if self._stopped is not None:
-            raise DivergenceError(*self._stopped, np.empty((*given.shape[:-1], 0)))
-        rows = [np.atleast_2d(series) for series in inputs]
-        output = np.empty_like(rows[0])
-        stops = [
-            run.advance(self, *(r[run.rows] for r in (*rows, output))) for run in self._runs
-        ]
-        stop, calm = min(stops)
-        shaped = output.reshape(given.shape)
-        if stop < given.shape[-1]:
-            self.samples += stop
-            self._stopped = calm / self.sample_rate, self.time
-            # A copy, so that the error does not hold all the memory of the run.
-            raise DivergenceError(*self._stopped, shaped[..., :stop].copy())
-        self.samples += given.shape[-1]
+        inputs = [np.atleast_2d(given).T, _series("c1", c1, given), _series("c2", c2, given)]
+        output, begin = np.empty(inputs[0].shape), self.samples
+        shaped = output[:, 0] if self.draws is None else output.T
+        for at in range(0, len(output), BLOCK):
+            part = slice(at, at + BLOCK)
+            if self._stopped is None:
+                self._fill(output[part], *(s[part] if len(s) > 1 else s for s in inputs))
+            if self._stopped is not None:
+                # A copy, so that the error does not hold all the memory of the run.
+                until = shaped[..., : self.samples - begin].copy()
+                raise DivergenceError(*self._stopped, until)
         return shaped
 
-
-class _Lanes:
-    """Some runs of a simulation, side by side, and where they are."""
-
-    def __init__(
-        self, rows: slice, lanes: int, run: Simulation, history: float | FloatArray
+    def _fill(
+        self, output: FloatArray, noise: FloatArray, c1: FloatArray, c2: FloatArray
     ) -> None:
-        self.rows, self.lanes = rows, lanes
-        self.past = run.history_samples
-        # Some times as long as the past, which each block moves.
-        self.block = max(BLOCK // lanes, 4 * self.past)
-        # The output, and what the controller sends: each with its past in front.
-        self.phi = np.zeros((self.past + self.block, lanes))
-        self.sent = np.zeros_like(self.phi)
-        self.phi[: self.past] = np.reshape(history, (-1, 1))
-        numbers = len(run._sensor.states) + 2 * len(run._controller.sections)
-        # See `_advance`: behind the states, five rows, the largest input, the last calm sample.
-        self.work = np.zeros((numbers + 7, lanes))
-        self.work[-2] = np.abs(self.phi[: self.past]).max()
-
-    def advance(
-        self,
-        run: Simulation,
-        noise: FloatArray,
-        c1: FloatArray,
-        c2: FloatArray,
-        output: FloatArray,
-    ) -> tuple[int, float]:
-        """Fill a part of the output; return where it stops, and the last calm sample before."""
-        done = run.samples
-        for at in range(0, noise.shape[1], self.block):
-            count = min(self.block, noise.shape[1] - at)
-            parts = (series[:, at : at + count] for series in (noise, c1, c2))
-            block, strides = zip(*map(self._interleaved, parts), strict=True)
-            stop = _advance(
-                (0,) * self.lanes,
-                self.phi.ravel(),
-                self.sent.ravel(),
-                self.past,
-                *block,
-                strides,
-                count,
-                run._delays,
-                run._sensor,
-                run._controller,
-                self.work.ravel(),
-                run.limit,
-                done + at,
+        """Compute the next samples, each in a row, unless the run stops before."""
+        kinds, past, columns = self._past.shape
+        signals = np.empty((kinds, past + len(output), columns))
+        signals[:, :past] = self._past
+        inputs = [_in_columns(series, columns) for series in (noise, c1, c2)]
+        first, stop = 0, len(output)
+        for work in self._groups:
+            lanes = work.shape[1]
+            end = _advance(
+                (0,) * lanes,
+                first,
+                signals[0],
+                signals[-1],
+                *inputs,
+                self._delays,
+                self._sensor,
+                self._controller,
+                work.ravel(),
+                self.limit,
+                self.samples,
             )
-            count = count if stop < 0 else stop
-            new = self.phi[self.past : self.past + count, : len(output)]
-            output[:, at : at + count] = new.T
-            if stop >= 0:
-                size = np.abs(self.phi[self.past + stop])
-                left = np.argmin(size <= run.limit * self.work[-2])
-                return at + stop, float(self.work[-1, left])
-            # Without a dead time nothing is read of what was sent before.
-            for signal in (self.phi, self.sent)[: 2 if run.loop.delay else 1]:
-                signal[: self.past] = signal[count : count + self.past]
-        return noise.shape[1], math.inf
-
-    def _interleaved(self, series: FloatArray) -> tuple[FloatArray, int]:
-        """Return an array with the lanes of a sample side by side, and the way to the next one.
-
-        Nothing is copied of an array in Fortran order, and of a single run. A lane without a
-        run of its own repeats the last one.
-        """
-        step, way = (stride // series.itemsize for stride in series.strides)
-        beside = len(series) == self.lanes and (step == 1 or self.lanes == 1)
-        if beside and way > 0 and series.flags.writeable:
-            length = (series.shape[1] - 1) * way + self.lanes
-            flat = np.lib.stride_tricks.as_strided(series, (length,), (series.itemsize,))
-            return flat, way
-        if way == 0:
-            series = series[:, :1]
-        rows = np.minimum(np.arange(self.lanes), len(series) - 1)
-        return np.ascontiguousarray(series[rows].T).ravel(), self.lanes if way else 0
+            if end < stop:
+                size = np.abs(signals[0, past + end, first : first + lanes])
+                calm = work[-1, np.argmin(size <= self.limit * work[-2])]
+                self._stopped = calm / self.sample_rate, (self.samples + end) / self.sample_rate
+                stop = end
+            first += lanes
+        output[:stop] = signals[0, past : past + stop, : output.shape[1]]
+        self._past = signals[:, len(output) :].copy()
+        self.samples += stop
 
 
 def simulate(
@@ -682,7 +565,6 @@ def simulate(
     sample_rate: float = 200.0,
     *,
     history: npt.ArrayLike = 0.0,
-    interpolation: int = INTERPOLATION_ORDER,
     limit: float = LIMIT,
 ) -> FloatArray:
     r"""Run a loop, and return the frequency noise of the locked laser.
@@ -708,8 +590,6 @@ def simulate(
         In Hz.
     history : float or array_like, optional
         Output before the first sample, zero by default; see `Simulation`.
-    interpolation : int, optional
-        Order of interpolation for delays that are not whole samples; see `Simulation`.
     limit : float, optional
         Size of the output, in units of the largest input, that counts as diverged.
 
@@ -736,15 +616,9 @@ def simulate(
     9.9991e-05
     """
     given = finite_series("noise", noise, 1, 2)
-    run = Simulation(
-        loop,
-        sample_rate,
-        history=history,
-        interpolation=interpolation,
-        limit=limit,
-        draws=len(given) if given.ndim == 2 else None,
-    )
-    return run._advance(given, c1, c2)
+    draws = len(given) if given.ndim == 2 else None
+    run = Simulation(loop, sample_rate, history=history, limit=limit, draws=draws)
+    return run.advance(given, c1, c2)
 
 
 def simulate_blocks(
@@ -753,7 +627,6 @@ def simulate_blocks(
     sample_rate: float = 200.0,
     *,
     history: npt.ArrayLike = 0.0,
-    interpolation: int = INTERPOLATION_ORDER,
     limit: float = LIMIT,
 ) -> Iterator[FloatArray]:
     """Run a loop over a stream of blocks; memory does not grow with the duration.
@@ -767,7 +640,7 @@ def simulate_blocks(
         included.
     sample_rate : float, optional
         In Hz.
-    history, interpolation, limit
+    history, limit
         As for `simulate`.
 
     Yields
@@ -788,11 +661,7 @@ def simulate_blocks(
     >>> sum(locked.size for locked in simulate_blocks(paper_loop(), blocks))
     2000
     """
-    run = Simulation(
-        loop, sample_rate, history=history, interpolation=interpolation, limit=limit
-    )
-    if not isinstance(blocks, Iterable):
-        raise TypeError(f"blocks must be an iterable of arrays, got {blocks!r}")
+    run = Simulation(loop, sample_rate, history=history, limit=limit)
     parts = (block if isinstance(block, tuple) else (block,) for block in blocks)
     return (run.advance(*part) for part in parts)
 
@@ -821,9 +690,9 @@ def save_series(path: str | os.PathLike[str], blocks: Iterable[FloatArray]) -> i
 
     Notes
     -----
-    The blocks go to a file of another name in the same folder, which takes this one when the
-    last block is in. If anything stops the run, that file is removed, and what was at `path`
-    before stays. A process that is killed leaves the file, whose name ends in .part.
+    The blocks go to a file whose name ends in .part, in the same folder, which takes the name
+    `path` when the last block is in. If anything stops the run, that file stays, and so does
+    what was at `path` before.
 
     Examples
     --------
@@ -839,24 +708,18 @@ def save_series(path: str | os.PathLike[str], blocks: Iterable[FloatArray]) -> i
     100 (100,)
     """
     path = Path(path)
-    if not isinstance(blocks, Iterable):
-        raise TypeError(f"blocks must be an iterable of arrays, got {blocks!r}")
-    temporary = path.with_name(f"{path.name}.{secrets.token_hex(4)}.part")
+    temporary = path.with_name(f"{path.name}.part")
     count = 0
-    try:
-        with temporary.open("xb") as file:
-            # The header has room for any length: it is written again below.
-            _write_header(file, 0)
-            for number, block in enumerate(blocks):
-                values = finite_series(f"blocks[{number}]", block)
-                file.write(np.ascontiguousarray(values, dtype="<f8").tobytes())
-                count += values.size
-            file.seek(0)
-            _write_header(file, count)
-        temporary.replace(path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
+    with temporary.open("wb") as file:
+        # The header has room for any length: it is written again below.
+        _write_header(file, 0)
+        for number, block in enumerate(blocks):
+            values = finite_series(f"blocks[{number}]", block)
+            file.write(np.ascontiguousarray(values, dtype="<f8").tobytes())
+            count += values.size
+        file.seek(0)
+        _write_header(file, count)
+    temporary.replace(path)
     return count
 
 

@@ -25,7 +25,6 @@ from armlock.checks import (
     finite_series,
     positive_number,
     real_array,
-    whole_number,
 )
 
 if TYPE_CHECKING:
@@ -38,6 +37,8 @@ HOP = SEGMENT // 4
 FACTOR = 4
 #: Probability that a band's confidence interval holds the true density.
 CONFIDENCE = 0.95
+#: Bands a decade.
+BANDS = 12
 #: Bins next to zero that the window's main lobe spoils.
 SPOILED = 8
 
@@ -342,13 +343,8 @@ class SpectrumEstimator:
             given = self._levels[depth].add(given)
             depth += 1
 
-    def spectrum(self, *, bands: int = 12) -> Spectrum:
+    def spectrum(self) -> Spectrum:
         """Return the estimate from what has come in so far.
-
-        Parameters
-        ----------
-        bands : int, optional
-            Bands a decade.
 
         Returns
         -------
@@ -359,9 +355,8 @@ class SpectrumEstimator:
         Raises
         ------
         ValueError
-            If fewer samples than one segment have come in, or `bands` is no positive integer.
+            If fewer samples than one segment have come in.
         """
-        bands = whole_number("bands", bands, 1)
         usable = [level for level in self._levels if level.segments]
         if not usable:
             raise ValueError(
@@ -375,7 +370,7 @@ class SpectrumEstimator:
         for level, slower in zip(usable, [*usable[1:], None], strict=True):
             settled = slower is not None and slower.segments >= _ENOUGH
             first = _TAKEN_OVER if settled else SPOILED
-            rows += _banded(level, np.arange(first, end), bands)
+            rows += _banded(level, np.arange(first, end))
             end = FACTOR * first
         frequency, power, degrees, resolution, count = np.array(sorted(rows)).T
         tail = 0.5 * (1.0 - CONFIDENCE)
@@ -390,10 +385,10 @@ class SpectrumEstimator:
         )
 
 
-def _banded(level: _Level, numbers: IntArray, bands: int) -> list[tuple[float, ...]]:
+def _banded(level: _Level, numbers: IntArray) -> list[tuple[float, ...]]:
     """Average some bins of a level in bands: frequency, power, degrees, width, how many."""
     density = level.density()
-    index = np.floor(bands * np.log10(numbers * level.width))
+    index = np.floor(BANDS * np.log10(numbers * level.width))
     return [
         (
             float(chosen.mean() * level.width),
@@ -406,9 +401,7 @@ def _banded(level: _Level, numbers: IntArray, bands: int) -> list[tuple[float, .
     ]
 
 
-def amplitude_spectrum(
-    series: npt.ArrayLike, sample_rate: float, *, bands: int = 12
-) -> Spectrum:
+def amplitude_spectrum(series: npt.ArrayLike, sample_rate: float) -> Spectrum:
     """Estimate the amplitude spectral density of a series.
 
     Parameters
@@ -417,8 +410,6 @@ def amplitude_spectrum(
         At least 1024 samples.
     sample_rate : float
         In Hz.
-    bands
-        As for `SpectrumEstimator.spectrum`.
 
     Returns
     -------
@@ -440,4 +431,4 @@ def amplitude_spectrum(
     """
     estimator = SpectrumEstimator(sample_rate)
     estimator.add(finite_series("series", series))
-    return estimator.spectrum(bands=bands)
+    return estimator.spectrum()

@@ -116,9 +116,6 @@ def test_poles_at_zero_that_zeros_cancel_leave_no_state(zeros, poles, polynomial
 def test_filters_that_have_no_samples_are_refused():
     with pytest.raises(ValueError, match="more zeros than poles: 2 and 1"):
         sampled_filter(Controller((-1.0, -2.0), (-3.0,), 1.0), RATE)
-    for controller in (Controller([400.0], [-1.0], 1.0), Controller([], [400.0], 1.0)):
-        with pytest.raises(ValueError, match="sample_rate must not be half a pole or zero"):
-            sampled_filter(controller, RATE)
 
 
 def test_states_run_as_the_response_says():
@@ -158,9 +155,3 @@ def test_stationary_states_have_the_covariance_of_white_noise(zeros, poles):
     expected = solve_discrete_lyapunov(matrix, np.outer(drive, drive))
     assert np.array_equal(root, np.tril(root))
     assert root @ root.T == pytest.approx(expected, rel=1e-9)
-
-
-def test_half_the_rate_stands_for_infinity():
-    for rate in (0.3, 7.0, 200.0, 1e5 / 3):
-        assert warped([0.0, np.pi * rate], rate)[0] == 0.0
-        assert warped(np.nextafter(np.pi * rate, np.inf), rate) > 1e15 * rate

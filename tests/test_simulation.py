@@ -1,15 +1,11 @@
 """The loop in time: accuracy, closed form, verdicts, blocks, divergence, bad input."""
 
-import copy
 import pickle
 from itertools import pairwise
-from math import factorial
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
 from scipy.signal import bilinear_zpk, lfilter, zpk2tf
 
 from armlock import (
@@ -29,7 +25,7 @@ from armlock import (
     simulate_blocks,
     unstable_roots,
 )
-from armlock.sensors import COMMON, SINGLE, SignalMapping
+from armlock.sensors import COMMON, SignalMapping
 from armlock.simulation import BLOCK, LANES, lagrange_delay
 from benchmarks.__main__ import main
 from tests.extended import reference
@@ -111,23 +107,6 @@ def test_sampled_loop_tends_to_the_continuous_one():
     assert np.abs(between / whole - 1.0).max() < 1e-4
 
 
-def test_dead_time_delays_what_the_controller_sends():
-    """phi(t) = t^2 - g times the integral of phi up to t - delay, solved step by step."""
-    gain, delay, end = 0.9, 1.1, 8.0
-    loop = Loop(Controller([], [0.0], gain), SINGLE, 20.0, 20.0, delay)
-    errors = []
-    for rate in (20.0, 40.0, 80.0):
-        t = np.arange(round(end * rate)) / rate
-        exact = sum(
-            2.0 * (-gain) ** k * np.maximum(t - k * delay, 0.0) ** (k + 2) / factorial(k + 2)
-            for k in range(8)
-        )
-        errors.append(np.abs(simulate(loop, t**2, 0.0, 0.0, rate) - exact).max())
-    assert errors[0] < 1e-2
-    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.02)
-    assert errors[1] / errors[2] == pytest.approx(4.0, rel=0.02)
-
-
 @pytest.mark.parametrize("dead", [1, 90])
 def test_dead_time_and_moving_arms_against_the_difference_equation(dead):
     """A controller without dynamics; each arm's factor is that of the moment it arrives."""
@@ -143,11 +122,9 @@ def test_dead_time_and_moving_arms_against_the_difference_equation(dead):
     assert relative_error(simulate(loop, noise, c1, c2, rate), phi[past:]) < 1e-12
 
 
-def test_dead_times_that_the_rate_does_not_resolve_are_refused():
+def test_delays_that_the_rate_does_not_resolve_are_refused():
     loop = Loop(Controller([], [-0.1], 0.2), COMMON, 20.1, 19.9, 1e-3)
-    message = (
-        r"sample_rate must be at least 4000\.0 Hz to interpolate delay = 0\.001 s .*, or a"
-    )
+    message = r"sample_rate must be at least 4000\.0 Hz to interpolate delay = 0\.001 s, or a"
     with pytest.raises(ValueError, match=message):
         Simulation(loop, 200.0)
     with pytest.raises(ValueError, match=message):
@@ -183,7 +160,7 @@ def test_streams_give_the_same_bits_and_are_read_one_block_at_a_time():
     noise = LaserNoise(3).draw(BLOCK + 5000)
     c1, c2 = (1.0 + PerturbationNoise(seed).draw(noise.size) for seed in (4, 5))
     whole = simulate(paper_loop(), noise, c1, c2)
-    cuts = [0, 1, 2, 4019, 4020, 9000, BLOCK, noise.size]
+    cuts = [0, 1, 2, 2, 4019, 4020, 9000, BLOCK, noise.size]
     drawn = []
 
     def blocks():
@@ -264,38 +241,6 @@ def test_divergence_does_not_depend_on_blocks():
         run.advance(noise[:10])
 
 
-SHORT = np.zeros(100)
-
-
-def test_rates_too_low_for_the_delays():
-    short = Loop(Controller([], [-0.1], 0.2), COMMON, 0.01, 0.01)
-    with pytest.raises(ValueError, match=r"sample_rate must be .* to interpolate tau1"):
-        simulate(short, SHORT, sample_rate=130.0)
-    whole = simulate(short, np.ones(100), sample_rate=100.0)
-    assert np.isfinite(whole).all()
-
-
-def test_rates_too_low_for_a_zero_in_the_right_half_plane():
-    loop = Loop(Controller([3.0], [-1.0], 0.1), COMMON, 20.0, 20.0)
-    with pytest.raises(ValueError, match=r"sample_rate must exceed 1\.5 Hz"):
-        sampled_open_loop(loop, 0.1, sample_rate=1.5)
-    # Fast factors in the left half-plane are no trouble.
-    fast = Loop(Controller([-30.0], [-1.0, -50.0], 1.0), COMMON, 20.0, 20.0)
-    impulse = np.append(1.0, np.zeros(4095))
-    omega = 2.0 * np.pi * np.fft.rfftfreq(impulse.size, 1.0)[1:-1]
-    expected = 1.0 / (1.0 + sampled_open_loop(fast, omega, 0.5, 0.5, 1.0))
-    found = np.fft.rfft(simulate(fast, impulse, 0.5, 0.5, 1.0))[1:-1]
-    assert found == pytest.approx(expected, rel=1e-9)
-
-
-def test_rates_too_low_for_the_feedback():
-    """With this gain 1 + K is negative at 2 / T and positive at infinity: a fast real root."""
-    loop = Loop(Controller([], [-1.0], -10.0), COMMON, 20.0, 20.0)
-    with pytest.raises(ValueError, match="sample_rate must be higher for this loop"):
-        simulate(loop, SHORT, sample_rate=5.0)
-    assert simulate(loop, SHORT, sample_rate=50.0).shape == SHORT.shape
-
-
 def test_saved_series_read_back(tmp_path):
     """While it is written, what another process sees has another name."""
     noise = np.random.default_rng(1).standard_normal(5000)
@@ -311,55 +256,27 @@ def test_saved_series_read_back(tmp_path):
     assert np.array_equal(np.load(target), simulate(CommonArm(), noise, sample_rate=10.0))
     assert seen == [[".part"]] * 10
     assert [path.name for path in tmp_path.iterdir()] == ["run.npy"]
-    assert save_series(str(target), [[1, 2], np.array([4.5], "f4"), []]) == 3  # type: ignore[list-item]
-    assert np.load(target).tolist() == [1.0, 2.0, 4.5]
 
 
-@pytest.mark.parametrize("stop", [KeyboardInterrupt, DivergenceError(1.0, 2.0, SHORT)])
-def test_an_interrupted_run_leaves_no_file(tmp_path, stop):
+def test_an_interrupted_run_leaves_the_file_of_the_last_one(tmp_path):
     def blocks():
         yield np.ones(1000)
-        raise stop
+        raise KeyboardInterrupt
 
-    fresh, old = tmp_path / "fresh.npy", tmp_path / "old.npy"
-    np.save(old, np.arange(3.0))
-    for target in (fresh, old):
-        with pytest.raises((KeyboardInterrupt, DivergenceError)):
-            save_series(target, simulate_blocks(CommonArm(), blocks(), 10.0))
-    assert [path.name for path in tmp_path.iterdir()] == ["old.npy"]
-    assert np.array_equal(np.load(old), np.arange(3.0))
+    target = tmp_path / "run.npy"
+    np.save(target, np.arange(3.0))
+    with pytest.raises(KeyboardInterrupt):
+        save_series(target, simulate_blocks(CommonArm(), blocks(), 10.0))
+    assert np.array_equal(np.load(target), np.arange(3.0))
 
 
 def test_a_share_of_a_sample_is_seen_at_any_rate():
-    """0.04 samples are less than a part in 1e9 of a long delay, and no rounding error."""
-    assert len(lagrange_delay("tau", 20.0 + 1e-9, 1e6, 1)[1]) == 2
-    first, weights = lagrange_delay("tau", 5e7 + 0.04, 1.0, 1)
-    assert first == 50_000_000
-    assert weights == pytest.approx([0.96, 0.04], abs=1e-7)
+    """A thousandth of a sample in 2 10^7, which is no rounding error."""
+    first, weights = lagrange_delay("tau", 20.0 + 1e-9, 1e6)
+    assert (first, len(weights)) == (20_000_000 - 3, 8)
+    assert sum(k * weight for k, weight in enumerate(weights)) == pytest.approx(3.001)
     # The last digit of 20.1 * 1e5 = 2010000.0000000002 is.
-    assert lagrange_delay("tau", 20.1, 1e5, 7) == (2_010_000, (1.0,))
-
-
-PARTITION = st.lists(st.sampled_from([0, 1, 2, 3, 7, 64, 139, 140, 141, 400]), max_size=12)
-
-
-@given(st.sampled_from(sorted(LOOPS)), PARTITION, st.booleans())
-@example("fractional", [1] * 30, True)
-@settings(max_examples=40)
-def test_any_partition_gives_the_same_bits(name, sizes, constant):
-    loop, rate = LOOPS[name]
-    noise, c1, c2 = np.random.default_rng(9).standard_normal((3, sum(sizes)))
-    first, second = (0.7, -0.2) if constant else (c1, c2)
-    whole = simulate(loop, noise, first, second, rate, history=0.5, limit=1e30)
-    run = Simulation(loop, rate, history=0.5, limit=1e30)
-    ends = np.cumsum([0, *sizes])
-    parts = [
-        run.advance(noise[a:b], *((first, second) if constant else (c1[a:b], c2[a:b])))
-        for a, b in pairwise(ends)
-    ]
-    assert [part.size for part in parts] == sizes
-    assert np.array_equal(np.concatenate([np.empty(0), *parts]), whole)
-    assert run.samples == noise.size
+    assert lagrange_delay("tau", 20.1, 1e5) == (2_010_000, (1.0,))
 
 
 def test_a_refused_block_leaves_the_run_where_it_is():
@@ -373,27 +290,15 @@ def test_a_refused_block_leaves_the_run_where_it_is():
     assert np.array_equal(np.concatenate([first, run.advance(noise[200:])]), whole)
 
 
-def test_a_copied_run_goes_on_by_itself():
-    noise = np.random.default_rng(2).standard_normal(500)
-    whole = simulate(CommonArm(), noise, sample_rate=10.0)
-    run = Simulation(CommonArm(), 10.0)
-    run.advance(noise[:200])
-    for other in (copy.deepcopy(run), pickle.loads(pickle.dumps(run))):
-        assert np.array_equal(other.advance(noise[200:]), whole[200:])
-    assert run.samples == 200
-    assert np.array_equal(run.advance(noise[200:]), whole[200:])
-
-
 def test_the_error_travels():
     with pytest.raises(DivergenceError) as caught:
         simulate(SingleArm(), np.ones(20_000), 3.0, limit=10.0)
     error = caught.value
     assert error.output.base is None
-    for other in (pickle.loads(pickle.dumps(error)), copy.copy(error)):
-        assert type(other) is DivergenceError
-        assert str(other) == str(error)
-        assert (other.time, other.detected) == (error.time, error.detected)
-        assert np.array_equal(other.output, error.output)
+    other = pickle.loads(pickle.dumps(error))
+    assert type(other) is DivergenceError
+    assert (str(other), other.time, other.detected) == (str(error), error.time, error.detected)
+    assert np.array_equal(other.output, error.output)
 
 
 def test_the_benchmark_runs(tmp_path):

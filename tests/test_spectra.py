@@ -126,21 +126,6 @@ def test_a_spectrum_is_plotted_with_its_confidence_band():
     plt.close("all")
 
 
-@pytest.mark.parametrize("bands", [1, 3, np.int64(40), 1000])
-def test_bands_share_out_the_same_power(bands):
-    """Whatever their number, the bins are the same, and each is in one band."""
-    series = np.random.default_rng(4).standard_normal(5000)
-    found = amplitude_spectrum(series, 2.0, bands=bands)
-    usual = amplitude_spectrum(series, 2.0)
-    for one in (found, usual):
-        assert (np.diff(one.frequency) > 0.0).all()
-    power, expected = (np.sum(s.asd**2 * s.bins * s.resolution) for s in (found, usual))
-    assert power == pytest.approx(expected, rel=1e-12)
-    assert np.sum(found.bins * found.resolution) == pytest.approx(
-        np.sum(usual.bins * usual.resolution), rel=1e-12
-    )
-
-
 @given(st.lists(st.sampled_from([0, 1, 2, 3, 255, 256, 257, 1023, 1500]), max_size=14))
 @settings(max_examples=15)
 def test_any_partition_gives_the_same_estimate(sizes):
