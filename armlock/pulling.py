@@ -7,6 +7,7 @@ laser's own. Suppression at zero frequency is finite, and so the laser follows, 
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -171,29 +172,23 @@ def _found(loop: Loop) -> ComplexArray:
 def _complete_up_to(loop: Loop, roots: ComplexArray) -> float:
     """Return the rate up to which a certified count finds no other roots, or 0."""
     circle = loop(_circle(loop, roots), 1.0, 1.0)
-    turns = np.angle(np.roll(circle, -1) / circle).sum() / (2.0 * np.pi)
+    at_zero = round(np.angle(np.roll(circle, -1) / circle).sum() / (2.0 * np.pi))
     decays = np.unique(-roots.real)
     rates = np.sqrt(decays[:-1] * decays[1:])
     # Of faster ones there are too many, far up the axis.
     rates = rates[rates < 0.02 / max(loop.tau1, loop.tau2)]
-    known, unknown = -1, rates.size
-    while unknown - known > 1:
-        middle = (known + unknown) // 2
-        slower = roots[-roots.real < rates[middle]]
-        expected = round(turns) + np.where(slower.imag > 0.0, 2, 1).sum()
-        if _slower_than(loop, rates[middle]) == expected:
-            known = middle
-        else:
-            unknown = middle
-    return float(rates[known]) if known >= 0 else 0.0
 
+    def incomplete(rate: float) -> bool:
+        """Say whether other roots have Re s > -rate, or no count is certain."""
+        slower = roots[-roots.real < rate]
+        expected = at_zero + np.where(slower.imag > 0.0, 2, 1).sum()
+        try:
+            return bool(unstable_roots(loop.shifted(-rate), 1.0, 1.0) != expected)
+        except CountError:
+            return True
 
-def _slower_than(loop: Loop, rate: float) -> int:
-    """Count the roots with Re s > -rate, the unstable ones of D(s - rate); -1 if in doubt."""
-    try:
-        return int(unstable_roots(loop.shifted(-rate), 1.0, 1.0))
-    except CountError:
-        return -1
+    first = bisect_left(rates, True, key=incomplete)
+    return float(rates[first - 1]) if first else 0.0
 
 
 def _circle(loop: Loop, roots: ComplexArray) -> ComplexArray:
@@ -205,7 +200,7 @@ def _circle(loop: Loop, roots: ComplexArray) -> ComplexArray:
 def _slope(loop: Loop, s: ComplexArray) -> ComplexArray:
     """Return dL/ds as a central difference."""
     near = 1e-5 * np.minimum(np.abs(s), 1.0 / max(loop.tau1, loop.tau2))
-    return (_open_loop(loop, s + near) - _open_loop(loop, s - near)) / (2.0 * near)
+    return (loop.open_loop(s + near) - loop.open_loop(s - near)) / (2.0 * near)
 
 
 def _newton(loop: Loop, s: ComplexArray) -> tuple[ComplexArray, FloatArray]:
@@ -213,18 +208,12 @@ def _newton(loop: Loop, s: ComplexArray) -> tuple[ComplexArray, FloatArray]:
     tau = max(loop.tau1, loop.tau2)
     with np.errstate(all="ignore"):
         for _ in range(50):
-            step = (1.0 + _open_loop(loop, s)) / _slope(loop, s)
+            step = (1.0 + loop.open_loop(s)) / _slope(loop, s)
             longest = 0.05 * np.minimum(np.abs(s), 1.0 / tau)
-            s = s - step * np.minimum(1.0, longest / np.abs(step))
+            moved = s - step * np.minimum(1.0, longest / np.abs(step))
+            # Where the method has gone astray, 1 + L is no number.
+            s = np.where(np.isfinite(moved), moved, s)
     return s, np.abs(step / s)
-
-
-def _open_loop(loop: Loop, s: ComplexArray) -> ComplexArray:
-    """Evaluate L; nan where Newton's method has gone astray."""
-    good = np.isfinite(s)
-    value = np.full(s.shape, complex(np.nan, np.nan))
-    value[good] = loop.open_loop(s[good])
-    return value
 
 
 def _input(error: FloatArray, s: Any) -> Any:
