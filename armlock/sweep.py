@@ -62,8 +62,7 @@ def sweep(
     Raises
     ------
     TypeError
-        If `function` cannot be called, `points` is no iterable, or `executor` no executor, for
-        instance a Dask client itself.
+        If `executor` is no executor, for instance a Dask client itself.
     ValueError
         If the file is that of another sweep: of other points, function, attributes, or
         version of this package.
@@ -98,35 +97,29 @@ def sweep(
     With processes, `executor` is a ``ProcessPoolExecutor`` whose ``mp_context`` is
     ``multiprocessing.get_context("spawn")``.
     """
-    if not callable(function):
-        raise TypeError(f"function must be callable, got {function!r}")
-    if not isinstance(points, Iterable):
-        raise TypeError(f"points must be an iterable, got {points!r}")
     if executor is not None and not isinstance(executor, Executor):
         raise TypeError(
             f"executor must be a concurrent.futures.Executor, which client.get_executor() of a "
             f"Dask client is, got {executor!r}"
         )
     given = list(points)
-    results: list[Any] = [None] * len(given)
+    results: dict[int, _R] = {}
     left: Sequence[int] = range(len(given))
     kept = None
     if store is not None and given:
         kept = _Kept(Path(store), given, {"function": _name(function), **(about or {})})
         left = kept.missing()
-    begin, done = time.monotonic(), 0
+    begin = time.monotonic()
     for part, values in _computed(function, given, left, executor):
+        results.update(zip(part, values, strict=True))
         if kept is not None:
             kept.write(part, values)
-        else:
-            for i, value in zip(part, values, strict=True):
-                results[i] = value
-        done += len(part)
         if progress:
+            done = len(results)
             rest = (time.monotonic() - begin) / done * (len(left) - done)
             line = f"\r{done + len(given) - len(left)} of {len(given)}, {rest:.0f} s left   "
             print(line, end="\n" if done == len(left) else "", file=sys.stderr, flush=True)
-    return results if kept is None else kept.results()
+    return [results[i] for i in range(len(given))] if kept is None else kept.results()
 
 
 def _computed(
@@ -168,37 +161,26 @@ class _Kept:
     """The file of a sweep."""
 
     def __init__(self, path: Path, points: Sequence[Any], about: dict[str, Any]) -> None:
-        try:
-            self._h5py = import_module("h5py")
-        except ImportError as error:
-            raise ImportError("store needs h5py: pip install 'armlock[cluster]'") from error
+        self._h5py = import_module("h5py")
         self._path = path
         self._about = {**about, "armlock": version("armlock")}
-        self._points = np.array([repr(point) for point in points], dtype="S")
         try:
-            numbers = np.asarray(points)
-        except ValueError:
-            return
-        if numbers.dtype.kind in "biufc":
-            self._points = numbers
+            self._points = np.asarray(points, dtype=np.float64)
+        except (TypeError, ValueError):  # other things than numbers
+            self._points = np.array([repr(point) for point in points], dtype="S")
 
     def missing(self) -> Sequence[int]:
         """Return the points without a result; raise if the file belongs to another sweep."""
         if not self._path.exists():
             return range(len(self._points))
         with self._h5py.File(self._path) as file:
-            wrong = [
-                name
-                for name, value in self._about.items()
-                if not np.array_equal(file.attrs.get(name), value)
-            ]
-            if not np.array_equal(file["points"][...], self._points):
-                wrong.append("points")
-            if wrong:
-                raise ValueError(
-                    f"store must be the file of this very sweep, or of none; {self._path} "
-                    f"has another {wrong[0]}"
-                )
+            found = {**file.attrs, "points": file["points"][...]}
+            for name, value in {**self._about, "points": self._points}.items():
+                if name not in found or not np.array_equal(found[name], value):
+                    raise ValueError(
+                        f"store must be the file of this very sweep, or of none; {self._path} "
+                        f"has another {name}"
+                    )
             return [int(i) for i in np.flatnonzero(~file["done"][...])]
 
     def write(self, part: Sequence[int], values: Sequence[Any]) -> None:
@@ -218,12 +200,10 @@ class _Kept:
     def _create(self, first: np.ndarray[Any, Any]) -> None:
         """Make the file at its full size, complete from the moment at which it has its name."""
         count = len(self._points)
-        early = self._h5py.h5p.create(self._h5py.h5p.DATASET_CREATE)
-        early.set_alloc_time(self._h5py.h5d.ALLOC_TIME_EARLY)
         temporary = self._path.with_name(self._path.name + ".part")
         with self._h5py.File(temporary, "w") as file:
             file.attrs.update(self._about)
             file["points"] = self._points
-            file.create_dataset("done", (count,), dtype=bool, dcpl=early)
-            file.create_dataset("results", (count, *first.shape), first.dtype, dcpl=early)
+            file["done"] = np.zeros(count, dtype=bool)
+            file["results"] = np.zeros((count, *first.shape), first.dtype)
         temporary.replace(self._path)
