@@ -9,15 +9,16 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib.pyplot as plt
 import numpy as np
+import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from scipy import ndimage
 
-from armlock.checks import ComplexArray, FloatArray, positive_number, whole_number
+from armlock.checks import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
     from armlock.dcurve import Branch, Line
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9"
 #: Fill of the stable region.
 STABLE = "#B8C4CE"
+_CENTRED: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8}
 # Half the width of a count written into a region, over the width of the chart.
 _ROOM = 0.025
 #: The circle |L| that stands for infinity in a compressed Nyquist plot.
@@ -72,7 +74,7 @@ def plot_chart(
     Raises
     ------
     ValueError
-        If an axis does not ascend in equal steps, or `largest` is not a positive integer.
+        If an axis does not ascend in equal steps.
 
     Examples
     --------
@@ -84,22 +86,14 @@ def plot_chart(
     '0'
     """
     ax = plt.gca() if ax is None else ax
-    largest = whole_number("largest", largest, 1)
     shown = chart.counts >= 0 if counts else chart.stable
-    half_x, half_y = _half_cell("chart.x", chart.x), _half_cell("chart.y", chart.y)
+    unstable = plt.get_cmap("Oranges")(np.linspace(0.08, 0.75, largest))
     ax.imshow(
         np.where(shown, np.minimum(chart.counts, largest), np.nan),
-        cmap=ListedColormap(
-            [STABLE, *plt.get_cmap("Oranges")(np.linspace(0.08, 0.75, largest))]
-        ),
+        cmap=ListedColormap([STABLE, *unstable]),
         vmin=0.0,
         vmax=largest,
-        extent=(
-            chart.x[0] - half_x,
-            chart.x[-1] + half_x,
-            chart.y[0] - half_y,
-            chart.y[-1] + half_y,
-        ),
+        extent=(*_ends("chart.x", chart.x), *_ends("chart.y", chart.y)),
         origin="lower",
         aspect="auto",
         interpolation="nearest",
@@ -110,13 +104,14 @@ def plot_chart(
     return ax
 
 
-def _half_cell(name: str, axis: FloatArray) -> float:
-    """Return half the step of an even axis, by which cells reach beyond the points."""
+def _ends(name: str, axis: FloatArray) -> tuple[float, float]:
+    """Return the ends of an even axis, half a step beyond its points, as cells reach."""
     steps = np.diff(axis)
     # Close to the ideal point, rounding is a visible share of a step.
     if not (steps.size and (np.abs(steps - steps.mean()) < 1e-2 * steps.mean()).all()):
         raise ValueError(f"{name} must ascend in equal steps, got {axis}")
-    return float(0.5 * (axis[-1] - axis[0]) / steps.size)
+    half = 0.5 * (axis[-1] - axis[0]) / steps.size
+    return float(axis[0] - half), float(axis[-1] + half)
 
 
 def _label_regions(ax: Axes, chart: StabilityChart) -> None:
@@ -126,17 +121,10 @@ def _label_regions(ax: Axes, chart: StabilityChart) -> None:
         depth = ndimage.distance_transform_edt(np.pad(chart.counts == count, 1))
         regions, number = ndimage.label(depth)
         for row, column in ndimage.maximum_position(depth, regions, range(1, number + 1)):
-            if depth[row, column] < room:
-                continue
-            ax.text(
-                chart.x[column - 1],
-                chart.y[row - 1],
-                str(count),
-                ha="center",
-                va="center",
-                fontsize=8,
-                bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.8},
-            )
+            if depth[row, column] >= room:
+                box = {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.8}
+                x, y = chart.x[column - 1], chart.y[row - 1]
+                ax.text(x, y, str(count), bbox=box, **_CENTRED)
 
 
 def label_parameters(ax: Axes, parameters: tuple[str, str]) -> None:
@@ -147,43 +135,29 @@ def label_parameters(ax: Axes, parameters: tuple[str, str]) -> None:
     ax.set(xlabel=f"${x}${unit}", ylabel=f"${y}${unit}")
 
 
-def plot_branches(
-    branches: Sequence[Branch],
-    ax: Axes | None = None,
-    *,
-    color: str = BLUE,
-    linewidth: float = 0.8,
-    label: str | None = None,
-) -> Axes:
-    """Draw the branches of a D-curve, as `d_curve_branches` returns them, none joined."""
+def plot_branches(branches: Sequence[Branch], ax: Axes | None = None, **style: Any) -> Axes:
+    """Draw the branches of a D-curve, as `d_curve_branches` returns them, none joined.
+
+    The style is that of `matplotlib.axes.Axes.plot`; a legend names the first branch.
+    """
     ax = plt.gca() if ax is None else ax
-    for index, branch in enumerate(branches):
-        ax.plot(
-            branch.x,
-            branch.y,
-            color=color,
-            linestyle="-",
-            linewidth=linewidth,
-            label=label if index == 0 else None,
-            rasterized=True,
-        )
+    style = {"color": BLUE, "linewidth": 0.8, "rasterized": True, **style}
+    for branch in branches:
+        ax.plot(branch.x, branch.y, **style)
+        style["label"] = None
     return ax
 
 
-def plot_line(
-    line: Line,
-    ax: Axes | None = None,
-    *,
-    color: str = ORANGE,
-    linestyle: str = "--",
-    label: str | None = None,
-) -> Axes:
-    """Draw the line of omega = 0, from `d_curve_line`, across the axes and their limits."""
+def plot_line(line: Line, ax: Axes | None = None, **style: Any) -> Axes:
+    """Draw the line of omega = 0, from `d_curve_line`, across the axes and their limits.
+
+    The style is that of `matplotlib.axes.Axes.axline`.
+    """
     ax = plt.gca() if ax is None else ax
     normal = np.array([line.weight_x, line.weight_y])
     foot = line.value * normal / (normal @ normal)
     along = foot + np.array([line.weight_y, -line.weight_x])
-    ax.axline(tuple(foot), tuple(along), color=color, linestyle=linestyle, label=label)
+    ax.axline(tuple(foot), tuple(along), **{"color": ORANGE, "linestyle": "--", **style})
     return ax
 
 
@@ -214,7 +188,8 @@ def plot_nyquist(
         within about `unit`, logarithmic beyond, and no further out than the circle that
         stands for infinity. None keeps the plain complex plane.
     arrows : iterable of float, optional
-        Frequencies in rad/s at which an arrow points in the direction of rising omega.
+        Frequencies in rad/s at which an arrow points in the direction of rising omega; past
+        the end of the curve it stands there.
     omega_max : float, optional
         Frequency in rad/s up to which the curve is drawn.
     color : str, optional
@@ -226,12 +201,6 @@ def plot_nyquist(
     -------
     Axes
 
-    Raises
-    ------
-    ValueError
-        If `unit` is not positive, `omega_max` leaves less than two samples, or an arrow lies
-        beyond the frequencies that are drawn.
-
     Examples
     --------
     >>> from armlock import SingleArm, nyquist
@@ -240,16 +209,9 @@ def plot_nyquist(
     'Re $L$ [1]'
     """
     ax = plt.gca() if ax is None else ax
-    if not omega_max > curve.omega[1]:
-        raise ValueError(
-            f"omega_max must lie above {curve.omega[1]} rad/s, the curve's second sample, got "
-            f"{omega_max}"
-        )
     drawn = curve.omega <= omega_max
     forward, omega = curve.response[drawn], curve.omega[drawn]
-    last = omega[-2]
     if unit is not None:
-        unit = positive_number("unit", unit)
         if curve.indentation.size:
             # On to the infinite branch, in the direction in which the curve leaves for it.
             far = INFINITY * forward[:1] / np.abs(forward[:1])
@@ -259,12 +221,7 @@ def plot_nyquist(
     ax.plot(forward.real, forward.imag, "-", color=color, linewidth=1.5, label=positive)
     ax.plot(forward.real, -forward.imag, "-", color=color, linewidth=0.7, label=negative)
     for frequency in arrows:
-        if not 0.0 < frequency <= last:
-            raise ValueError(
-                f"arrows must lie above 0 and up to {last} rad/s, the last sample but one that "
-                f"is drawn, got {frequency}"
-            )
-        index = int(np.searchsorted(omega, frequency))
+        index = min(int(np.searchsorted(omega, frequency)), omega.size - 2)
         _arrow(ax, forward[index], forward[index + 1], color)
     if unit is None:
         ax.axhline(0.0, color="black", linewidth=0.6)
@@ -277,16 +234,11 @@ def plot_nyquist(
     return ax
 
 
-def _compressed_radius(size: float, unit: float) -> float:
-    """Return where a value of this size lies in the compressed plane."""
-    return float(np.log10(1.0 + size / unit))
-
-
-def _compressed(values: ComplexArray, unit: float) -> ComplexArray:
+def _compressed(values: npt.ArrayLike, unit: float) -> ComplexArray:
     """Move values radially into the compressed plane, those beyond infinity onto it."""
-    size = np.abs(values)
-    scale = np.divide(1.0, size, where=size > 0.0, out=np.zeros_like(size))
-    return np.asarray(values * scale * np.log10(1.0 + np.minimum(size, INFINITY) / unit))
+    values = np.asarray(values)
+    radius = np.log10(1.0 + np.minimum(np.abs(values), INFINITY) / unit)
+    return np.asarray(radius * np.exp(1j * np.angle(values)))
 
 
 def _arrow(ax: Axes, start: complex, stop: complex, color: str) -> None:
@@ -302,7 +254,7 @@ def _infinite_branch(ax: Axes, curve: NyquistCurve, unit: float) -> None:
     label = r"infinite branch, $\omega = 0$"
     for angles, name in ((-half[::-1], "_"), (half, label)):
         if angles.size:
-            arc = _compressed_radius(INFINITY, unit) * np.exp(1j * angles)
+            arc = _compressed(INFINITY * np.exp(1j * angles), unit)
             ax.plot(arc.real, arc.imag, color=ORANGE, linestyle="--", label=name)
             _arrow(ax, arc[arc.size // 2], arc[arc.size // 2 + 1], ORANGE)
 
@@ -318,23 +270,14 @@ def _circles(ax: Axes, unit: float) -> None:
         (1e4, "$10^{4}$"),
         (INFINITY, r"$\infty$"),
     ):
-        circle = _compressed_radius(size, unit) * turn
+        circle = _compressed(size * turn, unit)
         ax.plot(circle.real, circle.imag, "-", color="0.8", linewidth=0.6, zorder=0)
-        place = _compressed_radius(size, unit) * np.exp(0.25j * np.pi)
-        ax.text(
-            place.real,
-            place.imag,
-            text,
-            fontsize=8,
-            color="0.35",
-            ha="center",
-            va="center",
-            bbox={"fc": "white", "ec": "none", "pad": 0.8},
-            zorder=6,
-        )
-    reach = 1.06 * _compressed_radius(INFINITY, unit)
+        place = complex(_compressed(size * np.exp(0.25j * np.pi), unit))
+        box = {"fc": "white", "ec": "none", "pad": 0.8}
+        ax.text(place.real, place.imag, text, color="0.35", bbox=box, zorder=6, **_CENTRED)
+    reach = 1.06 * _compressed(INFINITY, unit).real
     for x, y in (([-reach, reach], [0.0, 0.0]), ([0.0, 0.0], [-reach, reach])):
         ax.plot(x, y, "-", color="0.6", linewidth=0.6, zorder=0)
     ax.set(xlim=(-reach, reach), ylim=(-reach, reach))
-    minus_one = -_compressed_radius(1.0, unit)
+    minus_one = _compressed(-1.0, unit).real
     ax.plot(minus_one, 0.0, "+", color="black", markersize=10, markeredgewidth=1.8, zorder=5)

@@ -243,27 +243,21 @@ def _residues(
 
 def _inverted(loop: Loop, t: FloatArray, errors: list[FloatArray]) -> FloatArray:
     """Invert the Laplace transform at each time, in 30 digits."""
+    factors = [(p.coefficients[-1], p.roots) for p in loop.polynomials()]
+
+    def transform(s: Any) -> Any:
+        below, first, second = (
+            mpmath.fprod([lead, *(s - root for root in roots)]) for lead, roots in factors
+        )
+        dead = mpmath.exp(-s * loop.delay)
+        first, second = first * dead, second * dead
+        below -= first * mpmath.expm1(-s * loop.tau1) + second * mpmath.expm1(-s * loop.tau2)
+        plus, minus = (_input(error, s) for error in errors)
+        return -((first + second) * plus + (first - second) * minus) / (2 * below)
+
     with mpmath.workdps(30):
-        rest, b1, b2 = ([*map(mpmath.mpc, p.roots)] for p in loop.polynomials())
-        leads = [mpmath.mpf(float(p.coefficients[-1])) for p in loop.polynomials()]
-        tau1, tau2, delay = map(mpmath.mpf, (loop.tau1, loop.tau2, loop.delay))
-
-        def value(lead: Any, roots: list[Any], s: Any) -> Any:
-            return mpmath.fprod([lead, *(s - root for root in roots)])
-
-        def transform(s: Any) -> Any:
-            dead = mpmath.exp(-s * delay)
-            first, second = (
-                value(lead, roots, s) * dead
-                for lead, roots in zip(leads[1:], (b1, b2), strict=True)
-            )
-            below = value(leads[0], rest, s)
-            below -= first * mpmath.expm1(-s * tau1) + second * mpmath.expm1(-s * tau2)
-            plus, minus = (_input(error, s) for error in errors)
-            return -((first + second) * plus + (first - second) * minus) / (2 * below)
-
         values = [
-            float(mpmath.invertlaplace(transform, mpmath.mpf(x), method="talbot", degree=40))
+            float(mpmath.invertlaplace(transform, x, method="talbot", degree=40))
             for x in t.ravel()
         ]
     return np.reshape(values, t.shape)

@@ -23,7 +23,6 @@ from armlock.checks import (
     broadcast_pair,
     check_memory,
     positive_number,
-    real_number,
     whole_number,
 )
 from armlock.statespace import Realization, realize
@@ -135,26 +134,20 @@ def transition_matrix(
     step, order = _checked(system, step, order)
     # The matrix, and what its eigenvalues take.
     check_memory("step", (system.degree + round(system.longest_delay / step),) * 2, 24)
-    name1, name2 = system.parameters
-    form = realize(system, real_number(name1, x), real_number(name2, y))
+    form = realize(system, x, y)
     flow, columns = _sampled(form, step, order)
     states = form.state.shape[0]
     steps = [whole_steps("delay", term.delay, step) for term in form.delayed]
     longest = max(steps, default=0)
     matrix = np.zeros((states + longest, states + longest))
     matrix[:states, :states] = flow
-
-    def add(back: int, column: FloatArray) -> None:
-        # The present sample is the first state, older ones stand behind the states.
-        matrix[:states, 0 if back == 0 else states + back - 1] += column
-
+    # The present sample is the first state, older ones stand behind the states.
+    place = [0, *range(states, states + longest)]
     for back, (older, newer) in zip(steps, columns, strict=True):
-        add(back, older)
-        add(back - 1, newer)
-    if longest:
-        matrix[states, 0] = 1.0
-        rest = np.arange(longest - 1)
-        matrix[states + 1 + rest, states + rest] = 1.0
+        matrix[:states, place[back]] += older
+        matrix[:states, place[back - 1]] += newer
+    # A step later each sample is one step older.
+    matrix[place[1:], place[:-1]] = 1.0
     return matrix
 
 
@@ -275,18 +268,12 @@ def semi_discretization(
             )
     form = realize(system, 1.0, 1.0)
     flow, columns = _sampled(form, step, order)
-    b1, b2 = (
-        poly.polyadd(
-            _numerator(flow, older),
-            np.append(0.0, _numerator(flow, newer)),
-        )
-        # Those before x and y; with a dead time there is a third one, x0 B1 + y0 B2.
-        for older, newer in columns[-2:]
-    )
+    # Those before x and y; with a dead time there is a third one, x0 B1 + y0 B2.
+    b1, b2 = (_numerator(flow, *both) for both in columns[-2:])
     return CharacteristicFunction(
         np.asarray(np.poly(flow)[::-1], dtype=np.float64),
-        np.asarray(b1, dtype=np.float64),
-        np.asarray(b2, dtype=np.float64),
+        b1,
+        b2,
         system.delay1,
         system.delay2,
         delay=system.delay,
@@ -297,8 +284,11 @@ def semi_discretization(
     )
 
 
-def _numerator(flow: FloatArray, column: FloatArray) -> FloatArray:
-    """Ascending coefficients of the numerator from an input column to the first state."""
-    output = np.eye(1, flow.shape[0])
-    above, _ = ss2tf(flow, column[:, None], output, np.zeros((1, 1)))
-    return np.asarray(above[0][::-1], dtype=np.float64)
+def _numerator(flow: FloatArray, older: FloatArray, newer: FloatArray) -> FloatArray:
+    """Ascending coefficients of the numerator from a delayed signal to the first state."""
+    output, direct = np.eye(1, flow.shape[0]), np.zeros((1, 1))
+    # The newer sample is the older one a step later, times z.
+    first, second = (
+        ss2tf(flow, column[:, None], output, direct)[0][0, ::-1] for column in (older, newer)
+    )
+    return np.asarray(poly.polyadd(first, np.append(0.0, second)), dtype=np.float64)
