@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from armlock import CommonArm, LaserNoise, paper_loop, simulate, stability_chart, sweep
+from armlock import CommonArm, LaserNoise, paper_loop, simulate, sweep
 
 ROOT = Path(__file__).parents[1]
 #: The lines of the book's page, piece by piece.
@@ -55,9 +55,6 @@ def test_a_cluster_gives_the_serial_results(executor, tmp_path, capsys):
     pytest.importorskip("h5py")
     found = sweep(draw, range(8), executor=executor, store=tmp_path / "draws.h5")
     assert np.array_equal(found, expected)
-    x, y = np.linspace(-3.0, 3.0, 31), np.linspace(-3.0, 3.0, 130)
-    tiled = stability_chart(CommonArm(), x, y, executor=executor)
-    assert np.array_equal(tiled.counts, stability_chart(CommonArm(), x, y).counts)
 
 
 def test_a_worker_that_is_killed_costs_no_result(executor, tmp_path):

@@ -61,18 +61,14 @@ def test_charts_with_uneven_axes_are_no_pictures(ax):
     stability_chart(CommonArm(), near, near).plot(ax)
 
 
-def test_no_two_branches_are_joined(ax):
+def test_d_curves_are_drawn_branch_by_branch_and_with_their_line(ax):
     branches = d_curve_branches(CommonArm(), 40.0)
     plotting.plot_branches(branches, ax, label="curve")
-    assert len(ax.lines) == len(branches) == 3
-    for line, branch in zip(ax.lines, branches, strict=True):
-        np.testing.assert_array_equal(line.get_xdata(), branch.x)
-    assert ax.get_legend_handles_labels()[1] == ["curve"]
-
-
-def test_the_straight_line_passes_through_its_points(ax):
     plotting.plot_line(d_curve_line(CommonArm()), ax)
-    (line,) = ax.lines
+    *curves, line = ax.lines
+    for drawn, branch in zip(curves, branches, strict=True):
+        np.testing.assert_array_equal(drawn.get_xdata(), branch.x)
+    assert ax.get_legend_handles_labels()[1] == ["curve"]
     for x, y in (line.get_xy1(), line.get_xy2()):
         assert x + y == pytest.approx(2.0)
 
@@ -127,12 +123,6 @@ def test_the_data_of_a_chart_are_its_counts_at_its_points(chart):
         assert abs(chart.y[row] - at_y) + abs(chart.x[column] - at_x) < 1e-9
         count = chart.counts[row, column]
         assert np.isnan(shown) if count < 0 else shown == count
-
-
-def test_long_curves_are_thinned_for_the_table(ax):
-    ax.plot(np.arange(100_000.0), np.arange(100_000.0))
-    sizes = {column.size for column in figures.drawn(ax.figure).values()}
-    assert max(sizes) <= 1000
 
 
 def test_a_drawing_has_no_data(ax, tmp_path, monkeypatch):
