@@ -184,9 +184,8 @@ class ShapedNoise:
         ------
         float array
         """
-        most = whole_number("size", size, 1)
-        for first in range(0, whole_number("samples", samples, 0), most):
-            yield self.draw(min(most, samples - first))
+        for first in range(0, samples, size):
+            yield self.draw(min(size, samples - first))
 
 
 @njit(cache=True, nogil=True)

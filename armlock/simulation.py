@@ -40,8 +40,8 @@ from armlock.loops import Loop, checked_loop
 
 #: Order of the Lagrange interpolation for delays that are not whole samples: odd.
 INTERPOLATION_ORDER = 7
-#: Samples that are computed at a time; results do not depend on it.
-BLOCK = 1 << 14
+#: Samples that are computed at a time, of all runs; results do not depend on it.
+BLOCK = 1 << 16
 #: Runs of an ensemble that go side by side. Fewer than half as many go one by one.
 LANES = 32
 #: The output counts as diverged when it exceeds the largest input so far by this factor.
@@ -49,6 +49,8 @@ LIMIT = 1e6
 
 #: A delay in samples, phi(t - tau) = sum_k weights[k] phi[n - first - k]: (first, weights).
 Delay = tuple[int, tuple[float, ...]]
+#: A loop in samples: delays of both arms and the dead time, sensor, controller.
+SampledLoop = tuple[tuple[Delay, ...], SampledSensor, SampledFilter]
 
 # Delays closer to whole samples than this, in samples, are whole.
 _WHOLE = 1e-6
@@ -147,13 +149,12 @@ def lagrange_delay(name: str, tau: float, sample_rate: float) -> Delay:
     return first, tuple(weights)
 
 
-def _sampled_delays(loop: Loop, sample_rate: float) -> tuple[Delay, Delay, Delay]:
+def _sampled_delays(loop: Loop, sample_rate: float) -> tuple[Delay, ...]:
     """Return the delays of both arms and the dead time, or say why they have no samples."""
-    tau1, tau2, dead = (
+    return tuple(
         lagrange_delay(name, getattr(loop, name), sample_rate)
         for name in ("tau1", "tau2", "delay")
     )
-    return tau1, tau2, dead
 
 
 @njit(cache=True)
@@ -167,35 +168,32 @@ def _late(signal: FloatArray, row: int, column: int, delay: Delay) -> float:
 
 
 @njit(cache=True, nogil=True)
-def _advance(
+def _compute(
     lanes: tuple[int, ...],
     first: int,
     phi: FloatArray,
     sent: FloatArray,
-    noise: FloatArray,
-    c1: FloatArray,
-    c2: FloatArray,
-    delays: tuple[Delay, Delay, Delay],
-    sensor: SampledSensor,
-    controller: SampledFilter,
+    inputs: tuple[FloatArray, ...],
+    sampled: SampledLoop,
     work: FloatArray,
     limit: float,
     done: int,
 ) -> int:
     """Compute the last rows of phi, and of what the controller sends, from those before.
 
-    Arrays hold a sample in each row and a run in each column; of c1 and c2 a single row is for
-    all samples. The runs from column `first` on go side by side in lanes, so that one
-    instruction works on several of them; the length of `lanes` is their number, for the
-    compiler to know.
+    These and `inputs`, which are noise, c1 and c2, hold a sample in each row and a run in each
+    column; of c1 and c2 a single row is for all samples. The runs from column `first` on go
+    side by side in lanes, so that one instruction works on several of them; the length of
+    `lanes` is their number, for the compiler to know.
 
-    `delays` are those of both arms and the dead time. `work` holds, each for all lanes: the
-    states of sensor and controller; what they send with the next sample if no input comes; for
-    one sample the light of both arms, the input, and the output; the largest input so far, and
-    the number of the last output not above it. Returns the index of the sample at which an
-    output exceeds `limit` times the largest input, or how many there are.
+    `work` holds, each for all lanes: the states of sensor and controller; what they send with
+    the next sample if no input comes; for one sample the light of both arms, the input, and
+    the output; the largest input so far, and the number of the last output not above it.
+    Returns the index of the sample at which an output exceeds `limit` times the largest input,
+    or how many there are.
     """
-    arm1, arm2, dead = delays
+    noise, c1, c2 = inputs
+    (arm1, arm2, dead), sensor, controller = sampled
     rows, sections, gain = sensor.states, controller.sections, controller.gain
     m, n, size = len(rows), len(sections), len(lanes)
     # Unsigned, because a negative index would count from the end, which takes time to check.
@@ -222,11 +220,16 @@ def _advance(
         now = len(phi) - len(noise) + i
         at, at1, at2 = np.uintp(i), np.uintp(i * varies1), np.uintp(i * varies2)
         for w in range(size):
+            column = np.uintp(first + w)
+            work[light1 + np.uintp(w)] = c1[at1, column] * _late(phi, now, column, arm1)
+        for w in range(size):
+            column = np.uintp(first + w)
+            work[light2 + np.uintp(w)] = c2[at2, column] * _late(phi, now, column, arm2)
+        for w in range(size):
+            work[free + np.uintp(w)] = noise[at, np.uintp(first + w)]
+        for w in range(size):
             lane, column = np.uintp(w), np.uintp(first + w)
-            a1 = c1[at1, column] * _late(phi, now, column, arm1)
-            a2 = c2[at2, column] * _late(phi, now, column, arm2)
-            x = noise[at, column]
-            work[free + lane] = x
+            a1, a2, x = work[light1 + lane], work[light2 + lane], work[free + lane]
             if implicit:
                 # phi = noise - rest - now1 (phi - a1) - now2 (phi - a2), solved for phi.
                 x = (x + (now1 * a1 + now2 * a2) - work[rest + lane]) * inverse
@@ -234,7 +237,7 @@ def _advance(
                 x -= _late(sent, now, column, dead)
                 sending = now1 * (x - a1) + now2 * (x - a2)
                 sent[np.uintp(now), column] = work[rest + lane] + sending
-            work[light1 + lane], work[light2 + lane], work[output + lane] = a1, a2, x
+            work[output + lane] = x
         for w in range(size):
             lane = np.uintp(w)
             x = work[output + lane]
@@ -444,11 +447,10 @@ class Simulation:
         self.sample_rate = positive_number("sample_rate", sample_rate)
         self.limit = positive_number("limit", limit)
         self.draws = None if draws is None else whole_number("draws", draws, 1)
-        self._delays = _sampled_delays(loop, self.sample_rate)
-        self._sensor, self._controller = sampled_loop(
-            loop.controller, loop.mapping, self.sample_rate
-        )
-        self.history_samples = max(first + len(weights) - 1 for first, weights in self._delays)
+        delays = _sampled_delays(loop, self.sample_rate)
+        sensor, controller = sampled_loop(loop.controller, loop.mapping, self.sample_rate)
+        self._sampled: SampledLoop = delays, sensor, controller
+        self.history_samples = max(first + len(weights) - 1 for first, weights in delays)
         before = finite_series("history", history, 0, 1)
         if before.ndim and before.size < self.history_samples:
             raise ValueError(
@@ -458,24 +460,19 @@ class Simulation:
         full, left = divmod(self.draws or 1, LANES)
         # The last runs may be few, and are then faster one by one.
         groups = [LANES] * full + ([1] * left if 2 * left < LANES else [LANES])
-        # See `_advance`: behind the states, five rows, the largest input, the last calm sample.
-        rows = len(self._sensor.states) + 2 * len(self._controller.sections) + 7
+        # See `_compute`: behind the states, five rows, the largest input, the last calm sample.
+        rows = len(sensor.states) + 2 * len(controller.sections) + 7
         self._groups = [np.zeros((rows, lanes)) for lanes in groups]
-        # As far back as delays reach, the output, and what the controller has sent; without a
-        # dead time nothing is read of that.
-        self._past = np.zeros((2 if loop.delay else 1, self.history_samples, sum(groups)))
-        self._past[0] = before[-self.history_samples :, None] if before.ndim else before
+        # The output, and what the controller has sent, of which nothing is read without a dead
+        # time: a block, behind as many samples as delays reach back.
+        kinds, past = 2 if loop.delay else 1, self.history_samples
+        self._block = max(BLOCK // sum(groups), 4 * past)
+        self._signals = np.zeros((kinds, past + self._block, sum(groups)))
+        self._signals[0, :past] = before[-past:, None] if before.ndim else before
         for work in self._groups:
-            work[-2] = np.abs(self._past).max()
+            work[-2] = np.abs(self._signals[0, :past]).max()
         self._stopped: tuple[float, float] | None = None
         self.samples = 0
-
-    def __repr__(self) -> str:
-        """Name the arguments, and how far the run has come."""
-        return (
-            f"Simulation({self.loop!r}, sample_rate={self.sample_rate}, limit={self.limit}; "
-            f"{self.samples} samples)"
-        )
 
     @property
     def time(self) -> float:
@@ -509,11 +506,15 @@ class Simulation:
         given = finite_series("noise", noise, 1 if self.draws is None else 2)
         if self.draws not in (None, len(given)):
             raise ValueError(f"noise must have {self.draws} rows, got shape {given.shape}")
+        return self._advance(given, c1, c2)
+
+    def _advance(self, given: FloatArray, c1: npt.ArrayLike, c2: npt.ArrayLike) -> FloatArray:
+        """Compute the next block, of noise that is checked."""
         inputs = [np.atleast_2d(given).T, _series("c1", c1, given), _series("c2", c2, given)]
         output, begin = np.empty(inputs[0].shape), self.samples
         shaped = output[:, 0] if self.draws is None else output.T
-        for at in range(0, len(output), BLOCK):
-            part = slice(at, at + BLOCK)
+        for at in range(0, len(output), self._block):
+            part = slice(at, at + self._block)
             if self._stopped is None:
                 self._fill(output[part], *(s[part] if len(s) > 1 else s for s in inputs))
             if self._stopped is not None:
@@ -526,34 +527,23 @@ class Simulation:
         self, output: FloatArray, noise: FloatArray, c1: FloatArray, c2: FloatArray
     ) -> None:
         """Compute the next samples, each in a row, unless the run stops before."""
-        kinds, past, columns = self._past.shape
-        signals = np.empty((kinds, past + len(output), columns))
-        signals[:, :past] = self._past
-        inputs = [_in_columns(series, columns) for series in (noise, c1, c2)]
-        first, stop = 0, len(output)
+        past, stop, first = self.history_samples, len(output), 0
+        columns = self._signals.shape[2]
+        phi, sent = (self._signals[kind, : past + stop] for kind in (0, -1))
+        inputs = tuple(_in_columns(series, columns) for series in (noise, c1, c2))
         for work in self._groups:
             lanes = work.shape[1]
-            end = _advance(
-                (0,) * lanes,
-                first,
-                signals[0],
-                signals[-1],
-                *inputs,
-                self._delays,
-                self._sensor,
-                self._controller,
-                work.ravel(),
-                self.limit,
-                self.samples,
-            )
+            run = first, phi, sent, inputs, self._sampled, work.ravel(), self.limit
+            end = _compute((0,) * lanes, *run, self.samples)
             if end < stop:
-                size = np.abs(signals[0, past + end, first : first + lanes])
+                size = np.abs(phi[past + end, first : first + lanes])
                 calm = work[-1, np.argmin(size <= self.limit * work[-2])]
                 self._stopped = calm / self.sample_rate, (self.samples + end) / self.sample_rate
                 stop = end
             first += lanes
-        output[:stop] = signals[0, past : past + stop, : output.shape[1]]
-        self._past = signals[:, len(output) :].copy()
+        output[:stop] = phi[past : past + stop, : output.shape[1]]
+        for signal in self._signals:
+            signal[:past] = signal[len(output) : len(output) + past]
         self.samples += stop
 
 
@@ -618,16 +608,13 @@ def simulate(
     given = finite_series("noise", noise, 1, 2)
     draws = len(given) if given.ndim == 2 else None
     run = Simulation(loop, sample_rate, history=history, limit=limit, draws=draws)
-    return run.advance(given, c1, c2)
+    return run._advance(given, c1, c2)
 
 
 def simulate_blocks(
     loop: Loop,
     blocks: Iterable[npt.ArrayLike | Sequence[npt.ArrayLike]],
     sample_rate: float = 200.0,
-    *,
-    history: npt.ArrayLike = 0.0,
-    limit: float = LIMIT,
 ) -> Iterator[FloatArray]:
     """Run a loop over a stream of blocks; memory does not grow with the duration.
 
@@ -640,8 +627,6 @@ def simulate_blocks(
         included.
     sample_rate : float, optional
         In Hz.
-    history, limit
-        As for `simulate`.
 
     Yields
     ------
@@ -661,7 +646,7 @@ def simulate_blocks(
     >>> sum(locked.size for locked in simulate_blocks(paper_loop(), blocks))
     2000
     """
-    run = Simulation(loop, sample_rate, history=history, limit=limit)
+    run = Simulation(loop, sample_rate)
     parts = (block if isinstance(block, tuple) else (block,) for block in blocks)
     return (run.advance(*part) for part in parts)
 

@@ -12,12 +12,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import control
 import numpy as np
 from numba import njit
-from scipy.signal import bilinear_zpk, zpk2sos
 
-from armlock import LaserNoise, Loop, PerturbationNoise, paper, paper_loop, simulate
+from armlock import LaserNoise, Loop, PerturbationNoise, paper_loop, simulate
 from armlock.checks import FloatArray
 from armlock.discretize import sampled_loop
 from armlock.paper import SAMPLE_RATE, TAU1, TAU2
@@ -30,7 +28,6 @@ ENSEMBLE_RATIO = 2.5
 ACCURACY = 1e-10
 MEMORY = 2 * 2**30
 CHAPTER = 90.0
-PADE_ORDER = 10
 DRAWS = 32
 
 
@@ -40,15 +37,12 @@ class Sizes:
 
     samples: int = 40_000_000
     python: int = 100_000
-    pade: int = 100_000
     compared: int = 1_000_000
     passes: int = 4
     chapter: bool = True
 
 
-QUICK = Sizes(
-    samples=30_000, python=6_000, pade=5_000, compared=30_000, passes=1, chapter=False
-)
+QUICK = Sizes(samples=30_000, python=6_000, compared=30_000, passes=1, chapter=False)
 
 
 def timed(
@@ -117,73 +111,12 @@ def plain_arguments(loop: Loop) -> tuple[Any, ...]:
     return (*delays, *arrays, controller.gain)
 
 
-@njit
-def _sections(sos: Any, state: FloatArray, v: float, move: bool) -> float:
-    for i in range(sos.shape[0]):
-        y = sos[i, 0] * v + state[i, 0]
-        if move:
-            state[i, 0] = sos[i, 1] * v - sos[i, 4] * y + state[i, 1]
-            state[i, 1] = sos[i, 2] * v - sos[i, 5] * y
-        v = y
-    return v
-
-
-@njit
-def _naive(
-    noise: FloatArray, c1: FloatArray, c2: FloatArray, r1: int, r2: int, sos1: Any, sos2: Any
-) -> FloatArray:
-    phi = np.zeros(noise.size)
-    s1, s2 = np.zeros((sos1.shape[0], 2)), np.zeros((sos2.shape[0], 2))
-    f1, f2 = 1.0, 1.0
-    for i in range(sos1.shape[0]):
-        f1 *= sos1[i, 0]
-    for i in range(sos2.shape[0]):
-        f2 *= sos2[i, 0]
-    for i in range(noise.size):
-        a1 = c1[i] * phi[i - r1] if i >= r1 else 0.0
-        a2 = c2[i] * phi[i - r2] if i >= r2 else 0.0
-        rest = _sections(sos1, s1, 0.0, False) + _sections(sos2, s2, 0.0, False)
-        right = noise[i] - rest + f1 * (a1 + a2) + f2 * (a1 - a2)
-        x = right / (1.0 + 2.0 * f1)
-        phi[i] = x
-        _sections(sos1, s1, 2.0 * x - a1 - a2, True)
-        _sections(sos2, s2, a2 - a1, True)
-    return phi
-
-
-def naive(noise: FloatArray, c1: FloatArray, c2: FloatArray, rate: float = SAMPLE_RATE) -> Any:
-    """Return it from second-order sections, as scipy stores them, the loop closed exactly."""
-    stage, zeros = -paper.TABLE_2_STAGE_1_POLE, [-z for z in paper.TABLE_2_ZEROS]
-    poles = [stage, stage, *(-p for p in paper.TABLE_2_POLES)]
-    corner, gain = paper.DUAL_SENSOR_CORNER, paper.CONTROLLER_GAIN
-    scale = corner / (TAU1 - TAU2)
-    sum_path = zpk2sos(*bilinear_zpk([0.0, 0.0, *zeros], poles, gain, rate))
-    apart = zpk2sos(*bilinear_zpk([0.0, *zeros], [*poles, -corner], gain * scale, rate))
-    r1, r2 = round(TAU1 * rate), round(TAU2 * rate)
-    return _naive(noise, c1, c2, r1, r2, sum_path, apart)
-
-
 def inputs(samples: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     noise = LaserNoise(1).draw(samples)
     c1, c2 = (PerturbationNoise(seed, scale=1e-4).draw(samples) for seed in (2, 3))
     c1 += 1.0
     c2 += 1.0
     return noise, c1, c2
-
-
-def pade_loop(loop: Loop) -> Any:
-    """Return the closed loop with Pade delays, constant c1 = c2 = 1, in discrete time."""
-    arms = [
-        1.0 - control.ss(control.tf(*control.pade(tau, PADE_ORDER))) for tau in (TAU1, TAU2)
-    ]
-    zeros, poles, gain = loop.controller.zeros, loop.controller.poles, loop.controller.gain
-    whole = control.ss(control.zpk(np.real(zeros), np.real(poles), gain))
-    # One zero at s = 0 cancels the sensor's integrator.
-    less = control.ss(control.zpk(np.real(zeros[1:]), np.real(poles), gain))
-    p, scale = loop.mapping.denominator[1], loop.mapping.denominator[2]
-    low = control.ss(control.tf([loop.mapping.numerator1[0] / scale], [1.0, p / scale]))
-    opened = whole * (arms[0] + arms[1]) + less * low * (arms[0] - arms[1])
-    return control.c2d(control.feedback(1, opened), 1.0 / SAMPLE_RATE, "tustin")
 
 
 def chapter_run() -> tuple[float, int]:
@@ -222,22 +155,15 @@ def run(*, quick: bool, folder: Path) -> Topic:
         Row("plain loop in Python [a]", slow, slow / best, f"at least {PYTHON_RATIO:g}",
             slow / best >= PYTHON_RATIO),
     ]  # fmt: skip
-    closed = pade_loop(loop)
-    steps = np.arange(sizes.pade) / SAMPLE_RATE
-    seconds = timed(lambda: control.forced_response(closed, steps, noise[: sizes.pade]))[0]
-    seconds *= sizes.samples / sizes.pade
-    topic.rows.append(
-        Row(f"python-control, Pade order {PADE_ORDER} [b]", seconds, seconds / best)
-    )
     topic.rows += ensemble_rows(loop, noise, c1, c2, sizes.passes)
-    topic.rows += accuracy_rows(loop, noise, c1, c2, sizes.compared)
+    topic.rows.append(accuracy_row(loop, noise, c1, c2, sizes.compared))
     compared = slice(0, 4 * sizes.compared)
     output = simulate(loop, noise[compared], c1[compared], c2[compared])
     phi = plain_output(noise[compared], c1[compared], c2[compared], arguments)
     same = float(np.abs(output - phi).max() / np.abs(output).max())
     topic.rows.append(Row(f"simulate and plain loop differ by {same:.1e}", None, None,
                           "at most 1e-10", same <= ACCURACY, correctness=True))  # fmt: skip
-    topic.data.update(simulate=ours, plain=theirs, python=slow, pade=seconds, difference=same)
+    topic.data.update(simulate=ours, plain=theirs, python=slow, difference=same)
     if sizes.chapter:
         seconds, memory = child.call("benchmarks.simulation", "chapter_run", {})
         topic.rows += [
@@ -249,12 +175,10 @@ def run(*, quick: bool, folder: Path) -> Topic:
         topic.data.update(chapter=seconds, memory=memory)
     topic.notes += [
         f"[a] Extrapolated from {sizes.python} samples.",
-        f"[b] Extrapolated from {sizes.pade} samples. Constant c1 = c2 = 1, for it has no "
-        "others; delays by Pade approximants, so that the result is another one.",
         "simulate and the plain loop each make their output, and are timed in turn after "
         "compiling; the best of "
         f"{sizes.passes} runs each.",
-        "[c] The ratio is that to the same runs one by one, on one core, in turn: the median "
+        "[b] The ratio is that to the same runs one by one, on one core, in turn: the median "
         f"of {5 * sizes.passes} passes, in processor time.",
     ]
     return topic
@@ -280,27 +204,20 @@ def ensemble_rows(
     # Processor time, in turn, so that other work on the machine slows down both.
     low, ratio, high = np.quantile(times[:, 1] / times[:, 0], (0.1, 0.5, 0.9))
     return [
-        Row(f"ensemble of {DRAWS}, {shape[0]:.3g} samples each [c]", float(times[:, 0].min()),
+        Row(f"ensemble of {DRAWS}, {shape[0]:.3g} samples each [b]", float(times[:, 0].min()),
             float(ratio), f"at least {ENSEMBLE_RATIO:g}", bool(ratio >= ENSEMBLE_RATIO)),
         Row(f"its ratio, from the 10th to the 90th percent: {low:.2f} to {high:.2f}"),
         Row("ensemble and single runs agree", None, None, "bit by bit", same, correctness=True),
     ]  # fmt: skip
 
 
-def accuracy_rows(
+def accuracy_row(
     loop: Loop, noise: FloatArray, c1: FloatArray, c2: FloatArray, samples: int
-) -> list[Row]:
+) -> Row:
     """Compare with the same loop in 106 bits, c1 and c2 varying."""
     part = slice(0, samples)
     series = noise[part], c1[part], c2[part]
     exact = reference(*series)
-
-    def error(found: FloatArray) -> float:
-        return float(np.abs(found - exact).max() / np.abs(exact).max())
-
-    ours, usual = error(simulate(loop, *series)), error(naive(*series))
-    return [
-        Row(f"relative error over {samples:.3g} samples: {ours:.1e}", None, None,
-            f"at most {ACCURACY:g}", ours <= ACCURACY, correctness=True),
-        Row(f"that of second-order sections: {usual:.1e}"),
-    ]  # fmt: skip
+    error = float(np.abs(simulate(loop, *series) - exact).max() / np.abs(exact).max())
+    return Row(f"relative error over {samples:.3g} samples: {error:.1e}", None, None,
+               f"at most {ACCURACY:g}", error <= ACCURACY, correctness=True)  # fmt: skip

@@ -30,22 +30,18 @@ DAY = 86400.0
 
 
 def test_responses_solve_the_loop_equation():
-    """phi = phi_L - K [m1 (phi (1 - e1) + n1) + m2 (phi (1 - e2) + n2)], an input at a time."""
+    """phi = phi_L - K [m1 (phi (1 - e1) + n1) + m2 (phi (1 - e2) + n2)], all at once."""
     s = 2j * np.pi * np.geomspace(1e-7, 1e3, 40)
     first, second = FLIGHT.arm_responses(s)
-    arms = [1.0 - np.exp(-s * tau) for tau in (FLIGHT.tau1, FLIGHT.tau2)]
-    inputs = {
-        "laser": (1.0, 0.0, 0.0),
-        "arm 1": (0.0, 1.0, 0.0),
-        "arm 2": (0.0, 0.0, 1.0),
-        "common": (0.0, 0.5, 0.5),
-        "differential": (0.0, 0.5, -0.5),
-    }
-    for name, (laser, n1, n2) in inputs.items():
-        phi = transfer(FLIGHT, name, s)
-        back = first * (phi * arms[0] + n1) + second * (phi * arms[1] + n2)
-        scale = np.abs(phi) + np.abs(first) + np.abs(second)
-        assert (np.abs(phi - (laser - back)) < 1e-9 * scale).all()
+    laser, n1, n2 = 1.0, 0.3, -0.8
+    given = {"laser": laser, "common": n1 + n2, "differential": n1 - n2}
+    phi = sum(size * transfer(FLIGHT, name, s) for name, size in given.items())
+    back = first * (phi * (1.0 - np.exp(-s * FLIGHT.tau1)) + n1)
+    back += second * (phi * (1.0 - np.exp(-s * FLIGHT.tau2)) + n2)
+    scale = np.abs(phi) + np.abs(first) + np.abs(second)
+    assert (np.abs(phi - (laser - back)) < 1e-9 * scale).all()
+    arms = [n * transfer(FLIGHT, name, s) for n, name in ((n1, "arm 1"), (n2, "arm 2"))]
+    np.testing.assert_allclose(phi, transfer(FLIGHT, "laser", s) + sum(arms), rtol=1e-9)
 
 
 def test_all_responses_are_one_object_of_python_control():
