@@ -14,8 +14,12 @@ So both are one class here, and one set of algorithms serves both.
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
 
+import mpmath
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
@@ -56,8 +60,9 @@ class CharacteristicFunction:
 
     Parameters
     ----------
-    rest, b1, b2 : sequence of float
-        Coefficients of R, B1 and B2 in ascending powers of s (of z = exp(s step) for a map).
+    rest, b1, b2 : sequence of float, or armlock.exponentials.Polynomial
+        Coefficients of R, B1 and B2 in ascending powers of s (of z = exp(s step) for a map);
+        or polynomials with known roots, which are then kept.
     delay1, delay2 : float
         Delays in s, zero or positive.
     delay : float, optional
@@ -104,9 +109,9 @@ class CharacteristicFunction:
 
     def __init__(
         self,
-        rest: Sequence[float] | FloatArray,
-        b1: Sequence[float] | FloatArray,
-        b2: Sequence[float] | FloatArray,
+        rest: Sequence[float] | FloatArray | Polynomial,
+        b1: Sequence[float] | FloatArray | Polynomial,
+        b2: Sequence[float] | FloatArray | Polynomial,
         delay1: float,
         delay2: float,
         *,
@@ -115,9 +120,10 @@ class CharacteristicFunction:
         parameters: tuple[str, str] = ("x", "y"),
         reference: tuple[float, float] = (0.0, 0.0),
     ) -> None:
-        self.rest = _polynomial("rest", rest)
-        self.b1 = _polynomial("b1", b1)
-        self.b2 = _polynomial("b2", b2)
+        self._polynomials = tuple(
+            _polynomial(name, p) for name, p in (("rest", rest), ("b1", b1), ("b2", b2))
+        )
+        self.rest, self.b1, self.b2 = (p.coefficients for p in self._polynomials)
         pair = axis("reference", reference)
         if pair.size != 2:
             raise ValueError(f"reference must hold two numbers, got {pair.size}")
@@ -132,10 +138,10 @@ class CharacteristicFunction:
         self.parameters = parameters
         c = poly.polyadd(self.reference[0] * self.b1, self.reference[1] * self.b2)
         if self.delay == 0.0:
-            self.a = _polynomial("a", np.asarray(poly.polyadd(self.rest, c)))
-            self.c = _polynomial("c", [0.0])
+            self.a = _trimmed("a", np.asarray(poly.polyadd(self.rest, c)))
+            self.c = _trimmed("c", [0.0])
         else:
-            self.a, self.c = self.rest, _polynomial("c", np.asarray(c))
+            self.a, self.c = self.rest, _trimmed("c", np.asarray(c))
         if not self.a.any():
             raise ValueError(
                 f"A, the term without a delay, must not vanish, got rest={self.rest.tolist()}"
@@ -171,9 +177,7 @@ class CharacteristicFunction:
     @property
     def neutral(self) -> bool:
         """Whether a delayed term is of the same order as A."""
-        if self.step:
-            return False
-        return any(b.size == self.a.size for b in (self.b1, self.b2, self.c))
+        return not self.step and any(self.highest_coefficients[1:])
 
     @property
     def highest_coefficients(self) -> tuple[float, float, float, float]:
@@ -257,20 +261,6 @@ class CharacteristicFunction:
             np.asarray(poly.polyval(z, self.b2) * np.exp(-s * self.delay2) * dead),
         )
 
-    def proportional_values(
-        self, z: ComplexArray
-    ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Evaluate R, B1 and B2 up to a factor that all three share.
-
-        A root does not depend on the factor, so that a subclass may divide by what rounding
-        would spoil.
-        """
-        rest, b1, b2 = (
-            np.asarray(poly.polyval(z, p), dtype=np.complex128)
-            for p in (self.rest, self.b1, self.b2)
-        )
-        return rest, b1, b2
-
     def __call__(self, s: npt.ArrayLike, x: npt.ArrayLike, y: npt.ArrayLike) -> ComplexArray:
         """Evaluate D(s; x, y); the three arguments broadcast.
 
@@ -280,7 +270,7 @@ class CharacteristicFunction:
             If s does not hold finite numbers, x or y is not finite and real, or the three do
             not broadcast.
         """
-        return self._value(*self._checked(s, x, y))
+        return np.asarray(self._value(*self._checked(s, x, y)))
 
     def _checked(
         self, s: npt.ArrayLike, x: npt.ArrayLike, y: npt.ArrayLike
@@ -291,17 +281,22 @@ class CharacteristicFunction:
         broadcast_shape(("s", name1, name2), arrays)
         return arrays
 
-    def _value(
-        self, s: ComplexArray, x: float | FloatArray, y: float | FloatArray
-    ) -> ComplexArray:
-        """Evaluate D(s; x, y) unchecked."""
-        z = np.exp(s * self.step) if self.step else s
-        b1, b2 = poly.polyval(z, self.b1), poly.polyval(z, self.b2)
-        arm1 = (self.reference[0] - x) - x * np.expm1(-s * self.delay1)
-        arm2 = (self.reference[1] - y) - y * np.expm1(-s * self.delay2)
-        dead = np.exp(-s * self.delay)
-        result: ComplexArray = poly.polyval(z, self.rest) + dead * (b1 * arm1 + b2 * arm2)
-        return result
+    def _arms(self, x: Any, y: Any) -> tuple[tuple[FloatArray, float, Any, Any], ...]:
+        """Return B, the delay, the reference and the parameter of either arm."""
+        x0, y0 = self.reference
+        return (self.b1, self.delay1, x0, x), (self.b2, self.delay2, y0, y)
+
+    def _value(self, s: Any, x: Any, y: Any, library: Any = np) -> Any:
+        """Evaluate D(s; x, y) unchecked.
+
+        The functions are those of numpy, or of mpmath for one number in extended precision.
+        """
+        z = library.exp(s * self.step) if self.step else s
+        arms = 0.0
+        for b, delay, origin, here in self._arms(x, y):
+            arm = (origin - here) - here * library.expm1(-s * delay)
+            arms = arms + poly.polyval(z, b) * arm
+        return poly.polyval(z, self.rest) + library.exp(-s * self.delay) * arms
 
     def derivative(self, s: npt.ArrayLike, x: npt.ArrayLike, y: npt.ArrayLike) -> ComplexArray:
         r"""Evaluate dD/ds; the three arguments broadcast.
@@ -319,30 +314,21 @@ class CharacteristicFunction:
         TypeError, ValueError
             As a call does.
         """
-        return self._slope(*self._checked(s, x, y))
+        return np.asarray(self._slope(*self._checked(s, x, y)))
 
-    def _slope(
-        self, s: ComplexArray, x: float | FloatArray, y: float | FloatArray
-    ) -> ComplexArray:
-        """Evaluate dD/ds unchecked."""
-        z = np.exp(s * self.step) if self.step else s
-        dz = self.step * z if self.step else np.ones_like(s)
-
-        def term(
-            p: FloatArray, lag: float, start: float, here: float | FloatArray
-        ) -> ComplexArray:
-            arm = (start - here) - here * np.expm1(-s * lag)
-            value = poly.polyval(z, p)
-            slope = poly.polyval(z, poly.polyder(p)) * dz - self.delay * value
-            return np.asarray(slope * arm + value * here * lag * np.exp(-s * lag))
-
-        result: ComplexArray = poly.polyval(z, poly.polyder(self.rest)) * dz + np.exp(
-            -s * self.delay
-        ) * (
-            term(self.b1, self.delay1, self.reference[0], x)
-            + term(self.b2, self.delay2, self.reference[1], y)
-        )
-        return result
+    def _slope(self, s: Any, x: Any, y: Any, library: Any = np) -> Any:
+        """Evaluate dD/ds unchecked, as `_value`."""
+        z = library.exp(s * self.step) if self.step else s
+        dz = self.step * z if self.step else 1.0
+        arms = 0.0
+        for b, delay, origin, here in self._arms(x, y):
+            late = library.expm1(-s * delay)
+            value = poly.polyval(z, b)
+            change = poly.polyval(z, poly.polyder(b)) * dz - self.delay * value
+            arms = arms + change * ((origin - here) - here * late)
+            arms = arms + value * here * delay * (1.0 + late)
+        own = poly.polyval(z, poly.polyder(self.rest)) * dz
+        return own + library.exp(-s * self.delay) * arms
 
     def shifted(self, sigma: float) -> CharacteristicFunction:
         """Return the function s -> D(s + sigma), whose roots lie `sigma` further left.
@@ -362,94 +348,99 @@ class CharacteristicFunction:
                 f"magnitude, got {sigma}: its exponential is no float"
             )
 
-        def move(p: FloatArray) -> FloatArray:
+        def move(p: Polynomial, delay: float) -> Polynomial:
+            late = np.exp(-sigma * delay)
             if self.step:
-                return np.asarray(p * np.exp(sigma * self.step * np.arange(p.size)))
-            return np.asarray(poly.Polynomial(p)(poly.Polynomial([sigma, 1.0])).coef)
+                scales = np.exp(sigma * self.step * np.arange(p.coefficients.size))
+                return Polynomial(
+                    late * scales * p.coefficients, p.roots * np.exp(-sigma * self.step)
+                )
+            moved = poly.Polynomial(p.coefficients)(poly.Polynomial([sigma, 1.0]))
+            return Polynomial(late * moved.coef, p.roots - sigma)
 
-        # The reference moves along, so that nothing has to cancel in `rest`.
-        dead = np.exp(-sigma * self.delay)
-        return CharacteristicFunction(
-            move(self.rest),
-            dead * np.exp(-sigma * self.delay1) * move(self.b1),
-            dead * np.exp(-sigma * self.delay2) * move(self.b2),
-            self.delay1,
-            self.delay2,
-            delay=self.delay,
-            step=self.step,
-            parameters=self.parameters,
-            reference=(
-                self.reference[0] * float(np.exp(sigma * self.delay1)),
-                self.reference[1] * float(np.exp(sigma * self.delay2)),
-            ),
+        x0, y0 = self.reference
+        rest, b1, b2 = self._polynomials
+        found = self.changed(
+            rest=move(rest, 0.0),
+            b1=move(b1, self.delay + self.delay1),
+            b2=move(b2, self.delay + self.delay2),
+            # It moves along, so that nothing has to cancel in `rest`.
+            reference=(x0 * np.exp(sigma * self.delay1), y0 * np.exp(sigma * self.delay2)),
         )
+        # Kept, not found again: in extended precision that takes a second.
+        vars(found)["roots_of_a"] = self.roots_of_a - sigma
+        return found
 
     def exchanged(self) -> CharacteristicFunction:
         """Return the same function with its two free parameters exchanged."""
-        return CharacteristicFunction(
-            self.rest,
-            self.b2,
-            self.b1,
-            self.delay2,
-            self.delay1,
-            delay=self.delay,
-            step=self.step,
+        _, b1, b2 = self._polynomials
+        return self.changed(
+            b1=b2,
+            b2=b1,
+            delay1=self.delay2,
+            delay2=self.delay1,
             parameters=self.parameters[::-1],
             reference=self.reference[::-1],
         )
 
-    def polynomials(self) -> tuple[Polynomial, Polynomial, Polynomial]:
+    def changed(self, **changes: Any) -> CharacteristicFunction:
+        """Return the function that other values of some arguments make."""
+        own = vars(self) | dict(zip(("rest", "b1", "b2"), self._polynomials, strict=True))
+        names = inspect.signature(CharacteristicFunction).parameters
+        return CharacteristicFunction(**{name: own[name] for name in names} | changes)
+
+    def polynomials(self) -> tuple[Polynomial, ...]:
         """Return R, B1 and B2 with their roots."""
-        return Polynomial.of(self.rest), Polynomial.of(self.b1), Polynomial.of(self.b2)
+        return self._polynomials
+
+    @cached_property
+    def roots_of_a(self) -> ComplexArray:
+        """Roots of A, in extended precision where doubles give those of another polynomial.
+
+        They enter a count through the argument of A alone, past the last frequency.
+        """
+        if self.a is self.rest:
+            return self._polynomials[0].roots
+        a = self.a
+        roots = poly.polyroots(a).astype(np.complex128)
+        product, magnitude = np.array([a[-1]], dtype=np.complex128), np.abs(a[-1:])
+        for root in roots[np.argsort(np.abs(roots))]:
+            product = np.convolve(product, [-root, 1.0])
+            magnitude = np.convolve(magnitude, [abs(root), 1.0])
+        if (np.abs(product - a) <= 1e-6 * magnitude).all():
+            return roots
+        with mpmath.workdps(60):
+            found = mpmath.polyroots(
+                a.tolist(), maxsteps=500, extraprec=400, asc=True, roots_init=roots.tolist()
+            )
+        return np.array([complex(root) for root in found])
+
+    def _delayed(self, k: int, lag: float, weight: float = 1.0) -> ExponentialSum:
+        """Return `weight` times R, B1 or B2, delayed by a time, at s = j omega.
+
+        For a map each power of z is an exponential, its polynomial is 1. Each coefficient keeps
+        a polynomial of its own, so that its rounding is not forgotten.
+        """
+        factors, polynomials = [np.ones(1)] * 3, self._polynomials
+        if self.step:
+            factors = [p.coefficients for p in self._polynomials]
+            number = sum(p.size for p in factors)
+            polynomials = (Polynomial(np.ones(1), np.zeros(0, dtype=np.complex128)),) * number
+        ends = np.cumsum([p.size for p in factors])
+        place = np.split(np.eye(len(polynomials)), ends[:-1])[k]
+        p = weight * factors[k]
+        phases = np.asarray(self.step * np.arange(p.size) - lag, dtype=np.float64)
+        return ExponentialSum(polynomials, p[:, None] * place, phases, p @ place)
 
     def on_boundary(self) -> tuple[ExponentialSum, ExponentialSum, ExponentialSum]:
         """Return the three terms of `parts` at s = j omega as exponential sums."""
         x0, y0 = self.reference
-        lags = self.delay + self.delay1, self.delay + self.delay2
-        if self.step:
-            return self._of_map(lags)
-        polynomials = self.polynomials()
+        undelayed = self.rest_on_boundary().plus(self._delayed(1, self.delay, x0))
         return (
-            ExponentialSum(
-                polynomials,
-                np.array([[1.0, 0.0, 0.0], [0.0, x0, y0]]),
-                np.array([0.0, -self.delay]),
-                np.array([1.0, x0, y0]),
-            ),
-            ExponentialSum(
-                polynomials,
-                np.array([[0.0, 1.0, 0.0]]),
-                np.array([-lags[0]]),
-                np.array([0.0, 1.0, 0.0]),
-            ),
-            ExponentialSum(
-                polynomials,
-                np.array([[0.0, 0.0, 1.0]]),
-                np.array([-lags[1]]),
-                np.array([0.0, 0.0, 1.0]),
-            ),
+            undelayed.plus(self._delayed(2, self.delay, y0)),
+            self._delayed(1, self.delay + self.delay1),
+            self._delayed(2, self.delay + self.delay2),
         )
-
-    def _of_map(
-        self, lags: tuple[float, float]
-    ) -> tuple[ExponentialSum, ExponentialSum, ExponentialSum]:
-        """`on_boundary` of a map: each power of z is an exponential, its polynomial is 1.
-
-        Each coefficient keeps a polynomial of its own, so that its rounding is not forgotten.
-        """
-        parts = self.rest, self.b1, self.b2
-        sizes = [p.size for p in parts]
-        ones = (Polynomial(np.ones(1), np.zeros(0, dtype=np.complex128)),) * sum(sizes)
-        places = np.split(np.eye(len(ones)), np.cumsum(sizes)[:-1])
-
-        def term(k: int, lag: float, weight: float = 1.0) -> ExponentialSum:
-            p = weight * parts[k]
-            phases = np.asarray(self.step * np.arange(p.size) - lag, dtype=np.float64)
-            return ExponentialSum(ones, p[:, None] * places[k], phases, p @ places[k])
-
-        x0, y0 = self.reference
-        first = term(0, 0.0).plus(term(1, self.delay, x0)).plus(term(2, self.delay, y0))
-        return first, term(1, lags[0]), term(2, lags[1])
 
     def at(self, x: float, y: float) -> ExponentialSum:
         """Return D(j omega; x, y) at one point as an exponential sum."""
@@ -469,17 +460,8 @@ class CharacteristicFunction:
         return b1.scaled(x).plus(b2.scaled(y))
 
     def rest_on_boundary(self) -> ExponentialSum:
-        """Return `rest` at s = j omega as an exponential sum."""
-        constant, _, _ = self.on_boundary()
-        if self.step:
-            size = self.rest.size
-            return constant._replace(
-                weights=constant.weights[:size],
-                phases=constant.phases[:size],
-                sums=np.concatenate((self.rest, np.zeros(constant.sums.size - size))),
-            )
-        only = np.array([1.0, 0.0, 0.0])
-        return constant._replace(weights=only[None, :], phases=np.zeros(1), sums=only)
+        """Return R at s = j omega as an exponential sum."""
+        return self._delayed(0, 0.0)
 
 
 def whole_steps(name: str, delay: float, step: float) -> int:
@@ -503,7 +485,14 @@ def checked_system(system: CharacteristicFunction) -> CharacteristicFunction:
     return system
 
 
-def _polynomial(name: str, coefficients: Sequence[float] | FloatArray) -> FloatArray:
+def _polynomial(name: str, given: Sequence[float] | FloatArray | Polynomial) -> Polynomial:
+    """Return a polynomial with trimmed, read-only coefficients, and its roots."""
+    if isinstance(given, Polynomial):
+        return Polynomial(_trimmed(name, given.coefficients), given.roots)
+    return Polynomial.of(_trimmed(name, given))
+
+
+def _trimmed(name: str, coefficients: Sequence[float] | FloatArray) -> FloatArray:
     """Return trimmed, read-only coefficients with at least one entry."""
     values = axis(name, coefficients)
     trimmed = np.array(poly.polytrim(values, tol=0.0), dtype=np.float64)

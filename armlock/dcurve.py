@@ -18,8 +18,6 @@ from armlock.checks import FloatArray, check_memory, positive_number, real_array
 from armlock.exponentials import EPSILON
 from armlock.stability import sign_changes
 
-# Phase in rad up to which a frequency next to a pole counts as the pole, in rounding errors.
-_MANY_TURNS = 1e3
 # Beyond this phase in rad rounding leaves too little of it.
 _MOST_RADIANS = 1e9
 
@@ -149,27 +147,23 @@ def d_curve(
             f"omega must be at most {highest:.3g} rad/s, where the phase of the delays is "
             f"still known to 1e-7 rad, got {np.abs(omega).max()}"
         )
-    x0, y0 = system.reference
-    s = 1j * omega
+    (x0, y0), s = system.reference, 1j * omega
+    rest, b1, b2 = system.polynomials()
     late1, late2 = np.expm1(-s * system.delay1), np.expm1(-s * system.delay2)
-    apart = np.expm1(-s * (system.delay1 - system.delay2))
-    with np.errstate(over="ignore", under="ignore", invalid="ignore", divide="ignore"):
+    with np.errstate(invalid="ignore"):
+        # All divided by B1, as factors: so the controller's part of it cancels.
         z = np.asarray(np.exp(s * system.step) if system.step else s, dtype=np.complex128)
-        rest, b1, b2 = system.proportional_values(z)
+        other = b2.over(b1, z)
         # D at the reference, where nothing cancels; from there both parameters are solved for.
-        known = rest * np.exp(s * system.delay) - b1 * x0 * late1 - b2 * y0 * late2
-        across = b1 * np.conj(b2)
+        known = rest.over(b1, z) * np.exp(s * system.delay) - x0 * late1 - y0 * other * late2
         # Only the difference of the delays enters here, which keeps low frequencies exact.
-        determinant = np.imag(across) + np.imag(across * apart)
-        turns = np.minimum(np.abs(omega * (system.delay1 - system.delay2)), _MANY_TURNS)
-        pole = np.abs(determinant) <= 4.0 * EPSILON * turns * np.abs(across)
-        # Where a parameter has no effect, rounding leaves it some.
-        for b in (system.b1, system.b2):
-            value, size = np.polyval(b[::-1], s), np.polyval(np.abs(b[::-1]), np.abs(s))
-            pole |= (not system.step) & (np.abs(value) <= 4.0 * EPSILON * size)
-        determinant = np.where(pole | (omega == 0.0), np.nan, determinant)
-        x = x0 + np.imag(known * np.conj(b2 * (1.0 + late2))) / determinant
-        y = y0 - np.imag(known * np.conj(b1 * (1.0 + late1))) / determinant
+        between = system.delay1 - system.delay2
+        across = np.conj(other)
+        determinant = np.imag(across) + np.imag(across * np.expm1(-s * between))
+        rounding = 4.0 * EPSILON * np.abs(omega * between * across)
+        determinant = np.where(np.abs(determinant) <= rounding, np.nan, determinant)
+        x = x0 + np.imag(known * np.conj(other * (1.0 + late2))) / determinant
+        y = y0 - np.imag(known * np.conj(1.0 + late1)) / determinant
     return x, y
 
 
@@ -205,7 +199,7 @@ def d_curve_line(system: CharacteristicFunction) -> Line:
     """
     checked_system(system)
     a, b1, b2 = (float(part.real) for part in system.parts(0.0))
-    scale = b1 if abs(b1) >= abs(b2) else b2
+    scale = max(b1, b2, key=abs)
     if scale == 0.0:
         raise ValueError(
             f"system must depend on a free parameter at s = 0, but {system!r} does not"

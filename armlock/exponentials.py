@@ -144,13 +144,12 @@ class ExponentialSum(NamedTuple):
         return self._replace(weights=weight * self.weights, sums=weight * self.sums)
 
     def plus(self, other: ExponentialSum) -> ExponentialSum:
-        """Return this sum plus another one of the same polynomials, over the groups of both."""
-        return ExponentialSum(
-            self.polynomials,
-            np.concatenate((self.weights, other.weights)),
-            np.concatenate((self.phases, other.phases)),
-            self.sums + other.sums,
-        )
+        """Return this sum plus another one of the same polynomials."""
+        both = np.concatenate((self.phases, other.phases))
+        phases, groups = np.unique(both, return_inverse=True)
+        weights = np.zeros((phases.size, self.sums.size), dtype=self.weights.dtype)
+        np.add.at(weights, groups, np.concatenate((self.weights, other.weights)))
+        return ExponentialSum(self.polynomials, weights, phases, self.sums + other.sums)
 
     def turned(self) -> ExponentialSum:
         """Return this sum times j, whose imaginary part is the real part of this one."""

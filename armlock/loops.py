@@ -12,7 +12,6 @@ of `armlock.characteristic`. The Hayes equation, which has no sensor, is one mor
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from armlock import paper, sensors
 from armlock.characteristic import CharacteristicFunction
 from armlock.checks import (
     ComplexArray,
+    FloatArray,
     complex_array,
     positive_number,
     real_number,
@@ -130,76 +130,34 @@ class Loop(CharacteristicFunction):
         self.mapping = mapping
         if not any(mapping.numerator1) and not any(mapping.numerator2):
             raise ValueError("mapping must not be zero: there would be no loop")
-        above = self.controller.numerator
-        b1, b2 = (np.convolve(above, m) for m in (mapping.numerator1, mapping.numerator2))
-        below = np.convolve(self.controller.denominator, mapping.denominator)
-        order = below.size - 1
-        for name, b in (("1", b1), ("2", b2)):
-            zeros = np.trim_zeros(b, "b").size - 1
-            if zeros > order:
+        k, m = self.controller, mapping
+        rest = np.convolve(k.denominator, m.denominator)
+        arms = [np.convolve(k.numerator, p) for p in (m.numerator1, m.numerator2)]
+        for name, b in zip(("m1", "m2"), arms, strict=True):
+            if b.any() and b.size > rest.size:
                 raise ValueError(
-                    f"controller times signal mapping m{name} must be proper, got "
-                    f"{zeros} zeros and {order} poles"
+                    f"controller times signal mapping {name} must be proper, got "
+                    f"{b.size - 1} zeros and {rest.size - 1} poles"
                 )
-        b1, b2 = (np.pad(b, (0, max(order + 1 - b.size, 0)))[: order + 1] for b in (b1, b2))
-        # As many poles at s = 0 as all three have zeros there.
-        common = int(np.flatnonzero((below != 0.0) | (b1 != 0.0) | (b2 != 0.0))[0])
-        below, b1, b2 = below[common:], b1[common:], b2[common:]
-        highest = b1[-1] + b2[-1] + below[-1]
-        if not delay and abs(highest) <= 1e-12 * abs(below[-1]):
+        # The highest power of R (1 + L).
+        highest = rest[-1] + sum(b[-1] for b in arms if b.size == rest.size)
+        if not delay and abs(highest) <= 1e-12 * abs(rest[-1]):
             raise ValueError(
                 f"the loop is not well posed: 1 + K (m1 + m2) must not vanish at high "
-                f"frequency, got {highest / below[-1]}"
+                f"frequency, got {highest / rest[-1]}"
             )
+        # As many poles at s = 0 as all three have zeros there.
+        common = min(int(np.flatnonzero(p)[0]) for p in (rest, *arms) if p.any())
         super().__init__(
-            below,
-            b1,
-            b2,
+            _factored(rest[common:], k.poles, m.denominator),
+            _factored(arms[0][common:], k.zeros, m.numerator1),
+            _factored(arms[1][common:], k.zeros, m.numerator2),
             self.tau1,
             self.tau2,
             delay=delay,
             parameters=("c1", "c2"),
             reference=(1.0, 1.0),
         )
-
-    def polynomials(self) -> tuple[Polynomial, Polynomial, Polynomial]:
-        """Return R, B1 and B2 with their roots: those of controller and signal mapping."""
-        return self._factored
-
-    @cached_property
-    def _factored(self) -> tuple[Polynomial, Polynomial, Polynomial]:
-        k, m = self.controller, self.mapping
-
-        def roots(own: Sequence[complex], p: Sequence[float]) -> ComplexArray:
-            return np.concatenate((own, poly.polyroots(np.asarray(p)))).astype(np.complex128)
-
-        # What has cancelled are roots at s = 0.
-        found = [
-            roots(k.poles, m.denominator),
-            roots(k.zeros, m.numerator1),
-            roots(k.zeros, m.numerator2),
-        ]
-        kept = []
-        for p, all_roots in zip((self.rest, self.b1, self.b2), found, strict=True):
-            others = all_roots[all_roots != 0.0]
-            at_zero = max(p.size - 1 - others.size, 0)
-            kept.append(Polynomial(p, np.concatenate((others, np.zeros(at_zero)))))
-        return kept[0], kept[1], kept[2]
-
-    def proportional_values(
-        self, z: ComplexArray
-    ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Evaluate R, B1 and B2, divided by the controller's numerator.
-
-        As factors the controller is known to rounding, where its coefficients are not.
-        """
-        k, m = self.controller, self.mapping
-        inverse = Controller(k.poles, k.zeros, 1.0)(z) / k.gain
-        below, first, second = (
-            np.asarray(poly.polyval(z, np.array(p)), dtype=np.complex128)
-            for p in (m.denominator, m.numerator1, m.numerator2)
-        )
-        return inverse * below, first, second
 
     def arm_responses(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """Evaluate K m1 exp(-s delay) and K m2 exp(-s delay), factor by factor.
@@ -245,6 +203,19 @@ class Loop(CharacteristicFunction):
         c1, c2 = arms
         result: ComplexArray = first * ((1.0 - c1) - c1 * np.expm1(-s * self.tau1))
         return result + second * ((1.0 - c2) - c2 * np.expm1(-s * self.tau2))
+
+
+def _factored(
+    product: FloatArray, roots: tuple[complex, ...], other: Sequence[float]
+) -> Polynomial:
+    """Return the product of two polynomials with the roots of both.
+
+    Roots at s = 0 may have cancelled: as many are left as the degree says.
+    """
+    found = np.concatenate((roots, poly.polyroots(np.asarray(other))))
+    found = found[found != 0.0]
+    at_zero = np.zeros(max(product.size - 1 - found.size, 0))
+    return Polynomial(product, np.concatenate((found, at_zero)).astype(np.complex128))
 
 
 def checked_loop(loop: Loop) -> Loop:

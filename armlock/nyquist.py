@@ -8,7 +8,6 @@ encirclements are then held against the count of unstable roots: Z = N + P.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import factorial
 from typing import TYPE_CHECKING, Any
@@ -16,24 +15,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from armlock import contour
 from armlock.bounds import last_frequency, last_larger
 from armlock.checks import (
     ComplexArray,
     FloatArray,
     axis,
-    check_memory,
     positive_array,
     positive_number,
     real_number,
 )
+from armlock.contour import MOST_SAMPLES, remaining_argument, resolved_grid
 from armlock.exponentials import ExponentialSum, Polynomial
 from armlock.loops import Loop, checked_loop
 from armlock.stability import (
     BOUNDARY,
     UNCONFINED,
     CountError,
-    roots_of_a,
     sign_changes,
     unstable_roots,
 )
@@ -42,11 +39,11 @@ if TYPE_CHECKING:
     import control
     from matplotlib.axes import Axes
 
-# Largest change of the argument of 1 + L between neighbouring samples, in rad.
-_TURN = 0.2
-# How straight numerator and denominator must be between the samples to start from, relative
-# to their distance from zero.
+# How far numerator and denominator of 1 + L may be from straight lines between two samples,
+# relative to their distance from zero. Neither turns by more than 0.31 rad then.
 _STRAIGHT = 0.1
+# Most that 1 + L turns between two samples, in rad, unless it passes through zero.
+_MOST_TURN = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,12 +193,6 @@ def _poles_at_zero(loop: Loop, c1: float, c2: float) -> int:
     return order - (int(nonzero[0]) if nonzero.size else order)
 
 
-def _poles_elsewhere(loop: Loop) -> ComplexArray:
-    """Poles of controller and sensor except those at s = 0."""
-    roots = loop.polynomials()[0].roots
-    return roots[np.abs(roots) > 0.0]
-
-
 def open_loop_poles(loop: Loop) -> int:
     """Count the poles of L in the open right half-plane.
 
@@ -220,8 +211,8 @@ def open_loop_poles(loop: Loop) -> int:
         If L has poles on the imaginary axis elsewhere than at s = 0: the contour is indented
         there only.
     """
-    poles = _poles_elsewhere(loop)
-    on_axis = np.abs(poles.real) <= 1e-12 * np.abs(poles)
+    poles = loop.polynomials()[0].roots
+    on_axis = (np.abs(poles.real) <= 1e-12 * np.abs(poles)) & (poles != 0.0)
     if on_axis.any():
         raise ValueError(
             "the open loop must have no pole on the imaginary axis except at s = 0, got one "
@@ -230,35 +221,15 @@ def open_loop_poles(loop: Loop) -> int:
     return int((poles.real > 0.0).sum())
 
 
-def _refined(
-    function: Callable[[ComplexArray], ComplexArray], points: ComplexArray
-) -> tuple[ComplexArray, ComplexArray]:
-    """Halve steps until 1 + L turns by less than _TURN and changes by less than half."""
-    values = function(points)
-    for _ in range(60):
-        before, after = 1.0 + values[:-1], 1.0 + values[1:]
-        ratio = after / before
-        wide = (np.abs(np.angle(ratio)) > _TURN) | (np.abs(ratio - 1.0) > 0.5)
-        if not wide.any():
-            return points, values
-        middles = 0.5 * (points[:-1][wide] + points[1:][wide])
-        places = np.flatnonzero(wide) + 1
-        values = np.insert(values, places, function(middles))
-        points = np.insert(points, places, middles)
-        if points.size > 20_000_000:
-            break
-    raise CountError("the Nyquist curve passes through -1", np.empty((0, 2)))
-
-
 def _resolving_grid(loop: Loop, c1: float, c2: float, end: float) -> FloatArray:
     """Frequencies from 0 to `end` between which neither D nor R turns by much."""
     grids = []
     for part in (loop.at(c1, c2), loop.rest_on_boundary()):
         function = part.weights, part.sums, part.phases
-        grids.append(contour.resolved_grid(part.compiled(), function, end, _STRAIGHT))
+        grids.append(resolved_grid(part.compiled(), function, end, _STRAIGHT))
     if any(grid[-1] < end for grid in grids):
         raise CountError(
-            f"no samples up to omega = {end} rad/s: more than {contour.MOST_SAMPLES:.0e}, "
+            f"no samples up to omega = {end} rad/s: more than {MOST_SAMPLES:.0e}, "
             f"because gain times delay is too large",
             np.empty((0, 2)),
         )
@@ -273,17 +244,11 @@ def _turn_beyond(loop: Loop, last: complex, end: float) -> float:
     are known from their roots, and the two turn alike along the arc.
     """
     rest = loop.polynomials()[0]
-    undelayed = Polynomial(loop.a, roots_of_a(loop))
+    undelayed = Polynomial(loop.a, loop.roots_of_a)
     ratio = undelayed.over(rest, np.array(1j * end))
-    gathered = contour.remaining_argument(undelayed.roots, end)
-    gathered -= contour.remaining_argument(rest.roots, end)
+    gathered = remaining_argument(undelayed.roots, end)
+    gathered -= remaining_argument(rest.roots, end)
     return float(gathered - np.angle(last / complex(ratio)))
-
-
-def _turns(values: ComplexArray) -> float:
-    """Argument that 1 + L gathers along the samples."""
-    moved = 1.0 + values
-    return float(np.angle(moved[1:] / moved[:-1]).sum())
 
 
 def leading_radius(loop: Loop, c1: float, c2: float) -> float:
@@ -331,12 +296,12 @@ def nyquist(
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no `Loop`, an argument is not finite and real, `omega_max` is not positive
-        or too large for the memory, or L has poles on the imaginary axis elsewhere than at
-        s = 0.
+        If `loop` is no `Loop`, an argument is not finite and real, `omega_max` is not
+        positive, or L has poles on the imaginary axis elsewhere than at s = 0.
     CountError
-        If the curve passes through -1, the loop's high-frequency chain is not confined, or
-        the encirclements and the independent count of roots disagree.
+        If the curve passes through -1, the loop's high-frequency chain is not confined, the
+        curve takes too many samples, or the encirclements and the independent count of roots
+        disagree.
 
     Notes
     -----
@@ -361,20 +326,12 @@ def nyquist(
         where = f"(c1, c2) = ({c1}, {c2})"
         return CountError(f"no Nyquist count at {where}: {why}", np.array([[c1, c2]]))
 
-    def response(s: ComplexArray) -> ComplexArray:
-        return loop.open_loop(s, c1, c2)
-
-    if np.isnan(end):
-        raise refused("a number overflows")
-    if end == np.inf:
+    if not np.isfinite(end):
         raise refused("the loop's high-frequency chain of roots is not confined")
-
     radius = leading_radius(loop, c1, c2)
     end = max(1.05 * end, 10.0 / loop.longest_delay, 10.0 * radius)
     if omega_max is not None:
         end = max(end, positive_number("omega_max", omega_max))
-        turns = end * loop.longest_delay / (2.0 * np.pi)
-        check_memory("omega_max", (int(min(400.0 * turns, 1e18)),), 256)
     grid = _resolving_grid(loop, c1, c2, end)
     if omega_max is not None:
         turn = 2.0 * np.pi / loop.longest_delay
@@ -382,14 +339,14 @@ def nyquist(
         low, high = np.geomspace(radius, end, 1000), np.arange(0.0, end, turn / 400.0)
         first = np.arange(0.0, min(4.0 * turn, end), turn / 2000.0)
         grid = np.unique(np.concatenate((grid, low, first, high)))
-    inner = grid[(grid > radius) & (grid < end)]
-    up, up_values = _refined(response, 1j * np.concatenate(([radius], inner, [end])))
-    argument = _turns(up_values) + _turn_beyond(loop, 1.0 + up_values[-1], end)
-    quarter = radius * np.exp(1j * np.linspace(0.0, 0.5 * np.pi, 64))
-    arc, arc_values = _refined(response, quarter)
-    argument += _turns(arc_values)
+    omega = np.concatenate(([radius], grid[(grid > radius) & (grid < end)], [end]))
+    arc = radius * np.exp(0.5j * np.pi * np.linspace(0.0, 1.0, 64))
+    contour = loop.open_loop(np.concatenate((arc[:-1], 1j * omega)), c1, c2)
+    turned = np.angle((1.0 + contour[1:]) / (1.0 + contour[:-1]))
+    if np.abs(turned).max() > _MOST_TURN:
+        raise refused("the curve passes through -1")
     # Half of the contour, for omega >= 0, in the direction of ascending omega.
-    turns = argument / np.pi
+    turns = (float(turned.sum()) + _turn_beyond(loop, 1.0 + contour[-1], end)) / np.pi
     encirclements = -round(turns)
     count = encirclements + poles
     expected = int(unstable_roots(loop, c1, c2))
@@ -400,11 +357,12 @@ def nyquist(
             f"{encirclements} encirclements and {poles} open-loop poles against {expected} "
             "roots"
         )
+    around = slice(arc.size if order else 0)
     return NyquistCurve(
-        up.imag,
-        up_values,
-        arc if order else np.empty(0, dtype=np.complex128),
-        arc_values if order else np.empty(0, dtype=np.complex128),
+        omega,
+        contour[arc.size - 1 :],
+        arc[around],
+        contour[around],
         order,
         encirclements,
         poles,

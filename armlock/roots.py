@@ -176,29 +176,12 @@ def extended_root(
     name1, name2 = checked_system(system).parameters
     x, y = real_number(name1, x), real_number(name2, y)
     digits = whole_number("digits", digits, 1)
-    terms = (
-        (system.b1, system.delay1, system.reference[0], x),
-        (system.b2, system.delay2, system.reference[1], y),
-    )
     # Next to s = 0 the terms of D cancel, and take as many digits with them.
     with mpmath.workdps(digits + _GUARD_DIGITS):
         s = mpmath.mpc(complex(complex_array("start", start)[()]))
+        point = mpmath.mpf(x), mpmath.mpf(y)
         for _ in range(_MOST_STEPS):
-            z, dz = s, mpmath.mpf(1)
-            if system.step:
-                z = mpmath.exp(s * system.step)
-                dz = system.step * z
-            # Both values at once: of the polynomial and of its derivative.
-            value, slope = mpmath.polyval(system.rest.tolist(), z, derivative=True, asc=True)
-            slope *= dz
-            dead = mpmath.exp(-s * system.delay)
-            for b, delay, origin, here in terms:
-                p, change = mpmath.polyval(b.tolist(), z, derivative=True, asc=True)
-                late = mpmath.expm1(-s * delay)
-                arm = mpmath.mpf(origin) - here - here * late
-                value += dead * p * arm
-                slope += dead * (change * dz - system.delay * p) * arm
-                slope += dead * p * delay * here * (1 + late)
+            value, slope = system._value(s, *point, mpmath), system._slope(s, *point, mpmath)
             if value == 0:
                 return +s
             if slope == 0:
@@ -221,37 +204,25 @@ def _acting(
 ) -> tuple[CharacteristicFunction, float, float]:
     """Return system and parameters without the delays that do not matter right of a line.
 
-    Their exponentials may be no floats, and zero times infinity is no number. Terms of equal
-    delays are one term, in which they may cancel.
+    Their exponentials may be no floats, and zero times infinity is no number.
     """
-    (x0, y0), (b1, b2) = system.reference, (system.b1, system.b2)
-    terms = [(b1, system.delay1, x0, x), (b2, system.delay2, y0, y)]
-    if system.delay1 == system.delay2:
-        delayed, left = (
-            np.asarray(poly.polyadd(p * b1, q * b2), dtype=np.float64)
-            for p, q in ((x, y), (x0 - x, y0 - y))
-        )
-        terms = [(delayed, system.delay1, 1.0, 1.0), (left, 0.0, 1.0, 0.0)]
-    rest = system.rest
-    for k, (b, delay, origin, here) in enumerate(terms):
-        if here == 0.0 or not b.any() or sigma * delay > _VANISHED:
-            terms[k] = (b, 0.0, origin, 0.0)
-            if system.delay == 0.0:
-                rest = np.asarray(poly.polyadd(rest, origin * b))
-                terms[k] = (np.zeros(1), 0.0, 0.0, 0.0)
-    (b1, delay1, x0, x), (b2, delay2, y0, y) = terms
-    acting = CharacteristicFunction(
-        rest,
-        b1,
-        b2,
-        delay1,
-        delay2,
-        delay=system.delay,
-        step=system.step,
-        parameters=system.parameters,
-        reference=(x0, y0),
-    )
-    return acting, x, y
+    values, delays = [x, y], [system.delay1, system.delay2]
+    if delays[0] == delays[1] and not poly.polyadd(x * system.b1, y * system.b2).any():
+        values = [0.0, 0.0]
+    for k, b in enumerate((system.b1, system.b2)):
+        if not b.any() or sigma * delays[k] > _VANISHED:
+            values[k] = 0.0
+    acting = [delay for delay, value in zip(delays, values, strict=True) if value]
+    if not any(acting) and not system.delay:
+        left = poly.polysub(system.a, values[0] * system.b1)
+        left = poly.polysub(left, values[1] * system.b2)
+        nothing, values = [0.0], [0.0, 0.0]
+        system = system.changed(rest=left, b1=nothing, b2=nothing, delay1=0.0, delay2=0.0)
+    elif len(acting) < 2 and system.delay1 != system.delay2:
+        # Before a parameter of zero any delay will do.
+        delay = acting[0] if acting else 0.0
+        system = system.changed(delay1=delay, delay2=delay)
+    return system, values[0], values[1]
 
 
 class _Line:
@@ -335,25 +306,24 @@ def _polished(system: CharacteristicFunction, x: float, y: float, start: complex
     return complex(root.real, abs(root.imag) if turns else 0.0)
 
 
-def _without_delay(system: CharacteristicFunction, x: float, y: float) -> complex:
-    """Return the rightmost root where no delay acts."""
-    p = poly.polysub(poly.polysub(system.a, x * system.b1), y * system.b2)
-    roots = poly.polyroots(p).astype(np.complex128)
+def _without_delay(system: CharacteristicFunction, point: tuple[float, float]) -> complex:
+    """Return the rightmost root of a system without a delay and without parameters."""
+    roots = system.roots_of_a
     if system.step:
         roots = np.log(roots[roots != 0.0]) / system.step
     if roots.size == 0:
-        name1, name2 = system.parameters
         raise ValueError(
-            f"{name1} and {name2} must leave a loop with roots, got ({x}, {y}): D is {p} there"
+            f"{' and '.join(system.parameters)} must leave a loop with roots, got {point}: "
+            f"D is {system.a} there"
         )
-    return _polished(system, x, y, roots[np.argmax(roots.real)])
+    return _polished(system, 0.0, 0.0, roots[np.argmax(roots.real)])
 
 
 def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
     """Find the rightmost root at one point, or raise `RootError`."""
     acting, p, q = _acting(system, x, y, 0.0)
     if acting.longest_delay == 0.0:
-        return _without_delay(acting, p, q)
+        return _without_delay(acting, (x, y))
     unit = 1.0 / acting.longest_delay
     best = complex(np.nan, np.nan)
     # There are roots right of `low`, as far as can be told, and none right of `high`.

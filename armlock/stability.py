@@ -18,10 +18,8 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
-import mpmath
 import numpy as np
 import numpy.typing as npt
-from numpy.polynomial import polynomial as poly
 from scipy.optimize import elementwise
 
 from armlock import contour
@@ -29,7 +27,6 @@ from armlock.bounds import last_frequency
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import (
     BoolArray,
-    ComplexArray,
     FloatArray,
     IntArray,
     axis,
@@ -112,32 +109,9 @@ def _compiled(system: CharacteristicFunction) -> tuple[Any, ...]:
         np.array(system.reference),
         phases,
         a,
-        roots_of_a(system),
+        system.roots_of_a,
         system.step > 0.0,
     )
-
-
-@lru_cache(maxsize=64)
-def roots_of_a(system: CharacteristicFunction) -> ComplexArray:
-    """Roots of A, in extended precision where doubles give those of another polynomial.
-
-    They enter a count through the argument of A alone, past the last frequency.
-    """
-    if system.delay and not system.step:
-        return system.polynomials()[0].roots
-    a = system.a
-    roots = poly.polyroots(a).astype(np.complex128)
-    product, magnitude = np.array([a[-1]], dtype=np.complex128), np.abs(a[-1:])
-    for root in roots[np.argsort(np.abs(roots))]:
-        product = np.convolve(product, [-root, 1.0])
-        magnitude = np.convolve(magnitude, [abs(root), 1.0])
-    if (np.abs(product - a) <= 1e-6 * magnitude).all():
-        return roots
-    with mpmath.workdps(60):
-        found = mpmath.polyroots(
-            a.tolist(), maxsteps=500, extraprec=400, asc=True, roots_init=roots.tolist()
-        )
-    return np.array([complex(root) for root in found])
 
 
 def sign_changes(
