@@ -21,13 +21,10 @@ _REAL = "iuf"
 
 def real_number(name: str, value: object) -> float:
     """Return `value` as a float, or say why it is not a finite real number."""
-    array = _array(name, value)
-    if array.ndim != 0 or array.dtype.kind not in _REAL:
+    array = _numbers(name, value, _REAL)
+    if array.ndim != 0:
         raise TypeError(f"{name} must be a real number, got {value!r}")
-    number = float(array)
-    if not math.isfinite(number):
-        raise ValueError(f"{name} must be finite, got {number}")
-    return number
+    return float(array)
 
 
 def positive_number(name: str, value: object) -> float:
@@ -63,7 +60,7 @@ def as_written(thing: object) -> str:
 
 def real_array(name: str, value: object) -> FloatArray:
     """Return a copy of `value` as a finite float array of any shape, or raise."""
-    return _real_array(name, value).copy()
+    return _numbers(name, value, _REAL).astype(np.float64)
 
 
 def positive_array(name: str, value: object) -> FloatArray:
@@ -76,11 +73,7 @@ def positive_array(name: str, value: object) -> FloatArray:
 
 def complex_array(name: str, value: object) -> ComplexArray:
     """Return `value` as a finite complex array of any shape, or raise."""
-    array = _array(name, value)
-    if array.dtype.kind not in _REAL + "c":
-        raise TypeError(f"{name} must hold numbers, got dtype {array.dtype}")
-    _require_finite(name, array)
-    return array.astype(np.complex128, copy=False)
+    return _numbers(name, value, _REAL + "c").astype(np.complex128, copy=False)
 
 
 def axis(name: str, value: object) -> FloatArray:
@@ -93,7 +86,7 @@ def axis(name: str, value: object) -> FloatArray:
 
 def finite_series(name: str, value: object, *dimensions: int) -> FloatArray:
     """Return a finite float array of one dimension, or of those given; it is not copied."""
-    array = _real_array(name, value)
+    array = _numbers(name, value, _REAL).astype(np.float64, copy=False)
     if dimensions in ((), (1,)):
         return _one_dimensional(name, array)
     if array.ndim not in dimensions:
@@ -120,9 +113,8 @@ def broadcast_pair(
     name1: str, value1: object, name2: str, value2: object
 ) -> tuple[FloatArray, FloatArray]:
     """Return two finite real arrays of one shape, or name both shapes and raise."""
-    first, second = _real_array(name1, value1), _real_array(name2, value2)
+    first, second = real_array(name1, value1), real_array(name2, value2)
     shape = broadcast_shape((name1, name2), (first, second))
-    check_memory(f"{name1} and {name2}", shape, 48)
     # Copies, because broadcast views are not to be written to.
     return np.broadcast_to(first, shape).copy(), np.broadcast_to(second, shape).copy()
 
@@ -139,21 +131,21 @@ def check_memory(name: str, shape: tuple[int, ...], bytes_each: int) -> None:
         )
 
 
-def _array(name: str, value: object) -> npt.NDArray[Any]:
-    """Return `value` as an array, or say that nested lists differ in length."""
+def _numbers(name: str, value: object, kinds: str) -> npt.NDArray[Any]:
+    """Return `value` as an array of finite numbers of some kinds of dtype, or raise."""
     try:
-        return np.asarray(value)
+        array = np.asarray(value)
     except ValueError:
         raise ValueError(f"{name} must be a rectangular array, got {value!r}") from None
-
-
-def _real_array(name: str, value: object) -> FloatArray:
-    """Return `value` as a finite float array of any shape, itself where it is one."""
-    array = _array(name, value)
-    if array.dtype.kind not in _REAL:
-        raise TypeError(f"{name} must hold real numbers, got dtype {array.dtype}")
-    _require_finite(name, array)
-    return array.astype(np.float64, copy=False)
+    if array.dtype.kind not in kinds:
+        what = "real numbers" if kinds == _REAL else "numbers"
+        raise TypeError(f"{name} must hold {what}, got dtype {array.dtype}")
+    finite = np.isfinite(array)
+    if not finite.all():
+        first = tuple(int(at) for at in np.argwhere(~finite)[0])
+        place = f" at index {', '.join(map(str, first))}" if first else ""
+        raise ValueError(f"{name} must be finite, got {array[first]}{place}")
+    return array
 
 
 def _one_dimensional(name: str, array: FloatArray) -> FloatArray:
@@ -161,12 +153,3 @@ def _one_dimensional(name: str, array: FloatArray) -> FloatArray:
     if array.ndim != 1:
         raise ValueError(f"{name} must be one-dimensional, got shape {array.shape}")
     return array
-
-
-def _require_finite(name: str, array: npt.NDArray[Any]) -> None:
-    """Raise where a value is infinite or nan."""
-    finite = np.isfinite(array)
-    if not finite.all():
-        first = tuple(int(at) for at in np.argwhere(~finite)[0])
-        place = f" at index {', '.join(map(str, first))}" if first else ""
-        raise ValueError(f"{name} must be finite, got {array[first]}{place}")

@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, reduce
 from typing import Any, Self
 
 import mpmath
 import numpy as np
 import numpy.typing as npt
+from numpy.polynomial import polynomial as poly
 
 from armlock import paper
 from armlock.checks import (
@@ -89,28 +90,25 @@ class Controller:
             return controller
         if isinstance(controller, tuple) and len(controller) == 3:
             return cls(*controller)
-        if isinstance(controller, type) or not all(
-            hasattr(controller, name)
-            for name in ("num", "den", "zeros", "poles", "ninputs", "noutputs", "dt")
-        ):
+        import control
+
+        if not isinstance(controller, control.TransferFunction):
             raise TypeError(
                 "controller must be a Controller, a control.TransferFunction or a triple "
                 f"(zeros, poles, gain), got {type(controller).__name__}"
             )
-        if controller.ninputs != 1 or controller.noutputs != 1:
+        if not controller.issiso():
             raise ValueError(
                 "controller must have one input and one output, got "
                 f"{controller.ninputs} and {controller.noutputs}"
             )
-        if controller.dt:
+        if controller.isdtime(strict=True):
             raise ValueError(
                 f"controller must be continuous in time, got sampling time {controller.dt}"
             )
-        above = np.trim_zeros(np.asarray(controller.num[0][0], dtype=float), "f")
-        below = np.trim_zeros(np.asarray(controller.den[0][0], dtype=float), "f")
-        if above.size == 0:
-            raise ValueError("controller must not be zero: there would be no loop")
-        return cls(controller.zeros(), controller.poles(), float(above[0] / below[0]))
+        # It has no zeros in front of the highest power.
+        gain = controller.num[0][0][0] / controller.den[0][0][0]
+        return cls(controller.zeros(), controller.poles(), float(gain))
 
     @property
     def numerator(self) -> FloatArray:
@@ -153,20 +151,16 @@ class Controller:
         mine, yours = Counter(self.poles), Counter(other.poles)
         only_mine, only_yours = (tuple(p.elements()) for p in (mine - yours, yours - mine))
         with mpmath.workdps(_DIGITS):
-            first = _precise(self.zeros + only_yours, self.gain)
-            second = _precise(other.zeros + only_mine, other.gain)
-            longer = max(len(first), len(second))
-            first, second = ([0] * (longer - len(p)) + p for p in (first, second))
-            total = [mpmath.re(a + b) for a, b in zip(first, second, strict=True)]
-            while total[0] == 0 and len(total) > 1:
-                del total[0]
-            exact = (
-                mpmath.polyroots(total[::-1], maxsteps=500, extraprec=400, asc=True)
-                if total[0]
-                else []
+            total = poly.polyadd(
+                _precise(self.zeros + only_yours, self.gain),
+                _precise(other.zeros + only_mine, other.gain),
             )
+            coefficients = [mpmath.re(value) for value in total]
+            zeros = []
+            if len(coefficients) > 1:
+                zeros = mpmath.polyroots(coefficients, maxsteps=500, extraprec=400, asc=True)
             poles = self.poles + only_yours
-            return Controller([complex(z) for z in exact], poles, float(total[0]))
+            return Controller([complex(z) for z in zeros], poles, float(coefficients[-1]))
 
 
 def _factors(name: str, values: Sequence[complex]) -> tuple[complex, ...]:
@@ -186,15 +180,10 @@ def _expanded(roots: tuple[complex, ...]) -> FloatArray:
     return np.ascontiguousarray(np.atleast_1d(np.poly(np.array(roots))).real[::-1])
 
 
-def _precise(roots: tuple[complex, ...], gain: float) -> list[Any]:
-    """Return the coefficients of gain prod(s - roots), descending, in extended precision."""
-    coefficients = [mpmath.mpf(gain)]
-    for root in map(mpmath.mpc, roots):
-        shifted = [*coefficients, mpmath.mpf(0)]
-        for k, value in enumerate(coefficients, 1):
-            shifted[k] -= root * value
-        coefficients = shifted
-    return coefficients
+def _precise(roots: tuple[complex, ...], gain: float) -> npt.NDArray[Any]:
+    """Return the coefficients of gain prod(s - roots), ascending, in extended precision."""
+    factors = [np.array([-mpmath.mpc(root), mpmath.mpf(1)]) for root in roots]
+    return reduce(np.convolve, factors, np.array([mpmath.mpf(gain)]))
 
 
 def integrating_actuator(gain: float = 1.0) -> Controller:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -57,6 +57,12 @@ MEASURES: Final = {
 # Corners of the box as seen from (1, 1), each next to the one before; the centre comes first.
 _CORNERS = np.array(((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)))
 _POINTS = np.vstack((np.zeros(2), _CORNERS))
+# Along which the critical perturbation is taken.
+_DIRECTION = (1.0, -1.0)
+# The certified margin behind a measure.
+_MARGINS = {"modulus": "modulus", "phase": "phase", "dead time": "delay"}
+# How far a search may move a parameter either way.
+_DECADES = 1.0
 # How often a box is cut in four before it is given up.
 _CUTS = 6
 # Bounds are searched for with so much to spare: samples miss a little, and the certified bound
@@ -68,21 +74,18 @@ _UNSTABLE = 1e3
 #: Dead time in s of actuator, phasemeter and transponder in the white paper.
 FLIGHT_DELAY: Final = 12.3e-6
 
-# What searches found, rounded, in Hz. `design` finds loops like them from round numbers and a
+# What searches found, rounded. `design` finds loops like them from round numbers and a
 # `roll_off` (the test from scratch); the second stems from a search outside of this module.
-_ROBUST_POLES = (0.25e-6, 0.108e-6)
-_ROBUST_LEADS = ((0.37e-6, 1), (16.75e-6, 3)), ((114.7e-6, 4),)
-_ROLL_OFF_ZEROS = (0.111, 4.67, 29.5, 186.0, 1266.0, 15450.0)
-_ROLL_OFF_POLES = (0.0059, 0.82, 8.91, 54.6, 342.0, 2228.0, 40e3)
 
 
 def _robust_controller() -> Controller:
-    zeros, poles = (
-        tuple(-2.0 * math.pi * f for f, count in factors for _ in range(count))
-        for factors in _ROBUST_LEADS
-    )
-    high_pass = tuple(-2.0 * math.pi * f for f in _ROBUST_POLES)
-    return Controller((0.0, 0.0, *zeros), (*high_pass, *poles), paper.CONTROLLER_GAIN)
+    zeros, poles = _at_hertz(0.37e-6, *[16.75e-6] * 3), [0.25e-6, 0.108e-6, *[114.7e-6] * 4]
+    return Controller((0.0, 0.0, *zeros), _at_hertz(*poles), paper.CONTROLLER_GAIN)
+
+
+def _at_hertz(*corners: float) -> list[float]:
+    """Return zeros or poles with corners in Hz."""
+    return [-2.0 * math.pi * f for f in corners]
 
 
 def robust_loop() -> Loop:
@@ -135,10 +138,8 @@ def buildable_loop() -> Loop:
     >>> int(unstable_roots(loop, 1.0 + 1e-6, 1.0 - 1e-6))
     0
     """
-    zeros, poles = (
-        tuple(-2.0 * math.pi * f for f in corners)
-        for corners in (_ROLL_OFF_ZEROS, _ROLL_OFF_POLES)
-    )
+    zeros = _at_hertz(0.111, 4.67, 29.5, 186.0, 1266.0, 15450.0)
+    poles = _at_hertz(0.0059, 0.82, 8.91, 54.6, 342.0, 2228.0, 40e3)
     # A gain of one at low frequency.
     gain = abs(float(np.prod(poles) / np.prod(zeros)))
     controller = _robust_controller() * Controller(zeros, poles, gain)
@@ -392,8 +393,6 @@ class Design:
     crossings : int
         Roots that cross the imaginary axis on the way around the box along its edges, by
         certified walks. What takes a root of the inner box there has to pass an edge.
-    start : float
-        The objective at the start, by samples; nan if the start is not stable.
     evaluations : int
         Candidates that were judged.
 
@@ -409,7 +408,6 @@ class Design:
     measures: dict[str, float]
     counts: IntArray
     crossings: int
-    start: float
     evaluations: int
 
     @property
@@ -439,12 +437,10 @@ class _Judge:
         start: Loop,
         goal: tuple[FloatArray, FloatArray],
         box: float,
-        direction: tuple[float, float],
         free_above: float | None,
         free_gain: bool,
     ) -> None:
-        self.start, self.box, self.direction = start, box, direction
-        self.free_above, self.free_gain = free_above, free_gain
+        self.start, self.box, self.free_gain = start, box, free_gain
         k = start.controller
         self.factors = [
             [(r.real, roots.count(r)) for r in sorted(set(roots), key=abs) if r]
@@ -498,7 +494,7 @@ class _Judge:
         expected = 0.5 * np.pi * int(np.flatnonzero(self.start.rest)[0])
         if abs(phase[-1] - phase[0] - expected) > 0.5 * np.pi or not (distance[0] > 0.0).all():
             return None
-        along = self.direction[0] * late[0] + self.direction[1] * late[1]
+        along = _DIRECTION[0] * late[0] + _DIRECTION[1] * late[1]
         n = self.low
         goal, wanted = self.goal
         return {
@@ -613,10 +609,8 @@ def design(
     *,
     goal: tuple[Sequence[float] | FloatArray, Sequence[float] | FloatArray] | None = None,
     box: float = paper.PERTURBATION,
-    direction: tuple[float, float] = (1.0, -1.0),
     free_above: float | None = None,
     free_gain: bool = False,
-    decades: float = 1.0,
     generations: int = 60,
     seed: int = 0,
     executor: Executor | None = None,
@@ -628,14 +622,14 @@ def design(
     ----------
     structure : Loop
         A loop to start from, with sensor, delays and dead time. Its controller's real zeros and
-        poles are moved; equal ones stay equal, those at s = 0 stay there.
+        poles are moved by a decade at most; equal ones stay equal, those at s = 0 stay there.
     objective : str
         What is to become as good as possible: a key of `constraints`.
     constraints : mapping of str to float
         Bounds on the others:
 
         - "suppression": smallest \|K\| over the goal, in dB
-        - "critical perturbation": along `direction`
+        - "critical perturbation": along (1, -1)
         - "modulus", "modulus in the box": modulus margin at (1, 1), and in the worst corner
         - "phase", "phase in the box": phase margin at (1, 1), and in the worst corner, in rad
         - "dead time": the smallest additional one that makes the loop unstable, in s
@@ -648,15 +642,11 @@ def design(
         the structure, at 60 frequencies from 0.1 mHz to 1 Hz.
     box : float, optional
         Perturbations of either arm for which the loop is to be stable.
-    direction : tuple of two floats, optional
-        Of the critical perturbation.
     free_above : float, optional
         As for `armlock.margins`; in rad/s. A loop that rolls off takes it: its certificates
         then need not follow every turn of the arms' phases.
     free_gain : bool, optional
         Whether the gain is a parameter, too.
-    decades : float, optional
-        How far a parameter may move either way.
     generations : int, optional
         Of the global search, differential evolution; 0 for the local one from the start alone.
     seed : int, optional
@@ -664,7 +654,7 @@ def design(
     executor : concurrent.futures.Executor, optional
         What judges the candidates, see `armlock.sweep`; the result is the same.
     progress : bool, optional
-        Whether a line is printed for each tenth generation.
+        Whether a line is printed for each generation.
 
     Returns
     -------
@@ -698,31 +688,42 @@ def design(
     bounds = _checked_bounds(objective, constraints)
     if free_above is not None:
         free_above = positive_number("free_above", free_above)
-    _check_structure(structure, free_gain)
+    _check_structure(structure)
     box = positive_number("box", box)
     goal = _checked_goal(structure, goal)
-    judge = _Judge(structure, goal, box, direction, free_above, bool(free_gain))
+    judge = _Judge(structure, goal, box, free_above, free_gain)
     ends = judge.omega[[0, -1]] / (2.0 * np.pi)
     if goal[0].min() < ends[0] or goal[0].max() > ends[1]:
         raise ValueError(
             f"goal must lie between {ends[0]:.3g} Hz and {ends[1]:.3g} Hz, which the samples "
             f"resolve; got {goal[0].min()} to {goal[0].max()}"
         )
-    reach = positive_number("decades", decades)
     generations = whole_number("generations", generations, 0)
     cost = partial(_cost, judge=judge, objective=objective, constraints=bounds)
     x, evaluations = judge.x, 0
+    limits = np.column_stack((x - _DECADES, x + _DECADES))
     if generations:
-        workers = partial(sweep, executor=executor)
-        x, evaluations = _global(cost, x, reach, generations, seed, workers, progress)
-    x, more = _local(cost, x, judge.x - reach, judge.x + reach)
+        found = differential_evolution(
+            cost,
+            limits,
+            maxiter=generations,
+            popsize=8,
+            rng=seed,
+            x0=x,
+            polish=False,
+            updating="deferred",
+            workers=partial(sweep, executor=executor),
+            disp=progress,
+        )
+        x, evaluations = found.x, int(found.nfev)
+    x, more = _local(cost, x, limits)
     sampled = judge(x)
     if sampled is None:
         raise ValueError(
             "constraints must be such that a stable loop is among the candidates; none was met"
         )
     _require(bounds, sampled)
-    loop, first = judge.loop(x), judge(judge.x)
+    loop = judge.loop(x)
     counts = box_counts(loop, box)
     crossings = edge_crossings(loop, box, free_above)
     if counts.any() or crossings:
@@ -730,12 +731,13 @@ def design(
             f"constraints must leave a loop that is stable over the box, but the counts of the "
             f"best candidate are {counts.tolist()}, and {crossings} roots cross on its edges"
         )
-    found = [margins(loop, c1, c2, free_above) for c1, c2 in 1.0 + box * _POINTS]
-    names = (objective, *bounds)
-    measures = {name: _certified(name, judge, loop, sampled, found) for name in names}
+    points = [margins(loop, c1, c2, free_above) for c1, c2 in 1.0 + box * _POINTS]
+    measures = {
+        name: _certified(name, loop, free_above, sampled[name], points)
+        for name in (objective, *bounds)
+    }
     _require(bounds, measures)
-    begin = math.nan if first is None else first[objective]
-    return Design(loop, measures, counts, crossings, begin, evaluations + more)
+    return Design(loop, measures, counts, crossings, evaluations + more)
 
 
 def _checked_bounds(objective: str, constraints: Mapping[str, float]) -> dict[str, float]:
@@ -747,15 +749,13 @@ def _checked_bounds(objective: str, constraints: Mapping[str, float]) -> dict[st
     return {name: real_number(name, bound) for name, bound in constraints.items()}
 
 
-def _check_structure(structure: Loop, free_gain: bool) -> None:
+def _check_structure(structure: Loop) -> None:
     k = checked_loop(structure).controller
     if any(r.imag or r.real > 0.0 for r in (*k.zeros, *k.poles)):
         raise ValueError(
             "structure must have a controller with real zeros and poles, none positive; "
             f"got zeros {k.zeros} and poles {k.poles}"
         )
-    if not any(k.zeros) and not any(k.poles) and not free_gain:
-        raise ValueError("structure must have a zero or pole to move, or free_gain be True")
 
 
 def _checked_goal(
@@ -772,59 +772,20 @@ def _checked_goal(
     return frequency, size
 
 
-def _global(
-    cost: Callable[[FloatArray], float],
-    start: FloatArray,
-    reach: float,
-    generations: int,
-    seed: int,
-    workers: Callable[..., list[float]],
-    progress: bool,
-) -> tuple[FloatArray, int]:
-    """Minimise a cost over a box around a start; return where, and the evaluations."""
-    done = 0
-
-    def report(intermediate_result: Any) -> None:
-        nonlocal done
-        done += 1
-        if progress and done % 10 == 0:
-            print(f"generation {done} of {generations}: {intermediate_result.fun:.4f}")
-
-    found = differential_evolution(
-        cost,
-        [(v - reach, v + reach) for v in start],
-        maxiter=generations,
-        popsize=8,
-        rng=seed,
-        x0=start,
-        polish=False,
-        updating="deferred",
-        workers=workers,
-        callback=report,
-    )
-    return found.x, int(found.nfev)
-
-
 def _local(
-    cost: Callable[[FloatArray], float], x: FloatArray, lower: FloatArray, upper: FloatArray
+    cost: Callable[[FloatArray], float], x: FloatArray, limits: FloatArray
 ) -> tuple[FloatArray, int]:
-    """Minimise a cost from a start, with ever smaller simplices; as `_global`."""
+    """Minimise a cost with ever smaller simplices; return where, and the number of calls."""
     evaluations = 0
     for size in (0.05, 0.02, 0.005):
+        simplex = np.clip(np.vstack((x, x + size * np.eye(x.size))), *limits.T)
+        options = {"initial_simplex": simplex, "adaptive": True, "maxfev": 150 * x.size}
         found = minimize(
             cost,
             x,
             method="Nelder-Mead",
-            bounds=list(zip(lower, upper, strict=True)),
-            options={
-                "initial_simplex": np.clip(
-                    np.vstack((x, x + size * np.eye(x.size))), lower, upper
-                ),
-                "adaptive": True,
-                "maxfev": 150 * x.size,
-                "xatol": 1e-5,
-                "fatol": 1e-7,
-            },
+            bounds=limits,
+            options={**options, "xatol": 1e-5, "fatol": 1e-7},
         )
         evaluations += int(found.nfev)
         if found.fun <= cost(x):
@@ -848,21 +809,20 @@ def _require(bounds: Mapping[str, float], found: Mapping[str, float]) -> None:
 
 def _certified(
     name: str,
-    judge: _Judge,
     loop: Loop,
-    sampled: Mapping[str, float],
-    found: Sequence[Margins],
+    free_above: float | None,
+    sampled: float,
+    points: Sequence[Margins],
 ) -> float:
-    """Return a measure of a loop; `found` holds its margins at (1, 1) and in the corners."""
+    """Return a measure of a loop; `points` are its margins at (1, 1) and in the corners."""
     if name == "critical perturbation":
-        return quick_critical_perturbation(loop, judge.direction, judge.free_above)
+        return quick_critical_perturbation(loop, _DIRECTION, free_above)
     if name == "unity gain":
         both = np.asarray(poly.polyadd(loop.b1, loop.b2), dtype=np.float64)
         end = last_larger(loop.rest, (both, loop.b1, loop.b2), np.ones(3))
         return end / (2.0 * math.pi)
-    fields = {"modulus": "modulus", "phase": "phase", "dead time": "delay"}
     plain = name.removesuffix(" in the box")
-    if plain not in fields:
-        return sampled[name]
-    values = [float(getattr(point, fields[plain])) for point in found]
+    if plain not in _MARGINS:
+        return sampled
+    values = [float(getattr(point, _MARGINS[plain])) for point in points]
     return values[0] if name == plain else min(values)

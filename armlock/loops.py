@@ -148,10 +148,11 @@ class Loop(CharacteristicFunction):
             )
         # As many poles at s = 0 as all three have zeros there.
         common = min(int(np.flatnonzero(p)[0]) for p in (rest, *arms) if p.any())
+        rest, b1, b2 = (p[common:] if p.any() else p for p in (rest, *arms))
         super().__init__(
-            _factored(rest[common:], k.poles, m.denominator),
-            _factored(arms[0][common:], k.zeros, m.numerator1),
-            _factored(arms[1][common:], k.zeros, m.numerator2),
+            _factored(rest, k.poles, m.denominator),
+            _factored(b1, k.zeros, m.numerator1),
+            _factored(b2, k.zeros, m.numerator2),
             self.tau1,
             self.tau2,
             delay=delay,

@@ -226,14 +226,13 @@ def modified_dual(
         )
     w0 = positive_number("corner", corner)
     zb, pb = 2.0 * np.pi * 5.0 / (13.0 * mean), 2.0 * np.pi * 5.0 / (2.0 * mean)
-    pe = 2.0 * np.pi / (90.0 * mean)
-    slow = poly.polyfromroots([0.0, -pb])
-    fast = poly.polyfromroots([-7.0 / (5.0 * mean), -11.0 / (20.0 * mean), -pe, -pe])
-    filtered = np.array([w0, 1.0])
-    common = poly.polymul(pb / (zb * mean) * np.array([zb, 1.0]), fast)
-    dual_part = poly.polymul([0.0, 0.0, 0.0, 0.0, 1.0], slow)
-    plus = poly.polymul(poly.polyadd(common, dual_part), filtered)
-    minus = poly.polymul([0.0, 0.0, 0.0, w0 / half], slow)
-    below = poly.polymul(poly.polymul(slow, fast), filtered)
-    first, second = poly.polyadd(plus, minus), poly.polysub(plus, minus)
-    return SignalMapping(first.tolist(), second.tolist(), below.tolist(), "modified dual")
+    pc, pd, pe = 7.0 / (5.0 * mean), 11.0 / (20.0 * mean), 2.0 * np.pi / (90.0 * mean)
+    s = poly.Polynomial([0.0, 1.0])
+    slow, fast = s * (s + pb), (s + pc) * (s + pd) * (s + pe) ** 2
+    plus = (pb / (zb * mean) * (s + zb) * fast + s**4 * slow) * (s + w0)
+    minus = w0 / half * s**3 * slow
+    below = slow * fast * (s + w0)
+    first, second = plus + minus, plus - minus
+    return SignalMapping(
+        first.coef.tolist(), second.coef.tolist(), below.coef.tolist(), "modified dual"
+    )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import mpmath
 import numpy as np
+from scipy.interpolate import BarycentricInterpolator
 from scipy.special import lambertw
 
 
@@ -111,8 +112,7 @@ def rectangle_count(system, x, y, density=10.0):
 def generator_eigenvalues(system, x, y, nodes=80):
     """Eigenvalues of the collocated delay equation in companion form (retarded only).
 
-    The state is (xi, xi', ...); polynomials of degree `nodes` on the longest delay, written
-    in Lagrange form with weights from products.
+    The state is (xi, xi', ...), as polynomials of degree `nodes` on the longest delay.
     """
     order = system.a.size - 1
     now = np.diag(np.ones(order - 1), 1)
@@ -127,21 +127,8 @@ def generator_eigenvalues(system, x, y, nodes=80):
             delayed.append((delay, last_row))
     longest = max((delay for delay, _ in delayed), default=1.0)
     theta = 0.5 * longest * (np.cos(np.pi * np.arange(nodes + 1) / nodes) - 1.0)
-    scaled = theta * (4.0 / longest)
-    gaps = scaled[:, None] - scaled[None, :] + np.eye(nodes + 1)
-    weights = 1.0 / gaps.prod(axis=1)
-    difference = (weights[None, :] / weights[:, None]) / gaps
-    np.fill_diagonal(difference, 0.0)
-    np.fill_diagonal(difference, -difference.sum(axis=1))
-    difference *= 4.0 / longest
-
-    def lagrange(at):
-        distance = at - theta
-        if np.abs(distance).min() == 0.0:
-            return (distance == 0.0).astype(float)
-        terms = weights / distance
-        return terms / terms.sum()
-
+    lagrange = BarycentricInterpolator(theta, np.eye(nodes + 1))
+    difference = lagrange.derivative(theta)
     matrix = np.kron(difference, np.eye(order))
     first = np.zeros((order, order * (nodes + 1)))
     first[:, :order] = now

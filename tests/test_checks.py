@@ -9,7 +9,6 @@ from typing import Any
 import control
 import numpy as np
 import pytest
-import scipy.signal
 
 import armlock
 from armlock import CharacteristicFunction, CommonArm, HayesEquation, SingleArm, paper_loop
@@ -127,34 +126,23 @@ def test_every_public_function_is_called_above():
 # Beyond that, what each argument must be: one value past the constraint.
 WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
     (CharacteristicFunction, "b1", [1.0, 1.0, 1.0], "not exceed the degree"),
-    (CharacteristicFunction, "b2", [[1.0]], "be one-dimensional"),
-    (CharacteristicFunction, "b2", [], "hold at least one value"),
-    (CharacteristicFunction, "delay1", -1.0, "not be negative, got -1.0"),
     (CharacteristicFunction, "delay", -1.0, "not be negative, got -1.0"),
     (CharacteristicFunction, "step", 0.3, "divide every delay, got step=0.3 for delay1"),
-    (CharacteristicFunction, "reference", (1.0,), "hold two numbers, got 1"),
     (CommonArm, "gain", 0.0, "be positive, got 0.0"),
     (armlock.Controller, "gain", 0.0, "not be zero"),
     (armlock.Controller, "poles", (1j,), "be real or in conjugate pairs"),
-    (armlock.Controller, "zeros", (1 + 1j, 1 - 2j), "be real or in conjugate pairs"),
-    (armlock.Controller, "zeros", ((1.0,),), "be one-dimensional, got shape (1, 1)"),
     (armlock.Loop, "controller", control.tf([1.0], [1.0, 1.0], 0.1), "be continuous"),
-    (armlock.Loop, "controller", control.tf([0.0], [1.0, 1.0]), "not be zero"),
-    (armlock.Loop, "controller", scipy.signal.TransferFunction([1.0], [1.0, 1.0]), "be a"),
     (armlock.Loop, "mapping", SignalMapping([0.0], [0.0], [1.0], "none"), "not be zero"),
     (SignalMapping, "denominator", [0.0], "not be zero, got (0.0,)"),
     (dual, "difference", 0.0, "not be zero"),
-    (table_two, "denominator", "x", "be 'table' or 'printed', got 'x'"),
     (ARMS.shifted, "sigma", -50.0, "be at most 700 over the longest delay"),
     (armlock.stability_chart, "x", [], "hold at least one value, got 0"),
     (armlock.stability_chart, "y", 1.0, "be one-dimensional, got shape ()"),
     (armlock.d_curve, "system", SingleArm(), "depend on both free parameters"),
-    (armlock.d_curve, "omega", 1e13, "be at most "),
     (armlock.d_curve_line, "system", FLAT, "depend on a free parameter at s = 0"),
     (ray_crossings, "start", (0.0,), "hold two numbers, got 1"),
     (ray_crossings, "direction", (0.0, 0.0), "not have length zero"),
     (armlock.nyquist, "loop", HayesEquation(), "be a Loop, for instance CommonArm()"),
-    (armlock.nyquist, "omega_max", 1e12, "be of a size that memory holds"),
     (armlock.axis_crossings, "omega_max", None, "be given"),
     (armlock.frequency_response, "omega", [1.0, 0.0], "be positive"),
     (armlock.spectral_radius, "system", NEUTRAL["integrator"], "be of retarded type"),

@@ -43,13 +43,6 @@ def test_three_forms_give_one_loop(zeros, poles, gain):
         )
 
 
-def test_a_numerator_of_python_control_may_start_with_zeros():
-    padded = control.TransferFunction([0.0, 0.0, 3.0], [1.0, 2.0, 0.0])
-    made = Controller.of(padded)
-    assert made.zeros == ()
-    np.testing.assert_allclose(made(S), 3.0 / (S * (S + 2.0)), rtol=1e-13)
-
-
 def test_series_connection_multiplies():
     first, second = Controller([-2.0], [-1.0], 3.0), integrating_actuator(0.5)
     np.testing.assert_allclose((first * second)(S), first(S) * second(S), rtol=1e-14)

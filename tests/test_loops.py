@@ -8,7 +8,6 @@ from armlock import (
     Loop,
     SingleArm,
     paper_loop,
-    unstable_roots,
 )
 from armlock.controllers import integrating_actuator
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, SignalMapping, dual
@@ -51,11 +50,6 @@ def test_characteristic_function_vanishes_where_the_return_difference_does(mappi
     ratio = loop(S, 0.9, 1.1) / (1.0 + loop.open_loop(S, 0.9, 1.1))
     denominator = S * np.polyval(list(mapping.denominator)[::-1], S)
     np.testing.assert_allclose(ratio, denominator, rtol=1e-11)
-
-
-def test_equal_delays_are_fine_where_only_roots_are_counted():
-    assert unstable_roots(CommonArm(tau1=20.0, tau2=20.0), 0.9, 0.9) == 0
-    assert unstable_roots(CommonArm(tau1=20.0, tau2=20.0), 1.5, 0.51) > 0
 
 
 def test_equal_delays_are_refused_by_the_dual_arm():

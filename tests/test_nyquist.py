@@ -34,9 +34,7 @@ PRINTED = table_two(denominator="printed")
 CASES = {
     "single arm, ideal": (SingleArm(), (1.0, 1.0), 0),
     "single arm, unstable": (SingleArm(), (1.001, 1.0), 0),
-    "single arm, stable": (SingleArm(), (0.999, 1.0), 0),
     "single arm, far below": (SingleArm(3.0, 2.0), (-1.7, 1.0), 0),
-    "common arm": (CommonArm(), (1.0, 1.001), 0),
     "common arm, many roots": (CommonArm(), (1.3, 1.1), 0),
     "common arm, a rounding away": (CommonArm(), (1.0, 1.0 + 1e-13), 0),
     "dual arm, ideal": (DualArm(), (1.0, 1.0), 0),
@@ -45,22 +43,13 @@ CASES = {
     "dual arm, many roots": (DualArm(gain=2.0), (1.2, 1.1), 0),
     "Table II": (paper_loop(), (1.0, 1.0 - 1e-6), 0),
     "Table II, unstable": (paper_loop(), (1.0, 1.0 - 4e-6), 0),
-    "Table II, actuator": (paper_loop(actuator=True), (1.0, 1.0 - 1e-6), 0),
-    "Eq. 11": (paper_loop(controller=PRINTED), (1.0, 1.0), 0),
     "Eq. 11, actuator": (paper_loop(controller=PRINTED, actuator=True), (1.0, 1.0), 0),
-    "double integrator": (Loop(((-0.1,), (0, 0), 1.0), COMMON, 2.0, 1.5), (1.0, 0.99), 0),
     "triple integrator": (
         Loop(((-0.1, -0.1), (0, 0, 0), 1.0), COMMON, 2.0, 1.5),
         (1.0, 1.01),
         0,
     ),
     "one unstable pole": (Loop(((), (0.5,), 2.0), SINGLE, 2.0, 1.5), (0.9, 1.0), 1),
-    "far unstable pole": (Loop(((), (100.0,), 500.0), SINGLE, 2.0, 1.5), (0.9, 1.0), 1),
-    "unstable pair": (
-        Loop(((-1,), (0.2 + 2j, 0.2 - 2j), 0.7), COMMON, 2.0, 1.5),
-        (0.8, 0.9),
-        2,
-    ),
     "fast unstable pair": (
         Loop(((), (0.1 + 50j, 0.1 - 50j), 1.0), SINGLE, 2, 1.5),
         (0.9, 1),
@@ -153,13 +142,6 @@ def test_poles_on_the_axis_are_refused_with_the_reason_and_counted_elsewhere(pol
 def test_an_unconfined_chain_is_refused():
     with pytest.raises(CountError, match="high-frequency chain of roots is not confined"):
         nyquist(Loop(((), (), 5.0), SINGLE, 2.0, 1.5), 1.3, 1.0)
-
-
-def test_an_improper_controller_is_refused():
-    with pytest.raises(ValueError, match="must be proper, got 2 zeros and 1 poles"):
-        Loop(((-1.0, -2.0), (-3.0,), 1.0), SINGLE, 2.0, 1.5)
-    # The integrator makes up for one zero too many.
-    assert Loop(((-1.0, -2.0), (-3.0, 0.0), 1.0), SINGLE, 2.0, 1.5).neutral
 
 
 @pytest.mark.parametrize(("mapping", "gain"), [(SINGLE, -1.0), (COMMON, -0.5)])
