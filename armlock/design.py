@@ -34,7 +34,7 @@ from armlock.checks import (
 from armlock.contour import winding
 from armlock.controllers import Controller
 from armlock.loops import Loop, checked_loop, paper_loop
-from armlock.margins import Margins, critical_perturbation, margins
+from armlock.margins import Margins, clear_above, critical_perturbation, margins
 from armlock.rays import Ray
 from armlock.stability import BOUNDARY, UNCONFINED, unstable_roots
 from armlock.sweep import sweep
@@ -301,7 +301,7 @@ def edge_crossings(loop: Loop, size: float, free_above: float | None = None) -> 
     highest = math.inf
     if free_above is not None:
         highest = positive_number("free_above", free_above)
-        if not _clear_above(loop, (1.0 + size, 1.0 + size), highest):
+        if not clear_above(loop, np.full(2, 1.0 + size), highest):
             return UNCONFINED
     return sum(
         Ray(loop, corner, following - corner).crossings(1.0, highest=highest).position.size
@@ -309,14 +309,6 @@ def edge_crossings(loop: Loop, size: float, free_above: float | None = None) -> 
             1.0 + size * _CORNERS, 1.0 + size * np.roll(_CORNERS, -1, axis=0), strict=True
         )
     )
-
-
-def _clear_above(loop: Loop, most: Sequence[float] | FloatArray, free_above: float) -> bool:
-    """Whether no phases above a frequency let a root cross, for |c1| and |c2| up to `most`."""
-    c1, c2 = most
-    stable = int(unstable_roots(loop, c1, c2)) == 0
-    # Where it is not stable the margins do not tell.
-    return stable and margins(loop, c1, c2, free_above).modulus > 0.0
 
 
 def _stays_clear(loop: Loop, c1: float, c2: float, half: float) -> bool:
@@ -331,51 +323,6 @@ def _stays_clear(loop: Loop, c1: float, c2: float, half: float) -> bool:
         whole.compiled(), whole.weights, whole.sums, whole.phases, uncertain, end
     )
     return bool(clear) and not math.isnan(argument)
-
-
-def quick_critical_perturbation(
-    loop: Loop, direction: npt.ArrayLike, free_above: float | None
-) -> float:
-    """Return what `critical_perturbation` does, for a loop that rolls off in less time.
-
-    Parameters
-    ----------
-    loop : Loop
-        The loop.
-    direction : array_like of two floats
-        (d1, d2), as there.
-    free_above : float or None
-        Angular frequency in rad/s up to which a first crossing is looked for. It is the result
-        if no phases of the arms let a root cross above it for so small a perturbation;
-        otherwise, and with None, all frequencies are walked.
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    TypeError, ValueError, CountError
-        As there; or if `free_above` is not positive.
-
-    Examples
-    --------
-    >>> import math
-    >>> from armlock import robust_loop
-    >>> from armlock.design import quick_critical_perturbation
-    >>> print(f"{quick_critical_perturbation(robust_loop(), (1, -1), 4 * math.pi):.3e}")
-    4.375e-06
-    """
-    if free_above is not None:
-        highest = positive_number("free_above", free_above)
-        ray = Ray(checked_loop(loop), (1.0, 1.0), direction)
-        stop = min(ray.scale, 0.5 * ray.chain_limit())
-        at = ray.crossings(stop, first=True, highest=highest).position
-        if at.size and int(unstable_roots(loop, 1.0, 1.0)) == 0:
-            most = 1.0 + float(at[0]) * np.abs(ray.direction)
-            if _clear_above(loop, most, highest):
-                return float(at[0])
-    return critical_perturbation(loop, direction)
 
 
 @dataclass(frozen=True, eq=False)
@@ -816,7 +763,7 @@ def _certified(
 ) -> float:
     """Return a measure of a loop; `points` are its margins at (1, 1) and in the corners."""
     if name == "critical perturbation":
-        return quick_critical_perturbation(loop, _DIRECTION, free_above)
+        return critical_perturbation(loop, _DIRECTION, free_above)
     if name == "unity gain":
         both = np.asarray(poly.polyadd(loop.b1, loop.b2), dtype=np.float64)
         end = last_larger(loop.rest, (both, loop.b1, loop.b2), np.ones(3))

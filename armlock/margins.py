@@ -24,13 +24,12 @@ from armlock.checks import (
     ComplexArray,
     FloatArray,
     IntArray,
-    axis,
     positive_number,
     real_number,
 )
 from armlock.loops import Loop, checked_loop
 from armlock.nyquist import leading_radius, loop_numerator
-from armlock.rays import first_break
+from armlock.rays import Ray, first_break
 from armlock.stability import (
     CountError,
     polished,
@@ -791,7 +790,17 @@ def margins(
     return Margins(*(float(value) for value in (*numbers, *places)))
 
 
-def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
+def clear_above(loop: Loop, most: FloatArray, free_above: float) -> bool:
+    """Whether no phases above a frequency let a root cross, for |c1| and |c2| up to `most`."""
+    c1, c2 = most
+    stable = int(unstable_roots(loop, c1, c2)) == 0
+    # Where it is not stable the margins do not tell.
+    return stable and margins(loop, c1, c2, free_above).modulus > 0.0
+
+
+def critical_perturbation(
+    loop: Loop, direction: npt.ArrayLike, free_above: float | None = None
+) -> float:
     r"""Return the smallest perturbation of (1, 1) in a direction that breaks the loop.
 
     Parameters
@@ -800,6 +809,10 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
         The loop.
     direction : array_like of two floats
         (d1, d2), taken as given and not normalised.
+    free_above : float, optional
+        Angular frequency in rad/s up to which a first crossing is looked for, to spare the time
+        of a loop that rolls off late. It is the result if no phases of the arms let a root
+        cross above it for so small a perturbation; otherwise all frequencies are walked.
 
     Returns
     -------
@@ -812,7 +825,7 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
     ------
     TypeError, ValueError
         If `loop` is no `Loop`, the direction is not two finite real numbers or has length
-        zero, or the loop is unstable at (1, 1) itself.
+        zero, the loop is unstable at (1, 1) itself, or `free_above` is not positive.
     CountError
         If the counts on the two sides of the result contradict it, or gain times delay is too
         large to follow.
@@ -836,4 +849,13 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
     >>> print(f"{critical_perturbation(paper_loop(), (0, -1)):.4e}")
     2.9286e-06
     """
-    return first_break(checked_loop(loop), (1.0, 1.0), axis("direction", direction)).position
+    ray = Ray(checked_loop(loop), (1.0, 1.0), direction)
+    if free_above is not None:
+        highest = positive_number("free_above", free_above)
+        stop = min(ray.scale, 0.5 * ray.chain_limit())
+        at = ray.crossings(stop, first=True, highest=highest).position
+        if at.size and int(unstable_roots(loop, 1.0, 1.0)) == 0:
+            most = 1.0 + float(at[0]) * np.abs(ray.direction)
+            if clear_above(loop, most, highest):
+                return float(at[0])
+    return first_break(loop, ray.start, ray.direction).position
