@@ -17,6 +17,7 @@ from armlock import paper
 from armlock.checks import (
     FloatArray,
     as_written,
+    check_memory,
     positive_number,
     real_array,
     whole_number,
@@ -163,9 +164,10 @@ class ShapedNoise:
         Raises
         ------
         ValueError
-            If `samples` is not a whole number, or negative.
+            If `samples` is not a whole number, negative, or more than memory holds.
         """
         count = whole_number("samples", samples, 0)
+        check_memory("samples", (count,), 8)
         series = self._scale * self._random.standard_normal(count)
         _shape(series, self._sampled.gain, self._sampled.sections, self._state)
         return series

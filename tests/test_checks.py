@@ -155,6 +155,7 @@ WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
     (armlock.sampled_open_loop, "omega", 0.0, "be positive, got 0.0"),
     (armlock.LaserNoise, "seed", -1, "be an integer from 0 on"),
     (armlock.ShapedNoise, "poles", [1j, -1j], "lie in the left half-plane, got "),
+    (LASER.draw, "samples", 10**13, "be of a size that memory holds"),
     (band_rms, "high", 0.5, "exceed"),
     (
         armlock.amplitude_spectrum,
