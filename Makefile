@@ -89,14 +89,14 @@ $(PACKAGE_READY): $(ENV_READY) pyproject.toml
 ## Notebooks -----------------------------------------------------------------------------
 
 # nbmake runs them once, on all cores, for the tests and for the book: a copy, which keeps the
-# outputs. The claims are checked before, once for all notebooks and tests. The longest notebook
-# comes first, so that no core waits for it.
+# outputs. The claims are checked before, once for all notebooks and tests, which share what these
+# have computed. The longest notebooks come first, so that no core waits for them.
 PYTEST := $(PY) -m pytest --numprocesses auto --maxprocesses 4 --dist worksteal
-run-notebooks = rm -rf $(1) $(2); \
+run-notebooks = rm -rf $(1) $(1).shared $(2); \
 	echo "Checking every claim of the paper: build/claims.txt ..."; \
 	$(PY) -m book.companion.claims $(1) > build/claims.txt && cp -R notebooks $(2) && \
 	ARMLOCK_FIGURES="$(CURDIR)/$(1)" $(PYTEST) --nbmake --overwrite \
-		$(2)/07_simulation.ipynb $(2)/*.ipynb
+		$(2)/07_simulation.ipynb $(2)/08c_design.ipynb $(2)/*.ipynb
 
 $(NOTEBOOKS_RAN): $(PACKAGE_READY) $(RUN_SOURCES) build/run-sources $(if $(FORCE),always)
 	@touch build/notebooks-started

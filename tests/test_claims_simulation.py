@@ -11,7 +11,6 @@ from armlock.paper import DURATION, PERTURBATION
 from armlock.roots import extended_root
 from armlock.simulation import LIMIT
 from book.companion.claims import simulation as claimed
-from book.companion.claims.appendix import perturbation_series
 
 
 @pytest.fixture(scope="module")
@@ -89,10 +88,6 @@ def test_filled_arms_stay_visible_where_the_chain_is_slow():
     assert np.median(filled.asd[fast] / quiet.asd[fast]) > 30.0
     assert np.abs(filled.asd / quiet.asd - 1.0)[slow].max() < 0.05
     assert np.abs(empty.asd / quiet.asd - 1.0)[slow].max() < 0.05
-
-
-def test_the_appendix_shows_the_same_series(run):
-    assert np.array_equal(perturbation_series().eta, run.perturbations)
 
 
 def test_the_perturbations_exceed_the_rms_of_the_band():

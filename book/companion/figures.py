@@ -28,6 +28,8 @@ from armlock.plotting import BLUE
 # Longer curves are thinned for the tables, and charts along both axes.
 _MOST_POINTS = 1000
 _MOST_CELLS = 50
+# Digits after the second in a path of an SVG, which would be a tenth of its size.
+_PATH, _DIGITS = re.compile(rb' d="[^"]*"'), re.compile(rb"(\.\d\d)\d+")
 
 
 def _plain(label: str) -> str:
@@ -185,7 +187,8 @@ def publish(figure: Figure, name: str, **values: object) -> Downloads:
     figure.savefig(pixels, format="png")
     image = Image.open(pixels).convert("RGB").quantize(128, dither=Image.Dither.NONE)
     image.save(stem.with_suffix(".png"), optimize=True)
-    figure.savefig(stem.with_suffix(".svg"), metadata={"Date": None})
+    figure.set_layout_engine("none")  # the one that was found holds for both
+    stem.with_suffix(".svg").write_bytes(svg(figure))
     endings = ("csv", "png", "svg") if columns else ("png", "svg")
     return Downloads(name, [f"{name}.{ending}" for ending in endings])
 
@@ -259,8 +262,8 @@ class FrameSlider:
 
 
 def svg(figure: Figure) -> bytes:
-    """Return a figure as SVG, and close it."""
+    """Return a figure as SVG, with coordinates to a hundredth of a point, and close it."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="svg", metadata={"Date": None})
     plt.close(figure)
-    return buffer.getvalue()
+    return _PATH.sub(lambda path: _DIGITS.sub(rb"\1", path[0]), buffer.getvalue())

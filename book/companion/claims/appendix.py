@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache, partial
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +13,6 @@ from scipy.optimize import brentq
 from armlock.checks import FloatArray
 from armlock.noise import PerturbationNoise, ShapedNoise, band_rms
 from armlock.paper import (
-    DURATION,
     LASER_NOISE,
     PERTURBATION,
     PHASE_NOISE_CORNER,
@@ -23,7 +22,13 @@ from armlock.paper import (
 from armlock.spectra import Spectrum, SpectrumEstimator
 from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, Weight, decide
-from book.companion.claims.simulation import LOWEST, PERTURBATION_SEEDS, face_value_rms
+from book.companion.claims.simulation import (
+    LOWEST,
+    PERTURBATION_SEEDS,
+    face_value_rms,
+    full_run,
+)
+from book.companion.shared import shared
 
 claim = partial(ledger.claim, chapter="08_perturbations")
 
@@ -125,7 +130,7 @@ def convolved_density(frequency: FloatArray) -> FloatArray:
     return np.sqrt(2.0 * np.interp(frequency, grid[half], whole[half]))
 
 
-@cache
+@shared
 def convolution() -> Convolution:
     """Multiply a phase by an independent perturbation, and compare spectra.
 
@@ -142,33 +147,6 @@ def convolution() -> Convolution:
     expected = product.expected(convolved_density)
     rms = float(np.sqrt(power / samples))
     return Convolution(product, expected, phase_spectrum, eta_spectrum, rms)
-
-
-class Series(NamedTuple):
-    """The generated c1 - 1 and c2 - 1 once a second, and the spectrum of the first."""
-
-    time: FloatArray
-    eta: FloatArray
-    spectrum: Spectrum
-
-
-@cache
-def perturbation_series() -> Series:
-    """Draw both perturbations at full length, as the simulation has them."""
-    samples = round(DURATION * SAMPLE_RATE)
-    every = int(SAMPLE_RATE)
-    estimator = SpectrumEstimator(SAMPLE_RATE)
-    kept = []
-    for seed in PERTURBATION_SEEDS:
-        source = PerturbationNoise(seed, SAMPLE_RATE, cutoff=LOWEST)
-        parts = []
-        for block in source.blocks(samples, 1000 * every):
-            parts.append(block[::every].copy())
-            if seed == PERTURBATION_SEEDS[0]:
-                estimator.add(block)
-        kept.append(np.concatenate(parts))
-    eta = np.stack(kept)
-    return Series(np.arange(eta.shape[1]) * every / SAMPLE_RATE, eta, estimator.spectrum())
 
 
 def printed_density(frequency: npt.ArrayLike) -> FloatArray:
@@ -296,7 +274,7 @@ def convolution_of_spectra() -> Finding:
 )
 def generated_series() -> Finding:
     """Compare the spectrum of the series with the formula, and see what makes its size."""
-    found = perturbation_series().spectrum
+    found = full_run().perturbation
     source = PerturbationNoise(PERTURBATION_SEEDS[0], SAMPLE_RATE, cutoff=LOWEST)
     expected = found.expected(source.asd)
     inside = float(((found.lower < expected) & (found.upper > expected)).mean())
