@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -43,6 +42,7 @@ from book.companion.claims.simulation import (
     leaving_probability,
     stable_up_to,
 )
+from book.companion.shared import shared
 
 #: The two meanings of dtau, in s: Sec. III.B and the source of Table I.
 DIFFERENCES = {"full": TAU1 - TAU2, "half": 0.5 * (TAU1 - TAU2)}
@@ -68,7 +68,7 @@ def break_along(loop: Loop, direction: tuple[float, float] = (1.0, -1.0)) -> flo
     return critical_perturbation(loop, direction)
 
 
-@cache
+@shared
 def over_corners(points: int = 31) -> tuple[FloatArray, dict[str, FloatArray]]:
     """Follow the controlled loop over two decades of p, for both meanings of dtau.
 

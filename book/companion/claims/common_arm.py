@@ -23,6 +23,7 @@ from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 from book.companion.outline import boundary_radius, outline, perimeter, rays
 from book.companion.schemes import sampled_loop, standard_schemes
+from book.companion.shared import shared
 
 claim = partial(ledger.claim, chapter="03_common_arm")
 
@@ -53,7 +54,7 @@ def exact_radius(number: int = RAYS) -> FloatArray:
     return boundary_radius(ARM, rays(number))
 
 
-@cache
+@shared
 def charts(points: int = 401) -> tuple[StabilityChart, StabilityChart, StabilityChart]:
     """Chart the whole stable region: of the loop, and of the maps of order 0 and 1."""
     axis = np.linspace(-WINDOW, WINDOW, points)
@@ -275,7 +276,7 @@ def errors_of(system: CharacteristicFunction) -> MapErrors:
     return MapErrors(np.array(roots), float(shift[np.argmax(np.abs(shift))]))
 
 
-@cache
+@shared
 def scheme_errors(step: float = STEP) -> dict[str, MapErrors]:
     """Errors of all `standard_schemes` of one step."""
     return {name: errors_of(system) for name, system in standard_schemes(ARM, step).items()}
@@ -286,7 +287,7 @@ def log_slope(x: npt.ArrayLike, y: npt.ArrayLike) -> float:
     return float(np.polyfit(np.log(x), np.log(y), 1)[0])
 
 
-@cache
+@shared
 def convergence(order: int) -> tuple[FloatArray, FloatArray]:
     """Errors of semi-discretization over `STEPS`.
 

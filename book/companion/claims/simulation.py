@@ -56,8 +56,6 @@ ENSEMBLE, ENSEMBLE_SIZES = 16, (1.0, 3.0)
 # Series are kept once a second.
 _EVERY = int(SAMPLE_RATE)
 _BLOCK = 1 << 18
-# Numbers in a line of the processor's cache: as many draws are written at a time.
-_LINE = 8
 # The sample rate of the random draws in Hz: what is faster passes long before the loop follows.
 _DRAW_RATE = 0.01
 
@@ -511,33 +509,25 @@ def ensemble(duration: float = DURATION) -> Ensemble:
         size: Simulation(paper_loop(), SAMPLE_RATE, limit=1e100, draws=ENSEMBLE)
         for size in ENSEMBLE_SIZES
     }
-    largest = {size: np.zeros(ENSEMBLE) for size in runs}
-    # All draws of a sample side by side, as the loop takes them.
-    eta = np.empty((2, 100 * _EVERY, ENSEMBLE))
-    perturbed = {size: np.empty_like(eta) for size in runs}
-    gaps, outputs = [], []
+    kept: dict[float, list[FloatArray]] = {size: [] for size in runs}
+    gaps, block = [], 100 * _EVERY
 
-    def draw(first: int) -> None:
-        few = slice(first, first + _LINE)
-        for k in (0, 1):
-            eta[k, :, few] = np.array([pair[k].draw(eta.shape[1]) for pair in sources[few]]).T
+    def draw(pair: Sequence[PerturbationNoise]) -> list[FloatArray]:
+        return [source.draw(block) for source in pair]
 
-    def advance(size: float, noise: FloatArray) -> FloatArray:
-        np.multiply(eta, size * unit_size(), out=perturbed[size])
-        c1, c2 = np.add(perturbed[size], 1.0, out=perturbed[size])
-        kept = runs[size].advance(noise.T, c1.T, c2.T)[:, ::_EVERY].copy()
-        np.maximum(largest[size], np.abs(kept).max(axis=1), out=largest[size])
-        return kept
+    def advance(size: float, noise: FloatArray, eta: FloatArray) -> None:
+        c1, c2 = 1.0 + size * unit_size() * eta
+        kept[size].append(runs[size].advance(noise, c1, c2)[:, ::_EVERY].copy())
 
     with ThreadPoolExecutor() as threads:
-        for noise in laser.blocks(round(duration * SAMPLE_RATE), eta.shape[1]):
-            list(threads.map(draw, range(0, ENSEMBLE, _LINE)))
-            alike = np.repeat(noise[:, None], ENSEMBLE, axis=1)
-            first, *_ = threads.map(partial(advance, noise=alike), runs)
-            outputs.append(first)
-            gaps.append(unit_size() * (eta[0, 0] - eta[1, 0]))
-    series = np.concatenate(outputs, axis=1)
-    return Ensemble(np.array(gaps).T, series, largest, process_time() - begun)
+        for noise in laser.blocks(round(duration * SAMPLE_RATE), block):
+            eta = np.stack(list(threads.map(draw, sources)), axis=1)
+            alike = np.tile(noise, (ENSEMBLE, 1))
+            list(threads.map(partial(advance, noise=alike, eta=eta), runs))
+            gaps.append(unit_size() * (eta[0, :, 0] - eta[1, :, 0]))
+    series = {size: np.concatenate(parts, axis=1) for size, parts in kept.items()}
+    largest = {size: np.abs(one).max(axis=1) for size, one in series.items()}
+    return Ensemble(np.array(gaps).T, series[1.0], largest, process_time() - begun)
 
 
 def chain_exponent(run: Run, until: float) -> float:
@@ -565,7 +555,7 @@ def chain_exponent(run: Run, until: float) -> float:
     return float((course - np.minimum.accumulate(course)).max())
 
 
-@cache
+@shared
 def starts() -> dict[str, Spectrum]:
     """Spectra of the ideal loop after three ways to switch it on, once it has settled.
 
