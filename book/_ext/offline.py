@@ -4,13 +4,16 @@ Formulas: the package sphinx-mathjax-offline carries MathJax. Of its 24 MB, the 
 script, the fonts, and the TeX extensions that the script loads when a formula asks for them;
 those are copied. The package's own Sphinx extension stays unused: it copies everything.
 
-The source maps of the theme's scripts, 3.5 MB, serve only those who develop it. They go.
+The source maps of the theme's scripts, 3.5 MB, serve only those who develop it. They go, and so
+do the theme's fonts in the old format TrueType, 0.7 MB: the same ones are there as woff2, which
+every browser reads that runs the pages' scripts.
 
 The licences of all that the pages ship stand in `_static/licenses`.
 
 Thebe, which Jupyter Book always adds, would run cells on a server elsewhere. It goes.
 """
 
+import re
 import shutil
 from importlib.metadata import files
 from importlib.util import find_spec
@@ -20,6 +23,7 @@ from sphinx_thebe import init_thebe_core, update_thebe_context
 
 SCRIPT = "mathjax/tex-mml-chtml.js"
 NEEDED = ["tex-mml-chtml.js", "output/chtml/fonts", "input/tex/extensions"]
+TRUETYPE = re.compile(r',url\([^)]*\.ttf\) format\("truetype"\)')
 # Packages that put files of their own into the pages. That of MathJax has no licence text:
 # book/_static/licenses holds it.
 SHIPPED = [
@@ -67,11 +71,16 @@ def copy_licenses(app, exception):
         shutil.copyfile(text.locate(), target / f"{name}.txt")
 
 
-def drop_source_maps(app, exception):
-    """Take out what only a debugger would ask for."""
-    if exception is None and app.builder.format == "html":
-        for file in (Path(app.outdir) / "_static").rglob("*.map"):
-            file.unlink()
+def drop_unread(app, exception):
+    """Take out what no reader's browser asks for."""
+    if exception is not None or app.builder.format != "html":
+        return
+    static = Path(app.outdir) / "_static"
+    for file in [*static.rglob("*.map"), *static.rglob("*.ttf")]:
+        file.unlink()
+    for file in static.rglob("*.css"):
+        text = file.read_text(encoding="utf-8")
+        file.write_text(TRUETYPE.sub("", text), encoding="utf-8")
 
 
 def drop_thebe(app, config):
@@ -91,5 +100,5 @@ def setup(app):
     app.connect("config-inited", drop_thebe)
     app.connect("build-finished", copy_mathjax)
     app.connect("build-finished", copy_licenses)
-    app.connect("build-finished", drop_source_maps)
+    app.connect("build-finished", drop_unread)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
