@@ -33,6 +33,7 @@ figures.publish(fig, "small", points=omega.size)
 CHECK = 'claims.check("S3").confirm()'
 CHANGED = """
 from dataclasses import replace
+from book.companion import claims
 from book.companion.claims import Verdict, ledger
 
 entry = ledger._REGISTER["S3"]
@@ -49,18 +50,27 @@ LINKS = {
 ALT = "A curve of {points:.0f} points."
 
 
-def small(*, text=TEXT, alt=ALT, before_check=""):
+def notebook(*cells):
+    kernel = {"kernelspec": {"name": "python3", "display_name": "Python 3"}}
+    return nbformat.v4.new_notebook(cells=list(cells), metadata=kernel)
+
+
+def failing(source):
+    """Return a notebook with a heading and one cell."""
+    heading = nbformat.v4.new_markdown_cell("# A chapter")
+    return notebook(heading, nbformat.v4.new_code_cell(source))
+
+
+def small(*, text=TEXT, alt=ALT):
     """Return a notebook with a figure, its data, and the check of a claim."""
     caption = {"caption": "A curve.", "name": "fig-small"}
     figure = {"mystnb": {"figure": caption, "image": {"alt": alt}}}
-    cells = [
+    return notebook(
         nbformat.v4.new_markdown_cell(text),
         nbformat.v4.new_code_cell(DRAW, metadata=figure),
         nbformat.v4.new_code_cell(PUBLISH, metadata={"tags": ["remove-input"]}),
-        nbformat.v4.new_code_cell(before_check + "\n" + CHECK),
-    ]
-    kernel = {"kernelspec": {"name": "python3", "display_name": "Python 3"}}
-    return nbformat.v4.new_notebook(cells=cells, metadata=kernel)
+        nbformat.v4.new_code_cell(CHECK),
+    )
 
 
 def build(folder, notebooks, address=None):
@@ -120,8 +130,8 @@ def test_a_build_fails_on_each_fault(tmp_path):
     """Each fault is a warning about its notebook, and every warning fails the build."""
     missing = TEXT + " {numref}`fig-missing` {doc}`/book/missing`"
     faulty = {
-        "cell": small(before_check="raise ValueError('on purpose')"),
-        "verdict": small(before_check=CHANGED),
+        "cell": failing("raise ValueError('on purpose')"),
+        "verdict": failing(CHANGED + CHECK),
         "link": small(text=missing, alt="At {nowhere:.1f} Hz"),
         "silent": small(alt=""),
     }
