@@ -90,13 +90,14 @@ $(PACKAGE_READY): $(ENV_READY) pyproject.toml
 
 # nbmake runs them once, on all cores, for the tests and for the book: a copy, which keeps the
 # outputs. The claims are checked before, once for all notebooks and tests, which share what these
-# have computed. The longest notebooks come first, so that no core waits for them.
+# have computed. The two longest notebooks go to two processes, which begin with two each: the
+# ledger, a short one, stands between them.
 PYTEST := $(PY) -m pytest --numprocesses auto --maxprocesses 4 --dist worksteal
 run-notebooks = rm -rf $(1) $(1).shared $(2); \
 	echo "Checking every claim of the paper: build/claims.txt ..."; \
 	$(PY) -m book.companion.claims $(1) > build/claims.txt && cp -R notebooks $(2) && \
-	ARMLOCK_FIGURES="$(CURDIR)/$(1)" $(PYTEST) --nbmake --overwrite \
-		$(2)/07_simulation.ipynb $(2)/08c_design.ipynb $(2)/*.ipynb
+	ARMLOCK_FIGURES="$(CURDIR)/$(1)" $(PYTEST) --dist load --maxschedchunk 1 --nbmake --overwrite \
+		$(addprefix $(2)/,07_simulation.ipynb 09_ledger.ipynb 08c_design.ipynb *.ipynb)
 
 $(NOTEBOOKS_RAN): $(PACKAGE_READY) $(RUN_SOURCES) build/run-sources $(if $(FORCE),always)
 	@touch build/notebooks-started
