@@ -93,10 +93,10 @@ $(PACKAGE_READY): $(ENV_READY) pyproject.toml
 # have computed. The two longest notebooks go to two processes, which begin with two each: the
 # ledger, a short one, stands between them.
 PYTEST := $(PY) -m pytest --numprocesses auto --maxprocesses 4 --dist worksteal
-run-notebooks = rm -rf $(1) $(1).shared $(2); \
+run-notebooks = rm -rf $(1) $(1).shared $(2); export ARMLOCK_FIGURES="$(CURDIR)/$(1)"; \
 	echo "Checking every claim of the paper: build/claims.txt ..."; \
 	$(PY) -m book.companion.claims $(1) > build/claims.txt && cp -R notebooks $(2) && \
-	ARMLOCK_FIGURES="$(CURDIR)/$(1)" $(PYTEST) --dist load --maxschedchunk 1 --nbmake --overwrite \
+	$(PYTEST) --dist load --maxschedchunk 1 --nbmake --overwrite \
 		$(addprefix $(2)/,07_simulation.ipynb 09_ledger.ipynb 08c_design.ipynb *.ipynb)
 
 $(NOTEBOOKS_RAN): $(PACKAGE_READY) $(RUN_SOURCES) build/run-sources $(if $(FORCE),always)
