@@ -28,11 +28,13 @@ def shown(page: Path) -> list[str]:
 def run(page: Path, claims: Path) -> str:
     """Run the code of a page; return what went wrong, or nothing."""
     with tempfile.TemporaryDirectory() as folder:
+        figures = Path(folder) / "figures"
+        figures.mkdir()
         if claims.exists():
-            shutil.copy(claims, folder)
+            shutil.copy(claims, figures)
         code = Path(folder) / f"{page.stem}.py"
         code.write_text("\n\n".join(shown(page)), encoding="utf-8")
-        environment = os.environ | {"MPLBACKEND": "Agg", "ARMLOCK_FIGURES": folder}
+        environment = os.environ | {"MPLBACKEND": "Agg", "ARMLOCK_FIGURES": str(figures)}
         command = [sys.executable, "-W", "error", str(code)]
         result = subprocess.run(command, env=environment, capture_output=True, text=True)
     return result.stderr if result.returncode else ""
