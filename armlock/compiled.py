@@ -72,7 +72,7 @@ def njit(
 
 
 def soon(function: Any, *, unless: object = None, **limits: object) -> Callable[..., Any]:
-    """Return a compiled function whose first calls are plain Python.
+    """Return a compiled function whose first calls are plain Python, unless it is kept.
 
     Compiling takes some seconds, which many calls should share. Both ways give the same result
     but for rounding.
@@ -90,7 +90,7 @@ def soon(function: Any, *, unless: object = None, **limits: object) -> Callable[
     -------
     callable
     """
-    plain, left = _plain(function, limits), [_PLAIN_CALLS]
+    plain, left = _plain(function, limits), [0 if _is_kept(function) else _PLAIN_CALLS]
 
     def call(*arguments: Any) -> Any:
         if left[0] > 0:
@@ -105,6 +105,12 @@ def soon(function: Any, *, unless: object = None, **limits: object) -> Callable[
         return function(*arguments)
 
     return call
+
+
+def _is_kept(function: Any) -> bool:
+    """Whether files hold a compiled function that is up to date."""
+    cache = getattr(function, "_cache", None)
+    return isinstance(cache, _Cache) and bool(cache._cache_file._load_index())
 
 
 def _plain(function: Any, limits: dict[str, object]) -> Callable[..., Any]:
