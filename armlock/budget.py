@@ -37,22 +37,22 @@ BEAT_NOTES = (15e6, -14e6)
 SPACECRAFT_MOTION = 2.5e-3
 #: Corner in Hz of the roll-off 1/sqrt(1 + (f / corner)^4) of that motion.
 MOTION_CORNER = 0.3
-
-
 #: Noise of a free-running laser at 1 Hz in Hz/sqrt(Hz); it falls as 1/f.
 FREE_RUNNING = 3e4
 #: What disturbs the locked laser.
 SOURCES = ("laser", "shot", "clock", "motion")
 
-_LADDER = [2.0 * np.pi * 10.0 ** (0.5 * k - 6.0) for k in range(20)]
-_CORNER = 2.0 * np.pi * MOTION_CORNER * np.exp(0.75j * np.pi)
-# Rational functions of s with the densities of an arm's noises, in Hz/sqrt(Hz).
+# Rational functions of s whose magnitudes are the densities of an arm's noises, in Hz/sqrt(Hz);
+# of the clocks' for a beat note of 1 Hz. The zero of the others turns cycles into Hz.
 _SHOT = Controller((0.0,), (), np.sqrt(2.0) * SHOT_NOISE)
-_CLOCK = Controller([-(10.0**0.25) * p for p in _LADDER], [-p for p in _LADDER], 1.0)
-_CLOCK = _CLOCK * Controller((), (), CLOCK_NOISE / abs(complex(_CLOCK(2j * np.pi))))
+_CORNER = 2.0 * np.pi * MOTION_CORNER * np.exp(0.75j * np.pi)
 _MOTION = Controller(
     (0.0,), (_CORNER, _CORNER.conjugate()), SPACECRAFT_MOTION * abs(_CORNER) ** 2
 )
+# Two poles a decade from 1 uHz on, each with a zero midway to the next, fall as 1/sqrt(f).
+_POLES = [-2.0 * np.pi * 10.0 ** (0.5 * k - 6.0) for k in range(20)]
+_FALL = Controller([10.0**0.25 * pole for pole in _POLES], _POLES, 1.0)
+_CLOCK = _FALL * Controller((), (), CLOCK_NOISE / abs(complex(_FALL(2j * np.pi))))
 
 
 def free_running(frequency: FloatArray) -> FloatArray:

@@ -42,13 +42,16 @@ BANDS = 12
 #: Bins next to zero that the window's main lobe spoils.
 SPOILED = 8
 
-# Below this bin the next level takes over, whose filter leaves alone what is below `FACTOR`
-# times it, to 2e-6; but above `SPOILED` only if the next level has so many segments.
-_TAKEN_OVER = 92
-_ENOUGH = 8
+# A rate gives its bins from this one on and leaves those below to the next rate, whose filter
+# changes them by 2e-6 at most; from `SPOILED` on while the next rate has fewer segments.
+_FIRST_BIN = 92
+_ENOUGH_SEGMENTS = 8
+# The filter before a lower rate: side lobes in dB below its pass band, and its length.
 _STOPBAND = 120.0
 _TAPS = 113
+# The segments' window has side lobes 150 dB below its peak.
 _BETA = 20.0
+# Segments that are transformed together, which bounds the memory.
 _TRANSFORMS_AT_ONCE = 512
 
 _WINDOW = np.kaiser(SEGMENT + 1, _BETA)[:-1]
@@ -368,8 +371,8 @@ class SpectrumEstimator:
         # this one's `first`.
         end = SEGMENT // 2 - SPOILED + 1
         for level, slower in zip(usable, [*usable[1:], None], strict=True):
-            settled = slower is not None and slower.segments >= _ENOUGH
-            first = _TAKEN_OVER if settled else SPOILED
+            settled = slower is not None and slower.segments >= _ENOUGH_SEGMENTS
+            first = _FIRST_BIN if settled else SPOILED
             rows += _banded(level, np.arange(first, end))
             end = FACTOR * first
         frequency, power, degrees, resolution, count = np.array(sorted(rows)).T
