@@ -233,6 +233,8 @@ class _Line:
     turns : float
         How far up roots can lie right of the line, in turns of the longest delay's
         exponential; inf past the limit of a neutral root chain, or where a number overflows.
+    walk : float
+        As many turns as a walk along the line takes; 0 if it is too long, and not begun.
     """
 
     def __init__(
@@ -247,6 +249,7 @@ class _Line:
         except ValueError:
             self.turns = np.inf
         self.short = self.turns <= _LONGEST_WALK
+        self.walk = self.turns if self.short else 0.0
 
     def count(self) -> int:
         """Count the roots right of the line; below zero where that cannot be told."""
@@ -320,7 +323,12 @@ def _without_delay(system: CharacteristicFunction, point: tuple[float, float]) -
 
 
 def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
-    """Find the rightmost root at one point, or raise `RootError`."""
+    """Find the rightmost root at one point, or raise `RootError`.
+
+    Line after line is tried. Roots near a line are candidates, and a count just right of the
+    rightmost of them tells whether it is the one. The counts on the lines enclose it, so that
+    the interval between two lines is halved until it is found.
+    """
     acting, p, q = _acting(system, x, y, 0.0)
     if acting.longest_delay == 0.0:
         return _without_delay(acting, (x, y))
@@ -328,11 +336,12 @@ def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
     best = complex(np.nan, np.nan)
     # There are roots right of `low`, as far as can be told, and none right of `high`.
     low, high, sigma, width, walked = -np.inf, np.inf, 0.0, unit, 0.0
-    # A map has nothing above its last frequency.
+    # Turns of the delay by which candidates are looked for beyond the last frequency of the
+    # roots right of the line. A map has nothing there.
     further = 0.0 if acting.step else 4.0
     while walked < _ALL_WALKS and sigma not in (low, high):
         line = _Line(acting, p, q, sigma)
-        walked += 2.0 * min(line.turns, _LONGEST_WALK) * line.short + further + _WALK_AT_LEAST
+        walked += 2.0 * line.walk + further + _WALK_AT_LEAST
         found = line.rightmost(further)
         further = min(2.0 * further, _LONGEST_WALK)
         if found is not None and not found[0].real <= low:
@@ -340,9 +349,9 @@ def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
             nearest = _EQUAL * max(abs(best), unit)
             farthest = max(nearest, _FARTHEST * max(abs(best.real), unit))
             for margin in np.geomspace(nearest, farthest, 6):
-                behind = _Line(acting, p, q, best.real + ahead + margin)
-                walked += min(behind.turns, _LONGEST_WALK) * behind.short
-                count = behind.count()
+                right_of_it = _Line(acting, p, q, best.real + ahead + margin)
+                walked += right_of_it.walk
+                count = right_of_it.count()
                 if count == 0:
                     return best
                 if count > 0:

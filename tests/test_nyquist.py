@@ -172,10 +172,8 @@ def test_a_tenth_of_a_nanohertz_is_as_exact_as_a_hertz(loop, c2):
     ("loop", "c1", "c2", "end"),
     [
         (SingleArm(), 1.001, 1.0, 20.0),
-        (SingleArm(), -1.5, 1.0, 20.0),
         (CommonArm(), 1.0, 1.001, 130.0),
         (CommonArm(), 1.2, 1.1, 20.0),
-        (DualArm(), 1.0, 1.005, 40.0),
         (DualArm(), 1.01, 1.02, 40.0),
         (paper_loop(), 1.0, 1.0 - 1e-6, 2.0),
     ],
