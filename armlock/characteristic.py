@@ -367,7 +367,8 @@ class CharacteristicFunction:
             # It moves along, so that nothing has to cancel in `rest`.
             reference=(x0 * np.exp(sigma * self.delay1), y0 * np.exp(sigma * self.delay2)),
         )
-        # Kept, not found again: in extended precision that takes a second.
+        # Not found again: in extended precision that takes a second. Of a map's only their
+        # number counts.
         vars(found)["roots_of_a"] = self.roots_of_a - sigma
         return found
 
@@ -384,7 +385,23 @@ class CharacteristicFunction:
         )
 
     def changed(self, **changes: Any) -> CharacteristicFunction:
-        """Return the function that other values of some arguments make."""
+        """Return a copy with other values of some arguments.
+
+        Parameters
+        ----------
+        **changes
+            Arguments of `CharacteristicFunction`, by name.
+
+        Returns
+        -------
+        CharacteristicFunction
+            A plain one, of a loop too.
+
+        Raises
+        ------
+        TypeError, ValueError
+            As `CharacteristicFunction` does.
+        """
         own = vars(self) | dict(zip(("rest", "b1", "b2"), self._polynomials, strict=True))
         names = inspect.signature(CharacteristicFunction).parameters
         return CharacteristicFunction(**{name: own[name] for name in names} | changes)
