@@ -273,34 +273,43 @@ def _smallest(
     if size > 1e7 and abs(complex(loop.open_loop(1j * lowest, c1, c2))) > 0.9 * size:
         lowest = higher
     improve(np.array([lowest]))
-    # Small distances are likely where the disc of free phases comes closest. They spare the
-    # walk most of its way; within a thousand turns of the delays it does without.
-    turn, last = 2.0 * np.pi / loop.longest_delay, end()
-    if last > 1e3 * turn:
-        omega = np.geomspace(lowest, last, 400)
-        free = infimum.free_margins_over(_factors(loop), _arms(loop, c1, c2), omega)
-        for at in omega[np.argmin(free[:, :2], axis=0)]:
-            if at > 1e3 * turn:
-                improve(np.linspace(at - 100.0 * turn, min(at + 100.0 * turn, last), 4001))
     numerator = loop_numerator(loop, c1, c2)
-    found, places, complete = infimum.smallest_distances(
-        numerator.compiled(),
-        (numerator.weights, numerator.sums, numerator.phases),
-        _factors(loop),
-        _arms(loop, c1, c2),
-        lowest,
-        end(),
-        loop.longest_delay,
-        best,
-        TOLERANCE,
-    )
-    if not complete:
-        raise CountError(
-            f"no margin at (c1, c2) = ({c1}, {c2}): rounding hides L, or following it takes "
-            f"more than {contour.MOST_STEPS:.0e} steps",
-            np.array([[c1, c2]]),
+    weights = numerator.weights, numerator.sums, numerator.phases
+    polynomials = numerator.compiled()
+    factors, arms = _factors(loop), _arms(loop, c1, c2)
+    # First the first turns of the delays: what they leave of the axis to be walked is less.
+    start, turn = lowest, 2.0 * np.pi / loop.longest_delay
+    for stop in (max(1e3 * turn, 2.0 * lowest), np.inf):
+        last = min(stop, end())
+        if last <= start:
+            break
+        if start > lowest:
+            # Small distances are likely where the disc of free phases comes closest.
+            omega = np.geomspace(start, last, 400)
+            free = infimum.free_margins_over(factors, arms, omega)
+            for at in omega[np.argmin(free[:, :2], axis=0)]:
+                improve(np.linspace(at, min(at + 100.0 * turn, last), 2001))
+            last = max(start, end())
+        found, places, complete = infimum.smallest_distances(
+            polynomials,
+            weights,
+            factors,
+            arms,
+            start,
+            last,
+            loop.longest_delay,
+            best,
+            TOLERANCE,
         )
-    return found, np.where(np.isnan(places), where, places)
+        if not complete:
+            raise CountError(
+                f"no margin at (c1, c2) = ({c1}, {c2}): rounding hides L, or following it "
+                f"takes more than {contour.MOST_STEPS:.0e} steps",
+                np.array([[c1, c2]]),
+            )
+        best, where = found, np.where(np.isnan(places), where, places)
+        start = last
+    return best, where
 
 
 def modulus_margin(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> float:
