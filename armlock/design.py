@@ -74,11 +74,9 @@ _UNSTABLE = 1e3
 #: Dead time in s of actuator, phasemeter and transponder in the white paper.
 FLIGHT_DELAY: Final = 12.3e-6
 
-# What searches found, rounded. `design` finds loops like them from round numbers and a
-# `roll_off` (the test from scratch); the second stems from a search outside of this module.
-
 
 def _robust_controller() -> Controller:
+    # What a search found, rounded; the test from scratch finds one like it.
     zeros, poles = _at_hertz(0.37e-6, *[16.75e-6] * 3), [0.25e-6, 0.108e-6, *[114.7e-6] * 4]
     return Controller((0.0, 0.0, *zeros), _at_hertz(*poles), paper.CONTROLLER_GAIN)
 
@@ -138,6 +136,7 @@ def buildable_loop() -> Loop:
     >>> int(unstable_roots(loop, 1.0 + 1e-6, 1.0 - 1e-6))
     0
     """
+    # From a search outside of this module; the test from scratch finds one like it.
     zeros = _at_hertz(0.111, 4.67, 29.5, 186.0, 1266.0, 15450.0)
     poles = _at_hertz(0.0059, 0.82, 8.91, 54.6, 342.0, 2228.0, 40e3)
     # A gain of one at low frequency.

@@ -249,7 +249,6 @@ def _smallest(
         discs = [
             infimum.excluded_disc(value * (1.0 - TOLERANCE), m == infimum.RATIO)
             for m, value in enumerate(best)
-            if value
         ]
         return min(max(_clear_from(loop, c1, c2, *disc) for disc in discs), highest)
 
