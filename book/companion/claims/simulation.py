@@ -51,7 +51,7 @@ SEED = 1
 PERTURBATION_SEEDS = (SEED + 1, SEED + 2)
 #: Number of random draws of c1 and c2.
 DRAWS = 4000
-#: Number of those that run in time, as many as one core does in a minute; and their sizes.
+#: Number of those that run in time, what one core does in a minute or two; and their sizes.
 ENSEMBLE, ENSEMBLE_SIZES = 16, (1.0, 3.0)
 # Series are kept once a second.
 _EVERY = int(SAMPLE_RATE)
