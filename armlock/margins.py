@@ -282,7 +282,10 @@ def _smallest(
         last = min(stop, end())
         if last <= start:
             break
-        if start > lowest:
+        if start == lowest:
+            # Next to the limit a walk takes short steps, unless it knows of a smaller value.
+            improve(np.geomspace(start, last, 2000))
+        else:
             # Small distances are likely where the disc of free phases comes closest.
             omega = np.geomspace(start, last, 400)
             free = infimum.free_margins_over(factors, arms, omega)
