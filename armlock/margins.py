@@ -456,7 +456,7 @@ def _least_lags(
     at = omega[np.unique(chosen)]
     # Not past the next null of an arm.
     span = np.minimum(0.01 / loop.longest_delay, 0.5 * at)
-    reaches = [np.minimum(share * at, span) for share in (1e-6, 1e-5, 1e-4, 1e-3)]
+    reaches = [np.minimum(10.0**power * at, span) for power in range(-6, 0)]
     at = polished(lambda w: np.log(np.abs(loop.open_loop(1j * w, c1, c2))), at, reaches)
     lag, nearest = lags(at)
     worst = int(np.argmin(nearest))
