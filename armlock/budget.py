@@ -149,6 +149,8 @@ class NoiseBudget:
 def _densities(name: str, value: npt.ArrayLike, frequency: FloatArray) -> FloatArray:
     """Return densities at the frequencies, or raise."""
     asd = real_array(name, value)
+    if (asd < 0.0).any():
+        raise ValueError(f"{name} must not be negative, got {asd.min()} among its values")
     if asd.shape not in ((), frequency.shape):
         raise ValueError(
             f"{name} must be one number or hold one a frequency, {frequency.size} of them; got "
@@ -201,7 +203,7 @@ def noise_budget(
     ------
     TypeError, ValueError
         If `loop` is no `Loop`, the frequencies are not positive and one-dimensional, there is
-        no laser of that name, or densities are not of the frequencies' shape.
+        no laser of that name, or densities are negative or not of the frequencies' shape.
 
     References
     ----------
