@@ -11,22 +11,23 @@ import math
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import zip_longest
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
-from scipy.optimize import minimize_scalar
+from scipy.optimize import elementwise, minimize_scalar
 
 from armlock import contour, infimum
 from armlock.bounds import last_larger, last_root_bound
 from armlock.checks import (
-    BoolArray,
     ComplexArray,
     FloatArray,
     IntArray,
     positive_number,
     real_number,
 )
+from armlock.exponentials import ExponentialSum
 from armlock.loops import Loop, checked_loop
 from armlock.nyquist import leading_radius, loop_numerator
 from armlock.rays import Ray, first_break
@@ -374,20 +375,49 @@ def _require_stable(loop: Loop, c1: float, c2: float) -> None:
         )
 
 
+def _zeros(whole: ExponentialSum, intervals: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Zeros of the imaginary part on intervals of the axis, and where rounding may hide some.
+
+    Of each stretch that hides some, its two ends and its middle, in a column.
+    """
+    parts: list[tuple[npt.NDArray[Any], ...]] = [(np.empty(0),) * 3]
+    for start, end in np.reshape(intervals, (-1, 2)):
+        parts.append(sign_changes(whole, float(end), start=float(start)))
+    omega, jump, width = (np.concatenate(part) for part in zip(*parts, strict=True))
+    hidden = jump == 0
+    stretches = omega[hidden] + np.outer((-1.0, 0.0, 1.0), width[hidden])
+    return omega[~hidden & (omega > 0.0)], stretches[:, stretches[0] > 0.0]
+
+
+def _on_unit_circle(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArray:
+    """Move frequencies next to crossovers to where |L|, from its factors, is one."""
+    # Not past the next null of an arm.
+    span = np.minimum(0.01 / loop.longest_delay, 0.5 * omega)
+    reaches = [np.minimum(10.0**power * omega, span) for power in range(-13, 0)]
+    return polished(lambda at: _level(loop, c1, c2, at), omega, reaches)
+
+
+def _level(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArray:
+    return np.asarray(np.log(np.abs(loop.open_loop(1j * omega, c1, c2))))
+
+
 def _crossovers(
     loop: Loop, c1: float, c2: float, intervals: npt.ArrayLike
-) -> tuple[FloatArray, BoolArray]:
+) -> tuple[FloatArray, FloatArray]:
     """Frequencies with |L| = 1 on intervals of the axis, and where rounding hides if it is."""
     above, below = loop_numerator(loop, c1, c2), loop.rest_on_boundary()
     squares = above.times_conjugate(above).plus(below.times_conjugate(below).scaled(-1.0))
-    excess = squares.turned()
-    found = [
-        sign_changes(excess, float(end), start=float(start))
-        for start, end in np.reshape(intervals, (-1, 2))
-    ]
-    omega = np.concatenate([np.empty(0), *(zeros for zeros, _ in found)])
-    jump = np.concatenate([np.empty(0), *(jumps for _, jumps in found)])
-    return omega[omega > 0.0], jump[omega > 0.0] == 0
+    omega, hidden = _zeros(squares.turned(), intervals)
+    far = np.abs(_level(loop, c1, c2, omega)) > TOLERANCE
+    omega[far] = _on_unit_circle(loop, c1, c2, omega[far])
+    lost = np.abs(_level(loop, c1, c2, omega)) > TOLERANCE
+    if lost.any():
+        raise CountError(
+            f"no margin at (c1, c2) = ({c1}, {c2}): rounding hides where |L| comes to one "
+            f"around {omega[lost][0]} rad/s",
+            np.array([[c1, c2]]),
+        )
+    return omega, hidden
 
 
 def _phase_and_delay(
@@ -419,8 +449,8 @@ def _phase_and_delay(
         intervals = np.concatenate((intervals, likely))
     for last in (False, True):
         omega, hidden = _crossovers(loop, c1, c2, intervals)
-        found = _least_lags(loop, c1, c2, omega[~hidden])
-        perhaps = _least_lags(loop, c1, c2, omega[hidden])
+        found = _least_lags(loop, c1, c2, omega)
+        perhaps = _least_lags(loop, c1, c2, hidden.ravel())
         if perhaps[0] < min(phase, found[0]) or perhaps[1] < min(delay, found[1]):
             raise CountError(
                 f"no margin at (c1, c2) = ({c1}, {c2}): rounding hides whether |L| comes to "
@@ -453,11 +483,7 @@ def _least_lags(
     chosen = np.concatenate(
         (np.argsort(nearest)[:_POLISHED], np.argsort(lag / omega)[:_POLISHED])
     )
-    at = omega[np.unique(chosen)]
-    # Not past the next null of an arm.
-    span = np.minimum(0.01 / loop.longest_delay, 0.5 * at)
-    reaches = [np.minimum(10.0**power * at, span) for power in range(-6, 0)]
-    at = polished(lambda w: np.log(np.abs(loop.open_loop(1j * w, c1, c2))), at, reaches)
+    at = _on_unit_circle(loop, c1, c2, omega[np.unique(chosen)])
     lag, nearest = lags(at)
     worst = int(np.argmin(nearest))
     return float(nearest[worst]), float(np.min(lag / at)), float(at[worst])
@@ -483,9 +509,12 @@ def _settled_from(loop: Loop, c1: float, c2: float, phase: float) -> float:
         for b in (loop.b1, loop.b2)
     ]
     left = [
-        _plus(b, -share * loop.rest)[: loop.rest.size - 1]
+        _plus(b, -share * loop.rest)
         for b, share in zip((loop.b1, loop.b2), shares, strict=True)
     ]
+    for remainder in left:
+        # The highest power cancels.
+        remainder[loop.rest.size - 1 :] = 0.0
     weights = 1.0 + np.array([abs(c1), abs(c2)])
     return last_larger(loop.rest, (left[0], left[1]), weights / near)
 
@@ -526,18 +555,21 @@ def _ascent(rest: FloatArray, c: FloatArray, t: float, sign: float) -> FloatArra
     return np.asarray(sign * product * (-1.0) ** np.arange(product.size))
 
 
-def _gains(
-    loop: Loop, c1: float, c2: float, intervals: npt.ArrayLike
-) -> tuple[FloatArray, FloatArray]:
-    """Find the gain factors that take a root to the axis on intervals of it, and where."""
-    crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
-    found = [np.empty(0)]
-    for start, end in np.reshape(intervals, (-1, 2)):
-        omega, jump = sign_changes(crossing, float(end), start=float(start))
-        found.append(omega[(omega > 0.0) & (jump != 0)])
-    omega = np.concatenate(found)
+def _gains(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArray:
+    """Gain factors that take a root to the axis at frequencies."""
     with np.errstate(divide="ignore"):
-        return -1.0 / loop.open_loop(1j * omega, c1, c2).real, omega
+        return np.asarray(-1.0 / loop.open_loop(1j * omega, c1, c2).real)
+
+
+def _real_within(loop: Loop, c1: float, c2: float, stretches: FloatArray) -> FloatArray:
+    """Where L, from its factors, is real within stretches in which rounding hides it."""
+
+    def imaginary(omega: FloatArray) -> FloatArray:
+        return np.asarray(loop.open_loop(1j * omega, c1, c2).imag)
+
+    lower, upper = stretches[:-1].ravel(), stretches[1:].ravel()
+    changes = imaginary(lower) * imaginary(upper) < 0.0
+    return np.asarray(elementwise.find_root(imaginary, (lower[changes], upper[changes])).x)
 
 
 def _free_gains(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArray:
@@ -575,11 +607,14 @@ def _gains_around_one(
     def meeting(lower: float, upper: float, span: tuple[float, float]) -> FloatArray:
         return _meeting(loop, c1, c2, span, segment=(-1.0 / upper, -1.0 / lower))
 
+    crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
     lower, upper, where = least, most, np.nan
     first = min(end(lower, upper), 1e3 * turn)
     intervals, wide, complete = meeting(lower, upper, (0.0, first)), 300.0, False
     while True:
-        factor, omega = _gains(loop, c1, c2, intervals)
+        omega, hidden = _zeros(crossing, intervals)
+        omega = np.concatenate((omega, _real_within(loop, c1, c2, hidden)))
+        factor = _gains(loop, c1, c2, omega)
         below = factor[(factor >= lower) & (factor <= 1.0)]
         lower = float(below.max(initial=lower))
         above = np.flatnonzero((factor > 1.0) & (factor <= upper))

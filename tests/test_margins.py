@@ -85,6 +85,12 @@ def test_the_limit_of_a_neutral_loop_is_that_of_its_chain():
     assert modulus_margin(loop, 1.5) == pytest.approx(1.3 - 0.45, rel=1e-9)
     ratio = margins(loop, 1.5).disk
     assert ratio == pytest.approx(2.0 * 0.85 / 1.15, rel=1e-6)
+    # With both arms and 2 g > 1 the disc around 2 g, of radius 2 g c, meets the unit circle.
+    centre, radius = 1.8, 1.8 * 0.99
+    found = margins(Loop(((), (), 0.9), COMMON, 2.2, 9.9), 0.99, 0.99)
+    meets = np.arccos((1.0 + centre**2 - radius**2) / (2.0 * centre))
+    assert found.phase == pytest.approx(np.pi - meets, rel=1e-6)
+    assert found.delay == 0.0
 
 
 @pytest.mark.parametrize("direction", [(0, -1), (1, 0), (0, 1), (-1, 0), (1, -1)])
