@@ -330,11 +330,12 @@ def count(sketch, c1, c2, sigma=0.0):
 
 
 def distance(sketch, c1, c2):
-    """Smallest |1 + L| over the size of its terms: how near a root is to the axis."""
+    """Smallest |1 + L|, or that over the size of its terms: how near a root is to the axis."""
     view = View(sketch, c1, c2)
     omega = np.geomspace(view.low, 1e2 * view.corners.max(), 20001)
     value, _, _, centre, radius = view.enclose(omega, 0.0 * omega)
-    return float((np.abs(1.0 + value) / (1.0 + np.abs(centre) + radius)).min())
+    shares = np.abs(1.0 + value) / (1.0 + np.abs(centre) + radius)
+    return min(float(shares.min()), margins(sketch, c1, c2, stable=False).modulus)
 
 
 @dataclass

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import mpmath
 import numpy as np
 import pytest
@@ -479,3 +481,19 @@ def test_a_dead_time_with_free_phases_takes_the_phase_it_should():
     found = margins(loop, 0.0, 0.0, 0.01)
     assert found.phase == pytest.approx(0.5 * np.pi - 0.3, rel=1e-5)
     assert found.delay == pytest.approx((0.5 * np.pi - 0.3) / 3.0, rel=1e-5)
+
+
+@pytest.mark.parametrize("factor", [0.3, 1.0, 3.0, 30.0])
+def test_a_count_up_to_free_phases_is_that_of_all_frequencies(factor):
+    """Above it no phases let a root cross, so that what lies below decides."""
+    module = sys.modules["armlock.margins"]
+    found = []
+    for loop, (c1, c2) in STABLE.values():
+        changed = scaled(loop, factor)
+        for omega in np.geomspace(1e-2, 1e2, 9):
+            if module._no_phases_cross(changed, c1, c2, omega):
+                count = module._count_below(changed, c1, c2, omega)
+                assert count == unstable_roots(changed, c1, c2)
+                found.append(count)
+    assert len(found) > 10
+    assert factor < 30.0 or max(found) > 0
