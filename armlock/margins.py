@@ -152,14 +152,15 @@ def _arm_weights(loop: Loop, c1: float, c2: float) -> FloatArray:
     return np.array([abs(c1), abs(c2)])
 
 
-def _clear_from(loop: Loop, c1: float, c2: float, centre: float, radius: float) -> float:
+def _clear_from(loop: Loop, arms: FloatArray, centre: float, radius: float) -> float:
     """Frequency past which L stays outside a disc around a negative centre; inf if it does not.
 
-    Past it |B1 + B2 - centre R| > radius |R| + |c1 B1| + |c2 B2|; with a dead time B1 + B2
-    turns, and stands on the other side.
+    `arms` are |c1| and |c2|, or what they count for. Past it |B1 + B2 - centre R| exceeds
+    radius |R| + |c1 B1| + |c2 B2|; with a dead time B1 + B2 turns, and stands on the other
+    side.
     """
     c = _plus(loop.b1, loop.b2)
-    factors = [radius, *_arm_weights(loop, c1, c2), 0.0]
+    factors = [radius, *arms, 0.0]
     first = -centre * loop.rest
     if loop.delay:
         factors[3] = 1.0
@@ -244,6 +245,7 @@ def _smallest(
     best = _limit(loop, c1, c2)[:2]
     best[infimum.RATIO] = min(best[infimum.RATIO], 1.0) if disk else 0.0
     where = np.full(2, np.inf)
+    together = _arm_weights(loop, c1, c2)
 
     def end() -> float:
         """Frequency past which nothing is smaller, or `highest`."""
@@ -251,7 +253,7 @@ def _smallest(
             infimum.excluded_disc(value * (1.0 - TOLERANCE), m == infimum.RATIO)
             for m, value in enumerate(best)
         ]
-        return min(max(_clear_from(loop, c1, c2, *disc) for disc in discs), highest)
+        return min(max(_clear_from(loop, together, *disc) for disc in discs), highest)
 
     if not np.isfinite(end()):
         raise _unconfined(c1, c2)
@@ -381,7 +383,7 @@ def _require_stable(loop: Loop, c1: float, c2: float, free_above: float = np.inf
 
 def _no_phases_cross(loop: Loop, c1: float, c2: float, free_above: float) -> bool:
     """Whether no phases of the arms take L to -1 above a frequency."""
-    end = _clear_from(loop, c1, c2, -1.0, 0.0)
+    end = _clear_from(loop, np.abs([c1, c2]), -1.0, 0.0)
     if not np.isfinite(end):
         return False
     if end <= free_above:
@@ -485,8 +487,10 @@ def _phase_and_delay(
     phase, delay, where = np.inf, np.inf, np.nan
     c, arms = _plus(loop.b1, loop.b2), _arm_weights(loop, c1, c2)
     end = last_larger(loop.rest, (c, loop.b1, loop.b2), np.array([1.0, *arms]))
-    if not np.isfinite(end) and not np.isfinite(highest):
+    centre, radius = _limit_disc(loop, c1, c2)
+    if abs(centre) + radius >= 1.0 and not np.isfinite(highest):
         phase, delay, where = float(_limit(loop, c1, c2)[infimum.PHASE]), 0.0, np.inf
+    if not np.isfinite(end) and not np.isfinite(highest):
         end = _settled_from(loop, c1, c2, phase)
     end, turn = min(end, highest), 2.0 * np.pi / loop.longest_delay
     first = min(end, 1e3 * turn)
@@ -565,7 +569,7 @@ def _settled_from(loop: Loop, c1: float, c2: float, phase: float) -> float:
     for remainder in left:
         # The highest power cancels.
         remainder[loop.rest.size - 1 :] = 0.0
-    weights = 1.0 + np.array([abs(c1), abs(c2)])
+    weights = 1.0 + np.abs([c1, c2])
     return last_larger(loop.rest, (left[0], left[1]), weights / near)
 
 
@@ -645,11 +649,12 @@ def _gains_around_one(
     `least` and `most` where there are none between them. As for phases, likely ones come first.
     """
     turn = 2.0 * np.pi / loop.longest_delay
+    arms = _arm_weights(loop, c1, c2)
 
     def end(lower: float, upper: float) -> float:
         """Frequency past which no factor between the two takes a root to the axis."""
         clear = max(
-            _clear_from(loop, c1, c2, -0.5 * (1.0 / k + 1.0), 0.5 * abs(1.0 - 1.0 / k))
+            _clear_from(loop, arms, -0.5 * (1.0 / k + 1.0), 0.5 * abs(1.0 - 1.0 / k))
             for k in (lower, upper)
         )
         return min(clear, _no_crossing_from(loop, c1, c2, lower, upper))
@@ -795,7 +800,7 @@ def _free_margins(
     # Past it L stays clear of where smaller values would be.
     for k, symmetric in ((infimum.MODULUS, False), (infimum.RATIO, True)):
         level = best[k] * (1.0 - TOLERANCE)
-        end = max(end, _clear_from(loop, c1, c2, *infimum.excluded_disc(level, symmetric)))
+        end = max(end, _clear_from(loop, arms, *infimum.excluded_disc(level, symmetric)))
     smaller, places, complete = infimum.free_margins(
         factors, free, lowest, end, best, _FREE_TOLERANCES
     )

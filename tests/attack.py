@@ -435,6 +435,9 @@ def check_critical(tally, rng, sketch, loop, point):
             if sketch.sensor != "single" or way[0] * loop.b1.any():
                 tally.note("critical_perturbation", way, eps, "finite")
             return
+        if eps * np.abs(way).max() < 1e-15:
+            tally.skipped["critical_perturbation: below rounding"] += 1
+            return
         for share in (1e-3, *rng.random(3), 1.0 - 1e-6):
             counts = judge.count(sketch, *(1.0 + share * eps * way))
             if counts not in (0, -1):

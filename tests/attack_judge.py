@@ -245,7 +245,7 @@ class View:
 
     def cells(self, high, free_above=np.inf):
         """Cells from `low` to `high`, ten a decade and one for each corner."""
-        if not 0.0 < self.low < high < np.inf:
+        if not 0.0 < self.low < high < 1e300 * self.low:
             raise UndecidedError("no range of frequencies")
         count = int(np.ceil(10 * np.log10(high / self.low))) + 1
         edges = np.geomspace(self.low, high, count)

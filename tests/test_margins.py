@@ -483,6 +483,17 @@ def test_a_dead_time_with_free_phases_takes_the_phase_it_should():
     assert found.delay == pytest.approx((0.5 * np.pi - 0.3) / 3.0, rel=1e-5)
 
 
+def test_arms_of_equal_delay_have_free_phases_of_their_own():
+    loop = Loop(((), (-2.0 + 60j, -2.0 - 60j), 30.0), COMMON, 2.0, 2.0)
+    c1, c2, above = 0.7, -0.9, 20.0
+    omega = np.geomspace(above, 1e4, 200_001)
+    first, second = loop.arm_responses(1j * omega)
+    away = np.abs(1.0 + first + second) - np.abs(c1 * first) - np.abs(c2 * second)
+    found = margins(loop, c1, c2, above)
+    assert found.modulus == pytest.approx(away.min(), rel=1e-4)
+    assert found.modulus_omega == pytest.approx(omega[away.argmin()], rel=1e-3)
+
+
 @pytest.mark.parametrize("factor", [0.3, 1.0, 3.0, 30.0])
 def test_a_count_up_to_free_phases_is_that_of_all_frequencies(factor):
     """Above it no phases let a root cross, so that what lies below decides."""
