@@ -83,8 +83,8 @@ def over_corners(points: int = 31) -> tuple[FloatArray, dict[str, FloatArray]]:
     corners : float array, shape (n,)
         Corner frequency p in rad/s, rising.
     columns : dict of str to float array
-        For "full" and "half": critical perturbation along (1, -1), 0 where it is unstable at
-        (1, 1), and under "full margin" and "half margin" min |1 + L|, nan there.
+        For "full" and "half": critical perturbation along (1, -1), 0 where the loop is
+        unstable at (1, 1); under "full margin" and "half margin" min |1 + L|, nan there.
     """
     grid = DUAL_SENSOR_CORNER * np.logspace(-1.0, 1.0, points)
     close = 1.0 - np.append(np.linspace(0.24, 0.02, 12), [1e-3, -1e-3])
