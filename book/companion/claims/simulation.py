@@ -356,11 +356,12 @@ def growth_rate(difference: FloatArray) -> FloatArray:
     sum.
     """
     differences, rates = _growth_table()
-    within = np.log(np.maximum(difference, differences[0]))
-    return np.asarray(np.interp(within, np.log(differences), rates))
+    found, beyond = np.zeros(difference.shape), difference > differences[0]
+    found[beyond] = np.interp(np.log(difference[beyond]), np.log(differences), rates)
+    return found
 
 
-@cache
+@shared
 def _growth_table() -> tuple[FloatArray, FloatArray]:
     differences = stable_up_to() * np.geomspace(1.0, 1e4, 25)
     roots = np.asarray(rightmost_root(paper_loop(), 1.0, 1.0 - differences[1:]))
@@ -398,6 +399,7 @@ def drawn_differences() -> FloatArray:
     return np.asarray((first - second) * unit_size())
 
 
+@shared
 def leaving_probability(size: float = 1.0) -> float:
     """Probability that (c1, c2) leaves the stable region for a time, over random draws.
 
@@ -420,6 +422,7 @@ def leaving_probability(size: float = 1.0) -> float:
     return float((size * drawn_differences().max(axis=1) > stable_up_to()).mean())
 
 
+@shared
 def growing_probability(size: float = 1.0) -> float:
     """Probability that the unstable root of the frozen loop grows by more than a factor e.
 
@@ -437,6 +440,7 @@ def growing_probability(size: float = 1.0) -> float:
     return float((grown > 1.0).mean())
 
 
+@shared
 def reduction_quantile(share: float) -> float:
     """Factor by which the printed spectrum must be reduced to stay in the stable region.
 
