@@ -34,9 +34,9 @@ from armlock.checks import (
 from armlock.contour import winding
 from armlock.controllers import Controller
 from armlock.loops import Loop, checked_loop, paper_loop
-from armlock.margins import Margins, clear_above, critical_perturbation, margins
+from armlock.margins import Margins, clear_above, count_at, critical_perturbation, margins
 from armlock.rays import Ray
-from armlock.stability import BOUNDARY, UNCONFINED, unstable_roots
+from armlock.stability import BOUNDARY, UNCONFINED
 from armlock.sweep import sweep
 
 if TYPE_CHECKING:
@@ -200,7 +200,7 @@ def roll_off(first: float, last: float, pairs: int, slope: float = 2.0 / 3.0) ->
     )
 
 
-def box_counts(loop: Loop, size: float) -> IntArray:
+def box_counts(loop: Loop, size: float, free_above: float | None = None) -> IntArray:
     r"""Count the unstable roots over a whole box of perturbations.
 
     Parameters
@@ -209,18 +209,22 @@ def box_counts(loop: Loop, size: float) -> IntArray:
         The loop.
     size : float
         The box is that of all \|c1 - 1\| <= size and \|c2 - 1\| <= size.
+    free_above : float, optional
+        Angular frequency in rad/s above which both arms' phases are taken as free, to spare the
+        time of a loop that rolls off late.
 
     Returns
     -------
     int array, shape (n,)
         Certified numbers of unstable roots in the n smaller boxes into which it was cut, each
         that of all points of one. `BOUNDARY` alone where no cut was fine enough: a root lies on
-        the imaginary axis, or comes close to it, somewhere in the box.
+        the imaginary axis, or comes close to it, somewhere in the box; or where some phases
+        above `free_above` let a root cross.
 
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no `Loop`, or the size is not positive.
+        If `loop` is no `Loop`, or the size or `free_above` is not positive.
     CountError
         As `unstable_roots` does.
 
@@ -242,17 +246,20 @@ def box_counts(loop: Loop, size: float) -> IntArray:
     """
     checked_loop(loop)
     size = positive_number("size", size)
+    highest = _checked_end(loop, size, free_above)
+    if not highest:
+        return np.array([BOUNDARY])
     left, centres = [(1.0, 1.0, size)], []
     while left:
         c1, c2, half = left.pop()
-        if _stays_clear(loop, c1, c2, half):
+        if _stays_clear(loop, c1, c2, half, highest):
             centres.append((c1, c2))
         elif half < 1.5 * size * 0.5**_CUTS:
             return np.array([BOUNDARY])
         else:
             half *= 0.5
             left += [(c1 + half * d1, c2 + half * d2, half) for d1, d2 in _CORNERS]
-    return unstable_roots(loop, *np.array(centres).T)
+    return np.array([count_at(loop, c1, c2, highest) for c1, c2 in centres])
 
 
 def edge_crossings(loop: Loop, size: float, free_above: float | None = None) -> int:
@@ -297,11 +304,9 @@ def edge_crossings(loop: Loop, size: float, free_above: float | None = None) -> 
     """
     checked_loop(loop)
     size = positive_number("size", size)
-    highest = math.inf
-    if free_above is not None:
-        highest = positive_number("free_above", free_above)
-        if not clear_above(loop, np.full(2, 1.0 + size), highest):
-            return UNCONFINED
+    highest = _checked_end(loop, size, free_above)
+    if not highest:
+        return UNCONFINED
     return sum(
         Ray(loop, corner, following - corner).crossings(1.0, highest=highest).position.size
         for corner, following in zip(
@@ -310,9 +315,17 @@ def edge_crossings(loop: Loop, size: float, free_above: float | None = None) -> 
     )
 
 
-def _stays_clear(loop: Loop, c1: float, c2: float, half: float) -> bool:
+def _checked_end(loop: Loop, size: float, free_above: float | None) -> float:
+    """Frequency up to which roots may cross for a box; 0 if they may for phases beyond."""
+    if free_above is None:
+        return math.inf
+    highest = positive_number("free_above", free_above)
+    return highest if clear_above(loop, 1.0 + size, 1.0 + size, highest) else 0.0
+
+
+def _stays_clear(loop: Loop, c1: float, c2: float, half: float, highest: float) -> bool:
     """Whether no point of a box has a root on the imaginary axis, as far as one walk tells."""
-    end = float(last_frequency(loop, abs(c1) + half, abs(c2) + half))
+    end = min(float(last_frequency(loop, abs(c1) + half, abs(c2) + half)), highest)
     if not np.isfinite(end):
         return False
     whole, (_, b1, b2) = loop.at(c1, c2), loop.on_boundary()
@@ -670,7 +683,7 @@ def design(
         )
     _require(bounds, sampled)
     loop = judge.loop(x)
-    counts = box_counts(loop, box)
+    counts = box_counts(loop, box, free_above)
     crossings = edge_crossings(loop, box, free_above)
     if counts.any() or crossings:
         raise ValueError(

@@ -369,11 +369,7 @@ def _unconfined(c1: float, c2: float) -> CountError:
 
 def _require_stable(loop: Loop, c1: float, c2: float, free_above: float = np.inf) -> None:
     """Raise unless 1 + L has all its zeros in the open left half-plane."""
-    count = None
-    if np.isfinite(free_above) and _no_phases_cross(loop, c1, c2, free_above):
-        count = _count_below(loop, c1, c2, free_above)
-    if count is None:
-        count = int(unstable_roots(loop, c1, c2))
+    count = count_at(loop, c1, c2, free_above)
     if count != 0:
         raise ValueError(
             f"the loop must be stable at (c1, c2) = ({c1}, {c2}) to have margins, but "
@@ -381,8 +377,8 @@ def _require_stable(loop: Loop, c1: float, c2: float, free_above: float = np.inf
         )
 
 
-def _no_phases_cross(loop: Loop, c1: float, c2: float, free_above: float) -> bool:
-    """Whether no phases of the arms take L to -1 above a frequency."""
+def clear_above(loop: Loop, c1: float, c2: float, free_above: float) -> bool:
+    """Whether no phases above a frequency take L to -1, for parameters of up to these sizes."""
     end = _clear_from(loop, np.abs([c1, c2]), -1.0, 0.0)
     if not np.isfinite(end):
         return False
@@ -394,6 +390,14 @@ def _no_phases_cross(loop: Loop, c1: float, c2: float, free_above: float) -> boo
         _factors(loop), _arms(loop, c1, c2, free=True), free_above, end, least, np.zeros(4)
     )
     return bool(complete) and nearest[infimum.MODULUS] == TOLERANCE
+
+
+def count_at(loop: Loop, c1: float, c2: float, free_above: float) -> int:
+    """Count the unstable roots; in less time where no phases above a frequency matter."""
+    count = None
+    if np.isfinite(free_above) and clear_above(loop, c1, c2, free_above):
+        count = _count_below(loop, c1, c2, free_above)
+    return int(unstable_roots(loop, c1, c2)) if count is None else count
 
 
 def _count_below(loop: Loop, c1: float, c2: float, omega: float) -> int | None:
@@ -891,14 +895,6 @@ def margins(
     return Margins(*(float(value) for value in (*numbers, *places)))
 
 
-def clear_above(loop: Loop, most: FloatArray, free_above: float) -> bool:
-    """Whether no phases above a frequency let a root cross, for |c1| and |c2| up to `most`."""
-    c1, c2 = most
-    stable = int(unstable_roots(loop, c1, c2)) == 0
-    # Where it is not stable the margins do not tell.
-    return stable and margins(loop, c1, c2, free_above).modulus > 0.0
-
-
 def critical_perturbation(
     loop: Loop, direction: npt.ArrayLike, free_above: float | None = None
 ) -> float:
@@ -955,8 +951,8 @@ def critical_perturbation(
         highest = positive_number("free_above", free_above)
         stop = min(ray.scale, 0.5 * ray.chain_limit())
         at = ray.crossings(stop, first=True, highest=highest).position
-        if at.size and int(unstable_roots(loop, 1.0, 1.0)) == 0:
-            most = 1.0 + float(at[0]) * np.abs(ray.direction)
-            if clear_above(loop, most, highest):
+        if at.size and count_at(loop, 1.0, 1.0, highest) == 0:
+            c1, c2 = 1.0 + float(at[0]) * np.abs(ray.direction)
+            if clear_above(loop, c1, c2, highest):
                 return float(at[0])
     return first_break(loop, ray.start, ray.direction).position

@@ -503,7 +503,7 @@ def test_a_count_up_to_free_phases_is_that_of_all_frequencies(factor):
     for loop, (c1, c2) in STABLE.values():
         changed = scaled(loop, factor)
         for omega in np.geomspace(1e-2, 1e2, 9):
-            if module._no_phases_cross(changed, c1, c2, omega):
+            if module.clear_above(changed, c1, c2, omega):
                 count = module._count_below(changed, c1, c2, omega)
                 assert count == unstable_roots(changed, c1, c2)
                 found.append(count)
