@@ -23,7 +23,7 @@ from armlock.paper import (
     TAU2,
 )
 from armlock.roots import rightmost_root
-from armlock.stability import StabilityChart, stability_chart, unstable_roots
+from armlock.stability import stability_chart, unstable_roots
 from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 
@@ -61,31 +61,6 @@ def counts_of(loop: Loop) -> dict[str, int]:
 
 
 # Charts and limits --------------------------------------------------------------------------
-
-
-@cache
-def chart(half_width: float, points: int = 401) -> StabilityChart:
-    """Chart the controlled loop over a square around (1, 1)."""
-    axis = 1.0 + np.linspace(-half_width, half_width, points)
-    return stability_chart(LOOP, axis, axis)
-
-
-@cache
-def largest_stable_square() -> float:
-    """Half-width of the largest square around (1, 1) in which the loop is stable.
-
-    The loop depends almost on c1 - c2 alone, so that the corner along (1, -1) is the first to
-    lose stability; a chart makes sure that no other point of the square does before.
-
-    Raises
-    ------
-    RuntimeError
-        If one does.
-    """
-    limit = critical_perturbation(LOOP, (1.0, -1.0))
-    if not chart(0.999 * limit, 101).stable.all():
-        raise RuntimeError(f"the square of half-width {limit} is not stable throughout")
-    return limit
 
 
 @cache
@@ -283,11 +258,14 @@ def which_denominator() -> Finding:
 )
 def stable_over_the_box() -> Finding:
     """Chart the box, find the largest stable square, and the same with half of dtau."""
-    limit = largest_stable_square()
+    limit = critical_perturbation(LOOP, (1.0, -1.0))
+    # The corner along (1, -1) is the first to lose stability if all before it is stable.
+    axis = 1.0 + 0.999 * limit * np.linspace(-1.0, 1.0, 101)
+    stable = stability_chart(LOOP, axis, axis).stable
     half = critical_perturbation(paper_loop(difference=0.5 * (TAU1 - TAU2)), (1.0, -1.0))
     corner = highest_stable_corner()
     return Finding(
-        decide(chart(PERTURBATION, 101).stable.all() and limit > PERTURBATION),
+        decide(stable.all() and limit > PERTURBATION),
         limit,
         "half-width of the largest square around (1, 1) in which the loop is stable, for "
         "constant $c₁$, $c₂$",
@@ -448,7 +426,7 @@ def robust() -> Finding:
     c1, c2, modulus = worst_in_box()
     left = margins(LOOP, *WORST_CORNER)
     return Finding(
-        decide(largest_stable_square() > PERTURBATION and modulus > 0.0),
+        decide(critical_perturbation(LOOP, (1.0, -1.0)) > PERTURBATION and modulus > 0.0),
         modulus,
         "smallest modulus margin, $|1 + L|$, over a grid of the box of perturbations",
         f"It is met at (1 {c1 - 1.0:+.0e}, 1 {c2 - 1.0:+.0e}), where the phase margin is "
