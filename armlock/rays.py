@@ -51,8 +51,8 @@ class Crossings(NamedTuple):
 class Crossing(NamedTuple):
     """One crossing as in `Crossings`; (inf, nan, 0) where there is none.
 
-    Where the neutral root chain is lost first, `position` is its limit, `omega` is inf, and
-    `change` is 0.
+    Where the neutral root chain ceases to be confined first, `position` is that limit, `omega`
+    is inf, and `change` is 0.
     """
 
     position: float
@@ -161,7 +161,7 @@ class Ray:
         if not self.acts():
             return Crossings(np.empty(0), np.empty(0), np.empty(0, dtype=np.int64))
         end = min(end, highest)
-        omega, change = sign_changes(self.family, end, is_map=self.system.step > 0.0)
+        omega, change, _ = sign_changes(self.family, end, is_map=self.system.step > 0.0)
         omega, change = omega[change != 0], change[change != 0]
         # Only those in reach are worth polishing. Where M vanishes the quotient is not real: a
         # root is there at infinite t only.
@@ -227,7 +227,7 @@ def ray_crossings(
     ------
     TypeError, ValueError
         If start or direction is not two finite real numbers, the direction has length zero,
-        stop is not positive, or the neutral root chain is lost on the way.
+        stop is not positive, or the neutral root chain ceases to be confined on the way.
     CountError
         If a number overflows, or gain times delay is too large to follow.
 

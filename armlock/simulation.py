@@ -1,4 +1,4 @@
-"""The loop in the time domain, sample by sample, its delays exact and its loop closed exactly.
+"""The loop in the time domain, sample by sample, closed exactly in each.
 
 With phi the frequency noise of the locked laser, every loop of `armlock.loops` reads
 
@@ -8,7 +8,8 @@ With phi the frequency noise of the locked laser, every loop of `armlock.loops` 
 Sensor and controller are sampled by the trapezoidal rule, see `armlock.discretize`. Without a
 dead time the present phi is on both sides, with a weight of thousands; each sample solves for
 it. A rule that took the previous phi instead would be unstable by itself as soon as gain
-times step exceeds about one, and is not offered.
+times step exceeds about one, and is not offered. A delay that is no whole number of samples is
+interpolated, with the weights of `lagrange_delay`.
 
 Because s = j omega becomes (2 j / T) tan(omega T / 2) while the delays stay what they are,
 what is simulated has an open loop in closed form, `sampled_open_loop`.

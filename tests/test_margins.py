@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import mpmath
 import numpy as np
 import pytest
@@ -85,6 +87,12 @@ def test_the_limit_of_a_neutral_loop_is_that_of_its_chain():
     assert modulus_margin(loop, 1.5) == pytest.approx(1.3 - 0.45, rel=1e-9)
     ratio = margins(loop, 1.5).disk
     assert ratio == pytest.approx(2.0 * 0.85 / 1.15, rel=1e-6)
+    # With both arms and 2 g > 1 the disc around 2 g, of radius 2 g c, meets the unit circle.
+    centre, radius = 1.8, 1.8 * 0.99
+    found = margins(Loop(((), (), 0.9), COMMON, 2.2, 9.9), 0.99, 0.99)
+    meets = np.arccos((1.0 + centre**2 - radius**2) / (2.0 * centre))
+    assert found.phase == pytest.approx(np.pi - meets, rel=1e-6)
+    assert found.delay == 0.0
 
 
 @pytest.mark.parametrize("direction", [(0, -1), (1, 0), (0, 1), (-1, 0), (1, -1)])
@@ -473,3 +481,31 @@ def test_a_dead_time_with_free_phases_takes_the_phase_it_should():
     found = margins(loop, 0.0, 0.0, 0.01)
     assert found.phase == pytest.approx(0.5 * np.pi - 0.3, rel=1e-5)
     assert found.delay == pytest.approx((0.5 * np.pi - 0.3) / 3.0, rel=1e-5)
+
+
+def test_arms_of_equal_delay_have_free_phases_of_their_own():
+    loop = Loop(((), (-60.0 + 60j, -60.0 - 60j), 1000.0), COMMON, 2.0, 2.0)
+    # The smallest distance lies past twenty times this frequency.
+    c1, c2, above = 0.7, -0.9, 4.2
+    omega = np.geomspace(above, 1e4, 200_001)
+    first, second = loop.arm_responses(1j * omega)
+    away = np.abs(1.0 + first + second) - np.abs(c1 * first) - np.abs(c2 * second)
+    found = margins(loop, c1, c2, above)
+    assert found.modulus == pytest.approx(away.min(), rel=1e-4)
+    assert found.modulus_omega == pytest.approx(omega[away.argmin()], rel=1e-3)
+
+
+@pytest.mark.parametrize("factor", [0.3, 1.0, 3.0, 30.0])
+def test_a_count_up_to_free_phases_is_that_of_all_frequencies(factor):
+    """Above it no phases let a root cross, so that what lies below decides."""
+    module = sys.modules["armlock.margins"]
+    found = []
+    for loop, (c1, c2) in STABLE.values():
+        changed = scaled(loop, factor)
+        for omega in np.geomspace(1e-2, 1e2, 9):
+            if module._no_phases_cross(changed, c1, c2, omega):
+                count = module._count_below(changed, c1, c2, omega)
+                assert count == unstable_roots(changed, c1, c2)
+                found.append(count)
+    assert len(found) > 10
+    assert factor < 30.0 or max(found) > 0
