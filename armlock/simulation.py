@@ -464,11 +464,11 @@ class Simulation:
         # See `_compute`: behind the states, five rows, the largest input, the last calm sample.
         rows = len(sensor.states) + 2 * len(controller.sections) + 7
         self._groups = [np.zeros((rows, lanes)) for lanes in groups]
-        # The output, and what the controller has sent, of which nothing is read without a dead
-        # time: a block, behind as many samples as delays reach back.
-        kinds, past = 2 if loop.delay else 1, self.history_samples
+        # Of the output and of what the controller has sent a block, behind as many samples as
+        # delays reach back.
+        past = self.history_samples
         self._block = max(BLOCK // sum(groups), 4 * past)
-        self._signals = np.zeros((kinds, past + self._block, sum(groups)))
+        self._signals = np.zeros((2, past + self._block, sum(groups)))
         self._signals[0, :past] = before[-past:, None] if before.ndim else before
         for work in self._groups:
             work[-2] = np.abs(self._signals[0, :past]).max()
@@ -530,7 +530,7 @@ class Simulation:
         """Compute the next samples, each in a row, unless the run stops before."""
         past, stop, first = self.history_samples, len(output), 0
         columns = self._signals.shape[2]
-        phi, sent = (self._signals[kind, : past + stop] for kind in (0, -1))
+        phi, sent = self._signals[:, : past + stop]
         inputs = tuple(_in_columns(series, columns) for series in (noise, c1, c2))
         for work in self._groups:
             lanes = work.shape[1]

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from armlock import nyquist, unstable_roots
-from armlock.roots import RootError, extended_root, pseudospectral_roots
+from armlock.roots import RootError, extended_root
 from book.companion.claims import nyquist_cases as chapter
+from book.companion.schemes import pseudospectral_roots
 from tests import independent
 
 

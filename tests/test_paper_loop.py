@@ -16,7 +16,8 @@ from armlock import (
     unstable_roots,
 )
 from armlock.controllers import table_two
-from armlock.roots import RootError, extended_root, pseudospectral_roots
+from armlock.roots import RootError, extended_root
+from book.companion.schemes import pseudospectral_roots
 from tests import independent
 
 LOOP = paper_loop()

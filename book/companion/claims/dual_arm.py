@@ -65,8 +65,6 @@ class Edges(NamedTuple):
 
     Attributes
     ----------
-    gain : float
-        In rad/s.
     corner : float
         c - 1 at the upper end of the straight edge c1 = c2 = c.
     corner_omega : float
@@ -75,7 +73,6 @@ class Edges(NamedTuple):
         c2 - c1 at the far edge, where c1 + c2 = 2 WINDOW[0].
     """
 
-    gain: float
     corner: float
     corner_omega: float
     width: float
@@ -113,13 +110,7 @@ def edges(
     """Compute the exact edges for one gain, corner frequency and dtau."""
     loop = DualArm(gain, TAU1, TAU2, corner, difference=difference)
     upper, far = upper_end(loop, 0.0, low=0.5), far_edge(loop, WINDOW[0])
-    return Edges(gain, upper.position - 0.5, upper.omega, far.position)
-
-
-@cache
-def gain_sweep() -> Edges:
-    """Sweep `edges` over `GAINS`, each field an array."""
-    return Edges(*np.transpose([edges(float(gain)) for gain in GAINS]))
+    return Edges(upper.position - 0.5, upper.omega, far.position)
 
 
 def corner_sweep(gain: float, corners: FloatArray, difference: float | None = None) -> Edges:
@@ -461,7 +452,7 @@ def chart_at_gain_ten() -> Finding:
 )
 def edges_against_gain() -> Finding:
     """Follow the corner over six decades of gain."""
-    corner = np.asarray(gain_sweep().corner)
+    corner = np.array([edges(float(gain)).corner for gain in GAINS])
     lines = {d_curve_line(DualArm(float(gain))) for gain in GAINS}
     high = GAINS >= 1e4
     slope = log_slope(GAINS[high], corner[high])
@@ -532,7 +523,7 @@ def exact_upper_edge() -> Finding:
 )
 def shrinking_region() -> Finding:
     """Follow area and far edge, and look for a point that only a high gain makes stable."""
-    width = np.asarray(gain_sweep().width)
+    width = np.array([edges(float(gain)).width for gain in GAINS])
     area = [window_area(gain) for gain in (DUAL_ARM_GAIN, 100.0, 1e3, float(GAINS[-1]))]
     middle = 0.5 * (width[0] + width[-1])
     point = (WINDOW[0] - 0.5 * middle, WINDOW[0] + 0.5 * middle)
