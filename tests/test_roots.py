@@ -226,38 +226,12 @@ def test_an_integrator_with_nothing_but_dead_time_is_lambert(gain, delay):
     assert np.abs(pseudospectral_roots(loop, 0.0, 0.0, 40) - root).min() < 1e-9
 
 
-@pytest.mark.parametrize("kind", [CommonArm, DualArm])
-@pytest.mark.parametrize("point", [(0.9, 1.05), (0.0, 1.0), (1.0, 0.0), (-1.4, 0.8)])
-def test_with_a_dead_time_the_root_is_that_of_the_collocated_loop(kind, point):
-    loop, (x, y) = kind(0.3, 3.0, 2.0, delay=0.7), point
-    root = rightmost_root(loop, x, y)
-    assert pseudospectral_roots(loop, x, y, 80)[0].real == pytest.approx(root.real, abs=1e-9)
-    assert (root.real > 0.0) == (unstable_roots(loop, x, y) > 0)
-
-
 def test_a_dead_time_sets_the_growth_of_a_neutral_loop():
     # At high frequency 1 + L is 1 + 2 K exp(-s delay), so that |exp(s delay)| tends to 2 K.
     loop = paper_loop(delay=1e-3)
     root = rightmost_root(loop, 1.0, 1.0)
     high = 2.0 * loop.controller.gain
     assert root.real == pytest.approx(np.log(high) / 1e-3, rel=1e-6)
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_random_dual_arms_have_a_certified_root(seed):
-    random = np.random.default_rng(seed)
-    tau1 = random.uniform(1.0, 30.0)
-    # Nearly equal delays in every other one.
-    shorter = random.uniform(0.0, 0.5) if seed % 2 else 10.0 ** random.uniform(-9.0, -3.0)
-    loop = DualArm(10.0 ** random.uniform(-2.0, 2.0), tau1, tau1 * (1.0 - shorter))
-    for x, y in [(1.0, 1.0), *random.uniform(-2.0, 2.0, (2, 2))]:
-        root = rightmost_root(loop, x, y)
-        count = unstable_roots(loop, x, y)
-        assert root == rightmost_root(loop, x, y)
-        assert root.real > 0.0 if count > 0 else root.real >= 0.0 if count else root.real < 0.0
-        margin = 1e-6 * max(abs(root), 1.0 / tau1)
-        assert unstable_roots(loop.shifted(root.real + margin), x, y) == 0
-        assert unstable_roots(loop.shifted(root.real - margin), x, y) > 0
 
 
 def test_equal_delays_are_one_in_which_both_terms_may_cancel():
