@@ -27,7 +27,6 @@ from armlock import (
 )
 from armlock.sensors import COMMON, SignalMapping
 from armlock.simulation import BLOCK, LANES, lagrange_delay
-from benchmarks.__main__ import main
 from tests.extended import reference
 
 RATE = 200.0
@@ -265,11 +264,6 @@ def test_a_refused_block_leaves_the_run_where_it_is():
         with pytest.raises(ValueError, match=r"^(c1|c2|noise) must"):
             run.advance(*bad)
     assert np.array_equal(np.concatenate([first, run.advance(noise[200:])]), whole)
-
-
-def test_the_benchmark_runs(tmp_path):
-    """It returns 1 if results disagree."""
-    assert main(["--quick", "--only", "simulation", "--output", str(tmp_path)]) == 0
 
 
 @pytest.mark.parametrize("draws", [1, LANES // 2 - 1, LANES // 2, 2 * LANES + 3])
