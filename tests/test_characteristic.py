@@ -1,7 +1,6 @@
 import copy
 import pickle
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -90,12 +89,3 @@ def test_a_system_is_a_value(system):
         for name in (*vars(system), "anything"):
             with pytest.raises(AttributeError, match=rf"cannot be changed, got {name} = 3\.0"):
                 setattr(again, name, 3.0)
-
-
-def test_a_list_given_for_a_polynomial_may_change_afterwards():
-    b1 = [0.1, 0.0]
-    reused = np.array([1.0, 1.0])
-    system = CharacteristicFunction(reused, b1, [0.1], 1.0, 2.0)
-    b1[0], reused[0] = 50.0, -3.0
-    assert system.b1.tolist() == [0.1]
-    assert system.rest.tolist() == [1.0, 1.0]

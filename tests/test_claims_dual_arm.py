@@ -27,11 +27,6 @@ def test_estimates_approach_the_exact_edges():
     assert chapter.width_estimate(0.9) == pytest.approx(width, rel=2e-3)
 
 
-def test_area_agrees_with_a_chart_of_counts():
-    for gain in (10.0, 1000.0):
-        assert chapter.chart_area(gain) == pytest.approx(chapter.window_area(gain), rel=0.01)
-
-
 @pytest.mark.parametrize("point", [(1.0, 1.012), chapter.SLIVER])
 def test_gain_factors_put_a_root_on_the_axis(point):
     for factor in chapter.gain_factors(*point):
@@ -68,10 +63,6 @@ def test_what_a_high_gain_leaves_of_the_strip():
     far = np.abs(np.abs(c1 + c2) - 2.0) > 0.02
     at_high_gain = unstable_roots(DualArm(1000.0), c1[far], c2[far]) == 0
     np.testing.assert_array_equal(at_high_gain, kept[far])
-
-
-def test_upper_edge_is_one_piece_at_a_medium_gain():
-    assert chapter.upper_edge(30.0) == pytest.approx((1, 30.607, 30.607), abs=1e-3)
 
 
 def test_upper_ends_are_where_the_count_changes():

@@ -155,13 +155,6 @@ def test_integrating_actuator_at_the_papers_gain():
     assert np.abs(simulate(CommonArm(5000.0), noise, 0.9, 0.9)).max() < 5.0
 
 
-def test_constant_parameters_equal_arrays():
-    noise = np.random.default_rng(1).standard_normal(9000)
-    full = np.full(noise.size, 1.0 - 1e-6)
-    found = simulate(paper_loop(), noise, 1, 1.0 - 1e-6)
-    assert np.array_equal(simulate(paper_loop(), noise, 1.0, full), found)
-
-
 def test_history_acts_like_noise_behind_the_controller():
     """What is in the arms when a run starts comes back, and goes through the controller."""
     loop = Loop(Controller([], [-0.1], 0.2), COMMON, 2.0, 1.5)
