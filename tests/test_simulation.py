@@ -56,8 +56,6 @@ def test_accuracy_over_a_million_samples(million):
 
 
 LOOPS = {
-    "common": (Loop(Controller([], [-0.1], 0.2), COMMON, 20.1, 19.9), 10.0),
-    "fractional": (Loop(Controller([], [-0.1], 0.2), COMMON, 20.13, 19.957), 7.0),
     "neutral": (Loop(Controller([-0.3], [-0.1], 0.2), COMMON, 2.0, 1.5), 10.0),
     "dead time": (Loop(Controller([], [-0.1], 0.2), COMMON, 20.1, 19.9, 0.3), 10.0),
     "dead time between samples": (
