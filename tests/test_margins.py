@@ -53,12 +53,11 @@ STABLE = {
 def test_margins_are_those_of_branch_and_bound(name):
     """All six, and counts on both sides of the gain margins."""
     (loop, point), tally = STABLE[name], Tally(patient=False, where=name)
-    sketch = sketch_of(loop)
+    found, sketch = margins(loop, *point), sketch_of(loop)
     with np.errstate(all="ignore"):
         check_margins(tally, np.random.default_rng(1), sketch, loop, point)
     assert tally.calls["margins"] == 1
     assert (tally.wrong, tally.refused) == ([], [])
-    found = margins(loop, *point)
     for factor, inside in ((found.gain_lower, 1.0 + E), (found.gain_upper, 1.0 - E)):
         if 0.0 < factor < np.inf:
             near = [to_loop(sketch.scaled(factor * k)) for k in (inside, 2.0 - inside)]
