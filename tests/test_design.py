@@ -131,10 +131,10 @@ def test_the_critical_perturbation_of_the_robust_loop_on_a_plain_grid():
     assert at[at > 0.0].min() == pytest.approx(limit, rel=1e-4)
 
 
-def test_a_roll_off_hardly_changes_the_critical_perturbation():
-    loop = buildable_loop()
-    quick = critical_perturbation(loop, (1.0, -1.0), TURN * 2.0)
-    assert quick == pytest.approx(critical_perturbation(loop, (1.0, -1.0)), rel=1e-12)
+def test_free_phases_above_do_not_change_the_critical_perturbation():
+    found = critical_perturbation(buildable_loop(), (1.0, -1.0), TURN * 2.0)
+    # Without free phases it is the same, and takes seconds.
+    assert found == pytest.approx(4.400363639535378e-06, rel=1e-12)
 
 
 def test_the_robust_loop_keeps_the_papers_suppression():
@@ -188,7 +188,7 @@ def test_a_roll_off_that_is_none_is_refused(arguments, message):
 
 def test_the_executor_does_not_change_what_is_found():
     search = partial(
-        design, robust_loop(), "critical perturbation", {"modulus": 0.6}, generations=2, seed=3
+        design, robust_loop(), "critical perturbation", {"modulus": 0.6}, generations=1, seed=3
     )
     alone = search()
     with ThreadPoolExecutor(2) as executor:
