@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.polynomial.polynomial import polyval
 
-from armlock import CommonArm, contour, paper_loop
+from armlock import CommonArm, contour, exponentials, paper_loop
 from armlock.bounds import last_frequency
 from tests.systems import NEUTRAL, RETARDED
 
@@ -82,6 +82,16 @@ def test_the_last_crossing_of_the_common_arm_is_known():
     assert ends[0] == 0.0
     assert (ends >= exact).all()
     np.testing.assert_allclose(ends, exact, rtol=0.05)
+
+
+@pytest.mark.parametrize("number", [2, 12, 40])
+def test_a_piece_reaches_as_far_as_equal_roots_allow(number):
+    # Of n roots at distance d, n reach / (reach + d) counts: 1.5 at reach = 1.5 d / (n - 1.5).
+    # Another polynomial's roots do not count.
+    roots, starts = np.full(2 * number, -3.0 + 0j), np.array([0, number, 2 * number])
+    expected = 1.5 * 5.0 / (number - 1.5)
+    found = exponentials._reach(roots, starts, 4.0, np.inf, 1.5)
+    assert found == pytest.approx(expected, rel=1e-2)
 
 
 def test_the_last_frequency_is_close_to_where_one_term_outgrows_the_others():
