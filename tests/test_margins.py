@@ -61,7 +61,15 @@ def test_margins_are_those_of_branch_and_bound(name):
     for factor, inside in ((found.gain_lower, 1.0 + E), (found.gain_upper, 1.0 - E)):
         if 0.0 < factor < np.inf:
             near = [to_loop(sketch.scaled(factor * k)) for k in (inside, 2.0 - inside)]
-            assert [unstable_roots(loop, *point) == 0 for loop in near] == [True, False]
+            assert [unstable_roots(k, *point) == 0 for k in near] == [True, False]
+    # Gain and phase are met where they are said to be taken.
+    if np.isfinite(found.gain_omega):
+        value = complex(loop.open_loop(1j * found.gain_omega, *point))
+        assert found.gain_upper * value == pytest.approx(-1.0, rel=1e-6)
+    if np.isfinite(found.phase_omega):
+        value = complex(loop.open_loop(1j * found.phase_omega, *point))
+        assert abs(value) == pytest.approx(1.0, rel=1e-9)
+        assert abs(np.angle(-value)) == pytest.approx(found.phase, abs=1e-9)
 
 
 def test_a_large_negative_gain_is_bounded_from_below():
