@@ -11,22 +11,23 @@ import math
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import zip_longest
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
-from scipy.optimize import minimize_scalar
+from scipy.optimize import elementwise, minimize_scalar
 
 from armlock import contour, infimum
 from armlock.bounds import last_larger, last_root_bound
 from armlock.checks import (
-    BoolArray,
     ComplexArray,
     FloatArray,
     IntArray,
     positive_number,
     real_number,
 )
+from armlock.exponentials import ExponentialSum
 from armlock.loops import Loop, checked_loop
 from armlock.nyquist import leading_radius, loop_numerator
 from armlock.rays import Ray, first_break
@@ -151,14 +152,15 @@ def _arm_weights(loop: Loop, c1: float, c2: float) -> FloatArray:
     return np.array([abs(c1), abs(c2)])
 
 
-def _clear_from(loop: Loop, c1: float, c2: float, centre: float, radius: float) -> float:
+def _clear_from(loop: Loop, arms: FloatArray, centre: float, radius: float) -> float:
     """Frequency past which L stays outside a disc around a negative centre; inf if it does not.
 
-    Past it |B1 + B2 - centre R| > radius |R| + |c1 B1| + |c2 B2|; with a dead time B1 + B2
-    turns, and stands on the other side.
+    `arms` are |c1| and |c2|, or what they count for. Past it |B1 + B2 - centre R| exceeds
+    radius |R| + |c1 B1| + |c2 B2|; with a dead time B1 + B2 turns, and stands on the other
+    side.
     """
     c = _plus(loop.b1, loop.b2)
-    factors = [radius, *_arm_weights(loop, c1, c2), 0.0]
+    factors = [radius, *arms, 0.0]
     first = -centre * loop.rest
     if loop.delay:
         factors[3] = 1.0
@@ -243,6 +245,7 @@ def _smallest(
     best = _limit(loop, c1, c2)[:2]
     best[infimum.RATIO] = min(best[infimum.RATIO], 1.0) if disk else 0.0
     where = np.full(2, np.inf)
+    together = _arm_weights(loop, c1, c2)
 
     def end() -> float:
         """Frequency past which nothing is smaller, or `highest`."""
@@ -250,7 +253,7 @@ def _smallest(
             infimum.excluded_disc(value * (1.0 - TOLERANCE), m == infimum.RATIO)
             for m, value in enumerate(best)
         ]
-        return min(max(_clear_from(loop, c1, c2, *disc) for disc in discs), highest)
+        return min(max(_clear_from(loop, together, *disc) for disc in discs), highest)
 
     if not np.isfinite(end()):
         raise _unconfined(c1, c2)
@@ -364,9 +367,13 @@ def _unconfined(c1: float, c2: float) -> CountError:
     )
 
 
-def _require_stable(loop: Loop, c1: float, c2: float) -> None:
+def _require_stable(loop: Loop, c1: float, c2: float, free_above: float = np.inf) -> None:
     """Raise unless 1 + L has all its zeros in the open left half-plane."""
-    count = int(unstable_roots(loop, c1, c2))
+    count = None
+    if np.isfinite(free_above) and _no_phases_cross(loop, c1, c2, free_above):
+        count = _count_below(loop, c1, c2, free_above)
+    if count is None:
+        count = int(unstable_roots(loop, c1, c2))
     if count != 0:
         raise ValueError(
             f"the loop must be stable at (c1, c2) = ({c1}, {c2}) to have margins, but "
@@ -374,20 +381,95 @@ def _require_stable(loop: Loop, c1: float, c2: float) -> None:
         )
 
 
+def _no_phases_cross(loop: Loop, c1: float, c2: float, free_above: float) -> bool:
+    """Whether no phases of the arms take L to -1 above a frequency."""
+    end = _clear_from(loop, np.abs([c1, c2]), -1.0, 0.0)
+    if not np.isfinite(end):
+        return False
+    if end <= free_above:
+        return True
+    # Looked for are distances that are as good as none.
+    least = np.array([TOLERANCE, 0.0, 0.0, 0.0])
+    nearest, _, complete = infimum.free_margins(
+        _factors(loop), _arms(loop, c1, c2, free=True), free_above, end, least, np.zeros(4)
+    )
+    return bool(complete) and nearest[infimum.MODULUS] == TOLERANCE
+
+
+def _count_below(loop: Loop, c1: float, c2: float, omega: float) -> int | None:
+    """Count the unstable roots of a loop that no phases of the arms let cross past omega.
+
+    Past it D(s; c1, c2) over its value at much smaller parameters stays in the right half-plane
+    and comes to one at last. So the counts of the two differ by what their arguments gather up
+    to there. None where rounding hides these.
+    """
+    # Not zero: sensors with an integrator have a root at s = 0 there.
+    low1, low2 = 1e-3 * c1, 1e-3 * c2
+    parts = [loop.at(c1, c2), loop.at(low1, low2)]
+    arguments, values = [], []
+    for whole in parts:
+        argument, value, clear = contour.winding(
+            whole.compiled(),
+            whole.weights,
+            whole.sums,
+            whole.phases,
+            np.zeros(whole.sums.size),
+            omega,
+        )
+        if not clear or np.isnan(argument):
+            return None
+        arguments.append(argument)
+        values.append(value)
+    ratio = values[0] * values[1].conjugate()
+    turned = arguments[0] - arguments[1] - math.atan2(ratio.imag, ratio.real)
+    below = int(unstable_roots(loop, low1, low2))
+    count = below - turned / math.pi
+    return round(count) if below >= 0 and abs(count - round(count)) < 1e-3 else None
+
+
+def _zeros(whole: ExponentialSum, intervals: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Zeros of the imaginary part on intervals of the axis, and where rounding may hide some.
+
+    Of each stretch that hides some, its two ends and its middle, in a column.
+    """
+    parts: list[tuple[npt.NDArray[Any], ...]] = [(np.empty(0),) * 3]
+    for start, end in np.reshape(intervals, (-1, 2)):
+        parts.append(sign_changes(whole, float(end), start=float(start)))
+    omega, jump, width = (np.concatenate(part) for part in zip(*parts, strict=True))
+    hidden = jump == 0
+    stretches = omega[hidden] + np.outer((-1.0, 0.0, 1.0), width[hidden])
+    return omega[~hidden & (omega > 0.0)], stretches[:, stretches[0] > 0.0]
+
+
+def _on_unit_circle(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArray:
+    """Move frequencies next to crossovers to where |L|, from its factors, is one."""
+    # Not past the next null of an arm.
+    span = np.minimum(0.01 / loop.longest_delay, 0.5 * omega)
+    reaches = [np.minimum(10.0**power * omega, span) for power in range(-13, 0)]
+    return polished(lambda at: _level(loop, c1, c2, at), omega, reaches)
+
+
+def _level(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArray:
+    return np.asarray(np.log(np.abs(loop.open_loop(1j * omega, c1, c2))))
+
+
 def _crossovers(
     loop: Loop, c1: float, c2: float, intervals: npt.ArrayLike
-) -> tuple[FloatArray, BoolArray]:
+) -> tuple[FloatArray, FloatArray]:
     """Frequencies with |L| = 1 on intervals of the axis, and where rounding hides if it is."""
     above, below = loop_numerator(loop, c1, c2), loop.rest_on_boundary()
     squares = above.times_conjugate(above).plus(below.times_conjugate(below).scaled(-1.0))
-    excess = squares.turned()
-    found = [
-        sign_changes(excess, float(end), start=float(start))
-        for start, end in np.reshape(intervals, (-1, 2))
-    ]
-    omega = np.concatenate([np.empty(0), *(zeros for zeros, _ in found)])
-    jump = np.concatenate([np.empty(0), *(jumps for _, jumps in found)])
-    return omega[omega > 0.0], jump[omega > 0.0] == 0
+    omega, hidden = _zeros(squares.turned(), intervals)
+    far = np.abs(_level(loop, c1, c2, omega)) > TOLERANCE
+    omega[far] = _on_unit_circle(loop, c1, c2, omega[far])
+    lost = np.abs(_level(loop, c1, c2, omega)) > TOLERANCE
+    if lost.any():
+        raise CountError(
+            f"no margin at (c1, c2) = ({c1}, {c2}): rounding hides where |L| comes to one "
+            f"around {omega[lost][0]} rad/s",
+            np.array([[c1, c2]]),
+        )
+    return omega, hidden
 
 
 def _phase_and_delay(
@@ -405,8 +487,10 @@ def _phase_and_delay(
     phase, delay, where = np.inf, np.inf, np.nan
     c, arms = _plus(loop.b1, loop.b2), _arm_weights(loop, c1, c2)
     end = last_larger(loop.rest, (c, loop.b1, loop.b2), np.array([1.0, *arms]))
-    if not np.isfinite(end) and not np.isfinite(highest):
+    centre, radius = _limit_disc(loop, c1, c2)
+    if abs(centre) + radius >= 1.0 and not np.isfinite(highest):
         phase, delay, where = float(_limit(loop, c1, c2)[infimum.PHASE]), 0.0, np.inf
+    if not np.isfinite(end) and not np.isfinite(highest):
         end = _settled_from(loop, c1, c2, phase)
     end, turn = min(end, highest), 2.0 * np.pi / loop.longest_delay
     first = min(end, 1e3 * turn)
@@ -419,8 +503,8 @@ def _phase_and_delay(
         intervals = np.concatenate((intervals, likely))
     for last in (False, True):
         omega, hidden = _crossovers(loop, c1, c2, intervals)
-        found = _least_lags(loop, c1, c2, omega[~hidden])
-        perhaps = _least_lags(loop, c1, c2, omega[hidden])
+        found = _least_lags(loop, c1, c2, omega)
+        perhaps = _least_lags(loop, c1, c2, hidden.ravel())
         if perhaps[0] < min(phase, found[0]) or perhaps[1] < min(delay, found[1]):
             raise CountError(
                 f"no margin at (c1, c2) = ({c1}, {c2}): rounding hides whether |L| comes to "
@@ -453,11 +537,7 @@ def _least_lags(
     chosen = np.concatenate(
         (np.argsort(nearest)[:_POLISHED], np.argsort(lag / omega)[:_POLISHED])
     )
-    at = omega[np.unique(chosen)]
-    # Not past the next null of an arm.
-    span = np.minimum(0.01 / loop.longest_delay, 0.5 * at)
-    reaches = [np.minimum(10.0**power * at, span) for power in range(-6, 0)]
-    at = polished(lambda w: np.log(np.abs(loop.open_loop(1j * w, c1, c2))), at, reaches)
+    at = _on_unit_circle(loop, c1, c2, omega[np.unique(chosen)])
     lag, nearest = lags(at)
     worst = int(np.argmin(nearest))
     return float(nearest[worst]), float(np.min(lag / at)), float(at[worst])
@@ -483,10 +563,13 @@ def _settled_from(loop: Loop, c1: float, c2: float, phase: float) -> float:
         for b in (loop.b1, loop.b2)
     ]
     left = [
-        _plus(b, -share * loop.rest)[: loop.rest.size - 1]
+        _plus(b, -share * loop.rest)
         for b, share in zip((loop.b1, loop.b2), shares, strict=True)
     ]
-    weights = 1.0 + np.array([abs(c1), abs(c2)])
+    for remainder in left:
+        # The highest power cancels.
+        remainder[loop.rest.size - 1 :] = 0.0
+    weights = 1.0 + np.abs([c1, c2])
     return last_larger(loop.rest, (left[0], left[1]), weights / near)
 
 
@@ -526,18 +609,21 @@ def _ascent(rest: FloatArray, c: FloatArray, t: float, sign: float) -> FloatArra
     return np.asarray(sign * product * (-1.0) ** np.arange(product.size))
 
 
-def _gains(
-    loop: Loop, c1: float, c2: float, intervals: npt.ArrayLike
-) -> tuple[FloatArray, FloatArray]:
-    """Find the gain factors that take a root to the axis on intervals of it, and where."""
-    crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
-    found = [np.empty(0)]
-    for start, end in np.reshape(intervals, (-1, 2)):
-        omega, jump = sign_changes(crossing, float(end), start=float(start))
-        found.append(omega[(omega > 0.0) & (jump != 0)])
-    omega = np.concatenate(found)
+def _gains(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArray:
+    """Gain factors that take a root to the axis at frequencies."""
     with np.errstate(divide="ignore"):
-        return -1.0 / loop.open_loop(1j * omega, c1, c2).real, omega
+        return np.asarray(-1.0 / loop.open_loop(1j * omega, c1, c2).real)
+
+
+def _real_within(loop: Loop, c1: float, c2: float, stretches: FloatArray) -> FloatArray:
+    """Where L, from its factors, is real within stretches in which rounding hides it."""
+
+    def imaginary(omega: FloatArray) -> FloatArray:
+        return np.asarray(loop.open_loop(1j * omega, c1, c2).imag)
+
+    lower, upper = stretches[:-1].ravel(), stretches[1:].ravel()
+    changes = imaginary(lower) * imaginary(upper) < 0.0
+    return np.asarray(elementwise.find_root(imaginary, (lower[changes], upper[changes])).x)
 
 
 def _free_gains(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArray:
@@ -563,11 +649,12 @@ def _gains_around_one(
     `least` and `most` where there are none between them. As for phases, likely ones come first.
     """
     turn = 2.0 * np.pi / loop.longest_delay
+    arms = _arm_weights(loop, c1, c2)
 
     def end(lower: float, upper: float) -> float:
         """Frequency past which no factor between the two takes a root to the axis."""
         clear = max(
-            _clear_from(loop, c1, c2, -0.5 * (1.0 / k + 1.0), 0.5 * abs(1.0 - 1.0 / k))
+            _clear_from(loop, arms, -0.5 * (1.0 / k + 1.0), 0.5 * abs(1.0 - 1.0 / k))
             for k in (lower, upper)
         )
         return min(clear, _no_crossing_from(loop, c1, c2, lower, upper))
@@ -575,11 +662,14 @@ def _gains_around_one(
     def meeting(lower: float, upper: float, span: tuple[float, float]) -> FloatArray:
         return _meeting(loop, c1, c2, span, segment=(-1.0 / upper, -1.0 / lower))
 
+    crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
     lower, upper, where = least, most, np.nan
     first = min(end(lower, upper), 1e3 * turn)
     intervals, wide, complete = meeting(lower, upper, (0.0, first)), 300.0, False
     while True:
-        factor, omega = _gains(loop, c1, c2, intervals)
+        omega, hidden = _zeros(crossing, intervals)
+        omega = np.concatenate((omega, _real_within(loop, c1, c2, hidden)))
+        factor = _gains(loop, c1, c2, omega)
         below = factor[(factor >= lower) & (factor <= 1.0)]
         lower = float(below.max(initial=lower))
         above = np.flatnonzero((factor > 1.0) & (factor <= upper))
@@ -710,7 +800,7 @@ def _free_margins(
     # Past it L stays clear of where smaller values would be.
     for k, symmetric in ((infimum.MODULUS, False), (infimum.RATIO, True)):
         level = best[k] * (1.0 - TOLERANCE)
-        end = max(end, _clear_from(loop, c1, c2, *infimum.excluded_disc(level, symmetric)))
+        end = max(end, _clear_from(loop, arms, *infimum.excluded_disc(level, symmetric)))
     smaller, places, complete = infimum.free_margins(
         factors, free, lowest, end, best, _FREE_TOLERANCES
     )
@@ -782,7 +872,7 @@ def margins(
     checked_loop(loop)
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
     highest = np.inf if free_above is None else positive_number("free_above", free_above)
-    _require_stable(loop, c1, c2)
+    _require_stable(loop, c1, c2, highest)
     (modulus, ratio), (modulus_omega, _) = _smallest(loop, c1, c2, disk=True, highest=highest)
     phase, delay, phase_omega = _phase_and_delay(loop, c1, c2, highest)
     if free_above is None:

@@ -161,7 +161,7 @@ class Ray:
         if not self.acts():
             return Crossings(np.empty(0), np.empty(0), np.empty(0, dtype=np.int64))
         end = min(end, highest)
-        omega, change = sign_changes(self.family, end, is_map=self.system.step > 0.0)
+        omega, change, _ = sign_changes(self.family, end, is_map=self.system.step > 0.0)
         omega, change = omega[change != 0], change[change != 0]
         # Only those in reach are worth polishing. Where M vanishes the quotient is not real: a
         # root is there at infinite t only.

@@ -353,6 +353,10 @@ def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
                 walked += right_of_it.walk
                 count = right_of_it.count()
                 if count == 0:
+                    # Another one may lie between the root and the line.
+                    between = right_of_it.rightmost(further) if margin > nearest else None
+                    if between is not None and between[0].real > best.real + nearest:
+                        return between[0]
                     return best
                 if count > 0:
                     break

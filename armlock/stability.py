@@ -116,11 +116,11 @@ def _compiled(system: CharacteristicFunction) -> tuple[Any, ...]:
 
 def sign_changes(
     whole: ExponentialSum, end: float, *, start: float = 0.0, is_map: bool = False
-) -> tuple[FloatArray, IntArray]:
-    """Zeros in [start, end] of the imaginary part of an exponential sum, and their jumps.
+) -> tuple[FloatArray, IntArray, FloatArray]:
+    """Zeros in [start, end] of the imaginary part of an exponential sum, jumps and widths.
 
     As `armlock.contour.imaginary_zeros`: the jump is 0 where rounding hides whether there is
-    one.
+    one, within the width.
 
     Raises
     ------
@@ -141,7 +141,8 @@ def sign_changes(
             f"or {contour.MOST_ZEROS:.0e} crossings, because gain times delay is too large",
             _NO_POINTS,
         )
-    return zeros[:, contour.OMEGA], zeros[:, contour.JUMP].astype(np.int64)
+    jump = zeros[:, contour.JUMP].astype(np.int64)
+    return zeros[:, contour.OMEGA], jump, zeros[:, contour.WIDTH]
 
 
 def polished(

@@ -415,7 +415,9 @@ def check_rays(tally, rng, sketch, loop, point):
     except UndecidedError:
         tally.skipped["ray_crossings: judge undecided"] += 1
     one = tally.ask("first_crossing", first_crossing, loop, start, way, stop)
-    expected = found.position[0] if found.position.size else np.inf
+    # A boundary at the start itself, to rounding, is none beyond it.
+    beyond = found.position[found.position > 1e-15 * np.abs(start).max()]
+    expected = beyond[0] if beyond.size else np.inf
     if one is not None and not np.isclose(one.position, expected, rtol=1e-9):
         tally.note("first_crossing", (start, way, stop), one.position, expected)
 
@@ -432,6 +434,9 @@ def check_critical(tally, rng, sketch, loop, point):
         if np.isinf(eps):
             if sketch.sensor != "single" or way[0] * loop.b1.any():
                 tally.note("critical_perturbation", way, eps, "finite")
+            return
+        if eps * np.abs(way).max() < 1e-15:
+            tally.skipped["critical_perturbation: below rounding"] += 1
             return
         for share in (1e-3, *rng.random(3), 1.0 - 1e-6):
             counts = judge.count(sketch, *(1.0 + share * eps * way))

@@ -8,7 +8,7 @@ free: a disc, which needs no resolution of the delays. A cell is left out only i
 shows that nothing on it can be below the smallest value found so far, less a part in 1e6;
 every other one is cut in eight. So the smallest value found is the infimum to 1e-6, whatever
 the function does between samples. Past the highest corner a disc bounds all that follows.
-Rounding is not enclosed: it is some 1e-13 of the terms.
+Rounding belongs to the remainder R.
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ TOL = 1e-6
 MOST_CELLS = 40_000
 # Cells that are looked at together.
 CHUNK = 20_000
+# Of a product of factors, relative.
+EPS = 1e-15
 GAINS = 1e6
 NAMES = ("modulus", "disk", "phase", "delay", "gain_upper", "gain_lower")
 
@@ -188,9 +190,12 @@ class View:
                 ap0, ap1, al, av = np.abs(p0), np.abs(p1), np.abs(log_slope), np.abs(v)
                 value = value + v * p0
                 slope = slope + v * (p1 + log_slope * p0)
+                # Phases are rounded as their arguments are.
+                rounding = EPS * (ap0 + abs(start) + (abs(a1) + abs(a2)) * b * self.tau.max())
                 rest = rest + av * (
                     al * ap1 * h * h + (ap0 + ap1 * h) * e + (1.0 + al * h) * rp + e * rp
                 )
+                rest = rest + np.where(h > 0.0, av * rounding, 0.0)
                 arms[0] += w1 * v
                 arms[1] += w2 * v
                 whole = abs(w1) + abs(w2) + abs(a1) + abs(a2)
@@ -240,7 +245,7 @@ class View:
 
     def cells(self, high, free_above=np.inf):
         """Cells from `low` to `high`, ten a decade and one for each corner."""
-        if not 0.0 < self.low < high < np.inf:
+        if not 0.0 < self.low < high < 1e300 * self.low:
             raise UndecidedError("no range of frequencies")
         count = int(np.ceil(10 * np.log10(high / self.low))) + 1
         edges = np.geomspace(self.low, high, count)
@@ -325,11 +330,12 @@ def count(sketch, c1, c2, sigma=0.0):
 
 
 def distance(sketch, c1, c2):
-    """Smallest |1 + L| over the size of its terms: how near a root is to the axis."""
+    """Smallest |1 + L|, or that over the size of its terms: how near a root is to the axis."""
     view = View(sketch, c1, c2)
     omega = np.geomspace(view.low, 1e2 * view.corners.max(), 20001)
     value, _, _, centre, radius = view.enclose(omega, 0.0 * omega)
-    return float((np.abs(1.0 + value) / (1.0 + np.abs(centre) + radius)).min())
+    shares = np.abs(1.0 + value) / (1.0 + np.abs(centre) + radius)
+    return min(float(shares.min()), margins(sketch, c1, c2, stable=False).modulus)
 
 
 @dataclass
@@ -536,6 +542,13 @@ def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
     high = max(high, 2.0 * free_above) if np.isfinite(free_above) else high
     a, b = view.cells(high, free_above)
     opened = np.zeros(len(NAMES), dtype=bool)
+
+    def past(high):
+        """For each margin, whether a smaller one may lie past a frequency."""
+        centre, radius = view.tail(high)
+        one, end = np.array([1.0]), np.array([np.inf])
+        return kept(centre * one + 0j, 0j * one, radius * one, 0.0 * one, high * one, end)[:, 0]
+
     while True:
         pending = [(np.ones(len(NAMES), dtype=bool), a, b)]
         while pending:
@@ -547,15 +560,14 @@ def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
             if a.size:
                 pending.append((rows, a, b))
             if best.used > most:
-                return done(np.any([opened, *(entry[0] for entry in pending)], axis=0))
-        centre, radius = view.tail(high)
-        one, end = np.array([1.0]), np.array([np.inf])
-        keep = kept(centre * one + 0j, 0j * one, radius * one, 0.0 * one, high * one, end)
+                left = [entry[0] for entry in pending]
+                return done(np.any([opened, past(high), *left], axis=0))
+        keep = past(high)
         if not keep.any():
             return done(opened)
         low, high = high, 4.0 * high
         if high > 1e30 * view.corners.max():
-            return done(opened | keep[:, 0])
+            return done(opened | keep)
         a, b = np.array([low]), np.array([high])
 
 

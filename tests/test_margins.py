@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import mpmath
 import numpy as np
 import pytest
@@ -19,7 +21,6 @@ from armlock import (
     paper_loop,
     unstable_roots,
 )
-from armlock.margins import gain_interval
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE
 from tests import independent
 from tests.attack import Tally, check_margins, to_loop
@@ -45,7 +46,11 @@ STABLE = {
     "neutral": (Loop(((-3.0,), (-1.0,), 0.2), COMMON, 2.0, 1.5), (0.9, 1.0)),
     "neutral, opposed": (Loop(((-3.0,), (-1.0,), 0.2), DIFFERENCE, 2.0, 1.5), (0.9, 1.0)),
     "without dynamics": (Loop(((), (), 0.3), SINGLE, 2.0, 1.5), (1.5, 1.0)),
+    # The disc that L fills at high frequency meets the unit circle.
+    "without dynamics, both arms": (Loop(((), (), 0.9), COMMON, 2.2, 9.9), (0.99, 0.99)),
     "negative gain": (Loop(((), (), -0.2), COMMON, 20.1, 19.9), (1.0, 1.0)),
+    # 1 - 5 k (2 - 0.1 u - 0.1 v) has no zero where 9 k > 1, and has some just below.
+    "large negative gain": (Loop(((), (), -5.0), COMMON, 20.1, 19.9), (0.1, 0.1)),
 }
 
 
@@ -70,12 +75,6 @@ def test_margins_are_those_of_branch_and_bound(name):
         value = complex(loop.open_loop(1j * found.phase_omega, *point))
         assert abs(value) == pytest.approx(1.0, rel=1e-9)
         assert abs(np.angle(-value)) == pytest.approx(found.phase, abs=1e-9)
-
-
-def test_a_large_negative_gain_is_bounded_from_below():
-    """1 - 5 k (2 - 0.1 u - 0.1 v) has no zero where 9 k > 1, and has some just below."""
-    lower, upper, _ = gain_interval(Loop(((), (), -5.0), COMMON, 20.1, 19.9), 0.1, 0.1)
-    assert (lower, upper) == pytest.approx((1.0 / 9.0, np.inf), rel=1e-12)
 
 
 @pytest.mark.parametrize("direction", [(0, -1), (1, 0), (0, 1), (-1, 0), (1, -1)])
@@ -229,3 +228,30 @@ def test_a_dead_time_with_free_phases_takes_the_phase_it_should():
     found = margins(loop, 0.0, 0.0, 0.01)
     assert found.phase == pytest.approx(0.5 * np.pi - 0.3, rel=1e-5)
     assert found.delay == pytest.approx((0.5 * np.pi - 0.3) / 3.0, rel=1e-5)
+
+
+def test_arms_of_equal_delay_have_free_phases_of_their_own():
+    loop = Loop(((), (-2.0 + 60j, -2.0 - 60j), 30.0), COMMON, 2.0, 2.0)
+    c1, c2, above = 0.7, -0.9, 20.0
+    omega = np.geomspace(above, 1e4, 200_001)
+    first, second = loop.arm_responses(1j * omega)
+    away = np.abs(1.0 + first + second) - np.abs(c1 * first) - np.abs(c2 * second)
+    found = margins(loop, c1, c2, above)
+    assert found.modulus == pytest.approx(away.min(), rel=1e-4)
+    assert found.modulus_omega == pytest.approx(omega[away.argmin()], rel=1e-3)
+
+
+@pytest.mark.parametrize("factor", [0.3, 1.0, 3.0, 30.0])
+def test_a_count_up_to_free_phases_is_that_of_all_frequencies(factor):
+    """Above it no phases let a root cross, so that what lies below decides."""
+    module = sys.modules["armlock.margins"]
+    found = []
+    for loop, (c1, c2) in STABLE.values():
+        changed = to_loop(sketch_of(loop).scaled(factor))
+        for omega in np.geomspace(1e-2, 1e2, 9):
+            if module._no_phases_cross(changed, c1, c2, omega):
+                count = module._count_below(changed, c1, c2, omega)
+                assert count == unstable_roots(changed, c1, c2)
+                found.append(count)
+    assert len(found) > 10
+    assert factor < 30.0 or max(found) > 0
