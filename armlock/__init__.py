@@ -17,7 +17,6 @@ from armlock.nyquist import (
     AxisCrossings,
     NyquistCurve,
     axis_crossings,
-    frequency_response,
     nyquist,
 )
 from armlock.pulling import pulling
@@ -80,7 +79,6 @@ __all__ = [
     "d_curve_line",
     "design",
     "flight_loop",
-    "frequency_response",
     "margins",
     "modulus_margin",
     "noise_budget",

@@ -170,7 +170,7 @@ def _factors(name: str, values: Sequence[complex]) -> tuple[complex, ...]:
         raise ValueError(f"{name} must be one-dimensional, got shape {roots.shape}")
     upper = np.sort_complex(roots[roots.imag > 0.0])
     lower = np.sort_complex(roots[roots.imag < 0.0].conj())
-    if upper.size != lower.size or not np.allclose(upper, lower, rtol=1e-12, atol=0.0):
+    if upper.size != lower.size or (np.abs(upper - lower) > 1e-12 * np.abs(lower)).any():
         raise ValueError(f"{name} must be real or in conjugate pairs, got {values!r}")
     return tuple(complex(root) for root in roots)
 

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from armlock import paper
 from armlock.checks import positive_number, real_number
 from armlock.controllers import Controller, white_paper
 from armlock.loops import Loop, paper_loop
 from armlock.sensors import COMMON, SINGLE, modified_dual
-
-_HALF = Controller((), (), 0.5)
 
 
 def flight_loop(
@@ -70,59 +66,38 @@ def flight_loop(
     if abs(half) >= mean:
         raise ValueError(f"half_difference must be below mean_delay ({mean}), got {half}")
     mapping = modified_dual(mean, half, corner)
-    controller = _HALF * white_paper(positive_number("g2", g2))
+    controller = white_paper(0.5 * positive_number("g2", g2))
     return Loop(controller, mapping, mean + half, mean - half, delay)
 
 
-class Published(NamedTuple):
-    """A published loop, and where it comes from.
-
-    Attributes
-    ----------
-    loop : Loop
-        The loop, without a dead time.
-    source : str
-        Its source, and what had to be assumed.
-    """
-
-    loop: Loop
-    source: str
-
-
-def published_loops() -> dict[str, Published]:
-    """Return the published loops by name.
+def published_loops() -> dict[str, Loop]:
+    """Return the published loops by name, without a dead time.
 
     Returns
     -------
-    dict of str to Published
+    dict of str to Loop
+        - "white paper": `flight_loop()`, from the LISA Frequency Control White Paper (2009),
+          Sec. 3; g2 and the sensor's corner are assumed
+        - "Table II": `paper_loop()`, from Table II of Y. Shao, X. Zhao, L. Ma and M. Xin; the
+          sensor's corner is assumed
+        - "PI": gain 1e4, integral below 100 rad/s and arms of 20.1 s and 19.9 s, from the
+          public code quickTDI, module TJ_lock
+        - "high-gain single arm": the same controller on an arm of 20 s
 
     Examples
     --------
     >>> from armlock import published_loops
-    >>> for name, (loop, source) in published_loops().items():
+    >>> for name, loop in published_loops().items():
     ...     print(f"{name}: {loop.mapping.name}")
     white paper: modified dual
     Table II: dual
     PI: common
     high-gain single arm: single
     """
-    gain, corner = 1e4, 100.0
-    proportional_integral = Controller((-corner,), (0.0,), gain)
-    code = "quickTDI, module TJ_lock: gain 1e4, integral below 100 rad/s; "
+    proportional_integral = Controller((-100.0,), (0.0,), 1e4)
     return {
-        "white paper": Published(
-            flight_loop(),
-            "LISA Frequency Control White Paper (2009), Sec. 3; g2 and the sensor's corner are "
-            "assumed",
-        ),
-        "Table II": Published(
-            paper_loop(),
-            "Y. Shao, X. Zhao, L. Ma and M. Xin, Table II; the sensor's corner is assumed",
-        ),
-        "PI": Published(
-            Loop(proportional_integral, COMMON, 20.1, 19.9), code + "arms of 20.1 s and 19.9 s"
-        ),
-        "high-gain single arm": Published(
-            Loop(proportional_integral, SINGLE, 20.0, 20.0), code + "an arm of 20 s"
-        ),
+        "white paper": flight_loop(),
+        "Table II": paper_loop(),
+        "PI": Loop(proportional_integral, COMMON, 20.1, 19.9),
+        "high-gain single arm": Loop(proportional_integral, SINGLE, 20.0, 20.0),
     }

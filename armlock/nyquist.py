@@ -13,14 +13,11 @@ from math import factorial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from armlock.bounds import last_frequency, last_larger
 from armlock.checks import (
     ComplexArray,
     FloatArray,
-    axis,
-    positive_array,
     positive_number,
     real_number,
 )
@@ -36,7 +33,6 @@ from armlock.stability import (
 )
 
 if TYPE_CHECKING:
-    import control
     from matplotlib.axes import Axes
 
 # How far numerator and denominator of 1 + L may be from straight lines between two samples,
@@ -127,48 +123,6 @@ class AxisCrossings:
 
     omega: FloatArray
     value: FloatArray
-
-
-def frequency_response(
-    loop: Loop, omega: npt.ArrayLike, c1: float = 1.0, c2: float = 1.0
-) -> control.FrequencyResponseData:
-    """Return the open loop as a python-control frequency response, with exact delays.
-
-    Parameters
-    ----------
-    loop : Loop
-        The loop.
-    omega : array_like of float, one-dimensional
-        Angular frequencies in rad/s, positive.
-    c1, c2 : float, optional
-        Multiplicative perturbations.
-
-    Returns
-    -------
-    control.FrequencyResponseData
-        For `control.bode_plot` and its like. Take counts and margins from this package:
-        python-control takes them from the samples alone.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If `loop` is no `Loop`, omega is not positive and one-dimensional, or c1 or c2 is not
-        finite and real.
-
-    Examples
-    --------
-    >>> import control
-    >>> from armlock import frequency_response, paper_loop
-    >>> response = frequency_response(paper_loop(), [0.01, 0.1])
-    >>> isinstance(response, control.FrequencyResponseData)
-    True
-    """
-    import control
-
-    checked_loop(loop)
-    omega = axis("omega", np.atleast_1d(positive_array("omega", omega)))
-    response = loop.open_loop(1j * omega, real_number("c1", c1), real_number("c2", c2))
-    return control.frd(response, omega, name=type(loop).__name__)
 
 
 def loop_numerator(loop: Loop, c1: float, c2: float) -> ExponentialSum:

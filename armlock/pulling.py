@@ -10,9 +10,7 @@ import math
 from bisect import bisect_left
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple
 
-import mpmath
 import numpy as np
 import numpy.typing as npt
 
@@ -34,7 +32,6 @@ def pulling(
     time: npt.ArrayLike,
     common: Sequence[float] = (1.0, 0.0, 0.0),
     differential: Sequence[float] = (0.0, 0.0, 0.0),
-    method: str = "roots",
 ) -> FloatArray:
     r"""Compute how a stable loop's laser follows Doppler errors that begin at time zero.
 
@@ -55,9 +52,6 @@ def pulling(
     common, differential : sequence of three floats, optional
         nu0 in Hz, gamma in Hz/s and alpha in Hz/s^2 of the sum and of the difference of the two
         arms' errors. An error of arm 1 alone is the same in both.
-    method : {"roots", "laplace"}, optional
-        Whether to add up the residues at the loop's own roots, or to invert the Laplace
-        transform with `mpmath.invertlaplace` by Talbot's method.
 
     Returns
     -------
@@ -67,15 +61,15 @@ def pulling(
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no `Loop` or unstable, a time is not positive, an error does not hold
-        three finite numbers, or there is no such method.
+        If `loop` is no `Loop` or unstable, a time is not positive, or an error does not hold
+        three finite numbers.
 
     Notes
     -----
-    The two methods share nothing but the transfer function. The first adds up residues at the
-    roots of `slow_roots`, which tells how far these are certified to be all: what is left out
-    decays faster than its `rate`. Talbot's method is not certified; it leaves out what the
-    arms' echoes add beyond some 8/t.
+    It adds up residues at the roots of `slow_roots`, which tells how far these are certified
+    to be all: what is left out decays faster than its `rate`. Another way, which shares nothing
+    with this one but the transfer function, is Talbot's: `mpmath.invertlaplace` of
+    `transfer(loop, "common", s) / s`. It leaves out what the arms' echoes add beyond some 8/t.
 
     Examples
     --------
@@ -86,14 +80,10 @@ def pulling(
     """
     checked_loop(loop)
     t = positive_array("time", time)
-    if method not in ("roots", "laplace"):
-        raise ValueError(f"method must be 'roots' or 'laplace', got {method!r}")
     unstable = int(unstable_roots(loop, 1.0, 1.0))
     if unstable > 0:
         raise ValueError(f"loop must be stable at c1 = c2 = 1, got {unstable} unstable roots")
     errors = [_error("common", common), _error("differential", differential)]
-    if method == "laplace":
-        return _inverted(loop, t, errors)
     roots = _found(loop)
     total = np.zeros(t.shape)
     for source, error in zip(("common", "differential"), errors, strict=True):
@@ -110,22 +100,7 @@ def _error(name: str, values: Sequence[float]) -> FloatArray:
     return error
 
 
-class SlowRoots(NamedTuple):
-    """Roots of a loop, and how far they are all of them.
-
-    Attributes
-    ----------
-    roots : complex array, shape (n,)
-        In rad/s, ascending in magnitude, of pairs those with Im s > 0; without those at s = 0.
-    rate : float
-        No other root has Re s > -rate, in rad/s: a certified count. 0 if that is not known.
-    """
-
-    roots: ComplexArray
-    rate: float
-
-
-def slow_roots(loop: Loop) -> SlowRoots:
+def slow_roots(loop: Loop) -> tuple[ComplexArray, float]:
     """Find the loop's roots below `_LINES` / tau, and count whether they are complete.
 
     Parameters
@@ -135,7 +110,10 @@ def slow_roots(loop: Loop) -> SlowRoots:
 
     Returns
     -------
-    SlowRoots
+    roots : complex array, shape (n,)
+        In rad/s, ascending in magnitude, of pairs those with Im s > 0; without those at s = 0.
+    rate : float
+        No other root has Re s > -rate, in rad/s: a certified count. 0 if that is not known.
 
     Examples
     --------
@@ -146,7 +124,7 @@ def slow_roots(loop: Loop) -> SlowRoots:
     572 roots, all that decay slower than in 2716 s
     """
     roots = _found(checked_loop(loop))
-    return SlowRoots(roots, _complete_up_to(loop, roots))
+    return roots, _complete_up_to(loop, roots)
 
 
 @lru_cache(maxsize=16)
@@ -216,9 +194,9 @@ def _newton(loop: Loop, s: ComplexArray) -> tuple[ComplexArray, FloatArray]:
     return s, np.abs(step / s)
 
 
-def _input(error: FloatArray, s: Any) -> Any:
+def _input(error: FloatArray, s: ComplexArray) -> ComplexArray:
     """Return the Laplace transform of nu0 + gamma t + alpha t^2 / 2."""
-    return error[0] / s + error[1] / s**2 + error[2] / s**3
+    return np.asarray(error[0] / s + error[1] / s**2 + error[2] / s**3)
 
 
 def _residues(
@@ -239,25 +217,3 @@ def _residues(
     pairs = np.where(roots.imag > 0.0, 2.0, 1.0) * residue
     decays = np.exp(t[..., None] * roots)
     return np.asarray(total + (decays @ pairs).real)
-
-
-def _inverted(loop: Loop, t: FloatArray, errors: list[FloatArray]) -> FloatArray:
-    """Invert the Laplace transform at each time, in 30 digits."""
-    factors = [(p.coefficients[-1], p.roots) for p in loop.polynomials()]
-
-    def transform(s: Any) -> Any:
-        below, first, second = (
-            mpmath.fprod([lead, *(s - root for root in roots)]) for lead, roots in factors
-        )
-        dead = mpmath.exp(-s * loop.delay)
-        first, second = first * dead, second * dead
-        below -= first * mpmath.expm1(-s * loop.tau1) + second * mpmath.expm1(-s * loop.tau2)
-        plus, minus = (_input(error, s) for error in errors)
-        return -((first + second) * plus + (first - second) * minus) / (2 * below)
-
-    with mpmath.workdps(30):
-        values = [
-            float(mpmath.invertlaplace(transform, x, method="talbot", degree=40))
-            for x in t.ravel()
-        ]
-    return np.reshape(values, t.shape)

@@ -4,8 +4,6 @@ How many roots lie right of a line Re s = sigma is the count of `unstable_roots`
 D(s + sigma). So the rightmost root is enclosed between a line with roots right of it and one
 without. Newton's method finds it from the points of such a line that are nearest to a root,
 and goes on in extended precision; a last count says that no root lies further right.
-
-`pseudospectral_roots` approximates many roots at once, for comparison.
 """
 
 from __future__ import annotations
@@ -16,7 +14,6 @@ import mpmath
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
-from scipy.interpolate import BarycentricInterpolator
 
 from armlock.bounds import last_frequency
 from armlock.characteristic import CharacteristicFunction, checked_system
@@ -31,7 +28,6 @@ from armlock.checks import (
 from armlock.contour import resolved_grid
 from armlock.exponentials import EPSILON
 from armlock.stability import BOUNDARY, CountError, unstable_roots
-from armlock.statespace import realize
 
 # Real parts that differ by less count as equal; relative to |s| or one over the longest delay.
 _EQUAL = 1e-11
@@ -75,64 +71,6 @@ class RootError(RuntimeError):
     def __reduce__(self) -> tuple[type[RootError], tuple[str, complex]]:
         """Pickle the estimate along, so that the error passes from process to process."""
         return type(self), (str(self), self.estimate)
-
-
-def pseudospectral_roots(
-    system: CharacteristicFunction, x: float, y: float, degree: int
-) -> ComplexArray:
-    """Approximate the characteristic roots of smallest magnitude, rightmost first.
-
-    Parameters
-    ----------
-    system : CharacteristicFunction
-        The loop, in continuous time.
-    x, y : float
-        The free parameters.
-    degree : int
-        Degree of the Chebyshev polynomial on the interval of the longest delay. Roots of
-        magnitude up to about degree / delay are resolved.
-
-    Returns
-    -------
-    complex array, shape (degree + order of the equation,)
-        Eigenvalues in descending order of real part: approximations, some of them spurious.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If x or y is not finite and real, or `degree` is no integer from 2 on.
-    """
-    degree = whole_number("degree", degree, 2)
-    name1, name2 = checked_system(system).parameters
-    form = realize(system, real_number(name1, x), real_number(name2, y))
-    states = form.state.shape[0]
-    # A term without effect would only add spurious eigenvalues.
-    delayed = [term for term in form.delayed if term.column.any() or term.direct != 0.0]
-    longest = max((term.delay for term in delayed), default=0.0)
-    if longest == 0.0:
-        eigenvalues = np.linalg.eigvals(form.state).astype(np.complex128)
-        return eigenvalues[np.argsort(-eigenvalues.real)]
-    # Chebyshev points from the present back to the longest delay.
-    history = 0.5 * longest * (np.cos(np.pi * np.arange(degree + 1) / degree) - 1.0)
-    interpolate = BarycentricInterpolator(history, np.eye(degree + 1))
-    difference = interpolate.derivative(history)
-    rows = [interpolate(-term.delay) for term in delayed]
-    # xi(0) in terms of the states and the history behind it.
-    direct = sum((t.direct * row for t, row in zip(delayed, rows, strict=True)))
-    present = np.zeros(states + degree)
-    present[:1] = 1.0 if states else 0.0
-    present[states:] += np.asarray(direct)[1:]
-    present /= 1.0 - np.asarray(direct)[0]
-    matrix = np.zeros((states + degree, states + degree))
-    matrix[:states, :states] = form.state
-    for term, row in zip(delayed, rows, strict=True):
-        signal = row[0] * present
-        signal[states:] += row[1:]
-        matrix[:states] += np.outer(term.column, signal)
-    matrix[states:] = np.outer(difference[1:, 0], present)
-    matrix[states:, states:] += difference[1:, 1:]
-    eigenvalues = np.linalg.eigvals(matrix).astype(np.complex128)
-    return eigenvalues[np.argsort(-eigenvalues.real)]
 
 
 def extended_root(

@@ -463,11 +463,11 @@ class Simulation:
         # See `_compute`: behind the states, five rows, the largest input, the last calm sample.
         rows = len(sensor.states) + 2 * len(controller.sections) + 7
         self._groups = [np.zeros((rows, lanes)) for lanes in groups]
-        # The output, and what the controller has sent, of which nothing is read without a dead
-        # time: a block, behind as many samples as delays reach back.
-        kinds, past = 2 if loop.delay else 1, self.history_samples
+        # Of the output and of what the controller has sent a block, behind as many samples as
+        # delays reach back.
+        past = self.history_samples
         self._block = max(BLOCK // sum(groups), 4 * past)
-        self._signals = np.zeros((kinds, past + self._block, sum(groups)))
+        self._signals = np.zeros((2, past + self._block, sum(groups)))
         self._signals[0, :past] = before[-past:, None] if before.ndim else before
         for work in self._groups:
             work[-2] = np.abs(self._signals[0, :past]).max()
@@ -506,10 +506,6 @@ class Simulation:
         given = finite_series("noise", noise, 1 if self.draws is None else 2)
         if self.draws not in (None, len(given)):
             raise ValueError(f"noise must have {self.draws} rows, got shape {given.shape}")
-        return self._advance(given, c1, c2)
-
-    def _advance(self, given: FloatArray, c1: npt.ArrayLike, c2: npt.ArrayLike) -> FloatArray:
-        """Compute the next block, of noise that is checked."""
         inputs = [np.atleast_2d(given).T, _series("c1", c1, given), _series("c2", c2, given)]
         output, begin = np.empty(inputs[0].shape), self.samples
         shaped = output[:, 0] if self.draws is None else output.T
@@ -529,7 +525,7 @@ class Simulation:
         """Compute the next samples, each in a row, unless the run stops before."""
         past, stop, first = self.history_samples, len(output), 0
         columns = self._signals.shape[2]
-        phi, sent = (self._signals[kind, : past + stop] for kind in (0, -1))
+        phi, sent = self._signals[:, : past + stop]
         inputs = tuple(_in_columns(series, columns) for series in (noise, c1, c2))
         for work in self._groups:
             lanes = work.shape[1]
@@ -608,7 +604,7 @@ def simulate(
     given = finite_series("noise", noise, 1, 2)
     draws = len(given) if given.ndim == 2 else None
     run = Simulation(loop, sample_rate, history=history, limit=limit, draws=draws)
-    return run._advance(given, c1, c2)
+    return run.advance(given, c1, c2)
 
 
 def simulate_blocks(

@@ -17,7 +17,7 @@ from armlock.controllers import integrating_actuator, stage_one, table_two
 from armlock.discretize import warped
 from armlock.noise import band_rms
 from armlock.rays import ray_crossings
-from armlock.roots import extended_root, pseudospectral_roots
+from armlock.roots import extended_root
 from armlock.sensors import COMMON, SignalMapping, dual
 from tests.systems import NEUTRAL
 
@@ -60,14 +60,12 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     armlock.stability_chart: {"system": ARMS, "x": [1.0], "y": [1.0]},
     armlock.rightmost_root: {"system": ARMS} | AT,
     extended_root: {"system": ARMS, "start": 0.0, "digits": 20} | AT,
-    pseudospectral_roots: {"system": ARMS, "degree": 8} | AT,
     armlock.d_curve: {"system": ARMS, "omega": 1.0},
     armlock.d_curve_line: {"system": ARMS},
     armlock.d_curve_branches: {"system": ARMS, "omega_max": 1.0, "points_per_turn": 24},
     ray_crossings: {"system": ARMS, "start": (0.0, 0.0), "direction": (1.0, 1.0), "stop": 1.0},
     armlock.nyquist: {"loop": ARMS, "omega_max": 3.0} | POINT,
     armlock.axis_crossings: {"loop": paper_loop(), "omega_max": 3.0} | POINT,
-    armlock.frequency_response: {"loop": ARMS, "omega": [1.0]} | POINT,
     armlock.margins: {"loop": ARMS, "c1": 0.9, "c2": 0.9, "free_above": 1.0},
     armlock.modulus_margin: {"loop": ARMS, "c1": 0.9, "c2": 0.9},
     armlock.critical_perturbation: {"loop": ARMS, "direction": (1.0, 1.0)},
@@ -92,7 +90,7 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     armlock.closed_loop: {"loop": ARMS, "omega": [1.0]} | POINT,
     armlock.noise_budget: {"loop": ARMS, "frequency": [1.0], "laser": 1.0, "requirement": 1.0},
     armlock.pulling: {"loop": CommonArm(), "time": 1e5, "common": (1.0, 0.0, 0.0),
-                      "differential": (0.0, 0.0, 0.0), "method": "roots"},
+                      "differential": (0.0, 0.0, 0.0)},
 }  # fmt: skip
 JUNK = {"text": "no", "nan": np.nan, "ragged": [[1.0], [1.0, 2.0]], "object": object()}
 
@@ -144,7 +142,6 @@ WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
     (ray_crossings, "direction", (0.0, 0.0), "not have length zero"),
     (armlock.nyquist, "loop", HayesEquation(), "be a Loop, for instance CommonArm()"),
     (armlock.axis_crossings, "omega_max", None, "be given"),
-    (armlock.frequency_response, "omega", [1.0, 0.0], "be positive"),
     (armlock.spectral_radius, "system", NEUTRAL["integrator"], "be of retarded type"),
     (armlock.spectral_radius, "system", armlock.semi_discretization(ARMS, 0.1), "be in contin"),
     (armlock.transition_matrix, "step", 1e-6, "be of a size that memory holds"),
@@ -171,7 +168,6 @@ WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
     (armlock.noise_budget, "laser", -1.0, "not be negative, got -1.0"),
     (armlock.pulling, "time", [0.0, 1.0], "be positive"),
     (armlock.pulling, "common", (1.0,), "hold nu0, gamma and alpha"),
-    (armlock.pulling, "method", "guess", "be 'roots' or 'laplace'"),
 ]
 
 

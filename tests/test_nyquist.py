@@ -15,7 +15,6 @@ from armlock import (
     Loop,
     SingleArm,
     axis_crossings,
-    frequency_response,
     nyquist,
     paper_loop,
     unstable_roots,
@@ -138,8 +137,7 @@ def test_a_loop_that_is_not_well_posed_is_refused(mapping, gain):
 def test_a_tenth_of_a_nanohertz_is_as_exact_as_a_hertz(loop, c2):
     frequency = np.array([1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 0.04, 0.26, 1.0])
     omega = 2.0 * np.pi * frequency
-    response = frequency_response(loop, omega, 1.0, c2)
-    value = np.squeeze(response.frdata)
+    value = loop.open_loop(1j * omega, 1.0, c2)
     with mpmath.workdps(50):
         expected = [complex(independent.exact(loop, 1j * w, 1.0, c2) - 1) for w in omega]
     np.testing.assert_array_less(np.abs(value / expected - 1.0), 1e-12)

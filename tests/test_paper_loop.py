@@ -16,7 +16,8 @@ from armlock import (
     stability_chart,
     unstable_roots,
 )
-from armlock.roots import RootError, extended_root, pseudospectral_roots
+from armlock.roots import RootError, extended_root
+from book.companion.schemes import pseudospectral_roots
 
 LOOP = paper_loop()
 E = 1e-6

@@ -21,9 +21,10 @@ from armlock import (
     rightmost_root,
     unstable_roots,
 )
-from armlock.roots import extended_root, pseudospectral_roots
+from armlock.roots import extended_root
 from armlock.semidiscretization import semi_discretization
 from armlock.sensors import COMMON
+from book.companion.schemes import pseudospectral_roots
 from tests import independent
 from tests.systems import RETARDED
 

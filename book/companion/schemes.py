@@ -1,14 +1,20 @@
-"""Standard discretizations of the common arm, to compare semi-discretization with.
+"""Standard discretizations, to compare semi-discretization with.
 
 With a constant step that divides both delays, each of them is a map that is affine in
 (c1, c2), and so a `CharacteristicFunction`: what counts and charts the loop takes it as well.
+Chebyshev polynomials over the longest delay approximate many roots at once, of any loop.
 """
 
 from __future__ import annotations
 
+import numpy as np
+from scipy.interpolate import BarycentricInterpolator
+
 from armlock.characteristic import CharacteristicFunction
+from armlock.checks import ComplexArray
 from armlock.loops import CommonArm
 from armlock.semidiscretization import semi_discretization
+from armlock.statespace import realize
 
 
 def sampled_loop(
@@ -88,3 +94,54 @@ def standard_schemes(loop: CommonArm, step: float) -> dict[str, CharacteristicFu
             loop, step, 1.0, (0.0, 0.0), lead=1.0 + 2.0 * gain, newer=gain
         ),
     }
+
+
+def pseudospectral_roots(
+    system: CharacteristicFunction, x: float, y: float, degree: int
+) -> ComplexArray:
+    """Approximate the characteristic roots of smallest magnitude, rightmost first.
+
+    Parameters
+    ----------
+    system : CharacteristicFunction
+        The loop, in continuous time.
+    x, y : float
+        The free parameters.
+    degree : int
+        Degree of the Chebyshev polynomial on the interval of the longest delay. Roots of
+        magnitude up to about degree / delay are resolved.
+
+    Returns
+    -------
+    complex array, shape (degree + order of the equation,)
+        Eigenvalues in descending order of real part: approximations, some of them spurious.
+    """
+    form = realize(system, x, y)
+    states = form.state.shape[0]
+    # A term without effect would only add spurious eigenvalues.
+    delayed = [term for term in form.delayed if term.column.any() or term.direct != 0.0]
+    longest = max((term.delay for term in delayed), default=0.0)
+    if longest == 0.0:
+        eigenvalues = np.linalg.eigvals(form.state).astype(np.complex128)
+        return eigenvalues[np.argsort(-eigenvalues.real)]
+    # Chebyshev points from the present back to the longest delay.
+    history = 0.5 * longest * (np.cos(np.pi * np.arange(degree + 1) / degree) - 1.0)
+    interpolate = BarycentricInterpolator(history, np.eye(degree + 1))
+    difference = interpolate.derivative(history)
+    rows = [interpolate(-term.delay) for term in delayed]
+    # xi(0) in terms of the states and the history behind it.
+    direct = sum((t.direct * row for t, row in zip(delayed, rows, strict=True)))
+    present = np.zeros(states + degree)
+    present[:1] = 1.0 if states else 0.0
+    present[states:] += np.asarray(direct)[1:]
+    present /= 1.0 - np.asarray(direct)[0]
+    matrix = np.zeros((states + degree, states + degree))
+    matrix[:states, :states] = form.state
+    for term, row in zip(delayed, rows, strict=True):
+        signal = row[0] * present
+        signal[states:] += row[1:]
+        matrix[:states] += np.outer(term.column, signal)
+    matrix[states:] = np.outer(difference[1:, 0], present)
+    matrix[states:, states:] += difference[1:, 1:]
+    eigenvalues = np.linalg.eigvals(matrix).astype(np.complex128)
+    return eigenvalues[np.argsort(-eigenvalues.real)]

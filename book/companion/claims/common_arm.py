@@ -16,13 +16,13 @@ from armlock.dcurve import Branch, d_curve, d_curve_branches, d_curve_line
 from armlock.loops import CommonArm
 from armlock.paper import COMMON_ARM_GAIN, STEP, TAU1, TAU2
 from armlock.rays import first_crossing
-from armlock.roots import extended_root, pseudospectral_roots, rightmost_root
+from armlock.roots import extended_root, rightmost_root
 from armlock.semidiscretization import semi_discretization, spectral_radius, transition_matrix
 from armlock.stability import StabilityChart, stability_chart, unstable_roots
 from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 from book.companion.outline import boundary_radius, outline, perimeter, rays
-from book.companion.schemes import sampled_loop, standard_schemes
+from book.companion.schemes import pseudospectral_roots, sampled_loop, standard_schemes
 from book.companion.shared import shared
 
 claim = partial(ledger.claim, chapter="03_common_arm")
@@ -309,11 +309,6 @@ def lower_edge_errors() -> FloatArray:
     exact = boundary_radius(ARM, down)
     maps = (semi_discretization(ARM, step) for step in STEPS)
     return np.array([abs(boundary_radius(m, down) - exact)[0] for m in maps])
-
-
-def ideal_root() -> float:
-    """Speed in 1/s at which the root at s = 0 moves with c1 + c2, at (1, 1)."""
-    return float(ARM.gain / ARM.derivative(0.0, 1.0, 1.0).real)
 
 
 # Claims ------------------------------------------------------------------------------------

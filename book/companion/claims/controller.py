@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cache, partial
-from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import bisect, brentq
@@ -11,7 +10,7 @@ from scipy.optimize import bisect, brentq
 from armlock.checks import ComplexArray, FloatArray
 from armlock.controllers import Controller, stage_one, table_two
 from armlock.loops import DualArm, Loop, paper_loop
-from armlock.margins import Margins, critical_perturbation, margins, modulus_margin
+from armlock.margins import critical_perturbation, margins, modulus_margin
 from armlock.nyquist import AxisCrossings, axis_crossings, nyquist
 from armlock.paper import (
     CONTROLLER_GAIN,
@@ -24,7 +23,7 @@ from armlock.paper import (
     TAU2,
 )
 from armlock.roots import rightmost_root
-from armlock.stability import StabilityChart, stability_chart, unstable_roots
+from armlock.stability import stability_chart, unstable_roots
 from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 
@@ -49,96 +48,19 @@ SUPPRESSION_BAND = (1e-4, 1.0)
 
 LOOP = paper_loop()
 STAGE_ONE = paper_loop(controller=stage_one())
-CONTROLLERS = {
-    "Stage I": stage_one(),
-    "Table II": table_two(),
-    "Eq. (11)": table_two(denominator="printed"),
-}
+PRINTED = paper_loop(controller=table_two(denominator="printed"))
+INTEGRATING = paper_loop(actuator=True)
 
 
 # Counts -------------------------------------------------------------------------------------
 
 
-class Reading(NamedTuple):
-    """One reading of the controlled loop at one perturbation, decided three ways.
-
-    Attributes
-    ----------
-    controller, actuator, point : str, bool, str
-        Keys of `CONTROLLERS` and `POINTS`, and whether 1/s is in the loop.
-    winding : int
-        Unstable roots, by winding number of D.
-    encirclements : int
-        Clockwise turns of the Nyquist curve around -1.
-    rightmost : complex
-        Rightmost root in rad/s; of a pair, the upper one.
-    """
-
-    controller: str
-    actuator: bool
-    point: str
-    winding: int
-    encirclements: int
-    rightmost: complex
-
-    @property
-    def agree(self) -> bool:
-        """Whether the three methods agree."""
-        unstable = self.rightmost.real > 0.0
-        return self.winding == self.encirclements and unstable == (self.winding > 0)
-
-
-@cache
-def readings() -> tuple[Reading, ...]:
-    """Decide every controller, with and without the actuator, at the paper's perturbations."""
-    table = []
-    for name, controller in CONTROLLERS.items():
-        for actuator in (False, True):
-            loop = paper_loop(controller=controller, actuator=actuator)
-            for point, c in POINTS.items():
-                count, turns = int(unstable_roots(loop, *c)), nyquist(loop, *c).encirclements
-                root = rightmost_root(loop, *c)
-                table.append(Reading(name, actuator, point, count, turns, root))
-    return tuple(table)
-
-
-def counts_of(controller: str, *, actuator: bool = False) -> dict[str, int]:
-    """Return the counts of one reading by perturbation."""
-    chosen = [r for r in readings() if r[:2] == (controller, actuator)]
-    return {reading.point: reading.winding for reading in chosen}
-
-
-def rightmost_of(controller: str, point: str, *, actuator: bool = False) -> complex:
-    """Return the rightmost root of one reading at one perturbation, in rad/s."""
-    return next(r.rightmost for r in readings() if r[:3] == (controller, actuator, point))
+def counts_of(loop: Loop) -> dict[str, int]:
+    """Return the counts of a loop at the paper's perturbations, by name."""
+    return {point: int(unstable_roots(loop, *c)) for point, c in POINTS.items()}
 
 
 # Charts and limits --------------------------------------------------------------------------
-
-
-@cache
-def chart(half_width: float, points: int = 401) -> StabilityChart:
-    """Chart the controlled loop over a square around (1, 1)."""
-    axis = 1.0 + np.linspace(-half_width, half_width, points)
-    return stability_chart(LOOP, axis, axis)
-
-
-@cache
-def largest_stable_square() -> float:
-    """Half-width of the largest square around (1, 1) in which the loop is stable.
-
-    The loop depends almost on c1 - c2 alone, so that the corner along (1, -1) is the first to
-    lose stability; a chart makes sure that no other point of the square does before.
-
-    Raises
-    ------
-    RuntimeError
-        If one does.
-    """
-    limit = critical_perturbation(LOOP, (1.0, -1.0))
-    if not chart(0.999 * limit, 101).stable.all():
-        raise RuntimeError(f"the square of half-width {limit} is not stable throughout")
-    return limit
 
 
 @cache
@@ -148,12 +70,6 @@ def worst_in_box(points: int = 5) -> tuple[float, float, float]:
     found = [(modulus_margin(LOOP, x, y), float(x), float(y)) for x in axis for y in axis]
     margin, c1, c2 = min(found)
     return c1, c2, margin
-
-
-@cache
-def all_margins(point: tuple[float, float]) -> Margins:
-    """Return all margins of the controlled loop at a point."""
-    return margins(LOOP, *point)
 
 
 @cache
@@ -244,13 +160,13 @@ def relative_gain(frequency: float) -> complex:
 )
 def stage_one_unstable() -> Finding:
     """Count at the three perturbations; follow L towards s = 0."""
-    counts = counts_of("Stage I")
+    counts = counts_of(STAGE_ONE)
     order = max(nyquist(STAGE_ONE, *c).pole_order for c in POINTS.values())
     plain = paper_loop(controller=Controller((), (), CONTROLLER_GAIN))
     bare = nyquist(plain, *POINTS["Area 2"]).pole_order
     first, last = STAGE_ONE.open_loop(np.array([1e-12, 1e-11]), *POINTS["Area 2"])
     slope = float(np.log10(abs(last / first)))
-    days = 1.0 / rightmost_of("Stage I", "Area 2").real / 86400.0
+    days = 1.0 / rightmost_root(STAGE_ONE, *POINTS["Area 2"]).real / 86400.0
     linear = abs(slope - 1.0) < 0.01 and first.real < 0.0
     return Finding(
         decide(bare > order == 0, linear, counts["Area 2"] > 0, beyond=all(counts.values())),
@@ -322,7 +238,7 @@ def stage_two_crossings() -> Finding:
 )
 def which_denominator() -> Finding:
     """Run both."""
-    table, printed = counts_of("Table II"), counts_of("Eq. (11)")
+    table, printed = counts_of(LOOP), counts_of(PRINTED)
     return Finding(
         decide(printed["A"] == 0, corrected=not any(table.values())),
         printed["A"],
@@ -342,11 +258,14 @@ def which_denominator() -> Finding:
 )
 def stable_over_the_box() -> Finding:
     """Chart the box, find the largest stable square, and the same with half of dtau."""
-    limit = largest_stable_square()
+    limit = critical_perturbation(LOOP, (1.0, -1.0))
+    # The corner along (1, -1) is the first to lose stability if all before it is stable.
+    axis = 1.0 + 0.999 * limit * np.linspace(-1.0, 1.0, 101)
+    stable = stability_chart(LOOP, axis, axis).stable
     half = critical_perturbation(paper_loop(difference=0.5 * (TAU1 - TAU2)), (1.0, -1.0))
     corner = highest_stable_corner()
     return Finding(
-        decide(chart(PERTURBATION, 101).stable.all() and limit > PERTURBATION),
+        decide(stable.all() and limit > PERTURBATION),
         limit,
         "half-width of the largest square around (1, 1) in which the loop is stable, for "
         "constant $c₁$, $c₂$",
@@ -459,7 +378,7 @@ def phase_at_unity_gain() -> Finding:
     """Find that frequency at each perturbation, and the phase lead there."""
     unity = [unity_gain(point) for point in POINTS]
     at, leads = np.array(unity).T
-    left = np.degrees(all_margins(WORST_CORNER).phase)
+    left = np.degrees(margins(LOOP, *WORST_CORNER).phase)
     return Finding(
         decide(leads.min() > 0.0 and leads.max() < np.pi),
         float(leads.max()) / np.pi,
@@ -505,9 +424,9 @@ def basic_requirement() -> Finding:
 def robust() -> Finding:
     """Take the modulus margin over the box of perturbations."""
     c1, c2, modulus = worst_in_box()
-    left = all_margins(WORST_CORNER)
+    left = margins(LOOP, *WORST_CORNER)
     return Finding(
-        decide(largest_stable_square() > PERTURBATION and modulus > 0.0),
+        decide(critical_perturbation(LOOP, (1.0, -1.0)) > PERTURBATION and modulus > 0.0),
         modulus,
         "smallest modulus margin, $|1 + L|$, over a grid of the box of perturbations",
         f"It is met at (1 {c1 - 1.0:+.0e}, 1 {c2 - 1.0:+.0e}), where the phase margin is "
@@ -529,8 +448,8 @@ def robust() -> Finding:
 )
 def which_open_loop() -> Finding:
     """Put the actuator's 1/s of Sec. III into the loop, and leave it out."""
-    bare, integrating = counts_of("Table II"), counts_of("Table II", actuator=True)
-    root = rightmost_of("Table II", "Area 2", actuator=True)
+    bare, integrating = counts_of(LOOP), counts_of(INTEGRATING)
+    root = rightmost_root(INTEGRATING, *POINTS["Area 2"])
     return Finding(
         decide(not any(integrating.values()), corrected=not any(bare.values())),
         integrating["Area 2"],
@@ -552,7 +471,7 @@ def which_open_loop() -> Finding:
 )
 def margins_left() -> Finding:
     """Take the margins at (1, 1), that against further delay included."""
-    nominal = all_margins(POINTS["A"])
+    nominal = margins(LOOP)
     delay = 5e-3
     growth = rightmost_root(paper_loop(delay=delay), 1.0, 1.0).real
     return Finding(

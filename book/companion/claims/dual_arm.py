@@ -66,8 +66,6 @@ class Edges(NamedTuple):
 
     Attributes
     ----------
-    gain : float
-        In rad/s.
     corner : float
         c - 1 at the upper end of the straight edge c1 = c2 = c.
     corner_omega : float
@@ -76,7 +74,6 @@ class Edges(NamedTuple):
         c2 - c1 at the far edge, where c1 + c2 = 2 WINDOW[0].
     """
 
-    gain: float
     corner: float
     corner_omega: float
     width: float
@@ -114,13 +111,7 @@ def edges(
     """Compute the exact edges for one gain, corner frequency and dtau."""
     loop = DualArm(gain, TAU1, TAU2, corner, difference=difference)
     upper, far = upper_end(loop, 0.0, low=0.5), far_edge(loop, WINDOW[0])
-    return Edges(gain, upper.position - 0.5, upper.omega, far.position)
-
-
-@cache
-def gain_sweep() -> Edges:
-    """Sweep `edges` over `GAINS`, each field an array."""
-    return Edges(*np.transpose([edges(float(gain)) for gain in GAINS]))
+    return Edges(upper.position - 0.5, upper.omega, far.position)
 
 
 def corner_sweep(gain: float, corners: FloatArray, difference: float | None = None) -> Edges:
@@ -203,32 +194,20 @@ def width_estimate(common: npt.ArrayLike) -> Any:
     return 2.0 * ratio * np.arccos(cosine) * np.sqrt(1.0 - cosine**2)
 
 
-class UpperEnds(NamedTuple):
-    """Far and upper edge of the strip, from the straight edge round to the far edge.
-
-    Attributes
-    ----------
-    difference : float array, shape (n,)
-        c2 - c1, ascending.
-    common : float array, shape (n,)
-        (c1 + c2) / 2 up to which the loop is stable.
-    omega : float array, shape (n,)
-        Frequency in rad/s of the root that crosses there.
-    """
-
-    difference: FloatArray
-    common: FloatArray
-    omega: FloatArray
-
-
 @cache
-def upper_ends(gain: float, number: int = 31, low: float = WINDOW[0]) -> UpperEnds:
-    """Trace the strip upwards from c1 + c2 = 2 low, along evenly spread c2 - c1."""
+def upper_ends(
+    gain: float, number: int = 31, low: float = WINDOW[0]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Trace the strip upwards from c1 + c2 = 2 low, along evenly spread c2 - c1.
+
+    Returns c2 - c1, ascending; the (c1 + c2) / 2 up to which the loop is stable; and the
+    frequency in rad/s of the root that crosses there.
+    """
     loop = DualArm(gain)
     # The strip narrows upwards, so that every such ray starts inside and leaves once.
     difference = far_edge(loop, low).position * (np.arange(number) + 0.5) / number
     ends = np.array([upper_end(loop, d, low) for d in difference])
-    return UpperEnds(difference, low + ends[:, 0], ends[:, 1])
+    return difference, low + ends[:, 0], ends[:, 1]
 
 
 def upper_edge(gain: float) -> tuple[int, float, float]:
@@ -237,7 +216,7 @@ def upper_edge(gain: float) -> tuple[int, float, float]:
     Along one piece of a D-curve the frequency, in rad/s, hardly changes; from one to another
     it jumps, and from the upper to the slow far edge most of all.
     """
-    omega = upper_ends(gain, 201).omega
+    omega = upper_ends(gain, 201)[2]
     jumps = np.flatnonzero(np.abs(np.diff(np.log(omega))) > 0.02)
     fast = omega[: jumps[-1] + 1]
     return jumps.size, float(fast.min()), float(fast.max())
@@ -478,7 +457,7 @@ def chart_at_gain_ten() -> Finding:
 )
 def edges_against_gain() -> Finding:
     """Follow the corner over six decades of gain."""
-    corner = np.asarray(gain_sweep().corner)
+    corner = np.array([edges(float(gain)).corner for gain in GAINS])
     lines = {d_curve_line(DualArm(float(gain))) for gain in GAINS}
     high = GAINS >= 1e4
     slope = log_slope(GAINS[high], corner[high])
@@ -549,7 +528,7 @@ def exact_upper_edge() -> Finding:
 )
 def shrinking_region() -> Finding:
     """Follow area and far edge, and look for a point that only a high gain makes stable."""
-    width = np.asarray(gain_sweep().width)
+    width = np.array([edges(float(gain)).width for gain in GAINS])
     area = [window_area(gain) for gain in (DUAL_ARM_GAIN, 100.0, 1e3, float(GAINS[-1]))]
     middle = 0.5 * (width[0] + width[-1])
     point = (WINDOW[0] - 0.5 * middle, WINDOW[0] + 0.5 * middle)

@@ -30,7 +30,6 @@ from enum import StrEnum
 from functools import cache
 from multiprocessing import get_context
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -126,19 +125,6 @@ class Finding:
         return "0 to rounding" if 0.0 < abs(self.value) < 1e-11 else f"{self.value:.6g}"
 
 
-class Pin(NamedTuple):
-    """What the check of a claim must find: verdict, number, and its absolute tolerance."""
-
-    verdict: Verdict
-    value: float
-    tolerance: float
-
-    def admits(self, finding: Finding) -> bool:
-        """Tell whether a finding is as pinned."""
-        near = abs(finding.value - self.value) <= self.tolerance
-        return finding.verdict is self.verdict and bool(near)
-
-
 @dataclass(frozen=True)
 class Claim:
     """One claim of the paper; the attributes are the arguments of `claim`."""
@@ -147,7 +133,7 @@ class Claim:
     place: str
     says: str
     chapter: str
-    pinned: Pin
+    pinned: tuple[Verdict, float, float]
     affects: tuple[str, ...]
     weight: Weight
     printed: str
@@ -204,7 +190,7 @@ def claim(
             raise ValueError(f"identifier must be new, got {identifier!r} a second time")
         remembered = cache(check)
         _REGISTER[identifier] = Claim(
-            identifier, place, says, chapter, Pin(*pinned), affects, weight, printed, same_as,
+            identifier, place, says, chapter, pinned, affects, weight, printed, same_as,
             remembered,
         )  # fmt: skip
         return remembered
@@ -249,12 +235,14 @@ class Ledger:
         AssertionError
             If one is not: which, what was found and what is pinned.
         """
-        wrong = [
-            f"{entry.identifier} is pinned as {entry.pinned.verdict}, {entry.pinned.value!r} "
-            f"within {entry.pinned.tolerance:g}; found {finding.verdict}, {finding.value!r}"
-            for entry, finding in self.entries
-            if not entry.pinned.admits(finding)
-        ]
+        wrong = []
+        for entry, finding in self.entries:
+            verdict, value, tolerance = entry.pinned
+            if finding.verdict is not verdict or not abs(finding.value - value) <= tolerance:
+                wrong.append(
+                    f"{entry.identifier} is pinned as {verdict}, {value!r} within "
+                    f"{tolerance:g}; found {finding.verdict}, {finding.value!r}"
+                )
         if wrong:
             raise AssertionError("\n".join(wrong))
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from functools import cache, partial
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import bisect, minimize_scalar
 
-from armlock.checks import FloatArray
 from armlock.loops import CommonArm, DualArm, Loop, SingleArm
 from armlock.margins import gain_interval, margins
 from armlock.noise import band_rms
@@ -132,12 +131,6 @@ def low_gain_threshold() -> float:
     """
     spread = TAU1 - TAU2
     return 1.0 / (1.0 + TAU2 / spread + 1.0 / (DUAL_SENSOR_CORNER * spread))
-
-
-@cache
-def dual_gains() -> FloatArray:
-    """Return the lower and upper gain margin of the dual arm at (1, 1 + size), a row a size."""
-    return np.array([gain_interval(DUAL, 1.0, 1.0 + float(size))[:2] for size in SIZES])
 
 
 @claim(
@@ -354,7 +347,7 @@ def dual_arm_branch() -> Finding:
 )
 def dual_arm_gain_margin() -> Finding:
     """Compute the margin on the stable side, and look for one at the paper's points."""
-    factor = dual_gains()[:, 1]
+    factor = np.array([gain_interval(DUAL, 1.0, 1.0 + float(e))[1] for e in SIZES])
     falls = bool(np.isfinite(factor).all() and (np.diff(factor) < 0.0).all())
     bounded = axis_crossings(DUAL).omega.size > 0
     fewest = fewest_roots(DUAL, *DUAL_POINT)

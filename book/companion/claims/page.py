@@ -13,7 +13,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from importlib import metadata
 from pathlib import Path
-from typing import NamedTuple
 
 from book.companion.claims.ledger import (
     Claim,
@@ -69,40 +68,21 @@ def whole_ledger() -> Ledger:
     return ledger
 
 
-class Source(NamedTuple):
-    """Where the check of a claim is written down.
-
-    Attributes
-    ----------
-    file : str
-        Relative to the project's root.
-    line : int
-        Where the function starts, its decorator included.
-    text : str
-        The function.
-    """
-
-    file: str
-    line: int
-    text: str
-
-
-def source(claim: Claim) -> Source:
-    """Find the function that checks a claim.
+def source(claim: Claim) -> tuple[str, int, str]:
+    """Return the file of the function that checks a claim, its first line, and its text.
 
     Examples
     --------
     >>> from book.companion.claims import check
     >>> from book.companion.claims.page import source
-    >>> [source(claim).file for claim, _ in check("T1")]
+    >>> [source(claim)[0] for claim, _ in check("T1")]
     ['book/companion/claims/table1.py']
     """
     function = inspect.unwrap(claim.check)
     lines, first = inspect.getsourcelines(function)
     root = Path(__file__).resolve().parents[3]
-    file = Path(inspect.getsourcefile(function) or "")
-    shown = file.relative_to(root).as_posix() if file.is_relative_to(root) else file.name
-    return Source(shown, first, "".join(lines))
+    file = Path(inspect.getfile(function)).relative_to(root)
+    return file.as_posix(), first, "".join(lines)
 
 
 def project_url() -> str | None:
@@ -229,10 +209,10 @@ def _controls(ledger: Ledger) -> str:
 
 def _row(claim: Claim, finding: Finding) -> str:
     """Return one row of the table, with the source of the check."""
-    name, place, url = claim.identifier, source(claim), project_url()
-    where = f"{place.file}, line {place.line}"
+    name, url, (file, line, text) = claim.identifier, project_url(), source(claim)
+    where = f"{file}, line {line}"
     if url:
-        where = f'<a href="{html.escape(url)}/blob/main/{place.file}#L{place.line}">{where}</a>'
+        where = f'<a href="{html.escape(url)}/blob/main/{file}#L{line}">{where}</a>'
     attributes = (
         f'id="ledger-{name}" data-verdict="{finding.verdict.name.lower()}" '
         f'data-weight="{claim.weight}" data-section="{html.escape(SECTIONS[claim.chapter])}"'
@@ -240,7 +220,7 @@ def _row(claim: Claim, finding: Finding) -> str:
     code = (
         f'<p>Shown in its <a href="{claim.chapter}.html#claim-{name}">chapter</a>.</p>'
         f"<details><summary>Source of {name}</summary><p>{where}</p>"
-        f'<pre tabindex="0">{html.escape(place.text)}</pre></details>'
+        f'<pre tabindex="0">{html.escape(text)}</pre></details>'
     )
     return row(claim, finding, attributes, ledger_link(name), code)
 

@@ -61,10 +61,9 @@ _DRAW_RATE = 0.01
 
 
 class Trace(NamedTuple):
-    """A series once a second, its spectrum if one was taken, and when it diverged."""
+    """A series once a second, and when it diverged."""
 
     series: FloatArray
-    spectrum: Spectrum | None
     diverged: float | None
 
 
@@ -85,19 +84,15 @@ class Run:
         the perturbations scaled to the size that the paper considers, "size ..." for other
         sizes, "face value", "face value from ..." for higher cut-offs in Hz, and "face
         value, c1 = c2".
+    spectra : dict of str to Spectrum
+        Of "free running", "ideal", "system 1" and "system 2".
     """
 
     time: FloatArray
     perturbations: FloatArray
     perturbation: Spectrum
     traces: dict[str, Trace]
-
-    def spectrum(self, name: str) -> Spectrum:
-        """Return the spectrum of a trace that has one."""
-        found = self.traces[name].spectrum
-        if found is None:
-            raise ValueError(f"name must be a trace with a spectrum, got {name!r}")
-        return found
+    spectra: dict[str, Spectrum]
 
     def difference(self, size: float = 1.0) -> FloatArray:
         """Return c1 - c2 once a second, with perturbations `size` times System 1's."""
@@ -145,10 +140,8 @@ class _System:
     ----------
     point : (float, float)
         c1 and c2 without perturbations.
-    sizes : (float, float), optional
-        Factors before the perturbations of c1 and c2.
-    spectrum : bool, optional
-        Whether to estimate its spectrum.
+    size : float, optional
+        Factor before the perturbations of c1 and c2.
     sources : sequence of PerturbationNoise, optional
         Perturbations of its own, in place of those that all systems share.
     """
@@ -156,13 +149,12 @@ class _System:
     def __init__(
         self,
         point: tuple[float, float],
-        sizes: tuple[float, float] = (0.0, 0.0),
-        spectrum: bool = False,
+        size: float = 0.0,
         sources: Sequence[PerturbationNoise] = (),
     ) -> None:
-        self.point, self.sizes, self.sources = point, sizes, sources
+        self.point, self.size, self.sources = point, size, sources
         self.simulation = Simulation(paper_loop(), SAMPLE_RATE)
-        self.estimator = SpectrumEstimator(SAMPLE_RATE) if spectrum else None
+        self.estimator: SpectrumEstimator | None = None
         self.kept: list[FloatArray] = []
         self.diverged: float | None = None
 
@@ -173,8 +165,8 @@ class _System:
         if self.sources:
             eta = [source.draw(noise.size) for source in self.sources]
         c1, c2 = (
-            c + size * change if size else c
-            for c, size, change in zip(self.point, self.sizes, eta, strict=True)
+            c + self.size * change if self.size else c
+            for c, change in zip(self.point, eta, strict=True)
         )
         try:
             output = self.simulation.advance(noise, c1, c2)
@@ -184,11 +176,6 @@ class _System:
         if self.estimator is not None:
             self.estimator.add(output)
         self.kept.append(output[::_EVERY].copy())
-
-    def trace(self) -> Trace:
-        """Return what was kept."""
-        spectrum = self.estimator.spectrum() if self.estimator else None
-        return Trace(np.concatenate(self.kept), spectrum, self.diverged)
 
 
 def _sources(seed: int, cutoff: float) -> list[PerturbationNoise]:
@@ -213,18 +200,17 @@ def full_run(duration: float = DURATION, seed: int = SEED) -> Run:
     laser = LaserNoise(seed, SAMPLE_RATE, at_rest=True)
     sources = _sources(seed, LOWEST)
     systems = {
-        "ideal": _System(IDEAL, spectrum=True),
-        "system 2": _System(STRONG, spectrum=True),
-        "face value": _System(IDEAL, (1.0, 1.0)),
-        ALIKE: _System(IDEAL, (1.0, 1.0)),
+        "ideal": _System(IDEAL),
+        "system 2": _System(STRONG),
+        "face value": _System(IDEAL, 1.0),
+        ALIKE: _System(IDEAL, 1.0),
+        **{size_name(size): _System(IDEAL, size * unit_size()) for size in SIZES},
+        **{cutoff_name(end): _System(IDEAL, 1.0, _sources(seed, end)) for end in CUTOFFS},
     }
-    for size in SIZES:
-        factor = size * unit_size()
-        systems[size_name(size)] = _System(IDEAL, (factor, factor), spectrum=size == 1.0)
-    for cutoff in CUTOFFS:
-        own = _sources(seed, cutoff)
-        systems[cutoff_name(cutoff)] = _System(IDEAL, (1.0, 1.0), sources=own)
     free, perturbation = SpectrumEstimator(SAMPLE_RATE), SpectrumEstimator(SAMPLE_RATE)
+    estimators = {"free running": free}
+    for name in ("ideal", "system 1", "system 2"):
+        systems[name].estimator = estimators[name] = SpectrumEstimator(SAMPLE_RATE)
     kept: list[FloatArray] = []
     samples = round(duration * SAMPLE_RATE)
     with ThreadPoolExecutor() as threads:
@@ -240,10 +226,11 @@ def full_run(duration: float = DURATION, seed: int = SEED) -> Run:
                 job.result()
             kept.append(np.stack([series[::_EVERY] for series in (noise, *eta)]))
     series, *perturbations = np.concatenate(kept, axis=1)
-    traces = {name: system.trace() for name, system in systems.items()}
-    traces["free running"] = Trace(series, free.spectrum(), None)
+    traces = {name: Trace(np.concatenate(s.kept), s.diverged) for name, s in systems.items()}
+    traces["free running"] = Trace(series, None)
+    spectra = {name: estimator.spectrum() for name, estimator in estimators.items()}
     time = np.arange(series.size) * _EVERY / SAMPLE_RATE
-    return Run(time, np.stack(perturbations), perturbation.spectrum(), traces)
+    return Run(time, np.stack(perturbations), perturbation.spectrum(), traces, spectra)
 
 
 def envelope(trace: Trace) -> tuple[FloatArray, FloatArray]:
@@ -287,37 +274,22 @@ def sensitivity(frequency: FloatArray, c1: float, c2: float) -> ComplexArray:
     return np.asarray(1.0 / (1.0 + loop))
 
 
-class SensitivityChange(NamedTuple):
-    """How 1/(1 + L) at System 2's point differs most from that at the ideal point.
+def sensitivity_change() -> dict[str, float]:
+    """Return where, and by how much, the constant perturbation changes the closed loop.
 
-    Attributes
-    ----------
-    ratio, ratio_at : float
-        Largest ratio of the magnitudes, and its frequency in Hz.
-    phase : float
-        Largest difference of the phases in rad.
-    differs_below : float
-        Frequency in Hz below which the magnitudes differ by more than a tenth.
+    That is: the largest ratio of the magnitudes, the frequency in Hz "at" which it occurs, the
+    largest difference of the "phase" in rad, and the frequency in Hz "below" which the
+    magnitudes differ by more than a tenth.
     """
-
-    ratio: float
-    ratio_at: float
-    phase: float
-    differs_below: float
-
-
-def sensitivity_change() -> SensitivityChange:
-    """Return where, and by how much, the constant perturbation changes the closed loop."""
     frequency = np.geomspace(1e-8, 1e-3, 4000)
     ratio = sensitivity(frequency, *STRONG) / sensitivity(frequency, *IDEAL)
     size = np.abs(ratio)
-    most = int(size.argmax())
-    return SensitivityChange(
-        float(size[most]),
-        float(frequency[most]),
-        float(np.abs(np.angle(ratio)).max()),
-        float(frequency[np.abs(size - 1.0) > 0.1].max()),
-    )
+    return {
+        "ratio": float(size.max()),
+        "at": float(frequency[size.argmax()]),
+        "phase": float(np.abs(np.angle(ratio)).max()),
+        "below": float(frequency[np.abs(size - 1.0) > 0.1].max()),
+    }
 
 
 def laser_density(frequency: FloatArray) -> FloatArray:
@@ -332,7 +304,7 @@ def expected_density(spectrum: Spectrum, point: tuple[float, float]) -> FloatArr
 
 def measured_suppression(run: Run, name: str, point: tuple[float, float]) -> Suppression:
     """Compare a system of a run with theory at a constant point, over `BAND`."""
-    below, above = (run.spectrum(which).within(*BAND) for which in (name, "free running"))
+    below, above = (run.spectra[which].within(*BAND) for which in (name, "free running"))
     measured = above.asd / below.asd
     expected = above.expected(laser_density) / expected_density(below, point)
     return Suppression(
@@ -597,7 +569,7 @@ def filled_from() -> float:
 
 def alike_from(run: Run) -> float:
     """Frequency in Hz from which the spectra of both systems agree within a tenth."""
-    first, second = (run.spectrum(name).within(*BAND) for name in ("system 1", "system 2"))
+    first, second = (run.spectra[name].within(*BAND) for name in ("system 1", "system 2"))
     return float(first.frequency[np.abs(first.asd / second.asd - 1.0) > 0.1].max())
 
 
@@ -696,9 +668,9 @@ def suppression_reached() -> Finding:
 def spectra_alike() -> Finding:
     """From which frequency on the spectra agree, and the Bode plots."""
     run = full_run()
-    first, second = (run.spectrum(name).within(*BAND) for name in ("system 1", "system 2"))
+    first, second = (run.spectra[name].within(*BAND) for name in ("system 1", "system 2"))
     start, ratio = alike_from(run), float(first.asd[0] / second.asd[0])
-    differs_below = sensitivity_change().differs_below
+    differs_below = sensitivity_change()["below"]
     constant = differs_below < BAND[0]
     return Finding(
         decide(constant, settled=not constant or start < 1.5 * BAND[0]),
@@ -730,10 +702,10 @@ def long_times() -> Finding:
         share,
         "r.m.s. of the difference of the outputs, relative to the output of System 2",
         f"In the first twentieth of the run it is {start:.1e}. The reason is the loop below "
-        f"{1e6 * most.differs_below:.0f} µHz, where from (1, 1) to $(1, 1 - 10⁻⁶)$ the closed "
-        f"loop's $1/|1 + L|$ grows up to {most.ratio:.2f}-fold and its phase moves by up to "
-        f"{np.degrees(most.phase):.0f} degrees. The phase shifts do not accumulate in a stable "
-        "loop.",
+        f"{1e6 * most['below']:.0f} µHz, where from (1, 1) to $(1, 1 - 10⁻⁶)$ the closed "
+        f"loop's $1/|1 + L|$ grows up to {most['ratio']:.2f}-fold and its phase moves by up to "
+        f"{np.degrees(most['phase']):.0f} degrees. The phase shifts do not accumulate in a "
+        "stable loop.",
     )
 
 
@@ -772,7 +744,7 @@ def agreement_with_theory() -> Finding:
 def which_point() -> Finding:
     """Whether the figure's spectrum could tell the two points apart."""
     run = full_run()
-    strong, ideal = (run.spectrum(name).within(*BAND) for name in ("system 2", "ideal"))
+    strong, ideal = (run.spectra[name].within(*BAND) for name in ("system 2", "ideal"))
     apart = float(np.abs(strong.asd / ideal.asd - 1.0).max())
     # The captions contradict each other; the series would tell the points apart.
     return Finding(
@@ -795,7 +767,7 @@ def which_point() -> Finding:
 )
 def laser_input() -> Finding:
     """Compare the spectrum of the run's input with the formula."""
-    found = full_run().spectrum("free running")
+    found = full_run().spectra["free running"]
     formula = found.expected(lambda f: LASER_NOISE / np.hypot(f, LOWEST))
     sharp = (found.degrees > 1e4) & (found.frequency < 90.0)
     worst = float(np.abs(found.asd / formula - 1.0)[sharp].max())
