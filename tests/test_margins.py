@@ -231,8 +231,9 @@ def test_a_dead_time_with_free_phases_takes_the_phase_it_should():
 
 
 def test_arms_of_equal_delay_have_free_phases_of_their_own():
-    loop = Loop(((), (-2.0 + 60j, -2.0 - 60j), 30.0), COMMON, 2.0, 2.0)
-    c1, c2, above = 0.7, -0.9, 20.0
+    loop = Loop(((), (-60.0 + 60j, -60.0 - 60j), 1000.0), COMMON, 2.0, 2.0)
+    # The smallest distance lies past twenty times this frequency.
+    c1, c2, above = 0.7, -0.9, 4.2
     omega = np.geomspace(above, 1e4, 200_001)
     first, second = loop.arm_responses(1j * omega)
     away = np.abs(1.0 + first + second) - np.abs(c1 * first) - np.abs(c2 * second)
