@@ -1,6 +1,7 @@
 """The frequency past which no root can lie on the imaginary axis.
 
-There A exceeds all other terms of D together. Every walk along the axis ends there.
+There A exceeds all other terms of D together (`armlock.characteristic.CharacteristicFunction`).
+Every walk along the axis ends there.
 """
 
 from __future__ import annotations

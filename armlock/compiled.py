@@ -3,11 +3,11 @@
 numba keeps compiled functions beside the package, in the user's folder for such files, or where
 NUMBA_CACHE_DIR says. What is different here, for all modules of the package:
 
-- where nothing can be written, the functions are compiled in each process, with a word;
+- where nothing can be written, the functions are compiled in each process, which warns;
 - what cannot be read, or has changed on the disk, is compiled anew;
 - a change of any module counts, because a compiled function holds those that it calls;
 - a line on the terminal says that something is being compiled, while it lasts;
-- a few calls of short functions are done in Python, sooner than compiled (`soon`).
+- a few calls of short functions run in Python, which takes less time than compiling (`soon`).
 """
 
 from __future__ import annotations

@@ -7,7 +7,8 @@ over a step, a function stays within M step^2 / 2 of its tangent. So
   exact up to rounding;
 - `imaginary_zeros` never steps over two zeros at once, so that none is missed.
 
-Where rounding makes a value indistinguishable from zero, the walks say so.
+Where a value is no larger than the bound on its rounding error, the walks say so: that makes a
+point a boundary point. The tolerance in the bound is `armlock.exponentials.ROUNDING`.
 
 All functions here work on exponential sums, piece by piece, see `armlock.exponentials`.
 """

@@ -51,8 +51,8 @@ class Crossings(NamedTuple):
 class Crossing(NamedTuple):
     """One crossing as in `Crossings`; (inf, nan, 0) where there is none.
 
-    Where the neutral root chain is lost first, `position` is its limit, `omega` is inf, and
-    `change` is 0.
+    Where the neutral root chain ceases to be confined first, `position` is that limit, `omega`
+    is inf, and `change` is 0.
     """
 
     position: float
@@ -227,7 +227,7 @@ def ray_crossings(
     ------
     TypeError, ValueError
         If start or direction is not two finite real numbers, the direction has length zero,
-        stop is not positive, or the neutral root chain is lost on the way.
+        stop is not positive, or the neutral root chain ceases to be confined on the way.
     CountError
         If a number overflows, or gain times delay is too large to follow.
 

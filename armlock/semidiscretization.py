@@ -15,7 +15,6 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 from scipy.linalg import expm
-from scipy.signal import ss2tf
 
 from armlock.characteristic import CharacteristicFunction, checked_system, whole_steps
 from armlock.checks import (
@@ -286,6 +285,8 @@ def semi_discretization(
 
 def _numerator(flow: FloatArray, older: FloatArray, newer: FloatArray) -> FloatArray:
     """Ascending coefficients of the numerator from a delayed signal to the first state."""
+    from scipy.signal import ss2tf
+
     output, direct = np.eye(1, flow.shape[0]), np.zeros((1, 1))
     # The newer sample is the older one a step later, times z.
     first, second = (

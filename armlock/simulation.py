@@ -1,4 +1,4 @@
-"""The loop in the time domain, sample by sample, its delays exact and its loop closed exactly.
+"""The loop in the time domain, sample by sample, closed exactly in each.
 
 With phi the frequency noise of the locked laser, every loop of `armlock.loops` reads
 
@@ -8,7 +8,8 @@ With phi the frequency noise of the locked laser, every loop of `armlock.loops` 
 Sensor and controller are sampled by the trapezoidal rule, see `armlock.discretize`. Without a
 dead time the present phi is on both sides, with a weight of thousands; each sample solves for
 it. A rule that took the previous phi instead would be unstable by itself as soon as gain
-times step exceeds about one, and is not offered.
+times step exceeds about one, and is not offered. A delay that is no whole number of samples is
+interpolated, with the weights of `lagrange_delay`.
 
 Because s = j omega becomes (2 j / T) tan(omega T / 2) while the delays stay what they are,
 what is simulated has an open loop in closed form, `sampled_open_loop`.
@@ -506,6 +507,10 @@ class Simulation:
         given = finite_series("noise", noise, 1 if self.draws is None else 2)
         if self.draws not in (None, len(given)):
             raise ValueError(f"noise must have {self.draws} rows, got shape {given.shape}")
+        return self._advance(given, c1, c2)
+
+    def _advance(self, given: FloatArray, c1: npt.ArrayLike, c2: npt.ArrayLike) -> FloatArray:
+        """Compute the next block, of noise that is checked."""
         inputs = [np.atleast_2d(given).T, _series("c1", c1, given), _series("c2", c2, given)]
         output, begin = np.empty(inputs[0].shape), self.samples
         shaped = output[:, 0] if self.draws is None else output.T
@@ -604,7 +609,7 @@ def simulate(
     given = finite_series("noise", noise, 1, 2)
     draws = len(given) if given.ndim == 2 else None
     run = Simulation(loop, sample_rate, history=history, limit=limit, draws=draws)
-    return run.advance(given, c1, c2)
+    return run._advance(given, c1, c2)
 
 
 def simulate_blocks(

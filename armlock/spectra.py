@@ -12,11 +12,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import firwin, kaiser_beta, upfirdn
 from scipy.special import chdtri
 
 from armlock.checks import (
@@ -55,7 +55,6 @@ _BETA = 20.0
 _TRANSFORMS_AT_ONCE = 512
 
 _WINDOW = np.kaiser(SEGMENT + 1, _BETA)[:-1]
-_FILTER = firwin(_TAPS, 1.0 / FACTOR, window=("kaiser", kaiser_beta(_STOPBAND)))
 # Points a bin at which a given density is sampled for `Spectrum.expected`.
 _FINE = 8
 
@@ -238,6 +237,15 @@ def _degrees(segments: int, bins: int) -> float:
     return float(2.0 / variance)
 
 
+@cache
+def _filter() -> FloatArray:
+    # To import scipy.signal takes as long as the whole package; not every user needs it.
+    from scipy.signal import firwin, kaiser_beta
+
+    window = "kaiser", kaiser_beta(_STOPBAND)
+    return np.asarray(firwin(_TAPS, 1.0 / FACTOR, window=window))
+
+
 class _Level:
     """One rate of the ladder, so many filters below the first."""
 
@@ -250,6 +258,8 @@ class _Level:
 
     def add(self, samples: FloatArray) -> FloatArray:
         """Take in samples; return those of the next level."""
+        from scipy.signal import upfirdn
+
         series = np.concatenate((self.waiting, samples))
         if series.size >= SEGMENT:
             windows = np.lib.stride_tricks.sliding_window_view(series, SEGMENT)[::HOP]
@@ -264,7 +274,7 @@ class _Level:
         series = np.concatenate((self.unfiltered, samples))
         count = max((series.size - _TAPS) // FACTOR + 1, 0)
         skipped = (_TAPS - 1) // FACTOR
-        filtered = upfirdn(_FILTER, series, down=FACTOR)[skipped : skipped + count]
+        filtered = upfirdn(_filter(), series, down=FACTOR)[skipped : skipped + count]
         self.unfiltered = series[count * FACTOR :].copy()
         return np.asarray(filtered)
 

@@ -1,4 +1,4 @@
-"""One function at many points: on one core, on all cores, or on many machines."""
+"""One function at many points, on one core, all cores or many machines; stopped and resumed."""
 
 from __future__ import annotations
 

@@ -65,13 +65,26 @@ def test_what_a_high_gain_leaves_of_the_strip():
     np.testing.assert_array_equal(at_high_gain, kept[far])
 
 
-def test_upper_ends_are_where_the_count_changes():
-    for gain in (10.0, 100.0, 1e4):
-        difference, common, _ = chapter.upper_ends(gain, 21, low=0.88)
-        for shift, stable in ((-1e-9, True), (1e-9, False)):
-            mean = common + shift
-            counts = unstable_roots(DualArm(gain), mean - difference / 2, mean + difference / 2)
+def test_the_top_of_the_strip_is_where_the_count_changes():
+    for gain in (0.3, 10.0, 100.0, 1e4):
+        difference, common = (side[50::500] for side in chapter.top_of_strip(gain, low=0.88))
+        here = common < 1.2
+        for shift, stable in ((-1e-6, True), (1e-6, False)):
+            mean, half = (common + shift)[here], 0.5 * difference[here]
+            counts = unstable_roots(DualArm(gain), mean - half, mean + half)
             assert ((counts == 0) == stable).all()
+
+
+def test_area_agrees_with_a_sum_over_rays():
+    """Rays upwards from c1 + c2 = 1.8, whose sum has an error of its own of a few in 1e4."""
+    for gain in (10.0, 100.0):
+        loop, number = DualArm(gain), 100
+        wide = chapter.far_edge(loop, 0.9).position
+        difference = wide * (np.arange(number) + 0.5) / number
+        top = np.array([0.9 + chapter.upper_end(loop, d).position for d in difference])
+        length = np.minimum(top, 1.1 - 0.5 * difference) - (0.9 + 0.5 * difference)
+        area = np.clip(length, 0.0, None).sum() * wide / number
+        assert chapter.window_area(gain) == pytest.approx(area, rel=5e-4)
 
 
 def test_above_the_largest_p_the_ideal_loop_is_unstable():

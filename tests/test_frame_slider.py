@@ -26,8 +26,13 @@ def test_svg_closes_its_figure():
 
 
 def test_glue_names_the_parts_of_a_value(monkeypatch):
-    glued: dict[str, object] = {}
-    monkeypatch.setattr("myst_nb.glue", lambda *named, display: glued.update([named]))
+    glued: dict[str, float] = {}
+
+    def display(record, raw, metadata):
+        about = metadata["scrapbook"]
+        glued[about["name"]] = float(record[about["mime_prefix"] + "text/plain"])
+
+    monkeypatch.setattr("IPython.display.display", display)
     glue(one=np.array(4), edge=[1, 2], bar={"area": (3,)}, upper=Crossing(0.5, 2.0, 1))
     found = {"one": 4, "edge_0": 1, "edge_1": 2, "bar_area_0": 3}
     assert glued == found | {"upper_position": 0.5, "upper_omega": 2.0, "upper_change": 1}

@@ -660,7 +660,7 @@ print(unstable_roots(loop, ${c1}, ${c2}))
         : value === Infinity ? "more than 2" : say(value, 4);
       if (this.breaks) {
         const [minus, plus, down] = this.breaks;
-        rows.push(["First break from (1, 1)", ""], ["along (1, \u22121)", part(minus)],
+        rows.push(["Critical perturbation from (1, 1)", ""], ["along (1, \u22121)", part(minus)],
           ["along (1, 1)", part(plus)], ["along (\u22121, \u22121)", part(down)]);
       }
       const m = this.margins;

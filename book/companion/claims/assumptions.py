@@ -83,8 +83,8 @@ def over_corners(points: int = 31) -> tuple[FloatArray, dict[str, FloatArray]]:
     corners : float array, shape (n,)
         Corner frequency p in rad/s, rising.
     columns : dict of str to float array
-        For "full" and "half": first break along (1, -1), 0 where the loop is unstable at
-        (1, 1), and under "full margin" and "half margin" min |1 + L|, nan there.
+        For "full" and "half": critical perturbation along (1, -1), 0 where the loop is
+        unstable at (1, 1); under "full margin" and "half margin" min |1 + L|, nan there.
     """
     grid = DUAL_SENSOR_CORNER * np.logspace(-1.0, 1.0, points)
     close = 1.0 - np.append(np.linspace(0.24, 0.02, 12), [1e-3, -1e-3])
@@ -141,7 +141,7 @@ def _corner() -> Assumption:
         f"{DUAL_SENSOR_CORNER:.4g} rad/s ({DUAL_SENSOR_CORNER / (2 * np.pi):.2g} Hz)",
         "The paper gives none. It is the default of the public code quickTDI (module TJ_lock), "
         "with arms of this length. Verdicts name the range of p for which they stand.",
-        f"The first break along (1, -1) is at {here:.4g}, and with a tenth of p at "
+        f"The critical perturbation along (1, -1) is {here:.4g}, and with a tenth of p "
         f"{tenth:.4g}. But from $p = {limit:.3g}$ rad/s on the loop is unstable without any "
         f"perturbation, and with half of Δτ from {half:.3g} rad/s on.",
     )
@@ -154,7 +154,7 @@ def _difference() -> Assumption:
         "Δτ in the dual sensor",
         f"$τ₁ - τ₂ = {DIFFERENCES['full']:.2g}$ s in the loop",
         "Sec. III.B defines it so. Table I is right only with half of it (claims T2 and T3).",
-        f"The first break along (1, -1) is at {full:.4g} with the whole difference and at "
+        f"The critical perturbation along (1, -1) is {full:.4g} with the whole difference and "
         f"{half:.4g} with half of it, which is inside the $±{PERTURBATION:g}$ of the paper.",
     )
 
@@ -190,8 +190,8 @@ def _gain() -> Assumption:
         "The unit of g",
         "rad/s with the actuator, a plain number without it",
         "The paper gives a number without unit; $g/s$ is a rate over s in rad/s.",
-        r"Were it in Hz, g would be $2\pi$ times larger: the first break along (1, -1) would "
-        f"be at {higher:.4g}, not at {here:.4g}.",
+        r"Were it in Hz, g would be $2\pi$ times larger: the critical perturbation "
+        f"along (1, -1) would be {higher:.4g}, not {here:.4g}.",
     )
 
 

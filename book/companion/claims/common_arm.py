@@ -48,7 +48,7 @@ ARM = CommonArm(COMMON_ARM_GAIN, TAU1, TAU2)
 # The stable region --------------------------------------------------------------------------
 
 
-@cache
+@shared
 def exact_radius(number: int = RAYS) -> FloatArray:
     """Return the boundary's distance from the origin along `rays(number)`."""
     return boundary_radius(ARM, rays(number))
@@ -69,12 +69,13 @@ def stable_by_magnitude(chart: StabilityChart) -> float:
     There |c1 + c2 exp(j omega (tau1 - tau2))| < |2 + j omega / g| for every omega, whatever
     the phase the two delays have in common.
     """
-    c1, c2 = chart.x[None, :], chart.y[:, None]
+    row, column = np.nonzero(chart.stable)
+    c1, c2 = chart.x[column], chart.y[row]
     excluded = np.abs(c1 + c2) < 2.0
     for omega in np.linspace(0.0, 4.0 * ARM.gain * WINDOW, 561)[1:]:
         common = 2.0 * c1 * c2 * np.cos(omega * (ARM.tau1 - ARM.tau2))
         excluded &= c1**2 + c2**2 + common < 4.0 + (omega / ARM.gain) ** 2
-    return float((excluded & chart.stable).sum() / chart.stable.sum())
+    return float(excluded.mean())
 
 
 def straight_edge() -> tuple[float, float]:

@@ -51,7 +51,7 @@ SEED = 1
 PERTURBATION_SEEDS = (SEED + 1, SEED + 2)
 #: Number of random draws of c1 and c2.
 DRAWS = 4000
-#: Number of those that run in time, what one core does in a minute or two; and their sizes.
+#: Number of those that run in time, what one core does within a minute; and their sizes.
 ENSEMBLE, ENSEMBLE_SIZES = 16, (1.0, 3.0)
 # Series are kept once a second.
 _EVERY = int(SAMPLE_RATE)
@@ -328,11 +328,12 @@ def growth_rate(difference: FloatArray) -> FloatArray:
     sum.
     """
     differences, rates = _growth_table()
-    within = np.log(np.maximum(difference, differences[0]))
-    return np.asarray(np.interp(within, np.log(differences), rates))
+    found, beyond = np.zeros(difference.shape), difference > differences[0]
+    found[beyond] = np.interp(np.log(difference[beyond]), np.log(differences), rates)
+    return found
 
 
-@cache
+@shared
 def _growth_table() -> tuple[FloatArray, FloatArray]:
     differences = stable_up_to() * np.geomspace(1.0, 1e4, 25)
     roots = np.asarray(rightmost_root(paper_loop(), 1.0, 1.0 - differences[1:]))
@@ -370,6 +371,7 @@ def drawn_differences() -> FloatArray:
     return np.asarray((first - second) * unit_size())
 
 
+@shared
 def leaving_probability(size: float = 1.0) -> float:
     """Probability that (c1, c2) leaves the stable region for a time, over random draws.
 
@@ -392,6 +394,7 @@ def leaving_probability(size: float = 1.0) -> float:
     return float((size * drawn_differences().max(axis=1) > stable_up_to()).mean())
 
 
+@shared
 def growing_probability(size: float = 1.0) -> float:
     """Probability that the unstable root of the frozen loop grows by more than a factor e.
 
@@ -409,6 +412,7 @@ def growing_probability(size: float = 1.0) -> float:
     return float((grown > 1.0).mean())
 
 
+@shared
 def reduction_quantile(share: float) -> float:
     """Factor by which the printed spectrum must be reduced to stay in the stable region.
 
@@ -476,30 +480,24 @@ def ensemble(duration: float = DURATION) -> Ensemble:
     """
     begun = process_time()
     laser, sources = LaserNoise(SEED, SAMPLE_RATE, at_rest=True), ensemble_sources()
-    # Above all growth: one draw that diverges would stop the others.
-    runs = {
-        size: Simulation(paper_loop(), SAMPLE_RATE, limit=1e100, draws=ENSEMBLE)
-        for size in ENSEMBLE_SIZES
-    }
-    kept: dict[float, list[FloatArray]] = {size: [] for size in runs}
-    gaps, block = [], 100 * _EVERY
-
-    def draw(pair: Sequence[PerturbationNoise]) -> list[FloatArray]:
-        return [source.draw(block) for source in pair]
-
-    def advance(size: float, noise: FloatArray, eta: FloatArray) -> None:
-        c1, c2 = 1.0 + size * unit_size() * eta
-        kept[size].append(runs[size].advance(noise, c1, c2)[:, ::_EVERY].copy())
-
-    with ThreadPoolExecutor() as threads:
-        for noise in laser.blocks(round(duration * SAMPLE_RATE), block):
-            eta = np.stack(list(threads.map(draw, sources)), axis=1)
-            alike = np.tile(noise, (ENSEMBLE, 1))
-            list(threads.map(partial(advance, noise=alike, eta=eta), runs))
-            gaps.append(unit_size() * (eta[0, :, 0] - eta[1, :, 0]))
-    series = {size: np.concatenate(parts, axis=1) for size, parts in kept.items()}
-    largest = {size: np.abs(one).max(axis=1) for size, one in series.items()}
-    return Ensemble(np.array(gaps).T, series[1.0], largest, process_time() - begun)
+    sizes = unit_size() * np.array(ENSEMBLE_SIZES)
+    # All sizes side by side. Above all growth: one that diverges would stop the others.
+    number = sizes.size * ENSEMBLE
+    run = Simulation(paper_loop(), SAMPLE_RATE, limit=1e100, draws=number)
+    kept, gaps, block = [], [], 100 * _EVERY
+    for noise in laser.blocks(round(duration * SAMPLE_RATE), block):
+        eta = np.array([[source.draw(block) for source in pair] for pair in sources])
+        gaps.append(unit_size() * (eta[:, 0, 0] - eta[:, 1, 0]))
+        # Samples in rows, as the simulation takes them.
+        c1, c2 = (
+            (1.0 + sizes[:, None] * arm[:, None]).reshape(block, number).T
+            for arm in np.ascontiguousarray(eta.transpose(1, 2, 0))
+        )
+        alike = np.broadcast_to(noise, (number, block))
+        kept.append(run.advance(alike, c1, c2)[:, ::_EVERY].copy())
+    series = np.concatenate(kept, axis=1).reshape(sizes.size, ENSEMBLE, -1)
+    largest = dict(zip(ENSEMBLE_SIZES, np.abs(series).max(axis=2), strict=True))
+    return Ensemble(np.array(gaps).T, series[0], largest, process_time() - begun)
 
 
 def chain_exponent(run: Run, until: float) -> float:
