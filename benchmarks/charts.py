@@ -105,77 +105,51 @@ def side_by_side(gain: float, side: int, points: int, passes: int) -> dict[str, 
     system = CommonArm(gain)
     charts: list[float] = []
     dense: list[list[float]] = []
-    outside, doubtful, order = [], [], 0
-    where = random_square(points)
-    for i in range(passes):
-        for x, y in where:
+    sizes = []
+    for x, y in random_square(points):
+        matrix = transition_matrix(system, x, y, STEP)
+        dense.append([])
+        for _ in range(passes):
             charts.append(timed(chart_of, gain, side)[0])
-            matrix = transition_matrix(system, x, y, STEP)
             seconds, values = timed(np.linalg.eigvals, matrix)
-            if i == 0:
-                dense.append([])
-                outside.append(int((np.abs(values) > 1.0).sum()))
-                doubtful.append(bool((np.abs(np.abs(values) - 1.0) < DOUBTFUL).any()))
-            dense[len(charts) - 1 - i * points].append(seconds)
-            order = matrix.shape[0]
+            dense[-1].append(seconds)
+        sizes.append(np.abs(values))
     return {
         "charts": charts,
         "dense": dense,
-        "outside": outside,
-        "doubtful": doubtful,
-        "order": order,
+        "outside": [int((size > 1.0).sum()) for size in sizes],
+        "doubtful": [bool((np.abs(size - 1.0) < DOUBTFUL).any()) for size in sizes],
+        "order": values.size,
     }
-
-
-def dense_alone(gain: float, points: int, passes: int) -> list[list[float]]:
-    """Time dense eigenvalues at the same points, a list of times a point."""
-    system = CommonArm(gain)
-    times = []
-    for x, y in random_square(points):
-        matrix = transition_matrix(system, x, y, STEP)
-        times.append([timed(np.linalg.eigvals, matrix)[0] for _ in range(passes)])
-    return times
 
 
 # The table -----------------------------------------------------------------------------
 
 
-def per_point(times: list[list[float]]) -> float:
-    """Return the mean over the points of the best time at each."""
-    return float(np.mean([min(at_point) for at_point in times]))
-
-
 def speed_rows(topic: Topic, gain: float, sizes: Sizes) -> None:
     """Compare a chart with dense eigenvalues, and their count of the unstable ones."""
-    side, module = sizes.side, "benchmarks.charts"
-    arguments: dict[str, Any] = {"gain": gain, "points": sizes.dense_points}
     both = child.call(
-        module, "side_by_side", child.ONE_THREAD, side=side, passes=sizes.passes, **arguments
+        "benchmarks.charts",
+        "side_by_side",
+        child.ONE_THREAD,
+        gain=gain,
+        side=sizes.side,
+        points=sizes.dense_points,
+        passes=sizes.passes,
     )
-    # More threads are slower at this order on most machines, but not on all.
-    threaded = child.call(module, "dense_alone", {}, passes=1, **arguments)
-    topic.data[f"g = {gain:g}"] = both | {"dense, all threads": threaded}
-
-    chart, median = min(both["charts"]), float(np.median(both["charts"]))
-    one, many = per_point(both["dense"]), per_point(threaded)
-    size = side * side
-    order = both["order"]
-    g = f"g = {gain:g}:"
-    runs = len(both["charts"])
+    topic.data[f"g = {gain:g}"] = both
+    chart, size = min(both["charts"]), sizes.side**2
+    # Of the best time at each point.
+    dense = float(np.mean([min(at_point) for at_point in both["dense"]])) * size
+    g, order = f"g = {gain:g}:", both["order"]
     topic.rows += [
-        Row(f"{g} chart {side} x {side}, best of {runs} runs", chart),
-        Row(f"{g} the same, median", median),
-        Row(f"{g} dense {order} x {order} at {size:,} points [a], one thread", one * size),
-        Row(f"{g} dense {order} x {order} at {size:,} points [a], all threads", many * size),
+        Row(f"{g} chart {sizes.side} x {sizes.side}, best of {len(both['charts'])}", chart),
         Row(
-            f"{g} chart against dense, the faster one [a]",
-            ratio=min(one, many) * size / chart,
-            requirement=f"at least {RATIO:,.0f}",
-            met=min(one, many) * size / chart >= RATIO,
-        ),
-        Row(
-            f"{g} chart against dense, medians, one thread [a]",
-            ratio=float(np.median(both["dense"])) * size / median,
+            f"{g} dense {order} x {order} at {size:,} points [a]",
+            dense,
+            dense / chart,
+            f"at least {RATIO:,.0f}",
+            dense / chart >= RATIO,
         ),
     ]
     where = random_square(sizes.dense_points)
@@ -201,38 +175,19 @@ def comparison(what: str, differ: int, points: int, seconds: float | None = None
 
 def count_rows(topic: Topic, gain: float, sizes: Sizes) -> None:
     """Compare a chart with counts at single points, by the argument principle."""
-    side, g = sizes.side, f"g = {gain:g}:"
-    system, values = CommonArm(gain), axis(side)
-    unstable_roots(system, 0.0, 0.0)
-    chart_seconds, chart = timed(chart_of, gain, side)
-    rows, columns = np.random.default_rng(SEED).integers(0, side, (2, sizes.points))
-    seconds, counts = timed(unstable_roots, system, values[columns], values[rows])
-    differ = int((counts != chart.counts[rows, columns]).sum())
-    each = seconds / sizes.points * side * side
-    ends = np.array([[0], [side - 1]])
-    end_seconds, at_ends = timed(unstable_roots, system, values[ends], values)
-    wrong = int((at_ends != chart.counts[:, [0, -1]].T).sum())
-    topic.rows += [
-        comparison(
-            f"{g} chart against single counts [c], random points",
-            differ,
-            sizes.points,
-            seconds,
+    side, system, values = sizes.side, CommonArm(gain), axis(sizes.side)
+    chart = chart_of(gain, side)
+    places = {
+        "random points": np.random.default_rng(SEED).integers(0, side, (2, sizes.points)),
+        "both ends of all rows": np.stack(
+            (np.tile([0, side - 1], side), np.repeat(np.arange(side), 2))
         ),
-        comparison(
-            f"{g} chart against single counts [c], both ends of all rows",
-            wrong,
-            2 * side,
-            end_seconds,
-        ),
-        Row(f"{g} single counts at {side * side:,} points [a]", each, each / chart_seconds),
-    ]
-    topic.data[f"g = {gain:g}"] |= {
-        "boundary points": int((chart.counts == -1).sum()),
-        "points counted singly": int(chart.counted_singly.sum()),
-        "rows counted singly": int(chart.recounted_rows.size),
-        "largest count": int(chart.counts.max()),
     }
+    for where, (columns, rows) in places.items():
+        seconds, counts = timed(unstable_roots, system, values[columns], values[rows])
+        differ = int((counts != chart.counts[rows, columns]).sum())
+        what = f"g = {gain:g}: chart against single counts [c], {where}"
+        topic.rows.append(comparison(what, differ, rows.size, seconds))
 
 
 def process_rows(topic: Topic, sizes: Sizes) -> None:
@@ -246,10 +201,8 @@ def process_rows(topic: Topic, sizes: Sizes) -> None:
         with tempfile.TemporaryDirectory() as cache:
             environment = {"NUMBA_CACHE_DIR": cache}
             cold = child.call(name, "chart_alone", environment, gain=sizes.gains[0], side=side)
-        topic.rows += [
-            Row("compiling, once after installation", cold["first"] - cold["second"]),
-            memory_row("compiling and chart", cold["memory"]),
-        ]
+        compiling = cold["first"] - cold["second"]
+        topic.rows.append(Row("compiling, once after installation", compiling))
 
 
 def memory_row(what: str, memory: int) -> Row:
@@ -343,9 +296,8 @@ def run(*, quick: bool, folder: Path) -> Topic:
     plot_growth(topic.series, folder / "chart_growth.png")
     topic.figures.append("chart_growth.png")
     topic.notes += [
-        f"[a] Extrapolated from {sizes.dense_points} random points (dense: the best of "
-        f"{sizes.passes} runs at each on one thread, of one on all; building the matrix does "
-        f"not count) or {sizes.points} (single counts).",
+        f"[a] Extrapolated from {sizes.dense_points} random points: the best of {sizes.passes} "
+        f"runs at each, on one thread; building the matrix does not count.",
         f"[b] The map is the semi-discretization of order 0 with a step of {STEP} s; the dense "
         f"reference is numpy.linalg.eigvals of its transition matrix.",
         "[c] Argument principle, point by point: another method than the chart's crossings.",

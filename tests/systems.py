@@ -14,6 +14,7 @@ from armlock import (
     SingleArm,
 )
 from armlock.sensors import COMMON
+from tests.attack_judge import Sketch
 
 
 def with_roots(*roots):
@@ -76,3 +77,13 @@ NEUTRAL = {
     ),
     "dead time": Loop(Controller([-0.3], [0.2], 0.2), COMMON, 2.0, 1.5, 0.6),
 }
+
+
+def sketch_of(loop):
+    """The same loop for the judge of `tests.attack`, which shares no code with armlock."""
+    k, tau1, tau2 = loop.controller, loop.tau1, loop.tau2
+    below = loop.mapping.denominator
+    corner = below[1] / below[2] if loop.mapping.name == "dual" else 1.0
+    return Sketch(
+        k.zeros, k.poles, k.gain, loop.mapping.name, tau1, tau2, loop.delay, corner, tau1 - tau2
+    )

@@ -12,7 +12,7 @@ import pytest
 
 import armlock
 from armlock import CharacteristicFunction, CommonArm, HayesEquation, SingleArm, paper_loop
-from armlock.checks import axis, check_memory, finite_series, real_array
+from armlock.checks import axis, finite_series, real_array
 from armlock.controllers import integrating_actuator, stage_one, table_two
 from armlock.discretize import warped
 from armlock.noise import band_rms
@@ -191,10 +191,3 @@ def test_what_is_checked_is_a_copy_but_for_a_long_series():
         check("x", given)[0] = 7.0
     assert given[0] == 1.0
     assert finite_series("x", given) is given
-
-
-def test_what_memory_does_not_hold_is_refused():
-    check_memory("x", (1000, 1000), 8)
-    message = r"^x must be of a size that memory holds, got 10000000 x 10000000 points: about "
-    with pytest.raises(ValueError, match=message):
-        check_memory("x", (10_000_000, 10_000_000), 8)

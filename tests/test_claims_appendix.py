@@ -19,42 +19,7 @@ def test_phase_error_is_that_of_the_arctangent(phase):
     assert abs(measured - phase) < 0.5 * np.pi
 
 
-def test_error_to_first_order():
-    phase = np.linspace(0.0, 10.0, 500)
-    first = 0.5 * appendix.ETA * np.sin(2.0 * phase)
-    assert appendix.phase_error(phase) == pytest.approx(first, abs=10.0 * appendix.ETA**2)
-
-
-def test_slope_at_zero_is_the_limit_of_the_error():
-    for mismatch in (appendix.MISMATCH, (0.02, -0.05)):
-        eta, phase = mismatch[1] - mismatch[0], 1e-5
-        ratio = float(appendix.phase_error(phase, mismatch)) / (eta * phase)
-        assert abs(ratio - 1.0) == pytest.approx(appendix.slope_error(mismatch), rel=1e-3)
-
-
-def test_the_error_vanishes_on_average():
-    """Also for unequal channels far beyond the first order, and not by a sum over a grid."""
-    for mismatch in (appendix.MISMATCH, (0.02, -0.05)):
-        eta = abs(mismatch[1] - mismatch[0])
-        assert abs(appendix.mean_over_turn(mismatch)) < 1e-13 * eta
-        # A quarter turn alone has a mean of eta / pi, to first order.
-        quarter = quad(appendix.phase_error, 0.0, 0.5 * np.pi, args=(mismatch,))[0]
-        assert abs(quarter) == pytest.approx(0.5 * eta, rel=2.0 * eta + 1e-5)
-
-
-def test_phase_of_the_laser_is_the_integral_of_its_frequency():
-    """By integration of the density on a logarithmic axis."""
-
-    def density(log_frequency):
-        f = np.exp(log_frequency)
-        # phi = integral of 2 pi nu dt: in rad, 2 pi / (2 pi f) times that of the frequency.
-        return (2.0 * np.pi / (2.0 * np.pi * f) * 30.0 / f) ** 2 * f
-
-    power = quad(density, np.log(5e-6), np.log(100.0), epsabs=0.0, epsrel=1e-11, limit=400)[0]
-    assert appendix.laser_phase_rms() == pytest.approx(np.sqrt(power), rel=1e-9)
-
-
-@pytest.mark.parametrize("frequency", [0.0, 1e-4, 1e-2, 0.1, 0.3, 1.0])
+@pytest.mark.parametrize("frequency", [0.0, 1e-2, 0.3, 1.0])
 def test_convolution_against_adaptive_integration(frequency):
     phase, eta = appendix.sources()
 

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from armlock import CommonArm, spectral_radius, unstable_roots
-from armlock.dcurve import d_curve, d_curve_line
+from armlock.dcurve import d_curve
 from book.companion.claims import Verdict, check
 from book.companion.claims import common_arm as chapter
-from book.companion.schemes import standard_schemes
 from tests.independent import map_eigenvalues
 
 
@@ -29,17 +28,6 @@ def test_cusp_conditions_are_where_they_say():
         assert np.abs(left.imag / left.real).max() < 1e-10
         # They grow by about pi / tau from one to the next, and none is left out.
         assert np.diff(omega).max() < 1.1 * np.pi / tau
-
-
-def test_drawing_converges_but_not_beyond_its_range():
-    last = np.sqrt(4.0 * 7.0**2 - 4.0)
-    coarse, fine, short = (
-        np.abs(chapter.drawn_radius(n, end) - chapter.exact_radius()).max()
-        for n, end in ((2000, last), (4000, last), (40_000, 5.0))
-    )
-    # Straight pieces miss a curve by the square of their length.
-    assert coarse / fine == pytest.approx(4.0, rel=0.15)
-    assert short > 0.05
 
 
 def test_sharpest_turn_by_three_points_of_the_curve():
@@ -65,11 +53,3 @@ def test_the_straight_edge_ends_where_the_stable_region_does():
         below = CommonArm(), np.array([c1 + inwards, c1 - inwards])
         counts = unstable_roots(*below, 2.0 - below[1] - 1e-9)
         assert (counts > 0).tolist() == [False, True]
-
-
-def test_every_scheme_keeps_the_straight_line_and_converges():
-    for system in standard_schemes(CommonArm(), 0.1).values():
-        assert np.allclose(d_curve_line(system), (1.0, 1.0, 2.0), rtol=0.0, atol=1e-12)
-    coarse, fine = (chapter.scheme_errors(step) for step in (0.1, 0.05))
-    for name, errors in coarse.items():
-        assert abs(fine[name].boundary) < 0.6 * abs(errors.boundary)

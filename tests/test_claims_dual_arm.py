@@ -27,11 +27,6 @@ def test_estimates_approach_the_exact_edges():
     assert chapter.width_estimate(0.9) == pytest.approx(width, rel=2e-3)
 
 
-def test_area_agrees_with_a_chart_of_counts():
-    for gain in (10.0, 1000.0):
-        assert chapter.chart_area(gain) == pytest.approx(chapter.window_area(gain), rel=0.01)
-
-
 @pytest.mark.parametrize("point", [(1.0, 1.012), chapter.SLIVER])
 def test_gain_factors_put_a_root_on_the_axis(point):
     for factor in chapter.gain_factors(*point):

@@ -2,19 +2,15 @@ import csv
 import json
 from html.parser import HTMLParser
 
-import numpy as np
 import pytest
 
-from armlock import CommonArm, paper_loop, unstable_roots
+from armlock import CommonArm
 from book.companion.claims import Weight, check
 from book.companion.claims import page as module
 from book.companion.claims.assumptions import (
-    DIFFERENCES,
     Assumptions,
     break_along,
-    over_corners,
 )
-from book.companion.claims.controller import highest_stable_corner
 from book.companion.claims.page import (
     Errata,
     LedgerPage,
@@ -125,28 +121,8 @@ def test_claims_with_one_finding_share_an_erratum():
     )
 
 
-@pytest.mark.parametrize("name", DIFFERENCES)
-def test_the_first_break_is_where_counts_find_the_first_unstable_root(name):
-    loop = paper_loop(difference=DIFFERENCES[name])
-    found = break_along(loop)
-    sizes = found * np.append(np.geomspace(1e-3, 1.0 - 1e-7, 40), 1.0 + 1e-7)
-    assert (unstable_roots(loop, 1.0 + sizes, 1.0 - sizes) == 0).tolist() == [True] * 40 + [
-        False
-    ]
-
-
 def test_a_loop_that_is_unstable_has_no_first_break():
     assert break_along(CommonArm(), (1.0, 0.0)) == 0.0
-
-
-def test_the_loop_is_lost_at_the_highest_stable_corner():
-    corners, columns = over_corners(3)
-    for name, difference in DIFFERENCES.items():
-        limit = highest_stable_corner(difference)
-        stable, lost = corners[columns[name] > 0.0], corners[columns[name] == 0.0]
-        assert stable.max() == pytest.approx(limit * (1.0 - 1e-3))
-        assert lost.min() == pytest.approx(limit * (1.0 + 1e-3))
-        assert columns[f"{name} margin"][corners == stable.max()] < 0.01
 
 
 def test_every_assumption_has_an_entry():

@@ -6,21 +6,13 @@ import numpy as np
 import pytest
 
 from armlock import critical_perturbation, paper_loop, rightmost_root
-from armlock.noise import PerturbationNoise
-from armlock.paper import DURATION, PERTURBATION
-from armlock.roots import extended_root
-from armlock.simulation import LIMIT
+from armlock.paper import PERTURBATION
 from book.companion.claims import simulation as claimed
 
 
 @pytest.fixture(scope="module")
 def run():
     return claimed.full_run()
-
-
-def test_the_run_has_the_papers_size(run):
-    assert run.time.size == DURATION
-    assert claimed.full_run() is run
 
 
 def test_a_shorter_run_is_the_start_of_the_full_one(run):
@@ -35,17 +27,6 @@ def test_another_seed_gives_another_run():
     one, other = (claimed.full_run(duration=10.0, seed=seed) for seed in (1, 7))
     assert not np.allclose(one.perturbations, other.perturbations)
     assert not np.allclose(one.traces["ideal"].series, other.traces["ideal"].series)
-
-
-def test_the_ensembles_first_draw_is_the_run(run):
-    drawn, length = claimed.ensemble(duration=2000.0), 2000
-    assert drawn.series.shape == (claimed.ENSEMBLE, length)
-    assert np.array_equal(drawn.series[0], run.traces["system 1"].series[:length])
-    assert np.array_equal(drawn.difference[0], run.difference()[:length:100])
-    for size, largest in drawn.largest.items():
-        trace = run.traces[claimed.size_name(size)].series[:length]
-        assert largest[0] == np.abs(trace).max()
-    assert len(np.unique(drawn.difference)) == drawn.difference.size
 
 
 def test_stability_is_lost_where_the_frozen_loop_loses_it(run):
@@ -91,35 +72,6 @@ def test_the_perturbations_exceed_the_rms_of_the_band():
     excess = np.sqrt(0.25 * np.pi / (1.0 / 3.0))
     drawn = claimed.drawn_differences().std() / np.sqrt(2.0)
     assert drawn == pytest.approx(excess * PERTURBATION, rel=0.02)
-
-
-def test_random_draws_against_draws_from_the_spectrum():
-    """Another generator, by the sum of cosines of the prescribed density, agrees."""
-    random = np.random.default_rng(7)
-    length, step, draws = 1 << 14, 100.0, 600
-    frequency = np.fft.rfftfreq(length, step)
-    asd = PerturbationNoise(1, cutoff=claimed.LOWEST).asd(frequency)
-    # One-sided density to amplitudes of numpy's transform.
-    weight = asd * np.sqrt(length / (2.0 * step)) * (PERTURBATION / claimed.face_value_rms())
-    parts = random.standard_normal((2, 2, draws, frequency.size)) * np.sqrt(0.5)
-    series = np.fft.irfft(weight * (parts[0] + 1j * parts[1]), length)
-    widest = (series[0] - series[1])[:, : int(DURATION / step)].max(axis=1)
-    edge = critical_perturbation(paper_loop(), (0.0, -1.0))
-    for size in (0.7, 1.0, 2.0):
-        share = float((size * widest > edge).mean())
-        assert claimed.leaving_probability(size) == pytest.approx(share, abs=0.07)
-
-
-def test_equal_perturbations_are_lost_through_the_chain(run):
-    """Their difference is zero; the roots at high frequency grow as `chain_exponent` has it."""
-    trace = run.traces[claimed.ALIKE]
-    assert trace.diverged == pytest.approx(38778.3, abs=1.0)
-    assert claimed.chain_exponent(run, trace.series.size) > np.log(LIMIT)
-    # The rate of the chain at constant c1 = c2, by Newton's method near a multiple of 10 Hz.
-    loop, c = paper_loop(), 1.02
-    expected = np.log(c / (1.0 + 0.5 / 5000.0)) / 20.0
-    root = extended_root(loop, c, c, complex(expected, 2.0 * np.pi * 80.0))
-    assert root.real == pytest.approx(expected, rel=1e-3)
 
 
 def test_the_sensitivity_changes_near_unity_gain():

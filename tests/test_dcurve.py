@@ -12,7 +12,6 @@ from armlock import (
     d_curve_line,
     paper_loop,
     semi_discretization,
-    unstable_roots,
 )
 from tests import independent
 from tests.systems import NEUTRAL, RETARDED
@@ -23,18 +22,6 @@ CURVED = {
     for name, system in {**RETARDED, **NEUTRAL, "map": MAP}.items()
     if system.b1.any() and system.b2.any()
 }
-
-
-def test_hayes_curve_is_omega_cotangent():
-    omega = np.linspace(0.1, 40.0, 57)
-    tau = 0.7
-    a, b = d_curve(HayesEquation(tau), omega)
-    np.testing.assert_allclose(a, omega / np.tan(omega * tau), rtol=1e-11, atol=1e-12)
-    np.testing.assert_allclose(b, -omega / np.sin(omega * tau), rtol=1e-11)
-
-
-def test_common_arm_line_is_c1_plus_c2_equal_two():
-    assert d_curve_line(CommonArm(1000.0)) == pytest.approx((1.0, 1.0, 2.0), rel=1e-15)
 
 
 @pytest.mark.parametrize("name", CURVED)
@@ -57,23 +44,6 @@ def test_the_line_has_a_root_at_zero(name):
     y = value * wy / (wx * wx + wy * wy) - wx
     assert abs(independent.value(system, 0.0, x, y)) < 1e-12
     assert max(abs(wx), abs(wy)) == 1.0
-
-
-def test_crossing_the_curve_moves_a_pair_and_crossing_the_line_a_single_root():
-    system = HayesEquation()
-    a, b = d_curve(system, np.array([1.0, 2.0, 4.0, 8.0]))
-    before, after = (unstable_roots(system, a, b + shift) for shift in (-1e-4, 1e-4))
-    np.testing.assert_array_equal(np.abs(before - after), 2)
-    left, right = unstable_roots(system, np.array([-1.0, -1.0]), np.array([0.999, 1.001]))
-    assert abs(left - right) == 1
-
-
-def test_a_map_has_its_curve_on_the_unit_circle():
-    omega = np.linspace(0.3, 11.0, 23)
-    x, y = d_curve(MAP, omega)
-    for w, p, q in zip(omega, x, y, strict=True):
-        z = independent.map_eigenvalues(MAP, p, q)
-        assert abs(z - np.exp(1j * w * 0.25)).min() < 1e-7
 
 
 @pytest.mark.parametrize("factor", [1e-6, 1e6])

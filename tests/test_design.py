@@ -1,8 +1,10 @@
-"""The two loops that were found: certified, and again from their numbers on plain grids."""
+"""The two loops that were found: certified, and again from their numbers on plain grids.
+
+The chapter on design holds the search to what it should find.
+"""
 
 from __future__ import annotations
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
@@ -18,24 +20,22 @@ from armlock import (
     critical_perturbation,
     design,
     margins,
-    modulus_margin,
     paper_loop,
     robust_loop,
 )
 from armlock.design import (
-    FLIGHT_DELAY,
     box_counts,
     edge_crossings,
     roll_off,
 )
 from armlock.paper import PERTURBATION
+from tests import attack_judge as judge
+from tests.systems import sketch_of
 
 TURN = 2.0 * np.pi
 CORNER = TURN * 0.4
 DIFFERENCE = 0.2
 DELAYS = (20.1, 19.9)
-# The loops depend almost on c1 - c2 alone.
-BOX = [(0, 0), (1, -1), (-1, 1)]
 LOOPS = {"robust": robust_loop, "buildable": buildable_loop}
 
 
@@ -120,23 +120,21 @@ def test_phases_that_let_a_root_cross_are_not_called_stable():
     assert edge_crossings(slower, PERTURBATION, TURN * 2.0) == UNCONFINED
 
 
-def test_the_robust_loop_withstands_nearly_three_times_the_papers_perturbation():
-    robust = robust_loop()
-    limit = critical_perturbation(robust, (1.0, -1.0))
-    assert limit > 2.9 * critical_perturbation(paper_loop(), (1.0, -1.0))
-    # The smallest eps at which 1 + L along (1, -1) vanishes, on a plain grid.
+def test_the_critical_perturbation_of_the_robust_loop_on_a_plain_grid():
+    """The smallest eps at which 1 + L along (1, -1) vanishes."""
     frequency = np.geomspace(1e-9, 1e-3, 400_001)
     plain = response(frequency)
     slope = (response(frequency, 1.0 + 1e-3, 1.0 - 1e-3) - plain) / 1e-3
     eps = -(1.0 + plain) / slope
     at = eps.real[np.flatnonzero(np.diff(np.sign(eps.imag)))]
+    limit = critical_perturbation(robust_loop(), (1.0, -1.0))
     assert at[at > 0.0].min() == pytest.approx(limit, rel=1e-4)
 
 
-def test_a_roll_off_hardly_changes_the_critical_perturbation():
-    loop = buildable_loop()
-    quick = critical_perturbation(loop, (1.0, -1.0), TURN * 2.0)
-    assert quick == pytest.approx(critical_perturbation(loop, (1.0, -1.0)), rel=1e-12)
+def test_free_phases_above_do_not_change_the_critical_perturbation():
+    found = critical_perturbation(buildable_loop(), (1.0, -1.0), TURN * 2.0)
+    # Without free phases it is the same, and takes seconds.
+    assert found == pytest.approx(4.400363639535378e-06, rel=1e-12)
 
 
 def test_the_robust_loop_keeps_the_papers_suppression():
@@ -145,40 +143,17 @@ def test_the_robust_loop_keeps_the_papers_suppression():
     assert change.min() > -0.05
 
 
-@pytest.mark.parametrize(
-    ("point", "expected"), [((0, 0), 0.704243), ((1, -1), 0.481682), ((-1, 1), 0.945637)]
-)
-def test_modulus_margins_of_the_robust_loop(point, expected):
-    c = tuple(1.0 + PERTURBATION * d for d in point)
-    certified = modulus_margin(robust_loop(), *c)
-    assert certified == pytest.approx(expected, abs=2e-6)
-    # At (-1, 1) it is taken at high frequency, elsewhere where the gain is low.
-    low = np.abs(1.0 + response(np.geomspace(1e-9, 5e-3, 400_001), *c)).min()
-    assert low > certified * (1.0 - 1e-6)
-    if point != (-1, 1):
-        assert low == pytest.approx(certified, rel=1e-6)
-
-
-def test_the_buildable_loop_has_its_margins_uniformly_and_exactly():
-    loop = buildable_loop()
-    for d in BOX[:2]:
-        c = tuple(1.0 + PERTURBATION * x for x in d)
-        phase = np.degrees(margins(loop, c[0], c[1], free_above=TURN * 2.0).phase)
-        assert phase > (25.0 if any(d) else 30.0)
-    # Above 2 Hz, on a plain grid: the disc's share of the unit circle.
-    frequency = np.geomspace(2.0, 1e6, 400_001)
-    first, second = arms(frequency, rolls_off=True)
-    centre, radius = first + second, np.abs(first) + np.abs(second)
-    size = np.abs(centre)
-    crosses = np.abs(size - 1.0) <= radius
-    half = np.arccos((1.0 + size**2 - radius**2)[crosses] / (2.0 * size[crosses]))
-    away = np.pi - np.abs(np.angle(centre[crosses])) - half
-    assert np.degrees(away.min()) > 30.0
-    # Below, |L| is one near the lower end.
-    low = np.geomspace(1e-9, 5e-3, 400_001)
-    loop_gain = response(low, rolls_off=True)
-    at = np.flatnonzero(np.diff(np.sign(np.abs(loop_gain) - 1.0)))
-    assert (180.0 - np.abs(np.degrees(np.angle(loop_gain[at]))) > 25.0).all()
+@pytest.mark.parametrize("way", [(0, 0), (1, -1), (-1, 1)])
+def test_margins_over_the_box_are_those_of_branch_and_bound(way):
+    """The loops depend almost on c1 - c2 alone."""
+    c1, c2 = 1.0 + PERTURBATION * np.array(way)
+    for make, above in ((robust_loop, np.inf), (buildable_loop, TURN * 2.0)):
+        with np.errstate(all="ignore"):
+            verdict = judge.margins(sketch_of(make()), c1, c2, free_above=above)
+        found = margins(make(), c1, c2, None if above == np.inf else above)
+        for name in judge.NAMES[:4]:
+            expected = getattr(verdict, name)
+            assert getattr(found, name) == pytest.approx(expected, rel=1e-5), name
 
 
 def test_the_buildable_loop_has_its_gain_and_rolls_off():
@@ -188,34 +163,6 @@ def test_the_buildable_loop_has_its_gain_and_rolls_off():
     # The largest |L| that any phases of the arms give, from 15 kHz on.
     first, second = arms(np.geomspace(15e3, 1e6, 2001), rolls_off=True)
     assert (np.abs(first + second) + np.abs(first) + np.abs(second) < 1.0).all()
-
-
-BOUNDS = {"suppression": -0.05, "modulus": 0.70, "modulus in the box": 0.45}
-
-
-def goal():
-    frequency = np.geomspace(1e-4, 1.0, 60)
-    return frequency, np.abs(table_two_gain(frequency))
-
-
-def plain_start():
-    """The factors of the robust controller at round places."""
-    u = -TURN * 1e-6
-    poles = (0.5 * u, 0.2 * u, *[100.0 * u] * 4)
-    return paper_loop(controller=Controller((0.0, 0.0, u, *[10.0 * u] * 3), poles, 5000.0))
-
-
-def test_a_search_from_round_numbers_finds_as_much_again():
-    found = design(plain_start(), "critical perturbation", BOUNDS, goal=goal(), generations=50)
-    assert found.measures["critical perturbation"] > 2.9 * 1.4643205e-6
-    assert not found.counts.any()
-    assert found.crossings == 0
-    assert modulus_margin(found.loop) == pytest.approx(found.measures["modulus"], rel=1e-9)
-    assert found.measures["modulus"] >= 0.70
-    s = 1e-3j
-    assert complex(found.transfer_function(s)) == pytest.approx(
-        complex(found.controller(s)), rel=1e-9
-    )
 
 
 def test_a_roll_off_has_its_slope_and_the_phase_that_goes_with_it():
@@ -239,36 +186,9 @@ def test_a_roll_off_that_is_none_is_refused(arguments, message):
         roll_off(*arguments)
 
 
-@pytest.mark.skipif("ARMLOCK_SEARCH" not in os.environ, reason="ARMLOCK_SEARCH=1: minutes")
-def test_both_loops_are_found_from_scratch():
-    """As the flag of the chapter does: first without, then with a roll-off and a dead time."""
-    robust = design(plain_start(), "critical perturbation", BOUNDS, goal=goal(), generations=50)
-    assert robust.measures["critical perturbation"] > 2.9 * 1.4643205e-6
-    controller = robust.controller * roll_off(6e-3, 5e4, 7)
-    band = np.geomspace(1e-4, 1e-2, 40)
-    wanted = np.append(band, 1.0), np.append(0.5 * np.abs(table_two_gain(band)), 150.0)
-    found = design(
-        paper_loop(controller=controller, delay=FLIGHT_DELAY),
-        "suppression",
-        {
-            "phase": np.radians(30.0),
-            "phase in the box": np.radians(25.0),
-            "unity gain": 15e3,
-            "modulus": 0.3,
-            "critical perturbation": 4.2e-6,
-        },
-        goal=wanted,
-        free_above=TURN * 2.0,
-        generations=0,
-    )
-    assert found.measures["suppression"] > 0.0
-    assert not found.counts.any()
-    assert found.crossings == 0
-
-
 def test_the_executor_does_not_change_what_is_found():
     search = partial(
-        design, robust_loop(), "critical perturbation", {"modulus": 0.6}, generations=2, seed=3
+        design, robust_loop(), "critical perturbation", {"modulus": 0.6}, generations=1, seed=3
     )
     alone = search()
     with ThreadPoolExecutor(2) as executor:

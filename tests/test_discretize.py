@@ -111,19 +111,6 @@ def test_filters_that_have_no_samples_are_refused():
         sampled_filter(Controller((-1.0, -2.0), (-3.0,), 1.0), RATE)
 
 
-def test_states_run_as_the_response_says():
-    """The impulse response of the compiled sections, transformed."""
-    controller = Controller((-1 + 2j, -1 - 2j, -3), (-1.1, -2 + 4j, -2 - 4j, -9.0), 3.0)
-    sampled = sampled_filter(controller, 10.0)
-    state = np.zeros(2 * len(sampled.sections))
-    impulse = np.append(1.0, np.zeros(1023))
-    series = [sampled.gain * through(sampled.sections, state, value) for value in impulse]
-    omega = 2.0 * np.pi * np.fft.rfftfreq(impulse.size, 0.1)
-    assert np.fft.rfft(series) == pytest.approx(
-        filter_response(sampled, omega, 10.0), abs=1e-12
-    )
-
-
 @pytest.mark.parametrize(
     ("zeros", "poles"),
     [

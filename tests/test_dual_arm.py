@@ -12,7 +12,6 @@ from armlock import (
     d_curve_line,
     unstable_roots,
 )
-from armlock.paper import DUAL_SENSOR_CORNER
 from armlock.rays import first_crossing, ray_crossings
 from armlock.sensors import COMMON
 from book.companion.claims import dual_arm
@@ -27,17 +26,6 @@ def test_straight_edge_is_where_both_perturbations_are_equal(gain, options):
     np.testing.assert_array_equal(unstable_roots(loop, c, c), BOUNDARY)
     np.testing.assert_array_equal(unstable_roots(loop, c, c + 1e-9), 0)
     np.testing.assert_array_equal(unstable_roots(loop, c, c - 1e-9), 1)
-
-
-@pytest.mark.parametrize("gain", [0.5, 10.0, 300.0])
-@pytest.mark.parametrize("difference", [None, 0.1])
-def test_corner_solves_its_closed_form_condition(gain, difference):
-    found = dual_arm.edges(gain, difference=difference)
-    omega, c = found.corner_omega, 1.0 + found.corner
-    theta, share = 0.1 * omega, 0.2 / (difference or 0.2)
-    p = DUAL_SENSOR_CORNER
-    response = 2.0 * np.cos(theta) - share * p / (p + 1j * omega) * np.sin(theta) / theta
-    assert abs(2.0 + 1j * omega / gain - c * np.exp(-20j * omega) * response) < 1e-9
 
 
 @pytest.mark.parametrize("gain", [1.0, 10.0, 300.0])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import cmath
 import itertools
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +23,7 @@ from armlock import (
 )
 from tests.attack import between, draw_arm, draw_delays, draw_paper, draw_point, roots, to_loop
 from tests.attack_judge import Sketch, View
+from tests.systems import sketch_of
 from tests.test_browser import needs_chromium
 from tools import check_browser
 
@@ -47,43 +48,17 @@ def page(chromium):
     return page
 
 
-def pairs(roots):
-    return [[complex(root).real, complex(root).imag] for root in roots]
-
-
-def of_sketch(sketch):
+def described(sketch):
     """The description of a loop that `loop.js` takes."""
-    return {
-        "sensor": sketch.sensor,
-        "tau1": sketch.tau1,
-        "tau2": sketch.tau2,
-        "delay": sketch.delay,
-        "zeros": pairs(sketch.zeros),
-        "poles": pairs(sketch.poles),
-        "gain": sketch.gain,
-        "corner": sketch.corner,
-        "difference": sketch.difference,
-    }
+    found = asdict(sketch)
+    for name in ("zeros", "poles"):
+        found[name] = [[complex(root).real, complex(root).imag] for root in found[name]]
+    return found
 
 
-def of_loop(loop, corner=0.0, difference=0.0):
-    """The same of a loop of the package."""
-    return {
-        "sensor": loop.mapping.name,
-        "tau1": loop.tau1,
-        "tau2": loop.tau2,
-        "delay": loop.delay,
-        "zeros": pairs(loop.controller.zeros),
-        "poles": pairs(loop.controller.poles),
-        "gain": loop.controller.gain,
-        "corner": corner,
-        "difference": difference,
-    }
-
-
-PAPER = of_loop(paper_loop(), 2.0 * np.pi * 0.4, 20.1 - 19.9)
-COMMON = of_loop(CommonArm())
-DUAL = of_loop(DualArm(), 2.0 * np.pi * 0.4, 20.1 - 19.9)
+PAPER, COMMON, DUAL = (
+    described(sketch_of(loop)) for loop in (paper_loop(), CommonArm(), DualArm())
+)
 
 
 def draw_any(rng):
@@ -129,7 +104,7 @@ def test_no_count_of_5000_differs_off_the_boundary(page):
                 counts.append(int(unstable_roots(to_loop(sketch), *point)))
             except CountError:
                 continue
-            cases.append([of_sketch(sketch), *map(float, point)])
+            cases.append([described(sketch), *map(float, point)])
     found = []
     for first in range(0, len(cases), 500):
         found += page.evaluate(

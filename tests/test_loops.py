@@ -15,11 +15,6 @@ from armlock.sensors import COMMON, DIFFERENCE, SINGLE, SignalMapping, dual
 S = np.array([0.01j, 0.3 + 0.2j, -0.1 + 2j, 1.5])
 
 
-def test_hayes_equation_is_written_out():
-    expected = S - 0.7 + 1.3 * np.exp(-S * 2.0)
-    np.testing.assert_allclose(HayesEquation(2.0)(S, 0.7, -1.3), expected, rtol=1e-14)
-
-
 def test_single_arm_is_the_hayes_equation_of_the_paper():
     # a = -k1 and b = k1 k2, with k1 the gain and k2 the perturbation.
     k1, k2, tau = 0.8, 0.95, 3.0

@@ -13,12 +13,6 @@ def test_along_the_diagonal_the_line_of_zero_frequency_is_met():
     )
 
 
-def test_rays_are_unit_vectors_all_the_way_around():
-    directions = boundary.rays(40)
-    np.testing.assert_allclose(np.hypot(*directions), 1.0, rtol=1e-14)
-    np.testing.assert_allclose(directions.sum(axis=1), 0.0, atol=1e-13)
-
-
 def test_area_and_perimeter_of_a_circle():
     angle = np.linspace(0.0, 2.0 * np.pi, 721)[:-1]
     closed = boundary.outline(np.full(720, 3.0), np.stack((np.cos(angle), np.sin(angle))))

@@ -87,16 +87,6 @@ def test_counts_of_the_map_are_eigenvalues_outside_the_unit_circle(system, order
             assert count == independent.map_count(sampled, p, q)
 
 
-def test_the_exact_line_of_zero_frequency_survives_sampling():
-    # A constant is a solution of the map exactly where it is one of the equation.
-    for order in (0, 1):
-        sampled = semi_discretization(CommonArm(), 0.1, order)
-        np.testing.assert_array_equal(
-            unstable_roots(sampled, [1.0, 0.7, 1.0, 1.0], [1.0, 1.3, 1.0 - 1e-6, 1.0 + 1e-6]),
-            [-1, -1, 0, 1],
-        )
-
-
 def test_delays_off_the_grid_by_rounding_alone_are_accepted():
     # The quotient 19.9 / 0.05 lies below 398 in floating point.
     assert transition_matrix(CommonArm(), 1.0, 1.0, 0.05).shape == (403, 403)

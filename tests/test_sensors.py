@@ -10,34 +10,29 @@ S = 1j * OMEGA
 TAU1, TAU2 = 20.1, 19.9
 
 
-def test_single_sensor_is_a_sine_of_the_one_way_delay():
+MEAN, HALF = (TAU1 + TAU2) / 2.0, (TAU1 - TAU2) / 2.0
+COMMON = 2.0 * (1.0 - np.cos(HALF * OMEGA) * np.exp(-1j * OMEGA * MEAN))
+# Positive exponential of the longer arm.
+DIFFERENCE = np.exp(-S * TAU1) - np.exp(-S * TAU2)
+CASES = {
     # 2 j sin(tau w) exp(-j w tau) with the one-way delay tau, half the round trip.
-    one_way = TAU1 / 2.0
-    expected = 2j * np.sin(one_way * OMEGA) * np.exp(-1j * OMEGA * one_way)
-    np.testing.assert_allclose(sensors.SINGLE.response(S, TAU1, TAU2), expected, rtol=1e-12)
+    "single": (
+        sensors.SINGLE,
+        2j * np.sin(0.5 * TAU1 * OMEGA) * np.exp(-0.5j * OMEGA * TAU1),
+    ),
+    "common": (sensors.COMMON, COMMON),
+    "difference": (sensors.DIFFERENCE, DIFFERENCE),
+    "dual": (
+        sensors.dual(2.5, TAU1 - TAU2),
+        COMMON - 2.5 / ((S + 2.5) * S * (TAU1 - TAU2)) * DIFFERENCE,
+    ),
+}
 
 
-def test_common_sensor_holds_mean_and_difference_of_the_delays():
-    mean, half = (TAU1 + TAU2) / 2.0, (TAU1 - TAU2) / 2.0
-    expected = 2.0 * (1.0 - np.cos(half * OMEGA) * np.exp(-1j * OMEGA * mean))
-    np.testing.assert_allclose(sensors.COMMON.response(S, TAU1, TAU2), expected, rtol=1e-12)
-
-
-def test_difference_sensor_is_positive_exponential_of_the_longer_arm():
-    expected = np.exp(-S * TAU1) - np.exp(-S * TAU2)
-    np.testing.assert_allclose(
-        sensors.DIFFERENCE.response(S, TAU1, TAU2), expected, rtol=1e-10, atol=1e-14
-    )
-
-
-def test_dual_sensor_is_common_plus_integrated_difference():
-    p, dtau = 2.5, TAU1 - TAU2
-    common = sensors.COMMON.response(S, TAU1, TAU2)
-    difference = sensors.DIFFERENCE.response(S, TAU1, TAU2)
-    expected = common - p / ((S + p) * S * dtau) * difference
-    np.testing.assert_allclose(
-        sensors.dual(p, dtau).response(S, TAU1, TAU2), expected, rtol=1e-10
-    )
+@pytest.mark.parametrize("name", CASES)
+def test_responses_are_those_of_table_one(name):
+    sensor, expected = CASES[name]
+    np.testing.assert_allclose(sensor.response(S, TAU1, TAU2), expected, rtol=1e-10, atol=1e-14)
 
 
 def test_exchanging_the_arms_of_the_dual_sensor_changes_the_sign_of_the_difference():
