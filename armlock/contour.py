@@ -371,29 +371,6 @@ def _polish(
 
 
 @njit(cache=True)
-def _cubic_zero(step: float, h0: float, dh0: float, h1: float, dh1: float) -> float:
-    """Zero, as an offset in (0, step), of the cubic through values and slopes at both ends."""
-    t = h0 / (h0 - h1)
-    for _ in range(2):
-        u = 1.0 - t
-        h = (
-            (1.0 + 2.0 * t) * u * u * h0
-            + t * u * u * step * dh0
-            + t * t * (3.0 - 2.0 * t) * h1
-            - t * t * u * step * dh1
-        )
-        dh = (
-            6.0 * t * u * (h1 - h0)
-            + u * (1.0 - 3.0 * t) * step * dh0
-            + t * (3.0 * t - 2.0) * step * dh1
-        )
-        if dh == 0.0:
-            break
-        t -= h / dh
-    return t * step if 0.0 < t < 1.0 else 0.5 * step
-
-
-@njit(cache=True)
 def _safe_step(h: float, dh: float, curvature: float, error: float) -> float:
     """Step over which a real function has one zero at most.
 
@@ -514,7 +491,7 @@ def imaginary_zeros(
                     certified = max(certified, unresolved, stretch, 1e-14 * omega_end)
                 step = min(step, certified)
             following = end if step >= end - omega else omega + step
-            old_h, old_dh = h, dh
+            old_h = h
             value, slope = evaluate(start, reach, local, phases, following)
             h, dh = value.imag, slope.imag
             if abs(h) > real_horner(error, (following - start) / reach):
@@ -532,9 +509,7 @@ def imaginary_zeros(
                     elif now != sign:
                         jump = 2 * now
                         if not doubtful:
-                            middle = omega + _cubic_zero(
-                                following - omega, old_h, old_dh, h, dh
-                            )
+                            middle = omega + (following - omega) * old_h / (old_h - h)
                         middle, rate = _polish(
                             start, reach, local, phases, bound, (last_clear, following), middle,
                             sign,

@@ -16,11 +16,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import numpy.typing as npt
-from numpy.polynomial import polynomial as poly
 from scipy.optimize import differential_evolution, minimize
 
 from armlock import paper
-from armlock.bounds import last_frequency, last_larger
+from armlock.bounds import last_frequency
 from armlock.checks import (
     ComplexArray,
     FloatArray,
@@ -34,7 +33,14 @@ from armlock.checks import (
 from armlock.contour import winding
 from armlock.controllers import Controller
 from armlock.loops import Loop, checked_loop, paper_loop
-from armlock.margins import Margins, clear_above, count_at, critical_perturbation, margins
+from armlock.margins import (
+    Margins,
+    clear_above,
+    count_at,
+    critical_perturbation,
+    last_crossover,
+    margins,
+)
 from armlock.rays import Ray
 from armlock.stability import BOUNDARY, UNCONFINED
 from armlock.sweep import sweep
@@ -777,9 +783,7 @@ def _certified(
     if name == "critical perturbation":
         return critical_perturbation(loop, _DIRECTION, free_above)
     if name == "unity gain":
-        both = np.asarray(poly.polyadd(loop.b1, loop.b2), dtype=np.float64)
-        end = last_larger(loop.rest, (both, loop.b1, loop.b2), np.ones(3))
-        return end / (2.0 * math.pi)
+        return last_crossover(loop, np.ones(2)) / (2.0 * math.pi)
     plain = name.removesuffix(" in the box")
     if plain not in _MARGINS:
         return sampled

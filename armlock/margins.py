@@ -170,6 +170,15 @@ def _clear_from(loop: Loop, arms: FloatArray, centre: float, radius: float) -> f
     return last_larger(first, others, np.array(factors))
 
 
+def last_crossover(loop: Loop, arms: FloatArray, gain: float = 1.0) -> float:
+    """Frequency past which `gain` times |L| is below one at all phases; inf if there is none.
+
+    `arms` are |c1| and |c2|, or what they count for.
+    """
+    c = _plus(loop.b1, loop.b2)
+    return last_larger(loop.rest, (c, loop.b1, loop.b2), gain * np.array([1.0, *arms]))
+
+
 @lru_cache(maxsize=64)
 def _factors(loop: Loop) -> tuple[ComplexArray, IntArray, FloatArray]:
     """Return the responses to the two arms as `armlock.infimum` takes them.
@@ -489,8 +498,7 @@ def _phase_and_delay(
     looked for only where free phases would allow smaller ones.
     """
     phase, delay, where = np.inf, np.inf, np.nan
-    c, arms = _plus(loop.b1, loop.b2), _arm_weights(loop, c1, c2)
-    end = last_larger(loop.rest, (c, loop.b1, loop.b2), np.array([1.0, *arms]))
+    end = last_crossover(loop, _arm_weights(loop, c1, c2))
     centre, radius = _limit_disc(loop, c1, c2)
     if abs(centre) + radius >= 1.0 and not np.isfinite(highest):
         phase, delay, where = float(_limit(loop, c1, c2)[infimum.PHASE]), 0.0, np.inf
@@ -597,7 +605,7 @@ def _no_crossing_from(loop: Loop, c1: float, c2: float, low: float, high: float)
     end of the interval, it is smallest there; if it descends at the upper end, there.
     """
     c, arms = _plus(loop.b1, loop.b2), _arm_weights(loop, c1, c2)
-    found = [last_larger(loop.rest, (c, loop.b1, loop.b2), np.array([high, *(high * arms)]))]
+    found = [last_crossover(loop, arms, high)]
     if not loop.delay:
         for t, sign in ((1.0 / high, 1.0), (1.0 / low, -1.0)):
             ascends = math.sqrt(last_root_bound(_ascent(loop.rest, c, t, sign)))
@@ -769,15 +777,14 @@ def _free_margins(
     A coarse sample gives values that occur. The certified walk then steps over what cannot hold
     smaller ones.
     """
-    c = _plus(loop.b1, loop.b2)
-    arms = np.array([abs(c1), abs(c2)])
+    arms = np.abs([c1, c2])
     limit = _limit(loop, c1, c2)
     centre, radius = _limit_disc(loop, c1, c2)
     if abs(centre) + radius >= 1.0:
         # L does not roll off: any delay more destabilises it at high frequency.
         limit[infimum.DELAY] = 0.0
     # Past it nothing has a phase.
-    end = last_larger(loop.rest, (c, loop.b1, loop.b2), np.array([1.0, *arms]))
+    end = last_crossover(loop, arms)
     if not np.isfinite(end):
         end = _settled_from(loop, c1, c2, float(limit[infimum.PHASE]))
     end = max(end, 2.0 * lowest)
