@@ -412,9 +412,10 @@ def count_at(loop: Loop, c1: float, c2: float, free_above: float) -> int:
 def _count_below(loop: Loop, c1: float, c2: float, omega: float) -> int | None:
     """Count the unstable roots of a loop that no phases of the arms let cross past omega.
 
-    Past it D(s; c1, c2) over its value at much smaller parameters stays in the right half-plane
-    and comes to one at last. So the counts of the two differ by what their arguments gather up
-    to there. None where rounding hides these.
+    Past it, and far out right of the axis, D(s; c1, c2) over its value at much smaller
+    parameters stays in the right half-plane: what its argument gathers there only takes back
+    what it is at omega. So the two counts differ by what the arguments gather up to omega, less
+    that. None where rounding hides these.
     """
     # Not zero: sensors with an integrator have a root at s = 0 there.
     low1, low2 = 1e-3 * c1, 1e-3 * c2
@@ -724,7 +725,7 @@ def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float
         If `loop` is no `Loop`, or c1 or c2 is not finite and real, or the loop is not stable
         there.
     CountError
-        If gain times delay is too large to follow.
+        If gain times delay is too large to follow, or rounding hides what decides.
 
     Notes
     -----
@@ -850,7 +851,7 @@ def margins(
         If `loop` is no `Loop`, c1 or c2 is not finite and real, `free_above` is not positive,
         or the loop is not stable there.
     CountError
-        If gain times delay is too large to follow.
+        If gain times delay is too large to follow, or rounding hides what decides.
 
     Notes
     -----
