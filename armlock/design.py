@@ -238,8 +238,9 @@ def box_counts(loop: Loop, size: float, free_above: float | None = None) -> IntA
     -----
     From the centre of a box of half its width r to any of its points, D changes by no more than
     r (\|B1\| + \|B2\|). Where a certified walk along the imaginary axis finds \|D\| larger than
-    this, no root crosses the axis within the box, and the count at its centre is that of
-    all of it. Otherwise it is cut in four, six times at most.
+    this, no root crosses the axis within the box, and all its points have one count. Otherwise
+    it is cut in four, six times at most. The smaller boxes meet, so that the count at (1, 1) is
+    that of all.
 
     Examples
     --------
@@ -255,17 +256,17 @@ def box_counts(loop: Loop, size: float, free_above: float | None = None) -> IntA
     highest = _checked_end(loop, size, free_above)
     if not highest:
         return np.array([BOUNDARY])
-    left, centres = [(1.0, 1.0, size)], []
+    left, clear = [(1.0, 1.0, size)], 0
     while left:
         c1, c2, half = left.pop()
         if _stays_clear(loop, c1, c2, half, highest):
-            centres.append((c1, c2))
+            clear += 1
         elif half < 1.5 * size * 0.5**_CUTS:
             return np.array([BOUNDARY])
         else:
             half *= 0.5
             left += [(c1 + half * d1, c2 + half * d2, half) for d1, d2 in _CORNERS]
-    return np.array([count_at(loop, c1, c2, highest) for c1, c2 in centres])
+    return np.full(clear, count_at(loop, 1.0, 1.0, highest))
 
 
 def edge_crossings(loop: Loop, size: float, free_above: float | None = None) -> int:

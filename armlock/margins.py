@@ -140,6 +140,9 @@ def _limit(loop: Loop, c1: float, c2: float) -> FloatArray:
     found: FloatArray = infimum.free_margins_at(complex(centre), radius, np.inf)
     if not found[infimum.MODULUS] > 0.0:
         raise _unconfined(c1, c2)
+    if abs(centre) + radius >= 1.0:
+        # L does not roll off: any delay more destabilises it at high frequency.
+        found[infimum.DELAY] = 0.0
     return found
 
 
@@ -475,14 +478,15 @@ def _crossovers(
     squares = above.times_conjugate(above).plus(below.times_conjugate(below).scaled(-1.0))
     omega, hidden = _zeros(squares.turned(), intervals)
     far = np.abs(_level(loop, c1, c2, omega)) > TOLERANCE
-    omega[far] = _on_unit_circle(loop, c1, c2, omega[far])
-    lost = np.abs(_level(loop, c1, c2, omega)) > TOLERANCE
-    if lost.any():
+    moved = _on_unit_circle(loop, c1, c2, omega[far])
+    lost = moved[np.abs(_level(loop, c1, c2, moved)) > TOLERANCE]
+    if lost.size:
         raise CountError(
             f"no margin at (c1, c2) = ({c1}, {c2}): rounding hides where |L| comes to one "
-            f"around {omega[lost][0]} rad/s",
+            f"around {lost[0]} rad/s",
             np.array([[c1, c2]]),
         )
+    omega[far] = moved
     return omega, hidden
 
 
@@ -500,11 +504,12 @@ def _phase_and_delay(
     """
     phase, delay, where = np.inf, np.inf, np.nan
     end = last_crossover(loop, _arm_weights(loop, c1, c2))
-    centre, radius = _limit_disc(loop, c1, c2)
-    if abs(centre) + radius >= 1.0 and not np.isfinite(highest):
-        phase, delay, where = float(_limit(loop, c1, c2)[infimum.PHASE]), 0.0, np.inf
-    if not np.isfinite(end) and not np.isfinite(highest):
-        end = _settled_from(loop, c1, c2, phase)
+    if not np.isfinite(highest):
+        limit = _limit(loop, c1, c2)
+        phase, delay = float(limit[infimum.PHASE]), float(limit[infimum.DELAY])
+        where = np.inf if delay == 0.0 else np.nan
+        if not np.isfinite(end):
+            end = _settled_from(loop, c1, c2, phase)
     end, turn = min(end, highest), 2.0 * np.pi / loop.longest_delay
     first = min(end, 1e3 * turn)
     intervals = np.array([[0.0, first]])
@@ -749,6 +754,11 @@ def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float
     checked_loop(loop)
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
     _require_stable(loop, c1, c2)
+    return _gain_interval(loop, c1, c2)
+
+
+def _gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float]:
+    """Do what `gain_interval` does for a loop that is known to be stable."""
     floor, limit = _chain_gains(loop, c1, c2)
     # Just inside the limits of the chain, roots cross at ever higher frequency.
     least = max(floor * (1.0 + _NEXT_TO_THE_CHAIN), 1.0 / LARGEST_GAIN)
@@ -780,10 +790,6 @@ def _free_margins(
     """
     arms = np.abs([c1, c2])
     limit = _limit(loop, c1, c2)
-    centre, radius = _limit_disc(loop, c1, c2)
-    if abs(centre) + radius >= 1.0:
-        # L does not roll off: any delay more destabilises it at high frequency.
-        limit[infimum.DELAY] = 0.0
     # Past it nothing has a phase.
     end = last_crossover(loop, arms)
     if not np.isfinite(end):
@@ -888,7 +894,7 @@ def margins(
     (modulus, ratio), (modulus_omega, _) = _smallest(loop, c1, c2, disk=True, highest=highest)
     phase, delay, phase_omega = _phase_and_delay(loop, c1, c2, highest)
     if free_above is None:
-        lower, upper, gain_omega = gain_interval(loop, c1, c2)
+        lower, upper, gain_omega = _gain_interval(loop, c1, c2)
     else:
         lower, upper, gain_omega = np.nan, np.nan, np.nan
         known = np.array([modulus, ratio, phase, delay])

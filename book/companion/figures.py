@@ -123,17 +123,11 @@ def glue(**values: object) -> None:
         Of a sequence, a mapping or a named tuple called `edge` the parts are called `edge_0`,
         or `edge_` and the key.
     """
-    from IPython.core.formatters import format_display_data
-    from IPython.display import display
+    from myst_nb import glue as glue_one
 
-    # What myst_nb.glue does, without Sphinx, which takes each notebook seconds to import.
-    prefix = "application/papermill.record/"
     for name, value in values.items():
         for part, number in _numbers(name, value):
-            shown, about = format_display_data(number)
-            about["scrapbook"] = {"name": part, "mime_prefix": prefix}
-            record = {prefix + kind: content for kind, content in shown.items()}
-            display(record, raw=True, metadata=about)
+            glue_one(part, number, display=False)
 
 
 @dataclass(frozen=True, repr=False)

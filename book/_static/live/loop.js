@@ -580,8 +580,8 @@ function armlockLoop() {
   }
 
   /* The critical perturbation along a ray from (1, 1), from sampled frequencies, then counted for
-   * certain on both sides: nan where that fails, infinity where there is none up to |c - 1| = 2. Where
-   * the chain is lost first, its limit. */
+   * certain on both sides: nan where that fails, infinity where there is none up to |c - 1| = 2.
+   * Where the chain is lost first, its limit. */
   function firstBreak(loop, d1, d2) {
     const inside = t => count(loop, 1 + t * d1, 1 + t * d2);
     const begun = count(loop, 1, 1);
