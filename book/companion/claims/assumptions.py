@@ -1,4 +1,4 @@
-"""What the paper leaves open, the value taken, and how much of the results hangs on it."""
+"""What the paper leaves open, the value taken, and how much of the results depends on it."""
 
 from __future__ import annotations
 
@@ -141,9 +141,9 @@ def _corner() -> Assumption:
         f"{DUAL_SENSOR_CORNER:.4g} rad/s ({DUAL_SENSOR_CORNER / (2 * np.pi):.2g} Hz)",
         "The paper gives none. It is the default of the public code quickTDI (module TJ_lock), "
         "with arms of this length. Verdicts name the range of p for which they stand.",
-        f"The critical perturbation along (1, -1) is {here:.4g}, and with a tenth of p "
-        f"{tenth:.4g}. But from $p = {limit:.3g}$ rad/s on the loop is unstable without any "
-        f"perturbation, and with half of Δτ from {half:.3g} rad/s on.",
+        f"The critical perturbation along $(1, -1)$ is {here:.4g}, and with a tenth of p "
+        f"it is {tenth:.4g}. But from $p = {limit:.3g}$ rad/s on the loop is unstable without "
+        f"any perturbation, and with half of Δτ from {half:.3g} rad/s on.",
     )
 
 
@@ -154,8 +154,9 @@ def _difference() -> Assumption:
         "Δτ in the dual sensor",
         f"$τ₁ - τ₂ = {DIFFERENCES['full']:.2g}$ s in the loop",
         "Sec. III.B defines it so. Table I is right only with half of it (claims T2 and T3).",
-        f"The critical perturbation along (1, -1) is {full:.4g} with the whole difference and "
-        f"{half:.4g} with half of it, which is inside the $±{PERTURBATION:g}$ of the paper.",
+        f"The critical perturbation along $(1, -1)$ is {full:.4g} with the whole difference "
+        f"and {half:.4g} with half of it, which is inside the $±{PERTURBATION:g}$ of the "
+        "paper.",
     )
 
 
@@ -191,7 +192,7 @@ def _gain() -> Assumption:
         "rad/s with the actuator, a plain number without it",
         "The paper gives a number without unit; $g/s$ is a rate over s in rad/s.",
         r"Were it in Hz, g would be $2\pi$ times larger: the critical perturbation "
-        f"along (1, -1) would be {higher:.4g}, not {here:.4g}.",
+        f"along $(1, -1)$ would be {higher:.4g}, not {here:.4g}.",
     )
 
 
@@ -261,7 +262,7 @@ def _laser() -> Assumption:
         "Where the laser's $30/f$ spectrum ends at low frequency",
         f"At {cutoff:g} Hz; flat below",
         "$1/f$ has an infinite variance. The end lies below all that a run of "
-        f"{DURATION:g} s resolves.",
+        f"{DURATION / 86400.0:.2g} days resolves.",
         f"At {1e3 * low:g} mHz, where the suppression is measured from, the density is lower "
         f"by {change:.1g} of itself. The slow wandering of input and outputs in the time "
         r"series grows as one over the root of the cut-off: $\sqrt{10}$ times larger for one "

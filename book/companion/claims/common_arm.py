@@ -420,7 +420,7 @@ def order_of_the_delays() -> Finding:
 @claim(
     "C5",
     place="Eq. (7), the integral below it, and Eq. (8)",
-    says="The recurrence weighs the delayed samples with an integral R and with $g h c₂$.",
+    says="The recurrence weighs the delayed samples with an integral $R$ and with $g h c₂$.",
     pinned=(Verdict.NOT_AS_WRITTEN, 1.82965e-4, 1e-8),
     weight=Weight.DERIVATION,
     printed=r"$R = \int_{t_i}^{t_{i+1}} g c_k e^{-2g(t_i - ν)} dν$ and "

@@ -431,8 +431,8 @@ def robust() -> Finding:
         "smallest modulus margin, $|1 + L|$, over a grid of the box of perturbations",
         f"It is met at (1 {c1 - 1.0:+.0e}, 1 {c2 - 1.0:+.0e}), where the phase margin is "
         f"{np.degrees(left.phase):.1f} degrees and the gain may change by factors from "
-        f"{left.gain_lower:.3f} to {left.gain_upper:.3f}. What else the loop has to bear is "
-        "claim K14.",
+        f"{left.gain_lower:.3f} to {left.gain_upper:.3f}. Margins against other changes, of "
+        "the delay for instance, are claim K14.",
     )
 
 
@@ -444,7 +444,7 @@ def robust() -> Finding:
     affects=("K1", "K5", "K10", "M1"),
     weight=Weight.DERIVATION,
     printed=r"the dual arm-locking systems $C(s)P_d(s)$, and in Sec. III.B "
-    r"$P_d(jω) = \frac{g}{jω}(2 - c_1 e^{-τ_1jω} - c_2 e^{-τ_2jω}) + \dots$",
+    r"$P_d(jω) =$ $\frac{g}{jω}(2 - c_1 e^{-τ_1jω} - c_2 e^{-τ_2jω})$ $+ \dots$",
 )
 def which_open_loop() -> Finding:
     """Put the actuator's 1/s of Sec. III into the loop, and leave it out."""
@@ -456,7 +456,7 @@ def which_open_loop() -> Finding:
         "unstable roots at $(1, 1 - 10⁻⁶)$ with $P_d$ as in Sec. III.B",
         "There $P_d$ contains the integrating actuator and the gain, $g/s$; with it the loop "
         f"grows by a factor e in {1.0 / root.real / 86400.0:.2g} days. With the dual sensor of "
-        "Table I alone it is stable. The O(-s) after Stage I (claim K1) and stability (claim "
+        "Table I alone it is stable. The $O(-s)$ after Stage I (claim K1) and stability (claim "
         "K5) need the loop without.",
     )
 

@@ -44,8 +44,8 @@ WINDOW = (0.9, 1.1)
 GAINS = np.logspace(-1.0, 5.0, 61)
 #: First frequency in rad/s at which the round trips differ by a whole period, 5 Hz: 100.5 and
 #: 99.5 periods. At twice this, 10 Hz, both are whole numbers of periods.
-BEAT = 2.0 * np.pi / FULL_DIFFERENCE
-RESONANCE = 2.0 * BEAT
+ONE_PERIOD = 2.0 * np.pi / FULL_DIFFERENCE
+TWO_PERIODS = 2.0 * ONE_PERIOD
 #: Points of the strip on either side of c1 + c2 = 2, and one of the sliver below that line
 #: which a high gain takes as well.
 ABOVE = ((1.0, 1.0 + PERTURBATION), (1.001, 1.002), (1.1, 1.105))
@@ -133,7 +133,7 @@ def corner_estimate(
     corner : float, optional
         p in rad/s.
     """
-    omega = periods * BEAT
+    omega = periods * ONE_PERIOD
     off = 0.0 if periods % 2 == 0 else 0.5 * np.pi * FULL_DIFFERENCE / MEAN_DELAY
     share = corner**2 / (corner**2 + omega**2)
     detuned = 0.5 * off**2 - share * off / (2.0 * np.pi * periods)
@@ -142,7 +142,7 @@ def corner_estimate(
 
 def sensor_weight(periods: int = 2) -> float:
     """Return -Re E at 5 Hz times `periods`: the sensor weighs the arms 1 + E and 1 - E."""
-    p, omega = DUAL_SENSOR_CORNER, periods * BEAT
+    p, omega = DUAL_SENSOR_CORNER, periods * ONE_PERIOD
     return float(p / ((p**2 + omega**2) * FULL_DIFFERENCE))
 
 
@@ -158,7 +158,7 @@ def lost_from(c1: float, c2: float) -> float:
         left = excess + 0.5 * sensor_weight(periods) * (c2 - c1)
         left -= corner_estimate(np.inf, periods)
         if left > 0.0:
-            gains.append(periods * BEAT / np.sqrt(8.0 * left))
+            gains.append(periods * ONE_PERIOD / np.sqrt(8.0 * left))
     return float(min(gains))
 
 
@@ -291,7 +291,7 @@ def largest_p(
 def largest_p_estimate() -> float:
     """Estimate `largest_p` at infinite gain: where `corner_estimate` near 5 Hz is zero."""
     share = 0.5 * np.pi**2 * FULL_DIFFERENCE / MEAN_DELAY
-    return float(BEAT * np.sqrt(share / (1.0 - share)))
+    return float(ONE_PERIOD * np.sqrt(share / (1.0 - share)))
 
 
 @cache
@@ -447,7 +447,7 @@ def chart_at_gain_ten() -> Finding:
 @claim(
     "D3",
     place="Fig. 6",
-    says="As g grows, the upper-right edge moves inwards and the straight edge stays.",
+    says="As $g$ grows, the upper-right edge moves inwards and the straight edge stays.",
     pinned=(Verdict.REPRODUCED, -2.0014925, 1e-6),
 )
 def edges_against_gain() -> Finding:
@@ -586,15 +586,16 @@ def sampled_framework() -> Finding:
         "exact, $g = 100$",
         f"At $g = 10$, the only gain that the paper names here, the ratio is {at_ten:.3f} and "
         f"the chart is right. At $g = 100$ the roots that cross oscillate with "
-        f"{BEAT / (2 * np.pi):g} and {RESONANCE / (2 * np.pi):g} Hz, and a step of {STEP:g} s "
-        f"resolves up to {0.5 / STEP:g} Hz; the paper gives no step for the dual arm.",
+        f"{ONE_PERIOD / (2 * np.pi):g} and {TWO_PERIODS / (2 * np.pi):g} Hz, and a step of "
+        f"{STEP:g} s resolves up to {0.5 / STEP:g} Hz; the paper gives no step for the dual "
+        "arm.",
     )
 
 
 @claim(
     "D9",
     place="Sec. III.B, below the open loop",
-    says="p is the corner frequency; no value is given.",
+    says="$p$ is the corner frequency; no value is given.",
     pinned=(Verdict.OPEN, 7.249457, 1e-5),
 )
 def unknown_corner_frequency() -> Finding:

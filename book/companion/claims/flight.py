@@ -244,8 +244,8 @@ def amplification() -> Finding:
         decide(peaks[0] < 2.0, min(at) < 5.0 < max(at)),
         peaks[0],
         f"largest |1 / (1 + L)| without dead time, at {where[0]:.4f} Hz, beside the null",
-        "At high frequency the amplification over all phases of the arms hangs on the dead "
-        f"time. At 15 kHz it is {at[0]:.2f} without one, {at[1]:.2f} with 12.3 µs, and "
+        "At high frequency the amplification over all phases of the arms depends on the "
+        f"dead time. At 15 kHz it is {at[0]:.2f} without one, {at[1]:.2f} with 12.3 µs, and "
         f"{at[2]:.2f} with that of pre-stabilisation; the certified peaks of the last two are "
         f"{peaks[1]:.2f} at {where[1] / 1e3:.1f} kHz and {peaks[2]:.2f} at "
         f"{where[2] / 1e3:.1f} kHz.",
@@ -272,7 +272,8 @@ def smaller_mismatch() -> Finding:
         f"of {len(counts)} mismatches 2 Δτ from {2 * MISMATCHES[0]:.2f} s to "
         f"{2 * MISMATCHES[-1]:.0e} s at which the loop is not stable",
         "Each count is certified, what lies between two is not; the sensor follows the "
-        "mismatch. What it bears shrinks with it: Doppler factors that differ from one by "
+        "mismatch. The perturbation that the loop tolerates shrinks with the mismatch, and "
+        "Doppler factors that differ from one by "
         f"5·10⁻⁸ break the loop from 2 Δτ = {moving:.1e} s down. With the other sign of H₋ "
         f"{others} roots are unstable at the largest mismatch.",
     )
@@ -313,7 +314,7 @@ def below_the_capability() -> Finding:
 @noise(
     "W7",
     place="White paper, Sec. 3",
-    says="A single arm is pulled by ν c / (2 L) a second: an error of 100 kHz makes 1 GHz in "
+    says="A single arm is pulled by $ν c / (2 L)$ a second: an error of 100 kHz makes 1 GHz in "
     "four days.",
     pinned=(Verdict.REPRODUCED, 1.0345e9, 2e6),
 )

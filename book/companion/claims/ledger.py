@@ -71,7 +71,7 @@ def decide(
     corrected : bool, optional
         Whether the claim holds with a slip in the paper mended.
     settled : bool, optional
-        False if the answer hangs on something that the paper does not say.
+        False if the answer depends on something that the paper does not say.
 
     Returns
     -------

@@ -300,7 +300,7 @@ def _winding(values: ComplexArray) -> int:
 @claim(
     "S8",
     place="Sec. II, after Eq. (2); caption of Fig. 2",
-    says="n is the additive noise of Eq. (1), and also the deviation of the gain.",
+    says="$n$ is the additive noise of Eq. (1), and also the deviation of the gain.",
     pinned=(Verdict.NOT_AS_WRITTEN, 0.434699287, 1e-8),
     weight=Weight.WORDING,
     printed="$(1+η(t))X(t) + n(t)$, and then $k₁ = 1 + n$, $k₂ = 1 + η$",

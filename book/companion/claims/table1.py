@@ -159,7 +159,7 @@ def _largest(values: Any) -> float:
 @claim(
     "T1",
     place="Table I, first row",
-    says="The single arm responds with $2i sin(τω) e^{-iωτ}$.",
+    says="A single arm responds with $2i sin(τω) e^{-iωτ}$.",
     pinned=(Verdict.REPRODUCED, 0.0, 1e-12),
     weight=Weight.DERIVATION,
 )
