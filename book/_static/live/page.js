@@ -10,7 +10,7 @@
   const hertz = values => values.map(f => [-TURN * f, 0]);
   const PAPER = {
     sensor: "dual", tau1: 20.1, tau2: 19.9, delay: 0, corner: TURN * 0.4,
-    difference: 20.1 - 19.9, gain: 5000,
+    difference: 0.2, gain: 5000,
     zeros: [[0, 0], [0, 0], ...hertz([1e-8, 5e-6, 5e-6, 5e-6])],
     poles: hertz([1e-6, 1e-6, 1e-6, 5e-5, 4e-4, 5e-5]),
   };
@@ -30,9 +30,14 @@
   function say(number, digits = 3) {
     if (number === 0) return "0";
     const size = Math.abs(number);
-    const text = size < 1e-3 || size >= 1e5 ? number.toExponential(digits - 1)
+    const text = size < 1e-3 || size >= 1e5 ? scientific(number, digits - 1)
       : String(+number.toPrecision(digits));
     return text.replace(/-/g, "\u2212");
+  }
+
+  function scientific(number, digits) {
+    const [factor, exponent] = number.toExponential(digits).split("e");
+    return `${factor} \u00d7 ${power(Number(exponent))}`;
   }
 
   function power(exponent) {
@@ -146,7 +151,7 @@
         pen.font = "13px sans-serif";
         pen.fillStyle = pen.strokeStyle = style.color;
         const dark = document.documentElement.dataset.theme === "dark";
-        draw(pen, wide, high, { text: style.color, grid: dark ? "#55606a" : "#c9d0d6",
+        draw(pen, wide, high, { dark, text: style.color, grid: dark ? "#55606a" : "#c9d0d6",
           line: dark ? "#56b4e9" : "#0072b2", mark: dark ? "#f0a060" : "#d55e00" });
       };
       this.canvas.style.aspectRatio = String(1 / shape);
@@ -252,8 +257,11 @@
       const px = x => frame.left + frame.wide * (x - x0) / (x1 - x0);
       const py = y => frame.top + frame.high * (y1 - y) / (y1 - y0);
       pen.imageSmoothingEnabled = false;
+      // In dark mode as armlock.css turns the figures.
+      if (colours.dark) pen.filter = "invert(0.93) hue-rotate(180deg)";
       if (this.picture)
         pen.drawImage(this.picture, frame.left, frame.top, frame.wide, frame.high);
+      pen.filter = "none";
       const read = v => unit ? (v - 1) / unit : v, write = v => unit ? 1 + v * unit : v;
       pen.strokeStyle = colours.text;
       pen.strokeRect(frame.left, frame.top, frame.wide, frame.high);
@@ -280,13 +288,13 @@
       pen.rect(frame.left, frame.top, frame.wide, frame.high);
       pen.clip();
       if (this.half < 1e-4) {
-        pen.strokeStyle = "#0072b2";
+        pen.strokeStyle = colours.line;
         pen.lineWidth = 2;
         pen.strokeRect(px(1 - SQUARE), py(1 + SQUARE), px(1 + SQUARE) - px(1 - SQUARE),
           py(1 - SQUARE) - py(1 + SQUARE));
       }
       // The ideal point.
-      pen.strokeStyle = "#000";
+      pen.strokeStyle = colours.text;
       pen.lineWidth = 1.5;
       pen.beginPath();
       for (const [dx, dy] of [[7, 0], [0, 7]]) {
@@ -295,8 +303,8 @@
       }
       pen.stroke();
       if (this.broken > 0 && this.broken < Infinity) {
-        pen.fillStyle = "#000";
-        pen.strokeStyle = "#fff";
+        pen.fillStyle = colours.text;
+        pen.strokeStyle = colours.dark ? "#000" : "#fff";
         pen.beginPath();
         pen.arc(px(1 + this.broken), py(1 - this.broken), 5, 0, 7);
         pen.fill();
@@ -350,8 +358,8 @@
     }
 
     name([x, y]) {
-      const text = v => this.unit ? `1 ${v < 1 ? "\u2212" : "+"} ${Math.abs(v - 1).toExponential(2)
-        .replace("-", "\u2212")}` : say(v, 4);
+      const text = v => this.unit
+      ? `1 ${v < 1 ? "\u2212" : "+"} ${scientific(Math.abs(v - 1), 2)}` : say(v, 4);
       return `c1 = ${text(x)}, c2 = ${text(y)}`;
     }
   }
@@ -735,7 +743,7 @@ print(unstable_roots(loop, ${c1}, ${c2}))
     const colour = (text, shown) =>
       element("span", { class: "live-key" }, element("i", { style: `background: ${shown}` }), text);
     const legend = element("p", { class: "live-note" }, colour("stable", "rgb(184,196,206)"),
-      colour("unstable, darker with more roots", "rgb(232,163,129)"), "+ the ideal point (1, 1)");
+      colour("unstable, stronger with more roots", "rgb(232,163,129)"), "+ the ideal point (1, 1)");
     if (half < 1e-4)
       legend.append("; square: the paper\u2019s perturbations; dot: first to break along (1, \u22121)");
     const button = (text, done) => element("button", { type: "button", onclick: done }, text);
@@ -829,6 +837,7 @@ print(unstable_roots(loop, ${c1}, ${c2}))
     const sensor = choice(id("sensor"), "Sensor", [["single", "single arm"], ["common", "common arm"],
       ["difference", "difference of the arms"], ["dual", "dual"]], () => { shape(); take(); });
     fields.sensor = sensor.querySelector("select");
+    preset.classList.add("live-wide");
     const form = element("form", { class: "live-form", onsubmit: event => event.preventDefault() },
       preset, sensor, field("tau1", "Delay \u03c4\u2081 in s"), field("tau2", "Delay \u03c4\u2082 in s"),
       field("delay", "Dead time in s"), field("gain", "Gain"),
