@@ -239,12 +239,14 @@ def stage_two_crossings() -> Finding:
 def which_denominator() -> Finding:
     """Run both."""
     table, printed = counts_of(LOOP), counts_of(PRINTED)
+    days = 1.0 / rightmost_root(PRINTED, *POINTS["A"]).real / 86400.0
     return Finding(
         decide(printed["A"] == 0, corrected=not any(table.values())),
         printed["A"],
         "unstable roots at (1, 1) with the denominator that Eq. (11) prints",
-        "As printed, $s + z₂₄$ cancels the last zero, and $p₂₄$ of Table II is not used. With "
-        "it the loop is stable at all three points of the paper's Bode plot: a misprint.",
+        "As printed, $s + z₂₄$ cancels the last zero, $p₂₄$ of Table II is not used, and the "
+        f"loop grows by a factor e in {days:.0f} days. With $p₂₄$ it is stable at all three "
+        "points of the paper's Bode plot: a misprint.",
     )
 
 
