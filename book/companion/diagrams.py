@@ -19,7 +19,7 @@ def _draw(ax: Axes, parts: list[Any]) -> None:
     """Draw elements in axes, whose units are theirs."""
     ax.set_axis_off()
     ax.set_aspect("equal")
-    drawing: Any = schemdraw.Drawing(canvas=ax, show=False, unit=1.0, fontsize=9, lw=1.3)
+    drawing: Any = schemdraw.Drawing(canvas=ax, show=False, unit=1.0, fontsize=11, lw=1.3)
     for part in parts:
         drawing.add(part)
     drawing.draw(show=False)
@@ -95,10 +95,10 @@ def plot_modules(ax: Axes) -> None:
     ]
     _draw(ax, parts)
     for x, text in ((3.0, "local spacecraft"), (11.6, "remote spacecraft")):
-        ax.text(x, 5.5, text, ha="center", va="bottom", fontsize=9)
-    ax.text(7.85, 4.45, r"out: $\varphi(t)$", ha="center", va="bottom", fontsize=9)
+        ax.text(x, 5.5, text, ha="center", va="bottom", fontsize=11)
+    ax.text(7.85, 4.45, r"out: $\varphi(t)$", ha="center", va="bottom", fontsize=11)
     back = r"back: $c\,\varphi(t-\tau) + n$"
-    ax.text(7.85, 3.5, back, ha="center", va="top", fontsize=9)
+    ax.text(7.8, 3.5, back, ha="center", va="top", fontsize=10)
     ax.set(xlim=(-0.5, 14.1), ylim=(-3.3, 6.3))
 
 
@@ -152,8 +152,8 @@ def plot_loop(ax: Axes) -> None:
     ]
     _draw(ax, parts)
     for y in (upper, lower):
-        ax.text(8.15, y - 0.75, "−", ha="left", va="center", fontsize=10)
-    ax.text(-1.6, 1.75, r"laser, $\varphi_0$", ha="left", va="bottom", fontsize=9)
-    ax.text(14.4, 1.75, r"$\varphi$", ha="right", va="bottom", fontsize=10)
-    ax.text(0.2, 0.75, "−", ha="right", va="center", fontsize=10)
+        ax.text(8.15, y - 0.75, "−", ha="left", va="center", fontsize=11)
+    ax.text(-1.8, 1.75, r"laser, $\varphi_0$", ha="left", va="bottom", fontsize=10)
+    ax.text(14.4, 1.75, r"$\varphi$", ha="right", va="bottom", fontsize=11)
+    ax.text(0.2, 0.75, "−", ha="right", va="center", fontsize=11)
     ax.set(xlim=(-1.9, 14.7), ylim=(-5.6, 2.6))
