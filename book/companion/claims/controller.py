@@ -303,7 +303,7 @@ def constant_gain() -> Finding:
         "Bode plot",
         f"At the corners of the box along (1, -1) it is {100 * most:.1f} %. Read as flat in "
         f"frequency, the claim would fail: $|L|$ rises {high / low:.0f}-fold over that band, "
-        f"and is between {low_science:.4g} and {high_science:.4g} from 1 mHz on.",
+        f"and is between {low_science:.0f} and {high_science:.0f} from 1 mHz on.",
     )
 
 
@@ -431,7 +431,7 @@ def robust() -> Finding:
         decide(critical_perturbation(LOOP, (1.0, -1.0)) > PERTURBATION and modulus > 0.0),
         modulus,
         "smallest modulus margin, $|1 + L|$, over a grid of the box of perturbations",
-        f"It is met at (1 {c1 - 1.0:+.0e}, 1 {c2 - 1.0:+.0e}), where the phase margin is "
+        f"It is met at $(1 {c1 - 1.0:+.0e}, 1 {c2 - 1.0:+.0e})$, where the phase margin is "
         f"{np.degrees(left.phase):.1f} degrees and the gain may change by factors from "
         f"{left.gain_lower:.3f} to {left.gain_upper:.3f}. Margins against other changes, of "
         "the delay for instance, are claim K14.",
