@@ -282,7 +282,7 @@ def test_roots_far_slower_than_the_delays_or_far_up_are_certified(loop, point):
     margin = 1.001e-6 * max(abs(root.real), 1.0 / loop.longest_delay)
     assert unstable_roots(loop.shifted(root.real + margin), *point) == 0
     with mpmath.workdps(40):
-        exact = extended_root(loop, *point, root, digits=20)
+        exact = extended_root(loop, point[0], point[1], root, digits=20)
         assert abs(exact - root) <= 1e-12 * abs(root)
 
 
