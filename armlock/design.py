@@ -32,15 +32,9 @@ from armlock.checks import (
 )
 from armlock.contour import winding
 from armlock.controllers import Controller
+from armlock.free_phases import clear_above, count_at, last_crossover
 from armlock.loops import Loop, checked_loop, paper_loop
-from armlock.margins import (
-    Margins,
-    clear_above,
-    count_at,
-    critical_perturbation,
-    last_crossover,
-    margins,
-)
+from armlock.margins import Margins, critical_perturbation, margins
 from armlock.rays import Ray
 from armlock.stability import BOUNDARY, UNCONFINED
 from armlock.sweep import sweep

@@ -33,17 +33,27 @@ from armlock.stability import BOUNDARY, CountError, unstable_roots
 _EQUAL = 1e-11
 # How far right of its root the last count may stand, relative to |Re s| or the same.
 _FARTHEST = 1e-6
-# Longest walk along a line, in turns of the longest delay's exponential, and how many turns
-# all walks for one root may take, at least so many a line: half a second, and three.
-_LONGEST_WALK = 2e5
+# Longest walk along a line to count, and to look for roots, in turns of the longest delay's
+# exponential; and how many turns all walks for one root may take, at least so many a line:
+# one second, half a second, and three.
+_LONGEST_COUNT = 1e6
+_LONGEST_SEARCH = 2e5
 _ALL_WALKS = 1e6
 _WALK_AT_LEAST = 1e4
+# Roots left of a line may lie further up than those right of it. They are looked for so many
+# turns further: few at first, at most so many.
+_FURTHER = 4.0
+_FURTHEST = 3e4
+# Most roots are slow: first looked for within this many times those turns.
+_SLOW_ONES = 1e3
 # Most points of a line from which Newton's method starts, and most of its steps in extended
 # precision: at a multiple root they only shrink by a share.
 _MOST_STARTS = 4096
 _MOST_STEPS = 100
 # Most roots near a line that are tried in extended precision.
 _MOST_TRIED = 8
+# Roots down to so many times one over the longest delay are looked for in steps of their size.
+_SLOWEST = 1e-9
 # Past this a delayed term is nothing right of a line, and its factor no float.
 _VANISHED = 600.0
 # Digits that extended precision keeps besides those that are asked for.
@@ -156,7 +166,7 @@ def _acting(
         left = poly.polysub(left, values[1] * system.b2)
         nothing, values = [0.0], [0.0, 0.0]
         system = system.changed(rest=left, b1=nothing, b2=nothing, delay1=0.0, delay2=0.0)
-    elif len(acting) < 2 and system.delay1 != system.delay2:
+    elif set(acting) != {system.delay1, system.delay2}:
         # Before a parameter of zero any delay will do.
         delay = acting[0] if acting else 0.0
         system = system.changed(delay1=delay, delay2=delay)
@@ -171,8 +181,6 @@ class _Line:
     turns : float
         How far up roots can lie right of the line, in turns of the longest delay's
         exponential; inf past the limit of a neutral root chain, or where a number overflows.
-    walk : float
-        As many turns as a walk along the line takes; 0 if it is too long, and not begun.
     """
 
     def __init__(
@@ -186,12 +194,11 @@ class _Line:
             self.turns = float(last_frequency(self.shifted, self.x, self.y)) / self.turn
         except ValueError:
             self.turns = np.inf
-        self.short = self.turns <= _LONGEST_WALK
-        self.walk = self.turns if self.short else 0.0
+        self.known = self.turns <= _LONGEST_COUNT
 
     def count(self) -> int:
         """Count the roots right of the line; below zero where that cannot be told."""
-        if not self.short:
+        if not self.known:
             return BOUNDARY
         try:
             return int(unstable_roots(self.shifted, self.x, self.y))
@@ -206,15 +213,22 @@ class _Line:
         length = np.abs(move)
         return s - move, np.where(np.isnan(length), np.inf, length)
 
+    def search(self, further: float) -> float:
+        """Return up to how many turns roots near the line are looked for."""
+        if not self.known:
+            return 0.0
+        if self.system.step:
+            return self.turns
+        return min(self.turns, _SLOW_ONES * further, _LONGEST_SEARCH) + further
+
     def rightmost(self, further: float) -> tuple[complex, float] | None:
         """Return the rightmost root near the line, and how far a faster one is ahead of it.
 
-        Of roots that count as equal it is the slowest. Left of the line they may lie further
-        up than right of it; as many turns further they are looked for.
+        Of roots that count as equal it is the slowest.
         """
-        if not self.short:
+        end = self.search(further) * self.turn
+        if not end:
             return None
-        end = (self.turns + further) * self.turn
         whole = self.shifted.at(self.x, self.y)
         function = whole.weights, whole.sums, whole.phases
         s = self.sigma + 1j * resolved_grid(whole.compiled(), function, end, 1.0)
@@ -271,24 +285,23 @@ def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
     if acting.longest_delay == 0.0:
         return _without_delay(acting, (x, y))
     unit = 1.0 / acting.longest_delay
+    small = _SLOWEST * unit
     best = complex(np.nan, np.nan)
     # There are roots right of `low`, as far as can be told, and none right of `high`.
     low, high, sigma, width, walked = -np.inf, np.inf, 0.0, unit, 0.0
-    # Turns of the delay by which candidates are looked for beyond the last frequency of the
-    # roots right of the line. A map has nothing there.
-    further = 0.0 if acting.step else 4.0
+    further = _FURTHER
     while walked < _ALL_WALKS and sigma not in (low, high):
         line = _Line(acting, p, q, sigma)
-        walked += 2.0 * line.walk + further + _WALK_AT_LEAST
-        found = line.rightmost(further)
-        further = min(2.0 * further, _LONGEST_WALK)
-        if found is not None and not found[0].real <= low:
-            best, ahead = found
+        walked += 2.0 * line.search(further) + _WALK_AT_LEAST
+        root, ahead = line.rightmost(further) or (complex(np.nan, np.nan), 0.0)
+        further = min(2.0 * further, _FURTHEST)
+        farthest = _FARTHEST * max(abs(root.real), unit)
+        # Next to the limit of the chain no count tells that roots lie right of `low`.
+        if root.real + farthest > low:
+            best = root
             nearest = _EQUAL * max(abs(best), unit)
-            farthest = max(nearest, _FARTHEST * max(abs(best.real), unit))
-            for margin in np.geomspace(nearest, farthest, 6):
+            for margin in np.geomspace(nearest, max(nearest, farthest), 6):
                 right_of_it = _Line(acting, p, q, best.real + ahead + margin)
-                walked += right_of_it.walk
                 count = right_of_it.count()
                 if count == 0:
                     # Another one may lie between the root and the line.
@@ -298,14 +311,15 @@ def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
                     return best
                 if count > 0:
                     break
-            low = best.real
+            low = max(low, best.real)
         if sigma > low:
             if line.count() == 0:
                 high = sigma
             else:
                 low = sigma
         if low > -np.inf and high < np.inf:
-            sigma = 0.5 * (low + high)
+            # Roots next to the axis may be slower than the delays by many decades.
+            sigma = float(small * np.sinh(0.5 * sum(np.arcsinh(np.array([low, high]) / small))))
         else:
             sigma = low + width if low > -np.inf else high - width
             width *= 4.0

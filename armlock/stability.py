@@ -157,6 +157,8 @@ def polished(
     """
     omega, left = omega.copy(), np.arange(omega.size)
     for reach in reaches:
+        if not left.size:
+            break
         low, high = omega[left] - reach[left], omega[left] + reach[left]
         enclosed = function(low) * function(high) < 0.0
         if enclosed.any():

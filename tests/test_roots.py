@@ -21,9 +21,10 @@ from armlock import (
     rightmost_root,
     unstable_roots,
 )
+from armlock.flight import flight_loop
 from armlock.roots import extended_root
 from armlock.semidiscretization import semi_discretization
-from armlock.sensors import COMMON
+from armlock.sensors import COMMON, dual
 from book.companion.schemes import pseudospectral_roots
 from tests import independent
 from tests.systems import RETARDED
@@ -31,6 +32,7 @@ from tests.systems import RETARDED
 gains = st.floats(0.05, 3.0)
 delays = st.floats(0.2, 5.0)
 reals = st.floats(-3.0, 3.0)
+PAPER = paper_loop(actuator=True).controller
 
 
 def test_acceptance_roots_of_the_hayes_equation(table):
@@ -194,6 +196,13 @@ def test_a_root_so_far_right_that_delayed_terms_vanish_is_certified():
     assert rightmost_root(system, 2.14, -0.5827) == pytest.approx(expected, rel=1e-12)
 
 
+def test_a_root_right_of_which_only_the_dead_time_acts_is_that_of_lambert():
+    # The arms have died out there: s = 2 K exp(-s delay).
+    loop = Loop(([], [0.0], -5000.0), COMMON, 5.9, 5.9, delay=7e-6)
+    expected = lambertw(1e4 * 7e-6).real / 7e-6
+    assert rightmost_root(loop, 1.0, 0.9) == pytest.approx(expected, rel=1e-12)
+
+
 def test_a_root_that_cannot_be_certified_is_refused_at_once():
     # A chain of some 1e20 roots comes closer to its end than any walk.
     begun = time.process_time()
@@ -250,6 +259,31 @@ def test_many_poles_do_not_take_long():
     margin = 1e-6 * max(abs(root), 0.05)
     assert unstable_roots(loop.shifted(root.real + margin), 1.00002, 0.9996) == 0
     assert unstable_roots(loop.shifted(root.real - margin), 1.00002, 0.9996) > 0
+
+
+@pytest.mark.parametrize(
+    ("loop", "point"),
+    [
+        # A flight loop, which a walk follows for half a million turns.
+        (flight_loop(delay=1e-6), (1.0, 1.0)),
+        # Slower than the delays by five decades, and unstable.
+        (paper_loop(actuator=True, delay=1e-6), (1.000015, 1.00001)),
+        # The roots tend to the limit of the chain, and none of them reaches it.
+        (
+            Loop((PAPER.zeros, PAPER.poles[:-1], 1e4), dual(2.5, 20.016), 30.013, 9.997),
+            (1.0, 1.0),
+        ),
+    ],
+)
+def test_roots_far_slower_than_the_delays_or_far_up_are_certified(loop, point):
+    begun = time.process_time()
+    root = rightmost_root(loop, *point)
+    assert time.process_time() - begun < 5.0
+    margin = 1.001e-6 * max(abs(root.real), 1.0 / loop.longest_delay)
+    assert unstable_roots(loop.shifted(root.real + margin), *point) == 0
+    with mpmath.workdps(40):
+        exact = extended_root(loop, point[0], point[1], root, digits=20)
+        assert abs(exact - root) <= 1e-12 * abs(root)
 
 
 def test_a_root_at_zero_is_zero_from_any_start():

@@ -16,8 +16,8 @@ from scipy.optimize import brentq, minimize_scalar
 from armlock.characteristic import CharacteristicFunction
 from armlock.checks import FloatArray
 from armlock.dcurve import d_curve, d_curve_line
+from armlock.gains import gain_interval
 from armlock.loops import DualArm
-from armlock.margins import gain_interval
 from armlock.paper import (
     CONTROLLER_GAIN,
     DUAL_ARM_GAIN,

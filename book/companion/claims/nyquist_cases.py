@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import bisect, minimize_scalar
 
+from armlock.gains import gain_interval
 from armlock.loops import CommonArm, DualArm, Loop, SingleArm
-from armlock.margins import Margins, gain_interval, margins
+from armlock.margins import Margins, margins
 from armlock.noise import band_rms
 from armlock.nyquist import AxisCrossings, NyquistCurve, axis_crossings, nyquist
 from armlock.paper import (

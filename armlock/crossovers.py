@@ -1,0 +1,189 @@
+"""Gain crossovers, where |L| = 1, and the phase and delay margins that are taken there.
+
+No grid decides: crossovers are zeros of |L|^2 - 1, which the certified walk of
+`armlock.contour` finds, on those parts of the axis where free phases would allow a smaller
+margin than is known.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from armlock import infimum
+from armlock.bounds import last_larger
+from armlock.checks import FloatArray
+from armlock.exponentials import ExponentialSum
+from armlock.free_phases import (
+    TOLERANCE,
+    arm_factors,
+    arm_parameters,
+    arm_weights,
+    last_crossover,
+    limit_disc,
+    limit_margins,
+    meeting_intervals,
+    polynomial_sum,
+)
+from armlock.loops import Loop
+from armlock.nyquist import loop_numerator
+from armlock.stability import CountError, polished, sign_changes
+
+# Crossovers that are polished: those with the smallest margins.
+_POLISHED = 8
+
+
+def axis_zeros(
+    whole: ExponentialSum, intervals: npt.ArrayLike
+) -> tuple[FloatArray, FloatArray]:
+    """Zeros of the imaginary part on intervals of the axis, and where rounding may hide some.
+
+    Of each stretch that hides some, its two ends and its middle, in a column.
+    """
+    parts: list[tuple[npt.NDArray[Any], ...]] = [(np.empty(0),) * 3]
+    for start, end in np.reshape(intervals, (-1, 2)):
+        parts.append(sign_changes(whole, float(end), start=float(start)))
+    omega, jump, width = (np.concatenate(part) for part in zip(*parts, strict=True))
+    hidden = jump == 0
+    stretches = omega[hidden] + np.outer((-1.0, 0.0, 1.0), width[hidden])
+    return omega[~hidden & (omega > 0.0)], stretches[:, stretches[0] > 0.0]
+
+
+def around(omega: FloatArray, reach: float, span: tuple[float, float]) -> FloatArray:
+    """Intervals around frequencies, cut to a span of the axis."""
+    return np.column_stack((omega - reach, omega + reach)).clip(*span)
+
+
+def _on_unit_circle(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArray:
+    """Move frequencies next to crossovers to where |L|, from its factors, is one."""
+    # Not past the next null of an arm.
+    span = np.minimum(0.01 / loop.longest_delay, 0.5 * omega)
+    reaches = [np.minimum(10.0**power * omega, span) for power in range(-13, 0)]
+    return polished(lambda at: _level(loop, c1, c2, at), omega, reaches)
+
+
+def _level(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArray:
+    return np.asarray(np.log(np.abs(loop.open_loop(1j * omega, c1, c2))))
+
+
+def _crossovers(
+    loop: Loop, c1: float, c2: float, intervals: npt.ArrayLike
+) -> tuple[FloatArray, FloatArray]:
+    """Frequencies with |L| = 1 on intervals of the axis, and where rounding hides if it is."""
+    above, below = loop_numerator(loop, c1, c2), loop.rest_on_boundary()
+    squares = above.times_conjugate(above).plus(below.times_conjugate(below).scaled(-1.0))
+    omega, hidden = axis_zeros(squares.turned(), intervals)
+    far = np.abs(_level(loop, c1, c2, omega)) > TOLERANCE
+    moved = _on_unit_circle(loop, c1, c2, omega[far])
+    lost = moved[np.abs(_level(loop, c1, c2, moved)) > TOLERANCE]
+    if lost.size:
+        raise CountError(
+            f"no margin at (c1, c2) = ({c1}, {c2}): rounding hides where |L| comes to one "
+            f"around {lost[0]} rad/s",
+            np.array([[c1, c2]]),
+        )
+    omega[far] = moved
+    return omega, hidden
+
+
+def _least_lags(
+    loop: Loop, c1: float, c2: float, omega: FloatArray
+) -> tuple[float, float, float]:
+    """Smallest phase and delay margins at crossovers, and where the former is taken."""
+
+    def lags(at: FloatArray) -> tuple[FloatArray, FloatArray]:
+        lag = np.mod(np.angle(loop.open_loop(1j * at, c1, c2)) + np.pi, 2.0 * np.pi)
+        # A lag turns L clockwise; a lead may reach -1 sooner.
+        return lag, np.minimum(lag, 2.0 * np.pi - lag)
+
+    if not omega.size:
+        return np.inf, np.inf, np.nan
+    lag, nearest = lags(omega)
+    chosen = np.concatenate(
+        (np.argsort(nearest)[:_POLISHED], np.argsort(lag / omega)[:_POLISHED])
+    )
+    at = _on_unit_circle(loop, c1, c2, omega[np.unique(chosen)])
+    lag, nearest = lags(at)
+    worst = int(np.argmin(nearest))
+    return float(nearest[worst]), float(np.min(lag / at)), float(at[worst])
+
+
+def settled_from(loop: Loop, c1: float, c2: float, phase: float) -> float:
+    """Frequency past which no phase margin of a neutral loop is below a number.
+
+    Past it the disc of L is so close to its limit that what it may hold of the unit circle
+    does not come closer to -1, by more than the share TOLERANCE.
+    """
+    centre, radius = limit_disc(loop, c1, c2)
+
+    def nearby(near: float) -> float:
+        limit = infimum.free_margins_at(complex(centre), radius + near, np.inf)
+        return float(limit[infimum.PHASE])
+
+    near = 1e-3
+    while nearby(near) < (1.0 - TOLERANCE) * phase and near > 1e-12:
+        near *= 0.1
+    shares = [
+        float(b[-1] / loop.rest[-1]) if b.size == loop.rest.size else 0.0
+        for b in (loop.b1, loop.b2)
+    ]
+    left = [
+        polynomial_sum(b, -share * loop.rest)
+        for b, share in zip((loop.b1, loop.b2), shares, strict=True)
+    ]
+    for remainder in left:
+        # The highest power cancels.
+        remainder[loop.rest.size - 1 :] = 0.0
+    weights = 1.0 + np.abs([c1, c2])
+    return last_larger(loop.rest, (left[0], left[1]), weights / near)
+
+
+def phase_and_delay(
+    loop: Loop, c1: float, c2: float, highest: float
+) -> tuple[float, float, float]:
+    """Phase margin, delay margin, and the frequency of the former, up to `highest`.
+
+    A neutral loop may have crossovers without end. Then its delay margin is zero, and its
+    phase margin may be that of the disc that L fills at high frequency.
+
+    First come crossovers that are likely to have the smallest margins: those of the first
+    turns of the delays, and those next to where free phases would have them. The others are
+    looked for only where free phases would allow smaller ones.
+    """
+    phase, delay, where = np.inf, np.inf, np.nan
+    end = last_crossover(loop, arm_weights(loop, c1, c2))
+    if not np.isfinite(highest):
+        limit = limit_margins(loop, c1, c2)
+        phase, delay = float(limit[infimum.PHASE]), float(limit[infimum.DELAY])
+        where = np.inf if delay == 0.0 else np.nan
+        if not np.isfinite(end):
+            end = settled_from(loop, c1, c2, phase)
+    end, turn = min(end, highest), 2.0 * np.pi / loop.longest_delay
+    first = min(end, 1e3 * turn)
+    intervals = np.array([[0.0, first]])
+    if end > first:
+        omega = np.geomspace(first, end, 400)
+        free = infimum.free_margins_over(arm_factors(loop), arm_parameters(loop, c1, c2), omega)
+        nearest = omega[np.argmin(free[:, [infimum.PHASE, infimum.DELAY]], axis=0)]
+        likely = around(nearest, 300.0 * turn, (first, end))
+        intervals = np.concatenate((intervals, likely))
+    for last in (False, True):
+        omega, hidden = _crossovers(loop, c1, c2, intervals)
+        found = _least_lags(loop, c1, c2, omega)
+        perhaps = _least_lags(loop, c1, c2, hidden.ravel())
+        if perhaps[0] < min(phase, found[0]) or perhaps[1] < min(delay, found[1]):
+            raise CountError(
+                f"no margin at (c1, c2) = ({c1}, {c2}): rounding hides whether |L| comes to "
+                f"one around {perhaps[2]} rad/s",
+                np.array([[c1, c2]]),
+            )
+        if found[0] < phase:
+            phase, where = found[0], found[2]
+        delay = min(delay, found[1])
+        if last or end == first:
+            break
+        levels = 0.0, 0.0, phase, delay
+        intervals = meeting_intervals(loop, c1, c2, (first, end), levels=levels)
+    return phase, delay, where

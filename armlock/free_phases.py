@@ -1,0 +1,235 @@
+"""What L can be at all phases of the arms: a disc, and the count and the limits it decides.
+
+With free phases L fills a disc, around the sum of the responses to the two arms. Where that
+stays off a target, such as -1 or the unit circle, L does, whatever the delays are. So it tells
+which parts of the axis need no walk, and its limit at high frequency is that of L.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from itertools import zip_longest
+
+import numpy as np
+from numpy.polynomial import polynomial as poly
+
+from armlock import contour, infimum
+from armlock.bounds import last_larger
+from armlock.checks import ComplexArray, FloatArray, IntArray
+from armlock.loops import Loop
+from armlock.stability import CountError, unstable_roots
+
+#: Relative accuracy of the certificate for modulus and disk margins.
+TOLERANCE = 1e-6
+
+
+def polynomial_sum(p: FloatArray, q: FloatArray) -> FloatArray:
+    """Return the sum of two polynomials."""
+    return np.asarray(poly.polyadd(p, q), dtype=np.float64)
+
+
+def limit_disc(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
+    """Centre and radius of the disc that L fills at high frequency.
+
+    It is that of all phases that small changes of the delays can make.
+    """
+    r = float(loop.rest[-1])
+    b1, b2 = (float(b[-1]) if b.size == loop.rest.size else 0.0 for b in (loop.b1, loop.b2))
+    arms = (abs(c1 * b1) + abs(c2 * b2)) / abs(r)
+    if loop.delay:
+        return 0.0, abs(b1 + b2) / abs(r) + arms
+    return (b1 + b2) / r, arms
+
+
+def limit_margins(loop: Loop, c1: float, c2: float) -> FloatArray:
+    """Margins of the disc that L fills at high frequency, see `infimum.free_margins_at`.
+
+    Raises
+    ------
+    CountError
+        If it holds -1: the neutral root chain is not confined.
+    """
+    centre, radius = limit_disc(loop, c1, c2)
+    found: FloatArray = infimum.free_margins_at(complex(centre), radius, np.inf)
+    if not found[infimum.MODULUS] > 0.0:
+        raise unconfined(c1, c2)
+    if abs(centre) + radius >= 1.0:
+        # L does not roll off: any delay more destabilises it at high frequency.
+        found[infimum.DELAY] = 0.0
+    return found
+
+
+def unconfined(c1: float, c2: float) -> CountError:
+    """Return the error of a loop that has no margins, because its chain is not confined."""
+    return CountError(
+        f"no margin at (c1, c2) = ({c1}, {c2}): the neutral root chain is not confined to the "
+        f"left half-plane",
+        np.array([[c1, c2]]),
+    )
+
+
+def arm_weights(loop: Loop, c1: float, c2: float) -> FloatArray:
+    """Return |c1| and |c2|; arms of the same delay and response count together, as one."""
+    if loop.tau1 == loop.tau2 and loop.b1.any():
+        ratio = float(loop.b2[-1] / loop.b1[-1])
+        if np.array_equal(loop.b2, ratio * loop.b1):
+            return np.array([abs(c1 + c2 * ratio), 0.0])
+    return np.array([abs(c1), abs(c2)])
+
+
+def clear_from(loop: Loop, arms: FloatArray, centre: float, radius: float) -> float:
+    """Frequency past which L stays outside a disc around a negative centre; inf if it does not.
+
+    `arms` are |c1| and |c2|, or what they count for. Past it |B1 + B2 - centre R| exceeds
+    radius |R| + |c1 B1| + |c2 B2|; with a dead time B1 + B2 turns, and stands on the other
+    side.
+    """
+    c = polynomial_sum(loop.b1, loop.b2)
+    factors = [radius, *arms, 0.0]
+    first = -centre * loop.rest
+    if loop.delay:
+        factors[3] = 1.0
+    else:
+        first = polynomial_sum(first, c)
+    others = (loop.rest, loop.b1, loop.b2, c)
+    return last_larger(first, others, np.array(factors))
+
+
+def last_crossover(loop: Loop, arms: FloatArray, gain: float = 1.0) -> float:
+    """Frequency past which `gain` times |L| is below one at all phases; inf if there is none.
+
+    `arms` are |c1| and |c2|, or what they count for.
+    """
+    c = polynomial_sum(loop.b1, loop.b2)
+    return last_larger(loop.rest, (c, loop.b1, loop.b2), gain * np.array([1.0, *arms]))
+
+
+@lru_cache(maxsize=64)
+def arm_factors(loop: Loop) -> tuple[ComplexArray, IntArray, FloatArray]:
+    """Return the responses to the two arms as `armlock.infimum` takes them.
+
+    The roots of their factors, the powers of these in both, shape (2, roots), and the highest
+    coefficients.
+    """
+    rest, *arms = loop.polynomials()
+    leads = np.array([float(p.coefficients[-1] / rest.coefficients[-1]) for p in arms])
+    powers: dict[complex, list[int]] = {}
+    for k in range(2):
+        # A response of zero takes part in nothing; as the other one's multiple it costs least.
+        zeros = arms[k if leads[k] else 1 - k].roots
+        for roots, change in ((zeros, 1), (rest.roots, -1)):
+            for root in roots:
+                powers.setdefault(complex(root), [0, 0])[k] += change
+    kept = [(root, n) for root, n in powers.items() if any(n)]
+    up = [entry for entry in kept if entry[1][0] > 0 or entry[1][1] > 0]
+    down = [entry for entry in kept if entry not in up]
+    # In turn, so that no product overflows.
+    kept = [one for pair in zip_longest(up, down) for one in pair if one is not None]
+    return (
+        np.array([root for root, _ in kept], dtype=np.complex128),
+        np.array([n for _, n in kept], dtype=np.int64).reshape(-1, 2).T.copy(),
+        leads,
+    )
+
+
+def arm_parameters(loop: Loop, c1: float, c2: float, *, free: bool = False) -> FloatArray:
+    """Return what `armlock.infimum` needs of the arms beside their responses.
+
+    If `free`, both phases are free at all frequencies.
+    """
+    return np.array([c1, c2, np.nan if free else loop.tau2 - loop.tau1, loop.delay])
+
+
+def meeting_intervals(
+    loop: Loop,
+    c1: float,
+    c2: float,
+    span: tuple[float, float],
+    *,
+    segment: tuple[float, ...] = (),
+    levels: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
+) -> FloatArray:
+    """Intervals of a span of the axis outside which free phases keep L off a target.
+
+    The target is that of `armlock.infimum.meeting_intervals`.
+    """
+    found: FloatArray = infimum.meeting_intervals(
+        arm_factors(loop),
+        arm_parameters(loop, c1, c2),
+        np.array(segment),
+        np.array(levels),
+        span,
+        loop.longest_delay,
+    )
+    return found
+
+
+def clear_above(loop: Loop, c1: float, c2: float, free_above: float) -> bool:
+    """Whether no phases above a frequency take L to -1, for parameters of up to these sizes."""
+    end = clear_from(loop, np.abs([c1, c2]), -1.0, 0.0)
+    if not np.isfinite(end):
+        return False
+    if end <= free_above:
+        return True
+    # Looked for are distances that are as good as none.
+    least = np.array([TOLERANCE, 0.0, 0.0, 0.0])
+    nearest, _, complete = infimum.free_margins(
+        arm_factors(loop),
+        arm_parameters(loop, c1, c2, free=True),
+        free_above,
+        end,
+        least,
+        np.zeros(4),
+    )
+    return bool(complete) and nearest[infimum.MODULUS] == TOLERANCE
+
+
+def count_at(loop: Loop, c1: float, c2: float, free_above: float) -> int:
+    """Count the unstable roots; in less time where no phases above a frequency matter."""
+    count = None
+    if np.isfinite(free_above) and clear_above(loop, c1, c2, free_above):
+        count = _count_below(loop, c1, c2, free_above)
+    return int(unstable_roots(loop, c1, c2)) if count is None else count
+
+
+def _count_below(loop: Loop, c1: float, c2: float, omega: float) -> int | None:
+    """Count the unstable roots of a loop that no phases of the arms let cross past omega.
+
+    Past it, and far out right of the axis, D(s; c1, c2) over its value at much smaller
+    parameters stays in the right half-plane: what its argument gathers there only takes back
+    what it is at omega. So the two counts differ by what the arguments gather up to omega, less
+    that. None where rounding hides these.
+    """
+    # Not zero: sensors with an integrator have a root at s = 0 there.
+    low1, low2 = 1e-3 * c1, 1e-3 * c2
+    parts = [loop.at(c1, c2), loop.at(low1, low2)]
+    arguments, values = [], []
+    for whole in parts:
+        argument, value, clear = contour.winding(
+            whole.compiled(),
+            whole.weights,
+            whole.sums,
+            whole.phases,
+            np.zeros(whole.sums.size),
+            omega,
+        )
+        if not clear or np.isnan(argument):
+            return None
+        arguments.append(argument)
+        values.append(value)
+    ratio = values[0] * values[1].conjugate()
+    turned = arguments[0] - arguments[1] - math.atan2(ratio.imag, ratio.real)
+    below = int(unstable_roots(loop, low1, low2))
+    count = below - turned / math.pi
+    return round(count) if below >= 0 and abs(count - round(count)) < 1e-3 else None
+
+
+def require_stable(loop: Loop, c1: float, c2: float, free_above: float = np.inf) -> None:
+    """Raise unless 1 + L has all its zeros in the open left half-plane."""
+    count = count_at(loop, c1, c2, free_above)
+    if count != 0:
+        raise ValueError(
+            f"the loop must be stable at (c1, c2) = ({c1}, {c2}) to have margins, but "
+            f"unstable_roots gives {count}"
+        )

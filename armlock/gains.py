@@ -1,0 +1,227 @@
+"""The gain factors between which a stable loop stays stable.
+
+A factor takes a root to the imaginary axis where L is real and negative there. Such places are
+zeros of Im L, which the certified walk of `armlock.contour` finds, on those parts of the axis
+where free phases would allow a factor closer to one than is known.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.optimize import elementwise
+
+from armlock.bounds import last_larger, last_root_bound
+from armlock.checks import FloatArray, real_number
+from armlock.crossovers import around, axis_zeros
+from armlock.free_phases import (
+    arm_weights,
+    clear_from,
+    last_crossover,
+    limit_disc,
+    meeting_intervals,
+    polynomial_sum,
+    require_stable,
+)
+from armlock.loops import Loop, checked_loop
+from armlock.nyquist import loop_numerator
+
+#: Gain factors up to this, and down to one over it, are looked at.
+LARGEST_GAIN = 1e6
+# Share of its limits up to which the neutral root chain lets gain factors be looked at.
+_NEXT_TO_THE_CHAIN = 1e-5
+# Turns of the longest delay that a walk along the axis can take.
+_MOST_TURNS = 1.5e6
+
+
+def _chain_gains(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
+    """Gain factors around one between which the neutral root chain is confined.
+
+    A factor k multiplies the disc of L at high frequency; the chain is confined while that
+    stays clear of -1.
+    """
+    centre, radius = limit_disc(loop, c1, c2)
+    limits = [-1.0 / end for end in (centre - radius, centre + radius) if end < 0.0]
+    lower = max((k for k in limits if k < 1.0), default=0.0)
+    return lower, min((k for k in limits if k > 1.0), default=np.inf)
+
+
+def _no_crossing_from(loop: Loop, c1: float, c2: float, low: float, high: float) -> float:
+    r"""Frequency past which no gain factor from `low` to `high` takes a root across the axis.
+
+    With t = 1 / k from 1 / high to 1 / low, and S = |c1 B1| + |c2 B2|, the square of
+    |t R + C| - S must stay positive. \|t R + C\|^2 is convex in t. If it ascends at the lower
+    end of the interval, it is smallest there; if it descends at the upper end, there.
+    """
+    c, arms = polynomial_sum(loop.b1, loop.b2), arm_weights(loop, c1, c2)
+    found = [last_crossover(loop, arms, high)]
+    if not loop.delay:
+        for t, sign in ((1.0 / high, 1.0), (1.0 / low, -1.0)):
+            ascends = math.sqrt(last_root_bound(_ascent(loop.rest, c, t, sign)))
+            first = polynomial_sum(t * loop.rest, c)
+            found.append(max(ascends, last_larger(first, (loop.b1, loop.b2), arms)))
+    return min(found)
+
+
+def _ascent(rest: FloatArray, c: FloatArray, t: float, sign: float) -> FloatArray:
+    """Half the slope of |t R + C|^2 in t, times a sign, as a polynomial in omega^2."""
+    whole = polynomial_sum(t * rest, c)
+    product = np.convolve(whole, rest * (-1.0) ** np.arange(rest.size))[::2]
+    return np.asarray(sign * product * (-1.0) ** np.arange(product.size))
+
+
+def _gains(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArray:
+    """Gain factors that take a root to the axis at frequencies."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(-1.0 / loop.open_loop(1j * omega, c1, c2).real)
+
+
+def _real_within(loop: Loop, c1: float, c2: float, stretches: FloatArray) -> FloatArray:
+    """Where L, from its factors, is real within stretches in which rounding hides it."""
+
+    def imaginary(omega: FloatArray) -> FloatArray:
+        return np.asarray(loop.open_loop(1j * omega, c1, c2).imag)
+
+    lower, upper = stretches[:-1].ravel(), stretches[1:].ravel()
+    changes = imaginary(lower) * imaginary(upper) < 0.0
+    return np.asarray(elementwise.find_root(imaginary, (lower[changes], upper[changes])).x)
+
+
+def _free_gains(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArray:
+    """Gain factors next to one, below and above, for some phases; shape (omega, 2).
+
+    They belong to the ends of what the disc of L covers of the negative real axis.
+    """
+    first, second = loop.arm_responses(1j * omega)
+    centre, spread = first + second, np.abs(c1 * first) + np.abs(c2 * second)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        half = np.sqrt(spread**2 - centre.imag**2)
+        factors = -1.0 / np.column_stack((centre.real + half, centre.real - half))
+    lower = np.where((factors > 0.0) & (factors < 1.0), factors, 0.0).max(axis=1)
+    upper = np.where(factors > 1.0, factors, np.inf).min(axis=1)
+    return np.column_stack((lower, upper))
+
+
+def _gains_around_one(
+    loop: Loop, c1: float, c2: float, least: float, most: float
+) -> tuple[float, float, float]:
+    """Gain factors next to one that take a root to the axis, and where the upper one does.
+
+    `least` and `most` where there are none between them. As for phases, likely ones come first.
+    """
+    turn = 2.0 * np.pi / loop.longest_delay
+    arms = arm_weights(loop, c1, c2)
+
+    def end(lower: float, upper: float) -> float:
+        """Frequency past which no factor between the two takes a root to the axis."""
+        clear = max(
+            clear_from(loop, arms, -0.5 * (1.0 / k + 1.0), 0.5 * abs(1.0 - 1.0 / k))
+            for k in (lower, upper)
+        )
+        return min(clear, _no_crossing_from(loop, c1, c2, lower, upper))
+
+    def meeting(lower: float, upper: float, span: tuple[float, float]) -> FloatArray:
+        return meeting_intervals(loop, c1, c2, span, segment=(-1.0 / upper, -1.0 / lower))
+
+    crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
+    lower, upper, where = least, most, np.nan
+    first = min(end(lower, upper), 1e3 * turn)
+    intervals, wide, complete = meeting(lower, upper, (0.0, first)), 300.0, False
+    while True:
+        omega, hidden = axis_zeros(crossing, intervals)
+        omega = np.concatenate((omega, _real_within(loop, c1, c2, hidden)))
+        factor = _gains(loop, c1, c2, omega)
+        below = factor[(factor >= lower) & (factor <= 1.0)]
+        lower = float(below.max(initial=lower))
+        above = np.flatnonzero((factor > 1.0) & (factor <= upper))
+        if above.size:
+            nearest = above[np.argmin(factor[above])]
+            upper, where = float(factor[nearest]), float(omega[nearest])
+        last = end(lower, upper)
+        if complete or last <= first:
+            return lower, upper, where
+        intervals = meeting(lower, upper, (first, last))
+        complete = float(np.diff(intervals).sum()) < _MOST_TURNS * turn or wide > _MOST_TURNS
+        if not complete:
+            # Too many turns: around where free phases would have the nearest gains.
+            omega = np.geomspace(first, last, 400)
+            free = _free_gains(loop, c1, c2, omega)
+            at = omega[[np.argmax(free[:, 0]), np.argmin(free[:, 1])]]
+            intervals = around(at, wide * turn, (first, last))
+            wide *= 30.0
+
+
+def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float]:
+    r"""Find the gain factors around one between which a stable loop stays stable.
+
+    Parameters
+    ----------
+    loop : Loop
+        The loop.
+    c1, c2 : float
+        Multiplicative perturbations, at which the loop is stable.
+
+    Returns
+    -------
+    lower, upper, omega : float
+        The two factors, and where the upper one is taken, in rad/s; 0, inf and nan where
+        nothing between factors of 1e-6 and 1e6 bounds them.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If `loop` is no `Loop`, or c1 or c2 is not finite and real, or the loop is not stable
+        there.
+    CountError
+        If gain times delay is too large to follow, or rounding hides what decides.
+
+    Notes
+    -----
+    With a factor k, and L = N / R, a root is at s = j omega where
+
+    .. math::
+
+        R + k N = 0 , \qquad k = -\frac{1}{L} \text{ is real.}
+
+    The neutral root chain bounds the gain, too. Just inside its limits roots cross at ever
+    higher frequency: a factor that lies within 1e-5 of a limit may be given as the limit.
+
+    All sign changes of Im L are found, but for short stretches in which rounding hides its
+    sign, at most a part in ten million of the frequency as a rule. There L is looked at in
+    three places, from its factors: that part is not certified.
+
+    Examples
+    --------
+    >>> from armlock import DualArm
+    >>> from armlock.gains import gain_interval
+    >>> lower, upper, omega = gain_interval(DualArm(), 1.001, 1.002)
+    >>> print(f"{upper:.2f}")
+    29.58
+    """
+    checked_loop(loop)
+    c1, c2 = real_number("c1", c1), real_number("c2", c2)
+    require_stable(loop, c1, c2)
+    return gain_interval_of_stable(loop, c1, c2)
+
+
+def gain_interval_of_stable(loop: Loop, c1: float, c2: float) -> tuple[float, float, float]:
+    """Do what `gain_interval` does for a loop that is known to be stable."""
+    floor, limit = _chain_gains(loop, c1, c2)
+    # Just inside the limits of the chain, roots cross at ever higher frequency.
+    least = max(floor * (1.0 + _NEXT_TO_THE_CHAIN), 1.0 / LARGEST_GAIN)
+    most = min(limit * (1.0 - _NEXT_TO_THE_CHAIN), LARGEST_GAIN)
+    least, most = min(least, 1.0), max(most, 1.0)
+    lower, upper, where = _gains_around_one(loop, c1, c2, least, most)
+    if lower == least:
+        lower = floor if floor >= 1.0 / LARGEST_GAIN else 0.0
+    if upper == most:
+        upper, where = (limit, np.inf) if limit <= LARGEST_GAIN else (np.inf, np.nan)
+    # A real root crosses at s = 0.
+    start, first = float(loop.b1[0] * (1.0 - c1) + loop.b2[0] * (1.0 - c2)), float(loop.rest[0])
+    if start * first < 0.0:
+        at_zero = -first / start
+        lower = max(lower, at_zero) if at_zero < 1.0 else lower
+        if 1.0 < at_zero < upper:
+            upper, where = at_zero, 0.0
+    return lower, upper, where
