@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from numpy.polynomial.polynomial import polyval
 
-from armlock import CommonArm, contour, exponentials, paper_loop
+from armlock import CommonArm, contour, exponentials, paper_loop, unstable_roots
 from armlock.bounds import last_frequency
+from armlock.stability import _compiled
 from tests.systems import NEUTRAL, RETARDED
 
 
@@ -64,6 +65,15 @@ def test_a_polynomial_gathers_the_angles_of_its_roots():
     # (1 + j omega)^3, from 0 to 50.
     argument, _, _ = walk([[1.0, 3j, -3.0, -1j]], [0.0], 50.0)
     assert argument == pytest.approx(3.0 * np.arctan(50.0), rel=1e-12)
+
+
+def test_what_adds_up_to_no_whole_turns_is_doubted():
+    # The roots of A turn the argument by 0.06 pi less than those of another polynomial.
+    system, point = CommonArm(gain=3.0), (1.5, 1.5)
+    model, end = _compiled(system), float(last_frequency(system, *point))
+    assert contour.count_point(model, *point, end) == unstable_roots(system, *point)
+    other = (*model[:6], np.array([-4.0 + 0.0j]), model[7])
+    assert contour.count_point(other, *point, end) == contour.DOUBTFUL
 
 
 @pytest.mark.parametrize("system", [*RETARDED.values(), *NEUTRAL.values()], ids=repr)

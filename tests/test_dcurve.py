@@ -133,3 +133,8 @@ def test_where_a_parameter_has_no_effect_the_curve_has_a_pole():
     # A root of B1 is known to rounding: the curve is far away there, or nan.
     assert not abs(x[1]) < 1e12
     assert (np.abs([x[0], x[2], y[0], y[2]]) < 1e4).all()
+
+
+def test_terms_in_proportion_have_no_curve_at_equal_delays():
+    with pytest.raises(ValueError, match=r"^delay1 and delay2 must differ, got 20\.0 for both"):
+        d_curve(CommonArm(2.0, 20.0, 20.0), 1.0)

@@ -38,7 +38,8 @@ STABLE = {
     "controlled, above": (paper_loop(), (1.0, 1.0 + 1e-4)),
     "oscillator": (Loop(((), (-0.1 + 1j, -0.1 - 1j), 0.9), SINGLE, 2.0, 1.5), (0.5, 1.0)),
     "resonance": (Loop(((-1,), (-1e-6 + 3j, -1e-6 - 3j), 1e-7), SINGLE, 2, 1.5), (0.9, 1.0)),
-    "weak": (Loop(((), (-1.0,), 1e-3), SINGLE, 2.0, 1.5), (0.9, 1.0)),
+    # A real root crosses at s = 0 where k 699 gain = 1, with k = 1.43.
+    "weak": (Loop(((), (-1.0,), 1e-3), SINGLE, 2.0, 1.5), (700.0, 1.0)),
     # It needs gain: with less, a real root crosses at s = 0.
     "unstable pole": (Loop(((-2.0,), (0.2, -3.0), 1.5), COMMON, 0.3, 0.2), (0.1, 0.2)),
     "dead time": (Loop(((), (0.0,), 3.0), COMMON, 20.1, 19.9, delay=0.03), (1.0, 0.999)),

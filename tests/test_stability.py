@@ -20,6 +20,7 @@ from armlock import (
     stability_chart,
     unstable_roots,
 )
+from armlock.rays import Ray
 from tests import independent
 from tests.systems import NEUTRAL, RETARDED, with_roots
 
@@ -185,6 +186,17 @@ class TestOtherLoops:
         limit = room / max(leads)
         on_it = (limit, 0.0) if leads[0] else (0.0, limit)
         assert unstable_roots(system, *on_it) == UNCONFINED
+
+    @given(st.sampled_from(list(NEUTRAL)), *[reals] * 2, *[st.integers(-900, 900)] * 2)
+    def test_a_ray_leaves_a_neutral_chain_where_its_reserve_ends(self, name, x, y, dx, dy):
+        system = NEUTRAL[name]
+        assume(dx or dy)
+        ray = Ray(system, (0.1 * x, 0.1 * y), (0.01 * dx, 0.01 * dy))
+        limit = min(ray.chain_limit(), 1e12)
+        near = [ray.at(limit * share) for share in (1.0 - 1e-9, 1.0 + 1e-9)]
+        inside, outside = (system.chain_reserve(*point) for point in near)
+        assert inside > 0.0 or limit == 0.0
+        assert outside <= 0.0 or limit == 1e12
 
     @pytest.mark.parametrize(
         ("roots", "count"),

@@ -1,12 +1,14 @@
 """Change armlock at random, a sign, a comparison or a constant at a time, and run its tests.
 
-    python tools/mutants.py MODULE [--number 20] [--seed 1] [--tests FILE ...] [--also FILE ...]
+    python tools/mutants.py MODULE [--number 20] [--seed 1] [--tests FILE ...]
 
-Each mutant is one small change in armlock/MODULE.py, made in a copy of the repository. The
-tests of MODULE are run on it and then, if they pass, those that --also names. What no test
-notices is printed, with the change. Kept tools do not serve here: mutmut leaves out decorated
-functions, and so all compiled ones; cosmic-ray makes a thousand mutants of a short module, most
-of them no Python for floats, draws no sample, and does not know that compiled code is kept.
+Each mutant is one small change in armlock/MODULE.py, made in a copy of the repository. Of the
+tests, those run that call the changed function, the fastest first. What none of them notices is
+printed, with the change. Kept tools do not serve here: mutmut leaves out decorated functions,
+and so all compiled ones; cosmic-ray makes a thousand mutants of a short module, most of them no
+Python for floats, draws no sample, and does not know that compiled code is kept.
+
+tests/mutants.md holds what such runs found.
 """
 
 from __future__ import annotations
@@ -14,16 +16,55 @@ from __future__ import annotations
 import argparse
 import ast
 import copy
+import importlib
+import json
 import os
 import random
+import resource
 import shutil
-import subprocess
 import sys
-import tempfile
-from collections.abc import Iterator
+import time
+from collections.abc import Generator, Iterator
 from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import numba
+import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
+PLACE = ROOT / "build" / "mutants"
+TREE, WARM, CACHE, KNOWN = (PLACE / name for name in ("tree", "warm", "cache", "known.json"))
+# Loaded once, for the processes of all mutants.
+LOADED = "numba mpmath matplotlib.pyplot scipy.signal scipy.stats control"
+# In the copy, compiled code is kept until its function, or one that it calls, changes: a change
+# of any module makes all of it anew in the package.
+STAMP = """
+
+def _text(function, seen):
+    import inspect
+
+    seen.add(function)
+    text = inspect.getsource(function)
+    for name in function.__code__.co_names:
+        value = function.__globals__.get(name)
+        if hasattr(value, "py_func"):
+            text += _text(value.py_func, seen) if value.py_func not in seen else ""
+        elif isinstance(value, int | float | complex | tuple | np.ndarray):
+            text += repr(value)
+    return text
+
+
+def _begin_files(cache, function):
+    super(_Cache, cache).__init__(function)
+    files = _Files(cache.cache_path, cache._impl.filename_base, None)
+    files.function = function
+    cache._cache_file = files
+
+
+_Cache.__init__ = _begin_files
+_Files._source_stamp = property(lambda self: _text(self.function, set()), lambda self, _: None)
+"""
 SWAPS: dict[type[ast.AST], tuple[type[ast.AST], ...]] = {
     ast.Add: (ast.Sub,),
     ast.Sub: (ast.Add,),
@@ -99,22 +140,72 @@ def mutants(source: str) -> list[tuple[int, str, str]]:
     return found
 
 
-def passes(tree: Path, tests: list[str], cache: Path, limit: float) -> bool:
+def functions(source: str) -> list[range]:
+    """Return the lines of each function that is in no other."""
+    found: list[range] = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.FunctionDef) and not any(node.lineno in f for f in found):
+            first = min([node.lineno, *(one.lineno for one in node.decorator_list)])
+            found.append(range(first, (node.end_lineno or first) + 1))
+    return found
+
+
+class Tests:
+    """A plugin for pytest: learn what tests call and how long they take, or choose by it."""
+
+    def __init__(self, module: Path, function: range | None, *, learn: bool) -> None:
+        self.module, self.function, self.learn = str(module), function, learn
+        self.known = {} if learn else json.loads(KNOWN.read_text())
+
+    def pytest_collection_modifyitems(self, items: list[Any]) -> None:
+        """Keep the tests that call the function, and sort them by time."""
+        if self.learn:
+            return
+        if self.function is not None:
+            lines = {*self.function}
+            calling = [item for item in items if lines & {*self.known[item.nodeid][1]}]
+            items[:] = calling or items  # what no test calls may run on import
+        items.sort(key=lambda item: float(self.known[item.nodeid][0]))
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_protocol(self, item: Any) -> Generator[None, object, object]:
+        """Note which functions of the module a test calls, and its time."""
+        called, start = set(), time.process_time()
+
+        def note(frame: FrameType, event: str, _: object) -> None:
+            if event == "call" and frame.f_code.co_filename == self.module:
+                called.add(frame.f_code.co_firstlineno)
+
+        sys.setprofile(note if self.learn else None)
+        result = yield
+        sys.setprofile(None)
+        self.known[item.nodeid] = time.process_time() - start, sorted(called)
+        return result
+
+    def pytest_sessionfinish(self) -> None:
+        """Keep what was learned."""
+        if self.learn:
+            KNOWN.write_text(json.dumps(self.known))
+
+
+def passes(tests: list[str], plugin: Tests, cache: Path, limit: int) -> bool:
     """Whether the tests pass; one that takes too long has noticed something."""
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
-    kept = {"PYTHONPATH": str(tree), "NUMBA_CACHE_DIR": str(cache)}
-    with subprocess.Popen(
-        command,
-        cwd=tree,
-        env=os.environ | kept | {"PYTHONDONTWRITEBYTECODE": "1"},
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    ) as run:
-        try:
-            return run.wait(limit) == 0
-        except subprocess.TimeoutExpired:
-            run.kill()
-            return False
+    child = os.fork()
+    if child:
+        return os.waitpid(child, 0)[1] == 0
+    code = 1
+    try:
+        resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
+        nowhere = os.open(os.devnull, os.O_RDWR)
+        for k in range(3):
+            os.dup2(nowhere, k)
+        os.chdir(TREE)
+        sys.path[0] = os.environ["PYTHONPATH"] = str(TREE)
+        sys.dont_write_bytecode = True
+        numba.config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"] = str(cache)
+        code = pytest.main(["-x", "-q", "-p", "no:cacheprovider", *tests], plugins=[plugin])
+    finally:
+        os._exit(int(code))
 
 
 def main() -> int:
@@ -124,34 +215,41 @@ def main() -> int:
     parser.add_argument("--number", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--tests", nargs="*", help="tests/test_MODULE.py if not given")
-    parser.add_argument("--also", nargs="*", default=[], help="tests for what survives these")
-    parser.add_argument("--limit", type=float, default=600.0, help="seconds for each run")
+    parser.add_argument("--limit", type=int, default=600, help="processor seconds a run")
     given = parser.parse_args()
+    tests = given.tests or [f"tests/test_{given.module}.py"]
     source = (ROOT / "armlock" / f"{given.module}.py").read_text()
     drawn = mutants(source)
     drawn = random.Random(given.seed).sample(drawn, min(given.number, len(drawn)))
-    stages = [given.tests or [f"tests/test_{given.module}.py"], given.also]
+    for name in LOADED.split():
+        importlib.import_module(name)
+    shutil.rmtree(TREE, ignore_errors=True)
+    for name in ("armlock", "book", "tests", "benchmarks"):
+        ignored = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(ROOT / name, TREE / name, ignore=ignored)
+    shutil.copy(ROOT / "pyproject.toml", TREE)
+    with (TREE / "armlock" / "compiled.py").open("a") as file:
+        file.write(STAMP)
+    changing = TREE / "armlock" / f"{given.module}.py"
+    if not passes(tests, Tests(changing, None, learn=True), WARM, given.limit):
+        print("the tests fail without any change")
+        return 1
     alive = 0
-    with tempfile.TemporaryDirectory() as place:
-        tree, warm = Path(place, "tree"), Path(place, "warm")
-        for name in ("armlock", "book", "tests", "benchmarks"):
-            shutil.copytree(
-                ROOT / name, tree / name, ignore=shutil.ignore_patterns("__pycache__")
-            )
-        shutil.copy(ROOT / "pyproject.toml", tree)
-        if not all(passes(tree, tests, warm, given.limit) for tests in stages if tests):
-            print("the tests fail without any change")
-            return 1
-        for number, (line, change, whole) in enumerate(drawn, 1):
-            (tree / "armlock" / f"{given.module}.py").write_text(whole)
-            # Compiled code is kept by file: callers in other files keep what they have inlined.
-            cold = "njit" in source
-            with tempfile.TemporaryDirectory() as new:
-                cache = Path(new) if cold else warm
-                if all(passes(tree, tests, cache, given.limit) for tests in stages if tests):
-                    alive += 1
-                    print(f"{given.module}.py:{line}: {change}", flush=True)
-            print(f"{number} of {len(drawn)}: {alive} unnoticed", file=sys.stderr, flush=True)
+    for number, (line, change, whole) in enumerate(drawn, 1):
+        changing.write_text(whole)
+        shutil.rmtree(CACHE, ignore_errors=True)
+        shutil.copytree(WARM, CACHE)
+        # Calls of compiled functions are not seen.
+        inside = (
+            None
+            if "njit" in source
+            else next((one for one in functions(source) if line in one), None)
+        )
+        lives = passes(tests, Tests(changing, inside, learn=False), CACHE, given.limit)
+        alive += lives
+        if lives:
+            print(f"{given.module}.py:{line}: {change}", flush=True)
+        print(f"{number} of {len(drawn)}: {alive} unnoticed", file=sys.stderr, flush=True)
     return 0
 
 
