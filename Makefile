@@ -45,7 +45,7 @@ NOTEBOOKS := $(wildcard notebooks/*.ipynb)
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help env book pdf browser same lab test claims attack mutants bench dist print serve lint format strip lock clean distclean always
+.PHONY: help env book pdf browser same lab test check claims attack mutants bench dist print serve lint format strip lock clean distclean always
 
 help: ## List the targets
 	@echo "armlock: make TARGET, where TARGET is one of"
@@ -59,8 +59,11 @@ env: ## Make .venv with every package of environment.txt, and this one
 	+@$(alone) $(PACKAGE_READY)
 	@echo "The environment is ready: $(VENV)"
 
-# Both stamps are written last, so an interrupted install starts over. The kernel's log level
-# keeps its notes on transport, one for each notebook, out of the build's output.
+# Both stamps are written last, so an interrupted install starts over. The lock is complete, as
+# `pip check` confirms, and nothing needs to be resolved: an older pip, led by the extras of a
+# requirement, would ask for the newest version and refuse it. Modules are compiled at the end,
+# on all cores; some hold templates, and cannot be. The kernel's log level keeps its notes on
+# transport, one for each notebook, out of the build's output.
 $(ENV_READY): environment.txt
 	@test -n "$(PYTHON)" || { \
 		echo "armlock needs Python 3.11 or newer, and found: $$(python3 --version 2>&1)."; \
@@ -74,7 +77,9 @@ $(ENV_READY): environment.txt
 	@echo "Installing the packages of environment.txt into $(VENV), once: a minute or two ..."
 	@rm -f $(ENV_READY) $(PACKAGE_READY)
 	@$(PYTHON) -m venv --clear $(VENV)
-	@$(PY) -m pip install --quiet --require-hashes --only-binary :all: -r environment.txt
+	@$(PY) -m pip install --quiet --no-deps --no-compile --require-hashes --only-binary :all: \
+		-r environment.txt
+	@$(PY) -m compileall -qq -j 0 $(VENV)/lib || true
 	@mkdir -p $(VENV)/etc/ipython
 	@echo '{"IPKernelApp": {"log_level": 40}}' > $(VENV)/etc/ipython/ipython_kernel_config.json
 	@$(PY) -c 'import matplotlib.font_manager'
@@ -177,6 +182,10 @@ $(TESTS_PASSED): $(NOTEBOOKS_RAN) $(TEST_SOURCES) build/test-sources $(if $(FORC
 	@date '+%Y-%m-%d %H:%M:%S' > $@
 	@touch -r build/tests-started $@
 	@touch build/tests-ran
+
+check: ## Run all tests and build the book, side by side
+	+@$(alone) --jobs 2 $(TESTS_PASSED) $(INDEX)
+	@rm -f build/tests-ran
 
 claims: $(PACKAGE_READY) ## Check every claim; print the ledger, write it as CSV and JSON
 	$(PY) -m book.companion.claims build/claims

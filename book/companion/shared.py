@@ -7,6 +7,7 @@ import os
 import pickle
 from collections.abc import Callable
 from functools import cache, wraps
+from inspect import signature
 from pathlib import Path
 from typing import TypeVar
 
@@ -35,6 +36,7 @@ def shared(function: Callable[..., R]) -> Callable[..., R]:
     -------
     callable
     """
+    names = signature(function)
 
     @cache
     @wraps(function)
@@ -43,7 +45,10 @@ def shared(function: Callable[..., R]) -> Callable[..., R]:
         if folder is None:
             return function(*args, **kwargs)
         folder.mkdir(parents=True, exist_ok=True)
-        values = "_".join(map(str, (*args, *kwargs.items())))
+        # A default counts as one that is written out.
+        given = names.bind(*args, **kwargs)
+        given.apply_defaults()
+        values = "_".join(map(str, given.arguments.values()))
         with (folder / f"{function.__name__}_{values}").open("a+b") as stream:
             fcntl.flock(stream, fcntl.LOCK_EX)
             stream.seek(0)

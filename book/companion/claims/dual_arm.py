@@ -35,6 +35,7 @@ from book.companion.claims import ledger
 from book.companion.claims.common_arm import log_slope
 from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 from book.companion.claims.table1 import FULL_DIFFERENCE, HALF_DIFFERENCE, MEAN_DELAY
+from book.companion.shared import shared
 
 claim = partial(ledger.claim, chapter="04_dual_arm")
 
@@ -103,7 +104,7 @@ def far_edge(loop: DualArm, common: float) -> Crossing:
     return first_crossing(loop, (common, common), (-0.5, 0.5), stop=1.0)
 
 
-@cache
+@shared
 def edges(
     gain: float, corner: float = DUAL_SENSOR_CORNER, difference: float | None = None
 ) -> Edges:
@@ -193,7 +194,7 @@ def width_estimate(common: npt.ArrayLike) -> Any:
     return 2.0 * ratio * np.arccos(cosine) * np.sqrt(1.0 - cosine**2)
 
 
-@cache
+@shared
 def top_of_strip(gain: float, low: float = WINDOW[0]) -> tuple[FloatArray, FloatArray]:
     """Trace the far and the upper edge of the strip, from c1 + c2 = 2 low up to 2.4.
 
@@ -216,7 +217,7 @@ def top_of_strip(gain: float, low: float = WINDOW[0]) -> tuple[FloatArray, Float
     return difference, common
 
 
-@cache
+@shared
 def strip(gain: float, number: int = 61) -> FloatArray:
     """Trace the boundary of the strip but for its straight edge.
 
@@ -252,7 +253,7 @@ def window_area(gain: float) -> float:
     return float(np.trapezoid(np.clip(length, 0.0, None), difference))
 
 
-@cache
+@shared
 def chart_area(gain: float, points: int = 401) -> float:
     """Area as `window_area` has it, from a chart of counts: a second opinion."""
     axis = np.linspace(*WINDOW, points)
@@ -273,7 +274,7 @@ def area_excess() -> tuple[FloatArray, FloatArray]:
     return gains, np.array([window_area(float(gain)) - least for gain in gains])
 
 
-@cache
+@shared
 def largest_p(
     gain: float = CONTROLLER_GAIN, difference: float | None = None, away: float = 0.0
 ) -> float:
@@ -294,7 +295,7 @@ def largest_p_estimate() -> float:
     return float(ONE_PERIOD * np.sqrt(share / (1.0 - share)))
 
 
-@cache
+@shared
 def gain_at_perturbation() -> float:
     """Gain in rad/s at which the corner is `PERTURBATION` away from (1, 1)."""
 
@@ -348,7 +349,7 @@ def printed_deviation(c1: float, c2: float, *, restored: bool = False) -> tuple[
     return -float(found.fun), float(np.exp(found.x))
 
 
-@cache
+@shared
 def stable_both_ways() -> tuple[tuple[int, float], ...]:
     """Count and real part of the rightmost root in 1/s at each of `POINTS`."""
     loop = DualArm()

@@ -467,8 +467,10 @@ def check_in_parallel() -> Ledger:
         All claims. Those of a chapter share what they need, such as one simulation, and so
         stay together.
     """
-    # The longest first: simulation and appendix stand at the end of the paper.
-    chapters = dict.fromkeys(entry.chapter for entry in reversed(all_claims()))
+    # The longest first. It needs few of the compiled functions: the other process has compiled
+    # the rest before this one comes to need them.
+    longest, others = "08_perturbations", (entry.chapter for entry in reversed(all_claims()))
+    chapters = dict.fromkeys([longest, *others])
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
         parts = pool.map(_check_chapter, chapters)
         found = {name: finding for part in parts for name, finding in part.items()}
