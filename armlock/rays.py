@@ -161,7 +161,9 @@ class Ray:
         if not self.acts():
             return Crossings(np.empty(0), np.empty(0), np.empty(0, dtype=np.int64))
         end = min(end, highest)
-        omega, change, _ = sign_changes(self.family, end, is_map=self.system.step > 0.0)
+        omega, change, width = sign_changes(self.family, end, is_map=self.system.step > 0.0)
+        # Rounding hides a stretch, or all signs from the start on.
+        hidden = bool(((change == 0) | (omega == 0.0) & (width > 0.0)).any())
         omega, change = omega[change != 0], change[change != 0]
         # Only those in reach are worth polishing. Where M vanishes the quotient is not real: a
         # root is there at infinite t only.
@@ -175,7 +177,23 @@ class Ray:
         position = self.quotient(omega).real
         kept = np.flatnonzero((position > lowest) & (position <= stop))
         kept = kept[np.argsort(position[kept], kind="stable")]
-        return Crossings(position[kept], omega[kept], change[kept])
+        found = Crossings(position[kept], omega[kept], change[kept])
+        if hidden and highest == np.inf:
+            self._confirm(found, stop, first=first)
+        return found
+
+    def _confirm(self, found: Crossings, stop: float, *, first: bool) -> None:
+        """Raise if counts at both ends of the ray, or up to the first crossing, contradict."""
+        change = int(found.change.sum())
+        if first and found.position.size:
+            stop, change = (1.0 - 1e-6) * float(found.position[0]), 0
+        counts = unstable_roots(self.system, *np.transpose([self.at(0.0), self.at(stop)]))
+        if counts.min() >= 0 and counts[1] - counts[0] != change:
+            raise CountError(
+                f"no crossings up to t = {stop}: rounding hides some, for the counts at both "
+                f"ends are {counts[0]} and {counts[1]}",
+                np.array([self.at(stop)]),
+            )
 
     def reaches(self, stop: float, chain: float) -> Iterator[float]:
         """Yield growing t up to `stop`, or ever closer to the limit of the chain."""
@@ -229,7 +247,8 @@ def ray_crossings(
         If start or direction is not two finite real numbers, the direction has length zero,
         stop is not positive, or the neutral root chain ceases to be confined on the way.
     CountError
-        If a number overflows, or gain times delay is too large to follow.
+        If a number overflows, gain times delay is too large to follow, or counts show that
+        rounding hides a crossing.
 
     Notes
     -----
@@ -284,7 +303,8 @@ def first_crossing(
         If start or direction is not two finite real numbers, the direction has length zero, or
         stop is not positive.
     CountError
-        If a number overflows, or gain times delay is too large to follow.
+        If a number overflows, gain times delay is too large to follow, or counts show that
+        rounding hides a crossing.
 
     Notes
     -----

@@ -7,13 +7,14 @@ from armlock import (
     BOUNDARY,
     CommonArm,
     Controller,
+    CountError,
     DualArm,
     Loop,
     d_curve_line,
     unstable_roots,
 )
 from armlock.rays import first_crossing, ray_crossings
-from armlock.sensors import COMMON
+from armlock.sensors import COMMON, dual
 from book.companion.claims import dual_arm
 
 
@@ -50,6 +51,17 @@ def test_crossings_along_a_ray_add_up_to_the_counts():
     np.testing.assert_array_equal(unstable_roots(loop, *along), expected)
     first = first_crossing(loop, start, direction, 1.0)
     assert first.position == pytest.approx(crossings.position[0], rel=1e-12)
+
+
+def test_a_crossing_that_rounding_hides_is_refused():
+    # A sensor with 1 / (tau1 - tau2) = 4e7 1/s: below 7 rad/s a walk sees no sign.
+    loop = Loop(([], [0.0], 2.0), dual(2.5, 2.3e-8), 15.977629546, 15.977629523, delay=0.00538)
+    start, direction = (1.0000024, 1.0000003518), (1.0, 1.0)
+    counts = unstable_roots(loop, *np.transpose([start, np.add(start, 0.2)]))
+    assert counts[0] > counts[1]
+    for find in (ray_crossings, first_crossing):
+        with pytest.raises(CountError, match="rounding hides some"):
+            find(loop, start, direction, 0.2)
 
 
 def test_first_crossing_says_where_there_is_none():
