@@ -193,8 +193,10 @@ def without_unused(*sums: ExponentialSum) -> tuple[ExponentialSum, ...]:
     """Return sums of the same polynomials without those that have no weight in any of them."""
     used = np.any([np.any(s.weights, axis=0) | (s.sums != 0.0) for s in sums], axis=0)
     polynomials = tuple(p for p, kept in zip(sums[0].polynomials, used, strict=True) if kept)
+    # Not s.weights[:, used]: its rows would lie the other way, for which all is compiled again.
     return tuple(
-        ExponentialSum(polynomials, s.weights[:, used], s.phases, s.sums[used]) for s in sums
+        ExponentialSum(polynomials, s.weights.compress(used, axis=1), s.phases, s.sums[used])
+        for s in sums
     )
 
 

@@ -52,7 +52,7 @@ PERTURBATION_SEEDS = (SEED + 1, SEED + 2)
 #: Number of random draws of c1 and c2.
 DRAWS = 4000
 #: Number of those that run in time, what one core does within a minute; and their sizes.
-ENSEMBLE, ENSEMBLE_SIZES = 16, (1.0, 3.0)
+ENSEMBLE, ENSEMBLE_SIZES = 12, (1.0, 3.0)
 # Series are kept once a second.
 _EVERY = int(SAMPLE_RATE)
 _BLOCK = 1 << 18
