@@ -34,8 +34,8 @@ _EQUAL = 1e-11
 # How far right of its root the last count may stand, relative to |Re s| or the same.
 _FARTHEST = 1e-6
 # Longest walk along a line to count, and to look for roots, in turns of the longest delay's
-# exponential; and how many turns all walks for one root may take, at least so many a line:
-# one second, half a second, and three.
+# exponential: a second, and three. The searches for one root may take so many turns together,
+# each counting four times, and at least so many a line: some four seconds.
 _LONGEST_COUNT = 1e6
 _LONGEST_SEARCH = 2e5
 _ALL_WALKS = 1e6
@@ -292,7 +292,7 @@ def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
     further = _FURTHER
     while walked < _ALL_WALKS and sigma not in (low, high):
         line = _Line(acting, p, q, sigma)
-        walked += 2.0 * line.search(further) + _WALK_AT_LEAST
+        walked += 4.0 * line.search(further) + _WALK_AT_LEAST
         root, ahead = line.rightmost(further) or (complex(np.nan, np.nan), 0.0)
         further = min(2.0 * further, _FURTHEST)
         farthest = _FARTHEST * max(abs(root.real), unit)
