@@ -55,10 +55,10 @@ UNTRIED = -5
 
 # Turns of the longest delay after which `winding` tries again to follow the slow terms alone.
 _BLOCK = 32.0
-# Most steps of one walk, about ten a turn of the longest delay: some three seconds.
-MOST_STEPS = 8_000_000
+# Most steps of one walk, about ten a turn of the longest delay: some five seconds.
+MOST_STEPS = 20_000_000
 # No walk begins that turns the fastest exponential by more radians: it would not end.
-MOST_RADIANS = 25.0 * MOST_STEPS
+MOST_RADIANS = 10.0 * MOST_STEPS
 # Most zeros that a walk keeps: about a gigabyte.
 MOST_ZEROS = 30_000_000
 # Most samples of a grid.
