@@ -45,7 +45,7 @@ NOTEBOOKS := $(wildcard notebooks/*.ipynb)
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help env book pdf browser same lab test check claims attack mutants bench dist print serve lint format strip lock clean distclean always
+.PHONY: help env book pdf browser same lab test claims attack mutants bench dist print serve lint format strip lock clean distclean always
 
 help: ## List the targets
 	@echo "armlock: make TARGET, where TARGET is one of"
@@ -182,10 +182,6 @@ $(TESTS_PASSED): $(NOTEBOOKS_RAN) $(TEST_SOURCES) build/test-sources $(if $(FORC
 	@date '+%Y-%m-%d %H:%M:%S' > $@
 	@touch -r build/tests-started $@
 	@touch build/tests-ran
-
-check: ## Run all tests and build the book, side by side
-	+@$(alone) --jobs 2 $(TESTS_PASSED) $(INDEX)
-	@rm -f build/tests-ran
 
 claims: $(PACKAGE_READY) ## Check every claim; print the ledger, write it as CSV and JSON
 	$(PY) -m book.companion.claims build/claims

@@ -36,7 +36,7 @@ def shared(function: Callable[..., R]) -> Callable[..., R]:
     -------
     callable
     """
-    names = signature(function)
+    parameters = signature(function)
 
     @cache
     @wraps(function)
@@ -46,7 +46,7 @@ def shared(function: Callable[..., R]) -> Callable[..., R]:
             return function(*args, **kwargs)
         folder.mkdir(parents=True, exist_ok=True)
         # A default counts as one that is written out.
-        given = names.bind(*args, **kwargs)
+        given = parameters.bind(*args, **kwargs)
         given.apply_defaults()
         values = "_".join(map(str, given.arguments.values()))
         with (folder / f"{function.__name__}_{values}").open("a+b") as stream:
