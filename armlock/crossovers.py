@@ -7,8 +7,6 @@ margin than is known.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
 
@@ -26,6 +24,7 @@ from armlock.free_phases import (
     limit_margins,
     meeting_intervals,
     polynomial_sum,
+    search_outwards,
 )
 from armlock.loops import Loop
 from armlock.nyquist import loop_numerator
@@ -42,18 +41,10 @@ def axis_zeros(
 
     Of each stretch that hides some, its two ends and its middle, in a column.
     """
-    parts: list[tuple[npt.NDArray[Any], ...]] = [(np.empty(0),) * 3]
-    for start, end in np.reshape(intervals, (-1, 2)):
-        parts.append(sign_changes(whole, float(end), start=float(start)))
-    omega, jump, width = (np.concatenate(part) for part in zip(*parts, strict=True))
+    omega, jump, width = sign_changes(whole, intervals)
     hidden = jump == 0
     stretches = omega[hidden] + np.outer((-1.0, 0.0, 1.0), width[hidden])
     return omega[~hidden & (omega > 0.0)], stretches[:, stretches[0] > 0.0]
-
-
-def around(omega: FloatArray, reach: float, span: tuple[float, float]) -> FloatArray:
-    """Intervals around frequencies, cut to a span of the axis."""
-    return np.column_stack((omega - reach, omega + reach)).clip(*span)
 
 
 def _on_unit_circle(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArray:
@@ -147,29 +138,26 @@ def phase_and_delay(
 
     A neutral loop may have crossovers without end. Then its delay margin is zero, and its
     phase margin may be that of the disc that L fills at high frequency.
-
-    First come crossovers that are likely to have the smallest margins: those of the first
-    turns of the delays, and those next to where free phases would have them. The others are
-    looked for only where free phases would allow smaller ones.
     """
     phase, delay, where = np.inf, np.inf, np.nan
-    end = last_crossover(loop, arm_weights(loop, c1, c2))
+    last = last_crossover(loop, arm_weights(loop, c1, c2))
     if not np.isfinite(highest):
         limit = limit_margins(loop, c1, c2)
         phase, delay = float(limit[infimum.PHASE]), float(limit[infimum.DELAY])
         where = np.inf if delay == 0.0 else np.nan
-        if not np.isfinite(end):
-            end = settled_from(loop, c1, c2, phase)
-    end, turn = min(end, highest), 2.0 * np.pi / loop.longest_delay
-    first = min(end, 1e3 * turn)
-    intervals = np.array([[0.0, first]])
-    if end > first:
-        omega = np.geomspace(first, end, 400)
+        if not np.isfinite(last):
+            last = settled_from(loop, c1, c2, phase)
+
+    def meeting(span: tuple[float, float]) -> FloatArray:
+        return meeting_intervals(loop, c1, c2, span, levels=(0.0, 0.0, phase, delay))
+
+    def likely(omega: FloatArray) -> FloatArray:
         free = infimum.free_margins_over(arm_factors(loop), arm_parameters(loop, c1, c2), omega)
-        nearest = omega[np.argmin(free[:, [infimum.PHASE, infimum.DELAY]], axis=0)]
-        likely = around(nearest, 300.0 * turn, (first, end))
-        intervals = np.concatenate((intervals, likely))
-    for last in (False, True):
+        nearest: FloatArray = omega[np.argmin(free[:, infimum.PHASE :], axis=0)]
+        return nearest
+
+    def look(intervals: FloatArray) -> None:
+        nonlocal phase, delay, where
         omega, hidden = _crossovers(loop, c1, c2, intervals)
         found = _least_lags(loop, c1, c2, omega)
         perhaps = _least_lags(loop, c1, c2, hidden.ravel())
@@ -182,8 +170,6 @@ def phase_and_delay(
         if found[0] < phase:
             phase, where = found[0], found[2]
         delay = min(delay, found[1])
-        if last or end == first:
-            break
-        levels = 0.0, 0.0, phase, delay
-        intervals = meeting_intervals(loop, c1, c2, (first, end), levels=levels)
+
+    search_outwards(loop, look, lambda: min(last, highest), meeting, likely)
     return phase, delay, where

@@ -308,11 +308,11 @@ def edge_crossings(loop: Loop, size: float, free_above: float | None = None) -> 
     highest = _checked_end(loop, size, free_above)
     if not highest:
         return UNCONFINED
+    corners = 1.0 + size * _CORNERS
+    edges = zip(corners, np.roll(corners, -1, axis=0), strict=True)
     return sum(
-        Ray(loop, corner, following - corner).crossings(1.0, highest=highest).position.size
-        for corner, following in zip(
-            1.0 + size * _CORNERS, 1.0 + size * np.roll(_CORNERS, -1, axis=0), strict=True
-        )
+        Ray(loop, start, end - start).crossings(1.0, intervals=[(0.0, highest)]).position.size
+        for start, end in edges
     )
 
 
@@ -776,7 +776,7 @@ def _certified(
 ) -> float:
     """Return a measure of a loop; `points` are its margins at (1, 1) and in the corners."""
     if name == "critical perturbation":
-        return critical_perturbation(loop, _DIRECTION, free_above)
+        return critical_perturbation(loop, _DIRECTION)
     if name == "unity gain":
         return last_crossover(loop, np.ones(2)) / (2.0 * math.pi)
     plain = name.removesuffix(" in the box")

@@ -8,6 +8,7 @@ which parts of the axis need no walk, and its limit at high frequency is that of
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
 from itertools import zip_longest
 
@@ -22,6 +23,9 @@ from armlock.stability import CountError, unstable_roots
 
 #: Relative accuracy of the certificate for modulus and disk margins.
 TOLERANCE = 1e-6
+# Turns of the longest delay that a search begins with, and that it looks at on both sides of a
+# likely place.
+_FIRST_TURNS, _TURNS_AROUND = 1e3, 300.0
 
 
 def polynomial_sum(p: FloatArray, q: FloatArray) -> FloatArray:
@@ -149,20 +153,59 @@ def meeting_intervals(
     *,
     segment: tuple[float, ...] = (),
     levels: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
+    free: bool = False,
 ) -> FloatArray:
     """Intervals of a span of the axis outside which free phases keep L off a target.
 
-    The target is that of `armlock.infimum.meeting_intervals`.
+    The target is that of `armlock.infimum.meeting_intervals`; `free` is that of
+    `arm_parameters`, and with it the result holds for all smaller perturbations too.
     """
     found: FloatArray = infimum.meeting_intervals(
         arm_factors(loop),
-        arm_parameters(loop, c1, c2),
+        arm_parameters(loop, c1, c2, free=free),
         np.array(segment),
         np.array(levels),
         span,
         loop.longest_delay,
     )
     return found
+
+
+def may_cross(loop: Loop, c1: float, c2: float, span: tuple[float, float]) -> FloatArray:
+    """Intervals of a span on which phases and parameters of up to these sizes take L to -1."""
+    # Looked for are distances that are as good as none.
+    levels = (TOLERANCE, 0.0, 0.0, 0.0)
+    return meeting_intervals(loop, c1, c2, span, levels=levels, free=True)
+
+
+def search_outwards(
+    loop: Loop,
+    look: Callable[[FloatArray], None],
+    end: Callable[[], float],
+    meeting: Callable[[tuple[float, float]], FloatArray],
+    likely: Callable[[FloatArray], FloatArray],
+) -> None:
+    """Look at intervals of the axis, the most promising first, until nothing is left.
+
+    What `look` finds may bring `end` closer, the frequency past which nothing better can be,
+    and leave less of a span for `meeting`, the intervals on which something better can be.
+    First come the first turns of the delays; then, as long as many more turns are left, what
+    lies around the `likely` ones of some frequencies; then all that is left.
+    """
+    turn = 2.0 * np.pi / loop.longest_delay
+    first, wide = min(end(), _FIRST_TURNS * turn), _TURNS_AROUND
+    look(meeting((0.0, first)))
+    while (last := end()) > first:
+        intervals = meeting((first, last))
+        many = float(np.diff(intervals).sum()) > 100.0 * wide * turn
+        if many:
+            at, reach = likely(np.geomspace(first, last, 400)), wide * turn
+            around = np.column_stack((at - reach, at + reach)).clip(first, last)
+            intervals = np.concatenate([meeting((low, high)) for low, high in around])
+            wide *= 30.0
+        look(intervals)
+        if not many:
+            break
 
 
 def clear_above(loop: Loop, c1: float, c2: float, free_above: float) -> bool:

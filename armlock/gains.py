@@ -14,7 +14,7 @@ from scipy.optimize import elementwise
 
 from armlock.bounds import last_larger, last_root_bound
 from armlock.checks import FloatArray, real_number
-from armlock.crossovers import around, axis_zeros
+from armlock.crossovers import axis_zeros
 from armlock.free_phases import (
     arm_weights,
     clear_from,
@@ -23,6 +23,7 @@ from armlock.free_phases import (
     meeting_intervals,
     polynomial_sum,
     require_stable,
+    search_outwards,
 )
 from armlock.loops import Loop, checked_loop
 from armlock.nyquist import loop_numerator
@@ -31,8 +32,6 @@ from armlock.nyquist import loop_numerator
 LARGEST_GAIN = 1e6
 # Share of its limits up to which the neutral root chain lets gain factors be looked at.
 _NEXT_TO_THE_CHAIN = 1e-5
-# Turns of the longest delay that a walk along the axis can take.
-_MOST_TURNS = 1.5e6
 
 
 def _chain_gains(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
@@ -108,12 +107,13 @@ def _gains_around_one(
 ) -> tuple[float, float, float]:
     """Gain factors next to one that take a root to the axis, and where the upper one does.
 
-    `least` and `most` where there are none between them. As for phases, likely ones come first.
+    `least` and `most` where there are none between them.
     """
-    turn = 2.0 * np.pi / loop.longest_delay
     arms = arm_weights(loop, c1, c2)
+    crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
+    lower, upper, where = least, most, np.nan
 
-    def end(lower: float, upper: float) -> float:
+    def end() -> float:
         """Frequency past which no factor between the two takes a root to the axis."""
         clear = max(
             clear_from(loop, arms, -0.5 * (1.0 / k + 1.0), 0.5 * abs(1.0 - 1.0 / k))
@@ -121,14 +121,15 @@ def _gains_around_one(
         )
         return min(clear, _no_crossing_from(loop, c1, c2, lower, upper))
 
-    def meeting(lower: float, upper: float, span: tuple[float, float]) -> FloatArray:
+    def meeting(span: tuple[float, float]) -> FloatArray:
         return meeting_intervals(loop, c1, c2, span, segment=(-1.0 / upper, -1.0 / lower))
 
-    crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
-    lower, upper, where = least, most, np.nan
-    first = min(end(lower, upper), 1e3 * turn)
-    intervals, wide, complete = meeting(lower, upper, (0.0, first)), 300.0, False
-    while True:
+    def likely(omega: FloatArray) -> FloatArray:
+        free = _free_gains(loop, c1, c2, omega)
+        return omega[[np.argmax(free[:, 0]), np.argmin(free[:, 1])]]
+
+    def look(intervals: FloatArray) -> None:
+        nonlocal lower, upper, where
         omega, hidden = axis_zeros(crossing, intervals)
         omega = np.concatenate((omega, _real_within(loop, c1, c2, hidden)))
         factor = _gains(loop, c1, c2, omega)
@@ -138,18 +139,9 @@ def _gains_around_one(
         if above.size:
             nearest = above[np.argmin(factor[above])]
             upper, where = float(factor[nearest]), float(omega[nearest])
-        last = end(lower, upper)
-        if complete or last <= first:
-            return lower, upper, where
-        intervals = meeting(lower, upper, (first, last))
-        complete = float(np.diff(intervals).sum()) < _MOST_TURNS * turn or wide > _MOST_TURNS
-        if not complete:
-            # Too many turns: around where free phases would have the nearest gains.
-            omega = np.geomspace(first, last, 400)
-            free = _free_gains(loop, c1, c2, omega)
-            at = omega[[np.argmax(free[:, 0]), np.argmin(free[:, 1])]]
-            intervals = around(at, wide * turn, (first, last))
-            wide *= 30.0
+
+    search_outwards(loop, look, end, meeting, likely)
+    return lower, upper, where
 
 
 def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float]:

@@ -23,19 +23,19 @@ from armlock.free_phases import (
     arm_factors,
     arm_parameters,
     arm_weights,
-    clear_above,
     clear_from,
-    count_at,
     last_crossover,
     limit_margins,
+    may_cross,
     require_stable,
+    search_outwards,
     unconfined,
 )
 from armlock.gains import gain_interval_of_stable
 from armlock.loops import Loop, checked_loop
 from armlock.nyquist import leading_radius, loop_numerator
-from armlock.rays import Ray, first_break
-from armlock.stability import CountError
+from armlock.rays import Crossing, Ray, first_crossing
+from armlock.stability import BOUNDARY, UNCONFINED, CountError, unstable_roots
 
 # Relative accuracy with free phases, in the order of `armlock.infimum.free_margins_at`. The
 # disk margin may be flat over decades of frequency, where a finer one would take too long.
@@ -353,9 +353,46 @@ def margins(
     return Margins(*(float(value) for value in (*numbers, *places)))
 
 
-def critical_perturbation(
-    loop: Loop, direction: npt.ArrayLike, free_above: float | None = None
-) -> float:
+def _first_near(loop: Loop, ray: Ray) -> Crossing | None:
+    """First crossing along a ray from (1, 1), None if there is none about as far as zero is.
+
+    Free phases tell which parts of the axis no root can cross: with the largest parameters on
+    the ray, and so with all. At each frequency they also tell the nearest crossing that there
+    could be.
+    """
+    stop, found = min(ray.scale, 0.5 * ray.chain_limit()), None
+    if not stop > 0.0:
+        return None
+
+    def meeting(span: tuple[float, float]) -> FloatArray:
+        c1, c2 = (max(1.0, abs(c)) for c in ray.at(stop))
+        return may_cross(loop, c1, c2, span)
+
+    def look(intervals: FloatArray) -> None:
+        nonlocal stop, found
+        crossing = ray.crossings(
+            stop, first=True, lowest=1e-15 * ray.scale, intervals=intervals
+        )
+        if crossing.position.size:
+            stop = float(crossing.position[0])
+            found = Crossing(stop, float(crossing.omega[0]), int(crossing.change[0]))
+
+    def likely(omega: FloatArray) -> FloatArray:
+        arms = np.array(loop.arm_responses(1j * omega))
+        apart = np.abs(1.0 + arms.sum(axis=0)) - np.abs(arms).sum(axis=0)
+        return omega[[np.argmin(apart / (np.abs(ray.direction) @ np.abs(arms)))]]
+
+    search_outwards(
+        loop,
+        look,
+        lambda: ray.end(stop),
+        meeting,
+        likely,
+    )
+    return found
+
+
+def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
     r"""Return the smallest perturbation of (1, 1) in a direction that breaks the loop.
 
     Parameters
@@ -364,10 +401,6 @@ def critical_perturbation(
         The loop.
     direction : array_like of two floats
         (d1, d2), taken as given and not normalised.
-    free_above : float, optional
-        Angular frequency in rad/s up to which a first crossing is looked for, to spare the time
-        of a loop that rolls off late. It is the result if no phases of the arms let a root
-        cross above it for so small a perturbation; otherwise all frequencies are walked.
 
     Returns
     -------
@@ -380,14 +413,14 @@ def critical_perturbation(
     ------
     TypeError, ValueError
         If `loop` is no `Loop`, the direction is not two finite real numbers or has length
-        zero, the loop is unstable at (1, 1) itself, or `free_above` is not positive.
+        zero, or the loop is unstable at (1, 1) itself.
     CountError
         If the counts on the two sides of the result contradict it, or gain times delay is too
         large to follow.
 
     See Also
     --------
-    armlock.rays.first_break : from other points, and with the frequency.
+    armlock.rays.first_crossing : from other points, and with the frequency.
 
     Notes
     -----
@@ -405,12 +438,25 @@ def critical_perturbation(
     2.9286e-06
     """
     ray = Ray(checked_loop(loop), (1.0, 1.0), direction)
-    if free_above is not None:
-        highest = positive_number("free_above", free_above)
-        stop = min(ray.scale, 0.5 * ray.chain_limit())
-        at = ray.crossings(stop, first=True, highest=highest).position
-        if at.size and count_at(loop, 1.0, 1.0, highest) == 0:
-            c1, c2 = 1.0 + float(at[0]) * np.abs(ray.direction)
-            if clear_above(loop, c1, c2, highest):
-                return float(at[0])
-    return first_break(loop, ray.start, ray.direction).position
+    count = int(unstable_roots(loop, *ray.start))
+    if count > 0 or count == UNCONFINED:
+        raise ValueError(
+            f"the loop must be stable at (c1, c2) = (1, 1) to lose stability, but "
+            f"unstable_roots gives {count}"
+        )
+    if count != 0 and int(unstable_roots(loop, *ray.at(1e-9 * ray.scale))) != 0:
+        return 0.0
+    at = (_first_near(loop, ray) or first_crossing(loop, ray.start, direction)).position
+    if not np.isfinite(at):
+        return at
+    # Closer to the result than to a part in a million, rounding may hide which side it is.
+    for share, allowed in ((0.5, {0}), (1.0 - 1e-6, {0, BOUNDARY}), (1.0 + 1e-6, None)):
+        point = ray.at(share * at)
+        count = int(unstable_roots(loop, *point))
+        if (count == 0) if allowed is None else (count not in allowed):
+            raise CountError(
+                f"the first crossing along {tuple(ray.direction.tolist())} lies at t = {at}, "
+                f"but the count at {point}, {count}, contradicts it",
+                np.array([point]),
+            )
+    return at

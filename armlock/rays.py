@@ -19,7 +19,7 @@ from numpy.polynomial import polynomial as poly
 from armlock.bounds import last_frequency
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import ComplexArray, FloatArray, IntArray, axis, positive_number
-from armlock.stability import UNCONFINED, CountError, polished, sign_changes, unstable_roots
+from armlock.stability import CountError, polished, sign_changes, unstable_roots
 
 #: Parameters this many times the length of the start and the direction are not looked at.
 FARTHEST = 1e9
@@ -142,11 +142,11 @@ class Ray:
         *,
         first: bool = False,
         lowest: float = 0.0,
-        highest: float = np.inf,
+        intervals: npt.ArrayLike | None = None,
     ) -> Crossings:
         """Find crossings with `lowest` < t <= stop: all, or the first and what ties with it.
 
-        Only those up to the frequency `highest` are looked for.
+        With `intervals` of the axis, shape (n, 2), only those whose frequency lies in them.
         """
         end = self.end(stop)
         if end == np.inf:
@@ -160,8 +160,11 @@ class Ray:
             )
         if not self.acts():
             return Crossings(np.empty(0), np.empty(0), np.empty(0, dtype=np.int64))
-        end = min(end, highest)
-        omega, change, width = sign_changes(self.family, end, is_map=self.system.step > 0.0)
+        omega, change, width = sign_changes(
+            self.family,
+            [(0.0, end)] if intervals is None else np.minimum(intervals, end),
+            is_map=self.system.step > 0.0,
+        )
         # Rounding hides a stretch, or all signs from the start on.
         hidden = bool(((change == 0) | (omega == 0.0) & (width > 0.0)).any())
         omega, change = omega[change != 0], change[change != 0]
@@ -178,7 +181,7 @@ class Ray:
         kept = np.flatnonzero((position > lowest) & (position <= stop))
         kept = kept[np.argsort(position[kept], kind="stable")]
         found = Crossings(position[kept], omega[kept], change[kept])
-        if hidden and highest == np.inf:
+        if hidden and intervals is None:
             self._confirm(found, stop, first=first)
         return found
 
@@ -339,67 +342,9 @@ def first_crossing(
     return Crossing(chain, np.inf, 0) if chain <= stop else Crossing(np.inf, np.nan, 0)
 
 
-def first_break(
-    system: CharacteristicFunction, start: npt.ArrayLike, direction: npt.ArrayLike
-) -> Crossing:
-    """Find where a stable system ceases to be stable along a ray.
-
-    Parameters
-    ----------
-    system : CharacteristicFunction
-        The loop, stable at the start or on its boundary of stability there.
-    start, direction : array_like of two floats
-        The ray start + t direction in the plane of the free parameters.
-
-    Returns
-    -------
-    Crossing
-        Its `position` is the smallest t > 0 at which `unstable_roots` is not zero: the first
-        crossing, or the limit of the neutral root chain. It is 0 where the system is not
-        stable next to the start.
-
-    Raises
-    ------
-    TypeError, ValueError
-        As `first_crossing` does, or if the system is unstable at the start.
-    CountError
-        As `first_crossing` does, or if the counts on the two sides of the result contradict
-        it.
-
-    Examples
-    --------
-    >>> from armlock import CommonArm
-    >>> from armlock.rays import first_break
-    >>> print(f"{first_break(CommonArm(), (0.0, 0.0), (1.0, 1.0)).position:.6f}")
-    1.000000
-    """
-    ray = Ray(system, start, direction)
-    count = int(unstable_roots(system, *ray.start))
-    if count > 0 or count == UNCONFINED:
-        raise ValueError(
-            f"start must be stable to lose stability, but unstable_roots gives {count} at "
-            f"{ray.at(0.0)}"
-        )
-    if count != 0 and int(unstable_roots(system, *ray.at(1e-9 * ray.scale))) != 0:
-        return Crossing(0.0, np.nan, 0)
-    found = first_crossing(system, start, direction)
-    if not np.isfinite(found.position):
-        return found
-    for share, stable in ((0.5, True), (1.0 + 1e-6, False)):
-        point = ray.at(share * found.position)
-        if (int(unstable_roots(system, *point)) == 0) != stable:
-            raise CountError(
-                f"the first crossing along {tuple(ray.direction.tolist())} lies at t = "
-                f"{found.position}, but the count at {point} contradicts it",
-                np.array([point]),
-            )
-    return found
-
-
 __all__ = [
     "Crossing",
     "Crossings",
-    "first_break",
     "first_crossing",
     "ray_crossings",
 ]

@@ -76,7 +76,7 @@ def crossings_found(system: CharacteristicFunction, y: FloatArray, right: float)
         sums = fixed.plus(varying.scaled(system.reference[1] - level)).sums
         row = fixed.plus(varying.scaled(-level))
         end = float(last_frequency(system, right, level))
-        total += sign_changes(row._replace(sums=sums), end)[0].size
+        total += sign_changes(row._replace(sums=sums), [(0.0, end)])[0].size
     return total
 
 
