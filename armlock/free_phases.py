@@ -197,9 +197,13 @@ def search_outwards(
     look(meeting((0.0, first)))
     while (last := end()) > first:
         intervals = meeting((first, last))
-        many = float(np.diff(intervals).sum()) > 100.0 * wide * turn
+        many = float(np.diff(intervals).sum()) > 10.0 * wide * turn
         if many:
-            at, reach = likely(np.geomspace(first, last, 400)), wide * turn
+            number = 2 + 400 // len(intervals)
+            places = np.concatenate(
+                [np.geomspace(low, high, number) for low, high in intervals]
+            )
+            at, reach = np.unique(likely(places)), wide * turn
             around = np.column_stack((at - reach, at + reach)).clip(first, last)
             intervals = np.concatenate([meeting((low, high)) for low, high in around])
             wide *= 30.0
