@@ -27,6 +27,7 @@ from armlock.free_phases import (
 )
 from armlock.loops import Loop, checked_loop
 from armlock.nyquist import loop_numerator
+from armlock.stability import CountError, unstable_roots
 
 #: Gain factors up to this, and down to one over it, are looked at.
 LARGEST_GAIN = 1e6
@@ -112,6 +113,7 @@ def _gains_around_one(
     arms = arm_weights(loop, c1, c2)
     crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
     lower, upper, where = least, most, np.nan
+    hidden: list[FloatArray] = []
 
     def end() -> float:
         """Frequency past which no factor between the two takes a root to the axis."""
@@ -130,8 +132,9 @@ def _gains_around_one(
 
     def look(intervals: FloatArray) -> None:
         nonlocal lower, upper, where
-        omega, hidden = axis_zeros(crossing, intervals)
-        omega = np.concatenate((omega, _real_within(loop, c1, c2, hidden)))
+        omega, stretches = axis_zeros(crossing, intervals)
+        omega = np.concatenate((omega, _real_within(loop, c1, c2, stretches)))
+        hidden.append(_gains(loop, c1, c2, stretches.ravel()))
         factor = _gains(loop, c1, c2, omega)
         below = factor[(factor >= lower) & (factor <= 1.0)]
         lower = float(below.max(initial=lower))
@@ -141,7 +144,24 @@ def _gains_around_one(
             upper, where = float(factor[nearest]), float(omega[nearest])
 
     search_outwards(loop, look, end, meeting, likely)
+    perhaps = np.concatenate(hidden)
+    if ((perhaps > lower) & (perhaps < upper)).any():
+        _confirm(loop, c1, c2, lower, upper)
     return lower, upper, where
+
+
+def _confirm(loop: Loop, c1: float, c2: float, lower: float, upper: float) -> None:
+    """Raise if counts just inside two gain factors say that the loop is unstable there."""
+    rest = loop.polynomials()[0]
+    for factor in (lower * (1.0 + 1e-6), upper * (1.0 - 1e-6)):
+        scaled = rest._replace(coefficients=rest.coefficients / factor)
+        count = int(unstable_roots(loop.changed(rest=scaled), c1, c2))
+        if count > 0:
+            raise CountError(
+                f"no gain margin at (c1, c2) = ({c1}, {c2}): rounding hides a crossing, for "
+                f"the count at {factor} times the gain is {count}",
+                np.array([[c1, c2]]),
+            )
 
 
 def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float]:
@@ -181,7 +201,8 @@ def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float
 
     All sign changes of Im L are found, but for short stretches in which rounding hides its
     sign, at most a part in ten million of the frequency as a rule. There L is looked at in
-    three places, from its factors: that part is not certified.
+    three places, from its factors. Where it could give a factor between the two, counts just
+    inside both confirm them.
 
     Examples
     --------

@@ -16,6 +16,7 @@ from armlock import (
     critical_perturbation,
     flight_loop,
     free_phases,
+    gains,
     margins,
     modulus_margin,
     paper_loop,
@@ -185,6 +186,16 @@ def test_a_dead_time_far_below_the_crossing_period_changes_little(direction):
     found = critical_perturbation(flight_loop(delay=1e-6), direction)
     assert found != plain
     assert found == pytest.approx(plain, rel=1e-7)
+
+
+def test_counts_contradict_gains_between_which_the_loop_is_not_stable():
+    """As they do where rounding hides a crossing."""
+    loop = paper_loop()
+    lower, upper, _ = gains.gain_interval(loop, 1.0, 1.0)
+    gains._confirm(loop, 1.0, 1.0, lower, upper)
+    for low, high in ((0.99 * lower, upper), (lower, 1.01 * upper)):
+        with pytest.raises(CountError, match="rounding hides a crossing"):
+            gains._confirm(loop, 1.0, 1.0, low, high)
 
 
 def test_an_unstable_loop_has_no_margins_and_nothing_to_lose():
