@@ -7,7 +7,6 @@ crossings of a whole ray are the zeros of Im(D0 conj(M)): one certified walk fin
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import NamedTuple
@@ -23,8 +22,8 @@ from armlock.stability import CountError, polished, sign_changes, unstable_roots
 
 #: Parameters this many times the length of the start and the direction are not looked at.
 FARTHEST = 1e9
-# Each further walk along a ray goes so many times as far up in frequency.
-_LONGER = 4.0
+# Each further walk looks so many times as far along a ray.
+_FURTHER = 10.0
 # Next to the limit of the neutral root chain, roots cross at ever higher frequency. They are
 # followed up to so many turns of the longest delay, about a tenth of a second.
 _TURNS_NEXT_TO_THE_CHAIN = 50_000
@@ -205,16 +204,7 @@ class Ray:
         far = 0.0 if self.system.step else min(stop, 0.5 * chain)
         while t < far:
             yield t
-            # A near crossing is found at low frequency: go no further than that takes.
-            lowest = 1.0 / max(self.system.longest_delay, 1e-12)
-            limit = _LONGER * max(self.end(t), lowest)
-            if self.end(far) <= limit:
-                break
-            low, high = t, far
-            while high > 1.1 * low:
-                middle = math.sqrt(low * high)
-                low, high = (middle, high) if self.end(middle) <= limit else (low, middle)
-            t = high
+            t *= _FURTHER
         if stop < chain:
             yield stop
         else:
