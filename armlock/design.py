@@ -308,10 +308,11 @@ def edge_crossings(loop: Loop, size: float, free_above: float | None = None) -> 
     highest = _checked_end(loop, size, free_above)
     if not highest:
         return UNCONFINED
+    intervals = [(0.0, highest)] if math.isfinite(highest) else None
     corners = 1.0 + size * _CORNERS
     edges = zip(corners, np.roll(corners, -1, axis=0), strict=True)
     return sum(
-        Ray(loop, start, end - start).crossings(1.0, intervals=[(0.0, highest)]).position.size
+        Ray(loop, start, end - start).crossings(1.0, intervals=intervals).position.size
         for start, end in edges
     )
 

@@ -18,20 +18,22 @@ from armlock.crossovers import axis_zeros
 from armlock.free_phases import (
     arm_weights,
     clear_from,
+    free_disc,
     last_crossover,
     limit_disc,
     meeting_intervals,
+    no_margin,
     polynomial_sum,
     require_stable,
     search_outwards,
 )
 from armlock.loops import Loop, checked_loop
 from armlock.nyquist import loop_numerator
-from armlock.stability import CountError, unstable_roots
+from armlock.stability import unstable_roots
 
 #: Gain factors up to this, and down to one over it, are looked at.
 LARGEST_GAIN = 1e6
-# Share of its limits up to which the neutral root chain lets gain factors be looked at.
+# So close to the limits of the neutral root chain, as a share, no gain factors are looked for.
 _NEXT_TO_THE_CHAIN = 1e-5
 
 
@@ -48,11 +50,11 @@ def _chain_gains(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
 
 
 def _no_crossing_from(loop: Loop, c1: float, c2: float, low: float, high: float) -> float:
-    r"""Frequency past which no gain factor from `low` to `high` takes a root across the axis.
+    """Frequency in rad/s past which no gain factor of a range takes a root across the axis.
 
-    With t = 1 / k from 1 / high to 1 / low, and S = |c1 B1| + |c2 B2|, the square of
-    |t R + C| - S must stay positive. \|t R + C\|^2 is convex in t. If it ascends at the lower
-    end of the interval, it is smallest there; if it descends at the upper end, there.
+    With t = 1 / k from 1 / high to 1 / low, |t R + C| must exceed |c1 B1| + |c2 B2|. Its square
+    is convex in t. If it ascends at the lower end of the interval, it is smallest there; if it
+    descends at the upper end, there.
     """
     c, arms = polynomial_sum(loop.b1, loop.b2), arm_weights(loop, c1, c2)
     found = [last_crossover(loop, arms, high)]
@@ -65,7 +67,7 @@ def _no_crossing_from(loop: Loop, c1: float, c2: float, low: float, high: float)
 
 
 def _ascent(rest: FloatArray, c: FloatArray, t: float, sign: float) -> FloatArray:
-    """Half the slope of |t R + C|^2 in t, times a sign, as a polynomial in omega^2."""
+    """Half the slope of |t R + C|^2 in t, times a sign, in ascending powers of omega^2."""
     whole = polynomial_sum(t * rest, c)
     product = np.convolve(whole, rest * (-1.0) ** np.arange(rest.size))[::2]
     return np.asarray(sign * product * (-1.0) ** np.arange(product.size))
@@ -78,7 +80,7 @@ def _gains(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArray:
 
 
 def _real_within(loop: Loop, c1: float, c2: float, stretches: FloatArray) -> FloatArray:
-    """Where L, from its factors, is real within stretches in which rounding hides it."""
+    """Where L, from its factors, is real within stretches that may hide it, in rad/s."""
 
     def imaginary(omega: FloatArray) -> FloatArray:
         return np.asarray(loop.open_loop(1j * omega, c1, c2).imag)
@@ -93,10 +95,9 @@ def _free_gains(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArr
 
     They belong to the ends of what the disc of L covers of the negative real axis.
     """
-    first, second = loop.arm_responses(1j * omega)
-    centre, spread = first + second, np.abs(c1 * first) + np.abs(c2 * second)
+    centre, radius = free_disc(loop, c1, c2, omega)
     with np.errstate(invalid="ignore", divide="ignore"):
-        half = np.sqrt(spread**2 - centre.imag**2)
+        half = np.sqrt(radius**2 - centre.imag**2)
         factors = -1.0 / np.column_stack((centre.real + half, centre.real - half))
     lower = np.where((factors > 0.0) & (factors < 1.0), factors, 0.0).max(axis=1)
     upper = np.where(factors > 1.0, factors, np.inf).min(axis=1)
@@ -108,7 +109,7 @@ def _gains_around_one(
 ) -> tuple[float, float, float]:
     """Gain factors next to one that take a root to the axis, and where the upper one does.
 
-    `least` and `most` where there are none between them.
+    The frequency is in rad/s; `least`, `most` and nan where there are none between these two.
     """
     arms = arm_weights(loop, c1, c2)
     crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
@@ -144,24 +145,23 @@ def _gains_around_one(
             upper, where = float(factor[nearest]), float(omega[nearest])
 
     search_outwards(loop, look, end, meeting, likely)
-    perhaps = np.concatenate(hidden)
-    if ((perhaps > lower) & (perhaps < upper)).any():
-        _confirm(loop, c1, c2, lower, upper)
+    hidden_gains = np.concatenate(hidden)
+    if ((hidden_gains > lower) & (hidden_gains < upper)).any():
+        _require_stable_inside(loop, c1, c2, lower, upper)
     return lower, upper, where
 
 
-def _confirm(loop: Loop, c1: float, c2: float, lower: float, upper: float) -> None:
-    """Raise if counts just inside two gain factors say that the loop is unstable there."""
+def _require_stable_inside(
+    loop: Loop, c1: float, c2: float, lower: float, upper: float
+) -> None:
+    """Raise if a count just inside two gain factors says that the loop is unstable there."""
     rest = loop.polynomials()[0]
     for factor in (lower * (1.0 + 1e-6), upper * (1.0 - 1e-6)):
         scaled = rest._replace(coefficients=rest.coefficients / factor)
         count = int(unstable_roots(loop.changed(rest=scaled), c1, c2))
         if count > 0:
-            raise CountError(
-                f"no gain margin at (c1, c2) = ({c1}, {c2}): rounding hides a crossing, for "
-                f"the count at {factor} times the gain is {count}",
-                np.array([[c1, c2]]),
-            )
+            at = f"the count at {factor} times the gain is {count}"
+            raise no_margin(c1, c2, f"rounding hides a crossing, for {at}")
 
 
 def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float]:
@@ -177,8 +177,9 @@ def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float
     Returns
     -------
     lower, upper, omega : float
-        The two factors, and where the upper one is taken, in rad/s; 0, inf and nan where
-        nothing between factors of 1e-6 and 1e6 bounds them.
+        The two factors, and where the upper one is taken, in rad/s: 0 for a real root, inf for
+        the limit of the neutral root chain. 0, inf and nan where nothing between factors of
+        1e-6 and 1e6 bounds them.
 
     Raises
     ------
@@ -230,10 +231,11 @@ def gain_interval_of_stable(loop: Loop, c1: float, c2: float) -> tuple[float, fl
         lower = floor if floor >= 1.0 / LARGEST_GAIN else 0.0
     if upper == most:
         upper, where = (limit, np.inf) if limit <= LARGEST_GAIN else (np.inf, np.nan)
-    # A real root crosses at s = 0.
-    start, first = float(loop.b1[0] * (1.0 - c1) + loop.b2[0] * (1.0 - c2)), float(loop.rest[0])
-    if start * first < 0.0:
-        at_zero = -first / start
+    # At s = 0, where L is `above` over `below`, a real root crosses.
+    above = float(loop.b1[0] * (1.0 - c1) + loop.b2[0] * (1.0 - c2))
+    below = float(loop.rest[0])
+    if above * below < 0.0:
+        at_zero = -below / above
         lower = max(lower, at_zero) if at_zero < 1.0 else lower
         if 1.0 < at_zero < upper:
             upper, where = at_zero, 0.0

@@ -24,9 +24,11 @@ from armlock.free_phases import (
     arm_parameters,
     arm_weights,
     clear_from,
+    crossing_intervals,
+    free_disc,
     last_crossover,
     limit_margins,
-    may_cross,
+    no_margin,
     require_stable,
     search_outwards,
     unconfined,
@@ -34,7 +36,7 @@ from armlock.free_phases import (
 from armlock.gains import gain_interval_of_stable
 from armlock.loops import Loop, checked_loop
 from armlock.nyquist import leading_radius, loop_numerator
-from armlock.rays import Crossing, Ray, first_crossing
+from armlock.rays import Ray, first_crossing
 from armlock.stability import BOUNDARY, UNCONFINED, CountError, unstable_roots
 
 # Relative accuracy with free phases, in the order of `armlock.infimum.free_margins_at`. The
@@ -171,11 +173,8 @@ def _smallest(
             TOLERANCE,
         )
         if not complete:
-            raise CountError(
-                f"no margin at (c1, c2) = ({c1}, {c2}): rounding hides L, or following it "
-                f"takes more than {contour.MOST_STEPS:.0e} steps",
-                np.array([[c1, c2]]),
-            )
+            why = f"following it takes more than {contour.MOST_STEPS:.0e} steps"
+            raise no_margin(c1, c2, f"rounding hides L, or {why}")
         best, where = found, np.where(np.isnan(places), where, places)
         start = last
     return best, where
@@ -267,10 +266,7 @@ def _free_margins(
         factors, free, lowest, end, best, _FREE_TOLERANCES
     )
     if not complete:
-        raise CountError(
-            f"no margins for free phases at (c1, c2) = ({c1}, {c2}) from {lowest} rad/s on",
-            np.array([[c1, c2]]),
-        )
+        raise no_margin(c1, c2, f"free phases from {lowest} rad/s on take too many steps")
     return smaller, np.where(np.isnan(places), where, places)
 
 
@@ -353,20 +349,18 @@ def margins(
     return Margins(*(float(value) for value in (*numbers, *places)))
 
 
-def _first_near(loop: Loop, ray: Ray) -> Crossing | None:
-    """First crossing along a ray from (1, 1), None if there is none about as far as zero is.
+def _first_near(loop: Loop, ray: Ray) -> float | None:
+    """First t at which a root crosses along a ray from (1, 1); None if it lies far.
 
-    Free phases tell which parts of the axis no root can cross: with the largest parameters on
-    the ray, and so with all. At each frequency they also tell the nearest crossing that there
-    could be.
+    Far is past half the limit of the neutral root chain, or where the parameters change by more
+    than their own size. At the largest |c1| and |c2| of the ray, free phases tell which parts
+    of the axis no root can cross; with smaller ones it cannot cross there either.
     """
     stop, found = min(ray.scale, 0.5 * ray.chain_limit()), None
-    if not stop > 0.0:
-        return None
 
     def meeting(span: tuple[float, float]) -> FloatArray:
         c1, c2 = (max(1.0, abs(c)) for c in ray.at(stop))
-        return may_cross(loop, c1, c2, span)
+        return crossing_intervals(loop, c1, c2, span)
 
     def look(intervals: FloatArray) -> None:
         nonlocal stop, found
@@ -374,21 +368,15 @@ def _first_near(loop: Loop, ray: Ray) -> Crossing | None:
             stop, first=True, lowest=1e-15 * ray.scale, intervals=intervals
         )
         if crossing.position.size:
-            stop = float(crossing.position[0])
-            found = Crossing(stop, float(crossing.omega[0]), int(crossing.change[0]))
+            stop = found = float(crossing.position[0])
 
     def likely(omega: FloatArray) -> FloatArray:
-        arms = np.array(loop.arm_responses(1j * omega))
-        apart = np.abs(1.0 + arms.sum(axis=0)) - np.abs(arms).sum(axis=0)
-        return omega[[np.argmin(apart / (np.abs(ray.direction) @ np.abs(arms)))]]
+        centre, radius = free_disc(loop, 1.0, 1.0, omega)
+        growth = free_disc(loop, float(ray.direction[0]), float(ray.direction[1]), omega)[1]
+        # The t at which the disc of free phases first holds -1.
+        return omega[[np.argmin((np.abs(1.0 + centre) - radius) / growth)]]
 
-    search_outwards(
-        loop,
-        look,
-        lambda: ray.end(stop),
-        meeting,
-        likely,
-    )
+    search_outwards(loop, look, lambda: ray.end(stop), meeting, likely)
     return found
 
 
@@ -413,7 +401,7 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
     ------
     TypeError, ValueError
         If `loop` is no `Loop`, the direction is not two finite real numbers or has length
-        zero, or the loop is unstable at (1, 1) itself.
+        zero, or the loop is unstable at (1, 1) itself. A boundary point is allowed there.
     CountError
         If the counts on the two sides of the result contradict it, or gain times delay is too
         large to follow.
@@ -446,17 +434,19 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
         )
     if count != 0 and int(unstable_roots(loop, *ray.at(1e-9 * ray.scale))) != 0:
         return 0.0
-    at = (_first_near(loop, ray) or first_crossing(loop, ray.start, direction)).position
-    if not np.isfinite(at):
-        return at
-    # Closer to the result than to a part in a million, rounding may hide which side it is.
-    for share, allowed in ((0.5, {0}), (1.0 - 1e-6, {0, BOUNDARY}), (1.0 + 1e-6, None)):
-        point = ray.at(share * at)
-        count = int(unstable_roots(loop, *point))
-        if (count == 0) if allowed is None else (count not in allowed):
-            raise CountError(
-                f"the first crossing along {tuple(ray.direction.tolist())} lies at t = {at}, "
-                f"but the count at {point}, {count}, contradicts it",
-                np.array([point]),
-            )
-    return at
+    eps = _first_near(loop, ray)
+    if eps is None:
+        eps = first_crossing(loop, ray.start, direction).position
+    if not np.isfinite(eps):
+        return eps
+    points = [ray.at(share * eps) for share in (0.5, 1.0 - 1e-6, 1.0 + 1e-6)]
+    halfway, before, beyond = (int(unstable_roots(loop, *point)) for point in points)
+    # So close to the result, rounding may hide on which side of the boundary a point is.
+    if halfway != 0 or before not in (0, BOUNDARY) or beyond == 0:
+        raise CountError(
+            f"the first crossing along {tuple(ray.direction.tolist())} lies at {eps}, but "
+            f"the counts half-way, just before and just beyond, {halfway}, {before} and "
+            f"{beyond}, contradict it",
+            np.array(points),
+        )
+    return eps

@@ -1,8 +1,9 @@
 """Along a ray of the parameter plane: every crossing of the axis, and the first break.
 
-On a ray (x, y) = start + t direction the characteristic function is D0 - t M, with D0 its
-value at the start. A root lies on the imaginary axis where t = D0 / M is real, so that the
-crossings of a whole ray are the zeros of Im(D0 conj(M)): one certified walk finds them all.
+On a ray (x, y) = start + t (d1, d2) the characteristic function is D0 - t M, with D0 its value
+at the start, and M = d1 B1 exp(-s theta1) + d2 B2 exp(-s theta2), with the dead time of both. A
+root lies on the imaginary axis where t = D0 / M is real, so that the crossings of a whole ray
+are the zeros of Im(D0 conj(M)): one certified walk finds them all.
 """
 
 from __future__ import annotations
@@ -20,12 +21,12 @@ from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import ComplexArray, FloatArray, IntArray, axis, positive_number
 from armlock.stability import CountError, polished, sign_changes, unstable_roots
 
-#: Parameters this many times the length of the start and the direction are not looked at.
+#: Nothing is looked at where the parameters are this many times as large as the start, or as 1.
 FARTHEST = 1e9
 # Each further walk looks so many times as far along a ray.
 _FURTHER = 10.0
 # Next to the limit of the neutral root chain, roots cross at ever higher frequency. They are
-# followed up to so many turns of the longest delay, about a tenth of a second.
+# followed up to so many turns of the longest delay, which takes about a tenth of a second.
 _TURNS_NEXT_TO_THE_CHAIN = 50_000
 
 
@@ -82,9 +83,10 @@ class Ray:
         return float(x), float(y)
 
     def end(self, t: float) -> float:
-        """Frequency past which no root crosses between 0 and t.
+        """Frequency in rad/s past which no root crosses between 0 and t.
 
         The terms with x and y are convex along the ray, and thus largest at one of its ends.
+        inf where the neutral root chain is not confined, nan where a number overflows.
         """
         points = np.array([self.at(0.0), self.at(t)])
         return float(last_frequency(self.system, *points.T).max())
@@ -92,7 +94,8 @@ class Ray:
     def chain_limit(self) -> float:
         """Smallest t > 0 at which the neutral root chain is not confined, inf if there is none.
 
-        The reserve of the chain is concave in t, and linear between the zeros of x and y.
+        The reserve of the chain is concave in t, and linear except where x or y changes its
+        sign: the `kinks`.
         """
 
         def reserve(t: float) -> float:
@@ -145,7 +148,8 @@ class Ray:
     ) -> Crossings:
         """Find crossings with `lowest` < t <= stop: all, or the first and what ties with it.
 
-        With `intervals` of the axis, shape (n, 2), only those whose frequency lies in them.
+        With `intervals` of the axis, in rad/s and of shape (n, 2), only those whose frequency
+        lies in them, and no counts confirm that rounding hides none.
         """
         end = self.end(stop)
         if end == np.inf:
@@ -164,7 +168,7 @@ class Ray:
             [(0.0, end)] if intervals is None else np.minimum(intervals, end),
             is_map=self.system.step > 0.0,
         )
-        # Rounding hides a stretch, or all signs from the start on.
+        # Stretches in which rounding hides the sign, on the way or from omega = 0 on.
         hidden = bool(((change == 0) | (omega == 0.0) & (width > 0.0)).any())
         omega, change = omega[change != 0], change[change != 0]
         # Only those in reach are worth polishing. Where M vanishes the quotient is not real: a
@@ -185,7 +189,10 @@ class Ray:
         return found
 
     def _confirm(self, found: Crossings, stop: float, *, first: bool) -> None:
-        """Raise if counts at both ends of the ray, or up to the first crossing, contradict."""
+        """Raise if counts at the ends contradict, or one just before the first crossing.
+
+        Counts that cannot be told say nothing.
+        """
         change = int(found.change.sum())
         if first and found.position.size:
             stop, change = (1.0 - 1e-6) * float(found.position[0]), 0
@@ -198,7 +205,7 @@ class Ray:
             )
 
     def reaches(self, stop: float, chain: float) -> Iterator[float]:
-        """Yield growing t up to `stop`, or ever closer to the limit of the chain."""
+        """Yield the t of walk after walk: up to `stop`, or ever closer to the chain's limit."""
         # The boundary of a map ends at one frequency: a single walk sees all of it.
         t = 1e-4 * min(stop, self.scale)
         far = 0.0 if self.system.step else min(stop, 0.5 * chain)

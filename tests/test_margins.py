@@ -192,10 +192,10 @@ def test_counts_contradict_gains_between_which_the_loop_is_not_stable():
     """As they do where rounding hides a crossing."""
     loop = paper_loop()
     lower, upper, _ = gains.gain_interval(loop, 1.0, 1.0)
-    gains._confirm(loop, 1.0, 1.0, lower, upper)
+    gains._require_stable_inside(loop, 1.0, 1.0, lower, upper)
     for low, high in ((0.99 * lower, upper), (lower, 1.01 * upper)):
         with pytest.raises(CountError, match="rounding hides a crossing"):
-            gains._confirm(loop, 1.0, 1.0, low, high)
+            gains._require_stable_inside(loop, 1.0, 1.0, low, high)
 
 
 def test_an_unstable_loop_has_no_margins_and_nothing_to_lose():
