@@ -49,6 +49,20 @@ STABLE = {
     # The disc that L fills at high frequency meets the unit circle.
     "without dynamics, both arms": (Loop(((), (), 0.9), COMMON, 2.2, 9.9), (0.99, 0.99)),
     "negative gain": (Loop(((), (), -0.2), COMMON, 20.1, 19.9), (1.0, 1.0)),
+    # The peak that limits the gain lies past a thousand turns of the delay.
+    "far peak": (
+        Loop(
+            (
+                (0.0, -106.0, 112.0, -3.2 + 396j, -3.2 - 396j),
+                (0.1 + 3j, 0.1 - 3j, -0.5 + 50j, -0.5 - 50j, -200 + 2e4j, -200 - 2e4j),
+                -112.0,
+            ),
+            SINGLE,
+            2.0,
+            1.5,
+        ),
+        (0.01, 1.0),
+    ),
     # 1 - 5 k (2 - 0.1 u - 0.1 v) has no zero where 9 k > 1, and has some just below.
     "large negative gain": (Loop(((), (), -5.0), COMMON, 20.1, 19.9), (0.1, 0.1)),
 }
