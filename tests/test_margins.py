@@ -20,7 +20,7 @@ from armlock import (
     paper_loop,
     unstable_roots,
 )
-from armlock.sensors import COMMON, DIFFERENCE, SINGLE
+from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
 from tests import independent
 from tests.attack import Tally, check_margins, to_loop
 from tests.systems import sketch_of
@@ -45,6 +45,11 @@ STABLE = {
     "dead time": (Loop(((), (0.0,), 3.0), COMMON, 20.1, 19.9, delay=0.03), (1.0, 0.999)),
     "neutral": (Loop(((-3.0,), (-1.0,), 0.2), COMMON, 2.0, 1.5), (0.9, 1.0)),
     "neutral, opposed": (Loop(((-3.0,), (-1.0,), 0.2), DIFFERENCE, 2.0, 1.5), (0.9, 1.0)),
+    # L is the limit of a quotient whose denominator does not begin with one.
+    "neutral, dual arm": (
+        Loop(((-1.0,), (-2.0,), 0.2), dual(3.0, 0.5), 2.0, 1.5, 0.1),
+        (0.9, 1.0),
+    ),
     "without dynamics": (Loop(((), (), 0.3), SINGLE, 2.0, 1.5), (1.5, 1.0)),
     # The disc that L fills at high frequency meets the unit circle.
     "without dynamics, both arms": (Loop(((), (), 0.9), COMMON, 2.2, 9.9), (0.99, 0.99)),
