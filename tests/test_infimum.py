@@ -20,7 +20,8 @@ def discs_ahead(number):
         zeros, poles = roots(rng, few, 0.1, 10.0, 0.3), roots(rng, many, 0.1, 10.0, 0.3)
         mapping = (COMMON, DIFFERENCE, dual(3.0, 0.5))[rng.integers(3)]
         delay = between(rng, 1e-3, 1.0) * rng.integers(2)
-        loop = Loop((zeros, poles, between(rng, 0.1, 10.0)), mapping, 2.0, 1.5, delay)
+        gain = rng.choice([1.0, between(rng, 0.1, 10.0)])
+        loop = Loop((zeros, poles, gain), mapping, 2.0, 1.5, delay)
         c1, c2 = rng.uniform(-2.0, 2.0, 2)
         arms = arm_parameters(loop, c1, c2)
         for omega in 10.0 ** rng.uniform(-1.5, 1.5, 10):
