@@ -96,6 +96,14 @@ def test_margins_are_those_of_branch_and_bound(name):
         assert abs(np.angle(-value)) == pytest.approx(found.phase, abs=1e-9)
 
 
+def test_the_limit_of_the_chain_limits_the_gain():
+    # |L| tends to 0.4 + 0.2 (0.9 + 1), and is there at no frequency.
+    loop, point = STABLE["neutral, dual arm"]
+    found = margins(loop, *point)
+    assert found.gain_upper == pytest.approx(1.0 / 0.78, rel=1e-12)
+    assert found.gain_omega == np.inf
+
+
 @pytest.mark.parametrize("direction", [(0, -1), (1, 0), (0, 1), (-1, 0), (1, -1)])
 def test_the_modulus_margin_vanishes_where_the_loop_breaks(direction):
     """A root next to the axis makes a dip of |1 + L| that hides between samples."""
