@@ -44,6 +44,7 @@ STABLE = {
     "unstable pole": (Loop(((-2.0,), (0.2, -3.0), 1.5), COMMON, 0.3, 0.2), (0.1, 0.2)),
     "dead time": (Loop(((), (0.0,), 3.0), COMMON, 20.1, 19.9, delay=0.03), (1.0, 0.999)),
     "neutral": (Loop(((-3.0,), (-1.0,), 0.2), COMMON, 2.0, 1.5), (0.9, 1.0)),
+    "neutral, single arm": (Loop(((-30.0,), (-1.0,), 0.6), SINGLE, 2.0, 1.5), (0.7, 1.0)),
     "neutral, opposed": (Loop(((-3.0,), (-1.0,), 0.2), DIFFERENCE, 2.0, 1.5), (0.9, 1.0)),
     # L is the limit of a quotient whose denominator does not begin with one.
     "neutral, dual arm": (
