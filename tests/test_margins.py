@@ -15,6 +15,7 @@ from armlock import (
     SingleArm,
     critical_perturbation,
     free_phases,
+    gains,
     margins,
     modulus_margin,
     paper_loop,
@@ -103,6 +104,14 @@ def test_the_limit_of_the_chain_limits_the_gain():
     found = margins(loop, *point)
     assert found.gain_upper == pytest.approx(1.0 / 0.78, rel=1e-12)
     assert found.gain_omega == np.inf
+
+
+def test_the_factors_of_a_loop_show_where_it_is_real():
+    """This is looked at where rounding hides the sign of Im L in sums of exponentials."""
+    loop, point = STABLE["oscillator"]
+    omega = margins(loop, *point).gain_omega
+    stretch = omega + 1e-6 * np.array([[-2.0], [0.5], [1.0]])
+    assert gains._real_within(loop, *point, stretch) == pytest.approx([omega], rel=1e-12)
 
 
 @pytest.mark.parametrize("direction", [(0, -1), (1, 0), (0, 1), (-1, 0), (1, -1)])
