@@ -17,6 +17,7 @@ from armlock import (
 )
 from armlock.rays import first_crossing
 from tests import independent
+from tests.systems import RETARDED
 
 OSCILLATOR = CharacteristicFunction([2.0, 0.3, 1.0], [1.0], [0.0, 1.0], 1.0, 2.5)
 UNSTABLE = CharacteristicFunction([-0.5, 0.2, 1.0], [-1.0, -0.6], [0.7], 0.5, 1.5)
@@ -115,6 +116,11 @@ def test_a_dead_time_is_a_further_delay_of_the_map(order):
     assert fine == pytest.approx(exact, rel=1e-2 if order == 0 else 1e-5)
     with pytest.raises(ValueError, match=r"^step must divide every delay, .* for delay=0.5"):
         semi_discretization(loop, 0.2)
+
+
+def test_a_parameter_without_a_delay_makes_no_affine_map():
+    with pytest.raises(ValueError, match=r"^the free parameter x of .* undelayed signal"):
+        semi_discretization(RETARDED["undelayed first parameter"], 0.25)
 
 
 def test_a_frequency_at_which_the_direction_has_no_effect_is_no_crossing():
