@@ -123,9 +123,10 @@ def test_a_parameter_without_a_delay_makes_no_affine_map():
         semi_discretization(RETARDED["undelayed first parameter"], 0.25)
 
 
-def test_a_frequency_at_which_the_direction_has_no_effect_is_no_crossing():
+@pytest.mark.parametrize("order", [0, 1])
+def test_a_frequency_at_which_the_direction_has_no_effect_is_no_crossing(order):
     """Along (1, -1) the delayed terms cancel at z = -1, where D is real."""
-    system = semi_discretization(CommonArm(gain=1.0), 0.1)
+    system = semi_discretization(CommonArm(gain=1.0), 0.1, order)
     edge = first_crossing(system, (0.0, 0.0), (1.0, -1.0), stop=10.0).position
     around = edge * np.array([1.0 - 1e-9, 1.0 + 1e-9])
     assert unstable_roots(system, around, -around).tolist() == [0, 2]
