@@ -64,6 +64,11 @@ def test_near_the_ideal_point_little_is_lost_to_cancellation():
     assert CommonArm(gain=100.0)(s, 1.0, 1.0) / s == pytest.approx(4001.0, rel=1e-9)
 
 
+def test_a_parameter_that_would_change_the_order_is_refused():
+    with pytest.raises(ValueError, match=r"^b1 without a delay must be of lower degree than A"):
+        CharacteristicFunction([1.0, 1.0], [0.0, 1.0], [1.0], 0.0, 1.0)
+
+
 SYSTEMS_OF_ALL_KINDS = [
     HayesEquation(0.7),
     SingleArm(0.3, 2.0),

@@ -22,7 +22,7 @@ from armlock import (
     paper_loop,
     unstable_roots,
 )
-from armlock.sensors import COMMON, DIFFERENCE, SINGLE
+from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
 from tests import independent
 from tests.attack import Tally, check_margins, to_loop
 from tests.systems import sketch_of
@@ -46,11 +46,31 @@ STABLE = {
     "unstable pole": (Loop(((-2.0,), (0.2, -3.0), 1.5), COMMON, 0.3, 0.2), (0.1, 0.2)),
     "dead time": (Loop(((), (0.0,), 3.0), COMMON, 20.1, 19.9, delay=0.03), (1.0, 0.999)),
     "neutral": (Loop(((-3.0,), (-1.0,), 0.2), COMMON, 2.0, 1.5), (0.9, 1.0)),
+    "neutral, single arm": (Loop(((-30.0,), (-1.0,), 0.6), SINGLE, 2.0, 1.5), (0.7, 1.0)),
     "neutral, opposed": (Loop(((-3.0,), (-1.0,), 0.2), DIFFERENCE, 2.0, 1.5), (0.9, 1.0)),
+    # L is the limit of a quotient whose denominator does not begin with one.
+    "neutral, dual arm": (
+        Loop(((-1.0,), (-2.0,), 0.2), dual(3.0, 0.5), 2.0, 1.5, 0.1),
+        (0.9, 1.0),
+    ),
     "without dynamics": (Loop(((), (), 0.3), SINGLE, 2.0, 1.5), (1.5, 1.0)),
     # The disc that L fills at high frequency meets the unit circle.
     "without dynamics, both arms": (Loop(((), (), 0.9), COMMON, 2.2, 9.9), (0.99, 0.99)),
     "negative gain": (Loop(((), (), -0.2), COMMON, 20.1, 19.9), (1.0, 1.0)),
+    # The peak that limits the gain lies past a thousand turns of the delay.
+    "far peak": (
+        Loop(
+            (
+                (0.0, -106.0, 112.0, -3.2 + 396j, -3.2 - 396j),
+                (0.1 + 3j, 0.1 - 3j, -0.5 + 50j, -0.5 - 50j, -200 + 2e4j, -200 - 2e4j),
+                -112.0,
+            ),
+            SINGLE,
+            2.0,
+            1.5,
+        ),
+        (0.01, 1.0),
+    ),
     # 1 - 5 k (2 - 0.1 u - 0.1 v) has no zero where 9 k > 1, and has some just below.
     "large negative gain": (Loop(((), (), -5.0), COMMON, 20.1, 19.9), (0.1, 0.1)),
 }
@@ -77,6 +97,22 @@ def test_margins_are_those_of_branch_and_bound(name):
         value = complex(loop.open_loop(1j * found.phase_omega, *point))
         assert abs(value) == pytest.approx(1.0, rel=1e-9)
         assert abs(np.angle(-value)) == pytest.approx(found.phase, abs=1e-9)
+
+
+def test_the_limit_of_the_chain_limits_the_gain():
+    # |L| tends to 0.4 + 0.2 (0.9 + 1), and is there at no frequency.
+    loop, point = STABLE["neutral, dual arm"]
+    found = margins(loop, *point)
+    assert found.gain_upper == pytest.approx(1.0 / 0.78, rel=1e-12)
+    assert found.gain_omega == np.inf
+
+
+def test_the_factors_of_a_loop_show_where_it_is_real():
+    """This is looked at where rounding hides the sign of Im L in sums of exponentials."""
+    loop, point = STABLE["oscillator"]
+    omega = margins(loop, *point).gain_omega
+    stretch = omega + 1e-6 * np.array([[-2.0], [0.5], [1.0]])
+    assert gains._real_within(loop, *point, stretch) == pytest.approx([omega], rel=1e-12)
 
 
 @pytest.mark.parametrize("direction", [(0, -1), (1, 0), (0, 1), (-1, 0), (1, -1)])

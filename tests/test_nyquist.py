@@ -31,6 +31,8 @@ module = importlib.import_module("armlock.nyquist")
 CASES = {
     "single arm, ideal": (SingleArm(), (1.0, 1.0), 0),
     "single arm, unstable": (SingleArm(), (1.001, 1.0), 0),
+    # Down to 5e-8 rad/s L looks like a constant of 2010.
+    "single arm, large gain": (SingleArm(100.0, 20.1), (1.0 + 1e-6, 1.0), 0),
     "common arm, many roots": (CommonArm(), (1.3, 1.1), 0),
     "common arm, a rounding away": (CommonArm(), (1.0, 1.0 + 1e-13), 0),
     "dual arm, ideal": (DualArm(), (1.0, 1.0), 0),

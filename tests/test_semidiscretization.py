@@ -17,6 +17,7 @@ from armlock import (
 )
 from armlock.rays import first_crossing
 from tests import independent
+from tests.systems import RETARDED
 
 OSCILLATOR = CharacteristicFunction([2.0, 0.3, 1.0], [1.0], [0.0, 1.0], 1.0, 2.5)
 UNSTABLE = CharacteristicFunction([-0.5, 0.2, 1.0], [-1.0, -0.6], [0.7], 0.5, 1.5)
@@ -117,9 +118,15 @@ def test_a_dead_time_is_a_further_delay_of_the_map(order):
         semi_discretization(loop, 0.2)
 
 
-def test_a_frequency_at_which_the_direction_has_no_effect_is_no_crossing():
+def test_a_parameter_without_a_delay_makes_no_affine_map():
+    with pytest.raises(ValueError, match=r"^the free parameter x of .* undelayed signal"):
+        semi_discretization(RETARDED["undelayed first parameter"], 0.25)
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_a_frequency_at_which_the_direction_has_no_effect_is_no_crossing(order):
     """Along (1, -1) the delayed terms cancel at z = -1, where D is real."""
-    system = semi_discretization(CommonArm(gain=1.0), 0.1)
+    system = semi_discretization(CommonArm(gain=1.0), 0.1, order)
     edge = first_crossing(system, (0.0, 0.0), (1.0, -1.0), stop=10.0).position
     around = edge * np.array([1.0 - 1e-9, 1.0 + 1e-9])
     assert unstable_roots(system, around, -around).tolist() == [0, 2]

@@ -1,0 +1,67 @@
+"""A step of a walk is not called clear if what it looks for is met on it."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from armlock import Loop, infimum
+from armlock.free_phases import arm_factors, arm_parameters
+from armlock.sensors import COMMON, DIFFERENCE, dual
+from tests.attack import between, roots
+
+
+def discs_ahead(number):
+    """A random disc, a step from there, and centre and radius on the way or at the end."""
+    rng = np.random.default_rng(4)
+    for _ in range(number):
+        few, many = sorted(rng.integers(0, 4, 2))
+        zeros, poles = roots(rng, few, 0.1, 10.0, 0.3), roots(rng, many, 0.1, 10.0, 0.3)
+        mapping = (COMMON, DIFFERENCE, dual(3.0, 0.5))[rng.integers(3)]
+        delay = between(rng, 1e-3, 1.0) * rng.integers(2)
+        gain = rng.choice([1.0, between(rng, 0.1, 10.0)])
+        loop = Loop((zeros, poles, gain), mapping, 2.0, 1.5, delay)
+        c1, c2 = rng.uniform(-2.0, 2.0, 2)
+        arms = arm_parameters(loop, c1, c2)
+        for omega in 10.0 ** rng.uniform(-1.5, 1.5, 10):
+            disc = infimum._disc(arm_factors(loop), arms, omega)
+            step = min(0.5 * disc[-1], between(rng, 1e-3, 10.0) * omega)
+            at = omega + step * rng.choice([1.0, rng.random()])
+            first, second = (complex(arm[0]) for arm in loop.arm_responses(np.array([1j * at])))
+            # Next to zero the phase between the two arms is known.
+            apart = np.exp(0.5j * at) if 0.5 * omega < 1.0 else None
+            held, swung = c1 * first, c2 * second
+            spread = abs(held) + abs(swung) if apart is None else abs(held + swung * apart)
+            yield rng, disc, omega, step, at, first + second, spread
+
+
+def test_what_a_step_meets_is_not_called_clear():
+    # What is met by a hair, and what lies ten times as far.
+    met, far = Counter(), Counter()
+    for rng, disc, omega, step, at, centre, spread in discs_ahead(500):
+        ahead = infimum._ahead(disc, step)
+        radius, way = between(rng, 1e-3, 10.0), np.exp(2j * np.pi * rng.random())
+        for tally, share in ((met, 1.0 - 1e-9), (far, 10.0)):
+            point = centre + share * (spread + radius) * way
+            tally["disc"] += infimum._clear(disc, ahead, step, point, radius)
+        tally = met if abs(centre.imag) <= spread else far
+        tally["axis"] += infimum._on_one_side(disc, ahead, step)
+        half = np.sqrt(max(spread**2 - centre.imag**2, 0.0))
+        right, left = centre.real + half, centre.real - half
+        for tally, one, other in (
+            (met, right * (1.0 + 1e-9), 0.5 * right),
+            (met, left * (1.0 - 1e-9), 2.0 * left),
+            (far, 10.0 * left, 20.0 * left),
+        ):
+            if half > 0.0 and other < 0.0:
+                near, end = max(one, other), min(one, other)
+                tally["segment"] += infimum._misses_segment(disc, step, near, end)
+        margins = infimum.free_margins_at(centre, spread, at)
+        for m in np.flatnonzero((margins > 0.0) & (margins < (np.inf, 1.0, np.inf, np.inf))):
+            for tally, share in ((met, 1.0 + 1e-9), (far, 0.1)):
+                levels = share * np.where(np.arange(4) == m, margins, 0.0)
+                tally[f"margin {m}"] += infimum._nothing_smaller(disc, omega, step, levels)
+    assert +met == {}
+    assert len(far) == 7
+    assert min(far.values()) > 50
