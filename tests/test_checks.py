@@ -51,7 +51,7 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     integrating_actuator: {"gain": 1.0},
     stage_one: {"gain": 1.0},
     table_two: {"gain": 1.0, "denominator": "table"},
-    COMMON.response: {"s": 1j, "tau1": 2.0, "tau2": 1.0} | POINT,
+    COMMON.weights: {"s": 1j},
     ARMS: {"s": 1j} | AT,
     ARMS.open_loop: {"s": 1j} | POINT,
     ARMS.derivative: {"s": 1j} | AT,
