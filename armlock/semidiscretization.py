@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from numpy.polynomial import polynomial as poly
 from scipy.linalg import expm
 
 from armlock.characteristic import CharacteristicFunction, checked_system, whole_steps
@@ -287,9 +286,8 @@ def _numerator(flow: FloatArray, older: FloatArray, newer: FloatArray) -> FloatA
     """Ascending coefficients of the numerator from a delayed signal to the first state."""
     from scipy.signal import ss2tf
 
-    output, direct = np.eye(1, flow.shape[0]), np.zeros((1, 1))
-    # The newer sample is the older one a step later, times z.
-    first, second = (
-        ss2tf(flow, column[:, None], output, direct)[0][0, ::-1] for column in (older, newer)
-    )
-    return np.asarray(poly.polyadd(first, np.append(0.0, second)), dtype=np.float64)
+    # z W / (z - flow) = W + flow W / (z - flow), where W is the newer sample's column.
+    column = older + flow @ newer
+    output = np.eye(1, flow.shape[0])
+    above, _ = ss2tf(flow, column[:, None], output, newer[:1, None])
+    return np.asarray(above[0, ::-1], dtype=np.float64)
