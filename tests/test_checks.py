@@ -135,7 +135,7 @@ WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
     (dual, "difference", 0.0, "not be zero"),
     (ARMS.shifted, "sigma", -50.0, "be at most 700 over the longest delay"),
     (armlock.stability_chart, "x", [], "hold at least one value, got 0"),
-    (armlock.stability_chart, "y", 1.0, "be one-dimensional, got shape ()"),
+    (armlock.stability_chart, "y", 1.0, "be of dimension 1, got shape ()"),
     (armlock.d_curve, "system", SingleArm(), "depend on both free parameters"),
     (armlock.d_curve_line, "system", FLAT, "depend on a free parameter at s = 0"),
     (ray_crossings, "start", (0.0,), "hold two numbers, got 1"),
