@@ -10,7 +10,6 @@ import numpy.typing as npt
 from scipy.constants import speed_of_light
 
 from armlock import sensors
-from armlock.checks import FloatArray
 from armlock.controllers import Controller
 from armlock.dcurve import d_curve_line
 from armlock.loops import CommonArm, DualArm, Loop, SingleArm
@@ -58,11 +57,6 @@ def perturbed(name: str, size: npt.ArrayLike) -> tuple[Any, Any]:
     return 1.0 + size * OUTWARD[name][0], 1.0 + size * OUTWARD[name][1]
 
 
-def growth_beside_ideal(name: str, size: npt.ArrayLike) -> FloatArray:
-    """Return the real part of the rightmost root, in 1/s, `size` away from (1, 1)."""
-    return np.real(np.asarray(rightmost_root(LOOPS[name], *perturbed(name, size))))
-
-
 def _readings(gain: float) -> list[tuple[str, float, Loop]]:
     """Return name, p and loop of the configurations, the dual arm's for each p and dtau."""
     return [
@@ -97,7 +91,8 @@ def ideal_point_on_boundary() -> Finding:
     used = {COMMON_ARM_GAIN, DUAL_ARM_GAIN}
     tried = [(*reading, g) for g in (*used, 0.1, CONTROLLER_GAIN) for reading in _readings(g)]
     off = [(p, g) for name, p, loop, g in tried if not _on_edge(name, loop)]
-    days = [1.0 / float(growth_beside_ideal(k, PERTURBATION)) / 86400.0 for k in LOOPS]
+    roots = [rightmost_root(loop, *perturbed(k, PERTURBATION)) for k, loop in LOOPS.items()]
+    days = [1.0 / complex(root).real / 86400.0 for root in roots]
     return Finding(
         decide(not used & {g for _, g in off}, beyond=not off),
         len(off),
