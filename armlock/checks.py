@@ -35,16 +35,10 @@ def positive_number(name: str, value: object) -> float:
     return number
 
 
-def whole_number(name: str, value: object, lowest: int, highest: int | None = None) -> int:
-    """Return a Python or NumPy integer between two bounds, ends included, or raise."""
-    end = "on" if highest is None else f"to {highest}"
-    if (
-        isinstance(value, bool)
-        or not isinstance(value, int | np.integer)
-        or value < lowest
-        or (highest is not None and value > highest)
-    ):
-        raise ValueError(f"{name} must be an integer from {lowest} {end}, got {value!r}")
+def whole_number(name: str, value: object, lowest: int) -> int:
+    """Return a Python or NumPy integer that is no smaller than a bound, or raise."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < lowest:
+        raise ValueError(f"{name} must be an integer from {lowest} on, got {value!r}")
     return int(value)
 
 
