@@ -35,3 +35,16 @@ def test_random_loops_agree_with_brute_force(kind):
     tally = attack.attack(seed, range(10), (kind,), attack.Tally(patient=False))
     assert tally.calls.total() > tally.calls["loops"]
     assert listed(tally) == []
+
+
+@pytest.mark.parametrize(
+    ("seed", "loop", "kind"),
+    [
+        (8, 931, "rays"),  # a walk crawled where terms cancel to rounding
+        (8, 6441, "margins"),  # the last frequency was bounded ten times too high
+        (9, 394, "margins"),  # the nearest gain lies far above the first turns
+    ],
+)
+def test_loops_that_were_refused_or_late_are_answered(seed, loop, kind):
+    tally = attack.attack(seed, [loop], (kind,), attack.Tally(patient=False))
+    assert listed(tally) == []
