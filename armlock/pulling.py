@@ -83,12 +83,11 @@ def pulling(
     unstable = int(unstable_roots(loop, 1.0, 1.0))
     if unstable > 0:
         raise ValueError(f"loop must be stable at c1 = c2 = 1, got {unstable} unstable roots")
-    errors = [_error("common", common), _error("differential", differential)]
-    roots = _found(loop)
     total = np.zeros(t.shape)
-    for source, error in zip(("common", "differential"), errors, strict=True):
+    for source, values in (("common", common), ("differential", differential)):
+        error = _error(source, values)
         if error.any():
-            total += _residues(loop, roots, t, source, error)
+            total += _residues(loop, t, source, error)
     return total
 
 
@@ -199,10 +198,9 @@ def _input(error: FloatArray, s: ComplexArray) -> ComplexArray:
     return np.asarray(error[0] / s + error[1] / s**2 + error[2] / s**3)
 
 
-def _residues(
-    loop: Loop, roots: ComplexArray, t: FloatArray, source: str, error: FloatArray
-) -> FloatArray:
+def _residues(loop: Loop, t: FloatArray, source: str, error: FloatArray) -> FloatArray:
     """Add up the residues of Y(s) nu(s) exp(s t) at s = 0 and at the loop's own roots."""
+    roots = _found(loop)
     first, second = loop.arm_responses(roots)
     over = 0.5 * (first + second if source == "common" else first - second)
     residue = -over / _slope(loop, roots) * _input(error, roots)
