@@ -2,6 +2,7 @@ import os
 import subprocess
 import sys
 
+import mpmath
 import numpy as np
 import pytest
 from numpy.polynomial.polynomial import polyval
@@ -9,6 +10,7 @@ from numpy.polynomial.polynomial import polyval
 from armlock import CommonArm, contour, exponentials, paper_loop, unstable_roots
 from armlock.bounds import last_frequency
 from armlock.stability import _compiled
+from tests.attack import roots
 from tests.systems import NEUTRAL, RETARDED
 
 
@@ -102,6 +104,58 @@ def test_a_piece_reaches_as_far_as_equal_roots_allow(number):
     expected = 1.5 * 5.0 / (number - 1.5)
     found = exponentials._reach(roots, starts, 4.0, np.inf, 1.5)
     assert found == pytest.approx(expected, rel=1e-2)
+
+
+def random_sum(degree, rng):
+    """A sum of two polynomials, times exponentials, and the same in forty digits."""
+    parts = []
+    for number in (degree, degree // 2):
+        found = roots(rng, number, 1e-2, 1e3, 0.5)
+        coefficients = np.poly(found).real[::-1]
+        parts.append(exponentials.Polynomial(coefficients, np.array(found, complex)))
+    phases, weights = rng.uniform(-3.0, 3.0, 2), rng.normal(size=(2, 2))
+    whole = exponentials.ExponentialSum(tuple(parts), weights, phases, weights.sum(axis=0))
+
+    def value(p, s):
+        if degree <= exponentials.LOW_DEGREE:
+            return mpmath.polyval(p.coefficients.tolist(), s, asc=True)
+        return p.coefficients[-1] * mpmath.fprod(s - mpmath.mpc(root) for root in p.roots)
+
+    def exact(omega):
+        s, late = mpmath.mpc(0, omega), [mpmath.expj(omega * mpmath.mpf(t)) for t in phases]
+        return sum(
+            value(p, s) * mpmath.fdot(weights[:, k].tolist(), late) for k, p in enumerate(parts)
+        )
+
+    return whole, exact
+
+
+@pytest.mark.parametrize("degree", [2, 12, 30, 60])
+@pytest.mark.parametrize("omega", [0.0, 0.03, 2.0, 3e4])
+def test_a_piece_holds_a_sum_and_bounds_what_it_leaves_out(degree, omega):
+    whole, exact = random_sum(degree, np.random.default_rng(degree))
+    start, reach, local, sizes = exponentials.piece(
+        whole.compiled(), whole.weights, whole.sums, omega, 0.5
+    )
+    rounding = exponentials.rounding_bound(start, reach, sizes, whole.phases, 8.0)
+    bends = [exponentials.curvature_bound(start, reach, local, whole.phases)]
+    if omega == 0.0:
+        bends.append(exponentials.curvature_from_zero(reach, local, whole.phases))
+    with mpmath.workdps(40):
+        # A piece is divided by a power of two.
+        at = omega + reach
+        found = exponentials.evaluate(start, reach, local, whole.phases, at)[0]
+        unit = 2.0 ** round(float(mpmath.log(abs(exact(at) / found), 2)))
+        for u in (0.01, 0.4, 1.0):
+            at = omega + u * reach
+            value, slope = exponentials.evaluate(start, reach, local, whole.phases, at)
+            error = exponentials.real_horner(rounding, u)
+            assert abs(value - exact(at) / unit) <= error
+            changes = [mpmath.diff(exact, at, n) / unit for n in (1, 2)]
+            assert abs(slope - changes[0]) <= 1e3 * error / reach + 1e-9 * abs(slope)
+            sizes = abs(changes[1]), abs(changes[1].imag)
+            for size, bend in zip(sizes, bends, strict=False):
+                assert size <= exponentials.real_horner(bend, u) * (1.0 + 1e-6)
 
 
 def test_the_last_frequency_is_close_to_where_one_term_outgrows_the_others():
