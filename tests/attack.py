@@ -372,10 +372,10 @@ def confined_until(sketch, start, way, stop):
     def good(t):
         return View(sketch, *(start + t * way)).confined()
 
-    if not sketch.neutral or good(stop):
-        return stop
     if not good(0.0):
         return 0.0
+    if good(stop):
+        return stop
     low, high = 0.0, stop
     for _ in range(60):
         middle = 0.5 * (low + high)
