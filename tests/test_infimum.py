@@ -38,7 +38,8 @@ def discs_ahead(number):
 
 def test_what_a_step_meets_is_not_called_clear():
     # What is met by a hair, and what lies ten times as far.
-    met, far = Counter(), Counter()
+    met: Counter[str] = Counter()
+    far: Counter[str] = Counter()
     for rng, disc, omega, step, at, centre, spread in discs_ahead(500):
         ahead = infimum._ahead(disc, step)
         radius, way = between(rng, 1e-3, 10.0), np.exp(2j * np.pi * rng.random())
