@@ -102,12 +102,15 @@ def _last_frequency(
         shares[i] *= scale
         shares[i] += factors[i] * np.sqrt(squares[i + 1, top])
     bound = _outgrown_from(squares, factors, shares)
-    if 0.0 < bound < np.inf:
-        # Nearer to equality, and to the frequency: the shares that the terms have there.
+    # Nearer to equality, and to the frequency: the shares that the terms have there.
+    nearer = bound
+    while 0.0 < nearer < np.inf:
+        bound = nearer
         for i in range(factors.size):
             shares[i] = factors[i] * np.sqrt(max(real_horner(squares[i + 1], bound), 0.0))
         nearer = _outgrown_from(squares, factors, shares)
-        bound = min(bound, nearer) if nearer >= 0.0 else bound
+        if not nearer < 0.9 * bound:
+            break
     return float(np.sqrt(bound) * unit)
 
 

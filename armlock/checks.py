@@ -35,16 +35,10 @@ def positive_number(name: str, value: object) -> float:
     return number
 
 
-def whole_number(name: str, value: object, lowest: int, highest: int | None = None) -> int:
-    """Return a Python or NumPy integer between two bounds, ends included, or raise."""
-    end = "on" if highest is None else f"to {highest}"
-    if (
-        isinstance(value, bool)
-        or not isinstance(value, int | np.integer)
-        or value < lowest
-        or (highest is not None and value > highest)
-    ):
-        raise ValueError(f"{name} must be an integer from {lowest} {end}, got {value!r}")
+def whole_number(name: str, value: object, lowest: int) -> int:
+    """Return a Python or NumPy integer that is no smaller than a bound, or raise."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < lowest:
+        raise ValueError(f"{name} must be an integer from {lowest} on, got {value!r}")
     return int(value)
 
 
@@ -78,20 +72,19 @@ def complex_array(name: str, value: object) -> ComplexArray:
 
 def axis(name: str, value: object) -> FloatArray:
     """Return a copy of `value` as a one-dimensional finite float array, or raise."""
-    array = _one_dimensional(name, real_array(name, value))
+    array = finite_series(name, value)
     if array.size == 0:
         raise ValueError(f"{name} must hold at least one value, got 0")
-    return array
+    return array.copy()
 
 
 def finite_series(name: str, value: object, *dimensions: int) -> FloatArray:
     """Return a finite float array of one dimension, or of those given; it is not copied."""
     array = _numbers(name, value, _REAL).astype(np.float64, copy=False)
-    if dimensions in ((), (1,)):
-        return _one_dimensional(name, array)
-    if array.ndim not in dimensions:
-        many = " or ".join(map(str, dimensions))
-        raise ValueError(f"{name} must have {many} dimensions, got shape {array.shape}")
+    allowed = dimensions or (1,)
+    if array.ndim not in allowed:
+        many = " or ".join(map(str, allowed))
+        raise ValueError(f"{name} must be of dimension {many}, got shape {array.shape}")
     return array
 
 
@@ -145,11 +138,4 @@ def _numbers(name: str, value: object, kinds: str) -> npt.NDArray[Any]:
         first = tuple(int(at) for at in np.argwhere(~finite)[0])
         place = f" at index {', '.join(map(str, first))}" if first else ""
         raise ValueError(f"{name} must be finite, got {array[first]}{place}")
-    return array
-
-
-def _one_dimensional(name: str, array: FloatArray) -> FloatArray:
-    """Return the array, or raise if it has not one dimension."""
-    if array.ndim != 1:
-        raise ValueError(f"{name} must be one-dimensional, got shape {array.shape}")
     return array

@@ -55,10 +55,10 @@ UNTRIED = -5
 
 # Turns of the longest delay after which `winding` tries again to follow the slow terms alone.
 _BLOCK = 32.0
-# Most steps of one walk, about ten a turn of the longest delay: some five seconds.
-MOST_STEPS = 20_000_000
+# Most steps of one walk, about ten a turn of the longest delay: some three seconds.
+MOST_STEPS = 10_000_000
 # No walk begins that turns the fastest exponential by more radians: it would not end.
-MOST_RADIANS = 10.0 * MOST_STEPS
+MOST_RADIANS = 20.0 * MOST_STEPS
 # Most zeros that a walk keeps: about a gigabyte.
 MOST_ZEROS = 30_000_000
 # Most samples of a grid.
@@ -451,7 +451,7 @@ def imaginary_zeros(
         return zeros[:0], False
     found, steps, sign = 0, 0, 0
     omega, last_clear, step = omega_start, omega_start, omega_end
-    doubtful = True
+    doubtful, crawled, caution = True, 0, 1.0
     fastest = np.abs(phases).max() if phases.size else 0.0
     while omega < omega_end and steps <= MOST_STEPS and found <= MOST_ZEROS:
         start, reach, local, sizes = piece(polynomials, weights, sums, omega, np.inf)
@@ -490,12 +490,17 @@ def imaginary_zeros(
                     stretch = 0.25 * (omega - last_clear)
                     certified = max(certified, unresolved, stretch, 1e-14 * omega_end)
                 step = min(step, certified)
+                # Next to rounding the terms may cancel so far that bounds allow no progress.
+                short = step < 1e-6 * min(omega, 1.0 / max(fastest, 1e-300))
+                crawled = crawled + 1 if short and not doubtful else 0
+                if crawled > 1000:
+                    caution = 1e3
             following = end if step >= end - omega else omega + step
             old_h = h
             value, slope = evaluate(start, reach, local, phases, following)
             h, dh = value.imag, slope.imag
-            if abs(h) > real_horner(error, (following - start) / reach):
-                now = 1 if h > 0.0 else -1
+            if abs(h) > caution * real_horner(error, (following - start) / reach):
+                now, caution = 1 if h > 0.0 else -1, 1.0
                 if now != sign or doubtful:
                     if found == zeros.shape[0]:
                         zeros = np.concatenate((zeros, np.empty_like(zeros)))

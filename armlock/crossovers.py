@@ -7,8 +7,6 @@ margin than is known.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
 
@@ -25,11 +23,13 @@ from armlock.free_phases import (
     limit_disc,
     limit_margins,
     meeting_intervals,
+    no_margin,
     polynomial_sum,
+    search_outwards,
 )
 from armlock.loops import Loop
 from armlock.nyquist import loop_numerator
-from armlock.stability import CountError, polished, sign_changes
+from armlock.stability import polished, sign_changes
 
 # Crossovers that are polished: those with the smallest margins.
 _POLISHED = 8
@@ -38,40 +38,36 @@ _POLISHED = 8
 def axis_zeros(
     whole: ExponentialSum, intervals: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray]:
-    """Zeros of the imaginary part on intervals of the axis, and where rounding may hide some.
+    """Zeros of the imaginary part on intervals of the axis, and stretches that may hide some.
 
-    Of each stretch that hides some, its two ends and its middle, in a column.
+    In rad/s. The stretches have shape (3, n): the lower ends, the middles, the upper ends.
     """
-    parts: list[tuple[npt.NDArray[Any], ...]] = [(np.empty(0),) * 3]
-    for start, end in np.reshape(intervals, (-1, 2)):
-        parts.append(sign_changes(whole, float(end), start=float(start)))
-    omega, jump, width = (np.concatenate(part) for part in zip(*parts, strict=True))
+    omega, jump, width = sign_changes(whole, intervals)
     hidden = jump == 0
     stretches = omega[hidden] + np.outer((-1.0, 0.0, 1.0), width[hidden])
     return omega[~hidden & (omega > 0.0)], stretches[:, stretches[0] > 0.0]
 
 
-def around(omega: FloatArray, reach: float, span: tuple[float, float]) -> FloatArray:
-    """Intervals around frequencies, cut to a span of the axis."""
-    return np.column_stack((omega - reach, omega + reach)).clip(*span)
-
-
 def _on_unit_circle(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArray:
     """Move frequencies next to crossovers to where |L|, from its factors, is one."""
-    # Not past the next null of an arm.
+    # Far less than the distance between two nulls of an arm.
     span = np.minimum(0.01 / loop.longest_delay, 0.5 * omega)
     reaches = [np.minimum(10.0**power * omega, span) for power in range(-13, 0)]
     return polished(lambda at: _level(loop, c1, c2, at), omega, reaches)
 
 
 def _level(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArray:
+    """Return ln |L|."""
     return np.asarray(np.log(np.abs(loop.open_loop(1j * omega, c1, c2))))
 
 
 def _crossovers(
     loop: Loop, c1: float, c2: float, intervals: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray]:
-    """Frequencies with |L| = 1 on intervals of the axis, and where rounding hides if it is."""
+    """Frequencies with |L| = 1 on intervals of the axis, and stretches that may hide some.
+
+    As `axis_zeros` returns them.
+    """
     above, below = loop_numerator(loop, c1, c2), loop.rest_on_boundary()
     squares = above.times_conjugate(above).plus(below.times_conjugate(below).scaled(-1.0))
     omega, hidden = axis_zeros(squares.turned(), intervals)
@@ -79,11 +75,7 @@ def _crossovers(
     moved = _on_unit_circle(loop, c1, c2, omega[far])
     lost = moved[np.abs(_level(loop, c1, c2, moved)) > TOLERANCE]
     if lost.size:
-        raise CountError(
-            f"no margin at (c1, c2) = ({c1}, {c2}): rounding hides where |L| comes to one "
-            f"around {lost[0]} rad/s",
-            np.array([[c1, c2]]),
-        )
+        raise no_margin(c1, c2, f"rounding hides where |L| comes to one around {lost[0]} rad/s")
     omega[far] = moved
     return omega, hidden
 
@@ -91,7 +83,10 @@ def _crossovers(
 def _least_lags(
     loop: Loop, c1: float, c2: float, omega: FloatArray
 ) -> tuple[float, float, float]:
-    """Smallest phase and delay margins at crossovers, and where the former is taken."""
+    """Smallest phase margin in rad, smallest delay margin in s, and where the former is taken.
+
+    Of crossovers at given frequencies; inf, inf and nan if there are none.
+    """
 
     def lags(at: FloatArray) -> tuple[FloatArray, FloatArray]:
         lag = np.mod(np.angle(loop.open_loop(1j * at, c1, c2)) + np.pi, 2.0 * np.pi)
@@ -100,31 +95,29 @@ def _least_lags(
 
     if not omega.size:
         return np.inf, np.inf, np.nan
-    lag, nearest = lags(omega)
-    chosen = np.concatenate(
-        (np.argsort(nearest)[:_POLISHED], np.argsort(lag / omega)[:_POLISHED])
-    )
+    lag, turn = lags(omega)
+    chosen = np.concatenate((np.argsort(turn)[:_POLISHED], np.argsort(lag / omega)[:_POLISHED]))
     at = _on_unit_circle(loop, c1, c2, omega[np.unique(chosen)])
-    lag, nearest = lags(at)
-    worst = int(np.argmin(nearest))
-    return float(nearest[worst]), float(np.min(lag / at)), float(at[worst])
+    lag, turn = lags(at)
+    worst = int(np.argmin(turn))
+    return float(turn[worst]), float(np.min(lag / at)), float(at[worst])
 
 
 def settled_from(loop: Loop, c1: float, c2: float, phase: float) -> float:
-    """Frequency past which no phase margin of a neutral loop is below a number.
+    """Frequency in rad/s past which a neutral loop has no smaller phase margin than a number.
 
-    Past it the disc of L is so close to its limit that what it may hold of the unit circle
-    does not come closer to -1, by more than the share TOLERANCE.
+    Smaller means by more than the share TOLERANCE. Past it the disc of L is so close to its
+    limit that what it may hold of the unit circle comes no closer to -1.
     """
     centre, radius = limit_disc(loop, c1, c2)
 
-    def nearby(near: float) -> float:
-        limit = infimum.free_margins_at(complex(centre), radius + near, np.inf)
+    def phase_within(slack: float) -> float:
+        limit = infimum.free_margins_at(complex(centre), radius + slack, np.inf)
         return float(limit[infimum.PHASE])
 
-    near = 1e-3
-    while nearby(near) < (1.0 - TOLERANCE) * phase and near > 1e-12:
-        near *= 0.1
+    slack = 1e-3
+    while phase_within(slack) < (1.0 - TOLERANCE) * phase and slack > 1e-12:
+        slack *= 0.1
     shares = [
         float(b[-1] / loop.rest[-1]) if b.size == loop.rest.size else 0.0
         for b in (loop.b1, loop.b2)
@@ -137,53 +130,48 @@ def settled_from(loop: Loop, c1: float, c2: float, phase: float) -> float:
         # The highest power cancels.
         remainder[loop.rest.size - 1 :] = 0.0
     weights = 1.0 + np.abs([c1, c2])
-    return last_larger(loop.rest, (left[0], left[1]), weights / near)
+    return last_larger(loop.rest, (left[0], left[1]), weights / slack)
 
 
 def phase_and_delay(
     loop: Loop, c1: float, c2: float, highest: float
 ) -> tuple[float, float, float]:
-    """Phase margin, delay margin, and the frequency of the former, up to `highest`.
+    """Phase margin in rad, delay margin in s, and the frequency of the former, in rad/s.
+
+    Of crossovers up to the frequency `highest`, which is inf unless phases are free above it.
 
     A neutral loop may have crossovers without end. Then its delay margin is zero, and its
     phase margin may be that of the disc that L fills at high frequency.
-
-    First come crossovers that are likely to have the smallest margins: those of the first
-    turns of the delays, and those next to where free phases would have them. The others are
-    looked for only where free phases would allow smaller ones.
     """
     phase, delay, where = np.inf, np.inf, np.nan
-    end = last_crossover(loop, arm_weights(loop, c1, c2))
+    last = last_crossover(loop, arm_weights(loop, c1, c2))
     if not np.isfinite(highest):
         limit = limit_margins(loop, c1, c2)
         phase, delay = float(limit[infimum.PHASE]), float(limit[infimum.DELAY])
         where = np.inf if delay == 0.0 else np.nan
-        if not np.isfinite(end):
-            end = settled_from(loop, c1, c2, phase)
-    end, turn = min(end, highest), 2.0 * np.pi / loop.longest_delay
-    first = min(end, 1e3 * turn)
-    intervals = np.array([[0.0, first]])
-    if end > first:
-        omega = np.geomspace(first, end, 400)
+        if not np.isfinite(last):
+            last = settled_from(loop, c1, c2, phase)
+
+    def meeting(span: tuple[float, float]) -> FloatArray:
+        return meeting_intervals(loop, c1, c2, span, levels=(0.0, 0.0, phase, delay))
+
+    def likely(omega: FloatArray) -> FloatArray:
         free = infimum.free_margins_over(arm_factors(loop), arm_parameters(loop, c1, c2), omega)
-        nearest = omega[np.argmin(free[:, [infimum.PHASE, infimum.DELAY]], axis=0)]
-        likely = around(nearest, 300.0 * turn, (first, end))
-        intervals = np.concatenate((intervals, likely))
-    for last in (False, True):
+        nearest: FloatArray = omega[np.argmin(free[:, infimum.PHASE :], axis=0)]
+        return nearest
+
+    def look(intervals: FloatArray) -> None:
+        nonlocal phase, delay, where
         omega, hidden = _crossovers(loop, c1, c2, intervals)
         found = _least_lags(loop, c1, c2, omega)
         perhaps = _least_lags(loop, c1, c2, hidden.ravel())
         if perhaps[0] < min(phase, found[0]) or perhaps[1] < min(delay, found[1]):
-            raise CountError(
-                f"no margin at (c1, c2) = ({c1}, {c2}): rounding hides whether |L| comes to "
-                f"one around {perhaps[2]} rad/s",
-                np.array([[c1, c2]]),
+            raise no_margin(
+                c1, c2, f"rounding hides whether |L| comes to one around {perhaps[2]} rad/s"
             )
         if found[0] < phase:
             phase, where = found[0], found[2]
         delay = min(delay, found[1])
-        if last or end == first:
-            break
-        levels = 0.0, 0.0, phase, delay
-        intervals = meeting_intervals(loop, c1, c2, (first, end), levels=levels)
+
+    search_outwards(loop, look, lambda: min(last, highest), meeting, likely)
     return phase, delay, where

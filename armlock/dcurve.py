@@ -254,7 +254,7 @@ def d_curve_branches(
     check_memory("omega_max", (int(min(density * turns, 1e18)),), 256)
     _, b1, b2 = system.on_boundary()
     determinant = b1.times_conjugate(b2)
-    poles = sign_changes(determinant, omega_max)[0]
+    poles = sign_changes(determinant, [(0.0, omega_max)])[0]
     edges = np.unique(np.concatenate(([0.0], poles, [omega_max])))
     branches = []
     for start, stop in pairwise(edges):

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -308,11 +308,12 @@ def edge_crossings(loop: Loop, size: float, free_above: float | None = None) -> 
     highest = _checked_end(loop, size, free_above)
     if not highest:
         return UNCONFINED
+    intervals = [(0.0, highest)] if math.isfinite(highest) else None
+    corners = 1.0 + size * _CORNERS
+    edges = np.roll(corners, -1, axis=0) - corners
     return sum(
-        Ray(loop, corner, following - corner).crossings(1.0, highest=highest).position.size
-        for corner, following in zip(
-            1.0 + size * _CORNERS, 1.0 + size * np.roll(_CORNERS, -1, axis=0), strict=True
-        )
+        Ray(loop, corner, edge).crossings(1.0, intervals=intervals).position.size
+        for corner, edge in zip(corners, edges, strict=True)
     )
 
 
@@ -401,20 +402,17 @@ class _Judge:
         free_gain: bool,
     ) -> None:
         self.start, self.box, self.free_gain = start, box, free_gain
-        k = start.controller
-        self.factors = [
-            [(r.real, roots.count(r)) for r in sorted(set(roots), key=abs) if r]
-            for roots in (k.zeros, k.poles)
-        ]
-        self.at_zero = k.zeros.count(0.0) - k.poles.count(0.0)
-        self.goal = 1j * 2.0 * np.pi * goal[0], goal[1]
-        # With a free gain, the size of K in the middle of the goal is the parameter.
-        self.middle = 1j * math.exp(float(np.log(self.goal[0].imag).mean()))
-        corners = [-value for group in self.factors for value, _ in group]
-        own = [math.log10(value) for value in corners]
-        size = [math.log10(abs(complex(k(self.middle))))] if free_gain else []
-        self.x = np.array([*own, *size])
-        self.omega, self.low, ring = _samples(start, corners, free_above)
+        self.goal = 2j * np.pi * goal[0], goal[1]
+        # Equal zeros are one parameter, and so are equal poles.
+        zeros, self.zeros_of = _distinct(start.controller.zeros)
+        poles, self.poles_of = _distinct(start.controller.poles)
+        corners = np.concatenate((zeros, poles))
+        self.poles_of += zeros.size
+        # With a free gain, the size of K in the middle of the goal is the last parameter.
+        self.middle = 1j * np.exp(np.log(self.goal[0].imag).mean())
+        size = [abs(start.controller(self.middle))] if free_gain else []
+        self.x = np.log10(np.append(corners, size))
+        self.omega, self.low, ring = _samples(start, corners.tolist(), free_above)
         s = 1j * self.omega
         self.s, self.ring = s, ring - self.low
         dead = np.exp(-s * start.delay)
@@ -423,18 +421,13 @@ class _Judge:
 
     def controller(self, x: FloatArray) -> Controller:
         """Return the controller of a candidate."""
-        found: list[list[float]] = [[], []]
-        k = 0
-        for own, group in zip(found, self.factors, strict=True):
-            for _, count in group:
-                own.extend([-(10.0 ** float(x[k]))] * count)
-                k += 1
-        zeros = [0.0] * max(self.at_zero, 0) + found[0]
-        poles = [0.0] * max(-self.at_zero, 0) + found[1]
-        gain = self.start.controller.gain
+        old, values = self.start.controller, 10.0**x
+        zeros = [0.0] * old.zeros.count(0.0) + (-values[self.zeros_of]).tolist()
+        poles = [0.0] * old.poles.count(0.0) + (-values[self.poles_of]).tolist()
+        gain = old.gain
         if self.free_gain:
-            one = Controller(zeros, poles, 1.0)
-            gain = math.copysign(10.0 ** float(x[-1]) / abs(complex(one(self.middle))), gain)
+            one = Controller(zeros, poles, math.copysign(1.0, gain))
+            gain = one.gain * float(values[-1] / abs(one(self.middle)))
         return Controller(zeros, poles, gain)
 
     def loop(self, x: FloatArray) -> Loop:
@@ -494,21 +487,23 @@ class _Judge:
         half = np.where(radius > 0.0, np.arccos(np.clip(cosine, -1.0, 1.0)), 0.0)
         lag = np.mod(np.angle(-centre), 2.0 * np.pi)
         near = np.minimum(lag, 2.0 * np.pi - lag) - half
+        # From the last sample at which |L| may exceed one it falls to the one after it.
         most = np.log(size[0] + radius[0])
-        last = int(np.flatnonzero(most >= 0.0)[-1]) if (most >= 0.0).any() else -1
-        unity, delay = 0.0, math.inf
-        if last == most.size - 1:
-            unity, delay = math.inf, 0.0
-        elif last >= 0:
-            w, share = self.omega, most[last] / (most[last] - most[last + 1])
-            unity = float(w[last] * (w[last + 1] / w[last]) ** share) / (2.0 * np.pi)
-            delay = float(((lag - half) / w)[0, crosses[0]].min(initial=math.inf))
+        last = int(np.flatnonzero(most >= 0.0).max(initial=0))
+        falls = slice(last, last + 2)
+        unity = np.exp(np.interp(0.0, -most[falls], np.log(self.omega[falls])))
+        delay = ((lag - half) / self.omega)[0, crosses[0]].min(initial=math.inf)
         return {
             "phase": float(near[0, crosses[0]].min(initial=np.pi)),
             "phase in the box": float(near[crosses].min(initial=np.pi)),
-            "dead time": delay,
-            "unity gain": unity,
+            "dead time": 0.0 if most[-1] >= 0.0 else float(delay),
+            "unity gain": float(unity) / (2.0 * np.pi),
         }
+
+
+def _distinct(roots: Sequence[complex]) -> tuple[FloatArray, IntArray]:
+    """Return the sizes that roots other than zero have, and which of them each one has."""
+    return np.unique([abs(root) for root in roots if root], return_inverse=True)
 
 
 def _samples(
@@ -739,17 +734,10 @@ def _local(
     evaluations = 0
     for size in (0.05, 0.02, 0.005):
         simplex = np.clip(np.vstack((x, x + size * np.eye(x.size))), *limits.T)
-        options = {"initial_simplex": simplex, "adaptive": True, "maxfev": 150 * x.size}
-        found = minimize(
-            cost,
-            x,
-            method="Nelder-Mead",
-            bounds=limits,
-            options={**options, "xatol": 1e-5, "fatol": 1e-7},
-        )
-        evaluations += int(found.nfev)
-        if found.fun <= cost(x):
-            x = found.x
+        options: dict[str, Any] = {"initial_simplex": simplex, "adaptive": True}
+        options |= {"maxfev": 150 * x.size, "xatol": 1e-5, "fatol": 1e-7}
+        found = minimize(cost, x, method="Nelder-Mead", bounds=limits, options=options)
+        x, evaluations = found.x, evaluations + int(found.nfev)
     return x, evaluations
 
 
@@ -776,7 +764,7 @@ def _certified(
 ) -> float:
     """Return a measure of a loop; `points` are its margins at (1, 1) and in the corners."""
     if name == "critical perturbation":
-        return critical_perturbation(loop, _DIRECTION, free_above)
+        return critical_perturbation(loop, _DIRECTION)
     if name == "unity gain":
         return last_crossover(loop, np.ones(2)) / (2.0 * math.pi)
     plain = name.removesuffix(" in the box")

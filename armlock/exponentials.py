@@ -14,6 +14,7 @@ bound on its rounding error. The walks of `armlock.contour` and `armlock.infimum
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -90,6 +91,19 @@ class Polynomial(NamedTuple):
         return Polynomial(product, np.concatenate((self.roots, -other.roots)), (self, other))
 
 
+def _gathered(
+    weights: Sequence[npt.NDArray[Any]], phases: Sequence[float]
+) -> tuple[npt.NDArray[Any], FloatArray]:
+    """Add up the weights of equal phases; those that only rounding tells apart are equal."""
+    every = np.array(phases)
+    order = np.argsort(every, kind="stable")
+    first = np.diff(every[order], prepend=-np.inf) > 4.0 * EPSILON * np.abs(every).max()
+    groups = np.cumsum(first) - 1
+    gathered = np.zeros((groups[-1] + 1, weights[0].size), dtype=weights[0].dtype)
+    np.add.at(gathered, groups, np.array(weights)[order])
+    return gathered, every[order][first]
+
+
 class ExponentialSum(NamedTuple):
     r"""A function of s = j omega: polynomials times exponentials, added up.
 
@@ -131,13 +145,9 @@ class ExponentialSum(NamedTuple):
             for w, phase in zip(self.weights, self.phases, strict=True)
             for v, other_phase in zip(other.weights, other.phases, strict=True)
         ]
-        phases = np.array(sorted({phase for _, phase in pairs}))
-        weights = np.zeros((phases.size, len(products)))
-        for weight, phase in pairs:
-            weights[np.searchsorted(phases, phase)] += weight
-        return ExponentialSum(
-            products, weights, phases, np.outer(self.sums, other.sums).ravel()
-        )
+        weights, phases = _gathered(*zip(*pairs, strict=True))
+        sums = np.outer(self.sums, other.sums).ravel()
+        return ExponentialSum(products, weights, phases, sums)
 
     def scaled(self, weight: float) -> ExponentialSum:
         """Return this sum times a number."""
@@ -145,10 +155,9 @@ class ExponentialSum(NamedTuple):
 
     def plus(self, other: ExponentialSum) -> ExponentialSum:
         """Return this sum plus another one of the same polynomials."""
-        both = np.concatenate((self.phases, other.phases))
-        phases, groups = np.unique(both, return_inverse=True)
-        weights = np.zeros((phases.size, self.sums.size), dtype=self.weights.dtype)
-        np.add.at(weights, groups, np.concatenate((self.weights, other.weights)))
+        weights, phases = _gathered(
+            (*self.weights, *other.weights), (*self.phases, *other.phases)
+        )
         return ExponentialSum(self.polynomials, weights, phases, self.sums + other.sums)
 
     def turned(self) -> ExponentialSum:

@@ -8,6 +8,7 @@ which parts of the axis need no walk, and its limit at high frequency is that of
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
 from itertools import zip_longest
 
@@ -20,8 +21,12 @@ from armlock.checks import ComplexArray, FloatArray, IntArray
 from armlock.loops import Loop
 from armlock.stability import CountError, unstable_roots
 
-#: Relative accuracy of the certificate for modulus and disk margins.
+#: Relative accuracy of modulus and disk margins, and of |L| at a crossover. A distance of L
+#: from -1 below it is as good as none.
 TOLERANCE = 1e-6
+# A search begins with so many turns of the longest delay, then looks at so many on either side
+# of a likely place, and so many times more when it has to look again.
+_FIRST_TURNS, _TURNS_AROUND, _WIDER = 1e3, 300.0, 30.0
 
 
 def polynomial_sum(p: FloatArray, q: FloatArray) -> FloatArray:
@@ -30,25 +35,32 @@ def polynomial_sum(p: FloatArray, q: FloatArray) -> FloatArray:
 
 
 def limit_disc(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
-    """Centre and radius of the disc that L fills at high frequency.
-
-    It is that of all phases that small changes of the delays can make.
-    """
+    """Centre and radius of the disc that L fills at high frequency, all phases being free."""
     r = float(loop.rest[-1])
     b1, b2 = (float(b[-1]) if b.size == loop.rest.size else 0.0 for b in (loop.b1, loop.b2))
-    arms = (abs(c1 * b1) + abs(c2 * b2)) / abs(r)
+    radius = (abs(c1 * b1) + abs(c2 * b2)) / abs(r)
     if loop.delay:
-        return 0.0, abs(b1 + b2) / abs(r) + arms
-    return (b1 + b2) / r, arms
+        return 0.0, abs(b1 + b2) / abs(r) + radius
+    return (b1 + b2) / r, radius
+
+
+def free_disc(
+    loop: Loop, c1: float, c2: float, omega: FloatArray
+) -> tuple[ComplexArray, FloatArray]:
+    """Centres and radii of the discs that L fills at frequencies, both arms' phases free."""
+    first, second = loop.arm_responses(1j * omega)
+    return first + second, np.abs(c1 * first) + np.abs(c2 * second)
 
 
 def limit_margins(loop: Loop, c1: float, c2: float) -> FloatArray:
-    """Margins of the disc that L fills at high frequency, see `infimum.free_margins_at`.
+    """Margins of the disc that L fills at high frequency.
+
+    In the order of `infimum.free_margins_at`: modulus, ratio, phase in rad, delay in s.
 
     Raises
     ------
     CountError
-        If it holds -1: the neutral root chain is not confined.
+        If the disc holds -1: the neutral root chain is not confined.
     """
     centre, radius = limit_disc(loop, c1, c2)
     found: FloatArray = infimum.free_margins_at(complex(centre), radius, np.inf)
@@ -62,15 +74,20 @@ def limit_margins(loop: Loop, c1: float, c2: float) -> FloatArray:
 
 def unconfined(c1: float, c2: float) -> CountError:
     """Return the error of a loop that has no margins, because its chain is not confined."""
-    return CountError(
-        f"no margin at (c1, c2) = ({c1}, {c2}): the neutral root chain is not confined to the "
-        f"left half-plane",
-        np.array([[c1, c2]]),
-    )
+    return no_margin(c1, c2, "the neutral root chain is not confined to the left half-plane")
+
+
+def no_margin(c1: float, c2: float, why: str) -> CountError:
+    """Return the error of a margin that cannot be certified."""
+    at = f"(c1, c2) = ({c1}, {c2})"
+    return CountError(f"no margin at {at}: {why}", np.array([[c1, c2]]))
 
 
 def arm_weights(loop: Loop, c1: float, c2: float) -> FloatArray:
-    """Return |c1| and |c2|; arms of the same delay and response count together, as one."""
+    """Return |c1| and |c2|, or the weight of both arms and 0 if they act as one.
+
+    They do if their delays are equal, and their responses proportional.
+    """
     if loop.tau1 == loop.tau2 and loop.b1.any():
         ratio = float(loop.b2[-1] / loop.b1[-1])
         if np.array_equal(loop.b2, ratio * loop.b1):
@@ -78,15 +95,15 @@ def arm_weights(loop: Loop, c1: float, c2: float) -> FloatArray:
     return np.array([abs(c1), abs(c2)])
 
 
-def clear_from(loop: Loop, arms: FloatArray, centre: float, radius: float) -> float:
-    """Frequency past which L stays outside a disc around a negative centre; inf if it does not.
+def clear_from(loop: Loop, weights: FloatArray, centre: float, radius: float) -> float:
+    """Frequency in rad/s past which L, at all phases, stays outside a disc; inf if it does not.
 
-    `arms` are |c1| and |c2|, or what they count for. Past it |B1 + B2 - centre R| exceeds
-    radius |R| + |c1 B1| + |c2 B2|; with a dead time B1 + B2 turns, and stands on the other
-    side.
+    The centre of the disc is negative, `weights` are those of `arm_weights`. Past it
+    |B1 + B2 - centre R| exceeds radius |R| + |c1 B1| + |c2 B2|. With a dead time B1 + B2 may
+    have any phase, too: then |centre R| has to exceed that and |B1 + B2|.
     """
     c = polynomial_sum(loop.b1, loop.b2)
-    factors = [radius, *arms, 0.0]
+    factors = [radius, *weights, 0.0]
     first = -centre * loop.rest
     if loop.delay:
         factors[3] = 1.0
@@ -96,13 +113,13 @@ def clear_from(loop: Loop, arms: FloatArray, centre: float, radius: float) -> fl
     return last_larger(first, others, np.array(factors))
 
 
-def last_crossover(loop: Loop, arms: FloatArray, gain: float = 1.0) -> float:
-    """Frequency past which `gain` times |L| is below one at all phases; inf if there is none.
+def last_crossover(loop: Loop, weights: FloatArray, gain: float = 1.0) -> float:
+    """Frequency in rad/s past which `gain` times |L| is below one at all phases, or inf.
 
-    `arms` are |c1| and |c2|, or what they count for.
+    `weights` are those of `arm_weights`.
     """
     c = polynomial_sum(loop.b1, loop.b2)
-    return last_larger(loop.rest, (c, loop.b1, loop.b2), gain * np.array([1.0, *arms]))
+    return last_larger(loop.rest, (c, loop.b1, loop.b2), gain * np.array([1.0, *weights]))
 
 
 @lru_cache(maxsize=64)
@@ -149,20 +166,75 @@ def meeting_intervals(
     *,
     segment: tuple[float, ...] = (),
     levels: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
+    free: bool = False,
 ) -> FloatArray:
-    """Intervals of a span of the axis outside which free phases keep L off a target.
+    """Intervals, in rad/s and of shape (n, 2), on which L may meet a target at some phases.
 
-    The target is that of `armlock.infimum.meeting_intervals`.
+    Intervals of a span of the axis. The target is that of `armlock.infimum.meeting_intervals`.
+    With `free`, that of `arm_parameters`, they hold for all smaller perturbations, too.
     """
     found: FloatArray = infimum.meeting_intervals(
         arm_factors(loop),
-        arm_parameters(loop, c1, c2),
+        arm_parameters(loop, c1, c2, free=free),
         np.array(segment),
         np.array(levels),
         span,
         loop.longest_delay,
     )
     return found
+
+
+def crossing_intervals(
+    loop: Loop, c1: float, c2: float, span: tuple[float, float]
+) -> FloatArray:
+    """Intervals of a span on which phases and parameters of up to these sizes take L to -1."""
+    levels = (TOLERANCE, 0.0, 0.0, 0.0)
+    return meeting_intervals(loop, c1, c2, span, levels=levels, free=True)
+
+
+def search_outwards(
+    loop: Loop,
+    look: Callable[[FloatArray], None],
+    end: Callable[[], float],
+    meeting: Callable[[tuple[float, float]], FloatArray],
+    likely: Callable[[FloatArray], FloatArray],
+) -> None:
+    """Look at intervals of the axis, the most promising first, until nothing is left.
+
+    First come the first turns of the delays. While many more turns are left than that, those
+    around likely places come next. Last comes all that is left.
+
+    Parameters
+    ----------
+    loop : Loop
+        The loop.
+    look : callable
+        Looks at intervals in rad/s, shape (n, 2), and keeps the best that it finds.
+    end : callable
+        Frequency in rad/s past which nothing better than that can be.
+    meeting : callable
+        The intervals of a span on which something better can be.
+    likely : callable
+        Of an array of frequencies, those next to which the best are likely.
+    """
+    per_turn = 2.0 * np.pi / loop.longest_delay
+    first, around = min(end(), _FIRST_TURNS * per_turn), _TURNS_AROUND
+    look(meeting((0.0, first)))
+    while (last := end()) > first:
+        intervals = meeting((first, last))
+        many = float(np.diff(intervals).sum()) > 10.0 * around * per_turn
+        if many:
+            number = 2 + 400 // len(intervals)
+            places = np.concatenate(
+                [np.geomspace(low, high, number) for low, high in intervals]
+            )
+            at, reach = np.unique(likely(places)), around * per_turn
+            spans = np.column_stack((at - reach, at + reach)).clip(first, last)
+            intervals = np.concatenate([meeting((low, high)) for low, high in spans])
+            around *= _WIDER
+        look(intervals)
+        if not many:
+            break
 
 
 def clear_above(loop: Loop, c1: float, c2: float, free_above: float) -> bool:
@@ -172,7 +244,6 @@ def clear_above(loop: Loop, c1: float, c2: float, free_above: float) -> bool:
         return False
     if end <= free_above:
         return True
-    # Looked for are distances that are as good as none.
     least = np.array([TOLERANCE, 0.0, 0.0, 0.0])
     nearest, _, complete = infimum.free_margins(
         arm_factors(loop),
@@ -186,7 +257,10 @@ def clear_above(loop: Loop, c1: float, c2: float, free_above: float) -> bool:
 
 
 def count_at(loop: Loop, c1: float, c2: float, free_above: float) -> int:
-    """Count the unstable roots; in less time where no phases above a frequency matter."""
+    """Count the unstable roots as `unstable_roots` does.
+
+    It takes less time where no phases above the frequency `free_above`, in rad/s, matter.
+    """
     count = None
     if np.isfinite(free_above) and clear_above(loop, c1, c2, free_above):
         count = _count_below(loop, c1, c2, free_above)
@@ -196,10 +270,10 @@ def count_at(loop: Loop, c1: float, c2: float, free_above: float) -> int:
 def _count_below(loop: Loop, c1: float, c2: float, omega: float) -> int | None:
     """Count the unstable roots of a loop that no phases of the arms let cross past omega.
 
-    Past it, and far out right of the axis, D(s; c1, c2) over its value at much smaller
-    parameters stays in the right half-plane: what its argument gathers there only takes back
-    what it is at omega. So the two counts differ by what the arguments gather up to omega, less
-    that. None where rounding hides these.
+    D(s; c1, c2) is compared with D at a thousandth of c1 and c2, whose count is known. Past
+    omega their ratio stays in the right half-plane, so that its argument goes back to zero from
+    what it is at omega. The counts differ by what it gathers in all, over pi. None where
+    rounding hides one of the two.
     """
     # Not zero: sensors with an integrator have a root at s = 0 there.
     low1, low2 = 1e-3 * c1, 1e-3 * c2

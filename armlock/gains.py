@@ -14,25 +14,27 @@ from scipy.optimize import elementwise
 
 from armlock.bounds import last_larger, last_root_bound
 from armlock.checks import FloatArray, real_number
-from armlock.crossovers import around, axis_zeros
+from armlock.crossovers import axis_zeros
 from armlock.free_phases import (
     arm_weights,
     clear_from,
+    free_disc,
     last_crossover,
     limit_disc,
     meeting_intervals,
+    no_margin,
     polynomial_sum,
     require_stable,
+    search_outwards,
 )
 from armlock.loops import Loop, checked_loop
 from armlock.nyquist import loop_numerator
+from armlock.stability import unstable_roots
 
 #: Gain factors up to this, and down to one over it, are looked at.
 LARGEST_GAIN = 1e6
-# Share of its limits up to which the neutral root chain lets gain factors be looked at.
+# So close to the limits of the neutral root chain, as a share, no gain factors are looked for.
 _NEXT_TO_THE_CHAIN = 1e-5
-# Turns of the longest delay that a walk along the axis can take.
-_MOST_TURNS = 1.5e6
 
 
 def _chain_gains(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
@@ -48,11 +50,11 @@ def _chain_gains(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
 
 
 def _no_crossing_from(loop: Loop, c1: float, c2: float, low: float, high: float) -> float:
-    r"""Frequency past which no gain factor from `low` to `high` takes a root across the axis.
+    """Frequency in rad/s past which no gain factor of a range takes a root across the axis.
 
-    With t = 1 / k from 1 / high to 1 / low, and S = |c1 B1| + |c2 B2|, the square of
-    |t R + C| - S must stay positive. \|t R + C\|^2 is convex in t. If it ascends at the lower
-    end of the interval, it is smallest there; if it descends at the upper end, there.
+    With t = 1 / k from 1 / high to 1 / low, |t R + C| must exceed |c1 B1| + |c2 B2|. Its square
+    is convex in t. If it ascends at the lower end of the interval, it is smallest there; if it
+    descends at the upper end, there.
     """
     c, arms = polynomial_sum(loop.b1, loop.b2), arm_weights(loop, c1, c2)
     found = [last_crossover(loop, arms, high)]
@@ -65,7 +67,7 @@ def _no_crossing_from(loop: Loop, c1: float, c2: float, low: float, high: float)
 
 
 def _ascent(rest: FloatArray, c: FloatArray, t: float, sign: float) -> FloatArray:
-    """Half the slope of |t R + C|^2 in t, times a sign, as a polynomial in omega^2."""
+    """Half the slope of |t R + C|^2 in t, times a sign, in ascending powers of omega^2."""
     whole = polynomial_sum(t * rest, c)
     product = np.convolve(whole, rest * (-1.0) ** np.arange(rest.size))[::2]
     return np.asarray(sign * product * (-1.0) ** np.arange(product.size))
@@ -78,7 +80,7 @@ def _gains(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArray:
 
 
 def _real_within(loop: Loop, c1: float, c2: float, stretches: FloatArray) -> FloatArray:
-    """Where L, from its factors, is real within stretches in which rounding hides it."""
+    """Where L, from its factors, is real within stretches that may hide it, in rad/s."""
 
     def imaginary(omega: FloatArray) -> FloatArray:
         return np.asarray(loop.open_loop(1j * omega, c1, c2).imag)
@@ -93,10 +95,9 @@ def _free_gains(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArr
 
     They belong to the ends of what the disc of L covers of the negative real axis.
     """
-    first, second = loop.arm_responses(1j * omega)
-    centre, spread = first + second, np.abs(c1 * first) + np.abs(c2 * second)
+    centre, radius = free_disc(loop, c1, c2, omega)
     with np.errstate(invalid="ignore", divide="ignore"):
-        half = np.sqrt(spread**2 - centre.imag**2)
+        half = np.sqrt(radius**2 - centre.imag**2)
         factors = -1.0 / np.column_stack((centre.real + half, centre.real - half))
     lower = np.where((factors > 0.0) & (factors < 1.0), factors, 0.0).max(axis=1)
     upper = np.where(factors > 1.0, factors, np.inf).min(axis=1)
@@ -108,12 +109,14 @@ def _gains_around_one(
 ) -> tuple[float, float, float]:
     """Gain factors next to one that take a root to the axis, and where the upper one does.
 
-    `least` and `most` where there are none between them. As for phases, likely ones come first.
+    The frequency is in rad/s; `least`, `most` and nan where there are none between these two.
     """
-    turn = 2.0 * np.pi / loop.longest_delay
     arms = arm_weights(loop, c1, c2)
+    crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
+    lower, upper, where = least, most, np.nan
+    hidden: list[FloatArray] = []
 
-    def end(lower: float, upper: float) -> float:
+    def end() -> float:
         """Frequency past which no factor between the two takes a root to the axis."""
         clear = max(
             clear_from(loop, arms, -0.5 * (1.0 / k + 1.0), 0.5 * abs(1.0 - 1.0 / k))
@@ -121,16 +124,18 @@ def _gains_around_one(
         )
         return min(clear, _no_crossing_from(loop, c1, c2, lower, upper))
 
-    def meeting(lower: float, upper: float, span: tuple[float, float]) -> FloatArray:
+    def meeting(span: tuple[float, float]) -> FloatArray:
         return meeting_intervals(loop, c1, c2, span, segment=(-1.0 / upper, -1.0 / lower))
 
-    crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
-    lower, upper, where = least, most, np.nan
-    first = min(end(lower, upper), 1e3 * turn)
-    intervals, wide, complete = meeting(lower, upper, (0.0, first)), 300.0, False
-    while True:
-        omega, hidden = axis_zeros(crossing, intervals)
-        omega = np.concatenate((omega, _real_within(loop, c1, c2, hidden)))
+    def likely(omega: FloatArray) -> FloatArray:
+        free = _free_gains(loop, c1, c2, omega)
+        return omega[[np.argmax(free[:, 0]), np.argmin(free[:, 1])]]
+
+    def look(intervals: FloatArray) -> None:
+        nonlocal lower, upper, where
+        omega, stretches = axis_zeros(crossing, intervals)
+        omega = np.concatenate((omega, _real_within(loop, c1, c2, stretches)))
+        hidden.append(_gains(loop, c1, c2, stretches.ravel()))
         factor = _gains(loop, c1, c2, omega)
         below = factor[(factor >= lower) & (factor <= 1.0)]
         lower = float(below.max(initial=lower))
@@ -138,18 +143,25 @@ def _gains_around_one(
         if above.size:
             nearest = above[np.argmin(factor[above])]
             upper, where = float(factor[nearest]), float(omega[nearest])
-        last = end(lower, upper)
-        if complete or last <= first:
-            return lower, upper, where
-        intervals = meeting(lower, upper, (first, last))
-        complete = float(np.diff(intervals).sum()) < _MOST_TURNS * turn or wide > _MOST_TURNS
-        if not complete:
-            # Too many turns: around where free phases would have the nearest gains.
-            omega = np.geomspace(first, last, 400)
-            free = _free_gains(loop, c1, c2, omega)
-            at = omega[[np.argmax(free[:, 0]), np.argmin(free[:, 1])]]
-            intervals = around(at, wide * turn, (first, last))
-            wide *= 30.0
+
+    search_outwards(loop, look, end, meeting, likely)
+    hidden_gains = np.concatenate(hidden)
+    if ((hidden_gains > lower) & (hidden_gains < upper)).any():
+        _require_stable_inside(loop, c1, c2, lower, upper)
+    return lower, upper, where
+
+
+def _require_stable_inside(
+    loop: Loop, c1: float, c2: float, lower: float, upper: float
+) -> None:
+    """Raise if a count just inside two gain factors says that the loop is unstable there."""
+    rest = loop.polynomials()[0]
+    for factor in (lower * (1.0 + 1e-6), upper * (1.0 - 1e-6)):
+        scaled = rest._replace(coefficients=rest.coefficients / factor)
+        count = int(unstable_roots(loop.changed(rest=scaled), c1, c2))
+        if count > 0:
+            at = f"the count at {factor} times the gain is {count}"
+            raise no_margin(c1, c2, f"rounding hides a crossing, for {at}")
 
 
 def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float]:
@@ -165,8 +177,9 @@ def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float
     Returns
     -------
     lower, upper, omega : float
-        The two factors, and where the upper one is taken, in rad/s; 0, inf and nan where
-        nothing between factors of 1e-6 and 1e6 bounds them.
+        The two factors, and where the upper one is taken, in rad/s: 0 for a real root, inf for
+        the limit of the neutral root chain. 0, inf and nan where nothing between factors of
+        1e-6 and 1e6 bounds them.
 
     Raises
     ------
@@ -189,7 +202,8 @@ def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float
 
     All sign changes of Im L are found, but for short stretches in which rounding hides its
     sign, at most a part in ten million of the frequency as a rule. There L is looked at in
-    three places, from its factors: that part is not certified.
+    three places, from its factors. Where it could give a factor between the two, counts just
+    inside both confirm them.
 
     Examples
     --------
@@ -217,10 +231,11 @@ def gain_interval_of_stable(loop: Loop, c1: float, c2: float) -> tuple[float, fl
         lower = floor if floor >= 1.0 / LARGEST_GAIN else 0.0
     if upper == most:
         upper, where = (limit, np.inf) if limit <= LARGEST_GAIN else (np.inf, np.nan)
-    # A real root crosses at s = 0.
-    start, first = float(loop.b1[0] * (1.0 - c1) + loop.b2[0] * (1.0 - c2)), float(loop.rest[0])
-    if start * first < 0.0:
-        at_zero = -first / start
+    # At s = 0, where L is `above` over `below`, a real root crosses.
+    above = float(loop.b1[0] * (1.0 - c1) + loop.b2[0] * (1.0 - c2))
+    below = float(loop.rest[0])
+    if above * below < 0.0:
+        at_zero = -below / above
         lower = max(lower, at_zero) if at_zero < 1.0 else lower
         if 1.0 < at_zero < upper:
             upper, where = at_zero, 0.0

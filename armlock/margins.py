@@ -23,19 +23,21 @@ from armlock.free_phases import (
     arm_factors,
     arm_parameters,
     arm_weights,
-    clear_above,
     clear_from,
-    count_at,
+    crossing_intervals,
+    free_disc,
     last_crossover,
     limit_margins,
+    no_margin,
     require_stable,
+    search_outwards,
     unconfined,
 )
 from armlock.gains import gain_interval_of_stable
 from armlock.loops import Loop, checked_loop
 from armlock.nyquist import leading_radius, loop_numerator
-from armlock.rays import Ray, first_break
-from armlock.stability import CountError
+from armlock.rays import Ray, first_crossing
+from armlock.stability import BOUNDARY, UNCONFINED, CountError, unstable_roots
 
 # Relative accuracy with free phases, in the order of `armlock.infimum.free_margins_at`. The
 # disk margin may be flat over decades of frequency, where a finer one would take too long.
@@ -171,11 +173,8 @@ def _smallest(
             TOLERANCE,
         )
         if not complete:
-            raise CountError(
-                f"no margin at (c1, c2) = ({c1}, {c2}): rounding hides L, or following it "
-                f"takes more than {contour.MOST_STEPS:.0e} steps",
-                np.array([[c1, c2]]),
-            )
+            why = f"following it takes more than {contour.MOST_STEPS:.0e} steps"
+            raise no_margin(c1, c2, f"rounding hides L, or {why}")
         best, where = found, np.where(np.isnan(places), where, places)
         start = last
     return best, where
@@ -267,10 +266,7 @@ def _free_margins(
         factors, free, lowest, end, best, _FREE_TOLERANCES
     )
     if not complete:
-        raise CountError(
-            f"no margins for free phases at (c1, c2) = ({c1}, {c2}) from {lowest} rad/s on",
-            np.array([[c1, c2]]),
-        )
+        raise no_margin(c1, c2, f"free phases from {lowest} rad/s on take too many steps")
     return smaller, np.where(np.isnan(places), where, places)
 
 
@@ -353,9 +349,38 @@ def margins(
     return Margins(*(float(value) for value in (*numbers, *places)))
 
 
-def critical_perturbation(
-    loop: Loop, direction: npt.ArrayLike, free_above: float | None = None
-) -> float:
+def _first_near(loop: Loop, ray: Ray) -> float | None:
+    """First t at which a root crosses along a ray from (1, 1); None if it lies far.
+
+    Far is past half the limit of the neutral root chain, or where the parameters change by more
+    than their own size. At the largest |c1| and |c2| of the ray, free phases tell which parts
+    of the axis no root can cross; with smaller ones it cannot cross there either.
+    """
+    stop, found = min(ray.scale, 0.5 * ray.chain_limit()), None
+
+    def meeting(span: tuple[float, float]) -> FloatArray:
+        c1, c2 = (max(1.0, abs(c)) for c in ray.at(stop))
+        return crossing_intervals(loop, c1, c2, span)
+
+    def look(intervals: FloatArray) -> None:
+        nonlocal stop, found
+        crossing = ray.crossings(
+            stop, first=True, lowest=1e-15 * ray.scale, intervals=intervals
+        )
+        if crossing.position.size:
+            stop = found = float(crossing.position[0])
+
+    def likely(omega: FloatArray) -> FloatArray:
+        centre, radius = free_disc(loop, 1.0, 1.0, omega)
+        growth = free_disc(loop, float(ray.direction[0]), float(ray.direction[1]), omega)[1]
+        # The t at which the disc of free phases first holds -1.
+        return omega[[np.argmin((np.abs(1.0 + centre) - radius) / growth)]]
+
+    search_outwards(loop, look, lambda: ray.end(stop), meeting, likely)
+    return found
+
+
+def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
     r"""Return the smallest perturbation of (1, 1) in a direction that breaks the loop.
 
     Parameters
@@ -364,10 +389,6 @@ def critical_perturbation(
         The loop.
     direction : array_like of two floats
         (d1, d2), taken as given and not normalised.
-    free_above : float, optional
-        Angular frequency in rad/s up to which a first crossing is looked for, to spare the time
-        of a loop that rolls off late. It is the result if no phases of the arms let a root
-        cross above it for so small a perturbation; otherwise all frequencies are walked.
 
     Returns
     -------
@@ -380,14 +401,14 @@ def critical_perturbation(
     ------
     TypeError, ValueError
         If `loop` is no `Loop`, the direction is not two finite real numbers or has length
-        zero, the loop is unstable at (1, 1) itself, or `free_above` is not positive.
+        zero, or the loop is unstable at (1, 1) itself. A boundary point is allowed there.
     CountError
         If the counts on the two sides of the result contradict it, or gain times delay is too
         large to follow.
 
     See Also
     --------
-    armlock.rays.first_break : from other points, and with the frequency.
+    armlock.rays.first_crossing : from other points, and with the frequency.
 
     Notes
     -----
@@ -405,12 +426,27 @@ def critical_perturbation(
     2.9286e-06
     """
     ray = Ray(checked_loop(loop), (1.0, 1.0), direction)
-    if free_above is not None:
-        highest = positive_number("free_above", free_above)
-        stop = min(ray.scale, 0.5 * ray.chain_limit())
-        at = ray.crossings(stop, first=True, highest=highest).position
-        if at.size and count_at(loop, 1.0, 1.0, highest) == 0:
-            c1, c2 = 1.0 + float(at[0]) * np.abs(ray.direction)
-            if clear_above(loop, c1, c2, highest):
-                return float(at[0])
-    return first_break(loop, ray.start, ray.direction).position
+    count = int(unstable_roots(loop, *ray.start))
+    if count > 0 or count == UNCONFINED:
+        raise ValueError(
+            f"the loop must be stable at (c1, c2) = (1, 1) to lose stability, but "
+            f"unstable_roots gives {count}"
+        )
+    if count != 0 and int(unstable_roots(loop, *ray.at(1e-9 * ray.scale))) != 0:
+        return 0.0
+    eps = _first_near(loop, ray)
+    if eps is None:
+        eps = first_crossing(loop, ray.start, direction).position
+    if not np.isfinite(eps):
+        return eps
+    points = [ray.at(share * eps) for share in (0.5, 1.0 - 1e-6, 1.0 + 1e-6)]
+    halfway, before, beyond = (int(unstable_roots(loop, *point)) for point in points)
+    # So close to the result, rounding may hide on which side of the boundary a point is.
+    if halfway != 0 or before not in (0, BOUNDARY) or beyond == 0:
+        raise CountError(
+            f"the first crossing along {tuple(ray.direction.tolist())} lies at {eps}, but "
+            f"the counts half-way, just before and just beyond, {halfway}, {before} and "
+            f"{beyond}, contradict it",
+            np.array(points),
+        )
+    return eps

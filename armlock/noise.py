@@ -139,15 +139,13 @@ class ShapedNoise:
         TypeError, ValueError
             If a frequency is not finite and real.
         """
-        return self._density(2.0 * np.pi * real_array("frequency", frequency))
+        omega = 2.0 * np.pi * real_array("frequency", frequency)
+        return np.asarray(np.abs(self._filter(1j * omega)))
 
     def sampled_asd(self, frequency: npt.ArrayLike) -> FloatArray:
         """Density of the samples in closed form; see `asd`."""
         omega = 2.0 * np.pi * real_array("frequency", frequency)
-        return self._density(warped(omega, self.sample_rate))
-
-    def _density(self, omega: FloatArray) -> FloatArray:
-        return np.asarray(np.abs(self._filter(1j * omega)))
+        return np.asarray(np.abs(self._filter(1j * warped(omega, self.sample_rate))))
 
     def draw(self, samples: int) -> FloatArray:
         """Return the next samples of the series.

@@ -381,7 +381,7 @@ def axis_crossings(
             )
     omega_max = positive_number("omega_max", omega_max)
     crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
-    omega, jump, _ = sign_changes(crossing, omega_max)
+    omega, jump, _ = sign_changes(crossing, [(0.0, omega_max)])
     omega = omega[(omega > 0.0) & (jump != 0)]
     value = loop.open_loop(1j * omega, c1, c2).real
     return AxisCrossings(omega[value < 0.0], value[value < 0.0])

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib.pyplot as plt
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
+from matplotlib.projections.polar import PolarAxes
 from scipy import ndimage
 
 from armlock.checks import ComplexArray, FloatArray
@@ -57,7 +57,7 @@ def plot_chart(
     Parameters
     ----------
     chart : StabilityChart
-        With ascending, evenly spaced axes. Points with a root on the boundary stay white.
+        Points with a root on the boundary stay white.
     ax : Axes, optional
         Where to draw; matplotlib's current axes by default.
     counts : bool, optional
@@ -74,7 +74,7 @@ def plot_chart(
     Raises
     ------
     ValueError
-        If an axis does not ascend in equal steps.
+        If an axis holds one value only.
 
     Examples
     --------
@@ -88,15 +88,13 @@ def plot_chart(
     ax = plt.gca() if ax is None else ax
     shown = chart.counts >= 0 if counts else chart.stable
     unstable = plt.get_cmap("Oranges")(np.linspace(0.08, 0.75, largest))
-    ax.imshow(
+    ax.pcolorfast(
+        _edges("chart.x", chart.x),
+        _edges("chart.y", chart.y),
         np.where(shown, np.minimum(chart.counts, largest), np.nan),
         cmap=ListedColormap([STABLE, *unstable]),
         vmin=0.0,
         vmax=largest,
-        extent=(*_ends("chart.x", chart.x), *_ends("chart.y", chart.y)),
-        origin="lower",
-        aspect="auto",
-        interpolation="nearest",
     )
     label_parameters(ax, chart.system.parameters)
     if labels:
@@ -104,14 +102,12 @@ def plot_chart(
     return ax
 
 
-def _ends(name: str, axis: FloatArray) -> tuple[float, float]:
-    """Return the ends of an even axis, half a step beyond its points, as cells reach."""
-    steps = np.diff(axis)
-    # Close to the ideal point, rounding is a visible share of a step.
-    if not (steps.size and (np.abs(steps - steps.mean()) < 1e-2 * steps.mean()).all()):
-        raise ValueError(f"{name} must ascend in equal steps, got {axis}")
-    half = 0.5 * (axis[-1] - axis[0]) / steps.size
-    return float(axis[0] - half), float(axis[-1] + half)
+def _edges(name: str, axis: FloatArray) -> FloatArray:
+    """Return the edges of cells around the points of an axis."""
+    if axis.size == 1:
+        raise ValueError(f"{name} must hold at least two values to be drawn, got {axis}")
+    inner = 0.5 * (axis[1:] + axis[:-1])
+    return np.concatenate(([2.0 * axis[0] - inner[0]], inner, [2.0 * axis[-1] - inner[-1]]))
 
 
 def _label_regions(ax: Axes, chart: StabilityChart) -> None:
@@ -168,7 +164,6 @@ def plot_nyquist(
     curve: NyquistCurve,
     ax: Axes | None = None,
     *,
-    unit: float | None = 0.01,
     arrows: Iterable[float] = (),
     omega_max: float = np.inf,
     color: str = BLUE,
@@ -181,12 +176,10 @@ def plot_nyquist(
     curve : NyquistCurve
         From `nyquist` with `omega_max`, so that its samples are close.
     ax : Axes, optional
-        Where to draw; matplotlib's current axes by default. In the compressed plane they are
-        replaced by circles of |L|.
-    unit : float, optional
-        L is drawn at log10(1 + |L| / unit) from the origin, in its own direction: linear
-        within about `unit`, logarithmic beyond, and no further out than the circle that
-        stands for infinity. None keeps the plain complex plane.
+        Where to draw; matplotlib's current axes by default, or new polar ones. Polar axes show
+        every direction as it is and compress the distance from the origin, which is linear up
+        to 0.01 and logarithmic beyond, as far as the circle that stands for infinity. Other
+        axes show the plain complex plane, without the infinite branch.
     arrows : iterable of float, optional
         Frequencies in rad/s at which an arrow points in the direction of rising omega; past
         the end of the curve it stands there.
@@ -203,81 +196,67 @@ def plot_nyquist(
 
     Examples
     --------
+    >>> import matplotlib.pyplot as plt
     >>> from armlock import SingleArm, nyquist
-    >>> ax = nyquist(SingleArm(), omega_max=1.0).plot(unit=None)
+    >>> ax = nyquist(SingleArm(), omega_max=1.0).plot(plt.figure().subplots())
     >>> ax.get_xlabel()
     'Re $L$ [1]'
     """
-    ax = plt.gca() if ax is None else ax
+    if ax is None:
+        ax = plt.gca() if plt.gcf().axes else plt.subplot(projection="polar")
+    compressed = isinstance(ax, PolarAxes)
     drawn = curve.omega <= omega_max
     forward, omega = curve.response[drawn], curve.omega[drawn]
-    if unit is not None:
-        if curve.indentation.size:
-            # On to the infinite branch, in the direction in which the curve leaves for it.
-            far = INFINITY * forward[:1] / np.abs(forward[:1])
-            forward, omega = np.append(far, forward), np.append(0.0, omega)
-        forward = _compressed(forward, unit)
+    if compressed and curve.indentation.size:
+        # On to the infinite branch, in the direction in which the curve leaves for it.
+        far = INFINITY * forward[:1] / np.abs(forward[:1])
+        forward, omega = np.append(far, forward), np.append(0.0, omega)
     positive, negative = (r"$\omega > 0$", r"$\omega < 0$") if label is None else (label, "_")
-    ax.plot(forward.real, forward.imag, "-", color=color, linewidth=1.5, label=positive)
-    ax.plot(forward.real, -forward.imag, "-", color=color, linewidth=0.7, label=negative)
+    for half, width, name in ((forward, 1.5, positive), (forward.conj(), 0.7, negative)):
+        ax.plot(*_coordinates(ax, half), "-", color=color, linewidth=width, label=name)
     for frequency in arrows:
         index = min(int(np.searchsorted(omega, frequency)), omega.size - 2)
-        _arrow(ax, forward[index], forward[index + 1], color)
-    if unit is None:
+        _arrow(ax, forward[index : index + 2], color)
+    minus_one = _coordinates(ax, np.array([-1.0 + 0.0j]))
+    ax.plot(*minus_one, "+", color="black", markersize=10, markeredgewidth=1.8, zorder=5)
+    if isinstance(ax, PolarAxes):
+        _infinite_branch(ax, curve)
+        ax.spines["polar"].set(edgecolor="0.8", linewidth=0.6, zorder=0)
+        ax.set_rscale("asinh", linear_width=0.01)
+        ax.set_rlim(0.0, INFINITY)
+        # No label at the circle through -1, where it would hide the curve.
+        ax.set_rgrids(
+            [1.0, 1e2, 1e4, INFINITY], ["", "$10^2$", "$10^4$", r"$\infty$"], angle=45
+        )
+        ax.set_thetagrids([0.0, 90.0, 180.0, 270.0], [])
+    else:
         ax.axhline(0.0, color="black", linewidth=0.6)
         ax.axvline(0.0, color="black", linewidth=0.6)
-        ax.plot(-1.0, 0.0, "+", color="black", markersize=10, markeredgewidth=1.8)
         ax.set(xlabel="Re $L$ [1]", ylabel="Im $L$ [1]")
-    else:
-        _infinite_branch(ax, curve, unit)
-        _circles(ax, unit)
     return ax
 
 
-def _compressed(values: npt.ArrayLike, unit: float) -> ComplexArray:
-    """Move values radially into the compressed plane, those beyond infinity onto it."""
-    values = np.asarray(values)
-    radius = np.log10(1.0 + np.minimum(np.abs(values), INFINITY) / unit)
-    return np.asarray(radius * np.exp(1j * np.angle(values)))
+def _coordinates(ax: Axes, values: ComplexArray) -> tuple[FloatArray, FloatArray]:
+    """Return where complex values lie in axes; in polar ones no further out than infinity."""
+    if isinstance(ax, PolarAxes):
+        return np.angle(values), np.minimum(np.abs(values), INFINITY)
+    return values.real, values.imag
 
 
-def _arrow(ax: Axes, start: complex, stop: complex, color: str) -> None:
-    """Draw an arrow head at the second of two points, seen from the first."""
+def _arrow(ax: Axes, values: ComplexArray, color: str) -> None:
+    """Draw an arrow head at the second of two values, seen from the first."""
+    start, stop = np.transpose(_coordinates(ax, values))
     arrow = {"arrowstyle": "-|>", "color": color, "mutation_scale": 13, "shrinkB": 0}
-    ends = (stop.real, stop.imag), (start.real, start.imag)
-    ax.annotate("", *ends, arrowprops=arrow)
+    ax.annotate("", stop, start, arrowprops=arrow)
 
 
-def _infinite_branch(ax: Axes, curve: NyquistCurve, unit: float) -> None:
+def _infinite_branch(ax: Axes, curve: NyquistCurve) -> None:
     """Draw the image of the indentation around s = 0, if there is one, at infinity."""
-    half = np.unwrap(np.angle(curve.indentation_response))
+    half = INFINITY * curve.indentation_response / np.abs(curve.indentation_response)
     label = r"infinite branch, $\omega = 0$"
-    for angles, name in ((-half[::-1], "_"), (half, label)):
-        if angles.size:
-            arc = _compressed(INFINITY * np.exp(1j * angles), unit)
-            ax.plot(arc.real, arc.imag, color=ORANGE, linestyle="--", label=name)
-            _arrow(ax, arc[arc.size // 2], arc[arc.size // 2 + 1], ORANGE)
-
-
-def _circles(ax: Axes, unit: float) -> None:
-    """Draw circles of |L|, the two axes and -1 in the compressed plane."""
-    ax.set_axis_off()
-    ax.set_aspect("equal")
-    turn = np.exp(2j * np.pi * np.linspace(0.0, 1.0, 181))
-    for size, text in (
-        (1.0, ""),  # through -1, where a label would hide the curve
-        (1e2, "$10^{2}$"),
-        (1e4, "$10^{4}$"),
-        (INFINITY, r"$\infty$"),
-    ):
-        circle = _compressed(size * turn, unit)
-        ax.plot(circle.real, circle.imag, "-", color="0.8", linewidth=0.6, zorder=0)
-        place = complex(_compressed(size * np.exp(0.25j * np.pi), unit))
-        box = {"fc": "white", "ec": "none", "pad": 0.8}
-        ax.text(place.real, place.imag, text, color="0.35", bbox=box, zorder=6, **_CENTRED)
-    reach = 1.06 * _compressed(INFINITY, unit).real
-    for x, y in (([-reach, reach], [0.0, 0.0]), ([0.0, 0.0], [-reach, reach])):
-        ax.plot(x, y, "-", color="0.6", linewidth=0.6, zorder=0)
-    ax.set(xlim=(-reach, reach), ylim=(-reach, reach))
-    minus_one = _compressed(-1.0, unit).real
-    ax.plot(minus_one, 0.0, "+", color="black", markersize=10, markeredgewidth=1.8, zorder=5)
+    for arc, name in ((half[::-1].conj(), "_"), (half, label)):
+        if arc.size:
+            ax.plot(
+                *_coordinates(ax, arc), color=ORANGE, linestyle="--", label=name, clip_on=False
+            )
+            _arrow(ax, arc[arc.size // 2 :][:2], ORANGE)

@@ -83,12 +83,11 @@ def pulling(
     unstable = int(unstable_roots(loop, 1.0, 1.0))
     if unstable > 0:
         raise ValueError(f"loop must be stable at c1 = c2 = 1, got {unstable} unstable roots")
-    errors = [_error("common", common), _error("differential", differential)]
-    roots = _found(loop)
     total = np.zeros(t.shape)
-    for source, error in zip(("common", "differential"), errors, strict=True):
+    for source, values in (("common", common), ("differential", differential)):
+        error = _error(source, values)
         if error.any():
-            total += _residues(loop, roots, t, source, error)
+            total += _residues(loop, t, source, error)
     return total
 
 
@@ -133,7 +132,7 @@ def _found(loop: Loop) -> ComplexArray:
 
     Slow ones may be anywhere; the others lie near multiples of 1 / tau.
     """
-    tau = max(loop.tau1, loop.tau2)
+    tau = loop.longest_delay
     slow = np.outer(np.geomspace(1e-6, 4.0, 60) / tau, np.exp(1j * np.linspace(1.6, np.pi, 8)))
     lines = 2j * np.pi / tau * np.arange(0.75, _LINES, 0.25)
     found, last_step = _newton(loop, np.concatenate((slow.ravel(), lines)))
@@ -154,7 +153,7 @@ def _complete_up_to(loop: Loop, roots: ComplexArray) -> float:
     decays = np.unique(-roots.real)
     rates = np.sqrt(decays[:-1] * decays[1:])
     # Of faster ones there are too many, far up the axis.
-    rates = rates[rates < 0.02 / max(loop.tau1, loop.tau2)]
+    rates = rates[rates < 0.02 / loop.longest_delay]
 
     def incomplete(rate: float) -> bool:
         """Say whether other roots have Re s > -rate, or no count is certain."""
@@ -171,19 +170,19 @@ def _complete_up_to(loop: Loop, roots: ComplexArray) -> float:
 
 def _circle(loop: Loop, roots: ComplexArray) -> ComplexArray:
     """Return points around s = 0, inside of the smallest root."""
-    radius = 0.3 * float(np.abs(roots).min(initial=1e-3 / max(loop.tau1, loop.tau2)))
+    radius = 0.3 * float(np.abs(roots).min(initial=1e-3 / loop.longest_delay))
     return np.asarray(radius * np.exp(2j * np.pi * (np.arange(_CIRCLE) + 0.5) / _CIRCLE))
 
 
 def _slope(loop: Loop, s: ComplexArray) -> ComplexArray:
     """Return dL/ds as a central difference."""
-    near = 1e-5 * np.minimum(np.abs(s), 1.0 / max(loop.tau1, loop.tau2))
+    near = 1e-5 * np.minimum(np.abs(s), 1.0 / loop.longest_delay)
     return (loop.open_loop(s + near) - loop.open_loop(s - near)) / (2.0 * near)
 
 
 def _newton(loop: Loop, s: ComplexArray) -> tuple[ComplexArray, FloatArray]:
     """Follow 1 + L to zeros; return them, and the last steps' relative lengths."""
-    tau = max(loop.tau1, loop.tau2)
+    tau = loop.longest_delay
     with np.errstate(all="ignore"):
         for _ in range(50):
             step = (1.0 + loop.open_loop(s)) / _slope(loop, s)
@@ -199,10 +198,9 @@ def _input(error: FloatArray, s: ComplexArray) -> ComplexArray:
     return np.asarray(error[0] / s + error[1] / s**2 + error[2] / s**3)
 
 
-def _residues(
-    loop: Loop, roots: ComplexArray, t: FloatArray, source: str, error: FloatArray
-) -> FloatArray:
+def _residues(loop: Loop, t: FloatArray, source: str, error: FloatArray) -> FloatArray:
     """Add up the residues of Y(s) nu(s) exp(s t) at s = 0 and at the loop's own roots."""
+    roots = _found(loop)
     first, second = loop.arm_responses(roots)
     over = 0.5 * (first + second if source == "common" else first - second)
     residue = -over / _slope(loop, roots) * _input(error, roots)

@@ -1,13 +1,13 @@
 """Along a ray of the parameter plane: every crossing of the axis, and the first break.
 
-On a ray (x, y) = start + t direction the characteristic function is D0 - t M, with D0 its
-value at the start. A root lies on the imaginary axis where t = D0 / M is real, so that the
-crossings of a whole ray are the zeros of Im(D0 conj(M)): one certified walk finds them all.
+On a ray (x, y) = start + t (d1, d2) the characteristic function is D0 - t M, with D0 its value
+at the start, and M = d1 B1 exp(-s theta1) + d2 B2 exp(-s theta2), with the dead time of both. A
+root lies on the imaginary axis where t = D0 / M is real, so that the crossings of a whole ray
+are the zeros of Im(D0 conj(M)): one certified walk finds them all.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import NamedTuple
@@ -19,14 +19,14 @@ from numpy.polynomial import polynomial as poly
 from armlock.bounds import last_frequency
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import ComplexArray, FloatArray, IntArray, axis, positive_number
-from armlock.stability import UNCONFINED, CountError, polished, sign_changes, unstable_roots
+from armlock.stability import CountError, polished, sign_changes, unstable_roots
 
-#: Parameters this many times the length of the start and the direction are not looked at.
+#: Nothing is looked at where the parameters are this many times as large as the start, or as 1.
 FARTHEST = 1e9
-# Each further walk along a ray goes so many times as far up in frequency.
-_LONGER = 4.0
+# Each further walk looks so many times as far along a ray.
+_FURTHER = 10.0
 # Next to the limit of the neutral root chain, roots cross at ever higher frequency. They are
-# followed up to so many turns of the longest delay, about a tenth of a second.
+# followed up to so many turns of the longest delay, which takes about a tenth of a second.
 _TURNS_NEXT_TO_THE_CHAIN = 50_000
 
 
@@ -83,9 +83,10 @@ class Ray:
         return float(x), float(y)
 
     def end(self, t: float) -> float:
-        """Frequency past which no root crosses between 0 and t.
+        """Frequency in rad/s past which no root crosses between 0 and t.
 
         The terms with x and y are convex along the ray, and thus largest at one of its ends.
+        inf where the neutral root chain is not confined, nan where a number overflows.
         """
         points = np.array([self.at(0.0), self.at(t)])
         return float(last_frequency(self.system, *points.T).max())
@@ -93,7 +94,8 @@ class Ray:
     def chain_limit(self) -> float:
         """Smallest t > 0 at which the neutral root chain is not confined, inf if there is none.
 
-        The reserve of the chain is concave in t, and linear between the zeros of x and y.
+        The reserve of the chain is concave in t, and linear except where x or y changes its
+        sign: the `kinks`.
         """
 
         def reserve(t: float) -> float:
@@ -142,11 +144,12 @@ class Ray:
         *,
         first: bool = False,
         lowest: float = 0.0,
-        highest: float = np.inf,
+        intervals: npt.ArrayLike | None = None,
     ) -> Crossings:
         """Find crossings with `lowest` < t <= stop: all, or the first and what ties with it.
 
-        Only those up to the frequency `highest` are looked for.
+        With `intervals` of the axis, in rad/s and of shape (n, 2), only those whose frequency
+        lies in them, and no counts confirm that rounding hides none.
         """
         end = self.end(stop)
         if end == np.inf:
@@ -160,9 +163,12 @@ class Ray:
             )
         if not self.acts():
             return Crossings(np.empty(0), np.empty(0), np.empty(0, dtype=np.int64))
-        end = min(end, highest)
-        omega, change, width = sign_changes(self.family, end, is_map=self.system.step > 0.0)
-        # Rounding hides a stretch, or all signs from the start on.
+        omega, change, width = sign_changes(
+            self.family,
+            [(0.0, end)] if intervals is None else np.minimum(intervals, end),
+            is_map=self.system.step > 0.0,
+        )
+        # Stretches in which rounding hides the sign, on the way or from omega = 0 on.
         hidden = bool(((change == 0) | (omega == 0.0) & (width > 0.0)).any())
         omega, change = omega[change != 0], change[change != 0]
         # Only those in reach are worth polishing. Where M vanishes the quotient is not real: a
@@ -178,12 +184,15 @@ class Ray:
         kept = np.flatnonzero((position > lowest) & (position <= stop))
         kept = kept[np.argsort(position[kept], kind="stable")]
         found = Crossings(position[kept], omega[kept], change[kept])
-        if hidden and highest == np.inf:
+        if hidden and intervals is None:
             self._confirm(found, stop, first=first)
         return found
 
     def _confirm(self, found: Crossings, stop: float, *, first: bool) -> None:
-        """Raise if counts at both ends of the ray, or up to the first crossing, contradict."""
+        """Raise if counts at the ends contradict, or one just before the first crossing.
+
+        Counts that cannot be told say nothing.
+        """
         change = int(found.change.sum())
         if first and found.position.size:
             stop, change = (1.0 - 1e-6) * float(found.position[0]), 0
@@ -196,22 +205,13 @@ class Ray:
             )
 
     def reaches(self, stop: float, chain: float) -> Iterator[float]:
-        """Yield growing t up to `stop`, or ever closer to the limit of the chain."""
+        """Yield the t of walk after walk: up to `stop`, or ever closer to the chain's limit."""
         # The boundary of a map ends at one frequency: a single walk sees all of it.
         t = 1e-4 * min(stop, self.scale)
         far = 0.0 if self.system.step else min(stop, 0.5 * chain)
         while t < far:
             yield t
-            # A near crossing is found at low frequency: go no further than that takes.
-            lowest = 1.0 / max(self.system.longest_delay, 1e-12)
-            limit = _LONGER * max(self.end(t), lowest)
-            if self.end(far) <= limit:
-                break
-            low, high = t, far
-            while high > 1.1 * low:
-                middle = math.sqrt(low * high)
-                low, high = (middle, high) if self.end(middle) <= limit else (low, middle)
-            t = high
+            t *= _FURTHER
         if stop < chain:
             yield stop
         else:
@@ -339,67 +339,9 @@ def first_crossing(
     return Crossing(chain, np.inf, 0) if chain <= stop else Crossing(np.inf, np.nan, 0)
 
 
-def first_break(
-    system: CharacteristicFunction, start: npt.ArrayLike, direction: npt.ArrayLike
-) -> Crossing:
-    """Find where a stable system ceases to be stable along a ray.
-
-    Parameters
-    ----------
-    system : CharacteristicFunction
-        The loop, stable at the start or on its boundary of stability there.
-    start, direction : array_like of two floats
-        The ray start + t direction in the plane of the free parameters.
-
-    Returns
-    -------
-    Crossing
-        Its `position` is the smallest t > 0 at which `unstable_roots` is not zero: the first
-        crossing, or the limit of the neutral root chain. It is 0 where the system is not
-        stable next to the start.
-
-    Raises
-    ------
-    TypeError, ValueError
-        As `first_crossing` does, or if the system is unstable at the start.
-    CountError
-        As `first_crossing` does, or if the counts on the two sides of the result contradict
-        it.
-
-    Examples
-    --------
-    >>> from armlock import CommonArm
-    >>> from armlock.rays import first_break
-    >>> print(f"{first_break(CommonArm(), (0.0, 0.0), (1.0, 1.0)).position:.6f}")
-    1.000000
-    """
-    ray = Ray(system, start, direction)
-    count = int(unstable_roots(system, *ray.start))
-    if count > 0 or count == UNCONFINED:
-        raise ValueError(
-            f"start must be stable to lose stability, but unstable_roots gives {count} at "
-            f"{ray.at(0.0)}"
-        )
-    if count != 0 and int(unstable_roots(system, *ray.at(1e-9 * ray.scale))) != 0:
-        return Crossing(0.0, np.nan, 0)
-    found = first_crossing(system, start, direction)
-    if not np.isfinite(found.position):
-        return found
-    for share, stable in ((0.5, True), (1.0 + 1e-6, False)):
-        point = ray.at(share * found.position)
-        if (int(unstable_roots(system, *point)) == 0) != stable:
-            raise CountError(
-                f"the first crossing along {tuple(ray.direction.tolist())} lies at t = "
-                f"{found.position}, but the count at {point} contradicts it",
-                np.array([point]),
-            )
-    return found
-
-
 __all__ = [
     "Crossing",
     "Crossings",
-    "first_break",
     "first_crossing",
     "ray_crossings",
 ]

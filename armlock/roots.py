@@ -34,10 +34,10 @@ _EQUAL = 1e-11
 # How far right of its root the last count may stand, relative to |Re s| or the same.
 _FARTHEST = 1e-6
 # Longest walk along a line to count, and to look for roots, in turns of the longest delay's
-# exponential: a second, and three. The searches for one root may take so many turns together,
+# exponential: a second each. The searches for one root may take so many turns together,
 # each counting four times, and at least so many a line: some four seconds.
 _LONGEST_COUNT = 1e6
-_LONGEST_SEARCH = 2e5
+_LONGEST_SEARCH = 1e5
 _ALL_WALKS = 1e6
 _WALK_AT_LEAST = 1e4
 # Roots left of a line may lie further up than those right of it. They are looked for so many
@@ -234,7 +234,9 @@ class _Line:
         s = self.sigma + 1j * resolved_grid(whole.compiled(), function, end, 1.0)
         # From where a step of Newton's method is locally shortest: no root close to the line
         # lies between two of its points.
-        s, length = self._step(s)
+        # Part by part, because arrays of millions would spend their time on memory.
+        parts = np.array_split(s, 1 + s.size // 2**15)
+        s, length = map(np.concatenate, zip(*map(self._step, parts), strict=True))
         wider = np.pad(length, 1, constant_values=np.inf)
         s = s[(length <= wider[:-2]) & (length < wider[2:])]
         s = s[np.argsort(-s.real, kind="stable")][:_MOST_STARTS]

@@ -13,24 +13,18 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from numpy.polynomial import polynomial as poly
 from scipy.linalg import expm
 
 from armlock.characteristic import CharacteristicFunction, checked_system, whole_steps
-from armlock.checks import (
-    FloatArray,
-    broadcast_pair,
-    check_memory,
-    positive_number,
-    whole_number,
-)
+from armlock.checks import FloatArray, broadcast_pair, check_memory, positive_number
 from armlock.statespace import Realization, realize
 
 
-def _checked(system: CharacteristicFunction, step: float, order: int) -> tuple[float, int]:
-    """Return the step and the order, or raise for what cannot be semi-discretized."""
+def _checked(system: CharacteristicFunction, step: float, order: int) -> float:
+    """Return the step, or raise for what cannot be semi-discretized."""
     step = positive_number("step", step)
-    order = whole_number("order", order, 0, 1)
+    if order not in (0, 1):
+        raise ValueError(f"order must be 0 or 1, got {order!r}")
     if checked_system(system).neutral:
         raise ValueError(
             "system must be of retarded type: a neutral loop feeds back the delayed signal "
@@ -38,7 +32,7 @@ def _checked(system: CharacteristicFunction, step: float, order: int) -> tuple[f
         )
     for name in ("delay", "delay1", "delay2"):
         whole_steps(name, getattr(system, name), step)
-    return step, order
+    return step
 
 
 def _sampled(
@@ -130,7 +124,7 @@ def transition_matrix(
     >>> print(f"{matrix[0, 0]:.6f}")
     0.904837
     """
-    step, order = _checked(system, step, order)
+    step = _checked(system, step, order)
     # The matrix, and what its eigenvalues take.
     check_memory("step", (system.degree + round(system.longest_delay / step),) * 2, 24)
     form = realize(system, x, y)
@@ -257,7 +251,7 @@ def semi_discretization(
     >>> unstable_roots(semi_discretization(CommonArm(), step=0.05), [0.9, 0.5], [1.05, 1.6])
     array([0, 5])
     """
-    step, order = _checked(system, step, order)
+    step = _checked(system, step, order)
     for name, delay in zip(system.parameters, (system.delay1, system.delay2), strict=True):
         if system.delay + delay == 0.0:
             raise ValueError(
@@ -287,9 +281,8 @@ def _numerator(flow: FloatArray, older: FloatArray, newer: FloatArray) -> FloatA
     """Ascending coefficients of the numerator from a delayed signal to the first state."""
     from scipy.signal import ss2tf
 
-    output, direct = np.eye(1, flow.shape[0]), np.zeros((1, 1))
-    # The newer sample is the older one a step later, times z.
-    first, second = (
-        ss2tf(flow, column[:, None], output, direct)[0][0, ::-1] for column in (older, newer)
-    )
-    return np.asarray(poly.polyadd(first, np.append(0.0, second)), dtype=np.float64)
+    # z W / (z - flow) = W + flow W / (z - flow), where W is the newer sample's column.
+    column = older + flow @ newer
+    output = np.eye(1, flow.shape[0])
+    above, _ = ss2tf(flow, column[:, None], output, newer[:1, None])
+    return np.asarray(above[0, ::-1], dtype=np.float64)

@@ -21,7 +21,6 @@ from armlock.checks import (
     axis,
     complex_array,
     positive_number,
-    real_array,
     real_number,
 )
 
@@ -82,41 +81,6 @@ class SignalMapping:
             poly.polyval(s, np.asarray(self.numerator1, dtype=float)) / below,
             poly.polyval(s, np.asarray(self.numerator2, dtype=float)) / below,
         )
-
-    def response(
-        self,
-        s: npt.ArrayLike,
-        tau1: float,
-        tau2: float,
-        c1: npt.ArrayLike = 1.0,
-        c2: npt.ArrayLike = 1.0,
-    ) -> ComplexArray:
-        """Evaluate the sensor's response P(s).
-
-        Parameters
-        ----------
-        s : array_like of complex
-            Laplace variable in rad/s.
-        tau1, tau2 : float
-            Round-trip delays in s.
-        c1, c2 : array_like of float, optional
-            Multiplicative perturbations of the two arms, 1 where there are none. They
-            broadcast with `s`.
-
-        Returns
-        -------
-        complex array, of the broadcast shape
-
-        Raises
-        ------
-        TypeError, ValueError
-            If an argument does not hold finite numbers, or a delay is not positive.
-        """
-        tau1, tau2 = positive_number("tau1", tau1), positive_number("tau2", tau2)
-        s, k1, k2 = complex_array("s", s), real_array("c1", c1), real_array("c2", c2)
-        m1, m2 = self.weights(s)
-        response: ComplexArray = m1 * (1.0 - k1 * np.exp(-s * tau1))
-        return response + m2 * (1.0 - k2 * np.exp(-s * tau2))
 
 
 #: One arm alone.

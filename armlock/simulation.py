@@ -431,8 +431,8 @@ class Simulation:
     >>> from armlock import CommonArm, Simulation
     >>> run = Simulation(CommonArm(gain=1.0), sample_rate=20.0)
     >>> first, second = run.advance(np.ones(400)), run.advance(np.ones(400))
-    >>> run.time
-    40.0
+    >>> run.samples
+    800
     """
 
     def __init__(
@@ -475,11 +475,6 @@ class Simulation:
         self._stopped: tuple[float, float] | None = None
         self.samples = 0
 
-    @property
-    def time(self) -> float:
-        """How far the run has come, in s."""
-        return self.samples / self.sample_rate
-
     def advance(
         self, noise: npt.ArrayLike, c1: npt.ArrayLike = 1.0, c2: npt.ArrayLike = 1.0
     ) -> FloatArray:
@@ -507,13 +502,9 @@ class Simulation:
         given = finite_series("noise", noise, 1 if self.draws is None else 2)
         if self.draws not in (None, len(given)):
             raise ValueError(f"noise must have {self.draws} rows, got shape {given.shape}")
-        return self._advance(given, c1, c2)
-
-    def _advance(self, given: FloatArray, c1: npt.ArrayLike, c2: npt.ArrayLike) -> FloatArray:
-        """Compute the next block, of noise that is checked."""
         inputs = [np.atleast_2d(given).T, _series("c1", c1, given), _series("c2", c2, given)]
         output, begin = np.empty(inputs[0].shape), self.samples
-        shaped = output[:, 0] if self.draws is None else output.T
+        shaped = output.T.reshape(given.shape)
         for at in range(0, len(output), self._block):
             part = slice(at, at + self._block)
             if self._stopped is None:
@@ -609,7 +600,7 @@ def simulate(
     given = finite_series("noise", noise, 1, 2)
     draws = len(given) if given.ndim == 2 else None
     run = Simulation(loop, sample_rate, history=history, limit=limit, draws=draws)
-    return run._advance(given, c1, c2)
+    return run.advance(given, c1, c2)
 
 
 def simulate_blocks(

@@ -216,13 +216,9 @@ def _response() -> tuple[FloatArray, FloatArray]:
 
 def _overlaps() -> FloatArray:
     """Squared correlation of two bins: rows the hops between segments, columns the bins."""
-    reach = SEGMENT // HOP
-    rows = []
-    for hops in range(reach):
-        shifted = np.zeros(SEGMENT)
-        shifted[: SEGMENT - hops * HOP] = _WINDOW[hops * HOP :]
-        rows.append(np.abs(np.fft.fft(_WINDOW * shifted))[: 2 * SPOILED] ** 2)
-    return np.array(rows) / float(np.sum(_WINDOW**2)) ** 2
+    shifts = range(0, SEGMENT, HOP)
+    rows = [np.fft.fft(_WINDOW[k:] * _WINDOW[: SEGMENT - k], SEGMENT) for k in shifts]
+    return np.asarray(np.abs(rows)[:, : 2 * SPOILED] ** 2 / np.sum(_WINDOW**2) ** 2)
 
 
 _OVERLAPS = _overlaps()

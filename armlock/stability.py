@@ -115,32 +115,39 @@ def _compiled(system: CharacteristicFunction) -> tuple[Any, ...]:
 
 
 def sign_changes(
-    whole: ExponentialSum, end: float, *, start: float = 0.0, is_map: bool = False
+    whole: ExponentialSum, intervals: npt.ArrayLike, *, is_map: bool = False
 ) -> tuple[FloatArray, IntArray, FloatArray]:
-    """Zeros in [start, end] of the imaginary part of an exponential sum, jumps and widths.
+    """Zeros of the imaginary part of an exponential sum, jumps and widths.
 
-    As `armlock.contour.imaginary_zeros`: the jump is 0 where rounding hides whether there is
-    one, within the width.
+    On intervals of the axis, shape (n, 2). As `armlock.contour.imaginary_zeros`: the jump is 0
+    where rounding hides whether there is one, within the width.
 
     Raises
     ------
     CountError
         If there are too many of them, or a number overflows.
     """
-    if not np.isfinite(end):
-        raise CountError(f"no crossings up to omega = {end}: a number overflows", _NO_POINTS)
     (whole,) = without_unused(whole)
     function = whole.weights, whole.sums, whole.phases
     nothing = np.zeros((0, whole.sums.size)), np.zeros(whole.sums.size), np.zeros(0)
-    zeros, complete = contour.imaginary_zeros(
-        whole.compiled(), function, nothing, start, end, is_map, ROUNDING
-    )
-    if not complete:
-        raise CountError(
-            f"no crossings up to omega = {end} rad/s: more than {contour.MOST_STEPS:.0e} steps "
-            f"or {contour.MOST_ZEROS:.0e} crossings, because gain times delay is too large",
-            _NO_POINTS,
+    parts = [np.empty((0, 5))]
+    for start, end in np.reshape(intervals, (-1, 2)):
+        if not np.isfinite(end):
+            raise CountError(
+                f"no crossings up to omega = {end}: a number overflows", _NO_POINTS
+            )
+        zeros, complete = contour.imaginary_zeros(
+            whole.compiled(), function, nothing, start, end, is_map, ROUNDING
         )
+        if not complete:
+            raise CountError(
+                f"no crossings up to omega = {end} rad/s: more than {contour.MOST_STEPS:.0e} "
+                f"steps or {contour.MOST_ZEROS:.0e} crossings, because gain times delay is too "
+                f"large",
+                _NO_POINTS,
+            )
+        parts.append(zeros)
+    zeros = np.concatenate(parts)
     jump = zeros[:, contour.JUMP].astype(np.int64)
     return zeros[:, contour.OMEGA], jump, zeros[:, contour.WIDTH]
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -22,7 +21,15 @@ from armlock import CommonArm, StabilityChart, stability_chart, unstable_roots
 from armlock.checks import FloatArray
 from armlock.semidiscretization import semi_discretization, transition_matrix
 from benchmarks import child
-from benchmarks.report import Row, Series, Topic, fit_series
+from benchmarks.report import (
+    Row,
+    Series,
+    Topic,
+    comparison,
+    fit_series,
+    memory_row,
+    timed,
+)
 
 REACH = 3.0
 STEP = 0.05
@@ -71,12 +78,6 @@ QUICK = Sizes(
 
 def axis(side: int) -> FloatArray:
     return np.linspace(-REACH, REACH, side)
-
-
-def timed(function: Callable[..., Any], *arguments: Any) -> tuple[float, Any]:
-    start = time.perf_counter()
-    result = function(*arguments)
-    return time.perf_counter() - start, result
 
 
 def chart_of(gain: float, side: int) -> StabilityChart:
@@ -163,16 +164,6 @@ def speed_rows(topic: Topic, gain: float, sizes: Sizes) -> None:
     )
 
 
-def comparison(what: str, differ: int, points: int, seconds: float | None = None) -> Row:
-    return Row(
-        what,
-        seconds,
-        requirement=f"{differ} of {points} differ, none may",
-        met=differ == 0,
-        correctness=True,
-    )
-
-
 def count_rows(topic: Topic, gain: float, sizes: Sizes) -> None:
     """Compare a chart with counts at single points, by the argument principle."""
     side, system, values = sizes.side, CommonArm(gain), axis(sizes.side)
@@ -195,7 +186,8 @@ def process_rows(topic: Topic, sizes: Sizes) -> None:
     side, name = sizes.side, "benchmarks.charts"
     for gain in sizes.gains:
         warm = child.call(name, "chart_alone", {}, gain=gain, side=side)
-        topic.rows.append(memory_row(f"g = {gain:g}: chart {side} x {side}", warm["memory"]))
+        what = f"g = {gain:g}: chart {side} x {side}"
+        topic.rows.append(memory_row(what, warm["memory"], MEMORY))
     topic.rows.append(Row("first chart of a process, compiled code on disk", warm["first"]))
     if sizes.fresh_compile:
         with tempfile.TemporaryDirectory() as cache:
@@ -203,14 +195,6 @@ def process_rows(topic: Topic, sizes: Sizes) -> None:
             cold = child.call(name, "chart_alone", environment, gain=sizes.gains[0], side=side)
         compiling = cold["first"] - cold["second"]
         topic.rows.append(Row("compiling, once after installation", compiling))
-
-
-def memory_row(what: str, memory: int) -> Row:
-    return Row(
-        f"{what}: peak resident memory",
-        requirement=f"{memory / 2**20:.0f} MiB < {MEMORY / 2**20:.0f} MiB",
-        met=memory < MEMORY,
-    )
 
 
 # Growth --------------------------------------------------------------------------------

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-import time
 from pathlib import Path
 
 import numpy as np
 
 from armlock import LaserNoise, paper_loop, simulate_blocks, sweep
-from benchmarks import report
-from benchmarks.report import Row, Topic
+from benchmarks import child, report
+from benchmarks.report import Row, Topic, memory_row, timed
 
 SCALING = 1.8
 MEMORY = 320 * 2**20
@@ -36,10 +35,10 @@ def run(*, quick: bool, folder: Path) -> Topic:
         with Client(n_workers=workers, threads_per_worker=1, dashboard_address=None) as client:
             # The workers start, and load what is compiled.
             sweep(largest, tasks[:workers], executor=client.get_executor())
-            start = time.perf_counter()
-            found.append(sweep(largest, tasks, executor=client.get_executor()))
-            seconds.append(time.perf_counter() - start)
-            memory = max(memory, *client.run(_peak).values())
+            took, results = timed(sweep, largest, tasks, executor=client.get_executor())
+            seconds.append(took)
+            found.append(results)
+            memory = max(memory, *client.run(child.peak_memory).values())
     ratio = seconds[0] / seconds[1]
     enough = report.cores() >= 2
     topic = Topic(f"A Dask cluster: {draws} draws of {samples:.3g} samples")
@@ -47,15 +46,8 @@ def run(*, quick: bool, folder: Path) -> Topic:
         Row("one worker", seconds[0]),
         Row("two workers", seconds[1], ratio, f"at least {SCALING:g}" if enough else "",
             ratio >= SCALING if enough else None),
-        Row(f"peak memory of a worker: {memory / 2**20:.0f} MiB", None, None,
-            f"at most {MEMORY / 2**20:.0f} MiB", memory <= MEMORY),
+        memory_row("a worker", memory, MEMORY),
         Row("results of both", None, None, "bit by bit", found[0] == found[1],
             correctness=True),
     ]  # fmt: skip
     return topic
-
-
-def _peak() -> int:
-    from benchmarks.child import peak_memory
-
-    return peak_memory()

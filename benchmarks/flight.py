@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from armlock import (
     unstable_roots,
 )
 from armlock.checks import FloatArray
-from benchmarks.report import Row, Topic
+from benchmarks.report import Row, Topic, at_most, timed
 
 #: Past this frequency in rad/s |L| is below one.
 LAST = 2.0 * np.pi * 14.8e3
@@ -28,10 +27,7 @@ _BLOCK = 1_000_000
 def row(what: str, function: Callable[[], object], most: float) -> Row:
     """Time a call, after one that compiles."""
     function()
-    start = time.perf_counter()
-    function()
-    seconds = time.perf_counter() - start
-    return Row(what, seconds, requirement=f"at most {most:g} s", met=seconds <= most)
+    return at_most(what, timed(function)[0], most)
 
 
 def fine_grid(loop: Loop, last: float, points_a_turn: float) -> FloatArray:
@@ -78,14 +74,10 @@ def run(*, quick: bool, folder: Path) -> Topic:
         ),
         row("noise budget over seven decades", lambda: noise_budget(loop, frequency), 2.0),
     ]
-    start = time.perf_counter()
-    pulling(flight_loop(), 86400.0 * np.linspace(0.05, 20.0, points))
-    seconds = time.perf_counter() - start
-    topic.rows.append(Row(f"pulling at {points} times", seconds))
+    times = 86400.0 * np.linspace(0.05, 20.0, points)
+    topic.rows.append(Row(f"pulling at {points} times", timed(pulling, loop, times)[0]))
     grid = fine_grid(loop, 1e-3 if quick else LAST, 4.0)
-    start = time.perf_counter()
-    found, largest = encirclements(loop, grid)
-    seconds = time.perf_counter() - start
+    seconds, (found, largest) = timed(encirclements, loop, grid)
     topic.rows.append(
         Row(
             f"plain NumPy on {grid.size:.2g} points, steps up to {largest:.2f} rad",

@@ -27,8 +27,8 @@ from armlock.bounds import last_frequency
 from armlock.checks import FloatArray
 from armlock.stability import sign_changes
 from benchmarks import child
-from benchmarks.charts import comparison, memory_row, timed
-from benchmarks.report import Row, Topic
+from benchmarks.charts import MEMORY
+from benchmarks.report import Row, Topic, at_most, comparison, memory_row, timed
 
 GAIN = 10.0
 SECONDS_CHART = 10.0
@@ -76,7 +76,7 @@ def crossings_found(system: CharacteristicFunction, y: FloatArray, right: float)
         sums = fixed.plus(varying.scaled(system.reference[1] - level)).sums
         row = fixed.plus(varying.scaled(-level))
         end = float(last_frequency(system, right, level))
-        total += sign_changes(row._replace(sums=sums), end)[0].size
+        total += sign_changes(row._replace(sums=sums), [(0.0, end)])[0].size
     return total
 
 
@@ -104,12 +104,8 @@ def chart_rows(topic: Topic, sizes: Sizes) -> None:
     }
     best = {name: min(of_name) for name, of_name in times.items()}
     each = {name: best[name] / found[name] for name in best}
-    for name in best:
-        topic.rows.append(
-            Row(
-                f"{name} arm, g = {GAIN:g}: chart {side} x {side} over [0.9, 1.1]^2", best[name]
-            )
-        )
+    what = f"arm, g = {GAIN:g}: chart {side} x {side} over [0.9, 1.1]^2"
+    topic.rows += [Row(f"{name} {what}", seconds) for name, seconds in best.items()]
     quotient = each["dual"] / each["common"]
     topic.rows.append(
         Row(
@@ -141,14 +137,8 @@ def critical_rows(topic: Topic, sizes: Sizes) -> None:
         for direction in DIRECTIONS
     }
     where = max(times, key=lambda direction: times[direction])
-    topic.rows.append(
-        Row(
-            f"critical_perturbation, slowest of {len(DIRECTIONS)} directions {where}",
-            times[where],
-            requirement=f"at most {SECONDS_CRITICAL:g} s",
-            met=times[where] <= SECONDS_CRITICAL,
-        )
-    )
+    what = f"critical_perturbation, slowest of {len(DIRECTIONS)} directions {where}"
+    topic.rows.append(at_most(what, times[where], SECONDS_CRITICAL))
 
 
 def run(*, quick: bool, folder: Path) -> Topic:
@@ -162,14 +152,9 @@ def run(*, quick: bool, folder: Path) -> Topic:
         what = f"{name}: chart {side} x {side}"
         if name == "controlled":
             topic.rows.append(
-                Row(
-                    f"{what} over 1 +- 5e-6",
-                    measured["seconds"],
-                    requirement=f"at most {SECONDS_CHART:g} s",
-                    met=measured["seconds"] <= SECONDS_CHART,
-                )
+                at_most(f"{what} over 1 +- 5e-6", measured["seconds"], SECONDS_CHART)
             )
-        topic.rows.append(memory_row(what, measured["memory"]))
+        topic.rows.append(memory_row(what, measured["memory"], MEMORY))
     critical_rows(topic, sizes)
     topic.notes += [
         f"[a] Best of {sizes.runs} runs in turn; crossings are the frequencies at which a root "

@@ -6,7 +6,8 @@ import json
 import math
 import os
 import platform
-from collections.abc import Iterator, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -42,6 +43,35 @@ class Row:
             self.requirement,
             "" if self.met is None else ("yes" if self.met else "NO"),
         )
+
+
+def timed(
+    function: Callable[..., Any],
+    *arguments: Any,
+    clock: Callable[[], float] = time.perf_counter,
+    **options: Any,
+) -> tuple[float, Any]:
+    """Return how long a call took, and what it returned."""
+    start = clock()
+    result = function(*arguments, **options)
+    return clock() - start, result
+
+
+def at_most(what: str, seconds: float, limit: float) -> Row:
+    """Return the row of a time that must not exceed a limit in s."""
+    return Row(what, seconds, requirement=f"at most {limit:g} s", met=seconds <= limit)
+
+
+def memory_row(what: str, memory: int, limit: int) -> Row:
+    """Return the row of a memory that must not exceed a limit, both in bytes."""
+    requirement = f"{memory / 2**20:.0f} MiB <= {limit / 2**20:.0f} MiB"
+    return Row(f"{what}: peak memory", requirement=requirement, met=memory <= limit)
+
+
+def comparison(what: str, differ: int, points: int, seconds: float | None = None) -> Row:
+    """Return the row of a comparison of results at some points."""
+    requirement = f"{differ} of {points} differ, none may"
+    return Row(what, seconds, None, requirement, differ == 0, correctness=True)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ hundred times as fast as that loop in Python. Tests hold it against 106 bits.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,7 @@ from armlock import LaserNoise, Loop, PerturbationNoise, paper_loop, simulate
 from armlock.checks import FloatArray
 from armlock.discretize import sampled_loop
 from armlock.paper import SAMPLE_RATE, TAU1, TAU2
-from benchmarks.report import Row, Topic
+from benchmarks.report import Row, Topic, timed
 
 PYTHON_RATIO = 100.0
 ENSEMBLE_RATIO = 2.5
@@ -38,14 +37,6 @@ class Sizes:
 
 
 QUICK = Sizes(samples=30_000, python=6_000, compared=30_000, passes=1)
-
-
-def timed(
-    function: Callable[[], Any], clock: Callable[[], float] = time.perf_counter
-) -> tuple[float, Any]:
-    start = clock()
-    result = function()
-    return clock() - start, result
 
 
 def plain(
@@ -172,8 +163,11 @@ def ensemble_rows(
     same = np.array_equal(simulate(loop, *together), [simulate(loop, *row) for row in rows])
     times = np.array([
         [
-            timed(lambda: simulate(loop, *together).size, time.process_time)[0],
-            timed(lambda: [simulate(loop, *row).size for row in rows], time.process_time)[0],
+            timed(function, clock=time.process_time)[0]
+            for function in (
+                lambda: simulate(loop, *together).size,
+                lambda: [simulate(loop, *row).size for row in rows],
+            )
         ]
         for _ in range(5 * passes)
     ])  # fmt: skip

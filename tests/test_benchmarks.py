@@ -44,7 +44,7 @@ def test_quick_run_writes_the_report(tmp_path, capsys, monkeypatch):
 def test_wrong_results_fail_the_run(tmp_path, monkeypatch, capsys, differ, code, last):
     def run(*, quick, folder):
         slow = report.Row("chart", 2.0, 0.5, "at least 1", met=False)
-        return report.Topic("Made up", [slow, charts.comparison("counts", differ, 10)])
+        return report.Topic("Made up", [slow, report.comparison("counts", differ, 10)])
 
     monkeypatch.setattr(charts, "run", run)
     assert main(["--quick", "--only", "charts", "--output", str(tmp_path)]) == code

@@ -6,19 +6,9 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from book.companion.claims import (
-    Finding,
-    Ledger,
-    Verdict,
-    Weight,
-    all_claims,
-    chapter_claims,
-    check,
-    claim,
-    decide,
-)
+from book.companion.claims import Verdict, Weight, all_claims, chapter_claims, check
 from book.companion.claims import ledger as module
-from book.companion.claims.ledger import typeset
+from book.companion.claims.ledger import Finding, Ledger, claim, decide, typeset
 from book.companion.claims.page import SECTIONS, whole_ledger
 
 NOTEBOOKS = Path(__file__).parents[1] / "notebooks"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from armlock import unstable_roots
 from book.companion.claims import nyquist_cases as chapter
@@ -22,7 +21,6 @@ def test_threshold_of_the_common_arm_does_not_depend_on_the_gain():
 def test_the_lower_gain_margin_starts_at_its_threshold():
     """Beyond it, a slow pair of roots is unstable at low gain."""
     threshold = chapter.low_gain_threshold()
-    assert threshold == pytest.approx(0.00976, rel=1e-3)
     low = chapter.at_gain(chapter.DUAL, 1e-7)
     assert unstable_roots(low, 1.0, 1.0 + threshold * (1.0 - 1e-3)) == 0
     assert unstable_roots(low, 1.0, 1.0 + threshold * (1.0 + 1e-3)) == 2

@@ -7,10 +7,7 @@ import pytest
 from armlock import CommonArm
 from book.companion.claims import Weight, check
 from book.companion.claims import page as module
-from book.companion.claims.assumptions import (
-    Assumptions,
-    break_along,
-)
+from book.companion.claims.assumptions import break_along
 from book.companion.claims.page import (
     Errata,
     LedgerPage,
@@ -123,9 +120,3 @@ def test_claims_with_one_finding_share_an_erratum():
 
 def test_a_loop_that_is_unstable_has_no_first_break():
     assert break_along(CommonArm(), (1.0, 0.0)) == 0.0
-
-
-def test_every_assumption_has_an_entry():
-    entries = Assumptions().entries
-    assert len({entry.name for entry in entries}) == 13
-    assert all(all(entry) for entry in entries)

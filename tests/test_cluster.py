@@ -34,35 +34,20 @@ def draw_or_die(task):
     return draw(seed)
 
 
-@pytest.fixture(scope="module")
-def executor():
-    with (
-        distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, dashboard_address=None
-        ) as c,
-        distributed.Client(c) as client,
-    ):
-        yield client.get_executor()
-
-
-def test_a_cluster_gives_the_serial_results(executor, tmp_path, capsys):
-    expected = [draw(seed) for seed in range(8)]
-    assert np.array_equal(sweep(draw, range(8), executor=executor, progress=True), expected)
-    assert "8 of 8" in capsys.readouterr().err
-    pytest.importorskip("h5py")
-    found = sweep(draw, range(8), executor=executor, store=tmp_path / "draws.h5")
-    assert np.array_equal(found, expected)
-
-
-def test_a_worker_that_is_killed_costs_no_result(executor, tmp_path):
+def test_a_worker_that_is_killed_costs_no_result(tmp_path):
     place = tmp_path / "killed"
-    found = sweep(draw_or_die, [(seed, str(place)) for seed in range(12)], executor=executor)
+    tasks = [(seed, str(place)) for seed in range(12)]
+    with distributed.Client(
+        n_workers=2, threads_per_worker=1, dashboard_address=None
+    ) as client:
+        found = sweep(draw_or_die, tasks, executor=client.get_executor())
     assert place.exists()
     assert np.array_equal(found, [draw(seed) for seed in range(12)])
 
 
 def test_the_lines_of_the_page_run(tmp_path):
     """As a script, whose workers import it again."""
+    pytest.importorskip("h5py")
     (tmp_path / "page.py").write_text(PAGE[0].replace("200)", "6)"))
     done = subprocess.run(
         [sys.executable, "page.py"],
@@ -73,6 +58,7 @@ def test_the_lines_of_the_page_run(tmp_path):
         check=True,
     )
     assert re.fullmatch(r"between \d+\.\d+ and \d+\.\d+\n", done.stdout)
+    assert "6 of 6" in done.stderr
 
 
 def test_the_full_draws_of_the_page_are_single_runs():

@@ -134,12 +134,6 @@ def test_the_critical_perturbation_of_the_robust_loop_on_a_plain_grid():
     assert at[at > 0.0].min() == pytest.approx(limit, rel=1e-4)
 
 
-def test_free_phases_above_do_not_change_the_critical_perturbation():
-    found = critical_perturbation(buildable_loop(), (1.0, -1.0), TURN * 2.0)
-    # Without free phases it is the same, and takes seconds.
-    assert found == pytest.approx(4.400363639535378e-06, rel=1e-12)
-
-
 def test_the_robust_loop_keeps_the_papers_suppression():
     frequency = np.geomspace(1e-4, 1.0, 200_001)
     change = 20.0 * np.log10(np.abs(gain(frequency) / table_two_gain(frequency)))

@@ -5,6 +5,7 @@ from matplotlib.colors import to_rgba
 
 from armlock import (
     CommonArm,
+    SingleArm,
     d_curve_branches,
     d_curve_line,
     nyquist,
@@ -52,11 +53,12 @@ def test_labels_stand_in_regions_of_their_count(ax, chart):
         assert int(text.get_text()) == chart.counts[row, column]
 
 
-def test_charts_with_uneven_axes_are_no_pictures(ax):
-    even = np.linspace(-1, 1, 5)
-    for bad in ([0.0, 0.1, 1.0], even[::-1], [1.0]):
-        with pytest.raises(ValueError, match=r"^chart\.y must ascend in equal steps, got "):
-            stability_chart(CommonArm(), even, bad).plot(ax)
+def test_cells_lie_around_the_points_of_any_axes(ax):
+    even, uneven = np.linspace(-1, 1, 5), np.array([0.0, 0.2, 1.0])
+    stability_chart(CommonArm(), even, uneven).plot(ax)
+    assert ax.images[0].get_extent() == pytest.approx([-1.25, 1.25, -0.1, 1.4])
+    with pytest.raises(ValueError, match=r"^chart\.y must hold at least two values"):
+        stability_chart(CommonArm(), even, [1.0]).plot(ax)
     near = 1.0 + np.linspace(-1e-9, 1e-9, 200)
     stability_chart(CommonArm(), near, near).plot(ax)
 
@@ -75,7 +77,7 @@ def test_d_curves_are_drawn_branch_by_branch_and_with_their_line(ax):
 
 def test_a_curve_can_be_drawn_in_part_and_under_a_name(ax):
     curve = nyquist(CommonArm(), 0.9, 0.9, omega_max=3.0)
-    curve.plot(ax, unit=None, omega_max=1.0, color=plotting.GREEN, label="part")
+    curve.plot(ax, omega_max=1.0, color=plotting.GREEN, label="part")
     positive, negative = ax.lines[:2]
     shown = curve.response[curve.omega <= 1.0]
     np.testing.assert_array_equal(positive.get_xdata(), shown.real)
@@ -84,16 +86,24 @@ def test_a_curve_can_be_drawn_in_part_and_under_a_name(ax):
     assert ax.get_legend_handles_labels()[1] == ["part"]
 
 
-def test_the_compressed_plane_keeps_directions_and_ends_at_infinity(ax):
-    curve = nyquist(CommonArm(), 0.9, 0.9, omega_max=3.0)
-    curve.plot(ax, unit=0.1, arrows=[0.1, curve.omega[-1]])
-    drawn = ax.lines[0].get_xdata() + 1j * ax.lines[0].get_ydata()
+def test_polar_axes_keep_directions_and_end_at_infinity():
+    curve = nyquist(SingleArm(), 1.001, omega_max=3.0)
+    figure = plt.figure()
+    ax = figure.add_subplot(projection="polar")
+    assert curve.plot(ax, arrows=[0.1, curve.omega[-1]]) is ax
+    angle, size = np.array(ax.lines[0].get_data())
     # The first point is the one at infinity, at which the infinite branch is joined.
-    assert abs(drawn[0]) == pytest.approx(np.log10(1.0 + plotting.INFINITY / 0.1))
-    assert abs(drawn[1:]) == pytest.approx(np.log10(1.0 + abs(curve.response) / 0.1))
-    assert np.angle(drawn[1:] / curve.response) == pytest.approx(0.0, abs=1e-12)
-    branch = ax.lines[3]
-    assert np.hypot(*branch.get_data()) == pytest.approx(abs(drawn[0]))
+    assert size[0] == ax.get_ylim()[1] == plotting.INFINITY
+    assert size[1:] == pytest.approx(np.minimum(abs(curve.response), plotting.INFINITY))
+    assert angle[1:] == pytest.approx(np.angle(curve.response), abs=1e-12)
+    branch = ax.lines[-1].get_ydata()
+    assert branch == pytest.approx(plotting.INFINITY)
+    assert figures.drawn(figure) == {}
+    plt.close(figure)
+    # Without any axes, polar ones are made.
+    plt.figure()
+    assert curve.plot().name == "polar"
+    plt.close()
 
 
 def test_publishing_writes_figure_and_data(ax, chart, tmp_path, monkeypatch):

@@ -54,8 +54,12 @@ def drawn(figure: Figure) -> dict[str, npt.NDArray[np.float64]]:
         whole panel and single marks are left out.
     """
     columns: dict[str, npt.NDArray[np.float64]] = {}
-    # Drawings and colour bars hold no data.
-    panels = [ax for ax in figure.axes if ax.axison and ax.get_label() != "<colorbar>"]
+    # Drawings, colour bars and polar axes, whose distances are compressed, are left out.
+    panels = [
+        ax
+        for ax in figure.axes
+        if ax.axison and ax.get_label() != "<colorbar>" and ax.name != "polar"
+    ]
     for letter, ax in zip(ascii_lowercase, panels, strict=False):
         panel = f"{letter}: " if len(panels) > 1 else ""
         below = [other.get_xlabel() for other in ax.get_shared_x_axes().get_siblings(ax)]

@@ -1,17 +1,6 @@
 """The paper's claims as executable checks, one module a section of the paper."""
 
-from book.companion.claims.ledger import (
-    Claim,
-    Finding,
-    Ledger,
-    Verdict,
-    Weight,
-    all_claims,
-    chapter_claims,
-    check,
-    claim,
-    decide,
-)
+from book.companion.claims.ledger import Verdict, Weight, all_claims, chapter_claims, check
 
 # In the order of the paper, which is the order of the register.
 from book.companion.claims import table1  # isort: skip
@@ -25,19 +14,14 @@ from book.companion.claims import appendix  # isort: skip
 from book.companion.claims import flight  # isort: skip
 
 __all__ = [
-    "Claim",
-    "Finding",
-    "Ledger",
     "Verdict",
     "Weight",
     "all_claims",
     "appendix",
     "chapter_claims",
     "check",
-    "claim",
     "common_arm",
     "controller",
-    "decide",
     "dual_arm",
     "flight",
     "nyquist_cases",

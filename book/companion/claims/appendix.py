@@ -61,14 +61,6 @@ def phase_error(phase: npt.ArrayLike, mismatch: tuple[float, float] = MISMATCH) 
     return np.asarray(np.arctan2(above, below))
 
 
-def slope_error(mismatch: tuple[float, float] = MISMATCH) -> float:
-    """Relative difference of the exact error and eta phi as the phase goes to zero.
-
-    The slope of the arctangent's argument there is eta / (1 + epsilon_I).
-    """
-    return abs(1.0 / (1.0 + mismatch[0]) - 1.0)
-
-
 def mean_over_turn(mismatch: tuple[float, float] = MISMATCH) -> float:
     """Mean of the error over half a turn, its period, by adaptive integration, in rad.
 
@@ -177,7 +169,8 @@ def laser_phase_rms() -> float:
 def gain_mismatch() -> Finding:
     """Slope of the exact arctangent at zero phase against the linear model."""
     small = 1e-4
-    off = slope_error()
+    # The slope of the arctangent's argument at zero is eta / (1 + epsilon_I).
+    off = abs(1.0 / (1.0 + MISMATCH[0]) - 1.0)
     # The next term of the series is -2/3 phase^2.
     series = (1.0 - off) * (1.0 - 2.0 * small**2 / 3.0)
     agrees = abs(float(phase_error(small)) / (ETA * small) - series) < 1e-12
@@ -224,10 +217,8 @@ def any_phase() -> Finding:
 )
 def size_of_spectrum() -> Finding:
     """Integrate the spectrum over the simulated band."""
-    rms = band_rms(LOWEST, 0.5 * SAMPLE_RATE)
-    lowest = (PHASE_NOISE_LEVEL**2 * PHASE_NOISE_CORNER**4 / 3.0 / PERTURBATION**2) ** (
-        1.0 / 3.0
-    )
+    rms = face_value_rms()
+    lowest = np.cbrt((PHASE_NOISE_LEVEL / PERTURBATION) ** 2 * PHASE_NOISE_CORNER**4 / 3.0)
     return Finding(
         decide(rms <= 2.0 * PERTURBATION),
         rms / PERTURBATION,

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from scipy.constants import speed_of_light
 
 from armlock import sensors
-from armlock.checks import FloatArray
+from armlock.controllers import Controller
 from armlock.dcurve import d_curve_line
 from armlock.loops import CommonArm, DualArm, Loop, SingleArm
 from armlock.paper import (
@@ -57,11 +57,6 @@ def perturbed(name: str, size: npt.ArrayLike) -> tuple[Any, Any]:
     return 1.0 + size * OUTWARD[name][0], 1.0 + size * OUTWARD[name][1]
 
 
-def growth_beside_ideal(name: str, size: npt.ArrayLike) -> FloatArray:
-    """Return the real part of the rightmost root, in 1/s, `size` away from (1, 1)."""
-    return np.real(np.asarray(rightmost_root(LOOPS[name], *perturbed(name, size))))
-
-
 def _readings(gain: float) -> list[tuple[str, float, Loop]]:
     """Return name, p and loop of the configurations, the dual arm's for each p and dtau."""
     return [
@@ -96,7 +91,8 @@ def ideal_point_on_boundary() -> Finding:
     used = {COMMON_ARM_GAIN, DUAL_ARM_GAIN}
     tried = [(*reading, g) for g in (*used, 0.1, CONTROLLER_GAIN) for reading in _readings(g)]
     off = [(p, g) for name, p, loop, g in tried if not _on_edge(name, loop)]
-    days = [1.0 / float(growth_beside_ideal(k, PERTURBATION)) / 86400.0 for k in LOOPS]
+    roots = [rightmost_root(loop, *perturbed(k, PERTURBATION)) for k, loop in LOOPS.items()]
+    days = [1.0 / complex(root).real / 86400.0 for root in roots]
     return Finding(
         decide(not used & {g for _, g in off}, beyond=not off),
         len(off),
@@ -126,6 +122,11 @@ def printed_difference(omega: npt.ArrayLike, difference: float, mean: float) -> 
     return -2j * np.sin(difference * omega) * np.exp(-1j * omega * mean)
 
 
+def response(sensor: sensors.SignalMapping, omega: npt.ArrayLike) -> Any:
+    """Evaluate a sensor's P with the paper's round trips, at omega in rad/s."""
+    return Loop(Controller((), (), 1.0), sensor, TAU1, TAU2).open_loop(1j * np.asarray(omega))
+
+
 def dual_response(
     omega: npt.ArrayLike, corner: float, difference: float, *, printed: bool = False
 ) -> Any:
@@ -148,8 +149,8 @@ def dual_response(
     """
     s = 1j * np.asarray(omega)
     factor = corner / ((1.0 if printed else s) + corner)
-    common = sensors.COMMON.response(s, TAU1, TAU2)
-    return common - factor / (s * difference) * sensors.DIFFERENCE.response(s, TAU1, TAU2)
+    apart = response(sensors.DIFFERENCE, omega)
+    return response(sensors.COMMON, omega) - factor / (s * difference) * apart
 
 
 def _largest(values: Any) -> float:
@@ -165,7 +166,7 @@ def _largest(values: Any) -> float:
 )
 def single_row() -> Finding:
     """Compare with 1 - exp(-s round trip), tau being the time for one way."""
-    truth = sensors.SINGLE.response(1j * OMEGA, TAU1, TAU1)
+    truth = response(sensors.SINGLE, OMEGA)
     tau = TAU1 / 2.0
     one_way = _largest(2j * np.sin(tau * OMEGA) * np.exp(-1j * OMEGA * tau) - truth)
     return Finding(
@@ -188,7 +189,7 @@ def single_row() -> Finding:
 )
 def common_row() -> Finding:
     """Compare with 2 - e1 - e2 for both meanings of the difference."""
-    truth = sensors.COMMON.response(1j * OMEGA, TAU1, TAU2)
+    truth = response(sensors.COMMON, OMEGA)
     full = _largest(printed_common(OMEGA, FULL_DIFFERENCE, MEAN_DELAY) - truth)
     half = _largest(printed_common(OMEGA, HALF_DIFFERENCE, MEAN_DELAY) - truth)
     return Finding(
@@ -212,7 +213,7 @@ def common_row() -> Finding:
 )
 def difference_row() -> Finding:
     """Compare with the difference of the arms, for both meanings of dtau."""
-    truth = sensors.DIFFERENCE.response(1j * OMEGA, TAU1, TAU2)
+    truth = response(sensors.DIFFERENCE, OMEGA)
     half = printed_difference(OMEGA, HALF_DIFFERENCE, MEAN_DELAY)
     full = printed_difference(OMEGA, FULL_DIFFERENCE, MEAN_DELAY)
     exact, ratio = _largest(half - truth), float(np.abs(full[0] / truth[0]))
@@ -270,7 +271,7 @@ def dual_row() -> Finding:
 )
 def modified_dual_row() -> Finding:
     """Show that the row says nothing before H_+ and H_- are given."""
-    common = abs(sensors.COMMON.response(1j * NULL, TAU1, TAU2))
+    common = abs(complex(response(sensors.COMMON, NULL)))
     dual = abs(dual_response(NULL, DUAL_SENSOR_CORNER, HALF_DIFFERENCE))
     ratio = float(dual / common)
     return Finding(
