@@ -46,6 +46,8 @@ def test_what_a_step_meets_is_not_called_clear():
         for tally, share in ((met, 1.0 - 1e-9), (far, 10.0)):
             point = centre + share * (spread + radius) * way
             tally["disc"] += infimum._clear(disc, ahead, step, point, radius)
+        own_centre = infimum._centre_and_radius(disc)[0]
+        met["disc"] += infimum._clear(disc, ahead, step, own_centre, radius)
         tally = met if abs(centre.imag) <= spread else far
         tally["axis"] += infimum._on_one_side(disc, ahead, step)
         half = np.sqrt(max(spread**2 - centre.imag**2, 0.0))
