@@ -51,8 +51,8 @@ def axis_zeros(
 def _on_unit_circle(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArray:
     """Move frequencies next to crossovers to where |L|, from its factors, is one."""
     # Far less than the distance between two nulls of an arm.
-    span = np.minimum(0.01 / loop.longest_delay, 0.5 * omega)
-    reaches = [np.minimum(10.0**power * omega, span) for power in range(-13, 0)]
+    longest = 0.01 / loop.longest_delay
+    reaches = [np.minimum(10.0**power * omega, longest) for power in range(-13, 0)]
     return polished(lambda at: _level(loop, c1, c2, at), omega, reaches)
 
 

@@ -111,7 +111,7 @@ def random_sum(degree, rng):
     parts = []
     for number in (degree, degree // 2):
         found = roots(rng, number, 1e-2, 1e3, 0.5)
-        coefficients = np.array(np.poly(found).real[::-1], dtype=np.float64)
+        coefficients = np.poly(found).real[::-1].astype(np.float64)
         parts.append(exponentials.Polynomial(coefficients, np.array(found, complex)))
     phases, weights = rng.uniform(-3.0, 3.0, 2), rng.normal(size=(2, 2))
     whole = exponentials.ExponentialSum(tuple(parts), weights, phases, weights.sum(axis=0))

@@ -46,6 +46,8 @@ def test_what_a_step_meets_is_not_called_clear():
         for tally, share in ((met, 1.0 - 1e-9), (far, 10.0)):
             point = centre + share * (spread + radius) * way
             tally["disc"] += infimum._clear(disc, ahead, step, point, radius)
+        own_centre = infimum._centre_and_radius(disc)[0]
+        met["disc"] += infimum._clear(disc, ahead, step, own_centre, radius)
         tally = met if abs(centre.imag) <= spread else far
         tally["axis"] += infimum._on_one_side(disc, ahead, step)
         half = np.sqrt(max(spread**2 - centre.imag**2, 0.0))
@@ -66,3 +68,17 @@ def test_what_a_step_meets_is_not_called_clear():
     assert +met == {}
     assert len(far) == 7
     assert min(far.values()) > 50
+
+
+def test_a_bound_along_tangents_is_one():
+    rng = np.random.default_rng(5)
+    share = np.linspace(0.0, 1.0, 30)
+    for _ in range(500):
+        over, over_slope, under, under_slope = (
+            between(rng, 1e-2, 1e2) * np.exp(2j * np.pi * rng.random()) for _ in range(4)
+        )
+        level, step = between(rng, 1e-2, 1.0), between(rng, 1e-3, 1.0)
+        along = over + share * step * over_slope, under + share * step * under_slope
+        least = (abs(along[0]) - level * abs(along[1])).min()
+        found = infimum._stays_above(over, over_slope, under, under_slope, level, step)
+        assert found <= least + 1e-12 * (abs(over) + abs(under))
