@@ -451,7 +451,7 @@ def imaginary_zeros(
         return zeros[:0], False
     found, steps, sign = 0, 0, 0
     omega, last_clear, step = omega_start, omega_start, omega_end
-    doubtful, crawled, caution = True, 0, 1.0
+    doubtful, crawled, patience, caution = True, 0, 1000, 1.0
     fastest = np.abs(phases).max() if phases.size else 0.0
     while omega < omega_end and steps <= MOST_STEPS and found <= MOST_ZEROS:
         start, reach, local, sizes = piece(polynomials, weights, sums, omega, np.inf)
@@ -493,8 +493,8 @@ def imaginary_zeros(
                 # Next to rounding the terms may cancel so far that bounds allow no progress.
                 short = step < 1e-6 * min(omega, 1.0 / max(fastest, 1e-300))
                 crawled = crawled + 1 if short and not doubtful else 0
-                if crawled > 1000:
-                    caution = 1e3
+                if crawled > patience:
+                    caution, patience = 1e3, 50
             following = end if step >= end - omega else omega + step
             old_h = h
             value, slope = evaluate(start, reach, local, phases, following)

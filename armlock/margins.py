@@ -36,7 +36,7 @@ from armlock.free_phases import (
 from armlock.gains import gain_interval_of_stable
 from armlock.loops import Loop, checked_loop
 from armlock.nyquist import leading_radius, loop_numerator
-from armlock.rays import Ray, first_crossing
+from armlock.rays import FARTHEST, Ray, first_crossing
 from armlock.stability import BOUNDARY, UNCONFINED, CountError, unstable_roots
 
 # Relative accuracy with free phases, in the order of `armlock.infimum.free_margins_at`. The
@@ -349,14 +349,13 @@ def margins(
     return Margins(*(float(value) for value in (*numbers, *places)))
 
 
-def _first_near(loop: Loop, ray: Ray) -> float | None:
-    """First t at which a root crosses along a ray from (1, 1); None if it lies far.
+def _first_up_to(loop: Loop, ray: Ray, stop: float) -> float | None:
+    """First t up to `stop` at which a root crosses along a ray from (1, 1); None if none does.
 
-    Far is past half the limit of the neutral root chain, or where the parameters change by more
-    than their own size. At the largest |c1| and |c2| of the ray, free phases tell which parts
-    of the axis no root can cross; with smaller ones it cannot cross there either.
+    At the largest |c1| and |c2| of the ray, free phases tell which parts of the axis no root
+    can cross; with smaller ones it cannot cross there either.
     """
-    stop, found = min(ray.scale, 0.5 * ray.chain_limit()), None
+    found = None
 
     def meeting(span: tuple[float, float]) -> FloatArray:
         c1, c2 = (max(1.0, abs(c)) for c in ray.at(stop))
@@ -434,9 +433,15 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
         )
     if count != 0 and int(unstable_roots(loop, *ray.at(1e-9 * ray.scale))) != 0:
         return 0.0
-    eps = _first_near(loop, ray)
+    farthest = FARTHEST * ray.scale
+    far = min(farthest, 0.5 * ray.chain_limit())
+    stop = min(ray.scale, far)
+    while (eps := _first_up_to(loop, ray, stop)) is None and stop < far:
+        stop = min(10.0 * stop, far)
     if eps is None:
-        eps = first_crossing(loop, ray.start, direction).position
+        # Next to the limit of the neutral root chain, if there is one.
+        near_chain = far < farthest
+        eps = first_crossing(loop, ray.start, direction).position if near_chain else np.inf
     if not np.isfinite(eps):
         return eps
     points = [ray.at(share * eps) for share in (0.5, 1.0 - 1e-6, 1.0 + 1e-6)]

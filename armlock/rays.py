@@ -206,10 +206,10 @@ class Ray:
 
     def reaches(self, stop: float, chain: float) -> Iterator[float]:
         """Yield the t of walk after walk: up to `stop`, or ever closer to the chain's limit."""
-        # The boundary of a map ends at one frequency: a single walk sees all of it.
+        # Where the frequency is the same for all t, as for maps, a single walk sees all of it.
         t = 1e-4 * min(stop, self.scale)
-        far = 0.0 if self.system.step else min(stop, 0.5 * chain)
-        while t < far:
+        far = min(stop, 0.5 * chain)
+        while t < far and self.end(t) < 0.5 * self.end(far):
             yield t
             t *= _FURTHER
         if stop < chain:
