@@ -442,16 +442,16 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
         # Next to the limit of the neutral root chain, if there is one.
         near_chain = far < farthest
         eps = first_crossing(loop, ray.start, direction).position if near_chain else np.inf
-    if not np.isfinite(eps):
-        return eps
-    points = [ray.at(share * eps) for share in (0.5, 1.0 - 1e-6, 1.0 + 1e-6)]
-    halfway, before, beyond = (int(unstable_roots(loop, *point)) for point in points)
-    # So close to the result, rounding may hide on which side of the boundary a point is.
-    if halfway != 0 or before not in (0, BOUNDARY) or beyond == 0:
+    # The loop must be stable half-way and just before, and not just beyond. So close to the
+    # result, rounding may hide on which side of the boundary a point is.
+    broken = np.isfinite(eps)
+    shares = (0.5, 1.0 - 1e-6, 1.0 + 1e-6) if broken else (0.5,)
+    points = [ray.at(share * min(eps, farthest)) for share in shares]
+    counts = [int(unstable_roots(loop, *point)) for point in points]
+    if counts[0] != 0 or (broken and (counts[1] not in (0, BOUNDARY) or counts[2] == 0)):
         raise CountError(
-            f"the first crossing along {tuple(ray.direction.tolist())} lies at {eps}, but "
-            f"the counts half-way, just before and just beyond, {halfway}, {before} and "
-            f"{beyond}, contradict it",
+            f"the first crossing along {tuple(ray.direction.tolist())} lies at {eps}, but the "
+            f"counts {counts} at {points} contradict it",
             np.array(points),
         )
     return eps

@@ -8,6 +8,7 @@ are the zeros of Im(D0 conj(M)): one certified walk finds them all.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import NamedTuple
@@ -23,8 +24,8 @@ from armlock.stability import CountError, polished, sign_changes, unstable_roots
 
 #: Nothing is looked at where the parameters are this many times as large as the start, or as 1.
 FARTHEST = 1e9
-# Each further walk looks so many times as far along a ray.
-_FURTHER = 10.0
+# Each further walk along a ray goes so many times as far up in frequency.
+_LONGER = 4.0
 # Next to the limit of the neutral root chain, roots cross at ever higher frequency. They are
 # followed up to so many turns of the longest delay, which takes about a tenth of a second.
 _TURNS_NEXT_TO_THE_CHAIN = 50_000
@@ -206,12 +207,21 @@ class Ray:
 
     def reaches(self, stop: float, chain: float) -> Iterator[float]:
         """Yield the t of walk after walk: up to `stop`, or ever closer to the chain's limit."""
-        # Where the frequency is the same for all t, as for maps, a single walk sees all of it.
+        # The boundary of a map ends at one frequency: a single walk sees all of it.
         t = 1e-4 * min(stop, self.scale)
-        far = min(stop, 0.5 * chain)
-        while t < far and self.end(t) < 0.5 * self.end(far):
+        far = 0.0 if self.system.step else min(stop, 0.5 * chain)
+        while t < far:
             yield t
-            t *= _FURTHER
+            # A near crossing is found at low frequency: go no further than that takes.
+            lowest = 1.0 / max(self.system.longest_delay, 1e-12)
+            limit = _LONGER * max(self.end(t), lowest)
+            if self.end(far) <= limit:
+                break
+            low, high = t, far
+            while high > 1.1 * low:
+                middle = math.sqrt(low * high)
+                low, high = (middle, high) if self.end(middle) <= limit else (low, middle)
+            t = high
         if stop < chain:
             yield stop
         else:
