@@ -442,9 +442,11 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
         # Next to the limit of the neutral root chain, if there is one.
         near_chain = far < farthest
         eps = first_crossing(loop, ray.start, direction).position if near_chain else np.inf
+    broken = np.isfinite(eps)
+    if not broken and not ray.acts():
+        return eps
     # The loop must be stable half-way and just before, and not just beyond. So close to the
     # result, rounding may hide on which side of the boundary a point is.
-    broken = np.isfinite(eps)
     shares = (0.5, 1.0 - 1e-6, 1.0 + 1e-6) if broken else (0.5,)
     points = [ray.at(share * min(eps, farthest)) for share in shares]
     counts = [int(unstable_roots(loop, *point)) for point in points]
