@@ -489,15 +489,15 @@ class _Judge:
         near = np.minimum(lag, 2.0 * np.pi - lag) - half
         # From the last sample at which |L| may exceed one it falls to the one after it.
         most = np.log(size[0] + radius[0])
-        last = int(np.flatnonzero(most >= 0.0).max(initial=0))
+        last, rolls_off = int(np.flatnonzero(most >= 0.0).max(initial=0)), most[-1] < 0.0
         falls = slice(last, last + 2)
         unity = np.exp(np.interp(0.0, -most[falls], np.log(self.omega[falls])))
         delay = ((lag - half) / self.omega)[0, crosses[0]].min(initial=math.inf)
         return {
             "phase": float(near[0, crosses[0]].min(initial=np.pi)),
             "phase in the box": float(near[crosses].min(initial=np.pi)),
-            "dead time": 0.0 if most[-1] >= 0.0 else float(delay),
-            "unity gain": float(unity) / (2.0 * np.pi),
+            "dead time": float(delay) if rolls_off else 0.0,
+            "unity gain": float(unity) / (2.0 * np.pi) if rolls_off else math.inf,
         }
 
 

@@ -434,5 +434,12 @@ def paper_loop(
 
 def _delay_difference(tau1: float, tau2: float, difference: float | None) -> float:
     """Return the dtau of the dual sensor, tau1 - tau2 unless it is given."""
+    if difference is not None:
+        return real_number("difference", difference)
     between = positive_number("tau1", tau1) - positive_number("tau2", tau2)
-    return between if difference is None else real_number("difference", difference)
+    if between == 0.0:
+        raise ValueError(
+            f"tau1 and tau2 must differ, got {tau1} for both: the dual sensor divides by "
+            f"their difference"
+        )
+    return between

@@ -84,8 +84,9 @@ def pulling(
     if unstable > 0:
         raise ValueError(f"loop must be stable at c1 = c2 = 1, got {unstable} unstable roots")
     total = np.zeros(t.shape)
-    for source, values in (("common", common), ("differential", differential)):
-        error = _error(source, values)
+    errors = {"common": _error("common", common)}
+    errors["differential"] = _error("differential", differential)
+    for source, error in errors.items():
         if error.any():
             total += _residues(loop, t, source, error)
     return total

@@ -16,14 +16,20 @@ import numpy.typing as npt
 from scipy.linalg import expm
 
 from armlock.characteristic import CharacteristicFunction, checked_system, whole_steps
-from armlock.checks import FloatArray, broadcast_pair, check_memory, positive_number
+from armlock.checks import (
+    FloatArray,
+    broadcast_pair,
+    check_memory,
+    positive_number,
+    whole_number,
+)
 from armlock.statespace import Realization, realize
 
 
 def _checked(system: CharacteristicFunction, step: float, order: int) -> float:
     """Return the step, or raise for what cannot be semi-discretized."""
     step = positive_number("step", step)
-    if order not in (0, 1):
+    if whole_number("order", order, 0) > 1:
         raise ValueError(f"order must be 0 or 1, got {order!r}")
     if checked_system(system).neutral:
         raise ValueError(

@@ -146,6 +146,7 @@ WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
     (armlock.spectral_radius, "system", armlock.semi_discretization(ARMS, 0.1), "be in contin"),
     (armlock.transition_matrix, "step", 1e-6, "be of a size that memory holds"),
     (armlock.semi_discretization, "order", 2, "be 0 or 1, got 2"),
+    (armlock.semi_discretization, "order", 1.0, "be an integer from 0 on, got 1.0"),
     (armlock.simulate, "noise", [0.0, np.nan], "be finite, got nan at index 1"),
     (armlock.simulate, "c1", np.ones(8), "be a number or have the shape of noise, (9,)"),
     (armlock.simulate, "history", np.zeros(10), "hold at least 201 samples"),

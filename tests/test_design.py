@@ -95,10 +95,10 @@ def test_every_point_of_the_box_is_stable(name):
     assert edge_crossings(loop, PERTURBATION, free) == 0
     # No perturbation of the box can take 1 + L to zero, whatever the phases of the arms:
     # |1 + L| exceeds what it can add. Above 5 mHz L goes around a circle, once each 20 s.
-    low = np.geomspace(1e-10, 5e-3, 20_001)
+    low = np.geomspace(1e-10, 5e-3, 200_001)
     away = np.abs(1.0 + response(low, **options))
     assert (away > 2.0 * PERTURBATION * np.abs(arms(low, **options)).sum(axis=0)).all()
-    high = np.geomspace(5e-3, 1e6, 20_001)
+    high = np.geomspace(5e-3, 1e6, 200_001)
     first, second = arms(high, **options)
     radius = np.abs(first + second * np.exp(1j * TURN * high * DIFFERENCE))
     added = PERTURBATION * (np.abs(first) + np.abs(second))

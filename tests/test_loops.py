@@ -50,7 +50,7 @@ def test_characteristic_function_vanishes_where_the_return_difference_does(mappi
 
 
 def test_equal_delays_are_refused_by_the_dual_arm():
-    with pytest.raises(ValueError, match=r"^difference must not be zero"):
+    with pytest.raises(ValueError, match=r"^tau1 and tau2 must differ, got 20\.0 for both"):
         DualArm(tau1=20.0, tau2=20.0)
 
 
