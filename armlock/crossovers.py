@@ -62,14 +62,12 @@ def _level(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArray:
 
 
 def _crossovers(
-    loop: Loop, c1: float, c2: float, intervals: npt.ArrayLike
+    loop: Loop, c1: float, c2: float, squares: ExponentialSum, intervals: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray]:
     """Frequencies with |L| = 1 on intervals of the axis, and stretches that may hide some.
 
-    As `axis_zeros` returns them.
+    As `axis_zeros` returns them. `squares` is |N|^2 - |R|^2, with L = N / R.
     """
-    above, below = loop_numerator(loop, c1, c2), loop.rest_on_boundary()
-    squares = above.times_conjugate(above).plus(below.times_conjugate(below).scaled(-1.0))
     omega, hidden = axis_zeros(squares.turned(), intervals)
     far = np.abs(_level(loop, c1, c2, omega)) > TOLERANCE
     moved = _on_unit_circle(loop, c1, c2, omega[far])
@@ -151,6 +149,8 @@ def phase_and_delay(
         where = np.inf if delay == 0.0 else np.nan
         if not np.isfinite(last):
             last = settled_from(loop, c1, c2, phase)
+    above, below = loop_numerator(loop, c1, c2), loop.rest_on_boundary()
+    squares = above.times_conjugate(above).plus(below.times_conjugate(below).scaled(-1.0))
 
     def meeting(span: tuple[float, float]) -> FloatArray:
         return meeting_intervals(loop, c1, c2, span, levels=(0.0, 0.0, phase, delay))
@@ -162,7 +162,7 @@ def phase_and_delay(
 
     def look(intervals: FloatArray) -> None:
         nonlocal phase, delay, where
-        omega, hidden = _crossovers(loop, c1, c2, intervals)
+        omega, hidden = _crossovers(loop, c1, c2, squares, intervals)
         found = _least_lags(loop, c1, c2, omega)
         perhaps = _least_lags(loop, c1, c2, hidden.ravel())
         if perhaps[0] < min(phase, found[0]) or perhaps[1] < min(delay, found[1]):

@@ -130,6 +130,7 @@ def sign_changes(
     (whole,) = without_unused(whole)
     function = whole.weights, whole.sums, whole.phases
     nothing = np.zeros((0, whole.sums.size)), np.zeros(whole.sums.size), np.zeros(0)
+    polynomials = whole.compiled()
     parts = [np.empty((0, 5))]
     for start, end in np.reshape(intervals, (-1, 2)):
         if not np.isfinite(end):
@@ -137,7 +138,7 @@ def sign_changes(
                 f"no crossings up to omega = {end}: a number overflows", _NO_POINTS
             )
         zeros, complete = contour.imaginary_zeros(
-            whole.compiled(), function, nothing, start, end, is_map, ROUNDING
+            polynomials, function, nothing, start, end, is_map, ROUNDING
         )
         if not complete:
             raise CountError(

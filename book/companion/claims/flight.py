@@ -19,6 +19,7 @@ from armlock.budget import (
 )
 from armlock.checks import FloatArray
 from armlock.flight import flight_loop
+from armlock.free_phases import free_disc
 from armlock.infimum import MODULUS, PHASE, free_margins_at
 from armlock.loops import Loop, SingleArm
 from armlock.margins import Margins, critical_perturbation, margins
@@ -79,9 +80,8 @@ def free_margins(loop: Loop, frequency: FloatArray) -> FloatArray:
 
     At each frequency in closed form; shape (2, n).
     """
-    first, second = loop.arm_responses(1j * TURN * frequency)
-    spread = np.abs(first) + np.abs(second)
-    rows = zip(first + second, spread, TURN * frequency, strict=True)
+    omega = TURN * frequency
+    rows = zip(*free_disc(loop, 1.0, 1.0, omega), omega, strict=True)
     found = np.array([free_margins_at(complex(c), r, w) for c, r, w in rows])
     return np.array([found[:, MODULUS], np.degrees(found[:, PHASE])])
 
