@@ -103,14 +103,13 @@ def _last_frequency(
         shares[i] += factors[i] * np.sqrt(squares[i + 1, top])
     bound = _outgrown_from(squares, factors, shares)
     # Nearer to equality, and to the frequency: the shares that the terms have there.
-    nearer = bound
-    while 0.0 < nearer < np.inf:
-        bound = nearer
+    while 0.0 < bound < np.inf:
         for i in range(factors.size):
             shares[i] = factors[i] * np.sqrt(max(real_horner(squares[i + 1], bound), 0.0))
         nearer = _outgrown_from(squares, factors, shares)
-        if not nearer < 0.9 * bound:
+        if not 0.0 <= nearer < 0.9 * bound:
             break
+        bound = nearer
     return float(np.sqrt(bound) * unit)
 
 

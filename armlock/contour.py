@@ -491,7 +491,7 @@ def imaginary_zeros(
                     certified = max(certified, unresolved, stretch, 1e-14 * omega_end)
                 step = min(step, certified)
                 # Next to rounding the terms may cancel so far that bounds allow no progress.
-                short = step < 1e-6 * min(omega, 1.0 / max(fastest, 1e-300))
+                short = step < 1e-6 * omega and fastest * step < 1e-6
                 crawled = crawled + 1 if short and not doubtful else 0
                 if crawled > patience:
                     caution, patience = 1e3, 50

@@ -371,7 +371,8 @@ def _first_up_to(loop: Loop, ray: Ray, stop: float) -> float | None:
 
     def likely(omega: FloatArray) -> FloatArray:
         centre, radius = free_disc(loop, 1.0, 1.0, omega)
-        growth = free_disc(loop, float(ray.direction[0]), float(ray.direction[1]), omega)[1]
+        d1, d2 = map(float, ray.direction)
+        growth = free_disc(loop, d1, d2, omega)[1]
         # The t at which the disc of free phases first holds -1.
         return omega[[np.argmin((np.abs(1.0 + centre) - radius) / growth)]]
 
@@ -425,13 +426,17 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
     2.9286e-06
     """
     ray = Ray(checked_loop(loop), (1.0, 1.0), direction)
-    count = int(unstable_roots(loop, *ray.start))
-    if count > 0 or count == UNCONFINED:
+
+    def count(t: float) -> int:
+        return int(unstable_roots(loop, *ray.at(t)))
+
+    at_start = count(0.0)
+    if at_start > 0 or at_start == UNCONFINED:
         raise ValueError(
             f"the loop must be stable at (c1, c2) = (1, 1) to lose stability, but "
-            f"unstable_roots gives {count}"
+            f"unstable_roots gives {at_start}"
         )
-    if count != 0 and int(unstable_roots(loop, *ray.at(1e-9 * ray.scale))) != 0:
+    if at_start != 0 and count(1e-9 * ray.scale) != 0:
         return 0.0
     farthest = FARTHEST * ray.scale
     far = min(farthest, 0.5 * ray.chain_limit())
@@ -439,21 +444,20 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
     while (eps := _first_up_to(loop, ray, stop)) is None and stop < far:
         stop = min(10.0 * stop, far)
     if eps is None:
-        # Next to the limit of the neutral root chain, if there is one.
-        near_chain = far < farthest
-        eps = first_crossing(loop, ray.start, direction).position if near_chain else np.inf
-    broken = np.isfinite(eps)
-    if not broken and not ray.acts():
-        return eps
-    # The loop must be stable half-way and just before, and not just beyond. So close to the
-    # result, rounding may hide on which side of the boundary a point is.
-    shares = (0.5, 1.0 - 1e-6, 1.0 + 1e-6) if broken else (0.5,)
-    points = [ray.at(share * min(eps, farthest)) for share in shares]
-    counts = [int(unstable_roots(loop, *point)) for point in points]
-    if counts[0] != 0 or (broken and (counts[1] not in (0, BOUNDARY) or counts[2] == 0)):
+        # What is left is next to the limit of the neutral root chain, if there is one.
+        left = far < farthest
+        eps = first_crossing(loop, ray.start, direction).position if left else np.inf
+    if eps < np.inf:
+        # So close to the result, rounding may hide on which side of the boundary a point is.
+        counts = [count(share * eps) for share in (0.5, 1.0 - 1e-6, 1.0 + 1e-6)]
+        agree = counts[0] == 0 and counts[1] in (0, BOUNDARY) and counts[2] != 0
+    else:
+        counts = [count(0.5 * farthest)] if ray.acts() else []
+        agree = not any(counts)
+    if not agree:
         raise CountError(
-            f"the first crossing along {tuple(ray.direction.tolist())} lies at {eps}, but the "
-            f"counts {counts} at {points} contradict it",
-            np.array(points),
+            f"the first crossing along {tuple(ray.direction.tolist())} lies at {eps}, but "
+            f"counts on the way there and past it contradict it: {counts}",
+            np.array([ray.at(min(eps, farthest))]),
         )
     return eps
