@@ -153,7 +153,19 @@ def squared_magnitudes(polynomials: Sequence[FloatArray]) -> tuple[FloatArray, f
     return squares, float(np.ldexp(1.0, exponent))
 
 
-_last_frequency_soon = soon(_last_frequency)
+@njit(cache=True)
+def _last_frequencies(
+    squares: FloatArray, unit: float, x: FloatArray, y: FloatArray, reserve: FloatArray
+) -> FloatArray:
+    """Return `_last_frequency` at points; the factors are |x|, |y| and one."""
+    ends = np.empty(x.size)
+    for i in range(x.size):
+        factors = np.array([abs(x[i]), abs(y[i]), 1.0])
+        ends[i] = _last_frequency(squares, unit, factors, reserve[i])
+    return ends
+
+
+_few_last_frequencies = soon(_last_frequencies)
 
 
 @lru_cache(maxsize=64)
@@ -191,11 +203,9 @@ def last_frequency(
         return np.full(xs.shape, np.pi / system.step)
     squares, unit = _squares(system)
     reserve = system.chain_reserve(xs, ys)
-    ends = [
-        _last_frequency_soon(squares, unit, np.array([abs(p), abs(q), 1.0]), float(r))
-        for p, q, r in zip(xs.flat, ys.flat, reserve.flat, strict=True)
-    ]
-    return np.array(ends, dtype=np.float64).reshape(xs.shape)
+    found = _few_last_frequencies if xs.size < 10 else _last_frequencies
+    ends: FloatArray = found(squares, unit, xs.ravel(), ys.ravel(), reserve.ravel())
+    return ends.reshape(xs.shape)
 
 
 def last_larger(

@@ -98,7 +98,7 @@ def soon(function: Any, *, unless: object = None, **limits: object) -> Callable[
             # Python raises where compiled functions go on with inf or nan.
             with np.errstate(all="ignore"), suppress(ArithmeticError):
                 result = plain(*arguments)
-                if result != unless:
+                if not np.array_equal(result, unless):
                     return result
             # Compiled now, it is the faster way from here on.
             left[0] = 0

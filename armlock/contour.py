@@ -167,13 +167,13 @@ def winding(
     if phases.size and phases.any():
         block = _BLOCK * 2.0 * np.pi / np.abs(phases).max()
     while omega < omega_end or value == 0j:
-        start, reach, local, sizes = piece(polynomials, weights, sums, omega, np.inf)
+        start, reach, local, sizes = piece(polynomials, weights, sums, omega)
         end = omega_end if polynomials[0].shape[0] > 0 else min(omega + reach, omega_end)
         span = start, reach
         bound = curvature_bound(start, reach, local, phases)
         error = rounding_bound(start, reach, sizes, phases, ROUNDING)
         # What the uncertainty of `sums` adds to the error: the magnitudes in row 0.
-        off = piece(polynomials, weights, uncertain, omega, np.inf)[3]
+        off = piece(polynomials, weights[:0], uncertain, omega)[3]
         for k in range(min(off.shape[1], error.size)):
             error[k] += off[0, k]
         value = evaluate(start, reach, local, phases, omega)[0]
@@ -264,8 +264,8 @@ def count_point(model: tuple[Any, ...], x: float, y: float, end: float) -> int:
     else:
         # From `end` on |D / A - 1| < 1, so that D / A does not go around zero: its argument at
         # `end` is taken back. That of A is known from its roots.
-        start, reach, local, _ = piece(polynomials, np.zeros((0, here.size)), a_sums, end, 1e-3)
-        a = evaluate(start, reach, local, np.zeros(0), end)[0]
+        start, reach, local, _ = piece(polynomials, weights[0, :0], a_sums, end)
+        a = evaluate(start, reach, local, phases[:0], end)[0]
         ratio = value * a.conjugate()
         argument += remaining_argument(roots, end) - np.arctan2(ratio.imag, ratio.real)
         count = 0.5 * roots.size - argument / np.pi
@@ -341,15 +341,15 @@ def _polish(
     bracket: tuple[float, float],
     guess: float,
     sign: int,
-) -> tuple[float, float]:
+) -> tuple[float, complex, complex]:
     """Zero of the imaginary part in a bracket, by Newton steps kept inside it.
 
-    `sign` is that of the imaginary part at the lower end. Returns the zero, and the slope of
-    the imaginary part there.
+    `sign` is that of the imaginary part at the lower end. Returns the zero, and value and slope
+    of the sum there.
     """
     lower, upper = bracket
     omega = guess
-    slope = 0j
+    value, slope = 0j, 0j
     for _ in range(80):
         value, slope = evaluate(start, reach, local, phases, omega)
         if (value.imag > 0.0) == (sign > 0):
@@ -366,8 +366,24 @@ def _polish(
         # What is left after a Newton step is at most curvature move^2 / (2 slope).
         left = 0.5 * real_horner(bound, (upper - start) / reach) * move * move
         if left <= 2.0 * EPSILON * upper * abs(slope.imag):
+            value += slope * move
             break
-    return omega, slope.imag
+    return omega, value, slope
+
+
+@njit(cache=True)
+def _zero_between(
+    low: float, high: float, h: tuple[float, float], dh: tuple[float, float]
+) -> float:
+    """Estimate a zero from values and slopes at both ends: the cubic omega(h), at h = 0."""
+    (h0, h1), (dh0, dh1) = h, dh
+    t = h0 / (h0 - h1)
+    if dh0 != 0.0 and dh1 != 0.0:
+        omega = low * (1.0 + 2.0 * t) * (1.0 - t) ** 2 + high * t * t * (3.0 - 2.0 * t)
+        omega += (h1 - h0) * t * (1.0 - t) * ((1.0 - t) / dh0 - t / dh1)
+        if low < omega < high:
+            return omega
+    return low + (high - low) * t
 
 
 @njit(cache=True)
@@ -393,26 +409,24 @@ def _place(
     zeros: FloatArray,
     start: float,
     reach: float,
-    local: ComplexArray,
-    phases: FloatArray,
     square: ComplexArray,
     square_phases: FloatArray,
     sizes: FloatArray,
+    fastest: float,
 ) -> None:
-    """Fill in POSITION and SPREAD of zeros that lie in one piece."""
-    fastest = np.abs(phases).max()
+    """Divide POSITION and SPREAD of zeros in one piece by the measure, `square`."""
     magnitude = np.zeros(sizes.shape[1])
     for g in range(1, sizes.shape[0]):
         for m in range(sizes.shape[1]):
             magnitude[m] += sizes[g, m]
     for zero in zeros:
         omega = zero[OMEGA]
-        value, slope = evaluate(start, reach, local, phases, omega)
         measured, change = evaluate(start, reach, square, square_phases, omega)
+        part, slope = zero[POSITION], zero[SPREAD]
         zero[POSITION], zero[SPREAD] = np.nan, 0.0
         if measured.real > 0.0:
-            position = value.real / measured.real
-            steepness = (abs(slope) + abs(position) * abs(change.real)) / measured.real
+            position = part / measured.real
+            steepness = (slope + abs(position) * abs(change.real)) / measured.real
             rounding = CAUTION * EPSILON * (1.0 + fastest * omega) / measured.real
             rounding *= real_horner(magnitude, (omega - start) / reach)
             zero[POSITION], zero[SPREAD] = position, 4.0 * steepness * zero[WIDTH] + rounding
@@ -444,6 +458,8 @@ def imaginary_zeros(
       stretch in which the sign is doubtful;
     - POSITION, the real part over the measure, nan where that vanishes;
     - SPREAD, how far rounding lets the position move.
+
+    Without a measure the last two are the real part and the size of the slope.
     """
     weights, sums, phases = function
     zeros = np.empty((64, 5))
@@ -454,8 +470,9 @@ def imaginary_zeros(
     doubtful, crawled, patience, caution = True, 0, 1000, 1.0
     fastest = np.abs(phases).max() if phases.size else 0.0
     while omega < omega_end and steps <= MOST_STEPS and found <= MOST_ZEROS:
-        start, reach, local, sizes = piece(polynomials, weights, sums, omega, np.inf)
+        start, reach, local, sizes = piece(polynomials, weights, sums, omega)
         end = omega_end if polynomials[0].shape[0] > 0 else min(omega + reach, omega_end)
+        per_reach = 1.0 / reach
         only = local.copy()
         for m in range(local.shape[1]):
             only[0, m] = only[0, m].imag
@@ -470,19 +487,20 @@ def imaginary_zeros(
         value, slope = evaluate(start, reach, local, phases, omega)
         h, dh = value.imag, slope.imag
         if omega == omega_start:
-            if abs(h) > real_horner(error, (omega - start) / reach):
+            if abs(h) > real_horner(error, (omega - start) * per_reach):
                 sign, doubtful = (1 if h > 0.0 else -1), False
             elif omega == 0.0 and abs(dh) > error[1] / reach:
                 sign, doubtful = (1 if dh > 0.0 else -1), False
                 zeros[0, OMEGA], zeros[0, JUMP], zeros[0, WIDTH] = 0.0, sign, 0.0
+                zeros[0, POSITION], zeros[0, SPREAD] = value.real, abs(slope)
                 found = 1
         while omega < end and steps <= MOST_STEPS and found <= MOST_ZEROS:
             steps += 1
             step = min(2.0 * step, end - omega)
             bound = near if fastest * (omega + step) < 1.0 else far
-            curvature = real_horner(bound, (omega + step - start) / reach)
+            curvature = real_horner(bound, (omega + step - start) * per_reach)
             if curvature > 0.0:
-                uncertain = real_horner(error, (omega - start) / reach)
+                uncertain = real_horner(error, (omega - start) * per_reach)
                 certified = _safe_step(h, dh, curvature, uncertain)
                 if doubtful:
                     # Nothing can be resolved here; leave the stretch, in proportion to it.
@@ -496,10 +514,10 @@ def imaginary_zeros(
                 if crawled > patience:
                     caution, patience = 1e3, 50
             following = end if step >= end - omega else omega + step
-            old_h = h
+            old_h, old_dh = h, dh
             value, slope = evaluate(start, reach, local, phases, following)
             h, dh = value.imag, slope.imag
-            if abs(h) > caution * real_horner(error, (following - start) / reach):
+            if abs(h) > caution * real_horner(error, (following - start) * per_reach):
                 now, caution = 1 if h > 0.0 else -1, 1.0
                 if now != sign or doubtful:
                     if found == zeros.shape[0]:
@@ -507,23 +525,26 @@ def imaginary_zeros(
                     middle = 0.5 * (last_clear + following)
                     width = 0.5 * (following - last_clear)
                     jump = 0
-                    if sign == 0:
-                        # At the start itself the sign was hidden.
-                        middle, width = omega_start, following - omega_start
-                        jump = now if omega_start == 0.0 else 0
-                    elif now != sign:
+                    if sign != 0 and now != sign:
                         jump = 2 * now
                         if not doubtful:
-                            middle = omega + (following - omega) * old_h / (old_h - h)
-                        middle, rate = _polish(
+                            middle = _zero_between(omega, following, (old_h, h), (old_dh, dh))
+                        middle, there, rate = _polish(
                             start, reach, local, phases, bound, (last_clear, following), middle,
                             sign,
                         )  # fmt: skip
-                        uncertain = real_horner(error, (middle - start) / reach)
-                        if abs(rate) * width > uncertain:
-                            width = uncertain / abs(rate)
+                        uncertain = real_horner(error, (middle - start) * per_reach)
+                        if abs(rate.imag) * width > uncertain:
+                            width = uncertain / abs(rate.imag)
+                    else:
+                        if sign == 0:
+                            # At the start itself the sign was hidden.
+                            middle, width = omega_start, following - omega_start
+                            jump = now if omega_start == 0.0 else 0
+                        there, rate = evaluate(start, reach, local, phases, middle)
                     zeros[found, OMEGA] = middle
                     zeros[found, JUMP], zeros[found, WIDTH] = jump, width
+                    zeros[found, POSITION], zeros[found, SPREAD] = there.real, abs(rate)
                     found += 1
                 sign, last_clear, doubtful = now, following, False
             else:
@@ -534,10 +555,11 @@ def imaginary_zeros(
                 zeros = np.concatenate((zeros, np.empty_like(zeros)))
             zeros[found, OMEGA] = omega_end
             zeros[found, JUMP], zeros[found, WIDTH] = -sign, 0.0
+            zeros[found, POSITION], zeros[found, SPREAD] = value.real, abs(slope)
             found += 1
         if measure[0].shape[0] > 0:
-            square = piece(polynomials, measure[0], measure[1], start, np.inf)[2]
-            _place(zeros[first:found], start, reach, local, phases, square, measure[2], sizes)
+            square = piece(polynomials, measure[0], measure[1], start)[2]
+            _place(zeros[first:found], start, reach, square, measure[2], sizes, fastest)
     return zeros[:found], omega >= omega_end
 
 
@@ -632,7 +654,7 @@ def resolved_grid(
     found, omega, step = 1, 0.0, omega_end
     grid[0] = omega
     while omega < omega_end and found < MOST_SAMPLES:
-        start, reach, local, _ = piece(polynomials, weights, sums, omega, np.inf)
+        start, reach, local, _ = piece(polynomials, weights, sums, omega)
         end = omega_end if polynomials[0].shape[0] > 0 else min(omega + reach, omega_end)
         bound = curvature_bound(start, reach, local, phases)
         while omega < end and found < MOST_SAMPLES:

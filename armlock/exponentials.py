@@ -313,15 +313,13 @@ def _multiplied(
 
 
 @njit(cache=True)
-def _reach(
-    roots: ComplexArray, starts: IntArray, omega: float, longest: float, most: float
-) -> float:
-    """How far from omega the expansion of `_from_roots` is accurate.
+def _reach(roots: ComplexArray, starts: IntArray, omega: float, most: float) -> float:
+    """How far from omega the expansion of `_from_roots` is accurate, at most 1e300.
 
     Around each polynomial the crowd, the sum of reach / (reach + distance), is concave in the
     reach: Newton's method from below never passes the length at which it is `most`.
     """
-    shortest = longest
+    shortest = 1e300
     for k in range(starts.size - 1):
         reach = 0.0
         for _ in range(6):
@@ -343,55 +341,27 @@ def _reach(
 
 
 @njit(cache=True)
-def _shifted(
-    whole: ComplexArray, omega: float, reach: float
-) -> tuple[ComplexArray, FloatArray, FloatArray]:
-    """Expand polynomials in omega about another omega; see `_from_roots`."""
-    found, sizes = whole.copy(), np.abs(whole)
-    for k in range(whole.shape[0]):
-        if omega == 0.0 and reach == 1.0:
-            break
-        for i in range(whole.shape[1] - 1):
-            for m in range(whole.shape[1] - 2, i - 1, -1):
-                found[k, m] += omega * found[k, m + 1]
-                sizes[k, m] += omega * sizes[k, m + 1]
-        scale = 1.0
-        for m in range(whole.shape[1]):
-            found[k, m] *= scale
-            sizes[k, m] *= scale
-            scale *= reach
-    return found, sizes, np.zeros(whole.shape[0])
-
-
-@njit(cache=True)
 def piece(
-    polynomials: tuple[Any, ...],
-    weights: FloatArray,
-    sums: FloatArray,
-    omega: float,
-    longest: float,
+    polynomials: tuple[Any, ...], weights: FloatArray, sums: FloatArray, omega: float
 ) -> tuple[float, float, ComplexArray, FloatArray]:
     """Expand an exponential sum over the piece of the axis that starts at omega.
 
-    `polynomials` is what `ExponentialSum.compiled` returns; weights, shape
-    (groups, k), and sums, shape (k,), are those of the sum. A piece is no longer than
-    `longest`; if that is infinite, polynomials of low degree are one piece from zero on.
-    Returns `start` and `reach`, with u = (omega - start) / reach from 0 to 1 over the piece;
-    the coefficients in powers of u of the sum, then of each group, shape (1 + groups, n); and
-    magnitudes for rounding, shape (1 + groups, n + 1). The last column bounds the powers that
-    are left out, over EPSILON, by which `rounding_bound` multiplies it.
+    `polynomials` is what `ExponentialSum.compiled` returns; weights, shape (groups, k), and
+    sums, shape (k,), are those of the sum. Of polynomials of low degree the whole axis is one
+    piece, with a start of zero and a reach of one. Returns `start` and `reach`, with
+    u = (omega - start) / reach from 0 to 1 over any other piece; the coefficients in powers of
+    u of the sum, then of each group, shape (1 + groups, n); and magnitudes for rounding, shape
+    (1 + groups, n + 1). The last column bounds the powers that are left out, over EPSILON, by
+    which `rounding_bound` multiplies it.
     """
     whole, roots, starts, leads, pairs = polynomials
-    start, reach = omega, longest
-    if whole.shape[0] == 0:
+    start, reach, expanded = 0.0, 1.0, whole.shape[0] == 0
+    coefficients, magnitudes, left_out = whole, np.abs(whole), np.zeros(whole.shape[0])
+    if expanded:
         crowd = 0.5 * _CROWD if pairs[:, 1].max() >= 0 else _CROWD
-        reach = _reach(roots, starts, omega, min(longest, 1e300), crowd)
+        start, reach = omega, _reach(roots, starts, omega, crowd)
         found, most, beyond = _from_roots(roots, starts, leads, start, reach)
         coefficients, magnitudes, left_out = _multiplied(found, most, beyond, starts, pairs)
-    else:
-        if longest == np.inf:
-            start, reach = 0.0, 1.0
-        coefficients, magnitudes, left_out = _shifted(whole, start, reach)
     number, size = coefficients.shape
     groups = weights.shape[0]
     local = np.zeros((1 + groups, size), dtype=np.complex128)
@@ -404,7 +374,7 @@ def piece(
                     local[g, m] += weight * coefficients[k, m]
                     sizes[g, m] += abs(weight) * magnitudes[k, m]
                 sizes[g, size] += abs(weight) * left_out[k] / EPSILON
-    if reach == 1.0 and start == 0.0:
+    if not expanded:
         return start, reach, local, sizes
     # Powers that rounding hides are not worth their time.
     total = 0.0
@@ -439,15 +409,16 @@ def evaluate(
     Real and imaginary parts apart, since omega is real: this is the innermost loop.
     """
     size = local.shape[1]
-    u = (omega - start) / reach
+    per_reach = 1.0 / reach
+    u = (omega - start) * per_reach
     value_re, value_im, slope_re, slope_im = 0.0, 0.0, 0.0, 0.0
     for k in range(size - 1, -1, -1):
         slope_re = slope_re * u + value_re
         slope_im = slope_im * u + value_im
         value_re = value_re * u + local[0, k].real
         value_im = value_im * u + local[0, k].imag
-    slope_re /= reach
-    slope_im /= reach
+    slope_re *= per_reach
+    slope_im *= per_reach
     for g in range(phases.size):
         phase = phases[g]
         if phase == 0.0:
@@ -458,8 +429,8 @@ def evaluate(
             dp_im = dp_im * u + p_im
             p_re = p_re * u + local[g + 1, k].real
             p_im = p_im * u + local[g + 1, k].imag
-        dp_re /= reach
-        dp_im /= reach
+        dp_re *= per_reach
+        dp_im *= per_reach
         half = 0.5 * phase * omega
         sine, cosine = np.sin(half), np.cos(half)
         # exp(j omega phase) - 1, and phase times exp(j omega phase).

@@ -356,10 +356,10 @@ def smallest_distances(
         if skip > block:
             omega += skip
             continue
-        start, reach, local, sizes = piece(
-            polynomials, unit, np.zeros(3), omega, min(block, max(omega_end, turn))
-        )
-        end = min(omega + reach, omega_end)
+        start, reach, local, sizes = piece(polynomials, unit, np.zeros(3), omega)
+        end = min(omega + block, omega_end)
+        if polynomials[0].shape[0] == 0:
+            end = min(end, omega + reach)
         n, n_sizes = _combined(local, sizes, weights, sums)
         r, r_sizes = _combined(local, sizes, nothing, only_r)
         n_bound = curvature_bound(start, reach, n, phases)

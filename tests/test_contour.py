@@ -102,7 +102,7 @@ def test_a_piece_reaches_as_far_as_equal_roots_allow(number):
     # Another polynomial's roots do not count.
     roots, starts = np.full(2 * number, -3.0 + 0j), np.array([0, number, 2 * number])
     expected = 1.5 * 5.0 / (number - 1.5)
-    found = exponentials._reach(roots, starts, 4.0, np.inf, 1.5)
+    found = exponentials._reach(roots, starts, 4.0, 1.5)
     assert found == pytest.approx(expected, rel=1e-2)
 
 
@@ -135,19 +135,21 @@ def random_sum(degree, rng):
 def test_a_piece_holds_a_sum_and_bounds_what_it_leaves_out(degree, omega):
     whole, exact = random_sum(degree, np.random.default_rng(degree))
     start, reach, local, sizes = exponentials.piece(
-        whole.compiled(), whole.weights, whole.sums, omega, 0.5
+        whole.compiled(), whole.weights, whole.sums, omega
     )
     rounding = exponentials.rounding_bound(start, reach, sizes, whole.phases, 8.0)
     bends = [exponentials.curvature_bound(start, reach, local, whole.phases)]
     if omega == 0.0:
         bends.append(exponentials.curvature_from_zero(reach, local, whole.phases))
+    length = reach if degree > exponentials.LOW_DEGREE else 0.5
     with mpmath.workdps(40):
         # A piece is divided by a power of two.
-        at = omega + reach
+        at = omega + length
         found = exponentials.evaluate(start, reach, local, whole.phases, at)[0]
         unit = 2.0 ** round(float(mpmath.log(abs(exact(at) / found), 2)))
-        for u in (0.01, 0.4, 1.0):
-            at = omega + u * reach
+        for share in (0.01, 0.4, 1.0):
+            at = omega + share * length
+            u = (at - start) / reach
             value, slope = exponentials.evaluate(start, reach, local, whole.phases, at)
             error = exponentials.real_horner(rounding, u)
             assert abs(value - exact(at) / unit) <= error
