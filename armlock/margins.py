@@ -24,19 +24,16 @@ from armlock.free_phases import (
     arm_parameters,
     arm_weights,
     clear_from,
-    crossing_intervals,
-    free_disc,
     last_crossover,
     limit_margins,
     no_margin,
     require_stable,
-    search_outwards,
     unconfined,
 )
 from armlock.gains import gain_interval_of_stable
 from armlock.loops import Loop, checked_loop
 from armlock.nyquist import leading_radius, loop_numerator
-from armlock.rays import FARTHEST, Ray, first_crossing
+from armlock.rays import FARTHEST, Ray
 from armlock.stability import BOUNDARY, UNCONFINED, CountError, unstable_roots
 
 # Relative accuracy with free phases, in the order of `armlock.infimum.free_margins_at`. The
@@ -349,37 +346,6 @@ def margins(
     return Margins(*(float(value) for value in (*numbers, *places)))
 
 
-def _first_up_to(loop: Loop, ray: Ray, stop: float) -> float | None:
-    """First t up to `stop` at which a root crosses along a ray from (1, 1); None if none does.
-
-    At the largest |c1| and |c2| of the ray, free phases tell which parts of the axis no root
-    can cross; with smaller ones it cannot cross there either.
-    """
-    found = None
-
-    def meeting(span: tuple[float, float]) -> FloatArray:
-        c1, c2 = (max(1.0, abs(c)) for c in ray.at(stop))
-        return crossing_intervals(loop, c1, c2, span)
-
-    def look(intervals: FloatArray) -> None:
-        nonlocal stop, found
-        crossing = ray.crossings(
-            stop, first=True, lowest=1e-15 * ray.scale, intervals=intervals
-        )
-        if crossing.position.size:
-            stop = found = float(crossing.position[0])
-
-    def likely(omega: FloatArray) -> FloatArray:
-        centre, radius = free_disc(loop, 1.0, 1.0, omega)
-        d1, d2 = map(float, ray.direction)
-        growth = free_disc(loop, d1, d2, omega)[1]
-        # The t at which the disc of free phases first holds -1.
-        return omega[[np.argmin((np.abs(1.0 + centre) - radius) / growth)]]
-
-    search_outwards(loop, look, lambda: ray.end(stop), meeting, likely)
-    return found
-
-
 def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
     r"""Return the smallest perturbation of (1, 1) in a direction that breaks the loop.
 
@@ -439,14 +405,7 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
     if at_start != 0 and count(1e-9 * ray.scale) != 0:
         return 0.0
     farthest = FARTHEST * ray.scale
-    far = min(farthest, 0.5 * ray.chain_limit())
-    stop = min(ray.scale, far)
-    while (eps := _first_up_to(loop, ray, stop)) is None and stop < far:
-        stop = min(10.0 * stop, far)
-    if eps is None:
-        # What is left is next to the limit of the neutral root chain, if there is one.
-        left = far < farthest
-        eps = first_crossing(loop, ray.start, direction).position if left else np.inf
+    eps = ray.first(farthest).position
     if eps < np.inf:
         # So close to the result, rounding may hide on which side of the boundary a point is.
         counts = [count(share * eps) for share in (0.5, 1.0 - 1e-6, 1.0 + 1e-6)]

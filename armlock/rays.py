@@ -3,13 +3,13 @@
 On a ray (x, y) = start + t (d1, d2) the characteristic function is D0 - t M, with D0 its value
 at the start, and M = d1 B1 exp(-s theta1) + d2 B2 exp(-s theta2), with the dead time of both. A
 root lies on the imaginary axis where t = D0 / M is real, so that the crossings of a whole ray
-are the zeros of Im(D0 conj(M)): one certified walk finds them all.
+are the zeros of Im(D0 conj(M)): one certified walk finds them all. The first of them is looked
+for from low frequency upwards, and only as far as a root can cross before the first one so far.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
+from collections.abc import Callable
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -20,12 +20,15 @@ from numpy.polynomial import polynomial as poly
 from armlock.bounds import last_frequency
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import ComplexArray, FloatArray, IntArray, axis, positive_number
+from armlock.free_phases import crossing_intervals, free_disc, search_outwards
+from armlock.loops import Loop
 from armlock.stability import CountError, polished, sign_changes, unstable_roots
 
 #: Nothing is looked at where the parameters are this many times as large as the start, or as 1.
 FARTHEST = 1e9
-# Each further walk along a ray goes so many times as far up in frequency.
-_LONGER = 4.0
+# Of a system that is no loop, the first walk goes so many turns of the longest delay up, and
+# each further one so many times as far.
+_FIRST_TURNS, _LONGER = 1e3, 4.0
 # Next to the limit of the neutral root chain, roots cross at ever higher frequency. They are
 # followed up to so many turns of the longest delay, which takes about a tenth of a second.
 _TURNS_NEXT_TO_THE_CHAIN = 50_000
@@ -139,15 +142,8 @@ class Ray:
         result: ComplexArray = np.where(acts, value / np.where(acts, effect, 1.0), np.nan)
         return result
 
-    def crossings(
-        self,
-        stop: float,
-        *,
-        first: bool = False,
-        lowest: float = 0.0,
-        intervals: npt.ArrayLike | None = None,
-    ) -> Crossings:
-        """Find crossings with `lowest` < t <= stop: all, or the first and what ties with it.
+    def crossings(self, stop: float, intervals: npt.ArrayLike | None = None) -> Crossings:
+        """Find all crossings with 0 < t <= stop.
 
         With `intervals` of the axis, in rad/s and of shape (n, 2), only those whose frequency
         lies in them, and no counts confirm that rounding hides none.
@@ -162,12 +158,21 @@ class Ray:
             raise CountError(
                 f"no crossings up to t = {stop}: a number overflows", np.array([self.at(stop)])
             )
+        everywhere = intervals is None
+        parts = [(0.0, end)] if intervals is None else np.minimum(intervals, end)
+        found, hidden = self._crossings(parts, 0.0, stop)
+        if hidden and everywhere:
+            self._confirm(stop, int(found.change.sum()))
+        return found
+
+    def _crossings(
+        self, intervals: npt.ArrayLike, lowest: float, stop: float
+    ) -> tuple[Crossings, bool]:
+        """Find crossings on intervals of the axis; return whether rounding may hide some."""
         if not self.acts():
-            return Crossings(np.empty(0), np.empty(0), np.empty(0, dtype=np.int64))
+            return Crossings(np.empty(0), np.empty(0), np.empty(0, dtype=np.int64)), False
         omega, change, width = sign_changes(
-            self.family,
-            [(0.0, end)] if intervals is None else np.minimum(intervals, end),
-            is_map=self.system.step > 0.0,
+            self.family, intervals, is_map=self.system.step > 0.0
         )
         # Stretches in which rounding hides the sign, on the way or from omega = 0 on.
         hidden = bool(((change == 0) | (omega == 0.0) & (width > 0.0)).any())
@@ -177,26 +182,18 @@ class Ray:
         q = self.quotient(omega)
         rough = np.where(np.abs(q.imag) <= np.abs(q.real) + self.scale, q.real, np.inf)
         near = (rough > lowest) & (rough <= stop * (1.0 + 1e-6))
-        if first and near.any():
-            near &= rough <= rough[near].min() * (1.0 + 1e-6)
         omega, change = omega[near], change[near]
         omega = polished(lambda w: self.quotient(w).imag, omega, (1e-7 * omega,))
         position = self.quotient(omega).real
         kept = np.flatnonzero((position > lowest) & (position <= stop))
         kept = kept[np.argsort(position[kept], kind="stable")]
-        found = Crossings(position[kept], omega[kept], change[kept])
-        if hidden and intervals is None:
-            self._confirm(found, stop, first=first)
-        return found
+        return Crossings(position[kept], omega[kept], change[kept]), hidden
 
-    def _confirm(self, found: Crossings, stop: float, *, first: bool) -> None:
-        """Raise if counts at the ends contradict, or one just before the first crossing.
+    def _confirm(self, stop: float, change: int) -> None:
+        """Raise if counts at both ends contradict a change of the number of unstable roots.
 
         Counts that cannot be told say nothing.
         """
-        change = int(found.change.sum())
-        if first and found.position.size:
-            stop, change = (1.0 - 1e-6) * float(found.position[0]), 0
         counts = unstable_roots(self.system, *np.transpose([self.at(0.0), self.at(stop)]))
         if counts.min() >= 0 and counts[1] - counts[0] != change:
             raise CountError(
@@ -205,82 +202,67 @@ class Ray:
                 np.array([self.at(stop)]),
             )
 
-    def reaches(self, stop: float, chain: float) -> Iterator[float]:
-        """Yield the t of walk after walk: up to `stop`, or ever closer to the chain's limit."""
-        # The boundary of a map ends at one frequency: a single walk sees all of it.
-        t = 1e-4 * min(stop, self.scale)
-        far = 0.0 if self.system.step else min(stop, 0.5 * chain)
-        while t < far:
-            yield t
-            # A near crossing is found at low frequency: go no further than that takes.
-            lowest = 1.0 / max(self.system.longest_delay, 1e-12)
-            limit = _LONGER * max(self.end(t), lowest)
-            if self.end(far) <= limit:
-                break
-            low, high = t, far
-            while high > 1.1 * low:
-                middle = math.sqrt(low * high)
-                low, high = (middle, high) if self.end(middle) <= limit else (low, middle)
-            t = high
-        if stop < chain:
-            yield stop
+    def first(self, stop: float) -> Crossing:
+        """Find the first crossing up to `stop`, or the limit of the neutral root chain."""
+        chain = self.chain_limit()
+        if chain == 0.0:
+            return Crossing(0.0, np.inf, 0)
+        best = Crossing(chain, np.inf, 0) if chain <= stop else Crossing(np.inf, np.nan, 0)
+        hidden = False
+        turn = 2.0 * np.pi / max(self.system.longest_delay, 1e-12)
+
+        def reach() -> float:
+            return min(best.position, stop)
+
+        def end() -> float:
+            """Frequency past which no root crosses earlier."""
+            if reach() < chain:
+                return self.end(reach())
+            near, nearest = (self.end(chain * (1.0 - share)) for share in (1e-6, 1e-10))
+            return max(near, min(nearest, _TURNS_NEXT_TO_THE_CHAIN * turn))
+
+        def look(intervals: FloatArray) -> None:
+            nonlocal best, hidden
+            # A boundary at the start itself, known to rounding, is not a crossing beyond it.
+            found, doubtful = self._crossings(intervals, 1e-15 * self.scale, reach())
+            hidden |= doubtful
+            if found.position.size:
+                best = Crossing(*(values[0].item() for values in found))
+
+        if isinstance(self.system, Loop):
+            self._search(self.system, look, end, reach)
         else:
-            yield from (chain * (1.0 - share) for share in (0.5, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10))
+            walked = 0.0
+            while (last := end()) > walked:
+                # The boundary of a map ends at one frequency: a single walk sees all of it.
+                far = np.inf if self.system.step else max(_LONGER * walked, _FIRST_TURNS * turn)
+                look(np.array([[walked, min(last, far)]]))
+                walked = min(last, far)
+        if hidden:
+            self._confirm((1.0 - 1e-6) * reach(), 0)
+        return best
 
+    def _search(
+        self,
+        loop: Loop,
+        look: Callable[[FloatArray], None],
+        end: Callable[[], float],
+        reach: Callable[[], float],
+    ) -> None:
+        """Look where phases of the arms and parameters up to `reach` let a root cross."""
 
-def ray_crossings(
-    system: CharacteristicFunction,
-    start: npt.ArrayLike,
-    direction: npt.ArrayLike,
-    stop: float,
-) -> Crossings:
-    r"""Find every crossing of the imaginary axis along a ray.
+        def meeting(span: tuple[float, float]) -> FloatArray:
+            c1, c2 = np.abs([self.at(0.0), self.at(reach())]).max(axis=0)
+            return crossing_intervals(loop, c1, c2, span)
 
-    Parameters
-    ----------
-    system : CharacteristicFunction
-        The loop.
-    start, direction : array_like of two floats
-        The ray start + t direction in the plane of the free parameters.
-    stop : float
-        Largest t.
+        def likely(omega: FloatArray) -> FloatArray:
+            centre, radius = free_disc(loop, *self.at(0.0), omega)
+            d1, d2 = map(float, self.direction)
+            growth = free_disc(loop, d1, d2, omega)[1]
+            # The t at which the disc of free phases first holds -1.
+            return omega[[np.argmin((np.abs(1.0 + centre) - radius) / growth)]]
 
-    Returns
-    -------
-    Crossings
-        With the number of unstable roots at the start, its `change` adds up to the number
-        anywhere on the ray.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If start or direction is not two finite real numbers, the direction has length zero,
-        stop is not positive, or the neutral root chain ceases to be confined on the way.
-    CountError
-        If a number overflows, gain times delay is too large to follow, or counts show that
-        rounding hides a crossing.
-
-    Notes
-    -----
-    With D0 the characteristic function at the start, and (d1, d2) the direction, a root is
-    at s = j omega where
-
-    .. math::
-
-        t = \frac{D_0\, e^{s\delta}}
-        {d_1 B_1 e^{-s\theta_1} + d_2 B_2 e^{-s\theta_2}} \text{ is real.}
-
-    A root that lies at s = 0 along the whole ray crosses nowhere and is not reported.
-
-    Examples
-    --------
-    >>> from armlock import CommonArm
-    >>> from armlock.rays import ray_crossings
-    >>> found = ray_crossings(CommonArm(), (0.0, 0.0), (0.2, 0.4), 3.4)
-    >>> found.position.round(4), found.omega.round(4), found.change
-    (array([3.3333, 3.3738]), array([0.    , 0.3071]), array([1, 2]))
-    """
-    return Ray(system, start, direction).crossings(positive_number("stop", stop))
+        search_outwards(loop, look, end, meeting, likely)
 
 
 def first_crossing(
@@ -318,10 +300,10 @@ def first_crossing(
 
     Notes
     -----
-    Walks reach further and further along the ray, so that a near crossing is found at once.
-    Below the limit of the neutral root chain, roots cross at ever higher frequency. Where the
-    first of them crosses closer to the limit than a part in a million, and at more than
-    50 000 turns of the longest delay, the limit is returned in its place.
+    Walks go up in frequency, as far as a root can cross before the first one so far. Below the
+    limit of the neutral root chain, roots cross at ever higher frequency. Where the first of
+    them crosses closer to the limit than a part in a million, and at more than 50 000 turns of
+    the longest delay, the limit is returned in its place.
 
     Examples
     --------
@@ -332,26 +314,11 @@ def first_crossing(
     0.254006 3.7746 2
     """
     ray = Ray(system, start, direction)
-    stop = FARTHEST * ray.scale if stop is None else positive_number("stop", stop)
-    chain = ray.chain_limit()
-    if chain == 0.0:
-        return Crossing(0.0, np.inf, 0)
-    for t in ray.reaches(stop, chain):
-        turns = ray.end(t) * system.longest_delay / (2.0 * np.pi)
-        if t > (1.0 - 1e-6) * chain and turns > _TURNS_NEXT_TO_THE_CHAIN:
-            break
-        # A boundary at the start itself, known to rounding, is not a crossing beyond it.
-        found = ray.crossings(t, first=True, lowest=1e-15 * ray.scale)
-        if found.position.size:
-            return Crossing(
-                float(found.position[0]), float(found.omega[0]), int(found.change[0])
-            )
-    return Crossing(chain, np.inf, 0) if chain <= stop else Crossing(np.inf, np.nan, 0)
+    return ray.first(FARTHEST * ray.scale if stop is None else positive_number("stop", stop))
 
 
 __all__ = [
     "Crossing",
     "Crossings",
     "first_crossing",
-    "ray_crossings",
 ]

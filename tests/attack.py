@@ -35,7 +35,7 @@ from armlock import (
     stability_chart,
     unstable_roots,
 )
-from armlock.rays import first_crossing, ray_crossings
+from armlock.rays import Ray, first_crossing
 from armlock.semidiscretization import semi_discretization
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
 from tests import attack_judge as judge
@@ -391,15 +391,13 @@ def check_rays(tally, rng, sketch, loop, point):
     stop = confined_until(sketch, start, way, between(rng, 0.01, 3.0))
     if stop < 1e-9:
         return
-    found = tally.ask("ray_crossings", ray_crossings, loop, start, way, stop)
+    found = tally.ask("crossings", Ray(loop, start, way).crossings, stop)
     if found is None:
         return
     try:
         first, last = (judge.count(sketch, *(start + t * way)) for t in (0.0, stop))
         if first >= 0 and last >= 0 and first + found.change.sum() != last:
-            tally.note(
-                "ray_crossings", (start, way, stop), found.change.tolist(), (first, last)
-            )
+            tally.note("crossings", (start, way, stop), found.change.tolist(), (first, last))
         for t in rng.permutation(found.position)[:2]:
             near = 1e-7 * t
             if near < 1e-10 * np.hypot(*start):
@@ -407,9 +405,9 @@ def check_rays(tally, rng, sketch, loop, point):
             counts = [judge.count(sketch, *(start + s * way)) for s in (t - near, t + near)]
             window = np.abs(found.position - t) < near
             if min(counts) >= 0 and counts[1] - counts[0] != found.change[window].sum():
-                tally.note("ray_crossings", (start, way, stop, t), found.change[window], counts)
+                tally.note("crossings", (start, way, stop, t), found.change[window], counts)
     except UndecidedError:
-        tally.skipped["ray_crossings: judge undecided"] += 1
+        tally.skipped["crossings: judge undecided"] += 1
     one = tally.ask("first_crossing", first_crossing, loop, start, way, stop)
     # A boundary at the start itself, to rounding, is none beyond it.
     beyond = found.position[found.position > 1e-15 * np.abs(start).max()]
@@ -602,7 +600,7 @@ def compile_all():
         margins(system, *point)
         margins(system, *point, 1.0)
         modulus_margin(system, *point)
-        ray_crossings(system, point, (1.0, 0.5), 0.1)
+        Ray(system, point, (1.0, 0.5)).crossings(0.1)
         first_crossing(system, point, (1.0, 0.5), 0.1)
         critical_perturbation(to_loop(Sketch((), (-1.0,), 0.3, "common", 2.0, 1.0)), (1.0, 0.3))
         rightmost_root(system, *point)

@@ -16,7 +16,7 @@ from armlock.checks import axis, finite_series, real_array
 from armlock.controllers import integrating_actuator, stage_one, table_two
 from armlock.discretize import warped
 from armlock.noise import band_rms
-from armlock.rays import ray_crossings
+from armlock.rays import first_crossing
 from armlock.roots import extended_root
 from armlock.sensors import COMMON, SignalMapping, dual
 from tests.systems import NEUTRAL
@@ -63,7 +63,7 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     armlock.d_curve: {"system": ARMS, "omega": 1.0},
     armlock.d_curve_line: {"system": ARMS},
     armlock.d_curve_branches: {"system": ARMS, "omega_max": 1.0, "points_per_turn": 24},
-    ray_crossings: {"system": ARMS, "start": (0.0, 0.0), "direction": (1.0, 1.0), "stop": 1.0},
+    first_crossing: {"system": ARMS, "start": (0.0, 0.0), "direction": (1.0, 1.0), "stop": 1.0},
     armlock.nyquist: {"loop": ARMS, "omega_max": 3.0} | POINT,
     armlock.axis_crossings: {"loop": paper_loop(), "omega_max": 3.0} | POINT,
     armlock.margins: {"loop": ARMS, "c1": 0.9, "c2": 0.9, "free_above": 1.0},
@@ -138,8 +138,8 @@ WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
     (armlock.stability_chart, "y", 1.0, "be of dimension 1, got shape ()"),
     (armlock.d_curve, "system", SingleArm(), "depend on both free parameters"),
     (armlock.d_curve_line, "system", FLAT, "depend on a free parameter at s = 0"),
-    (ray_crossings, "start", (0.0,), "hold two numbers, got 1"),
-    (ray_crossings, "direction", (0.0, 0.0), "not have length zero"),
+    (first_crossing, "start", (0.0,), "hold two numbers, got 1"),
+    (first_crossing, "direction", (0.0, 0.0), "not have length zero"),
     (armlock.nyquist, "loop", HayesEquation(), "be a Loop, for instance CommonArm()"),
     (armlock.axis_crossings, "omega_max", None, "be given"),
     (armlock.spectral_radius, "system", NEUTRAL["integrator"], "be of retarded type"),

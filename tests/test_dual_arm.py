@@ -13,7 +13,7 @@ from armlock import (
     d_curve_line,
     unstable_roots,
 )
-from armlock.rays import first_crossing, ray_crossings
+from armlock.rays import Ray, first_crossing
 from armlock.sensors import COMMON, dual
 from book.companion.claims import dual_arm
 
@@ -41,7 +41,7 @@ def test_edges_are_where_the_count_changes(gain):
 def test_crossings_along_a_ray_add_up_to_the_counts():
     loop = DualArm()
     start, direction = np.array([0.8, 1.2]), np.array([0.35, -0.4])
-    crossings = ray_crossings(loop, start, direction, 1.0)
+    crossings = Ray(loop, start, direction).crossings(1.0)
     assert (np.diff(crossings.position) >= 0.0).all()
     t = np.linspace(0.013, 0.99, 40)
     expected = int(unstable_roots(loop, *start)) + np.array(
@@ -59,9 +59,10 @@ def test_a_crossing_that_rounding_hides_is_refused():
     start, direction = (1.0000024, 1.0000003518), (1.0, 1.0)
     counts = unstable_roots(loop, *np.transpose([start, np.add(start, 0.2)]))
     assert counts[0] > counts[1]
-    for find in (ray_crossings, first_crossing):
+    ray = Ray(loop, start, direction)
+    for find in (ray.crossings, ray.first):
         with pytest.raises(CountError, match="rounding hides some"):
-            find(loop, start, direction, 0.2)
+            find(0.2)
 
 
 def test_first_crossing_says_where_there_is_none():
@@ -74,7 +75,7 @@ def test_a_lost_chain_is_not_passed_over():
     """1 + 0.3 (2 - x u - y v): stable up to 0.3 (|x| + |y|) = 1.6, and lost from there on."""
     loop = Loop(Controller([], [], 0.3), COMMON, 20.1, 19.9)
     with pytest.raises(ValueError, match=r"^the ray must stay where the neutral root chain"):
-        ray_crossings(loop, (0.0, 0.0), (1.0, -1.0), 3.0)
+        Ray(loop, (0.0, 0.0), (1.0, -1.0)).crossings(3.0)
     found = first_crossing(loop, (0.0, 0.0), (1.0, -1.0), 3.0)
     assert found.position == pytest.approx(1.6 / 0.6, rel=1e-12)
     assert (found.omega, found.change) == (np.inf, 0)
