@@ -71,7 +71,7 @@ def njit(
     return decorate
 
 
-def soon(function: Any, *, unless: object = None, **limits: object) -> Callable[..., Any]:
+def soon(function: Any, *, unless: Any = None, **limits: object) -> Callable[..., Any]:
     """Return a compiled function whose first calls are plain Python, unless it is kept.
 
     Compiling takes some seconds, which many calls should share. Both ways give the same result

@@ -405,6 +405,27 @@ OMEGA, JUMP, WIDTH, POSITION, SPREAD = 0, 1, 2, 3, 4
 
 
 @njit(cache=True)
+def _with_zero(
+    zeros: FloatArray,
+    found: int,
+    omega: float,
+    jump: int,
+    width: float,
+    value: complex,
+    slope: complex,
+) -> FloatArray:
+    """Return `zeros` with one more in row `found`, a longer array if it is full.
+
+    The value of the sum and its slope take the place of position and spread.
+    """
+    if found == zeros.shape[0]:
+        zeros = np.concatenate((zeros, np.empty_like(zeros)))
+    zeros[found, OMEGA], zeros[found, JUMP], zeros[found, WIDTH] = omega, jump, width
+    zeros[found, POSITION], zeros[found, SPREAD] = value.real, abs(slope)
+    return zeros
+
+
+@njit(cache=True)
 def _place(
     zeros: FloatArray,
     start: float,
@@ -430,6 +451,30 @@ def _place(
             rounding = CAUTION * EPSILON * (1.0 + fastest * omega) / measured.real
             rounding *= real_horner(magnitude, (omega - start) / reach)
             zero[POSITION], zero[SPREAD] = position, 4.0 * steepness * zero[WIDTH] + rounding
+
+
+@njit(cache=True)
+def _imaginary_bounds(
+    start: float,
+    reach: float,
+    local: ComplexArray,
+    sizes: FloatArray,
+    phases: FloatArray,
+    rounding: float,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Bounds on the imaginary part in a piece, as polynomials in u.
+
+    On its second derivative, next to omega = 0 and everywhere; and on its rounding error.
+    """
+    only, magnitudes = local.copy(), sizes.copy()
+    for m in range(local.shape[1]):
+        only[0, m] = local[0, m].imag
+        if start == 0.0 and reach == 1.0:
+            # The coefficients are real or imaginary: only the latter enter the imaginary part.
+            magnitudes[0, m] = abs(local[0, m].imag)
+    everywhere = curvature_bound(start, reach, only, phases)
+    near = curvature_from_zero(reach, local, phases) if start == 0.0 else everywhere
+    return near, everywhere, rounding_bound(start, reach, magnitudes, phases, rounding)
 
 
 @njit(cache=True)
@@ -462,46 +507,36 @@ def imaginary_zeros(
     Without a measure the last two are the real part and the size of the slope.
     """
     weights, sums, phases = function
-    zeros = np.empty((64, 5))
-    if phases.size and (omega_end - omega_start) * np.abs(phases).max() > MOST_RADIANS:
-        return zeros[:0], False
-    found, steps, sign = 0, 0, 0
-    omega, last_clear, step = omega_start, omega_start, omega_end
-    doubtful, crawled, patience, caution = True, 0, 1000, 1.0
+    zeros, found = np.empty((64, 5)), 0
     fastest = np.abs(phases).max() if phases.size else 0.0
+    if (omega_end - omega_start) * fastest > MOST_RADIANS:
+        return zeros[:0], False
+    omega, last_clear, step = omega_start, omega_start, omega_end
+    steps, sign, doubtful = 0, 0, True
+    crawled, patience, caution = 0, 1000, 1.0
     while omega < omega_end and steps <= MOST_STEPS and found <= MOST_ZEROS:
         start, reach, local, sizes = piece(polynomials, weights, sums, omega)
         end = omega_end if polynomials[0].shape[0] > 0 else min(omega + reach, omega_end)
-        per_reach = 1.0 / reach
-        only = local.copy()
-        for m in range(local.shape[1]):
-            only[0, m] = only[0, m].imag
-        far = curvature_bound(start, reach, only, phases)
-        near = curvature_from_zero(reach, local, phases) if start == 0.0 else far
-        if reach == 1.0 and start == 0.0:
-            # The coefficients are real or imaginary: only the latter enter the imaginary part.
-            for m in range(local.shape[1]):
-                sizes[0, m] = abs(local[0, m].imag)
-        error = rounding_bound(start, reach, sizes, phases, rounding)
-        first = found
+        per_reach, first = 1.0 / reach, found
+        near, everywhere, error = _imaginary_bounds(
+            start, reach, local, sizes, phases, rounding
+        )
         value, slope = evaluate(start, reach, local, phases, omega)
-        h, dh = value.imag, slope.imag
         if omega == omega_start:
-            if abs(h) > real_horner(error, (omega - start) * per_reach):
-                sign, doubtful = (1 if h > 0.0 else -1), False
-            elif omega == 0.0 and abs(dh) > error[1] / reach:
-                sign, doubtful = (1 if dh > 0.0 else -1), False
-                zeros[0, OMEGA], zeros[0, JUMP], zeros[0, WIDTH] = 0.0, sign, 0.0
-                zeros[0, POSITION], zeros[0, SPREAD] = value.real, abs(slope)
-                found = 1
+            if abs(value.imag) > real_horner(error, (omega - start) * per_reach):
+                sign, doubtful = (1 if value.imag > 0.0 else -1), False
+            elif omega == 0.0 and abs(slope.imag) > error[1] * per_reach:
+                sign, doubtful = (1 if slope.imag > 0.0 else -1), False
+                zeros = _with_zero(zeros, found, 0.0, sign, 0.0, value, slope)
+                found += 1
         while omega < end and steps <= MOST_STEPS and found <= MOST_ZEROS:
             steps += 1
             step = min(2.0 * step, end - omega)
-            bound = near if fastest * (omega + step) < 1.0 else far
+            bound = near if fastest * (omega + step) < 1.0 else everywhere
             curvature = real_horner(bound, (omega + step - start) * per_reach)
             if curvature > 0.0:
                 uncertain = real_horner(error, (omega - start) * per_reach)
-                certified = _safe_step(h, dh, curvature, uncertain)
+                certified = _safe_step(value.imag, slope.imag, curvature, uncertain)
                 if doubtful:
                     # Nothing can be resolved here; leave the stretch, in proportion to it.
                     unresolved = 0.5 * np.sqrt(2.0 * uncertain / curvature)
@@ -514,48 +549,41 @@ def imaginary_zeros(
                 if crawled > patience:
                     caution, patience = 1e3, 50
             following = end if step >= end - omega else omega + step
-            old_h, old_dh = h, dh
+            old_value, old_slope = value, slope
             value, slope = evaluate(start, reach, local, phases, following)
-            h, dh = value.imag, slope.imag
-            if abs(h) > caution * real_horner(error, (following - start) * per_reach):
-                now, caution = 1 if h > 0.0 else -1, 1.0
-                if now != sign or doubtful:
-                    if found == zeros.shape[0]:
-                        zeros = np.concatenate((zeros, np.empty_like(zeros)))
-                    middle = 0.5 * (last_clear + following)
-                    width = 0.5 * (following - last_clear)
-                    jump = 0
-                    if sign != 0 and now != sign:
-                        jump = 2 * now
-                        if not doubtful:
-                            middle = _zero_between(omega, following, (old_h, h), (old_dh, dh))
-                        middle, there, rate = _polish(
-                            start, reach, local, phases, bound, (last_clear, following), middle,
-                            sign,
-                        )  # fmt: skip
-                        uncertain = real_horner(error, (middle - start) * per_reach)
-                        if abs(rate.imag) * width > uncertain:
-                            width = uncertain / abs(rate.imag)
-                    else:
-                        if sign == 0:
-                            # At the start itself the sign was hidden.
-                            middle, width = omega_start, following - omega_start
-                            jump = now if omega_start == 0.0 else 0
-                        there, rate = evaluate(start, reach, local, phases, middle)
-                    zeros[found, OMEGA] = middle
-                    zeros[found, JUMP], zeros[found, WIDTH] = jump, width
-                    zeros[found, POSITION], zeros[found, SPREAD] = there.real, abs(rate)
-                    found += 1
-                sign, last_clear, doubtful = now, following, False
-            else:
-                doubtful = True
-            omega = following
+            doubt = caution * real_horner(error, (following - start) * per_reach)
+            if abs(value.imag) <= doubt:
+                omega, doubtful = following, True
+                continue
+            now, caution = 1 if value.imag > 0.0 else -1, 1.0
+            if sign == 0:
+                # At the start itself the sign was hidden.
+                there, rate = evaluate(start, reach, local, phases, omega_start)
+                jump, width = (now if omega_start == 0.0 else 0), following - omega_start
+                zeros = _with_zero(zeros, found, omega_start, jump, width, there, rate)
+                found += 1
+            elif now != sign:
+                guess = 0.5 * (last_clear + following)
+                if not doubtful:
+                    h, dh = (old_value.imag, value.imag), (old_slope.imag, slope.imag)
+                    guess = _zero_between(omega, following, h, dh)
+                at, there, rate = _polish(
+                    start, reach, local, phases, bound, (last_clear, following), guess, sign
+                )
+                width = 0.5 * (following - last_clear)
+                uncertain = real_horner(error, (at - start) * per_reach)
+                if abs(rate.imag) * width > uncertain:
+                    width = uncertain / abs(rate.imag)
+                zeros = _with_zero(zeros, found, at, 2 * now, width, there, rate)
+                found += 1
+            elif doubtful:
+                at, width = 0.5 * (last_clear + following), 0.5 * (following - last_clear)
+                there, rate = evaluate(start, reach, local, phases, at)
+                zeros = _with_zero(zeros, found, at, 0, width, there, rate)
+                found += 1
+            omega, last_clear, sign, doubtful = following, following, now, False
         if is_map and omega >= omega_end and sign != 0:
-            if found == zeros.shape[0]:
-                zeros = np.concatenate((zeros, np.empty_like(zeros)))
-            zeros[found, OMEGA] = omega_end
-            zeros[found, JUMP], zeros[found, WIDTH] = -sign, 0.0
-            zeros[found, POSITION], zeros[found, SPREAD] = value.real, abs(slope)
+            zeros = _with_zero(zeros, found, omega_end, -sign, 0.0, value, slope)
             found += 1
         if measure[0].shape[0] > 0:
             square = piece(polynomials, measure[0], measure[1], start)[2]
