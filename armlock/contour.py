@@ -15,16 +15,12 @@ All functions here work on exponential sums, piece by piece, see `armlock.expone
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numba import config
 
-from armlock.checks import BoolArray, ComplexArray, FloatArray, IntArray
-from armlock.compiled import njit, soon
+from armlock.checks import ComplexArray, FloatArray
+from armlock.compiled import njit
 from armlock.exponentials import (
     EPSILON,
     ROUNDING,
@@ -42,16 +38,6 @@ from armlock.exponentials import (
 CAUTION = 8.0 * ROUNDING
 # Share of a certified bound that a step may use up.
 SAFETY = 0.95
-
-# What `count_point` returns where it is no number of roots. The first two mean what
-# `armlock.stability.unstable_roots` says: BOUNDARY where `winding` finds the sum no larger than
-# its rounding error, UNCONFINED where `armlock.bounds.last_frequency` is infinite, because the
-# neutral root chain is not confined. The others become errors there.
-BOUNDARY = -1
-UNCONFINED = -2
-DOUBTFUL = -3
-TOO_LONG = -4
-UNTRIED = -5
 
 # Turns of the longest delay after which `winding` tries again to follow the slow terms alone.
 _BLOCK = 32.0
@@ -226,109 +212,6 @@ def remaining_argument(roots: ComplexArray, omega: float) -> float:
             angle += 2.0 * np.pi
         argument += 0.5 * np.pi - angle
     return argument
-
-
-@njit(cache=True)
-def count_point(model: tuple[Any, ...], x: float, y: float, end: float) -> int:
-    """Return the number of unstable roots at one point, or a status code below zero.
-
-    By the argument principle: degree / 2 less the argument over pi, gathered from 0 to
-    infinity, for polynomials in s; degree less the argument over pi, gathered from 0 to `end`,
-    for a map. `end` is what `armlock.bounds.last_frequency` gives: past it no root crosses; for
-    a map it is pi / step, and inf where the neutral root chain is not confined. The model is
-    what `armlock.stability` makes of a characteristic function.
-    """
-    polynomials, weights, sums, reference, phases, a_sums, roots, is_map = model
-    if end == np.inf:
-        return UNCONFINED
-    if np.isnan(end):
-        return DOUBTFUL
-    for phase in phases:
-        if end * abs(phase) > MOST_RADIANS:
-            return TOO_LONG
-    dx, dy = x - reference[0], y - reference[1]
-    here, uncertain, total = np.zeros_like(sums[0]), np.zeros_like(sums[0]), weights[0].copy()
-    for k in range(here.size):
-        here[k] = sums[0, k] - dx * sums[1, k] - dy * sums[2, k]
-        # The parameters are rounded numbers themselves.
-        uncertain[k] = EPSILON * (abs(x * sums[1, k]) + abs(y * sums[2, k]))
-        for g in range(phases.size):
-            total[g, k] -= x * weights[1, g, k] + y * weights[2, g, k]
-    argument, value, clear = winding(polynomials, total, here, phases, uncertain, end)
-    if not clear:
-        return BOUNDARY
-    if np.isnan(argument):
-        return TOO_LONG
-    if is_map:
-        count = roots.size - argument / np.pi
-    else:
-        # From `end` on |D / A - 1| < 1, so that D / A does not go around zero: its argument at
-        # `end` is taken back. That of A is known from its roots.
-        start, reach, local, _ = piece(polynomials, weights[0, :0], a_sums, end)
-        a = evaluate(start, reach, local, phases[:0], end)[0]
-        ratio = value * a.conjugate()
-        argument += remaining_argument(roots, end) - np.arctan2(ratio.imag, ratio.real)
-        count = 0.5 * roots.size - argument / np.pi
-    nearest = int(np.floor(count + 0.5)) if np.isfinite(count) else -1
-    if abs(count - nearest) > 1e-3 or nearest < 0:
-        return DOUBTFUL
-    return nearest
-
-
-# In Python a step takes some 50 microseconds, and a second is shorter than compiling.
-_count_soon = soon(count_point, unless=TOO_LONG, MOST_STEPS=20_000)
-
-
-@njit(cache=True, nogil=True)
-def _count_range(
-    first: int,
-    last: int,
-    model: tuple[Any, ...],
-    x: FloatArray,
-    y: FloatArray,
-    ends: FloatArray,
-    counts: IntArray,
-    stop: BoolArray,
-) -> None:
-    """Count at points `first` to `last`, until one of them takes too long."""
-    for i in range(first, last):
-        counts[i] = UNTRIED if stop[0] else count_point(model, x[i], y[i], ends[i])
-        if counts[i] == TOO_LONG:
-            stop[0] = True
-
-
-def count_points(
-    model: tuple[Any, ...], x: FloatArray, y: FloatArray, ends: FloatArray
-) -> IntArray:
-    """`count_point` over one-dimensional arrays of the same length, on all cores.
-
-    After the first point that takes too long no further one is tried.
-    """
-    if x.size == 1:
-        return np.array([_count_soon(model, x[0], y[0], ends[0])])
-    counts, stop = np.empty(x.size, dtype=np.int64), np.zeros(1, dtype=np.bool_)
-    _on_all_cores(_count_range, x.size, model, x, y, ends, counts, stop)
-    return counts
-
-
-def _on_all_cores(function: Callable[..., None], size: int, *arguments: object) -> None:
-    """Call function(first, last, ...) for ranges that cover `size`, in a thread each.
-
-    The function is compiled to release the interpreter's lock. Ranges are short, because some
-    points or rows take much longer than others.
-    """
-    cores = config.NUMBA_NUM_THREADS
-    if size < 2 or cores < 2:
-        function(0, size, *arguments)
-        return
-    edges = np.unique(np.linspace(0, size, 16 * cores + 1).astype(int))
-    with ThreadPoolExecutor(cores) as pool:
-        parts = [
-            pool.submit(function, int(first), int(last), *arguments)
-            for first, last in pairwise(edges)
-        ]
-        for part in parts:
-            part.result()
 
 
 @njit(cache=True)
@@ -589,82 +472,6 @@ def imaginary_zeros(
             square = piece(polynomials, measure[0], measure[1], start)[2]
             _place(zeros[first:found], start, reach, square, measure[2], sizes, fastest)
     return zeros[:found], omega >= omega_end
-
-
-@njit(cache=True)
-def _fill_row(
-    filled: tuple[Any, ...], model: tuple[Any, ...], rows: tuple[Any, ...], i: int
-) -> None:
-    """Fill row i of a chart, see `fill_rows`."""
-    counts, doubtful, last = filled
-    ends, y, deviation, base, x, lower, upper = rows
-    polynomials, fixed, varying, fixed_sums, varying_sums, phases, measure, is_map = model
-    function = (fixed - y[i] * varying, fixed_sums - deviation[i] * varying_sums, phases)
-    zeros, complete = imaginary_zeros(
-        polynomials, function, measure, 0.0, ends[i], is_map, CAUTION
-    )
-    change = np.zeros(x.size + 1, dtype=np.int64)
-    total = base[i]
-    trusted = complete and base[i] >= 0
-    for zero in zeros:
-        jump, position, spread = int(zero[JUMP]), zero[POSITION], zero[SPREAD]
-        if np.isnan(position):
-            continue
-        if abs(position - lower[i]) <= spread or abs(position - upper[i]) <= spread:
-            trusted = False
-        if lower[i] < position < upper[i]:
-            total += jump
-            change[np.searchsorted(x, position)] += jump
-        if position + spread >= x[0] and position - spread <= x[-1]:
-            near = np.searchsorted(x, position - spread)
-            while near < x.size and x[near] <= position + spread:
-                doubtful[i, near] = True
-                near += 1
-    running = base[i]
-    for k in range(x.size):
-        running += change[k]
-        counts[i, k] = running
-    last[i] = total if trusted else DOUBTFUL
-
-
-@njit(cache=True, nogil=True)
-def _fill_range(
-    first: int,
-    last: int,
-    filled: tuple[Any, ...],
-    model: tuple[Any, ...],
-    rows: tuple[Any, ...],
-) -> None:
-    for i in range(first, last):
-        _fill_row(filled, model, rows, i)
-
-
-def fill_rows(
-    model: tuple[Any, ...],
-    ends: FloatArray,
-    y: FloatArray,
-    deviation: FloatArray,
-    base: IntArray,
-    x: FloatArray,
-    lower: FloatArray,
-    upper: FloatArray,
-) -> tuple[IntArray, BoolArray, IntArray]:
-    """Fill rows of a chart with counts, from the crossings of each row.
-
-    A row is x = N / M. The model holds, in this order: the polynomials; the weights `fixed`
-    and `varying`, with N conj(M) = `fixed` - y `varying`, and their sums, the latter to be
-    weighted by the deviation of y from the reference; the phases of both; weights, sums and
-    phases of |M|^2; and whether it is a map. Row i starts with the count base[i] at
-    x = lower[i]. Returns the counts, which of them lie too near a crossing to be trusted, and
-    the count at x = upper[i] (DOUBTFUL where a crossing lies too near one of the two ends, or
-    there are more than can be found).
-    """
-    counts = np.empty((y.size, x.size), dtype=np.int64)
-    doubtful = np.zeros((y.size, x.size), dtype=np.bool_)
-    last = np.empty(y.size, dtype=np.int64)
-    rows = ends, y, deviation, base, x, lower, upper
-    _on_all_cores(_fill_range, y.size, (counts, doubtful, last), model, rows)
-    return counts, doubtful, last
 
 
 @njit(cache=True)

@@ -12,7 +12,7 @@ keeps the smallest values found so far, and steps over what cannot hold smaller 
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -73,8 +73,60 @@ def _combined(
     return found, most
 
 
+class _Disc(NamedTuple):
+    """What L fills at one frequency with free phases, and how it changes with omega.
+
+    F is the larger one of the responses to the two arms, G the other one.
+
+    Attributes
+    ----------
+    larger, ratio : complex
+        F, and G / F.
+    rate, bend : complex, float
+        The rate at which log F changes, and a bound on its second derivative.
+    ratio_rate, ratio_bend : complex, float
+        The same two for log(G / F).
+    held, swung, swing : complex
+        c of the larger one; c G / F of the other, turned against it; and its logarithm's rate.
+    nearest : float
+        The distance of the nearest root, up to which the bounds hold: within a step they are
+        divided by 1 - step / nearest, because |log(1 + x) - x| <= |x|^2 / (2 (1 - |x|)).
+    """
+
+    larger: complex
+    ratio: complex
+    rate: complex
+    bend: float
+    ratio_rate: complex
+    ratio_bend: float
+    held: complex
+    swung: complex
+    swing: complex
+    nearest: float
+
+
+class _Ahead(NamedTuple):
+    """How the parts of a disc change over a step.
+
+    Attributes
+    ----------
+    slope : float
+        Of the radius over |F|, bounded from above.
+    own, left : float
+        What F, as a factor, and the rest over |F| change by beyond first order.
+    turned, changed : float
+        How much log F and G / F change at most.
+    """
+
+    slope: float
+    own: float
+    left: float
+    turned: float
+    changed: float
+
+
 @njit(cache=True)
-def _disc(factors: tuple[Any, ...], arms: FloatArray, omega: float) -> tuple[Any, ...]:
+def _disc(factors: tuple[Any, ...], arms: FloatArray, omega: float) -> _Disc:
     """Return the disc that L fills at s = j omega, and how it changes with omega.
 
     L is M less c1 F1 exp(-s tau1) + c2 F2 exp(-s tau2), where F1 and F2 are the responses to
@@ -84,14 +136,7 @@ def _disc(factors: tuple[Any, ...], arms: FloatArray, omega: float) -> tuple[Any
 
     `factors` are the roots of F1 and F2, their powers in each, and the highest coefficients.
     `arms` are c1, c2, tau2 - tau1 (nan where both phases are free at all frequencies) and the
-    dead time. Returned are, for the larger response F and the other one, G:
-
-    - F, and G / F;
-    - the rate at which log F changes with omega, and a bound on its second derivative;
-    - the same two for log(G / F);
-    - c of the larger one; c G / F of the other, turned against it; and its logarithm's rate;
-    - the distance of the nearest root, up to which the bounds hold: within a step they are
-      divided by 1 - step / nearest, because |log(1 + x) - x| <= |x|^2 / (2 (1 - |x|)).
+    dead time.
     """
     roots, powers, leads = factors
     value1, value2 = complex(leads[0]), complex(leads[1])
@@ -128,16 +173,15 @@ def _disc(factors: tuple[Any, ...], arms: FloatArray, omega: float) -> tuple[Any
     if abs(apart) * omega < 1.0:
         held, swung = complex(c1), c2 * ratio * np.exp(-1j * omega * apart)
         swing = between - 1j * apart
-    return (
+    return _Disc(
         value1 * turn, ratio, rate1 - 1j * delay, bend1, between, bend,
         held, swung, swing, np.sqrt(nearest),
     )  # fmt: skip
 
 
 @njit(cache=True)
-def _centre_and_radius(disc: tuple[Any, ...]) -> tuple[complex, float]:
-    first, ratio, held, swung = disc[0], disc[1], disc[6], disc[7]
-    return first * (1.0 + ratio), abs(first) * abs(held + swung)
+def _centre_and_radius(disc: _Disc) -> tuple[complex, float]:
+    return disc.larger * (1.0 + disc.ratio), abs(disc.larger) * abs(disc.held + disc.swung)
 
 
 @njit(cache=True)
@@ -148,53 +192,45 @@ def _beyond_first_order(rate: complex, bend: float, step: float) -> float:
 
 
 @njit(cache=True)
-def _ahead(disc: tuple[Any, ...], step: float) -> tuple[float, float, float, float, float]:
-    """How the parts of a disc change over a step.
-
-    Returned are the slope of the radius over |F|, bounded from above; what F, as a factor, and
-    the rest over |F| change by beyond first order; and how much log F and G / F change at most.
-    """
-    _, ratio, rate, bend, between, other, held, swung, swing, nearest = disc
-    second = 0.5 * step * step / (1.0 - step / nearest)
+def _ahead(disc: _Disc, step: float) -> _Ahead:
+    """How the parts of a disc change over a step."""
+    second = 0.5 * step * step / (1.0 - step / disc.nearest)
     # Up to higher orders |held + swung| is convex, and below its chord.
-    slope = (abs(held + swung + swung * swing * step) - abs(held + swung)) / step
-    own = _beyond_first_order(rate, bend * second, step)
-    left = abs(ratio) * _beyond_first_order(between, other * second, step)
-    left += abs(swung) * _beyond_first_order(swing, other * second, step)
-    turned = abs(rate) * step + bend * second
-    return slope, own, left, turned, abs(ratio) * np.expm1(abs(between) * step + other * second)
+    there = disc.held + disc.swung + disc.swung * disc.swing * step
+    slope = (abs(there) - abs(disc.held + disc.swung)) / step
+    bend, other = disc.bend * second, disc.ratio_bend * second
+    own = _beyond_first_order(disc.rate, bend, step)
+    left = abs(disc.ratio) * _beyond_first_order(disc.ratio_rate, other, step)
+    left += abs(disc.swung) * _beyond_first_order(disc.swing, other, step)
+    changed = abs(disc.ratio) * np.expm1(abs(disc.ratio_rate) * step + other)
+    return _Ahead(slope, own, left, abs(disc.rate) * step + bend, changed)
 
 
 @njit(cache=True)
-def _clear(
-    disc: tuple[Any, ...], ahead: tuple[Any, ...], step: float, point: complex, radius: float
-) -> bool:
+def _clear(disc: _Disc, ahead: _Ahead, step: float, point: complex, radius: float) -> bool:
     """Whether L stays outside a disc around `point` over a step, whatever the free phases.
 
     Divided by what F changes by, L keeps its size to first order, however large it is, and the
     other disc moves: that is what the distance of the two is made of here. Only what is beyond
     first order counts against it. |v + v' t| is at least |v| (1 + t Re(v' / v)).
     """
-    first, ratio, rate, between = disc[0], disc[1], disc[2], disc[4]
+    size = abs(disc.larger)
     centre, spread = _centre_and_radius(disc)
-    slope, own, left, _, _ = ahead
     away = centre - point
     distance = abs(away)
     if distance == 0.0:
         return False
     begin = distance - spread - radius
-    change = first * ratio * between + point * rate
-    total = (change * away.conjugate()).real / distance - abs(first) * slope
-    total += radius * rate.real
-    beyond = (abs(point) + radius) * own + abs(first) * left
+    change = disc.larger * disc.ratio * disc.ratio_rate + point * disc.rate
+    total = (change * away.conjugate()).real / distance - size * ahead.slope
+    total += radius * disc.rate.real
+    beyond = (abs(point) + radius) * ahead.own + size * ahead.left
     rounding = 64.0 * EPSILON * (abs(centre) + spread + abs(point) + radius)
     return bool(min(begin, begin + total * step) > beyond + rounding)
 
 
 @njit(cache=True)
-def _nothing_smaller(
-    disc: tuple[Any, ...], omega: float, step: float, levels: FloatArray
-) -> bool:
+def _nothing_smaller(disc: _Disc, omega: float, step: float, levels: FloatArray) -> bool:
     """Whether no margin is below its level over a step, whatever the free phases.
 
     Levels of zero are not looked at.
@@ -211,11 +247,9 @@ def _nothing_smaller(
     # Nothing has a phase if the disc stays outside the unit circle, or inside.
     if _clear(disc, ahead, step, 0j, 1.0):
         return True
-    first, ratio = disc[0], disc[1]
-    slope, _, left, turned, changed = ahead
     centre, spread = _centre_and_radius(disc)
-    most = abs(centre) + spread + abs(first) * (changed + max(slope * step, 0.0) + left)
-    if most * np.exp(turned) < 1.0:
+    grown = ahead.changed + max(ahead.slope * step, 0.0) + ahead.left
+    if (abs(centre) + spread + abs(disc.larger) * grown) * np.exp(ahead.turned) < 1.0:
         return True
     lead = min(levels[PHASE], np.pi)
     lag = max(lead, levels[DELAY] * (omega + step))
@@ -226,33 +260,32 @@ def _nothing_smaller(
     for end in (-np.exp(-1j * lead), -np.exp(1j * lag)):
         if not _clear(disc, ahead, step, end, 0.0):
             return False
-    if changed >= abs(1.0 + ratio):
+    if ahead.changed >= abs(1.0 + disc.ratio):
         return False
     own = np.arctan2(-centre.imag, -centre.real) % (2.0 * np.pi)
-    turned += np.arcsin(changed / abs(1.0 + ratio))
+    turned = ahead.turned + np.arcsin(ahead.changed / abs(1.0 + disc.ratio))
     return bool(min(own - lag, 2.0 * np.pi - lead - own) > turned)
 
 
 @njit(cache=True)
-def _on_one_side(disc: tuple[Any, ...], ahead: tuple[Any, ...], step: float) -> bool:
+def _on_one_side(disc: _Disc, ahead: _Ahead, step: float) -> bool:
     """Whether L stays on one side of the real axis over a step, whatever the free phases.
 
     Divided by what F changes by it is the axis that turns, against the phase of F.
     """
-    first, ratio, rate, between = disc[0], disc[1], disc[2], disc[4]
+    size = abs(disc.larger)
     centre, spread = _centre_and_radius(disc)
-    slope, own, left, turned, changed = ahead
     normal = 1j if centre.imag > 0.0 else -1j
     begin = abs(centre.imag) - spread
-    change = first * ratio * between + 1j * centre * rate.imag
-    total = (change * normal.conjugate()).real - abs(first) * slope
-    beyond = abs(centre) * own + abs(first) * (left + changed * turned)
+    change = disc.larger * disc.ratio * disc.ratio_rate + 1j * centre * disc.rate.imag
+    total = (change * normal.conjugate()).real - size * ahead.slope
+    beyond = abs(centre) * ahead.own + size * (ahead.left + ahead.changed * ahead.turned)
     rounding = 64.0 * EPSILON * (abs(centre) + spread)
     return bool(min(begin, begin + total * step) > beyond + rounding)
 
 
 @njit(cache=True)
-def _misses_segment(disc: tuple[Any, ...], step: float, near: float, far: float) -> bool:
+def _misses_segment(disc: _Disc, step: float, near: float, far: float) -> bool:
     """Whether L stays off a segment of the negative real axis, whatever the free phases.
 
     It does if it stays off the axis, off the disc around the segment, or off the end that is
@@ -263,8 +296,9 @@ def _misses_segment(disc: tuple[Any, ...], step: float, near: float, far: float)
         return True
     if _clear(disc, ahead, step, complex(0.5 * (near + far)), 0.5 * (near - far)):
         return True
-    centre, (turned, changed) = _centre_and_radius(disc)[0], ahead[3:]
-    moved = abs(centre) * np.expm1(turned) + abs(disc[0]) * changed * np.exp(turned)
+    centre = _centre_and_radius(disc)[0]
+    moved = abs(centre) * np.expm1(ahead.turned)
+    moved += abs(disc.larger) * ahead.changed * np.exp(ahead.turned)
     if centre.real - moved > near:
         return bool(_clear(disc, ahead, step, complex(near), 0.0))
     if centre.real + moved < far:
@@ -350,7 +384,7 @@ def smallest_distances(
     while omega < omega_end:
         levels[:2] = best * (1.0 - tolerance)
         disc = _disc(factors, arms, omega)
-        skip = min(4.0 * skip, 0.5 * disc[-1], omega_end - omega)
+        skip = min(4.0 * skip, 0.5 * disc.nearest, omega_end - omega)
         while skip > block and not _nothing_smaller(disc, omega, skip, levels):
             skip *= 0.5
         if skip > block:
@@ -440,7 +474,7 @@ def meeting_intervals(
         # Next to zero whole turns are too long.
         shortest = max(min(_TURNS * turn, 0.03 * omega), 3e-4 * omega, 1e-3 * turn)
         disc = _disc(factors, arms, omega)
-        step = min(4.0 * step, 0.5 * disc[-1], omega_end - omega)
+        step = min(4.0 * step, 0.5 * disc.nearest, omega_end - omega)
         clear = False
         while step > shortest and not clear:
             if segment.size:
@@ -529,7 +563,7 @@ def free_margins(
     for _ in range(MOST_STEPS // 8):
         disc = _disc(factors, arms, omega)
         centre, radius = _centre_and_radius(disc)
-        step = min(2.0 * step, 0.5 * disc[-1], omega_end - omega)
+        step = min(2.0 * step, 0.5 * disc.nearest, omega_end - omega)
         grown = 0.0
         while True:
             here = free_margins_at(centre, radius + grown * (abs(centre) + radius), omega)

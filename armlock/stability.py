@@ -6,8 +6,8 @@ y fixed, roots cross the axis where Im(N / M) = 0, at x = Re(N / M); a crossing 
 adds unstable roots. Each row is checked against an independent count at its far end.
 
 The walks are those of `armlock.contour`. What makes a point a boundary point stands there, in
-`winding`: D is no larger somewhere on the axis than its rounding error, to which that of x and
-y contributes (`count_point`), or no step of the walk can be certified.
+`winding`: D is no larger somewhere on the axis than its rounding error, or no step of the walk
+can be certified. To that error the one of x and y contributes (`armlock.counting.count_point`).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import elementwise
 
-from armlock import contour
+from armlock import contour, counting
 from armlock.bounds import last_frequency
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import (
@@ -33,6 +33,7 @@ from armlock.checks import (
     broadcast_pair,
     check_memory,
 )
+from armlock.counting import PointModel, RowModel, Rows
 from armlock.exponentials import ROUNDING, ExponentialSum, without_unused
 from armlock.sweep import sweep
 
@@ -40,9 +41,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 #: What a count is where a root lies on the boundary of stability: -1.
-BOUNDARY = contour.BOUNDARY
+BOUNDARY = counting.BOUNDARY
 #: What a count is where infinitely many roots do not stay left of the boundary: -2.
-UNCONFINED = contour.UNCONFINED
+UNCONFINED = counting.UNCONFINED
 
 # How far outside a chart's axes its reference counts lie, in steps of the axis: no round
 # numbers, and not the same for both axes, so that no reference point falls on a line that a
@@ -85,13 +86,8 @@ class CountError(RuntimeError):
 
 
 @lru_cache(maxsize=64)
-def _compiled(system: CharacteristicFunction) -> tuple[Any, ...]:
-    """Return a system in the form that `armlock.contour.count_point` takes.
-
-    The polynomials; the weights of the three terms of D over all their exponentials; their
-    sums where all exponentials are one, at the reference; the reference; the phase rates; the
-    weights of A alone; the roots of A; and whether it is a map.
-    """
+def _point_model(system: CharacteristicFunction) -> PointModel:
+    """Return a system in the form in which points are counted."""
     terms = system.on_boundary()
     phases = np.concatenate([term.phases for term in terms])
     weights = np.zeros((3, phases.size, len(terms[0].polynomials)))
@@ -101,16 +97,16 @@ def _compiled(system: CharacteristicFunction) -> tuple[Any, ...]:
         weights[k, first:last] = term.weights
         first = last
     rest = system.rest_on_boundary().sums
-    a = rest if system.delay else terms[0].sums  # not used for a map
-    return (
-        terms[0].compiled(),
-        weights,
-        np.array([rest, terms[1].sums, terms[2].sums]),
-        np.array(system.reference),
-        phases,
-        a,
-        system.roots_of_a,
-        system.step > 0.0,
+    return PointModel(
+        polynomials=terms[0].compiled(),
+        weights=weights,
+        sums=np.array([rest, terms[1].sums, terms[2].sums]),
+        reference=np.array(system.reference),
+        phases=phases,
+        # Not used for a map.
+        a_sums=rest if system.delay else terms[0].sums,
+        roots=system.roots_of_a,
+        is_map=system.step > 0.0,
     )
 
 
@@ -180,13 +176,13 @@ def polished(
 def _count(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -> IntArray:
     """Count at flat arrays of points; raise where rounding spoils it."""
     ends = last_frequency(system, x, y)
-    counts: IntArray = contour.count_points(_compiled(system), x, y, ends)
-    bad = (counts == contour.DOUBTFUL) | (counts == contour.TOO_LONG)
+    counts: IntArray = counting.count_points(_point_model(system), x, y, ends)
+    bad = (counts == counting.DOUBTFUL) | (counts == counting.TOO_LONG)
     if bad.any():
         points = np.column_stack((x[bad], y[bad]))
         name1, name2 = system.parameters
         at = f"no count at ({name1}, {name2}) = ({points[0, 0]}, {points[0, 1]})"
-        if (counts == contour.TOO_LONG).any():
+        if (counts == counting.TOO_LONG).any():
             raise CountError(
                 f"{at}: following D takes more than {contour.MOST_STEPS:.0e} steps, because "
                 f"the gain, with these parameters, times the delay is too large",
@@ -477,16 +473,15 @@ def _walk(
     ends = last_frequency(system, np.maximum(np.abs(lower), np.abs(upper)), y)
     # A row that is nowhere confined has nothing to count.
     ends = np.where(np.isfinite(ends), ends, 0.0)
-    model = (
-        whole.compiled(),
-        whole.weights,
-        apart.weights,
-        whole.sums,
-        apart.sums,
-        whole.phases,
-        (square.weights, square.sums, square.phases),
-        system.step > 0.0,
+    model = RowModel(
+        polynomials=whole.compiled(),
+        fixed=whole.weights,
+        varying=apart.weights,
+        fixed_sums=whole.sums,
+        varying_sums=apart.sums,
+        phases=whole.phases,
+        measure=(square.weights, square.sums, square.phases),
+        is_map=system.step > 0.0,
     )
-    return contour.fill_rows(
-        model, ends, y, y - y0, np.ascontiguousarray(base), x, lower, upper
-    )
+    rows = Rows(ends, y, y - y0, np.ascontiguousarray(base), x, lower, upper)
+    return counting.fill_rows(model, rows)

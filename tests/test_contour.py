@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from numpy.polynomial.polynomial import polyval
 
-from armlock import CommonArm, contour, exponentials, paper_loop, unstable_roots
+from armlock import CommonArm, contour, counting, exponentials, paper_loop, unstable_roots
 from armlock.bounds import last_frequency
-from armlock.stability import _compiled
+from armlock.stability import _point_model
 from tests.attack import roots
 from tests.systems import NEUTRAL, RETARDED
 
@@ -72,10 +72,10 @@ def test_a_polynomial_gathers_the_angles_of_its_roots():
 def test_what_adds_up_to_no_whole_turns_is_doubted():
     # The roots of A turn the argument by 0.06 pi less than those of another polynomial.
     system, point = CommonArm(gain=3.0), (1.5, 1.5)
-    model, end = _compiled(system), float(last_frequency(system, *point))
-    assert contour.count_point(model, *point, end) == unstable_roots(system, *point)
-    other = (*model[:6], np.array([-4.0 + 0.0j]), model[7])
-    assert contour.count_point(other, *point, end) == contour.DOUBTFUL
+    model, end = _point_model(system), float(last_frequency(system, *point))
+    assert counting.count_point(model, *point, end) == unstable_roots(system, *point)
+    other = model._replace(roots=np.array([-4.0 + 0.0j]))
+    assert counting.count_point(other, *point, end) == counting.DOUBTFUL
 
 
 @pytest.mark.parametrize("system", [*RETARDED.values(), *NEUTRAL.values()], ids=repr)
@@ -171,7 +171,7 @@ def test_the_last_frequency_is_close_to_where_one_term_outgrows_the_others():
 # Im f = omega^5 (cos omega - 2) beside Re f = omega^2: next to zero only the former counts.
 HIGH_ORDER = """
 import numpy as np
-from armlock import contour, exponentials
+from armlock import contour, counting, exponentials
 
 whole = np.zeros((2, 6), dtype=complex)
 whole[0, 2], whole[1, 5] = 1.0, 1.0j

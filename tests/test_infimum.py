@@ -26,7 +26,7 @@ def discs_ahead(number):
         arms = arm_parameters(loop, c1, c2)
         for omega in 10.0 ** rng.uniform(-1.5, 1.5, 10):
             disc = infimum._disc(arm_factors(loop), arms, omega)
-            step = min(0.5 * disc[-1], between(rng, 1e-3, 10.0) * omega)
+            step = min(0.5 * disc.nearest, between(rng, 1e-3, 10.0) * omega)
             at = omega + step * rng.choice([1.0, rng.random()])
             first, second = (complex(arm[0]) for arm in loop.arm_responses(np.array([1j * at])))
             # Next to zero the phase between the two arms is known.

@@ -1,0 +1,297 @@
+"""Compiled: from walks along the axis to counts, at points and along the rows of a chart.
+
+The walks are those of `armlock.contour`. What is counted is in a form that compiled functions
+take: `PointModel` for points, `RowModel` for rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import config
+
+from armlock.checks import BoolArray, ComplexArray, FloatArray, IntArray
+from armlock.compiled import njit, soon
+from armlock.contour import (
+    CAUTION,
+    JUMP,
+    MOST_RADIANS,
+    POSITION,
+    SPREAD,
+    imaginary_zeros,
+    remaining_argument,
+    winding,
+)
+from armlock.exponentials import EPSILON, evaluate, piece
+
+# What `count_point` returns where it is no number of roots. The first two mean what
+# `armlock.stability.unstable_roots` says: BOUNDARY where `winding` finds the sum no larger than
+# its rounding error, UNCONFINED where `armlock.bounds.last_frequency` is infinite, because the
+# neutral root chain is not confined. The others become errors there.
+BOUNDARY = -1
+UNCONFINED = -2
+DOUBTFUL = -3
+TOO_LONG = -4
+UNTRIED = -5
+
+
+class PointModel(NamedTuple):
+    """A characteristic function as `count_point` takes it.
+
+    Attributes
+    ----------
+    polynomials : tuple
+        Those of its exponential sums, from `armlock.exponentials.ExponentialSum.compiled`.
+    weights : float array, shape (3, groups, k)
+        Of the three terms of D, over all their exponentials.
+    sums : float array, shape (3, k)
+        Of the three, where all exponentials are one, at the reference.
+    reference : float array, shape (2,)
+        The parameters (x0, y0).
+    phases : float array, shape (groups,)
+        Phase rates in s.
+    a_sums : float array, shape (k,)
+        The weights of A alone.
+    roots : complex array
+        The roots of A.
+    is_map : bool
+        Whether the polynomials are those of a map.
+    """
+
+    polynomials: tuple[Any, ...]
+    weights: FloatArray
+    sums: FloatArray
+    reference: FloatArray
+    phases: FloatArray
+    a_sums: FloatArray
+    roots: ComplexArray
+    is_map: bool
+
+
+class RowModel(NamedTuple):
+    """The crossings x = N / M of a chart's rows, as `fill_rows` takes them.
+
+    Attributes
+    ----------
+    polynomials : tuple
+        As in `PointModel`.
+    fixed, varying : float arrays, shape (groups, k)
+        Weights: N conj(M) is `fixed` - y `varying`.
+    fixed_sums, varying_sums : float arrays, shape (k,)
+        Their sums, the latter to be weighted by the deviation of y from the reference.
+    phases : float array, shape (groups,)
+        Phase rates of both in s.
+    measure : tuple of three float arrays
+        Weights, sums and phases of |M|^2.
+    is_map : bool
+        Whether the polynomials are those of a map.
+    """
+
+    polynomials: tuple[Any, ...]
+    fixed: FloatArray
+    varying: FloatArray
+    fixed_sums: FloatArray
+    varying_sums: FloatArray
+    phases: FloatArray
+    measure: tuple[FloatArray, FloatArray, FloatArray]
+    is_map: bool
+
+
+class Rows(NamedTuple):
+    """The rows of a chart, with one entry of each array but `x` for a row.
+
+    Attributes
+    ----------
+    ends : float array, shape (m,)
+        Frequencies in rad/s past which nothing crosses.
+    y, deviation : float arrays, shape (m,)
+        The parameter y, and how far it is from the reference.
+    base : int array, shape (m,)
+        The counts at x = lower.
+    x : float array, shape (n,)
+        The parameter x, ascending.
+    lower, upper : float arrays, shape (m,)
+        Where rows begin and end.
+    """
+
+    ends: FloatArray
+    y: FloatArray
+    deviation: FloatArray
+    base: IntArray
+    x: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+
+
+@njit(cache=True)
+def count_point(model: PointModel, x: float, y: float, end: float) -> int:
+    """Return the number of unstable roots at one point, or a status code below zero.
+
+    By the argument principle: degree / 2 less the argument over pi, gathered from 0 to
+    infinity, for polynomials in s; degree less the argument over pi, gathered from 0 to `end`,
+    for a map. `end` is what `armlock.bounds.last_frequency` gives: past it no root crosses; for
+    a map it is pi / step, and inf where the neutral root chain is not confined.
+    """
+    weights, sums, phases = model.weights, model.sums, model.phases
+    if end == np.inf:
+        return UNCONFINED
+    if np.isnan(end):
+        return DOUBTFUL
+    for phase in phases:
+        if end * abs(phase) > MOST_RADIANS:
+            return TOO_LONG
+    dx, dy = x - model.reference[0], y - model.reference[1]
+    here, uncertain, total = np.zeros_like(sums[0]), np.zeros_like(sums[0]), weights[0].copy()
+    for k in range(here.size):
+        here[k] = sums[0, k] - dx * sums[1, k] - dy * sums[2, k]
+        # The parameters are rounded numbers themselves.
+        uncertain[k] = EPSILON * (abs(x * sums[1, k]) + abs(y * sums[2, k]))
+        for g in range(phases.size):
+            total[g, k] -= x * weights[1, g, k] + y * weights[2, g, k]
+    argument, value, clear = winding(model.polynomials, total, here, phases, uncertain, end)
+    if not clear:
+        return BOUNDARY
+    if np.isnan(argument):
+        return TOO_LONG
+    if model.is_map:
+        count = model.roots.size - argument / np.pi
+    else:
+        # From `end` on |D / A - 1| < 1, so that D / A does not go around zero: its argument at
+        # `end` is taken back. That of A is known from its roots.
+        start, reach, local, _ = piece(model.polynomials, weights[0, :0], model.a_sums, end)
+        a = evaluate(start, reach, local, phases[:0], end)[0]
+        ratio = value * a.conjugate()
+        argument += remaining_argument(model.roots, end) - np.arctan2(ratio.imag, ratio.real)
+        count = 0.5 * model.roots.size - argument / np.pi
+    nearest = int(np.floor(count + 0.5)) if np.isfinite(count) else -1
+    if abs(count - nearest) > 1e-3 or nearest < 0:
+        return DOUBTFUL
+    return nearest
+
+
+# In Python a step takes some 50 microseconds, and a second is shorter than compiling.
+_count_soon = soon(count_point, unless=TOO_LONG, MOST_STEPS=20_000)
+
+
+@njit(cache=True, nogil=True)
+def _count_range(
+    first: int,
+    last: int,
+    model: PointModel,
+    x: FloatArray,
+    y: FloatArray,
+    ends: FloatArray,
+    counts: IntArray,
+    stop: BoolArray,
+) -> None:
+    """Count at points `first` to `last`, until one of them takes too long."""
+    for i in range(first, last):
+        counts[i] = UNTRIED if stop[0] else count_point(model, x[i], y[i], ends[i])
+        if counts[i] == TOO_LONG:
+            stop[0] = True
+
+
+def count_points(model: PointModel, x: FloatArray, y: FloatArray, ends: FloatArray) -> IntArray:
+    """`count_point` over one-dimensional arrays of the same length, on all cores.
+
+    After the first point that takes too long no further one is tried.
+    """
+    if x.size == 1:
+        return np.array([_count_soon(model, x[0], y[0], ends[0])])
+    counts, stop = np.empty(x.size, dtype=np.int64), np.zeros(1, dtype=np.bool_)
+    _on_all_cores(_count_range, x.size, model, x, y, ends, counts, stop)
+    return counts
+
+
+def _on_all_cores(function: Callable[..., None], size: int, *arguments: object) -> None:
+    """Call function(first, last, ...) for ranges that cover `size`, in a thread each.
+
+    The function is compiled to release the interpreter's lock. Ranges are short, because some
+    points or rows take much longer than others.
+    """
+    cores = config.NUMBA_NUM_THREADS
+    if size < 2 or cores < 2:
+        function(0, size, *arguments)
+        return
+    edges = np.unique(np.linspace(0, size, 16 * cores + 1).astype(int))
+    with ThreadPoolExecutor(cores) as pool:
+        parts = [
+            pool.submit(function, int(first), int(last), *arguments)
+            for first, last in pairwise(edges)
+        ]
+        for part in parts:
+            part.result()
+
+
+@njit(cache=True)
+def _fill_row(
+    filled: tuple[IntArray, BoolArray, IntArray], model: RowModel, rows: Rows, i: int
+) -> None:
+    """Fill row i of a chart, see `fill_rows`."""
+    counts, doubtful, last = filled
+    x, lower, upper = rows.x, rows.lower[i], rows.upper[i]
+    weights = model.fixed - rows.y[i] * model.varying
+    sums = model.fixed_sums - rows.deviation[i] * model.varying_sums
+    zeros, complete = imaginary_zeros(
+        model.polynomials,
+        (weights, sums, model.phases),
+        model.measure,
+        0.0,
+        rows.ends[i],
+        model.is_map,
+        CAUTION,
+    )
+    change = np.zeros(x.size + 1, dtype=np.int64)
+    total = running = rows.base[i]
+    trusted = complete and total >= 0
+    for zero in zeros:
+        jump, position, spread = int(zero[JUMP]), zero[POSITION], zero[SPREAD]
+        if np.isnan(position):
+            continue
+        if abs(position - lower) <= spread or abs(position - upper) <= spread:
+            trusted = False
+        if lower < position < upper:
+            total += jump
+            change[np.searchsorted(x, position)] += jump
+        if position + spread >= x[0] and position - spread <= x[-1]:
+            near = np.searchsorted(x, position - spread)
+            while near < x.size and x[near] <= position + spread:
+                doubtful[i, near] = True
+                near += 1
+    for k in range(x.size):
+        running += change[k]
+        counts[i, k] = running
+    last[i] = total if trusted else DOUBTFUL
+
+
+@njit(cache=True, nogil=True)
+def _fill_range(
+    first: int,
+    last: int,
+    filled: tuple[IntArray, BoolArray, IntArray],
+    model: RowModel,
+    rows: Rows,
+) -> None:
+    for i in range(first, last):
+        _fill_row(filled, model, rows, i)
+
+
+def fill_rows(model: RowModel, rows: Rows) -> tuple[IntArray, BoolArray, IntArray]:
+    """Fill rows of a chart with counts, from the crossings of each row.
+
+    Returns the counts, which of them lie too near a crossing to be trusted, and the count at
+    the end of each row (DOUBTFUL where a crossing lies too near one of its two ends, or there
+    are more than can be found).
+    """
+    shape = rows.y.size, rows.x.size
+    filled = (
+        np.empty(shape, dtype=np.int64),
+        np.zeros(shape, dtype=np.bool_),
+        np.empty(shape[0], dtype=np.int64),
+    )
+    _on_all_cores(_fill_range, shape[0], filled, model, rows)
+    return filled
