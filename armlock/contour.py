@@ -347,17 +347,18 @@ def _imaginary_bounds(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Bounds on the imaginary part in a piece, as polynomials in u.
 
-    On its second derivative, next to omega = 0 and everywhere; and on its rounding error.
+    On its second derivative, next to omega = 0 and everywhere; and on its rounding error, for
+    which row 0 of `sizes` becomes that of the imaginary part.
     """
-    only, magnitudes = local.copy(), sizes.copy()
+    only = local.copy()
     for m in range(local.shape[1]):
         only[0, m] = local[0, m].imag
         if start == 0.0 and reach == 1.0:
             # The coefficients are real or imaginary: only the latter enter the imaginary part.
-            magnitudes[0, m] = abs(local[0, m].imag)
+            sizes[0, m] = abs(local[0, m].imag)
     everywhere = curvature_bound(start, reach, only, phases)
     near = curvature_from_zero(reach, local, phases) if start == 0.0 else everywhere
-    return near, everywhere, rounding_bound(start, reach, magnitudes, phases, rounding)
+    return near, everywhere, rounding_bound(start, reach, sizes, phases, rounding)
 
 
 @njit(cache=True)
@@ -468,7 +469,7 @@ def imaginary_zeros(
         if is_map and omega >= omega_end and sign != 0:
             zeros = _with_zero(zeros, found, omega_end, -sign, 0.0, value, slope)
             found += 1
-        if measure[0].shape[0] > 0:
+        if found > first and measure[0].shape[0] > 0:
             square = piece(polynomials, measure[0], measure[1], start)[2]
             _place(zeros[first:found], start, reach, square, measure[2], sizes, fastest)
     return zeros[:found], omega >= omega_end
