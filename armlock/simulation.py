@@ -502,6 +502,10 @@ class Simulation:
         given = finite_series("noise", noise, 1 if self.draws is None else 2)
         if self.draws not in (None, len(given)):
             raise ValueError(f"noise must have {self.draws} rows, got shape {given.shape}")
+        return self._advance(given, c1, c2)
+
+    def _advance(self, given: FloatArray, c1: npt.ArrayLike, c2: npt.ArrayLike) -> FloatArray:
+        """Compute the next block of noise that is already checked."""
         inputs = [np.atleast_2d(given).T, _series("c1", c1, given), _series("c2", c2, given)]
         output, begin = np.empty(inputs[0].shape), self.samples
         shaped = output.T.reshape(given.shape)
@@ -600,7 +604,7 @@ def simulate(
     given = finite_series("noise", noise, 1, 2)
     draws = len(given) if given.ndim == 2 else None
     run = Simulation(loop, sample_rate, history=history, limit=limit, draws=draws)
-    return run.advance(given, c1, c2)
+    return run._advance(given, c1, c2)
 
 
 def simulate_blocks(

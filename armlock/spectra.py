@@ -331,12 +331,12 @@ class SpectrumEstimator:
         self.sample_rate = positive_number("sample_rate", sample_rate)
         self._levels = [_Level(self.sample_rate, 0)]
 
-    def add(self, samples: npt.ArrayLike) -> None:
+    def add(self, series: npt.ArrayLike) -> None:
         """Take in the next samples.
 
         Parameters
         ----------
-        samples : array_like of float, one-dimensional
+        series : array_like of float, one-dimensional
             Finite.
 
         Raises
@@ -344,7 +344,7 @@ class SpectrumEstimator:
         TypeError, ValueError
             If they are not; none of them is taken in.
         """
-        given = finite_series("samples", samples)
+        given = finite_series("series", series)
         depth = 0
         while given.size:
             if depth == len(self._levels):
@@ -439,5 +439,5 @@ def amplitude_spectrum(series: npt.ArrayLike, sample_rate: float) -> Spectrum:
     True
     """
     estimator = SpectrumEstimator(sample_rate)
-    estimator.add(finite_series("series", series))
+    estimator.add(series)
     return estimator.spectrum()

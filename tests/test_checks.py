@@ -14,7 +14,6 @@ import armlock
 from armlock import CharacteristicFunction, CommonArm, HayesEquation, SingleArm, paper_loop
 from armlock.checks import axis, finite_series, real_array
 from armlock.controllers import integrating_actuator, stage_one, table_two
-from armlock.discretize import warped
 from armlock.noise import band_rms
 from armlock.rays import first_crossing
 from armlock.roots import extended_root
@@ -75,7 +74,6 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     armlock.simulate: {"loop": ARMS, "noise": np.ones(9)} | POINT | RUN,
     armlock.Simulation: {"loop": ARMS} | RUN,
     armlock.sampled_open_loop: {"loop": ARMS, "omega": 1.0, "sample_rate": 10.0} | POINT,
-    warped: {"omega": 1.0, "sample_rate": 10.0},
     armlock.LaserNoise: {"level": 30.0} | NOISE,
     armlock.PerturbationNoise: {"scale": 1.0} | NOISE,
     armlock.ShapedNoise: {"seed": 1, "sample_rate": 10.0} | SHAPE,
