@@ -412,9 +412,8 @@ class _Judge:
         self.middle = 1j * np.exp(np.log(self.goal[0].imag).mean())
         size = [abs(start.controller(self.middle))] if free_gain else []
         self.x = np.log10(np.append(corners, size))
-        self.omega, self.low, ring = _samples(start, corners.tolist(), free_above)
-        s = 1j * self.omega
-        self.s, self.ring = s, ring - self.low
+        self.omega, self.low, self.ring = _samples(start, corners.tolist(), free_above)
+        self.s = s = 1j * self.omega
         dead = np.exp(-s * start.delay)
         self.m = [weight * dead for weight in start.mapping.weights(s)]
         self.turn = np.exp(-s * start.tau1), np.exp(-s * start.tau2)
@@ -443,6 +442,7 @@ class _Judge:
         late = first * self.turn[0], second * self.turn[1]
         centre, radius = self._discs(first, second, late)
         distance = np.abs(1.0 + centre) - radius
+        # Of a stable loop 1 + L turns by a right angle for each pole of L at s = 0, no more.
         phase = np.unwrap(np.angle(1.0 + centre[0]))
         expected = 0.5 * np.pi * int(np.flatnonzero(self.start.rest)[0])
         if abs(phase[-1] - phase[0] - expected) > 0.5 * np.pi or not (distance[0] > 0.0).all():
@@ -509,7 +509,10 @@ def _distinct(roots: Sequence[complex]) -> tuple[FloatArray, IntArray]:
 def _samples(
     start: Loop, corners: list[float], free_above: float | None
 ) -> tuple[FloatArray, int, int]:
-    """Frequencies at which candidates are judged, and how many lie below the two limits."""
+    """Frequencies at which candidates are judged: low ones, those of the circle, free ones.
+
+    How many are low, and how many of the circle, is returned with them.
+    """
     longest, apart = start.longest_delay, abs(start.tau1 - start.tau2)
     switch = 0.6 / longest
     top = 30.0 * max([*corners, 1.0 / start.delay if start.delay else 0.0, 10.0 * switch])
@@ -522,7 +525,7 @@ def _samples(
         ring = np.union1d(ring, steps[(steps > switch) & (steps < ring_end)])
     free = np.geomspace(ring_end, max(top, 2.0 * ring_end), 160)
     omega = np.concatenate((low, ring, free if free_above else []))
-    return omega, low.size, low.size + ring.size
+    return omega, low.size, ring.size
 
 
 def _first_real(values: ComplexArray) -> float:

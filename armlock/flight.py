@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from armlock import paper
-from armlock.checks import positive_number, real_number
+from armlock.checks import positive_number
 from armlock.controllers import Controller, white_paper
 from armlock.loops import Loop, paper_loop
 from armlock.sensors import COMMON, SINGLE, modified_dual
@@ -61,13 +61,14 @@ def flight_loop(
     >>> unstable_roots(flight_loop(), [1.0, 1.02], [1.0, 0.98])
     array([0, 2])
     """
-    mean = positive_number("mean_delay", mean_delay)
-    half = real_number("half_difference", half_difference)
-    if abs(half) >= mean:
-        raise ValueError(f"half_difference must be below mean_delay ({mean}), got {half}")
-    mapping = modified_dual(mean, half, corner)
+    mapping = modified_dual(mean_delay, half_difference, corner)
+    if abs(half_difference) >= mean_delay:
+        raise ValueError(
+            f"half_difference must be below mean_delay ({mean_delay}), got {half_difference}"
+        )
     controller = white_paper(0.5 * positive_number("g2", g2))
-    return Loop(controller, mapping, mean + half, mean - half, delay)
+    tau1, tau2 = mean_delay + half_difference, mean_delay - half_difference
+    return Loop(controller, mapping, tau1, tau2, delay)
 
 
 def published_loops() -> dict[str, Loop]:

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9"
 #: Fill of the stable region.
 STABLE = "#B8C4CE"
-_CENTRED: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8}
 # Half the width of a count written into a region, over the width of the chart.
 _ROOM = 0.025
 #: The circle |L| that stands for infinity in a compressed Nyquist plot.
@@ -120,7 +119,7 @@ def _label_regions(ax: Axes, chart: StabilityChart) -> None:
             if depth[row, column] >= room:
                 box = {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.8}
                 x, y = chart.x[column - 1], chart.y[row - 1]
-                ax.text(x, y, str(count), bbox=box, **_CENTRED)
+                ax.text(x, y, str(count), ha="center", va="center", fontsize=8, bbox=box)
 
 
 def label_parameters(ax: Axes, parameters: tuple[str, str]) -> None:
