@@ -190,6 +190,14 @@ def _resolving_grid(loop: Loop, c1: float, c2: float, end: float) -> FloatArray:
     return np.unique(np.concatenate(grids))
 
 
+def _drawing_grid(loop: Loop, start: float, end: float) -> FloatArray:
+    """Frequencies close enough to draw the curve; finer at first, where L changes most."""
+    turn = 2.0 * np.pi / loop.longest_delay
+    first = np.arange(0.0, min(4.0 * turn, end), turn / 2000.0)
+    whole = np.arange(0.0, end, turn / 400.0)
+    return np.concatenate((np.geomspace(start, end, 1000), first, whole))
+
+
 def _turn_beyond(loop: Loop, last: complex, end: float) -> float:
     """Argument that 1 + L gathers from j `end`, where it is `last`, to infinity and back.
 
@@ -288,11 +296,7 @@ def nyquist(
         end = max(end, positive_number("omega_max", omega_max))
     grid = _resolving_grid(loop, c1, c2, end)
     if omega_max is not None:
-        turn = 2.0 * np.pi / loop.longest_delay
-        # Finer at first, where L changes most.
-        low, high = np.geomspace(radius, end, 1000), np.arange(0.0, end, turn / 400.0)
-        first = np.arange(0.0, min(4.0 * turn, end), turn / 2000.0)
-        grid = np.unique(np.concatenate((grid, low, first, high)))
+        grid = np.union1d(grid, _drawing_grid(loop, radius, end))
     omega = np.concatenate(([radius], grid[(grid > radius) & (grid < end)], [end]))
     arc = radius * np.exp(0.5j * np.pi * np.linspace(0.0, 1.0, 64))
     contour = loop.open_loop(np.concatenate((arc[:-1], 1j * omega)), c1, c2)
@@ -311,16 +315,16 @@ def nyquist(
             f"{encirclements} encirclements and {poles} open-loop poles against {expected} "
             "roots"
         )
-    around = slice(arc.size if order else 0)
+    indented = slice(arc.size if order else 0)
     return NyquistCurve(
-        omega,
-        contour[arc.size - 1 :],
-        arc[around],
-        contour[around],
-        order,
-        encirclements,
-        poles,
-        count,
+        omega=omega,
+        response=contour[arc.size - 1 :],
+        indentation=arc[indented],
+        indentation_response=contour[indented],
+        pole_order=order,
+        encirclements=encirclements,
+        open_loop_poles=poles,
+        closed_loop_roots=count,
     )
 
 

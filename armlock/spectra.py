@@ -381,16 +381,16 @@ class SpectrumEstimator:
             first = _FIRST_BIN if settled else SPOILED
             rows += _banded(level, np.arange(first, end))
             end = FACTOR * first
-        frequency, power, degrees, resolution, count = np.array(sorted(rows)).T
+        frequency, power, degrees, resolution, bins = np.array(sorted(rows)).T
         tail = 0.5 * (1.0 - CONFIDENCE)
         return Spectrum(
-            frequency,
-            np.sqrt(power),
-            np.sqrt(power * degrees / chdtri(degrees, tail)),
-            np.sqrt(power * degrees / chdtri(degrees, 1.0 - tail)),
-            degrees,
-            resolution,
-            count.astype(np.int64),
+            frequency=frequency,
+            asd=np.sqrt(power),
+            lower=np.sqrt(power * degrees / chdtri(degrees, tail)),
+            upper=np.sqrt(power * degrees / chdtri(degrees, 1.0 - tail)),
+            degrees=degrees,
+            resolution=resolution,
+            bins=bins.astype(np.int64),
         )
 
 
