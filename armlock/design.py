@@ -247,8 +247,8 @@ def box_counts(loop: Loop, size: float, free_above: float | None = None) -> IntA
     """
     checked_loop(loop)
     size = positive_number("size", size)
-    highest = _checked_end(loop, size, free_above)
-    if not highest:
+    highest = _end_of_walks(loop, size, free_above)
+    if highest is None:
         return np.array([BOUNDARY])
     left, clear = [(1.0, 1.0, size)], 0
     while left:
@@ -305,8 +305,8 @@ def edge_crossings(loop: Loop, size: float, free_above: float | None = None) -> 
     """
     checked_loop(loop)
     size = positive_number("size", size)
-    highest = _checked_end(loop, size, free_above)
-    if not highest:
+    highest = _end_of_walks(loop, size, free_above)
+    if highest is None:
         return UNCONFINED
     intervals = [(0.0, highest)] if math.isfinite(highest) else None
     corners = 1.0 + size * _CORNERS
@@ -317,12 +317,12 @@ def edge_crossings(loop: Loop, size: float, free_above: float | None = None) -> 
     )
 
 
-def _checked_end(loop: Loop, size: float, free_above: float | None) -> float:
-    """Frequency up to which roots may cross for a box; 0 if they may for phases beyond."""
+def _end_of_walks(loop: Loop, size: float, free_above: float | None) -> float | None:
+    """Frequency up to which roots may cross in a box; None if some phases let one beyond."""
     if free_above is None:
         return math.inf
     highest = positive_number("free_above", free_above)
-    return highest if clear_above(loop, 1.0 + size, 1.0 + size, highest) else 0.0
+    return highest if clear_above(loop, 1.0 + size, 1.0 + size, highest) else None
 
 
 def _stays_clear(loop: Loop, c1: float, c2: float, half: float, highest: float) -> bool:
