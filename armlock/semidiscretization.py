@@ -11,6 +11,8 @@ unit circle instead of the imaginary axis, so that `unstable_roots`, `stability_
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import expm
@@ -21,9 +23,86 @@ from armlock.checks import (
     broadcast_pair,
     check_memory,
     positive_number,
+    real_number,
     whole_number,
 )
-from armlock.statespace import Realization, realize
+
+
+class DelayedTerm(NamedTuple):
+    """One delayed term at given parameters: delay, input column and direct share."""
+
+    delay: float
+    column: FloatArray
+    direct: float
+
+
+def realize(
+    system: CharacteristicFunction, x: float, y: float
+) -> tuple[FloatArray, list[DelayedTerm]]:
+    r"""Return a state space of `system` at (x, y), in which a single signal is delayed.
+
+    With C and A as in `armlock.characteristic.CharacteristicFunction`, D xi = 0 reads
+
+    .. math::
+
+        A\, \xi = -C\, \xi(t - \delta) + x\, B_1\, \xi(t - \delta - \theta_1)
+        + y\, B_2\, \xi(t - \delta - \theta_2) .
+
+    In observer form, with as many states as D has degree and a term k for each delay, that is
+
+    .. math::
+
+        \dot z(t) &= F z(t) + \sum_k G_k\, \xi(t - \theta_k) , \\
+        \xi(t) &= z_1(t) + \sum_k d_k\, \xi(t - \theta_k) .
+
+    Parameters
+    ----------
+    system : CharacteristicFunction
+        With polynomials in s.
+    x, y : float
+        The free parameters.
+
+    Returns
+    -------
+    state : float array, shape (n, n)
+        The matrix F. Terms without delay are part of it.
+    delayed : list of DelayedTerm
+        The others, free parameters included; d_k = 0 for retarded equations.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If x or y is not a finite real number, or the system is a map.
+    """
+    name1, name2 = checked_system(system).parameters
+    x, y = real_number(name1, x), real_number(name2, y)
+    if system.step:
+        raise ValueError(
+            f"system must be in continuous time, got a map with step {system.step}"
+        )
+    undelayed = system.a.copy()
+    terms = []
+    for weight, b, delay in (
+        (-1.0, system.c, system.delay),
+        (x, system.b1, system.delay + system.delay1),
+        (y, system.b2, system.delay + system.delay2),
+    ):
+        padded = np.zeros_like(undelayed)
+        padded[: b.size] = weight * b
+        if delay == 0.0:
+            undelayed -= padded
+        else:
+            terms.append((delay, padded))
+    # Descending powers below the highest one, as the observer form lists them.
+    lead = undelayed[-1]
+    below = undelayed[-2::-1] / lead
+    state = np.diag(np.ones(system.degree - 1), 1)
+    state[:, 0] = -below
+    delayed = []
+    for delay, b in terms:
+        direct = float(b[-1] / lead)
+        delayed.append(DelayedTerm(delay, b[-2::-1] / lead - direct * below, direct))
+    return state, delayed
 
 
 def _checked(system: CharacteristicFunction, step: float, order: int) -> float:
@@ -42,21 +121,21 @@ def _checked(system: CharacteristicFunction, step: float, order: int) -> float:
 
 
 def _sampled(
-    form: Realization, step: float, order: int
+    state: FloatArray, delayed: list[DelayedTerm], step: float, order: int
 ) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
     """Return exp(F h) and, per delayed term, the columns of its older and newer sample."""
-    states = form.state.shape[0]
+    states = len(state)
     columns = []
-    for term in form.delayed:
+    for term in delayed:
         # exp of this block matrix holds the integrals of exp(F u) G and of u exp(F u) G.
         block = np.zeros((states + 2, states + 2))
-        block[:states, :states] = form.state
+        block[:states, :states] = state
         block[:states, states] = term.column
         block[states, states + 1] = 1.0 / step
         integrals = expm(block * step)[:states, states:]
         held, ramp = integrals[:, 0], integrals[:, 1]
         columns.append((held, np.zeros(states)) if order == 0 else (held - ramp, ramp))
-    return np.asarray(expm(form.state * step)), columns
+    return np.asarray(expm(state * step)), columns
 
 
 def transition_matrix(
@@ -91,8 +170,8 @@ def transition_matrix(
     Notes
     -----
     In state space the loop is z' = F z + sum_k G_k xi(t - theta_k), where xi is the first
-    state, G_1 contains x and G_2 contains y, and what is not delayed is part of F. With
-    :math:`\theta_k = r_k h`, a step is
+    state, G_1 contains x and G_2 contains y, and what is not delayed is part of F (`realize`).
+    With :math:`\theta_k = r_k h`, a step is
 
     .. math::
 
@@ -133,10 +212,10 @@ def transition_matrix(
     step = _checked(system, step, order)
     # The matrix, and what its eigenvalues take.
     check_memory("step", (system.degree + round(system.longest_delay / step),) * 2, 24)
-    form = realize(system, x, y)
-    flow, columns = _sampled(form, step, order)
-    states = form.state.shape[0]
-    steps = [whole_steps("delay", term.delay, step) for term in form.delayed]
+    state, delayed = realize(system, x, y)
+    flow, columns = _sampled(state, delayed, step, order)
+    states = len(state)
+    steps = [whole_steps("delay", term.delay, step) for term in delayed]
     longest = max(steps, default=0)
     matrix = np.zeros((states + longest, states + longest))
     matrix[:states, :states] = flow
@@ -265,8 +344,7 @@ def semi_discretization(
                 f"so that the map is not affine in it; use transition_matrix or "
                 f"spectral_radius at single points"
             )
-    form = realize(system, 1.0, 1.0)
-    flow, columns = _sampled(form, step, order)
+    flow, columns = _sampled(*realize(system, 1.0, 1.0), step, order)
     # Those before x and y; with a dead time there is a third one, x0 B1 + y0 B2.
     b1, b2 = (_numerator(flow, *both) for both in columns[-2:])
     return CharacteristicFunction(

@@ -13,8 +13,7 @@ from scipy.interpolate import BarycentricInterpolator
 from armlock.characteristic import CharacteristicFunction
 from armlock.checks import ComplexArray
 from armlock.loops import CommonArm
-from armlock.semidiscretization import semi_discretization
-from armlock.statespace import realize
+from armlock.semidiscretization import realize, semi_discretization
 
 
 def sampled_loop(
@@ -116,13 +115,13 @@ def pseudospectral_roots(
     complex array, shape (degree + order of the equation,)
         Eigenvalues in descending order of real part: approximations, some of them spurious.
     """
-    form = realize(system, x, y)
-    states = form.state.shape[0]
+    state, terms = realize(system, x, y)
+    states = len(state)
     # A term without effect would only add spurious eigenvalues.
-    delayed = [term for term in form.delayed if term.column.any() or term.direct != 0.0]
+    delayed = [term for term in terms if term.column.any() or term.direct != 0.0]
     longest = max((term.delay for term in delayed), default=0.0)
     if longest == 0.0:
-        eigenvalues = np.linalg.eigvals(form.state).astype(np.complex128)
+        eigenvalues = np.linalg.eigvals(state).astype(np.complex128)
         return eigenvalues[np.argsort(-eigenvalues.real)]
     # Chebyshev points from the present back to the longest delay.
     history = 0.5 * longest * (np.cos(np.pi * np.arange(degree + 1) / degree) - 1.0)
@@ -136,7 +135,7 @@ def pseudospectral_roots(
     present[states:] += np.asarray(direct)[1:]
     present /= 1.0 - np.asarray(direct)[0]
     matrix = np.zeros((states + degree, states + degree))
-    matrix[:states, :states] = form.state
+    matrix[:states, :states] = state
     for term, row in zip(delayed, rows, strict=True):
         signal = row[0] * present
         signal[states:] += row[1:]
