@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from armlock.checks import ComplexArray, FloatArray, axis, positive_array
 from armlock.loops import Loop, checked_loop
-from armlock.stability import CountError, unstable_roots
+from armlock.stability import BOUNDARY, UNCONFINED, CountError, unstable_roots
 from armlock.transfer import transfer
 
 # Multiples of 1 / tau up to which the roots are taken.
@@ -80,9 +80,11 @@ def pulling(
     """
     checked_loop(loop)
     t = positive_array("time", time)
-    unstable = int(unstable_roots(loop, 1.0, 1.0))
-    if unstable > 0:
-        raise ValueError(f"loop must be stable at c1 = c2 = 1, got {unstable} unstable roots")
+    count = int(unstable_roots(loop, 1.0, 1.0))
+    if count not in (0, BOUNDARY):
+        chain = "a neutral root chain that is not confined"
+        found = chain if count == UNCONFINED else f"{count} unstable roots"
+        raise ValueError(f"loop must be stable at c1 = c2 = 1, got {found}")
     total = np.zeros(t.shape)
     errors = {"common": _error("common", common)}
     errors["differential"] = _error("differential", differential)

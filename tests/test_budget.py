@@ -15,6 +15,7 @@ from armlock import (
     closed_loop,
     flight_loop,
     noise_budget,
+    paper_loop,
     published_loops,
     pulling,
     rightmost_root,
@@ -142,3 +143,6 @@ def test_what_an_unstable_loop_does_is_no_pulling():
     turned = Loop(FLIGHT.controller, modified_dual(33.6, -0.255), FLIGHT.tau1, FLIGHT.tau2)
     with pytest.raises(ValueError, match="loop must be stable at c1 = c2 = 1, got 38 unstable"):
         pulling(turned, 1.0)
+    # With any dead time its chain reaches the right half-plane.
+    with pytest.raises(ValueError, match="got a neutral root chain that is not confined"):
+        pulling(paper_loop(delay=1e-6), 1.0)
