@@ -27,8 +27,7 @@ from armlock.free_phases import (
     polynomial_sum,
     search_outwards,
 )
-from armlock.loops import Loop
-from armlock.nyquist import loop_numerator
+from armlock.loops import Loop, loop_numerator
 from armlock.stability import polished, sign_changes
 
 # Crossovers that are polished: those with the smallest margins.

@@ -71,15 +71,6 @@ _SPARE = 4e-3
 # Cost of a candidate that is not stable, beside costs of the order of one.
 _UNSTABLE = 1e3
 
-#: Dead time in s of actuator, phasemeter and transponder in the white paper.
-FLIGHT_DELAY: Final = 12.3e-6
-
-
-def _robust_controller() -> Controller:
-    # What a search found, rounded; the test from scratch finds one like it.
-    zeros, poles = _at_hertz(0.37e-6, *[16.75e-6] * 3), [0.25e-6, 0.108e-6, *[114.7e-6] * 4]
-    return Controller((0.0, 0.0, *zeros), _at_hertz(*poles), paper.CONTROLLER_GAIN)
-
 
 def _at_hertz(*corners: float) -> list[float]:
     """Return zeros or poles with corners in Hz."""
@@ -113,7 +104,10 @@ def robust_loop() -> Loop:
     1.464e-06
     4.375e-06
     """
-    return paper_loop(controller=_robust_controller())
+    # What a search found, rounded; the chapter on design finds one like it from round numbers.
+    zeros = _at_hertz(0.37e-6, *[16.75e-6] * 3)
+    poles = _at_hertz(0.25e-6, 0.108e-6, *[114.7e-6] * 4)
+    return paper_loop(controller=((0.0, 0.0, *zeros), poles, paper.CONTROLLER_GAIN))
 
 
 def buildable_loop() -> Loop:
@@ -136,13 +130,13 @@ def buildable_loop() -> Loop:
     >>> int(unstable_roots(loop, 1.0 + 1e-6, 1.0 - 1e-6))
     0
     """
-    # From a search outside of this module; the test from scratch finds one like it.
+    # What a search found, rounded; the chapter on design finds one like it.
     zeros = _at_hertz(0.111, 4.67, 29.5, 186.0, 1266.0, 15450.0)
     poles = _at_hertz(0.0059, 0.82, 8.91, 54.6, 342.0, 2228.0, 40e3)
     # A gain of one at low frequency.
     gain = abs(float(np.prod(poles) / np.prod(zeros)))
-    controller = _robust_controller() * Controller(zeros, poles, gain)
-    return paper_loop(controller=controller, delay=FLIGHT_DELAY)
+    controller = robust_loop().controller * Controller(zeros, poles, gain)
+    return paper_loop(controller=controller, delay=12.3e-6)
 
 
 def roll_off(first: float, last: float, pairs: int, slope: float = 2.0 / 3.0) -> Controller:

@@ -27,8 +27,7 @@ from armlock.free_phases import (
     require_stable,
     search_outwards,
 )
-from armlock.loops import Loop, checked_loop
-from armlock.nyquist import loop_numerator
+from armlock.loops import Loop, checked_loop, loop_numerator
 from armlock.stability import unstable_roots
 
 #: Gain factors up to this, and down to one over it, are looked at.

@@ -31,8 +31,7 @@ from armlock.free_phases import (
     unconfined,
 )
 from armlock.gains import gain_interval_of_stable
-from armlock.loops import Loop, checked_loop
-from armlock.nyquist import leading_radius, loop_numerator
+from armlock.loops import Loop, checked_loop, leading_radius, loop_numerator
 from armlock.rays import FARTHEST, Ray
 from armlock.stability import BOUNDARY, UNCONFINED, CountError, unstable_roots
 

@@ -9,7 +9,6 @@ encirclements are then held against the count of unstable roots: Z = N + P.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import factorial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,8 +21,14 @@ from armlock.checks import (
     real_number,
 )
 from armlock.contour import MOST_SAMPLES, remaining_argument, resolved_grid
-from armlock.exponentials import ExponentialSum, Polynomial
-from armlock.loops import Loop, checked_loop
+from armlock.exponentials import Polynomial
+from armlock.loops import (
+    Loop,
+    checked_loop,
+    leading_radius,
+    loop_numerator,
+    poles_at_zero,
+)
 from armlock.stability import (
     BOUNDARY,
     UNCONFINED,
@@ -125,28 +130,6 @@ class AxisCrossings:
     value: FloatArray
 
 
-def loop_numerator(loop: Loop, c1: float, c2: float) -> ExponentialSum:
-    """Return the numerator N of L = N / R at s = j omega as an exponential sum."""
-    return loop.at(c1, c2).plus(loop.rest_on_boundary().scaled(-1.0))
-
-
-def _poles_at_zero(loop: Loop, c1: float, c2: float) -> int:
-    """Order of the pole of L at s = 0 once numerator and denominator have cancelled."""
-    order = int(np.flatnonzero(loop.rest)[0])
-    if order == 0:
-        return 0
-    # Taylor coefficients of B1 (1 - c1 exp(-s tau1)) + B2 (1 - c2 exp(-s tau2)), and the
-    # magnitudes they are summed from.
-    taylor, size = np.zeros(order), np.zeros(order)
-    for b, c, tau in ((loop.b1, c1, loop.tau1), (loop.b2, c2, loop.tau2)):
-        arm = np.array([-c * (-tau) ** k / factorial(k) for k in range(order)])
-        arm[0] += 1.0
-        taylor += np.convolve(b, arm)[:order]
-        size += np.convolve(np.abs(b), np.abs(arm))[:order]
-    nonzero = np.flatnonzero(np.abs(taylor) > 1e-13 * size)
-    return order - (int(nonzero[0]) if nonzero.size else order)
-
-
 def open_loop_poles(loop: Loop) -> int:
     """Count the poles of L in the open right half-plane.
 
@@ -213,23 +196,6 @@ def _turn_beyond(loop: Loop, last: complex, end: float) -> float:
     return float(gathered - np.angle(last / complex(ratio)))
 
 
-def leading_radius(loop: Loop, c1: float, c2: float) -> float:
-    """Radius within which L is its leading term at s = 0, a power of s, to a part in 1000."""
-    order = _poles_at_zero(loop, c1, c2)
-    scales = [float(size) for p in loop.polynomials() for size in np.abs(p.roots) if size > 0.0]
-    radius = 1e-3 * min([*scales, 1.0 / loop.longest_delay])
-    for _ in range(40):
-        near, nearer = (complex(loop.open_loop(r, c1, c2)) for r in (radius, 0.5 * radius))
-        if order:
-            settled = abs(nearer / near - 2.0**order) < 1e-3 and abs(near) > 1e3
-        else:
-            settled = abs(nearer - near) < 1e-3 * abs(1.0 + near)
-        if settled:
-            break
-        radius *= 0.1
-    return radius
-
-
 def nyquist(
     loop: Loop, c1: float = 1.0, c2: float = 1.0, *, omega_max: float | None = None
 ) -> NyquistCurve:
@@ -281,7 +247,7 @@ def nyquist(
     checked_loop(loop)
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
     poles = open_loop_poles(loop)
-    order = _poles_at_zero(loop, c1, c2)
+    order = poles_at_zero(loop, c1, c2)
     end = float(last_frequency(loop, c1, c2))
 
     def refused(why: str) -> CountError:

@@ -200,8 +200,8 @@ def _compute(
     # Unsigned, because a negative index would count from the end, which takes time to check.
     # One array, because the compiler would have to check that several do not overlap.
     row = np.uintp(size)
-    rest = np.uintp((m + 2 * n) * size)
-    light1 = rest + row
+    coming = np.uintp((m + 2 * n) * size)
+    light1 = coming + row
     light2 = light1 + row
     free = light2 + row
     output = free + row
@@ -232,12 +232,12 @@ def _compute(
             lane, column = np.uintp(w), np.uintp(first + w)
             a1, a2, x = work[light1 + lane], work[light2 + lane], work[free + lane]
             if implicit:
-                # phi = noise - rest - now1 (phi - a1) - now2 (phi - a2), solved for phi.
-                x = (x + (now1 * a1 + now2 * a2) - work[rest + lane]) * inverse
+                # phi = noise - coming - now1 (phi - a1) - now2 (phi - a2), solved for phi.
+                x = (x + (now1 * a1 + now2 * a2) - work[coming + lane]) * inverse
             else:
                 x -= _late(sent, now, column, dead)
                 sending = now1 * (x - a1) + now2 * (x - a2)
-                sent[np.uintp(now), column] = work[rest + lane] + sending
+                sent[np.uintp(now), column] = work[coming + lane] + sending
             work[output + lane] = x
         for w in range(size):
             lane = np.uintp(w)
@@ -262,7 +262,7 @@ def _compute(
                 ready += t1 * new1 + t2 * new2
                 v += t1 * w1 + t2 * w2
                 work[state], work[state + row] = new1 + direct, new2
-            work[rest + lane] = gain * ready + (next1 * u1 + next2 * u2)
+            work[coming + lane] = gain * ready + (next1 * u1 + next2 * u2)
         number, exceeded = float(done + i), 0
         for w in range(size):
             lane = np.uintp(w)

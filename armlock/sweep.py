@@ -116,8 +116,8 @@ def sweep(
             kept.write(part, values)
         if progress:
             done = len(results)
-            rest = (time.monotonic() - begin) / done * (len(left) - done)
-            line = f"\r{done + len(given) - len(left)} of {len(given)}, {rest:.0f} s left   "
+            seconds = (time.monotonic() - begin) / done * (len(left) - done)
+            line = f"\r{done + len(given) - len(left)} of {len(given)}, {seconds:.0f} s left   "
             print(line, end="\n" if done == len(left) else "", file=sys.stderr, flush=True)
     return [results[i] for i in range(len(given))] if kept is None else kept.results()
 
