@@ -98,8 +98,7 @@ class Ray:
     def chain_limit(self) -> float:
         """Smallest t > 0 at which the neutral root chain is not confined, inf if there is none.
 
-        The reserve of the chain is concave in t, and linear except where x or y changes its
-        sign: the `kinks`.
+        The reserve of the chain is linear in t, except where x or y changes its sign.
         """
 
         def reserve(t: float) -> float:
@@ -108,17 +107,14 @@ class Ray:
         if reserve(0.0) <= 0.0:
             return 0.0
         with np.errstate(divide="ignore", invalid="ignore"):
-            kinks = -self.start / self.direction
-        last = max([1.0, *kinks[np.isfinite(kinks) & (kinks > 0.0)]])
-        slope = (reserve(2.0 * last) - reserve(last)) / last
-        if slope < 0.0:
-            beyond = last - reserve(last) / slope
-            if beyond >= last:
-                return float(beyond)
-        edges = sorted({0.0, last, *kinks[(kinks > 0.0) & (kinks < last)]})
-        for low, high in pairwise(edges):
-            if reserve(high) <= 0.0:
-                return float(low + (high - low) * reserve(low) / (reserve(low) - reserve(high)))
+            signs_change = -self.start / self.direction
+        edges = [0.0, *sorted(t for t in signs_change.tolist() if 0.0 < t < np.inf)]
+        last = 2.0 * max(1.0, edges[-1])
+        for low, high in pairwise([*edges, last]):
+            left, right = reserve(low), reserve(high)
+            # From the last sign on it descends for ever, or stays what it is.
+            if right <= 0.0 or (high == last and right < left):
+                return float(low + (high - low) * left / (left - right))
         return np.inf
 
     def acts(self) -> bool:
