@@ -273,11 +273,6 @@ class StabilityChart:
         The axes, as given.
     counts : int array, shape (m, n)
         As `unstable_roots`: number of unstable roots, or -1 or -2.
-    counted_singly : bool array, shape (m, n)
-        Points so near a crossing that they were counted on their own.
-    recounted_rows : int array
-        Indices of rows whose crossings did not agree with the independent count at the far
-        end, and which were counted point by point instead. Empty unless rounding interferes.
 
     Examples
     --------
@@ -294,8 +289,6 @@ class StabilityChart:
     x: FloatArray
     y: FloatArray
     counts: IntArray
-    counted_singly: BoolArray
-    recounted_rows: npt.NDArray[np.intp]
 
     @property
     def stable(self) -> BoolArray:
@@ -377,34 +370,20 @@ def stability_chart(
     if executor is not None:
         tiles = np.array_split(ys, min(ys.size, _TILES))
         charts = sweep(partial(stability_chart, system, xs), tiles, executor=executor)
-        firsts = np.cumsum([0, *(tile.size for tile in tiles[:-1])])
-        return StabilityChart(
-            system,
-            xs,
-            ys,
-            np.vstack([chart.counts for chart in charts]),
-            np.vstack([chart.counted_singly for chart in charts]),
-            np.concatenate(
-                [c.recounted_rows + at for c, at in zip(charts, firsts, strict=True)]
-            ),
-        )
+        return StabilityChart(system, xs, ys, np.vstack([chart.counts for chart in charts]))
     order_x, order_y = np.argsort(xs, kind="stable"), np.argsort(ys, kind="stable")
-    if not system.b1.any():
-        # Without B1 nothing crosses along a row: walk along the columns instead.
-        turned = _chart_rows(system.exchanged(), ys[order_y], xs[order_x])
-        counts, singly, rows = turned[0].T, turned[1].T, np.empty(0, dtype=np.intp)
+    if system.b1.any():
+        counts = _chart_rows(system, xs[order_x], ys[order_y])
     else:
-        counts, singly, rows = _chart_rows(system, xs[order_x], ys[order_y])
-    if (np.diff(order_x) != 1).any() or (np.diff(order_y) != 1).any():
-        place = np.ix_(np.argsort(order_y), np.argsort(order_x))
-        counts, singly = counts[place], singly[place]
-    return StabilityChart(system, xs, ys, counts, singly, np.sort(order_y[rows]))
+        # Without B1 nothing crosses along a row: walk along the columns instead.
+        counts = _chart_rows(system.exchanged(), ys[order_y], xs[order_x]).T
+    return StabilityChart(
+        system, xs, ys, counts[np.ix_(np.argsort(order_y), np.argsort(order_x))]
+    )
 
 
-def _chart_rows(
-    system: CharacteristicFunction, x: FloatArray, y: FloatArray
-) -> tuple[IntArray, BoolArray, npt.NDArray[np.intp]]:
-    """Chart ascending axes; return counts, points counted singly, rows counted singly."""
+def _chart_rows(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -> IntArray:
+    """Return the counts of a chart with ascending axes."""
     left, right = _ends(x, _OUTSIDE[0])
     low, high = _ends(y, _OUTSIDE[1])
     lower, upper = np.full(y.size, left), np.full(y.size, right)
@@ -433,13 +412,13 @@ def _chart_rows(
         corners = _count(system, np.array([left, right]), np.full(2, low))
         base, top = np.repeat(corners[:, None], y.size, axis=1)
     counts, singly, reached = _walk(system, x, y, base, lower, upper)
-    failed = ((reached < 0) | (reached != top)) & confined.any(axis=1)
-    singly[failed] = True
+    # Next to a crossing, and in rows whose crossings do not add up to the count at their end.
+    singly[(reached < 0) | (reached != top)] = True
     singly &= confined
     rows, across = np.nonzero(singly)
     counts[singly] = _count(system, x[across], y[rows])
     counts[~confined] = UNCONFINED
-    return counts, singly, np.flatnonzero(failed)
+    return counts
 
 
 def _ends(values: FloatArray, outside: float) -> tuple[float, float]:
