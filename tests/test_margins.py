@@ -22,6 +22,7 @@ from armlock import (
     paper_loop,
     unstable_roots,
 )
+from armlock.rays import first_crossing
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
 from tests import independent
 from tests.attack import Tally, check_margins, to_loop
@@ -232,6 +233,17 @@ def test_counts_contradict_gains_between_which_the_loop_is_not_stable():
     for low, high in ((0.99 * lower, upper), (lower, 1.01 * upper)):
         with pytest.raises(CountError, match="rounding hides a crossing"):
             gains._require_stable_inside(loop, 1.0, 1.0, low, high)
+
+
+@pytest.mark.parametrize("name", STABLE)
+@pytest.mark.parametrize("direction", [(1.0, 0.3), (-1.0, 0.7), (0.4, -1.0)])
+def test_free_phases_pass_over_no_first_crossing(name, direction):
+    """As a plain characteristic function a loop is walked without them."""
+    loop, point = STABLE[name]
+    found, expected = (
+        first_crossing(system, point, direction, 5.0) for system in (loop, loop.changed())
+    )
+    assert found == pytest.approx(expected, rel=1e-9, nan_ok=True)
 
 
 def test_an_unstable_loop_has_no_margins_and_nothing_to_lose():
