@@ -1,7 +1,7 @@
 """The frequency past which no root can lie on the imaginary axis.
 
 There A exceeds all other terms of D together (`armlock.characteristic.CharacteristicFunction`).
-Every walk along the axis ends there.
+Counts and crossings end there. Margins end where one polynomial exceeds others, `last_larger`.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ def _taylor_signs_positive(q: FloatArray, shift: float) -> bool:
 def last_root_bound(q: FloatArray) -> float:
     """Bound past which a real polynomial is positive, or zero throughout; inf if there is none.
 
-    A shift of the variable after which all coefficients are positive proves it.
+    It is nan where a coefficient is not finite. A shift of the variable after which all
+    coefficients are positive proves it.
     """
     top = q.size - 1
     while top > 0 and q[top] == 0.0:
@@ -97,12 +98,13 @@ def _last_frequency(
             size += abs(squares[i + 1, m])
         shares[i] = factors[i] * np.sqrt(size)
         whole += shares[i]
+    # At first their highest powers, and half of what these leave, by the terms' sizes.
     scale = 0.5 * reserve * lead / whole if whole > 0.0 else 1.0
     for i in range(factors.size):
         shares[i] *= scale
         shares[i] += factors[i] * np.sqrt(squares[i + 1, top])
     bound = _outgrown_from(squares, factors, shares)
-    # Nearer to equality, and to the frequency: the shares that the terms have there.
+    # Then the shares that the terms have at the bound: they give a lower one.
     while 0.0 < bound < np.inf:
         for i in range(factors.size):
             shares[i] = factors[i] * np.sqrt(max(real_horner(squares[i + 1], bound), 0.0))
@@ -132,8 +134,8 @@ def _outgrown_from(squares: FloatArray, factors: FloatArray, shares: FloatArray)
 def squared_magnitudes(polynomials: Sequence[FloatArray]) -> tuple[FloatArray, float]:
     """Return |p(j omega)|^2 as polynomials in (omega / unit)^2, and the unit in rad/s.
 
-    The first polynomial is of the highest degree. In this unit, a power of two, its lowest and
-    highest coefficients are of the same size.
+    All are multiplied by one power of two. The first polynomial is of the highest degree. In
+    this unit, a power of two, its lowest and highest coefficients are of the same size.
     """
     first = polynomials[0]
     degree, lowest = first.size - 1, int(np.flatnonzero(first)[0])
@@ -170,11 +172,7 @@ _few_last_frequencies = soon(_last_frequencies)
 
 @lru_cache(maxsize=64)
 def _squares(system: CharacteristicFunction) -> tuple[FloatArray, float]:
-    """Return |A|^2, |B1|^2, |B2|^2, |C|^2 at s = j omega, and their unit of frequency.
-
-    They are polynomials in (omega / unit)^2. In this unit, a power of two in rad/s, the lowest
-    and the highest coefficient of A are of the same size.
-    """
+    """Return the `squared_magnitudes` of A, B1, B2 and C."""
     return squared_magnitudes((system.a, system.b1, system.b2, system.c))
 
 
@@ -195,7 +193,7 @@ def last_frequency(
     float array, of the broadcast shape
         In rad/s, a bound: past it |A| > |C| + |x B1| + |y B2|, also for all smaller |x| and
         |y|. inf where the neutral root chain is not confined to the left half-plane, and nan
-        where numbers overflow.
+        where numbers overflow. Of a map pi / step, where its axis ends.
     """
     name1, name2 = checked_system(system).parameters
     xs, ys = broadcast_pair(name1, x, name2, y)
@@ -211,9 +209,12 @@ def last_frequency(
 def last_larger(
     first: FloatArray, others: tuple[FloatArray, ...], factors: FloatArray
 ) -> float:
-    """Frequency past which a polynomial is larger than the sum of others; inf if it is not."""
-    degree = max(p.size for p in others)
-    lead = abs(float(first[-1])) if first.size >= degree else 0.0
+    """Frequency past which |first| exceeds the sum of factors times |others|, or inf.
+
+    In rad/s, of polynomials at s = j omega.
+    """
+    size = max(p.size for p in others)
+    lead = abs(float(first[-1])) if first.size >= size else 0.0
     if lead == 0.0:
         return np.inf
     tops = [abs(float(p[-1])) if p.size == first.size else 0.0 for p in others]

@@ -7,8 +7,10 @@ over a step, a function stays within M step^2 / 2 of its tangent. So
   exact up to rounding;
 - `imaginary_zeros` never steps over two zeros at once, so that none is missed.
 
-Where a value is no larger than the bound on its rounding error, the walks say so: that makes a
-point a boundary point. The tolerance in the bound is `armlock.exponentials.ROUNDING`.
+Where rounding hides more, they say so. Where the sum is no larger than the bound on its
+rounding error, `winding` stops: that makes a point a boundary point. Where only its imaginary
+part is no larger, `imaginary_zeros` gives a zero with a jump of 0. The tolerance in the bound
+is `armlock.exponentials.ROUNDING`.
 
 All functions here work on exponential sums, piece by piece, see `armlock.exponentials`.
 """
@@ -33,8 +35,8 @@ from armlock.exponentials import (
     tangent_distance,
 )
 
-# ROUNDING for the crossings of a chart's row: wider, so that what is a boundary point by
-# itself is doubtful there, and counted by itself.
+# ROUNDING along a chart's row. It is larger, so that a point that may be a boundary point is
+# doubtful there, and counted on its own.
 CAUTION = 8.0 * ROUNDING
 # Share of a certified bound that a step may use up.
 SAFETY = 0.95
@@ -43,10 +45,8 @@ SAFETY = 0.95
 _BLOCK = 32.0
 # Most steps of one walk, about ten a turn of the longest delay: some three seconds.
 MOST_STEPS = 10_000_000
-# No walk begins that turns the fastest exponential by more radians: it would not end.
+# A walk that turns the fastest exponential by more radians is not begun.
 MOST_RADIANS = 20.0 * MOST_STEPS
-# Most zeros that a walk keeps: about a gigabyte.
-MOST_ZEROS = 30_000_000
 # Most samples of a grid.
 MOST_SAMPLES = 10_000_000
 
@@ -68,7 +68,7 @@ def _follow(
     `span` is the piece's start and reach; `bound` and `error` are polynomials that bound the
     second derivative and how far the values may be off. Returns the argument, the frequency
     up to which it is certain, the last step, and the number of steps. It is not certain up to
-    `end` where that takes a step below `shortest`.
+    `end` where that takes a step below `shortest`, or where the sum is within its error.
     """
     start, reach = span
     argument, steps = 0.0, 0
@@ -153,13 +153,13 @@ def winding(
     if phases.size and phases.any():
         block = _BLOCK * 2.0 * np.pi / np.abs(phases).max()
     while omega < omega_end or value == 0j:
-        start, reach, local, sizes = piece(polynomials, weights, sums, omega)
-        end = omega_end if polynomials[0].shape[0] > 0 else min(omega + reach, omega_end)
+        start, reach, end, local, sizes = piece(polynomials, weights, sums, omega)
+        end = min(end, omega_end)
         span = start, reach
         bound = curvature_bound(start, reach, local, phases)
         error = rounding_bound(start, reach, sizes, phases, ROUNDING)
         # What the uncertainty of `sums` adds to the error: the magnitudes in row 0.
-        off = piece(polynomials, weights[:0], uncertain, omega)[3]
+        off = piece(polynomials, weights[:0], uncertain, omega)[4]
         for k in range(min(off.shape[1], error.size)):
             error[k] += off[0, k]
         value = evaluate(start, reach, local, phases, omega)[0]
@@ -273,7 +273,8 @@ def _zero_between(
 def _safe_step(h: float, dh: float, curvature: float, error: float) -> float:
     """Step over which a real function has one zero at most.
 
-    Over |dh| / curvature it is monotonic; over the other length it keeps its sign.
+    Over |dh| / curvature it is monotonic. It keeps its sign up to the zero of
+    |h| + toward t - curvature t^2 / 2.
     """
     certified = abs(dh) / curvature
     if abs(h) > error:
@@ -318,7 +319,7 @@ def _place(
     sizes: FloatArray,
     fastest: float,
 ) -> None:
-    """Divide POSITION and SPREAD of zeros in one piece by the measure, `square`."""
+    """Turn value and slope of zeros in one piece into POSITION and SPREAD."""
     magnitude = np.zeros(sizes.shape[1])
     for g in range(1, sizes.shape[0]):
         for m in range(sizes.shape[1]):
@@ -376,15 +377,15 @@ def imaginary_zeros(
     `function` and `measure` are weights, sums and phases of two exponential sums, the measure
     being positive: |M|^2 for a row x = N / M, whose `function` is N conj(M). Where the
     imaginary part is odd in omega, as it is for a row of a chart, omega = 0 is one of the
-    zeros. Returns a row for each zero, and whether these are all (they are not if there are
-    more than MOST_ZEROS, or the walk would take more than MOST_STEPS steps). Its columns:
+    zeros. Of a map `omega_end` is pi / step. Returns a row for each zero, and whether these are
+    all (they are not if the walk would take more than MOST_STEPS steps). Its columns:
 
     - OMEGA, polished;
     - JUMP, twice the direction of the sign change (a conjugate pair crosses); once at
       omega = 0 and, for a map, at `omega_end` (a real root crosses); 0 where rounding hides
-      whether there is one, or the sign at `omega_start`;
+      whether there is one, or the sign at an `omega_start` above zero;
     - WIDTH, how far rounding lets the zero move: for a zero that is not simple, half the
-      stretch in which the sign is doubtful;
+      stretch in which the sign is doubtful, and all of it at `omega_start`;
     - POSITION, the real part over the measure, nan where that vanishes;
     - SPREAD, how far rounding lets the position move.
 
@@ -398,9 +399,9 @@ def imaginary_zeros(
     omega, last_clear, step = omega_start, omega_start, omega_end
     steps, sign, doubtful = 0, 0, True
     crawled, patience, caution = 0, 1000, 1.0
-    while omega < omega_end and steps <= MOST_STEPS and found <= MOST_ZEROS:
-        start, reach, local, sizes = piece(polynomials, weights, sums, omega)
-        end = omega_end if polynomials[0].shape[0] > 0 else min(omega + reach, omega_end)
+    while omega < omega_end and steps <= MOST_STEPS:
+        start, reach, end, local, sizes = piece(polynomials, weights, sums, omega)
+        end = min(end, omega_end)
         per_reach, first = 1.0 / reach, found
         near, everywhere, error = _imaginary_bounds(
             start, reach, local, sizes, phases, rounding
@@ -413,7 +414,7 @@ def imaginary_zeros(
                 sign, doubtful = (1 if slope.imag > 0.0 else -1), False
                 zeros = _with_zero(zeros, found, 0.0, sign, 0.0, value, slope)
                 found += 1
-        while omega < end and steps <= MOST_STEPS and found <= MOST_ZEROS:
+        while omega < end and steps <= MOST_STEPS:
             steps += 1
             step = min(2.0 * step, end - omega)
             bound = near if fastest * (omega + step) < 1.0 else everywhere
@@ -428,6 +429,7 @@ def imaginary_zeros(
                     certified = max(certified, unresolved, stretch, 1e-14 * omega_end)
                 step = min(step, certified)
                 # Next to rounding the terms may cancel so far that bounds allow no progress.
+                # Then a larger error hides the sign, until it is clear.
                 short = step < 1e-6 * omega and fastest * step < 1e-6
                 crawled = crawled + 1 if short and not doubtful else 0
                 if crawled > patience:
@@ -470,7 +472,7 @@ def imaginary_zeros(
             zeros = _with_zero(zeros, found, omega_end, -sign, 0.0, value, slope)
             found += 1
         if found > first and measure[0].shape[0] > 0:
-            square = piece(polynomials, measure[0], measure[1], start)[2]
+            square = piece(polynomials, measure[0], measure[1], start)[3]
             _place(zeros[first:found], start, reach, square, measure[2], sizes, fastest)
     return zeros[:found], omega >= omega_end
 
@@ -481,17 +483,17 @@ def resolved_grid(
 ) -> FloatArray:
     """Frequencies from 0 to `omega_end` between which an exponential sum is nearly straight.
 
-    Over each step it moves by no more than twice `tolerance` times its distance from zero, and
-    stays as close to its tangent, or the step is as small as rounding allows. The grid ends
-    before `omega_end` if it would take more than MOST_SAMPLES.
+    Over each step its tangent moves by no more than twice `tolerance` times its distance from
+    zero, and the sum leaves the tangent by no more than once that, or the step is as small as
+    rounding allows. The grid ends before `omega_end` if it would take more than MOST_SAMPLES.
     """
     weights, sums, phases = function
     grid = np.empty(1024)
     found, omega, step = 1, 0.0, omega_end
     grid[0] = omega
     while omega < omega_end and found < MOST_SAMPLES:
-        start, reach, local, _ = piece(polynomials, weights, sums, omega)
-        end = omega_end if polynomials[0].shape[0] > 0 else min(omega + reach, omega_end)
+        start, reach, end, local, _ = piece(polynomials, weights, sums, omega)
+        end = min(end, omega_end)
         bound = curvature_bound(start, reach, local, phases)
         while omega < end and found < MOST_SAMPLES:
             value, slope = evaluate(start, reach, local, phases, omega)

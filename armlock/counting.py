@@ -29,9 +29,10 @@ from armlock.contour import (
 from armlock.exponentials import EPSILON, evaluate, piece
 
 # What `count_point` returns where it is no number of roots. The first two mean what
-# `armlock.stability.unstable_roots` says: BOUNDARY where `winding` finds the sum no larger than
-# its rounding error, UNCONFINED where `armlock.bounds.last_frequency` is infinite, because the
-# neutral root chain is not confined. The others become errors there.
+# `armlock.stability.unstable_roots` says: BOUNDARY where `winding` meets a value within its
+# rounding error, or can certify no step; UNCONFINED where `armlock.bounds.last_frequency` is
+# infinite, because the neutral root chain is not confined. DOUBTFUL and TOO_LONG become errors
+# there. UNTRIED stands for points after one that took too long.
 BOUNDARY = -1
 UNCONFINED = -2
 DOUBTFUL = -3
@@ -47,9 +48,9 @@ class PointModel(NamedTuple):
     polynomials : tuple
         Those of its exponential sums, from `armlock.exponentials.ExponentialSum.compiled`.
     weights : float array, shape (3, groups, k)
-        Of the three terms of D, over all their exponentials.
+        Of the three terms of `CharacteristicFunction.parts`, over all their exponentials.
     sums : float array, shape (3, k)
-        Of the three, where all exponentials are one, at the reference.
+        Of R, B1 and B2: D at the reference, and what x and y take off, without the delays.
     reference : float array, shape (2,)
         The parameters (x0, y0).
     phases : float array, shape (groups,)
@@ -74,6 +75,8 @@ class PointModel(NamedTuple):
 
 class RowModel(NamedTuple):
     """The crossings x = N / M of a chart's rows, as `fill_rows` takes them.
+
+    D = N - x M, with M = B1 exp(-s (delay + delay1)), and all other terms in N.
 
     Attributes
     ----------
@@ -139,8 +142,6 @@ def count_point(model: PointModel, x: float, y: float, end: float) -> int:
     weights, sums, phases = model.weights, model.sums, model.phases
     if end == np.inf:
         return UNCONFINED
-    if np.isnan(end):
-        return DOUBTFUL
     for phase in phases:
         if end * abs(phase) > MOST_RADIANS:
             return TOO_LONG
@@ -162,7 +163,7 @@ def count_point(model: PointModel, x: float, y: float, end: float) -> int:
     else:
         # From `end` on |D / A - 1| < 1, so that D / A does not go around zero: its argument at
         # `end` is taken back. That of A is known from its roots.
-        start, reach, local, _ = piece(model.polynomials, weights[0, :0], model.a_sums, end)
+        start, reach, _, local, _ = piece(model.polynomials, weights[0, :0], model.a_sums, end)
         a = evaluate(start, reach, local, phases[:0], end)[0]
         ratio = value * a.conjugate()
         argument += remaining_argument(model.roots, end) - np.arctan2(ratio.imag, ratio.real)

@@ -22,6 +22,7 @@ from armlock.free_phases import (
     last_crossover,
     limit_disc,
     limit_margins,
+    limit_responses,
     meeting_intervals,
     no_margin,
     polynomial_sum,
@@ -37,9 +38,10 @@ _POLISHED = 8
 def axis_zeros(
     whole: ExponentialSum, intervals: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray]:
-    """Zeros of the imaginary part on intervals of the axis, and stretches that may hide some.
+    """Zeros of the imaginary part at omega > 0, and stretches there that may hide some.
 
-    In rad/s. The stretches have shape (3, n): the lower ends, the middles, the upper ends.
+    On intervals of the axis, in rad/s. The stretches have shape (3, n): the lower ends, the
+    middles, the upper ends.
     """
     omega, jump, width = sign_changes(whole, intervals)
     hidden = jump == 0
@@ -115,13 +117,9 @@ def settled_from(loop: Loop, c1: float, c2: float, phase: float) -> float:
     slack = 1e-3
     while phase_within(slack) < (1.0 - TOLERANCE) * phase and slack > 1e-12:
         slack *= 0.1
-    shares = [
-        float(b[-1] / loop.rest[-1]) if b.size == loop.rest.size else 0.0
-        for b in (loop.b1, loop.b2)
-    ]
     left = [
-        polynomial_sum(b, -share * loop.rest)
-        for b, share in zip((loop.b1, loop.b2), shares, strict=True)
+        polynomial_sum(b, -limit * loop.rest)
+        for b, limit in zip((loop.b1, loop.b2), limit_responses(loop), strict=True)
     ]
     for remainder in left:
         # The highest power cancels.

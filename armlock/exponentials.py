@@ -27,8 +27,8 @@ from armlock.compiled import njit
 EPSILON = 2.0**-52
 #: Up to this degree a polynomial is evaluated from its coefficients, beyond from its roots.
 LOW_DEGREE = 20
-# Rounding errors of one evaluation, in units of EPSILON times the sum of magnitudes. This is
-# the tolerance of a boundary point: where D is no larger, a count is -1.
+# The rounding error of a value is at most ROUNDING EPSILON times the sum of magnitudes. Where D
+# is no larger on the axis, a point is a boundary point, and its count -1.
 ROUNDING = 8.0
 # How many roots of a polynomial, each weighed by reach / (reach + distance), a piece may have
 # around it. Then LOW_DEGREE powers hold the polynomial to rounding.
@@ -343,23 +343,24 @@ def _reach(roots: ComplexArray, starts: IntArray, omega: float, most: float) -> 
 @njit(cache=True)
 def piece(
     polynomials: tuple[Any, ...], weights: FloatArray, sums: FloatArray, omega: float
-) -> tuple[float, float, ComplexArray, FloatArray]:
+) -> tuple[float, float, float, ComplexArray, FloatArray]:
     """Expand an exponential sum over the piece of the axis that starts at omega.
 
     `polynomials` is what `ExponentialSum.compiled` returns; weights, shape (groups, k), and
     sums, shape (k,), are those of the sum. Of polynomials of low degree the whole axis is one
     piece, with a start of zero and a reach of one. Returns `start` and `reach`, with
-    u = (omega - start) / reach from 0 to 1 over any other piece; the coefficients in powers of
-    u of the sum, then of each group, shape (1 + groups, n); and magnitudes for rounding, shape
-    (1 + groups, n + 1). The last column bounds the powers that are left out, over EPSILON, by
-    which `rounding_bound` multiplies it.
+    u = (omega - start) / reach from 0 to 1 over any other piece; where the piece ends; the
+    coefficients in powers of u of the sum, then of each group, shape (1 + groups, n); and
+    magnitudes for rounding, shape (1 + groups, n + 1). The last column bounds the powers that
+    are left out, over EPSILON, by which `rounding_bound` multiplies it.
     """
     whole, roots, starts, leads, pairs = polynomials
-    start, reach, expanded = 0.0, 1.0, whole.shape[0] == 0
+    start, reach, end, expanded = 0.0, 1.0, np.inf, whole.shape[0] == 0
     coefficients, magnitudes, left_out = whole, np.abs(whole), np.zeros(whole.shape[0])
     if expanded:
         crowd = 0.5 * _CROWD if pairs[:, 1].max() >= 0 else _CROWD
         start, reach = omega, _reach(roots, starts, omega, crowd)
+        end = start + reach
         found, most, beyond = _from_roots(roots, starts, leads, start, reach)
         coefficients, magnitudes, left_out = _multiplied(found, most, beyond, starts, pairs)
     number, size = coefficients.shape
@@ -375,7 +376,7 @@ def piece(
                     sizes[g, m] += abs(weight) * magnitudes[k, m]
                 sizes[g, size] += abs(weight) * left_out[k] / EPSILON
     if not expanded:
-        return start, reach, local, sizes
+        return start, reach, end, local, sizes
     # Powers that rounding hides are not worth their time.
     total = 0.0
     for g in range(1 + groups):
@@ -397,7 +398,7 @@ def piece(
                 kept[g, m], shorter[g, m] = sizes[g, m], local[g, m]
             else:
                 kept[g, used] += sizes[g, m] / EPSILON
-    return start, reach, shorter, kept
+    return start, reach, end, shorter, kept
 
 
 @njit(cache=True)
@@ -461,7 +462,7 @@ def curvature_bound(
     """Polynomial in u that bounds the second derivative of an exponential sum in a piece.
 
     Where a polynomial is differentiated twice, |exp(j omega phase) - 1| is at most
-    |phase| (start + reach u), and at most 2.
+    min(|phase| start, 2) + |phase| reach u.
     """
     groups, size = local.shape
     bound = np.zeros(size)
@@ -507,7 +508,10 @@ def curvature_from_zero(reach: float, local: ComplexArray, phases: FloatArray) -
 def rounding_bound(
     start: float, reach: float, sizes: FloatArray, phases: FloatArray, rounding: float
 ) -> FloatArray:
-    """Polynomial in u that bounds the rounding error of an exponential sum in a piece."""
+    """Polynomial in u that bounds the rounding error of an exponential sum in a piece.
+
+    A group counts with |phase| omega, which bounds |exp(j omega phase) - 1|.
+    """
     groups, size = sizes.shape
     bound = np.zeros(size + 1)
     for k in range(size):

@@ -24,9 +24,11 @@ from armlock.stability import CountError, unstable_roots
 #: Relative accuracy of modulus and disk margins, and of |L| at a crossover. A distance of L
 #: from -1 below it is as good as none.
 TOLERANCE = 1e-6
-# A search begins with so many turns of the longest delay, then looks at so many on either side
-# of a likely place, and so many times more when it has to look again.
-_FIRST_TURNS, _TURNS_AROUND, _WIDER = 1e3, 300.0, 30.0
+#: A search begins with so many turns of the longest delay.
+FIRST_TURNS = 1e3
+# Then it looks at so many on either side of a likely place, and so many times more when it has
+# to look again.
+_TURNS_AROUND, _WIDER = 300.0, 30.0
 
 
 def polynomial_sum(p: FloatArray, q: FloatArray) -> FloatArray:
@@ -34,20 +36,31 @@ def polynomial_sum(p: FloatArray, q: FloatArray) -> FloatArray:
     return np.asarray(poly.polyadd(p, q), dtype=np.float64)
 
 
+def limit_responses(loop: Loop) -> tuple[float, float]:
+    """Return the responses to both arms at high frequency, dead time left out."""
+    first, second = (
+        float(b[-1] / loop.rest[-1]) if b.size == loop.rest.size else 0.0
+        for b in (loop.b1, loop.b2)
+    )
+    return first, second
+
+
 def limit_disc(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
     """Centre and radius of the disc that L fills at high frequency, all phases being free."""
-    r = float(loop.rest[-1])
-    b1, b2 = (float(b[-1]) if b.size == loop.rest.size else 0.0 for b in (loop.b1, loop.b2))
-    radius = (abs(c1 * b1) + abs(c2 * b2)) / abs(r)
+    first, second = limit_responses(loop)
+    radius = abs(c1 * first) + abs(c2 * second)
     if loop.delay:
-        return 0.0, abs(b1 + b2) / abs(r) + radius
-    return (b1 + b2) / r, radius
+        return 0.0, abs(first + second) + radius
+    return first + second, radius
 
 
 def free_disc(
     loop: Loop, c1: float, c2: float, omega: FloatArray
 ) -> tuple[ComplexArray, FloatArray]:
-    """Centres and radii of the discs that L fills at frequencies, both arms' phases free."""
+    """Centres and radii of the discs that L fills at frequencies, both arms' phases free.
+
+    `armlock.infimum` has the same, with the phase between the arms where it is known.
+    """
     first, second = loop.arm_responses(1j * omega)
     return first + second, np.abs(c1 * first) + np.abs(c2 * second)
 
@@ -218,7 +231,7 @@ def search_outwards(
         Of an array of frequencies, those next to which the best are likely.
     """
     per_turn = 2.0 * np.pi / loop.longest_delay
-    first, around = min(end(), _FIRST_TURNS * per_turn), _TURNS_AROUND
+    first, around = min(end(), FIRST_TURNS * per_turn), _TURNS_AROUND
     look(meeting((0.0, first)))
     while (last := end()) > first:
         intervals = meeting((first, last))
@@ -270,7 +283,7 @@ def count_at(loop: Loop, c1: float, c2: float, free_above: float) -> int:
 def _count_below(loop: Loop, c1: float, c2: float, omega: float) -> int | None:
     """Count the unstable roots of a loop that no phases of the arms let cross past omega.
 
-    D(s; c1, c2) is compared with D at a thousandth of c1 and c2, whose count is known. Past
+    D(s; c1, c2) is compared with D at a thousandth of c1 and c2, which takes little time. Past
     omega their ratio stays in the right half-plane, so that its argument goes back to zero from
     what it is at omega. The counts differ by what it gathers in all, over pi. None where
     rounding hides one of the two.
@@ -300,7 +313,7 @@ def _count_below(loop: Loop, c1: float, c2: float, omega: float) -> int | None:
 
 
 def require_stable(loop: Loop, c1: float, c2: float, free_above: float = np.inf) -> None:
-    """Raise unless 1 + L has all its zeros in the open left half-plane."""
+    """Raise unless all roots of D lie in the open left half-plane, hidden modes included."""
     count = count_at(loop, c1, c2, free_above)
     if count != 0:
         raise ValueError(

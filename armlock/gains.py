@@ -51,7 +51,8 @@ def _chain_gains(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
 def _no_crossing_from(loop: Loop, c1: float, c2: float, low: float, high: float) -> float:
     """Frequency in rad/s past which no gain factor of a range takes a root across the axis.
 
-    With t = 1 / k from 1 / high to 1 / low, |t R + C| must exceed |c1 B1| + |c2 B2|. Its square
+    With t = 1 / k from 1 / high to 1 / low, and C = B1 + B2, |t R + C| must exceed
+    |c1 B1| + |c2 B2|. Its square
     is convex in t. If it ascends at the lower end of the interval, it is smallest there; if it
     descends at the upper end, there.
     """

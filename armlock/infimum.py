@@ -113,7 +113,7 @@ class _Ahead(NamedTuple):
     slope : float
         Of the radius over |F|, bounded from above.
     own, left : float
-        What F, as a factor, and the rest over |F| change by beyond first order.
+        How much is beyond first order: of F, as a factor; of G / F and of the radius over |F|.
     turned, changed : float
         How much log F and G / F change at most.
     """
@@ -129,10 +129,10 @@ class _Ahead(NamedTuple):
 def _disc(factors: tuple[Any, ...], arms: FloatArray, omega: float) -> _Disc:
     """Return the disc that L fills at s = j omega, and how it changes with omega.
 
-    L is M less c1 F1 exp(-s tau1) + c2 F2 exp(-s tau2), where F1 and F2 are the responses to
-    the two arms, dead time included, and M = F1 + F2. With the phases free it fills a disc
-    around M. Next to omega = 0 the phase between two arms of nearly the same length is known;
-    only their common one is free then.
+    L = F1 + F2 - c1 F1 exp(-s tau1) - c2 F2 exp(-s tau2), where F1 and F2 are the responses to
+    the two arms, dead time included. With the phases free it fills a disc around F1 + F2. Below
+    omega |tau2 - tau1| = 1 the phase between the two arms is taken as it is; only their common
+    one is free then.
 
     `factors` are the roots of F1 and F2, their powers in each, and the highest coefficients.
     `arms` are c1, c2, tau2 - tau1 (nan where both phases are free at all frequencies) and the
@@ -210,9 +210,10 @@ def _ahead(disc: _Disc, step: float) -> _Ahead:
 def _clear(disc: _Disc, ahead: _Ahead, step: float, point: complex, radius: float) -> bool:
     """Whether L stays outside a disc around `point` over a step, whatever the free phases.
 
-    Divided by what F changes by, L keeps its size to first order, however large it is, and the
-    other disc moves: that is what the distance of the two is made of here. Only what is beyond
-    first order counts against it. |v + v' t| is at least |v| (1 + t Re(v' / v)).
+    L and the disc around `point` are both divided by F(omega + t) / F(omega). To first order
+    only G / F then moves the disc of L, and the other disc moves with 1 / F. What is beyond
+    first order is subtracted from their distance. Besides,
+    |v + v' t| is at least |v| (1 + t Re(v' / v)).
     """
     size = abs(disc.larger)
     centre, spread = _centre_and_radius(disc)
@@ -244,7 +245,7 @@ def _nothing_smaller(disc: _Disc, omega: float, step: float, levels: FloatArray)
             return False
     if levels[PHASE] <= 0.0 and levels[DELAY] <= 0.0:
         return True
-    # Nothing has a phase if the disc stays outside the unit circle, or inside.
+    # There is no gain crossover if the disc stays outside the unit circle, or inside.
     if _clear(disc, ahead, step, 0j, 1.0):
         return True
     centre, spread = _centre_and_radius(disc)
@@ -390,10 +391,8 @@ def smallest_distances(
         if skip > block:
             omega += skip
             continue
-        start, reach, local, sizes = piece(polynomials, unit, np.zeros(3), omega)
-        end = min(omega + block, omega_end)
-        if polynomials[0].shape[0] == 0:
-            end = min(end, omega + reach)
+        start, reach, end, local, sizes = piece(polynomials, unit, np.zeros(3), omega)
+        end = min(end, omega + block, omega_end)
         n, n_sizes = _combined(local, sizes, weights, sums)
         r, r_sizes = _combined(local, sizes, nothing, only_r)
         n_bound = curvature_bound(start, reach, n, phases)

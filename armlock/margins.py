@@ -8,12 +8,10 @@ known in closed form.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import minimize_scalar
 
 from armlock import contour, infimum
 from armlock.checks import FloatArray, positive_number, real_number
@@ -129,8 +127,8 @@ def _smallest(
             if distances[m, nearest] < best[m]:
                 best[m], where[m] = distances[m, nearest], omega[nearest]
 
-    # Below it L is a single power of s, up to a part in ten million; or, if it is large there
-    # and no positive power, it is large below.
+    # No walk is needed below `lowest`. L is one power of s there, up to a part in ten million;
+    # or it is as large as that, which no margin can be near.
     radius = leading_radius(loop, c1, c2)
     lowest, higher = 1e-4 * radius, 1e-2 * radius
     size = abs(complex(loop.open_loop(1j * higher, c1, c2)))
@@ -229,31 +227,19 @@ def _free_margins(
     """
     arms = np.abs([c1, c2])
     limit = limit_margins(loop, c1, c2)
-    # Past it nothing has a phase.
+    # Past it |L| is below one.
     end = last_crossover(loop, arms)
     if not np.isfinite(end):
         end = settled_from(loop, c1, c2, float(limit[infimum.PHASE]))
     end = max(end, 2.0 * lowest)
 
     factors, free = arm_factors(loop), arm_parameters(loop, c1, c2, free=True)
-
-    def at(u: npt.ArrayLike) -> FloatArray:
-        omega = np.exp(np.atleast_1d(np.asarray(u, dtype=float)))
-        return np.asarray(infimum.free_margins_over(factors, free, omega))
-
     # The smallest distances may lie past the last crossover, where L turns most.
-    u = np.linspace(math.log(lowest), math.log(10.0 * end), 300)
-    sampled = at(u)
-    best, where = np.minimum(limit, known), np.full(limit.size, np.inf)
-    for k in range(best.size):
-        nearest = int(np.argmin(sampled[:, k]))
-        if not sampled[nearest, k] < best[k]:
-            continue
-        best[k], where[k] = sampled[nearest, k], math.exp(u[nearest])
-        sides = u[max(nearest - 1, 0)], u[min(nearest + 1, u.size - 1)]
-        lower = minimize_scalar(lambda v, k=k: at(v)[0, k], bounds=sides, method="bounded")
-        if lower.fun < best[k]:
-            best[k], where[k] = float(lower.fun), math.exp(float(lower.x))
+    omega = np.geomspace(lowest, 10.0 * end, 300)
+    sampled = infimum.free_margins_over(factors, free, omega)
+    nearest, least = omega[np.argmin(sampled, axis=0)], sampled.min(axis=0)
+    known = np.minimum(limit, known)
+    best, where = np.minimum(known, least), np.where(least < known, nearest, np.inf)
     # Past it L stays clear of where smaller values would be.
     for k, symmetric in ((infimum.MODULUS, False), (infimum.RATIO, True)):
         level = best[k] * (1.0 - TOLERANCE)
@@ -312,8 +298,8 @@ def margins(
     form at each frequency; their minima over frequency are certified to 1e-5, the disk margin
     to 1e-4. A disc that holds -1 has margins of zero. A gain interval is not
     given: the edge of such a disc may run along the real axis.
-    With equal weights m and c1 = c2 = 1 the disc is that around K m exp(-s delay) times two
-    whose edge runs through the origin: it stays clear of -1, for arms of any lengths, where
+    With equal weights m and c1 = c2 = 1 the disc has the centre 2 K m exp(-s delay), and a
+    radius of the same magnitude: it stays clear of -1, for arms of any lengths, where
     Re [K m exp(-s delay)] > -1/4.
 
     Examples

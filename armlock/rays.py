@@ -4,7 +4,8 @@ On a ray (x, y) = start + t (d1, d2) the characteristic function is D0 - t M, wi
 at the start, and M = d1 B1 exp(-s theta1) + d2 B2 exp(-s theta2), with the dead time of both. A
 root lies on the imaginary axis where t = D0 / M is real, so that the crossings of a whole ray
 are the zeros of Im(D0 conj(M)): one certified walk finds them all. The first of them is looked
-for from low frequency upwards, and only as far as a root can cross before the first one so far.
+for only as far up in frequency as a root can cross before the first one so far; of a loop, only
+where free phases let a root cross at all, likely places first.
 """
 
 from __future__ import annotations
@@ -20,15 +21,19 @@ from numpy.polynomial import polynomial as poly
 from armlock.bounds import last_frequency
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import ComplexArray, FloatArray, IntArray, axis, positive_number
-from armlock.free_phases import crossing_intervals, free_disc, search_outwards
+from armlock.free_phases import (
+    FIRST_TURNS,
+    crossing_intervals,
+    free_disc,
+    search_outwards,
+)
 from armlock.loops import Loop
 from armlock.stability import CountError, polished, sign_changes, unstable_roots
 
 #: Nothing is looked at where the parameters are this many times as large as the start, or as 1.
 FARTHEST = 1e9
-# Of a system that is no loop, the first walk goes so many turns of the longest delay up, and
-# each further one so many times as far.
-_FIRST_TURNS, _LONGER = 1e3, 4.0
+# Of a system that is no loop, each further walk goes so many times as far up.
+_LONGER = 4.0
 # Next to the limit of the neutral root chain, roots cross at ever higher frequency. They are
 # followed up to so many turns of the longest delay, which takes about a tenth of a second.
 _TURNS_NEXT_TO_THE_CHAIN = 50_000
@@ -79,7 +84,8 @@ class Ray:
             raise ValueError("direction must not have length zero, got (0, 0)")
         #: The t at which the parameters are about as far from the start as it is from zero.
         self.scale = max(1.0, float(np.hypot(*self.start))) / float(np.hypot(*self.direction))
-        self.family = system.at(*self.start).times_conjugate(system.deviation(*self.direction))
+        #: D0 conj(M) at s = j omega.
+        self.product = system.at(*self.start).times_conjugate(system.deviation(*self.direction))
 
     def at(self, t: float) -> tuple[float, float]:
         """Return the point start + t direction."""
@@ -96,8 +102,9 @@ class Ray:
         return float(last_frequency(self.system, *points.T).max())
 
     def chain_limit(self) -> float:
-        """Smallest t > 0 at which the neutral root chain is not confined, inf if there is none.
+        """Smallest t at which the neutral root chain is not confined: 0 at the start itself.
 
+        inf if there is none.
         The reserve of the chain is linear in t, except where x or y changes its sign.
         """
 
@@ -168,7 +175,7 @@ class Ray:
         if not self.acts():
             return Crossings(np.empty(0), np.empty(0), np.empty(0, dtype=np.int64)), False
         omega, change, width = sign_changes(
-            self.family, intervals, is_map=self.system.step > 0.0
+            self.product, intervals, is_map=self.system.step > 0.0
         )
         # Stretches in which rounding hides the sign, on the way or from omega = 0 on.
         hidden = bool(((change == 0) | (omega == 0.0) & (width > 0.0)).any())
@@ -231,7 +238,7 @@ class Ray:
             walked = 0.0
             while (last := end()) > walked:
                 # The boundary of a map ends at one frequency: a single walk sees all of it.
-                far = np.inf if self.system.step else max(_LONGER * walked, _FIRST_TURNS * turn)
+                far = np.inf if self.system.step else max(_LONGER * walked, FIRST_TURNS * turn)
                 look(np.array([[walked, min(last, far)]]))
                 walked = min(last, far)
         if hidden:
@@ -296,7 +303,7 @@ def first_crossing(
 
     Notes
     -----
-    Walks go up in frequency, as far as a root can cross before the first one so far. Below the
+    Walks go as far up in frequency as a root can cross before the first one so far. Below the
     limit of the neutral root chain, roots cross at ever higher frequency. Where the first of
     them crosses closer to the limit than a part in a million, and at more than 50 000 turns of
     the longest delay, the limit is returned in its place.

@@ -2,8 +2,9 @@
 
 Points are counted by the argument principle along s = j omega, with certified steps up to
 a frequency past which no root can cross. With D = N - x M, charts are counted row by row: with
-y fixed, roots cross the axis where Im(N / M) = 0, at x = Re(N / M); a crossing upward
-adds unstable roots. Each row is checked against an independent count at its far end.
+y fixed, roots cross the axis where Im(N / M) = 0, at x = Re(N / M). Where Im(N / M) ascends
+with omega, they become unstable towards larger x. Each row is checked against an independent
+count at its far end.
 
 The walks are those of `armlock.contour`. What makes a point a boundary point stands there, in
 `winding`: D is no larger somewhere on the axis than its rounding error, or no step of the walk
@@ -139,8 +140,7 @@ def sign_changes(
         if not complete:
             raise CountError(
                 f"no crossings up to omega = {end} rad/s: more than {contour.MOST_STEPS:.0e} "
-                f"steps or {contour.MOST_ZEROS:.0e} crossings, because gain times delay is too "
-                f"large",
+                f"steps, because gain times delay is too large",
                 _NO_POINTS,
             )
         parts.append(zeros)
@@ -176,6 +176,9 @@ def polished(
 def _count(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -> IntArray:
     """Count at flat arrays of points; raise where rounding spoils it."""
     ends = last_frequency(system, x, y)
+    if np.isnan(ends).any():
+        points = np.column_stack((x, y))[np.isnan(ends)]
+        raise CountError(f"no count at {tuple(points[0].tolist())}: a number overflows", points)
     counts: IntArray = counting.count_points(_point_model(system), x, y, ends)
     bad = (counts == counting.DOUBTFUL) | (counts == counting.TOO_LONG)
     if bad.any():
@@ -213,21 +216,20 @@ def unstable_roots(
     int array, of the broadcast shape
         Number of unstable roots, multiplicity included. The point is stable, with all roots
         in the open left half-plane, where it is 0. `BOUNDARY` (-1) where a root lies on the
-        imaginary axis, or nearer to it than rounding can tell. That of the phase omega tau is
-        the largest: a point within some 8 EPSILON omega tau of the boundary, relative to its
-        parameters, may be given as -1 (3e-10 where a root crosses at 1e4 rad/s, with 20 s).
-        `UNCONFINED` (-2) where the
-        neutral root chain is not confined to the left half-plane
-        (`CharacteristicFunction.chain_reserve` is not positive): at the latest after an
-        arbitrarily small change of the delays it reaches the right half-plane, and no finite
-        count would tell.
+        imaginary axis, or nearer to it than rounding can tell. The rounding of the phase
+        omega tau is the largest: a point within some 8 EPSILON omega tau of the boundary,
+        relative to its parameters, may be given as -1 (4e-10 where a root crosses at 1e4 rad/s,
+        with 20 s). `UNCONFINED` (-2) where the neutral root chain is not confined to the left
+        half-plane (`CharacteristicFunction.chain_reserve` is not positive): an arbitrarily
+        small change of the delays can then make infinitely many roots unstable.
 
     Raises
     ------
     TypeError, ValueError
         If x or y is not finite and real, or the two do not broadcast.
     CountError
-        If rounding spoils the count. Nothing is guessed.
+        If rounding spoils the count, it takes too many steps, or a number overflows. Nothing is
+        guessed.
 
     Notes
     -----
@@ -340,7 +342,8 @@ def stability_chart(
     Raises
     ------
     TypeError, ValueError
-        If an axis is empty, not one-dimensional, or not finite and real.
+        If an axis is empty, not one-dimensional, or not finite and real, or the chart does not
+        fit into the memory.
     CountError
         As `unstable_roots` does.
 
@@ -350,12 +353,14 @@ def stability_chart(
 
     .. math::
 
-        x = q , \qquad \mathrm{Im}\, q = 0 , \qquad
-        q = \frac{A - y\, B_2\, e^{-s\theta_2}}{B_1\, e^{-s\theta_1}} .
+        x = \frac{N}{M} , \qquad \mathrm{Im}\, \frac{N}{M} = 0 , \qquad
+        N = A + C\, e^{-s\delta} - y\, B_2\, e^{-s(\delta + \theta_2)} , \quad
+        M = B_1\, e^{-s(\delta + \theta_1)} .
 
-    Past it, towards larger x, a conjugate pair has become unstable if Im q ascends with omega
-    there, and stable if it descends; at omega = 0 one root. The counts at the two
-    ends of all rows come from two columns, those of the columns from four single counts.
+    Past it, towards larger x, a conjugate pair has become unstable if Im(N / M) ascends with
+    omega there, and stable if it descends; at omega = 0 one root. Of a retarded system the
+    counts at the two ends of all rows come from two columns, and those of the columns from four
+    single counts; of a neutral one each end is counted.
 
     Examples
     --------
@@ -400,7 +405,7 @@ def _chart_rows(system: CharacteristicFunction, x: FloatArray, y: FloatArray) ->
     elif system.b2.any():
         sides = np.array([left, right])
         at_low, at_high = (_count(system, sides, np.full(2, level)) for level in (low, high))
-        columns, unsure, reached = _walk(
+        columns, unsure, reached = _fill(
             system.exchanged(), y, sides, at_low, np.full(2, low), np.full(2, high)
         )
         unsure[(reached != at_high) | (reached < 0)] = True
@@ -411,7 +416,7 @@ def _chart_rows(system: CharacteristicFunction, x: FloatArray, y: FloatArray) ->
     else:
         corners = _count(system, np.array([left, right]), np.full(2, low))
         base, top = np.repeat(corners[:, None], y.size, axis=1)
-    counts, singly, reached = _walk(system, x, y, base, lower, upper)
+    counts, singly, reached = _fill(system, x, y, base, lower, upper)
     # Next to a crossing, and in rows whose crossings do not add up to the count at their end.
     singly[(reached < 0) | (reached != top)] = True
     singly &= confined
@@ -428,7 +433,7 @@ def _ends(values: FloatArray, outside: float) -> tuple[float, float]:
     return float(values[0]) - margin, float(values[-1]) + margin
 
 
-def _walk(
+def _fill(
     system: CharacteristicFunction,
     x: FloatArray,
     y: FloatArray,

@@ -134,14 +134,14 @@ def random_sum(degree, rng):
 @pytest.mark.parametrize("omega", [0.0, 0.03, 2.0, 3e4])
 def test_a_piece_holds_a_sum_and_bounds_what_it_leaves_out(degree, omega):
     whole, exact = random_sum(degree, np.random.default_rng(degree))
-    start, reach, local, sizes = exponentials.piece(
+    start, reach, end, local, sizes = exponentials.piece(
         whole.compiled(), whole.weights, whole.sums, omega
     )
     rounding = exponentials.rounding_bound(start, reach, sizes, whole.phases, 8.0)
     bends = [exponentials.curvature_bound(start, reach, local, whole.phases)]
     if omega == 0.0:
         bends.append(exponentials.curvature_from_zero(reach, local, whole.phases))
-    length = reach if degree > exponentials.LOW_DEGREE else 0.5
+    length = min(end - omega, 0.5)
     with mpmath.workdps(40):
         # A piece is divided by a power of two.
         at = omega + length
