@@ -11,7 +11,6 @@ from armlock import (
     flight_loop,
     nyquist,
     published_loops,
-    stability_chart,
     unstable_roots,
 )
 from armlock.sensors import COMMON, modified_dual
@@ -41,12 +40,6 @@ def test_with_the_other_sign_of_the_difference_arm_it_is_unstable():
     assert unstable_roots(Loop(flight_loop().controller, turned, 33.855, 33.345), 1, 1) == 38
     # With arm 2 the longer one the sign is right again: the arms have changed places.
     assert unstable_roots(flight_loop(half_difference=-0.255), 1, 1) == 0
-
-
-def test_a_chart_agrees_with_single_counts():
-    axis = np.linspace(0.97, 1.03, 7)
-    chart = stability_chart(flight_loop(), axis, axis)
-    assert (chart.counts == unstable_roots(flight_loop(), *np.meshgrid(axis, axis))).all()
 
 
 def test_parallel_branches_are_their_sum():
