@@ -16,6 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.optimize.elementwise import find_root
 
 TOL = 1e-6
 MOST_CELLS = 40_000
@@ -137,20 +138,21 @@ class View:
             return w1 * self.miss[0] + w2 * self.miss[1]
         return w1 * (self.c2 - self.c1)
 
-    def at(self, omega):
-        """L at real frequencies."""
-        omega = np.asarray(omega, float)
-        jw, s, total = 1j * omega[:, None], self.sketch, 0j
-        late2 = np.exp(-1j * omega * s.tau2)
-        turned = [-np.expm1(-1j * omega * t) for t in self.tau]
-        apart = late2 * -np.expm1(-1j * omega * (s.tau1 - s.tau2))
+    def parts(self, omega):
+        """Of each term of L its W exp(-s delay), and the arms' share a1 (...) + a2 (...)."""
+        s, jw = self.sketch, 1j * omega[:, None]
+        back1, back2 = (-np.expm1(-1j * omega * t) for t in self.tau)
+        apart = np.exp(-1j * omega * s.tau2) * -np.expm1(-1j * omega * (s.tau1 - s.tau2))
         for z, p, gain, (w1, w2) in self.terms:
             a1, a2 = w1 * self.c[0], w2 * self.c[1]
-            arms = self.start(w1, w2) + (a1 + a2) * turned[0] - a2 * apart
-            if w1 != -w2:
-                arms = self.start(w1, w2) + a1 * turned[0] + a2 * turned[1]
-            total = total + gain * quotient(jw - z, jw - p) * arms
-        return total * np.exp(-1j * omega * s.delay)
+            # (1 - c1 e1) - (1 - c2 e2) keeps its digits where the two are close.
+            arms = (a1 + a2) * back1 - a2 * apart if w1 == -w2 else a1 * back1 + a2 * back2
+            dead = np.exp(-1j * omega * s.delay)
+            yield gain * quotient(jw - z, jw - p) * dead, self.start(w1, w2) + arms
+
+    def at(self, omega):
+        """L at real frequencies."""
+        return sum(value * arms for value, arms in self.parts(omega))
 
     def enclose(self, m, h):
         """L0, L1, R; and a disc with both arms' phases free: centre and radius."""
@@ -159,15 +161,12 @@ class View:
         value = slope = 0j
         rest = np.zeros(m.size)
         late = [np.exp(-1j * m * t) for t in self.tau]
-        turned = [-np.expm1(-1j * m * t) for t in self.tau]
-        apart = late[1] * -np.expm1(-1j * m * (s.tau1 - s.tau2))
         arms = [np.zeros(m.size, complex), np.zeros(m.size, complex)]
         free_rest = np.zeros(m.size)
         hh = h[:, None]
         with np.errstate(all="ignore"):
-            for z, p, gain, (w1, w2) in self.terms:
+            for (z, p, gain, (w1, w2)), (v, p0) in zip(self.terms, self.parts(m), strict=True):
                 dz, dp = jm - z, jm - p
-                v = gain * quotient(dz, dp) * np.exp(-1j * m * s.delay)
                 log_slope = (1j / dz).sum(1) - (1j / dp).sum(1) - 1j * s.delay
                 az, ap = np.abs(dz), np.abs(dp)
                 near = (1.0 / np.maximum(az - hh, 0.0) ** 2).sum(1)
@@ -177,14 +176,10 @@ class View:
                 e = bend + 0.5 * x * x * np.exp(np.minimum(x, 700.0))
                 a1, a2 = w1 * self.c[0], w2 * self.c[1]
                 start = self.start(w1, w2)
+                curve = abs(a1) * s.tau1**2 + abs(a2) * s.tau2**2
                 if w1 == -w2:
-                    # (1 - c1 e1) - (1 - c2 e2), without losing digits where the two are close.
-                    p0 = start + (a1 + a2) * turned[0] - a2 * apart
                     far = np.minimum(2.0, b * abs(s.tau1 - s.tau2))
                     curve = abs(a1 * s.tau1**2 + a2 * s.tau2**2) + abs(a2) * s.tau2**2 * far
-                else:
-                    p0 = start + a1 * turned[0] + a2 * turned[1]
-                    curve = abs(a1) * s.tau1**2 + abs(a2) * s.tau2**2
                 p1 = 1j * (a1 * s.tau1 * late[0] + a2 * s.tau2 * late[1])
                 rp = 0.5 * h * h * curve
                 ap0, ap1, al, av = np.abs(p0), np.abs(p1), np.abs(log_slope), np.abs(v)
@@ -386,31 +381,18 @@ def to_arc(value, turn):
 
 
 def zeros_of(view, a, b, excess):
-    """Zeros of `excess(L)` in cells at whose ends its sign differs, by the Illinois rule."""
-    fa, fb = excess(view.at(a)), excess(view.at(b))
-    a, b = a.copy(), b.copy()
-    for _ in range(14):
-        with np.errstate(all="ignore"):
-            m = np.clip(np.where(fa != fb, (a * fb - b * fa) / (fb - fa), a), a, b)
-        m = np.where(np.isnan(m), 0.5 * (a + b), m)
-        fm = excess(view.at(m))
-        same = (fm > 0.0) == (fa > 0.0)
-        a, fa, fb = (
-            np.where(same, m, a),
-            np.where(same, fm, 0.5 * fa),
-            np.where(same, 0.5 * fb, fm),
-        )
-        b = np.where(same, b, m)
-        if (np.abs(fm) < 1e-13).all():
-            break
-    return m
+    """Zeros of `excess(L)` in cells at whose ends its sign differs."""
+    near = {"fatol": 1e-11}
+    return find_root(lambda omega: excess(view.at(omega)), (a, b), tolerances=near).x
 
 
 def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
     """All margins; of a loop that is not stable the modulus and the disk only.
 
-    Above `free_above`, in rad/s, both arms' phases are free: L fills a disc.
+    Above `free_above`, in rad/s, both arms' phases are free: L fills a disc. Gains are not
+    looked at then.
     """
+    asked = 2 if not stable else 4 if np.isfinite(free_above) else len(NAMES)
     view = View(sketch, c1, c2)
     best = Verdict()
     centre, radius = view.limit()
@@ -455,8 +437,6 @@ def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
         else:
             far = np.maximum(np.abs(value - slope * h - at), np.abs(value + slope * h - at))
             keep[1] = far >= size - rest
-        if not stable:
-            return keep
         spread = np.abs(slope) * h + rest
         turn = np.where(best.phase < np.pi, best.phase * (1.0 - TOL), np.pi) * np.ones(
             value.size
@@ -472,6 +452,7 @@ def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
         bottom = max(best.gain_lower * (1.0 + TOL), 0.99 / GAINS)
         keep[4] = real & (largest > -1.0) & (smallest < -1.0 / top) & (top > 1.0)
         keep[5] = real & (smallest < -1.0) & (largest > -1.0 / bottom) & (bottom < 1.0)
+        keep[asked:] = False
         return keep
 
     def improve(omega):
@@ -592,12 +573,3 @@ def improve_free(best, omega, centre, radius, stable):
     best.phase = min(best.phase, float(nearest.min(initial=np.inf)))
     first = np.where((turn > half) & (turn + half < 2.0 * np.pi), turn - half, 0.0)
     best.delay = min(best.delay, float((first / omega).min(initial=np.inf)))
-    on_axis = np.abs(centre.imag) <= radius
-    half = np.sqrt(radius[on_axis] ** 2 - centre[on_axis].imag ** 2)
-    for left, right in zip(
-        centre[on_axis].real - half, centre[on_axis].real + half, strict=True
-    ):
-        if -1.0 < left < 0.0:
-            best.gain_upper = min(best.gain_upper, float(-1.0 / left))
-        if right < -1.0:
-            best.gain_lower = max(best.gain_lower, float(-1.0 / right))

@@ -73,7 +73,7 @@ def test_convergence_of_the_dominant_eigenvalue(system, order, observed):
 
 
 @pytest.mark.parametrize("order", [0, 1])
-@pytest.mark.parametrize("system", [*SYSTEMS, CommonArm(tau1=1.5, tau2=0.5)])
+@pytest.mark.parametrize("system", [*SYSTEMS, CommonArm(10.0, 1.5, 0.5)])
 def test_counts_of_the_map_are_eigenvalues_outside_the_unit_circle(system, order):
     sampled = semi_discretization(system, 0.25, order)
     x, y = np.random.default_rng(3).uniform(-3.5, 3.5, (2, 9))

@@ -114,6 +114,13 @@ class TestCommonArm:
             assert unstable_roots(system, c1 - distance, c2) == 0
             assert unstable_roots(system, c1 + distance, c2) == 1
 
+    def test_next_to_the_boundary_there_is_a_count_far_from_the_ideal_point(self):
+        for x in (3.0, 1e2, 1e4):
+            y = 2.0 + 1e-10 * np.array([-1.0, 1.0]) * x - x
+            counts = unstable_roots(CommonArm(), x, y)
+            np.testing.assert_array_equal(counts % 2, x + y > 2.0)
+            assert (counts >= 0).all()
+
     def test_within_rounding_of_the_boundary_nothing_is_guessed(self):
         # The sign of c1 + c2 - 2 is exact here: c2 = 1 + k eps, and c1 = 1.
         k = np.arange(-400, 401)
