@@ -2,18 +2,15 @@
 
 import os
 import re
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from armlock import LaserNoise, paper_loop, simulate, sweep
-from tests.test_sweep import draw
+from armlock import LaserNoise, paper_loop, simulate
 
 ROOT = Path(__file__).parents[1]
 #: The lines of the book's page, piece by piece.
@@ -22,27 +19,6 @@ distributed = pytest.importorskip("distributed")
 
 # Dask warns of ports that are taken and of workers that restart: neither is a failure here.
 pytestmark = pytest.mark.filterwarnings("default")
-
-
-def draw_or_die(task):
-    """Kill the process that computes one of the tasks, the first time."""
-    seed, place = task
-    if seed == 3 and not Path(place).exists():
-        Path(place).touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-    time.sleep(0.05)
-    return draw(seed)
-
-
-def test_a_worker_that_is_killed_costs_no_result(tmp_path):
-    place = tmp_path / "killed"
-    tasks = [(seed, str(place)) for seed in range(12)]
-    with distributed.Client(
-        n_workers=2, threads_per_worker=1, dashboard_address=None
-    ) as client:
-        found = sweep(draw_or_die, tasks, executor=client.get_executor())
-    assert place.exists()
-    assert np.array_equal(found, [draw(seed) for seed in range(12)])
 
 
 def test_the_lines_of_the_page_run(tmp_path):

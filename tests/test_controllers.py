@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from armlock import Controller, Loop, unstable_roots
-from armlock.controllers import integrating_actuator, stage_one, stage_two, table_two
+from armlock.controllers import stage_one, stage_two, table_two
 from armlock.paper import TABLE_2_POLES, TABLE_2_STAGE_1_POLE, TABLE_2_ZEROS
 from armlock.sensors import COMMON
 
@@ -41,13 +41,6 @@ def test_three_forms_give_one_loop(zeros, poles, gain):
         np.testing.assert_array_equal(
             unstable_roots(loop, x, y), unstable_roots(loops[0], x, y)
         )
-
-
-def test_series_connection_multiplies():
-    first, second = Controller([-2.0], [-1.0], 3.0), integrating_actuator(0.5)
-    np.testing.assert_allclose((first * second)(S), first(S) * second(S), rtol=1e-14)
-    with pytest.raises(TypeError):
-        first * 2.0  # type: ignore[operator]
 
 
 def test_table_two_is_the_product_of_its_factors():
