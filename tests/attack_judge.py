@@ -207,13 +207,13 @@ class View:
         return value, slope, rest, arms[0] + arms[1], radius
 
     def limit(self):
-        """Centre and radius of the disc of L at infinity; turning if there is a dead time."""
-        centre, radius = 0.0, 0.0
+        """Centre and radius of the disc of L at infinity, which a dead time turns around 0."""
         z, p, gain, (w1, w2) = self.terms[0]
-        if z.size == p.size:
-            centre = gain * (w1 + w2)
-            radius = abs(gain) * (abs(w1 * self.c[0]) + abs(w2 * self.c[1]))
-        return centre, radius
+        if z.size != p.size:
+            return 0.0, 0.0
+        centre = gain * (w1 + w2)
+        radius = abs(gain) * (abs(w1 * self.c[0]) + abs(w2 * self.c[1]))
+        return (0.0, abs(centre) + radius) if self.sketch.delay else (centre, radius)
 
     def tail(self, omega):
         """Centre and radius of a disc that holds L at all frequencies past `omega`."""
@@ -227,15 +227,11 @@ class View:
                 radius += abs(gain) * np.expm1(grown) * whole
             else:
                 radius += abs(gain) * np.exp(grown + (z.size - p.size) * np.log(omega)) * whole
-        if self.sketch.delay:
-            return 0.0, abs(centre) + radius
         return centre, radius
 
     def confined(self):
         """Whether the neutral root chain stays left, dead time and delays a little changed."""
         centre, radius = self.limit()
-        if self.sketch.delay:
-            return abs(centre) + radius < 1.0
         return abs(1.0 + centre) > radius
 
     def cells(self, high, free_above=np.inf):
@@ -283,7 +279,7 @@ def count(sketch, c1, c2, sigma=0.0):
     if np.count_nonzero(poles == 0.0) > max(view.power, 0):
         return -1
     high = 10.0 * float(view.corners.max())
-    goal = 1.0 if sketch.delay else 1.0 + view.limit()[0]
+    goal = 1.0 + view.limit()[0]
     while True:
         centre, radius = view.tail(high)
         if abs(1.0 + centre) > radius:
@@ -347,17 +343,6 @@ class Verdict:
     used: int = 0
 
 
-def chain_gains(view):
-    """Gain factors at which the neutral root chain is lost."""
-    centre, radius = view.limit()
-    if view.sketch.delay:
-        return 0.0, 1.0 / (abs(centre) + radius)
-    limits = [1.0 / r for r in (radius - centre, -centre - radius) if r > 0.0]
-    return max([k for k in limits if k < 1.0], default=0.0), min(
-        [k for k in limits if k > 1.0], default=np.inf
-    )
-
-
 def apollonius(k):
     """Where |1 + L| < k |1 - L|: inside a disc (k < 1) or outside one."""
     k = min(max(k, 1e-300), 1e300)
@@ -394,28 +379,20 @@ def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
     """
     asked = 2 if not stable else 4 if np.isfinite(free_above) else len(NAMES)
     view = View(sketch, c1, c2)
-    best = Verdict()
+    # The limits, first. The ratio is a Moebius map: its least value on the disc is on the real
+    # axis or where a circle of constant ratio touches, which by symmetry is there, too.
     centre, radius = view.limit()
-    # The limits, first.
-    if sketch.neutral:
-        if sketch.delay:
-            near = -(abs(centre) + radius)
-            best.modulus, best.disk = 1.0 + near, abs(float(ratio(near)))
-            reach = abs(centre) + radius
-        else:
-            best.modulus = abs(1.0 + centre) - radius
-            # The ratio is a Moebius map: its least value on the disc is on the real axis or
-            # where a circle of constant ratio touches, which by symmetry is there, too.
-            best.disk = float(ratio(np.array([centre - radius, centre + radius])).min())
-            reach = abs(centre) + radius
-        best.gain_lower, best.gain_upper = chain_gains(view)
-        if reach >= 1.0:
-            best.delay = 0.0
-            if not sketch.delay and centre > 0.0 and abs(centre) - radius <= 1.0:
-                cosine = (radius**2 - 1.0 - centre**2) / (2.0 * centre)
-                best.phase = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
-    else:
-        best.modulus = best.disk = 1.0
+    ends = np.array([centre - radius, centre + radius])
+    best = Verdict(abs(1.0 + centre) - radius, float(ratio(ends).min()))
+    # Gain factors at which the neutral root chain is lost.
+    lost = [1.0 / r for r in (radius - centre, -centre - radius) if r > 0.0]
+    best.gain_lower = max([k for k in lost if k < 1.0], default=0.0)
+    best.gain_upper = min([k for k in lost if k > 1.0], default=np.inf)
+    if abs(centre) + radius >= 1.0:
+        best.delay = 0.0
+        if centre > 0.0 and centre - radius <= 1.0:
+            cosine = (radius**2 - 1.0 - centre**2) / (2.0 * centre)
+            best.phase = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
     first = view.at(np.array([view.low]))
     best.modulus = min(best.modulus, float(np.abs(1.0 + first[0])))
     best.disk = min(best.disk, float(ratio(first)[0]))
