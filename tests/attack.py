@@ -210,7 +210,10 @@ def _too_late(*_):
 
 @dataclass
 class Tally:
-    """Calls, refusals and findings of a run."""
+    """Calls, refusals and findings of a run.
+
+    From the command line it is patient: it ends calls that last, and prints what it finds.
+    """
 
     calls: Counter = field(default_factory=Counter)
     refused: list = field(default_factory=list)
@@ -242,10 +245,16 @@ class Tally:
             self.note(name, arguments[1:], refusal or "an answer", f"not after {spent:.1f} s")
         if refusal:
             self.refused.append((name, self.where, arguments[1:], refusal, spent))
+            self.say(f"REFUSED {name} at {arguments[1:]}: {refusal:.160} ({spent:.1f} s)")
         return answer
 
     def note(self, name, arguments, got, expected):
         self.wrong.append((name, self.where, arguments, got, expected))
+        self.say(f"WRONG {name} at {arguments}: got {got}, expected {expected}")
+
+    def say(self, line):
+        if self.patient:
+            print(f"{line}\n   of loop {self.where}", flush=True)
 
     def near(self, name, arguments, got, expected, unsure=False, upward=False):
         """Compare a number with the judge's, or with its bound on one side."""
@@ -516,7 +525,7 @@ CHECKS = {
 }
 
 
-def attack(seed, loops, kinds=tuple(CHECKS), tally=None, progress=False):
+def attack(seed, loops, kinds=tuple(CHECKS), tally=None):
     """Check the loops of these indices; return the tally."""
     tally = tally or Tally()
     for index in loops:
@@ -530,7 +539,6 @@ def attack(seed, loops, kinds=tuple(CHECKS), tally=None, progress=False):
             continue
         tally.where = (index, sketch)
         tally.calls["loops"] += 1
-        before = len(tally.wrong), len(tally.refused)
         for number, (kind, (check, share)) in enumerate(CHECKS.items()):
             own = np.random.default_rng([seed, index, number])
             if kind in kinds and own.random() < share:
@@ -538,24 +546,12 @@ def attack(seed, loops, kinds=tuple(CHECKS), tally=None, progress=False):
                     check(tally, own, sketch, loop, point)
                 except UndecidedError:
                     tally.skipped[f"{kind}: judge undecided"] += 1
-        if progress:
-            report(tally, *before)
-            if index % 100 == 99:
-                print(
-                    f"... {index + 1}: {len(tally.wrong)} wrong, {len(tally.refused)} refused",
-                    flush=True,
-                )
+        if tally.patient and index % 100 == 99:
+            print(
+                f"... {index + 1}: {len(tally.wrong)} wrong, {len(tally.refused)} refused",
+                flush=True,
+            )
     return tally
-
-
-def report(tally, wrong=0, refused=0):
-    """Print what is new."""
-    for name, (index, sketch), arguments, got, expected in tally.wrong[wrong:]:
-        print(f"WRONG {name}, loop {index}: {sketch}", flush=True)
-        print(f"   at {arguments}: got {got}, expected {expected}", flush=True)
-    for name, (index, sketch), arguments, error, spent in tally.refused[refused:]:
-        print(f"REFUSED {name}, loop {index}: {sketch}", flush=True)
-        print(f"   at {arguments}: {error:.160} ({spent:.1f} s)", flush=True)
 
 
 def main():
@@ -569,7 +565,7 @@ def main():
     start = time.perf_counter()
     numbers = range(given.first, given.first + given.loops)
     attack(given.seed, numbers[:10], tally=Tally(patient=False))  # compiles
-    tally = attack(given.seed, numbers, tuple(given.kinds), progress=True)
+    tally = attack(given.seed, numbers, tuple(given.kinds))
     print(f"\nin {time.perf_counter() - start:.0f} s:", dict(tally.calls))
     print("not decided by the judge:", dict(tally.skipped))
     print("largest deviations:", {k: f"{v:.1e}" for k, v in tally.worst.items()})
