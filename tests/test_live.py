@@ -154,9 +154,9 @@ def test_a_chart_is_that_of_the_package_to_a_pixel(page, spec, loop, low, high, 
 def test_break_and_margins_are_those_of_the_package(page):
     call = "spec => live.firstBreak(live.make(spec), 1, -1)"
     for difference in (PAPER["difference"], 0.1):
+        edge = critical_perturbation(paper_loop(difference=difference), (1, -1))
         found = page.evaluate(call, {**PAPER, "difference": difference})
-        expected = critical_perturbation(paper_loop(difference=difference), (1, -1))
-        assert found == pytest.approx(expected, rel=1e-7)
+        assert found == pytest.approx(edge, rel=1e-7)
     found = page.evaluate("spec => live.margins(spec, 1, 1)", PAPER)
     expected = margins(paper_loop())
     assert found["lower"] == pytest.approx(expected.gain_lower, rel=1e-6)
