@@ -561,7 +561,6 @@ def main():
     parser.add_argument("--first", type=int, default=0, help="index of the first loop")
     parser.add_argument("--kinds", nargs="*", default=list(CHECKS), choices=list(CHECKS))
     given = parser.parse_args()
-    np.seterr(all="ignore")
     start = time.perf_counter()
     numbers = range(given.first, given.first + given.loops)
     attack(given.seed, numbers[:10], tally=Tally(patient=False))  # compiles

@@ -28,6 +28,10 @@ GAINS = 1e6
 NAMES = ("modulus", "disk", "phase", "delay", "gain_upper", "gain_lower")
 
 
+#: 1/0 is inf, and 0/0 is looked at.
+quiet = np.errstate(all="ignore")
+
+
 class UndecidedError(RuntimeError):
     """The cells did not suffice."""
 
@@ -150,10 +154,12 @@ class View:
             dead = np.exp(-1j * omega * s.delay)
             yield gain * quotient(jw - z, jw - p) * dead, self.start(w1, w2) + arms
 
+    @quiet
     def at(self, omega):
         """L at real frequencies."""
         return sum(value * arms for value, arms in self.parts(omega))
 
+    @quiet
     def enclose(self, m, h):
         """L0, L1, R; and a disc with both arms' phases free: centre and radius."""
         s = self.sketch
@@ -164,44 +170,41 @@ class View:
         arms = [np.zeros(m.size, complex), np.zeros(m.size, complex)]
         free_rest = np.zeros(m.size)
         hh = h[:, None]
-        with np.errstate(all="ignore"):
-            for (z, p, gain, (w1, w2)), (v, p0) in zip(self.terms, self.parts(m), strict=True):
-                dz, dp = jm - z, jm - p
-                log_slope = (1j / dz).sum(1) - (1j / dp).sum(1) - 1j * s.delay
-                az, ap = np.abs(dz), np.abs(dp)
-                near = (1.0 / np.maximum(az - hh, 0.0) ** 2).sum(1)
-                near = near + (1.0 / np.maximum(ap - hh, 0.0) ** 2).sum(1)
-                bend = np.where(h > 0.0, 0.5 * h * h * near, 0.0)
-                x = np.abs(log_slope) * h + bend
-                e = bend + 0.5 * x * x * np.exp(np.minimum(x, 700.0))
-                a1, a2 = w1 * self.c[0], w2 * self.c[1]
-                start = self.start(w1, w2)
-                curve = abs(a1) * s.tau1**2 + abs(a2) * s.tau2**2
-                if w1 == -w2:
-                    far = np.minimum(2.0, b * abs(s.tau1 - s.tau2))
-                    curve = abs(a1 * s.tau1**2 + a2 * s.tau2**2) + abs(a2) * s.tau2**2 * far
-                p1 = 1j * (a1 * s.tau1 * late[0] + a2 * s.tau2 * late[1])
-                rp = 0.5 * h * h * curve
-                ap0, ap1, al, av = np.abs(p0), np.abs(p1), np.abs(log_slope), np.abs(v)
-                value = value + v * p0
-                slope = slope + v * (p1 + log_slope * p0)
-                # Phases are rounded as their arguments are.
-                rounding = EPS * (ap0 + abs(start) + (abs(a1) + abs(a2)) * b * self.tau.max())
-                rest = rest + av * (
-                    al * ap1 * h * h + (ap0 + ap1 * h) * e + (1.0 + al * h) * rp + e * rp
-                )
-                rest = rest + np.where(h > 0.0, av * rounding, 0.0)
-                arms[0] += w1 * v
-                arms[1] += w2 * v
-                whole = abs(w1) + abs(w2) + abs(a1) + abs(a2)
-                # |W / W(m) - 1| on the cell, or how large W is at all.
-                moved = np.minimum(x * np.exp(np.minimum(x, 700.0)), np.inf)
-                largest = quotient(az + hh, ap - hh)
-                largest = np.where((ap > hh).all(1), abs(gain) * largest, np.inf)
-                free_rest += np.where(
-                    h > 0.0, np.minimum(av * moved, largest + av) * whole, 0.0
-                )
-            radius = np.abs(arms[0] * self.c[0]) + np.abs(arms[1] * self.c[1]) + free_rest
+        for (z, p, gain, (w1, w2)), (v, p0) in zip(self.terms, self.parts(m), strict=True):
+            dz, dp = jm - z, jm - p
+            log_slope = (1j / dz).sum(1) - (1j / dp).sum(1) - 1j * s.delay
+            az, ap = np.abs(dz), np.abs(dp)
+            near = (1.0 / np.maximum(az - hh, 0.0) ** 2).sum(1)
+            near = near + (1.0 / np.maximum(ap - hh, 0.0) ** 2).sum(1)
+            bend = np.where(h > 0.0, 0.5 * h * h * near, 0.0)
+            x = np.abs(log_slope) * h + bend
+            e = bend + 0.5 * x * x * np.exp(np.minimum(x, 700.0))
+            a1, a2 = w1 * self.c[0], w2 * self.c[1]
+            start = self.start(w1, w2)
+            curve = abs(a1) * s.tau1**2 + abs(a2) * s.tau2**2
+            if w1 == -w2:
+                far = np.minimum(2.0, b * abs(s.tau1 - s.tau2))
+                curve = abs(a1 * s.tau1**2 + a2 * s.tau2**2) + abs(a2) * s.tau2**2 * far
+            p1 = 1j * (a1 * s.tau1 * late[0] + a2 * s.tau2 * late[1])
+            rp = 0.5 * h * h * curve
+            ap0, ap1, al, av = np.abs(p0), np.abs(p1), np.abs(log_slope), np.abs(v)
+            value = value + v * p0
+            slope = slope + v * (p1 + log_slope * p0)
+            # Phases are rounded as their arguments are.
+            rounding = EPS * (ap0 + abs(start) + (abs(a1) + abs(a2)) * b * self.tau.max())
+            rest = rest + av * (
+                al * ap1 * h * h + (ap0 + ap1 * h) * e + (1.0 + al * h) * rp + e * rp
+            )
+            rest = rest + np.where(h > 0.0, av * rounding, 0.0)
+            arms[0] += w1 * v
+            arms[1] += w2 * v
+            whole = abs(w1) + abs(w2) + abs(a1) + abs(a2)
+            # |W / W(m) - 1| on the cell, or how large W is at all.
+            moved = np.minimum(x * np.exp(np.minimum(x, 700.0)), np.inf)
+            largest = quotient(az + hh, ap - hh)
+            largest = np.where((ap > hh).all(1), abs(gain) * largest, np.inf)
+            free_rest += np.where(h > 0.0, np.minimum(av * moved, largest + av) * whole, 0.0)
+        radius = np.abs(arms[0] * self.c[0]) + np.abs(arms[1] * self.c[1]) + free_rest
         rest = np.where(np.isnan(rest), np.inf, rest)
         radius = np.where(np.isnan(radius), np.inf, radius)
         return value, slope, rest, arms[0] + arms[1], radius
@@ -259,12 +262,12 @@ def to_segment(point, value, slope, h):
     """Distance of a point to the segment value + slope t, |t| <= h; and the nearest t."""
     speed = np.abs(slope) ** 2
     away = point - value
-    with np.errstate(all="ignore"):
-        t = np.where(speed > 0.0, (away * np.conj(slope)).real / speed, 0.0)
+    t = np.where(speed > 0.0, (away * np.conj(slope)).real / speed, 0.0)
     t = np.clip(t, -h, h)
     return np.abs(away - slope * t), t
 
 
+@quiet
 def count(sketch, c1, c2, sigma=0.0):
     """Roots of D right of Re s = sigma; -1 on the line (to rounding), -2 unconfined.
 
@@ -371,6 +374,7 @@ def zeros_of(view, a, b, excess):
     return find_root(lambda omega: excess(view.at(omega)), (a, b), tolerances=near).x
 
 
+@quiet
 def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
     """All margins; of a loop that is not stable the modulus and the disk only.
 
@@ -419,8 +423,7 @@ def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
             value.size
         )
         keep[2] = to_arc(value * np.exp(1j * turn), 2.0 * turn) <= spread
-        with np.errstate(invalid="ignore"):
-            turn = np.minimum(best.delay * (1.0 - TOL) * b, 2.0 * np.pi)
+        turn = np.minimum(best.delay * (1.0 - TOL) * b, 2.0 * np.pi)
         keep[3] = (to_arc(value, turn) <= spread) & (turn > 0.0)
         real = np.abs(value.imag) <= np.abs(slope.imag) * h + rest
         half = np.abs(slope.real) * h + rest
@@ -541,8 +544,7 @@ def improve_free(best, omega, centre, radius, stable):
     best.disk = min(best.disk, float(np.maximum(gap, 0.0).min()))
     if not stable:
         return
-    with np.errstate(all="ignore"):
-        cosine = (1.0 + np.abs(centre) ** 2 - radius**2) / (2.0 * np.abs(centre))
+    cosine = (1.0 + np.abs(centre) ** 2 - radius**2) / (2.0 * np.abs(centre))
     met = cosine <= 1.0
     half = np.arccos(np.clip(cosine[met], -1.0, 1.0))
     turn, omega = lag(centre[met]), omega[met]

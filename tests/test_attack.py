@@ -12,12 +12,6 @@ def listed(tally):
     return [(*entry[:1], entry[1][0], *entry[2:]) for entry in (*tally.wrong, *tally.refused)]
 
 
-@pytest.fixture(autouse=True)
-def quiet():
-    with np.errstate(all="ignore"):
-        yield
-
-
 #: What was wrong once: a loop, a point, and what is right there where brute force takes long:
 #: 4e7 cells, a quarter of an hour.
 FIXED = {

@@ -61,8 +61,7 @@ def test_margins_over_the_box_are_those_of_branch_and_bound(way):
     """The loops depend almost on c1 - c2 alone."""
     c1, c2 = 1.0 + PERTURBATION * np.array(way)
     for make, above in ((robust_loop, np.inf), (buildable_loop, TURN * 2.0)):
-        with np.errstate(all="ignore"):
-            verdict = judge.margins(sketch_of(make()), c1, c2, free_above=above)
+        verdict = judge.margins(sketch_of(make()), c1, c2, free_above=above)
         found = margins(make(), c1, c2, None if above == np.inf else above)
         for name in judge.NAMES[:4]:
             expected = getattr(verdict, name)
