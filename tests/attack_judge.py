@@ -400,12 +400,17 @@ def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
     first = view.at(np.array([view.low]))
     best.modulus = min(best.modulus, float(np.abs(1.0 + first[0])))
     best.disk = min(best.disk, float(ratio(first)[0]))
-    if view.power == 0 and first[0].real < 0.0:
-        k = -1.0 / first[0].real
+
+    def limit_gain(value):
+        """Take in a value of L on the negative real axis."""
+        k = -1.0 / float(value.real)
         if k > 1.0:
             best.gain_upper = min(best.gain_upper, k)
         else:
             best.gain_lower = max(best.gain_lower, k)
+
+    if view.power == 0 and first[0].real < 0.0:
+        limit_gain(first[0])
 
     def kept(value, slope, rest, h, a, b):
         """For each margin, the cells on which a smaller one may lie."""
@@ -460,12 +465,8 @@ def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
         if some.size:
             omega = zeros_of(view, a[some], b[some], lambda v: v.imag / np.abs(v))
             value = view.at(omega)
-            value = value[(np.abs(value.imag) < 1e-10 * np.abs(value)) & (value.real < 0.0)]
-            for k in -1.0 / value.real:
-                if k > 1.0:
-                    best.gain_upper = min(best.gain_upper, float(k))
-                else:
-                    best.gain_lower = max(best.gain_lower, float(k))
+            for met in value[(np.abs(value.imag) < 1e-10 * np.abs(value)) & (value.real < 0.0)]:
+                limit_gain(met)
 
     def done(undecided):
         best.disk = 2.0 * min(best.disk, 1.0)
