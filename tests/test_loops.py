@@ -2,14 +2,24 @@ import numpy as np
 import pytest
 
 from armlock import (
+    CommonArm,
     DualArm,
     Loop,
+    SingleArm,
     paper_loop,
 )
 from armlock.controllers import integrating_actuator
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, SignalMapping, dual
 
 S = np.array([0.01j, 0.3 + 0.2j, -0.1 + 2j, 1.5])
+
+
+def test_single_and_common_arm_are_the_equations_of_the_paper():
+    g, tau1, tau2, c1, c2 = 0.7, 2.1, 1.9, 0.9, 1.2
+    late1, late2 = g * c1 * np.exp(-S * tau1), g * c2 * np.exp(-S * tau2)
+    np.testing.assert_allclose(SingleArm(g, tau1)(S, c1, 5.0), S + g - late1, rtol=1e-13)
+    common = S + 2.0 * g - late1 - late2
+    np.testing.assert_allclose(CommonArm(g, tau1, tau2)(S, c1, c2), common, rtol=1e-13)
 
 
 @pytest.mark.parametrize("mapping", [SINGLE, COMMON, DIFFERENCE, dual(2.0, 0.2)])
