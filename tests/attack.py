@@ -21,10 +21,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from armlock import (
-    CommonArm,
     Controller,
     CountError,
-    DualArm,
     Loop,
     RootError,
     critical_perturbation,
@@ -46,6 +44,7 @@ from tests.attack_judge import Sketch, UndecidedError, View
 EXACT = 1e-5
 #: A refusal later than this, or an answer later than twice this, is a finding, in s.
 LATEST = 5.0
+REFUSALS = CountError, RootError, ValueError, ArithmeticError, TimeoutError, SystemError
 
 
 def to_loop(sketch):
@@ -211,7 +210,10 @@ def _too_late(*_):
 
 @dataclass
 class Tally:
-    """Calls, refusals and findings of a run."""
+    """Calls, refusals and findings of a run.
+
+    From the command line it is patient: it ends calls that last, and prints what it finds.
+    """
 
     calls: Counter = field(default_factory=Counter)
     refused: list = field(default_factory=list)
@@ -222,33 +224,37 @@ class Tally:
     patient: bool = hasattr(signal, "setitimer")
 
     def ask(self, name, function, *arguments):
-        """Call armlock; None if it refuses."""
-        start = time.process_time()
+        """Call armlock; None if it refuses. A late call is made again: it may have compiled."""
         self.calls[name] += 1
-        if self.patient:
-            signal.signal(signal.SIGPROF, _too_late)
-            signal.setitimer(signal.ITIMER_PROF, 4.0 * LATEST)
-        try:
-            answer = function(*arguments)
-        except (TimeoutError, SystemError):
-            self.note(name, arguments[1:], f"none within {4.0 * LATEST:.0f} s", "within 10 s")
-            return None
-        except (CountError, RootError, ValueError, ArithmeticError) as error:
-            spent = time.process_time() - start
-            self.refused.append((name, self.where, arguments[1:], f"{error!r:.300}", spent))
-            if spent > LATEST:
-                self.note(name, arguments[1:], f"refused after {spent:.1f} s", "within 5 s")
-            return None
-        finally:
+        for _ in range(2):
+            start, answer, refusal = time.process_time(), None, ""
             if self.patient:
-                signal.setitimer(signal.ITIMER_PROF, 0.0)
-        spent = time.process_time() - start
-        if spent > 2.0 * LATEST:
-            self.note(name, arguments[1:], f"answered after {spent:.1f} s", "within 10 s")
+                signal.signal(signal.SIGPROF, _too_late)
+                signal.setitimer(signal.ITIMER_PROF, 4.0 * LATEST)
+            try:
+                answer = function(*arguments)
+            except REFUSALS as error:
+                refusal = f"{error!r:.300}"
+            finally:
+                if self.patient:
+                    signal.setitimer(signal.ITIMER_PROF, 0.0)
+            spent = time.process_time() - start
+            if spent <= (LATEST if refusal else 2.0 * LATEST):
+                break
+        else:
+            self.note(name, arguments[1:], refusal or "an answer", f"not after {spent:.1f} s")
+        if refusal:
+            self.refused.append((name, self.where, arguments[1:], refusal, spent))
+            self.say(f"REFUSED {name} at {arguments[1:]}: {refusal:.160} ({spent:.1f} s)")
         return answer
 
     def note(self, name, arguments, got, expected):
         self.wrong.append((name, self.where, arguments, got, expected))
+        self.say(f"WRONG {name} at {arguments}: got {got}, expected {expected}")
+
+    def say(self, line):
+        if self.patient:
+            print(f"{line}\n   of loop {self.where}", flush=True)
 
     def near(self, name, arguments, got, expected, unsure=False, upward=False):
         """Compare a number with the judge's, or with its bound on one side."""
@@ -291,10 +297,7 @@ def check_counts(tally, rng, sketch, loop, point):
 
 
 def check_margins(tally, rng, sketch, loop, point):
-    try:
-        number = judge.count(sketch, *point)
-    except UndecidedError:
-        return
+    number = judge.count(sketch, *point)
     if number in (-1, -2):
         return
     verdict = judge.margins(sketch, *point, stable=number == 0)
@@ -347,12 +350,9 @@ def check_margins(tally, rng, sketch, loop, point):
 def check_free(tally, rng, sketch, loop, point):
     """Margins with both arms' phases free above a frequency."""
     above = between(rng, 1e-2, 1e3) / max(sketch.tau1, sketch.tau2)
-    try:
-        if judge.count(sketch, *point) != 0:
-            return
-        verdict = judge.margins(sketch, *point, free_above=above)
-    except UndecidedError:
+    if judge.count(sketch, *point) != 0:
         return
+    verdict = judge.margins(sketch, *point, free_above=above)
     found = tally.ask("margins, free", margins, loop, *point, above)
     if verdict.modulus <= 0.0:
         # Some phases make it unstable: whatever is said then, no margin may be left.
@@ -365,117 +365,83 @@ def check_free(tally, rng, sketch, loop, point):
         tally.near(f"margins.{name}, free", (*point, above), got, expected, unsure)
 
 
-def confined_until(sketch, start, way, stop):
-    """A t before which the neutral chain stays left, nine tenths of the largest."""
-
-    def good(t):
-        return View(sketch, *(start + t * way)).confined()
-
-    if not good(0.0):
-        return 0.0
-    if good(stop):
-        return stop
-    low, high = 0.0, stop
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if good(middle) else (low, middle)
-    return 0.9 * low
-
-
 def check_rays(tally, rng, sketch, loop, point):
     start = np.array(point if rng.random() < 0.5 else draw_point(rng))
     angle = rng.uniform(0.0, 2.0 * np.pi)
     way = (
         np.array([np.cos(angle), np.sin(angle)]) if rng.random() < 0.7 else np.array([1.0, 1.0])
     )
-    stop = confined_until(sketch, start, way, between(rng, 0.01, 3.0))
-    if stop < 1e-9:
+    stop = between(rng, 0.01, 3.0)
+    # Parameters that confine the neutral chain lie within a convex set.
+    while stop > 1e-9 and not View(sketch, *(start + stop * way)).confined():
+        stop *= 0.7
+    if stop <= 1e-9 or not View(sketch, *start).confined():
         return
     found = tally.ask("crossings", Ray(loop, start, way).crossings, stop)
+    one = tally.ask("first_crossing", first_crossing, loop, start, way, stop)
     if found is None:
         return
-    try:
-        first, last = (judge.count(sketch, *(start + t * way)) for t in (0.0, stop))
-        if first >= 0 and last >= 0 and first + found.change.sum() != last:
-            tally.note("crossings", (start, way, stop), found.change.tolist(), (first, last))
-        for t in rng.permutation(found.position)[:2]:
-            near = 1e-7 * t
-            if near < 1e-10 * np.hypot(*start):
-                continue
-            counts = [judge.count(sketch, *(start + s * way)) for s in (t - near, t + near)]
-            window = np.abs(found.position - t) < near
-            if min(counts) >= 0 and counts[1] - counts[0] != found.change[window].sum():
-                tally.note("crossings", (start, way, stop, t), found.change[window], counts)
-    except UndecidedError:
-        tally.skipped["crossings: judge undecided"] += 1
-    one = tally.ask("first_crossing", first_crossing, loop, start, way, stop)
     # A boundary at the start itself, to rounding, is none beyond it.
     beyond = found.position[found.position > 1e-15 * np.abs(start).max()]
     expected = beyond[0] if beyond.size else np.inf
     if one is not None and not np.isclose(one.position, expected, rtol=1e-9):
         tally.note("first_crossing", (start, way, stop), one.position, expected)
+    first, last = (judge.count(sketch, *(start + t * way)) for t in (0.0, stop))
+    if first >= 0 and last >= 0 and first + found.change.sum() != last:
+        tally.note("crossings", (start, way, stop), found.change.tolist(), (first, last))
+    for t in rng.permutation(found.position)[:2]:
+        near = 1e-7 * t
+        if near < 1e-10 * np.hypot(*start):
+            continue
+        counts = [judge.count(sketch, *(start + s * way)) for s in (t - near, t + near)]
+        change = found.change[np.abs(found.position - t) < near]
+        if min(counts) >= 0 and counts[1] - counts[0] != change.sum():
+            tally.note("crossings", (start, way, stop, t), change, counts)
 
 
 def check_critical(tally, rng, sketch, loop, point):
-    try:
-        if judge.count(sketch, 1.0, 1.0) != 0:
+    if judge.count(sketch, 1.0, 1.0) != 0:
+        return
+    angle = rng.uniform(0.0, 2.0 * np.pi)
+    way = np.array([np.cos(angle), np.sin(angle)]) * between(rng, 1e-3, 1e3)
+    eps = tally.ask("critical_perturbation", critical_perturbation, loop, way)
+    if eps is None:
+        return
+    if np.isinf(eps):
+        if sketch.sensor != "single" or way[0] * loop.b1.any():
+            tally.note("critical_perturbation", way, eps, "finite")
+        return
+    # The parameters are numbers next to one, and rounded as these are.
+    near = max(1e-6, 1e-15 / (eps * np.abs(way).max()))
+    if near > 0.1:
+        tally.skipped["critical_perturbation: below rounding"] += 1
+        return
+    for share in (1e-3, *(rng.random(3) * (1.0 - near)), 1.0 - near, 1.0 + near):
+        counts = judge.count(sketch, *(1.0 + share * eps * way))
+        if counts != -1 and (counts == 0) != (share < 1.0):
+            tally.note("critical_perturbation", (way, share), eps, counts)
             return
-        angle = rng.uniform(0.0, 2.0 * np.pi)
-        way = np.array([np.cos(angle), np.sin(angle)]) * between(rng, 1e-3, 1e3)
-        eps = tally.ask("critical_perturbation", critical_perturbation, loop, way)
-        if eps is None:
-            return
-        if np.isinf(eps):
-            if sketch.sensor != "single" or way[0] * loop.b1.any():
-                tally.note("critical_perturbation", way, eps, "finite")
-            return
-        # The parameters are numbers next to one, and rounded as these are.
-        near = max(1e-6, 1e-15 / (eps * np.abs(way).max()))
-        if near > 0.1:
-            tally.skipped["critical_perturbation: below rounding"] += 1
-            return
-        for share in (1e-3, *(rng.random(3) * (1.0 - near)), 1.0 - near):
-            counts = judge.count(sketch, *(1.0 + share * eps * way))
-            if counts not in (0, -1):
-                tally.note("critical_perturbation", (way, share), eps, counts)
-                return
-        counts = judge.count(sketch, *(1.0 + (1.0 + near) * eps * way))
-        if counts == 0:
-            tally.note("critical_perturbation", (way, 1.0 + near), eps, counts)
-    except UndecidedError:
-        tally.skipped["critical_perturbation: judge undecided"] += 1
 
 
 def check_root(tally, rng, sketch, loop, point):
-    try:
-        number = judge.count(sketch, *point)
-        if number == -2:
-            return
-        root = tally.ask("rightmost_root", rightmost_root, loop, *point)
-        if root is None:
-            return
-        longest = max(sketch.tau1, sketch.tau2)
-        near = 1e-7 * (abs(root) + 1e-3 / longest)
-        off = number >= 0 and (root.real > 0.0) != (number > 0)
-        if off and abs(root.real) > near:
-            tally.note("rightmost_root", point, root, f"count {number}")
-            return
-        if not np.isfinite(root) or -root.real * longest > 300.0:
-            tally.skipped["rightmost_root: far left"] += 1
-            return
-        right, left = (judge.count(sketch, *point, root.real + d) for d in (near, -near))
-        if right > 0 or left == 0:
-            tally.note("rightmost_root", point, root, f"{right} right, {left} with it")
-        if len(sketch.poles) < 4 and not sketch.neutral and not sketch.delay:
-            other = independent.generator_eigenvalues(loop, *point, nodes=40)
-            best = other[np.argmin(np.abs(other - root) + np.abs(other - np.conj(root)))]
-            tally.calls["collocation"] += 1
-            if np.abs(root) * longest < 20.0 and min(
-                abs(best - root), abs(best - np.conj(root))
-            ) > 1e-2 * (abs(root) + 1.0 / longest):
-                tally.note("collocation", point, root, best)
-    except UndecidedError:
-        tally.skipped["rightmost_root: judge undecided"] += 1
+    number = judge.count(sketch, *point)
+    if number == -2:
+        return
+    root = tally.ask("rightmost_root", rightmost_root, loop, *point)
+    if root is None:
+        return
+    longest = max(sketch.tau1, sketch.tau2)
+    near = 1e-7 * (abs(root) + 1e-3 / longest)
+    off = number >= 0 and (root.real > 0.0) != (number > 0)
+    if off and abs(root.real) > near:
+        tally.note("rightmost_root", point, root, f"count {number}")
+        return
+    if not np.isfinite(root) or -root.real * longest > 300.0:
+        tally.skipped["rightmost_root: far left"] += 1
+        return
+    right, left = (judge.count(sketch, *point, root.real + d) for d in (near, -near))
+    if right > 0 or left == 0:
+        tally.note("rightmost_root", point, root, f"{right} right, {left} with it")
 
 
 def check_chart(tally, rng, sketch, loop, point):
@@ -559,118 +525,7 @@ CHECKS = {
 }
 
 
-#: What was wrong once: a loop, a point, and what is right there where brute force takes long:
-#: 4e7 cells, a quarter of an hour.
-FIXED = {
-    "a zero far above the neutral chain": (
-        Sketch((-1.01e5,), (-1e3,), 0.2, "common", 20.1, 19.9),
-        (1.0, 1.0),
-        {
-            "modulus": 0.28939025667,
-            "disk": 0.299310722618,
-            "phase": 0.298149424673,
-            "delay": 1.78674003931e-5,
-        },
-    ),
-    "a factor of 2.1": (
-        Sketch((0.2,), (-1.0, -2.0, -7.0), -10.0, "single", 20.1, 20.1),
-        (0.01, 0.0),
-        {"gain_upper": 2.1057216476},
-    ),
-    "unity gain at 14.7 kHz": (
-        Sketch((), (0j,), np.pi * 14.7e3, "common", 33.6, 33.1),
-        (0.999, 0.999),
-        {
-            "modulus": 0.044711663436,
-            "disk": 0.0447341982395,
-            "delay": 5.5152126654e-6,
-        },
-    ),
-    "small and rippled": (Sketch((), (0j,), 0.181, "common", 0.3566, 0.3565), (1e-6, 0.04), {}),
-}
-
-
-def compile_all():
-    """Call everything once, so that no call's time is that of the compiler."""
-    loop = to_loop(Sketch((-2.0,), (-1.0, -3.0), 0.3, "dual", 2.0, 1.0, 0.0, 1.0, 1.0))
-    for system in (loop, to_loop(Sketch((-2.0,), (-1.0,), 0.3, "common", 2.0, 1.0))):
-        point = 0.8, 0.9
-        for _ in range(10):  # the first ones may be plain Python
-            unstable_roots(system, *point)
-        margins(system, *point)
-        margins(system, *point, 1.0)
-        modulus_margin(system, *point)
-        Ray(system, point, (1.0, 0.5)).crossings(0.1)
-        first_crossing(system, point, (1.0, 0.5), 0.1)
-        critical_perturbation(to_loop(Sketch((), (-1.0,), 0.3, "common", 2.0, 1.0)), (1.0, 0.3))
-        rightmost_root(system, *point)
-        stability_chart(system, [0.7, 0.9], [0.6, 0.8])
-        d_curve(system, [0.5, 1.0])
-    plane = semi_discretization(CommonArm(), 0.1, 1)
-    stability_chart(plane, [0.7, 0.9], [0.6, 0.8])
-
-
-def attack_fixed(tally):
-    """Hold the loops of FIXED, and calls that were wrong once, against what is right."""
-    rng = np.random.default_rng(0)
-    for name, (sketch, point, known) in FIXED.items():
-        tally.where, loop = (name, sketch), to_loop(sketch)
-        check_margins(tally, rng, sketch, loop, point)
-        found = tally.ask("margins", margins, loop, *point)
-        for margin, expected in known.items():
-            if found is not None:
-                tally.near(f"margins.{margin}", point, getattr(found, margin), expected)
-    # A map has finitely many eigenvalues, and no neutral chain.
-    plane = semi_discretization(CommonArm(gain=10.0), 0.05, 1)
-    expected = independent.map_count(plane, 3.0, 3.0)
-    for got in (unstable_roots(plane, 3.0, 3.0), stability_chart(plane, [3.0], [3.0]).counts):
-        if int(np.ravel(got)[0]) != expected:
-            tally.note("map", (3.0, 3.0), got, expected)
-    # With equal delays D does not change along (1, -1), however far.
-    for zeros in ((), (-0.5,)):
-        sketch = Sketch(zeros, (-1.0,), 0.2, "common", 20.0, 20.0)
-        tally.where, loop, way = (
-            ("equal delays", sketch),
-            to_loop(sketch),
-            np.array([1.0, -1.0]),
-        )
-        eps = tally.ask("critical_perturbation", critical_perturbation, loop, way)
-        far = [int(unstable_roots(loop, *(1.0 + t * way))) for t in (0.5, 2.0, 100.0, 1e4)]
-        agree = all(
-            (t < eps) == (n == 0) for t, n in zip((0.5, 2.0, 100.0, 1e4), far, strict=True)
-        )
-        if not agree:
-            tally.note("critical_perturbation", way, eps, f"counts {far} at 0.5, 2, 100, 1e4")
-    # A point 1e-10 off a boundary, far from the reference, has a count.
-    tally.where = ("far from the reference", FIXED["small and rippled"][0])
-    for x in (3.0, 1e2, 1e4):
-        for off in (-1e-10, 1e-10):
-            y = 2.0 + off * x - x
-            got = int(unstable_roots(CommonArm(), x, y))
-            if got < 0 or got % 2 != int(x + y > 2.0):
-                tally.note("unstable_roots", (x, y), got, "odd" if x + y > 2.0 else "even")
-    # Dual arms at (1, 1): the root at s = 0 of the sensor's integral, twice the same.
-    for k in range(25):
-        gain, tau1, corner = (
-            between(rng, *ends) for ends in ((0.01, 100), (0.5, 40), (0.05, 20))
-        )
-        tau2 = tau1 * (1.0 - between(rng, 1e-6, 0.9))
-        arm = DualArm(gain, tau1, tau2, corner)
-        sketch = Sketch((), (0j,), gain, "dual", tau1, tau2, 0.0, corner, tau1 - tau2)
-        tally.where = (f"dual arm {k}", sketch)
-        roots = [tally.ask("rightmost_root", rightmost_root, arm, 1.0, 1.0) for _ in range(2)]
-        if None in roots:
-            continue
-        right = judge.count(
-            sketch, 1.0, 1.0, roots[0].real + 1e-7 * (abs(roots[0]) + 1e-3 / tau1)
-        )
-        if roots[0] != roots[1] or roots[0].real < -1e-9 or right > 0:
-            tally.note(
-                "rightmost_root", (1.0, 1.0), roots, f"twice the same; {right} right of it"
-            )
-
-
-def attack(seed, loops, kinds=tuple(CHECKS), tally=None, progress=False):
+def attack(seed, loops, kinds=tuple(CHECKS), tally=None):
     """Check the loops of these indices; return the tally."""
     tally = tally or Tally()
     for index in loops:
@@ -684,39 +539,19 @@ def attack(seed, loops, kinds=tuple(CHECKS), tally=None, progress=False):
             continue
         tally.where = (index, sketch)
         tally.calls["loops"] += 1
-        before = len(tally.wrong), len(tally.refused)
         for number, (kind, (check, share)) in enumerate(CHECKS.items()):
             own = np.random.default_rng([seed, index, number])
             if kind in kinds and own.random() < share:
-                check(tally, own, sketch, loop, point)
-        if progress:
-            report(tally, *before)
-            if index % 100 == 99:
-                print(
-                    f"... {index + 1}: {len(tally.wrong)} wrong, {len(tally.refused)} refused",
-                    flush=True,
-                )
+                try:
+                    check(tally, own, sketch, loop, point)
+                except UndecidedError:
+                    tally.skipped[f"{kind}: judge undecided"] += 1
+        if tally.patient and index % 100 == 99:
+            print(
+                f"... {index + 1}: {len(tally.wrong)} wrong, {len(tally.refused)} refused",
+                flush=True,
+            )
     return tally
-
-
-def short(sketch):
-    """A loop in a line; its number makes it again."""
-    kind = "neutral" if sketch.neutral else "retarded"
-    dead = f", dead time {sketch.delay:.3g}" if sketch.delay else ""
-    return (
-        f"{kind} {sketch.sensor}, {len(sketch.zeros)} zeros, {len(sketch.poles)} poles, "
-        f"gain {sketch.gain:.3g}, delays {sketch.tau1:.6g} {sketch.tau2:.6g}{dead}"
-    )
-
-
-def report(tally, wrong=0, refused=0):
-    """Print what is new."""
-    for name, (index, sketch), arguments, got, expected in tally.wrong[wrong:]:
-        print(f"WRONG {name}, loop {index} ({short(sketch)})", flush=True)
-        print(f"   at {arguments}: got {got}, expected {expected}", flush=True)
-    for name, (index, sketch), arguments, error, spent in tally.refused[refused:]:
-        print(f"REFUSED {name}, loop {index} ({short(sketch)})", flush=True)
-        print(f"   at {arguments}: {error:.160} ({spent:.1f} s)", flush=True)
 
 
 def main():
@@ -726,14 +561,10 @@ def main():
     parser.add_argument("--first", type=int, default=0, help="index of the first loop")
     parser.add_argument("--kinds", nargs="*", default=list(CHECKS), choices=list(CHECKS))
     given = parser.parse_args()
-    np.seterr(all="ignore")
     start = time.perf_counter()
     numbers = range(given.first, given.first + given.loops)
-    compile_all()
-    tally = Tally()
-    attack_fixed(tally)
-    report(tally)
-    attack(given.seed, numbers, tuple(given.kinds), tally, progress=True)
+    attack(given.seed, numbers[:10], tally=Tally(patient=False))  # compiles
+    tally = attack(given.seed, numbers, tuple(given.kinds))
     print(f"\nin {time.perf_counter() - start:.0f} s:", dict(tally.calls))
     print("not decided by the judge:", dict(tally.skipped))
     print("largest deviations:", {k: f"{v:.1e}" for k, v in tally.worst.items()})

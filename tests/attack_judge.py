@@ -16,6 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.optimize.elementwise import find_root
 
 TOL = 1e-6
 MOST_CELLS = 40_000
@@ -25,6 +26,10 @@ CHUNK = 20_000
 EPS = 1e-15
 GAINS = 1e6
 NAMES = ("modulus", "disk", "phase", "delay", "gain_upper", "gain_lower")
+
+
+#: 1/0 is inf, and 0/0 is looked at.
+quiet = np.errstate(all="ignore")
 
 
 class UndecidedError(RuntimeError):
@@ -137,21 +142,24 @@ class View:
             return w1 * self.miss[0] + w2 * self.miss[1]
         return w1 * (self.c2 - self.c1)
 
-    def at(self, omega):
-        """L at real frequencies."""
-        omega = np.asarray(omega, float)
-        jw, s, total = 1j * omega[:, None], self.sketch, 0j
-        late2 = np.exp(-1j * omega * s.tau2)
-        turned = [-np.expm1(-1j * omega * t) for t in self.tau]
-        apart = late2 * -np.expm1(-1j * omega * (s.tau1 - s.tau2))
+    def parts(self, omega):
+        """Of each term of L its W exp(-s delay), and the arms' share a1 (...) + a2 (...)."""
+        s, jw = self.sketch, 1j * omega[:, None]
+        back1, back2 = (-np.expm1(-1j * omega * t) for t in self.tau)
+        apart = np.exp(-1j * omega * s.tau2) * -np.expm1(-1j * omega * (s.tau1 - s.tau2))
         for z, p, gain, (w1, w2) in self.terms:
             a1, a2 = w1 * self.c[0], w2 * self.c[1]
-            arms = self.start(w1, w2) + (a1 + a2) * turned[0] - a2 * apart
-            if w1 != -w2:
-                arms = self.start(w1, w2) + a1 * turned[0] + a2 * turned[1]
-            total = total + gain * quotient(jw - z, jw - p) * arms
-        return total * np.exp(-1j * omega * s.delay)
+            # (1 - c1 e1) - (1 - c2 e2) keeps its digits where the two are close.
+            arms = (a1 + a2) * back1 - a2 * apart if w1 == -w2 else a1 * back1 + a2 * back2
+            dead = np.exp(-1j * omega * s.delay)
+            yield gain * quotient(jw - z, jw - p) * dead, self.start(w1, w2) + arms
 
+    @quiet
+    def at(self, omega):
+        """L at real frequencies."""
+        return sum(value * arms for value, arms in self.parts(omega))
+
+    @quiet
     def enclose(self, m, h):
         """L0, L1, R; and a disc with both arms' phases free: centre and radius."""
         s = self.sketch
@@ -159,66 +167,56 @@ class View:
         value = slope = 0j
         rest = np.zeros(m.size)
         late = [np.exp(-1j * m * t) for t in self.tau]
-        turned = [-np.expm1(-1j * m * t) for t in self.tau]
-        apart = late[1] * -np.expm1(-1j * m * (s.tau1 - s.tau2))
         arms = [np.zeros(m.size, complex), np.zeros(m.size, complex)]
         free_rest = np.zeros(m.size)
         hh = h[:, None]
-        with np.errstate(all="ignore"):
-            for z, p, gain, (w1, w2) in self.terms:
-                dz, dp = jm - z, jm - p
-                v = gain * quotient(dz, dp) * np.exp(-1j * m * s.delay)
-                log_slope = (1j / dz).sum(1) - (1j / dp).sum(1) - 1j * s.delay
-                az, ap = np.abs(dz), np.abs(dp)
-                near = (1.0 / np.maximum(az - hh, 0.0) ** 2).sum(1)
-                near = near + (1.0 / np.maximum(ap - hh, 0.0) ** 2).sum(1)
-                bend = np.where(h > 0.0, 0.5 * h * h * near, 0.0)
-                x = np.abs(log_slope) * h + bend
-                e = bend + 0.5 * x * x * np.exp(np.minimum(x, 700.0))
-                a1, a2 = w1 * self.c[0], w2 * self.c[1]
-                start = self.start(w1, w2)
-                if w1 == -w2:
-                    # (1 - c1 e1) - (1 - c2 e2), without losing digits where the two are close.
-                    p0 = start + (a1 + a2) * turned[0] - a2 * apart
-                    far = np.minimum(2.0, b * abs(s.tau1 - s.tau2))
-                    curve = abs(a1 * s.tau1**2 + a2 * s.tau2**2) + abs(a2) * s.tau2**2 * far
-                else:
-                    p0 = start + a1 * turned[0] + a2 * turned[1]
-                    curve = abs(a1) * s.tau1**2 + abs(a2) * s.tau2**2
-                p1 = 1j * (a1 * s.tau1 * late[0] + a2 * s.tau2 * late[1])
-                rp = 0.5 * h * h * curve
-                ap0, ap1, al, av = np.abs(p0), np.abs(p1), np.abs(log_slope), np.abs(v)
-                value = value + v * p0
-                slope = slope + v * (p1 + log_slope * p0)
-                # Phases are rounded as their arguments are.
-                rounding = EPS * (ap0 + abs(start) + (abs(a1) + abs(a2)) * b * self.tau.max())
-                rest = rest + av * (
-                    al * ap1 * h * h + (ap0 + ap1 * h) * e + (1.0 + al * h) * rp + e * rp
-                )
-                rest = rest + np.where(h > 0.0, av * rounding, 0.0)
-                arms[0] += w1 * v
-                arms[1] += w2 * v
-                whole = abs(w1) + abs(w2) + abs(a1) + abs(a2)
-                # |W / W(m) - 1| on the cell, or how large W is at all.
-                moved = np.minimum(x * np.exp(np.minimum(x, 700.0)), np.inf)
-                largest = quotient(az + hh, ap - hh)
-                largest = np.where((ap > hh).all(1), abs(gain) * largest, np.inf)
-                free_rest += np.where(
-                    h > 0.0, np.minimum(av * moved, largest + av) * whole, 0.0
-                )
-            radius = np.abs(arms[0] * self.c[0]) + np.abs(arms[1] * self.c[1]) + free_rest
+        for (z, p, gain, (w1, w2)), (v, p0) in zip(self.terms, self.parts(m), strict=True):
+            dz, dp = jm - z, jm - p
+            log_slope = (1j / dz).sum(1) - (1j / dp).sum(1) - 1j * s.delay
+            az, ap = np.abs(dz), np.abs(dp)
+            near = (1.0 / np.maximum(az - hh, 0.0) ** 2).sum(1)
+            near = near + (1.0 / np.maximum(ap - hh, 0.0) ** 2).sum(1)
+            bend = np.where(h > 0.0, 0.5 * h * h * near, 0.0)
+            x = np.abs(log_slope) * h + bend
+            e = bend + 0.5 * x * x * np.exp(np.minimum(x, 700.0))
+            a1, a2 = w1 * self.c[0], w2 * self.c[1]
+            start = self.start(w1, w2)
+            curve = abs(a1) * s.tau1**2 + abs(a2) * s.tau2**2
+            if w1 == -w2:
+                far = np.minimum(2.0, b * abs(s.tau1 - s.tau2))
+                curve = abs(a1 * s.tau1**2 + a2 * s.tau2**2) + abs(a2) * s.tau2**2 * far
+            p1 = 1j * (a1 * s.tau1 * late[0] + a2 * s.tau2 * late[1])
+            rp = 0.5 * h * h * curve
+            ap0, ap1, al, av = np.abs(p0), np.abs(p1), np.abs(log_slope), np.abs(v)
+            value = value + v * p0
+            slope = slope + v * (p1 + log_slope * p0)
+            # Phases are rounded as their arguments are.
+            rounding = EPS * (ap0 + abs(start) + (abs(a1) + abs(a2)) * b * self.tau.max())
+            rest = rest + av * (
+                al * ap1 * h * h + (ap0 + ap1 * h) * e + (1.0 + al * h) * rp + e * rp
+            )
+            rest = rest + np.where(h > 0.0, av * rounding, 0.0)
+            arms[0] += w1 * v
+            arms[1] += w2 * v
+            whole = abs(w1) + abs(w2) + abs(a1) + abs(a2)
+            # |W / W(m) - 1| on the cell, or how large W is at all.
+            moved = np.minimum(x * np.exp(np.minimum(x, 700.0)), np.inf)
+            largest = quotient(az + hh, ap - hh)
+            largest = np.where((ap > hh).all(1), abs(gain) * largest, np.inf)
+            free_rest += np.where(h > 0.0, np.minimum(av * moved, largest + av) * whole, 0.0)
+        radius = np.abs(arms[0] * self.c[0]) + np.abs(arms[1] * self.c[1]) + free_rest
         rest = np.where(np.isnan(rest), np.inf, rest)
         radius = np.where(np.isnan(radius), np.inf, radius)
         return value, slope, rest, arms[0] + arms[1], radius
 
     def limit(self):
-        """Centre and radius of the disc of L at infinity; turning if there is a dead time."""
-        centre, radius = 0.0, 0.0
+        """Centre and radius of the disc of L at infinity, which a dead time turns around 0."""
         z, p, gain, (w1, w2) = self.terms[0]
-        if z.size == p.size:
-            centre = gain * (w1 + w2)
-            radius = abs(gain) * (abs(w1 * self.c[0]) + abs(w2 * self.c[1]))
-        return centre, radius
+        if z.size != p.size:
+            return 0.0, 0.0
+        centre = gain * (w1 + w2)
+        radius = abs(gain) * (abs(w1 * self.c[0]) + abs(w2 * self.c[1]))
+        return (0.0, abs(centre) + radius) if self.sketch.delay else (centre, radius)
 
     def tail(self, omega):
         """Centre and radius of a disc that holds L at all frequencies past `omega`."""
@@ -232,15 +230,11 @@ class View:
                 radius += abs(gain) * np.expm1(grown) * whole
             else:
                 radius += abs(gain) * np.exp(grown + (z.size - p.size) * np.log(omega)) * whole
-        if self.sketch.delay:
-            return 0.0, abs(centre) + radius
         return centre, radius
 
     def confined(self):
         """Whether the neutral root chain stays left, dead time and delays a little changed."""
         centre, radius = self.limit()
-        if self.sketch.delay:
-            return abs(centre) + radius < 1.0
         return abs(1.0 + centre) > radius
 
     def cells(self, high, free_above=np.inf):
@@ -268,12 +262,12 @@ def to_segment(point, value, slope, h):
     """Distance of a point to the segment value + slope t, |t| <= h; and the nearest t."""
     speed = np.abs(slope) ** 2
     away = point - value
-    with np.errstate(all="ignore"):
-        t = np.where(speed > 0.0, (away * np.conj(slope)).real / speed, 0.0)
+    t = np.where(speed > 0.0, (away * np.conj(slope)).real / speed, 0.0)
     t = np.clip(t, -h, h)
     return np.abs(away - slope * t), t
 
 
+@quiet
 def count(sketch, c1, c2, sigma=0.0):
     """Roots of D right of Re s = sigma; -1 on the line (to rounding), -2 unconfined.
 
@@ -288,7 +282,7 @@ def count(sketch, c1, c2, sigma=0.0):
     if np.count_nonzero(poles == 0.0) > max(view.power, 0):
         return -1
     high = 10.0 * float(view.corners.max())
-    goal = 1.0 if sketch.delay else 1.0 + view.limit()[0]
+    goal = 1.0 + view.limit()[0]
     while True:
         centre, radius = view.tail(high)
         if abs(1.0 + centre) > radius:
@@ -352,17 +346,6 @@ class Verdict:
     used: int = 0
 
 
-def chain_gains(view):
-    """Gain factors at which the neutral root chain is lost."""
-    centre, radius = view.limit()
-    if view.sketch.delay:
-        return 0.0, 1.0 / (abs(centre) + radius)
-    limits = [1.0 / r for r in (radius - centre, -centre - radius) if r > 0.0]
-    return max([k for k in limits if k < 1.0], default=0.0), min(
-        [k for k in limits if k > 1.0], default=np.inf
-    )
-
-
 def apollonius(k):
     """Where |1 + L| < k |1 - L|: inside a disc (k < 1) or outside one."""
     k = min(max(k, 1e-300), 1e300)
@@ -386,63 +369,48 @@ def to_arc(value, turn):
 
 
 def zeros_of(view, a, b, excess):
-    """Zeros of `excess(L)` in cells at whose ends its sign differs, by the Illinois rule."""
-    fa, fb = excess(view.at(a)), excess(view.at(b))
-    a, b = a.copy(), b.copy()
-    for _ in range(14):
-        with np.errstate(all="ignore"):
-            m = np.clip(np.where(fa != fb, (a * fb - b * fa) / (fb - fa), a), a, b)
-        m = np.where(np.isnan(m), 0.5 * (a + b), m)
-        fm = excess(view.at(m))
-        same = (fm > 0.0) == (fa > 0.0)
-        a, fa, fb = (
-            np.where(same, m, a),
-            np.where(same, fm, 0.5 * fa),
-            np.where(same, 0.5 * fb, fm),
-        )
-        b = np.where(same, b, m)
-        if (np.abs(fm) < 1e-13).all():
-            break
-    return m
+    """Zeros of `excess(L)` in cells at whose ends its sign differs."""
+    near = {"fatol": 1e-11}
+    return find_root(lambda omega: excess(view.at(omega)), (a, b), tolerances=near).x
 
 
+@quiet
 def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
     """All margins; of a loop that is not stable the modulus and the disk only.
 
-    Above `free_above`, in rad/s, both arms' phases are free: L fills a disc.
+    Above `free_above`, in rad/s, both arms' phases are free: L fills a disc. Gains are not
+    looked at then.
     """
+    asked = 2 if not stable else 4 if np.isfinite(free_above) else len(NAMES)
     view = View(sketch, c1, c2)
-    best = Verdict()
+    # The limits, first. The ratio is a Moebius map: its least value on the disc is on the real
+    # axis or where a circle of constant ratio touches, which by symmetry is there, too.
     centre, radius = view.limit()
-    # The limits, first.
-    if sketch.neutral:
-        if sketch.delay:
-            near = -(abs(centre) + radius)
-            best.modulus, best.disk = 1.0 + near, abs(float(ratio(near)))
-            reach = abs(centre) + radius
-        else:
-            best.modulus = abs(1.0 + centre) - radius
-            # The ratio is a Moebius map: its least value on the disc is on the real axis or
-            # where a circle of constant ratio touches, which by symmetry is there, too.
-            best.disk = float(ratio(np.array([centre - radius, centre + radius])).min())
-            reach = abs(centre) + radius
-        best.gain_lower, best.gain_upper = chain_gains(view)
-        if reach >= 1.0:
-            best.delay = 0.0
-            if not sketch.delay and centre > 0.0 and abs(centre) - radius <= 1.0:
-                cosine = (radius**2 - 1.0 - centre**2) / (2.0 * centre)
-                best.phase = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
-    else:
-        best.modulus = best.disk = 1.0
+    ends = np.array([centre - radius, centre + radius])
+    best = Verdict(abs(1.0 + centre) - radius, float(ratio(ends).min()))
+    # Gain factors at which the neutral root chain is lost.
+    lost = [1.0 / r for r in (radius - centre, -centre - radius) if r > 0.0]
+    best.gain_lower = max([k for k in lost if k < 1.0], default=0.0)
+    best.gain_upper = min([k for k in lost if k > 1.0], default=np.inf)
+    if abs(centre) + radius >= 1.0:
+        best.delay = 0.0
+        if centre > 0.0 and centre - radius <= 1.0:
+            cosine = (radius**2 - 1.0 - centre**2) / (2.0 * centre)
+            best.phase = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
     first = view.at(np.array([view.low]))
     best.modulus = min(best.modulus, float(np.abs(1.0 + first[0])))
     best.disk = min(best.disk, float(ratio(first)[0]))
-    if view.power == 0 and first[0].real < 0.0:
-        k = -1.0 / first[0].real
+
+    def limit_gain(value):
+        """Take in a value of L on the negative real axis."""
+        k = -1.0 / float(value.real)
         if k > 1.0:
             best.gain_upper = min(best.gain_upper, k)
         else:
             best.gain_lower = max(best.gain_lower, k)
+
+    if view.power == 0 and first[0].real < 0.0:
+        limit_gain(first[0])
 
     def kept(value, slope, rest, h, a, b):
         """For each margin, the cells on which a smaller one may lie."""
@@ -455,15 +423,12 @@ def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
         else:
             far = np.maximum(np.abs(value - slope * h - at), np.abs(value + slope * h - at))
             keep[1] = far >= size - rest
-        if not stable:
-            return keep
         spread = np.abs(slope) * h + rest
         turn = np.where(best.phase < np.pi, best.phase * (1.0 - TOL), np.pi) * np.ones(
             value.size
         )
         keep[2] = to_arc(value * np.exp(1j * turn), 2.0 * turn) <= spread
-        with np.errstate(invalid="ignore"):
-            turn = np.minimum(best.delay * (1.0 - TOL) * b, 2.0 * np.pi)
+        turn = np.minimum(best.delay * (1.0 - TOL) * b, 2.0 * np.pi)
         keep[3] = (to_arc(value, turn) <= spread) & (turn > 0.0)
         real = np.abs(value.imag) <= np.abs(slope.imag) * h + rest
         half = np.abs(slope.real) * h + rest
@@ -472,6 +437,7 @@ def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
         bottom = max(best.gain_lower * (1.0 + TOL), 0.99 / GAINS)
         keep[4] = real & (largest > -1.0) & (smallest < -1.0 / top) & (top > 1.0)
         keep[5] = real & (smallest < -1.0) & (largest > -1.0 / bottom) & (bottom < 1.0)
+        keep[asked:] = False
         return keep
 
     def improve(omega):
@@ -499,12 +465,8 @@ def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
         if some.size:
             omega = zeros_of(view, a[some], b[some], lambda v: v.imag / np.abs(v))
             value = view.at(omega)
-            value = value[(np.abs(value.imag) < 1e-10 * np.abs(value)) & (value.real < 0.0)]
-            for k in -1.0 / value.real:
-                if k > 1.0:
-                    best.gain_upper = min(best.gain_upper, float(k))
-                else:
-                    best.gain_lower = max(best.gain_lower, float(k))
+            for met in value[(np.abs(value.imag) < 1e-10 * np.abs(value)) & (value.real < 0.0)]:
+                limit_gain(met)
 
     def done(undecided):
         best.disk = 2.0 * min(best.disk, 1.0)
@@ -583,8 +545,7 @@ def improve_free(best, omega, centre, radius, stable):
     best.disk = min(best.disk, float(np.maximum(gap, 0.0).min()))
     if not stable:
         return
-    with np.errstate(all="ignore"):
-        cosine = (1.0 + np.abs(centre) ** 2 - radius**2) / (2.0 * np.abs(centre))
+    cosine = (1.0 + np.abs(centre) ** 2 - radius**2) / (2.0 * np.abs(centre))
     met = cosine <= 1.0
     half = np.arccos(np.clip(cosine[met], -1.0, 1.0))
     turn, omega = lag(centre[met]), omega[met]
@@ -592,12 +553,3 @@ def improve_free(best, omega, centre, radius, stable):
     best.phase = min(best.phase, float(nearest.min(initial=np.inf)))
     first = np.where((turn > half) & (turn + half < 2.0 * np.pi), turn - half, 0.0)
     best.delay = min(best.delay, float((first / omega).min(initial=np.inf)))
-    on_axis = np.abs(centre.imag) <= radius
-    half = np.sqrt(radius[on_axis] ** 2 - centre[on_axis].imag ** 2)
-    for left, right in zip(
-        centre[on_axis].real - half, centre[on_axis].real + half, strict=True
-    ):
-        if -1.0 < left < 0.0:
-            best.gain_upper = min(best.gain_upper, float(-1.0 / left))
-        if right < -1.0:
-            best.gain_lower = max(best.gain_lower, float(-1.0 / right))

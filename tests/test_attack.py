@@ -3,28 +3,54 @@
 import numpy as np
 import pytest
 
+from armlock import margins
 from tests import attack
+from tests.attack_judge import Sketch
 
 
 def listed(tally):
     return [(*entry[:1], entry[1][0], *entry[2:]) for entry in (*tally.wrong, *tally.refused)]
 
 
-@pytest.fixture(scope="module", autouse=True)
-def compiled():
-    """Times are held against a limit, in which the compiler has no part."""
-    attack.compile_all()
+#: What was wrong once: a loop, a point, and what is right there where brute force takes long:
+#: 4e7 cells, a quarter of an hour.
+FIXED = {
+    "a zero far above the neutral chain": (
+        Sketch((-1.01e5,), (-1e3,), 0.2, "common", 20.1, 19.9),
+        (1.0, 1.0),
+        {
+            "modulus": 0.28939025667,
+            "disk": 0.299310722618,
+            "phase": 0.298149424673,
+            "delay": 1.78674003931e-5,
+        },
+    ),
+    "a factor of 2.1": (
+        Sketch((0.2,), (-1.0, -2.0, -7.0), -10.0, "single", 20.1, 20.1),
+        (0.01, 0.0),
+        {"gain_upper": 2.1057216476},
+    ),
+    "unity gain at 14.7 kHz": (
+        Sketch((), (0j,), np.pi * 14.7e3, "common", 33.6, 33.1),
+        (0.999, 0.999),
+        {
+            "modulus": 0.044711663436,
+            "disk": 0.0447341982395,
+            "delay": 5.5152126654e-6,
+        },
+    ),
+    "small and rippled": (Sketch((), (0j,), 0.181, "common", 0.3566, 0.3565), (1e-6, 0.04), {}),
+}
 
 
-@pytest.fixture(autouse=True)
-def quiet():
-    with np.errstate(all="ignore"):
-        yield
-
-
-def test_what_was_wrong_once_is_right():
-    tally = attack.Tally(patient=False)
-    attack.attack_fixed(tally)
+@pytest.mark.parametrize("name", FIXED)
+def test_margins_that_were_wrong_once_are_right(name):
+    sketch, point, known = FIXED[name]
+    tally, loop = attack.Tally(patient=False, where=(name, sketch)), attack.to_loop(sketch)
+    attack.check_margins(tally, np.random.default_rng(0), sketch, loop, point)
+    found = margins(loop, *point)
+    for margin, expected in known.items():
+        tally.near(f"margins.{margin}", point, getattr(found, margin), expected)
     assert listed(tally) == []
 
 

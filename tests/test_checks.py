@@ -14,6 +14,7 @@ import armlock
 from armlock import CharacteristicFunction, CommonArm, HayesEquation, SingleArm, paper_loop
 from armlock.checks import axis, finite_series, real_array
 from armlock.controllers import integrating_actuator, stage_one, table_two
+from armlock.design import roll_off
 from armlock.noise import band_rms
 from armlock.rays import first_crossing
 from armlock.roots import extended_root
@@ -87,6 +88,7 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     armlock.transfer: {"loop": ARMS, "source": "laser", "s": 1j} | POINT,
     armlock.closed_loop: {"loop": ARMS, "omega": [1.0]} | POINT,
     armlock.noise_budget: {"loop": ARMS, "frequency": [1.0], "laser": 1.0, "requirement": 1.0},
+    roll_off: {"first": 1.0, "last": 2.0, "pairs": 3, "slope": 0.5},
     armlock.pulling: {"loop": CommonArm(), "time": 1e5, "common": (1.0, 0.0, 0.0),
                       "differential": (0.0, 0.0, 0.0)},
 }  # fmt: skip
@@ -127,6 +129,9 @@ WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
     (CommonArm, "gain", 0.0, "be positive, got 0.0"),
     (armlock.Controller, "gain", 0.0, "not be zero"),
     (armlock.Controller, "poles", (1j,), "be real or in conjugate pairs"),
+    (table_two, "denominator", "x", "be 'table' or 'printed', got 'x'"),
+    (roll_off, "last", 1.0, "be above first (1.0), got 1.0"),
+    (roll_off, "slope", 1.0, "be below one, got 1.0"),
     (armlock.Loop, "controller", control.tf([1.0], [1.0, 1.0], 0.1), "be continuous"),
     (armlock.Loop, "mapping", SignalMapping([0.0], [0.0], [1.0], "none"), "not be zero"),
     (SignalMapping, "denominator", [0.0], "not be zero, got (0.0,)"),

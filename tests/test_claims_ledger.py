@@ -40,8 +40,12 @@ def calls(monkeypatch):
 def test_checks_run_once_and_only_when_asked_for(calls):
     assert calls == []
     check("X1")
-    check("X1", "X2")
+    ledger = check("X2", "X1")
     assert calls == ["X1"]
+    assert [entry.identifier for entry, _ in ledger] == ["X2", "X1"]
+    assert ledger["X1"].verdict is Verdict.REPRODUCED
+    with pytest.raises(KeyError):
+        ledger["X3"]
 
 
 def test_what_a_build_has_found_is_not_computed_again(calls, monkeypatch, tmp_path):
@@ -51,14 +55,6 @@ def test_what_a_build_has_found_is_not_computed_again(calls, monkeypatch, tmp_pa
     monkeypatch.setenv("ARMLOCK_FIGURES", str(tmp_path))
     assert check("X1", "X2")["X1"] == found
     assert calls == []
-
-
-def test_findings_are_looked_up_by_identifier(calls):
-    ledger = check("X2", "X1")
-    assert ledger["X1"].verdict is Verdict.REPRODUCED
-    assert [entry.identifier for entry, _ in ledger] == ["X2", "X1"]
-    with pytest.raises(KeyError):
-        ledger["X3"]
 
 
 def test_a_chapter_has_all_its_claims(calls):
@@ -111,13 +107,10 @@ def test_what_is_not_as_pinned_is_named(calls, found):
         ledger.confirm()
 
 
-def test_an_identifier_is_taken_once(calls):
+def test_an_identifier_is_taken_once_and_known(calls):
     again = claim("X1", place="", says="", chapter="", pinned=(Verdict.OPEN, 0.0, 0.0))
     with pytest.raises(ValueError, match=r"^identifier must be new, got 'X1'"):
         again(calls)
-
-
-def test_an_unknown_identifier_is_named(calls):
     with pytest.raises(ValueError, match=r"^identifier must be one of X1, X2; got 'X9'"):
         check("X9")
 

@@ -12,7 +12,6 @@ from book.companion.claims.page import (
     Errata,
     LedgerPage,
     VerdictCounts,
-    source,
     whole_ledger,
 )
 
@@ -79,27 +78,11 @@ def test_a_build_checks_the_claims_once(ledger, monkeypatch, tmp_path):
     assert made == 2
 
 
-def test_a_source_is_the_function_that_checks(ledger):
-    claim = next(iter(ledger))[0]
-    file, line, text = source(claim)
-    assert file == "book/companion/claims/table1.py"
-    assert line > 1
-    assert "def single_row" in text
-
-
-def test_counts_are_of_physics_and_name_only_verdicts_that_occur():
-    counts = VerdictCounts(check("T1", "T6"))
-    assert repr(counts).splitlines() == [
-        "1 finding of physics: 1 reproduced",
-        "Besides, 1 of derivation and 0 of wording",
-    ]
-    assert "differs" not in counts._repr_html_()
-
-
-def test_claims_of_the_white_paper_count_by_themselves():
+def test_counts_are_of_physics_and_of_the_white_paper_by_itself():
     counts = VerdictCounts(check("T6", "W7"))
     assert "1 finding of physics: 1 reproduced" in repr(counts)
     assert "1 of the white paper: 1 reproduced" in repr(counts)
+    assert "differs" not in counts._repr_html_()
 
 
 def test_errata_are_what_is_not_as_printed(ledger):
@@ -108,13 +91,11 @@ def test_errata_are_what_is_not_as_printed(ledger):
     assert Ids(found._repr_html_()).ids == ["erratum-T2"]
     assert "<dt>Printed</dt>" in found._repr_html_()
     assert len(Errata(ledger, Weight.PHYSICS)) == 0
-
-
-def test_claims_with_one_finding_share_an_erratum():
-    found = Errata(check("T2", "T3"))
-    assert [claim.identifier for claim, _ in found.entries] == ["T2"]
+    # Claims with one finding share one.
+    shared = Errata(check("T2", "T3"))
+    assert [claim.identifier for claim, _ in shared.entries] == ["T2"]
     assert '<dt>The same finding</dt><dd><a href="09_ledger.html#ledger-T3">' in (
-        found._repr_html_()
+        shared._repr_html_()
     )
 
 

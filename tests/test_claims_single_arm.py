@@ -2,22 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
-from armlock import HayesEquation, unstable_roots
-from armlock.paper import TAU1
 from book.companion.claims import Verdict, single_arm
-
-
-@pytest.mark.parametrize("gain", [0.02, 1.0, 400.0])
-@pytest.mark.parametrize("tau", [0.5, TAU1])
-def test_lowest_stable_k2_is_where_the_count_changes(gain, tau):
-    limit = single_arm.lowest_stable_k2(gain, tau)
-    assert limit < -1.0
-    k2 = limit * np.array([1.0 - 1e-8, 1.0 + 1e-8])
-    counts = unstable_roots(HayesEquation(tau), *single_arm.parameters(gain, k2))
-    assert counts.tolist() == [0, 2]
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ from armlock import (
     CharacteristicFunction,
     CommonArm,
     DualArm,
-    HayesEquation,
     d_curve,
     d_curve_branches,
     d_curve_line,
@@ -17,26 +16,21 @@ from tests import independent
 from tests.systems import NEUTRAL, RETARDED
 
 MAP = semi_discretization(CommonArm(tau1=2.0, tau2=1.5), 0.25, order=1)
+LOOPS = {
+    "delays far apart": CommonArm(1.0, 20.1, 0.3),
+    "dual arm, high gain": DualArm(),
+    "controlled": paper_loop(),
+    "map": MAP,
+    "map, fine": semi_discretization(CommonArm(), 0.1),
+}
 CURVED = {
     name: system
-    for name, system in {**RETARDED, **NEUTRAL, "map": MAP}.items()
+    for name, system in {**RETARDED, **NEUTRAL, **LOOPS}.items()
     if system.b1.any() and system.b2.any()
 }
 
 
-@pytest.mark.parametrize("name", CURVED)
-def test_points_of_the_curve_have_a_root_on_the_axis(name):
-    system = CURVED[name]
-    omega = np.array([-2.7, -0.9, 0.2, 0.9, 1.3, 2.7, 6.1])
-    x, y = d_curve(system, omega)
-    residual = [
-        independent.value(system, 1j * w, p, q) for w, p, q in zip(omega, x, y, strict=True)
-    ]
-    a, b1, b2 = system.parts(1j * omega)
-    assert (np.abs(residual) <= 1e-10 * (abs(a) + abs(x * b1) + abs(y * b2))).all()
-
-
-@pytest.mark.parametrize("name", CURVED)
+@pytest.mark.parametrize("name", sorted(CURVED.keys() - {"controlled"}))
 def test_the_line_has_a_root_at_zero(name):
     system = CURVED[name]
     wx, wy, value = d_curve_line(system)
@@ -92,7 +86,7 @@ def test_a_branch_of_a_map_ends_at_the_nyquist_frequency():
 
 def exact_curve(system, omega):
     """The point of the curve at a double taken as exact, with as many digits as it takes."""
-    with mpmath.workdps(40 + 2 * int(abs(np.log10(omega)))):
+    with mpmath.workdps(40 + 2 * int(abs(np.log10(abs(omega))))):
         s = mpmath.mpc(0, float(omega))
         # Without both signals, and by how much each of them lowers that.
         a, one, other = (independent.exact(system, s, *c) for c in ((0, 0), (1, 0), (0, 1)))
@@ -103,26 +97,16 @@ def exact_curve(system, omega):
         return float(x), float(y), float(abs(determinant) / abs(late1 * late2))
 
 
-@pytest.mark.parametrize(
-    "system",
-    [
-        CommonArm(),
-        CommonArm(1.0, 20.1, 0.3),
-        DualArm(),
-        paper_loop(),
-        HayesEquation(0.7),
-        semi_discretization(CommonArm(), 0.1),
-    ],
-    ids=lambda system: type(system).__name__,
-)
-def test_the_curve_is_right_at_every_frequency(system):
-    rng = np.random.default_rng(5)
-    for omega in 10.0 ** rng.uniform(-9.0, 7.0, 80):
+@pytest.mark.parametrize("name", CURVED)
+def test_the_curve_is_right_at_every_frequency(name):
+    system, rng = CURVED[name], np.random.default_rng(5)
+    for omega in rng.choice([-1.0, 1.0], 80) * 10.0 ** rng.uniform(-9.0, 7.0, 80):
         x, y = d_curve(system, omega)
         exact_x, exact_y, sine = exact_curve(system, omega)
         # The coefficients' own rounding is magnified next to a pole, beyond low frequencies.
-        turns = 1.0 + omega * system.longest_delay
-        allowed = 1e-11 + 1e-15 / omega if omega < 1e-2 else 1e-12 * turns / sine
+        size = abs(omega)
+        turns = 1.0 + size * system.longest_delay
+        allowed = 1e-11 + 1e-15 / size if size < 1e-2 else 1e-12 * turns / sine
         assert x == pytest.approx(exact_x, rel=allowed, abs=allowed)
         assert y == pytest.approx(exact_y, rel=allowed, abs=allowed)
 

@@ -10,11 +10,14 @@ import matplotlib.pyplot as plt
 import pytest
 
 import armlock
+from book import companion
 
 ROOT = Path(__file__).parents[1]
 MODULES = [
-    "armlock",
-    *sorted(m.name for m in pkgutil.walk_packages(armlock.__path__, "armlock.")),
+    module.name
+    for package in (armlock, companion)
+    for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
+    if not module.name.endswith("__main__")
 ]
 
 

@@ -10,6 +10,7 @@ from armlock import (
     CountError,
     DualArm,
     Loop,
+    critical_perturbation,
     d_curve_line,
     unstable_roots,
 )
@@ -63,6 +64,17 @@ def test_a_crossing_that_rounding_hides_is_refused():
     for find in (ray.crossings, ray.first):
         with pytest.raises(CountError, match="rounding hides some"):
             find(0.2)
+
+
+@pytest.mark.parametrize("zeros", [(), (-0.5,)])
+def test_with_equal_delays_only_the_chain_ends_what_no_parameter_changes(zeros):
+    """Along (1, -1), however far."""
+    loop = Loop((zeros, (-1.0,), 0.2), COMMON, 20.0, 20.0)
+    far = np.array([0.5, 2.0, 100.0, 1e4])
+    stable = unstable_roots(loop, 1.0 + far, 1.0 - far) == 0
+    assert (stable == (far < critical_perturbation(loop, (1.0, -1.0)))).all()
+    assert stable[0]
+    assert stable[-1] != bool(zeros)
 
 
 def test_first_crossing_says_where_there_is_none():

@@ -11,10 +11,9 @@ from armlock import (
     flight_loop,
     nyquist,
     published_loops,
-    stability_chart,
     unstable_roots,
 )
-from armlock.sensors import COMMON, modified_dual
+from armlock.sensors import COMMON
 
 
 def test_the_open_loop_has_its_digits_over_thirteen_decades(table):
@@ -33,20 +32,8 @@ def test_the_open_loop_has_its_digits_over_thirteen_decades(table):
 def test_counts_of_the_loop_that_flies():
     assert unstable_roots(flight_loop(), [1.0, 1.02], [1.0, 0.98]).tolist() == [0, 2]
     assert nyquist(flight_loop()).encirclements == 0
-
-
-def test_with_the_other_sign_of_the_difference_arm_it_is_unstable():
-    right, turned = modified_dual(33.6, 0.255), modified_dual(33.6, -0.255)
-    assert right.numerator1 == turned.numerator2
-    assert unstable_roots(Loop(flight_loop().controller, turned, 33.855, 33.345), 1, 1) == 38
-    # With arm 2 the longer one the sign is right again: the arms have changed places.
-    assert unstable_roots(flight_loop(half_difference=-0.255), 1, 1) == 0
-
-
-def test_a_chart_agrees_with_single_counts():
-    axis = np.linspace(0.97, 1.03, 7)
-    chart = stability_chart(flight_loop(), axis, axis)
-    assert (chart.counts == unstable_roots(flight_loop(), *np.meshgrid(axis, axis))).all()
+    # With arm 2 the longer one, the arms change places.
+    assert unstable_roots(flight_loop(half_difference=-0.255), 1.0, 1.0) == 0
 
 
 def test_parallel_branches_are_their_sum():

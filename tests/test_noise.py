@@ -1,16 +1,13 @@
 """Shaped noise: density, start, blocks, seeds."""
 
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.integrate import quad
 
 from armlock import LaserNoise, PerturbationNoise, ShapedNoise
-from armlock.noise import band_rms
 from armlock.spectra import SpectrumEstimator
 
 SOURCES: dict[str, Any] = {
@@ -127,12 +124,3 @@ def test_at_rest_starts_at_zero():
     full = LaserNoise(4).draw(200)
     assert np.abs(quiet).max() < 100.0
     assert np.abs(full).min() > 100.0
-
-
-def test_band_rms_is_the_integral():
-    def power(f):
-        return (3.6e-5) ** 2 * (1.0 + (2.8e-3 / f) ** 4)
-
-    edges = np.geomspace(5e-6, 100.0, 40)
-    total = sum(quad(power, a, b)[0] for a, b in pairwise(edges))
-    assert band_rms(5e-6, 100.0) == pytest.approx(np.sqrt(total), rel=1e-6)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from armlock import CommonArm, stability_chart
+from armlock import CommonArm
 from book.companion import outline as boundary
 
 DIAGONAL = np.full((2, 1), np.sqrt(0.5))
@@ -18,11 +18,3 @@ def test_area_and_perimeter_of_a_circle():
     closed = boundary.outline(np.full(720, 3.0), np.stack((np.cos(angle), np.sin(angle))))
     assert boundary.enclosed_area(closed) == pytest.approx(9.0 * np.pi, rel=1e-4)
     assert boundary.perimeter(closed) == pytest.approx(6.0 * np.pi, rel=1e-4)
-
-
-def test_the_area_agrees_with_the_stable_share_of_a_chart():
-    system, directions = CommonArm(), boundary.rays(80)
-    closed = boundary.outline(boundary.boundary_radius(system, directions), directions)
-    axis = np.linspace(-7.0, 7.0, 1001)
-    share = stability_chart(system, axis, axis).stable.mean() * 14.0**2
-    assert boundary.enclosed_area(closed) == pytest.approx(share, rel=2e-3)

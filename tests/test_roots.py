@@ -23,7 +23,6 @@ from armlock import (
 )
 from armlock.flight import flight_loop
 from armlock.roots import extended_root
-from armlock.semidiscretization import semi_discretization
 from armlock.sensors import COMMON, dual
 from book.companion.schemes import pseudospectral_roots
 from tests import independent
@@ -33,6 +32,8 @@ gains = st.floats(0.05, 3.0)
 delays = st.floats(0.2, 5.0)
 reals = st.floats(-3.0, 3.0)
 PAPER = paper_loop(actuator=True).controller
+# Twenty-six poles over four decades.
+MANY = -np.geomspace(1e-5, 4e-2, 26)
 
 
 def test_acceptance_roots_of_the_hayes_equation(table):
@@ -89,18 +90,15 @@ def test_other_loops_agree_with_count_and_independent_spectrum(name):
         assert (root.real > 0.0) == (unstable_roots(system, x, y) > 0)
 
 
-@pytest.mark.parametrize("gain", [1.0, 10.0, 100.0, 1000.0])
-def test_large_gains_have_a_certified_root(gain):
-    system = CommonArm(gain=gain)
-    for c1, c2 in [(3.0, 3.0), (-1.5, 1.4), (0.9, 1.05)]:
-        root = rightmost_root(system, c1, c2)
-        assert (root.real > 0.0) == (unstable_roots(system, c1, c2) > 0)
-        assert unstable_roots(system.shifted(root.real + 1e-6), c1, c2) == 0
-        assert unstable_roots(system.shifted(root.real - 1e-6), c1, c2) > 0
-
-
 DEADBEAT = CharacteristicFunction([0.0, 1.0], [1.0], [0.0], 1.0, 1.0, step=1.0)
 OSCILLATOR = CharacteristicFunction([1.0, 0.0, 1.0], [1.0, 1.0], [1.0], 0.0, 0.0)
+LOST = CharacteristicFunction(
+    [-0.3585, -0.0848, -0.4575, -2.4528, 0.02115],
+    [0.1308, 0.238, -0.497, 0.172, 0.10785],
+    [-0.884, -1.101, 0.238, -0.477, 0.5011],
+    8.848,
+    3.975,
+)
 # Loop, point, root, and how far off it may be.
 CLOSED: dict[str, tuple[Any, tuple[float, float], complex, float]] = {
     "at zero": (CommonArm(), (1.0, 1.0), 0.0, 1e-15),
@@ -117,6 +115,20 @@ CLOSED: dict[str, tuple[Any, tuple[float, float], complex, float]] = {
         1e-12,
     ),
     "of a map": (DEADBEAT, (0.25, 0.0), np.log(0.5), 1e-15),
+    # Its chain is lost, but confined left of the real root, which is that of A alone.
+    "so far right that delayed terms vanish": (
+        LOST,
+        (2.14, -0.5827),
+        np.roots(LOST.a[::-1]).real.max(),
+        1e-10,
+    ),
+    # The arms have died out there: s = 2 K exp(-s delay).
+    "where only the dead time acts": (
+        Loop(([], [0.0], -5000.0), COMMON, 5.9, 5.9, delay=7e-6),
+        (1.0, 0.9),
+        lambertw(1e4 * 7e-6) / 7e-6,
+        1e-8,
+    ),
 }
 # s + g exp(-s delay) = 0
 for gain, delay in ((1.0, 0.5), (1.0, 1.7), (0.2, 3.0)):
@@ -169,40 +181,6 @@ def test_a_start_far_from_every_extended_root_is_refused():
         extended_root(HayesEquation(), 0.0, -0.2, -300.0)
 
 
-@pytest.mark.parametrize(
-    ("system", "point"),
-    [
-        (DualArm(gain=5000.0), (0.99, 1.0)),
-        (DualArm(gain=5000.0), (1.00005, 1.000051)),
-        (paper_loop(), (1.0 - 1e-6, 1.0)),
-    ],
-)
-def test_roots_far_up_the_chain_are_found_to_the_right_of_slow_ones(system, point):
-    root = rightmost_root(system, *point)
-    assert root.imag == pytest.approx(62.83, abs=0.01)
-    with mpmath.workdps(30):
-        exact = extended_root(system, point[0], point[1], root, digits=30)
-        assert abs(exact - root) < 1e-13 * abs(root)
-    assert unstable_roots(system.shifted(root.real + 1e-8), *point) == 0
-    assert unstable_roots(system, *point) == 2 * (root.real > 0)
-
-
-def test_a_root_so_far_right_that_delayed_terms_vanish_is_certified():
-    # Its chain is lost, but confined left of it: the real root is that of A alone.
-    a = [-0.3585, -0.0848, -0.4575, -2.4528, 0.02115]
-    b1, b2 = [0.1308, 0.238, -0.497, 0.172, 0.10785], [-0.884, -1.101, 0.238, -0.477, 0.5011]
-    system = CharacteristicFunction(a, b1, b2, 8.848, 3.975)
-    expected = np.roots(a[::-1]).real.max()
-    assert rightmost_root(system, 2.14, -0.5827) == pytest.approx(expected, rel=1e-12)
-
-
-def test_a_root_right_of_which_only_the_dead_time_acts_is_that_of_lambert():
-    # The arms have died out there: s = 2 K exp(-s delay).
-    loop = Loop(([], [0.0], -5000.0), COMMON, 5.9, 5.9, delay=7e-6)
-    expected = lambertw(1e4 * 7e-6).real / 7e-6
-    assert rightmost_root(loop, 1.0, 0.9) == pytest.approx(expected, rel=1e-12)
-
-
 def test_a_root_that_cannot_be_certified_is_refused_at_once():
     # A chain of some 1e20 roots comes closer to its end than any walk.
     begun = time.process_time()
@@ -219,21 +197,11 @@ def test_a_map_without_memory_has_no_root():
         rightmost_root(DEADBEAT, 0.0, 0.0)
 
 
-def test_the_rightmost_root_of_a_map_is_its_largest_eigenvalue():
-    held = semi_discretization(CommonArm(1.0, 2.0, 1.5), 0.25)
-    for x, y in [(0.9, 1.05), (-2.0, 0.3), (0.0, 0.7), (0.0, 0.0)]:
-        root = rightmost_root(held, x, y)
-        assert np.exp(root.real * 0.25) == pytest.approx(
-            np.abs(independent.map_eigenvalues(held, x, y)).max(), rel=1e-9
-        )
-
-
 def test_a_dead_time_sets_the_growth_of_a_neutral_loop():
     # At high frequency 1 + L is 1 + 2 K exp(-s delay), so that |exp(s delay)| tends to 2 K.
     loop = paper_loop(delay=1e-3)
-    root = rightmost_root(loop, 1.0, 1.0)
     high = 2.0 * loop.controller.gain
-    assert root.real == pytest.approx(np.log(high) / 1e-3, rel=1e-6)
+    assert rightmost_root(loop, 1.0, 1.0).real == pytest.approx(np.log(high) / 1e-3, rel=1e-6)
 
 
 def test_a_root_next_to_zero_is_that_of_the_factored_loop():
@@ -249,18 +217,6 @@ def test_a_root_next_to_zero_is_that_of_the_factored_loop():
         assert abs(found - exact) < 1e-9 * abs(exact)
 
 
-def test_many_poles_do_not_take_long():
-    """Of 26 poles over four decades; in extended precision each line took a second once."""
-    poles = -np.geomspace(1e-5, 4e-2, 26)
-    loop = Loop((poles[1:] * 1.5, poles, 1e-3), COMMON, 20.1, 19.9)
-    begun = time.process_time()
-    root = rightmost_root(loop, 1.00002, 0.9996)
-    assert time.process_time() - begun < 5.0
-    margin = 1e-6 * max(abs(root), 0.05)
-    assert unstable_roots(loop.shifted(root.real + margin), 1.00002, 0.9996) == 0
-    assert unstable_roots(loop.shifted(root.real - margin), 1.00002, 0.9996) > 0
-
-
 @pytest.mark.parametrize(
     ("loop", "point"),
     [
@@ -273,6 +229,12 @@ def test_many_poles_do_not_take_long():
             Loop((PAPER.zeros, PAPER.poles[:-1], 1e4), dual(2.5, 20.016), 30.013, 9.997),
             (1.0, 1.0),
         ),
+        # Far up the chain, to the right of slow ones.
+        (DualArm(gain=5000.0), (0.99, 1.0)),
+        (DualArm(gain=5000.0), (1.00005, 1.000051)),
+        (paper_loop(), (1.0 - 1e-6, 1.0)),
+        # In extended precision each line took a second once.
+        (Loop((MANY[1:] * 1.5, MANY, 1e-3), COMMON, 20.1, 19.9), (1.00002, 0.9996)),
     ],
 )
 def test_roots_far_slower_than_the_delays_or_far_up_are_certified(loop, point):

@@ -4,7 +4,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from armlock import (
-    CharacteristicFunction,
     CommonArm,
     DualArm,
     HayesEquation,
@@ -19,9 +18,8 @@ from armlock.rays import first_crossing
 from tests import independent
 from tests.systems import RETARDED
 
-OSCILLATOR = CharacteristicFunction([2.0, 0.3, 1.0], [1.0], [0.0, 1.0], 1.0, 2.5)
-UNSTABLE = CharacteristicFunction([-0.5, 0.2, 1.0], [-1.0, -0.6], [0.7], 0.5, 1.5)
-THIRD = CharacteristicFunction([1.0, 2.0, 3.0, 1.0], [1.0, 0.0, 1.0], [1.0, 2.0], 1.0, 1.5)
+NAMES = "oscillator", "third order, unstable A", "zero of B1 on the axis"
+SYSTEMS = [RETARDED[name] for name in NAMES]
 
 
 def test_published_spectral_radius_of_the_hayes_equation(table):
@@ -61,7 +59,7 @@ def test_first_order_matrix_is_its_closed_form(gain, steps1, steps2, c1, c2, ord
     np.testing.assert_allclose(matrix, expected, rtol=1e-12, atol=1e-14)
 
 
-@pytest.mark.parametrize("system", [OSCILLATOR, UNSTABLE, THIRD, CommonArm(tau1=2.5, tau2=1.0)])
+@pytest.mark.parametrize("system", [*SYSTEMS, CommonArm(tau1=2.5, tau2=1.0)])
 @pytest.mark.parametrize(("order", "observed"), [(0, 1.0), (1, 2.0)])
 def test_convergence_of_the_dominant_eigenvalue(system, order, observed):
     exact = np.exp(rightmost_root(system, -0.4, 0.3).real)
@@ -75,7 +73,7 @@ def test_convergence_of_the_dominant_eigenvalue(system, order, observed):
 
 
 @pytest.mark.parametrize("order", [0, 1])
-@pytest.mark.parametrize("system", [OSCILLATOR, UNSTABLE, THIRD, CommonArm(tau1=1.5, tau2=0.5)])
+@pytest.mark.parametrize("system", [*SYSTEMS, CommonArm(10.0, 1.5, 0.5)])
 def test_counts_of_the_map_are_eigenvalues_outside_the_unit_circle(system, order):
     sampled = semi_discretization(system, 0.25, order)
     x, y = np.random.default_rng(3).uniform(-3.5, 3.5, (2, 9))

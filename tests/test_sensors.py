@@ -1,5 +1,3 @@
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -40,15 +38,3 @@ def test_exchanging_the_arms_of_the_dual_sensor_changes_the_sign_of_the_differen
     one = sensors.dual(1.0, 0.2).weights(S)
     other = sensors.dual(1.0, -0.2).weights(S)
     np.testing.assert_allclose(one, other[::-1], rtol=1e-14)
-
-
-def test_a_mapping_keeps_what_it_was_given():
-    weights = [1.0, 2.0]
-    array: Any = np.array([1.0])
-    mapping = sensors.SignalMapping(weights, array, [1.0, 0.5, 0.0], "own")
-    weights[0] = 50.0
-    assert mapping.numerator1 == (1.0, 2.0)
-    assert mapping.denominator == (1.0, 0.5)
-    assert eval(repr(mapping), {"SignalMapping": sensors.SignalMapping}) == mapping
-    with pytest.raises(AttributeError, match="cannot assign"):
-        mapping.numerator1 = (3.0,)  # type: ignore[misc]

@@ -15,7 +15,6 @@ from armlock import (
     CommonArm,
     CountError,
     HayesEquation,
-    SingleArm,
     d_curve,
     stability_chart,
     unstable_roots,
@@ -42,6 +41,8 @@ def pointwise(system, x, y):
     chart = stability_chart(system, x, y)
     expected = unstable_roots(system, x, np.array(y)[:, None])
     np.testing.assert_array_equal(chart.counts, expected)
+    np.testing.assert_array_equal(chart.x, x)
+    np.testing.assert_array_equal(chart.y, y)
     return chart
 
 
@@ -64,12 +65,6 @@ class TestHayes:
         np.testing.assert_array_equal(unstable_roots(HayesEquation(), a, -a), BOUNDARY)
         b = -np.pi / 2.0 * np.array([1.0, -3.0, 5.0])
         np.testing.assert_array_equal(unstable_roots(HayesEquation(), 0.0, b), BOUNDARY)
-
-    @given(st.floats(0.01, 50.0), st.floats(-0.999, 0.999))
-    def test_single_arm_is_stable_for_perturbations_below_one(self, gain, perturbation):
-        system = SingleArm(gain=gain)
-        assert unstable_roots(system, perturbation, 0.0) == 0
-        assert unstable_roots(system, 1.0, 0.0) == BOUNDARY
 
 
 class TestCommonArm:
@@ -104,12 +99,6 @@ class TestCommonArm:
         assume(count != BOUNDARY)
         assert count == independent.hayes_count(-2.0 * gain, gain * (c1 + c2), tau)
 
-    @pytest.mark.parametrize("gain", [10.0, 100.0])
-    def test_large_gains_agree_with_a_sampled_contour(self, gain):
-        for c1, c2 in np.random.default_rng(7).uniform(-3.0, 3.0, (2 if gain > 50 else 6, 2)):
-            expected = independent.rectangle_count(CommonArm(gain), c1, c2)
-            assert unstable_roots(CommonArm(gain), c1, c2) == expected
-
     def test_the_ideal_point_and_its_line_are_boundary_points_at_any_gain(self):
         c1 = np.linspace(-3.0, 3.0, 49)
         for gain in (1e-3, 1.0, 10.0, 1000.0):
@@ -124,6 +113,13 @@ class TestCommonArm:
         for c1, c2 in [(1.0, 1.0), (0.6, 1.4)]:
             assert unstable_roots(system, c1 - distance, c2) == 0
             assert unstable_roots(system, c1 + distance, c2) == 1
+
+    def test_next_to_the_boundary_there_is_a_count_far_from_the_ideal_point(self):
+        for x in (3.0, 1e2, 1e4):
+            y = 2.0 + 1e-10 * np.array([-1.0, 1.0]) * x - x
+            counts = unstable_roots(CommonArm(), x, y)
+            np.testing.assert_array_equal(counts % 2, x + y > 2.0)
+            assert (counts >= 0).all()
 
     def test_within_rounding_of_the_boundary_nothing_is_guessed(self):
         # The sign of c1 + c2 - 2 is exact here: c2 = 1 + k eps, and c1 = 1.
@@ -247,11 +243,6 @@ class TestChart:
         x, y = rng.uniform(-2.5, 2.5, 41), rng.uniform(-2.5, 2.5, 23)
         pointwise(RETARDED_AND_NEUTRAL[name], x, y)
 
-    @pytest.mark.parametrize("gain", [0.01, 1.0, 10.0, 100.0])
-    def test_every_point_at_any_gain(self, gain):
-        x, y = np.random.default_rng(12).uniform(-3.0, 3.0, (2, 30))
-        pointwise(CommonArm(gain), x, y if gain < 50 else y[:6])
-
     @given(
         st.lists(reals, min_size=1, max_size=6),
         st.lists(reals, min_size=1, max_size=6),
@@ -261,13 +252,6 @@ class TestChart:
     )
     def test_any_axes_give_the_pointwise_count(self, x, y, gain, tau1, tau2):
         pointwise(CommonArm(gain, tau1, tau2), x, y)
-
-    def test_axes_may_be_unsorted_uneven_and_repeat(self):
-        x = np.array([2.0, -1.0, 0.3, 0.3, 2.9, -1.0, -2.999, 0.30000001])
-        y = np.array([1.7, 1.7, -2.0, 0.0])
-        chart = pointwise(CommonArm(), x, y)
-        np.testing.assert_array_equal(chart.x, x)
-        np.testing.assert_array_equal(chart.y, y)
 
     @pytest.mark.parametrize("width", [1e-9, 1e-12])
     @pytest.mark.parametrize("centre", [(1.0, 1.0), (0.7, 1.3), (2.0, 0.0)])
