@@ -136,7 +136,7 @@ def phase_and_delay(
     Of crossovers up to the frequency `highest`, which is inf unless phases are free above it.
 
     A neutral loop may have crossovers without end. Then its delay margin is zero, and its
-    phase margin may be that of the disc that L fills at high frequency.
+    phase margin may be that of the disc that L fills at high frequency, `limit_margins`.
     """
     phase, delay, where = np.inf, np.inf, np.nan
     last = last_crossover(loop, arm_weights(loop, c1, c2))

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from scipy.optimize import differential_evolution, minimize
 
 from armlock import paper
-from armlock.bounds import last_frequency
+from armlock.boxes import CORNERS, box_counts, edge_crossings
 from armlock.checks import (
     ComplexArray,
     FloatArray,
@@ -30,13 +30,10 @@ from armlock.checks import (
     real_number,
     whole_number,
 )
-from armlock.contour import winding
 from armlock.controllers import Controller
-from armlock.free_phases import clear_above, count_at, last_crossover
+from armlock.free_phases import last_crossover
 from armlock.loops import Loop, checked_loop, paper_loop
 from armlock.margins import Margins, critical_perturbation, margins
-from armlock.rays import Ray
-from armlock.stability import BOUNDARY, UNCONFINED
 from armlock.sweep import sweep
 
 if TYPE_CHECKING:
@@ -54,17 +51,14 @@ MEASURES: Final = {
     "unity gain": False,
     "pulling": False,
 }
-# Corners of the box as seen from (1, 1), each next to the one before; the centre comes first.
-_CORNERS = np.array(((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)))
-_POINTS = np.vstack((np.zeros(2), _CORNERS))
+# The centre of the box and its corners, as seen from there.
+_POINTS = np.vstack((np.zeros(2), CORNERS))
 # Along which the critical perturbation is taken.
 _DIRECTION = (1.0, -1.0)
 # The certified margin behind a measure.
 _MARGINS = {"modulus": "modulus", "phase": "phase", "dead time": "delay"}
 # How far a search may move a parameter either way.
 _DECADES = 1.0
-# How often a box is cut in four before it is given up.
-_CUTS = 6
 # Bounds are searched for with so much to spare: samples miss a little, and the certified bound
 # on the unity gain lies some parts in a thousand above it.
 _SPARE = 4e-3
@@ -192,145 +186,6 @@ def roll_off(first: float, last: float, pairs: int, slope: float = 2.0 / 3.0) ->
     return Controller(
         (-zeros).tolist(), (-poles).tolist(), float(np.prod(poles / np.append(zeros, 1.0)))
     )
-
-
-def box_counts(loop: Loop, size: float, free_above: float | None = None) -> IntArray:
-    r"""Count the unstable roots over a whole box of perturbations.
-
-    Parameters
-    ----------
-    loop : Loop
-        The loop.
-    size : float
-        The box is that of all \|c1 - 1\| <= size and \|c2 - 1\| <= size.
-    free_above : float, optional
-        Angular frequency in rad/s above which both arms' phases are taken as free, to spare the
-        time of a loop that rolls off late.
-
-    Returns
-    -------
-    int array, shape (n,)
-        Certified numbers of unstable roots in the n smaller boxes into which it was cut, each
-        that of all points of one. `BOUNDARY` alone where no cut was fine enough: a root lies on
-        the imaginary axis, or comes close to it, somewhere in the box; or where some phases
-        above `free_above` let a root cross.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If `loop` is no `Loop`, or the size or `free_above` is not positive.
-    CountError
-        As `unstable_roots` does.
-
-    Notes
-    -----
-    From the centre of a box of half its width r to any of its points, D changes by no more than
-    r (\|B1\| + \|B2\|). Where a certified walk along the imaginary axis finds \|D\| larger than
-    this, no root crosses the axis within the box, and all its points have one count. Otherwise
-    it is cut in four, six times at most. The smaller boxes meet, so that the count at (1, 1) is
-    that of all.
-
-    Examples
-    --------
-    >>> from armlock import paper_loop, robust_loop
-    >>> from armlock.design import box_counts
-    >>> [box_counts(loop, 1e-6).tolist() for loop in (robust_loop(), paper_loop())]
-    [[0], [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]]
-    >>> box_counts(paper_loop(), 1.5e-6).tolist()
-    [-1]
-    """
-    checked_loop(loop)
-    size = positive_number("size", size)
-    highest = _end_of_walks(loop, size, free_above)
-    if highest is None:
-        return np.array([BOUNDARY])
-    left, clear = [(1.0, 1.0, size)], 0
-    while left:
-        c1, c2, half = left.pop()
-        if _stays_clear(loop, c1, c2, half, highest):
-            clear += 1
-        elif half < 1.5 * size * 0.5**_CUTS:
-            return np.array([BOUNDARY])
-        else:
-            half *= 0.5
-            left += [(c1 + half * d1, c2 + half * d2, half) for d1, d2 in _CORNERS]
-    return np.full(clear, count_at(loop, 1.0, 1.0, highest))
-
-
-def edge_crossings(loop: Loop, size: float, free_above: float | None = None) -> int:
-    r"""Count the roots that cross the imaginary axis along the edges of a box.
-
-    Parameters
-    ----------
-    loop : Loop
-        The loop.
-    size : float
-        The box is that of all \|c1 - 1\| <= size and \|c2 - 1\| <= size.
-    free_above : float, optional
-        Angular frequency in rad/s above which both arms' phases are taken as free.
-
-    Returns
-    -------
-    int
-        Number of crossings, or `UNCONFINED` if some phases above `free_above` let a root cross
-        for a perturbation of the box. With 0, and no unstable root at one point of the box, all
-        of it is stable.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If `loop` is no `Loop`; the size or `free_above` is not positive; or the neutral root
-        chain is not confined over the box.
-    CountError
-        If gain times delay is too large to follow.
-
-    Notes
-    -----
-    The perturbations with a root at s = j omega solve D(j omega) = 0, two real equations. They
-    lie on curves that go with omega; where the equations depend on one another the curve goes
-    to infinity, or is a line. So a curve that enters the box has to cross one of its edges.
-
-    Examples
-    --------
-    >>> from armlock import paper_loop
-    >>> from armlock.design import edge_crossings
-    >>> [edge_crossings(paper_loop(), size) for size in (1e-6, 1.5e-6)]
-    [0, 2]
-    """
-    checked_loop(loop)
-    size = positive_number("size", size)
-    highest = _end_of_walks(loop, size, free_above)
-    if highest is None:
-        return UNCONFINED
-    intervals = [(0.0, highest)] if math.isfinite(highest) else None
-    corners = 1.0 + size * _CORNERS
-    edges = np.roll(corners, -1, axis=0) - corners
-    return sum(
-        Ray(loop, corner, edge).crossings(1.0, intervals=intervals).position.size
-        for corner, edge in zip(corners, edges, strict=True)
-    )
-
-
-def _end_of_walks(loop: Loop, size: float, free_above: float | None) -> float | None:
-    """Frequency up to which roots may cross in a box; None if some phases let one beyond."""
-    if free_above is None:
-        return math.inf
-    highest = positive_number("free_above", free_above)
-    return highest if clear_above(loop, 1.0 + size, 1.0 + size, highest) else None
-
-
-def _stays_clear(loop: Loop, c1: float, c2: float, half: float, highest: float) -> bool:
-    """Whether no point of a box has a root on the imaginary axis, as far as one walk tells."""
-    end = min(float(last_frequency(loop, abs(c1) + half, abs(c2) + half)), highest)
-    if not np.isfinite(end):
-        return False
-    whole, (_, b1, b2) = loop.at(c1, c2), loop.on_boundary()
-    # The centre is a rounded number itself.
-    uncertain = (half + 1e-15) * (np.abs(b1.sums) + np.abs(b2.sums))
-    argument, _, clear = winding(
-        whole.compiled(), whole.weights, whole.sums, whole.phases, uncertain, end
-    )
-    return bool(clear) and not math.isnan(argument)
 
 
 @dataclass(frozen=True, eq=False)

@@ -97,9 +97,10 @@ def no_margin(c1: float, c2: float, why: str) -> CountError:
 
 
 def arm_weights(loop: Loop, c1: float, c2: float) -> FloatArray:
-    """Return |c1| and |c2|, or the weight of both arms and 0 if they act as one.
+    """Return the weights of the arms' phases: |c1| and |c2|, or one of both arms, and 0.
 
-    They do if their delays are equal, and their responses proportional.
+    Two arms act as one if their delays are equal and their responses proportional. Phases that
+    are free of each other never do.
     """
     if loop.tau1 == loop.tau2 and loop.b1.any():
         ratio = float(loop.b2[-1] / loop.b1[-1])

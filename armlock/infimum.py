@@ -30,7 +30,7 @@ from armlock.exponentials import (
     tangent_distance,
 )
 
-# Turns of the longest delay that are followed at least, where the disc does not help.
+# Turns of the longest delay after which the disc is tried again where it did not help.
 _TURNS = 32.0
 
 #: Places of the four margins in what `free_margins_at` returns, and in levels.
@@ -86,8 +86,12 @@ class _Disc(NamedTuple):
         The rate at which log F changes, and a bound on its second derivative.
     ratio_rate, ratio_bend : complex, float
         The same two for log(G / F).
-    held, swung, swing : complex
-        c of the larger one; c G / F of the other, turned against it; and its logarithm's rate.
+    held : complex
+        The larger one's c; of free phases its magnitude.
+    swung : complex
+        c G / F of the other one, with the phase between the two; of free phases its magnitude.
+    swing : complex
+        The rate at which log(swung) changes.
     nearest : float
         The distance of the nearest root, up to which the bounds hold: within a step they are
         divided by 1 - step / nearest, because |log(1 + x) - x| <= |x|^2 / (2 (1 - |x|)).
@@ -555,7 +559,8 @@ def free_margins(
     `factors` and `arms` are what `_disc` takes. `best` holds values that are known to occur,
     or inf. Returns the smallest values, where they were met (nan for those of `best`), and
     whether the walk came to its end. None is smaller than the result by more than its share
-    `tolerance`.
+    `tolerance`. Where the disc only touches the unit circle, phase and delay may be those of a
+    disc that is larger by a part in 1e9, and thus smaller by some 5e-5 rad.
     """
     best, where = best.copy(), np.full(4, np.nan)
     step = omega_end
@@ -583,6 +588,8 @@ def free_margins(
         if omega + step >= omega_end * (1.0 - 1e-15):
             return best, where, True
         if not step > 1e-12 * omega:
+            # Phase and delay were taken from the larger disc. Over the shortest step only the
+            # distances are left to be certified.
             levels[PHASE], levels[DELAY] = 0.0, 0.0
             step = 1e-12 * omega
             if not _nothing_smaller(disc, omega, step, levels):

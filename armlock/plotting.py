@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from armlock.nyquist import NyquistCurve
     from armlock.stability import StabilityChart
 
-#: Colours of the figures, which the colour-blind tell apart too (Okabe and Ito).
+#: Colours of the figures, which the colour-blind tell apart too (Okabe and Ito). The colour
+#: cycle of armlock.mplstyle has the same.
 BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9"
 #: Fill of the stable region.
 STABLE = "#B8C4CE"

@@ -5,7 +5,7 @@ at the start, and M = d1 B1 exp(-s theta1) + d2 B2 exp(-s theta2), with the dead
 root lies on the imaginary axis where t = D0 / M is real, so that the crossings of a whole ray
 are the zeros of Im(D0 conj(M)): one certified walk finds them all. The first of them is looked
 for only as far up in frequency as a root can cross before the first one so far; of a loop, only
-where free phases let a root cross at all, likely places first.
+where free phases let a root cross at all: the first turns, then likely places, then the rest.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Crossings(NamedTuple):
     position : float array, shape (n,)
         Ascending t of the points start + t direction, all of them positive.
     omega : float array, shape (n,)
-        Frequency of the crossing root in rad/s; 0 for a real one.
+        Frequency of the crossing root in rad/s; 0, or for a map pi / step, for a real one.
     change : int array, shape (n,)
         By how much the number of unstable roots changes there.
     """
@@ -96,15 +96,17 @@ class Ray:
         """Frequency in rad/s past which no root crosses between 0 and t.
 
         The terms with x and y are convex along the ray, and thus largest at one of its ends.
-        inf where the neutral root chain is not confined, nan where a number overflows.
+        inf where the neutral root chain is not confined.
         """
         points = np.array([self.at(0.0), self.at(t)])
-        return float(last_frequency(self.system, *points.T).max())
+        end = float(last_frequency(self.system, *points.T).max())
+        if np.isnan(end):
+            raise CountError(f"no crossings up to t = {t}: a number overflows", points[1:])
+        return end
 
     def chain_limit(self) -> float:
-        """Smallest t at which the neutral root chain is not confined: 0 at the start itself.
+        """Smallest t >= 0 at which the neutral root chain is not confined, or inf.
 
-        inf if there is none.
         The reserve of the chain is linear in t, except where x or y changes its sign.
         """
 
@@ -116,7 +118,7 @@ class Ray:
         with np.errstate(divide="ignore", invalid="ignore"):
             signs_change = -self.start / self.direction
         edges = [0.0, *sorted(t for t in signs_change.tolist() if 0.0 < t < np.inf)]
-        last = 2.0 * max(1.0, edges[-1])
+        last = 2.0 * max(self.scale, edges[-1])
         for low, high in pairwise([*edges, last]):
             left, right = reserve(low), reserve(high)
             # From the last sign on it descends for ever, or stays what it is.
@@ -157,10 +159,6 @@ class Ray:
                 f"the ray must stay where the neutral root chain is confined, but "
                 f"{self.system!r} loses it before t = {stop}"
             )
-        if np.isnan(end):
-            raise CountError(
-                f"no crossings up to t = {stop}: a number overflows", np.array([self.at(stop)])
-            )
         everywhere = intervals is None
         parts = [(0.0, end)] if intervals is None else np.minimum(intervals, end)
         found, hidden = self._crossings(parts, 0.0, stop)
@@ -178,10 +176,11 @@ class Ray:
             self.product, intervals, is_map=self.system.step > 0.0
         )
         # Stretches in which rounding hides the sign, on the way or from omega = 0 on.
-        hidden = bool(((change == 0) | (omega == 0.0) & (width > 0.0)).any())
+        hidden = bool(((change == 0) | ((omega == 0.0) & (width > 0.0))).any())
         omega, change = omega[change != 0], change[change != 0]
-        # Only those in reach are worth polishing. Where M vanishes the quotient is not real: a
-        # root is there at infinite t only.
+        # Only those in reach are worth polishing. Where M vanishes, its product with D0 does,
+        # but D0 / M is large and not real: no root is there. Elsewhere D0 / M need not be quite
+        # real, because omega is not yet polished.
         q = self.quotient(omega)
         rough = np.where(np.abs(q.imag) <= np.abs(q.real) + self.scale, q.real, np.inf)
         near = (rough > lowest) & (rough <= stop * (1.0 + 1e-6))
@@ -221,6 +220,8 @@ class Ray:
             """Frequency past which no root crosses earlier."""
             if reach() < chain:
                 return self.end(reach())
+            # A root that crosses nearer to the limit than these shares is taken for the limit:
+            # the first past so many turns, the second in any case.
             near, nearest = (self.end(chain * (1.0 - share)) for share in (1e-6, 1e-10))
             return max(near, min(nearest, _TURNS_NEXT_TO_THE_CHAIN * turn))
 
@@ -303,10 +304,10 @@ def first_crossing(
 
     Notes
     -----
-    Walks go as far up in frequency as a root can cross before the first one so far. Below the
-    limit of the neutral root chain, roots cross at ever higher frequency. Where the first of
-    them crosses closer to the limit than a part in a million, and at more than 50 000 turns of
-    the longest delay, the limit is returned in its place.
+    Walks go as far up in frequency as a root can cross before the first one so far. As t comes
+    near the limit of the neutral root chain, roots cross at ever higher frequency. The limit is
+    returned in place of a root that crosses closer to it than a part in a million and at more
+    than 50 000 turns of the longest delay, or closer than a part in 1e10.
 
     Examples
     --------

@@ -3,8 +3,8 @@
 Points are counted by the argument principle along s = j omega, with certified steps up to
 a frequency past which no root can cross. With D = N - x M, charts are counted row by row: with
 y fixed, roots cross the axis where Im(N / M) = 0, at x = Re(N / M). Where Im(N / M) ascends
-with omega, they become unstable towards larger x. Each row is checked against an independent
-count at its far end.
+with omega, they become unstable towards larger x. Each row starts from a count just outside of
+the chart, and is checked against an independent one past its far end.
 
 The walks are those of `armlock.contour`. What makes a point a boundary point stands there, in
 `winding`: D is no larger somewhere on the axis than its rounding error, or no step of the walk
@@ -427,7 +427,7 @@ def _chart_rows(system: CharacteristicFunction, x: FloatArray, y: FloatArray) ->
 
 
 def _ends(values: FloatArray, outside: float) -> tuple[float, float]:
-    """Return points just outside an ascending axis."""
+    """Return the two places just outside of an ascending axis at which rows begin and end."""
     span = float(values[-1] - values[0])
     margin = outside * (span / (values.size - 1) if span else max(abs(float(values[0])), 1e-3))
     return float(values[0]) - margin, float(values[-1]) + margin

@@ -22,8 +22,9 @@ from armlock import (
     paper_loop,
     robust_loop,
 )
+from armlock.boxes import box_counts, edge_crossings
 from armlock.controllers import table_two
-from armlock.design import box_counts, edge_crossings, roll_off
+from armlock.design import roll_off
 from armlock.paper import PERTURBATION
 from tests import attack_judge as judge
 from tests.systems import sketch_of

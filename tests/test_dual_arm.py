@@ -88,8 +88,9 @@ def test_a_lost_chain_is_not_passed_over():
     loop = Loop(Controller([], [], 0.3), COMMON, 20.1, 19.9)
     with pytest.raises(ValueError, match=r"^the ray must stay where the neutral root chain"):
         Ray(loop, (0.0, 0.0), (1.0, -1.0)).crossings(3.0)
-    found = first_crossing(loop, (0.0, 0.0), (1.0, -1.0), 3.0)
-    assert found.position == pytest.approx(1.6 / 0.6, rel=1e-12)
-    assert (found.omega, found.change) == (np.inf, 0)
+    for size in (1e-30, 1.0, 1e30):
+        found = first_crossing(loop, (0.0, 0.0), (size, -size), 3.0 / size)
+        assert size * found.position == pytest.approx(1.6 / 0.6, rel=1e-12)
+        assert (found.omega, found.change) == (np.inf, 0)
     assert first_crossing(loop, (6.0, 0.0), (0.0, 1.0), 1.0).position == 0.0
     assert first_crossing(loop, (0.0, 0.0), (1.0, -1.0), 2.5).position == np.inf
