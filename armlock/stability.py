@@ -382,9 +382,9 @@ def stability_chart(
     else:
         # Without B1 nothing crosses along a row: walk along the columns instead.
         counts = _chart_rows(system.exchanged(), ys[order_y], xs[order_x]).T
-    return StabilityChart(
-        system, xs, ys, counts[np.ix_(np.argsort(order_y), np.argsort(order_x))]
-    )
+    if (np.diff(order_x) != 1).any() or (np.diff(order_y) != 1).any():
+        counts = counts[np.ix_(np.argsort(order_y), np.argsort(order_x))]
+    return StabilityChart(system, xs, ys, counts)
 
 
 def _chart_rows(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -> IntArray:
@@ -392,7 +392,6 @@ def _chart_rows(system: CharacteristicFunction, x: FloatArray, y: FloatArray) ->
     left, right = _ends(x, _OUTSIDE[0])
     low, high = _ends(y, _OUTSIDE[1])
     lower, upper = np.full(y.size, left), np.full(y.size, right)
-    confined = np.ones((y.size, x.size), dtype=np.bool_)
     if system.neutral:
         # Rows end half-way between their last confined point and the limit of the chain.
         confined = system.chain_reserve(x, y[:, None]) > 0.0
@@ -419,10 +418,11 @@ def _chart_rows(system: CharacteristicFunction, x: FloatArray, y: FloatArray) ->
     counts, singly, reached = _fill(system, x, y, base, lower, upper)
     # Next to a crossing, and in rows whose crossings do not add up to the count at their end.
     singly[(reached < 0) | (reached != top)] = True
-    singly &= confined
+    if system.neutral:
+        singly &= confined
+        counts[~confined] = UNCONFINED
     rows, across = np.nonzero(singly)
-    counts[singly] = _count(system, x[across], y[rows])
-    counts[~confined] = UNCONFINED
+    counts[rows, across] = _count(system, x[across], y[rows])
     return counts
 
 
