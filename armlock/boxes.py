@@ -32,7 +32,7 @@ def box_counts(loop: Loop, size: float, free_above: float | None = None) -> IntA
     loop : Loop
         The loop.
     size : float
-        The box is that of all \|c1 - 1\| <= size and \|c2 - 1\| <= size.
+        The box is that of all |c1 - 1| <= size and |c2 - 1| <= size.
     free_above : float, optional
         Angular frequency in rad/s above which both arms' phases are taken as free, to spare the
         time of a loop that rolls off late.
@@ -55,7 +55,7 @@ def box_counts(loop: Loop, size: float, free_above: float | None = None) -> IntA
     Notes
     -----
     From the centre of a box of half its width r to any of its points, D changes by no more than
-    r (\|B1\| + \|B2\|). Where a certified walk along the imaginary axis finds \|D\| larger than
+    r (|B1| + |B2|). Where a certified walk along the imaginary axis finds |D| larger than
     this, no root crosses the axis within the box, and all its points have one count. Otherwise
     it is cut in four, six times at most. The smaller boxes meet, so that the count at (1, 1) is
     that of all.
@@ -95,7 +95,7 @@ def edge_crossings(loop: Loop, size: float, free_above: float | None = None) -> 
     loop : Loop
         The loop.
     size : float
-        The box is that of all \|c1 - 1\| <= size and \|c2 - 1\| <= size.
+        The box is that of all |c1 - 1| <= size and |c2 - 1| <= size.
     free_above : float, optional
         Angular frequency in rad/s above which both arms' phases are taken as free.
 

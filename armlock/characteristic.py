@@ -214,7 +214,7 @@ class CharacteristicFunction:
         Returns
         -------
         float array, of the broadcast shape
-            Left less right side over \|a\|, and zero where rounding hides the sign. Negative or
+            Left less right side over |a|, and zero where rounding hides the sign. Negative or
             zero: the chain is not confined to the left half-plane. One for a retarded
             equation and for a map, which has no such chain.
         """

@@ -435,17 +435,17 @@ def design(
     constraints : mapping of str to float
         Bounds on the others:
 
-        - "suppression": smallest \|K\| over the goal, in dB
+        - "suppression": smallest |K| over the goal, in dB
         - "critical perturbation": along (1, -1)
         - "modulus", "modulus in the box": modulus margin at (1, 1), and in the worst corner
         - "phase", "phase in the box": phase margin at (1, 1), and in the worst corner, in rad
         - "dead time": the smallest additional one that makes the loop unstable, in s
-        - "unity gain": highest frequency with \|L\| = 1 at any phase of the arms, in Hz; from
+        - "unity gain": highest frequency with |L| = 1 at any phase of the arms, in Hz; from
           above
-        - "pulling": largest \|Y_-\|, from a difference of the arms' errors to the laser; from
+        - "pulling": largest |Y_-|, from a difference of the arms' errors to the laser; from
           above
     goal : tuple of two sequences of floats, optional
-        Frequencies in Hz, and the \|K\| that suppression is relative to. By default that of
+        Frequencies in Hz, and the |K| that suppression is relative to. By default that of
         the structure, at 60 frequencies from 0.1 mHz to 1 Hz.
     box : float, optional
         Perturbations of either arm for which the loop is to be stable.
