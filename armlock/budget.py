@@ -37,7 +37,8 @@ BEAT_NOTES = (15e6, -14e6)
 SPACECRAFT_MOTION = 2.5e-3
 #: Corner in Hz of the roll-off 1/sqrt(1 + (f / corner)^4) of that motion.
 MOTION_CORNER = 0.3
-#: Noise of a free-running laser at 1 Hz in Hz/sqrt(Hz); it falls as 1/f.
+#: Noise of a free-running laser at 1 Hz in Hz/sqrt(Hz); it falls as 1/f. The paper's is
+#: `armlock.paper.LASER_NOISE`.
 FREE_RUNNING = 3e4
 #: What disturbs the locked laser.
 SOURCES = ("laser", "shot", "clock", "motion")

@@ -24,6 +24,7 @@ from armlock.checks import (
     complex_array,
     positive_number,
     real_number,
+    whole_number,
 )
 
 # Decimal digits in which the zeros of parallel branches are found.
@@ -306,3 +307,58 @@ def white_paper(gain: float = 40.0) -> Controller:
     high_pass = Controller((0.0,) * 4, (-p1, -p1, -p1, -p2), positive_number("gain", gain))
     lead = Controller((-z3,) * 5, (-p3,) * 5, (p3 / z3) ** 5)
     return high_pass * lead * _parallel_branches()
+
+
+def roll_off(first: float, last: float, pairs: int, slope: float = 2.0 / 3.0) -> Controller:
+    r"""Return a controller whose gain falls by a share of a power of the frequency.
+
+    Poles and zeros take turns. With n pairs, and r = (last / first)^(1 / n), it is
+
+    .. math::
+
+        C(s) = \frac{1}{1 + s / p_n}
+        \prod_{k=0}^{n-1} \frac{1 + s / z_k}{1 + s / p_k} , \qquad
+        p_k = 2 \pi\, \mathrm{first}\; r^k , \quad z_k = r^{\mathrm{slope}}\, p_k .
+
+    By Bode's relation its phase is near -90 degrees times the slope between the two ends.
+
+    Parameters
+    ----------
+    first, last : float
+        Frequencies of the first and the last pole in Hz.
+    pairs : int
+        Number of zeros; there is one pole more.
+    slope : float, optional
+        Power of the frequency by which the gain falls, between zero and one.
+
+    Returns
+    -------
+    Controller
+        With a gain of one at low frequency.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If `first` or the slope is not positive, `last` is not above `first`, the slope is not
+        below one, or `pairs` is no whole number from one on.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from armlock.controllers import roll_off
+    >>> shallow = roll_off(1e-2, 1e4, 6)
+    >>> print(f"{abs(complex(shallow(2j * np.pi * 10.0))):.4f}")
+    0.0079
+    """
+    first, last = positive_number("first", first), positive_number("last", last)
+    slope, pairs = positive_number("slope", slope), whole_number("pairs", pairs, 1)
+    if last <= first:
+        raise ValueError(f"last must be above first ({first}), got {last}")
+    if slope >= 1.0:
+        raise ValueError(f"slope must be below one, got {slope}")
+    step = (last / first) ** (1.0 / pairs)
+    poles = 2.0 * np.pi * first * step ** np.arange(pairs + 1)
+    zeros = poles[:-1] * step**slope
+    return Controller(
+        (-zeros).tolist(), (-poles).tolist(), float(np.prod(poles / np.append(zeros, 1.0)))
+    )

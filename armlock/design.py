@@ -133,61 +133,6 @@ def buildable_loop() -> Loop:
     return paper_loop(controller=controller, delay=12.3e-6)
 
 
-def roll_off(first: float, last: float, pairs: int, slope: float = 2.0 / 3.0) -> Controller:
-    r"""Return a controller whose gain falls by a share of a power of the frequency.
-
-    Poles and zeros take turns. With n pairs, and r = (last / first)^(1 / n), it is
-
-    .. math::
-
-        C(s) = \frac{1}{1 + s / p_n}
-        \prod_{k=0}^{n-1} \frac{1 + s / z_k}{1 + s / p_k} , \qquad
-        p_k = 2 \pi\, \mathrm{first}\; r^k , \quad z_k = r^{\mathrm{slope}}\, p_k .
-
-    By Bode's relation its phase is near -90 degrees times the slope between the two ends.
-
-    Parameters
-    ----------
-    first, last : float
-        Frequencies of the first and the last pole in Hz.
-    pairs : int
-        Number of zeros; there is one pole more.
-    slope : float, optional
-        Power of the frequency by which the gain falls, between zero and one.
-
-    Returns
-    -------
-    Controller
-        With a gain of one at low frequency.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If `first` or the slope is not positive, `last` is not above `first`, the slope is not
-        below one, or `pairs` is no whole number from one on.
-
-    Examples
-    --------
-    >>> import math
-    >>> from armlock.design import roll_off
-    >>> shallow = roll_off(1e-2, 1e4, 6)
-    >>> print(f"{abs(complex(shallow(2j * math.pi * 10.0))):.4f}")
-    0.0079
-    """
-    first, last = positive_number("first", first), positive_number("last", last)
-    slope, pairs = positive_number("slope", slope), whole_number("pairs", pairs, 1)
-    if last <= first:
-        raise ValueError(f"last must be above first ({first}), got {last}")
-    if slope >= 1.0:
-        raise ValueError(f"slope must be below one, got {slope}")
-    step = (last / first) ** (1.0 / pairs)
-    poles = 2.0 * math.pi * first * step ** np.arange(pairs + 1)
-    zeros = poles[:-1] * step**slope
-    return Controller(
-        (-zeros).tolist(), (-poles).tolist(), float(np.prod(poles / np.append(zeros, 1.0)))
-    )
-
-
 @dataclass(frozen=True, eq=False)
 class Design:
     """What a search found.

@@ -13,8 +13,7 @@ import pytest
 import armlock
 from armlock import CharacteristicFunction, CommonArm, HayesEquation, SingleArm, paper_loop
 from armlock.checks import axis, finite_series, real_array
-from armlock.controllers import integrating_actuator, stage_one, table_two
-from armlock.design import roll_off
+from armlock.controllers import integrating_actuator, roll_off, stage_one, table_two
 from armlock.noise import band_rms
 from armlock.rays import first_crossing
 from armlock.roots import extended_root

@@ -23,8 +23,7 @@ from armlock import (
     robust_loop,
 )
 from armlock.boxes import box_counts, edge_crossings
-from armlock.controllers import table_two
-from armlock.design import roll_off
+from armlock.controllers import roll_off, table_two
 from armlock.paper import PERTURBATION
 from tests import attack_judge as judge
 from tests.systems import sketch_of
