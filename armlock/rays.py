@@ -160,6 +160,8 @@ class Ray:
                 f"{self.system!r} loses it before t = {stop}"
             )
         everywhere = intervals is None
+        if not self.acts():
+            return Crossings(np.empty(0), np.empty(0), np.empty(0, dtype=np.int64))
         parts = [(0.0, end)] if intervals is None else np.minimum(intervals, end)
         found, hidden = self._crossings(parts, 0.0, stop)
         if hidden and everywhere:
@@ -167,11 +169,12 @@ class Ray:
         return found
 
     def _crossings(
-        self, intervals: npt.ArrayLike, lowest: float, stop: float
+        self, intervals: npt.ArrayLike, lowest: float, stop: float, *, first: bool = False
     ) -> tuple[Crossings, bool]:
-        """Find crossings on intervals of the axis; return whether rounding may hide some."""
-        if not self.acts():
-            return Crossings(np.empty(0), np.empty(0), np.empty(0, dtype=np.int64)), False
+        """Find crossings on intervals of the axis; return whether rounding may hide some.
+
+        All with `lowest` < t <= stop, or the first and what ties with it.
+        """
         omega, change, width = sign_changes(
             self.product, intervals, is_map=self.system.step > 0.0
         )
@@ -184,6 +187,8 @@ class Ray:
         q = self.quotient(omega)
         rough = np.where(np.abs(q.imag) <= np.abs(q.real) + self.scale, q.real, np.inf)
         near = (rough > lowest) & (rough <= stop * (1.0 + 1e-6))
+        if first and near.any():
+            near &= rough <= rough[near].min() * (1.0 + 1e-6)
         omega, change = omega[near], change[near]
         omega = polished(lambda w: self.quotient(w).imag, omega, (1e-7 * omega,))
         position = self.quotient(omega).real
@@ -210,6 +215,8 @@ class Ray:
         if chain == 0.0:
             return Crossing(0.0, np.inf, 0)
         best = Crossing(chain, np.inf, 0) if chain <= stop else Crossing(np.inf, np.nan, 0)
+        if not self.acts():
+            return best
         hidden = False
         turn = 2.0 * np.pi / max(self.system.longest_delay, 1e-12)
 
@@ -228,7 +235,8 @@ class Ray:
         def look(intervals: FloatArray) -> None:
             nonlocal best, hidden
             # A boundary at the start itself, known to rounding, is not a crossing beyond it.
-            found, doubtful = self._crossings(intervals, 1e-15 * self.scale, reach())
+            lowest = 1e-15 * self.scale
+            found, doubtful = self._crossings(intervals, lowest, reach(), first=True)
             hidden |= doubtful
             if found.position.size:
                 best = Crossing(*(values[0].item() for values in found))
