@@ -21,10 +21,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 from scipy.linalg import solve_continuous_lyapunov
 
-from armlock.checks import ComplexArray, FloatArray
+from armlock.checks import ComplexArray, FloatArray, positive_number, real_array
 from armlock.compiled import njit
 from armlock.controllers import Controller
 from armlock.sensors import SignalMapping
@@ -88,7 +89,7 @@ class SampledSensor(NamedTuple):
     direct: tuple[float, float]
 
 
-def warped(omega: FloatArray, sample_rate: float) -> FloatArray:
+def warped(omega: npt.ArrayLike, sample_rate: float) -> FloatArray:
     r"""Frequency at which a continuous system responds as the sampled one does at `omega`.
 
     With the sampling step T it is
@@ -99,7 +100,7 @@ def warped(omega: FloatArray, sample_rate: float) -> FloatArray:
 
     Parameters
     ----------
-    omega : float array
+    omega : array_like of float
         In rad/s. At pi times the sample rate the result is infinite but for rounding, and past
         it that of the frequency it is an alias of.
     sample_rate : float
@@ -109,8 +110,14 @@ def warped(omega: FloatArray, sample_rate: float) -> FloatArray:
     -------
     float array, shaped like `omega`
         In rad/s.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a frequency is not finite and real, or the sample rate not positive.
     """
-    return np.asarray(2.0 * sample_rate * np.tan(0.5 * omega / sample_rate))
+    rate = positive_number("sample_rate", sample_rate)
+    return np.asarray(2.0 * rate * np.tan(0.5 * real_array("omega", omega) / rate))
 
 
 def sampled_filter(controller: Controller, sample_rate: float) -> SampledFilter:
@@ -154,7 +161,7 @@ def sampled_filter(controller: Controller, sample_rate: float) -> SampledFilter:
             f"controller must be proper, got more zeros than poles: {zeros.size} and "
             f"{poles.size}"
         )
-    half = 0.5 / sample_rate
+    half = 0.5 / positive_number("sample_rate", sample_rate)
     at_infinity = poles.size - zeros.size
     factors = np.append(1.0 - half * zeros, np.full(at_infinity, half)) / (1.0 - half * poles)
     finite = 2.0 * half * zeros / (1.0 - half * zeros)

@@ -14,6 +14,7 @@ import armlock
 from armlock import CharacteristicFunction, CommonArm, HayesEquation, SingleArm, paper_loop
 from armlock.checks import axis, finite_series, real_array
 from armlock.controllers import integrating_actuator, roll_off, stage_one, table_two
+from armlock.discretize import warped
 from armlock.noise import band_rms
 from armlock.rays import first_crossing
 from armlock.roots import extended_root
@@ -87,6 +88,7 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     armlock.transfer: {"loop": ARMS, "source": "laser", "s": 1j} | POINT,
     armlock.closed_loop: {"loop": ARMS, "omega": [1.0]} | POINT,
     armlock.noise_budget: {"loop": ARMS, "frequency": [1.0], "laser": 1.0, "requirement": 1.0},
+    warped: {"omega": 1.0, "sample_rate": 10.0},
     roll_off: {"first": 1.0, "last": 2.0, "pairs": 3, "slope": 0.5},
     armlock.pulling: {"loop": CommonArm(), "time": 1e5, "common": (1.0, 0.0, 0.0),
                       "differential": (0.0, 0.0, 0.0)},
