@@ -215,8 +215,8 @@ def search_outwards(
 ) -> None:
     """Look at intervals of the axis, the most promising first, until nothing is left.
 
-    First come the first turns of the delays. While many more turns are left than that, those
-    around likely places come next. Last comes all that is left.
+    First come the first turns of the delays. While many more turns are left than lie around
+    likely places, these come next. Last comes all that is left.
 
     Parameters
     ----------

@@ -52,9 +52,8 @@ def _no_crossing_from(loop: Loop, c1: float, c2: float, low: float, high: float)
     """Frequency in rad/s past which no gain factor of a range takes a root across the axis.
 
     With t = 1 / k from 1 / high to 1 / low, and C = B1 + B2, |t R + C| must exceed
-    |c1 B1| + |c2 B2|. Its square
-    is convex in t. If it ascends at the lower end of the interval, it is smallest there; if it
-    descends at the upper end, there.
+    |c1 B1| + |c2 B2|. Its square is convex in t. If it ascends at the lower end of the
+    interval, it is smallest there; if it descends at the upper end, there.
     """
     c, arms = polynomial_sum(loop.b1, loop.b2), arm_weights(loop, c1, c2)
     found = [last_crossover(loop, arms, high)]

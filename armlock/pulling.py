@@ -86,8 +86,8 @@ def pulling(
         found = chain if count == UNCONFINED else f"{count} unstable roots"
         raise ValueError(f"loop must be stable at c1 = c2 = 1, got {found}")
     total = np.zeros(t.shape)
-    errors = {"common": _error("common", common)}
-    errors["differential"] = _error("differential", differential)
+    given = {"common": common, "differential": differential}
+    errors = {source: _error(source, values) for source, values in given.items()}
     for source, error in errors.items():
         if error.any():
             total += _residues(loop, t, source, error)
