@@ -19,9 +19,14 @@ from armlock.exponentials import real_horner
 
 
 @njit(cache=True)
-def _taylor_signs_positive(q: FloatArray, shift: float) -> bool:
-    """Whether all coefficients of q(w + shift) are positive beyond rounding, or zero."""
-    p, magnitude = q.copy(), np.abs(q)
+def _taylor_signs_positive(q: FloatArray, shift: float, room: FloatArray) -> bool:
+    """Whether all coefficients of q(w + shift) are positive beyond rounding, or zero.
+
+    `room`, shape (2, q.size), is overwritten.
+    """
+    p, magnitude = room
+    for k in range(q.size):
+        p[k], magnitude[k] = q[k], abs(q[k])
     for i in range(q.size - 1):
         for k in range(q.size - 2, i - 1, -1):
             p[k] += shift * p[k + 1]
@@ -41,11 +46,12 @@ def last_root_bound(q: FloatArray) -> float:
     top = q.size - 1
     while top > 0 and q[top] == 0.0:
         top -= 1
-    q = q[: top + 1].copy()
+    q = q[: top + 1]
+    room = np.empty((2, q.size))
     for value in q:
         if not np.isfinite(value):
             return np.nan
-    if _taylor_signs_positive(q, 0.0):
+    if _taylor_signs_positive(q, 0.0, room):
         return 0.0
     if not q[top] > 0.0:
         return np.inf
@@ -53,16 +59,16 @@ def last_root_bound(q: FloatArray) -> float:
     for k in range(1, q.size):
         upper = max(upper, 2.0 * (abs(q[top - k]) / q[top]) ** (1.0 / k))
     for _ in range(60):
-        if _taylor_signs_positive(q, upper):
+        if _taylor_signs_positive(q, upper, room):
             break
         upper *= 2.0
     lower = 0.5 * upper
-    while lower > 1e-60 * upper and _taylor_signs_positive(q, lower):
+    while lower > 1e-60 * upper and _taylor_signs_positive(q, lower, room):
         upper = lower
         lower *= 0.5
     for _ in range(6):
         middle = np.sqrt(lower * upper)
-        if _taylor_signs_positive(q, middle):
+        if _taylor_signs_positive(q, middle, room):
             upper = middle
         else:
             lower = middle

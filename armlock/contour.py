@@ -153,15 +153,11 @@ def winding(
     if phases.size and phases.any():
         block = _BLOCK * 2.0 * np.pi / np.abs(phases).max()
     while omega < omega_end or value == 0j:
-        start, reach, end, local, sizes = piece(polynomials, weights, sums, omega)
+        start, reach, end, local, sizes = piece(polynomials, weights, sums, omega, uncertain)
         end = min(end, omega_end)
         span = start, reach
         bound = curvature_bound(start, reach, local, phases)
         error = rounding_bound(start, reach, sizes, phases, ROUNDING)
-        # What the uncertainty of `sums` adds to the error: the magnitudes in row 0.
-        off = piece(polynomials, weights[:0], uncertain, omega)[4]
-        for k in range(min(off.shape[1], error.size)):
-            error[k] += off[0, k]
         value = evaluate(start, reach, local, phases, omega)[0]
         if abs(value) <= real_horner(error, (omega - start) / reach):
             return argument, value, False
@@ -172,8 +168,6 @@ def winding(
             slow_error = rounding_bound(start, reach, sizes, rates, ROUNDING)
             for k in range(fast.size):
                 slow_error[k] += fast[k]
-            for k in range(min(off.shape[1], slow_error.size)):
-                slow_error[k] += off[0, k]
         while omega < end:
             if many and end - omega > block:
                 turned, following, _, more = _follow(

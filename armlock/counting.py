@@ -26,7 +26,7 @@ from armlock.contour import (
     remaining_argument,
     winding,
 )
-from armlock.exponentials import EPSILON, evaluate, piece
+from armlock.exponentials import EPSILON
 
 # What `count_point` returns where it is no number of roots. The first two mean what
 # `armlock.stability.unstable_roots` says: BOUNDARY where `winding` meets a value within its
@@ -57,8 +57,8 @@ class PointModel(NamedTuple):
         The parameters (x0, y0).
     phases : float array, shape (groups,)
         Phase rates in s.
-    a_sums : float array, shape (k,)
-        The weights of A alone.
+    sign : float
+        That of the highest coefficient of A, 1 or -1.
     roots : complex array
         The roots of A.
     is_map : bool
@@ -70,7 +70,7 @@ class PointModel(NamedTuple):
     sums: FloatArray
     reference: FloatArray
     phases: FloatArray
-    a_sums: FloatArray
+    sign: float
     roots: ComplexArray
     is_map: bool
 
@@ -164,11 +164,15 @@ def count_point(model: PointModel, x: float, y: float, end: float) -> int:
         count = model.roots.size - argument / np.pi
     else:
         # From `end` on |D / A - 1| < 1, so that D / A does not go around zero: its argument at
-        # `end` is taken back. That of A is known from its roots.
-        start, reach, _, local, _ = piece(model.polynomials, weights[0, :0], model.a_sums, end)
-        a = evaluate(start, reach, local, phases[:0], end)[0]
+        # `end` is taken back. That of A is known from its roots, there and at infinity.
+        remaining = remaining_argument(model.roots, end)
+        a = model.sign * np.exp(1j * (0.5 * np.pi * model.roots.size - remaining))
         ratio = value * a.conjugate()
-        argument += remaining_argument(model.roots, end) - np.arctan2(ratio.imag, ratio.real)
+        apart = np.arctan2(ratio.imag, ratio.real)
+        if abs(apart) > 0.51 * np.pi:
+            # |D / A - 1| < 1 does not allow that.
+            return DOUBTFUL
+        argument += remaining - apart
         count = 0.5 * model.roots.size - argument / np.pi
     nearest = int(np.floor(count + 0.5)) if np.isfinite(count) else -1
     if abs(count - nearest) > 1e-3 or nearest < 0:

@@ -342,12 +342,17 @@ def _reach(roots: ComplexArray, starts: IntArray, omega: float, most: float) -> 
 
 @njit(cache=True)
 def piece(
-    polynomials: tuple[Any, ...], weights: FloatArray, sums: FloatArray, omega: float
+    polynomials: tuple[Any, ...],
+    weights: FloatArray,
+    sums: FloatArray,
+    omega: float,
+    uncertain: FloatArray | None = None,
 ) -> tuple[float, float, float, ComplexArray, FloatArray]:
     """Expand an exponential sum over the piece of the axis that starts at omega.
 
     `polynomials` is what `ExponentialSum.compiled` returns; weights, shape (groups, k), and
-    sums, shape (k,), are those of the sum. Of polynomials of low degree the whole axis is one
+    sums, shape (k,), are those of the sum. `uncertain` holds how far the entries of `sums` may
+    be off; the magnitudes contain it. Of polynomials of low degree the whole axis is one
     piece, with a start of zero and a reach of one. Returns `start` and `reach`, with
     u = (omega - start) / reach from 0 to 1 over any other piece; where the piece ends; the
     coefficients in powers of u of the sum, then of each group, shape (1 + groups, n); and
@@ -370,11 +375,14 @@ def piece(
     for g in range(1 + groups):
         for k in range(number):
             weight = sums[k] if g == 0 else weights[g - 1, k]
-            if weight != 0.0:
+            magnitude = abs(weight)
+            if g == 0 and uncertain is not None:
+                magnitude += uncertain[k] / (ROUNDING * EPSILON)
+            if magnitude != 0.0:
                 for m in range(size):
                     local[g, m] += weight * coefficients[k, m]
-                    sizes[g, m] += abs(weight) * magnitudes[k, m]
-                sizes[g, size] += abs(weight) * left_out[k] / EPSILON
+                    sizes[g, m] += magnitude * magnitudes[k, m]
+                sizes[g, size] += magnitude * left_out[k] / EPSILON
     if not expanded:
         return start, reach, end, local, sizes
     # Powers that rounding hides are not worth their time.

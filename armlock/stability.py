@@ -104,8 +104,7 @@ def _point_model(system: CharacteristicFunction) -> PointModel:
         sums=np.array([rest, terms[1].sums, terms[2].sums]),
         reference=np.array(system.reference),
         phases=phases,
-        # Not used for a map.
-        a_sums=rest if system.delay else terms[0].sums,
+        sign=float(np.sign(system.a[-1])),
         roots=system.roots_of_a,
         is_map=system.step > 0.0,
     )
@@ -192,8 +191,7 @@ def _count(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -> IntA
                 points,
             )
         raise CountError(
-            f"{at} and {len(points) - 1} further points: the argument of D does not add up to "
-            f"a whole number of turns",
+            f"{at} and {len(points) - 1} further points: the argument of D does not add up",
             points,
         )
     return counts
