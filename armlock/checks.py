@@ -17,6 +17,8 @@ BoolArray = npt.NDArray[np.bool_]
 
 # Kinds of dtype that are real numbers: integers, unsigned integers and floats.
 _REAL = "iuf"
+# Of the machine's memory, the share that one request may take.
+_MEMORY_SHARE = 0.5
 
 
 def real_number(name: str, value: object) -> float:
@@ -113,10 +115,10 @@ def broadcast_pair(
 
 
 def check_memory(name: str, shape: tuple[int, ...], bytes_each: int) -> None:
-    """Raise if so many values would take more than half of the machine's memory."""
+    """Raise if so many values would take more than a share of the machine's memory."""
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     needed = math.prod(shape) * bytes_each
-    if needed > memory // 2:
+    if needed > _MEMORY_SHARE * memory:
         times = " x ".join(str(size) for size in shape)
         raise ValueError(
             f"{name} must be of a size that memory holds, got {times} points: about "

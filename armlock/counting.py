@@ -28,16 +28,19 @@ from armlock.contour import (
 )
 from armlock.exponentials import EPSILON
 
-# What `count_point` returns where it is no number of roots. The first two mean what
-# `armlock.stability.unstable_roots` says: BOUNDARY where `winding` meets a value within its
-# rounding error, or can certify no step; UNCONFINED where `armlock.bounds.last_frequency` is
-# infinite, because the neutral root chain is not confined. DOUBTFUL and TOO_LONG become errors
-# there, but for the DOUBTFUL of `fill_rows`, after which a row's points are counted singly.
-# UNTRIED stands for points after one that took too long.
+# What `count_point` returns where it is no number of roots. `armlock.stability.unstable_roots`
+# returns the first two as well, and makes errors of DOUBTFUL and TOO_LONG.
+#
+# A root lies on the axis: `winding` meets a value within its rounding error, or can certify no
+# step.
 BOUNDARY = -1
+# The neutral root chain is not confined: `armlock.bounds.last_frequency` is infinite.
 UNCONFINED = -2
+# The argument does not add up. Of a row of a chart: its points are to be counted one by one.
 DOUBTFUL = -3
+# The walk takes too many steps.
 TOO_LONG = -4
+# A point after one that took too long.
 UNTRIED = -5
 
 

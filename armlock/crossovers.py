@@ -10,12 +10,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from armlock import infimum
+from armlock import discs
 from armlock.bounds import last_larger
 from armlock.checks import FloatArray
 from armlock.exponentials import ExponentialSum
 from armlock.free_phases import (
-    TOLERANCE,
     arm_factors,
     arm_parameters,
     arm_weights,
@@ -31,6 +30,8 @@ from armlock.free_phases import (
 from armlock.loops import Loop, loop_numerator
 from armlock.stability import polished, sign_changes
 
+#: Relative accuracy of |L| at a crossover, and of a phase margin that L has at high frequency.
+TOLERANCE = 1e-6
 # Crossovers that are polished: those with the smallest margins.
 _POLISHED = 8
 
@@ -111,8 +112,8 @@ def settled_from(loop: Loop, c1: float, c2: float, phase: float) -> float:
     centre, radius = limit_disc(loop, c1, c2)
 
     def phase_within(slack: float) -> float:
-        limit = infimum.free_margins_at(complex(centre), radius + slack, np.inf)
-        return float(limit[infimum.PHASE])
+        limit = discs.free_margins_at(complex(centre), radius + slack, np.inf)
+        return float(limit[discs.PHASE])
 
     slack = 1e-3
     while phase_within(slack) < (1.0 - TOLERANCE) * phase and slack > 1e-12:
@@ -142,7 +143,7 @@ def phase_and_delay(
     last = last_crossover(loop, arm_weights(loop, c1, c2))
     if not np.isfinite(highest):
         limit = limit_margins(loop, c1, c2)
-        phase, delay = float(limit[infimum.PHASE]), float(limit[infimum.DELAY])
+        phase, delay = float(limit[discs.PHASE]), float(limit[discs.DELAY])
         where = np.inf if delay == 0.0 else np.nan
         if not np.isfinite(last):
             last = settled_from(loop, c1, c2, phase)
@@ -153,8 +154,8 @@ def phase_and_delay(
         return meeting_intervals(loop, c1, c2, span, levels=(0.0, 0.0, phase, delay))
 
     def likely(omega: FloatArray) -> FloatArray:
-        free = infimum.free_margins_over(arm_factors(loop), arm_parameters(loop, c1, c2), omega)
-        nearest: FloatArray = omega[np.argmin(free[:, infimum.PHASE :], axis=0)]
+        free = discs.free_margins_over(arm_factors(loop), arm_parameters(loop, c1, c2), omega)
+        nearest: FloatArray = omega[np.argmin(free[:, discs.PHASE :], axis=0)]
         return nearest
 
     def look(intervals: FloatArray) -> None:

@@ -55,6 +55,8 @@ MEASURES: Final = {
 _POINTS = np.vstack((np.zeros(2), CORNERS))
 # Along which the critical perturbation is taken.
 _DIRECTION = (1.0, -1.0)
+# The band in Hz of the suppression by default, and the number of its frequencies.
+_GOAL_BAND = (1e-4, 1.0, 60)
 # The certified margin behind a measure.
 _MARGINS = {"modulus": "modulus", "phase": "phase", "dead time": "delay"}
 # How far a search may move a parameter either way.
@@ -514,7 +516,7 @@ def _checked_goal(
     structure: Loop, goal: tuple[npt.ArrayLike, npt.ArrayLike] | None
 ) -> tuple[FloatArray, FloatArray]:
     if goal is None:
-        frequency = np.geomspace(1e-4, 1.0, 60)
+        frequency = np.geomspace(*_GOAL_BAND)
         return frequency, np.abs(structure.controller(2j * np.pi * frequency))
     frequency, size = (positive_array("goal", axis("goal", values)) for values in goal)
     if frequency.shape != size.shape:

@@ -9,7 +9,7 @@ Those of high degree are expanded anew in each *piece* of the axis, from their r
 decades of frequency one expansion would lose its digits.
 
 Within a piece a sum has a value and a derivative, a bound on its second derivative, and a
-bound on its rounding error. The walks of `armlock.contour` and `armlock.infimum` need no more.
+bound on its rounding error. The walks along the axis need no more.
 """
 
 from __future__ import annotations

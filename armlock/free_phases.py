@@ -15,15 +15,14 @@ from itertools import zip_longest
 import numpy as np
 from numpy.polynomial import polynomial as poly
 
-from armlock import contour, infimum
+from armlock import contour, discs
 from armlock.bounds import last_larger
 from armlock.checks import ComplexArray, FloatArray, IntArray
 from armlock.loops import Loop
 from armlock.stability import CountError, unstable_roots
 
-#: Relative accuracy of modulus and disk margins, and of |L| at a crossover. A distance of L
-#: from -1 below it is as good as none.
-TOLERANCE = 1e-6
+# A distance of L from -1 below it is as good as none.
+_TOUCHING = 1e-6
 #: A search begins with so many turns of the longest delay.
 FIRST_TURNS = 1e3
 # Then it looks at so many on either side of a likely place, and so many times more when it has
@@ -59,7 +58,7 @@ def free_disc(
 ) -> tuple[ComplexArray, FloatArray]:
     """Centres and radii of the discs that L fills at frequencies, both arms' phases free.
 
-    `armlock.infimum` has the same, with the phase between the arms where it is known.
+    `armlock.discs` has the same, with the phase between the arms where it is known.
     """
     first, second = loop.arm_responses(1j * omega)
     return first + second, np.abs(c1 * first) + np.abs(c2 * second)
@@ -68,7 +67,7 @@ def free_disc(
 def limit_margins(loop: Loop, c1: float, c2: float) -> FloatArray:
     """Margins of the disc that L fills at high frequency.
 
-    In the order of `infimum.free_margins_at`: modulus, ratio, phase in rad, delay in s.
+    In the order of `discs.free_margins_at`: modulus, ratio, phase in rad, delay in s.
 
     Raises
     ------
@@ -76,12 +75,12 @@ def limit_margins(loop: Loop, c1: float, c2: float) -> FloatArray:
         If the disc holds -1: the neutral root chain is not confined.
     """
     centre, radius = limit_disc(loop, c1, c2)
-    found: FloatArray = infimum.free_margins_at(complex(centre), radius, np.inf)
-    if not found[infimum.MODULUS] > 0.0:
+    found: FloatArray = discs.free_margins_at(complex(centre), radius, np.inf)
+    if not found[discs.MODULUS] > 0.0:
         raise unconfined(c1, c2)
     if abs(centre) + radius >= 1.0:
         # L does not roll off: any delay more destabilises it at high frequency.
-        found[infimum.DELAY] = 0.0
+        found[discs.DELAY] = 0.0
     return found
 
 
@@ -138,7 +137,7 @@ def last_crossover(loop: Loop, weights: FloatArray, gain: float = 1.0) -> float:
 
 @lru_cache(maxsize=64)
 def arm_factors(loop: Loop) -> tuple[ComplexArray, IntArray, FloatArray]:
-    """Return the responses to the two arms as `armlock.infimum` takes them.
+    """Return the responses to the two arms as `armlock.discs` takes them.
 
     The roots of their factors, the powers of these in both, shape (2, roots), and the highest
     coefficients.
@@ -165,7 +164,7 @@ def arm_factors(loop: Loop) -> tuple[ComplexArray, IntArray, FloatArray]:
 
 
 def arm_parameters(loop: Loop, c1: float, c2: float, *, free: bool = False) -> FloatArray:
-    """Return what `armlock.infimum` needs of the arms beside their responses.
+    """Return what `armlock.discs` needs of the arms beside their responses.
 
     If `free`, both phases are free at all frequencies.
     """
@@ -184,10 +183,10 @@ def meeting_intervals(
 ) -> FloatArray:
     """Intervals, in rad/s and of shape (n, 2), on which L may meet a target at some phases.
 
-    Intervals of a span of the axis. The target is that of `armlock.infimum.meeting_intervals`.
+    Intervals of a span of the axis. The target is that of `armlock.discs.meeting_intervals`.
     With `free`, that of `arm_parameters`, they hold for all smaller perturbations, too.
     """
-    found: FloatArray = infimum.meeting_intervals(
+    found: FloatArray = discs.meeting_intervals(
         arm_factors(loop),
         arm_parameters(loop, c1, c2, free=free),
         np.array(segment),
@@ -202,7 +201,7 @@ def crossing_intervals(
     loop: Loop, c1: float, c2: float, span: tuple[float, float]
 ) -> FloatArray:
     """Intervals of a span on which phases and parameters of up to these sizes take L to -1."""
-    levels = (TOLERANCE, 0.0, 0.0, 0.0)
+    levels = (_TOUCHING, 0.0, 0.0, 0.0)
     return meeting_intervals(loop, c1, c2, span, levels=levels, free=True)
 
 
@@ -258,8 +257,8 @@ def clear_above(loop: Loop, c1: float, c2: float, free_above: float) -> bool:
         return False
     if end <= free_above:
         return True
-    least = np.array([TOLERANCE, 0.0, 0.0, 0.0])
-    nearest, _, complete = infimum.free_margins(
+    least = np.array([_TOUCHING, 0.0, 0.0, 0.0])
+    nearest, _, complete = discs.free_margins(
         arm_factors(loop),
         arm_parameters(loop, c1, c2, free=True),
         free_above,
@@ -267,7 +266,7 @@ def clear_above(loop: Loop, c1: float, c2: float, free_above: float) -> bool:
         least,
         np.zeros(4),
     )
-    return bool(complete) and nearest[infimum.MODULUS] == TOLERANCE
+    return bool(complete) and nearest[discs.MODULUS] == _TOUCHING
 
 
 def count_at(loop: Loop, c1: float, c2: float, free_above: float) -> int:

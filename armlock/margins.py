@@ -1,9 +1,9 @@
 """How far a loop is from instability: margins, and the first perturbation that breaks it.
 
-No grid enters a number. Distances from -1 come from the certified walk of `armlock.infimum`,
-phase and delay margins from `armlock.crossovers`, the gain interval from `armlock.gains`. Each
-walk ends at a frequency past which nothing smaller is possible; at high frequency the limit is
-known in closed form.
+No grid enters a number. Distances from -1 come from `armlock.distances`, phase and delay
+margins from `armlock.crossovers`, the gain interval from `armlock.gains`. Each walk ends at a
+frequency past which nothing smaller is possible. At high frequency the limit is known in closed
+form.
 """
 
 from __future__ import annotations
@@ -13,27 +13,25 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from armlock import contour, infimum
+from armlock import discs
 from armlock.checks import FloatArray, positive_number, real_number
 from armlock.crossovers import phase_and_delay, settled_from
+from armlock.distances import TOLERANCE, smallest_distances
 from armlock.free_phases import (
-    TOLERANCE,
     arm_factors,
     arm_parameters,
-    arm_weights,
     clear_from,
     last_crossover,
     limit_margins,
     no_margin,
     require_stable,
-    unconfined,
 )
 from armlock.gains import gain_interval_of_stable
-from armlock.loops import Loop, checked_loop, leading_radius, loop_numerator
+from armlock.loops import Loop, checked_loop
 from armlock.rays import FARTHEST, Ray
 from armlock.stability import BOUNDARY, UNCONFINED, CountError, unstable_roots
 
-# Relative accuracy with free phases, in the order of `armlock.infimum.free_margins_at`. The
+# Relative accuracy with free phases, in the order of `armlock.discs.free_margins_at`. The
 # disk margin may be flat over decades of frequency, where a finer one would take too long.
 _FREE_TOLERANCES = np.array([1e-5, 1e-4, 1e-5, 1e-5])
 
@@ -95,85 +93,6 @@ class Margins:
     modulus_omega: float
 
 
-def _smallest(
-    loop: Loop, c1: float, c2: float, *, disk: bool, highest: float = np.inf
-) -> tuple[FloatArray, FloatArray]:
-    """Smallest |1 + L| up to `highest`, and |1 + L| / |1 - L| if `disk`; and where.
-
-    That is inf where it is the limit.
-    """
-    best = limit_margins(loop, c1, c2)[:2]
-    best[infimum.RATIO] = min(best[infimum.RATIO], 1.0) if disk else 0.0
-    where = np.full(2, np.inf)
-    together = arm_weights(loop, c1, c2)
-
-    def end() -> float:
-        """Frequency past which nothing is smaller, or `highest`."""
-        discs = [
-            infimum.excluded_disc(value * (1.0 - TOLERANCE), m == infimum.RATIO)
-            for m, value in enumerate(best)
-        ]
-        return min(max(clear_from(loop, together, *disc) for disc in discs), highest)
-
-    if not np.isfinite(end()):
-        raise unconfined(c1, c2)
-
-    def improve(omega: FloatArray) -> None:
-        """Take the smallest distances at given frequencies if they are smaller."""
-        response = loop.open_loop(1j * omega, c1, c2)
-        with np.errstate(divide="ignore"):
-            distances = np.abs(1.0 + response) / [np.ones(omega.size), np.abs(1.0 - response)]
-        for m, nearest in enumerate(np.argmin(distances, axis=1)):
-            if distances[m, nearest] < best[m]:
-                best[m], where[m] = distances[m, nearest], omega[nearest]
-
-    # No walk is needed below `lowest`. L is one power of s there, up to a part in ten million;
-    # or it is as large as that, which no margin can be near.
-    radius = leading_radius(loop, c1, c2)
-    lowest, higher = 1e-4 * radius, 1e-2 * radius
-    size = abs(complex(loop.open_loop(1j * higher, c1, c2)))
-    if size > 1e7 and abs(complex(loop.open_loop(1j * lowest, c1, c2))) > 0.9 * size:
-        lowest = higher
-    improve(np.array([lowest]))
-    numerator = loop_numerator(loop, c1, c2)
-    weights = numerator.weights, numerator.sums, numerator.phases
-    polynomials = numerator.compiled()
-    factors, arms = arm_factors(loop), arm_parameters(loop, c1, c2)
-    # First the first turns of the delays: what they leave of the axis to be walked is less.
-    start, turn = lowest, 2.0 * np.pi / loop.longest_delay
-    for stop in (max(1e3 * turn, 2.0 * lowest), np.inf):
-        last = min(stop, end())
-        if last <= start:
-            break
-        if start == lowest:
-            # Next to the limit a walk takes short steps, unless it knows of a smaller value.
-            improve(np.geomspace(start, last, 2000))
-        else:
-            # Small distances are likely where the disc of free phases comes closest.
-            omega = np.geomspace(start, last, 400)
-            free = infimum.free_margins_over(factors, arms, omega)
-            for at in omega[np.argmin(free[:, :2], axis=0)]:
-                improve(np.linspace(at, min(at + 100.0 * turn, last), 2001))
-            last = max(start, end())
-        found, places, complete = infimum.smallest_distances(
-            polynomials,
-            weights,
-            factors,
-            arms,
-            start,
-            last,
-            loop.longest_delay,
-            best,
-            TOLERANCE,
-        )
-        if not complete:
-            why = f"following it takes more than {contour.MOST_STEPS:.0e} steps"
-            raise no_margin(c1, c2, f"rounding hides L, or {why}")
-        best, where = found, np.where(np.isnan(places), where, places)
-        start = last
-    return best, where
-
-
 def modulus_margin(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> float:
     r"""Smallest distance of the Nyquist curve from -1, min over omega of |1 + L|.
 
@@ -212,7 +131,7 @@ def modulus_margin(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> float:
     """
     checked_loop(loop)
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
-    (modulus, _), _ = _smallest(loop, c1, c2, disk=False)
+    (modulus, _), _ = smallest_distances(loop, c1, c2, disk=False)
     return float(modulus)
 
 
@@ -221,7 +140,7 @@ def _free_margins(
 ) -> tuple[FloatArray, FloatArray]:
     """Margins over all phases of the two arms, from a frequency on, and where they are met.
 
-    In the order of `armlock.infimum.free_margins_at`; only those below `known` are looked for.
+    In the order of `armlock.discs.free_margins_at`; only those below `known` are looked for.
     A coarse sample gives values that occur. The certified walk then steps over what cannot hold
     smaller ones.
     """
@@ -230,21 +149,21 @@ def _free_margins(
     # Past it |L| is below one.
     end = last_crossover(loop, arms)
     if not np.isfinite(end):
-        end = settled_from(loop, c1, c2, float(limit[infimum.PHASE]))
+        end = settled_from(loop, c1, c2, float(limit[discs.PHASE]))
     end = max(end, 2.0 * lowest)
 
     factors, free = arm_factors(loop), arm_parameters(loop, c1, c2, free=True)
     # The smallest distances may lie past the last crossover, where L turns most.
     omega = np.geomspace(lowest, 10.0 * end, 300)
-    sampled = infimum.free_margins_over(factors, free, omega)
+    sampled = discs.free_margins_over(factors, free, omega)
     nearest, least = omega[np.argmin(sampled, axis=0)], sampled.min(axis=0)
     known = np.minimum(limit, known)
     best, where = np.minimum(known, least), np.where(least < known, nearest, np.inf)
     # Past it L stays clear of where smaller values would be.
-    for k, symmetric in ((infimum.MODULUS, False), (infimum.RATIO, True)):
+    for k, symmetric in ((discs.MODULUS, False), (discs.RATIO, True)):
         level = best[k] * (1.0 - TOLERANCE)
-        end = max(end, clear_from(loop, arms, *infimum.excluded_disc(level, symmetric)))
-    smaller, places, complete = infimum.free_margins(
+        end = max(end, clear_from(loop, arms, *discs.excluded_disc(level, symmetric)))
+    smaller, places, complete = discs.free_margins(
         factors, free, lowest, end, best, _FREE_TOLERANCES
     )
     if not complete:
@@ -313,7 +232,9 @@ def margins(
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
     highest = np.inf if free_above is None else positive_number("free_above", free_above)
     require_stable(loop, c1, c2, highest)
-    (modulus, ratio), (modulus_omega, _) = _smallest(loop, c1, c2, disk=True, highest=highest)
+    (modulus, ratio), (modulus_omega, _) = smallest_distances(
+        loop, c1, c2, disk=True, highest=highest
+    )
     phase, delay, phase_omega = phase_and_delay(loop, c1, c2, highest)
     if free_above is None:
         lower, upper, gain_omega = gain_interval_of_stable(loop, c1, c2)
@@ -321,11 +242,11 @@ def margins(
         lower, upper, gain_omega = np.nan, np.nan, np.nan
         known = np.array([modulus, ratio, phase, delay])
         free, where = _free_margins(loop, c1, c2, highest, known)
-        if free[infimum.MODULUS] < modulus:
-            modulus, modulus_omega = free[infimum.MODULUS], where[infimum.MODULUS]
-        if free[infimum.PHASE] < phase:
-            phase, phase_omega = free[infimum.PHASE], where[infimum.PHASE]
-        ratio, delay = min(ratio, free[infimum.RATIO]), min(delay, free[infimum.DELAY])
+        if free[discs.MODULUS] < modulus:
+            modulus, modulus_omega = free[discs.MODULUS], where[discs.MODULUS]
+        if free[discs.PHASE] < phase:
+            phase, phase_omega = free[discs.PHASE], where[discs.PHASE]
+        ratio, delay = min(ratio, free[discs.RATIO]), min(delay, free[discs.DELAY])
     numbers = lower, upper, phase, delay, modulus, 2.0 * ratio
     places = gain_omega, phase_omega, modulus_omega
     return Margins(*(float(value) for value in (*numbers, *places)))

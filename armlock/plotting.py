@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9"
 #: Fill of the stable region.
 STABLE = "#B8C4CE"
-# Half the width of a count written into a region, over the width of the chart.
+# A count is written into a region whose deepest point is at least so far from its edges, as a
+# share of the chart's points along its shorter axis.
 _ROOM = 0.025
 #: The circle |L| that stands for infinity in a compressed Nyquist plot.
 INFINITY = 1e6

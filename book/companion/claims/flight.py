@@ -18,9 +18,9 @@ from armlock.budget import (
     tdi_capability,
 )
 from armlock.checks import FloatArray
+from armlock.discs import MODULUS, PHASE, free_margins_at
 from armlock.flight import flight_loop
 from armlock.free_phases import free_disc
-from armlock.infimum import MODULUS, PHASE, free_margins_at
 from armlock.loops import Loop, SingleArm
 from armlock.margins import Margins, critical_perturbation, margins
 from armlock.noise import LaserNoise

@@ -6,7 +6,7 @@ from collections import Counter
 
 import numpy as np
 
-from armlock import Loop, infimum
+from armlock import Loop, discs, distances
 from armlock.free_phases import arm_factors, arm_parameters
 from armlock.sensors import COMMON, DIFFERENCE, dual
 from tests.attack import between, roots
@@ -25,7 +25,7 @@ def discs_ahead(number):
         c1, c2 = rng.uniform(-2.0, 2.0, 2)
         arms = arm_parameters(loop, c1, c2)
         for omega in 10.0 ** rng.uniform(-1.5, 1.5, 10):
-            disc = infimum._disc(arm_factors(loop), arms, omega)
+            disc = discs._disc(arm_factors(loop), arms, omega)
             step = min(0.5 * disc.nearest, between(rng, 1e-3, 10.0) * omega)
             at = omega + step * rng.choice([1.0, rng.random()])
             first, second = (complex(arm[0]) for arm in loop.arm_responses(np.array([1j * at])))
@@ -41,15 +41,15 @@ def test_what_a_step_meets_is_not_called_clear():
     met: Counter[str] = Counter()
     far: Counter[str] = Counter()
     for rng, disc, omega, step, at, centre, spread in discs_ahead(500):
-        ahead = infimum._ahead(disc, step)
+        ahead = discs._ahead(disc, step)
         radius, way = between(rng, 1e-3, 10.0), np.exp(2j * np.pi * rng.random())
         for tally, share in ((met, 1.0 - 1e-9), (far, 10.0)):
             point = centre + share * (spread + radius) * way
-            tally["disc"] += infimum._clear(disc, ahead, step, point, radius)
-        own_centre = infimum._centre_and_radius(disc)[0]
-        met["disc"] += infimum._clear(disc, ahead, step, own_centre, radius)
+            tally["disc"] += discs._clear(disc, ahead, step, point, radius)
+        own_centre = discs._centre_and_radius(disc)[0]
+        met["disc"] += discs._clear(disc, ahead, step, own_centre, radius)
         tally = met if abs(centre.imag) <= spread else far
-        tally["axis"] += infimum._on_one_side(disc, ahead, step)
+        tally["axis"] += discs._on_one_side(disc, ahead, step)
         half = np.sqrt(max(spread**2 - centre.imag**2, 0.0))
         right, left = centre.real + half, centre.real - half
         for tally, one, other in (
@@ -59,12 +59,12 @@ def test_what_a_step_meets_is_not_called_clear():
         ):
             if half > 0.0 and other < 0.0:
                 near, end = max(one, other), min(one, other)
-                tally["segment"] += infimum._misses_segment(disc, step, near, end)
-        margins = infimum.free_margins_at(centre, spread, at)
+                tally["segment"] += discs._misses_segment(disc, step, near, end)
+        margins = discs.free_margins_at(centre, spread, at)
         for m in np.flatnonzero((margins > 0.0) & (margins < (np.inf, 1.0, np.inf, np.inf))):
             for tally, share in ((met, 1.0 + 1e-9), (far, 0.1)):
                 levels = share * np.where(np.arange(4) == m, margins, 0.0)
-                tally[f"margin {m}"] += infimum._nothing_smaller(disc, omega, step, levels)
+                tally[f"margin {m}"] += discs._nothing_smaller(disc, omega, step, levels)
     assert +met == {}
     assert len(far) == 7
     assert min(far.values()) > 50
@@ -80,5 +80,5 @@ def test_a_bound_along_tangents_is_one():
         level, step = between(rng, 1e-2, 1.0), between(rng, 1e-3, 1.0)
         along = over + share * step * over_slope, under + share * step * under_slope
         least = (abs(along[0]) - level * abs(along[1])).min()
-        found = infimum._stays_above(over, over_slope, under, under_slope, level, step)
+        found = distances._stays_above(over, over_slope, under, under_slope, level, step)
         assert found <= least + 1e-12 * (abs(over) + abs(under))

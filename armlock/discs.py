@@ -1,13 +1,9 @@
-"""Compiled: the smallest distance of an open loop from -1 over all frequencies, certified.
+"""Compiled: the disc that L fills at a frequency when the phases of the arms are free.
 
-With L = N / R the walk looks for the smallest |1 + L| and the smallest |1 + L| / |1 - L|. It
-keeps the smallest values found so far, and steps over what cannot hold smaller ones:
-
-- a step of the walk, where the tangents of N and R, and bounds on their second derivatives,
-  leave no room for it;
-- a whole piece of the axis, where L with free phases of its arms, which fills a disc, stays
-  clear of the disc in which a smaller value would have to lie. At high frequency the phases
-  turn much faster than anything else changes, and this spares most of the work.
+Whatever the delays are, L lies in that disc. Bounds on how the parts of the disc change certify
+that it stays off a target over a step of the axis. So `meeting_intervals` tells which parts of
+the axis need no walk. At high frequency, where the phases turn much faster than anything else
+changes, this spares most of the work. `free_margins` finds the smallest margins of the disc.
 """
 
 from __future__ import annotations
@@ -16,19 +12,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from armlock.checks import ComplexArray, FloatArray
+from armlock.checks import FloatArray
 from armlock.compiled import njit
 from armlock.contour import MOST_STEPS
-from armlock.exponentials import (
-    EPSILON,
-    ROUNDING,
-    curvature_bound,
-    evaluate,
-    piece,
-    real_horner,
-    rounding_bound,
-    tangent_distance,
-)
+from armlock.exponentials import EPSILON
 
 # Turns of the longest delay after which the disc is tried again where it did not help.
 _TURNS = 32.0
@@ -48,29 +35,6 @@ def excluded_disc(value: float, symmetric: bool) -> tuple[float, float]:
         return -1.0, value
     square = value * value
     return -(1.0 + square) / (1.0 - square), 2.0 * value / (1.0 - square)
-
-
-@njit(cache=True)
-def _distance(n: complex, r: complex, symmetric: bool) -> float:
-    """|1 + L|, or |1 + L| / |1 - L|, of L = n / r."""
-    below = abs(r - n) if symmetric else abs(r)
-    return abs(r + n) / below if below > 0.0 else np.inf
-
-
-@njit(cache=True)
-def _combined(
-    local: ComplexArray, sizes: FloatArray, weights: FloatArray, sums: FloatArray
-) -> tuple[ComplexArray, FloatArray]:
-    """Sum polynomials, given as rows 1 to 3, as `armlock.exponentials.piece` does."""
-    rows = 1 + weights.shape[0]
-    found = np.zeros((rows, local.shape[1]), dtype=np.complex128)
-    most = np.zeros((rows, sizes.shape[1]))
-    for g in range(rows):
-        for k in range(sums.size):
-            weight = sums[k] if g == 0 else weights[g - 1, k]
-            found[g] += weight * local[k + 1]
-            most[g] += abs(weight) * sizes[k + 1]
-    return found, most
 
 
 class _Disc(NamedTuple):
@@ -309,150 +273,6 @@ def _misses_segment(disc: _Disc, step: float, near: float, far: float) -> bool:
     if centre.real + moved < far:
         return bool(_clear(disc, ahead, step, complex(far), 0.0))
     return False
-
-
-@njit(cache=True)
-def _stays_above(
-    over: complex, over_slope: complex, under: complex, under_slope: complex, level: float,
-    step: float,
-) -> float:  # fmt: skip
-    """Bound from below on |over + slope t| - level |under + slope t| for 0 <= t <= step.
-
-    |v + v' t| lies between |v| (1 + t Re(v' / v)) and that plus (|v'| t)^2 / (2 |v|), so that
-    what both change by in proportion does not count.
-    """
-    if over == 0.0 or under == 0.0:
-        return -np.inf
-    begin = abs(over) - level * abs(under)
-    rate = (over_slope * over.conjugate()).real / abs(over)
-    rate -= level * (under_slope * under.conjugate()).real / abs(under)
-    second = 0.5 * level * (abs(under_slope) * step) ** 2 / abs(under)
-    return min(begin, begin + rate * step) - second
-
-
-@njit(cache=True)
-def _downhill(
-    curves: tuple[Any, ...], symmetric: bool, omega: float, step: float, end: float
-) -> tuple[float, float]:
-    """Follow a distance of L from -1 down to a minimum next to omega, within one piece.
-
-    `curves` are start and reach of the piece, N and its phases, R and none. Returns the
-    distance, and where.
-    """
-    start, reach, n, phases, r, none = curves
-    least, shortest = np.inf, 1e-9 * step
-    at = omega
-    while step > shortest:
-        if start <= at <= end:
-            value = evaluate(start, reach, n, phases, at)[0]
-            here = _distance(value, evaluate(start, reach, r, none, at)[0], symmetric)
-            if here < least:
-                omega, least = at, here
-                at = omega + step
-                continue
-        # First on the one side, then on the other, then closer.
-        if at > omega:
-            at = omega - step
-        else:
-            step *= 0.5
-            at = omega + step
-    return least, omega
-
-
-@njit(cache=True)
-def smallest_distances(
-    polynomials: tuple[Any, ...],
-    numerator: tuple[Any, ...],
-    factors: tuple[Any, ...],
-    arms: FloatArray,
-    omega: float,
-    omega_end: float,
-    longest_delay: float,
-    best: FloatArray,
-    tolerance: float,
-) -> tuple[FloatArray, FloatArray, bool]:
-    """Smallest |1 + L|, and |1 + L| / |1 - L|, from omega to omega_end.
-
-    `polynomials` are R, B1 and B2, `numerator` weights, sums and phases of N, `factors` and
-    `arms` what `_disc` takes. `best` holds a value of each that occurs: only smaller ones are
-    looked for, and none where it is zero. Returns the smallest ones; where they are, nan for
-    those of `best`; and whether the walk came to its end, which it does not if it is too long
-    or rounding hides L. None is smaller than the result by more than the share `tolerance`, or
-    by more than rounding, of 1e-6 at most.
-    """
-    weights, sums, phases = numerator
-    unit, nothing, none = np.eye(3), np.zeros((0, 3)), np.zeros(0)
-    only_r = np.array([1.0, 0.0, 0.0])
-    best, where, steps = best.copy(), np.full(2, np.nan), 0
-    turn, skip = 2.0 * np.pi / longest_delay, omega_end
-    block, levels, here = _TURNS * turn, np.zeros(4), np.zeros(2)
-    while omega < omega_end:
-        levels[:2] = best * (1.0 - tolerance)
-        disc = _disc(factors, arms, omega)
-        skip = min(4.0 * skip, 0.5 * disc.nearest, omega_end - omega)
-        while skip > block and not _nothing_smaller(disc, omega, skip, levels):
-            skip *= 0.5
-        if skip > block:
-            omega += skip
-            continue
-        start, reach, end, local, sizes = piece(polynomials, unit, np.zeros(3), omega)
-        end = min(end, omega + block, omega_end)
-        n, n_sizes = _combined(local, sizes, weights, sums)
-        r, r_sizes = _combined(local, sizes, nothing, only_r)
-        n_bound = curvature_bound(start, reach, n, phases)
-        r_bound = curvature_bound(start, reach, r, none)
-        n_error = rounding_bound(start, reach, n_sizes, phases, ROUNDING)
-        r_error = rounding_bound(start, reach, r_sizes, none, ROUNDING)
-        value, slope = evaluate(start, reach, n, phases, omega)
-        below, change = evaluate(start, reach, r, none, omega)
-        step = end - omega
-        while omega < end:
-            steps += 1
-            if steps > MOST_STEPS:
-                return best, where, False
-            step = min(2.0 * step, end - omega)
-            while True:
-                following = end if step >= end - omega else omega + step
-                new_value, new_slope = evaluate(start, reach, n, phases, following)
-                new_below, new_change = evaluate(start, reach, r, none, following)
-                u = (following - start) / reach
-                bent = 0.5 * step * step * real_horner(r_bound, u)
-                both = 0.5 * step * step * real_horner(n_bound, u) + bent
-                error = real_horner(n_error, u) + real_horner(r_error, u)
-                over, over_slope = below + value, change + slope
-                least = tangent_distance(over, over_slope, step) - both - error
-                certain = True
-                for m in range(2):
-                    if best[m] == 0.0:
-                        continue
-                    here[m] = _distance(new_value, new_below, m == RATIO)
-                    under, under_slope, under_bent = below, change, bent
-                    if m == RATIO:
-                        under, under_slope, under_bent = below - value, change - slope, both
-                    most = max(abs(under), abs(under + step * under_slope))
-                    most += under_bent + error
-                    level = (1.0 - tolerance) * min(best[m], here[m])
-                    # By so much rounding may move what was met already: no step avoids that.
-                    unknown = (1.0 + level) * error
-                    allowed = 2.0 * unknown if unknown <= 1e-6 * most else 0.0
-                    if least + allowed >= level * most:
-                        continue
-                    apart = _stays_above(over, over_slope, under, under_slope, level, step)
-                    if apart + allowed < both + level * under_bent + unknown:
-                        certain = False
-                        break
-                if certain:
-                    break
-                if step <= 1e-15 * omega or step < 1e-300:
-                    return best, where, False
-                step *= 0.5
-            for m in range(2):
-                if here[m] < best[m]:
-                    curves = start, reach, n, phases, r, none
-                    best[m], where[m] = _downhill(curves, m == RATIO, following, step, end)
-            omega, value, slope = following, new_value, new_slope
-            below, change = new_below, new_change
-    return best, where, True
 
 
 @njit(cache=True)

@@ -1,0 +1,259 @@
+"""The smallest distance of an open loop from -1 over all frequencies, certified.
+
+With L = N / R these are the smallest |1 + L| and |1 + L| / |1 - L|. A compiled walk keeps the
+smallest values found so far. Its steps are certified where the tangents of N and R, and bounds
+on their second derivatives, leave no room for smaller ones. It is taken on those parts of the
+axis where free phases would allow one.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from armlock import contour, discs
+from armlock.checks import FloatArray
+from armlock.compiled import njit
+from armlock.exponentials import (
+    ROUNDING,
+    curvature_bound,
+    evaluate,
+    piece,
+    real_horner,
+    rounding_bound,
+    tangent_distance,
+)
+from armlock.free_phases import (
+    FIRST_TURNS,
+    arm_factors,
+    arm_parameters,
+    arm_weights,
+    clear_from,
+    limit_margins,
+    meeting_intervals,
+    no_margin,
+    search_outwards,
+    unconfined,
+)
+from armlock.loops import Loop, leading_radius, loop_numerator
+
+#: Relative accuracy of the smallest distances, and so of modulus and disk margins.
+TOLERANCE = 1e-6
+
+
+@njit(cache=True)
+def _distance(n: complex, r: complex, symmetric: bool) -> float:
+    """|1 + L|, or |1 + L| / |1 - L|, of L = n / r."""
+    below = abs(r - n) if symmetric else abs(r)
+    return abs(r + n) / below if below > 0.0 else np.inf
+
+
+@njit(cache=True)
+def _stays_above(
+    over: complex, over_slope: complex, under: complex, under_slope: complex, level: float,
+    step: float,
+) -> float:  # fmt: skip
+    """Bound from below on |over + slope t| - level |under + slope t| for 0 <= t <= step.
+
+    |v + v' t| lies between |v| (1 + t Re(v' / v)) and that plus (|v'| t)^2 / (2 |v|), so that
+    what both change by in proportion does not count.
+    """
+    if over == 0.0 or under == 0.0:
+        return -np.inf
+    begin = abs(over) - level * abs(under)
+    rate = (over_slope * over.conjugate()).real / abs(over)
+    rate -= level * (under_slope * under.conjugate()).real / abs(under)
+    second = 0.5 * level * (abs(under_slope) * step) ** 2 / abs(under)
+    return min(begin, begin + rate * step) - second
+
+
+@njit(cache=True)
+def _downhill(
+    curves: tuple[Any, ...], symmetric: bool, omega: float, step: float, end: float
+) -> tuple[float, float]:
+    """Follow a distance of L from -1 down to a minimum next to omega, within one piece.
+
+    `curves` are start and reach of the piece, N and its phases, R and none. Returns the
+    distance, and where.
+    """
+    start, reach, n, phases, r, none = curves
+    least, shortest = np.inf, 1e-9 * step
+    at = omega
+    while step > shortest:
+        if start <= at <= end:
+            value = evaluate(start, reach, n, phases, at)[0]
+            here = _distance(value, evaluate(start, reach, r, none, at)[0], symmetric)
+            if here < least:
+                omega, least = at, here
+                at = omega + step
+                continue
+        # First on the one side, then on the other, then closer.
+        if at > omega:
+            at = omega - step
+        else:
+            step *= 0.5
+            at = omega + step
+    return least, omega
+
+
+@njit(cache=True)
+def _walk(
+    polynomials: tuple[Any, ...],
+    numerator: tuple[Any, ...],
+    omega: float,
+    omega_end: float,
+    best: FloatArray,
+    tolerance: float,
+) -> tuple[FloatArray, FloatArray, bool]:
+    """Smallest |1 + L|, and |1 + L| / |1 - L|, from omega to omega_end.
+
+    `polynomials` are R, B1 and B2, `numerator` weights, sums and phases of N. `best` holds a
+    value of each that occurs: only smaller ones are looked for, and none where it is zero.
+    Returns the smallest ones; where they are, nan for those of `best`; and whether the walk
+    came to its end, which it does not if it is too long or rounding hides L. None is smaller
+    than the result by more than the share `tolerance`, and by what rounding moves L: at most a
+    part in a million of the larger one of R and N.
+    """
+    weights, sums, phases = numerator
+    only_r, none = np.array([1.0, 0.0, 0.0]), np.zeros(0)
+    best, where, here, steps = best.copy(), np.full(2, np.nan), np.zeros(2), 0
+    while omega < omega_end:
+        # Both pieces are the same: their polynomials are.
+        start, reach, end, n, n_sizes = piece(polynomials, weights, sums, omega)
+        _, _, _, r, r_sizes = piece(polynomials, weights[:0], only_r, omega)
+        end = min(end, omega_end)
+        n_bound = curvature_bound(start, reach, n, phases)
+        r_bound = curvature_bound(start, reach, r, none)
+        n_error = rounding_bound(start, reach, n_sizes, phases, ROUNDING)
+        r_error = rounding_bound(start, reach, r_sizes, none, ROUNDING)
+        value, slope = evaluate(start, reach, n, phases, omega)
+        below, change = evaluate(start, reach, r, none, omega)
+        step = end - omega
+        while omega < end:
+            steps += 1
+            if steps > contour.MOST_STEPS:
+                return best, where, False
+            step = min(2.0 * step, end - omega)
+            while True:
+                following = end if step >= end - omega else omega + step
+                new_value, new_slope = evaluate(start, reach, n, phases, following)
+                new_below, new_change = evaluate(start, reach, r, none, following)
+                u = (following - start) / reach
+                bent = 0.5 * step * step * real_horner(r_bound, u)
+                both = 0.5 * step * step * real_horner(n_bound, u) + bent
+                error = real_horner(n_error, u) + real_horner(r_error, u)
+                over, over_slope = below + value, change + slope
+                least = tangent_distance(over, over_slope, step) - both - error
+                certain = True
+                for m in range(2):
+                    if best[m] == 0.0:
+                        continue
+                    here[m] = _distance(new_value, new_below, m == discs.RATIO)
+                    under, under_slope, under_bent = below, change, bent
+                    if m == discs.RATIO:
+                        under, under_slope, under_bent = below - value, change - slope, both
+                    most = max(abs(under), abs(under + step * under_slope))
+                    most += under_bent + error
+                    level = (1.0 - tolerance) * min(best[m], here[m])
+                    # By so much rounding may move what was met already: no step avoids that.
+                    unknown = (1.0 + level) * error
+                    allowed = 2.0 * unknown if unknown <= 1e-6 * most else 0.0
+                    if least + allowed >= level * most:
+                        continue
+                    apart = _stays_above(over, over_slope, under, under_slope, level, step)
+                    if apart + allowed < both + level * under_bent + unknown:
+                        certain = False
+                        break
+                if certain:
+                    break
+                if step <= 1e-15 * omega or step < 1e-300:
+                    return best, where, False
+                step *= 0.5
+            for m in range(2):
+                if here[m] < best[m]:
+                    curves = start, reach, n, phases, r, none
+                    best[m], where[m] = _downhill(
+                        curves, m == discs.RATIO, following, step, end
+                    )
+            omega, value, slope = following, new_value, new_slope
+            below, change = new_below, new_change
+    return best, where, True
+
+
+def smallest_distances(
+    loop: Loop, c1: float, c2: float, *, disk: bool, highest: float = np.inf
+) -> tuple[FloatArray, FloatArray]:
+    """Smallest |1 + L| up to `highest`, and |1 + L| / |1 - L| if `disk`; and where.
+
+    That is inf where it is the limit.
+    """
+    best = limit_margins(loop, c1, c2)[:2]
+    best[discs.RATIO] = min(best[discs.RATIO], 1.0) if disk else 0.0
+    where = np.full(2, np.inf)
+    together = arm_weights(loop, c1, c2)
+    factors, arms = arm_factors(loop), arm_parameters(loop, c1, c2)
+
+    def end() -> float:
+        """Frequency past which nothing is smaller, or `highest`."""
+        excluded = [
+            discs.excluded_disc(value * (1.0 - TOLERANCE), m == discs.RATIO)
+            for m, value in enumerate(best)
+        ]
+        return min(max(clear_from(loop, together, *disc) for disc in excluded), highest)
+
+    def improve(omega: FloatArray) -> None:
+        """Take the smallest distances at given frequencies if they are smaller."""
+        response = loop.open_loop(1j * omega, c1, c2)
+        with np.errstate(divide="ignore"):
+            distances = np.abs(1.0 + response) / [np.ones(omega.size), np.abs(1.0 - response)]
+        for m, nearest in enumerate(np.argmin(distances, axis=1)):
+            if distances[m, nearest] < best[m]:
+                best[m], where[m] = distances[m, nearest], omega[nearest]
+
+    def meeting(span: tuple[float, float]) -> FloatArray:
+        modulus, ratio = best * (1.0 - TOLERANCE)
+        return meeting_intervals(loop, c1, c2, span, levels=(modulus, ratio, 0.0, 0.0))
+
+    def likely(omega: FloatArray) -> FloatArray:
+        free = discs.free_margins_over(factors, arms, omega)
+        nearest: FloatArray = omega[np.argmin(free[:, : discs.PHASE], axis=0)]
+        return nearest
+
+    def look(intervals: FloatArray) -> None:
+        nonlocal best, where
+        for low, high in np.maximum(intervals, lowest).tolist():
+            improve(np.linspace(low, high, 2 + 2000 // len(intervals)))
+            for start, stop in meeting((low, high)):
+                found, places, complete = _walk(
+                    polynomials, weights, start, stop, best, TOLERANCE
+                )
+                if not complete:
+                    why = f"following it takes more than {contour.MOST_STEPS:.0e} steps"
+                    raise no_margin(c1, c2, f"rounding hides L, or {why}")
+                best, where = found, np.where(np.isnan(places), where, places)
+
+    if not np.isfinite(end()):
+        raise unconfined(c1, c2)
+    numerator = loop_numerator(loop, c1, c2)
+    weights = numerator.weights, numerator.sums, numerator.phases
+    polynomials = numerator.compiled()
+    lowest = _one_power_up_to(loop, c1, c2)
+    # Next to the limit a walk takes short steps, unless it knows of a smaller value.
+    first = FIRST_TURNS * 2.0 * np.pi / loop.longest_delay
+    improve(np.geomspace(lowest, max(min(first, end()), lowest), 2000))
+    search_outwards(loop, look, end, meeting, likely)
+    return best, where
+
+
+def _one_power_up_to(loop: Loop, c1: float, c2: float) -> float:
+    """Frequency in rad/s up to which no margin is taken.
+
+    L is one power of s there, up to a part in ten million; or its magnitude is above 1e7.
+    """
+    radius = leading_radius(loop, c1, c2)
+    lowest, higher = 1e-4 * radius, 1e-2 * radius
+    size = abs(complex(loop.open_loop(1j * higher, c1, c2)))
+    if size > 1e7 and abs(complex(loop.open_loop(1j * lowest, c1, c2))) > 0.9 * size:
+        return higher
+    return lowest
