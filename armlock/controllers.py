@@ -26,6 +26,7 @@ from armlock.checks import (
     real_number,
     whole_number,
 )
+from armlock.exponentials import quotients
 
 # Decimal digits in which the zeros of parallel branches are found.
 _DIGITS = 80
@@ -123,15 +124,8 @@ class Controller:
 
     def __call__(self, s: npt.ArrayLike) -> ComplexArray:
         """Evaluate K(s), factor by factor; `s` in rad/s, any shape."""
-        s = complex_array("s", s)
-        value = np.full(s.shape, self.gain, dtype=np.complex128)
-        # In turn, so that the product neither overflows nor underflows on the way.
-        for k in range(max(len(self.zeros), len(self.poles))):
-            if k < len(self.zeros):
-                value *= s - self.zeros[k]
-            if k < len(self.poles):
-                value /= s - self.poles[k]
-        return value
+        zeros, poles = np.array(self.zeros, dtype=complex), np.array(self.poles, dtype=complex)
+        return quotients(zeros, poles, self.gain, complex_array("s", s))
 
     def __mul__(self, other: Controller) -> Controller:
         """Return the two in series."""

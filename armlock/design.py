@@ -310,15 +310,15 @@ def _samples(
     How many are low, and how many of the circle, is returned with them.
     """
     longest, apart = start.longest_delay, abs(start.tau1 - start.tau2)
-    switch = 0.6 / longest
-    top = 30.0 * max([*corners, 1.0 / start.delay if start.delay else 0.0, 10.0 * switch])
+    low_end = 0.6 / longest
+    top = 30.0 * max([*corners, 1.0 / start.delay if start.delay else 0.0, 10.0 * low_end])
     ring_end = free_above or 40.0 / max(apart, 1e-2 * longest)
-    low = np.geomspace(1e-3 * min([*corners, switch]), switch, 320)
-    ring = np.geomspace(switch, ring_end, 200)
+    low = np.geomspace(1e-3 * min([*corners, low_end]), low_end, 320)
+    ring = np.geomspace(low_end, ring_end, 200)
     if apart:
         # The circle is widest where the arms are whole turns apart.
         steps = 2.0 * np.pi / apart * np.arange(1, 241) / 40.0
-        ring = np.union1d(ring, steps[(steps > switch) & (steps < ring_end)])
+        ring = np.union1d(ring, steps[(steps > low_end) & (steps < ring_end)])
     free = np.geomspace(ring_end, max(top, 2.0 * ring_end), 160)
     omega = np.concatenate((low, ring, free if free_above else []))
     return omega, low.size, ring.size

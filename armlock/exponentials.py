@@ -35,29 +35,27 @@ ROUNDING = 8.0
 _CROWD = 1.5
 
 
+def quotients(
+    zeros: ComplexArray, poles: ComplexArray, lead: float, s: ComplexArray
+) -> ComplexArray:
+    """Evaluate `lead` times the product of s - zeros over that of s - poles, at any s."""
+    found: ComplexArray = _quotients(zeros, poles, complex(lead), np.ravel(s))
+    return found.reshape(s.shape)
+
+
 @njit(cache=True, error_model="numpy")
-def quotient(zeros: ComplexArray, poles: ComplexArray, lead: complex, s: complex) -> complex:
-    """Evaluate `lead` times the product of s - zeros over that of s - poles."""
-    value = lead
-    # In turn, so that the product neither overflows nor underflows on the way.
-    for k in range(max(zeros.size, poles.size)):
-        if k < zeros.size:
-            value *= s - zeros[k]
-        if k < poles.size:
-            value /= s - poles[k]
-    return value
-
-
-@njit(cache=True)
 def _quotients(
-    zeros: ComplexArray,
-    poles: ComplexArray,
-    lead: complex,
-    s: ComplexArray,
-    found: ComplexArray,
-) -> None:
+    zeros: ComplexArray, poles: ComplexArray, lead: complex, s: ComplexArray
+) -> ComplexArray:
+    found = np.full(s.size, lead)
     for i in range(s.size):
-        found[i] = quotient(zeros, poles, lead, s[i])
+        # In turn, so that the product neither overflows nor underflows on the way.
+        for k in range(max(zeros.size, poles.size)):
+            if k < zeros.size:
+                found[i] *= s[i] - zeros[k]
+            if k < poles.size:
+                found[i] /= s[i] - poles[k]
+    return found
 
 
 class Polynomial(NamedTuple):
@@ -77,10 +75,8 @@ class Polynomial(NamedTuple):
 
     def over(self, other: Polynomial, s: ComplexArray) -> ComplexArray:
         """Evaluate p(s) / q(s), factor by factor."""
-        lead = complex(self.coefficients[-1] / other.coefficients[-1])
-        found = np.empty(s.size, dtype=np.complex128)
-        _quotients(self.roots, other.roots, lead, np.ravel(s), found)
-        return found.reshape(s.shape)
+        lead = float(self.coefficients[-1] / other.coefficients[-1])
+        return quotients(self.roots, other.roots, lead, s)
 
     def times_conjugate(self, other: Polynomial) -> Polynomial:
         """Return p q*, where q*(j omega) is the complex conjugate of q(j omega)."""

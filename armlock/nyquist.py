@@ -21,7 +21,6 @@ from armlock.checks import (
     real_number,
 )
 from armlock.contour import MOST_SAMPLES, remaining_argument, resolved_grid
-from armlock.exponentials import Polynomial
 from armlock.loops import (
     Loop,
     checked_loop,
@@ -186,14 +185,12 @@ def _turn_beyond(loop: Loop, last: complex, end: float) -> float:
 
     1 + L is D / A times A / R. From `end` on |D / A - 1| < 1, up the axis and along the arc at
     infinity, on which D / A tends to one: its argument at `end` is taken back. Those of A and R
-    are known from their roots, and the two turn alike along the arc.
+    are known from their roots. The two are of one degree, and turn alike along the arc.
     """
-    rest = loop.polynomials()[0]
-    undelayed = Polynomial(loop.a, loop.roots_of_a)
-    ratio = undelayed.over(rest, np.array(1j * end))
-    gathered = remaining_argument(undelayed.roots, end)
-    gathered -= remaining_argument(rest.roots, end)
-    return float(gathered - np.angle(last / complex(ratio)))
+    gathered = remaining_argument(loop.roots_of_a, end)
+    gathered -= remaining_argument(loop.polynomials()[0].roots, end)
+    ratio = loop.a[-1] / loop.rest[-1] * np.exp(-1j * gathered)
+    return float(gathered - np.angle(last / ratio))
 
 
 def nyquist(
