@@ -15,10 +15,9 @@ from armlock.bounds import last_larger
 from armlock.checks import FloatArray
 from armlock.exponentials import ExponentialSum
 from armlock.free_phases import (
-    arm_factors,
-    arm_parameters,
     arm_weights,
     last_crossover,
+    least_at,
     limit_disc,
     limit_margins,
     limit_responses,
@@ -42,7 +41,8 @@ def axis_zeros(
     """Zeros of the imaginary part at omega > 0, and stretches there that may hide some.
 
     On intervals of the axis, in rad/s. The stretches have shape (3, n): the lower ends, the
-    middles, the upper ends.
+    middles, the upper ends. One that begins at omega = 0, where L is one power of s, is none of
+    them.
     """
     omega, jump, width = sign_changes(whole, intervals)
     hidden = jump == 0
@@ -103,7 +103,18 @@ def _least_lags(
     return float(turn[worst]), float(np.min(lag / at)), float(at[worst])
 
 
-def settled_from(loop: Loop, c1: float, c2: float, phase: float) -> float:
+def crossovers_end(
+    loop: Loop, c1: float, c2: float, weights: FloatArray, phase: float
+) -> float:
+    """Frequency in rad/s past which no crossover has a smaller phase margin than a number.
+
+    `weights` are those of `last_crossover`, past which |L| is below one.
+    """
+    last = last_crossover(loop, weights)
+    return last if np.isfinite(last) else _settled_from(loop, c1, c2, phase)
+
+
+def _settled_from(loop: Loop, c1: float, c2: float, phase: float) -> float:
     """Frequency in rad/s past which a neutral loop has no smaller phase margin than a number.
 
     Smaller means by more than the share TOLERANCE. Past it the disc of L is so close to its
@@ -140,13 +151,11 @@ def phase_and_delay(
     phase margin may be that of the disc that L fills at high frequency, `limit_margins`.
     """
     phase, delay, where = np.inf, np.inf, np.nan
-    last = last_crossover(loop, arm_weights(loop, c1, c2))
     if not np.isfinite(highest):
         limit = limit_margins(loop, c1, c2)
         phase, delay = float(limit[discs.PHASE]), float(limit[discs.DELAY])
-        where = np.inf if delay == 0.0 else np.nan
-        if not np.isfinite(last):
-            last = settled_from(loop, c1, c2, phase)
+        where = np.inf if np.isfinite(phase) else np.nan
+    end = crossovers_end(loop, c1, c2, arm_weights(loop, c1, c2), phase)
     above, below = loop_numerator(loop, c1, c2), loop.rest_on_boundary()
     squares = above.times_conjugate(above).plus(below.times_conjugate(below).scaled(-1.0))
 
@@ -154,9 +163,7 @@ def phase_and_delay(
         return meeting_intervals(loop, c1, c2, span, levels=(0.0, 0.0, phase, delay))
 
     def likely(omega: FloatArray) -> FloatArray:
-        free = discs.free_margins_over(arm_factors(loop), arm_parameters(loop, c1, c2), omega)
-        nearest: FloatArray = omega[np.argmin(free[:, discs.PHASE :], axis=0)]
-        return nearest
+        return least_at(loop, c1, c2, omega, slice(discs.PHASE, None))
 
     def look(intervals: FloatArray) -> None:
         nonlocal phase, delay, where
@@ -171,5 +178,5 @@ def phase_and_delay(
             phase, where = found[0], found[2]
         delay = min(delay, found[1])
 
-    search_outwards(loop, look, lambda: min(last, highest), meeting, likely)
+    search_outwards(loop, look, lambda: min(end, highest), meeting, likely)
     return phase, delay, where

@@ -1,40 +1,75 @@
 """Compiled: the disc that L fills at a frequency when the phases of the arms are free.
 
-Whatever the delays are, L lies in that disc. Bounds on how the parts of the disc change certify
-that it stays off a target over a step of the axis. So `meeting_intervals` tells which parts of
-the axis need no walk. At high frequency, where the phases turn much faster than anything else
-changes, this spares most of the work. `free_margins` finds the smallest margins of the disc.
+Whatever these phases are, L lies in that disc. (At low frequency the phase between the two
+arms is taken as it is, and only their common one is free.) Bounds on how the parts of the disc
+change certify that it stays off a target over a step of the axis. So `intervals_not_clear`
+tells which parts of the axis need a walk. At high frequency, where the phases turn much faster
+than anything else changes, this spares most of the work. `free_margins` finds the smallest
+margins of the disc.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from armlock.checks import FloatArray
+from armlock.checks import ComplexArray, FloatArray, IntArray
 from armlock.compiled import njit
 from armlock.contour import MOST_STEPS
 from armlock.exponentials import EPSILON
 
 # Turns of the longest delay after which the disc is tried again where it did not help.
 _TURNS = 32.0
+# The shortest step of `free_margins`, over omega.
+_SHORTEST = 1e-12
+# Where the disc may touch the unit circle it is taken for larger by this share. Roots closer to
+# the axis than this, over omega, are not passed.
+_GROWN = 1e-9
 
 #: Places of the four margins in what `free_margins_at` returns, and in levels.
 MODULUS, RATIO, PHASE, DELAY = 0, 1, 2, 3
 
 
 @njit(cache=True)
-def excluded_disc(value: float, symmetric: bool) -> tuple[float, float]:
+def excluded_disc(value: float, m: int) -> tuple[float, float]:
     """Centre and radius of the disc in which the distance of L from -1 is below a value.
 
-    The distance is |1 + L|, or, if `symmetric`, |1 + L| / |1 - L|, whose level lines are the
-    circles of Apollonius.
+    The distance is |1 + L| where m is MODULUS, and |1 + L| / |1 - L| where it is RATIO. Level
+    lines of the latter are the circles of Apollonius.
     """
-    if not symmetric:
+    if m == MODULUS:
         return -1.0, value
     square = value * value
     return -(1.0 + square) / (1.0 - square), 2.0 * value / (1.0 - square)
+
+
+class Arms(NamedTuple):
+    """The responses F1 and F2 to the two arms, and what else decides the disc.
+
+    Attributes
+    ----------
+    roots : complex array, shape (n,)
+        Those of all factors of F1 and F2.
+    powers : int array, shape (2, n)
+        The power of each factor in F1 and in F2.
+    leads : float array, shape (2,)
+        The highest coefficients of F1 and F2.
+    c1, c2 : float
+        The perturbations. Where phases are free, only their magnitudes matter.
+    apart : float
+        tau2 - tau1 in s; nan where both phases are free at all frequencies.
+    delay : float
+        The dead time in s.
+    """
+
+    roots: ComplexArray
+    powers: IntArray
+    leads: FloatArray
+    c1: float
+    c2: float
+    apart: float
+    delay: float
 
 
 class _Disc(NamedTuple):
@@ -44,11 +79,11 @@ class _Disc(NamedTuple):
 
     Attributes
     ----------
-    larger, ratio : complex
+    larger, other : complex
         F, and G / F.
     rate, bend : complex, float
         The rate at which log F changes, and a bound on its second derivative.
-    ratio_rate, ratio_bend : complex, float
+    other_rate, other_bend : complex, float
         The same two for log(G / F).
     held : complex
         The larger one's c; of free phases its magnitude.
@@ -58,15 +93,16 @@ class _Disc(NamedTuple):
         The rate at which log(swung) changes.
     nearest : float
         The distance of the nearest root, up to which the bounds hold: within a step they are
-        divided by 1 - step / nearest, because |log(1 + x) - x| <= |x|^2 / (2 (1 - |x|)).
+        divided by 1 - step / nearest, because |log(1 + x) - x| <= |x|^2 / (2 (1 - |x|)). Where
+        it is zero, the factor of that root is left out, and the disc is not that of L.
     """
 
     larger: complex
-    ratio: complex
+    other: complex
     rate: complex
     bend: float
-    ratio_rate: complex
-    ratio_bend: float
+    other_rate: complex
+    other_bend: float
     held: complex
     swung: complex
     swing: complex
@@ -74,16 +110,20 @@ class _Disc(NamedTuple):
 
 
 class _Ahead(NamedTuple):
-    """How the parts of a disc change over a step.
+    """How the parts of a disc change over a step, which ends before the nearest root.
 
     Attributes
     ----------
     slope : float
         Of the radius over |F|, bounded from above.
-    own, left : float
-        How much is beyond first order: of F, as a factor; of G / F and of the radius over |F|.
-    turned, changed : float
-        How much log F and G / F change at most.
+    own : float
+        How far F at the end over F at the start, or its inverse, may be from first order.
+    left : float
+        How far G / F, and the radius over |F|, may be from first order, together.
+    turned : float
+        How much log F changes at most, in magnitude and phase.
+    changed : float
+        How much G / F changes at most.
     """
 
     slope: float
@@ -94,20 +134,15 @@ class _Ahead(NamedTuple):
 
 
 @njit(cache=True)
-def _disc(factors: tuple[Any, ...], arms: FloatArray, omega: float) -> _Disc:
+def _disc(arms: Arms, omega: float) -> _Disc:
     """Return the disc that L fills at s = j omega, and how it changes with omega.
 
-    L = F1 + F2 - c1 F1 exp(-s tau1) - c2 F2 exp(-s tau2), where F1 and F2 are the responses to
-    the two arms, dead time included. With the phases free it fills a disc around F1 + F2. Below
-    omega |tau2 - tau1| = 1 the phase between the two arms is taken as it is; only their common
-    one is free then.
-
-    `factors` are the roots of F1 and F2, their powers in each, and the highest coefficients.
-    `arms` are c1, c2, tau2 - tau1 (nan where both phases are free at all frequencies) and the
-    dead time.
+    L = F1 + F2 - c1 F1 exp(-s tau1) - c2 F2 exp(-s tau2), dead time included in F1 and F2. With
+    the phases free it fills a disc around F1 + F2. Below omega |tau2 - tau1| = 1 the phase
+    between the two arms is taken as it is; only their common one is free then.
     """
-    roots, powers, leads = factors
-    value1, value2 = complex(leads[0]), complex(leads[1])
+    roots, powers = arms.roots, arms.powers
+    value1, value2 = complex(arms.leads[0]), complex(arms.leads[1])
     rate1, rate2, nearest = 0j, 0j, np.inf
     bend1, bend2, bend = 0.0, 0.0, 0.0
     for i in range(roots.size):
@@ -131,25 +166,32 @@ def _disc(factors: tuple[Any, ...], arms: FloatArray, omega: float) -> _Disc:
         bend1, bend2 = bend1 + abs(n1) / square, bend2 + abs(n2) / square
         bend += abs(n2 - n1) / square
         nearest = min(nearest, square)
-    c1, c2, apart, delay = arms
+    c1, c2, apart = arms.c1, arms.c2, arms.apart
     if abs(value1) < abs(value2):
         value1, value2, rate1, rate2 = value2, value1, rate2, rate1
         bend1, c1, c2, apart = bend2, c2, c1, -apart
-    turn, ratio = np.exp(-1j * omega * delay), value2 / value1 if value2 != 0.0 else 0j
+    dead, other = np.exp(-1j * omega * arms.delay), value2 / value1 if value2 != 0.0 else 0j
     between = rate2 - rate1 if value2 != 0.0 else 0j
-    held, swung, swing = complex(abs(c1)), complex(abs(c2 * ratio)), complex(between.real)
+    held, swung, swing = complex(abs(c1)), complex(abs(c2 * other)), complex(between.real)
     if abs(apart) * omega < 1.0:
-        held, swung = complex(c1), c2 * ratio * np.exp(-1j * omega * apart)
+        held, swung = complex(c1), c2 * other * np.exp(-1j * omega * apart)
         swing = between - 1j * apart
     return _Disc(
-        value1 * turn, ratio, rate1 - 1j * delay, bend1, between, bend,
+        value1 * dead, other, rate1 - 1j * arms.delay, bend1, between, bend,
         held, swung, swing, np.sqrt(nearest),
     )  # fmt: skip
 
 
 @njit(cache=True)
 def _centre_and_radius(disc: _Disc) -> tuple[complex, float]:
-    return disc.larger * (1.0 + disc.ratio), abs(disc.larger) * abs(disc.held + disc.swung)
+    return disc.larger * (1.0 + disc.other), abs(disc.larger) * abs(disc.held + disc.swung)
+
+
+@njit(cache=True)
+def _rounding(disc: _Disc) -> float:
+    """Bound on the rounding error of centre and radius, whose terms may cancel."""
+    terms = 1.0 + abs(disc.other) + abs(disc.held) + abs(disc.swung)
+    return float(64.0 * EPSILON * abs(disc.larger) * terms)
 
 
 @njit(cache=True)
@@ -166,11 +208,11 @@ def _ahead(disc: _Disc, step: float) -> _Ahead:
     # Up to higher orders |held + swung| is convex, and below its chord.
     there = disc.held + disc.swung + disc.swung * disc.swing * step
     slope = (abs(there) - abs(disc.held + disc.swung)) / step
-    bend, other = disc.bend * second, disc.ratio_bend * second
+    bend, other_bend = disc.bend * second, disc.other_bend * second
     own = _beyond_first_order(disc.rate, bend, step)
-    left = abs(disc.ratio) * _beyond_first_order(disc.ratio_rate, other, step)
-    left += abs(disc.swung) * _beyond_first_order(disc.swing, other, step)
-    changed = abs(disc.ratio) * np.expm1(abs(disc.ratio_rate) * step + other)
+    left = abs(disc.other) * _beyond_first_order(disc.other_rate, other_bend, step)
+    left += abs(disc.swung) * _beyond_first_order(disc.swing, other_bend, step)
+    changed = abs(disc.other) * np.expm1(abs(disc.other_rate) * step + other_bend)
     return _Ahead(slope, own, left, abs(disc.rate) * step + bend, changed)
 
 
@@ -190,11 +232,11 @@ def _clear(disc: _Disc, ahead: _Ahead, step: float, point: complex, radius: floa
     if distance == 0.0:
         return False
     begin = distance - spread - radius
-    change = disc.larger * disc.ratio * disc.ratio_rate + point * disc.rate
+    change = disc.larger * disc.other * disc.other_rate + point * disc.rate
     total = (change * away.conjugate()).real / distance - size * ahead.slope
     total += radius * disc.rate.real
     beyond = (abs(point) + radius) * ahead.own + size * ahead.left
-    rounding = 64.0 * EPSILON * (abs(centre) + spread + abs(point) + radius)
+    rounding = _rounding(disc) + 64.0 * EPSILON * (abs(point) + radius)
     return bool(min(begin, begin + total * step) > beyond + rounding)
 
 
@@ -205,11 +247,9 @@ def _nothing_smaller(disc: _Disc, omega: float, step: float, levels: FloatArray)
     Levels of zero are not looked at.
     """
     ahead = _ahead(disc, step)
-    if levels[MODULUS] > 0.0 and not _clear(disc, ahead, step, -1.0 + 0j, levels[MODULUS]):
-        return False
-    if levels[RATIO] > 0.0:
-        point, radius = excluded_disc(levels[RATIO], True)
-        if not _clear(disc, ahead, step, complex(point), radius):
+    for m in (MODULUS, RATIO):
+        point, radius = excluded_disc(levels[m], m)
+        if levels[m] > 0.0 and not _clear(disc, ahead, step, complex(point), radius):
             return False
     if levels[PHASE] <= 0.0 and levels[DELAY] <= 0.0:
         return True
@@ -229,10 +269,10 @@ def _nothing_smaller(disc: _Disc, omega: float, step: float, levels: FloatArray)
     for end in (-np.exp(-1j * lead), -np.exp(1j * lag)):
         if not _clear(disc, ahead, step, end, 0.0):
             return False
-    if ahead.changed >= abs(1.0 + disc.ratio):
+    if ahead.changed >= abs(1.0 + disc.other):
         return False
     own = np.arctan2(-centre.imag, -centre.real) % (2.0 * np.pi)
-    turned = ahead.turned + np.arcsin(ahead.changed / abs(1.0 + disc.ratio))
+    turned = ahead.turned + np.arcsin(ahead.changed / abs(1.0 + disc.other))
     return bool(min(own - lag, 2.0 * np.pi - lead - own) > turned)
 
 
@@ -240,17 +280,17 @@ def _nothing_smaller(disc: _Disc, omega: float, step: float, levels: FloatArray)
 def _on_one_side(disc: _Disc, ahead: _Ahead, step: float) -> bool:
     """Whether L stays on one side of the real axis over a step, whatever the free phases.
 
-    Divided by what F changes by it is the axis that turns, against the phase of F.
+    Both are divided by F(omega + t) / F(omega). The axis then turns by minus the phase that F
+    gains.
     """
     size = abs(disc.larger)
     centre, spread = _centre_and_radius(disc)
     normal = 1j if centre.imag > 0.0 else -1j
     begin = abs(centre.imag) - spread
-    change = disc.larger * disc.ratio * disc.ratio_rate + 1j * centre * disc.rate.imag
+    change = disc.larger * disc.other * disc.other_rate + 1j * centre * disc.rate.imag
     total = (change * normal.conjugate()).real - size * ahead.slope
     beyond = abs(centre) * ahead.own + size * (ahead.left + ahead.changed * ahead.turned)
-    rounding = 64.0 * EPSILON * (abs(centre) + spread)
-    return bool(min(begin, begin + total * step) > beyond + rounding)
+    return bool(min(begin, begin + total * step) > beyond + _rounding(disc))
 
 
 @njit(cache=True)
@@ -276,27 +316,25 @@ def _misses_segment(disc: _Disc, step: float, near: float, far: float) -> bool:
 
 
 @njit(cache=True)
-def meeting_intervals(
-    factors: tuple[Any, ...],
-    arms: FloatArray,
+def intervals_not_clear(
+    arms: Arms,
     segment: FloatArray,
     levels: FloatArray,
     span: tuple[float, float],
     longest_delay: float,
 ) -> FloatArray:
-    """Intervals, shape (n, 2), of a span of the axis outside which L does not meet a target.
+    """Intervals, shape (n, 2), of a span of the axis outside which L stays off a target.
 
-    `factors` and `arms` are what `_disc` takes. The target is a segment of the negative real
-    axis, given by its nearer and its farther end; or, where that is empty, all that has margins
-    below `levels`.
+    The target is a segment of the negative real axis, given by its nearer and its farther end;
+    or, where that is empty, all that has margins below `levels`.
     """
     found, number = np.empty((64, 2)), 0
     omega, omega_end = span
-    step, turn = omega_end, 2.0 * np.pi / longest_delay
+    step, per_turn = omega_end, 2.0 * np.pi / longest_delay
     while omega < omega_end:
         # Next to zero whole turns are too long.
-        shortest = max(min(_TURNS * turn, 0.03 * omega), 3e-4 * omega, 1e-3 * turn)
-        disc = _disc(factors, arms, omega)
+        shortest = max(min(_TURNS * per_turn, 0.03 * omega), 3e-4 * omega, 1e-3 * per_turn)
+        disc = _disc(arms, omega)
         step = min(4.0 * step, 0.5 * disc.nearest, omega_end - omega)
         clear = False
         while step > shortest and not clear:
@@ -331,18 +369,15 @@ def free_margins_at(centre: complex, radius: float, omega: float) -> FloatArray:
     if modulus <= 0.0:
         return np.zeros(4)
     found[MODULUS] = modulus
-    # w = (1 + L) / (1 - L) takes the disc to a disc, or to the outside of one.
-    below = abs(1.0 - centre) ** 2 - radius**2
-    if below == 0.0:
-        found[RATIO] = modulus / (2.0 * radius)
-    else:
-        image = abs(((1.0 + centre) * (1.0 - centre).conjugate() + radius**2) / below)
-        found[RATIO] = abs(image - abs(2.0 * radius / below))
+    # w = (1 + L) / (1 - L) takes the disc to another one, or to the outside of one. In both
+    # cases this is the distance of the image from zero.
+    under = abs((1.0 + centre) * (1.0 - centre).conjugate() + radius**2) + 2.0 * radius
+    if under > 0.0:
+        found[RATIO] = modulus * (abs(1.0 + centre) + radius) / under
     size = abs(centre)
     if abs(size - 1.0) <= radius:
-        half = np.pi
-        if size > 0.0:
-            half = np.arccos(min(max((1.0 + size**2 - radius**2) / (2.0 * size), -1.0), 1.0))
+        # Centre and radius are not both zero, and -1 is outside.
+        half = np.arccos(min(max((1.0 + size**2 - radius**2) / (2.0 * size), -1.0), 1.0))
         angle = np.arctan2(centre.imag, centre.real)
         lag = (angle - half + np.pi) % (2.0 * np.pi)
         lead = (np.pi - angle - half) % (2.0 * np.pi)
@@ -351,68 +386,74 @@ def free_margins_at(centre: complex, radius: float, omega: float) -> FloatArray:
 
 
 @njit(cache=True)
-def free_margins_over(
-    factors: tuple[Any, ...], arms: FloatArray, omega: FloatArray
-) -> FloatArray:
+def free_margins_over(arms: Arms, omega: FloatArray) -> FloatArray:
     """Smallest margins of the disc that L fills with free phases, at given frequencies.
 
-    A row of `free_margins_at` for each.
+    A row of `free_margins_at` for each; inf at a root.
     """
-    found = np.empty((omega.size, 4))
+    found = np.full((omega.size, 4), np.inf)
     for i, w in enumerate(omega):
-        centre, radius = _centre_and_radius(_disc(factors, arms, w))
-        found[i] = free_margins_at(centre, radius, w)
+        disc = _disc(arms, w)
+        if disc.nearest > 0.0:
+            centre, radius = _centre_and_radius(disc)
+            found[i] = free_margins_at(centre, radius, w)
     return found
 
 
 @njit(cache=True)
+def _longest_step(disc: _Disc, omega: float, step: float, levels: FloatArray) -> float:
+    """Longest of step, step / 2, ... over which no margin is below its level, or 0."""
+    while step > _SHORTEST * omega:
+        if _nothing_smaller(disc, omega, step, levels):
+            return step
+        step *= 0.5
+    return 0.0
+
+
+@njit(cache=True)
 def free_margins(
-    factors: tuple[Any, ...],
-    arms: FloatArray,
-    omega: float,
-    omega_end: float,
-    best: FloatArray,
-    tolerance: FloatArray,
+    arms: Arms, omega: float, omega_end: float, best: FloatArray, tolerance: FloatArray
 ) -> tuple[FloatArray, FloatArray, bool]:
     """Smallest margins of the disc that L fills with free phases, from omega to `omega_end`.
 
-    `factors` and `arms` are what `_disc` takes. `best` holds values that are known to occur,
-    or inf. Returns the smallest values, where they were met (nan for those of `best`), and
-    whether the walk came to its end. None is smaller than the result by more than its share
-    `tolerance`. Where the disc only touches the unit circle, phase and delay may be those of a
-    disc that is larger by a part in 1e9, and thus smaller by some 5e-5 rad.
+    `best` holds values that are known to occur, or inf. Returns the smallest values, where they
+    were met (nan for those of `best`), and whether the walk came to its end, which it does not
+    if it is too long, or a root lies on the axis. None is smaller than the result by more than
+    its share `tolerance`. Where the disc only touches the unit circle, phase and delay may be
+    those of a disc that is larger by a part in 1e9.
     """
     best, where = best.copy(), np.full(4, np.nan)
     step = omega_end
     for _ in range(MOST_STEPS // 8):
-        disc = _disc(factors, arms, omega)
+        disc = _disc(arms, omega)
+        if disc.nearest <= _GROWN * omega:
+            break
         centre, radius = _centre_and_radius(disc)
+        here = free_margins_at(centre, radius, omega)
+        for m in range(4):
+            if here[m] < best[m]:
+                best[m], where[m] = here[m], omega
+        if best[MODULUS] == 0.0:
+            # Some phases take L to -1.
+            return best, where, True
         step = min(2.0 * step, 0.5 * disc.nearest, omega_end - omega)
-        grown = 0.0
-        while True:
-            here = free_margins_at(centre, radius + grown * (abs(centre) + radius), omega)
-            for m in range(PHASE if grown else MODULUS, 4):
-                if here[m] < best[m]:
-                    best[m], where[m] = here[m], omega
-            if best[MODULUS] == 0.0:
-                # Some phases take L to -1.
-                return best, where, True
-            levels = (1.0 - tolerance) * best
-            while step > 1e-12 * omega and not _nothing_smaller(disc, omega, step, levels):
-                step *= 0.5
-            if step > 1e-12 * omega or grown > 0.0:
-                break
+        step = _longest_step(disc, omega, step, (1.0 - tolerance) * best)
+        if step == 0.0:
             # The disc may touch the unit circle next to here. It then covers a short arc of it,
             # and a little later a longer one.
-            grown, step = 1e-9, 1e-9 * omega
+            here = free_margins_at(centre, radius + _GROWN * (abs(centre) + radius), omega)
+            for m in (PHASE, DELAY):
+                if here[m] < best[m]:
+                    best[m], where[m] = here[m], omega
+            step = min(_GROWN * omega, 0.5 * disc.nearest)
+            step = _longest_step(disc, omega, step, (1.0 - tolerance) * best)
+        if step == 0.0:
+            # Over the shortest step only the distances are left to be certified.
+            step, levels = _SHORTEST * omega, (1.0 - tolerance) * best
+            levels[PHASE], levels[DELAY] = 0.0, 0.0
+            if not _nothing_smaller(disc, omega, step, levels):
+                break
         if omega + step >= omega_end * (1.0 - 1e-15):
             return best, where, True
-        if not step > 1e-12 * omega:
-            # Phase and delay were taken from the larger disc. Over the shortest step only the
-            # distances are left to be certified.
-            levels[PHASE], levels[DELAY] = 0.0, 0.0
-            step = 1e-12 * omega
-            if not _nothing_smaller(disc, omega, step, levels):
-                return best, where, False
         omega += step
     return best, where, False

@@ -26,13 +26,12 @@ from armlock.exponentials import (
 )
 from armlock.free_phases import (
     FIRST_TURNS,
-    arm_factors,
-    arm_parameters,
     arm_weights,
-    clear_from,
+    least_at,
     limit_margins,
     meeting_intervals,
     no_margin,
+    no_smaller_from,
     search_outwards,
     unconfined,
 )
@@ -43,9 +42,9 @@ TOLERANCE = 1e-6
 
 
 @njit(cache=True)
-def _distance(n: complex, r: complex, symmetric: bool) -> float:
-    """|1 + L|, or |1 + L| / |1 - L|, of L = n / r."""
-    below = abs(r - n) if symmetric else abs(r)
+def _distance(n: complex, r: complex, m: int) -> float:
+    """|1 + L|, or |1 + L| / |1 - L| where m is RATIO, of L = n / r."""
+    below = abs(r - n) if m == discs.RATIO else abs(r)
     return abs(r + n) / below if below > 0.0 else np.inf
 
 
@@ -70,7 +69,7 @@ def _stays_above(
 
 @njit(cache=True)
 def _downhill(
-    curves: tuple[Any, ...], symmetric: bool, omega: float, step: float, end: float
+    curves: tuple[Any, ...], m: int, omega: float, step: float, end: float
 ) -> tuple[float, float]:
     """Follow a distance of L from -1 down to a minimum next to omega, within one piece.
 
@@ -83,7 +82,7 @@ def _downhill(
     while step > shortest:
         if start <= at <= end:
             value = evaluate(start, reach, n, phases, at)[0]
-            here = _distance(value, evaluate(start, reach, r, none, at)[0], symmetric)
+            here = _distance(value, evaluate(start, reach, r, none, at)[0], m)
             if here < least:
                 omega, least = at, here
                 at = omega + step
@@ -109,11 +108,11 @@ def _walk(
     """Smallest |1 + L|, and |1 + L| / |1 - L|, from omega to omega_end.
 
     `polynomials` are R, B1 and B2, `numerator` weights, sums and phases of N. `best` holds a
-    value of each that occurs: only smaller ones are looked for, and none where it is zero.
-    Returns the smallest ones; where they are, nan for those of `best`; and whether the walk
-    came to its end, which it does not if it is too long or rounding hides L. None is smaller
-    than the result by more than the share `tolerance`, and by what rounding moves L: at most a
-    part in a million of the larger one of R and N.
+    value of each that occurs: the walk looks for smaller ones, and passes over an entry of
+    zero. Returns the smallest ones; where they are, nan for those of `best`; and whether the
+    walk came to its end, which it does not if it is too long or rounding hides L. None is
+    smaller than the result by more than the share `tolerance` and twice what rounding may move
+    R + N by. That is at most 1e-6 |R|, or |R - N| for the second one.
     """
     weights, sums, phases = numerator
     only_r, none = np.array([1.0, 0.0, 0.0]), np.zeros(0)
@@ -149,7 +148,7 @@ def _walk(
                 for m in range(2):
                     if best[m] == 0.0:
                         continue
-                    here[m] = _distance(new_value, new_below, m == discs.RATIO)
+                    here[m] = _distance(new_value, new_below, m)
                     under, under_slope, under_bent = below, change, bent
                     if m == discs.RATIO:
                         under, under_slope, under_bent = below - value, change - slope, both
@@ -173,9 +172,7 @@ def _walk(
             for m in range(2):
                 if here[m] < best[m]:
                     curves = start, reach, n, phases, r, none
-                    best[m], where[m] = _downhill(
-                        curves, m == discs.RATIO, following, step, end
-                    )
+                    best[m], where[m] = _downhill(curves, m, following, step, end)
             omega, value, slope = following, new_value, new_slope
             below, change = new_below, new_change
     return best, where, True
@@ -184,23 +181,18 @@ def _walk(
 def smallest_distances(
     loop: Loop, c1: float, c2: float, *, disk: bool, highest: float = np.inf
 ) -> tuple[FloatArray, FloatArray]:
-    """Smallest |1 + L| up to `highest`, and |1 + L| / |1 - L| if `disk`; and where.
+    """Smallest |1 + L| and |1 + L| / |1 - L| up to a frequency, the limit included; and where.
 
-    That is inf where it is the limit.
+    `highest` and the places are in rad/s, a place is inf for the limit at high frequency. The
+    second distance is one if no smaller one occurs, and zero unless `disk` asks for it.
     """
     best = limit_margins(loop, c1, c2)[:2]
     best[discs.RATIO] = min(best[discs.RATIO], 1.0) if disk else 0.0
     where = np.full(2, np.inf)
-    together = arm_weights(loop, c1, c2)
-    factors, arms = arm_factors(loop), arm_parameters(loop, c1, c2)
 
     def end() -> float:
         """Frequency past which nothing is smaller, or `highest`."""
-        excluded = [
-            discs.excluded_disc(value * (1.0 - TOLERANCE), m == discs.RATIO)
-            for m, value in enumerate(best)
-        ]
-        return min(max(clear_from(loop, together, *disc) for disc in excluded), highest)
+        return min(no_smaller_from(loop, weights, (1.0 - TOLERANCE) * best), highest)
 
     def improve(omega: FloatArray) -> None:
         """Take the smallest distances at given frequencies if they are smaller."""
@@ -212,13 +204,11 @@ def smallest_distances(
                 best[m], where[m] = distances[m, nearest], omega[nearest]
 
     def meeting(span: tuple[float, float]) -> FloatArray:
-        modulus, ratio = best * (1.0 - TOLERANCE)
+        modulus, ratio = (1.0 - TOLERANCE) * best
         return meeting_intervals(loop, c1, c2, span, levels=(modulus, ratio, 0.0, 0.0))
 
     def likely(omega: FloatArray) -> FloatArray:
-        free = discs.free_margins_over(factors, arms, omega)
-        nearest: FloatArray = omega[np.argmin(free[:, : discs.PHASE], axis=0)]
-        return nearest
+        return least_at(loop, c1, c2, omega, slice(discs.PHASE))
 
     def look(intervals: FloatArray) -> None:
         nonlocal best, where
@@ -226,18 +216,18 @@ def smallest_distances(
             improve(np.linspace(low, high, 2 + 2000 // len(intervals)))
             for start, stop in meeting((low, high)):
                 found, places, complete = _walk(
-                    polynomials, weights, start, stop, best, TOLERANCE
+                    polynomials, numerator, start, stop, best, TOLERANCE
                 )
                 if not complete:
                     why = f"following it takes more than {contour.MOST_STEPS:.0e} steps"
                     raise no_margin(c1, c2, f"rounding hides L, or {why}")
                 best, where = found, np.where(np.isnan(places), where, places)
 
+    weights = arm_weights(loop, c1, c2)
     if not np.isfinite(end()):
         raise unconfined(c1, c2)
-    numerator = loop_numerator(loop, c1, c2)
-    weights = numerator.weights, numerator.sums, numerator.phases
-    polynomials = numerator.compiled()
+    whole = loop_numerator(loop, c1, c2)
+    polynomials, numerator = whole.compiled(), (whole.weights, whole.sums, whole.phases)
     lowest = _one_power_up_to(loop, c1, c2)
     # Next to the limit a walk takes short steps, unless it knows of a smaller value.
     first = FIRST_TURNS * 2.0 * np.pi / loop.longest_delay

@@ -1,8 +1,9 @@
 """What L can be at all phases of the arms: a disc, and the count and the limits it decides.
 
-With free phases L fills a disc, around the sum of the responses to the two arms. Where that
-stays off a target, such as -1 or the unit circle, L does, whatever the delays are. So it tells
-which parts of the axis need no walk, and its limit at high frequency is that of L.
+With free phases L fills a disc, around the sum of the responses to the two arms
+(`armlock.discs`). Where that stays off a target, such as -1 or the unit circle, L does at all
+those phases. So it tells which parts of the axis need no walk, and its limit at high frequency
+is that of L.
 """
 
 from __future__ import annotations
@@ -135,13 +136,17 @@ def last_crossover(loop: Loop, weights: FloatArray, gain: float = 1.0) -> float:
     return last_larger(loop.rest, (c, loop.b1, loop.b2), gain * np.array([1.0, *weights]))
 
 
-@lru_cache(maxsize=64)
-def arm_factors(loop: Loop) -> tuple[ComplexArray, IntArray, FloatArray]:
-    """Return the responses to the two arms as `armlock.discs` takes them.
+def no_smaller_from(loop: Loop, weights: FloatArray, levels: FloatArray) -> float:
+    """Frequency past which neither |1 + L| nor |1 + L| / |1 - L| is below its level, or inf."""
+    return max(
+        clear_from(loop, weights, *discs.excluded_disc(levels[m], m))
+        for m in (discs.MODULUS, discs.RATIO)
+    )
 
-    The roots of their factors, the powers of these in both, shape (2, roots), and the highest
-    coefficients.
-    """
+
+@lru_cache(maxsize=64)
+def _factors(loop: Loop) -> tuple[ComplexArray, IntArray, FloatArray]:
+    """Return the roots, powers and leads of `armlock.discs.Arms`."""
     rest, *arms = loop.polynomials()
     leads = np.array([float(p.coefficients[-1] / rest.coefficients[-1]) for p in arms])
     powers: dict[complex, list[int]] = {}
@@ -163,12 +168,10 @@ def arm_factors(loop: Loop) -> tuple[ComplexArray, IntArray, FloatArray]:
     )
 
 
-def arm_parameters(loop: Loop, c1: float, c2: float, *, free: bool = False) -> FloatArray:
-    """Return what `armlock.discs` needs of the arms beside their responses.
-
-    If `free`, both phases are free at all frequencies.
-    """
-    return np.array([c1, c2, np.nan if free else loop.tau2 - loop.tau1, loop.delay])
+def arms_of(loop: Loop, c1: float, c2: float, *, free: bool = False) -> discs.Arms:
+    """Return the arms of a loop. If `free`, both phases are free at all frequencies."""
+    apart = np.nan if free else loop.tau2 - loop.tau1
+    return discs.Arms(*_factors(loop), float(c1), float(c2), apart, loop.delay)
 
 
 def meeting_intervals(
@@ -183,12 +186,11 @@ def meeting_intervals(
 ) -> FloatArray:
     """Intervals, in rad/s and of shape (n, 2), on which L may meet a target at some phases.
 
-    Intervals of a span of the axis. The target is that of `armlock.discs.meeting_intervals`.
-    With `free`, that of `arm_parameters`, they hold for all smaller perturbations, too.
+    Intervals of a span of the axis. The target is that of `armlock.discs.intervals_not_clear`.
+    With `free`, as for `arms_of`, they hold for all smaller |c1| and |c2|, too.
     """
-    found: FloatArray = discs.meeting_intervals(
-        arm_factors(loop),
-        arm_parameters(loop, c1, c2, free=free),
+    found: FloatArray = discs.intervals_not_clear(
+        arms_of(loop, c1, c2, free=free),
         np.array(segment),
         np.array(levels),
         span,
@@ -200,9 +202,16 @@ def meeting_intervals(
 def crossing_intervals(
     loop: Loop, c1: float, c2: float, span: tuple[float, float]
 ) -> FloatArray:
-    """Intervals of a span on which phases and parameters of up to these sizes take L to -1."""
+    """Intervals of a span outside which no phases, and no smaller |c1|, |c2|, take L to -1."""
     levels = (_TOUCHING, 0.0, 0.0, 0.0)
     return meeting_intervals(loop, c1, c2, span, levels=levels, free=True)
+
+
+def least_at(loop: Loop, c1: float, c2: float, omega: FloatArray, margins: slice) -> FloatArray:
+    """Return at which of some frequencies each of some margins of the disc is smallest."""
+    found: FloatArray = discs.free_margins_over(arms_of(loop, c1, c2), omega)
+    nearest: FloatArray = omega[np.argmin(found[:, margins], axis=0)]
+    return nearest
 
 
 def search_outwards(
@@ -214,8 +223,8 @@ def search_outwards(
 ) -> None:
     """Look at intervals of the axis, the most promising first, until nothing is left.
 
-    First come the first turns of the delays. While many more turns are left than lie around
-    likely places, these come next. Last comes all that is left.
+    First come the first turns of the delays. Then, as long as far more is left, what lies
+    around likely places, each time further around. Last comes the rest.
 
     Parameters
     ----------
@@ -259,12 +268,7 @@ def clear_above(loop: Loop, c1: float, c2: float, free_above: float) -> bool:
         return True
     least = np.array([_TOUCHING, 0.0, 0.0, 0.0])
     nearest, _, complete = discs.free_margins(
-        arm_factors(loop),
-        arm_parameters(loop, c1, c2, free=True),
-        free_above,
-        end,
-        least,
-        np.zeros(4),
+        arms_of(loop, c1, c2, free=True), free_above, end, least, np.zeros(4)
     )
     return bool(complete) and nearest[discs.MODULUS] == _TOUCHING
 
@@ -274,10 +278,11 @@ def count_at(loop: Loop, c1: float, c2: float, free_above: float) -> int:
 
     It takes less time where no phases above the frequency `free_above`, in rad/s, matter.
     """
-    count = None
     if np.isfinite(free_above) and clear_above(loop, c1, c2, free_above):
         count = _count_below(loop, c1, c2, free_above)
-    return int(unstable_roots(loop, c1, c2)) if count is None else count
+        if count is not None:
+            return count
+    return int(unstable_roots(loop, c1, c2))
 
 
 def _count_below(loop: Loop, c1: float, c2: float, omega: float) -> int | None:

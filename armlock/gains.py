@@ -233,9 +233,9 @@ def gain_interval_of_stable(loop: Loop, c1: float, c2: float) -> tuple[float, fl
     # At s = 0, where L is `above` over `below`, a real root crosses.
     above = float(loop.b1[0] * (1.0 - c1) + loop.b2[0] * (1.0 - c2))
     below = float(loop.rest[0])
-    if above * below < 0.0:
-        at_zero = -below / above
-        lower = max(lower, at_zero) if at_zero < 1.0 else lower
-        if 1.0 < at_zero < upper:
-            upper, where = at_zero, 0.0
+    at_zero = -below / above if above else np.inf
+    if max(lower, 1.0 / LARGEST_GAIN) < at_zero < 1.0:
+        lower = at_zero
+    elif 1.0 < at_zero < min(upper, LARGEST_GAIN):
+        upper, where = at_zero, 0.0
     return lower, upper, where

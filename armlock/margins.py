@@ -15,15 +15,13 @@ import numpy.typing as npt
 
 from armlock import discs
 from armlock.checks import FloatArray, positive_number, real_number
-from armlock.crossovers import phase_and_delay, settled_from
-from armlock.distances import TOLERANCE, smallest_distances
+from armlock.crossovers import crossovers_end, phase_and_delay
+from armlock.distances import smallest_distances
 from armlock.free_phases import (
-    arm_factors,
-    arm_parameters,
-    clear_from,
-    last_crossover,
+    arms_of,
     limit_margins,
     no_margin,
+    no_smaller_from,
     require_stable,
 )
 from armlock.gains import gain_interval_of_stable
@@ -144,30 +142,22 @@ def _free_margins(
     A coarse sample gives values that occur. The certified walk then steps over what cannot hold
     smaller ones.
     """
-    arms = np.abs([c1, c2])
-    limit = limit_margins(loop, c1, c2)
-    # Past it |L| is below one.
-    end = last_crossover(loop, arms)
-    if not np.isfinite(end):
-        end = settled_from(loop, c1, c2, float(limit[discs.PHASE]))
+    limit, weights = limit_margins(loop, c1, c2), np.abs([c1, c2])
+    end = crossovers_end(loop, c1, c2, weights, float(limit[discs.PHASE]))
     end = max(end, 2.0 * lowest)
-
-    factors, free = arm_factors(loop), arm_parameters(loop, c1, c2, free=True)
+    arms = arms_of(loop, c1, c2, free=True)
     # The smallest distances may lie past the last crossover, where L turns most.
     omega = np.geomspace(lowest, 10.0 * end, 300)
-    sampled = discs.free_margins_over(factors, free, omega)
+    sampled = discs.free_margins_over(arms, omega)
     nearest, least = omega[np.argmin(sampled, axis=0)], sampled.min(axis=0)
     known = np.minimum(limit, known)
     best, where = np.minimum(known, least), np.where(least < known, nearest, np.inf)
-    # Past it L stays clear of where smaller values would be.
-    for k, symmetric in ((discs.MODULUS, False), (discs.RATIO, True)):
-        level = best[k] * (1.0 - TOLERANCE)
-        end = max(end, clear_from(loop, arms, *discs.excluded_disc(level, symmetric)))
-    smaller, places, complete = discs.free_margins(
-        factors, free, lowest, end, best, _FREE_TOLERANCES
-    )
+    # Past it no distance is smaller, either.
+    end = max(end, no_smaller_from(loop, weights, (1.0 - _FREE_TOLERANCES) * best))
+    smaller, places, complete = discs.free_margins(arms, lowest, end, best, _FREE_TOLERANCES)
     if not complete:
-        raise no_margin(c1, c2, f"free phases from {lowest} rad/s on take too many steps")
+        why = "take too many steps, or meet a root on the imaginary axis"
+        raise no_margin(c1, c2, f"free phases from {lowest} rad/s on {why}")
     return smaller, np.where(np.isnan(places), where, places)
 
 
@@ -198,7 +188,9 @@ def margins(
         If `loop` is no `Loop`, c1 or c2 is not finite and real, `free_above` is not positive,
         or the loop is not stable there.
     CountError
-        If gain times delay is too large to follow, or rounding hides what decides.
+        If gain times delay is too large to follow, or rounding hides what decides; with free
+        phases also if a root of the controller or the sensor lies on the imaginary axis above
+        that frequency.
 
     Notes
     -----
@@ -213,10 +205,11 @@ def margins(
         \left| L - K e^{-s\delta} (m_1 + m_2) \right|
         \le |K| \left( |c_1 m_1| + |c_2 m_2| \right) .
 
-    The distances from -1 of this disc, and of its share of the unit circle, are known in closed
-    form at each frequency; their minima over frequency are certified to 1e-5, the disk margin
-    to 1e-4. A disc that holds -1 has margins of zero. A gain interval is not
-    given: the edge of such a disc may run along the real axis.
+    The distances from -1 of this disc, and of its share of the unit circle, are known in
+    closed form at each frequency; their minima over frequency are certified to 1e-5, the disk
+    margin to 1e-4. Where the disc only touches the unit circle, phase and delay may be those
+    of a disc that is larger by a part in 1e9. A disc that holds -1 has margins of zero. A gain
+    interval is not given: the edge of such a disc may run along the real axis.
     With equal weights m and c1 = c2 = 1 the disc has the centre 2 K m exp(-s delay), and a
     radius of the same magnitude: it stays clear of -1, for arms of any lengths, where
     Re [K m exp(-s delay)] > -1/4.
@@ -247,9 +240,17 @@ def margins(
         if free[discs.PHASE] < phase:
             phase, phase_omega = free[discs.PHASE], where[discs.PHASE]
         ratio, delay = min(ratio, free[discs.RATIO]), min(delay, free[discs.DELAY])
-    numbers = lower, upper, phase, delay, modulus, 2.0 * ratio
-    places = gain_omega, phase_omega, modulus_omega
-    return Margins(*(float(value) for value in (*numbers, *places)))
+    return Margins(
+        gain_lower=lower,
+        gain_upper=upper,
+        phase=float(phase),
+        delay=float(delay),
+        modulus=float(modulus),
+        disk=2.0 * float(ratio),
+        gain_omega=gain_omega,
+        phase_omega=float(phase_omega),
+        modulus_omega=float(modulus_omega),
+    )
 
 
 def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:

@@ -159,12 +159,11 @@ class Ray:
                 f"the ray must stay where the neutral root chain is confined, but "
                 f"{self.system!r} loses it before t = {stop}"
             )
-        everywhere = intervals is None
         if not self.acts():
             return Crossings(np.empty(0), np.empty(0), np.empty(0, dtype=np.int64))
         parts = [(0.0, end)] if intervals is None else np.minimum(intervals, end)
         found, hidden = self._crossings(parts, 0.0, stop)
-        if hidden and everywhere:
+        if hidden and intervals is None:
             self._confirm(stop, int(found.change.sum()))
         return found
 
@@ -190,7 +189,9 @@ class Ray:
         if first and near.any():
             near &= rough <= rough[near].min() * (1.0 + 1e-6)
         omega, change = omega[near], change[near]
-        omega = polished(lambda w: self.quotient(w).imag, omega, (1e-7 * omega,))
+        # Far less than the distance between two zeros.
+        reach = np.minimum(1e-7 * omega, 0.01 / max(self.system.longest_delay, 1e-12))
+        omega = polished(lambda w: self.quotient(w).imag, omega, (reach,))
         position = self.quotient(omega).real
         kept = np.flatnonzero((position > lowest) & (position <= stop))
         kept = kept[np.argsort(position[kept], kind="stable")]
@@ -218,7 +219,7 @@ class Ray:
         if not self.acts():
             return best
         hidden = False
-        turn = 2.0 * np.pi / max(self.system.longest_delay, 1e-12)
+        per_turn = 2.0 * np.pi / max(self.system.longest_delay, 1e-12)
 
         def reach() -> float:
             return min(best.position, stop)
@@ -227,10 +228,10 @@ class Ray:
             """Frequency past which no root crosses earlier."""
             if reach() < chain:
                 return self.end(reach())
-            # A root that crosses nearer to the limit than these shares is taken for the limit:
-            # the first past so many turns, the second in any case.
+            # Nearer to the limit than the first share, roots are followed for so many turns at
+            # most; nearer than the second, not at all. What is left is taken for the limit.
             near, nearest = (self.end(chain * (1.0 - share)) for share in (1e-6, 1e-10))
-            return max(near, min(nearest, _TURNS_NEXT_TO_THE_CHAIN * turn))
+            return max(near, min(nearest, _TURNS_NEXT_TO_THE_CHAIN * per_turn))
 
         def look(intervals: FloatArray) -> None:
             nonlocal best, hidden
@@ -247,7 +248,11 @@ class Ray:
             walked = 0.0
             while (last := end()) > walked:
                 # The boundary of a map ends at one frequency: a single walk sees all of it.
-                far = np.inf if self.system.step else max(_LONGER * walked, FIRST_TURNS * turn)
+                far = (
+                    np.inf
+                    if self.system.step
+                    else max(_LONGER * walked, FIRST_TURNS * per_turn)
+                )
                 look(np.array([[walked, min(last, far)]]))
                 walked = min(last, far)
         if hidden:
@@ -313,9 +318,10 @@ def first_crossing(
     Notes
     -----
     Walks go as far up in frequency as a root can cross before the first one so far. As t comes
-    near the limit of the neutral root chain, roots cross at ever higher frequency. The limit is
-    returned in place of a root that crosses closer to it than a part in a million and at more
-    than 50 000 turns of the longest delay, or closer than a part in 1e10.
+    near the limit of the neutral root chain, roots cross at ever higher frequency. The limit
+    is returned in place of a root that crosses closer to it than a part in a million and at
+    more than 50 000 turns of the longest delay. It may be in place of one closer than a part
+    in 1e10.
 
     Examples
     --------

@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 
 from armlock import Loop, discs, distances
-from armlock.free_phases import arm_factors, arm_parameters
+from armlock.free_phases import arms_of
 from armlock.sensors import COMMON, DIFFERENCE, dual
 from tests.attack import between, roots
 
@@ -23,9 +23,9 @@ def discs_ahead(number):
         gain = rng.choice([1.0, between(rng, 0.1, 10.0)])
         loop = Loop((zeros, poles, gain), mapping, 2.0, 1.5, delay)
         c1, c2 = rng.uniform(-2.0, 2.0, 2)
-        arms = arm_parameters(loop, c1, c2)
+        arms = arms_of(loop, c1, c2)
         for omega in 10.0 ** rng.uniform(-1.5, 1.5, 10):
-            disc = discs._disc(arm_factors(loop), arms, omega)
+            disc = discs._disc(arms, omega)
             step = min(0.5 * disc.nearest, between(rng, 1e-3, 10.0) * omega)
             at = omega + step * rng.choice([1.0, rng.random()])
             first, second = (complex(arm[0]) for arm in loop.arm_responses(np.array([1j * at])))

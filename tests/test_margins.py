@@ -22,6 +22,7 @@ from armlock import (
     paper_loop,
     unstable_roots,
 )
+from armlock.gains import gain_interval
 from armlock.rays import first_crossing
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
 from tests import independent
@@ -244,6 +245,35 @@ def test_free_phases_pass_over_no_first_crossing(name, direction):
         first_crossing(system, point, direction, 5.0) for system in (loop, loop.changed())
     )
     assert found == pytest.approx(expected, rel=1e-9, nan_ok=True)
+
+
+def test_what_l_fills_may_have_one_on_its_edge():
+    # L = 4 - 4 c exp(-2 s) is nearest to -1 at 4 - 4 c, and comes to 1 for c = 0.75 only.
+    constant = Loop(((), (), 4.0), SINGLE, 2.0, 1.5)
+    for c1, nearest, phase, place in ((0.75, 2.0, np.pi, np.inf), (0.5, 3.0, np.inf, np.nan)):
+        found = margins(constant, c1)
+        assert found.modulus == pytest.approx(nearest, rel=1e-12)
+        assert (found.disk, found.phase, found.delay) == (2.0, phase, 0.0)
+        np.testing.assert_equal(found.phase_omega, place)
+    # L falls from 2 to 1, where |1 - L| vanishes.
+    lag = Loop(((-2.0,), (-1.0,), 1.0), SINGLE, 2.0, 1.5)
+    assert margins(lag, 0.0).modulus == pytest.approx(2.0, rel=1e-6)
+    assert margins(lag, 0.0).disk == 2.0
+
+
+def test_gain_factors_past_a_million_are_not_told():
+    # A real root would cross at 1e11, but a pair has done so at some 4e7.
+    weak = Loop(((), (-1.0, -1.0, -1.0), 1e-7), SINGLE, 2.0, 1.5)
+    assert gain_interval(weak, 1.0001, 1.0)[:2] == (0.0, np.inf)
+
+
+@pytest.mark.parametrize("lowest", [0.5, 1.0])
+def test_free_phases_do_not_step_over_a_root_on_the_axis(lowest):
+    notch = ((1j, -1j), (-0.25 + 0.97j, -0.25 - 0.97j, -1.0, -1.0), 0.9)
+    loop = Loop(notch, SINGLE, 2.0, 1.5)
+    with pytest.raises(CountError, match="a root on the imaginary axis"):
+        margins(loop, 0.1, 0.0, free_above=lowest)
+    assert margins(loop, 0.1, 0.0, free_above=1.5).modulus > 0.0
 
 
 def test_an_unstable_loop_has_no_margins_and_nothing_to_lose():

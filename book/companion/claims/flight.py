@@ -18,9 +18,9 @@ from armlock.budget import (
     tdi_capability,
 )
 from armlock.checks import FloatArray
-from armlock.discs import MODULUS, PHASE, free_margins_at
+from armlock.discs import MODULUS, PHASE, free_margins_over
 from armlock.flight import flight_loop
-from armlock.free_phases import free_disc
+from armlock.free_phases import arms_of
 from armlock.loops import Loop, SingleArm
 from armlock.margins import Margins, critical_perturbation, margins
 from armlock.noise import LaserNoise
@@ -80,9 +80,7 @@ def free_margins(loop: Loop, frequency: FloatArray) -> FloatArray:
 
     At each frequency in closed form; shape (2, n).
     """
-    omega = TURN * frequency
-    rows = zip(*free_disc(loop, 1.0, 1.0, omega), omega, strict=True)
-    found = np.array([free_margins_at(complex(c), r, w) for c, r, w in rows])
+    found = free_margins_over(arms_of(loop, 1.0, 1.0, free=True), TURN * frequency)
     return np.array([found[:, MODULUS], np.degrees(found[:, PHASE])])
 
 
