@@ -140,14 +140,17 @@ def _outgrown_from(squares: FloatArray, factors: FloatArray, shares: FloatArray)
 def squared_magnitudes(polynomials: Sequence[FloatArray]) -> tuple[FloatArray, float]:
     """Return |p(j omega)|^2 as polynomials in (omega / unit)^2, and the unit in rad/s.
 
-    All are multiplied by one power of two. The first polynomial is of the highest degree. In
-    this unit, a power of two, its lowest and highest coefficients are of the same size.
+    The first polynomial is of the highest degree. In this unit, a power of two, its lowest and
+    highest coefficients are of the same size. All are multiplied by one power of two, so that
+    its coefficients lie around one.
     """
     first = polynomials[0]
-    degree, lowest = first.size - 1, int(np.flatnonzero(first)[0])
-    turn = np.log2(abs(first[lowest])) - np.log2(abs(first[degree]))
-    exponent = round(turn / (degree - lowest)) if degree > lowest else 0
-    powers = exponent * np.arange(degree + 1) - round(0.5 * exponent * (degree + lowest))
+    degree, used = first.size - 1, np.flatnonzero(first)
+    sizes = np.log2(np.abs(first[used]))
+    lowest = int(used[0])
+    exponent = round((sizes[0] - sizes[-1]) / (degree - lowest)) if degree > lowest else 0
+    sizes += exponent * used
+    powers = exponent * np.arange(degree + 1) - round(0.5 * (sizes.max() + sizes.min()))
     squares = np.zeros((len(polynomials), degree + 1))
     for row, p in zip(squares, polynomials, strict=True):
         scaled = np.ldexp(p, powers[: p.size])

@@ -51,9 +51,10 @@ _MOTION = Controller(
     (0.0,), (_CORNER, _CORNER.conjugate()), SPACECRAFT_MOTION * abs(_CORNER) ** 2
 )
 # Two poles a decade from 1 uHz on, each with a zero midway to the next, fall as 1/sqrt(f).
-_POLES = [-2.0 * np.pi * 10.0 ** (0.5 * k - 6.0) for k in range(20)]
-_FALL = Controller([10.0**0.25 * pole for pole in _POLES], _POLES, 1.0)
-_CLOCK = _FALL * Controller((), (), CLOCK_NOISE / abs(complex(_FALL(2j * np.pi))))
+_POLES = -2.0 * np.pi * 10.0 ** (0.5 * np.arange(20) - 6.0)
+_ZEROS = 10.0**0.25 * _POLES
+_AT_1_HZ = np.prod((2j * np.pi - _ZEROS) / (2j * np.pi - _POLES))
+_CLOCK = Controller(_ZEROS.tolist(), _POLES.tolist(), CLOCK_NOISE / abs(_AT_1_HZ))
 
 
 def free_running(frequency: FloatArray) -> FloatArray:

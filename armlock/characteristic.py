@@ -16,10 +16,10 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Sequence
+from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
-import mpmath
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
@@ -34,7 +34,7 @@ from armlock.checks import (
     real_array,
     real_number,
 )
-from armlock.exponentials import EPSILON, ExponentialSum, Polynomial
+from armlock.exponentials import EPSILON, LOW_DEGREE, ExponentialSum, Polynomial
 
 # Past this an exponential is no float.
 _LARGEST_EXPONENT = 700.0
@@ -153,7 +153,7 @@ class CharacteristicFunction:
                     f"got degree {b.size - 1}: the equation would be of advanced type"
                 )
         for name, b, lag in (("b1", self.b1, self.delay1), ("b2", self.b2, self.delay2)):
-            if lag + self.delay == 0.0 and b.size == self.a.size and not self.step:
+            if lag + self.delay == 0.0 and b.size == self.a.size:
                 raise ValueError(
                     f"{name} without a delay must be of lower degree than A ({self.degree}), "
                     f"or its parameter would change the order of the equation"
@@ -355,8 +355,15 @@ class CharacteristicFunction:
                 return Polynomial(
                     late * scales * p.coefficients, p.roots * np.exp(-sigma * self.step)
                 )
-            moved = poly.Polynomial(p.coefficients)(poly.Polynomial([sigma, 1.0]))
-            return Polynomial(late * moved.coef, p.roots - sigma)
+            if p.coefficients.size > LOW_DEGREE + 1:
+                moved = poly.Polynomial(p.coefficients)(poly.Polynomial([sigma, 1.0]))
+                return Polynomial(late * moved.coef, p.roots - sigma)
+            # D is evaluated from these: exactly, because powers of sigma may cancel.
+            exact = [Fraction(value) for value in p.coefficients.tolist()]
+            for i in range(len(exact) - 1):
+                for k in range(len(exact) - 2, i - 1, -1):
+                    exact[k] += Fraction(sigma) * exact[k + 1]
+            return Polynomial.of(late * np.array(exact, dtype=float), p.roots - sigma)
 
         x0, y0 = self.reference
         rest, b1, b2 = self._polynomials
@@ -367,9 +374,13 @@ class CharacteristicFunction:
             # It moves along, so that nothing has to cancel in `rest`.
             reference=(x0 * np.exp(sigma * self.delay1), y0 * np.exp(sigma * self.delay2)),
         )
-        # Not found again: in extended precision that takes a second. Of a map's only their
-        # number counts.
-        vars(found)["roots_of_a"] = self.roots_of_a - sigma
+        # Not found again: in extended precision that takes a second.
+        roots = self.roots_of_a - sigma
+        if self.step:
+            roots = self.roots_of_a * np.exp(-sigma * self.step)
+        elif self.degree <= LOW_DEGREE:
+            roots = Polynomial.of(found.a, roots).roots
+        vars(found)["roots_of_a"] = roots
         return found
 
     def exchanged(self) -> CharacteristicFunction:
@@ -412,25 +423,9 @@ class CharacteristicFunction:
 
     @cached_property
     def roots_of_a(self) -> ComplexArray:
-        """Roots of A, in extended precision where doubles give those of another polynomial.
-
-        They enter a count through the argument of A alone, past the last frequency.
-        """
-        if self.a is self.rest:
-            return self._polynomials[0].roots
-        a = self.a
-        roots = poly.polyroots(a).astype(np.complex128)
-        product, magnitude = np.array([a[-1]], dtype=np.complex128), np.abs(a[-1:])
-        for root in roots[np.argsort(np.abs(roots))]:
-            product = np.convolve(product, [-root, 1.0])
-            magnitude = np.convolve(magnitude, [abs(root), 1.0])
-        if (np.abs(product - a) <= 1e-6 * magnitude).all():
-            return roots
-        with mpmath.workdps(60):
-            found = mpmath.polyroots(
-                a.tolist(), maxsteps=500, extraprec=400, asc=True, roots_init=roots.tolist()
-            )
-        return np.array([complex(root) for root in found])
+        """Roots of A: they enter a count through the argument of A, past the last frequency."""
+        rest = self._polynomials[0]
+        return rest.roots if self.a is self.rest else Polynomial.of(self.a).roots
 
     def _delayed(self, k: int, lag: float, weight: float = 1.0) -> ExponentialSum:
         """Return `weight` times R, B1 or B2, delayed by a time, at s = j omega.

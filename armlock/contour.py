@@ -94,13 +94,13 @@ def _follow(
             return argument, omega, step, steps
         # Along the tangent, then from its end to the curve: both parts are principal.
         tangent = value + step * slope
-        argument += _angle(tangent, value) + _angle(next_value, tangent)
+        argument += angle_between(tangent, value) + angle_between(next_value, tangent)
         omega, value, slope = following, next_value, next_slope
     return argument, omega, step, steps
 
 
 @njit(cache=True)
-def _angle(value: complex, other: complex) -> float:
+def angle_between(value: complex, other: complex) -> float:
     """Principal argument of value / other."""
     ratio = value * other.conjugate()
     return float(np.arctan2(ratio.imag, ratio.real))
@@ -177,9 +177,9 @@ def winding(
                 if following > omega:
                     before = evaluate(start, reach, slow, rates, omega)[0]
                     after = evaluate(start, reach, slow, rates, following)[0]
-                    argument -= _angle(value, before)
+                    argument -= angle_between(value, before)
                     value = evaluate(start, reach, local, phases, following)[0]
-                    argument += turned + _angle(value, after)
+                    argument += turned + angle_between(value, after)
                     omega = following
             until = min(end, omega + block)
             turned, following, step, more = _follow(
@@ -197,14 +197,17 @@ def winding(
 
 
 @njit(cache=True)
-def remaining_argument(roots: ComplexArray, omega: float) -> float:
-    """Argument that the polynomial with these roots gathers from j omega to infinity."""
+def argument_at(roots: ComplexArray, omega: float) -> float:
+    """Argument at j omega of the polynomial with these roots, up to the sign of its lead.
+
+    It is continuous along the axis, and half pi for each root at infinity.
+    """
     argument = 0.0
     for root in roots:
         angle = np.arctan2(omega - root.imag, -root.real)
         if root.real > 0.0 and angle < 0.0:
             angle += 2.0 * np.pi
-        argument += 0.5 * np.pi - angle
+        argument += angle
     return argument
 
 
@@ -350,7 +353,7 @@ def _imaginary_bounds(
         only[0, m] = local[0, m].imag
         if start == 0.0 and reach == 1.0:
             # The coefficients are real or imaginary: only the latter enter the imaginary part.
-            sizes[0, m] = abs(local[0, m].imag)
+            sizes[0, m] = sizes[0, m] if local[0, m].imag != 0.0 else 0.0
     everywhere = curvature_bound(start, reach, only, phases)
     near = curvature_from_zero(reach, local, phases) if start == 0.0 else everywhere
     return near, everywhere, rounding_bound(start, reach, sizes, phases, rounding)
@@ -377,9 +380,9 @@ def imaginary_zeros(
     - OMEGA, polished;
     - JUMP, twice the direction of the sign change (a conjugate pair crosses); once at
       omega = 0 and, for a map, at `omega_end` (a real root crosses); 0 where rounding hides
-      whether there is one, or the sign at an `omega_start` above zero;
+      whether there is one, or the sign at an `omega_start` above zero, or at `omega_end`;
     - WIDTH, how far rounding lets the zero move: for a zero that is not simple, half the
-      stretch in which the sign is doubtful, and all of it at `omega_start`;
+      stretch in which the sign is doubtful, and all of it at `omega_start` and `omega_end`;
     - POSITION, the real part over the measure, nan where that vanishes;
     - SPREAD, how far rounding lets the position move.
 
@@ -438,9 +441,15 @@ def imaginary_zeros(
             now, caution = 1 if value.imag > 0.0 else -1, 1.0
             if sign == 0:
                 # At the start itself the sign was hidden.
-                there, rate = evaluate(start, reach, local, phases, omega_start)
+                there = evaluate(start, reach, local, phases, max(omega_start, start))[0]
                 jump, width = (now if omega_start == 0.0 else 0), following - omega_start
+                rate = (value - there) / width
                 zeros = _with_zero(zeros, found, omega_start, jump, width, there, rate)
+                found += 1
+            elif now != sign and last_clear < start:
+                # It was hidden since before this piece.
+                width = following - last_clear
+                zeros = _with_zero(zeros, found, following, 2 * now, width, value, slope)
                 found += 1
             elif now != sign:
                 guess = 0.5 * (last_clear + following)
@@ -458,12 +467,16 @@ def imaginary_zeros(
                 found += 1
             elif doubtful:
                 at, width = 0.5 * (last_clear + following), 0.5 * (following - last_clear)
-                there, rate = evaluate(start, reach, local, phases, at)
+                there, rate = evaluate(start, reach, local, phases, max(at, start))
                 zeros = _with_zero(zeros, found, at, 0, width, there, rate)
                 found += 1
             omega, last_clear, sign, doubtful = following, following, now, False
         if is_map and omega >= omega_end and sign != 0:
-            zeros = _with_zero(zeros, found, omega_end, -sign, 0.0, value, slope)
+            width = omega_end - last_clear if doubtful else 0.0
+            zeros = _with_zero(zeros, found, omega_end, -sign, width, value, slope)
+            found += 1
+        elif omega >= omega_end and doubtful:
+            zeros = _with_zero(zeros, found, omega_end, 0, omega_end - last_clear, value, slope)
             found += 1
         if found > first and measure[0].shape[0] > 0:
             square = piece(polynomials, measure[0], measure[1], start)[3]

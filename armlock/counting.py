@@ -22,8 +22,9 @@ from armlock.contour import (
     MOST_RADIANS,
     POSITION,
     SPREAD,
+    angle_between,
+    argument_at,
     imaginary_zeros,
-    remaining_argument,
     winding,
 )
 from armlock.exponentials import EPSILON
@@ -36,7 +37,8 @@ from armlock.exponentials import EPSILON
 BOUNDARY = -1
 # The neutral root chain is not confined: `armlock.bounds.last_frequency` is infinite.
 UNCONFINED = -2
-# The argument does not add up. Of a row of a chart: its points are to be counted one by one.
+# D and the roots of A contradict each other, or the count is below zero. Of a row of a chart:
+# its points are to be counted one by one.
 DOUBTFUL = -3
 # The walk takes too many steps.
 TOO_LONG = -4
@@ -110,7 +112,7 @@ class RowModel(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """The rows of a chart, with one entry of each array but `x` for a row.
+    """The rows of a chart: entry i of each array but `x` belongs to row i.
 
     Attributes
     ----------
@@ -139,10 +141,11 @@ class Rows(NamedTuple):
 def count_point(model: PointModel, x: float, y: float, end: float) -> int:
     """Return the number of unstable roots at one point, or a status code below zero.
 
-    By the argument principle: degree / 2 less the argument over pi, gathered from 0 to
-    infinity, for polynomials in s; degree less the argument over pi, gathered from 0 to `end`,
-    for a map. `end` is what `armlock.bounds.last_frequency` gives. Past it no root crosses, or
-    it is inf, because the neutral root chain is not confined; for a map it is pi / step.
+    By the argument principle. Without unstable roots the argument of D gathers, from 0 to
+    infinity, half pi for each root of A, and that of a map, from 0 to pi / step, pi for each.
+    Each unstable root takes away pi. `end` is what `armlock.bounds.last_frequency` gives. Past
+    it no root crosses, or it is inf, because the neutral root chain is not confined; for a map
+    it is pi / step.
     """
     weights, sums, phases = model.weights, model.sums, model.phases
     if end == np.inf:
@@ -163,24 +166,19 @@ def count_point(model: PointModel, x: float, y: float, end: float) -> int:
         return BOUNDARY
     if np.isnan(argument):
         return TOO_LONG
-    if model.is_map:
-        count = model.roots.size - argument / np.pi
-    else:
-        # From `end` on |D / A - 1| < 1, so that D / A does not go around zero: its argument at
-        # `end` is taken back. That of A is known from its roots, there and at infinity.
-        remaining = remaining_argument(model.roots, end)
-        a = model.sign * np.exp(1j * (0.5 * np.pi * model.roots.size - remaining))
-        ratio = value * a.conjugate()
-        apart = np.arctan2(ratio.imag, ratio.real)
+    whole = np.pi * model.roots.size
+    if not model.is_map:
+        # What the argument of D is at `end`. Past it |D / A - 1| < 1: the argument of D / A is
+        # within a quarter turn, and goes back to zero, and that of A is known from its roots.
+        whole = argument_at(model.roots, end)
+        apart = angle_between(value, model.sign * np.exp(1j * whole))
         if abs(apart) > 0.51 * np.pi:
-            # |D / A - 1| < 1 does not allow that.
+            # More than rounding explains: the roots of A are not those of A.
             return DOUBTFUL
-        argument += remaining - apart
-        count = 0.5 * model.roots.size - argument / np.pi
-    nearest = int(np.floor(count + 0.5)) if np.isfinite(count) else -1
-    if abs(count - nearest) > 1e-3 or nearest < 0:
-        return DOUBTFUL
-    return nearest
+        whole += apart
+    count = (whole - argument) / np.pi
+    # It is a whole number but for rounding, because D is real at both ends of the axis.
+    return int(np.floor(count + 0.5)) if -0.5 < count < np.inf else DOUBTFUL
 
 
 # So few points or rows are left to one core: threads take half a millisecond to begin.
@@ -263,13 +261,10 @@ def _fill_row(
     )
     change = np.zeros(x.size + 1, dtype=np.int64)
     total = running = rows.base[i]
-    trusted = complete and total >= 0
     for zero in zeros:
         jump, position, spread = int(zero[JUMP]), zero[POSITION], zero[SPREAD]
         if np.isnan(position):
             continue
-        if abs(position - lower) <= spread or abs(position - upper) <= spread:
-            trusted = False
         if lower < position < upper:
             total += jump
             change[np.searchsorted(x, position)] += jump
@@ -281,7 +276,7 @@ def _fill_row(
     for k in range(x.size):
         running += change[k]
         counts[i, k] = running
-    last[i] = total if trusted else DOUBTFUL
+    last[i] = total if complete and rows.base[i] >= 0 else DOUBTFUL
 
 
 @njit(cache=True, nogil=True)
@@ -300,8 +295,8 @@ def fill_rows(model: RowModel, rows: Rows) -> tuple[IntArray, BoolArray, IntArra
     """Fill rows of a chart with counts, from the crossings of each row.
 
     Returns the counts, which of them lie too near a crossing to be trusted, and the count at
-    the end of each row. That is DOUBTFUL, and the row's counts mean nothing, where its first
-    count is none, a crossing lies too near one of its two ends, or the walk was given up.
+    the end of each row. That is DOUBTFUL, and the row's counts mean nothing, where `base` is
+    below zero, or the walk was given up.
     """
     shape = rows.y.size, rows.x.size
     filled = (

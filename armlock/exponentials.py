@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import mpmath
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
@@ -69,9 +70,28 @@ class Polynomial(NamedTuple):
     factors: tuple[Polynomial, ...] = ()
 
     @classmethod
-    def of(cls, coefficients: FloatArray) -> Polynomial:
-        """Return the polynomial with these coefficients."""
-        return cls(coefficients, poly.polyroots(coefficients).astype(np.complex128))
+    def of(cls, coefficients: FloatArray, known: ComplexArray | None = None) -> Polynomial:
+        """Return the polynomial with these coefficients, and these roots if they are known.
+
+        Roots that are those of another polynomial are found anew, in extended precision.
+        """
+        roots = poly.polyroots(coefficients).astype(np.complex128) if known is None else known
+        product = np.array(coefficients[-1:], dtype=np.complex128)
+        magnitude = np.abs(coefficients[-1:])
+        for root in roots[np.argsort(np.abs(roots))]:
+            product = np.convolve(product, [-root, 1.0])
+            magnitude = np.convolve(magnitude, [abs(root), 1.0])
+        if (np.abs(product - coefficients) <= 1e-6 * magnitude).all():
+            return cls(coefficients, roots)
+        with mpmath.workdps(60):
+            found = mpmath.polyroots(
+                coefficients.tolist(),
+                maxsteps=500,
+                extraprec=400,
+                asc=True,
+                roots_init=roots.tolist(),
+            )
+        return cls(coefficients, np.array([complex(root) for root in found]))
 
     def over(self, other: Polynomial, s: ComplexArray) -> ComplexArray:
         """Evaluate p(s) / q(s), factor by factor."""
@@ -164,7 +184,8 @@ class ExponentialSum(NamedTuple):
         """Return the polynomials as compiled functions take them, in five arrays.
 
         1. Coefficients in powers of omega, shape (polynomials, degree + 1). There are no rows
-           where a degree exceeds `LOW_DEGREE`: the others are for that case.
+           where a degree exceeds `LOW_DEGREE`, or squares would leave the range of floats: the
+           others are for that case.
         2. Roots with an imaginary part of zero or above, factor after factor.
         3. The index of each factor's first root.
         4. The factors' highest coefficients.
@@ -186,12 +207,18 @@ class ExponentialSum(NamedTuple):
                 pair[m] = place[id(f)]
         kept = [np.sort_complex(f.roots[f.roots.imag >= 0.0]) for f in factors.values()]
         return (
-            whole if degree <= LOW_DEGREE else whole[:0],
+            whole if degree <= LOW_DEGREE and _in_range(whole) else whole[:0],
             np.concatenate(kept),
             np.cumsum([0, *(roots.size for roots in kept)]),
             np.array([f.coefficients[-1] for f in factors.values()]),
             pairs,
         )
+
+
+def _in_range(values: ComplexArray) -> bool:
+    """Whether products of four such values are floats, zeros left out."""
+    sizes = np.abs(values[values != 0.0])
+    return bool(((sizes > 1e-70) & (sizes < 1e70)).all())
 
 
 def without_unused(*sums: ExponentialSum) -> tuple[ExponentialSum, ...]:
@@ -267,7 +294,7 @@ def _from_roots(
         if total > 0.0:
             largest = max(largest, exponents[k] + int(np.floor(np.log2(total))))
     for k in range(leads.size):
-        scale = 2.0 ** max(exponents[k] - largest, -1000)
+        scale = 2.0 ** min(max(exponents[k] - largest, -1000), 1000)
         left_out[k] *= scale
         for m in range(size):
             found[k, m] *= scale

@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from numpy.polynomial import polynomial as poly
 
 from armlock import paper, sensors
 from armlock.characteristic import CharacteristicFunction
@@ -214,7 +213,7 @@ def _factored(
 
     Roots at s = 0 may have cancelled: as many are left as the degree says.
     """
-    found = np.concatenate((roots, poly.polyroots(np.asarray(other))))
+    found = np.concatenate((roots, Polynomial.of(np.asarray(other, dtype=float)).roots))
     found = found[found != 0.0]
     at_zero = np.zeros(max(product.size - 1 - found.size, 0))
     return Polynomial(product, np.concatenate((found, at_zero)).astype(np.complex128))

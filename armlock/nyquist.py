@@ -2,7 +2,8 @@
 
 The contour goes up the imaginary axis, indented to the right around the pole of L at s = 0,
 and back at infinity. It is sampled so finely that the argument of 1 + L is known without doubt,
-up to where no root lies on the axis; what 1 + L gathers from there on follows from poles. The
+up to past the last root on the axis; what 1 + L gathers from there on follows from the roots of
+its numerator and denominator without delays. The
 encirclements are then held against the count of unstable roots: Z = N + P.
 """
 
@@ -17,10 +18,11 @@ from armlock.bounds import last_frequency, last_larger
 from armlock.checks import (
     ComplexArray,
     FloatArray,
+    check_memory,
     positive_number,
     real_number,
 )
-from armlock.contour import MOST_SAMPLES, remaining_argument, resolved_grid
+from armlock.contour import MOST_SAMPLES, argument_at, resolved_grid
 from armlock.loops import (
     Loop,
     checked_loop,
@@ -30,7 +32,6 @@ from armlock.loops import (
 )
 from armlock.stability import (
     BOUNDARY,
-    UNCONFINED,
     CountError,
     sign_changes,
     unstable_roots,
@@ -175,6 +176,7 @@ def _resolving_grid(loop: Loop, c1: float, c2: float, end: float) -> FloatArray:
 def _drawing_grid(loop: Loop, start: float, end: float) -> FloatArray:
     """Frequencies close enough to draw the curve; finer at first, where L changes most."""
     turn = 2.0 * np.pi / loop.longest_delay
+    check_memory("omega_max", (int(min(400.0 * end / turn, 1e18)),), 64)
     first = np.arange(0.0, min(4.0 * turn, end), turn / 2000.0)
     whole = np.arange(0.0, end, turn / 400.0)
     return np.concatenate((np.geomspace(start, end, 1000), first, whole))
@@ -187,8 +189,7 @@ def _turn_beyond(loop: Loop, last: complex, end: float) -> float:
     infinity, on which D / A tends to one: its argument at `end` is taken back. Those of A and R
     are known from their roots. The two are of one degree, and turn alike along the arc.
     """
-    gathered = remaining_argument(loop.roots_of_a, end)
-    gathered -= remaining_argument(loop.polynomials()[0].roots, end)
+    gathered = argument_at(loop.polynomials()[0].roots, end) - argument_at(loop.roots_of_a, end)
     ratio = loop.a[-1] / loop.rest[-1] * np.exp(-1j * gathered)
     return float(gathered - np.angle(last / ratio))
 
@@ -273,7 +274,7 @@ def nyquist(
     expected = int(unstable_roots(loop, c1, c2))
     if expected == BOUNDARY:
         expected = int(unstable_roots(loop.shifted(radius), c1, c2))
-    if abs(turns + encirclements) > 1e-3 or (expected != UNCONFINED and expected != count):
+    if expected != count:
         raise refused(
             f"{encirclements} encirclements and {poles} open-loop poles against {expected} "
             "roots"
@@ -317,8 +318,9 @@ def axis_crossings(
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no `Loop`, an argument is not finite and real, or `omega_max` is not
-        positive, or not given where |L| does not fall below 1e-3.
+        If `loop` is no `Loop`, an argument is not finite and real, `omega_max` is not positive,
+        or not given where |L| does not fall below 1e-3, or L has poles on the imaginary axis
+        elsewhere than at s = 0.
     CountError
         If there are too many crossings to be found.
 
@@ -338,6 +340,7 @@ def axis_crossings(
     """
     checked_loop(loop)
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
+    open_loop_poles(loop)
     if omega_max is None:
         factors = np.array([1.0 + abs(c1), 1.0 + abs(c2)]) / 1e-3
         omega_max = last_larger(loop.rest, (loop.b1, loop.b2), factors)
@@ -346,7 +349,8 @@ def axis_crossings(
                 "omega_max must be given for a loop whose |L| does not fall to zero at high "
                 "frequency"
             )
-    omega_max = positive_number("omega_max", omega_max)
+    else:
+        omega_max = positive_number("omega_max", omega_max)
     crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
     omega, jump, _ = sign_changes(crossing, [(0.0, omega_max)])
     omega = omega[(omega > 0.0) & (jump != 0)]

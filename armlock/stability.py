@@ -56,6 +56,12 @@ _BYTES_A_POINT = 32
 # Most tiles, of whole rows, into which a chart is cut for an executor.
 _TILES = 64
 _NO_POINTS = np.empty((0, 2))
+# What becomes an error, and the reason that it gives.
+_WHY_NOT = {
+    counting.TOO_LONG: f"following D takes more than {contour.MOST_STEPS:.0e} steps, because "
+    "the gain, with these parameters, times the delay is too large",
+    counting.DOUBTFUL: "the argument of D does not add up",
+}
 
 
 class CountError(RuntimeError):
@@ -179,21 +185,13 @@ def _count(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -> IntA
         points = np.column_stack((x, y))[np.isnan(ends)]
         raise CountError(f"no count at {tuple(points[0].tolist())}: a number overflows", points)
     counts: IntArray = counting.count_points(_point_model(system), x, y, ends)
-    bad = (counts == counting.DOUBTFUL) | (counts == counting.TOO_LONG)
-    if bad.any():
-        points = np.column_stack((x[bad], y[bad]))
-        name1, name2 = system.parameters
-        at = f"no count at ({name1}, {name2}) = ({points[0, 0]}, {points[0, 1]})"
-        if (counts == counting.TOO_LONG).any():
-            raise CountError(
-                f"{at}: following D takes more than {contour.MOST_STEPS:.0e} steps, because "
-                f"the gain, with these parameters, times the delay is too large",
-                points,
-            )
-        raise CountError(
-            f"{at} and {len(points) - 1} further points: the argument of D does not add up",
-            points,
-        )
+    name1, name2 = system.parameters
+    for status, why in _WHY_NOT.items():
+        if (counts == status).any():
+            points = np.column_stack((x, y))[counts == status]
+            at = f"({name1}, {name2}) = ({points[0, 0]}, {points[0, 1]})"
+            more = f" and {len(points) - 1} further points" if len(points) > 1 else ""
+            raise CountError(f"no count at {at}{more}: {why}", points)
     return counts
 
 

@@ -61,6 +61,8 @@ def test_exchanging_swaps_the_parameters(system, s, x, y):
 def test_a_parameter_that_would_change_the_order_is_refused():
     with pytest.raises(ValueError, match=r"^b1 without a delay must be of lower degree than A"):
         CharacteristicFunction([1.0, 1.0], [0.0, 1.0], [1.0], 0.0, 1.0)
+    with pytest.raises(ValueError, match=r"^b1 without a delay must be of lower degree than A"):
+        CharacteristicFunction([0.5, 1.0], [0.0, 1.0], [0.0], 0.0, 0.0, step=1.0)
 
 
 SYSTEMS_OF_ALL_KINDS = [

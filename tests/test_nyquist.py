@@ -194,3 +194,13 @@ def test_the_pole_at_zero_cancels_only_where_it_does(loop, c1, order):
 def test_a_curve_that_takes_too_many_samples_is_refused():
     with pytest.raises(CountError, match="gain times delay is too large"):
         nyquist(CommonArm(1e9), 1.2, 1.05)
+
+
+def test_crossings_are_none_of_a_weak_loop_and_refused_where_l_has_no_value():
+    weak = Loop(((), (-1.0,), 1e-5), SINGLE, 2.0, 1.5)
+    assert axis_crossings(weak).omega.size == 0
+    resonant = Loop(((-1.0,), (2j, -2j, -1.0), 0.3), SINGLE, 2.0, 1.5)
+    with pytest.raises(ValueError, match="no pole on the imaginary axis except at s = 0"):
+        axis_crossings(resonant)
+    with pytest.raises(ValueError, match=r"^omega_max must be of a size that memory holds"):
+        nyquist(CommonArm(), omega_max=1e9)

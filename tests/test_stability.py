@@ -20,6 +20,7 @@ from armlock import (
     unstable_roots,
 )
 from armlock.rays import Ray
+from armlock.stability import sign_changes
 from tests import independent
 from tests.systems import NEUTRAL, RETARDED, with_roots
 
@@ -337,3 +338,32 @@ class TestLimits:
         again = pickle.loads(pickle.dumps(CountError("why", np.array([[1.0, 2.0]]))))
         assert str(again) == "why"
         np.testing.assert_array_equal(again.points, [[1.0, 2.0]])
+
+
+def test_coefficients_of_any_size_are_counted_alike():
+    tiny = CharacteristicFunction([1e-170, 1e-170], [1e-171], [1e-171], 1.0, 2.0)
+    usual = CharacteristicFunction([1.0, 1.0], [0.1], [0.1], 1.0, 2.0)
+    assert unstable_roots(tiny, -35.0, 1.0) == unstable_roots(usual, -35.0, 1.0) == 2
+
+
+def test_equal_roots_are_counted_where_a_shift_takes_them():
+    # Ten roots at -0.002 after the shift, of which doubles alone would scatter some.
+    equal = CharacteristicFunction(np.poly([-1.0] * 10)[::-1], [1.0], [1.0], 1.0, 2.0)
+    assert unstable_roots(equal.shifted(-0.998), 0.0, 0.0) == 0
+    assert unstable_roots(equal.shifted(-1.002), 0.0, 0.0) == 10
+
+
+def test_a_row_that_starts_hidden_doubts_the_points_around_its_crossing():
+    # Im D of this row is 0.2 omega^5 next to zero, and hidden up to some 1e-3 rad/s.
+    system, y = CharacteristicFunction([-11.0 / 6.0, 1.0], [1.0], [1.0], 2.0, 1.0), -8.0 / 3.0
+    x = 5.0 / 6.0 + np.array([-1.0, -1e-8, 1e-8, 1e-6, 1.0])
+    counts = stability_chart(system, x, [y]).counts[0]
+    np.testing.assert_array_equal(counts, unstable_roots(system, x, y))
+
+
+def test_a_sign_that_is_hidden_to_the_end_is_reported():
+    real = CharacteristicFunction([1.0, 0.0, 1.0], [1.0], [0.0], 0.0, 0.0)
+    ray = Ray(real, (2.0, 0.0), (-1.0, 0.0))
+    _, change, width = sign_changes(ray.product, [(0.0, 3.0)])
+    assert change.tolist() == [0]
+    assert width[0] == 3.0
