@@ -17,8 +17,6 @@ All functions here work on exponential sums, piece by piece, see `armlock.expone
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from armlock.checks import ComplexArray, FloatArray
@@ -26,6 +24,7 @@ from armlock.compiled import njit
 from armlock.exponentials import (
     EPSILON,
     ROUNDING,
+    CompiledSum,
     curvature_bound,
     curvature_from_zero,
     evaluate,
@@ -130,12 +129,7 @@ def _slow_terms(
 
 @njit(cache=True)
 def winding(
-    polynomials: tuple[Any, ...],
-    weights: FloatArray,
-    sums: FloatArray,
-    phases: FloatArray,
-    uncertain: FloatArray,
-    omega_end: float,
+    whole: CompiledSum, uncertain: FloatArray, omega_end: float
 ) -> tuple[float, complex, bool]:
     """Argument gathered by an exponential sum as omega goes from 0 to `omega_end`.
 
@@ -147,13 +141,14 @@ def winding(
     value up to a positive factor, and whether the sum stays clear of zero. The argument is nan
     where the walk would take more than MOST_STEPS steps.
     """
+    phases = whole.phases
     steps, argument, omega, step = 0, 0.0, 0.0, omega_end
     value = 0j
     block = np.inf
     if phases.size and phases.any():
         block = _BLOCK * 2.0 * np.pi / np.abs(phases).max()
-    while omega < omega_end or value == 0j:
-        start, reach, end, local, sizes = piece(polynomials, weights, sums, omega, uncertain)
+    while omega < omega_end or value == 0j:  # once at least
+        start, reach, end, local, sizes = piece(whole, omega, uncertain)
         end = min(end, omega_end)
         span = start, reach
         bound = curvature_bound(start, reach, local, phases)
@@ -361,9 +356,8 @@ def _imaginary_bounds(
 
 @njit(cache=True)
 def imaginary_zeros(
-    polynomials: tuple[Any, ...],
-    function: tuple[Any, ...],
-    measure: tuple[Any, ...],
+    whole: CompiledSum,
+    measure: CompiledSum | None,
     omega_start: float,
     omega_end: float,
     is_map: bool,
@@ -371,11 +365,10 @@ def imaginary_zeros(
 ) -> tuple[FloatArray, bool]:
     """Zeros in [omega_start, omega_end] of the imaginary part of an exponential sum.
 
-    `function` and `measure` are weights, sums and phases of two exponential sums, the measure
-    being positive: |M|^2 for a row x = N / M, whose `function` is N conj(M). Where the
-    imaginary part is odd in omega, as it is for a row of a chart, omega = 0 is one of the
-    zeros. Of a map `omega_end` is pi / step. Returns a row for each zero, and whether these are
-    all (they are not if the walk would take more than MOST_STEPS steps). Its columns:
+    For a row x = N / M of a chart the sum is N conj(M), and `measure` is |M|^2. Where the
+    imaginary part is odd in omega, as it is there, omega = 0 is one of the zeros. Of a map
+    `omega_end` is pi / step. Returns a row for each zero, and whether these are all (they are
+    not if the walk would take more than MOST_STEPS steps). Its columns:
 
     - OMEGA, polished;
     - JUMP, twice the direction of the sign change (a conjugate pair crosses); once at
@@ -388,7 +381,7 @@ def imaginary_zeros(
 
     Without a measure the last two are the real part and the size of the slope.
     """
-    weights, sums, phases = function
+    phases = whole.phases
     zeros, found = np.empty((64, 5)), 0
     fastest = np.abs(phases).max() if phases.size else 0.0
     if (omega_end - omega_start) * fastest > MOST_RADIANS:
@@ -397,7 +390,7 @@ def imaginary_zeros(
     steps, sign, doubtful = 0, 0, True
     crawled, patience, caution = 0, 1000, 1.0
     while omega < omega_end and steps <= MOST_STEPS:
-        start, reach, end, local, sizes = piece(polynomials, weights, sums, omega)
+        start, reach, end, local, sizes = piece(whole, omega)
         end = min(end, omega_end)
         per_reach, first = 1.0 / reach, found
         near, everywhere, error = _imaginary_bounds(
@@ -478,28 +471,25 @@ def imaginary_zeros(
         elif omega >= omega_end and doubtful:
             zeros = _with_zero(zeros, found, omega_end, 0, omega_end - last_clear, value, slope)
             found += 1
-        if found > first and measure[0].shape[0] > 0:
-            square = piece(polynomials, measure[0], measure[1], start)[3]
-            _place(zeros[first:found], start, reach, square, measure[2], sizes, fastest)
+        if found > first and measure is not None:
+            square = piece(measure, start)[3]
+            _place(zeros[first:found], start, reach, square, measure.phases, sizes, fastest)
     return zeros[:found], omega >= omega_end
 
 
 @njit(cache=True)
-def resolved_grid(
-    polynomials: tuple[Any, ...], function: tuple[Any, ...], omega_end: float, tolerance: float
-) -> FloatArray:
+def resolved_grid(whole: CompiledSum, omega_end: float, tolerance: float) -> FloatArray:
     """Frequencies from 0 to `omega_end` between which an exponential sum is nearly straight.
 
     Over each step its tangent moves by no more than twice `tolerance` times its distance from
     zero, and the sum leaves the tangent by no more than once that, or the step is as small as
     rounding allows. The grid ends before `omega_end` if it would take more than MOST_SAMPLES.
     """
-    weights, sums, phases = function
-    grid = np.empty(1024)
+    phases, grid = whole.phases, np.empty(1024)
     found, omega, step = 1, 0.0, omega_end
     grid[0] = omega
     while omega < omega_end and found < MOST_SAMPLES:
-        start, reach, end, local, _ = piece(polynomials, weights, sums, omega)
+        start, reach, end, local, _ = piece(whole, omega)
         end = min(end, omega_end)
         bound = curvature_bound(start, reach, local, phases)
         while omega < end and found < MOST_SAMPLES:

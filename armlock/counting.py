@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import config
@@ -27,7 +27,7 @@ from armlock.contour import (
     imaginary_zeros,
     winding,
 )
-from armlock.exponentials import EPSILON
+from armlock.exponentials import EPSILON, CompiledSum
 
 # What `count_point` returns where it is no number of roots. `armlock.stability.unstable_roots`
 # returns the first two as well, and makes errors of DOUBTFUL and TOO_LONG.
@@ -51,17 +51,12 @@ class PointModel(NamedTuple):
 
     Attributes
     ----------
-    polynomials : tuple
-        Those of its exponential sums, from `armlock.exponentials.ExponentialSum.compiled`.
-    weights : float array, shape (3, groups, k)
-        Of the three terms of `CharacteristicFunction.parts`, over all their exponentials.
-    sums : float array, shape (3, k)
-        Of R, B1 and B2. Where all exponentials are one, D is R less x - x0 and y - y0 times the
-        two others: so nothing cancels there.
-    reference : float array, shape (2,)
+    constant, b1, b2 : CompiledSum
+        The terms of `CharacteristicFunction.parts`, over the same exponentials. The sums of the
+        first are those of R: where all exponentials are one, D is R less x - x0 and y - y0
+        times the two others, so that nothing cancels there.
+    reference : tuple of two floats
         The parameters (x0, y0).
-    phases : float array, shape (groups,)
-        Phase rates in s.
     sign : float
         That of the highest coefficient of A, 1 or -1.
     roots : complex array
@@ -70,11 +65,10 @@ class PointModel(NamedTuple):
         Whether the polynomials are those of a map.
     """
 
-    polynomials: tuple[Any, ...]
-    weights: FloatArray
-    sums: FloatArray
-    reference: FloatArray
-    phases: FloatArray
+    constant: CompiledSum
+    b1: CompiledSum
+    b2: CompiledSum
+    reference: tuple[float, float]
     sign: float
     roots: ComplexArray
     is_map: bool
@@ -87,27 +81,21 @@ class RowModel(NamedTuple):
 
     Attributes
     ----------
-    polynomials : tuple
-        As in `PointModel`.
-    fixed, varying : float arrays, shape (groups, k)
-        Weights: N conj(M) is `fixed` - y `varying`.
-    fixed_sums, varying_sums : float arrays, shape (k,)
-        Their sums, the latter to be weighted by the deviation of y from the reference.
-    phases : float array, shape (groups,)
-        Phase rates of both in s.
-    measure : tuple of three float arrays
-        Weights, sums and phases of |M|^2.
+    fixed, varying : CompiledSum
+        N conj(M) is `fixed` - y `varying`, over the same exponentials. The sums of `fixed` are
+        those at y = y0.
+    measure : CompiledSum
+        |M|^2.
+    reference : float
+        The parameter y0.
     is_map : bool
         Whether the polynomials are those of a map.
     """
 
-    polynomials: tuple[Any, ...]
-    fixed: FloatArray
-    varying: FloatArray
-    fixed_sums: FloatArray
-    varying_sums: FloatArray
-    phases: FloatArray
-    measure: tuple[FloatArray, FloatArray, FloatArray]
+    fixed: CompiledSum
+    varying: CompiledSum
+    measure: CompiledSum
+    reference: float
     is_map: bool
 
 
@@ -118,8 +106,8 @@ class Rows(NamedTuple):
     ----------
     ends : float array, shape (m,)
         Frequencies in rad/s past which nothing crosses.
-    y, deviation : float arrays, shape (m,)
-        The parameter y, and how far it is from the reference.
+    y : float array, shape (m,)
+        The parameter y.
     base : int array, shape (m,)
         The counts at x = lower.
     x : float array, shape (n,)
@@ -130,7 +118,6 @@ class Rows(NamedTuple):
 
     ends: FloatArray
     y: FloatArray
-    deviation: FloatArray
     base: IntArray
     x: FloatArray
     lower: FloatArray
@@ -147,36 +134,38 @@ def count_point(model: PointModel, x: float, y: float, end: float) -> int:
     it no root crosses, or it is inf, because the neutral root chain is not confined; for a map
     it is pi / step.
     """
-    weights, sums, phases = model.weights, model.sums, model.phases
+    constant, b1, b2 = model.constant, model.b1, model.b2
     if end == np.inf:
         return UNCONFINED
-    for phase in phases:
+    for phase in constant.phases:
         if end * abs(phase) > MOST_RADIANS:
             return TOO_LONG
     dx, dy = x - model.reference[0], y - model.reference[1]
-    here, uncertain, total = np.zeros_like(sums[0]), np.zeros_like(sums[0]), weights[0].copy()
-    for k in range(here.size):
-        here[k] = sums[0, k] - dx * sums[1, k] - dy * sums[2, k]
+    sums, uncertain = constant.sums.copy(), np.empty_like(constant.sums)
+    weights = constant.weights.copy()
+    for k in range(sums.size):
+        sums[k] -= dx * b1.sums[k] + dy * b2.sums[k]
         # The parameters are rounded numbers themselves.
-        uncertain[k] = EPSILON * (abs(x * sums[1, k]) + abs(y * sums[2, k]))
-        for g in range(phases.size):
-            total[g, k] -= x * weights[1, g, k] + y * weights[2, g, k]
-    argument, value, clear = winding(model.polynomials, total, here, phases, uncertain, end)
+        uncertain[k] = EPSILON * (abs(x * b1.sums[k]) + abs(y * b2.sums[k]))
+        for g in range(weights.shape[0]):
+            weights[g, k] -= x * b1.weights[g, k] + y * b2.weights[g, k]
+    whole = CompiledSum(constant.polynomials, weights, sums, constant.phases)
+    argument, value, clear = winding(whole, uncertain, end)
     if not clear:
         return BOUNDARY
     if np.isnan(argument):
         return TOO_LONG
-    whole = np.pi * model.roots.size
+    final = np.pi * model.roots.size
     if not model.is_map:
         # What the argument of D is at `end`. Past it |D / A - 1| < 1: the argument of D / A is
         # within a quarter turn, and goes back to zero, and that of A is known from its roots.
-        whole = argument_at(model.roots, end)
-        apart = angle_between(value, model.sign * np.exp(1j * whole))
+        final = argument_at(model.roots, end)
+        apart = angle_between(value, model.sign * np.exp(1j * final))
         if abs(apart) > 0.51 * np.pi:
             # More than rounding explains: the roots of A are not those of A.
             return DOUBTFUL
-        whole += apart
-    count = (whole - argument) / np.pi
+        final += apart
+    count = (final - argument) / np.pi
     # It is a whole number but for rounding, because D is real at both ends of the axis.
     return int(np.floor(count + 0.5)) if -0.5 < count < np.inf else DOUBTFUL
 
@@ -248,16 +237,15 @@ def _fill_row(
     """Fill row i of a chart, see `fill_rows`."""
     counts, doubtful, last = filled
     x, lower, upper = rows.x, rows.lower[i], rows.upper[i]
-    weights = model.fixed - rows.y[i] * model.varying
-    sums = model.fixed_sums - rows.deviation[i] * model.varying_sums
+    fixed, varying = model.fixed, model.varying
+    crossing = CompiledSum(
+        fixed.polynomials,
+        fixed.weights - rows.y[i] * varying.weights,
+        fixed.sums - (rows.y[i] - model.reference) * varying.sums,
+        fixed.phases,
+    )
     zeros, complete = imaginary_zeros(
-        model.polynomials,
-        (weights, sums, model.phases),
-        model.measure,
-        0.0,
-        rows.ends[i],
-        model.is_map,
-        CAUTION,
+        crossing, model.measure, 0.0, rows.ends[i], model.is_map, CAUTION
     )
     change = np.zeros(x.size + 1, dtype=np.int64)
     total = running = rows.base[i]

@@ -17,6 +17,7 @@ from armlock.checks import FloatArray
 from armlock.compiled import njit
 from armlock.exponentials import (
     ROUNDING,
+    CompiledSum,
     curvature_bound,
     evaluate,
     piece,
@@ -98,8 +99,8 @@ def _downhill(
 
 @njit(cache=True)
 def _walk(
-    polynomials: tuple[Any, ...],
-    numerator: tuple[Any, ...],
+    numerator: CompiledSum,
+    denominator: CompiledSum,
     omega: float,
     omega_end: float,
     best: FloatArray,
@@ -107,20 +108,19 @@ def _walk(
 ) -> tuple[FloatArray, FloatArray, bool]:
     """Smallest |1 + L|, and |1 + L| / |1 - L|, from omega to omega_end.
 
-    `polynomials` are R, B1 and B2, `numerator` weights, sums and phases of N. `best` holds a
-    value of each that occurs: the walk looks for smaller ones, and passes over an entry of
-    zero. Returns the smallest ones; where they are, nan for those of `best`; and whether the
-    walk came to its end, which it does not if it is too long or rounding hides L. None is
-    smaller than the result by more than the share `tolerance` and twice what rounding may move
-    R + N by. That is at most 1e-6 |R|, or |R - N| for the second one.
+    `numerator` is N and `denominator` R, of the same polynomials. `best` holds a value of each
+    that occurs: the walk looks for smaller ones, and passes over an entry of zero. Returns the
+    smallest ones; where they are, nan for those of `best`; and whether the walk came to its
+    end, which it does not if it is too long or rounding hides L. None is smaller than the
+    result by more than the share `tolerance` and twice what rounding may move R + N by. That is
+    at most 1e-6 |R|, or 1e-6 |R - N| for the second one.
     """
-    weights, sums, phases = numerator
-    only_r, none = np.array([1.0, 0.0, 0.0]), np.zeros(0)
+    phases, none = numerator.phases, np.zeros(0)
     best, where, here, steps = best.copy(), np.full(2, np.nan), np.zeros(2), 0
     while omega < omega_end:
         # Both pieces are the same: their polynomials are.
-        start, reach, end, n, n_sizes = piece(polynomials, weights, sums, omega)
-        _, _, _, r, r_sizes = piece(polynomials, weights[:0], only_r, omega)
+        start, reach, end, n, n_sizes = piece(numerator, omega)
+        _, _, _, r, r_sizes = piece(denominator, omega)
         end = min(end, omega_end)
         n_bound = curvature_bound(start, reach, n, phases)
         r_bound = curvature_bound(start, reach, r, none)
@@ -216,7 +216,7 @@ def smallest_distances(
             improve(np.linspace(low, high, 2 + 2000 // len(intervals)))
             for start, stop in meeting((low, high)):
                 found, places, complete = _walk(
-                    polynomials, numerator, start, stop, best, TOLERANCE
+                    numerator, denominator, start, stop, best, TOLERANCE
                 )
                 if not complete:
                     why = f"following it takes more than {contour.MOST_STEPS:.0e} steps"
@@ -226,8 +226,10 @@ def smallest_distances(
     weights = arm_weights(loop, c1, c2)
     if not np.isfinite(end()):
         raise unconfined(c1, c2)
-    whole = loop_numerator(loop, c1, c2)
-    polynomials, numerator = whole.compiled(), (whole.weights, whole.sums, whole.phases)
+    numerator = loop_numerator(loop, c1, c2).compiled()
+    # Its only exponential is one: the sum is all.
+    denominator = loop.rest_on_boundary().compiled()
+    denominator = denominator._replace(weights=denominator.weights[:0])
     lowest = _one_power_up_to(loop, c1, c2)
     # Next to the limit a walk takes short steps, unless it knows of a smaller value.
     first = FIRST_TURNS * 2.0 * np.pi / loop.longest_delay

@@ -15,6 +15,7 @@ bound on its rounding error. The walks along the axis need no more.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 from typing import Any, NamedTuple
 
 import mpmath
@@ -75,22 +76,21 @@ class Polynomial(NamedTuple):
 
         Roots that are those of another polynomial are found anew, in extended precision.
         """
-        roots = poly.polyroots(coefficients).astype(np.complex128) if known is None else known
-        product = np.array(coefficients[-1:], dtype=np.complex128)
-        magnitude = np.abs(coefficients[-1:])
-        for root in roots[np.argsort(np.abs(roots))]:
-            product = np.convolve(product, [-root, 1.0])
-            magnitude = np.convolve(magnitude, [abs(root), 1.0])
-        if (np.abs(product - coefficients) <= 1e-6 * magnitude).all():
+        if known is not None and _are_roots(known, coefficients):
+            return cls(coefficients, known)
+        roots = poly.polyroots(coefficients).astype(np.complex128)
+        if _are_roots(roots, coefficients):
             return cls(coefficients, roots)
+        start = {"asc": True, "roots_init": roots.tolist()}
         with mpmath.workdps(60):
-            found = mpmath.polyroots(
-                coefficients.tolist(),
-                maxsteps=500,
-                extraprec=400,
-                asc=True,
-                roots_init=roots.tolist(),
-            )
+            try:
+                found = mpmath.polyroots(
+                    coefficients.tolist(), maxsteps=500, extraprec=400, **start
+                )
+            except mpmath.libmp.NoConvergence:
+                raise ValueError(
+                    f"no roots of the polynomial {coefficients} are found"
+                ) from None
         return cls(coefficients, np.array([complex(root) for root in found]))
 
     def over(self, other: Polynomial, s: ComplexArray) -> ComplexArray:
@@ -105,6 +105,16 @@ class Polynomial(NamedTuple):
         with np.errstate(over="ignore", invalid="ignore"):
             product = np.convolve(self.coefficients, signs * other.coefficients)
         return Polynomial(product, np.concatenate((self.roots, -other.roots)), (self, other))
+
+
+def _are_roots(roots: ComplexArray, coefficients: FloatArray) -> bool:
+    """Whether a polynomial of these roots has these coefficients, to a part in a million."""
+    product = np.array(coefficients[-1:], dtype=np.complex128)
+    magnitude = np.abs(coefficients[-1:])
+    for root in roots[np.argsort(np.abs(roots))]:
+        product = np.convolve(product, [-root, 1.0])
+        magnitude = np.convolve(magnitude, [abs(root), 1.0])
+    return bool((np.abs(product - coefficients) <= 1e-6 * magnitude).all())
 
 
 def _gathered(
@@ -180,17 +190,8 @@ class ExponentialSum(NamedTuple):
         """Return this sum times j, whose imaginary part is the real part of this one."""
         return ExponentialSum(self.polynomials, 1j * self.weights, self.phases, 1j * self.sums)
 
-    def compiled(self) -> tuple[Any, ...]:
-        """Return the polynomials as compiled functions take them, in five arrays.
-
-        1. Coefficients in powers of omega, shape (polynomials, degree + 1). There are no rows
-           where a degree exceeds `LOW_DEGREE`, or squares would leave the range of floats: the
-           others are for that case.
-        2. Roots with an imaginary part of zero or above, factor after factor.
-        3. The index of each factor's first root.
-        4. The factors' highest coefficients.
-        5. Which two factors each polynomial p q* has, shape (polynomials, 2); -1 for no second.
-        """
+    def compiled(self) -> CompiledSum:
+        """Return the sum as compiled functions take it."""
         degree = max(p.coefficients.size for p in self.polynomials) - 1
         whole = np.zeros((len(self.polynomials), degree + 1), dtype=np.complex128)
         # Powers of j, so that each coefficient stays exactly real or exactly imaginary.
@@ -206,13 +207,43 @@ class ExponentialSum(NamedTuple):
             for m, f in enumerate(p.factors or (p,)):
                 pair[m] = place[id(f)]
         kept = [np.sort_complex(f.roots[f.roots.imag >= 0.0]) for f in factors.values()]
-        return (
+        polynomials = (
             whole if degree <= LOW_DEGREE and _in_range(whole) else whole[:0],
             np.concatenate(kept),
             np.cumsum([0, *(roots.size for roots in kept)]),
             np.array([f.coefficients[-1] for f in factors.values()]),
             pairs,
         )
+        return CompiledSum(polynomials, self.weights, self.sums, self.phases)
+
+
+class CompiledSum(NamedTuple):
+    """An exponential sum as compiled functions take it.
+
+    Attributes
+    ----------
+    polynomials : tuple of five arrays
+        1. Coefficients in powers of omega, shape (k, degree + 1). There are no rows where a
+           degree exceeds `LOW_DEGREE`, or products leave the range of floats: the others are
+           for that case.
+        2. Roots with an imaginary part of zero or above, factor after factor.
+        3. The index of each factor's first root.
+        4. The factors' highest coefficients.
+        5. Which two factors each polynomial p q* has, shape (k, 2); -1 for no second.
+    weights, sums, phases : arrays
+        Those of `ExponentialSum`.
+    """
+
+    polynomials: tuple[Any, ...]
+    weights: npt.NDArray[Any]
+    sums: npt.NDArray[Any]
+    phases: FloatArray
+
+
+def aligned(*sums: ExponentialSum) -> tuple[ExponentialSum, ...]:
+    """Return sums of the same polynomials over the exponentials of all of them."""
+    nothing = reduce(ExponentialSum.plus, [whole.scaled(0.0) for whole in sums])
+    return tuple(nothing.plus(whole) for whole in sums)
 
 
 def _in_range(values: ComplexArray) -> bool:
@@ -365,26 +396,22 @@ def _reach(roots: ComplexArray, starts: IntArray, omega: float, most: float) -> 
 
 @njit(cache=True)
 def piece(
-    polynomials: tuple[Any, ...],
-    weights: FloatArray,
-    sums: FloatArray,
-    omega: float,
-    uncertain: FloatArray | None = None,
+    whole: CompiledSum, omega: float, uncertain: FloatArray | None = None
 ) -> tuple[float, float, float, ComplexArray, FloatArray]:
     """Expand an exponential sum over the piece of the axis that starts at omega.
 
-    `polynomials` is what `ExponentialSum.compiled` returns; weights, shape (groups, k), and
-    sums, shape (k,), are those of the sum. `uncertain` holds how far the entries of `sums` may
-    be off; the magnitudes contain it. Of polynomials of low degree the whole axis is one
+    `uncertain` holds how far the entries of `sums` may be off; the magnitudes contain it. Of
+    polynomials of low degree the whole axis is one
     piece, with a start of zero and a reach of one. Returns `start` and `reach`, with
     u = (omega - start) / reach from 0 to 1 over any other piece; where the piece ends; the
     coefficients in powers of u of the sum, then of each group, shape (1 + groups, n); and
     magnitudes for rounding, shape (1 + groups, n + 1). The last column bounds the powers that
     are left out, over EPSILON, by which `rounding_bound` multiplies it.
     """
-    whole, roots, starts, leads, pairs = polynomials
-    start, reach, end, expanded = 0.0, 1.0, np.inf, whole.shape[0] == 0
-    coefficients, magnitudes, left_out = whole, np.abs(whole), np.zeros(whole.shape[0])
+    coefficients, roots, starts, leads, pairs = whole.polynomials
+    weights, sums = whole.weights, whole.sums
+    start, reach, end, expanded = 0.0, 1.0, np.inf, coefficients.shape[0] == 0
+    magnitudes, left_out = np.abs(coefficients), np.zeros(coefficients.shape[0])
     if expanded:
         crowd = 0.5 * _CROWD if pairs[:, 1].max() >= 0 else _CROWD
         start, reach = omega, _reach(roots, starts, omega, crowd)

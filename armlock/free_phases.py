@@ -298,14 +298,8 @@ def _count_below(loop: Loop, c1: float, c2: float, omega: float) -> int | None:
     parts = [loop.at(c1, c2), loop.at(low1, low2)]
     arguments, values = [], []
     for whole in parts:
-        argument, value, clear = contour.winding(
-            whole.compiled(),
-            whole.weights,
-            whole.sums,
-            whole.phases,
-            np.zeros(whole.sums.size),
-            omega,
-        )
+        none = np.zeros(whole.sums.size)
+        argument, value, clear = contour.winding(whole.compiled(), none, omega)
         if not clear or np.isnan(argument):
             return None
         arguments.append(argument)

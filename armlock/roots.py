@@ -229,9 +229,8 @@ class _Line:
         end = self.search(further) * self.turn
         if not end:
             return None
-        whole = self.shifted.at(self.x, self.y)
-        function = whole.weights, whole.sums, whole.phases
-        s = self.sigma + 1j * resolved_grid(whole.compiled(), function, end, 1.0)
+        whole = self.shifted.at(self.x, self.y).compiled()
+        s = self.sigma + 1j * resolved_grid(whole, end, 1.0)
         # From where a step of Newton's method is locally shortest: no root close to the line
         # lies between two of its points.
         # Part by part, because arrays of millions would spend their time on memory.

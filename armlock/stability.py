@@ -35,7 +35,7 @@ from armlock.checks import (
     check_memory,
 )
 from armlock.counting import PointModel, RowModel, Rows
-from armlock.exponentials import ROUNDING, ExponentialSum, without_unused
+from armlock.exponentials import ROUNDING, ExponentialSum, aligned, without_unused
 from armlock.sweep import sweep
 
 if TYPE_CHECKING:
@@ -95,21 +95,14 @@ class CountError(RuntimeError):
 @lru_cache(maxsize=64)
 def _point_model(system: CharacteristicFunction) -> PointModel:
     """Return a system in the form in which points are counted."""
-    terms = system.on_boundary()
-    phases = np.concatenate([term.phases for term in terms])
-    weights = np.zeros((3, phases.size, len(terms[0].polynomials)))
-    first = 0
-    for k, term in enumerate(terms):
-        last = first + term.phases.size
-        weights[k, first:last] = term.weights
-        first = last
-    rest = system.rest_on_boundary().sums
+    constant, b1, b2 = system.on_boundary()
+    at_reference = constant._replace(sums=system.rest_on_boundary().sums)
+    constant, b1, b2 = aligned(at_reference, b1, b2)
     return PointModel(
-        polynomials=terms[0].compiled(),
-        weights=weights,
-        sums=np.array([rest, terms[1].sums, terms[2].sums]),
-        reference=np.array(system.reference),
-        phases=phases,
+        constant=constant.compiled(),
+        b1=b1.compiled(),
+        b2=b2.compiled(),
+        reference=system.reference,
         sign=float(np.sign(system.a[-1])),
         roots=system.roots_of_a,
         is_map=system.step > 0.0,
@@ -129,19 +122,14 @@ def sign_changes(
     CountError
         If there are too many of them, or a number overflows.
     """
-    (whole,) = without_unused(whole)
-    function = whole.weights, whole.sums, whole.phases
-    nothing = np.zeros((0, whole.sums.size)), np.zeros(whole.sums.size), np.zeros(0)
-    polynomials = whole.compiled()
+    compiled = without_unused(whole)[0].compiled()
     parts = [np.empty((0, 5))]
     for start, end in np.reshape(intervals, (-1, 2)):
         if not np.isfinite(end):
             raise CountError(
                 f"no crossings up to omega = {end}: a number overflows", _NO_POINTS
             )
-        zeros, complete = contour.imaginary_zeros(
-            polynomials, function, nothing, start, end, is_map, ROUNDING
-        )
+        zeros, complete = contour.imaginary_zeros(compiled, None, start, end, is_map, ROUNDING)
         if not complete:
             raise CountError(
                 f"no crossings up to omega = {end} rad/s: more than {contour.MOST_STEPS:.0e} "
@@ -439,29 +427,22 @@ def _fill(
 ) -> tuple[IntArray, BoolArray, IntArray]:
     """Fill rows from their crossings, starting with the counts `base` at x = lower."""
     constant, b1, b2 = system.on_boundary()
-    x0, y0 = system.reference
-    # Where all exponentials are one, N = A + C - y B2 is R + x0 B1 at y = y0, exactly.
-    at_reference = system.rest_on_boundary().sums + x0 * b1.sums
+    # Where all exponentials are one, N at y = y0 is D at x = 0 and y = y0, exactly.
+    y0 = system.reference[1]
+    at_reference = constant._replace(sums=system.at(0.0, y0).sums)
     fixed, varying, square = without_unused(
-        constant._replace(sums=at_reference).times_conjugate(b1),
-        b2.times_conjugate(b1),
-        b1.times_conjugate(b1),
+        at_reference.times_conjugate(b1), b2.times_conjugate(b1), b1.times_conjugate(b1)
     )
-    # Both over the exponentials of both, so that they add with a weight.
-    whole = fixed.plus(varying.scaled(0.0))
-    apart = fixed.scaled(0.0).plus(varying)
+    fixed, varying = aligned(fixed, varying)
     ends = last_frequency(system, np.maximum(np.abs(lower), np.abs(upper)), y)
     # A row that is nowhere confined has nothing to count.
     ends = np.where(np.isfinite(ends), ends, 0.0)
     model = RowModel(
-        polynomials=whole.compiled(),
-        fixed=whole.weights,
-        varying=apart.weights,
-        fixed_sums=whole.sums,
-        varying_sums=apart.sums,
-        phases=whole.phases,
-        measure=(square.weights, square.sums, square.phases),
+        fixed=fixed.compiled(),
+        varying=varying.compiled(),
+        measure=square.compiled(),
+        reference=y0,
         is_map=system.step > 0.0,
     )
-    rows = Rows(ends, y, y - y0, np.ascontiguousarray(base), x, lower, upper)
+    rows = Rows(ends, y, np.ascontiguousarray(base), x, lower, upper)
     return counting.fill_rows(model, rows)

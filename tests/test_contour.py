@@ -19,14 +19,13 @@ def walk(coefficients, phases, omega_end):
     whole = np.array(coefficients, dtype=complex)
     nothing = np.zeros(0, dtype=complex), np.zeros(1, dtype=np.int64), np.zeros(0)
     pairs = np.column_stack((np.arange(len(whole)), np.full(len(whole), -1)))
-    return contour.winding(
-        (whole, *nothing, pairs),
+    weights, sums, phases = (
         np.eye(len(whole)),
         np.ones(len(whole)),
         np.array(phases, dtype=float),
-        np.zeros(len(whole)),
-        omega_end,
     )
+    summed = exponentials.CompiledSum((whole, *nothing, pairs), weights, sums, phases)
+    return contour.winding(summed, np.zeros(len(whole)), omega_end)
 
 
 def test_a_single_exponential_winds_at_its_rate():
@@ -134,9 +133,7 @@ def random_sum(degree, rng):
 @pytest.mark.parametrize("omega", [0.0, 0.03, 2.0, 3e4])
 def test_a_piece_holds_a_sum_and_bounds_what_it_leaves_out(degree, omega):
     whole, exact = random_sum(degree, np.random.default_rng(degree))
-    start, reach, end, local, sizes = exponentials.piece(
-        whole.compiled(), whole.weights, whole.sums, omega
-    )
+    start, reach, end, local, sizes = exponentials.piece(whole.compiled(), omega)
     rounding = exponentials.rounding_bound(start, reach, sizes, whole.phases, 8.0)
     bends = [exponentials.curvature_bound(start, reach, local, whole.phases)]
     if omega == 0.0:
@@ -178,12 +175,11 @@ whole[0, 2], whole[1, 5] = 1.0, 1.0j
 none = np.zeros(0, dtype=complex), np.zeros(1, dtype=np.int64), np.zeros(0)
 polynomials = whole, *none, np.array([[0, -1], [1, -1]])
 weights, phases = np.array([[0.0, 0.5], [0.0, 0.5]]), np.array([1.0, -1.0])
-function = weights, np.array([1.0, -1.0]), phases
-nothing = np.zeros((0, 2)), np.zeros(2), np.zeros(0)
+function = exponentials.CompiledSum(polynomials, weights, np.array([1.0, -1.0]), phases)
 steps = []
 contour.evaluate = lambda *at: steps.append(at) or exponentials.evaluate(*at)
 zeros, complete = contour.imaginary_zeros(
-    polynomials, function, nothing, 0.0, 50.0, False, exponentials.ROUNDING
+    function, None, 0.0, 50.0, False, exponentials.ROUNDING
 )
 print(complete, zeros[:, contour.OMEGA].tolist(), len(steps))
 """

@@ -348,7 +348,7 @@ def test_coefficients_of_any_size_are_counted_alike():
 
 def test_equal_roots_are_counted_where_a_shift_takes_them():
     # Ten roots at -0.002 after the shift, of which doubles alone would scatter some.
-    equal = CharacteristicFunction(np.poly([-1.0] * 10)[::-1], [1.0], [1.0], 1.0, 2.0)
+    equal = CharacteristicFunction(np.poly([-1.0] * 10)[::-1].tolist(), [1.0], [1.0], 1.0, 2.0)
     assert unstable_roots(equal.shifted(-0.998), 0.0, 0.0) == 0
     assert unstable_roots(equal.shifted(-1.002), 0.0, 0.0) == 10
 
