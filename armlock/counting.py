@@ -51,10 +51,12 @@ class PointModel(NamedTuple):
 
     Attributes
     ----------
-    constant, b1, b2 : CompiledSum
-        The terms of `CharacteristicFunction.parts`, over the same exponentials. The sums of the
-        first are those of R: where all exponentials are one, D is R less x - x0 and y - y0
+    constant : CompiledSum
+        The first term of `CharacteristicFunction.parts`, over the exponentials of all three.
+        Its sums are those of R: where all exponentials are one, D is R less x - x0 and y - y0
         times the two others, so that nothing cancels there.
+    weights, sums : float arrays, shapes (2, groups, k) and (2, k)
+        Of the two other terms.
     reference : tuple of two floats
         The parameters (x0, y0).
     sign : float
@@ -66,8 +68,8 @@ class PointModel(NamedTuple):
     """
 
     constant: CompiledSum
-    b1: CompiledSum
-    b2: CompiledSum
+    weights: FloatArray
+    sums: FloatArray
     reference: tuple[float, float]
     sign: float
     roots: ComplexArray
@@ -81,9 +83,10 @@ class RowModel(NamedTuple):
 
     Attributes
     ----------
-    fixed, varying : CompiledSum
-        N conj(M) is `fixed` - y `varying`, over the same exponentials. The sums of `fixed` are
-        those at y = y0.
+    fixed : CompiledSum
+        N conj(M) at y = 0, but the sums are those at y = y0.
+    weights, sums : float arrays, shapes (groups, k) and (k,)
+        Of what N conj(M) loses with y, over the same exponentials.
     measure : CompiledSum
         |M|^2.
     reference : float
@@ -93,7 +96,8 @@ class RowModel(NamedTuple):
     """
 
     fixed: CompiledSum
-    varying: CompiledSum
+    weights: FloatArray
+    sums: FloatArray
     measure: CompiledSum
     reference: float
     is_map: bool
@@ -134,7 +138,7 @@ def count_point(model: PointModel, x: float, y: float, end: float) -> int:
     it no root crosses, or it is inf, because the neutral root chain is not confined; for a map
     it is pi / step.
     """
-    constant, b1, b2 = model.constant, model.b1, model.b2
+    constant, b1, b2 = model.constant, model.sums[0], model.sums[1]
     if end == np.inf:
         return UNCONFINED
     for phase in constant.phases:
@@ -144,11 +148,11 @@ def count_point(model: PointModel, x: float, y: float, end: float) -> int:
     sums, uncertain = constant.sums.copy(), np.empty_like(constant.sums)
     weights = constant.weights.copy()
     for k in range(sums.size):
-        sums[k] -= dx * b1.sums[k] + dy * b2.sums[k]
+        sums[k] -= dx * b1[k] + dy * b2[k]
         # The parameters are rounded numbers themselves.
-        uncertain[k] = EPSILON * (abs(x * b1.sums[k]) + abs(y * b2.sums[k]))
+        uncertain[k] = EPSILON * (abs(x * b1[k]) + abs(y * b2[k]))
         for g in range(weights.shape[0]):
-            weights[g, k] -= x * b1.weights[g, k] + y * b2.weights[g, k]
+            weights[g, k] -= x * model.weights[0, g, k] + y * model.weights[1, g, k]
     whole = CompiledSum(constant.polynomials, weights, sums, constant.phases)
     argument, value, clear = winding(whole, uncertain, end)
     if not clear:
@@ -237,13 +241,10 @@ def _fill_row(
     """Fill row i of a chart, see `fill_rows`."""
     counts, doubtful, last = filled
     x, lower, upper = rows.x, rows.lower[i], rows.upper[i]
-    fixed, varying = model.fixed, model.varying
-    crossing = CompiledSum(
-        fixed.polynomials,
-        fixed.weights - rows.y[i] * varying.weights,
-        fixed.sums - (rows.y[i] - model.reference) * varying.sums,
-        fixed.phases,
-    )
+    fixed, y = model.fixed, rows.y[i]
+    weights = fixed.weights - y * model.weights
+    sums = fixed.sums - (y - model.reference) * model.sums
+    crossing = CompiledSum(fixed.polynomials, weights, sums, fixed.phases)
     zeros, complete = imaginary_zeros(
         crossing, model.measure, 0.0, rows.ends[i], model.is_map, CAUTION
     )

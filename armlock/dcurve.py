@@ -2,7 +2,7 @@
 
 D(j omega; x, y) = 0 is, for each omega, a real linear 2 x 2 system for (x, y). Its solution
 traces the D-curve; at omega = 0, where D is real, it is a straight line instead. Between
-these curves the number of unstable roots is constant.
+these curves the number of unstable roots of a retarded system is constant.
 """
 
 from __future__ import annotations
@@ -101,15 +101,15 @@ def d_curve(
         \begin{pmatrix} \mathrm{Re}\, \beta_1 & \mathrm{Re}\, \beta_2 \\
         \mathrm{Im}\, \beta_1 & \mathrm{Im}\, \beta_2 \end{pmatrix}
         \begin{pmatrix} x \\ y \end{pmatrix} =
-        \begin{pmatrix} \mathrm{Re}\, A \\ \mathrm{Im}\, A \end{pmatrix}
+        \begin{pmatrix} \mathrm{Re}\, V \\ \mathrm{Im}\, V \end{pmatrix}
 
-    with :math:`A = R\, e^{s\delta} + x_0 B_1 + y_0 B_2` and
+    with :math:`V = R\, e^{s\delta} + x_0 B_1 + y_0 B_2` and
     :math:`\beta_k = B_k e^{-s\theta_k}` taken at s = j omega. It is solved by Cramer's rule:
 
     .. math::
 
-        x = \frac{\mathrm{Im}(A \bar\beta_2)}{\mathrm{Im}(\beta_1 \bar\beta_2)} , \qquad
-        y = -\frac{\mathrm{Im}(A \bar\beta_1)}{\mathrm{Im}(\beta_1 \bar\beta_2)} .
+        x = \frac{\mathrm{Im}(V \bar\beta_2)}{\mathrm{Im}(\beta_1 \bar\beta_2)} , \qquad
+        y = -\frac{\mathrm{Im}(V \bar\beta_1)}{\mathrm{Im}(\beta_1 \bar\beta_2)} .
 
     For the Hayes equation this is
 
@@ -162,7 +162,7 @@ def d_curve_line(system: CharacteristicFunction) -> Line:
 
     .. math::
 
-        x\, B_1(0) + y\, B_2(0) = A(0)
+        x\, B_1(0) + y\, B_2(0) = A(0) + C(0)
 
     Parameters
     ----------

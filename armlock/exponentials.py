@@ -207,14 +207,14 @@ class ExponentialSum(NamedTuple):
             for m, f in enumerate(p.factors or (p,)):
                 pair[m] = place[id(f)]
         kept = [np.sort_complex(f.roots[f.roots.imag >= 0.0]) for f in factors.values()]
-        polynomials = (
+        arrays = (
             whole if degree <= LOW_DEGREE and _in_range(whole) else whole[:0],
             np.concatenate(kept),
             np.cumsum([0, *(roots.size for roots in kept)]),
             np.array([f.coefficients[-1] for f in factors.values()]),
             pairs,
         )
-        return CompiledSum(polynomials, self.weights, self.sums, self.phases)
+        return CompiledSum(arrays, self.weights, self.sums, self.phases)
 
 
 class CompiledSum(NamedTuple):
@@ -406,7 +406,7 @@ def piece(
     u = (omega - start) / reach from 0 to 1 over any other piece; where the piece ends; the
     coefficients in powers of u of the sum, then of each group, shape (1 + groups, n); and
     magnitudes for rounding, shape (1 + groups, n + 1). The last column bounds the powers that
-    are left out, over EPSILON, by which `rounding_bound` multiplies it.
+    are left out, over EPSILON: `rounding_bound` multiplies all by EPSILON and more.
     """
     coefficients, roots, starts, leads, pairs = whole.polynomials
     weights, sums = whole.weights, whole.sums

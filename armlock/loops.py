@@ -249,7 +249,10 @@ def poles_at_zero(loop: Loop, c1: float, c2: float) -> int:
 
 
 def leading_radius(loop: Loop, c1: float, c2: float) -> float:
-    """Radius within which L is its leading term at s = 0, a power of s, to a part in 1000."""
+    """Radius within which L is its leading term at s = 0, a power of s, to a part in 1000.
+
+    With a pole there |L| is above 1000, too. Where nothing settles, the last one tried.
+    """
     order = poles_at_zero(loop, c1, c2)
     scales = [float(size) for p in loop.polynomials() for size in np.abs(p.roots) if size > 0.0]
     radius = 1e-3 * min([*scales, 1.0 / loop.longest_delay])
@@ -362,7 +365,7 @@ class DualArm(Loop):
     gain : float, optional
         Loop gain g in rad/s.
     tau1, tau2 : float, optional
-        Round-trip delays in s; they must differ.
+        Round-trip delays in s; they must differ, unless `difference` is given.
     corner : float, optional
         Corner frequency p of the sensor in rad/s. The paper gives none.
     difference : float, optional
@@ -374,7 +377,7 @@ class DualArm(Loop):
     Raises
     ------
     TypeError, ValueError
-        If gain, corner or a delay is not a positive finite number, or the delays are equal.
+        If gain, corner or a delay is not a positive finite number, or the dtau is zero.
 
     Notes
     -----
@@ -437,7 +440,7 @@ def paper_loop(
     corner : float, optional
         Corner frequency p of the sensor in rad/s. The paper gives none.
     tau1, tau2 : float, optional
-        Round-trip delays in s; they must differ.
+        Round-trip delays in s; they must differ, unless `difference` is given.
     controller : Controller, control.TransferFunction, or (zeros, poles, gain), optional
         Table II by default; `armlock.controllers` has its stages and the printed variant.
     actuator : bool, optional
@@ -456,7 +459,7 @@ def paper_loop(
     Raises
     ------
     TypeError, ValueError
-        If corner or a delay is not a positive finite number, or the delays are equal.
+        If corner or a delay is not a positive finite number, or the dtau is zero.
 
     Examples
     --------

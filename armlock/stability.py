@@ -4,7 +4,7 @@ Points are counted by the argument principle along s = j omega, with certified s
 a frequency past which no root can cross. With D = N - x M, charts are counted row by row: with
 y fixed, roots cross the axis where Im(N / M) = 0, at x = Re(N / M). Where Im(N / M) ascends
 with omega, they become unstable towards larger x. Each row starts from a count just outside of
-the chart, and is checked against an independent one past its far end.
+the chart, and is checked against an independent one at its far end.
 
 The walks are those of `armlock.contour`. What makes a point a boundary point stands there, in
 `winding`: D is no larger somewhere on the axis than its rounding error, or no step of the walk
@@ -100,8 +100,8 @@ def _point_model(system: CharacteristicFunction) -> PointModel:
     constant, b1, b2 = aligned(at_reference, b1, b2)
     return PointModel(
         constant=constant.compiled(),
-        b1=b1.compiled(),
-        b2=b2.compiled(),
+        weights=np.array([b1.weights, b2.weights]),
+        sums=np.array([b1.sums, b2.sums]),
         reference=system.reference,
         sign=float(np.sign(system.a[-1])),
         roots=system.roots_of_a,
@@ -122,14 +122,14 @@ def sign_changes(
     CountError
         If there are too many of them, or a number overflows.
     """
-    compiled = without_unused(whole)[0].compiled()
+    summed = without_unused(whole)[0].compiled()
     parts = [np.empty((0, 5))]
     for start, end in np.reshape(intervals, (-1, 2)):
         if not np.isfinite(end):
             raise CountError(
                 f"no crossings up to omega = {end}: a number overflows", _NO_POINTS
             )
-        zeros, complete = contour.imaginary_zeros(compiled, None, start, end, is_map, ROUNDING)
+        zeros, complete = contour.imaginary_zeros(summed, None, start, end, is_map, ROUNDING)
         if not complete:
             raise CountError(
                 f"no crossings up to omega = {end} rad/s: more than {contour.MOST_STEPS:.0e} "
@@ -433,13 +433,14 @@ def _fill(
     fixed, varying, square = without_unused(
         at_reference.times_conjugate(b1), b2.times_conjugate(b1), b1.times_conjugate(b1)
     )
-    fixed, varying = aligned(fixed, varying)
     ends = last_frequency(system, np.maximum(np.abs(lower), np.abs(upper)), y)
     # A row that is nowhere confined has nothing to count.
     ends = np.where(np.isfinite(ends), ends, 0.0)
+    fixed, varying = aligned(fixed, varying)
     model = RowModel(
         fixed=fixed.compiled(),
-        varying=varying.compiled(),
+        weights=varying.weights,
+        sums=varying.sums,
         measure=square.compiled(),
         reference=y0,
         is_map=system.step > 0.0,
