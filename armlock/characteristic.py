@@ -33,6 +33,7 @@ from armlock.checks import (
     complex_array,
     real_array,
     real_number,
+    whole_steps,
 )
 from armlock.exponentials import EPSILON, LOW_DEGREE, ExponentialSum, Polynomial
 
@@ -474,18 +475,6 @@ class CharacteristicFunction:
     def rest_on_boundary(self) -> ExponentialSum:
         """Return R at s = j omega as an exponential sum."""
         return self._delayed(0, 0.0)
-
-
-def whole_steps(name: str, delay: float, step: float) -> int:
-    """Return delay / step, or raise if it is not a whole number but for rounding."""
-    steps = delay / step
-    # Within a part in 1e9 of the delay, and always within a thousandth of a step.
-    if not steps < 1e15 or abs(steps - round(steps)) > min(1e-9 * steps, 1e-3):
-        raise ValueError(
-            f"step must divide every delay, got step={step} for {name}={delay} "
-            f"({steps:g} steps)"
-        )
-    return round(steps)
 
 
 def checked_system(system: CharacteristicFunction) -> CharacteristicFunction:

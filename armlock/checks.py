@@ -19,6 +19,8 @@ BoolArray = npt.NDArray[np.bool_]
 _REAL = "iuf"
 # Of the machine's memory, the share that one request may take.
 _MEMORY_SHARE = 0.5
+# How far a delay may be from a whole number of steps: as a share of the delay, and of a step.
+_OFF_A_DELAY, _OFF_A_STEP = 1e-9, 1e-3
 
 
 def real_number(name: str, value: object) -> float:
@@ -42,6 +44,18 @@ def whole_number(name: str, value: object, lowest: int) -> int:
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < lowest:
         raise ValueError(f"{name} must be an integer from {lowest} on, got {value!r}")
     return int(value)
+
+
+def whole_steps(name: str, delay: float, step: float) -> int:
+    """Return delay / step, or raise if it is not a whole number but for rounding."""
+    steps = delay / step
+    allowed = min(_OFF_A_DELAY * steps, _OFF_A_STEP)
+    if not steps < 1e15 or abs(steps - round(steps)) > allowed:
+        raise ValueError(
+            f"step must divide every delay, got step={step} for {name}={delay} "
+            f"({steps:g} steps)"
+        )
+    return round(steps)
 
 
 def as_written(thing: object) -> str:

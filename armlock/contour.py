@@ -42,9 +42,10 @@ SAFETY = 0.95
 
 # Turns of the longest delay after which `winding` tries again to follow the slow terms alone.
 _BLOCK = 32.0
-# Most steps of one walk, about ten a turn of the longest delay: some three seconds.
+# Most steps of one walk: some three seconds. A turn of the longest delay takes about ten, but
+# where slow terms are followed alone.
 MOST_STEPS = 10_000_000
-# A walk that turns the fastest exponential by more radians is not begun.
+# A walk over which the fastest exponential turns by more radians than this is not begun.
 MOST_RADIANS = 20.0 * MOST_STEPS
 # Most samples of a grid.
 MOST_SAMPLES = 10_000_000

@@ -286,8 +286,9 @@ def sampled_loop(
 ) -> tuple[SampledSensor, SampledFilter]:
     """Return sensor and controller in samples, one behind the other.
 
-    Poles at s = 0 drop out where zeros cancel them, in whichever of the two these are: a
-    hidden state would not decay. A part that is then improper takes factors of the other.
+    Poles at s = 0, of sensor or controller, drop out against zeros there of the other or the
+    same: a hidden state would not decay. Then the sensor or the controller may have more zeros
+    than poles, and takes slow factors of the other.
 
     Parameters
     ----------

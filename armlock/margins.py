@@ -268,7 +268,8 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
     float
         Smallest eps > 0 such that `unstable_roots` at (1, 1) + eps (d1, d2) is not zero: a
         root reaches the imaginary axis there, or the neutral root chain does. 0 if it is not
-        stable next to (1, 1), inf if no eps breaks it, up to parameters of 1e9.
+        stable next to (1, 1), inf if no eps breaks it, up to parameters of 1e9. How near to the
+        limit of the chain roots are followed, `armlock.rays.first_crossing` says.
 
     Raises
     ------

@@ -33,8 +33,9 @@ STABLE = "#B8C4CE"
 # A count is written into a region whose deepest point is at least so far from its edges, as a
 # share of the chart's points along its shorter axis.
 _ROOM = 0.025
-#: The circle |L| that stands for infinity in a compressed Nyquist plot.
-INFINITY = 1e6
+#: Of a compressed Nyquist plot: the circle |L| that stands for infinity, and that up to which
+#: the scale is linear.
+INFINITY, LINEAR = 1e6, 0.01
 
 
 def use_style() -> None:
@@ -223,7 +224,7 @@ def plot_nyquist(
     if isinstance(ax, PolarAxes):
         _infinite_branch(ax, curve)
         ax.spines["polar"].set(edgecolor="0.8", linewidth=0.6, zorder=0)
-        ax.set_rscale("asinh", linear_width=0.01)
+        ax.set_rscale("asinh", linear_width=LINEAR)
         ax.set_rlim(0.0, INFINITY)
         # No label at the circle through -1, where it would hide the curve.
         ax.set_rgrids(

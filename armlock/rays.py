@@ -228,8 +228,8 @@ class Ray:
             """Frequency past which no root crosses earlier."""
             if reach() < chain:
                 return self.end(reach())
-            # Nearer to the limit than the first share, roots are followed for so many turns at
-            # most; nearer than the second, not at all. What is left is taken for the limit.
+            # Roots are followed up to where they cross a part in a million before the limit,
+            # and beyond for so many turns at most. Past that the limit is taken for them.
             near, nearest = (self.end(chain * (1.0 - share)) for share in (1e-6, 1e-10))
             return max(near, min(nearest, _TURNS_NEXT_TO_THE_CHAIN * per_turn))
 

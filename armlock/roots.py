@@ -34,12 +34,13 @@ _EQUAL = 1e-11
 # How far right of its root the last count may stand, relative to |Re s| or the same.
 _FARTHEST = 1e-6
 # Longest walk along a line to count, and to look for roots, in turns of the longest delay's
-# exponential: a second each. The searches for one root may take so many turns together,
-# each counting four times, and at least so many a line: some four seconds.
+# exponential: a second each.
 _LONGEST_COUNT = 1e6
 _LONGEST_SEARCH = 1e5
+# The search for one root ends once its lines have cost so many turns: some four seconds. A line
+# costs the second number, and four times the turns over which roots are looked for.
 _ALL_WALKS = 1e6
-_WALK_AT_LEAST = 1e4
+_COST_OF_A_LINE = 1e4
 # Roots left of a line may lie further up than those right of it. They are looked for so many
 # turns further: few at first, at most so many.
 _FURTHER = 4.0
@@ -243,8 +244,9 @@ class _Line:
             s, length = self._step(s)
         found = s[length <= 1e-5 * self.turn]
         found = found.real + 1j * np.abs(found.imag)
+        unit = self.turn / (2.0 * np.pi)
         for top in sorted(found, key=lambda s: -s.real)[:_MOST_TRIED]:
-            level = found[found.real >= top.real - _EQUAL * max(abs(top), self.turn)]
+            level = found[found.real >= top.real - _EQUAL * max(abs(top), unit)]
             slowest = level[np.argmin(level.imag)]
             try:
                 root = _polished(self.system, self.x, self.y, slowest)
@@ -293,7 +295,7 @@ def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
     further = _FURTHER
     while walked < _ALL_WALKS and sigma not in (low, high):
         line = _Line(acting, p, q, sigma)
-        walked += 4.0 * line.search(further) + _WALK_AT_LEAST
+        walked += 4.0 * line.search(further) + _COST_OF_A_LINE
         root, ahead = line.rightmost(further) or (complex(np.nan, np.nan), 0.0)
         further = min(2.0 * further, _FURTHEST)
         farthest = _FARTHEST * max(abs(root.real), unit)

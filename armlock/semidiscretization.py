@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import expm
 
-from armlock.characteristic import CharacteristicFunction, checked_system, whole_steps
+from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import (
     FloatArray,
     broadcast_pair,
@@ -25,6 +25,7 @@ from armlock.checks import (
     positive_number,
     real_number,
     whole_number,
+    whole_steps,
 )
 
 
