@@ -19,7 +19,7 @@ from armlock.loops import Loop, checked_loop
 from armlock.stability import BOUNDARY, UNCONFINED, CountError, unstable_roots
 from armlock.transfer import transfer
 
-# Multiples of 1 / tau up to which the roots are taken.
+# Multiples of 2 pi / tau, in rad/s, up to which roots are taken.
 _LINES = 600
 # Points on the circle around s = 0 from which the Laurent coefficients there are taken.
 _CIRCLE = 64
@@ -103,7 +103,7 @@ def _error(name: str, values: Sequence[float]) -> FloatArray:
 
 
 def slow_roots(loop: Loop) -> tuple[ComplexArray, float]:
-    """Find the loop's roots below `_LINES` / tau, and count whether they are complete.
+    """Find the roots up to a multiple of 2 pi / tau, and count whether they are complete.
 
     Parameters
     ----------
@@ -131,9 +131,9 @@ def slow_roots(loop: Loop) -> tuple[ComplexArray, float]:
 
 @lru_cache(maxsize=16)
 def _found(loop: Loop) -> ComplexArray:
-    """Find roots below `_LINES` / tau, by Newton's method from many points.
+    """Find roots up to `_LINES` times 2 pi / tau, by Newton's method from many points.
 
-    Slow ones may be anywhere; the others lie near multiples of 1 / tau.
+    Slow ones may be anywhere; the others lie near multiples of 2 pi / tau.
     """
     tau = loop.longest_delay
     slow = np.outer(np.geomspace(1e-6, 4.0, 60) / tau, np.exp(1j * np.linspace(1.6, np.pi, 8)))
