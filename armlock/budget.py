@@ -53,6 +53,7 @@ _MOTION = Controller(
 # Two poles a decade from 1 uHz on, each with a zero midway to the next, fall as 1/sqrt(f).
 _POLES = -2.0 * np.pi * 10.0 ** (0.5 * np.arange(20) - 6.0)
 _ZEROS = 10.0**0.25 * _POLES
+# Not a controller's value: to import the package must compile nothing.
 _AT_1_HZ = np.prod((2j * np.pi - _ZEROS) / (2j * np.pi - _POLES))
 _CLOCK = Controller(_ZEROS.tolist(), _POLES.tolist(), CLOCK_NOISE / abs(_AT_1_HZ))
 

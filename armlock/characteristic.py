@@ -349,22 +349,28 @@ class CharacteristicFunction:
                 f"magnitude, got {sigma}: its exponential is no float"
             )
 
-        def move(p: Polynomial, delay: float) -> Polynomial:
-            late = np.exp(-sigma * delay)
+        def with_moved(roots: ComplexArray, coefficients: FloatArray) -> Polynomial:
+            """Return a shifted polynomial from the roots before, and its coefficients."""
             if self.step:
-                scales = np.exp(sigma * self.step * np.arange(p.coefficients.size))
-                return Polynomial(
-                    late * scales * p.coefficients, p.roots * np.exp(-sigma * self.step)
-                )
-            if p.coefficients.size > LOW_DEGREE + 1:
-                moved = poly.Polynomial(p.coefficients)(poly.Polynomial([sigma, 1.0]))
-                return Polynomial(late * moved.coef, p.roots - sigma)
-            # D is evaluated from these: exactly, because powers of sigma may cancel.
-            exact = [Fraction(value) for value in p.coefficients.tolist()]
-            for i in range(len(exact) - 1):
-                for k in range(len(exact) - 2, i - 1, -1):
-                    exact[k] += Fraction(sigma) * exact[k + 1]
-            return Polynomial.of(late * np.array(exact, dtype=float), p.roots - sigma)
+                return Polynomial(coefficients, roots * np.exp(-sigma * self.step))
+            if coefficients.size > LOW_DEGREE + 1:
+                return Polynomial(coefficients, roots - sigma)
+            return Polynomial.of(coefficients, roots - sigma)
+
+        def move(p: Polynomial, delay: float) -> Polynomial:
+            late, size = np.exp(-sigma * delay), p.coefficients.size
+            if self.step:
+                moved = np.exp(sigma * self.step * np.arange(size)) * p.coefficients
+            elif size > LOW_DEGREE + 1:
+                moved = poly.Polynomial(p.coefficients)(poly.Polynomial([sigma, 1.0])).coef
+            else:
+                # D is evaluated from these: exactly, because powers of sigma may cancel.
+                exact = [Fraction(value) for value in p.coefficients.tolist()]
+                for i in range(size - 1):
+                    for k in range(size - 2, i - 1, -1):
+                        exact[k] += Fraction(sigma) * exact[k + 1]
+                moved = np.array(exact, dtype=float)
+            return with_moved(p.roots, late * moved)
 
         x0, y0 = self.reference
         rest, b1, b2 = self._polynomials
@@ -375,13 +381,9 @@ class CharacteristicFunction:
             # It moves along, so that nothing has to cancel in `rest`.
             reference=(x0 * np.exp(sigma * self.delay1), y0 * np.exp(sigma * self.delay2)),
         )
-        # Not found again: in extended precision that takes a second.
-        roots = self.roots_of_a - sigma
-        if self.step:
-            roots = self.roots_of_a * np.exp(-sigma * self.step)
-        elif self.degree <= LOW_DEGREE:
-            roots = Polynomial.of(found.a, roots).roots
-        vars(found)["roots_of_a"] = roots
+        if found.a is not found.rest:
+            # Not found again: in extended precision that takes a second.
+            vars(found)["roots_of_a"] = with_moved(self.roots_of_a, found.a).roots
         return found
 
     def exchanged(self) -> CharacteristicFunction:

@@ -214,6 +214,7 @@ def smallest_distances(
         nonlocal best, where
         for low, high in np.maximum(intervals, lowest).tolist():
             improve(np.linspace(low, high, 2 + 2000 // len(intervals)))
+            # What that has found narrows them.
             for start, stop in meeting((low, high)):
                 found, places, complete = _walk(
                     numerator, denominator, start, stop, best, TOLERANCE

@@ -304,8 +304,7 @@ def _count_below(loop: Loop, c1: float, c2: float, omega: float) -> int | None:
             return None
         arguments.append(argument)
         values.append(value)
-    ratio = values[0] * values[1].conjugate()
-    turned = arguments[0] - arguments[1] - math.atan2(ratio.imag, ratio.real)
+    turned = arguments[0] - arguments[1] - contour.angle_between(values[0], values[1])
     below = int(unstable_roots(loop, low1, low2))
     count = below - turned / math.pi
     return round(count) if below >= 0 and abs(count - round(count)) < 1e-3 else None

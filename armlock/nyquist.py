@@ -3,8 +3,8 @@
 The contour goes up the imaginary axis, indented to the right around the pole of L at s = 0,
 and back at infinity. It is sampled so finely that the argument of 1 + L is known without doubt,
 up to past the last root on the axis; what 1 + L gathers from there on follows from the roots of
-its numerator and denominator without delays. The
-encirclements are then held against the count of unstable roots: Z = N + P.
+its numerator and denominator without delays. The encirclements are then held against the count
+of unstable roots: Z = N + P.
 """
 
 from __future__ import annotations

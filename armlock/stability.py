@@ -427,9 +427,9 @@ def _fill(
 ) -> tuple[IntArray, BoolArray, IntArray]:
     """Fill rows from their crossings, starting with the counts `base` at x = lower."""
     constant, b1, b2 = system.on_boundary()
-    # Where all exponentials are one, N at y = y0 is D at x = 0 and y = y0, exactly.
-    y0 = system.reference[1]
-    at_reference = constant._replace(sums=system.at(0.0, y0).sums)
+    x0, y0 = system.reference
+    # Where all exponentials are one, N = A + C - y B2 is R + x0 B1 at y = y0, exactly.
+    at_reference = constant._replace(sums=system.rest_on_boundary().sums + x0 * b1.sums)
     fixed, varying, square = without_unused(
         at_reference.times_conjugate(b1), b2.times_conjugate(b1), b1.times_conjugate(b1)
     )
