@@ -61,14 +61,10 @@ def _quotients(
 
 
 class Polynomial(NamedTuple):
-    """A real polynomial of s: its coefficients in ascending powers, and its roots.
-
-    A product p q* keeps p and q.
-    """
+    """A real polynomial of s: its coefficients in ascending powers, and its roots."""
 
     coefficients: FloatArray
     roots: ComplexArray
-    factors: tuple[Polynomial, ...] = ()
 
     @classmethod
     def of(cls, coefficients: FloatArray, known: ComplexArray | None = None) -> Polynomial:
@@ -104,7 +100,7 @@ class Polynomial(NamedTuple):
         signs = (-1.0) ** np.arange(other.coefficients.size)
         with np.errstate(over="ignore", invalid="ignore"):
             product = np.convolve(self.coefficients, signs * other.coefficients)
-        return Polynomial(product, np.concatenate((self.roots, -other.roots)), (self, other))
+        return Polynomial(product, np.concatenate((self.roots, -other.roots)))
 
 
 def _are_roots(roots: ComplexArray, coefficients: FloatArray) -> bool:
@@ -200,19 +196,11 @@ class ExponentialSum(NamedTuple):
             size = p.coefficients.size
             row.real[:size] = p.coefficients * turns.real[:size]
             row.imag[:size] = p.coefficients * turns.imag[:size]
-        factors = {id(f): f for p in self.polynomials for f in p.factors or (p,)}
-        place = {key: k for k, key in enumerate(factors)}
-        pairs = np.full((len(self.polynomials), 2), -1)
-        for pair, p in zip(pairs, self.polynomials, strict=True):
-            for m, f in enumerate(p.factors or (p,)):
-                pair[m] = place[id(f)]
-        kept = [np.sort_complex(f.roots[f.roots.imag >= 0.0]) for f in factors.values()]
         arrays = (
             whole if degree <= LOW_DEGREE and _in_range(whole) else whole[:0],
-            np.concatenate(kept),
-            np.cumsum([0, *(roots.size for roots in kept)]),
-            np.array([f.coefficients[-1] for f in factors.values()]),
-            pairs,
+            np.concatenate([p.roots for p in self.polynomials]),
+            np.cumsum([0, *(p.roots.size for p in self.polynomials)]),
+            np.array([p.coefficients[-1] for p in self.polynomials]),
         )
         return CompiledSum(arrays, self.weights, self.sums, self.phases)
 
@@ -222,14 +210,13 @@ class CompiledSum(NamedTuple):
 
     Attributes
     ----------
-    polynomials : tuple of five arrays
+    polynomials : tuple of four arrays
         1. Coefficients in powers of omega, shape (k, degree + 1). There are no rows where a
            degree exceeds `LOW_DEGREE`, or products leave the range of floats: the others are
            for that case.
-        2. Roots with an imaginary part of zero or above, factor after factor.
-        3. The index of each factor's first root.
-        4. The factors' highest coefficients.
-        5. Which two factors each polynomial p q* has, shape (k, 2); -1 for no second.
+        2. Roots, polynomial after polynomial.
+        3. The index of each polynomial's first root, and their number.
+        4. Highest coefficients, shape (k,).
     weights, sums, phases : arrays
         Those of `ExponentialSum`.
     """
@@ -278,10 +265,10 @@ def _from_roots(
 ) -> tuple[ComplexArray, FloatArray, FloatArray]:
     """Expand polynomials about j omega, in powers of u = (change of omega) / reach.
 
-    Polynomial k has the highest coefficient leads[k], and its real roots and the upper halves
-    of its pairs are roots[starts[k] : starts[k + 1]]. All are divided by one power of two, so
-    that the largest is about one. Returns the coefficients and their magnitudes, shape
-    (k, LOW_DEGREE + 1), and bounds on what the higher powers add up to where 0 <= u <= 1.
+    Polynomial k has the highest coefficient leads[k] and roots[starts[k] : starts[k + 1]]. All
+    are divided by one power of two, so that the largest is about one. Returns the coefficients
+    and their magnitudes, shape (k, LOW_DEGREE + 1), and bounds on what the higher powers add up
+    to where 0 <= u <= 1. The magnitudes count the roots, since each multiplication rounds.
     """
     size = LOW_DEGREE + 1
     found = np.zeros((leads.size, size), dtype=np.complex128)
@@ -292,86 +279,40 @@ def _from_roots(
     for k in range(leads.size):
         found[k, 0], sizes[k, 0], total = leads[k], abs(leads[k]), abs(leads[k])
         degree = 0
-        for i in range(starts[k], starts[k + 1]):
-            root = roots[i]
-            below = 1j * omega - root
-            q0, q1, q2 = below, 1j * reach, 0j
-            m0, m1, m2 = abs(below), reach, 0.0
-            if root.imag != 0.0:
-                above = 1j * omega - root.conjugate()
-                q0, q1, q2 = below * above, 1j * reach * (below + above), complex(-(reach**2))
-                m0, m1 = abs(below) * abs(above), reach * (abs(below) + abs(above))
-                m2 = reach * reach
-            total *= m0 + m1 + m2
+        for root in roots[starts[k] : starts[k + 1]]:
+            away = 1j * omega - root
+            distance = abs(away)
+            total *= distance + reach
             scale = 1.0
             if total > 1e60 or 0.0 < total < 1e-60:
                 exponent = int(np.floor(np.log2(total)))
                 exponents[k] += exponent
                 scale = 2.0**-exponent
                 total *= scale
-            degree += 1 if root.imag == 0.0 else 2
-            for m in range(min(degree, size - 1), -1, -1):
-                new, most = q0 * found[k, m], m0 * sizes[k, m]
-                if m > 0:
-                    new, most = new + q1 * found[k, m - 1], most + m1 * sizes[k, m - 1]
-                if m > 1:
-                    new, most = new + q2 * found[k, m - 2], most + m2 * sizes[k, m - 2]
-                found[k, m], sizes[k, m] = scale * new, scale * most
-        factors = starts[k + 1] - starts[k]
-        held = 0.0
-        for m in range(size):
-            held += sizes[k, m]
-        left_out[k] = max(total - held, 0.0) + factors * EPSILON * total
+            degree += 1
+            for m in range(min(degree, size - 1), 0, -1):
+                found[k, m] = scale * (away * found[k, m] + 1j * reach * found[k, m - 1])
+                sizes[k, m] = scale * (distance * sizes[k, m] + reach * sizes[k, m - 1])
+            found[k, 0] *= scale * away
+            sizes[k, 0] *= scale * distance
+        left_out[k] = max(total - sizes[k].sum(), 0.0) + degree * EPSILON * total
+        sizes[k] *= 1.0 + 0.5 * degree
         if total > 0.0:
             largest = max(largest, exponents[k] + int(np.floor(np.log2(total))))
     for k in range(leads.size):
         scale = 2.0 ** min(max(exponents[k] - largest, -1000), 1000)
+        found[k] *= scale
+        sizes[k] *= scale
         left_out[k] *= scale
-        for m in range(size):
-            found[k, m] *= scale
-            sizes[k, m] *= scale
     return found, sizes, left_out
 
 
 @njit(cache=True)
-def _multiplied(
-    found: ComplexArray,
-    sizes: FloatArray,
-    left_out: FloatArray,
-    starts: IntArray,
-    pairs: IntArray,
-) -> tuple[ComplexArray, FloatArray, FloatArray]:
-    """Multiply expansions of `_from_roots` to those of products p q*, up to as many powers.
-
-    What is returned has the same form. The magnitudes are those for rounding: they count the
-    roots, since each multiplication rounds.
-    """
-    number, size = pairs.shape[0], found.shape[1]
-    product = np.zeros((number, size), dtype=np.complex128)
-    most, left = np.zeros((number, size)), np.zeros(number)
-    for k in range(number):
-        p, q = pairs[k]
-        factors = starts[p + 1] - starts[p]
-        if q < 0:
-            product[k], most[k], left[k] = found[p], sizes[p], left_out[p]
-        else:
-            factors += starts[q + 1] - starts[q]
-            for m in range(size):
-                for i in range(m + 1):
-                    product[k, m] += found[p, i] * found[q, m - i].conjugate()
-                    most[k, m] += sizes[p, i] * sizes[q, m - i]
-            total = (sizes[p].sum() + left_out[p]) * (sizes[q].sum() + left_out[q])
-            left[k] = max(total - most[k].sum(), 0.0) + EPSILON * total
-        most[k] *= 1.0 + 0.5 * factors
-    return product, most, left
-
-
-@njit(cache=True)
-def _reach(roots: ComplexArray, starts: IntArray, omega: float, most: float) -> float:
+def _reach(roots: ComplexArray, starts: IntArray, omega: float) -> float:
     """How far from omega the expansion of `_from_roots` is accurate, at most 1e300.
 
     Around each polynomial the crowd, the sum of reach / (reach + distance), is concave in the
-    reach: Newton's method from below never passes the length at which it is `most`.
+    reach: Newton's method from below never passes the length at which it is _CROWD.
     """
     shortest = 1e300
     for k in range(starts.size - 1):
@@ -379,17 +320,14 @@ def _reach(roots: ComplexArray, starts: IntArray, omega: float, most: float) -> 
         for _ in range(6):
             crowd, rate = 0.0, 0.0
             for root in roots[starts[k] : starts[k + 1]]:
-                for above in (omega - root.imag, omega + root.imag):
-                    distance = np.hypot(root.real, above)
-                    if distance > 0.0:
-                        crowd += reach / (reach + distance)
-                        rate += distance / (reach + distance) ** 2
-                    if root.imag == 0.0:
-                        break
-            if rate * (shortest - reach) <= most - crowd:
+                distance = abs(1j * omega - root)
+                if distance > 0.0:
+                    crowd += reach / (reach + distance)
+                    rate += distance / (reach + distance) ** 2
+            if rate * (shortest - reach) <= _CROWD - crowd:
                 reach = shortest
                 break
-            reach += (most - crowd) / rate
+            reach += (_CROWD - crowd) / rate
         shortest = min(shortest, reach)
     return shortest
 
@@ -400,24 +338,39 @@ def piece(
 ) -> tuple[float, float, float, ComplexArray, FloatArray]:
     """Expand an exponential sum over the piece of the axis that starts at omega.
 
-    `uncertain` holds how far the entries of `sums` may be off; the magnitudes contain it. Of
-    polynomials of low degree the whole axis is one
-    piece, with a start of zero and a reach of one. Returns `start` and `reach`, with
-    u = (omega - start) / reach from 0 to 1 over any other piece; where the piece ends; the
-    coefficients in powers of u of the sum, then of each group, shape (1 + groups, n); and
-    magnitudes for rounding, shape (1 + groups, n + 1). The last column bounds the powers that
-    are left out, over EPSILON: `rounding_bound` multiplies all by EPSILON and more.
+    Of polynomials of low degree the whole axis is one piece, with a start of zero and a reach
+    of one.
+
+    Parameters
+    ----------
+    whole : CompiledSum
+        The sum.
+    omega : float
+        In rad/s.
+    uncertain : float array, shape (polynomials,), optional
+        How far the entries of `sums` may be off. The magnitudes contain it.
+
+    Returns
+    -------
+    start, reach : float
+        In rad/s. In a piece that is not the whole axis u = (omega - start) / reach goes from 0
+        to 1.
+    end : float
+        Where the piece ends, in rad/s.
+    local : complex array, shape (1 + groups, n)
+        The coefficients in powers of u of the sum, then of each group.
+    sizes : float array, shape (1 + groups, n + 1)
+        Magnitudes for rounding. The last column bounds the powers that are left out, over
+        EPSILON: `rounding_bound` multiplies all by EPSILON and more.
     """
-    coefficients, roots, starts, leads, pairs = whole.polynomials
+    coefficients, roots, starts, leads = whole.polynomials
     weights, sums = whole.weights, whole.sums
     start, reach, end, expanded = 0.0, 1.0, np.inf, coefficients.shape[0] == 0
     magnitudes, left_out = np.abs(coefficients), np.zeros(coefficients.shape[0])
     if expanded:
-        crowd = 0.5 * _CROWD if pairs[:, 1].max() >= 0 else _CROWD
-        start, reach = omega, _reach(roots, starts, omega, crowd)
+        start, reach = omega, _reach(roots, starts, omega)
         end = start + reach
-        found, most, beyond = _from_roots(roots, starts, leads, start, reach)
-        coefficients, magnitudes, left_out = _multiplied(found, most, beyond, starts, pairs)
+        coefficients, magnitudes, left_out = _from_roots(roots, starts, leads, start, reach)
     number, size = coefficients.shape
     groups = weights.shape[0]
     local = np.zeros((1 + groups, size), dtype=np.complex128)
@@ -436,27 +389,13 @@ def piece(
     if not expanded:
         return start, reach, end, local, sizes
     # Powers that rounding hides are not worth their time.
-    total = 0.0
-    for g in range(1 + groups):
-        for m in range(size):
-            total += sizes[g, m]
-    used, dropped = size, 0.0
-    while used > 1:
-        for g in range(1 + groups):
-            dropped += sizes[g, used - 1]
-        if dropped > 1e-3 * EPSILON * total:
-            break
+    powers = sizes[:, :size].sum(axis=0)
+    used, dropped = size, powers[size - 1]
+    while used > 1 and dropped <= 1e-3 * EPSILON * powers.sum():
         used -= 1
-    kept = np.zeros((1 + groups, used + 1))
-    shorter = np.zeros((1 + groups, used), dtype=np.complex128)
-    for g in range(1 + groups):
-        kept[g, used] = sizes[g, size]
-        for m in range(size):
-            if m < used:
-                kept[g, m], shorter[g, m] = sizes[g, m], local[g, m]
-            else:
-                kept[g, used] += sizes[g, m] / EPSILON
-    return start, reach, end, shorter, kept
+        dropped += powers[used - 1]
+    sizes[:, used] = sizes[:, size] + sizes[:, used:size].sum(axis=1) / EPSILON
+    return start, reach, end, local[:, :used].copy(), sizes[:, : used + 1].copy()
 
 
 @njit(cache=True)

@@ -18,13 +18,12 @@ def walk(coefficients, phases, omega_end):
     """Wind a sum of polynomials in omega, one a row, times exponentials."""
     whole = np.array(coefficients, dtype=complex)
     nothing = np.zeros(0, dtype=complex), np.zeros(1, dtype=np.int64), np.zeros(0)
-    pairs = np.column_stack((np.arange(len(whole)), np.full(len(whole), -1)))
     weights, sums, phases = (
         np.eye(len(whole)),
         np.ones(len(whole)),
         np.array(phases, dtype=float),
     )
-    summed = exponentials.CompiledSum((whole, *nothing, pairs), weights, sums, phases)
+    summed = exponentials.CompiledSum((whole, *nothing), weights, sums, phases)
     return contour.winding(summed, np.zeros(len(whole)), omega_end)
 
 
@@ -101,7 +100,7 @@ def test_a_piece_reaches_as_far_as_equal_roots_allow(number):
     # Another polynomial's roots do not count.
     roots, starts = np.full(2 * number, -3.0 + 0j), np.array([0, number, 2 * number])
     expected = 1.5 * 5.0 / (number - 1.5)
-    found = exponentials._reach(roots, starts, 4.0, 1.5)
+    found = exponentials._reach(roots, starts, 4.0)
     assert found == pytest.approx(expected, rel=1e-2)
 
 
@@ -173,9 +172,8 @@ from armlock import contour, counting, exponentials
 whole = np.zeros((2, 6), dtype=complex)
 whole[0, 2], whole[1, 5] = 1.0, 1.0j
 none = np.zeros(0, dtype=complex), np.zeros(1, dtype=np.int64), np.zeros(0)
-polynomials = whole, *none, np.array([[0, -1], [1, -1]])
 weights, phases = np.array([[0.0, 0.5], [0.0, 0.5]]), np.array([1.0, -1.0])
-function = exponentials.CompiledSum(polynomials, weights, np.array([1.0, -1.0]), phases)
+function = exponentials.CompiledSum((whole, *none), weights, np.array([1.0, -1.0]), phases)
 steps = []
 contour.evaluate = lambda *at: steps.append(at) or exponentials.evaluate(*at)
 zeros, complete = contour.imaginary_zeros(
