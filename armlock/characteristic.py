@@ -231,6 +231,11 @@ class CharacteristicFunction:
         """The longest time in s by which a term is delayed, dead time included."""
         return self.delay + max(self.delay1, self.delay2)
 
+    @property
+    def omega_per_turn(self) -> float:
+        """Change of omega, in rad/s, that is one turn of the longest delay; inf without one."""
+        return 2.0 * np.pi / self.longest_delay if self.longest_delay else np.inf
+
     def __repr__(self) -> str:
         """Name the class and its arguments, as they are written to make it again."""
         return as_written(self)
@@ -361,15 +366,12 @@ class CharacteristicFunction:
             late, size = np.exp(-sigma * delay), p.coefficients.size
             if self.step:
                 moved = np.exp(sigma * self.step * np.arange(size)) * p.coefficients
-            elif size > LOW_DEGREE + 1:
-                moved = poly.Polynomial(p.coefficients)(poly.Polynomial([sigma, 1.0])).coef
             else:
-                # D is evaluated from these: exactly, because powers of sigma may cancel.
-                exact = [Fraction(value) for value in p.coefficients.tolist()]
-                for i in range(size - 1):
-                    for k in range(size - 2, i - 1, -1):
-                        exact[k] += Fraction(sigma) * exact[k + 1]
-                moved = np.array(exact, dtype=float)
+                # Where D is evaluated from these: exactly, because powers of sigma may cancel.
+                number = Fraction if size <= LOW_DEGREE + 1 else float
+                line = poly.Polynomial(np.array([number(sigma), number(1.0)]))
+                before = np.array([number(value) for value in p.coefficients.tolist()])
+                moved = poly.polyval(line, before).coef.astype(np.float64)
             return with_moved(p.roots, late * moved)
 
         x0, y0 = self.reference

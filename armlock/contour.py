@@ -318,7 +318,7 @@ def _place(
         for m in range(sizes.shape[1]):
             magnitude[m] += sizes[g, m]
     for zero in zeros:
-        omega = zero[OMEGA]
+        omega = max(zero[OMEGA], start)
         measured, change = evaluate(start, reach, square, square_phases, omega)
         part, slope = zero[POSITION], zero[SPREAD]
         zero[POSITION], zero[SPREAD] = np.nan, 0.0
@@ -433,44 +433,31 @@ def imaginary_zeros(
                 omega, doubtful = following, True
                 continue
             now, caution = 1 if value.imag > 0.0 else -1, 1.0
-            if sign == 0:
-                # At the start itself the sign was hidden.
-                there = evaluate(start, reach, local, phases, max(omega_start, start))[0]
-                jump, width = (now if omega_start == 0.0 else 0), following - omega_start
-                rate = (value - there) / width
-                zeros = _with_zero(zeros, found, omega_start, jump, width, there, rate)
-                found += 1
-            elif now != sign and last_clear < start:
-                # It was hidden since before this piece.
-                width = following - last_clear
-                zeros = _with_zero(zeros, found, following, 2 * now, width, value, slope)
-                found += 1
-            elif now != sign:
-                guess = 0.5 * (last_clear + following)
-                if not doubtful:
-                    h, dh = (old_value.imag, value.imag), (old_slope.imag, slope.imag)
-                    guess = _zero_between(omega, following, h, dh)
-                at, there, rate = _polish(
-                    start, reach, local, phases, bound, (last_clear, following), guess, sign
-                )
-                width = 0.5 * (following - last_clear)
-                uncertain = real_horner(error, (at - start) * per_reach)
-                if abs(rate.imag) * width > uncertain:
-                    width = uncertain / abs(rate.imag)
-                zeros = _with_zero(zeros, found, at, 2 * now, width, there, rate)
-                found += 1
-            elif doubtful:
-                at, width = 0.5 * (last_clear + following), 0.5 * (following - last_clear)
+            if now != sign or doubtful:
+                jump, width = now - sign, 0.5 * (following - last_clear)
+                at = last_clear + width
                 there, rate = evaluate(start, reach, local, phases, max(at, start))
-                zeros = _with_zero(zeros, found, at, 0, width, there, rate)
+                if sign == 0:
+                    # At the start itself the sign was hidden.
+                    at, width = omega_start, 2.0 * width
+                    there = evaluate(start, reach, local, phases, max(at, start))[0]
+                    jump = now if omega_start == 0.0 else 0
+                elif jump != 0 and last_clear >= start:
+                    if not doubtful:
+                        h, dh = (old_value.imag, value.imag), (old_slope.imag, slope.imag)
+                        at = _zero_between(omega, following, h, dh)
+                    at, there, rate = _polish(
+                        start, reach, local, phases, bound, (last_clear, following), at, sign
+                    )
+                    uncertain = real_horner(error, (at - start) * per_reach)
+                    if abs(rate.imag) * width > uncertain:
+                        width = uncertain / abs(rate.imag)
+                zeros = _with_zero(zeros, found, at, jump, width, there, rate)
                 found += 1
             omega, last_clear, sign, doubtful = following, following, now, False
-        if is_map and omega >= omega_end and sign != 0:
-            width = omega_end - last_clear if doubtful else 0.0
-            zeros = _with_zero(zeros, found, omega_end, -sign, width, value, slope)
-            found += 1
-        elif omega >= omega_end and doubtful:
-            zeros = _with_zero(zeros, found, omega_end, 0, omega_end - last_clear, value, slope)
+        if omega >= omega_end and (is_map or doubtful):
+            jump, width = (-sign if is_map else 0), omega_end - last_clear if doubtful else 0.0
+            zeros = _with_zero(zeros, found, omega_end, jump, width, value, slope)
             found += 1
         if found > first and measure is not None:
             square = piece(measure, start)[3]

@@ -178,5 +178,5 @@ def phase_and_delay(
             phase, where = found[0], found[2]
         delay = min(delay, found[1])
 
-    search_outwards(loop, look, lambda: min(end, highest), meeting, likely)
+    search_outwards(loop.omega_per_turn, look, lambda: min(end, highest), meeting, likely)
     return phase, delay, where

@@ -250,7 +250,7 @@ def d_curve_branches(
         omega_max = min(omega_max, np.pi / system.step)
     density = positive_number("points_per_turn", points_per_turn)
     _require_two_parameters(system)
-    turns = omega_max * system.longest_delay / (2.0 * np.pi)
+    turns = omega_max / system.omega_per_turn
     check_memory("omega_max", (int(min(density * turns, 1e18)),), 256)
     _, b1, b2 = system.on_boundary()
     determinant = b1.times_conjugate(b2)
@@ -258,7 +258,7 @@ def d_curve_branches(
     edges = np.unique(np.concatenate(([0.0], poles, [omega_max])))
     branches = []
     for start, stop in pairwise(edges):
-        turns = (stop - start) * system.longest_delay / (2.0 * np.pi)
+        turns = (stop - start) / system.omega_per_turn
         count = int(np.ceil(density * max(turns, 4.0)))
         # Closer towards both ends, where the curve runs off to its poles.
         share = 0.5 * (1.0 - np.cos(np.pi * (np.arange(count) + 0.5) / count))

@@ -321,7 +321,7 @@ def intervals_not_clear(
     segment: FloatArray,
     levels: FloatArray,
     span: tuple[float, float],
-    longest_delay: float,
+    per_turn: float,
 ) -> FloatArray:
     """Intervals, shape (n, 2), of a span of the axis outside which L stays off a target.
 
@@ -330,7 +330,7 @@ def intervals_not_clear(
     """
     found, number = np.empty((64, 2)), 0
     omega, omega_end = span
-    step, per_turn = omega_end, 2.0 * np.pi / longest_delay
+    step = omega_end
     while omega < omega_end:
         # Next to zero whole turns are too long.
         shortest = max(min(_TURNS * per_turn, 0.03 * omega), 3e-4 * omega, 1e-3 * per_turn)

@@ -233,9 +233,9 @@ def smallest_distances(
     denominator = denominator._replace(weights=denominator.weights[:0])
     lowest = _one_power_up_to(loop, c1, c2)
     # Next to the limit a walk takes short steps, unless it knows of a smaller value.
-    first = FIRST_TURNS * 2.0 * np.pi / loop.longest_delay
+    first = FIRST_TURNS * loop.omega_per_turn
     improve(np.geomspace(lowest, max(min(first, end()), lowest), 2000))
-    search_outwards(loop, look, end, meeting, likely)
+    search_outwards(loop.omega_per_turn, look, end, meeting, likely)
     return best, where
 
 

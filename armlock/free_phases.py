@@ -194,7 +194,7 @@ def meeting_intervals(
         np.array(segment),
         np.array(levels),
         span,
-        loop.longest_delay,
+        loop.omega_per_turn,
     )
     return found
 
@@ -215,7 +215,7 @@ def least_at(loop: Loop, c1: float, c2: float, omega: FloatArray, margins: slice
 
 
 def search_outwards(
-    loop: Loop,
+    per_turn: float,
     look: Callable[[FloatArray], None],
     end: Callable[[], float],
     meeting: Callable[[tuple[float, float]], FloatArray],
@@ -228,8 +228,9 @@ def search_outwards(
 
     Parameters
     ----------
-    loop : Loop
-        The loop.
+    per_turn : float
+        The change of omega, in rad/s, that is one turn of the delays; inf to look everywhere
+        at once.
     look : callable
         Looks at intervals in rad/s, shape (n, 2), and keeps the best that it finds.
     end : callable
@@ -239,7 +240,6 @@ def search_outwards(
     likely : callable
         Of an array of frequencies, those next to which the best are likely.
     """
-    per_turn = 2.0 * np.pi / loop.longest_delay
     first, around = min(end(), FIRST_TURNS * per_turn), _TURNS_AROUND
     look(meeting((0.0, first)))
     while (last := end()) > first:

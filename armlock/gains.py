@@ -143,7 +143,7 @@ def _gains_around_one(
             nearest = above[np.argmin(factor[above])]
             upper, where = float(factor[nearest]), float(omega[nearest])
 
-    search_outwards(loop, look, end, meeting, likely)
+    search_outwards(loop.omega_per_turn, look, end, meeting, likely)
     hidden_gains = np.concatenate(hidden)
     if ((hidden_gains > lower) & (hidden_gains < upper)).any():
         _require_stable_inside(loop, c1, c2, lower, upper)

@@ -10,7 +10,6 @@ where free phases let a root cross at all: the first turns, then likely places, 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -21,19 +20,12 @@ from numpy.polynomial import polynomial as poly
 from armlock.bounds import last_frequency
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import ComplexArray, FloatArray, IntArray, axis, positive_number
-from armlock.free_phases import (
-    FIRST_TURNS,
-    crossing_intervals,
-    free_disc,
-    search_outwards,
-)
+from armlock.free_phases import crossing_intervals, free_disc, search_outwards
 from armlock.loops import Loop
 from armlock.stability import CountError, polished, sign_changes, unstable_roots
 
 #: Nothing is looked at where the parameters are this many times as large as the start, or as 1.
 FARTHEST = 1e9
-# Of a system that is no loop, each further walk goes so many times as far up.
-_LONGER = 4.0
 # Next to the limit of the neutral root chain, roots cross at ever higher frequency. They are
 # followed up to so many turns of the longest delay, which takes about a tenth of a second.
 _TURNS_NEXT_TO_THE_CHAIN = 50_000
@@ -190,7 +182,7 @@ class Ray:
             near &= rough <= rough[near].min() * (1.0 + 1e-6)
         omega, change = omega[near], change[near]
         # Far less than the distance between two zeros.
-        reach = np.minimum(1e-7 * omega, 0.01 / max(self.system.longest_delay, 1e-12))
+        reach = np.minimum(1e-7 * omega, 1e-3 * self.system.omega_per_turn)
         omega = polished(lambda w: self.quotient(w).imag, omega, (reach,))
         position = self.quotient(omega).real
         kept = np.flatnonzero((position > lowest) & (position <= stop))
@@ -218,8 +210,9 @@ class Ray:
         best = Crossing(chain, np.inf, 0) if chain <= stop else Crossing(np.inf, np.nan, 0)
         if not self.acts():
             return best
+        # The boundary of a map ends at one frequency: a single walk sees all of it.
+        per_turn = np.inf if self.system.step else self.system.omega_per_turn
         hidden = False
-        per_turn = 2.0 * np.pi / max(self.system.longest_delay, 1e-12)
 
         def reach() -> float:
             return min(best.position, stop)
@@ -242,44 +235,25 @@ class Ray:
             if found.position.size:
                 best = Crossing(*(values[0].item() for values in found))
 
-        if isinstance(self.system, Loop):
-            self._search(self.system, look, end, reach)
-        else:
-            walked = 0.0
-            while (last := end()) > walked:
-                # The boundary of a map ends at one frequency: a single walk sees all of it.
-                far = (
-                    np.inf
-                    if self.system.step
-                    else max(_LONGER * walked, FIRST_TURNS * per_turn)
-                )
-                look(np.array([[walked, min(last, far)]]))
-                walked = min(last, far)
-        if hidden:
-            self._confirm((1.0 - 1e-6) * reach(), 0)
-        return best
-
-    def _search(
-        self,
-        loop: Loop,
-        look: Callable[[FloatArray], None],
-        end: Callable[[], float],
-        reach: Callable[[], float],
-    ) -> None:
-        """Look where phases of the arms and parameters up to `reach` let a root cross."""
-
         def meeting(span: tuple[float, float]) -> FloatArray:
+            if not isinstance(self.system, Loop):
+                return np.array([span])
             c1, c2 = np.abs([self.at(0.0), self.at(reach())]).max(axis=0)
-            return crossing_intervals(loop, c1, c2, span)
+            return crossing_intervals(self.system, c1, c2, span)
 
         def likely(omega: FloatArray) -> FloatArray:
-            centre, radius = free_disc(loop, *self.at(0.0), omega)
+            if not isinstance(self.system, Loop):
+                return omega[:1]
+            centre, radius = free_disc(self.system, *self.at(0.0), omega)
             d1, d2 = map(float, self.direction)
-            growth = free_disc(loop, d1, d2, omega)[1]
+            growth = free_disc(self.system, d1, d2, omega)[1]
             # The t at which the disc of free phases first holds -1.
             return omega[[np.argmin((np.abs(1.0 + centre) - radius) / growth)]]
 
-        search_outwards(loop, look, end, meeting, likely)
+        search_outwards(per_turn, look, end, meeting, likely)
+        if hidden:
+            self._confirm((1.0 - 1e-6) * reach(), 0)
+        return best
 
 
 def first_crossing(
