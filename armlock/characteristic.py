@@ -328,11 +328,11 @@ class CharacteristicFunction:
         dz = self.step * z if self.step else 1.0
         arms = 0.0
         for b, delay, origin, here in self._arms(x, y):
-            late = library.expm1(-s * delay)
+            change = library.expm1(-s * delay)
             value = poly.polyval(z, b)
-            change = poly.polyval(z, poly.polyder(b)) * dz - self.delay * value
-            arms = arms + change * ((origin - here) - here * late)
-            arms = arms + value * here * delay * (1.0 + late)
+            rate = poly.polyval(z, poly.polyder(b)) * dz - self.delay * value
+            arms = arms + rate * ((origin - here) - here * change)
+            arms = arms + value * here * delay * (1.0 + change)
         own = poly.polyval(z, poly.polyder(self.rest)) * dz
         return own + library.exp(-s * self.delay) * arms
 

@@ -55,10 +55,10 @@ def _on_unit_circle(loop: Loop, c1: float, c2: float, omega: FloatArray) -> Floa
     # Far less than the distance between two nulls of an arm.
     longest = 0.01 / loop.longest_delay
     reaches = [np.minimum(10.0**power * omega, longest) for power in range(-13, 0)]
-    return polished(lambda at: _level(loop, c1, c2, at), omega, reaches)
+    return polished(lambda at: _log_size(loop, c1, c2, at), omega, reaches)
 
 
-def _level(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArray:
+def _log_size(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArray:
     """Return ln |L|."""
     return np.asarray(np.log(np.abs(loop.open_loop(1j * omega, c1, c2))))
 
@@ -71,9 +71,9 @@ def _crossovers(
     As `axis_zeros` returns them. `squares` is |N|^2 - |R|^2, with L = N / R.
     """
     omega, hidden = axis_zeros(squares.turned(), intervals)
-    far = np.abs(_level(loop, c1, c2, omega)) > TOLERANCE
+    far = np.abs(_log_size(loop, c1, c2, omega)) > TOLERANCE
     moved = _on_unit_circle(loop, c1, c2, omega[far])
-    lost = moved[np.abs(_level(loop, c1, c2, moved)) > TOLERANCE]
+    lost = moved[np.abs(_log_size(loop, c1, c2, moved)) > TOLERANCE]
     if lost.size:
         raise no_margin(c1, c2, f"rounding hides where |L| comes to one around {lost[0]} rad/s")
     omega[far] = moved
@@ -95,12 +95,12 @@ def _least_lags(
 
     if not omega.size:
         return np.inf, np.inf, np.nan
-    lag, turn = lags(omega)
-    chosen = np.concatenate((np.argsort(turn)[:_POLISHED], np.argsort(lag / omega)[:_POLISHED]))
+    lag, near = lags(omega)
+    chosen = np.concatenate((np.argsort(near)[:_POLISHED], np.argsort(lag / omega)[:_POLISHED]))
     at = _on_unit_circle(loop, c1, c2, omega[np.unique(chosen)])
-    lag, turn = lags(at)
-    worst = int(np.argmin(turn))
-    return float(turn[worst]), float(np.min(lag / at)), float(at[worst])
+    lag, near = lags(at)
+    worst = int(np.argmin(near))
+    return float(near[worst]), float(np.min(lag / at)), float(at[worst])
 
 
 def crossovers_end(

@@ -139,21 +139,23 @@ def d_curve(
     _require_two_parameters(system)
     (x0, y0), s = system.reference, 1j * omega
     rest, b1, b2 = system.polynomials()
-    late1, late2 = np.expm1(-s * system.delay1), np.expm1(-s * system.delay2)
+    change1, change2 = np.expm1(-s * system.delay1), np.expm1(-s * system.delay2)
     with np.errstate(invalid="ignore"):
         # All divided by B1, as factors: so the controller's part of it cancels.
         z = np.asarray(np.exp(s * system.step) if system.step else s, dtype=np.complex128)
         other = b2.over(b1, z)
         # D at the reference, where nothing cancels; from there both parameters are solved for.
-        known = rest.over(b1, z) * np.exp(s * system.delay) - x0 * late1 - y0 * other * late2
+        known = (
+            rest.over(b1, z) * np.exp(s * system.delay) - x0 * change1 - y0 * other * change2
+        )
         # Only the difference of the delays enters here, which keeps low frequencies exact.
         between = system.delay1 - system.delay2
         across = np.conj(other)
         determinant = np.imag(across) + np.imag(across * np.expm1(-s * between))
         rounding = 4.0 * EPSILON * np.abs(omega * between * across)
         determinant = np.where(np.abs(determinant) <= rounding, np.nan, determinant)
-        x = x0 + np.imag(known * np.conj(other * (1.0 + late2))) / determinant
-        y = y0 - np.imag(known * np.conj(1.0 + late1)) / determinant
+        x = x0 + np.imag(known * np.conj(other * (1.0 + change2))) / determinant
+        y = y0 - np.imag(known * np.conj(1.0 + change1)) / determinant
     return x, y
 
 

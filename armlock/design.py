@@ -212,7 +212,7 @@ class _Judge:
         self.s = s = 1j * self.omega
         dead = np.exp(-s * start.delay)
         self.m = [weight * dead for weight in start.mapping.weights(s)]
-        self.turn = np.exp(-s * start.tau1), np.exp(-s * start.tau2)
+        self.delayed = np.exp(-s * start.tau1), np.exp(-s * start.tau2)
 
     def controller(self, x: FloatArray) -> Controller:
         """Return the controller of a candidate."""
@@ -235,7 +235,7 @@ class _Judge:
         k = self.controller(x)
         response = k(self.s)
         first, second = (response * m for m in self.m)
-        late = first * self.turn[0], second * self.turn[1]
+        late = first * self.delayed[0], second * self.delayed[1]
         centre, radius = self._discs(first, second, late)
         distance = np.abs(1.0 + centre) - radius
         # Of a stable loop 1 + L turns by a right angle for each pole of L at s = 0, no more.

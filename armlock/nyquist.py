@@ -174,10 +174,10 @@ def _resolving_grid(loop: Loop, c1: float, c2: float, end: float) -> FloatArray:
 
 def _drawing_grid(loop: Loop, start: float, end: float) -> FloatArray:
     """Frequencies close enough to draw the curve; finer at first, where L changes most."""
-    turn = loop.omega_per_turn
-    check_memory("omega_max", (int(min(400.0 * end / turn, 1e18)),), 64)
-    first = np.arange(0.0, min(4.0 * turn, end), turn / 2000.0)
-    whole = np.arange(0.0, end, turn / 400.0)
+    per_turn = loop.omega_per_turn
+    check_memory("omega_max", (int(min(400.0 * end / per_turn, 1e18)),), 64)
+    first = np.arange(0.0, min(4.0 * per_turn, end), per_turn / 2000.0)
+    whole = np.arange(0.0, end, per_turn / 400.0)
     return np.concatenate((np.geomspace(start, end, 1000), first, whole))
 
 

@@ -189,10 +189,10 @@ class _Line:
     ) -> None:
         self.system, self.x, self.y = _acting(system, x, y, sigma)
         self.sigma = sigma
-        self.turn = 2.0 * np.pi / (self.system.longest_delay or system.longest_delay)
+        self.per_turn = 2.0 * np.pi / (self.system.longest_delay or system.longest_delay)
         try:
             self.shifted = self.system.shifted(sigma)
-            self.turns = float(last_frequency(self.shifted, self.x, self.y)) / self.turn
+            self.turns = float(last_frequency(self.shifted, self.x, self.y)) / self.per_turn
         except ValueError:
             self.turns = np.inf
         self.known = self.turns <= _LONGEST_COUNT
@@ -227,7 +227,7 @@ class _Line:
 
         Of roots that count as equal it is the slowest.
         """
-        end = self.search(further) * self.turn
+        end = self.search(further) * self.per_turn
         if not end:
             return None
         whole = self.shifted.at(self.x, self.y).compiled()
@@ -242,12 +242,12 @@ class _Line:
         s = s[np.argsort(-s.real, kind="stable")][:_MOST_STARTS]
         for _ in range(12):
             s, length = self._step(s)
-        found = s[length <= 1e-5 * self.turn]
+        found = s[length <= 1e-5 * self.per_turn]
         found = found.real + 1j * np.abs(found.imag)
-        unit = self.turn / (2.0 * np.pi)
+        unit = self.per_turn / (2.0 * np.pi)
         for top in sorted(found, key=lambda s: -s.real)[:_MOST_TRIED]:
-            level = found[found.real >= top.real - _EQUAL * max(abs(top), unit)]
-            slowest = level[np.argmin(level.imag)]
+            equal = found[found.real >= top.real - _EQUAL * max(abs(top), unit)]
+            slowest = equal[np.argmin(equal.imag)]
             try:
                 root = _polished(self.system, self.x, self.y, slowest)
             except RootError:

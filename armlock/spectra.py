@@ -243,7 +243,7 @@ def _filter() -> FloatArray:
     return np.asarray(firwin(_TAPS, 1.0 / FACTOR, window=window))
 
 
-class _Level:
+class _Rate:
     """One rate of the ladder, so many filters below the first."""
 
     def __init__(self, sample_rate: float, depth: int) -> None:
@@ -254,7 +254,7 @@ class _Level:
         self.unfiltered = np.empty(0)
 
     def add(self, samples: FloatArray) -> FloatArray:
-        """Take in samples; return those of the next level."""
+        """Take in samples; return those of the next rate."""
         series = np.concatenate((self.waiting, samples))
         if series.size >= SEGMENT:
             windows = sliding_window_view(series, SEGMENT)[::HOP]
@@ -329,7 +329,7 @@ class SpectrumEstimator:
 
     def __init__(self, sample_rate: float) -> None:
         self.sample_rate = positive_number("sample_rate", sample_rate)
-        self._levels = [_Level(self.sample_rate, 0)]
+        self._rates = [_Rate(self.sample_rate, 0)]
 
     def add(self, series: npt.ArrayLike) -> None:
         """Take in the next samples.
@@ -347,9 +347,9 @@ class SpectrumEstimator:
         given = finite_series("series", series)
         depth = 0
         while given.size:
-            if depth == len(self._levels):
-                self._levels.append(_Level(self.sample_rate, depth))
-            given = self._levels[depth].add(given)
+            if depth == len(self._rates):
+                self._rates.append(_Rate(self.sample_rate, depth))
+            given = self._rates[depth].add(given)
             depth += 1
 
     def spectrum(self) -> Spectrum:
@@ -366,20 +366,20 @@ class SpectrumEstimator:
         ValueError
             If fewer samples than one segment have come in.
         """
-        usable = [level for level in self._levels if level.segments]
+        usable = [rate for rate in self._rates if rate.segments]
         if not usable:
             raise ValueError(
                 f"series must hold at least {SEGMENT} samples, got "
-                f"{self._levels[0].waiting.size}"
+                f"{self._rates[0].waiting.size}"
             )
         rows: list[tuple[float, ...]] = []
-        # Of each level the bins from `first` on and below `end`, the next level's `end` being
+        # Of each rate the bins from `first` on and below `end`, the next rate's `end` being
         # this one's `first`.
         end = SEGMENT // 2 - SPOILED + 1
-        for level, slower in zip(usable, [*usable[1:], None], strict=True):
+        for rate, slower in zip(usable, [*usable[1:], None], strict=True):
             settled = slower is not None and slower.segments >= _ENOUGH_SEGMENTS
             first = _FIRST_BIN if settled else SPOILED
-            rows += _banded(level, np.arange(first, end))
+            rows += _banded(rate, np.arange(first, end))
             end = FACTOR * first
         frequency, power, degrees, resolution, bins = np.array(sorted(rows)).T
         tail = 0.5 * (1.0 - CONFIDENCE)
@@ -394,16 +394,16 @@ class SpectrumEstimator:
         )
 
 
-def _banded(level: _Level, numbers: IntArray) -> list[tuple[float, ...]]:
-    """Average some bins of a level in bands: frequency, power, degrees, width, how many."""
-    density = level.density()
-    index = np.floor(BANDS * np.log10(numbers * level.width))
+def _banded(rate: _Rate, numbers: IntArray) -> list[tuple[float, ...]]:
+    """Average some bins of a rate in bands: frequency, power, degrees, width, how many."""
+    density = rate.density()
+    index = np.floor(BANDS * np.log10(numbers * rate.width))
     return [
         (
-            float(chosen.mean() * level.width),
+            float(chosen.mean() * rate.width),
             float(density[chosen].mean()),
-            _degrees(level.segments, chosen.size),
-            level.width,
+            _degrees(rate.segments, chosen.size),
+            rate.width,
             float(chosen.size),
         )
         for chosen in (numbers[index == band] for band in np.unique(index))

@@ -387,7 +387,7 @@ def _chart_rows(system: CharacteristicFunction, x: FloatArray, y: FloatArray) ->
         base, top = _count(system, lower, y), _count(system, upper, y)
     elif system.b2.any():
         sides = np.array([left, right])
-        at_low, at_high = (_count(system, sides, np.full(2, level)) for level in (low, high))
+        at_low, at_high = (_count(system, sides, np.full(2, at)) for at in (low, high))
         columns, unsure, reached = _fill(
             system.exchanged(), y, sides, at_low, np.full(2, low), np.full(2, high)
         )

@@ -115,8 +115,8 @@ def test_any_partition_gives_the_same_estimate(sizes):
     for block in np.split(series, np.cumsum(sizes)):
         estimator.add(block)
     whole, parts = amplitude_spectrum(series, 3.0), estimator.spectrum()
-    held = sum(level.waiting.size + level.unfiltered.size for level in estimator._levels)
-    assert held < 2 * SEGMENT * len(estimator._levels)
+    held = sum(level.waiting.size + level.unfiltered.size for level in estimator._rates)
+    assert held < 2 * SEGMENT * len(estimator._rates)
     np.testing.assert_allclose(parts.asd, whole.asd, rtol=1e-12)
     assert np.array_equal(parts.degrees, whole.degrees)
 
