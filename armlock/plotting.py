@@ -228,7 +228,7 @@ def plot_nyquist(
         ax.set_rlim(0.0, INFINITY)
         # No label at the circle through -1, where it would hide the curve.
         ax.set_rgrids(
-            [1.0, 1e2, 1e4, INFINITY], ["", "$10^2$", "$10^4$", r"$\infty$"], angle=45
+            [1.0, 1e2, 1e4, INFINITY], ["", "$10^2$", "$10^4$", r"$\infty$"], angle=27
         )
         ax.set_thetagrids([0.0, 90.0, 180.0, 270.0], [])
     else:
