@@ -25,11 +25,12 @@ from armlock.exponentials import (
     EPSILON,
     ROUNDING,
     CompiledSum,
+    Piece,
+    bound_at,
     curvature_bound,
     curvature_from_zero,
     evaluate,
-    piece,
-    real_horner,
+    expand,
     rounding_bound,
     tangent_distance,
 )
@@ -53,11 +54,9 @@ MOST_SAMPLES = 10_000_000
 
 @njit(cache=True)
 def _follow(
-    local: ComplexArray,
-    phases: FloatArray,
+    piece: Piece,
     bound: FloatArray,
     error: FloatArray,
-    span: tuple[float, float],
     omega: float,
     end: float,
     step: float,
@@ -65,32 +64,30 @@ def _follow(
 ) -> tuple[float, float, float, int]:
     """Argument gathered by an exponential sum from omega to `end`, within one piece.
 
-    `span` is the piece's start and reach; `bound` and `error` are polynomials that bound the
-    second derivative and how far the values may be off. Returns the argument, the frequency
+    `bound` and `error` are polynomials in u that bound the second derivative and how far the
+    values may be off. Returns the argument, the frequency
     up to which it is certain, the last step, and the number of steps. It is not certain up to
     `end` where that takes a step below `shortest`, or where the sum is within its error.
     """
-    start, reach = span
     argument, steps = 0.0, 0
-    value, slope = evaluate(start, reach, local, phases, omega)
-    if abs(value) <= real_horner(error, (omega - start) / reach):
+    value, slope = evaluate(piece, omega)
+    if abs(value) <= bound_at(error, piece, omega):
         return argument, omega, step, steps
     while omega < end and steps <= MOST_STEPS:
         steps += 1
         step = min(4.0 * step, end - omega)
         while True:
-            u = (omega + step - start) / reach
             distance = tangent_distance(value, slope, step)
             # Rounding moves the tangent, too: closer to the origin nothing is certain.
-            apart = 0.5 * real_horner(bound, u) * step * step
-            if apart + real_horner(error, u) <= SAFETY * distance:
+            apart = 0.5 * bound_at(bound, piece, omega + step) * step * step
+            if apart + bound_at(error, piece, omega + step) <= SAFETY * distance:
                 break
             step *= 0.5
             if step <= max(shortest, 4.0 * EPSILON * omega) or step < 1e-300:
                 return argument, omega, step, steps
         following = end if step == end - omega else omega + step
-        next_value, next_slope = evaluate(start, reach, local, phases, following)
-        if abs(next_value) <= real_horner(error, (following - start) / reach):
+        next_value, next_slope = evaluate(piece, following)
+        if abs(next_value) <= bound_at(error, piece, following):
             return argument, omega, step, steps
         # Along the tangent, then from its end to the curve: both parts are principal.
         tangent = value + step * slope
@@ -107,25 +104,22 @@ def angle_between(value: complex, other: complex) -> float:
 
 
 @njit(cache=True)
-def _slow_terms(
-    local: ComplexArray, sizes: FloatArray, phases: FloatArray
-) -> tuple[ComplexArray, FloatArray, FloatArray, FloatArray]:
+def _slow_terms(piece: Piece) -> tuple[Piece, FloatArray]:
     """Split the terms that turn fast off an exponential sum, within one piece.
 
-    Fast are exponentials of at least a tenth of the longest delay. Returns what is left: its
-    rows, the magnitudes for rounding and the phase rates; and a polynomial in u that bounds
-    what the fast terms add up to.
+    Fast are exponentials of at least a tenth of the longest delay. Returns what is left, and a
+    polynomial in u that bounds what the fast terms add up to.
     """
-    fastest = np.abs(phases).max()
-    slow, magnitudes, rates = local.copy(), sizes.copy(), phases.copy()
-    fast = np.zeros(local.shape[1])
-    for g in range(phases.size):
-        if abs(phases[g]) >= 0.1 * fastest:
-            slow[0] -= local[g + 1]
-            magnitudes[0] += sizes[g + 1]
-            fast += np.abs(local[g + 1])
+    fastest = np.abs(piece.phases).max()
+    slow, magnitudes, rates = piece.local.copy(), piece.sizes.copy(), piece.phases.copy()
+    fast = np.zeros(slow.shape[1])
+    for g in range(rates.size):
+        if abs(rates[g]) >= 0.1 * fastest:
+            slow[0] -= slow[g + 1]
+            magnitudes[0] += magnitudes[g + 1]
+            fast += np.abs(slow[g + 1])
             slow[g + 1], magnitudes[g + 1], rates[g] = 0.0, 0.0, 0.0
-    return slow, magnitudes, rates, fast
+    return Piece(piece.start, piece.end, piece.per_reach, slow, magnitudes, rates), fast
 
 
 @njit(cache=True)
@@ -149,42 +143,37 @@ def winding(
     if phases.size and phases.any():
         block = _BLOCK * 2.0 * np.pi / np.abs(phases).max()
     while omega < omega_end or value == 0j:  # once at least
-        start, reach, end, local, sizes = piece(whole, omega, uncertain)
-        end = min(end, omega_end)
-        span = start, reach
-        bound = curvature_bound(start, reach, local, phases)
-        error = rounding_bound(start, reach, sizes, phases, ROUNDING)
-        value = evaluate(start, reach, local, phases, omega)[0]
-        if abs(value) <= real_horner(error, (omega - start) / reach):
+        piece = expand(whole, omega, uncertain)
+        end = min(piece.end, omega_end)
+        bound, error = curvature_bound(piece), rounding_bound(piece, ROUNDING)
+        value = evaluate(piece, omega)[0]
+        if abs(value) <= bound_at(error, piece, omega):
             return argument, value, False
         many = end - omega > 2.0 * block
         if many:
-            slow, sizes, rates, fast = _slow_terms(local, sizes, phases)
-            slow_bound = curvature_bound(start, reach, slow, rates)
-            slow_error = rounding_bound(start, reach, sizes, rates, ROUNDING)
+            slow, fast = _slow_terms(piece)
+            slow_bound, slow_error = curvature_bound(slow), rounding_bound(slow, ROUNDING)
             for k in range(fast.size):
                 slow_error[k] += fast[k]
         while omega < end:
             if many and end - omega > block:
                 turned, following, _, more = _follow(
-                    slow, rates, slow_bound, slow_error, span, omega, end, end - omega, block
+                    slow, slow_bound, slow_error, omega, end, end - omega, block
                 )
                 steps += more + 1
                 if following > omega:
-                    before = evaluate(start, reach, slow, rates, omega)[0]
-                    after = evaluate(start, reach, slow, rates, following)[0]
-                    argument -= angle_between(value, before)
-                    value = evaluate(start, reach, local, phases, following)[0]
-                    argument += turned + angle_between(value, after)
+                    argument -= angle_between(value, evaluate(slow, omega)[0])
+                    value = evaluate(piece, following)[0]
+                    argument += turned + angle_between(value, evaluate(slow, following)[0])
                     omega = following
             until = min(end, omega + block)
             turned, following, step, more = _follow(
-                local, phases, bound, error, span, omega, until, step, 0.0
+                piece, bound, error, omega, until, step, 0.0
             )
             steps += more
             if steps > MOST_STEPS:
                 return np.nan, value, True
-            value = evaluate(start, reach, local, phases, following)[0]
+            value = evaluate(piece, following)[0]
             argument += turned
             if following < until:
                 return argument, value, False
@@ -209,14 +198,7 @@ def argument_at(roots: ComplexArray, omega: float) -> float:
 
 @njit(cache=True)
 def _polish(
-    start: float,
-    reach: float,
-    local: ComplexArray,
-    phases: FloatArray,
-    bound: FloatArray,
-    bracket: tuple[float, float],
-    guess: float,
-    sign: int,
+    piece: Piece, bound: FloatArray, bracket: tuple[float, float], guess: float, sign: int
 ) -> tuple[float, complex, complex]:
     """Zero of the imaginary part in a bracket, by Newton steps kept inside it.
 
@@ -227,7 +209,7 @@ def _polish(
     omega = guess
     value, slope = 0j, 0j
     for _ in range(80):
-        value, slope = evaluate(start, reach, local, phases, omega)
+        value, slope = evaluate(piece, omega)
         if (value.imag > 0.0) == (sign > 0):
             lower = omega
         else:
@@ -240,7 +222,7 @@ def _polish(
             continue
         omega += move
         # What is left after a Newton step is at most curvature move^2 / (2 slope).
-        left = 0.5 * real_horner(bound, (upper - start) / reach) * move * move
+        left = 0.5 * bound_at(bound, piece, upper) * move * move
         if left <= 2.0 * EPSILON * upper * abs(slope.imag):
             value += slope * move
             break
@@ -303,56 +285,44 @@ def _with_zero(
 
 
 @njit(cache=True)
-def _place(
-    zeros: FloatArray,
-    start: float,
-    reach: float,
-    square: ComplexArray,
-    square_phases: FloatArray,
-    sizes: FloatArray,
-    fastest: float,
-) -> None:
-    """Turn value and slope of zeros in one piece into POSITION and SPREAD."""
-    magnitude = np.zeros(sizes.shape[1])
-    for g in range(1, sizes.shape[0]):
-        for m in range(sizes.shape[1]):
-            magnitude[m] += sizes[g, m]
+def _place(zeros: FloatArray, piece: Piece, square: Piece) -> None:
+    """Turn value and slope of zeros in one piece into POSITION and SPREAD.
+
+    `square` is the measure in the same powers.
+    """
+    fastest, magnitude = np.abs(piece.phases).max(), piece.sizes[1:].sum(axis=0)
     for zero in zeros:
-        omega = max(zero[OMEGA], start)
-        measured, change = evaluate(start, reach, square, square_phases, omega)
+        omega = max(zero[OMEGA], piece.start)
+        measured, change = evaluate(square, omega)
         part, slope = zero[POSITION], zero[SPREAD]
         zero[POSITION], zero[SPREAD] = np.nan, 0.0
         if measured.real > 0.0:
             position = part / measured.real
             steepness = (slope + abs(position) * abs(change.real)) / measured.real
             rounding = CAUTION * EPSILON * (1.0 + fastest * omega) / measured.real
-            rounding *= real_horner(magnitude, (omega - start) / reach)
+            rounding *= bound_at(magnitude, piece, omega)
             zero[POSITION], zero[SPREAD] = position, 4.0 * steepness * zero[WIDTH] + rounding
 
 
 @njit(cache=True)
 def _imaginary_bounds(
-    start: float,
-    reach: float,
-    local: ComplexArray,
-    sizes: FloatArray,
-    phases: FloatArray,
-    rounding: float,
+    piece: Piece, rounding: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Bounds on the imaginary part in a piece, as polynomials in u.
 
     On its second derivative, next to omega = 0 and everywhere; and on its rounding error, for
     which row 0 of `sizes` becomes that of the imaginary part.
     """
+    start, end, per_reach, local, sizes, phases = piece
     only = local.copy()
     for m in range(local.shape[1]):
         only[0, m] = local[0, m].imag
-        if start == 0.0 and reach == 1.0:
+        if end == np.inf:
             # The coefficients are real or imaginary: only the latter enter the imaginary part.
             sizes[0, m] = sizes[0, m] if local[0, m].imag != 0.0 else 0.0
-    everywhere = curvature_bound(start, reach, only, phases)
-    near = curvature_from_zero(reach, local, phases) if start == 0.0 else everywhere
-    return near, everywhere, rounding_bound(start, reach, sizes, phases, rounding)
+    everywhere = curvature_bound(Piece(start, end, per_reach, only, sizes, phases))
+    near = curvature_from_zero(piece) if start == 0.0 else everywhere
+    return near, everywhere, rounding_bound(piece, rounding)
 
 
 @njit(cache=True)
@@ -391,17 +361,14 @@ def imaginary_zeros(
     steps, sign, doubtful = 0, 0, True
     crawled, patience, caution = 0, 1000, 1.0
     while omega < omega_end and steps <= MOST_STEPS:
-        start, reach, end, local, sizes = piece(whole, omega)
-        end = min(end, omega_end)
-        per_reach, first = 1.0 / reach, found
-        near, everywhere, error = _imaginary_bounds(
-            start, reach, local, sizes, phases, rounding
-        )
-        value, slope = evaluate(start, reach, local, phases, omega)
+        piece, first = expand(whole, omega), found
+        start, end = piece.start, min(piece.end, omega_end)
+        near, everywhere, error = _imaginary_bounds(piece, rounding)
+        value, slope = evaluate(piece, omega)
         if omega == omega_start:
-            if abs(value.imag) > real_horner(error, (omega - start) * per_reach):
+            if abs(value.imag) > bound_at(error, piece, omega):
                 sign, doubtful = (1 if value.imag > 0.0 else -1), False
-            elif omega == 0.0 and abs(slope.imag) > error[1] * per_reach:
+            elif omega == 0.0 and abs(slope.imag) > error[1] * piece.per_reach:
                 sign, doubtful = (1 if slope.imag > 0.0 else -1), False
                 zeros = _with_zero(zeros, found, 0.0, sign, 0.0, value, slope)
                 found += 1
@@ -409,9 +376,9 @@ def imaginary_zeros(
             steps += 1
             step = min(2.0 * step, end - omega)
             bound = near if fastest * (omega + step) < 1.0 else everywhere
-            curvature = real_horner(bound, (omega + step - start) * per_reach)
+            curvature = bound_at(bound, piece, omega + step)
             if curvature > 0.0:
-                uncertain = real_horner(error, (omega - start) * per_reach)
+                uncertain = bound_at(error, piece, omega)
                 certified = _safe_step(value.imag, slope.imag, curvature, uncertain)
                 if doubtful:
                     # Nothing can be resolved here; leave the stretch, in proportion to it.
@@ -427,8 +394,8 @@ def imaginary_zeros(
                     caution, patience = 1e3, 50
             following = end if step >= end - omega else omega + step
             old_value, old_slope = value, slope
-            value, slope = evaluate(start, reach, local, phases, following)
-            doubt = caution * real_horner(error, (following - start) * per_reach)
+            value, slope = evaluate(piece, following)
+            doubt = caution * bound_at(error, piece, following)
             if abs(value.imag) <= doubt:
                 omega, doubtful = following, True
                 continue
@@ -436,20 +403,18 @@ def imaginary_zeros(
             if now != sign or doubtful:
                 jump, width = now - sign, 0.5 * (following - last_clear)
                 at = last_clear + width
-                there, rate = evaluate(start, reach, local, phases, max(at, start))
+                there, rate = evaluate(piece, max(at, start))
                 if sign == 0:
                     # At the start itself the sign was hidden.
                     at, width = omega_start, 2.0 * width
-                    there = evaluate(start, reach, local, phases, max(at, start))[0]
+                    there = evaluate(piece, max(at, start))[0]
                     jump = now if omega_start == 0.0 else 0
                 elif jump != 0 and last_clear >= start:
                     if not doubtful:
                         h, dh = (old_value.imag, value.imag), (old_slope.imag, slope.imag)
                         at = _zero_between(omega, following, h, dh)
-                    at, there, rate = _polish(
-                        start, reach, local, phases, bound, (last_clear, following), at, sign
-                    )
-                    uncertain = real_horner(error, (at - start) * per_reach)
+                    at, there, rate = _polish(piece, bound, (last_clear, following), at, sign)
+                    uncertain = bound_at(error, piece, at)
                     if abs(rate.imag) * width > uncertain:
                         width = uncertain / abs(rate.imag)
                 zeros = _with_zero(zeros, found, at, jump, width, there, rate)
@@ -460,8 +425,7 @@ def imaginary_zeros(
             zeros = _with_zero(zeros, found, omega_end, jump, width, value, slope)
             found += 1
         if found > first and measure is not None:
-            square = piece(measure, start)[3]
-            _place(zeros[first:found], start, reach, square, measure.phases, sizes, fastest)
+            _place(zeros[first:found], piece, expand(measure, start))
     return zeros[:found], omega >= omega_end
 
 
@@ -473,21 +437,18 @@ def resolved_grid(whole: CompiledSum, omega_end: float, tolerance: float) -> Flo
     zero, and the sum leaves the tangent by no more than once that, or the step is as small as
     rounding allows. The grid ends before `omega_end` if it would take more than MOST_SAMPLES.
     """
-    phases, grid = whole.phases, np.empty(1024)
-    found, omega, step = 1, 0.0, omega_end
+    grid, found, omega, step = np.empty(1024), 1, 0.0, omega_end
     grid[0] = omega
     while omega < omega_end and found < MOST_SAMPLES:
-        start, reach, end, local, _ = piece(whole, omega)
-        end = min(end, omega_end)
-        bound = curvature_bound(start, reach, local, phases)
+        piece = expand(whole, omega)
+        end, bound = min(piece.end, omega_end), curvature_bound(piece)
         while omega < end and found < MOST_SAMPLES:
-            value, slope = evaluate(start, reach, local, phases, omega)
+            value, slope = evaluate(piece, omega)
             step = min(2.0 * step, end - omega)
             smallest = max(1e-13 * omega, 1e-16 * omega_end)
             while True:
                 nearest = tangent_distance(value, slope, step)
-                u = (omega + step - start) / reach
-                left = 0.5 * real_horner(bound, u) * step * step
+                left = 0.5 * bound_at(bound, piece, omega + step) * step * step
                 moved = 0.5 * step * abs(slope)
                 if max(left, moved) <= tolerance * nearest or step <= smallest:
                     break

@@ -8,8 +8,6 @@ axis where free phases would allow one.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from armlock import contour, discs
@@ -18,10 +16,11 @@ from armlock.compiled import njit
 from armlock.exponentials import (
     ROUNDING,
     CompiledSum,
+    Piece,
+    bound_at,
     curvature_bound,
     evaluate,
-    piece,
-    real_horner,
+    expand,
     rounding_bound,
     tangent_distance,
 )
@@ -70,20 +69,17 @@ def _stays_above(
 
 @njit(cache=True)
 def _downhill(
-    curves: tuple[Any, ...], m: int, omega: float, step: float, end: float
+    n: Piece, r: Piece, m: int, omega: float, step: float, end: float
 ) -> tuple[float, float]:
-    """Follow a distance of L from -1 down to a minimum next to omega, within one piece.
+    """Follow a distance of L = N / R from -1 down to a minimum next to omega, within one piece.
 
-    `curves` are start and reach of the piece, N and its phases, R and none. Returns the
-    distance, and where.
+    Returns the distance, and where.
     """
-    start, reach, n, phases, r, none = curves
     least, shortest = np.inf, 1e-9 * step
     at = omega
     while step > shortest:
-        if start <= at <= end:
-            value = evaluate(start, reach, n, phases, at)[0]
-            here = _distance(value, evaluate(start, reach, r, none, at)[0], m)
+        if n.start <= at <= end:
+            here = _distance(evaluate(n, at)[0], evaluate(r, at)[0], m)
             if here < least:
                 omega, least = at, here
                 at = omega + step
@@ -115,19 +111,14 @@ def _walk(
     result by more than the share `tolerance` and twice what rounding may move R + N by. That is
     at most 1e-6 |R|, or 1e-6 |R - N| for the second one.
     """
-    phases, none = numerator.phases, np.zeros(0)
     best, where, here, steps = best.copy(), np.full(2, np.nan), np.zeros(2), 0
     while omega < omega_end:
         # Both pieces are the same: their polynomials are.
-        start, reach, end, n, n_sizes = piece(numerator, omega)
-        _, _, _, r, r_sizes = piece(denominator, omega)
-        end = min(end, omega_end)
-        n_bound = curvature_bound(start, reach, n, phases)
-        r_bound = curvature_bound(start, reach, r, none)
-        n_error = rounding_bound(start, reach, n_sizes, phases, ROUNDING)
-        r_error = rounding_bound(start, reach, r_sizes, none, ROUNDING)
-        value, slope = evaluate(start, reach, n, phases, omega)
-        below, change = evaluate(start, reach, r, none, omega)
+        n, r = expand(numerator, omega), expand(denominator, omega)
+        end = min(n.end, omega_end)
+        n_bound, r_bound = curvature_bound(n), curvature_bound(r)
+        n_error, r_error = rounding_bound(n, ROUNDING), rounding_bound(r, ROUNDING)
+        (value, slope), (below, change) = evaluate(n, omega), evaluate(r, omega)
         step = end - omega
         while omega < end:
             steps += 1
@@ -136,12 +127,11 @@ def _walk(
             step = min(2.0 * step, end - omega)
             while True:
                 following = end if step >= end - omega else omega + step
-                new_value, new_slope = evaluate(start, reach, n, phases, following)
-                new_below, new_change = evaluate(start, reach, r, none, following)
-                u = (following - start) / reach
-                bent = 0.5 * step * step * real_horner(r_bound, u)
-                both = 0.5 * step * step * real_horner(n_bound, u) + bent
-                error = real_horner(n_error, u) + real_horner(r_error, u)
+                new_value, new_slope = evaluate(n, following)
+                new_below, new_change = evaluate(r, following)
+                bent = 0.5 * step * step * bound_at(r_bound, r, following)
+                both = 0.5 * step * step * bound_at(n_bound, n, following) + bent
+                error = bound_at(n_error, n, following) + bound_at(r_error, r, following)
                 over, over_slope = below + value, change + slope
                 least = tangent_distance(over, over_slope, step) - both - error
                 certain = True
@@ -171,8 +161,7 @@ def _walk(
                 step *= 0.5
             for m in range(2):
                 if here[m] < best[m]:
-                    curves = start, reach, n, phases, r, none
-                    best[m], where[m] = _downhill(curves, m, following, step, end)
+                    best[m], where[m] = _downhill(n, r, m, following, step, end)
             omega, value, slope = following, new_value, new_slope
             below, change = new_below, new_change
     return best, where, True
@@ -230,7 +219,9 @@ def smallest_distances(
     numerator = loop_numerator(loop, c1, c2).compiled()
     # Its only exponential is one: the sum is all.
     denominator = loop.rest_on_boundary().compiled()
-    denominator = denominator._replace(weights=denominator.weights[:0])
+    denominator = denominator._replace(
+        weights=denominator.weights[:0], phases=denominator.phases[:0]
+    )
     lowest = _one_power_up_to(loop, c1, c2)
     # Next to the limit a walk takes short steps, unless it knows of a smaller value.
     first = FIRST_TURNS * loop.omega_per_turn

@@ -332,45 +332,48 @@ def _reach(roots: ComplexArray, starts: IntArray, omega: float) -> float:
     return shortest
 
 
-@njit(cache=True)
-def piece(
-    whole: CompiledSum, omega: float, uncertain: FloatArray | None = None
-) -> tuple[float, float, float, ComplexArray, FloatArray]:
-    """Expand an exponential sum over the piece of the axis that starts at omega.
+class Piece(NamedTuple):
+    """An exponential sum over a piece of the axis, in powers of u = (omega - start) per_reach.
 
-    Of polynomials of low degree the whole axis is one piece, with a start of zero and a reach
-    of one.
+    In a piece u goes from 0 to 1; `per_reach` is one over its length. But of polynomials of low
+    degree the whole axis is one piece, with u = omega.
 
-    Parameters
+    Attributes
     ----------
-    whole : CompiledSum
-        The sum.
-    omega : float
+    start, end : float
         In rad/s.
-    uncertain : float array, shape (polynomials,), optional
-        How far the entries of `sums` may be off. The magnitudes contain it.
-
-    Returns
-    -------
-    start, reach : float
-        In rad/s. In a piece that is not the whole axis u = (omega - start) / reach goes from 0
-        to 1.
-    end : float
-        Where the piece ends, in rad/s.
+    per_reach : float
+        In s/rad.
     local : complex array, shape (1 + groups, n)
-        The coefficients in powers of u of the sum, then of each group.
+        The coefficients of the sum, then of each group.
     sizes : float array, shape (1 + groups, n + 1)
         Magnitudes for rounding. The last column bounds the powers that are left out, over
         EPSILON: `rounding_bound` multiplies all by EPSILON and more.
+    phases : float array, shape (groups,)
+        Those of the sum.
+    """
+
+    start: float
+    end: float
+    per_reach: float
+    local: ComplexArray
+    sizes: FloatArray
+    phases: FloatArray
+
+
+@njit(cache=True)
+def expand(whole: CompiledSum, omega: float, uncertain: FloatArray | None = None) -> Piece:
+    """Expand an exponential sum over the piece of the axis that starts at omega.
+
+    `uncertain` holds how far the entries of `sums` may be off. The magnitudes contain it.
     """
     coefficients, roots, starts, leads = whole.polynomials
     weights, sums = whole.weights, whole.sums
-    start, reach, end, expanded = 0.0, 1.0, np.inf, coefficients.shape[0] == 0
+    reach, expanded = 1.0, coefficients.shape[0] == 0
     magnitudes, left_out = np.abs(coefficients), np.zeros(coefficients.shape[0])
     if expanded:
-        start, reach = omega, _reach(roots, starts, omega)
-        end = start + reach
-        coefficients, magnitudes, left_out = _from_roots(roots, starts, leads, start, reach)
+        reach = _reach(roots, starts, omega)
+        coefficients, magnitudes, left_out = _from_roots(roots, starts, leads, omega, reach)
     number, size = coefficients.shape
     groups = weights.shape[0]
     local = np.zeros((1 + groups, size), dtype=np.complex128)
@@ -387,7 +390,7 @@ def piece(
                     sizes[g, m] += magnitude * magnitudes[k, m]
                 sizes[g, size] += magnitude * left_out[k] / EPSILON
     if not expanded:
-        return start, reach, end, local, sizes
+        return Piece(0.0, np.inf, 1.0, local, sizes, whole.phases)
     # Powers that rounding hides are not worth their time.
     powers = sizes[:, :size].sum(axis=0)
     used, dropped = size, powers[size - 1]
@@ -395,20 +398,20 @@ def piece(
         used -= 1
         dropped += powers[used - 1]
     sizes[:, used] = sizes[:, size] + sizes[:, used:size].sum(axis=1) / EPSILON
-    return start, reach, end, local[:, :used].copy(), sizes[:, : used + 1].copy()
+    local, sizes = local[:, :used].copy(), sizes[:, : used + 1].copy()
+    return Piece(omega, omega + reach, 1.0 / reach, local, sizes, whole.phases)
 
 
 @njit(cache=True)
-def evaluate(
-    start: float, reach: float, local: ComplexArray, phases: FloatArray, omega: float
-) -> tuple[complex, complex]:
+def evaluate(piece: Piece, omega: float) -> tuple[complex, complex]:
     """Value and derivative of an exponential sum within a piece.
 
     Real and imaginary parts apart, since omega is real: this is the innermost loop.
     """
+    local, phases = piece.local, piece.phases
     size = local.shape[1]
-    per_reach = 1.0 / reach
-    u = (omega - start) * per_reach
+    per_reach = piece.per_reach
+    u = (omega - piece.start) * per_reach
     value_re, value_im, slope_re, slope_im = 0.0, 0.0, 0.0, 0.0
     for k in range(size - 1, -1, -1):
         slope_re = slope_re * u + value_re
@@ -453,68 +456,73 @@ def tangent_distance(value: complex, slope: complex, step: float) -> float:
 
 
 @njit(cache=True)
-def curvature_bound(
-    start: float, reach: float, local: ComplexArray, phases: FloatArray
-) -> FloatArray:
+def bound_at(bound: FloatArray, piece: Piece, omega: float) -> float:
+    """Value of a bound that is a polynomial in u."""
+    return float(real_horner(bound, (omega - piece.start) * piece.per_reach))
+
+
+@njit(cache=True)
+def curvature_bound(piece: Piece) -> FloatArray:
     """Polynomial in u that bounds the second derivative of an exponential sum in a piece.
 
     Where a polynomial is differentiated twice, |exp(j omega phase) - 1| is at most
     min(|phase| start, 2) + |phase| reach u.
     """
+    per_reach, local, phases = piece.per_reach, piece.local, piece.phases
     groups, size = local.shape
     bound = np.zeros(size)
     for k in range(2, size):
-        bound[k - 2] += abs(local[0, k]) * k * (k - 1.0) / reach**2
+        bound[k - 2] += abs(local[0, k]) * k * (k - 1.0) * per_reach**2
     for g in range(1, groups):
         phase = abs(phases[g - 1])
-        begun = min(phase * start, 2.0)
+        begun = min(phase * piece.start, 2.0)
         for k in range(size):
             magnitude = abs(local[g, k])
             bound[k] += magnitude * phase * phase
             if k >= 1:
-                bound[k - 1] += magnitude * phase * (2.0 * k + k * (k - 1.0)) / reach
+                bound[k - 1] += magnitude * phase * (2.0 * k + k * (k - 1.0)) * per_reach
             if k >= 2:
-                bound[k - 2] += magnitude * begun * k * (k - 1.0) / reach**2
+                bound[k - 2] += magnitude * begun * k * (k - 1.0) * per_reach**2
     return bound
 
 
 @njit(cache=True)
-def curvature_from_zero(reach: float, local: ComplexArray, phases: FloatArray) -> FloatArray:
+def curvature_from_zero(piece: Piece) -> FloatArray:
     """Bound the second derivative of an imaginary part, in a piece that starts at omega = 0.
 
     A polynomial in u. With c = a + j b, Im[c (exp(j x) - 1)] = a sin x + b (cos x - 1), where
     |sin x| <= x and 1 - cos x <= x^2 / 2: next to zero, where the real part may be larger by
     orders of magnitude, this bound vanishes with the imaginary part.
     """
+    per_reach, local = piece.per_reach, piece.local
     groups, size = local.shape
     bound = np.zeros(size + 2)
     for k in range(2, size):
         bound[k - 2] += abs(local[0, k].imag) * k * (k - 1.0)
     for g in range(1, groups):
-        turn = abs(phases[g - 1]) * reach
+        turn = abs(piece.phases[g - 1]) / per_reach
         for k in range(size):
             a, b = abs(local[g, k].real), abs(local[g, k].imag)
             if k >= 1:
                 bound[k - 1] += a * turn * k * (k + 1.0)
             bound[k + 1] += a * turn**3
             bound[k] += b * turn**2 * (0.5 * k * (k - 1.0) + 2.0 * k + 1.0)
-    return bound / reach**2
+    return bound * per_reach**2
 
 
 @njit(cache=True)
-def rounding_bound(
-    start: float, reach: float, sizes: FloatArray, phases: FloatArray, rounding: float
-) -> FloatArray:
+def rounding_bound(piece: Piece, rounding: float) -> FloatArray:
     """Polynomial in u that bounds the rounding error of an exponential sum in a piece.
 
     A group counts with |phase| omega, which bounds |exp(j omega phase) - 1|.
     """
+    sizes = piece.sizes
     groups, size = sizes.shape
     bound = np.zeros(size + 1)
     for k in range(size):
         bound[k] += rounding * EPSILON * sizes[0, k]
         for g in range(1, groups):
-            error = rounding * EPSILON * sizes[g, k] * abs(phases[g - 1])
-            bound[k] += error * start
-            bound[k + 1] += error * reach
+            error = rounding * EPSILON * sizes[g, k] * abs(piece.phases[g - 1])
+            bound[k] += error * piece.start
+            bound[k + 1] += error / piece.per_reach
     return bound

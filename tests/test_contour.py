@@ -132,28 +132,27 @@ def random_sum(degree, rng):
 @pytest.mark.parametrize("omega", [0.0, 0.03, 2.0, 3e4])
 def test_a_piece_holds_a_sum_and_bounds_what_it_leaves_out(degree, omega):
     whole, exact = random_sum(degree, np.random.default_rng(degree))
-    start, reach, end, local, sizes = exponentials.piece(whole.compiled(), omega)
-    rounding = exponentials.rounding_bound(start, reach, sizes, whole.phases, 8.0)
-    bends = [exponentials.curvature_bound(start, reach, local, whole.phases)]
+    piece = exponentials.expand(whole.compiled(), omega)
+    rounding = exponentials.rounding_bound(piece, 8.0)
+    bends = [exponentials.curvature_bound(piece)]
     if omega == 0.0:
-        bends.append(exponentials.curvature_from_zero(reach, local, whole.phases))
-    length = min(end - omega, 0.5)
+        bends.append(exponentials.curvature_from_zero(piece))
+    length = min(piece.end - omega, 0.5)
     with mpmath.workdps(40):
         # A piece is divided by a power of two.
         at = omega + length
-        found = exponentials.evaluate(start, reach, local, whole.phases, at)[0]
+        found = exponentials.evaluate(piece, at)[0]
         unit = 2.0 ** round(float(mpmath.log(abs(exact(at) / found), 2)))
         for share in (0.01, 0.4, 1.0):
             at = omega + share * length
-            u = (at - start) / reach
-            value, slope = exponentials.evaluate(start, reach, local, whole.phases, at)
-            error = exponentials.real_horner(rounding, u)
+            value, slope = exponentials.evaluate(piece, at)
+            error = exponentials.bound_at(rounding, piece, at)
             assert abs(value - exact(at) / unit) <= error
             changes = [mpmath.diff(exact, at, n) / unit for n in (1, 2)]
-            assert abs(slope - changes[0]) <= 1e3 * error / reach + 1e-9 * abs(slope)
+            assert abs(slope - changes[0]) <= 1e3 * error * piece.per_reach + 1e-9 * abs(slope)
             sizes = abs(changes[1]), abs(changes[1].imag)
             for size, bend in zip(sizes, bends, strict=False):
-                assert size <= exponentials.real_horner(bend, u) * (1.0 + 1e-6)
+                assert size <= exponentials.bound_at(bend, piece, at) * (1.0 + 1e-6)
 
 
 def test_the_last_frequency_is_close_to_where_one_term_outgrows_the_others():
