@@ -14,7 +14,7 @@ from armlock.bounds import last_frequency
 from armlock.checks import IntArray, positive_number
 from armlock.contour import winding
 from armlock.free_phases import clear_above, count_at
-from armlock.loops import Loop, checked_loop
+from armlock.loops import Loop, LoopAt, checked_loop
 from armlock.rays import Ray
 from armlock.stability import BOUNDARY, UNCONFINED
 
@@ -84,7 +84,7 @@ def box_counts(loop: Loop, size: float, free_above: float | None = None) -> IntA
         else:
             half *= 0.5
             left += [(c1 + half * d1, c2 + half * d2, half) for d1, d2 in CORNERS]
-    return np.full(clear, count_at(loop, 1.0, 1.0, highest))
+    return np.full(clear, count_at(LoopAt(loop, 1.0, 1.0), highest))
 
 
 def edge_crossings(loop: Loop, size: float, free_above: float | None = None) -> int:
@@ -146,7 +146,7 @@ def _end_of_walks(loop: Loop, size: float, free_above: float | None) -> float | 
     if free_above is None:
         return math.inf
     highest = positive_number("free_above", free_above)
-    return highest if clear_above(loop, 1.0 + size, 1.0 + size, highest) else None
+    return highest if clear_above(LoopAt(loop, 1.0 + size, 1.0 + size), highest) else None
 
 
 def _stays_clear(loop: Loop, c1: float, c2: float, half: float, highest: float) -> bool:

@@ -26,7 +26,7 @@ from armlock.free_phases import (
     polynomial_sum,
     search_outwards,
 )
-from armlock.loops import Loop, loop_numerator
+from armlock.loops import LoopAt
 from armlock.stability import polished, sign_changes
 
 #: Relative accuracy of |L| at a crossover, and of a phase margin that L has at high frequency.
@@ -50,46 +50,44 @@ def axis_zeros(
     return omega[~hidden & (omega > 0.0)], stretches[:, stretches[0] > 0.0]
 
 
-def _on_unit_circle(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArray:
+def _on_unit_circle(point: LoopAt, omega: FloatArray) -> FloatArray:
     """Move frequencies next to crossovers to where |L|, from its factors, is one."""
     # Far less than the distance between two nulls of an arm.
-    longest = 0.01 / loop.longest_delay
+    longest = 0.01 / point.loop.longest_delay
     reaches = [np.minimum(10.0**power * omega, longest) for power in range(-13, 0)]
-    return polished(lambda at: _log_size(loop, c1, c2, at), omega, reaches)
+    return polished(lambda at: _log_size(point, at), omega, reaches)
 
 
-def _log_size(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArray:
+def _log_size(point: LoopAt, omega: FloatArray) -> FloatArray:
     """Return ln |L|."""
-    return np.asarray(np.log(np.abs(loop.open_loop(1j * omega, c1, c2))))
+    return np.asarray(np.log(np.abs(point.response(omega))))
 
 
 def _crossovers(
-    loop: Loop, c1: float, c2: float, squares: ExponentialSum, intervals: npt.ArrayLike
+    point: LoopAt, squares: ExponentialSum, intervals: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray]:
     """Frequencies with |L| = 1 on intervals of the axis, and stretches that may hide some.
 
     As `axis_zeros` returns them. `squares` is |N|^2 - |R|^2, with L = N / R.
     """
     omega, hidden = axis_zeros(squares.turned(), intervals)
-    far = np.abs(_log_size(loop, c1, c2, omega)) > TOLERANCE
-    moved = _on_unit_circle(loop, c1, c2, omega[far])
-    lost = moved[np.abs(_log_size(loop, c1, c2, moved)) > TOLERANCE]
+    far = np.abs(_log_size(point, omega)) > TOLERANCE
+    moved = _on_unit_circle(point, omega[far])
+    lost = moved[np.abs(_log_size(point, moved)) > TOLERANCE]
     if lost.size:
-        raise no_margin(c1, c2, f"rounding hides where |L| comes to one around {lost[0]} rad/s")
+        raise no_margin(point, f"rounding hides where |L| comes to one around {lost[0]} rad/s")
     omega[far] = moved
     return omega, hidden
 
 
-def _least_lags(
-    loop: Loop, c1: float, c2: float, omega: FloatArray
-) -> tuple[float, float, float]:
+def _least_lags(point: LoopAt, omega: FloatArray) -> tuple[float, float, float]:
     """Smallest phase margin in rad, smallest delay margin in s, and where the former is taken.
 
     Of crossovers at given frequencies; inf, inf and nan if there are none.
     """
 
     def lags(at: FloatArray) -> tuple[FloatArray, FloatArray]:
-        lag = np.mod(np.angle(loop.open_loop(1j * at, c1, c2)) + np.pi, 2.0 * np.pi)
+        lag = np.mod(np.angle(point.response(at)) + np.pi, 2.0 * np.pi)
         # A lag turns L clockwise; a lead may reach -1 sooner.
         return lag, np.minimum(lag, 2.0 * np.pi - lag)
 
@@ -97,30 +95,29 @@ def _least_lags(
         return np.inf, np.inf, np.nan
     lag, near = lags(omega)
     chosen = np.concatenate((np.argsort(near)[:_POLISHED], np.argsort(lag / omega)[:_POLISHED]))
-    at = _on_unit_circle(loop, c1, c2, omega[np.unique(chosen)])
+    at = _on_unit_circle(point, omega[np.unique(chosen)])
     lag, near = lags(at)
     worst = int(np.argmin(near))
     return float(near[worst]), float(np.min(lag / at)), float(at[worst])
 
 
-def crossovers_end(
-    loop: Loop, c1: float, c2: float, weights: FloatArray, phase: float
-) -> float:
+def crossovers_end(point: LoopAt, weights: FloatArray, phase: float) -> float:
     """Frequency in rad/s past which no crossover has a smaller phase margin than a number.
 
     `weights` are those of `last_crossover`, past which |L| is below one.
     """
-    last = last_crossover(loop, weights)
-    return last if np.isfinite(last) else _settled_from(loop, c1, c2, phase)
+    last = last_crossover(point.loop, weights)
+    return last if np.isfinite(last) else _settled_from(point, phase)
 
 
-def _settled_from(loop: Loop, c1: float, c2: float, phase: float) -> float:
+def _settled_from(point: LoopAt, phase: float) -> float:
     """Frequency in rad/s past which a neutral loop has no smaller phase margin than a number.
 
     Smaller means by more than the share TOLERANCE. Past it the disc of L is so close to its
     limit that what it may hold of the unit circle comes no closer to -1.
     """
-    centre, radius = limit_disc(loop, c1, c2)
+    loop, c1, c2 = point
+    centre, radius = limit_disc(point)
 
     def phase_within(slack: float) -> float:
         limit = discs.free_margins_at(complex(centre), radius + slack, np.inf)
@@ -140,9 +137,7 @@ def _settled_from(loop: Loop, c1: float, c2: float, phase: float) -> float:
     return last_larger(loop.rest, (left[0], left[1]), weights / slack)
 
 
-def phase_and_delay(
-    loop: Loop, c1: float, c2: float, highest: float
-) -> tuple[float, float, float]:
+def phase_and_delay(point: LoopAt, highest: float) -> tuple[float, float, float]:
     """Phase margin in rad, delay margin in s, and the frequency of the former, in rad/s.
 
     Of crossovers up to the frequency `highest`, which is inf unless phases are free above it.
@@ -152,31 +147,31 @@ def phase_and_delay(
     """
     phase, delay, where = np.inf, np.inf, np.nan
     if not np.isfinite(highest):
-        limit = limit_margins(loop, c1, c2)
+        limit = limit_margins(point)
         phase, delay = float(limit[discs.PHASE]), float(limit[discs.DELAY])
         where = np.inf if np.isfinite(phase) else np.nan
-    end = crossovers_end(loop, c1, c2, arm_weights(loop, c1, c2), phase)
-    above, below = loop_numerator(loop, c1, c2), loop.rest_on_boundary()
+    end = crossovers_end(point, arm_weights(point), phase)
+    above, below = point.numerator(), point.loop.rest_on_boundary()
     squares = above.times_conjugate(above).plus(below.times_conjugate(below).scaled(-1.0))
 
     def meeting(span: tuple[float, float]) -> FloatArray:
-        return meeting_intervals(loop, c1, c2, span, levels=(0.0, 0.0, phase, delay))
+        return meeting_intervals(point, span, levels=(0.0, 0.0, phase, delay))
 
     def likely(omega: FloatArray) -> FloatArray:
-        return least_at(loop, c1, c2, omega, slice(discs.PHASE, None))
+        return least_at(point, omega, slice(discs.PHASE, None))
 
     def look(intervals: FloatArray) -> None:
         nonlocal phase, delay, where
-        omega, hidden = _crossovers(loop, c1, c2, squares, intervals)
-        found = _least_lags(loop, c1, c2, omega)
-        perhaps = _least_lags(loop, c1, c2, hidden.ravel())
+        omega, hidden = _crossovers(point, squares, intervals)
+        found = _least_lags(point, omega)
+        perhaps = _least_lags(point, hidden.ravel())
         if perhaps[0] < min(phase, found[0]) or perhaps[1] < min(delay, found[1]):
             raise no_margin(
-                c1, c2, f"rounding hides whether |L| comes to one around {perhaps[2]} rad/s"
+                point, f"rounding hides whether |L| comes to one around {perhaps[2]} rad/s"
             )
         if found[0] < phase:
             phase, where = found[0], found[2]
         delay = min(delay, found[1])
 
-    search_outwards(loop.omega_per_turn, look, lambda: min(end, highest), meeting, likely)
+    search_outwards(point.loop.omega_per_turn, look, lambda: min(end, highest), meeting, likely)
     return phase, delay, where

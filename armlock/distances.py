@@ -35,7 +35,7 @@ from armlock.free_phases import (
     search_outwards,
     unconfined,
 )
-from armlock.loops import Loop, leading_radius, loop_numerator
+from armlock.loops import LoopAt
 
 #: Relative accuracy of the smallest distances, and so of modulus and disk margins.
 TOLERANCE = 1e-6
@@ -168,24 +168,24 @@ def _walk(
 
 
 def smallest_distances(
-    loop: Loop, c1: float, c2: float, *, disk: bool, highest: float = np.inf
+    point: LoopAt, *, disk: bool, highest: float = np.inf
 ) -> tuple[FloatArray, FloatArray]:
     """Smallest |1 + L| and |1 + L| / |1 - L| up to a frequency, the limit included; and where.
 
     `highest` and the places are in rad/s, a place is inf for the limit at high frequency. The
     second distance is one if no smaller one occurs, and zero unless `disk` asks for it.
     """
-    best = limit_margins(loop, c1, c2)[:2]
+    best = limit_margins(point)[:2]
     best[discs.RATIO] = min(best[discs.RATIO], 1.0) if disk else 0.0
     where = np.full(2, np.inf)
 
     def end() -> float:
         """Frequency past which nothing is smaller, or `highest`."""
-        return min(no_smaller_from(loop, weights, (1.0 - TOLERANCE) * best), highest)
+        return min(no_smaller_from(point.loop, weights, (1.0 - TOLERANCE) * best), highest)
 
     def improve(omega: FloatArray) -> None:
         """Take the smallest distances at given frequencies if they are smaller."""
-        response = loop.open_loop(1j * omega, c1, c2)
+        response = point.response(omega)
         with np.errstate(divide="ignore"):
             distances = np.abs(1.0 + response) / [np.ones(omega.size), np.abs(1.0 - response)]
         for m, nearest in enumerate(np.argmin(distances, axis=1)):
@@ -194,10 +194,10 @@ def smallest_distances(
 
     def meeting(span: tuple[float, float]) -> FloatArray:
         modulus, ratio = (1.0 - TOLERANCE) * best
-        return meeting_intervals(loop, c1, c2, span, levels=(modulus, ratio, 0.0, 0.0))
+        return meeting_intervals(point, span, levels=(modulus, ratio, 0.0, 0.0))
 
     def likely(omega: FloatArray) -> FloatArray:
-        return least_at(loop, c1, c2, omega, slice(discs.PHASE))
+        return least_at(point, omega, slice(discs.PHASE))
 
     def look(intervals: FloatArray) -> None:
         nonlocal best, where
@@ -210,34 +210,34 @@ def smallest_distances(
                 )
                 if not complete:
                     why = f"following it takes more than {contour.MOST_STEPS:.0e} steps"
-                    raise no_margin(c1, c2, f"rounding hides L, or {why}")
+                    raise no_margin(point, f"rounding hides L, or {why}")
                 best, where = found, np.where(np.isnan(places), where, places)
 
-    weights = arm_weights(loop, c1, c2)
+    weights = arm_weights(point)
     if not np.isfinite(end()):
-        raise unconfined(c1, c2)
-    numerator = loop_numerator(loop, c1, c2).compiled()
+        raise unconfined(point)
+    numerator = point.numerator().compiled()
     # Its only exponential is one: the sum is all.
-    denominator = loop.rest_on_boundary().compiled()
+    denominator = point.loop.rest_on_boundary().compiled()
     denominator = denominator._replace(
         weights=denominator.weights[:0], phases=denominator.phases[:0]
     )
-    lowest = _one_power_up_to(loop, c1, c2)
+    lowest = _one_power_up_to(point)
     # Next to the limit a walk takes short steps, unless it knows of a smaller value.
-    first = FIRST_TURNS * loop.omega_per_turn
+    first = FIRST_TURNS * point.loop.omega_per_turn
     improve(np.geomspace(lowest, max(min(first, end()), lowest), 2000))
-    search_outwards(loop.omega_per_turn, look, end, meeting, likely)
+    search_outwards(point.loop.omega_per_turn, look, end, meeting, likely)
     return best, where
 
 
-def _one_power_up_to(loop: Loop, c1: float, c2: float) -> float:
+def _one_power_up_to(point: LoopAt) -> float:
     """Frequency in rad/s up to which no margin is taken.
 
     L is one power of s there, up to a part in ten million; or its magnitude is above 1e7.
     """
-    radius = leading_radius(loop, c1, c2)
+    radius = point.leading_radius()
     lowest, higher = 1e-4 * radius, 1e-2 * radius
-    size = abs(complex(loop.open_loop(1j * higher, c1, c2)))
-    if size > 1e7 and abs(complex(loop.open_loop(1j * lowest, c1, c2))) > 0.9 * size:
+    size = abs(complex(point.response(higher)))
+    if size > 1e7 and abs(complex(point.response(lowest))) > 0.9 * size:
         return higher
     return lowest

@@ -19,7 +19,7 @@ from numpy.polynomial import polynomial as poly
 from armlock import contour, discs
 from armlock.bounds import last_larger
 from armlock.checks import ComplexArray, FloatArray, IntArray
-from armlock.loops import Loop
+from armlock.loops import Loop, LoopAt
 from armlock.stability import CountError, unstable_roots
 
 # A distance of L from -1 below it is as good as none.
@@ -45,27 +45,25 @@ def limit_responses(loop: Loop) -> tuple[float, float]:
     return first, second
 
 
-def limit_disc(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
+def limit_disc(point: LoopAt) -> tuple[float, float]:
     """Centre and radius of the disc that L fills at high frequency, all phases being free."""
-    first, second = limit_responses(loop)
-    radius = abs(c1 * first) + abs(c2 * second)
-    if loop.delay:
+    first, second = limit_responses(point.loop)
+    radius = abs(point.c1 * first) + abs(point.c2 * second)
+    if point.loop.delay:
         return 0.0, abs(first + second) + radius
     return first + second, radius
 
 
-def free_disc(
-    loop: Loop, c1: float, c2: float, omega: FloatArray
-) -> tuple[ComplexArray, FloatArray]:
+def free_disc(point: LoopAt, omega: FloatArray) -> tuple[ComplexArray, FloatArray]:
     """Centres and radii of the discs that L fills at frequencies, both arms' phases free.
 
     `armlock.discs` has the same, with the phase between the arms where it is known.
     """
-    first, second = loop.arm_responses(1j * omega)
-    return first + second, np.abs(c1 * first) + np.abs(c2 * second)
+    first, second = point.loop.arm_responses(1j * omega)
+    return first + second, np.abs(point.c1 * first) + np.abs(point.c2 * second)
 
 
-def limit_margins(loop: Loop, c1: float, c2: float) -> FloatArray:
+def limit_margins(point: LoopAt) -> FloatArray:
     """Margins of the disc that L fills at high frequency.
 
     In the order of `discs.free_margins_at`: modulus, ratio, phase in rad, delay in s.
@@ -75,33 +73,34 @@ def limit_margins(loop: Loop, c1: float, c2: float) -> FloatArray:
     CountError
         If the disc holds -1: the neutral root chain is not confined.
     """
-    centre, radius = limit_disc(loop, c1, c2)
+    centre, radius = limit_disc(point)
     found: FloatArray = discs.free_margins_at(complex(centre), radius, np.inf)
     if not found[discs.MODULUS] > 0.0:
-        raise unconfined(c1, c2)
+        raise unconfined(point)
     if abs(centre) + radius >= 1.0:
         # L does not roll off: any delay more destabilises it at high frequency.
         found[discs.DELAY] = 0.0
     return found
 
 
-def unconfined(c1: float, c2: float) -> CountError:
+def unconfined(point: LoopAt) -> CountError:
     """Return the error of a loop that has no margins, because its chain is not confined."""
-    return no_margin(c1, c2, "the neutral root chain is not confined to the left half-plane")
+    return no_margin(point, "the neutral root chain is not confined to the left half-plane")
 
 
-def no_margin(c1: float, c2: float, why: str) -> CountError:
+def no_margin(point: LoopAt, why: str) -> CountError:
     """Return the error of a margin that cannot be certified."""
-    at = f"(c1, c2) = ({c1}, {c2})"
-    return CountError(f"no margin at {at}: {why}", np.array([[c1, c2]]))
+    _, c1, c2 = point
+    return CountError(f"no margin at (c1, c2) = ({c1}, {c2}): {why}", np.array([[c1, c2]]))
 
 
-def arm_weights(loop: Loop, c1: float, c2: float) -> FloatArray:
+def arm_weights(point: LoopAt) -> FloatArray:
     """Return the weights of the arms' phases: |c1| and |c2|, or one of both arms, and 0.
 
     Two arms act as one if their delays are equal and their responses proportional. Phases that
     are free of each other never do.
     """
+    loop, c1, c2 = point
     if loop.tau1 == loop.tau2 and loop.b1.any():
         ratio = float(loop.b2[-1] / loop.b1[-1])
         if np.array_equal(loop.b2, ratio * loop.b1):
@@ -168,16 +167,15 @@ def _factors(loop: Loop) -> tuple[ComplexArray, IntArray, FloatArray]:
     )
 
 
-def arms_of(loop: Loop, c1: float, c2: float, *, free: bool = False) -> discs.Arms:
+def arms_of(point: LoopAt, *, free: bool = False) -> discs.Arms:
     """Return the arms of a loop. If `free`, both phases are free at all frequencies."""
+    loop, c1, c2 = point
     apart = np.nan if free else loop.tau2 - loop.tau1
     return discs.Arms(*_factors(loop), float(c1), float(c2), apart, loop.delay)
 
 
 def meeting_intervals(
-    loop: Loop,
-    c1: float,
-    c2: float,
+    point: LoopAt,
     span: tuple[float, float],
     *,
     segment: tuple[float, ...] = (),
@@ -190,26 +188,24 @@ def meeting_intervals(
     With `free`, as for `arms_of`, they hold for all smaller |c1| and |c2|, too.
     """
     found: FloatArray = discs.intervals_not_clear(
-        arms_of(loop, c1, c2, free=free),
+        arms_of(point, free=free),
         np.array(segment),
         np.array(levels),
         span,
-        loop.omega_per_turn,
+        point.loop.omega_per_turn,
     )
     return found
 
 
-def crossing_intervals(
-    loop: Loop, c1: float, c2: float, span: tuple[float, float]
-) -> FloatArray:
+def crossing_intervals(point: LoopAt, span: tuple[float, float]) -> FloatArray:
     """Intervals of a span outside which no phases, and no smaller |c1|, |c2|, take L to -1."""
     levels = (_TOUCHING, 0.0, 0.0, 0.0)
-    return meeting_intervals(loop, c1, c2, span, levels=levels, free=True)
+    return meeting_intervals(point, span, levels=levels, free=True)
 
 
-def least_at(loop: Loop, c1: float, c2: float, omega: FloatArray, margins: slice) -> FloatArray:
+def least_at(point: LoopAt, omega: FloatArray, margins: slice) -> FloatArray:
     """Return at which of some frequencies each of some margins of the disc is smallest."""
-    found: FloatArray = discs.free_margins_over(arms_of(loop, c1, c2), omega)
+    found: FloatArray = discs.free_margins_over(arms_of(point), omega)
     nearest: FloatArray = omega[np.argmin(found[:, margins], axis=0)]
     return nearest
 
@@ -259,33 +255,33 @@ def search_outwards(
             break
 
 
-def clear_above(loop: Loop, c1: float, c2: float, free_above: float) -> bool:
+def clear_above(point: LoopAt, free_above: float) -> bool:
     """Whether no phases above a frequency take L to -1, for parameters of up to these sizes."""
-    end = clear_from(loop, np.abs([c1, c2]), -1.0, 0.0)
+    end = clear_from(point.loop, np.abs(point[1:]), -1.0, 0.0)
     if not np.isfinite(end):
         return False
     if end <= free_above:
         return True
     least = np.array([_TOUCHING, 0.0, 0.0, 0.0])
     nearest, _, complete = discs.free_margins(
-        arms_of(loop, c1, c2, free=True), free_above, end, least, np.zeros(4)
+        arms_of(point, free=True), free_above, end, least, np.zeros(4)
     )
     return bool(complete) and nearest[discs.MODULUS] == _TOUCHING
 
 
-def count_at(loop: Loop, c1: float, c2: float, free_above: float) -> int:
+def count_at(point: LoopAt, free_above: float) -> int:
     """Count the unstable roots as `unstable_roots` does.
 
     It takes less time where no phases above the frequency `free_above`, in rad/s, matter.
     """
-    if np.isfinite(free_above) and clear_above(loop, c1, c2, free_above):
-        count = _count_below(loop, c1, c2, free_above)
+    if np.isfinite(free_above) and clear_above(point, free_above):
+        count = _count_below(point, free_above)
         if count is not None:
             return count
-    return int(unstable_roots(loop, c1, c2))
+    return int(unstable_roots(*point))
 
 
-def _count_below(loop: Loop, c1: float, c2: float, omega: float) -> int | None:
+def _count_below(point: LoopAt, omega: float) -> int | None:
     """Count the unstable roots of a loop that no phases of the arms let cross past omega.
 
     D(s; c1, c2) is compared with D at a thousandth of c1 and c2, which takes little time. Past
@@ -294,6 +290,7 @@ def _count_below(loop: Loop, c1: float, c2: float, omega: float) -> int | None:
     rounding hides one of the two.
     """
     # Not zero: sensors with an integrator have a root at s = 0 there.
+    loop, c1, c2 = point
     low1, low2 = 1e-3 * c1, 1e-3 * c2
     parts = [loop.at(c1, c2), loop.at(low1, low2)]
     arguments, values = [], []
@@ -310,11 +307,11 @@ def _count_below(loop: Loop, c1: float, c2: float, omega: float) -> int | None:
     return round(count) if below >= 0 and abs(count - round(count)) < 1e-3 else None
 
 
-def require_stable(loop: Loop, c1: float, c2: float, free_above: float = np.inf) -> None:
+def require_stable(point: LoopAt, free_above: float = np.inf) -> None:
     """Raise unless all roots of D lie in the open left half-plane, hidden modes included."""
-    count = count_at(loop, c1, c2, free_above)
+    count = count_at(point, free_above)
     if count != 0:
         raise ValueError(
-            f"the loop must be stable at (c1, c2) = ({c1}, {c2}) to have margins, but "
+            f"the loop must be stable at (c1, c2) = {point[1:]} to have margins, but "
             f"unstable_roots gives {count}"
         )

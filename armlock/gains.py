@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import elementwise
 
 from armlock.bounds import last_larger, last_root_bound
-from armlock.checks import FloatArray, real_number
+from armlock.checks import FloatArray
 from armlock.crossovers import axis_zeros
 from armlock.free_phases import (
     arm_weights,
@@ -27,7 +27,7 @@ from armlock.free_phases import (
     require_stable,
     search_outwards,
 )
-from armlock.loops import Loop, checked_loop, loop_numerator
+from armlock.loops import Loop, LoopAt
 from armlock.stability import unstable_roots
 
 #: Gain factors up to this, and down to one over it, are looked at.
@@ -36,26 +36,27 @@ LARGEST_GAIN = 1e6
 _NEXT_TO_THE_CHAIN = 1e-5
 
 
-def _chain_gains(loop: Loop, c1: float, c2: float) -> tuple[float, float]:
+def _chain_gains(point: LoopAt) -> tuple[float, float]:
     """Gain factors around one between which the neutral root chain is confined.
 
     A factor k multiplies the disc of L at high frequency; the chain is confined while that
     stays clear of -1.
     """
-    centre, radius = limit_disc(loop, c1, c2)
+    centre, radius = limit_disc(point)
     limits = [-1.0 / end for end in (centre - radius, centre + radius) if end < 0.0]
     lower = max((k for k in limits if k < 1.0), default=0.0)
     return lower, min((k for k in limits if k > 1.0), default=np.inf)
 
 
-def _no_crossing_from(loop: Loop, c1: float, c2: float, low: float, high: float) -> float:
+def _no_crossing_from(point: LoopAt, low: float, high: float) -> float:
     """Frequency in rad/s past which no gain factor of a range takes a root across the axis.
 
     With t = 1 / k from 1 / high to 1 / low, and C = B1 + B2, |t R + C| must exceed
     |c1 B1| + |c2 B2|. Its square is convex in t. If it ascends at the lower end of the
     interval, it is smallest there; if it descends at the upper end, there.
     """
-    c, arms = polynomial_sum(loop.b1, loop.b2), arm_weights(loop, c1, c2)
+    loop, arms = point.loop, arm_weights(point)
+    c = polynomial_sum(loop.b1, loop.b2)
     found = [last_crossover(loop, arms, high)]
     if not loop.delay:
         for t, sign in ((1.0 / high, 1.0), (1.0 / low, -1.0)):
@@ -72,29 +73,29 @@ def _ascent(rest: FloatArray, c: FloatArray, t: float, sign: float) -> FloatArra
     return np.asarray(sign * product * (-1.0) ** np.arange(product.size))
 
 
-def _gains(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArray:
+def _gains(point: LoopAt, omega: FloatArray) -> FloatArray:
     """Gain factors that take a root to the axis at frequencies."""
     with np.errstate(divide="ignore"):
-        return np.asarray(-1.0 / loop.open_loop(1j * omega, c1, c2).real)
+        return np.asarray(-1.0 / point.response(omega).real)
 
 
-def _real_within(loop: Loop, c1: float, c2: float, stretches: FloatArray) -> FloatArray:
+def _real_within(point: LoopAt, stretches: FloatArray) -> FloatArray:
     """Where L, from its factors, is real within stretches that may hide it, in rad/s."""
 
     def imaginary(omega: FloatArray) -> FloatArray:
-        return np.asarray(loop.open_loop(1j * omega, c1, c2).imag)
+        return np.asarray(point.response(omega).imag)
 
     lower, upper = stretches[:-1].ravel(), stretches[1:].ravel()
     changes = imaginary(lower) * imaginary(upper) < 0.0
     return np.asarray(elementwise.find_root(imaginary, (lower[changes], upper[changes])).x)
 
 
-def _free_gains(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArray:
+def _free_gains(point: LoopAt, omega: FloatArray) -> FloatArray:
     """Gain factors next to one, below and above, for some phases; shape (omega, 2).
 
     They belong to the ends of what the disc of L covers of the negative real axis.
     """
-    centre, radius = free_disc(loop, c1, c2, omega)
+    centre, radius = free_disc(point, omega)
     with np.errstate(invalid="ignore", divide="ignore"):
         half = np.sqrt(radius**2 - centre.imag**2)
         factors = -1.0 / np.column_stack((centre.real + half, centre.real - half))
@@ -103,15 +104,13 @@ def _free_gains(loop: Loop, c1: float, c2: float, omega: FloatArray) -> FloatArr
     return np.column_stack((lower, upper))
 
 
-def _gains_around_one(
-    loop: Loop, c1: float, c2: float, least: float, most: float
-) -> tuple[float, float, float]:
+def _gains_around_one(point: LoopAt, least: float, most: float) -> tuple[float, float, float]:
     """Gain factors next to one that take a root to the axis, and where the upper one does.
 
     The frequency is in rad/s; `least`, `most` and nan where there are none between these two.
     """
-    arms = arm_weights(loop, c1, c2)
-    crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
+    loop, arms = point.loop, arm_weights(point)
+    crossing = point.numerator().times_conjugate(loop.rest_on_boundary())
     lower, upper, where = least, most, np.nan
     hidden: list[FloatArray] = []
 
@@ -121,21 +120,21 @@ def _gains_around_one(
             clear_from(loop, arms, -0.5 * (1.0 / k + 1.0), 0.5 * abs(1.0 - 1.0 / k))
             for k in (lower, upper)
         )
-        return min(clear, _no_crossing_from(loop, c1, c2, lower, upper))
+        return min(clear, _no_crossing_from(point, lower, upper))
 
     def meeting(span: tuple[float, float]) -> FloatArray:
-        return meeting_intervals(loop, c1, c2, span, segment=(-1.0 / upper, -1.0 / lower))
+        return meeting_intervals(point, span, segment=(-1.0 / upper, -1.0 / lower))
 
     def likely(omega: FloatArray) -> FloatArray:
-        free = _free_gains(loop, c1, c2, omega)
+        free = _free_gains(point, omega)
         return omega[[np.argmax(free[:, 0]), np.argmin(free[:, 1])]]
 
     def look(intervals: FloatArray) -> None:
         nonlocal lower, upper, where
         omega, stretches = axis_zeros(crossing, intervals)
-        omega = np.concatenate((omega, _real_within(loop, c1, c2, stretches)))
-        hidden.append(_gains(loop, c1, c2, stretches.ravel()))
-        factor = _gains(loop, c1, c2, omega)
+        omega = np.concatenate((omega, _real_within(point, stretches)))
+        hidden.append(_gains(point, stretches.ravel()))
+        factor = _gains(point, omega)
         below = factor[(factor >= lower) & (factor <= 1.0)]
         lower = float(below.max(initial=lower))
         above = np.flatnonzero((factor > 1.0) & (factor <= upper))
@@ -146,21 +145,20 @@ def _gains_around_one(
     search_outwards(loop.omega_per_turn, look, end, meeting, likely)
     hidden_gains = np.concatenate(hidden)
     if ((hidden_gains > lower) & (hidden_gains < upper)).any():
-        _require_stable_inside(loop, c1, c2, lower, upper)
+        _require_stable_inside(point, lower, upper)
     return lower, upper, where
 
 
-def _require_stable_inside(
-    loop: Loop, c1: float, c2: float, lower: float, upper: float
-) -> None:
+def _require_stable_inside(point: LoopAt, lower: float, upper: float) -> None:
     """Raise if a count just inside two gain factors says that the loop is unstable there."""
+    loop, c1, c2 = point
     rest = loop.polynomials()[0]
     for factor in (lower * (1.0 + 1e-6), upper * (1.0 - 1e-6)):
         scaled = rest._replace(coefficients=rest.coefficients / factor)
         count = int(unstable_roots(loop.changed(rest=scaled), c1, c2))
         if count > 0:
             at = f"the count at {factor} times the gain is {count}"
-            raise no_margin(c1, c2, f"rounding hides a crossing, for {at}")
+            raise no_margin(point, f"rounding hides a crossing, for {at}")
 
 
 def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float]:
@@ -212,25 +210,25 @@ def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float
     >>> print(f"{upper:.2f}")
     29.58
     """
-    checked_loop(loop)
-    c1, c2 = real_number("c1", c1), real_number("c2", c2)
-    require_stable(loop, c1, c2)
-    return gain_interval_of_stable(loop, c1, c2)
+    point = LoopAt.of(loop, c1, c2)
+    require_stable(point)
+    return gain_interval_of_stable(point)
 
 
-def gain_interval_of_stable(loop: Loop, c1: float, c2: float) -> tuple[float, float, float]:
+def gain_interval_of_stable(point: LoopAt) -> tuple[float, float, float]:
     """Do what `gain_interval` does for a loop that is known to be stable."""
-    floor, limit = _chain_gains(loop, c1, c2)
+    floor, limit = _chain_gains(point)
     # Just inside the limits of the chain, roots cross at ever higher frequency.
     least = max(floor * (1.0 + _NEXT_TO_THE_CHAIN), 1.0 / LARGEST_GAIN)
     most = min(limit * (1.0 - _NEXT_TO_THE_CHAIN), LARGEST_GAIN)
     least, most = min(least, 1.0), max(most, 1.0)
-    lower, upper, where = _gains_around_one(loop, c1, c2, least, most)
+    lower, upper, where = _gains_around_one(point, least, most)
     if lower == least:
         lower = floor if floor >= 1.0 / LARGEST_GAIN else 0.0
     if upper == most:
         upper, where = (limit, np.inf) if limit <= LARGEST_GAIN else (np.inf, np.nan)
     # At s = 0, where L is `above` over `below`, a real root crosses.
+    loop, c1, c2 = point
     above = float(loop.b1[0] * (1.0 - c1) + loop.b2[0] * (1.0 - c2))
     below = float(loop.rest[0])
     at_zero = -below / above if above else np.inf

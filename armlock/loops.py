@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import factorial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -226,46 +226,69 @@ def checked_loop(loop: Loop) -> Loop:
     return loop
 
 
-def loop_numerator(loop: Loop, c1: float, c2: float) -> ExponentialSum:
-    """Return the numerator N of L = N / R at s = j omega as an exponential sum."""
-    return loop.at(c1, c2).plus(loop.rest_on_boundary().scaled(-1.0))
+class LoopAt(NamedTuple):
+    """A loop at one pair of perturbations, L = N / R.
 
-
-def poles_at_zero(loop: Loop, c1: float, c2: float) -> int:
-    """Order of the pole of L at s = 0 once numerator and denominator have cancelled."""
-    order = int(np.flatnonzero(loop.rest)[0])
-    if order == 0:
-        return 0
-    # Taylor coefficients of B1 (1 - c1 exp(-s tau1)) + B2 (1 - c2 exp(-s tau2)), and the
-    # magnitudes they are summed from.
-    taylor, size = np.zeros(order), np.zeros(order)
-    for b, c, tau in ((loop.b1, c1, loop.tau1), (loop.b2, c2, loop.tau2)):
-        arm = np.array([-c * (-tau) ** k / factorial(k) for k in range(order)])
-        arm[0] += 1.0
-        taylor += np.convolve(b, arm)[:order]
-        size += np.convolve(np.abs(b), np.abs(arm))[:order]
-    nonzero = np.flatnonzero(np.abs(taylor) > 1e-13 * size)
-    return order - (int(nonzero[0]) if nonzero.size else order)
-
-
-def leading_radius(loop: Loop, c1: float, c2: float) -> float:
-    """Radius within which L is its leading term at s = 0, a power of s, to a part in 1000.
-
-    With a pole there |L| is above 1000, too. Where nothing settles, the last one tried.
+    Attributes
+    ----------
+    loop : Loop
+        The loop.
+    c1, c2 : float
+        Multiplicative perturbations.
     """
-    order = poles_at_zero(loop, c1, c2)
-    scales = [float(size) for p in loop.polynomials() for size in np.abs(p.roots) if size > 0.0]
-    radius = 1e-3 * min([*scales, 1.0 / loop.longest_delay])
-    for _ in range(40):
-        near, nearer = (complex(loop.open_loop(r, c1, c2)) for r in (radius, 0.5 * radius))
-        if order:
-            settled = abs(nearer / near - 2.0**order) < 1e-3 and abs(near) > 1e3
-        else:
-            settled = abs(nearer - near) < 1e-3 * abs(1.0 + near)
-        if settled:
-            break
-        radius *= 0.1
-    return radius
+
+    loop: Loop
+    c1: float
+    c2: float
+
+    @classmethod
+    def of(cls, loop: Loop, c1: float, c2: float) -> LoopAt:
+        """Check a loop and its perturbations."""
+        return cls(checked_loop(loop), real_number("c1", c1), real_number("c2", c2))
+
+    def response(self, omega: npt.ArrayLike) -> ComplexArray:
+        """Evaluate L(j omega), with omega in rad/s."""
+        return self.loop.open_loop(1j * np.asarray(omega), self.c1, self.c2)
+
+    def numerator(self) -> ExponentialSum:
+        """Return N at s = j omega as an exponential sum."""
+        return self.loop.at(self.c1, self.c2).plus(self.loop.rest_on_boundary().scaled(-1.0))
+
+    def poles_at_zero(self) -> int:
+        """Order of the pole of L at s = 0 once numerator and denominator have cancelled."""
+        loop, c1, c2 = self
+        order = int(np.flatnonzero(loop.rest)[0])
+        if order == 0:
+            return 0
+        # Taylor coefficients of B1 (1 - c1 exp(-s tau1)) + B2 (1 - c2 exp(-s tau2)), and the
+        # magnitudes they are summed from.
+        taylor, size = np.zeros(order), np.zeros(order)
+        for b, c, tau in ((loop.b1, c1, loop.tau1), (loop.b2, c2, loop.tau2)):
+            arm = np.array([-c * (-tau) ** k / factorial(k) for k in range(order)])
+            arm[0] += 1.0
+            taylor += np.convolve(b, arm)[:order]
+            size += np.convolve(np.abs(b), np.abs(arm))[:order]
+        nonzero = np.flatnonzero(np.abs(taylor) > 1e-13 * size)
+        return order - (int(nonzero[0]) if nonzero.size else order)
+
+    def leading_radius(self) -> float:
+        """Radius within which L is its leading term at s = 0, a power of s, to a part in 1000.
+
+        With a pole there |L| is above 1000, too. Where nothing settles, the last one tried.
+        """
+        loop, order = self.loop, self.poles_at_zero()
+        sizes = np.abs(np.concatenate([p.roots for p in loop.polynomials()]))
+        radius = 1e-3 * float(sizes[sizes > 0.0].min(initial=1.0 / loop.longest_delay))
+        for _ in range(40):
+            near, nearer = loop.open_loop([radius, 0.5 * radius], self.c1, self.c2)
+            if order:
+                settled = abs(nearer / near - 2.0**order) < 1e-3 and abs(near) > 1e3
+            else:
+                settled = abs(nearer - near) < 1e-3 * abs(1.0 + near)
+            if settled:
+                break
+            radius *= 0.1
+        return radius
 
 
 class SingleArm(Loop):

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from armlock import discs
-from armlock.checks import FloatArray, positive_number, real_number
+from armlock.checks import FloatArray, positive_number
 from armlock.crossovers import crossovers_end, phase_and_delay
 from armlock.distances import smallest_distances
 from armlock.free_phases import (
@@ -25,7 +25,7 @@ from armlock.free_phases import (
     require_stable,
 )
 from armlock.gains import gain_interval_of_stable
-from armlock.loops import Loop, checked_loop
+from armlock.loops import Loop, LoopAt, checked_loop
 from armlock.rays import FARTHEST, Ray
 from armlock.stability import BOUNDARY, UNCONFINED, CountError, unstable_roots
 
@@ -127,14 +127,12 @@ def modulus_margin(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> float:
     >>> print(f"{modulus_margin(paper_loop()):.4f}")
     0.6156
     """
-    checked_loop(loop)
-    c1, c2 = real_number("c1", c1), real_number("c2", c2)
-    (modulus, _), _ = smallest_distances(loop, c1, c2, disk=False)
+    (modulus, _), _ = smallest_distances(LoopAt.of(loop, c1, c2), disk=False)
     return float(modulus)
 
 
 def _free_margins(
-    loop: Loop, c1: float, c2: float, lowest: float, known: FloatArray
+    point: LoopAt, lowest: float, known: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Margins over all phases of the two arms, from a frequency on, and where they are met.
 
@@ -142,10 +140,10 @@ def _free_margins(
     A coarse sample gives values that occur. The certified walk then steps over what cannot hold
     smaller ones.
     """
-    limit, weights = limit_margins(loop, c1, c2), np.abs([c1, c2])
-    end = crossovers_end(loop, c1, c2, weights, float(limit[discs.PHASE]))
+    limit, weights = limit_margins(point), np.abs(point[1:])
+    end = crossovers_end(point, weights, float(limit[discs.PHASE]))
     end = max(end, 2.0 * lowest)
-    arms = arms_of(loop, c1, c2, free=True)
+    arms = arms_of(point, free=True)
     # The smallest distances may lie past the last crossover, where L turns most.
     omega = np.geomspace(lowest, 10.0 * end, 300)
     sampled = discs.free_margins_over(arms, omega)
@@ -153,11 +151,11 @@ def _free_margins(
     known = np.minimum(limit, known)
     best, where = np.minimum(known, least), np.where(least < known, nearest, np.inf)
     # Past it no distance is smaller, either.
-    end = max(end, no_smaller_from(loop, weights, (1.0 - _FREE_TOLERANCES) * best))
+    end = max(end, no_smaller_from(point.loop, weights, (1.0 - _FREE_TOLERANCES) * best))
     smaller, places, complete = discs.free_margins(arms, lowest, end, best, _FREE_TOLERANCES)
     if not complete:
         why = "take too many steps, or meet a root on the imaginary axis"
-        raise no_margin(c1, c2, f"free phases from {lowest} rad/s on {why}")
+        raise no_margin(point, f"free phases from {lowest} rad/s on {why}")
     return smaller, np.where(np.isnan(places), where, places)
 
 
@@ -221,20 +219,17 @@ def margins(
     >>> print(f"{math.degrees(margins(paper_loop()).phase):.1f} degrees")
     36.0 degrees
     """
-    checked_loop(loop)
-    c1, c2 = real_number("c1", c1), real_number("c2", c2)
+    point = LoopAt.of(loop, c1, c2)
     highest = np.inf if free_above is None else positive_number("free_above", free_above)
-    require_stable(loop, c1, c2, highest)
-    (modulus, ratio), (modulus_omega, _) = smallest_distances(
-        loop, c1, c2, disk=True, highest=highest
-    )
-    phase, delay, phase_omega = phase_and_delay(loop, c1, c2, highest)
+    require_stable(point, highest)
+    (modulus, ratio), (modulus_omega, _) = smallest_distances(point, disk=True, highest=highest)
+    phase, delay, phase_omega = phase_and_delay(point, highest)
     if free_above is None:
-        lower, upper, gain_omega = gain_interval_of_stable(loop, c1, c2)
+        lower, upper, gain_omega = gain_interval_of_stable(point)
     else:
         lower, upper, gain_omega = np.nan, np.nan, np.nan
         known = np.array([modulus, ratio, phase, delay])
-        free, where = _free_margins(loop, c1, c2, highest, known)
+        free, where = _free_margins(point, highest, known)
         if free[discs.MODULUS] < modulus:
             modulus, modulus_omega = free[discs.MODULUS], where[discs.MODULUS]
         if free[discs.PHASE] < phase:

@@ -20,16 +20,9 @@ from armlock.checks import (
     FloatArray,
     check_memory,
     positive_number,
-    real_number,
 )
 from armlock.contour import MOST_SAMPLES, argument_at, resolved_grid
-from armlock.loops import (
-    Loop,
-    checked_loop,
-    leading_radius,
-    loop_numerator,
-    poles_at_zero,
-)
+from armlock.loops import Loop, LoopAt
 from armlock.stability import (
     BOUNDARY,
     CountError,
@@ -241,10 +234,9 @@ def nyquist(
     >>> curve.encirclements, curve.open_loop_poles, curve.closed_loop_roots
     (1, 0, 1)
     """
-    checked_loop(loop)
-    c1, c2 = real_number("c1", c1), real_number("c2", c2)
+    point = LoopAt.of(loop, c1, c2)
     poles = open_loop_poles(loop)
-    order = poles_at_zero(loop, c1, c2)
+    order = point.poles_at_zero()
     end = float(last_frequency(loop, c1, c2))
 
     def refused(why: str) -> CountError:
@@ -253,7 +245,7 @@ def nyquist(
 
     if not np.isfinite(end):
         raise refused("the loop's high-frequency chain of roots is not confined")
-    radius = leading_radius(loop, c1, c2)
+    radius = point.leading_radius()
     end = max(1.05 * end, 10.0 / loop.longest_delay, 10.0 * radius)
     if omega_max is not None:
         end = max(end, positive_number("omega_max", omega_max))
@@ -337,8 +329,7 @@ def axis_crossings(
     5.63e-05 rad/s: -5.13
     1.96e-04 rad/s: -113.07
     """
-    checked_loop(loop)
-    c1, c2 = real_number("c1", c1), real_number("c2", c2)
+    point = LoopAt.of(loop, c1, c2)
     open_loop_poles(loop)
     if omega_max is None:
         factors = np.array([1.0 + abs(c1), 1.0 + abs(c2)]) / 1e-3
@@ -350,8 +341,8 @@ def axis_crossings(
             )
     else:
         omega_max = positive_number("omega_max", omega_max)
-    crossing = loop_numerator(loop, c1, c2).times_conjugate(loop.rest_on_boundary())
+    crossing = point.numerator().times_conjugate(loop.rest_on_boundary())
     omega, jump, _ = sign_changes(crossing, [(0.0, omega_max)])
     omega = omega[(omega > 0.0) & (jump != 0)]
-    value = loop.open_loop(1j * omega, c1, c2).real
+    value = point.response(omega).real
     return AxisCrossings(omega[value < 0.0], value[value < 0.0])

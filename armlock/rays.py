@@ -21,7 +21,7 @@ from armlock.bounds import last_frequency
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import ComplexArray, FloatArray, IntArray, axis, positive_number
 from armlock.free_phases import crossing_intervals, free_disc, search_outwards
-from armlock.loops import Loop
+from armlock.loops import Loop, LoopAt
 from armlock.stability import CountError, polished, sign_changes, unstable_roots
 
 #: Nothing is looked at where the parameters are this many times as large as the start, or as 1.
@@ -239,14 +239,14 @@ class Ray:
             if not isinstance(self.system, Loop):
                 return np.array([span])
             c1, c2 = np.abs([self.at(0.0), self.at(reach())]).max(axis=0)
-            return crossing_intervals(self.system, c1, c2, span)
+            return crossing_intervals(LoopAt(self.system, c1, c2), span)
 
         def likely(omega: FloatArray) -> FloatArray:
             if not isinstance(self.system, Loop):
                 return omega[:1]
-            centre, radius = free_disc(self.system, *self.at(0.0), omega)
+            centre, radius = free_disc(LoopAt(self.system, *self.at(0.0)), omega)
             d1, d2 = map(float, self.direction)
-            growth = free_disc(self.system, d1, d2, omega)[1]
+            growth = free_disc(LoopAt(self.system, d1, d2), omega)[1]
             # The t at which the disc of free phases first holds -1.
             return omega[[np.argmin((np.abs(1.0 + centre) - radius) / growth)]]
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from armlock import Loop, discs, distances
 from armlock.free_phases import arms_of
+from armlock.loops import LoopAt
 from armlock.sensors import COMMON, DIFFERENCE, dual
 from tests.attack import between, roots
 
@@ -23,7 +24,7 @@ def discs_ahead(number):
         gain = rng.choice([1.0, between(rng, 0.1, 10.0)])
         loop = Loop((zeros, poles, gain), mapping, 2.0, 1.5, delay)
         c1, c2 = rng.uniform(-2.0, 2.0, 2)
-        arms = arms_of(loop, c1, c2)
+        arms = arms_of(LoopAt(loop, c1, c2))
         for omega in 10.0 ** rng.uniform(-1.5, 1.5, 10):
             disc = discs._disc(arms, omega)
             step = min(0.5 * disc.nearest, between(rng, 1e-3, 10.0) * omega)

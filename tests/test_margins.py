@@ -23,6 +23,7 @@ from armlock import (
     unstable_roots,
 )
 from armlock.gains import gain_interval
+from armlock.loops import LoopAt
 from armlock.rays import first_crossing
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
 from tests import independent
@@ -111,10 +112,12 @@ def test_the_limit_of_the_chain_limits_the_gain():
 
 def test_the_factors_of_a_loop_show_where_it_is_real():
     """This is looked at where rounding hides the sign of Im L in sums of exponentials."""
-    loop, point = STABLE["oscillator"]
-    omega = margins(loop, *point).gain_omega
+    loop, (c1, c2) = STABLE["oscillator"]
+    omega = margins(loop, c1, c2).gain_omega
     stretch = omega + 1e-6 * np.array([[-2.0], [0.5], [1.0]])
-    assert gains._real_within(loop, *point, stretch) == pytest.approx([omega], rel=1e-12)
+    assert gains._real_within(LoopAt(loop, c1, c2), stretch) == pytest.approx(
+        [omega], rel=1e-12
+    )
 
 
 @pytest.mark.parametrize("direction", [(0, -1), (1, 0), (0, 1), (-1, 0), (1, -1)])
@@ -228,12 +231,12 @@ def test_a_dead_time_far_below_the_crossing_period_changes_little(direction):
 
 def test_counts_contradict_gains_between_which_the_loop_is_not_stable():
     """As they do where rounding hides a crossing."""
-    loop = paper_loop()
-    lower, upper, _ = gains.gain_interval(loop, 1.0, 1.0)
-    gains._require_stable_inside(loop, 1.0, 1.0, lower, upper)
+    point = LoopAt(paper_loop(), 1.0, 1.0)
+    lower, upper, _ = gains.gain_interval(*point)
+    gains._require_stable_inside(point, lower, upper)
     for low, high in ((0.99 * lower, upper), (lower, 1.01 * upper)):
         with pytest.raises(CountError, match="rounding hides a crossing"):
-            gains._require_stable_inside(loop, 1.0, 1.0, low, high)
+            gains._require_stable_inside(point, low, high)
 
 
 @pytest.mark.parametrize("name", STABLE)
@@ -348,9 +351,10 @@ def test_a_count_up_to_free_phases_is_that_of_all_frequencies(factor):
     for loop, (c1, c2) in STABLE.values():
         changed = to_loop(sketch_of(loop).scaled(factor))
         for omega in np.geomspace(1e-2, 1e2, 9):
-            if free_phases.clear_above(changed, c1, c2, omega):
+            point = LoopAt(changed, c1, c2)
+            if free_phases.clear_above(point, omega):
                 expected = int(unstable_roots(changed, c1, c2))
-                assert free_phases._count_below(changed, c1, c2, omega) == expected
+                assert free_phases._count_below(point, omega) == expected
                 found.append(expected)
     assert len(found) > 10
     assert factor < 30.0 or max(found) > 0

@@ -21,7 +21,7 @@ from armlock.checks import FloatArray
 from armlock.discs import MODULUS, PHASE, free_margins_over
 from armlock.flight import flight_loop
 from armlock.free_phases import arms_of
-from armlock.loops import Loop, SingleArm
+from armlock.loops import Loop, LoopAt, SingleArm
 from armlock.margins import Margins, critical_perturbation, margins
 from armlock.noise import LaserNoise
 from armlock.pulling import pulling
@@ -80,7 +80,7 @@ def free_margins(loop: Loop, frequency: FloatArray) -> FloatArray:
 
     At each frequency in closed form; shape (2, n).
     """
-    found = free_margins_over(arms_of(loop, 1.0, 1.0, free=True), TURN * frequency)
+    found = free_margins_over(arms_of(LoopAt(loop, 1.0, 1.0), free=True), TURN * frequency)
     return np.array([found[:, MODULUS], np.degrees(found[:, PHASE])])
 
 
