@@ -411,6 +411,16 @@ def _longest_step(disc: _Disc, omega: float, step: float, levels: FloatArray) ->
 
 
 @njit(cache=True)
+def _keep_smaller(best: FloatArray, where: FloatArray, here: FloatArray, omega: float) -> bool:
+    """Put margins that are smaller than `best` into it, and omega into `where`; if any is."""
+    smaller = False
+    for m in range(4):
+        if here[m] < best[m]:
+            best[m], where[m], smaller = here[m], omega, True
+    return smaller
+
+
+@njit(cache=True)
 def free_margins(
     arms: Arms, omega: float, omega_end: float, best: FloatArray, tolerance: FloatArray
 ) -> tuple[FloatArray, FloatArray, bool]:
@@ -430,21 +440,25 @@ def free_margins(
             break
         centre, radius = _centre_and_radius(disc)
         here = free_margins_at(centre, radius, omega)
-        for m in range(4):
-            if here[m] < best[m]:
-                best[m], where[m] = here[m], omega
+        falls = _keep_smaller(best, where, here, omega) or (where > omega).any()
         if best[MODULUS] == 0.0:
             # Some phases take L to -1.
             return best, where, True
         step = min(2.0 * step, 0.5 * disc.nearest, omega_end - omega)
+        while falls and step > _SHORTEST * omega:
+            # On the way down steps would get ever shorter without a look ahead.
+            if _nothing_smaller(disc, omega, step, (1.0 - tolerance) * best):
+                break
+            here = free_margins_over(arms, np.array([omega + step]))[0]
+            _keep_smaller(best, where, here, omega + step)
+            step *= 0.5
         step = _longest_step(disc, omega, step, (1.0 - tolerance) * best)
         if step == 0.0:
             # The disc may touch the unit circle next to here. It then covers a short arc of it,
             # and a little later a longer one.
             here = free_margins_at(centre, radius + _GROWN * (abs(centre) + radius), omega)
-            for m in (PHASE, DELAY):
-                if here[m] < best[m]:
-                    best[m], where[m] = here[m], omega
+            here[MODULUS], here[RATIO] = np.inf, np.inf
+            _keep_smaller(best, where, here, omega)
             step = min(_GROWN * omega, 0.5 * disc.nearest)
             step = _longest_step(disc, omega, step, (1.0 - tolerance) * best)
         if step == 0.0:

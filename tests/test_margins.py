@@ -9,6 +9,7 @@ import pytest
 from armlock import (
     BOUNDARY,
     CommonArm,
+    Controller,
     CountError,
     DualArm,
     Loop,
@@ -342,6 +343,15 @@ def test_arms_of_equal_delay_have_free_phases_of_their_own():
     found = margins(loop, c1, c2, above)
     assert found.modulus == pytest.approx(away.min(), rel=1e-4)
     assert found.modulus_omega == pytest.approx(omega[away.argmin()], rel=1e-3)
+
+
+@pytest.mark.parametrize(("gain", "damping"), [(1e-3, 1e-2), (1e-3, 1e-3), (1e-2, 1e-2)])
+def test_free_phases_of_a_difference_fill_a_disc_around_zero(gain, damping):
+    """Of radius 2 |K|. At a resonance it may hold -1: the walk comes there in few steps."""
+    resonant = Controller([-1.0], [complex(-damping, 6.3), complex(-damping, -6.3)], gain)
+    found = margins(Loop(resonant, DIFFERENCE, 2.8, 2.2), free_above=0.3)
+    largest = 2.0 * np.abs(resonant(1j * np.linspace(6.2, 6.4, 200_001))).max()
+    assert found.modulus == pytest.approx(max(1.0 - largest, 0.0), rel=1e-5)
 
 
 @pytest.mark.parametrize("factor", [0.3, 1.0, 3.0, 30.0])
