@@ -7,7 +7,7 @@ over a step, a function stays within M step^2 / 2 of its tangent. So
   exact up to rounding;
 - `imaginary_zeros` never steps over two zeros at once, so that none is missed.
 
-Where rounding hides more, they say so. Where the sum is no larger than the bound on its
+Where the sum is no larger than the bound on its
 rounding error, `winding` stops: that makes a point a boundary point. Where only its imaginary
 part is no larger, `imaginary_zeros` gives a zero with a jump of 0. The tolerance in the bound
 is `armlock.exponentials.ROUNDING`.
@@ -142,7 +142,7 @@ def winding(
     block = np.inf
     if phases.size and phases.any():
         block = _BLOCK * 2.0 * np.pi / np.abs(phases).max()
-    while omega < omega_end or value == 0j:  # once at least
+    while True:
         piece = expand(whole, omega, uncertain)
         end = min(piece.end, omega_end)
         bound, error = curvature_bound(piece), rounding_bound(piece, ROUNDING)
@@ -178,14 +178,15 @@ def winding(
             if following < until:
                 return argument, value, False
             omega = following
-    return argument, value, True
+        if omega >= omega_end:
+            return argument, value, True
 
 
 @njit(cache=True)
 def argument_at(roots: ComplexArray, omega: float) -> float:
     """Argument at j omega of the polynomial with these roots, up to the sign of its lead.
 
-    It is continuous along the axis, and half pi for each root at infinity.
+    No root may lie on the axis. As omega grows, each root's share tends to half pi.
     """
     argument = 0.0
     for root in roots:
@@ -288,7 +289,8 @@ def _with_zero(
 def _place(zeros: FloatArray, piece: Piece, square: Piece) -> None:
     """Turn value and slope of zeros in one piece into POSITION and SPREAD.
 
-    `square` is the measure in the same powers.
+    `square` is the measure, expanded from the same polynomials at the same start: it has the
+    same powers and the same scale.
     """
     fastest, magnitude = np.abs(piece.phases).max(), piece.sizes[1:].sum(axis=0)
     for zero in zeros:
@@ -310,19 +312,19 @@ def _imaginary_bounds(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Bounds on the imaginary part in a piece, as polynomials in u.
 
-    On its second derivative, next to omega = 0 and everywhere; and on its rounding error, for
-    which row 0 of `sizes` becomes that of the imaginary part.
+    On its second derivative, next to omega = 0 and everywhere; and on its rounding error.
     """
     start, end, per_reach, local, sizes, phases = piece
-    only = local.copy()
+    local, sizes = local.copy(), sizes.copy()
     for m in range(local.shape[1]):
-        only[0, m] = local[0, m].imag
-        if end == np.inf:
-            # The coefficients are real or imaginary: only the latter enter the imaginary part.
-            sizes[0, m] = sizes[0, m] if local[0, m].imag != 0.0 else 0.0
-    everywhere = curvature_bound(Piece(start, end, per_reach, only, sizes, phases))
+        if end == np.inf and local[0, m].imag == 0.0:
+            # In powers of omega the coefficients are real or imaginary.
+            sizes[0, m] = 0.0
+        local[0, m] = local[0, m].imag
+    imaginary = Piece(start, end, per_reach, local, sizes, phases)
+    everywhere = curvature_bound(imaginary)
     near = curvature_from_zero(piece) if start == 0.0 else everywhere
-    return near, everywhere, rounding_bound(piece, rounding)
+    return near, everywhere, rounding_bound(imaginary, rounding)
 
 
 @njit(cache=True)
@@ -342,9 +344,9 @@ def imaginary_zeros(
     not if the walk would take more than MOST_STEPS steps). Its columns:
 
     - OMEGA, polished;
-    - JUMP, twice the direction of the sign change (a conjugate pair crosses); once at
-      omega = 0 and, for a map, at `omega_end` (a real root crosses); 0 where rounding hides
-      whether there is one, or the sign at an `omega_start` above zero, or at `omega_end`;
+    - JUMP, 2 or -2, the direction of the sign change, where a conjugate pair crosses; 1 or -1
+      where a real root does: at omega = 0, and at the `omega_end` of a map; 0 where rounding
+      hides whether there is a sign change, or the sign at another end of the walk;
     - WIDTH, how far rounding lets the zero move: for a zero that is not simple, half the
       stretch in which the sign is doubtful, and all of it at `omega_start` and `omega_end`;
     - POSITION, the real part over the measure, nan where that vanishes;
@@ -386,8 +388,8 @@ def imaginary_zeros(
                     stretch = 0.25 * (omega - last_clear)
                     certified = max(certified, unresolved, stretch, 1e-14 * omega_end)
                 step = min(step, certified)
-                # Next to rounding the terms may cancel so far that bounds allow no progress.
-                # Then a larger error hides the sign, until it is clear.
+                # Where terms cancel nearly to rounding, steps may become tiny. Then the error
+                # is taken for larger, until the sign is clear again.
                 short = step < 1e-6 * omega and fastest * step < 1e-6
                 crawled = crawled + 1 if short and not doubtful else 0
                 if crawled > patience:

@@ -33,7 +33,8 @@ LOW_DEGREE = 20
 # is no larger on the axis, a point is a boundary point, and its count -1.
 ROUNDING = 8.0
 # How many roots of a polynomial, each weighed by reach / (reach + distance), a piece may have
-# around it. Then LOW_DEGREE powers hold the polynomial to rounding.
+# around it. Roots exactly at its start are not counted. Then LOW_DEGREE powers hold the
+# polynomial to rounding.
 _CROWD = 1.5
 
 
@@ -61,16 +62,21 @@ def _quotients(
 
 
 class Polynomial(NamedTuple):
-    """A real polynomial of s: its coefficients in ascending powers, and its roots."""
+    """A real polynomial of s: its coefficients in ascending powers, and its roots.
+
+    A product also has the highest coefficients of its factors: their product may be no float.
+    """
 
     coefficients: FloatArray
     roots: ComplexArray
+    leads: tuple[float, ...] = ()
 
     @classmethod
     def of(cls, coefficients: FloatArray, known: ComplexArray | None = None) -> Polynomial:
         """Return the polynomial with these coefficients, and these roots if they are known.
 
-        Roots that are those of another polynomial are found anew, in extended precision.
+        Known roots are kept if they give these coefficients to a part in a million. If not,
+        roots are found in double precision, and if those fail the test, in extended precision.
         """
         if known is not None and _are_roots(known, coefficients):
             return cls(coefficients, known)
@@ -100,7 +106,8 @@ class Polynomial(NamedTuple):
         signs = (-1.0) ** np.arange(other.coefficients.size)
         with np.errstate(over="ignore", invalid="ignore"):
             product = np.convolve(self.coefficients, signs * other.coefficients)
-        return Polynomial(product, np.concatenate((self.roots, -other.roots)))
+        leads = self.coefficients[-1], signs[-1] * other.coefficients[-1]
+        return Polynomial(product, np.concatenate((self.roots, -other.roots)), leads)
 
 
 def _are_roots(roots: ComplexArray, coefficients: FloatArray) -> bool:
@@ -194,15 +201,41 @@ class ExponentialSum(NamedTuple):
         turns = np.array([1.0, 1.0j, -1.0, -1.0j])[np.arange(degree + 1) % 4]
         for row, p in zip(whole, self.polynomials, strict=True):
             size = p.coefficients.size
-            row.real[:size] = p.coefficients * turns.real[:size]
-            row.imag[:size] = p.coefficients * turns.imag[:size]
-        arrays = (
+            with np.errstate(invalid="ignore"):
+                row.real[:size] = p.coefficients * turns.real[:size]
+                row.imag[:size] = p.coefficients * turns.imag[:size]
+        leads = [np.frexp(p.leads or p.coefficients[-1:]) for p in self.polynomials]
+        polynomials = CompiledPolynomials(
             whole if degree <= LOW_DEGREE and _in_range(whole) else whole[:0],
             np.concatenate([p.roots for p in self.polynomials]),
             np.cumsum([0, *(p.roots.size for p in self.polynomials)]),
-            np.array([p.coefficients[-1] for p in self.polynomials]),
+            np.array([mantissas.prod() for mantissas, _ in leads]),
+            np.array([int(exponents.sum()) for _, exponents in leads]),
         )
-        return CompiledSum(arrays, self.weights, self.sums, self.phases)
+        return CompiledSum(polynomials, self.weights, self.sums, self.phases)
+
+
+class CompiledPolynomials(NamedTuple):
+    """Some polynomials as compiled functions take them.
+
+    Attributes
+    ----------
+    coefficients : complex array, shape (k, degree + 1)
+        In powers of omega. It has no rows if a degree exceeds `LOW_DEGREE` or products would
+        leave the range of floats. Then the roots are used.
+    roots : complex array
+        Those of all polynomials, one polynomial after the other.
+    starts : int array, shape (k + 1,)
+        The index of each polynomial's first root, and the number of all roots.
+    leads, exponents : float and int array, shape (k,)
+        Highest coefficients, over powers of two; and the exponents of these.
+    """
+
+    coefficients: ComplexArray
+    roots: ComplexArray
+    starts: IntArray
+    leads: FloatArray
+    exponents: IntArray
 
 
 class CompiledSum(NamedTuple):
@@ -210,25 +243,20 @@ class CompiledSum(NamedTuple):
 
     Attributes
     ----------
-    polynomials : tuple of four arrays
-        1. Coefficients in powers of omega, shape (k, degree + 1). There are no rows where a
-           degree exceeds `LOW_DEGREE`, or products leave the range of floats: the others are
-           for that case.
-        2. Roots, polynomial after polynomial.
-        3. The index of each polynomial's first root, and their number.
-        4. Highest coefficients, shape (k,).
+    polynomials : CompiledPolynomials
+        The polynomials.
     weights, sums, phases : arrays
         Those of `ExponentialSum`.
     """
 
-    polynomials: tuple[Any, ...]
+    polynomials: CompiledPolynomials
     weights: npt.NDArray[Any]
     sums: npt.NDArray[Any]
     phases: FloatArray
 
 
 def aligned(*sums: ExponentialSum) -> tuple[ExponentialSum, ...]:
-    """Return sums of the same polynomials over the exponentials of all of them."""
+    """Give sums of the same polynomials the same phases. Missing ones get a weight of zero."""
     nothing = reduce(ExponentialSum.plus, [whole.scaled(0.0) for whole in sums])
     return tuple(nothing.plus(whole) for whole in sums)
 
@@ -261,20 +289,20 @@ def real_horner(p: FloatArray, u: float) -> float:
 
 @njit(cache=True)
 def _from_roots(
-    roots: ComplexArray, starts: IntArray, leads: FloatArray, omega: float, reach: float
+    polynomials: CompiledPolynomials, omega: float, reach: float
 ) -> tuple[ComplexArray, FloatArray, FloatArray]:
     """Expand polynomials about j omega, in powers of u = (change of omega) / reach.
 
-    Polynomial k has the highest coefficient leads[k] and roots[starts[k] : starts[k + 1]]. All
-    are divided by one power of two, so that the largest is about one. Returns the coefficients
-    and their magnitudes, shape (k, LOW_DEGREE + 1), and bounds on what the higher powers add up
-    to where 0 <= u <= 1. The magnitudes count the roots, since each multiplication rounds.
+    All are divided by one power of two, so that the largest is about one. Returns the
+    coefficients and their magnitudes, shape (k, LOW_DEGREE + 1), and bounds on what the higher
+    powers add up to where 0 <= u <= 1. The magnitudes count the roots, since each
+    multiplication rounds.
     """
-    size = LOW_DEGREE + 1
+    _, roots, starts, leads, exponents = polynomials
+    size, exponents = LOW_DEGREE + 1, exponents.copy()
     found = np.zeros((leads.size, size), dtype=np.complex128)
     sizes = np.zeros((leads.size, size))
     left_out = np.zeros(leads.size)
-    exponents = np.zeros(leads.size, dtype=np.int64)
     largest = -(1 << 60)
     for k in range(leads.size):
         found[k, 0], sizes[k, 0], total = leads[k], abs(leads[k]), abs(leads[k])
@@ -335,8 +363,8 @@ def _reach(roots: ComplexArray, starts: IntArray, omega: float) -> float:
 class Piece(NamedTuple):
     """An exponential sum over a piece of the axis, in powers of u = (omega - start) per_reach.
 
-    In a piece u goes from 0 to 1; `per_reach` is one over its length. But of polynomials of low
-    degree the whole axis is one piece, with u = omega.
+    Of polynomials of low degree the whole axis is one piece, with u = omega. In any other piece
+    u goes from 0 to 1, and `per_reach` is one over its length.
 
     Attributes
     ----------
@@ -367,13 +395,14 @@ def expand(whole: CompiledSum, omega: float, uncertain: FloatArray | None = None
 
     `uncertain` holds how far the entries of `sums` may be off. The magnitudes contain it.
     """
-    coefficients, roots, starts, leads = whole.polynomials
-    weights, sums = whole.weights, whole.sums
+    polynomials, weights, sums, phases = whole
+    coefficients = polynomials.coefficients
     reach, expanded = 1.0, coefficients.shape[0] == 0
     magnitudes, left_out = np.abs(coefficients), np.zeros(coefficients.shape[0])
     if expanded:
-        reach = _reach(roots, starts, omega)
-        coefficients, magnitudes, left_out = _from_roots(roots, starts, leads, omega, reach)
+        # Next to a root of high order on the axis it would be no step at all.
+        reach = max(_reach(polynomials.roots, polynomials.starts, omega), 4.0 * EPSILON * omega)
+        coefficients, magnitudes, left_out = _from_roots(polynomials, omega, reach)
     number, size = coefficients.shape
     groups = weights.shape[0]
     local = np.zeros((1 + groups, size), dtype=np.complex128)
@@ -390,7 +419,7 @@ def expand(whole: CompiledSum, omega: float, uncertain: FloatArray | None = None
                     sizes[g, m] += magnitude * magnitudes[k, m]
                 sizes[g, size] += magnitude * left_out[k] / EPSILON
     if not expanded:
-        return Piece(0.0, np.inf, 1.0, local, sizes, whole.phases)
+        return Piece(0.0, np.inf, 1.0, local, sizes, phases)
     # Powers that rounding hides are not worth their time.
     powers = sizes[:, :size].sum(axis=0)
     used, dropped = size, powers[size - 1]
@@ -399,7 +428,7 @@ def expand(whole: CompiledSum, omega: float, uncertain: FloatArray | None = None
         dropped += powers[used - 1]
     sizes[:, used] = sizes[:, size] + sizes[:, used:size].sum(axis=1) / EPSILON
     local, sizes = local[:, :used].copy(), sizes[:, : used + 1].copy()
-    return Piece(omega, omega + reach, 1.0 / reach, local, sizes, whole.phases)
+    return Piece(omega, omega + reach, 1.0 / reach, local, sizes, phases)
 
 
 @njit(cache=True)

@@ -17,13 +17,14 @@ from tests.systems import NEUTRAL, RETARDED
 def walk(coefficients, phases, omega_end):
     """Wind a sum of polynomials in omega, one a row, times exponentials."""
     whole = np.array(coefficients, dtype=complex)
-    nothing = np.zeros(0, dtype=complex), np.zeros(1, dtype=np.int64), np.zeros(0)
+    nothing = np.zeros(0, complex), np.zeros(1, int), np.zeros(0), np.zeros(0, int)
+    polynomials = exponentials.CompiledPolynomials(whole, *nothing)
     weights, sums, phases = (
         np.eye(len(whole)),
         np.ones(len(whole)),
         np.array(phases, dtype=float),
     )
-    summed = exponentials.CompiledSum((whole, *nothing), weights, sums, phases)
+    summed = exponentials.CompiledSum(polynomials, weights, sums, phases)
     return contour.winding(summed, np.zeros(len(whole)), omega_end)
 
 
@@ -104,6 +105,14 @@ def test_a_piece_reaches_as_far_as_equal_roots_allow(number):
     assert found == pytest.approx(expected, rel=1e-2)
 
 
+def test_a_piece_goes_on_next_to_a_root_of_high_order():
+    found = np.repeat([0.7j, -0.7j, -1.0], [5, 5, 13])
+    high = exponentials.Polynomial(np.poly(found).real[::-1].astype(np.float64), found)
+    whole = exponentials.ExponentialSum((high,), np.ones((1, 1)), np.zeros(1), np.ones(1))
+    omega = np.nextafter(0.7, 0.0)
+    assert exponentials.expand(whole.compiled(), omega).end > omega
+
+
 def random_sum(degree, rng):
     """A sum of two polynomials, times exponentials, and the same in forty digits."""
     parts = []
@@ -170,9 +179,10 @@ from armlock import contour, counting, exponentials
 
 whole = np.zeros((2, 6), dtype=complex)
 whole[0, 2], whole[1, 5] = 1.0, 1.0j
-none = np.zeros(0, dtype=complex), np.zeros(1, dtype=np.int64), np.zeros(0)
+nothing = np.zeros(0, complex), np.zeros(1, int), np.zeros(0), np.zeros(0, int)
+polynomials = exponentials.CompiledPolynomials(whole, *nothing)
 weights, phases = np.array([[0.0, 0.5], [0.0, 0.5]]), np.array([1.0, -1.0])
-function = exponentials.CompiledSum((whole, *none), weights, np.array([1.0, -1.0]), phases)
+function = exponentials.CompiledSum(polynomials, weights, np.array([1.0, -1.0]), phases)
 steps = []
 contour.evaluate = lambda *at: steps.append(at) or exponentials.evaluate(*at)
 zeros, complete = contour.imaginary_zeros(
