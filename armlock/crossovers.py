@@ -47,7 +47,7 @@ def axis_zeros(
     omega, jump, width = sign_changes(whole, intervals)
     hidden = jump == 0
     stretches = omega[hidden] + np.outer((-1.0, 0.0, 1.0), width[hidden])
-    return omega[~hidden & (omega > 0.0)], stretches[:, stretches[0] > 0.0]
+    return omega[~hidden & (omega > 0.0)], np.maximum(stretches, 1e-3 * omega[hidden])
 
 
 def _on_unit_circle(point: LoopAt, omega: FloatArray) -> FloatArray:
@@ -160,8 +160,8 @@ def phase_and_delay(point: LoopAt, highest: float) -> tuple[float, float, float]
     def likely(omega: FloatArray) -> FloatArray:
         return least_at(point, omega, slice(discs.PHASE, None))
 
-    def look(intervals: FloatArray) -> None:
-        nonlocal phase, delay, where
+    per_turn = point.loop.omega_per_turn
+    for intervals in search_outwards(per_turn, lambda: min(end, highest), meeting, likely):
         omega, hidden = _crossovers(point, squares, intervals)
         found = _least_lags(point, omega)
         perhaps = _least_lags(point, hidden.ravel())
@@ -172,6 +172,4 @@ def phase_and_delay(point: LoopAt, highest: float) -> tuple[float, float, float]
         if found[0] < phase:
             phase, where = found[0], found[2]
         delay = min(delay, found[1])
-
-    search_outwards(point.loop.omega_per_turn, look, lambda: min(end, highest), meeting, likely)
     return phase, delay, where

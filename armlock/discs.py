@@ -217,26 +217,26 @@ def _ahead(disc: _Disc, step: float) -> _Ahead:
 
 
 @njit(cache=True)
-def _clear(disc: _Disc, ahead: _Ahead, step: float, point: complex, radius: float) -> bool:
-    """Whether L stays outside a disc around `point` over a step, whatever the free phases.
+def _clear(disc: _Disc, ahead: _Ahead, step: float, target: complex, radius: float) -> bool:
+    """Whether L stays outside a disc around `target` over a step, whatever the free phases.
 
-    L and the disc around `point` are both divided by F(omega + t) / F(omega). To first order
+    L and the disc around `target` are both divided by F(omega + t) / F(omega). To first order
     only G / F then moves the disc of L, and the other disc moves with 1 / F. What is beyond
     first order is subtracted from their distance. Besides,
     |v + v' t| is at least |v| (1 + t Re(v' / v)).
     """
     size = abs(disc.larger)
     centre, spread = _centre_and_radius(disc)
-    away = centre - point
+    away = centre - target
     distance = abs(away)
     if distance == 0.0:
         return False
     begin = distance - spread - radius
-    change = disc.larger * disc.other * disc.other_rate + point * disc.rate
+    change = disc.larger * disc.other * disc.other_rate + target * disc.rate
     total = (change * away.conjugate()).real / distance - size * ahead.slope
     total += radius * disc.rate.real
-    beyond = (abs(point) + radius) * ahead.own + size * ahead.left
-    rounding = _rounding(disc) + 64.0 * EPSILON * (abs(point) + radius)
+    beyond = (abs(target) + radius) * ahead.own + size * ahead.left
+    rounding = _rounding(disc) + 64.0 * EPSILON * (abs(target) + radius)
     return bool(min(begin, begin + total * step) > beyond + rounding)
 
 
@@ -264,8 +264,8 @@ def _nothing_smaller(disc: _Disc, omega: float, step: float, levels: FloatArray)
     lag = max(lead, levels[DELAY] * (omega + step))
     if lead + lag >= 2.0 * np.pi:
         return False
-    # The disc covers the circle around its own direction. It may come to the arc that holds
-    # smaller margins over an end of it, or by turning there.
+    # What the disc covers of the circle is an arc around the direction of its centre. It may
+    # come to the arc that holds smaller margins over an end of that, or by turning there.
     for end in (-np.exp(-1j * lead), -np.exp(1j * lag)):
         if not _clear(disc, ahead, step, end, 0.0):
             return False
@@ -376,7 +376,7 @@ def free_margins_at(centre: complex, radius: float, omega: float) -> FloatArray:
         found[RATIO] = modulus * (abs(1.0 + centre) + radius) / under
     size = abs(centre)
     if abs(size - 1.0) <= radius:
-        # Centre and radius are not both zero, and -1 is outside.
+        # The centre is not zero: a disc around it that meets the circle holds -1.
         half = np.arccos(min(max((1.0 + size**2 - radius**2) / (2.0 * size), -1.0), 1.0))
         angle = np.arctan2(centre.imag, centre.real)
         lag = (angle - half + np.pi) % (2.0 * np.pi)

@@ -108,8 +108,8 @@ def _walk(
     that occurs: the walk looks for smaller ones, and passes over an entry of zero. Returns the
     smallest ones; where they are, nan for those of `best`; and whether the walk came to its
     end, which it does not if it is too long or rounding hides L. None is smaller than the
-    result by more than the share `tolerance` and twice what rounding may move R + N by. That is
-    at most 1e-6 |R|, or 1e-6 |R - N| for the second one.
+    result by more than the share `tolerance` and twice what rounding may move R + N by. A walk
+    ends where that exceeds 1e-6 |R|, or 1e-6 |R - N| for the second one.
     """
     best, where, here, steps = best.copy(), np.full(2, np.nan), np.zeros(2), 0
     while omega < omega_end:
@@ -175,13 +175,14 @@ def smallest_distances(
     `highest` and the places are in rad/s, a place is inf for the limit at high frequency. The
     second distance is one if no smaller one occurs, and zero unless `disk` asks for it.
     """
+    loop, weights = point.loop, arm_weights(point)
     best = limit_margins(point)[:2]
     best[discs.RATIO] = min(best[discs.RATIO], 1.0) if disk else 0.0
     where = np.full(2, np.inf)
 
     def end() -> float:
         """Frequency past which nothing is smaller, or `highest`."""
-        return min(no_smaller_from(point.loop, weights, (1.0 - TOLERANCE) * best), highest)
+        return min(no_smaller_from(loop, weights, (1.0 - TOLERANCE) * best), highest)
 
     def improve(omega: FloatArray) -> None:
         """Take the smallest distances at given frequencies if they are smaller."""
@@ -199,41 +200,30 @@ def smallest_distances(
     def likely(omega: FloatArray) -> FloatArray:
         return least_at(point, omega, slice(discs.PHASE))
 
-    def look(intervals: FloatArray) -> None:
-        nonlocal best, where
+    if not np.isfinite(end()):
+        raise unconfined(point)
+    parts = point.numerator().compiled(), loop.rest_on_boundary().compiled()
+    lowest = _constant_up_to(point)
+    # Next to the limit a walk takes short steps, unless it knows of a smaller value.
+    first = FIRST_TURNS * loop.omega_per_turn
+    improve(np.geomspace(lowest, max(min(first, end()), lowest), 2000))
+    for intervals in search_outwards(loop.omega_per_turn, end, meeting, likely):
         for low, high in np.maximum(intervals, lowest).tolist():
             improve(np.linspace(low, high, 2 + 2000 // len(intervals)))
             # What that has found narrows them.
             for start, stop in meeting((low, high)):
-                found, places, complete = _walk(
-                    numerator, denominator, start, stop, best, TOLERANCE
-                )
+                found, places, complete = _walk(*parts, start, stop, best, TOLERANCE)
                 if not complete:
                     why = f"following it takes more than {contour.MOST_STEPS:.0e} steps"
                     raise no_margin(point, f"rounding hides L, or {why}")
                 best, where = found, np.where(np.isnan(places), where, places)
-
-    weights = arm_weights(point)
-    if not np.isfinite(end()):
-        raise unconfined(point)
-    numerator = point.numerator().compiled()
-    # Its only exponential is one: the sum is all.
-    denominator = point.loop.rest_on_boundary().compiled()
-    denominator = denominator._replace(
-        weights=denominator.weights[:0], phases=denominator.phases[:0]
-    )
-    lowest = _one_power_up_to(point)
-    # Next to the limit a walk takes short steps, unless it knows of a smaller value.
-    first = FIRST_TURNS * point.loop.omega_per_turn
-    improve(np.geomspace(lowest, max(min(first, end()), lowest), 2000))
-    search_outwards(point.loop.omega_per_turn, look, end, meeting, likely)
     return best, where
 
 
-def _one_power_up_to(point: LoopAt) -> float:
+def _constant_up_to(point: LoopAt) -> float:
     """Frequency in rad/s up to which no margin is taken.
 
-    L is one power of s there, up to a part in ten million; or its magnitude is above 1e7.
+    There |1 + L| changes by less than a part in ten million, or |L| is above 1e7.
     """
     radius = point.leading_radius()
     lowest, higher = 1e-4 * radius, 1e-2 * radius

@@ -9,7 +9,7 @@ is that of L.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from itertools import zip_longest
 
@@ -95,10 +95,10 @@ def no_margin(point: LoopAt, why: str) -> CountError:
 
 
 def arm_weights(point: LoopAt) -> FloatArray:
-    """Return the weights of the arms' phases: |c1| and |c2|, or one of both arms, and 0.
+    """Return the weights of |B1| and |B2| in a bound on what the delayed terms add up to.
 
-    Two arms act as one if their delays are equal and their responses proportional. Phases that
-    are free of each other never do.
+    They are |c1| and |c2|. Arms of equal delay with B2 = ratio B1 act as one: the weights are
+    |c1 + ratio c2| and 0.
     """
     loop, c1, c2 = point
     if loop.tau1 == loop.tau2 and loop.b1.any():
@@ -111,19 +111,15 @@ def arm_weights(point: LoopAt) -> FloatArray:
 def clear_from(loop: Loop, weights: FloatArray, centre: float, radius: float) -> float:
     """Frequency in rad/s past which L, at all phases, stays outside a disc; inf if it does not.
 
-    The centre of the disc is negative, `weights` are those of `arm_weights`. Past it
+    The centre is real and not zero, `weights` are those of `arm_weights`. Past the frequency
     |B1 + B2 - centre R| exceeds radius |R| + |c1 B1| + |c2 B2|. With a dead time B1 + B2 may
     have any phase, too: then |centre R| has to exceed that and |B1 + B2|.
     """
-    c = polynomial_sum(loop.b1, loop.b2)
-    factors = [radius, *weights, 0.0]
-    first = -centre * loop.rest
+    first, c = -centre * loop.rest, polynomial_sum(loop.b1, loop.b2)
+    others, factors = (loop.rest, loop.b1, loop.b2), [radius, *weights]
     if loop.delay:
-        factors[3] = 1.0
-    else:
-        first = polynomial_sum(first, c)
-    others = (loop.rest, loop.b1, loop.b2, c)
-    return last_larger(first, others, np.array(factors))
+        return last_larger(first, (*others, c), np.array([*factors, 1.0]))
+    return last_larger(polynomial_sum(first, c), others, np.array(factors))
 
 
 def last_crossover(loop: Loop, weights: FloatArray, gain: float = 1.0) -> float:
@@ -156,8 +152,8 @@ def _factors(loop: Loop) -> tuple[ComplexArray, IntArray, FloatArray]:
             for root in roots:
                 powers.setdefault(complex(root), [0, 0])[k] += change
     kept = [(root, n) for root, n in powers.items() if any(n)]
-    up = [entry for entry in kept if entry[1][0] > 0 or entry[1][1] > 0]
-    down = [entry for entry in kept if entry not in up]
+    up = [(root, n) for root, n in kept if max(n) > 0]
+    down = [(root, n) for root, n in kept if max(n) <= 0]
     # In turn, so that no product overflows.
     kept = [one for pair in zip_longest(up, down) for one in pair if one is not None]
     return (
@@ -212,32 +208,34 @@ def least_at(point: LoopAt, omega: FloatArray, margins: slice) -> FloatArray:
 
 def search_outwards(
     per_turn: float,
-    look: Callable[[FloatArray], None],
     end: Callable[[], float],
     meeting: Callable[[tuple[float, float]], FloatArray],
     likely: Callable[[FloatArray], FloatArray],
-) -> None:
-    """Look at intervals of the axis, the most promising first, until nothing is left.
+) -> Iterator[FloatArray]:
+    """Yield intervals of the axis to look at, the most promising first, until none is left.
 
     First come the first turns of the delays. Then, as long as far more is left, what lies
-    around likely places, each time further around. Last comes the rest.
+    around likely places, each time further around. Last comes the rest. After each the caller
+    keeps the best that it has found, on which the three functions depend.
 
     Parameters
     ----------
     per_turn : float
-        The change of omega, in rad/s, that is one turn of the delays; inf to look everywhere
-        at once.
-    look : callable
-        Looks at intervals in rad/s, shape (n, 2), and keeps the best that it finds.
+        The change of omega, in rad/s, that is one turn of the delays.
     end : callable
-        Frequency in rad/s past which nothing better than that can be.
+        Frequency in rad/s past which nothing better than the best can be.
     meeting : callable
         The intervals of a span on which something better can be.
     likely : callable
         Of an array of frequencies, those next to which the best are likely.
+
+    Yields
+    ------
+    float array, shape (n, 2)
+        In rad/s.
     """
     first, around = min(end(), FIRST_TURNS * per_turn), _TURNS_AROUND
-    look(meeting((0.0, first)))
+    yield meeting((0.0, first))
     while (last := end()) > first:
         intervals = meeting((first, last))
         many = float(np.diff(intervals).sum()) > 10.0 * around * per_turn
@@ -250,7 +248,7 @@ def search_outwards(
             spans = np.column_stack((at - reach, at + reach)).clip(first, last)
             intervals = np.concatenate([meeting((low, high)) for low, high in spans])
             around *= _WIDER
-        look(intervals)
+        yield intervals
         if not many:
             break
 
@@ -285,8 +283,8 @@ def _count_below(point: LoopAt, omega: float) -> int | None:
     """Count the unstable roots of a loop that no phases of the arms let cross past omega.
 
     D(s; c1, c2) is compared with D at a thousandth of c1 and c2, which takes little time. Past
-    omega their ratio stays in the right half-plane, so that its argument goes back to zero from
-    what it is at omega. The counts differ by what it gathers in all, over pi. None where
+    omega their ratio stays off the negative real axis, so that its argument goes back to zero
+    from what it is at omega. The counts differ by what it gathers in all, over pi. None where
     rounding hides one of the two.
     """
     # Not zero: sensors with an integrator have a root at s = 0 there.

@@ -55,14 +55,14 @@ def _no_crossing_from(point: LoopAt, low: float, high: float) -> float:
     |c1 B1| + |c2 B2|. Its square is convex in t. If it ascends at the lower end of the
     interval, it is smallest there; if it descends at the upper end, there.
     """
-    loop, arms = point.loop, arm_weights(point)
+    loop, weights = point.loop, arm_weights(point)
     c = polynomial_sum(loop.b1, loop.b2)
-    found = [last_crossover(loop, arms, high)]
+    found = [last_crossover(loop, weights, high)]
     if not loop.delay:
         for t, sign in ((1.0 / high, 1.0), (1.0 / low, -1.0)):
             ascends = math.sqrt(last_root_bound(_ascent(loop.rest, c, t, sign)))
             first = polynomial_sum(t * loop.rest, c)
-            found.append(max(ascends, last_larger(first, (loop.b1, loop.b2), arms)))
+            found.append(max(ascends, last_larger(first, (loop.b1, loop.b2), weights)))
     return min(found)
 
 
@@ -109,7 +109,7 @@ def _gains_around_one(point: LoopAt, least: float, most: float) -> tuple[float, 
 
     The frequency is in rad/s; `least`, `most` and nan where there are none between these two.
     """
-    loop, arms = point.loop, arm_weights(point)
+    loop, weights = point.loop, arm_weights(point)
     crossing = point.numerator().times_conjugate(loop.rest_on_boundary())
     lower, upper, where = least, most, np.nan
     hidden: list[FloatArray] = []
@@ -117,7 +117,7 @@ def _gains_around_one(point: LoopAt, least: float, most: float) -> tuple[float, 
     def end() -> float:
         """Frequency past which no factor between the two takes a root to the axis."""
         clear = max(
-            clear_from(loop, arms, -0.5 * (1.0 / k + 1.0), 0.5 * abs(1.0 - 1.0 / k))
+            clear_from(loop, weights, -0.5 * (1.0 / k + 1.0), 0.5 * abs(1.0 - 1.0 / k))
             for k in (lower, upper)
         )
         return min(clear, _no_crossing_from(point, lower, upper))
@@ -129,8 +129,7 @@ def _gains_around_one(point: LoopAt, least: float, most: float) -> tuple[float, 
         free = _free_gains(point, omega)
         return omega[[np.argmax(free[:, 0]), np.argmin(free[:, 1])]]
 
-    def look(intervals: FloatArray) -> None:
-        nonlocal lower, upper, where
+    for intervals in search_outwards(loop.omega_per_turn, end, meeting, likely):
         omega, stretches = axis_zeros(crossing, intervals)
         omega = np.concatenate((omega, _real_within(point, stretches)))
         hidden.append(_gains(point, stretches.ravel()))
@@ -141,8 +140,6 @@ def _gains_around_one(point: LoopAt, least: float, most: float) -> tuple[float, 
         if above.size:
             nearest = above[np.argmin(factor[above])]
             upper, where = float(factor[nearest]), float(omega[nearest])
-
-    search_outwards(loop.omega_per_turn, look, end, meeting, likely)
     hidden_gains = np.concatenate(hidden)
     if ((hidden_gains > lower) & (hidden_gains < upper)).any():
         _require_stable_inside(point, lower, upper)
@@ -199,8 +196,8 @@ def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float
 
     All sign changes of Im L are found, but for short stretches in which rounding hides its
     sign, at most a part in ten million of the frequency as a rule. There L is looked at in
-    three places, from its factors. Where it could give a factor between the two, counts just
-    inside both confirm them.
+    three places, from its factors. Where it could give a factor between the two, they are
+    refused if a count just inside one of them says that the loop is unstable.
 
     Examples
     --------

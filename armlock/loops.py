@@ -272,9 +272,10 @@ class LoopAt(NamedTuple):
         return order - (int(nonzero[0]) if nonzero.size else order)
 
     def leading_radius(self) -> float:
-        """Radius within which L is its leading term at s = 0, a power of s, to a part in 1000.
+        """Radius around s = 0 within which L is as simple as it gets, or the last one tried.
 
-        With a pole there |L| is above 1000, too. Where nothing settles, the last one tried.
+        With a pole of order n at s = 0, L s^n is constant to a part in 1000, and |L| is above
+        1000. Without one L changes by less than a thousandth of |1 + L|.
         """
         loop, order = self.loop, self.poles_at_zero()
         sizes = np.abs(np.concatenate([p.roots for p in loop.polynomials()]))

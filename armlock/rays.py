@@ -10,6 +10,7 @@ where free phases let a root cross at all: the first turns, then likely places, 
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -20,12 +21,19 @@ from numpy.polynomial import polynomial as poly
 from armlock.bounds import last_frequency
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import ComplexArray, FloatArray, IntArray, axis, positive_number
-from armlock.free_phases import crossing_intervals, free_disc, search_outwards
+from armlock.free_phases import (
+    FIRST_TURNS,
+    crossing_intervals,
+    free_disc,
+    search_outwards,
+)
 from armlock.loops import Loop, LoopAt
-from armlock.stability import CountError, polished, sign_changes, unstable_roots
+from armlock.stability import BOUNDARY, CountError, polished, sign_changes, unstable_roots
 
 #: Nothing is looked at where the parameters are this many times as large as the start, or as 1.
 FARTHEST = 1e9
+# Of a start on the boundary, crossings up to this share of it are the start's own.
+_OWN = 1e-10
 # Next to the limit of the neutral root chain, roots cross at ever higher frequency. They are
 # followed up to so many turns of the longest delay, which takes about a tenth of a second.
 _TURNS_NEXT_TO_THE_CHAIN = 50_000
@@ -61,6 +69,9 @@ class Crossing(NamedTuple):
     change: int
 
 
+_NONE = Crossings(np.empty(0), np.empty(0), np.empty(0, dtype=np.int64))
+
+
 class Ray:
     """A ray, and the characteristic function along it."""
 
@@ -74,7 +85,7 @@ class Ray:
                 raise ValueError(f"{name} must hold two numbers, got {value.size}")
         if not self.direction.any():
             raise ValueError("direction must not have length zero, got (0, 0)")
-        #: The t at which the parameters are about as far from the start as it is from zero.
+        #: The t at which the distance from the start is the start's from zero, or one.
         self.scale = max(1.0, float(np.hypot(*self.start))) / float(np.hypot(*self.direction))
         #: D0 conj(M) at s = j omega.
         self.product = system.at(*self.start).times_conjugate(system.deviation(*self.direction))
@@ -152,19 +163,19 @@ class Ray:
                 f"{self.system!r} loses it before t = {stop}"
             )
         if not self.acts():
-            return Crossings(np.empty(0), np.empty(0), np.empty(0, dtype=np.int64))
+            return _NONE
         parts = [(0.0, end)] if intervals is None else np.minimum(intervals, end)
-        found, hidden = self._crossings(parts, 0.0, stop)
+        found, hidden = self._crossings(parts, stop)
         if hidden and intervals is None:
             self._confirm(stop, int(found.change.sum()))
         return found
 
     def _crossings(
-        self, intervals: npt.ArrayLike, lowest: float, stop: float, *, first: bool = False
+        self, intervals: npt.ArrayLike, stop: float, *, first: bool = False
     ) -> tuple[Crossings, bool]:
         """Find crossings on intervals of the axis; return whether rounding may hide some.
 
-        All with `lowest` < t <= stop, or the first and what ties with it.
+        All of them up to `stop`, or the first and what ties with it.
         """
         omega, change, width = sign_changes(
             self.product, intervals, is_map=self.system.step > 0.0
@@ -177,17 +188,30 @@ class Ray:
         # real, because omega is not yet polished.
         q = self.quotient(omega)
         rough = np.where(np.abs(q.imag) <= np.abs(q.real) + self.scale, q.real, np.inf)
-        near = (rough > lowest) & (rough <= stop * (1.0 + 1e-6))
-        if first and near.any():
-            near &= rough <= rough[near].min() * (1.0 + 1e-6)
-        omega, change = omega[near], change[near]
+        left = np.flatnonzero((rough > 0.0) & (rough <= stop * (1.0 + 1e-6)))
+        left, found = left[np.argsort(rough[left], kind="stable")], _NONE
+        while left.size and not found.position.size:
+            many = left.size
+            if first:
+                many = int((rough[left] <= rough[left[0]] * (1.0 + 1e-6)).sum())
+            found = self._polished(omega[left[:many]], change[left[:many]], stop)
+            left = left[many:]
+        return found, hidden
+
+    def _polished(self, omega: FloatArray, change: IntArray, stop: float) -> Crossings:
+        """Polish frequencies; return the crossings up to `stop`, but for the start's own."""
         # Far less than the distance between two zeros.
         reach = np.minimum(1e-7 * omega, 1e-3 * self.system.omega_per_turn)
         omega = polished(lambda w: self.quotient(w).imag, omega, (reach,))
         position = self.quotient(omega).real
+        lowest = 1e-15 * self.scale
+        if (position[position > lowest] <= _OWN * self.scale).any():
+            # The start itself may be on the axis, up to rounding.
+            own = unstable_roots(self.system, *self.start) == BOUNDARY
+            lowest = _OWN * self.scale if own else lowest
         kept = np.flatnonzero((position > lowest) & (position <= stop))
         kept = kept[np.argsort(position[kept], kind="stable")]
-        return Crossings(position[kept], omega[kept], change[kept]), hidden
+        return Crossings(position[kept], omega[kept], change[kept])
 
     def _confirm(self, stop: float, change: int) -> None:
         """Raise if counts at both ends contradict a change of the number of unstable roots.
@@ -210,50 +234,60 @@ class Ray:
         best = Crossing(chain, np.inf, 0) if chain <= stop else Crossing(np.inf, np.nan, 0)
         if not self.acts():
             return best
-        # The boundary of a map ends at one frequency: a single walk sees all of it.
-        per_turn = np.inf if self.system.step else self.system.omega_per_turn
-        hidden = False
+        hidden, per_turn = False, self.system.omega_per_turn
 
         def reach() -> float:
             return min(best.position, stop)
 
         def end() -> float:
             """Frequency past which no root crosses earlier."""
-            if reach() < chain:
+            if reach() < chain * (1.0 - 1e-10):
                 return self.end(reach())
             # Roots are followed up to where they cross a part in a million before the limit,
             # and beyond for so many turns at most. Past that the limit is taken for them.
             near, nearest = (self.end(chain * (1.0 - share)) for share in (1e-6, 1e-10))
             return max(near, min(nearest, _TURNS_NEXT_TO_THE_CHAIN * per_turn))
 
-        def look(intervals: FloatArray) -> None:
-            nonlocal best, hidden
-            # A boundary at the start itself, known to rounding, is not a crossing beyond it.
-            lowest = 1e-15 * self.scale
-            found, doubtful = self._crossings(intervals, lowest, reach(), first=True)
+        if isinstance(self.system, Loop):
+            parts = self._where_free_phases_cross(self.system, end, reach)
+        else:
+            # The boundary of a map ends at one frequency: a single walk sees all of it.
+            parts = _outwards(np.inf if self.system.step else per_turn, end)
+        for intervals in parts:
+            found, doubtful = self._crossings(intervals, reach(), first=True)
             hidden |= doubtful
             if found.position.size:
                 best = Crossing(*(values[0].item() for values in found))
-
-        def meeting(span: tuple[float, float]) -> FloatArray:
-            if not isinstance(self.system, Loop):
-                return np.array([span])
-            c1, c2 = np.abs([self.at(0.0), self.at(reach())]).max(axis=0)
-            return crossing_intervals(LoopAt(self.system, c1, c2), span)
-
-        def likely(omega: FloatArray) -> FloatArray:
-            if not isinstance(self.system, Loop):
-                return omega[:1]
-            centre, radius = free_disc(LoopAt(self.system, *self.at(0.0)), omega)
-            d1, d2 = map(float, self.direction)
-            growth = free_disc(LoopAt(self.system, d1, d2), omega)[1]
-            # The t at which the disc of free phases first holds -1.
-            return omega[[np.argmin((np.abs(1.0 + centre) - radius) / growth)]]
-
-        search_outwards(per_turn, look, end, meeting, likely)
         if hidden:
             self._confirm((1.0 - 1e-6) * reach(), 0)
         return best
+
+    def _where_free_phases_cross(
+        self, loop: Loop, end: Callable[[], float], reach: Callable[[], float]
+    ) -> Iterator[FloatArray]:
+        """Yield where phases of the arms and parameters up to `reach` let a root cross."""
+
+        def meeting(span: tuple[float, float]) -> FloatArray:
+            c1, c2 = np.abs([self.at(0.0), self.at(reach())]).max(axis=0)
+            return crossing_intervals(LoopAt(loop, c1, c2), span)
+
+        def likely(omega: FloatArray) -> FloatArray:
+            centre, radius = free_disc(LoopAt(loop, *self.at(0.0)), omega)
+            d1, d2 = map(float, self.direction)
+            growth = free_disc(LoopAt(loop, d1, d2), omega)[1]
+            # The t at which the disc of free phases first holds -1.
+            return omega[[np.argmin((np.abs(1.0 + centre) - radius) / growth)]]
+
+        return search_outwards(loop.omega_per_turn, end, meeting, likely)
+
+
+def _outwards(per_turn: float, end: Callable[[], float]) -> Iterator[FloatArray]:
+    """Yield parts of the axis up to `end`, each three times as long as all before it."""
+    walked = 0.0
+    while (last := end()) > walked:
+        following = min(last, max(4.0 * walked, FIRST_TURNS * per_turn))
+        yield np.array([[walked, following]])
+        walked = following
 
 
 def first_crossing(

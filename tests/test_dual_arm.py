@@ -5,6 +5,7 @@ import pytest
 
 from armlock import (
     BOUNDARY,
+    CharacteristicFunction,
     CommonArm,
     Controller,
     CountError,
@@ -12,6 +13,7 @@ from armlock import (
     Loop,
     critical_perturbation,
     d_curve_line,
+    margins,
     unstable_roots,
 )
 from armlock.rays import Ray, first_crossing
@@ -94,3 +96,59 @@ def test_a_lost_chain_is_not_passed_over():
         assert (found.omega, found.change) == (np.inf, 0)
     assert first_crossing(loop, (6.0, 0.0), (0.0, 1.0), 1.0).position == 0.0
     assert first_crossing(loop, (0.0, 0.0), (1.0, -1.0), 2.5).position == np.inf
+
+
+# An oscillator with two delayed forces, and one of its crossings, known to rounding.
+OSCILLATOR = CharacteristicFunction([1.0, 0.2, 1.0], [1.0], [1.0], 1.0, 2.0)
+BOUNDARY_POINT = (-0.40709479644622093, 0.185983667443698)
+
+
+@pytest.mark.parametrize("stop", [0.2, 1.0, None])
+def test_a_ray_from_the_boundary_meets_the_next_crossing(stop):
+    direction = np.array([-0.967681471724209, 1.6784190387621596])
+    assert unstable_roots(OSCILLATOR, *BOUNDARY_POINT) == BOUNDARY
+    found = first_crossing(OSCILLATOR, BOUNDARY_POINT, direction, stop)
+    around = np.outer([0.5, 1.0 - 1e-6, 1.0 + 1e-6], found.position * direction)
+    counts = unstable_roots(OSCILLATOR, *(BOUNDARY_POINT + around).T)
+    assert counts.tolist() == [0, 0, 2]
+
+
+def test_a_ray_may_end_where_rounding_has_the_chain_at_its_limit():
+    loop = Loop(Controller([-1.0], [-2.0], 0.2), COMMON, 1.0, 0.7)
+    limit = Ray(loop, (0.1, 0.1), (1.0, 1.0)).chain_limit()
+    found = first_crossing(loop, (0.1, 0.1), (1.0, 1.0), limit * (1.0 - 1e-15))
+    assert found.position == np.inf
+
+
+def test_a_first_crossing_may_lie_many_turns_up():
+    # The resonance is 1.5e5 turns of the delay up, and damps until x is 4 pi 1.5e5 1e-6.
+    resonance = 2.0 * np.pi * 1.5e5
+    squared = [resonance**2, 2e-6 * resonance, 1.0]
+    system = CharacteristicFunction(squared, [0.0, 1.0], [0.0], 1.0, 1.0)
+    found = first_crossing(system, (0.0, 0.0), (1.0, 0.0))
+    assert found.position == pytest.approx(2e-6 * resonance, rel=1e-9)
+
+
+def test_a_factor_before_the_equation_moves_no_crossing():
+    plain, scaled = (
+        CharacteristicFunction([2.0 * f, 0.3 * f, f], [f], [0.0, f], 1.0, 2.5)
+        for f in (1.0, 1e-158)
+    )
+    for direction in ((1.0, 0.5), (-1.0, 1.0)):
+        found, expected = (
+            first_crossing(system, (0.0, 0.0), direction) for system in (scaled, plain)
+        )
+        assert found == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_steep_low_pass_far_above_changes_no_crossing():
+    """The square of its gain is no float."""
+    angles = np.pi * (0.5 + (2.0 * np.arange(16) + 1.0) / 64.0)
+    upper = 1e5 * np.exp(1j * angles)
+    poles = [0.0, *upper, *upper.conj()]
+    loop = Loop(Controller([], poles, 0.2 * 1e160), COMMON, 3.0, 2.1)
+    assert tuple(first_crossing(loop, (0.5, 0.5), (1.0, 1.0), 3.0)) == (0.5, 0.0, 1)
+    plain = margins(Loop(Controller([], [0.0], 0.2), COMMON, 3.0, 2.1), 0.9, 0.9)
+    found = margins(loop, 0.9, 0.9)
+    assert found.phase == pytest.approx(plain.phase, rel=1e-3)
+    assert found.delay == pytest.approx(plain.delay, rel=1e-3)
