@@ -433,7 +433,7 @@ def imaginary_zeros(
 
 @njit(cache=True)
 def resolved_grid(whole: CompiledSum, omega_end: float, tolerance: float) -> FloatArray:
-    """Frequencies from 0 to `omega_end` between which an exponential sum is nearly straight.
+    """Frequencies from 0 to `omega_end` between which an exponential sum changes little.
 
     Over each step its tangent moves by no more than twice `tolerance` times its distance from
     zero, and the sum leaves the tangent by no more than once that, or the step is as small as

@@ -41,13 +41,14 @@ def axis_zeros(
     """Zeros of the imaginary part at omega > 0, and stretches there that may hide some.
 
     On intervals of the axis, in rad/s. The stretches have shape (3, n): the lower ends, the
-    middles, the upper ends. One that begins at omega = 0, where L is one power of s, is none of
-    them.
+    middles, the upper ends. A stretch that begins at omega = 0, where L is one power of s, is
+    left out.
     """
     omega, jump, width = sign_changes(whole, intervals)
     hidden = jump == 0
     stretches = omega[hidden] + np.outer((-1.0, 0.0, 1.0), width[hidden])
-    return omega[~hidden & (omega > 0.0)], np.maximum(stretches, 1e-3 * omega[hidden])
+    stretches = np.maximum(stretches, 1e-3 * omega[hidden])[:, stretches[0] != 0.0]
+    return omega[~hidden & (omega > 0.0)], stretches
 
 
 def _on_unit_circle(point: LoopAt, omega: FloatArray) -> FloatArray:
@@ -104,7 +105,7 @@ def _least_lags(point: LoopAt, omega: FloatArray) -> tuple[float, float, float]:
 def crossovers_end(point: LoopAt, weights: FloatArray, phase: float) -> float:
     """Frequency in rad/s past which no crossover has a smaller phase margin than a number.
 
-    `weights` are those of `last_crossover`, past which |L| is below one.
+    `weights` are those of `arm_weights`.
     """
     last = last_crossover(point.loop, weights)
     return last if np.isfinite(last) else _settled_from(point, phase)
