@@ -369,9 +369,13 @@ class CharacteristicFunction:
             else:
                 # Where D is evaluated from these: exactly, because powers of sigma may cancel.
                 number = Fraction if size <= LOW_DEGREE + 1 else float
-                line = poly.Polynomial(np.array([number(sigma), number(1.0)]))
-                before = np.array([number(value) for value in p.coefficients.tolist()])
-                moved = poly.polyval(line, before).coef.astype(np.float64)
+                exact: list[Any] = []
+                for value in reversed(p.coefficients.tolist()):
+                    # Horner's rule, with s + sigma in place of s.
+                    left = [number(sigma) * c for c in exact]
+                    pairs = zip([number(value), *exact], [*left, 0], strict=True)
+                    exact = [a + b for a, b in pairs]
+                moved = np.array(exact, dtype=np.float64)
             return with_moved(p.roots, late * moved)
 
         x0, y0 = self.reference
