@@ -312,7 +312,8 @@ def first_crossing(
     -------
     Crossing
         The one of smallest t > 0. A root that lies on the axis at the start itself counts as
-        a crossing only where it comes back to it.
+        a crossing only where it comes back to it. Of a start on the boundary, crossings closer
+        than a part in 1e10 are taken for its own.
 
     Raises
     ------
