@@ -234,3 +234,9 @@ def gain_interval_of_stable(point: LoopAt) -> tuple[float, float, float]:
     elif 1.0 < at_zero < min(upper, LARGEST_GAIN):
         upper, where = at_zero, 0.0
     return lower, upper, where
+
+
+__all__ = [
+    "LARGEST_GAIN",
+    "gain_interval",
+]
