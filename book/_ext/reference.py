@@ -2,9 +2,9 @@
 
 `public` describes what some modules offer: the names in `armlock.__all__` under the name they
 are imported by, `armlock.Loop`, and with the option `all` also those that are reached through
-the module, `armlock.sensors.COMMON`. A constant is described by a comment (`#:`) above it.
-`public-index` lists all names of `armlock.__all__`. `versions` is a table of the packages that
-the book was computed with.
+the module, `armlock.sensors.COMMON`: those of its own `__all__`, if it has one. A constant is
+described by a comment (`#:`) above it. `public-index` lists all names of `armlock.__all__`.
+`versions` is a table of the packages that the book was computed with.
 
 Docstrings are written to be read in a terminal too. What reStructuredText would take for
 markup there, such as the bars of an absolute value, is escaped; `name` in backticks becomes a
@@ -118,7 +118,8 @@ class Public(SphinxDirective):
                 lines = documented.get(name, [])
                 text += described(f"armlock.{name}", getattr(armlock, name), module, lines)
             if "all" in self.options:
-                for name, thing in vars(module).items():
+                for name in getattr(module, "__all__", vars(module)):
+                    thing = vars(module)[name]
                     ours = getattr(thing, "__module__", None) == module_name
                     ours &= inspect.isclass(thing) or callable(thing)
                     if name.startswith("_") or name in own or not (ours or name in documented):
