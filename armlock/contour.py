@@ -7,10 +7,9 @@ over a step, a function stays within M step^2 / 2 of its tangent. So
   exact up to rounding;
 - `imaginary_zeros` never steps over two zeros at once, so that none is missed.
 
-Where the sum is no larger than the bound on its
-rounding error, `winding` stops: that makes a point a boundary point. Where only its imaginary
-part is no larger, `imaginary_zeros` gives a zero with a jump of 0. The tolerance in the bound
-is `armlock.exponentials.ROUNDING`.
+Where the sum is no larger than the bound on its rounding error, `winding` stops: that makes a
+point a boundary point. Where only its imaginary part is no larger, `imaginary_zeros` gives a
+zero with a jump of 0. The tolerance in the bound is `armlock.exponentials.ROUNDING`.
 
 All functions here work on exponential sums, piece by piece, see `armlock.exponentials`.
 """
@@ -65,9 +64,9 @@ def _follow(
     """Argument gathered by an exponential sum from omega to `end`, within one piece.
 
     `bound` and `error` are polynomials in u that bound the second derivative and how far the
-    values may be off. Returns the argument, the frequency
-    up to which it is certain, the last step, and the number of steps. It is not certain up to
-    `end` where that takes a step below `shortest`, or where the sum is within its error.
+    values may be off. Returns the argument, the frequency up to which it is certain, the last
+    step, and the number of steps. It is not certain up to `end` where that takes a step below
+    `shortest`, or where the sum is within its error.
     """
     argument, steps = 0.0, 0
     value, slope = evaluate(piece, omega)
@@ -405,13 +404,7 @@ def imaginary_zeros(
             if now != sign or doubtful:
                 jump, width = now - sign, 0.5 * (following - last_clear)
                 at = last_clear + width
-                there, rate = evaluate(piece, max(at, start))
-                if sign == 0:
-                    # At the start itself the sign was hidden.
-                    at, width = omega_start, 2.0 * width
-                    there = evaluate(piece, max(at, start))[0]
-                    jump = now if omega_start == 0.0 else 0
-                elif jump != 0 and last_clear >= start:
+                if sign != 0 and now != sign and last_clear >= start:
                     if not doubtful:
                         h, dh = (old_value.imag, value.imag), (old_slope.imag, slope.imag)
                         at = _zero_between(omega, following, h, dh)
@@ -419,6 +412,13 @@ def imaginary_zeros(
                     uncertain = bound_at(error, piece, at)
                     if abs(rate.imag) * width > uncertain:
                         width = uncertain / abs(rate.imag)
+                else:
+                    there, rate = evaluate(piece, max(at, start))
+                    if sign == 0:
+                        # At the start itself the sign was hidden.
+                        at, width = omega_start, 2.0 * width
+                        there = evaluate(piece, max(at, start))[0]
+                        jump = now if omega_start == 0.0 else 0
                 zeros = _with_zero(zeros, found, at, jump, width, there, rate)
                 found += 1
             omega, last_clear, sign, doubtful = following, following, now, False

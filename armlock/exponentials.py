@@ -199,9 +199,9 @@ class ExponentialSum(NamedTuple):
         whole = np.zeros((len(self.polynomials), degree + 1), dtype=np.complex128)
         # Powers of j, so that each coefficient stays exactly real or exactly imaginary.
         turns = np.array([1.0, 1.0j, -1.0, -1.0j])[np.arange(degree + 1) % 4]
-        for row, p in zip(whole, self.polynomials, strict=True):
-            size = p.coefficients.size
-            with np.errstate(invalid="ignore"):
+        with np.errstate(invalid="ignore"):
+            for row, p in zip(whole, self.polynomials, strict=True):
+                size = p.coefficients.size
                 row.real[:size] = p.coefficients * turns.real[:size]
                 row.imag[:size] = p.coefficients * turns.imag[:size]
         leads = [np.frexp(p.leads or p.coefficients[-1:]) for p in self.polynomials]
@@ -422,8 +422,8 @@ def expand(whole: CompiledSum, omega: float, uncertain: FloatArray | None = None
         return Piece(0.0, np.inf, 1.0, local, sizes, phases)
     # Powers that rounding hides are not worth their time.
     powers = sizes[:, :size].sum(axis=0)
-    used, dropped = size, powers[size - 1]
-    while used > 1 and dropped <= 1e-3 * EPSILON * powers.sum():
+    used, dropped, hidden = size, powers[size - 1], 1e-3 * EPSILON * powers.sum()
+    while used > 1 and dropped <= hidden:
         used -= 1
         dropped += powers[used - 1]
     sizes[:, used] = sizes[:, size] + sizes[:, used:size].sum(axis=1) / EPSILON

@@ -234,7 +234,7 @@ def nyquist(
     >>> curve.encirclements, curve.open_loop_poles, curve.closed_loop_roots
     (1, 0, 1)
     """
-    point = LoopAt.of(loop, c1, c2)
+    loop, c1, c2 = point = LoopAt.of(loop, c1, c2)
     poles = open_loop_poles(loop)
     order = point.poles_at_zero()
     end = float(last_frequency(loop, c1, c2))
@@ -329,7 +329,7 @@ def axis_crossings(
     5.63e-05 rad/s: -5.13
     1.96e-04 rad/s: -113.07
     """
-    point = LoopAt.of(loop, c1, c2)
+    loop, c1, c2 = point = LoopAt.of(loop, c1, c2)
     open_loop_poles(loop)
     if omega_max is None:
         factors = np.array([1.0 + abs(c1), 1.0 + abs(c2)]) / 1e-3

@@ -189,7 +189,8 @@ class _Line:
     ) -> None:
         self.system, self.x, self.y = _acting(system, x, y, sigma)
         self.sigma = sigma
-        self.per_turn = 2.0 * np.pi / (self.system.longest_delay or system.longest_delay)
+        delayed = self.system if self.system.longest_delay else system
+        self.per_turn = delayed.omega_per_turn
         try:
             self.shifted = self.system.shifted(sigma)
             self.turns = float(last_frequency(self.shifted, self.x, self.y)) / self.per_turn
