@@ -4,43 +4,56 @@ The reproducible companion to "Robustness Analysis and Controller Design of Arm-
 System in Space-based Gravitational Wave Detectors".
 """
 
-from armlock.budget import NoiseBudget, noise_budget
 from armlock.characteristic import CharacteristicFunction
 from armlock.controllers import Controller
-from armlock.dcurve import d_curve, d_curve_branches, d_curve_line
 from armlock.design import Design, buildable_loop, design, robust_loop
-from armlock.flight import flight_loop, published_loops
-from armlock.loops import CommonArm, DualArm, HayesEquation, Loop, SingleArm, paper_loop
-from armlock.margins import Margins, critical_perturbation, margins, modulus_margin
-from armlock.noise import LaserNoise, PerturbationNoise, ShapedNoise
-from armlock.nyquist import (
-    AxisCrossings,
-    NyquistCurve,
-    axis_crossings,
-    nyquist,
+from armlock.loops import (
+    CommonArm,
+    DualArm,
+    HayesEquation,
+    Loop,
+    SingleArm,
+    flight_loop,
+    paper_loop,
+    published_loops,
 )
-from armlock.pulling import pulling
-from armlock.roots import RootError, rightmost_root
-from armlock.semidiscretization import semi_discretization, spectral_radius, transition_matrix
-from armlock.simulation import (
+from armlock.performance import NoiseBudget, closed_loop, noise_budget, pulling, transfer
+from armlock.robustness import Margins, critical_perturbation, margins, modulus_margin
+from armlock.stability import (
+    BOUNDARY,
+    UNCONFINED,
+    AxisCrossings,
+    CountError,
+    NyquistCurve,
+    RootError,
+    StabilityChart,
+    axis_crossings,
+    d_curve,
+    d_curve_branches,
+    d_curve_line,
+    nyquist,
+    rightmost_root,
+    semi_discretization,
+    spectral_radius,
+    stability_chart,
+    transition_matrix,
+    unstable_roots,
+)
+from armlock.sweep import sweep
+from armlock.timedomain import (
     DivergenceError,
+    LaserNoise,
+    PerturbationNoise,
+    ShapedNoise,
     Simulation,
+    Spectrum,
+    SpectrumEstimator,
+    amplitude_spectrum,
     sampled_open_loop,
     save_series,
     simulate,
     simulate_blocks,
 )
-from armlock.spectra import Spectrum, SpectrumEstimator, amplitude_spectrum
-from armlock.stability import (
-    BOUNDARY,
-    UNCONFINED,
-    CountError,
-    StabilityChart,
-    stability_chart,
-    unstable_roots,
-)
-from armlock.sweep import sweep
-from armlock.transfer import closed_loop, transfer
 
 __version__ = "0.1.0"
 

@@ -24,6 +24,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
+from armlock.axis.exponentials import EPSILON, LOW_DEGREE, ExponentialSum, Polynomial
 from armlock.checks import (
     ComplexArray,
     FloatArray,
@@ -35,7 +36,6 @@ from armlock.checks import (
     real_number,
     whole_steps,
 )
-from armlock.exponentials import EPSILON, LOW_DEGREE, ExponentialSum, Polynomial
 
 # Past this an exponential is no float.
 _LARGEST_EXPONENT = 700.0
@@ -61,7 +61,7 @@ class CharacteristicFunction:
 
     Parameters
     ----------
-    rest, b1, b2 : sequence of float, or armlock.exponentials.Polynomial
+    rest, b1, b2 : sequence of float, or armlock.axis.exponentials.Polynomial
         Coefficients of R, B1 and B2 in ascending powers of s (of z = exp(s step) for a map);
         or polynomials with known roots, which are then kept.
     delay1, delay2 : float

@@ -18,6 +18,7 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
 from armlock import paper
+from armlock.axis.exponentials import quotients
 from armlock.checks import (
     ComplexArray,
     FloatArray,
@@ -26,7 +27,6 @@ from armlock.checks import (
     real_number,
     whole_number,
 )
-from armlock.exponentials import quotients
 
 # Decimal digits in which the zeros of parallel branches are found.
 _DIGITS = 80

@@ -19,7 +19,6 @@ import numpy.typing as npt
 from scipy.optimize import differential_evolution, minimize
 
 from armlock import paper
-from armlock.boxes import CORNERS, box_counts, edge_crossings
 from armlock.checks import (
     ComplexArray,
     FloatArray,
@@ -31,9 +30,10 @@ from armlock.checks import (
     whole_number,
 )
 from armlock.controllers import Controller
-from armlock.free_phases import last_crossover
 from armlock.loops import Loop, checked_loop, paper_loop
-from armlock.margins import Margins, critical_perturbation, margins
+from armlock.robustness.boxes import CORNERS, box_counts, edge_crossings
+from armlock.robustness.free_phases import last_crossover
+from armlock.robustness.margins import Margins, critical_perturbation, margins
 from armlock.sweep import sweep
 
 if TYPE_CHECKING:
@@ -397,8 +397,8 @@ def design(
     box : float, optional
         Perturbations of either arm for which the loop is to be stable.
     free_above : float, optional
-        As for `armlock.margins`; in rad/s. A loop that rolls off takes it: its certificates
-        then need not follow every turn of the arms' phases.
+        As for `armlock.robustness.margins`; in rad/s. A loop that rolls off takes it: its
+        certificates then need not follow every turn of the arms' phases.
     free_gain : bool, optional
         Whether the gain is a parameter, too.
     generations : int, optional

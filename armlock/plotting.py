@@ -21,9 +21,9 @@ from scipy import ndimage
 from armlock.checks import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
-    from armlock.dcurve import Branch, Line
-    from armlock.nyquist import NyquistCurve
-    from armlock.stability import StabilityChart
+    from armlock.stability.counts import StabilityChart
+    from armlock.stability.dcurve import Branch, Line
+    from armlock.stability.nyquist import NyquistCurve
 
 #: Colours of the figures, which the colour-blind tell apart too (Okabe and Ito). The colour
 #: cycle of armlock.mplstyle has the same.

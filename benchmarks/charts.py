@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 import armlock
 from armlock import CommonArm, StabilityChart, stability_chart, unstable_roots
 from armlock.checks import FloatArray
-from armlock.semidiscretization import semi_discretization, transition_matrix
+from armlock.stability.semidiscretization import semi_discretization, transition_matrix
 from benchmarks import child
 from benchmarks.report import (
     Row,

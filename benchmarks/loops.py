@@ -23,9 +23,9 @@ from armlock import (
     stability_chart,
     unstable_roots,
 )
-from armlock.bounds import last_frequency
 from armlock.checks import FloatArray
-from armlock.stability import sign_changes
+from armlock.stability.bounds import last_frequency
+from armlock.stability.counts import sign_changes
 from benchmarks import child
 from benchmarks.charts import MEMORY
 from benchmarks.report import Row, Topic, at_most, comparison, memory_row, timed

@@ -16,8 +16,8 @@ from numba import njit
 
 from armlock import LaserNoise, Loop, PerturbationNoise, paper_loop, simulate
 from armlock.checks import FloatArray
-from armlock.discretize import sampled_loop
 from armlock.paper import SAMPLE_RATE, TAU1, TAU2
+from armlock.timedomain.discretize import sampled_loop
 from benchmarks.report import Row, Topic, timed
 
 PYTHON_RATIO = 100.0

@@ -33,9 +33,9 @@ from armlock import (
     stability_chart,
     unstable_roots,
 )
-from armlock.rays import Ray, first_crossing
-from armlock.semidiscretization import semi_discretization
+from armlock.robustness.rays import Ray, first_crossing
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
+from armlock.stability.semidiscretization import semi_discretization
 from tests import attack_judge as judge
 from tests import independent
 from tests.attack_judge import Sketch, UndecidedError, View

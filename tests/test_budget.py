@@ -20,8 +20,8 @@ from armlock import (
     rightmost_root,
     transfer,
 )
-from armlock.budget import MOTION_CORNER, noise_series, tdi_capability
-from armlock.pulling import _complete_up_to, slow_roots
+from armlock.performance.budget import MOTION_CORNER, noise_series, tdi_capability
+from armlock.performance.pulling import _complete_up_to, slow_roots
 from armlock.sensors import SINGLE, modified_dual
 
 FLIGHT = flight_loop()

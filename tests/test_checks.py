@@ -14,11 +14,11 @@ import armlock
 from armlock import CharacteristicFunction, CommonArm, HayesEquation, SingleArm, paper_loop
 from armlock.checks import axis, finite_series, real_array
 from armlock.controllers import integrating_actuator, roll_off, stage_one, table_two
-from armlock.discretize import warped
-from armlock.noise import band_rms
-from armlock.rays import first_crossing
-from armlock.roots import extended_root
+from armlock.robustness.rays import first_crossing
 from armlock.sensors import COMMON, SignalMapping, dual
+from armlock.stability.roots import extended_root
+from armlock.timedomain.discretize import warped
+from armlock.timedomain.noise import band_rms
 from tests.systems import NEUTRAL
 
 ARMS = CommonArm()
@@ -64,9 +64,9 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     armlock.d_curve_line: {"system": ARMS},
     armlock.d_curve_branches: {"system": ARMS, "omega_max": 1.0, "points_per_turn": 24},
     first_crossing: {"system": ARMS, "start": (0.0, 0.0), "direction": (1.0, 1.0), "stop": 1.0},
-    armlock.nyquist: {"loop": ARMS, "omega_max": 3.0} | POINT,
+    armlock.stability.nyquist: {"loop": ARMS, "omega_max": 3.0} | POINT,
     armlock.axis_crossings: {"loop": paper_loop(), "omega_max": 3.0} | POINT,
-    armlock.margins: {"loop": ARMS, "c1": 0.9, "c2": 0.9, "free_above": 1.0},
+    armlock.robustness.margins: {"loop": ARMS, "c1": 0.9, "c2": 0.9, "free_above": 1.0},
     armlock.modulus_margin: {"loop": ARMS, "c1": 0.9, "c2": 0.9},
     armlock.critical_perturbation: {"loop": ARMS, "direction": (1.0, 1.0)},
     armlock.spectral_radius: {"system": ARMS, "step": 0.1, "order": 1} | AT,
@@ -85,12 +85,12 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     armlock.amplitude_spectrum: {"series": np.ones(2000), "sample_rate": 1.0},
     armlock.flight_loop: {"mean_delay": 33.6, "half_difference": 0.255, "g2": 40.0,
                           "corner": 2.0, "delay": 0.0},
-    armlock.transfer: {"loop": ARMS, "source": "laser", "s": 1j} | POINT,
+    armlock.performance.transfer: {"loop": ARMS, "source": "laser", "s": 1j} | POINT,
     armlock.closed_loop: {"loop": ARMS, "omega": [1.0]} | POINT,
     armlock.noise_budget: {"loop": ARMS, "frequency": [1.0], "laser": 1.0, "requirement": 1.0},
     warped: {"omega": 1.0, "sample_rate": 10.0},
     roll_off: {"first": 1.0, "last": 2.0, "pairs": 3, "slope": 0.5},
-    armlock.pulling: {"loop": CommonArm(), "time": 1e5, "common": (1.0, 0.0, 0.0),
+    armlock.performance.pulling: {"loop": CommonArm(), "time": 1e5, "common": (1.0, 0.0, 0.0),
                       "differential": (0.0, 0.0, 0.0)},
 }  # fmt: skip
 JUNK = {"text": "no", "nan": np.nan, "ragged": [[1.0], [1.0, 2.0]], "object": object()}
@@ -144,7 +144,7 @@ WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
     (armlock.d_curve_line, "system", FLAT, "depend on a free parameter at s = 0"),
     (first_crossing, "start", (0.0,), "hold two numbers, got 1"),
     (first_crossing, "direction", (0.0, 0.0), "not have length zero"),
-    (armlock.nyquist, "loop", HayesEquation(), "be a Loop, for instance CommonArm()"),
+    (armlock.stability.nyquist, "loop", HayesEquation(), "be a Loop, for instance CommonArm()"),
     (armlock.axis_crossings, "omega_max", None, "be given"),
     (armlock.spectral_radius, "system", NEUTRAL["integrator"], "be of retarded type"),
     (armlock.spectral_radius, "system", armlock.semi_discretization(ARMS, 0.1), "be in contin"),
@@ -171,8 +171,8 @@ WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
     (armlock.noise_budget, "laser", "maser", "be one of free-running, Mach-Zehnder, cavity"),
     (armlock.noise_budget, "laser", [1.0, 2.0], "be one number or hold one a frequency, 1 of"),
     (armlock.noise_budget, "laser", -1.0, "not be negative, got -1.0"),
-    (armlock.pulling, "time", [0.0, 1.0], "be positive"),
-    (armlock.pulling, "common", (1.0,), "hold nu0, gamma and alpha"),
+    (armlock.performance.pulling, "time", [0.0, 1.0], "be positive"),
+    (armlock.performance.pulling, "common", (1.0,), "hold nu0, gamma and alpha"),
 ]
 
 

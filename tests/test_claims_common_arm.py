@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from armlock import CommonArm, unstable_roots
-from armlock.dcurve import d_curve
+from armlock.stability.dcurve import d_curve
 from book.companion.claims import Verdict
 from book.companion.claims import common_arm as chapter
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from armlock import LaserNoise, Loop, transfer
-from armlock.budget import FREE_RUNNING
+from armlock import LaserNoise, Loop
+from armlock.performance import transfer
+from armlock.performance.budget import FREE_RUNNING
 from book.companion.claims import flight
 
 

@@ -1,4 +1,4 @@
-"""Compiled functions: kept where there is room, made anew where what is kept is no good."""
+"""Compiled functions: kept where there is room, made anew where their code has changed."""
 
 import os
 import pty
@@ -9,14 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from armlock.compiled import soon
-
 ROOT = Path(__file__).parents[1]
 # `draw` compiles two functions, in two modules, one of which calls the other.
 DRAW = "from armlock import LaserNoise; print(LaserNoise(1).draw(3).tolist())"
-LOADED = "from armlock.noise import _shape; print(sum(_shape.stats.cache_hits.values()))"
-# A long walk, close to the ideal point.
-COUNT = "from armlock import *; print(unstable_roots(paper_loop(), 1, 1 - 1e-6))"
+LOADED = (
+    "from armlock.timedomain.noise import _shape; print(sum(_shape.stats.cache_hits.values()))"
+)
 
 
 @pytest.fixture
@@ -45,28 +43,31 @@ def run(package, code, stderr=subprocess.PIPE, **settings):
 def test_where_nothing_can_be_written_it_works_all_the_same(package):
     (package / "__pycache__").write_text("in the way")
     nowhere = {"HOME": "/dev/null", "XDG_CACHE_HOME": "/dev/null"}
-    assert run(package, COUNT, **nowhere) == ("0\n", "")
     printed, word = run(package, DRAW, **nowhere)
     assert len(printed.split(",")) == 3
     assert word.count("\n") == 1
     assert "NUMBA_CACHE_DIR" in word
 
 
-def test_what_is_damaged_or_out_of_date_is_compiled_anew(package):
+def test_what_others_could_have_written_is_not_run(package, tmp_path):
+    elsewhere = {"XDG_CACHE_HOME": str(tmp_path)}
+    run(package, DRAW, **elsewhere)
+    assert not (tmp_path / "armlock-compiled").exists()
+    for folder in (package / "__pycache__" / "armlock-compiled").iterdir():
+        folder.chmod(0o777)
+    run(package, DRAW, **elsewhere)
+    assert (tmp_path / "armlock-compiled").exists()
+
+
+def test_only_a_change_of_what_a_function_uses_compiles_it_anew(package):
     first, _ = run(package, DRAW)
     assert run(package, f"{DRAW}; {LOADED}") == (f"{first}1\n", "")
-    kept = package / "__pycache__"
-    for pattern, damage in (
-        ("*.nbc", lambda data: data[:-1500] + bytes(700) + data[-800:]),
-        ("*.nbi", lambda data: data[: len(data) // 2]),
-    ):
-        for file in kept.glob(pattern):
-            file.write_bytes(damage(file.read_bytes()))
-        assert run(package, f"{DRAW}; {LOADED}") == (f"{first}0\n", "")
+    # A comment, in a module that the function does not stand in.
+    changed = package / "timedomain" / "discretize.py"
+    source = changed.read_text()
+    changed.write_text(source + "# A comment.\n")
     assert run(package, f"{DRAW}; {LOADED}") == (f"{first}1\n", "")
     # Of the two functions, the one that has changed is part of the other.
-    changed = package / "discretize.py"
-    source = changed.read_text()
     changed.write_text(source.replace("y = v + (t1 * w1 + t2 * w2)", "y = v"))
     assert source != changed.read_text()
     assert run(package, DRAW)[0] != first
@@ -79,27 +80,3 @@ def test_a_terminal_says_that_something_is_compiled(package):
     shown = os.read(ours, 1000).decode()
     assert shown.startswith("armlock compiles, once")
     assert shown.endswith("\r\033[K")
-
-
-def test_the_first_calls_are_plain_python():
-    """Until there have been some, or one is too long."""
-    compiled = []
-
-    def function(x: int) -> int | None:
-        return x if x < LIMIT else None
-
-    class Other:
-        py_func = staticmethod(function)
-
-        def __call__(self, x: int) -> int:
-            compiled.append(x)
-            return x
-
-    for calls, left in (((1, 2, 3, 4, 5, 6), [6]), ((1, 20, 3), [20, 3])):
-        compiled.clear()
-        call = soon(Other(), LIMIT=10)
-        assert tuple(call(x) for x in calls) == calls
-        assert compiled == left
-
-
-LIMIT = 2

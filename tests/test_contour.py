@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from numpy.polynomial.polynomial import polyval
 
-from armlock import CommonArm, contour, counting, exponentials, paper_loop, unstable_roots
-from armlock.bounds import last_frequency
-from armlock.stability import _point_model
+from armlock import CommonArm, paper_loop, unstable_roots
+from armlock.axis import contour, counting, exponentials
+from armlock.stability.bounds import last_frequency
+from armlock.stability.counts import _point_model
 from tests.attack import roots
 from tests.systems import NEUTRAL, RETARDED
 
@@ -175,7 +176,7 @@ def test_the_last_frequency_is_close_to_where_one_term_outgrows_the_others():
 # Im f = omega^5 (cos omega - 2) beside Re f = omega^2: next to zero only the former counts.
 HIGH_ORDER = """
 import numpy as np
-from armlock import contour, counting, exponentials
+from armlock.axis import contour, counting, exponentials
 
 whole = np.zeros((2, 6), dtype=complex)
 whole[0, 2], whole[1, 5] = 1.0, 1.0j

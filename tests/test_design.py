@@ -22,9 +22,9 @@ from armlock import (
     paper_loop,
     robust_loop,
 )
-from armlock.boxes import box_counts, edge_crossings
 from armlock.controllers import roll_off, table_two
 from armlock.paper import PERTURBATION
+from armlock.robustness.boxes import box_counts, edge_crossings
 from tests import attack_judge as judge
 from tests.systems import sketch_of
 

@@ -8,14 +8,14 @@ from scipy.linalg import solve_discrete_lyapunov
 
 from armlock import Controller
 from armlock.controllers import table_two
-from armlock.discretize import (
+from armlock.sensors import SignalMapping, dual
+from armlock.timedomain.discretize import (
     sampled_filter,
     sampled_loop,
     stationary_root,
     through,
     warped,
 )
-from armlock.sensors import SignalMapping, dual
 from tests.systems import with_roots
 
 RATE = 200.0

@@ -6,9 +6,10 @@ from collections import Counter
 
 import numpy as np
 
-from armlock import Loop, discs, distances
-from armlock.free_phases import arms_of
+from armlock import Loop
 from armlock.loops import LoopAt
+from armlock.robustness import discs, distances
+from armlock.robustness.free_phases import arms_of
 from armlock.sensors import COMMON, DIFFERENCE, dual
 from tests.attack import between, roots
 

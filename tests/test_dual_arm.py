@@ -16,7 +16,7 @@ from armlock import (
     margins,
     unstable_roots,
 )
-from armlock.rays import Ray, first_crossing
+from armlock.robustness.rays import Ray, first_crossing
 from armlock.sensors import COMMON, dual
 from book.companion.claims import dual_arm
 

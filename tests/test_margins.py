@@ -16,16 +16,15 @@ from armlock import (
     SingleArm,
     critical_perturbation,
     flight_loop,
-    free_phases,
-    gains,
     margins,
     modulus_margin,
     paper_loop,
     unstable_roots,
 )
-from armlock.gains import gain_interval
 from armlock.loops import LoopAt
-from armlock.rays import first_crossing
+from armlock.robustness import free_phases, gains
+from armlock.robustness.gains import gain_interval
+from armlock.robustness.rays import first_crossing
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
 from tests import independent
 from tests.attack import Tally, check_margins, to_loop

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from armlock import LaserNoise, PerturbationNoise, ShapedNoise
-from armlock.spectra import SpectrumEstimator
+from armlock.timedomain.spectra import SpectrumEstimator
 
 SOURCES: dict[str, Any] = {
     "laser": lambda seed, **more: LaserNoise(seed, **more),

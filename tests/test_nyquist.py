@@ -19,13 +19,13 @@ from armlock import (
     paper_loop,
     unstable_roots,
 )
-from armlock.nyquist import open_loop_poles
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
+from armlock.stability.nyquist import open_loop_poles
 from tests import independent
 from tests.attack import roots
 
 # The package has a function of the same name.
-module = importlib.import_module("armlock.nyquist")
+module = importlib.import_module("armlock.stability.nyquist")
 
 # Loop, (c1, c2), unstable poles of L.
 CASES = {

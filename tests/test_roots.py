@@ -21,9 +21,9 @@ from armlock import (
     rightmost_root,
     unstable_roots,
 )
-from armlock.flight import flight_loop
-from armlock.roots import extended_root
+from armlock.loops import flight_loop
 from armlock.sensors import COMMON, dual
+from armlock.stability.roots import extended_root
 from book.companion.schemes import pseudospectral_roots
 from tests import independent
 from tests.systems import RETARDED

@@ -14,7 +14,7 @@ from armlock import (
     transition_matrix,
     unstable_roots,
 )
-from armlock.rays import first_crossing
+from armlock.robustness.rays import first_crossing
 from tests import independent
 from tests.systems import RETARDED
 

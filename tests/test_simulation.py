@@ -26,7 +26,7 @@ from armlock import (
     unstable_roots,
 )
 from armlock.sensors import COMMON, SignalMapping
-from armlock.simulation import BLOCK, LANES, lagrange_delay
+from armlock.timedomain.simulation import BLOCK, LANES, lagrange_delay
 from tests import independent
 
 RATE = 200.0

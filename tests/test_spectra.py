@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from armlock import SpectrumEstimator, amplitude_spectrum
-from armlock.spectra import SEGMENT
+from armlock.timedomain.spectra import SEGMENT
 
 
 def test_confidence_band_holds_what_it_says():

@@ -19,8 +19,8 @@ from armlock import (
     stability_chart,
     unstable_roots,
 )
-from armlock.rays import Ray
-from armlock.stability import sign_changes
+from armlock.robustness.rays import Ray
+from armlock.stability.counts import sign_changes
 from tests import independent
 from tests.systems import NEUTRAL, RETARDED, with_roots
 

@@ -13,7 +13,7 @@ from scipy.interpolate import BarycentricInterpolator
 from armlock.characteristic import CharacteristicFunction
 from armlock.checks import ComplexArray
 from armlock.loops import CommonArm
-from armlock.semidiscretization import realize, semi_discretization
+from armlock.stability.semidiscretization import realize, semi_discretization
 
 
 def sampled_loop(

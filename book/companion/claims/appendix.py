@@ -11,7 +11,6 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from armlock.checks import FloatArray
-from armlock.noise import PerturbationNoise, ShapedNoise, band_rms
 from armlock.paper import (
     LASER_NOISE,
     PERTURBATION,
@@ -19,7 +18,8 @@ from armlock.paper import (
     PHASE_NOISE_LEVEL,
     SAMPLE_RATE,
 )
-from armlock.spectra import Spectrum, SpectrumEstimator
+from armlock.timedomain.noise import PerturbationNoise, ShapedNoise, band_rms
+from armlock.timedomain.spectra import Spectrum, SpectrumEstimator
 from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 from book.companion.claims.simulation import (

@@ -10,8 +10,6 @@ import numpy as np
 from armlock.checks import FloatArray
 from armlock.controllers import table_two
 from armlock.loops import Loop, paper_loop
-from armlock.margins import critical_perturbation, modulus_margin
-from armlock.noise import LaserNoise, band_rms
 from armlock.paper import (
     CONTROLLER_GAIN,
     DUAL_SENSOR_CORNER,
@@ -22,9 +20,11 @@ from armlock.paper import (
     TAU1,
     TAU2,
 )
-from armlock.roots import rightmost_root
-from armlock.simulation import sampled_open_loop
-from armlock.stability import unstable_roots
+from armlock.robustness.margins import critical_perturbation, modulus_margin
+from armlock.stability.counts import unstable_roots
+from armlock.stability.roots import rightmost_root
+from armlock.timedomain.noise import LaserNoise, band_rms
+from armlock.timedomain.simulation import sampled_open_loop
 from book.companion.claims.controller import (
     SUPPRESSION_BAND,
     highest_stable_corner,

@@ -12,13 +12,17 @@ from scipy.optimize import brentq, minimize_scalar
 
 from armlock.characteristic import CharacteristicFunction
 from armlock.checks import FloatArray
-from armlock.dcurve import Branch, d_curve, d_curve_branches, d_curve_line
 from armlock.loops import CommonArm
 from armlock.paper import COMMON_ARM_GAIN, STEP, TAU1, TAU2
-from armlock.rays import first_crossing
-from armlock.roots import extended_root, rightmost_root
-from armlock.semidiscretization import semi_discretization, spectral_radius, transition_matrix
-from armlock.stability import StabilityChart, stability_chart, unstable_roots
+from armlock.robustness.rays import first_crossing
+from armlock.stability.counts import StabilityChart, stability_chart, unstable_roots
+from armlock.stability.dcurve import Branch, d_curve, d_curve_branches, d_curve_line
+from armlock.stability.roots import extended_root, rightmost_root
+from armlock.stability.semidiscretization import (
+    semi_discretization,
+    spectral_radius,
+    transition_matrix,
+)
 from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 from book.companion.outline import boundary_radius, outline, perimeter, rays

@@ -10,8 +10,6 @@ from scipy.optimize import bisect, brentq
 from armlock.checks import ComplexArray, FloatArray
 from armlock.controllers import Controller, stage_one, table_two
 from armlock.loops import DualArm, Loop, paper_loop
-from armlock.margins import critical_perturbation, margins, modulus_margin
-from armlock.nyquist import AxisCrossings, axis_crossings, nyquist
 from armlock.paper import (
     CONTROLLER_GAIN,
     DUAL_SENSOR_CORNER,
@@ -22,8 +20,10 @@ from armlock.paper import (
     TAU1,
     TAU2,
 )
-from armlock.roots import rightmost_root
-from armlock.stability import stability_chart, unstable_roots
+from armlock.robustness.margins import critical_perturbation, margins, modulus_margin
+from armlock.stability.counts import stability_chart, unstable_roots
+from armlock.stability.nyquist import AxisCrossings, axis_crossings, nyquist
+from armlock.stability.roots import rightmost_root
 from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 

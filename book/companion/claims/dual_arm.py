@@ -15,8 +15,6 @@ from scipy.optimize import brentq, minimize_scalar
 
 from armlock.characteristic import CharacteristicFunction
 from armlock.checks import FloatArray
-from armlock.dcurve import d_curve, d_curve_line
-from armlock.gains import gain_interval
 from armlock.loops import DualArm
 from armlock.paper import (
     CONTROLLER_GAIN,
@@ -27,10 +25,12 @@ from armlock.paper import (
     TAU1,
     TAU2,
 )
-from armlock.rays import Crossing, first_crossing
-from armlock.roots import rightmost_root
-from armlock.semidiscretization import semi_discretization
-from armlock.stability import BOUNDARY, stability_chart, unstable_roots
+from armlock.robustness.gains import gain_interval
+from armlock.robustness.rays import Crossing, first_crossing
+from armlock.stability.counts import BOUNDARY, stability_chart, unstable_roots
+from armlock.stability.dcurve import d_curve, d_curve_line
+from armlock.stability.roots import rightmost_root
+from armlock.stability.semidiscretization import semi_discretization
 from book.companion.claims import ledger
 from book.companion.claims.common_arm import log_slope
 from book.companion.claims.ledger import Finding, Verdict, Weight, decide

@@ -8,7 +8,9 @@ from functools import cache, partial
 import numpy as np
 from scipy.optimize import brentq
 
-from armlock.budget import (
+from armlock.checks import FloatArray
+from armlock.loops import Loop, LoopAt, SingleArm, flight_loop
+from armlock.performance.budget import (
     BEAT_NOTES,
     FREE_RUNNING,
     LASERS,
@@ -17,17 +19,14 @@ from armlock.budget import (
     noise_budget,
     tdi_capability,
 )
-from armlock.checks import FloatArray
-from armlock.discs import MODULUS, PHASE, free_margins_over
-from armlock.flight import flight_loop
-from armlock.free_phases import arms_of
-from armlock.loops import Loop, LoopAt, SingleArm
-from armlock.margins import Margins, critical_perturbation, margins
-from armlock.noise import LaserNoise
-from armlock.pulling import pulling
+from armlock.performance.pulling import pulling
+from armlock.performance.transfer import transfer
+from armlock.robustness.discs import MODULUS, PHASE, free_margins_over
+from armlock.robustness.free_phases import arms_of
+from armlock.robustness.margins import Margins, critical_perturbation, margins
 from armlock.sensors import modified_dual
-from armlock.stability import unstable_roots
-from armlock.transfer import transfer
+from armlock.stability.counts import unstable_roots
+from armlock.timedomain.noise import LaserNoise
 from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, decide
 

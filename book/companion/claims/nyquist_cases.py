@@ -8,11 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import bisect, minimize_scalar
 
-from armlock.gains import gain_interval
 from armlock.loops import CommonArm, DualArm, Loop, SingleArm
-from armlock.margins import Margins, margins
-from armlock.noise import band_rms
-from armlock.nyquist import AxisCrossings, NyquistCurve, axis_crossings, nyquist
 from armlock.paper import (
     DUAL_SENSOR_CORNER,
     DURATION,
@@ -22,8 +18,12 @@ from armlock.paper import (
     TAU1,
     TAU2,
 )
-from armlock.roots import rightmost_root
-from armlock.stability import BOUNDARY, unstable_roots
+from armlock.robustness.gains import gain_interval
+from armlock.robustness.margins import Margins, margins
+from armlock.stability.counts import BOUNDARY, unstable_roots
+from armlock.stability.nyquist import AxisCrossings, NyquistCurve, axis_crossings, nyquist
+from armlock.stability.roots import rightmost_root
+from armlock.timedomain.noise import band_rms
 from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 

@@ -16,13 +16,13 @@ import numpy as np
 
 from armlock.checks import ComplexArray, FloatArray
 from armlock.loops import paper_loop
-from armlock.margins import critical_perturbation
-from armlock.noise import LaserNoise, PerturbationNoise, band_rms
 from armlock.paper import DURATION, LASER_NOISE, PERTURBATION, SAMPLE_RATE
-from armlock.roots import rightmost_root
-from armlock.simulation import DivergenceError, Simulation, sampled_open_loop
-from armlock.spectra import Spectrum, SpectrumEstimator, amplitude_spectrum
-from armlock.stability import unstable_roots
+from armlock.robustness.margins import critical_perturbation
+from armlock.stability.counts import unstable_roots
+from armlock.stability.roots import rightmost_root
+from armlock.timedomain.noise import LaserNoise, PerturbationNoise, band_rms
+from armlock.timedomain.simulation import DivergenceError, Simulation, sampled_open_loop
+from armlock.timedomain.spectra import Spectrum, SpectrumEstimator, amplitude_spectrum
 from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 from book.companion.shared import shared

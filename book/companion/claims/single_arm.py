@@ -12,11 +12,11 @@ from scipy.optimize import bisect, brentq
 from scipy.special import lambertw
 
 from armlock.checks import ComplexArray, IntArray
-from armlock.dcurve import d_curve, d_curve_line
 from armlock.loops import HayesEquation, SingleArm
 from armlock.paper import PERTURBATION, TAU1
-from armlock.roots import rightmost_root
-from armlock.stability import stability_chart, unstable_roots
+from armlock.stability.counts import stability_chart, unstable_roots
+from armlock.stability.dcurve import d_curve, d_curve_line
+from armlock.stability.roots import rightmost_root
 from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 

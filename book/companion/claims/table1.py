@@ -11,7 +11,6 @@ from scipy.constants import speed_of_light
 
 from armlock import sensors
 from armlock.controllers import Controller
-from armlock.dcurve import d_curve_line
 from armlock.loops import CommonArm, DualArm, Loop, SingleArm
 from armlock.paper import (
     COMMON_ARM_GAIN,
@@ -23,8 +22,9 @@ from armlock.paper import (
     TAU1,
     TAU2,
 )
-from armlock.roots import rightmost_root
-from armlock.stability import unstable_roots
+from armlock.stability.counts import unstable_roots
+from armlock.stability.dcurve import d_curve_line
+from armlock.stability.roots import rightmost_root
 from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 

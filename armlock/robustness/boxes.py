@@ -10,13 +10,13 @@ import math
 
 import numpy as np
 
-from armlock.bounds import last_frequency
+from armlock.axis.contour import winding
 from armlock.checks import IntArray, positive_number
-from armlock.contour import winding
-from armlock.free_phases import clear_above, count_at
 from armlock.loops import Loop, LoopAt, checked_loop
-from armlock.rays import Ray
-from armlock.stability import BOUNDARY, UNCONFINED
+from armlock.robustness.free_phases import clear_above, count_at
+from armlock.robustness.rays import Ray
+from armlock.stability.bounds import last_frequency
+from armlock.stability.counts import BOUNDARY, UNCONFINED
 
 #: Corners of a box as seen from its centre, each next to the one before.
 CORNERS = np.array(((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)))
@@ -63,7 +63,7 @@ def box_counts(loop: Loop, size: float, free_above: float | None = None) -> IntA
     Examples
     --------
     >>> from armlock import paper_loop, robust_loop
-    >>> from armlock.boxes import box_counts
+    >>> from armlock.robustness.boxes import box_counts
     >>> [box_counts(loop, 1e-6).tolist() for loop in (robust_loop(), paper_loop())]
     [[0], [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]]
     >>> box_counts(paper_loop(), 1.5e-6).tolist()
@@ -123,7 +123,7 @@ def edge_crossings(loop: Loop, size: float, free_above: float | None = None) -> 
     Examples
     --------
     >>> from armlock import paper_loop
-    >>> from armlock.boxes import edge_crossings
+    >>> from armlock.robustness.boxes import edge_crossings
     >>> [edge_crossings(paper_loop(), size) for size in (1e-6, 1.5e-6)]
     [0, 2]
     """

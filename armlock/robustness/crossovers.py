@@ -1,7 +1,7 @@
 """Gain crossovers, where |L| = 1, and the phase and delay margins that are taken there.
 
 No grid decides: crossovers are zeros of |L|^2 - 1, which the certified walk of
-`armlock.contour` finds, on those parts of the axis where free phases would allow a smaller
+`armlock.axis.contour` finds, on those parts of the axis where free phases would allow a smaller
 margin than is known.
 """
 
@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from armlock import discs
-from armlock.bounds import last_larger
+from armlock.axis.exponentials import ExponentialSum
 from armlock.checks import FloatArray
-from armlock.exponentials import ExponentialSum
-from armlock.free_phases import (
+from armlock.loops import LoopAt
+from armlock.robustness import discs
+from armlock.robustness.free_phases import (
     arm_weights,
     last_crossover,
     least_at,
@@ -26,8 +26,8 @@ from armlock.free_phases import (
     polynomial_sum,
     search_outwards,
 )
-from armlock.loops import LoopAt
-from armlock.stability import polished, sign_changes
+from armlock.stability.bounds import last_larger
+from armlock.stability.counts import polished, sign_changes
 
 #: Relative accuracy of |L| at a crossover, and of a phase margin that L has at high frequency.
 TOLERANCE = 1e-6

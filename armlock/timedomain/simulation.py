@@ -5,11 +5,11 @@ With phi the frequency noise of the locked laser, every loop of `armlock.loops` 
     phi(t) = noise(t) - K [m1 u1 + m2 u2](t - delay),
     u_k(t) = phi(t) - c_k(t) phi(t - tau_k).
 
-Sensor and controller are sampled by the trapezoidal rule, see `armlock.discretize`. Without a
-dead time the present phi is on both sides, with a weight of thousands; each sample solves for
-it. A rule that took the previous phi instead would be unstable by itself as soon as gain
-times step exceeds about one, and is not offered. A delay that is no whole number of samples is
-interpolated, with the weights of `lagrange_delay`.
+Sensor and controller are sampled by the trapezoidal rule, see `armlock.timedomain.discretize`.
+Without a dead time the present phi is on both sides, with a weight of thousands; each sample
+solves for it. A rule that took the previous phi instead would be unstable by itself as soon as
+gain times step exceeds about one, and is not offered. A delay that is no whole number of
+samples is interpolated, with the weights of `lagrange_delay`.
 
 Because s = j omega becomes (2 j / T) tan(omega T / 2) while the delays stay what they are,
 what is simulated has an open loop in closed form, `sampled_open_loop`.
@@ -26,6 +26,7 @@ from typing import BinaryIO
 import numpy as np
 import numpy.typing as npt
 
+from armlock.axis.compiled import njit
 from armlock.checks import (
     ComplexArray,
     FloatArray,
@@ -35,9 +36,8 @@ from armlock.checks import (
     real_number,
     whole_number,
 )
-from armlock.compiled import njit
-from armlock.discretize import SampledFilter, SampledSensor, sampled_loop, warped
 from armlock.loops import Loop, checked_loop
+from armlock.timedomain.discretize import SampledFilter, SampledSensor, sampled_loop, warped
 
 #: Order of the Lagrange interpolation for delays that are not whole samples: odd.
 INTERPOLATION_ORDER = 7
@@ -411,9 +411,9 @@ class Simulation:
         \varphi[n] &= \varphi_0[n] - \sum_i \ell_{0,i}\, y[n - f_0 - i] .
 
     Here y is what the controller sends, of gain g behind the sensor's direct shares d_k, and r
-    what their states make of earlier samples (`armlock.discretize`). The late light a_k and
-    the dead time, k = 0, are interpolated as for `sampled_open_loop`. Without a dead time
-    y[n] enters its own sample, and the loop is closed within it:
+    what their states make of earlier samples (`armlock.timedomain.discretize`). The late light
+    a_k and the dead time, k = 0, are interpolated as for `sampled_open_loop`. Without a dead
+    time y[n] enters its own sample, and the loop is closed within it:
 
     .. math::
 

@@ -15,7 +15,8 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
-from armlock.bounds import last_frequency
+from armlock.axis.contour import resolved_grid
+from armlock.axis.exponentials import EPSILON
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import (
     ComplexArray,
@@ -25,9 +26,8 @@ from armlock.checks import (
     real_number,
     whole_number,
 )
-from armlock.contour import resolved_grid
-from armlock.exponentials import EPSILON
-from armlock.stability import BOUNDARY, CountError, unstable_roots
+from armlock.stability.bounds import last_frequency
+from armlock.stability.counts import BOUNDARY, CountError, unstable_roots
 
 # Real parts that differ by less count as equal; relative to |s| or one over the longest delay.
 _EQUAL = 1e-11
@@ -118,7 +118,7 @@ def extended_root(
     --------
     >>> from mpmath import nstr
     >>> from armlock import HayesEquation
-    >>> from armlock.roots import extended_root
+    >>> from armlock.stability.roots import extended_root
     >>> print(nstr(extended_root(HayesEquation(), 0.0, -0.2, -0.26, digits=40).real, 30))
     -0.259171101819073764476637135967
     """

@@ -6,9 +6,10 @@ y fixed, roots cross the axis where Im(N / M) = 0, at x = Re(N / M). Where Im(N 
 with omega, they become unstable towards larger x. Each row starts from a count just outside of
 the chart, and is checked against an independent one at its far end.
 
-The walks are those of `armlock.contour`. What makes a point a boundary point stands there, in
-`winding`: D is no larger somewhere on the axis than its rounding error, or no step of the walk
-can be certified. To that error the one of x and y contributes (`armlock.counting.count_point`).
+The walks are those of `armlock.axis.contour`. What makes a point a boundary point stands there,
+in `winding`: D is no larger somewhere on the axis than its rounding error, or no step of the
+walk can be certified. To that error the one of x and y contributes
+(`armlock.axis.counting.count_point`).
 """
 
 from __future__ import annotations
@@ -23,8 +24,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import elementwise
 
-from armlock import contour, counting
-from armlock.bounds import last_frequency
+from armlock.axis import contour, counting
+from armlock.axis.counting import PointModel, RowModel, Rows
+from armlock.axis.exponentials import ROUNDING, ExponentialSum, aligned, without_unused
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import (
     BoolArray,
@@ -34,8 +36,7 @@ from armlock.checks import (
     broadcast_pair,
     check_memory,
 )
-from armlock.counting import PointModel, RowModel, Rows
-from armlock.exponentials import ROUNDING, ExponentialSum, aligned, without_unused
+from armlock.stability.bounds import last_frequency
 from armlock.sweep import sweep
 
 if TYPE_CHECKING:
@@ -114,8 +115,8 @@ def sign_changes(
 ) -> tuple[FloatArray, IntArray, FloatArray]:
     """Zeros of the imaginary part of an exponential sum, jumps and widths.
 
-    On intervals of the axis, shape (n, 2). As `armlock.contour.imaginary_zeros`: the jump is 0
-    where rounding hides whether there is one, within the width.
+    On intervals of the axis, shape (n, 2). As `armlock.axis.contour.imaginary_zeros`: the jump
+    is 0 where rounding hides whether there is one, within the width.
 
     Raises
     ------

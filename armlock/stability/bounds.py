@@ -12,10 +12,10 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
+from armlock.axis.compiled import njit
+from armlock.axis.exponentials import real_horner
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import FloatArray, broadcast_pair
-from armlock.compiled import njit, soon
-from armlock.exponentials import real_horner
 
 
 @njit(cache=True)
@@ -176,9 +176,6 @@ def _last_frequencies(
     return ends
 
 
-_few_last_frequencies = soon(_last_frequencies)
-
-
 @lru_cache(maxsize=64)
 def _squares(system: CharacteristicFunction) -> tuple[FloatArray, float]:
     """Return the `squared_magnitudes` of A, B1, B2 and C."""
@@ -210,8 +207,7 @@ def last_frequency(
         return np.full(xs.shape, np.pi / system.step)
     squares, unit = _squares(system)
     reserve = system.chain_reserve(xs, ys)
-    found = _few_last_frequencies if xs.size < 10 else _last_frequencies
-    ends: FloatArray = found(squares, unit, xs.ravel(), ys.ravel(), reserve.ravel())
+    ends: FloatArray = _last_frequencies(squares, unit, xs.ravel(), ys.ravel(), reserve.ravel())
     return ends.reshape(xs.shape)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from armlock import paper
+from armlock.axis.compiled import njit
 from armlock.checks import (
     FloatArray,
     as_written,
@@ -22,9 +23,8 @@ from armlock.checks import (
     real_array,
     whole_number,
 )
-from armlock.compiled import njit
 from armlock.controllers import Controller
-from armlock.discretize import (
+from armlock.timedomain.discretize import (
     Rows,
     sampled_filter,
     stationary_root,
@@ -76,7 +76,8 @@ class ShapedNoise:
 
         \text{asd}_T(f) = \text{asd} \left( \frac{\tan \pi f T}{\pi T} \right) ,
 
-    see `armlock.discretize.warped`. One draw and many give the same series, bit by bit.
+    see `armlock.timedomain.discretize.warped`. One draw and many give the same series, bit by
+    bit.
 
     Examples
     --------

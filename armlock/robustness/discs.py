@@ -14,10 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from armlock.axis.compiled import njit
+from armlock.axis.contour import MOST_STEPS
+from armlock.axis.exponentials import EPSILON
 from armlock.checks import ComplexArray, FloatArray, IntArray
-from armlock.compiled import njit
-from armlock.contour import MOST_STEPS
-from armlock.exponentials import EPSILON
 
 # Turns of the longest delay after which the disc is tried again where it did not help.
 _TURNS = 32.0

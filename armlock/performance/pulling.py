@@ -16,8 +16,8 @@ import numpy.typing as npt
 
 from armlock.checks import ComplexArray, FloatArray, axis, positive_array
 from armlock.loops import Loop, checked_loop
-from armlock.stability import BOUNDARY, UNCONFINED, CountError, unstable_roots
-from armlock.transfer import transfer
+from armlock.performance.transfer import transfer
+from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError, unstable_roots
 
 # Multiples of 2 pi / tau, in rad/s, up to which roots are taken.
 _LINES = 600
@@ -40,8 +40,8 @@ def pulling(
         \nu(t) &= y_+ * \nu_+ + y_- * \nu_- , \\
         \nu_\pm(t) &= \nu_0 + \gamma t + \tfrac12 \alpha t^2 \quad (t \ge 0)
 
-    with the responses :math:`Y_\pm` of `armlock.transfer` to the sum :math:`\nu_+` and the
-    difference :math:`\nu_-` of the two arms' errors.
+    with the responses :math:`Y_\pm` of `armlock.performance.transfer` to the sum :math:`\nu_+`
+    and the difference :math:`\nu_-` of the two arms' errors.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def slow_roots(loop: Loop) -> tuple[ComplexArray, float]:
     Examples
     --------
     >>> from armlock import flight_loop
-    >>> from armlock.pulling import slow_roots
+    >>> from armlock.performance.pulling import slow_roots
     >>> roots, rate = slow_roots(flight_loop())
     >>> print(f"{len(roots)} roots, all that decay slower than in {1 / rate:.0f} s")
     572 roots, all that decay slower than in 2716 s

@@ -1,7 +1,7 @@
 """What noise is left on the locked laser, source by source.
 
 Levels are those of the LISA Frequency Control White Paper (2009), Sec. 3. Each source reaches
-the laser through the closed-form responses of `armlock.transfer`.
+the laser through the closed-form responses of `armlock.performance.transfer`.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from armlock.checks import (
 )
 from armlock.controllers import Controller
 from armlock.loops import Loop, checked_loop
-from armlock.noise import LaserNoise, ShapedNoise
-from armlock.transfer import responses
+from armlock.performance.transfer import responses
+from armlock.timedomain.noise import LaserNoise, ShapedNoise
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -289,7 +289,7 @@ def noise_series(
     Examples
     --------
     >>> from armlock import flight_loop, simulate
-    >>> from armlock.budget import noise_series
+    >>> from armlock.performance.budget import noise_series
     >>> loop = flight_loop()
     >>> locked = simulate(loop, noise_series(loop, "clock", 10_000, seed=1))
     """

@@ -14,16 +14,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from armlock.bounds import last_frequency, last_larger
+from armlock.axis.contour import MOST_SAMPLES, argument_at, resolved_grid
 from armlock.checks import (
     ComplexArray,
     FloatArray,
     check_memory,
     positive_number,
 )
-from armlock.contour import MOST_SAMPLES, argument_at, resolved_grid
 from armlock.loops import Loop, LoopAt
-from armlock.stability import (
+from armlock.stability.bounds import last_frequency, last_larger
+from armlock.stability.counts import (
     BOUNDARY,
     CountError,
     sign_changes,
@@ -229,7 +229,7 @@ def nyquist(
     Examples
     --------
     >>> from armlock import SingleArm
-    >>> from armlock.nyquist import nyquist
+    >>> from armlock.stability.nyquist import nyquist
     >>> curve = nyquist(SingleArm(), c1=1.001)
     >>> curve.encirclements, curve.open_loop_poles, curve.closed_loop_roots
     (1, 0, 1)

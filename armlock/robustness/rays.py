@@ -18,17 +18,23 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
-from armlock.bounds import last_frequency
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import ComplexArray, FloatArray, IntArray, axis, positive_number
-from armlock.free_phases import (
+from armlock.loops import Loop, LoopAt
+from armlock.robustness.free_phases import (
     FIRST_TURNS,
     crossing_intervals,
     free_disc,
     search_outwards,
 )
-from armlock.loops import Loop, LoopAt
-from armlock.stability import BOUNDARY, CountError, polished, sign_changes, unstable_roots
+from armlock.stability.bounds import last_frequency
+from armlock.stability.counts import (
+    BOUNDARY,
+    CountError,
+    polished,
+    sign_changes,
+    unstable_roots,
+)
 
 #: Nothing is looked at where the parameters are this many times as large as the start, or as 1.
 FARTHEST = 1e9
@@ -335,7 +341,7 @@ def first_crossing(
     Examples
     --------
     >>> from armlock import DualArm
-    >>> from armlock.rays import first_crossing
+    >>> from armlock.robustness.rays import first_crossing
     >>> edge = first_crossing(DualArm(gain=10.0), (1.0, 1.0), (1.0, 1.0), stop=3.0)
     >>> print(f"{edge.position:.6f} {edge.omega:.4f} {edge.change}")
     0.254006 3.7746 2

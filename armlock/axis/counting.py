@@ -1,7 +1,7 @@
 """From walks along the axis to counts, at points and along the rows of a chart; compiled.
 
-The walks are those of `armlock.contour`. What is counted is in a form that compiled functions
-take: `PointModel` for points, `RowModel` for rows.
+The walks are those of `armlock.axis.contour`. What is counted is in a form that compiled
+functions take: `PointModel` for points, `RowModel` for rows.
 """
 
 from __future__ import annotations
@@ -14,9 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import config
 
-from armlock.checks import BoolArray, ComplexArray, FloatArray, IntArray
-from armlock.compiled import njit, soon
-from armlock.contour import (
+from armlock.axis.compiled import njit
+from armlock.axis.contour import (
     CAUTION,
     JUMP,
     MOST_RADIANS,
@@ -27,15 +26,17 @@ from armlock.contour import (
     imaginary_zeros,
     winding,
 )
-from armlock.exponentials import EPSILON, CompiledSum
+from armlock.axis.exponentials import EPSILON, CompiledSum
+from armlock.checks import BoolArray, ComplexArray, FloatArray, IntArray
 
-# What `count_point` returns where it is no number of roots. `armlock.stability.unstable_roots`
-# returns the first two as well, and makes errors of DOUBTFUL and TOO_LONG.
+# What `count_point` returns where it is no number of roots.
+# `armlock.stability.counts.unstable_roots` returns the first two as well, and makes errors of
+# DOUBTFUL and TOO_LONG.
 #
 # A root lies on the axis: `winding` meets a value within its rounding error, or can certify no
 # step.
 BOUNDARY = -1
-# The neutral root chain is not confined: `armlock.bounds.last_frequency` is infinite.
+# The neutral root chain is not confined: `armlock.stability.bounds.last_frequency` is infinite.
 UNCONFINED = -2
 # D and the roots of A contradict each other, or the count is below zero. Of a row of a chart:
 # its points are to be counted one by one.
@@ -134,9 +135,9 @@ def count_point(model: PointModel, x: float, y: float, end: float) -> int:
 
     By the argument principle. Without unstable roots the argument of D gathers, from 0 to
     infinity, half pi for each root of A, and that of a map, from 0 to pi / step, pi for each.
-    Each unstable root takes away pi. `end` is what `armlock.bounds.last_frequency` gives. Past
-    it no root crosses, or it is inf, because the neutral root chain is not confined; for a map
-    it is pi / step.
+    Each unstable root takes away pi. `end` is what `armlock.stability.bounds.last_frequency`
+    gives. Past it no root crosses, or it is inf, because the neutral root chain is not
+    confined; for a map it is pi / step.
     """
     constant, b1, b2 = model.constant, model.sums[0], model.sums[1]
     if end == np.inf:
@@ -177,9 +178,6 @@ def count_point(model: PointModel, x: float, y: float, end: float) -> int:
 # So few points or rows are left to one core: threads take half a millisecond to begin.
 _FEW = 16
 
-# In Python 20 000 steps take about a second, which is less than compiling does.
-_count_soon = soon(count_point, unless=TOO_LONG, MOST_STEPS=20_000)
-
 
 @njit(cache=True, nogil=True)
 def _count_range(
@@ -205,7 +203,7 @@ def count_points(model: PointModel, x: FloatArray, y: FloatArray, ends: FloatArr
     After the first point that takes too long no further one is tried.
     """
     if x.size == 1:
-        return np.array([_count_soon(model, x[0], y[0], ends[0])])
+        return np.array([count_point(model, x[0], y[0], ends[0])])
     counts, stop = np.empty(x.size, dtype=np.int64), np.zeros(1, dtype=np.bool_)
     _on_all_cores(_count_range, x.size, model, x, y, ends, counts, stop)
     return counts

@@ -9,18 +9,17 @@ over a step, a function stays within M step^2 / 2 of its tangent. So
 
 Where the sum is no larger than the bound on its rounding error, `winding` stops: that makes a
 point a boundary point. Where only its imaginary part is no larger, `imaginary_zeros` gives a
-zero with a jump of 0. The tolerance in the bound is `armlock.exponentials.ROUNDING`.
+zero with a jump of 0. The tolerance in the bound is `armlock.axis.exponentials.ROUNDING`.
 
-All functions here work on exponential sums, piece by piece, see `armlock.exponentials`.
+All functions here work on exponential sums, piece by piece, see `armlock.axis.exponentials`.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from armlock.checks import ComplexArray, FloatArray
-from armlock.compiled import njit
-from armlock.exponentials import (
+from armlock.axis.compiled import njit
+from armlock.axis.exponentials import (
     EPSILON,
     ROUNDING,
     CompiledSum,
@@ -33,6 +32,7 @@ from armlock.exponentials import (
     rounding_bound,
     tangent_distance,
 )
+from armlock.checks import ComplexArray, FloatArray
 
 # ROUNDING along a chart's row. It is larger, so that a point that may be a boundary point is
 # doubtful there, and counted on its own.

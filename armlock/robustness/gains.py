@@ -1,8 +1,8 @@
 """The gain factors between which a stable loop stays stable.
 
 A factor takes a root to the imaginary axis where L is real and negative there. Such places are
-zeros of Im L, which the certified walk of `armlock.contour` finds, on those parts of the axis
-where free phases would allow a factor closer to one than is known.
+zeros of Im L, which the certified walk of `armlock.axis.contour` finds, on those parts of the
+axis where free phases would allow a factor closer to one than is known.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ import math
 import numpy as np
 from scipy.optimize import elementwise
 
-from armlock.bounds import last_larger, last_root_bound
 from armlock.checks import FloatArray
-from armlock.crossovers import axis_zeros
-from armlock.free_phases import (
+from armlock.loops import Loop, LoopAt
+from armlock.robustness.crossovers import axis_zeros
+from armlock.robustness.free_phases import (
     arm_weights,
     clear_from,
     free_disc,
@@ -27,8 +27,8 @@ from armlock.free_phases import (
     require_stable,
     search_outwards,
 )
-from armlock.loops import Loop, LoopAt
-from armlock.stability import unstable_roots
+from armlock.stability.bounds import last_larger, last_root_bound
+from armlock.stability.counts import unstable_roots
 
 #: Gain factors up to this, and down to one over it, are looked at.
 LARGEST_GAIN = 1e6
@@ -202,7 +202,7 @@ def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float
     Examples
     --------
     >>> from armlock import DualArm
-    >>> from armlock.gains import gain_interval
+    >>> from armlock.robustness.gains import gain_interval
     >>> lower, upper, omega = gain_interval(DualArm(), 1.001, 1.002)
     >>> print(f"{upper:.2f}")
     29.58

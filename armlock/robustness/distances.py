@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from armlock import contour, discs
-from armlock.checks import FloatArray
-from armlock.compiled import njit
-from armlock.exponentials import (
+from armlock.axis import contour
+from armlock.axis.compiled import njit
+from armlock.axis.exponentials import (
     ROUNDING,
     CompiledSum,
     Piece,
@@ -24,7 +23,10 @@ from armlock.exponentials import (
     rounding_bound,
     tangent_distance,
 )
-from armlock.free_phases import (
+from armlock.checks import FloatArray
+from armlock.loops import LoopAt
+from armlock.robustness import discs
+from armlock.robustness.free_phases import (
     FIRST_TURNS,
     arm_weights,
     least_at,
@@ -35,7 +37,6 @@ from armlock.free_phases import (
     search_outwards,
     unconfined,
 )
-from armlock.loops import LoopAt
 
 #: Relative accuracy of the smallest distances, and so of modulus and disk margins.
 TOLERANCE = 1e-6

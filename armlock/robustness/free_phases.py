@@ -1,9 +1,9 @@
 """What L can be at all phases of the arms: a disc, and the count and the limits it decides.
 
 With free phases L fills a disc, around the sum of the responses to the two arms
-(`armlock.discs`). Where that stays off a target, such as -1 or the unit circle, L does at all
-those phases. So it tells which parts of the axis need no walk, and its limit at high frequency
-is that of L.
+(`armlock.robustness.discs`). Where that stays off a target, such as -1 or the unit circle, L
+does at all those phases. So it tells which parts of the axis need no walk, and its limit at
+high frequency is that of L.
 """
 
 from __future__ import annotations
@@ -16,11 +16,12 @@ from itertools import zip_longest
 import numpy as np
 from numpy.polynomial import polynomial as poly
 
-from armlock import contour, discs
-from armlock.bounds import last_larger
+from armlock.axis import contour
 from armlock.checks import ComplexArray, FloatArray, IntArray
 from armlock.loops import Loop, LoopAt
-from armlock.stability import CountError, unstable_roots
+from armlock.robustness import discs
+from armlock.stability.bounds import last_larger
+from armlock.stability.counts import CountError, unstable_roots
 
 # A distance of L from -1 below it is as good as none.
 _TOUCHING = 1e-6
@@ -57,7 +58,7 @@ def limit_disc(point: LoopAt) -> tuple[float, float]:
 def free_disc(point: LoopAt, omega: FloatArray) -> tuple[ComplexArray, FloatArray]:
     """Centres and radii of the discs that L fills at frequencies, both arms' phases free.
 
-    `armlock.discs` has the same, with the phase between the arms where it is known.
+    `armlock.robustness.discs` has the same, with the phase between the arms where it is known.
     """
     first, second = point.loop.arm_responses(1j * omega)
     return first + second, np.abs(point.c1 * first) + np.abs(point.c2 * second)
@@ -141,7 +142,7 @@ def no_smaller_from(loop: Loop, weights: FloatArray, levels: FloatArray) -> floa
 
 @lru_cache(maxsize=64)
 def _factors(loop: Loop) -> tuple[ComplexArray, IntArray, FloatArray]:
-    """Return the roots, powers and leads of `armlock.discs.Arms`."""
+    """Return the roots, powers and leads of `armlock.robustness.discs.Arms`."""
     rest, *arms = loop.polynomials()
     leads = np.array([float(p.coefficients[-1] / rest.coefficients[-1]) for p in arms])
     powers: dict[complex, list[int]] = {}
@@ -180,8 +181,9 @@ def meeting_intervals(
 ) -> FloatArray:
     """Intervals, in rad/s and of shape (n, 2), on which L may meet a target at some phases.
 
-    Intervals of a span of the axis. The target is that of `armlock.discs.intervals_not_clear`.
-    With `free`, as for `arms_of`, they hold for all smaller |c1| and |c2|, too.
+    Intervals of a span of the axis. The target is that of
+    `armlock.robustness.discs.intervals_not_clear`. With `free`, as for `arms_of`, they hold for
+    all smaller |c1| and |c2|, too.
     """
     found: FloatArray = discs.intervals_not_clear(
         arms_of(point, free=free),

@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from armlock.axis.exponentials import EPSILON
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import FloatArray, check_memory, positive_number, real_array
-from armlock.exponentials import EPSILON
-from armlock.stability import sign_changes
+from armlock.stability.counts import sign_changes
 
 
 class Line(NamedTuple):
@@ -185,7 +185,7 @@ def d_curve_line(system: CharacteristicFunction) -> Line:
     Examples
     --------
     >>> from armlock import CommonArm
-    >>> from armlock.dcurve import d_curve_line
+    >>> from armlock.stability.dcurve import d_curve_line
     >>> d_curve_line(CommonArm())
     Line(weight_x=1.0, weight_y=1.0, value=2.0)
     """
@@ -235,7 +235,7 @@ def d_curve_branches(
         \mathrm{Im} \left[ B_1(\mathrm{j}\omega)\, \overline{B_2(\mathrm{j}\omega)}\,
         e^{-\mathrm{j}\omega (\theta_1 - \theta_2)} \right] = 0 ,
 
-    found with certified steps (`armlock.contour.imaginary_zeros`).
+    found with certified steps (`armlock.axis.contour.imaginary_zeros`).
 
     Examples
     --------

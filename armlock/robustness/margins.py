@@ -1,9 +1,9 @@
 """How far a loop is from instability: margins, and the first perturbation that breaks it.
 
-No grid enters a number. Distances from -1 come from `armlock.distances`, phase and delay
-margins from `armlock.crossovers`, the gain interval from `armlock.gains`. Each walk ends at a
-frequency past which nothing smaller is possible. At high frequency the limit is known in closed
-form.
+No grid enters a number. Distances from -1 come from `armlock.robustness.distances`, phase and
+delay margins from `armlock.robustness.crossovers`, the gain interval from
+`armlock.robustness.gains`. Each walk ends at a frequency past which nothing smaller is
+possible. At high frequency the limit is known in closed form.
 """
 
 from __future__ import annotations
@@ -13,24 +13,25 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from armlock import discs
 from armlock.checks import FloatArray, positive_number
-from armlock.crossovers import crossovers_end, phase_and_delay
-from armlock.distances import smallest_distances
-from armlock.free_phases import (
+from armlock.loops import Loop, LoopAt, checked_loop
+from armlock.robustness import discs
+from armlock.robustness.crossovers import crossovers_end, phase_and_delay
+from armlock.robustness.distances import smallest_distances
+from armlock.robustness.free_phases import (
     arms_of,
     limit_margins,
     no_margin,
     no_smaller_from,
     require_stable,
 )
-from armlock.gains import gain_interval_of_stable
-from armlock.loops import Loop, LoopAt, checked_loop
-from armlock.rays import FARTHEST, Ray
-from armlock.stability import BOUNDARY, UNCONFINED, CountError, unstable_roots
+from armlock.robustness.gains import gain_interval_of_stable
+from armlock.robustness.rays import FARTHEST, Ray
+from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError, unstable_roots
 
-# Relative accuracy with free phases, in the order of `armlock.discs.free_margins_at`. The
-# disk margin may be flat over decades of frequency, where a finer one would take too long.
+# Relative accuracy with free phases, in the order of
+# `armlock.robustness.discs.free_margins_at`. The disk margin may be flat over decades of
+# frequency, where a finer one would take too long.
 _FREE_TOLERANCES = np.array([1e-5, 1e-4, 1e-5, 1e-5])
 
 
@@ -136,9 +137,9 @@ def _free_margins(
 ) -> tuple[FloatArray, FloatArray]:
     """Margins over all phases of the two arms, from a frequency on, and where they are met.
 
-    In the order of `armlock.discs.free_margins_at`; only those below `known` are looked for.
-    A coarse sample gives values that occur. The certified walk then steps over what cannot hold
-    smaller ones.
+    In the order of `armlock.robustness.discs.free_margins_at`; only those below `known` are
+    looked for. A coarse sample gives values that occur. The certified walk then steps over what
+    cannot hold smaller ones.
     """
     limit, weights = limit_margins(point), np.abs(point[1:])
     end = crossovers_end(point, weights, float(limit[discs.PHASE]))
@@ -264,7 +265,7 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
         Smallest eps > 0 such that `unstable_roots` at (1, 1) + eps (d1, d2) is not zero: a
         root reaches the imaginary axis there, or the neutral root chain does. 0 if it is not
         stable next to (1, 1), inf if no eps breaks it, up to parameters of 1e9. How near to the
-        limit of the chain roots are followed, `armlock.rays.first_crossing` says.
+        limit of the chain roots are followed, `armlock.robustness.rays.first_crossing` says.
 
     Raises
     ------
@@ -277,7 +278,7 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
 
     See Also
     --------
-    armlock.rays.first_crossing : from other points, and with the frequency.
+    armlock.robustness.rays.first_crossing : from other points, and with the frequency.
 
     Notes
     -----

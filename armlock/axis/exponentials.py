@@ -23,8 +23,8 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
+from armlock.axis.compiled import njit
 from armlock.checks import ComplexArray, FloatArray, IntArray
-from armlock.compiled import njit
 
 EPSILON = 2.0**-52
 #: Up to this degree a polynomial is evaluated from its coefficients, beyond from its roots.

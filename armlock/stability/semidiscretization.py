@@ -333,7 +333,7 @@ def semi_discretization(
     Examples
     --------
     >>> from armlock import CommonArm, unstable_roots
-    >>> from armlock.semidiscretization import semi_discretization
+    >>> from armlock.stability.semidiscretization import semi_discretization
     >>> unstable_roots(semi_discretization(CommonArm(), step=0.05), [0.9, 0.5], [1.05, 1.6])
     array([0, 5])
     """
