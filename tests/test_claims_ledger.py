@@ -17,6 +17,7 @@ NOTEBOOKS = Path(__file__).parents[1] / "notebooks"
 @pytest.fixture
 def calls(monkeypatch):
     monkeypatch.setattr(module, "_REGISTER", {})
+    monkeypatch.delenv("ARMLOCK_SHARED", raising=False)
     made = []
 
     @claim(
@@ -46,15 +47,6 @@ def test_checks_run_once_and_only_when_asked_for(calls):
     assert ledger["X1"].verdict is Verdict.REPRODUCED
     with pytest.raises(KeyError):
         ledger["X3"]
-
-
-def test_what_a_build_has_found_is_not_computed_again(calls, monkeypatch, tmp_path):
-    (entry,) = [entry for entry in all_claims() if entry.identifier == "X1"]
-    found = Finding(Verdict.OPEN, 3.0, "m", "found at the start of the build")
-    Ledger([(entry, found)]).write(tmp_path)
-    monkeypatch.setenv("ARMLOCK_FIGURES", str(tmp_path))
-    assert check("X1", "X2")["X1"] == found
-    assert calls == []
 
 
 def test_a_chapter_has_all_its_claims(calls):

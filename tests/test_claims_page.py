@@ -6,13 +6,11 @@ import pytest
 
 from armlock import CommonArm
 from book.companion.claims import Weight, check
-from book.companion.claims import page as module
 from book.companion.claims.assumptions import break_along
 from book.companion.claims.page import (
     Errata,
     LedgerPage,
     VerdictCounts,
-    whole_ledger,
 )
 
 
@@ -57,25 +55,6 @@ def test_the_page_offers_the_ledger_as_data(ledger, monkeypatch, tmp_path):
     with (tmp_path / "claims.csv").open() as stream:
         assert [row["claim"] for row in csv.DictReader(stream)] == ["T1", "D10", "C2"]
     assert len(json.loads((tmp_path / "claims.json").read_text())) == 3
-
-
-def test_a_build_checks_the_claims_once(ledger, monkeypatch, tmp_path):
-    made = 0
-
-    def checked():
-        nonlocal made
-        made += 1
-        return ledger
-
-    monkeypatch.setattr(module, "all_claims", lambda: [claim for claim, _ in ledger])
-    monkeypatch.setattr(module, "check_in_parallel", checked)
-    monkeypatch.setenv("ARMLOCK_FIGURES", str(tmp_path))
-    for _ in range(2):
-        assert whole_ledger().entries == ledger.entries
-    assert made == 1
-    monkeypatch.delenv("ARMLOCK_FIGURES")
-    whole_ledger()
-    assert made == 2
 
 
 def test_counts_are_of_physics_and_of_the_white_paper_by_itself():

@@ -20,18 +20,18 @@ from __future__ import annotations
 import csv
 import html
 import json
-import os
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cache
 from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
+
+from book.companion.shared import shared
 
 
 class Verdict(StrEnum):
@@ -137,7 +137,7 @@ class Claim:
     affects: tuple[str, ...]
     weight: Weight
     printed: str
-    check: Callable[[], Finding]
+    check: shared[Finding]
 
 
 _REGISTER: dict[str, Claim] = {}
@@ -153,7 +153,7 @@ def claim(
     affects: tuple[str, ...] = (),
     weight: Weight = Weight.PHYSICS,
     printed: str = "",
-) -> Callable[[Callable[[], Finding]], Callable[[], Finding]]:
+) -> Callable[[Callable[[], Finding]], shared[Finding]]:
     """Enter the decorated check in the register of claims.
 
     Parameters
@@ -181,10 +181,10 @@ def claim(
         If the identifier is taken.
     """
 
-    def enter(check: Callable[[], Finding]) -> Callable[[], Finding]:
+    def enter(check: Callable[[], Finding]) -> shared[Finding]:
         if identifier in _REGISTER:
             raise ValueError(f"identifier must be new, got {identifier!r} a second time")
-        remembered = cache(check)
+        remembered = shared(check)
         _REGISTER[identifier] = Claim(
             identifier, place, says, chapter, pinned, affects, weight, printed, remembered,
         )  # fmt: skip
@@ -379,26 +379,8 @@ def table(rows: str) -> str:
     )
 
 
-def findings_of_the_build() -> dict[str, Finding]:
-    """Return what the claims' check at the start of a build or of the tests has found.
-
-    Both check every claim on all cores, before the first page or test, and leave claims.json
-    in the folder that the environment variable ARMLOCK_FIGURES names. Elsewhere this is empty.
-    """
-    folder = os.environ.get("ARMLOCK_FIGURES")
-    file = Path(folder) / "claims.json" if folder else None
-    if file is None or not file.exists():
-        return {}
-    return {
-        record["claim"]: Finding(
-            Verdict(record["verdict"]), record["value"], record["quantity"], record["note"]
-        )
-        for record in json.loads(file.read_text("utf-8"))
-    }
-
-
 def check(*identifiers: str) -> Ledger:
-    """Check claims by identifier, those that a build has not checked already.
+    """Check claims by identifier, those that this build has not checked already.
 
     Parameters
     ----------
@@ -420,8 +402,7 @@ def check(*identifiers: str) -> Ledger:
                 f"identifier must be one of {', '.join(_REGISTER)}; got {identifier!r}"
             )
     chosen = [_REGISTER[identifier] for identifier in identifiers]
-    found = findings_of_the_build()
-    return Ledger((entry, found.get(entry.identifier) or entry.check()) for entry in chosen)
+    return Ledger((entry, entry.check()) for entry in chosen)
 
 
 def chapter_claims(chapter: str) -> Ledger:
