@@ -292,7 +292,7 @@ def _count_below(point: LoopAt, omega: float) -> int | None:
     # Not zero: sensors with an integrator have a root at s = 0 there.
     loop, c1, c2 = point
     low1, low2 = 1e-3 * c1, 1e-3 * c2
-    parts = [loop.at(c1, c2), loop.at(low1, low2)]
+    parts = [loop.sum_at(c1, c2), loop.sum_at(low1, low2)]
     arguments, values = [], []
     for whole in parts:
         none = np.zeros(whole.sums.size)

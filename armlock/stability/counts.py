@@ -27,13 +27,12 @@ from scipy.optimize import elementwise
 from armlock.axis import contour, counting
 from armlock.axis.counting import PointModel, RowModel, Rows
 from armlock.axis.exponentials import ROUNDING, ExponentialSum, aligned, without_unused
-from armlock.characteristic import CharacteristicFunction, checked_system
+from armlock.characteristic import CharacteristicFunction, broadcast_parameters, checked_system
 from armlock.checks import (
     BoolArray,
     FloatArray,
     IntArray,
     axis,
-    broadcast_pair,
     check_memory,
 )
 from armlock.stability.bounds import last_frequency
@@ -185,7 +184,9 @@ def _count(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -> IntA
 
 
 def unstable_roots(
-    system: CharacteristicFunction, x: npt.ArrayLike, y: npt.ArrayLike
+    system: CharacteristicFunction,
+    x: npt.ArrayLike | None = None,
+    y: npt.ArrayLike | None = None,
 ) -> IntArray:
     r"""Count the characteristic roots with positive real part.
 
@@ -193,8 +194,9 @@ def unstable_roots(
     ----------
     system : CharacteristicFunction
         The loop, for instance `CommonArm()`.
-    x, y : array_like of float
-        The free parameters; they broadcast.
+    x, y : array_like of float, optional
+        The free parameters; they broadcast. Those of a loop, c1 and c2, are one if they are not
+        given; others have to be.
 
     Returns
     -------
@@ -243,8 +245,7 @@ def unstable_roots(
     >>> unstable_roots(CommonArm(), [0.9, 0.5, 1.0], [1.05, 1.6, 1.0])
     array([ 0,  5, -1])
     """
-    name1, name2 = checked_system(system).parameters
-    xs, ys = broadcast_pair(name1, x, name2, y)
+    xs, ys = broadcast_parameters(system, x, y)
     return _count(system, xs.ravel(), ys.ravel()).reshape(xs.shape)
 
 
