@@ -12,6 +12,7 @@ of `armlock.characteristic`. The Hayes equation, which has no sensor, is one mor
 from __future__ import annotations
 
 from collections.abc import Sequence
+from fractions import Fraction
 from math import factorial
 from typing import Any, NamedTuple
 
@@ -293,6 +294,22 @@ def checked_loop(loop: Loop) -> Loop:
     return loop
 
 
+def power_series(
+    system: CharacteristicFunction, x: float | Fraction, y: float | Fraction, number: int
+) -> tuple[list[Fraction], list[Fraction]]:
+    """Return the first coefficients of R and of D - R in ascending powers of s, exactly."""
+    rest = [Fraction(value) for value in system.rest.tolist()[:number]]
+    rest += [Fraction(0)] * (number - len(rest))
+    numerator, dead = [Fraction(0)] * number, -Fraction(system.delay)
+    for b, tau, origin, parameter in system.arms(x, y):
+        late, here, there = dead - Fraction(tau), Fraction(parameter), Fraction(origin)
+        for i, value in enumerate(b.tolist()[:number]):
+            for j in range(number - i if value else 0):
+                turn = there * dead**j - here * late**j
+                numerator[i + j] += Fraction(value) * turn / factorial(j)
+    return rest, numerator
+
+
 class LoopAt(NamedTuple):
     """A loop at one pair of perturbations, L = N / R.
 
@@ -323,22 +340,19 @@ class LoopAt(NamedTuple):
             self.loop.rest_on_boundary().scaled(-1.0)
         )
 
+    def at_zero(self) -> tuple[int, Fraction, Fraction]:
+        """Return how many factors s cancel in L = N / R, and N and R at s = 0 without them.
+
+        Exact for the coefficients, delays and parameters as they are given.
+        """
+        loop, c1, c2 = self
+        rest, numerator = power_series(loop, c1, c2, int(np.flatnonzero(loop.rest)[0]) + 1)
+        pairs = enumerate(zip(numerator, rest, strict=True))
+        return next((k, above, below) for k, (above, below) in pairs if above or below)
+
     def poles_at_zero(self) -> int:
         """Order of the pole of L at s = 0 once numerator and denominator have cancelled."""
-        loop, c1, c2 = self
-        order = int(np.flatnonzero(loop.rest)[0])
-        if order == 0:
-            return 0
-        # Taylor coefficients of B1 (1 - c1 exp(-s tau1)) + B2 (1 - c2 exp(-s tau2)), and the
-        # magnitudes they are summed from.
-        taylor, size = np.zeros(order), np.zeros(order)
-        for b, tau, _, c in loop.arms(c1, c2):
-            arm = np.array([-c * (-tau) ** k / factorial(k) for k in range(order)])
-            arm[0] += 1.0
-            taylor += np.convolve(b, arm)[:order]
-            size += np.convolve(np.abs(b), np.abs(arm))[:order]
-        nonzero = np.flatnonzero(np.abs(taylor) > 1e-13 * size)
-        return order - (int(nonzero[0]) if nonzero.size else order)
+        return int(np.flatnonzero(self.loop.rest)[0]) - self.at_zero()[0]
 
     def leading_radius(self) -> float:
         """Radius around s = 0 within which L is as simple as it gets, or the last one tried.

@@ -298,9 +298,11 @@ class Ledger:
         ).replace("$", "")
 
     def _repr_html_(self) -> str:
-        """Return the table as HTML, for notebooks."""
+        """Return the table as HTML, for a chapter; what is behind a row is in the ledger."""
         rows = "".join(
-            row(c, f, f'id="claim-{c.identifier}"', ledger_link(c.identifier))
+            f'<tr id="claim-{c.identifier}"><td>{ledger_link(c.identifier)}</td>'
+            f"<td>{badge(f.verdict)}</td><td>{c.weight}</td><td>{typeset(c.says)}"
+            f"<br><strong>{typeset(f.shown)}</strong>: {typeset(f.quantity)}.</td></tr>"
             for c, f in self.entries
         )
         return table(rows)
@@ -360,8 +362,8 @@ def badge(verdict: Verdict, text: str = "") -> str:
     return f'<span class="verdict verdict-{name}">{text or name.replace("_", " ")}</span>'
 
 
-def row(claim: Claim, finding: Finding, attributes: str, link: str, more: str = "") -> str:
-    """Return a claim as a row of `table`: one line, and what unfolds below it."""
+def row(claim: Claim, finding: Finding, attributes: str, link: str, more: str) -> str:
+    """Return a claim as a row of the ledger: one line, and what unfolds below it."""
     printed = f"<p>Printed ({typeset(claim.place)}): {typeset(claim.printed)}.</p>"
     place = f"<p>{typeset(claim.place)}, in our words.</p>"
     return (
