@@ -301,9 +301,8 @@ def power_series(
     rest = [Fraction(value) for value in system.rest.tolist()[:number]]
     rest += [Fraction(0)] * (number - len(rest))
     numerator, dead = [Fraction(0)] * number, -Fraction(system.delay)
-    arms = (system.b1, system.tau1, x), (system.b2, system.tau2, y)
-    for (b, delay, parameter), origin in zip(arms, system.reference, strict=True):
-        late, here, there = dead - Fraction(delay), Fraction(parameter), Fraction(origin)
+    for b, tau, origin, parameter in system.arms(x, y):
+        late, here, there = dead - Fraction(tau), Fraction(parameter), Fraction(origin)
         for i, value in enumerate(b.tolist()[:number]):
             for j in range(number - i if value else 0):
                 turn = there * dead**j - here * late**j

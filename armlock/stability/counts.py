@@ -339,7 +339,7 @@ def loop_count(loop: CharacteristicFunction, c1: float | Fraction, c2: float | F
     Parameters
     ----------
     loop : CharacteristicFunction
-        The loop, for instance `CommonArm()`, or what `changed` makes of one.
+        The loop, for instance `CommonArm()`, or its `plain` function, changed.
     c1, c2 : float or Fraction
         Multiplicative perturbations. Whether anything cancels is decided for these numbers and
         the loop's own, without rounding.
