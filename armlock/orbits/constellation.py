@@ -35,7 +35,7 @@ _SHAPIRO = 4.0 * SUN / SPEED_OF_LIGHT**3
 _Path = Callable[[FloatArray, int], FloatArray]
 # Light moves ten thousand times as fast as a spacecraft: each round of the iteration gives four
 # digits. A round trip that has not settled after so many is none.
-_ROUNDS = 8
+_ROUNDS = 6
 _SETTLED = 1e-12
 # No spacecraft is within the Sun, radius in m: positions in km, or not from the Sun, would be.
 _SUN_RADIUS = 6.957e8
