@@ -351,10 +351,19 @@ def ledger_link(identifier: str) -> str:
     return f'<a href="09_ledger.html#ledger-{identifier}">{identifier}</a>'
 
 
+#: Verdicts that are too long for the narrow column of a table, as it shows them.
+SHORT = {
+    Verdict.WHERE_USED: "holds where used",
+    Verdict.IN_PART: "in part",
+    Verdict.OPEN: "cannot be settled",
+}
+
+
 def badge(verdict: Verdict, text: str = "") -> str:
     """Return a text as HTML in the colour of a verdict; by default the verdict in short."""
     name = verdict.name.lower()
-    return f'<span class="verdict verdict-{name}">{text or name.replace("_", " ")}</span>'
+    shown = text or SHORT.get(verdict, verdict)
+    return f'<span class="verdict verdict-{name}">{shown}</span>'
 
 
 def row(claim: Claim, finding: Finding, attributes: str, link: str, more: str) -> str:
