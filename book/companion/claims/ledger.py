@@ -122,7 +122,10 @@ class Finding:
     @property
     def shown(self) -> str:
         """The number as a reader sees it; "0 to rounding" where only rounding is left."""
-        return "0 to rounding" if 0.0 < abs(self.value) < 1e-11 else f"{self.value:.6g}"
+        if 0.0 < abs(self.value) < 1e-11:
+            return "0 to rounding"
+        # Four digits decide; a number of some ten thousand is not given as a power of ten.
+        return f"{self.value:.0f}" if 1e4 <= abs(self.value) < 1e6 else f"{self.value:.4g}"
 
 
 @dataclass(frozen=True)
