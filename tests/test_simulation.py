@@ -1,5 +1,6 @@
 """The loop in time: accuracy, closed form, verdicts, blocks, divergence, bad input."""
 
+import copy
 import pickle
 import re
 from functools import partial
@@ -24,16 +25,20 @@ from armlock import (
     paper_loop,
     rightmost_root,
     sampled_open_loop,
-    save_series,
     simulate,
-    simulate_blocks,
     unstable_roots,
 )
 from armlock.sensors import COMMON, SINGLE, SignalMapping
+from armlock.timedomain import simulation
 from armlock.timedomain.simulation import BLOCK, LANES, lagrange_delay
 from tests import independent
 
 RATE = 200.0
+# Arms that move for hours.
+SLOW_MOVES: dict[str, Any] = {
+    "tau1": lambda t: 20.13 + 1e-5 * t,
+    "tau2": lambda t: 19.957 - 1e-5 * t,
+}
 
 
 def relative_error(found, expected):
@@ -119,7 +124,7 @@ def test_dead_time_and_moving_arms_against_the_difference_equation(dead):
 
 def test_delays_that_the_rate_does_not_resolve_are_refused():
     loop = Loop(Controller([], [-0.1], 0.2), COMMON, 20.1, 19.9, 1e-3)
-    message = r"sample_rate must be at least 4000\.0 Hz to interpolate delay = 0\.001 s, or a"
+    message = r"sample_rate must be at least 4000 Hz to interpolate delay = 0\.001 s, or a"
     with pytest.raises(ValueError, match=message):
         Simulation(loop, 200.0)
     with pytest.raises(ValueError, match=message):
@@ -182,34 +187,82 @@ def test_divergence_does_not_depend_on_blocks():
         run.advance(noise[:10])
 
 
-def test_a_stream_is_read_block_by_block_and_saved_with_the_same_bits(tmp_path):
-    """While it is written, what another process sees has another name."""
-    rows = np.random.default_rng(1).standard_normal((BLOCK + 5000, 3)) * (1.0, 1e-3, 1e-3)
-    noise, c1, c2 = rows.T
-    seen = []
-
-    def blocks():
-        for a, b in pairwise([0, 1, 2, 2, 4019, 4020, 9000, BLOCK, noise.size]):
-            seen.append([path.suffix for path in tmp_path.iterdir()])
-            yield noise[a:b], c1[a:b], c2[a:b]
-
-    target = tmp_path / "run.npy"
-    assert save_series(target, simulate_blocks(paper_loop(), blocks())) == noise.size
-    assert np.array_equal(np.load(target), simulate(paper_loop(), noise, c1, c2))
-    assert seen == [[".part"]] * 8
-    assert [path.name for path in tmp_path.iterdir()] == ["run.npy"]
+def test_a_run_goes_on_from_its_saved_state_with_the_same_bits():
+    """Before its first block, in the middle, with arms that move; it takes little room."""
+    noise = np.random.default_rng(1).standard_normal((2, BLOCK + 5000))
+    loop = Loop(Controller([], [-0.1], 0.02), COMMON, 20.1, 19.9, 0.3)
+    whole = simulate(loop, noise, sample_rate=10.0, history=0.5, **SLOW_MOVES)
+    run, parts = Simulation(loop, 10.0, history=0.5, draws=2), []
+    for a, b in pairwise([0, 3, 500, noise.shape[1]]):
+        saved = pickle.dumps(run)
+        run = pickle.loads(saved)
+        assert len(saved) < 20_000
+        parts.append(run.advance(noise[:, a:b], **SLOW_MOVES))
+        aside = copy.deepcopy(run)
+        aside.advance(noise[:, :9], **SLOW_MOVES)
+    assert np.array_equal(np.hstack(parts), whole)
 
 
-def test_an_interrupted_run_leaves_the_file_of_the_last_one(tmp_path):
-    def blocks():
-        yield np.ones(1000)
-        raise KeyboardInterrupt
+def test_an_arm_may_have_grown_during_a_gap():
+    """By some samples, as arms do in a month; what it then reaches back to is still there."""
+    loop = Loop(Controller([], [], 0.2), SINGLE, 2.0, 2.0)
+    noise = np.random.default_rng(1).standard_normal(2000)
+    run = Simulation(loop, 20.0, history=np.zeros(50))
+    before = run.advance(noise[:1000], 0.5)
+    first = run.advance(noise[1000:], 0.5, tau1=2.5)[0]
+    assert first == pytest.approx((noise[1000] + 0.2 * 0.5 * before[-50]) / 1.2)
+    with pytest.raises(
+        ValueError, match=r"^tau1 must not reach back .* got 9.0 s at t = 100 s"
+    ):
+        run.advance(noise, 0.5, tau1=9.0)
 
-    target = tmp_path / "run.npy"
-    np.save(target, np.arange(3.0))
+
+def test_an_interrupted_run_does_not_go_on(monkeypatch):
+    """Some of its runs have moved on, others have not."""
+    run, compute, calls = Simulation(CommonArm(), 10.0, draws=2), simulation._compute, []
+
+    def interrupted(*arguments):
+        calls.append(arguments)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return compute(*arguments)
+
+    monkeypatch.setattr(simulation, "_compute", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        save_series(target, simulate_blocks(CommonArm(), blocks(), 10.0))
-    assert np.array_equal(np.load(target), np.arange(3.0))
+        run.advance(np.ones((2, 50)))
+    with pytest.raises(RuntimeError, match="was interrupted in the middle of a block"):
+        run.advance(np.ones((2, 50)))
+
+
+def test_the_history_is_input_for_the_divergence_test():
+    """A loop that is left alone with what its arms hold is judged by that."""
+    with pytest.raises(DivergenceError) as caught:
+        simulate(SingleArm(), np.zeros(20_000), 3.0, history=1e-3, limit=10.0)
+    size = np.abs(caught.value.output)
+    assert 9.9e-3 < size[-1] <= 1e-2
+    began = round(caught.value.time * RATE)
+    assert size[began] <= 1e-3 < size[began + 1 :].min()
+
+
+def test_a_dead_time_below_the_step_comes_with_the_ways_out():
+    loop = paper_loop(delay=20e-6)
+    message = (
+        r"at least 200000 Hz to interpolate delay = 2e-05 s, or a multiple of 50000 Hz, got 20; "
+        r"loop\.replace\(delay=0\.0\) neglects .* by 0\.00126 rad at 10 Hz, the highest"
+    )
+    with pytest.raises(ValueError, match=message):
+        Simulation(loop, 20.0)
+    without, at = loop.replace(delay=0.0), 2j * np.pi * 10.0
+    assert Simulation(without, 20.0).advance(np.ones(3)).shape == (3,)
+    turned = np.angle(without.open_loop(at) / loop.open_loop(at))
+    assert turned == pytest.approx(0.00126, abs=5e-6)
+
+
+def test_what_memory_cannot_hold_is_refused():
+    with pytest.raises(ValueError, match=r"^sample_rate must be of a size that memory holds"):
+        simulate(CommonArm(), np.ones(9), sample_rate=1e9)
+    with pytest.raises(ValueError, match=r"^draws must be of a size that memory holds"):
+        Simulation(CommonArm(), draws=10**9)
 
 
 def test_a_share_of_a_sample_is_seen_at_any_rate():

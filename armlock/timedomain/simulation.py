@@ -19,11 +19,8 @@ what is simulated has an open loop in closed form, `sampled_open_loop`.
 from __future__ import annotations
 
 import math
-import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from pathlib import Path
-from typing import BinaryIO
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +29,7 @@ from armlock.axis.compiled import njit
 from armlock.checks import (
     ComplexArray,
     FloatArray,
+    check_memory,
     finite_series,
     positive_array,
     positive_number,
@@ -39,6 +37,7 @@ from armlock.checks import (
     whole_number,
 )
 from armlock.loops import Loop, checked_loop
+from armlock.progress import progress
 from armlock.timedomain.discretize import SampledFilter, SampledSensor, sampled_loop, warped
 
 #: Order of the Lagrange interpolation for delays that are not whole samples: odd.
@@ -47,7 +46,8 @@ INTERPOLATION_ORDER = 7
 BLOCK = 1 << 16
 #: Runs of an ensemble that go side by side. Fewer than half as many go one by one.
 LANES = 32
-#: The output counts as diverged when it exceeds the largest input so far by this factor.
+#: The output counts as diverged when it exceeds the largest input so far by this factor. What
+#: the arms hold at the start, the history, is input too.
 LIMIT = 1e6
 
 #: A constant delay in samples, phi(t - tau) = sum_k weights[k] phi[n - first - k].
@@ -89,7 +89,7 @@ class DivergenceError(ArithmeticError):
     ----------
     time : float
         When it began, in s: the last time at which the output was no larger than the largest
-        input so far.
+        input so far, noise or history.
     detected : float
         When the output exceeded that input by the limit, in s.
     output : float array
@@ -166,8 +166,8 @@ def lagrange_delay(name: str, tau: float, sample_rate: float) -> Delay:
         return whole, (1.0,)
     if first < 1:
         raise ValueError(
-            f"sample_rate must be at least {half / tau} Hz to interpolate {name} = {tau} s, "
-            f"or a multiple of {1.0 / tau} Hz, got {sample_rate}"
+            f"sample_rate must be at least {half / tau:.9g} Hz to interpolate {name} = {tau} "
+            f"s, or a multiple of {1.0 / tau:.9g} Hz, got {sample_rate:.9g}"
         )
     x = samples - first
     nodes = range(INTERPOLATION_ORDER + 1)
@@ -177,10 +177,16 @@ def lagrange_delay(name: str, tau: float, sample_rate: float) -> Delay:
 
 def _sampled_delays(loop: Loop, sample_rate: float) -> tuple[Delay, ...]:
     """Return the delays of both arms and the dead time, or say why they have no samples."""
-    return tuple(
-        lagrange_delay(name, getattr(loop, name), sample_rate)
-        for name in ("tau1", "tau2", "delay")
-    )
+    arms = [lagrange_delay(name, getattr(loop, name), sample_rate) for name in ("tau1", "tau2")]
+    try:
+        return (*arms, lagrange_delay("delay", loop.delay, sample_rate))
+    except ValueError as error:
+        phase = math.pi * sample_rate * loop.delay
+        raise ValueError(
+            f"{error}; loop.replace(delay=0.0) neglects the dead time, which changes the phase "
+            f"of L by {phase:.3g} rad at {0.5 * sample_rate:g} Hz, the highest frequency "
+            f"simulated, and by less below"
+        ) from None
 
 
 def _reach(delay: Delay) -> int:
@@ -545,8 +551,8 @@ class Simulation:
         or at least `history_samples` values, and as many as delays that move reach back at
         the start. Controller and sensor start at rest.
     limit : float, optional
-        The run counts as diverged when the output exceeds the largest input so far by this
-        factor.
+        The run counts as diverged when the output exceeds the largest input so far, noise or
+        history, by this factor.
     draws : int, optional
         Runs an ensemble of so many, side by side: noise, c1 and c2 have a row for each.
 
@@ -593,7 +599,11 @@ class Simulation:
         \dot\tau = 1 - \left( 1 - \frac{v_1}{c} \right) \left( 1 - \frac{v_2}{c} \right) .
 
     One call and many give the same samples, bit by bit, and so do an ensemble and its runs one
-    by one. An ensemble takes `LANES` runs at a time, whose samples the processor's vector units
+    by one. A run goes on after a gap as if there were none: its arms hold what they held before.
+    ``copy.deepcopy(run)`` and ``pickle.dumps(run)`` keep its state, which is the output as far
+    back as delays reach, and some numbers more: 64 kB for the paper's loop at 200 Hz.
+
+    An ensemble takes `LANES` runs at a time, whose samples the processor's vector units
     compute together. Of arrays in Fortran order, where the same sample of all runs stands side
     by side, nothing has to be copied.
 
@@ -605,6 +615,14 @@ class Simulation:
     >>> first, second = run.advance(np.ones(400)), run.advance(np.ones(400))
     >>> run.samples
     800
+
+    The state goes into a file, and another process goes on from there:
+
+    >>> import pickle
+    >>> saved = pickle.dumps(run)
+    >>> later = pickle.loads(saved)
+    >>> bool(np.array_equal(later.advance(np.ones(400)), run.advance(np.ones(400))))
+    True
     """
 
     def __init__(
@@ -631,17 +649,21 @@ class Simulation:
                 f"longest delay reaches, got {before.size}"
             )
         self._history = before.copy()
-        full, left = divmod(self.draws or 1, LANES)
+        # A block of samples of the output, and of what the controller has sent, stands behind
+        # some samples of the past, of which so many are known. They come with the first block.
+        columns = self.draws or 1
+        self._block = max(BLOCK // columns, 4 * self.history_samples)
+        self._past = self._known = 0
+        for name, number in (("sample_rate", 1), ("draws", columns)):
+            check_memory(name, (2, self.history_samples + self._block, number), 8)
+        full, left = divmod(columns, LANES)
         # The last runs may be few, and are then faster one by one.
         groups = [LANES] * full + ([1] * left if 2 * left < LANES else [LANES])
         rows = _STATES + len(sensor.states) + 2 * len(controller.sections)
         self._groups = [np.zeros((rows, lanes)) for lanes in groups]
-        # Of the output and of what the controller has sent: a block, behind some samples of the
-        # past, of which so many are known. They come with the first block.
-        self._block = max(BLOCK // sum(groups), 4 * self.history_samples)
         self._signals = np.zeros((2, 0, sum(groups)))
-        self._past = self._known = 0
         self._stopped: tuple[float, float] | None = None
+        self._within = False
         self.samples = 0
 
     def __getstate__(self) -> dict[str, object]:
@@ -702,16 +724,24 @@ class Simulation:
         """Compute the next block of noise that is already checked."""
         inputs = [np.atleast_2d(given).T, _series("c1", c1, given), _series("c2", c2, given)]
         arms = [self._arm(k, tau, given) for k, tau in enumerate((tau1, tau2))]
+        if self._within:
+            raise RuntimeError(
+                "this run was interrupted in the middle of a block, and cannot go on: begin "
+                "again, or with a copy made before"
+            )
         output, begin = np.empty(inputs[0].shape), self.samples
         shaped = output.T.reshape(given.shape)
-        for at in range(0, len(output), self._block):
-            part = slice(at, at + self._block)
-            if self._stopped is None:
-                self._fill(output[part], [s[part] if len(s) > 1 else s for s in inputs], arms)
-            if self._stopped is not None:
-                # A copy, so that the error does not hold all the memory of the run.
-                until = shaped[..., : self.samples - begin].copy()
-                raise DivergenceError(*self._stopped, until)
+        with progress("simulation", len(output)) as say:
+            for at in range(0, len(output), self._block):
+                part = slice(at, at + self._block)
+                if self._stopped is None:
+                    block = [s[part] if len(s) > 1 else s for s in inputs]
+                    self._fill(output[part], block, arms)
+                if self._stopped is not None:
+                    # A copy, so that the error does not hold all the memory of the run.
+                    until = shaped[..., : self.samples - begin].copy()
+                    raise DivergenceError(*self._stopped, until)
+                say(at + self._block)
         return shaped
 
     def _arm(self, k: int, tau: GivenDelay | None, like: FloatArray) -> Delay | _MovingArm:
@@ -749,6 +779,7 @@ class Simulation:
         phi, sent = self._signals[:, : past + stop]
         series = tuple(_in_columns(given, columns) for given in inputs)
         sampled = (arm1, arm2, dead), *self._filters
+        self._within = True
         for work in self._groups:
             lanes = work.shape[1]
             run = first, phi, sent, series, sampled, work.ravel(), self.limit
@@ -767,6 +798,7 @@ class Simulation:
             signal[:past] = signal[len(output) : len(output) + past]
         self._known = min(self._known + stop, past)
         self.samples += stop
+        self._within = False
 
     def _reaches(self) -> int:
         """Return how many samples before the present are known."""
@@ -846,7 +878,8 @@ def simulate(
     history : float or array_like, optional
         Output before the first sample, zero by default; see `Simulation`.
     limit : float, optional
-        Size of the output, in units of the largest input, that counts as diverged.
+        Size of the output that counts as diverged, in units of the largest input so far, noise
+        or history.
 
     Returns
     -------
@@ -885,105 +918,3 @@ def simulate(
     draws = len(given) if given.ndim == 2 else None
     run = Simulation(loop, sample_rate, history=history, limit=limit, draws=draws)
     return run._advance(given, c1, c2, tau1, tau2)
-
-
-def simulate_blocks(
-    loop: Loop,
-    blocks: Iterable[npt.ArrayLike | Sequence[npt.ArrayLike]],
-    sample_rate: float = 200.0,
-) -> Iterator[FloatArray]:
-    """Run a loop over a stream of blocks; memory does not grow with the duration.
-
-    Parameters
-    ----------
-    loop : Loop
-        The loop.
-    blocks : iterable
-        Of arrays of noise, or of tuples (noise, c1, c2). Their lengths may differ, zero
-        included.
-    sample_rate : float, optional
-        In Hz.
-
-    Yields
-    ------
-    float array, shaped like the block's noise
-        The same samples as `simulate` gives for the whole.
-
-    Raises
-    ------
-    TypeError, ValueError, DivergenceError
-        As `simulate` does.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from armlock import paper_loop, simulate_blocks
-    >>> blocks = (np.ones(500) for _ in range(4))
-    >>> sum(locked.size for locked in simulate_blocks(paper_loop(), blocks))
-    2000
-    """
-    run = Simulation(loop, sample_rate)
-    parts = (block if isinstance(block, tuple) else (block,) for block in blocks)
-    return (run.advance(*part) for part in parts)
-
-
-def save_series(path: str | os.PathLike[str], blocks: Iterable[FloatArray]) -> int:
-    """Write a stream of blocks as one NumPy file that exists only when it is complete.
-
-    Parameters
-    ----------
-    path : path_like
-        Name of the file, for instance one that ends in .npy.
-    blocks : iterable of float arrays
-        Each one-dimensional and finite, for instance from `simulate_blocks`.
-
-    Returns
-    -------
-    int
-        Number of samples written.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If a block is not a one-dimensional series of finite real numbers.
-    OSError
-        If the file cannot be written.
-
-    Notes
-    -----
-    The blocks go to a file whose name ends in .part, in the same folder, which takes the name
-    `path` when the last block is in. If anything stops the run, that file stays, and so does
-    what was at `path` before.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from pathlib import Path
-    >>> import numpy as np
-    >>> from armlock import paper_loop, save_series, simulate_blocks
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = Path(folder) / "locked.npy"
-    ...     blocks = simulate_blocks(paper_loop(), [np.ones(50), np.ones(50)])
-    ...     written = save_series(path, blocks)
-    ...     print(written, np.load(path).shape)
-    100 (100,)
-    """
-    path = Path(path)
-    temporary = path.with_name(f"{path.name}.part")
-    count = 0
-    with temporary.open("wb") as file:
-        # The header has room for any length: it is written again below.
-        _write_header(file, 0)
-        for number, block in enumerate(blocks):
-            values = finite_series(f"blocks[{number}]", block)
-            file.write(np.ascontiguousarray(values, dtype="<f8").tobytes())
-            count += values.size
-        file.seek(0)
-        _write_header(file, count)
-    temporary.replace(path)
-    return count
-
-
-def _write_header(file: BinaryIO, count: int) -> None:
-    description = {"descr": "<f8", "fortran_order": False, "shape": (count,)}
-    np.lib.format.write_array_header_1_0(file, description)
