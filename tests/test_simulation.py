@@ -247,8 +247,8 @@ def test_the_history_is_input_for_the_divergence_test():
 def test_a_dead_time_below_the_step_comes_with_the_ways_out():
     loop = paper_loop(delay=20e-6)
     message = (
-        r"at least 200000 Hz to interpolate delay = 2e-05 s, or a multiple of 50000 Hz, got 20; "
-        r"loop\.replace\(delay=0\.0\) neglects .* by 0\.00126 rad at 10 Hz, the highest"
+        r"at least 200000 Hz to interpolate delay = 2e-05 s, or a multiple of 50000 Hz, got "
+        r"20; loop\.replace\(delay=0\.0\) neglects .* by 0\.00126 rad at 10 Hz, the highest"
     )
     with pytest.raises(ValueError, match=message):
         Simulation(loop, 20.0)

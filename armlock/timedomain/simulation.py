@@ -599,9 +599,9 @@ class Simulation:
         \dot\tau = 1 - \left( 1 - \frac{v_1}{c} \right) \left( 1 - \frac{v_2}{c} \right) .
 
     One call and many give the same samples, bit by bit, and so do an ensemble and its runs one
-    by one. A run goes on after a gap as if there were none: its arms hold what they held before.
-    ``copy.deepcopy(run)`` and ``pickle.dumps(run)`` keep its state, which is the output as far
-    back as delays reach, and some numbers more: 64 kB for the paper's loop at 200 Hz.
+    by one. A run goes on after a gap as if there were none: its arms hold what they held. Its
+    state is the output as far back as delays reach, and some numbers more, 68 kB for the
+    paper's loop at 200 Hz; ``copy.deepcopy(run)`` and ``pickle.dumps(run)`` keep it.
 
     An ensemble takes `LANES` runs at a time, whose samples the processor's vector units
     compute together. Of arrays in Fortran order, where the same sample of all runs stands side
