@@ -20,8 +20,8 @@ def delayed_terms(system, x, y):
     """What D holds beside A: coefficients and delay of each term."""
     return (
         (system.c, system.delay),
-        (-x * system.b1, system.delay + system.delay1),
-        (-y * system.b2, system.delay + system.delay2),
+        (-x * system.b1, system.delay + system.tau1),
+        (-y * system.b2, system.delay + system.tau2),
     )
 
 
@@ -51,8 +51,8 @@ def exact(system, s, x, y):
         polynomials = system.rest, system.b1, system.b2
         rest, b1, b2 = (mpmath.polyval(p.tolist(), z, asc=True) for p in polynomials)
     x0, y0 = system.reference
-    arms = b1 * (x0 - x * mpmath.exp(-s * system.delay1))
-    arms += b2 * (y0 - y * mpmath.exp(-s * system.delay2))
+    arms = b1 * (x0 - x * mpmath.exp(-s * system.tau1))
+    arms += b2 * (y0 - y * mpmath.exp(-s * system.tau2))
     return rest + mpmath.exp(-s * system.delay) * arms
 
 
@@ -91,7 +91,7 @@ def rectangle_count(system, x, y, density=10.0, at_zero=0):
     many as `at_zero` says, are divided out.
     """
     radius = radius_of_unstable_roots(system, x, y)
-    longest = system.delay + max(system.delay1, system.delay2)
+    longest = system.delay + max(system.tau1, system.tau2)
     size = int(density * (radius * longest + 30.0))
     side = np.linspace(0.0, radius, size)
     near = np.geomspace(1e-9 * radius, radius, 400)

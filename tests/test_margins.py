@@ -285,7 +285,7 @@ def test_free_phases_pass_over_no_first_crossing(name, direction):
     """As a plain characteristic function a loop is walked without them."""
     loop, point = STABLE[name]
     found, expected = (
-        first_crossing(system, point, direction, 5.0) for system in (loop, loop.changed())
+        first_crossing(system, point, direction, 5.0) for system in (loop, loop.plain())
     )
     assert found == pytest.approx(expected, rel=1e-9, nan_ok=True)
 

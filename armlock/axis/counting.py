@@ -85,7 +85,7 @@ class PointModel(NamedTuple):
 class RowModel(NamedTuple):
     """The crossings x = N / M of a chart's rows, as `fill_rows` takes them.
 
-    D = N - x M, with M = B1 exp(-s (delay + delay1)), and all other terms in N.
+    D = N - x M, with M = B1 exp(-s (delay + tau1)), and all other terms in N.
 
     Attributes
     ----------

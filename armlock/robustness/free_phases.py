@@ -294,7 +294,7 @@ def _count_below(point: LoopAt, omega: float) -> int | None:
     low = LoopAt(loop, 1e-3 * c1, 1e-3 * c2)
     arguments, values = [], []
     for at in (point, low):
-        begin, whole = walk_begins(*at), at.loop.at(at.c1, at.c2)
+        begin, whole = walk_begins(*at), at.loop.sum_at(at.c1, at.c2)
         if begin is None or begin[0] >= omega:
             return None
         none = np.zeros(whole.sums.size)

@@ -152,13 +152,13 @@ def _require_stable_inside(point: LoopAt, lower: float, upper: float) -> None:
     rest = loop.polynomials()[0]
     for factor in (lower * (1.0 + 1e-6), upper * (1.0 - 1e-6)):
         scaled = rest._replace(coefficients=rest.coefficients / factor)
-        count = loop_count(loop.changed(rest=scaled), c1, c2)
+        count = loop_count(loop.plain().replace(rest=scaled), c1, c2)
         if count > 0:
             at = f"the count at {factor} times the gain is {count}"
             raise no_margin(point, f"rounding hides a crossing, for {at}")
 
 
-def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float]:
+def gain_interval(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> tuple[float, float, float]:
     r"""Find the gain factors around one between which a stable loop stays stable.
 
     Parameters

@@ -94,7 +94,9 @@ class Ray:
         #: The t at which the distance from the start is the start's from zero, or one.
         self.scale = max(1.0, float(np.hypot(*self.start))) / float(np.hypot(*self.direction))
         #: D0 conj(M) at s = j omega.
-        self.product = system.at(*self.start).times_conjugate(system.deviation(*self.direction))
+        self.product = system.sum_at(*self.start).times_conjugate(
+            system.deviation(*self.direction)
+        )
 
     def at(self, t: float) -> tuple[float, float]:
         """Return the point start + t direction."""
@@ -138,7 +140,7 @@ class Ray:
     def acts(self) -> bool:
         """Whether D changes along the ray."""
         system, (d1, d2) = self.system, self.direction
-        if system.delay1 != system.delay2:
+        if system.tau1 != system.tau2:
             return bool((d1 * system.b1).any() or (d2 * system.b2).any())
         return bool(poly.polyadd(d1 * system.b1, d2 * system.b2).any())
 
@@ -148,8 +150,8 @@ class Ray:
         z = np.exp(s * system.step) if system.step else s
         p1, p2 = self.direction[0] * system.b1, self.direction[1] * system.b2
         effect = np.asarray(poly.polyval(z, poly.polyadd(p1, p2)), dtype=np.complex128)
-        effect = effect + poly.polyval(z, p1) * np.expm1(-s * system.delay1)
-        effect = effect + poly.polyval(z, p2) * np.expm1(-s * system.delay2)
+        effect = effect + poly.polyval(z, p1) * np.expm1(-s * system.tau1)
+        effect = effect + poly.polyval(z, p2) * np.expm1(-s * system.tau2)
         effect = effect * np.exp(-s * system.delay)
         value = system(s, *self.start)
         acts = effect != 0.0

@@ -36,13 +36,12 @@ from armlock.axis.exponentials import (
     expand,
     without_unused,
 )
-from armlock.characteristic import CharacteristicFunction, checked_system
+from armlock.characteristic import CharacteristicFunction, broadcast_parameters, checked_system
 from armlock.checks import (
     BoolArray,
     FloatArray,
     IntArray,
     axis,
-    broadcast_pair,
     check_memory,
     real_number,
 )
@@ -207,7 +206,9 @@ def _count(
 
 
 def unstable_roots(
-    system: CharacteristicFunction, x: npt.ArrayLike, y: npt.ArrayLike
+    system: CharacteristicFunction,
+    x: npt.ArrayLike | None = None,
+    y: npt.ArrayLike | None = None,
 ) -> IntArray:
     r"""Count the characteristic roots with positive real part.
 
@@ -215,8 +216,9 @@ def unstable_roots(
     ----------
     system : CharacteristicFunction
         The loop, for instance `CommonArm()`.
-    x, y : array_like of float
-        The free parameters; they broadcast.
+    x, y : array_like of float, optional
+        The free parameters; they broadcast. Those of a loop, c1 and c2, are one if they are not
+        given; others have to be.
 
     Returns
     -------
@@ -265,8 +267,7 @@ def unstable_roots(
     >>> unstable_roots(CommonArm(), [0.9, 0.5, 1.0], [1.05, 1.6, 1.0])
     array([ 0,  5, -1])
     """
-    name1, name2 = checked_system(system).parameters
-    xs, ys = broadcast_pair(name1, x, name2, y)
+    xs, ys = broadcast_parameters(system, x, y)
     return _count(system, xs.ravel(), ys.ravel()).reshape(xs.shape)
 
 
@@ -316,7 +317,7 @@ def walk_begins(
         if j > shared and value
     ]
     start = 0.5 * min(math.exp(min([*logs, 700.0])), 1.0 / longest)
-    value = evaluate(expand(loop.at(float(c1), float(c2)).compiled(), start), start)[0]
+    value = evaluate(expand(loop.sum_at(float(c1), float(c2)).compiled(), start), start)[0]
     turn = contour.angle_between(value, (1.0 if first > 0 else -1.0) * 1j**shared)
     # More than the bound: rounding hides D there, or its coefficients are not those in use.
     return (start, 0.5 * math.pi * shared + turn) if abs(turn) < 0.6 else None
@@ -338,7 +339,7 @@ def loop_count(loop: CharacteristicFunction, c1: float | Fraction, c2: float | F
     Parameters
     ----------
     loop : CharacteristicFunction
-        The loop, for instance `CommonArm()`, or what `changed` makes of one.
+        The loop, for instance `CommonArm()`, or its `plain` function, changed.
     c1, c2 : float or Fraction
         Multiplicative perturbations. Whether anything cancels is decided for these numbers and
         the loop's own, without rounding.
