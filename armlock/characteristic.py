@@ -259,12 +259,12 @@ class CharacteristicFunction:
             If s does not hold finite numbers.
         """
         s = complex_array("s", s)
-        z = np.exp(s * self.step) if self.step else s
-        dead = np.exp(-s * self.delay)
+        (rest, _), (b1, _), (b2, _) = self._evaluated(s, np)
+        dead, (x0, y0) = np.exp(-s * self.delay), self.reference
         return (
-            np.asarray(poly.polyval(z, self.a) + poly.polyval(z, self.c) * dead),
-            np.asarray(poly.polyval(z, self.b1) * np.exp(-s * self.delay1) * dead),
-            np.asarray(poly.polyval(z, self.b2) * np.exp(-s * self.delay2) * dead),
+            np.asarray(rest + (x0 * b1 + y0 * b2) * dead),
+            np.asarray(b1 * np.exp(-s * self.delay1) * dead),
+            np.asarray(b2 * np.exp(-s * self.delay2) * dead),
         )
 
     def __call__(self, s: npt.ArrayLike, x: npt.ArrayLike, y: npt.ArrayLike) -> ComplexArray:
@@ -287,22 +287,23 @@ class CharacteristicFunction:
         broadcast_shape(("s", name1, name2), arrays)
         return arrays
 
-    def _arms(self, x: Any, y: Any) -> tuple[tuple[FloatArray, float, Any, Any], ...]:
-        """Return B, the delay, the reference and the parameter of either arm."""
-        x0, y0 = self.reference
-        return (self.b1, self.delay1, x0, x), (self.b2, self.delay2, y0, y)
+    def _evaluated(self, s: Any, library: Any) -> list[tuple[Any, Any]]:
+        """Return R, B1 and B2 at s, and their derivatives by z."""
+        z = library.exp(s * self.step) if self.step else s
+        return [p.evaluated(z) for p in self._polynomials]
 
     def _value(self, s: Any, x: Any, y: Any, library: Any = np) -> Any:
         """Evaluate D(s; x, y) unchecked.
 
         The functions are those of numpy, or of mpmath for one number in extended precision.
         """
-        z = library.exp(s * self.step) if self.step else s
-        arms = 0.0
-        for b, delay, origin, here in self._arms(x, y):
-            arm = (origin - here) - here * library.expm1(-s * delay)
-            arms = arms + poly.polyval(z, b) * arm
-        return poly.polyval(z, self.rest) + library.exp(-s * self.delay) * arms
+        (rest, _), *arms = self._evaluated(s, library)
+        delays, whole = (self.delay1, self.delay2), 0.0
+        for (b, _), delay, origin, here in zip(
+            arms, delays, self.reference, (x, y), strict=True
+        ):
+            whole = whole + b * ((origin - here) - here * library.expm1(-s * delay))
+        return rest + library.exp(-s * self.delay) * whole
 
     def derivative(self, s: npt.ArrayLike, x: npt.ArrayLike, y: npt.ArrayLike) -> ComplexArray:
         r"""Evaluate dD/ds; the three arguments broadcast.
@@ -324,17 +325,16 @@ class CharacteristicFunction:
 
     def _slope(self, s: Any, x: Any, y: Any, library: Any = np) -> Any:
         """Evaluate dD/ds unchecked, as `_value`."""
-        z = library.exp(s * self.step) if self.step else s
-        dz = self.step * z if self.step else 1.0
-        arms = 0.0
-        for b, delay, origin, here in self._arms(x, y):
-            change = library.expm1(-s * delay)
-            value = poly.polyval(z, b)
-            rate = poly.polyval(z, poly.polyder(b)) * dz - self.delay * value
-            arms = arms + rate * ((origin - here) - here * change)
-            arms = arms + value * here * delay * (1.0 + change)
-        own = poly.polyval(z, poly.polyder(self.rest)) * dz
-        return own + library.exp(-s * self.delay) * arms
+        dz = self.step * library.exp(s * self.step) if self.step else 1.0
+        (_, slope), *arms = self._evaluated(s, library)
+        delays, whole = (self.delay1, self.delay2), 0.0
+        for (b, change), delay, origin, here in zip(
+            arms, delays, self.reference, (x, y), strict=True
+        ):
+            late = library.expm1(-s * delay)
+            whole = whole + (change * dz - self.delay * b) * ((origin - here) - here * late)
+            whole = whole + b * here * delay * (1.0 + late)
+        return slope * dz + library.exp(-s * self.delay) * whole
 
     def shifted(self, sigma: float) -> CharacteristicFunction:
         """Return the function s -> D(s + sigma), whose roots lie `sigma` further left.
@@ -354,13 +354,15 @@ class CharacteristicFunction:
                 f"magnitude, got {sigma}: its exponential is no float"
             )
 
-        def with_moved(roots: ComplexArray, coefficients: FloatArray) -> Polynomial:
-            """Return a shifted polynomial from the roots before, and its coefficients."""
+        def with_moved(p: Polynomial, coefficients: FloatArray) -> Polynomial:
+            """Return a shifted polynomial of these coefficients."""
             if self.step:
-                return Polynomial(coefficients, roots * np.exp(-sigma * self.step))
-            if coefficients.size > LOW_DEGREE + 1:
-                return Polynomial(coefficients, roots - sigma)
-            return Polynomial.of(coefficients, roots - sigma)
+                return p._replace(
+                    coefficients=coefficients, roots=p.roots * np.exp(-sigma * self.step)
+                )
+            if p.missed and coefficients.size <= LOW_DEGREE + 1:
+                return Polynomial.of(coefficients, p.roots - sigma)
+            return p._replace(coefficients=coefficients, roots=p.roots - sigma)
 
         def move(p: Polynomial, delay: float) -> Polynomial:
             late, size = np.exp(-sigma * delay), p.coefficients.size
@@ -376,7 +378,7 @@ class CharacteristicFunction:
                     pairs = zip([number(value), *exact], [*left, 0], strict=True)
                     exact = [a + b for a, b in pairs]
                 moved = np.array(exact, dtype=np.float64)
-            return with_moved(p.roots, late * moved)
+            return with_moved(p, late * moved)
 
         x0, y0 = self.reference
         rest, b1, b2 = self._polynomials
@@ -389,7 +391,8 @@ class CharacteristicFunction:
         )
         if found.a is not found.rest:
             # Not found again: in extended precision that takes a second.
-            vars(found)["roots_of_a"] = with_moved(self.roots_of_a, found.a).roots
+            guess = Polynomial(self.a, self.roots_of_a, missed=1e-6)
+            vars(found)["roots_of_a"] = with_moved(guess, found.a).roots
         return found
 
     def exchanged(self) -> CharacteristicFunction:
@@ -436,31 +439,50 @@ class CharacteristicFunction:
         rest = self._polynomials[0]
         return rest.roots if self.a is self.rest else Polynomial.of(self.a).roots
 
-    def _delayed(self, k: int, lag: float, weight: float = 1.0) -> ExponentialSum:
+    def _delayed(
+        self, k: int, lag: float, weight: float = 1.0, *, rows: bool = False
+    ) -> ExponentialSum:
         """Return `weight` times R, B1 or B2, delayed by a time, at s = j omega.
 
-        For a map each power of z is an exponential, its polynomial is 1. Each coefficient keeps
-        a polynomial of its own, so that its rounding is not forgotten.
+        In the polynomials of `_basis`. For a map each power of z is an exponential, its
+        polynomial is 1. Each coefficient keeps a polynomial of its own, so that its rounding is
+        not forgotten.
         """
-        factors, polynomials = [np.ones(1)] * 3, self._polynomials
-        if self.step:
-            factors = [p.coefficients for p in self._polynomials]
-            number = sum(p.size for p in factors)
-            polynomials = (Polynomial(np.ones(1), np.zeros(0, dtype=np.complex128)),) * number
+        if not self.step:
+            polynomials, shares = self._basis
+            if rows and len(polynomials) == len(self._polynomials):
+                # A row has products with B1 only: the fewer terms in that the better.
+                polynomials, shares = self._polynomials, np.eye(3)
+            share = weight * shares[k]
+            return ExponentialSum(polynomials, share[None, :], np.array([-lag]), share)
+        factors = [p.coefficients for p in self._polynomials]
         ends = np.cumsum([p.size for p in factors])
+        polynomials = (Polynomial(np.ones(1), np.zeros(0, dtype=np.complex128)),) * ends[-1]
         place = np.split(np.eye(len(polynomials)), ends[:-1])[k]
         p = weight * factors[k]
         phases = np.asarray(self.step * np.arange(p.size) - lag, dtype=np.float64)
         return ExponentialSum(polynomials, p[:, None] * place, phases, p @ place)
 
-    def on_boundary(self) -> tuple[ExponentialSum, ExponentialSum, ExponentialSum]:
-        """Return the three terms of `parts` at s = j omega as exponential sums."""
+    @cached_property
+    def _basis(self) -> tuple[tuple[Polynomial, ...], FloatArray]:
+        """Polynomials, and the shares of them in R, B1 and B2, shape (3, polynomials)."""
+        return self._polynomials, np.eye(3)
+
+    def on_boundary(
+        self, *, rows: bool = False
+    ) -> tuple[ExponentialSum, ExponentialSum, ExponentialSum]:
+        """Return the three terms of `parts` at s = j omega as exponential sums.
+
+        With `rows` in the polynomials that suit the rows of a chart.
+        """
         x0, y0 = self.reference
-        undelayed = self.rest_on_boundary().plus(self._delayed(1, self.delay, x0))
+        undelayed = self.rest_on_boundary(rows=rows).plus(
+            self._delayed(1, self.delay, x0, rows=rows)
+        )
         return (
-            undelayed.plus(self._delayed(2, self.delay, y0)),
-            self._delayed(1, self.delay + self.delay1),
-            self._delayed(2, self.delay + self.delay2),
+            undelayed.plus(self._delayed(2, self.delay, y0, rows=rows)),
+            self._delayed(1, self.delay + self.delay1, rows=rows),
+            self._delayed(2, self.delay + self.delay2, rows=rows),
         )
 
     def at(self, x: float, y: float) -> ExponentialSum:
@@ -469,8 +491,12 @@ class CharacteristicFunction:
         constant, b1, b2 = self.on_boundary()
         combined = constant.plus(b1.scaled(-x)).plus(b2.scaled(-y))
         # What is left where all exponentials are one, without the digits lost by cancelling.
-        left = self.rest_on_boundary().sums + (x0 - x) * b1.sums + (y0 - y) * b2.sums
-        return combined._replace(sums=left)
+        # Of two ways to add up, the one with the smaller terms.
+        near, far = (x0 - x) * b1.sums, (y0 - y) * b2.sums
+        all_near, all_far = x0 * b1.sums + y0 * b2.sums, x * b1.sums + y * b2.sums
+        smaller = np.abs(all_near) + np.abs(all_far) < np.abs(near) + np.abs(far)
+        left = np.where(smaller, all_near - all_far, near + far)
+        return combined._replace(sums=self.rest_on_boundary().sums + left)
 
     def deviation(self, x: float, y: float) -> ExponentialSum:
         """Return x B1 exp(-s (delay + delay1)) + y B2 exp(-s (delay + delay2)) at s = j omega.
@@ -480,9 +506,9 @@ class CharacteristicFunction:
         _, b1, b2 = self.on_boundary()
         return b1.scaled(x).plus(b2.scaled(y))
 
-    def rest_on_boundary(self) -> ExponentialSum:
-        """Return R at s = j omega as an exponential sum."""
-        return self._delayed(0, 0.0)
+    def rest_on_boundary(self, *, rows: bool = False) -> ExponentialSum:
+        """Return R at s = j omega as an exponential sum, as `on_boundary` does."""
+        return self._delayed(0, 0.0, rows=rows)
 
 
 def checked_system(system: CharacteristicFunction) -> CharacteristicFunction:
@@ -497,7 +523,7 @@ def checked_system(system: CharacteristicFunction) -> CharacteristicFunction:
 def _polynomial(name: str, given: Sequence[float] | FloatArray | Polynomial) -> Polynomial:
     """Return a polynomial with trimmed, read-only coefficients, and its roots."""
     if isinstance(given, Polynomial):
-        return Polynomial(_trimmed(name, given.coefficients), given.roots)
+        return given._replace(coefficients=_trimmed(name, given.coefficients))
     return Polynomial.of(_trimmed(name, given))
 
 

@@ -311,9 +311,11 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
     farthest = FARTHEST * ray.scale
     eps = ray.first(farthest).position
     if eps < np.inf:
-        # So close to the result, rounding may hide on which side of the boundary a point is.
-        counts = [count(share * eps) for share in (0.5, 1.0 - 1e-6, 1.0 + 1e-6)]
-        agree = counts[0] == 0 and counts[1] in (0, BOUNDARY) and counts[2] != 0
+        # So close to the result, rounding may hide on which side of the boundary a point is:
+        # then a count farther away tells.
+        beside = [ray.count_beside(eps, side, 1e-6)[1] for side in (-1, 1)]
+        counts = [count(0.5 * eps), *beside]
+        agree = counts[:2] == [0, 0] and counts[2] not in (0, BOUNDARY)
     else:
         counts = [count(0.5 * farthest)] if ray.acts() else []
         agree = not any(counts)
