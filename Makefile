@@ -26,6 +26,8 @@ export IPYTHONDIR := $(CURDIR)/$(VENV)/ipython
 # The matrices here are small, and several processes share the machine.
 export OPENBLAS_NUM_THREADS := 1
 unexport PYTHONPATH PYTHONHOME VIRTUAL_ENV MPLBACKEND
+# What one claim, notebook or test has computed, the next one finds here.
+export ARMLOCK_SHARED := $(CURDIR)/build/shared
 
 # Two makes in one folder must not build the same files: the second waits for the first.
 alone = mkdir -p build; $(or $(PYTHON),python3) tools/alone.py build/lock \
@@ -40,7 +42,7 @@ RUN_SOURCES := $(call find-sources,armlock book/companion notebooks)
 BOOK_SOURCES := $(call find-sources,book) tools/check_html.py tools/write_codecheck.py \
 	tools/cache_notebooks.py codecheck.yml
 TEST_SOURCES := $(call find-sources,armlock book notebooks tests benchmarks tools binder) \
-	pyproject.toml environment.txt README.md codecheck.yml
+	pyproject.toml conftest.py environment.txt README.md codecheck.yml
 NOTEBOOKS := $(wildcard notebooks/*.ipynb)
 
 .DEFAULT_GOAL := help
@@ -58,6 +60,12 @@ help: ## List the targets
 env: ## Make .venv with every package of environment.txt, and this one
 	+@$(alone) $(PACKAGE_READY)
 	@echo "The environment is ready: $(VENV)"
+
+# The programs of an environment hold the path of their folder: one that was moved or copied is
+# made anew.
+ifneq ($(shell cat $(ENV_READY) 2>/dev/null),$(CURDIR))
+$(shell rm -f $(ENV_READY) $(PACKAGE_READY))
+endif
 
 # Both stamps are written last, so an interrupted install starts over. The lock is complete, as
 # `pip check` confirms, and nothing needs to be resolved: an older pip, led by the extras of a
@@ -83,7 +91,7 @@ $(ENV_READY): environment.txt
 	@mkdir -p $(VENV)/etc/ipython
 	@echo '{"IPKernelApp": {"log_level": 40}}' > $(VENV)/etc/ipython/ipython_kernel_config.json
 	@$(PY) -c 'import matplotlib.font_manager'
-	@touch $@
+	@echo "$(CURDIR)" > $@
 
 # README.md and LICENSE are part of the package's metadata, and must exist.
 $(PACKAGE_READY): $(ENV_READY) pyproject.toml
@@ -98,15 +106,20 @@ $(PACKAGE_READY): $(ENV_READY) pyproject.toml
 # have computed. The two longest notebooks go to two processes, which begin with two each: the
 # ledger, a short one, stands between them.
 PYTEST := $(PY) -m pytest --numprocesses auto --maxprocesses 4 --dist worksteal
-run-notebooks = rm -rf $(1) $(1).shared $(2); export ARMLOCK_FIGURES="$(CURDIR)/$(1)"; \
+execute = export ARMLOCK_FIGURES="$(CURDIR)/$(1)"; \
+	$(PYTEST) --dist load --maxschedchunk 1 --nbmake --overwrite $(addprefix $(2)/,$(3))
+run-notebooks = rm -rf $(1) build/shared $(2); export ARMLOCK_FIGURES="$(CURDIR)/$(1)"; \
 	echo "Checking every claim of the paper: build/claims.txt ..."; \
 	$(PY) -m book.companion.claims $(1) > build/claims.txt && cp -R notebooks $(2) && \
-	$(PYTEST) --dist load --maxschedchunk 1 --nbmake --overwrite \
-		$(addprefix $(2)/,07_simulation.ipynb 09_ledger.ipynb 08c_design.ipynb *.ipynb)
+	$(call execute,$(1),$(2),07_simulation.ipynb 09_ledger.ipynb 08c_design.ipynb *.ipynb)
 
+# Where notebooks alone have changed since the last run, only these run again. The stamp goes
+# first: what an interrupted run has left is not taken for a whole one.
 $(NOTEBOOKS_RAN): $(PACKAGE_READY) $(RUN_SOURCES) build/run-sources $(if $(FORCE),always)
+	@rm -f $@
 	@touch build/notebooks-started
-	@$(call run-notebooks,build/figures,build/executed)
+	@$(if $(filter-out notebooks/%.ipynb,$?),$(call run-notebooks,build/figures,build/executed),\
+		cp $? build/executed && $(call execute,build/figures,build/executed,$(notdir $?)))
 	@touch -r build/notebooks-started $@
 
 same: ## Run all notebooks again: the data of all figures, equal byte for byte
@@ -161,7 +174,7 @@ browser: ## Check every page in Chromium, without network; run the code as it sh
 	$(PY) tools/check_cells.py build/html
 
 lab: $(PACKAGE_READY) ## Open the notebooks in JupyterLab
-	$(VENV)/bin/jupyter-lab --notebook-dir notebooks
+	$(VENV)/bin/jupyter-lab --notebook-dir notebooks $(if $(filter 0,$(shell id -u)),--allow-root)
 
 serve: ## Serve the book at http://localhost:PORT
 	+@$(alone) $(INDEX)
@@ -178,7 +191,7 @@ test: ## Run all tests, notebooks included
 
 $(TESTS_PASSED): $(NOTEBOOKS_RAN) $(TEST_SOURCES) build/test-sources $(if $(FORCE),always)
 	@touch build/tests-started
-	ARMLOCK_FIGURES="$(CURDIR)/build/figures" $(PYTEST) tests
+	$(PYTEST) tests
 	@date '+%Y-%m-%d %H:%M:%S' > $@
 	@touch -r build/tests-started $@
 	@touch build/tests-ran

@@ -2,7 +2,7 @@
 
 Whatever the sensor and the controller, clearing denominators of 1 + L(s) leaves
 
-    D(s; x, y) = R + exp(-s delay) [ B1 (x0 - x exp(-s delay1)) + B2 (y0 - y exp(-s delay2)) ]
+    D(s; x, y) = R + exp(-s delay) [ B1 (x0 - x exp(-s tau1)) + B2 (y0 - y exp(-s tau2)) ]
 
 with real polynomials R, B1, B2 of s: affine in the two free parameters x and y. The dead time
 `delay` is zero unless the loop has one. At x = x0 and y = y0, which is (1, 1) for an
@@ -14,11 +14,10 @@ So both are one class here, and one set of algorithms serves both.
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Sequence
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import Any, NoReturn, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -28,8 +27,8 @@ from armlock.axis.exponentials import EPSILON, LOW_DEGREE, ExponentialSum, Polyn
 from armlock.checks import (
     ComplexArray,
     FloatArray,
-    as_written,
     axis,
+    broadcast_pair,
     broadcast_shape,
     complex_array,
     real_array,
@@ -39,6 +38,8 @@ from armlock.checks import (
 
 # Past this an exponential is no float.
 _LARGEST_EXPONENT = 700.0
+# The free parameters of a loop, the perturbations of its arms: one where there is none.
+_PERTURBATIONS = ("c1", "c2")
 
 
 class CharacteristicFunction:
@@ -46,16 +47,16 @@ class CharacteristicFunction:
 
     .. math::
 
-        D(s; x, y) = R + e^{-s\delta} \left[ B_1 \left( x_0 - x\, e^{-s\theta_1} \right)
-        + B_2 \left( y_0 - y\, e^{-s\theta_2} \right) \right]
+        D(s; x, y) = R + e^{-s\delta} \left[ B_1 \left( x_0 - x\, e^{-s\tau_1} \right)
+        + B_2 \left( y_0 - y\, e^{-s\tau_2} \right) \right]
 
     with polynomials R, B1 and B2 of s, a dead time :math:`\delta` and delays
-    :math:`\theta_1, \theta_2`. Sorted by delays it is
+    :math:`\tau_1, \tau_2`. Sorted by delays it is
 
     .. math::
 
-        D(s; x, y) = A + C\, e^{-s\delta} - x\, B_1 e^{-s(\delta + \theta_1)}
-        - y\, B_2 e^{-s(\delta + \theta_2)} ,
+        D(s; x, y) = A + C\, e^{-s\delta} - x\, B_1 e^{-s(\delta + \tau_1)}
+        - y\, B_2 e^{-s(\delta + \tau_2)} ,
 
     With a dead time A = R and C = x0 B1 + y0 B2. Without one A = R + x0 B1 + y0 B2 and C = 0.
 
@@ -64,10 +65,10 @@ class CharacteristicFunction:
     rest, b1, b2 : sequence of float, or armlock.axis.exponentials.Polynomial
         Coefficients of R, B1 and B2 in ascending powers of s (of z = exp(s step) for a map);
         or polynomials with known roots, which are then kept.
-    delay1, delay2 : float
+    tau1, tau2 : float
         Delays in s, zero or positive.
     delay : float, optional
-        Dead time in s, zero or positive.
+        Dead time in s, by which both terms are delayed; zero or positive.
     step : float, optional
         Zero (default) for polynomials in s; the sampling step in s for a map, which must
         divide all delays.
@@ -90,8 +91,9 @@ class CharacteristicFunction:
 
     Notes
     -----
-    It cannot be changed once it is made, because results are kept with it; its arrays are
-    read-only.
+    It is a value: it cannot be changed, its arrays are read-only, and two of one type that are
+    made from equal arguments are equal. `replace` makes another one. A subclass calls
+    `made_from` with its own arguments once it is made.
 
     The equation is of *retarded* type if all delayed terms are of lower degree than A, and of
     *neutral* type (`neutral` is true) if one of them reaches it. The roots of a neutral
@@ -103,72 +105,171 @@ class CharacteristicFunction:
 
     >>> from armlock import CharacteristicFunction, unstable_roots
     >>> a, b1, b2 = [1.0, 0.2, 1.0], [1.0], [1.0]
-    >>> forced = CharacteristicFunction(a, b1, b2, delay1=1.0, delay2=2.0)
+    >>> forced = CharacteristicFunction(a, b1, b2, tau1=1.0, tau2=2.0)
     >>> unstable_roots(forced, [0.1, -0.5], 0.05)
     array([0, 2])
     """
+
+    rest: FloatArray
+    b1: FloatArray
+    b2: FloatArray
+    a: FloatArray
+    c: FloatArray
+    tau1: float
+    tau2: float
+    delay: float
+    step: float
+    parameters: tuple[str, str]
+    reference: tuple[float, float]
+    _polynomials: tuple[Polynomial, ...]
+    _arguments: dict[str, Any]
 
     def __init__(
         self,
         rest: Sequence[float] | FloatArray | Polynomial,
         b1: Sequence[float] | FloatArray | Polynomial,
         b2: Sequence[float] | FloatArray | Polynomial,
-        delay1: float,
-        delay2: float,
+        tau1: float,
+        tau2: float,
         *,
         delay: float = 0.0,
         step: float = 0.0,
         parameters: tuple[str, str] = ("x", "y"),
         reference: tuple[float, float] = (0.0, 0.0),
     ) -> None:
-        self._polynomials = tuple(
-            _polynomial(name, p) for name, p in (("rest", rest), ("b1", b1), ("b2", b2))
-        )
-        self.rest, self.b1, self.b2 = (p.coefficients for p in self._polynomials)
+        named = {"rest": rest, "b1": b1, "b2": b2}
+        polynomials = {name: _polynomial(name, p) for name, p in named.items()}
+        r, p1, p2 = (p.coefficients for p in polynomials.values())
         pair = axis("reference", reference)
         if pair.size != 2:
             raise ValueError(f"reference must hold two numbers, got {pair.size}")
-        self.reference = (float(pair[0]), float(pair[1]))
-        self.delay = _not_negative("delay", delay)
-        self.delay1 = _not_negative("delay1", delay1)
-        self.delay2 = _not_negative("delay2", delay2)
-        self.step = _not_negative("step", step)
-        if self.step:
-            for name in ("delay", "delay1", "delay2"):
-                whole_steps(name, getattr(self, name), self.step)
-        self.parameters = parameters
-        c = poly.polyadd(self.reference[0] * self.b1, self.reference[1] * self.b2)
-        if self.delay == 0.0:
-            self.a = _trimmed("a", np.asarray(poly.polyadd(self.rest, c)))
-            self.c = _trimmed("c", [0.0])
+        x0, y0 = pair.tolist()
+        times = {"tau1": tau1, "tau2": tau2, "delay": delay, "step": step}
+        times = {name: _not_negative(name, value) for name, value in times.items()}
+        if times["step"]:
+            for name in ("delay", "tau1", "tau2"):
+                whole_steps(name, times[name], times["step"])
+        c = poly.polyadd(x0 * p1, y0 * p2)
+        if times["delay"]:
+            a, c = r, _trimmed("c", np.asarray(c))
         else:
-            self.a, self.c = self.rest, _trimmed("c", np.asarray(c))
-        if not self.a.any():
+            # Nothing delays C: it is part of A.
+            a, c = _trimmed("a", np.asarray(poly.polyadd(r, c))), _trimmed("c", [0.0])
+        if not a.any():
             raise ValueError(
-                f"A, the term without a delay, must not vanish, got rest={self.rest.tolist()}"
+                f"A, the term without a delay, must not vanish, got rest={r.tolist()}"
             )
-        for name, b in (("b1", self.b1), ("b2", self.b2), ("c", self.c)):
-            if b.size > self.a.size:
+        degree = a.size - 1
+        for name, b in (("b1", p1), ("b2", p2), ("c", c)):
+            if b.size > a.size:
                 raise ValueError(
-                    f"{name} must not exceed the degree of A ({self.degree}), "
+                    f"{name} must not exceed the degree of A ({degree}), "
                     f"got degree {b.size - 1}: the equation would be of advanced type"
                 )
-        for name, b, lag in (("b1", self.b1, self.delay1), ("b2", self.b2, self.delay2)):
-            if lag + self.delay == 0.0 and b.size == self.a.size:
+        for name, b, tau in (("b1", p1, times["tau1"]), ("b2", p2, times["tau2"])):
+            if tau + times["delay"] == 0.0 and b.size == a.size:
                 raise ValueError(
-                    f"{name} without a delay must be of lower degree than A ({self.degree}), "
+                    f"{name} without a delay must be of lower degree than A ({degree}), "
                     f"or its parameter would change the order of the equation"
                 )
-        self._sealed = True
+        vars(self).update(
+            times, rest=r, b1=p1, b2=p2, a=a, c=c, parameters=tuple(parameters),
+            reference=(x0, y0), _polynomials=tuple(polynomials.values()),
+        )  # fmt: skip
+        self.made_from(
+            **polynomials, **times, parameters=self.parameters, reference=self.reference
+        )
 
-    def __setattr__(self, name: str, value: object) -> None:
+    def made_from(self, **arguments: Any) -> None:
+        """Keep the arguments that make this once more, at the end of a class's `__init__`.
+
+        Parameters
+        ----------
+        **arguments
+            Checked, and such that nobody changes them. They become attributes too, but for
+            those that there are already.
+        """
+        vars(self).update({**arguments, **vars(self), "_arguments": arguments})
+
+    def replace(self, **changes: Any) -> Self:
+        """Return another one of the same class, made with other values of some arguments.
+
+        Parameters
+        ----------
+        **changes
+            Arguments of the class, by name. All others are as they were given: a signal mapping
+            that was given as an object stays as it is when the delays change, one that was
+            given by its name is made anew.
+
+        Returns
+        -------
+        CharacteristicFunction
+            Of the same class. `copy.replace` calls this, from Python 3.13 on.
+
+        Raises
+        ------
+        TypeError, ValueError
+            As the class does.
+
+        Examples
+        --------
+        >>> from armlock import CommonArm
+        >>> CommonArm(delay=20e-6).replace(delay=0.0) == CommonArm()
+        True
+        """
+        return type(self)(**{**self._arguments, **changes})
+
+    __replace__ = replace
+
+    def plain(self) -> CharacteristicFunction:
+        """Return D alone, with the arguments of `CharacteristicFunction`."""
+        rest, b1, b2 = self._polynomials
+        return CharacteristicFunction(
+            rest, b1, b2, self.tau1, self.tau2, delay=self.delay, step=self.step,
+            parameters=self.parameters, reference=self.reference,
+        )  # fmt: skip
+
+    def __setattr__(self, name: str, value: object) -> NoReturn:
         """Refuse changes: results are kept with the system they belong to."""
-        if "_sealed" in self.__dict__:
-            raise AttributeError(
-                f"a {type(self).__name__} cannot be changed, got {name} = {value!r:.60}: make "
-                f"a new one instead (a subclass sets its attributes before super().__init__)"
-            )
-        super().__setattr__(name, value)
+        raise AttributeError(
+            f"a {type(self).__name__} cannot be changed, got {name} = {value!r:.60}: make "
+            f"another one with replace({name}=...)"
+        )
+
+    def __delattr__(self, name: str) -> NoReturn:
+        """Refuse changes."""
+        raise AttributeError(f"a {type(self).__name__} cannot be changed, got del {name}")
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take what was pickled or copied; arrays are read-only again."""
+        vars(self).update(state)
+        for p in self._polynomials:
+            _sealed(p)
+        for array in (self.rest, self.b1, self.b2, self.a, self.c):
+            array.setflags(write=False)
+
+    def _identity(self) -> tuple[Any, ...]:
+        """Return what two equal ones have in common, hashable."""
+        polynomials = [(*p.coefficients.tolist(), *p.roots.tolist()) for p in self._polynomials]
+        times = self.tau1, self.tau2, self.delay, self.step
+        return *polynomials, times, self.parameters, self.reference
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the other one is of the same class, with equal arguments."""
+        if type(other) is not type(self):
+            return NotImplemented
+        assert isinstance(other, CharacteristicFunction)
+        return self._identity() == other._identity()
+
+    @cached_property
+    def _hash(self) -> int:
+        """Of numbers alone, whose hash is the same in every process: it is pickled along."""
+        numbers = self.rest.tolist(), self.b1.tolist(), self.b2.tolist()
+        return hash((*map(tuple, numbers), self.tau1, self.tau2, self.delay))
+
+    def __hash__(self) -> int:
+        """Return a number that equal ones share."""
+        return self._hash
 
     @property
     def degree(self) -> int:
@@ -196,8 +297,8 @@ class CharacteristicFunction:
 
         .. math::
 
-            a + c\, e^{-s\delta} - x\, b_1 e^{-s(\delta + \theta_1)}
-            - y\, b_2 e^{-s(\delta + \theta_2)} ,
+            a + c\, e^{-s\delta} - x\, b_1 e^{-s(\delta + \tau_1)}
+            - y\, b_2 e^{-s(\delta + \tau_2)} ,
 
         with the highest coefficients of A, C, B1 and B2. The roots of this sum repeat along
         the imaginary axis for ever: they are the neutral root chain. The chain stays in the
@@ -218,8 +319,14 @@ class CharacteristicFunction:
             Left less right side over |a|, and zero where rounding hides the sign. Negative or
             zero: the chain is not confined to the left half-plane. One for a retarded
             equation and for a map, which has no such chain.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If x or y is not finite and real.
         """
-        x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+        name1, name2 = self.parameters
+        x, y = real_array(name1, x), real_array(name2, y)
         if self.step:
             return np.ones(np.broadcast_shapes(x.shape, y.shape))
         a, b1, b2, c = (abs(value) for value in self.highest_coefficients)
@@ -229,7 +336,7 @@ class CharacteristicFunction:
     @property
     def longest_delay(self) -> float:
         """The longest time in s by which a term is delayed, dead time included."""
-        return self.delay + max(self.delay1, self.delay2)
+        return self.delay + max(self.tau1, self.tau2)
 
     @property
     def omega_per_turn(self) -> float:
@@ -238,7 +345,12 @@ class CharacteristicFunction:
 
     def __repr__(self) -> str:
         """Name the class and its arguments, as they are written to make it again."""
-        return as_written(self)
+        shown = {
+            name: value.coefficients.tolist() if isinstance(value, Polynomial) else value
+            for name, value in self._arguments.items()
+        }
+        listed = ", ".join(f"{name}={value!r}" for name, value in shown.items())
+        return f"{type(self).__name__}({listed})"
 
     def parts(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """Evaluate the three terms of D, which is the first less x, y times the others.
@@ -251,7 +363,7 @@ class CharacteristicFunction:
         Returns
         -------
         tuple of three complex arrays, shaped like `s`
-            A + C exp(-s delay), B1 exp(-s (delay + delay1)) and B2 exp(-s (delay + delay2)).
+            A + C exp(-s delay), B1 exp(-s (delay + tau1)) and B2 exp(-s (delay + tau2)).
 
         Raises
         ------
@@ -263,12 +375,14 @@ class CharacteristicFunction:
         dead, (x0, y0) = np.exp(-s * self.delay), self.reference
         return (
             np.asarray(rest + (x0 * b1 + y0 * b2) * dead),
-            np.asarray(b1 * np.exp(-s * self.delay1) * dead),
-            np.asarray(b2 * np.exp(-s * self.delay2) * dead),
+            np.asarray(b1 * np.exp(-s * self.tau1) * dead),
+            np.asarray(b2 * np.exp(-s * self.tau2) * dead),
         )
 
-    def __call__(self, s: npt.ArrayLike, x: npt.ArrayLike, y: npt.ArrayLike) -> ComplexArray:
-        """Evaluate D(s; x, y); the three arguments broadcast.
+    def __call__(
+        self, s: npt.ArrayLike, x: npt.ArrayLike | None = None, y: npt.ArrayLike | None = None
+    ) -> ComplexArray:
+        """Evaluate D(s; x, y); the three arguments broadcast. Of a loop x and y default to one.
 
         Raises
         ------
@@ -279,13 +393,19 @@ class CharacteristicFunction:
         return np.asarray(self._value(*self._checked(s, x, y)))
 
     def _checked(
-        self, s: npt.ArrayLike, x: npt.ArrayLike, y: npt.ArrayLike
+        self, s: npt.ArrayLike, x: npt.ArrayLike | None, y: npt.ArrayLike | None
     ) -> tuple[ComplexArray, FloatArray, FloatArray]:
         """Return s, x and y as arrays that broadcast, or raise."""
+        x, y = given_or_one(self, x, y)
         name1, name2 = self.parameters
         arrays = complex_array("s", s), real_array(name1, x), real_array(name2, y)
         broadcast_shape(("s", name1, name2), arrays)
         return arrays
+
+    def arms(self, x: Any, y: Any) -> tuple[tuple[FloatArray, float, Any, Any], ...]:
+        """Return B, the delay, the reference and the parameter of either arm."""
+        x0, y0 = self.reference
+        return (self.b1, self.tau1, x0, x), (self.b2, self.tau2, y0, y)
 
     def _evaluated(self, s: Any, library: Any) -> list[tuple[Any, Any]]:
         """Return R, B1 and B2 at s, and their derivatives by z."""
@@ -297,22 +417,22 @@ class CharacteristicFunction:
 
         The functions are those of numpy, or of mpmath for one number in extended precision.
         """
-        (rest, _), *arms = self._evaluated(s, library)
-        delays, whole = (self.delay1, self.delay2), 0.0
-        for (b, _), delay, origin, here in zip(
-            arms, delays, self.reference, (x, y), strict=True
-        ):
-            whole = whole + b * ((origin - here) - here * library.expm1(-s * delay))
-        return rest + library.exp(-s * self.delay) * whole
+        (rest, _), *evaluated = self._evaluated(s, library)
+        arms = 0.0
+        for (b, _), (_, tau, origin, here) in zip(evaluated, self.arms(x, y), strict=True):
+            arms = arms + b * ((origin - here) - here * library.expm1(-s * tau))
+        return rest + library.exp(-s * self.delay) * arms
 
-    def derivative(self, s: npt.ArrayLike, x: npt.ArrayLike, y: npt.ArrayLike) -> ComplexArray:
-        r"""Evaluate dD/ds; the three arguments broadcast.
+    def derivative(
+        self, s: npt.ArrayLike, x: npt.ArrayLike | None = None, y: npt.ArrayLike | None = None
+    ) -> ComplexArray:
+        r"""Evaluate dD/ds; the three arguments broadcast. Of a loop x and y default to one.
 
         .. math::
 
             \frac{\partial D}{\partial s} = R' + e^{-s\delta} \sum_k \left[
-            \left( B_k' - \delta B_k \right) \left( x_{0k} - x_k\, e^{-s\theta_k} \right)
-            + x_k\, \theta_k B_k e^{-s\theta_k} \right]
+            \left( B_k' - \delta B_k \right) \left( x_{0k} - x_k\, e^{-s\tau_k} \right)
+            + x_k\, \tau_k B_k e^{-s\tau_k} \right]
 
         with :math:`(x_1, x_2) = (x, y)`.
 
@@ -326,15 +446,13 @@ class CharacteristicFunction:
     def _slope(self, s: Any, x: Any, y: Any, library: Any = np) -> Any:
         """Evaluate dD/ds unchecked, as `_value`."""
         dz = self.step * library.exp(s * self.step) if self.step else 1.0
-        (_, slope), *arms = self._evaluated(s, library)
-        delays, whole = (self.delay1, self.delay2), 0.0
-        for (b, change), delay, origin, here in zip(
-            arms, delays, self.reference, (x, y), strict=True
-        ):
-            late = library.expm1(-s * delay)
-            whole = whole + (change * dz - self.delay * b) * ((origin - here) - here * late)
-            whole = whole + b * here * delay * (1.0 + late)
-        return slope * dz + library.exp(-s * self.delay) * whole
+        (_, own), *evaluated = self._evaluated(s, library)
+        arms = 0.0
+        for (b, db), (_, tau, origin, here) in zip(evaluated, self.arms(x, y), strict=True):
+            change = library.expm1(-s * tau)
+            arms = arms + (db * dz - self.delay * b) * ((origin - here) - here * change)
+            arms = arms + b * here * tau * (1.0 + change)
+        return own * dz + library.exp(-s * self.delay) * arms
 
     def shifted(self, sigma: float) -> CharacteristicFunction:
         """Return the function s -> D(s + sigma), whose roots lie `sigma` further left.
@@ -346,88 +464,19 @@ class CharacteristicFunction:
         TypeError, ValueError
             If sigma is not finite and real, or so large that exp(sigma delay) is not.
         """
-        sigma = real_number("sigma", sigma)
-        reach = abs(sigma) * max(self.longest_delay, self.step * self.degree)
-        if reach > _LARGEST_EXPONENT:
-            raise ValueError(
-                f"sigma must be at most {_LARGEST_EXPONENT:.0f} over the longest delay in "
-                f"magnitude, got {sigma}: its exponential is no float"
-            )
-
-        def with_moved(p: Polynomial, coefficients: FloatArray) -> Polynomial:
-            """Return a shifted polynomial of these coefficients."""
-            if self.step:
-                return p._replace(
-                    coefficients=coefficients, roots=p.roots * np.exp(-sigma * self.step)
-                )
-            if p.missed and coefficients.size <= LOW_DEGREE + 1:
-                return Polynomial.of(coefficients, p.roots - sigma)
-            return p._replace(coefficients=coefficients, roots=p.roots - sigma)
-
-        def move(p: Polynomial, delay: float) -> Polynomial:
-            late, size = np.exp(-sigma * delay), p.coefficients.size
-            if self.step:
-                moved = np.exp(sigma * self.step * np.arange(size)) * p.coefficients
-            else:
-                # Where D is evaluated from these: exactly, because powers of sigma may cancel.
-                number = Fraction if size <= LOW_DEGREE + 1 else float
-                exact: list[Any] = []
-                for value in reversed(p.coefficients.tolist()):
-                    # Horner's rule, with s + sigma in place of s.
-                    left = [number(sigma) * c for c in exact]
-                    pairs = zip([number(value), *exact], [*left, 0], strict=True)
-                    exact = [a + b for a, b in pairs]
-                moved = np.array(exact, dtype=np.float64)
-            return with_moved(p, late * moved)
-
-        x0, y0 = self.reference
-        rest, b1, b2 = self._polynomials
-        found = self.changed(
-            rest=move(rest, 0.0),
-            b1=move(b1, self.delay + self.delay1),
-            b2=move(b2, self.delay + self.delay2),
-            # It moves along, so that nothing has to cancel in `rest`.
-            reference=(x0 * np.exp(sigma * self.delay1), y0 * np.exp(sigma * self.delay2)),
-        )
-        if found.a is not found.rest:
-            # Not found again: in extended precision that takes a second.
-            guess = Polynomial(self.a, self.roots_of_a, missed=1e-6)
-            vars(found)["roots_of_a"] = with_moved(guess, found.a).roots
-        return found
+        return _Shifted(self, sigma)
 
     def exchanged(self) -> CharacteristicFunction:
         """Return the same function with its two free parameters exchanged."""
         _, b1, b2 = self._polynomials
-        return self.changed(
+        return self.plain().replace(
             b1=b2,
             b2=b1,
-            delay1=self.delay2,
-            delay2=self.delay1,
+            tau1=self.tau2,
+            tau2=self.tau1,
             parameters=self.parameters[::-1],
             reference=self.reference[::-1],
         )
-
-    def changed(self, **changes: Any) -> CharacteristicFunction:
-        """Return a copy with other values of some arguments.
-
-        Parameters
-        ----------
-        **changes
-            Arguments of `CharacteristicFunction`, by name.
-
-        Returns
-        -------
-        CharacteristicFunction
-            A plain one, of a loop too.
-
-        Raises
-        ------
-        TypeError, ValueError
-            As `CharacteristicFunction` does.
-        """
-        own = vars(self) | dict(zip(("rest", "b1", "b2"), self._polynomials, strict=True))
-        names = inspect.signature(CharacteristicFunction).parameters
-        return CharacteristicFunction(**{name: own[name] for name in names} | changes)
 
     def polynomials(self) -> tuple[Polynomial, ...]:
         """Return R, B1 and B2 with their roots."""
@@ -435,9 +484,11 @@ class CharacteristicFunction:
 
     @cached_property
     def roots_of_a(self) -> ComplexArray:
-        """Roots of A: they enter a count through the argument of A, past the last frequency."""
-        rest = self._polynomials[0]
-        return rest.roots if self.a is self.rest else Polynomial.of(self.a).roots
+        """Roots of A: they enter a count through the argument of A, past the last frequency.
+
+        With a dead time A is R, whose roots are known.
+        """
+        return self._polynomials[0].roots if self.delay else Polynomial.of(self.a).roots
 
     def _delayed(
         self, k: int, lag: float, weight: float = 1.0, *, rows: bool = False
@@ -481,11 +532,11 @@ class CharacteristicFunction:
         )
         return (
             undelayed.plus(self._delayed(2, self.delay, y0, rows=rows)),
-            self._delayed(1, self.delay + self.delay1, rows=rows),
-            self._delayed(2, self.delay + self.delay2, rows=rows),
+            self._delayed(1, self.delay + self.tau1, rows=rows),
+            self._delayed(2, self.delay + self.tau2, rows=rows),
         )
 
-    def at(self, x: float, y: float) -> ExponentialSum:
+    def sum_at(self, x: float, y: float) -> ExponentialSum:
         """Return D(j omega; x, y) at one point as an exponential sum."""
         x0, y0 = self.reference
         constant, b1, b2 = self.on_boundary()
@@ -499,7 +550,7 @@ class CharacteristicFunction:
         return combined._replace(sums=self.rest_on_boundary().sums + left)
 
     def deviation(self, x: float, y: float) -> ExponentialSum:
-        """Return x B1 exp(-s (delay + delay1)) + y B2 exp(-s (delay + delay2)) at s = j omega.
+        """Return x B1 exp(-s (delay + tau1)) + y B2 exp(-s (delay + tau2)) at s = j omega.
 
         That is what D subtracts from its first term.
         """
@@ -520,11 +571,116 @@ def checked_system(system: CharacteristicFunction) -> CharacteristicFunction:
     return system
 
 
+def broadcast_parameters(
+    system: CharacteristicFunction, x: npt.ArrayLike | None, y: npt.ArrayLike | None
+) -> tuple[FloatArray, FloatArray]:
+    """Return the two free parameters of a system as finite real arrays of one shape.
+
+    Those of a loop, c1 and c2, are one where they are not given. Others have to be given.
+    """
+    x, y = given_or_one(checked_system(system), x, y)
+    name1, name2 = system.parameters
+    return broadcast_pair(name1, x, name2, y)
+
+
+def given_or_one(
+    system: CharacteristicFunction, x: npt.ArrayLike | None, y: npt.ArrayLike | None
+) -> tuple[npt.ArrayLike, npt.ArrayLike]:
+    """Return both parameters, one for a perturbation that is not given; raise for others."""
+    given = []
+    for name, value in zip(system.parameters, (x, y), strict=True):
+        if value is None and name not in _PERTURBATIONS:
+            raise TypeError(
+                f"{name} must be given: only c1 and c2 of a loop are one by default"
+            )
+        given.append(1.0 if value is None else value)
+    return given[0], given[1]
+
+
+class _Shifted(CharacteristicFunction):
+    """The function s -> D(s + sigma), see `CharacteristicFunction.shifted`."""
+
+    origin: CharacteristicFunction
+    sigma: float
+
+    def __init__(self, origin: CharacteristicFunction, sigma: float) -> None:
+        sigma = real_number("sigma", sigma)
+        reach = abs(sigma) * max(origin.longest_delay, origin.step * origin.degree)
+        if reach > _LARGEST_EXPONENT:
+            raise ValueError(
+                f"sigma must be at most {_LARGEST_EXPONENT:.0f} over the longest delay in "
+                f"magnitude, got {sigma}: its exponential is no float"
+            )
+
+        def moved(p: Polynomial, lag: float) -> Polynomial:
+            late = np.exp(-sigma * lag)
+            if origin.step:
+                powers = np.exp(sigma * origin.step * np.arange(p.coefficients.size))
+                return _with_moved(origin, sigma, late * powers * p.coefficients, p)
+            return _with_moved(origin, sigma, late * _taylor(p.coefficients, sigma), p)
+
+        (x0, y0), (rest, b1, b2) = origin.reference, origin.polynomials()
+        super().__init__(
+            moved(rest, 0.0),
+            moved(b1, origin.delay + origin.tau1),
+            moved(b2, origin.delay + origin.tau2),
+            origin.tau1,
+            origin.tau2,
+            delay=origin.delay,
+            step=origin.step,
+            parameters=origin.parameters,
+            # It moves along, so that nothing has to cancel in `rest`.
+            reference=(x0 * np.exp(sigma * origin.tau1), y0 * np.exp(sigma * origin.tau2)),
+        )
+        self.made_from(origin=origin, sigma=sigma)
+
+    @cached_property
+    def roots_of_a(self) -> ComplexArray:
+        """Those of the origin, moved: to find them in extended precision takes a second."""
+        if self.delay:
+            return super().roots_of_a
+        guess = Polynomial(self.origin.a, self.origin.roots_of_a, missed=EPSILON)
+        return _with_moved(self.origin, self.sigma, self.a, guess).roots
+
+
+def _taylor(coefficients: FloatArray, sigma: float) -> FloatArray:
+    """Return the coefficients of p(s + sigma) in powers of s."""
+    # Where D is evaluated from these: exactly, because powers of sigma may cancel.
+    number = Fraction if coefficients.size <= LOW_DEGREE + 1 else float
+    moved: list[Any] = []
+    for value in reversed(coefficients.tolist()):
+        # Horner's rule, with s + sigma in place of s.
+        left = [number(sigma) * c for c in moved]
+        moved = [a + b for a, b in zip([number(value), *moved], [*left, 0], strict=True)]
+    return np.array(moved, dtype=np.float64)
+
+
+def _with_moved(
+    origin: CharacteristicFunction, sigma: float, coefficients: FloatArray, before: Polynomial
+) -> Polynomial:
+    """Return a shifted polynomial from its coefficients, and the one before the shift."""
+    if origin.step:
+        roots = before.roots * np.exp(-sigma * origin.step)
+    else:
+        roots = before.roots - sigma
+        if before.missed and coefficients.size <= LOW_DEGREE + 1:
+            return Polynomial.of(coefficients, roots)
+    return before._replace(coefficients=coefficients, roots=roots)
+
+
 def _polynomial(name: str, given: Sequence[float] | FloatArray | Polynomial) -> Polynomial:
     """Return a polynomial with trimmed, read-only coefficients, and its roots."""
     if isinstance(given, Polynomial):
-        return given._replace(coefficients=_trimmed(name, given.coefficients))
-    return Polynomial.of(_trimmed(name, given))
+        coefficients, roots = _trimmed(name, given.coefficients), given.roots.copy()
+        return _sealed(given._replace(coefficients=coefficients, roots=roots))
+    return _sealed(Polynomial.of(_trimmed(name, given)))
+
+
+def _sealed(p: Polynomial) -> Polynomial:
+    """Make the arrays of a polynomial read-only."""
+    for array in (p.coefficients, p.roots):
+        array.setflags(write=False)
+    return p
 
 
 def _trimmed(name: str, coefficients: Sequence[float] | FloatArray) -> FloatArray:

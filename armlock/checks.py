@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 import os
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -44,6 +45,21 @@ def whole_number(name: str, value: object, lowest: int) -> int:
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < lowest:
         raise ValueError(f"{name} must be an integer from {lowest} on, got {value!r}")
     return int(value)
+
+
+def true_or_false(name: str, value: object) -> bool:
+    """Return a Python or NumPy truth value, or raise."""
+    if not isinstance(value, bool | np.bool_):
+        raise TypeError(f"{name} must be True or False, got {value!r}")
+    return bool(value)
+
+
+def one_of(name: str, value: object, allowed: Collection[str]) -> str:
+    """Return a text that is one of those allowed, or raise."""
+    if not isinstance(value, str) or value not in allowed:
+        options = ", ".join(map(repr, allowed))
+        raise ValueError(f"{name} must be one of {options}; got {value!r}")
+    return value
 
 
 def whole_steps(name: str, delay: float, step: float) -> int:
@@ -142,6 +158,12 @@ def check_memory(name: str, shape: tuple[int, ...], bytes_each: int) -> None:
 
 def _numbers(name: str, value: object, kinds: str) -> npt.NDArray[Any]:
     """Return `value` as an array of finite numbers of some kinds of dtype, or raise."""
+    parts = (value, *value) if isinstance(value, list | tuple) else (value,)
+    if any(isinstance(part, np.ma.MaskedArray) for part in parts):
+        raise TypeError(
+            f"{name} must hold no masked values, got a masked array: take its compressed() or "
+            f"filled() values"
+        )
     try:
         array = np.asarray(value)
     except ValueError:

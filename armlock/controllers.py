@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache, reduce
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import mpmath
 import numpy as np
@@ -23,10 +23,14 @@ from armlock.checks import (
     ComplexArray,
     FloatArray,
     complex_array,
+    one_of,
     positive_number,
     real_number,
     whole_number,
 )
+
+if TYPE_CHECKING:
+    import control
 
 # Decimal digits in which the zeros of parallel branches are found.
 _DIGITS = 80
@@ -80,13 +84,30 @@ class Controller:
 
         Parameters
         ----------
-        controller : Controller, control.TransferFunction, or (zeros, poles, gain)
-            A python-control system must be continuous in time, with one input and output.
+        controller : Controller, python-control system, or (zeros, poles, gain)
+            A transfer function or state space of python-control must be continuous in time,
+            with one input and output.
 
         Raises
         ------
         TypeError, ValueError
-            If it is none of these, or a system in discrete time or with several channels.
+            If it is none of these, a system in discrete time or with several channels, or a
+            state space whose zeros and poles do not give its response back to a part in a
+            million.
+
+        Notes
+        -----
+        Repeated zeros and poles stay what they are in a `Controller` or a triple. In
+        python-control they do not: it multiplies all factors out, those of `control.zpk` too,
+        and ``control.zpk([], [-1e-3] * 5, 1)`` comes back as five complex poles around -1e-3.
+        Write ``Controller([], [-1e-3] * 5, 1)`` in its place.
+
+        Examples
+        --------
+        >>> import control
+        >>> from armlock import Controller
+        >>> Controller.of(control.tf([2.0, 1.0], [1.0, 0.5, 0.0]))
+        Controller(zeros=((-0.5+0j),), poles=((-0.5+0j), 0j), gain=2.0)
         """
         if isinstance(controller, cls):
             return controller
@@ -94,10 +115,10 @@ class Controller:
             return cls(*controller)
         import control
 
-        if not isinstance(controller, control.TransferFunction):
+        if not isinstance(controller, control.TransferFunction | control.StateSpace):
             raise TypeError(
-                "controller must be a Controller, a control.TransferFunction or a triple "
-                f"(zeros, poles, gain), got {type(controller).__name__}"
+                "controller must be a Controller, a transfer function or state space of "
+                f"python-control or a triple (zeros, poles, gain), got {controller!r:.200}"
             )
         if not controller.issiso():
             raise ValueError(
@@ -108,9 +129,12 @@ class Controller:
             raise ValueError(
                 f"controller must be continuous in time, got sampling time {controller.dt}"
             )
+        if isinstance(controller, control.StateSpace):
+            zeros, poles, gain = _factored(controller)
+            return cls(zeros.tolist(), poles.tolist(), gain)
         # It has no zeros in front of the highest power.
-        gain = controller.num[0][0][0] / controller.den[0][0][0]
-        return cls(controller.zeros(), controller.poles(), float(gain))
+        gain = float(controller.num[0][0][0] / controller.den[0][0][0])
+        return cls(controller.zeros(), controller.poles(), gain)
 
     @property
     def numerator(self) -> FloatArray:
@@ -156,6 +180,35 @@ class Controller:
                 zeros = mpmath.polyroots(coefficients, maxsteps=500, extraprec=400, asc=True)
             poles = self.poles + only_yours
             return Controller([complex(z) for z in zeros], poles, float(coefficients[-1]))
+
+
+def _factored(system: control.StateSpace) -> tuple[ComplexArray, ComplexArray, float]:
+    """Return zeros, poles and gain of a state space, which give its response back.
+
+    D, C B, C A B, ... are the coefficients of 1, 1/s, 1/s^2, ... at high frequency. The first
+    of them that is not zero is the gain, and tells how many zeros there are.
+    """
+    poles, candidates = system.poles(), np.asarray(system.zeros())
+    gain, size = float(system.D[0, 0]), 0.0
+    column, number = system.B, poles.size
+    while abs(gain) <= 1e-12 * size or gain == 0.0:
+        if not number:
+            raise ValueError(f"controller must not be zero, got {system!r:.200}")
+        gain = (system.C @ column).item()
+        size = float(np.linalg.norm(system.C) * np.linalg.norm(column))
+        column, number = system.A @ column, number - 1
+    zeros = candidates[np.argsort(np.abs(candidates))][:number]
+    sizes = np.abs(np.concatenate((zeros, poles)))
+    # What rounding left of a zero at s = 0 is none of the places to look at.
+    sizes = sizes[sizes > 1e-12 * sizes.max()] if sizes.any() else np.ones(1)
+    s = np.geomspace(0.1 * sizes.min(), 10.0 * sizes.max(), 40) * np.exp(0.7j)
+    given, found = system(s), quotients(zeros + 0j, poles + 0j, gain, s)
+    if not (np.abs(found - given) <= 1e-6 * np.abs(given)).all():
+        raise ValueError(
+            "controller must be a state space whose zeros and poles are found to a part in a "
+            f"million, got {system!r:.200}: give it as (zeros, poles, gain)"
+        )
+    return zeros, poles, gain
 
 
 def _factors(name: str, values: Sequence[complex]) -> tuple[complex, ...]:
@@ -230,8 +283,7 @@ def stage_two(*, denominator: str = "table") -> Controller:
     ValueError
         If `denominator` is neither.
     """
-    if denominator not in ("table", "printed"):
-        raise ValueError(f"denominator must be 'table' or 'printed', got {denominator!r}")
+    one_of("denominator", denominator, ("table", "printed"))
     zeros = [-z for z in paper.TABLE_2_ZEROS]
     poles = [-p for p in paper.TABLE_2_POLES]
     if denominator == "printed":

@@ -12,6 +12,7 @@ of `armlock.characteristic`. The Hayes equation, which has no sensor, is one mor
 from __future__ import annotations
 
 from collections.abc import Sequence
+from fractions import Fraction
 from functools import cached_property
 from math import factorial
 from typing import Any, NamedTuple
@@ -29,6 +30,7 @@ from armlock.checks import (
     complex_array,
     positive_number,
     real_number,
+    true_or_false,
 )
 from armlock.controllers import Controller, integrating_actuator, table_two, white_paper
 from armlock.sensors import COMMON, SINGLE, SignalMapping, modified_dual
@@ -60,9 +62,12 @@ class HayesEquation(CharacteristicFunction):
     array([0, 2])
     """
 
+    tau: float
+
     def __init__(self, tau: float = 1.0) -> None:
-        self.tau = positive_number("tau", tau)
-        super().__init__((0.0, 1.0), (1.0,), (1.0,), 0.0, self.tau, parameters=("a", "b"))
+        tau = positive_number("tau", tau)
+        super().__init__((0.0, 1.0), (1.0,), (1.0,), 0.0, tau, parameters=("a", "b"))
+        self.made_from(tau=tau)
 
 
 class Loop(CharacteristicFunction):
@@ -81,12 +86,14 @@ class Loop(CharacteristicFunction):
 
     Parameters
     ----------
-    controller : Controller, control.TransferFunction, or (zeros, poles, gain)
-        Controller times actuator, K(s).
-    mapping : SignalMapping
-        The sensor, for instance `armlock.sensors.COMMON`.
+    controller : Controller, python-control system, or (zeros, poles, gain)
+        Controller times actuator, K(s), see `armlock.Controller.of`.
+    mapping : SignalMapping or str
+        The sensor: an object, for instance `armlock.sensors.COMMON`, or a name ("single",
+        "common", "difference", "dual", "modified dual"), see `armlock.sensors.named`.
     tau1, tau2 : float
-        Round-trip delays of the two arms, in s.
+        Round-trip delays of the two arms, in s. A mapping without arm 2, such as "single",
+        needs no tau2.
     delay : float, optional
         Dead time of the loop in s (actuator, phasemeter, transponder), zero or positive.
 
@@ -96,6 +103,13 @@ class Loop(CharacteristicFunction):
         If tau1 or tau2 is not a positive finite number, `delay` is negative, a polynomial is
         not finite and real, the open loop has more zeros than poles, or 1 + L vanishes at high
         frequency.
+
+    Attributes
+    ----------
+    controller : Controller
+        K(s).
+    mapping : SignalMapping
+        The weights m1 and m2.
 
     Notes
     -----
@@ -107,32 +121,30 @@ class Loop(CharacteristicFunction):
     A loop of one's own: a common-arm sensor, an integrator and a lead filter.
 
     >>> from armlock import Controller, Loop, unstable_roots
-    >>> from armlock.sensors import COMMON
-    >>> loop = Loop(Controller([-0.02], [0.0, -0.1], 1.0), COMMON, tau1=20.1, tau2=19.9)
+    >>> loop = Loop(Controller([-0.02], [0.0, -0.1], 1.0), "common", tau1=20.1, tau2=19.9)
     >>> unstable_roots(loop, [0.999, 1.001], 1.0)
     array([0, 1])
+
+    The same with a dead time:
+
+    >>> unstable_roots(loop.replace(delay=20e-6), 0.999)
+    array(0)
     """
+
+    controller: Controller
+    mapping: SignalMapping
 
     def __init__(
         self,
         controller: Any,
-        mapping: SignalMapping,
+        mapping: SignalMapping | str,
         tau1: float,
-        tau2: float,
+        tau2: float | None = None,
         delay: float = 0.0,
     ) -> None:
-        self.tau1 = positive_number("tau1", tau1)
-        self.tau2 = positive_number("tau2", tau2)
-        self.controller = Controller.of(controller)
-        if not isinstance(mapping, SignalMapping):
-            raise TypeError(
-                f"mapping must be a SignalMapping, for instance armlock.sensors.COMMON, got "
-                f"{mapping!r}"
-            )
-        self.mapping = mapping
-        if not any(mapping.numerator1) and not any(mapping.numerator2):
-            raise ValueError("mapping must not be zero: there would be no loop")
-        k, m = self.controller, mapping
+        tau1 = positive_number("tau1", tau1)
+        delay = real_number("delay", delay)
+        k, m, tau2 = Controller.of(controller), *_mapping_and_tau2(mapping, tau1, tau2)
         rest = np.convolve(k.denominator, m.denominator)
         arms = [np.convolve(k.numerator, p) for p in (m.numerator1, m.numerator2)]
         for name, b in zip(("m1", "m2"), arms, strict=True):
@@ -155,12 +167,20 @@ class Loop(CharacteristicFunction):
             _factored(rest, k.poles, m.denominator),
             _factored(b1, k.zeros, m.numerator1),
             _factored(b2, k.zeros, m.numerator2),
-            self.tau1,
-            self.tau2,
+            tau1,
+            tau2,
             delay=delay,
             parameters=("c1", "c2"),
             reference=(1.0, 1.0),
         )
+        vars(self).update(controller=k, mapping=m)
+        given = mapping if isinstance(mapping, str) else m
+        delays = {"tau1": tau1} | ({"tau2": tau2} if any(m.numerator2) else {})
+        self.made_from(controller=k, mapping=given, **delays, delay=delay)
+
+    def _identity(self) -> tuple[Any, ...]:
+        """Return what two equal loops have in common: controller and mapping too."""
+        return *super()._identity(), self.controller, self.mapping
 
     @cached_property
     def _basis(self) -> tuple[tuple[Polynomial, ...], FloatArray]:
@@ -195,9 +215,20 @@ class Loop(CharacteristicFunction):
         Returns
         -------
         tuple of two complex arrays, shaped like `s`
+
+        Raises
+        ------
+        TypeError, ValueError
+            If s does not hold finite numbers, or holds a pole of K, m1 or m2.
         """
         s = complex_array("s", s)
         rest, b1, b2 = self.polynomials()
+        for pole in set(rest.roots.tolist()):
+            if (s == pole).any():
+                raise ValueError(
+                    f"s must not be a pole of the open loop, got {pole}: a limit there is not "
+                    f"computed"
+                )
         dead = np.exp(-s * self.delay)
         return b1.over(rest, s) * dead, b2.over(rest, s) * dead
 
@@ -220,14 +251,51 @@ class Loop(CharacteristicFunction):
         Raises
         ------
         TypeError, ValueError
-            If s does not hold finite numbers, c1 or c2 is not finite and real, or the three
-            do not broadcast.
+            If s does not hold finite numbers, or holds a pole of K, m1 or m2, c1 or c2 is not
+            finite and real, or the three do not broadcast.
         """
-        s, *arms = self._checked(s, c1, c2)
+        s, c1, c2 = self._checked(s, c1, c2)
         first, second = self.arm_responses(s)
-        c1, c2 = arms
         result: ComplexArray = first * ((1.0 - c1) - c1 * np.expm1(-s * self.tau1))
         return result + second * ((1.0 - c2) - c2 * np.expm1(-s * self.tau2))
+
+
+def _mapping_and_tau2(
+    mapping: SignalMapping | str, tau1: float, tau2: float | None
+) -> tuple[SignalMapping, float]:
+    """Return the signal mapping as an object, and tau2: tau1 where there is no arm 2."""
+    if not isinstance(mapping, SignalMapping | str):
+        raise TypeError(
+            f"mapping must be a SignalMapping, for instance armlock.sensors.COMMON, or a name "
+            f"such as 'common', got {mapping!r}"
+        )
+    if mapping == "single" or (
+        isinstance(mapping, SignalMapping) and not any(mapping.numerator2)
+    ):
+        tau2 = tau1
+    if tau2 is None:
+        raise TypeError(f"tau2 must be given: the signal mapping {mapping!r} has two arms")
+    tau2 = positive_number("tau2", tau2)
+    if isinstance(mapping, str):
+        return sensors.named(mapping, tau1, tau2), tau2
+    if not any(mapping.numerator1) and not any(mapping.numerator2):
+        raise ValueError("mapping must not be zero: there would be no loop")
+    return mapping, tau2
+
+
+def _actuated(
+    gain: float | None, default: float, controller: Any
+) -> tuple[Controller, dict[str, Any]]:
+    """Return K, gain / s or what stands in its place, and the argument that makes it."""
+    if controller is None:
+        gain = positive_number("gain", default if gain is None else gain)
+        return integrating_actuator(gain), {"gain": gain}
+    if gain is not None:
+        raise ValueError(
+            f"gain must be None where a controller takes the place of gain / s, got {gain}"
+        )
+    own = Controller.of(controller)
+    return own, {"controller": own}
 
 
 def _factored(
@@ -250,6 +318,22 @@ def checked_loop(loop: Loop) -> Loop:
     if not isinstance(loop, Loop):
         raise TypeError(f"loop must be a Loop, for instance CommonArm(), got {loop!r:.200}")
     return loop
+
+
+def power_series(
+    system: CharacteristicFunction, x: float | Fraction, y: float | Fraction, number: int
+) -> tuple[list[Fraction], list[Fraction]]:
+    """Return the first coefficients of R and of D - R in ascending powers of s, exactly."""
+    rest = [Fraction(value) for value in system.rest.tolist()[:number]]
+    rest += [Fraction(0)] * (number - len(rest))
+    numerator, dead = [Fraction(0)] * number, -Fraction(system.delay)
+    for b, tau, origin, parameter in system.arms(x, y):
+        late, here, there = dead - Fraction(tau), Fraction(parameter), Fraction(origin)
+        for i, value in enumerate(b.tolist()[:number]):
+            for j in range(number - i if value else 0):
+                turn = there * dead**j - here * late**j
+                numerator[i + j] += Fraction(value) * turn / factorial(j)
+    return rest, numerator
 
 
 class LoopAt(NamedTuple):
@@ -278,24 +362,23 @@ class LoopAt(NamedTuple):
 
     def numerator(self) -> ExponentialSum:
         """Return N at s = j omega as an exponential sum."""
-        return self.loop.at(self.c1, self.c2).plus(self.loop.rest_on_boundary().scaled(-1.0))
+        return self.loop.sum_at(self.c1, self.c2).plus(
+            self.loop.rest_on_boundary().scaled(-1.0)
+        )
+
+    def at_zero(self) -> tuple[int, Fraction, Fraction]:
+        """Return how many factors s cancel in L = N / R, and N and R at s = 0 without them.
+
+        Exact for the coefficients, delays and parameters as they are given.
+        """
+        loop, c1, c2 = self
+        rest, numerator = power_series(loop, c1, c2, int(np.flatnonzero(loop.rest)[0]) + 1)
+        pairs = enumerate(zip(numerator, rest, strict=True))
+        return next((k, above, below) for k, (above, below) in pairs if above or below)
 
     def poles_at_zero(self) -> int:
         """Order of the pole of L at s = 0 once numerator and denominator have cancelled."""
-        loop, c1, c2 = self
-        order = int(np.flatnonzero(loop.rest)[0])
-        if order == 0:
-            return 0
-        # Taylor coefficients of B1 (1 - c1 exp(-s tau1)) + B2 (1 - c2 exp(-s tau2)), and the
-        # magnitudes they are summed from.
-        taylor, size = np.zeros(order), np.zeros(order)
-        for b, c, tau in ((loop.b1, c1, loop.tau1), (loop.b2, c2, loop.tau2)):
-            arm = np.array([-c * (-tau) ** k / factorial(k) for k in range(order)])
-            arm[0] += 1.0
-            taylor += np.convolve(b, arm)[:order]
-            size += np.convolve(np.abs(b), np.abs(arm))[:order]
-        nonzero = np.flatnonzero(np.abs(taylor) > 1e-13 * size)
-        return order - (int(nonzero[0]) if nonzero.size else order)
+        return int(np.flatnonzero(self.loop.rest)[0]) - self.at_zero()[0]
 
     def leading_radius(self) -> float:
         """Radius around s = 0 within which L is as simple as it gets, or the last one tried.
@@ -331,16 +414,19 @@ class SingleArm(Loop):
     Parameters
     ----------
     gain : float, optional
-        Loop gain g in rad/s.
+        Loop gain g in rad/s, 1 by default.
     tau : float, optional
         Round-trip delay in s.
     delay : float, optional
         Dead time in s, see `Loop`.
+    controller : Controller, python-control system, or (zeros, poles, gain), optional
+        K(s) in place of g / s, see `armlock.Controller.of`. The loop then has no gain.
 
     Raises
     ------
     TypeError, ValueError
-        If one of the two is not a positive finite number.
+        If gain or tau is not a positive finite number, there are both gain and controller, or
+        as `Loop` does.
 
     Examples
     --------
@@ -349,15 +435,21 @@ class SingleArm(Loop):
     array([ 0, -1,  1])
     """
 
+    gain: float
+    tau: float
+
     def __init__(
         self,
-        gain: float = paper.COMMON_ARM_GAIN,
+        gain: float | None = None,
         tau: float = paper.TAU1,
         delay: float = 0.0,
+        *,
+        controller: Any = None,
     ) -> None:
-        self.gain = positive_number("gain", gain)
-        self.tau = positive_number("tau", tau)
-        super().__init__(integrating_actuator(self.gain), sensors.SINGLE, tau, tau, delay)
+        k, made = _actuated(gain, paper.COMMON_ARM_GAIN, controller)
+        tau = positive_number("tau", tau)
+        super().__init__(k, sensors.SINGLE, tau, delay=delay)
+        self.made_from(**made, tau=tau, delay=self.delay)
 
 
 class CommonArm(Loop):
@@ -372,16 +464,19 @@ class CommonArm(Loop):
     Parameters
     ----------
     gain : float, optional
-        Loop gain g in rad/s.
+        Loop gain g in rad/s, 1 by default.
     tau1, tau2 : float, optional
         Round-trip delays in s.
     delay : float, optional
         Dead time in s, see `Loop`.
+    controller : Controller, python-control system, or (zeros, poles, gain), optional
+        K(s) in place of g / s, see `armlock.Controller.of`. The loop then has no gain.
 
     Raises
     ------
     TypeError, ValueError
-        If one of the three is not a positive finite number.
+        If gain or a delay is not a positive finite number, there are both gain and controller,
+        or as `Loop` does.
 
     Examples
     --------
@@ -390,15 +485,20 @@ class CommonArm(Loop):
     array(0)
     """
 
+    gain: float
+
     def __init__(
         self,
-        gain: float = paper.COMMON_ARM_GAIN,
+        gain: float | None = None,
         tau1: float = paper.TAU1,
         tau2: float = paper.TAU2,
         delay: float = 0.0,
+        *,
+        controller: Any = None,
     ) -> None:
-        self.gain = positive_number("gain", gain)
-        super().__init__(integrating_actuator(self.gain), sensors.COMMON, tau1, tau2, delay)
+        k, made = _actuated(gain, paper.COMMON_ARM_GAIN, controller)
+        super().__init__(k, sensors.COMMON, tau1, tau2, delay)
+        self.made_from(**made, tau1=self.tau1, tau2=self.tau2, delay=self.delay)
 
 
 class DualArm(Loop):
@@ -413,7 +513,7 @@ class DualArm(Loop):
     Parameters
     ----------
     gain : float, optional
-        Loop gain g in rad/s.
+        Loop gain g in rad/s, 10 by default.
     tau1, tau2 : float, optional
         Round-trip delays in s; they must differ, unless `difference` is given.
     corner : float, optional
@@ -423,11 +523,14 @@ class DualArm(Loop):
         Sec. III.B. The source of Table I takes half of it.
     delay : float, optional
         Dead time in s, see `Loop`.
+    controller : Controller, python-control system, or (zeros, poles, gain), optional
+        K(s) in place of g / s, see `armlock.Controller.of`. The loop then has no gain.
 
     Raises
     ------
     TypeError, ValueError
-        If gain, corner or a delay is not a positive finite number, or the dtau is zero.
+        If gain, corner or a delay is not a positive finite number, the dtau is zero, there are
+        both gain and controller, or as `Loop` does.
 
     Notes
     -----
@@ -448,21 +551,31 @@ class DualArm(Loop):
     array([ 1, -1,  0])
     """
 
+    gain: float
+    corner: float
+    difference: float
+
     def __init__(
         self,
-        gain: float = paper.DUAL_ARM_GAIN,
+        gain: float | None = None,
         tau1: float = paper.TAU1,
         tau2: float = paper.TAU2,
         corner: float = paper.DUAL_SENSOR_CORNER,
         *,
         difference: float | None = None,
         delay: float = 0.0,
+        controller: Any = None,
     ) -> None:
-        self.gain = positive_number("gain", gain)
-        self.corner = positive_number("corner", corner)
-        self.difference = _delay_difference(tau1, tau2, difference)
-        mapping = sensors.dual(self.corner, self.difference)
-        super().__init__(integrating_actuator(self.gain), mapping, tau1, tau2, delay)
+        k, made = _actuated(gain, paper.DUAL_ARM_GAIN, controller)
+        between = _delay_difference(tau1, tau2, difference)
+        mapping = sensors.dual(corner, between)
+        super().__init__(k, mapping, tau1, tau2, delay)
+        vars(self).update(difference=between)
+        # The dtau as it was given: by default it follows the delays.
+        self.made_from(
+            **made, tau1=self.tau1, tau2=self.tau2, corner=float(corner),
+            difference=None if difference is None else between, delay=self.delay,
+        )  # fmt: skip
 
 
 def paper_loop(
@@ -491,7 +604,7 @@ def paper_loop(
         Corner frequency p of the sensor in rad/s. The paper gives none.
     tau1, tau2 : float, optional
         Round-trip delays in s; they must differ, unless `difference` is given.
-    controller : Controller, control.TransferFunction, or (zeros, poles, gain), optional
+    controller : Controller, python-control system, or (zeros, poles, gain), optional
         Table II by default; `armlock.controllers` has its stages and the printed variant.
     actuator : bool, optional
         Whether the integrating actuator 1/s of Secs. II and III is in the loop. Without it,
@@ -518,7 +631,7 @@ def paper_loop(
     array([0, 0])
     """
     chosen = table_two() if controller is None else Controller.of(controller)
-    if actuator:
+    if true_or_false("actuator", actuator):
         chosen = chosen * integrating_actuator()
     mapping = sensors.dual(corner, _delay_difference(tau1, tau2, difference))
     return Loop(chosen, mapping, tau1, tau2, delay)
@@ -528,13 +641,7 @@ def _delay_difference(tau1: float, tau2: float, difference: float | None) -> flo
     """Return the dtau of the dual sensor, tau1 - tau2 unless it is given."""
     if difference is not None:
         return real_number("difference", difference)
-    between = positive_number("tau1", tau1) - positive_number("tau2", tau2)
-    if between == 0.0:
-        raise ValueError(
-            f"tau1 and tau2 must differ, got {tau1} for both: the dual sensor divides by "
-            f"their difference"
-        )
-    return between
+    return sensors.delay_difference(tau1, tau2)
 
 
 def flight_loop(

@@ -1,7 +1,7 @@
 """Signal mappings of Table I: how a sensor combines the signals of the two arms.
 
-Arm k returns the signal phi(t) - c_k phi(t - tau_k). A signal mapping weighs the two with
-rational functions m1(s) and m2(s), so that the sensor's response is
+Arm k returns the signal phi(t) - c_k phi(t - tau_k). A sensor is known by its signal mapping:
+the rational functions m1(s) and m2(s) by which it weighs the two, so that its response is
 
     P(s) = m1(s) (1 - c1 exp(-s tau1)) + m2(s) (1 - c2 exp(-s tau2)).
 """
@@ -20,6 +20,7 @@ from armlock.checks import (
     ComplexArray,
     axis,
     complex_array,
+    one_of,
     positive_number,
     real_number,
 )
@@ -200,3 +201,53 @@ def modified_dual(
     return SignalMapping(
         first.coef.tolist(), second.coef.tolist(), below.coef.tolist(), "modified dual"
     )
+
+
+def delay_difference(tau1: float, tau2: float) -> float:
+    """Return tau1 - tau2, by which the dual sensors divide, or raise if it is zero."""
+    between = positive_number("tau1", tau1) - positive_number("tau2", tau2)
+    if between == 0.0:
+        raise ValueError(
+            f"tau1 and tau2 must differ, got {tau1} for both: the dual sensor divides by "
+            f"their difference"
+        )
+    return between
+
+
+#: Names of the signal mappings that `Loop` takes in place of an object.
+NAMES = ("single", "common", "difference", "dual", "modified dual")
+
+
+def named(name: str, tau1: float, tau2: float) -> SignalMapping:
+    """Return a signal mapping of the paper by its name, made for these delays.
+
+    Parameters
+    ----------
+    name : {"single", "common", "difference", "dual", "modified dual"}
+        The corner of the dual ones is `armlock.paper.DUAL_SENSOR_CORNER`, an assumption. The
+        dtau of "dual" is tau1 - tau2.
+    tau1, tau2 : float
+        Round-trip delays in s.
+
+    Returns
+    -------
+    SignalMapping
+
+    Raises
+    ------
+    TypeError, ValueError
+        If there is none of this name, or a dual one is asked for equal delays.
+
+    Examples
+    --------
+    >>> from armlock.sensors import COMMON, named
+    >>> named("common", 20.1, 19.9) is COMMON
+    True
+    """
+    if name == "dual":
+        return dual(paper.DUAL_SENSOR_CORNER, delay_difference(tau1, tau2))
+    if name == "modified dual":
+        half = 0.5 * delay_difference(tau1, tau2)
+        return modified_dual(0.5 * (tau1 + tau2), half)
+    plain = {mapping.name: mapping for mapping in (SINGLE, COMMON, DIFFERENCE)}
+    return plain[one_of("mapping", name, NAMES)]

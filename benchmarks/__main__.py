@@ -7,6 +7,7 @@ import importlib
 import pkgutil
 import sys
 import time
+import traceback
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -42,11 +43,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"measuring: {name} ...", file=sys.stderr, flush=True)
         start = time.perf_counter()
         module = importlib.import_module(f"benchmarks.{name}")
-        topics[name] = module.run(quick=options.quick, folder=folder)
+        try:
+            topics[name] = module.run(quick=options.quick, folder=folder)
+        except Exception:  # the other topics are measured all the same
+            traceback.print_exc()
+            topics[name] = report.failed(name)
         topics[name].data["seconds"] = time.perf_counter() - start
-    about["load"].append(report.load())
-    report.write(folder, about, topics)
-    print(report.as_markdown(about, topics))
+        about["load"].append(report.load())
+        report.write(folder, about, topics)
+        print(report.topic_as_markdown(topics[name]), flush=True)
+    print(report.machine_line(about))
+    print(report.closing_line(topics))
     print(f"Written: report.md, report.json and figures in {folder}")
     return 0 if report.agree(topics) else 1
 

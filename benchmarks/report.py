@@ -198,18 +198,33 @@ def agree(topics: dict[str, Topic]) -> bool:
     return all(row.met for topic in topics.values() for row in topic.rows if row.correctness)
 
 
+def failed(name: str) -> Topic:
+    """Return the topic of a module that ended in an error."""
+    return Topic(name, [Row("it ended in an error", met=False, correctness=True)])
+
+
+def topic_as_markdown(topic: Topic) -> str:
+    """Return the tables, figures and remarks of a topic."""
+    lines = []
+    for heading, rows in tables(topic):
+        lines += [f"## {heading}", ""]
+        widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
+        head, *body = ([c.ljust(w) for c, w in zip(r, widths, strict=True)] for r in rows)
+        rule = ["-" * width for width in widths]
+        lines += [*(f"| {' | '.join(row)} |" for row in (head, rule, *body)), ""]
+    lines += [*(f"![{topic.title}]({name})" for name in topic.figures), ""]
+    lines += [*(f"- {note}" for note in topic.notes), ""] if topic.notes else []
+    return "\n".join(lines)
+
+
 def as_markdown(about: dict[str, Any], topics: dict[str, Topic]) -> str:
-    lines = ["# Benchmark report", "", machine_line(about)]
-    for topic in topics.values():
-        for heading, rows in tables(topic):
-            lines += ["", f"## {heading}", ""]
-            widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
-            head, *body = ([c.ljust(w) for c, w in zip(r, widths, strict=True)] for r in rows)
-            rule = ["-" * width for width in widths]
-            lines += [f"| {' | '.join(row)} |" for row in (head, rule, *body)]
-        lines += ["", *(f"![{topic.title}]({name})" for name in topic.figures)]
-        lines += ["", *(f"- {note}" for note in topic.notes)] if topic.notes else []
-    return "\n".join([*lines, "", closing_line(topics), ""])
+    """Return the whole report."""
+    parts = [
+        "# Benchmark report",
+        machine_line(about),
+        *map(topic_as_markdown, topics.values()),
+    ]
+    return "\n\n".join([*parts, closing_line(topics), ""])
 
 
 def write(folder: Path, about: dict[str, Any], topics: dict[str, Topic]) -> None:

@@ -7,7 +7,7 @@ import re
 import nbformat
 import pytest
 
-from benchmarks import charts, child, notebooks, report
+from benchmarks import charts, child, loops, notebooks, report
 from benchmarks.__main__ import main
 
 
@@ -49,6 +49,22 @@ def test_wrong_results_fail_the_run(tmp_path, monkeypatch, capsys, differ, code,
     monkeypatch.setattr(charts, "run", run)
     assert main(["--quick", "--only", "charts", "--output", str(tmp_path)]) == code
     assert last in capsys.readouterr().out
+
+
+def test_a_topic_that_fails_costs_no_other(tmp_path, monkeypatch, capsys):
+    def run(*, quick, folder):
+        raise MemoryError
+
+    monkeypatch.setattr(charts, "run", run)
+    monkeypatch.setattr(
+        loops, "run", lambda **_: report.Topic("Made up", [report.Row("x", 1.0)])
+    )
+    only = ["--only", "charts", "--only", "loops", "--output", str(tmp_path)]
+    assert main(only) == 1
+    assert "Made up" in capsys.readouterr().out
+    assert {"charts", "loops"} == json.loads((tmp_path / "report.json").read_text())[
+        "topics"
+    ].keys()
 
 
 def test_a_failing_notebook_is_named_and_the_memory_is_that_of_its_kernel(tmp_path):

@@ -12,7 +12,7 @@ import pytest
 
 import armlock
 from armlock import CharacteristicFunction, CommonArm, HayesEquation, SingleArm, paper_loop
-from armlock.checks import axis, finite_series, real_array
+from armlock.checks import axis, complex_array, finite_series, real_array
 from armlock.controllers import integrating_actuator, roll_off, stage_one, table_two
 from armlock.robustness.rays import first_crossing
 from armlock.sensors import COMMON, SignalMapping, dual
@@ -34,8 +34,8 @@ NOISE: dict[str, Any] = {"seed": 1, "sample_rate": 10.0, "cutoff": 1e-3}
 
 # A call of everything that takes arguments, with sensible ones.
 CALLS: dict[Callable[..., object], dict[str, Any]] = {
-    CharacteristicFunction: {"rest": [1.0, 1.0], "b1": [1.0], "b2": [1.0], "delay1": 1.0,
-                             "delay2": 2.0, "delay": 0.0, "step": 0.0,
+    CharacteristicFunction: {"rest": [1.0, 1.0], "b1": [1.0], "b2": [1.0], "tau1": 1.0,
+                             "tau2": 2.0, "delay": 0.0, "step": 0.0,
                              "reference": (0.0, 0.0)},
     HayesEquation: {"tau": 1.0},
     SingleArm: {"gain": 1.0, "tau": 1.0, "delay": 0.0},
@@ -56,6 +56,7 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     ARMS.open_loop: {"s": 1j} | POINT,
     ARMS.derivative: {"s": 1j} | AT,
     ARMS.shifted: {"sigma": 0.1},
+    ARMS.chain_reserve: AT,
     armlock.unstable_roots: {"system": ARMS} | AT,
     armlock.stability_chart: {"system": ARMS, "x": [1.0], "y": [1.0]},
     armlock.rightmost_root: {"system": ARMS} | AT,
@@ -93,7 +94,14 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     armlock.performance.pulling: {"loop": CommonArm(), "time": 1e5, "common": (1.0, 0.0, 0.0),
                       "differential": (0.0, 0.0, 0.0)},
 }  # fmt: skip
-JUNK = {"text": "no", "nan": np.nan, "ragged": [[1.0], [1.0, 2.0]], "object": object()}
+MASKED = np.ma.array([1.0, 2.0], mask=[False, True])
+JUNK = {
+    "masked": MASKED,
+    "text": "no",
+    "nan": np.nan,
+    "ragged": [[1.0], [1.0, 2.0]],
+    "object": object(),
+}
 
 
 # The free parameters of ARMS are called c1 and c2.
@@ -126,11 +134,15 @@ def test_every_public_function_is_called_above():
 WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
     (CharacteristicFunction, "b1", [1.0, 1.0, 1.0], "not exceed the degree"),
     (CharacteristicFunction, "delay", -1.0, "not be negative, got -1.0"),
-    (CharacteristicFunction, "step", 0.3, "divide every delay, got step=0.3 for delay1"),
+    (CharacteristicFunction, "step", 0.3, "divide every delay, got step=0.3 for tau1"),
     (CommonArm, "gain", 0.0, "be positive, got 0.0"),
+    (CommonArm, "delay", np.array([0.1, 0.2]), "be a real number, got array([0.1, 0.2])"),
+    (ARMS.chain_reserve, "x", "1.0", "hold real numbers"),
+    (paper_loop, "actuator", "no", "be True or False, got 'no'"),
+    (armlock.performance.transfer, "s", 0.0, "not be a pole of the open loop, got 0j"),
     (armlock.Controller, "gain", 0.0, "not be zero"),
     (armlock.Controller, "poles", (1j,), "be real or in conjugate pairs"),
-    (table_two, "denominator", "x", "be 'table' or 'printed', got 'x'"),
+    (table_two, "denominator", "x", "be one of 'table', 'printed'; got 'x'"),
     (roll_off, "last", 1.0, "be above first (1.0), got 1.0"),
     (roll_off, "slope", 1.0, "be below one, got 1.0"),
     (armlock.Loop, "controller", control.tf([1.0], [1.0, 1.0], 0.1), "be continuous"),
@@ -196,3 +208,10 @@ def test_what_is_checked_is_a_copy_but_for_a_long_series():
         check("x", given)[0] = 7.0
     assert given[0] == 1.0
     assert finite_series("x", given) is given
+
+
+@pytest.mark.parametrize("given", [MASKED, MASKED[1], [MASKED, MASKED], [1.0, np.ma.masked]])
+def test_masked_values_are_not_taken_for_others(given):
+    for check in (real_array, complex_array):
+        with pytest.raises(TypeError, match=r"^x must hold no masked values"):
+            check("x", given)

@@ -14,7 +14,7 @@ def test_no_mean_length_of_the_arms_leaves_more_of_the_laser():
     frequency = np.array([0.05, 0.3, 0.9, 1.9, 1.95])
     most = flight.most_laser(flight.LOOP, frequency)
     found = np.zeros(frequency.size)
-    for mean in 33.6 + np.linspace(0.0, 20.0, 2_001):
+    for mean in flight.MEAN_DELAY + np.linspace(0.0, 20.0, 2_001):
         loop = Loop(flight.LOOP.controller, flight.LOOP.mapping, mean + 0.255, mean - 0.255)
         left = np.abs(transfer(loop, "laser", 2j * np.pi * frequency))
         found = np.maximum(found, left * FREE_RUNNING / frequency)

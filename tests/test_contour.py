@@ -32,7 +32,7 @@ def walk(coefficients, phases, omega_end):
         np.array(phases, dtype=float),
     )
     summed = exponentials.CompiledSum(polynomials, weights, sums, phases)
-    return contour.winding(summed, np.zeros(len(whole)), omega_end)
+    return contour.winding(summed, np.zeros(len(whole)), 0.0, omega_end)
 
 
 def test_a_single_exponential_winds_at_its_rate():

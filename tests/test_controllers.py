@@ -1,4 +1,4 @@
-"""Controllers: three forms of one thing, and what they refuse."""
+"""Controllers: forms of one thing, and what they refuse."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ S = np.array([1e-9j, 1e-5j, 0.3 + 0.2j, -0.1 + 2j, 1.5])
         ((), (), 5.0),
     ],
 )
-def test_three_forms_give_one_loop(zeros, poles, gain):
+def test_all_forms_give_one_loop(zeros, poles, gain):
     above = gain * np.atleast_1d(np.poly(zeros)).real
     below = np.atleast_1d(np.poly(poles)).real
     forms = [
@@ -32,6 +32,7 @@ def test_three_forms_give_one_loop(zeros, poles, gain):
         Controller(zeros, poles, gain),
         control.tf(above, below),
         control.zpk(zeros, poles, gain),
+        control.tf2ss(control.tf(above, below)),
     ]
     loops = [Loop(form, COMMON, 2.1, 1.9) for form in forms]
     x, y = np.meshgrid([0.5, 0.9, 1.2], [0.3, 0.95, 1.1])
@@ -56,3 +57,24 @@ def test_the_printed_denominator_cancels_a_zero():
     table, printed = stage_two(), stage_two(denominator="printed")
     ratio = (S + TABLE_2_ZEROS[-1]) / (S + TABLE_2_POLES[-1])
     np.testing.assert_allclose(table(S), printed(S) * ratio, rtol=1e-13)
+
+
+def test_a_state_space_is_taken_or_refused_by_its_response():
+    """The eigenvalues of a matrix that is far from normal are not those that it was made of."""
+    turn, _ = np.linalg.qr(np.random.default_rng(0).normal(size=(8, 8)))
+    matrix = turn @ (np.triu(np.full((8, 8), 1e4), 1) - np.eye(8)) @ turn.T
+    far = control.ss(matrix, turn @ np.ones((8, 1)), np.ones((1, 8)) @ turn.T, 0)
+    with pytest.raises(ValueError, match=r"^controller must be a state space whose zeros and"):
+        Controller.of(far)
+    with pytest.raises(ValueError, match=r"^controller must not be zero"):
+        Controller.of(control.ss([[-1.0]], [[0.0]], [[1.0]], [[0.0]]))
+    with pytest.raises(ValueError, match=r"^controller must be continuous in time"):
+        Controller.of(control.ss([[0.5]], [[1.0]], [[1.0]], [[0.0]], 0.1))
+
+
+def test_repeated_poles_stay_together_as_the_docstring_says():
+    poles = [-1e-3] * 5
+    assert set(Controller([], poles, 1.0).poles) == {-1e-3}
+    assert set(Loop(([], poles, 1.0), "single", 20.0).polynomials()[0].roots) == {-1e-3}
+    scattered = Controller.of(control.zpk([], poles, 1.0)).poles
+    assert len(set(scattered)) == 5

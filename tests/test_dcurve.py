@@ -120,5 +120,5 @@ def test_where_a_parameter_has_no_effect_the_curve_has_a_pole():
 
 
 def test_terms_in_proportion_have_no_curve_at_equal_delays():
-    with pytest.raises(ValueError, match=r"^delay1 and delay2 must differ, got 20\.0 for both"):
+    with pytest.raises(ValueError, match=r"^tau1 and tau2 must differ, got 20\.0 for both"):
         d_curve(CommonArm(2.0, 20.0, 20.0), 1.0)

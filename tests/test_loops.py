@@ -9,8 +9,10 @@ from armlock import (
     paper_loop,
 )
 from armlock.controllers import integrating_actuator
-from armlock.sensors import COMMON, DIFFERENCE, SINGLE, SignalMapping, dual
+from armlock.paper import DUAL_SENSOR_CORNER
+from armlock.sensors import COMMON, DIFFERENCE, SINGLE, SignalMapping, dual, modified_dual
 
+MODIFIED = modified_dual(0.5 * (33.855 + 33.345), 0.5 * (33.855 - 33.345))
 S = np.array([0.01j, 0.3 + 0.2j, -0.1 + 2j, 1.5])
 
 
@@ -55,3 +57,34 @@ def test_a_controller_given_as_a_triple_takes_the_actuator():
     one = paper_loop(controller=((), (-1.0,), 2.0), actuator=True)
     other = paper_loop(controller=((), (-1.0, 0.0), 2.0))
     np.testing.assert_array_equal(one.open_loop(S), other.open_loop(S))
+
+
+K = ((-0.02,), (0.0, -0.1), 1.0)
+
+
+def test_a_loop_of_ones_own_as_one_guesses_it():
+    """Sensors by name, no tau2 without an arm 2, the paper's arms with another controller."""
+    pairs = [
+        (SingleArm(controller=K, tau=20.0, delay=20e-6), Loop(K, SINGLE, 20.0, 20.0, 20e-6)),
+        (CommonArm(controller=K), Loop(K, "common", 20.1, 19.9)),
+        (DualArm(controller=K), Loop(K, "dual", 20.1, 19.9)),
+        (Loop(K, dual(DUAL_SENSOR_CORNER, 20.1 - 19.9), 20.1, 19.9), DualArm(controller=K)),
+        (Loop(K, "single", tau1=20.0), Loop(K, SINGLE, 20.0, 19.0)),
+        (Loop(K, "difference", 20.1, 19.9), Loop(K, DIFFERENCE, 20.1, 19.9)),
+        (Loop(K, "modified dual", 33.855, 33.345), Loop(K, MODIFIED, 33.855, 33.345)),
+    ]
+    for one, other in pairs:
+        assert one.plain() == other.plain()
+        assert one.controller == other.controller
+
+
+def test_what_is_missing_or_doubled_is_named():
+    with pytest.raises(TypeError, match=r"^tau2 must be given: the signal mapping 'common'"):
+        Loop(K, "common", tau1=20.0)
+    with pytest.raises(ValueError, match=r"^mapping must be .* 'modified dual'; got 'triple'"):
+        Loop(K, "triple", 20.1, 19.9)
+    with pytest.raises(ValueError, match=r"^gain must be None where a controller takes"):
+        CommonArm().replace(controller=K)
+    assert CommonArm().replace(gain=None, controller=K) == CommonArm(controller=K)
+    with pytest.raises(ValueError, match=r"^s must not be a pole of the open loop, got 0j"):
+        CommonArm().open_loop([1j, 0.0])

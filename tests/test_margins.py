@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import mpmath
 import numpy as np
 import pytest
@@ -26,6 +28,7 @@ from armlock.robustness import free_phases, gains
 from armlock.robustness.gains import gain_interval
 from armlock.robustness.rays import first_crossing
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
+from armlock.stability.counts import loop_count
 from tests import independent
 from tests.attack import Tally, check_margins, to_loop
 from tests.systems import sketch_of
@@ -182,13 +185,50 @@ def test_critical_perturbation_from_the_boundary_inwards(loop, direction):
         (CommonArm(), (1.0, 0.0)),
         (CommonArm(), (1.0, -0.5)),
         (DualArm(), (0.0, -1.0)),
-        (DualArm(), (1.0, 1.0)),
-        # On the boundary from the start, and along it.
-        (CommonArm(1.0, 20.0, 20.0), (1.0, -1.0)),
+        # Out of its way along the boundary by a rounding of the direction.
+        (CommonArm(), (1.0, np.nextafter(-1.0, 0.0))),
     ],
 )
-def test_nothing_is_left_where_the_direction_leads_out_or_along(loop, direction):
+def test_nothing_is_left_where_the_direction_leads_out(loop, direction):
     assert critical_perturbation(loop, direction) == 0.0
+
+
+@pytest.mark.parametrize("size", [1.0, 0.3])
+def test_along_the_line_on_which_the_root_at_zero_cancels_another_root_is_first(size):
+    # No pair comes to the axis of a common arm with equal arms: only c1 + c2 acts.
+    assert critical_perturbation(CommonArm(1.0, 20.0, 20.0), (size, -size)) == np.inf
+    for loop, direction in ((CommonArm(), (size, -size)), (DualArm(), (size, size))):
+        eps = critical_perturbation(loop, direction)
+        found = [
+            loop_count(loop, *(1 + Fraction(share * eps) * Fraction(d) for d in direction))
+            for share in (1e-6, 0.5, 1.0 - 1e-9, 1.0 + 1e-9)
+        ]
+        assert found == [0, 0, 0, 2]
+
+
+@pytest.mark.parametrize(
+    "loop", [SingleArm(), SingleArm(0.5, 3.0, 0.7), CommonArm(), CommonArm(0.05), DualArm()]
+)
+def test_the_ideal_point_has_the_margins_that_its_neighbours_tend_to(loop):
+    # Next to it, inside, a slow real root leaves all as it is at higher frequency.
+    ideal, near = margins(loop), margins(loop, 1.0 - 2e-9, 1.0 - 1e-9)
+    for name in ("gain_upper", "phase", "delay", "modulus", "disk", "modulus_omega"):
+        assert getattr(ideal, name) == pytest.approx(getattr(near, name), rel=1e-5), name
+
+
+def test_a_gain_that_takes_a_real_root_to_zero_is_that_of_the_finite_open_loop():
+    # L(0) = -gain tau with a positive feedback: s = 0 is met where that is -1.
+    loop = Loop(((), (0.0,), -0.02), SINGLE, 20.0, 20.0)
+    assert gain_interval(loop, 1.0, 1.0) == (0.0, 2.5, 0.0)
+
+
+@pytest.mark.parametrize("loop", [SingleArm(50.0, 10.0, 0.05), DualArm(gain=10.0, delay=1.0)])
+def test_roots_behind_the_one_at_zero_are_not_passed_over(loop):
+    assert unstable_roots(loop, 1.0, 1.0) == BOUNDARY
+    with pytest.raises(ValueError, match=r"must be stable at .* but loop_count gives \d"):
+        margins(loop)
+    with pytest.raises(ValueError, match=r"to lose stability, but loop_count gives \d"):
+        critical_perturbation(loop, (-1.0, -1.0))
 
 
 @pytest.mark.parametrize(
@@ -235,7 +275,7 @@ def test_free_phases_pass_over_no_first_crossing(name, direction):
     """As a plain characteristic function a loop is walked without them."""
     loop, point = STABLE[name]
     found, expected = (
-        first_crossing(system, point, direction, 5.0) for system in (loop, loop.changed())
+        first_crossing(system, point, direction, 5.0) for system in (loop, loop.plain())
     )
     assert found == pytest.approx(expected, rel=1e-9, nan_ok=True)
 

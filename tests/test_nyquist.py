@@ -20,6 +20,7 @@ from armlock import (
     unstable_roots,
 )
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
+from armlock.stability.counts import loop_count
 from armlock.stability.nyquist import open_loop_poles
 from tests import independent
 from tests.attack import roots
@@ -88,6 +89,38 @@ def test_random_controllers_agree_with_a_rectangle_of_another_kind(seed):
     point = rng.normal(1.0, 0.3, 2)
     expected = independent.rectangle_count(loop, *point)
     assert nyquist(loop, *point).closed_loop_roots == expected
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_roots_that_cancel_at_zero_hide_no_other(seed):
+    rng = np.random.default_rng(seed)
+    integrators = 1 + seed % 3
+    order = int(rng.integers(0, 4))
+    zeros, poles = (roots(rng, n, 0.03, 6.0, 0.2) for n in (order, order))
+    controller = (zeros, [*poles, *[0.0] * integrators], 10.0 ** rng.uniform(-2.0, 0.5))
+    c = float(rng.choice([1.0, rng.integers(-8, 9) / 4.0]))
+    mapping, point, cancelled = [
+        (SINGLE, (1.0, c), 1),
+        (COMMON, (c, 2.0 - c), 1),
+        (DIFFERENCE, (c, c), 1),
+        (dual(2.0, 0.5), (c, c), 1),
+        # Here the first derivative of the numerator vanishes, too.
+        (COMMON, (-6.0, 8.0), min(integrators, 2)),
+    ][seed % 5]
+    loop = Loop(controller, mapping, 2.0, 1.5, delay=float(rng.choice([0.0, 0.3])))
+    if mapping is DIFFERENCE and c == 0.0:
+        cancelled = integrators
+    assert unstable_roots(loop, *point) == -1
+    expected = independent.rectangle_count(loop, point[0], point[1], at_zero=cancelled)
+    assert loop_count(loop, *point) == expected
+    assert nyquist(loop, *point).closed_loop_roots == expected
+
+
+def test_a_loop_of_minus_one_at_zero_stays_a_boundary_point():
+    # L(0) = -gain tau.
+    for gain, count in ((-0.5, -1), (-0.5 * (1.0 + 1e-6), 1), (-0.5 * (1.0 - 1e-6), 0)):
+        loop = Loop(((), (0.0,), gain), SINGLE, 2.0, 2.0)
+        assert loop_count(loop, 1.0, 1.0) == count
 
 
 def test_a_resonance_between_the_samples_is_refused_not_guessed(monkeypatch):

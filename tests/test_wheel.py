@@ -23,7 +23,8 @@ def built(tmp_path_factory):
 
 
 def test_the_wheel_holds_the_package_only(built):
-    there = {f"armlock/{file.name}" for file in (ROOT / "armlock").glob("*.*")}
+    files = (ROOT / "armlock").rglob("*.*")
+    there = {str(file.relative_to(ROOT)) for file in files if "__pycache__" not in str(file)}
     wheel = zipfile.ZipFile(next(built.glob("*.whl")))
     held = {name for name in wheel.namelist() if ".dist-info/" not in name}
     assert held == there

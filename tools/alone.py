@@ -9,6 +9,7 @@ Nothing is run where Python could not read the name of the folder from its own f
 import fcntl
 import locale
 import os
+import signal
 import sys
 from contextlib import suppress
 
@@ -32,6 +33,8 @@ def main() -> None:
         print("Another make is building here: waiting for it ...", flush=True)
         fcntl.flock(lock, fcntl.LOCK_EX)
     os.set_inheritable(lock, True)
+    # Python ignores it, and the command would do so too: a closed pipe would be an error.
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)
     os.execvp(sys.argv[2], sys.argv[2:])
 
 

@@ -10,6 +10,7 @@ pyproject.toml has its address. Until then they are plain text, and there is no 
 import os
 import re
 import shutil
+import subprocess
 import sys
 import tempfile
 import tomllib
@@ -52,9 +53,16 @@ def main() -> int:
         readme = tree / "README.md"
         text = for_an_index(readme.read_text(encoding="utf-8"), settings["project"])
         readme.write_text(text, encoding="utf-8")
+        # Archives of one commit are equal, byte for byte.
+        commit = ["git", "-C", str(ROOT), "log", "-1", "--format=%ct"]
+        made = subprocess.run(commit, capture_output=True, text=True).stdout.strip()
+        if made:
+            os.environ.setdefault("SOURCE_DATE_EPOCH", made)
         os.chdir(tree)
         for build in (buildapi.build_sdist, buildapi.build_wheel):
-            print(build(str(target)))
+            archive = target / build(str(target))
+            archive.chmod(0o644)
+            print(archive.name)
     return 0
 
 

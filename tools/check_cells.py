@@ -9,7 +9,6 @@ would in a terminal; claims are taken from the build. FOLDER is the built book.
 import html
 import os
 import re
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -25,13 +24,11 @@ def shown(page: Path) -> list[str]:
     return [html.unescape(re.sub(r"<[^>]+>", "", cell)) for cell in cells]
 
 
-def run(page: Path, claims: Path) -> str:
+def run(page: Path) -> str:
     """Run the code of a page; return what went wrong, or nothing."""
     with tempfile.TemporaryDirectory() as folder:
         figures = Path(folder) / "figures"
         figures.mkdir()
-        if claims.exists():
-            shutil.copy(claims, figures)
         code = Path(folder) / f"{page.stem}.py"
         code.write_text("\n\n".join(shown(page)), encoding="utf-8")
         environment = os.environ | {"MPLBACKEND": "Agg", "ARMLOCK_FIGURES": str(figures)}
@@ -47,7 +44,7 @@ def main() -> int:
     found = named or sorted((folder / "notebooks").glob("*.html"))
     pages = [page for page in found if shown(page)]
     with ThreadPoolExecutor(2) as pool:
-        errors = list(pool.map(lambda page: run(page, folder / "figures/claims.json"), pages))
+        errors = list(pool.map(run, pages))
     failed = {page.name: error for page, error in zip(pages, errors, strict=True) if error}
     for name, error in failed.items():
         print(f"{name}, its code run in order:\n{error}")

@@ -147,9 +147,9 @@ def _slow_terms(piece: Piece) -> tuple[Piece, FloatArray]:
 
 @njit(cache=True)
 def winding(
-    whole: CompiledSum, uncertain: FloatArray, omega_end: float
+    whole: CompiledSum, uncertain: FloatArray, omega: float, omega_end: float
 ) -> tuple[float, complex, bool]:
-    """Argument gathered by an exponential sum as omega goes from 0 to `omega_end`.
+    """Argument gathered by an exponential sum from omega to `omega_end`.
 
     Where the terms that turn slowly exceed the others together, the sum's argument stays within
     a quarter of a turn of theirs, and only theirs is followed: in long steps, however fast the
@@ -160,7 +160,7 @@ def winding(
     where the walk would take more than MOST_STEPS steps.
     """
     phases = whole.phases
-    steps, argument, omega, step = 0, 0.0, 0.0, omega_end
+    steps, argument, step = 0, 0.0, omega_end
     value = 0j
     block = np.inf
     if phases.size and phases.any():

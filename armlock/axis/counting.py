@@ -67,6 +67,9 @@ class PointModel(NamedTuple):
         The roots of A.
     is_map : bool
         Whether the polynomials are those of a map.
+    start, begun : float
+        The frequency in rad/s from which D is followed, and its argument there in rad: what it
+        has gathered since s = 0, and half pi for each root at s = 0 that does not count.
     """
 
     constant: CompiledSum
@@ -76,12 +79,14 @@ class PointModel(NamedTuple):
     sign: float
     roots: ComplexArray
     is_map: bool
+    start: float
+    begun: float
 
 
 class RowModel(NamedTuple):
     """The crossings x = N / M of a chart's rows, as `fill_rows` takes them.
 
-    D = N - x M, with M = B1 exp(-s (delay + delay1)), and all other terms in N.
+    D = N - x M, with M = B1 exp(-s (delay + tau1)), and all other terms in N.
 
     Attributes
     ----------
@@ -163,7 +168,7 @@ def count_point(model: PointModel, x: float, y: float, end: float) -> int:
         for g in range(weights.shape[0]):
             weights[g, k] -= x * model.weights[0, g, k] + y * model.weights[1, g, k]
     whole = CompiledSum(constant.polynomials, weights, sums, constant.phases)
-    argument, value, clear = winding(whole, uncertain, end)
+    argument, value, clear = winding(whole, uncertain, model.start, end)
     if not clear:
         return BOUNDARY
     if np.isnan(argument):
@@ -178,7 +183,7 @@ def count_point(model: PointModel, x: float, y: float, end: float) -> int:
             # More than rounding explains: the roots of A are not those of A.
             return DOUBTFUL
         final += apart
-    count = (final - argument) / np.pi
+    count = (final - model.begun - argument) / np.pi
     # It is a whole number but for rounding, because D is real at both ends of the axis.
     return int(np.floor(count + 0.5)) if -0.5 < count < np.inf else DOUBTFUL
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from armlock.checks import ComplexArray, axis, positive_array, real_number
+from armlock.checks import ComplexArray, axis, one_of, positive_array, real_number
 from armlock.loops import Loop, checked_loop
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def transfer(
     ------
     TypeError, ValueError
         If `loop` is no `Loop`, there is no such input, or s, c1 or c2 is refused by
-        `Loop.open_loop`.
+        `Loop.open_loop`, for instance s at a pole of the open loop.
 
     Examples
     --------
@@ -69,9 +69,7 @@ def transfer(
     >>> print(f"{abs(transfer(flight_loop(), 'laser', 2j * 3.141592653589793 * 3e-3)):.2e}")
     1.13e-05
     """
-    if source not in INPUTS:
-        raise ValueError(f"source must be one of {', '.join(INPUTS)}; got {source!r}")
-    return responses(loop, s, c1, c2)[source]
+    return responses(loop, s, c1, c2)[one_of("source", source, INPUTS)]
 
 
 def responses(

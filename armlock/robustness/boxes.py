@@ -154,8 +154,8 @@ def _stays_clear(loop: Loop, c1: float, c2: float, half: float, highest: float) 
     end = min(float(last_frequency(loop, abs(c1) + half, abs(c2) + half)), highest)
     if not np.isfinite(end):
         return False
-    whole, (_, b1, b2) = loop.at(c1, c2), loop.on_boundary()
+    whole, (_, b1, b2) = loop.sum_at(c1, c2), loop.on_boundary()
     # The centre is a rounded number itself.
     uncertain = (half + 1e-15) * (np.abs(b1.sums) + np.abs(b2.sums))
-    argument, _, clear = winding(whole.compiled(), uncertain, end)
+    argument, _, clear = winding(whole.compiled(), uncertain, 0.0, end)
     return bool(clear) and not math.isnan(argument)

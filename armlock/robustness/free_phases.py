@@ -21,7 +21,7 @@ from armlock.checks import ComplexArray, FloatArray, IntArray
 from armlock.loops import Loop, LoopAt
 from armlock.robustness import discs
 from armlock.stability.bounds import last_larger
-from armlock.stability.counts import CountError, unstable_roots
+from armlock.stability.counts import CountError, loop_count, walk_begins
 
 # A distance of L from -1 below it is as good as none.
 _TOUCHING = 1e-6
@@ -270,7 +270,7 @@ def clear_above(point: LoopAt, free_above: float) -> bool:
 
 
 def count_at(point: LoopAt, free_above: float) -> int:
-    """Count the unstable roots as `unstable_roots` does.
+    """Count the unstable roots as `loop_count` does.
 
     It takes less time where no phases above the frequency `free_above`, in rad/s, matter.
     """
@@ -278,7 +278,7 @@ def count_at(point: LoopAt, free_above: float) -> int:
         count = _count_below(point, free_above)
         if count is not None:
             return count
-    return int(unstable_roots(*point))
+    return loop_count(*point)
 
 
 def _count_below(point: LoopAt, omega: float) -> int | None:
@@ -289,29 +289,31 @@ def _count_below(point: LoopAt, omega: float) -> int | None:
     from what it is at omega. The counts differ by what it gathers in all, over pi. None where
     rounding hides one of the two.
     """
-    # Not zero: sensors with an integrator have a root at s = 0 there.
+    # Not zero: there L has other poles at s = 0, which a walk does not begin with.
     loop, c1, c2 = point
-    low1, low2 = 1e-3 * c1, 1e-3 * c2
-    parts = [loop.at(c1, c2), loop.at(low1, low2)]
+    low = LoopAt(loop, 1e-3 * c1, 1e-3 * c2)
     arguments, values = [], []
-    for whole in parts:
+    for at in (point, low):
+        begin, whole = walk_begins(*at), at.loop.sum_at(at.c1, at.c2)
+        if begin is None or begin[0] >= omega:
+            return None
         none = np.zeros(whole.sums.size)
-        argument, value, clear = contour.winding(whole.compiled(), none, omega)
+        argument, value, clear = contour.winding(whole.compiled(), none, begin[0], omega)
         if not clear or np.isnan(argument):
             return None
-        arguments.append(argument)
+        arguments.append(begin[1] + argument)
         values.append(value)
     turned = arguments[0] - arguments[1] - contour.angle_between(values[0], values[1])
-    below = int(unstable_roots(loop, low1, low2))
+    below = loop_count(*low)
     count = below - turned / math.pi
     return round(count) if below >= 0 and abs(count - round(count)) < 1e-3 else None
 
 
 def require_stable(point: LoopAt, free_above: float = np.inf) -> None:
-    """Raise unless all roots of D lie in the open left half-plane, hidden modes included."""
+    """Raise unless all zeros of 1 + L lie in the open left half-plane."""
     count = count_at(point, free_above)
     if count != 0:
         raise ValueError(
             f"the loop must be stable at (c1, c2) = {point[1:]} to have margins, but "
-            f"unstable_roots gives {count}"
+            f"loop_count gives {count}"
         )

@@ -26,7 +26,7 @@ from armlock.robustness.free_phases import (
     search_outwards,
 )
 from armlock.stability.bounds import last_larger, last_root_bound
-from armlock.stability.counts import axis_zeros, unstable_roots
+from armlock.stability.counts import axis_zeros, loop_count
 
 #: Gain factors up to this, and down to one over it, are looked at.
 LARGEST_GAIN = 1e6
@@ -149,7 +149,7 @@ def _require_stable_inside(point: LoopAt, lower: float, upper: float) -> None:
         for share in _INSIDE:
             factor = limit * (1.0 + inwards * share)
             scaled = rest._replace(coefficients=rest.coefficients / factor)
-            count = int(unstable_roots(loop.changed(rest=scaled), c1, c2))
+            count = loop_count(loop.plain().replace(rest=scaled), c1, c2)
             if count >= 0:
                 break
         if count != 0:
@@ -157,7 +157,7 @@ def _require_stable_inside(point: LoopAt, lower: float, upper: float) -> None:
             raise no_margin(point, f"rounding hides a crossing, for {at}")
 
 
-def gain_interval(loop: Loop, c1: float, c2: float) -> tuple[float, float, float]:
+def gain_interval(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> tuple[float, float, float]:
     r"""Find the gain factors around one between which a stable loop stays stable.
 
     Parameters
@@ -223,10 +223,8 @@ def gain_interval_of_stable(point: LoopAt) -> tuple[float, float, float]:
     if upper == most:
         upper, where = (limit, np.inf) if limit <= LARGEST_GAIN else (np.inf, np.nan)
     # At s = 0, where L is `above` over `below`, a real root crosses.
-    loop, c1, c2 = point
-    above = float(loop.b1[0] * (1.0 - c1) + loop.b2[0] * (1.0 - c2))
-    below = float(loop.rest[0])
-    at_zero = -below / above if above else np.inf
+    _, above, below = point.at_zero()
+    at_zero = float(-below / above) if above else np.inf
     if max(lower, 1.0 / LARGEST_GAIN) < at_zero < 1.0:
         lower = at_zero
     elif 1.0 < at_zero < min(upper, LARGEST_GAIN):

@@ -27,7 +27,7 @@ from armlock.robustness.free_phases import (
 )
 from armlock.robustness.gains import gain_interval_of_stable
 from armlock.robustness.rays import FARTHEST, Ray
-from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError, unstable_roots
+from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError
 
 # Relative accuracy with free phases, in the order of
 # `armlock.robustness.discs.free_margins_at`. The disk margin may be flat over decades of
@@ -193,6 +193,9 @@ def margins(
 
     Notes
     -----
+    Stable are the zeros of 1 + L. A root at s = 0 that D has because numerator and denominator
+    of L cancel, as at the ideal point of a loop with an integrator, is none of them.
+
     Phase and delay margins are taken over all crossovers. A neutral loop may have crossovers
     without end; they then approach those of the disc below, and the phase margin is certified
     to a part in a million.
@@ -262,10 +265,11 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
     Returns
     -------
     float
-        Smallest eps > 0 such that `unstable_roots` at (1, 1) + eps (d1, d2) is not zero: a
-        root reaches the imaginary axis there, or the neutral root chain does. 0 if it is not
-        stable next to (1, 1), inf if no eps breaks it, up to parameters of 1e9. How near to the
-        limit of the chain roots are followed, `armlock.robustness.rays.first_crossing` says.
+        Smallest eps > 0 such that the count of the loop's unstable roots at (1, 1) +
+        eps (d1, d2), `armlock.stability.counts.loop_count`, is not zero: a root reaches the
+        imaginary axis there, or the neutral root chain does. 0 if the loop is not stable next
+        to (1, 1), inf if no eps breaks it, up to parameters of 1e9. How near to the limit of
+        the chain roots are followed, `armlock.robustness.rays.first_crossing` says.
 
     Raises
     ------
@@ -296,17 +300,15 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
     2.9286e-06
     """
     ray = Ray(checked_loop(loop), (1.0, 1.0), direction)
-
-    def count(t: float) -> int:
-        return int(unstable_roots(loop, *ray.at(t)))
-
-    at_start = count(0.0)
+    at_start = ray.count(0.0)
     if at_start > 0 or at_start == UNCONFINED:
         raise ValueError(
             f"the loop must be stable at (c1, c2) = (1, 1) to lose stability, but "
-            f"unstable_roots gives {at_start}"
+            f"loop_count gives {at_start}"
         )
-    if at_start != 0 and count(1e-9 * ray.scale) != 0:
+    # From there a root at s = 0 that cancels at (1, 1) may turn into the loop's own.
+    may_leave_zero = at_start != 0 or LoopAt(loop, 1.0, 1.0).at_zero()[0] > 0
+    if may_leave_zero and ray.count(1e-9 * ray.scale) != 0:
         return 0.0
     farthest = FARTHEST * ray.scale
     eps = ray.first(farthest).position
@@ -314,10 +316,10 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
         # So close to the result, rounding may hide on which side of the boundary a point is:
         # then a count farther away tells.
         beside = [ray.count_beside(eps, side, 1e-6)[1] for side in (-1, 1)]
-        counts = [count(0.5 * eps), *beside]
+        counts = [ray.count(0.5 * eps), *beside]
         agree = counts[:2] == [0, 0] and counts[2] not in (0, BOUNDARY)
     else:
-        counts = [count(0.5 * farthest)] if ray.acts() else []
+        counts = [ray.count(0.5 * farthest)] if ray.acts() else []
         agree = not any(counts)
     if not agree:
         raise CountError(

@@ -11,6 +11,7 @@ where free phases let a root cross at all: the first turns, then likely places, 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from fractions import Fraction
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -33,6 +34,7 @@ from armlock.stability.counts import (
     BOUNDARY,
     CountError,
     axis_zeros,
+    loop_count,
     polished,
     unstable_roots,
 )
@@ -46,8 +48,6 @@ _OWN = 1e-10
 _TURNS_NEXT_TO_THE_CHAIN = 50_000
 # A count that cannot be told at a point is looked for beside it, up to this share of t.
 _FARTHEST_BESIDE = 1e-3
-# Lines Re s = sigma on which roots are counted if one stays at s = 0, in turns of the delays.
-_BESIDE_THE_AXIS = (1e-9, 1e-6, 1e-3)
 
 
 class Crossings(NamedTuple):
@@ -111,7 +111,7 @@ class Ray:
         self.scale = max(1.0, float(np.hypot(*self.start))) / float(np.hypot(*self.direction))
         #: D0 conj(M) at s = j omega.
         effect = system.deviation(*self.direction)
-        self.product = system.at(*self.start).times_conjugate(effect)
+        self.product = system.sum_at(*self.start).times_conjugate(effect)
         #: |M|^2 there.
         self.square = effect.times_conjugate(effect)
 
@@ -157,7 +157,7 @@ class Ray:
     def acts(self) -> bool:
         """Whether D changes along the ray."""
         system, (d1, d2) = self.system, self.direction
-        if system.delay1 != system.delay2:
+        if system.tau1 != system.tau2:
             return bool((d1 * system.b1).any() or (d2 * system.b2).any())
         return bool(poly.polyadd(d1 * system.b1, d2 * system.b2).any())
 
@@ -169,7 +169,7 @@ class Ray:
             d * p.evaluated(z)[0]
             for d, p in zip(self.direction, system.polynomials()[1:], strict=True)
         )
-        effect = first * np.expm1(-s * system.delay1) + second * np.expm1(-s * system.delay2)
+        effect = first * np.expm1(-s * system.tau1) + second * np.expm1(-s * system.tau2)
         # The sum of the two from coefficients, in which they may cancel, or from factors: the
         # one whose terms are smaller.
         both = poly.polyadd(self.direction[0] * system.b1, self.direction[1] * system.b2)
@@ -264,20 +264,30 @@ class Ray:
             np.array([self.at(stop)]),
         )
 
-    def count_beside(
-        self, t: float, side: int, nearest: float, sigma: float = 0.0
-    ) -> tuple[float, int]:
-        """Count the roots right of Re s = sigma next to a point of the ray.
+    def count(self, t: float) -> int:
+        """Count the unstable roots at a point of the ray, of a loop as `loop_count` does.
+
+        There the point is not rounded: what cancels along the ray does so at it.
+        """
+        if not isinstance(self.system, Loop):
+            return int(unstable_roots(self.system, *self.at(t)))
+        begin, way = self.start.tolist(), self.direction.tolist()
+        c1, c2 = (
+            Fraction(a) + Fraction(t) * Fraction(d) for a, d in zip(begin, way, strict=True)
+        )
+        return loop_count(self.system, c1, c2)
+
+    def count_beside(self, t: float, side: int, nearest: float) -> tuple[float, int]:
+        """Count the unstable roots next to a point of the ray.
 
         At t times 1 + side `nearest`, and as long as that cannot be told farther away, up to a
         thousandth; from t = 0 on at shares of `scale`. Returns the place and the count, that
         may still be below zero: then it is no confirmation.
         """
-        system = self.system.shifted(sigma) if sigma else self.system
         place, count = t, BOUNDARY
         for share in (nearest, *np.geomspace(max(nearest, 1e-9), _FARTHEST_BESIDE, 4)):
             place = float(t * (1.0 + side * share) if t else share * self.scale)
-            count = int(unstable_roots(system, *self.at(place)))
+            count = self.count(place)
             if count != BOUNDARY:
                 break
         return place, count
@@ -286,16 +296,11 @@ class Ray:
         """Raise unless counts say that nothing crosses where rounding hides it.
 
         On both sides of each range of t that hidden stretches may cross, the counts differ by
-        what was found in between, or a crossing is hidden there. Where a root stays at s = 0
-        along the ray, roots right of a line next to the axis are counted.
+        what was found in between, or a crossing is hidden there.
         """
         for low, high in _merged(hidden):
-            for turns in (0.0, *_BESIDE_THE_AXIS):
-                sigma = turns * self.system.omega_per_turn
-                before = self.count_beside(low, -1, 0.0, sigma)
-                after = self.count_beside(high, -1 if high >= stop else 1, 0.0, sigma)
-                if min(before[1], after[1]) >= 0:
-                    break
+            before = self.count_beside(low, -1, 0.0)
+            after = self.count_beside(high, -1 if high >= stop else 1, 0.0)
             between = (found.position > before[0]) & (found.position <= after[0])
             told = min(before[1], after[1]) >= 0
             if not told or after[1] - before[1] != found.change[between].sum():

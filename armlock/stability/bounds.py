@@ -14,8 +14,8 @@ import numpy.typing as npt
 
 from armlock.axis.compiled import njit
 from armlock.axis.exponentials import real_horner
-from armlock.characteristic import CharacteristicFunction, checked_system
-from armlock.checks import FloatArray, broadcast_pair
+from armlock.characteristic import CharacteristicFunction, broadcast_parameters
+from armlock.checks import FloatArray
 
 
 @njit(cache=True)
@@ -201,8 +201,7 @@ def last_frequency(
         |y|. inf where the neutral root chain is not confined to the left half-plane, and nan
         where numbers overflow. Of a map pi / step, where its axis ends.
     """
-    name1, name2 = checked_system(system).parameters
-    xs, ys = broadcast_pair(name1, x, name2, y)
+    xs, ys = broadcast_parameters(system, x, y)
     if system.step:
         return np.full(xs.shape, np.pi / system.step)
     squares, unit = _squares(system)

@@ -14,9 +14,11 @@ walk can be certified. To that error the one of x and y contributes
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -26,16 +28,24 @@ from scipy.optimize import elementwise
 
 from armlock.axis import contour, counting
 from armlock.axis.counting import PointModel, RowModel, Rows
-from armlock.axis.exponentials import ROUNDING, ExponentialSum, aligned, without_unused
-from armlock.characteristic import CharacteristicFunction, checked_system
+from armlock.axis.exponentials import (
+    ROUNDING,
+    ExponentialSum,
+    aligned,
+    evaluate,
+    expand,
+    without_unused,
+)
+from armlock.characteristic import CharacteristicFunction, broadcast_parameters, checked_system
 from armlock.checks import (
     BoolArray,
     FloatArray,
     IntArray,
     axis,
-    broadcast_pair,
     check_memory,
+    real_number,
 )
+from armlock.loops import power_series
 from armlock.stability.bounds import last_frequency
 from armlock.sweep import sweep
 
@@ -107,6 +117,8 @@ def _point_model(system: CharacteristicFunction) -> PointModel:
         sign=float(np.sign(system.a[-1])),
         roots=system.roots_of_a,
         is_map=system.step > 0.0,
+        start=0.0,
+        begun=0.0,
     )
 
 
@@ -208,13 +220,22 @@ def polished(
     return omega
 
 
-def _count(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -> IntArray:
-    """Count at flat arrays of points; raise where rounding spoils it."""
+def _count(
+    system: CharacteristicFunction,
+    x: FloatArray,
+    y: FloatArray,
+    begin: tuple[float, float] = (0.0, 0.0),
+) -> IntArray:
+    """Count at flat arrays of points; raise where rounding spoils it.
+
+    `begin` is what `walk_begins` returns, or where D is followed from s = 0.
+    """
     ends = last_frequency(system, x, y)
     if np.isnan(ends).any():
         points = np.column_stack((x, y))[np.isnan(ends)]
         raise CountError(f"no count at {tuple(points[0].tolist())}: a number overflows", points)
-    counts: IntArray = counting.count_points(_point_model(system), x, y, ends)
+    model = _point_model(system)._replace(start=begin[0], begun=begin[1])
+    counts: IntArray = counting.count_points(model, x, y, np.maximum(ends, 2.0 * begin[0]))
     name1, name2 = system.parameters
     for status, why in _WHY_NOT.items():
         if (counts == status).any():
@@ -226,7 +247,9 @@ def _count(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -> IntA
 
 
 def unstable_roots(
-    system: CharacteristicFunction, x: npt.ArrayLike, y: npt.ArrayLike
+    system: CharacteristicFunction,
+    x: npt.ArrayLike | None = None,
+    y: npt.ArrayLike | None = None,
 ) -> IntArray:
     r"""Count the characteristic roots with positive real part.
 
@@ -234,8 +257,9 @@ def unstable_roots(
     ----------
     system : CharacteristicFunction
         The loop, for instance `CommonArm()`.
-    x, y : array_like of float
-        The free parameters; they broadcast.
+    x, y : array_like of float, optional
+        The free parameters; they broadcast. Those of a loop, c1 and c2, are one if they are not
+        given; others have to be.
 
     Returns
     -------
@@ -284,9 +308,123 @@ def unstable_roots(
     >>> unstable_roots(CommonArm(), [0.9, 0.5, 1.0], [1.05, 1.6, 1.0])
     array([ 0,  5, -1])
     """
-    name1, name2 = checked_system(system).parameters
-    xs, ys = broadcast_pair(name1, x, name2, y)
+    xs, ys = broadcast_parameters(system, x, y)
     return _count(system, xs.ravel(), ys.ravel()).reshape(xs.shape)
+
+
+def walk_begins(
+    loop: CharacteristicFunction, c1: float | Fraction, c2: float | Fraction
+) -> tuple[float, float] | None:
+    r"""Where a walk along D begins if the roots at s = 0 that cancel in L are not to count.
+
+    Returns a frequency in rad/s, and the argument of D there, in rad; zeros where none cancels,
+    and None where L(0) = -1, or rounding hides what it is.
+
+    With D - R = N, k factors s cancel where N and R both have them, and D / s^k begins with
+    d_k. From the series of D up to any power J,
+
+    .. math::
+
+        \left| \frac{D}{d_k s^k} - 1 \right| \le
+        \sum_{k < j \le J} \left| \frac{d_j}{d_k} \right| \omega^{j - k}
+        + \left| \frac{M}{d_k} \right| T^{J + 1} \omega^{J + 1 - k} ,
+
+    with T the longest delay and M a bound on |N| up to 1 / T, where all coefficients count as
+    positive. No term exceeds 2^-(j - k) / 2 up to the frequency that is returned, and the sum
+    is at most 1/2: D / s^k has no root on that part of the axis, and turns by 30 degrees at
+    most.
+    """
+    number = loop.degree + 21
+    rest, numerator = power_series(loop, c1, c2, number)
+    both = enumerate(zip(rest, numerator, strict=True))
+    shared = next((k for k, pair in both if any(pair)), 0)
+    if shared == 0:
+        return 0.0, 0.0
+    series = [r + n for r, n in zip(rest, numerator, strict=True)]
+    first, longest = series[shared], loop.longest_delay
+    if first == 0:
+        return None
+    unit = Fraction(longest)
+    past = sum(
+        abs(Fraction(value)) / unit**i * (abs(Fraction(origin)) + abs(Fraction(c)))
+        for b, c, origin in zip((loop.b1, loop.b2), (c1, c2), loop.reference, strict=True)
+        for i, value in enumerate(b.tolist())
+    )
+    # Below 1 / T an exponential's terms add up to less than e in all.
+    series.append(3 * past * unit**number)
+    logs = [
+        (_log(first) - _log(2 * value)) / (j - shared)
+        for j, value in enumerate(series)
+        if j > shared and value
+    ]
+    start = 0.5 * min(math.exp(min([*logs, 700.0])), 1.0 / longest)
+    value = evaluate(expand(loop.sum_at(float(c1), float(c2)).compiled(), start), start)[0]
+    turn = contour.angle_between(value, (1.0 if first > 0 else -1.0) * 1j**shared)
+    # More than the bound: rounding hides D there, or its coefficients are not those in use.
+    return (start, 0.5 * math.pi * shared + turn) if abs(turn) < 0.6 else None
+
+
+def _log(value: Fraction) -> float:
+    """Natural logarithm of the size of a fraction, of which a float may be too large."""
+    return math.log(abs(value.numerator)) - math.log(value.denominator)
+
+
+def loop_count(loop: CharacteristicFunction, c1: float | Fraction, c2: float | Fraction) -> int:
+    r"""Count the zeros of 1 + L with positive real part, at one point.
+
+    Where numerator and denominator of L cancel a factor s, D = R (1 + L) has a root at s = 0
+    that comes from clearing the denominator R, and is not the loop's. `unstable_roots` counts
+    -1 there, however many roots are unstable; here that root is taken out, exactly. This is
+    so at (1, 1) for every loop with an integrator.
+
+    Parameters
+    ----------
+    loop : CharacteristicFunction
+        The loop, for instance `CommonArm()`, or its `plain` function, changed.
+    c1, c2 : float or Fraction
+        Multiplicative perturbations. Whether anything cancels is decided for these numbers and
+        the loop's own, without rounding.
+
+    Returns
+    -------
+    int
+        As `unstable_roots`, which it is where nothing cancels. `BOUNDARY` (-1) remains where
+        1 + L itself is zero on the axis, or so close to it that rounding hides what it is.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If `loop` is no loop, or c1 or c2 is not finite and real.
+    CountError
+        As `unstable_roots` does.
+
+    Notes
+    -----
+    With k such factors, the walk along D / s^k starts at a small frequency. Up to there a bound
+    on its Taylor series shows that it has no root, and how far it has turned.
+
+    Examples
+    --------
+    >>> from armlock import SingleArm, unstable_roots
+    >>> from armlock.stability.counts import loop_count
+    >>> loop = SingleArm(gain=50.0, tau=10.0, delay=0.05)
+    >>> int(unstable_roots(loop, 1.0, 1.0)), loop_count(loop, 1.0, 1.0)
+    (-1, 166)
+    """
+    if checked_system(loop).step or loop.reference != (1.0, 1.0):
+        raise TypeError(f"loop must be a Loop, for instance CommonArm(), got {loop!r:.200}")
+    c1, c2 = (
+        c if isinstance(c, Fraction) else real_number(name, c)
+        for name, c in (("c1", c1), ("c2", c2))
+    )
+    x, y = np.array([float(c1)]), np.array([float(c2)])
+    count = int(_count(loop, x, y)[0])
+    if count != BOUNDARY:
+        return count
+    begin = walk_begins(loop, c1, c2)
+    if begin is None or begin[0] == 0.0:
+        return BOUNDARY
+    return int(_count(loop, x, y, begin)[0])
 
 
 @dataclass(frozen=True, eq=False)

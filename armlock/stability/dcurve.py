@@ -52,13 +52,13 @@ def _require_two_parameters(system: CharacteristicFunction) -> None:
                 f"system must depend on both free parameters, but {system!r} does not "
                 f"depend on {name}: there is no D-curve"
             )
-    if system.delay1 == system.delay2:
+    if system.tau1 == system.tau2:
         ratio = system.b1[-1] / system.b2[-1]
         if system.b1.size == system.b2.size and np.allclose(
             system.b1, ratio * system.b2, rtol=4 * EPSILON, atol=0.0
         ):
             raise ValueError(
-                f"delay1 and delay2 must differ, got {system.delay1} for both: only one "
+                f"tau1 and tau2 must differ, got {system.tau1} for both: only one "
                 f"combination of {' and '.join(system.parameters)} enters, and the D-curve "
                 f"degenerates to lines"
             )
@@ -140,7 +140,7 @@ def d_curve(
     _require_two_parameters(system)
     (x0, y0), s = system.reference, 1j * omega
     rest, b1, b2 = system.polynomials()
-    change1, change2 = np.expm1(-s * system.delay1), np.expm1(-s * system.delay2)
+    change1, change2 = np.expm1(-s * system.tau1), np.expm1(-s * system.tau2)
     with np.errstate(invalid="ignore"):
         # All divided by B1, as factors: so the controller's part of it cancels.
         z = np.asarray(np.exp(s * system.step) if system.step else s, dtype=np.complex128)
@@ -150,7 +150,7 @@ def d_curve(
             rest.over(b1, z) * np.exp(s * system.delay) - x0 * change1 - y0 * other * change2
         )
         # Only the difference of the delays enters here, which keeps low frequencies exact.
-        between = system.delay1 - system.delay2
+        between = system.tau1 - system.tau2
         across = np.conj(other)
         determinant = np.imag(across) + np.imag(across * np.expm1(-s * between))
         rounding = 4.0 * EPSILON * np.abs(omega * between * across)

@@ -24,10 +24,9 @@ from armlock.checks import (
 from armlock.loops import Loop, LoopAt
 from armlock.stability.bounds import last_frequency, last_larger
 from armlock.stability.counts import (
-    BOUNDARY,
     CountError,
     axis_zeros,
-    unstable_roots,
+    loop_count,
 )
 
 if TYPE_CHECKING:
@@ -156,7 +155,7 @@ def open_loop_poles(loop: Loop) -> int:
 def _resolving_grid(loop: Loop, c1: float, c2: float, end: float) -> FloatArray:
     """Frequencies from 0 to `end` between which neither D nor R turns by much."""
     grids = []
-    for part in (loop.at(c1, c2), loop.rest_on_boundary()):
+    for part in (loop.sum_at(c1, c2), loop.rest_on_boundary()):
         grids.append(resolved_grid(part.compiled(), end, _STRAIGHT))
     if any(grid[-1] < end for grid in grids):
         raise CountError(
@@ -225,8 +224,8 @@ def nyquist(
 
     Notes
     -----
-    At (c1, c2) where L loses a pole at s = 0 by cancellation, D has a root s = 0 that 1 + L
-    has not; Z counts the zeros of 1 + L.
+    Z counts the zeros of 1 + L. A root at s = 0 that D has because a pole of L cancels there
+    is none of them, see `armlock.stability.counts.loop_count`.
 
     Examples
     --------
@@ -264,9 +263,7 @@ def nyquist(
     turns = (float(turned.sum()) + _turn_beyond(loop, 1.0 + contour[-1], end)) / np.pi
     encirclements = -round(turns)
     count = encirclements + poles
-    expected = int(unstable_roots(loop, c1, c2))
-    if expected == BOUNDARY:
-        expected = int(unstable_roots(loop.shifted(radius), c1, c2))
+    expected = loop_count(loop, c1, c2)
     if expected != count:
         raise refused(
             f"{encirclements} encirclements and {poles} open-loop poles against {expected} "

@@ -17,11 +17,10 @@ from numpy.polynomial import polynomial as poly
 
 from armlock.axis.contour import resolved_grid
 from armlock.axis.exponentials import EPSILON
-from armlock.characteristic import CharacteristicFunction, checked_system
+from armlock.characteristic import CharacteristicFunction, broadcast_parameters, checked_system
 from armlock.checks import (
     ComplexArray,
     FloatArray,
-    broadcast_pair,
     complex_array,
     real_number,
     whole_number,
@@ -155,7 +154,7 @@ def _acting(
 
     Their exponentials may be no floats, and zero times infinity is no number.
     """
-    values, delays = [x, y], [system.delay1, system.delay2]
+    values, delays = [x, y], [system.tau1, system.tau2]
     if delays[0] == delays[1] and not poly.polyadd(x * system.b1, y * system.b2).any():
         values = [0.0, 0.0]
     for k, b in enumerate((system.b1, system.b2)):
@@ -166,11 +165,12 @@ def _acting(
         left = poly.polysub(system.a, values[0] * system.b1)
         left = poly.polysub(left, values[1] * system.b2)
         nothing, values = [0.0], [0.0, 0.0]
-        system = system.changed(rest=left, b1=nothing, b2=nothing, delay1=0.0, delay2=0.0)
-    elif set(acting) != {system.delay1, system.delay2}:
+        none = {"b1": nothing, "b2": nothing, "tau1": 0.0, "tau2": 0.0}
+        system = system.plain().replace(rest=left, **none)
+    elif set(acting) != {system.tau1, system.tau2}:
         # Before a parameter of zero any delay will do.
         delay = acting[0] if acting else 0.0
-        system = system.changed(delay1=delay, delay2=delay)
+        system = system.plain().replace(tau1=delay, tau2=delay)
     return system, values[0], values[1]
 
 
@@ -231,7 +231,7 @@ class _Line:
         end = self.search(further) * self.per_turn
         if not end:
             return None
-        whole = self.shifted.at(self.x, self.y).compiled()
+        whole = self.shifted.sum_at(self.x, self.y).compiled()
         s = self.sigma + 1j * resolved_grid(whole, end, 1.0)
         # From where a step of Newton's method is locally shortest: no root close to the line
         # lies between two of its points.
@@ -336,7 +336,9 @@ def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
 
 
 @overload
-def rightmost_root(system: CharacteristicFunction, x: float, y: float) -> complex: ...
+def rightmost_root(
+    system: CharacteristicFunction, x: float | None = None, y: float | None = None
+) -> complex: ...
 
 
 @overload
@@ -346,7 +348,9 @@ def rightmost_root(
 
 
 def rightmost_root(
-    system: CharacteristicFunction, x: npt.ArrayLike, y: npt.ArrayLike
+    system: CharacteristicFunction,
+    x: npt.ArrayLike | None = None,
+    y: npt.ArrayLike | None = None,
 ) -> complex | ComplexArray:
     r"""Return the characteristic root with the largest real part.
 
@@ -354,8 +358,9 @@ def rightmost_root(
     ----------
     system : CharacteristicFunction
         The loop, for instance `CommonArm()`, or a map.
-    x, y : array_like of float
-        The free parameters; they broadcast.
+    x, y : array_like of float, optional
+        The free parameters; they broadcast. Those of a loop, c1 and c2, are one if they are not
+        given; others have to be.
 
     Returns
     -------
@@ -394,10 +399,9 @@ def rightmost_root(
     >>> print(f"{root:.10f}")
     -0.3181315052+1.3372357014j
     """
-    name1, name2 = checked_system(system).parameters
-    xs, ys = broadcast_pair(name1, x, name2, y)
+    xs, ys = broadcast_parameters(system, x, y)
     if xs.ndim == 0:
-        return _rightmost(system, real_number(name1, xs[()]), real_number(name2, ys[()]))
+        return _rightmost(system, float(xs), float(ys))
     flat = [
         _rightmost(system, float(p), float(q)) for p, q in zip(xs.flat, ys.flat, strict=True)
     ]

@@ -17,10 +17,14 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import expm
 
-from armlock.characteristic import CharacteristicFunction, checked_system
+from armlock.characteristic import (
+    CharacteristicFunction,
+    broadcast_parameters,
+    checked_system,
+    given_or_one,
+)
 from armlock.checks import (
     FloatArray,
-    broadcast_pair,
     check_memory,
     positive_number,
     real_number,
@@ -38,7 +42,7 @@ class DelayedTerm(NamedTuple):
 
 
 def realize(
-    system: CharacteristicFunction, x: float, y: float
+    system: CharacteristicFunction, x: float | None, y: float | None
 ) -> tuple[FloatArray, list[DelayedTerm]]:
     r"""Return a state space of `system` at (x, y), in which a single signal is delayed.
 
@@ -46,15 +50,15 @@ def realize(
 
     .. math::
 
-        A\, \xi = -C\, \xi(t - \delta) + x\, B_1\, \xi(t - \delta - \theta_1)
-        + y\, B_2\, \xi(t - \delta - \theta_2) .
+        A\, \xi = -C\, \xi(t - \delta) + x\, B_1\, \xi(t - \delta - \tau_1)
+        + y\, B_2\, \xi(t - \delta - \tau_2) .
 
     In observer form, with as many states as D has degree and a term k for each delay, that is
 
     .. math::
 
-        \dot z(t) &= F z(t) + \sum_k G_k\, \xi(t - \theta_k) , \\
-        \xi(t) &= z_1(t) + \sum_k d_k\, \xi(t - \theta_k) .
+        \dot z(t) &= F z(t) + \sum_k G_k\, \xi(t - \tau_k) , \\
+        \xi(t) &= z_1(t) + \sum_k d_k\, \xi(t - \tau_k) .
 
     Parameters
     ----------
@@ -76,7 +80,8 @@ def realize(
         If x or y is not a finite real number, or the system is a map.
     """
     name1, name2 = checked_system(system).parameters
-    x, y = real_number(name1, x), real_number(name2, y)
+    given1, given2 = given_or_one(system, x, y)
+    x, y = real_number(name1, given1), real_number(name2, given2)
     if system.step:
         raise ValueError(
             f"system must be in continuous time, got a map with step {system.step}"
@@ -85,8 +90,8 @@ def realize(
     terms = []
     for weight, b, delay in (
         (-1.0, system.c, system.delay),
-        (x, system.b1, system.delay + system.delay1),
-        (y, system.b2, system.delay + system.delay2),
+        (x, system.b1, system.delay + system.tau1),
+        (y, system.b2, system.delay + system.tau2),
     ):
         padded = np.zeros_like(undelayed)
         padded[: b.size] = weight * b
@@ -106,7 +111,7 @@ def realize(
     return state, delayed
 
 
-def _checked(system: CharacteristicFunction, step: float, order: int) -> float:
+def _checked(system: CharacteristicFunction, step: float | None, order: int) -> float:
     """Return the step, or raise for what cannot be semi-discretized."""
     step = positive_number("step", step)
     if whole_number("order", order, 0) > 1:
@@ -116,7 +121,7 @@ def _checked(system: CharacteristicFunction, step: float, order: int) -> float:
             "system must be of retarded type: a neutral loop feeds back the delayed signal "
             "itself, which semi-discretization does not smooth"
         )
-    for name in ("delay", "delay1", "delay2"):
+    for name in ("delay", "tau1", "tau2"):
         whole_steps(name, getattr(system, name), step)
     return step
 
@@ -140,7 +145,11 @@ def _sampled(
 
 
 def transition_matrix(
-    system: CharacteristicFunction, x: float, y: float, step: float, order: int = 0
+    system: CharacteristicFunction,
+    x: float | None = None,
+    y: float | None = None,
+    step: float | None = None,
+    order: int = 0,
 ) -> FloatArray:
     r"""Build the transition matrix of the semi-discretized loop.
 
@@ -148,8 +157,8 @@ def transition_matrix(
     ----------
     system : CharacteristicFunction
         A retarded loop, for instance `CommonArm()`.
-    x, y : float
-        The free parameters.
+    x, y : float, optional
+        The free parameters. Those of a loop, c1 and c2, are one if they are not given.
     step : float
         Sampling step h in s; it must divide all delays.
     order : {0, 1}, optional
@@ -232,9 +241,9 @@ def transition_matrix(
 
 def spectral_radius(
     system: CharacteristicFunction,
-    x: npt.ArrayLike,
-    y: npt.ArrayLike,
-    step: float,
+    x: npt.ArrayLike | None = None,
+    y: npt.ArrayLike | None = None,
+    step: float | None = None,
     order: int = 0,
 ) -> FloatArray:
     r"""Spectral radius of the semi-discretized loop, from dense eigenvalues.
@@ -249,8 +258,9 @@ def spectral_radius(
     ----------
     system : CharacteristicFunction
         A retarded loop, for instance `CommonArm()` or `HayesEquation()`.
-    x, y : array_like of float
-        The free parameters; they broadcast.
+    x, y : array_like of float, optional
+        The free parameters; they broadcast. Those of a loop, c1 and c2, are one if they are not
+        given; others have to be.
     step : float
         Sampling step h in s; it must divide all delays.
     order : {0, 1}, optional
@@ -274,8 +284,7 @@ def spectral_radius(
     >>> print(round(float(spectral_radius(HayesEquation(), -1, -1, step=0.1, order=1)), 12))
     0.941189374167
     """
-    name1, name2 = checked_system(system).parameters
-    xs, ys = broadcast_pair(name1, x, name2, y)
+    xs, ys = broadcast_parameters(system, x, y)
     radii = [
         np.abs(np.linalg.eigvals(transition_matrix(system, p, q, step, order))).max()
         for p, q in zip(xs.flat, ys.flat, strict=True)
@@ -338,7 +347,7 @@ def semi_discretization(
     array([0, 5])
     """
     step = _checked(system, step, order)
-    for name, delay in zip(system.parameters, (system.delay1, system.delay2), strict=True):
+    for name, delay in zip(system.parameters, (system.tau1, system.tau2), strict=True):
         if system.delay + delay == 0.0:
             raise ValueError(
                 f"the free parameter {name} of {system!r} stands before an undelayed signal, "
@@ -352,8 +361,8 @@ def semi_discretization(
         np.asarray(np.poly(flow)[::-1], dtype=np.float64),
         b1,
         b2,
-        system.delay1,
-        system.delay2,
+        system.tau1,
+        system.tau2,
         delay=system.delay,
         step=step,
         parameters=system.parameters,

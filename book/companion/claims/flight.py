@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import cache, partial
 
 import numpy as np
+from scipy.constants import speed_of_light
 from scipy.optimize import brentq
 
 from armlock.checks import FloatArray
@@ -29,6 +30,7 @@ from armlock.stability.counts import unstable_roots
 from armlock.timedomain.noise import LaserNoise
 from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, decide
+from book.companion.extremes import largest, smallest
 
 stability = partial(ledger.claim, chapter="08a_flight")
 noise = partial(ledger.claim, chapter="08b_noise_and_pulling")
@@ -38,13 +40,19 @@ DAY = 86400.0
 #: Actuator, phasemeter and transponder, in s; pre-stabilisation adds the last once more.
 TRANSPONDER = 1.0 / (TURN * 30e3)
 DEAD_TIME = 5e-6 + 2e-6 + TRANSPONDER
-LOOP = flight_loop()
-DELAYED = flight_loop(delay=DEAD_TIME)
-PRESTABILISED = flight_loop(delay=DEAD_TIME + TRANSPONDER)
+#: Mean round trip in s of the source's arms of five million kilometres: 33.356 s.
+MEAN_DELAY = 2.0 * 5e9 / speed_of_light
+#: Others that are tried: as rounded elsewhere, and of arms that are 0.7 % longer.
+OTHER_DELAYS = (33.4, 33.6)
+LOOP = flight_loop(MEAN_DELAY)
+DELAYED = flight_loop(MEAN_DELAY, delay=DEAD_TIME)
+PRESTABILISED = flight_loop(MEAN_DELAY, delay=DEAD_TIME + TRANSPONDER)
+#: Frequency in Hz from which on the arms' phases are taken as free.
+FREE_FROM = 10.0
 #: Half differences of the round trips in s, from the largest down to a tenth of a microsecond.
 MISMATCHES = np.geomspace(0.255, 1e-7, 30)
 WAVELENGTH, ASTRONOMICAL_UNIT = 1064e-9, 149_597_870_700.0
-LASER_FREQUENCY = 299_792_458.0 / WAVELENGTH
+LASER_FREQUENCY = speed_of_light / WAVELENGTH
 #: Amplitude in Hz, assumed for acquisition, of the sum of both arms' shifts; a year in rad/s.
 DOPPLER, YEARLY = 15e6, TURN / (365.25 * DAY)
 
@@ -69,9 +77,9 @@ def highest_unity_gain(loop: Loop) -> float:
 
 
 @cache
-def uniform(loop: Loop) -> Margins:
-    """Return the margins for all phases of the arms above 10 Hz, certified."""
-    return margins(loop, free_above=TURN * 10.0)
+def uniform(loop: Loop, free_from: float = FREE_FROM) -> Margins:
+    """Return the margins for all phases of the arms above a frequency in Hz, certified."""
+    return margins(loop, free_above=TURN * free_from)
 
 
 def free_margins(loop: Loop, frequency: FloatArray) -> FloatArray:
@@ -85,8 +93,9 @@ def free_margins(loop: Loop, frequency: FloatArray) -> FloatArray:
 
 @cache
 def budget(laser: str = "free-running") -> NoiseBudget:
-    """Return the noise budget from 0.1 mHz to 2 Hz, with many points to an echo."""
-    low, high = np.geomspace(1e-4, 0.03, 500), np.arange(0.03, 2.0, 1.0 / 33.6 / 60.0)
+    """Return the noise budget from 0.1 mHz to 2 Hz, 60 points to a null of the mean arm."""
+    step = 1.0 / MEAN_DELAY / 60.0
+    low, high = np.geomspace(1e-4, 0.03, 500), np.arange(0.03, 2.0, step)
     return noise_budget(LOOP, np.concatenate((low, high)), laser=laser)
 
 
@@ -94,7 +103,8 @@ def most_laser(loop: Loop, frequency: FloatArray) -> FloatArray:
     """Return what is left of a free-running laser in Hz/sqrt(Hz), at most.
 
     For all mean lengths of the arms, their difference being what it is: L then runs around a
-    circle. So the lines of the echoes do not have to be resolved.
+    circle. So the narrow lines, one at each multiple of one over the round trip, do not have to
+    be resolved.
     """
     s = 1j * TURN * frequency
     first, second = loop.arm_responses(s)
@@ -120,9 +130,16 @@ def density(source: str) -> Callable[[FloatArray], FloatArray]:
 
 @cache
 def largest_answers() -> FloatArray:
-    """Return the laser's largest answer to an error of the sum of 1 Hz, 1 Hz/s and 1 Hz/s^2."""
-    time = np.geomspace(0.02, 20.0, 1000) * DAY
-    return np.array([np.abs(pulling(LOOP, time, tuple(e))).max() for e in np.eye(3)])
+    """Return the laser's largest answer to an error of the sum of 1 Hz, 1 Hz/s and 1 Hz/s^2.
+
+    From one second to twenty days after it begins.
+    """
+    time = np.geomspace(1.0, 20.0 * DAY, 1000)
+
+    def most(error: tuple[float, ...]) -> float:
+        return largest(lambda t: np.abs(pulling(LOOP, t, error)), time).value
+
+    return np.array([most(tuple(e)) for e in np.eye(3)])
 
 
 def doppler_errors(laser: str, averaging: float = 200.0) -> tuple[float, float]:
@@ -136,7 +153,7 @@ def doppler_errors(laser: str, averaging: float = 200.0) -> tuple[float, float]:
     x = np.pi * f * averaging
     mean = np.sinc(f * averaging)
     slope = 6.0 * (np.sin(x) - x * np.cos(x)) / (x**2 * averaging)
-    both_arms = 4.0 * np.sin(np.pi * f * 33.6) * LASERS[laser](f)
+    both_arms = 4.0 * np.sin(np.pi * f * MEAN_DELAY) * LASERS[laser](f)
     rms = [np.sqrt(np.trapezoid((both_arms * w) ** 2, f)) for w in (mean, slope)]
     return float(rms[0]), float(rms[1])
 
@@ -187,7 +204,7 @@ def unity_gain() -> Finding:
     "W2",
     place="White paper, Sec. 3",
     says="The gain at 3 mHz is 87 000.",
-    pinned=(Verdict.REPRODUCED, 88639.3, 1.0),
+    pinned=(Verdict.REPRODUCED, 88501.8, 1.0),
 )
 def gain_in_the_band() -> Finding:
     """Evaluate |L| at 3 mHz."""
@@ -204,24 +221,30 @@ def gain_in_the_band() -> Finding:
     "W3",
     place="White paper, Sec. 3",
     says="The phase margin is above 30 degrees at every unity-gain frequency.",
-    pinned=(Verdict.IN_PART, 28.64095, 1e-3),
+    pinned=(Verdict.WHERE_USED, 30.33617, 1e-3),
 )
 def phase_margins() -> Finding:
     """Take the smallest margin over all crossings, and for all phases of the arms."""
     lowest = complex(LOOP.open_loop(1j * TURN * _crossing(LOOP, 1e-6, 1e-5)))
     low = 180.0 - abs(float(np.degrees(np.angle(lowest))))
-    faster = flight_loop(corner=TURN * 0.8)
-    here, late, other = (np.degrees(uniform(one).phase) for one in (LOOP, DELAYED, faster))
+    faster = flight_loop(MEAN_DELAY, corner=TURN * 0.8)
+    longer = [flight_loop(delay) for delay in OTHER_DELAYS]
+    here, late, other, *more = (
+        np.degrees(uniform(one).phase) for one in (LOOP, DELAYED, faster, *longer)
+    )
+    sooner = float(np.degrees(uniform(LOOP, 2.0).phase))
     null = uniform(LOOP).phase_omega / TURN
     return Finding(
-        decide(low > 30.0, here > 30.0),
+        decide(low > 30.0, here > 30.0, beyond=min(late, other, sooner, *more) > 30.0),
         float(here),
         f"smallest phase margin in degrees, at {null:.4f} Hz, beside the null where both arms "
         "are in phase again",
-        f"It is {low:.1f} degrees at the lower unity gain, but {here:.2f} at the null, and "
-        f"{late:.2f} with the dead time. No other crossing has less, for any phases of the "
-        "two arms above 10 Hz: this is certified. E(s) is not printed: with a corner of 0.8 "
-        f"instead of 0.4 Hz the smallest margin is {other:.1f} degrees.",
+        f"True of the source's arms, $2L/c = {MEAN_DELAY:.3f}$ s, with {low:.1f} degrees at "
+        "the lower unity gain; certified, for any phases of the two arms above "
+        f"{FREE_FROM:g} Hz. With 33.4 s and 33.6 s for the mean round trip it is {more[0]:.2f} "
+        f"and {more[1]:.2f} degrees, with the dead time {late:.2f}, and with phases that are "
+        f"free from 2 Hz on {sooner:.2f}. E(s) is not printed: with a corner of 0.8 instead of "
+        f"0.4 Hz it is {other:.1f} degrees.",
     )
 
 
@@ -229,7 +252,7 @@ def phase_margins() -> Finding:
     "W4",
     place="White paper, Sec. 3",
     says="Noise is amplified by less than 2 at the nulls, and by 5 near 15 kHz.",
-    pinned=(Verdict.IN_PART, 2.0963, 1e-3),
+    pinned=(Verdict.WHERE_USED, 1.97686, 1e-4),
 )
 def amplification() -> Finding:
     """Take one over the modulus margin, and the disc of all phases at 15 kHz."""
@@ -237,13 +260,15 @@ def amplification() -> Finding:
     peaks = [1.0 / uniform(loop).modulus for loop in loops]
     where = [uniform(loop).modulus_omega / TURN for loop in loops]
     at = [1.0 / float(free_margins(loop, np.array([15e3]))[0, 0]) for loop in loops]
+    longer = [1.0 / uniform(flight_loop(delay)).modulus for delay in OTHER_DELAYS]
     return Finding(
-        decide(peaks[0] < 2.0, min(at) < 5.0 < max(at)),
+        decide(peaks[0] < 2.0, min(at) < 5.0 < max(at), beyond=max(longer) < 2.0),
         peaks[0],
-        f"largest |1 / (1 + L)| without dead time, at {where[0]:.4f} Hz, beside the null",
-        "At high frequency the amplification over all phases of the arms depends on the "
-        f"dead time. At 15 kHz it is {at[0]:.2f} without one, {at[1]:.2f} with 12.3 µs, and "
-        f"{at[2]:.2f} with that of pre-stabilisation; the certified peaks of the last two are "
+        f"largest |1 / (1 + L)| without dead time, at {where[0]:.1f} Hz",
+        f"Below 2 with the source's $2L/c = {MEAN_DELAY:.3f}$ s; {longer[0]:.2f} and "
+        f"{longer[1]:.2f} with 33.4 s and 33.6 s. At 15 kHz it depends on the dead time, which "
+        f"brackets the 5: {at[0]:.2f} without one, {at[1]:.2f} with 12.3 µs, and {at[2]:.2f} "
+        f"with that of pre-stabilisation. The certified peaks of the last two are "
         f"{peaks[1]:.2f} at {where[1] / 1e3:.1f} kHz and {peaks[2]:.2f} at "
         f"{where[2] / 1e3:.1f} kHz.",
     )
@@ -257,11 +282,11 @@ def amplification() -> Finding:
 )
 def smaller_mismatch() -> Finding:
     """Count at thirty mismatches down to 0.2 us, and with the other sign of H₋."""
-    counts = [int(unstable_roots(flight_loop(half_difference=h), 1, 1)) for h in MISMATCHES]
-    turned = Loop(LOOP.controller, modified_dual(33.6, -0.255), LOOP.tau1, LOOP.tau2)
+    counts = [int(unstable_roots(flight_loop(MEAN_DELAY, h), 1, 1)) for h in MISMATCHES]
+    turned = Loop(LOOP.controller, modified_dual(MEAN_DELAY, -0.255), LOOP.tau1, LOOP.tau2)
     others = int(unstable_roots(turned, 1, 1))
     small = 1e-5
-    edge = critical_perturbation(flight_loop(half_difference=small), (1, -1))
+    edge = critical_perturbation(flight_loop(MEAN_DELAY, small), (1, -1))
     moving = 2.0 * small * max(BEAT_NOTES) / LASER_FREQUENCY / edge
     return Finding(
         decide(not any(counts)),
@@ -281,30 +306,38 @@ def smaller_mismatch() -> Finding:
     place="White paper, Sec. 3",
     says="With a free-running laser the noise is a factor of 5 below the TDI capability at 3 "
     "mHz, and below it over the whole science band.",
-    pinned=(Verdict.REPRODUCED, 5.317, 0.01),
+    pinned=(Verdict.REPRODUCED, 5.3102, 1e-3),
 )
 def below_the_capability() -> Finding:
-    """Compute the noise budget from 0.1 mHz to 1 Hz, lines of the echoes included."""
+    """Compute the noise budget from 0.1 mHz to 1 Hz, and the laser's own lines up to 2 Hz."""
     at = noise_budget(LOOP, [3e-3])
     share = float(at.sources["laser"][0] / at.sources["clock"][0])
-    slow, fast = np.geomspace(1e-4, 0.03, 500), np.geomspace(0.03, 2.0, 20_001)
+    slow, fast = np.geomspace(1e-4, 0.03, 500), np.geomspace(0.03, 2.0, 4001)
+    science = fast[fast <= 1.0]
 
-    def factors(half: float) -> FloatArray:
-        loop = flight_loop(half_difference=half)
-        return tdi_capability(fast) / most_laser(loop, fast)
+    def factor(half: float) -> Callable[[FloatArray], FloatArray]:
+        loop = flight_loop(MEAN_DELAY, half)
+        return lambda f: tdi_capability(f) / most_laser(loop, f)
 
-    found, science = factors(0.255), fast <= 1.0
-    least = min(found[science].min(), noise_budget(LOOP, slow).factor.min())
-    enough = brentq(lambda half: factors(half)[science].min() - 1.0, 0.1, 0.255, xtol=1e-4)
+    def least_of_all(f: FloatArray) -> FloatArray:
+        return noise_budget(LOOP, np.atleast_1d(f)).factor.reshape(np.shape(f))
+
+    found = factor(0.255)
+    least = min(smallest(found, science).value, smallest(least_of_all, slow).value)
+    worst, first = smallest(found, fast), int(np.argmax(found(fast) < 1.0))
+    begins = brentq(lambda f: float(found(f)) - 1.0, fast[first - 1], fast[first])
+    enough = brentq(
+        lambda half: smallest(factor(half), science).value - 1.0, 0.1, 0.255, xtol=1e-4
+    )
     return Finding(
         decide(5.0 <= at.factor[0] < 6.0, least > 1.0),
         float(at.factor[0]),
         "capability over noise at 3 mHz",
-        f"From 0.1 mHz to 1 Hz the noise is at least a factor of {least:.2f} below, lines of "
-        f"the echoes included; from {fast[found < 1.0][0]:.2f} Hz on lines exceed the "
-        f"capability, {1.0 / found.min():.0f} times at {fast[found.argmin()]:.2f} Hz. At 3 mHz "
-        f"the laser leaves {share:.0f} times the clocks' noise. With 2 Δτ below "
-        f"{2.0 * enough:.2f} s lines exceed it within the band.",
+        f"From 0.1 mHz to 1 Hz the noise is at least a factor of {least:.2f} below, with the "
+        "laser's narrow lines near the nulls of the mean arm; from "
+        f"{begins:.2f} Hz on lines exceed the capability, {1.0 / worst.value:.0f} times at "
+        f"{worst.at:.2f} Hz. At 3 mHz the laser leaves {share:.0f} times the clocks' noise. "
+        f"With 2 Δτ below {2.0 * enough:.2f} s lines exceed it within the band.",
     )
 
 
@@ -313,17 +346,18 @@ def below_the_capability() -> Finding:
     place="White paper, Sec. 3",
     says="A single arm is pulled by $ν c / (2 L)$ a second: an error of 100 kHz makes 1 GHz in "
     "four days.",
-    pinned=(Verdict.REPRODUCED, 1.0345e9, 2e6),
+    pinned=(Verdict.REPRODUCED, 1.0359e9, 2e6),
 )
 def single_arm() -> Finding:
-    """Pull a single arm of 33.4 s by 100 kHz for four days."""
+    """Pull a single arm of the source's length by 100 kHz for four days."""
     error = (1e5, 0.0, 0.0)
-    pulled = abs(float(pulling(SingleArm(100.0, 33.4), 4.0 * DAY, error, error)))
+    pulled = abs(float(pulling(SingleArm(100.0, MEAN_DELAY), 4.0 * DAY, error, error)))
     return Finding(
         decide(abs(pulled / 1e9 - 1.0) < 0.05),
         pulled,
         "pulling in Hz after four days",
-        f"The rate is 100 kHz / 33.4 s = {1e5 / 33.4:.0f} Hz/s, whatever the gain.",
+        f"The rate is 100 kHz / {MEAN_DELAY:.3f} s = {1e5 / MEAN_DELAY:.0f} Hz/s, whatever the "
+        "gain.",
     )
 
 
@@ -331,7 +365,7 @@ def single_arm() -> Finding:
     "W8",
     place="White paper, Sec. 3",
     says="In steady state the laser is pulled by less than 8 MHz, peak to peak.",
-    pinned=(Verdict.OPEN, 5.9962e6, 1e3),
+    pinned=(Verdict.OPEN, 6.0400e6, 1e3),
 )
 def steady_state() -> Finding:
     """Take the response to the Doppler shifts themselves, which are never updated."""
@@ -353,7 +387,7 @@ def steady_state() -> Finding:
     place="White paper, Sec. 3",
     says="At acquisition the laser is pulled by 460, 90 and 4 MHz: free-running, Mach-Zehnder, "
     "Fabry-Perot.",
-    pinned=(Verdict.IN_PART, 1.557, 0.01),
+    pinned=(Verdict.OPEN, 1.5529, 1e-3),
 )
 def acquisition() -> Finding:
     """Compare with what Doppler estimates of 200 s would leave."""
@@ -364,12 +398,13 @@ def acquisition() -> Finding:
     longer = acquisition_pulling("free-running", 400.0)
     listed = ", ".join(f"{value / 1e6:.3g}" for value in found.values())
     return Finding(
-        decide(worst < 2.0, worst < 1.1),
+        decide(settled=False),
         worst,
         "largest factor between the pulling found and the one printed",
-        f"The errors are not printed. With one standard deviation of a straight line through "
-        f"200 s, and the orbit's rate and curvature for a shift of 15 MHz where that is "
-        f"better, the three are {listed} MHz. With 400 s the first is {longer / 1e6:.0f} MHz.",
+        "The errors of the Doppler estimates are not printed, and they decide. With one "
+        "standard deviation of a straight line through 200 s, and the orbit's rate and "
+        f"curvature for a shift of 15 MHz where that is better, the three are {listed} MHz: "
+        f"order and size are right. With 400 s the first is {longer / 1e6:.0f} MHz.",
     )
 
 
@@ -378,14 +413,14 @@ def acquisition() -> Finding:
     place="White paper, Sec. 3",
     says="The TDI capability is missed for about half an hour, twice a year, when the arms are "
     "equal and the central spacecraft cannot be switched.",
-    pinned=(Verdict.IN_PART, 15.654, 0.02),
+    pinned=(Verdict.OPEN, 15.5325, 1e-3),
 )
 def equal_arms() -> Finding:
     """Find the mismatch at which the sensor's noise at 3 mHz reaches the capability."""
 
     def excess(logarithm: float) -> float:
         half = float(np.exp(logarithm))
-        found = noise_budget(flight_loop(half_difference=half), [3e-3])
+        found = noise_budget(flight_loop(MEAN_DELAY, half), [3e-3])
         others = [asd**2 for name, asd in found.sources.items() if name != "laser"]
         return float(np.log(np.sqrt(sum(others)) / found.requirement)[0])
 
@@ -393,11 +428,12 @@ def equal_arms() -> Finding:
     rate = (BEAT_NOTES[0] - BEAT_NOTES[1]) / LASER_FREQUENCY
     minutes = 4.0 * half / rate / 60.0
     return Finding(
-        decide(10.0 < minutes < 60.0, 20.0 < minutes < 40.0),
+        decide(settled=minutes > 30.0),
         minutes,
-        "minutes for which clocks, motion and shot noise exceed the capability at 3 mHz",
-        f"That is below 2 Δτ = {2e6 * half:.0f} µs, which passes at {rate:.1e} s/s, the "
-        "largest difference of the Doppler shifts; at half that rate it takes twice as long. "
-        "The clocks make the noise, in inverse proportion to the mismatch. Near 1 Hz the "
-        "laser's own lines exceed the capability at far larger mismatches (claim W6).",
+        "minutes for which clocks, motion and shot noise exceed the capability at 3 mHz, if "
+        "the arms pass each other at the largest rate",
+        f"That is below 2 Δτ = {2e6 * half:.0f} µs. How fast it passes is not printed: the "
+        f"largest difference of the Doppler shifts is {rate:.1e} s/s, and at half that rate "
+        f"it takes {2.0 * minutes:.0f} minutes, as claimed. Near 1 Hz the laser's own lines "
+        "exceed the capability at far larger mismatches (claim W6).",
     )

@@ -20,18 +20,18 @@ from __future__ import annotations
 import csv
 import html
 import json
-import os
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cache
 from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
+
+from book.companion.shared import shared
 
 
 class Verdict(StrEnum):
@@ -137,8 +137,7 @@ class Claim:
     affects: tuple[str, ...]
     weight: Weight
     printed: str
-    same_as: str
-    check: Callable[[], Finding]
+    check: shared[Finding]
 
 
 _REGISTER: dict[str, Claim] = {}
@@ -154,8 +153,7 @@ def claim(
     affects: tuple[str, ...] = (),
     weight: Weight = Weight.PHYSICS,
     printed: str = "",
-    same_as: str = "",
-) -> Callable[[Callable[[], Finding]], Callable[[], Finding]]:
+) -> Callable[[Callable[[], Finding]], shared[Finding]]:
     """Enter the decorated check in the register of claims.
 
     Parameters
@@ -176,8 +174,6 @@ def claim(
         What the claim is about.
     printed : str, optional
         The formula, or the few words, as the paper prints them.
-    same_as : str, optional
-        The claim with the same finding, which then counts once.
 
     Raises
     ------
@@ -185,13 +181,12 @@ def claim(
         If the identifier is taken.
     """
 
-    def enter(check: Callable[[], Finding]) -> Callable[[], Finding]:
+    def enter(check: Callable[[], Finding]) -> shared[Finding]:
         if identifier in _REGISTER:
             raise ValueError(f"identifier must be new, got {identifier!r} a second time")
-        remembered = cache(check)
+        remembered = shared(check)
         _REGISTER[identifier] = Claim(
-            identifier, place, says, chapter, pinned, affects, weight, printed, same_as,
-            remembered,
+            identifier, place, says, chapter, pinned, affects, weight, printed, remembered,
         )  # fmt: skip
         return remembered
 
@@ -251,7 +246,7 @@ class Ledger:
         return Counter(
             finding.verdict
             for entry, finding in self.entries
-            if not entry.same_as and entry.weight in (weights or Weight)
+            if entry.weight in (weights or Weight)
         )
 
     def records(self) -> list[dict[str, str | float]]:
@@ -298,9 +293,11 @@ class Ledger:
         ).replace("$", "")
 
     def _repr_html_(self) -> str:
-        """Return the table as HTML, for notebooks."""
+        """Return the table as HTML, for a chapter; what is behind a row is in the ledger."""
         rows = "".join(
-            row(c, f, f'id="claim-{c.identifier}"', ledger_link(c.identifier))
+            f'<tr id="claim-{c.identifier}"><td>{ledger_link(c.identifier)}</td>'
+            f"<td>{badge(f.verdict)}</td><td>{c.weight}</td><td>{typeset(c.says)}"
+            f"<br><strong>{typeset(f.shown)}</strong>: {typeset(f.quantity)}.</td></tr>"
             for c, f in self.entries
         )
         return table(rows)
@@ -360,8 +357,8 @@ def badge(verdict: Verdict, text: str = "") -> str:
     return f'<span class="verdict verdict-{name}">{text or name.replace("_", " ")}</span>'
 
 
-def row(claim: Claim, finding: Finding, attributes: str, link: str, more: str = "") -> str:
-    """Return a claim as a row of `table`: one line, and what unfolds below it."""
+def row(claim: Claim, finding: Finding, attributes: str, link: str, more: str) -> str:
+    """Return a claim as a row of the ledger: one line, and what unfolds below it."""
     printed = f"<p>Printed ({typeset(claim.place)}): {typeset(claim.printed)}.</p>"
     place = f"<p>{typeset(claim.place)}, in our words.</p>"
     return (
@@ -382,26 +379,8 @@ def table(rows: str) -> str:
     )
 
 
-def findings_of_the_build() -> dict[str, Finding]:
-    """Return what the claims' check at the start of a build or of the tests has found.
-
-    Both check every claim on all cores, before the first page or test, and leave claims.json
-    in the folder that the environment variable ARMLOCK_FIGURES names. Elsewhere this is empty.
-    """
-    folder = os.environ.get("ARMLOCK_FIGURES")
-    file = Path(folder) / "claims.json" if folder else None
-    if file is None or not file.exists():
-        return {}
-    return {
-        record["claim"]: Finding(
-            Verdict(record["verdict"]), record["value"], record["quantity"], record["note"]
-        )
-        for record in json.loads(file.read_text("utf-8"))
-    }
-
-
 def check(*identifiers: str) -> Ledger:
-    """Check claims by identifier, those that a build has not checked already.
+    """Check claims by identifier, those that this build has not checked already.
 
     Parameters
     ----------
@@ -423,8 +402,7 @@ def check(*identifiers: str) -> Ledger:
                 f"identifier must be one of {', '.join(_REGISTER)}; got {identifier!r}"
             )
     chosen = [_REGISTER[identifier] for identifier in identifiers]
-    found = findings_of_the_build()
-    return Ledger((entry, found.get(entry.identifier) or entry.check()) for entry in chosen)
+    return Ledger((entry, entry.check()) for entry in chosen)
 
 
 def chapter_claims(chapter: str) -> Ledger:
