@@ -53,9 +53,7 @@ from armlock.timedomain import (
     SpectrumEstimator,
     amplitude_spectrum,
     sampled_open_loop,
-    save_series,
     simulate,
-    simulate_blocks,
 )
 
 __version__ = "0.1.0"
@@ -107,10 +105,8 @@ __all__ = [
     "rightmost_root",
     "robust_loop",
     "sampled_open_loop",
-    "save_series",
     "semi_discretization",
     "simulate",
-    "simulate_blocks",
     "spectral_radius",
     "stability_chart",
     "stability_region",

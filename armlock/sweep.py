@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, as_completed
-from functools import partial
-from importlib import import_module
-from importlib.metadata import version
-from pathlib import Path
+from contextlib import nullcontext
+from functools import cache
 from typing import Any, TypeVar
 
-import numpy as np
+from armlock.store import opened
 
 _P = TypeVar("_P")
 _R = TypeVar("_R")
 
 #: Most tasks of a sweep. Of more points than this, a task takes several, one after the other.
 TASKS = 4096
+# How often a log, which cannot take a line back, gets a line of progress, in s.
+_BETWEEN_LINES = 60.0
 
 
 def sweep(
@@ -46,13 +48,16 @@ def sweep(
         Without one, the calls are made here, one by one. The results are the same, bit by
         bit, on processors of one kind.
     progress : bool, optional
-        Whether a line on standard error says how far it is.
+        Whether standard error says how far it is: on one line in a terminal and in Jupyter,
+        and in a log with a line a minute and one at the end.
     store : path_like, optional
         HDF5 file that takes results as they come. A sweep that was interrupted, and is called
         again, goes on where it was. All results are numbers or arrays of one shape and type;
-        with a file they are returned as those of NumPy. It takes the package h5py.
+        with a file they are returned as those of NumPy. It takes the package h5py. Nothing
+        else can open the file while the sweep runs.
     about : mapping, optional
-        Attributes of the file, such as the names and units of axes, and the seed.
+        Attributes of the file, such as the names and units of axes, and the seed: numbers,
+        text, or lists of them.
 
     Returns
     -------
@@ -62,10 +67,14 @@ def sweep(
     Raises
     ------
     TypeError
-        If `executor` is no executor, for instance a Dask client itself.
+        If `executor` is no executor, for instance a Dask client itself; `function` cannot be
+        called; or, with a file, function or points hold what cannot be pickled, a result is no
+        number or array of numbers, or not of the type and shape of those before it, or `about`
+        holds what HDF5 does not take.
     ValueError
-        If the file is that of another sweep: of other points, function, attributes, or
-        version of this package.
+        If the file is that of another sweep, with other points, another function, other
+        attributes, or another version of this package; if it is damaged, or no such file, or
+        cannot be written; or if another sweep uses it.
     ImportError
         If there is a file to write and no h5py.
 
@@ -75,12 +84,14 @@ def sweep(
     points and results, and what the function takes. An error of the function ends the sweep.
 
     The file holds the datasets `points` (as numbers, or else as text), `results`, and `done`,
-    which is true where there is a result. The attributes `function` and `armlock`, the version,
-    join those given. It has its full size from the first result on, and then no change of
-    structure, so that a process that is killed leaves a file in order.
+    which is 0 where there is no result, and else the result's checksum: one that is damaged is
+    computed again. The file belongs to these points, with their types and last bits, and to
+    this function, with all values that it holds and uses. Functions and classes count as what
+    they do. Only what is installed counts by its name.
 
     A pool of processes starts them by `spawn`, because a forked process may hang where the
-    parent had threads. The program that makes one starts under ``if __name__ == "__main__":``.
+    parent had threads. They end when the parent is killed. The program that makes one
+    starts under ``if __name__ == "__main__":``.
 
     Examples
     --------
@@ -102,24 +113,34 @@ def sweep(
             f"executor must be a concurrent.futures.Executor, which client.get_executor() of a "
             f"Dask client is, got {executor!r}"
         )
+    if not callable(function):
+        raise TypeError(f"function must be callable, got {function!r}")
     given = list(points)
-    results: dict[int, _R] = {}
-    left: Sequence[int] = range(len(given))
-    kept = None
-    if store is not None and given:
-        kept = _Kept(Path(store), given, {"function": _name(function), **(about or {})})
-        left = kept.missing()
-    begin = time.monotonic()
-    for part, values in _computed(function, given, left, executor):
-        results.update(zip(part, values, strict=True))
-        if kept is not None:
-            kept.write(part, values)
-        if progress:
-            done = len(results)
-            seconds = (time.monotonic() - begin) / done * (len(left) - done)
-            line = f"\r{done + len(given) - len(left)} of {len(given)}, {seconds:.0f} s left   "
-            print(line, end="\n" if done == len(left) else "", file=sys.stderr, flush=True)
-    return [results[i] for i in range(len(given))] if kept is None else kept.results()
+    kept = None if store is None or not given else opened(store, function, given, about or {})
+    with kept or nullcontext() as file:
+        found: dict[int, Any] = file.found() if file else {}
+        left = [i for i in range(len(given)) if i not in found]
+        said = begin = time.monotonic()
+        for part, values in _computed(function, given, left, executor):
+            found.update(zip(part, file.write(part, values) if file else values, strict=True))
+            if progress:
+                missing = len(given) - len(found)
+                seconds = (time.monotonic() - begin) / (len(left) - missing) * missing
+                said = _say(
+                    f"{len(found)} of {len(given)}, {seconds:.0f} s left", missing, said
+                )
+    return [found[i] for i in range(len(given))]
+
+
+def _say(line: str, missing: int, said: float) -> float:
+    """Say how far a sweep is; return when something was said last."""
+    now, here = time.monotonic(), type(sys.stderr).__module__
+    rewritten = sys.stderr.isatty() or here.startswith("ipykernel")
+    if not rewritten and missing and now - said < _BETWEEN_LINES:
+        return said
+    end = "\r" if rewritten and missing else "\n"
+    print(f"{line:<40}" if rewritten else line, end=end, file=sys.stderr, flush=True)
+    return now
 
 
 def _computed(
@@ -136,7 +157,8 @@ def _computed(
             yield part, _several(function, [points[i] for i in part])
         return
     running = {
-        executor.submit(_several, function, [points[i] for i in part]): part for part in parts
+        executor.submit(_several, function, [points[i] for i in part], os.getpid()): part
+        for part in parts
     }
     try:
         for future in as_completed(list(running)):
@@ -146,64 +168,23 @@ def _computed(
             future.cancel()
 
 
-def _several(function: Callable[[_P], _R], points: list[_P]) -> list[_R]:
+def _several(
+    function: Callable[[_P], _R], points: list[_P], caller: int | None = None
+) -> list[_R]:
+    parent = multiprocessing.parent_process()
+    if parent is not None and parent.pid == caller:
+        _end_with_parent()
     return [function(point) for point in points]
 
 
-def _name(function: Callable[..., Any]) -> str:
-    """Return what a function is called, in every process the same."""
-    if isinstance(function, partial):
-        return f"{_name(function.func)} of {function.args} {function.keywords}"
-    return f"{function.__module__}.{getattr(function, '__qualname__', repr(function))}"
+@cache
+def _end_with_parent() -> None:
+    """End this process when its parent ends: one that is killed leaves its workers behind."""
 
+    def wait() -> None:
+        parent = multiprocessing.parent_process()
+        if parent is not None:
+            parent.join()
+            os._exit(1)
 
-class _Kept:
-    """The file of a sweep."""
-
-    def __init__(self, path: Path, points: Sequence[Any], about: dict[str, Any]) -> None:
-        self._h5py = import_module("h5py")
-        self._path = path
-        self._about = {**about, "armlock": version("armlock")}
-        try:
-            self._points = np.asarray(points, dtype=np.float64)
-        except (TypeError, ValueError):  # other things than numbers
-            self._points = np.array([repr(point) for point in points], dtype="S")
-
-    def missing(self) -> Sequence[int]:
-        """Return the points without a result; raise if the file belongs to another sweep."""
-        if not self._path.exists():
-            return range(len(self._points))
-        with self._h5py.File(self._path) as file:
-            found = {**file.attrs, "points": file["points"][...]}
-            for name, value in {**self._about, "points": self._points}.items():
-                if name not in found or not np.array_equal(found[name], value):
-                    raise ValueError(
-                        f"store must be the file of this very sweep, or of none; {self._path} "
-                        f"has another {name}"
-                    )
-            return [int(i) for i in np.flatnonzero(~file["done"][...])]
-
-    def write(self, part: Sequence[int], values: Sequence[Any]) -> None:
-        """Write the results of some points, which ascend."""
-        if not self._path.exists():
-            self._create(np.asarray(values[0]))
-        with self._h5py.File(self._path, "r+") as file:
-            file["results"][list(part)] = values
-            # What is said to be done is in the file before.
-            file.flush()
-            file["done"][list(part)] = True
-
-    def results(self) -> list[Any]:
-        with self._h5py.File(self._path) as file:
-            return list(file["results"][...])
-
-    def _create(self, first: np.ndarray[Any, Any]) -> None:
-        """Make the file at its full size, complete from the moment at which it has its name."""
-        count = len(self._points)
-        temporary = self._path.with_name(self._path.name + ".part")
-        with self._h5py.File(temporary, "w") as file:
-            file.attrs.update(self._about)
-            file["points"] = self._points
-            file["done"] = np.zeros(count, dtype=bool)
-            file["results"] = np.zeros((count, *first.shape), first.dtype)
-        temporary.replace(self._path)
+    threading.Thread(target=wait, daemon=True).start()

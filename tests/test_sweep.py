@@ -2,10 +2,12 @@
 
 import math
 import multiprocessing
+import os
 import re
 import signal
 import subprocess
 import sys
+import time
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -13,7 +15,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import armlock
 from armlock import CommonArm, LaserNoise, simulate, stability_chart, sweep
 from armlock.sweep import TASKS
 
@@ -66,12 +67,17 @@ def test_an_error_of_the_function_ends_the_sweep(processes):
         sweep(draw, range(3), executor=2)  # type: ignore[arg-type]
 
 
-def test_progress_is_shown(capsys):
+def test_progress_is_shown(capsys, monkeypatch):
     sweep(str, range(3), progress=True)
     shown = capsys.readouterr()
     assert shown.out == ""
-    assert re.findall(r"(\d) of 3", shown.err) == ["1", "2", "3"]
-    assert shown.err.endswith("\n")
+    assert shown.err == "3 of 3, 0 s left\n"
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    sweep(str, range(3), progress=True)
+    rewritten = capsys.readouterr().err
+    assert re.findall(r"(\d) of 3.*?([\r\n])", rewritten) == [
+        *zip("123", "\r\r\n", strict=True)
+    ]
 
 
 def test_a_file_holds_results_points_and_what_they_are(tmp_path, processes):
@@ -83,13 +89,12 @@ def test_a_file_holds_results_points_and_what_they_are(tmp_path, processes):
         assert np.array_equal(file["points"], points)
         assert np.array_equal(file["results"], found)
         assert file["done"][...].all()
-        assert file.attrs["armlock"] == armlock.__version__
         assert list(file.attrs["axes"]) == ABOUT["axes"]
         assert file.attrs["seed"] == 3
     # Nothing is computed again, and nothing is mixed with another sweep.
     assert sweep(size, points, store=path, about=ABOUT) == found
     for name, function, others, about in (
-        ("seed", size, points, {**ABOUT, "seed": 4}),
+        ("about", size, points, {**ABOUT, "seed": 4}),
         ("points", size, points[:2], ABOUT),
         ("function", partial(math.dist, (0.0, 0.0)), points, ABOUT),
     ):
@@ -147,3 +152,39 @@ def test_a_chart_by_tiles_is_the_chart(processes):
     whole = stability_chart(CommonArm(), x, y)
     tiled = stability_chart(CommonArm(), x, y, executor=processes)
     assert np.array_equal(tiled.counts, whole.counts)
+
+
+PARENT = """
+import multiprocessing, os, signal, sys, time
+from concurrent.futures import ProcessPoolExecutor
+from armlock import sweep
+
+def function(point):
+    with open(sys.argv[1], "a") as file:
+        file.write(f"{os.getpid()}\\n")
+    time.sleep(0.2)
+    return point
+
+if __name__ == "__main__":
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(2, mp_context=context) as executor:
+        sweep(function, range(10_000), executor=executor)
+"""
+
+
+def test_workers_end_with_a_parent_that_is_killed(tmp_path):
+    script, told = tmp_path / "parent.py", tmp_path / "told"
+    script.write_text(PARENT)
+    env = os.environ | {"PYTHONPATH": str(ROOT)}
+    with subprocess.Popen([sys.executable, script, told], env=env) as parent:
+        workers: set[str] = set()
+        until = time.monotonic() + 60.0
+        while len(workers) < 2 and time.monotonic() < until:
+            time.sleep(0.1)
+            workers = set(told.read_text().split()) if told.exists() else set()
+        parent.kill()
+    assert len(workers) == 2
+    until = time.monotonic() + 10.0
+    while any(Path("/proc", worker).exists() for worker in workers):
+        assert time.monotonic() < until
+        time.sleep(0.1)
