@@ -64,6 +64,8 @@ class NyquistCurve:
         P, poles of L in the open right half-plane.
     closed_loop_roots : int
         Z = N + P, zeros of 1 + L in the right half-plane.
+    point : LoopAt
+        The loop, c1 and c2.
 
     Examples
     --------
@@ -81,6 +83,7 @@ class NyquistCurve:
     encirclements: int
     open_loop_poles: int
     closed_loop_roots: int
+    point: LoopAt
 
     def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
         """Draw the curve, both signs of omega, with -1 and the infinite branch.
@@ -279,6 +282,7 @@ def nyquist(
         encirclements=encirclements,
         open_loop_poles=poles,
         closed_loop_roots=count,
+        point=point,
     )
 
 
