@@ -390,7 +390,7 @@ class CharacteristicFunction:
             If s does not hold finite numbers, x or y is not finite and real, or the three do
             not broadcast.
         """
-        return np.asarray(self._value(*self._checked(s, x, y)))
+        return np.asarray(self.with_slope(*self._checked(s, x, y))[0])
 
     def _checked(
         self, s: npt.ArrayLike, x: npt.ArrayLike | None, y: npt.ArrayLike | None
@@ -407,17 +407,26 @@ class CharacteristicFunction:
         x0, y0 = self.reference
         return (self.b1, self.tau1, x0, x), (self.b2, self.tau2, y0, y)
 
-    def _value(self, s: Any, x: Any, y: Any, library: Any = np) -> Any:
-        """Evaluate D(s; x, y) unchecked.
+    def with_slope(self, s: Any, x: Any, y: Any, library: Any = np) -> tuple[Any, Any]:
+        """Evaluate D(s; x, y) and its derivative in s, unchecked.
 
         The functions are those of numpy, or of mpmath for one number in extended precision.
         """
+        number = complex if library is np else library.mpc
         z = library.exp(s * self.step) if self.step else s
-        arms = 0.0
-        for b, tau, origin, here in self.arms(x, y):
-            arm = (origin - here) - here * library.expm1(-s * tau)
-            arms = arms + poly.polyval(z, b) * arm
-        return poly.polyval(z, self.rest) + library.exp(-s * self.delay) * arms
+        dz = self.step * z if self.step else 1.0
+        value, slope = 0.0, 0.0
+        for p, (_, tau, origin, here) in zip(
+            self._polynomials[1:], self.arms(x, y), strict=True
+        ):
+            b, db = p.with_slope(z, number)
+            change = library.expm1(-s * tau)
+            arm = (origin - here) - here * change
+            value = value + b * arm
+            slope = slope + (db * dz - self.delay * b) * arm + b * here * tau * (1.0 + change)
+        dead = library.exp(-s * self.delay)
+        rest, own = self._polynomials[0].with_slope(z, number)
+        return rest + dead * value, own * dz + dead * slope
 
     def derivative(
         self, s: npt.ArrayLike, x: npt.ArrayLike | None = None, y: npt.ArrayLike | None = None
@@ -437,21 +446,7 @@ class CharacteristicFunction:
         TypeError, ValueError
             As a call does.
         """
-        return np.asarray(self._slope(*self._checked(s, x, y)))
-
-    def _slope(self, s: Any, x: Any, y: Any, library: Any = np) -> Any:
-        """Evaluate dD/ds unchecked, as `_value`."""
-        z = library.exp(s * self.step) if self.step else s
-        dz = self.step * z if self.step else 1.0
-        arms = 0.0
-        for b, tau, origin, here in self.arms(x, y):
-            change = library.expm1(-s * tau)
-            value = poly.polyval(z, b)
-            rate = poly.polyval(z, poly.polyder(b)) * dz - self.delay * value
-            arms = arms + rate * ((origin - here) - here * change)
-            arms = arms + value * here * tau * (1.0 + change)
-        own = poly.polyval(z, poly.polyder(self.rest)) * dz
-        return own + library.exp(-s * self.delay) * arms
+        return np.asarray(self.with_slope(*self._checked(s, x, y))[1])
 
     def shifted(self, sigma: float) -> CharacteristicFunction:
         """Return the function s -> D(s + sigma), whose roots lie `sigma` further left.
@@ -644,7 +639,8 @@ def _with_moved(
 def _polynomial(name: str, given: Sequence[float] | FloatArray | Polynomial) -> Polynomial:
     """Return a polynomial with trimmed, read-only coefficients, and its roots."""
     if isinstance(given, Polynomial):
-        return _sealed(Polynomial(_trimmed(name, given.coefficients), given.roots.copy()))
+        coefficients = _trimmed(name, given.coefficients)
+        return _sealed(given._replace(coefficients=coefficients, roots=given.roots.copy()))
     return _sealed(Polynomial.of(_trimmed(name, given)))
 
 

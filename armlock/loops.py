@@ -284,7 +284,8 @@ def _factored(
     found = np.concatenate((roots, Polynomial.of(np.asarray(other, dtype=float)).roots))
     found = found[found != 0.0]
     at_zero = np.zeros(max(product.size - 1 - found.size, 0))
-    return Polynomial(product, np.concatenate((found, at_zero)).astype(np.complex128))
+    every = np.concatenate((found, at_zero)).astype(np.complex128)
+    return Polynomial(product, every, factored=product.size == every.size + 1)
 
 
 def checked_loop(loop: Loop) -> Loop:

@@ -14,7 +14,7 @@ bound on its rounding error. The walks along the axis need no more.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import reduce
 from typing import Any, NamedTuple
 
@@ -65,11 +65,14 @@ class Polynomial(NamedTuple):
     """A real polynomial of s: its coefficients in ascending powers, and its roots.
 
     A product also has the highest coefficients of its factors: their product may be no float.
+    `factored` says which of coefficients and roots were computed from the other: the roots, or,
+    of a product of known factors, the coefficients. Next to a cluster of roots the two differ.
     """
 
     coefficients: FloatArray
     roots: ComplexArray
     leads: tuple[float, ...] = ()
+    factored: bool = False
 
     @classmethod
     def of(cls, coefficients: FloatArray, known: ComplexArray | None = None) -> Polynomial:
@@ -94,6 +97,17 @@ class Polynomial(NamedTuple):
                     f"no roots of the polynomial {coefficients} are found"
                 ) from None
         return cls(coefficients, np.array([complex(root) for root in found]))
+
+    def with_slope(self, z: Any, number: Callable[[complex], Any] = complex) -> tuple[Any, Any]:
+        """Evaluate p and its derivative, from what is exact; roots in another kind of number."""
+        if not self.factored:
+            p = self.coefficients
+            return poly.polyval(z, p), poly.polyval(z, poly.polyder(p))
+        value, slope = 0.0 * z + float(self.coefficients[-1]), 0.0 * z
+        for root in self.roots.tolist():
+            away = z - number(root)
+            value, slope = value * away, slope * away + value
+        return value, slope
 
     def over(self, other: Polynomial, s: ComplexArray) -> ComplexArray:
         """Evaluate p(s) / q(s), factor by factor."""

@@ -36,10 +36,12 @@ _FARTHEST = 1e-6
 # exponential: a second each.
 _LONGEST_COUNT = 1e6
 _LONGEST_SEARCH = 1e5
-# The search for one root ends once its lines have cost so many turns: some four seconds. A line
-# costs the second number, and four times the turns over which roots are looked for.
-_ALL_WALKS = 1e6
-_COST_OF_A_LINE = 1e4
+# The search for one root ends once its walks have cost so many steps, some five seconds. A line
+# costs its points, and a count that cannot be told the second number.
+_ALL_STEPS = 3e6
+_DOUBTFUL_COUNT = 5e5
+# Most points of one line: where rounding hides D, there would be no end of them.
+_MOST_POINTS = 1_000_000
 # Roots left of a line may lie further up than those right of it. They are looked for so many
 # turns further: few at first, at most so many.
 _FURTHER = 4.0
@@ -49,6 +51,7 @@ _SLOW_ONES = 1e3
 # Most points of a line from which Newton's method starts, and most of its steps in extended
 # precision: at a multiple root they only shrink by a share.
 _MOST_STARTS = 4096
+_NEWTON_STEPS = 12
 _MOST_STEPS = 100
 # Most roots near a line that are tried in extended precision.
 _MOST_TRIED = 8
@@ -129,7 +132,7 @@ def extended_root(
         s = mpmath.mpc(complex(complex_array("start", start)[()]))
         point = mpmath.mpf(x), mpmath.mpf(y)
         for _ in range(_MOST_STEPS):
-            value, slope = system._value(s, *point, mpmath), system._slope(s, *point, mpmath)
+            value, slope = system.with_slope(s, *point, mpmath)
             if value == 0:
                 return +s
             if slope == 0:
@@ -182,6 +185,8 @@ class _Line:
     turns : float
         How far up roots can lie right of the line, in turns of the longest delay's
         exponential; inf past the limit of a neutral root chain, or where a number overflows.
+    steps : float
+        What its walks have cost so far.
     """
 
     def __init__(
@@ -196,22 +201,24 @@ class _Line:
             self.turns = float(last_frequency(self.shifted, self.x, self.y)) / self.per_turn
         except ValueError:
             self.turns = np.inf
-        self.known = self.turns <= _LONGEST_COUNT
+        self.known, self.steps = self.turns <= _LONGEST_COUNT, 0.0
 
     def count(self) -> int:
         """Count the roots right of the line; below zero where that cannot be told."""
         if not self.known:
             return BOUNDARY
         try:
-            return int(unstable_roots(self.shifted, self.x, self.y))
+            found = int(unstable_roots(self.shifted, self.x, self.y))
         except CountError:
-            return BOUNDARY
+            found = BOUNDARY
+        self.steps += self.turns if found >= 0 else _DOUBTFUL_COUNT
+        return found
 
     def _step(self, s: ComplexArray) -> tuple[ComplexArray, FloatArray]:
         """Return where a step of Newton's method leads from each s, and its length."""
         with np.errstate(all="ignore"):
-            value = self.system._value(s, self.x, self.y)
-            move = np.where(value == 0.0, 0.0, value / self.system._slope(s, self.x, self.y))
+            value, slope = self.system.with_slope(s, self.x, self.y)
+            move = np.where(value == 0.0, 0.0, value / slope)
         length = np.abs(move)
         return s - move, np.where(np.isnan(length), np.inf, length)
 
@@ -223,16 +230,14 @@ class _Line:
             return self.turns
         return min(self.turns, _SLOW_ONES * further, _LONGEST_SEARCH) + further
 
-    def rightmost(self, further: float) -> tuple[complex, float] | None:
-        """Return the rightmost root near the line, and how far a faster one is ahead of it.
+    def near(self, turns: float, most: int) -> tuple[ComplexArray, FloatArray]:
+        """Follow Newton's method to roots near the line; return them and the last steps.
 
-        Of roots that count as equal it is the slowest.
+        Up to so many turns, from those `most` starts whose first step leads furthest right.
         """
-        end = self.search(further) * self.per_turn
-        if not end:
-            return None
         whole = self.shifted.sum_at(self.x, self.y).compiled()
-        s = self.sigma + 1j * resolved_grid(whole, end, 1.0)
+        s = self.sigma + 1j * resolved_grid(whole, turns * self.per_turn, 1.0, _MOST_POINTS)
+        self.steps += s.size
         # From where a step of Newton's method is locally shortest: no root close to the line
         # lies between two of its points.
         # Part by part, because arrays of millions would spend their time on memory.
@@ -240,11 +245,21 @@ class _Line:
         s, length = map(np.concatenate, zip(*map(self._step, parts), strict=True))
         wider = np.pad(length, 1, constant_values=np.inf)
         s = s[(length <= wider[:-2]) & (length < wider[2:])]
-        s = s[np.argsort(-s.real, kind="stable")][:_MOST_STARTS]
-        for _ in range(12):
+        s = s[np.argsort(-s.real, kind="stable")][:most]
+        for _ in range(_NEWTON_STEPS):
             s, length = self._step(s)
-        found = s[length <= 1e-5 * self.per_turn]
-        found = found.real + 1j * np.abs(found.imag)
+        return s.real + 1j * np.abs(s.imag), length
+
+    def rightmost(self, further: float) -> tuple[complex, float] | None:
+        """Return the rightmost root near the line, and how far a faster one is ahead of it.
+
+        Of roots that count as equal it is the slowest.
+        """
+        turns = self.search(further)
+        if not turns:
+            return None
+        found, length = self.near(turns, _MOST_STARTS)
+        found = found[length <= 1e-5 * self.per_turn]
         unit = self.per_turn / (2.0 * np.pi)
         for top in sorted(found, key=lambda s: -s.real)[:_MOST_TRIED]:
             equal = found[found.real >= top.real - _EQUAL * max(abs(top), unit)]
@@ -294,9 +309,8 @@ def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
     # There are roots right of `low`, as far as can be told, and none right of `high`.
     low, high, sigma, width, walked = -np.inf, np.inf, 0.0, unit, 0.0
     further = _FURTHER
-    while walked < _ALL_WALKS and sigma not in (low, high):
+    while walked < _ALL_STEPS and sigma not in (low, high):
         line = _Line(acting, p, q, sigma)
-        walked += 4.0 * line.search(further) + _COST_OF_A_LINE
         root, ahead = line.rightmost(further) or (complex(np.nan, np.nan), 0.0)
         further = min(2.0 * further, _FURTHEST)
         farthest = _FARTHEST * max(abs(root.real), unit)
@@ -307,6 +321,7 @@ def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
             for margin in np.geomspace(nearest, max(nearest, farthest), 6):
                 right_of_it = _Line(acting, p, q, best.real + ahead + margin)
                 count = right_of_it.count()
+                walked += right_of_it.steps
                 if count == 0:
                     # Another one may lie between the root and the line.
                     between = right_of_it.rightmost(further) if margin > nearest else None
@@ -321,6 +336,7 @@ def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
                 high = sigma
             else:
                 low = sigma
+        walked += line.steps
         if low > -np.inf and high < np.inf:
             # Roots next to the axis may be slower than the delays by many decades.
             sigma = float(small * np.sinh(0.5 * sum(np.arcsinh(np.array([low, high]) / small))))
