@@ -99,7 +99,7 @@ class Polynomial(NamedTuple):
         return cls(coefficients, np.array([complex(root) for root in found]))
 
     def with_slope(self, z: Any, number: Callable[[complex], Any] = complex) -> tuple[Any, Any]:
-        """Evaluate p and its derivative, from what is exact; roots in another kind of number."""
+        """Evaluate p and its derivative from what is exact, as another kind of number."""
         if not self.factored:
             p = self.coefficients
             return poly.polyval(z, p), poly.polyval(z, poly.polyder(p))
