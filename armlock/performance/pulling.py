@@ -156,7 +156,7 @@ def _circle(roots: ComplexArray, rate: float) -> ComplexArray:
 
 def _slope(loop: Loop, s: ComplexArray) -> ComplexArray:
     """Return dL/ds at roots of the loop: there D / R = 1 + L is zero, and so is D."""
-    rest, _ = loop.polynomials()[0].with_slope(s)
+    rest, _ = loop.polynomials()[0].evaluated(s)
     return np.asarray(loop.derivative(s) / rest)
 
 

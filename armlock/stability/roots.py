@@ -138,7 +138,7 @@ def extended_root(
         s = mpmath.mpc(complex(complex_array("start", start)[()]))
         point = mpmath.mpf(x), mpmath.mpf(y)
         for _ in range(_MOST_STEPS):
-            value, slope = system.with_slope(s, *point, mpmath)
+            value, slope = system._value(s, *point, mpmath), system._slope(s, *point, mpmath)
             if value == 0:
                 return +s
             if slope == 0:
@@ -223,8 +223,8 @@ class _Line:
     def _step(self, s: ComplexArray) -> tuple[ComplexArray, FloatArray]:
         """Return where a step of Newton's method leads from each s, and its length."""
         with np.errstate(all="ignore"):
-            value, slope = self.system.with_slope(s, self.x, self.y)
-            move = np.where(value == 0.0, 0.0, value / slope)
+            value = self.system._value(s, self.x, self.y)
+            move = np.where(value == 0.0, 0.0, value / self.system._slope(s, self.x, self.y))
         length = np.abs(move)
         return s - move, np.where(np.isnan(length), np.inf, length)
 

@@ -137,7 +137,6 @@ class Claim:
     affects: tuple[str, ...]
     weight: Weight
     printed: str
-    same_as: str
     check: shared[Finding]
 
 
@@ -154,7 +153,6 @@ def claim(
     affects: tuple[str, ...] = (),
     weight: Weight = Weight.PHYSICS,
     printed: str = "",
-    same_as: str = "",
 ) -> Callable[[Callable[[], Finding]], shared[Finding]]:
     """Enter the decorated check in the register of claims.
 
@@ -176,8 +174,6 @@ def claim(
         What the claim is about.
     printed : str, optional
         The formula, or the few words, as the paper prints them.
-    same_as : str, optional
-        The claim with the same finding, which then counts once.
 
     Raises
     ------
@@ -190,8 +186,7 @@ def claim(
             raise ValueError(f"identifier must be new, got {identifier!r} a second time")
         remembered = shared(check)
         _REGISTER[identifier] = Claim(
-            identifier, place, says, chapter, pinned, affects, weight, printed, same_as,
-            remembered,
+            identifier, place, says, chapter, pinned, affects, weight, printed, remembered,
         )  # fmt: skip
         return remembered
 
@@ -251,7 +246,7 @@ class Ledger:
         return Counter(
             finding.verdict
             for entry, finding in self.entries
-            if not entry.same_as and entry.weight in (weights or Weight)
+            if entry.weight in (weights or Weight)
         )
 
     def records(self) -> list[dict[str, str | float]]:
