@@ -32,6 +32,8 @@ from armlock.stability.counts import axis_zeros, loop_count
 LARGEST_GAIN = 1e6
 # So close to the limits of the neutral root chain, as a share, no gain factors are looked for.
 _NEXT_TO_THE_CHAIN = 1e-5
+# Where L touches zero rounding hides its sign over a stretch in which it may be this large.
+_NULL = 1e-5
 # Shares of a gain factor inside of it at which counts are asked, until one is told.
 _INSIDE = (1e-6, 1e-5, 1e-4, 1e-3)
 
@@ -133,7 +135,7 @@ def _gains_around_one(point: LoopAt, least: float, most: float) -> tuple[float, 
             upper, where = float(factor[nearest]), float(omega[nearest])
     # Values of L in hidden stretches; nan where nothing is known of one.
     left, right = np.concatenate(hidden).T
-    if not ((left > -1.0 / upper) | (right < -1.0 / lower)).all():
+    if not ((left > -max(1.0 / upper, _NULL)) | (right < -1.0 / lower)).all():
         _require_stable_inside(point, lower, upper)
     return lower, upper, where
 
@@ -195,7 +197,8 @@ def gain_interval(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> tuple[float, 
 
     All sign changes of Im L are found, but for short stretches in which rounding hides its
     sign. Where L in one of them could give a factor between the two, they are refused unless
-    counts just inside of both say that the loop is stable.
+    counts just inside of both say that the loop is stable. Next to a null, where |L| is below
+    1e-5 in such a stretch, factors above 1e5 are passed over.
 
     Examples
     --------
