@@ -81,6 +81,17 @@ def _gains(point: LoopAt, omega: FloatArray) -> FloatArray:
         return np.asarray(-1.0 / point.response(omega).real)
 
 
+def _values_below(point: LoopAt, omega: float) -> tuple[float, float]:
+    """Range of what L may be on the negative real axis between zero and a frequency.
+
+    There, up to `LoopAt.leading_radius`, L is one power of s, or all but constant.
+    """
+    if omega > point.leading_radius():
+        return -np.inf, np.inf
+    size = abs(complex(point.response(omega)))
+    return (-np.inf, -0.5 * size) if point.poles_at_zero() > 0 else (-2.0 * size, 0.0)
+
+
 def _free_gains(point: LoopAt, omega: FloatArray) -> FloatArray:
     """Gain factors next to one, below and above, for some phases; shape (omega, 2).
 
@@ -124,7 +135,10 @@ def _gains_around_one(point: LoopAt, least: float, most: float) -> tuple[float, 
     for intervals in search_outwards(loop.omega_per_turn, end, meeting, likely):
         zeros = axis_zeros(crossing, intervals, measure)
         at, spread = zeros.position[zeros.hidden], zeros.spread[zeros.hidden]
-        hidden.append(np.column_stack((at - spread, at + spread)))
+        values = np.column_stack((at - spread, at + spread))
+        for k in np.flatnonzero(zeros.omega[zeros.hidden] == 0.0):
+            values[k] = _values_below(point, float(zeros.width[zeros.hidden][k]))
+        hidden.append(values)
         omega = zeros.omega[~zeros.hidden & (zeros.omega > 0.0)]
         factor = _gains(point, omega)
         below = factor[(factor >= lower) & (factor <= 1.0)]
