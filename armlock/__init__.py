@@ -50,9 +50,7 @@ from armlock.timedomain import (
     SpectrumEstimator,
     amplitude_spectrum,
     sampled_open_loop,
-    save_series,
     simulate,
-    simulate_blocks,
 )
 
 __version__ = "0.1.0"
@@ -102,10 +100,8 @@ __all__ = [
     "rightmost_root",
     "robust_loop",
     "sampled_open_loop",
-    "save_series",
     "semi_discretization",
     "simulate",
-    "simulate_blocks",
     "spectral_radius",
     "stability_chart",
     "sweep",

@@ -13,11 +13,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
+from functools import cached_property
 from math import factorial
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from numpy.polynomial import polynomial as poly
 
 from armlock import paper, sensors
 from armlock.axis.exponentials import ExponentialSum, Polynomial
@@ -180,6 +182,28 @@ class Loop(CharacteristicFunction):
         """Return what two equal loops have in common: controller and mapping too."""
         return *super()._identity(), self.controller, self.mapping
 
+    @cached_property
+    def _basis(self) -> tuple[tuple[Polynomial, ...], FloatArray]:
+        """R, B1 + B2 and B1 - B2, and the shares of them in R, B1 and B2.
+
+        Where the arms cancel, as in a difference or in the integral of the dual sensor, they do
+        so in these polynomials, and not in what a walk evaluates.
+        """
+        k, m = self.controller, self.mapping
+        if not self.b1.any() or not self.b2.any():
+            return super()._basis
+        common = len(k.zeros) + len(m.numerator1) - self.b1.size
+        polynomials, shares = [self.polynomials()[0]], [(1.0, 0.0, 0.0)]
+        for sign in (1.0, -1.0):
+            both = np.asarray(
+                poly.polyadd(m.numerator1, sign * np.array(m.numerator2)), dtype=np.float64
+            )
+            if both.any():
+                product = np.convolve(k.numerator, both)[common:]
+                polynomials.append(_factored(product, k.zeros, both))
+                shares.append((0.0, 0.5, 0.5 * sign))
+        return tuple(polynomials), np.array(shares).T.copy()
+
     def arm_responses(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """Evaluate K m1 exp(-s delay) and K m2 exp(-s delay), factor by factor.
 
@@ -275,13 +299,15 @@ def _actuated(
 
 
 def _factored(
-    product: FloatArray, roots: tuple[complex, ...], other: Sequence[float]
+    product: FloatArray, roots: tuple[complex, ...], other: Sequence[float] | FloatArray
 ) -> Polynomial:
     """Return the product of two polynomials with the roots of both.
 
     Roots at s = 0 may have cancelled: as many are left as the degree says.
     """
-    found = np.concatenate((roots, Polynomial.of(np.asarray(other, dtype=float)).roots))
+    rest = np.asarray(other, dtype=float)
+    rest = rest[np.flatnonzero(rest)[:1].sum() :]
+    found = np.concatenate((roots, Polynomial.of(rest).roots))
     found = found[found != 0.0]
     at_zero = np.zeros(max(product.size - 1 - found.size, 0))
     return Polynomial(product, np.concatenate((found, at_zero)).astype(np.complex128))

@@ -328,7 +328,7 @@ def modified_dual_row() -> Finding:
     return Finding(
         decide(off < 1e-12),
         off,
-        "largest relative deviation of the row from the sensor of chapter 8a, for the paper's "
+        "largest relative deviation of the row from the white paper's sensor, for the paper's "
         "arms",
         "H₊ and H₋ are not given, and the paper does not use this row. With those that the "
         "white paper prints for the work cited in the caption it is exact, sign included; one "
