@@ -145,7 +145,9 @@ def slow_roots(loop: Loop, rate: float) -> ComplexArray:
             return roots_right_of(loop, 1.0, 1.0, float(line))
         except RootError as error:
             last = error
-    raise CountError(f"no pulling from {_DECAYED / rate:.3g} s on: {last}", np.array([[1.0, 1.0]]))
+    raise CountError(
+        f"no pulling from {_DECAYED / rate:.3g} s on: {last}", np.array([[1.0, 1.0]])
+    )
 
 
 def _circle(roots: ComplexArray, rate: float) -> ComplexArray:

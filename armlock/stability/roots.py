@@ -318,7 +318,9 @@ def roots_right_of(
     wanted = line.count()
     if wanted < 0 or wanted > _MOST_ROOTS:
         why = "their number cannot be told" if wanted < 0 else f"there are {wanted}"
-        raise RootError(f"the roots right of {sigma} rad/s are not found: {why}", complex(sigma))
+        raise RootError(
+            f"the roots right of {sigma} rad/s are not found: {why}", complex(sigma)
+        )
     wanted -= _order_at_zero(system, x, y)
     unit, found, number = line.per_turn / (2.0 * np.pi), np.empty(0, dtype=np.complex128), 0
     for s, length in _all_near(line, unit):
