@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from functools import cached_property
 from math import factorial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -27,13 +27,19 @@ from armlock.characteristic import CharacteristicFunction
 from armlock.checks import (
     ComplexArray,
     FloatArray,
+    axis,
     complex_array,
+    positive_array,
     positive_number,
     real_number,
     true_or_false,
 )
 from armlock.controllers import Controller, integrating_actuator, table_two, white_paper
 from armlock.sensors import COMMON, SINGLE, SignalMapping, modified_dual
+
+if TYPE_CHECKING:
+    import control
+    from matplotlib.axes import Axes
 
 
 class HayesEquation(CharacteristicFunction):
@@ -258,6 +264,68 @@ class Loop(CharacteristicFunction):
         first, second = self.arm_responses(s)
         result: ComplexArray = first * ((1.0 - c1) - c1 * np.expm1(-s * self.tau1))
         return result + second * ((1.0 - c2) - c2 * np.expm1(-s * self.tau2))
+
+    def frd(
+        self, omega: npt.ArrayLike, c1: float = 1.0, c2: float = 1.0
+    ) -> control.FrequencyResponseData:
+        """Return the open loop as frequency response data of python-control, exact delays.
+
+        Parameters
+        ----------
+        omega : array_like of float, one-dimensional
+            Angular frequencies in rad/s, positive.
+        c1, c2 : float, optional
+            Multiplicative perturbations.
+
+        Returns
+        -------
+        control.FrequencyResponseData
+            For its plots. Its own margins see only these frequencies; `armlock.margins` misses
+            none.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If omega is not positive and one-dimensional, or c1 or c2 is no finite real number.
+
+        Examples
+        --------
+        >>> from armlock import paper_loop
+        >>> response = paper_loop().frd([0.01, 0.1])
+        >>> print(f"{abs(response(0.1j)):.4f}")
+        12770.0033
+        """
+        import control
+
+        omega = axis("omega", positive_array("omega", omega))
+        c1, c2 = real_number("c1", c1), real_number("c2", c2)
+        return control.frd(self.open_loop(1j * omega, c1, c2), omega)
+
+    def bode(
+        self,
+        omega: npt.ArrayLike | None = None,
+        c1: float = 1.0,
+        c2: float = 1.0,
+        **options: Any,
+    ) -> tuple[Axes, Axes]:
+        """Draw magnitude and phase of the open loop over frequency.
+
+        Parameters
+        ----------
+        omega : array_like of float, optional
+            Angular frequencies in rad/s; by default over all corners of the loop.
+        c1, c2 : float, optional
+            Multiplicative perturbations.
+        **options
+            As `armlock.plotting.plot_bode` takes them, for instance ``margins=True``.
+
+        Returns
+        -------
+        tuple of two matplotlib Axes
+        """
+        from armlock.plotting import plot_bode
+
+        return plot_bode(self, omega, c1, c2, **options)
 
 
 def _mapping_and_tau2(
