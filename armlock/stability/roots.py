@@ -254,7 +254,7 @@ class _Line:
         return self.followed(s[np.argsort(-s.real, kind="stable")][:most], _NEWTON_STEPS)
 
     def followed(self, s: ComplexArray, steps: int) -> tuple[ComplexArray, FloatArray]:
-        """Follow Newton's method; return where it leads, in the upper half, and the last steps."""
+        """Follow Newton's method; return where it leads, with Im s >= 0, and the last steps."""
         length = np.empty(s.size)
         for _ in range(steps):
             s, length = self._step(s)
@@ -318,13 +318,15 @@ def roots_right_of(
     wanted = line.count()
     if wanted < 0 or wanted > _MOST_ROOTS:
         why = "their number cannot be told" if wanted < 0 else f"there are {wanted}"
-        raise RootError(f"the roots right of {sigma} rad/s are not found: {why}", complex(sigma))
+        raise RootError(
+            f"the roots right of {sigma} rad/s are not found: {why}", complex(sigma)
+        )
     wanted -= _order_at_zero(system, x, y)
     unit, found, number = line.per_turn / (2.0 * np.pi), np.empty(0, dtype=np.complex128), 0
     for s, length in _all_near(line, unit):
         kept = (length <= 1e-10 * np.abs(s)) & (np.abs(s) > 1e-13 * unit) & (s.real > sigma)
         found = _distinct(np.concatenate((found, s[kept])))
-        number = found.size + np.count_nonzero(found.imag)
+        number = found.size + int(np.count_nonzero(found.imag))
         if number == wanted:
             return found[np.argsort(np.abs(found))]
     raise RootError(
