@@ -170,6 +170,7 @@ def plot_nyquist(
     omega_max: float = np.inf,
     color: str = BLUE,
     label: str | None = None,
+    margins: bool = False,
 ) -> Axes:
     """Draw a Nyquist curve, both signs of omega, with -1 and the infinite branch.
 
@@ -191,6 +192,8 @@ def plot_nyquist(
         Of the curve.
     label : str, optional
         Name of the curve in a legend; by default its two halves are named by the sign of omega.
+    margins : bool, optional
+        Whether to mark where gain, phase and modulus margin of the stable loop are taken.
 
     Returns
     -------
@@ -219,6 +222,8 @@ def plot_nyquist(
     for frequency in arrows:
         index = min(int(np.searchsorted(omega, frequency)), omega.size - 2)
         _arrow(ax, forward[index : index + 2], color)
+    if margins:
+        _mark_margins(ax, curve)
     minus_one = _coordinates(ax, np.array([-1.0 + 0.0j]))
     ax.plot(*minus_one, "+", color="black", markersize=10, markeredgewidth=1.8, zorder=5)
     if isinstance(ax, PolarAxes):
@@ -236,6 +241,18 @@ def plot_nyquist(
         ax.axvline(0.0, color="black", linewidth=0.6)
         ax.set(xlabel="Re $L$ [1]", ylabel="Im $L$ [1]")
     return ax
+
+
+def _mark_margins(ax: Axes, curve: NyquistCurve) -> None:
+    """Draw marks where the margins of a curve are taken."""
+    from armlock.robustness.margins import margins
+
+    found = margins(*curve.at)
+    for name, marker in (("gain", "s"), ("phase", "o"), ("modulus", "D")):
+        where = getattr(found, f"{name}_omega")
+        if np.isfinite(where):
+            place = _coordinates(ax, np.atleast_1d(curve.at.response(where)))
+            ax.plot(*place, marker, color=ORANGE, zorder=6, label=f"{name} margin")
 
 
 def _coordinates(ax: Axes, values: ComplexArray) -> tuple[FloatArray, FloatArray]:
