@@ -132,9 +132,9 @@ def density(source: str) -> Callable[[FloatArray], FloatArray]:
 def largest_answers() -> FloatArray:
     """Return the laser's largest answer to an error of the sum of 1 Hz, 1 Hz/s and 1 Hz/s^2.
 
-    From one second to twenty days after it begins.
+    From an hour to twenty days after it begins.
     """
-    time = np.geomspace(1.0, 20.0 * DAY, 1000)
+    time = np.geomspace(3600.0, 20.0 * DAY, 1000)
 
     def most(error: tuple[float, ...]) -> float:
         return largest(lambda t: np.abs(pulling(LOOP, t, error)), time).value
