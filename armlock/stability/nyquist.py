@@ -159,7 +159,7 @@ def _resolving_grid(loop: Loop, c1: float, c2: float, end: float) -> FloatArray:
     """Frequencies from 0 to `end` between which neither D nor R turns by much."""
     grids = []
     for part in (loop.sum_at(c1, c2), loop.rest_on_boundary()):
-        grids.append(resolved_grid(part.compiled(), end, _STRAIGHT))
+        grids.append(resolved_grid(part.compiled(), end, _STRAIGHT, MOST_SAMPLES))
     if any(grid[-1] < end for grid in grids):
         raise CountError(
             f"no samples up to omega = {end} rad/s: more than {MOST_SAMPLES:.0e}, "
