@@ -6,7 +6,7 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from book.companion.claims import Verdict, Weight, all_claims, chapter_claims, check
+from book.companion.claims import Verdict, all_claims, chapter_claims, check
 from book.companion.claims import ledger as module
 from book.companion.claims.ledger import Finding, Ledger, claim, decide, typeset
 from book.companion.claims.page import SECTIONS, whole_ledger
@@ -55,15 +55,6 @@ def test_a_chapter_has_all_its_claims(calls):
     assert ledger.counts() == {Verdict.REPRODUCED: 1, Verdict.DIFFERS: 1}
     with pytest.raises(ValueError, match=r"^chapter must be one of 00; got '01'"):
         chapter_claims("01")
-
-
-def test_claims_with_one_finding_count_once(calls):
-    claim("X3", place="", says="", chapter="00", pinned=(Verdict.OPEN, 0.0, 0.0), same_as="X1")(
-        lambda: Finding(Verdict.OPEN, 0.0, "", "")
-    )
-    ledger = check("X1", "X2", "X3")
-    assert ledger.counts(Weight.PHYSICS).total() == 2
-    assert ledger.counts(Weight.WORDING).total() == 0
 
 
 def test_formulas_are_typeset_and_claims_linked():
@@ -154,7 +145,7 @@ def test_a_chapter_shows_its_claims_and_confirms_them(chapter):
 def test_a_claim_names_other_claims():
     known = {entry.identifier for entry in all_claims()}
     for entry in all_claims():
-        assert {*entry.affects, entry.same_as} <= {*known, ""} - {entry.identifier}
+        assert set(entry.affects) <= known - {entry.identifier}
 
 
 def test_an_erratum_quotes_the_paper_and_a_note_is_short(everything):

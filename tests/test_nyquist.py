@@ -111,7 +111,7 @@ def test_roots_that_cancel_at_zero_hide_no_other(seed):
     if mapping is DIFFERENCE and c == 0.0:
         cancelled = integrators
     assert unstable_roots(loop, *point) == -1
-    expected = independent.rectangle_count(loop, *point, at_zero=cancelled)
+    expected = independent.rectangle_count(loop, point[0], point[1], at_zero=cancelled)
     assert loop_count(loop, *point) == expected
     assert nyquist(loop, *point).closed_loop_roots == expected
 

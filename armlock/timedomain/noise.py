@@ -21,6 +21,7 @@ from armlock.checks import (
     check_memory,
     positive_number,
     real_array,
+    true_or_false,
     whole_number,
 )
 from armlock.controllers import Controller
@@ -108,7 +109,7 @@ class ShapedNoise:
             if pole.real >= 0.0:
                 raise ValueError(f"poles must lie in the left half-plane, got {pole} rad/s")
         self.seed = whole_number("seed", seed, 0)
-        self.at_rest = at_rest
+        self.at_rest = true_or_false("at_rest", at_rest)
         self._random = np.random.default_rng(self.seed)
         self._sampled = sampled_filter(self._filter, self.sample_rate)
         # White samples of variance one have the one-sided density 2 / sample_rate.
@@ -181,12 +182,18 @@ class ShapedNoise:
         size : int, optional
             Largest size of a block, one or more.
 
-        Yields
+        Returns
+        -------
+        iterator of float arrays
+            Each block is drawn when its turn comes.
+
+        Raises
         ------
-        float array
+        ValueError
+            If `samples` is not a whole number from zero on, or `size` not one from one on.
         """
-        for first in range(0, samples, size):
-            yield self.draw(min(size, samples - first))
+        samples, size = whole_number("samples", samples, 0), whole_number("size", size, 1)
+        return (self.draw(min(size, samples - at)) for at in range(0, samples, size))
 
 
 @njit(cache=True, nogil=True)

@@ -122,7 +122,10 @@ class Finding:
     @property
     def shown(self) -> str:
         """The number as a reader sees it; "0 to rounding" where only rounding is left."""
-        return "0 to rounding" if 0.0 < abs(self.value) < 1e-11 else f"{self.value:.6g}"
+        if 0.0 < abs(self.value) < 1e-11:
+            return "0 to rounding"
+        # Four digits decide; a number of some ten thousand is not given as a power of ten.
+        return f"{self.value:.0f}" if 1e4 <= abs(self.value) < 1e6 else f"{self.value:.4g}"
 
 
 @dataclass(frozen=True)
@@ -137,7 +140,6 @@ class Claim:
     affects: tuple[str, ...]
     weight: Weight
     printed: str
-    same_as: str
     check: shared[Finding]
 
 
@@ -154,7 +156,6 @@ def claim(
     affects: tuple[str, ...] = (),
     weight: Weight = Weight.PHYSICS,
     printed: str = "",
-    same_as: str = "",
 ) -> Callable[[Callable[[], Finding]], shared[Finding]]:
     """Enter the decorated check in the register of claims.
 
@@ -176,8 +177,6 @@ def claim(
         What the claim is about.
     printed : str, optional
         The formula, or the few words, as the paper prints them.
-    same_as : str, optional
-        The claim with the same finding, which then counts once.
 
     Raises
     ------
@@ -190,8 +189,7 @@ def claim(
             raise ValueError(f"identifier must be new, got {identifier!r} a second time")
         remembered = shared(check)
         _REGISTER[identifier] = Claim(
-            identifier, place, says, chapter, pinned, affects, weight, printed, same_as,
-            remembered,
+            identifier, place, says, chapter, pinned, affects, weight, printed, remembered,
         )  # fmt: skip
         return remembered
 
@@ -251,7 +249,7 @@ class Ledger:
         return Counter(
             finding.verdict
             for entry, finding in self.entries
-            if not entry.same_as and entry.weight in (weights or Weight)
+            if entry.weight in (weights or Weight)
         )
 
     def records(self) -> list[dict[str, str | float]]:
@@ -356,10 +354,19 @@ def ledger_link(identifier: str) -> str:
     return f'<a href="09_ledger.html#ledger-{identifier}">{identifier}</a>'
 
 
+#: Verdicts that are too long for the narrow column of a table, as it shows them.
+SHORT = {
+    Verdict.WHERE_USED: "holds where used",
+    Verdict.IN_PART: "in part",
+    Verdict.OPEN: "cannot be settled",
+}
+
+
 def badge(verdict: Verdict, text: str = "") -> str:
     """Return a text as HTML in the colour of a verdict; by default the verdict in short."""
     name = verdict.name.lower()
-    return f'<span class="verdict verdict-{name}">{text or name.replace("_", " ")}</span>'
+    shown = text or SHORT.get(verdict, verdict)
+    return f'<span class="verdict verdict-{name}">{shown}</span>'
 
 
 def row(claim: Claim, finding: Finding, attributes: str, link: str, more: str) -> str:

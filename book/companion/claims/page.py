@@ -93,33 +93,30 @@ def project_url() -> str | None:
 
 
 class VerdictCounts:
-    """How many findings of physics met each verdict, and how many others there are.
-
-    Claims with the same finding count once, those of the white paper by themselves.
+    """How many claims met each verdict: of the paper by weight, and of the white paper.
 
     Examples
     --------
     >>> from book.companion.claims import check
     >>> from book.companion.claims.page import VerdictCounts
     >>> VerdictCounts(check("T2", "T6"))
-    1 finding of physics: 1 reproduced
-    Besides, 1 of derivation and 0 of wording
+    1 claim of physics: 1 reproduced
+    1 claim of derivation: 1 reproduced
     """
 
     def __init__(self, ledger: Ledger) -> None:
         entries: dict[bool, list[tuple[Claim, Finding]]] = {True: [], False: []}
         for claim, finding in ledger:
             entries[claim.chapter in OF_THE_PAPER].append((claim, finding))
-        paper = Ledger(entries[True])
-        physics, white = paper.counts(Weight.PHYSICS), Ledger(entries[False]).counts()
-        number = physics.total()
-        others = " and ".join(f"{paper.counts(w).total()} of {w}" for w in list(Weight)[1:])
+        paper, white = (Ledger(entries[of]) for of in (True, False))
+        met = {f"of {weight}": paper.counts(weight) for weight in Weight}
+        met["of the white paper"] = white.counts()
         #: What is counted, and how many met each verdict.
-        self.lines = [(f"{number} finding{'s' * (number != 1)} of physics", physics)]
-        if white:
-            self.lines.append((f"{white.total()} of the white paper", white))
-        #: What is said below that.
-        self.others = f"Besides, {others}"
+        self.lines = [
+            (f"{counts.total()} claim{'s' * (counts.total() != 1)} {of}", counts)
+            for of, counts in met.items()
+            if counts
+        ]
 
     def _met(self, shown: Callable[[Verdict, str], str]) -> list[tuple[str, list[str]]]:
         return [
@@ -130,13 +127,12 @@ class VerdictCounts:
     def __repr__(self) -> str:
         """Return the lines as text."""
         lines = self._met(lambda verdict, text: text)
-        found = [f"{head}: {', '.join(verdicts)}" for head, verdicts in lines]
-        return "\n".join([*found, self.others])
+        return "\n".join(f"{head}: {', '.join(verdicts)}" for head, verdicts in lines)
 
     def _repr_html_(self) -> str:
         """Return the lines as HTML."""
         found = [f"{head}: {' '.join(badges)}" for head, badges in self._met(badge)]
-        return f'<p class="verdict-counts">{"<br>".join([*found, self.others])}</p>'
+        return f'<p class="verdict-counts">{"<br>".join(found)}</p>'
 
 
 class LedgerPage:
@@ -238,7 +234,6 @@ class Errata:
             for claim, finding in ledger
             if finding.verdict in (Verdict.NOT_AS_WRITTEN, Verdict.DIFFERS)
             and claim.weight in (weights or Weight)
-            and not claim.same_as
         ]
         self.ledger = ledger
 
@@ -259,7 +254,6 @@ class Errata:
     def _block(self, claim: Claim, finding: Finding) -> str:
         name = claim.identifier
         affected = ((c, f) for c, f in self.ledger if c.identifier in claim.affects)
-        same = (ledger_link(c.identifier) for c, _ in self.ledger if c.same_as == name)
         parts = {
             "Printed" if claim.printed else "In our words": typeset(
                 claim.printed or claim.says
@@ -269,7 +263,6 @@ class Errata:
             "What depends on it": ", ".join(
                 f"{ledger_link(c.identifier)} ({f.verdict})" for c, f in affected
             ),
-            "The same finding": ", ".join(same),
         }
         items = "".join(
             f"<dt>{term}</dt><dd>{text}</dd>" for term, text in parts.items() if text

@@ -1,4 +1,4 @@
-"""Claims of Sec. II, the single arm: S1 to S12."""
+"""Claims of Sec. II, the single arm: S1 to S14."""
 
 from __future__ import annotations
 
@@ -12,8 +12,11 @@ from scipy.optimize import bisect, brentq
 from scipy.special import lambertw
 
 from armlock.checks import ComplexArray, IntArray
-from armlock.loops import HayesEquation, SingleArm
-from armlock.paper import PERTURBATION, TAU1
+from armlock.controllers import Controller, integrating_actuator, stage_one, table_two
+from armlock.loops import HayesEquation, Loop, SingleArm, paper_loop
+from armlock.paper import CONTROLLER_GAIN, PERTURBATION, TAU1
+from armlock.robustness.margins import critical_perturbation, margins
+from armlock.sensors import SINGLE
 from armlock.stability.counts import stability_chart, unstable_roots
 from armlock.stability.dcurve import d_curve, d_curve_line
 from armlock.stability.roots import rightmost_root
@@ -424,4 +427,70 @@ def closed_form_region() -> Finding:
         "The region lies between the line $b = -a$ and the first branch of the D-curve, "
         r"$a = ω cot ωτ$, $b = -ω / sin ωτ$ for $0 < ωτ < \pi$. The other branches only "
         "separate unstable from unstable.",
+    )
+
+
+@claim(
+    "S13",
+    place="Sec. II, before Eq. (3)",
+    says="A linear controller does not alter the essentials of the single arm.",
+    pinned=(Verdict.WHERE_USED, 3.0, 0.0),
+    printed="the use of a linear controller does not alter its essential characteristics",
+)
+def linear_controller() -> Finding:
+    """Count on both sides of k2 = 1 with other controllers, the actuator in the loop."""
+    controllers = {
+        "gain": Controller((), (), 1.0),
+        "proportional and integral": Controller((-0.01,), (0.0,), 1.0),
+        "lead": Controller((-0.01,), (-1.0,), 100.0),
+        "lag": Controller((-0.01,), (-0.001,), 1.0),
+        "low pass": Controller((), (-0.5,), 0.5),
+        "Stage I": stage_one(),
+        "Table II": table_two(),
+    }
+    sides = 1.0 + PERTURBATION * np.array([-1.0, 0.0, 1.0])
+    alters = []
+    for name, controller in controllers.items():
+        loop = Loop(controller * integrating_actuator(), SINGLE, TAU1, TAU1)
+        inside, edge, outside = unstable_roots(loop, sides, 0.0)
+        if not (inside == 0 and edge == -1 and outside > 0):
+            alters.append(name)
+    return Finding(
+        decide("gain" not in alters, beyond=not alters),
+        len(alters),
+        f"of {len(controllers)} linear controllers before the actuator, those with which "
+        "$k₂ = 1$ is not the edge of stability",
+        "With a plain gain, which Sec. II goes on with, and with integral, lead and lag parts "
+        f"it is. With {', '.join(alters[:-1])} and {alters[-1]} it is not: a low pass takes "
+        "phase and makes the arm unstable everywhere near, and zeros at $s = 0$ move the edge "
+        "away from $k₂ = 1$. The controller of Sec. IV rests on just that.",
+    )
+
+
+@claim(
+    "S14",
+    place="Sec. II, first paragraph",
+    says="Multiplicative perturbations are drifts of the controller's gain.",
+    pinned=(Verdict.IN_PART, 5.498e5, 1e2),
+    weight=Weight.DERIVATION,
+    printed="the multiplicative ones correspond to gain drifts of the arm-locking controller",
+)
+def gain_drift() -> Finding:
+    """Let the controlled loop drift in gain, and compare with a drift of c1 and c2."""
+    loop = paper_loop()
+    found = margins(loop)
+    gain = min(1.0 - found.gain_lower, found.gain_upper - 1.0)
+    arms = critical_perturbation(loop, (1.0, -1.0))
+    drifted = paper_loop(controller=table_two((1.0 + gain) * CONTROLLER_GAIN))
+    same = abs(complex(drifted.open_loop(0.1j) / loop.open_loop(0.1j)) - 1.0 - gain)
+    return Finding(
+        decide(same < 1e-12, gain < 10.0 * arms),
+        gain / arms,
+        "relative drift of the gain that the controlled loop tolerates, over that of $c₁$ and "
+        "$c₂$",
+        "A gain that drifts multiplies the signal, and is of the form $(1 + η)X$, with the "
+        "controller's output for X. It is $k₁$, which decides nothing in Sec. II (claim S9), "
+        "and not $c₁$, $c₂$, which the paper goes on to study and which multiply the returned "
+        f"signal alone: the one may fall by {100.0 * gain:.0f} %, the others may not be off by "
+        f"{arms:.2g}.",
     )
