@@ -498,12 +498,13 @@ class _MovingArm:
         rows[0] = samples[0] if self._last is None else self._last
         self._last = samples[-1].copy()
         change = np.diff(rows, axis=0)
-        wrong = (samples < _SIDE) | (change <= _SLOWEST) | (change >= _FASTEST)
-        # Because of that, no later sample reaches further back than those of the first row.
+        right = samples.min() >= _SIDE and change.min() > _SLOWEST and change.max() < _FASTEST
+        # Then no later sample reaches further back than those of the first row.
         reach = int(samples[0].max()) + _SIDE
-        if not wrong.any() and reach <= known:
+        if right and reach <= known:
             return samples, reach
-        i, w = np.argwhere(wrong)[0] if wrong.any() else (0, samples[0].argmax())
+        wrong = (samples < _SIDE) | (change <= _SLOWEST) | (change >= _FASTEST)
+        i, w = (0, samples[0].argmax()) if right else np.argwhere(wrong)[0]
         if samples[i, w] < _SIDE:
             constraint = f"be at least {_SIDE / self._rate} s where it is not constant"
         elif wrong[i, w]:
