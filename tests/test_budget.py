@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import control
+import matplotlib.pyplot as plt
 import mpmath
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from armlock import (
     transfer,
     unstable_roots,
 )
-from armlock.performance.budget import MOTION_CORNER, noise_series, tdi_capability
+from armlock.performance.budget import LEVELS, SOURCES, noise_series, tdi_capability
 from armlock.performance.pulling import slow_roots
 from armlock.sensors import SINGLE, modified_dual
 from armlock.stability.counts import loop_count
@@ -65,7 +66,7 @@ def test_one_arm_of_high_gain_leaves_the_noise_of_the_arm():
     np.testing.assert_allclose(budget.sources["shot"], w * 1e-5 * np.sqrt(2) / arm, rtol=1e-6)
     clock = 15e6 * 2.4e-12 / np.sqrt(f) * np.sqrt(2) / arm
     np.testing.assert_allclose(budget.sources["clock"], clock, rtol=1e-6)
-    moved = 2.5e-3 * w / np.sqrt(1 + (f / MOTION_CORNER) ** 4)
+    moved = 2.5e-3 * w / np.sqrt(1 + (f / LEVELS.motion_corner) ** 4)
     moved *= np.hypot(2.0 * np.cos(np.pi * f * tau), 2.0) / arm
     np.testing.assert_allclose(budget.sources["motion"], moved, rtol=1e-6)
     squares = sum(asd**2 for asd in budget.sources.values())
@@ -82,8 +83,36 @@ def test_the_budget_is_held_against_a_requirement_and_draws_itself():
     assert len(budget.plot().lines) == len(budget.sources) + 2
 
 
+def test_sources_of_ones_own_join_or_replace_the_others():
+    f = np.geomspace(1e-4, 1.0, 30)
+    known = noise_budget(FLIGHT, f, c1=1.01, c2=0.99)
+    w = 2.0 * np.pi * f
+    shot = np.sqrt(2.0) * LEVELS.shot * w
+    mine = np.array([3.0 + f, np.zeros(30)])
+    found = noise_budget(
+        FLIGHT, f, c1=1.01, c2=0.99, sources={"shot": 10.0 * shot, "mine": mine}
+    )
+    np.testing.assert_allclose(found.sources["shot"], 10.0 * known.sources["shot"], rtol=1e-12)
+    arm = np.abs(transfer(FLIGHT, "arm 1", 1j * w, 1.01, 0.99))
+    np.testing.assert_allclose(found.sources["mine"], arm * (3.0 + f), rtol=1e-12)
+    lines = found.plot(plt.figure().add_subplot(), alpha=0.5).lines
+    assert [line.get_label() for line in lines[:5]] == [*SOURCES, "mine"]
+    assert lines[0].get_alpha() == 0.5
+    with pytest.raises(AttributeError):
+        LEVELS.shot = 1.0
+    for sources, why in (
+        ({"laser": 1.0}, r"^sources must not hold 'laser'"),
+        ({"mine": [1.0, 2.0]}, r"^sources\['mine'\] must be one number or hold one a freq"),
+        ({"mine": -1.0}, r"^sources\['mine'\] must not be negative, got -1.0"),
+    ):
+        with pytest.raises(ValueError, match=why):
+            noise_budget(FLIGHT, f, sources=sources)
+
+
 def test_a_series_of_no_known_source_is_refused():
-    with pytest.raises(ValueError, match="source must be one of laser, shot, clock, motion"):
+    with pytest.raises(
+        ValueError, match="source must be one of 'laser', 'shot', 'clock', 'motion'"
+    ):
         noise_series(FLIGHT, "maser", 10, seed=1)
     with pytest.raises(ValueError, match="poles must lie in the left half-plane"):
         noise_series(published_loops()["PI"], "motion", 10, seed=1)

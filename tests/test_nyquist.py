@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import time
 
-import matplotlib.pyplot as plt
 import mpmath
 import numpy as np
 import pytest
@@ -18,7 +17,6 @@ from armlock import (
     SingleArm,
     axis_crossings,
     flight_loop,
-    margins,
     nyquist,
     paper_loop,
     unstable_roots,
@@ -250,21 +248,7 @@ def test_what_is_drawn_is_what_a_picture_shows_and_counts_as_before():
     for curve in (plain, far):
         assert curve.omega.size <= module._MOST_SHOWN + 1
         np.testing.assert_allclose(
-            curve.response[::997], curve.at.response(curve.omega[::997]), rtol=1e-9
+            curve.response[::997], curve.point.response(curve.omega[::997]), rtol=1e-9
         )
         assert (np.diff(curve.omega) > 0.0).all()
     assert far.omega[-1] == 1e9
-
-
-def test_marks_stand_where_the_margins_are_taken():
-    loop = paper_loop()
-    ax = nyquist(loop, omega_max=2.0).plot(plt.figure().subplots(), margins=True)
-    places = {line.get_label(): line for line in ax.lines if "margin" in line.get_label()}
-    found = margins(loop)
-    for name in ("gain", "phase", "modulus"):
-        value = complex(loop.open_loop(1j * getattr(found, f"{name}_omega")))
-        x, y = places[f"{name} margin"].get_data()
-        assert complex(x[0], y[0]) == pytest.approx(value)
-    assert abs(complex(*(v[0] for v in places["phase margin"].get_data()))) == pytest.approx(
-        1.0
-    )

@@ -50,8 +50,6 @@ class NyquistCurve:
 
     Attributes
     ----------
-    at : LoopAt
-        The loop and its perturbations.
     omega : float array, shape (n,)
         Ascending frequencies in rad/s, from the indentation up. There are at most a million,
         where a picture would show them apart.
@@ -70,6 +68,8 @@ class NyquistCurve:
         P, poles of L in the open right half-plane.
     closed_loop_roots : int
         Z = N + P, zeros of 1 + L in the right half-plane.
+    point : LoopAt
+        The loop, c1 and c2.
 
     Examples
     --------
@@ -79,7 +79,6 @@ class NyquistCurve:
     (1, 0)
     """
 
-    at: LoopAt
     omega: FloatArray
     response: ComplexArray
     indentation: ComplexArray
@@ -88,6 +87,7 @@ class NyquistCurve:
     encirclements: int
     open_loop_poles: int
     closed_loop_roots: int
+    point: LoopAt
 
     def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
         """Draw the curve, both signs of omega, with -1 and the infinite branch.
@@ -301,7 +301,6 @@ def nyquist(
         shown = _shown(response)
         omega, response = omega[shown], response[shown]
     return NyquistCurve(
-        at=point,
         omega=omega,
         response=response,
         indentation=arc[indented],
@@ -310,6 +309,7 @@ def nyquist(
         encirclements=encirclements,
         open_loop_poles=poles,
         closed_loop_roots=count,
+        point=point,
     )
 
 
