@@ -32,6 +32,8 @@ from armlock.stability.counts import axis_zeros, loop_count
 LARGEST_GAIN = 1e6
 # So close to the limits of the neutral root chain, as a share, no gain factors are looked for.
 _NEXT_TO_THE_CHAIN = 1e-5
+# Where L touches zero rounding hides its sign over a stretch in which it may be this large.
+_NULL = 1e-5
 # Shares of a gain factor inside of it at which counts are asked, until one is told.
 _INSIDE = (1e-6, 1e-5, 1e-4, 1e-3)
 
@@ -79,6 +81,17 @@ def _gains(point: LoopAt, omega: FloatArray) -> FloatArray:
         return np.asarray(-1.0 / point.response(omega).real)
 
 
+def _values_below(point: LoopAt, omega: float) -> tuple[float, float]:
+    """Range of what L may be on the negative real axis between zero and a frequency.
+
+    There, up to `LoopAt.leading_radius`, L is one power of s, or all but constant.
+    """
+    if omega > point.leading_radius():
+        return -np.inf, np.inf
+    size = abs(complex(point.response(omega)))
+    return (-np.inf, -0.5 * size) if point.poles_at_zero() > 0 else (-2.0 * size, 0.0)
+
+
 def _free_gains(point: LoopAt, omega: FloatArray) -> FloatArray:
     """Gain factors next to one, below and above, for some phases; shape (omega, 2).
 
@@ -122,7 +135,10 @@ def _gains_around_one(point: LoopAt, least: float, most: float) -> tuple[float, 
     for intervals in search_outwards(loop.omega_per_turn, end, meeting, likely):
         zeros = axis_zeros(crossing, intervals, measure)
         at, spread = zeros.position[zeros.hidden], zeros.spread[zeros.hidden]
-        hidden.append(np.column_stack((at - spread, at + spread)))
+        values = np.column_stack((at - spread, at + spread))
+        for k in np.flatnonzero(zeros.omega[zeros.hidden] == 0.0):
+            values[k] = _values_below(point, float(zeros.width[zeros.hidden][k]))
+        hidden.append(values)
         omega = zeros.omega[~zeros.hidden & (zeros.omega > 0.0)]
         factor = _gains(point, omega)
         below = factor[(factor >= lower) & (factor <= 1.0)]
@@ -133,7 +149,7 @@ def _gains_around_one(point: LoopAt, least: float, most: float) -> tuple[float, 
             upper, where = float(factor[nearest]), float(omega[nearest])
     # Values of L in hidden stretches; nan where nothing is known of one.
     left, right = np.concatenate(hidden).T
-    if not ((left > -1.0 / upper) | (right < -1.0 / lower)).all():
+    if not ((left > -max(1.0 / upper, _NULL)) | (right < -1.0 / lower)).all():
         _require_stable_inside(point, lower, upper)
     return lower, upper, where
 
@@ -195,7 +211,8 @@ def gain_interval(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> tuple[float, 
 
     All sign changes of Im L are found, but for short stretches in which rounding hides its
     sign. Where L in one of them could give a factor between the two, they are refused unless
-    counts just inside of both say that the loop is stable.
+    counts just inside of both say that the loop is stable. Next to a null, where |L| is below
+    1e-5 in such a stretch, factors above 1e5 are passed over.
 
     Examples
     --------

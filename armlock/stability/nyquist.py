@@ -64,6 +64,8 @@ class NyquistCurve:
         P, poles of L in the open right half-plane.
     closed_loop_roots : int
         Z = N + P, zeros of 1 + L in the right half-plane.
+    point : LoopAt
+        The loop, c1 and c2.
 
     Examples
     --------
@@ -81,6 +83,7 @@ class NyquistCurve:
     encirclements: int
     open_loop_poles: int
     closed_loop_roots: int
+    point: LoopAt
 
     def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
         """Draw the curve, both signs of omega, with -1 and the infinite branch.
@@ -156,7 +159,7 @@ def _resolving_grid(loop: Loop, c1: float, c2: float, end: float) -> FloatArray:
     """Frequencies from 0 to `end` between which neither D nor R turns by much."""
     grids = []
     for part in (loop.sum_at(c1, c2), loop.rest_on_boundary()):
-        grids.append(resolved_grid(part.compiled(), end, _STRAIGHT))
+        grids.append(resolved_grid(part.compiled(), end, _STRAIGHT, MOST_SAMPLES))
     if any(grid[-1] < end for grid in grids):
         raise CountError(
             f"no samples up to omega = {end} rad/s: more than {MOST_SAMPLES:.0e}, "
@@ -279,6 +282,7 @@ def nyquist(
         encirclements=encirclements,
         open_loop_poles=poles,
         closed_loop_roots=count,
+        point=point,
     )
 
 
