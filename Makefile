@@ -67,6 +67,9 @@ ifneq ($(shell cat $(ENV_READY) 2>/dev/null),$(CURDIR))
 $(shell rm -f $(ENV_READY) $(PACKAGE_READY))
 endif
 
+install = $(PY) -m pip install --quiet --no-deps --no-compile --require-hashes --only-binary :all:
+
+# uv installs in a fifth of pip's time. It does not know pip's settings: where it cannot, pip does.
 # Both stamps are written last, so an interrupted install starts over. The lock is complete, as
 # `pip check` confirms, and nothing needs to be resolved: an older pip, led by the extras of a
 # requirement, would ask for the newest version and refuse it. Modules are compiled at the end,
@@ -85,8 +88,11 @@ $(ENV_READY): environment.txt
 	@echo "Installing the packages of environment.txt into $(VENV), once: a minute or two ..."
 	@rm -f $(ENV_READY) $(PACKAGE_READY)
 	@$(PYTHON) -m venv --clear $(VENV)
-	@$(PY) -m pip install --quiet --no-deps --no-compile --require-hashes --only-binary :all: \
-		-r environment.txt
+	@sed -n '/^uv==/,/[^\\]$$/p' environment.txt > $(VENV)/installer.txt
+	@$(install) -r $(VENV)/installer.txt
+	@$(PY) -m uv pip install --quiet --no-config --python $(PY) --no-deps --require-hashes \
+		--only-binary :all: -r environment.txt 2> $(VENV)/uv.log \
+		|| $(install) -r environment.txt
 	@$(PY) -m compileall -qq -j 0 $(VENV)/lib || true
 	@mkdir -p $(VENV)/etc/ipython
 	@echo '{"IPKernelApp": {"log_level": 40}}' > $(VENV)/etc/ipython/ipython_kernel_config.json

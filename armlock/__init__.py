@@ -6,16 +6,18 @@ System in Space-based Gravitational Wave Detectors".
 
 from armlock.characteristic import CharacteristicFunction
 from armlock.controllers import Controller
-from armlock.design import Design, buildable_loop, design, robust_loop
+from armlock.design import Design, design
 from armlock.loops import (
     CommonArm,
     DualArm,
     HayesEquation,
     Loop,
     SingleArm,
+    buildable_loop,
     flight_loop,
     paper_loop,
     published_loops,
+    robust_loop,
 )
 from armlock.performance import NoiseBudget, closed_loop, noise_budget, pulling, transfer
 from armlock.robustness import Margins, critical_perturbation, margins, modulus_margin
@@ -27,15 +29,18 @@ from armlock.stability import (
     NyquistCurve,
     RootError,
     StabilityChart,
+    StabilityRegion,
     axis_crossings,
     d_curve,
     d_curve_branches,
     d_curve_line,
+    is_stable,
     nyquist,
     rightmost_root,
     semi_discretization,
     spectral_radius,
     stability_chart,
+    stability_region,
     transition_matrix,
     unstable_roots,
 )
@@ -50,9 +55,7 @@ from armlock.timedomain import (
     SpectrumEstimator,
     amplitude_spectrum,
     sampled_open_loop,
-    save_series,
     simulate,
-    simulate_blocks,
 )
 
 __version__ = "0.1.0"
@@ -82,6 +85,7 @@ __all__ = [
     "Spectrum",
     "SpectrumEstimator",
     "StabilityChart",
+    "StabilityRegion",
     "amplitude_spectrum",
     "axis_crossings",
     "buildable_loop",
@@ -92,6 +96,7 @@ __all__ = [
     "d_curve_line",
     "design",
     "flight_loop",
+    "is_stable",
     "margins",
     "modulus_margin",
     "noise_budget",
@@ -102,12 +107,11 @@ __all__ = [
     "rightmost_root",
     "robust_loop",
     "sampled_open_loop",
-    "save_series",
     "semi_discretization",
     "simulate",
-    "simulate_blocks",
     "spectral_radius",
     "stability_chart",
+    "stability_region",
     "sweep",
     "transfer",
     "transition_matrix",

@@ -371,12 +371,12 @@ class CharacteristicFunction:
             If s does not hold finite numbers.
         """
         s = complex_array("s", s)
-        z = np.exp(s * self.step) if self.step else s
-        dead = np.exp(-s * self.delay)
+        (rest, _), (b1, _), (b2, _) = self._evaluated(s, np)
+        dead, (x0, y0) = np.exp(-s * self.delay), self.reference
         return (
-            np.asarray(poly.polyval(z, self.a) + poly.polyval(z, self.c) * dead),
-            np.asarray(poly.polyval(z, self.b1) * np.exp(-s * self.tau1) * dead),
-            np.asarray(poly.polyval(z, self.b2) * np.exp(-s * self.tau2) * dead),
+            np.asarray(rest + (x0 * b1 + y0 * b2) * dead),
+            np.asarray(b1 * np.exp(-s * self.tau1) * dead),
+            np.asarray(b2 * np.exp(-s * self.tau2) * dead),
         )
 
     def __call__(
@@ -407,17 +407,21 @@ class CharacteristicFunction:
         x0, y0 = self.reference
         return (self.b1, self.tau1, x0, x), (self.b2, self.tau2, y0, y)
 
+    def _evaluated(self, s: Any, library: Any) -> list[tuple[Any, Any]]:
+        """Return R, B1 and B2 at s, and their derivatives by z."""
+        z = library.exp(s * self.step) if self.step else s
+        return [p.evaluated(z) for p in self._polynomials]
+
     def _value(self, s: Any, x: Any, y: Any, library: Any = np) -> Any:
         """Evaluate D(s; x, y) unchecked.
 
         The functions are those of numpy, or of mpmath for one number in extended precision.
         """
-        z = library.exp(s * self.step) if self.step else s
+        (rest, _), *evaluated = self._evaluated(s, library)
         arms = 0.0
-        for b, tau, origin, here in self.arms(x, y):
-            arm = (origin - here) - here * library.expm1(-s * tau)
-            arms = arms + poly.polyval(z, b) * arm
-        return poly.polyval(z, self.rest) + library.exp(-s * self.delay) * arms
+        for (b, _), (_, tau, origin, here) in zip(evaluated, self.arms(x, y), strict=True):
+            arms = arms + b * ((origin - here) - here * library.expm1(-s * tau))
+        return rest + library.exp(-s * self.delay) * arms
 
     def derivative(
         self, s: npt.ArrayLike, x: npt.ArrayLike | None = None, y: npt.ArrayLike | None = None
@@ -441,17 +445,14 @@ class CharacteristicFunction:
 
     def _slope(self, s: Any, x: Any, y: Any, library: Any = np) -> Any:
         """Evaluate dD/ds unchecked, as `_value`."""
-        z = library.exp(s * self.step) if self.step else s
-        dz = self.step * z if self.step else 1.0
+        dz = self.step * library.exp(s * self.step) if self.step else 1.0
+        (_, own), *evaluated = self._evaluated(s, library)
         arms = 0.0
-        for b, tau, origin, here in self.arms(x, y):
+        for (b, db), (_, tau, origin, here) in zip(evaluated, self.arms(x, y), strict=True):
             change = library.expm1(-s * tau)
-            value = poly.polyval(z, b)
-            rate = poly.polyval(z, poly.polyder(b)) * dz - self.delay * value
-            arms = arms + rate * ((origin - here) - here * change)
-            arms = arms + value * here * tau * (1.0 + change)
-        own = poly.polyval(z, poly.polyder(self.rest)) * dz
-        return own + library.exp(-s * self.delay) * arms
+            arms = arms + (db * dz - self.delay * b) * ((origin - here) - here * change)
+            arms = arms + b * here * tau * (1.0 + change)
+        return own * dz + library.exp(-s * self.delay) * arms
 
     def shifted(self, sigma: float) -> CharacteristicFunction:
         """Return the function s -> D(s + sigma), whose roots lie `sigma` further left.
@@ -489,31 +490,50 @@ class CharacteristicFunction:
         """
         return self._polynomials[0].roots if self.delay else Polynomial.of(self.a).roots
 
-    def _delayed(self, k: int, lag: float, weight: float = 1.0) -> ExponentialSum:
+    def _delayed(
+        self, k: int, lag: float, weight: float = 1.0, *, rows: bool = False
+    ) -> ExponentialSum:
         """Return `weight` times R, B1 or B2, delayed by a time, at s = j omega.
 
-        For a map each power of z is an exponential, its polynomial is 1. Each coefficient keeps
-        a polynomial of its own, so that its rounding is not forgotten.
+        In the polynomials of `_basis`. For a map each power of z is an exponential, its
+        polynomial is 1. Each coefficient keeps a polynomial of its own, so that its rounding is
+        not forgotten.
         """
-        factors, polynomials = [np.ones(1)] * 3, self._polynomials
-        if self.step:
-            factors = [p.coefficients for p in self._polynomials]
-            number = sum(p.size for p in factors)
-            polynomials = (Polynomial(np.ones(1), np.zeros(0, dtype=np.complex128)),) * number
+        if not self.step:
+            polynomials, shares = self._basis
+            if rows and len(polynomials) == len(self._polynomials):
+                # A row has products with B1 only: the fewer terms in that the better.
+                polynomials, shares = self._polynomials, np.eye(3)
+            share = weight * shares[k]
+            return ExponentialSum(polynomials, share[None, :], np.array([-lag]), share)
+        factors = [p.coefficients for p in self._polynomials]
         ends = np.cumsum([p.size for p in factors])
+        polynomials = (Polynomial(np.ones(1), np.zeros(0, dtype=np.complex128)),) * ends[-1]
         place = np.split(np.eye(len(polynomials)), ends[:-1])[k]
         p = weight * factors[k]
         phases = np.asarray(self.step * np.arange(p.size) - lag, dtype=np.float64)
         return ExponentialSum(polynomials, p[:, None] * place, phases, p @ place)
 
-    def on_boundary(self) -> tuple[ExponentialSum, ExponentialSum, ExponentialSum]:
-        """Return the three terms of `parts` at s = j omega as exponential sums."""
+    @cached_property
+    def _basis(self) -> tuple[tuple[Polynomial, ...], FloatArray]:
+        """Polynomials, and the shares of them in R, B1 and B2, shape (3, polynomials)."""
+        return self._polynomials, np.eye(3)
+
+    def on_boundary(
+        self, *, rows: bool = False
+    ) -> tuple[ExponentialSum, ExponentialSum, ExponentialSum]:
+        """Return the three terms of `parts` at s = j omega as exponential sums.
+
+        With `rows` in the polynomials that suit the rows of a chart.
+        """
         x0, y0 = self.reference
-        undelayed = self.rest_on_boundary().plus(self._delayed(1, self.delay, x0))
+        undelayed = self.rest_on_boundary(rows=rows).plus(
+            self._delayed(1, self.delay, x0, rows=rows)
+        )
         return (
-            undelayed.plus(self._delayed(2, self.delay, y0)),
-            self._delayed(1, self.delay + self.tau1),
-            self._delayed(2, self.delay + self.tau2),
+            undelayed.plus(self._delayed(2, self.delay, y0, rows=rows)),
+            self._delayed(1, self.delay + self.tau1, rows=rows),
+            self._delayed(2, self.delay + self.tau2, rows=rows),
         )
 
     def sum_at(self, x: float, y: float) -> ExponentialSum:
@@ -522,8 +542,12 @@ class CharacteristicFunction:
         constant, b1, b2 = self.on_boundary()
         combined = constant.plus(b1.scaled(-x)).plus(b2.scaled(-y))
         # What is left where all exponentials are one, without the digits lost by cancelling.
-        left = self.rest_on_boundary().sums + (x0 - x) * b1.sums + (y0 - y) * b2.sums
-        return combined._replace(sums=left)
+        # Of two ways to add up, the one with the smaller terms.
+        near, far = (x0 - x) * b1.sums, (y0 - y) * b2.sums
+        all_near, all_far = x0 * b1.sums + y0 * b2.sums, x * b1.sums + y * b2.sums
+        smaller = np.abs(all_near) + np.abs(all_far) < np.abs(near) + np.abs(far)
+        left = np.where(smaller, all_near - all_far, near + far)
+        return combined._replace(sums=self.rest_on_boundary().sums + left)
 
     def deviation(self, x: float, y: float) -> ExponentialSum:
         """Return x B1 exp(-s (delay + tau1)) + y B2 exp(-s (delay + tau2)) at s = j omega.
@@ -533,9 +557,9 @@ class CharacteristicFunction:
         _, b1, b2 = self.on_boundary()
         return b1.scaled(x).plus(b2.scaled(y))
 
-    def rest_on_boundary(self) -> ExponentialSum:
-        """Return R at s = j omega as an exponential sum."""
-        return self._delayed(0, 0.0)
+    def rest_on_boundary(self, *, rows: bool = False) -> ExponentialSum:
+        """Return R at s = j omega as an exponential sum, as `on_boundary` does."""
+        return self._delayed(0, 0.0, rows=rows)
 
 
 def checked_system(system: CharacteristicFunction) -> CharacteristicFunction:
@@ -592,8 +616,8 @@ class _Shifted(CharacteristicFunction):
             late = np.exp(-sigma * lag)
             if origin.step:
                 powers = np.exp(sigma * origin.step * np.arange(p.coefficients.size))
-                return _with_moved(origin, sigma, late * powers * p.coefficients, p.roots)
-            return _with_moved(origin, sigma, late * _taylor(p.coefficients, sigma), p.roots)
+                return _with_moved(origin, sigma, late * powers * p.coefficients, p)
+            return _with_moved(origin, sigma, late * _taylor(p.coefficients, sigma), p)
 
         (x0, y0), (rest, b1, b2) = origin.reference, origin.polynomials()
         super().__init__(
@@ -615,7 +639,8 @@ class _Shifted(CharacteristicFunction):
         """Those of the origin, moved: to find them in extended precision takes a second."""
         if self.delay:
             return super().roots_of_a
-        return _with_moved(self.origin, self.sigma, self.a, self.origin.roots_of_a).roots
+        guess = Polynomial(self.origin.a, self.origin.roots_of_a, missed=EPSILON)
+        return _with_moved(self.origin, self.sigma, self.a, guess).roots
 
 
 def _taylor(coefficients: FloatArray, sigma: float) -> FloatArray:
@@ -631,20 +656,23 @@ def _taylor(coefficients: FloatArray, sigma: float) -> FloatArray:
 
 
 def _with_moved(
-    origin: CharacteristicFunction, sigma: float, coefficients: FloatArray, roots: ComplexArray
+    origin: CharacteristicFunction, sigma: float, coefficients: FloatArray, before: Polynomial
 ) -> Polynomial:
-    """Return a shifted polynomial from its coefficients, and its roots before the shift."""
+    """Return a shifted polynomial from its coefficients, and the one before the shift."""
     if origin.step:
-        return Polynomial(coefficients, roots * np.exp(-sigma * origin.step))
-    if coefficients.size > LOW_DEGREE + 1:
-        return Polynomial(coefficients, roots - sigma)
-    return Polynomial.of(coefficients, roots - sigma)
+        roots = before.roots * np.exp(-sigma * origin.step)
+    else:
+        roots = before.roots - sigma
+        if before.missed and coefficients.size <= LOW_DEGREE + 1:
+            return Polynomial.of(coefficients, roots)
+    return before._replace(coefficients=coefficients, roots=roots)
 
 
 def _polynomial(name: str, given: Sequence[float] | FloatArray | Polynomial) -> Polynomial:
     """Return a polynomial with trimmed, read-only coefficients, and its roots."""
     if isinstance(given, Polynomial):
-        return _sealed(Polynomial(_trimmed(name, given.coefficients), given.roots.copy()))
+        coefficients, roots = _trimmed(name, given.coefficients), given.roots.copy()
+        return _sealed(given._replace(coefficients=coefficients, roots=roots))
     return _sealed(Polynomial.of(_trimmed(name, given)))
 
 

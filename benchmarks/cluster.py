@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from armlock import LaserNoise, paper_loop, simulate_blocks, sweep
+from armlock import LaserNoise, Simulation, paper_loop, sweep
 from benchmarks import child, report
 from benchmarks.report import Row, Topic, memory_row, timed
 
@@ -19,8 +19,11 @@ BLOCK = 1 << 16
 def largest(task: tuple[int, int]) -> float:
     """Return the largest output of a draw, in blocks: a seed and a number of samples."""
     seed, samples = task
-    blocks = LaserNoise(seed, at_rest=True).blocks(samples, BLOCK)
-    return max(float(np.abs(part).max()) for part in simulate_blocks(paper_loop(), blocks))
+    blocks, run = (
+        LaserNoise(seed, at_rest=True).blocks(samples, BLOCK),
+        Simulation(paper_loop()),
+    )
+    return max(float(np.abs(run.advance(block)).max()) for block in blocks)
 
 
 def run(*, quick: bool, folder: Path) -> Topic:

@@ -25,7 +25,7 @@ from armlock import (
 )
 from armlock.checks import FloatArray
 from armlock.stability.bounds import last_frequency
-from armlock.stability.counts import sign_changes
+from armlock.stability.counts import axis_zeros
 from benchmarks import child
 from benchmarks.charts import MEMORY
 from benchmarks.report import Row, Topic, at_most, comparison, memory_row, timed
@@ -76,7 +76,7 @@ def crossings_found(system: CharacteristicFunction, y: FloatArray, right: float)
         sums = fixed.plus(varying.scaled(system.reference[1] - level)).sums
         row = fixed.plus(varying.scaled(-level))
         end = float(last_frequency(system, right, level))
-        total += sign_changes(row._replace(sums=sums), [(0.0, end)])[0].size
+        total += axis_zeros(row._replace(sums=sums), [(0.0, end)]).omega.size
     return total
 
 

@@ -15,11 +15,17 @@ from tests.attack import roots
 from tests.systems import NEUTRAL, RETARDED
 
 
+def of_coefficients(whole):
+    """Polynomials in omega, one a row, without roots."""
+    empty = np.zeros(0)
+    rest = np.zeros((0, 2)), empty.astype(complex), np.zeros(1, int), empty
+    return exponentials.CompiledPolynomials(whole, *rest, empty.astype(int), empty)
+
+
 def walk(coefficients, phases, omega_end):
     """Wind a sum of polynomials in omega, one a row, times exponentials."""
     whole = np.array(coefficients, dtype=complex)
-    nothing = np.zeros(0, complex), np.zeros(1, int), np.zeros(0), np.zeros(0, int)
-    polynomials = exponentials.CompiledPolynomials(whole, *nothing)
+    polynomials = of_coefficients(whole)
     weights, sums, phases = (
         np.eye(len(whole)),
         np.ones(len(whole)),
@@ -177,11 +183,11 @@ def test_the_last_frequency_is_close_to_where_one_term_outgrows_the_others():
 HIGH_ORDER = """
 import numpy as np
 from armlock.axis import contour, counting, exponentials
+from tests.test_contour import of_coefficients
 
 whole = np.zeros((2, 6), dtype=complex)
 whole[0, 2], whole[1, 5] = 1.0, 1.0j
-nothing = np.zeros(0, complex), np.zeros(1, int), np.zeros(0), np.zeros(0, int)
-polynomials = exponentials.CompiledPolynomials(whole, *nothing)
+polynomials = of_coefficients(whole)
 weights, phases = np.array([[0.0, 0.5], [0.0, 0.5]]), np.array([1.0, -1.0])
 function = exponentials.CompiledSum(polynomials, weights, np.array([1.0, -1.0]), phases)
 steps = []

@@ -113,16 +113,6 @@ def test_the_limit_of_the_chain_limits_the_gain():
     assert found.gain_omega == np.inf
 
 
-def test_the_factors_of_a_loop_show_where_it_is_real():
-    """This is looked at where rounding hides the sign of Im L in sums of exponentials."""
-    loop, (c1, c2) = STABLE["oscillator"]
-    omega = margins(loop, c1, c2).gain_omega
-    stretch = omega + 1e-6 * np.array([[-2.0], [0.5], [1.0]])
-    assert gains._real_within(LoopAt(loop, c1, c2), stretch) == pytest.approx(
-        [omega], rel=1e-12
-    )
-
-
 @pytest.mark.parametrize("direction", [(0, -1), (1, 0), (0, 1), (-1, 0), (1, -1)])
 def test_the_modulus_margin_vanishes_where_the_loop_breaks(direction):
     """A root next to the axis makes a dip of |1 + L| that hides between samples."""

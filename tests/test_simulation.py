@@ -1,11 +1,16 @@
 """The loop in time: accuracy, closed form, verdicts, blocks, divergence, bad input."""
 
+import copy
 import pickle
+import re
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+from scipy.interpolate import BarycentricInterpolator
 from scipy.signal import bilinear_zpk, lfilter, zpk2tf
 
 from armlock import (
@@ -20,16 +25,20 @@ from armlock import (
     paper_loop,
     rightmost_root,
     sampled_open_loop,
-    save_series,
     simulate,
-    simulate_blocks,
     unstable_roots,
 )
-from armlock.sensors import COMMON, SignalMapping
+from armlock.sensors import COMMON, SINGLE, SignalMapping
+from armlock.timedomain import simulation
 from armlock.timedomain.simulation import BLOCK, LANES, lagrange_delay
 from tests import independent
 
 RATE = 200.0
+# Arms that move for hours.
+SLOW_MOVES: dict[str, Any] = {
+    "tau1": lambda t: 20.13 + 1e-5 * t,
+    "tau2": lambda t: 19.957 - 1e-5 * t,
+}
 
 
 def relative_error(found, expected):
@@ -115,7 +124,7 @@ def test_dead_time_and_moving_arms_against_the_difference_equation(dead):
 
 def test_delays_that_the_rate_does_not_resolve_are_refused():
     loop = Loop(Controller([], [-0.1], 0.2), COMMON, 20.1, 19.9, 1e-3)
-    message = r"sample_rate must be at least 4000\.0 Hz to interpolate delay = 0\.001 s, or a"
+    message = r"sample_rate must be at least 4000 Hz to interpolate delay = 0\.001 s, or a"
     with pytest.raises(ValueError, match=message):
         Simulation(loop, 200.0)
     with pytest.raises(ValueError, match=message):
@@ -178,34 +187,82 @@ def test_divergence_does_not_depend_on_blocks():
         run.advance(noise[:10])
 
 
-def test_a_stream_is_read_block_by_block_and_saved_with_the_same_bits(tmp_path):
-    """While it is written, what another process sees has another name."""
-    rows = np.random.default_rng(1).standard_normal((BLOCK + 5000, 3)) * (1.0, 1e-3, 1e-3)
-    noise, c1, c2 = rows.T
-    seen = []
-
-    def blocks():
-        for a, b in pairwise([0, 1, 2, 2, 4019, 4020, 9000, BLOCK, noise.size]):
-            seen.append([path.suffix for path in tmp_path.iterdir()])
-            yield noise[a:b], c1[a:b], c2[a:b]
-
-    target = tmp_path / "run.npy"
-    assert save_series(target, simulate_blocks(paper_loop(), blocks())) == noise.size
-    assert np.array_equal(np.load(target), simulate(paper_loop(), noise, c1, c2))
-    assert seen == [[".part"]] * 8
-    assert [path.name for path in tmp_path.iterdir()] == ["run.npy"]
+def test_a_run_goes_on_from_its_saved_state_with_the_same_bits():
+    """Before its first block, in the middle, with arms that move; it takes little room."""
+    noise = np.random.default_rng(1).standard_normal((2, BLOCK + 5000))
+    loop = Loop(Controller([], [-0.1], 0.02), COMMON, 20.1, 19.9, 0.3)
+    whole = simulate(loop, noise, sample_rate=10.0, history=0.5, **SLOW_MOVES)
+    run, parts = Simulation(loop, 10.0, history=0.5, draws=2), []
+    for a, b in pairwise([0, 3, 500, noise.shape[1]]):
+        saved = pickle.dumps(run)
+        run = pickle.loads(saved)
+        assert len(saved) < 20_000
+        parts.append(run.advance(noise[:, a:b], **SLOW_MOVES))
+        aside = copy.deepcopy(run)
+        aside.advance(noise[:, :9], **SLOW_MOVES)
+    assert np.array_equal(np.hstack(parts), whole)
 
 
-def test_an_interrupted_run_leaves_the_file_of_the_last_one(tmp_path):
-    def blocks():
-        yield np.ones(1000)
-        raise KeyboardInterrupt
+def test_an_arm_may_have_grown_during_a_gap():
+    """By some samples, as arms do in a month; what it then reaches back to is still there."""
+    loop = Loop(Controller([], [], 0.2), SINGLE, 2.0, 2.0)
+    noise = np.random.default_rng(1).standard_normal(2000)
+    run = Simulation(loop, 20.0, history=np.zeros(50))
+    before = run.advance(noise[:1000], 0.5)
+    first = run.advance(noise[1000:], 0.5, tau1=2.5)[0]
+    assert first == pytest.approx((noise[1000] + 0.2 * 0.5 * before[-50]) / 1.2)
+    with pytest.raises(
+        ValueError, match=r"^tau1 must not reach back .* got 9.0 s at t = 100 s"
+    ):
+        run.advance(noise, 0.5, tau1=9.0)
 
-    target = tmp_path / "run.npy"
-    np.save(target, np.arange(3.0))
+
+def test_an_interrupted_run_does_not_go_on(monkeypatch):
+    """Some of its runs have moved on, others have not."""
+    run, compute, calls = Simulation(CommonArm(), 10.0, draws=2), simulation._compute, []
+
+    def interrupted(*arguments):
+        calls.append(arguments)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return compute(*arguments)
+
+    monkeypatch.setattr(simulation, "_compute", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        save_series(target, simulate_blocks(CommonArm(), blocks(), 10.0))
-    assert np.array_equal(np.load(target), np.arange(3.0))
+        run.advance(np.ones((2, 50)))
+    with pytest.raises(RuntimeError, match="was interrupted in the middle of a block"):
+        run.advance(np.ones((2, 50)))
+
+
+def test_the_history_is_input_for_the_divergence_test():
+    """A loop that is left alone with what its arms hold is judged by that."""
+    with pytest.raises(DivergenceError) as caught:
+        simulate(SingleArm(), np.zeros(20_000), 3.0, history=1e-3, limit=10.0)
+    size = np.abs(caught.value.output)
+    assert 9.9e-3 < size[-1] <= 1e-2
+    began = round(caught.value.time * RATE)
+    assert size[began] <= 1e-3 < size[began + 1 :].min()
+
+
+def test_a_dead_time_below_the_step_comes_with_the_ways_out():
+    loop = paper_loop(delay=20e-6)
+    message = (
+        r"at least 200000 Hz to interpolate delay = 2e-05 s, or a multiple of 50000 Hz, got "
+        r"20; loop\.replace\(delay=0\.0\) neglects .* by 0\.00126 rad at 10 Hz, the highest"
+    )
+    with pytest.raises(ValueError, match=message):
+        Simulation(loop, 20.0)
+    without, at = loop.replace(delay=0.0), 2j * np.pi * 10.0
+    assert Simulation(without, 20.0).advance(np.ones(3)).shape == (3,)
+    turned = np.angle(without.open_loop(at) / loop.open_loop(at))
+    assert turned == pytest.approx(0.00126, abs=5e-6)
+
+
+def test_what_memory_cannot_hold_is_refused():
+    with pytest.raises(ValueError, match=r"^sample_rate must be of a size that memory holds"):
+        simulate(CommonArm(), np.ones(9), sample_rate=1e9)
+    with pytest.raises(ValueError, match=r"^draws must be of a size that memory holds"):
+        Simulation(CommonArm(), draws=10**9)
 
 
 def test_a_share_of_a_sample_is_seen_at_any_rate():
@@ -267,3 +324,173 @@ def test_an_ensemble_refuses_other_shapes():
     for wrong in ((noise, noise[0]), (noise[:2],), (noise[0],), (noise[None],)):
         with pytest.raises(ValueError, match=r"^(c1|noise) must"):
             Simulation(CommonArm(), 10.0, draws=3).advance(*wrong)
+
+
+# Arms that move: by shares of a sample, and over many samples.
+MOVES: dict[str, Any] = {
+    "tau1": lambda t: 20.13 + 1e-3 * t + 0.02 * np.sin(0.3 * t),
+    "tau2": lambda t: 19.957 - 2e-3 * t,
+}
+
+
+def moves(samples, rate):
+    t = np.arange(samples) / rate
+    return {name: move(t) for name, move in MOVES.items()}
+
+
+@pytest.mark.parametrize("dead", [0.0, 0.3])
+def test_moving_arms_against_plain_python(dead):
+    """An integrating controller with a zero, by the trapezoidal rule, and eight samples."""
+    rate, (gain, zero, pole) = 10.0, (0.02, -0.5, -0.1)
+    loop = Loop(Controller([zero], [pole], gain), COMMON, 20.0, 19.0, dead)
+    noise, c1, c2 = np.random.default_rng(6).uniform(-0.9, 0.9, (3, 2000))
+    delays = moves(noise.size, rate)
+    past = 300
+    phi, sent = np.zeros((2, past + noise.size))
+    # K = gain + residue / (s - pole), its state by the trapezoidal rule.
+    residue, half = gain * (pole - zero), 0.5 / rate
+    state = before = 0.0
+    for n, given in enumerate(noise):
+        now, light = past + n, 0.0
+        for c, tau in ((c1, delays["tau1"]), (c2, delays["tau2"])):
+            at = now - tau[n] * rate
+            nodes = np.arange(int(at) - 3, int(at) + 5)
+            light += c[n] * BarycentricInterpolator(nodes - int(at), phi[nodes])(at - int(at))
+        # state = (state (1 + half pole) + half (before + u)) / (1 - half pole), and
+        # u = 2 phi - light.
+        carried = (state * (1.0 + half * pole) + half * before) / (1.0 - half * pole)
+        share = gain + residue * half / (1.0 - half * pole)
+        if dead:
+            phi[now] = given - sent[now - round(dead * rate)]
+        else:
+            phi[now] = (given - residue * carried + share * light) / (1.0 + 2.0 * share)
+        before = 2.0 * phi[now] - light
+        sent[now] = residue * carried + share * before
+        state = carried + half * before / (1.0 - half * pole)
+    for given_delays in (delays, MOVES):
+        found = simulate(loop, noise, c1, c2, rate, **given_delays)
+        assert relative_error(found, phi[past:]) < 1e-12
+
+
+@pytest.mark.parametrize(("controller", "order"), [([], 8), ([-0.1], 2)])
+def test_a_manufactured_solution_converges_as_the_order_says(controller, order):
+    """The input that makes the output a sine; the arm grows by 1e-3 s a second."""
+
+    def phi(t):
+        return np.sin(2.0 * t + 0.4)
+
+    def tau(t):
+        return 2.005 + 1e-3 * t
+
+    def u(t):
+        return 0.2 * (phi(t) + 0.5 * phi(t - tau(t)))
+
+    loop, errors = Loop(Controller([], controller, 0.2), SINGLE, 2.0, 2.0), []
+    for rate in (10.0, 20.0):
+        t, before = np.arange(80 * rate) / rate, np.arange(-6 * rate, 0) / rate
+        sent = u(t)
+        if controller:
+            found = solve_ivp(
+                lambda x, y: controller[0] * y + u(x), (0.0, 80.0), [0.0], "DOP853", t,
+                rtol=1e-12, atol=1e-13,
+            )  # fmt: skip
+            sent = found.y[0]
+        output = simulate(loop, phi(t) + sent, -0.5, 0.0, rate, tau1=tau, history=phi(before))
+        # The sampled controller is at rest half a sample earlier; that is forgotten by then.
+        errors.append(np.abs(output - phi(t))[t > 30.0].max())
+    assert errors[0] / errors[1] == pytest.approx(2.0**order, rel=0.05)
+
+
+def test_a_moving_delay_that_stands_still_is_a_constant_one():
+    """Bit by bit where it is whole samples; the weights are the same but for rounding."""
+    noise = np.random.default_rng(7).standard_normal(3000)
+    for delay, accuracy in ((2.0, 0.0), (2.03, 1e-14)):
+        loop = Loop(Controller([], [-0.1], 0.2), COMMON, delay, 1.97)
+        constant = simulate(loop, noise, 0.9, 0.8, 20.0)
+        for tau in (np.full(noise.size, delay), lambda t, delay=delay: delay):
+            moving = simulate(loop, noise, 0.9, 0.8, 20.0, tau1=tau)
+            assert relative_error(moving, constant) <= accuracy
+        for other in (loop, Loop(loop.controller, COMMON, 2.1, 1.93)):
+            found = simulate(other, noise, 0.9, 0.8, 20.0, tau1=delay, tau2=1.97)
+            assert np.array_equal(found, constant)
+
+
+@pytest.mark.parametrize("draws", [1, LANES + 3])
+def test_moving_arms_do_not_depend_on_blocks_or_company(draws):
+    """Nor on whether they are given as series or as functions."""
+    rate, loop = 10.0, Loop(Controller([], [-0.1], 0.02), COMMON, 20.1, 19.9, 0.3)
+    noise = np.random.default_rng(4).standard_normal((draws, 700))
+    together = simulate(loop, noise, 0.9, 0.8, rate, **MOVES)
+    # Some runs' delays have other whole samples than the first one's, and some have not.
+    own = {
+        name: move + np.linspace(0.0, 0.02, draws)[:, None]
+        for name, move in moves(700, rate).items()
+    }
+    apart = simulate(loop, noise, 0.9, 0.8, rate, **own)
+    run = Simulation(loop, rate, draws=draws)
+    stretches = list(pairwise([0, 1, 2, 300, 700]))
+    parts = [run.advance(noise[:, a:b], 0.9, 0.8, **MOVES) for a, b in stretches]
+    assert np.array_equal(np.hstack(parts), together)
+    run = Simulation(loop, rate, draws=draws)
+    parts = [
+        run.advance(noise[:, a:b], 0.9, 0.8, **{name: tau[:, a:b] for name, tau in own.items()})
+        for a, b in stretches
+    ]
+    assert np.array_equal(np.hstack(parts), apart)
+    for k, row in enumerate(noise):
+        delays = {name: tau[k] for name, tau in own.items()}
+        assert np.array_equal(apart[k], simulate(loop, row, 0.9, 0.8, rate, **delays))
+    assert np.array_equal(together[0], apart[0])
+
+
+def test_a_delay_may_outgrow_what_the_run_began_with():
+    """Over several blocks; it grows by a tenth, then the arm is as long as the history was."""
+    rate, loop = 1000.0, Loop(Controller([], [], 0.2), SINGLE, 2.0, 2.0)
+    noise = np.random.default_rng(4).standard_normal(3 * BLOCK)
+    found = simulate(loop, noise, 0.5, 0.0, rate, tau1=lambda t: 2.0 + 0.1 * t)
+    t = np.arange(noise.size) / rate
+    at = (t - (2.0 + 0.1 * t)) * rate
+    known, whole = at > 4.0, np.floor(at).astype(int)
+    nodes = np.arange(-3, 5)
+    weights = [
+        np.prod([(at - whole - j) / (k - j) for j in nodes if j != k], axis=0) for k in nodes
+    ]
+    light = sum(w * found[whole + k] for w, k in zip(weights, nodes, strict=True))
+    expected = (noise + 0.2 * 0.5 * light) / 1.2
+    assert relative_error(found[known], expected[known]) < 1e-11
+
+
+SLOW = Loop(Controller([], [-0.1], 0.2), SINGLE, 2.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("tau", "constraint"),
+    [
+        (lambda t: 2.0 - 0.5 * t, "be at least 0.2 s where it is not constant, got 0.1"),
+        (lambda t: -t, "be at least 0.2 s where it is not constant, got -0.0 s at t = 0 s"),
+        (lambda t: 2.0 + 1.1 * t, "change by more than -3 and less than 1 s a second, as"),
+        (lambda t: 9.0 - 4.0 * t, "change by more than -3 and less than 1 s a second, as"),
+        (lambda t: 2.6 + 0.1 * t, "not reach back past the history, which begins at t = -2.5"),
+        (2.6, "not reach back past the history, which begins at t = -2.5 s, got 2.6 s at"),
+        (-1.0, "be positive, got -1.0"),
+        (np.full(99, 2.0), "be a number or have the shape of noise, (100,); got (99,)"),
+        (np.append(np.full(99, 2.0), np.nan), "be finite, got nan at index 99"),
+    ],
+)  # fmt: skip
+def test_a_delay_that_cannot_be_is_refused_with_its_time(tau, constraint):
+    call = partial(simulate, SLOW, np.ones(100), sample_rate=20.0, history=np.zeros(50))
+    with pytest.raises(ValueError, match=f"^tau1 must {re.escape(constraint)}"):
+        call(tau1=tau)
+    if callable(tau):
+        with pytest.raises(ValueError, match=f"^tau1 must {re.escape(constraint)}"):
+            call(tau1=tau(np.arange(100) / 20.0))
+
+
+def test_what_a_function_of_time_returns_is_checked():
+    for wrong, message in (
+        (lambda t: t[:-1], r"have the shape of t, \(100,\); got \(99,\)"),
+        (lambda t: np.where(t < 1.0, 2.0, np.nan), "be finite, got nan at index 20"),
+        (lambda t: "two", "hold real numbers"),
+    ):
+        with pytest.raises((TypeError, ValueError), match=rf"^tau1\(t\), .* must .*{message}"):
+            simulate(SLOW, np.ones(100), sample_rate=20.0, tau1=wrong)

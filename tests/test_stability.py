@@ -20,7 +20,7 @@ from armlock import (
     unstable_roots,
 )
 from armlock.robustness.rays import Ray
-from armlock.stability.counts import sign_changes
+from armlock.stability.counts import axis_zeros
 from tests import independent
 from tests.systems import NEUTRAL, RETARDED, with_roots
 
@@ -364,6 +364,6 @@ def test_a_row_that_starts_hidden_doubts_the_points_around_its_crossing():
 def test_a_sign_that_is_hidden_to_the_end_is_reported():
     real = CharacteristicFunction([1.0, 0.0, 1.0], [1.0], [0.0], 0.0, 0.0)
     ray = Ray(real, (2.0, 0.0), (-1.0, 0.0))
-    _, change, width = sign_changes(ray.product, [(0.0, 3.0)])
-    assert change.tolist() == [0]
-    assert width[0] == 3.0
+    zeros = axis_zeros(ray.product, [(0.0, 3.0)])
+    assert (zeros.hidden.tolist(), zeros.jump.tolist()) == ([True], [0])
+    assert zeros.width[0] == 3.0

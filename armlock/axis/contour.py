@@ -8,8 +8,23 @@ over a step, a function stays within M step^2 / 2 of its tangent. So
 - `imaginary_zeros` never steps over two zeros at once, so that none is missed.
 
 Where the sum is no larger than the bound on its rounding error, `winding` stops: that makes a
-point a boundary point. Where only its imaginary part is no larger, `imaginary_zeros` gives a
-zero with a jump of 0. The tolerance in the bound is `armlock.axis.exponentials.ROUNDING`.
+point a boundary point. Where only its imaginary part is no larger, `imaginary_zeros` cannot
+tell its sign over a stretch of the axis. The tolerance in the bound is
+`armlock.axis.exponentials.ROUNDING`.
+
+A *hidden stretch* is one in which nothing proves that the imaginary part has one zero, or none:
+it may hold any number of them, whatever the signs at its two ends are. Nobody may take it for a
+zero. Who asks, and what each does with it:
+
+- rows of charts (`armlock.axis.counting`) count points one by one whose parameter it may cross;
+- rays (`armlock.robustness.rays`) ask counts on both sides of the parameters that it may cross,
+  and refuse where these differ, or cannot be told;
+- phase and delay margins (`armlock.robustness.crossovers`) refuse where L in it would have a
+  smaller margin than the best one;
+- gain margins (`armlock.robustness.gains`) ask counts inside of the two factors, and refuse
+  where one is unstable, or cannot be told;
+- crossings of the negative real axis (`armlock.stability.nyquist`) refuse where L in it may be
+  negative.
 
 All functions here work on exponential sums, piece by piece, see `armlock.axis.exponentials`.
 """
@@ -49,6 +64,15 @@ MOST_STEPS = 10_000_000
 MOST_RADIANS = 20.0 * MOST_STEPS
 # Most samples of a grid.
 MOST_SAMPLES = 10_000_000
+
+# A zero walk crawls where steps are shorter than this share of omega, and of a radian of the
+# fastest exponential: a zero at a place of its own takes far less than a thousand such steps.
+# After so many the error is taken for larger, by the square root of 1 / _SHORT, which lets the
+# next steps be that much longer; where that happened once, it is not waited for so long again.
+_SHORT, _PATIENCE, _LESS_PATIENCE, _MORE_CAUTION = 1e-6, 1000, 50, 1e3
+# In a stretch without a sign steps grow in proportion to it, and are no shorter than this share
+# of the whole axis.
+_BLIND_GROWTH, _SHORTEST_BLIND = 0.25, 1e-14
 
 
 @njit(cache=True)
@@ -199,15 +223,14 @@ def argument_at(roots: ComplexArray, omega: float) -> float:
 @njit(cache=True)
 def _polish(
     piece: Piece, bound: FloatArray, bracket: tuple[float, float], guess: float, sign: int
-) -> tuple[float, complex, complex]:
+) -> tuple[float, tuple[complex, complex]]:
     """Zero of the imaginary part in a bracket, by Newton steps kept inside it.
 
     `sign` is that of the imaginary part at the lower end. Returns the zero, and value and slope
     of the sum there.
     """
     lower, upper = bracket
-    omega = guess
-    value, slope = 0j, 0j
+    omega, value, slope = guess, 0j, 0j
     for _ in range(80):
         value, slope = evaluate(piece, omega)
         if (value.imag > 0.0) == (sign > 0):
@@ -226,7 +249,7 @@ def _polish(
         if left <= 2.0 * EPSILON * upper * abs(slope.imag):
             value += slope * move
             break
-    return omega, value, slope
+    return omega, (value, slope)
 
 
 @njit(cache=True)
@@ -260,49 +283,76 @@ def _safe_step(h: float, dh: float, curvature: float, error: float) -> float:
 
 
 # Columns of what `imaginary_zeros` returns.
-OMEGA, JUMP, WIDTH, POSITION, SPREAD = 0, 1, 2, 3, 4
+OMEGA, JUMP, WIDTH, HIDDEN, POSITION, SPREAD = 0, 1, 2, 3, 4, 5
 
 
 @njit(cache=True)
 def _with_zero(
     zeros: FloatArray,
     found: int,
-    omega: float,
-    jump: int,
-    width: float,
-    value: complex,
-    slope: complex,
+    row: tuple[float, int, float, bool],
+    at: tuple[complex, complex],
 ) -> FloatArray:
     """Return `zeros` with one more in row `found`, a longer array if it is full.
 
-    The value of the sum and its slope take the place of position and spread.
+    Of the row these are OMEGA, JUMP, WIDTH and HIDDEN. The value of the sum and its slope take
+    the place of position and spread.
     """
     if found == zeros.shape[0]:
         zeros = np.concatenate((zeros, np.empty_like(zeros)))
-    zeros[found, OMEGA], zeros[found, JUMP], zeros[found, WIDTH] = omega, jump, width
-    zeros[found, POSITION], zeros[found, SPREAD] = value.real, abs(slope)
+    zeros[found, OMEGA], zeros[found, JUMP], zeros[found, WIDTH], zeros[found, HIDDEN] = row
+    zeros[found, POSITION], zeros[found, SPREAD] = at[0].real, abs(at[1])
     return zeros
 
 
 @njit(cache=True)
-def _place(zeros: FloatArray, piece: Piece, square: Piece) -> None:
-    """Turn value and slope of zeros in one piece into POSITION and SPREAD.
+def _place(zeros: FloatArray, piece: Piece, square: Piece, entered: float) -> None:
+    """Turn value and slope of zeros in one piece, from `entered` on, into POSITION and SPREAD.
 
     `square` is the measure, expanded from the same polynomials at the same start: it has the
-    same powers and the same scale.
+    same powers and the same scale. Over its width each of the two leaves its tangent by no more
+    than its bound on the second derivative allows.
     """
     fastest, magnitude = np.abs(piece.phases).max(), piece.sizes[1:].sum(axis=0)
+    bound, square_bound = curvature_bound(piece), curvature_bound(square)
     for zero in zeros:
-        omega = max(zero[OMEGA], piece.start)
-        measured, change = evaluate(square, omega)
-        part, slope = zero[POSITION], zero[SPREAD]
+        width, part, slope = zero[WIDTH], zero[POSITION], zero[SPREAD]
         zero[POSITION], zero[SPREAD] = np.nan, 0.0
-        if measured.real > 0.0:
-            position = part / measured.real
-            steepness = (slope + abs(position) * abs(change.real)) / measured.real
-            rounding = CAUTION * EPSILON * (1.0 + fastest * omega) / measured.real
-            rounding *= bound_at(magnitude, piece, omega)
-            zero[POSITION], zero[SPREAD] = position, 4.0 * steepness * zero[WIDTH] + rounding
+        omega = max(zero[OMEGA], entered)
+        measured, change = evaluate(square, omega)
+        if not measured.real > 0.0:
+            continue
+        position, last = part / measured.real, omega + width
+        moved = slope * width + 0.5 * bound_at(bound, piece, last) * width * width
+        shrunk = abs(change.real) * width
+        shrunk += 0.5 * bound_at(square_bound, square, last) * width * width
+        rounding = (
+            CAUTION * EPSILON * (1.0 + fastest * omega) * bound_at(magnitude, piece, last)
+        )
+        least = measured.real - shrunk
+        zero[POSITION], zero[SPREAD] = position, np.inf
+        if least > 0.0 and omega == zero[OMEGA]:
+            zero[SPREAD] = (moved + abs(position) * shrunk + rounding) / least
+
+
+@njit(cache=True)
+def _is_monotonic(
+    piece: Piece, bound: FloatArray, error: FloatArray, omega: float, width: float
+) -> bool:
+    """Whether the imaginary part ascends, or descends, throughout omega +- width.
+
+    Its slope is bounded by that at omega and the curvature. Rounding moves a slope by no more
+    than the bound on the value's changes, and by what the phases turn that: doubled, because
+    these two are of the same size.
+    """
+    slope = evaluate(piece, omega)[1]
+    last = omega + width
+    rate, turn = 0.0, (last - piece.start) * piece.per_reach
+    for k in range(error.size - 1, 0, -1):
+        rate = rate * turn + k * error[k]
+    fastest = np.abs(piece.phases).max() if piece.phases.size else 0.0
+    rounding = 2.0 * (rate * piece.per_reach + fastest * bound_at(error, piece, last))
+    return bool(abs(slope.imag) > bound_at(bound, piece, last) * width + rounding)
 
 
 @njit(cache=True)
@@ -316,7 +366,7 @@ def _imaginary_bounds(
     start, end, per_reach, local, sizes, phases = piece
     local, sizes = local.copy(), sizes.copy()
     for m in range(local.shape[1]):
-        if end == np.inf and local[0, m].imag == 0.0:
+        if per_reach == 1.0 and local[0, m].imag == 0.0:
             # In powers of omega the coefficients are real or imaginary.
             sizes[0, m] = 0.0
         local[0, m] = local[0, m].imag
@@ -339,31 +389,34 @@ def imaginary_zeros(
 
     For a row x = N / M of a chart the sum is N conj(M), and `measure` is |M|^2. Where the
     imaginary part is odd in omega, as it is there, omega = 0 is one of the zeros. Of a map
-    `omega_end` is pi / step. Returns a row for each zero, and whether these are all (they are
-    not if the walk would take more than MOST_STEPS steps). Its columns:
+    `omega_end` is pi / step. Returns a row for each zero and each hidden stretch, and whether
+    these are all (they are not if the walk would take more than MOST_STEPS steps). Its columns:
 
-    - OMEGA, polished;
+    - OMEGA, polished; of a hidden stretch its middle, or `omega_start` or `omega_end` where it
+      begins or ends there;
     - JUMP, 2 or -2, the direction of the sign change, where a conjugate pair crosses; 1 or -1
-      where a real root does: at omega = 0, and at the `omega_end` of a map; 0 where rounding
-      hides whether there is a sign change, or the sign at another end of the walk;
-    - WIDTH, how far rounding lets the zero move: for a zero that is not simple, half the
-      stretch in which the sign is doubtful, and all of it at `omega_start` and `omega_end`;
+      where a real root does: at omega = 0, and at the `omega_end` of a map. Of a hidden stretch
+      the jump that its zeros add up to, 0 where the sign at an end of the walk is hidden;
+    - WIDTH, how far rounding lets the zero move, or a hidden stretch reaches to either side;
+    - HIDDEN, 1 for a hidden stretch, else 0;
     - POSITION, the real part over the measure, nan where that vanishes;
-    - SPREAD, how far rounding lets the position move.
+    - SPREAD, how far from it the position may be within the width; inf where that cannot be
+      told.
 
     Without a measure the last two are the real part and the size of the slope.
     """
     phases = whole.phases
-    zeros, found = np.empty((64, 5)), 0
+    zeros, found = np.empty((64, 6)), 0
     fastest = np.abs(phases).max() if phases.size else 0.0
     if (omega_end - omega_start) * fastest > MOST_RADIANS:
         return zeros[:0], False
-    omega, last_clear, step = omega_start, omega_start, omega_end
-    steps, sign, doubtful = 0, 0, True
-    crawled, patience, caution = 0, 1000, 1.0
+    # Up to `last_clear` the sign is known; from there to omega it is not where `doubtful`.
+    omega, last_clear, sign, doubtful = omega_start, omega_start, 0, True
+    step, steps = omega_end, 0
+    crawled, patience, caution = 0, _PATIENCE, 1.0
     while omega < omega_end and steps <= MOST_STEPS:
-        piece, first = expand(whole, omega), found
-        start, end = piece.start, min(piece.end, omega_end)
+        piece, first, entered = expand(whole, omega), found, omega
+        end = min(piece.end, omega_end)
         near, everywhere, error = _imaginary_bounds(piece, rounding)
         value, slope = evaluate(piece, omega)
         if omega == omega_start:
@@ -371,7 +424,7 @@ def imaginary_zeros(
                 sign, doubtful = (1 if value.imag > 0.0 else -1), False
             elif omega == 0.0 and abs(slope.imag) > error[1] * piece.per_reach:
                 sign, doubtful = (1 if slope.imag > 0.0 else -1), False
-                zeros = _with_zero(zeros, found, 0.0, sign, 0.0, value, slope)
+                zeros = _with_zero(zeros, found, (0.0, sign, 0.0, False), (value, slope))
                 found += 1
         while omega < end and steps <= MOST_STEPS:
             steps += 1
@@ -384,67 +437,80 @@ def imaginary_zeros(
                 if doubtful:
                     # Nothing can be resolved here; leave the stretch, in proportion to it.
                     unresolved = 0.5 * np.sqrt(2.0 * uncertain / curvature)
-                    stretch = 0.25 * (omega - last_clear)
-                    certified = max(certified, unresolved, stretch, 1e-14 * omega_end)
+                    stretch = _BLIND_GROWTH * (omega - last_clear)
+                    blind = max(unresolved, stretch, _SHORTEST_BLIND * omega_end)
+                    certified = max(certified, blind)
                 step = min(step, certified)
                 # Where terms cancel nearly to rounding, steps may become tiny. Then the error
                 # is taken for larger, until the sign is clear again.
-                short = step < 1e-6 * omega and fastest * step < 1e-6
+                short = step < _SHORT * omega and fastest * step < _SHORT
                 crawled = crawled + 1 if short and not doubtful else 0
                 if crawled > patience:
-                    caution, patience = 1e3, 50
+                    caution, patience = _MORE_CAUTION, _LESS_PATIENCE
             following = end if step >= end - omega else omega + step
             old_value, old_slope = value, slope
             value, slope = evaluate(piece, following)
-            doubt = caution * bound_at(error, piece, following)
-            if abs(value.imag) <= doubt:
+            if abs(value.imag) <= caution * bound_at(error, piece, following):
                 omega, doubtful = following, True
                 continue
             now, caution = 1 if value.imag > 0.0 else -1, 1.0
             if now != sign or doubtful:
-                jump, width = now - sign, 0.5 * (following - last_clear)
-                at = last_clear + width
-                if sign != 0 and now != sign and last_clear >= start:
+                bracket, half = (last_clear, following), 0.5 * (following - last_clear)
+                at = last_clear + half
+                single = not doubtful
+                if doubtful and sign != 0 and last_clear >= entered:
+                    single = _is_monotonic(piece, bound, error, at, half)
+                if sign == 0:
+                    # At the start itself the sign was hidden.
+                    jump = now if omega_start == 0.0 else 0
+                    row = (omega_start, jump, 2.0 * half, True)
+                    there = evaluate(piece, max(omega_start, entered))
+                    zeros = _with_zero(zeros, found, row, there)
+                    found += 1
+                elif not single:
+                    row, there = (at, now - sign, half, True), evaluate(piece, max(at, entered))
+                    zeros = _with_zero(zeros, found, row, there)
+                    found += 1
+                elif now != sign:
                     if not doubtful:
                         h, dh = (old_value.imag, value.imag), (old_slope.imag, slope.imag)
                         at = _zero_between(omega, following, h, dh)
-                    at, there, rate = _polish(piece, bound, (last_clear, following), at, sign)
-                    uncertain = bound_at(error, piece, at)
-                    if abs(rate.imag) * width > uncertain:
-                        width = uncertain / abs(rate.imag)
-                else:
-                    there, rate = evaluate(piece, max(at, start))
-                    if sign == 0:
-                        # At the start itself the sign was hidden.
-                        at, width = omega_start, 2.0 * width
-                        there = evaluate(piece, max(at, start))[0]
-                        jump = now if omega_start == 0.0 else 0
-                zeros = _with_zero(zeros, found, at, jump, width, there, rate)
-                found += 1
+                    at, there = _polish(piece, bound, bracket, at, sign)
+                    rate, uncertain = abs(there[1].imag), bound_at(error, piece, at)
+                    if rate * half > uncertain:
+                        half = uncertain / rate
+                    zeros = _with_zero(zeros, found, (at, now - sign, half, False), there)
+                    found += 1
             omega, last_clear, sign, doubtful = following, following, now, False
         if omega >= omega_end and (is_map or doubtful):
-            jump, width = (-sign if is_map else 0), omega_end - last_clear if doubtful else 0.0
-            zeros = _with_zero(zeros, found, omega_end, jump, width, value, slope)
+            width = omega_end - last_clear if doubtful else 0.0
+            single = not doubtful
+            if is_map and sign != 0 and last_clear >= entered:
+                single = single or _is_monotonic(piece, bound, error, omega_end, width)
+            row = (omega_end, -sign if is_map else 0, width, not single)
+            zeros = _with_zero(zeros, found, row, (value, slope))
             found += 1
         if found > first and measure is not None:
-            _place(zeros[first:found], piece, expand(measure, start))
+            _place(zeros[first:found], piece, expand(measure, entered), entered)
     return zeros[:found], omega >= omega_end
 
 
 @njit(cache=True)
-def resolved_grid(whole: CompiledSum, omega_end: float, tolerance: float) -> FloatArray:
+def resolved_grid(
+    whole: CompiledSum, omega_end: float, tolerance: float, most: int
+) -> FloatArray:
     """Frequencies from 0 to `omega_end` between which an exponential sum changes little.
 
     Over each step its tangent moves by no more than twice `tolerance` times its distance from
     zero, and the sum leaves the tangent by no more than once that, or the step is as small as
-    rounding allows. The grid ends before `omega_end` if it would take more than MOST_SAMPLES.
+    rounding allows. The grid ends before `omega_end` if it would take more than `most`.
     """
     grid, found, omega, step = np.empty(1024), 1, 0.0, omega_end
     grid[0] = omega
-    while omega < omega_end and found < MOST_SAMPLES:
+    while omega < omega_end and found < most:
         piece = expand(whole, omega)
         end, bound = min(piece.end, omega_end), curvature_bound(piece)
-        while omega < end and found < MOST_SAMPLES:
+        while omega < end and found < most:
             value, slope = evaluate(piece, omega)
             step = min(2.0 * step, end - omega)
             smallest = max(1e-13 * omega, 1e-16 * omega_end)

@@ -17,6 +17,7 @@ from numba import config
 from armlock.axis.compiled import njit
 from armlock.axis.contour import (
     CAUTION,
+    HIDDEN,
     JUMP,
     MOST_RADIANS,
     POSITION,
@@ -154,7 +155,14 @@ def count_point(model: PointModel, x: float, y: float, end: float) -> int:
     sums, uncertain = constant.sums.copy(), np.empty_like(constant.sums)
     weights = constant.weights.copy()
     for k in range(sums.size):
-        sums[k] -= dx * b1[k] + dy * b2[k]
+        # Of two ways to add up, the one with the smaller terms.
+        near, far = dx * b1[k], dy * b2[k]
+        all_near = model.reference[0] * b1[k] + model.reference[1] * b2[k]
+        all_far = x * b1[k] + y * b2[k]
+        if abs(all_near) + abs(all_far) < abs(near) + abs(far):
+            sums[k] += all_near - all_far
+        else:
+            sums[k] -= near + far
         # The parameters are rounded numbers themselves.
         uncertain[k] = EPSILON * (abs(x * b1[k]) + abs(y * b2[k]))
         for g in range(weights.shape[0]):
@@ -246,7 +254,15 @@ def _fill_row(
     x, lower, upper = rows.x, rows.lower[i], rows.upper[i]
     fixed, y = model.fixed, rows.y[i]
     weights = fixed.weights - y * model.weights
-    sums = fixed.sums - (y - model.reference) * model.sums
+    sums = fixed.sums.copy()
+    for k in range(sums.size):
+        # Of two ways to add up, the one with the smaller terms.
+        at_zero = fixed.sums[k] + model.reference * model.sums[k]
+        near, far = (y - model.reference) * model.sums[k], y * model.sums[k]
+        if abs(at_zero) + abs(far) < abs(fixed.sums[k]) + abs(near):
+            sums[k] = at_zero - far
+        else:
+            sums[k] -= near
     crossing = CompiledSum(fixed.polynomials, weights, sums, fixed.phases)
     zeros, complete = imaginary_zeros(
         crossing, model.measure, 0.0, rows.ends[i], model.is_map, CAUTION
@@ -256,7 +272,10 @@ def _fill_row(
     for zero in zeros:
         jump, position, spread = int(zero[JUMP]), zero[POSITION], zero[SPREAD]
         if np.isnan(position):
-            continue
+            # Where M vanishes nothing crosses; but something may in a stretch around there.
+            if zero[HIDDEN] == 0.0:
+                continue
+            position, spread = 0.0, np.inf
         if lower < position < upper:
             total += jump
             change[np.searchsorted(x, position)] += jump

@@ -4,9 +4,9 @@ D, its terms and their products are exponential sums at s = j omega,
 
     f(omega) = sum_k sums_k p_k + sum_g sum_k weights_gk p_k (exp(j omega phase_g) - 1)
 
-with polynomials p_k of s. Polynomials of low degree are one expansion in powers of omega.
-Those of high degree are expanded anew in each *piece* of the axis, from their roots: over many
-decades of frequency one expansion would lose its digits.
+with polynomials p_k of s. Polynomials of low degree are one expansion in powers of omega, but
+where that cancels: next to a cluster of lightly damped roots. There, and of high degree
+everywhere, they are expanded anew in each *piece* of the axis, from their roots.
 
 Within a piece a sum has a value and a derivative, a bound on its second derivative, and a
 bound on its rounding error. The walks along the axis need no more.
@@ -27,11 +27,21 @@ from armlock.axis.compiled import njit
 from armlock.checks import ComplexArray, FloatArray, IntArray
 
 EPSILON = 2.0**-52
-#: Up to this degree a polynomial is evaluated from its coefficients, beyond from its roots.
+#: Most powers of an expansion. Beyond this degree a polynomial is evaluated from its roots.
 LOW_DEGREE = 20
 # The rounding error of a value is at most ROUNDING EPSILON times the sum of magnitudes. Where D
-# is no larger on the axis, a point is a boundary point, and its count -1.
+# is no larger on the axis, a point is a boundary point, and its count -1. In units of EPSILON,
+# one half for each operation: three for the phase of an exponential and its sine, three for the
+# products with it, two for weights and sums. What grows with the degree n is in the magnitudes,
+# which are multiplied by 1 + n / 4. That adds 2 n: n for the coefficients (n factors, a product
+# and a sum each), and n for Horner's rule (the same).
 ROUNDING = 8.0
+# Where a polynomial is smaller than the product of omega + |root| by more than this factor, it
+# is evaluated from its roots: up to here rounding takes four of its sixteen digits.
+_CANCELLED = 1e4
+# Roots within this share of the axis are looked at for that. Other roots cancel by less than a
+# factor of 20 each, all of 20 such roots together next to one another seldom.
+_LIGHT = 0.1
 # How many roots of a polynomial, each weighed by reach / (reach + distance), a piece may have
 # around it. Roots exactly at its start are not counted. Then LOW_DEGREE powers hold the
 # polynomial to rounding.
@@ -64,36 +74,61 @@ def _quotients(
 class Polynomial(NamedTuple):
     """A real polynomial of s: its coefficients in ascending powers, and its roots.
 
-    A product also has the highest coefficients of its factors: their product may be no float.
+    Attributes
+    ----------
+    coefficients : float array, shape (n + 1,)
+        In ascending powers of s.
+    roots : complex array, shape (n,)
+        They define the polynomial where they are known; else they are found.
+    leads : tuple of float
+        Of a product the highest coefficients of its factors: their product may be no float.
+    missed : float
+        By how much the roots miss the polynomial at s, over its highest coefficient times the
+        product of |s| + |root|. Zero where the roots define it.
     """
 
     coefficients: FloatArray
     roots: ComplexArray
     leads: tuple[float, ...] = ()
+    missed: float = 0.0
 
     @classmethod
-    def of(cls, coefficients: FloatArray, known: ComplexArray | None = None) -> Polynomial:
-        """Return the polynomial with these coefficients, and these roots if they are known.
+    def of(cls, coefficients: FloatArray, guess: ComplexArray | None = None) -> Polynomial:
+        """Return the polynomial with these coefficients, and roots that are found.
 
-        Known roots are kept if they give these coefficients to a part in a million. If not,
-        roots are found in double precision, and if those fail the test, in extended precision.
+        They are a guess, or found in double precision, if that gives the coefficients to a part
+        in a million; if not, in extended precision. What they miss is kept, see `missed`.
         """
-        if known is not None and _are_roots(known, coefficients):
-            return cls(coefficients, known)
-        roots = poly.polyroots(coefficients).astype(np.complex128)
-        if _are_roots(roots, coefficients):
-            return cls(coefficients, roots)
-        start = {"asc": True, "roots_init": roots.tolist()}
+        found = poly.polyroots(coefficients).astype(np.complex128) if guess is None else guess
+        missed = _missed(found, coefficients)
+        if missed <= 1e-6:
+            return cls(coefficients, found, missed=missed)
+        if guess is not None:
+            return cls.of(coefficients)
+        start = {"asc": True, "roots_init": found.tolist()}
         with mpmath.workdps(60):
             try:
-                found = mpmath.polyroots(
+                exact = mpmath.polyroots(
                     coefficients.tolist(), maxsteps=500, extraprec=400, **start
                 )
             except mpmath.libmp.NoConvergence:
                 raise ValueError(
                     f"no roots of the polynomial {coefficients} are found"
                 ) from None
-        return cls(coefficients, np.array([complex(root) for root in found]))
+        found = np.array([complex(root) for root in exact])
+        return cls(coefficients, found, missed=_missed(found, coefficients))
+
+    def evaluated(self, s: Any) -> tuple[Any, Any]:
+        """Value and derivative at s, in numpy's or mpmath's numbers."""
+        value, slope = 0.0 * s, 0.0 * s
+        if self.missed:
+            for coefficient in self.coefficients[::-1].tolist():
+                value, slope = value * s + coefficient, slope * s + value
+            return value, slope
+        value = value + float(self.coefficients[-1])
+        for root in self.roots.tolist():
+            value, slope = value * (s - root), slope * (s - root) + value
+        return value, slope
 
     def over(self, other: Polynomial, s: ComplexArray) -> ComplexArray:
         """Evaluate p(s) / q(s), factor by factor."""
@@ -107,17 +142,62 @@ class Polynomial(NamedTuple):
         with np.errstate(over="ignore", invalid="ignore"):
             product = np.convolve(self.coefficients, signs * other.coefficients)
         leads = self.coefficients[-1], signs[-1] * other.coefficients[-1]
-        return Polynomial(product, np.concatenate((self.roots, -other.roots)), leads)
+        missed = (1.0 + self.missed) * (1.0 + other.missed) - 1.0
+        return Polynomial(product, np.concatenate((self.roots, -other.roots)), leads, missed)
 
 
-def _are_roots(roots: ComplexArray, coefficients: FloatArray) -> bool:
-    """Whether a polynomial of these roots has these coefficients, to a part in a million."""
+def _missed(roots: ComplexArray, coefficients: FloatArray) -> float:
+    """By how much roots miss the polynomial with these coefficients, see `Polynomial.missed`.
+
+    A power of s that is off by no more than this share of what the magnitudes of the roots give
+    is off by no more than it at any s. The product itself rounds, two EPSILON a root.
+    """
     product = np.array(coefficients[-1:], dtype=np.complex128)
     magnitude = np.abs(coefficients[-1:])
     for root in roots[np.argsort(np.abs(roots))]:
         product = np.convolve(product, [-root, 1.0])
         magnitude = np.convolve(magnitude, [abs(root), 1.0])
-    return bool((np.abs(product - coefficients) <= 1e-6 * magnitude).all())
+    off = np.abs(product - coefficients)
+    if not (off <= magnitude).all():
+        return np.inf
+    shares = off[magnitude > 0.0] / magnitude[magnitude > 0.0]
+    return float(shares.max(initial=0.0)) + 2.0 * EPSILON * roots.size
+
+
+def _cancellation(roots: ComplexArray, omega: FloatArray) -> FloatArray:
+    """Return log of the product of (omega + |root|) / |j omega - root| at frequencies."""
+    with np.errstate(divide="ignore"):
+        ratios = (omega[:, None] + np.abs(roots)) / np.abs(1j * omega[:, None] - roots)
+        return np.asarray(np.log(ratios).sum(axis=1))
+
+
+def _crowded(polynomials: Sequence[Polynomial]) -> FloatArray:
+    """Intervals of the axis on which a polynomial's expansion about s = 0 cancels.
+
+    Ascending, in rad/s, of shape (n, 2). They are found from the cancellation at the light
+    roots, where it is largest, and at distances from these that are halved again and again. No
+    bound depends on them: both expansions know their rounding.
+    """
+    known = [p.roots for p in polynomials]
+    every = np.concatenate([np.empty(0, dtype=np.complex128), *known])
+    light = (every.imag > 0.0) & (np.abs(every.real) < _LIGHT * np.abs(every))
+    peaks = np.unique(every.imag[light])
+    shares = np.concatenate(([0.0], 0.5 ** np.arange(50, 0, -1)))
+    found: list[tuple[float, float]] = []
+    for roots in known if peaks.size else ():
+        for peak in peaks[_cancellation(roots, peaks) > np.log(_CANCELLED)]:
+            reach = 0.0
+            for side in (-1.0, 1.0):
+                far = _cancellation(roots, peak * (1.0 + side * shares)) > np.log(_CANCELLED)
+                reach = max(reach, 2.0 * shares[far].max())
+            found.append((peak * max(1.0 - reach, 0.0), peak * (1.0 + reach)))
+    merged: list[tuple[float, float]] = []
+    for low, high in sorted(found):
+        if merged and low <= merged[-1][1]:
+            merged[-1] = merged[-1][0], max(high, merged[-1][1])
+        else:
+            merged.append((low, high))
+    return np.array(merged).reshape(-1, 2)
 
 
 def _gathered(
@@ -205,12 +285,15 @@ class ExponentialSum(NamedTuple):
                 row.real[:size] = p.coefficients * turns.real[:size]
                 row.imag[:size] = p.coefficients * turns.imag[:size]
         leads = [np.frexp(p.leads or p.coefficients[-1:]) for p in self.polynomials]
+        direct = degree <= LOW_DEGREE and _in_range(whole)
         polynomials = CompiledPolynomials(
-            whole if degree <= LOW_DEGREE and _in_range(whole) else whole[:0],
+            whole if direct else whole[:0],
+            _crowded(self.polynomials) if direct else np.empty((0, 2)),
             np.concatenate([p.roots for p in self.polynomials]),
             np.cumsum([0, *(p.roots.size for p in self.polynomials)]),
             np.array([mantissas.prod() for mantissas, _ in leads]),
             np.array([int(exponents.sum()) for _, exponents in leads]),
+            np.array([p.missed for p in self.polynomials]),
         )
         return CompiledSum(polynomials, self.weights, self.sums, self.phases)
 
@@ -223,19 +306,25 @@ class CompiledPolynomials(NamedTuple):
     coefficients : complex array, shape (k, degree + 1)
         In powers of omega. It has no rows if a degree exceeds `LOW_DEGREE` or products would
         leave the range of floats. Then the roots are used.
+    crowded : float array, shape (n, 2)
+        Ascending intervals of the axis, in rad/s, on which the roots are used all the same.
     roots : complex array
         Those of all polynomials, one polynomial after the other.
     starts : int array, shape (k + 1,)
         The index of each polynomial's first root, and the number of all roots.
     leads, exponents : float and int array, shape (k,)
         Highest coefficients, over powers of two; and the exponents of these.
+    missed : float array, shape (k,)
+        As for `Polynomial`.
     """
 
     coefficients: ComplexArray
+    crowded: FloatArray
     roots: ComplexArray
     starts: IntArray
     leads: FloatArray
     exponents: IntArray
+    missed: FloatArray
 
 
 class CompiledSum(NamedTuple):
@@ -296,9 +385,9 @@ def _from_roots(
     All are divided by one power of two, so that the largest is about one. Returns the
     coefficients and their magnitudes, shape (k, LOW_DEGREE + 1), and bounds on what the higher
     powers add up to where 0 <= u <= 1. The magnitudes count the roots, since each
-    multiplication rounds.
+    multiplication rounds, and hold what the roots miss.
     """
-    _, roots, starts, leads, exponents = polynomials
+    _, _, roots, starts, leads, exponents, missed = polynomials
     size, exponents = LOW_DEGREE + 1, exponents.copy()
     found = np.zeros((leads.size, size), dtype=np.complex128)
     sizes = np.zeros((leads.size, size))
@@ -306,7 +395,7 @@ def _from_roots(
     largest = -(1 << 60)
     for k in range(leads.size):
         found[k, 0], sizes[k, 0], total = leads[k], abs(leads[k]), abs(leads[k])
-        degree = 0
+        degree, off = 0, missed[k] * abs(leads[k])
         for root in roots[starts[k] : starts[k + 1]]:
             away = 1j * omega - root
             distance = abs(away)
@@ -317,14 +406,18 @@ def _from_roots(
                 exponents[k] += exponent
                 scale = 2.0**-exponent
                 total *= scale
-            degree += 1
+            degree, off = degree + 1, scale * off * (omega + reach + abs(root))
             for m in range(min(degree, size - 1), 0, -1):
                 found[k, m] = scale * (away * found[k, m] + 1j * reach * found[k, m - 1])
                 sizes[k, m] = scale * (distance * sizes[k, m] + reach * sizes[k, m - 1])
             found[k, 0] *= scale * away
             sizes[k, 0] *= scale * distance
-        left_out[k] = max(total - sizes[k].sum(), 0.0) + degree * EPSILON * total
+        # Of a low degree no power is left out.
+        if degree >= size:
+            left_out[k] = max(total - sizes[k].sum(), 0.0) + degree * EPSILON * total
+        # Each root multiplies twice and adds, in complex numbers: four EPSILON.
         sizes[k] *= 1.0 + 0.5 * degree
+        sizes[k, 0] += off / (ROUNDING * EPSILON)
         if total > 0.0:
             largest = max(largest, exponents[k] + int(np.floor(np.log2(total))))
     for k in range(leads.size):
@@ -363,13 +456,13 @@ def _reach(roots: ComplexArray, starts: IntArray, omega: float) -> float:
 class Piece(NamedTuple):
     """An exponential sum over a piece of the axis, in powers of u = (omega - start) per_reach.
 
-    Of polynomials of low degree the whole axis is one piece, with u = omega. In any other piece
-    u goes from 0 to 1, and `per_reach` is one over its length.
+    Where polynomials of low degree are evaluated from coefficients, a piece starts at omega = 0
+    and u = omega. In any other piece u goes from 0 to at most 1.
 
     Attributes
     ----------
     start, end : float
-        In rad/s.
+        In rad/s: where u is zero, and up to where it holds.
     per_reach : float
         In s/rad.
     local : complex array, shape (1 + groups, n)
@@ -397,11 +490,20 @@ def expand(whole: CompiledSum, omega: float, uncertain: FloatArray | None = None
     """
     polynomials, weights, sums, phases = whole
     coefficients = polynomials.coefficients
-    reach, expanded = 1.0, coefficients.shape[0] == 0
-    magnitudes, left_out = np.abs(coefficients), np.zeros(coefficients.shape[0])
+    expanded, piece_end = coefficients.shape[0] == 0, np.inf
+    for low, high in polynomials.crowded:
+        if omega < high:
+            expanded = omega >= low
+            piece_end = high if expanded else low
+            break
+    reach = 1.0
+    magnitudes = (0.75 + 0.25 * coefficients.shape[1]) * np.abs(coefficients)
+    left_out = np.zeros(coefficients.shape[0])
     if expanded:
         # Next to a root of high order on the axis it would be no step at all.
         reach = max(_reach(polynomials.roots, polynomials.starts, omega), 4.0 * EPSILON * omega)
+        reach = min(reach, piece_end - omega)
+        piece_end = min(omega + reach, piece_end)
         coefficients, magnitudes, left_out = _from_roots(polynomials, omega, reach)
     number, size = coefficients.shape
     groups = weights.shape[0]
@@ -419,7 +521,7 @@ def expand(whole: CompiledSum, omega: float, uncertain: FloatArray | None = None
                     sizes[g, m] += magnitude * magnitudes[k, m]
                 sizes[g, size] += magnitude * left_out[k] / EPSILON
     if not expanded:
-        return Piece(0.0, np.inf, 1.0, local, sizes, phases)
+        return Piece(0.0, piece_end, 1.0, local, sizes, phases)
     # Powers that rounding hides are not worth their time.
     powers = sizes[:, :size].sum(axis=0)
     used, dropped, hidden = size, powers[size - 1], 1e-3 * EPSILON * powers.sum()
@@ -428,7 +530,7 @@ def expand(whole: CompiledSum, omega: float, uncertain: FloatArray | None = None
         dropped += powers[used - 1]
     sizes[:, used] = sizes[:, size] + sizes[:, used:size].sum(axis=1) / EPSILON
     local, sizes = local[:, :used].copy(), sizes[:, : used + 1].copy()
-    return Piece(omega, omega + reach, 1.0 / reach, local, sizes, phases)
+    return Piece(omega, piece_end, 1.0 / reach, local, sizes, phases)
 
 
 @njit(cache=True)

@@ -11,6 +11,7 @@ tau' = 1 - (1 - l_back'(t)) (1 - l_out'(t - l_back)).
 
 from __future__ import annotations
 
+import gzip
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -128,6 +129,28 @@ class Constellation:
         """
         rate1, rate2 = (rate for _, rate in self._arms(t, master))
         return rate1, rate2
+
+    def positions(self, t: npt.ArrayLike) -> FloatArray:
+        """Return where the spacecraft are, in m, by time, spacecraft and coordinate.
+
+        Parameters
+        ----------
+        t : array_like of float, shape (n,)
+            In s since `epoch`, from the first state of a table to its last.
+
+        Returns
+        -------
+        float array, shape (n, 3, 3)
+
+        Raises
+        ------
+        TypeError, ValueError
+            If t is not one-dimensional, finite and real, or outside of the table.
+        """
+        t = axis("t", t)
+        if t.min() < min(0.0, self.span[0]) or t.max() > self.span[1]:
+            raise ValueError(f"t must lie within the table, got {t.min()} to {t.max()} s")
+        return np.stack([path(t, 0) for path in self._paths], axis=1)
 
     def _arms(self, t: npt.ArrayLike, master: int) -> list[tuple[FloatArray, FloatArray]]:
         """Return delay and rate of both arms, after a look at the arguments."""
@@ -283,6 +306,44 @@ def from_table(
             f"spacecraft and three coordinates; got {places.shape}"
         )
     return _interpolated(epoch or f"{time[0]} s", scale, time - time[0], places, _spline)
+
+
+def read_table(path: str | Path) -> Constellation:
+    """Read a table of positions from a text file, as `from_table` takes it.
+
+    Parameters
+    ----------
+    path : str or Path
+        Ten numbers a row, separated by commas: time in s, and x, y, z of spacecraft 1, 2 and 3
+        in m from the Sun. Lines with ``#`` are comments; two of them have to say
+        ``# epoch: ...`` and ``# scale: TCB`` or ``TDB``. Names ending in .gz are unpacked.
+
+    Returns
+    -------
+    Constellation
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    TypeError, ValueError
+        If a row does not hold ten numbers, epoch or scale is missing, or as for `from_table`.
+    """
+    path = Path(path)
+    content = path.read_bytes()
+    lines = (
+        (gzip.decompress(content) if path.suffix == ".gz" else content).decode().splitlines()
+    )
+    comments = [line.strip("# ").partition(":") for line in lines if line.startswith("#")]
+    said = {key.strip(): value.strip() for key, colon, value in comments if colon}
+    missing = [key for key in ("epoch", "scale") if key not in said]
+    if missing:
+        raise ValueError(f"{path} must say its {' and '.join(missing)}, as '# scale: TCB'")
+    rows = np.loadtxt(lines, delimiter=",", ndmin=2)
+    if rows.shape[1] != 10:
+        raise ValueError(f"{path} must hold ten numbers a row, got {rows.shape[1]}")
+    places = rows[:, 1:].reshape(-1, 3, 3)
+    return from_table(rows[:, 0], places, epoch=said["epoch"], scale=said["scale"])
 
 
 def read_oem(paths: Sequence[str | Path]) -> Constellation:

@@ -27,28 +27,12 @@ from armlock.robustness.free_phases import (
     search_outwards,
 )
 from armlock.stability.bounds import last_larger
-from armlock.stability.counts import polished, sign_changes
+from armlock.stability.counts import axis_zeros, polished
 
 #: Relative accuracy of |L| at a crossover, and of a phase margin that L has at high frequency.
 TOLERANCE = 1e-6
 # Crossovers that are polished: those with the smallest margins.
 _POLISHED = 8
-
-
-def axis_zeros(
-    whole: ExponentialSum, intervals: npt.ArrayLike
-) -> tuple[FloatArray, FloatArray]:
-    """Zeros of the imaginary part at omega > 0, and stretches there that may hide some.
-
-    On intervals of the axis, in rad/s. The stretches have shape (3, n): the lower ends, the
-    middles, the upper ends. A stretch that begins at omega = 0, where L is one power of s, is
-    left out.
-    """
-    omega, jump, width = sign_changes(whole, intervals)
-    hidden = jump == 0
-    stretches = omega[hidden] + np.outer((-1.0, 0.0, 1.0), width[hidden])
-    stretches = np.maximum(stretches, 1e-3 * omega[hidden])[:, stretches[0] != 0.0]
-    return omega[~hidden & (omega > 0.0)], stretches
 
 
 def _on_unit_circle(point: LoopAt, omega: FloatArray) -> FloatArray:
@@ -67,18 +51,41 @@ def _log_size(point: LoopAt, omega: FloatArray) -> FloatArray:
 def _crossovers(
     point: LoopAt, squares: ExponentialSum, intervals: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray]:
-    """Frequencies with |L| = 1 on intervals of the axis, and stretches that may hide some.
+    """Frequencies with |L| = 1 on intervals of the axis, and places in hidden stretches.
 
-    As `axis_zeros` returns them. `squares` is |N|^2 - |R|^2, with L = N / R.
+    `squares` is |N|^2 - |R|^2, with L = N / R. Of a hidden stretch the places are its ends and
+    its middle.
     """
-    omega, hidden = axis_zeros(squares.turned(), intervals)
+    zeros = axis_zeros(squares.turned(), intervals)
+    stretches = zeros.omega[zeros.hidden] + np.outer(
+        (-1.0, 0.0, 1.0), zeros.width[zeros.hidden]
+    )
+    at_zero = zeros.omega[zeros.hidden] == 0.0
+    for start in stretches[2, at_zero]:
+        _require_none_below(point, float(start))
+    stretches = np.maximum(stretches, 1e-3 * zeros.omega[zeros.hidden])[:, ~at_zero]
+    omega = zeros.omega[~zeros.hidden & (zeros.omega > 0.0)]
     far = np.abs(_log_size(point, omega)) > TOLERANCE
     moved = _on_unit_circle(point, omega[far])
     lost = moved[np.abs(_log_size(point, moved)) > TOLERANCE]
     if lost.size:
         raise no_margin(point, f"rounding hides where |L| comes to one around {lost[0]} rad/s")
     omega[far] = moved
-    return omega, hidden
+    return omega, stretches.ravel()
+
+
+def _require_none_below(point: LoopAt, omega: float) -> None:
+    """Raise if |L| may come to one between zero and a frequency.
+
+    There, up to `LoopAt.leading_radius`, L is one power of s: it does not if it is above one
+    and has a pole at s = 0, or is below one and has none, and none if both hold at omega.
+    """
+    radius, pole = point.leading_radius(), point.poles_at_zero() > 0
+    sizes = np.abs(point.response(np.array([min(radius, omega), omega])))
+    far = np.abs(np.log(sizes)) > TOLERANCE
+    same = (sizes > 1.0).all() or (sizes < 1.0).all()
+    if not far.all() or not same or (pole and sizes[0] < 1.0):
+        raise no_margin(point, f"rounding hides whether |L| comes to one below {omega} rad/s")
 
 
 def _least_lags(point: LoopAt, omega: FloatArray) -> tuple[float, float, float]:
@@ -165,7 +172,7 @@ def phase_and_delay(point: LoopAt, highest: float) -> tuple[float, float, float]
     for intervals in search_outwards(per_turn, lambda: min(end, highest), meeting, likely):
         omega, hidden = _crossovers(point, squares, intervals)
         found = _least_lags(point, omega)
-        perhaps = _least_lags(point, hidden.ravel())
+        perhaps = _least_lags(point, hidden)
         if perhaps[0] < min(phase, found[0]) or perhaps[1] < min(delay, found[1]):
             raise no_margin(
                 point, f"rounding hides whether |L| comes to one around {perhaps[2]} rad/s"

@@ -217,6 +217,15 @@ def _ahead(disc: _Disc, step: float) -> _Ahead:
 
 
 @njit(cache=True)
+def _largest(disc: _Disc, ahead: _Ahead, step: float) -> float:
+    """Bound on |L| over a step, whatever the free phases."""
+    centre, spread = _centre_and_radius(disc)
+    grown = ahead.changed + max(ahead.slope * step, 0.0) + ahead.left
+    largest = abs(centre) + spread + abs(disc.larger) * grown + _rounding(disc)
+    return float(largest * np.exp(ahead.turned))
+
+
+@njit(cache=True)
 def _clear(disc: _Disc, ahead: _Ahead, step: float, target: complex, radius: float) -> bool:
     """Whether L stays outside a disc around `target` over a step, whatever the free phases.
 
@@ -225,6 +234,8 @@ def _clear(disc: _Disc, ahead: _Ahead, step: float, target: complex, radius: flo
     first order is subtracted from their distance. Besides,
     |v + v' t| is at least |v| (1 + t Re(v' / v)).
     """
+    if _largest(disc, ahead, step) < abs(target) - radius:
+        return True
     size = abs(disc.larger)
     centre, spread = _centre_and_radius(disc)
     away = centre - target
@@ -256,9 +267,8 @@ def _nothing_smaller(disc: _Disc, omega: float, step: float, levels: FloatArray)
     # There is no gain crossover if the disc stays outside the unit circle, or inside.
     if _clear(disc, ahead, step, 0j, 1.0):
         return True
-    centre, spread = _centre_and_radius(disc)
-    grown = ahead.changed + max(ahead.slope * step, 0.0) + ahead.left
-    if (abs(centre) + spread + abs(disc.larger) * grown) * np.exp(ahead.turned) < 1.0:
+    centre = _centre_and_radius(disc)[0]
+    if _largest(disc, ahead, step) < 1.0:
         return True
     lead = min(levels[PHASE], np.pi)
     lag = max(lead, levels[DELAY] * (omega + step))

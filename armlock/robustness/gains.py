@@ -10,11 +10,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.optimize import elementwise
 
 from armlock.checks import FloatArray
 from armlock.loops import Loop, LoopAt
-from armlock.robustness.crossovers import axis_zeros
 from armlock.robustness.free_phases import (
     arm_weights,
     clear_from,
@@ -28,12 +26,16 @@ from armlock.robustness.free_phases import (
     search_outwards,
 )
 from armlock.stability.bounds import last_larger, last_root_bound
-from armlock.stability.counts import loop_count
+from armlock.stability.counts import axis_zeros, loop_count
 
 #: Gain factors up to this, and down to one over it, are looked at.
 LARGEST_GAIN = 1e6
 # So close to the limits of the neutral root chain, as a share, no gain factors are looked for.
 _NEXT_TO_THE_CHAIN = 1e-5
+# Where L touches zero rounding hides its sign over a stretch in which it may be this large.
+_NULL = 1e-5
+# Shares of a gain factor inside of it at which counts are asked, until one is told.
+_INSIDE = (1e-6, 1e-5, 1e-4, 1e-3)
 
 
 def _chain_gains(point: LoopAt) -> tuple[float, float]:
@@ -79,15 +81,15 @@ def _gains(point: LoopAt, omega: FloatArray) -> FloatArray:
         return np.asarray(-1.0 / point.response(omega).real)
 
 
-def _real_within(point: LoopAt, stretches: FloatArray) -> FloatArray:
-    """Where L, from its factors, is real within stretches that may hide it, in rad/s."""
+def _values_below(point: LoopAt, omega: float) -> tuple[float, float]:
+    """Range of what L may be on the negative real axis between zero and a frequency.
 
-    def imaginary(omega: FloatArray) -> FloatArray:
-        return np.asarray(point.response(omega).imag)
-
-    lower, upper = stretches[:-1].ravel(), stretches[1:].ravel()
-    changes = imaginary(lower) * imaginary(upper) < 0.0
-    return np.asarray(elementwise.find_root(imaginary, (lower[changes], upper[changes])).x)
+    There, up to `LoopAt.leading_radius`, L is one power of s, or all but constant.
+    """
+    if omega > point.leading_radius():
+        return -np.inf, np.inf
+    size = abs(complex(point.response(omega)))
+    return (-np.inf, -0.5 * size) if point.poles_at_zero() > 0 else (-2.0 * size, 0.0)
 
 
 def _free_gains(point: LoopAt, omega: FloatArray) -> FloatArray:
@@ -110,7 +112,8 @@ def _gains_around_one(point: LoopAt, least: float, most: float) -> tuple[float, 
     The frequency is in rad/s; `least`, `most` and nan where there are none between these two.
     """
     loop, weights = point.loop, arm_weights(point)
-    crossing = point.numerator().times_conjugate(loop.rest_on_boundary())
+    rest = loop.rest_on_boundary()
+    crossing, measure = point.numerator().times_conjugate(rest), rest.times_conjugate(rest)
     lower, upper, where = least, most, np.nan
     hidden: list[FloatArray] = []
 
@@ -130,9 +133,13 @@ def _gains_around_one(point: LoopAt, least: float, most: float) -> tuple[float, 
         return omega[[np.argmax(free[:, 0]), np.argmin(free[:, 1])]]
 
     for intervals in search_outwards(loop.omega_per_turn, end, meeting, likely):
-        omega, stretches = axis_zeros(crossing, intervals)
-        omega = np.concatenate((omega, _real_within(point, stretches)))
-        hidden.append(_gains(point, stretches.ravel()))
+        zeros = axis_zeros(crossing, intervals, measure)
+        at, spread = zeros.position[zeros.hidden], zeros.spread[zeros.hidden]
+        values = np.column_stack((at - spread, at + spread))
+        for k in np.flatnonzero(zeros.omega[zeros.hidden] == 0.0):
+            values[k] = _values_below(point, float(zeros.width[zeros.hidden][k]))
+        hidden.append(values)
+        omega = zeros.omega[~zeros.hidden & (zeros.omega > 0.0)]
         factor = _gains(point, omega)
         below = factor[(factor >= lower) & (factor <= 1.0)]
         lower = float(below.max(initial=lower))
@@ -140,20 +147,28 @@ def _gains_around_one(point: LoopAt, least: float, most: float) -> tuple[float, 
         if above.size:
             nearest = above[np.argmin(factor[above])]
             upper, where = float(factor[nearest]), float(omega[nearest])
-    hidden_gains = np.concatenate(hidden)
-    if ((hidden_gains > lower) & (hidden_gains < upper)).any():
+    # Values of L in hidden stretches; nan where nothing is known of one.
+    left, right = np.concatenate(hidden).T
+    if not ((left > -max(1.0 / upper, _NULL)) | (right < -1.0 / lower)).all():
         _require_stable_inside(point, lower, upper)
     return lower, upper, where
 
 
 def _require_stable_inside(point: LoopAt, lower: float, upper: float) -> None:
-    """Raise if a count just inside two gain factors says that the loop is unstable there."""
+    """Raise unless counts just inside two gain factors say that the loop is stable there.
+
+    Where a count cannot be told, one farther inside tells.
+    """
     loop, c1, c2 = point
     rest = loop.polynomials()[0]
-    for factor in (lower * (1.0 + 1e-6), upper * (1.0 - 1e-6)):
-        scaled = rest._replace(coefficients=rest.coefficients / factor)
-        count = loop_count(loop.plain().replace(rest=scaled), c1, c2)
-        if count > 0:
+    for limit, inwards in ((lower, 1.0), (upper, -1.0)):
+        for share in _INSIDE:
+            factor = limit * (1.0 + inwards * share)
+            scaled = rest._replace(coefficients=rest.coefficients / factor)
+            count = loop_count(loop.plain().replace(rest=scaled), c1, c2)
+            if count >= 0:
+                break
+        if count != 0:
             at = f"the count at {factor} times the gain is {count}"
             raise no_margin(point, f"rounding hides a crossing, for {at}")
 
@@ -195,9 +210,9 @@ def gain_interval(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> tuple[float, 
     higher frequency: a factor that lies within 1e-5 of a limit may be given as the limit.
 
     All sign changes of Im L are found, but for short stretches in which rounding hides its
-    sign, at most a part in ten million of the frequency as a rule. There L is looked at in
-    three places, from its factors. Where it could give a factor between the two, they are
-    refused if a count just inside one of them says that the loop is unstable.
+    sign. Where L in one of them could give a factor between the two, they are refused unless
+    counts just inside of both say that the loop is stable. Next to a null, where |L| is below
+    1e-5 in such a stretch, factors above 1e5 are passed over.
 
     Examples
     --------

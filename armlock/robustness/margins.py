@@ -9,7 +9,6 @@ possible. At high frequency the limit is known in closed form.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from fractions import Fraction
 
 import numpy as np
 import numpy.typing as npt
@@ -28,7 +27,7 @@ from armlock.robustness.free_phases import (
 )
 from armlock.robustness.gains import gain_interval_of_stable
 from armlock.robustness.rays import FARTHEST, Ray
-from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError, loop_count
+from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError
 
 # Relative accuracy with free phases, in the order of
 # `armlock.robustness.discs.free_margins_at`. The disk margin may be flat over decades of
@@ -301,13 +300,7 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
     2.9286e-06
     """
     ray = Ray(checked_loop(loop), (1.0, 1.0), direction)
-
-    def count(t: float) -> int:
-        """Count at a point of the ray, not rounded: what cancels along it does so there."""
-        c1, c2 = (1 + Fraction(t) * Fraction(d) for d in ray.direction.tolist())
-        return loop_count(loop, c1, c2)
-
-    at_start = count(0.0)
+    at_start = ray.count(0.0)
     if at_start > 0 or at_start == UNCONFINED:
         raise ValueError(
             f"the loop must be stable at (c1, c2) = (1, 1) to lose stability, but "
@@ -315,16 +308,18 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
         )
     # From there a root at s = 0 that cancels at (1, 1) may turn into the loop's own.
     may_leave_zero = at_start != 0 or LoopAt(loop, 1.0, 1.0).at_zero()[0] > 0
-    if may_leave_zero and count(1e-9 * ray.scale) != 0:
+    if may_leave_zero and ray.count(1e-9 * ray.scale) != 0:
         return 0.0
     farthest = FARTHEST * ray.scale
     eps = ray.first(farthest).position
     if eps < np.inf:
-        # So close to the result, rounding may hide on which side of the boundary a point is.
-        counts = [count(share * eps) for share in (0.5, 1.0 - 1e-6, 1.0 + 1e-6)]
-        agree = counts[0] == 0 and counts[1] in (0, BOUNDARY) and counts[2] != 0
+        # So close to the result, rounding may hide on which side of the boundary a point is:
+        # then a count farther away tells.
+        beside = [ray.count_beside(eps, side, 1e-6)[1] for side in (-1, 1)]
+        counts = [ray.count(0.5 * eps), *beside]
+        agree = counts[:2] == [0, 0] and counts[2] not in (0, BOUNDARY)
     else:
-        counts = [count(0.5 * farthest)] if ray.acts() else []
+        counts = [ray.count(0.5 * farthest)] if ray.acts() else []
         agree = not any(counts)
     if not agree:
         raise CountError(

@@ -11,6 +11,7 @@ where free phases let a root cross at all: the first turns, then likely places, 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from fractions import Fraction
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -18,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
+from armlock.axis.exponentials import EPSILON
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import ComplexArray, FloatArray, IntArray, axis, positive_number
 from armlock.loops import Loop, LoopAt
@@ -31,8 +33,9 @@ from armlock.stability.bounds import last_frequency
 from armlock.stability.counts import (
     BOUNDARY,
     CountError,
+    axis_zeros,
+    loop_count,
     polished,
-    sign_changes,
     unstable_roots,
 )
 
@@ -43,6 +46,8 @@ _OWN = 1e-10
 # Next to the limit of the neutral root chain, roots cross at ever higher frequency. They are
 # followed up to so many turns of the longest delay, which takes about a tenth of a second.
 _TURNS_NEXT_TO_THE_CHAIN = 50_000
+# A count that cannot be told at a point is looked for beside it, up to this share of t.
+_FARTHEST_BESIDE = 1e-3
 
 
 class Crossings(NamedTuple):
@@ -75,6 +80,17 @@ class Crossing(NamedTuple):
     change: int
 
 
+def _merged(ranges: FloatArray) -> list[tuple[float, float]]:
+    """Ranges that overlap, made one."""
+    merged: list[tuple[float, float]] = []
+    for low, high in sorted(map(tuple, ranges.tolist())):
+        if merged and low <= merged[-1][1]:
+            merged[-1] = merged[-1][0], max(high, merged[-1][1])
+        else:
+            merged.append((low, high))
+    return merged
+
+
 _NONE = Crossings(np.empty(0), np.empty(0), np.empty(0, dtype=np.int64))
 
 
@@ -94,9 +110,10 @@ class Ray:
         #: The t at which the distance from the start is the start's from zero, or one.
         self.scale = max(1.0, float(np.hypot(*self.start))) / float(np.hypot(*self.direction))
         #: D0 conj(M) at s = j omega.
-        self.product = system.sum_at(*self.start).times_conjugate(
-            system.deviation(*self.direction)
-        )
+        effect = system.deviation(*self.direction)
+        self.product = system.sum_at(*self.start).times_conjugate(effect)
+        #: |M|^2 there.
+        self.square = effect.times_conjugate(effect)
 
     def at(self, t: float) -> tuple[float, float]:
         """Return the point start + t direction."""
@@ -148,10 +165,16 @@ class Ray:
         """D0 / M at s = j omega, shaped like `omega`; nan where M vanishes."""
         system, s = self.system, 1j * np.asarray(omega, dtype=float)
         z = np.exp(s * system.step) if system.step else s
-        p1, p2 = self.direction[0] * system.b1, self.direction[1] * system.b2
-        effect = np.asarray(poly.polyval(z, poly.polyadd(p1, p2)), dtype=np.complex128)
-        effect = effect + poly.polyval(z, p1) * np.expm1(-s * system.tau1)
-        effect = effect + poly.polyval(z, p2) * np.expm1(-s * system.tau2)
+        first, second = (
+            d * p.evaluated(z)[0]
+            for d, p in zip(self.direction, system.polynomials()[1:], strict=True)
+        )
+        effect = first * np.expm1(-s * system.tau1) + second * np.expm1(-s * system.tau2)
+        # The sum of the two from coefficients, in which they may cancel, or from factors: the
+        # one whose terms are smaller.
+        both = poly.polyadd(self.direction[0] * system.b1, self.direction[1] * system.b2)
+        cancel = poly.polyval(np.abs(z), np.abs(both)) < np.abs(first) + np.abs(second)
+        effect = effect + np.where(cancel, poly.polyval(z, both), first + second)
         effect = effect * np.exp(-s * system.delay)
         value = system(s, *self.start)
         acts = effect != 0.0
@@ -162,7 +185,7 @@ class Ray:
         """Find all crossings with 0 < t <= stop.
 
         With `intervals` of the axis, in rad/s and of shape (n, 2), only those whose frequency
-        lies in them, and no counts confirm that rounding hides none.
+        lies in them.
         """
         end = self.end(stop)
         if end == np.inf:
@@ -174,43 +197,57 @@ class Ray:
             return _NONE
         parts = [(0.0, end)] if intervals is None else np.minimum(intervals, end)
         found, hidden = self._crossings(parts, stop)
-        if hidden and intervals is None:
-            self._confirm(stop, int(found.change.sum()))
+        if intervals is None:
+            self._confirm(found, hidden, stop)
+        elif hidden.size:
+            # Counts know all frequencies: they cannot tell what crosses in these.
+            raise self._hides(stop, f"where t = {hidden.tolist()}")
         return found
 
     def _crossings(
         self, intervals: npt.ArrayLike, stop: float, *, first: bool = False
-    ) -> tuple[Crossings, bool]:
-        """Find crossings on intervals of the axis; return whether rounding may hide some.
+    ) -> tuple[Crossings, FloatArray]:
+        """Find crossings on intervals of the axis, and where rounding may hide others.
 
-        All of them up to `stop`, or the first and what ties with it.
+        All of them up to `stop`, or the first and what ties with it. The places are ranges of t
+        that hidden stretches may cross, of shape (n, 2).
         """
-        omega, change, width = sign_changes(
-            self.product, intervals, is_map=self.system.step > 0.0
+        zeros = axis_zeros(self.product, intervals, self.square, is_map=self.system.step > 0.0)
+        lower, upper = zeros.position - zeros.spread, zeros.position + zeros.spread
+        # Where M vanishes, its product with D0 does, but D0 / M is large and not real: no root
+        # is there. Elsewhere D0 / M need not be quite real, because omega is not yet polished.
+        q = self.quotient(zeros.omega)
+        real = np.abs(q.imag) <= np.abs(q.real) + self.scale
+        # In a stretch around such a place anything may be.
+        hidden = zeros.hidden | (~real & np.isfinite(zeros.spread))
+        lower, upper = (
+            np.where(np.isnan(lower), -np.inf, lower),
+            np.where(np.isnan(upper), np.inf, upper),
         )
-        # Stretches in which rounding hides the sign, on the way or from omega = 0 on.
-        hidden = bool(((change == 0) | ((omega == 0.0) & (width > 0.0))).any())
-        omega, change = omega[change != 0], change[change != 0]
-        # Only those in reach are worth polishing. Where M vanishes, its product with D0 does,
-        # but D0 / M is large and not real: no root is there. Elsewhere D0 / M need not be quite
-        # real, because omega is not yet polished.
-        q = self.quotient(omega)
-        rough = np.where(np.abs(q.imag) <= np.abs(q.real) + self.scale, q.real, np.inf)
+        met = hidden & (upper > 0.0) & (lower <= stop)
+        ranges = np.column_stack((lower, upper))[met].clip(0.0, stop)
+        omega, change, width = zeros.omega[~hidden], zeros.jump[~hidden], zeros.width[~hidden]
+        # Only those in reach are worth polishing.
+        rough = np.where(real, q.real, np.inf)[~hidden]
         left = np.flatnonzero((rough > 0.0) & (rough <= stop * (1.0 + 1e-6)))
         left, found = left[np.argsort(rough[left], kind="stable")], _NONE
         while left.size and not found.position.size:
             many = left.size
             if first:
                 many = int((rough[left] <= rough[left[0]] * (1.0 + 1e-6)).sum())
-            found = self._polished(omega[left[:many]], change[left[:many]], stop)
+            some = left[:many]
+            found = self._polished(omega[some], change[some], width[some], stop)
             left = left[many:]
-        return found, hidden
+        return found, ranges
 
-    def _polished(self, omega: FloatArray, change: IntArray, stop: float) -> Crossings:
+    def _polished(
+        self, omega: FloatArray, change: IntArray, width: FloatArray, stop: float
+    ) -> Crossings:
         """Polish frequencies; return the crossings up to `stop`, but for the start's own."""
-        # Far less than the distance between two zeros.
-        reach = np.minimum(1e-7 * omega, 1e-3 * self.system.omega_per_turn)
-        omega = polished(lambda w: self.quotient(w).imag, omega, (reach,))
+        # What rounding lets them move, of both ways to evaluate D0 / M, and no more: the next
+        # zero may be close.
+        reaches = [np.maximum(share * width, 4.0 * EPSILON * omega) for share in (2.0, 16.0)]
+        omega = polished(lambda w: self.quotient(w).imag, omega, reaches)
         position = self.quotient(omega).real
         lowest = 1e-15 * self.scale
         if (position[position > lowest] <= _OWN * self.scale).any():
@@ -221,18 +258,57 @@ class Ray:
         kept = kept[np.argsort(position[kept], kind="stable")]
         return Crossings(position[kept], omega[kept], change[kept])
 
-    def _confirm(self, stop: float, change: int) -> None:
-        """Raise if counts at both ends contradict a change of the number of unstable roots.
+    def _hides(self, stop: float, why: str) -> CountError:
+        return CountError(
+            f"no crossings up to t = {stop}: rounding hides some, {why}",
+            np.array([self.at(stop)]),
+        )
 
-        Counts that cannot be told say nothing.
+    def count(self, t: float) -> int:
+        """Count the unstable roots at a point of the ray, of a loop as `loop_count` does.
+
+        There the point is not rounded: what cancels along the ray does so at it.
         """
-        counts = unstable_roots(self.system, *np.transpose([self.at(0.0), self.at(stop)]))
-        if counts.min() >= 0 and counts[1] - counts[0] != change:
-            raise CountError(
-                f"no crossings up to t = {stop}: rounding hides some, for the counts at both "
-                f"ends are {counts[0]} and {counts[1]}",
-                np.array([self.at(stop)]),
-            )
+        if not isinstance(self.system, Loop):
+            return int(unstable_roots(self.system, *self.at(t)))
+        begin, way = self.start.tolist(), self.direction.tolist()
+        c1, c2 = (
+            Fraction(a) + Fraction(t) * Fraction(d) for a, d in zip(begin, way, strict=True)
+        )
+        return loop_count(self.system, c1, c2)
+
+    def count_beside(self, t: float, side: int, nearest: float) -> tuple[float, int]:
+        """Count the unstable roots next to a point of the ray.
+
+        At t times 1 + side `nearest`, and as long as that cannot be told farther away, up to a
+        thousandth; from t = 0 on at shares of `scale`. Returns the place and the count, that
+        may still be below zero: then it is no confirmation.
+        """
+        place, count = t, BOUNDARY
+        for share in (nearest, *np.geomspace(max(nearest, 1e-9), _FARTHEST_BESIDE, 4)):
+            place = float(t * (1.0 + side * share) if t else share * self.scale)
+            count = self.count(place)
+            if count != BOUNDARY:
+                break
+        return place, count
+
+    def _confirm(self, found: Crossings, hidden: FloatArray, stop: float) -> None:
+        """Raise unless counts say that nothing crosses where rounding hides it.
+
+        On both sides of each range of t that hidden stretches may cross, the counts differ by
+        what was found in between, or a crossing is hidden there.
+        """
+        for low, high in _merged(hidden):
+            before = self.count_beside(low, -1, 0.0)
+            after = self.count_beside(high, -1 if high >= stop else 1, 0.0)
+            between = (found.position > before[0]) & (found.position <= after[0])
+            told = min(before[1], after[1]) >= 0
+            if not told or after[1] - before[1] != found.change[between].sum():
+                raise self._hides(
+                    stop,
+                    f"for the counts at t = {before[0]} and {after[0]} are {before[1]} and "
+                    f"{after[1]}",
+                )
 
     def first(self, stop: float) -> Crossing:
         """Find the first crossing up to `stop`, or the limit of the neutral root chain."""
@@ -242,7 +318,7 @@ class Ray:
         best = Crossing(chain, np.inf, 0) if chain <= stop else Crossing(np.inf, np.nan, 0)
         if not self.acts():
             return best
-        hidden, per_turn = False, self.system.omega_per_turn
+        hidden, per_turn = [np.empty((0, 2))], self.system.omega_per_turn
 
         def reach() -> float:
             return min(best.position, stop)
@@ -263,11 +339,12 @@ class Ray:
             parts = _outwards(np.inf if self.system.step else per_turn, end)
         for intervals in parts:
             found, doubtful = self._crossings(intervals, reach(), first=True)
-            hidden |= doubtful
+            hidden.append(doubtful)
             if found.position.size:
                 best = Crossing(*(values[0].item() for values in found))
-        if hidden:
-            self._confirm((1.0 - 1e-6) * reach(), 0)
+        before = (1.0 - 1e-6) * reach()
+        ranges = np.concatenate(hidden)
+        self._confirm(_NONE, ranges[ranges[:, 0] < before].clip(0.0, before), before)
         return best
 
     def _where_free_phases_cross(

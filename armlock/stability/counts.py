@@ -20,7 +20,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -122,27 +122,62 @@ def _point_model(system: CharacteristicFunction) -> PointModel:
     )
 
 
-def sign_changes(
-    whole: ExponentialSum, intervals: npt.ArrayLike, *, is_map: bool = False
-) -> tuple[FloatArray, IntArray, FloatArray]:
-    """Zeros of the imaginary part of an exponential sum, jumps and widths.
+class AxisZeros(NamedTuple):
+    """Zeros of an imaginary part along the axis, and hidden stretches, ascending by interval.
 
-    On intervals of the axis, shape (n, 2). As `armlock.axis.contour.imaginary_zeros`: the jump
-    is 0 where rounding hides whether there is one, within the width.
+    Columns of `armlock.axis.contour.imaginary_zeros`, where it also stands what a hidden
+    stretch means to each caller.
+
+    Attributes
+    ----------
+    omega, width : float array, shape (n,)
+        Where, in rad/s, and how far rounding lets it move or a stretch reaches to either side.
+    jump : int array, shape (n,)
+        Twice the sign of the change; once at an end of the axis.
+    hidden : bool array, shape (n,)
+        Whether it is a hidden stretch.
+    position, spread : float array, shape (n,)
+        The real part over the measure, and how far from it that may be within the width;
+        without a measure the real part and the size of the slope.
+    """
+
+    omega: FloatArray
+    jump: IntArray
+    width: FloatArray
+    hidden: BoolArray
+    position: FloatArray
+    spread: FloatArray
+
+
+def axis_zeros(
+    whole: ExponentialSum,
+    intervals: npt.ArrayLike,
+    measure: ExponentialSum | None = None,
+    *,
+    is_map: bool = False,
+) -> AxisZeros:
+    """Zeros of the imaginary part of an exponential sum on intervals of the axis.
+
+    The intervals have shape (n, 2), in rad/s. The measure is a positive sum of the same
+    polynomials.
 
     Raises
     ------
     CountError
         If there are too many of them, or a number overflows.
     """
-    summed = without_unused(whole)[0].compiled()
-    parts = [np.empty((0, 5))]
+    sums = without_unused(whole) if measure is None else without_unused(whole, measure)
+    summed = [one.compiled() for one in sums]
+    under = None if measure is None else summed[1]
+    parts = [np.empty((0, 6))]
     for start, end in np.reshape(intervals, (-1, 2)):
         if not np.isfinite(end):
             raise CountError(
                 f"no crossings up to omega = {end}: a number overflows", _NO_POINTS
             )
-        zeros, complete = contour.imaginary_zeros(summed, None, start, end, is_map, ROUNDING)
+        zeros, complete = contour.imaginary_zeros(
+            summed[0], under, start, end, is_map, ROUNDING
+        )
         if not complete:
             raise CountError(
                 f"no crossings up to omega = {end} rad/s: more than {contour.MOST_STEPS:.0e} "
@@ -151,8 +186,14 @@ def sign_changes(
             )
         parts.append(zeros)
     zeros = np.concatenate(parts)
-    jump = zeros[:, contour.JUMP].astype(np.int64)
-    return zeros[:, contour.OMEGA], jump, zeros[:, contour.WIDTH]
+    return AxisZeros(
+        zeros[:, contour.OMEGA],
+        zeros[:, contour.JUMP].astype(np.int64),
+        zeros[:, contour.WIDTH],
+        zeros[:, contour.HIDDEN] > 0.0,
+        zeros[:, contour.POSITION],
+        zeros[:, contour.SPREAD],
+    )
 
 
 def polished(
@@ -160,7 +201,7 @@ def polished(
     omega: FloatArray,
     reaches: Iterable[FloatArray],
 ) -> FloatArray:
-    """Zeros of a function next to those that `sign_changes` found on the expanded sums.
+    """Zeros of a function next to those that `axis_zeros` found on the expanded sums.
 
     Each is looked for within the first of the reaches around it over which the sign changes,
     and stays as it is where there is none.
@@ -565,10 +606,12 @@ def _fill(
     upper: FloatArray,
 ) -> tuple[IntArray, BoolArray, IntArray]:
     """Fill rows from their crossings, starting with the counts `base` at x = lower."""
-    constant, b1, b2 = system.on_boundary()
+    constant, b1, b2 = system.on_boundary(rows=True)
     x0, y0 = system.reference
     # Where all exponentials are one, N = A + C - y B2 is R + x0 B1 at y = y0, exactly.
-    at_reference = constant._replace(sums=system.rest_on_boundary().sums + x0 * b1.sums)
+    at_reference = constant._replace(
+        sums=system.rest_on_boundary(rows=True).sums + x0 * b1.sums
+    )
     fixed, varying, square = without_unused(
         at_reference.times_conjugate(b1), b2.times_conjugate(b1), b1.times_conjugate(b1)
     )

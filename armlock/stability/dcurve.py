@@ -12,11 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from numpy.polynomial import polynomial as poly
 
 from armlock.axis.exponentials import EPSILON
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import FloatArray, check_memory, positive_number, real_array
-from armlock.stability.counts import sign_changes
+from armlock.stability.counts import axis_zeros
 
 
 class Line(NamedTuple):
@@ -190,7 +191,10 @@ def d_curve_line(system: CharacteristicFunction) -> Line:
     Line(weight_x=1.0, weight_y=1.0, value=2.0)
     """
     checked_system(system)
-    a, b1, b2 = (float(part.real) for part in system.parts(0.0))
+    # From coefficients, which are exact there.
+    at = 1.0 if system.step else 0.0
+    rest, b1, b2 = (float(poly.polyval(at, p.coefficients)) for p in system.polynomials())
+    a = rest + system.reference[0] * b1 + system.reference[1] * b2
     scale = max(b1, b2, key=abs)
     if scale == 0.0:
         raise ValueError(
@@ -256,7 +260,7 @@ def d_curve_branches(
     check_memory("omega_max", (int(min(density * turns, 1e18)),), 256)
     _, b1, b2 = system.on_boundary()
     determinant = b1.times_conjugate(b2)
-    poles = sign_changes(determinant, [(0.0, omega_max)])[0]
+    poles = axis_zeros(determinant, [(0.0, omega_max)]).omega
     edges = np.unique(np.concatenate(([0.0], poles, [omega_max])))
     branches = []
     for start, stop in pairwise(edges):

@@ -25,8 +25,8 @@ from armlock.loops import Loop, LoopAt
 from armlock.stability.bounds import last_frequency, last_larger
 from armlock.stability.counts import (
     CountError,
+    axis_zeros,
     loop_count,
-    sign_changes,
 )
 
 if TYPE_CHECKING:
@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 _STRAIGHT = 0.1
 # Most that 1 + L turns between two samples, in rad, unless it passes through zero.
 _MOST_TURN = 1.0
+# Where |L| is below it no crossing of the negative real axis is of interest.
+_SMALL = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +64,8 @@ class NyquistCurve:
         P, poles of L in the open right half-plane.
     closed_loop_roots : int
         Z = N + P, zeros of 1 + L in the right half-plane.
+    point : LoopAt
+        The loop, c1 and c2.
 
     Examples
     --------
@@ -79,6 +83,7 @@ class NyquistCurve:
     encirclements: int
     open_loop_poles: int
     closed_loop_roots: int
+    point: LoopAt
 
     def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
         """Draw the curve, both signs of omega, with -1 and the infinite branch.
@@ -154,7 +159,7 @@ def _resolving_grid(loop: Loop, c1: float, c2: float, end: float) -> FloatArray:
     """Frequencies from 0 to `end` between which neither D nor R turns by much."""
     grids = []
     for part in (loop.sum_at(c1, c2), loop.rest_on_boundary()):
-        grids.append(resolved_grid(part.compiled(), end, _STRAIGHT))
+        grids.append(resolved_grid(part.compiled(), end, _STRAIGHT, MOST_SAMPLES))
     if any(grid[-1] < end for grid in grids):
         raise CountError(
             f"no samples up to omega = {end} rad/s: more than {MOST_SAMPLES:.0e}, "
@@ -277,6 +282,7 @@ def nyquist(
         encirclements=encirclements,
         open_loop_poles=poles,
         closed_loop_roots=count,
+        point=point,
     )
 
 
@@ -310,12 +316,13 @@ def axis_crossings(
         or not given where |L| does not fall below 1e-3, or L has poles on the imaginary axis
         elsewhere than at s = 0.
     CountError
-        If there are too many crossings to be found.
+        If there are too many crossings to be found, or rounding hides some.
 
     Notes
     -----
     Zeros of Im L at omega > 0, found with certified steps: none is missed, however close to
-    another. Where L(0) is finite the whole curve also meets the axis there.
+    another. Where rounding may hide one they are refused, but next to a null, below 1e-3. Where
+    L(0) is finite the whole curve also meets the axis there.
 
     Examples
     --------
@@ -329,7 +336,7 @@ def axis_crossings(
     loop, c1, c2 = point = LoopAt.of(loop, c1, c2)
     open_loop_poles(loop)
     if omega_max is None:
-        factors = np.array([1.0 + abs(c1), 1.0 + abs(c2)]) / 1e-3
+        factors = np.array([1.0 + abs(c1), 1.0 + abs(c2)]) / _SMALL
         omega_max = last_larger(loop.rest, (loop.b1, loop.b2), factors)
         if not np.isfinite(omega_max):
             raise ValueError(
@@ -338,8 +345,17 @@ def axis_crossings(
             )
     else:
         omega_max = positive_number("omega_max", omega_max)
-    crossing = point.numerator().times_conjugate(loop.rest_on_boundary())
-    omega, jump, _ = sign_changes(crossing, [(0.0, omega_max)])
-    omega = omega[(omega > 0.0) & (jump != 0)]
+    below = loop.rest_on_boundary()
+    crossing, measure = point.numerator().times_conjugate(below), below.times_conjugate(below)
+    zeros = axis_zeros(crossing, [(0.0, omega_max)], measure)
+    inside = zeros.omega > 0.0
+    hidden = inside & zeros.hidden & ~(zeros.position - zeros.spread > -_SMALL)
+    if hidden.any():
+        raise CountError(
+            f"no crossings at (c1, c2) = ({c1}, {c2}): rounding hides some around "
+            f"{zeros.omega[hidden][0]} rad/s",
+            np.array([[c1, c2]]),
+        )
+    omega = zeros.omega[inside & ~zeros.hidden]
     value = point.response(omega).real
     return AxisCrossings(omega[value < 0.0], value[value < 0.0])

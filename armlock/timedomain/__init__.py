@@ -8,9 +8,7 @@ from armlock.timedomain.simulation import (
     DivergenceError,
     Simulation,
     sampled_open_loop,
-    save_series,
     simulate,
-    simulate_blocks,
 )
 from armlock.timedomain.spectra import Spectrum, SpectrumEstimator, amplitude_spectrum
 
@@ -25,7 +23,5 @@ __all__ = [
     "amplitude_spectrum",
     "band_rms",
     "sampled_open_loop",
-    "save_series",
     "simulate",
-    "simulate_blocks",
 ]

@@ -21,9 +21,11 @@ from armlock.checks import (
     check_memory,
     positive_number,
     real_array,
+    true_or_false,
     whole_number,
 )
 from armlock.controllers import Controller
+from armlock.progress import progress
 from armlock.timedomain.discretize import (
     Rows,
     sampled_filter,
@@ -31,6 +33,9 @@ from armlock.timedomain.discretize import (
     through,
     warped,
 )
+
+# Samples that are drawn at a time.
+_BLOCK = 1 << 20
 
 #: Zeros and pole, in rad per sample, that raise the sampled 1/f density to the prescribed one.
 _LASER_ZEROS, _LASER_POLE = (2.37, 7.87), 6.03
@@ -108,7 +113,7 @@ class ShapedNoise:
             if pole.real >= 0.0:
                 raise ValueError(f"poles must lie in the left half-plane, got {pole} rad/s")
         self.seed = whole_number("seed", seed, 0)
-        self.at_rest = at_rest
+        self.at_rest = true_or_false("at_rest", at_rest)
         self._random = np.random.default_rng(self.seed)
         self._sampled = sampled_filter(self._filter, self.sample_rate)
         # White samples of variance one have the one-sided density 2 / sample_rate.
@@ -167,8 +172,14 @@ class ShapedNoise:
         """
         count = whole_number("samples", samples, 0)
         check_memory("samples", (count,), 8)
-        series = self._scale * self._random.standard_normal(count)
-        _shape(series, self._sampled.gain, self._sampled.sections, self._state)
+        series = np.empty(count)
+        with progress("noise", count) as say:
+            for at in range(0, count, _BLOCK):
+                part = series[at : at + _BLOCK]
+                self._random.standard_normal(out=part)
+                part *= self._scale
+                _shape(part, self._sampled.gain, self._sampled.sections, self._state)
+                say(at + _BLOCK)
         return series
 
     def blocks(self, samples: int, size: int = 1 << 20) -> Iterator[FloatArray]:
@@ -181,12 +192,18 @@ class ShapedNoise:
         size : int, optional
             Largest size of a block, one or more.
 
-        Yields
+        Returns
+        -------
+        iterator of float arrays
+            Each block is drawn when its turn comes.
+
+        Raises
         ------
-        float array
+        ValueError
+            If `samples` is not a whole number from zero on, or `size` not one from one on.
         """
-        for first in range(0, samples, size):
-            yield self.draw(min(size, samples - first))
+        samples, size = whole_number("samples", samples, 0), whole_number("size", size, 1)
+        return (self.draw(min(size, samples - at)) for at in range(0, samples, size))
 
 
 @njit(cache=True, nogil=True)

@@ -9,7 +9,8 @@ Sensor and controller are sampled by the trapezoidal rule, see `armlock.timedoma
 Without a dead time the present phi is on both sides, with a weight of thousands; each sample
 solves for it. A rule that took the previous phi instead would be unstable by itself as soon as
 gain times step exceeds about one, and is not offered. A delay that is no whole number of
-samples is interpolated, with the weights of `lagrange_delay`.
+samples is interpolated, with the weights of `lagrange_delay`; those of a delay that moves
+follow it sample by sample.
 
 Because s = j omega becomes (2 j / T) tan(omega T / 2) while the delays stay what they are,
 what is simulated has an open loop in closed form, `sampled_open_loop`.
@@ -18,10 +19,8 @@ what is simulated has an open loop in closed form, `sampled_open_loop`.
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Iterable, Iterator, Sequence
-from pathlib import Path
-from typing import BinaryIO
+import sys
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +29,7 @@ from armlock.axis.compiled import njit
 from armlock.checks import (
     ComplexArray,
     FloatArray,
+    check_memory,
     finite_series,
     positive_array,
     positive_number,
@@ -37,24 +37,51 @@ from armlock.checks import (
     whole_number,
 )
 from armlock.loops import Loop, checked_loop
+from armlock.progress import progress
 from armlock.timedomain.discretize import SampledFilter, SampledSensor, sampled_loop, warped
 
 #: Order of the Lagrange interpolation for delays that are not whole samples: odd.
 INTERPOLATION_ORDER = 7
 #: Samples that are computed at a time, of all runs; results do not depend on it.
 BLOCK = 1 << 16
+#: More are, up to this, where the past is long, which is moved with each block.
+MOST = 1 << 22
 #: Runs of an ensemble that go side by side. Fewer than half as many go one by one.
 LANES = 32
-#: The output counts as diverged when it exceeds the largest input so far by this factor.
+#: The output counts as diverged when it exceeds the largest input so far by this factor. What
+#: the arms hold at the start, the history, is input too.
 LIMIT = 1e6
 
-#: A delay in samples, phi(t - tau) = sum_k weights[k] phi[n - first - k]: (first, weights).
+#: A constant delay in samples, phi(t - tau) = sum_k weights[k] phi[n - first - k].
 Delay = tuple[int, tuple[float, ...]]
+#: A delay that moves, in samples with a run in each column, and the scales of `_between`.
+MovingDelay = tuple[FloatArray, tuple[float, ...]]
+#: What the caller gives for tau1 and tau2: a number, a series, or a function of the time in s.
+GivenDelay = npt.ArrayLike | Callable[[FloatArray], npt.ArrayLike]
 #: A loop in samples: delays of both arms and the dead time, sensor, controller.
-SampledLoop = tuple[tuple[Delay, ...], SampledSensor, SampledFilter]
+SampledLoop = tuple[tuple[Delay | MovingDelay, ...], SampledSensor, SampledFilter]
 
 # Delays closer to whole samples than this, in samples, are whole.
 _WHOLE = 1e-6
+# Interpolated are so many samples on either side of a delay.
+_SIDE = (INTERPOLATION_ORDER + 1) // 2
+# Factors of a pair of samples, see `_between`: 1 / prod (k - j) over all nodes j but k.
+_SCALES = tuple(
+    1.0 / math.prod(k - j for j in range(2 * _SIDE) if j != k) for k in range(_SIDE, 2 * _SIDE)
+)
+# A round trip is 1 - (1 - v1 / c) (1 - v2 / c) longer a second, where the ends part at speeds
+# v1 and v2: between these, whatever moves slower than light.
+_SLOWEST, _FASTEST = -3.0, 1.0
+# Samples kept behind the longest delay, for arms that have grown during a gap of the run.
+_SPARE = 64
+
+_HISTORY = "not reach back past the history, which begins at t = {:.9g} s"
+
+# Rows of the working memory of a run, of lanes side by side: what the controller sends with the
+# next sample if no input comes; the late light of both arms, the input and the output of this
+# sample; the largest input so far, and the number of the last output not above it. The states
+# of sensor and controller follow.
+_PREDICTED, _LATE1, _LATE2, _INPUT, _OUTPUT, _LARGEST, _BOUNDED, _STATES = range(8)
 
 
 class DivergenceError(ArithmeticError):
@@ -64,7 +91,7 @@ class DivergenceError(ArithmeticError):
     ----------
     time : float
         When it began, in s: the last time at which the output was no larger than the largest
-        input so far.
+        input so far, noise or history.
     detected : float
         When the output exceeded that input by the limit, in s.
     output : float array
@@ -141,8 +168,8 @@ def lagrange_delay(name: str, tau: float, sample_rate: float) -> Delay:
         return whole, (1.0,)
     if first < 1:
         raise ValueError(
-            f"sample_rate must be at least {half / tau} Hz to interpolate {name} = {tau} s, "
-            f"or a multiple of {1.0 / tau} Hz, got {sample_rate}"
+            f"sample_rate must be at least {half / tau:.9g} Hz to interpolate {name} = {tau} "
+            f"s, or a multiple of {1.0 / tau:.9g} Hz, got {sample_rate:.9g}"
         )
     x = samples - first
     nodes = range(INTERPOLATION_ORDER + 1)
@@ -152,20 +179,101 @@ def lagrange_delay(name: str, tau: float, sample_rate: float) -> Delay:
 
 def _sampled_delays(loop: Loop, sample_rate: float) -> tuple[Delay, ...]:
     """Return the delays of both arms and the dead time, or say why they have no samples."""
-    return tuple(
-        lagrange_delay(name, getattr(loop, name), sample_rate)
-        for name in ("tau1", "tau2", "delay")
-    )
+    arms = [lagrange_delay(name, getattr(loop, name), sample_rate) for name in ("tau1", "tau2")]
+    try:
+        return (*arms, lagrange_delay("delay", loop.delay, sample_rate))
+    except ValueError as error:
+        phase = math.pi * sample_rate * loop.delay
+        raise ValueError(
+            f"{error}; loop.replace(delay=0.0) neglects the dead time, which changes the phase "
+            f"of L by {phase:.3g} rad at {0.5 * sample_rate:g} Hz, the highest frequency "
+            f"simulated, and by less below"
+        ) from None
+
+
+def _reach(delay: Delay) -> int:
+    """Return how many samples a constant delay reaches back."""
+    first, weights = delay
+    return first + len(weights) - 1
 
 
 @njit(cache=True)
 def _late(signal: FloatArray, row: int, column: int, delay: Delay) -> float:
-    """Return a column of a signal as it was a delay before a row."""
+    """Return a column of a signal as it was a constant delay before a row."""
     first, weights = delay
     value = 0.0
     for k in range(len(weights)):
         value += weights[k] * signal[np.uintp(row - first - k), column]
     return value
+
+
+@njit(cache=True)
+def _between(
+    signal: FloatArray, middle: int, column: int, u: float, scales: tuple[float, ...]
+) -> float:
+    """Return a column of a signal between two rows, at middle - 1/2 - u with abs(u) <= 1/2.
+
+    Lagrange's polynomial, as in `lagrange_delay`, its nodes taken by twos: with u counted from
+    the middle, those at h and -h contribute, of q(i) = u^2 - i^2 for i = 1/2, 3/2, ...
+
+        prod_{i != h} q(i) scale(h) ((u + h) y(h) - (u - h) y(-h)) .
+
+    At a node it is that sample, bit by bit.
+    """
+    square, value = u * u, 0.0
+    q1, q2, q3, q4 = square - 0.25, square - 2.25, square - 6.25, square - 12.25
+    near, far = q1 * q2, q3 * q4
+    products = q2 * far, q1 * far, near * q4, near * q3
+    for k in range(4):
+        h = k + 0.5
+        later = signal[np.uintp(middle + k), column]
+        earlier = signal[np.uintp(middle - 1 - k), column]
+        value += (products[k] * scales[k]) * ((u + h) * earlier - (u - h) * later)
+    return value
+
+
+@njit(cache=True)
+def _receive(
+    lanes: tuple[int, ...],
+    first: int,
+    phi: FloatArray,
+    now: int,
+    c: FloatArray,
+    delay: Delay | MovingDelay,
+    i: int,
+    work: FloatArray,
+    late: int,
+) -> None:
+    """Put the late light of an arm, c(t) phi(t - tau(t)), into the lanes of a row of `work`.
+
+    `now` is the present row of phi, and `i` that of c, unless it has only one, and of a delay
+    that moves. See `_compute` for the rest.
+    """
+    start, weights = delay
+    at = np.uintp(i * (len(c) > 1))
+    if isinstance(start, int):  # known when it is compiled
+        for w in range(len(lanes)):
+            column = np.uintp(first + w)
+            work[late + np.uintp(w)] = c[at, column] * _late(phi, now, column, delay)
+    else:
+        # Where all lanes have the same whole samples, they read from the same rows.
+        whole, others = np.floor(start[i, first]), 0
+        for w in range(len(lanes)):
+            others += np.floor(start[i, np.uintp(first + w)]) != whole
+        if others == 0:
+            middle = now - int(whole)
+            for w in range(len(lanes)):
+                column = np.uintp(first + w)
+                u = start[i, column] - whole - 0.5
+                received = _between(phi, middle, column, u, weights)
+                work[late + np.uintp(w)] = c[at, column] * received
+        else:
+            for w in range(len(lanes)):
+                column = np.uintp(first + w)
+                whole = np.floor(start[i, column])
+                u = start[i, column] - whole - 0.5
+                received = _between(phi, now - int(whole), column, u, weights)
+                work[late + np.uintp(w)] = c[at, column] * received
 
 
 @njit(cache=True, nogil=True)
@@ -183,13 +291,11 @@ def _compute(
     """Compute the last rows of phi, and of what the controller sends, from those before.
 
     These and `inputs`, which are noise, c1 and c2, hold a sample in each row and a run in each
-    column; of c1 and c2 a single row is for all samples. The runs from column `first` on go
-    side by side in lanes, so that one instruction works on several of them; the length of
-    `lanes` is their number, for the compiler to know.
+    column, as delays that move do; of c1 and c2 a single row is for all samples. The runs from
+    column `first` on go side by side in lanes, so that one instruction works on several of
+    them; the length of `lanes` is their number, for the compiler to know. `work` holds their
+    rows one behind the other: see `_STATES`.
 
-    `work` holds, each for all lanes: the states of sensor and controller; what they send with
-    the next sample if no input comes; for one sample the light of both arms, the input, and
-    the output; the largest input so far, and the number of the last output not above it.
     Returns the index of the sample at which an output exceeds `limit` times the largest input,
     or how many there are.
     """
@@ -200,13 +306,10 @@ def _compute(
     # Unsigned, because a negative index would count from the end, which takes time to check.
     # One array, because the compiler would have to check that several do not overlap.
     row = np.uintp(size)
-    coming = np.uintp((m + 2 * n) * size)
-    light1 = coming + row
-    light2 = light1 + row
-    free = light2 + row
-    output = free + row
-    most = output + row
-    calm = most + row
+    predicted, given, output = _PREDICTED * row, _INPUT * row, _OUTPUT * row
+    late1, late2 = _LATE1 * row, _LATE2 * row
+    largest, bounded = _LARGEST * row, _BOUNDED * row
+    sensing, filtering = _STATES * row, (_STATES + m) * row
     # What an input adds to the present output, and by way of the states to the next.
     direct1, direct2 = sensor.direct
     _, next1, next2 = rows[m - 1]
@@ -216,38 +319,32 @@ def _compute(
     now1, now2, next1, next2 = gain * direct1, gain * direct2, gain * next1, gain * next2
     implicit = dead[0] == 0
     inverse = 1.0 / (1.0 + now1 + now2)
-    varies1, varies2 = len(c1) > 1, len(c2) > 1
     for i in range(len(noise)):
         now = len(phi) - len(noise) + i
-        at, at1, at2 = np.uintp(i), np.uintp(i * varies1), np.uintp(i * varies2)
+        _receive(lanes, first, phi, now, c1, arm1, i, work, late1)
+        _receive(lanes, first, phi, now, c2, arm2, i, work, late2)
         for w in range(size):
-            column = np.uintp(first + w)
-            work[light1 + np.uintp(w)] = c1[at1, column] * _late(phi, now, column, arm1)
-        for w in range(size):
-            column = np.uintp(first + w)
-            work[light2 + np.uintp(w)] = c2[at2, column] * _late(phi, now, column, arm2)
-        for w in range(size):
-            work[free + np.uintp(w)] = noise[at, np.uintp(first + w)]
+            work[given + np.uintp(w)] = noise[np.uintp(i), np.uintp(first + w)]
         for w in range(size):
             lane, column = np.uintp(w), np.uintp(first + w)
-            a1, a2, x = work[light1 + lane], work[light2 + lane], work[free + lane]
+            a1, a2, x = work[late1 + lane], work[late2 + lane], work[given + lane]
             if implicit:
-                # phi = noise - coming - now1 (phi - a1) - now2 (phi - a2), solved for phi.
-                x = (x + (now1 * a1 + now2 * a2) - work[coming + lane]) * inverse
+                # phi = noise - predicted - now1 (phi - a1) - now2 (phi - a2), solved for phi.
+                x = (x + (now1 * a1 + now2 * a2) - work[predicted + lane]) * inverse
             else:
                 x -= _late(sent, now, column, dead)
                 sending = now1 * (x - a1) + now2 * (x - a2)
-                sent[np.uintp(now), column] = work[coming + lane] + sending
+                sent[np.uintp(now), column] = work[predicted + lane] + sending
             work[output + lane] = x
         for w in range(size):
             lane = np.uintp(w)
             x = work[output + lane]
-            u1, u2 = x - work[light1 + lane], x - work[light2 + lane]
+            u1, u2 = x - work[late1 + lane], x - work[late2 + lane]
             # The states move on; what they send next does not wait for what u1 and u2 do.
-            top, below, ready = work[np.uintp((m - 1) * size) + lane], 0.0, 0.0
+            top, below, ready = work[sensing + np.uintp((m - 1) * size) + lane], 0.0, 0.0
             for j in range(m):
                 q, b1, b2 = rows[j]
-                state = np.uintp(j * size) + lane
+                state = sensing + np.uintp(j * size) + lane
                 old = work[state]
                 ready = old + (below - q * top)
                 work[state] = ready + (b1 * u1 + b2 * u2)
@@ -255,23 +352,23 @@ def _compute(
             v, direct = top, direct1 * u1 + direct2 * u2
             for j in range(n):
                 r1, r2, k, t1, t2 = sections[j]
-                state = np.uintp((m + 2 * j) * size) + lane
+                state = filtering + np.uintp(2 * j * size) + lane
                 w1, w2 = work[state], work[state + row]
                 new1 = w1 + (r1 * w1 - k * w2 + v)
                 new2 = w2 + (r2 * w2 + w1)
                 ready += t1 * new1 + t2 * new2
                 v += t1 * w1 + t2 * w2
                 work[state], work[state + row] = new1 + direct, new2
-            work[coming + lane] = gain * ready + (next1 * u1 + next2 * u2)
+            work[predicted + lane] = gain * ready + (next1 * u1 + next2 * u2)
         number, exceeded = float(done + i), 0
         for w in range(size):
             lane = np.uintp(w)
-            amount, given = abs(work[output + lane]), abs(work[free + lane])
-            largest = work[most + lane]
-            largest = given if given > largest else largest
-            work[most + lane] = largest
-            work[calm + lane] = number if amount <= largest else work[calm + lane]
-            exceeded += 0 if amount <= limit * largest else 1
+            amount, put_in = abs(work[output + lane]), abs(work[given + lane])
+            most = work[largest + lane]
+            most = put_in if put_in > most else most
+            work[largest + lane] = most
+            work[bounded + lane] = number if amount <= most else work[bounded + lane]
+            exceeded += 0 if amount <= limit * most else 1
         for w in range(size):
             phi[np.uintp(now), np.uintp(first + w)] = work[output + np.uintp(w)]
         if exceeded:
@@ -292,7 +389,9 @@ def _series(name: str, value: npt.ArrayLike, like: FloatArray) -> FloatArray:
 
 def _in_columns(series: FloatArray, number: int) -> FloatArray:
     """Return samples in rows, as compiled code takes them, the last run repeated at the end."""
-    if series.shape[1] < number:
+    if series.shape[1] == 1 < number:
+        series = np.broadcast_to(series, (len(series), number))
+    elif series.shape[1] < number:
         series = series[:, np.minimum(np.arange(number), series.shape[1] - 1)]
     return np.require(series, requirements=["C", "W"])
 
@@ -369,6 +468,78 @@ def sampled_open_loop(
     return np.asarray(dead * loop.controller(s) * sensor)
 
 
+class _MovingArm:
+    """The delay of one arm during a call: a series, or a function of time.
+
+    `begin` is the number of the call's first sample in the run.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        given: FloatArray | Callable[[FloatArray], npt.ArrayLike],
+        rate: float,
+        begin: int,
+    ) -> None:
+        self._name, self._given, self._rate, self._begin = name, given, rate, begin
+        self._last: FloatArray | None = None
+
+    def part(self, noise: FloatArray, number: int, known: int) -> tuple[FloatArray, int]:
+        """Return the delays of a block in samples, in rows, and how far they reach back.
+
+        `noise` is that of the block, `number` that of its first sample in the run, and so many
+        samples are `known` before it.
+        """
+        if callable(self._given):
+            tau = self._called(self._given, number, noise)
+        else:
+            tau = self._given[number - self._begin :][: len(noise)]
+        # Behind the last sample of the block before, in few arrays: new memory takes time.
+        rows = np.empty((len(tau) + 1, tau.shape[1]))
+        samples = np.multiply(tau, self._rate, out=rows[1:])
+        rows[0] = samples[0] if self._last is None else self._last
+        self._last = samples[-1].copy()
+        change = np.diff(rows, axis=0)
+        right = samples.min() >= _SIDE and change.min() > _SLOWEST and change.max() < _FASTEST
+        # Then no later sample reaches further back than those of the first row.
+        reach = int(samples[0].max()) + _SIDE
+        if right and reach <= known:
+            return samples, reach
+        wrong = (samples < _SIDE) | (change <= _SLOWEST) | (change >= _FASTEST)
+        i, w = (0, samples[0].argmax()) if right else np.argwhere(wrong)[0]
+        if samples[i, w] < _SIDE:
+            constraint = f"be at least {_SIDE / self._rate} s where it is not constant"
+        elif wrong[i, w]:
+            constraint = (
+                f"change by more than {_SLOWEST:g} and less than {_FASTEST:g} s a second, as "
+                f"round trips do at less than the speed of light"
+            )
+        else:
+            begin = (number - known) / self._rate
+            constraint = _HISTORY.format(begin)
+        time = (number + i) / self._rate
+        raise ValueError(
+            f"{self._name} must {constraint}, got {tau[i, w]} s at t = {time:.9g} s"
+        )
+
+    def _called(
+        self,
+        function: Callable[[FloatArray], npt.ArrayLike],
+        number: int,
+        noise: FloatArray,
+    ) -> FloatArray:
+        """Return what a function of time gives, in rows."""
+        time = np.arange(number, number + len(noise), dtype=np.float64)
+        time /= self._rate
+        name = f"{self._name}(t), for t from {time[0]:.9g} s on,"
+        tau = finite_series(name, function(time), 0, 1, 2)
+        if tau.shape not in ((), time.shape, noise.T.shape):
+            raise ValueError(
+                f"{name} must be a number or have the shape of t, {time.shape}; got {tau.shape}"
+            )
+        return np.atleast_2d(tau if tau.ndim else np.full(time.shape, tau)).T
+
+
 class Simulation:
     r"""A loop that is run block by block, and remembers where it is.
 
@@ -380,10 +551,11 @@ class Simulation:
         In Hz.
     history : float or array_like, optional
         The locked laser's noise before the first sample, the latest value last: a constant,
-        or at least `history_samples` values. Controller and sensor start at rest.
+        or at least `history_samples` values, and as many as delays that move reach back at
+        the start. Controller and sensor start at rest.
     limit : float, optional
-        The run counts as diverged when the output exceeds the largest input so far by this
-        factor.
+        The run counts as diverged when the output exceeds the largest input so far, noise or
+        history, by this factor.
     draws : int, optional
         Runs an ensemble of so many, side by side: noise, c1 and c2 have a row for each.
 
@@ -392,7 +564,7 @@ class Simulation:
     samples : int
         How many samples were computed.
     history_samples : int
-        How many samples the longest delay reaches back.
+        How many samples the loop's own longest delay reaches back.
 
     Raises
     ------
@@ -420,8 +592,21 @@ class Simulation:
         \varphi[n] = \frac{\varphi_0[n] - r[n] + g \left( d_1 a_1[n] + d_2 a_2[n] \right)}
         {1 + g \left( d_1 + d_2 \right)} .
 
+    A delay that moves is interpolated in every sample, with the weights that the same formula
+    gives for :math:`\tau_k[n]`: where it is whole samples, that sample. In a second it changes
+    by more than -3 and less than 1 s, as round trips do whose ends move at less than the speed
+    of light: with speeds :math:`v_1`, :math:`v_2` of the ends apart,
+
+    .. math::
+
+        \dot\tau = 1 - \left( 1 - \frac{v_1}{c} \right) \left( 1 - \frac{v_2}{c} \right) .
+
     One call and many give the same samples, bit by bit, and so do an ensemble and its runs one
-    by one. An ensemble takes `LANES` runs at a time, whose samples the processor's vector units
+    by one. A run goes on after a gap as if there were none: its arms hold what they held. Its
+    state is the output as far back as delays reach, and some numbers more, 68 kB for the
+    paper's loop at 200 Hz; ``copy.deepcopy(run)`` and ``pickle.dumps(run)`` keep it.
+
+    An ensemble takes `LANES` runs at a time, whose samples the processor's vector units
     compute together. Of arrays in Fortran order, where the same sample of all runs stands side
     by side, nothing has to be copied.
 
@@ -433,6 +618,14 @@ class Simulation:
     >>> first, second = run.advance(np.ones(400)), run.advance(np.ones(400))
     >>> run.samples
     800
+
+    The state goes into a file, and another process goes on from there:
+
+    >>> import pickle
+    >>> saved = pickle.dumps(run)
+    >>> later = pickle.loads(saved)
+    >>> bool(np.array_equal(later.advance(np.ones(400)), run.advance(np.ones(400))))
+    True
     """
 
     def __init__(
@@ -448,35 +641,47 @@ class Simulation:
         self.sample_rate = positive_number("sample_rate", sample_rate)
         self.limit = positive_number("limit", limit)
         self.draws = None if draws is None else whole_number("draws", draws, 1)
-        delays = _sampled_delays(loop, self.sample_rate)
+        self._delays = _sampled_delays(loop, self.sample_rate)
         sensor, controller = sampled_loop(loop.controller, loop.mapping, self.sample_rate)
-        self._sampled: SampledLoop = delays, sensor, controller
-        self.history_samples = max(first + len(weights) - 1 for first, weights in delays)
+        self._filters = sensor, controller
+        self.history_samples = max(_reach(delay) for delay in self._delays)
         before = finite_series("history", history, 0, 1)
         if before.ndim and before.size < self.history_samples:
             raise ValueError(
                 f"history must hold at least {self.history_samples} samples, as far as the "
                 f"longest delay reaches, got {before.size}"
             )
-        full, left = divmod(self.draws or 1, LANES)
+        self._history = before.copy()
+        # A block of samples of the output, and of what the controller has sent, stands behind
+        # some samples of the past, of which so many are known. They come with the first block.
+        columns = self.draws or 1
+        past = self.history_samples
+        self._block = max(BLOCK // columns, min(4 * past, max(past, MOST // columns)))
+        self._past = self._known = 0
+        for name, number in (("sample_rate", 1), ("draws", columns)):
+            check_memory(name, (2, past + self._block, number), 8)
+        full, left = divmod(columns, LANES)
         # The last runs may be few, and are then faster one by one.
         groups = [LANES] * full + ([1] * left if 2 * left < LANES else [LANES])
-        # See `_compute`: behind the states, five rows, the largest input, the last calm sample.
-        rows = len(sensor.states) + 2 * len(controller.sections) + 7
+        rows = _STATES + len(sensor.states) + 2 * len(controller.sections)
         self._groups = [np.zeros((rows, lanes)) for lanes in groups]
-        # Of the output and of what the controller has sent a block, behind as many samples as
-        # delays reach back.
-        past = self.history_samples
-        self._block = max(BLOCK // sum(groups), 4 * past)
-        self._signals = np.zeros((2, past + self._block, sum(groups)))
-        self._signals[0, :past] = before[-past:, None] if before.ndim else before
-        for work in self._groups:
-            work[-2] = np.abs(self._signals[0, :past]).max()
+        self._signals = np.zeros((2, 0, sum(groups)))
         self._stopped: tuple[float, float] | None = None
+        self._within = False
         self.samples = 0
 
+    def __getstate__(self) -> dict[str, object]:
+        """Leave out the room for the next block."""
+        return self.__dict__ | {"_signals": self._signals[:, : self._past].copy()}
+
     def advance(
-        self, noise: npt.ArrayLike, c1: npt.ArrayLike = 1.0, c2: npt.ArrayLike = 1.0
+        self,
+        noise: npt.ArrayLike,
+        c1: npt.ArrayLike = 1.0,
+        c2: npt.ArrayLike = 1.0,
+        *,
+        tau1: GivenDelay | None = None,
+        tau2: GivenDelay | None = None,
     ) -> FloatArray:
         """Compute the next block.
 
@@ -486,6 +691,11 @@ class Simulation:
             Free-running noise of the laser; the output has its unit.
         c1, c2 : float or array_like of the same shape, optional
             Multiplicative perturbations.
+        tau1, tau2 : float, array_like of the same shape, or callable, optional
+            Delays of the arms in s, in place of the loop's own. A callable takes an array of
+            times in s from the first sample of the run on, and returns a number, an array of
+            the same shape, or for an ensemble one of shape (draws, n). It is called for some
+            ten thousand samples at a time.
 
         Returns
         -------
@@ -496,51 +706,142 @@ class Simulation:
         ------
         TypeError, ValueError
             If an argument is not finite and real, or of another shape; nothing is computed.
+            If a delay is shorter than four samples, though not constant, reaches back past the
+            history, or changes faster than light allows; the message names the time, and
+            `samples` says how far the run has come.
         DivergenceError
             If the output leaves all bounds. The run cannot be continued.
         """
         given = finite_series("noise", noise, 1 if self.draws is None else 2)
         if self.draws not in (None, len(given)):
             raise ValueError(f"noise must have {self.draws} rows, got shape {given.shape}")
-        return self._advance(given, c1, c2)
+        return self._advance(given, c1, c2, tau1, tau2)
 
-    def _advance(self, given: FloatArray, c1: npt.ArrayLike, c2: npt.ArrayLike) -> FloatArray:
+    def _advance(
+        self,
+        given: FloatArray,
+        c1: npt.ArrayLike,
+        c2: npt.ArrayLike,
+        tau1: GivenDelay | None,
+        tau2: GivenDelay | None,
+    ) -> FloatArray:
         """Compute the next block of noise that is already checked."""
         inputs = [np.atleast_2d(given).T, _series("c1", c1, given), _series("c2", c2, given)]
+        arms = [self._arm(k, tau, given) for k, tau in enumerate((tau1, tau2))]
+        if self._within:
+            raise RuntimeError(
+                "this run was interrupted in the middle of a block, and cannot go on: begin "
+                "again, or with a copy made before"
+            )
         output, begin = np.empty(inputs[0].shape), self.samples
         shaped = output.T.reshape(given.shape)
-        for at in range(0, len(output), self._block):
-            part = slice(at, at + self._block)
-            if self._stopped is None:
-                self._fill(output[part], *(s[part] if len(s) > 1 else s for s in inputs))
-            if self._stopped is not None:
-                # A copy, so that the error does not hold all the memory of the run.
-                until = shaped[..., : self.samples - begin].copy()
-                raise DivergenceError(*self._stopped, until)
+        with progress("simulation", len(output)) as say:
+            for at in range(0, len(output), self._block):
+                part = slice(at, at + self._block)
+                if self._stopped is None:
+                    block = [s[part] if len(s) > 1 else s for s in inputs]
+                    self._fill(output[part], block, arms)
+                if self._stopped is not None:
+                    # A copy, so that the error does not hold all the memory of the run.
+                    until = shaped[..., : self.samples - begin].copy()
+                    raise DivergenceError(*self._stopped, until)
+                say(at + self._block)
         return shaped
 
+    def _arm(self, k: int, tau: GivenDelay | None, like: FloatArray) -> Delay | _MovingArm:
+        """Return a constant delay in samples, or one that moves; the loop's own for None."""
+        name, delay = f"tau{k + 1}", self._delays[k]
+        if callable(tau):
+            return _MovingArm(name, tau, self.sample_rate, self.samples)
+        if tau is not None:
+            series = _series(name, tau, like)
+            if np.ndim(tau) > 0:
+                return _MovingArm(name, series, self.sample_rate, self.samples)
+            delay = lagrange_delay(name, positive_number(name, tau), self.sample_rate)
+        if _reach(delay) > self._reaches():
+            begin = (self.samples - self._reaches()) / self.sample_rate
+            raise ValueError(
+                f"{name} must {_HISTORY.format(begin)}, got "
+                f"{getattr(self.loop, name) if tau is None else tau} s at "
+                f"t = {self.samples / self.sample_rate:.9g} s"
+            )
+        return delay
+
     def _fill(
-        self, output: FloatArray, noise: FloatArray, c1: FloatArray, c2: FloatArray
+        self,
+        output: FloatArray,
+        inputs: Sequence[FloatArray],
+        arms: Sequence[Delay | _MovingArm],
     ) -> None:
         """Compute the next samples, each in a row, unless the run stops before."""
-        past, stop, first = self.history_samples, len(output), 0
-        columns = self._signals.shape[2]
+        stop, first, columns = len(output), 0, self._signals.shape[2]
+        dead = self._delays[2]
+        (arm1, reach1, kept1), (arm2, reach2, kept2) = (
+            self._delay(arm, inputs[0]) for arm in arms
+        )
+        past = self._make_room(max(reach1, reach2, _reach(dead)), max(kept1, kept2))
         phi, sent = self._signals[:, : past + stop]
-        inputs = tuple(_in_columns(series, columns) for series in (noise, c1, c2))
+        series = tuple(_in_columns(given, columns) for given in inputs)
+        sampled = (arm1, arm2, dead), *self._filters
+        self._within = True
         for work in self._groups:
             lanes = work.shape[1]
-            run = first, phi, sent, inputs, self._sampled, work.ravel(), self.limit
+            run = first, phi, sent, series, sampled, work.ravel(), self.limit
             end = _compute((0,) * lanes, *run, self.samples)
             if end < stop:
                 size = np.abs(phi[past + end, first : first + lanes])
-                calm = work[-1, np.argmin(size <= self.limit * work[-2])]
-                self._stopped = calm / self.sample_rate, (self.samples + end) / self.sample_rate
+                began = work[_BOUNDED, np.argmin(size <= self.limit * work[_LARGEST])]
+                self._stopped = (
+                    began / self.sample_rate,
+                    (self.samples + end) / self.sample_rate,
+                )
                 stop = end
             first += lanes
         output[:stop] = phi[past : past + stop, : output.shape[1]]
         for signal in self._signals:
             signal[:past] = signal[len(output) : len(output) + past]
+        self._known = min(self._known + stop, past)
         self.samples += stop
+        self._within = False
+
+    def _reaches(self) -> int:
+        """Return how many samples before the present are known."""
+        if self.samples:
+            return self._known
+        return self._history.size if self._history.ndim else sys.maxsize
+
+    def _delay(
+        self, arm: Delay | _MovingArm, noise: FloatArray
+    ) -> tuple[Delay | MovingDelay, int, int]:
+        """Return an arm's delay during a block, and how far it reaches back.
+
+        The latter from the block's first sample, and as far as its last delay from there.
+        """
+        if isinstance(arm, _MovingArm):
+            samples, reach = arm.part(noise, self.samples, self._reaches())
+            columns = _in_columns(samples, self._signals.shape[2])
+            return (columns, _SCALES), reach, int(samples[-1].max()) + _SIDE
+        reach = _reach(arm)
+        return arm, reach, reach
+
+    def _make_room(self, reach: int, kept: int) -> int:
+        """Make room for a block; return behind how many samples it stands.
+
+        These are no fewer than before, than the present block takes, which is `reach`, and
+        some more than the next one will, which is `kept`.
+        """
+        past = max(self._past, self.history_samples, reach, kept + _SPARE)
+        if self._signals.shape[1] < past + self._block:
+            signals = np.zeros((2, past + self._block, self._signals.shape[2]))
+            signals[:, past - self._past : past] = self._signals[:, : self._past]
+            self._signals, self._past = signals, past
+        if self.samples == 0:
+            self._known = min(self._reaches(), past)
+            before = self._history[-past:, None] if self._history.ndim else self._history
+            self._signals[0, past - self._known : past] = before
+            for work in self._groups:
+                work[_LARGEST] = np.abs(self._signals[0, past - reach : past]).max()
+        return past
 
 
 def simulate(
@@ -550,6 +851,8 @@ def simulate(
     c2: npt.ArrayLike = 1.0,
     sample_rate: float = 200.0,
     *,
+    tau1: GivenDelay | None = None,
+    tau2: GivenDelay | None = None,
     history: npt.ArrayLike = 0.0,
     limit: float = LIMIT,
 ) -> FloatArray:
@@ -560,7 +863,7 @@ def simulate(
     .. math::
 
         \varphi(t) &= \varphi_0(t) - K \left[ m_1 u_1 + m_2 u_2 \right](t) , \\
-        u_k(t) &= \varphi(t) - c_k(t)\, \varphi(t - \tau_k) ,
+        u_k(t) &= \varphi(t) - c_k(t)\, \varphi(t - \tau_k(t)) ,
 
     sampled as `Simulation` describes it.
 
@@ -574,10 +877,13 @@ def simulate(
         Multiplicative perturbations of the two arms, constant or sample by sample.
     sample_rate : float, optional
         In Hz.
+    tau1, tau2 : float, array_like of the same shape, or callable, optional
+        Delays of the arms in s, in place of the loop's own; see `Simulation.advance`.
     history : float or array_like, optional
         Output before the first sample, zero by default; see `Simulation`.
     limit : float, optional
-        Size of the output, in units of the largest input, that counts as diverged.
+        Size of the output that counts as diverged, in units of the largest input so far, noise
+        or history.
 
     Returns
     -------
@@ -587,11 +893,17 @@ def simulate(
     Raises
     ------
     TypeError, ValueError
-        If an argument is unsuitable; before anything is computed.
+        If an argument is unsuitable; before anything is computed, but for delays that move.
     DivergenceError
         If the output leaves all bounds, in an ensemble that of the first run to do so. It
         carries the time at which that began and the part computed so far. An unstable loop
         that has not grown so far by the end of the run returns its output.
+
+    Notes
+    -----
+    An arm returns c(t) times the signal as it was tau(t) ago, and no more. Where the signal is
+    a phase, that is all that a moving arm does to it. Where it is a frequency, the arm returns
+    :math:`(1 - \dot\tau)\, \nu(t - \tau)`: then c holds the factor :math:`1 - \dot\tau`.
 
     Examples
     --------
@@ -600,110 +912,13 @@ def simulate(
     >>> step = simulate(paper_loop(), np.ones(2000))
     >>> print(f"{step[0]:.4e}")
     9.9991e-05
+
+    An arm that grows by 10 m a second:
+
+    >>> drift = 2 * 10.0 / 299_792_458.0
+    >>> step = simulate(paper_loop(), np.ones(2000), tau1=lambda t: 20.1 + drift * t)
     """
     given = finite_series("noise", noise, 1, 2)
     draws = len(given) if given.ndim == 2 else None
     run = Simulation(loop, sample_rate, history=history, limit=limit, draws=draws)
-    return run._advance(given, c1, c2)
-
-
-def simulate_blocks(
-    loop: Loop,
-    blocks: Iterable[npt.ArrayLike | Sequence[npt.ArrayLike]],
-    sample_rate: float = 200.0,
-) -> Iterator[FloatArray]:
-    """Run a loop over a stream of blocks; memory does not grow with the duration.
-
-    Parameters
-    ----------
-    loop : Loop
-        The loop.
-    blocks : iterable
-        Of arrays of noise, or of tuples (noise, c1, c2). Their lengths may differ, zero
-        included.
-    sample_rate : float, optional
-        In Hz.
-
-    Yields
-    ------
-    float array, shaped like the block's noise
-        The same samples as `simulate` gives for the whole.
-
-    Raises
-    ------
-    TypeError, ValueError, DivergenceError
-        As `simulate` does.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from armlock import paper_loop, simulate_blocks
-    >>> blocks = (np.ones(500) for _ in range(4))
-    >>> sum(locked.size for locked in simulate_blocks(paper_loop(), blocks))
-    2000
-    """
-    run = Simulation(loop, sample_rate)
-    parts = (block if isinstance(block, tuple) else (block,) for block in blocks)
-    return (run.advance(*part) for part in parts)
-
-
-def save_series(path: str | os.PathLike[str], blocks: Iterable[FloatArray]) -> int:
-    """Write a stream of blocks as one NumPy file that exists only when it is complete.
-
-    Parameters
-    ----------
-    path : path_like
-        Name of the file, for instance one that ends in .npy.
-    blocks : iterable of float arrays
-        Each one-dimensional and finite, for instance from `simulate_blocks`.
-
-    Returns
-    -------
-    int
-        Number of samples written.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If a block is not a one-dimensional series of finite real numbers.
-    OSError
-        If the file cannot be written.
-
-    Notes
-    -----
-    The blocks go to a file whose name ends in .part, in the same folder, which takes the name
-    `path` when the last block is in. If anything stops the run, that file stays, and so does
-    what was at `path` before.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from pathlib import Path
-    >>> import numpy as np
-    >>> from armlock import paper_loop, save_series, simulate_blocks
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = Path(folder) / "locked.npy"
-    ...     blocks = simulate_blocks(paper_loop(), [np.ones(50), np.ones(50)])
-    ...     written = save_series(path, blocks)
-    ...     print(written, np.load(path).shape)
-    100 (100,)
-    """
-    path = Path(path)
-    temporary = path.with_name(f"{path.name}.part")
-    count = 0
-    with temporary.open("wb") as file:
-        # The header has room for any length: it is written again below.
-        _write_header(file, 0)
-        for number, block in enumerate(blocks):
-            values = finite_series(f"blocks[{number}]", block)
-            file.write(np.ascontiguousarray(values, dtype="<f8").tobytes())
-            count += values.size
-        file.seek(0)
-        _write_header(file, count)
-    temporary.replace(path)
-    return count
-
-
-def _write_header(file: BinaryIO, count: int) -> None:
-    description = {"descr": "<f8", "fortran_order": False, "shape": (count,)}
-    np.lib.format.write_array_header_1_0(file, description)
+    return run._advance(given, c1, c2, tau1, tau2)

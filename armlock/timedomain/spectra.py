@@ -26,7 +26,9 @@ from armlock.checks import (
     finite_series,
     positive_number,
     real_array,
+    real_number,
 )
+from armlock.progress import progress
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,6 +56,9 @@ _TAPS = 113
 _BETA = 20.0
 # Segments that are transformed together: few enough to stay in the processor's cache.
 _TRANSFORMS_AT_ONCE = 64
+
+# Samples of a long series that are taken in at a time: so the user is heard between them.
+_BLOCK = 1 << 20
 
 _WINDOW = np.kaiser(SEGMENT + 1, _BETA)[:-1]
 # Points a bin at which a given density is sampled for `Spectrum.expected`.
@@ -144,6 +149,8 @@ class Spectrum:
             If `asd` does not return finite real numbers for frequencies from zero to half the
             sample rate.
         """
+        if not callable(asd):
+            raise TypeError(f"asd must be a function of the frequency, got {asd!r}")
         spread, weights = _response()
         result = np.empty(self.frequency.size)
         for i, centre in enumerate(self.frequency):
@@ -167,7 +174,18 @@ class Spectrum:
         -------
         Spectrum
             It may be empty.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If a bound is no real number, or `high` lies below `low`.
         """
+        low, high = (
+            bound if isinstance(bound, float) and np.isinf(bound) else real_number(name, bound)
+            for name, bound in (("low", low), ("high", high))
+        )
+        if high < low:
+            raise ValueError(f"high must not lie below low = {low}, got {high}")
         keep = (self.frequency >= low) & (self.frequency <= high)
         return Spectrum(*(getattr(self, field.name)[keep] for field in fields(self)))
 
@@ -439,5 +457,9 @@ def amplitude_spectrum(series: npt.ArrayLike, sample_rate: float) -> Spectrum:
     True
     """
     estimator = SpectrumEstimator(sample_rate)
-    estimator.add(series)
+    given = finite_series("series", series)
+    with progress("spectrum", given.size) as say:
+        for at in range(0, given.size, _BLOCK):
+            estimator.add(given[at : at + _BLOCK])
+            say(at + _BLOCK)
     return estimator.spectrum()

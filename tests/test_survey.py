@@ -1,0 +1,162 @@
+"""What TDI leaves, against other ways to it, and the survey of a loop along an orbit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize_scalar
+
+from armlock import pulling, unstable_roots
+from armlock.orbits import kepler, read_table
+from armlock.orbits.__main__ import main
+from armlock.orbits.passages import DAY, YEAR, flight, loops, policies
+from armlock.orbits.survey import largest_pulling, outages, survey
+from armlock.orbits.tdi import flexing, ranging_residual
+
+KEPLER = kepler()
+LIGHT = 299_792_458.0
+DATA = Path(__file__).parents[1] / "book" / "data"
+TABLES = {name: read_table(DATA / f"esa_{name}.csv.gz") for name in ("trailing", "leading")}
+
+
+def test_a_metre_leaves_what_is_known():
+    x1, x2 = ranging_residual(2 * np.pi * 3e-3, 16.6794, 16.6146, 1.0 / LIGHT)
+    assert abs(x1 / 1.96108e-11 - 1) < 1e-5
+    assert abs(x2 / 1.21063e-11 - 1) < 1e-5
+    # The same error in both of two equal arms leaves nothing.
+    assert ranging_residual(0.02, 16.0, 16.0, 1e-8, 1e-8)[0] < 1e-24
+    with pytest.raises(ValueError, match="must broadcast"):
+        ranging_residual([1.0, 2.0], [16.0, 16.1, 16.2], 16.0)
+
+
+def nested(orbits, t, beams, master):
+    lengths = []
+    for beam in beams:
+        length = 0.0
+        for arm in beam:
+            length += float(orbits.round_trips(t - length, master)[arm - 1])
+        lengths.append(length)
+    return lengths[0] - lengths[1]
+
+
+@pytest.mark.parametrize("master", [1, 2, 3])
+def test_flexing_is_the_difference_of_the_beams(master):
+    # Near t = 0, where times are exact enough, and on long arms, which flex more.
+    long = kepler(1.2e10)
+    for t in (1e5, 1.1e6, 3e6):
+        first = nested(KEPLER, t, ((1, 2), (2, 1)), master)
+        assert abs(flexing(KEPLER, t, 1, master) - first) < 1e-3 * abs(first) + 1e-12
+        second = nested(long, t, ((1, 2, 2, 1), (2, 1, 1, 2)), master)
+        assert abs(flexing(long, t, 2, master) - second) < 0.02 * abs(second) + 3e-12
+
+
+def test_flexing_on_keplers_orbits_is_at_most_the_known_one():
+    t = np.linspace(0.0, YEAR, 2001)
+    sizes = LIGHT * np.abs(flexing(KEPLER, t, 1))
+    at = int(np.argmax(sizes))
+    top = minimize_scalar(
+        lambda x: -LIGHT * abs(float(flexing(KEPLER, x, 1))),
+        bounds=(t[max(at - 1, 0)], t[min(at + 1, 2000)]),
+        method="bounded",
+    )
+    assert abs(-top.fun - 65.45) < 0.01
+    with pytest.raises(ValueError, match="generation must be 1 or 2, got 3"):
+        flexing(KEPLER, 0.0, 3)
+
+
+def test_the_largest_pulling_is_no_point_of_a_grid():
+    loop = flight(16.68, 16.62, 0.03)
+    peak = largest_pulling(loop, "differential")
+    near = peak.time + np.linspace(-3.0, 3.0, 601)
+    sizes = np.abs(pulling(loop, near, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)))
+    assert abs(sizes.max() / peak.size - 1) < 1e-5
+    # It grows as one over the half difference.
+    nearer = largest_pulling(flight(16.653, 16.647, 0.003), "differential")
+    assert abs(nearer.size * 0.003 / (peak.size * 0.03) - 1) < 1e-3
+
+
+def test_a_survey_of_a_year_says_the_known_days():
+    found = survey(flight, KEPLER)
+    text = str(found)
+    assert found.years == 1.0
+    assert "365.196" in text
+    assert "28.005 ms" in text
+    t = np.array([100 * DAY])
+    assert abs(found.pulled(t)[0] / 2.6 * found.half(t)[0] - 1) < 0.01
+    assert outages(found.lost["month's middle"])[0][0] == 0.0
+    assert len(found.plot().axes) == 4
+    for wrong in ((1e6, 1e6), (0.0, np.nan)):
+        with pytest.raises(ValueError, match="stop"):
+            survey(flight, KEPLER, *wrong)
+    with pytest.raises(ValueError, match="master must be"):
+        survey(flight, KEPLER, master=4)
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_the_verdict_along_esas_orbits_is_that_of_counts(name):
+    """The edges are those at one held value: they must do at every other that occurs."""
+    orbits = TABLES[name]
+    rng = np.random.default_rng(3)
+    start = orbits.span[0] + rng.uniform(0.0, 9.0) * YEAR
+    found = survey(loops()["paper"], orbits, start, start + YEAR, master=2)
+    for policy, holds in policies(found.half).items():
+        gone = found.lost[policy]
+        for t in rng.uniform(start, start + YEAR, 30):
+            held = next(held for begin, stop, held in holds if begin <= t <= stop)
+            near = min(abs(t - s) for part in gone for s in part[:2])
+            if near > 3e3:
+                tau1, tau2 = map(float, orbits.round_trips(t, 2))
+                count = int(unstable_roots(found.loop(tau1, tau2, held), 1.0, 1.0))
+                assert (count != 0) == any(begin < t < stop for begin, stop, _ in gone)
+
+
+LOOP = """
+from armlock import Loop, paper_loop
+from armlock.sensors import dual
+
+def loop(tau1, tau2, held):
+    return Loop(paper_loop().controller, dual(2.5, 2 * held), tau1, tau2)
+"""
+
+
+def test_the_command_reads_a_loop_and_an_orbit(tmp_path, capsys):
+    mine = tmp_path / "mine.py"
+    mine.write_text(LOOP, "utf-8")
+    figure = tmp_path / "mine.png"
+    arguments = [str(mine), str(DATA / "esa_leading.csv.gz"), "--years", "1", "--start", "700"]
+    main([*arguments, "--master", "3", "--plot", str(figure)])
+    printed = capsys.readouterr().out
+    assert "master 3, 1.00 years" in printed
+    assert "month's middle" in printed
+    assert figure.stat().st_size > 20_000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["flight", "a.oem", "b.oem"], "three OEM files, one a spacecraft; got 2"),
+        (["nothing", "kepler"], "LOOP must be a Python file or one of flight, paper"),
+        (["flight", "nowhere.csv"], "No such file"),
+        (["flight", "kepler", "--years", "-1"], "years must be positive"),
+        (["flight", "kepler", "--start", "1e9"], "must ascend within the span"),
+    ],
+)
+def test_the_command_says_what_is_wrong(arguments, message, capsys):
+    with pytest.raises(SystemExit):
+        main(arguments)
+    assert message in capsys.readouterr().err
+
+
+def test_a_file_must_define_a_loop(tmp_path, capsys):
+    mine = tmp_path / "mine.py"
+    mine.write_text("loop = 3\n", "utf-8")
+    with pytest.raises(SystemExit):
+        main([str(mine), "kepler"])
+    assert "must define a function loop" in capsys.readouterr().err
+    table = tmp_path / "mine.csv"
+    table.write_text("# epoch: now\n0,1,2\n", "utf-8")
+    with pytest.raises(SystemExit):
+        main(["flight", str(table)])
+    assert "must say its scale" in capsys.readouterr().err
