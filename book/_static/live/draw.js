@@ -275,8 +275,8 @@ const armlockDraw = (function () {
       pen.strokeStyle = colours.text;
       if (line) {
         const [a, b, c] = line, { x0, x1, y0, y1 } = this.box;
-        const ends = Math.abs(b) > Math.abs(a) ? [x0, x1].map(x => [x, 1 - (a * (x - 1) + c) / b])
-          : [y0, y1].map(y => [1 - (b * (y - 1) + c) / a, y]);
+        const ends = Math.abs(b) > Math.abs(a) ? [x0, x1].map(x => [x, 1 + (c - a * (x - 1)) / b])
+          : [y0, y1].map(y => [1 + (c - b * (y - 1)) / a, y]);
         pen.beginPath();
         ends.forEach(([x, y], k) => k ? pen.lineTo(px(x), py(y)) : pen.moveTo(px(x), py(y)));
         pen.stroke();

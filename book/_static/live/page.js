@@ -518,10 +518,8 @@ function armlockPages() {
   function chapter(place) {
     const { live: name, centre, half } = place.dataset;
     const live = new Live(`${name}: number of unstable roots over c1 and c2.`);
-    place.replaceChildren(element("div", { class: "live-pair" },
-      element("div", {}, live.figure, legend(half), tools(live, name.toLowerCase().replace(/\W+/g, "-")),
-        live.note), element("div", { class: "live-beside" }, ...live.plots.map(plot => plot.canvas),
-        live.following)));
+    place.replaceChildren(element("div", { class: "live-one" }, live.figure, legend(half),
+      tools(live, name.toLowerCase().replace(/\W+/g, "-")), live.note), plots(live), live.following);
     live.chart.show([Number(centre), Number(centre)], Number(half));
     live.set(PRESETS[name][0]);
   }
