@@ -6,18 +6,20 @@ System in Space-based Gravitational Wave Detectors".
 
 from armlock.characteristic import CharacteristicFunction
 from armlock.controllers import Controller
-from armlock.design import Design, buildable_loop, design, robust_loop
+from armlock.design import Design, design
 from armlock.loops import (
     CommonArm,
     DualArm,
     HayesEquation,
     Loop,
     SingleArm,
+    buildable_loop,
     flight_loop,
     paper_loop,
     published_loops,
+    robust_loop,
 )
-from armlock.performance import NoiseBudget, closed_loop, noise_budget, pulling, transfer
+from armlock.performance import NoiseBudget, noise_budget, pulling, transfer
 from armlock.robustness import Margins, critical_perturbation, margins, modulus_margin
 from armlock.stability import (
     BOUNDARY,
@@ -87,7 +89,6 @@ __all__ = [
     "amplitude_spectrum",
     "axis_crossings",
     "buildable_loop",
-    "closed_loop",
     "critical_perturbation",
     "d_curve",
     "d_curve_branches",

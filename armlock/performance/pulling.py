@@ -92,7 +92,9 @@ def pulling(
         chain = "a neutral root chain that is not confined"
         found = chain if count == UNCONFINED else f"{count} unstable roots"
         raise ValueError(f"loop must be stable at c1 = c2 = 1, got {found}")
-    rate, total = _DECAYED / float(t.min(initial=np.inf)), np.zeros(t.shape)
+    # In steps, so that roots are found once for times that differ little.
+    rate = 2.0 ** (0.25 * math.ceil(4.0 * math.log2(_DECAYED / float(t.min(initial=np.inf)))))
+    total = np.zeros(t.shape)
     given = {"common": common, "differential": differential}
     errors = {source: _error(source, values) for source, values in given.items()}
     for source, error in errors.items():

@@ -254,7 +254,7 @@ class _Line:
         return self.followed(s[np.argsort(-s.real, kind="stable")][:most], _NEWTON_STEPS)
 
     def followed(self, s: ComplexArray, steps: int) -> tuple[ComplexArray, FloatArray]:
-        """Follow Newton's method; return where it leads, in the upper half, and the last steps."""
+        """Follow Newton's method; return where it leads, with Im s >= 0, and the last steps."""
         length = np.empty(s.size)
         for _ in range(steps):
             s, length = self._step(s)
@@ -326,7 +326,7 @@ def roots_right_of(
     for s, length in _all_near(line, unit):
         kept = (length <= 1e-10 * np.abs(s)) & (np.abs(s) > 1e-13 * unit) & (s.real > sigma)
         found = _distinct(np.concatenate((found, s[kept])))
-        number = found.size + np.count_nonzero(found.imag)
+        number = found.size + int(np.count_nonzero(found.imag))
         if number == wanted:
             return found[np.argsort(np.abs(found))]
     raise RootError(

@@ -18,7 +18,7 @@ from armlock.paper import (
     PHASE_NOISE_LEVEL,
     SAMPLE_RATE,
 )
-from armlock.performance.budget import SHOT_NOISE
+from armlock.performance.budget import LEVELS
 from armlock.timedomain.noise import PerturbationNoise, ShapedNoise, band_rms
 from armlock.timedomain.spectra import Spectrum, SpectrumEstimator
 from book.companion.claims import ledger
@@ -357,6 +357,6 @@ def requirement_of_lisa() -> Finding:
         1e12 * cycles * wavelength,
         "pm/√Hz at 1064 nm, the level of Eq. (A5) as a path length",
         f"No document is cited for it. It is {1e6 * cycles:.1f} µcycle/√Hz; the white paper "
-        f"has {1e6 * SHOT_NOISE:g} µcycle/√Hz for the shot noise of one link. Whether it is a "
+        f"has {1e6 * LEVELS.shot:g} µcycle/√Hz for the shot noise of one link. Whether it is a "
         "requirement on LISA decides nothing here: it is the scale of η that does (claim N1).",
     )
