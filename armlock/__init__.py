@@ -6,18 +6,20 @@ System in Space-based Gravitational Wave Detectors".
 
 from armlock.characteristic import CharacteristicFunction
 from armlock.controllers import Controller
-from armlock.design import Design, buildable_loop, design, robust_loop
+from armlock.design import Design, design
 from armlock.loops import (
     CommonArm,
     DualArm,
     HayesEquation,
     Loop,
     SingleArm,
+    buildable_loop,
     flight_loop,
     paper_loop,
     published_loops,
+    robust_loop,
 )
-from armlock.performance import NoiseBudget, closed_loop, noise_budget, pulling, transfer
+from armlock.performance import NoiseBudget, noise_budget, pulling, transfer
 from armlock.robustness import Margins, critical_perturbation, margins, modulus_margin
 from armlock.stability import (
     BOUNDARY,
@@ -27,15 +29,18 @@ from armlock.stability import (
     NyquistCurve,
     RootError,
     StabilityChart,
+    StabilityRegion,
     axis_crossings,
     d_curve,
     d_curve_branches,
     d_curve_line,
+    is_stable,
     nyquist,
     rightmost_root,
     semi_discretization,
     spectral_radius,
     stability_chart,
+    stability_region,
     transition_matrix,
     unstable_roots,
 )
@@ -80,16 +85,17 @@ __all__ = [
     "Spectrum",
     "SpectrumEstimator",
     "StabilityChart",
+    "StabilityRegion",
     "amplitude_spectrum",
     "axis_crossings",
     "buildable_loop",
-    "closed_loop",
     "critical_perturbation",
     "d_curve",
     "d_curve_branches",
     "d_curve_line",
     "design",
     "flight_loop",
+    "is_stable",
     "margins",
     "modulus_margin",
     "noise_budget",
@@ -104,6 +110,7 @@ __all__ = [
     "simulate",
     "spectral_radius",
     "stability_chart",
+    "stability_region",
     "sweep",
     "transfer",
     "transition_matrix",

@@ -1,13 +1,17 @@
 """The simulation: against other ways to run the same loop.
 
 The requirement: at least as fast as a plain compiled loop of the same arithmetic, and a
-hundred times as fast as that loop in Python. Tests hold it against 106 bits.
+hundred times as fast as that loop in Python. Tests hold it against 106 bits. Arms that move
+take at most twice the time of constant delays between samples, and five times that of whole
+samples.
 """
 
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +26,9 @@ from benchmarks.report import Row, Topic, timed
 
 PYTHON_RATIO = 100.0
 ENSEMBLE_RATIO = 2.5
+BETWEEN_RATIO, WHOLE_RATIO = 2.0, 5.0
+# Delays between samples, in s, and their change in s/s: as that of ESA's arms, some samples.
+BETWEEN = (TAU1 + 0.4 / SAMPLE_RATE, 6e-8), (TAU2 + 0.3 / SAMPLE_RATE, -5e-8)
 ACCURACY = 1e-10
 DRAWS = 32
 
@@ -133,6 +140,7 @@ def run(*, quick: bool, folder: Path) -> Topic:
             slow / best >= PYTHON_RATIO),
     ]  # fmt: skip
     topic.rows += ensemble_rows(loop, noise, c1, c2, sizes.passes)
+    topic.rows += moving_rows(loop, noise, c1, c2, sizes.passes)
     compared = slice(0, 4 * sizes.compared)
     output = simulate(loop, noise[compared], c1[compared], c2[compared])
     phi = plain_output(noise[compared], c1[compared], c2[compared], arguments)
@@ -147,6 +155,8 @@ def run(*, quick: bool, folder: Path) -> Topic:
         f"{sizes.passes} runs each.",
         "[b] The ratio is that to the same runs one by one, on one core, in turn: the median "
         f"of {5 * sizes.passes} passes, in processor time.",
+        "[c] The ratio is that to constant delays between samples, in turn: the median of "
+        f"{2 * sizes.passes + 1} passes, in processor time; behind it that to whole samples.",
     ]
     return topic
 
@@ -179,3 +189,50 @@ def ensemble_rows(
         Row(f"its ratio, from the 10th to the 90th percent: {low:.2f} to {high:.2f}"),
         Row("ensemble and single runs agree", None, None, "bit by bit", same, correctness=True),
     ]  # fmt: skip
+
+
+def moving_rows(
+    loop: Loop, noise: FloatArray, c1: FloatArray, c2: FloatArray, passes: int
+) -> list[Row]:
+    """Compare arms that move with constant delays, whole ones and others, in turn."""
+    shape = min(noise.size // DRAWS, 100_000), DRAWS
+    one = noise, c1, c2
+    together = [part[: shape[0] * DRAWS].reshape(shape).T for part in one]
+    alike, own = (
+        [partial(moving, shift=shift, tau=tau, rate=rate) for tau, rate in BETWEEN]
+        for shift in (np.zeros(()), np.arange(DRAWS)[:, None] / SAMPLE_RATE)
+    )
+    rows = []
+    for what, arrays, moves in (
+        ("one run", one, alike),
+        (f"ensemble of {DRAWS}", together, alike),
+        (f"ensemble of {DRAWS}, each its own arms", together, own),
+    ):
+        calls = [
+            partial(locked_size, loop, arrays, delays)
+            for delays in ((None, None), [tau for tau, _ in BETWEEN], moves)
+        ]
+        times = np.array(
+            [
+                [timed(call, clock=time.process_time)[0] for call in calls]
+                for _ in range(2 * passes + 2)
+            ]
+        )[1:]  # the first pass compiles
+        whole, between = np.median(times[:, 2:] / times[:, :2], axis=0)
+        met = bool(between <= BETWEEN_RATIO and whole <= WHOLE_RATIO)
+        rows.append(
+            Row(f"arms that move, {what} [c]; {whole:.2f}", float(times[:, 2].min()),
+                float(between), f"at most {BETWEEN_RATIO:g}; {WHOLE_RATIO:g}", met)
+        )  # fmt: skip
+    return rows
+
+
+def moving(t: FloatArray, *, shift: FloatArray, tau: float, rate: float) -> FloatArray:
+    """Return a delay that grows from `tau` on, with a constant more for each run."""
+    return np.asarray(shift + (tau + rate * t))
+
+
+def locked_size(loop: Loop, arrays: Sequence[FloatArray], delays: Sequence[Any]) -> int:
+    """Run a loop; nothing is kept."""
+    noise, c1, c2 = arrays
+    return simulate(loop, noise, c1, c2, tau1=delays[0], tau2=delays[1]).size

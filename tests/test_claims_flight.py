@@ -6,7 +6,7 @@ import numpy as np
 
 from armlock import LaserNoise, Loop
 from armlock.performance import transfer
-from armlock.performance.budget import FREE_RUNNING
+from armlock.performance.budget import LEVELS
 from book.companion.claims import flight
 
 
@@ -17,13 +17,13 @@ def test_no_mean_length_of_the_arms_leaves_more_of_the_laser():
     for mean in flight.MEAN_DELAY + np.linspace(0.0, 20.0, 2_001):
         loop = Loop(flight.LOOP.controller, flight.LOOP.mapping, mean + 0.255, mean - 0.255)
         left = np.abs(transfer(loop, "laser", 2j * np.pi * frequency))
-        found = np.maximum(found, left * FREE_RUNNING / frequency)
+        found = np.maximum(found, left * LEVELS.free_running / frequency)
     assert (found <= most * (1.0 + 1e-9)).all()
     assert (found > 0.9 * most).all()
 
 
 def test_errors_of_doppler_estimates_are_those_of_a_fitted_line():
-    noise = LaserNoise(seed=1, sample_rate=1.0, level=FREE_RUNNING).draw(2_000_000)
+    noise = LaserNoise(seed=1, sample_rate=1.0, level=LEVELS.free_running).draw(2_000_000)
     measured = 2.0 * (noise[34:] - noise[:-34])
     parts = measured[: measured.size // 200 * 200].reshape(-1, 200).T
     slope, start = np.polyfit(np.arange(200.0), parts, 1)

@@ -22,7 +22,7 @@ from armlock import (
     unstable_roots,
 )
 from armlock.loops import flight_loop
-from armlock.sensors import COMMON, dual
+from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
 from armlock.stability.roots import extended_root
 from book.companion.schemes import pseudospectral_roots
 from tests import independent
@@ -255,3 +255,44 @@ def test_a_root_at_zero_is_zero_from_any_start():
     for size in 10.0 ** random.uniform(-16.0, -6.0, 20):
         assert extended_root(loop, 1.0, 1.0, size * complex(*random.normal(size=2))) == 0.0
     assert rightmost_root(loop, 1.0, 1.0) == 0.0
+
+
+def modes(seed):
+    """A loop with a cluster of lightly damped modes, next to which D is lost to rounding."""
+    random = np.random.default_rng(seed)
+    number, quality = int(random.integers(2, 9)), 10.0 ** random.uniform(1, 5)
+    spacing, lowest = 10.0 ** random.uniform(-3, -1), 10.0 ** random.uniform(-1, 1.5)
+    at = lowest * (1.0 + 0.5 * spacing * np.arange(2 * number - 1))
+    both = np.array([1j, -1j])[:, None] * at - 0.5 * at / quality
+    zeros, poles = both[:, 1::2].ravel(), both[:, ::2].ravel()
+    mapping = [SINGLE, COMMON, DIFFERENCE, dual(2.0, 0.5)][int(random.integers(4))]
+    return Loop((zeros, poles, 10.0 ** random.uniform(-3, 1)), mapping, 20.0, 19.0)
+
+
+@pytest.mark.parametrize("seed", [3, 8, 10])
+def test_next_to_a_cluster_of_modes_it_is_answered_or_refused_in_time(seed):
+    loop, begun = modes(seed), time.thread_time()
+    try:
+        root = rightmost_root(loop)
+    except RootError:
+        root = None
+    assert time.thread_time() - begun < 10.0
+    if root is not None:
+        for margin, least, most in ((1e-6, 0, 0), (-1e-6, 1, 2)):
+            shifted = loop.shifted(root.real + margin * max(abs(root.real), 0.05))
+            assert least <= unstable_roots(shifted, 1.0, 1.0) <= most
+        with mpmath.workdps(60):
+            value, slope = (
+                mpmath.diff(lambda s: independent.exact(loop, s, 1.0, 1.0), root, n)
+                for n in (0, 1)
+            )
+        assert abs(value / slope) < 1e-12 * abs(root)
+
+
+def test_next_to_a_cluster_a_root_is_that_of_the_factors():
+    # Expanded, the coefficients are another loop's.
+    loop = modes(13)
+    root = rightmost_root(loop)
+    with mpmath.workdps(60):
+        exact = mpmath.findroot(lambda s: independent.exact(loop, s, 1.0, 1.0), root)
+        assert abs(complex(exact) - root) < 1e-13 * abs(root)

@@ -498,19 +498,21 @@ def imaginary_zeros(
 
 
 @njit(cache=True)
-def resolved_grid(whole: CompiledSum, omega_end: float, tolerance: float) -> FloatArray:
+def resolved_grid(
+    whole: CompiledSum, omega_end: float, tolerance: float, most: int
+) -> FloatArray:
     """Frequencies from 0 to `omega_end` between which an exponential sum changes little.
 
     Over each step its tangent moves by no more than twice `tolerance` times its distance from
     zero, and the sum leaves the tangent by no more than once that, or the step is as small as
-    rounding allows. The grid ends before `omega_end` if it would take more than MOST_SAMPLES.
+    rounding allows. The grid ends before `omega_end` if it would take more than `most`.
     """
     grid, found, omega, step = np.empty(1024), 1, 0.0, omega_end
     grid[0] = omega
-    while omega < omega_end and found < MOST_SAMPLES:
+    while omega < omega_end and found < most:
         piece = expand(whole, omega)
         end, bound = min(piece.end, omega_end), curvature_bound(piece)
-        while omega < end and found < MOST_SAMPLES:
+        while omega < end and found < most:
             value, slope = evaluate(piece, omega)
             step = min(2.0 * step, end - omega)
             smallest = max(1e-13 * omega, 1e-16 * omega_end)

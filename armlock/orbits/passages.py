@@ -29,7 +29,9 @@ from armlock.stability.roots import rightmost_root
 #: A loop of two round trips and of the half difference that its sensor holds, all in s.
 LoopInOrbit = Callable[[float, float, float], Loop]
 
+#: In s.
 DAY = 86400.0
+#: In s.
 YEAR = 365.25 * DAY
 #: A loop is kept for a month with one held value: a twelfth of a year.
 MONTH = YEAR / 12.0
@@ -377,6 +379,9 @@ def switches(halves: Mapping[int, Course], floor: float) -> list[tuple[float, in
 
 
 __all__ = [
+    "DAY",
+    "MONTH",
+    "YEAR",
     "Course",
     "Hold",
     "LoopInOrbit",

@@ -1,14 +1,15 @@
 """What noise is left on the locked laser, source by source.
 
-Levels are those of the LISA Frequency Control White Paper (2009), Sec. 3. Each source reaches
-the laser through the closed-form responses of `armlock.performance.transfer`.
+Levels are those of the LISA Frequency Control White Paper (2009), Sec. 3, or the caller's. Each
+source reaches the laser through the closed-form responses of `armlock.performance.transfer`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from itertools import cycle
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,8 +17,10 @@ import numpy.typing as npt
 from armlock.checks import (
     FloatArray,
     axis,
+    one_of,
     positive_array,
     real_array,
+    real_number,
 )
 from armlock.controllers import Controller
 from armlock.loops import Loop, checked_loop
@@ -27,40 +30,56 @@ from armlock.timedomain.noise import LaserNoise, ShapedNoise
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: Shot noise of one link in cycles/sqrt(Hz); a round trip has two, independent.
-SHOT_NOISE = 10e-6
-#: Fractional frequency noise of a clock at 1 Hz in 1/sqrt(Hz); it falls as 1/sqrt(f).
-CLOCK_NOISE = 2.4e-12
-#: Doppler shifts of the two arms' beat notes in Hz, which the clock noise comes with.
-BEAT_NOTES = (15e6, -14e6)
-#: Motion of a spacecraft along one arm in cycles/sqrt(Hz), at low frequency.
-SPACECRAFT_MOTION = 2.5e-3
-#: Corner in Hz of the roll-off 1/sqrt(1 + (f / corner)^4) of that motion.
-MOTION_CORNER = 0.3
-#: Noise of a free-running laser at 1 Hz in Hz/sqrt(Hz); it falls as 1/f. The paper's is
-#: `armlock.paper.LASER_NOISE`.
-FREE_RUNNING = 3e4
-#: What disturbs the locked laser.
-SOURCES = ("laser", "shot", "clock", "motion")
+
+class Levels(NamedTuple):
+    """Levels of the white paper, as they are: another level is a source of one's own.
+
+    Attributes
+    ----------
+    shot : float
+        Shot noise of one link in cycles/sqrt(Hz); a round trip has two, independent.
+    clock : float
+        Fractional frequency noise of a clock at 1 Hz in 1/sqrt(Hz); it falls as 1/sqrt(f).
+    beat_notes : tuple of two float
+        Doppler shifts of the two arms' beat notes in Hz, which the clock noise comes with.
+    motion : float
+        Motion of a spacecraft along one arm in cycles/sqrt(Hz), at low frequency.
+    motion_corner : float
+        Corner in Hz of the roll-off 1/sqrt(1 + (f / corner)^4) of that motion.
+    free_running : float
+        Noise of a free-running laser at 1 Hz in Hz/sqrt(Hz); it falls as 1/f. The paper's is
+        `armlock.paper.LASER_NOISE`.
+    """
+
+    shot: float = 10e-6
+    clock: float = 2.4e-12
+    beat_notes: tuple[float, float] = (15e6, -14e6)
+    motion: float = 2.5e-3
+    motion_corner: float = 0.3
+    free_running: float = 3e4
+
+
+#: The white paper's levels, which cannot be changed.
+LEVELS: Final = Levels()
+#: What disturbs the locked laser, if nothing else is said.
+SOURCES: Final = ("laser", "shot", "clock", "motion")
 
 # Rational functions of s whose magnitudes are the densities of an arm's noises, in Hz/sqrt(Hz);
 # of the clocks' for a beat note of 1 Hz. The zero of the others turns cycles into Hz.
-_SHOT = Controller((0.0,), (), np.sqrt(2.0) * SHOT_NOISE)
-_CORNER = 2.0 * np.pi * MOTION_CORNER * np.exp(0.75j * np.pi)
-_MOTION = Controller(
-    (0.0,), (_CORNER, _CORNER.conjugate()), SPACECRAFT_MOTION * abs(_CORNER) ** 2
-)
+_SHOT = Controller((0.0,), (), np.sqrt(2.0) * LEVELS.shot)
+_CORNER = 2.0 * np.pi * LEVELS.motion_corner * np.exp(0.75j * np.pi)
+_MOTION = Controller((0.0,), (_CORNER, _CORNER.conjugate()), LEVELS.motion * abs(_CORNER) ** 2)
 # Two poles a decade from 1 uHz on, each with a zero midway to the next, fall as 1/sqrt(f).
 _POLES = -2.0 * np.pi * 10.0 ** (0.5 * np.arange(20) - 6.0)
 _ZEROS = 10.0**0.25 * _POLES
 # Not a controller's value: to import the package must compile nothing.
 _AT_1_HZ = np.prod((2j * np.pi - _ZEROS) / (2j * np.pi - _POLES))
-_CLOCK = Controller(_ZEROS.tolist(), _POLES.tolist(), CLOCK_NOISE / abs(_AT_1_HZ))
+_CLOCK = Controller(_ZEROS.tolist(), _POLES.tolist(), LEVELS.clock / abs(_AT_1_HZ))
 
 
 def free_running(frequency: FloatArray) -> FloatArray:
     """Return the noise of a free-running laser in Hz/sqrt(Hz): 30 kHz at 1 Hz, as 1/f."""
-    return FREE_RUNNING / frequency
+    return LEVELS.free_running / frequency
 
 
 def cavity(frequency: FloatArray) -> FloatArray:
@@ -99,7 +118,8 @@ class NoiseBudget:
     frequency : float array, shape (n,)
         In Hz.
     sources : dict of str to float array, shape (n,)
-        What each source leaves on the locked laser: "laser", "shot", "clock", "motion".
+        What each source leaves on the locked laser: "laser", "shot", "clock", "motion", and
+        those of one's own.
     requirement : float array, shape (n,)
         What the total is held against.
 
@@ -124,13 +144,15 @@ class NoiseBudget:
         """How many times the total lies below the requirement."""
         return self.requirement / self.total
 
-    def plot(self, ax: Axes | None = None) -> Axes:
+    def plot(self, ax: Axes | None = None, **style: Any) -> Axes:
         """Draw the sources, the total and the requirement over frequency.
 
         Parameters
         ----------
         ax : matplotlib Axes, optional
             Where to draw; the current ones by default.
+        **style
+            Of the sources, as `matplotlib.axes.Axes.loglog` takes it.
 
         Returns
         -------
@@ -139,8 +161,9 @@ class NoiseBudget:
         import matplotlib.pyplot as plt
 
         ax = plt.gca() if ax is None else ax
-        for line, (name, asd) in zip(("-", "--", "-.", ":"), self.sources.items(), strict=True):
-            ax.loglog(self.frequency, asd, line, linewidth=0.9, label=name)
+        for line, (name, asd) in zip(cycle(("-", "--", "-.", ":")), self.sources.items()):
+            shown = {"linestyle": line, "linewidth": 0.9, "label": name, **style}
+            ax.loglog(self.frequency, asd, **shown)
         ax.loglog(self.frequency, self.total, color="black", linewidth=1.4, label="total")
         ax.loglog(
             self.frequency, self.requirement, color="0.5", dashes=(6, 2), label="required"
@@ -149,17 +172,21 @@ class NoiseBudget:
         return ax
 
 
-def _densities(name: str, value: npt.ArrayLike, frequency: FloatArray) -> FloatArray:
-    """Return densities at the frequencies, or raise."""
+def _densities(
+    name: str, value: npt.ArrayLike, frequency: FloatArray, arms: int = 0
+) -> FloatArray:
+    """Return densities at the frequencies, or a row of them for each arm, or raise."""
     asd = real_array(name, value)
     if (asd < 0.0).any():
         raise ValueError(f"{name} must not be negative, got {asd.min()} among its values")
-    if asd.shape not in ((), frequency.shape):
+    rows = (arms, frequency.size)
+    if asd.shape not in ((), frequency.shape, rows):
+        each = f", or {arms} rows of them" if arms else ""
         raise ValueError(
-            f"{name} must be one number or hold one a frequency, {frequency.size} of them; got "
-            f"shape {asd.shape}"
+            f"{name} must be one number or hold one a frequency, {frequency.size} of them"
+            f"{each}; got shape {asd.shape}"
         )
-    return np.asarray(np.broadcast_to(asd, frequency.shape))
+    return np.asarray(np.broadcast_to(asd, rows if arms else frequency.shape))
 
 
 def noise_budget(
@@ -167,6 +194,10 @@ def noise_budget(
     frequency: npt.ArrayLike,
     laser: str | npt.ArrayLike = "free-running",
     requirement: npt.ArrayLike | None = None,
+    *,
+    c1: float = 1.0,
+    c2: float = 1.0,
+    sources: Mapping[str, npt.ArrayLike] | None = None,
 ) -> NoiseBudget:
     r"""Compute what noise is left on the locked laser.
 
@@ -189,7 +220,7 @@ def noise_budget(
     Parameters
     ----------
     loop : Loop
-        The loop, at c1 = c2 = 1.
+        The loop.
     frequency : array_like of float, one-dimensional
         In Hz, positive.
     laser : {"free-running", "Mach-Zehnder", "cavity"} or array_like of float, optional
@@ -197,6 +228,12 @@ def noise_budget(
     requirement : array_like of float, optional
         What the total is held against, a value a frequency in Hz/sqrt(Hz); by default the
         capability of time-delay interferometry, 300 (1 + (3 mHz / f)^2).
+    c1, c2 : float, optional
+        Multiplicative perturbations.
+    sources : mapping of str to array_like of float, optional
+        Sources of one's own: densities in Hz/sqrt(Hz) of what adds to the signal of each arm,
+        independent in the two. One number, a value a frequency, or two rows of them, for arm 1
+        and arm 2. One called "shot", "clock" or "motion" takes the place of that source.
 
     Returns
     -------
@@ -206,7 +243,8 @@ def noise_budget(
     ------
     TypeError, ValueError
         If `loop` is no `Loop`, the frequencies are not positive and one-dimensional, there is
-        no laser of that name, or densities are negative or not of the frequencies' shape.
+        no laser of that name, densities are negative or not of the frequencies' shape, c1 or c2
+        is no finite real number, or `sources` has one called "laser".
 
     References
     ----------
@@ -218,30 +256,44 @@ def noise_budget(
     >>> found = noise_budget(flight_loop(), [3e-3])
     >>> print(f"{found.total[0]:.0f} Hz/sqrt(Hz), {found.factor[0]:.1f} times below")
     113 Hz/sqrt(Hz), 5.3 times below
+
+    With ten times the shot noise, and a noise of one's own in arm 1 alone:
+
+    >>> import numpy as np
+    >>> f = np.array([3e-3, 0.1])
+    >>> shot = 2e-4 * np.pi * f * np.sqrt(2.0)
+    >>> mine = [0.01 * f, 0.0 * f]
+    >>> found = noise_budget(flight_loop(), f, sources={"shot": shot, "mine": mine})
+    >>> list(found.sources)
+    ['laser', 'shot', 'clock', 'motion', 'mine']
+
+    As a table: ``pandas.DataFrame(found.sources, index=found.frequency)``.
     """
     f = axis("frequency", positive_array("frequency", frequency))
     if isinstance(laser, str):
-        if laser not in LASERS:
-            raise ValueError(f"laser must be one of {', '.join(LASERS)}; got {laser!r}")
-        laser = LASERS[laser](f)
+        laser = LASERS[one_of("laser", laser, LASERS)](f)
     s = 2j * np.pi * f
-    found = responses(loop, s)
+    found = responses(loop, s, real_number("c1", c1), real_number("c2", c2))
     arms = np.array([found["arm 1"], found["arm 2"]])
-    beats, tau = np.array(BEAT_NOTES)[:, None], np.array([[loop.tau1], [loop.tau2]])
+    beats, tau = np.array(LEVELS.beat_notes)[:, None], np.array([[loop.tau1], [loop.tau2]])
 
     def through(shared: npt.ArrayLike, own: npt.ArrayLike) -> FloatArray:
         """Return the response to one noise in both arms and one in each, by their weights."""
         together = np.abs(np.sum(shared * arms, axis=0))
         return np.asarray(np.hypot(together, np.linalg.norm(own * arms, axis=0)))
 
-    sources = {
+    left = {
         "laser": np.abs(found["laser"]) * _densities("laser", laser, f),
         "shot": np.abs(_SHOT(s)) * through(0.0, 1.0),
-        "clock": CLOCK_NOISE / np.sqrt(f) * through(beats, beats),
+        "clock": LEVELS.clock / np.sqrt(f) * through(beats, beats),
         "motion": np.abs(_MOTION(s)) * through(1.0 + np.exp(-s * tau), 2.0),
     }
+    for name, given in (sources or {}).items():
+        if name == "laser":
+            raise ValueError("sources must not hold 'laser': its noise is given as laser=...")
+        left[name] = through(0.0, _densities(f"sources[{name!r}]", given, f, arms=2))
     required = tdi_capability(f) if requirement is None else requirement
-    return NoiseBudget(f, sources, _densities("requirement", required, f))
+    return NoiseBudget(f, left, _densities("requirement", required, f))
 
 
 def noise_series(
@@ -294,11 +346,10 @@ def noise_series(
     >>> locked = simulate(loop, noise_series(loop, "clock", 10_000, seed=1))
     """
     checked_loop(loop)
-    if source not in SOURCES:
-        raise ValueError(f"source must be one of {', '.join(SOURCES)}; got {source!r}")
+    one_of("source", source, SOURCES)
     streams = np.random.SeedSequence([seed, SOURCES.index(source)]).generate_state(3).tolist()
     if source == "laser":
-        laser = LaserNoise(streams[0], sample_rate, level=FREE_RUNNING, at_rest=True)
+        laser = LaserNoise(streams[0], sample_rate, level=LEVELS.free_running, at_rest=True)
         return laser.draw(samples)
 
     def drawn(shape: Controller, stream: int) -> FloatArray:
@@ -311,7 +362,7 @@ def noise_series(
     total = np.zeros(samples)
     rest, *arms = loop.polynomials()
     delays = loop.tau1, loop.tau2
-    for b, tau, beat, own in zip(arms, delays, BEAT_NOTES, streams[1:], strict=True):
+    for b, tau, beat, own in zip(arms, delays, LEVELS.beat_notes, streams[1:], strict=True):
         gain = -float(b.coefficients[-1] / rest.coefficients[-1])
         if not gain:
             continue

@@ -8,6 +8,7 @@ and goes on in extended precision; a last count says that no root lies further r
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import overload
 
 import mpmath
@@ -25,6 +26,7 @@ from armlock.checks import (
     real_number,
     whole_number,
 )
+from armlock.loops import power_series
 from armlock.stability.bounds import last_frequency
 from armlock.stability.counts import BOUNDARY, CountError, unstable_roots
 
@@ -36,10 +38,12 @@ _FARTHEST = 1e-6
 # exponential: a second each.
 _LONGEST_COUNT = 1e6
 _LONGEST_SEARCH = 1e5
-# The search for one root ends once its lines have cost so many turns: some four seconds. A line
-# costs the second number, and four times the turns over which roots are looked for.
-_ALL_WALKS = 1e6
-_COST_OF_A_LINE = 1e4
+# The search for one root ends once its walks have cost so many steps, some five seconds. A line
+# costs its points, and a count that cannot be told the second number.
+_ALL_STEPS = 3e6
+_DOUBTFUL_COUNT = 5e5
+# Most points of one line: where rounding hides D, there would be no end of them.
+_MOST_POINTS = 1_000_000
 # Roots left of a line may lie further up than those right of it. They are looked for so many
 # turns further: few at first, at most so many.
 _FURTHER = 4.0
@@ -49,9 +53,14 @@ _SLOW_ONES = 1e3
 # Most points of a line from which Newton's method starts, and most of its steps in extended
 # precision: at a multiple root they only shrink by a share.
 _MOST_STARTS = 4096
+_NEWTON_STEPS = 12
 _MOST_STEPS = 100
 # Most roots near a line that are tried in extended precision.
 _MOST_TRIED = 8
+# Most roots that are looked for right of a line.
+_MOST_ROOTS = 20_000
+# Directions from s = 0 in which slow ones are looked for.
+_ANGLES = np.linspace(1.6, np.pi, 8)
 # Roots down to so many times one over the longest delay are looked for in steps of their size.
 _SLOWEST = 1e-9
 # Past this a delayed term is nothing right of a line, and its factor no float.
@@ -182,6 +191,8 @@ class _Line:
     turns : float
         How far up roots can lie right of the line, in turns of the longest delay's
         exponential; inf past the limit of a neutral root chain, or where a number overflows.
+    steps : float
+        What its walks have cost so far.
     """
 
     def __init__(
@@ -196,16 +207,18 @@ class _Line:
             self.turns = float(last_frequency(self.shifted, self.x, self.y)) / self.per_turn
         except ValueError:
             self.turns = np.inf
-        self.known = self.turns <= _LONGEST_COUNT
+        self.known, self.steps = self.turns <= _LONGEST_COUNT, 0.0
 
     def count(self) -> int:
         """Count the roots right of the line; below zero where that cannot be told."""
         if not self.known:
             return BOUNDARY
         try:
-            return int(unstable_roots(self.shifted, self.x, self.y))
+            found = int(unstable_roots(self.shifted, self.x, self.y))
         except CountError:
-            return BOUNDARY
+            found = BOUNDARY
+        self.steps += self.turns if found >= 0 else _DOUBTFUL_COUNT
+        return found
 
     def _step(self, s: ComplexArray) -> tuple[ComplexArray, FloatArray]:
         """Return where a step of Newton's method leads from each s, and its length."""
@@ -223,16 +236,14 @@ class _Line:
             return self.turns
         return min(self.turns, _SLOW_ONES * further, _LONGEST_SEARCH) + further
 
-    def rightmost(self, further: float) -> tuple[complex, float] | None:
-        """Return the rightmost root near the line, and how far a faster one is ahead of it.
+    def near(self, turns: float, most: int) -> tuple[ComplexArray, FloatArray]:
+        """Follow Newton's method to roots near the line; return them and the last steps.
 
-        Of roots that count as equal it is the slowest.
+        Up to so many turns, from those `most` starts whose first step leads furthest right.
         """
-        end = self.search(further) * self.per_turn
-        if not end:
-            return None
         whole = self.shifted.sum_at(self.x, self.y).compiled()
-        s = self.sigma + 1j * resolved_grid(whole, end, 1.0)
+        s = self.sigma + 1j * resolved_grid(whole, turns * self.per_turn, 1.0, _MOST_POINTS)
+        self.steps += s.size
         # From where a step of Newton's method is locally shortest: no root close to the line
         # lies between two of its points.
         # Part by part, because arrays of millions would spend their time on memory.
@@ -240,11 +251,25 @@ class _Line:
         s, length = map(np.concatenate, zip(*map(self._step, parts), strict=True))
         wider = np.pad(length, 1, constant_values=np.inf)
         s = s[(length <= wider[:-2]) & (length < wider[2:])]
-        s = s[np.argsort(-s.real, kind="stable")][:_MOST_STARTS]
-        for _ in range(12):
+        return self.followed(s[np.argsort(-s.real, kind="stable")][:most], _NEWTON_STEPS)
+
+    def followed(self, s: ComplexArray, steps: int) -> tuple[ComplexArray, FloatArray]:
+        """Follow Newton's method; return where it leads, with Im s >= 0, and the last steps."""
+        length = np.empty(s.size)
+        for _ in range(steps):
             s, length = self._step(s)
-        found = s[length <= 1e-5 * self.per_turn]
-        found = found.real + 1j * np.abs(found.imag)
+        return s.real + 1j * np.abs(s.imag), length
+
+    def rightmost(self, further: float) -> tuple[complex, float] | None:
+        """Return the rightmost root near the line, and how far a faster one is ahead of it.
+
+        Of roots that count as equal it is the slowest.
+        """
+        turns = self.search(further)
+        if not turns:
+            return None
+        found, length = self.near(turns, _MOST_STARTS)
+        found = found[length <= 1e-5 * self.per_turn]
         unit = self.per_turn / (2.0 * np.pi)
         for top in sorted(found, key=lambda s: -s.real)[:_MOST_TRIED]:
             equal = found[found.real >= top.real - _EQUAL * max(abs(top), unit)]
@@ -255,6 +280,93 @@ class _Line:
                 continue
             return root, float(top.real - slowest.real)
         return None
+
+
+def roots_right_of(
+    system: CharacteristicFunction, x: float, y: float, sigma: float
+) -> ComplexArray:
+    """Find all characteristic roots right of a line Re s = sigma, but for those at s = 0.
+
+    Parameters
+    ----------
+    system : CharacteristicFunction
+        The loop, with polynomials in s.
+    x, y : float
+        The free parameters.
+    sigma : float
+        Where the line is, in rad/s; negative.
+
+    Returns
+    -------
+    complex array, shape (n,)
+        In rad/s, ascending in magnitude; of pairs those with Im s > 0. With their conjugates,
+        and the roots that D has exactly at s = 0, they are as many as a certified count says.
+
+    Raises
+    ------
+    RootError
+        If there is no such count, if there are too many roots, or not all are found.
+
+    Examples
+    --------
+    >>> from armlock import HayesEquation
+    >>> from armlock.stability.roots import roots_right_of
+    >>> len(roots_right_of(HayesEquation(tau=1.0), 0.0, -1.0, -3.0))
+    4
+    """
+    line = _Line(system, x, y, sigma)
+    wanted = line.count()
+    if wanted < 0 or wanted > _MOST_ROOTS:
+        why = "their number cannot be told" if wanted < 0 else f"there are {wanted}"
+        raise RootError(
+            f"the roots right of {sigma} rad/s are not found: {why}", complex(sigma)
+        )
+    wanted -= _order_at_zero(system, x, y)
+    unit, found, number = line.per_turn / (2.0 * np.pi), np.empty(0, dtype=np.complex128), 0
+    for s, length in _all_near(line, unit):
+        kept = (length <= 1e-10 * np.abs(s)) & (np.abs(s) > 1e-13 * unit) & (s.real > sigma)
+        found = _distinct(np.concatenate((found, s[kept])))
+        number = found.size + int(np.count_nonzero(found.imag))
+        if number == wanted:
+            return found[np.argsort(np.abs(found))]
+    raise RootError(
+        f"of {wanted} roots right of {sigma} rad/s only {number} are found", complex(sigma)
+    )
+
+
+def _all_near(line: _Line, unit: float) -> Iterator[tuple[ComplexArray, FloatArray]]:
+    """Yield where Newton's method leads, and its last steps, until all walks are too long."""
+    # Slow roots lie close to each other, anywhere around zero.
+    sizes = unit * np.geomspace(_SLOWEST, 4.0, 200)
+    yield line.followed(np.outer(sizes, np.exp(1j * _ANGLES)).ravel(), 40)
+    # Others along the line, ever further up, or closer to the axis.
+    turns, steps = 0.0, 0.0
+    while turns < line.turns:
+        turns = min(8.0 * max(turns, _FURTHER), line.turns)
+        for share in (1.0, 0.3, 0.1, 0.0):
+            one = _Line(line.system, line.x, line.y, share * line.sigma)
+            yield one.near(turns, 2 * _MOST_ROOTS)
+            steps += one.steps
+            if steps > _ALL_STEPS:
+                return
+
+
+def _order_at_zero(system: CharacteristicFunction, x: float, y: float) -> int:
+    """How many roots D has exactly at s = 0."""
+    whole = zip(*power_series(system, x, y, system.degree + 1), strict=True)
+    return next((k for k, pair in enumerate(whole) if sum(pair)), 0)
+
+
+def _distinct(s: ComplexArray) -> ComplexArray:
+    """Return the upper one of each pair, and each root once."""
+    s = np.where(np.abs(s.imag) <= 1e-9 * np.abs(s), s.real, s)
+    s = s[np.lexsort((s.real, np.abs(s.imag)))]
+    kept = np.ones(s.size, dtype=bool)
+    # Those that differ by rounding alone are neighbours, or next to one.
+    for apart in range(1, 4):
+        same = np.abs(s[apart:] - s[:-apart]) <= 1e-7 * np.abs(s[apart:])
+        kept[apart:] &= ~same
+    return s[kept]
 
 
 def _polished(system: CharacteristicFunction, x: float, y: float, start: complex) -> complex:
@@ -294,9 +406,8 @@ def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
     # There are roots right of `low`, as far as can be told, and none right of `high`.
     low, high, sigma, width, walked = -np.inf, np.inf, 0.0, unit, 0.0
     further = _FURTHER
-    while walked < _ALL_WALKS and sigma not in (low, high):
+    while walked < _ALL_STEPS and sigma not in (low, high):
         line = _Line(acting, p, q, sigma)
-        walked += 4.0 * line.search(further) + _COST_OF_A_LINE
         root, ahead = line.rightmost(further) or (complex(np.nan, np.nan), 0.0)
         further = min(2.0 * further, _FURTHEST)
         farthest = _FARTHEST * max(abs(root.real), unit)
@@ -307,6 +418,7 @@ def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
             for margin in np.geomspace(nearest, max(nearest, farthest), 6):
                 right_of_it = _Line(acting, p, q, best.real + ahead + margin)
                 count = right_of_it.count()
+                walked += right_of_it.steps
                 if count == 0:
                     # Another one may lie between the root and the line.
                     between = right_of_it.rightmost(further) if margin > nearest else None
@@ -321,6 +433,7 @@ def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
                 high = sigma
             else:
                 low = sigma
+        walked += line.steps
         if low > -np.inf and high < np.inf:
             # Roots next to the axis may be slower than the delays by many decades.
             sigma = float(small * np.sinh(0.5 * sum(np.arcsinh(np.array([low, high]) / small))))

@@ -25,6 +25,7 @@ from armlock.checks import (
     whole_number,
 )
 from armlock.controllers import Controller
+from armlock.progress import progress
 from armlock.timedomain.discretize import (
     Rows,
     sampled_filter,
@@ -32,6 +33,9 @@ from armlock.timedomain.discretize import (
     through,
     warped,
 )
+
+# Samples that are drawn at a time.
+_BLOCK = 1 << 20
 
 #: Zeros and pole, in rad per sample, that raise the sampled 1/f density to the prescribed one.
 _LASER_ZEROS, _LASER_POLE = (2.37, 7.87), 6.03
@@ -168,8 +172,14 @@ class ShapedNoise:
         """
         count = whole_number("samples", samples, 0)
         check_memory("samples", (count,), 8)
-        series = self._scale * self._random.standard_normal(count)
-        _shape(series, self._sampled.gain, self._sampled.sections, self._state)
+        series = np.empty(count)
+        with progress("noise", count) as say:
+            for at in range(0, count, _BLOCK):
+                part = series[at : at + _BLOCK]
+                self._random.standard_normal(out=part)
+                part *= self._scale
+                _shape(part, self._sampled.gain, self._sampled.sections, self._state)
+                say(at + _BLOCK)
         return series
 
     def blocks(self, samples: int, size: int = 1 << 20) -> Iterator[FloatArray]:

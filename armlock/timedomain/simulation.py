@@ -44,6 +44,8 @@ from armlock.timedomain.discretize import SampledFilter, SampledSensor, sampled_
 INTERPOLATION_ORDER = 7
 #: Samples that are computed at a time, of all runs; results do not depend on it.
 BLOCK = 1 << 16
+#: More are, up to this, where the past is long, which is moved with each block.
+MOST = 1 << 22
 #: Runs of an ensemble that go side by side. Fewer than half as many go one by one.
 LANES = 32
 #: The output counts as diverged when it exceeds the largest input so far by this factor. What
@@ -498,12 +500,13 @@ class _MovingArm:
         rows[0] = samples[0] if self._last is None else self._last
         self._last = samples[-1].copy()
         change = np.diff(rows, axis=0)
-        wrong = (samples < _SIDE) | (change <= _SLOWEST) | (change >= _FASTEST)
-        # Because of that, no later sample reaches further back than those of the first row.
+        right = samples.min() >= _SIDE and change.min() > _SLOWEST and change.max() < _FASTEST
+        # Then no later sample reaches further back than those of the first row.
         reach = int(samples[0].max()) + _SIDE
-        if not wrong.any() and reach <= known:
+        if right and reach <= known:
             return samples, reach
-        i, w = np.argwhere(wrong)[0] if wrong.any() else (0, samples[0].argmax())
+        wrong = (samples < _SIDE) | (change <= _SLOWEST) | (change >= _FASTEST)
+        i, w = (0, samples[0].argmax()) if right else np.argwhere(wrong)[0]
         if samples[i, w] < _SIDE:
             constraint = f"be at least {_SIDE / self._rate} s where it is not constant"
         elif wrong[i, w]:
@@ -652,10 +655,11 @@ class Simulation:
         # A block of samples of the output, and of what the controller has sent, stands behind
         # some samples of the past, of which so many are known. They come with the first block.
         columns = self.draws or 1
-        self._block = max(BLOCK // columns, 4 * self.history_samples)
+        past = self.history_samples
+        self._block = max(BLOCK // columns, min(4 * past, max(past, MOST // columns)))
         self._past = self._known = 0
         for name, number in (("sample_rate", 1), ("draws", columns)):
-            check_memory(name, (2, self.history_samples + self._block, number), 8)
+            check_memory(name, (2, past + self._block, number), 8)
         full, left = divmod(columns, LANES)
         # The last runs may be few, and are then faster one by one.
         groups = [LANES] * full + ([1] * left if 2 * left < LANES else [LANES])

@@ -1,13 +1,40 @@
 "use strict";
 /*
- * The live pages: a form, a chart of the stable region that answers the pointer, plots.
+ * The live pages: a form, a chart of the stable region that answers the pointer, plots that follow.
  *
- * All mathematics is in loop.js and runs in one worker. A page that is opened from disk may not
- * load a worker's script, so that the worker is made of the functions' own text.
+ * A page loads this file. It loads those beside it, each with one job: loop.js counts, margins.js
+ * and chart.js certify, time.js steps, text.js reads and writes, draw.js draws. What takes long
+ * runs in workers, which are made of the functions' own text: a page that is opened from disk may
+ * load no script into one.
  */
 (function () {
-  const TURN = 2 * Math.PI;
+  const here = document.currentScript.src;
+  const files = ["loop.js", "margins.js", "chart.js", "time.js", "text.js", "draw.js"];
+  const missing = files.filter(name =>
+    !Array.from(document.scripts).some(script => script.src.endsWith(`/live/${name}`)));
+  Promise.all(missing.map(name => new Promise((done, failed) => {
+    const script = document.createElement("script");
+    // In the order of the list.
+    script.async = false;
+    script.onload = done;
+    script.onerror = () => failed(new Error(`${name} is missing beside page.js`));
+    script.src = new URL(name, here).href;
+    document.head.append(script);
+  }))).then(() => {
+    if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", armlockPages);
+    else armlockPages();
+  });
+})();
+
+function armlockPages() {
+  const { TURN, say, duration, written, list, readRoots, readPolynomial, readNumber, python, address,
+    fromAddress, exact } = armlockText;
+  const { element, Sheet, Chart, drawNyquist, drawBode, drawTime } = armlockDraw;
+  const api = armlockLoop();
+  Object.assign(api, armlockChart(api));
+
   const hertz = values => values.map(f => [-TURN * f, 0]);
+  const real = values => values.map(v => [v, 0]);
   const PAPER = {
     sensor: "dual", tau1: 20.1, tau2: 19.9, delay: 0, corner: TURN * 0.4,
     difference: 0.2, gain: 5000,
@@ -15,6 +42,15 @@
     poles: hertz([1e-6, 1e-6, 1e-6, 5e-5, 4e-4, 5e-5]),
   };
   const ARM = { ...PAPER, zeros: [], poles: [[0, 0]], gain: 1 };
+  // As the package has it, `flight_loop()`: the zeros of the sum of ten terms are computed there.
+  const FLIGHT = { sensor: "modified", tau1: 33.855, tau2: 33.345, delay: 0, corner: TURN * 0.4,
+    difference: 0.51, gain: 83425.53428423413,
+    zeros: [...real([0, 0, 0, 0]), ...hertz(Array(5).fill(36.6e-6)), ...real([-909686.7705117954,
+      -79277.49256135186, -9812.456529020996, -852.8835173889007, -86.46434550283912,
+      -2.0732204903372633, -0.1640373233692247]),
+      [-4.11185038643452, -2.2259179668023865], [-4.11185038643452, 2.2259179668023865]],
+    poles: hertz([8e-7, 8e-7, 8e-7, 2.1e-4, ...Array(5).fill(1.85e-4), 3e-3, 0.238,
+      0.03, 0.3, 3, 30, 300, 3e3, 3e4, 3e5]) };
   const PRESETS = {
     "The paper's controlled loop": [PAPER, 1, 3e-6],
     "Common arm": [{ ...ARM, sensor: "common" }, 0, 3],
@@ -22,58 +58,32 @@
     "Single arm": [{ ...ARM, sensor: "single" }, 0, 3],
     "Common arm with a lead filter and a dead time": [{ ...ARM, sensor: "common", delay: 0.1,
       zeros: [[-0.02, 0]], poles: [[0, 0], [-0.1, 0]] }, 0, 1.5],
+    "The white paper's loop (modified dual)": [FLIGHT, 1, 2e-3],
   };
-  const SQUARE = 1e-6;
-  const WORDS = { [-1]: "on the boundary", [-2]: "not stable: the high-frequency chain of roots is not confined",
-    [-3]: "not sure" };
-
-  function say(number, digits = 3) {
-    if (number === 0) return "0";
-    const size = Math.abs(number);
-    const text = size < 1e-3 || size >= 1e5 ? scientific(number, digits - 1)
-      : String(+number.toPrecision(digits));
-    return text.replace(/-/g, "\u2212");
-  }
-
-  function scientific(number, digits) {
-    const [factor, exponent] = number.toExponential(digits).split("e");
-    return `${factor} \u00d7 ${power(Number(exponent))}`;
-  }
-
-  function power(exponent) {
-    const digits = "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079";
-    return `10${String(exponent).replace(/./g, d => d === "-" ? "\u207b" : digits[d])}`;
-  }
+  const SENSORS = [["single", "single arm"], ["common", "common arm"],
+    ["difference", "difference of the arms"], ["dual", "dual"], ["modified", "modified dual"],
+    ["own", "one of your own"]];
+  const WORDS = { [-1]: "on the boundary", [-3]: "not sure",
+    [-2]: "not stable: the high-frequency chain of roots is not confined" };
 
   function counted(count) {
     return count === 0 ? "stable" : count > 0
       ? `${count} unstable root${count > 1 ? "s" : ""}` : WORDS[count];
   }
 
-  /* ---------------------------------------------------------------------------- worker */
+  /* ---------------------------------------------------------------------------- workers */
 
-  /* Runs in the worker: `api` is what loop.js gives. */
+  /* Runs in a worker: `api` is what the engine's files give. */
   function tasks(api) {
     const look = {
-      chart: (spec, x0, x1, y0, y1, n) => {
-        const { counts, complete } = api.chart(api.make(spec), x0, x1, n, y0, y1, n);
-        return { counts, complete, n };
-      },
+      chart: (spec, x0, x1, y0, y1, n, samples) => ({ n, box: { x0, x1, y0, y1 },
+        ...api.chart(api.make(spec), x0, x1, n, y0, y1, n, samples) }),
       point: (spec, c1, c2) => api.count(api.make(spec), c1, c2),
       root: (spec, c1, c2) => api.rightmost(spec, c1, c2),
       breaks: spec => [[1, -1], [1, 1], [-1, -1]].map(
         ([x, y]) => api.firstBreak(api.make(spec), x, y)),
-      margins: (spec, c1, c2) => api.count(api.make(spec), c1, c2) === 0
-        ? api.margins(spec, c1, c2) : null,
-      plots: (spec, c1, c2) => {
-        const { omega, re, im } = api.response(api.make(spec), c1, c2);
-        // Forty turns of the longest delay are what a picture can hold.
-        const last = 40 * 2 * Math.PI / (Math.max(spec.tau1, spec.tau2) + spec.delay);
-        const n = omega.findIndex(w => w > last);
-        return [omega, re, im].map(values => values.slice(0, n < 0 ? values.length : n));
-      },
-      // Counts at points of a chart, each for certain.
-      check: (spec, points) => points.map(([x, y]) => api.count(api.make(spec), x, y)),
+      margins: (spec, c1, c2) => api.margins(spec, c1, c2),
+      time: (spec, c1, c2, trips) => api.inTime(spec, c1, c2, trips),
     };
     return ({ data: { kind, version, input } }) => {
       let result = null, error = null;
@@ -82,10 +92,13 @@
     };
   }
 
-  /* Asks the worker one thing at a time, the most urgent first; of each kind only the last. */
+  /* Asks a worker one thing at a time, the most urgent first; of each kind only the last. */
   class Desk {
     constructor(order) {
-      const text = `onmessage = (${tasks})((${armlockLoop})());`;
+      const text = `const api = (${armlockLoop})();
+        for (const more of [${armlockMargins}, ${armlockChart}, ${armlockTime}])
+          Object.assign(api, more(api));
+        onmessage = (${tasks})(api);`;
       this.worker = new Worker(URL.createObjectURL(new Blob([text], { type: "text/javascript" })));
       this.worker.onmessage = ({ data }) => {
         const { kind, version, result, error } = data, { heard } = this.running;
@@ -122,579 +135,267 @@
     }
   }
 
-  /* ---------------------------------------------------------------------------- drawing */
+  /* ---------------------------------------------------------------------------- an explorer */
 
-  function element(tag, attributes = {}, ...children) {
-    const made = document.createElement(tag);
-    for (const [name, value] of Object.entries(attributes)) {
-      if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
-      else if (value !== null) made.setAttribute(name, value);
-    }
-    made.append(...children);
-    return made;
-  }
-
-  /* A canvas as wide as its place, sharp on every screen. */
-  class Sheet {
-    constructor(attributes, shape, draw) {
-      this.canvas = element("canvas", attributes);
-      this.shape = shape;
-      this.draw = () => {
-        const wide = this.canvas.clientWidth;
-        if (!wide) return;
-        const ratio = window.devicePixelRatio || 1, high = Math.round(wide * shape);
-        this.canvas.width = wide * ratio;
-        this.canvas.height = high * ratio;
-        const pen = this.canvas.getContext("2d");
-        pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-        const style = getComputedStyle(this.canvas);
-        pen.font = "13px sans-serif";
-        pen.fillStyle = pen.strokeStyle = style.color;
-        const dark = document.documentElement.dataset.theme === "dark";
-        draw(pen, wide, high, { dark, text: style.color, grid: dark ? "#55606a" : "#c9d0d6",
-          line: dark ? "#56b4e9" : "#0072b2", mark: dark ? "#f0a060" : "#d55e00" });
-      };
-      this.canvas.style.aspectRatio = String(1 / shape);
-      new ResizeObserver(this.draw).observe(this.canvas);
-      new MutationObserver(this.draw).observe(document.documentElement,
-        { attributes: true, attributeFilter: ["data-theme"] });
-    }
-  }
-
-  function ticks(low, high, most) {
-    const rough = (high - low) / most, power = 10 ** Math.floor(Math.log10(rough));
-    const step = [1, 2, 5, 10].map(k => k * power).find(k => k >= rough);
-    const found = [];
-    for (let k = Math.ceil(low / step); k * step <= high; k++) found.push(k * step);
-    return found;
-  }
-
-  const COLOURS = { [-1]: [0, 0, 0], [-2]: [147, 132, 160], [-3]: [255, 255, 255] };
-
-  /* The chart over (c1, c2). `centre` and `half` say what it shows; it is drawn and named in
-   * units of a power of ten from (1, 1) where it is small. */
-  class Chart {
-    constructor(label, changed, pointed) {
-      this.changed = changed;
-      this.pointed = pointed;
-      this.centre = [1, 1];
-      this.half = 3;
-      this.marked = null;
-      this.broken = null;
-      this.picture = null;
-      this.sheet = new Sheet({ tabindex: 0, role: "application", "aria-label": `${label} Arrow keys `
-        + "move the point, with shift by ten steps; plus and minus zoom." }, 1,
-        (pen, wide, high, colours) => this.draw(pen, wide, high, colours));
-      const canvas = this.canvas = this.sheet.canvas;
-      canvas.addEventListener("pointermove", event => this.point(event, false));
-      canvas.addEventListener("pointerdown", event => this.point(event, true));
-      canvas.addEventListener("keydown", event => this.key(event));
-      canvas.addEventListener("wheel", event => {
-        event.preventDefault();
-        this.zoom(event.deltaY > 0 ? 1.5 : 1 / 1.5, this.at(event));
-      }, { passive: false });
-    }
-
-    get box() {
-      return { x0: this.centre[0] - this.half, x1: this.centre[0] + this.half,
-        y0: this.centre[1] - this.half, y1: this.centre[1] + this.half };
-    }
-
-    show(centre, half) {
-      this.centre = centre;
-      this.half = Math.min(Math.max(half, 1e-12), 1e3);
-      this.picture = null;
-      this.sheet.draw();
-      this.changed();
-    }
-
-    zoom(factor, around) {
-      const [x, y] = around || this.marked || this.centre;
-      const half = this.half * factor;
-      this.show([x + (this.centre[0] - x) * factor, y + (this.centre[1] - y) * factor], half);
-    }
-
-    fill({ counts, n }) {
-      let largest = 1;
-      for (const count of counts) if (count > largest) largest = count;
-      const picture = element("canvas", { width: n, height: n }), image = new ImageData(n, n);
-      for (let j = 0; j < n; j++) for (let i = 0; i < n; i++) {
-        const count = counts[j * n + i], t = Math.sqrt(count / largest);
-        const colour = count < 0 ? COLOURS[count] : count === 0 ? [184, 196, 206]
-          : [255 - 46 * t, 240 - 155 * t, 224 - 190 * t];
-        image.data.set([...colour, 255], 4 * ((n - 1 - j) * n + i));
-      }
-      picture.getContext("2d").putImageData(image, 0, 0);
-      this.picture = picture;
-      this.grid = { counts, n, ...this.box };
-      this.sheet.draw();
-    }
-
-    /* The chart's own count at a point: of the nearest grid point, and of all around it. */
-    around(c1, c2) {
-      const { counts, n, x0, x1, y0, y1 } = this.grid;
-      const i = Math.round((c1 - x0) / (x1 - x0) * (n - 1));
-      const j = Math.round((c2 - y0) / (y1 - y0) * (n - 1));
-      const found = [];
-      for (let b = Math.max(j - 1, 0); b <= Math.min(j + 1, n - 1); b++)
-        for (let a = Math.max(i - 1, 0); a <= Math.min(i + 1, n - 1); a++)
-          found.push(counts[b * n + a]);
-      return found;
-    }
-
-    get unit() {
-      const { x0, x1, y0, y1 } = this.box;
-      const far = Math.max(...[x0, x1, y0, y1].map(v => Math.abs(v - 1)));
-      return far < 0.01 ? 10 ** Math.floor(Math.log10(far)) : 0;
-    }
-
-    frame(wide, high) {
-      return { left: 58, top: 10, wide: wide - 58 - 12, high: high - 10 - 48 };
-    }
-
-    draw(pen, wide, high, colours) {
-      const frame = this.frame(wide, high), { x0, x1, y0, y1 } = this.box, unit = this.unit;
-      const px = x => frame.left + frame.wide * (x - x0) / (x1 - x0);
-      const py = y => frame.top + frame.high * (y1 - y) / (y1 - y0);
-      pen.imageSmoothingEnabled = false;
-      // In dark mode as armlock.css turns the figures.
-      if (colours.dark) pen.filter = "invert(0.93) hue-rotate(180deg)";
-      if (this.picture)
-        pen.drawImage(this.picture, frame.left, frame.top, frame.wide, frame.high);
-      pen.filter = "none";
-      const read = v => unit ? (v - 1) / unit : v, write = v => unit ? 1 + v * unit : v;
-      pen.strokeStyle = colours.text;
-      pen.strokeRect(frame.left, frame.top, frame.wide, frame.high);
-      pen.textAlign = "center";
-      pen.textBaseline = "top";
-      for (const v of ticks(read(x0), read(x1), 6))
-        pen.fillText(say(+v.toPrecision(6), 6), px(write(v)), frame.top + frame.high + 6);
-      pen.textAlign = "right";
-      pen.textBaseline = "middle";
-      for (const v of ticks(read(y0), read(y1), 6))
-        pen.fillText(say(+v.toPrecision(6), 6), frame.left - 6, py(write(v)));
-      const name = k => unit ? `${power(Math.round(-Math.log10(unit)))} (c${k} \u2212 1)` : `c${k}`;
-      pen.textAlign = "center";
-      pen.textBaseline = "bottom";
-      pen.fillText(name(1), frame.left + frame.wide / 2, high - 4);
-      pen.save();
-      pen.translate(4, frame.top + frame.high / 2);
-      pen.rotate(-Math.PI / 2);
-      pen.textBaseline = "top";
-      pen.fillText(name(2), 0, 0);
-      pen.restore();
-      pen.save();
-      pen.beginPath();
-      pen.rect(frame.left, frame.top, frame.wide, frame.high);
-      pen.clip();
-      if (this.half < 1e-4) {
-        pen.strokeStyle = colours.line;
-        pen.lineWidth = 2;
-        pen.strokeRect(px(1 - SQUARE), py(1 + SQUARE), px(1 + SQUARE) - px(1 - SQUARE),
-          py(1 - SQUARE) - py(1 + SQUARE));
-      }
-      // The ideal point.
-      pen.strokeStyle = colours.text;
-      pen.lineWidth = 1.5;
-      pen.beginPath();
-      for (const [dx, dy] of [[7, 0], [0, 7]]) {
-        pen.moveTo(px(1) - dx, py(1) - dy);
-        pen.lineTo(px(1) + dx, py(1) + dy);
-      }
-      pen.stroke();
-      if (this.broken > 0 && this.broken < Infinity) {
-        pen.fillStyle = colours.text;
-        pen.strokeStyle = colours.dark ? "#000" : "#fff";
-        pen.beginPath();
-        pen.arc(px(1 + this.broken), py(1 - this.broken), 5, 0, 7);
-        pen.fill();
-        pen.stroke();
-      }
-      if (this.marked) for (const [colour, width] of [["#fff", 5], ["#0072b2", 2]]) {
-        pen.strokeStyle = colour;
-        pen.lineWidth = width;
-        pen.beginPath();
-        pen.arc(px(this.marked[0]), py(this.marked[1]), 7, 0, 7);
-        pen.stroke();
-      }
-      pen.restore();
-    }
-
-    at(event) {
-      const place = this.canvas.getBoundingClientRect();
-      const frame = this.frame(place.width, place.height), { x0, x1, y0, y1 } = this.box;
-      const x = (event.clientX - place.left - frame.left) / frame.wide;
-      const y = 1 - (event.clientY - place.top - frame.top) / frame.high;
-      if (x < 0 || x > 1 || y < 0 || y > 1) return null;
-      return [x0 + x * (x1 - x0), y0 + y * (y1 - y0)];
-    }
-
-    point(event, firmly) {
-      const found = this.at(event);
-      if (found) this.mark(found, firmly);
-    }
-
-    mark(point, firmly) {
-      this.marked = point;
-      this.sheet.draw();
-      this.pointed(point, firmly);
-    }
-
-    key(event) {
-      const zoom = { "+": 0.5, "=": 0.5, "-": 2 }[event.key];
-      if (zoom) {
-        event.preventDefault();
-        this.zoom(zoom);
-        return;
-      }
-      const move = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1],
-        ArrowDown: [0, -1] }[event.key];
-      if (!move) return;
-      event.preventDefault();
-      const step = this.half / 100 * (event.shiftKey ? 10 : 1), { x0, x1, y0, y1 } = this.box;
-      const [x, y] = this.marked || this.centre;
-      this.mark([Math.min(x1, Math.max(x0, x + step * move[0])),
-        Math.min(y1, Math.max(y0, y + step * move[1]))], true);
-    }
-
-    name([x, y]) {
-      const text = v => this.unit
-      ? `1 ${v < 1 ? "\u2212" : "+"} ${scientific(Math.abs(v - 1), 2)}` : say(v, 4);
-      return `c1 = ${text(x)}, c2 = ${text(y)}`;
-    }
-  }
-
-  function curve(pen, n, x, y) {
-    pen.beginPath();
-    for (let i = 0; i < n; i++) if (i) pen.lineTo(x(i), y(i)); else pen.moveTo(x(i), y(i));
-    pen.stroke();
-  }
-
-  /* The Nyquist curve, its distance from 0 on a logarithmic scale: angles stay as they are. */
-  function drawNyquist([omega, re, im], pen, wide, high, colours) {
-    const n = omega.length;
-    const far = v => Math.log10(1 + v);
-    let most = 2;
-    for (let i = 0; i < n; i++) most = Math.max(most, Math.hypot(re[i], im[i]));
-    most = Math.min(most, 1e6);
-    const scale = 0.46 * Math.min(wide, high) / far(most), cx = wide / 2, cy = high / 2;
-    pen.strokeStyle = colours.grid;
-    pen.textAlign = "left";
-    pen.textBaseline = "bottom";
-    for (let size = 1; size <= most; size *= 10) {
-      pen.beginPath();
-      pen.arc(cx, cy, scale * far(size), 0, 7);
-      pen.stroke();
-      pen.fillText(power(Math.round(Math.log10(size))), cx + 3, cy - scale * far(size));
-    }
-    const place = (i, sign) => {
-      const size = Math.hypot(re[i], im[i]) || 1e-300, k = scale * far(Math.min(size, most)) / size;
-      return [cx + k * re[i], cy - sign * k * im[i]];
-    };
-    for (const sign of [-1, 1]) {
-      pen.strokeStyle = sign > 0 ? colours.line : colours.grid;
-      curve(pen, n, i => place(i, sign)[0], i => place(i, sign)[1]);
-    }
-    pen.strokeStyle = colours.mark;
-    pen.lineWidth = 2;
-    const x = cx - scale * far(1);
-    for (const d of [-1, 1]) {
-      pen.beginPath();
-      pen.moveTo(x - 5, cy - 5 * d);
-      pen.lineTo(x + 5, cy + 5 * d);
-      pen.stroke();
-    }
-  }
-
-  function drawBode([omega, re, im], pen, wide, high, colours) {
-    const n = omega.length, size = [], phase = [];
-    for (let i = 0; i < n; i++) {
-      size.push(20 * Math.log10(Math.hypot(re[i], im[i]) + 1e-300));
-      phase.push(Math.atan2(im[i], re[i]) * 180 / Math.PI);
-    }
-    const first = Math.log10(omega[0] / TURN), last = Math.log10(omega[n - 1] / TURN);
-    const left = 56, right = 8, room = (high - 62) / 2;
-    const px = i => left + (wide - left - right) * (Math.log10(omega[i] / TURN) - first) / (last - first);
-    const panel = (top, values, low, most, name, step) => {
-      const py = v => top + room * (most - v) / (most - low);
-      pen.strokeStyle = colours.grid;
-      pen.textAlign = "right";
-      pen.textBaseline = "middle";
-      for (const v of step || ticks(low, most, 4)) {
-        pen.beginPath();
-        pen.moveTo(left, py(v));
-        pen.lineTo(wide - right, py(v));
-        pen.stroke();
-        pen.fillText(say(v), left - 5, py(v));
-      }
-      pen.save();
-      pen.translate(2, top + room / 2);
-      pen.rotate(-Math.PI / 2);
-      pen.textAlign = "center";
-      pen.textBaseline = "top";
-      pen.fillText(name, 0, 0);
-      pen.restore();
-      pen.save();
-      pen.beginPath();
-      pen.rect(left, top, wide - left - right, room);
-      pen.clip();
-      pen.strokeStyle = colours.line;
-      // A phase that passes 180 degrees is drawn anew from the other side.
-      pen.beginPath();
-      for (let i = 0; i < n; i++) {
-        const on = i && Math.abs(values[i] - values[i - 1]) < 300;
-        if (on) pen.lineTo(px(i), py(values[i])); else pen.moveTo(px(i), py(values[i]));
-      }
-      pen.stroke();
-      pen.restore();
-    };
-    let top = -Infinity;
-    for (const v of size) top = Math.max(top, v);
-    const low = size.reduce((a, v) => Math.min(a, Math.max(v, top - 160)), top);
-    panel(8, size, low - 5, top + 5, "|L| in dB");
-    panel(22 + room, phase, -180, 180, "phase in degrees", [-180, -90, 0, 90, 180]);
-    pen.fillStyle = colours.text;
-    pen.textAlign = "center";
-    pen.textBaseline = "top";
-    const every = Math.ceil((last - first) / (wide / 60));
-    for (let k = Math.ceil(first); k <= last; k += every) {
-      const x = left + (wide - left - right) * (k - first) / (last - first);
-      pen.fillText(power(k), x, 26 + 2 * room);
-    }
-    pen.textBaseline = "bottom";
-    pen.fillText("frequency in Hz", (left + wide - right) / 2, high - 2);
-  }
-
-  /* ---------------------------------------------------------------------------- state */
-
-  /* A number in as few characters as hold all its digits. */
-  function exact(number) {
-    const plain = String(number), scientific = number.toExponential();
-    return scientific.length < plain.length ? scientific : plain;
-  }
-
-  function written(roots) {
-    const left = [...roots], parts = [];
-    while (left.length) {
-      const [re, im] = left.shift();
-      const partner = im ? left.findIndex(([x, y]) => x === re && y === -im) : -1;
-      if (partner >= 0) {
-        left.splice(partner, 1);
-        parts.push(`${exact(re)}\u00b1${exact(Math.abs(im))}j`);
-      } else {
-        parts.push(im ? `${exact(re)}${im < 0 ? "-" : "+"}${exact(Math.abs(im))}j` : exact(re));
-      }
-    }
-    return parts.join(", ");
-  }
-
-  const NUMBER = "[+-]?(?:\\d+\\.?\\d*|\\.\\d+)(?:e[+-]?\\d+)?";
-  const REAL = new RegExp(`^${NUMBER}$`, "i");
-  const COMPLEX = new RegExp(`^(${NUMBER})?([+-]|\u00b1)((?:\\d+\\.?\\d*|\\.\\d+)(?:e[+-]?\\d+)?)[ij]$`, "i");
-
-  function read(name, text) {
-    const found = [];
-    for (const part of text.replace(/\u2212/g, "-").split(/[,;\s]+/).filter(p => p)) {
-      const match = COMPLEX.exec(part);
-      if (match) {
-        const re = Number(match[1] || 0), im = Number(match[3]);
-        if (match[2] !== "-") found.push([re, im]);
-        if (match[2] !== "+") found.push([re, -im]);
-      } else if (REAL.test(part)) {
-        found.push([Number(part), 0]);
-      } else {
-        throw new RangeError(`${name} must be numbers such as -0.1 or -0.1\u00b12j, got ${part}`);
-      }
-    }
-    return found;
-  }
-
-  /* The lines that make the same loop with the package. */
-  function python(spec, [c1, c2]) {
-    const root = ([re, im]) =>
-      im ? `${exact(re)}${im < 0 ? "-" : "+"}${exact(Math.abs(im))}j` : exact(re);
-    const list = roots => `[${roots.map(root).join(", ")}]`;
-    const dual = spec.sensor === "dual";
-    const sensor = dual ? `dual(corner=${spec.corner}, difference=${spec.difference})`
-      : spec.sensor.toUpperCase();
-    return `from armlock import Controller, Loop, unstable_roots
-from armlock.sensors import ${dual ? "dual" : sensor}
-
-controller = Controller(
-    zeros=${list(spec.zeros)},
-    poles=${list(spec.poles)},
-    gain=${spec.gain},
-)
-loop = Loop(
-    controller, ${sensor},
-    tau1=${spec.tau1}, tau2=${spec.tau2}, delay=${spec.delay},
-)
-print(unstable_roots(loop, ${c1}, ${c2}))
-`;
-  }
-
-  const SHORT = { sensor: "s", tau1: "t1", tau2: "t2", delay: "d", gain: "g", corner: "p",
-    difference: "dt", zeros: "z", poles: "q" };
-
-  function address(spec, chart) {
-    const parts = new URLSearchParams();
-    for (const [name, key] of Object.entries(SHORT))
-      parts.set(key, Array.isArray(spec[name]) ? written(spec[name]) : spec[name]);
-    parts.set("at", [...chart.centre, chart.half].join(","));
-    return `#${parts}`;
-  }
-
-  function fromAddress(hash) {
-    const parts = new URLSearchParams(hash.slice(1));
-    if (!parts.has("s")) return null;
-    const spec = {};
-    for (const [name, key] of Object.entries(SHORT)) {
-      const text = parts.get(key) ?? "";
-      spec[name] = name === "sensor" ? text
-        : name === "zeros" || name === "poles" ? read(name, text) : Number(text);
-    }
-    const [x, y, half] = (parts.get("at") || "1,1,1").split(",").map(Number);
-    return [spec, [x, y], half];
-  }
-
-  /* ---------------------------------------------------------------------------- pages */
-
+  const HINT = "Point at the chart, touch it, or move with the arrow keys. Drag to move the view.";
   let number = 0;
 
-  /* What both pages have: a chart that answers, and the numbers of the loop. */
+  /* What all pages have: a chart that answers, plots that follow it, and the loop's numbers. */
   class Live {
     constructor(label) {
       this.id = `live-${++number}`;
-      this.desk = new Desk(["point", "chart", "root", "breaks", "margins", "plots", "check"]);
+      // What answers the pointer waits for nothing else.
+      this.near = new Desk(["point", "root"]);
+      this.wide = new Desk(["chart"]);
+      this.slow = new Desk(["time", "breaks", "margins"]);
       this.out = element("output", { role: "status", "aria-live": "polite" });
-      this.note = element("p", { class: "live-note" });
+      this.note = element("p", { class: "live-note", role: "status" });
       this.numbers = element("dl", { class: "live-numbers" });
-      this.chart = new Chart(label, () => this.redraw(), point => this.tell(point));
+      this.chart = new Chart(label, { changed: () => this.redraw(),
+        pointed: point => this.tell(point) });
       this.figure = element("div", { class: "live-chart", "data-check": "hover" },
         this.chart.canvas, this.out);
+      this.lit = null;
+      // What a page does besides when loop or point are others.
+      this.told = () => {};
+      this.plots = [
+        ["Nyquist curve of L at the point, distances from 0 on a logarithmic scale; inset: around -1, "
+          + "with the arc of the smallest phase at a crossover.", drawNyquist, 0.85],
+        ["Magnitude and phase of L at the point against frequency.", drawBode, 0.85],
+      ].map(([text, draw, shape]) => this.plot(text, draw, shape));
+      this.following = element("p", { class: "live-note", role: "status" });
       this.forget();
+    }
+
+    /* A plot of the response, on which a frequency can be pointed at. */
+    plot(label, draw, shape) {
+      let place = null;
+      const sheet = new Sheet({ role: "application", tabindex: 0, "aria-label": `${label} Arrow keys `
+        + "move along the frequencies." }, shape, (pen, wide, high, colours) => {
+        if (this.response) place = draw(this.response, this.lit, pen, wide, high, colours);
+      });
+      sheet.canvas.addEventListener("pointermove", event => {
+        if (!this.response || !place) return;
+        const box = sheet.canvas.getBoundingClientRect();
+        const x = event.clientX - box.left, y = event.clientY - box.top;
+        let best = Infinity, nearest = null;
+        for (let i = 0; i < this.response.omega.length; i++) {
+          const [u, v] = place(i), gap = Math.abs(u - x) + (v === null ? 0 : Math.abs(v - y));
+          if (gap < best) [best, nearest] = [gap, i];
+        }
+        this.light(nearest);
+      });
+      sheet.canvas.addEventListener("pointerleave", () => this.light(null));
+      sheet.canvas.addEventListener("keydown", event => {
+        const move = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key];
+        if (!move || !this.response) return;
+        event.preventDefault();
+        const n = this.response.omega.length, from = this.lit ?? Math.round(n / 2);
+        this.light(Math.min(n - 1, Math.max(0, from + move * (event.shiftKey ? 20 : 1))));
+      });
+      return sheet;
+    }
+
+    /* Light one frequency in all plots, and where the D-curve has it. */
+    light(index) {
+      if (index === this.lit) return;
+      this.lit = index;
+      this.chart.lit = null;
+      if (index !== null) {
+        const { omega, re, im } = this.response, w = omega[index];
+        const [x, y] = api.crossing(this.loop, w);
+        if (Number.isFinite(x + y)) this.chart.lit = [x, y];
+        this.following.textContent = `${say(w / TURN)} Hz: |L| = ${say(Math.hypot(re[index], im[index]))}, `
+          + `phase ${say(Math.atan2(im[index], re[index]) * 180 / Math.PI)}\u00b0`;
+      } else {
+        this.following.textContent = "";
+      }
+      this.chart.sheet.draw();
+      for (const plot of this.plots) plot.draw();
     }
 
     /* Nobody has pointed at a place yet. */
     forget() {
       this.chart.marked = null;
       this.shown = [1, 1];
-      this.out.textContent = "Point at the chart, touch it, or move with the arrow keys.";
+      this.out.textContent = HINT;
     }
 
-    /* Take another loop. */
-    set(spec) {
+    /* There is no loop: nothing of the one before stays. */
+    none(why) {
+      this.near.drop("point", "root");
+      this.wide.drop("chart");
+      this.slow.drop("time", "breaks", "margins");
+      clearTimeout(this.rest);
+      this.spec = this.loop = this.response = null;
+      this.lit = null;
+      this.chart.clear();
+      this.out.textContent = why;
+      this.note.textContent = this.following.textContent = "";
+      this.numbers.replaceChildren();
+      for (const plot of this.plots) plot.draw();
+    }
+
+    /* Take another loop. While a slider moves, `moving`, pictures are coarser and nothing is asked
+     * that takes long. */
+    set(spec, moving = false) {
       this.spec = spec;
+      this.loop = api.make(spec);
       this.chart.broken = null;
-      this.desk.drop("point", "root", "margins", "plots", "check");
-      this.redraw();
-      this.desk.ask("breaks", [spec], found => {
-        this.breaks = found;
-        this.chart.broken = found ? found[0] : null;
-        this.chart.sheet.draw();
-        this.list();
-      });
-      this.settle(this.shown, 0);
-      if (this.chart.marked) this.tell(this.chart.marked);
+      this.breaks = this.margins = undefined;
+      this.near.drop("point", "root");
+      this.slow.drop("time", "breaks", "margins");
+      this.list();
+      this.lit = this.chart.lit = null;
+      this.responded = api.response(this.loop, ...this.most(), moving ? 2500 : 9000);
+      this.follow(this.shown);
+      this.redraw(moving);
+      if (this.chart.marked) this.tell(this.chart.marked); else this.wait();
+      this.told();
     }
 
-    redraw() {
-      if (!this.spec) return;
+    /* Parameters as large as the view has them: their response shows the most. */
+    most() {
       const { x0, x1, y0, y1 } = this.chart.box;
-      this.desk.drop("check");
-      const input = [this.spec, x0, x1, y0, y1];
-      this.desk.ask("chart", [...input, 200], (found, error) => {
+      return [[x0, x1], [y0, y1]].map(pair => Math.max(...pair.map(Math.abs), 1));
+    }
+
+    /* The response at a point, in this frame. */
+    follow(point) {
+      if (!this.responded) return;
+      this.response = this.responded.to(...point);
+      if (this.lit >= this.response.omega.length) this.lit = null;
+      for (const plot of this.plots) plot.draw();
+    }
+
+    redraw(moving = false) {
+      if (!this.spec) return;
+      const { x0, x1, y0, y1 } = this.chart.box, input = [this.spec, x0, x1, y0, y1];
+      this.chart.stale = true;
+      this.chart.curve = this.dcurve(moving ? 3000 : 20000);
+      this.chart.sheet.draw();
+      this.wide.ask("chart", [...input, 100, 60000], (found, error) => {
         if (error) { this.note.textContent = error; return; }
         this.chart.fill(found);
         this.note.textContent = "Refining \u2026";
-        this.desk.ask("chart", [...input, 400], finer => {
+        this.wide.ask("chart", [...input, 400, 3000000], finer => {
           this.chart.fill(finer);
-          this.verify(finer.complete);
+          const share = 1 - finer.sure;
+          this.note.textContent = share === 0
+            ? "Every pixel of the chart is certain, lines between areas to a pixel."
+            : `${share > 0.999 ? "All" : `${say(100 * share, 2)} %`} of the chart is not sure, and striped; `
+              + "the rest is certain, lines between areas to a pixel.";
         });
       });
     }
 
-    /* Count some points of the chart for certain, and say how they compare. */
-    verify(complete) {
-      const { x0, x1, y0, y1 } = this.chart.box, points = [];
-      for (let k = 1; k <= 24; k++)
-        points.push([x0 + (x1 - x0) * (0.7548776662 * k % 1), y0 + (y1 - y0) * (0.5698402910 * k % 1)]);
-      this.desk.ask("check", [this.spec, points], found => {
-        let same = 0, sure = 0;
-        found.forEach((count, k) => {
-          if (count === -3) return;
-          sure++;
-          const around = this.chart.around(...points[k]);
-          same += count >= Math.min(...around) && count <= Math.max(...around);
-        });
-        this.note.textContent = `The chart is drawn from sampled frequencies. ${sure} of its points `
-          + `were counted for certain: ${same === sure ? "all agree" : `${sure - same} differ`}.`
-          + (complete ? "" : " Crossings at still higher frequencies are left out.");
-      });
+    dcurve(most) {
+      const { x0, x1, y0, y1 } = this.chart.box, range = [Infinity, 0];
+      const found = api.dcurve(this.loop, x0, x1, y0, y1, most);
+      for (let i = 2; i < found.curve.length; i += 3) {
+        if (found.curve[i] < range[0]) range[0] = found.curve[i];
+        if (found.curve[i] > range[1]) range[1] = found.curve[i];
+      }
+      return { ...found, range };
     }
 
     tell(point) {
+      if (!this.spec) return;
       const name = this.chart.name(point);
+      this.shown = point;
+      this.follow(point);
       this.out.textContent = `${name}: counting \u2026`;
-      this.desk.drop("root");
-      this.desk.ask("point", [this.spec, ...point], (count, error) => {
+      this.near.drop("root");
+      this.margins = undefined;
+      this.list();
+      this.near.ask("point", [this.spec, ...point], (count, error) => {
         this.out.textContent = error || `${name}: ${counted(count)}`;
-        if (error) return;
-        clearTimeout(this.rest);
-        this.rest = setTimeout(() => this.settle(point, count), 200);
+        if (!error && count >= 0) this.root(point, this.out.textContent);
+      });
+      this.wait();
+      this.told();
+    }
+
+    root(point, before) {
+      this.near.ask("root", [this.spec, ...point], root => {
+        if (!root || this.out.textContent !== before) return;
+        const im = root[1] ? ` \u00b1 ${say(Math.abs(root[1]))}j` : "";
+        const rate = root[0] < 0 ? "decays" : "grows";
+        this.out.textContent = `${before}; rightmost root ${say(root[0])}${im} rad/s: ${rate} by e in `
+          + `${duration(1 / Math.abs(root[0]))}`;
       });
     }
 
-    /* Once the pointer rests: what takes longer. */
-    settle(point, count) {
-      this.shown = point;
-      if (count >= 0 && this.chart.marked) {
-        const before = this.out.textContent;
-        this.desk.ask("root", [this.spec, ...point], root => {
-          if (!root || this.out.textContent !== before) return;
-          const im = root[1] ? ` \u00b1 ${say(Math.abs(root[1]))}j` : "";
-          this.out.textContent = `${before}; rightmost root ${say(root[0])}${im} rad/s`;
+    /* Ask for what takes longer once pointer and sliders rest. */
+    wait() {
+      clearTimeout(this.rest);
+      this.rest = setTimeout(() => this.settle(this.shown), 250);
+    }
+
+    settle(point) {
+      if (!this.spec) return;
+      if (this.breaks === undefined)
+        this.slow.ask("breaks", [this.spec], (found, error) => {
+          this.breaks = error ? [NaN, NaN, NaN] : found;
+          this.chart.broken = found ? found[0] : null;
+          this.chart.sheet.draw();
+          this.list();
         });
-      }
-      this.desk.ask("margins", [this.spec, ...point], found => {
-        this.margins = found;
+      this.slow.ask("margins", [this.spec, ...point], (found, error) => {
+        this.margins = error ? { lower: NaN, upper: NaN, phase: NaN, modulus: NaN } : found;
         this.list();
       });
     }
 
     list() {
-      const rows = [];
-      const part = value => Number.isNaN(value) ? "not sure" : value === 0 ? "none"
-        : value === Infinity ? "more than 2" : say(value, 4);
-      if (this.breaks) {
-        const [minus, plus, down] = this.breaks;
-        rows.push(["Critical perturbation from (1, 1)", ""], ["along (1, \u22121)", part(minus)],
-          ["along (1, 1)", part(plus)], ["along (\u22121, \u22121)", part(down)]);
-      }
-      const m = this.margins;
-      const where = this.chart.marked ? this.chart.name(this.shown) : "(1, 1)";
-      const limit = (value, none) =>
-        Number.isNaN(value) ? "not sure" : value === none ? "none found" : say(value, 4);
-      if (m !== undefined) rows.push([`At ${where}`, m ? "" : "no margins: not stable"]);
-      if (m) rows.push(["Smallest gain factor that keeps it stable", limit(m.lower, 0)],
-        ["Largest", limit(m.upper, Infinity)],
-        ["Phase margin (sampled)",
-          m.phase === Infinity ? "no crossover" : `${say(m.phase * 180 / Math.PI)}\u00b0`],
-        ["Smallest |1 + L| (sampled)", say(m.modulus)]);
+      const wait = "\u2026", rows = [];
+      const or = (value, special, words) => Number.isNaN(value) ? "not sure"
+        : value === special ? words : say(value);
+      const part = value => value === undefined ? wait : value === null ? "not stable at (1, 1)"
+        : value === 0 ? "0: the least breaks it" : or(value, Infinity, "none up to 2");
+      const [minus, plus, down] = this.breaks || [];
+      rows.push(["Critical perturbation from (1, 1)", ""], ["along (1, \u22121)", part(minus)],
+        ["along (1, 1)", part(plus)], ["along (\u22121, \u22121)", part(down)]);
+      const m = this.margins, where = this.chart.marked ? this.chart.name(this.shown) : "(1, 1)";
+      rows.push([`Margins at ${where}`, m === null ? "none: not stable" : ""]);
+      if (m !== null) rows.push(
+        ["Smallest gain factor that keeps it stable", m ? or(m.lower, 0, `none above 1/${m.most}`) : wait],
+        ["Largest", m ? or(m.upper, Infinity, `none up to ${m.most}`) : wait],
+        ["Phase margin", m ? m.phase === Infinity ? "no crossover"
+          : or(m.phase * 180 / Math.PI, null) + (Number.isNaN(m.phase) ? "" : "\u00b0") : wait],
+        ["Smallest |1 + L|", m ? or(m.modulus, null) : wait]);
       this.numbers.replaceChildren(...rows.map(([name, value]) =>
         element("div", {}, element("dt", {}, name), element("dd", {}, value))));
     }
+
+    /* Pin the curve as it is: what follows is seen against it. */
+    pin() {
+      this.chart.ghost = this.chart.ghost ? null : this.chart.curve;
+      this.chart.sheet.draw();
+      return Boolean(this.chart.ghost);
+    }
   }
 
+  /* ---------------------------------------------------------------------------- controls */
+
+  const button = (text, done) => element("button", { type: "button", onclick: done }, text);
+
+  /* A slider. `moved(value, moving)` hears every move, and the last one with moving = false. */
   function slider(id, name, low, high, value, write, moved) {
     const shown = element("output", { id: `${id}-value` }, write(value));
     const input = element("input", { type: "range", id, min: low, max: high, step: (high - low) / 200,
       "aria-controls": `${id}-value`, oninput: () => {
         shown.textContent = write(Number(input.value));
-        moved(Number(input.value));
-      } });
+        moved(Number(input.value), true);
+      }, onchange: () => moved(Number(input.value), false) });
     input.value = value;
-    return element("label", { class: "live-field" }, element("span", {}, name, " ", shown), input);
+    const label = element("label", { class: "live-field" }, element("span", {}, name, " ", shown), input);
+    label.to = at => {
+      if (at > Number(input.max)) [input.max, input.step] = [at, at / 200];
+      input.value = at;
+      shown.textContent = write(at);
+    };
+    return label;
   }
 
   function choice(id, name, options, changed) {
@@ -703,16 +404,98 @@ print(unstable_roots(loop, ${c1}, ${c2}))
     return element("label", { class: "live-field" }, element("span", {}, name), select);
   }
 
+  function save(name, blob) {
+    const link = element("a", { href: URL.createObjectURL(blob), download: name });
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  }
+
+  /* Zoom, download, and the ghost, of any explorer. */
+  function tools(live, file) {
+    const counts = () => {
+      if (!live.chart.grid) return;
+      const { counts, n, x0, x1, y0, y1 } = live.chart.grid;
+      const at = (low, high, i) => low + (high - low) * i / (n - 1);
+      const rows = Array.from(counts, (count, k) =>
+        `${at(x0, x1, k % n)},${at(y0, y1, Math.floor(k / n))},${count}\n`);
+      save(`${file}.csv`, new Blob(["c1 [1],c2 [1],unstable roots [1]\n", ...rows]));
+    };
+    const pin = element("button", { type: "button", "aria-pressed": "false", onclick: () => {
+      pin.setAttribute("aria-pressed", String(live.pin()));
+    } }, "Pin the curve");
+    return element("p", { class: "live-buttons" },
+      button("Zoom in", () => live.chart.zoom(0.5)), button("Zoom out", () => live.chart.zoom(2)),
+      pin, button("Download CSV", counts),
+      button("Download PNG", () => live.chart.canvas.toBlob(blob => save(`${file}.png`, blob))));
+  }
+
+  function legend(half) {
+    const colour = (text, name) =>
+      element("span", { class: "live-key" }, element("i", { class: `live-${name}` }), text);
+    const found = element("p", { class: "live-note" }, colour("stable", "stable"),
+      colour("unstable, stronger with more roots", "unstable"), colour("chain lost", "lost"),
+      colour("not sure", "unsure"), "curve: a root on the axis, from low frequency (blue) to high "
+      + "(yellow); + the ideal point (1, 1)");
+    if (half < 1e-4)
+      found.append("; square: the paper\u2019s perturbations; dot: first to break along (1, \u22121)");
+    return found;
+  }
+
+  const plots = live => element("div", { class: "live-plots" },
+    ...live.plots.map(plot => plot.canvas));
+
+  /* The loop in time at the point, played so that a person can follow. */
+  function inTime(live) {
+    const TRIPS = 12, still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    let run = null, playing = 0;
+    const words = element("p", { class: "live-note", role: "status" });
+    const sheet = new Sheet({ role: "img", "aria-label": "The laser's frequency in time, from rest." },
+      0.4, (pen, wide, high, colours) => { if (run) drawTime(run, pen, wide, high, colours); });
+    sheet.canvas.hidden = true;
+    const play = () => {
+      if (!live.spec) return;
+      const [c1, c2] = live.shown, name = live.chart.marked ? live.chart.name(live.shown) : "(1, 1)";
+      words.textContent = "Stepping \u2026";
+      live.slow.ask("time", [live.spec, c1, c2, TRIPS], (found, error) => {
+        cancelAnimationFrame(playing);
+        if (error || !found.values.length) {
+          words.textContent = error || "The first step already is too large to show.";
+          return;
+        }
+        run = { ...found, shown: still ? Infinity : 2 };
+        sheet.canvas.hidden = false;
+        const { step, trip, missed, values } = found, last = Math.abs(values[values.length - 1]);
+        words.textContent = `At ${name}: a step of the laser by 1 at t = 0, silence for ${say(trip)} s, then `
+          + `what the arms send back. After ${TRIPS} round trips it is off by ${say(last)}. Steps of `
+          + `${say(1000 * step)} ms${missed > 1e-6 ? "; delays between two steps are interpolated" : ""}`
+          + `${found.fast ? "; the loop reacts faster than these steps, so that fast ringing is not to be "
+            + "trusted" : ""}.`;
+        const begun = performance.now(), whole = values.length;
+        const frame = now => {
+          // A round trip a second.
+          run.shown = 2 + (now - begun) / 1000 * trip / step;
+          sheet.draw();
+          if (run.shown < whole) playing = requestAnimationFrame(frame);
+        };
+        if (still) sheet.draw(); else playing = requestAnimationFrame(frame);
+      });
+    };
+    return element("div", { class: "live-time" },
+      element("p", { class: "live-buttons" }, button("Watch it lock, or not", play)), sheet.canvas, words);
+  }
+
+  /* ---------------------------------------------------------------------------- pages */
+
   /* The controlled loop of the paper, with what it leaves open as switches. */
   function front(place) {
     const live = new Live("Stability of the paper's controlled loop near (1, 1).");
     const state = { half: false, actuator: false, printed: false, corner: 0.4, delay: 0 };
-    const update = () => {
+    const update = moving => {
       const poles = [...PAPER.poles], zeros = [...PAPER.zeros];
       if (state.printed) { zeros.pop(); poles.pop(); }
       if (state.actuator) poles.push([0, 0]);
       live.set({ ...PAPER, zeros, poles, corner: TURN * state.corner, delay: state.delay,
-        difference: (state.half ? 0.5 : 1) * PAPER.difference });
+        difference: (state.half ? 0.5 : 1) * PAPER.difference }, moving);
     };
     const flag = (key, name, off, on) => choice(`${live.id}-${key}`, name, [["", off], ["1", on]],
       value => { state[key] = Boolean(value); update(); });
@@ -721,45 +504,22 @@ print(unstable_roots(loop, ${c1}, ${c2}))
       flag("actuator", "Actuator 1/s", "left out", "in the loop"),
       flag("printed", "Last pole of the controller", "p24 (Table II)", "z24 (as Eq. 11 prints it)"),
       slider(`${live.id}-corner`, "Corner p of the sensor:", -2, 1, Math.log10(0.4),
-        v => `${say(10 ** v)} Hz`, v => { state.corner = 10 ** v; update(); }),
+        v => `${say(10 ** v)} Hz`, (v, moving) => { state.corner = 10 ** v; update(moving); }),
       slider(`${live.id}-delay`, "Dead time:", 0, 10, 0, v => `${say(v)} ms`,
-        v => { state.delay = 1e-3 * v; update(); }));
-    place.replaceChildren(form, element("div", { class: "live-pair" }, live.figure,
+        (v, moving) => { state.delay = 1e-3 * v; update(moving); }));
+    place.replaceChildren(form, element("div", { class: "live-pair" },
+      element("div", {}, live.figure, legend(3e-6)),
       element("div", {}, live.numbers, live.note)));
     live.chart.show([1, 1], 3e-6);
     update();
-  }
-
-  function save(name, blob) {
-    const link = element("a", { href: URL.createObjectURL(blob), download: name });
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
   }
 
   /* The chart of a chapter: one of the presets in the window that the page asks for. */
   function chapter(place) {
     const { live: name, centre, half } = place.dataset;
     const live = new Live(`${name}: number of unstable roots over c1 and c2.`);
-    const colour = (text, shown) =>
-      element("span", { class: "live-key" }, element("i", { style: `background: ${shown}` }), text);
-    const legend = element("p", { class: "live-note" }, colour("stable", "rgb(184,196,206)"),
-      colour("unstable, stronger with more roots", "rgb(232,163,129)"), "+ the ideal point (1, 1)");
-    if (half < 1e-4)
-      legend.append("; square: the paper\u2019s perturbations; dot: first to break along (1, \u22121)");
-    const button = (text, done) => element("button", { type: "button", onclick: done }, text);
-    const file = name.toLowerCase().replace(/\W+/g, "-");
-    const counts = () => {
-      const { counts, n, x0, x1, y0, y1 } = live.chart.grid;
-      const at = (low, high, i) => low + (high - low) * i / (n - 1);
-      const rows = Array.from(counts, (count, k) =>
-        `${at(x0, x1, k % n)},${at(y0, y1, Math.floor(k / n))},${count}\n`);
-      save(`${file}.csv`, new Blob(["c1 [1],c2 [1],unstable roots [1]\n", ...rows]));
-    };
-    const tools = element("p", { class: "live-buttons" },
-      button("Zoom in", () => live.chart.zoom(0.5)), button("Zoom out", () => live.chart.zoom(2)),
-      button("Download CSV", counts),
-      button("Download PNG", () => live.chart.canvas.toBlob(blob => save(`${file}.png`, blob))));
-    place.replaceChildren(element("div", { class: "live-one" }, live.figure, legend, tools, live.note));
+    place.replaceChildren(element("div", { class: "live-one" }, live.figure, legend(half),
+      tools(live, name.toLowerCase().replace(/\W+/g, "-")), live.note), plots(live), live.following);
     live.chart.show([Number(centre), Number(centre)], Number(half));
     live.set(PRESETS[name][0]);
   }
@@ -768,95 +528,179 @@ print(unstable_roots(loop, ${c1}, ${c2}))
   function own(place) {
     const live = new Live("Number of unstable roots over c1 and c2.");
     const id = name => `${live.id}-${name}`;
-    const fields = {};
-    const wrong = element("p", { class: "live-wrong", role: "alert" });
+    const fields = {}, errors = {};
     const code = element("pre", { class: "live-code", "aria-label": "Python" });
-    let response = null, factor = 1;
-    const picture = (draw, label) => new Sheet({ role: "img", "aria-label": label }, 0.85,
-      (pen, wide, high, colours) => { if (response) draw(response, pen, wide, high, colours); });
-    const nyquist = picture(drawNyquist, "Nyquist curve of L at the point, distances from 0 on a "
-      + "logarithmic scale, -1 marked");
-    const bode = picture(drawBode, "Magnitude and phase of L at the point against frequency");
+    let unit = 1, base = 1, chosen = null;
 
     const settle = live.settle.bind(live);
-    live.settle = (point, count) => {
-      settle(point, count);
-      code.textContent = python(live.spec, point);
-      live.desk.ask("plots", [live.spec, ...point], found => {
-        response = found;
-        nyquist.draw();
-        bode.draw();
-      });
+    live.settle = point => {
+      settle(point);
+      remember();
     };
-    const remember = () => history.replaceState(null, "", address(live.spec, live.chart));
+    live.told = () => { code.textContent = python(live.spec, live.shown); };
+    const remember = () => {
+      if (live.spec) history.replaceState(null, "", address(live.spec, live.chart, unit));
+    };
     const redraw = live.redraw.bind(live);
-    live.redraw = () => { redraw(); if (live.spec) remember(); };
+    live.redraw = moving => { redraw(moving); if (!moving) remember(); };
 
-    const take = () => {
+    /* An error stands at its field. */
+    const blame = (name, message) => {
+      const field = fields[name];
+      if (!field) return;
+      if (message) field.setAttribute("aria-invalid", "true"); else field.removeAttribute("aria-invalid");
+      errors[name].textContent = message || "";
+    };
+    const NAMES = { tau1: "\u03c4\u2081", tau2: "\u03c4\u2082", delay: "The dead time", gain: "The gain",
+      corner: "The corner", difference: "\u0394\u03c4" };
+    const scaled = { corner: () => unit, zeros: () => unit, poles: () => unit };
+
+    /* The loop that the fields hold; throws an error that names its field. */
+    const held = () => {
+      const spec = { sensor: fields.sensor.value };
+      for (const name of ["tau1", "tau2", "delay"])
+        spec[name] = readNumber(name, fields[name].value, NAMES[name]);
+      const two = ["dual", "modified"].includes(spec.sensor);
+      for (const name of ["corner", "difference"]) {
+        const text = fields[name].value;
+        if (two) spec[name] = readNumber(name, text, NAMES[name]) * (scaled[name]?.() ?? 1);
+      }
+      if (spec.sensor === "own") for (const name of ["m1", "m2", "below"])
+        spec[name] = readPolynomial(name, fields[name].value, "It");
+      if (fields.form.value === "roots") {
+        spec.gain = readNumber("gain", fields.gain.value, NAMES.gain);
+        for (const [name, title] of [["zeros", "Zeros"], ["poles", "Poles"]])
+          spec[name] = readRoots(name, fields[name].value, title).map(v => v.map(x => x * unit));
+      } else {
+        const [above, below] = ["above", "under"].map(name => readPolynomial(name, fields[name].value, "It"));
+        const lead = [above, below].map(p => p.find(v => v !== 0));
+        if (!lead[0]) throw Object.assign(new RangeError("It must not be zero."), { field: "above" });
+        if (!lead[1]) throw Object.assign(new RangeError("It must not be zero."), { field: "under" });
+        [spec.gain, spec.zeros, spec.poles] = [lead[0] / lead[1], api.rootsOf(above), api.rootsOf(below)];
+      }
+      api.make(spec);
+      return spec;
+    };
+
+    const take = moving => {
+      for (const name of Object.keys(errors)) blame(name, "");
       try {
-        const spec = { sensor: fields.sensor.value };
-        for (const name of ["tau1", "tau2", "delay", "gain", "corner", "difference"]) {
-          const text = fields[name].value.trim().replace(/\u2212/g, "-");
-          if (!REAL.test(text)) throw new RangeError(`${name} must be a number, got ${text || "nothing"}`);
-          spec[name] = Number(text);
-        }
-        for (const name of ["zeros", "poles"]) spec[name] = read(name, fields[name].value);
-        armlockLoop().make(spec);
+        const spec = held();
         wrong.textContent = "";
-        live.set(spec);
+        if (!moving) follow(spec);
+        live.set(spec, moving);
       } catch (error) {
+        const name = fields[error.field] ? error.field
+          : { zeros: "above", poles: "under" }[error.field] || "sensor";
+        blame(name, error.message);
         wrong.textContent = error.message;
+        live.none("There is no loop to show: a field above holds none.");
       }
     };
+    /* Sliders and "Start from" follow what is there. */
+    const follow = spec => {
+      base = spec.gain;
+      gain.to(0);
+      dead.to(spec.delay);
+      const changed = chosen !== null && !same(spec, PRESETS[chosen][0]);
+      state.textContent = chosen === null ? "from a link" : changed ? "changed" : "";
+      reset.hidden = !changed;
+    };
+    const same = (a, b) => {
+      const plain = spec => JSON.stringify([spec.sensor, spec.tau1, spec.tau2, spec.delay, spec.gain,
+        written(spec.zeros), written(spec.poles), ...["dual", "modified"].includes(spec.sensor)
+          ? [spec.corner, spec.difference] : []]);
+      return plain(a) === plain(b);
+    };
+
     const put = spec => {
-      for (const name of Object.keys(SHORT))
-        fields[name].value = Array.isArray(spec[name]) ? written(spec[name]) : String(spec[name]);
-      fields.gain.dataset.base = spec.gain;
+      fields.form.value = "roots";
+      for (const name of ["sensor", "tau1", "tau2", "delay", "gain", "difference"])
+        if (spec[name] !== undefined) fields[name].value = String(spec[name]);
+      if (spec.corner !== undefined) fields.corner.value = String(spec.corner / unit);
+      for (const name of ["zeros", "poles"])
+        fields[name].value = written(spec[name].map(v => v.map(x => x / unit)));
+      for (const name of ["m1", "m2", "below"]) if (spec[name]) fields[name].value = list(spec[name]);
       shape();
     };
     const shape = () => {
-      for (const name of ["corner", "difference"])
-        fields[name].closest("label").hidden = fields.sensor.value !== "dual";
+      const sensor = fields.sensor.value, roots = fields.form.value === "roots";
+      const shown = { corner: ["dual", "modified"].includes(sensor), m1: sensor === "own",
+        zeros: roots, above: !roots };
+      Object.assign(shown, { difference: shown.corner, m2: shown.m1, below: shown.m1, poles: roots,
+        gain: roots, under: !roots });
+      for (const [name, on] of Object.entries(shown)) fields[name].closest(".live-field").hidden = !on;
+      gain.hidden = !roots;
     };
-    const field = (name, label, tag = "input") => {
-      fields[name] = element(tag, { id: id(name), spellcheck: "false", autocomplete: "off",
-        inputmode: tag === "input" ? "text" : null, rows: tag === "textarea" ? 2 : null,
-        onchange: () => { fields.gain.dataset.base = fields.gain.value; take(); } });
-      return element("label", { class: `live-field${tag === "textarea" ? " live-wide" : ""}` },
-        element("span", {}, label), fields[name]);
+    const field = (name, label, { area = false, value = "", wide = area } = {}) => {
+      fields[name] = element(area ? "textarea" : "input", { id: id(name), spellcheck: "false",
+        autocomplete: "off", autocapitalize: "off", rows: area ? 2 : null,
+        "aria-describedby": id(`${name}-wrong`), onchange: () => take() });
+      fields[name].value = value;
+      errors[name] = element("span", { id: id(`${name}-wrong`), class: "live-wrong" });
+      return element("div", { class: `live-field${wide ? " live-wide" : ""}` },
+        element("label", { for: id(name) }, label), fields[name], errors[name]);
     };
-    const preset = choice(id("preset"), "Start from", Object.keys(PRESETS).map(name => [name, name]),
-      name => {
-        const [spec, centre, half] = PRESETS[name];
-        put(spec);
-        live.forget();
-        live.spec = null;
-        live.chart.show([centre, centre], half);
+    const start = name => {
+      const [spec, centre, half] = PRESETS[chosen = name];
+      put(spec);
+      live.none("");
+      live.forget();
+      live.chart.ghost = null;
+      live.chart.show([centre, centre], half);
+      take();
+    };
+
+    const state = element("span", { class: "live-state", role: "status" });
+    const reset = button("Reset", () => start(chosen));
+    reset.hidden = true;
+    const preset = choice(id("preset"), "Start from", Object.keys(PRESETS).map(name => [name, name]), start);
+    const starts = element("div", { class: "live-start" }, preset, state, reset);
+    const select = (name, title, options, changed) => {
+      const made = choice(id(name), title, options, changed);
+      fields[name] = made.querySelector("select");
+      errors[name] = element("span", { id: id(`${name}-wrong`), class: "live-wrong" });
+      fields[name].setAttribute("aria-describedby", id(`${name}-wrong`));
+      made.append(errors[name]);
+      return made;
+    };
+    const units = choice(id("unit"), "Unit of zeros, poles and corner", [["1", "rad/s"], ["hz", "Hz"]],
+      value => {
+        // The loop stays what it is; the fields say it in the other unit.
+        const spec = live.spec;
+        unit = value === "hz" ? TURN : 1;
+        if (spec && fields.form.value === "roots") put(spec);
         take();
       });
-    const sensor = choice(id("sensor"), "Sensor", [["single", "single arm"], ["common", "common arm"],
-      ["difference", "difference of the arms"], ["dual", "dual"]], () => { shape(); take(); });
-    fields.sensor = sensor.querySelector("select");
-    preset.classList.add("live-wide");
+    const gain = slider(id("factor"), "Drag the gain: times", -2, 2, 0, v => say(10 ** v), (v, moving) => {
+      fields.gain.value = exact(+(base * 10 ** v).toPrecision(6));
+      const before = base;
+      take(moving);
+      // Let go, what is reached is where the next drag begins.
+      if (moving) base = before;
+    });
+    const dead = slider(id("dead"), "Drag the dead time:", 0, 1, 0, v => `${say(v)} s`, (v, moving) => {
+      fields.delay.value = String(v);
+      take(moving);
+    });
+    const wrong = element("p", { class: "live-note live-wrong", role: "alert" });
     const form = element("form", { class: "live-form", onsubmit: event => event.preventDefault() },
-      preset, sensor, field("tau1", "Delay \u03c4\u2081 in s"), field("tau2", "Delay \u03c4\u2082 in s"),
-      field("delay", "Dead time in s"), field("gain", "Gain"),
-      field("corner", "Sensor's corner p in rad/s"), field("difference", "Sensor's \u0394\u03c4 in s"),
-      field("zeros", "Zeros in rad/s, such as \u22120.1 or \u22120.1\u00b12j", "textarea"),
-      field("poles", "Poles in rad/s", "textarea"),
-      slider(id("factor"), "Drag the gain: times", -2, 2, 0, v => say(10 ** v), v => {
-        factor = 10 ** v;
-        fields.gain.value = String(+(Number(fields.gain.dataset.base) * factor).toPrecision(6));
-        take();
-      }),
-      slider(id("dead"), "Drag the dead time:", 0, 1, 0, v => `${say(v)} s`, v => {
-        fields.delay.value = String(v);
-        take();
-      }));
-    const button = (text, done) => element("button", { type: "button", onclick: done }, text);
-    const view = element("p", { class: "live-buttons" },
-      button("Zoom in", () => live.chart.zoom(0.5)), button("Zoom out", () => live.chart.zoom(2)),
-      button("Paper's square", () => live.chart.show([1, 1], 3e-6)),
+      gain, dead,
+      select("sensor", "Sensor", SENSORS, () => { shape(); take(); }),
+      field("tau1", "Delay \u03c4\u2081 in s"), field("tau2", "Delay \u03c4\u2082 in s"),
+      field("delay", "Dead time in s"), field("corner", "Sensor\u2019s corner"),
+      field("difference", "Sensor\u2019s \u0394\u03c4 in s"),
+      field("m1", "Weight m1: numerator", { value: "1", wide: true }),
+      field("m2", "Weight m2: numerator", { value: "1", wide: true }),
+      field("below", "Their denominator", { value: "1", wide: true }),
+      select("form", "Controller given by", [["roots", "zeros, poles and gain"],
+        ["fraction", "numerator and denominator"]], () => { shape(); take(); }),
+      field("gain", "Gain"), units,
+      field("zeros", "Zeros", { area: true }), field("poles", "Poles", { area: true }),
+      field("above", "Numerator, highest power first, or in s", { area: true, value: "1" }),
+      field("under", "Denominator", { area: true, value: "s" }));
+    const view = tools(live, "loop");
+    view.append(button("Paper\u2019s square", () => live.chart.show([1, 1], 3e-6)),
       button("Whole", () => live.chart.show([0, 0], 3)));
     const copied = button("Copy as Python", async () => {
       try {
@@ -869,18 +713,23 @@ print(unstable_roots(loop, ${c1}, ${c2}))
       }
       setTimeout(() => { copied.textContent = "Copy as Python"; }, 3000);
     });
-    place.replaceChildren(form, wrong, element("div", { class: "live-pair" },
-      element("div", {}, live.figure, view), element("div", {}, live.numbers, live.note)),
-      element("div", { class: "live-plots" }, nyquist.canvas, bode.canvas),
-      element("p", { class: "live-buttons" }, copied), code);
+    place.replaceChildren(element("div", { class: "live-own" },
+      element("div", { class: "live-main" }, live.figure, view, legend(1), live.note),
+      element("div", { class: "live-side" }, starts, wrong, form)),
+      live.numbers, plots(live), live.following, inTime(live), element("p", { class: "live-buttons" }, copied), code);
 
     const open = () => {
       try {
         const given = fromAddress(location.hash);
         if (!given) return false;
-        put(given[0]);
-        live.spec = null;
-        live.chart.show(given[1], given[2]);
+        chosen = null;
+        unit = given.unit;
+        units.querySelector("select").value = unit === 1 ? "1" : "hz";
+        put(given.spec);
+        live.none("");
+        live.forget();
+        if (given.marked) live.chart.marked = live.shown = given.marked;
+        live.chart.show(given.centre, given.half);
         take();
         return true;
       } catch (error) {
@@ -889,13 +738,9 @@ print(unstable_roots(loop, ${c1}, ${c2}))
       }
     };
     window.addEventListener("hashchange", open);
-    if (!open()) preset.querySelector("select").dispatchEvent(new Event("change"));
+    if (!open()) start(Object.keys(PRESETS)[0]);
   }
 
-  function start() {
-    for (const place of document.querySelectorAll("[data-live]"))
-      ({ front, loop: own }[place.dataset.live] || chapter)(place);
-  }
-  if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", start);
-  else start();
-})();
+  for (const place of document.querySelectorAll("[data-live]"))
+    ({ front, loop: own }[place.dataset.live] || chapter)(place);
+}

@@ -20,7 +20,7 @@ from armlock.paper import (
     TAU1,
     TAU2,
 )
-from armlock.robustness.margins import critical_perturbation, modulus_margin
+from armlock.robustness.margins import critical_perturbation
 from armlock.stability.counts import unstable_roots
 from armlock.stability.roots import rightmost_root
 from armlock.timedomain.noise import LaserNoise, band_rms
@@ -44,7 +44,6 @@ from book.companion.claims.simulation import (
     stable_up_to,
 )
 from book.companion.extremes import largest, smallest
-from book.companion.shared import shared
 
 #: The two meanings of dtau, in s: Sec. III.B and the source of Table I.
 DIFFERENCES = {"full": TAU1 - TAU2, "half": 0.5 * (TAU1 - TAU2)}
@@ -68,39 +67,6 @@ def break_along(loop: Loop, direction: tuple[float, float] = (1.0, -1.0)) -> flo
     if unstable_roots(loop, 1.0, 1.0):
         return 0.0
     return critical_perturbation(loop, direction)
-
-
-@shared
-def over_corners(points: int = 31) -> tuple[FloatArray, dict[str, FloatArray]]:
-    """Follow the controlled loop over two decades of p, for both meanings of dtau.
-
-    Parameters
-    ----------
-    points : int, optional
-        Number of corner frequencies on a logarithmic grid; more are put where the loop is
-        about to become unstable.
-
-    Returns
-    -------
-    corners : float array, shape (n,)
-        Corner frequency p in rad/s, rising.
-    columns : dict of str to float array
-        For "full" and "half": critical perturbation along (1, -1), 0 where the loop is
-        unstable at (1, 1); under "full margin" and "half margin" min |1 + L|, nan there.
-    """
-    grid = DUAL_SENSOR_CORNER * np.logspace(-1.0, 1.0, points)
-    close = 1.0 - np.append(np.linspace(0.24, 0.02, 12), [1e-3, -1e-3])
-    near = [highest_stable_corner(difference) * close for difference in DIFFERENCES.values()]
-    corners = np.unique(np.concatenate((grid, *near)))
-    columns: dict[str, FloatArray] = {}
-    for name, difference in DIFFERENCES.items():
-        loops = [paper_loop(float(p), difference=difference) for p in corners]
-        breaks = [break_along(loop) for loop in loops]
-        left = [
-            modulus_margin(k) if at else np.nan for k, at in zip(loops, breaks, strict=True)
-        ]
-        columns |= {name: np.array(breaks), f"{name} margin": np.array(left)}
-    return corners, columns
 
 
 class Assumption(NamedTuple):

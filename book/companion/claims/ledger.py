@@ -122,7 +122,10 @@ class Finding:
     @property
     def shown(self) -> str:
         """The number as a reader sees it; "0 to rounding" where only rounding is left."""
-        return "0 to rounding" if 0.0 < abs(self.value) < 1e-11 else f"{self.value:.6g}"
+        if 0.0 < abs(self.value) < 1e-11:
+            return "0 to rounding"
+        # Four digits decide; a number of some ten thousand is not given as a power of ten.
+        return f"{self.value:.0f}" if 1e4 <= abs(self.value) < 1e6 else f"{self.value:.4g}"
 
 
 @dataclass(frozen=True)
@@ -351,10 +354,19 @@ def ledger_link(identifier: str) -> str:
     return f'<a href="09_ledger.html#ledger-{identifier}">{identifier}</a>'
 
 
+#: Verdicts that are too long for the narrow column of a table, as it shows them.
+SHORT = {
+    Verdict.WHERE_USED: "holds where used",
+    Verdict.IN_PART: "in part",
+    Verdict.OPEN: "cannot be settled",
+}
+
+
 def badge(verdict: Verdict, text: str = "") -> str:
     """Return a text as HTML in the colour of a verdict; by default the verdict in short."""
     name = verdict.name.lower()
-    return f'<span class="verdict verdict-{name}">{text or name.replace("_", " ")}</span>'
+    shown = text or SHORT.get(verdict, verdict)
+    return f'<span class="verdict verdict-{name}">{shown}</span>'
 
 
 def row(claim: Claim, finding: Finding, attributes: str, link: str, more: str) -> str:
