@@ -1,9 +1,9 @@
 """Mend, in the finished pages, what a screen reader or a link would stumble over.
 
-The theme's switches that unfold a part of the contents have no name; docutils calls the
-bibliography a list without list items; the table of run times has a mark that many systems have
-no font for; and the links from a source file back to the reference name the package where the
-reference names the module.
+The theme's switches that unfold a part of the contents have no name, and its sidebar is no
+region of the page; docutils calls the bibliography a list without list items; the table of run
+times has a mark that many systems have no font for; and the links from a source file back to the
+reference name the package where the reference names the module.
 """
 
 import re
@@ -12,6 +12,9 @@ from pathlib import Path
 MENDED = {
     '<summary><span class="toctree-toggle"': (
         '<summary aria-label="Unfold the pages of this part"><span class="toctree-toggle"'
+    ),
+    '<div id="pst-primary-sidebar" class=': (
+        '<div id="pst-primary-sidebar" role="complementary" aria-label="The book" class='
     ),
     '<div role="list" class="citation-list">': '<div class="citation-list">',
     "✅": "ran",
