@@ -88,7 +88,6 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     armlock.flight_loop: {"mean_delay": 33.6, "half_difference": 0.255, "g2": 40.0,
                           "corner": 2.0, "delay": 0.0},
     armlock.performance.transfer: {"loop": ARMS, "source": "laser", "s": 1j} | POINT,
-    armlock.closed_loop: {"loop": ARMS, "omega": [1.0]} | POINT,
     armlock.noise_budget: {"loop": ARMS, "frequency": [1.0], "laser": 1.0,
                            "requirement": 1.0} | POINT,
     warped: {"omega": 1.0, "sample_rate": 10.0},

@@ -130,6 +130,33 @@ class Constellation:
         rate1, rate2 = (rate for _, rate in self._arms(t, master))
         return rate1, rate2
 
+    def light_time(self, t: npt.ArrayLike, receiver: int, emitter: int) -> FloatArray:
+        """Return the light time in s of what is received at t.
+
+        Parameters
+        ----------
+        t : array_like of float
+            In s since `epoch`; any shape.
+        receiver, emitter : {1, 2, 3}
+            Two spacecraft.
+
+        Returns
+        -------
+        float array, shaped like `t`
+
+        Raises
+        ------
+        TypeError, ValueError
+            If t is not finite and real, or outside of `span`, or these are not two spacecraft.
+        """
+        if receiver not in _LINKS or emitter not in _LINKS[receiver]:
+            raise ValueError(
+                f"receiver and emitter must be two of 1, 2, 3, got {receiver!r} and {emitter!r}"
+            )
+        t = self._within(t)
+        here, there = (self._paths[k - 1] for k in (receiver, emitter))
+        return _link(here, there, t.ravel())[0].reshape(t.shape)
+
     def positions(self, t: npt.ArrayLike) -> FloatArray:
         """Return where the spacecraft are, in m, by time, spacecraft and coordinate.
 
@@ -154,17 +181,22 @@ class Constellation:
 
     def _arms(self, t: npt.ArrayLike, master: int) -> list[tuple[FloatArray, FloatArray]]:
         """Return delay and rate of both arms, after a look at the arguments."""
-        t = real_array("t", t)
-        if isinstance(master, bool) or master not in _LINKS:
+        t = self._within(t)
+        if master not in _LINKS or isinstance(master, bool):
             raise ValueError(f"master must be 1, 2 or 3, got {master!r}")
+        arms = [_round_trip(self._paths, master, far, t.ravel()) for far in _LINKS[master]]
+        return [(delay.reshape(t.shape), rate.reshape(t.shape)) for delay, rate in arms]
+
+    def _within(self, t: npt.ArrayLike) -> FloatArray:
+        """Return times as an array, or raise if one is outside of the span."""
+        t = real_array("t", t)
         first, last = self.span
         outside = t[(t < first) | (t > last)]
         if outside.size:
             raise ValueError(
                 f"t must lie within the span {first} to {last} s, got {outside.flat[0]}"
             )
-        arms = [_round_trip(self._paths, master, far, t.ravel()) for far in _LINKS[master]]
-        return [(delay.reshape(t.shape), rate.reshape(t.shape)) for delay, rate in arms]
+        return t
 
 
 def _round_trip(

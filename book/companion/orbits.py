@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 
 from armlock import DivergenceError, critical_perturbation, simulate
 from armlock.checks import FloatArray
@@ -25,7 +24,6 @@ from armlock.orbits.passages import (
     lost,
     policies,
 )
-from armlock.paper import PERTURBATION
 from book.companion.shared import shared
 
 #: Where the ranges of the loops are taken: held half difference and mean delay, in s.
@@ -161,7 +159,7 @@ def random_stretches(count: int = 24, seed: int = 29) -> list[Stretch]:
     differ by less than a factor of two. Stable loops take weeks to forget: every sixth stretch
     is one of them, of up to twenty days.
     """
-    rng, found = np.random.default_rng(seed), []
+    rng, found = np.random.default_rng(seed), list[Stretch]()
     names = list(constellations())
     while len(found) < count:
         orbit, master = names[rng.integers(3)], int(rng.integers(1, 4))
@@ -213,15 +211,7 @@ def kepler_passages(loop: str, policy: str) -> list[Passage]:
 
 
 @shared
-def needed_half() -> float:
-    """Return the half difference in s above which the paper's loop is stable over its box.
-
-    The perturbation that breaks the loop along (1, -1), its closest one, is proportional to
-    the half difference that is held and true.
-    """
-
-    def spare(size: float) -> float:
-        loop = loops()["paper"](MEAN + size, MEAN - size, size)
-        return critical_perturbation(loop, (1.0, -1.0)) / PERTURBATION - 1.0
-
-    return float(brentq(spare, 0.01, 0.15, rtol=1e-6))
+def tolerated(size: float) -> float:
+    """Return which perturbation along (1, -1) breaks the paper's loop, at a half difference."""
+    loop = loops()["paper"](MEAN + size, MEAN - size, size)
+    return critical_perturbation(loop, (1.0, -1.0))
