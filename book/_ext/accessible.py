@@ -2,9 +2,9 @@
 
 The theme's switches that unfold a part of the contents have no name, and its sidebar is no
 region of the page; docutils calls the bibliography a list without list items; the table of run
-times has a mark that many systems have no font for; images do not say how large they are; and the
-links from a source file back to the reference name the package where the reference names the
-module.
+times has a mark that many systems have no font for; images do not say how large they are; and
+the links from a source file back to the reference name the package where the reference names
+the module.
 """
 
 import re
