@@ -19,8 +19,7 @@ from numpy.polynomial import Chebyshev, chebyshev
 from armlock import paper
 from armlock.checks import BoolArray, FloatArray, positive_number, real_number
 from armlock.controllers import Controller
-from armlock.design import buildable_loop, robust_loop
-from armlock.loops import Loop, flight_loop, paper_loop
+from armlock.loops import Loop, buildable_loop, flight_loop, paper_loop, robust_loop
 from armlock.orbits.constellation import Constellation
 from armlock.sensors import dual
 from armlock.stability.counts import unstable_roots
