@@ -114,7 +114,7 @@ def test_a_loop_that_rolls_off_is_measured_with_free_phases():
     found = design(
         buildable_loop(),
         "unity_gain",
-        {"suppression": -6.0, "modulus": 0.25, "phase_in_corners": 0.4},
+        {"suppression": -3.0, "modulus": 0.25, "critical_perturbation": 3e-6},
         free_above=TURN * 2.0,
         free_gain=True,
     )
@@ -123,7 +123,7 @@ def test_a_loop_that_rolls_off_is_measured_with_free_phases():
     above = 1j * TURN * np.geomspace(found.measures["unity_gain"], 1e6, 2001)
     first, second = loop.arm_responses(above)
     assert (np.abs(first + second) + np.abs(first) + np.abs(second) < 1.001).all()
-    assert found.measures["unity_gain"] < 12e3
+    assert found.measures["unity_gain"] < 14e3
 
 
 @pytest.mark.parametrize("gain", [3.0, 300.0, 3000.0])
