@@ -137,6 +137,15 @@ def test_a_stable_start_is_seen_and_the_constraint_that_is_missed_is_named(gain)
             design(start, "suppression", bounds)
 
 
+def test_a_perturbation_above_one_is_made_larger():
+    """With K(0) = k the loop is stable up to c1 = 1 + 1 / k: k falls as far as it may."""
+    start = Loop(([], [-0.1], 0.003), "single", 20.0)
+    found = design(start, "critical_perturbation", {"suppression": -25.0})
+    k = found.controller(0.0).real
+    assert found.measures["critical_perturbation"] == pytest.approx(1.0 / k, rel=1e-9)
+    assert k == pytest.approx(0.003, rel=1e-3)
+
+
 def test_contradictory_constraints_say_which_was_missed_and_by_how_much():
     with pytest.raises(ValueError, match=r"modulus 0\.\d+ in place of 1\.5"):
         design(robust_loop(), "suppression", {"modulus": 1.5})
