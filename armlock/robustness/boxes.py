@@ -55,8 +55,8 @@ def box_counts(loop: Loop, size: float, free_above: float | None = None) -> IntA
     From the centre of a box of half its width r to any of its points, D changes by no more than
     r (|B1| + |B2|). Where a certified walk along the imaginary axis finds |D| larger than
     this, no root crosses the axis within the box, and all its points have one count. Otherwise
-    it is cut in four, eight times at most. The smaller boxes meet, so that the count at (1, 1) is
-    that of all.
+    it is cut in four, eight times at most. The smaller boxes meet, so that the count at (1, 1)
+    is that of all.
 
     Examples
     --------
