@@ -356,7 +356,12 @@ def _phases_at_unity_gain(centre: ComplexArray, radius: FloatArray, low: int) ->
 
 
 def _first_real(values: ComplexArray) -> float:
-    """Return the smallest positive value at which a sampled curve crosses the real axis."""
+    """Return the smallest positive value at which a sampled curve crosses the real axis.
+
+    It begins next to omega = 0, where it may cross, too: its values at -omega are conjugate.
+    """
+    if abs(values[0].imag) < 1e-2 * abs(values[0].real):
+        values = np.append(values[0].conj(), values)
     at = np.flatnonzero(values.imag[1:] * values.imag[:-1] < 0.0)
     a, b = values[at], values[at + 1]
     share = a.imag / (a.imag - b.imag)

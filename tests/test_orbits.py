@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from armlock.orbits import from_table, kepler, read_oem
+from armlock.orbits import from_table, kepler, read_oem, read_table
 
+DATA = Path(__file__).parents[1] / "book" / "data"
 DAY = 86400.0
 YEAR = 365.25 * DAY
 KEPLER = kepler()
@@ -242,3 +244,46 @@ def test_states_that_disagree_at_a_border_are_refused(tmp_path):
         ValueError, match="agree where an epoch stands twice, got positions 100"
     ):
         read_oem(files)
+
+
+def test_the_books_tables_are_esas_orbits():
+    for name, most in (("trailing", 0.1457), ("leading", 0.16)):
+        table = read_table(DATA / f"esa_{name}.csv.gz")
+        assert table.scale == "TCB"
+        assert table.epoch.startswith(("2036-12-09T00:00:29.327664", "2037-06-11T00:00:29.574"))
+        t = np.linspace(*table.span, 20_000)
+        assert abs(np.abs(half(t, orbits=table)).max() - most) < 1e-4
+        assert max(np.abs(rate).max() for rate in table.rates(t)) < 6.8e-8
+
+
+def test_a_table_says_what_its_times_are(tmp_path):
+    time, positions = weeks(span=30.0)
+    rows = np.column_stack((time, positions.reshape(-1, 9)))
+    text = "\n".join(",".join(f"{value:.17g}" for value in row) for row in rows)
+    file = tmp_path / "mine.csv"
+    file.write_text("# epoch: 2035-01-01T00:00:00\n# scale: TDB\n" + text, "utf-8")
+    table = read_table(file)
+    assert (table.epoch, table.scale) == ("2035-01-01T00:00:00", "TDB")
+    off = np.subtract(table.round_trips(10 * DAY), KEPLER.round_trips(10 * DAY))
+    assert np.abs(off).max() < 1e-9
+    for wrong, message in (
+        (text, "must say its epoch and scale"),
+        ("# epoch: now\n# scale: UTC\n" + text, "scale must be one of TCB, TDB"),
+        ("# epoch: now\n# scale: TCB\n1,2,3\n", "ten numbers a row, got 3"),
+    ):
+        file.write_text(wrong, "utf-8")
+        with pytest.raises(ValueError, match=message):
+            read_table(file)
+
+
+def test_links_add_up_to_round_trips():
+    t = np.linspace(0.0, YEAR, 7)
+    back = KEPLER.light_time(t, 1, 2)
+    trip = back + KEPLER.light_time(t - back, 2, 1)
+    assert np.abs(trip - KEPLER.round_trips(t)[0]).max() == 0.0
+    for pair in ((1, 1), (0, 2), (1, 4)):
+        with pytest.raises(ValueError, match="receiver and emitter must be two of 1, 2, 3"):
+            KEPLER.light_time(t, *pair)
+    assert KEPLER.positions(t).shape == (7, 3, 3)
+    with pytest.raises(ValueError, match="t must lie within the table"):
+        KEPLER.positions([1e10])

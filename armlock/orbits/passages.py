@@ -19,11 +19,10 @@ from numpy.polynomial import Chebyshev, chebyshev
 from armlock import paper
 from armlock.checks import BoolArray, FloatArray, positive_number, real_number
 from armlock.controllers import Controller
-from armlock.design import buildable_loop, robust_loop
-from armlock.loops import Loop, flight_loop, paper_loop
+from armlock.loops import Loop, buildable_loop, flight_loop, paper_loop, robust_loop
 from armlock.orbits.constellation import Constellation
 from armlock.sensors import dual
-from armlock.stability.counts import unstable_roots
+from armlock.stability.regions import is_stable
 from armlock.stability.roots import rightmost_root
 
 #: A loop of two round trips and of the half difference that its sensor holds, all in s.
@@ -160,9 +159,9 @@ def held_range(
     Returns
     -------
     low, high : float
-        The edges around one. On their inner side a certified count is zero, on their outer
-        side it is not. In between ratios were counted in steps of a quarter: that the loop is
-        stable at all of them is not certified. 0 or inf where no edge was found within a
+        The edges around one. On their inner side the loop is stable, on their outer side it is
+        not, both certified. In between ratios were tried in steps of a quarter: that the loop
+        is stable at all of them is not certified. 0 or inf where no edge was found within a
         factor of 1e5, or before the half difference reaches the mean.
 
     Raises
@@ -183,7 +182,7 @@ def held_range(
 
     def stable(ratio: float) -> bool:
         half = ratio * held
-        return int(unstable_roots(loop(mean + half, mean - half, held), 1.0, 1.0)) == 0
+        return bool(is_stable(loop(mean + half, mean - half, held)))
 
     if not stable(1.0):
         raise ValueError(f"loop must be stable with a true value held, got held={held}")

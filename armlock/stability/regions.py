@@ -298,6 +298,8 @@ def stability_region(
     array([[ True, False],
            [False,  True]])
     """
+    if not callable(make_loop):
+        raise TypeError(f"make_loop must be a function of two numbers, got {make_loop!r}")
     names = [
         name
         for name, parameter in inspect.signature(make_loop).parameters.items()
@@ -305,7 +307,7 @@ def stability_region(
     ]
     if len(names) < 2:
         raise TypeError(f"make_loop must take two arguments, got {make_loop!r}")
-    xs, ys = axis("x", x), axis("y", y)
+    xs, ys = axis(names[0], x), axis(names[1], y)
     at = real_number("c1", c1), real_number("c2", c2)
     row = partial(_row, make_loop, xs, at)
     rows = sweep(row, ys.tolist(), executor=executor, progress=progress)

@@ -582,12 +582,12 @@ function armlockPages() {
       return spec;
     };
 
-    const take = moving => {
+    const take = (moving = false, dragged = false) => {
       for (const name of Object.keys(errors)) blame(name, "");
       try {
         const spec = held();
         wrong.textContent = "";
-        if (!moving) follow(spec);
+        follow(spec, dragged);
         live.set(spec, moving);
       } catch (error) {
         const name = fields[error.field] ? error.field
@@ -598,10 +598,12 @@ function armlockPages() {
       }
     };
     /* Sliders and "Start from" follow what is there. */
-    const follow = spec => {
-      base = spec.gain;
-      gain.to(0);
-      dead.to(spec.delay);
+    const follow = (spec, dragged) => {
+      if (!dragged) {
+        base = spec.gain;
+        gain.to(0);
+        dead.to(spec.delay);
+      }
       const changed = chosen !== null && !same(spec, PRESETS[chosen][0]);
       state.textContent = chosen === null ? "from a link" : changed ? "changed" : "";
       reset.hidden = !changed;
@@ -674,14 +676,11 @@ function armlockPages() {
       });
     const gain = slider(id("factor"), "Drag the gain: times", -2, 2, 0, v => say(10 ** v), (v, moving) => {
       fields.gain.value = exact(+(base * 10 ** v).toPrecision(6));
-      const before = base;
-      take(moving);
-      // Let go, what is reached is where the next drag begins.
-      if (moving) base = before;
+      take(moving, true);
     });
     const dead = slider(id("dead"), "Drag the dead time:", 0, 1, 0, v => `${say(v)} s`, (v, moving) => {
       fields.delay.value = String(v);
-      take(moving);
+      take(moving, true);
     });
     const wrong = element("p", { class: "live-note live-wrong", role: "alert" });
     const form = element("form", { class: "live-form", onsubmit: event => event.preventDefault() },
