@@ -1,4 +1,7 @@
+import os
 import pickle
+import signal
+import threading
 import time
 
 import mpmath
@@ -367,3 +370,19 @@ def test_a_sign_that_is_hidden_to_the_end_is_reported():
     zeros = axis_zeros(ray.product, [(0.0, 3.0)])
     assert (zeros.hidden.tolist(), zeros.jump.tolist()) == ([True], [0])
     assert zeros.width[0] == 3.0
+
+
+def test_an_interrupt_is_heard_while_points_are_counted():
+    # They take half a minute.
+    x, y = np.random.default_rng(0).uniform(-1.2, 1.2, (2, 4000))
+    unstable_roots(CommonArm(3e3), 0.0, 0.0)
+    sent = []
+
+    def interrupt():
+        sent.append(time.monotonic())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Timer(0.5, interrupt).start()
+    with pytest.raises(KeyboardInterrupt):
+        unstable_roots(CommonArm(3e3), x, y)
+    assert time.monotonic() - sent[0] < 1.0

@@ -76,11 +76,13 @@ def largest_pulling(loop: Loop, source: str) -> Peak:
     errors = (step, none) if source == "common" else (none, step)
     soon = np.arange(_PULLED_FROM, 20.0 * loop.longest_delay, 0.25)
     times = np.concatenate((soon, np.geomspace(soon[-1], _PULLED_TO * DAY, 2000)[1:]))
-    sizes = np.abs(pulling(loop, times, *errors))
+    sizes = np.abs(pulling(loop, times, *errors, certified=False))
     at = int(np.argmax(sizes))
     low, high = times[max(at - 1, 0)], times[min(at + 1, times.size - 1)]
     found = minimize_scalar(
-        lambda t: -abs(float(pulling(loop, t, *errors))), bounds=(low, high), method="bounded"
+        lambda t: -abs(float(pulling(loop, t, *errors, certified=False))),
+        bounds=(low, high),
+        method="bounded",
     )
     size, time = max((-float(found.fun), float(found.x)), (float(sizes[at]), float(times[at])))
     return Peak(size, time)

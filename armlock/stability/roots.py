@@ -342,6 +342,26 @@ def roots_right_of(
     )
 
 
+def roots_up_to(
+    system: CharacteristicFunction, x: float, y: float, turns: float
+) -> ComplexArray:
+    """Find roots near the axis up to so many turns of the longest delay; none is certified.
+
+    As `roots_right_of` gives them, of stable ones. Newton's method starts around s = 0 and at
+    four places of each turn.
+    """
+    line = _Line(system, x, y, 0.0)
+    unit = line.per_turn / (2.0 * np.pi)
+    sizes = unit * np.geomspace(_SLOWEST, 4.0, 200)
+    starts = np.append(
+        np.outer(sizes, np.exp(1j * _ANGLES)), 1j * line.per_turn * np.arange(0.75, turns, 0.25)
+    )
+    s, length = line.followed(starts, 40)
+    kept = (length <= 1e-10 * np.abs(s)) & (np.abs(s) > 1e-13 * unit) & (s.real < 0.0)
+    found = _distinct(s[kept])
+    return found[np.argsort(np.abs(found))]
+
+
 def _all_near(line: _Line, unit: float) -> Iterator[tuple[ComplexArray, FloatArray]]:
     """Yield where Newton's method leads, and its last steps, until all walks are too long."""
     # Slow roots lie close to each other, anywhere around zero.
