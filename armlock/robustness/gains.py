@@ -32,10 +32,8 @@ from armlock.stability.counts import axis_zeros, loop_count
 LARGEST_GAIN = 1e6
 # So close to the limits of the neutral root chain, as a share, no gain factors are looked for.
 _NEXT_TO_THE_CHAIN = 1e-5
-# Where L touches zero rounding hides its sign over a stretch in which it may be this large.
-_NULL = 1e-5
 # Shares of a gain factor inside of it at which counts are asked, until one is told.
-_INSIDE = (1e-6, 1e-5, 1e-4, 1e-3)
+_INSIDE = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 0.5, 0.9)
 
 
 def _chain_gains(point: LoopAt) -> tuple[float, float]:
@@ -149,15 +147,17 @@ def _gains_around_one(point: LoopAt, least: float, most: float) -> tuple[float, 
             upper, where = float(factor[nearest]), float(omega[nearest])
     # Values of L in hidden stretches; nan where nothing is known of one.
     left, right = np.concatenate(hidden).T
-    if not ((left > -max(1.0 / upper, _NULL)) | (right < -1.0 / lower)).all():
-        _require_stable_inside(point, lower, upper)
+    met = ~((left > -1.0 / upper) | (right < -1.0 / lower))
+    if met.any():
+        _require_stable_inside(point, lower, upper, is_null=bool((right[met] >= 0.0).all()))
     return lower, upper, where
 
 
-def _require_stable_inside(point: LoopAt, lower: float, upper: float) -> None:
+def _require_stable_inside(point: LoopAt, lower: float, upper: float, *, is_null: bool) -> None:
     """Raise unless counts just inside two gain factors say that the loop is stable there.
 
-    Where a count cannot be told, one farther inside tells.
+    Where a count cannot be told, one farther inside tells. Next to a null of L, which large
+    factors do not tell from a value of -1, it is enough that no count says that it is unstable.
     """
     loop, c1, c2 = point
     rest = loop.polynomials()[0]
@@ -168,7 +168,7 @@ def _require_stable_inside(point: LoopAt, lower: float, upper: float) -> None:
             count = loop_count(loop.plain().replace(rest=scaled), c1, c2)
             if count >= 0:
                 break
-        if count != 0:
+        if count > 0 or (count < 0 and not is_null):
             at = f"the count at {factor} times the gain is {count}"
             raise no_margin(point, f"rounding hides a crossing, for {at}")
 
@@ -211,8 +211,9 @@ def gain_interval(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> tuple[float, 
 
     All sign changes of Im L are found, but for short stretches in which rounding hides its
     sign. Where L in one of them could give a factor between the two, they are refused unless
-    counts just inside of both say that the loop is stable. Next to a null, where |L| is below
-    1e-5 in such a stretch, factors above 1e5 are passed over.
+    counts inside of both say that the loop is stable, the nearest that can be told. Next to a
+    null of L, which large factors do not tell from -1, they are refused if one says that it is
+    unstable.
 
     Examples
     --------
