@@ -201,7 +201,9 @@ class _Content(pickle.Pickler):
             return None if _has_a_name(thing) else _function(thing)
         if isinstance(thing, type):
             return None if _has_a_name(thing) else _class(thing)
-        state = getattr(thing, "__dict__", {})
+        if not hasattr(thing, "__dict__"):
+            return None
+        state = vars(thing)
         inner = next((state[name] for name in _INNER if name in state), None)
         if isinstance(inner, FunctionType):
             return inner.__qualname__ if _has_a_name(inner) else inner
