@@ -19,7 +19,7 @@ from armlock.loops import (
     published_loops,
     robust_loop,
 )
-from armlock.performance import NoiseBudget, closed_loop, noise_budget, pulling, transfer
+from armlock.performance import NoiseBudget, noise_budget, pulling, transfer
 from armlock.robustness import Margins, critical_perturbation, margins, modulus_margin
 from armlock.stability import (
     BOUNDARY,
@@ -89,7 +89,6 @@ __all__ = [
     "amplitude_spectrum",
     "axis_crossings",
     "buildable_loop",
-    "closed_loop",
     "critical_perturbation",
     "d_curve",
     "d_curve_branches",

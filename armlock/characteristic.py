@@ -330,8 +330,7 @@ class CharacteristicFunction:
         if self.step:
             return np.ones(np.broadcast_shapes(x.shape, y.shape))
         a, b1, b2, c = (abs(value) for value in self.highest_coefficients)
-        reserve = (a - c - np.abs(x) * b1 - np.abs(y) * b2) / a
-        return np.asarray(np.where(np.abs(reserve) <= 16.0 * EPSILON, 0.0, reserve))
+        return left_of(a, c + np.abs(x) * b1 + np.abs(y) * b2)
 
     @property
     def longest_delay(self) -> float:
@@ -560,6 +559,16 @@ class CharacteristicFunction:
     def rest_on_boundary(self, *, rows: bool = False) -> ExponentialSum:
         """Return R at s = j omega as an exponential sum, as `on_boundary` does."""
         return self._delayed(0, 0.0, rows=rows)
+
+
+def left_of(whole: float, others: npt.ArrayLike) -> FloatArray:
+    """Share of a positive number that others leave of it, zero where rounding hides its sign.
+
+    Of highest coefficients, and sums of such times parameters: a few products and sums, each of
+    which rounds by half an EPSILON, and the coefficients, which are products of a few numbers.
+    """
+    left = (whole - np.asarray(others, dtype=float)) / whole
+    return np.asarray(np.where(np.abs(left) <= 16.0 * EPSILON, 0.0, left))
 
 
 def checked_system(system: CharacteristicFunction) -> CharacteristicFunction:

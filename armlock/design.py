@@ -356,7 +356,12 @@ def _phases_at_unity_gain(centre: ComplexArray, radius: FloatArray, low: int) ->
 
 
 def _first_real(values: ComplexArray) -> float:
-    """Return the smallest positive value at which a sampled curve crosses the real axis."""
+    """Return the smallest positive value at which a sampled curve crosses the real axis.
+
+    It begins next to omega = 0, where it may cross, too: its values at -omega are conjugate.
+    """
+    if abs(values[0].imag) < 1e-2 * abs(values[0].real):
+        values = np.append(values[0].conj(), values)
     at = np.flatnonzero(values.imag[1:] * values.imag[:-1] < 0.0)
     a, b = values[at], values[at + 1]
     share = a.imag / (a.imag - b.imag)
@@ -398,9 +403,9 @@ def _smallest(cost: Callable[[FloatArray], float], size: int) -> tuple[FloatArra
     """Look for the smallest cost from zero on, within -1 and 1; return where, and the calls."""
     x, calls, limits = np.zeros(size), 0, np.tile((-1.0, 1.0), (size, 1))
     for reach in (0.05, 0.02, 0.005):
-        # Away from the upper limit, or the simplex would be flat there and stay so.
-        corners = x + np.diag(np.where(x + reach > 1.0, -reach, reach))
-        options: dict[str, Any] = {"initial_simplex": np.vstack((x, corners)), "adaptive": True}
+        # Where that leaves the limits, scipy turns it back inside.
+        simplex = np.vstack((x, x + reach * np.eye(size)))
+        options: dict[str, Any] = {"initial_simplex": simplex, "adaptive": True}
         options |= {"maxfev": 150 * size, "xatol": 1e-5, "fatol": 1e-7}
         found = minimize(cost, x, method="Nelder-Mead", bounds=limits, options=options)
         x, calls = found.x, calls + int(found.nfev)

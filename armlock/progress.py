@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import sys
 import threading
@@ -56,8 +57,9 @@ def is_watched() -> bool:
     """Whether somebody sees the error stream grow: on a terminal, or in Jupyter.
 
     A notebook that is run by a build has a kernel, but no server that names its session; and
-    the line belongs to the thread that the user waits for.
+    the line belongs to the process and thread that the user waits for.
     """
     in_jupyter = "ipykernel" in sys.modules and "JPY_SESSION_NAME" in os.environ
     in_front = threading.current_thread() is threading.main_thread()
-    return in_front and (in_jupyter or sys.stderr.isatty())
+    is_worker = multiprocessing.parent_process() is not None
+    return in_front and not is_worker and (in_jupyter or sys.stderr.isatty())

@@ -39,6 +39,12 @@ FIXED = {
             "delay": 5.5152126654e-6,
         },
     ),
+    # There |L| comes to one at 2.4e-7 rad/s.
+    "parameters next to zero": (
+        Sketch((-1.5,), (0j,), 0.65, "difference", 27.6, 0.05),
+        (2.5e-7, 5e-9),
+        {"phase": 1.5707897588},
+    ),
     "small and rippled": (Sketch((), (0j,), 0.181, "common", 0.3566, 0.3565), (1e-6, 0.04), {}),
 }
 
@@ -60,6 +66,13 @@ def test_random_loops_agree_with_brute_force(kind):
     seed = 8 if kind == "critical" else 7
     tally = attack.attack(seed, range(10), (kind,), attack.Tally(patient=False))
     assert tally.calls.total() > tally.calls["loops"]
+    assert listed(tally) == []
+
+
+@pytest.mark.parametrize("family", ["clusters", "zero"])
+def test_random_loops_of_a_family_agree_with_brute_force(family):
+    tally = attack.attack(26, range(12), tally=attack.Tally(patient=False), family=family)
+    assert tally.calls.total() > 4 * tally.calls["loops"]
     assert listed(tally) == []
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import control
 import matplotlib.pyplot as plt
 import mpmath
 import numpy as np
@@ -14,7 +13,6 @@ from armlock import (
     DualArm,
     Loop,
     SingleArm,
-    closed_loop,
     flight_loop,
     noise_budget,
     paper_loop,
@@ -47,14 +45,6 @@ def test_responses_solve_the_loop_equation():
     assert (np.abs(phi - (laser - back)) < 1e-9 * scale).all()
     arms = [n * transfer(FLIGHT, name, s) for n, name in ((n1, "arm 1"), (n2, "arm 2"))]
     np.testing.assert_allclose(phi, transfer(FLIGHT, "laser", s) + sum(arms), rtol=1e-9)
-
-
-def test_all_responses_are_one_object_of_python_control():
-    response = closed_loop(FLIGHT, [0.01, 0.1])
-    assert isinstance(response, control.FrequencyResponseData)
-    assert (response.ninputs, response.noutputs) == (5, 1)
-    expected = [transfer(FLIGHT, name, 0.1j) for name in response.input_labels]
-    np.testing.assert_allclose(response(0.1j)[0], expected, rtol=1e-12)
 
 
 def test_one_arm_of_high_gain_leaves_the_noise_of_the_arm():

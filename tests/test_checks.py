@@ -59,6 +59,10 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     ARMS.chain_reserve: AT,
     armlock.unstable_roots: {"system": ARMS} | AT,
     armlock.stability_chart: {"system": ARMS, "x": [1.0], "y": [1.0]},
+    armlock.is_stable: {"system": ARMS} | AT,
+    # Its arguments have the names of the free parameters, as those of ARMS.
+    armlock.stability_region: {"make_loop": lambda c1, c2: SingleArm(c1, c2), "x": [1.0],
+                               "y": [1.0]} | POINT,
     armlock.rightmost_root: {"system": ARMS} | AT,
     extended_root: {"system": ARMS, "start": 0.0, "digits": 20} | AT,
     armlock.d_curve: {"system": ARMS, "omega": 1.0},
@@ -88,7 +92,6 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     armlock.flight_loop: {"mean_delay": 33.6, "half_difference": 0.255, "g2": 40.0,
                           "corner": 2.0, "delay": 0.0},
     armlock.performance.transfer: {"loop": ARMS, "source": "laser", "s": 1j} | POINT,
-    armlock.closed_loop: {"loop": ARMS, "omega": [1.0]} | POINT,
     armlock.noise_budget: {"loop": ARMS, "frequency": [1.0], "laser": 1.0,
                            "requirement": 1.0} | POINT,
     warped: {"omega": 1.0, "sample_rate": 10.0},

@@ -9,6 +9,7 @@ from numpy.polynomial.polynomial import polyval
 
 from armlock import CommonArm, paper_loop, unstable_roots
 from armlock.axis import contour, counting, exponentials
+from armlock.stability import bounds
 from armlock.stability.bounds import last_frequency
 from armlock.stability.counts import _point_model
 from tests.attack import roots
@@ -169,6 +170,153 @@ def test_a_piece_holds_a_sum_and_bounds_what_it_leaves_out(degree, omega):
             sizes = abs(changes[1]), abs(changes[1].imag)
             for size, bend in zip(sizes, bends, strict=False):
                 assert size <= exponentials.bound_at(bend, piece, at) * (1.0 + 1e-6)
+
+
+def random_piece(rng, *, direct=False):
+    """A piece of random coefficients and phases, of any sizes."""
+    groups, powers = int(rng.integers(1, 4)), int(rng.integers(1, 8))
+    sizes = 10.0 ** rng.uniform(-3.0, 3.0, (groups + 1, powers))
+    local = sizes * np.exp(2j * np.pi * rng.random((groups + 1, powers)))
+    start, length = 0.0, 10.0 ** rng.uniform(-3.0, 3.0)
+    if direct:
+        # In powers of omega: real, imaginary, real, ...
+        local = sizes * rng.choice([-1.0, 1.0], sizes.shape) * 1j ** np.arange(powers)
+    else:
+        start = rng.choice([0.0, 10.0 ** rng.uniform(-3.0, 3.0)])
+    phases = rng.choice([-1.0, 1.0], groups) * 10.0 ** rng.uniform(-3.0, 2.0, groups)
+    magnitudes = np.column_stack((np.abs(local), np.zeros(groups + 1)))
+    return exponentials.Piece(start, start + length, 1.0 / length, local, magnitudes, phases)
+
+
+def second_derivative(piece, omega):
+    """That of a piece, power by power: (p e)'' = p'' e + 2 p' e' + p e''."""
+    u, rate = (omega - piece.start) * piece.per_reach, piece.per_reach
+    whole = polyval(u, np.polynomial.polynomial.polyder(piece.local[0], 2)) * rate**2
+    for p, phase in zip(piece.local[1:], piece.phases, strict=True):
+        value, slope, bend = (
+            polyval(u, np.polynomial.polynomial.polyder(p, n)) * rate**n for n in range(3)
+        )
+        late = np.exp(1j * omega * phase)
+        whole = whole + bend * (late - 1.0) + (2j * phase * slope - phase**2 * value) * late
+    return whole
+
+
+@pytest.mark.parametrize("direct", [False, True])
+def test_bounds_on_the_curvature_of_random_pieces_hold_everywhere(direct):
+    rng = np.random.default_rng(26)
+    for _ in range(2000):
+        piece = random_piece(rng, direct=direct)
+        omega = piece.start + (piece.end - piece.start) * rng.random(20)
+        bends = second_derivative(piece, omega)
+        pairs = [(np.abs(bends), exponentials.curvature_bound(piece))]
+        if direct:
+            pairs.append((np.abs(bends.imag), exponentials.curvature_from_zero(piece)))
+        for sizes, bound in pairs:
+            for size, at in zip(sizes, omega, strict=True):
+                assert size <= exponentials.bound_at(bound, piece, at) * (1.0 + 1e-9)
+
+
+def test_a_monotonic_stretch_is_one():
+    rng, told = np.random.default_rng(27), 0
+    for _ in range(2000):
+        piece = random_piece(rng)
+        bound = exponentials.curvature_bound(piece)
+        error = exponentials.rounding_bound(piece, exponentials.ROUNDING)
+        width = 0.5 * (piece.end - piece.start) * 10.0 ** rng.uniform(-6.0, 0.0)
+        omega = piece.start + width + (piece.end - piece.start - 2.0 * width) * rng.random()
+        if contour._is_monotonic(piece, bound, error, omega, width):
+            told += 1
+            along = omega + width * np.linspace(-1.0, 1.0, 30)
+            slopes = [exponentials.evaluate(piece, at)[1].imag for at in along]
+            assert min(slopes) > 0.0 or max(slopes) < 0.0
+    assert told > 300
+
+
+def test_a_position_stays_within_its_spread():
+    rng, told = np.random.default_rng(28), 0
+    for _ in range(2000):
+        piece, square = random_piece(rng), random_piece(rng)
+        square = piece._replace(local=square.local[:1] + 0j, sizes=square.sizes[:1])
+        square = square._replace(phases=np.zeros(0))
+        width = 0.5 * (piece.end - piece.start) * 10.0 ** rng.uniform(-9.0, -1.0)
+        omega = piece.start + width + (piece.end - piece.start - 2.0 * width) * rng.random()
+        value, slope = exponentials.evaluate(piece, omega)
+        zeros = np.array([[omega, 2.0, width, 1.0, value.real, abs(slope)]])
+        contour._place(zeros, piece, square, piece.start)
+        position, spread = zeros[0, contour.POSITION], zeros[0, contour.SPREAD]
+        if np.isfinite(spread) and not np.isnan(position):
+            told += 1
+            for at in omega + width * np.linspace(-1.0, 1.0, 20):
+                over, under = (exponentials.evaluate(p, at)[0].real for p in (piece, square))
+                assert abs(over / under - position) <= spread * (1.0 + 1e-9)
+    assert told > 300
+
+
+def test_slow_terms_bound_what_the_fast_ones_add_up_to():
+    rng = np.random.default_rng(29)
+    for _ in range(500):
+        piece = random_piece(rng)
+        slow, fast = contour._slow_terms(piece)
+        for at in piece.start + (piece.end - piece.start) * rng.random(10):
+            left = abs(exponentials.evaluate(piece, at)[0] - exponentials.evaluate(slow, at)[0])
+            error = exponentials.rounding_bound(slow, exponentials.ROUNDING)
+            most = exponentials.bound_at(fast, piece, at)
+            assert left <= most + exponentials.bound_at(error, piece, at)
+
+
+def test_past_the_last_root_a_polynomial_stays_positive():
+    rng = np.random.default_rng(30)
+    for _ in range(1000):
+        found = roots(rng, int(rng.integers(1, 8)), 1e-3, 1e3, 0.6)
+        q = np.poly(found).real[::-1].astype(np.float64) * 10.0 ** rng.uniform(-9.0, 9.0)
+        bound = bounds.last_root_bound(q)
+        real = [root.real for root in found if complex(root).imag == 0.0]
+        assert bound >= max([*real, 0.0]) * (1.0 - 1e-9)
+        assert (polyval(bound * (1.0 + np.geomspace(1e-6, 1e6, 50)), q) >= 0.0).all()
+
+
+def cluster(number, spacing, quality):
+    """Roots of modes around 1 rad/s."""
+    sizes = 1.0 + spacing * (np.arange(number) - 0.5 * (number - 1))
+    upper = sizes * (-0.5 / quality + 1j)
+    return np.column_stack((upper, upper.conj())).ravel()
+
+
+@pytest.mark.parametrize("shape", [(7, 1e-2, 500.0), (4, 3e-3, 5e3), (3, 1e-3, 500.0)])
+def test_next_to_a_cluster_a_polynomial_keeps_its_digits(shape):
+    found = cluster(*shape)
+    coefficients = np.poly(found).real[::-1].astype(np.float64)
+    whole = exponentials.ExponentialSum(
+        (exponentials.Polynomial(coefficients, found),),
+        np.ones((1, 1)),
+        np.zeros(1),
+        np.ones(1),
+    ).compiled()
+    scales = []
+    for omega in found[::2].imag:
+        piece = exponentials.expand(whole, omega)
+        value, _ = exponentials.evaluate(piece, omega)
+        error = exponentials.bound_at(exponentials.rounding_bound(piece, 8.0), piece, omega)
+        exact = np.prod(1j * omega - found)
+        # A piece is divided by a power of two.
+        scales.append(np.log2(abs(value / exact)))
+        assert error < 1e-9 * abs(value)
+        assert np.angle(value / exact) == pytest.approx(0.0, abs=1e-9)
+    assert np.array(scales) == pytest.approx(np.round(scales), abs=1e-9)
+
+
+def test_a_stretch_that_may_hold_three_zeros_is_not_taken_for_one():
+    # Im f = (omega - 1) ((omega - 1)^2 - 1e-14): the three zeros lie within rounding.
+    imaginary = np.poly([1.0, 1.0 - 1e-7, 1.0 + 1e-7])[::-1]
+    whole = of_coefficients(1j * imaginary[None, :] + np.array([[1.0, 0.0, 0.0, 0.0]]))
+    summed = exponentials.CompiledSum(whole, np.ones((1, 1)), np.ones(1), np.zeros(1))
+    zeros, complete = contour.imaginary_zeros(
+        summed, None, 0.5, 2.0, False, exponentials.ROUNDING
+    )
+    assert complete
+    assert zeros[:, [contour.JUMP, contour.HIDDEN]].tolist() == [[2.0, 1.0]]
+    assert zeros[0, contour.WIDTH] > 1e-7
+    assert abs(zeros[0, contour.OMEGA] - 1.0) < zeros[0, contour.WIDTH]
 
 
 def test_the_last_frequency_is_close_to_where_one_term_outgrows_the_others():

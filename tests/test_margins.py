@@ -397,3 +397,10 @@ def test_a_count_up_to_free_phases_is_that_of_all_frequencies(factor):
                 found.append(expected)
     assert len(found) > 10
     assert factor < 30.0 or max(found) > 0
+
+
+def test_a_difference_of_nearly_equal_delays_that_is_small_everywhere_is_answered():
+    loop = Loop(Controller([], [-1.0], 1.0), DIFFERENCE, 10.0, 10.0 * (1.0 - 1e-8))
+    found = margins(loop)
+    assert found.modulus == pytest.approx(1.0, abs=1e-6)
+    assert (found.phase, found.gain_upper) == (np.inf, np.inf)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import time
 
 import mpmath
 import numpy as np
@@ -15,6 +16,7 @@ from armlock import (
     Loop,
     SingleArm,
     axis_crossings,
+    flight_loop,
     nyquist,
     paper_loop,
     unstable_roots,
@@ -235,5 +237,18 @@ def test_crossings_are_none_of_a_weak_loop_and_refused_where_l_has_no_value():
     resonant = Loop(((-1.0,), (2j, -2j, -1.0), 0.3), SINGLE, 2.0, 1.5)
     with pytest.raises(ValueError, match="no pole on the imaginary axis except at s = 0"):
         axis_crossings(resonant)
-    with pytest.raises(ValueError, match=r"^omega_max must be of a size that memory holds"):
-        nyquist(CommonArm(), omega_max=1e9)
+
+
+def test_what_is_drawn_is_what_a_picture_shows_and_counts_as_before():
+    loop = flight_loop()
+    begun = time.thread_time()
+    plain, far = nyquist(loop), nyquist(CommonArm(), omega_max=1e9)
+    assert time.thread_time() - begun < 20.0
+    assert plain.closed_loop_roots == far.closed_loop_roots == 0
+    for curve in (plain, far):
+        assert curve.omega.size <= module._MOST_SHOWN + 1
+        np.testing.assert_allclose(
+            curve.response[::997], curve.point.response(curve.omega[::997]), rtol=1e-9
+        )
+        assert (np.diff(curve.omega) > 0.0).all()
+    assert far.omega[-1] == 1e9

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from armlock import (
+    CharacteristicFunction,
     CommonArm,
     CountError,
     DualArm,
@@ -78,6 +79,11 @@ def test_maps_and_chains_are_judged_as_they_are_counted():
     system = semi_discretization(CommonArm(tau1=2.0, tau2=1.5), 0.5)
     assert is_stable(system, [0.9, 1.2], [0.9, 1.2]).tolist() == [True, False]
     assert not is_stable(NEUTRAL["integrator"], 5.0, 5.0)
+    # Without any delay D is a polynomial, here (s - 1) (s + 3) or (s + 1) (s + 3).
+    for constant, stable in ((-3.0, False), (3.0, True)):
+        middle = 2.0 if constant < 0.0 else 4.0
+        plain = CharacteristicFunction([constant, middle, 1.0], [1.0], [1.0], 0.0, 0.0)
+        assert is_stable(plain, 0.0, 0.0) == stable
     with pytest.raises(TypeError, match=r"^a must be given"):
         is_stable(HayesEquation())
 

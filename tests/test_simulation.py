@@ -263,6 +263,8 @@ def test_what_memory_cannot_hold_is_refused():
         simulate(CommonArm(), np.ones(9), sample_rate=1e9)
     with pytest.raises(ValueError, match=r"^draws must be of a size that memory holds"):
         Simulation(CommonArm(), draws=10**9)
+    with pytest.raises(ValueError, match=r"^tau1 and tau2 must be of a size that memory holds"):
+        simulate(CommonArm(), np.ones(9), tau1=1e9)
 
 
 def test_a_share_of_a_sample_is_seen_at_any_rate():

@@ -313,7 +313,8 @@ def _place(zeros: FloatArray, piece: Piece, square: Piece, entered: float) -> No
     same powers and the same scale. Over its width each of the two leaves its tangent by no more
     than its bound on the second derivative allows.
     """
-    fastest, magnitude = np.abs(piece.phases).max(), piece.sizes[1:].sum(axis=0)
+    fastest = np.abs(piece.phases).max()
+    magnitude, square_magnitude = piece.sizes.sum(axis=0), square.sizes.sum(axis=0)
     bound, square_bound = curvature_bound(piece), curvature_bound(square)
     for zero in zeros:
         width, part, slope = zero[WIDTH], zero[POSITION], zero[SPREAD]
@@ -326,9 +327,10 @@ def _place(zeros: FloatArray, piece: Piece, square: Piece, entered: float) -> No
         moved = slope * width + 0.5 * bound_at(bound, piece, last) * width * width
         shrunk = abs(change.real) * width
         shrunk += 0.5 * bound_at(square_bound, square, last) * width * width
-        rounding = (
-            CAUTION * EPSILON * (1.0 + fastest * omega) * bound_at(magnitude, piece, last)
-        )
+        # Whole magnitudes, because the parameters in the weights are rounded numbers, too.
+        share = CAUTION * EPSILON * (1.0 + fastest * omega)
+        rounding = share * bound_at(magnitude, piece, last)
+        shrunk += share * bound_at(square_magnitude, square, last)
         least = measured.real - shrunk
         zero[POSITION], zero[SPREAD] = position, np.inf
         if least > 0.0 and omega == zero[OMEGA]:

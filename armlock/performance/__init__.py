@@ -5,6 +5,6 @@ Responses are evaluated at the frequencies asked for, of a loop whose stability 
 
 from armlock.performance.budget import NoiseBudget, noise_budget
 from armlock.performance.pulling import pulling
-from armlock.performance.transfer import closed_loop, transfer
+from armlock.performance.transfer import transfer
 
-__all__ = ["NoiseBudget", "closed_loop", "noise_budget", "pulling", "transfer"]
+__all__ = ["NoiseBudget", "noise_budget", "pulling", "transfer"]

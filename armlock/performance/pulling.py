@@ -138,7 +138,7 @@ def slow_roots(loop: Loop, rate: float) -> ComplexArray:
     >>> from armlock import flight_loop
     >>> from armlock.performance.pulling import slow_roots
     >>> len(slow_roots(flight_loop(), 1e-4))
-    9
+    4
     """
     checked_loop(loop)
     last = RootError("", 0.0)

@@ -6,16 +6,11 @@ laser pulling are made from these responses.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import numpy.typing as npt
 
-from armlock.checks import ComplexArray, axis, one_of, positive_array, real_number
+from armlock.checks import ComplexArray, one_of
 from armlock.loops import Loop, checked_loop
-
-if TYPE_CHECKING:
-    import control
 
 #: The inputs of a loop: the laser, both arms, and the sum and difference of the arms.
 INPUTS = ("laser", "arm 1", "arm 2", "common", "differential")
@@ -96,44 +91,3 @@ def responses(
     }
     found = {name: np.asarray(-error * sensitivity) for name, error in errors.items()}
     return {"laser": np.asarray(sensitivity), **found}
-
-
-def closed_loop(
-    loop: Loop, omega: npt.ArrayLike, c1: float = 1.0, c2: float = 1.0
-) -> control.FrequencyResponseData:
-    """Return the responses to all inputs as one python-control object, with exact delays.
-
-    Parameters
-    ----------
-    loop : Loop
-        The loop.
-    omega : array_like of float, one-dimensional
-        Angular frequencies in rad/s, positive.
-    c1, c2 : float, optional
-        Multiplicative perturbations.
-
-    Returns
-    -------
-    control.FrequencyResponseData
-        With one output, "locked laser", and the inputs of `transfer`.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If `loop` is no `Loop`, omega is not positive and one-dimensional, or c1 or c2 is not
-        finite and real.
-
-    Examples
-    --------
-    >>> from armlock import closed_loop, flight_loop
-    >>> response = closed_loop(flight_loop(), [0.01, 0.1])
-    >>> response.input_labels
-    ['laser', 'arm 1', 'arm 2', 'common', 'differential']
-    """
-    import control
-
-    omega = axis("omega", np.atleast_1d(positive_array("omega", omega)))
-    found = responses(loop, 1j * omega, real_number("c1", c1), real_number("c2", c2))
-    return control.frd(
-        np.array([[*found.values()]]), omega, inputs=list(INPUTS), outputs=["locked laser"]
-    )

@@ -4,7 +4,7 @@ Each margin comes from a certified search of the axis and is confirmed by counts
 cannot be certified is refused.
 """
 
-from armlock.robustness.boxes import box_counts, edge_crossings
+from armlock.robustness.boxes import box_counts
 from armlock.robustness.gains import gain_interval
 from armlock.robustness.margins import Margins, critical_perturbation, margins, modulus_margin
 from armlock.robustness.rays import Crossing, Crossings, Ray, first_crossing
@@ -16,7 +16,6 @@ __all__ = [
     "Ray",
     "box_counts",
     "critical_perturbation",
-    "edge_crossings",
     "first_crossing",
     "gain_interval",
     "margins",

@@ -91,6 +91,10 @@ class _Disc(NamedTuple):
         c G / F of the other one, with the phase between the two; of free phases its magnitude.
     swing : complex
         The rate at which log(swung) changes.
+    rounding : float
+        The relative rounding error of F and G / F. A factor's difference rounds by half an
+        EPSILON, a complex product by no more than two, a quotient by no more than five: eight
+        for each factor, and 64 for the thirty operations or so with which a disc is compared.
     nearest : float
         The distance of the nearest root, up to which the bounds hold: within a step they are
         divided by 1 - step / nearest, because |log(1 + x) - x| <= |x|^2 / (2 (1 - |x|)). Where
@@ -106,6 +110,7 @@ class _Disc(NamedTuple):
     held: complex
     swung: complex
     swing: complex
+    rounding: float
     nearest: float
 
 
@@ -144,7 +149,7 @@ def _disc(arms: Arms, omega: float) -> _Disc:
     roots, powers = arms.roots, arms.powers
     value1, value2 = complex(arms.leads[0]), complex(arms.leads[1])
     rate1, rate2, nearest = 0j, 0j, np.inf
-    bend1, bend2, bend = 0.0, 0.0, 0.0
+    bend1, bend2, bend, rounding = 0.0, 0.0, 0.0, 64.0 * EPSILON
     for i in range(roots.size):
         away = 1j * omega - roots[i]
         square = away.real * away.real + away.imag * away.imag
@@ -152,6 +157,7 @@ def _disc(arms: Arms, omega: float) -> _Disc:
             nearest = 0.0
             continue
         n1, n2 = powers[0, i], powers[1, i]
+        rounding += 8.0 * EPSILON * (abs(n1) + abs(n2))
         # Powers alternate, so that the products neither overflow nor underflow on the way.
         for _ in range(n1):
             value1 *= away
@@ -178,7 +184,7 @@ def _disc(arms: Arms, omega: float) -> _Disc:
         swing = between - 1j * apart
     return _Disc(
         value1 * dead, other, rate1 - 1j * arms.delay, bend1, between, bend,
-        held, swung, swing, np.sqrt(nearest),
+        held, swung, swing, rounding, np.sqrt(nearest),
     )  # fmt: skip
 
 
@@ -191,7 +197,7 @@ def _centre_and_radius(disc: _Disc) -> tuple[complex, float]:
 def _rounding(disc: _Disc) -> float:
     """Bound on the rounding error of centre and radius, whose terms may cancel."""
     terms = 1.0 + abs(disc.other) + abs(disc.held) + abs(disc.swung)
-    return float(64.0 * EPSILON * abs(disc.larger) * terms)
+    return float(disc.rounding * abs(disc.larger) * terms)
 
 
 @njit(cache=True)
@@ -247,7 +253,7 @@ def _clear(disc: _Disc, ahead: _Ahead, step: float, target: complex, radius: flo
     total = (change * away.conjugate()).real / distance - size * ahead.slope
     total += radius * disc.rate.real
     beyond = (abs(target) + radius) * ahead.own + size * ahead.left
-    rounding = _rounding(disc) + 64.0 * EPSILON * (abs(target) + radius)
+    rounding = _rounding(disc) + disc.rounding * (abs(target) + radius)
     return bool(min(begin, begin + total * step) > beyond + rounding)
 
 

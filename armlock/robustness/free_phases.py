@@ -72,11 +72,12 @@ def limit_margins(point: LoopAt) -> FloatArray:
     Raises
     ------
     CountError
-        If the disc holds -1: the neutral root chain is not confined.
+        If the neutral root chain is not confined (`CharacteristicFunction.chain_reserve`): the
+        disc holds -1.
     """
     centre, radius = limit_disc(point)
     found: FloatArray = discs.free_margins_at(complex(centre), radius, np.inf)
-    if not found[discs.MODULUS] > 0.0:
+    if not point.loop.chain_reserve(point.c1, point.c2) > 0.0:
         raise unconfined(point)
     if abs(centre) + radius >= 1.0:
         # L does not roll off: any delay more destabilises it at high frequency.

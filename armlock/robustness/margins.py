@@ -79,6 +79,8 @@ class Margins:
     >>> found = margins(paper_loop())
     >>> print(f"stable for gains from {found.gain_lower:.3f} to {found.gain_upper:.2f}")
     stable for gains from 0.195 to 6.61
+
+    As a Series of pandas: ``pd.Series(vars(found))``.
     """
 
     gain_lower: float

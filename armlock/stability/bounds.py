@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from armlock.axis.compiled import njit
 from armlock.axis.exponentials import real_horner
-from armlock.characteristic import CharacteristicFunction, broadcast_parameters
+from armlock.characteristic import CharacteristicFunction, broadcast_parameters, left_of
 from armlock.checks import FloatArray
 
 
@@ -222,7 +222,7 @@ def last_larger(
     if lead == 0.0:
         return np.inf
     tops = [abs(float(p[-1])) if p.size == first.size else 0.0 for p in others]
-    reserve = (lead - float(factors @ np.array(tops))) / lead
+    reserve = float(left_of(lead, float(factors @ np.array(tops))))
     squares, unit = squared_magnitudes((first, *others))
     found: float = _last_frequency(squares, unit, factors, reserve)
     return found

@@ -16,9 +16,9 @@ import numpy as np
 
 from armlock.axis.contour import MOST_SAMPLES, argument_at, resolved_grid
 from armlock.checks import (
+    BoolArray,
     ComplexArray,
     FloatArray,
-    check_memory,
     positive_number,
 )
 from armlock.loops import Loop, LoopAt
@@ -37,6 +37,9 @@ if TYPE_CHECKING:
 _STRAIGHT = 0.1
 # Most that 1 + L turns between two samples, in rad, unless it passes through zero.
 _MOST_TURN = 1.0
+# Up to which |L| a picture is linear; it is logarithmic beyond. And most samples that it takes.
+_LINEAR = 0.01
+_MOST_SHOWN = 1_000_000
 # Where |L| is below it no crossing of the negative real axis is of interest.
 _SMALL = 1e-3
 
@@ -48,7 +51,8 @@ class NyquistCurve:
     Attributes
     ----------
     omega : float array, shape (n,)
-        Ascending frequencies in rad/s, from the indentation up.
+        Ascending frequencies in rad/s, from the indentation up. There are at most a million,
+        where a picture would show them apart.
     response : complex array, shape (n,)
         L(j omega).
     indentation : complex array, shape (k,)
@@ -170,12 +174,27 @@ def _resolving_grid(loop: Loop, c1: float, c2: float, end: float) -> FloatArray:
 
 
 def _drawing_grid(loop: Loop, start: float, end: float) -> FloatArray:
-    """Frequencies close enough to draw the curve; finer at first, where L changes most."""
+    """Frequencies close enough to draw the curve; finer at first, where L changes most.
+
+    Past a thousand turns of the delays no picture shows one turn beside the next.
+    """
     per_turn = loop.omega_per_turn
-    check_memory("omega_max", (int(min(400.0 * end / per_turn, 1e18)),), 64)
     first = np.arange(0.0, min(4.0 * per_turn, end), per_turn / 2000.0)
-    whole = np.arange(0.0, end, per_turn / 400.0)
-    return np.concatenate((np.geomspace(start, end, 1000), first, whole))
+    resolved = min(1000.0 * per_turn, end)
+    whole = np.arange(0.0, resolved, per_turn / 400.0)
+    far = np.geomspace(resolved, end, 100_000) if end > resolved else whole[:0]
+    return np.concatenate((np.geomspace(start, end, 1000), first, whole, far))
+
+
+def _shown(response: ComplexArray) -> BoolArray:
+    """Which of many samples a picture shows apart, on the scale of `plot_nyquist`."""
+    size = np.abs(response)
+    far = np.arcsinh(size / _LINEAR) * response / np.where(size > 0.0, size, 1.0)
+    length = np.cumsum(np.abs(np.diff(far, prepend=far[0])))
+    share = length / max(float(length[-1]), 1e-300)
+    kept = np.diff(np.floor(share * _MOST_SHOWN), prepend=-1.0) > 0.0
+    kept[-1] = True
+    return np.asarray(kept)
 
 
 def _turn_beyond(loop: Loop, last: complex, end: float) -> float:
@@ -209,7 +228,7 @@ def nyquist(
         Multiplicative perturbations.
     omega_max : float, optional
         Trace at least up to this frequency in rad/s, with samples close enough to draw. The
-        count needs neither.
+        count needs neither, and takes other samples.
 
     Returns
     -------
@@ -251,11 +270,7 @@ def nyquist(
         raise refused("the loop's high-frequency chain of roots is not confined")
     radius = point.leading_radius()
     end = max(1.05 * end, 10.0 / loop.longest_delay, 10.0 * radius)
-    if omega_max is not None:
-        end = max(end, positive_number("omega_max", omega_max))
     grid = _resolving_grid(loop, c1, c2, end)
-    if omega_max is not None:
-        grid = np.union1d(grid, _drawing_grid(loop, radius, end))
     omega = np.concatenate(([radius], grid[(grid > radius) & (grid < end)], [end]))
     arc = radius * np.exp(0.5j * np.pi * np.linspace(0.0, 1.0, 64))
     contour = loop.open_loop(np.concatenate((arc[:-1], 1j * omega)), c1, c2)
@@ -273,9 +288,21 @@ def nyquist(
             "roots"
         )
     indented = slice(arc.size if order else 0)
+    response = contour[arc.size - 1 :]
+    if omega_max is not None:
+        last = max(end, positive_number("omega_max", omega_max))
+        more = np.setdiff1d(_drawing_grid(loop, radius, last), omega)
+        more = np.append(more[(more > radius) & (more < last)], last if last > end else [])
+        every = np.concatenate((omega, more))
+        order_of = np.argsort(every, kind="stable")
+        omega = every[order_of]
+        response = np.concatenate((response, loop.open_loop(1j * more, c1, c2)))[order_of]
+    if omega.size > _MOST_SHOWN:
+        shown = _shown(response)
+        omega, response = omega[shown], response[shown]
     return NyquistCurve(
         omega=omega,
-        response=contour[arc.size - 1 :],
+        response=response,
         indentation=arc[indented],
         indentation_response=contour[indented],
         pole_order=order,

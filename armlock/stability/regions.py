@@ -97,7 +97,7 @@ def proves_instability(system: CharacteristicFunction, x: float, y: float) -> bo
     if system.step or not 0.0 < end < np.inf or not rest.coefficients.any():
         return False
     sizes = np.abs(np.concatenate([p.roots for p in system.polynomials()]))
-    lowest = 0.1 * min(sizes[sizes > 0.0].min(initial=np.inf), 1.0 / system.longest_delay, end)
+    lowest = 0.1 * min(sizes[sizes > 0.0].min(initial=np.inf), system.omega_per_turn, end)
     omega, most = np.geomspace(lowest, end, _TRIALS), -0.5 * system.longest_delay
     with np.errstate(all="ignore"):
         for _ in range(_MOVES + 1):
@@ -204,6 +204,9 @@ class StabilityRegion:
     >>> region = stability_region(make, [1.0, 10.0], [0.01, 0.5], c1=0.9)
     >>> region.parameters, region.stable.tolist()
     (('gain', 'delay'), [[True, True], [True, False]])
+
+    As an array of xarray: ``xr.DataArray(region.stable, [("delay", region.y), ("gain",
+    region.x)])``.
     """
 
     parameters: tuple[str, str]
@@ -295,6 +298,8 @@ def stability_region(
     array([[ True, False],
            [False,  True]])
     """
+    if not callable(make_loop):
+        raise TypeError(f"make_loop must be a function of two numbers, got {make_loop!r}")
     names = [
         name
         for name, parameter in inspect.signature(make_loop).parameters.items()
@@ -302,7 +307,7 @@ def stability_region(
     ]
     if len(names) < 2:
         raise TypeError(f"make_loop must take two arguments, got {make_loop!r}")
-    xs, ys = axis("x", x), axis("y", y)
+    xs, ys = axis(names[0], x), axis(names[1], y)
     at = real_number("c1", c1), real_number("c2", c2)
     row = partial(_row, make_loop, xs, at)
     rows = sweep(row, ys.tolist(), executor=executor, progress=progress)

@@ -282,6 +282,14 @@ class _Line:
         return None
 
 
+def count_right_of(system: CharacteristicFunction, x: float, y: float, sigma: float) -> int:
+    """Count the roots right of a line Re s = sigma, in rad/s; below zero if it cannot be told.
+
+    Delays that do not act at these parameters, or that far to the right, are left out.
+    """
+    return _Line(system, x, y, sigma).count()
+
+
 def roots_right_of(
     system: CharacteristicFunction, x: float, y: float, sigma: float
 ) -> ComplexArray:
@@ -312,7 +320,7 @@ def roots_right_of(
     >>> from armlock import HayesEquation
     >>> from armlock.stability.roots import roots_right_of
     >>> len(roots_right_of(HayesEquation(tau=1.0), 0.0, -1.0, -3.0))
-    4
+    3
     """
     line = _Line(system, x, y, sigma)
     wanted = line.count()

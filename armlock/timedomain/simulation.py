@@ -831,8 +831,10 @@ class Simulation:
         some more than the next one will, which is `kept`.
         """
         past = max(self._past, self.history_samples, reach, kept + _SPARE)
-        if self._signals.shape[1] < past + self._block:
-            signals = np.zeros((2, past + self._block, self._signals.shape[2]))
+        shape = 2, past + self._block, self._signals.shape[2]
+        if self._signals.shape[1] < shape[1]:
+            check_memory("tau1 and tau2", shape, 8)
+            signals = np.zeros(shape)
             signals[:, past - self._past : past] = self._signals[:, : self._past]
             self._signals, self._past = signals, past
         if self.samples == 0:

@@ -1,22 +1,42 @@
 """Mend, in the finished pages, what a screen reader or a link would stumble over.
 
-The theme's switches that unfold a part of the contents have no name; docutils calls the
-bibliography a list without list items; the table of run times has a mark that many systems have
-no font for; and the links from a source file back to the reference name the package where the
-reference names the module.
+The theme's switches that unfold a part of the contents have no name, and its sidebar is no
+region of the page; docutils calls the bibliography a list without list items; the table of run
+times has a mark that many systems have no font for; images do not say how large they are; and
+the links from a source file back to the reference name the package where the reference names
+the module.
 """
 
 import re
+import struct
 from pathlib import Path
+from urllib.parse import unquote
 
 MENDED = {
     '<summary><span class="toctree-toggle"': (
         '<summary aria-label="Unfold the pages of this part"><span class="toctree-toggle"'
     ),
+    '<div id="pst-primary-sidebar" class=': (
+        '<div id="pst-primary-sidebar" role="complementary" aria-label="The book" class='
+    ),
     '<div role="list" class="citation-list">': '<div class="citation-list">',
     "✅": "ran",
 }
+IMAGE = re.compile(r'<img (?=[^>]*src="([^"#?:]+\.png)")(?![^>]*(?:width|loading)=)')
 BACK = re.compile(r'(class="viewcode-back" href="[^"#]+#)([^"]+)"')
+
+
+def sized(file, text):
+    """Give images their size, so that nothing jumps, and load them when they come into view."""
+
+    def tag(match):
+        image = file.parent / unquote(match[1])
+        if not image.is_file():
+            return match[0]
+        wide, high = struct.unpack(">2I", image.read_bytes()[16:24])
+        return f'<img width="{wide}" height="{high}" loading="lazy" '
+
+    return IMAGE.sub(tag, text)
 
 
 def mend(app, exception):
@@ -28,6 +48,9 @@ def mend(app, exception):
         before = text = file.read_text(encoding="utf-8")
         for old, new in MENDED.items():
             text = text.replace(old, new)
+        # What is printed must be there at once.
+        if app.builder.name == "html":
+            text = sized(file, text)
         parts = file.relative_to(app.outdir).with_suffix("").parts
         if parts[0] == "_modules":
             module = ".".join(parts[1:])

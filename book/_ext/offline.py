@@ -1,8 +1,10 @@
 """Let the book be read without any network, from a folder as well as from a server.
 
-Formulas: the package sphinx-mathjax-offline carries MathJax. Of its 24 MB, the pages need one
-script, the fonts, and the TeX extensions that the script loads when a formula asks for them;
-those are copied. The package's own Sphinx extension stays unused: it copies everything.
+Formulas: the package sphinx-mathjax-offline carries MathJax. Of its 24 MB, the pages need the
+parts that read TeX and set it, the fonts, and the TeX extensions that are loaded when a formula
+asks for them; those are copied. The package's own Sphinx extension stays unused: it copies
+everything. MathJax's menu stays away: it would make every formula a stop of the tab key. Screen
+readers have the formulas as MathML.
 
 The source maps of the theme's scripts, 3.5 MB, serve only those who develop it. They go, and so
 do the theme's fonts in the old format TrueType, 0.7 MB: the same ones are there as woff2, which
@@ -21,8 +23,10 @@ from pathlib import Path
 
 from sphinx_thebe import init_thebe_core, update_thebe_context
 
-SCRIPT = "mathjax/tex-mml-chtml.js"
-NEEDED = ["tex-mml-chtml.js", "output/chtml/fonts", "input/tex/extensions"]
+SCRIPT = "mathjax/startup.js"
+PARTS = ["core", "input/tex", "output/chtml", "a11y/assistive-mml"]
+NEEDED = ["startup.js", *[f"{part}.js" for part in PARTS]]
+NEEDED += ["output/chtml/fonts", "input/tex/extensions"]
 TRUETYPE = re.compile(r',url\([^)]*\.ttf\) format\("truetype"\)')
 # Packages that put files of their own into the pages. That of MathJax has no licence text:
 # book/_static/licenses holds it.
@@ -97,6 +101,7 @@ def setup(app):
     # A page may have formulas in the outputs of its cells only, which Sphinx does not see.
     app.set_html_assets_policy("always")
     app.config.mathjax_path = SCRIPT
+    app.config.mathjax3_config = {"loader": {"load": PARTS}}
     app.connect("config-inited", drop_thebe)
     app.connect("build-finished", copy_mathjax)
     app.connect("build-finished", copy_licenses)

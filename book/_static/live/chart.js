@@ -252,7 +252,7 @@ function armlockChart(api) {
   const crossing = (loop, omega) => crossingOf(new Lines(loop, false), omega);
 
   /* The D-curve in a window: [c1, c2, omega, ...], nan between parts, and the line of s = 0 as
-   * [a, b, c] with a c1 + b c2 = c, or null. For a picture: cut to a few pixels. */
+   * [a, b, c] with a (c1 - 1) + b (c2 - 1) = c, or null. For a picture: cut to a few pixels. */
   function dcurve(loop, x0, x1, y0, y1, most = 20000) {
     const lines = new Lines(loop, false), found = [], spot = omega => crossingOf(lines, omega);
     const wide = x1 - x0, high = y1 - y0, { longest } = loop;
@@ -283,7 +283,7 @@ function armlockChart(api) {
       p = q;
     }
     lines.sample(0);
-    const { base, m, o } = lines, line = [-m.lr, -o.lr, base.vr - m.lr - o.lr];
+    const { base, m, o } = lines, line = [-m.lr, -o.lr, base.vr];
     return { curve: Float64Array.from(found), line: line[0] || line[1] ? line : null };
   }
 

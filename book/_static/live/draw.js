@@ -275,8 +275,8 @@ const armlockDraw = (function () {
       pen.strokeStyle = colours.text;
       if (line) {
         const [a, b, c] = line, { x0, x1, y0, y1 } = this.box;
-        const ends = Math.abs(b) > Math.abs(a) ? [x0, x1].map(x => [x, 1 - (a * (x - 1) + c) / b])
-          : [y0, y1].map(y => [1 - (b * (y - 1) + c) / a, y]);
+        const ends = Math.abs(b) > Math.abs(a) ? [x0, x1].map(x => [x, 1 + (c - a * (x - 1)) / b])
+          : [y0, y1].map(y => [1 + (c - b * (y - 1)) / a, y]);
         pen.beginPath();
         ends.forEach(([x, y], k) => k ? pen.lineTo(px(x), py(y)) : pen.moveTo(px(x), py(y)));
         pen.stroke();
@@ -554,27 +554,35 @@ const armlockDraw = (function () {
     return i => [px(i), null];
   }
 
-  /* The loop in time: the laser's frequency after a step of its own, a round trip a line. */
+  /* The loop in time: the laser's frequency after a step of its own, a round trip a line. The scale
+   * is linear around zero and logarithmic beyond, so that step, echo and what is left are seen. */
   function drawTime({ values, step, trip, shown }, pen, wide, high, colours) {
     const left = 56, right = 8, top = 8, below = 46, span = wide - left - right;
     const n = Math.max(2, Math.min(values.length, shown)), whole = values.length;
-    let low = 0, most = 1;
+    let low = 0, most = 0, later = 0;
     for (let i = 0; i < whole; i++) {
       low = Math.min(low, values[i]);
       most = Math.max(most, values[i]);
+      if (i > whole / 2) later = Math.max(later, Math.abs(values[i]));
     }
-    const room = 0.06 * (most - low), high0 = high - top - below;
+    const largest = Math.max(most, -low), small = Math.min(Math.max(0.3 * later, 1e-6 * largest), largest);
+    const bent = v => Math.asinh(v / small), high0 = high - top - below;
+    const room = 0.06 * (bent(most) - bent(low)) || 1, first = bent(low) - room, last = bent(most) + room;
     const px = i => left + span * i / (whole - 1);
-    const py = v => top + high0 * (most + room - v) / (most - low + 2 * room);
+    const py = v => top + high0 * (last - bent(v)) / (last - first);
+    const decades = [0];
+    for (let k = Math.ceil(Math.log10(small)); k <= Math.log10(largest); k++)
+      decades.push(...[10 ** k, -(10 ** k)].filter(v => v <= most && v >= low));
     pen.textAlign = "right";
     pen.textBaseline = "middle";
     pen.strokeStyle = colours.grid;
-    for (const v of ticks(low, most, 4)) {
+    for (const v of decades) {
       pen.beginPath();
       pen.moveTo(left, py(v));
       pen.lineTo(wide - right, py(v));
       pen.stroke();
-      pen.fillText(say(+v.toPrecision(6)), left - 5, py(v));
+      const k = Math.round(Math.log10(Math.abs(v)));
+      pen.fillText(v ? `${v < 0 ? "\u2212" : ""}${k ? power(k) : 1}` : "0", left - 5, py(v));
     }
     pen.textAlign = "center";
     pen.textBaseline = "top";

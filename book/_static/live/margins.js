@@ -480,7 +480,7 @@ function armlockMargins(api) {
    * rad, infinity without a crossover, and `modulus`; each nan where it is not certain. */
   function margins(spec, c1, c2) {
     const loop = make(spec), begun = count(loop, c1, c2, { hidden: true, most: COUNTED });
-    let [lower, upper, most] = [NaN, NaN, 0];
+    let [lower, upper, most] = [NaN, NaN, LARGEST[0]];
     if (begun !== 0)
       return begun === UNSURE ? { lower, upper, most, phase: NaN, modulus: NaN } : null;
     for (most of LARGEST) {

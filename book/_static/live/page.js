@@ -58,7 +58,7 @@ function armlockPages() {
     "Single arm": [{ ...ARM, sensor: "single" }, 0, 3],
     "Common arm with a lead filter and a dead time": [{ ...ARM, sensor: "common", delay: 0.1,
       zeros: [[-0.02, 0]], poles: [[0, 0], [-0.1, 0]] }, 0, 1.5],
-    "The white paper's loop (modified dual)": [FLIGHT, 1, 2e-4],
+    "The white paper's loop (modified dual)": [FLIGHT, 1, 2e-3],
   };
   const SENSORS = [["single", "single arm"], ["common", "common arm"],
     ["difference", "difference of the arms"], ["dual", "dual"], ["modified", "modified dual"],
@@ -156,6 +156,8 @@ function armlockPages() {
       this.figure = element("div", { class: "live-chart", "data-check": "hover" },
         this.chart.canvas, this.out);
       this.lit = null;
+      // What a page does besides when loop or point are others.
+      this.told = () => {};
       this.plots = [
         ["Nyquist curve of L at the point, distances from 0 on a logarithmic scale; inset: around -1, "
           + "with the arc of the smallest phase at a crossover.", drawNyquist, 0.85],
@@ -249,6 +251,7 @@ function armlockPages() {
       this.follow(this.shown);
       this.redraw(moving);
       if (this.chart.marked) this.tell(this.chart.marked); else this.wait();
+      this.told();
     }
 
     /* Parameters as large as the view has them: their response shows the most. */
@@ -310,6 +313,7 @@ function armlockPages() {
         if (!error && count >= 0) this.root(point, this.out.textContent);
       });
       this.wait();
+      this.told();
     }
 
     root(point, before) {
@@ -514,10 +518,8 @@ function armlockPages() {
   function chapter(place) {
     const { live: name, centre, half } = place.dataset;
     const live = new Live(`${name}: number of unstable roots over c1 and c2.`);
-    place.replaceChildren(element("div", { class: "live-pair" },
-      element("div", {}, live.figure, legend(half), tools(live, name.toLowerCase().replace(/\W+/g, "-")),
-        live.note), element("div", { class: "live-beside" }, ...live.plots.map(plot => plot.canvas),
-        live.following)));
+    place.replaceChildren(element("div", { class: "live-one" }, live.figure, legend(half),
+      tools(live, name.toLowerCase().replace(/\W+/g, "-")), live.note), plots(live), live.following);
     live.chart.show([Number(centre), Number(centre)], Number(half));
     live.set(PRESETS[name][0]);
   }
@@ -533,9 +535,9 @@ function armlockPages() {
     const settle = live.settle.bind(live);
     live.settle = point => {
       settle(point);
-      code.textContent = python(live.spec, point);
       remember();
     };
+    live.told = () => { code.textContent = python(live.spec, live.shown); };
     const remember = () => {
       if (live.spec) history.replaceState(null, "", address(live.spec, live.chart, unit));
     };
@@ -580,12 +582,12 @@ function armlockPages() {
       return spec;
     };
 
-    const take = moving => {
+    const take = (moving = false, dragged = false) => {
       for (const name of Object.keys(errors)) blame(name, "");
       try {
         const spec = held();
         wrong.textContent = "";
-        if (!moving) follow(spec);
+        follow(spec, dragged);
         live.set(spec, moving);
       } catch (error) {
         const name = fields[error.field] ? error.field
@@ -596,10 +598,12 @@ function armlockPages() {
       }
     };
     /* Sliders and "Start from" follow what is there. */
-    const follow = spec => {
-      base = spec.gain;
-      gain.to(0);
-      dead.to(spec.delay);
+    const follow = (spec, dragged) => {
+      if (!dragged) {
+        base = spec.gain;
+        gain.to(0);
+        dead.to(spec.delay);
+      }
       const changed = chosen !== null && !same(spec, PRESETS[chosen][0]);
       state.textContent = chosen === null ? "from a link" : changed ? "changed" : "";
       reset.hidden = !changed;
@@ -672,14 +676,11 @@ function armlockPages() {
       });
     const gain = slider(id("factor"), "Drag the gain: times", -2, 2, 0, v => say(10 ** v), (v, moving) => {
       fields.gain.value = exact(+(base * 10 ** v).toPrecision(6));
-      const before = base;
-      take(moving);
-      // Let go, what is reached is where the next drag begins.
-      if (moving) base = before;
+      take(moving, true);
     });
     const dead = slider(id("dead"), "Drag the dead time:", 0, 1, 0, v => `${say(v)} s`, (v, moving) => {
       fields.delay.value = String(v);
-      take(moving);
+      take(moving, true);
     });
     const wrong = element("p", { class: "live-note live-wrong", role: "alert" });
     const form = element("form", { class: "live-form", onsubmit: event => event.preventDefault() },

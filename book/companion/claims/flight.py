@@ -29,7 +29,8 @@ from armlock.stability.counts import unstable_roots
 from armlock.timedomain.noise import LaserNoise
 from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, decide
-from book.companion.extremes import largest, smallest
+from book.companion.extremes import smallest
+from book.companion.transients import largest_answer
 
 stability = partial(ledger.claim, chapter="08a_flight")
 noise = partial(ledger.claim, chapter="08b_noise_and_pulling")
@@ -131,16 +132,9 @@ def density(source: str) -> Callable[[FloatArray], FloatArray]:
 
 @cache
 def largest_answers() -> FloatArray:
-    """Return the laser's largest answer to an error of the sum of 1 Hz, 1 Hz/s and 1 Hz/s^2.
-
-    From an hour to twenty days after it begins.
-    """
-    time = np.geomspace(3600.0, 20.0 * DAY, 1000)
-
-    def most(error: tuple[float, ...]) -> float:
-        return largest(lambda t: np.abs(pulling(LOOP, t, error)), time).value
-
-    return np.array([most(tuple(e)) for e in np.eye(3)])
+    """Return the laser's largest answer to an error of the sum of 1 Hz, 1 Hz/s and 1 Hz/s^2."""
+    errors = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+    return np.array([largest_answer(LOOP, "common", error)[1] for error in errors])
 
 
 def doppler_errors(laser: str, averaging: float = 200.0) -> tuple[float, float]:

@@ -1,0 +1,122 @@
+"""Take out of the finished pages' scripts and styles what no page uses.
+
+Icons: the theme ships 2 045 of them, 1.4 MB. Those stay whose name a page or a script names.
+Styles: a rule goes if each of its selectors asks for a class that occurs in no page and in no
+script; what a script puts together from parts would be missed, and `KEPT` names it. The live
+pages' scripts are shipped without comments and indentation.
+"""
+
+import re
+from pathlib import Path
+
+ICON = re.compile(
+    r'"?([a-z0-9-]+)"?:\[\d+,\d+,\[[^\]]*\],"[0-9a-f]+",(?:"[^"]*"|\[[^\]]*\])\](,?)'
+)
+ICON_NAME = re.compile(r"\bfa-([a-z0-9-]+)")
+CLASS = re.compile(r"\.(-?[A-Za-z_][\w-]*)")
+WORD = re.compile(r"[\w-]+")
+COMMENT = re.compile(r"(?m)^[ ]*(?:/\*(?:.|\n)*?\*/|//.*)\n")
+# Bootstrap joins these from parts.
+KEPT = (
+    "bs-",
+    "collapsing",
+    "show",
+    "fade",
+    "tooltip",
+    "popover",
+    "modal",
+    "dropdown",
+    "dropup",
+)
+
+
+def rules(text):
+    """Split a style sheet into (head, body), a body being text or the rules of a block."""
+    found, at = [], 0
+    while (brace := text.find("{", at)) >= 0:
+        head = text[at:brace]
+        # Statements such as @import end without a block.
+        *statements, head = head.split(";") if head.lstrip().startswith("@") else [head]
+        found += [(f"{statement};", None) for statement in statements]
+        depth, end = 1, brace + 1
+        while depth:
+            depth += {"{": 1, "}": -1}.get(text[end], 0)
+            end += 1
+        found.append((head, text[brace + 1 : end - 1]))
+        at = end
+    return [*found, (text[at:], None)]
+
+
+def thin(text, words):
+    """Return a style sheet without the rules that no page can match."""
+    kept = []
+    for head, body in rules(text):
+        name = head.strip()
+        if body is None:
+            kept.append(head)
+        elif name.startswith(("@media", "@supports", "@layer", "@container")):
+            inner = thin(body, words)
+            if inner.strip():
+                kept.append(f"{head}{{{inner}}}")
+        elif name.startswith("@"):
+            kept.append(f"{head}{{{body}}}")
+        else:
+            used = [one for one in selectors(name) if matches(one, words)]
+            if used:
+                kept.append(f"{','.join(used)}{{{body}}}")
+    return "".join(kept)
+
+
+def selectors(text):
+    """Split a list of selectors at its commas, but for those within brackets."""
+    found, depth, start = [], 0, 0
+    for at, letter in enumerate(text):
+        depth += {"(": 1, "[": 1, ")": -1, "]": -1}.get(letter, 0)
+        if letter == "," and depth == 0:
+            found.append(text[start:at])
+            start = at + 1
+    return [*found, text[start:]]
+
+
+def matches(selector, words):
+    """Whether all classes that a selector asks for occur somewhere; those in brackets do."""
+    bare = re.sub(r"\[[^\]]*\]|:(?:not|is|where|has)\((?:[^()]|\([^()]*\))*\)", "", selector)
+    names = CLASS.findall(bare.replace("\\", ""))
+    return all(name in words or name.startswith(KEPT) for name in names)
+
+
+def lean(app, exception):
+    """Thin out the scripts and styles of the built pages."""
+    if exception is not None or app.builder.format != "html":
+        return
+    out = Path(app.outdir)
+    static = out / "_static"
+    icons = static / "scripts" / "fontawesome.js"
+    pages = [file.read_text(encoding="utf-8") for file in out.rglob("*.html")]
+    scripts = [
+        file.read_text(encoding="utf-8")
+        for file in static.rglob("*.js")
+        if file != icons and "mathjax" not in file.parts
+    ]
+    styles = {file: file.read_text(encoding="utf-8") for file in static.rglob("*.css")}
+    if icons.is_file():
+        used = {name for text in [*pages, *scripts] for name in ICON_NAME.findall(text)}
+        text = icons.read_text(encoding="utf-8")
+        icons.write_text(
+            ICON.sub(lambda icon: icon[0] if icon[1] in used else "", text).replace(",}", "}"),
+            encoding="utf-8",
+        )
+    words = {word for text in [*pages, *scripts] for word in WORD.findall(text)}
+    for file, text in styles.items():
+        bare = re.sub(r"/\*(?!!)(?:.|\n)*?\*/", "", text)
+        file.write_text(thin(bare, words), encoding="utf-8")
+    for file in (static / "live").glob("*.js"):
+        text = COMMENT.sub("", file.read_text(encoding="utf-8"))
+        file.write_text(re.sub(r"(?m)^[ ]+", "", text), encoding="utf-8")
+
+
+def setup(app):
+    """Register with Sphinx."""
+    # After what else mends the pages.
+    app.connect("build-finished", lean, priority=900)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
