@@ -496,3 +496,25 @@ def test_what_a_function_of_time_returns_is_checked():
     ):
         with pytest.raises((TypeError, ValueError), match=rf"^tau1\(t\), .* must .*{message}"):
             simulate(SLOW, np.ones(100), sample_rate=20.0, tau1=wrong)
+
+
+def test_a_jump_is_refused_between_two_blocks_too():
+    jump = np.where(np.arange(BLOCK + 10) < BLOCK, 2.0, 2.5)
+    with pytest.raises(
+        ValueError, match=r"^tau1 must change by .* got 2\.5 s at t = 3276\.8 s"
+    ):
+        simulate(SLOW, np.zeros(jump.size), sample_rate=20.0, tau1=jump)
+
+
+def test_no_run_and_no_call_reaches_back_past_the_history():
+    """Whichever run's arm is the longest, and however little has been computed since."""
+    begins = (
+        r"^tau1 must not reach back past the history, which begins at t = -2\.5 s, got 2\.6 s"
+    )
+    call = partial(simulate, SLOW, sample_rate=20.0, history=np.zeros(50))
+    with pytest.raises(ValueError, match=begins):
+        call(np.ones((2, 9)), tau1=lambda t: np.outer([2.0, 2.6], np.ones(t.size)))
+    run = Simulation(SLOW, 20.0, history=np.zeros(50))
+    run.advance([1.0])
+    with pytest.raises(ValueError, match=rf"{begins} at t = 0\.05 s"):
+        run.advance([1.0], tau1=2.6)
