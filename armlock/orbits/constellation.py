@@ -522,3 +522,6 @@ def _interpolated(
         first = np.max(trips, axis=0)
     span = (float(first[0]), float(t[-1]))
     return Constellation(epoch, scale, span, error, (paths[0], paths[1], paths[2]))
+
+
+__all__ = ["Constellation", "from_table", "kepler", "read_oem", "read_table"]
