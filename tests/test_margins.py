@@ -263,10 +263,10 @@ def test_counts_contradict_gains_between_which_the_loop_is_not_stable():
     """As they do where rounding hides a crossing."""
     point = LoopAt(paper_loop(), 1.0, 1.0)
     lower, upper, _ = gains.gain_interval(*point)
-    gains._require_stable_inside(point, lower, upper)
+    gains._require_stable_inside(point, lower, upper, is_null=False)
     for low, high in ((0.99 * lower, upper), (lower, 1.01 * upper)):
         with pytest.raises(CountError, match="rounding hides a crossing"):
-            gains._require_stable_inside(point, low, high)
+            gains._require_stable_inside(point, low, high, is_null=True)
 
 
 @pytest.mark.parametrize("name", STABLE)

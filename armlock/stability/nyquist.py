@@ -348,8 +348,8 @@ def axis_crossings(
     Notes
     -----
     Zeros of Im L at omega > 0, found with certified steps: none is missed, however close to
-    another. Where rounding may hide one they are refused, but next to a null, below 1e-3. Where
-    L(0) is finite the whole curve also meets the axis there.
+    another. Where rounding may hide one they are refused, but next to a null of L, and where
+    |L| is below 1e-3. Where L(0) is finite the whole curve also meets the axis there.
 
     Examples
     --------
@@ -376,7 +376,8 @@ def axis_crossings(
     crossing, measure = point.numerator().times_conjugate(below), below.times_conjugate(below)
     zeros = axis_zeros(crossing, [(0.0, omega_max)], measure)
     inside = zeros.omega > 0.0
-    hidden = inside & zeros.hidden & ~(zeros.position - zeros.spread > -_SMALL)
+    # A stretch that L = 0 may lie in is taken for a null, next to which L is small.
+    hidden = inside & zeros.hidden & ~(zeros.position + zeros.spread > -_SMALL)
     if hidden.any():
         raise CountError(
             f"no crossings at (c1, c2) = ({c1}, {c2}): rounding hides some around "
