@@ -89,7 +89,7 @@ def test_sources_of_ones_own_join_or_replace_the_others():
     assert [line.get_label() for line in lines[:5]] == [*SOURCES, "mine"]
     assert lines[0].get_alpha() == 0.5
     with pytest.raises(AttributeError):
-        LEVELS.shot = 1.0
+        LEVELS.shot = 1.0  # type: ignore[misc]
     for sources, why in (
         ({"laser": 1.0}, r"^sources must not hold 'laser'"),
         ({"mine": [1.0, 2.0]}, r"^sources\['mine'\] must be one number or hold one a freq"),

@@ -152,3 +152,14 @@ def test_a_steep_low_pass_far_above_changes_no_crossing():
     found = margins(loop, 0.9, 0.9)
     assert found.phase == pytest.approx(plain.phase, rel=1e-3)
     assert found.delay == pytest.approx(plain.delay, rel=1e-3)
+
+
+@pytest.mark.parametrize("gain", [0.1, 0.3])
+def test_where_the_straight_edge_ends_a_root_passes_zero(gain):
+    # Along c1 = c2 the root of D at s = 0 is not the loop's; past c1 = c2 = 2 another one is.
+    loop = DualArm(gain=gain)
+    edge = first_crossing(loop, (0.5, 0.5), (1.0, 1.0), stop=10.0)
+    assert edge[1:] == (0.0, 1)
+    assert abs(edge.position - 1.5) < 1e-12
+    c = np.array([1.999, 2.001])
+    assert unstable_roots(loop, c - 1e-6, c + 1e-6).tolist() == [0, 2]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -110,13 +111,16 @@ def test_what_takes_too_long_is_not_drawn_as_decided():
     region = stability_region(make, [1.0, 1e8], [0.0, 5e-9], c1=0.5)
     assert region.verdicts.tolist() == [[0, 0], [0, -1]]
     (image,) = region.plot(plt.figure().add_subplot()).images
-    assert np.ma.getmaskarray(image.get_array()).tolist() == [[False, False], [False, True]]
+    drawn: Any = np.ma.asarray(image.get_array())
+    assert np.ma.getmaskarray(drawn).tolist() == [[False, False], [False, True]]
 
 
 def test_a_function_that_makes_no_loop_is_refused():
+    hayes: Any = lambda gain, tau: HayesEquation(tau)  # noqa: E731
+    nothing: Any = lambda: SingleArm()  # noqa: E731
     with pytest.raises(TypeError, match=r"^loop must be a Loop"):
-        stability_region(lambda gain, tau: HayesEquation(tau), [1.0], [1.0])
+        stability_region(hayes, [1.0], [1.0])
     with pytest.raises(TypeError, match=r"^make_loop must take two arguments"):
-        stability_region(lambda: SingleArm(), [1.0], [1.0])
+        stability_region(nothing, [1.0], [1.0])
     with pytest.raises(TypeError, match=r"^make_loop must take two arguments"):
         stability_region(partial(make, dead_time=0.0), [1.0], [1.0])

@@ -139,12 +139,12 @@ def test_a_frequency_at_which_the_direction_has_no_effect_is_no_crossing(order):
 def test_slow_poles_that_rounding_scatters_have_no_spectral_radius(point):
     # Dense eigenvalues give 1.00002; the exact map has none beyond 1 + 1e-9.
     loop = paper_loop(actuator=True)
-    eigenvalues = np.linalg.eigvals(transition_matrix(loop, *point, 0.1))
+    eigenvalues = np.linalg.eigvals(transition_matrix(loop, point[0], point[1], 0.1))
     assert np.abs(eigenvalues).max() > 1.0 + 1e-5
     with pytest.raises(
         CountError, match=r"^no spectral radius at \(c1, c2\) = .* do not confirm the 1"
     ):
-        spectral_radius(loop, *point, 0.1)
+        spectral_radius(loop, point[0], point[1], 0.1)
 
 
 def test_parameters_at_which_eigenvalues_are_lost_are_refused():
@@ -160,7 +160,7 @@ def test_a_radius_is_that_of_the_map_in_many_digits_or_refused(seed):
     loop = Loop(((), poles, gain), [SINGLE, COMMON][seed % 2], 1.0, 0.75)
     point = tuple(random.uniform(-1.2, 1.2, 2).tolist())
     try:
-        radius = float(spectral_radius(loop, *point, 0.25))
+        radius = float(spectral_radius(loop, point[0], point[1], 0.25))
     except CountError:
         assert np.abs(poles).min() < 1e-2
         return

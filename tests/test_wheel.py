@@ -30,7 +30,11 @@ def test_the_wheel_holds_the_package_only(built):
     assert held == there
     name = next(name for name in wheel.namelist() if name.endswith("/METADATA"))
     metadata = wheel.read(name).decode()
-    assert re.findall(r"^Provides-Extra: (.*)", metadata, re.MULTILINE) == ["book", "cluster"]
+    assert re.findall(r"^Provides-Extra: (.*)", metadata, re.MULTILINE) == [
+        "book",
+        "cluster",
+        "tdi",
+    ]
     assert not re.search(r"\]\((?!https?:)", metadata)
 
 

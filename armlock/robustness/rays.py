@@ -22,7 +22,7 @@ from numpy.polynomial import polynomial as poly
 from armlock.axis.exponentials import EPSILON
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import ComplexArray, FloatArray, IntArray, axis, positive_number
-from armlock.loops import Loop, LoopAt
+from armlock.loops import Loop, LoopAt, power_series
 from armlock.robustness.free_phases import (
     FIRST_TURNS,
     crossing_intervals,
@@ -181,12 +181,8 @@ class Ray:
         result: ComplexArray = np.where(acts, value / np.where(acts, effect, 1.0), np.nan)
         return result
 
-    def crossings(self, stop: float, intervals: npt.ArrayLike | None = None) -> Crossings:
-        """Find all crossings with 0 < t <= stop.
-
-        With `intervals` of the axis, in rad/s and of shape (n, 2), only those whose frequency
-        lies in them.
-        """
+    def crossings(self, stop: float) -> Crossings:
+        """Find all crossings with 0 < t <= stop."""
         end = self.end(stop)
         if end == np.inf:
             raise ValueError(
@@ -195,13 +191,13 @@ class Ray:
             )
         if not self.acts():
             return _NONE
-        parts = [(0.0, end)] if intervals is None else np.minimum(intervals, end)
-        found, hidden = self._crossings(parts, stop)
-        if intervals is None:
-            self._confirm(found, hidden, stop)
-        elif hidden.size:
-            # Counts know all frequencies: they cannot tell what crosses in these.
-            raise self._hides(stop, f"where t = {hidden.tolist()}")
+        found, hidden = self._crossings([(0.0, end)], stop)
+        known = self.through_zero()
+        if known.position.size and known.position[0] <= stop:
+            order = np.argsort(np.append(found.position, known.position), kind="stable")
+            pairs = zip(found, known, strict=True)
+            found = Crossings(*(np.concatenate(pair)[order] for pair in pairs))
+        self._confirm(found, hidden, stop)
         return found
 
     def _crossings(
@@ -277,6 +273,34 @@ class Ray:
         )
         return loop_count(self.system, c1, c2)
 
+    def through_zero(self) -> Crossings:
+        """Find where a root of the loop passes s = 0 although L loses factors of s all along.
+
+        Of D(s; t) = sum_k (p_k + t q_k) s^k the first terms vanish for all t, and with them the
+        walk's D0 / M at s = 0. The loop's own root passes where the first that is left does,
+        at t = -p_k / q_k.
+        """
+        if not isinstance(self.system, Loop):
+            return _NONE
+        number = int(np.flatnonzero(self.system.rest)[0]) + 1
+        begin = [Fraction(value) for value in self.start.tolist()]
+        end = [a + Fraction(d) for a, d in zip(begin, self.direction.tolist(), strict=True)]
+        here, there = (
+            [sum(pair) for pair in zip(*power_series(self.system, x, y, number), strict=True)]
+            for x, y in (begin, end)
+        )
+        cancelled = next((k for k in range(number) if here[k] or there[k]), 0)
+        p, q = here[cancelled], there[cancelled] - here[cancelled]
+        if cancelled == 0 or q == 0 or -p / q <= 0:
+            return _NONE
+        t = float(-p / q)
+        (_, before), (_, after) = (self.count_beside(t, side, 1e-9) for side in (-1, 1))
+        if min(before, after) < 0:
+            raise self._hides(t, "where a root passes s = 0")
+        if before == after:
+            return _NONE
+        return Crossings(np.array([t]), np.zeros(1), np.array([after - before]))
+
     def count_beside(self, t: float, side: int, nearest: float) -> tuple[float, int]:
         """Count the unstable roots next to a point of the ray.
 
@@ -318,6 +342,9 @@ class Ray:
         best = Crossing(chain, np.inf, 0) if chain <= stop else Crossing(np.inf, np.nan, 0)
         if not self.acts():
             return best
+        known = self.through_zero()
+        if known.position.size and known.position[0] <= min(stop, best.position):
+            best = Crossing(*(values[0].item() for values in known))
         hidden, per_turn = [np.empty((0, 2))], self.system.omega_per_turn
 
         def reach() -> float:
