@@ -130,6 +130,13 @@ class Polynomial(NamedTuple):
             value, slope = value * (s - root), slope * (s - root) + value
         return value, slope
 
+    def without_zeros(self, number: int) -> Polynomial:
+        """Return p(s) / s^number, for as many roots that are exactly zero."""
+        others = np.concatenate(
+            (self.roots[self.roots == 0.0][number:], self.roots[self.roots != 0.0])
+        )
+        return Polynomial(self.coefficients[number:], others, self.leads, self.missed)
+
     def over(self, other: Polynomial, s: ComplexArray) -> ComplexArray:
         """Evaluate p(s) / q(s), factor by factor."""
         lead = float(self.coefficients[-1] / other.coefficients[-1])
@@ -354,6 +361,40 @@ def _in_range(values: ComplexArray) -> bool:
     """Whether products of four such values are floats, zeros left out."""
     sizes = np.abs(values[values != 0.0])
     return bool(((sizes > 1e-70) & (sizes < 1e70)).all())
+
+
+def conjugates_without_zeros(
+    whole: ExponentialSum, *others: ExponentialSum
+) -> tuple[ExponentialSum, ...]:
+    """Return `others` times the conjugate of M / omega^2m, and |M|^2 / omega^2m.
+
+    M is `whole`, and 2m as many roots as its polynomials have at s = 0, up to an odd one. The
+    signs of the imaginary parts and the quotients N / M = N conj(M) / |M|^2 are those without
+    the division; but next to s = 0 M vanishes to a high order, and rounding would hide both.
+    """
+    used = np.flatnonzero(np.any(whole.weights, axis=0) | (whole.sums != 0.0))
+    zeros = [int((whole.polynomials[k].roots == 0.0).sum()) for k in used]
+    m = min(zeros, default=0) // 2
+    if m == 0:
+        return *(one.times_conjugate(whole) for one in others), whole.times_conjugate(whole)
+    number = len(whole.polynomials)
+    short = [whole.polynomials[k].without_zeros(2 * m) for k in used]
+    half = [whole.polynomials[k].without_zeros(m) for k in used]
+    polynomials = (*whole.polynomials, *short, *half)
+
+    def placed(one: ExponentialSum, at: IntArray, factor: float, to: int) -> ExponentialSum:
+        weights = np.zeros((one.phases.size, len(polynomials)))
+        sums = np.zeros(len(polynomials))
+        weights[:, to : to + at.size] = factor * one.weights[:, at]
+        sums[to : to + at.size] = factor * one.sums[at]
+        return ExponentialSum(polynomials, weights, one.phases, sums)
+
+    every = np.arange(number)
+    # (j omega)^2m is (-1)^m omega^2m, and s^m times its conjugate is omega^2m.
+    divided = placed(whole, used, (-1.0) ** m, number)
+    root = placed(whole, used, 1.0, number + used.size)
+    products = (placed(one, every, 1.0, 0).times_conjugate(divided) for one in others)
+    return *products, root.times_conjugate(root)
 
 
 def without_unused(*sums: ExponentialSum) -> tuple[ExponentialSum, ...]:

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
-from armlock.axis.exponentials import EPSILON
+from armlock.axis.exponentials import EPSILON, conjugates_without_zeros
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import ComplexArray, FloatArray, IntArray, axis, positive_number
 from armlock.loops import Loop, LoopAt, power_series
@@ -109,11 +109,10 @@ class Ray:
             raise ValueError("direction must not have length zero, got (0, 0)")
         #: The t at which the distance from the start is the start's from zero, or one.
         self.scale = max(1.0, float(np.hypot(*self.start))) / float(np.hypot(*self.direction))
-        #: D0 conj(M) at s = j omega.
-        effect = system.deviation(*self.direction)
-        self.product = system.sum_at(*self.start).times_conjugate(effect)
-        #: |M|^2 there.
-        self.square = effect.times_conjugate(effect)
+        #: D0 conj(M) and |M|^2 at s = j omega, over the power of omega that both have.
+        self.product, self.square = conjugates_without_zeros(
+            system.deviation(*self.direction), system.sum_at(*self.start)
+        )
 
     def at(self, t: float) -> tuple[float, float]:
         """Return the point start + t direction."""

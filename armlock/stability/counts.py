@@ -32,6 +32,7 @@ from armlock.axis.exponentials import (
     ROUNDING,
     ExponentialSum,
     aligned,
+    conjugates_without_zeros,
     evaluate,
     expand,
     without_unused,
@@ -612,9 +613,7 @@ def _fill(
     at_reference = constant._replace(
         sums=system.rest_on_boundary(rows=True).sums + x0 * b1.sums
     )
-    fixed, varying, square = without_unused(
-        at_reference.times_conjugate(b1), b2.times_conjugate(b1), b1.times_conjugate(b1)
-    )
+    fixed, varying, square = without_unused(*conjugates_without_zeros(b1, at_reference, b2))
     ends = last_frequency(system, np.maximum(np.abs(lower), np.abs(upper)), y)
     # A row that is nowhere confined has nothing to count.
     ends = np.where(np.isfinite(ends), ends, 0.0)
