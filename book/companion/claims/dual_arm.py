@@ -463,8 +463,9 @@ def edges_against_gain() -> Finding:
         "exponent with which the distance from (1, 1) to the straight edge's upper end falls "
         "with g, from $10⁴$ rad/s on",
         f"Along $c₁ = c₂$ the upper edge is at {1 + corner[0]:.3g} for $g = {GAINS[0]:g}$: a "
-        "real root passes there, whatever the gain. Later it moves inwards at every step, through "
-        f"{1 + edges(DUAL_ARM_GAIN).corner:.4f} at $g = 10$ to 1 + {corner[-1]:.3g} at the "
+        "real root passes there, whatever the gain. Later it moves inwards at every step, "
+        f"through {1 + edges(DUAL_ARM_GAIN).corner:.4f} at $g = 10$ to "
+        f"1 + {corner[-1]:.3g} at the "
         "highest gain. The line $c₁ = c₂$ is the same for every g.",
     )
 
