@@ -3,7 +3,8 @@
 Usage: python -m tools.print_book SINGLEHTML BOOK
 
 SINGLEHTML is what Sphinx's builder of this name has made, BOOK the folder of the built HTML,
-which gets the file armlock.pdf, and a link to it at the foot of each page. Chromium prints.
+which gets the file armlock.pdf, a link to it at the foot of each page, and sheet.pdf, the page to
+pin to the wall. Chromium prints.
 """
 
 import os
@@ -13,6 +14,7 @@ from pathlib import Path
 from tools.check_browser import TYPESET, browser, find_chromium
 
 NAME = "armlock.pdf"
+SHEET = "notebooks/13_sheet.html"
 FOOT = "Code: MIT License.</p>"
 NUMBER = (
     '<div style="width: 100%; font-size: 8px; text-align: center"><span class="pageNumber">'
@@ -95,6 +97,8 @@ def main() -> int:
     page_file = single / "book.html"
     page_file.write_text(source.read_text().replace("../_static/", "_static/"))
     broken = print_pdf(page_file, source.stem, book / NAME)
+    if (book / SHEET).exists():
+        print_pdf(book / SHEET, source.stem, book / "sheet.pdf")
     for href in sorted(set(broken)):
         print(f"{NAME}: a reference leads nowhere: {href}")
     for page in book.rglob("*.html"):
