@@ -3,8 +3,8 @@
 Usage: python -m tools.print_book SINGLEHTML BOOK
 
 SINGLEHTML is what Sphinx's builder of this name has made, BOOK the folder of the built HTML,
-which gets the file armlock.pdf, a link to it at the foot of each page, and sheet.pdf, the page to
-pin to the wall. Chromium prints.
+which gets the file armlock.pdf, a link to it at the foot of each page, and sheet.pdf, the page
+to pin to the wall. Chromium prints.
 """
 
 import os

@@ -191,8 +191,8 @@ class Ray:
         if not self.acts():
             return _NONE
         found, hidden = self._crossings([(0.0, end)], stop)
-        known = self.through_zero()
-        if known.position.size and known.position[0] <= stop:
+        known = self.through_zero(stop)
+        if known.position.size:
             order = np.argsort(np.append(found.position, known.position), kind="stable")
             pairs = zip(found, known, strict=True)
             found = Crossings(*(np.concatenate(pair)[order] for pair in pairs))
@@ -272,8 +272,8 @@ class Ray:
         )
         return loop_count(self.system, c1, c2)
 
-    def through_zero(self) -> Crossings:
-        """Find where a root of the loop passes s = 0 although L loses factors of s all along.
+    def through_zero(self, stop: float) -> Crossings:
+        """Find where, up to `stop`, a root of the loop passes s = 0 though s cancels all along.
 
         Of D(s; t) = sum_k (p_k + t q_k) s^k the first terms vanish for all t, and with them the
         walk's D0 / M at s = 0. The loop's own root passes where the first that is left does,
@@ -290,7 +290,7 @@ class Ray:
         )
         cancelled = next((k for k in range(number) if here[k] or there[k]), 0)
         p, q = here[cancelled], there[cancelled] - here[cancelled]
-        if cancelled == 0 or q == 0 or -p / q <= 0:
+        if cancelled == 0 or q == 0 or not 0 < -p / q <= stop:
             return _NONE
         t = float(-p / q)
         (_, before), (_, after) = (self.count_beside(t, side, 1e-9) for side in (-1, 1))
@@ -341,8 +341,8 @@ class Ray:
         best = Crossing(chain, np.inf, 0) if chain <= stop else Crossing(np.inf, np.nan, 0)
         if not self.acts():
             return best
-        known = self.through_zero()
-        if known.position.size and known.position[0] <= min(stop, best.position):
+        known = self.through_zero(min(stop, best.position))
+        if known.position.size:
             best = Crossing(*(values[0].item() for values in known))
         hidden, per_turn = [np.empty((0, 2))], self.system.omega_per_turn
 
