@@ -6,8 +6,8 @@ Every script, style sheet, font, image, frame and other part that a page loads b
 be a file in the folder, and must exist. Links that a reader may follow can lead anywhere,
 but those that stay within the book must lead to a page that exists.
 
-The book, of twenty-one chapters, is to stay below 30 MB, and a figure's SVG below 2 MB: dense curves are rasterised in
-it. What each page weighs is checked in a browser.
+The book, of twenty-one chapters, is to stay below 30 MB, and a figure's SVG below 2 MB: dense
+curves are rasterised in it. What each page weighs is checked in a browser.
 """
 
 import re
