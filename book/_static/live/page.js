@@ -431,10 +431,11 @@ function armlockPages() {
 
   function legend(half) {
     const colour = (text, name) =>
-      element("span", { class: "live-key" }, element("i", { class: `live-${name}` }), text);
-    const found = element("p", { class: "live-note" }, colour("stable", "stable"),
-      colour("unstable, stronger with more roots", "unstable"), colour("chain lost", "lost"),
-      colour("not sure", "unsure"), "curve: a root on the axis, from low frequency (blue) to high "
+      element("span", { class: "live-key" }, element("i", { class: name }), text);
+    const found = element("p", { class: "live-note" }, colour("stable", "live-stable"),
+      colour("unstable, stronger with more roots", "live-unstable"),
+      colour("chain lost", "live-lost"),
+      colour("not sure", "live-unsure"), "curve: a root on the axis, from low frequency (blue) to high "
       + "(yellow); + the ideal point (1, 1)");
     if (half < 1e-4)
       found.append("; square: the paper\u2019s perturbations; dot: first to break along (1, \u22121)");
