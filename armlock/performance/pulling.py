@@ -17,14 +17,12 @@ from armlock.checks import ComplexArray, FloatArray, axis, positive_array, posit
 from armlock.loops import Loop, checked_loop
 from armlock.performance.transfer import transfer
 from armlock.stability.counts import UNCONFINED, CountError, loop_count
-from armlock.stability.roots import RootError, roots_right_of, roots_up_to
+from armlock.stability.roots import RootError, roots_right_of
 
 # What is left out has decayed by so many powers of e at the earliest time: to 1e-4.
 _DECAYED = math.log(1e4)
 # So much further left a line is tried once more, where a root lies on the first.
 _ASIDE = 1.03
-# Turns of the longest delay up to which roots are taken that are not certified.
-_LINES = 600.0
 # Points on the circle around s = 0 from which the Laurent coefficients there are taken.
 _CIRCLE = 64
 # Highest order of a pole at s = 0.
@@ -36,8 +34,6 @@ def pulling(
     time: npt.ArrayLike,
     common: Sequence[float] = (1.0, 0.0, 0.0),
     differential: Sequence[float] = (0.0, 0.0, 0.0),
-    *,
-    certified: bool = True,
 ) -> FloatArray:
     r"""Compute how a stable loop's laser follows Doppler errors that begin at time zero.
 
@@ -58,10 +54,6 @@ def pulling(
     common, differential : sequence of three floats, optional
         nu0 in Hz, gamma in Hz/s and alpha in Hz/s^2 of the sum and of the difference of the two
         arms' errors. An error of arm 1 alone is the same in both.
-    certified : bool, optional
-        If False, the roots up to 600 turns of the longest delay are summed up, as far as they
-        are found, and nothing says how much is left out: what changes fast, and steps of the
-        echoes. It is for times that are refused otherwise.
 
     Returns
     -------
@@ -107,10 +99,9 @@ def pulling(
     errors = {source: _error(source, values) for source, values in given.items()}
     for source, error in errors.items():
         if error.any():
-            roots = slow_roots(loop, rate) if certified else _lines(loop)
+            roots = slow_roots(loop, rate)
             # No root that is not among them lies closer to s = 0.
-            nearest = rate if certified else 1e-3 / loop.longest_delay
-            nearest = min(float(np.abs(roots).min(initial=nearest)), nearest)
+            nearest = float(np.abs(roots).min(initial=rate))
             total += _residues(loop, t, roots, nearest, source, error)
     return total
 
@@ -162,12 +153,6 @@ def slow_roots(loop: Loop, rate: float) -> ComplexArray:
     raise CountError(
         f"no pulling from {_DECAYED / rate:.3g} s on: {last}", np.array([[1.0, 1.0]])
     )
-
-
-@lru_cache(maxsize=16)
-def _lines(loop: Loop) -> ComplexArray:
-    """Find roots up to `_LINES` turns of the longest delay; none is certified."""
-    return roots_up_to(loop, 1.0, 1.0, _LINES)
 
 
 def _circle(nearest: float) -> ComplexArray:
