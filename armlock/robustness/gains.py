@@ -32,7 +32,7 @@ from armlock.stability.counts import axis_zeros, loop_count
 #: Gain factors up to this, and down to one over it, are looked at.
 LARGEST_GAIN = 1e6
 #: Next to a null of L only up to this, if none is found. A passive L passes its null along a
-#: tangent to the real axis: up to a share sqrt(EPSILON) of its terms it is then as good as real.
+#: tangent to the real axis: at sqrt(EPSILON) of its terms it is then as good as real.
 LARGEST_NEXT_TO_A_NULL = 1e4
 # So close to the limits of the neutral root chain, as a share, no gain factors are looked for.
 _NEXT_TO_THE_CHAIN = 1e-5
