@@ -27,6 +27,7 @@ from tests.live_numbers import (
     UNSURE,
     compare,
     described,
+    draw,
     draw_any,
     open_engine,
 )
@@ -55,10 +56,13 @@ EQUAL = {**DUAL, "tau1": 3.39, "tau2": 3.39, "difference": 0.2}
 
 
 def test_no_number_of_a_hundred_loops_drawn_anew_differs(page):
-    """Those of `python -m tests.live_numbers --seed ...`, which draws more."""
+    """Those of `python -m tests.live_numbers --seed ...`, which draws more, and slow ones."""
     seed = secrets.randbits(32)
     print("seed", seed)
-    found = compare(page, 100, seed)
+    rng = np.random.default_rng(seed)
+    cases = (draw(rng) for _ in range(100))
+    # The paper's loop with its actuator takes 5 s in the page.
+    found = compare(page, (c for c in cases if 0.0 not in c[0].poles or len(c[0].poles) < 6))
     assert found.wrong == []
     # Few refusals, and something to compare.
     assert found.unsure.total() < 0.05 * found.asked.total()
@@ -66,10 +70,10 @@ def test_no_number_of_a_hundred_loops_drawn_anew_differs(page):
 
 
 #: Loops and points of each kind. A browser takes 70 ms for the paper's loop with its actuator.
-PAIRS = {draw_any: 2000, draw_paper: 300, draw_arm: 2700}
+PAIRS = {draw_any: 1000, draw_paper: 100, draw_arm: 900}
 
 
-def test_no_count_of_5000_differs_off_the_boundary(page):
+def test_no_count_of_2000_differs_off_the_boundary(page):
     """The walks share no code: other polynomials, other bounds, another end of the axis."""
     rng = np.random.default_rng(20260)
     cases, counts = [], []
@@ -96,9 +100,9 @@ def test_no_count_of_5000_differs_off_the_boundary(page):
     assert [(cases[k], hers[k], ours[k]) for k in differs] == []
     # Where one of the two says that it cannot tell, the other may be able to.
     assert ((hers == UNSURE) | ((hers == BOUNDARY) & (ours != BOUNDARY))).mean() < 0.01
-    assert len(cases) >= 4990
+    assert len(cases) >= 1990
     # All kinds are among them.
-    assert min((ours == 0).sum(), (ours > 0).sum(), (ours == UNCONFINED).sum()) > 100
+    assert min((ours == 0).sum(), (ours > 0).sum(), (ours == UNCONFINED).sum()) > 50
 
 
 @pytest.mark.parametrize(
@@ -152,7 +156,7 @@ def test_root_and_count_at_2000_places_of_the_chapters_do_not_contradict(
     counts = unstable_roots(loop, *points.T)
     assert [count for count, _ in told] == counts.tolist()
     shown = np.array([root is not None for _, root in told])
-    assert shown.mean() > 0.7
+    assert shown.mean() >= 0.95
     hers = np.array([complex(*root) if root else np.nan for _, root in told])
     assert ((hers.real > 0) == (counts > 0))[shown].all()
     some = np.flatnonzero(shown)[:20]
@@ -197,7 +201,7 @@ def test_a_sensor_of_ones_own_is_the_one_it_repeats(page):
     k, m, points = (
         loop.controller,
         loop.mapping,
-        [(1.02, 0.98), (0.999, 1.0), (1.0, 1.0 - 1e-6)],
+        [(1.02, 0.98), (1.0, 1.0 - 1e-6)],
     )
     flight = {
         "sensor": "modified", "tau1": loop.tau1, "tau2": loop.tau2, "delay": loop.delay,
