@@ -101,11 +101,12 @@ class CharacteristicFunction:
 
     Examples
     --------
-    An oscillator with two delayed forces, x'' + 0.2 x' + x = x1 x(t - 1) + x2 x(t - 2):
+    An oscillator with two delayed forces, x'' + 0.2 x' + x = x1 x(t - 1) + x2 x(t - 2). The
+    reference is (0, 0), so that R is A:
 
     >>> from armlock import CharacteristicFunction, unstable_roots
-    >>> a, b1, b2 = [1.0, 0.2, 1.0], [1.0], [1.0]
-    >>> forced = CharacteristicFunction(a, b1, b2, tau1=1.0, tau2=2.0)
+    >>> rest, b1, b2 = [1.0, 0.2, 1.0], [1.0], [1.0]
+    >>> forced = CharacteristicFunction(rest, b1, b2, tau1=1.0, tau2=2.0)
     >>> unstable_roots(forced, [0.1, -0.5], 0.05)
     array([0, 2])
     """

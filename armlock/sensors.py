@@ -153,7 +153,8 @@ def modified_dual(
         F_C &= \frac{p_b}{z_b\, \bar\tau}\, \frac{s + z_b}{s\, (s + p_b)} , \quad
         F_D = \frac{s^4}{(s + p_c)(s + p_d)(s + p_e)^2}
 
-    with :math:`z_b = 2\pi \cdot 5 / (13 \bar\tau)`,
+    with the mean delay :math:`\bar\tau`, half the delays' difference :math:`\Delta\tau`,
+    :math:`z_b = 2\pi \cdot 5 / (13 \bar\tau)`,
     :math:`p_b = 2\pi \cdot 5 / (2 \bar\tau)`, :math:`p_c = 7 / (5 \bar\tau)`,
     :math:`p_d = 11 / (20 \bar\tau)` and :math:`p_e = 2\pi / (90 \bar\tau)`.
 
