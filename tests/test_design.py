@@ -133,7 +133,9 @@ def test_a_stable_start_is_seen_and_the_constraint_that_is_missed_is_named(gain)
     if gain == 3.0:
         assert design(start, "suppression", bounds).measures["phase"] > bounds["phase"]
     else:
-        with pytest.raises(ValueError, match=r"the best candidate has phase 0\.\d+ rad in place"):
+        with pytest.raises(
+            ValueError, match=r"the best candidate has phase 0\.\d+ rad in place"
+        ):
             design(start, "suppression", bounds)
 
 

@@ -441,7 +441,8 @@ def robust() -> Finding:
         decide(critical_perturbation(LOOP, (1.0, -1.0)) > PERTURBATION and modulus > 0.0),
         modulus,
         "smallest modulus margin, $|1 + L|$, over a grid of the box of perturbations",
-        f"It is met at $(1 {c1 - 1.0:+.0e}, 1 {c2 - 1.0:+.0e})$, where the phase margin is "
+        "Stable over the box, with $Δτ = τ₁ - τ₂$ (claim K5). The smallest is met at "
+        f"$(1 {c1 - 1.0:+.0e}, 1 {c2 - 1.0:+.0e})$, where the phase margin is "
         f"{np.degrees(left.phase):.1f} degrees and the gain may change by factors from "
         f"{left.gain_lower:.3f} to {left.gain_upper:.3f}. Margins against other changes, of "
         "the delay for instance, are claim K14.",

@@ -641,8 +641,8 @@ def convention_of_difference() -> Finding:
         decide(abs(ratio - 1.0) < 1e-6, corrected=lines[0] == lines[1]),
         ratio,
         "weight of the integrated difference in Table I over that of Sec. III.B",
-        "Table I is right for half the difference of the round trips, as in the work that it "
-        "cites (claims T2 and T3); the loop takes the whole one, as it says, and so do we: one "
-        "letter for two quantities. The straight edge is the same for "
+        "One letter stands for two quantities: Table I needs half the difference of the round "
+        "trips, as in the work that it cites (claims T2 and T3), and Sec. III.B defines the "
+        "whole. For the loop we take that of Sec. III.B. The straight edge is the same for "
         f"both; at $g = 10$ it ends at {1 + one.corner:.4f} or {1 + other.corner:.4f}.",
     )
