@@ -212,3 +212,11 @@ def test_what_cannot_be_searched_is_refused(changes, message):
     }
     with pytest.raises(ValueError, match=message):
         design(**arguments | changes)
+
+
+def test_an_objective_that_presses_against_the_box_stays_within_it():
+    """The best loops lie at its edge; some are stable in its corners and not on the way."""
+    found = design(robust_loop(), "suppression", {"phase": np.radians(40.0)})
+    assert found.measures["phase"] > np.radians(40.0)
+    assert found.measures["suppression"] > 0.0
+    assert not found.counts.any()
