@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 from functools import cached_property
+from types import SimpleNamespace
 from typing import Any, NoReturn, Self
 
 import numpy as np
@@ -221,6 +222,17 @@ class CharacteristicFunction:
         return type(self)(**{**self._arguments, **changes})
 
     __replace__ = replace
+
+    @property
+    def __dataclass_fields__(self) -> NoReturn:
+        """Say what to write in place of `dataclasses.replace`, which reads this first."""
+        raise AttributeError(
+            f"a {type(self).__name__} is no dataclass: make another one with its method "
+            f"replace, for instance replace({next(reversed(self._arguments))}=...)"
+        )
+
+    # What `pprint` reads of all that have the former.
+    __dataclass_params__ = SimpleNamespace(repr=False)
 
     def plain(self) -> CharacteristicFunction:
         """Return D alone, with the arguments of `CharacteristicFunction`."""

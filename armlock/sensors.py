@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -190,7 +191,12 @@ def modified_dual(
         raise ValueError(
             "half_difference must not be zero: the modified dual sensor divides by it"
         )
-    w0 = positive_number("corner", corner)
+    return _modified_dual(mean, half, positive_number("corner", corner))
+
+
+@lru_cache
+def _modified_dual(mean: float, half: float, w0: float) -> SignalMapping:
+    """Multiply the sensor's polynomials out: loops of one sensor are made by the thousand."""
     zb, pb = 2.0 * np.pi * 5.0 / (13.0 * mean), 2.0 * np.pi * 5.0 / (2.0 * mean)
     pc, pd, pe = 7.0 / (5.0 * mean), 11.0 / (20.0 * mean), 2.0 * np.pi / (90.0 * mean)
     s = poly.Polynomial([0.0, 1.0])
