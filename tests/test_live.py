@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import re
 import secrets
-import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -27,6 +26,7 @@ from armlock import (
 from armlock.orbits.passages import DAY, MONTH
 from armlock.sensors import COMMON as COMMON_SENSOR
 from book._ext import year
+from book._ext.lean import shortened
 from book.companion import orbits
 from tests.attack import draw_arm, draw_paper, to_loop
 from tests.live_numbers import (
@@ -64,18 +64,18 @@ PAPER, COMMON, DUAL = (
 EQUAL = {**DUAL, "tau1": 3.39, "tau2": 3.39, "difference": 0.2}
 
 
-def test_no_number_of_a_hundred_loops_drawn_anew_differs(page):
+def test_no_number_of_sixty_loops_drawn_anew_differs(page):
     """Those of `python -m tests.live_numbers --seed ...`, which draws more, and slow ones."""
     seed = secrets.randbits(32)
     print("seed", seed)
     rng = np.random.default_rng(seed)
-    cases = (draw(rng) for _ in range(100))
+    cases = (draw(rng) for _ in range(60))
     # The paper's loop with its actuator takes 5 s in the page.
     found = compare(page, (c for c in cases if 0.0 not in c[0].poles or len(c[0].poles) < 6))
     assert found.wrong == []
     # Few refusals, and something to compare.
     assert found.unsure.total() < 0.05 * found.asked.total()
-    assert min(found.asked["phase"], found.asked["root"]) >= 20
+    assert min(found.asked["phase"], found.asked["root"]) >= 10
 
 
 #: Loops and points of each kind. A browser takes 70 ms for the paper's loop with its actuator.
@@ -580,8 +580,12 @@ def test_a_finger_drags_the_view_and_taps_the_point(chromium, tmp_path):
 
 
 def test_the_year_marks_the_days_on_which_the_package_finds_no_stable_loop(chromium, tmp_path):
-    shutil.copytree(LIVE, tmp_path / "live")
-    (tmp_path / "live" / "orbits.js").write_text(year.table())
+    live = tmp_path / "live"
+    live.mkdir()
+    for file in LIVE.glob("*.js"):
+        (live / file.name).write_text(shortened(file.read_text()))
+    (live / "orbits.js").write_text(year.table())
+    assert sum(file.stat().st_size for file in live.iterdir()) <= 120_000
     page = tmp_path / "page.html"
     page.write_text(
         "<!DOCTYPE html><main><div data-live='year'></div><script src='live/page.js'></script>"

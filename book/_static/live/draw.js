@@ -163,13 +163,16 @@ const armlockDraw = (function () {
       let largest = 1;
       for (const count of counts) if (count > largest) largest = count;
       const picture = element("canvas", { width: n, height: n }), image = new ImageData(n, n);
+      // Of each count its colour as one number, the lowest byte first.
+      const packed = ([r, g, b]) => 0xff000000 + (Math.round(b) << 16) + (Math.round(g) << 8) + Math.round(r);
+      const shades = Array.from({ length: largest + 1 }, (_, count) => packed(count === 0 ? colours.stable
+        : colours.few.map((v, m) => v + Math.sqrt(count / largest) * (colours.many[m] - v))));
+      const [lost, unsure] = [packed(colours.lost), colours.unsure.map(packed)];
+      const pixels = new Uint32Array(image.data.buffer);
       for (let j = 0; j < n; j++) for (let i = 0; i < n; i++) {
-        const count = counts[j * n + i], t = Math.sqrt(count / largest), k = 4 * ((n - 1 - j) * n + i);
-        const colour = count === -3 ? colours.unsure[(i + j) * 100 / n % 8 < 4 ? 0 : 1]
-          : count === -2 ? colours.lost : count === -1 ? [0, 0, 0] : count === 0 ? colours.stable
-            : colours.few.map((v, m) => v + t * (colours.many[m] - v));
-        image.data.set(colour, k);
-        image.data[k + 3] = 255;
+        const count = counts[j * n + i];
+        pixels[(n - 1 - j) * n + i] = count >= 0 ? shades[count] : count === -2 ? lost
+          : unsure[(i + j) * 100 / n % 8 < 4 ? 0 : 1];
       }
       picture.getContext("2d").putImageData(image, 0, 0);
       this.picture = { picture, dark: colours.dark };
@@ -397,10 +400,16 @@ const armlockDraw = (function () {
     }
   }
 
-  /* A line through n places. */
+  /* A line through n places. One that is no farther than half a pixel from the one before goes. */
   function curve(pen, n, place) {
+    let u = Infinity, v = Infinity;
     pen.beginPath();
-    for (let i = 0; i < n; i++) pen.lineTo(...place(i));
+    for (let i = 0; i < n; i++) {
+      const [x, y] = place(i);
+      if (Math.abs(x - u) + Math.abs(y - v) < 0.5 && i < n - 1) continue;
+      pen.lineTo(x, y);
+      [u, v] = [x, y];
+    }
     pen.stroke();
   }
 

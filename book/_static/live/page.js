@@ -94,7 +94,7 @@ function armlockPages() {
     return ({ data: { kind, version, input } }) => {
       let result = null, error = null;
       try { result = look[kind.split(" ")[0]](...input); } catch (problem) { error = problem.message; }
-      postMessage({ kind, version, result, error });
+      postMessage({ kind, version, result, error }, result?.counts ? [result.counts.buffer] : []);
     };
   }
 
@@ -372,6 +372,7 @@ function armlockPages() {
       if (!this.spec) return;
       const name = this.chart.name(point);
       this.near.drop("root");
+      clearTimeout(this.asked);
       this.shown = point;
       // What is told of a point is not told of another; the critical perturbation stays.
       for (const one of [this.design, this.pinned]) if (one) {
@@ -380,15 +381,13 @@ function armlockPages() {
       }
       this.follow(point);
       this.out.textContent = `${name}: counting \u2026`;
-      this.list();
+      if (!this.empty) this.list();
       this.near.ask("point", [this.spec, ...point], (count, error) => {
         this.out.textContent = error || `${name}: ${counted(count)}`;
-        if (count > -3) {
-          this.design.told.count = count;
-          this.list();
-          for (const plot of this.plots) plot.draw();
-        }
-        if (!error && count >= 0) this.root(point, this.out.textContent);
+        if (count > -3) this.design.told.count = count;
+        // What is left of the noise is drawn of stable loops only.
+        if (this.laser && count) this.plots.at(-1).draw();
+        if (!error && count >= 0) this.asked = setTimeout(() => this.root(point, this.out.textContent), 60);
       });
       this.wait();
       this.told();
@@ -411,6 +410,7 @@ function armlockPages() {
     }
 
     settle(point) {
+      this.list();
       for (const one of [this.design, this.pinned]) for (const kind of one ? TOLD : []) {
         if (one.told[kind] !== undefined || kind === "breaks" && one.breaking) continue;
         one.breaking ||= kind === "breaks";
@@ -428,6 +428,7 @@ function armlockPages() {
     /* The numbers of the loop, and of the pinned one beside it. */
     list() {
       if (!this.numbers.isConnected) return;
+      this.empty = !this.design || this.design.told.count === undefined;
       const designs = [this.design, this.pinned].filter(one => one), wait = "\u2026";
       const where = this.chart.marked ? this.chart.name(this.shown) : "(1, 1)";
       const or = (value, special, words) => Number.isNaN(value) ? "not sure"
