@@ -43,6 +43,9 @@ MEASURES = (
     "phase_in_corners",
     "unity_gain",
 )
+# The units of those that have one.
+_UNITS = {"suppression": " dB", "unity_gain": " Hz"}
+_UNITS |= dict.fromkeys(("phase", "phase_in_corners"), " rad")
 # The centre of the box and its corners, as seen from there.
 _POINTS = np.vstack((np.zeros(2), CORNERS))
 # Along which the critical perturbation is taken.
@@ -204,8 +207,8 @@ def _checked_bounds(objective: str, constraints: Mapping[str, float]) -> dict[st
         raise ValueError(f"objective must not be among constraints, got {objective!r} in both")
     bounds = {name: real_number(name, bound) for name, bound in constraints.items()}
     for name in ("phase", "phase_in_corners"):
-        if bounds.get(name, 0.0) > math.pi:
-            raise ValueError(f"{name} must be at most pi, in rad, got {bounds[name]}")
+        if not 0.0 <= bounds.get(name, 0.0) <= math.pi:
+            raise ValueError(f"{name} must lie from 0 to pi, in rad, got {bounds[name]}")
     return bounds
 
 
@@ -433,7 +436,7 @@ def _certified(
 def _require(bounds: Mapping[str, float], found: Mapping[str, float]) -> None:
     """Raise if a bound is missed, and say by how much."""
     missed = [
-        f"{name} {found[name]:.6g} in place of {bound:.6g}"
+        f"{name} {found[name]:.6g}{_UNITS.get(name, '')} in place of {bound:.6g}"
         for name, bound in bounds.items()
         if _missing(name, found[name], bound) > 0.0
     ]

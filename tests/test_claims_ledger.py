@@ -65,7 +65,7 @@ def test_formulas_are_typeset_and_claims_linked():
         assert f'<a href="09_ledger.html#ledger-{name}">{name}</a>' in text
 
 
-def test_tables_hold_verdict_number_and_note(calls):
+def test_a_terminal_shows_all_and_a_chapter_the_verdict(calls):
     ledger = check("X1")
     assert "reproduced: 1.52 (s). it is so" in repr(ledger)
     html = ledger._repr_html_()

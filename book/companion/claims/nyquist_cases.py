@@ -299,7 +299,7 @@ def common_arm_alike() -> Finding:
         threshold,
         r"$c₂ - 1$ from which on the curve crosses the negative real axis near $2\pi$ over the "
         "mean delay",
-        "The branch is as in the single arm. But the two delays never complete a turn "
+        "The branch is as in the single arm. But below 10 Hz the two delays complete no turn "
         f"together: the ideal curve passes below the origin at a distance of {miss:.1e}, and a "
         f"perturbation of {PERTURBATION:g} leaves it on that side.",
     )
