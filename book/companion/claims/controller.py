@@ -21,6 +21,7 @@ from armlock.paper import (
     TAU2,
 )
 from armlock.performance.budget import noise_budget
+from armlock.performance.pulling import largest_pulling
 from armlock.performance.transfer import transfer
 from armlock.robustness.margins import critical_perturbation, margins, modulus_margin
 from armlock.stability.counts import stability_chart, unstable_roots
@@ -29,7 +30,6 @@ from armlock.stability.roots import rightmost_root
 from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 from book.companion.extremes import largest, smallest
-from book.companion.transients import largest_answer
 
 claim = partial(ledger.claim, chapter="06_controller")
 TURN = 2.0 * np.pi
@@ -538,7 +538,7 @@ def like_anti_pulling() -> Finding:
     zeros = [sum(abs(z) == 0.0 for z in one.zeros) for one in (here, there)]
     slowest = [min(abs(p) for p in one.poles) for one in (here, there)]
     ratio = float(slowest[0] / slowest[1])
-    at, pulled = largest_answer(LOOP, "differential")
+    peak = largest_pulling(LOOP, "differential")
     return Finding(
         decide(min(zeros) >= 2, 0.5 < ratio < 2.0),
         ratio,
@@ -546,7 +546,7 @@ def like_anti_pulling() -> Finding:
         f"Stage I has {zeros[0]} zeros at $s = 0$, the white paper's controller {zeros[1]}. "
         "Similar is the form and not what it does here: the paper's sensor integrates the "
         f"difference of the arms, and an error of 1 Hz in it pulls the laser by "
-        f"{pulled:.2g} Hz within {at / 86400.0:.1f} days.",
+        f"{peak.size:.2g} Hz within {peak.time / 86400.0:.1f} days.",
     )
 
 
