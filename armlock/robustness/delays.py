@@ -24,8 +24,8 @@ from numpy.polynomial import polynomial as poly
 from armlock.axis.exponentials import EPSILON
 from armlock.checks import BoolArray, ComplexArray, FloatArray, real_number
 from armlock.loops import Loop, checked_loop
+from armlock.robustness.regions import is_stable
 from armlock.stability.bounds import last_frequency
-from armlock.stability.regions import is_stable
 
 # Rectangles at the start, how often they are halved, and how many are looked at, at most.
 _STRIPS, _HALVINGS, _RECTANGLES = 200, 120, 2_000_000
