@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import threading
@@ -132,6 +133,14 @@ def late(kind, numbers, latest=LATEST):
     finally:
         signal.signal(signal.SIGPROF, before)
     return found
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled():
+    """Compile first: that takes longer, once."""
+    for ask in asked(np.random.default_rng(0), paper_loop(), (1.0, 1.0)).values():
+        with contextlib.suppress(*REFUSED):
+            ask()
 
 
 @pytest.mark.parametrize("kind", list(KINDS))
