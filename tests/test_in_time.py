@@ -30,7 +30,7 @@ from armlock import (
 )
 from armlock.loops import LoopAt
 from armlock.performance.pulling import pulling
-from armlock.robustness import box_counts, distances, first_crossing, gain_interval
+from armlock.robustness import box_counts, first_crossing, gain_interval
 from armlock.robustness.rays import Ray
 from tests import attack
 from tests.attack_judge import Sketch, UndecidedError
@@ -150,9 +150,7 @@ def test_every_question_is_answered_or_refused_in_time(kind):
 
 LONG = {
     "crossings": lambda: Ray(CommonArm(1e5), (0.1, 0.2), (1.0, 0.9)).crossings(1.0),
-    "distances": lambda: distances.smallest_distances(
-        LoopAt(CommonArm(1e5), 0.7, 0.9), disk=True
-    ),
+    "modulus": lambda: modulus.smallest_distances(LoopAt(CommonArm(1e5), 0.7, 0.9), disk=True),
     "free phases": lambda: margins(paper_loop(), free_above=1e308),
     "samples": lambda: nyquist(CommonArm(3e4), 0.7, 0.9),
     "a box": lambda: box_counts(CommonArm(1e5), 0.3),
