@@ -372,7 +372,9 @@ def conjugates_without_zeros(
     signs of the imaginary parts and the quotients N / M = N conj(M) / |M|^2 are those without
     the division; but next to s = 0 M vanishes to a high order, and rounding would hide both.
     """
-    used = np.flatnonzero(np.any(whole.weights, axis=0) | (whole.sums != 0.0))
+    # An arm that the sensor does not use has the polynomial zero.
+    there = np.array([p.coefficients.any() for p in whole.polynomials])
+    used = np.flatnonzero(there & (np.any(whole.weights, axis=0) | (whole.sums != 0.0)))
     zeros = [int((whole.polynomials[k].roots == 0.0).sum()) for k in used]
     m = min(zeros, default=0) // 2
     if m == 0:

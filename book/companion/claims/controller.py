@@ -21,6 +21,7 @@ from armlock.paper import (
     TAU2,
 )
 from armlock.performance.budget import noise_budget
+from armlock.performance.pulling import largest_pulling
 from armlock.performance.transfer import transfer
 from armlock.robustness.margins import critical_perturbation, margins, modulus_margin
 from armlock.stability.counts import stability_chart, unstable_roots
@@ -29,7 +30,6 @@ from armlock.stability.roots import rightmost_root
 from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 from book.companion.extremes import largest, smallest
-from book.companion.transients import largest_answer
 
 claim = partial(ledger.claim, chapter="06_controller")
 TURN = 2.0 * np.pi
@@ -441,7 +441,8 @@ def robust() -> Finding:
         decide(critical_perturbation(LOOP, (1.0, -1.0)) > PERTURBATION and modulus > 0.0),
         modulus,
         "smallest modulus margin, $|1 + L|$, over a grid of the box of perturbations",
-        f"It is met at $(1 {c1 - 1.0:+.0e}, 1 {c2 - 1.0:+.0e})$, where the phase margin is "
+        "Stable over the box, with $Δτ = τ₁ - τ₂$ (claim K5). The smallest is met at "
+        f"$(1 {c1 - 1.0:+.0e}, 1 {c2 - 1.0:+.0e})$, where the phase margin is "
         f"{np.degrees(left.phase):.1f} degrees and the gain may change by factors from "
         f"{left.gain_lower:.3f} to {left.gain_upper:.3f}. Margins against other changes, of "
         "the delay for instance, are claim K14.",
@@ -476,24 +477,24 @@ def which_open_loop() -> Finding:
 @claim(
     "K14",
     place="Introduction, last paragraph but two",
-    says="A loop needs margins for what the modules around it do; the paper's own is tried.",
-    pinned=(Verdict.IN_PART, 0.0, 0.0),
+    says="A loop needs margins for the perturbations that the modules around it make.",
+    pinned=(Verdict.REPRODUCED, 0.0, 0.0),
     printed="crucial to be designed with adequate stability margins to tolerate parameter "
     "perturbations arising from inter-module interactions",
 )
 def margins_left() -> Finding:
-    """Take the margins at (1, 1), that against further delay included."""
+    """Take the margins at (1, 1); that against further delay is a remark on the loop."""
     nominal = margins(LOOP)
     delay = 5e-3
     growth = rightmost_root(paper_loop(delay=delay), 1.0, 1.0).real
     return Finding(
-        decide(nominal.gain_lower < 1.0 < nominal.gain_upper, nominal.delay > 0.0),
+        decide(nominal.gain_lower < 1.0 < nominal.gain_upper),
         nominal.delay,
         "delay margin in s at $c₁ = c₂ = 1$: the further loop delay that the loop tolerates",
-        "The paper states this as an aim, and claims nothing of its own loop there. Its gain "
-        f"may change by factors from {nominal.gain_lower:.3f} to {nominal.gain_upper:.2f}; but "
-        "it does not roll off, and any further delay, of which the paper says nothing, makes "
-        "it unstable at high frequency. A delay δ "
+        "The paper means perturbations of parameters, and its loop has a margin for them: its "
+        f"gain may change by factors from {nominal.gain_lower:.3f} to {nominal.gain_upper:.2f}."
+        " Of delays the paper does not speak; but its loop does not roll off, and any further "
+        "delay makes it unstable at high frequency. A delay δ "
         rf"grows by a factor e in about $δ/\ln(2g) = δ/{np.log(2.0 * CONTROLLER_GAIN):.1f}$, "
         f"with {1e3 * delay:g} ms (a sample at 200 Hz) in {1e3 / growth:.2g} ms.",
     )
@@ -537,7 +538,7 @@ def like_anti_pulling() -> Finding:
     zeros = [sum(abs(z) == 0.0 for z in one.zeros) for one in (here, there)]
     slowest = [min(abs(p) for p in one.poles) for one in (here, there)]
     ratio = float(slowest[0] / slowest[1])
-    at, pulled = largest_answer(LOOP, "differential")
+    peak = largest_pulling(LOOP, "differential")
     return Finding(
         decide(min(zeros) >= 2, 0.5 < ratio < 2.0),
         ratio,
@@ -545,7 +546,7 @@ def like_anti_pulling() -> Finding:
         f"Stage I has {zeros[0]} zeros at $s = 0$, the white paper's controller {zeros[1]}. "
         "Similar is the form and not what it does here: the paper's sensor integrates the "
         f"difference of the arms, and an error of 1 Hz in it pulls the laser by "
-        f"{pulled:.2g} Hz within {at / 86400.0:.1f} days.",
+        f"{peak.size:.2g} Hz within {peak.time / 86400.0:.1f} days.",
     )
 
 
