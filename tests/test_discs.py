@@ -8,7 +8,7 @@ import numpy as np
 
 from armlock import Loop
 from armlock.loops import LoopAt
-from armlock.robustness import discs
+from armlock.robustness import discs, modulus
 from armlock.robustness.free_phases import arms_of
 from armlock.sensors import COMMON, DIFFERENCE, dual
 from tests.attack import between, roots

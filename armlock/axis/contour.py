@@ -110,7 +110,10 @@ def heard(walk: Callable[..., Any], *arguments: Any, most: int = MOST_STEPS) -> 
         found = walk(*arguments, min(most, _FEW_STEPS), stop)
     except SystemError as error:
         # What numba makes of an interrupt that it meets while it packs its results.
-        raise (error.__cause__ or error) from None
+        cause: BaseException = error
+        while isinstance(cause, SystemError) and cause.__cause__ is not None:
+            cause = cause.__cause__
+        raise cause from None
     if found[-1] or most <= _FEW_STEPS:
         return found
     with ThreadPoolExecutor(1) as pool:
