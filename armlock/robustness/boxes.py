@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from armlock.axis.contour import winding
+from armlock.axis.contour import heard, winding
 from armlock.checks import IntArray, positive_number
 from armlock.loops import Loop, LoopAt, checked_loop
 from armlock.robustness.free_phases import clear_above, count_at
@@ -101,5 +101,5 @@ def _stays_clear(loop: Loop, c1: float, c2: float, half: float, highest: float) 
     whole, (_, b1, b2) = loop.sum_at(c1, c2), loop.on_boundary()
     # The centre is a rounded number itself.
     uncertain = (half + 1e-15) * (np.abs(b1.sums) + np.abs(b2.sums))
-    argument, _, clear = winding(whole.compiled(), uncertain, 0.0, end)
-    return bool(clear) and not math.isnan(argument)
+    _, _, clear, _ = heard(winding, whole.compiled(), uncertain, 0.0, end)
+    return bool(clear)
