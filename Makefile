@@ -47,7 +47,7 @@ NOTEBOOKS := $(wildcard notebooks/*.ipynb)
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help env book pdf browser same lab test claims attack mutants bench dist print serve lint format strip lock clean distclean always
+.PHONY: help env book pdf browser same lab test claims attack bench dist print serve lint format strip lock clean distclean always
 
 help: ## List the targets
 	@echo "armlock: make TARGET, where TARGET is one of"
@@ -207,9 +207,6 @@ claims: $(PACKAGE_READY) ## Check every claim; print the ledger, write it as CSV
 
 attack: $(PACKAGE_READY) ## Hold margins, counts and roots of random loops against brute force
 	$(PY) -m tests.attack
-
-mutants: $(PACKAGE_READY) ## Change a module at random, list what no test notices (MODULE=dcurve)
-	$(PY) tools/mutants.py $(MODULE)
 
 bench: $(PACKAGE_READY) ## Measure speed and memory, and print a table
 	$(PY) -m benchmarks

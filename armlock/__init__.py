@@ -20,7 +20,15 @@ from armlock.loops import (
     robust_loop,
 )
 from armlock.performance import NoiseBudget, noise_budget, pulling, transfer
-from armlock.robustness import Margins, critical_perturbation, margins, modulus_margin
+from armlock.robustness import (
+    Margins,
+    StabilityRegion,
+    critical_perturbation,
+    is_stable,
+    margins,
+    modulus_margin,
+    stability_region,
+)
 from armlock.stability import (
     BOUNDARY,
     UNCONFINED,
@@ -29,18 +37,15 @@ from armlock.stability import (
     NyquistCurve,
     RootError,
     StabilityChart,
-    StabilityRegion,
     axis_crossings,
     d_curve,
     d_curve_branches,
     d_curve_line,
-    is_stable,
     nyquist,
     rightmost_root,
     semi_discretization,
     spectral_radius,
     stability_chart,
-    stability_region,
     transition_matrix,
     unstable_roots,
 )

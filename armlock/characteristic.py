@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 from functools import cached_property
+from types import SimpleNamespace
 from typing import Any, NoReturn, Self
 
 import numpy as np
@@ -101,11 +102,12 @@ class CharacteristicFunction:
 
     Examples
     --------
-    An oscillator with two delayed forces, x'' + 0.2 x' + x = x1 x(t - 1) + x2 x(t - 2):
+    An oscillator with two delayed forces, x'' + 0.2 x' + x = x1 x(t - 1) + x2 x(t - 2). The
+    reference is (0, 0), so that R is A:
 
     >>> from armlock import CharacteristicFunction, unstable_roots
-    >>> a, b1, b2 = [1.0, 0.2, 1.0], [1.0], [1.0]
-    >>> forced = CharacteristicFunction(a, b1, b2, tau1=1.0, tau2=2.0)
+    >>> rest, b1, b2 = [1.0, 0.2, 1.0], [1.0], [1.0]
+    >>> forced = CharacteristicFunction(rest, b1, b2, tau1=1.0, tau2=2.0)
     >>> unstable_roots(forced, [0.1, -0.5], 0.05)
     array([0, 2])
     """
@@ -220,6 +222,17 @@ class CharacteristicFunction:
         return type(self)(**{**self._arguments, **changes})
 
     __replace__ = replace
+
+    @property
+    def __dataclass_fields__(self) -> NoReturn:
+        """Say what to write in place of `dataclasses.replace`, which reads this first."""
+        raise AttributeError(
+            f"a {type(self).__name__} is no dataclass: make another one with its method "
+            f"replace, for instance replace({next(reversed(self._arguments))}=...)"
+        )
+
+    # What `pprint` reads of all that have the former.
+    __dataclass_params__ = SimpleNamespace(repr=False)
 
     def plain(self) -> CharacteristicFunction:
         """Return D alone, with the arguments of `CharacteristicFunction`."""

@@ -29,6 +29,7 @@ from armlock.checks import (
     FloatArray,
     axis,
     complex_array,
+    one_of,
     positive_array,
     positive_number,
     real_number,
@@ -299,7 +300,9 @@ class Loop(CharacteristicFunction):
 
         omega = axis("omega", positive_array("omega", omega))
         c1, c2 = real_number("c1", c1), real_number("c2", c2)
-        return control.frd(self.open_loop(1j * omega, c1, c2), omega)
+        response = self.open_loop(1j * omega, c1, c2)
+        # Its plots need a name.
+        return control.frd(response, omega, sysname=type(self).__name__)
 
     def bode(
         self,
@@ -337,6 +340,8 @@ def _mapping_and_tau2(
             f"mapping must be a SignalMapping, for instance armlock.sensors.COMMON, or a name "
             f"such as 'common', got {mapping!r}"
         )
+    if isinstance(mapping, str):
+        one_of("mapping", mapping, sensors.NAMES)
     if mapping == "single" or (
         isinstance(mapping, SignalMapping) and not any(mapping.numerator2)
     ):

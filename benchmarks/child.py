@@ -49,17 +49,5 @@ def peak_memory() -> int:
         for line in status.read_text().splitlines():
             if line.startswith("VmHWM:"):
                 return int(line.split()[1]) * 1024
-    return _largest(resource.RUSAGE_SELF)
-
-
-def peak_memory_of_children() -> int:
-    """Return the most resident memory of any process that this one has waited for, in bytes.
-
-    Those that its children have waited for count as well.
-    """
-    return _largest(resource.RUSAGE_CHILDREN)
-
-
-def _largest(who: int) -> int:
-    peak = resource.getrusage(who).ru_maxrss
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak if sys.platform == "darwin" else peak * 1024

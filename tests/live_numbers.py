@@ -11,6 +11,7 @@ part in a thousand that the page says; what the page says it cannot tell is coun
 from __future__ import annotations
 
 import argparse
+import itertools
 import math
 import secrets
 from collections import Counter
@@ -20,16 +21,17 @@ from pathlib import Path
 import numpy as np
 
 from armlock import CountError, critical_perturbation, margins, rightmost_root, unstable_roots
+from book._ext.lean import shortened
 from tests import attack_judge as judge
 from tests.attack import between, draw_arm, draw_delays, draw_paper, draw_point, roots, to_loop
 from tests.attack_judge import Sketch, View
 
 LIVE = Path(__file__).parents[1] / "book" / "_static" / "live"
 #: The engine's files. Each function takes what those before it return.
-ENGINE = ("loop.js", "margins.js", "chart.js")
+ENGINE = ("loop.js", "margins.js", "chart.js", "noise.js")
 LOAD = """() => {
     window.live = armlockLoop();
-    Object.assign(live, armlockMargins(live), armlockChart(live));
+    Object.assign(live, armlockMargins(live), armlockChart(live), armlockNoise(live));
 }"""
 #: What a count in a browser is where it is no number of roots, as `loop.js` has it.
 BOUNDARY, UNCONFINED, UNSURE = -1, -2, -3
@@ -52,10 +54,10 @@ ASK = """cases => cases.map(([spec, c1, c2]) => {
 
 
 def open_engine(chromium):
-    """A page with the engine, and nothing else."""
+    """A page with the engine as it is shipped, and nothing else."""
     page = chromium.new_page()
     for name in ENGINE:
-        page.add_script_tag(path=LIVE / name)
+        page.add_script_tag(content=shortened((LIVE / name).read_text()))
     page.evaluate(LOAD)
     return page
 
@@ -170,6 +172,18 @@ class Comparison:
             self.refused[name] += 1
             return error
 
+    def one_has_none(self, name, case, hers, ours):
+        """Whether nothing can be compared: an unstable loop has no such number, in both."""
+        if isinstance(ours, Exception):
+            unstable = isinstance(ours, ValueError)
+            shown = hers.values() if isinstance(hers, dict) else [hers]
+            if unstable and not {None, "nan"} & {str(v).lower() if v else v for v in shown}:
+                self.wrong.append((name, case, hers, ours))
+            return True
+        if hers is None:
+            self.wrong.append((name, case, hers, ours))
+        return hers is None
+
     def compare(self, sketch, point, page):
         """Hold all that the page says of a loop against the package."""
         loop, case = to_loop(sketch), (sketch, point)
@@ -180,26 +194,20 @@ class Comparison:
                 self.unsure["count"] += 1
             elif count not in (page["count"], BOUNDARY):
                 self.wrong.append(("count", case, page["count"], int(count)))
-        if page["root"]:
+        if page["count"] >= 0:
             root = self.package("root", rightmost_root, loop, *point)
             if not isinstance(root, Exception):
-                self.number("root", case, page["root"][0], complex(root).real)
+                hers = page["root"][0] if page["root"] else math.nan
+                self.number("root", case, hers, complex(root).real)
         for direction, hers in zip(DIRECTIONS, page["breaks"], strict=True):
             ours = self.package("break", critical_perturbation, loop, direction)
-            if isinstance(ours, Exception):
-                continue
-            if hers is None:
-                self.wrong.append((f"break {direction}", case, hers, ours))
+            if self.one_has_none(f"break {direction}", case, hers, ours):
                 continue
             # The page looks no farther than 2.
             self.number(f"break {direction}", case, hers, ours if ours <= 2.0 else math.inf)
         ours = self.package("margins", margins, loop, *point)
         hers = page["margins"]
-        if isinstance(ours, ValueError) or hers is None:
-            if not isinstance(ours, Exception):
-                self.wrong.append(("margins", case, hers, ours))
-            return
-        if isinstance(ours, Exception):
+        if self.one_has_none("margins", case, hers, ours):
             return
         most = float(hers["most"])
 
@@ -225,11 +233,10 @@ class Comparison:
         told("modulus", "modulus", ours.modulus)
 
 
-def compare(page, number, seed):
-    """Compare that many loops."""
-    rng, found = np.random.default_rng(seed), Comparison()
-    for first in range(0, number, 20):
-        drawn = [draw(rng) for _ in range(first, min(first + 20, number))]
+def compare(page, cases):
+    """Compare loops at their points, a few at a time."""
+    found = Comparison()
+    while drawn := list(itertools.islice(cases, 20)):
         said = page.evaluate(ASK, [[described(s), *map(float, p)] for s, p in drawn])
         for (sketch, point), one in zip(drawn, said, strict=True):
             found.compare(sketch, point, one)
@@ -245,8 +252,9 @@ def main():
     parser.add_argument("--seed", type=int, default=secrets.randbits(32))
     given = parser.parse_args()
     print(f"seed {given.seed}", flush=True)
+    rng = np.random.default_rng(given.seed)
     with check_browser.browser() as chromium:
-        found = compare(open_engine(chromium), given.loops, given.seed)
+        found = compare(open_engine(chromium), (draw(rng) for _ in range(given.loops)))
     for name, case, hers, ours in found.wrong:
         print(f"WRONG {name}: page {hers}, package {ours}\n   {case}")
     for name, case, hers, ours in found.judged:

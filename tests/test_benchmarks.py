@@ -2,12 +2,10 @@
 
 import importlib
 import json
-import re
 
-import nbformat
 import pytest
 
-from benchmarks import charts, child, loops, notebooks, report
+from benchmarks import charts, child, loops, report
 from benchmarks.__main__ import main
 
 
@@ -65,16 +63,6 @@ def test_a_topic_that_fails_costs_no_other(tmp_path, monkeypatch, capsys):
     assert {"charts", "loops"} == json.loads((tmp_path / "report.json").read_text())[
         "topics"
     ].keys()
-
-
-def test_a_failing_notebook_is_named_and_the_memory_is_that_of_its_kernel(tmp_path):
-    cell = nbformat.v4.new_code_cell("a = 400_000_000 * b'x'\n1 / 0")
-    nbformat.write(nbformat.v4.new_notebook(cells=[cell]), tmp_path / "fails.ipynb")
-    topic = notebooks.run(quick=False, folder=tmp_path, notebooks=tmp_path)
-    assert [row.met for row in topic.rows] == [False]
-    assert any("ZeroDivisionError" in note for note in topic.notes)
-    (size,) = re.findall(r"(\d+) MiB <", topic.rows[0].requirement)
-    assert 380 < int(size) < 700
 
 
 def test_exponents_are_fitted():

@@ -1,5 +1,7 @@
 import copy
+import dataclasses
 import pickle
+import pprint
 
 import pytest
 from hypothesis import given
@@ -108,6 +110,10 @@ def test_one_thing_is_replaced_and_all_else_stays():
     assert loop.replace(delay=0.0) == CommonArm(gain=2.0) != loop
     assert margins(loop.replace(delay=0.0), 0.9, 0.9).delay > 0.0
     assert hash(loop.replace(gain=3.0)) != hash(loop)
+    # `dataclasses.replace` would hold a default fixed that follows the delays.
+    with pytest.raises(AttributeError, match=r"no dataclass.* replace\(delay=...\)"):
+        dataclasses.replace(loop, gain=3.0)  # type: ignore[type-var]
+    assert pprint.pformat(loop) == repr(loop)
     if hasattr(copy, "replace"):
         assert copy.replace(loop, gain=3.0) == loop.replace(gain=3.0)
     with pytest.raises(TypeError, match="unexpected keyword argument 'dead_time'"):

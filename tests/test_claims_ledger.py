@@ -8,7 +8,7 @@ import pytest
 
 from book.companion.claims import Verdict, all_claims, chapter_claims, check
 from book.companion.claims import ledger as module
-from book.companion.claims.ledger import Finding, Ledger, claim, decide, typeset
+from book.companion.claims.ledger import Finding, claim, decide, typeset
 from book.companion.claims.page import SECTIONS, whole_ledger
 
 NOTEBOOKS = Path(__file__).parents[1] / "notebooks"
@@ -65,7 +65,7 @@ def test_formulas_are_typeset_and_claims_linked():
         assert f'<a href="09_ledger.html#ledger-{name}">{name}</a>' in text
 
 
-def test_tables_hold_verdict_number_and_note(calls):
+def test_a_terminal_shows_all_and_a_chapter_the_verdict(calls):
     ledger = check("X1")
     assert "reproduced: 1.52 (s). it is so" in repr(ledger)
     html = ledger._repr_html_()
@@ -117,14 +117,6 @@ def everything():
     return whole_ledger()
 
 
-@pytest.mark.parametrize("identifier", [entry.identifier for entry in all_claims()])
-def test_a_claim_is_as_pinned(identifier, everything):
-    (pair,) = [pair for pair in everything if pair[0].identifier == identifier]
-    Ledger([pair]).confirm()
-    assert pair[1].quantity
-    assert pair[1].note
-
-
 @pytest.mark.parametrize("chapter", dict.fromkeys(entry.chapter for entry in all_claims()))
 def test_a_chapter_shows_its_claims_and_confirms_them(chapter):
     notebook = nbformat.read(NOTEBOOKS / f"{chapter}.ipynb", 4)
@@ -150,6 +142,8 @@ def test_a_claim_names_other_claims():
 
 def test_an_erratum_quotes_the_paper_and_a_note_is_short(everything):
     for entry, finding in everything:
+        assert finding.quantity, entry.identifier
+        assert finding.note, entry.identifier
         if finding.verdict in (Verdict.NOT_AS_WRITTEN, Verdict.DIFFERS):
             assert entry.printed, entry.identifier
         sentences = re.split(r"(?<!Sec)(?<!Fig)[.?!] (?=[A-Z$])", finding.note)

@@ -11,6 +11,7 @@ from armlock import (
     CountError,
     DualArm,
     Loop,
+    SingleArm,
     critical_perturbation,
     d_curve_line,
     margins,
@@ -139,6 +140,15 @@ def test_a_factor_before_the_equation_moves_no_crossing():
             first_crossing(system, (0.0, 0.0), direction) for system in (scaled, plain)
         )
         assert found == pytest.approx(expected, rel=1e-12)
+
+
+def test_an_arm_that_is_not_used_changes_no_crossing():
+    """The polynomial zero stands for it, also where s cancels along the ray."""
+    loop = SingleArm(controller=Controller([0.0, 0.0], [-1.0, -2.0, -3.0], 30.0))
+    ways = (1.0, 2.0), (1.0, 0.0)
+    found, expected = (first_crossing(loop, (1.0, 1.0), way) for way in ways)
+    assert found == expected
+    assert first_crossing(loop, (1.0, 1.0), (0.0, 1.0)).position == np.inf
 
 
 def test_a_steep_low_pass_far_above_changes_no_crossing():

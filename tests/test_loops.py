@@ -82,7 +82,7 @@ def test_what_is_missing_or_doubled_is_named():
     with pytest.raises(TypeError, match=r"^tau2 must be given: the signal mapping 'common'"):
         Loop(K, "common", tau1=20.0)
     with pytest.raises(ValueError, match=r"^mapping must be .* 'modified dual'; got 'triple'"):
-        Loop(K, "triple", 20.1, 19.9)
+        Loop(K, "triple", tau1=20.0)
     with pytest.raises(ValueError, match=r"^gain must be None where a controller takes"):
         CommonArm().replace(controller=K)
     assert CommonArm().replace(gain=None, controller=K) == CommonArm(controller=K)

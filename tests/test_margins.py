@@ -7,6 +7,7 @@ from fractions import Fraction
 import mpmath
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from armlock import (
     BOUNDARY,
@@ -24,7 +25,7 @@ from armlock import (
     unstable_roots,
 )
 from armlock.loops import LoopAt
-from armlock.robustness import free_phases, gains
+from armlock.robustness import free_phases, gains, rays
 from armlock.robustness.gains import gain_interval
 from armlock.robustness.rays import first_crossing
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
@@ -193,6 +194,12 @@ def test_nothing_is_left_where_the_direction_leads_out(loop, direction):
     assert critical_perturbation(loop, direction) == 0.0
 
 
+def test_a_direction_that_leads_in_by_a_rounding_does_not_lead_out():
+    """No count tells so close to the boundary."""
+    with pytest.raises(CountError, match="rounding hides some"):
+        critical_perturbation(CommonArm(), (1.0, np.nextafter(-1.0, -2.0)))
+
+
 @pytest.mark.parametrize("size", [1.0, 0.3])
 def test_along_the_line_on_which_the_root_at_zero_cancels_another_root_is_first(size):
     # No pair comes to the axis of a common arm with equal arms: only c1 + c2 acts.
@@ -263,10 +270,71 @@ def test_counts_contradict_gains_between_which_the_loop_is_not_stable():
     """As they do where rounding hides a crossing."""
     point = LoopAt(paper_loop(), 1.0, 1.0)
     lower, upper, _ = gains.gain_interval(*point)
-    gains._require_stable_inside(point, lower, upper, is_null=False)
+    hidden = np.array([[-np.inf, np.nan]])
+    gains._require_nothing_hidden(point, hidden, lower, upper)
     for low, high in ((0.99 * lower, upper), (lower, 1.01 * upper)):
         with pytest.raises(CountError, match="rounding hides a crossing"):
-            gains._require_stable_inside(point, low, high, is_null=True)
+            gains._require_nothing_hidden(point, hidden, low, high)
+
+
+@pytest.mark.parametrize("hidden", [(-1.5, -0.9), (-0.3, 0.1), (-0.3, -0.2), (-9.0, -3.0)])
+def test_a_count_that_cannot_be_told_confirms_no_gain(hidden, monkeypatch):
+    """Neither next to a null of L, nor elsewhere."""
+    point = LoopAt(paper_loop(), 1.0, 1.0)
+    lower, upper, _ = gains.gain_interval(*point)
+    gains._require_nothing_hidden(point, np.array([hidden]), lower, upper)
+    monkeypatch.setattr(gains, "loop_count", lambda *_: -1)
+    with pytest.raises(CountError, match="times the gain is -1"):
+        gains._require_nothing_hidden(point, np.array([hidden]), lower, upper)
+    # What gives only factors past the two decides nothing.
+    gains._require_nothing_hidden(point, np.array([[-1e-3, 1e-3]]), lower, upper)
+
+
+def test_a_count_that_cannot_be_told_next_to_the_start_breaks_no_loop(monkeypatch):
+    monkeypatch.setattr(rays, "loop_count", lambda *_: -1)
+    with pytest.raises(CountError, match="cannot be told"):
+        critical_perturbation(DualArm(), (1.0, 1.0))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_gains_of_nearly_equal_arms_at_a_resonance_are_those_of_one_delay(seed):
+    """The difference of equal arms is L = K (c1 - c2) exp(-s tau): its phase only descends.
+
+    Where it is an odd number of half turns, L is real and negative.
+    """
+    rng = np.random.default_rng(seed)
+    tau, quality = 10.0 ** rng.uniform([-1.0, 2.0], [1.5, 5.5])
+    size, apart = 10.0 ** rng.uniform(-1.0, 2.0) / tau, 10.0 ** rng.uniform(-9.0, -6.0)
+    pole = size * complex(-0.5 / quality, np.sqrt(1.0 - 0.25 / quality**2))
+    c1, c2 = 1.0, 1.0 + float(rng.choice([-1, 1])) * apart
+    gain = size**2 * 10.0 ** rng.uniform(-3.0, -0.5) / quality / apart
+
+    def phase(omega):
+        turned = np.angle(1j * omega - pole) + np.angle(1j * omega - pole.conjugate())
+        return (0.0 if c1 > c2 else np.pi) - omega * tau - turned
+
+    end = 3.0 * size + 20.0 * np.pi / tau
+    turns = np.arange(np.ceil((phase(end) / np.pi - 1.0) / 2.0), 1.0)
+    at = [
+        brentq(lambda w, t=t: phase(w) - np.pi * (2.0 * t + 1.0), 1e-12 * size, end)
+        for t in turns
+        if phase(1e-12 * size) > np.pi * (2.0 * t + 1.0)
+    ]
+    at = np.array([*at, *([0.0] if c1 < c2 else [])])
+    factors = np.abs((1j * at - pole) * (1j * at - pole.conjugate())) / abs(gain * (c1 - c2))
+    loop = Loop(Controller([], [pole, pole.conjugate()], gain), DIFFERENCE, tau, tau)
+    assert gain_interval(loop, c1, c2)[1] == pytest.approx(factors.min(), rel=1e-6)
+
+
+def test_the_phase_next_to_where_a_pole_cancels_is_that_of_the_first_terms():
+    # L = 0.3 (1.5 - 1e-8 j / (0.2 omega)) up to far above where it is one.
+    loop = Loop(Controller([], [], 0.3), paper_loop().mapping, 20.1, 19.9)
+    found = margins(loop, 0.5, 0.5 + 1e-8)
+    lag = np.pi - np.arccos(0.3 * 1.5)
+    assert found.phase == pytest.approx(lag, rel=1e-6)
+    assert found.phase == pytest.approx(2.0376, rel=1e-4)
+    assert found.delay == pytest.approx(lag * 0.2 * np.sqrt(1 / 0.09 - 2.25) / 1e-8, rel=1e-6)
+    assert found.delay == pytest.approx(1.2e8, rel=2e-2)
 
 
 @pytest.mark.parametrize("name", STABLE)

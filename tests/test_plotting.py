@@ -1,3 +1,4 @@
+import control
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
@@ -113,6 +114,8 @@ def test_the_open_loop_goes_to_python_control_with_exact_delays():
     loop, omega = paper_loop(delay=1e-3), np.array([0.01, 0.3])
     response = loop.frd(omega, 0.9, 1.1)
     np.testing.assert_array_equal(response(1j * omega), loop.open_loop(1j * omega, 0.9, 1.1))
+    control.bode_plot([response, SingleArm().frd(omega)])
+    plt.close("all")
 
 
 def test_polar_axes_keep_directions_and_end_at_infinity():

@@ -26,7 +26,7 @@ from armlock import (
     stability_region,
     unstable_roots,
 )
-from armlock.stability.regions import proves_instability
+from armlock.robustness.regions import proves_instability
 from tests.systems import NEUTRAL, RETARDED
 
 SYSTEMS = [*RETARDED.values(), *NEUTRAL.values(), *(s.shifted(0.01) for s in RETARDED.values())]
@@ -105,6 +105,39 @@ def test_a_region_is_what_each_point_is():
     ax = region.plot(plt.figure().add_subplot(), cmap="viridis")
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("gain", "dead time")
     assert ax.images[0].cmap.name == "viridis"
+
+
+def neutral(gain: float, pole: float) -> Loop:
+    """Negative gains, and gains past the limit of the neutral root chain, occur."""
+    return Loop(([-0.3], [-pole], gain), "common", 2.0, 1.5)
+
+
+def conditional(gain: float, zero: float) -> Loop:
+    """Stable between two gains: a double integrator beyond one of its zeros."""
+    return Loop(([-zero, -zero], [0.0, 0.0, -5.0], gain), "single", 1.0, delay=0.02)
+
+
+def called_backwards(family: Any, other: float, gain: float) -> Loop:
+    made: Loop = family(gain, other)
+    return made
+
+
+@pytest.mark.parametrize(
+    ("family", "gain", "other"),
+    [
+        (make, np.geomspace(0.1, 300.0, 25), [0.0, 0.01, 0.1]),
+        (neutral, np.linspace(-1.0, 1.0, 24), [0.01, 0.1, 1.0]),
+        (conditional, np.geomspace(1e-3, 1e3, 25), [0.05, 0.5, 3.0]),
+    ],
+)
+def test_gains_decided_together_are_those_decided_one_by_one(family, gain, other):
+    for c1 in (0.3, 0.9):
+        found = stability_region(family, gain, other, c1=c1)
+        expected = [[is_stable(family(g, value), c1) for g in gain] for value in other]
+        np.testing.assert_array_equal(found.stable, expected)
+        assert 0 < found.stable.sum() < found.stable.size
+        again = stability_region(partial(called_backwards, family), other, gain, c1=c1)
+        np.testing.assert_array_equal(again.verdicts, found.verdicts.T)
 
 
 def test_what_takes_too_long_is_not_drawn_as_decided():

@@ -43,9 +43,7 @@ LINKS = """FRONT => {
   document.querySelector("article").id = "document-" + FRONT;
   for (const entry of document.querySelectorAll("div.citation[id]"))
     entry.id = "cite-" + entry.id;
-  // A chapter's table of claims stays one of lines: the ledger has the rest.
-  for (const folded of document.querySelectorAll("details"))
-    folded.open = folded.closest(".ledger") || !folded.closest(".claims");
+  for (const folded of document.querySelectorAll("details")) folded.open = true;
   const broken = [];
   for (const link of document.querySelectorAll("a[href]")) {
     const href = link.getAttribute("href");

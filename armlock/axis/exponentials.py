@@ -372,7 +372,9 @@ def conjugates_without_zeros(
     signs of the imaginary parts and the quotients N / M = N conj(M) / |M|^2 are those without
     the division; but next to s = 0 M vanishes to a high order, and rounding would hide both.
     """
-    used = np.flatnonzero(np.any(whole.weights, axis=0) | (whole.sums != 0.0))
+    # An arm that the sensor does not use has the polynomial zero.
+    there = np.array([p.coefficients.any() for p in whole.polynomials])
+    used = np.flatnonzero(there & (np.any(whole.weights, axis=0) | (whole.sums != 0.0)))
     zeros = [int((whole.polynomials[k].roots == 0.0).sum()) for k in used]
     m = min(zeros, default=0) // 2
     if m == 0:
@@ -552,15 +554,18 @@ def expand(whole: CompiledSum, omega: float, uncertain: FloatArray | None = None
     sizes = np.zeros((1 + groups, size + 1))
     for g in range(1 + groups):
         for k in range(number):
-            weight = sums[k] if g == 0 else weights[g - 1, k]
-            magnitude = abs(weight)
+            weight, unknown = sums[k] if g == 0 else weights[g - 1, k], 0.0
             if g == 0 and uncertain is not None:
-                magnitude += uncertain[k] / (ROUNDING * EPSILON)
+                unknown = uncertain[k]
+            # What is unknown moves the sum by that share of a polynomial's value, and rounds.
+            magnitude, moved = abs(weight) + unknown, unknown / (ROUNDING * EPSILON)
             if magnitude != 0.0:
                 for m in range(size):
                     local[g, m] += weight * coefficients[k, m]
                     sizes[g, m] += magnitude * magnitudes[k, m]
-                sizes[g, size] += magnitude * left_out[k] / EPSILON
+                    if moved > 0.0:
+                        sizes[g, m] += moved * abs(coefficients[k, m])
+                sizes[g, size] += (magnitude / EPSILON + moved) * left_out[k]
     if not expanded:
         return Piece(0.0, piece_end, 1.0, local, sizes, phases)
     # Powers that rounding hides are not worth their time.

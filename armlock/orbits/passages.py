@@ -22,8 +22,8 @@ from armlock.controllers import Controller
 from armlock.loops import Loop, buildable_loop, flight_loop, paper_loop, robust_loop
 from armlock.orbits.constellation import Constellation
 from armlock.robustness.delays import no_root_crosses
+from armlock.robustness.regions import is_stable
 from armlock.sensors import dual
-from armlock.stability.regions import is_stable
 from armlock.stability.roots import rightmost_root
 
 #: A loop of two round trips and of the half difference that its sensor holds, all in s.

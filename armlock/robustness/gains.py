@@ -25,15 +25,19 @@ from armlock.robustness.free_phases import (
     require_stable,
     search_outwards,
 )
+from armlock.robustness.rays import count_beside, merged
 from armlock.stability.bounds import last_larger, last_root_bound
 from armlock.stability.counts import axis_zeros, loop_count
 
 #: Gain factors up to this, and down to one over it, are looked at.
 LARGEST_GAIN = 1e6
+#: Next to a null of L only up to this, if none is found. A passive L passes its null along a
+#: tangent to the real axis: at sqrt(EPSILON) of its terms it is then as good as real.
+LARGEST_NEXT_TO_A_NULL = 1e4
 # So close to the limits of the neutral root chain, as a share, no gain factors are looked for.
 _NEXT_TO_THE_CHAIN = 1e-5
-# Shares of a gain factor inside of it at which counts are asked, until one is told.
-_INSIDE = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 0.5, 0.9)
+# So near to a limit of the gain factors, as a share, a count is asked first.
+_NEAREST = 1e-6
 
 
 def _chain_gains(point: LoopAt) -> tuple[float, float]:
@@ -145,32 +149,46 @@ def _gains_around_one(point: LoopAt, least: float, most: float) -> tuple[float, 
         if above.size:
             nearest = above[np.argmin(factor[above])]
             upper, where = float(factor[nearest]), float(omega[nearest])
-    # Values of L in hidden stretches; nan where nothing is known of one.
-    left, right = np.concatenate(hidden).T
-    met = ~((left > -1.0 / upper) | (right < -1.0 / lower))
-    if met.any():
-        _require_stable_inside(point, lower, upper, is_null=bool((right[met] >= 0.0).all()))
+    values = np.concatenate(hidden)
+    if upper == most:
+        # What only larger factors could meet next to a null is not asked for.
+        small = values[:, 0] >= -1.0 / LARGEST_NEXT_TO_A_NULL
+        values = values[~(small & (values[:, 1] >= 0.0))]
+    _require_nothing_hidden(point, values, lower, upper)
     return lower, upper, where
 
 
-def _require_stable_inside(point: LoopAt, lower: float, upper: float, *, is_null: bool) -> None:
-    """Raise unless counts just inside two gain factors say that the loop is stable there.
+def _require_nothing_hidden(
+    point: LoopAt, values: FloatArray, lower: float, upper: float
+) -> None:
+    """Raise unless counts say that hidden stretches hold no gain factor between two.
 
-    Where a count cannot be told, one farther inside tells. Next to a null of L, which large
-    factors do not tell from a value of -1, it is enough that no count says that it is unstable.
+    `values`, of shape (n, 2), are the ranges in which L lies on the real axis in each stretch;
+    nan where nothing is known of one. A root may cross at the factors k = -1 / L. Between one
+    and these all crossings are known, so that the loop is stable there. It is on their far
+    side, too, or a crossing is hidden.
     """
     loop, c1, c2 = point
     rest = loop.polynomials()[0]
-    for limit, inwards in ((lower, 1.0), (upper, -1.0)):
-        for share in _INSIDE:
-            factor = limit * (1.0 + inwards * share)
-            scaled = rest._replace(coefficients=rest.coefficients / factor)
-            count = loop_count(loop.plain().replace(rest=scaled), c1, c2)
-            if count >= 0:
-                break
-        if count > 0 or (count < 0 and not is_null):
-            at = f"the count at {factor} times the gain is {count}"
-            raise no_margin(point, f"rounding hides a crossing, for {at}")
+
+    def count(factor: float) -> int:
+        scaled = rest._replace(coefficients=rest.coefficients / factor)
+        return loop_count(loop.plain().replace(rest=scaled), c1, c2)
+
+    with np.errstate(divide="ignore"):
+        # Without a negative value nothing crosses; with zero among them any large factor may.
+        first = np.where(values[:, 0] >= 0.0, np.inf, -1.0 / values[:, 0])
+        last = np.where(values[:, 1] < 0.0, -1.0 / values[:, 1], np.inf)
+    factors = np.column_stack((np.where(np.isnan(first), 0.0, first), last))
+    met = (factors[:, 0] < upper) & (factors[:, 1] > lower)
+    for low, high in merged(factors[met].clip(lower, upper)):
+        sides = [(low, 1 if low <= lower else -1)] if low < 1.0 else []
+        sides += [(high, -1 if high >= upper else 1)] if high > 1.0 else []
+        for limit, side in sides:
+            factor, found = count_beside(count, limit, side, _NEAREST)
+            if found != 0:
+                at = f"the count at {factor} times the gain is {found}"
+                raise no_margin(point, f"rounding hides a crossing, for {at}")
 
 
 def gain_interval(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> tuple[float, float, float]:
@@ -188,7 +206,7 @@ def gain_interval(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> tuple[float, 
     lower, upper, omega : float
         The two factors, and where the upper one is taken, in rad/s: 0 for a real root, inf for
         the limit of the neutral root chain. 0, inf and nan where nothing between factors of
-        1e-6 and 1e6 bounds them.
+        1e-6 and 1e6 bounds them, next to nulls of L nothing up to 1e4.
 
     Raises
     ------
@@ -211,9 +229,7 @@ def gain_interval(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> tuple[float, 
 
     All sign changes of Im L are found, but for short stretches in which rounding hides its
     sign. Where L in one of them could give a factor between the two, they are refused unless
-    counts inside of both say that the loop is stable, the nearest that can be told. Next to a
-    null of L, which large factors do not tell from -1, they are refused if one says that it is
-    unstable.
+    a count on its far side says that the loop is stable.
 
     Examples
     --------
@@ -252,5 +268,6 @@ def gain_interval_of_stable(point: LoopAt) -> tuple[float, float, float]:
 
 __all__ = [
     "LARGEST_GAIN",
+    "LARGEST_NEXT_TO_A_NULL",
     "gain_interval",
 ]

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from armlock.axis.contour import heard
 from armlock.checks import FloatArray, positive_number
 from armlock.loops import Loop, LoopAt, checked_loop
 from armlock.robustness import discs
@@ -33,6 +34,8 @@ from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError
 # `armlock.robustness.discs.free_margins_at`. The disk margin may be flat over decades of
 # frequency, where a finer one would take too long.
 _FREE_TOLERANCES = np.array([1e-5, 1e-4, 1e-5, 1e-5])
+# So close to (1, 1), relative, a loop is as stable as next to it.
+_NEXT_TO_START = 1e-9
 
 
 @dataclass(frozen=True)
@@ -56,7 +59,8 @@ class Margins:
     ----------
     gain_lower, gain_upper : float
         The loop stays stable for every gain factor between the two; 0 and inf where nothing
-        between factors of 1e-6 and 1e6 bounds it; nan where the arms' phases are free.
+        between factors of 1e-6 and 1e6, next to nulls of L up to 1e4, bounds it; nan where the
+        arms' phases are free.
     phase : float
         Smallest turn in rad, lag or lead, at a gain crossover that makes the loop marginal;
         inf without a crossover.
@@ -155,7 +159,9 @@ def _free_margins(
     best, where = np.minimum(known, least), np.where(least < known, nearest, np.inf)
     # Past it no distance is smaller, either.
     end = max(end, no_smaller_from(point.loop, weights, (1.0 - _FREE_TOLERANCES) * best))
-    smaller, places, complete = discs.free_margins(arms, lowest, end, best, _FREE_TOLERANCES)
+    smaller, places, complete = heard(
+        discs.free_margins, arms, lowest, end, best, _FREE_TOLERANCES
+    )
     if not complete:
         why = "take too many steps, or meet a root on the imaginary axis"
         raise no_margin(point, f"free phases from {lowest} rad/s on {why}")
@@ -310,8 +316,17 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
         )
     # From there a root at s = 0 that cancels at (1, 1) may turn into the loop's own.
     may_leave_zero = at_start != 0 or LoopAt(loop, 1.0, 1.0).at_zero()[0] > 0
-    if may_leave_zero and ray.count(1e-9 * ray.scale) != 0:
+    where_to = ray.from_zero() if may_leave_zero else 0
+    if where_to > 0:
         return 0.0
+    if may_leave_zero and not (where_to < 0 and at_start == 0):
+        nearest, count = ray.count_beside(0.0, 1, _NEXT_TO_START)
+        if count == BOUNDARY:
+            where = ray.at(nearest)
+            why = f"the counts next to (1, 1), up to {where}, cannot be told"
+            raise no_margin(LoopAt(loop, *where), why)
+        if count != 0 and nearest == _NEXT_TO_START * ray.scale:
+            return 0.0
     farthest = FARTHEST * ray.scale
     eps = ray.first(farthest).position
     if eps < np.inf:

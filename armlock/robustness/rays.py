@@ -80,15 +80,33 @@ class Crossing(NamedTuple):
     change: int
 
 
-def _merged(ranges: FloatArray) -> list[tuple[float, float]]:
+def merged(ranges: FloatArray) -> list[tuple[float, float]]:
     """Ranges that overlap, made one."""
-    merged: list[tuple[float, float]] = []
+    found: list[tuple[float, float]] = []
     for low, high in sorted(map(tuple, ranges.tolist())):
-        if merged and low <= merged[-1][1]:
-            merged[-1] = merged[-1][0], max(high, merged[-1][1])
+        if found and low <= found[-1][1]:
+            found[-1] = found[-1][0], max(high, found[-1][1])
         else:
-            merged.append((low, high))
-    return merged
+            found.append((low, high))
+    return found
+
+
+def count_beside(
+    count: Callable[[float], int], t: float, side: int, nearest: float, scale: float = 1.0
+) -> tuple[float, int]:
+    """Count the unstable roots next to a parameter t on which the loop depends.
+
+    At t times 1 + side `nearest`, and as long as that cannot be told farther away, up to a
+    thousandth; from t = 0 on at shares of `scale`. Returns the place and the count, that may
+    still be below zero: then it is no confirmation.
+    """
+    place, found = t, BOUNDARY
+    for share in (nearest, *np.geomspace(max(nearest, 1e-9), _FARTHEST_BESIDE, 4)):
+        place = float(t * (1.0 + side * share) if t else share * scale)
+        found = count(place)
+        if found != BOUNDARY:
+            break
+    return place, found
 
 
 _NONE = Crossings(np.empty(0), np.empty(0), np.empty(0, dtype=np.int64))
@@ -272,48 +290,66 @@ class Ray:
         )
         return loop_count(self.system, c1, c2)
 
+    def _terms_at_zero(self, loop: Loop) -> tuple[list[Fraction], list[Fraction]]:
+        """p_k and q_k of D(s; t) = sum_k (p_k + t q_k) s^k, up to one past the first of R."""
+        number = int(np.flatnonzero(loop.rest)[0]) + 2
+        begin = [Fraction(value) for value in self.start.tolist()]
+        end = [a + Fraction(d) for a, d in zip(begin, self.direction.tolist(), strict=True)]
+        here, there = (
+            [
+                sum(pair, Fraction(0))
+                for pair in zip(*power_series(loop, x, y, number), strict=True)
+            ]
+            for x, y in (begin, end)
+        )
+        return here, [b - a for a, b in zip(here, there, strict=True)]
+
+    def from_zero(self) -> int:
+        """Where a root of a loop goes next to the start that cancels at s = 0 there.
+
+        D is t q_0 + p_k s^k to first order, with p_k the first that is not zero. So one root
+        goes right where q_0 and p_k have opposite signs, and 1 is returned. -1: the only one
+        goes left. 0: none leaves, or it takes more than these two terms to say.
+        """
+        if not isinstance(self.system, Loop):
+            return 0
+        here, change = self._terms_at_zero(self.system)
+        order = next((k for k, p in enumerate(here) if p), 0)
+        if order == 0 or change[0] == 0:
+            return 0
+        return 1 if here[order] * change[0] < 0 else (-1 if order == 1 else 0)
+
     def through_zero(self, stop: float) -> Crossings:
         """Find where, up to `stop`, a root of the loop passes s = 0 though s cancels all along.
 
         Of D(s; t) = sum_k (p_k + t q_k) s^k the first terms vanish for all t, and with them the
         walk's D0 / M at s = 0. The loop's own root passes where the first that is left does,
-        at t = -p_k / q_k.
+        at t = -p_k / q_k. With r = p_(k+1) + t q_(k+1) it goes right there if q_k / r < 0.
         """
         if not isinstance(self.system, Loop):
             return _NONE
-        number = int(np.flatnonzero(self.system.rest)[0]) + 1
-        begin = [Fraction(value) for value in self.start.tolist()]
-        end = [a + Fraction(d) for a, d in zip(begin, self.direction.tolist(), strict=True)]
-        here, there = (
-            [sum(pair) for pair in zip(*power_series(self.system, x, y, number), strict=True)]
-            for x, y in (begin, end)
-        )
-        cancelled = next((k for k in range(number) if here[k] or there[k]), 0)
-        p, q = here[cancelled], there[cancelled] - here[cancelled]
+        here, change = self._terms_at_zero(self.system)
+        pairs = enumerate(zip(here[:-1], change, strict=False))
+        cancelled = next((k for k, pair in pairs if any(pair)), 0)
+        p, q = here[cancelled], change[cancelled]
         if cancelled == 0 or q == 0 or not 0 < -p / q <= stop:
             return _NONE
-        t = float(-p / q)
+        t, following = float(-p / q), here[cancelled + 1] - p / q * change[cancelled + 1]
+        if following:
+            return Crossings(
+                np.array([t]), np.zeros(1), np.array([1 if q * following < 0 else -1])
+            )
+        # Two roots or more pass: counts tell.
         (_, before), (_, after) = (self.count_beside(t, side, 1e-9) for side in (-1, 1))
         if min(before, after) < 0:
-            raise self._hides(t, "where a root passes s = 0")
+            raise self._hides(t, "where roots pass s = 0")
         if before == after:
             return _NONE
         return Crossings(np.array([t]), np.zeros(1), np.array([after - before]))
 
     def count_beside(self, t: float, side: int, nearest: float) -> tuple[float, int]:
-        """Count the unstable roots next to a point of the ray.
-
-        At t times 1 + side `nearest`, and as long as that cannot be told farther away, up to a
-        thousandth; from t = 0 on at shares of `scale`. Returns the place and the count, that
-        may still be below zero: then it is no confirmation.
-        """
-        place, count = t, BOUNDARY
-        for share in (nearest, *np.geomspace(max(nearest, 1e-9), _FARTHEST_BESIDE, 4)):
-            place = float(t * (1.0 + side * share) if t else share * self.scale)
-            count = self.count(place)
-            if count != BOUNDARY:
-                break
-        return place, count
+        """`count_beside` of the ray's counts."""
+        return count_beside(self.count, t, side, nearest, self.scale)
 
     def _confirm(self, found: Crossings, hidden: FloatArray, stop: float) -> None:
         """Raise unless counts say that nothing crosses where rounding hides it.
@@ -321,7 +357,7 @@ class Ray:
         On both sides of each range of t that hidden stretches may cross, the counts differ by
         what was found in between, or a crossing is hidden there.
         """
-        for low, high in _merged(hidden):
+        for low, high in merged(hidden):
             before = self.count_beside(low, -1, 0.0)
             after = self.count_beside(high, -1 if high >= stop else 1, 0.0)
             between = (found.position > before[0]) & (found.position <= after[0])

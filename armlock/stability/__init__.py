@@ -15,7 +15,6 @@ from armlock.stability.counts import (
 )
 from armlock.stability.dcurve import d_curve, d_curve_branches, d_curve_line
 from armlock.stability.nyquist import AxisCrossings, NyquistCurve, axis_crossings, nyquist
-from armlock.stability.regions import StabilityRegion, is_stable, stability_region
 from armlock.stability.roots import RootError, rightmost_root
 from armlock.stability.semidiscretization import (
     semi_discretization,
@@ -31,19 +30,16 @@ __all__ = [
     "NyquistCurve",
     "RootError",
     "StabilityChart",
-    "StabilityRegion",
     "axis_crossings",
     "d_curve",
     "d_curve_branches",
     "d_curve_line",
-    "is_stable",
     "last_frequency",
     "nyquist",
     "rightmost_root",
     "semi_discretization",
     "spectral_radius",
     "stability_chart",
-    "stability_region",
     "transition_matrix",
     "unstable_roots",
 ]

@@ -108,7 +108,7 @@ const armlockDraw = (function () {
   class Chart {
     constructor(label, { changed, pointed }) {
       Object.assign(this, { changed, pointed, centre: [1, 1], half: 3, marked: null, broken: null,
-        grid: null, picture: null, curve: null, ghost: null, lit: null, stale: false });
+        grid: null, picture: null, curve: null, ghost: null, lit: null, stale: false, fingers: new Map() });
       this.sheet = new Sheet({ tabindex: 0, role: "application", "aria-label": `${label} Arrow keys `
         + "move the point, with shift by ten steps, with control the view; plus and minus zoom." }, 1,
         (pen, wide, high, colours) => this.draw(pen, wide, high, colours));
@@ -116,7 +116,7 @@ const armlockDraw = (function () {
       canvas.addEventListener("pointermove", event => this.move(event));
       canvas.addEventListener("pointerdown", event => this.press(event));
       for (const name of ["pointerup", "pointercancel"])
-        canvas.addEventListener(name, () => { this.held = null; canvas.style.cursor = ""; });
+        canvas.addEventListener(name, event => this.lift(event));
       canvas.addEventListener("keydown", event => this.key(event));
       // The wheel scrolls the page; with control it zooms, as on a map.
       canvas.addEventListener("wheel", event => {
@@ -163,13 +163,16 @@ const armlockDraw = (function () {
       let largest = 1;
       for (const count of counts) if (count > largest) largest = count;
       const picture = element("canvas", { width: n, height: n }), image = new ImageData(n, n);
+      // Of each count its colour as one number, the lowest byte first.
+      const packed = ([r, g, b]) => 0xff000000 + (Math.round(b) << 16) + (Math.round(g) << 8) + Math.round(r);
+      const shades = Array.from({ length: largest + 1 }, (_, count) => packed(count === 0 ? colours.stable
+        : colours.few.map((v, m) => v + Math.sqrt(count / largest) * (colours.many[m] - v))));
+      const [lost, unsure] = [packed(colours.lost), colours.unsure.map(packed)];
+      const pixels = new Uint32Array(image.data.buffer);
       for (let j = 0; j < n; j++) for (let i = 0; i < n; i++) {
-        const count = counts[j * n + i], t = Math.sqrt(count / largest), k = 4 * ((n - 1 - j) * n + i);
-        const colour = count === -3 ? colours.unsure[(i + j) * 100 / n % 8 < 4 ? 0 : 1]
-          : count === -2 ? colours.lost : count === -1 ? [0, 0, 0] : count === 0 ? colours.stable
-            : colours.few.map((v, m) => v + t * (colours.many[m] - v));
-        image.data.set(colour, k);
-        image.data[k + 3] = 255;
+        const count = counts[j * n + i];
+        pixels[(n - 1 - j) * n + i] = count >= 0 ? shades[count] : count === -2 ? lost
+          : unsure[(i + j) * 100 / n % 8 < 4 ? 0 : 1];
       }
       picture.getContext("2d").putImageData(image, 0, 0);
       this.picture = { picture, dark: colours.dark };
@@ -310,36 +313,60 @@ const armlockDraw = (function () {
       return [x0 + x * (x1 - x0), y0 + y * (y1 - y0)];
     }
 
-    /* A mouse that drags moves the view; a finger moves the point. */
+    /* Where the fingers are, or the mouse: the middle, and how far two are apart. */
+    grip() {
+      const all = [...this.fingers.values()], [[x, y]] = all, [u, v] = all[all.length - 1];
+      return { x: 0.5 * (x + u), y: 0.5 * (y + v), apart: Math.hypot(u - x, v - y),
+        centre: this.centre, half: this.half };
+    }
+
+    /* A drag moves the view, and two fingers zoom; a tap sets the point, and a finger on it moves it. */
     press(event) {
       const found = this.at(event);
-      if (!found) return;
-      if (event.pointerType === "mouse" && event.button === 0) {
-        this.held = { x: event.clientX, y: event.clientY, centre: this.centre, moved: false };
-        this.canvas.setPointerCapture(event.pointerId);
-      }
-      this.mark(found, true);
+      if (!found || event.button) return;
+      const place = this.canvas.getBoundingClientRect(), mouse = event.pointerType === "mouse";
+      this.canvas.setPointerCapture(event.pointerId);
+      this.fingers.set(event.pointerId, [event.clientX, event.clientY]);
+      this.held = this.grip();
+      this.moved = this.fingers.size > 1;
+      this.onPoint = !mouse && this.marked && this.fingers.size === 1 && Math.hypot(event.clientX - place.left
+        - this.px(this.marked[0]), event.clientY - place.top - this.py(this.marked[1])) < 24;
+      if (mouse) this.mark(found);
     }
 
     move(event) {
-      if (!this.held) {
+      if (!this.fingers.has(event.pointerId) || this.onPoint) {
         const found = this.at(event);
-        if (found) this.mark(found, false);
+        if (found) this.mark(found);
         return;
       }
-      const { x, y, centre } = this.held, place = this.canvas.getBoundingClientRect();
-      const frame = this.frame(place.width, place.height), span = 2 * this.half;
-      if (!this.held.moved && Math.hypot(event.clientX - x, event.clientY - y) < 4) return;
-      this.held.moved = true;
+      this.fingers.set(event.pointerId, [event.clientX, event.clientY]);
+      const now = this.grip(), from = this.held, place = this.canvas.getBoundingClientRect();
+      if (!this.moved && Math.hypot(now.x - from.x, now.y - from.y) < 4) return;
+      this.moved = true;
       this.canvas.style.cursor = "grabbing";
-      this.show([centre[0] - (event.clientX - x) * span / frame.wide,
-        centre[1] + (event.clientY - y) * span / frame.high], this.half);
+      const frame = this.frame(place.width, place.height);
+      const half = from.apart && now.apart ? from.half * from.apart / now.apart : from.half;
+      // What was below the fingers stays there.
+      const off = ({ x, y }) => [2 * (x - place.left - frame.left) / frame.wide - 1,
+        1 - 2 * (y - place.top - frame.top) / frame.high];
+      const [p, q] = [off(from), off(now)];
+      this.show(from.centre.map((v, k) => v + p[k] * from.half - q[k] * half), half);
     }
 
-    mark(point, firmly) {
+    lift(event) {
+      const tapped = this.fingers.delete(event.pointerId) && !this.moved && event.type === "pointerup";
+      const found = tapped && this.at(event);
+      if (found) this.mark(found);
+      this.onPoint = false;
+      this.canvas.style.cursor = "";
+      if (this.fingers.size) this.held = this.grip();
+    }
+
+    mark(point) {
       this.marked = point;
       this.sheet.draw();
-      this.pointed(point, firmly);
+      this.pointed(point);
     }
 
     key(event) {
@@ -360,7 +387,7 @@ const armlockDraw = (function () {
       }
       const { x0, x1, y0, y1 } = this.box, [x, y] = this.marked || this.centre;
       this.mark([Math.min(x1, Math.max(x0, x + step * move[0])),
-        Math.min(y1, Math.max(y0, y + step * move[1]))], true);
+        Math.min(y1, Math.max(y0, y + step * move[1]))]);
     }
 
     name(point) {
@@ -373,10 +400,49 @@ const armlockDraw = (function () {
     }
   }
 
-  function curve(pen, n, x, y) {
+  /* A line through n places. One that is no farther than half a pixel from the one before goes. */
+  function curve(pen, n, place) {
+    let u = Infinity, v = Infinity;
     pen.beginPath();
-    for (let i = 0; i < n; i++) if (i) pen.lineTo(x(i), y(i)); else pen.moveTo(x(i), y(i));
+    for (let i = 0; i < n; i++) {
+      const [x, y] = place(i);
+      if (Math.abs(x - u) + Math.abs(y - v) < 0.5 && i < n - 1) continue;
+      pen.lineTo(x, y);
+      [u, v] = [x, y];
+    }
     pen.stroke();
+  }
+
+  /* What is pinned is thin and dashed. */
+  function ghost(pen, colours, draw) {
+    pen.strokeStyle = colours.text;
+    pen.setLineDash([4, 4]);
+    draw();
+    pen.setLineDash([]);
+  }
+
+  /* Frequencies in Hz below a plot, and lines at values beside it. */
+  function powersBelow(pen, first, last, left, span, y, wide, high) {
+    pen.textAlign = "center";
+    pen.textBaseline = "top";
+    const every = Math.ceil((last - first) / (wide / 60));
+    for (let k = Math.ceil(first); k <= last; k += every)
+      pen.fillText(power(k), left + span * (k - first) / (last - first), y);
+    pen.textBaseline = "bottom";
+    pen.fillText("frequency in Hz", left + span / 2, high - 2);
+  }
+
+  function lines(pen, values, write, py, left, right, colours) {
+    pen.textAlign = "right";
+    pen.textBaseline = "middle";
+    pen.strokeStyle = colours.grid;
+    for (const v of values) {
+      pen.beginPath();
+      pen.moveTo(left, py(v));
+      pen.lineTo(right, py(v));
+      pen.stroke();
+      pen.fillText(write(v), left - 5, py(v));
+    }
   }
 
   /* Where the sampled |L| passes one: [index, phase in rad], the smallest phases first. */
@@ -397,7 +463,7 @@ const armlockDraw = (function () {
 
   /* The Nyquist curve, its distance from 0 on a logarithmic scale: angles stay as they are. The
    * inset shows what is around -1 as it is, with the margin's arc. Returns where a sample is. */
-  function drawNyquist({ omega, re, im }, lit, pen, wide, high, colours) {
+  function drawNyquist([{ omega, re, im }, pinned], lit, pen, wide, high, colours) {
     const n = omega.length, far = v => Math.log10(1 + v);
     let most = 2, nearest = Infinity;
     for (let i = 0; i < n; i++) {
@@ -415,14 +481,20 @@ const armlockDraw = (function () {
       pen.stroke();
       pen.fillText(power(Math.round(Math.log10(size))), cx + 3, cy - scale * far(size));
     }
-    const place = (i, sign = 1) => {
+    const bent = ({ re, im }, i, sign) => {
       const size = Math.hypot(re[i], im[i]) || 1e-300, k = scale * far(Math.min(size, most)) / size;
       return [cx + k * re[i], cy - sign * k * im[i]];
     };
-    for (const sign of [-1, 1]) {
-      pen.strokeStyle = sign > 0 ? colours.line : colours.grid;
-      curve(pen, n, i => place(i, sign)[0], i => place(i, sign)[1]);
-    }
+    const place = i => bent({ re, im }, i, 1);
+    // Both halves, and the pinned loop's.
+    const both = to => {
+      for (const sign of [-1, 1]) {
+        pen.strokeStyle = sign > 0 ? colours.line : colours.grid;
+        curve(pen, n, i => to({ re, im }, i, sign));
+      }
+      if (pinned) ghost(pen, colours, () => curve(pen, pinned.omega.length, i => to(pinned, i, 1)));
+    };
+    both(bent);
     const cross = (x, y) => {
       pen.strokeStyle = colours.mark;
       pen.lineWidth = 2;
@@ -450,10 +522,7 @@ const armlockDraw = (function () {
     pen.beginPath();
     pen.arc(inX(0), inY(0), zoom, 0, 7);
     pen.stroke();
-    for (const sign of [-1, 1]) {
-      pen.strokeStyle = sign > 0 ? colours.line : colours.grid;
-      curve(pen, n, i => inX(re[i]), i => inY(sign * im[i]));
-    }
+    both(({ re, im }, i, sign) => [inX(re[i]), inY(sign * im[i])]);
     if (worst) {
       const angle = Math.atan2(-im[worst[0]], re[worst[0]]), half = angle > 0 ? Math.PI : -Math.PI;
       pen.strokeStyle = colours.mark;
@@ -484,50 +553,43 @@ const armlockDraw = (function () {
     return place;
   }
 
-  function drawBode({ omega, re, im }, lit, pen, wide, high, colours) {
-    const n = omega.length, size = new Float64Array(n), phase = new Float64Array(n);
-    let top = -Infinity, low = Infinity;
-    for (let i = 0; i < n; i++) {
-      size[i] = 10 * Math.log10(re[i] * re[i] + im[i] * im[i] + 1e-300);
-      phase[i] = Math.atan2(im[i], re[i]) * 180 / Math.PI;
-      top = Math.max(top, size[i]);
-    }
-    for (const v of size) low = Math.min(low, Math.max(v, top - 160));
+  function drawBode([now, pinned], lit, pen, wide, high, colours) {
+    const read = ({ omega, re, im }) => ({ omega, size: omega.map((_, i) =>
+      10 * Math.log10(re[i] * re[i] + im[i] * im[i] + 1e-300)),
+    phase: omega.map((_, i) => Math.atan2(im[i], re[i]) * 180 / Math.PI) });
+    const shown = [now, pinned].filter(one => one).map(read), [{ omega, size, phase }] = shown;
+    const n = omega.length, top = size.reduce((a, b) => Math.max(a, b));
+    const low = size.reduce((a, b) => Math.min(a, Math.max(b, top - 160)), top);
     const first = Math.log10(omega[0] / TURN), last = Math.log10(omega[n - 1] / TURN);
     const left = 56, right = 8, room = (high - 62) / 2, span = wide - left - right;
-    const px = i => left + span * (Math.log10(omega[i] / TURN) - first) / (last - first);
-    const panel = (above, values, least, most, name, step) => {
+    const at = w => left + span * (Math.log10(w / TURN) - first) / (last - first), px = i => at(omega[i]);
+    const panel = (above, part, least, most, name, step) => {
       const py = v => above + room * (most - v) / (most - least);
-      pen.textAlign = "right";
-      pen.textBaseline = "middle";
-      pen.strokeStyle = colours.grid;
-      for (const v of step || ticks(least, most, 4)) {
-        pen.beginPath();
-        pen.moveTo(left, py(v));
-        pen.lineTo(wide - right, py(v));
-        pen.stroke();
-        pen.fillText(say(v), left - 5, py(v));
-      }
+      lines(pen, step || ticks(least, most, 4), v => say(v), py, left, wide - right, colours);
       upright(pen, name, 2, above + room / 2);
       pen.save();
       pen.beginPath();
       pen.rect(left, above, span, room);
       pen.clip();
-      pen.strokeStyle = colours.line;
       // A phase that passes 180 degrees is drawn anew from the other side.
-      pen.beginPath();
-      for (let i = 0; i < n; i++) {
-        const on = i && Math.abs(values[i] - values[i - 1]) < 300;
-        if (on) pen.lineTo(px(i), py(values[i])); else pen.moveTo(px(i), py(values[i]));
-      }
-      pen.stroke();
+      const trace = one => {
+        pen.beginPath();
+        one[part].forEach((v, i) => {
+          const on = i && Math.abs(v - one[part][i - 1]) < 300;
+          if (on) pen.lineTo(at(one.omega[i]), py(v)); else pen.moveTo(at(one.omega[i]), py(v));
+        });
+        pen.stroke();
+      };
+      pen.strokeStyle = colours.line;
+      trace(shown[0]);
+      if (shown[1]) ghost(pen, colours, () => trace(shown[1]));
       pen.restore();
       return py;
     };
-    const of = panel(8, size, low - 5, top + 5, "|L| in dB");
-    const turned = panel(22 + room, phase, -180, 180, "phase in degrees", [-180, -90, 0, 90, 180]);
+    const of = panel(8, "size", low - 5, top + 5, "|L| in dB");
+    const turned = panel(22 + room, "phase", -180, 180, "phase in degrees", [-180, -90, 0, 90, 180]);
     pen.fillStyle = colours.text;
-    crossovers({ omega, re, im }).forEach(([i], k) => {
+    crossovers(now).forEach(([i], k) => {
       pen.beginPath();
       pen.arc(px(i), of(0), 3, 0, 7);
       pen.fill();
@@ -544,14 +606,53 @@ const armlockDraw = (function () {
       ring(pen, px(lit), of(size[lit]), 5, colours);
       ring(pen, px(lit), turned(phase[lit]), 5, colours);
     }
-    pen.textAlign = "center";
-    pen.textBaseline = "top";
-    const every = Math.ceil((last - first) / (wide / 60));
-    for (let k = Math.ceil(first); k <= last; k += every)
-      pen.fillText(power(k), left + span * (k - first) / (last - first), 26 + 2 * room);
-    pen.textBaseline = "bottom";
-    pen.fillText("frequency in Hz", (left + wide - right) / 2, high - 2);
+    powersBelow(pen, first, last, left, span, 26 + 2 * room, wide, high);
     return i => [px(i), null];
+  }
+
+  /* The noise that is left, source by source; what time-delay interferometry takes out is dashed. */
+  function drawNoise([now, pinned], lit, pen, wide, high, colours) {
+    const { omega } = now, n = omega.length, left = 56, right = 8, top = 44, span = wide - left - right;
+    const first = Math.log10(omega[0] / TURN), last = Math.log10(omega[n - 1] / TURN);
+    const sources = [["laser", "laser", "#d55e00"], ["shot", "shot noise", "#009e73"],
+      ["clock", "clocks", "#cc79a7"], ["motion", "motion", colours.dark ? "#56b4e9" : "#0072b2"],
+      ["total", "all of it", colours.text]];
+    const most = Math.ceil(Math.log10(Math.max(...now.total, ...now.required)));
+    const least = Math.max(most - 9, Math.floor(Math.log10(Math.min(...now.total, ...now.clock, ...now.motion))));
+    const px = w => left + span * (Math.log10(w / TURN) - first) / (last - first);
+    const py = v => top + (high - top - 46) * (most - Math.log10(v + 1e-300)) / (most - least);
+    const every = Math.ceil((most - least) / 6), powers = [];
+    for (let k = least; k <= most; k += every) powers.push(10 ** k);
+    lines(pen, powers, v => power(Math.round(Math.log10(v))), py, left, wide - right, colours);
+    upright(pen, "Hz/\u221aHz", 2, top + (high - top) / 2);
+    pen.textAlign = "left";
+    pen.textBaseline = "top";
+    sources.reduce(([x, y], [, name, colour]) => {
+      const long = pen.measureText(name).width + 28;
+      const [u, v] = x + long > wide ? [left, y + 18] : [x, y];
+      pen.fillStyle = colour;
+      pen.fillRect(u, v + 5, 12, 3);
+      pen.fillStyle = colours.text;
+      pen.fillText(name, u + 16, v);
+      return [u + long, v];
+    }, [left, 4]);
+    pen.save();
+    pen.beginPath();
+    pen.rect(left, top, span, high - top - 46);
+    pen.clip();
+    const trace = (found, name) => curve(pen, found.omega.length, i => [px(found.omega[i]), py(found[name][i])]);
+    ghost(pen, { text: colours.mark }, () => trace(now, "required"));
+    for (const [name, , colour] of sources) {
+      pen.strokeStyle = colour;
+      pen.lineWidth = name === "total" ? 2 : 1.2;
+      trace(now, name);
+    }
+    pen.lineWidth = 1;
+    if (pinned) ghost(pen, colours, () => trace(pinned, "total"));
+    pen.restore();
+    if (lit !== null) ring(pen, px(omega[lit]), py(now.total[lit]), 5, colours);
+    powersBelow(pen, first, last, left, span, high - 42, wide, high);
+    return i => [px(omega[i]), null];
   }
 
   /* The loop in time: the laser's frequency after a step of its own, a round trip a line. The scale
@@ -573,17 +674,8 @@ const armlockDraw = (function () {
     const decades = [0];
     for (let k = Math.ceil(Math.log10(small)); k <= Math.log10(largest); k++)
       decades.push(...[10 ** k, -(10 ** k)].filter(v => v <= most && v >= low));
-    pen.textAlign = "right";
-    pen.textBaseline = "middle";
-    pen.strokeStyle = colours.grid;
-    for (const v of decades) {
-      pen.beginPath();
-      pen.moveTo(left, py(v));
-      pen.lineTo(wide - right, py(v));
-      pen.stroke();
-      const k = Math.round(Math.log10(Math.abs(v)));
-      pen.fillText(v ? `${v < 0 ? "\u2212" : ""}${k ? power(k) : 1}` : "0", left - 5, py(v));
-    }
+    lines(pen, decades, v => v ? `${v < 0 ? "\u2212" : ""}${power(Math.round(Math.log10(Math.abs(v))))}` : "0",
+      py, left, wide - right, colours);
     pen.textAlign = "center";
     pen.textBaseline = "top";
     const trips = whole * step / trip, every = Math.ceil(trips / (wide / 50));
@@ -597,7 +689,7 @@ const armlockDraw = (function () {
     }
     pen.strokeStyle = colours.line;
     pen.lineWidth = 1.5;
-    curve(pen, n, px, i => py(values[i]));
+    curve(pen, n, i => [px(i), py(values[i])]);
     pen.fillStyle = colours.mark;
     pen.beginPath();
     pen.arc(px(n - 1), py(values[n - 1]), 4, 0, 7);
@@ -608,5 +700,55 @@ const armlockDraw = (function () {
     upright(pen, "laser's frequency", 2, top + high0 / 2);
   }
 
-  return { element, Sheet, Chart, drawNyquist, drawBode, drawTime, palette };
+  /* A year: half differences above, true and held (dashed), and the critical perturbation below. Days
+   * that were counted and are not stable are shaded in both. */
+  function drawYear({ values, days, day }, pen, wide, high, colours) {
+    const left = 56, right = 8, span = wide - left - right, room = (high - 74) / 2, last = values.length - 1;
+    const px = t => left + span * t / last;
+    const most = 1.1 * Math.max(...values.flat().map(Math.abs)) * 1e3, above = v => 8 + room * (most - v) / (2 * most);
+    pen.fillStyle = colours.mark;
+    days.forEach((found, t) => {
+      if (found !== null) return;
+      // As far as to the days beside it that were counted.
+      let from = t - 1, to = t + 1;
+      while (from > 0 && days[from] === undefined) from--;
+      while (to < last && days[to] === undefined) to++;
+      pen.globalAlpha = 0.3;
+      for (const y of [8, 26 + room])
+        pen.fillRect(px(0.5 * (from + t)), y, px(0.5 * (to + t)) - px(0.5 * (from + t)), room);
+      pen.globalAlpha = 1;
+      pen.fillRect(px(0.5 * (from + t)), 4, px(0.5 * (to + t)) - px(0.5 * (from + t)), 4);
+    });
+    pen.fillStyle = colours.text;
+    lines(pen, ticks(-most, most, 5), v => say(+v.toPrecision(6)), above, left, wide - right, colours);
+    upright(pen, "half difference in ms", 2, 8 + room / 2);
+    pen.strokeStyle = colours.line;
+    pen.lineWidth = 2;
+    curve(pen, values.length, t => [px(t), above(1e3 * values[t][0])]);
+    pen.lineWidth = 1;
+    ghost(pen, colours, () => curve(pen, values.length, t => [px(t), above(1e3 * values[t][1])]));
+    const found = days.map((v, t) => [t, v]).filter(([, v]) => v > 0 && v < Infinity);
+    const sizes = found.map(([, v]) => Math.log10(v)), first = Math.floor(Math.min(-1, ...sizes));
+    const top = Math.max(first + 1, ...sizes.map(Math.ceil));
+    const below = v => 26 + room + room * (top - Math.log10(v)) / (top - first);
+    lines(pen, Array.from({ length: top - first + 1 }, (_, k) => 10 ** (first + k)),
+      v => power(Math.round(Math.log10(v))), below, left, wide - right, colours);
+    upright(pen, "breaks at, along (1, \u22121)", 2, 26 + 1.5 * room);
+    pen.fillStyle = colours.line;
+    for (const [t, v] of found) pen.fillRect(px(t) - 1.5, below(v) - 1.5, 3, 3);
+    pen.strokeStyle = colours.mark;
+    pen.lineWidth = 2;
+    pen.beginPath();
+    pen.moveTo(px(day), 4);
+    pen.lineTo(px(day), 26 + 2 * room);
+    pen.stroke();
+    pen.fillStyle = colours.text;
+    pen.textAlign = "center";
+    pen.textBaseline = "top";
+    for (let t = 0; t <= last; t += 60) pen.fillText(String(t), px(t), 32 + 2 * room);
+    pen.textBaseline = "bottom";
+    pen.fillText("day", left + span / 2, high - 2);
+  }
+
+  return { element, Sheet, Chart, drawNyquist, drawBode, drawNoise, drawTime, drawYear };
 })();

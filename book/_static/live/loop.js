@@ -321,7 +321,7 @@ function armlockLoop() {
     for (; lent < 0; lent++) lend(theirs, own);
     const gain = spec.gain * Math.exp(-sigma * delay);
     const part = (given, k) => given && new Product(given.gain, shares[k].map(shifted), theirs);
-    const loop = { spec, sigma, tau1, tau2, delay, second: sensor.second,
+    const loop = { spec, sigma, tau1, tau2, delay, second: sensor.second, below: all,
       rest: new Product(1, above, all), common: new Product(gain, zeros.map(shifted), own),
       sum: part(sensor.sum, 0), difference: part(sensor.difference, 1),
       longest: Math.max(tau1, tau2) + delay };
@@ -638,31 +638,44 @@ function armlockLoop() {
     return { omega, re, im, to };
   }
 
-  /* The rightmost root at (c1, c2): Newton's method from along the axis, and counts right and
-   * left of what it finds. Null where the counts do not confirm it. */
+  /* The rightmost root at (c1, c2), null where counts right and left of it do not confirm it. Lines
+   * Re s = low and high have it between them, by counts; Newton's method looks from one of them. */
   function rightmost(spec, c1, c2) {
-    let line = 0;
-    for (let attempt = 0; attempt < 4; attempt++) {
-      const found = newton(spec, line, c1, c2);
-      if (!found) return null;
-      const [re, im] = found, margin = 1e-4 * Math.abs(re);
-      const beyond = count(make(spec, re + margin), c1, c2);
-      if (beyond === 0) return count(make(spec, re - margin), c1, c2) > 0 ? [re, im] : null;
-      if (beyond < 0) return null;
-      line = re + 10 * margin;
+    let low = -Infinity, high = Infinity, line = 0, step = 1 / Math.max(spec.tau1, spec.tau2);
+    const beyond = sigma => {
+      const number = count(make(spec, sigma), c1, c2);
+      if (number > 0) low = Math.max(low, sigma); else if (number === 0) high = Math.min(high, sigma);
+      return number;
+    };
+    for (let attempt = 0; attempt < 16; attempt++) {
+      if (beyond(line) < 0) return null;
+      const found = newton(spec, line, c1, c2).find(([re]) => re > low && re < high);
+      if (found) {
+        const [re] = found, margin = 1e-4 * Math.abs(re), right = beyond(re + margin);
+        const left = right === 0 ? beyond(re - margin) : 0;
+        if (right < 0 || left < 0) return null;
+        if (left > 0) return found;
+      }
+      line = low === -Infinity ? high - step : high === Infinity ? low + step : 0.5 * (low + high);
+      step *= 2;
     }
     return null;
   }
 
-  /* The rightmost of the roots that Newton's method reaches from a line Re s = sigma. */
+  /* The roots that Newton's method reaches from a line Re s = sigma, the rightmost first. */
   function newton(spec, sigma, c1, c2) {
     const loop = make(spec, sigma), omega = around(loop, c1, c2);
-    const curve = new Curve(loop, at(loop, c1, c2)), seeds = [];
-    // ds = -D / D' with D' = dD/d(j omega)
-    const step = from => {
-      const square = from.dr * from.dr + from.di * from.di;
-      return [(from.vi * from.dr - from.vr * from.di) / square,
-        -(from.vr * from.dr + from.vi * from.di) / square];
+    const curve = new Curve(loop, at(loop, c1, c2)), seeds = [], found = [];
+    // ds = -D / D', where D = F Q with Q' / Q = sum 1 / (s + a)
+    const step = ({ vr, vi, dr, di, omega, loop: { below } }) => {
+      const square = vr * vr + vi * vi;
+      if (!square) return [0, 0];
+      let re = (di * vr - dr * vi) / square, im = -(dr * vr + di * vi) / square;
+      for (const a of below) {
+        re += a / (a * a + omega * omega);
+        im -= omega / (a * a + omega * omega);
+      }
+      return [-re / (re * re + im * im), im / (re * re + im * im)];
     };
     let size = [Infinity, Infinity], last = null;
     for (const w of omega) {
@@ -674,7 +687,6 @@ function armlockLoop() {
       last = [sigma + move[0], w + move[1]];
     }
     seeds.sort((p, q) => q[0] - p[0]);
-    let best = null;
     for (let [re, im] of seeds.slice(0, 12)) {
       for (let k = 0; k < 40; k++) {
         const there = make(spec, re), point = new Curve(there, at(there, c1, c2));
@@ -684,14 +696,14 @@ function armlockLoop() {
         im += dy;
         if (!Number.isFinite(re + im)) break;
         if (Math.hypot(dx, dy) <= 1e-7 * Math.abs(re) + 1e-14 * Math.abs(im)) {
-          if (!best || re > best[0]) best = [re, Math.abs(im) < 1e-9 * Math.abs(re) ? 0 : im];
+          found.push([re, Math.abs(im) < 1e-9 * Math.abs(re) ? 0 : im]);
           break;
         }
       }
     }
-    return best;
+    return found.sort((p, q) => q[0] - p[0]);
   }
 
   return { EPSILON, BOUNDARY, UNCONFINED, UNSURE, MOST_STEPS, SENSORS, make, at, beside, along, Curve, tail,
-    chainLeads, tangentDistance, vanishes, count, response, rightmost, rootsOf };
+    chainLeads, tangentDistance, vanishes, count, frequencies, response, rightmost, rootsOf };
 }

@@ -3,13 +3,14 @@
  * The live pages: a form, a chart of the stable region that answers the pointer, plots that follow.
  *
  * A page loads this file. It loads those beside it, each with one job: loop.js counts, margins.js
- * and chart.js certify, time.js steps, text.js reads and writes, draw.js draws. What takes long
+ * and chart.js certify, time.js steps, noise.js weighs noise, text.js reads and writes, draw.js draws. What takes long
  * runs in workers, which are made of the functions' own text: a page that is opened from disk may
  * load no script into one.
  */
 (function () {
   const here = document.currentScript.src;
-  const files = ["loop.js", "margins.js", "chart.js", "time.js", "text.js", "draw.js"];
+  const files = ["loop.js", "margins.js", "chart.js", "time.js", "noise.js", "text.js",
+    "draw.js", ...document.querySelector("[data-live=year]") ? ["orbits.js"] : []];
   const missing = files.filter(name =>
     !Array.from(document.scripts).some(script => script.src.endsWith(`/live/${name}`)));
   Promise.all(missing.map(name => new Promise((done, failed) => {
@@ -29,9 +30,10 @@
 function armlockPages() {
   const { TURN, say, duration, written, list, readRoots, readPolynomial, readNumber, python, address,
     fromAddress, exact } = armlockText;
-  const { element, Sheet, Chart, drawNyquist, drawBode, drawTime } = armlockDraw;
+  const { element, Sheet, Chart, drawNyquist, drawBode, drawNoise, drawTime, drawYear }
+    = armlockDraw;
   const api = armlockLoop();
-  Object.assign(api, armlockChart(api));
+  Object.assign(api, armlockChart(api), armlockNoise(api));
 
   const hertz = values => values.map(f => [-TURN * f, 0]);
   const real = values => values.map(v => [v, 0]);
@@ -79,16 +81,20 @@ function armlockPages() {
       chart: (spec, x0, x1, y0, y1, n, samples) => ({ n, box: { x0, x1, y0, y1 },
         ...api.chart(api.make(spec), x0, x1, n, y0, y1, n, samples) }),
       point: (spec, c1, c2) => api.count(api.make(spec), c1, c2),
+      // With ten times the steps, for who waits.
+      count: (spec, c1, c2) => api.count(api.make(spec), c1, c2, { most: 4000000 }),
       root: (spec, c1, c2) => api.rightmost(spec, c1, c2),
       breaks: spec => [[1, -1], [1, 1], [-1, -1]].map(
         ([x, y]) => api.firstBreak(api.make(spec), x, y)),
       margins: (spec, c1, c2) => api.margins(spec, c1, c2),
+      // Of one day of a year: where the loop first breaks along (1, -1).
+      day: spec => api.firstBreak(api.make(spec), 1, -1),
       time: (spec, c1, c2, trips) => api.inTime(spec, c1, c2, trips),
     };
     return ({ data: { kind, version, input } }) => {
       let result = null, error = null;
-      try { result = look[kind](...input); } catch (problem) { error = problem.message; }
-      postMessage({ kind, version, result, error });
+      try { result = look[kind.split(" ")[0]](...input); } catch (problem) { error = problem.message; }
+      postMessage({ kind, version, result, error }, result?.counts ? [result.counts.buffer] : []);
     };
   }
 
@@ -137,8 +143,33 @@ function armlockPages() {
 
   /* ---------------------------------------------------------------------------- an explorer */
 
-  const HINT = "Point at the chart, touch it, or move with the arrow keys. Drag to move the view.";
+  // What the table has of a loop, in the order in which it is found, and what it says where it is not.
+  const TOLD = ["count", "root", "breaks", "margins"];
+  const UNTOLD = { count: -3, root: null, breaks: [NaN, NaN, NaN],
+    margins: { lower: NaN, upper: NaN, phase: NaN, modulus: NaN } };
+  const UNSTABLE = "none: not stable";
+  const SOURCES = { laser: "laser", shot: "shot noise", clock: "clocks", motion: "spacecraft's motion",
+    total: "all of it" };
+  const HINT = "Point at the chart, touch it, or move with the arrow keys. Drag to move the "
+    + "view; two fingers zoom.";
   let number = 0;
+
+  /* Whether a loop is stable at its point, but for a hidden root at s = 0; undefined as long as that is
+   * not known. */
+  function stable({ told: { count, margins } }) {
+    if (count > 0 || count === -2 || margins === null) return false;
+    return count === 0 || margins ? true : undefined;
+  }
+
+  /* The place in an ascending array that is nearest to a value. */
+  function nearest(values, value) {
+    let low = 0, high = values.length - 1;
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (values[middle] < value) low = middle; else high = middle;
+    }
+    return value - values[low] < values[high] - value ? low : high;
+  }
 
   /* What all pages have: a chart that answers, plots that follow it, and the loop's numbers. */
   class Live {
@@ -147,91 +178,128 @@ function armlockPages() {
       // What answers the pointer waits for nothing else.
       this.near = new Desk(["point", "root"]);
       this.wide = new Desk(["chart"]);
-      this.slow = new Desk(["time", "breaks", "margins"]);
+      this.slow = new Desk(["time", ...TOLD, ...TOLD.map(kind => `${kind} of the pinned`), "day"]);
       this.out = element("output", { role: "status", "aria-live": "polite" });
       this.note = element("p", { class: "live-note", role: "status" });
-      this.numbers = element("dl", { class: "live-numbers" });
+      this.numbers = element("table", { class: "live-numbers" });
+      // For who hears the page: said once all numbers are there.
+      this.ready = element("p", { class: "visually-hidden", role: "status" });
       this.chart = new Chart(label, { changed: () => this.redraw(),
         pointed: point => this.tell(point) });
       this.figure = element("div", { class: "live-chart", "data-check": "hover" },
-        this.chart.canvas, this.out);
+        this.chart.canvas, this.out, this.ready);
       this.lit = null;
+      // The loop as it is, and the one that was pinned.
+      this.design = this.pinned = null;
       // What a page does besides when loop or point are others.
       this.told = () => {};
+      const pair = read => () => this.design && [this.design, this.pinned].map(one => one && read(one));
       this.plots = [
         ["Nyquist curve of L at the point, distances from 0 on a logarithmic scale; inset: around -1, "
-          + "with the arc of the smallest phase at a crossover.", drawNyquist, 0.85],
-        ["Magnitude and phase of L at the point against frequency.", drawBode, 0.85],
-      ].map(([text, draw, shape]) => this.plot(text, draw, shape));
+          + "with the arc of the smallest phase at a crossover.", drawNyquist, pair(one => one.response)],
+        ["Magnitude and phase of L at the point against frequency.", drawBode, pair(one => one.response)],
+      ].map(plot => this.plot(...plot));
       this.following = element("p", { class: "live-note", role: "status" });
       this.forget();
     }
 
-    /* A plot of the response, on which a frequency can be pointed at. */
-    plot(label, draw, shape) {
-      let place = null;
+    get spec() { return this.design?.spec; }
+
+    /* One more plot: the noise that is left. */
+    budget(laser) {
+      this.laser = laser;
+      this.plots.push(this.plot("Noise left on the locked laser at the point, source by source, against "
+        + "frequency.", drawNoise, () => {
+        const found = [this.design, this.pinned].map(one => one && this.noise(one));
+        return found[0] && found;
+      }));
+    }
+
+    /* The noise of a design in the band; none once it is known not to be stable. */
+    noise(design) {
+      if (stable(design) === false) return null;
+      if (design.laser !== this.laser)
+        [design.laser, design.weighed] = [this.laser, api.noise(design.loop, this.laser)];
+      return design.weighed.to(...this.shown);
+    }
+
+    /* A plot over frequencies, on which one can be pointed at. `read` gives what it draws. */
+    plot(label, draw, read) {
+      let place = null, shown = null;
       const sheet = new Sheet({ role: "application", tabindex: 0, "aria-label": `${label} Arrow keys `
-        + "move along the frequencies." }, shape, (pen, wide, high, colours) => {
-        if (this.response) place = draw(this.response, this.lit, pen, wide, high, colours);
+        + "move along the frequencies." }, 0.85, (pen, wide, high, colours) => {
+        shown = read();
+        pen.textAlign = "center";
+        if (this.design && !shown) pen.fillText("not stable at the point", wide / 2, high / 2);
+        if (shown) place = draw(shown, this.lit && nearest(shown[0].omega, this.lit), pen, wide, high, colours);
       });
-      sheet.canvas.addEventListener("pointermove", event => {
-        if (!this.response || !place) return;
-        const box = sheet.canvas.getBoundingClientRect();
+      for (const name of ["pointermove", "pointerdown"]) sheet.canvas.addEventListener(name, event => {
+        if (!shown || !place) return;
+        const box = sheet.canvas.getBoundingClientRect(), { omega } = shown[0];
         const x = event.clientX - box.left, y = event.clientY - box.top;
-        let best = Infinity, nearest = null;
-        for (let i = 0; i < this.response.omega.length; i++) {
+        let best = Infinity, found = null;
+        for (let i = 0; i < omega.length; i++) {
           const [u, v] = place(i), gap = Math.abs(u - x) + (v === null ? 0 : Math.abs(v - y));
-          if (gap < best) [best, nearest] = [gap, i];
+          if (gap < best) [best, found] = [gap, omega[i]];
         }
-        this.light(nearest);
+        this.light(found);
       });
-      sheet.canvas.addEventListener("pointerleave", () => this.light(null));
+      sheet.canvas.addEventListener("pointerleave", event => {
+        // A finger that was lifted has left what it pointed at lit.
+        if (event.pointerType !== "touch") this.light(null);
+      });
       sheet.canvas.addEventListener("keydown", event => {
         const move = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key];
-        if (!move || !this.response) return;
+        if (!move || !shown) return;
         event.preventDefault();
-        const n = this.response.omega.length, from = this.lit ?? Math.round(n / 2);
-        this.light(Math.min(n - 1, Math.max(0, from + move * (event.shiftKey ? 20 : 1))));
+        const { omega } = shown[0], from = this.lit ? nearest(omega, this.lit) : omega.length >> 1;
+        this.light(omega[Math.min(omega.length - 1, Math.max(0, from + move * (event.shiftKey ? 20 : 1)))]);
       });
       return sheet;
     }
 
     /* Light one frequency in all plots, and where the D-curve has it. */
-    light(index) {
-      if (index === this.lit) return;
-      this.lit = index;
+    light(omega) {
+      if (omega === this.lit) return;
+      this.lit = omega;
       this.chart.lit = null;
-      if (index !== null) {
-        const { omega, re, im } = this.response, w = omega[index];
-        const [x, y] = api.crossing(this.loop, w);
+      this.following.textContent = "";
+      if (omega) {
+        const { loop, response } = this.design, [x, y] = api.crossing(loop, omega);
         if (Number.isFinite(x + y)) this.chart.lit = [x, y];
-        this.following.textContent = `${say(w / TURN)} Hz: |L| = ${say(Math.hypot(re[index], im[index]))}, `
-          + `phase ${say(Math.atan2(im[index], re[index]) * 180 / Math.PI)}\u00b0`;
-      } else {
-        this.following.textContent = "";
+        const i = nearest(response.omega, omega), re = response.re[i], im = response.im[i];
+        this.following.textContent = `${say(omega / TURN)} Hz: |L| = ${say(Math.hypot(re, im))}, `
+          + `phase ${say(Math.atan2(im, re) * 180 / Math.PI)}\u00b0`;
       }
       this.chart.sheet.draw();
       for (const plot of this.plots) plot.draw();
+      if (this.laser) this.list();
     }
 
     /* Nobody has pointed at a place yet. */
     forget() {
       this.chart.marked = null;
       this.shown = [1, 1];
-      this.out.textContent = HINT;
     }
+
+    /* What was asked of a loop is asked no more. */
+    drop(one, kinds = TOLD) {
+      this.slow.drop(...kinds.map(kind => this.named(one, kind)));
+    }
+
+    named(one, kind) { return one === this.pinned ? `${kind} of the pinned` : kind; }
 
     /* There is no loop: nothing of the one before stays. */
     none(why) {
       this.near.drop("point", "root");
       this.wide.drop("chart");
-      this.slow.drop("time", "breaks", "margins");
+      this.slow.drop("time");
+      this.drop(this.design);
       clearTimeout(this.rest);
-      this.spec = this.loop = this.response = null;
-      this.lit = null;
+      this.design = this.lit = null;
       this.chart.clear();
       this.out.textContent = why;
-      this.note.textContent = this.following.textContent = "";
+      this.note.textContent = this.following.textContent = this.ready.textContent = "";
       this.numbers.replaceChildren();
       for (const plot of this.plots) plot.draw();
     }
@@ -239,18 +307,21 @@ function armlockPages() {
     /* Take another loop. While a slider moves, `moving`, pictures are coarser and nothing is asked
      * that takes long. */
     set(spec, moving = false) {
-      this.spec = spec;
-      this.loop = api.make(spec);
-      this.chart.broken = null;
-      this.breaks = this.margins = undefined;
       this.near.drop("point", "root");
-      this.slow.drop("time", "breaks", "margins");
-      this.list();
+      this.slow.drop("time");
+      this.drop(this.design);
+      this.design = { spec, loop: api.make(spec), told: {} };
+      this.chart.broken = null;
       this.lit = this.chart.lit = null;
-      this.responded = api.response(this.loop, ...this.most(), moving ? 2500 : 9000);
+      this.design.responded = api.response(this.design.loop, ...this.most(), moving ? 2500 : 9000);
       this.follow(this.shown);
+      this.list();
       this.redraw(moving);
-      if (this.chart.marked) this.tell(this.chart.marked); else this.wait();
+      if (this.chart.marked) this.tell(this.chart.marked);
+      else {
+        this.out.textContent = HINT;
+        this.wait();
+      }
       this.told();
     }
 
@@ -260,11 +331,9 @@ function armlockPages() {
       return [[x0, x1], [y0, y1]].map(pair => Math.max(...pair.map(Math.abs), 1));
     }
 
-    /* The response at a point, in this frame. */
+    /* The responses at a point, in this frame. */
     follow(point) {
-      if (!this.responded) return;
-      this.response = this.responded.to(...point);
-      if (this.lit >= this.response.omega.length) this.lit = null;
+      for (const one of [this.design, this.pinned]) if (one) one.response = one.responded.to(...point);
       for (const plot of this.plots) plot.draw();
     }
 
@@ -291,7 +360,7 @@ function armlockPages() {
 
     dcurve(most) {
       const { x0, x1, y0, y1 } = this.chart.box, range = [Infinity, 0];
-      const found = api.dcurve(this.loop, x0, x1, y0, y1, most);
+      const found = api.dcurve(this.design.loop, x0, x1, y0, y1, most);
       for (let i = 2; i < found.curve.length; i += 3) {
         if (found.curve[i] < range[0]) range[0] = found.curve[i];
         if (found.curve[i] > range[1]) range[1] = found.curve[i];
@@ -302,15 +371,23 @@ function armlockPages() {
     tell(point) {
       if (!this.spec) return;
       const name = this.chart.name(point);
+      this.near.drop("root");
+      clearTimeout(this.asked);
       this.shown = point;
+      // What is told of a point is not told of another; the critical perturbation stays.
+      for (const one of [this.design, this.pinned]) if (one) {
+        this.drop(one, TOLD.filter(kind => kind !== "breaks"));
+        one.told = { breaks: one.told.breaks };
+      }
       this.follow(point);
       this.out.textContent = `${name}: counting \u2026`;
-      this.near.drop("root");
-      this.margins = undefined;
-      this.list();
+      if (!this.empty) this.list();
       this.near.ask("point", [this.spec, ...point], (count, error) => {
         this.out.textContent = error || `${name}: ${counted(count)}`;
-        if (!error && count >= 0) this.root(point, this.out.textContent);
+        if (count > -3) this.design.told.count = count;
+        // What is left of the noise is drawn of stable loops only.
+        if (this.laser && count) this.plots.at(-1).draw();
+        if (!error && count >= 0) this.asked = setTimeout(() => this.root(point, this.out.textContent), 60);
       });
       this.wait();
       this.told();
@@ -333,46 +410,79 @@ function armlockPages() {
     }
 
     settle(point) {
-      if (!this.spec) return;
-      if (this.breaks === undefined)
-        this.slow.ask("breaks", [this.spec], (found, error) => {
-          this.breaks = error ? [NaN, NaN, NaN] : found;
-          this.chart.broken = found ? found[0] : null;
+      this.list();
+      for (const one of [this.design, this.pinned]) for (const kind of one ? TOLD : []) {
+        if (one.told[kind] !== undefined || kind === "breaks" && one.breaking) continue;
+        one.breaking ||= kind === "breaks";
+        const input = kind === "breaks" ? [one.spec] : [one.spec, ...point];
+        this.slow.ask(this.named(one, kind), input, (found, error) => {
+          one.told[kind] = error ? UNTOLD[kind] : found;
+          if (kind === "breaks" && one === this.design) this.chart.broken = one.told.breaks[0];
+          for (const plot of this.plots) plot.draw();
           this.chart.sheet.draw();
           this.list();
         });
-      this.slow.ask("margins", [this.spec, ...point], (found, error) => {
-        this.margins = error ? { lower: NaN, upper: NaN, phase: NaN, modulus: NaN } : found;
-        this.list();
-      });
+      }
     }
 
+    /* The numbers of the loop, and of the pinned one beside it. */
     list() {
-      const wait = "\u2026", rows = [];
+      if (!this.numbers.isConnected) return;
+      this.empty = !this.design || this.design.told.count === undefined;
+      const designs = [this.design, this.pinned].filter(one => one), wait = "\u2026";
+      const where = this.chart.marked ? this.chart.name(this.shown) : "(1, 1)";
       const or = (value, special, words) => Number.isNaN(value) ? "not sure"
         : value === special ? words : say(value);
-      const part = value => value === undefined ? wait : value === null ? "not stable at (1, 1)"
+      const broken = value => value === null ? "not stable at (1, 1)"
         : value === 0 ? "0: the least breaks it" : or(value, Infinity, "none up to 2");
-      const [minus, plus, down] = this.breaks || [];
-      rows.push(["Critical perturbation from (1, 1)", ""], ["along (1, \u22121)", part(minus)],
-        ["along (1, 1)", part(plus)], ["along (\u22121, \u22121)", part(down)]);
-      const m = this.margins, where = this.chart.marked ? this.chart.name(this.shown) : "(1, 1)";
-      rows.push([`Margins at ${where}`, m === null ? "none: not stable" : ""]);
-      if (m !== null) rows.push(
-        ["Smallest gain factor that keeps it stable", m ? or(m.lower, 0, `none above 1/${m.most}`) : wait],
-        ["Largest", m ? or(m.upper, Infinity, `none up to ${m.most}`) : wait],
-        ["Phase margin", m ? m.phase === Infinity ? "no crossover"
-          : or(m.phase * 180 / Math.PI, null) + (Number.isNaN(m.phase) ? "" : "\u00b0") : wait],
-        ["Smallest |1 + L|", m ? or(m.modulus, null) : wait]);
-      this.numbers.replaceChildren(...rows.map(([name, value]) =>
-        element("div", {}, element("dt", {}, name), element("dd", {}, value))));
+      const of = (kind, read) => designs.map(({ told }) => told[kind] === undefined ? wait : read(told[kind]));
+      const margin = read => of("margins", found => found ? read(found) : UNSTABLE);
+      const degrees = value => `${say(value * 180 / Math.PI)}\u00b0`;
+      const parts = [
+        ["Critical perturbation from (1, 1)", ["along (1, \u22121)", of("breaks", b => broken(b[0]))],
+          ["along (1, 1)", of("breaks", b => broken(b[1]))],
+          ["along (\u22121, \u22121)", of("breaks", b => broken(b[2]))]],
+        [`At ${where}`, ["Unstable roots", of("count", n => n >= 0 ? String(n) : WORDS[n])],
+          ["Rightmost root: real part in rad/s", designs.map(({ told: { count, root } }) =>
+            count < 0 ? "none" : root === undefined ? wait : root ? say(root[0]) : "not sure")],
+          ["Smallest gain factor that keeps it stable", margin(m => or(m.lower, 0, `none above 1/${m.most}`))],
+          ["Largest gain factor", margin(m => or(m.upper, Infinity, `none up to ${m.most}`))],
+          ["Phase margin", margin(({ phase }) => phase < Infinity ? degrees(phase)
+            : Number.isNaN(phase) ? "not sure" : "no crossover")],
+          ["Smallest |1 + L|", margin(m => or(m.modulus))]],
+      ];
+      if (this.laser) {
+        const omega = this.lit || TURN * 3e-3;
+        const left = designs.map(({ loop }) => api.noise(loop, this.laser, [omega]).to(...this.shown));
+        const level = name => designs.map((one, k) => ({ true: say(left[k][name][0]), false: UNSTABLE,
+          undefined: wait })[stable(one)]);
+        parts.push([`Noise left at ${say(omega / TURN)} Hz, in Hz/\u221aHz`,
+          ...[...api.SOURCES, "total"].map(name => [SOURCES[name], level(name)]),
+          ["what TDI takes out", designs.map(() => say(300 * (1 + (TURN * 3e-3 / omega) ** 2)))]]);
+      }
+      const cell = (tag, attributes, text) => element(tag, attributes, text);
+      this.numbers.replaceChildren(element("thead", {}, element("tr", {},
+        ...["Number", "This loop", "Pinned"].slice(0, 1 + designs.length)
+          .map(text => cell("th", { scope: "col" }, text)))),
+      ...parts.map(([title, ...rows]) => element("tbody", {},
+        element("tr", {}, cell("th", { scope: "rowgroup", colspan: 1 + designs.length }, title)),
+        ...rows.map(([name, values]) => element("tr", {}, cell("th", { scope: "row" }, name),
+          ...values.map(value => cell("td", {}, value)))))));
+      const done = designs.length && designs.every(({ told }) => TOLD.every(kind => told[kind] !== undefined));
+      this.ready.textContent = done ? `The table has all numbers at ${where}: ${parts[1].slice(1)
+        .map(([name, [value]]) => `${name}: ${value}`).join("; ")}.` : "";
     }
 
-    /* Pin the curve as it is: what follows is seen against it. */
+    /* Pin the design as it is: what follows is seen against it, in all plots and numbers. */
     pin() {
-      this.chart.ghost = this.chart.ghost ? null : this.chart.curve;
-      this.chart.sheet.draw();
-      return Boolean(this.chart.ghost);
+      if (this.pinned) this.drop(this.pinned);
+      this.pinned = this.pinned || !this.design ? null : { ...this.design, told: { ...this.design.told },
+        breaking: Boolean(this.design.told.breaks), responded: api.response(this.design.loop, ...this.most()) };
+      this.chart.ghost = this.pinned && this.chart.curve;
+      this.follow(this.shown);
+      this.list();
+      this.wait();
+      return Boolean(this.pinned);
     }
   }
 
@@ -422,7 +532,7 @@ function armlockPages() {
     };
     const pin = element("button", { type: "button", "aria-pressed": "false", onclick: () => {
       pin.setAttribute("aria-pressed", String(live.pin()));
-    } }, "Pin the curve");
+    } }, "Pin this loop");
     return element("p", { class: "live-buttons" },
       button("Zoom in", () => live.chart.zoom(0.5)), button("Zoom out", () => live.chart.zoom(2)),
       pin, button("Download CSV", counts),
@@ -649,7 +759,6 @@ function armlockPages() {
       put(spec);
       live.none("");
       live.forget();
-      live.chart.ghost = null;
       live.chart.show([centre, centre], half);
       take();
     };
@@ -699,6 +808,13 @@ function armlockPages() {
       field("zeros", "Zeros", { area: true }), field("poles", "Poles", { area: true }),
       field("above", "Numerator, highest power first, or in s", { area: true, value: "1" }),
       field("under", "Denominator", { area: true, value: "s" }));
+    const laser = choice(id("laser"), "Laser before it is locked", Object.keys(api.LASERS).map(name =>
+      [name, name]), value => {
+      live.laser = value;
+      for (const plot of live.plots) plot.draw();
+      live.list();
+    });
+    live.budget("free-running");
     const view = tools(live, "loop");
     view.append(button("Paper\u2019s square", () => live.chart.show([1, 1], 3e-6)),
       button("Whole", () => live.chart.show([0, 0], 3)));
@@ -716,7 +832,7 @@ function armlockPages() {
     place.replaceChildren(element("div", { class: "live-own" },
       element("div", { class: "live-main" }, live.figure, view, legend(1), live.note),
       element("div", { class: "live-side" }, starts, wrong, form)),
-      live.numbers, plots(live), live.following, inTime(live), element("p", { class: "live-buttons" }, copied), code);
+      live.numbers, laser, plots(live), live.following, inTime(live), element("p", { class: "live-buttons" }, copied), code);
 
     const open = () => {
       try {
@@ -741,6 +857,146 @@ function armlockPages() {
     if (!open()) start(Object.keys(PRESETS)[0]);
   }
 
+  /* A year in orbit: the arms, what the sensor holds, and where the loop stands each day. */
+  const ARMS = { 1: [0, 2], 2: [1, 0], 3: [2, 1] }, STEP = 5, YEAR = 365, MONTH = 365.25 / 12;
+  const HOLDS = ["the largest, all year", "the largest, with the right sign", "a month's start",
+    "a month's middle"];
+
+  /* Both round trips in s, as [t => tau1, t => tau2] with t in days: cubics through four entries. */
+  function arms(orbit, master) {
+    return ARMS[master].map(arm => t => {
+      const v = armlockOrbits[orbit][arm], k = Math.min(v.length - 4, Math.max(0, Math.floor(t / STEP)));
+      const x = t / STEP - k, [a, b, c, d] = v.slice(k, k + 4);
+      return 16.5 + 1e-6 * (b + 0.5 * x * (c - a + x * (2 * a - 5 * b + 4 * c - d
+        + x * (3 * (b - c) + d - a))));
+    });
+  }
+
+  function held(half, hold, t) {
+    if (hold === HOLDS[2]) return half(MONTH * Math.floor(t / MONTH));
+    if (hold === HOLDS[3]) return half(Math.min(YEAR, MONTH * (Math.floor(t / MONTH) + 0.5)));
+    let largest = 0;
+    for (let day = 0; day <= YEAR; day++) if (Math.abs(half(day)) > Math.abs(largest)) largest = half(day);
+    return hold === HOLDS[0] || half(t) < 0 === largest < 0 ? largest : -largest;
+  }
+
+  function year(place) {
+    const LOOPS = { "the white paper's": [FLIGHT, 6e-3], "the paper's": [PAPER, 1.5e-6] };
+    const live = new Live("Number of unstable roots over c1 and c2 on this day.");
+    const state = { loop: Object.keys(LOOPS)[0], orbit: Object.keys(armlockOrbits)[0], master: "1",
+      hold: HOLDS[0], day: 20 };
+    // Of each day that was counted: where the loop breaks, null where it is not stable.
+    let days = [], trips = null, half = null, values = [];
+    const words = element("p", { class: "live-note", role: "status" });
+    const spec = day => {
+      const [tau1, tau2] = trips.map(trip => trip(day));
+      return { ...LOOPS[state.loop][0], tau1, tau2, difference: 2 * held(half, state.hold, day) };
+    };
+    const sheet = new Sheet({ role: "img", "aria-label": "The year: true and held half difference, days on "
+      + "which the loop is not stable, and its critical perturbation along (1, \u22121)." }, 0.55,
+    (pen, ...rest) => drawYear({ values, days, day: state.day }, pen, ...rest));
+    for (const name of ["pointerdown", "pointermove"]) sheet.canvas.addEventListener(name, event => {
+      const box = sheet.canvas.getBoundingClientRect(), at = (event.clientX - box.left - 56) / (box.width - 64);
+      if (event.buttons && at >= 0 && at <= 1) { today.to(Math.round(at * YEAR)); move(Math.round(at * YEAR), true); }
+    });
+    sheet.canvas.addEventListener("pointerup", () => move(state.day, false));
+
+    /* Every sixteenth day first, then those between. */
+    const count = () => {
+      days = Array(YEAR + 1);
+      const order = [16, 8, 4, 2, 1].flatMap((step, k) => Array.from({ length: Math.ceil((YEAR + 1) / step) },
+        (_, i) => i * step).filter(day => !k || day % (2 * step)));
+      const next = () => {
+        const day = order.shift();
+        if (day === undefined) { summary(); return; }
+        live.slow.ask("day", [spec(day)], (found, error) => {
+          // A sensor that would divide by zero is no loop, and so not a stable one.
+          days[day] = error ? null : found;
+          sheet.draw();
+          next();
+        });
+      };
+      live.slow.drop("day");
+      next();
+    };
+    const summary = () => {
+      const parts = [];
+      for (let day = 0; day <= YEAR; day++) if (days[day] === null) {
+        const from = day;
+        while (days[day + 1] === null) day++;
+        parts.push(from === day ? `${day}` : `${from} to ${day}`);
+      }
+      lost.textContent = parts.length ? `Not stable on days ${parts.join(", ")}.`
+        : "Stable on every day of the year.";
+      lost.textContent += " Counted once a day: what is shorter is not seen.";
+    };
+    const lost = element("p", { class: "live-note", role: "status" });
+    const move = (day, moving) => {
+      state.day = day;
+      const now = spec(day), ms = v => `${say(1e3 * v)} ms`;
+      if (now.difference) live.set(now, moving);
+      else live.none("The sensor would divide by zero: there is no loop on this day.");
+      words.textContent = `Day ${Math.round(day)}: round trips ${now.tau1.toFixed(4)} s and ${now.tau2.toFixed(4)} s; `
+        + `half difference ${ms(half(day))}, held ${ms(now.difference / 2)}.`;
+      sheet.draw();
+    };
+    const update = () => {
+      trips = arms(state.orbit, state.master);
+      half = t => 0.5 * (trips[0](t) - trips[1](t));
+      values = Array.from({ length: YEAR + 1 }, (_, day) => [half(day), held(half, state.hold, day)]);
+      lost.textContent = "Counting the days \u2026";
+      live.chart.show([1, 1], LOOPS[state.loop][1]);
+      move(state.day, false);
+      count();
+    };
+    const pick = (key, name, options) => {
+      const label = choice(`${live.id}-${key}`, name, options.map(text => [text, text]), value => {
+        state[key] = value;
+        update();
+      });
+      label.querySelector("select").value = state[key];
+      return label;
+    };
+    const today = slider(`${live.id}-day`, "Day", 0, YEAR, state.day, v => String(Math.round(v)),
+      (v, moving) => { stop(); move(v, moving); });
+    today.querySelector("input").step = 1;
+    // Who wants no motion goes on by a week at a time.
+    let playing = 0;
+    const still = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
+    const stop = () => {
+      cancelAnimationFrame(playing);
+      if (playing) move(state.day, false);
+      playing = 0;
+      play.textContent = still() ? "A week on" : "Play the year";
+    };
+    const play = button("", () => {
+      if (playing) { stop(); return; }
+      const from = state.day >= YEAR ? 0 : state.day, begun = performance.now();
+      if (still()) {
+        const day = Math.min(YEAR, from + 7);
+        today.to(day);
+        move(day, false);
+        return;
+      }
+      play.textContent = "Pause";
+      const frame = now => {
+        const day = Math.min(YEAR, from + 15 * (now - begun) / 1000);
+        today.to(day);
+        move(day, true);
+        if (day < YEAR) playing = requestAnimationFrame(frame); else stop();
+      };
+      playing = requestAnimationFrame(frame);
+    });
+    stop();
+    const form = element("form", { class: "live-form", onsubmit: event => event.preventDefault() },
+      pick("loop", "Loop", Object.keys(LOOPS)), pick("orbit", "Orbit", Object.keys(armlockOrbits)),
+      pick("master", "Master", Object.keys(ARMS)), pick("hold", "The sensor holds", HOLDS));
+    place.replaceChildren(form, element("div", { class: "live-day" }, today, play),
+      sheet.canvas, words, lost, element("div", { class: "live-pair" },
+        element("div", {}, live.figure, legend(1), live.note), element("div", {}, live.numbers)));
+    update();
+  }
+
   for (const place of document.querySelectorAll("[data-live]"))
-    ({ front, loop: own }[place.dataset.live] || chapter)(place);
+    ({ front, loop: own, year }[place.dataset.live] || chapter)(place);
 }

@@ -441,7 +441,8 @@ def robust() -> Finding:
         decide(critical_perturbation(LOOP, (1.0, -1.0)) > PERTURBATION and modulus > 0.0),
         modulus,
         "smallest modulus margin, $|1 + L|$, over a grid of the box of perturbations",
-        f"It is met at $(1 {c1 - 1.0:+.0e}, 1 {c2 - 1.0:+.0e})$, where the phase margin is "
+        "Stable over the box, with $Δτ = τ₁ - τ₂$ (claim K5). The smallest is met at "
+        f"$(1 {c1 - 1.0:+.0e}, 1 {c2 - 1.0:+.0e})$, where the phase margin is "
         f"{np.degrees(left.phase):.1f} degrees and the gain may change by factors from "
         f"{left.gain_lower:.3f} to {left.gain_upper:.3f}. Margins against other changes, of "
         "the delay for instance, are claim K14.",
@@ -476,24 +477,24 @@ def which_open_loop() -> Finding:
 @claim(
     "K14",
     place="Introduction, last paragraph but two",
-    says="A loop needs margins for what the modules around it do; the paper's own is tried.",
-    pinned=(Verdict.IN_PART, 0.0, 0.0),
+    says="A loop needs margins for the perturbations that the modules around it make.",
+    pinned=(Verdict.REPRODUCED, 0.0, 0.0),
     printed="crucial to be designed with adequate stability margins to tolerate parameter "
     "perturbations arising from inter-module interactions",
 )
 def margins_left() -> Finding:
-    """Take the margins at (1, 1), that against further delay included."""
+    """Take the margins at (1, 1); that against further delay is a remark on the loop."""
     nominal = margins(LOOP)
     delay = 5e-3
     growth = rightmost_root(paper_loop(delay=delay), 1.0, 1.0).real
     return Finding(
-        decide(nominal.gain_lower < 1.0 < nominal.gain_upper, nominal.delay > 0.0),
+        decide(nominal.gain_lower < 1.0 < nominal.gain_upper),
         nominal.delay,
         "delay margin in s at $c₁ = c₂ = 1$: the further loop delay that the loop tolerates",
-        "The paper states this as an aim, and claims nothing of its own loop there. Its gain "
-        f"may change by factors from {nominal.gain_lower:.3f} to {nominal.gain_upper:.2f}; but "
-        "it does not roll off, and any further delay, of which the paper says nothing, makes "
-        "it unstable at high frequency. A delay δ "
+        "The paper means perturbations of parameters, and its loop has a margin for them: its "
+        f"gain may change by factors from {nominal.gain_lower:.3f} to {nominal.gain_upper:.2f}."
+        " Of delays the paper does not speak; but its loop does not roll off, and any further "
+        "delay makes it unstable at high frequency. A delay δ "
         rf"grows by a factor e in about $δ/\ln(2g) = δ/{np.log(2.0 * CONTROLLER_GAIN):.1f}$, "
         f"with {1e3 * delay:g} ms (a sample at 200 Hz) in {1e3 / growth:.2g} ms.",
     )

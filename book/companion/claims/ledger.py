@@ -202,7 +202,7 @@ def all_claims() -> list[Claim]:
 
 
 class Ledger:
-    """Claims with their findings, shown as a table.
+    """Claims with their findings, shown under their verdicts.
 
     Parameters
     ----------
@@ -296,14 +296,14 @@ class Ledger:
         ).replace("$", "")
 
     def _repr_html_(self) -> str:
-        """Return the table as HTML, for a chapter; what is behind a row is in the ledger."""
-        rows = "".join(
-            f'<tr id="claim-{c.identifier}"><td>{ledger_link(c.identifier)}</td>'
-            f"<td>{badge(f.verdict)}</td><td>{c.weight}</td><td>{typeset(c.says)}"
-            f"<br><strong>{typeset(f.shown)}</strong>: {typeset(f.quantity)}.</td></tr>"
-            for c, f in self.entries
-        )
-        return table(rows)
+        """Return links to the claims, under their verdicts, as HTML for a chapter."""
+        found: dict[Verdict, list[str]] = {}
+        for c, f in self.entries:
+            says = html.escape(c.says.replace("$", ""))
+            link = ledger_link(c.identifier, f'id="claim-{c.identifier}" title="{says}" ')
+            found.setdefault(f.verdict, []).append(link)
+        lines = (f"{badge(v, v)} {', '.join(found[v])}" for v in Verdict if v in found)
+        return f'<p class="verdict-counts">{"<br>".join(lines)}</p>'
 
 
 # HTML ----------------------------------------------------------------------------------------
@@ -349,9 +349,9 @@ def typeset(text: str) -> str:
     return "".join(parts)
 
 
-def ledger_link(identifier: str) -> str:
+def ledger_link(identifier: str, attributes: str = "") -> str:
     """Return a link from a chapter to a claim's row in the ledger."""
-    return f'<a href="09_ledger.html#ledger-{identifier}">{identifier}</a>'
+    return f'<a {attributes}href="09_ledger.html#ledger-{identifier}">{identifier}</a>'
 
 
 #: Verdicts that are too long for the narrow column of a table, as it shows them.
@@ -377,7 +377,7 @@ def row(claim: Claim, finding: Finding, attributes: str, link: str, more: str) -
         f"<tr {attributes}><td>{link}</td><td>{badge(finding.verdict)}</td>"
         f"<td>{claim.weight}</td><td><details><summary>{typeset(claim.says)}</summary>"
         f"{printed if claim.printed else place}<p>{badge(finding.verdict, finding.verdict)} "
-        f"<strong>{typeset(finding.shown)}</strong>: {typeset(finding.quantity)}.</p>"
+        f"{typeset(finding.quantity)}: <strong>{typeset(finding.shown)}</strong>.</p>"
         f"<p>{typeset(finding.note)}</p>{more}</details></td></tr>"
     )
 

@@ -100,9 +100,10 @@ def ideal_point_on_boundary() -> Finding:
         len(off),
         f"of {len(tried)} combinations of sensor, gain, p and Δτ, those in which (1, 1) is "
         "not on the edge of the stable region",
-        f"At the gains of the charts it holds for every p and Δτ tried; at the controller's "
-        f"gain, {CONTROLLER_GAIN:g} rad/s, the dual arm with p = {max(off)[0]:.3g} rad/s, four "
-        "times ours, is unstable at (1, 1) (claim D9). On the edge is not the same as "
+        "At the gains of the charts it holds for every p and Δτ tried. With the number of the "
+        f"controller's gain, {CONTROLLER_GAIN:g}, and the actuator, a loop that the paper does "
+        f"not close, the dual arm with p = {max(off)[0]:.3g} rad/s, four times ours, is "
+        "unstable at (1, 1) (claim D9). On the edge is not the same as "
         f"sensitive: a perturbation of {PERTURBATION:g} to the unstable side grows by a factor "
         f"e in {days[0]:.0f} days (single), {days[1]:.0f} days (common) and {days[2]:.1f} days "
         "(dual).",
@@ -131,7 +132,8 @@ def common_against_modified_dual() -> Finding:
     return Finding(
         decide(settled=rolls_off),
         float(left(modified, at) / left(common, at)),
-        "laser noise at 3 mHz that a modified dual arm leaves, over that of a common arm",
+        "laser noise at 3 mHz that a modified dual arm leaves, over that of a common arm: more "
+        "than one speaks for the claim",
         "The paper reports this of another work, and gives no loop. Two published ones, PI on "
         "the common arm and the white paper's, leave at most "
         f"{most[0]:.1e} and {most[1]:.1e} of the laser's noise from 10 mHz to 1 Hz, which "
@@ -311,7 +313,7 @@ def dual_row() -> Finding:
 @claim(
     "T5",
     place="Table I, fifth row",
-    says="The modified dual arm responds with $P₊ H₊ - P₋ H₋$.",
+    says="The modified dual arm responds with $P₊ H₊ - P₋ H₋$, filters of the work cited.",
     pinned=(Verdict.REPRODUCED, 0.0, 1e-12),
     weight=Weight.DERIVATION,
 )
