@@ -27,6 +27,7 @@ ax.set(xlabel="a [1/s]", ylabel="b [1/s]");
 """
 PUBLISH = 'figures.publish(fig, "small", points=omega.size)'
 PAGES = ("bibliography.md", "status.md")
+OFFERED = ("LICENSE", "LICENSE-docs", "CITATION.cff", "CHANGELOG.md")
 ADDRESS = "https://github.com/someone/something"
 LINKS = {
     "book/bibliography.html": f'href="{ADDRESS}"',
@@ -60,6 +61,11 @@ def build(folder, notebooks, address=None):
     for name in ("_config.yml", "_ext", "_static", "references.bib", *PAGES):
         source, target = ROOT / "book" / name, folder / "book" / name
         (shutil.copytree if source.is_dir() else shutil.copyfile)(source, target)
+    # There is no ledger for the claims that it names.
+    works = folder / "book" / "bibliography.md"
+    works.write_text(works.read_text().replace("claim", "statement"))
+    for name in OFFERED:
+        shutil.copyfile(ROOT / name, folder / name)
     (folder / "book" / "intro.md").write_text("# A book\n\n{cite:t}`shao_robustness`\n")
     chapters = [f"notebooks/{name}" for name in notebooks] + [f"book/{name}" for name in PAGES]
     (folder / "book" / "_toc.yml").write_text(
@@ -102,6 +108,11 @@ def test_a_book_has_its_data_numbers_and_links_and_needs_no_network(tmp_path):
     assert r"\(2.0 \times 10^{2}\)" in page
     for page, link in LINKS.items():
         assert link in (pages / page).read_text()
+    status = (pages / "book/status.html").read_text()
+    for name in (*OFFERED, "references.bib"):
+        (target,) = re.findall(rf'href="\.\./(_downloads/\w+/{name})"', status)
+        assert (pages / target).is_file()
+    assert version("armlock") in status[status.index("@software") :]
     check = [sys.executable, str(ROOT / "tools" / "check_html.py"), str(pages)]
     assert subprocess.run(check, capture_output=True, timeout=60).returncode == 0
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from armlock.axis.contour import heard
 from armlock.checks import FloatArray, positive_number
 from armlock.loops import Loop, LoopAt, checked_loop
 from armlock.robustness import discs
@@ -158,7 +159,9 @@ def _free_margins(
     best, where = np.minimum(known, least), np.where(least < known, nearest, np.inf)
     # Past it no distance is smaller, either.
     end = max(end, no_smaller_from(point.loop, weights, (1.0 - _FREE_TOLERANCES) * best))
-    smaller, places, complete = discs.free_margins(arms, lowest, end, best, _FREE_TOLERANCES)
+    smaller, places, complete = heard(
+        discs.free_margins, arms, lowest, end, best, _FREE_TOLERANCES
+    )
     if not complete:
         why = "take too many steps, or meet a root on the imaginary axis"
         raise no_margin(point, f"free phases from {lowest} rad/s on {why}")
