@@ -33,7 +33,11 @@ def walk(coefficients, phases, omega_end):
         np.array(phases, dtype=float),
     )
     summed = exponentials.CompiledSum(polynomials, weights, sums, phases)
-    return contour.winding(summed, np.zeros(len(whole)), 0.0, omega_end)
+    argument, value, clear, _, told = contour.heard(
+        contour.winding, summed, np.zeros(len(whole)), 0.0, omega_end
+    )
+    assert told
+    return argument, value, clear
 
 
 def test_a_single_exponential_winds_at_its_rate():
@@ -80,9 +84,11 @@ def test_an_argument_that_does_not_add_up_is_doubted():
     # D ends next to A. A polynomial of two more roots points the other way there.
     system, point = CommonArm(gain=3.0), (1.5, 1.5)
     model, end = _point_model(system), float(last_frequency(system, *point))
-    assert counting.count_point(model, *point, end) == unstable_roots(system, *point)
+    go = np.zeros(1, dtype=bool)
+    assert counting.count_point(model, *point, end, go) == unstable_roots(system, *point)
     other = model._replace(roots=np.zeros(3, dtype=complex))
-    assert counting.count_point(other, *point, end) == counting.DOUBTFUL
+    assert counting.count_point(other, *point, end, go) == counting.DOUBTFUL
+    assert counting.count_point(model, *point, end, ~go) == counting.TOO_LONG
 
 
 @pytest.mark.parametrize("system", [*RETARDED.values(), *NEUTRAL.values()], ids=repr)
@@ -310,8 +316,8 @@ def test_a_stretch_that_may_hold_three_zeros_is_not_taken_for_one():
     imaginary = np.poly([1.0, 1.0 - 1e-7, 1.0 + 1e-7])[::-1]
     whole = of_coefficients(1j * imaginary[None, :] + np.array([[1.0, 0.0, 0.0, 0.0]]))
     summed = exponentials.CompiledSum(whole, np.ones((1, 1)), np.ones(1), np.zeros(1))
-    zeros, complete = contour.imaginary_zeros(
-        summed, None, 0.5, 2.0, False, exponentials.ROUNDING
+    zeros, complete = contour.heard(
+        contour.imaginary_zeros, summed, None, 0.5, 2.0, False, exponentials.ROUNDING
     )
     assert complete
     assert zeros[:, [contour.JUMP, contour.HIDDEN]].tolist() == [[2.0, 1.0]]
@@ -340,8 +346,8 @@ weights, phases = np.array([[0.0, 0.5], [0.0, 0.5]]), np.array([1.0, -1.0])
 function = exponentials.CompiledSum(polynomials, weights, np.array([1.0, -1.0]), phases)
 steps = []
 contour.evaluate = lambda *at: steps.append(at) or exponentials.evaluate(*at)
-zeros, complete = contour.imaginary_zeros(
-    function, None, 0.0, 50.0, False, exponentials.ROUNDING
+zeros, complete = contour.heard(
+    contour.imaginary_zeros, function, None, 0.0, 50.0, False, exponentials.ROUNDING
 )
 print(complete, zeros[:, contour.OMEGA].tolist(), len(steps))
 """

@@ -19,8 +19,8 @@ zero. Who asks, and what each does with it:
 - rows of charts (`armlock.axis.counting`) count points one by one whose parameter it may cross;
 - rays (`armlock.robustness.rays`) ask counts on both sides of the parameters that it may cross,
   and refuse where these differ by other than what was found, or cannot be told;
-- phase and delay margins (`armlock.robustness.crossovers`) refuse where L in it would have a
-  smaller margin than the best one;
+- phase and delay margins (`armlock.robustness.phase_and_delay`) refuse where L in it would have
+  a smaller margin than the best one;
 - gain margins (`armlock.robustness.gains`) ask a count on the far side of the factors that it
   may give, and refuse where that is not zero, or cannot be told; next to a null of L they say
   nothing of factors above 1e4;
@@ -35,6 +35,10 @@ All functions here work on exponential sums, piece by piece, see `armlock.axis.e
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -52,7 +56,7 @@ from armlock.axis.exponentials import (
     rounding_bound,
     tangent_distance,
 )
-from armlock.checks import ComplexArray, FloatArray
+from armlock.checks import BoolArray, ComplexArray, FloatArray
 
 # ROUNDING along a chart's row. It is larger, so that a point that may be a boundary point is
 # doubtful there, and counted on its own.
@@ -78,6 +82,46 @@ _SHORT, _PATIENCE, _LESS_PATIENCE, _MORE_CAUTION = 1e-6, 1000, 50, 1e3
 # In a stretch without a sign steps grow in proportion to it, and are no shorter than this share
 # of the whole axis.
 _BLIND_GROWTH, _SHORTEST_BLIND = 0.25, 1e-14
+
+
+# Steps that a walk may take before it is left to another thread: about a tenth of a second.
+_FEW_STEPS = 300_000
+
+
+def heard(walk: Callable[..., Any], *arguments: Any, most: int = MOST_STEPS) -> Any:
+    """Return what a compiled walk does, and let an interrupt end it.
+
+    Compiled functions hear no interrupt. A short walk is over before that matters. A long one
+    is taken in another thread, from its start: this thread only waits, and tells it to stop.
+
+    Parameters
+    ----------
+    walk : callable
+        A function that releases the interpreter's lock. Its last two arguments are the most
+        steps, and an array whose entry stops it; the last of what it returns is whether it came
+        to its end.
+    *arguments
+        All others.
+    most : int, optional
+        The most steps.
+    """
+    stop = np.zeros(1, dtype=np.bool_)
+    try:
+        found = walk(*arguments, min(most, _FEW_STEPS), stop)
+    except SystemError as error:
+        # What numba makes of an interrupt that it meets while it packs its results.
+        cause: BaseException = error
+        while isinstance(cause, SystemError) and cause.__cause__ is not None:
+            cause = cause.__cause__
+        raise cause from None
+    if found[-1] or most <= _FEW_STEPS:
+        return found
+    with ThreadPoolExecutor(1) as pool:
+        longer = pool.submit(walk, *arguments, most, stop)
+        try:
+            return longer.result()
+        finally:
+            stop[0] = True
 
 
 @njit(cache=True)
@@ -150,10 +194,15 @@ def _slow_terms(piece: Piece) -> tuple[Piece, FloatArray]:
     return Piece(piece.start, piece.end, piece.per_reach, slow, magnitudes, rates), fast
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def winding(
-    whole: CompiledSum, uncertain: FloatArray, omega: float, omega_end: float
-) -> tuple[float, complex, bool]:
+    whole: CompiledSum,
+    uncertain: FloatArray,
+    omega: float,
+    omega_end: float,
+    most: int,
+    stop: BoolArray,
+) -> tuple[float, complex, bool, int, bool]:
     """Argument gathered by an exponential sum from omega to `omega_end`.
 
     Where the terms that turn slowly exceed the others together, the sum's argument stays within
@@ -161,8 +210,8 @@ def winding(
     others turn.
 
     `uncertain` holds how far the entries of `sums` may be off. Returns the argument, the last
-    value up to a positive factor, and whether the sum stays clear of zero. The argument is nan
-    where the walk would take more than MOST_STEPS steps.
+    value up to a positive factor, whether the sum stays clear of zero, the number of steps, and
+    whether that is told: not where there would be more than `most` steps, or `stop` is set.
     """
     phases = whole.phases
     steps, argument, step = 0, 0.0, omega_end
@@ -176,7 +225,7 @@ def winding(
         bound, error = curvature_bound(piece), rounding_bound(piece, ROUNDING)
         value = evaluate(piece, omega)[0]
         if abs(value) <= bound_at(error, piece, omega):
-            return argument, value, False
+            return argument, value, False, steps, True
         many = end - omega > 2.0 * block
         if many:
             slow, fast = _slow_terms(piece)
@@ -199,15 +248,15 @@ def winding(
                 piece, bound, error, omega, until, step, 0.0
             )
             steps += more
-            if steps > MOST_STEPS:
-                return np.nan, value, True
+            if steps > most or stop[0]:
+                return argument, value, False, steps, False
             value = evaluate(piece, following)[0]
             argument += turned
             if following < until:
-                return argument, value, False
+                return argument, value, False, steps, True
             omega = following
         if omega >= omega_end:
-            return argument, value, True
+            return argument, value, True, steps, True
 
 
 @njit(cache=True)
@@ -383,7 +432,120 @@ def _imaginary_bounds(
     return near, everywhere, rounding_bound(imaginary, rounding)
 
 
+class _Known(NamedTuple):
+    """What a walk knows of the sign of an imaginary part.
+
+    Attributes
+    ----------
+    until : float
+        The frequency up to which it is known; where the walk begins as long as it is not.
+    sign : int
+        1 or -1 there, 0 as long as it is not known.
+    hidden : bool
+        Whether rounding has hidden it since.
+    """
+
+    until: float
+    sign: int
+    hidden: bool
+
+
 @njit(cache=True)
+def _begins(
+    piece: Piece, error: FloatArray, omega: float, value: complex, slope: complex
+) -> tuple[_Known, bool]:
+    """Return what is known where a walk begins, and whether omega = 0 is a zero there."""
+    if abs(value.imag) > bound_at(error, piece, omega):
+        return _Known(omega, 1 if value.imag > 0.0 else -1, False), False
+    if omega == 0.0 and abs(slope.imag) > error[1] * piece.per_reach:
+        return _Known(omega, 1 if slope.imag > 0.0 else -1, False), True
+    return _Known(omega, 0, True), False
+
+
+@njit(cache=True)
+def _imaginary_step(
+    at: tuple[float, complex, complex],
+    step: float,
+    curvature: float,
+    uncertain: float,
+    blind: float,
+) -> float:
+    """Longest certified step, at most `step`, from a frequency with this value and slope.
+
+    Where the sign is hidden, `blind` is a step that leaves that stretch, and zero elsewhere:
+    there nothing can be resolved.
+    """
+    if not curvature > 0.0:
+        return step
+    _, value, slope = at
+    certified = _safe_step(value.imag, slope.imag, curvature, uncertain)
+    if blind > 0.0:
+        certified = max(certified, blind, 0.5 * np.sqrt(2.0 * uncertain / curvature))
+    return float(min(step, certified))
+
+
+@njit(cache=True)
+def _passed(
+    piece: Piece,
+    bounds: tuple[FloatArray, FloatArray],
+    entered: float,
+    known: _Known,
+    before: tuple[float, complex, complex],
+    after: tuple[float, complex, complex],
+) -> tuple[tuple[float, int, float, bool], tuple[complex, complex]]:
+    """Return what lies between where the sign was known last and where it is known again.
+
+    As `_with_zero` takes it: a zero, a hidden stretch, or nothing, where the jump is 0 and it
+    is not hidden. `bounds` are those on the second derivative and on rounding. `before` and
+    `after` are a step's frequencies, with value and slope; the sign is known after it. It may
+    have been hidden since before `entered`, where the piece was: then nothing bounds the slope
+    all the way, and several zeros may lie there.
+    """
+    bound, error = bounds
+    following, now = after[0], 1 if after[1].imag > 0.0 else -1
+    half = 0.5 * (following - known.until)
+    middle = known.until + half
+    if known.sign == 0:
+        jump = now if known.until == 0.0 else 0
+        at = max(known.until, entered)
+        return (known.until, jump, 2.0 * half, True), evaluate(piece, at)
+    jump, single = now - known.sign, not known.hidden
+    if known.hidden and known.until >= entered:
+        single = _is_monotonic(piece, bound, error, middle, half)
+    if not single or jump == 0:
+        return (middle, jump, half, not single), evaluate(piece, max(middle, entered))
+    if not known.hidden:
+        h, dh = (before[1].imag, after[1].imag), (before[2].imag, after[2].imag)
+        middle = _zero_between(before[0], following, h, dh)
+    at, there = _polish(piece, bound, (known.until, following), middle, known.sign)
+    rate, uncertain = abs(there[1].imag), bound_at(error, piece, at)
+    if rate * half > uncertain:
+        half = uncertain / rate
+    return (at, jump, half, False), there
+
+
+@njit(cache=True)
+def _ends(
+    piece: Piece,
+    bounds: tuple[FloatArray, FloatArray],
+    entered: float,
+    known: _Known,
+    omega: float,
+    is_map: bool,
+) -> tuple[float, int, float, bool]:
+    """Return what lies between where the sign was known last and the end of a walk.
+
+    At the end of its axis the imaginary part of a map is zero.
+    """
+    width, single = 0.0, True
+    if known.hidden:
+        width, single = omega - known.until, False
+        if is_map and known.sign != 0 and known.until >= entered:
+            single = _is_monotonic(piece, bounds[0], bounds[1], omega, width)
+    return omega, -known.sign if is_map else 0, width, not single
+
+
+@njit(cache=True, nogil=True)
 def imaginary_zeros(
     whole: CompiledSum,
     measure: CompiledSum | None,
@@ -391,13 +553,16 @@ def imaginary_zeros(
     omega_end: float,
     is_map: bool,
     rounding: float,
+    most: int,
+    stop: BoolArray,
 ) -> tuple[FloatArray, bool]:
     """Zeros in [omega_start, omega_end] of the imaginary part of an exponential sum.
 
     For a row x = N / M of a chart the sum is N conj(M), and `measure` is |M|^2. Where the
     imaginary part is odd in omega, as it is there, omega = 0 is one of the zeros. Of a map
     `omega_end` is pi / step. Returns a row for each zero and each hidden stretch, and whether
-    these are all (they are not if the walk would take more than MOST_STEPS steps). Its columns:
+    these are all: they are not if the walk would take more than `most` steps, or `stop` is set.
+    Its columns:
 
     - OMEGA, polished; of a hidden stretch its middle, or `omega_start` or `omega_end` where it
       begins or ends there;
@@ -417,84 +582,52 @@ def imaginary_zeros(
     fastest = np.abs(phases).max() if phases.size else 0.0
     if (omega_end - omega_start) * fastest > MOST_RADIANS:
         return zeros[:0], False
-    # Up to `last_clear` the sign is known; from there to omega it is not where `doubtful`.
-    omega, last_clear, sign, doubtful = omega_start, omega_start, 0, True
-    step, steps = omega_end, 0
+    omega, step, steps = omega_start, omega_end, 0
+    known = _Known(omega, 0, True)
     crawled, patience, caution = 0, _PATIENCE, 1.0
-    while omega < omega_end and steps <= MOST_STEPS:
+    while omega < omega_end and steps <= most and not stop[0]:
         piece, first, entered = expand(whole, omega), found, omega
         end = min(piece.end, omega_end)
         near, everywhere, error = _imaginary_bounds(piece, rounding)
+        bound = everywhere
         value, slope = evaluate(piece, omega)
         if omega == omega_start:
-            if abs(value.imag) > bound_at(error, piece, omega):
-                sign, doubtful = (1 if value.imag > 0.0 else -1), False
-            elif omega == 0.0 and abs(slope.imag) > error[1] * piece.per_reach:
-                sign, doubtful = (1 if slope.imag > 0.0 else -1), False
-                zeros = _with_zero(zeros, found, (0.0, sign, 0.0, False), (value, slope))
+            known, is_zero = _begins(piece, error, omega, value, slope)
+            if is_zero:
+                row = (omega, known.sign, 0.0, False)
+                zeros = _with_zero(zeros, found, row, (value, slope))
                 found += 1
-        while omega < end and steps <= MOST_STEPS:
+        while omega < end and steps <= most and not stop[0]:
             steps += 1
-            step = min(2.0 * step, end - omega)
+            step, blind = min(2.0 * step, end - omega), 0.0
             bound = near if fastest * (omega + step) < 1.0 else everywhere
+            if known.hidden:
+                blind = max(_BLIND_GROWTH * (omega - known.until), _SHORTEST_BLIND * omega_end)
             curvature = bound_at(bound, piece, omega + step)
-            if curvature > 0.0:
-                uncertain = bound_at(error, piece, omega)
-                certified = _safe_step(value.imag, slope.imag, curvature, uncertain)
-                if doubtful:
-                    # Nothing can be resolved here; leave the stretch, in proportion to it.
-                    unresolved = 0.5 * np.sqrt(2.0 * uncertain / curvature)
-                    stretch = _BLIND_GROWTH * (omega - last_clear)
-                    blind = max(unresolved, stretch, _SHORTEST_BLIND * omega_end)
-                    certified = max(certified, blind)
-                step = min(step, certified)
-                # Where terms cancel nearly to rounding, steps may become tiny. Then the error
-                # is taken for larger, until the sign is clear again.
-                short = step < _SHORT * omega and fastest * step < _SHORT
-                crawled = crawled + 1 if short and not doubtful else 0
-                if crawled > patience:
-                    caution, patience = _MORE_CAUTION, _LESS_PATIENCE
-            following = end if step >= end - omega else omega + step
-            old_value, old_slope = value, slope
-            value, slope = evaluate(piece, following)
-            if abs(value.imag) <= caution * bound_at(error, piece, following):
-                omega, doubtful = following, True
+            uncertain = bound_at(error, piece, omega)
+            before = (omega, value, slope)
+            step = _imaginary_step(before, step, curvature, uncertain, blind)
+            # Where terms cancel nearly to rounding, steps may become tiny. Then the error is
+            # taken for larger, until the sign is clear again.
+            short = step < _SHORT * omega and fastest * step < _SHORT
+            crawled = crawled + 1 if short and not known.hidden else 0
+            if crawled > patience:
+                caution, patience = _MORE_CAUTION, _LESS_PATIENCE
+            omega = end if step >= end - omega else omega + step
+            value, slope = evaluate(piece, omega)
+            if abs(value.imag) <= caution * bound_at(error, piece, omega):
+                known = _Known(known.until, known.sign, True)
                 continue
             now, caution = 1 if value.imag > 0.0 else -1, 1.0
-            if now != sign or doubtful:
-                bracket, half = (last_clear, following), 0.5 * (following - last_clear)
-                at = last_clear + half
-                single = not doubtful
-                if doubtful and sign != 0 and last_clear >= entered:
-                    single = _is_monotonic(piece, bound, error, at, half)
-                if sign == 0:
-                    # At the start itself the sign was hidden.
-                    jump = now if omega_start == 0.0 else 0
-                    row = (omega_start, jump, 2.0 * half, True)
-                    there = evaluate(piece, max(omega_start, entered))
+            if now != known.sign or known.hidden:
+                after = (omega, value, slope)
+                row, there = _passed(piece, (bound, error), entered, known, before, after)
+                if row[JUMP] != 0 or row[HIDDEN]:
                     zeros = _with_zero(zeros, found, row, there)
                     found += 1
-                elif not single:
-                    row, there = (at, now - sign, half, True), evaluate(piece, max(at, entered))
-                    zeros = _with_zero(zeros, found, row, there)
-                    found += 1
-                elif now != sign:
-                    if not doubtful:
-                        h, dh = (old_value.imag, value.imag), (old_slope.imag, slope.imag)
-                        at = _zero_between(omega, following, h, dh)
-                    at, there = _polish(piece, bound, bracket, at, sign)
-                    rate, uncertain = abs(there[1].imag), bound_at(error, piece, at)
-                    if rate * half > uncertain:
-                        half = uncertain / rate
-                    zeros = _with_zero(zeros, found, (at, now - sign, half, False), there)
-                    found += 1
-            omega, last_clear, sign, doubtful = following, following, now, False
-        if omega >= omega_end and (is_map or doubtful):
-            width = omega_end - last_clear if doubtful else 0.0
-            single = not doubtful
-            if is_map and sign != 0 and last_clear >= entered:
-                single = single or _is_monotonic(piece, bound, error, omega_end, width)
-            row = (omega_end, -sign if is_map else 0, width, not single)
+            known = _Known(omega, now, False)
+        if omega >= omega_end and (is_map or known.hidden):
+            row = _ends(piece, (bound, error), entered, known, omega_end, is_map)
             zeros = _with_zero(zeros, found, row, (value, slope))
             found += 1
         if found > first and measure is not None:
@@ -502,22 +635,23 @@ def imaginary_zeros(
     return zeros[:found], omega >= omega_end
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def resolved_grid(
-    whole: CompiledSum, omega_end: float, tolerance: float, most: int
-) -> FloatArray:
+    whole: CompiledSum, omega_end: float, tolerance: float, most: int, stop: BoolArray
+) -> tuple[FloatArray, bool]:
     """Frequencies from 0 to `omega_end` between which an exponential sum changes little.
 
     Over each step its tangent moves by no more than twice `tolerance` times its distance from
     zero, and the sum leaves the tangent by no more than once that, or the step is as small as
-    rounding allows. The grid ends before `omega_end` if it would take more than `most`.
+    rounding allows. Returns them, and whether they reach `omega_end`, which they do not if it
+    takes more than `most` of them, or `stop` is set.
     """
     grid, found, omega, step = np.empty(1024), 1, 0.0, omega_end
     grid[0] = omega
-    while omega < omega_end and found < most:
+    while omega < omega_end and found < most and not stop[0]:
         piece = expand(whole, omega)
         end, bound = min(piece.end, omega_end), curvature_bound(piece)
-        while omega < end and found < most:
+        while omega < end and found < most and not stop[0]:
             value, slope = evaluate(piece, omega)
             step = min(2.0 * step, end - omega)
             smallest = max(1e-13 * omega, 1e-16 * omega_end)
@@ -533,4 +667,4 @@ def resolved_grid(
                 grid = np.concatenate((grid, np.empty_like(grid)))
             grid[found] = omega
             found += 1
-    return grid[:found]
+    return grid[:found], omega >= omega_end

@@ -20,6 +20,7 @@ from armlock.axis.contour import (
     HIDDEN,
     JUMP,
     MOST_RADIANS,
+    MOST_STEPS,
     POSITION,
     SPREAD,
     angle_between,
@@ -136,14 +137,14 @@ class Rows(NamedTuple):
 
 
 @njit(cache=True)
-def count_point(model: PointModel, x: float, y: float, end: float) -> int:
+def count_point(model: PointModel, x: float, y: float, end: float, stop: BoolArray) -> int:
     """Return the number of unstable roots at one point, or a status code below zero.
 
     By the argument principle. Without unstable roots the argument of D gathers, from 0 to
     infinity, half pi for each root of A, and that of a map, from 0 to pi / step, pi for each.
     Each unstable root takes away pi. `end` is what `armlock.stability.bounds.last_frequency`
     gives. Past it no root crosses, or it is inf, because the neutral root chain is not
-    confined; for a map it is pi / step.
+    confined; for a map it is pi / step. It takes too long once `stop` is set.
     """
     constant, b1, b2 = model.constant, model.sums[0], model.sums[1]
     if end == np.inf:
@@ -168,11 +169,13 @@ def count_point(model: PointModel, x: float, y: float, end: float) -> int:
         for g in range(weights.shape[0]):
             weights[g, k] -= x * model.weights[0, g, k] + y * model.weights[1, g, k]
     whole = CompiledSum(constant.polynomials, weights, sums, constant.phases)
-    argument, value, clear = winding(whole, uncertain, model.start, end)
+    argument, value, clear, _, told = winding(
+        whole, uncertain, model.start, end, MOST_STEPS, stop
+    )
+    if not told:
+        return TOO_LONG
     if not clear:
         return BOUNDARY
-    if np.isnan(argument):
-        return TOO_LONG
     final = np.pi * model.roots.size
     if not model.is_map:
         # What the argument of D is at `end`. Past it |D / A - 1| < 1: the argument of D / A is
@@ -208,7 +211,7 @@ def _count_range(
 ) -> None:
     """Count at points `first` to `last`, until one of them takes too long."""
     for i in range(first, last):
-        counts[i] = UNTRIED if stop[0] else count_point(model, x[i], y[i], ends[i])
+        counts[i] = UNTRIED if stop[0] else count_point(model, x[i], y[i], ends[i], stop)
         if counts[i] == TOO_LONG:
             stop[0] = True
 
@@ -223,20 +226,18 @@ def count_points(model: PointModel, x: FloatArray, y: FloatArray, ends: FloatArr
     if x.size < _FEW and ends.max(initial=0.0) * fastest <= _LONG:
         _count_range(0, x.size, model, x, y, ends, counts, stop)
         return counts
-    try:
-        _on_all_cores(_count_range, x.size, model, x, y, ends, counts, stop)
-    except KeyboardInterrupt:
-        stop[0] = True
-        raise
+    _on_all_cores(_count_range, x.size, model, x, y, ends, counts, stop=stop)
     return counts
 
 
-def _on_all_cores(function: Callable[..., None], size: int, *arguments: object) -> None:
+def _on_all_cores(
+    function: Callable[..., None], size: int, *arguments: object, stop: BoolArray
+) -> None:
     """Call function(first, last, ...) for ranges that cover `size`, in a thread each.
 
     The function is compiled to release the interpreter's lock. Ranges are short, because some
     points or rows take much longer than others. An interrupt is heard at once, since this
-    thread only waits; the others end with the range that they are at.
+    thread only waits; the others end because the last argument, `stop`, is set.
     """
     cores = config.NUMBA_NUM_THREADS
     edges = np.unique(np.linspace(0, size, 16 * cores + 1).astype(int)).tolist()
@@ -249,21 +250,27 @@ def _on_all_cores(function: Callable[..., None], size: int, *arguments: object) 
                 first, last = ranges.pop()
             except IndexError:
                 return
-            function(first, last, *arguments)
+            function(first, last, *arguments, stop)
 
     pool = ThreadPoolExecutor(cores)
     try:
         for thread in [pool.submit(work) for _ in range(cores)]:
             thread.result()
-    finally:
-        # Empty but for an interrupt.
+    except BaseException:
         ranges.clear()
+        stop[0] = True
+        raise
+    finally:
         pool.shutdown(wait=False)
 
 
 @njit(cache=True)
 def _fill_row(
-    filled: tuple[IntArray, BoolArray, IntArray], model: RowModel, rows: Rows, i: int
+    filled: tuple[IntArray, BoolArray, IntArray],
+    model: RowModel,
+    rows: Rows,
+    i: int,
+    stop: BoolArray,
 ) -> None:
     """Fill row i of a chart, see `fill_rows`."""
     counts, doubtful, last = filled
@@ -281,7 +288,7 @@ def _fill_row(
             sums[k] -= near
     crossing = CompiledSum(fixed.polynomials, weights, sums, fixed.phases)
     zeros, complete = imaginary_zeros(
-        crossing, model.measure, 0.0, rows.ends[i], model.is_map, CAUTION
+        crossing, model.measure, 0.0, rows.ends[i], model.is_map, CAUTION, MOST_STEPS, stop
     )
     change = np.zeros(x.size + 1, dtype=np.int64)
     total = running = rows.base[i]
@@ -313,9 +320,11 @@ def _fill_range(
     filled: tuple[IntArray, BoolArray, IntArray],
     model: RowModel,
     rows: Rows,
+    stop: BoolArray,
 ) -> None:
     for i in range(first, last):
-        _fill_row(filled, model, rows, i)
+        if not stop[0]:
+            _fill_row(filled, model, rows, i, stop)
 
 
 def fill_rows(model: RowModel, rows: Rows) -> tuple[IntArray, BoolArray, IntArray]:
@@ -331,5 +340,6 @@ def fill_rows(model: RowModel, rows: Rows) -> tuple[IntArray, BoolArray, IntArra
         np.zeros(shape, dtype=np.bool_),
         np.empty(shape[0], dtype=np.int64),
     )
-    _on_all_cores(_fill_range, shape[0], filled, model, rows)
+    stop = np.zeros(1, dtype=np.bool_)
+    _on_all_cores(_fill_range, shape[0], filled, model, rows, stop=stop)
     return filled

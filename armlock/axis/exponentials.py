@@ -554,15 +554,18 @@ def expand(whole: CompiledSum, omega: float, uncertain: FloatArray | None = None
     sizes = np.zeros((1 + groups, size + 1))
     for g in range(1 + groups):
         for k in range(number):
-            weight = sums[k] if g == 0 else weights[g - 1, k]
-            magnitude = abs(weight)
+            weight, unknown = sums[k] if g == 0 else weights[g - 1, k], 0.0
             if g == 0 and uncertain is not None:
-                magnitude += uncertain[k] / (ROUNDING * EPSILON)
+                unknown = uncertain[k]
+            # What is unknown moves the sum by that share of a polynomial's value, and rounds.
+            magnitude, moved = abs(weight) + unknown, unknown / (ROUNDING * EPSILON)
             if magnitude != 0.0:
                 for m in range(size):
                     local[g, m] += weight * coefficients[k, m]
                     sizes[g, m] += magnitude * magnitudes[k, m]
-                sizes[g, size] += magnitude * left_out[k] / EPSILON
+                    if moved > 0.0:
+                        sizes[g, m] += moved * abs(coefficients[k, m])
+                sizes[g, size] += (magnitude / EPSILON + moved) * left_out[k]
     if not expanded:
         return Piece(0.0, piece_end, 1.0, local, sizes, phases)
     # Powers that rounding hides are not worth their time.

@@ -21,6 +21,7 @@ from armlock.checks import BoolArray, FloatArray, positive_number, real_number
 from armlock.controllers import Controller
 from armlock.loops import Loop, buildable_loop, flight_loop, paper_loop, robust_loop
 from armlock.orbits.constellation import Constellation
+from armlock.robustness.differences import stable_for_all_differences
 from armlock.robustness.regions import is_stable
 from armlock.sensors import dual
 from armlock.stability.roots import rightmost_root
@@ -140,9 +141,28 @@ def half_difference(orbits: Constellation, master: int, start: float, stop: floa
     return Course(half, start, stop)
 
 
+class HeldRange(NamedTuple):
+    """Between which true over held half differences a frozen loop is stable.
+
+    Attributes
+    ----------
+    low, high : float
+        The edges around one. On their inner side the loop is stable, on their outer side it is
+        not, both certified. 0 or inf where no edge was found within a factor of 1e5, or before
+        the half difference reaches the mean.
+    certified : bool
+        Whether it is certified that the loop is stable at every ratio in between. If not,
+        ratios were only tried in steps of a quarter.
+    """
+
+    low: float
+    high: float
+    certified: bool
+
+
 def held_range(
     loop: LoopInOrbit, held: float, mean: float, precision: float = 1e-7
-) -> tuple[float, float]:
+) -> HeldRange:
     """Find between which true over held half differences a frozen loop is stable.
 
     Parameters
@@ -158,11 +178,7 @@ def held_range(
 
     Returns
     -------
-    low, high : float
-        The edges around one. On their inner side the loop is stable, on their outer side it is
-        not, both certified. In between ratios were tried in steps of a quarter: that the loop
-        is stable at all of them is not certified. 0 or inf where no edge was found within a
-        factor of 1e5, or before the half difference reaches the mean.
+    HeldRange
 
     Raises
     ------
@@ -172,33 +188,43 @@ def held_range(
 
     Examples
     --------
-    >>> from armlock.orbits.passages import flight, held_range
-    >>> low, high = held_range(flight, 0.0325469, 16.65)
-    >>> print(f"{low:.7f} {high:.5f}")
-    0.0010107 2.32835
+    >>> from armlock.orbits.passages import held_range, loops
+    >>> low, high, certified = held_range(loops()["paper"], 0.0325469, 16.65)
+    >>> print(f"{low:.7f} {high:.5f} {certified}")
+    0.2003803 3.99740 True
     """
     held, mean = real_number("held", held), positive_number("mean", mean)
     width = positive_number("precision", precision)
 
-    def stable(ratio: float) -> bool:
+    def frozen(ratio: float) -> Loop:
         half = ratio * held
-        return bool(is_stable(loop(mean + half, mean - half, held)))
+        return loop(mean + half, mean - half, held)
+
+    def stable(ratio: float) -> bool:
+        return bool(is_stable(frozen(ratio)))
 
     if not stable(1.0):
         raise ValueError(f"loop must be stable with a true value held, got held={held}")
-    edges = []
+    edges, reached = [], []
     for step, end in ((1.0 / _TRIED, 0.0), (_TRIED, np.inf)):
         inner, outer = 1.0, step
         while 1.0 / _FARTHEST < outer < min(_FARTHEST, mean / abs(held)) and stable(outer):
             inner, outer = outer, outer * step
-        if not 1.0 / _FARTHEST < outer < min(_FARTHEST, mean / abs(held)):
-            edges.append(end)
-            continue
-        while abs(outer / inner - 1.0) > width:
+        found = 1.0 / _FARTHEST < outer < min(_FARTHEST, mean / abs(held))
+        while found and abs(outer / inner - 1.0) > width:
             middle = float(np.sqrt(inner * outer))
             inner, outer = (middle, outer) if stable(middle) else (inner, middle)
-        edges.append(inner)
-    return edges[0], edges[1]
+        edges.append(inner if found else end)
+        reached.append(inner)
+    # The certificate is for one sensor and controller: the round trips alone may change.
+    ends = [frozen(ratio) for ratio in reached]
+    alike = all(
+        np.allclose(p.coefficients, q.coefficients, rtol=1e-12, atol=0.0)
+        for p, q in zip(*(end.polynomials() for end in ends), strict=True)
+    )
+    low, high = sorted(ratio * held for ratio in reached)
+    certified = alike and stable_for_all_differences(ends[0], low, high)
+    return HeldRange(edges[0], edges[1], certified)
 
 
 class Hold(NamedTuple):
@@ -241,7 +267,7 @@ def policies(half: Course) -> dict[str, list[Hold]]:
     return found
 
 
-def lost(half: Course, holds: Sequence[Hold], edges: tuple[float, float]) -> list[Hold]:
+def lost(half: Course, holds: Sequence[Hold], edges: HeldRange) -> list[Hold]:
     """Return the stretches on which the frozen loop is unstable.
 
     Parameters
@@ -250,7 +276,7 @@ def lost(half: Course, holds: Sequence[Hold], edges: tuple[float, float]) -> lis
         Of the half difference.
     holds : sequence of Hold
         What the sensor holds.
-    edges : tuple of two floats
+    edges : HeldRange
         True over held, as `held_range` finds them.
 
     Returns
@@ -260,10 +286,10 @@ def lost(half: Course, holds: Sequence[Hold], edges: tuple[float, float]) -> lis
     """
     found = []
     for start, stop, held in holds:
-        levels = [edge * held for edge in edges if np.isfinite(edge)]
+        levels = [edge * held for edge in edges[:2] if np.isfinite(edge)]
         inner = np.concatenate([half.times(level, start, stop) for level in levels])
         for low, high in pairwise(np.unique([start, *inner.tolist(), stop]).tolist()):
-            if not edges[0] < float(half(0.5 * (low + high))) / held < edges[1]:
+            if not edges.low < float(half(0.5 * (low + high))) / held < edges.high:
                 found.append(Hold(low, high, held))
     return found
 
@@ -382,6 +408,7 @@ __all__ = [
     "MONTH",
     "YEAR",
     "Course",
+    "HeldRange",
     "Hold",
     "LoopInOrbit",
     "days",

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from textwrap import wrap
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
-from scipy.optimize import minimize_scalar
-from scipy.stats import binom
 
-from armlock.checks import FloatArray, positive_array, real_number
-from armlock.loops import Loop
+from armlock.checks import FloatArray, real_number
 from armlock.orbits.constellation import SPEED_OF_LIGHT, Constellation
 from armlock.orbits.passages import (
     DAY,
     YEAR,
     Course,
+    HeldRange,
     Hold,
     LoopInOrbit,
     days,
@@ -30,6 +27,7 @@ from armlock.orbits.passages import (
 )
 from armlock.orbits.tdi import flexing, ranging_residual
 from armlock.performance.budget import free_running
+from armlock.performance.pulling import Peak, largest_pulling
 from armlock.performance.transfer import transfer
 
 if TYPE_CHECKING:
@@ -37,102 +35,10 @@ if TYPE_CHECKING:
 
 #: X2 is told at this frequency, in Hz, for a ranging error of so many metres.
 FREQUENCY, RANGING_ERROR = 3e-3, 1.0
-# The largest pulling is looked for from one second to so many days.
-_PULLED_FROM, _PULLED_TO = 1.0, 60.0
-# The Fourier series of an inverse Laplace transform: its terms, the last of them that are
-# averaged, and the exponent A; exp(-A) is its error.
-_TERMS, _AVERAGED, _EXPONENT = 300, 12, 18.4
 # Edges are those at this share of the largest half difference.
 _SHARE = 0.25
 # Masters are kept until their half difference is this share of what can always be had.
 _FLOOR = 0.9
-
-
-class Peak(NamedTuple):
-    """The largest pulling by a step of 1 Hz: in Hz, and how many s after it began."""
-
-    size: float
-    time: float
-
-
-def pulled_by_a_step(loop: Loop, source: str, time: npt.ArrayLike) -> FloatArray:
-    r"""Return how far 1 Hz pulls a stable loop, also soon after it begins.
-
-    By a Fourier series of the inverse Laplace transform, summed up after Euler,
-
-    .. math::
-
-        y(t) \approx \frac{e^{A/2}}{t} \left[ \tfrac12\, Y\!\left( \tfrac{A}{2t} \right)
-        + \sum_{k \ge 1} (-1)^k\, \mathrm{Re}\, Y\!\left( \tfrac{A + 2\pi k j}{2t} \right)
-        \right] , \qquad A = 18.4 .
-
-    `armlock.pulling` certifies its sums, and therefore refuses times at which the arms' echoes
-    still count. Here nothing is certified.
-
-    Parameters
-    ----------
-    loop : Loop
-        The loop, stable at c1 = c2 = 1.
-    source : {"common", "differential"}
-        Whether the error is in the sum or in the difference of the arms.
-    time : array_like of float
-        In s after the error's beginning, positive; any shape.
-
-    Returns
-    -------
-    float array, shaped like `time`
-        In Hz.
-
-    References
-    ----------
-    J. Abate and W. Whitt, ORSA J. Computing 7, 36 (1995).
-    """
-    t = positive_array("time", time)
-    k = np.arange(_TERMS + 1)
-    signs = (-1.0) ** k
-    signs[0] = 0.5
-    # The last partial sums are averaged with binomial weights.
-    weights = binom.cdf(_TERMS - k, _AVERAGED, 0.5) * signs
-    found = np.empty(t.size)
-    for at, one in enumerate(t.ravel()):
-        s = (_EXPONENT + 2j * np.pi * k) / (2.0 * one)
-        found[at] = np.dot(weights, (transfer(loop, source, s) / s).real) / one
-    return np.asarray(np.exp(0.5 * _EXPONENT) * found.reshape(t.shape))
-
-
-def largest_pulling(loop: Loop, source: str) -> Peak:
-    """Find the largest pulling by 1 Hz, from one second on.
-
-    Parameters
-    ----------
-    loop : Loop
-        A stable loop.
-    source : {"common", "differential"}
-        Whether the error is in the sum or in the difference of the arms.
-
-    Returns
-    -------
-    Peak
-        The highest of samples, half a second apart for ten round trips and then two percent,
-        is refined between its neighbours. It is not certified.
-
-    Raises
-    ------
-    TypeError, ValueError
-        As `armlock.transfer`.
-    """
-    soon = np.arange(_PULLED_FROM, 10.0 * loop.longest_delay, 0.5)
-    times = np.concatenate((soon, np.geomspace(soon[-1], _PULLED_TO * DAY, 600)[1:]))
-    sizes = np.abs(pulled_by_a_step(loop, source, times))
-    at = int(np.argmax(sizes))
-    low, high = times[max(at - 1, 0)], times[min(at + 1, times.size - 1)]
-    found = minimize_scalar(
-        lambda t: -abs(float(pulled_by_a_step(loop, source, t))),
-        bounds=(low, high),
-        method="bounded",
-    )
-    size, time = max((-float(found.fun), float(found.x)), (float(sizes[at]), float(times[at])))
-    return Peak(size, time)
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +55,7 @@ class Survey:
         The spacecraft with the locked laser.
     halves : dict of int to Course
         Half differences by master.
-    edges : tuple of two floats
+    edges : HeldRange
         Between which true over held half differences the loop is stable, at a held value of a
         quarter of the largest one.
     lost : dict of str to list of Hold
@@ -170,7 +76,7 @@ class Survey:
     orbits: Constellation
     master: int
     halves: dict[int, Course]
-    edges: tuple[float, float]
+    edges: HeldRange
     lost: dict[str, list[Hold]]
     floor: float
     floor_time: float
@@ -211,12 +117,14 @@ class Survey:
 
     def __str__(self) -> str:
         """Say all of it, a line each."""
-        low, high = self.edges
+        low, high, certified = self.edges
+        between = "certified" if certified else "in between only tried in steps of a quarter"
+        standing = {True: "", False: " (not certified)"}
         lines = [
             f"t = 0 at epoch {self.orbits.epoch} ({self.orbits.scale})",
             f"master {self.master}, {self.years:.2f} years, half difference up to "
             f"{1e3 * self.largest:.2f} ms, {self.half.times().size} zeros",
-            f"stable for true/held from {low:.5g} to {high:.5g}",
+            f"stable for true/held from {low:.5g} to {high:.5g} ({between})",
             "",
             f"{'held value':15s} {'stable days a year':>18s} {'outages':>8s} {'longest':>10s}",
         ]
@@ -236,9 +144,10 @@ class Survey:
             *wrap(plan, 78),
             "",
             f"pulling by 1 Hz in the sum: {self.common.size:.4g} Hz after "
-            f"{self.common.time:.4g} s",
+            f"{self.common.time:.4g} s{standing[self.common.certified]}",
             f"pulling by 1 Hz in the difference: {self.differential.size:.4g} Hz after "
-            f"{self.differential.time:.4g} s, at {1e3 * self.largest:.2f} ms; as 1/half else",
+            f"{self.differential.time:.4g} s{standing[self.differential.certified]}, "
+            f"at {1e3 * self.largest:.2f} ms; as 1/half else",
             f"X2 at 3 mHz, free-running laser, 1 m: {x2.min():.3g} to {x2.max():.3g} "
             f"Hz/sqrt(Hz) at {t.size} times",
         ]
@@ -356,11 +265,4 @@ def survey(
     )
 
 
-__all__ = [
-    "Peak",
-    "Survey",
-    "largest_pulling",
-    "outages",
-    "pulled_by_a_step",
-    "survey",
-]
+__all__ = ["Survey", "outages", "survey"]

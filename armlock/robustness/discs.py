@@ -15,12 +15,13 @@ from typing import NamedTuple
 import numpy as np
 
 from armlock.axis.compiled import njit
-from armlock.axis.contour import MOST_STEPS
 from armlock.axis.exponentials import EPSILON
-from armlock.checks import ComplexArray, FloatArray, IntArray
+from armlock.checks import BoolArray, ComplexArray, FloatArray, IntArray
 
 # Turns of the longest delay after which the disc is tried again where it did not help.
 _TURNS = 32.0
+# A comparison of a disc with its target takes as long as so many steps of a walk along D.
+_AS_STEPS = 4
 # The shortest step of `free_margins`, over omega.
 _SHORTEST = 1e-12
 # Where the disc may touch the unit circle it is taken for larger by this share. Roots closer to
@@ -331,22 +332,26 @@ def _misses_segment(disc: _Disc, step: float, near: float, far: float) -> bool:
     return False
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def intervals_not_clear(
     arms: Arms,
     segment: FloatArray,
     levels: FloatArray,
     span: tuple[float, float],
     per_turn: float,
-) -> FloatArray:
+    most: int,
+    stop: BoolArray,
+) -> tuple[FloatArray, bool]:
     """Intervals, shape (n, 2), of a span of the axis outside which L stays off a target.
 
     The target is a segment of the negative real axis, given by its nearer and its farther end;
-    or, where that is empty, all that has margins below `levels`.
+    or, where that is empty, all that has margins below `levels`. What is left of the span after
+    `most` steps, or once `stop` is set, belongs to the last interval. Returns them, and whether
+    nothing was left.
     """
-    found, number = np.empty((64, 2)), 0
+    found, number, compared = np.empty((64, 2)), 0, 0
     omega, omega_end = span
-    step = omega_end
+    step, complete = omega_end, True
     while omega < omega_end:
         # Next to zero whole turns are too long.
         shortest = max(min(_TURNS * per_turn, 0.03 * omega), 3e-4 * omega, 1e-3 * per_turn)
@@ -354,6 +359,7 @@ def intervals_not_clear(
         step = min(4.0 * step, 0.5 * disc.nearest, omega_end - omega)
         clear = False
         while step > shortest and not clear:
+            compared += _AS_STEPS
             if segment.size:
                 clear = _misses_segment(disc, step, segment[0], segment[1])
             else:
@@ -362,6 +368,9 @@ def intervals_not_clear(
                 step *= 0.5
         step = step if clear else shortest
         end = min(omega + step, omega_end)
+        complete = compared <= most and not stop[0]
+        if not complete:
+            clear, end = False, omega_end
         if not clear and number and found[number - 1, 1] == omega:
             found[number - 1, 1] = end
         elif not clear:
@@ -370,7 +379,7 @@ def intervals_not_clear(
             found[number, 0], found[number, 1] = omega, end
             number += 1
         omega = end
-    return found[:number]
+    return found[:number], complete
 
 
 @njit(cache=True)
@@ -417,13 +426,20 @@ def free_margins_over(arms: Arms, omega: FloatArray) -> FloatArray:
 
 
 @njit(cache=True)
-def _longest_step(disc: _Disc, omega: float, step: float, levels: FloatArray) -> float:
-    """Longest of step, step / 2, ... over which no margin is below its level, or 0."""
+def _longest_step(
+    disc: _Disc, omega: float, step: float, levels: FloatArray
+) -> tuple[float, int]:
+    """Longest of step, step / 2, ... over which no margin is below its level, or 0.
+
+    And how many of them were compared.
+    """
+    compared = 0
     while step > _SHORTEST * omega:
+        compared += 1
         if _nothing_smaller(disc, omega, step, levels):
-            return step
+            return step, compared
         step *= 0.5
-    return 0.0
+    return 0.0, compared
 
 
 @njit(cache=True)
@@ -436,21 +452,27 @@ def _keep_smaller(best: FloatArray, where: FloatArray, here: FloatArray, omega: 
     return smaller
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def free_margins(
-    arms: Arms, omega: float, omega_end: float, best: FloatArray, tolerance: FloatArray
+    arms: Arms,
+    omega: float,
+    omega_end: float,
+    best: FloatArray,
+    tolerance: FloatArray,
+    most: int,
+    stop: BoolArray,
 ) -> tuple[FloatArray, FloatArray, bool]:
     """Smallest margins of the disc that L fills with free phases, from omega to `omega_end`.
 
     `best` holds values that are known to occur, or inf. Returns the smallest values, where they
     were met (nan for those of `best`), and whether the walk came to its end, which it does not
-    if it is too long, or a root lies on the axis. None is smaller than the result by more than
-    its share `tolerance`. Where the disc only touches the unit circle, phase and delay may be
-    those of a disc that is larger by a part in 1e9.
+    if it takes more than `most` steps, `stop` is set, or a root lies on the axis. None is
+    smaller than the result by more than its share `tolerance`. Where the disc only touches the
+    unit circle, phase and delay may be those of a disc that is larger by a part in 1e9.
     """
     best, where = best.copy(), np.full(4, np.nan)
-    step = omega_end
-    for _ in range(MOST_STEPS // 8):
+    step, compared = omega_end, 0
+    while _AS_STEPS * compared <= most and not stop[0]:
         disc = _disc(arms, omega)
         if disc.nearest <= _GROWN * omega:
             break
@@ -463,12 +485,14 @@ def free_margins(
         step = min(2.0 * step, 0.5 * disc.nearest, omega_end - omega)
         while falls and step > _SHORTEST * omega:
             # On the way down steps would get ever shorter without a look ahead.
+            compared += 1
             if _nothing_smaller(disc, omega, step, (1.0 - tolerance) * best):
                 break
             here = free_margins_over(arms, np.array([omega + step]))[0]
             _keep_smaller(best, where, here, omega + step)
             step *= 0.5
-        step = _longest_step(disc, omega, step, (1.0 - tolerance) * best)
+        step, more = _longest_step(disc, omega, step, (1.0 - tolerance) * best)
+        compared += more + 1
         if step == 0.0:
             # The disc may touch the unit circle next to here. It then covers a short arc of it,
             # and a little later a longer one.
@@ -476,7 +500,8 @@ def free_margins(
             here[MODULUS], here[RATIO] = np.inf, np.inf
             _keep_smaller(best, where, here, omega)
             step = min(_GROWN * omega, 0.5 * disc.nearest)
-            step = _longest_step(disc, omega, step, (1.0 - tolerance) * best)
+            step, more = _longest_step(disc, omega, step, (1.0 - tolerance) * best)
+            compared += more
         if step == 0.0:
             # Over the shortest step only the distances are left to be certified.
             step, levels = _SHORTEST * omega, (1.0 - tolerance) * best

@@ -186,7 +186,9 @@ def meeting_intervals(
     `armlock.robustness.discs.intervals_not_clear`. With `free`, as for `arms_of`, they hold for
     all smaller |c1| and |c2|, too.
     """
-    found: FloatArray = discs.intervals_not_clear(
+    found: FloatArray
+    found, _ = contour.heard(
+        discs.intervals_not_clear,
         arms_of(point, free=free),
         np.array(segment),
         np.array(levels),
@@ -264,8 +266,8 @@ def clear_above(point: LoopAt, free_above: float) -> bool:
     if end <= free_above:
         return True
     least = np.array([_TOUCHING, 0.0, 0.0, 0.0])
-    nearest, _, complete = discs.free_margins(
-        arms_of(point, free=True), free_above, end, least, np.zeros(4)
+    nearest, _, complete = contour.heard(
+        discs.free_margins, arms_of(point, free=True), free_above, end, least, np.zeros(4)
     )
     return bool(complete) and nearest[discs.MODULUS] == _TOUCHING
 
@@ -299,8 +301,10 @@ def _count_below(point: LoopAt, omega: float) -> int | None:
         if begin is None or begin[0] >= omega:
             return None
         none = np.zeros(whole.sums.size)
-        argument, value, clear = contour.winding(whole.compiled(), none, begin[0], omega)
-        if not clear or np.isnan(argument):
+        argument, value, clear, _, _ = contour.heard(
+            contour.winding, whole.compiled(), none, begin[0], omega
+        )
+        if not clear:
             return None
         arguments.append(begin[1] + argument)
         values.append(value)

@@ -291,8 +291,8 @@ class Ray:
         return loop_count(self.system, c1, c2)
 
     def _terms_at_zero(self, loop: Loop) -> tuple[list[Fraction], list[Fraction]]:
-        """p_k and q_k of D(s; t) = sum_k (p_k + t q_k) s^k, up to the first power of R."""
-        number = int(np.flatnonzero(loop.rest)[0]) + 1
+        """p_k and q_k of D(s; t) = sum_k (p_k + t q_k) s^k, up to one past the first of R."""
+        number = int(np.flatnonzero(loop.rest)[0]) + 2
         begin = [Fraction(value) for value in self.start.tolist()]
         end = [a + Fraction(d) for a, d in zip(begin, self.direction.tolist(), strict=True)]
         here, there = (
@@ -324,21 +324,25 @@ class Ray:
 
         Of D(s; t) = sum_k (p_k + t q_k) s^k the first terms vanish for all t, and with them the
         walk's D0 / M at s = 0. The loop's own root passes where the first that is left does,
-        at t = -p_k / q_k.
+        at t = -p_k / q_k. With r = p_(k+1) + t q_(k+1) it goes right there if q_k / r < 0.
         """
         if not isinstance(self.system, Loop):
             return _NONE
         here, change = self._terms_at_zero(self.system)
-        cancelled = next(
-            (k for k, pair in enumerate(zip(here, change, strict=True)) if any(pair)), 0
-        )
+        pairs = enumerate(zip(here[:-1], change, strict=False))
+        cancelled = next((k for k, pair in pairs if any(pair)), 0)
         p, q = here[cancelled], change[cancelled]
         if cancelled == 0 or q == 0 or not 0 < -p / q <= stop:
             return _NONE
-        t = float(-p / q)
+        t, following = float(-p / q), here[cancelled + 1] - p / q * change[cancelled + 1]
+        if following:
+            return Crossings(
+                np.array([t]), np.zeros(1), np.array([1 if q * following < 0 else -1])
+            )
+        # Two roots or more pass: counts tell.
         (_, before), (_, after) = (self.count_beside(t, side, 1e-9) for side in (-1, 1))
         if min(before, after) < 0:
-            raise self._hides(t, "where a root passes s = 0")
+            raise self._hides(t, "where roots pass s = 0")
         if before == after:
             return _NONE
         return Crossings(np.array([t]), np.zeros(1), np.array([after - before]))

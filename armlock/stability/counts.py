@@ -176,8 +176,8 @@ def axis_zeros(
             raise CountError(
                 f"no crossings up to omega = {end}: a number overflows", _NO_POINTS
             )
-        zeros, complete = contour.imaginary_zeros(
-            summed[0], under, start, end, is_map, ROUNDING
+        zeros, complete = contour.heard(
+            contour.imaginary_zeros, summed[0], under, start, end, is_map, ROUNDING
         )
         if not complete:
             raise CountError(

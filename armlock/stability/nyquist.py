@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from armlock.axis.contour import MOST_SAMPLES, argument_at, resolved_grid
+from armlock.axis.contour import MOST_SAMPLES, argument_at, heard, resolved_grid
 from armlock.checks import (
     BoolArray,
     ComplexArray,
@@ -163,13 +163,16 @@ def _resolving_grid(loop: Loop, c1: float, c2: float, end: float) -> FloatArray:
     """Frequencies from 0 to `end` between which neither D nor R turns by much."""
     grids = []
     for part in (loop.sum_at(c1, c2), loop.rest_on_boundary()):
-        grids.append(resolved_grid(part.compiled(), end, _STRAIGHT, MOST_SAMPLES))
-    if any(grid[-1] < end for grid in grids):
-        raise CountError(
-            f"no samples up to omega = {end} rad/s: more than {MOST_SAMPLES:.0e}, "
-            f"because gain times delay is too large",
-            np.empty((0, 2)),
+        grid, complete = heard(
+            resolved_grid, part.compiled(), end, _STRAIGHT, most=MOST_SAMPLES
         )
+        if not complete:
+            raise CountError(
+                f"no samples up to omega = {end} rad/s: more than {MOST_SAMPLES:.0e}, "
+                f"because gain times delay is too large",
+                np.empty((0, 2)),
+            )
+        grids.append(grid)
     return np.unique(np.concatenate(grids))
 
 

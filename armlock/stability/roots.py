@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
-from armlock.axis.contour import resolved_grid
+from armlock.axis.contour import heard, resolved_grid
 from armlock.axis.exponentials import EPSILON
 from armlock.characteristic import CharacteristicFunction, broadcast_parameters, checked_system
 from armlock.checks import (
@@ -38,10 +38,12 @@ _FARTHEST = 1e-6
 # exponential: a second each.
 _LONGEST_COUNT = 1e6
 _LONGEST_SEARCH = 1e5
-# The search for one root ends once its walks have cost so many steps, some five seconds. A line
-# costs its points, and a count that cannot be told the second number.
+# The search for one root ends once it has cost so many steps of a walk, some five seconds. A
+# count that cannot be told costs the second number. So does a root that extended precision does
+# not settle at, a fifth of it; one that it does settle at takes a twentieth of its steps.
 _ALL_STEPS = 3e6
 _DOUBTFUL_COUNT = 5e5
+_LOST_ROOT, _POLISHED_ROOT = 1e5, 5e3
 # Most points of one line: where rounding hides D, there would be no end of them.
 _MOST_POINTS = 1_000_000
 # Roots left of a line may lie further up than those right of it. They are looked for so many
@@ -242,8 +244,10 @@ class _Line:
         Up to so many turns, from those `most` starts whose first step leads furthest right.
         """
         whole = self.shifted.sum_at(self.x, self.y).compiled()
-        s = self.sigma + 1j * resolved_grid(whole, turns * self.per_turn, 1.0, _MOST_POINTS)
-        self.steps += s.size
+        grid, _ = heard(resolved_grid, whole, turns * self.per_turn, 1.0, most=_MOST_POINTS)
+        s = self.sigma + 1j * grid
+        # A point costs a step of the walk, and one of Newton's method.
+        self.steps += 2 * s.size
         # From where a step of Newton's method is locally shortest: no root close to the line
         # lies between two of its points.
         # Part by part, because arrays of millions would spend their time on memory.
@@ -256,6 +260,7 @@ class _Line:
     def followed(self, s: ComplexArray, steps: int) -> tuple[ComplexArray, FloatArray]:
         """Follow Newton's method; return where it leads, with Im s >= 0, and the last steps."""
         length = np.empty(s.size)
+        self.steps += steps * s.size
         for _ in range(steps):
             s, length = self._step(s)
         return s.real + 1j * np.abs(s.imag), length
@@ -277,7 +282,9 @@ class _Line:
             try:
                 root = _polished(self.system, self.x, self.y, slowest)
             except RootError:
+                self.steps += _LOST_ROOT
                 continue
+            self.steps += _POLISHED_ROOT
             return root, float(top.real - slowest.real)
         return None
 
@@ -342,26 +349,6 @@ def roots_right_of(
     )
 
 
-def roots_up_to(
-    system: CharacteristicFunction, x: float, y: float, turns: float
-) -> ComplexArray:
-    """Find roots near the axis up to so many turns of the longest delay; none is certified.
-
-    As `roots_right_of` gives them, of stable ones. Newton's method starts around s = 0 and at
-    four places of each turn.
-    """
-    line = _Line(system, x, y, 0.0)
-    unit = line.per_turn / (2.0 * np.pi)
-    sizes = unit * np.geomspace(_SLOWEST, 4.0, 200)
-    starts = np.append(
-        np.outer(sizes, np.exp(1j * _ANGLES)), 1j * line.per_turn * np.arange(0.75, turns, 0.25)
-    )
-    s, length = line.followed(starts, 40)
-    kept = (length <= 1e-10 * np.abs(s)) & (np.abs(s) > 1e-13 * unit) & (s.real < 0.0)
-    found = _distinct(s[kept])
-    return found[np.argsort(np.abs(found))]
-
-
 def _all_near(line: _Line, unit: float) -> Iterator[tuple[ComplexArray, FloatArray]]:
     """Yield where Newton's method leads, and its last steps, until all walks are too long."""
     # Slow roots lie close to each other, anywhere around zero.
@@ -373,6 +360,8 @@ def _all_near(line: _Line, unit: float) -> Iterator[tuple[ComplexArray, FloatArr
         turns = min(8.0 * max(turns, _FURTHER), line.turns)
         for share in (1.0, 0.3, 0.1, 0.0):
             one = _Line(line.system, line.x, line.y, share * line.sigma)
+            # That of the delays that act on no root so far to the right, if none is left.
+            one.per_turn = line.per_turn
             yield one.near(turns, 2 * _MOST_ROOTS)
             steps += one.steps
             if steps > _ALL_STEPS:

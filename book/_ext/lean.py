@@ -3,7 +3,7 @@
 Icons: the theme ships 2 045 of them, 1.4 MB. Those stay whose name a page or a script names.
 Styles: a rule goes if each of its selectors asks for a class that occurs in no page and in no
 script; what a script puts together from parts would be missed, and `KEPT` names it. The live
-pages' scripts are shipped without comments and indentation.
+pages' scripts are shipped without comments, and with no space that says nothing.
 """
 
 import re
@@ -16,6 +16,11 @@ ICON_NAME = re.compile(r"\bfa-([a-z0-9-]+)")
 CLASS = re.compile(r"\.(-?[A-Za-z_][\w-]*)")
 WORD = re.compile(r"[\w-]+")
 COMMENT = re.compile(r"(?m)^[ ]*(?:/\*(?:.|\n)*?\*/|//.*)\n")
+# In a script, what stays as it is: texts, regular expressions, and where a template begins.
+LITERAL = re.compile(
+    r"""(?x) "(?:[^"\\\n]|\\.)*" | '(?:[^'\\\n]|\\.)*' | `
+    | (?<=[(,=:!&|?{};\n])\s* /(?![*/]) (?:[^/\\\n[] | \\. | \[(?:[^]\\\n]|\\.)*\])+ /[a-z]*"""
+)
 # Bootstrap joins these from parts.
 KEPT = (
     "bs-",
@@ -85,6 +90,43 @@ def matches(selector, words):
     return all(name in words or name.startswith(KEPT) for name in names)
 
 
+def template_end(text, start):
+    """Return where a template ends that begins at a backquote."""
+    at, depth = start + 1, 0
+    while text[at] != "`" or depth:
+        if text[at] == "`":
+            at = template_end(text, at) - 1
+        elif text[at] == "\\":
+            at += 1
+        elif text.startswith("${", at) or (depth and text[at] == "{"):
+            depth += 1
+            at += text[at] == "$"
+        elif depth and text[at] == "}":
+            depth -= 1
+        at += 1
+    return at + 1
+
+
+def without_space(text):
+    """Return code that quotes nothing without the spaces and lines that say nothing."""
+    text = re.sub(r"\s*\n\s*", "\n", text)
+    text = re.sub(r" *([][{}(),;:?=<>&|*/!%^]) *", r"\1", text)
+    text = re.sub(r"(?<![+-]) ([+-]) (?![+-])", r"\1", text)
+    # A line may end a statement, but not here.
+    return re.sub(r"\n?([,;:?=<>&|*([{])\n?", r"\1", text)
+
+
+def shortened(text):
+    """Return a script without comments and needless space. Statements end in a semicolon."""
+    text, parts, at = COMMENT.sub("", text), [], 0
+    while literal := LITERAL.search(text, at):
+        parts.append(without_space(text[at : literal.start()]))
+        end = literal.end() if literal[0] != "`" else template_end(text, literal.start())
+        parts.append(text[literal.start() : end].strip())
+        at = end
+    return "".join([*parts, without_space(text[at:])])
+
+
 def lean(app, exception):
     """Thin out the scripts and styles of the built pages."""
     if exception is not None or app.builder.format != "html":
@@ -111,8 +153,7 @@ def lean(app, exception):
         bare = re.sub(r"/\*(?!!)(?:.|\n)*?\*/", "", text)
         file.write_text(thin(bare, words), encoding="utf-8")
     for file in (static / "live").glob("*.js"):
-        text = COMMENT.sub("", file.read_text(encoding="utf-8"))
-        file.write_text(re.sub(r"(?m)^[ ]+", "", text), encoding="utf-8")
+        file.write_text(shortened(file.read_text(encoding="utf-8")), encoding="utf-8")
 
 
 def setup(app):

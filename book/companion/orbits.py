@@ -15,6 +15,7 @@ from armlock.orbits.passages import (
     DAY,
     YEAR,
     Course,
+    HeldRange,
     days,
     frozen_rate,
     growth,
@@ -59,7 +60,7 @@ def zeros_by_year(orbit: str) -> dict[int, list[int]]:
 
 
 @shared
-def ranges() -> dict[str, tuple[float, float]]:
+def ranges() -> dict[str, HeldRange]:
     """Return between which true over held half differences each loop is stable."""
     return {
         name: held_range(loop, HELD, MEAN, 1e-3 if name == "buildable" else 1e-7)

@@ -163,13 +163,16 @@ const armlockDraw = (function () {
       let largest = 1;
       for (const count of counts) if (count > largest) largest = count;
       const picture = element("canvas", { width: n, height: n }), image = new ImageData(n, n);
+      // Of each count its colour as one number, the lowest byte first.
+      const packed = ([r, g, b]) => 0xff000000 + (Math.round(b) << 16) + (Math.round(g) << 8) + Math.round(r);
+      const shades = Array.from({ length: largest + 1 }, (_, count) => packed(count === 0 ? colours.stable
+        : colours.few.map((v, m) => v + Math.sqrt(count / largest) * (colours.many[m] - v))));
+      const [lost, unsure] = [packed(colours.lost), colours.unsure.map(packed)];
+      const pixels = new Uint32Array(image.data.buffer);
       for (let j = 0; j < n; j++) for (let i = 0; i < n; i++) {
-        const count = counts[j * n + i], t = Math.sqrt(count / largest), k = 4 * ((n - 1 - j) * n + i);
-        const colour = count === -3 ? colours.unsure[(i + j) * 100 / n % 8 < 4 ? 0 : 1]
-          : count === -2 ? colours.lost : count === -1 ? [0, 0, 0] : count === 0 ? colours.stable
-            : colours.few.map((v, m) => v + t * (colours.many[m] - v));
-        image.data.set(colour, k);
-        image.data[k + 3] = 255;
+        const count = counts[j * n + i];
+        pixels[(n - 1 - j) * n + i] = count >= 0 ? shades[count] : count === -2 ? lost
+          : unsure[(i + j) * 100 / n % 8 < 4 ? 0 : 1];
       }
       picture.getContext("2d").putImageData(image, 0, 0);
       this.picture = { picture, dark: colours.dark };
@@ -397,10 +400,16 @@ const armlockDraw = (function () {
     }
   }
 
-  /* A line through n places. */
+  /* A line through n places. One that is no farther than half a pixel from the one before goes. */
   function curve(pen, n, place) {
+    let u = Infinity, v = Infinity;
     pen.beginPath();
-    for (let i = 0; i < n; i++) pen.lineTo(...place(i));
+    for (let i = 0; i < n; i++) {
+      const [x, y] = place(i);
+      if (Math.abs(x - u) + Math.abs(y - v) < 0.5 && i < n - 1) continue;
+      pen.lineTo(x, y);
+      [u, v] = [x, y];
+    }
     pen.stroke();
   }
 
@@ -691,5 +700,55 @@ const armlockDraw = (function () {
     upright(pen, "laser's frequency", 2, top + high0 / 2);
   }
 
-  return { element, Sheet, Chart, curve, lines, upright, drawNyquist, drawBode, drawNoise, drawTime };
+  /* A year: half differences above, true and held (dashed), and the critical perturbation below. Days
+   * that were counted and are not stable are shaded in both. */
+  function drawYear({ values, days, day }, pen, wide, high, colours) {
+    const left = 56, right = 8, span = wide - left - right, room = (high - 74) / 2, last = values.length - 1;
+    const px = t => left + span * t / last;
+    const most = 1.1 * Math.max(...values.flat().map(Math.abs)) * 1e3, above = v => 8 + room * (most - v) / (2 * most);
+    pen.fillStyle = colours.mark;
+    days.forEach((found, t) => {
+      if (found !== null) return;
+      // As far as to the days beside it that were counted.
+      let from = t - 1, to = t + 1;
+      while (from > 0 && days[from] === undefined) from--;
+      while (to < last && days[to] === undefined) to++;
+      pen.globalAlpha = 0.3;
+      for (const y of [8, 26 + room])
+        pen.fillRect(px(0.5 * (from + t)), y, px(0.5 * (to + t)) - px(0.5 * (from + t)), room);
+      pen.globalAlpha = 1;
+      pen.fillRect(px(0.5 * (from + t)), 4, px(0.5 * (to + t)) - px(0.5 * (from + t)), 4);
+    });
+    pen.fillStyle = colours.text;
+    lines(pen, ticks(-most, most, 5), v => say(+v.toPrecision(6)), above, left, wide - right, colours);
+    upright(pen, "half difference in ms", 2, 8 + room / 2);
+    pen.strokeStyle = colours.line;
+    pen.lineWidth = 2;
+    curve(pen, values.length, t => [px(t), above(1e3 * values[t][0])]);
+    pen.lineWidth = 1;
+    ghost(pen, colours, () => curve(pen, values.length, t => [px(t), above(1e3 * values[t][1])]));
+    const found = days.map((v, t) => [t, v]).filter(([, v]) => v > 0 && v < Infinity);
+    const sizes = found.map(([, v]) => Math.log10(v)), first = Math.floor(Math.min(-1, ...sizes));
+    const top = Math.max(first + 1, ...sizes.map(Math.ceil));
+    const below = v => 26 + room + room * (top - Math.log10(v)) / (top - first);
+    lines(pen, Array.from({ length: top - first + 1 }, (_, k) => 10 ** (first + k)),
+      v => power(Math.round(Math.log10(v))), below, left, wide - right, colours);
+    upright(pen, "breaks at, along (1, \u22121)", 2, 26 + 1.5 * room);
+    pen.fillStyle = colours.line;
+    for (const [t, v] of found) pen.fillRect(px(t) - 1.5, below(v) - 1.5, 3, 3);
+    pen.strokeStyle = colours.mark;
+    pen.lineWidth = 2;
+    pen.beginPath();
+    pen.moveTo(px(day), 4);
+    pen.lineTo(px(day), 26 + 2 * room);
+    pen.stroke();
+    pen.fillStyle = colours.text;
+    pen.textAlign = "center";
+    pen.textBaseline = "top";
+    for (let t = 0; t <= last; t += 60) pen.fillText(String(t), px(t), 32 + 2 * room);
+    pen.textBaseline = "bottom";
+    pen.fillText("day", left + span / 2, high - 2);
+  }
+
+  return { element, Sheet, Chart, drawNyquist, drawBode, drawNoise, drawTime, drawYear };
 })();

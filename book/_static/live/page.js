@@ -10,7 +10,7 @@
 (function () {
   const here = document.currentScript.src;
   const files = ["loop.js", "margins.js", "chart.js", "time.js", "noise.js", "text.js",
-    "draw.js"];
+    "draw.js", ...document.querySelector("[data-live=year]") ? ["orbits.js"] : []];
   const missing = files.filter(name =>
     !Array.from(document.scripts).some(script => script.src.endsWith(`/live/${name}`)));
   Promise.all(missing.map(name => new Promise((done, failed) => {
@@ -30,7 +30,8 @@
 function armlockPages() {
   const { TURN, say, duration, written, list, readRoots, readPolynomial, readNumber, python, address,
     fromAddress, exact } = armlockText;
-  const { element, Sheet, Chart, drawNyquist, drawBode, drawNoise, drawTime } = armlockDraw;
+  const { element, Sheet, Chart, drawNyquist, drawBode, drawNoise, drawTime, drawYear }
+    = armlockDraw;
   const api = armlockLoop();
   Object.assign(api, armlockChart(api), armlockNoise(api));
 
@@ -86,12 +87,14 @@ function armlockPages() {
       breaks: spec => [[1, -1], [1, 1], [-1, -1]].map(
         ([x, y]) => api.firstBreak(api.make(spec), x, y)),
       margins: (spec, c1, c2) => api.margins(spec, c1, c2),
+      // Of one day of a year: where the loop first breaks along (1, -1).
+      day: spec => api.firstBreak(api.make(spec), 1, -1),
       time: (spec, c1, c2, trips) => api.inTime(spec, c1, c2, trips),
     };
     return ({ data: { kind, version, input } }) => {
       let result = null, error = null;
       try { result = look[kind.split(" ")[0]](...input); } catch (problem) { error = problem.message; }
-      postMessage({ kind, version, result, error });
+      postMessage({ kind, version, result, error }, result?.counts ? [result.counts.buffer] : []);
     };
   }
 
@@ -175,7 +178,7 @@ function armlockPages() {
       // What answers the pointer waits for nothing else.
       this.near = new Desk(["point", "root"]);
       this.wide = new Desk(["chart"]);
-      this.slow = new Desk(["time", ...TOLD, ...TOLD.map(kind => `${kind} of the pinned`)]);
+      this.slow = new Desk(["time", ...TOLD, ...TOLD.map(kind => `${kind} of the pinned`), "day"]);
       this.out = element("output", { role: "status", "aria-live": "polite" });
       this.note = element("p", { class: "live-note", role: "status" });
       this.numbers = element("table", { class: "live-numbers" });
@@ -277,7 +280,6 @@ function armlockPages() {
     forget() {
       this.chart.marked = null;
       this.shown = [1, 1];
-      this.out.textContent = HINT;
     }
 
     /* What was asked of a loop is asked no more. */
@@ -315,7 +317,11 @@ function armlockPages() {
       this.follow(this.shown);
       this.list();
       this.redraw(moving);
-      if (this.chart.marked) this.tell(this.chart.marked); else this.wait();
+      if (this.chart.marked) this.tell(this.chart.marked);
+      else {
+        this.out.textContent = HINT;
+        this.wait();
+      }
       this.told();
     }
 
@@ -366,6 +372,7 @@ function armlockPages() {
       if (!this.spec) return;
       const name = this.chart.name(point);
       this.near.drop("root");
+      clearTimeout(this.asked);
       this.shown = point;
       // What is told of a point is not told of another; the critical perturbation stays.
       for (const one of [this.design, this.pinned]) if (one) {
@@ -374,15 +381,13 @@ function armlockPages() {
       }
       this.follow(point);
       this.out.textContent = `${name}: counting \u2026`;
-      this.list();
+      if (!this.empty) this.list();
       this.near.ask("point", [this.spec, ...point], (count, error) => {
         this.out.textContent = error || `${name}: ${counted(count)}`;
-        if (count > -3) {
-          this.design.told.count = count;
-          this.list();
-          for (const plot of this.plots) plot.draw();
-        }
-        if (!error && count >= 0) this.root(point, this.out.textContent);
+        if (count > -3) this.design.told.count = count;
+        // What is left of the noise is drawn of stable loops only.
+        if (this.laser && count) this.plots.at(-1).draw();
+        if (!error && count >= 0) this.asked = setTimeout(() => this.root(point, this.out.textContent), 60);
       });
       this.wait();
       this.told();
@@ -405,6 +410,7 @@ function armlockPages() {
     }
 
     settle(point) {
+      this.list();
       for (const one of [this.design, this.pinned]) for (const kind of one ? TOLD : []) {
         if (one.told[kind] !== undefined || kind === "breaks" && one.breaking) continue;
         one.breaking ||= kind === "breaks";
@@ -422,6 +428,7 @@ function armlockPages() {
     /* The numbers of the loop, and of the pinned one beside it. */
     list() {
       if (!this.numbers.isConnected) return;
+      this.empty = !this.design || this.design.told.count === undefined;
       const designs = [this.design, this.pinned].filter(one => one), wait = "\u2026";
       const where = this.chart.marked ? this.chart.name(this.shown) : "(1, 1)";
       const or = (value, special, words) => Number.isNaN(value) ? "not sure"
@@ -850,6 +857,146 @@ function armlockPages() {
     if (!open()) start(Object.keys(PRESETS)[0]);
   }
 
+  /* A year in orbit: the arms, what the sensor holds, and where the loop stands each day. */
+  const ARMS = { 1: [0, 2], 2: [1, 0], 3: [2, 1] }, STEP = 5, YEAR = 365, MONTH = 365.25 / 12;
+  const HOLDS = ["the largest, all year", "the largest, with the right sign", "a month's start",
+    "a month's middle"];
+
+  /* Both round trips in s, as [t => tau1, t => tau2] with t in days: cubics through four entries. */
+  function arms(orbit, master) {
+    return ARMS[master].map(arm => t => {
+      const v = armlockOrbits[orbit][arm], k = Math.min(v.length - 4, Math.max(0, Math.floor(t / STEP)));
+      const x = t / STEP - k, [a, b, c, d] = v.slice(k, k + 4);
+      return 16.5 + 1e-6 * (b + 0.5 * x * (c - a + x * (2 * a - 5 * b + 4 * c - d
+        + x * (3 * (b - c) + d - a))));
+    });
+  }
+
+  function held(half, hold, t) {
+    if (hold === HOLDS[2]) return half(MONTH * Math.floor(t / MONTH));
+    if (hold === HOLDS[3]) return half(Math.min(YEAR, MONTH * (Math.floor(t / MONTH) + 0.5)));
+    let largest = 0;
+    for (let day = 0; day <= YEAR; day++) if (Math.abs(half(day)) > Math.abs(largest)) largest = half(day);
+    return hold === HOLDS[0] || half(t) < 0 === largest < 0 ? largest : -largest;
+  }
+
+  function year(place) {
+    const LOOPS = { "the white paper's": [FLIGHT, 6e-3], "the paper's": [PAPER, 1.5e-6] };
+    const live = new Live("Number of unstable roots over c1 and c2 on this day.");
+    const state = { loop: Object.keys(LOOPS)[0], orbit: Object.keys(armlockOrbits)[0], master: "1",
+      hold: HOLDS[0], day: 20 };
+    // Of each day that was counted: where the loop breaks, null where it is not stable.
+    let days = [], trips = null, half = null, values = [];
+    const words = element("p", { class: "live-note", role: "status" });
+    const spec = day => {
+      const [tau1, tau2] = trips.map(trip => trip(day));
+      return { ...LOOPS[state.loop][0], tau1, tau2, difference: 2 * held(half, state.hold, day) };
+    };
+    const sheet = new Sheet({ role: "img", "aria-label": "The year: true and held half difference, days on "
+      + "which the loop is not stable, and its critical perturbation along (1, \u22121)." }, 0.55,
+    (pen, ...rest) => drawYear({ values, days, day: state.day }, pen, ...rest));
+    for (const name of ["pointerdown", "pointermove"]) sheet.canvas.addEventListener(name, event => {
+      const box = sheet.canvas.getBoundingClientRect(), at = (event.clientX - box.left - 56) / (box.width - 64);
+      if (event.buttons && at >= 0 && at <= 1) { today.to(Math.round(at * YEAR)); move(Math.round(at * YEAR), true); }
+    });
+    sheet.canvas.addEventListener("pointerup", () => move(state.day, false));
+
+    /* Every sixteenth day first, then those between. */
+    const count = () => {
+      days = Array(YEAR + 1);
+      const order = [16, 8, 4, 2, 1].flatMap((step, k) => Array.from({ length: Math.ceil((YEAR + 1) / step) },
+        (_, i) => i * step).filter(day => !k || day % (2 * step)));
+      const next = () => {
+        const day = order.shift();
+        if (day === undefined) { summary(); return; }
+        live.slow.ask("day", [spec(day)], (found, error) => {
+          // A sensor that would divide by zero is no loop, and so not a stable one.
+          days[day] = error ? null : found;
+          sheet.draw();
+          next();
+        });
+      };
+      live.slow.drop("day");
+      next();
+    };
+    const summary = () => {
+      const parts = [];
+      for (let day = 0; day <= YEAR; day++) if (days[day] === null) {
+        const from = day;
+        while (days[day + 1] === null) day++;
+        parts.push(from === day ? `${day}` : `${from} to ${day}`);
+      }
+      lost.textContent = parts.length ? `Not stable on days ${parts.join(", ")}.`
+        : "Stable on every day of the year.";
+      lost.textContent += " Counted once a day: what is shorter is not seen.";
+    };
+    const lost = element("p", { class: "live-note", role: "status" });
+    const move = (day, moving) => {
+      state.day = day;
+      const now = spec(day), ms = v => `${say(1e3 * v)} ms`;
+      if (now.difference) live.set(now, moving);
+      else live.none("The sensor would divide by zero: there is no loop on this day.");
+      words.textContent = `Day ${Math.round(day)}: round trips ${now.tau1.toFixed(4)} s and ${now.tau2.toFixed(4)} s; `
+        + `half difference ${ms(half(day))}, held ${ms(now.difference / 2)}.`;
+      sheet.draw();
+    };
+    const update = () => {
+      trips = arms(state.orbit, state.master);
+      half = t => 0.5 * (trips[0](t) - trips[1](t));
+      values = Array.from({ length: YEAR + 1 }, (_, day) => [half(day), held(half, state.hold, day)]);
+      lost.textContent = "Counting the days \u2026";
+      live.chart.show([1, 1], LOOPS[state.loop][1]);
+      move(state.day, false);
+      count();
+    };
+    const pick = (key, name, options) => {
+      const label = choice(`${live.id}-${key}`, name, options.map(text => [text, text]), value => {
+        state[key] = value;
+        update();
+      });
+      label.querySelector("select").value = state[key];
+      return label;
+    };
+    const today = slider(`${live.id}-day`, "Day", 0, YEAR, state.day, v => String(Math.round(v)),
+      (v, moving) => { stop(); move(v, moving); });
+    today.querySelector("input").step = 1;
+    // Who wants no motion goes on by a week at a time.
+    let playing = 0;
+    const still = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
+    const stop = () => {
+      cancelAnimationFrame(playing);
+      if (playing) move(state.day, false);
+      playing = 0;
+      play.textContent = still() ? "A week on" : "Play the year";
+    };
+    const play = button("", () => {
+      if (playing) { stop(); return; }
+      const from = state.day >= YEAR ? 0 : state.day, begun = performance.now();
+      if (still()) {
+        const day = Math.min(YEAR, from + 7);
+        today.to(day);
+        move(day, false);
+        return;
+      }
+      play.textContent = "Pause";
+      const frame = now => {
+        const day = Math.min(YEAR, from + 15 * (now - begun) / 1000);
+        today.to(day);
+        move(day, true);
+        if (day < YEAR) playing = requestAnimationFrame(frame); else stop();
+      };
+      playing = requestAnimationFrame(frame);
+    });
+    stop();
+    const form = element("form", { class: "live-form", onsubmit: event => event.preventDefault() },
+      pick("loop", "Loop", Object.keys(LOOPS)), pick("orbit", "Orbit", Object.keys(armlockOrbits)),
+      pick("master", "Master", Object.keys(ARMS)), pick("hold", "The sensor holds", HOLDS));
+    place.replaceChildren(form, element("div", { class: "live-day" }, today, play),
+      sheet.canvas, words, lost, element("div", { class: "live-pair" },
+        element("div", {}, live.figure, legend(1), live.note), element("div", {}, live.numbers)));
+    update();
+  }
+
   for (const place of document.querySelectorAll("[data-live]"))
-    ({ front, loop: own }[place.dataset.live] || chapter)(place);
+    ({ front, loop: own, year }[place.dataset.live] || chapter)(place);
 }

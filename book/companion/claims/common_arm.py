@@ -463,8 +463,8 @@ def recurrence() -> Finding:
         "The exponent needs $t_{i+1} - ν$: as printed it grows, and R is "
         f"{gain:.4f} times too large. With $R_k = c_k (1 - e^{{-2gh}})/2$ for both, as the "
         "matrix of Eq. (8) suggests, the spectral radius at (1, 1) is 1 for every h. Eq. (8) "
-        "ends with the sample $i - r₂$, which with the example's delays leaves its column "
-        "$R₁$ outside.",
+        "ends with the sample $i - r₂$; with the delays of the example arm 1 is the longer "
+        "one, and its sample $i - r₁$ has no place in the matrix.",
     )
 
 

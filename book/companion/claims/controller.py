@@ -21,6 +21,7 @@ from armlock.paper import (
     TAU2,
 )
 from armlock.performance.budget import noise_budget
+from armlock.performance.pulling import largest_pulling
 from armlock.performance.transfer import transfer
 from armlock.robustness.margins import critical_perturbation, margins, modulus_margin
 from armlock.stability.counts import stability_chart, unstable_roots
@@ -29,7 +30,6 @@ from armlock.stability.roots import rightmost_root
 from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 from book.companion.extremes import largest, smallest
-from book.companion.transients import largest_answer
 
 claim = partial(ledger.claim, chapter="06_controller")
 TURN = 2.0 * np.pi
@@ -441,7 +441,8 @@ def robust() -> Finding:
         decide(critical_perturbation(LOOP, (1.0, -1.0)) > PERTURBATION and modulus > 0.0),
         modulus,
         "smallest modulus margin, $|1 + L|$, over a grid of the box of perturbations",
-        f"It is met at $(1 {c1 - 1.0:+.0e}, 1 {c2 - 1.0:+.0e})$, where the phase margin is "
+        "Stable over the box, with $Δτ = τ₁ - τ₂$ (claim K5). The smallest is met at "
+        f"$(1 {c1 - 1.0:+.0e}, 1 {c2 - 1.0:+.0e})$, where the phase margin is "
         f"{np.degrees(left.phase):.1f} degrees and the gain may change by factors from "
         f"{left.gain_lower:.3f} to {left.gain_upper:.3f}. Margins against other changes, of "
         "the delay for instance, are claim K14.",
@@ -537,7 +538,7 @@ def like_anti_pulling() -> Finding:
     zeros = [sum(abs(z) == 0.0 for z in one.zeros) for one in (here, there)]
     slowest = [min(abs(p) for p in one.poles) for one in (here, there)]
     ratio = float(slowest[0] / slowest[1])
-    at, pulled = largest_answer(LOOP, "differential")
+    peak = largest_pulling(LOOP, "differential")
     return Finding(
         decide(min(zeros) >= 2, 0.5 < ratio < 2.0),
         ratio,
@@ -545,7 +546,7 @@ def like_anti_pulling() -> Finding:
         f"Stage I has {zeros[0]} zeros at $s = 0$, the white paper's controller {zeros[1]}. "
         "Similar is the form and not what it does here: the paper's sensor integrates the "
         f"difference of the arms, and an error of 1 Hz in it pulls the laser by "
-        f"{pulled:.2g} Hz within {at / 86400.0:.1f} days.",
+        f"{peak.size:.2g} Hz within {peak.time / 86400.0:.1f} days.",
     )
 
 

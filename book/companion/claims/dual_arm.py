@@ -47,10 +47,8 @@ GAINS = np.logspace(-1.0, 5.0, 61)
 #: 99.5 periods. At twice this, 10 Hz, both are whole numbers of periods.
 ONE_PERIOD = 2.0 * np.pi / FULL_DIFFERENCE
 TWO_PERIODS = 2.0 * ONE_PERIOD
-#: Points of the strip on either side of c1 + c2 = 2, and one of the sliver below that line
-#: which a high gain takes as well.
+#: Points of the strip on either side of c1 + c2 = 2.
 ABOVE = ((1.0, 1.0 + PERTURBATION), (1.001, 1.002), (1.1, 1.105))
-SLIVER = (0.99198, 1.00798)
 BELOW = ((0.999, 1.0), (0.9, 0.905))
 #: Point at which the printed open loop is compared with the derived one.
 PRINTED_AT = (1.01, 0.98)
@@ -141,45 +139,6 @@ def corner_estimate(
     return omega**2 / (8.0 * np.asarray(gain) ** 2) + detuned
 
 
-def sensor_weight(periods: int = 2) -> float:
-    """Return -Re E at 5 Hz times `periods`: the sensor weighs the arms 1 + E and 1 - E."""
-    p, omega = DUAL_SENSOR_CORNER, periods * ONE_PERIOD
-    return float(p / ((p**2 + omega**2) * FULL_DIFFERENCE))
-
-
-def lost_from(c1: float, c2: float) -> float:
-    """Estimate the gain in rad/s that takes a point of the upper strip; inf for none.
-
-    The estimate is `corner_estimate` with the weights 1 + E and 1 - E of the two arms, which
-    differ for the sensor's integral; near 5 Hz or at 10 Hz, whichever is the lower.
-    """
-    excess = 0.5 * (c1 + c2) - 1.0
-    gains = [np.inf]
-    for periods in (1, 2):
-        left = excess + 0.5 * sensor_weight(periods) * (c2 - c1)
-        left -= corner_estimate(np.inf, periods)
-        if left > 0.0:
-            gains.append(periods * ONE_PERIOD / np.sqrt(8.0 * left))
-    return float(min(gains))
-
-
-@cache
-def high_gain_limit() -> CharacteristicFunction:
-    """Return D / g of the dual arm for g to infinity.
-
-    It is neutral. Where it has no root on the axis past some frequency, no gain has, because
-    |2 + j omega / g| is least at infinite gain.
-    """
-    one, two = DualArm(1.0), DualArm(2.0)
-    a = two.a - one.a  # D is affine in the gain, and B1 and B2 are proportional to it
-    return CharacteristicFunction(a, one.b1, one.b2, TAU1, TAU2, parameters=one.parameters)
-
-
-def limit_end(difference: float) -> float:
-    """Return c1 + c2 at the upper edge for an infinite gain, at a given c2 - c1."""
-    return 2.0 * (WINDOW[0] + upper_end(high_gain_limit(), difference).position)
-
-
 def width_estimate(common: npt.ArrayLike) -> Any:
     """Estimate c2 - c1 at the far edge, for a high gain and frequencies far below p.
 
@@ -215,30 +174,6 @@ def top_of_strip(gain: float, low: float = WINDOW[0]) -> tuple[FloatArray, Float
         slope = (low + upper_end(loop, near, low).position - corner) / near
         common = np.minimum(common, corner + slope * difference)
     return difference, common
-
-
-@shared
-def strip(gain: float, number: int = 61) -> FloatArray:
-    """Trace the boundary of the strip but for its straight edge.
-
-    Returns
-    -------
-    float array, shape (2, 3 number)
-        (c1 + c2) / 2 and c2 - c1, from the lower end of the straight edge along the lower,
-        the far and the upper edge to its upper end.
-    """
-    loop = DualArm(gain)
-    lowest = -0.5 - upper_end(loop, 0.0, low=-0.5, sign=-1.0).position
-    low, high = 0.96 * lowest, WINDOW[0]  # from these lines every ray leaves by an end
-
-    def end(start: float, sign: float) -> FloatArray:
-        difference = far_edge(loop, start).position * np.linspace(0.0, 1.0 - 1e-6, number)
-        reach = [upper_end(loop, d, start, sign).position for d in difference]
-        return np.array([start + sign * np.array(reach), difference])
-
-    middle = np.linspace(low, high, number)
-    between = np.array([middle, [far_edge(loop, common).position for common in middle]])
-    return np.concatenate((end(low, -1.0), between, end(high, 1.0)[:, ::-1]), axis=1)
 
 
 def window_area(gain: float) -> float:
@@ -287,12 +222,6 @@ def largest_p(
 
     start = np.log(DUAL_SENSOR_CORNER)
     return float(np.exp(brentq(beyond, start, start + np.log(10.0), xtol=1e-7)))
-
-
-def largest_p_estimate() -> float:
-    """Estimate `largest_p` at infinite gain: where `corner_estimate` near 5 Hz is zero."""
-    share = 0.5 * np.pi**2 * FULL_DIFFERENCE / MEAN_DELAY
-    return float(ONE_PERIOD * np.sqrt(share / (1.0 - share)))
 
 
 @shared
@@ -364,20 +293,6 @@ def stable_both_ways() -> tuple[tuple[int, float], ...]:
 def gain_factors(c1: float, c2: float) -> tuple[float, float]:
     """Return the gain factors between which the loop stays stable, from g = 10."""
     return gain_interval(DualArm(), c1, c2)[:2]
-
-
-def sliver() -> dict[str, object]:
-    """Return what the chapter tells of the sliver between the edge and c1 + c2 = 2."""
-    (c1, c2), weight = SLIVER, sensor_weight()
-    return {
-        "weight": weight,
-        "at": SLIVER,
-        "sum": c1 + c2,
-        "gain": 10.0 * gain_factors(c1, c2)[1],
-        "estimate": lost_from(c1, c2),
-        "most": weight * far_edge(DualArm(), 1.0).position,
-        "off": abs((2.0 - limit_end(c2 - c1)) / (weight * (c2 - c1)) - 1.0),
-    }
 
 
 def middle_corner(system: CharacteristicFunction) -> float:
@@ -626,7 +541,7 @@ def unknown_corner_frequency() -> Finding:
     says="The loop uses the dual sensor of Table I, with $Δτ = τ₁ - τ₂$.",
     pinned=(Verdict.NOT_AS_WRITTEN, 2.0, 1e-9),
     weight=Weight.DERIVATION,
-    printed="where $Δτ = (τ₁ - τ₂)$",
+    printed=r"$\frac{p}{1+p} \frac{1}{iωΔτ} P_-(ω)$ in Table I, and $Δτ = (τ₁ - τ₂)$",
     affects=("K5",),
 )
 def convention_of_difference() -> Finding:
@@ -641,8 +556,8 @@ def convention_of_difference() -> Finding:
         decide(abs(ratio - 1.0) < 1e-6, corrected=lines[0] == lines[1]),
         ratio,
         "weight of the integrated difference in Table I over that of Sec. III.B",
-        "Table I is right for half the difference of the round trips, as in the work that it "
-        "cites (claims T2 and T3); the loop takes the whole one, as it says, and so do we: one "
-        "letter for two quantities. The straight edge is the same for "
+        "One letter stands for two quantities. Table I needs half the difference of the round "
+        "trips, as the work that it cites has it (claims T2 and T3); Sec. III.B defines the "
+        "whole, and for the loop we take that. The straight edge is the same for "
         f"both; at $g = 10$ it ends at {1 + one.corner:.4f} or {1 + other.corner:.4f}.",
     )

@@ -19,7 +19,7 @@ from armlock.performance.budget import (
     noise_budget,
     tdi_capability,
 )
-from armlock.performance.pulling import pulling
+from armlock.performance.pulling import largest_pulling, pulling
 from armlock.performance.transfer import transfer
 from armlock.robustness.discs import MODULUS, PHASE, free_margins_over
 from armlock.robustness.free_phases import arms_of
@@ -30,7 +30,6 @@ from armlock.timedomain.noise import LaserNoise
 from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, decide
 from book.companion.extremes import smallest
-from book.companion.transients import largest_answer
 
 stability = partial(ledger.claim, chapter="08a_flight")
 noise = partial(ledger.claim, chapter="08b_noise_and_pulling")
@@ -134,7 +133,7 @@ def density(source: str) -> Callable[[FloatArray], FloatArray]:
 def largest_answers() -> FloatArray:
     """Return the laser's largest answer to an error of the sum of 1 Hz, 1 Hz/s and 1 Hz/s^2."""
     errors = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-    return np.array([largest_answer(LOOP, "common", error)[1] for error in errors])
+    return np.array([largest_pulling(LOOP, "common", error).size for error in errors])
 
 
 def doppler_errors(laser: str, averaging: float = 200.0) -> tuple[float, float]:

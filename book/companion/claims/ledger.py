@@ -377,7 +377,7 @@ def row(claim: Claim, finding: Finding, attributes: str, link: str, more: str) -
         f"<tr {attributes}><td>{link}</td><td>{badge(finding.verdict)}</td>"
         f"<td>{claim.weight}</td><td><details><summary>{typeset(claim.says)}</summary>"
         f"{printed if claim.printed else place}<p>{badge(finding.verdict, finding.verdict)} "
-        f"<strong>{typeset(finding.shown)}</strong>: {typeset(finding.quantity)}.</p>"
+        f"{typeset(finding.quantity)}: <strong>{typeset(finding.shown)}</strong>.</p>"
         f"<p>{typeset(finding.note)}</p>{more}</details></td></tr>"
     )
 

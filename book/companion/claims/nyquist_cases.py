@@ -10,7 +10,6 @@ from scipy.optimize import bisect, minimize_scalar
 
 from armlock.loops import CommonArm, DualArm, Loop, SingleArm
 from armlock.paper import (
-    DUAL_SENSOR_CORNER,
     DURATION,
     PERTURBATION,
     PHASE_NOISE_LEVEL,
@@ -137,16 +136,6 @@ def modulus_change() -> float:
     """Return the largest relative change of the modulus margin over `SMALL`."""
     first, *others = (found.modulus for found in small_margins())
     return max(abs(other / first - 1.0) for other in others)
-
-
-def low_gain_threshold() -> float:
-    """Smallest c2 - 1 from which on the dual arm also has a lower gain margin, at c1 = 1.
-
-    At low gain 1 + L has the roots of s^2 + g (a s + b) with the first terms b / s^2 + a / s
-    of the loop per gain; they are stable as long as a is positive.
-    """
-    spread = TAU1 - TAU2
-    return 1.0 / (1.0 + TAU2 / spread + 1.0 / (DUAL_SENSOR_CORNER * spread))
 
 
 @claim(

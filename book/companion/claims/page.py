@@ -258,8 +258,8 @@ class Errata:
             "Printed" if claim.printed else "In our words": typeset(
                 claim.printed or claim.says
             ),
-            "What follows": f"<strong>{typeset(finding.shown)}</strong>: "
-            f"{typeset(finding.quantity)}. {typeset(finding.note)}",
+            "What follows": f"{typeset(finding.quantity)}: "
+            f"<strong>{typeset(finding.shown)}</strong>. {typeset(finding.note)}",
             "What depends on it": ", ".join(
                 f"{ledger_link(c.identifier)} ({f.verdict})" for c, f in affected
             ),

@@ -629,7 +629,8 @@ def varying_perturbation() -> Finding:
         f"printed, from {LOWEST:g} Hz on, the output diverges after {face.diverged:.0f} s; "
         f"flat below {1e3 * CUTOFFS[1]:g} mHz it stays bounded. Reduced to an r.m.s. of "
         f"{PERTURBATION:g} it stays bounded, though of {DRAWS} random draws "
-        f"{100 * leaving_probability():.0f} percent leave the region for a time.",
+        f"{100 * leaving_probability():.0f} percent leave the region for a time; with "
+        f"{PERTURBATION:g} as a bound, as in Sec. IV.A, none can (claim K5).",
     )
 
 
@@ -688,7 +689,7 @@ def spectra_alike() -> Finding:
     return Finding(
         decide(constant, settled=not constant or start < 1.5 * BAND[0]),
         start,
-        "Hz, frequency from which the two spectra agree within 10 percent",
+        "frequency in Hz from which the two spectra agree within 10 percent",
         "With constant $c₁$, $c₂$ the closed loops at (1, 1) and $(1, 1 - 10⁻⁶)$ differ by "
         f"more than 10 percent below {differs_below:.1e} Hz only. What System 1 adds depends "
         "on the scale and the end of its spectrum, which the paper does not give: ours makes "

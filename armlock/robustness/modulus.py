@@ -8,6 +8,8 @@ axis where free phases would allow one.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from armlock.axis import contour
@@ -23,7 +25,7 @@ from armlock.axis.exponentials import (
     rounding_bound,
     tangent_distance,
 )
-from armlock.checks import FloatArray
+from armlock.checks import BoolArray, FloatArray
 from armlock.loops import LoopAt
 from armlock.robustness import discs
 from armlock.robustness.free_phases import (
@@ -94,7 +96,52 @@ def _downhill(
     return least, omega
 
 
+class _Tangents(NamedTuple):
+    """N and R of L = N / R at one frequency, and their slopes."""
+
+    above: complex
+    above_slope: complex
+    below: complex
+    below_slope: complex
+
+
+class _Room(NamedTuple):
+    """How far N + R and R may leave their tangents over a step, and rounding moves them.
+
+    `least` is what that leaves of the distance of N + R from zero.
+    """
+
+    both: float
+    below: float
+    error: float
+    least: float
+
+
 @njit(cache=True)
+def _tangents(n: Piece, r: Piece, omega: float) -> _Tangents:
+    """Return N, R and their slopes."""
+    (above, above_slope), (below, below_slope) = evaluate(n, omega), evaluate(r, omega)
+    return _Tangents(above, above_slope, below, below_slope)
+
+
+@njit(cache=True)
+def _stays_larger(at: _Tangents, room: _Room, step: float, level: float, m: int) -> bool:
+    """Whether a distance of L from -1 stays above a level over a step."""
+    over, over_slope = at.below + at.above, at.below_slope + at.above_slope
+    under, under_slope, bent = at.below, at.below_slope, room.below
+    if m == discs.RATIO:
+        under, under_slope, bent = under - at.above, under_slope - at.above_slope, room.both
+    most = max(abs(under), abs(under + step * under_slope)) + bent + room.error
+    # By so much rounding may move what was met already: no step avoids that.
+    unknown = (1.0 + level) * room.error
+    allowed = 2.0 * unknown if unknown <= 1e-6 * most else 0.0
+    if room.least + allowed >= level * most:
+        return True
+    apart = _stays_above(over, over_slope, under, under_slope, level, step)
+    return bool(apart + allowed >= room.both + level * bent + unknown)
+
+
+@njit(cache=True, nogil=True)
 def _walk(
     numerator: CompiledSum,
     denominator: CompiledSum,
@@ -102,15 +149,18 @@ def _walk(
     omega_end: float,
     best: FloatArray,
     tolerance: float,
+    most: int,
+    stop: BoolArray,
 ) -> tuple[FloatArray, FloatArray, bool]:
     """Smallest |1 + L|, and |1 + L| / |1 - L|, from omega to omega_end.
 
     `numerator` is N and `denominator` R, of the same polynomials. `best` holds a value of each
     that occurs: the walk looks for smaller ones, and passes over an entry of zero. Returns the
     smallest ones; where they are, nan for those of `best`; and whether the walk came to its
-    end, which it does not if it is too long or rounding hides L. None is smaller than the
-    result by more than the share `tolerance` and twice what rounding may move R + N by. A walk
-    ends where that exceeds 1e-6 |R|, or 1e-6 |R - N| for the second one.
+    end, which it does not if it takes more than `most` steps, `stop` is set, or rounding hides
+    L. None is smaller than the result by more than the share `tolerance` and twice what
+    rounding may move R + N by. A walk ends where that exceeds 1e-6 |R|, or 1e-6 |R - N| for the
+    second one.
     """
     best, where, here, steps = best.copy(), np.full(2, np.nan), np.zeros(2), 0
     while omega < omega_end:
@@ -119,42 +169,26 @@ def _walk(
         end = min(n.end, omega_end)
         n_bound, r_bound = curvature_bound(n), curvature_bound(r)
         n_error, r_error = rounding_bound(n, ROUNDING), rounding_bound(r, ROUNDING)
-        (value, slope), (below, change) = evaluate(n, omega), evaluate(r, omega)
-        step = end - omega
+        at, step = _tangents(n, r, omega), end - omega
         while omega < end:
             steps += 1
-            if steps > contour.MOST_STEPS:
+            if steps > most or stop[0]:
                 return best, where, False
             step = min(2.0 * step, end - omega)
             while True:
                 following = end if step >= end - omega else omega + step
-                new_value, new_slope = evaluate(n, following)
-                new_below, new_change = evaluate(r, following)
+                there = _tangents(n, r, following)
                 bent = 0.5 * step * step * bound_at(r_bound, r, following)
                 both = 0.5 * step * step * bound_at(n_bound, n, following) + bent
                 error = bound_at(n_error, n, following) + bound_at(r_error, r, following)
-                over, over_slope = below + value, change + slope
+                over, over_slope = at.below + at.above, at.below_slope + at.above_slope
                 least = tangent_distance(over, over_slope, step) - both - error
-                certain = True
+                room, certain = _Room(both, bent, error, least), True
                 for m in range(2):
-                    if best[m] == 0.0:
-                        continue
-                    here[m] = _distance(new_value, new_below, m)
-                    under, under_slope, under_bent = below, change, bent
-                    if m == discs.RATIO:
-                        under, under_slope, under_bent = below - value, change - slope, both
-                    most = max(abs(under), abs(under + step * under_slope))
-                    most += under_bent + error
-                    level = (1.0 - tolerance) * min(best[m], here[m])
-                    # By so much rounding may move what was met already: no step avoids that.
-                    unknown = (1.0 + level) * error
-                    allowed = 2.0 * unknown if unknown <= 1e-6 * most else 0.0
-                    if least + allowed >= level * most:
-                        continue
-                    apart = _stays_above(over, over_slope, under, under_slope, level, step)
-                    if apart + allowed < both + level * under_bent + unknown:
-                        certain = False
-                        break
+                    if best[m] > 0.0:
+                        here[m] = _distance(there.above, there.below, m)
+                        level = (1.0 - tolerance) * min(best[m], here[m])
+                        certain = certain and _stays_larger(at, room, step, level, m)
                 if certain:
                     break
                 if step <= 1e-15 * omega or step < 1e-300:
@@ -163,8 +197,7 @@ def _walk(
             for m in range(2):
                 if here[m] < best[m]:
                     best[m], where[m] = _downhill(n, r, m, following, step, end)
-            omega, value, slope = following, new_value, new_slope
-            below, change = new_below, new_change
+            omega, at = following, there
     return best, where, True
 
 
@@ -213,7 +246,9 @@ def smallest_distances(
             improve(np.linspace(low, high, 2 + 2000 // len(intervals)))
             # What that has found narrows them.
             for start, stop in meeting((low, high)):
-                found, places, complete = _walk(*parts, start, stop, best, TOLERANCE)
+                found, places, complete = contour.heard(
+                    _walk, *parts, start, stop, best, TOLERANCE
+                )
                 if not complete:
                     why = f"following it takes more than {contour.MOST_STEPS:.0e} steps"
                     raise no_margin(point, f"rounding hides L, or {why}")

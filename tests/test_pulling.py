@@ -1,0 +1,41 @@
+"""Pulling by an inverse Laplace transform, held against closed forms and against residues."""
+
+import numpy as np
+
+from armlock import SingleArm, flight_loop, paper_loop, pulling
+from armlock.performance.pulling import largest_pulling, pulled_series
+
+
+def test_before_the_light_comes_back_the_loop_has_no_delay():
+    """Then Y of a single arm is -g / (s + g), and half of that for the sum."""
+    time, frequency = pulled_series(SingleArm(0.5, 20.0), "common", 40.0)
+    early = (time > 0.1) & (time < 19.0)
+    expected = -0.5 * (1.0 - np.exp(-0.5 * time[early]))
+    assert np.abs(frequency[early] - expected).max() < 1e-4
+
+
+def test_late_answers_are_the_sum_of_residues():
+    loop, error = flight_loop(), (1.0, 1e-5, 0.0)
+    series = pulled_series(loop, "common", 20_000.0, error)
+    at = np.array([2000.0, 5000.0, 18_000.0])
+    assert np.allclose(np.interp(at, *series), pulling(loop, at, error), rtol=1e-4)
+
+
+def test_the_largest_pulling_is_certified_where_the_sum_over_roots_is():
+    loop = flight_loop()
+    late, soon = (largest_pulling(loop, source) for source in ("common", "differential"))
+    assert late.certified
+    assert abs(float(pulling(loop, late.time))) == late.size
+    assert not soon.certified
+    # Neither is lower than what another span has at other times.
+    for peak, source in ((late, "common"), (soon, "differential")):
+        time, frequency = pulled_series(loop, source, 3.0 * peak.time)
+        assert np.abs(frequency[time > 1.0]).max() < peak.size * (1 + 1e-4)
+
+
+def test_a_peak_next_to_an_echo_is_not_rounded_off():
+    """Undelayed, the paper's loop answers at once and jumps with each echo."""
+    loop = paper_loop(tau1=16.68, tau2=16.62)
+    peak = largest_pulling(loop, "common")
+    time, frequency = pulled_series(loop, "common", 70.0)
+    assert abs(np.abs(frequency[time > 1.0]).max() / peak.size - 1) < 5e-3
