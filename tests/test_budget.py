@@ -183,9 +183,8 @@ def test_pulling_is_what_the_method_of_steps_gives(seed):
         [0.0, -fast],
     ][seed % 3]
     gain = float(10.0 ** rng.uniform(-2.0, -0.5)) * fast
-    loop = Loop(([], poles, gain), SINGLE, tau, tau)
-    if loop_count(loop, 1.0, 1.0):
-        pytest.skip("unstable")
+    while loop_count(loop := Loop(([], poles, gain), SINGLE, tau, tau), 1.0, 1.0):
+        gain *= 0.5
     phi = steps_answer(poles, gain, tau, 40.0 * tau, 60)
     at = np.array([12.0, 13.35, 20.0, 31.0, 39.0]) * tau
     found = pulling(loop, at, (1.0, 0.0, 0.0), (1.0, 0.0, 0.0))

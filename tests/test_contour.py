@@ -33,7 +33,7 @@ def walk(coefficients, phases, omega_end):
         np.array(phases, dtype=float),
     )
     summed = exponentials.CompiledSum(polynomials, weights, sums, phases)
-    argument, value, clear, told = contour.heard(
+    argument, value, clear, _, told = contour.heard(
         contour.winding, summed, np.zeros(len(whole)), 0.0, omega_end
     )
     assert told

@@ -19,8 +19,8 @@ zero. Who asks, and what each does with it:
 - rows of charts (`armlock.axis.counting`) count points one by one whose parameter it may cross;
 - rays (`armlock.robustness.rays`) ask counts on both sides of the parameters that it may cross,
   and refuse where these differ by other than what was found, or cannot be told;
-- phase and delay margins (`armlock.robustness.crossovers`) refuse where L in it would have a
-  smaller margin than the best one;
+- phase and delay margins (`armlock.robustness.phase_and_delay`) refuse where L in it would have
+  a smaller margin than the best one;
 - gain margins (`armlock.robustness.gains`) ask a count on the far side of the factors that it
   may give, and refuse where that is not zero, or cannot be told; next to a null of L they say
   nothing of factors above 1e4;
@@ -106,7 +106,14 @@ def heard(walk: Callable[..., Any], *arguments: Any, most: int = MOST_STEPS) -> 
         The most steps.
     """
     stop = np.zeros(1, dtype=np.bool_)
-    found = walk(*arguments, min(most, _FEW_STEPS), stop)
+    try:
+        found = walk(*arguments, min(most, _FEW_STEPS), stop)
+    except SystemError as error:
+        # What numba makes of an interrupt that it meets while it packs its results.
+        cause: BaseException = error
+        while isinstance(cause, SystemError) and cause.__cause__ is not None:
+            cause = cause.__cause__
+        raise cause from None
     if found[-1] or most <= _FEW_STEPS:
         return found
     with ThreadPoolExecutor(1) as pool:
@@ -195,7 +202,7 @@ def winding(
     omega_end: float,
     most: int,
     stop: BoolArray,
-) -> tuple[float, complex, bool, bool]:
+) -> tuple[float, complex, bool, int, bool]:
     """Argument gathered by an exponential sum from omega to `omega_end`.
 
     Where the terms that turn slowly exceed the others together, the sum's argument stays within
@@ -203,8 +210,8 @@ def winding(
     others turn.
 
     `uncertain` holds how far the entries of `sums` may be off. Returns the argument, the last
-    value up to a positive factor, whether the sum stays clear of zero, and whether that can be
-    told: not where the walk would take more than `most` steps, or `stop` is set.
+    value up to a positive factor, whether the sum stays clear of zero, the number of steps, and
+    whether that is told: not where there would be more than `most` steps, or `stop` is set.
     """
     phases = whole.phases
     steps, argument, step = 0, 0.0, omega_end
@@ -218,7 +225,7 @@ def winding(
         bound, error = curvature_bound(piece), rounding_bound(piece, ROUNDING)
         value = evaluate(piece, omega)[0]
         if abs(value) <= bound_at(error, piece, omega):
-            return argument, value, False, True
+            return argument, value, False, steps, True
         many = end - omega > 2.0 * block
         if many:
             slow, fast = _slow_terms(piece)
@@ -242,14 +249,14 @@ def winding(
             )
             steps += more
             if steps > most or stop[0]:
-                return argument, value, False, False
+                return argument, value, False, steps, False
             value = evaluate(piece, following)[0]
             argument += turned
             if following < until:
-                return argument, value, False, True
+                return argument, value, False, steps, True
             omega = following
         if omega >= omega_end:
-            return argument, value, True, True
+            return argument, value, True, steps, True
 
 
 @njit(cache=True)

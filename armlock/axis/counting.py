@@ -169,7 +169,9 @@ def count_point(model: PointModel, x: float, y: float, end: float, stop: BoolArr
         for g in range(weights.shape[0]):
             weights[g, k] -= x * model.weights[0, g, k] + y * model.weights[1, g, k]
     whole = CompiledSum(constant.polynomials, weights, sums, constant.phases)
-    argument, value, clear, told = winding(whole, uncertain, model.start, end, MOST_STEPS, stop)
+    argument, value, clear, _, told = winding(
+        whole, uncertain, model.start, end, MOST_STEPS, stop
+    )
     if not told:
         return TOO_LONG
     if not clear:

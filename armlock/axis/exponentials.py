@@ -563,7 +563,8 @@ def expand(whole: CompiledSum, omega: float, uncertain: FloatArray | None = None
                 for m in range(size):
                     local[g, m] += weight * coefficients[k, m]
                     sizes[g, m] += magnitude * magnitudes[k, m]
-                    sizes[g, m] += moved * abs(coefficients[k, m])
+                    if moved > 0.0:
+                        sizes[g, m] += moved * abs(coefficients[k, m])
                 sizes[g, size] += (magnitude / EPSILON + moved) * left_out[k]
     if not expanded:
         return Piece(0.0, piece_end, 1.0, local, sizes, phases)

@@ -21,7 +21,7 @@ from armlock.checks import BoolArray, FloatArray, positive_number, real_number
 from armlock.controllers import Controller
 from armlock.loops import Loop, buildable_loop, flight_loop, paper_loop, robust_loop
 from armlock.orbits.constellation import Constellation
-from armlock.robustness.delays import stable_for_all_differences
+from armlock.robustness.differences import stable_for_all_differences
 from armlock.robustness.regions import is_stable
 from armlock.sensors import dual
 from armlock.stability.roots import rightmost_root

@@ -14,12 +14,14 @@ from armlock.checks import IntArray, positive_number
 from armlock.loops import Loop, LoopAt, checked_loop
 from armlock.robustness.free_phases import clear_above, count_at
 from armlock.stability.bounds import last_frequency
-from armlock.stability.counts import BOUNDARY
+from armlock.stability.counts import BOUNDARY, CountError
 
 #: Corners of a box as seen from its centre, each next to the one before.
 CORNERS = np.array(((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)))
 # How often a box is cut in four before it is given up.
 _CUTS = 8
+# Most steps of all walks together: some five seconds.
+_ALL_STEPS = 5e6
 
 
 def box_counts(loop: Loop, size: float, free_above: float | None = None) -> IntArray:
@@ -48,7 +50,7 @@ def box_counts(loop: Loop, size: float, free_above: float | None = None) -> IntA
     TypeError, ValueError
         If `loop` is no `Loop`, or the size or `free_above` is not positive.
     CountError
-        As `unstable_roots` does.
+        As `unstable_roots` does, or if the smaller boxes take too many steps.
 
     Notes
     -----
@@ -72,10 +74,18 @@ def box_counts(loop: Loop, size: float, free_above: float | None = None) -> IntA
     highest = _end_of_walks(loop, size, free_above)
     if highest is None:
         return np.array([BOUNDARY])
-    left, clear = [(1.0, 1.0, size)], 0
+    left, clear, walked = [(1.0, 1.0, size)], 0, 0
     while left:
         c1, c2, half = left.pop()
-        if _stays_clear(loop, c1, c2, half, highest):
+        is_clear, steps = _stays_clear(loop, c1, c2, half, highest)
+        walked += steps
+        if walked > _ALL_STEPS:
+            raise CountError(
+                f"no counts over a box of size {size}: its parts take more than "
+                f"{_ALL_STEPS:.0e} steps, because gain times delay is too large",
+                np.array([[c1, c2]]),
+            )
+        if is_clear:
             clear += 1
         elif half < 1.5 * size * 0.5**_CUTS:
             return np.array([BOUNDARY])
@@ -93,13 +103,18 @@ def _end_of_walks(loop: Loop, size: float, free_above: float | None) -> float | 
     return highest if clear_above(LoopAt(loop, 1.0 + size, 1.0 + size), highest) else None
 
 
-def _stays_clear(loop: Loop, c1: float, c2: float, half: float, highest: float) -> bool:
-    """Whether no point of a box has a root on the imaginary axis, as far as one walk tells."""
+def _stays_clear(
+    loop: Loop, c1: float, c2: float, half: float, highest: float
+) -> tuple[bool, int]:
+    """Whether no point of a box has a root on the imaginary axis, as far as one walk tells.
+
+    And how many steps that takes.
+    """
     end = min(float(last_frequency(loop, abs(c1) + half, abs(c2) + half)), highest)
     if not np.isfinite(end):
-        return False
+        return False, 0
     whole, (_, b1, b2) = loop.sum_at(c1, c2), loop.on_boundary()
     # The centre is a rounded number itself.
     uncertain = (half + 1e-15) * (np.abs(b1.sums) + np.abs(b2.sums))
-    _, _, clear, _ = heard(winding, whole.compiled(), uncertain, 0.0, end)
-    return bool(clear)
+    _, _, clear, steps, _ = heard(winding, whole.compiled(), uncertain, 0.0, end)
+    return bool(clear), steps

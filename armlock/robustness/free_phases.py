@@ -301,7 +301,7 @@ def _count_below(point: LoopAt, omega: float) -> int | None:
         if begin is None or begin[0] >= omega:
             return None
         none = np.zeros(whole.sums.size)
-        argument, value, clear, _ = contour.heard(
+        argument, value, clear, _, _ = contour.heard(
             contour.winding, whole.compiled(), none, begin[0], omega
         )
         if not clear:

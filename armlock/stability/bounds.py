@@ -152,15 +152,17 @@ def squared_magnitudes(polynomials: Sequence[FloatArray]) -> tuple[FloatArray, f
     sizes += exponent * used
     powers = exponent * np.arange(degree + 1) - round(0.5 * (sizes.max() + sizes.min()))
     squares = np.zeros((len(polynomials), degree + 1))
-    for row, p in zip(squares, polynomials, strict=True):
-        scaled = np.ldexp(p, powers[: p.size])
-        # Powers of s two apart have opposite signs at s = j omega.
-        even, odd = scaled[0::2].copy(), scaled[1::2].copy()
-        even[1::2] *= -1.0
-        odd[1::2] *= -1.0
-        row[: 2 * even.size - 1] += np.convolve(even, even)
-        if odd.size:
-            row[1 : 2 * odd.size] += np.convolve(odd, odd)
+    # Where one overflows, who asks gets nan.
+    with np.errstate(over="ignore", invalid="ignore"):
+        for row, p in zip(squares, polynomials, strict=True):
+            scaled = np.ldexp(p, powers[: p.size])
+            # Powers of s two apart have opposite signs at s = j omega.
+            even, odd = scaled[0::2].copy(), scaled[1::2].copy()
+            even[1::2] *= -1.0
+            odd[1::2] *= -1.0
+            row[: 2 * even.size - 1] += np.convolve(even, even)
+            if odd.size:
+                row[1 : 2 * odd.size] += np.convolve(odd, odd)
     return squares, float(np.ldexp(1.0, exponent))
 
 

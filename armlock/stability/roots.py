@@ -360,6 +360,8 @@ def _all_near(line: _Line, unit: float) -> Iterator[tuple[ComplexArray, FloatArr
         turns = min(8.0 * max(turns, _FURTHER), line.turns)
         for share in (1.0, 0.3, 0.1, 0.0):
             one = _Line(line.system, line.x, line.y, share * line.sigma)
+            # That of the delays that act on no root so far to the right, if none is left.
+            one.per_turn = line.per_turn
             yield one.near(turns, 2 * _MOST_ROOTS)
             steps += one.steps
             if steps > _ALL_STEPS:

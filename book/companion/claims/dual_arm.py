@@ -541,7 +541,7 @@ def unknown_corner_frequency() -> Finding:
     says="The loop uses the dual sensor of Table I, with $Δτ = τ₁ - τ₂$.",
     pinned=(Verdict.NOT_AS_WRITTEN, 2.0, 1e-9),
     weight=Weight.DERIVATION,
-    printed="where $Δτ = (τ₁ - τ₂)$",
+    printed=r"$\frac{p}{1+p} \frac{1}{iωΔτ} P_-(ω)$ in Table I, and $Δτ = (τ₁ - τ₂)$",
     affects=("K5",),
 )
 def convention_of_difference() -> Finding:
@@ -556,8 +556,8 @@ def convention_of_difference() -> Finding:
         decide(abs(ratio - 1.0) < 1e-6, corrected=lines[0] == lines[1]),
         ratio,
         "weight of the integrated difference in Table I over that of Sec. III.B",
-        "One letter stands for two quantities: Table I needs half the difference of the round "
-        "trips, as in the work that it cites (claims T2 and T3), and Sec. III.B defines the "
-        "whole. For the loop we take that of Sec. III.B. The straight edge is the same for "
+        "One letter stands for two quantities. Table I needs half the difference of the round "
+        "trips, as the work that it cites has it (claims T2 and T3); Sec. III.B defines the "
+        "whole, and for the loop we take that. The straight edge is the same for "
         f"both; at $g = 10$ it ends at {1 + one.corner:.4f} or {1 + other.corner:.4f}.",
     )

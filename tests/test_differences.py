@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from armlock import Controller, Loop, is_stable, paper_loop
-from armlock.robustness.delays import stable_for_all_differences
+from armlock.robustness.differences import stable_for_all_differences
 from armlock.sensors import COMMON, dual, modified_dual
 
 

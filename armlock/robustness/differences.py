@@ -72,7 +72,7 @@ def stable_for_all_differences(loop: Loop, low: float, high: float) -> bool:
     Examples
     --------
     >>> from armlock import paper_loop
-    >>> from armlock.robustness.delays import stable_for_all_differences
+    >>> from armlock.robustness.differences import stable_for_all_differences
     >>> [stable_for_all_differences(paper_loop(), low, 0.2) for low in (0.03, 0.01)]
     [True, False]
     """
