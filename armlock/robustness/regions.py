@@ -36,7 +36,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from armlock.axis.exponentials import EPSILON
+from armlock.axis.rounding import EPSILON
 from armlock.characteristic import CharacteristicFunction, broadcast_parameters
 from armlock.checks import BoolArray, FloatArray, IntArray, axis, real_number
 from armlock.loops import Loop, LoopAt, checked_loop

@@ -29,7 +29,6 @@ from scipy.optimize import elementwise
 from armlock.axis import contour, counting
 from armlock.axis.counting import PointModel, RowModel, Rows
 from armlock.axis.exponentials import (
-    ROUNDING,
     ExponentialSum,
     aligned,
     conjugates_without_zeros,
@@ -37,6 +36,7 @@ from armlock.axis.exponentials import (
     expand,
     without_unused,
 )
+from armlock.axis.rounding import ROUNDING
 from armlock.characteristic import CharacteristicFunction, broadcast_parameters, checked_system
 from armlock.checks import (
     BoolArray,
