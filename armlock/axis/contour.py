@@ -19,8 +19,8 @@ zero. Who asks, and what each does with it:
 - rows of charts (`armlock.axis.counting`) count points one by one whose parameter it may cross;
 - rays (`armlock.robustness.rays`) ask counts on both sides of the parameters that it may cross,
   and refuse where these differ by other than what was found, or cannot be told;
-- phase and delay margins (`armlock.robustness.crossovers`) refuse where L in it would have a
-  smaller margin than the best one;
+- phase and delay margins (`armlock.robustness.phase_and_delay`) refuse where L in it would have
+  a smaller margin than the best one;
 - gain margins (`armlock.robustness.gains`) ask a count on the far side of the factors that it
   may give, and refuse where that is not zero, or cannot be told; next to a null of L they say
   nothing of factors above 1e4;
@@ -110,7 +110,10 @@ def heard(walk: Callable[..., Any], *arguments: Any, most: int = MOST_STEPS) -> 
         found = walk(*arguments, min(most, _FEW_STEPS), stop)
     except SystemError as error:
         # What numba makes of an interrupt that it meets while it packs its results.
-        raise (error.__cause__ or error) from None
+        cause: BaseException = error
+        while isinstance(cause, SystemError) and cause.__cause__ is not None:
+            cause = cause.__cause__
+        raise cause from None
     if found[-1] or most <= _FEW_STEPS:
         return found
     with ThreadPoolExecutor(1) as pool:
