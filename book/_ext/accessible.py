@@ -1,11 +1,10 @@
 """Mend, in the finished pages, what a screen reader or a link would stumble over.
 
 The theme's switches that unfold a part of the contents have no name, and its sidebar is no
-region of the page; docutils calls the bibliography a list without list items, and its entries by a role that is no
-more; a table's empty corner is no heading; the table of run times has a mark that many systems
-have no font for; images do not say how large they are; and
-the links from a source file back to the reference name the package where the reference names
-the module.
+region of the page; docutils calls the bibliography a list without list items, and its entries
+by a role that is no more; a table's empty corner is no heading; the table of run times has a
+mark that many systems have no font for; images do not say how large they are; and the links
+from a source file back to the reference name the package where the reference names the module.
 """
 
 import re
