@@ -122,8 +122,10 @@ def plot_counts(
     else:
         # An image of uneven cells is drawn wrongly where an axis is logarithmic.
         ax.pcolormesh(across, up, shown, rasterized=True, **style)
-    ax.set(xscale="log" if _geometric(x) else "linear")
-    ax.set(yscale="log" if _geometric(y) else "linear")
+    if _geometric(x):
+        ax.set_xscale("log")
+    if _geometric(y):
+        ax.set_yscale("log")
     label_parameters(ax, parameters)
     return ax
 
