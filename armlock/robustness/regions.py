@@ -244,12 +244,14 @@ class StabilityRegion:
     def plot(self, ax: Axes | None = None, **style: Any) -> Axes:
         """Shade the stable region; what is not decided stays white.
 
+        An axis whose values have equal ratios is drawn logarithmic.
+
         Parameters
         ----------
         ax : matplotlib Axes, optional
             Where to draw; the current ones by default.
         **style
-            As `matplotlib.axes.Axes.pcolorfast` takes it.
+            As `matplotlib.axes.Axes.pcolormesh` takes it.
 
         Returns
         -------
