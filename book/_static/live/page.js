@@ -418,6 +418,8 @@ function armlockPages() {
         this.slow.ask(this.named(one, kind), input, (found, error) => {
           one.told[kind] = error ? UNTOLD[kind] : found;
           if (kind === "breaks" && one === this.design) this.chart.broken = one.told.breaks[0];
+          if (kind === "count" && one === this.design && this.out.textContent.endsWith(WORDS[-3]))
+            this.out.textContent = `${this.chart.name(point)}: ${counted(one.told.count)}`;
           for (const plot of this.plots) plot.draw();
           this.chart.sheet.draw();
           this.list();
