@@ -25,7 +25,6 @@ from scipy.special import comb
 from armlock.axis.exponentials import EPSILON
 from armlock.checks import BoolArray, ComplexArray, FloatArray, real_number
 from armlock.loops import Loop, checked_loop
-from armlock.robustness.regions import is_stable
 from armlock.stability.bounds import last_frequency
 
 # Rectangles at the start, how many are looked at, and how narrow they become, at most. Where
