@@ -12,6 +12,7 @@ tau' = 1 - (1 - l_back'(t)) (1 - l_out'(t - l_back)).
 from __future__ import annotations
 
 import gzip
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -438,26 +439,18 @@ def _read(path: Path) -> tuple[tuple[str, str], npt.NDArray[np.datetime64], Floa
     text = path.read_text("utf-8", errors="replace")
     if "CCSDS_OEM_VERS" not in text:
         raise ValueError(f"{path} must be a CCSDS OEM in text form, with CCSDS_OEM_VERS")
-    found: dict[str, set[str]] = {
-        "CENTER_NAME": set(),
-        "REF_FRAME": set(),
-        "TIME_SYSTEM": set(),
-    }
-    rows, inside = [], False
-    for line in text.splitlines():
-        key, equals, value = (part.strip() for part in line.partition("="))
-        if key in found and equals:
-            found[key].add(value.upper())
-        elif key.startswith("COVARIANCE"):
-            inside = key == "COVARIANCE_START"
-        elif key[:1].isdigit() and not equals and not inside:
-            rows.append(key.split())
+    header = []
     for key, allowed in _ALLOWED.items():
-        if len(found[key]) != 1 or not found[key] <= set(allowed):
+        said = set(re.findall(rf"^\s*{key}\s*=\s*(.*?)\s*$", text.upper(), re.MULTILINE))
+        if len(said) != 1 or not said <= set(allowed):
             raise ValueError(
                 f"{key} of {path} must be one of {', '.join(allowed)}, got "
-                f"{', '.join(sorted(found[key])) or 'none'}"
+                f"{', '.join(sorted(said)) or 'none'}"
             )
+        header.append(said.pop())
+    # States are what begins with a digit, but for covariances.
+    without = re.sub("COVARIANCE_START.*?COVARIANCE_STOP", "", text, flags=re.DOTALL)
+    rows = [line.split() for line in without.splitlines() if line.strip()[:1].isdigit()]
     wrong = [" ".join(row) for row in rows if len(row) != 10] or ["none"] * (not rows)
     if wrong:
         raise ValueError(
@@ -474,8 +467,8 @@ def _read(path: Path) -> tuple[tuple[str, str], npt.NDArray[np.datetime64], Floa
             f"states of {path} must agree where an epoch stands twice, got positions "
             f"{apart.max():.3g} m apart at {epochs[twice[np.argmax(apart)]]}"
         )
-    header = found["REF_FRAME"].pop(), found["TIME_SYSTEM"].pop()
-    return header, np.delete(epochs, twice + 1), np.delete(states, twice + 1, axis=0)
+    frame = header[1], header[2]
+    return frame, np.delete(epochs, twice + 1), np.delete(states, twice + 1, axis=0)
 
 
 def _interpolated(
