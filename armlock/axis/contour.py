@@ -586,6 +586,7 @@ def imaginary_zeros(
         near, everywhere, error = _imaginary_bounds(piece, rounding)
         bound = everywhere
         value, slope = evaluate(piece, omega)
+        uncertain = bound_at(error, piece, omega)
         if omega == omega_start:
             known, is_zero = _begins(piece, error, omega, value, slope)
             if is_zero:
@@ -599,7 +600,6 @@ def imaginary_zeros(
             if known.hidden:
                 blind = max(_BLIND_GROWTH * (omega - known.until), _SHORTEST_BLIND * omega_end)
             curvature = bound_at(bound, piece, omega + step)
-            uncertain = bound_at(error, piece, omega)
             before = (omega, value, slope)
             step = _imaginary_step(before, step, curvature, uncertain, blind)
             # Where terms cancel nearly to rounding, steps may become tiny. Then the error is
@@ -610,7 +610,8 @@ def imaginary_zeros(
                 caution, patience = _MORE_CAUTION, _LESS_PATIENCE
             omega = end if step >= end - omega else omega + step
             value, slope = evaluate(piece, omega)
-            if abs(value.imag) <= caution * bound_at(error, piece, omega):
+            uncertain = bound_at(error, piece, omega)
+            if abs(value.imag) <= caution * uncertain:
                 known = _Known(known.until, known.sign, True)
                 continue
             now, caution = 1 if value.imag > 0.0 else -1, 1.0
