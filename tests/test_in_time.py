@@ -29,10 +29,10 @@ from armlock import (
     unstable_roots,
 )
 from armlock.axis import contour
-from armlock.axis.exponentials import ROUNDING
+from armlock.axis.rounding import ROUNDING
 from armlock.loops import LoopAt
 from armlock.performance.pulling import pulling
-from armlock.robustness import box_counts, distances, first_crossing, gain_interval
+from armlock.robustness import box_counts, first_crossing, gain_interval, modulus
 from tests import attack
 from tests.attack_judge import Sketch, UndecidedError
 
@@ -159,7 +159,7 @@ LONG = {
     "argument": (contour.winding, WHOLE, np.zeros(WHOLE.sums.size), 0.0, 1e6),
     "zeros": (contour.imaginary_zeros, WHOLE, None, 0.0, 1e6, False, ROUNDING),
     "samples": (contour.resolved_grid, WHOLE, 1e6, 0.1),
-    "distances": (distances._walk, ABOVE, UNDER, 1.0, 1e6, np.array([0.5, 0.5]), 1e-6),
+    "modulus": (modulus._walk, ABOVE, UNDER, 1.0, 1e6, np.array([0.5, 0.5]), 1e-6),
 }
 
 

@@ -54,16 +54,14 @@ def test_a_course_finds_all_zeros_and_extremes():
 
 
 def test_the_range_of_the_flight_loop_is_the_known_one():
-    low, high, certified = EDGES["flight"]
-    assert certified
+    low, high = EDGES["flight"]
     assert abs(low / 0.0010107 - 1.0) < 1e-4
     assert abs(high - 2.32835) < 1e-5
 
 
 @pytest.mark.parametrize("name", EDGES)
 def test_an_edge_has_a_count_of_zero_inside_only(name):
-    low, high, certified = EDGES[name]
-    assert certified
+    low, high = EDGES[name]
     assert stable(name, low * (1 + 1e-6))
     assert not stable(name, low * (1 - 1e-6))
     assert stable(name, high * (1 - 1e-6))
@@ -71,6 +69,22 @@ def test_an_edge_has_a_count_of_zero_inside_only(name):
     # The edges depend little on the held value.
     assert not stable(name, 0.99 * low, held=0.01)
     assert stable(name, 1.01 * low, held=0.1)
+
+
+def test_a_range_ends_at_the_first_unstable_window():
+    """Held at 0.15 s the paper's loop has windows, with stable ratios behind them."""
+    _, high = held_range(LOOPS["paper"], 0.15, MEAN, 1e-5)
+    assert 1.85 < high < 1.95
+    assert not stable("paper", 2.0889, held=0.15)
+    assert stable("paper", 2.4, held=0.15)
+
+
+def test_a_loop_whose_sensor_follows_the_true_value_has_no_range():
+    def follows(tau1, tau2, held):
+        return LOOPS["paper"](tau1, tau2, 0.5 * (tau1 - tau2))
+
+    with pytest.raises(ValueError, match="got another sensor or controller at"):
+        held_range(follows, HELD, MEAN)
 
 
 def test_a_range_begins_where_the_true_value_is_held():

@@ -9,19 +9,19 @@ difference passes a level. These are roots of polynomials, and no hour has to be
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from itertools import pairwise
+from itertools import combinations, pairwise
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numpy.polynomial import Chebyshev, chebyshev
+from scipy.interpolate import PPoly, make_interp_spline
 
 from armlock import paper
-from armlock.checks import BoolArray, FloatArray, positive_number, real_number
+from armlock.checks import FloatArray, positive_number, real_number
 from armlock.controllers import Controller
 from armlock.loops import Loop, buildable_loop, flight_loop, paper_loop, robust_loop
 from armlock.orbits.constellation import Constellation
-from armlock.robustness.delays import stable_for_all_differences
+from armlock.robustness.differences import no_root_crosses
 from armlock.robustness.regions import is_stable
 from armlock.sensors import dual
 from armlock.stability.roots import rightmost_root
@@ -36,9 +36,9 @@ YEAR = 365.25 * DAY
 #: A loop is kept for a month with one held value: a twelfth of a year.
 MONTH = YEAR / 12.0
 
-# Longest stretch of a course that one polynomial describes, in s, and its degree.
-_STRETCH, _DEGREE = 10.0 * DAY, 16
-# Ratios are tried in such steps away from one, up to the last, until a count is not zero.
+# Time between the nodes of a course's spline, in s, and its degree.
+_SPACING, _DEGREE = DAY, 5
+# An edge is looked for in such steps away from one, up to the last.
 _TRIED, _FARTHEST = 1.25, 1e5
 # Gauss-Legendre points along a part of a passage.
 _POINTS = 8
@@ -69,7 +69,7 @@ def loops() -> dict[str, LoopInOrbit]:
 
 
 class Course:
-    """A smooth function of time, as polynomials whose roots are all found.
+    """A smooth function of time as a spline of degree five, whose roots are all found.
 
     Parameters
     ----------
@@ -83,52 +83,27 @@ class Course:
         self, function: Callable[[FloatArray], FloatArray], start: float, stop: float
     ) -> None:
         self.start, self.stop = start, stop
-        self.borders = np.linspace(start, stop, int(np.ceil((stop - start) / _STRETCH)) + 1)
-        #: Coefficients of Chebyshev polynomials, by stretch.
-        self.series: FloatArray = np.array(
-            [
-                Chebyshev.interpolate(function, _DEGREE, domain=[low, high]).coef
-                for low, high in pairwise(self.borders)
-            ],
-            dtype=np.float64,
-        )
+        number = int((stop - start) / _SPACING) + 2 * (_DEGREE + 1)
+        nodes = np.linspace(start, stop, number)
+        spline = make_interp_spline(nodes, function(nodes), k=_DEGREE)
+        #: The same as polynomials, by stretch.
+        self.curve = PPoly.from_spline(spline)
 
     def __call__(self, t: npt.ArrayLike) -> FloatArray:
-        """Evaluate the polynomials."""
-        t = np.asarray(t, dtype=float)
-        k = np.clip(np.searchsorted(self.borders, t) - 1, 0, len(self.series) - 1)
-        low, high = self.borders[k], self.borders[k + 1]
-        x = (2.0 * t - low - high) / (high - low)
-        return np.asarray(
-            chebyshev.chebval(x, np.moveaxis(self.series[k], -1, 0), tensor=False)
-        )
+        """Evaluate the spline."""
+        return np.asarray(self.curve(t))
 
     def times(
         self, level: float = 0.0, start: float = -np.inf, stop: float = np.inf
     ) -> FloatArray:
         """Return all times at which the function has a value, from start to stop."""
-        series = self.series.copy()
-        series[:, 0] -= level
-        near = (self.borders[1:] >= start) & (self.borders[:-1] <= stop)
-        found = self.roots(series, near)
-        return found[(found >= start) & (found <= stop)]
+        found = np.unique(self.curve.solve(level, extrapolate=False))
+        return np.asarray(found[(found >= start) & (found <= stop)])
 
     def extremes(self) -> FloatArray:
         """Return the times of all extremes, the ends included."""
-        slopes = np.asarray(chebyshev.chebder(self.series, axis=1), dtype=np.float64)
-        return np.unique([self.start, *self.roots(slopes).tolist(), self.stop])
-
-    def roots(self, series: FloatArray, near: BoolArray | bool = True) -> FloatArray:
-        """Return the times at which polynomials on these stretches are zero, ascending."""
-        found: list[float] = []
-        # Elsewhere the constant term exceeds all others.
-        possible = np.abs(series[:, 0]) <= np.abs(series[:, 1:]).sum(axis=1)
-        for k in np.flatnonzero(possible & near):
-            roots = chebyshev.chebroots(series[k])
-            x = roots.real[(np.abs(roots.imag) < 1e-8) & (np.abs(roots.real) <= 1.0)]
-            low, high = self.borders[k : k + 2]
-            found += (low + 0.5 * (high - low) * (x + 1.0)).tolist()
-        return np.array(sorted(found))
+        slope = self.curve.derivative()
+        return np.unique([self.start, *slope.roots(extrapolate=False), self.stop])
 
 
 def half_difference(orbits: Constellation, master: int, start: float, stop: float) -> Course:
@@ -141,28 +116,9 @@ def half_difference(orbits: Constellation, master: int, start: float, stop: floa
     return Course(half, start, stop)
 
 
-class HeldRange(NamedTuple):
-    """Between which true over held half differences a frozen loop is stable.
-
-    Attributes
-    ----------
-    low, high : float
-        The edges around one. On their inner side the loop is stable, on their outer side it is
-        not, both certified. 0 or inf where no edge was found within a factor of 1e5, or before
-        the half difference reaches the mean.
-    certified : bool
-        Whether it is certified that the loop is stable at every ratio in between. If not,
-        ratios were only tried in steps of a quarter.
-    """
-
-    low: float
-    high: float
-    certified: bool
-
-
 def held_range(
     loop: LoopInOrbit, held: float, mean: float, precision: float = 1e-7
-) -> HeldRange:
+) -> tuple[float, float]:
     """Find between which true over held half differences a frozen loop is stable.
 
     Parameters
@@ -178,53 +134,63 @@ def held_range(
 
     Returns
     -------
-    HeldRange
+    low, high : float
+        The loop is certified as stable at one, and at every ratio from low to high. This much
+        outside of an edge it is not: a root crosses the axis, or that none does could not be
+        shown. 0 or inf where there is no edge within a factor of 1e5, or before the half
+        difference reaches the mean.
 
     Raises
     ------
     TypeError, ValueError
-        If the held value is zero or no number, the mean is not positive, or the loop is not
-        stable where the held value is the true one.
+        If the held value is zero or no number, the mean is not positive, the loop is not stable
+        where the held value is the true one, or something in it but its two round trips changes
+        with their difference.
+
+    Notes
+    -----
+    One count at a ratio of one, and from there on `armlock.robustness.differences`.
 
     Examples
     --------
-    >>> from armlock.orbits.passages import held_range, loops
-    >>> low, high, certified = held_range(loops()["paper"], 0.0325469, 16.65)
-    >>> print(f"{low:.7f} {high:.5f} {certified}")
-    0.2003803 3.99740 True
+    >>> from armlock.orbits.passages import flight, held_range
+    >>> low, high = held_range(flight, 0.0325469, 16.65)
+    >>> print(f"{low:.7f} {high:.5f}")
+    0.0010107 2.32835
     """
     held, mean = real_number("held", held), positive_number("mean", mean)
     width = positive_number("precision", precision)
 
     def frozen(ratio: float) -> Loop:
-        half = ratio * held
-        return loop(mean + half, mean - half, held)
+        return loop(mean + ratio * held, mean - ratio * held, held)
 
-    def stable(ratio: float) -> bool:
-        return bool(is_stable(frozen(ratio)))
+    def stays(near: float, far: float) -> bool:
+        return no_root_crosses(true, *sorted((near * held, far * held)))
 
-    if not stable(1.0):
+    true = frozen(1.0)
+    if not is_stable(true):
         raise ValueError(f"loop must be stable with a true value held, got held={held}")
-    edges, reached = [], []
+    farthest = min(_FARTHEST, mean / abs(held))
+    edges = []
     for step, end in ((1.0 / _TRIED, 0.0), (_TRIED, np.inf)):
         inner, outer = 1.0, step
-        while 1.0 / _FARTHEST < outer < min(_FARTHEST, mean / abs(held)) and stable(outer):
+        while 1.0 / _FARTHEST < outer < farthest and stays(inner, outer):
             inner, outer = outer, outer * step
-        found = 1.0 / _FARTHEST < outer < min(_FARTHEST, mean / abs(held))
-        while found and abs(outer / inner - 1.0) > width:
+        there = frozen(inner).replace(tau1=true.tau1, tau2=true.tau2)
+        for p, q in zip(there.polynomials(), true.polynomials(), strict=True):
+            if not np.allclose(p.coefficients, q.coefficients, rtol=1e-12, atol=0.0):
+                raise ValueError(
+                    "loop must depend on the difference of tau1 and tau2 by its round trips "
+                    f"alone, got another sensor or controller at true/held={inner}"
+                )
+        if not 1.0 / _FARTHEST < outer < farthest:
+            edges.append(end)
+            continue
+        while abs(outer / inner - 1.0) > width:
             middle = float(np.sqrt(inner * outer))
-            inner, outer = (middle, outer) if stable(middle) else (inner, middle)
-        edges.append(inner if found else end)
-        reached.append(inner)
-    # The certificate is for one sensor and controller: the round trips alone may change.
-    ends = [frozen(ratio) for ratio in reached]
-    alike = all(
-        np.allclose(p.coefficients, q.coefficients, rtol=1e-12, atol=0.0)
-        for p, q in zip(*(end.polynomials() for end in ends), strict=True)
-    )
-    low, high = sorted(ratio * held for ratio in reached)
-    certified = alike and stable_for_all_differences(ends[0], low, high)
-    return HeldRange(edges[0], edges[1], certified)
+            inner, outer = (middle, outer) if stays(inner, middle) else (inner, middle)
+        edges.append(inner)
+    return edges[0], edges[1]
 
 
 class Hold(NamedTuple):
@@ -267,7 +233,7 @@ def policies(half: Course) -> dict[str, list[Hold]]:
     return found
 
 
-def lost(half: Course, holds: Sequence[Hold], edges: HeldRange) -> list[Hold]:
+def lost(half: Course, holds: Sequence[Hold], edges: tuple[float, float]) -> list[Hold]:
     """Return the stretches on which the frozen loop is unstable.
 
     Parameters
@@ -276,7 +242,7 @@ def lost(half: Course, holds: Sequence[Hold], edges: HeldRange) -> list[Hold]:
         Of the half difference.
     holds : sequence of Hold
         What the sensor holds.
-    edges : HeldRange
+    edges : tuple of two floats
         True over held, as `held_range` finds them.
 
     Returns
@@ -286,10 +252,10 @@ def lost(half: Course, holds: Sequence[Hold], edges: HeldRange) -> list[Hold]:
     """
     found = []
     for start, stop, held in holds:
-        levels = [edge * held for edge in edges[:2] if np.isfinite(edge)]
+        levels = [edge * held for edge in edges if np.isfinite(edge)]
         inner = np.concatenate([half.times(level, start, stop) for level in levels])
         for low, high in pairwise(np.unique([start, *inner.tolist(), stop]).tolist()):
-            if not edges.low < float(half(0.5 * (low + high))) / held < edges.high:
+            if not edges[0] < float(half(0.5 * (low + high))) / held < edges[1]:
                 found.append(Hold(low, high, held))
     return found
 
@@ -345,10 +311,10 @@ def largest_half(halves: Mapping[int, Course]) -> tuple[float, float]:
     courses = list(halves.values())
     times = [course.extremes() for course in courses]
     # Two of them are alike in size where their sum or difference is zero.
-    for k, one in enumerate(courses):
-        for other in courses[k + 1 :]:
-            for sign in (-1.0, 1.0):
-                times.append(one.roots(one.series + sign * other.series))
+    for one, other in combinations((course.curve for course in courses), 2):
+        for sign in (-1.0, 1.0):
+            together = PPoly(one.c + sign * other.c, one.x)
+            times.append(together.roots(extrapolate=False))
     t = np.unique(np.concatenate(times))
     largest = np.max([np.abs(course(t)) for course in courses], axis=0)
     at = int(np.argmin(largest))
@@ -408,7 +374,6 @@ __all__ = [
     "MONTH",
     "YEAR",
     "Course",
-    "HeldRange",
     "Hold",
     "LoopInOrbit",
     "days",

@@ -14,7 +14,6 @@ from armlock.orbits.passages import (
     DAY,
     YEAR,
     Course,
-    HeldRange,
     Hold,
     LoopInOrbit,
     days,
@@ -55,7 +54,7 @@ class Survey:
         The spacecraft with the locked laser.
     halves : dict of int to Course
         Half differences by master.
-    edges : HeldRange
+    edges : tuple of two floats
         Between which true over held half differences the loop is stable, at a held value of a
         quarter of the largest one.
     lost : dict of str to list of Hold
@@ -76,7 +75,7 @@ class Survey:
     orbits: Constellation
     master: int
     halves: dict[int, Course]
-    edges: HeldRange
+    edges: tuple[float, float]
     lost: dict[str, list[Hold]]
     floor: float
     floor_time: float
@@ -117,14 +116,13 @@ class Survey:
 
     def __str__(self) -> str:
         """Say all of it, a line each."""
-        low, high, certified = self.edges
-        between = "certified" if certified else "in between only tried in steps of a quarter"
+        low, high = self.edges
         standing = {True: "", False: " (not certified)"}
         lines = [
-            f"t = 0 at epoch {self.orbits.epoch} ({self.orbits.scale})",
+            f"epoch: {self.orbits.epoch} ({self.orbits.scale})",
             f"master {self.master}, {self.years:.2f} years, half difference up to "
             f"{1e3 * self.largest:.2f} ms, {self.half.times().size} zeros",
-            f"stable for true/held from {low:.5g} to {high:.5g} ({between})",
+            f"stable for true/held from {low:.5g} to {high:.5g} (certified)",
             "",
             f"{'held value':15s} {'stable days a year':>18s} {'outages':>8s} {'longest':>10s}",
         ]

@@ -15,7 +15,6 @@ from armlock.orbits.passages import (
     DAY,
     YEAR,
     Course,
-    HeldRange,
     days,
     frozen_rate,
     growth,
@@ -31,6 +30,8 @@ from book.companion.shared import shared
 HELD, MEAN = 0.0325469, 16.65
 DATA = Path(__file__).parents[1] / "data"
 MASTERS = (1, 2, 3)
+#: The ways to hold a value, as `policies` names them.
+POLICIES = ("constant", "right sign", "month's start", "month's middle")
 
 
 @cache
@@ -52,6 +53,18 @@ def half(orbit: str, master: int = 1) -> Course:
     return half_difference(constellations()[orbit], master, *interval(orbit))
 
 
+def largest(orbit: str, master: int = 1) -> float:
+    """Return the largest half difference in s, in magnitude."""
+    course = half(orbit, master)
+    return float(np.abs(course(course.extremes())).max())
+
+
+def taiji_half() -> float:
+    """Return the largest half difference in s with Taiji's arms on Kepler's orbits."""
+    course = half_difference(kepler(3e9), 1, 0.0, YEAR)
+    return float(np.abs(course(course.extremes())).max())
+
+
 def zeros_by_year(orbit: str) -> dict[int, list[int]]:
     """Return how often the half difference passes zero in each year, by master."""
     start, stop = interval(orbit)
@@ -60,12 +73,15 @@ def zeros_by_year(orbit: str) -> dict[int, list[int]]:
 
 
 @shared
-def ranges() -> dict[str, HeldRange]:
+def ranges() -> dict[str, tuple[float, float]]:
     """Return between which true over held half differences each loop is stable."""
-    return {
-        name: held_range(loop, HELD, MEAN, 1e-3 if name == "buildable" else 1e-7)
-        for name, loop in loops().items()
-    }
+    return {name: held_range(loop, HELD, MEAN) for name, loop in loops().items()}
+
+
+@shared
+def range_at(loop: str, held: float) -> tuple[float, float]:
+    """Return the range of one loop at another held value in s, to a ten thousandth."""
+    return held_range(loops()[loop], held, MEAN, 1e-4)
 
 
 @shared
