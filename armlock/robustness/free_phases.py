@@ -25,10 +25,12 @@ from armlock.stability.counts import CountError, loop_count, walk_begins
 
 # A distance of L from -1 below it is as good as none.
 _TOUCHING = 1e-6
-#: A search begins with so many turns of the longest delay.
+#: A search begins with so many turns of the longest delay: a walk along them takes some 10 000
+#: steps, a few milliseconds, and the smallest margins of most loops lie there. These numbers
+#: decide in which order the axis is looked at, and none of them which number is found.
 FIRST_TURNS = 1e3
-# Then it looks at so many on either side of a likely place, and so many times more when it has
-# to look again.
+# Then it looks at so many on either side of a likely place, about as many as before in all, and
+# so many times more when it has to look again: three times, and 10^7 turns are covered.
 _TURNS_AROUND, _WIDER = 300.0, 30.0
 
 
@@ -245,6 +247,7 @@ def search_outwards(
         intervals = meeting((first, last))
         many = float(np.diff(intervals).sum()) > 10.0 * around * per_turn
         if many:
+            # Some 400 discs in all, which cost no more than the walk to come.
             number = 2 + 400 // len(intervals)
             places = np.concatenate(
                 [np.geomspace(low, high, number) for low, high in intervals]

@@ -285,8 +285,8 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
         If `loop` is no `Loop`, the direction is not two finite real numbers or has length
         zero, or the loop is unstable at (1, 1) itself. A boundary point is allowed there.
     CountError
-        If the counts on the two sides of the result contradict it, or gain times delay is too
-        large to follow.
+        If the counts next to (1, 1) cannot be told, or those on the two sides of the result
+        contradict it, or gain times delay is too large to follow.
 
     See Also
     --------
