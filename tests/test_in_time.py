@@ -29,7 +29,7 @@ from armlock import (
     unstable_roots,
 )
 from armlock.axis import contour
-from armlock.axis.exponentials import ROUNDING
+from armlock.axis.rounding import ROUNDING
 from armlock.loops import LoopAt
 from armlock.performance.pulling import pulling
 from armlock.robustness import box_counts, first_crossing, gain_interval, modulus

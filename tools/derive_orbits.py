@@ -4,7 +4,7 @@
 
 FOLDER holds `trailing_lisa1.oem` ... `leading_lisa3.oem`. Positions are taken every five days
 from the curves of `armlock.orbits.read_oem`, and rounded to centimetres. Round trips from these
-tables are within 3e-7 s of those from the files, which is how well the files' own states agree.
+tables are within 3e-7 s of those from the files.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ over a step, a function stays within M step^2 / 2 of its tangent. So
 Where the sum is no larger than the bound on its rounding error, `winding` stops: that makes a
 point a boundary point. Where only its imaginary part is no larger, `imaginary_zeros` cannot
 tell its sign over a stretch of the axis. The tolerance in the bound is
-`armlock.axis.exponentials.ROUNDING`.
+`armlock.axis.rounding.ROUNDING`.
 
 A *hidden stretch* is one in which nothing proves that the imaginary part has one zero, or none:
 it may hold any number of them, whatever the signs at its two ends are. Nobody may take it for a
@@ -44,8 +44,6 @@ import numpy as np
 
 from armlock.axis.compiled import njit
 from armlock.axis.exponentials import (
-    EPSILON,
-    ROUNDING,
     CompiledSum,
     Piece,
     bound_at,
@@ -53,14 +51,11 @@ from armlock.axis.exponentials import (
     curvature_from_zero,
     evaluate,
     expand,
-    rounding_bound,
     tangent_distance,
 )
+from armlock.axis.rounding import CAUTION, EPSILON, ROUNDING, rounding_bound
 from armlock.checks import BoolArray, ComplexArray, FloatArray
 
-# ROUNDING along a chart's row. It is larger, so that a point that may be a boundary point is
-# doubtful there, and counted on its own.
-CAUTION = 8.0 * ROUNDING
 # Share of a certified bound that a step may use up.
 SAFETY = 0.95
 

@@ -119,7 +119,7 @@ class Survey:
         low, high = self.edges
         standing = {True: "", False: " (not certified)"}
         lines = [
-            f"t = 0 at epoch {self.orbits.epoch} ({self.orbits.scale})",
+            f"epoch: {self.orbits.epoch} ({self.orbits.scale})",
             f"master {self.master}, {self.years:.2f} years, half difference up to "
             f"{1e3 * self.largest:.2f} ms, {self.half.times().size} zeros",
             f"stable for true/held from {low:.5g} to {high:.5g} (certified)",

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.polynomial import polynomial as poly
 from scipy.special import comb
 
-from armlock.axis.exponentials import EPSILON
+from armlock.axis.rounding import EPSILON
 from armlock.checks import BoolArray, ComplexArray, FloatArray, real_number
 from armlock.loops import Loop, checked_loop
 from armlock.stability.bounds import last_frequency
