@@ -400,13 +400,13 @@ const armlockDraw = (function () {
     }
   }
 
-  /* A line through n places. One that is no farther than half a pixel from the one before goes. */
+  /* A line through n places. One that is less than a pixel from the one before goes. */
   function curve(pen, n, place) {
     let u = Infinity, v = Infinity;
     pen.beginPath();
     for (let i = 0; i < n; i++) {
       const [x, y] = place(i);
-      if (Math.abs(x - u) + Math.abs(y - v) < 0.5 && i < n - 1) continue;
+      if (Math.abs(x - u) + Math.abs(y - v) < 0.7 && i < n - 1) continue;
       pen.lineTo(x, y);
       [u, v] = [x, y];
     }
@@ -481,20 +481,22 @@ const armlockDraw = (function () {
       pen.stroke();
       pen.fillText(power(Math.round(Math.log10(size))), cx + 3, cy - scale * far(size));
     }
-    const bent = ({ re, im }, i, sign) => {
-      const size = Math.hypot(re[i], im[i]) || 1e-300, k = scale * far(Math.min(size, most)) / size;
-      return [cx + k * re[i], cy - sign * k * im[i]];
+    const bent = (x, y) => {
+      const size = Math.sqrt(x * x + y * y) || 1e-300, k = scale * far(Math.min(size, most)) / size;
+      return [cx + k * x, cy - k * y];
     };
-    const place = i => bent({ re, im }, i, 1);
-    // Both halves, and the pinned loop's.
-    const both = to => {
-      for (const sign of [-1, 1]) {
-        pen.strokeStyle = sign > 0 ? colours.line : colours.grid;
-        curve(pen, n, i => to({ re, im }, i, sign));
-      }
-      if (pinned) ghost(pen, colours, () => curve(pen, pinned.omega.length, i => to(pinned, i, 1)));
+    const place = i => bent(re[i], im[i]);
+    // Both halves, mirrored at an axis, and the pinned loop's.
+    const both = (to, axis) => {
+      const half = Array.from(re, (x, i) => to(x, im[i]));
+      pen.strokeStyle = colours.grid;
+      curve(pen, n, i => [half[i][0], 2 * axis - half[i][1]]);
+      pen.strokeStyle = colours.line;
+      curve(pen, n, i => half[i]);
+      if (pinned) ghost(pen, colours, () => curve(pen, pinned.omega.length,
+        i => to(pinned.re[i], pinned.im[i])));
     };
-    both(bent);
+    both(bent, cy);
     const cross = (x, y) => {
       pen.strokeStyle = colours.mark;
       pen.lineWidth = 2;
@@ -522,7 +524,7 @@ const armlockDraw = (function () {
     pen.beginPath();
     pen.arc(inX(0), inY(0), zoom, 0, 7);
     pen.stroke();
-    both(({ re, im }, i, sign) => [inX(re[i]), inY(sign * im[i])]);
+    both((x, y) => [inX(x), inY(y)], iy);
     if (worst) {
       const angle = Math.atan2(-im[worst[0]], re[worst[0]]), half = angle > 0 ? Math.PI : -Math.PI;
       pen.strokeStyle = colours.mark;
@@ -627,7 +629,7 @@ const armlockDraw = (function () {
     upright(pen, "Hz/\u221aHz", 2, top + (high - top) / 2);
     pen.textAlign = "left";
     pen.textBaseline = "top";
-    sources.reduce(([x, y], [, name, colour]) => {
+    [...sources, ["", "dashed: what TDI takes out", colours.mark]].reduce(([x, y], [, name, colour]) => {
       const long = pen.measureText(name).width + 28;
       const [u, v] = x + long > wide ? [left, y + 18] : [x, y];
       pen.fillStyle = colour;
