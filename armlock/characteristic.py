@@ -24,7 +24,8 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
-from armlock.axis.exponentials import EPSILON, LOW_DEGREE, ExponentialSum, Polynomial
+from armlock.axis.exponentials import LOW_DEGREE, ExponentialSum, Polynomial
+from armlock.axis.rounding import EPSILON
 from armlock.checks import (
     ComplexArray,
     FloatArray,

@@ -127,7 +127,8 @@ class Controller:
             )
         if controller.isdtime(strict=True):
             raise ValueError(
-                f"controller must be continuous in time, got sampling time {controller.dt}"
+                f"controller must be continuous in time, got sampling time "
+                f"{controller.dt}: give the one that was sampled"
             )
         if isinstance(controller, control.StateSpace):
             zeros, poles, gain = _factored(controller)

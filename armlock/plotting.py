@@ -64,7 +64,8 @@ def plot_chart(
     Parameters
     ----------
     chart : StabilityChart
-        Points with a root on the boundary stay white.
+        Points with a root on the boundary stay white. An axis whose values have equal ratios,
+        as those of `numpy.geomspace`, is drawn logarithmic.
     ax : Axes, optional
         Where to draw; matplotlib's current axes by default.
     counts : bool, optional
@@ -74,7 +75,7 @@ def plot_chart(
     labels : bool, optional
         Write the count into each region that has room for it.
     **style
-        As `matplotlib.axes.Axes.pcolorfast` takes it, for instance `cmap`.
+        As `matplotlib.axes.Axes.pcolormesh` takes it, for instance `cmap`.
 
     Returns
     -------
@@ -115,15 +116,37 @@ def plot_counts(
     unstable = plt.get_cmap("Oranges")(np.linspace(0.08, 0.75, largest))
     style = {"cmap": ListedColormap([STABLE, *unstable]), "vmin": 0, "vmax": largest, **style}
     shown = np.where(counts >= 0, np.minimum(counts, largest), np.nan)
-    ax.pcolorfast(_edges("chart.x", x), _edges("chart.y", y), shown, **style)
+    across, up = _edges("chart.x", x), _edges("chart.y", y)
+    if _even(x) and _even(y):
+        ax.pcolorfast(across, up, shown, **style)
+    else:
+        # An image of uneven cells is drawn wrongly where an axis is logarithmic.
+        ax.pcolormesh(across, up, shown, rasterized=True, **style)
+    if _geometric(x):
+        ax.set_xscale("log")
+    if _geometric(y):
+        ax.set_yscale("log")
     label_parameters(ax, parameters)
     return ax
+
+
+def _even(values: FloatArray) -> bool:
+    """Whether points have equal distances, to a hundredth."""
+    steps = np.diff(values)
+    return bool(np.ptp(steps) < 0.01 * abs(steps.mean()))
+
+
+def _geometric(values: FloatArray) -> bool:
+    """Whether points are positive, with equal ratios, and no equal distances."""
+    return bool((values > 0.0).all()) and not _even(values) and _even(np.log(values))
 
 
 def _edges(name: str, axis: FloatArray) -> FloatArray:
     """Return the edges of cells around the points of an axis."""
     if axis.size == 1:
         raise ValueError(f"{name} must hold at least two values to be drawn, got {axis}")
+    if _geometric(axis):
+        return np.exp(_edges(name, np.log(axis)))
     inner = 0.5 * (axis[1:] + axis[:-1])
     return np.concatenate(([2.0 * axis[0] - inner[0]], inner, [2.0 * axis[-1] - inner[-1]]))
 

@@ -81,7 +81,9 @@ def sweep(
     Notes
     -----
     A task is one point, or as many as make `TASKS` tasks of all. A worker holds its task's
-    points and results, and what the function takes. An error of the function ends the sweep.
+    points and results, and what the function takes. An error of the function ends the sweep; a
+    function that catches it, for instance `CountError` of one loop among many, and returns nan
+    goes on.
 
     The file holds the datasets `points` (as numbers, or else as text), `results`, and `done`,
     which is 0 where there is no result, and else the result's checksum: one that is damaged is

@@ -8,7 +8,7 @@ import pytest
 from numpy.polynomial.polynomial import polyval
 
 from armlock import CommonArm, paper_loop, unstable_roots
-from armlock.axis import contour, counting, exponentials
+from armlock.axis import contour, counting, exponentials, rounding
 from armlock.stability import bounds
 from armlock.stability.bounds import last_frequency
 from armlock.stability.counts import _point_model
@@ -156,7 +156,7 @@ def random_sum(degree, rng):
 def test_a_piece_holds_a_sum_and_bounds_what_it_leaves_out(degree, omega):
     whole, exact = random_sum(degree, np.random.default_rng(degree))
     piece = exponentials.expand(whole.compiled(), omega)
-    rounding = exponentials.rounding_bound(piece, 8.0)
+    rounded = rounding.rounding_bound(piece, 8.0)
     bends = [exponentials.curvature_bound(piece)]
     if omega == 0.0:
         bends.append(exponentials.curvature_from_zero(piece))
@@ -169,7 +169,7 @@ def test_a_piece_holds_a_sum_and_bounds_what_it_leaves_out(degree, omega):
         for share in (0.01, 0.4, 1.0):
             at = omega + share * length
             value, slope = exponentials.evaluate(piece, at)
-            error = exponentials.bound_at(rounding, piece, at)
+            error = exponentials.bound_at(rounded, piece, at)
             assert abs(value - exact(at) / unit) <= error
             changes = [mpmath.diff(exact, at, n) / unit for n in (1, 2)]
             assert abs(slope - changes[0]) <= 1e3 * error * piece.per_reach + 1e-9 * abs(slope)
@@ -227,7 +227,7 @@ def test_a_monotonic_stretch_is_one():
     for _ in range(2000):
         piece = random_piece(rng)
         bound = exponentials.curvature_bound(piece)
-        error = exponentials.rounding_bound(piece, exponentials.ROUNDING)
+        error = rounding.rounding_bound(piece, rounding.ROUNDING)
         width = 0.5 * (piece.end - piece.start) * 10.0 ** rng.uniform(-6.0, 0.0)
         omega = piece.start + width + (piece.end - piece.start - 2.0 * width) * rng.random()
         if contour._is_monotonic(piece, bound, error, omega, width):
@@ -265,7 +265,7 @@ def test_slow_terms_bound_what_the_fast_ones_add_up_to():
         slow, fast = contour._slow_terms(piece)
         for at in piece.start + (piece.end - piece.start) * rng.random(10):
             left = abs(exponentials.evaluate(piece, at)[0] - exponentials.evaluate(slow, at)[0])
-            error = exponentials.rounding_bound(slow, exponentials.ROUNDING)
+            error = rounding.rounding_bound(slow, rounding.ROUNDING)
             most = exponentials.bound_at(fast, piece, at)
             assert left <= most + exponentials.bound_at(error, piece, at)
 
@@ -302,7 +302,7 @@ def test_next_to_a_cluster_a_polynomial_keeps_its_digits(shape):
     for omega in found[::2].imag:
         piece = exponentials.expand(whole, omega)
         value, _ = exponentials.evaluate(piece, omega)
-        error = exponentials.bound_at(exponentials.rounding_bound(piece, 8.0), piece, omega)
+        error = exponentials.bound_at(rounding.rounding_bound(piece, 8.0), piece, omega)
         exact = np.prod(1j * omega - found)
         # A piece is divided by a power of two.
         scales.append(np.log2(abs(value / exact)))
@@ -317,7 +317,7 @@ def test_a_stretch_that_may_hold_three_zeros_is_not_taken_for_one():
     whole = of_coefficients(1j * imaginary[None, :] + np.array([[1.0, 0.0, 0.0, 0.0]]))
     summed = exponentials.CompiledSum(whole, np.ones((1, 1)), np.ones(1), np.zeros(1))
     zeros, complete = contour.heard(
-        contour.imaginary_zeros, summed, None, 0.5, 2.0, False, exponentials.ROUNDING
+        contour.imaginary_zeros, summed, None, 0.5, 2.0, False, rounding.ROUNDING
     )
     assert complete
     assert zeros[:, [contour.JUMP, contour.HIDDEN]].tolist() == [[2.0, 1.0]]
@@ -336,7 +336,7 @@ def test_the_last_frequency_is_close_to_where_one_term_outgrows_the_others():
 # Im f = omega^5 (cos omega - 2) beside Re f = omega^2: next to zero only the former counts.
 HIGH_ORDER = """
 import numpy as np
-from armlock.axis import contour, counting, exponentials
+from armlock.axis import contour, counting, exponentials, rounding
 from tests.test_contour import of_coefficients
 
 whole = np.zeros((2, 6), dtype=complex)
@@ -347,7 +347,7 @@ function = exponentials.CompiledSum(polynomials, weights, np.array([1.0, -1.0]),
 steps = []
 contour.evaluate = lambda *at: steps.append(at) or exponentials.evaluate(*at)
 zeros, complete = contour.heard(
-    contour.imaginary_zeros, function, None, 0.0, 50.0, False, exponentials.ROUNDING
+    contour.imaginary_zeros, function, None, 0.0, 50.0, False, rounding.ROUNDING
 )
 print(complete, zeros[:, contour.OMEGA].tolist(), len(steps))
 """

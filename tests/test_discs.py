@@ -8,7 +8,7 @@ import numpy as np
 
 from armlock import Loop
 from armlock.loops import LoopAt
-from armlock.robustness import discs, distances
+from armlock.robustness import discs, modulus
 from armlock.robustness.free_phases import arms_of
 from armlock.sensors import COMMON, DIFFERENCE, dual
 from tests.attack import between, roots
@@ -82,5 +82,5 @@ def test_a_bound_along_tangents_is_one():
         level, step = between(rng, 1e-2, 1.0), between(rng, 1e-3, 1.0)
         along = over + share * step * over_slope, under + share * step * under_slope
         least = (abs(along[0]) - level * abs(along[1])).min()
-        found = distances._stays_above(over, over_slope, under, under_slope, level, step)
+        found = modulus._stays_above(over, over_slope, under, under_slope, level, step)
         assert found <= least + 1e-12 * (abs(over) + abs(under))

@@ -14,6 +14,7 @@ from armlock import (
     paper_loop,
     plotting,
     stability_chart,
+    stability_region,
 )
 from book.companion import figures
 
@@ -59,11 +60,27 @@ def test_labels_stand_in_regions_of_their_count(ax, chart):
 def test_cells_lie_around_the_points_of_any_axes(ax):
     even, uneven = np.linspace(-1, 1, 5), np.array([0.0, 0.2, 1.0])
     stability_chart(CommonArm(), even, uneven).plot(ax)
-    assert ax.images[0].get_extent() == pytest.approx([-1.25, 1.25, -0.1, 1.4])
+    corners = ax.collections[0].get_coordinates()[[0, -1], [0, -1]]
+    np.testing.assert_allclose(corners, [[-1.25, -0.1], [1.25, 1.4]])
     with pytest.raises(ValueError, match=r"^chart\.y must hold at least two values"):
         stability_chart(CommonArm(), even, [1.0]).plot(ax)
     near = 1.0 + np.linspace(-1e-9, 1e-9, 200)
     stability_chart(CommonArm(), near, near).plot(ax)
+
+
+def test_a_region_over_logarithmic_axes_is_the_region_that_is_drawn(ax):
+    def make(gain, dead_time):
+        return SingleArm(gain, tau=20.0, delay=dead_time)
+
+    region = stability_region(make, np.geomspace(0.1, 100.0, 8), np.geomspace(1e-3, 3.0, 6))
+    region.plot(ax)
+    assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
+    ax.figure.canvas.draw()
+    drawn = np.asarray(ax.figure.canvas.buffer_rgba())[::-1, :, :3] / 255.0
+    for i, j in np.ndindex(region.verdicts.shape):
+        across, up = ax.transData.transform((region.x[j], region.y[i])).astype(int)
+        seen = np.allclose(drawn[up, across], to_rgba(plotting.STABLE)[:3], atol=0.01)
+        assert seen == region.stable[i, j]
 
 
 def test_d_curves_are_drawn_branch_by_branch_and_with_their_line(ax):

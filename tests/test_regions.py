@@ -104,7 +104,7 @@ def test_a_region_is_what_each_point_is():
     np.testing.assert_array_equal(again.verdicts, region.verdicts)
     ax = region.plot(plt.figure().add_subplot(), cmap="viridis")
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("gain", "dead time")
-    assert ax.images[0].cmap.name == "viridis"
+    assert ax.collections[0].cmap.name == "viridis"
 
 
 def neutral(gain: float, pole: float) -> Loop:

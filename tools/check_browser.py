@@ -3,9 +3,9 @@
 Usage: python tools/check_browser.py FOLDER [PAGE ...]
 
 Each page is opened from disk in headless Chromium, in light and dark mode and at the widths of
-a screen, a tablet and a telephone. A page must ask nothing of the network, report no error,
+a screen, a tablet and two telephones. A page must ask nothing of the network, report no error,
 show no raw TeX, have no broken link or anchor, describe every image, not scroll sideways, have
-no serious finding of axe, and be readable in time; what it loads must not weigh too much. Code,
+no finding of axe, and be readable in time; what it loads must not weigh too much. Code,
 tables and formulas that are wider than their column must scroll, and say so. Of the listings of
 the package's sources, which differ in their text only, one is opened. Search must find
 something, downloads must open, and what reacts to the pointer must react:
@@ -43,6 +43,7 @@ OPTIONS += ["--disable-background-networking", "--disable-component-update"]
 WIDE = {"width": 1280, "height": 900}
 MIDDLE = {"width": 768, "height": 1024}
 NARROW = {"width": 390, "height": 844}
+NARROWEST = {"width": 320, "height": 640}
 LONGEST = 3.0  # seconds of processor time until a page is readable
 HEAVIEST = 6e6  # bytes that a page loads
 OPENED = {".csv", ".png", ".svg", ".ipynb", ".json"}
@@ -250,7 +251,7 @@ class Book:
         self.page.evaluate("() => { document.documentElement.dataset.theme = 'dark' }")
         self.page.wait_for_timeout(50)
         self.check_contrast("dark")
-        for size in (WIDE, MIDDLE, NARROW):
+        for size in (WIDE, MIDDLE, NARROW, NARROWEST):
             self.page.set_viewport_size(size)
             self.page.wait_for_timeout(50)
             for problem in [*self.page.evaluate(SIDEWAYS), *self.page.evaluate(CUT)]:
@@ -290,14 +291,13 @@ class Book:
             self.check_axe(mode, parts, rule)
 
     def check_axe(self, mode: str, parts: dict[str, Any] | None, which: dict[str, Any]) -> None:
-        """Run axe, and note what it finds serious or critical."""
+        """Run axe, and note what it finds."""
         options = {"resultTypes": ["violations"], "preload": False, **which}
         found = self.axe.run(self.page, context=parts, options=options).response
         for finding in found["violations"]:
-            if finding["impact"] in {"serious", "critical"}:
-                targets = [str(node["target"][0]) for node in finding["nodes"]]
-                where = ", ".join(targets[:3]) + (" ..." if len(targets) > 3 else "")
-                self.report(f"axe, {mode}: {finding['help']} ({len(targets)}: {where})")
+            targets = [str(node["target"][0]) for node in finding["nodes"]]
+            where = ", ".join(targets[:3]) + (" ..." if len(targets) > 3 else "")
+            self.report(f"axe, {mode}: {finding['help']} ({len(targets)}: {where})")
 
     def check_interaction(self) -> None:
         """Move the pointer over what reacts to it, and sliders."""

@@ -10,7 +10,7 @@ over a step, a function stays within M step^2 / 2 of its tangent. So
 Where the sum is no larger than the bound on its rounding error, `winding` stops: that makes a
 point a boundary point. Where only its imaginary part is no larger, `imaginary_zeros` cannot
 tell its sign over a stretch of the axis. The tolerance in the bound is
-`armlock.axis.exponentials.ROUNDING`.
+`armlock.axis.rounding.ROUNDING`.
 
 A *hidden stretch* is one in which nothing proves that the imaginary part has one zero, or none:
 it may hold any number of them, whatever the signs at its two ends are. Nobody may take it for a
@@ -19,8 +19,8 @@ zero. Who asks, and what each does with it:
 - rows of charts (`armlock.axis.counting`) count points one by one whose parameter it may cross;
 - rays (`armlock.robustness.rays`) ask counts on both sides of the parameters that it may cross,
   and refuse where these differ by other than what was found, or cannot be told;
-- phase and delay margins (`armlock.robustness.crossovers`) refuse where L in it would have a
-  smaller margin than the best one;
+- phase and delay margins (`armlock.robustness.phase_and_delay`) refuse where L in it would have
+  a smaller margin than the best one;
 - gain margins (`armlock.robustness.gains`) ask a count on the far side of the factors that it
   may give, and refuse where that is not zero, or cannot be told; next to a null of L they say
   nothing of factors above 1e4;
@@ -44,8 +44,6 @@ import numpy as np
 
 from armlock.axis.compiled import njit
 from armlock.axis.exponentials import (
-    EPSILON,
-    ROUNDING,
     CompiledSum,
     Piece,
     bound_at,
@@ -53,14 +51,11 @@ from armlock.axis.exponentials import (
     curvature_from_zero,
     evaluate,
     expand,
-    rounding_bound,
     tangent_distance,
 )
+from armlock.axis.rounding import CAUTION, EPSILON, ROUNDING, rounding_bound
 from armlock.checks import BoolArray, ComplexArray, FloatArray
 
-# ROUNDING along a chart's row. It is larger, so that a point that may be a boundary point is
-# doubtful there, and counted on its own.
-CAUTION = 8.0 * ROUNDING
 # Share of a certified bound that a step may use up.
 SAFETY = 0.95
 
@@ -110,7 +105,10 @@ def heard(walk: Callable[..., Any], *arguments: Any, most: int = MOST_STEPS) -> 
         found = walk(*arguments, min(most, _FEW_STEPS), stop)
     except SystemError as error:
         # What numba makes of an interrupt that it meets while it packs its results.
-        raise (error.__cause__ or error) from None
+        cause: BaseException = error
+        while isinstance(cause, SystemError) and cause.__cause__ is not None:
+            cause = cause.__cause__
+        raise cause from None
     if found[-1] or most <= _FEW_STEPS:
         return found
     with ThreadPoolExecutor(1) as pool:

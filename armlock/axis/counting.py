@@ -16,7 +16,6 @@ from numba import config
 
 from armlock.axis.compiled import njit
 from armlock.axis.contour import (
-    CAUTION,
     HIDDEN,
     JUMP,
     MOST_RADIANS,
@@ -28,7 +27,8 @@ from armlock.axis.contour import (
     imaginary_zeros,
     winding,
 )
-from armlock.axis.exponentials import EPSILON, CompiledSum
+from armlock.axis.exponentials import CompiledSum
+from armlock.axis.rounding import CAUTION, EPSILON
 from armlock.checks import BoolArray, ComplexArray, FloatArray, IntArray
 
 # What `count_point` returns where it is no number of roots.

@@ -8,8 +8,8 @@ with polynomials p_k of s. Polynomials of low degree are one expansion in powers
 where that cancels: next to a cluster of lightly damped roots. There, and of high degree
 everywhere, they are expanded anew in each *piece* of the axis, from their roots.
 
-Within a piece a sum has a value and a derivative, a bound on its second derivative, and a
-bound on its rounding error. The walks along the axis need no more.
+Within a piece a sum has a value and a derivative, a bound on its second derivative, and one on
+its rounding error (`armlock.axis.rounding`). The walks along the axis need no more.
 """
 
 from __future__ import annotations
@@ -24,18 +24,11 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
 from armlock.axis.compiled import njit
+from armlock.axis.rounding import EPSILON, ROUNDING
 from armlock.checks import ComplexArray, FloatArray, IntArray
 
-EPSILON = 2.0**-52
 #: Most powers of an expansion. Beyond this degree a polynomial is evaluated from its roots.
 LOW_DEGREE = 20
-# The rounding error of a value is at most ROUNDING EPSILON times the sum of magnitudes. Where D
-# is no larger on the axis, a point is a boundary point, and its count -1. In units of EPSILON,
-# one half for each operation: three for the phase of an exponential and its sine, three for the
-# products with it, two for weights and sums. What grows with the degree n is in the magnitudes,
-# which are multiplied by 1 + n / 4. That adds 2 n: n for the coefficients (n factors, a product
-# and a sum each), and n for Horner's rule (the same).
-ROUNDING = 8.0
 # Where a polynomial is smaller than the product of omega + |root| by more than this factor, it
 # is evaluated from its roots: up to here rounding takes four of its sixteen digits.
 _CANCELLED = 1e4
@@ -685,21 +678,3 @@ def curvature_from_zero(piece: Piece) -> FloatArray:
             bound[k + 1] += a * turn**3
             bound[k] += b * turn**2 * (0.5 * k * (k - 1.0) + 2.0 * k + 1.0)
     return bound * per_reach**2
-
-
-@njit(cache=True)
-def rounding_bound(piece: Piece, rounding: float) -> FloatArray:
-    """Polynomial in u that bounds the rounding error of an exponential sum in a piece.
-
-    A group counts with |phase| omega, which bounds |exp(j omega phase) - 1|.
-    """
-    sizes = piece.sizes
-    groups, size = sizes.shape
-    bound = np.zeros(size + 1)
-    for k in range(size):
-        bound[k] += rounding * EPSILON * sizes[0, k]
-        for g in range(1, groups):
-            error = rounding * EPSILON * sizes[g, k] * abs(piece.phases[g - 1])
-            bound[k] += error * piece.start
-            bound[k + 1] += error / piece.per_reach
-    return bound

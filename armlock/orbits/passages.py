@@ -21,7 +21,7 @@ from armlock.checks import FloatArray, positive_number, real_number
 from armlock.controllers import Controller
 from armlock.loops import Loop, buildable_loop, flight_loop, paper_loop, robust_loop
 from armlock.orbits.constellation import Constellation
-from armlock.robustness.delays import no_root_crosses
+from armlock.robustness.differences import no_root_crosses
 from armlock.robustness.regions import is_stable
 from armlock.sensors import dual
 from armlock.stability.roots import rightmost_root
@@ -153,7 +153,7 @@ def held_range(
 
     Notes
     -----
-    One count at a ratio of one, and from there on `armlock.robustness.delays`.
+    One count at a ratio of one, and from there on `armlock.robustness.differences`.
 
     Examples
     --------

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from armlock.axis.compiled import njit
-from armlock.axis.exponentials import EPSILON
+from armlock.axis.rounding import EPSILON
 from armlock.checks import BoolArray, ComplexArray, FloatArray, IntArray
 
 # Turns of the longest delay after which the disc is tried again where it did not help.

@@ -1,7 +1,7 @@
 """How far a loop is from instability: margins, and the first perturbation that breaks it.
 
-No grid enters a number. Distances from -1 come from `armlock.robustness.distances`, phase and
-delay margins from `armlock.robustness.crossovers`, the gain interval from
+No grid enters a number. Distances from -1 come from `armlock.robustness.modulus`, phase and
+delay margins from `armlock.robustness.phase_and_delay`, the gain interval from
 `armlock.robustness.gains`. Each walk ends at a frequency past which nothing smaller is
 possible. At high frequency the limit is known in closed form.
 """
@@ -17,8 +17,6 @@ from armlock.axis.contour import heard
 from armlock.checks import FloatArray, positive_number
 from armlock.loops import Loop, LoopAt, checked_loop
 from armlock.robustness import discs
-from armlock.robustness.crossovers import crossovers_end, phase_and_delay
-from armlock.robustness.distances import smallest_distances
 from armlock.robustness.free_phases import (
     arms_of,
     limit_margins,
@@ -27,6 +25,8 @@ from armlock.robustness.free_phases import (
     require_stable,
 )
 from armlock.robustness.gains import gain_interval_of_stable
+from armlock.robustness.modulus import smallest_distances
+from armlock.robustness.phase_and_delay import crossovers_end, phase_and_delay
 from armlock.robustness.rays import FARTHEST, Ray
 from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError
 

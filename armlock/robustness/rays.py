@@ -19,7 +19,8 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
-from armlock.axis.exponentials import EPSILON, conjugates_without_zeros
+from armlock.axis.exponentials import conjugates_without_zeros
+from armlock.axis.rounding import EPSILON
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import ComplexArray, FloatArray, IntArray, axis, positive_number
 from armlock.loops import Loop, LoopAt, power_series

@@ -36,7 +36,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from armlock.axis.exponentials import EPSILON
+from armlock.axis.rounding import EPSILON
 from armlock.characteristic import CharacteristicFunction, broadcast_parameters
 from armlock.checks import BoolArray, FloatArray, IntArray, axis, real_number
 from armlock.loops import Loop, LoopAt, checked_loop
@@ -244,12 +244,14 @@ class StabilityRegion:
     def plot(self, ax: Axes | None = None, **style: Any) -> Axes:
         """Shade the stable region; what is not decided stays white.
 
+        An axis whose values have equal ratios is drawn logarithmic.
+
         Parameters
         ----------
         ax : matplotlib Axes, optional
             Where to draw; the current ones by default.
         **style
-            As `matplotlib.axes.Axes.pcolorfast` takes it.
+            As `matplotlib.axes.Axes.pcolormesh` takes it.
 
         Returns
         -------

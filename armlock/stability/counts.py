@@ -29,7 +29,6 @@ from scipy.optimize import elementwise
 from armlock.axis import contour, counting
 from armlock.axis.counting import PointModel, RowModel, Rows
 from armlock.axis.exponentials import (
-    ROUNDING,
     ExponentialSum,
     aligned,
     conjugates_without_zeros,
@@ -37,6 +36,7 @@ from armlock.axis.exponentials import (
     expand,
     without_unused,
 )
+from armlock.axis.rounding import ROUNDING
 from armlock.characteristic import CharacteristicFunction, broadcast_parameters, checked_system
 from armlock.checks import (
     BoolArray,
@@ -370,7 +370,9 @@ def _log(value: Fraction) -> float:
     return math.log(abs(value.numerator)) - math.log(value.denominator)
 
 
-def loop_count(loop: CharacteristicFunction, c1: float | Fraction, c2: float | Fraction) -> int:
+def loop_count(
+    loop: CharacteristicFunction, c1: float | Fraction = 1.0, c2: float | Fraction = 1.0
+) -> int:
     r"""Count the zeros of 1 + L with positive real part, at one point.
 
     Where numerator and denominator of L cancel a factor s, D = R (1 + L) has a root at s = 0
@@ -382,7 +384,7 @@ def loop_count(loop: CharacteristicFunction, c1: float | Fraction, c2: float | F
     ----------
     loop : CharacteristicFunction
         The loop, for instance `CommonArm()`, or its `plain` function, changed.
-    c1, c2 : float or Fraction
+    c1, c2 : float or Fraction, optional
         Multiplicative perturbations. Whether anything cancels is decided for these numbers and
         the loop's own, without rounding.
 
@@ -409,7 +411,7 @@ def loop_count(loop: CharacteristicFunction, c1: float | Fraction, c2: float | F
     >>> from armlock import SingleArm, unstable_roots
     >>> from armlock.stability.counts import loop_count
     >>> loop = SingleArm(gain=50.0, tau=10.0, delay=0.05)
-    >>> int(unstable_roots(loop, 1.0, 1.0)), loop_count(loop, 1.0, 1.0)
+    >>> int(unstable_roots(loop)), loop_count(loop)
     (-1, 166)
     """
     if checked_system(loop).step or loop.reference != (1.0, 1.0):

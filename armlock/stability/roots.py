@@ -17,7 +17,7 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
 from armlock.axis.contour import heard, resolved_grid
-from armlock.axis.exponentials import EPSILON
+from armlock.axis.rounding import EPSILON
 from armlock.characteristic import CharacteristicFunction, broadcast_parameters, checked_system
 from armlock.checks import (
     ComplexArray,

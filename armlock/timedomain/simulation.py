@@ -60,6 +60,9 @@ MovingDelay = tuple[FloatArray, tuple[float, ...]]
 GivenDelay = npt.ArrayLike | Callable[[FloatArray], npt.ArrayLike]
 #: A loop in samples: delays of both arms and the dead time, sensor, controller.
 SampledLoop = tuple[tuple[Delay | MovingDelay, ...], SampledSensor, SampledFilter]
+#: Shares of the signals of both arms in the sensor's output, in what the controller sends, and
+#: in what it sends with the next sample.
+Shares = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
 
 # Delays closer to whole samples than this, in samples, are whole.
 _WHOLE = 1e-6
@@ -233,6 +236,15 @@ def _between(
 
 
 @njit(cache=True)
+def _place(row: int, lanes: tuple[int, ...], w: int) -> np.uintp:
+    """Return where in `work` the entry of lane w in a row stands.
+
+    Unsigned, because a negative index would count from the end, which takes time to check.
+    """
+    return np.uintp(row * len(lanes) + w)
+
+
+@njit(cache=True)
 def _receive(
     lanes: tuple[int, ...],
     first: int,
@@ -244,7 +256,7 @@ def _receive(
     work: FloatArray,
     late: int,
 ) -> None:
-    """Put the late light of an arm, c(t) phi(t - tau(t)), into the lanes of a row of `work`.
+    """Put the late light of an arm, c(t) phi(t - tau(t)), into a row of `work`, `late`.
 
     `now` is the present row of phi, and `i` that of c, unless it has only one, and of a delay
     that moves. See `_compute` for the rest.
@@ -254,7 +266,7 @@ def _receive(
     if isinstance(start, int):  # known when it is compiled
         for w in range(len(lanes)):
             column = np.uintp(first + w)
-            work[late + np.uintp(w)] = c[at, column] * _late(phi, now, column, delay)
+            work[_place(late, lanes, w)] = c[at, column] * _late(phi, now, column, delay)
     else:
         # Where all lanes have the same whole samples, they read from the same rows.
         whole, others = np.floor(start[i, first]), 0
@@ -266,14 +278,110 @@ def _receive(
                 column = np.uintp(first + w)
                 u = start[i, column] - whole - 0.5
                 received = _between(phi, middle, column, u, weights)
-                work[late + np.uintp(w)] = c[at, column] * received
+                work[_place(late, lanes, w)] = c[at, column] * received
         else:
             for w in range(len(lanes)):
                 column = np.uintp(first + w)
                 whole = np.floor(start[i, column])
                 u = start[i, column] - whole - 0.5
                 received = _between(phi, now - int(whole), column, u, weights)
-                work[late + np.uintp(w)] = c[at, column] * received
+                work[_place(late, lanes, w)] = c[at, column] * received
+
+
+@njit(cache=True)
+def _shares(sensor: SampledSensor, controller: SampledFilter) -> Shares:
+    """Return what the signals of the arms add at once: see `Shares`."""
+    sections, gain = controller.sections, controller.gain
+    direct1, direct2 = sensor.direct
+    _, next1, next2 = sensor.states[len(sensor.states) - 1]
+    for j in range(len(sections)):
+        next1 += direct1 * sections[j][3]
+        next2 += direct2 * sections[j][3]
+    now1, now2, next1, next2 = gain * direct1, gain * direct2, gain * next1, gain * next2
+    return (direct1, direct2), (now1, now2), (next1, next2)
+
+
+@njit(cache=True)
+def _close(
+    lanes: tuple[int, ...],
+    first: int,
+    sent: FloatArray,
+    now: int,
+    dead: Delay,
+    shares: Shares,
+    work: FloatArray,
+) -> None:
+    """Compute this sample's output, and with a dead time what the controller sends."""
+    now1, now2 = shares[1]
+    inverse = 1.0 / (1.0 + now1 + now2)
+    for w in range(len(lanes)):
+        column = np.uintp(first + w)
+        a1, a2 = work[_place(_LATE1, lanes, w)], work[_place(_LATE2, lanes, w)]
+        x, predicted = work[_place(_INPUT, lanes, w)], work[_place(_PREDICTED, lanes, w)]
+        if dead[0] == 0:
+            # phi = noise - predicted - now1 (phi - a1) - now2 (phi - a2), solved for phi.
+            x = (x + (now1 * a1 + now2 * a2) - predicted) * inverse
+        else:
+            x -= _late(sent, now, column, dead)
+            sending = now1 * (x - a1) + now2 * (x - a2)
+            sent[np.uintp(now), column] = predicted + sending
+        work[_place(_OUTPUT, lanes, w)] = x
+
+
+@njit(cache=True)
+def _move_on(
+    lanes: tuple[int, ...],
+    sensor: SampledSensor,
+    controller: SampledFilter,
+    shares: Shares,
+    work: FloatArray,
+) -> None:
+    """Take the states of sensor and controller to the next sample.
+
+    What they send next does not wait for what the signals of the arms do to them.
+    """
+    (direct1, direct2), _, (next1, next2) = shares
+    rows, sections = sensor.states, controller.sections
+    m, n = len(rows), len(sections)
+    for w in range(len(lanes)):
+        x = work[_place(_OUTPUT, lanes, w)]
+        u1, u2 = x - work[_place(_LATE1, lanes, w)], x - work[_place(_LATE2, lanes, w)]
+        top, below, ready = work[_place(_STATES + m - 1, lanes, w)], 0.0, 0.0
+        for j in range(m):
+            q, b1, b2 = rows[j]
+            state = _place(_STATES + j, lanes, w)
+            old = work[state]
+            ready = old + (below - q * top)
+            work[state] = ready + (b1 * u1 + b2 * u2)
+            below = old
+        v, direct = top, direct1 * u1 + direct2 * u2
+        for j in range(n):
+            r1, r2, k, t1, t2 = sections[j]
+            state1 = _place(_STATES + m + 2 * j, lanes, w)
+            state2 = _place(_STATES + m + 2 * j + 1, lanes, w)
+            w1, w2 = work[state1], work[state2]
+            new1 = w1 + (r1 * w1 - k * w2 + v)
+            new2 = w2 + (r2 * w2 + w1)
+            ready += t1 * new1 + t2 * new2
+            v += t1 * w1 + t2 * w2
+            work[state1], work[state2] = new1 + direct, new2
+        predicted = controller.gain * ready + (next1 * u1 + next2 * u2)
+        work[_place(_PREDICTED, lanes, w)] = predicted
+
+
+@njit(cache=True)
+def _exceeding(lanes: tuple[int, ...], work: FloatArray, number: float, limit: float) -> int:
+    """Return how many outputs exceed the limit; note the largest inputs, and when not above."""
+    exceeding = 0
+    for w in range(len(lanes)):
+        size = abs(work[_place(_OUTPUT, lanes, w)])
+        given = abs(work[_place(_INPUT, lanes, w)])
+        most, bounded = work[_place(_LARGEST, lanes, w)], _place(_BOUNDED, lanes, w)
+        most = given if given > most else most
+        work[_place(_LARGEST, lanes, w)] = most
+        work[bounded] = number if size <= most else work[bounded]
+        exceeding += 0 if size <= limit * most else 1
+    return exceeding
 
 
 @njit(cache=True, nogil=True)
@@ -294,84 +402,27 @@ def _compute(
     column, as delays that move do; of c1 and c2 a single row is for all samples. The runs from
     column `first` on go side by side in lanes, so that one instruction works on several of
     them; the length of `lanes` is their number, for the compiler to know. `work` holds their
-    rows one behind the other: see `_STATES`.
+    rows one behind the other: see `_STATES`. It is one array, because the compiler would have
+    to check that several do not overlap.
 
     Returns the index of the sample at which an output exceeds `limit` times the largest input,
     or how many there are.
     """
     noise, c1, c2 = inputs
     (arm1, arm2, dead), sensor, controller = sampled
-    rows, sections, gain = sensor.states, controller.sections, controller.gain
-    m, n, size = len(rows), len(sections), len(lanes)
-    # Unsigned, because a negative index would count from the end, which takes time to check.
-    # One array, because the compiler would have to check that several do not overlap.
-    row = np.uintp(size)
-    predicted, given, output = _PREDICTED * row, _INPUT * row, _OUTPUT * row
-    late1, late2 = _LATE1 * row, _LATE2 * row
-    largest, bounded = _LARGEST * row, _BOUNDED * row
-    sensing, filtering = _STATES * row, (_STATES + m) * row
-    # What an input adds to the present output, and by way of the states to the next.
-    direct1, direct2 = sensor.direct
-    _, next1, next2 = rows[m - 1]
-    for j in range(n):
-        next1 += direct1 * sections[j][3]
-        next2 += direct2 * sections[j][3]
-    now1, now2, next1, next2 = gain * direct1, gain * direct2, gain * next1, gain * next2
-    implicit = dead[0] == 0
-    inverse = 1.0 / (1.0 + now1 + now2)
+    shares = _shares(sensor, controller)
     for i in range(len(noise)):
         now = len(phi) - len(noise) + i
-        _receive(lanes, first, phi, now, c1, arm1, i, work, late1)
-        _receive(lanes, first, phi, now, c2, arm2, i, work, late2)
-        for w in range(size):
-            work[given + np.uintp(w)] = noise[np.uintp(i), np.uintp(first + w)]
-        for w in range(size):
-            lane, column = np.uintp(w), np.uintp(first + w)
-            a1, a2, x = work[late1 + lane], work[late2 + lane], work[given + lane]
-            if implicit:
-                # phi = noise - predicted - now1 (phi - a1) - now2 (phi - a2), solved for phi.
-                x = (x + (now1 * a1 + now2 * a2) - work[predicted + lane]) * inverse
-            else:
-                x -= _late(sent, now, column, dead)
-                sending = now1 * (x - a1) + now2 * (x - a2)
-                sent[np.uintp(now), column] = work[predicted + lane] + sending
-            work[output + lane] = x
-        for w in range(size):
-            lane = np.uintp(w)
-            x = work[output + lane]
-            u1, u2 = x - work[late1 + lane], x - work[late2 + lane]
-            # The states move on; what they send next does not wait for what u1 and u2 do.
-            top, below, ready = work[sensing + np.uintp((m - 1) * size) + lane], 0.0, 0.0
-            for j in range(m):
-                q, b1, b2 = rows[j]
-                state = sensing + np.uintp(j * size) + lane
-                old = work[state]
-                ready = old + (below - q * top)
-                work[state] = ready + (b1 * u1 + b2 * u2)
-                below = old
-            v, direct = top, direct1 * u1 + direct2 * u2
-            for j in range(n):
-                r1, r2, k, t1, t2 = sections[j]
-                state = filtering + np.uintp(2 * j * size) + lane
-                w1, w2 = work[state], work[state + row]
-                new1 = w1 + (r1 * w1 - k * w2 + v)
-                new2 = w2 + (r2 * w2 + w1)
-                ready += t1 * new1 + t2 * new2
-                v += t1 * w1 + t2 * w2
-                work[state], work[state + row] = new1 + direct, new2
-            work[predicted + lane] = gain * ready + (next1 * u1 + next2 * u2)
-        number, exceeded = float(done + i), 0
-        for w in range(size):
-            lane = np.uintp(w)
-            amount, put_in = abs(work[output + lane]), abs(work[given + lane])
-            most = work[largest + lane]
-            most = put_in if put_in > most else most
-            work[largest + lane] = most
-            work[bounded + lane] = number if amount <= most else work[bounded + lane]
-            exceeded += 0 if amount <= limit * most else 1
-        for w in range(size):
-            phi[np.uintp(now), np.uintp(first + w)] = work[output + np.uintp(w)]
-        if exceeded:
+        _receive(lanes, first, phi, now, c1, arm1, i, work, _LATE1)
+        _receive(lanes, first, phi, now, c2, arm2, i, work, _LATE2)
+        for w in range(len(lanes)):
+            work[_place(_INPUT, lanes, w)] = noise[np.uintp(i), np.uintp(first + w)]
+        _close(lanes, first, sent, now, dead, shares, work)
+        _move_on(lanes, sensor, controller, shares, work)
+        exceeding = _exceeding(lanes, work, float(done + i), limit)
+        for w in range(len(lanes)):
+            phi[np.uintp(now), np.uintp(first + w)] = work[_place(_OUTPUT, lanes, w)]
+        if exceeding:
             return i
     return len(noise)
 

@@ -1,10 +1,10 @@
 """Mend, in the finished pages, what a screen reader or a link would stumble over.
 
 The theme's switches that unfold a part of the contents have no name, and its sidebar is no
-region of the page; docutils calls the bibliography a list without list items; the table of run
-times has a mark that many systems have no font for; images do not say how large they are; and
-the links from a source file back to the reference name the package where the reference names
-the module.
+region of the page; docutils calls the bibliography a list without list items, and its entries
+by a role that is no more; a table's empty corner is no heading; the table of run times has a
+mark that many systems have no font for; images do not say how large they are; and the links
+from a source file back to the reference name the package where the reference names the module.
 """
 
 import re
@@ -20,6 +20,8 @@ MENDED = {
         '<div id="pst-primary-sidebar" role="complementary" aria-label="The book" class='
     ),
     '<div role="list" class="citation-list">': '<div class="citation-list">',
+    ' role="doc-biblioentry">': ">",
+    '<th class="head"><p></p></th>': "<td></td>",
     "✅": "ran",
 }
 IMAGE = re.compile(r'<img (?=[^>]*src="([^"#?:]+\.png)")(?![^>]*(?:width|loading)=)')

@@ -446,7 +446,8 @@ function armlockMargins(api) {
     const inside = t => count(loop, 1 + t * d1, 1 + t * d2,
       { hidden: true, most: COUNTED, exact: beside(t * d1, t * d2) });
     const begun = inside(0);
-    if (begun === UNSURE) return NaN;
+    // Whether a loop that is on the boundary as far as rounding can tell is stable, nobody can tell.
+    if (begun === UNSURE || begun === BOUNDARY) return NaN;
     if (begun > 0 || begun < BOUNDARY) return null;
     const [a, b1, b2] = chainLeads(loop);
     const lost = t => Math.abs(1 + t * d1) * b1 + Math.abs(1 + t * d2) * b2 >= a;
@@ -460,10 +461,10 @@ function armlockMargins(api) {
     target.place(0);
     let low = 0;
     // A root at s = 0 that cancels at (1, 1) may turn into the loop's own next to it.
-    if (begun === BOUNDARY || vanishes(target.curve)) {
+    if (vanishes(target.curve)) {
       low = OWN;
       const next = inside(1e-9);
-      if (next === UNSURE || next === BOUNDARY && begun === BOUNDARY) return NaN;
+      if (next === UNSURE) return NaN;
       if (next !== 0) return 0;
     }
     target.low = low;

@@ -418,6 +418,8 @@ function armlockPages() {
         this.slow.ask(this.named(one, kind), input, (found, error) => {
           one.told[kind] = error ? UNTOLD[kind] : found;
           if (kind === "breaks" && one === this.design) this.chart.broken = one.told.breaks[0];
+          if (kind === "count" && one === this.design && this.out.textContent.endsWith(WORDS[-3]))
+            this.out.textContent = `${this.chart.name(point)}: ${counted(one.told.count)}`;
           for (const plot of this.plots) plot.draw();
           this.chart.sheet.draw();
           this.list();
@@ -893,7 +895,7 @@ function armlockPages() {
       return { ...LOOPS[state.loop][0], tau1, tau2, difference: 2 * held(half, state.hold, day) };
     };
     const sheet = new Sheet({ role: "img", "aria-label": "The year: true and held half difference, days on "
-      + "which the loop is not stable, and its critical perturbation along (1, \u22121)." }, 0.55,
+      + "which the loop is not stable, and its critical perturbation along (1, \u22121)." }, innerWidth < 600 ? 1.2 : 0.55,
     (pen, ...rest) => drawYear({ values, days, day: state.day }, pen, ...rest));
     for (const name of ["pointerdown", "pointermove"]) sheet.canvas.addEventListener(name, event => {
       const box = sheet.canvas.getBoundingClientRect(), at = (event.clientX - box.left - 56) / (box.width - 64);

@@ -15,16 +15,15 @@ import numpy as np
 from armlock.axis import contour
 from armlock.axis.compiled import njit
 from armlock.axis.exponentials import (
-    ROUNDING,
     CompiledSum,
     Piece,
     bound_at,
     curvature_bound,
     evaluate,
     expand,
-    rounding_bound,
     tangent_distance,
 )
+from armlock.axis.rounding import ROUNDING, rounding_bound
 from armlock.checks import BoolArray, FloatArray
 from armlock.loops import LoopAt
 from armlock.robustness import discs

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from armlock import Controller, Loop, is_stable, paper_loop
-from armlock.robustness.delays import no_root_crosses
+from armlock.robustness.differences import no_root_crosses
 from armlock.sensors import COMMON, dual, modified_dual
 
 

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.polynomial import polynomial as poly
 from scipy.special import comb
 
-from armlock.axis.exponentials import EPSILON
+from armlock.axis.rounding import EPSILON
 from armlock.checks import BoolArray, ComplexArray, FloatArray, real_number
 from armlock.loops import Loop, checked_loop
 from armlock.stability.bounds import last_frequency
@@ -69,7 +69,7 @@ def no_root_crosses(loop: Loop, low: float, high: float) -> bool:
     Stable between a third of the held half difference of 0.1 s and twice it:
 
     >>> from armlock import is_stable, paper_loop
-    >>> from armlock.robustness.delays import no_root_crosses
+    >>> from armlock.robustness.differences import no_root_crosses
     >>> bool(is_stable(paper_loop())), no_root_crosses(paper_loop(), 0.03, 0.2)
     (True, True)
     """
