@@ -97,7 +97,11 @@ class Course:
         self, level: float = 0.0, start: float = -np.inf, stop: float = np.inf
     ) -> FloatArray:
         """Return all times at which the function has a value, from start to stop."""
-        found = np.unique(self.curve.solve(level, extrapolate=False))
+        x = self.curve.x
+        first = max(int(np.searchsorted(x, start, "right")) - 1, 0)
+        last = max(int(np.searchsorted(x, stop)), first + 1)
+        near = PPoly(self.curve.c[:, first:last], x[first : last + 1])
+        found = np.unique(near.solve(level, extrapolate=False))
         return np.asarray(found[(found >= start) & (found <= stop)])
 
     def extremes(self) -> FloatArray:
