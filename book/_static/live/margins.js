@@ -465,7 +465,8 @@ function armlockMargins(api) {
       low = OWN;
       const next = inside(1e-9);
       if (next === UNSURE) return NaN;
-      if (next !== 0) return 0;
+      // Not zero where the loop is stable still nearer.
+      if (next !== 0) return [1e-10, 1e-11, 1e-12].some(t => inside(t) === 0) ? NaN : 0;
     }
     target.low = low;
     const found = target.found();
