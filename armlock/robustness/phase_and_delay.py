@@ -10,8 +10,16 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from armlock.axis.exponentials import ExponentialSum
-from armlock.checks import FloatArray
+from armlock.axis.exponentials import (
+    ExponentialSum,
+    Piece,
+    bound_at,
+    curvature_bound,
+    evaluate,
+    expand,
+)
+from armlock.axis.rounding import ROUNDING, rounding_bound
+from armlock.checks import ComplexArray, FloatArray
 from armlock.loops import LoopAt
 from armlock.robustness import discs
 from armlock.robustness.free_phases import (
@@ -33,6 +41,8 @@ from armlock.stability.counts import axis_zeros, polished
 TOLERANCE = 1e-6
 # Crossovers that are polished: those with the smallest margins.
 _POLISHED = 8
+# Parts of a hidden stretch that are looked at: halving takes some fifty to reach rounding.
+_PARTS = 1000
 
 
 def _on_unit_circle(point: LoopAt, omega: FloatArray) -> FloatArray:
@@ -51,19 +61,19 @@ def _log_size(point: LoopAt, omega: FloatArray) -> FloatArray:
 def _crossovers(
     point: LoopAt, squares: ExponentialSum, intervals: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray]:
-    """Frequencies with |L| = 1 on intervals of the axis, and places in hidden stretches.
+    """Frequencies with |L| = 1 on intervals of the axis, and hidden stretches as (start, end).
 
-    `squares` is |N|^2 - |R|^2, with L = N / R. Of a hidden stretch the places are its ends and
-    its middle.
+    `squares` is |N|^2 - |R|^2, with L = N / R.
     """
     zeros = axis_zeros(squares.turned(), intervals)
-    stretches = zeros.omega[zeros.hidden] + np.outer(
-        (-1.0, 0.0, 1.0), zeros.width[zeros.hidden]
-    )
-    at_zero = zeros.omega[zeros.hidden] == 0.0
-    for start in stretches[2, at_zero]:
-        _require_none_below(point, float(start))
-    stretches = np.maximum(stretches, 1e-3 * zeros.omega[zeros.hidden])[:, ~at_zero]
+    middle, width = zeros.omega[zeros.hidden], zeros.width[zeros.hidden]
+    for end in width[middle == 0.0]:
+        _require_none_below(point, float(end))
+    middle, width = middle[middle > 0.0], width[middle > 0.0]
+    # No stretch begins before its interval does.
+    starts = np.reshape(intervals, (-1, 2))[:, 0]
+    begun = starts[np.searchsorted(starts, middle, side="right") - 1]
+    stretches = np.column_stack((np.maximum(middle - width, begun), middle + width))
     omega = zeros.omega[~zeros.hidden & (zeros.omega > 0.0)]
     far = np.abs(_log_size(point, omega)) > TOLERANCE
     moved = _on_unit_circle(point, omega[far])
@@ -71,7 +81,7 @@ def _crossovers(
     if lost.size:
         raise no_margin(point, f"rounding hides where |L| comes to one around {lost[0]} rad/s")
     omega[far] = moved
-    return omega, stretches.ravel()
+    return omega, stretches
 
 
 def _require_none_below(point: LoopAt, omega: float) -> None:
@@ -88,6 +98,55 @@ def _require_none_below(point: LoopAt, omega: float) -> None:
         raise no_margin(point, f"rounding hides whether |L| comes to one below {omega} rad/s")
 
 
+def _share_moved(piece: Piece, start: float, end: float) -> float:
+    """Bound |f - f(start)| / |f(start)| from `start` to `end` in a piece, rounding included."""
+    value, slope = evaluate(piece, start)
+    step = end - start
+    moved = abs(slope) * step + 0.5 * bound_at(curvature_bound(piece), piece, end) * step**2
+    moved += 2.0 * bound_at(rounding_bound(piece, ROUNDING), piece, end)
+    return float(moved / abs(value)) if value else np.inf
+
+
+def _lags(response: ComplexArray) -> FloatArray:
+    """Return by how many rad L may lag before it points to -1, from 0 to 2 pi."""
+    return np.asarray(np.mod(np.angle(response) + np.pi, 2.0 * np.pi))
+
+
+def _hides_less(
+    point: LoopAt, stretch: tuple[float, float], phase: float, delay: float
+) -> bool:
+    """Whether a hidden stretch may hold a crossover with a smaller phase or delay margin.
+
+    With L = N / R, each of N and R is followed from the start of a part of the stretch by its
+    tangent and curvature. That bounds |L|, and the part is left out where |L| cannot be one.
+    It bounds the argument of L as well: by the arcsines of how far N and R move, as shares of
+    what they are at the start. What neither bound decides is halved.
+    """
+    sums = [one.compiled() for one in (point.numerator(), point.loop.rest_on_boundary())]
+    pieces = [expand(one, stretch[0]) for one in sums]
+    if not stretch[0] > 0.0 or min(piece.end for piece in pieces) < stretch[1]:
+        return True
+    parts, looked_at = [stretch], 0
+    while parts and looked_at < _PARTS:
+        start, end = parts.pop()
+        looked_at += 1
+        above, below = (_share_moved(piece, start, end) for piece in pieces)
+        response = point.response(np.array([start]))
+        size, lag = float(np.abs(response[0])), float(_lags(response)[0])
+        if below < 1.0 and size * (1.0 + above) < 1.0 - below:
+            continue
+        if above < 1.0 and size * (1.0 - above) > 1.0 + below:
+            continue
+        if max(above, below) < 1.0:
+            turned = float(np.arcsin(above) + np.arcsin(below))
+            near = min(lag, 2.0 * np.pi - lag) - turned
+            if near > 0.0 and near >= phase and (lag - turned) / end >= delay:
+                continue
+        middle = 0.5 * (start + end)
+        parts += [(start, middle), (middle, end)]
+    return bool(parts)
+
+
 def _least_lags(point: LoopAt, omega: FloatArray) -> tuple[float, float, float]:
     """Smallest phase margin in rad, smallest delay margin in s, and where the former is taken.
 
@@ -95,7 +154,7 @@ def _least_lags(point: LoopAt, omega: FloatArray) -> tuple[float, float, float]:
     """
 
     def lags(at: FloatArray) -> tuple[FloatArray, FloatArray]:
-        lag = np.mod(np.angle(point.response(at)) + np.pi, 2.0 * np.pi)
+        lag = _lags(point.response(at))
         # A lag turns L clockwise; a lead may reach -1 sooner.
         return lag, np.minimum(lag, 2.0 * np.pi - lag)
 
@@ -172,11 +231,11 @@ def phase_and_delay(point: LoopAt, highest: float) -> tuple[float, float, float]
     for intervals in search_outwards(per_turn, lambda: min(end, highest), meeting, likely):
         omega, hidden = _crossovers(point, squares, intervals)
         found = _least_lags(point, omega)
-        perhaps = _least_lags(point, hidden)
-        if perhaps[0] < min(phase, found[0]) or perhaps[1] < min(delay, found[1]):
-            raise no_margin(
-                point, f"rounding hides whether |L| comes to one around {perhaps[2]} rad/s"
-            )
+        for start, stop in hidden.tolist():
+            if _hides_less(point, (start, stop), min(phase, found[0]), min(delay, found[1])):
+                raise no_margin(
+                    point, f"rounding hides whether |L| comes to one around {start} rad/s"
+                )
         if found[0] < phase:
             phase, where = found[0], found[2]
         delay = min(delay, found[1])
