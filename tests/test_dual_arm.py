@@ -18,7 +18,7 @@ from armlock import (
     unstable_roots,
 )
 from armlock.robustness.rays import Ray, first_crossing
-from armlock.sensors import COMMON, dual
+from armlock.sensors import COMMON, DIFFERENCE, dual
 from book.companion.claims import dual_arm
 
 
@@ -149,6 +149,14 @@ def test_an_arm_that_is_not_used_changes_no_crossing():
     found, expected = (first_crossing(loop, (1.0, 1.0), way) for way in ways)
     assert found == expected
     assert first_crossing(loop, (1.0, 1.0), (0.0, 1.0)).position == np.inf
+
+
+def test_arms_that_differ_by_rounding_alone_are_refused():
+    controller = Controller([-3.0], [-2.0, -0.1, -0.3], 0.1)
+    equal, nearly = (Loop(controller, DIFFERENCE, 0.8, 0.8 + x) for x in (0.0, 2.0**-53))
+    assert first_crossing(equal, (1.0, 1.0), (1.0, 1.0)).position == np.inf
+    with pytest.raises(CountError, match="rounding hides all of the sum"):
+        first_crossing(nearly, (1.0, 1.0), (1.0, 1.0))
 
 
 def test_a_steep_low_pass_far_above_changes_no_crossing():

@@ -165,9 +165,11 @@ def axis_zeros(
     Raises
     ------
     CountError
-        If there are too many of them, or a number overflows.
+        If there are too many of them, a number overflows, or the sum vanishes to rounding.
     """
     sums = without_unused(whole) if measure is None else without_unused(whole, measure)
+    if not sums[0].polynomials:
+        raise CountError("no crossings: rounding hides all of the sum that crosses", _NO_POINTS)
     summed = [one.compiled() for one in sums]
     under = None if measure is None else summed[1]
     parts = [np.empty((0, 6))]
