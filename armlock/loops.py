@@ -17,6 +17,7 @@ from functools import cached_property
 from math import factorial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import mpmath
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
@@ -41,6 +42,9 @@ from armlock.sensors import COMMON, SINGLE, SignalMapping, modified_dual
 if TYPE_CHECKING:
     import control
     from matplotlib.axes import Axes
+
+# Where the terms of L cancel by more than this, in L or in 1 + L, rounding takes too much.
+_MOST_CANCELLED = 1e6
 
 
 class HayesEquation(CharacteristicFunction):
@@ -430,8 +434,37 @@ class LoopAt(NamedTuple):
         return cls(checked_loop(loop), real_number("c1", c1), real_number("c2", c2))
 
     def response(self, omega: npt.ArrayLike) -> ComplexArray:
-        """Evaluate L(j omega), with omega in rad/s."""
-        return self.loop.open_loop(1j * np.asarray(omega), self.c1, self.c2)
+        """Evaluate L(j omega), with omega in rad/s; in 40 digits where its terms cancel."""
+        s = 1j * np.asarray(omega, dtype=float)
+        first, second = self.loop.arm_responses(s)
+        terms = (
+            first * (1.0 - self.c1),
+            -first * self.c1 * np.expm1(-s * self.loop.tau1),
+            second * (1.0 - self.c2),
+            -second * self.c2 * np.expm1(-s * self.loop.tau2),
+        )
+        found = np.asarray(sum(terms))
+        largest = np.max(np.abs(terms), axis=0)
+        cancelled = largest > _MOST_CANCELLED * np.minimum(np.abs(found), np.abs(1.0 + found))
+        for at in np.argwhere(cancelled):
+            found[tuple(at)] = self._response_exactly(complex(s[tuple(at)]))
+        return found
+
+    def _response_exactly(self, s: complex) -> complex:
+        loop, k, m = self.loop, self.loop.controller, self.loop.mapping
+        with mpmath.workdps(40):
+            at = mpmath.mpc(s)
+            gain = k.gain * mpmath.exp(-at * loop.delay)
+            for zero in k.zeros:
+                gain *= at - zero
+            for pole in k.poles:
+                gain /= at - pole
+            signals = mpmath.mpc(0.0)
+            arms = (m.numerator1, self.c1, loop.tau1), (m.numerator2, self.c2, loop.tau2)
+            for above, c, tau in arms:
+                passed = 1 - mpmath.mpf(c) * mpmath.exp(-at * tau)
+                signals += mpmath.polyval(list(above), at, asc=True) * passed
+            return complex(gain * signals / mpmath.polyval(list(m.denominator), at, asc=True))
 
     def numerator(self) -> ExponentialSum:
         """Return N at s = j omega as an exponential sum."""

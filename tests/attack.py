@@ -389,23 +389,28 @@ def check_margins(tally, rng, sketch, loop, point):
             name == "gain_lower",
         )
     low, high = max(found.gain_lower, 1e-6), min(found.gain_upper, 1e6)
-    inside = [low * 1.00001, high * 0.99999, *(low * (high / low) ** rng.random(2))]
-    outside = [found.gain_lower * 0.99999, found.gain_upper * 1.00001]
-    for factor, stable in [*((k, True) for k in inside), *((k, False) for k in outside)]:
-        if not 1e-6 <= factor <= 1e6 or turns(sketch.scaled(factor)) > 5e4:
-            continue
-        try:
-            counts = judge.count(sketch.scaled(factor), *point)
-        except UndecidedError:
-            tally.skipped["gain interval: judge undecided"] += 1
-            continue
-        if (counts == 0) != stable and counts != -1:
-            tally.note(
-                "gain interval",
-                (*point, factor),
-                f"{found.gain_lower, found.gain_upper}",
-                counts,
-            )
+
+    def unstable(*factors):
+        """Whether the loop is unstable at one of these gain factors; None if that is open."""
+        counts = []
+        for factor in factors:
+            if not 1e-6 <= factor <= 1e6 or turns(sketch.scaled(factor)) > 5e4:
+                return None
+            try:
+                counts.append(judge.count(sketch.scaled(factor), *point))
+            except UndecidedError:
+                tally.skipped["gain interval: judge undecided"] += 1
+                return None
+        return None if -1 in counts else any(counts)
+
+    interval = f"{found.gain_lower, found.gain_upper}"
+    for factor in (low * 1.00001, high * 0.99999, *(low * (high / low) ** rng.random(2))):
+        if unstable(factor):
+            tally.note("gain interval", (*point, factor), interval, "unstable")
+    # Past its end a pair that has crossed may cross back at once.
+    for edge, way in ((found.gain_lower, -1.0), (found.gain_upper, 1.0)):
+        if unstable(*(edge * (1.0 + way * past) for past in (1e-5, 1e-6, 1e-7))) is False:
+            tally.note("gain interval", (*point, edge), interval, "stable past it")
 
 
 def check_free(tally, rng, sketch, loop, point):

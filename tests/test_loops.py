@@ -1,3 +1,4 @@
+import mpmath
 import numpy as np
 import pytest
 
@@ -9,6 +10,7 @@ from armlock import (
     paper_loop,
 )
 from armlock.controllers import integrating_actuator
+from armlock.loops import LoopAt
 from armlock.paper import DUAL_SENSOR_CORNER
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, SignalMapping, dual, modified_dual
 
@@ -88,3 +90,18 @@ def test_what_is_missing_or_doubled_is_named():
     assert CommonArm().replace(gain=None, controller=K) == CommonArm(controller=K)
     with pytest.raises(ValueError, match=r"^s must not be a pole of the open loop, got 0j"):
         CommonArm().open_loop([1j, 0.0])
+
+
+def test_next_to_equal_parameters_the_response_keeps_its_digits():
+    """There the integrated difference of the dual arm is small beside the two signals."""
+    c1, c2, omega = 0.5, 0.5 + 2.0**-38, 1e-14
+    loop = DualArm(gain=1.0, corner=0.7)
+    with mpmath.workdps(50):
+        s = mpmath.mpc(0, omega)
+        p, apart = mpmath.mpf(0.7), mpmath.mpf(loop.tau1 - loop.tau2)
+        one, two = (
+            1 - mpmath.mpf(c) * mpmath.exp(-s * tau)
+            for c, tau in ((c1, loop.tau1), (c2, loop.tau2))
+        )
+        expected = complex((one + two + p / ((s + p) * s * apart) * (one - two)) / s)
+    assert LoopAt(loop, c1, c2).response([omega])[0] == pytest.approx(expected, rel=1e-12)

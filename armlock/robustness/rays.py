@@ -197,6 +197,10 @@ class Ray:
         value = system(s, *self.start)
         acts = effect != 0.0
         result: ComplexArray = np.where(acts, value / np.where(acts, effect, 1.0), np.nan)
+        if isinstance(system, Loop) and (s == 0.0).any():
+            # There the terms may cancel to rounding, next to c1 = c2 for instance.
+            here, change = self._terms_at_zero(system)
+            result[s == 0.0] = float(-here[0] / change[0]) if change[0] else np.nan
         return result
 
     def crossings(self, stop: float) -> Crossings:

@@ -441,6 +441,11 @@ def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
                     between = right_of_it.rightmost(further) if margin > nearest else None
                     if between is not None and between[0].real > best.real + nearest:
                         return between[0]
+                    if not best.imag and 0.0 < abs(best.real) <= farthest:
+                        # D may vanish so slowly there that rounding decides the sign.
+                        on_axis = _Line(acting, p, q, 0.0).count()
+                        if on_axis < 0 or (on_axis > 0) != (best.real > 0.0):
+                            break
                     return best
                 if count > 0:
                     break
@@ -512,6 +517,9 @@ def rightmost_root(
     up to 1e-6 times |Re s| or one over the longest delay, whichever is larger; the smallest
     for which there is a count. Roots whose real parts differ by less than 1e-11 of |s| or one
     over the longest delay count as equal, and the one of lowest frequency is returned.
+
+    The sign of a real root within 1e-6 over the longest delay of s = 0 is one that the count of
+    unstable roots confirms; where that cannot be told, the root is refused.
 
     The real parts on a neutral root chain may tend to a limit that none of them reaches. Where
     no root lies right of it, a root up to m left of the limit is returned.
