@@ -61,9 +61,10 @@ def build(folder, notebooks, address=None):
     for name in ("_config.yml", "_ext", "_static", "references.bib", *PAGES):
         source, target = ROOT / "book" / name, folder / "book" / name
         (shutil.copytree if source.is_dir() else shutil.copyfile)(source, target)
-    # There is no ledger for the claims that it names.
+    # There is no ledger for the claims that it names, and of the pages only these.
     works = folder / "book" / "bibliography.md"
-    works.write_text(works.read_text().replace("claim", "statement"))
+    text = works.read_text().replace("claim", "statement")
+    works.write_text(re.sub(r"{doc}`(beside|in_orbit)`", r"\1", text))
     for name in OFFERED:
         shutil.copyfile(ROOT / name, folder / name)
     (folder / "book" / "intro.md").write_text("# A book\n\n{cite:t}`shao_robustness`\n")

@@ -8,6 +8,7 @@ import signal
 import threading
 import time
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,7 +35,7 @@ from armlock.loops import LoopAt
 from armlock.performance.pulling import pulling
 from armlock.robustness import box_counts, first_crossing, gain_interval, modulus
 from tests import attack
-from tests.attack_judge import Sketch, UndecidedError
+from tests.attack_judge import Sketch, UndecidedError, View
 
 LATEST = 10.0
 
@@ -61,7 +62,7 @@ def draw_wild(rng):
         tuple(zeros), tuple(poles), 1.0, sensor, tau1, tau2, delay, corner, difference
     )
     at = attack.between(rng, lowest, highest)
-    size = abs(attack.View(sketch, 0.3, -0.2).at(np.array([at]))[0])
+    size = abs(View(sketch, 0.3, -0.2).at(np.array([at]))[0])
     if not 1e-250 < size < 1e250:
         raise UndecidedError("no float")
     gain = attack.between(rng, 0.03, 1.0) if neutral else attack.between(rng, 1e-2, 1e4)
@@ -86,7 +87,7 @@ def asked(rng, loop, point):
         "unstable_roots": partial(unstable_roots, loop, *point),
         "is_stable": partial(is_stable, loop, *point),
         "margins": partial(margins, loop, *point),
-        "margins, free": partial(margins, loop, *point, free_above=above),
+        "margins, free": lambda: margins(loop, point[0], point[1], above),
         "modulus_margin": partial(modulus_margin, loop, *point),
         "gain_interval": partial(gain_interval, loop, *point),
         "critical_perturbation": partial(critical_perturbation, loop, way),
@@ -97,7 +98,7 @@ def asked(rng, loop, point):
         "axis_crossings, up to": partial(axis_crossings, loop, *point, omega_max=100 * above),
         "box_counts": partial(box_counts, loop, attack.between(rng, 1e-9, 1e-2)),
         "pulling": partial(pulling, loop, [0.1, 10.0, 1e3, 1e5]),
-        "spectral_radius": partial(spectral_radius, loop, *point, step),
+        "spectral_radius": lambda: spectral_radius(loop, point[0], point[1], step),
         "d_curve": partial(d_curve, loop, omega),
     }
 
@@ -155,7 +156,7 @@ WHOLE = FAST.sum_at(1.7, 0.9).compiled()
 ABOVE = LoopAt(FAST, 0.7, 0.9).numerator().compiled()
 UNDER = FAST.rest_on_boundary().compiled()
 # Each takes more than a second.
-LONG = {
+LONG: dict[str, tuple[Any, ...]] = {
     "argument": (contour.winding, WHOLE, np.zeros(WHOLE.sums.size), 0.0, 1e6),
     "zeros": (contour.imaginary_zeros, WHOLE, None, 0.0, 1e6, False, ROUNDING),
     "samples": (contour.resolved_grid, WHOLE, 1e6, 0.1),

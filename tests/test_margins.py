@@ -320,8 +320,8 @@ def test_gains_of_nearly_equal_arms_at_a_resonance_are_those_of_one_delay(seed):
         for t in turns
         if phase(1e-12 * size) > np.pi * (2.0 * t + 1.0)
     ]
-    at = np.array([*at, *([0.0] if c1 < c2 else [])])
-    factors = np.abs((1j * at - pole) * (1j * at - pole.conjugate())) / abs(gain * (c1 - c2))
+    s = 1j * np.array([*at, *([0.0] if c1 < c2 else [])])
+    factors = np.abs((s - pole) * (s - pole.conjugate())) / abs(gain * (c1 - c2))
     loop = Loop(Controller([], [pole, pole.conjugate()], gain), DIFFERENCE, tau, tau)
     assert gain_interval(loop, c1, c2)[1] == pytest.approx(factors.min(), rel=1e-6)
 
