@@ -269,7 +269,7 @@ class ExponentialSum(NamedTuple):
         )
         return ExponentialSum(self.polynomials, weights, phases, self.sums + other.sums)
 
-    def turned(self) -> ExponentialSum:
+    def times_j(self) -> ExponentialSum:
         """Return this sum times j, whose imaginary part is the real part of this one."""
         return ExponentialSum(self.polynomials, 1j * self.weights, self.phases, 1j * self.sums)
 

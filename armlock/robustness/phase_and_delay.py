@@ -65,7 +65,7 @@ def _crossovers(
 
     `squares` is |N|^2 - |R|^2, with L = N / R.
     """
-    zeros = axis_zeros(squares.turned(), intervals)
+    zeros = axis_zeros(squares.times_j(), intervals)
     middle, width = zeros.omega[zeros.hidden], zeros.width[zeros.hidden]
     for end in width[middle == 0.0]:
         _require_none_below(point, float(end))
