@@ -437,14 +437,14 @@ class LoopAt(NamedTuple):
         """Evaluate L(j omega), with omega in rad/s; in 40 digits where its terms cancel."""
         s = 1j * np.asarray(omega, dtype=float)
         first, second = self.loop.arm_responses(s)
-        terms = (
-            first * (1.0 - self.c1),
-            -first * self.c1 * np.expm1(-s * self.loop.tau1),
-            second * (1.0 - self.c2),
-            -second * self.c2 * np.expm1(-s * self.loop.tau2),
+        moved1 = self.c1 * np.expm1(-s * self.loop.tau1)
+        moved2 = self.c2 * np.expm1(-s * self.loop.tau2)
+        found = np.asarray(
+            first * ((1.0 - self.c1) - moved1) + second * ((1.0 - self.c2) - moved2)
         )
-        found = np.asarray(sum(terms))
-        largest = np.max(np.abs(terms), axis=0)
+        larger1 = np.abs(first) * np.maximum(abs(1.0 - self.c1), np.abs(moved1))
+        larger2 = np.abs(second) * np.maximum(abs(1.0 - self.c2), np.abs(moved2))
+        largest = np.maximum(larger1, larger2)
         cancelled = largest > _MOST_CANCELLED * np.minimum(np.abs(found), np.abs(1.0 + found))
         for at in np.argwhere(cancelled):
             found[tuple(at)] = self._response_exactly(complex(s[tuple(at)]))

@@ -39,14 +39,12 @@ def test_what_a_page_keeps_folded_is_printed():
     with browser() as chromium:
         page = chromium.new_page()
         page.set_content(
-            "<article><div class='claims'><details><summary>line</summary>more</details></div>"
-            "<div class='ledger'><div class='claims'><details><summary>claim</summary>verdict"
-            "</details></div></div>"
+            "<article><details><summary>claim</summary>verdict</details>"
             "<details class='hide'><summary>Show code</summary>code</details></article>"
         )
         page.add_style_tag(content=STYLE)
         page.evaluate(LINKS, "front")
-        assert page.inner_text("article").split() == ["line", "claim", "verdict", "code"]
+        assert page.inner_text("article").split() == ["claim", "verdict", "code"]
 
 
 def test_a_second_make_waits_for_the_first(tmp_path):
