@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from fractions import Fraction
+from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -199,7 +200,7 @@ class Ray:
         result: ComplexArray = np.where(acts, value / np.where(acts, effect, 1.0), np.nan)
         if isinstance(system, Loop) and (s == 0.0).any():
             # There the terms may cancel to rounding, next to c1 = c2 for instance.
-            here, change = self._terms_at_zero(system)
+            here, change = self._terms_at_zero
             result[s == 0.0] = float(-here[0] / change[0]) if change[0] else np.nan
         return result
 
@@ -295,15 +296,16 @@ class Ray:
         )
         return loop_count(self.system, c1, c2)
 
-    def _terms_at_zero(self, loop: Loop) -> tuple[list[Fraction], list[Fraction]]:
+    @cached_property
+    def _terms_at_zero(self) -> tuple[list[Fraction], list[Fraction]]:
         """p_k and q_k of D(s; t) = sum_k (p_k + t q_k) s^k, up to one past the first of R."""
-        number = int(np.flatnonzero(loop.rest)[0]) + 2
+        number = int(np.flatnonzero(self.system.rest)[0]) + 2
         begin = [Fraction(value) for value in self.start.tolist()]
         end = [a + Fraction(d) for a, d in zip(begin, self.direction.tolist(), strict=True)]
         here, there = (
             [
                 sum(pair, Fraction(0))
-                for pair in zip(*power_series(loop, x, y, number), strict=True)
+                for pair in zip(*power_series(self.system, x, y, number), strict=True)
             ]
             for x, y in (begin, end)
         )
@@ -318,7 +320,7 @@ class Ray:
         """
         if not isinstance(self.system, Loop):
             return 0
-        here, change = self._terms_at_zero(self.system)
+        here, change = self._terms_at_zero
         order = next((k for k, p in enumerate(here) if p), 0)
         if order == 0 or change[0] == 0:
             return 0
@@ -333,7 +335,7 @@ class Ray:
         """
         if not isinstance(self.system, Loop):
             return _NONE
-        here, change = self._terms_at_zero(self.system)
+        here, change = self._terms_at_zero
         pairs = enumerate(zip(here[:-1], change, strict=False))
         cancelled = next((k for k, pair in pairs if any(pair)), 0)
         p, q = here[cancelled], change[cancelled]
