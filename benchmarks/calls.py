@@ -49,6 +49,6 @@ def run(*, quick: bool) -> Topic:
         for direction in DIRECTIONS
     }
     rows = [
-        at_most(what, float(in_turn([call], 1)), limit) for what, (call, limit) in calls.items()
+        at_most(what, in_turn([call], 1).item(), limit) for what, (call, limit) in calls.items()
     ]
     return Topic("The white paper's loop, and the paper's", rows)
