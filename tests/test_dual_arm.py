@@ -13,23 +13,11 @@ from armlock import (
     Loop,
     SingleArm,
     critical_perturbation,
-    d_curve_line,
     margins,
     unstable_roots,
 )
 from armlock.robustness.rays import Ray, first_crossing
 from armlock.sensors import COMMON, DIFFERENCE, dual
-
-
-@pytest.mark.parametrize("gain", [0.1, 10.0, 1e4])
-@pytest.mark.parametrize("options", [{}, {"corner": 0.7}, {"difference": 0.1}])
-def test_straight_edge_is_where_both_perturbations_are_equal(gain, options):
-    loop = DualArm(gain, **options)
-    assert d_curve_line(loop) == (1.0, -1.0, 0.0)
-    c = np.array([-0.5, 0.2, 0.9, 1.0])
-    np.testing.assert_array_equal(unstable_roots(loop, c, c), BOUNDARY)
-    np.testing.assert_array_equal(unstable_roots(loop, c, c + 1e-9), 0)
-    np.testing.assert_array_equal(unstable_roots(loop, c, c - 1e-9), 1)
 
 
 def test_a_crossing_that_rounding_hides_is_refused():
