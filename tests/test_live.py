@@ -272,23 +272,39 @@ def test_roots_of_a_polynomial_give_it_back(page, roots):
 
 
 @pytest.fixture
-def opened(chromium, tmp_path):
-    """Open a page with one's own loop from disk, with what follows its address."""
-    page = tmp_path / "page.html"
-    script = f'<script src="{(LIVE / "page.js").as_uri()}"></script>'
-    page.write_text(f'<!DOCTYPE html><main><div data-live="loop"></div>{script}</main>')
-    tab, errors = chromium.new_page(), []
-    tab.on("pageerror", lambda error: errors.append(str(error)))
+def show(chromium, tmp_path):
+    """Open a live part from disk, with what follows its address, in a window like this."""
+    contexts, errors = [], []
 
-    def open_page(fragment=""):
-        tab.goto("about:blank")
-        tab.goto(page.as_uri() + fragment)
-        tab.wait_for_selector("textarea", state="attached")
+    def open_page(part, fragment="", live=LIVE, style="", **window):
+        file, script = tmp_path / "page.html", (live / "page.js").as_uri()
+        head = "<meta name=viewport content='width=device-width'>"
+        file.write_text(
+            f"<!DOCTYPE html>{head}<style>{style}</style><main><div data-live='{part}'></div>"
+            f"<script src='{script}'></script></main>"
+        )
+        contexts.append(chromium.new_context(**window))
+        tab = contexts[-1].new_page()
+        tab.on("pageerror", lambda error: errors.append(str(error)))
+        tab.goto(file.as_uri() + fragment)
         return tab
 
     yield open_page
     assert errors == []
-    tab.close()
+    for context in contexts:
+        context.close()
+
+
+@pytest.fixture
+def opened(show):
+    """Open a page with one's own loop."""
+
+    def open_page(*fragment, **window):
+        tab = show("loop", *fragment, **window)
+        tab.wait_for_selector("textarea", state="attached")
+        return tab
+
+    return open_page
 
 
 def said(page):
@@ -467,21 +483,12 @@ def test_two_designs_stand_side_by_side(opened):
     assert sum(row.split("\t")[1:2] != row.split("\t")[2:] for row in beside) > 5
 
 
-def test_a_finger_drags_the_view_and_taps_the_point(chromium, tmp_path):
-    page = tmp_path / "page.html"
-    script = f'<script src="{(LIVE / "page.js").as_uri()}"></script>'
+def test_a_finger_drags_the_view_and_taps_the_point(opened):
     style = "canvas { display: block; width: 100%; touch-action: none }"
-    page.write_text(
-        "<!DOCTYPE html><meta name=viewport content='width=device-width'>"
-        f"<style>{style}</style><main><div data-live='loop'></div>{script}</main>"
-    )
-    context = chromium.new_context(viewport={"width": 390, "height": 844}, has_touch=True)
-    tab = context.new_page()
-    tab.goto(page.as_uri())
-    tab.wait_for_selector("textarea", state="attached")
+    tab = opened(style=style, viewport={"width": 390, "height": 844}, has_touch=True)
     box = tab.locator(".live-chart canvas").bounding_box()
     x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.4 * box["height"]
-    session = context.new_cdp_session(tab)
+    session = tab.context.new_cdp_session(tab)
 
     def touch(kind, *points):
         places = [{"x": u, "y": v, "id": k} for k, (u, v) in enumerate(points)]
@@ -513,24 +520,16 @@ def test_a_finger_drags_the_view_and_taps_the_point(chromium, tmp_path):
     assert view()[2] == pytest.approx(before[2] / 3, rel=0.2)
     tab.touchscreen.tap(x, y)
     tab.wait_for_function("() => location.hash.includes('pt=')")
-    context.close()
 
 
-def test_the_year_marks_the_days_on_which_the_package_finds_no_stable_loop(chromium, tmp_path):
+def test_the_year_marks_the_days_on_which_the_package_finds_no_stable_loop(show, tmp_path):
     live = tmp_path / "live"
     live.mkdir()
     for file in LIVE.glob("*.js"):
         (live / file.name).write_text(shortened(file.read_text()))
     (live / "orbits.js").write_text(year.table())
     assert sum(file.stat().st_size for file in live.iterdir()) <= 120_000
-    page = tmp_path / "page.html"
-    page.write_text(
-        "<!DOCTYPE html><main><div data-live='year'></div><script src='live/page.js'></script>"
-    )
-    tab = chromium.new_page(reduced_motion="reduce")
-    errors: list[str] = []
-    tab.on("pageerror", lambda error: errors.append(str(error)))
-    tab.goto(page.as_uri())
+    tab = show("year", live=live, reduced_motion="reduce")
     for k, name in enumerate(("the paper's", "trailing", "2", "a month's start")):
         tab.locator("select").nth(k).select_option(name)
     words = tab.locator("p", has_text="table on days").or_(tab.locator("p", has_text="Counted"))
@@ -553,5 +552,3 @@ def test_the_year_marks_the_days_on_which_the_package_finds_no_stable_loop(chrom
     assert int(day.inner_text()) == before + 7
     tau = orbits.constellations()["trailing"].round_trips(t[before + 7], 2)
     assert f"{tau[0]:.4f} s and {tau[1]:.4f} s" in tab.locator("main").inner_text()
-    assert errors == []
-    tab.close()
