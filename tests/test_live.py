@@ -423,6 +423,31 @@ def test_sliders_follow_what_is_typed_and_a_changed_preset_says_so(opened):
     assert page.locator(".live-state").inner_text() == ""
 
 
+def test_the_regions_are_drawn_while_a_slider_is_held(opened):
+    # A chart dropped at each move would leave the one before until the slider rests.
+    page = opened()
+    page.locator("select").first.select_option("Common arm")
+    said(page)
+    # How orange a corner is: full of roots, which at ten times the gain a coarse chart cannot
+    # tell.
+    read = """() => { const c = document.querySelector('.live-chart canvas'), n = c.width;
+        const { data } = c.getContext('2d').getImageData(0.85 * n, 0.1 * n, 0.08 * n, 0.08 * n);
+        let sum = 0;
+        for (let i = 0; i < data.length; i += 4) sum += data[i] - data[i + 2];
+        return 4 * sum / data.length; }"""
+    before = page.evaluate(read)
+    page.evaluate(
+        """() => { const slider = document.querySelector('input[type=range]'); let k = 0;
+            const drag = () => { slider.value = 1 + 1e-3 * (k++ % 100);
+                slider.dispatchEvent(new Event('input', { bubbles: true }));
+                requestAnimationFrame(drag); };
+            drag(); }"""
+    )
+    page.wait_for_timeout(3000)
+    during = page.evaluate(read)
+    assert during < 0.25 * before
+
+
 def test_plots_follow_and_a_frequency_lights_up_in_all(opened):
     page = opened()
     page.locator("select").first.select_option("Common arm")
