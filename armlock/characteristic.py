@@ -459,13 +459,13 @@ class CharacteristicFunction:
     def _slope(self, s: Any, x: Any, y: Any, library: Any = np) -> Any:
         """Evaluate dD/ds unchecked, as `_value`."""
         dz = self.step * library.exp(s * self.step) if self.step else 1.0
-        (_, own), *evaluated = self._evaluated(s, library)
+        (_, dr), *evaluated = self._evaluated(s, library)
         arms = 0.0
         for (b, db), (_, tau, origin, here) in zip(evaluated, self.arms(x, y), strict=True):
             change = library.expm1(-s * tau)
             arms = arms + (db * dz - self.delay * b) * ((origin - here) - here * change)
             arms = arms + b * here * tau * (1.0 + change)
-        return own * dz + library.exp(-s * self.delay) * arms
+        return dr * dz + library.exp(-s * self.delay) * arms
 
     def shifted(self, sigma: float) -> CharacteristicFunction:
         """Return the function s -> D(s + sigma), whose roots lie `sigma` further left.

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 
 import numpy as np
 
 from armlock import LaserNoise, Simulation, paper_loop, sweep
-from benchmarks import child, report
-from benchmarks.report import Row, Topic, memory_row, timed
+from benchmarks.measure import cores, peak_memory, timed
+from benchmarks.report import Row, Topic, memory_row
 
 SCALING = 1.8
 MEMORY = 320 * 2**20
@@ -19,18 +18,16 @@ BLOCK = 1 << 16
 def largest(task: tuple[int, int]) -> float:
     """Return the largest output of a draw, in blocks: a seed and a number of samples."""
     seed, samples = task
-    blocks, run = (
-        LaserNoise(seed, at_rest=True).blocks(samples, BLOCK),
-        Simulation(paper_loop()),
-    )
+    run = Simulation(paper_loop())
+    blocks = LaserNoise(seed, at_rest=True).blocks(samples, BLOCK)
     return max(float(np.abs(run.advance(block)).max()) for block in blocks)
 
 
-def run(*, quick: bool, folder: Path) -> Topic:
+def run(*, quick: bool) -> Topic:
     """Measure how much faster two workers are than one."""
     from distributed import Client
 
-    os.environ |= {"OPENBLAS_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
+    os.environ["NUMBA_NUM_THREADS"] = "1"  # of the workers, which start later
     draws, samples = (4, 20_000) if quick else (32, 10_000_000)
     tasks = [(seed, samples) for seed in range(draws)]
     seconds, found, memory = [], [], 0
@@ -41,11 +38,10 @@ def run(*, quick: bool, folder: Path) -> Topic:
             took, results = timed(sweep, largest, tasks, executor=client.get_executor())
             seconds.append(took)
             found.append(results)
-            memory = max(memory, *client.run(child.peak_memory).values())
+            memory = max(memory, *client.run(peak_memory).values())
     ratio = seconds[0] / seconds[1]
-    enough = report.cores() >= 2
-    topic = Topic(f"A Dask cluster: {draws} draws of {samples:.3g} samples")
-    topic.rows += [
+    enough = cores() >= 2
+    rows = [
         Row("one worker", seconds[0]),
         Row("two workers", seconds[1], ratio, f"at least {SCALING:g}" if enough else "",
             ratio >= SCALING if enough else None),
@@ -53,4 +49,4 @@ def run(*, quick: bool, folder: Path) -> Topic:
         Row("results of both", None, None, "bit by bit", found[0] == found[1],
             correctness=True),
     ]  # fmt: skip
-    return topic
+    return Topic(f"A Dask cluster: {draws} draws of {samples:.3g} samples", rows)

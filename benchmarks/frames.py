@@ -75,7 +75,7 @@ def measure(browser: Any, page: Any, selector: str, seconds: float, what: str) -
     return Row(what, work / len(drawn), requirement=said, met=rate > 0.98 * SMOOTH)
 
 
-def run(*, quick: bool, folder: Path) -> Topic:
+def run(*, quick: bool) -> Topic:
     """Measure in Chromium's own timeline, without a graphics processor.
 
     Other work on the machine takes frames away; the processor's time for one stays.

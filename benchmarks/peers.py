@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from importlib import import_module
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 import control
@@ -17,7 +16,8 @@ import numpy as np
 from armlock import CommonArm, DualArm, Loop, transition_matrix, unstable_roots
 from armlock.checks import FloatArray
 from armlock.stability.semidiscretization import realize
-from benchmarks.report import Row, Topic, timed
+from benchmarks.measure import timed
+from benchmarks.report import Row, Topic
 
 SEED = 28
 Point = tuple[Loop, float, float]
@@ -105,7 +105,7 @@ def by_grid(samples: int) -> Callable[[Point], int]:
     return count
 
 
-def run(*, quick: bool, folder: Path) -> Topic:
+def run(*, quick: bool) -> Topic:
     """Let every tool that is there count the loops."""
     points = twenty_loops()[: 2 if quick else None]
     exact = [int(unstable_roots(*point)) for point in points]

@@ -10,9 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,7 +20,8 @@ from armlock import LaserNoise, Loop, PerturbationNoise, paper_loop, simulate
 from armlock.checks import FloatArray
 from armlock.paper import SAMPLE_RATE, TAU1, TAU2
 from armlock.timedomain.discretize import sampled_loop
-from benchmarks.report import Row, Topic, timed
+from benchmarks.measure import in_turn, timed
+from benchmarks.report import Row, Topic, at_least
 
 PYTHON_RATIO = 100.0
 ENSEMBLE_RATIO = 2.5
@@ -31,19 +30,6 @@ BETWEEN_RATIO, WHOLE_RATIO = 2.0, 5.0
 BETWEEN = (TAU1 + 0.4 / SAMPLE_RATE, 6e-8), (TAU2 + 0.3 / SAMPLE_RATE, -5e-8)
 ACCURACY = 1e-10
 DRAWS = 32
-
-
-@dataclass(frozen=True)
-class Sizes:
-    """How much is measured, in samples."""
-
-    samples: int = 40_000_000
-    python: int = 100_000
-    compared: int = 1_000_000
-    passes: int = 4
-
-
-QUICK = Sizes(samples=30_000, python=6_000, compared=30_000, passes=1)
 
 
 def plain(
@@ -106,103 +92,63 @@ def plain_arguments(loop: Loop) -> tuple[Any, ...]:
 
 def inputs(samples: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     noise = LaserNoise(1).draw(samples)
-    c1, c2 = (PerturbationNoise(seed, scale=1e-4).draw(samples) for seed in (2, 3))
-    c1 += 1.0
-    c2 += 1.0
+    c1, c2 = (1.0 + PerturbationNoise(seed, scale=1e-4).draw(samples) for seed in (2, 3))
     return noise, c1, c2
 
 
-def run(*, quick: bool, folder: Path) -> Topic:
-    """Measure speed, accuracy and memory of the simulation."""
-    sizes = QUICK if quick else Sizes()
-    topic = Topic(f"Simulation of the paper's loop, {sizes.samples:.3g} samples")
-    topic.data["sizes"] = asdict(sizes)
-    loop = paper_loop()
-    noise, c1, c2 = inputs(sizes.samples)
+def plain_rows(
+    loop: Loop, noise: FloatArray, c1: FloatArray, c2: FloatArray, python: int, passes: int
+) -> list[Row]:
+    """Compare `simulate` with the plain loop, compiled and in Python."""
     arguments = plain_arguments(loop)
-    short = slice(0, 5000)
-    simulate(loop, noise[short], c1[short], c2[short])
-    plain_output(noise[short], c1[short], c2[short], arguments)
-    ours, theirs = [], []
-    for _ in range(sizes.passes):
-        # No result is kept, so that both find the same memory free.
-        ours.append(timed(lambda: simulate(loop, noise, c1, c2).size)[0])
-        theirs.append(timed(lambda: plain_output(noise, c1, c2, arguments).size)[0])
-    part = slice(0, sizes.python)
-    few = noise[part], c1[part], c2[part]
-    slow = timed(lambda: plain(*few, *arguments, np.zeros(sizes.python)))[0]
-    slow *= sizes.samples / sizes.python
-    best, other = min(ours), min(theirs)
-    topic.rows += [
-        Row("simulate", best),
-        Row("plain compiled loop", other, other / best, "at least 1", other >= best),
-        Row("plain loop in Python [a]", slow, slow / best, f"at least {PYTHON_RATIO:g}",
-            slow / best >= PYTHON_RATIO),
-    ]  # fmt: skip
-    topic.rows += ensemble_rows(loop, noise, c1, c2, sizes.passes)
-    topic.rows += moving_rows(loop, noise, c1, c2, sizes.passes)
-    compared = slice(0, 4 * sizes.compared)
-    output = simulate(loop, noise[compared], c1[compared], c2[compared])
-    phi = plain_output(noise[compared], c1[compared], c2[compared], arguments)
-    same = float(np.abs(output - phi).max() / np.abs(output).max())
-    topic.rows.append(Row(f"simulate and plain loop differ by {same:.1e}", None, None,
-                          "at most 1e-10", same <= ACCURACY, correctness=True))  # fmt: skip
-    topic.data.update(simulate=ours, plain=theirs, python=slow, difference=same)
-    topic.notes += [
-        f"[a] Extrapolated from {sizes.python} samples.",
-        "simulate and the plain loop each make their output, and are timed in turn after "
-        "compiling; the best of "
-        f"{sizes.passes} runs each.",
-        "[b] The ratio is that to the same runs one by one, on one core, in turn: the median "
-        f"of {5 * sizes.passes} passes, in processor time.",
-        "[c] The ratio is that to constant delays between samples, in turn: the median of "
-        f"{2 * sizes.passes + 1} passes, in processor time; behind it that to whole samples.",
+    calls = [
+        lambda: simulate(loop, noise, c1, c2).size,
+        lambda: plain_output(noise, c1, c2, arguments).size,
     ]
-    return topic
+    ours, theirs = in_turn(calls, passes).min(axis=0)
+    few = (part[:python] for part in (noise, c1, c2))
+    slow = timed(plain, *few, *arguments, np.zeros(python))[0] * noise.size / python
+    many = [part[: 40 * python] for part in (noise, c1, c2)]
+    output, phi = simulate(loop, *many), plain_output(*many, arguments)
+    differ = float(np.abs(output - phi).max() / np.abs(output).max())
+    return [
+        Row("simulate", ours),
+        at_least("plain compiled loop", theirs, theirs / ours, 1.0),
+        at_least("plain loop in Python [a]", slow, slow / ours, PYTHON_RATIO),
+        Row(f"simulate and plain loop differ by {differ:.1e}", None, None,
+            f"at most {ACCURACY:g}", differ <= ACCURACY, correctness=True),
+    ]  # fmt: skip
 
 
 def ensemble_rows(
     loop: Loop, noise: FloatArray, c1: FloatArray, c2: FloatArray, passes: int
 ) -> list[Row]:
-    """Compare an ensemble with its runs one by one, in turn, by processor time."""
-    shape = min(noise.size // DRAWS, 100_000), DRAWS
-    # The same sample of all draws side by side, as `Simulation` would have it.
-    together = [part[: shape[0] * DRAWS].reshape(shape).T for part in (noise, c1, c2)]
-    singly = [np.ascontiguousarray(part) for part in together]
-    rows = list(zip(*singly, strict=True))
+    """Compare an ensemble with its runs one by one."""
+    together = side_by_side(noise, c1, c2)
+    rows = list(zip(*map(np.ascontiguousarray, together), strict=True))
     same = np.array_equal(simulate(loop, *together), [simulate(loop, *row) for row in rows])
-    times = np.array([
-        [
-            timed(function, clock=time.process_time)[0]
-            for function in (
-                lambda: simulate(loop, *together).size,
-                lambda: [simulate(loop, *row).size for row in rows],
-            )
-        ]
-        for _ in range(5 * passes)
-    ])  # fmt: skip
-    # Processor time, in turn, so that other work on the machine slows down both.
-    low, ratio, high = np.quantile(times[:, 1] / times[:, 0], (0.1, 0.5, 0.9))
+    calls = [
+        lambda: simulate(loop, *together).size,
+        lambda: [simulate(loop, *row).size for row in rows],
+    ]
+    times = in_turn(calls, passes, time.process_time)
+    ratio = float(np.median(times[:, 1] / times[:, 0]))
+    what = f"ensemble of {DRAWS}, {together[0].shape[1]:.3g} samples each [b]"
     return [
-        Row(f"ensemble of {DRAWS}, {shape[0]:.3g} samples each [b]", float(times[:, 0].min()),
-            float(ratio), f"at least {ENSEMBLE_RATIO:g}", bool(ratio >= ENSEMBLE_RATIO)),
-        Row(f"its ratio, from the 10th to the 90th percent: {low:.2f} to {high:.2f}"),
+        at_least(what, float(times[:, 0].min()), ratio, ENSEMBLE_RATIO),
         Row("ensemble and single runs agree", None, None, "bit by bit", same, correctness=True),
-    ]  # fmt: skip
+    ]
 
 
 def moving_rows(
     loop: Loop, noise: FloatArray, c1: FloatArray, c2: FloatArray, passes: int
 ) -> list[Row]:
-    """Compare arms that move with constant delays, whole ones and others, in turn."""
-    shape = min(noise.size // DRAWS, 100_000), DRAWS
-    one = noise, c1, c2
-    together = [part[: shape[0] * DRAWS].reshape(shape).T for part in one]
+    """Compare arms that move with constant delays, whole ones and others."""
     alike, own = (
         [partial(moving, shift=shift, tau=tau, rate=rate) for tau, rate in BETWEEN]
         for shift in (np.zeros(()), np.arange(DRAWS)[:, None] / SAMPLE_RATE)
     )
-    rows = []
+    one, together, rows = (noise, c1, c2), side_by_side(noise, c1, c2), []
     for what, arrays, moves in (
         ("one run", one, alike),
         (f"ensemble of {DRAWS}", together, alike),
@@ -212,12 +158,7 @@ def moving_rows(
             partial(locked_size, loop, arrays, delays)
             for delays in ((None, None), [tau for tau, _ in BETWEEN], moves)
         ]
-        times = np.array(
-            [
-                [timed(call, clock=time.process_time)[0] for call in calls]
-                for _ in range(2 * passes + 2)
-            ]
-        )[1:]  # the first pass compiles
+        times = in_turn(calls, passes, time.process_time)
         whole, between = np.median(times[:, 2:] / times[:, :2], axis=0)
         met = bool(between <= BETWEEN_RATIO and whole <= WHOLE_RATIO)
         rows.append(
@@ -225,6 +166,12 @@ def moving_rows(
                 float(between), f"at most {BETWEEN_RATIO:g}; {WHOLE_RATIO:g}", met)
         )  # fmt: skip
     return rows
+
+
+def side_by_side(*series: FloatArray) -> list[FloatArray]:
+    """Cut series into draws, the same sample of all side by side, as `Simulation` has it."""
+    samples = min(series[0].size // DRAWS, 100_000)
+    return [one[: samples * DRAWS].reshape(samples, DRAWS).T for one in series]
 
 
 def moving(t: FloatArray, *, shift: FloatArray, tau: float, rate: float) -> FloatArray:
@@ -236,3 +183,21 @@ def locked_size(loop: Loop, arrays: Sequence[FloatArray], delays: Sequence[Any])
     """Run a loop; nothing is kept."""
     noise, c1, c2 = arrays
     return simulate(loop, noise, c1, c2, tau1=delays[0], tau2=delays[1]).size
+
+
+def run(*, quick: bool) -> Topic:
+    """Measure speed and accuracy of the simulation."""
+    samples, python, passes = (30_000, 6_000, 1) if quick else (40_000_000, 100_000, 4)
+    loop, series = paper_loop(), inputs(samples)
+    rows = plain_rows(loop, *series, python, passes)
+    rows += ensemble_rows(loop, *series, 5 * passes)
+    rows += moving_rows(loop, *series, 2 * passes + 1)
+    notes = [
+        f"[a] Extrapolated from {python} samples. Both compiled loops make their output; the "
+        f"best of {passes} runs each.",
+        f"[b] The ratio is that to the same runs one by one: the median of {5 * passes} "
+        f"passes, in processor time.",
+        f"[c] The ratio is that to constant delays between samples: the median of "
+        f"{2 * passes + 1} passes, in processor time; behind it that to whole samples.",
+    ]
+    return Topic(f"Simulation of the paper's loop, {samples:.3g} samples", rows, notes)

@@ -149,35 +149,6 @@ def spectral_count(system, x, y, nodes=80):
     return int(np.count_nonzero(generator_eigenvalues(system, x, y, nodes).real > 0.0))
 
 
-def held_map(system, x, y, step, order):
-    """Transition matrix of a first-order delay equation, from its closed-form integrals.
-
-    The state is (xi_i, xi_{i-1}, ..., xi_{i-r}).
-    """
-    c0, c1 = system.a
-    rate = -c0 / c1
-    gains = []
-    for b, delay in delayed_terms(system, x, y):
-        if delay == 0.0:
-            rate -= b[0] / c1
-        else:
-            gains.append((round(delay / step), -b[0] / c1))
-    decay = np.exp(rate * step)
-    longest = max(back for back, _ in gains)
-    matrix = np.diag(np.ones(longest), -1)
-    matrix[0, 0] = decay
-    whole = np.expm1(rate * step) / rate
-    # Integral of (u / h) exp(rate (h - u)) over the step: the share of the newer sample.
-    newer = (np.expm1(rate * step) - rate * step) / (rate * rate * step)
-    for back, gain in gains:
-        if order == 0:
-            matrix[0, back] += gain * whole
-        else:
-            matrix[0, back] += gain * (whole - newer)
-            matrix[0, back - 1] += gain * newer
-    return matrix
-
-
 def map_eigenvalues(system, x, y):
     """Roots of z^r D for a map, r the longest delay in steps, by a companion matrix."""
     return np.roots(map_polynomial(system, x, y)[::-1])

@@ -6,7 +6,14 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from book.companion.claims import Verdict, all_claims, chapter_claims, check
+from book.companion.claims import (
+    Verdict,
+    all_claims,
+    chapter_claims,
+    check,
+    single_arm,
+    table1,
+)
 from book.companion.claims import ledger as module
 from book.companion.claims.ledger import Finding, claim, decide, typeset
 from book.companion.claims.page import SECTIONS, whole_ledger
@@ -107,6 +114,26 @@ def test_a_verdict_follows_from_the_parts_that_hold():
         assert decide(*parts, settled=False) is Verdict.OPEN
         limited = decide(*parts, beyond=False)
         assert limited is (Verdict.WHERE_USED if all(parts) else expected)
+
+
+def turned_filters(s, mean, half, *, right=table1.published_filters):
+    together, apart = right(s, mean, half)
+    return together, -apart
+
+
+@pytest.mark.parametrize(
+    ("chapter", "check", "name", "value"),
+    [
+        (table1, "common_row", "HALF_DIFFERENCE", table1.FULL_DIFFERENCE),
+        (table1, "modified_dual_row", "published_filters", turned_filters),
+        (single_arm, "below_one", "lowest_stable_k2", lambda gain, tau: -1.2),
+        (single_arm, "closed_form_region", "lowest_stable_b", lambda a, tau: -2.0),
+    ],
+)
+def test_a_check_can_fail(monkeypatch, chapter, check, name, value):
+    """A different ingredient leads to a different verdict."""
+    monkeypatch.setattr(chapter, name, value)
+    assert getattr(chapter, check).__wrapped__().verdict is Verdict.DIFFERS
 
 
 # The claims of the book ----------------------------------------------------------------

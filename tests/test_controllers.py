@@ -53,12 +53,6 @@ def test_table_two_is_the_product_of_its_factors():
     np.testing.assert_allclose((stage_one() * stage_two())(s), value, rtol=1e-13)
 
 
-def test_the_printed_denominator_cancels_a_zero():
-    table, printed = stage_two(), stage_two(denominator="printed")
-    ratio = (S + TABLE_2_ZEROS[-1]) / (S + TABLE_2_POLES[-1])
-    np.testing.assert_allclose(table(S), printed(S) * ratio, rtol=1e-13)
-
-
 def test_a_state_space_is_taken_or_refused_by_its_response():
     """The eigenvalues of a matrix that is far from normal are not those that it was made of."""
     turn, _ = np.linalg.qr(np.random.default_rng(0).normal(size=(8, 8)))

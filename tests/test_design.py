@@ -92,7 +92,7 @@ def test_what_is_found_has_the_measures_that_it_is_said_to_have():
     goal = np.array([1e-4, 1e-3]), np.array([100.0, 1000.0])
     bounds = {"modulus": 0.6, "modulus_in_corners": 0.4, "phase": 0.3, "suppression": -3.0}
     found = design(robust_loop(), "critical_perturbation", bounds, goal=goal)
-    loop, size = found.loop, np.abs(found.controller(1j * TURN * goal[0]))
+    loop, size = found.loop, np.abs(found.loop.controller(1j * TURN * goal[0]))
     corners = [1.0 + PERTURBATION * np.array(c) for c in CORNERS]
     expected = {
         "critical_perturbation": critical_perturbation(loop, (1.0, -1.0)),
@@ -109,21 +109,11 @@ def test_what_is_found_has_the_measures_that_it_is_said_to_have():
     assert not found.counts.any()
 
 
-def test_a_loop_that_rolls_off_is_measured_with_free_phases():
-    """The gain is free, and the unity gain is what has to become small."""
-    found = design(
-        buildable_loop(),
-        "unity_gain",
-        {"suppression": -3.0, "modulus": 0.25, "critical_perturbation": 3e-6},
-        free_above=TURN * 2.0,
-        free_gain=True,
-    )
-    loop, free = found.loop, TURN * 2.0
-    assert found.measures["modulus"] == margins(loop, free_above=free).modulus
-    above = 1j * TURN * np.geomspace(found.measures["unity_gain"], 1e6, 2001)
-    first, second = loop.arm_responses(above)
-    assert (np.abs(first + second) + np.abs(first) + np.abs(second) < 1.001).all()
-    assert found.measures["unity_gain"] < 14e3
+def test_a_loop_with_a_dead_time_is_certified_at_all_frequencies():
+    start = Loop(([], [-0.1], 0.1), "common", 20.1, 19.9, 1e-3)
+    found = design(start, "suppression", {"modulus": 0.25}, free_gain=True)
+    assert found.measures["suppression"] > 0.0
+    assert found.measures["modulus"] == modulus_margin(found.loop)
 
 
 @pytest.mark.parametrize("gain", [3.0, 300.0, 3000.0])
@@ -143,7 +133,7 @@ def test_a_perturbation_above_one_is_made_larger():
     """With K(0) = k the loop is stable up to c1 = 1 + 1 / k: k falls as far as it may."""
     start = Loop(([], [-0.1], 0.003), "single", 20.0)
     found = design(start, "critical_perturbation", {"suppression": -25.0})
-    k = found.controller(0.0).real
+    k = found.loop.controller(0.0).real
     assert found.measures["critical_perturbation"] == pytest.approx(1.0 / k, rel=1e-9)
     assert k == pytest.approx(0.003, rel=1e-3)
 
@@ -158,12 +148,9 @@ def test_contradictory_constraints_say_which_was_missed_and_by_how_much():
 def test_the_search_leaves_its_limits_and_keeps_within_them(size, data):
     """A distance from a place inside, or on a limit; from zero on, where one limit may be."""
     place = np.array(data.draw(st.lists(st.floats(-1.0, 1.0), min_size=size, max_size=size)))
-    x, calls = _smallest(
-        lambda x: float(np.abs(x - place).sum() + ((x - place) ** 2).sum()), size
-    )
+    x = _smallest(lambda x: float(np.abs(x - place).sum() + ((x - place) ** 2).sum()), size)
     assert np.abs(x - place).max() < 0.01
     assert np.abs(x).max() <= 1.0
-    assert calls <= 3 * 150 * size + 3 * size
 
 
 def test_a_parameter_on_its_upper_limit_is_not_frozen():
@@ -174,7 +161,7 @@ def test_a_parameter_on_its_upper_limit_is_not_frozen():
         calls.append(x[0])
         return -x[0] if len(calls) < 12 else (x[0] - 0.2) ** 2
 
-    x, _ = _smallest(cost, 1)
+    x = _smallest(cost, 1)
     assert calls[10] == 1.0
     assert x[0] == pytest.approx(0.2, abs=1e-3)
 
@@ -187,12 +174,12 @@ UNSTABLE = Loop(([], [-0.1], 300.0), "single", 20.0, delay=1.0)
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"objective": "beauty"}, "a measure must be one of .*'beauty'"),
+        ({"objective": "beauty"}, "objective must be one of .*'beauty'"),
         ({"constraints": {"modulus": 0.5}}, "objective must not be among constraints"),
         ({"constraints": {"phase": np.nan}}, "phase must be finite"),
-        ({"constraints": {"phase": 35}}, "phase must lie from 0 to pi, in rad, got 35"),
-        ({"constraints": {"phase": -35}}, "phase must lie from 0 to pi, in rad, got -35"),
-        ({"constraints": {"phase_in_corners": 3.15}}, "phase_in_corners must lie from 0 to pi"),
+        ({"constraints": {"phase": 35}}, "phase must not exceed pi, in rad, got 35"),
+        ({"constraints": {"phase": -35}}, "phase must be positive, got -35"),
+        ({"constraints": {"beauty": 1.0}}, "constraints must be one of .*'beauty'"),
         ({"structure": paper_loop(controller=RIGHT)}, "structure must have .* none positive"),
         ({"structure": paper_loop(controller=COMPLEX)}, "structure must have .* real zeros"),
         ({"structure": CommonArm()}, "structure must have a zero or pole other than s = 0"),
@@ -201,7 +188,6 @@ UNSTABLE = Loop(([], [-0.1], 300.0), "single", 20.0, delay=1.0)
         ({"goal": ([1e-3, 1e-2], [1.0])}, "goal must hold as many gains as frequencies"),
         ({"goal": ([-1e-3], [1.0])}, "goal must be positive"),
         ({"box": 0.0}, "box must be positive"),
-        ({"free_above": -1.0}, "free_above must be positive"),
     ],
 )
 def test_what_cannot_be_searched_is_refused(changes, message):

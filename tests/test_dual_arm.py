@@ -13,48 +13,11 @@ from armlock import (
     Loop,
     SingleArm,
     critical_perturbation,
-    d_curve_line,
     margins,
     unstable_roots,
 )
 from armlock.robustness.rays import Ray, first_crossing
 from armlock.sensors import COMMON, DIFFERENCE, dual
-from book.companion.claims import dual_arm
-
-
-@pytest.mark.parametrize("gain", [0.1, 10.0, 1e4])
-@pytest.mark.parametrize("options", [{}, {"corner": 0.7}, {"difference": 0.1}])
-def test_straight_edge_is_where_both_perturbations_are_equal(gain, options):
-    loop = DualArm(gain, **options)
-    assert d_curve_line(loop) == (1.0, -1.0, 0.0)
-    c = np.array([-0.5, 0.2, 0.9, 1.0])
-    np.testing.assert_array_equal(unstable_roots(loop, c, c), BOUNDARY)
-    np.testing.assert_array_equal(unstable_roots(loop, c, c + 1e-9), 0)
-    np.testing.assert_array_equal(unstable_roots(loop, c, c - 1e-9), 1)
-
-
-@pytest.mark.parametrize("gain", [1.0, 10.0, 300.0])
-def test_edges_are_where_the_count_changes(gain):
-    loop, found = DualArm(gain), dual_arm.edges(gain)
-    c = 1.0 + found.corner * np.array([1.0 - 1e-4, 1.0 + 1e-4])
-    assert unstable_roots(loop, c, c + 1e-9).tolist() == [0, 2]
-    d = found.width * np.array([1.0 - 1e-6, 1.0 + 1e-6])
-    assert unstable_roots(loop, 0.9 - d / 2, 0.9 + d / 2).tolist() == [0, 2]
-
-
-def test_crossings_along_a_ray_add_up_to_the_counts():
-    loop = DualArm()
-    start, direction = np.array([0.8, 1.2]), np.array([0.35, -0.4])
-    crossings = Ray(loop, start, direction).crossings(1.0)
-    assert (np.diff(crossings.position) >= 0.0).all()
-    t = np.linspace(0.013, 0.99, 40)
-    expected = int(unstable_roots(loop, *start)) + np.array(
-        [crossings.change[crossings.position < here].sum() for here in t]
-    )
-    along = start[:, None] + t * direction[:, None]
-    np.testing.assert_array_equal(unstable_roots(loop, *along), expected)
-    first = first_crossing(loop, start, direction, 1.0)
-    assert first.position == pytest.approx(crossings.position[0], rel=1e-12)
 
 
 def test_a_crossing_that_rounding_hides_is_refused():

@@ -18,7 +18,6 @@ from armlock import (
     Loop,
     SingleArm,
     critical_perturbation,
-    flight_loop,
     margins,
     modulus_margin,
     paper_loop,
@@ -114,19 +113,6 @@ def test_the_limit_of_the_chain_limits_the_gain():
     assert found.gain_omega == np.inf
 
 
-@pytest.mark.parametrize("direction", [(0, -1), (1, 0), (0, 1), (-1, 0), (1, -1)])
-def test_the_modulus_margin_vanishes_where_the_loop_breaks(direction):
-    """A root next to the axis makes a dip of |1 + L| that hides between samples."""
-    loop = paper_loop()
-    eps = critical_perturbation(loop, direction)
-    margin = [
-        modulus_margin(loop, *(1.0 + eps * (1.0 - gap) * np.array(direction)))
-        for gap in (1e-4, 1e-5)
-    ]
-    assert margin[1] < 0.05
-    assert margin[1] == pytest.approx(0.1 * margin[0], rel=0.01)
-
-
 # ---------------------------------------------------------- the first perturbation that breaks
 def exact(loop, direction, omega, eps):
     """Frequency and eps at which j omega is a root of 1 + L, with forty digits."""
@@ -179,19 +165,33 @@ def test_critical_perturbation_from_the_boundary_inwards(loop, direction):
     assert counts[-1] > 0
 
 
-@pytest.mark.parametrize(
-    ("loop", "direction"),
-    [
-        (SingleArm(), (1.0, 0.0)),
-        (CommonArm(), (1.0, 0.0)),
-        (CommonArm(), (1.0, -0.5)),
-        (DualArm(), (0.0, -1.0)),
-        # Out of its way along the boundary by a rounding of the direction.
-        (CommonArm(), (1.0, np.nextafter(-1.0, 0.0))),
-    ],
-)
-def test_nothing_is_left_where_the_direction_leads_out(loop, direction):
-    assert critical_perturbation(loop, direction) == 0.0
+def weak(gain, sensor):
+    return Loop(((), (-1.0,), gain), sensor, 20.0, 19.0)
+
+
+KNOWN = [
+    # Out of the stable region at once, the last by a rounding of the direction.
+    (SingleArm(), (1.0, 0.0), 0.0),
+    (CommonArm(), (1.0, -0.5), 0.0),
+    (DualArm(), (0.0, -1.0), 0.0),
+    (CommonArm(), (1.0, np.nextafter(-1.0, 0.0)), 0.0),
+    # s + 1 + k (1 - c1 e1) has the real root 0 where k c1 = 1 + k.
+    (weak(1e-5, COMMON), (1.0, 0.0), 1e5),
+    (weak(1e-8, SINGLE), (1.0, 0.0), 1e8),
+    (weak(1e-8, COMMON), (1.0, 0.0), 1e8),
+    # Not within parameters of a billion; an arm that the sensor does not see.
+    (weak(1e-12, COMMON), (1.0, 0.0), np.inf),
+    (weak(1e-5, SINGLE), (0.0, 1.0), np.inf),
+    # No pair comes to the axis of a common arm with equal arms: only c1 + c2 acts.
+    (CommonArm(1.0, 20.0, 20.0), (1.0, -1.0), np.inf),
+    # The chain, at 1 / (5000 1e-4).
+    (paper_loop(), (1.0, 1.0), 1e-4),
+]
+
+
+@pytest.mark.parametrize(("loop", "direction", "eps"), KNOWN)
+def test_critical_perturbation_where_it_is_known(loop, direction, eps):
+    assert critical_perturbation(loop, direction) == pytest.approx(eps, rel=1e-9)
 
 
 def test_a_direction_that_leads_in_by_a_rounding_does_not_lead_out():
@@ -202,8 +202,6 @@ def test_a_direction_that_leads_in_by_a_rounding_does_not_lead_out():
 
 @pytest.mark.parametrize("size", [1.0, 0.3])
 def test_along_the_line_on_which_the_root_at_zero_cancels_another_root_is_first(size):
-    # No pair comes to the axis of a common arm with equal arms: only c1 + c2 acts.
-    assert critical_perturbation(CommonArm(1.0, 20.0, 20.0), (size, -size)) == np.inf
     for loop, direction in ((CommonArm(), (size, -size)), (DualArm(), (size, size))):
         eps = critical_perturbation(loop, direction)
         found = [
@@ -236,34 +234,6 @@ def test_roots_behind_the_one_at_zero_are_not_passed_over(loop):
         margins(loop)
     with pytest.raises(ValueError, match=r"to lose stability, but loop_count gives \d"):
         critical_perturbation(loop, (-1.0, -1.0))
-
-
-@pytest.mark.parametrize(
-    ("mapping", "gain", "direction"),
-    [
-        (SINGLE, 0.3, (0.0, 1.0)),  # an arm that the sensor does not see
-        (COMMON, 1e-12, (1.0, 0.0)),  # not within parameters of a billion
-    ],
-)
-def test_what_never_breaks_is_said_not_to(mapping, gain, direction):
-    loop = Loop(((), (-1.0,), gain), mapping, 20.0, 19.0)
-    assert critical_perturbation(loop, direction) == np.inf
-
-
-def test_the_length_of_the_direction_scales_the_result():
-    expected = critical_perturbation(paper_loop(), (0.5, -1.0))
-    for size in (1e-8, 10.0, 1e8):
-        found = critical_perturbation(paper_loop(), (0.5 * size, -size))
-        assert found == pytest.approx(expected / size, rel=1e-9)
-
-
-@pytest.mark.parametrize("direction", [(0.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, -1.0)])
-def test_a_dead_time_far_below_the_crossing_period_changes_little(direction):
-    """With it the chain ends at 1e5 rad/s only; these crossings lie below 30 rad/s."""
-    plain = critical_perturbation(flight_loop(), direction)
-    found = critical_perturbation(flight_loop(delay=1e-6), direction)
-    assert found != plain
-    assert found == pytest.approx(plain, rel=1e-7)
 
 
 def test_counts_contradict_gains_between_which_the_loop_is_not_stable():
@@ -377,25 +347,9 @@ def test_free_phases_do_not_step_over_a_root_on_the_axis(lowest):
     assert margins(loop, 0.1, 0.0, free_above=1.5).modulus > 0.0
 
 
-def test_an_unstable_loop_has_no_margins_and_nothing_to_lose():
-    loop = Loop(((), (0.5, -1.0), 0.1), SINGLE, 2.0, 1.5)
-    with pytest.raises(ValueError, match="must be stable at"):
-        margins(loop)
-    with pytest.raises(ValueError, match=r"^the loop must be stable at .* = \(1, 1\) to lose"):
-        critical_perturbation(loop, (1.0, 0.0))
-
-
 def test_an_unconfined_chain_has_no_margin():
     with pytest.raises(CountError, match="not confined to the left half-plane"):
         modulus_margin(Loop(((), (), 5.0), SINGLE, 2.0, 1.5), 1.3, 1.0)
-
-
-@pytest.mark.parametrize("gain", [1e-5, 1e-7, 1e-8])
-def test_a_weak_loop_breaks_far_away(gain):
-    # s + 1 + k (1 - c1 e1) has the real root 0 where k c1 = 1 + k.
-    for mapping, tau2 in ((SINGLE, 20.0), (COMMON, 19.0)):
-        loop = Loop(((), (-1.0,), gain), mapping, 20.0, tau2)
-        assert critical_perturbation(loop, (1.0, 0.0)) == pytest.approx(1.0 / gain, rel=1e-9)
 
 
 def test_roots_that_cross_just_below_the_limit_of_the_chain_come_first():
@@ -406,40 +360,6 @@ def test_roots_that_cross_just_below_the_limit_of_the_chain_come_first():
         counts = unstable_roots(loop, 1.0 + tries * direction[0], 1.0 + tries * direction[1])
         assert (counts <= 0).all()
         assert counts[0] == 0
-
-
-@pytest.mark.parametrize("lowest", [1e-2, 1.0])
-def test_free_phases_of_a_common_arm_have_margins_in_closed_form(lowest):
-    # L fills a disc around -j a of radius c a, with a = 2 gain / omega: it comes closest to -1
-    # at a = c / sqrt(1 - c^2), and its share of the unit circle at a = 1 / sqrt(1 - c^2).
-    c = 0.999
-    nearest = np.sqrt(1.0 - c * c)
-    loop = Loop(((), (0.0,), np.pi * 14.7e3), COMMON, 33.6, 33.1)
-    found = margins(loop, c, c, lowest)
-    assert found.modulus == pytest.approx(nearest, rel=1e-5)
-    assert found.phase == pytest.approx(np.arcsin(nearest), rel=1e-5)
-    assert found.modulus_omega == pytest.approx(2.0 * np.pi * 14.7e3 * nearest / c, rel=1e-2)
-    assert np.isnan([found.gain_lower, found.gain_upper, found.gain_omega]).all()
-
-
-def test_a_dead_time_with_free_phases_takes_the_phase_it_should():
-    # With c = 0 the disc is the point K exp(-s delay): phase and delay margin are textbook's.
-    loop = Loop(((), (0.0,), 3.0), SINGLE, 2.0, 1.0, delay=0.1)
-    found = margins(loop, 0.0, 0.0, 0.01)
-    assert found.phase == pytest.approx(0.5 * np.pi - 0.3, rel=1e-5)
-    assert found.delay == pytest.approx((0.5 * np.pi - 0.3) / 3.0, rel=1e-5)
-
-
-def test_arms_of_equal_delay_have_free_phases_of_their_own():
-    loop = Loop(((), (-60.0 + 60j, -60.0 - 60j), 1000.0), COMMON, 2.0, 2.0)
-    # The smallest distance lies past twenty times this frequency.
-    c1, c2, above = 0.7, -0.9, 4.2
-    omega = np.geomspace(above, 1e4, 200_001)
-    first, second = loop.arm_responses(1j * omega)
-    away = np.abs(1.0 + first + second) - np.abs(c1 * first) - np.abs(c2 * second)
-    found = margins(loop, c1, c2, above)
-    assert found.modulus == pytest.approx(away.min(), rel=1e-4)
-    assert found.modulus_omega == pytest.approx(omega[away.argmin()], rel=1e-3)
 
 
 @pytest.mark.parametrize(("gain", "damping"), [(1e-3, 1e-2), (1e-3, 1e-3), (1e-2, 1e-2)])

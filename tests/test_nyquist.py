@@ -41,6 +41,8 @@ CASES = {
     "dual arm, ideal": (DualArm(), (1.0, 1.0), 0),
     "dual arm, Area 2": (DualArm(), (1.0, 0.995), 0),
     "dual arm, Area 1": (DualArm(), (1.0, 1.005), 0),
+    "controlled, corner of its box": (paper_loop(), (1.0 + 1e-6, 1.0 - 1e-6), 0),
+    "controlled, far away": (paper_loop(), (1.3, -0.6), 0),
     "triple integrator": (
         Loop(((-0.1, -0.1), (0, 0, 0), 1.0), COMMON, 2.0, 1.5),
         (1.0, 1.01),
@@ -79,18 +81,6 @@ def test_encirclements_and_open_loop_poles_give_the_closed_loop_roots(name):
     assert max(int(unstable_roots(loop, c1, c2)), 0) == curve.closed_loop_roots
     turns = np.abs(np.angle((1 + curve.response[1:]) / (1 + curve.response[:-1])))
     assert turns.max() <= 1.0
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_random_controllers_agree_with_a_rectangle_of_another_kind(seed):
-    rng = np.random.default_rng(seed)
-    order = int(rng.integers(1, 5))
-    zeros, poles = (roots(rng, n, 0.03, 6.0, 0.3) for n in (int(rng.integers(0, order)), order))
-    mapping = [SINGLE, COMMON, DIFFERENCE, dual(2.0, 0.5)][seed % 4]
-    loop = Loop((zeros, poles, 10.0 ** rng.uniform(-2.0, 0.5)), mapping, 2.0, 1.5)
-    point = rng.normal(1.0, 0.3, 2)
-    expected = independent.rectangle_count(loop, *point)
-    assert nyquist(loop, *point).closed_loop_roots == expected
 
 
 @pytest.mark.parametrize("seed", range(40))
@@ -134,13 +124,6 @@ def test_a_resonance_between_the_samples_is_refused_not_guessed(monkeypatch):
 
     monkeypatch.setattr(module, "_resolving_grid", even)
     with pytest.raises(CountError, match=r"passes through -1|against 2 roots"):
-        nyquist(loop, c1, c2)
-
-
-def test_a_forgotten_unstable_pole_is_noticed(monkeypatch):
-    loop, (c1, c2), _ = CASES["one unstable pole"]
-    monkeypatch.setattr(module, "open_loop_poles", lambda _: 0)
-    with pytest.raises(CountError, match=r"no Nyquist count at \(c1, c2\) = "):
         nyquist(loop, c1, c2)
 
 
@@ -218,6 +201,8 @@ def test_the_ideal_loops_cross_nowhere(loop):
         (SingleArm(), 1.0 + 4.5e-16, 1),
         (SingleArm(), 1.0 - 1e-12, 1),
         (SingleArm(), 0.5, 1),
+        # Here it meets zeros of the controller.
+        (paper_loop(), 1.0, 0),
         # Tiny corners of a controller do not hide it.
         (Loop(((-1e-8, -1e-8), (0.0, 0.0, -1.0), 1.0), SINGLE, 2.0, 1.5), 0.5, 2),
     ],

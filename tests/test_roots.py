@@ -26,7 +26,6 @@ from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
 from armlock.stability.roots import extended_root
 from book.companion.schemes import pseudospectral_roots
 from tests import independent
-from tests.systems import RETARDED
 
 gains = st.floats(0.05, 3.0)
 delays = st.floats(0.2, 5.0)
@@ -77,17 +76,6 @@ def test_root_is_a_zero_and_the_rightmost_of_an_independent_spectrum(gain, tau1,
     assert abs(independent.value(system, root, c1, c2)) <= 1e-12 * (parts.sum() + abs(root))
     others = independent.generator_eigenvalues(system, c1, c2, 70)
     assert others.real.max() == pytest.approx(root.real, abs=1e-6 * (1.0 + abs(root)))
-
-
-@pytest.mark.parametrize("name", [n for n in RETARDED if n != "no parameter"])
-def test_other_loops_agree_with_count_and_independent_spectrum(name):
-    system = RETARDED[name]
-    for x, y in [(0.4, -0.3), (-1.2, 0.8), (1.9, 1.1)]:
-        root = rightmost_root(system, x, y)
-        nodes = 40 if system.longest_delay < 5.0 else 100
-        others = independent.generator_eigenvalues(system, x, y, nodes)
-        assert others.real.max() == pytest.approx(root.real, abs=1e-7 * (1.0 + abs(root)))
-        assert (root.real > 0.0) == (unstable_roots(system, x, y) > 0)
 
 
 DEADBEAT = CharacteristicFunction([0.0, 1.0], [1.0], [0.0], 1.0, 1.0, step=1.0)
@@ -269,7 +257,8 @@ def modes(seed):
     return Loop((zeros, poles, 10.0 ** random.uniform(-3, 1)), mapping, 20.0, 19.0)
 
 
-@pytest.mark.parametrize("seed", [3, 8, 10])
+# Of the last one the expanded coefficients are another loop's.
+@pytest.mark.parametrize("seed", [3, 8, 10, 13])
 def test_next_to_a_cluster_of_modes_it_is_answered_or_refused_in_time(seed):
     loop, begun = modes(seed), time.thread_time()
     try:
@@ -277,6 +266,7 @@ def test_next_to_a_cluster_of_modes_it_is_answered_or_refused_in_time(seed):
     except RootError:
         root = None
     assert time.thread_time() - begun < 10.0
+    assert root is not None or seed != 13
     if root is not None:
         for margin, least, most in ((1e-6, 0, 0), (-1e-6, 1, 2)):
             shifted = loop.shifted(root.real + margin * max(abs(root.real), 0.05))
@@ -286,13 +276,4 @@ def test_next_to_a_cluster_of_modes_it_is_answered_or_refused_in_time(seed):
                 mpmath.diff(lambda s: independent.exact(loop, s, 1.0, 1.0), root, n)
                 for n in (0, 1)
             )
-        assert abs(value / slope) < 1e-12 * abs(root)
-
-
-def test_next_to_a_cluster_a_root_is_that_of_the_factors():
-    # Expanded, the coefficients are another loop's.
-    loop = modes(13)
-    root = rightmost_root(loop)
-    with mpmath.workdps(60):
-        exact = mpmath.findroot(lambda s: independent.exact(loop, s, 1.0, 1.0), root)
-        assert abs(complex(exact) - root) < 1e-13 * abs(root)
+        assert abs(value / slope) < 1e-13 * abs(root)

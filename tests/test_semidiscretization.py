@@ -1,15 +1,11 @@
-import mpmath
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from armlock import (
     CommonArm,
     CountError,
     DualArm,
     HayesEquation,
-    Loop,
     paper_loop,
     rightmost_root,
     semi_discretization,
@@ -19,7 +15,6 @@ from armlock import (
     unstable_roots,
 )
 from armlock.robustness.rays import first_crossing
-from armlock.sensors import COMMON, SINGLE
 from tests import independent
 from tests.systems import RETARDED
 
@@ -47,21 +42,6 @@ def test_spectral_radii_of_the_common_arm(table):
         given_digits = len(row["value"].split("e")[0].strip("-").replace(".", ""))
         excess = f"{float(radius) - 1.0:.{given_digits - 1}e}"
         assert float(excess) == float(row["value"])
-
-
-@given(
-    st.floats(0.05, 3.0),
-    st.integers(1, 6),
-    st.integers(1, 6),
-    st.floats(-3.0, 3.0),
-    st.floats(-3.0, 3.0),
-    st.sampled_from([0, 1]),
-)
-def test_first_order_matrix_is_its_closed_form(gain, steps1, steps2, c1, c2, order):
-    system = CommonArm(gain, tau1=0.25 * steps1, tau2=0.25 * steps2)
-    matrix = transition_matrix(system, c1, c2, 0.25, order)
-    expected = independent.held_map(system, c1, c2, 0.25, order)
-    np.testing.assert_allclose(matrix, expected, rtol=1e-12, atol=1e-14)
 
 
 @pytest.mark.parametrize("system", [*SYSTEMS, CommonArm(tau1=2.5, tau2=1.0)])
@@ -150,41 +130,3 @@ def test_slow_poles_that_rounding_scatters_have_no_spectral_radius(point):
 def test_parameters_at_which_eigenvalues_are_lost_are_refused():
     with pytest.raises(CountError, match="counts of the map do not confirm"):
         spectral_radius(CommonArm(), 1e20, 1e20, 0.1)
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_a_radius_is_that_of_the_map_in_many_digits_or_refused(seed):
-    random = np.random.default_rng(seed)
-    poles = -(10.0 ** random.uniform(-6.0, 0.5, int(random.integers(1, 5))))
-    gain = float(10.0 ** random.uniform(-2.0, 0.5) * np.prod(-poles))
-    loop = Loop(((), poles, gain), [SINGLE, COMMON][seed % 2], 1.0, 0.75)
-    point = tuple(random.uniform(-1.2, 1.2, 2).tolist())
-    try:
-        radius = float(spectral_radius(loop, point[0], point[1], 0.25))
-    except CountError:
-        assert np.abs(poles).min() < 1e-2
-        return
-    # The exact map: in many digits, from the controller's own states, one after the other.
-    with mpmath.workdps(60):
-        n, steps = poles.size, 4
-        flow = mpmath.zeros(n + 1, n + 1)
-        both = 1.0 + (seed % 2)
-        for k in range(n):
-            flow[k, k] = mpmath.mpf(poles[k])
-            if k:
-                flow[k, k - 1] = 1
-        # The first state is driven by gain times the arms' sum; the laser is minus the last.
-        flow[0, n - 1] -= both * mpmath.mpf(gain)
-        flow[0, n] = 1
-        exact = mpmath.expm(flow * mpmath.mpf(0.25))
-        size = n + steps
-        matrix = mpmath.zeros(size, size)
-        matrix[:n, :n] = exact[:n, :n]
-        for c, back in ((point[0], 4), (point[1] * (seed % 2), 3)):
-            for k in range(n):
-                matrix[k, n + back - 1] += mpmath.mpf(c) * mpmath.mpf(gain) * exact[k, n]
-        matrix[n, n - 1] = 1
-        for k in range(1, steps):
-            matrix[n + k, n + k - 1] = 1
-        expected = max(abs(value) for value in mpmath.eig(matrix, left=False, right=False))
-    assert radius == pytest.approx(float(expected), rel=1e-7)

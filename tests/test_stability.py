@@ -1,7 +1,4 @@
-import os
 import pickle
-import signal
-import threading
 import time
 
 import mpmath
@@ -26,18 +23,13 @@ from armlock.robustness.rays import Ray
 from armlock.stability.counts import axis_zeros
 from tests import independent
 from tests.systems import NEUTRAL, RETARDED, with_roots
+from tests.test_in_time import ends_when_interrupted
 
 RETARDED_AND_NEUTRAL = {**RETARDED, **{f"neutral {n}": s for n, s in NEUTRAL.items()}}
 
 reals = st.floats(-3.0, 3.0)
-whole_parts = reals.map(lambda value: round(value, 9))
 gains = st.floats(0.01, 3.0)
 delays = st.floats(0.2, 5.0)
-
-
-def counts_agree(one, other):
-    """Whether two counts are the same, where neither is a boundary point."""
-    return one == other or BOUNDARY in (one, other)
 
 
 def pointwise(system, x, y):
@@ -87,20 +79,6 @@ class TestCommonArm:
         assume(abs(eigenvalues.real).min() > 1e-8)
         assert count == np.count_nonzero(eigenvalues.real > 0.0)
 
-    @given(
-        st.floats(0.01, 1000.0), delays, delays, st.floats(0.0, 0.9999), st.floats(-1.0, 1.0)
-    )
-    def test_the_diamond_is_stable_whatever_gain_and_delays(self, gain, tau1, tau2, size, way):
-        c1 = 2.0 * size * way
-        c2 = 2.0 * size * (1.0 - abs(way)) * (-1.0 if way > 0.3 else 1.0)
-        assert unstable_roots(CommonArm(gain, tau1, tau2), c1, c2) == 0
-
-    @given(gains, delays, reals, reals)
-    def test_equal_delays_make_it_a_hayes_equation(self, gain, tau, c1, c2):
-        count = unstable_roots(CommonArm(gain, tau, tau), c1, c2)
-        assume(count != BOUNDARY)
-        assert count == independent.hayes_count(-2.0 * gain, gain * (c1 + c2), tau)
-
     def test_the_ideal_point_and_its_line_are_boundary_points_at_any_gain(self):
         c1 = np.linspace(-3.0, 3.0, 49)
         for gain in (1e-3, 1.0, 10.0, 1000.0):
@@ -115,13 +93,6 @@ class TestCommonArm:
         for c1, c2 in [(1.0, 1.0), (0.6, 1.4)]:
             assert unstable_roots(system, c1 - distance, c2) == 0
             assert unstable_roots(system, c1 + distance, c2) == 1
-
-    def test_next_to_the_boundary_there_is_a_count_far_from_the_ideal_point(self):
-        for x in (3.0, 1e2, 1e4):
-            y = 2.0 + 1e-10 * np.array([-1.0, 1.0]) * x - x
-            counts = unstable_roots(CommonArm(), x, y)
-            np.testing.assert_array_equal(counts % 2, x + y > 2.0)
-            assert (counts >= 0).all()
 
     def test_within_rounding_of_the_boundary_nothing_is_guessed(self):
         # The sign of c1 + c2 - 2 is exact here: c2 = 1 + k eps, and c1 = 1.
@@ -145,7 +116,7 @@ class TestCommonArm:
             assert abs(root.imag - omega) < 1e-6
             here = unstable_roots(system, c1 + shift, c2)
             far = unstable_roots(system, c1 + np.copysign(1e-5, shift), c2)
-            assert counts_agree(here, far)
+            assert here == far or BOUNDARY in (here, far)
             both = unstable_roots(system, c1 + np.array([-1e-5, 1e-5]), c2)
             assert (root.real > 0) == (far == both.max())
             if abs(shift) >= 1e-9:
@@ -220,15 +191,6 @@ class TestOtherLoops:
             roots = np.roots([1.0, 3.0 - q, 1.0 - p, 2.0 - p])
             assert unstable_roots(system, p, q) == np.count_nonzero(roots.real > 0.0)
 
-    # Multiples of 1e-9: roots at 1e-100 rad/s are refused, not counted.
-    @given(st.sampled_from(list(RETARDED)), whole_parts, whole_parts)
-    def test_the_parity_of_the_count_is_the_sign_at_zero(self, name, x, y):
-        system = RETARDED[name]
-        count = unstable_roots(system, x, y)
-        assume(count != BOUNDARY)
-        negative = independent.value(system, 0.0, x, y).real * system.a[-1] < 0.0
-        assert count % 2 == int(negative)
-
     def test_scalars_and_arrays_keep_their_shapes(self):
         assert unstable_roots(CommonArm(), 0.5, 0.5).shape == ()
         assert unstable_roots(CommonArm(), [0.5], 0.5).shape == (1,)
@@ -301,7 +263,7 @@ class TestChart:
 class TestLimits:
     """What changes nothing, and what is refused."""
 
-    @pytest.mark.parametrize("scale", [1e-20, 1e20])
+    @pytest.mark.parametrize("scale", [1e-170, 1e-20, 1e20])
     def test_a_common_factor_changes_no_count(self, scale):
         x, y = np.array([1.0, 20.0, 5.0, -20.0, -35.0]), np.array([1.0, -3.0])
         plain = CharacteristicFunction([1.0, 1.0], [0.1], [0.1], 1.0, 2.0)
@@ -340,12 +302,6 @@ class TestLimits:
         np.testing.assert_array_equal(again.points, [[1.0, 2.0]])
 
 
-def test_coefficients_of_any_size_are_counted_alike():
-    tiny = CharacteristicFunction([1e-170, 1e-170], [1e-171], [1e-171], 1.0, 2.0)
-    usual = CharacteristicFunction([1.0, 1.0], [0.1], [0.1], 1.0, 2.0)
-    assert unstable_roots(tiny, -35.0, 1.0) == unstable_roots(usual, -35.0, 1.0) == 2
-
-
 def test_equal_roots_are_counted_where_a_shift_takes_them():
     # Ten roots at -0.002 after the shift, of which doubles alone would scatter some.
     equal = CharacteristicFunction(np.poly([-1.0] * 10)[::-1].tolist(), [1.0], [1.0], 1.0, 2.0)
@@ -373,13 +329,4 @@ def test_an_interrupt_is_heard_while_points_are_counted():
     # They take half a minute.
     x, y = np.random.default_rng(0).uniform(-1.2, 1.2, (2, 4000))
     unstable_roots(CommonArm(3e3), 0.0, 0.0)
-    sent = []
-
-    def interrupt():
-        sent.append(time.monotonic())
-        os.kill(os.getpid(), signal.SIGINT)
-
-    threading.Timer(0.5, interrupt).start()
-    with pytest.raises(KeyboardInterrupt):
-        unstable_roots(CommonArm(3e3), x, y)
-    assert time.monotonic() - sent[0] < 1.0
+    assert ends_when_interrupted(lambda: unstable_roots(CommonArm(3e3), x, y)) < 1.0

@@ -98,9 +98,9 @@ def _numba_keeps_in(folder: Path) -> Iterator[None]:
 
 def _stamp(source: Path) -> str:
     """Return a digest of the code of a module and of all compiled modules that it imports."""
-    digest, left, read = hashlib.sha256(), [source], set()
-    while left:
-        path = left.pop()
+    digest, unread, read = hashlib.sha256(), [source], set()
+    while unread:
+        path = unread.pop()
         text = path.read_text("utf-8") if path.is_file() and path not in read else ""
         read.add(path)
         if "njit" not in text:
@@ -109,7 +109,7 @@ def _stamp(source: Path) -> str:
         for node in ast.walk(tree):
             if isinstance(node, ast.ImportFrom) and node.module:
                 names = [node.module, *(f"{node.module}.{one.name}" for one in node.names)]
-                left += [_PACKAGE.parent / (name.replace(".", "/") + ".py") for name in names]
+                unread += [_PACKAGE.parent / (name.replace(".", "/") + ".py") for name in names]
             body = getattr(node, "body", None)
             if isinstance(body, list):
                 # A string that stands alone is a docstring, or does nothing.

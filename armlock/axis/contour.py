@@ -146,8 +146,8 @@ def _follow(
         while True:
             distance = tangent_distance(value, slope, step)
             # Rounding moves the tangent, too: closer to the origin nothing is certain.
-            apart = 0.5 * bound_at(bound, piece, omega + step) * step * step
-            if apart + bound_at(error, piece, omega + step) <= SAFETY * distance:
+            departure = 0.5 * bound_at(bound, piece, omega + step) * step * step
+            if departure + bound_at(error, piece, omega + step) <= SAFETY * distance:
                 break
             step *= 0.5
             if step <= max(shortest, 4.0 * EPSILON * omega) or step < 1e-300:
@@ -229,24 +229,24 @@ def winding(
                 slow_error[k] += fast[k]
         while omega < end:
             if many and end - omega > block:
-                turned, following, _, more = _follow(
+                gained, following, _, more = _follow(
                     slow, slow_bound, slow_error, omega, end, end - omega, block
                 )
                 steps += more + 1
                 if following > omega:
                     argument -= angle_between(value, evaluate(slow, omega)[0])
                     value = evaluate(piece, following)[0]
-                    argument += turned + angle_between(value, evaluate(slow, following)[0])
+                    argument += gained + angle_between(value, evaluate(slow, following)[0])
                     omega = following
             until = min(end, omega + block)
-            turned, following, step, more = _follow(
+            gained, following, step, more = _follow(
                 piece, bound, error, omega, until, step, 0.0
             )
             steps += more
             if steps > most or stop[0]:
                 return argument, value, False, steps, False
             value = evaluate(piece, following)[0]
-            argument += turned
+            argument += gained
             if following < until:
                 return argument, value, False, steps, True
             omega = following
@@ -294,8 +294,8 @@ def _polish(
             continue
         omega += move
         # What is left after a Newton step is at most curvature move^2 / (2 slope).
-        left = 0.5 * bound_at(bound, piece, upper) * move * move
-        if left <= 2.0 * EPSILON * upper * abs(slope.imag):
+        departure = 0.5 * bound_at(bound, piece, upper) * move * move
+        if departure <= 2.0 * EPSILON * upper * abs(slope.imag):
             value += slope * move
             break
     return omega, (value, slope)
@@ -653,9 +653,9 @@ def resolved_grid(
             smallest = max(1e-13 * omega, 1e-16 * omega_end)
             while True:
                 nearest = tangent_distance(value, slope, step)
-                left = 0.5 * bound_at(bound, piece, omega + step) * step * step
+                departure = 0.5 * bound_at(bound, piece, omega + step) * step * step
                 moved = 0.5 * step * abs(slope)
-                if max(left, moved) <= tolerance * nearest or step <= smallest:
+                if max(departure, moved) <= tolerance * nearest or step <= smallest:
                     break
                 step *= 0.5
             omega = end if step >= end - omega else omega + step

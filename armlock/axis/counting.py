@@ -181,11 +181,11 @@ def count_point(model: PointModel, x: float, y: float, end: float, stop: BoolArr
         # What the argument of D is at `end`. Past it |D / A - 1| < 1: the argument of D / A is
         # within a quarter turn, and goes back to zero, and that of A is known from its roots.
         final = argument_at(model.roots, end)
-        apart = angle_between(value, model.sign * np.exp(1j * final))
-        if abs(apart) > 0.51 * np.pi:
+        offset = angle_between(value, model.sign * np.exp(1j * final))
+        if abs(offset) > 0.51 * np.pi:
             # More than rounding explains: the roots of A are not those of A.
             return DOUBTFUL
-        final += apart
+        final += offset
     count = (final - model.begun - argument) / np.pi
     # It is a whole number but for rounding, because D is real at both ends of the axis.
     return int(np.floor(count + 0.5)) if -0.5 < count < np.inf else DOUBTFUL

@@ -8,9 +8,10 @@ import sys
 from pathlib import Path
 
 from armlock.checks import positive_number
-from armlock.orbits.constellation import Constellation, kepler, read_oem, read_table
+from armlock.orbits.constellation import Constellation, kepler
 from armlock.orbits.passages import DAY, YEAR, LoopInOrbit, loops
 from armlock.orbits.survey import survey
+from armlock.orbits.tables import read_oem, read_table
 
 
 def chosen_loop(name: str) -> LoopInOrbit:

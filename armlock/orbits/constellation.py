@@ -11,18 +11,14 @@ tau' = 1 - (1 - l_back'(t)) (1 - l_out'(t - l_back)).
 
 from __future__ import annotations
 
-import gzip
-import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, NamedTuple
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import BPoly, BSpline, PPoly, make_interp_spline
 
-from armlock.checks import FloatArray, axis, finite_series, positive_number, real_array
+from armlock.checks import FloatArray, axis, positive_number, real_array
 
 #: Speed of light in m/s.
 SPEED_OF_LIGHT = 299_792_458.0
@@ -39,18 +35,6 @@ _Path = Callable[[FloatArray, int], FloatArray]
 # digits. A round trip that has not settled after so many is none.
 _ROUNDS = 6
 _SETTLED = 1e-12
-# No spacecraft is within the Sun, radius in m: positions in km, or not from the Sun, would be.
-_SUN_RADIUS = 6.957e8
-# Degree of the splines through positions, and the fewest states: half of them make a spline.
-_DEGREE = 7
-_FEWEST = 2 * (_DEGREE + 1)
-# By so much twice as many states are better, at least. Both kinds of curves have order six, and
-# would gain 64; ESA's states, which do not lie on one smooth curve to that order, gain ten.
-_GAINED = 8.0
-# Interpolated arms may be off by so much, in s of light; the states left out tell.
-_LARGEST_ERROR = 1e-6
-# The last state of a segment and the first of the next, at one epoch, differ by less, in m.
-_SAME_STATE = 1.0
 # Within so many s of their epoch Kepler's orbits are good to 5e-11 s in spite of rounding.
 _KEPLER_SPAN = 3e9
 _LINKS = {1: (2, 3), 2: (3, 1), 3: (1, 2)}
@@ -156,7 +140,7 @@ class Constellation:
             raise ValueError(
                 f"receiver and emitter must be two of 1, 2, 3, got {receiver!r} and {emitter!r}"
             )
-        t = self._within(t)
+        t = self._within(real_array("t", t), self.span[0])
         here, there = (self._paths[k - 1] for k in (receiver, emitter))
         return _link(here, there, t.ravel())[0].reshape(t.shape)
 
@@ -177,39 +161,35 @@ class Constellation:
         TypeError, ValueError
             If t is not one-dimensional, finite and real, or outside of the table.
         """
-        t = axis("t", t)
-        if t.min() < min(0.0, self.span[0]) or t.max() > self.span[1]:
-            raise ValueError(f"t must lie within the table, got {t.min()} to {t.max()} s")
+        t = self._within(axis("t", t), min(0.0, self.span[0]))
         return np.stack([path(t, 0) for path in self._paths], axis=1)
 
     def _arms(self, t: npt.ArrayLike, master: int) -> list[tuple[FloatArray, FloatArray]]:
         """Return delay and rate of both arms, after a look at the arguments."""
-        t = self._within(t)
-        if master not in _LINKS or isinstance(master, bool):
+        t = self._within(real_array("t", t), self.span[0])
+        if master not in _LINKS:
             raise ValueError(f"master must be 1, 2 or 3, got {master!r}")
-        arms = [_round_trip(self._paths, master, far, t.ravel()) for far in _LINKS[master]]
+        arms = [self._round_trip(master, far, t.ravel()) for far in _LINKS[master]]
         return [(delay.reshape(t.shape), rate.reshape(t.shape)) for delay, rate in arms]
 
-    def _within(self, t: npt.ArrayLike) -> FloatArray:
-        """Return times as an array, or raise if one is outside of the span."""
-        t = real_array("t", t)
-        first, last = self.span
+    def _round_trip(
+        self, master: int, far: int, t: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return delay and rate of one arm at times of shape (n,)."""
+        here, there = self._paths[master - 1], self._paths[far - 1]
+        back, back_rate = _link(here, there, t)
+        out, out_rate = _link(there, here, t - back)
+        return back + out, back_rate + out_rate - back_rate * out_rate
+
+    def _within(self, t: FloatArray, first: float) -> FloatArray:
+        """Return times, or raise if one is before the first or after the span."""
+        last = self.span[1]
         outside = t[(t < first) | (t > last)]
         if outside.size:
             raise ValueError(
                 f"t must lie within the span {first} to {last} s, got {outside.flat[0]}"
             )
         return t
-
-
-def _round_trip(
-    paths: Sequence[_Path], master: int, far: int, t: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return delay and rate of one arm at times of shape (n,)."""
-    here, there = paths[master - 1], paths[far - 1]
-    back, back_rate = _link(here, there, t)
-    out, out_rate = _link(there, here, t - back)
-    return back + out, back_rate + out_rate - back_rate * out_rate
 
 
 def _link(receiver: _Path, emitter: _Path, t: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -244,30 +224,24 @@ def _dot(first: FloatArray, second: FloatArray) -> FloatArray:
     return np.asarray((first * second).sum(axis=-1))
 
 
-class _Ellipse(NamedTuple):
-    """The path of one spacecraft around the Sun: ellipse, inclination, and angle around z."""
-
-    alpha: float
-    theta: float
-
-    def path(self, t: FloatArray, derivative: int) -> FloatArray:
-        """Return the place, or with 1 the velocity, at times of shape (n,)."""
-        nu = np.pi / 3.0 + 0.625 * self.alpha
-        e = np.sqrt(1 + 4 * self.alpha * np.cos(nu) / np.sqrt(3) + 4 * self.alpha**2 / 3) - 1
-        tilt = np.arctan2(self.alpha * np.sin(nu), np.sqrt(3) / 2 + self.alpha * np.cos(nu))
-        a, n = ASTRONOMICAL_UNIT, np.sqrt(SUN / ASTRONOMICAL_UNIT**3)
-        mean = np.remainder(n * t, 2.0 * np.pi) - self.theta
-        u = mean + e * np.sin(mean)
-        for _ in range(_ROUNDS):
-            u = u - (u - e * np.sin(u) - mean) / (1.0 - e * np.cos(u))
-        width = a * np.sqrt(1.0 - e**2)
-        x, y = a * (np.cos(u) - e), width * np.sin(u)
-        if derivative:
-            du = n / (1.0 - e * np.cos(u))
-            x, y = -a * np.sin(u) * du, width * np.cos(u) * du
-        cosine, sine = np.cos(self.theta), np.sin(self.theta)
-        flat, up = x * np.cos(tilt), -x * np.sin(tilt)
-        return np.column_stack((cosine * flat - sine * y, sine * flat + cosine * y, up))
+def _ellipse(alpha: float, theta: float, t: FloatArray, derivative: int) -> FloatArray:
+    """Return a spacecraft's place around the Sun, or with 1 its velocity, at times (n,)."""
+    nu = np.pi / 3.0 + 0.625 * alpha
+    e = np.sqrt(1 + 4 * alpha * np.cos(nu) / np.sqrt(3) + 4 * alpha**2 / 3) - 1
+    tilt = np.arctan2(alpha * np.sin(nu), np.sqrt(3) / 2 + alpha * np.cos(nu))
+    a, n = ASTRONOMICAL_UNIT, np.sqrt(SUN / ASTRONOMICAL_UNIT**3)
+    mean = np.remainder(n * t, 2.0 * np.pi) - theta
+    u = mean + e * np.sin(mean)
+    for _ in range(_ROUNDS):
+        u = u - (u - e * np.sin(u) - mean) / (1.0 - e * np.cos(u))
+    width = a * np.sqrt(1.0 - e**2)
+    x, y = a * (np.cos(u) - e), width * np.sin(u)
+    if derivative:
+        du = n / (1.0 - e * np.cos(u))
+        x, y = -a * np.sin(u) * du, width * np.cos(u) * du
+    cosine, sine = np.cos(theta), np.sin(theta)
+    flat, up = x * np.cos(tilt), -x * np.sin(tilt)
+    return np.column_stack((cosine * flat - sine * y, sine * flat + cosine * y, up))
 
 
 def kepler(arm_length: float = 2.5e9) -> Constellation:
@@ -301,222 +275,9 @@ def kepler(arm_length: float = 2.5e9) -> Constellation:
             f"astronomical unit, got {length}"
         )
     alpha = length / (2.0 * ASTRONOMICAL_UNIT)
-    one, two, three = (_Ellipse(alpha, k * 2.0 * np.pi / 3.0).path for k in range(3))
+    one, two, three = (partial(_ellipse, alpha, k * 2.0 * np.pi / 3.0) for k in range(3))
     span = (-_KEPLER_SPAN, _KEPLER_SPAN)
     return Constellation("that of the elements", "TCB", span, 0.0, (one, two, three))
 
 
-def from_table(
-    time: npt.ArrayLike, positions: npt.ArrayLike, *, epoch: str = "", scale: str = "TCB"
-) -> Constellation:
-    """Return a constellation from a table of positions, by splines of degree 7.
-
-    Parameters
-    ----------
-    time : array_like of float, shape (n,)
-        Ascending, in s, of the three spacecraft alike; 16 states at least.
-    positions : array_like of float, shape (n, 3, 3)
-        In m from the Sun, by time, spacecraft and coordinate, in axes that do not turn.
-    epoch : str, optional
-        What the first time stands for; by default its number.
-    scale : {"TCB", "TDB"}, optional
-        The time scale of the table, positions included.
-
-    Returns
-    -------
-    Constellation
-        With t = 0 at the first time of the table.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If the table is too short, unordered, not of that shape, within the Sun, too coarse to
-        be interpolated to 1e-6 s of light, or faster than light.
-    """
-    time = axis("time", time)
-    places = finite_series("positions", positions, 3)
-    if places.shape != (time.size, 3, 3):
-        raise ValueError(
-            f"positions must be of shape ({time.size}, 3, 3), as many as times, for three "
-            f"spacecraft and three coordinates; got {places.shape}"
-        )
-    return _interpolated(epoch or f"{time[0]} s", scale, time - time[0], places, _spline)
-
-
-def read_table(path: str | Path) -> Constellation:
-    """Read a table of positions from a text file, as `from_table` takes it.
-
-    Parameters
-    ----------
-    path : str or Path
-        Ten numbers a row, separated by commas: time in s, and x, y, z of spacecraft 1, 2 and 3
-        in m from the Sun. Lines with ``#`` are comments; two of them have to say
-        ``# epoch: ...`` and ``# scale: TCB`` or ``TDB``. Names ending in .gz are unpacked.
-
-    Returns
-    -------
-    Constellation
-
-    Raises
-    ------
-    OSError
-        If the file cannot be read.
-    TypeError, ValueError
-        If a row does not hold ten numbers, epoch or scale is missing, or as for `from_table`.
-    """
-    path = Path(path)
-    content = path.read_bytes()
-    lines = (
-        (gzip.decompress(content) if path.suffix == ".gz" else content).decode().splitlines()
-    )
-    comments = [line.strip("# ").partition(":") for line in lines if line.startswith("#")]
-    said = {key.strip(): value.strip() for key, colon, value in comments if colon}
-    missing = [key for key in ("epoch", "scale") if key not in said]
-    if missing:
-        raise ValueError(f"{path} must say its {' and '.join(missing)}, as '# scale: TCB'")
-    rows = np.loadtxt(lines, delimiter=",", ndmin=2)
-    if rows.shape[1] != 10:
-        raise ValueError(f"{path} must hold ten numbers a row, got {rows.shape[1]}")
-    places = rows[:, 1:].reshape(-1, 3, 3)
-    return from_table(rows[:, 0], places, epoch=said["epoch"], scale=said["scale"])
-
-
-def read_oem(paths: Sequence[str | Path]) -> Constellation:
-    """Read the orbits of three spacecraft from Orbit Ephemeris Messages (CCSDS OEM, text).
-
-    Parameters
-    ----------
-    paths : sequence of three paths
-        One file a spacecraft, 1 to 3: states around the Sun with accelerations, in TCB or TDB,
-        in one frame that does not turn, as ESA publishes them.
-
-    Returns
-    -------
-    Constellation
-        Interpolated by the polynomials of degree five through position, velocity and
-        acceleration at neighbouring states; t = 0 is the earliest epoch that all three have.
-
-    Raises
-    ------
-    OSError
-        If a file cannot be read.
-    TypeError, ValueError
-        If there are not three files, one of them is no OEM with accelerations, is of another
-        centre, frame or time scale, or of different ones; states are unordered, too few, or
-        differ at a border of segments; or as for `from_table`.
-    """
-    if isinstance(paths, str | Path) or len(paths) != 3:
-        raise ValueError(f"paths must hold three files, one a spacecraft, got {paths!r}")
-    headers, epochs, states = zip(*(_read(Path(path)) for path in paths), strict=True)
-    if len(set(headers)) > 1:
-        raise ValueError(f"paths must be of one frame and time scale, got {headers}")
-    if not all(np.array_equal(epochs[0], other) for other in epochs[1:]):
-        raise ValueError(f"paths must have the same epochs, got {[e.size for e in epochs]}")
-    t = (epochs[0] - epochs[0][0]) / np.timedelta64(1, "ns") * 1e-9
-    return _interpolated(str(epochs[0][0]), headers[0][1], t, np.stack(states, 1), _hermite)
-
-
-def _spline(t: FloatArray, states: FloatArray) -> BSpline:
-    """Return the spline through positions."""
-    return make_interp_spline(t, states, k=_DEGREE)
-
-
-def _hermite(t: FloatArray, states: FloatArray) -> PPoly:
-    """Return the curve of degree five through states by time, derivative and coordinate."""
-    return PPoly.from_bernstein_basis(BPoly.from_derivatives(t, states))
-
-
-# What a file may say of itself; the axes of these frames do not turn.
-_ALLOWED = {
-    "CENTER_NAME": ("SUN",),
-    "REF_FRAME": ("EME2000", "ICRF", "GCRF"),
-    "TIME_SYSTEM": ("TCB", "TDB"),
-}
-
-
-def _read(path: Path) -> tuple[tuple[str, str], npt.NDArray[np.datetime64], FloatArray]:
-    """Return frame and scale, epochs of shape (n,) and states of shape (n, 3, 3), in m."""
-    text = path.read_text("utf-8", errors="replace")
-    if "CCSDS_OEM_VERS" not in text:
-        raise ValueError(f"{path} must be a CCSDS OEM in text form, with CCSDS_OEM_VERS")
-    header = []
-    for key, allowed in _ALLOWED.items():
-        said = set(re.findall(rf"^\s*{key}\s*=\s*(.*?)\s*$", text.upper(), re.MULTILINE))
-        if len(said) != 1 or not said <= set(allowed):
-            raise ValueError(
-                f"{key} of {path} must be one of {', '.join(allowed)}, got "
-                f"{', '.join(sorted(said)) or 'none'}"
-            )
-        header.append(said.pop())
-    # States are what begins with a digit, but for covariances.
-    without = re.sub("COVARIANCE_START.*?COVARIANCE_STOP", "", text, flags=re.DOTALL)
-    rows = [line.split() for line in without.splitlines() if line.strip()[:1].isdigit()]
-    wrong = [" ".join(row) for row in rows if len(row) != 10] or ["none"] * (not rows)
-    if wrong:
-        raise ValueError(
-            f"states of {path} must have an epoch, position, velocity and acceleration, got "
-            f"{wrong[0]}"
-        )
-    epochs = np.array([row[0].removesuffix("Z") for row in rows], dtype="datetime64[ns]")
-    values = [[float(number) for number in row[1:]] for row in rows]
-    states = 1e3 * finite_series(f"states of {path}", values, 2).reshape(-1, 3, 3)
-    twice = np.flatnonzero(np.diff(epochs) == np.timedelta64(0))
-    apart = np.abs(states[twice + 1, 0] - states[twice, 0]).max(axis=1, initial=0.0)
-    if (apart > _SAME_STATE).any():
-        raise ValueError(
-            f"states of {path} must agree where an epoch stands twice, got positions "
-            f"{apart.max():.3g} m apart at {epochs[twice[np.argmax(apart)]]}"
-        )
-    frame = header[1], header[2]
-    return frame, np.delete(epochs, twice + 1), np.delete(states, twice + 1, axis=0)
-
-
-def _interpolated(
-    epoch: str,
-    scale: str,
-    t: FloatArray,
-    states: FloatArray,
-    curve: Callable[[FloatArray, FloatArray], Any],
-) -> Constellation:
-    """Lay curves through states by time and spacecraft; find when round trips exist."""
-    scales = _ALLOWED["TIME_SYSTEM"]
-    if scale not in scales:
-        raise ValueError(f"scale must be one of {', '.join(scales)}, got {scale!r}")
-    if t.size < _FEWEST:
-        raise ValueError(f"a table must hold at least {_FEWEST} states, got {t.size}")
-    back = np.flatnonzero(np.diff(t) <= 0.0)
-    if back.size:
-        raise ValueError(f"times must ascend, got {t[back[0] + 1]} s after {t[back[0]]} s")
-    paths, halves = ([curve(t[::step], states[::step, k]) for k in range(3)] for step in (1, 2))
-    # What lies after the last state of a half would be extrapolated.
-    places, others = (
-        np.stack([path(t[: t.size // 2 * 2 - 1]) for path in each]) for each in (paths, halves)
-    )
-    nearest = np.linalg.norm(places, axis=2).min()
-    if nearest < _SUN_RADIUS:
-        raise ValueError(
-            f"positions must be in m from the Sun, got one {nearest:.4g} m from its centre"
-        )
-    arms, roughly = (
-        np.linalg.norm(x - np.roll(x, 1, axis=0), axis=2) for x in (places, others)
-    )
-    error = float(np.abs(arms - roughly).max()) / SPEED_OF_LIGHT / _GAINED
-    if error > _LARGEST_ERROR:
-        raise ValueError(
-            f"states must be close enough to be interpolated to {_LARGEST_ERROR} s of light, "
-            f"got an estimated error of {error:.2g} s"
-        )
-    # The light that is back at the first t was sent at the first state: t = tau(t).
-    first = np.array([2.0 * arms.max() / SPEED_OF_LIGHT])
-    if first[0] >= t[-1]:
-        raise ValueError(
-            f"a table must be longer than a round trip of {first[0]:.4g} s, got {t[-1]} s"
-        )
-    for _ in range(_ROUNDS):
-        trips = [_round_trip(paths, m, far, first)[0] for m in _LINKS for far in _LINKS[m]]
-        first = np.max(trips, axis=0)
-    span = (float(first[0]), float(t[-1]))
-    return Constellation(epoch, scale, span, error, (paths[0], paths[1], paths[2]))
-
-
-__all__ = ["Constellation", "from_table", "kepler", "read_oem", "read_table"]
+__all__ = ["ASTRONOMICAL_UNIT", "SPEED_OF_LIGHT", "SUN", "Constellation", "kepler"]

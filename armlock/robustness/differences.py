@@ -81,10 +81,10 @@ def no_root_crosses(loop: Loop, low: float, high: float) -> bool:
             f"trips, got {low} and {high}"
         )
     rest, b1, b2 = (p.coefficients for p in loop.polynomials())
-    both, apart = (
+    common, opposed = (
         np.asarray(p, np.float64) for p in (poly.polyadd(b1, b2), poly.polysub(b1, b2))
     )
-    parts = _Parts((rest, both, apart), mean, loop.delay)
+    parts = _Parts((rest, common, opposed), mean, loop.delay)
     # No root lies on the axis past the one frequency, or up to the other but at s = 0.
     start, end = _leading_up_to(parts, low, high), float(last_frequency(loop, 1.0, 1.0))
     if not (start > 0.0 and end < np.inf):
@@ -98,13 +98,13 @@ def _leading_up_to(parts: _Parts, low: float, high: float) -> float:
     Of a delayed polynomial that is R times s mean, or s x, but for less than (omega longest)^2.
     """
     size = max(p.size for p in parts.polynomials) + 1
-    rest, both, apart = (
+    rest, common, opposed = (
         np.pad(p, (ahead, size - ahead - p.size))
         for p, ahead in zip(parts.polynomials, (0, 1, 1), strict=True)
     )
-    delayed = np.abs(both) + np.abs(apart)
+    delayed = np.abs(common) + np.abs(opposed)
     first = np.flatnonzero(np.abs(rest) + delayed)[0]
-    at_ends = [(rest + both * parts.mean + apart * x)[first] for x in (low, high)]
+    at_ends = [(rest + common * parts.mean + opposed * x)[first] for x in (low, high)]
     lead = min(np.abs(at_ends)) if at_ends[0] * at_ends[1] > 0.0 else 0.0
     longest = parts.mean + parts.delay + max(abs(low), abs(high))
     rest, delayed = np.abs(rest[first:]), delayed[first:]
@@ -120,29 +120,30 @@ def _covered(parts: _Parts, span: tuple[float, float], range_of_x: tuple[float, 
     """Whether D is shown to be nowhere zero for all omega and x of two intervals."""
     borders = np.geomspace(*span, _STRIPS + 1)
     ends = np.broadcast_to(np.reshape(range_of_x, (2, 1)), (2, _STRIPS))
-    left = np.stack((borders[:-1], borders[1:], *ends))
+    undecided = np.stack((borders[:-1], borders[1:], *ends))
     seen = 0
     while seen < _RECTANGLES:
-        seen += left.shape[1]
-        omega, x = left[:2].mean(axis=0), left[2:].mean(axis=0)
-        half, room = 0.5 * np.diff(left[:2], axis=0)[0], 0.5 * np.diff(left[2:], axis=0)[0]
+        seen += undecided.shape[1]
+        omega, x = undecided[:2].mean(axis=0), undecided[2:].mean(axis=0)
+        half = 0.5 * np.diff(undecided[:2], axis=0)[0]
+        room = 0.5 * np.diff(undecided[2:], axis=0)[0]
         open_ = ~_clear(parts, omega, half, x, room)
-        left = left[:, open_]
-        if left.size == 0:
+        undecided = undecided[:, open_]
+        if undecided.size == 0:
             return True
         if (half < _NARROWEST * omega)[open_].any():
             return False
         # Halve what is larger of its own magnitude, or once phases turn little what turns more.
-        turned = half * (parts.mean + parts.delay)
+        turn = half * (parts.mean + parts.delay)
         tall = np.where(
-            turned < 1.0, omega * room > turned, room / (np.abs(x) + room) > half / omega
+            turn < 1.0, omega * room > turn, room / (np.abs(x) + room) > half / omega
         )[open_]
-        lower, upper = left.copy(), left.copy()
-        lower[1] = np.where(tall, left[1], omega[open_])
-        upper[0] = np.where(tall, left[0], omega[open_])
-        lower[3] = np.where(tall, x[open_], left[3])
-        upper[2] = np.where(tall, x[open_], left[2])
-        left = np.hstack((lower, upper))
+        lower, upper = undecided.copy(), undecided.copy()
+        lower[1] = np.where(tall, undecided[1], omega[open_])
+        upper[0] = np.where(tall, undecided[0], omega[open_])
+        lower[3] = np.where(tall, x[open_], undecided[3])
+        upper[2] = np.where(tall, x[open_], undecided[2])
+        undecided = np.hstack((lower, upper))
     return False
 
 
@@ -155,7 +156,7 @@ def _clear(
     s = np.asarray(1j * omega, dtype=np.complex128)
     with np.errstate(over="ignore", invalid="ignore"):
         values, offs = zip(*(_with_change(p, s, half) for p in parts.polynomials), strict=True)
-        (rest, both, apart), (off_r, off_s, off_q) = values, offs
+        (rest, common, opposed), (off_r, off_s, off_q) = values, offs
         # The largest that they become, and by what the phases change.
         most_r, most_s, most_q = (abs(v) + off for v, off in zip(values, offs, strict=True))
         turn = omega * room + half * (np.abs(x) + room)
@@ -165,7 +166,7 @@ def _clear(
 
         # All of D.
         returned = 1.0 - mean * cosine
-        d = rest + late * (both * returned + 1j * apart * mean * sine)
+        d = rest + late * (common * returned + 1j * opposed * mean * sine)
         size = np.abs(sine)
         change = off_r + off_s * np.abs(returned) + off_q * size
         change += most_s * (dead + far * np.abs(cosine) + turn * (size + turn))
@@ -173,11 +174,11 @@ def _clear(
         clear = np.abs(d) > change + _ROUNDING * (most_r + most_s + most_q * size)
 
         # The mean open, and then the phase too.
-        a, b = np.abs(both) ** 2 - np.abs(apart) ** 2, (both * apart.conj()).imag
+        a, b = np.abs(common) ** 2 - np.abs(opposed) ** 2, (common * opposed.conj()).imag
         off_a = 2.0 * (most_s * off_s + most_q * off_q)
         off_a += _ROUNDING * (most_s**2 + most_q**2)
         off_b = most_s * off_q + most_q * off_s + _ROUNDING * most_s * most_q
-        least = np.abs(rest) ** 2 + 2.0 * (both * late * rest.conj()).real
+        least = np.abs(rest) ** 2 + 2.0 * (common * late * rest.conj()).real
         off = (most_r + most_s) * off_r + most_r * (off_s + most_s * dead)
         least -= 2.0 * off + _ROUNDING * most_r * (most_r + most_s)
         known = sine**2 * (a - off_a) + 2.0 * (cosine * sine * b - size * off_b)

@@ -58,7 +58,7 @@ class Arms(NamedTuple):
         The highest coefficients of F1 and F2.
     c1, c2 : float
         The perturbations. Where phases are free, only their magnitudes matter.
-    apart : float
+    tau_difference : float
         tau2 - tau1 in s; nan where both phases are free at all frequencies.
     delay : float
         The dead time in s.
@@ -69,7 +69,7 @@ class Arms(NamedTuple):
     leads: FloatArray
     c1: float
     c2: float
-    apart: float
+    tau_difference: float
     delay: float
 
 
@@ -86,12 +86,12 @@ class _Disc(NamedTuple):
         The rate at which log F changes, and a bound on its second derivative.
     other_rate, other_bend : complex, float
         The same two for log(G / F).
-    held : complex
+    radius_larger : complex
         The larger one's c; of free phases its magnitude.
-    swung : complex
+    radius_other : complex
         c G / F of the other one, with the phase between the two; of free phases its magnitude.
-    swing : complex
-        The rate at which log(swung) changes.
+    radius_rate : complex
+        The rate at which log(radius_other) changes.
     rounding : float
         The relative rounding error of F and G / F. A factor's difference rounds by half an
         EPSILON, a complex product by no more than two, a quotient by no more than five: eight
@@ -108,9 +108,9 @@ class _Disc(NamedTuple):
     bend: float
     other_rate: complex
     other_bend: float
-    held: complex
-    swung: complex
-    swing: complex
+    radius_larger: complex
+    radius_other: complex
+    radius_rate: complex
     rounding: float
     nearest: float
 
@@ -122,21 +122,21 @@ class _Ahead(NamedTuple):
     ----------
     slope : float
         Of the radius over |F|, bounded from above.
-    own : float
+    larger_beyond : float
         How far F at the end over F at the start, or its inverse, may be from first order.
-    left : float
+    other_beyond : float
         How far G / F, and the radius over |F|, may be from first order, together.
-    turned : float
+    larger_change : float
         How much log F changes at most, in magnitude and phase.
-    changed : float
+    other_change : float
         How much G / F changes at most.
     """
 
     slope: float
-    own: float
-    left: float
-    turned: float
-    changed: float
+    larger_beyond: float
+    other_beyond: float
+    larger_change: float
+    other_change: float
 
 
 @njit(cache=True)
@@ -173,31 +173,34 @@ def _disc(arms: Arms, omega: float) -> _Disc:
         bend1, bend2 = bend1 + abs(n1) / square, bend2 + abs(n2) / square
         bend += abs(n2 - n1) / square
         nearest = min(nearest, square)
-    c1, c2, apart = arms.c1, arms.c2, arms.apart
+    c1, c2, tau_difference = arms.c1, arms.c2, arms.tau_difference
     if abs(value1) < abs(value2):
         value1, value2, rate1, rate2 = value2, value1, rate2, rate1
-        bend1, c1, c2, apart = bend2, c2, c1, -apart
+        bend1, c1, c2, tau_difference = bend2, c2, c1, -tau_difference
     dead, other = np.exp(-1j * omega * arms.delay), value2 / value1 if value2 != 0.0 else 0j
     between = rate2 - rate1 if value2 != 0.0 else 0j
-    held, swung, swing = complex(abs(c1)), complex(abs(c2 * other)), complex(between.real)
-    if abs(apart) * omega < 1.0:
-        held, swung = complex(c1), c2 * other * np.exp(-1j * omega * apart)
-        swing = between - 1j * apart
+    radius_larger, radius_other = complex(abs(c1)), complex(abs(c2 * other))
+    radius_rate = complex(between.real)
+    if abs(tau_difference) * omega < 1.0:
+        radius_larger = complex(c1)
+        radius_other = c2 * other * np.exp(-1j * omega * tau_difference)
+        radius_rate = between - 1j * tau_difference
     return _Disc(
         value1 * dead, other, rate1 - 1j * arms.delay, bend1, between, bend,
-        held, swung, swing, rounding, np.sqrt(nearest),
+        radius_larger, radius_other, radius_rate, rounding, np.sqrt(nearest),
     )  # fmt: skip
 
 
 @njit(cache=True)
 def _centre_and_radius(disc: _Disc) -> tuple[complex, float]:
-    return disc.larger * (1.0 + disc.other), abs(disc.larger) * abs(disc.held + disc.swung)
+    radius = abs(disc.larger) * abs(disc.radius_larger + disc.radius_other)
+    return disc.larger * (1.0 + disc.other), radius
 
 
 @njit(cache=True)
 def _rounding(disc: _Disc) -> float:
     """Bound on the rounding error of centre and radius, whose terms may cancel."""
-    terms = 1.0 + abs(disc.other) + abs(disc.held) + abs(disc.swung)
+    terms = 1.0 + abs(disc.other) + abs(disc.radius_larger) + abs(disc.radius_other)
     return float(disc.rounding * abs(disc.larger) * terms)
 
 
@@ -212,24 +215,26 @@ def _beyond_first_order(rate: complex, bend: float, step: float) -> float:
 def _ahead(disc: _Disc, step: float) -> _Ahead:
     """How the parts of a disc change over a step."""
     second = 0.5 * step * step / (1.0 - step / disc.nearest)
-    # Up to higher orders |held + swung| is convex, and below its chord.
-    there = disc.held + disc.swung + disc.swung * disc.swing * step
-    slope = (abs(there) - abs(disc.held + disc.swung)) / step
+    # Up to higher orders |radius_larger + radius_other| is convex, and below its chord.
+    there = disc.radius_larger + disc.radius_other + disc.radius_other * disc.radius_rate * step
+    slope = (abs(there) - abs(disc.radius_larger + disc.radius_other)) / step
     bend, other_bend = disc.bend * second, disc.other_bend * second
-    own = _beyond_first_order(disc.rate, bend, step)
-    left = abs(disc.other) * _beyond_first_order(disc.other_rate, other_bend, step)
-    left += abs(disc.swung) * _beyond_first_order(disc.swing, other_bend, step)
-    changed = abs(disc.other) * np.expm1(abs(disc.other_rate) * step + other_bend)
-    return _Ahead(slope, own, left, abs(disc.rate) * step + bend, changed)
+    larger_beyond = _beyond_first_order(disc.rate, bend, step)
+    other_beyond = abs(disc.other) * _beyond_first_order(disc.other_rate, other_bend, step)
+    in_radius = _beyond_first_order(disc.radius_rate, other_bend, step)
+    other_beyond += abs(disc.radius_other) * in_radius
+    larger_change = abs(disc.rate) * step + bend
+    other_change = abs(disc.other) * np.expm1(abs(disc.other_rate) * step + other_bend)
+    return _Ahead(slope, larger_beyond, other_beyond, larger_change, other_change)
 
 
 @njit(cache=True)
 def _largest(disc: _Disc, ahead: _Ahead, step: float) -> float:
     """Bound on |L| over a step, whatever the free phases."""
     centre, spread = _centre_and_radius(disc)
-    grown = ahead.changed + max(ahead.slope * step, 0.0) + ahead.left
+    grown = ahead.other_change + max(ahead.slope * step, 0.0) + ahead.other_beyond
     largest = abs(centre) + spread + abs(disc.larger) * grown + _rounding(disc)
-    return float(largest * np.exp(ahead.turned))
+    return float(largest * np.exp(ahead.larger_change))
 
 
 @njit(cache=True)
@@ -253,7 +258,7 @@ def _clear(disc: _Disc, ahead: _Ahead, step: float, target: complex, radius: flo
     change = disc.larger * disc.other * disc.other_rate + target * disc.rate
     total = (change * away.conjugate()).real / distance - size * ahead.slope
     total += radius * disc.rate.real
-    beyond = (abs(target) + radius) * ahead.own + size * ahead.left
+    beyond = (abs(target) + radius) * ahead.larger_beyond + size * ahead.other_beyond
     rounding = _rounding(disc) + disc.rounding * (abs(target) + radius)
     return bool(min(begin, begin + total * step) > beyond + rounding)
 
@@ -286,11 +291,11 @@ def _nothing_smaller(disc: _Disc, omega: float, step: float, levels: FloatArray)
     for end in (-np.exp(-1j * lead), -np.exp(1j * lag)):
         if not _clear(disc, ahead, step, end, 0.0):
             return False
-    if ahead.changed >= abs(1.0 + disc.other):
+    if ahead.other_change >= abs(1.0 + disc.other):
         return False
-    own = np.arctan2(-centre.imag, -centre.real) % (2.0 * np.pi)
-    turned = ahead.turned + np.arcsin(ahead.changed / abs(1.0 + disc.other))
-    return bool(min(own - lag, 2.0 * np.pi - lead - own) > turned)
+    centre_lag = np.arctan2(-centre.imag, -centre.real) % (2.0 * np.pi)
+    turn = ahead.larger_change + np.arcsin(ahead.other_change / abs(1.0 + disc.other))
+    return bool(min(centre_lag - lag, 2.0 * np.pi - lead - centre_lag) > turn)
 
 
 @njit(cache=True)
@@ -306,7 +311,8 @@ def _on_one_side(disc: _Disc, ahead: _Ahead, step: float) -> bool:
     begin = abs(centre.imag) - spread
     change = disc.larger * disc.other * disc.other_rate + 1j * centre * disc.rate.imag
     total = (change * normal.conjugate()).real - size * ahead.slope
-    beyond = abs(centre) * ahead.own + size * (ahead.left + ahead.changed * ahead.turned)
+    of_other = ahead.other_beyond + ahead.other_change * ahead.larger_change
+    beyond = abs(centre) * ahead.larger_beyond + size * of_other
     return bool(min(begin, begin + total * step) > beyond + _rounding(disc))
 
 
@@ -323,8 +329,8 @@ def _misses_segment(disc: _Disc, step: float, near: float, far: float) -> bool:
     if _clear(disc, ahead, step, complex(0.5 * (near + far)), 0.5 * (near - far)):
         return True
     centre = _centre_and_radius(disc)[0]
-    moved = abs(centre) * np.expm1(ahead.turned)
-    moved += abs(disc.larger) * ahead.changed * np.exp(ahead.turned)
+    moved = abs(centre) * np.expm1(ahead.larger_change)
+    moved += abs(disc.larger) * ahead.other_change * np.exp(ahead.larger_change)
     if centre.real - moved > near:
         return bool(_clear(disc, ahead, step, complex(near), 0.0))
     if centre.real + moved < far:

@@ -170,8 +170,8 @@ def _factors(loop: Loop) -> tuple[ComplexArray, IntArray, FloatArray]:
 def arms_of(point: LoopAt, *, free: bool = False) -> discs.Arms:
     """Return the arms of a loop. If `free`, both phases are free at all frequencies."""
     loop, c1, c2 = point
-    apart = np.nan if free else loop.tau2 - loop.tau1
-    return discs.Arms(*_factors(loop), float(c1), float(c2), apart, loop.delay)
+    tau_difference = np.nan if free else loop.tau2 - loop.tau1
+    return discs.Arms(*_factors(loop), float(c1), float(c2), tau_difference, loop.delay)
 
 
 def meeting_intervals(
@@ -311,9 +311,9 @@ def _count_below(point: LoopAt, omega: float) -> int | None:
             return None
         arguments.append(begin[1] + argument)
         values.append(value)
-    turned = arguments[0] - arguments[1] - contour.angle_between(values[0], values[1])
+    gained = arguments[0] - arguments[1] - contour.angle_between(values[0], values[1])
     below = loop_count(*low)
-    count = below - turned / math.pi
+    count = below - gained / math.pi
     return round(count) if below >= 0 and abs(count - round(count)) < 1e-3 else None
 
 

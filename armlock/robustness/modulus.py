@@ -136,8 +136,8 @@ def _stays_larger(at: _Tangents, room: _Room, step: float, level: float, m: int)
     allowed = 2.0 * unknown if unknown <= 1e-6 * most else 0.0
     if room.least + allowed >= level * most:
         return True
-    apart = _stays_above(over, over_slope, under, under_slope, level, step)
-    return bool(apart + allowed >= room.both + level * bent + unknown)
+    above = _stays_above(over, over_slope, under, under_slope, level, step)
+    return bool(above + allowed >= room.both + level * bent + unknown)
 
 
 @njit(cache=True, nogil=True)

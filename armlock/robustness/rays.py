@@ -44,7 +44,7 @@ from armlock.stability.counts import (
 #: Nothing is looked at where the parameters are this many times as large as the start, or as 1.
 FARTHEST = 1e9
 # Of a start on the boundary, crossings up to this share of it are the start's own.
-_OWN = 1e-10
+_NEAR_START = 1e-10
 # Next to the limit of the neutral root chain, roots cross at ever higher frequency. They are
 # followed up to so many turns of the longest delay, which takes about a tenth of a second.
 _TURNS_NEXT_TO_THE_CHAIN = 50_000
@@ -167,10 +167,10 @@ class Ray:
         edges = [0.0, *sorted(t for t in signs_change.tolist() if 0.0 < t < np.inf)]
         last = 2.0 * max(self.scale, edges[-1])
         for low, high in pairwise([*edges, last]):
-            left, right = reserve(low), reserve(high)
+            at_low, at_high = reserve(low), reserve(high)
             # From the last sign on it descends for ever, or stays what it is.
-            if right <= 0.0 or (high == last and right < left):
-                return float(low + (high - low) * left / (left - right))
+            if at_high <= 0.0 or (high == last and at_high < at_low):
+                return float(low + (high - low) * at_low / (at_low - at_high))
         return np.inf
 
     def acts(self) -> bool:
@@ -248,15 +248,15 @@ class Ray:
         omega, change, width = zeros.omega[~hidden], zeros.jump[~hidden], zeros.width[~hidden]
         # Only those in reach are worth polishing.
         rough = np.where(real, q.real, np.inf)[~hidden]
-        left = np.flatnonzero((rough > 0.0) & (rough <= stop * (1.0 + 1e-6)))
-        left, found = left[np.argsort(rough[left], kind="stable")], _NONE
-        while left.size and not found.position.size:
-            many = left.size
+        rest = np.flatnonzero((rough > 0.0) & (rough <= stop * (1.0 + 1e-6)))
+        rest, found = rest[np.argsort(rough[rest], kind="stable")], _NONE
+        while rest.size and not found.position.size:
+            many = rest.size
             if first:
-                many = int((rough[left] <= rough[left[0]] * (1.0 + 1e-6)).sum())
-            some = left[:many]
+                many = int((rough[rest] <= rough[rest[0]] * (1.0 + 1e-6)).sum())
+            some = rest[:many]
             found = self._polished(omega[some], change[some], width[some], stop)
-            left = left[many:]
+            rest = rest[many:]
         return found, ranges
 
     def _polished(
@@ -269,10 +269,10 @@ class Ray:
         omega = polished(lambda w: self.quotient(w).imag, omega, reaches)
         position = self.quotient(omega).real
         lowest = 1e-15 * self.scale
-        if (position[position > lowest] <= _OWN * self.scale).any():
+        if (position[position > lowest] <= _NEAR_START * self.scale).any():
             # The start itself may be on the axis, up to rounding.
-            own = unstable_roots(self.system, *self.start) == BOUNDARY
-            lowest = _OWN * self.scale if own else lowest
+            begins_on_boundary = unstable_roots(self.system, *self.start) == BOUNDARY
+            lowest = _NEAR_START * self.scale if begins_on_boundary else lowest
         kept = np.flatnonzero((position > lowest) & (position <= stop))
         kept = kept[np.argsort(position[kept], kind="stable")]
         return Crossings(position[kept], omega[kept], change[kept])

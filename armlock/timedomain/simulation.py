@@ -40,12 +40,11 @@ from armlock.loops import Loop, checked_loop
 from armlock.progress import progress
 from armlock.timedomain.discretize import SampledFilter, SampledSensor, sampled_loop, warped
 
-#: Order of the Lagrange interpolation for delays that are not whole samples: odd.
+#: Order of the Lagrange interpolation for delays that are not whole samples.
 INTERPOLATION_ORDER = 7
-#: Samples that are computed at a time, of all runs; results do not depend on it.
+#: Samples that are computed at a time, of all runs, or more where the past is long, which is
+#: moved with each block; results do not depend on it.
 BLOCK = 1 << 16
-#: More are, up to this, where the past is long, which is moved with each block.
-MOST = 1 << 22
 #: Runs of an ensemble that go side by side. Fewer than half as many go one by one.
 LANES = 32
 #: The output counts as diverged when it exceeds the largest input so far by this factor. What
@@ -78,13 +77,11 @@ _SLOWEST, _FASTEST = -3.0, 1.0
 # Samples kept behind the longest delay, for arms that have grown during a gap of the run.
 _SPARE = 64
 
-_HISTORY = "not reach back past the history, which begins at t = {:.9g} s"
-
 # Rows of the working memory of a run, of lanes side by side: what the controller sends with the
-# next sample if no input comes; the late light of both arms, the input and the output of this
-# sample; the largest input so far, and the number of the last output not above it. The states
-# of sensor and controller follow.
-_PREDICTED, _LATE1, _LATE2, _INPUT, _OUTPUT, _LARGEST, _BOUNDED, _STATES = range(8)
+# next sample if no input comes; what both arms return, the input and the output of this sample;
+# the largest input so far, and the number of the last output not above it. The states of sensor
+# and controller follow.
+_PREDICTED, _DELAYED1, _DELAYED2, _INPUT, _OUTPUT, _LARGEST, _BOUNDED, _STATES = range(8)
 
 
 class DivergenceError(ArithmeticError):
@@ -165,13 +162,12 @@ def lagrange_delay(name: str, tau: float, sample_rate: float) -> Delay:
     """
     samples = tau * sample_rate
     whole = round(samples)
-    half = (INTERPOLATION_ORDER + 1) // 2
-    first = math.floor(samples) - half + 1
+    first = math.floor(samples) - _SIDE + 1
     if tau == 0.0 or (whole > 0 and abs(samples - whole) <= _WHOLE):
         return whole, (1.0,)
     if first < 1:
         raise ValueError(
-            f"sample_rate must be at least {half / tau:.9g} Hz to interpolate {name} = {tau} "
+            f"sample_rate must be at least {_SIDE / tau:.9g} Hz to interpolate {name} = {tau} "
             f"s, or a multiple of {1.0 / tau:.9g} Hz, got {sample_rate:.9g}"
         )
     x = samples - first
@@ -194,14 +190,19 @@ def _sampled_delays(loop: Loop, sample_rate: float) -> tuple[Delay, ...]:
         ) from None
 
 
-def _reach(delay: Delay) -> int:
-    """Return how many samples a constant delay reaches back."""
+def _reach(delay: Delay | MovingDelay) -> int:
+    """Return how many samples a delay reaches back, at most."""
     first, weights = delay
-    return first + len(weights) - 1
+    return first + len(weights) - 1 if isinstance(first, int) else int(first.max()) + _SIDE
+
+
+def _past_history(begin: int, rate: float) -> str:
+    """Say what a delay must not do that reaches back past sample number `begin`."""
+    return f"not reach back past the history, which begins at t = {begin / rate:.9g} s"
 
 
 @njit(cache=True)
-def _late(signal: FloatArray, row: int, column: int, delay: Delay) -> float:
+def _delayed(signal: FloatArray, row: int, column: int, delay: Delay) -> float:
     """Return a column of a signal as it was a constant delay before a row."""
     first, weights = delay
     value = 0.0
@@ -254,9 +255,9 @@ def _receive(
     delay: Delay | MovingDelay,
     i: int,
     work: FloatArray,
-    late: int,
+    target: int,
 ) -> None:
-    """Put the late light of an arm, c(t) phi(t - tau(t)), into a row of `work`, `late`.
+    """Put what an arm returns, c(t) phi(t - tau(t)), into the row `target` of `work`.
 
     `now` is the present row of phi, and `i` that of c, unless it has only one, and of a delay
     that moves. See `_compute` for the rest.
@@ -266,7 +267,7 @@ def _receive(
     if isinstance(start, int):  # known when it is compiled
         for w in range(len(lanes)):
             column = np.uintp(first + w)
-            work[_place(late, lanes, w)] = c[at, column] * _late(phi, now, column, delay)
+            work[_place(target, lanes, w)] = c[at, column] * _delayed(phi, now, column, delay)
     else:
         # Where all lanes have the same whole samples, they read from the same rows.
         whole, others = np.floor(start[i, first]), 0
@@ -278,14 +279,14 @@ def _receive(
                 column = np.uintp(first + w)
                 u = start[i, column] - whole - 0.5
                 received = _between(phi, middle, column, u, weights)
-                work[_place(late, lanes, w)] = c[at, column] * received
+                work[_place(target, lanes, w)] = c[at, column] * received
         else:
             for w in range(len(lanes)):
                 column = np.uintp(first + w)
                 whole = np.floor(start[i, column])
                 u = start[i, column] - whole - 0.5
                 received = _between(phi, now - int(whole), column, u, weights)
-                work[_place(late, lanes, w)] = c[at, column] * received
+                work[_place(target, lanes, w)] = c[at, column] * received
 
 
 @njit(cache=True)
@@ -316,13 +317,13 @@ def _close(
     inverse = 1.0 / (1.0 + now1 + now2)
     for w in range(len(lanes)):
         column = np.uintp(first + w)
-        a1, a2 = work[_place(_LATE1, lanes, w)], work[_place(_LATE2, lanes, w)]
+        a1, a2 = work[_place(_DELAYED1, lanes, w)], work[_place(_DELAYED2, lanes, w)]
         x, predicted = work[_place(_INPUT, lanes, w)], work[_place(_PREDICTED, lanes, w)]
         if dead[0] == 0:
             # phi = noise - predicted - now1 (phi - a1) - now2 (phi - a2), solved for phi.
             x = (x + (now1 * a1 + now2 * a2) - predicted) * inverse
         else:
-            x -= _late(sent, now, column, dead)
+            x -= _delayed(sent, now, column, dead)
             sending = now1 * (x - a1) + now2 * (x - a2)
             sent[np.uintp(now), column] = predicted + sending
         work[_place(_OUTPUT, lanes, w)] = x
@@ -345,7 +346,7 @@ def _move_on(
     m, n = len(rows), len(sections)
     for w in range(len(lanes)):
         x = work[_place(_OUTPUT, lanes, w)]
-        u1, u2 = x - work[_place(_LATE1, lanes, w)], x - work[_place(_LATE2, lanes, w)]
+        u1, u2 = x - work[_place(_DELAYED1, lanes, w)], x - work[_place(_DELAYED2, lanes, w)]
         top, below, ready = work[_place(_STATES + m - 1, lanes, w)], 0.0, 0.0
         for j in range(m):
             q, b1, b2 = rows[j]
@@ -413,8 +414,8 @@ def _compute(
     shares = _shares(sensor, controller)
     for i in range(len(noise)):
         now = len(phi) - len(noise) + i
-        _receive(lanes, first, phi, now, c1, arm1, i, work, _LATE1)
-        _receive(lanes, first, phi, now, c2, arm2, i, work, _LATE2)
+        _receive(lanes, first, phi, now, c1, arm1, i, work, _DELAYED1)
+        _receive(lanes, first, phi, now, c2, arm2, i, work, _DELAYED2)
         for w in range(len(lanes)):
             work[_place(_INPUT, lanes, w)] = noise[np.uintp(i), np.uintp(first + w)]
         _close(lanes, first, sent, now, dead, shares, work)
@@ -509,13 +510,13 @@ def sampled_open_loop(
     delays = _sampled_delays(checked_loop(loop), rate)
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
     omega = positive_array("omega", omega)
-    late1, late2, dead = (
+    delayed1, delayed2, dead = (
         np.exp(-1j * omega[..., None] * (first + np.arange(len(weights))) / rate) @ weights
         for first, weights in delays
     )
     s = 1j * warped(omega, rate)
     m1, m2 = loop.mapping.weights(s)
-    sensor = m1 * (1.0 - c1 * late1) + m2 * (1.0 - c2 * late2)
+    sensor = m1 * (1.0 - c1 * delayed1) + m2 * (1.0 - c2 * delayed2)
     return np.asarray(dead * loop.controller(s) * sensor)
 
 
@@ -535,8 +536,8 @@ class _MovingArm:
         self._name, self._given, self._rate, self._begin = name, given, rate, begin
         self._last: FloatArray | None = None
 
-    def part(self, noise: FloatArray, number: int, known: int) -> tuple[FloatArray, int]:
-        """Return the delays of a block in samples, in rows, and how far they reach back.
+    def part(self, noise: FloatArray, number: int, known: int) -> FloatArray:
+        """Return the delays of a block in samples, in rows.
 
         `noise` is that of the block, `number` that of its first sample in the run, and so many
         samples are `known` before it.
@@ -551,26 +552,25 @@ class _MovingArm:
         rows[0] = samples[0] if self._last is None else self._last
         self._last = samples[-1].copy()
         change = np.diff(rows, axis=0)
-        right = samples.min() >= _SIDE and change.min() > _SLOWEST and change.max() < _FASTEST
-        # Then no later sample reaches further back than those of the first row.
-        reach = int(samples[0].max()) + _SIDE
-        if right and reach <= known:
-            return samples, reach
-        wrong = (samples < _SIDE) | (change <= _SLOWEST) | (change >= _FASTEST)
-        i, w = (0, samples[0].argmax()) if right else np.argwhere(wrong)[0]
-        if samples[i, w] < _SIDE:
-            constraint = f"be at least {_SIDE / self._rate} s where it is not constant"
-        elif wrong[i, w]:
+        if change.min() <= _SLOWEST or change.max() >= _FASTEST:
             constraint = (
                 f"change by more than {_SLOWEST:g} and less than {_FASTEST:g} s a second, as "
                 f"round trips do at less than the speed of light"
             )
+            wrong = (change <= _SLOWEST) | (change >= _FASTEST)
+        elif samples.min() < _SIDE:
+            constraint = f"be at least {_SIDE / self._rate} s where it is not constant"
+            wrong = samples < _SIDE
+        elif _reach((samples[:1], _SCALES)) > known:
+            # No later sample reaches further back.
+            constraint = _past_history(number - known, self._rate)
+            wrong = samples[:1] == samples[0].max()
         else:
-            begin = (number - known) / self._rate
-            constraint = _HISTORY.format(begin)
-        time = (number + i) / self._rate
+            return samples
+        i, w = np.argwhere(wrong)[0]
         raise ValueError(
-            f"{self._name} must {constraint}, got {tau[i, w]} s at t = {time:.9g} s"
+            f"{self._name} must {constraint}, got {tau[i, w]} s at "
+            f"t = {(number + i) / self._rate:.9g} s"
         )
 
     def _called(
@@ -634,7 +634,7 @@ class Simulation:
         \varphi[n] &= \varphi_0[n] - \sum_i \ell_{0,i}\, y[n - f_0 - i] .
 
     Here y is what the controller sends, of gain g behind the sensor's direct shares d_k, and r
-    what their states make of earlier samples (`armlock.timedomain.discretize`). The late light
+    what their states make of earlier samples (`armlock.timedomain.discretize`). The returns
     a_k and the dead time, k = 0, are interpolated as for `sampled_open_loop`. Without a dead
     time y[n] enters its own sample, and the loop is closed within it:
 
@@ -704,26 +704,26 @@ class Simulation:
             )
         self._history = before.copy()
         # A block of samples of the output, and of what the controller has sent, stands behind
-        # some samples of the past, of which so many are known. They come with the first block.
+        # those before that are known. These come with the first block.
         columns = self.draws or 1
         past = self.history_samples
-        self._block = max(BLOCK // columns, min(4 * past, max(past, MOST // columns)))
-        self._past = self._known = 0
+        self._block = max(BLOCK // columns, 4 * past)
         for name, number in (("sample_rate", 1), ("draws", columns)):
             check_memory(name, (2, past + self._block, number), 8)
-        full, left = divmod(columns, LANES)
+        full, rest = divmod(columns, LANES)
         # The last runs may be few, and are then faster one by one.
-        groups = [LANES] * full + ([1] * left if 2 * left < LANES else [LANES])
+        groups = [LANES] * full + ([1] * rest if 2 * rest < LANES else [LANES])
         rows = _STATES + len(sensor.states) + 2 * len(controller.sections)
         self._groups = [np.zeros((rows, lanes)) for lanes in groups]
         self._signals = np.zeros((2, 0, sum(groups)))
+        self._known = before.size if before.ndim else sys.maxsize
         self._stopped: tuple[float, float] | None = None
         self._within = False
         self.samples = 0
 
     def __getstate__(self) -> dict[str, object]:
         """Leave out the room for the next block."""
-        return self.__dict__ | {"_signals": self._signals[:, : self._past].copy()}
+        return self.__dict__ | {"_signals": self._signals[:, : self._known].copy()}
 
     def advance(
         self,
@@ -809,10 +809,10 @@ class Simulation:
             if np.ndim(tau) > 0:
                 return _MovingArm(name, series, self.sample_rate, self.samples)
             delay = lagrange_delay(name, positive_number(name, tau), self.sample_rate)
-        if _reach(delay) > self._reaches():
-            begin = (self.samples - self._reaches()) / self.sample_rate
+        if _reach(delay) > self._known:
+            constraint = _past_history(self.samples - self._known, self.sample_rate)
             raise ValueError(
-                f"{name} must {_HISTORY.format(begin)}, got "
+                f"{name} must {constraint}, got "
                 f"{getattr(self.loop, name) if tau is None else tau} s at "
                 f"t = {self.samples / self.sample_rate:.9g} s"
             )
@@ -826,21 +826,19 @@ class Simulation:
     ) -> None:
         """Compute the next samples, each in a row, unless the run stops before."""
         stop, first, columns = len(output), 0, self._signals.shape[2]
-        dead = self._delays[2]
-        (arm1, reach1, kept1), (arm2, reach2, kept2) = (
-            self._delay(arm, inputs[0]) for arm in arms
-        )
-        past = self._make_room(max(reach1, reach2, _reach(dead)), max(kept1, kept2))
-        phi, sent = self._signals[:, : past + stop]
+        delays = (*(self._delay(arm, inputs[0]) for arm in arms), self._delays[2])
+        keep = self._make_room(max(map(_reach, delays)))
+        known = self._known
+        phi, sent = self._signals[:, : known + stop]
         series = tuple(_in_columns(given, columns) for given in inputs)
-        sampled = (arm1, arm2, dead), *self._filters
+        sampled = delays, *self._filters
         self._within = True
         for work in self._groups:
             lanes = work.shape[1]
             run = first, phi, sent, series, sampled, work.ravel(), self.limit
             end = _compute((0,) * lanes, *run, self.samples)
             if end < stop:
-                size = np.abs(phi[past + end, first : first + lanes])
+                size = np.abs(phi[known + end, first : first + lanes])
                 began = work[_BOUNDED, np.argmin(size <= self.limit * work[_LARGEST])]
                 self._stopped = (
                     began / self.sample_rate,
@@ -848,53 +846,38 @@ class Simulation:
                 )
                 stop = end
             first += lanes
-        output[:stop] = phi[past : past + stop, : output.shape[1]]
-        for signal in self._signals:
-            signal[:past] = signal[len(output) : len(output) + past]
-        self._known = min(self._known + stop, past)
+        output[:stop] = phi[known : known + stop, : output.shape[1]]
+        self._known, end = min(known + stop, keep), known + stop
+        self._signals[:, : self._known] = self._signals[:, end - self._known : end]
         self.samples += stop
         self._within = False
 
-    def _reaches(self) -> int:
-        """Return how many samples before the present are known."""
-        if self.samples:
-            return self._known
-        return self._history.size if self._history.ndim else sys.maxsize
+    def _delay(self, arm: Delay | _MovingArm, noise: FloatArray) -> Delay | MovingDelay:
+        """Return an arm's delay during a block."""
+        if not isinstance(arm, _MovingArm):
+            return arm
+        samples = arm.part(noise, self.samples, self._known)
+        return _in_columns(samples, self._signals.shape[2]), _SCALES
 
-    def _delay(
-        self, arm: Delay | _MovingArm, noise: FloatArray
-    ) -> tuple[Delay | MovingDelay, int, int]:
-        """Return an arm's delay during a block, and how far it reaches back.
+    def _make_room(self, reach: int) -> int:
+        """Make room for a block whose delays reach so far back; return what to keep after it.
 
-        The latter from the block's first sample, and as far as its last delay from there.
+        That is some samples more, for the arms of the next block.
         """
-        if isinstance(arm, _MovingArm):
-            samples, reach = arm.part(noise, self.samples, self._reaches())
-            columns = _in_columns(samples, self._signals.shape[2])
-            return (columns, _SCALES), reach, int(samples[-1].max()) + _SIDE
-        reach = _reach(arm)
-        return arm, reach, reach
-
-    def _make_room(self, reach: int, kept: int) -> int:
-        """Make room for a block; return behind how many samples it stands.
-
-        These are no fewer than before, than the present block takes, which is `reach`, and
-        some more than the next one will, which is `kept`.
-        """
-        past = max(self._past, self.history_samples, reach, kept + _SPARE)
-        shape = 2, past + self._block, self._signals.shape[2]
+        keep = max(self.history_samples, reach) + _SPARE
+        if self.samples == 0:
+            self._known = min(self._known, keep)
+        shape = 2, max(keep, self._known) + self._block, self._signals.shape[2]
         if self._signals.shape[1] < shape[1]:
             check_memory("tau1 and tau2", shape, 8)
-            signals = np.zeros(shape)
-            signals[:, past - self._past : past] = self._signals[:, : self._past]
-            self._signals, self._past = signals, past
+            before, self._signals = self._signals[:, : self._known], np.zeros(shape)
+            self._signals[:, : before.shape[1]] = before
         if self.samples == 0:
-            self._known = min(self._reaches(), past)
-            before = self._history[-past:, None] if self._history.ndim else self._history
-            self._signals[0, past - self._known : past] = before
+            history = self._history[-keep:, None] if self._history.ndim else self._history
+            self._signals[0, : self._known] = history
             for work in self._groups:
-                work[_LARGEST] = np.abs(self._signals[0, past - reach : past]).max()
-        return past
+                work[_LARGEST] = np.abs(self._signals[0, : self._known][-reach:]).max()
+        return keep
 
 
 def simulate(

@@ -293,6 +293,7 @@ function armlockPages() {
     none(why) {
       this.near.drop("point", "root");
       this.wide.drop("chart");
+      this.counting = false;
       this.slow.drop("time");
       this.drop(this.design);
       clearTimeout(this.rest);
@@ -339,14 +340,29 @@ function armlockPages() {
 
     redraw(moving = false) {
       if (!this.spec) return;
-      const { x0, x1, y0, y1 } = this.chart.box, input = [this.spec, x0, x1, y0, y1];
       this.chart.stale = true;
       this.chart.curve = this.dcurve(moving ? 3000 : 20000);
       this.chart.sheet.draw();
+      // A chart that is being counted while a slider moves is waited for: dropped at each frame, none
+      // would ever be drawn.
+      if (!(moving && this.counting)) this.count(moving);
+    }
+
+    /* Ask for the chart: a coarse one, and unless a slider moves a finer one after it. */
+    count(moving) {
+      const { spec } = this, { x0, x1, y0, y1 } = this.chart.box, input = [spec, x0, x1, y0, y1];
+      this.counting = true;
       this.wide.ask("chart", [...input, 100, 60000], (found, error) => {
-        if (error) { this.note.textContent = error; return; }
-        this.chart.fill(found);
-        this.note.textContent = "Refining \u2026";
+        this.counting = false;
+        this.note.textContent = error || "Refining \u2026";
+        if (!error) this.chart.fill(found);
+        if (spec !== this.spec) {
+          // It stays faint, because the loop has moved on.
+          this.chart.stale = true;
+          this.count(true);
+          return;
+        }
+        if (moving || error) return;
         this.wide.ask("chart", [...input, 400, 3000000], finer => {
           this.chart.fill(finer);
           const share = 1 - finer.sure;
