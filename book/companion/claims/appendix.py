@@ -290,7 +290,7 @@ def generated_series() -> Finding:
     "A6",
     place="Appendix, after Eq. (A4)",
     says="Imperfect quadrature of the channels makes a multiplicative phase error as well.",
-    pinned=(Verdict.IN_PART, 1.5e-6, 1e-8),
+    pinned=(Verdict.IN_PART, 1.5e-12, 1e-14),
     weight=Weight.DERIVATION,
     printed="when there is a gain mismatch or imperfect quadrature between I and Q channels "
     "..., a multiplicative DC phase error will occur",
@@ -308,9 +308,9 @@ def quadrature_error() -> Finding:
     at_zero, most = abs(slope_less_one(0.0)), abs(slope_less_one(0.25 * np.pi))
     return Finding(
         decide(most > 0.5 * error, at_zero > 0.5 * error),
-        at_zero / error,
-        "relative error of a small phase about zero, over the error of quadrature, which is "
-        f"{error:g} rad",
+        at_zero,
+        "relative error of a small phase about zero, from channels that are "
+        f"{error:g} rad off a quarter turn",
         "Small phases, of which the appendix speaks, get an offset and an error of second "
         "order only. About a phase that is held elsewhere, at 45 degrees, the factor is "
         f"{most:.1e} off, of first order.",
@@ -333,7 +333,8 @@ def other_causes() -> Finding:
     return Finding(
         decide(settled=False),
         changed,
-        f"change in rad of the measured phase by an intensity that is {100 * relative:g} % off",
+        f"change in rad of the measured phase by an intensity that is {100 * relative:g} % "
+        "off, the one of the three that is computed",
         "The paper gives neither size nor mechanism. In its own model the amplitude cancels in "
         "the ratio of the two channels, and a tilt adds to the path, so to the phase: it is "
         "additive. That any of the three multiplies the phase is possible, and not shown.",
