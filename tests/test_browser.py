@@ -14,7 +14,8 @@ PAGE = """<!DOCTYPE html>
 <meta name="viewport" content="width=device-width"></head>
 <body><main><h1 id="top">A page</h1>{}</main></body></html>"""
 GOOD = """<p><a href="#top">Up</a>, and <code>$\\frac$</code> in code.</p>
-<img src="data:," alt="A curve"><figure><output id="shown">1</output><label>Gain <input type="range" id="gain"
+<img src="data:," alt="A curve"><figure>
+<output id="shown">1</output><label>Gain <input type="range" id="gain"
 oninput="document.getElementById('shown').textContent = this.value"></label></figure>
 <p data-check="hover" onmousemove="this.textContent = 'here'">Move over this.</p>"""
 #: All on one page, each with what is to be said of it.
