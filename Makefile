@@ -37,11 +37,11 @@ empty :=
 space := $(empty) $(empty)
 find-sources = $(shell find $(wildcard $(1)) -type f \
 	-not -name '*.pyc' -not -name '*.nbi' -not -name '*.nbc' -not -path '*/.*' | sort)
-# What the notebooks depend on, and the book besides.
-RUN_SOURCES := $(call find-sources,armlock book/companion notebooks)
-BOOK_SOURCES := $(call find-sources,book) tools/check_html.py tools/write_codecheck.py \
+# What the notebooks depend on, and the book and the tests besides.
+run-sources := $(call find-sources,armlock book/companion notebooks)
+book-sources := $(call find-sources,book) tools/check_html.py tools/write_codecheck.py \
 	tools/cache_notebooks.py codecheck.yml
-TEST_SOURCES := $(call find-sources,armlock book notebooks tests benchmarks tools binder) \
+test-sources := $(call find-sources,armlock book notebooks tests benchmarks tools binder) \
 	pyproject.toml conftest.py environment.txt README.md codecheck.yml
 NOTEBOOKS := $(wildcard notebooks/*.ipynb)
 
@@ -121,7 +121,7 @@ run-notebooks = rm -rf $(1) build/shared $(2); export ARMLOCK_FIGURES="$(CURDIR)
 
 # Where notebooks alone have changed since the last run, only these run again. The stamp goes
 # first: what an interrupted run has left is not taken for a whole one.
-$(NOTEBOOKS_RAN): $(PACKAGE_READY) $(RUN_SOURCES) build/run-sources $(if $(FORCE),always)
+$(NOTEBOOKS_RAN): $(PACKAGE_READY) $(run-sources) build/run-sources $(if $(FORCE),always)
 	@rm -f $@
 	@touch build/notebooks-started
 	@$(if $(filter-out notebooks/%.ipynb,$?),$(call run-notebooks,build/figures,build/executed),\
@@ -144,7 +144,7 @@ book: ## Run all notebooks and build the book, as HTML that needs no network
 # from the cache, which holds the last run and nothing older. The new book replaces the old one
 # only when it is complete, and is as old as the start of its build, so that a source saved
 # meanwhile counts as newer. The link keeps the path right that Jupyter Book has printed.
-$(INDEX): $(NOTEBOOKS_RAN) $(BOOK_SOURCES) build/book-sources $(if $(FORCE),always)
+$(INDEX): $(NOTEBOOKS_RAN) $(book-sources) build/book-sources $(if $(FORCE),always)
 	@touch build/book-started
 	@rm -rf build/_build
 	@mkdir -p build/_build/html
@@ -195,7 +195,7 @@ test: ## Run all tests, notebooks included
 		"nothing has changed since; make test FORCE=1 runs them again."; }
 	@rm -f build/tests-ran
 
-$(TESTS_PASSED): $(NOTEBOOKS_RAN) $(TEST_SOURCES) build/test-sources $(if $(FORCE),always)
+$(TESTS_PASSED): $(NOTEBOOKS_RAN) $(test-sources) build/test-sources $(if $(FORCE),always)
 	@touch build/tests-started
 	$(PYTEST) tests
 	@date '+%Y-%m-%d %H:%M:%S' > $@
@@ -212,17 +212,9 @@ bench: $(PACKAGE_READY) ## Measure speed and memory, and print a table
 	$(PY) -m benchmarks
 
 # The lists of sources change when a file comes or goes, which no file's date would tell.
-build/run-sources: always
+build/run-sources build/book-sources build/test-sources: build/%-sources: always
 	@mkdir -p build
-	@echo $(RUN_SOURCES) | cmp -s - $@ || echo $(RUN_SOURCES) > $@
-
-build/book-sources: always
-	@mkdir -p build
-	@echo $(BOOK_SOURCES) | cmp -s - $@ || echo $(BOOK_SOURCES) > $@
-
-build/test-sources: always
-	@mkdir -p build
-	@echo $(TEST_SOURCES) | cmp -s - $@ || echo $(TEST_SOURCES) > $@
+	@echo $($*-sources) | cmp -s - $@ || echo $($*-sources) > $@
 
 always:
 
@@ -245,7 +237,6 @@ lint: $(PACKAGE_READY) ## Check style, types, stripped notebooks, and what is wr
 	$(PY) -m uv pip install --dry-run --quiet --no-index --no-deps --no-build \
 		--python $(PY) -r $(REQUIRED)
 	! grep -n '://' environment.txt
-	$(PY) tools/write_binder.py --check
 	$(PY) tools/write_codecheck.py --check
 
 format: $(PACKAGE_READY) ## Format the code, strip the notebooks, list what they publish
@@ -259,7 +250,6 @@ lock: $(ENV_READY) ## Write environment.txt from pyproject.toml (UPGRADE=1: newe
 		--universal --python-version 3.11 --fork-strategy fewest --only-binary :all: \
 		--generate-hashes --no-emit-index-url --no-emit-find-links --quiet \
 		--custom-compile-command "make lock" $(if $(UPGRADE),--upgrade) -o environment.txt
-	$(PY) tools/write_binder.py
 
 clean: ## Remove what was built
 	rm -rf build dist .pytest_cache .ruff_cache .mypy_cache .hypothesis

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import sys
 import threading
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, as_completed
 from contextlib import nullcontext
 from functools import cache
 from typing import Any, TypeVar
 
+from armlock.progress import progress
 from armlock.store import opened
 
 _P = TypeVar("_P")
@@ -20,8 +19,6 @@ _R = TypeVar("_R")
 
 #: Most tasks of a sweep. Of more points than this, a task takes several, one after the other.
 TASKS = 4096
-# How often a log, which cannot take a line back, gets a line of progress, in s.
-_BETWEEN_LINES = 60.0
 
 
 def sweep(
@@ -29,7 +26,6 @@ def sweep(
     points: Iterable[_P],
     *,
     executor: Executor | None = None,
-    progress: bool = False,
     store: str | os.PathLike[str] | None = None,
     about: Mapping[str, Any] | None = None,
 ) -> list[_R]:
@@ -47,9 +43,6 @@ def sweep(
         What calls it: of processes, of threads, or `client.get_executor()` of a Dask client.
         Without one, the calls are made here, one by one. The results are the same, bit by
         bit, on processors of one kind.
-    progress : bool, optional
-        Whether standard error says how far it is: on one line in a terminal and in Jupyter,
-        and in a log with a line a minute and one at the end.
     store : path_like, optional
         HDF5 file that takes results as they come. A sweep that was interrupted, and is called
         again, goes on where it was. All results are numbers or arrays of one shape and type;
@@ -80,6 +73,8 @@ def sweep(
 
     Notes
     -----
+    What takes longer than some seconds says how far it is, in a terminal and in Jupyter.
+
     A task is one point, or as many as make `TASKS` tasks of all. A worker holds its task's
     points and results, and what the function takes. An error of the function ends the sweep; a
     function that catches it, for instance `CountError` of one loop among many, and returns nan
@@ -122,27 +117,14 @@ def sweep(
     with kept or nullcontext() as file:
         found: dict[int, Any] = file.found() if file else {}
         left = [i for i in range(len(given)) if i not in found]
-        said = begin = time.monotonic()
-        for part, values in _computed(function, given, left, executor):
-            found.update(zip(part, file.write(part, values) if file else values, strict=True))
-            if progress:
-                missing = len(given) - len(found)
-                seconds = (time.monotonic() - begin) / (len(left) - missing) * missing
-                said = _say(
-                    f"{len(found)} of {len(given)}, {seconds:.0f} s left", missing, said
+        before = len(found)
+        with progress("sweep", len(left)) as say:
+            for part, values in _computed(function, given, left, executor):
+                found.update(
+                    zip(part, file.write(part, values) if file else values, strict=True)
                 )
+                say(len(found) - before)
     return [found[i] for i in range(len(given))]
-
-
-def _say(line: str, missing: int, said: float) -> float:
-    """Say how far a sweep is; return when something was said last."""
-    now, here = time.monotonic(), type(sys.stderr).__module__
-    rewritten = sys.stderr.isatty() or here.startswith("ipykernel")
-    if not rewritten and missing and now - said < _BETWEEN_LINES:
-        return said
-    end = "\r" if rewritten and missing else "\n"
-    print(f"{line:<40}" if rewritten else line, end=end, file=sys.stderr, flush=True)
-    return now
 
 
 def _computed(

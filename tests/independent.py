@@ -164,11 +164,6 @@ def map_polynomial(system, x, y):
     return polynomial
 
 
-def map_count(system, x, y):
-    """Eigenvalues of a map outside the unit circle."""
-    return int(np.count_nonzero(np.abs(map_eigenvalues(system, x, y)) > 1.0))
-
-
 def series(zeros, poles, gain):
     """A, B, C and D of the sections (s - z) / (s - p) or 1 / (s - p), one after the other."""
     n = len(poles)

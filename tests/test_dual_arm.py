@@ -111,6 +111,8 @@ def test_an_arm_that_is_not_used_changes_no_crossing():
     ways = (1.0, 2.0), (1.0, 0.0)
     found, expected = (first_crossing(loop, (1.0, 1.0), way) for way in ways)
     assert found == expected
+    before, after = unstable_roots(loop, 1.0 + found.position * np.array([1 - 1e-6, 1 + 1e-6]))
+    assert after - before == found.change
     assert first_crossing(loop, (1.0, 1.0), (0.0, 1.0)).position == np.inf
 
 

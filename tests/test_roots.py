@@ -27,9 +27,6 @@ from armlock.stability.roots import extended_root
 from book.companion.schemes import pseudospectral_roots
 from tests import independent
 
-gains = st.floats(0.05, 3.0)
-delays = st.floats(0.2, 5.0)
-reals = st.floats(-3.0, 3.0)
 PAPER = paper_loop(actuator=True).controller
 # Twenty-six poles over four decades.
 MANY = -np.geomspace(1e-5, 4e-2, 26)
@@ -62,20 +59,6 @@ def test_hayes_root_is_the_principal_branch_of_lambert(a, b, tau):
     expected = roots[np.argmax(roots.real)]
     assert root.real == pytest.approx(expected.real, rel=1e-9, abs=1e-9 / tau)
     assert root.imag == pytest.approx(abs(expected.imag), rel=1e-9, abs=1e-7 / tau)
-
-
-@given(gains, delays, delays, reals, reals)
-def test_root_is_a_zero_and_the_rightmost_of_an_independent_spectrum(gain, tau1, tau2, c1, c2):
-    system = CommonArm(gain, tau1, tau2)
-    assume(min(abs(c1), abs(c2)) > 0.05)
-    # Delayed terms that cancel leave no spectrum to collocate.
-    assume(tau1 != tau2 or abs(c1 + c2) > 0.05)
-    root = rightmost_root(system, c1, c2)
-    assert (root.real > 0.0) == (unstable_roots(system, c1, c2) > 0)
-    parts = np.abs(system.parts(root)) * [1.0, abs(c1), abs(c2)]
-    assert abs(independent.value(system, root, c1, c2)) <= 1e-12 * (parts.sum() + abs(root))
-    others = independent.generator_eigenvalues(system, c1, c2, 70)
-    assert others.real.max() == pytest.approx(root.real, abs=1e-6 * (1.0 + abs(root)))
 
 
 DEADBEAT = CharacteristicFunction([0.0, 1.0], [1.0], [0.0], 1.0, 1.0, step=1.0)

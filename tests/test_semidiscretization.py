@@ -10,12 +10,10 @@ from armlock import (
     rightmost_root,
     semi_discretization,
     spectral_radius,
-    stability_chart,
     transition_matrix,
     unstable_roots,
 )
 from armlock.robustness.rays import first_crossing
-from tests import independent
 from tests.systems import RETARDED
 
 NAMES = "oscillator", "third order, unstable A", "zero of B1 on the axis"
@@ -55,20 +53,6 @@ def test_convergence_of_the_dominant_eigenvalue(system, order, observed):
     ]
     slope = np.polyfit(np.log(steps), np.log(errors), 1)[0]
     assert slope == pytest.approx(observed, abs=0.2)
-
-
-@pytest.mark.parametrize("order", [0, 1])
-@pytest.mark.parametrize("system", [*SYSTEMS, CommonArm(10.0, 1.5, 0.5)])
-def test_counts_of_the_map_are_eigenvalues_outside_the_unit_circle(system, order):
-    sampled = semi_discretization(system, 0.25, order)
-    x, y = np.random.default_rng(3).uniform(-3.5, 3.5, (2, 9))
-    chart = stability_chart(sampled, x, y)
-    np.testing.assert_array_equal(chart.counts, unstable_roots(sampled, x, y[:, None]))
-    for k, q in enumerate(y):
-        for p, count in zip(x, chart.counts[k], strict=True):
-            eigenvalues = np.linalg.eigvals(transition_matrix(system, p, q, 0.25, order))
-            assert count == np.count_nonzero(abs(eigenvalues) > 1.0)
-            assert count == independent.map_count(sampled, p, q)
 
 
 def test_delays_off_the_grid_by_rounding_alone_are_accepted():

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from armlock import CommonArm, LaserNoise, simulate, stability_chart, sweep
+from armlock import CommonArm, LaserNoise, progress, simulate, stability_chart, sweep
 from armlock.sweep import TASKS
 
 ROOT = Path(__file__).parents[1]
@@ -67,17 +67,14 @@ def test_an_error_of_the_function_ends_the_sweep(processes):
         sweep(draw, range(3), executor=2)  # type: ignore[arg-type]
 
 
-def test_progress_is_shown(capsys, monkeypatch):
-    sweep(str, range(3), progress=True)
-    shown = capsys.readouterr()
-    assert shown.out == ""
-    assert shown.err == "3 of 3, 0 s left\n"
+def test_a_terminal_is_told_how_far_a_sweep_is(capsys, monkeypatch):
+    monkeypatch.setattr(progress, "_SHORT", -1.0)
+    monkeypatch.setattr(progress, "_EVERY", -1.0)
+    sweep(str, range(3))
+    assert capsys.readouterr().err == ""
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
-    sweep(str, range(3), progress=True)
-    rewritten = capsys.readouterr().err
-    assert re.findall(r"(\d) of 3.*?([\r\n])", rewritten) == [
-        *zip("123", "\r\r\n", strict=True)
-    ]
+    sweep(str, range(3))
+    assert re.findall(r"sweep: (\d+)%", capsys.readouterr().err) == ["33", "67", "100"]
 
 
 def test_a_file_holds_results_points_and_what_they_are(tmp_path, processes):

@@ -8,7 +8,8 @@ difference passes a level. These are roots of polynomials, and no hour has to be
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import combinations, pairwise
 from typing import NamedTuple
 
@@ -108,6 +109,24 @@ class Course:
         """Return the times of all extremes, the ends included."""
         slope = self.curve.derivative()
         return np.unique([self.start, *slope.roots(extrapolate=False), self.stop])
+
+    def largest(self) -> tuple[float, float]:
+        """Return the value of largest magnitude, and when it is reached."""
+        times = self.extremes()
+        values = self(times)
+        at = int(np.argmax(np.abs(values)))
+        return float(values[at]), float(times[at])
+
+    def cut(
+        self, levels: Iterable[float], start: float, stop: float
+    ) -> list[tuple[float, float, float]]:
+        """Cut the time from start to stop where the function has one of some values.
+
+        Returns start, stop and the value halfway of each stretch.
+        """
+        inner = [t for level in levels for t in self.times(level, start, stop).tolist()]
+        pairs = pairwise(np.unique([start, *inner, stop]).tolist())
+        return [(low, high, float(self(0.5 * (low + high)))) for low, high in pairs]
 
 
 def half_difference(orbits: Constellation, master: int, start: float, stop: float) -> Course:
@@ -220,14 +239,14 @@ def policies(half: Course) -> dict[str, list[Hold]]:
         - "right sign": that magnitude, with the sign of the true value
         - "month's start", "month's middle": for each month the value at that time
     """
-    extremes = half.extremes()
-    values = half(extremes)
-    largest = float(values[np.argmax(np.abs(values))])
-    zeros = [half.start, *half.times().tolist(), half.stop]
-    found = {"constant": [Hold(half.start, half.stop, largest)], "right sign": []}
-    for start, stop in pairwise(zeros):
-        size = np.copysign(largest, half(0.5 * (start + stop)))
-        found["right sign"].append(Hold(start, stop, float(size)))
+    largest, _ = half.largest()
+    found = {
+        "constant": [Hold(half.start, half.stop, largest)],
+        "right sign": [
+            Hold(low, high, math.copysign(largest, value))
+            for low, high, value in half.cut([0.0], half.start, half.stop)
+        ],
+    }
     months = int(np.ceil((half.stop - half.start) / MONTH * (1.0 - 1e-12)))
     for name, share in (("month's start", 0.0), ("month's middle", 0.5)):
         starts = half.start + MONTH * np.arange(months)
@@ -254,14 +273,14 @@ def lost(half: Course, holds: Sequence[Hold], edges: tuple[float, float]) -> lis
     list of Hold
         In the order of time; of one stretch across two holds two parts.
     """
-    found = []
-    for start, stop, held in holds:
-        levels = [edge * held for edge in edges if np.isfinite(edge)]
-        inner = np.concatenate([half.times(level, start, stop) for level in levels])
-        for low, high in pairwise(np.unique([start, *inner.tolist(), stop]).tolist()):
-            if not edges[0] < float(half(0.5 * (low + high))) / held < edges[1]:
-                found.append(Hold(low, high, held))
-    return found
+    return [
+        Hold(low, high, held)
+        for start, stop, held in holds
+        for low, high, true in half.cut(
+            [edge * held for edge in edges if np.isfinite(edge)], start, stop
+        )
+        if not edges[0] < true / held < edges[1]
+    ]
 
 
 def days(stretches: Sequence[Hold]) -> float:
@@ -289,10 +308,9 @@ def growth(
     Where the half difference is zero the rate changes its form, and the sum is split there.
     """
     start, stop, held = stretch
-    inner = half.times(0.0, start, stop).tolist()
     nodes, weights = np.polynomial.legendre.leggauss(_POINTS)
     total = 0.0
-    for low, high in pairwise([start, *inner, stop]):
+    for low, high, _ in half.cut([0.0], start, stop):
         times = [low + 0.5 * (high - low) * (float(x) + 1.0) for x in nodes]
         rates = [frozen_rate(loop, orbits, t, held, master) for t in times]
         total += 0.5 * (high - low) * float(np.dot(weights, rates))
@@ -349,11 +367,8 @@ def switches(halves: Mapping[int, Course], floor: float) -> list[tuple[float, in
     floor = positive_number("floor", floor)
     ends: dict[int, list[tuple[float, float]]] = {}
     for master, half in halves.items():
-        times = np.unique(np.concatenate((half.times(floor), half.times(-floor))))
-        stretches = pairwise([half.start, *times.tolist(), half.stop])
-        ends[master] = [
-            pair for pair in stretches if abs(float(half(0.5 * sum(pair)))) >= floor
-        ]
+        stretches = half.cut([floor, -floor], half.start, half.stop)
+        ends[master] = [(low, high) for low, high, value in stretches if abs(value) >= floor]
     now, stop = next((half.start, half.stop) for half in halves.values())
     found: list[tuple[float, int]] = []
     while now < stop:

@@ -55,8 +55,9 @@ class Survey:
     halves : dict of int to Course
         Half differences by master.
     edges : tuple of two floats
-        Between which true over held half differences the loop is stable, at a held value of a
-        quarter of the largest one.
+        Between which true over held half differences the loop is stable: certified on the arms
+        with the largest one, with a quarter of it held, and taken for all other arms and held
+        values.
     lost : dict of str to list of Hold
         Stretches without a stable loop, by policy.
     floor, floor_time : float
@@ -94,6 +95,10 @@ class Survey:
         """How many years are surveyed."""
         return (self.half.stop - self.half.start) / YEAR
 
+    def _times(self, number: int) -> FloatArray:
+        """Return times in s at which X2 can be had: an hour within the orbits' span."""
+        return np.linspace(self.half.start + 3700.0, self.half.stop - 3700.0, number)
+
     def pulled(self, t: FloatArray) -> FloatArray:
         """Return the largest pulling in Hz by 1 Hz in the difference, at times in s."""
         return self.differential.size * self.largest / np.abs(self.half(t))
@@ -123,6 +128,8 @@ class Survey:
             f"master {self.master}, {self.years:.2f} years, half difference up to "
             f"{1e3 * self.largest:.2f} ms, {self.half.times().size} zeros",
             f"stable for true/held from {low:.5g} to {high:.5g} (certified)",
+            f"with {1e3 * _SHARE * self.largest:.2f} ms held, on the arms with the largest "
+            f"half difference; taken for all others",
             "",
             f"{'held value':15s} {'stable days a year':>18s} {'outages':>8s} {'longest':>10s}",
         ]
@@ -132,7 +139,7 @@ class Survey:
             share = 365.25 - days(stretches) / self.years
             lines.append(f"{name:15s} {share:18.3f} {len(joined):8d} {longest:8.2f} d")
         plan = ", ".join(f"{t / DAY:.1f}: {master}" for t, master in self.switches)
-        t = np.linspace(self.half.start + 3700.0, self.half.stop - 3700.0, 400)
+        t = self._times(400)
         x2 = self.x2(t)
         lines += [
             "",
@@ -146,6 +153,8 @@ class Survey:
             f"pulling by 1 Hz in the difference: {self.differential.size:.4g} Hz after "
             f"{self.differential.time:.4g} s{standing[self.differential.certified]}, "
             f"at {1e3 * self.largest:.2f} ms; as 1/half else",
+            "both are the largest of samples between 1 s and 20 d: that none is larger is not "
+            "certified",
             f"X2 at 3 mHz, free-running laser, 1 m: {x2.min():.3g} to {x2.max():.3g} "
             f"Hz/sqrt(Hz) at {t.size} times",
         ]
@@ -160,7 +169,7 @@ class Survey:
         """
         import matplotlib.pyplot as plt
 
-        t = np.linspace(self.half.start + 3700.0, self.half.stop - 3700.0, 3000)
+        t = self._times(3000)
         years = t / YEAR
         fig, (top, outage, pull, x2) = plt.subplots(4, 1, figsize=(6.4, 9.0), sharex=True)
         for (master, half), style in zip(self.halves.items(), ("-", "--", ":"), strict=True):
@@ -234,10 +243,9 @@ def survey(
             f"start and stop must ascend within the span {first} to {last} s, got {start} and "
             f"{stop}"
         )
+    half = half_difference(orbits, master, start, stop)
     halves = {k: half_difference(orbits, k, start, stop) for k in (1, 2, 3)}
-    half = halves[master] if master in halves else half_difference(orbits, master, start, stop)
-    extremes = half.extremes()
-    at = float(extremes[np.argmax(np.abs(half(extremes)))])
+    _, at = half.largest()
     tau1, tau2 = map(float, orbits.round_trips(at, master))
     held = 0.5 * (tau1 - tau2)
     # Upper edges matter where the held value is small: then at half differences that occur.

@@ -277,12 +277,12 @@ def noise_budget(
     arms = np.array([found["arm 1"], found["arm 2"]])
     beats, tau = np.array(LEVELS.beat_notes)[:, None], np.array([[loop.tau1], [loop.tau2]])
 
-    def through(shared: npt.ArrayLike, own: npt.ArrayLike) -> FloatArray:
+    def through(shared: npt.ArrayLike, separate: npt.ArrayLike) -> FloatArray:
         """Return the response to one noise in both arms and one in each, by their weights."""
         together = np.abs(np.sum(shared * arms, axis=0))
-        return np.asarray(np.hypot(together, np.linalg.norm(own * arms, axis=0)))
+        return np.asarray(np.hypot(together, np.linalg.norm(separate * arms, axis=0)))
 
-    left = {
+    locked = {
         "laser": np.abs(found["laser"]) * _densities("laser", laser, f),
         "shot": np.abs(_SHOT(s)) * through(0.0, 1.0),
         "clock": LEVELS.clock / np.sqrt(f) * through(beats, beats),
@@ -291,9 +291,9 @@ def noise_budget(
     for name, given in (sources or {}).items():
         if name == "laser":
             raise ValueError("sources must not hold 'laser': its noise is given as laser=...")
-        left[name] = through(0.0, _densities(f"sources[{name!r}]", given, f, arms=2))
+        locked[name] = through(0.0, _densities(f"sources[{name!r}]", given, f, arms=2))
     required = tdi_capability(f) if requirement is None else requirement
-    return NoiseBudget(f, left, _densities("requirement", required, f))
+    return NoiseBudget(f, locked, _densities("requirement", required, f))
 
 
 def noise_series(
@@ -362,18 +362,18 @@ def noise_series(
     total = np.zeros(samples)
     rest, *arms = loop.polynomials()
     delays = loop.tau1, loop.tau2
-    for b, tau, beat, own in zip(arms, delays, LEVELS.beat_notes, streams[1:], strict=True):
+    for b, tau, beat, stream in zip(arms, delays, LEVELS.beat_notes, streams[1:], strict=True):
         gain = -float(b.coefficients[-1] / rest.coefficients[-1])
         if not gain:
             continue
         arm = Controller(b.roots.tolist(), rest.roots.tolist(), gain)
         if source == "shot":
-            total += drawn(_SHOT * arm, own)
+            total += drawn(_SHOT * arm, stream)
         elif source == "clock":
-            total += beat * (drawn(_CLOCK * arm, streams[0]) + drawn(_CLOCK * arm, own))
+            total += beat * (drawn(_CLOCK * arm, streams[0]) + drawn(_CLOCK * arm, stream))
         else:
             here = drawn(_MOTION * arm, streams[0])
-            total += here + 2.0 * drawn(_MOTION * arm, own)
-            late = total[round(tau * sample_rate) :]
-            late += here[: late.size]
+            total += here + 2.0 * drawn(_MOTION * arm, stream)
+            delayed = total[round(tau * sample_rate) :]
+            delayed += here[: delayed.size]
     return total

@@ -270,7 +270,6 @@ def stability_region(
     c1: float = 1.0,
     c2: float = 1.0,
     executor: Executor | None = None,
-    progress: bool = False,
 ) -> StabilityRegion:
     """Tell where a loop is stable, over a grid of any two parameters.
 
@@ -285,8 +284,6 @@ def stability_region(
     executor : concurrent.futures.Executor, optional
         What computes the rows, as for `armlock.sweep`. For processes `make_loop` stands in a
         module, or is a `functools.partial` of one that does.
-    progress : bool, optional
-        Whether to say how far it is, as for `armlock.sweep`.
 
     Returns
     -------
@@ -333,11 +330,11 @@ def stability_region(
     ends = [checked_loop(make_loop(float(xs[0]), y)) for y in (float(ys[0]), float(ys[-1]))]
     if _but_for_gain(ends[0]) == _but_for_gain(ends[1]):
         row = partial(_row, partial(_exchanged, make_loop), ys, at)
-        columns = sweep(row, xs.tolist(), executor=executor, progress=progress)
+        columns = sweep(row, xs.tolist(), executor=executor)
         verdicts = np.array(columns, dtype=np.int64).T
     else:
         row = partial(_row, make_loop, xs, at)
-        rows = sweep(row, ys.tolist(), executor=executor, progress=progress)
+        rows = sweep(row, ys.tolist(), executor=executor)
         verdicts = np.array(rows, dtype=np.int64)
     return StabilityRegion((names[0], names[1]), xs, ys, verdicts)
 

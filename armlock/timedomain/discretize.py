@@ -185,8 +185,8 @@ def _pairs(roots: list[complex]) -> Rows:
     real = sorted((float(r.real) for r in roots if r.imag == 0.0), key=abs, reverse=True)
     pairs += [(r1, r2, 0.0) for r1, r2 in zip(real[::2], real[1::2], strict=False)]
     pairs.sort(key=lambda pair: math.hypot(pair[0], math.sqrt(pair[2])), reverse=True)
-    left = [(real[-1], -1.0, 0.0)] if len(real) % 2 else []
-    return tuple(pairs + left)
+    last = [(real[-1], -1.0, 0.0)] if len(real) % 2 else []
+    return tuple(pairs + last)
 
 
 @njit(cache=True)

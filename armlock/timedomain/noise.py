@@ -182,7 +182,7 @@ class ShapedNoise:
                 say(at + _BLOCK)
         return series
 
-    def blocks(self, samples: int, size: int = 1 << 20) -> Iterator[FloatArray]:
+    def blocks(self, samples: int, size: int = _BLOCK) -> Iterator[FloatArray]:
         """Yield the next samples in blocks.
 
         Parameters

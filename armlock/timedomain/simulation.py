@@ -766,17 +766,6 @@ class Simulation:
         given = finite_series("noise", noise, 1 if self.draws is None else 2)
         if self.draws not in (None, len(given)):
             raise ValueError(f"noise must have {self.draws} rows, got shape {given.shape}")
-        return self._advance(given, c1, c2, tau1, tau2)
-
-    def _advance(
-        self,
-        given: FloatArray,
-        c1: npt.ArrayLike,
-        c2: npt.ArrayLike,
-        tau1: GivenDelay | None,
-        tau2: GivenDelay | None,
-    ) -> FloatArray:
-        """Compute the next block of noise that is already checked."""
         inputs = [np.atleast_2d(given).T, _series("c1", c1, given), _series("c2", c2, given)]
         arms = [self._arm(k, tau, given) for k, tau in enumerate((tau1, tau2))]
         if self._within:
@@ -957,4 +946,4 @@ def simulate(
     given = finite_series("noise", noise, 1, 2)
     draws = len(given) if given.ndim == 2 else None
     run = Simulation(loop, sample_rate, history=history, limit=limit, draws=draws)
-    return run._advance(given, c1, c2, tau1, tau2)
+    return run.advance(given, c1, c2, tau1=tau1, tau2=tau2)

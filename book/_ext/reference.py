@@ -32,7 +32,6 @@ BUILD_TOOLS = ["jupyter-book", "sphinx", "myst-nb", "ipykernel"]
 # Code, a role with its text, a name in single backticks; what lies between is plain text.
 INLINE = re.compile(r"(``.+?``|:[\w:]+:`[^`]+`|`[^`]+`(?!_))")
 TRAILING_UNDERSCORE = re.compile(r"(?<=\w)_(?!\w)")
-SHARED = re.compile(r"(\w+(?:, \w+)+)( : .*)")
 
 
 def comments(module):
@@ -171,27 +170,8 @@ def inline(piece):
     return link_or_code(piece) if re.match(r"`[^`]", piece) else piece
 
 
-def separated(lines):
-    """Give attributes that share a line one each: Napoleon does so for parameters only."""
-    done, inside, at = [], False, 0
-    while at < len(lines):
-        if at + 1 < len(lines) and lines[at + 1].startswith("---"):
-            inside = lines[at] == "Attributes"
-        end = at + 1
-        if inside and (shared := SHARED.fullmatch(lines[at])):
-            while end < len(lines) and lines[end].startswith(" "):
-                end += 1
-            for name in shared[1].split(", "):
-                done += [name + shared[2], *lines[at + 1 : end]]
-        else:
-            done.append(lines[at])
-        at = end
-    return done
-
-
 def prepare(app, what, name, thing, options, lines):
     """Prepare a docstring, outside its formulas and examples."""
-    lines[:] = separated(lines)
     skip = None
     for number, line in enumerate(lines):
         indent = len(line) - len(line.lstrip())

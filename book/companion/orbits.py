@@ -55,14 +55,12 @@ def half(orbit: str, master: int = 1) -> Course:
 
 def largest(orbit: str, master: int = 1) -> float:
     """Return the largest half difference in s, in magnitude."""
-    course = half(orbit, master)
-    return float(np.abs(course(course.extremes())).max())
+    return abs(half(orbit, master).largest()[0])
 
 
 def taiji_half() -> float:
     """Return the largest half difference in s with Taiji's arms on Kepler's orbits."""
-    course = half_difference(kepler(3e9), 1, 0.0, YEAR)
-    return float(np.abs(course(course.extremes())).max())
+    return abs(half_difference(kepler(3e9), 1, 0.0, YEAR).largest()[0])
 
 
 def zeros_by_year(orbit: str) -> dict[int, list[int]]:
@@ -102,10 +100,9 @@ def stable_days() -> dict[tuple[str, int, str, str], float]:
 def days_above(orbit: str, level: float, master: int = 1) -> float:
     """Return on how many days a year the half difference is above a level, in magnitude."""
     course = half(orbit, master)
-    times = np.unique([course.start, *course.times(level), *course.times(-level), course.stop])
-    above = np.abs(course(0.5 * (times[1:] + times[:-1]))) > level
-    share = np.diff(times)[above].sum() / (course.stop - course.start)
-    return float(365.25 * share)
+    stretches = course.cut([level, -level], course.start, course.stop)
+    above = sum(stop - start for start, stop, value in stretches if abs(value) > level)
+    return 365.25 * above / (course.stop - course.start)
 
 
 class Stretch(NamedTuple):
