@@ -857,8 +857,9 @@ class Simulation:
         shape = 2, max(keep, self._known) + self._block, self._signals.shape[2]
         if self._signals.shape[1] < shape[1]:
             check_memory("tau1 and tau2", shape, 8)
-            before, self._signals = self._signals[:, : self._known], np.zeros(shape)
-            self._signals[:, : before.shape[1]] = before
+            signals, before = np.zeros(shape), self._signals[:, : self._known]
+            signals[:, : before.shape[1]] = before
+            self._signals = signals
         if self.samples == 0:
             history = self._history[-keep:, None] if self._history.ndim else self._history
             self._signals[0, : self._known] = history
