@@ -224,7 +224,8 @@ READ = """([reader, typed]) => {
 )
 def test_what_programs_print_is_read(text, typed, roots):
     found = [complex(*pair) for pair in text.evaluate(READ, ["readRoots", typed])]
-    np.testing.assert_allclose(np.sort_complex(found), np.sort_complex(roots), rtol=1e-15)
+    one, other = (np.sort_complex(np.array(v, dtype=complex)) for v in (found, roots))
+    np.testing.assert_allclose(one, other, rtol=1e-15)
 
 
 @pytest.mark.parametrize(
