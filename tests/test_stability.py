@@ -231,13 +231,6 @@ class TestChart:
         assert (chart.counts[side < 0] == 0).all()
         assert (chart.counts[side > 0] == 1).all()
 
-    def test_a_row_through_a_point_of_the_curve_reports_it(self):
-        x, y = d_curve(CommonArm(gain=10.0), 4.3)
-        x = x + np.array([-0.01, 0.0, 0.01])
-        left, here, right = pointwise(CommonArm(gain=10.0), x, [y]).counts[0]
-        assert here == BOUNDARY
-        assert abs(right - left) == 2
-
     @pytest.mark.parametrize(
         ("system", "omega", "way"),
         [
