@@ -107,32 +107,6 @@ def test_sampled_loop_tends_to_the_continuous_one():
     assert np.abs(between / whole - 1.0).max() < 1e-4
 
 
-@pytest.mark.parametrize("dead", [1, 90])
-def test_dead_time_and_moving_arms_against_the_difference_equation(dead):
-    """A controller without dynamics; each arm's factor is that of the moment it arrives."""
-    (gain, rate), (r1, r2) = (0.2, 20.0), (80, 70)
-    loop = Loop(Controller([], [], gain), COMMON, r1 / rate, r2 / rate, dead / rate)
-    noise, c1, c2 = np.random.default_rng(6).uniform(-0.9, 0.9, (3, 3000))
-    past = max(r1, r2, dead)
-    phi, sent = np.zeros((2, past + noise.size))
-    for i, n in enumerate(noise):
-        k = past + i
-        phi[k] = n - sent[k - dead]
-        sent[k] = gain * (2.0 * phi[k] - c1[i] * phi[k - r1] - c2[i] * phi[k - r2])
-    assert relative_error(simulate(loop, noise, c1, c2, rate), phi[past:]) < 1e-12
-
-
-def test_delays_that_the_rate_does_not_resolve_are_refused():
-    loop = Loop(Controller([], [-0.1], 0.2), COMMON, 20.1, 19.9, 1e-3)
-    message = r"sample_rate must be at least 4000 Hz to interpolate delay = 0\.001 s, or a"
-    with pytest.raises(ValueError, match=message):
-        Simulation(loop, 200.0)
-    with pytest.raises(ValueError, match=message):
-        sampled_open_loop(loop, 1.0, sample_rate=200.0)
-    assert Simulation(loop, 1000.0).advance(np.ones(3)).shape == (3,)
-    assert Simulation(loop, 4100.0).advance(np.ones(3)).shape == (3,)
-
-
 def test_history_acts_like_noise_behind_the_controller():
     """What is in the arms when a run starts comes back, and goes through the controller."""
     loop = Loop(Controller([], [-0.1], 0.2), COMMON, 2.0, 1.5)

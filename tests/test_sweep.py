@@ -131,19 +131,6 @@ def test_a_killed_sweep_goes_on_where_it_was(tmp_path):
     assert printed[-1] == float(each + each + each).hex()
 
 
-def test_points_that_are_no_numbers_are_kept_as_text(tmp_path):
-    pytest.importorskip("h5py")
-    loops = [CommonArm(gain) for gain in (0.1, 0.2)]
-    path = tmp_path / "loops.h5"
-    assert sweep(_rate, loops, store=path) == [0.1, 0.2]
-    with pytest.raises(ValueError, match="another points"):
-        sweep(_rate, loops[::-1], store=path)
-
-
-def _rate(loop):
-    return loop.controller.gain
-
-
 def test_a_chart_by_tiles_is_the_chart(processes):
     x, y = np.linspace(3.0, -3.0, 41), np.linspace(-3.0, 3.0, 300)
     whole = stability_chart(CommonArm(), x, y)
