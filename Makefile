@@ -47,7 +47,7 @@ NOTEBOOKS := $(wildcard notebooks/*.ipynb)
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help env book pdf browser same lab test claims attack bench dist print serve lint format strip lock clean distclean always
+.PHONY: help env book pdf browser same lab test claims attack bench dist print serve lint format lock clean distclean always
 
 help: ## List the targets
 	@echo "armlock: make TARGET, where TARGET is one of"

@@ -441,7 +441,8 @@ def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
         return keep
 
     def improve(omega):
-        value = view.at(omega)
+        # Past there phases are rounded away: L's values are none.
+        value = view.at(omega[omega * view.tau.max() * EPS < 1e-8])
         best.modulus = min(best.modulus, float(np.abs(1.0 + value).min(initial=np.inf)))
         best.disk = min(best.disk, float(ratio(value).min(initial=np.inf)))
 

@@ -13,6 +13,8 @@ from pathlib import Path
 
 import nbformat
 
+from tools import check_html
+
 ROOT = Path(__file__).parents[1]
 TEXT = "# A chapter\n\n{numref}`fig-small`: {glue:text}`points:.1e` points. {doc}`/book/intro`"
 DRAW = """
@@ -144,3 +146,40 @@ def test_a_build_fails_on_each_fault(tmp_path):
     # Nothing links to a repository whose address is not known.
     for page in pages.rglob("*.html"):
         assert not re.search("github.com|mybinder|colab", page.read_text()), page
+
+
+#: What may stand on a page of the book, and what is then said of it.
+FAULTS = {
+    '<a href="missing.html">There</a>': "names missing.html, which does not exist",
+    '<a href="#missing">There</a>': "has a broken anchor, #missing",
+    '<a href="ragged.csv">data</a>': None,
+    '<img src="gone.png" alt="Gone">': "names gone.png, which does not exist",
+    '<script src="http://192.0.2.1/x.js"></script>': "loads http://192.0.2.1/x.js from",
+    '<link rel="stylesheet" href="/a.css">': "names /a.css, which is not relative",
+    '<p style="background: url(//cdn/a.png)">': "loads //cdn/a.png from the network",
+    "<style>@import 'http://there/a.css'</style>": "loads http://there/a.css from the network",
+}
+GOOD = """<h1 id="top">Up</h1><a href="page.html#top">up</a> <a href="https://example.org">out</a>
+<img src="data:,"><a href="figures/a.csv">data</a><a href="page.ipynb">this</a>
+<script>const text = "url(http://in-a-script)";</script>"""
+
+
+def test_the_files_of_a_book_name_only_what_is_there(tmp_path):
+    folder = tmp_path / "notebooks"
+    (folder / "figures").mkdir(parents=True)
+    (folder / "figures" / "a.csv").write_text("omega [rad/s]\n1\n")
+    (folder / "page.ipynb").write_text('{"cells": [1]}')
+    (folder / "page.html").write_text(GOOD)
+    assert check_html.check(tmp_path) == []
+    (folder / "page.html").write_text("\n".join(FAULTS))
+    (folder / "ragged.csv").write_text("omega [rad/s]\n1,2\n")
+    page = [f"notebooks/page.html {sign}" for sign in FAULTS.values() if sign]
+    page += ["notebooks/page.html has no link to download the notebook"]
+    page += ["notebooks/ragged.csv does not open: not a table with a header"]
+    found = check_html.check(tmp_path)
+    assert len(found) == len(page)
+    assert all(any(one.startswith(sign) for one in found) for sign in page), found
+    (folder / "ragged.csv").unlink()
+    (folder / "figures" / "a.csv").write_text("omega\n1\n")
+    (folder / "page.html").write_text(GOOD)
+    assert "columns without a unit: omega" in check_html.check(tmp_path)[0]

@@ -12,10 +12,12 @@ from armlock import (
     DualArm,
     Loop,
     SingleArm,
+    axis_crossings,
     critical_perturbation,
     margins,
     unstable_roots,
 )
+from armlock.robustness import rays
 from armlock.robustness.rays import Ray, first_crossing
 from armlock.sensors import COMMON, DIFFERENCE, dual
 
@@ -30,6 +32,18 @@ def test_a_crossing_that_rounding_hides_is_refused():
     for find in (ray.crossings, ray.first):
         with pytest.raises(CountError, match="rounding hides some"):
             find(0.2)
+    with pytest.raises(CountError, match="rounding hides some"):
+        axis_crossings(loop, *start, omega_max=50.0)
+
+
+def test_a_count_that_cannot_be_told_confirms_no_crossing(monkeypatch):
+    ray, stretch = Ray(DualArm(), (0.9, 1.0), (0.0, 1.0)), np.array([[1e-4, 2e-4]])
+    nothing = ray.crossings(3e-4)
+    assert nothing.position.size == 0
+    ray._confirm(nothing, stretch, 3e-4)
+    monkeypatch.setattr(rays, "loop_count", lambda *_: -1)
+    with pytest.raises(CountError, match="are -1 and -1"):
+        ray._confirm(nothing, stretch, 3e-4)
 
 
 @pytest.mark.parametrize("zeros", [(), (-0.5,)])

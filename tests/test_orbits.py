@@ -10,6 +10,7 @@ import pytest
 from scipy.optimize import brentq
 
 from armlock.orbits import from_table, kepler, read_oem, read_table
+from armlock.orbits.constellation import ASTRONOMICAL_UNIT, SUN
 
 DATA = Path(__file__).parents[1] / "book" / "data"
 DAY = 86400.0
@@ -49,6 +50,14 @@ def test_a_year_of_kepler_has_the_known_extremes_and_zeros():
         assert abs(KEPLER.round_trips(where)[0] - extreme) < 1e-8
     assert abs(brentq(half, -100.0, 100.0) - 8.332) < 1e-3
     assert abs(brentq(half, 182 * DAY, 183 * DAY, xtol=1e-6) / DAY - 182.6285454) < 1e-7
+
+
+def test_a_century_later_the_arms_are_the_same():
+    period = 2.0 * np.pi * np.sqrt(ASTRONOMICAL_UNIT**3 / SUN)
+    t = np.linspace(0.0, period, 300)
+    for periods in (-94, 94):
+        off = np.subtract(KEPLER.round_trips(t + periods * period), KEPLER.round_trips(t))
+        assert np.abs(off).max() < 5e-11
 
 
 def test_light_times_against_lisaorbits():
@@ -132,6 +141,7 @@ BAD_TABLES = {
     r"ascend, got 0\.0 s after 86400": changed(time=np.r_[TIME[:2], TIME[0], TIME[3:]]),
     r"of shape \(40, 3, 3\)": changed(positions=PLACES[:, :2]),
     r"in m from the Sun, got one 1\.4": changed(positions=PLACES / 1e3),
+    "of three spacecraft, got two in one place": changed(positions=PLACES[:, [0, 0, 2]]),
     "slower than light": changed(time=np.linspace(0.0, 300.0, 40)),
     "longer than a round trip": changed(
         time=np.linspace(0, 16, 40), positions=sampled(np.linspace(0, 16, 40))

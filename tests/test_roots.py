@@ -1,3 +1,4 @@
+import contextlib
 import pickle
 import time
 from typing import Any
@@ -226,6 +227,16 @@ def test_a_root_at_zero_is_zero_from_any_start():
     for size in 10.0 ** random.uniform(-16.0, -6.0, 20):
         assert extended_root(loop, 1.0, 1.0, size * complex(*random.normal(size=2))) == 0.0
     assert rightmost_root(loop, 1.0, 1.0) == 0.0
+
+
+@pytest.mark.parametrize("gap", [-2e-15, -1e-15, 1e-15, 2e-15])
+@pytest.mark.parametrize("c", [1e-10, 0.077])
+def test_a_slow_root_is_on_the_side_that_the_count_says_or_refused(c, gap):
+    """The expanded coefficients, rounded, would have some of them on the other side of zero."""
+    loop = Loop(([-2.6], [-0.2, -0.5], -5e-3), dual(1.75, 2.2e-7), 2.0, 2.0 - 4.4e-7)
+    point = c, c * (1.0 + gap)
+    with contextlib.suppress(RootError):
+        assert (rightmost_root(loop, *point).real > 0.0) == (unstable_roots(loop, *point) > 0)
 
 
 def modes(seed):

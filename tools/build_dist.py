@@ -40,16 +40,9 @@ def main() -> int:
     shutil.rmtree(target, ignore_errors=True)
     target.mkdir(parents=True)
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    packed = ["armlock", "pyproject.toml", "README.md", "LICENSE"]
-    packed += settings["tool"]["flit"]["sdist"]["include"]
+    leave = shutil.ignore_patterns("build", "dist", "__pycache__", ".*")
     with tempfile.TemporaryDirectory() as folder:
-        tree = Path(folder)
-        for name in packed:
-            if (ROOT / name).is_dir():
-                leave = shutil.ignore_patterns("__pycache__", ".*")
-                shutil.copytree(ROOT / name, tree / name, ignore=leave)
-            else:
-                shutil.copyfile(ROOT / name, tree / name)
+        tree = shutil.copytree(ROOT, Path(folder, "armlock"), ignore=leave)
         readme = tree / "README.md"
         text = for_an_index(readme.read_text(encoding="utf-8"), settings["project"])
         readme.write_text(text, encoding="utf-8")

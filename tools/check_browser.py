@@ -4,11 +4,11 @@ Usage: python tools/check_browser.py FOLDER [PAGE ...]
 
 Each page is opened from disk in headless Chromium, in light and dark mode and at the widths of
 a screen, a tablet and two telephones. A page must ask nothing of the network, report no error,
-show no raw TeX, have no broken link or anchor, describe every image, not scroll sideways, have
-no finding of axe, and be readable in time; what it loads must not weigh too much. Code,
-tables and formulas that are wider than their column must scroll, and say so. Of the listings of
-the package's sources, which differ in their text only, one is opened. Search must find
-something, downloads must open, and what reacts to the pointer must react:
+show no raw TeX, describe every image, not scroll sideways, have no finding of axe, and be
+readable in time; what it loads must not weigh too much. Code, tables and formulas that are
+wider than their column must scroll, and say so. Of the listings of the package's sources, which
+differ in their text only, one is opened. Search must find something, and what reacts to the
+pointer must react:
 
 - `data-check="hover"` on an element: its text must change while the pointer crosses it, and
   where a finger taps it;
@@ -18,15 +18,10 @@ something, downloads must open, and what reacts to the pointer must react:
 Chromium is the one of the system, or the one that the variable CHROMIUM names.
 """
 
-import csv
-import html
-import json
 import os
-import re
 import shutil
 import sys
 import time
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
@@ -46,7 +41,6 @@ NARROW = {"width": 390, "height": 844}
 NARROWEST = {"width": 320, "height": 640}
 LONGEST = 3.0  # seconds of processor time until a page is readable
 HEAVIEST = 6e6  # bytes that a page loads
-OPENED = {".csv", ".png", ".svg", ".ipynb", ".json"}
 # A word that the search of any book here must find.
 WORD = "delay"
 
@@ -102,11 +96,6 @@ CUT = r"""async () => {
   }
   return found;
 }"""
-
-LINKS = r"""() => ({
-  links: [...document.querySelectorAll('a[href]')].map(a => a.getAttribute('href')),
-  anchors: [...document.querySelectorAll('[id], a[name]')].map(e => e.id || e.name),
-})"""
 
 # Marks where a combination of colours is new: of a text, of what lies behind it, and whether it
 # is large, which decides how strong the contrast has to be.
@@ -178,8 +167,7 @@ class Book:
         self.axe = Axe()
         self.colours: list[str] = []
         self.problems: list[str] = []
-        self.links: dict[Path, list[str]] = {}
-        self.anchors: dict[Path, set[str]] = {}
+        self.pages = 0
         self.slowest = (0.0, "")
         self.heaviest = (0, "")
         self.file = self.folder
@@ -197,14 +185,13 @@ class Book:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what was found: the browser stays in its process."""
-        kept = ("folder", "file", "problems", "links", "anchors", "slowest", "heaviest")
+        kept = ("problems", "pages", "slowest", "heaviest")
         return {name: vars(self)[name] for name in kept}
 
     def join(self, other: "Book") -> None:
         """Add what was found on other pages."""
         self.problems += other.problems
-        self.links |= other.links
-        self.anchors |= other.anchors
+        self.pages += other.pages
         self.slowest = max(self.slowest, other.slowest)
         self.heaviest = max(self.heaviest, other.heaviest)
 
@@ -238,8 +225,7 @@ class Book:
         self.slowest = max(self.slowest, (seconds, name))
         if seconds > LONGEST:
             self.report(f"takes {seconds:.1f} s to load, more than {LONGEST:.0f}")
-        found = self.page.evaluate(LINKS)
-        self.links[file], self.anchors[file] = found["links"], set(found["anchors"])
+        self.pages += 1
         for script in (RAW, IMAGES):
             for problem in self.page.evaluate(script):
                 self.report(problem)
@@ -258,14 +244,6 @@ class Book:
                 self.report(problem)
         self.page.set_viewport_size(WIDE)
         self.check_requests(name)
-
-    def read(self, file: Path) -> None:
-        """Take the links and anchors of a page that is not opened."""
-        text = file.read_text(encoding="utf-8")
-        self.links[file] = [
-            html.unescape(a) for a in re.findall(r'<a [^>]*href="([^"]*)"', text)
-        ]
-        self.anchors[file] = set(re.findall(r' id="([^"]*)"', text))
 
     def check_requests(self, name: str) -> None:
         """See that everything came from disk, and how much it was."""
@@ -346,33 +324,6 @@ class Book:
                 return True
         return False
 
-    def check_links(self) -> None:
-        """Follow all links within the book, once all pages are known."""
-        downloads = set()
-        for file, links in self.links.items():
-            self.file = file
-            for link in dict.fromkeys(links):
-                parts = urlsplit(link)
-                if parts.scheme or parts.netloc:
-                    continue
-                target = (file.parent / unquote(parts.path)).resolve() if parts.path else file
-                if not target.is_file():
-                    self.report(f"broken link: {link}")
-                elif target in self.anchors:
-                    anchor = unquote(parts.fragment)
-                    if anchor and anchor not in self.anchors[target]:
-                        self.report(f"broken anchor: {link}")
-                elif target.suffix in OPENED:
-                    downloads.add(target)
-            if file.parent.name == "notebooks" and not any(a.endswith(".ipynb") for a in links):
-                self.report("no link to download the notebook")
-        for target in sorted(downloads):
-            self.file = target
-            try:
-                read_download(target)
-            except (ValueError, SyntaxError, OSError, KeyError) as error:
-                self.report(f"does not open: {error}")
-
     def check_search(self) -> None:
         """Search, from disk, for a word that is in the book."""
         page = self.folder / "search.html"
@@ -383,39 +334,6 @@ class Book:
             self.page.wait_for_selector("#search-results li a", timeout=10_000)
         except Exception:  # of any kind: the driver's own are not ours to name
             self.report(f"the search does not find {WORD!r}")
-
-
-def is_number(text: str) -> bool:
-    """Return whether a field of a table is a number, or empty."""
-    try:
-        return not text or isinstance(float(text), float)
-    except ValueError:
-        return False
-
-
-def read_download(file: Path) -> None:
-    """Open a file that the book offers, or raise."""
-    if file.suffix == ".csv":
-        with file.open(newline="", encoding="utf-8") as stream:
-            rows = list(csv.reader(stream))
-        if len(rows) < 2 or any(len(row) != len(rows[0]) for row in rows):
-            raise ValueError("not a table with a header")
-        bare = [
-            name
-            for name, *values in zip(*rows, strict=True)
-            if "[" not in name and all(is_number(value) for value in values)
-        ]
-        if file.parent.name == "figures" and bare:
-            raise ValueError(f"columns without a unit: {', '.join(bare)}")
-    elif file.suffix == ".svg":
-        ElementTree.parse(file)
-    elif file.suffix == ".png":
-        if not file.read_bytes().startswith(b"\x89PNG\r\n\x1a\n"):
-            raise ValueError("not a PNG")
-    else:
-        content = json.loads(file.read_text(encoding="utf-8"))
-        if file.suffix == ".ipynb" and not content["cells"]:
-            raise ValueError("a notebook without cells")
 
 
 def pages(folder: Path) -> list[Path]:
@@ -456,10 +374,6 @@ def check(folder: Path, names: list[str] | None = None) -> Book:
         parts = [opened[::2], opened[1::2]]
         book, other = pool.map(check_some, [folder] * 2, parts, [not names, False])
     book.join(other)
-    if not names:
-        for file in listings[1:]:
-            book.read(file)
-        book.check_links()
     return book
 
 
@@ -473,7 +387,7 @@ def main() -> int:
     book = check(folder, sys.argv[2:])
     print(*book.problems, sep="\n", end="\n" if book.problems else "")
     print(
-        f"{len(book.links)} pages in Chromium, {time.monotonic() - started:.0f} s; slowest: "
+        f"{book.pages} pages in Chromium, {time.monotonic() - started:.0f} s; slowest: "
         f"{book.slowest[1]}, {book.slowest[0]:.2f} s; heaviest: {book.heaviest[1]}, "
         f"{book.heaviest[0] / 1e6:.1f} MB"
     )

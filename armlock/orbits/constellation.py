@@ -230,7 +230,8 @@ def _ellipse(alpha: float, theta: float, t: FloatArray, derivative: int) -> Floa
     e = np.sqrt(1 + 4 * alpha * np.cos(nu) / np.sqrt(3) + 4 * alpha**2 / 3) - 1
     tilt = np.arctan2(alpha * np.sin(nu), np.sqrt(3) / 2 + alpha * np.cos(nu))
     a, n = ASTRONOMICAL_UNIT, np.sqrt(SUN / ASTRONOMICAL_UNIT**3)
-    mean = np.remainder(n * t, 2.0 * np.pi) - theta
+    # In this order the product does not round as a century does.
+    mean = n * np.remainder(t, 2.0 * np.pi / n) - theta
     u = mean + e * np.sin(mean)
     for _ in range(_ROUNDS):
         u = u - (u - e * np.sin(u) - mean) / (1.0 - e * np.cos(u))

@@ -91,6 +91,8 @@ def from_table(
         for x in (places, every_second(t[: t.size // 2 * 2 - 1]))
     )
     error = float(np.abs(arms[: len(roughly)] - roughly).max()) / _GAINED
+    if arms.min() == 0.0:
+        raise ValueError("positions must be of three spacecraft, got two in one place")
     if error > _LARGEST_ERROR:
         raise ValueError(
             f"states must be close enough to be interpolated to {_LARGEST_ERROR} s of light, "
