@@ -1,5 +1,6 @@
 """The dual arm against closed forms, and crossings along rays."""
 
+import mpmath
 import numpy as np
 import pytest
 
@@ -160,3 +161,25 @@ def test_where_the_straight_edge_ends_a_root_passes_zero(gain):
     assert abs(edge.position - 1.5) < 1e-12
     c = np.array([1.999, 2.001])
     assert unstable_roots(loop, c - 1e-6, c + 1e-6).tolist() == [0, 2]
+
+
+def test_a_crossing_keeps_its_digits_where_both_arms_cancel_through_a_resonance():
+    # K is 5e10 at the crossing, and the arms differ by a part in 4e6 of a turn.
+    poles = [-4.6e-8 + 2.5e-4j, -4.6e-8 - 2.5e-4j]
+    loop = Loop(Controller([-1e-3], poles, 1e5), DIFFERENCE, 0.1325, 0.1320, delay=0.115)
+    crossing = first_crossing(loop, (5e-8, 5e-8), (1.0, 1.0), stop=1e-2)
+
+    def characteristic(omega, t):
+        s = mpmath.mpc(0, omega)
+        k = (
+            1e5
+            * (s + mpmath.mpf(1e-3))
+            / ((s - mpmath.mpc(poles[0])) * (s - mpmath.mpc(poles[1])))
+        )
+        arms = mpmath.exp(-s * loop.tau1) - mpmath.exp(-s * loop.tau2)
+        d = 1 + k * mpmath.exp(-s * loop.delay) * (mpmath.mpf(5e-8) + t) * arms
+        return [d.real, d.imag]
+
+    with mpmath.workdps(50):
+        _, exact = mpmath.findroot(characteristic, (crossing.omega, crossing.position))
+    assert crossing.position == pytest.approx(float(exact), rel=1e-11)

@@ -183,19 +183,31 @@ class Ray:
     def quotient(self, omega: npt.ArrayLike) -> ComplexArray:
         """D0 / M at s = j omega, shaped like `omega`; nan where M vanishes."""
         system, s = self.system, 1j * np.asarray(omega, dtype=float)
+        (x, y), (x0, y0), (d1, d2) = self.start, system.reference, self.direction
         z = np.exp(s * system.step) if system.step else s
-        first, second = (
-            d * p.evaluated(z)[0]
-            for d, p in zip(self.direction, system.polynomials()[1:], strict=True)
-        )
-        effect = first * np.expm1(-s * system.tau1) + second * np.expm1(-s * system.tau2)
-        # The sum of the two from coefficients, in which they may cancel, or from factors: the
-        # one whose terms are smaller.
-        both = poly.polyadd(self.direction[0] * system.b1, self.direction[1] * system.b2)
-        cancel = poly.polyval(np.abs(z), np.abs(both)) < np.abs(first) + np.abs(second)
-        effect = effect + np.where(cancel, poly.polyval(z, both), first + second)
-        effect = effect * np.exp(-s * system.delay)
-        value = system(s, *self.start)
+        rest, b1, b2 = (p.evaluated(z)[0] for p in system.polynomials())
+        return1, return2 = np.exp(-s * system.tau1), np.exp(-s * system.tau2)
+        dead, later = np.exp(-s * system.delay), np.expm1(-s * (system.tau2 - system.tau1))
+
+        def added(
+            w1: float, w2: float, u1: ComplexArray, u2: ComplexArray, between: ComplexArray
+        ) -> ComplexArray:
+            """w1 B1 u1 + w2 B2 u2, in the one of two ways that has the smaller terms.
+
+            `between` is u2 - u1, the sum of both polynomials is made from their coefficients.
+            """
+            both = poly.polyadd(w1 * system.b1, w2 * system.b2)
+            size = poly.polyval(np.abs(z), np.abs(both)) * np.abs(u1)
+            separate = np.abs(w1 * b1 * u1) + np.abs(w2 * b2 * u2)
+            together = poly.polyval(z, both) * u1 + w2 * b2 * between
+            cancel = size + np.abs(w2 * b2 * between) < separate
+            return np.asarray(np.where(cancel, together, w1 * b1 * u1 + w2 * b2 * u2))
+
+        arm1 = (x0 - x) - x * np.expm1(-s * system.tau1)
+        arm2 = (y0 - y) - y * np.expm1(-s * system.tau2)
+        between = (y0 - x0) - ((y - x) + y * later) * return1
+        value = rest + dead * added(1.0, 1.0, arm1, arm2, between)
+        effect = dead * added(d1, d2, return1, return2, return1 * later)
         acts = effect != 0.0
         result: ComplexArray = np.where(acts, value / np.where(acts, effect, 1.0), np.nan)
         if isinstance(system, Loop) and (s == 0.0).any():
