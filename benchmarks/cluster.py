@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from importlib import import_module
+from typing import Any
 
 import numpy as np
 
@@ -25,14 +27,15 @@ def largest(task: tuple[int, int]) -> float:
 
 def run(*, quick: bool) -> Topic:
     """Measure how much faster two workers are than one."""
-    from distributed import Client
-
+    make_client: Any = import_module("distributed").Client
     os.environ["NUMBA_NUM_THREADS"] = "1"  # of the workers, which start later
     draws, samples = (4, 20_000) if quick else (32, 10_000_000)
     tasks = [(seed, samples) for seed in range(draws)]
     seconds, found, memory = [], [], 0
     for workers in (1, 2):
-        with Client(n_workers=workers, threads_per_worker=1, dashboard_address=None) as client:
+        with make_client(
+            n_workers=workers, threads_per_worker=1, dashboard_address=None
+        ) as client:
             # The workers start, and load what is compiled.
             sweep(largest, tasks[:workers], executor=client.get_executor())
             took, results = timed(sweep, largest, tasks, executor=client.get_executor())

@@ -81,7 +81,7 @@ def run(*, quick: bool) -> Topic:
     Other work on the machine takes frames away; the processor's time for one stays.
     """
     if check_browser.find_chromium() is None:
-        return Topic("Frames of the live page", notes=["No Chromium was found."])
+        return Topic("Frames of the live page", [], ["No Chromium was found."])
     seconds, rows = 0.5 if quick else 5.0, []
     with tempfile.TemporaryDirectory() as name, check_browser.browser() as browser:
         file = Path(name) / "page.html"

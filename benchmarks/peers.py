@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from importlib import import_module
 from importlib.metadata import version
+from importlib.util import find_spec
 from typing import Any
 
 import control
@@ -100,7 +101,7 @@ def by_grid(samples: int) -> Callable[[Point], int]:
         omega = np.geomspace(1e-4, 1e3, samples)
         value = loop(1j * omega, c1, c2)
         turned = np.angle(value[1:] / value[:-1]).sum() + np.angle(value[0] / value[0].real)
-        return round(loop.degree / 2 - turned / np.pi)
+        return round(loop.degree / 2 - float(turned) / np.pi)
 
     return count
 
@@ -117,12 +118,9 @@ def run(*, quick: bool) -> Topic:
         "argument on 1 000 frequencies": by_grid(1_000),
         "argument on 100 000 frequencies": by_grid(100_000),
     }
-    for name, count in {"tdcpy": by_tdcpy, "tdscontrol": by_tdscontrol}.items():
-        try:
-            import_module(name)
-        except ImportError:
-            continue
-        tools[f"{name} {version(name)}"] = count
+    for name, by_other in (("tdcpy", by_tdcpy), ("tdscontrol", by_tdscontrol)):
+        if find_spec(name):
+            tools[f"{name} {version(name)}"] = by_other
     rows = []
     for name, count in tools.items():
         seconds, right = [], 0

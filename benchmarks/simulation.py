@@ -9,7 +9,7 @@ samples.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -30,6 +30,9 @@ BETWEEN_RATIO, WHOLE_RATIO = 2.0, 5.0
 BETWEEN = (TAU1 + 0.4 / SAMPLE_RATE, 6e-8), (TAU2 + 0.3 / SAMPLE_RATE, -5e-8)
 ACCURACY = 1e-10
 DRAWS = 32
+
+#: The noise and both perturbations.
+Inputs = tuple[FloatArray, FloatArray, FloatArray]
 
 
 def plain(
@@ -74,12 +77,10 @@ def plain(
 compiled = njit(plain)
 
 
-def plain_output(
-    noise: FloatArray, c1: FloatArray, c2: FloatArray, arguments: tuple[Any, ...]
-) -> FloatArray:
+def plain_output(series: Inputs, arguments: tuple[Any, ...]) -> FloatArray:
     """Run the plain compiled loop, room for the output included, as `simulate` has it."""
-    phi = np.zeros_like(noise)
-    compiled(noise, c1, c2, *arguments, phi)
+    phi = np.zeros_like(series[0])
+    compiled(*series, *arguments, phi)
     return phi
 
 
@@ -90,26 +91,36 @@ def plain_arguments(loop: Loop) -> tuple[Any, ...]:
     return (*delays, *arrays, controller.gain)
 
 
-def inputs(samples: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+def inputs(samples: int) -> Inputs:
     noise = LaserNoise(1).draw(samples)
     c1, c2 = (1.0 + PerturbationNoise(seed, scale=1e-4).draw(samples) for seed in (2, 3))
     return noise, c1, c2
 
 
-def plain_rows(
-    loop: Loop, noise: FloatArray, c1: FloatArray, c2: FloatArray, python: int, passes: int
-) -> list[Row]:
+def part(series: Inputs, samples: int) -> Inputs:
+    noise, c1, c2 = series
+    return noise[:samples], c1[:samples], c2[:samples]
+
+
+def side_by_side(series: Inputs) -> Inputs:
+    """Cut series into draws, the same sample of all side by side, as `Simulation` has it."""
+    samples = min(series[0].size // DRAWS, 100_000)
+    noise, c1, c2 = (x.reshape(samples, DRAWS).T for x in part(series, samples * DRAWS))
+    return noise, c1, c2
+
+
+def plain_rows(loop: Loop, series: Inputs, python: int, passes: int) -> list[Row]:
     """Compare `simulate` with the plain loop, compiled and in Python."""
     arguments = plain_arguments(loop)
     calls = [
-        lambda: simulate(loop, noise, c1, c2).size,
-        lambda: plain_output(noise, c1, c2, arguments).size,
+        lambda: simulate(loop, *series).size,
+        lambda: plain_output(series, arguments).size,
     ]
     ours, theirs = in_turn(calls, passes).min(axis=0)
-    few = (part[:python] for part in (noise, c1, c2))
-    slow = timed(plain, *few, *arguments, np.zeros(python))[0] * noise.size / python
-    many = [part[: 40 * python] for part in (noise, c1, c2)]
-    output, phi = simulate(loop, *many), plain_output(*many, arguments)
+    few = part(series, python)
+    slow = timed(plain, *few, *arguments, np.zeros(python))[0] * series[0].size / python
+    many = part(series, 40 * python)
+    output, phi = simulate(loop, *many), plain_output(many, arguments)
     differ = float(np.abs(output - phi).max() / np.abs(output).max())
     return [
         Row("simulate", ours),
@@ -120,14 +131,12 @@ def plain_rows(
     ]  # fmt: skip
 
 
-def ensemble_rows(
-    loop: Loop, noise: FloatArray, c1: FloatArray, c2: FloatArray, passes: int
-) -> list[Row]:
+def ensemble_rows(loop: Loop, series: Inputs, passes: int) -> list[Row]:
     """Compare an ensemble with its runs one by one."""
-    together = side_by_side(noise, c1, c2)
+    together = side_by_side(series)
     rows = list(zip(*map(np.ascontiguousarray, together), strict=True))
     same = np.array_equal(simulate(loop, *together), [simulate(loop, *row) for row in rows])
-    calls = [
+    calls: list[Callable[[], object]] = [
         lambda: simulate(loop, *together).size,
         lambda: [simulate(loop, *row).size for row in rows],
     ]
@@ -140,17 +149,15 @@ def ensemble_rows(
     ]
 
 
-def moving_rows(
-    loop: Loop, noise: FloatArray, c1: FloatArray, c2: FloatArray, passes: int
-) -> list[Row]:
+def moving_rows(loop: Loop, series: Inputs, passes: int) -> list[Row]:
     """Compare arms that move with constant delays, whole ones and others."""
     alike, own = (
         [partial(moving, shift=shift, tau=tau, rate=rate) for tau, rate in BETWEEN]
         for shift in (np.zeros(()), np.arange(DRAWS)[:, None] / SAMPLE_RATE)
     )
-    one, together, rows = (noise, c1, c2), side_by_side(noise, c1, c2), []
+    together, rows = side_by_side(series), []
     for what, arrays, moves in (
-        ("one run", one, alike),
+        ("one run", series, alike),
         (f"ensemble of {DRAWS}", together, alike),
         (f"ensemble of {DRAWS}, each its own arms", together, own),
     ):
@@ -168,30 +175,23 @@ def moving_rows(
     return rows
 
 
-def side_by_side(*series: FloatArray) -> list[FloatArray]:
-    """Cut series into draws, the same sample of all side by side, as `Simulation` has it."""
-    samples = min(series[0].size // DRAWS, 100_000)
-    return [one[: samples * DRAWS].reshape(samples, DRAWS).T for one in series]
-
-
 def moving(t: FloatArray, *, shift: FloatArray, tau: float, rate: float) -> FloatArray:
     """Return a delay that grows from `tau` on, with a constant more for each run."""
     return np.asarray(shift + (tau + rate * t))
 
 
-def locked_size(loop: Loop, arrays: Sequence[FloatArray], delays: Sequence[Any]) -> int:
+def locked_size(loop: Loop, series: Inputs, delays: Sequence[Any]) -> int:
     """Run a loop; nothing is kept."""
-    noise, c1, c2 = arrays
-    return simulate(loop, noise, c1, c2, tau1=delays[0], tau2=delays[1]).size
+    return simulate(loop, *series, tau1=delays[0], tau2=delays[1]).size
 
 
 def run(*, quick: bool) -> Topic:
     """Measure speed and accuracy of the simulation."""
     samples, python, passes = (30_000, 6_000, 1) if quick else (40_000_000, 100_000, 4)
     loop, series = paper_loop(), inputs(samples)
-    rows = plain_rows(loop, *series, python, passes)
-    rows += ensemble_rows(loop, *series, 5 * passes)
-    rows += moving_rows(loop, *series, 2 * passes + 1)
+    rows = plain_rows(loop, series, python, passes)
+    rows += ensemble_rows(loop, series, 5 * passes)
+    rows += moving_rows(loop, series, 2 * passes + 1)
     notes = [
         f"[a] Extrapolated from {python} samples. Both compiled loops make their output; the "
         f"best of {passes} runs each.",
