@@ -28,8 +28,6 @@ _OF_CODE = (
     *("co_code", "co_names", "co_varnames", "co_cellvars", "co_freevars", "co_flags"),
     *("co_argcount", "co_posonlyargcount", "co_kwonlyargcount", "co_exceptiontable"),
 )
-# Where a function that is compiled, or keeps its results, has the one that it is made from.
-_INNER = ("py_func", "__wrapped__")
 
 
 @contextmanager
@@ -204,7 +202,8 @@ class _Content(pickle.Pickler):
         if not hasattr(thing, "__dict__"):
             return None
         state = vars(thing)
-        inner = next((state[name] for name in _INNER if name in state), None)
+        # A function that is compiled, or keeps its results, has the one that it is made from.
+        inner = state.get("__wrapped__")
         if isinstance(inner, FunctionType):
             return inner.__qualname__ if _has_a_name(inner) else inner
         # What is computed when it is first asked for says nothing more.

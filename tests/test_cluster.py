@@ -58,7 +58,6 @@ def test_the_lines_of_the_page_run(tmp_path):
         check=True,
     )
     assert re.fullmatch(r"between \d+\.\d+ and \d+\.\d+\n", done.stdout)
-    assert "6 of 6" in done.stderr
 
 
 def test_the_full_draws_of_the_page_are_single_runs():

@@ -92,7 +92,7 @@ def test_shapes_are_kept_and_masters_are_three():
     t = np.zeros((2, 3)) + 1e6
     assert KEPLER.round_trips(t)[0].shape == KEPLER.rates(t, 3)[1].shape == (2, 3)
     assert KEPLER.round_trips(1e6)[0].shape == ()
-    wrong: list[Any] = [0, 4, 1.5, "1"]
+    wrong: list[Any] = [0, 4, 1.5, "1", [1]]
     for master in wrong:
         with pytest.raises(ValueError, match="master must be 1, 2 or 3"):
             KEPLER.round_trips(0.0, master)
@@ -114,6 +114,12 @@ def test_a_table_gives_the_round_trips_it_was_sampled_from():
         off = np.subtract(table.round_trips(t, master), KEPLER.round_trips(t, master))
         assert np.abs(off).max() < 1e-11
     assert table.error < 1e-11
+    # One state that is 3 m off shows, wherever it is left out.
+    time, positions = weeks()
+    for k in (101, 207):
+        moved = positions.copy()
+        moved[k, 0] += 3.0 * moved[k, 0] / np.linalg.norm(moved[k, 0])
+        assert from_table(time[:209], moved[:209]).error > 1e-10
     assert from_table(*weeks()).epoch == "1000000000.0 s"
 
 
@@ -243,6 +249,7 @@ def test_a_file_of_another_frame_is_refused(tmp_path, wrong, message):
         (lambda text: text[: text.rindex(" ")], "position and velocity, .* got 2035-01-30"),
         (lambda text: text.split("META_STOP")[0], "have an acceleration, got none"),
         (lambda text: text.replace("2035-01-05", "2034-01-05"), "same epochs"),
+        (lambda text: text.replace("2035-01-05", "2035-005"), "hold dates and numbers: "),
     ],
 )
 def test_a_file_that_is_damaged_is_refused(tmp_path, change, message):

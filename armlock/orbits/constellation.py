@@ -55,7 +55,7 @@ class Constellation:
     error : float
         Estimate of how far interpolation puts an arm off, in s of light: what is found with
         every second state left out, divided by eight. 0 where nothing is interpolated. Of ESA's
-        files it is 1e-8 s, because their states do not lie on one smooth curve to better.
+        files it is 1e-8 to 2e-8 s: their states do not lie on one smooth curve to better.
     """
 
     epoch: str
@@ -167,7 +167,7 @@ class Constellation:
     def _arms(self, t: npt.ArrayLike, master: int) -> list[tuple[FloatArray, FloatArray]]:
         """Return delay and rate of both arms, after a look at the arguments."""
         t = self._within(real_array("t", t), self.span[0])
-        if master not in _LINKS:
+        if master not in (1, 2, 3):
             raise ValueError(f"master must be 1, 2 or 3, got {master!r}")
         arms = [self._round_trip(master, far, t.ravel()) for far in _LINKS[master]]
         return [(delay.reshape(t.shape), rate.reshape(t.shape)) for delay, rate in arms]

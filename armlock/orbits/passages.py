@@ -2,8 +2,9 @@
 
 At time t the loop is frozen: its arms are tau1(t) and tau2(t), its sensor divides by what it
 holds. It is counted in phase, at c1 = c2 = 1. The verdict depends on true over held half
-difference, and next to nothing else: its edges, from counts, become times at which the half
-difference passes a level. These are roots of polynomials, and no hour has to be counted.
+difference, and little on anything else. Its edges are certified at one held value and one mean
+of the round trips, and taken for all others. They become times at which the half difference
+passes a level. These are roots of polynomials, and no hour has to be counted.
 """
 
 from __future__ import annotations

@@ -85,12 +85,12 @@ def from_table(
         )
     one, two, three = (make_interp_spline(t, places[:, k], k=_DEGREE) for k in range(3))
     every_second = make_interp_spline(t[::2], places[::2], k=_DEGREE)
-    # What lies after its last state would be extrapolated.
     arms, roughly = (
         np.linalg.norm(x - np.roll(x, 1, axis=1), axis=2) / SPEED_OF_LIGHT
-        for x in (places, every_second(t[: t.size // 2 * 2 - 1]))
+        for x in (places, every_second(t))
     )
-    error = float(np.abs(arms[: len(roughly)] - roughly).max()) / _GAINED
+    # After the last of every second state the curve is extrapolated.
+    error = float(np.abs(arms - roughly)[t <= t[::2][-1]].max()) / _GAINED
     if arms.min() == 0.0:
         raise ValueError("positions must be of three spacecraft, got two in one place")
     if error > _LARGEST_ERROR:
@@ -212,8 +212,11 @@ def _read(path: Path) -> tuple[tuple[str, str], npt.NDArray[np.datetime64], Floa
             f"states of {path} must have an epoch, position and velocity, and may have an "
             f"acceleration, got {wrong[0]}"
         )
-    epochs = np.array([row[0].removesuffix("Z") for row in rows], dtype="datetime64[ns]")
-    values = [[float(number) for number in row[1:4]] for row in rows]
+    try:
+        epochs = np.array([row[0].removesuffix("Z") for row in rows], dtype="datetime64[ns]")
+        values = [[float(number) for number in row[1:4]] for row in rows]
+    except ValueError as error:
+        raise ValueError(f"states of {path} must hold dates and numbers: {error}") from None
     places = 1e3 * finite_series(f"positions of {path}", values, 2)
     again = np.append(False, np.diff(epochs) == np.timedelta64(0))
     apart = np.abs(places - np.roll(places, 1, axis=0)).max(axis=1) * again

@@ -62,13 +62,13 @@ def ranging_residual(
     values = zip(names, (omega, tau1, tau2, error1, error2), strict=True)
     arrays = tuple(real_array(name, value) for name, value in values)
     broadcast_shape(names, arrays)
-    turn, one, two, off1, off2 = arrays
-    # 1 - a and so on, without the loss of digits where a phase is small.
-    short1, short2 = -np.expm1(-1j * turn * one), -np.expm1(-1j * turn * two)
-    wrong1 = -np.exp(-1j * turn * one) * np.expm1(-1j * turn * off1)
-    wrong2 = -np.exp(-1j * turn * two) * np.expm1(-1j * turn * off2)
-    x1 = wrong1 * short2 - wrong2 * short1
-    return np.abs(x1), np.abs(x1 * np.expm1(-1j * turn * (one + two)))
+    omega, tau1, tau2, error1, error2 = arrays
+    # No digits are lost where a phase is small: 1 - a, 1 - b, and then a - a^, b - b^.
+    one_less_a, one_less_b = -np.expm1(-1j * omega * tau1), -np.expm1(-1j * omega * tau2)
+    error_a = -np.exp(-1j * omega * tau1) * np.expm1(-1j * omega * error1)
+    error_b = -np.exp(-1j * omega * tau2) * np.expm1(-1j * omega * error2)
+    x1 = error_a * one_less_b - error_b * one_less_a
+    return np.abs(x1), np.abs(x1 * np.expm1(-1j * omega * (tau1 + tau2)))
 
 
 def flexing(

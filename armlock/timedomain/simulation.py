@@ -21,6 +21,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -520,21 +521,18 @@ def sampled_open_loop(
     return np.asarray(dead * loop.controller(s) * sensor)
 
 
+@dataclass
 class _MovingArm:
     """The delay of one arm during a call: a series, or a function of time.
 
-    `begin` is the number of the call's first sample in the run.
+    `begin` is the number of the call's first sample in the run, `last` the last delay so far.
     """
 
-    def __init__(
-        self,
-        name: str,
-        given: FloatArray | Callable[[FloatArray], npt.ArrayLike],
-        rate: float,
-        begin: int,
-    ) -> None:
-        self._name, self._given, self._rate, self._begin = name, given, rate, begin
-        self._last: FloatArray | None = None
+    name: str
+    given: FloatArray | Callable[[FloatArray], npt.ArrayLike]
+    rate: float
+    begin: int
+    last: FloatArray | None = None
 
     def part(self, noise: FloatArray, number: int, known: int) -> FloatArray:
         """Return the delays of a block in samples, in rows.
@@ -542,15 +540,15 @@ class _MovingArm:
         `noise` is that of the block, `number` that of its first sample in the run, and so many
         samples are `known` before it.
         """
-        if callable(self._given):
-            tau = self._called(self._given, number, noise)
+        if callable(self.given):
+            tau = self._called(self.given, number, noise)
         else:
-            tau = self._given[number - self._begin :][: len(noise)]
+            tau = self.given[number - self.begin :][: len(noise)]
         # Behind the last sample of the block before, in few arrays: new memory takes time.
         rows = np.empty((len(tau) + 1, tau.shape[1]))
-        samples = np.multiply(tau, self._rate, out=rows[1:])
-        rows[0] = samples[0] if self._last is None else self._last
-        self._last = samples[-1].copy()
+        samples = np.multiply(tau, self.rate, out=rows[1:])
+        rows[0] = samples[0] if self.last is None else self.last
+        self.last = samples[-1].copy()
         change = np.diff(rows, axis=0)
         if change.min() <= _SLOWEST or change.max() >= _FASTEST:
             constraint = (
@@ -559,18 +557,18 @@ class _MovingArm:
             )
             wrong = (change <= _SLOWEST) | (change >= _FASTEST)
         elif samples.min() < _SIDE:
-            constraint = f"be at least {_SIDE / self._rate} s where it is not constant"
+            constraint = f"be at least {_SIDE / self.rate} s where it is not constant"
             wrong = samples < _SIDE
         elif _reach((samples[:1], _SCALES)) > known:
             # No later sample reaches further back.
-            constraint = _past_history(number - known, self._rate)
+            constraint = _past_history(number - known, self.rate)
             wrong = samples[:1] == samples[0].max()
         else:
             return samples
         i, w = np.argwhere(wrong)[0]
         raise ValueError(
-            f"{self._name} must {constraint}, got {tau[i, w]} s at "
-            f"t = {(number + i) / self._rate:.9g} s"
+            f"{self.name} must {constraint}, got {tau[i, w]} s at "
+            f"t = {(number + i) / self.rate:.9g} s"
         )
 
     def _called(
@@ -581,8 +579,8 @@ class _MovingArm:
     ) -> FloatArray:
         """Return what a function of time gives, in rows."""
         time = np.arange(number, number + len(noise), dtype=np.float64)
-        time /= self._rate
-        name = f"{self._name}(t), for t from {time[0]:.9g} s on,"
+        time /= self.rate
+        name = f"{self.name}(t), for t from {time[0]:.9g} s on,"
         tau = finite_series(name, function(time), 0, 1, 2)
         if tau.shape not in ((), time.shape, noise.T.shape):
             raise ValueError(
@@ -718,7 +716,7 @@ class Simulation:
         self._signals = np.zeros((2, 0, sum(groups)))
         self._known = before.size if before.ndim else sys.maxsize
         self._stopped: tuple[float, float] | None = None
-        self._within = False
+        self._in_block = False
         self.samples = 0
 
     def __getstate__(self) -> dict[str, object]:
@@ -768,7 +766,7 @@ class Simulation:
             raise ValueError(f"noise must have {self.draws} rows, got shape {given.shape}")
         inputs = [np.atleast_2d(given).T, _series("c1", c1, given), _series("c2", c2, given)]
         arms = [self._arm(k, tau, given) for k, tau in enumerate((tau1, tau2))]
-        if self._within:
+        if self._in_block:
             raise RuntimeError(
                 "this run was interrupted in the middle of a block, and cannot go on: begin "
                 "again, or with a copy made before"
@@ -821,7 +819,7 @@ class Simulation:
         phi, sent = self._signals[:, : known + stop]
         series = tuple(_in_columns(given, columns) for given in inputs)
         sampled = delays, *self._filters
-        self._within = True
+        self._in_block = True
         for work in self._groups:
             lanes = work.shape[1]
             run = first, phi, sent, series, sampled, work.ravel(), self.limit
@@ -839,7 +837,7 @@ class Simulation:
         self._known, end = min(known + stop, keep), known + stop
         self._signals[:, : self._known] = self._signals[:, end - self._known : end]
         self.samples += stop
-        self._within = False
+        self._in_block = False
 
     def _delay(self, arm: Delay | _MovingArm, noise: FloatArray) -> Delay | MovingDelay:
         """Return an arm's delay during a block."""
@@ -859,8 +857,9 @@ class Simulation:
         shape = 2, max(keep, self._known) + self._block, self._signals.shape[2]
         if self._signals.shape[1] < shape[1]:
             check_memory("tau1 and tau2", shape, 8)
-            before, self._signals = self._signals[:, : self._known], np.zeros(shape)
-            self._signals[:, : before.shape[1]] = before
+            signals, before = np.zeros(shape), self._signals[:, : self._known]
+            signals[:, : before.shape[1]] = before
+            self._signals = signals
         if self.samples == 0:
             history = self._history[-keep:, None] if self._history.ndim else self._history
             self._signals[0, : self._known] = history
