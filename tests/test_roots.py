@@ -230,6 +230,21 @@ def test_a_slow_root_is_on_the_side_that_the_count_says_or_refused(c, gap):
         assert (rightmost_root(loop, *point).real > 0.0) == (unstable_roots(loop, *point) > 0)
 
 
+def test_a_slow_pair_is_on_the_side_that_the_count_says_or_refused():
+    modes = [
+        -16.295411135280883 + 29.126440582678686j,
+        -16.295411135280883 - 29.126440582678686j,
+    ]
+    controller = [-1.4457176246553571, -413.0038904912396], [0.0, *modes], 2.11001973771314e-11
+    sensor = dual(2.5132741228718345, 1.3851322124835974e-06)
+    delays = 3.317495130470978, 3.317492360206553, 0.00016504573441033512
+    loop = Loop(controller, sensor, *delays[:2], delay=delays[2])
+    point = 0.0029713867158988505, 0.0029713867158988475
+    assert unstable_roots(loop, *point) == 1
+    with contextlib.suppress(RootError):
+        assert rightmost_root(loop, *point).real > 0.0
+
+
 def modes(seed):
     """A loop with a cluster of lightly damped modes, next to which D is lost to rounding."""
     random = np.random.default_rng(seed)

@@ -441,10 +441,12 @@ def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
                     between = right_of_it.rightmost(further) if margin > nearest else None
                     if between is not None and between[0].real > best.real + nearest:
                         return between[0]
-                    if not best.imag and 0.0 < abs(best.real) <= farthest:
-                        # D may vanish so slowly there that rounding decides the sign.
+                    if 0.0 < abs(best.real) <= farthest:
+                        # D may vanish so slowly there that rounding decides the sign. Of a pair
+                        # on the axis no count tells it, and it need not.
                         on_axis = _Line(acting, p, q, 0.0).count()
-                        if on_axis < 0 or (on_axis > 0) != (best.real > 0.0):
+                        told = on_axis >= 0 or (best.imag and abs(best.real) <= nearest)
+                        if not told or (on_axis >= 0 and (on_axis > 0) != (best.real > 0.0)):
                             break
                     return best
                 if count > 0:
