@@ -183,3 +183,13 @@ def test_a_crossing_keeps_its_digits_where_both_arms_cancel_through_a_resonance(
     with mpmath.workdps(50):
         _, exact = mpmath.findroot(characteristic, (crossing.omega, crossing.position))
     assert crossing.position == pytest.approx(float(exact), rel=1e-11)
+
+
+def test_a_crossing_nearer_than_rounding_of_one_is_found_next_to_zero_parameters():
+    # R is 1e-21 at s = 0, so that a root passes there at t = 5e-22.
+    loop = Loop(Controller([], [-1e-7] * 3, 1.0), DIFFERENCE, 5.0, 4.0)
+    ray = Ray(loop, (1e-11, 1e-11), (-1.0, 1.0))
+    before, after = (unstable_roots(loop, *ray.at(t)) for t in (0.0, 1e-18))
+    crossings = ray.crossings(1e-18)
+    assert crossings.position[crossings.omega == 0.0] == pytest.approx([5e-22], abs=1e-28)
+    assert after - before == crossings.change.sum() != 0

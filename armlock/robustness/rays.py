@@ -280,11 +280,11 @@ class Ray:
         reaches = [np.maximum(share * width, 4.0 * EPSILON * omega) for share in (2.0, 16.0)]
         omega = polished(lambda w: self.quotient(w).imag, omega, reaches)
         position = self.quotient(omega).real
-        lowest = 1e-15 * self.scale
-        if (position[position > lowest] <= _NEAR_START * self.scale).any():
+        lowest = 0.0
+        if ((position > 0.0) & (position <= _NEAR_START * self.scale)).any():
             # The start itself may be on the axis, up to rounding.
             begins_on_boundary = unstable_roots(self.system, *self.start) == BOUNDARY
-            lowest = _NEAR_START * self.scale if begins_on_boundary else lowest
+            lowest = _NEAR_START * self.scale if begins_on_boundary else 0.0
         kept = np.flatnonzero((position > lowest) & (position <= stop))
         kept = kept[np.argsort(position[kept], kind="stable")]
         return Crossings(position[kept], omega[kept], change[kept])
