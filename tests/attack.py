@@ -479,8 +479,13 @@ def check_critical(tally, rng, sketch, loop, point):
     if eps is None:
         return
     if np.isinf(eps):
-        if sketch.sensor != "single" or way[0] * loop.b1.any():
-            tally.note("critical_perturbation", way, eps, "finite")
+        # Parameters past 1e9 times those of the start are not looked at.
+        farthest = 0.99e9 * np.sqrt(2.0) / np.hypot(*way)
+        for share in (*rng.random(3), 1.0):
+            counts = judge.count(sketch, *(1.0 + share * farthest * way))
+            if counts not in (0, -1):
+                tally.note("critical_perturbation", (way, share * farthest), eps, counts)
+                return
         return
     # The parameters are numbers next to one, and rounded as these are.
     near = max(1e-6, 1e-15 / (eps * np.abs(way).max()))
