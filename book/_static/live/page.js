@@ -824,7 +824,7 @@ function armlockPages() {
       field("m1", "Weight m1: numerator", { value: "1", wide: true }),
       field("m2", "Weight m2: numerator", { value: "1", wide: true }),
       field("below", "Their denominator", { value: "1", wide: true }),
-      select("form", "Controller given by", [["roots", "zeros, poles and gain"],
+      select("form", "Controller given by", [["roots", "zeros and poles"],
         ["fraction", "numerator and denominator"]], () => { shape(); take(); }),
       field("gain", "Gain"), units,
       field("zeros", "Zeros", { area: true }), field("poles", "Poles", { area: true }),
@@ -881,7 +881,7 @@ function armlockPages() {
 
   /* A year in orbit: the arms, what the sensor holds, and where the loop stands each day. */
   const ARMS = { 1: [0, 2], 2: [1, 0], 3: [2, 1] }, STEP = 5, YEAR = 365, MONTH = 365.25 / 12;
-  const HOLDS = ["the largest, all year", "the largest, with the right sign", "a month's start",
+  const HOLDS = ["largest, all year", "largest, right sign", "a month's start",
     "a month's middle"];
 
   /* Both round trips in s, as [t => tau1, t => tau2] with t in days: cubics through four entries. */
