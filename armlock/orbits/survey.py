@@ -128,8 +128,8 @@ class Survey:
             f"master {self.master}, {self.years:.2f} years, half difference up to "
             f"{1e3 * self.largest:.2f} ms, {self.half.times().size} zeros",
             f"stable for true/held from {low:.5g} to {high:.5g} (certified)",
-            f"with {1e3 * _SHARE * self.largest:.2f} ms held, on the arms with the largest "
-            f"half difference; taken for all others",
+            f"with {1e3 * _SHARE * self.largest:.2f} ms held, where the arms differ most; "
+            f"taken for all others",
             "",
             f"{'held value':15s} {'stable days a year':>18s} {'outages':>8s} {'longest':>10s}",
         ]

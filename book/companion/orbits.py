@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from functools import cache
+from itertools import combinations
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import PPoly
 
 from armlock import DivergenceError, critical_perturbation, simulate
 from armlock.checks import FloatArray
@@ -51,6 +53,23 @@ def interval(orbit: str) -> tuple[float, float]:
 def half(orbit: str, master: int = 1) -> Course:
     """Return the course of a half difference."""
     return half_difference(constellations()[orbit], master, *interval(orbit))
+
+
+def telling_times(orbit: str) -> FloatArray:
+    """Return times in s to draw the sizes of the half differences at.
+
+    Besides 600 even ones they are all zeros and extremes, and where two masters are alike in
+    size: there the largest of the three may be smallest.
+    """
+    courses = [half(orbit, master) for master in MASTERS]
+    found = [np.linspace(*interval(orbit), 600)]
+    for course in courses:
+        found += [course.times(), course.extremes()]
+    for one, other in combinations((course.curve for course in courses), 2):
+        for sign in (-1.0, 1.0):
+            together = PPoly(one.c + sign * other.c, one.x)
+            found.append(together.roots(extrapolate=False))
+    return np.unique(np.concatenate(found))
 
 
 def largest(orbit: str, master: int = 1) -> float:

@@ -251,11 +251,11 @@ const armlockDraw = (function () {
       pen.strokeStyle = pen.fillStyle = colours.text;
       pen.lineWidth = 1;
       pen.strokeRect(frame.left, frame.top, frame.wide, frame.high);
-      [[x0, x1], [y0, y1]].forEach(([low, high], axis) => {
+      [[x0, x1], [y0, y1]].forEach(([least, most], axis) => {
         const [from, unit] = this.scale(axis), read = v => (v - from) / unit, write = v => from + v * unit;
         pen.textAlign = axis ? "right" : "center";
         pen.textBaseline = axis ? "middle" : "top";
-        for (const v of ticks(read(low), read(high), 5)) {
+        for (const v of ticks(read(least), read(most), 5)) {
           const text = say(+v.toPrecision(9), 9);
           if (axis) pen.fillText(text, frame.left - 6, this.py(write(v)));
           else pen.fillText(text, this.px(write(v)), frame.top + frame.high + 6);
@@ -735,7 +735,7 @@ const armlockDraw = (function () {
     const below = v => 26 + room + room * (top - Math.log10(v)) / (top - first);
     lines(pen, Array.from({ length: top - first + 1 }, (_, k) => 10 ** (first + k)),
       v => power(Math.round(Math.log10(v))), below, left, wide - right, colours);
-    upright(pen, "breaks at, along (1, \u22121)", 2, 26 + 1.5 * room);
+    upright(pen, "least that breaks it", 2, 26 + 1.5 * room);
     pen.fillStyle = colours.line;
     for (const [t, v] of found) pen.fillRect(px(t) - 1.5, below(v) - 1.5, 3, 3);
     pen.strokeStyle = colours.mark;

@@ -84,11 +84,14 @@ function armlockPages() {
       // With ten times the steps, for who waits.
       count: (spec, c1, c2) => api.count(api.make(spec), c1, c2, { most: 4000000 }),
       root: (spec, c1, c2) => api.rightmost(spec, c1, c2),
-      breaks: spec => [[1, -1], [1, 1], [-1, -1]].map(
+      breaks: spec => [[1, -1], [-1, 1], [1, 1], [-1, -1]].map(
         ([x, y]) => api.firstBreak(api.make(spec), x, y)),
       margins: (spec, c1, c2) => api.margins(spec, c1, c2),
-      // Of one day of a year: where the loop first breaks along (1, -1).
-      day: spec => api.firstBreak(api.make(spec), 1, -1),
+      // Of one day of a year: the least that breaks the loop, the arms perturbed against each other.
+      day: spec => {
+        const found = [1, -1].map(way => api.firstBreak(api.make(spec), way, -way));
+        return found.includes(null) ? null : Math.min(...found);
+      },
       time: (spec, c1, c2, trips) => api.inTime(spec, c1, c2, trips),
     };
     return ({ data: { kind, version, input } }) => {
@@ -145,7 +148,7 @@ function armlockPages() {
 
   // What the table has of a loop, in the order in which it is found, and what it says where it is not.
   const TOLD = ["count", "root", "breaks", "margins"];
-  const UNTOLD = { count: -3, root: null, breaks: [NaN, NaN, NaN],
+  const UNTOLD = { count: -3, root: null, breaks: [NaN, NaN, NaN, NaN],
     margins: { lower: NaN, upper: NaN, phase: NaN, modulus: NaN } };
   const UNSTABLE = "none: not stable";
   const SOURCES = { laser: "laser", shot: "shot noise", clock: "clocks", motion: "spacecraft's motion",
@@ -458,8 +461,9 @@ function armlockPages() {
       const degrees = value => `${say(value * 180 / Math.PI)}\u00b0`;
       const parts = [
         ["Critical perturbation from (1, 1)", ["along (1, \u22121)", of("breaks", b => broken(b[0]))],
-          ["along (1, 1)", of("breaks", b => broken(b[1]))],
-          ["along (\u22121, \u22121)", of("breaks", b => broken(b[2]))]],
+          ["along (\u22121, 1)", of("breaks", b => broken(b[1]))],
+          ["along (1, 1)", of("breaks", b => broken(b[2]))],
+          ["along (\u22121, \u22121)", of("breaks", b => broken(b[3]))]],
         [`At ${where}`, ["Unstable roots", of("count", n => n >= 0 ? String(n) : WORDS[n])],
           ["Rightmost root: real part in rad/s", designs.map(({ told: { count, root } }) =>
             count < 0 ? "none" : root === undefined ? wait : root ? say(root[0]) : "not sure")],
@@ -562,8 +566,8 @@ function armlockPages() {
       element("span", { class: "live-key" }, element("i", { class: name }), text);
     const found = element("p", { class: "live-note" }, colour("stable", "live-stable"),
       colour("unstable, stronger with more roots", "live-unstable"),
-      colour("chain lost", "live-lost"),
-      colour("not sure", "live-unsure"), "curve: a root on the axis, from low frequency (blue) to high "
+      colour("unstable at arbitrarily high frequency", "live-lost"),
+      colour("not sure", "live-unsure"), "curve: a root on the imaginary axis, from low frequency (blue) to high "
       + "(yellow); + the ideal point (1, 1)");
     if (half < 1e-4)
       found.append("; square: the paper\u2019s perturbations; dot: first to break along (1, \u22121)");
@@ -820,7 +824,7 @@ function armlockPages() {
       field("m1", "Weight m1: numerator", { value: "1", wide: true }),
       field("m2", "Weight m2: numerator", { value: "1", wide: true }),
       field("below", "Their denominator", { value: "1", wide: true }),
-      select("form", "Controller given by", [["roots", "zeros, poles and gain"],
+      select("form", "Controller given by", [["roots", "zeros and poles"],
         ["fraction", "numerator and denominator"]], () => { shape(); take(); }),
       field("gain", "Gain"), units,
       field("zeros", "Zeros", { area: true }), field("poles", "Poles", { area: true }),
@@ -877,7 +881,7 @@ function armlockPages() {
 
   /* A year in orbit: the arms, what the sensor holds, and where the loop stands each day. */
   const ARMS = { 1: [0, 2], 2: [1, 0], 3: [2, 1] }, STEP = 5, YEAR = 365, MONTH = 365.25 / 12;
-  const HOLDS = ["the largest, all year", "the largest, with the right sign", "a month's start",
+  const HOLDS = ["largest, all year", "largest, right sign", "a month's start",
     "a month's middle"];
 
   /* Both round trips in s, as [t => tau1, t => tau2] with t in days: cubics through four entries. */
@@ -911,7 +915,7 @@ function armlockPages() {
       return { ...LOOPS[state.loop][0], tau1, tau2, difference: 2 * held(half, state.hold, day) };
     };
     const sheet = new Sheet({ role: "img", "aria-label": "The year: true and held half difference, days on "
-      + "which the loop is not stable, and its critical perturbation along (1, \u22121)." }, innerWidth < 600 ? 1.2 : 0.55,
+      + "which the loop is not stable, and the least perturbation against each other that breaks it." }, innerWidth < 600 ? 1.2 : 0.55,
     (pen, ...rest) => drawYear({ values, days, day: state.day }, pen, ...rest));
     for (const name of ["pointerdown", "pointermove"]) sheet.canvas.addEventListener(name, event => {
       const box = sheet.canvas.getBoundingClientRect(), at = (event.clientX - box.left - 56) / (box.width - 64);
@@ -946,7 +950,7 @@ function armlockPages() {
       }
       lost.textContent = parts.length ? `Not stable on days ${parts.join(", ")}.`
         : "Stable on every day of the year.";
-      lost.textContent += " Counted once a day: what is shorter is not seen.";
+      lost.textContent += " Counted once a day: what is shorter is not seen. No dot: not sure, or none up to 2.";
     };
     const lost = element("p", { class: "live-note", role: "status" });
     const move = (day, moving) => {
