@@ -1,6 +1,8 @@
-"""Take out of the finished pages' scripts what no page uses.
+"""Take out of the finished pages' scripts and styles what no page uses.
 
-The theme ships 2 045 icons, 1.4 MB. Those stay whose name a page or a script names. The live
+Icons: the theme ships 2 045 of them, 1.4 MB. Those stay whose name a page or a script names.
+Styles: a rule goes if each of its selectors asks for a class that occurs in no page and in no
+script; what a script puts together from parts would be missed, and `KEPT` names it. The live
 pages' scripts are shipped without comments, and with no space that says nothing.
 """
 
@@ -11,12 +13,81 @@ ICON = re.compile(
     r'"?([a-z0-9-]+)"?:\[\d+,\d+,\[[^\]]*\],"[0-9a-f]+",(?:"[^"]*"|\[[^\]]*\])\](,?)'
 )
 ICON_NAME = re.compile(r"\bfa-([a-z0-9-]+)")
+CLASS = re.compile(r"\.(-?[A-Za-z_][\w-]*)")
+WORD = re.compile(r"[\w-]+")
 COMMENT = re.compile(r"(?m)^[ ]*(?:/\*(?:.|\n)*?\*/|//.*)\n")
 # In a script, what stays as it is: texts, regular expressions, and where a template begins.
 LITERAL = re.compile(
     r"""(?x) "(?:[^"\\\n]|\\.)*" | '(?:[^'\\\n]|\\.)*' | `
     | (?<=[(,=:!&|?{};\n])\s* /(?![*/]) (?:[^/\\\n[] | \\. | \[(?:[^]\\\n]|\\.)*\])+ /[a-z]*"""
 )
+# Bootstrap joins these from parts.
+KEPT = (
+    "bs-",
+    "collapsing",
+    "show",
+    "fade",
+    "tooltip",
+    "popover",
+    "modal",
+    "dropdown",
+    "dropup",
+)
+
+
+def rules(text):
+    """Split a style sheet into (head, body), a body being text or the rules of a block."""
+    found, at = [], 0
+    while (brace := text.find("{", at)) >= 0:
+        head = text[at:brace]
+        # Statements such as @import end without a block.
+        *statements, head = head.split(";") if head.lstrip().startswith("@") else [head]
+        found += [(f"{statement};", None) for statement in statements]
+        depth, end = 1, brace + 1
+        while depth:
+            depth += {"{": 1, "}": -1}.get(text[end], 0)
+            end += 1
+        found.append((head, text[brace + 1 : end - 1]))
+        at = end
+    return [*found, (text[at:], None)]
+
+
+def thin(text, words):
+    """Return a style sheet without the rules that no page can match."""
+    kept = []
+    for head, body in rules(text):
+        name = head.strip()
+        if body is None:
+            kept.append(head)
+        elif name.startswith(("@media", "@supports", "@layer", "@container")):
+            inner = thin(body, words)
+            if inner.strip():
+                kept.append(f"{head}{{{inner}}}")
+        elif name.startswith("@"):
+            kept.append(f"{head}{{{body}}}")
+        else:
+            used = [one for one in selectors(name) if matches(one, words)]
+            if used:
+                kept.append(f"{','.join(used)}{{{body}}}")
+    return "".join(kept)
+
+
+def selectors(text):
+    """Split a list of selectors at its commas, but for those within brackets."""
+    found, depth, start = [], 0, 0
+    for at, letter in enumerate(text):
+        depth += {"(": 1, "[": 1, ")": -1, "]": -1}.get(letter, 0)
+        if letter == "," and depth == 0:
+            found.append(text[start:at])
+            start = at + 1
+    return [*found, text[start:]]
+
+
+def matches(selector, words):
+    """Whether all classes that a selector asks for occur somewhere; those in brackets do."""
+    bare = re.sub(r"\[[^\]]*\]|:(?:not|is|where|has)\((?:[^()]|\([^()]*\))*\)", "", selector)
+    names = CLASS.findall(bare.replace("\\", ""))
+    return all(name in words or name.startswith(KEPT) for name in names)
 
 
 def template_end(text, start):
@@ -57,26 +128,30 @@ def shortened(text):
 
 
 def lean(app, exception):
-    """Thin out the scripts of the built pages."""
+    """Thin out the scripts and styles of the built pages."""
     if exception is not None or app.builder.format != "html":
         return
-    static = Path(app.outdir) / "_static"
+    out = Path(app.outdir)
+    static = out / "_static"
     icons = static / "scripts" / "fontawesome.js"
-    named = [
-        *Path(app.outdir).rglob("*.html"),
-        *static.glob("*.js"),
-        *static.glob("scripts/*.js"),
+    pages = [file.read_text(encoding="utf-8") for file in out.rglob("*.html")]
+    scripts = [
+        file.read_text(encoding="utf-8")
+        for file in static.rglob("*.js")
+        if file != icons and "mathjax" not in file.parts
     ]
-    used = {
-        name
-        for file in named
-        if file != icons
-        for name in ICON_NAME.findall(file.read_text(encoding="utf-8"))
-    }
+    styles = {file: file.read_text(encoding="utf-8") for file in static.rglob("*.css")}
     if icons.is_file():
+        used = {name for text in [*pages, *scripts] for name in ICON_NAME.findall(text)}
         text = icons.read_text(encoding="utf-8")
-        text = ICON.sub(lambda icon: icon[0] if icon[1] in used else "", text)
-        icons.write_text(text.replace(",}", "}"), encoding="utf-8")
+        icons.write_text(
+            ICON.sub(lambda icon: icon[0] if icon[1] in used else "", text).replace(",}", "}"),
+            encoding="utf-8",
+        )
+    words = {word for text in [*pages, *scripts] for word in WORD.findall(text)}
+    for file, text in styles.items():
+        bare = re.sub(r"/\*(?!!)(?:.|\n)*?\*/", "", text)
+        file.write_text(thin(bare, words), encoding="utf-8")
     for file in (static / "live").glob("*.js"):
         file.write_text(shortened(file.read_text(encoding="utf-8")), encoding="utf-8")
 
