@@ -92,7 +92,7 @@ def test_shapes_are_kept_and_masters_are_three():
     t = np.zeros((2, 3)) + 1e6
     assert KEPLER.round_trips(t)[0].shape == KEPLER.rates(t, 3)[1].shape == (2, 3)
     assert KEPLER.round_trips(1e6)[0].shape == ()
-    wrong: list[Any] = [0, 4, 1.5, "1", [1]]
+    wrong: list[Any] = [0, 4, 1.5, True, "1", [1]]
     for master in wrong:
         with pytest.raises(ValueError, match="master must be 1, 2 or 3"):
             KEPLER.round_trips(0.0, master)

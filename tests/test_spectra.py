@@ -128,6 +128,12 @@ def test_a_part_of_a_spectrum_lies_between_two_frequencies():
     assert np.array_equal(part.upper, found.upper[inside])
     assert np.array_equal(part.bins, found.bins[inside])
     assert repr(found.within(2.0, 3.0)) == "Spectrum(0 bands)"
+    with pytest.raises(ValueError, match=r"^high must not lie below low = 1\.0, got 0\.1"):
+        found.within(1.0, 0.1)
+    with pytest.raises(TypeError, match=r"^low must be a real number"):
+        found.within([0.1, 0.2], np.inf)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=r"^high must be finite, got nan"):
+        found.within(0.1, np.nan)
     assert found.within(-np.inf, np.inf).frequency.size == found.frequency.size
     with pytest.raises(TypeError, match=r"^asd must be a function of the frequency, got 1\.0"):
         found.expected(1.0)  # type: ignore[arg-type]

@@ -167,7 +167,7 @@ class Constellation:
     def _arms(self, t: npt.ArrayLike, master: int) -> list[tuple[FloatArray, FloatArray]]:
         """Return delay and rate of both arms, after a look at the arguments."""
         t = self._within(real_array("t", t), self.span[0])
-        if master not in (1, 2, 3):
+        if master not in (1, 2, 3) or isinstance(master, bool):
             raise ValueError(f"master must be 1, 2 or 3, got {master!r}")
         arms = [self._round_trip(master, far, t.ravel()) for far in _LINKS[master]]
         return [(delay.reshape(t.shape), rate.reshape(t.shape)) for delay, rate in arms]

@@ -26,6 +26,7 @@ from armlock.checks import (
     finite_series,
     positive_number,
     real_array,
+    real_number,
 )
 from armlock.progress import progress
 
@@ -173,7 +174,18 @@ class Spectrum:
         -------
         Spectrum
             It may be empty.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If a bound is no real number, or `high` lies below `low`.
         """
+        low, high = (
+            bound if isinstance(bound, float) and np.isinf(bound) else real_number(name, bound)
+            for name, bound in (("low", low), ("high", high))
+        )
+        if high < low:
+            raise ValueError(f"high must not lie below low = {low}, got {high}")
         keep = (self.frequency >= low) & (self.frequency <= high)
         return Spectrum(*(getattr(self, field.name)[keep] for field in fields(self)))
 
