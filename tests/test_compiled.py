@@ -7,7 +7,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import pytest
+
+import armlock.axis.compiled  # noqa: F401  it listens to numba
 
 ROOT = Path(__file__).parents[1]
 # `draw` compiles two functions, in two modules, one of which calls the other.
@@ -80,3 +83,12 @@ def test_a_terminal_says_that_something_is_compiled(package):
     shown = os.read(ours, 1000).decode()
     assert shown.startswith("armlock compiles, once")
     assert shown.endswith("\r\033[K")
+
+
+def test_a_function_without_a_module_compiles_beside_the_package():
+    def double(x):
+        return 2.0 * x
+
+    # As of one that was made from text.
+    double.__module__ = None  # type: ignore[assignment]
+    assert numba.njit(double)(1.5) == 3.0

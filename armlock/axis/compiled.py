@@ -144,7 +144,8 @@ class _Word(event.Listener):  # type: ignore[misc]
                 print("\r\033[K", end="", file=sys.stderr, flush=True)
 
     def _is_ours(self, event: Any) -> bool:
-        module: str = event.data["dispatcher"].py_func.__module__
+        # A function that was made from text has no module.
+        module = str(event.data["dispatcher"].py_func.__module__)
         return module.startswith("armlock.") and sys.stderr.isatty()
 
 
