@@ -39,7 +39,8 @@ find-sources = $(shell find $(wildcard $(1)) -type f \
 	-not -name '*.pyc' -not -name '*.nbi' -not -name '*.nbc' -not -path '*/.*' | sort)
 # What the notebooks depend on, and the book and the tests besides.
 run-sources := $(call find-sources,armlock book/companion notebooks)
-book-sources := $(call find-sources,book) tools/check_html.py tools/cache_notebooks.py
+book-sources := $(call find-sources,book) tools/check_html.py tools/write_codecheck.py \
+	tools/cache_notebooks.py codecheck.yml
 test-sources := $(call find-sources,armlock book notebooks tests benchmarks tools binder) \
 	pyproject.toml conftest.py environment.txt README.md codecheck.yml
 NOTEBOOKS := $(wildcard notebooks/*.ipynb)
@@ -153,6 +154,7 @@ $(INDEX): $(NOTEBOOKS_RAN) $(book-sources) build/book-sources $(if $(FORCE),alwa
 		$(VENV)/bin/jupyter-book build . --all --config book/_config.yml --toc book/_toc.yml \
 		--path-output build -W -n --keep-going
 	$(PY) tools/check_html.py build/_build/html
+	$(PY) tools/write_codecheck.py --check build/_build/html
 	@rm -rf build/html
 	@mv build/_build/html build/html
 	@ln -s ../html build/_build/html

@@ -1,10 +1,10 @@
 """Write codecheck.yml, the CODECHECK manifest: what the book computes, file by file.
 
-Usage: python tools/write_codecheck.py [--check]
+Usage: python tools/write_codecheck.py [--check [FOLDER]]
 
 Every figure that a notebook publishes is listed with the first sentence of its caption. So is
 the ledger of claims. With --check nothing is written, and a manifest that is out of date is an
-error.
+error. FOLDER is a built book: it must hold what is listed, and no other figures.
 """
 
 import ast
@@ -61,28 +61,45 @@ def first_sentence(text: str) -> str:
     )[0]
 
 
-def manifest() -> str:
+def listed() -> dict[str, str]:
+    """Return the files in the folder of figures, each with what it holds."""
+    notebooks = sorted(Path("notebooks").glob("*.ipynb"))
+    return CLAIMS | {file: text for notebook in notebooks for file, text in published(notebook)}
+
+
+def manifest(files: dict[str, str]) -> str:
     """Return the text of the manifest."""
-    files = list(CLAIMS.items())
-    for notebook in sorted(Path("notebooks").glob("*.ipynb")):
-        files += published(notebook)
     entries = [
         f"  - file: {BOOK}/figures/{file}\n"
         f"    comment: {json.dumps(comment, ensure_ascii=False)}\n"
-        for file, comment in files
+        for file, comment in files.items()
     ]
     return HEAD + "".join(entries)
 
 
+def differences(files: dict[str, str], book: Path) -> list[str]:
+    """Return how the list differs from what is in a built book."""
+    there = {file.name for file in (book / "figures").iterdir()}
+    figures = {name for name in there if name.endswith(".svg")}
+    missing = [f"{name} is listed, and nothing writes it" for name in files.keys() - there]
+    return sorted(missing) + [
+        f"{name} is not listed" for name in sorted(figures - files.keys())
+    ]
+
+
 def main() -> int:
     """Write or check the manifest in the current folder."""
-    text = manifest()
+    files = listed()
+    text = manifest(files)
     if "--check" not in sys.argv:
         MANIFEST.write_text(text, encoding="utf-8")
-    elif MANIFEST.read_text(encoding="utf-8") != text:
-        print(f"{MANIFEST} does not list what the notebooks publish: make format does")
-        return 1
-    return 0
+        return 0
+    problems = [differences(files, Path(folder)) for folder in sys.argv[2:]]
+    lines = [f"{MANIFEST}: {line}" for problem in problems for line in problem]
+    if not MANIFEST.exists() or MANIFEST.read_text(encoding="utf-8") != text:
+        lines.append(f"{MANIFEST} does not list what the notebooks publish: make format does")
+    print(*lines, sep="\n", end="\n" if lines else "")
+    return 1 if lines else 0
 
 
 if __name__ == "__main__":
