@@ -118,6 +118,13 @@ class Course:
         at = int(np.argmax(np.abs(values)))
         return float(values[at]), float(times[at])
 
+    def alike(self, other: Course) -> FloatArray:
+        """Return when another course over the same times is of the same size."""
+        both = (
+            PPoly(self.curve.c + sign * other.curve.c, self.curve.x) for sign in (-1.0, 1.0)
+        )
+        return np.concatenate([curve.roots(extrapolate=False) for curve in both])
+
     def cut(
         self, levels: Iterable[float], start: float, stop: float
     ) -> list[tuple[float, float, float]]:
@@ -333,11 +340,7 @@ def largest_half(halves: Mapping[int, Course]) -> tuple[float, float]:
     """
     courses = list(halves.values())
     times = [course.extremes() for course in courses]
-    # Two of them are alike in size where their sum or difference is zero.
-    for one, other in combinations((course.curve for course in courses), 2):
-        for sign in (-1.0, 1.0):
-            together = PPoly(one.c + sign * other.c, one.x)
-            times.append(together.roots(extrapolate=False))
+    times += [one.alike(other) for one, other in combinations(courses, 2)]
     t = np.unique(np.concatenate(times))
     largest = np.max([np.abs(course(t)) for course in courses], axis=0)
     at = int(np.argmin(largest))

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import PPoly
 
 from armlock import DivergenceError, critical_perturbation, simulate
 from armlock.checks import FloatArray
@@ -65,10 +64,7 @@ def telling_times(orbit: str) -> FloatArray:
     found = [np.linspace(*interval(orbit), 600)]
     for course in courses:
         found += [course.times(), course.extremes()]
-    for one, other in combinations((course.curve for course in courses), 2):
-        for sign in (-1.0, 1.0):
-            together = PPoly(one.c + sign * other.c, one.x)
-            found.append(together.roots(extrapolate=False))
+    found += [one.alike(other) for one, other in combinations(courses, 2)]
     return np.unique(np.concatenate(found))
 
 
