@@ -20,7 +20,7 @@ def compiled_sum(coefficients, weights, sums, phases):
         np.array(coefficients, complex), *rest, empty.astype(int), empty
     )
     weights, sums, phases = (np.array(given, float) for given in (weights, sums, phases))
-    return exponentials.CompiledSum(whole, weights, sums, phases)
+    return exponentials.CompiledSum(whole, weights, sums, phases, np.zeros_like(sums))
 
 
 def compiled_polynomial(found):
@@ -37,9 +37,7 @@ def walk(constants, phases, omega_end):
     summed = compiled_sum(
         np.reshape(constants, (-1, 1)), np.eye(number), np.ones(number), phases
     )
-    argument, value, clear, _, told = contour.heard(
-        contour.winding, summed, np.zeros(number), 0.0, omega_end
-    )
+    argument, value, clear, _, told = contour.heard(contour.winding, summed, 0.0, omega_end)
     assert clear
     assert told
     return argument, value

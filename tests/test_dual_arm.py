@@ -43,8 +43,9 @@ def test_a_count_that_cannot_be_told_confirms_no_crossing(monkeypatch):
     assert nothing.position.size == 0
     ray._confirm(nothing, stretch, 3e-4)
     monkeypatch.setattr(rays, "loop_count", lambda *_: -1)
+    unknown = Ray(DualArm(), (0.9, 1.0), (0.0, 1.0))
     with pytest.raises(CountError, match="are -1 and -1"):
-        ray._confirm(nothing, stretch, 3e-4)
+        unknown._confirm(nothing, stretch, 3e-4)
 
 
 @pytest.mark.parametrize("zeros", [(), (-0.5,)])

@@ -157,7 +157,7 @@ ABOVE = LoopAt(FAST, 0.7, 0.9).numerator().compiled()
 UNDER = FAST.rest_on_boundary().compiled()
 # Each takes more than a second.
 LONG: dict[str, tuple[Any, ...]] = {
-    "argument": (contour.winding, WHOLE, np.zeros(WHOLE.sums.size), 0.0, 1e6),
+    "argument": (contour.winding, WHOLE, 0.0, 1e6),
     "zeros": (contour.imaginary_zeros, WHOLE, None, 0.0, 1e6, False, ROUNDING),
     "samples": (contour.resolved_grid, WHOLE, 1e6, 0.1),
     "modulus": (modulus._walk, ABOVE, UNDER, 1.0, 1e6, np.array([0.5, 0.5]), 1e-6),

@@ -62,8 +62,8 @@ SAFETY = 0.95
 # Turns of the longest delay after which `winding` tries again to follow the slow terms alone.
 _BLOCK = 32.0
 # Most steps of one walk: some three seconds. A turn of the longest delay takes about ten, but
-# where slow terms are followed alone.
-MOST_STEPS = 10_000_000
+# where slow terms are followed alone. No plain int, for which numba would compile walks twice.
+MOST_STEPS = np.int64(10_000_000)
 # A walk over which the fastest exponential turns by more radians than this is not begun.
 MOST_RADIANS = 20.0 * MOST_STEPS
 # Most samples of a grid.
@@ -83,7 +83,7 @@ _BLIND_GROWTH, _SHORTEST_BLIND = 0.25, 1e-14
 _FEW_STEPS = 300_000
 
 
-def heard(walk: Callable[..., Any], *arguments: Any, most: int = MOST_STEPS) -> Any:
+def heard(walk: Callable[..., Any], *arguments: Any, most: int = int(MOST_STEPS)) -> Any:
     """Return what a compiled walk does, and let an interrupt end it.
 
     Compiled functions hear no interrupt. A short walk is over before that matters. A long one
@@ -192,7 +192,6 @@ def _slow_terms(piece: Piece) -> tuple[Piece, FloatArray]:
 @njit(cache=True, nogil=True)
 def winding(
     whole: CompiledSum,
-    uncertain: FloatArray,
     omega: float,
     omega_end: float,
     most: int,
@@ -204,9 +203,9 @@ def winding(
     a quarter of a turn of theirs, and only theirs is followed: in long steps, however fast the
     others turn.
 
-    `uncertain` holds how far the entries of `sums` may be off. Returns the argument, the last
-    value up to a positive factor, whether the sum stays clear of zero, the number of steps, and
-    whether that is told: not where there would be more than `most` steps, or `stop` is set.
+    Returns the argument, the last value up to a positive factor, whether the sum stays clear of
+    zero, the number of steps, and whether that is told: not where there would be more than
+    `most` steps, or `stop` is set.
     """
     phases = whole.phases
     steps, argument, step = 0, 0.0, omega_end
@@ -215,7 +214,7 @@ def winding(
     if phases.size and phases.any():
         block = _BLOCK * 2.0 * np.pi / np.abs(phases).max()
     while True:
-        piece = expand(whole, omega, uncertain)
+        piece = expand(whole, omega)
         end = min(piece.end, omega_end)
         bound, error = curvature_bound(piece), rounding_bound(piece, ROUNDING)
         value = evaluate(piece, omega)[0]

@@ -168,10 +168,8 @@ def count_point(model: PointModel, x: float, y: float, end: float, stop: BoolArr
         uncertain[k] = EPSILON * (abs(x * b1[k]) + abs(y * b2[k]))
         for g in range(weights.shape[0]):
             weights[g, k] -= x * model.weights[0, g, k] + y * model.weights[1, g, k]
-    whole = CompiledSum(constant.polynomials, weights, sums, constant.phases)
-    argument, value, clear, _, told = winding(
-        whole, uncertain, model.start, end, MOST_STEPS, stop
-    )
+    whole = CompiledSum(constant.polynomials, weights, sums, constant.phases, uncertain)
+    argument, value, clear, _, told = winding(whole, model.start, end, MOST_STEPS, stop)
     if not told:
         return TOO_LONG
     if not clear:
@@ -286,7 +284,7 @@ def _fill_row(
             sums[k] = at_zero - far
         else:
             sums[k] -= near
-    crossing = CompiledSum(fixed.polynomials, weights, sums, fixed.phases)
+    crossing = CompiledSum(fixed.polynomials, weights, sums, fixed.phases, fixed.uncertain)
     zeros, complete = imaginary_zeros(
         crossing, model.measure, 0.0, rows.ends[i], model.is_map, CAUTION, MOST_STEPS, stop
     )

@@ -295,7 +295,8 @@ class ExponentialSum(NamedTuple):
             np.array([int(exponents.sum()) for _, exponents in leads]),
             np.array([p.missed for p in self.polynomials]),
         )
-        return CompiledSum(polynomials, self.weights, self.sums, self.phases)
+        certain = np.zeros(self.sums.size)
+        return CompiledSum(polynomials, self.weights, self.sums, self.phases, certain)
 
 
 class CompiledPolynomials(NamedTuple):
@@ -336,12 +337,15 @@ class CompiledSum(NamedTuple):
         The polynomials.
     weights, sums, phases : arrays
         Those of `ExponentialSum`.
+    uncertain : float array, shape (polynomials,)
+        How far the entries of `sums` may be off.
     """
 
     polynomials: CompiledPolynomials
     weights: npt.NDArray[Any]
     sums: npt.NDArray[Any]
     phases: FloatArray
+    uncertain: FloatArray
 
 
 def aligned(*sums: ExponentialSum) -> tuple[ExponentialSum, ...]:
@@ -519,12 +523,12 @@ class Piece(NamedTuple):
 
 
 @njit(cache=True)
-def expand(whole: CompiledSum, omega: float, uncertain: FloatArray | None = None) -> Piece:
+def expand(whole: CompiledSum, omega: float) -> Piece:
     """Expand an exponential sum over the piece of the axis that starts at omega.
 
-    `uncertain` holds how far the entries of `sums` may be off. The magnitudes contain it.
+    The magnitudes contain what is uncertain in the sum.
     """
-    polynomials, weights, sums, phases = whole
+    polynomials, weights, sums, phases, uncertain = whole
     coefficients = polynomials.coefficients
     expanded, piece_end = coefficients.shape[0] == 0, np.inf
     for low, high in polynomials.crowded:
@@ -547,9 +551,8 @@ def expand(whole: CompiledSum, omega: float, uncertain: FloatArray | None = None
     sizes = np.zeros((1 + groups, size + 1))
     for g in range(1 + groups):
         for k in range(number):
-            weight, unknown = sums[k] if g == 0 else weights[g - 1, k], 0.0
-            if g == 0 and uncertain is not None:
-                unknown = uncertain[k]
+            weight = sums[k] if g == 0 else weights[g - 1, k]
+            unknown = uncertain[k] if g == 0 else 0.0
             # What is unknown moves the sum by that share of a polynomial's value, and rounds.
             magnitude, moved = abs(weight) + unknown, unknown / (ROUNDING * EPSILON)
             if magnitude != 0.0:

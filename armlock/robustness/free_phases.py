@@ -303,9 +303,8 @@ def _count_below(point: LoopAt, omega: float) -> int | None:
         begin, whole = walk_begins(*at), at.loop.sum_at(at.c1, at.c2)
         if begin is None or begin[0] >= omega:
             return None
-        none = np.zeros(whole.sums.size)
         argument, value, clear, _, _ = contour.heard(
-            contour.winding, whole.compiled(), none, begin[0], omega
+            contour.winding, whole.compiled(), begin[0], omega
         )
         if not clear:
             return None
