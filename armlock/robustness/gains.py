@@ -27,7 +27,8 @@ from armlock.robustness.free_phases import (
 )
 from armlock.robustness.rays import count_beside, merged
 from armlock.stability.bounds import last_larger, last_root_bound
-from armlock.stability.counts import axis_zeros, loop_count
+from armlock.stability.counts import loop_count
+from armlock.stability.zeros import axis_zeros
 
 #: Gain factors up to this, and down to one over it, are looked at.
 LARGEST_GAIN = 1e6

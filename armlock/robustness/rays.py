@@ -32,14 +32,8 @@ from armlock.robustness.free_phases import (
     search_outwards,
 )
 from armlock.stability.bounds import last_frequency
-from armlock.stability.counts import (
-    BOUNDARY,
-    CountError,
-    axis_zeros,
-    loop_count,
-    polished,
-    unstable_roots,
-)
+from armlock.stability.counts import BOUNDARY, CountError, loop_count, unstable_roots
+from armlock.stability.zeros import axis_zeros, polished
 
 #: Nothing is looked at where the parameters are this many times as large as the start, or as 1.
 FARTHEST = 1e9

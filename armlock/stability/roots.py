@@ -16,8 +16,9 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
-from armlock.axis.contour import heard, resolved_grid
+from armlock.axis.contour import resolved_grid
 from armlock.axis.rounding import EPSILON
+from armlock.axis.threads import interruptible
 from armlock.characteristic import CharacteristicFunction, broadcast_parameters, checked_system
 from armlock.checks import (
     ComplexArray,
@@ -244,7 +245,8 @@ class _Line:
         Up to so many turns, from those `most` starts whose first step leads furthest right.
         """
         whole = self.shifted.sum_at(self.x, self.y).compiled()
-        grid, _ = heard(resolved_grid, whole, turns * self.per_turn, 1.0, most=_MOST_POINTS)
+        end = turns * self.per_turn
+        grid, _ = interruptible(resolved_grid, whole, end, 1.0, most=_MOST_POINTS)
         s = self.sigma + 1j * grid
         # A point costs a step of the walk, and one of Newton's method.
         self.steps += 2 * s.size
