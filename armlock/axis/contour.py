@@ -29,7 +29,7 @@ zero. Who asks, and what each does with it:
 - D-curves (`armlock.stability.dcurve`) are cut at its middle: their points do not depend on it.
 
 A count that cannot be told (-1) confirms nothing: who asks for one looks beside it, up to a
-thousandth away (`armlock.robustness.rays.count_beside`), and refuses where that does not help.
+thousandth away (`armlock.stability.zeros.count_beside`), and refuses where that does not help.
 
 All functions here work on exponential sums, piece by piece, see `armlock.axis.exponentials`.
 """

@@ -47,6 +47,17 @@ def _cancellation(roots: ComplexArray, omega: FloatArray) -> FloatArray:
         return np.asarray(np.log(ratios).sum(axis=1))
 
 
+def merged(ranges: FloatArray) -> list[tuple[float, float]]:
+    """Intervals of shape (n, 2), ascending, with those that overlap made one."""
+    found: list[tuple[float, float]] = []
+    for low, high in sorted(map(tuple, ranges.tolist())):
+        if found and low <= found[-1][1]:
+            found[-1] = found[-1][0], max(high, found[-1][1])
+        else:
+            found.append((low, high))
+    return found
+
+
 def _crowded(polynomials: Sequence[Polynomial]) -> FloatArray:
     """Intervals of the axis on which a polynomial's expansion about s = 0 cancels.
 
@@ -67,13 +78,7 @@ def _crowded(polynomials: Sequence[Polynomial]) -> FloatArray:
                 far = _cancellation(roots, peak * (1.0 + side * shares)) > np.log(_CANCELLED)
                 reach = max(reach, 2.0 * shares[far].max())
             found.append((peak * max(1.0 - reach, 0.0), peak * (1.0 + reach)))
-    merged: list[tuple[float, float]] = []
-    for low, high in sorted(found):
-        if merged and low <= merged[-1][1]:
-            merged[-1] = merged[-1][0], max(high, merged[-1][1])
-        else:
-            merged.append((low, high))
-    return np.array(merged).reshape(-1, 2)
+    return np.reshape(merged(np.reshape(found, (-1, 2))), (-1, 2))
 
 
 def _gathered(

@@ -1,7 +1,7 @@
 """Where the imaginary part of an exponential sum vanishes along the axis, and where it may.
 
 The walk is that of `armlock.axis.contour`, where it also stands what a hidden stretch is, and
-what each caller does with it.
+what each caller does with it. Most ask a count beside the parameters that it may stand for.
 """
 
 from __future__ import annotations
@@ -18,8 +18,10 @@ from armlock.axis.exponentials import ExponentialSum, without_unused
 from armlock.axis.rounding import ROUNDING
 from armlock.axis.threads import MOST_STEPS, interruptible
 from armlock.checks import BoolArray, FloatArray, IntArray
-from armlock.stability.counts import CountError
+from armlock.stability.counts import BOUNDARY, CountError
 
+# A count that cannot be told at a point is looked for beside it, up to this share of t.
+_FARTHEST_BESIDE = 1e-3
 _NO_POINTS = np.empty((0, 2))
 
 
@@ -58,13 +60,13 @@ def axis_zeros(
 ) -> AxisZeros:
     """Zeros of the imaginary part of an exponential sum on intervals of the axis.
 
-    The intervals have shape (n, 2), in rad/s. The measure is a positive sum of the same
-    polynomials.
+    The intervals have shape (n, 2), in rad/s; a map has one, up to pi / step. The measure is a
+    positive sum of the same polynomials.
 
     Raises
     ------
     CountError
-        If there are too many of them, a number overflows, or the sum vanishes to rounding.
+        If the walk takes too many steps, a number overflows, or the sum vanishes to rounding.
     """
     sums = without_unused(whole) if measure is None else without_unused(whole, measure)
     if not sums[0].polynomials:
@@ -105,8 +107,8 @@ def polished(
 ) -> FloatArray:
     """Zeros of a function next to those that `axis_zeros` found on the expanded sums.
 
-    Each is looked for within the first of the reaches around it over which the sign changes,
-    and stays as it is where there is none.
+    The reaches are half-widths in rad/s, ascending. Each zero is looked for within the first of
+    them over which the sign changes. Where there is none, it stays as `axis_zeros` left it.
     """
     omega, left = omega.copy(), np.arange(omega.size)
     for reach in reaches:
@@ -120,3 +122,21 @@ def polished(
             omega[left[enclosed]] = found.x
         left = left[~enclosed]
     return omega
+
+
+def count_beside(
+    count: Callable[[float], int], t: float, side: int, nearest: float, scale: float = 1.0
+) -> tuple[float, int]:
+    """Count the unstable roots next to a parameter t on which the loop depends.
+
+    At t times 1 + side `nearest`, and as long as that cannot be told farther away, up to a
+    thousandth. At t = 0, past which alone there is something, at shares of `scale`. Returns the
+    place and the count, that may still be below zero: then it is no confirmation.
+    """
+    place, found = t, BOUNDARY
+    for share in (nearest, *np.geomspace(max(nearest, 1e-9), _FARTHEST_BESIDE, 4)):
+        place = float(t * (1.0 + side * share) if t else share * scale)
+        found = count(place)
+        if found != BOUNDARY:
+            break
+    return place, found
