@@ -390,25 +390,3 @@ def switches(halves: Mapping[int, Course], floor: float) -> list[tuple[float, in
         found.append((now, master))
         now = reach
     return found
-
-
-__all__ = [
-    "DAY",
-    "MONTH",
-    "YEAR",
-    "Course",
-    "Hold",
-    "LoopInOrbit",
-    "days",
-    "flight",
-    "frozen_rate",
-    "growth",
-    "half_difference",
-    "held_range",
-    "largest_half",
-    "loops",
-    "lost",
-    "on_dual",
-    "policies",
-    "switches",
-]
