@@ -30,7 +30,8 @@ from armlock import (
 )
 from armlock.sensors import COMMON, SINGLE, SignalMapping
 from armlock.timedomain import simulation
-from armlock.timedomain.simulation import BLOCK, LANES, lagrange_delay
+from armlock.timedomain.delays import lagrange_delay
+from armlock.timedomain.simulation import BLOCK, LANES
 from tests import independent
 
 RATE = 200.0
