@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from fractions import Fraction
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -129,6 +129,9 @@ class Ray:
             raise ValueError("direction must not have length zero, got (0, 0)")
         #: The t at which the distance from the start is the start's from zero, or one.
         self.scale = max(1.0, float(np.hypot(*self.start))) / float(np.hypot(*self.direction))
+        #: Count the unstable roots at a point of the ray, given its t. A search and who asks
+        #: for it confirm at the same points.
+        self.count: Callable[[float], int] = cache(self._count)
         #: D0 conj(M) and |M|^2 at s = j omega, over the power of omega that both have.
         self.product, self.square = conjugates_without_zeros(
             system.deviation(*self.direction), system.sum_at(*self.start)
@@ -295,7 +298,7 @@ class Ray:
             np.array([self.at(stop)]),
         )
 
-    def count(self, t: float) -> int:
+    def _count(self, t: float) -> int:
         """Count the unstable roots at a point of the ray, of a loop as `loop_count` does.
 
         There the point is not rounded: what cancels along the ray does so at it.
