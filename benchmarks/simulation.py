@@ -93,7 +93,7 @@ def plain_arguments(loop: Loop) -> tuple[Any, ...]:
 
 def inputs(samples: int) -> Inputs:
     noise = LaserNoise(1).draw(samples)
-    c1, c2 = (1.0 + PerturbationNoise(seed, scale=1e-4).draw(samples) for seed in (2, 3))
+    c1, c2 = (1.0 + 1e-4 * PerturbationNoise(seed).draw(samples) for seed in (2, 3))
     return noise, c1, c2
 
 
