@@ -113,11 +113,6 @@ def reach(delay: Delay | MovingDelay) -> int:
     return int(delay.max()) + _SIDE
 
 
-def past_history(begin: int, rate: float) -> str:
-    """Say what a delay must not do that reaches back past sample number `begin`."""
-    return f"not reach back past the history, which begins at t = {begin / rate:.9g} s"
-
-
 @njit(cache=True)
 def delayed(signal: FloatArray, row: int, column: int, delay: Delay) -> float:
     """Return a column of a signal as it was a constant delay before a row."""
@@ -152,24 +147,31 @@ def between(signal: FloatArray, middle: int, column: int, u: float) -> float:
 
 
 @dataclass
-class MovingArm:
-    """The delay of one arm during a call: a series, or a function of time.
+class Arm:
+    """The delay of one arm during a call: a number, a series, or a function of time.
 
     `begin` is the number of the call's first sample in the run, `last` the last delay so far.
     """
 
     name: str
-    given: FloatArray | Callable[[FloatArray], npt.ArrayLike]
+    given: float | FloatArray | Callable[[FloatArray], npt.ArrayLike]
     rate: float
     begin: int
     last: FloatArray | None = None
 
-    def part(self, noise: FloatArray, number: int, known: int) -> FloatArray:
-        """Return the delays of a block in samples, in rows.
+    def part(self, noise: FloatArray, number: int, known: int) -> Delay | MovingDelay:
+        """Return the delay during a block, in samples.
 
         `noise` is that of the block, `number` that of its first sample in the run, and so many
         samples are `known` before it.
         """
+        begins = (number - known) / self.rate
+        not_known = f"not reach back past the history, which begins at t = {begins:.9g} s"
+        if isinstance(self.given, float):
+            delay = lagrange_delay(self.name, self.given, self.rate)
+            if reach(delay) > known:
+                raise self._refusal(not_known, self.given, number)
+            return delay
         if callable(self.given):
             tau = self._called(self.given, number, noise)
         else:
@@ -191,15 +193,17 @@ class MovingArm:
             wrong = samples < _SIDE
         elif reach(samples[:1]) > known:
             # No later sample reaches further back.
-            constraint = past_history(number - known, self.rate)
+            constraint = not_known
             wrong = samples[:1] == samples[0].max()
         else:
             return samples
         i, w = np.argwhere(wrong)[0]
-        raise ValueError(
-            f"{self.name} must {constraint}, got {tau[i, w]} s at "
-            f"t = {(number + i) / self.rate:.9g} s"
-        )
+        raise self._refusal(constraint, tau[i, w], number + i)
+
+    def _refusal(self, constraint: str, tau: float, number: int) -> ValueError:
+        """Say what a delay must do that is `tau` at a sample of the run."""
+        at = number / self.rate
+        return ValueError(f"{self.name} must {constraint}, got {tau} s at t = {at:.9g} s")
 
     def _called(
         self,

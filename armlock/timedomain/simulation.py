@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -37,21 +38,19 @@ from armlock.checks import (
 from armlock.loops import Loop, checked_loop
 from armlock.progress import progress
 from armlock.timedomain.delays import (
+    Arm,
     Delay,
     GivenDelay,
-    MovingArm,
     MovingDelay,
     between,
     delayed,
-    lagrange_delay,
-    past_history,
     reach,
     sampled_delays,
 )
 from armlock.timedomain.discretize import SampledFilter, SampledSensor, sampled_loop, warped
 
-#: Samples that are computed at a time, of all runs, or more where the past is long, which is
-#: moved with each block; results do not depend on it.
+#: Samples that are computed at a time, of all runs together. Where delays reach far back there
+#: are more, because each block moves the past. Results do not depend on their number.
 BLOCK = 1 << 16
 #: Runs of an ensemble that go side by side. Fewer than half as many go one by one.
 LANES = 32
@@ -312,6 +311,13 @@ def _series(name: str, value: npt.ArrayLike, like: FloatArray) -> FloatArray:
     return np.atleast_2d(array).T
 
 
+def _in_lanes(delay: Delay | MovingDelay, number: int) -> Delay | MovingDelay:
+    """Return a delay with a column for each lane, if the runs have their own."""
+    if isinstance(delay, tuple) or delay.shape[1] == 1:
+        return delay
+    return _in_columns(delay, number)
+
+
 def _in_columns(series: FloatArray, number: int) -> FloatArray:
     """Return samples in rows, as compiled code takes them, the last run repeated at the end."""
     if series.shape[1] == 1 < number:
@@ -494,10 +500,11 @@ class Simulation:
         self.sample_rate = positive_number("sample_rate", sample_rate)
         self.limit = positive_number("limit", limit)
         self.draws = None if draws is None else whole_number("draws", draws, 1)
-        self._delays = sampled_delays(loop, self.sample_rate)
+        delays = sampled_delays(loop, self.sample_rate)
         sensor, controller = sampled_loop(loop.controller, loop.mapping, self.sample_rate)
         self._filters = sensor, controller
-        self.history_samples = max(reach(delay) for delay in self._delays)
+        self._dead = delays[2]
+        self.history_samples = max(map(reach, delays))
         before = finite_series("history", history, 0, 1)
         if before.ndim and before.size < self.history_samples:
             raise ValueError(
@@ -569,7 +576,7 @@ class Simulation:
         if self.draws not in (None, len(given)):
             raise ValueError(f"noise must have {self.draws} rows, got shape {given.shape}")
         inputs = [np.atleast_2d(given).T, _series("c1", c1, given), _series("c2", c2, given)]
-        arms = [self._arm(k, tau, given) for k, tau in enumerate((tau1, tau2))]
+        arms = self._arm("tau1", tau1, given), self._arm("tau2", tau2, given)
         if self._in_block:
             raise RuntimeError(
                 "this run was interrupted in the middle of a block, and cannot go on: begin "
@@ -590,39 +597,28 @@ class Simulation:
                 say(at + self._block)
         return shaped
 
-    def _arm(self, k: int, tau: GivenDelay | None, like: FloatArray) -> Delay | MovingArm:
-        """Return a constant delay in samples, or one that moves; the loop's own for None."""
-        name, delay = f"tau{k + 1}", self._delays[k]
-        if callable(tau):
-            return MovingArm(name, tau, self.sample_rate, self.samples)
-        if tau is not None:
-            series = _series(name, tau, like)
-            if np.ndim(tau) > 0:
-                return MovingArm(name, series, self.sample_rate, self.samples)
-            delay = lagrange_delay(name, positive_number(name, tau), self.sample_rate)
-        if reach(delay) > self._known:
-            constraint = past_history(self.samples - self._known, self.sample_rate)
-            raise ValueError(
-                f"{name} must {constraint}, got "
-                f"{getattr(self.loop, name) if tau is None else tau} s at "
-                f"t = {self.samples / self.sample_rate:.9g} s"
-            )
-        return delay
+    def _arm(self, name: str, tau: GivenDelay | None, like: FloatArray) -> Arm:
+        """Return the delay of an arm during a call, the loop's own for None."""
+        given: Any = getattr(self.loop, name) if tau is None else tau
+        if not callable(given):
+            series = _series(name, given, like)
+            given = series if np.ndim(given) > 0 else positive_number(name, given)
+        return Arm(name, given, self.sample_rate, self.samples)
 
     def _fill(
         self,
         output: FloatArray,
         inputs: Sequence[FloatArray],
-        arms: Sequence[Delay | MovingArm],
+        arms: Sequence[Arm],
     ) -> None:
         """Compute the next samples, each in a row, unless the run stops before."""
         stop, first, columns = len(output), 0, self._signals.shape[2]
-        delays = (*(self._delay(arm, inputs[0]) for arm in arms), self._delays[2])
-        keep = self._make_room(max(map(reach, delays)))
+        delays = [arm.part(inputs[0], self.samples, self._known) for arm in arms]
+        keep = self._make_room(max(map(reach, (*delays, self._dead))))
         known = self._known
         phi, sent = self._signals[:, : known + stop]
         series = tuple(_in_columns(given, columns) for given in inputs)
-        sampled = delays, *self._filters
+        sampled = (*(_in_lanes(delay, columns) for delay in delays), self._dead), *self._filters
         self._in_block = True
         for work in self._groups:
             lanes = work.shape[1]
@@ -642,14 +638,6 @@ class Simulation:
         self._signals[:, : self._known] = self._signals[:, end - self._known : end]
         self.samples += stop
         self._in_block = False
-
-    def _delay(self, arm: Delay | MovingArm, noise: FloatArray) -> Delay | MovingDelay:
-        """Return an arm's delay during a block."""
-        if not isinstance(arm, MovingArm):
-            return arm
-        samples = arm.part(noise, self.samples, self._known)
-        own = samples.shape[1] > 1
-        return _in_columns(samples, self._signals.shape[2]) if own else samples
 
     def _make_room(self, longest: int) -> int:
         """Make room for a block whose delays reach so far back; return what to keep after it.
