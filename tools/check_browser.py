@@ -39,7 +39,7 @@ MIDDLE = {"width": 768, "height": 1024}
 NARROW = {"width": 390, "height": 844}
 NARROWEST = {"width": 320, "height": 640}
 LONGEST = 3.0  # seconds of processor time until a page is readable
-HEAVIEST = 6e6  # bytes that a page loads
+HEAVIEST = 3e6  # bytes that a page loads
 # A word that the search of any book here must find.
 WORD = "delay"
 
@@ -147,6 +147,21 @@ def browser() -> Iterator[Any]:
             chromium.close()
 
 
+def clock(page: Any) -> Callable[[], float]:
+    """Return what tells for how long a page has worked since it was opened, in s.
+
+    It is time of the processor, which other programs may have meanwhile.
+    """
+    session = page.context.new_cdp_session(page)
+    session.send("Performance.enable", {"timeDomain": "threadTicks"})
+
+    def worked() -> float:
+        metrics = session.send("Performance.getMetrics")["metrics"]
+        return float(next(m["value"] for m in metrics if m["name"] == "TaskDuration"))
+
+    return worked
+
+
 class Book:
     """The pages of a built book, and what was found on them."""
 
@@ -163,9 +178,7 @@ class Book:
         self.page = context.new_page()
         telephone = chromium.new_context(viewport=NARROW, offline=True, has_touch=True)
         self.telephone = telephone.new_page()
-        # Time of the processor, since other programs may have it meanwhile.
-        self.session = context.new_cdp_session(self.page)
-        self.session.send("Performance.enable", {"timeDomain": "threadTicks"})
+        self.worked = clock(self.page)
         self.page.on("request", lambda request: self.requests.add(request.url))
         self.page.on("pageerror", lambda error: self.report(f"script error: {error}"))
         self.page.on("console", self.read_console)
@@ -181,17 +194,12 @@ class Book:
         if message.type == "error":
             self.report(f"console: {message.text}")
 
-    def busy(self) -> float:
-        """Return for how long the page has worked since it was opened, in s."""
-        metrics = self.session.send("Performance.getMetrics")["metrics"]
-        return float(next(m["value"] for m in metrics if m["name"] == "TaskDuration"))
-
     def open(self, file: Path, query: str = "") -> float:
         """Open a page, wait for its formulas, and return what work that was, in s."""
         self.file, self.requests = file, set()
         self.page.goto(file.as_uri() + query, wait_until="load")
         self.page.evaluate(TYPESET)
-        return self.busy()
+        return self.worked()
 
     def check(self, file: Path) -> None:
         """Do all checks of one page."""
