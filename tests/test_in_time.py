@@ -29,7 +29,7 @@ from armlock import (
     spectral_radius,
     unstable_roots,
 )
-from armlock.axis import contour
+from armlock.axis import contour, threads
 from armlock.axis.rounding import ROUNDING
 from armlock.loops import LoopAt
 from armlock.performance.pulling import pulling
@@ -157,7 +157,7 @@ ABOVE = LoopAt(FAST, 0.7, 0.9).numerator().compiled()
 UNDER = FAST.rest_on_boundary().compiled()
 # Each takes more than a second.
 LONG: dict[str, tuple[Any, ...]] = {
-    "argument": (contour.winding, WHOLE, np.zeros(WHOLE.sums.size), 0.0, 1e6),
+    "argument": (contour.winding, WHOLE, 0.0, 1e6),
     "zeros": (contour.imaginary_zeros, WHOLE, None, 0.0, 1e6, False, ROUNDING),
     "samples": (contour.resolved_grid, WHOLE, 1e6, 0.1),
     "modulus": (modulus._walk, ABOVE, UNDER, 1.0, 1e6, np.array([0.5, 0.5]), 1e-6),
@@ -185,8 +185,8 @@ def ends_when_interrupted(call):
 @pytest.mark.parametrize("name", LONG)
 def test_an_interrupt_ends_a_walk_within_a_second(name):
     walk, *arguments = LONG[name]
-    contour.heard(walk, *arguments, most=1)  # compiles
-    assert ends_when_interrupted(lambda: contour.heard(walk, *arguments)) < 1.0
+    threads.interruptible(walk, *arguments, most=1)  # compiles
+    assert ends_when_interrupted(lambda: threads.interruptible(walk, *arguments)) < 1.0
 
 
 def test_an_interrupt_ends_free_phases_within_a_second():

@@ -6,20 +6,15 @@ functions take: `PointModel` for points, `RowModel` for rows.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numba import config
 
 from armlock.axis.compiled import njit
 from armlock.axis.contour import (
     HIDDEN,
     JUMP,
     MOST_RADIANS,
-    MOST_STEPS,
     POSITION,
     SPREAD,
     angle_between,
@@ -27,8 +22,9 @@ from armlock.axis.contour import (
     imaginary_zeros,
     winding,
 )
-from armlock.axis.exponentials import CompiledSum
+from armlock.axis.exponentials import CompiledSum, with_smaller_terms
 from armlock.axis.rounding import CAUTION, EPSILON
+from armlock.axis.threads import MOST_STEPS, on_all_cores
 from armlock.checks import BoolArray, ComplexArray, FloatArray, IntArray
 
 # What `count_point` returns where it is no number of roots.
@@ -152,26 +148,18 @@ def count_point(model: PointModel, x: float, y: float, end: float, stop: BoolArr
     for phase in constant.phases:
         if end * abs(phase) > MOST_RADIANS:
             return TOO_LONG
-    dx, dy = x - model.reference[0], y - model.reference[1]
+    x0, y0 = model.reference
     sums, uncertain = constant.sums.copy(), np.empty_like(constant.sums)
     weights = constant.weights.copy()
     for k in range(sums.size):
-        # Of two ways to add up, the one with the smaller terms.
-        near, far = dx * b1[k], dy * b2[k]
-        all_near = model.reference[0] * b1[k] + model.reference[1] * b2[k]
-        all_far = x * b1[k] + y * b2[k]
-        if abs(all_near) + abs(all_far) < abs(near) + abs(far):
-            sums[k] += all_near - all_far
-        else:
-            sums[k] -= near + far
+        there, here = x0 * b1[k] + y0 * b2[k], x * b1[k] + y * b2[k]
+        sums[k] += with_smaller_terms(there, -here, (x0 - x) * b1[k], (y0 - y) * b2[k])
         # The parameters are rounded numbers themselves.
         uncertain[k] = EPSILON * (abs(x * b1[k]) + abs(y * b2[k]))
         for g in range(weights.shape[0]):
             weights[g, k] -= x * model.weights[0, g, k] + y * model.weights[1, g, k]
-    whole = CompiledSum(constant.polynomials, weights, sums, constant.phases)
-    argument, value, clear, _, told = winding(
-        whole, uncertain, model.start, end, MOST_STEPS, stop
-    )
+    whole = CompiledSum(constant.polynomials, weights, sums, constant.phases, uncertain)
+    argument, value, clear, _, told = winding(whole, model.start, end, MOST_STEPS, stop)
     if not told:
         return TOO_LONG
     if not clear:
@@ -191,7 +179,7 @@ def count_point(model: PointModel, x: float, y: float, end: float, stop: BoolArr
     return int(np.floor(count + 0.5)) if -0.5 < count < np.inf else DOUBTFUL
 
 
-# So few points or rows are left to one core: threads take half a millisecond to begin.
+# So few points are left to one core: threads take half a millisecond to begin.
 _FEW = 16
 # Points up to which the fastest exponential turns by more radians than this are left to others
 # all the same: to wait for them can be interrupted.
@@ -226,42 +214,8 @@ def count_points(model: PointModel, x: FloatArray, y: FloatArray, ends: FloatArr
     if x.size < _FEW and ends.max(initial=0.0) * fastest <= _LONG:
         _count_range(0, x.size, model, x, y, ends, counts, stop)
         return counts
-    _on_all_cores(_count_range, x.size, model, x, y, ends, counts, stop=stop)
+    on_all_cores(_count_range, x.size, model, x, y, ends, counts, stop=stop)
     return counts
-
-
-def _on_all_cores(
-    function: Callable[..., None], size: int, *arguments: object, stop: BoolArray
-) -> None:
-    """Call function(first, last, ...) for ranges that cover `size`, in a thread each.
-
-    The function is compiled to release the interpreter's lock. Ranges are short, because some
-    points or rows take much longer than others. An interrupt is heard at once, since this
-    thread only waits; the others end because the last argument, `stop`, is set.
-    """
-    cores = config.NUMBA_NUM_THREADS
-    edges = np.unique(np.linspace(0, size, 16 * cores + 1).astype(int)).tolist()
-    ranges = list(pairwise(edges))[::-1]
-
-    def work() -> None:
-        """Take the next range until there is none: a list gives each to one thread."""
-        while ranges:
-            try:
-                first, last = ranges.pop()
-            except IndexError:
-                return
-            function(first, last, *arguments, stop)
-
-    pool = ThreadPoolExecutor(cores)
-    try:
-        for thread in [pool.submit(work) for _ in range(cores)]:
-            thread.result()
-    except BaseException:
-        ranges.clear()
-        stop[0] = True
-        raise
-    finally:
-        pool.shutdown(wait=False)
 
 
 @njit(cache=True)
@@ -279,14 +233,10 @@ def _fill_row(
     weights = fixed.weights - y * model.weights
     sums = fixed.sums.copy()
     for k in range(sums.size):
-        # Of two ways to add up, the one with the smaller terms.
-        at_zero = fixed.sums[k] + model.reference * model.sums[k]
-        near, far = (y - model.reference) * model.sums[k], y * model.sums[k]
-        if abs(at_zero) + abs(far) < abs(fixed.sums[k]) + abs(near):
-            sums[k] = at_zero - far
-        else:
-            sums[k] -= near
-    crossing = CompiledSum(fixed.polynomials, weights, sums, fixed.phases)
+        lost, y0 = model.sums[k], model.reference
+        at_zero = fixed.sums[k] + y0 * lost
+        sums[k] = with_smaller_terms(at_zero, -y * lost, fixed.sums[k], (y0 - y) * lost)
+    crossing = CompiledSum(fixed.polynomials, weights, sums, fixed.phases, fixed.uncertain)
     zeros, complete = imaginary_zeros(
         crossing, model.measure, 0.0, rows.ends[i], model.is_map, CAUTION, MOST_STEPS, stop
     )
@@ -303,10 +253,10 @@ def _fill_row(
             total += jump
             change[np.searchsorted(x, position)] += jump
         if position + spread >= x[0] and position - spread <= x[-1]:
-            near = np.searchsorted(x, position - spread)
-            while near < x.size and x[near] <= position + spread:
-                doubtful[i, near] = True
-                near += 1
+            k = np.searchsorted(x, position - spread)
+            while k < x.size and x[k] <= position + spread:
+                doubtful[i, k] = True
+                k += 1
     for k in range(x.size):
         running += change[k]
         counts[i, k] = running
@@ -341,5 +291,5 @@ def fill_rows(model: RowModel, rows: Rows) -> tuple[IntArray, BoolArray, IntArra
         np.empty(shape[0], dtype=np.int64),
     )
     stop = np.zeros(1, dtype=np.bool_)
-    _on_all_cores(_fill_range, shape[0], filled, model, rows, stop=stop)
+    on_all_cores(_fill_range, shape[0], filled, model, rows, stop=stop)
     return filled

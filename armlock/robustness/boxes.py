@@ -9,7 +9,8 @@ import math
 
 import numpy as np
 
-from armlock.axis.contour import heard, winding
+from armlock.axis.contour import winding
+from armlock.axis.threads import interruptible
 from armlock.checks import IntArray, positive_number
 from armlock.loops import Loop, LoopAt, checked_loop
 from armlock.robustness.free_phases import clear_above, count_at
@@ -116,5 +117,6 @@ def _stays_clear(
     whole, (_, b1, b2) = loop.sum_at(c1, c2), loop.on_boundary()
     # The centre is a rounded number itself.
     uncertain = (half + 1e-15) * (np.abs(b1.sums) + np.abs(b2.sums))
-    _, _, clear, steps, _ = heard(winding, whole.compiled(), uncertain, 0.0, end)
+    followed = whole.compiled()._replace(uncertain=uncertain)
+    _, _, clear, steps, _ = interruptible(winding, followed, 0.0, end)
     return bool(clear), steps

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from armlock.axis.contour import MOST_SAMPLES, argument_at, heard, resolved_grid
+from armlock.axis.contour import MOST_SAMPLES, argument_at, resolved_grid
+from armlock.axis.threads import interruptible
 from armlock.checks import (
     BoolArray,
     ComplexArray,
@@ -23,11 +24,8 @@ from armlock.checks import (
 )
 from armlock.loops import Loop, LoopAt
 from armlock.stability.bounds import last_frequency, last_larger
-from armlock.stability.counts import (
-    CountError,
-    axis_zeros,
-    loop_count,
-)
+from armlock.stability.counts import CountError, loop_count
+from armlock.stability.zeros import axis_zeros
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -163,7 +161,7 @@ def _resolving_grid(loop: Loop, c1: float, c2: float, end: float) -> FloatArray:
     """Frequencies from 0 to `end` between which neither D nor R turns by much."""
     grids = []
     for part in (loop.sum_at(c1, c2), loop.rest_on_boundary()):
-        grid, complete = heard(
+        grid, complete = interruptible(
             resolved_grid, part.compiled(), end, _STRAIGHT, most=MOST_SAMPLES
         )
         if not complete:

@@ -16,8 +16,9 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
-from armlock.axis.contour import heard, resolved_grid
+from armlock.axis.contour import resolved_grid
 from armlock.axis.rounding import EPSILON
+from armlock.axis.threads import interruptible
 from armlock.characteristic import CharacteristicFunction, broadcast_parameters, checked_system
 from armlock.checks import (
     ComplexArray,
@@ -33,7 +34,7 @@ from armlock.stability.counts import BOUNDARY, CountError, unstable_roots
 # Real parts that differ by less count as equal; relative to |s| or one over the longest delay.
 _EQUAL = 1e-11
 # How far right of its root the last count may stand, relative to |Re s| or the same.
-_FARTHEST = 1e-6
+_COUNT_WITHIN = 1e-6
 # Longest walk along a line to count, and to look for roots, in turns of the longest delay's
 # exponential: a second each.
 _LONGEST_COUNT = 1e6
@@ -48,15 +49,15 @@ _LOST_ROOT, _POLISHED_ROOT = 1e5, 5e3
 _MOST_POINTS = 1_000_000
 # Roots left of a line may lie further up than those right of it. They are looked for so many
 # turns further: few at first, at most so many.
-_FURTHER = 4.0
-_FURTHEST = 3e4
+_FIRST_TURNS_FURTHER = 4.0
+_MOST_TURNS_FURTHER = 3e4
 # Most roots are slow: first looked for within this many times those turns.
-_SLOW_ONES = 1e3
+_MOST_OF_THEM = 1e3
 # Most points of a line from which Newton's method starts, and most of its steps in extended
 # precision: at a multiple root they only shrink by a share.
 _MOST_STARTS = 4096
 _NEWTON_STEPS = 12
-_MOST_STEPS = 100
+_EXTENDED_STEPS = 100
 # Most roots near a line that are tried in extended precision.
 _MOST_TRIED = 8
 # Most roots that are looked for right of a line.
@@ -139,7 +140,7 @@ def extended_root(
     with mpmath.workdps(digits + _GUARD_DIGITS):
         s = mpmath.mpc(complex(complex_array("start", start)[()]))
         point = mpmath.mpf(x), mpmath.mpf(y)
-        for _ in range(_MOST_STEPS):
+        for _ in range(_EXTENDED_STEPS):
             value, slope = system._value(s, *point, mpmath), system._slope(s, *point, mpmath)
             if value == 0:
                 return +s
@@ -236,7 +237,7 @@ class _Line:
             return 0.0
         if self.system.step:
             return self.turns
-        return min(self.turns, _SLOW_ONES * further, _LONGEST_SEARCH) + further
+        return min(self.turns, _MOST_OF_THEM * further, _LONGEST_SEARCH) + further
 
     def near(self, turns: float, most: int) -> tuple[ComplexArray, FloatArray]:
         """Follow Newton's method to roots near the line; return them and the last steps.
@@ -244,7 +245,8 @@ class _Line:
         Up to so many turns, from those `most` starts whose first step leads furthest right.
         """
         whole = self.shifted.sum_at(self.x, self.y).compiled()
-        grid, _ = heard(resolved_grid, whole, turns * self.per_turn, 1.0, most=_MOST_POINTS)
+        end = turns * self.per_turn
+        grid, _ = interruptible(resolved_grid, whole, end, 1.0, most=_MOST_POINTS)
         s = self.sigma + 1j * grid
         # A point costs a step of the walk, and one of Newton's method.
         self.steps += 2 * s.size
@@ -357,7 +359,7 @@ def _all_near(line: _Line, unit: float) -> Iterator[tuple[ComplexArray, FloatArr
     # Others along the line, ever further up, or closer to the axis.
     turns, steps = 0.0, 0.0
     while turns < line.turns:
-        turns = min(8.0 * max(turns, _FURTHER), line.turns)
+        turns = min(8.0 * max(turns, _FIRST_TURNS_FURTHER), line.turns)
         for share in (1.0, 0.3, 0.1, 0.0):
             one = _Line(line.system, line.x, line.y, share * line.sigma)
             # That of the delays that act on no root so far to the right, if none is left.
@@ -422,12 +424,12 @@ def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
     best = complex(np.nan, np.nan)
     # There are roots right of `low`, as far as can be told, and none right of `high`.
     low, high, sigma, width, walked = -np.inf, np.inf, 0.0, unit, 0.0
-    further = _FURTHER
+    further = _FIRST_TURNS_FURTHER
     while walked < _ALL_STEPS and sigma not in (low, high):
         line = _Line(acting, p, q, sigma)
         root, ahead = line.rightmost(further) or (complex(np.nan, np.nan), 0.0)
-        further = min(2.0 * further, _FURTHEST)
-        farthest = _FARTHEST * max(abs(root.real), unit)
+        further = min(2.0 * further, _MOST_TURNS_FURTHER)
+        farthest = _COUNT_WITHIN * max(abs(root.real), unit)
         # Next to the limit of the chain no count tells that roots lie right of `low`.
         if root.real + farthest > low:
             best = root
