@@ -277,6 +277,7 @@ def sensitivity(frequency: FloatArray, c1: float, c2: float) -> ComplexArray:
     return np.asarray(1.0 / (1.0 + loop))
 
 
+@shared
 def sensitivity_change() -> dict[str, float]:
     """Return where, and by how much, the constant perturbation changes the closed loop.
 
@@ -290,11 +291,11 @@ def sensitivity_change() -> dict[str, float]:
         f = np.asarray(f)
         return np.asarray(sensitivity(f, *STRONG) / sensitivity(f, *IDEAL))
 
-    def apart(f: float) -> float:
-        return float(np.abs(np.abs(ratio(f)) - 1.0)) - 0.1
+    def apart(f: npt.ArrayLike) -> FloatArray:
+        return np.asarray(np.abs(np.abs(ratio(f)) - 1.0) - 0.1)
 
     size = largest(lambda f: np.abs(ratio(f)), frequency)
-    last = int(np.flatnonzero([apart(f) > 0.0 for f in frequency])[-1])
+    last = int(np.flatnonzero(apart(frequency) > 0.0)[-1])
     return {
         "ratio": size.value,
         "at": size.at,
