@@ -24,7 +24,8 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
-from armlock.axis.exponentials import LOW_DEGREE, ExponentialSum, Polynomial
+from armlock.axis.exponentials import LOW_DEGREE, ExponentialSum
+from armlock.axis.polynomials import Polynomial
 from armlock.axis.rounding import EPSILON
 from armlock.checks import (
     ComplexArray,
@@ -64,7 +65,7 @@ class CharacteristicFunction:
 
     Parameters
     ----------
-    rest, b1, b2 : sequence of float, or armlock.axis.exponentials.Polynomial
+    rest, b1, b2 : sequence of float, or armlock.axis.polynomials.Polynomial
         Coefficients of R, B1 and B2 in ascending powers of s (of z = exp(s step) for a map);
         or polynomials with known roots, which are then kept.
     tau1, tau2 : float

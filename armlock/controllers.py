@@ -18,7 +18,7 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
 from armlock import paper
-from armlock.axis.exponentials import quotients
+from armlock.axis.polynomials import quotients
 from armlock.checks import (
     ComplexArray,
     FloatArray,

@@ -27,7 +27,6 @@ from armlock.checks import (
     positive_array,
     positive_number,
     real_number,
-    true_or_false,
 )
 from armlock.controllers import Controller
 from armlock.loops import Loop, LoopAt, checked_loop
@@ -92,7 +91,6 @@ def design(
     *,
     goal: tuple[Sequence[float] | FloatArray, Sequence[float] | FloatArray] | None = None,
     box: float = paper.PERTURBATION,
-    free_gain: bool = False,
 ) -> Design:
     r"""Search for a controller of a given structure, and certify what was found.
 
@@ -100,7 +98,8 @@ def design(
     ----------
     structure : Loop
         A loop to start from, with sensor, delays and dead time. Its controller's real zeros and
-        poles are moved by a decade at most; equal ones stay equal, those at s = 0 stay there.
+        poles, and its gain in the middle of the goal's frequencies, are moved by a decade at
+        most; equal ones stay equal, those at s = 0 stay there.
     objective : str
         What is to become as large as possible: a key of `constraints`.
     constraints : mapping of str to float
@@ -117,8 +116,6 @@ def design(
         the structure, at 60 frequencies from 0.1 mHz to 1 Hz.
     box : float, optional
         Perturbations of either arm for which the loop is to be stable.
-    free_gain : bool, optional
-        Whether the gain is a parameter, too.
 
     Returns
     -------
@@ -128,9 +125,8 @@ def design(
     ------
     TypeError, ValueError
         If an argument is not what it is to be; the structure has complex factors, or ones right
-        of the imaginary axis, or nothing to move, or is not stable; or no candidate met all
-        constraints: the message names those that were missed by the best candidate, and by how
-        much.
+        of the imaginary axis, or is not stable; or no candidate met all constraints: the
+        message names those that were missed by the best candidate, and by how much.
     CountError
         If rounding spoils a certificate.
 
@@ -149,7 +145,7 @@ def design(
     """
     bounds = _checked_bounds(objective, constraints)
     box = positive_number("box", box)
-    parameters = _parameters(structure, true_or_false("free_gain", free_gain))
+    parameters = _parameters(structure)
     goal = _checked_goal(structure, goal)
     moved = partial(_moved, structure, parameters, np.exp(np.log(goal[0]).mean()))
     samples = _samples(structure)
@@ -165,7 +161,7 @@ def design(
         )
         return 10.0 * sum(max(m, 0.0) for m in missed) - _logarithm(objective, found[objective])
 
-    loop = moved(_smallest(cost, len(parameters)))
+    loop = moved(_smallest(cost, len(parameters) + 1))
     counts = box_counts(loop, box, samples.omega[samples.free])
     if counts.any():
         raise ValueError(
@@ -226,8 +222,8 @@ def _check_start(structure: Loop, sampled: dict[str, float] | None) -> None:
         )
 
 
-def _parameters(structure: Loop, free_gain: bool) -> list[tuple[str, complex]]:
-    """Return what moves: each zero and pole but those at s = 0, equal ones as one; the gain."""
+def _parameters(structure: Loop) -> list[tuple[str, complex]]:
+    """Return what moves but the gain: zeros and poles not at s = 0, equal ones as one."""
     k = checked_loop(structure).controller
     if any(r.imag or r.real > 0.0 for r in (*k.zeros, *k.poles)):
         raise ValueError(
@@ -235,30 +231,19 @@ def _parameters(structure: Loop, free_gain: bool) -> list[tuple[str, complex]]:
             f"got zeros {k.zeros} and poles {k.poles}"
         )
     roots = [("zero", z) for z in k.zeros if z] + [("pole", p) for p in k.poles if p]
-    found = list(dict.fromkeys(roots)) + [("gain", 0.0)] * free_gain
-    if not found:
-        raise ValueError(
-            f"structure must have a zero or pole other than s = 0 to move, or free_gain be "
-            f"true; got {k!r}"
-        )
-    return found
+    return list(dict.fromkeys(roots))
 
 
 def _moved(
     structure: Loop, parameters: list[tuple[str, complex]], frequency: float, x: FloatArray
 ) -> Loop:
-    """Return a candidate, with the parameters moved by x decades.
-
-    A free gain is that of K at a frequency in Hz; otherwise K keeps its factor in front.
-    """
-    old, factors = structure.controller, dict(zip(parameters, 10.0**x, strict=True))
+    """Return a candidate: parameters, and |K| at a frequency in Hz, moved by x decades."""
+    old, (*moves, gain) = structure.controller, 10.0**x
+    factors = dict(zip(parameters, moves, strict=True))
     zeros = [z * factors.get(("zero", z), 1.0) for z in old.zeros]
     poles = [p * factors.get(("pole", p), 1.0) for p in old.poles]
-    k = Controller(zeros, poles, old.gain)
-    if ("gain", 0.0) in factors:
-        middle = 2j * np.pi * frequency
-        size = factors["gain", 0.0] * abs(old(middle) / k(middle))
-        k = Controller(zeros, poles, old.gain * size)
+    k, middle = Controller(zeros, poles, old.gain), 2j * np.pi * frequency
+    k = Controller(zeros, poles, old.gain * float(gain * abs(old(middle) / k(middle))))
     return Loop(k, structure.mapping, structure.tau1, structure.tau2, structure.delay)
 
 

@@ -23,7 +23,8 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
 from armlock import paper, sensors
-from armlock.axis.exponentials import ExponentialSum, Polynomial
+from armlock.axis.exponentials import ExponentialSum
+from armlock.axis.polynomials import Polynomial
 from armlock.characteristic import CharacteristicFunction
 from armlock.checks import (
     ComplexArray,

@@ -82,7 +82,7 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     armlock.Simulation: {"loop": ARMS} | RUN,
     armlock.sampled_open_loop: {"loop": ARMS, "omega": 1.0, "sample_rate": 10.0} | POINT,
     armlock.LaserNoise: {"level": 30.0} | NOISE,
-    armlock.PerturbationNoise: {"scale": 1.0} | NOISE,
+    armlock.PerturbationNoise: NOISE,
     armlock.ShapedNoise: {"seed": 1, "sample_rate": 10.0} | SHAPE,
     LASER.draw: {"samples": 3},
     LASER.asd: {"frequency": 3.0},

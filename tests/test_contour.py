@@ -4,7 +4,7 @@ import pytest
 from numpy.polynomial.polynomial import polyval
 
 from armlock import CommonArm, paper_loop, unstable_roots
-from armlock.axis import contour, counting, exponentials, rounding
+from armlock.axis import contour, counting, exponentials, polynomials, rounding, threads
 from armlock.stability import bounds
 from armlock.stability.bounds import last_frequency
 from armlock.stability.counts import _point_model
@@ -26,7 +26,7 @@ def compiled_sum(coefficients, weights, sums, phases):
 def compiled_polynomial(found):
     """The monic real polynomial with these roots, evaluated from them."""
     coefficients = np.poly(found).real[::-1].astype(np.float64)
-    one = exponentials.Polynomial(coefficients, found)
+    one = polynomials.Polynomial(coefficients, found)
     whole = exponentials.ExponentialSum((one,), np.ones((1, 1)), np.zeros(1), np.ones(1))
     return whole.compiled()
 
@@ -37,7 +37,9 @@ def walk(constants, phases, omega_end):
     summed = compiled_sum(
         np.reshape(constants, (-1, 1)), np.eye(number), np.ones(number), phases
     )
-    argument, value, clear, _, told = contour.heard(contour.winding, summed, 0.0, omega_end)
+    argument, value, clear, _, told = threads.interruptible(
+        contour.winding, summed, 0.0, omega_end
+    )
     assert clear
     assert told
     return argument, value
@@ -87,7 +89,7 @@ def random_sum(degree, rng):
     for number in (degree, degree // 2):
         found = roots(rng, number, 1e-2, 1e3, 0.5)
         coefficients = np.poly(found).real[::-1].astype(np.float64)
-        parts.append(exponentials.Polynomial(coefficients, np.array(found, complex)))
+        parts.append(polynomials.Polynomial(coefficients, np.array(found, complex)))
     phases, weights = rng.uniform(-3.0, 3.0, 2), rng.normal(size=(2, 2))
     whole = exponentials.ExponentialSum(tuple(parts), weights, phases, weights.sum(axis=0))
 
@@ -110,7 +112,7 @@ def random_sum(degree, rng):
 def test_a_piece_holds_a_sum_and_bounds_what_it_leaves_out(degree, omega):
     whole, exact = random_sum(degree, np.random.default_rng(degree))
     piece = exponentials.expand(whole.compiled(), omega)
-    rounded = rounding.rounding_bound(piece, 8.0)
+    rounded = exponentials.rounding_bound(piece, 8.0)
     bends = [exponentials.curvature_bound(piece)]
     if omega == 0.0:
         bends.append(exponentials.curvature_from_zero(piece))
@@ -145,7 +147,9 @@ def random_piece(rng, *, direct=False):
         start = rng.choice([0.0, 10.0 ** rng.uniform(-3.0, 3.0)])
     phases = rng.choice([-1.0, 1.0], groups) * 10.0 ** rng.uniform(-3.0, 2.0, groups)
     magnitudes = np.column_stack((np.abs(local), np.zeros(groups + 1)))
-    return exponentials.Piece(start, start + length, 1.0 / length, local, magnitudes, phases)
+    return exponentials.Piece(
+        start, start + length, 1.0 / length, local, magnitudes, phases, False
+    )
 
 
 def second_derivative(piece, omega):
@@ -181,7 +185,7 @@ def test_a_monotonic_stretch_is_one():
     for _ in range(2000):
         piece = random_piece(rng)
         bound = exponentials.curvature_bound(piece)
-        error = rounding.rounding_bound(piece, rounding.ROUNDING)
+        error = exponentials.rounding_bound(piece, rounding.ROUNDING)
         width = 0.5 * (piece.end - piece.start) * 10.0 ** rng.uniform(-6.0, 0.0)
         omega = piece.start + width + (piece.end - piece.start - 2.0 * width) * rng.random()
         if contour._is_monotonic(piece, bound, error, omega, width):
@@ -219,7 +223,7 @@ def test_slow_terms_bound_what_the_fast_ones_add_up_to():
         slow, fast = contour._slow_terms(piece)
         for at in piece.start + (piece.end - piece.start) * rng.random(10):
             left = abs(exponentials.evaluate(piece, at)[0] - exponentials.evaluate(slow, at)[0])
-            error = rounding.rounding_bound(slow, rounding.ROUNDING)
+            error = exponentials.rounding_bound(slow, rounding.ROUNDING)
             most = exponentials.bound_at(fast, piece, at)
             assert left <= most + exponentials.bound_at(error, piece, at)
 
@@ -250,7 +254,7 @@ def test_next_to_a_cluster_a_polynomial_keeps_its_digits(shape):
     for omega in found[::2].imag:
         piece = exponentials.expand(whole, omega)
         value, _ = exponentials.evaluate(piece, omega)
-        error = exponentials.bound_at(rounding.rounding_bound(piece, 8.0), piece, omega)
+        error = exponentials.bound_at(exponentials.rounding_bound(piece, 8.0), piece, omega)
         exact = np.prod(1j * omega - found)
         # A piece is divided by a power of two.
         scales.append(np.log2(abs(value / exact)))
@@ -264,7 +268,7 @@ def test_a_stretch_that_may_hold_three_zeros_is_not_taken_for_one():
     imaginary = np.poly([1.0, 1.0 - 1e-7, 1.0 + 1e-7])[::-1]
     whole = 1j * imaginary[None, :] + np.array([[1.0, 0.0, 0.0, 0.0]])
     summed = compiled_sum(whole, [[1.0]], [1.0], [0.0])
-    zeros, complete = contour.heard(
+    zeros, complete = threads.interruptible(
         contour.imaginary_zeros, summed, None, 0.5, 2.0, False, rounding.ROUNDING
     )
     assert complete
@@ -286,7 +290,7 @@ def test_a_walk_leaves_a_zero_of_high_order_at_once():
     whole = np.zeros((2, 6), dtype=complex)
     whole[0, 2], whole[1, 5] = 1.0, 1.0j
     summed = compiled_sum(whole, [[0.0, 0.5], [0.0, 0.5]], [1.0, -1.0], [1.0, -1.0])
-    zeros, complete = contour.heard(
+    zeros, complete = threads.interruptible(
         contour.imaginary_zeros, summed, None, 0.0, 50.0, False, rounding.ROUNDING, most=500
     )
     assert complete

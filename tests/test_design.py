@@ -97,7 +97,7 @@ def test_what_is_found_has_the_measures_that_it_is_said_to_have():
 
 def test_a_loop_with_a_dead_time_is_certified_at_all_frequencies():
     start = Loop(([], [-0.1], 0.1), "common", 20.1, 19.9, 1e-3)
-    found = design(start, "suppression", {"modulus": 0.25}, free_gain=True)
+    found = design(start, "suppression", {"modulus": 0.25})
     assert found.measures["suppression"] > 0.0
     assert found.measures["modulus"] == modulus_margin(found.loop)
 
@@ -118,10 +118,10 @@ def test_a_stable_start_is_seen_and_the_constraint_that_is_missed_is_named(gain)
 def test_a_perturbation_above_one_is_made_larger():
     """With K(0) = k the loop is stable up to c1 = 1 + 1 / k: k falls as far as it may."""
     start = Loop(([], [-0.1], 0.003), "single", 20.0)
-    found = design(start, "critical_perturbation", {"suppression": -25.0})
+    found = design(start, "critical_perturbation", {"suppression": -10.0})
     k = found.loop.controller(0.0).real
     assert found.measures["critical_perturbation"] == pytest.approx(1.0 / k, rel=1e-9)
-    assert k == pytest.approx(0.003, rel=1e-3)
+    assert k == pytest.approx(0.03 * 10.0**-0.5, rel=1e-2)
 
 
 def test_contradictory_constraints_say_which_was_missed_and_by_how_much():
@@ -168,9 +168,8 @@ UNSTABLE = Loop(([], [-0.1], 300.0), "single", 20.0, delay=1.0)
         ({"constraints": {"beauty": 1.0}}, "constraints must be one of .*'beauty'"),
         ({"structure": paper_loop(controller=RIGHT)}, "structure must have .* none positive"),
         ({"structure": paper_loop(controller=COMPLEX)}, "structure must have .* real zeros"),
-        ({"structure": CommonArm()}, "structure must have a zero or pole other than s = 0"),
         ({"structure": UNSTABLE}, r"structure must be stable at .* is 1336"),
-        ({"structure": CommonArm(), "free_gain": True}, r"stable over the box; .*\[-1\]"),
+        ({"structure": CommonArm()}, r"stable over the box; .*\[-1\]"),
         ({"goal": ([1e-3, 1e-2], [1.0])}, "goal must hold as many gains as frequencies"),
         ({"goal": ([-1e-3], [1.0])}, "goal must be positive"),
         ({"box": 0.0}, "box must be positive"),

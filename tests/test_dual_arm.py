@@ -1,5 +1,7 @@
 """The dual arm against closed forms, and crossings along rays."""
 
+from contextlib import nullcontext
+
 import mpmath
 import numpy as np
 import pytest
@@ -46,6 +48,17 @@ def test_a_count_that_cannot_be_told_confirms_no_crossing(monkeypatch):
     unknown = Ray(DualArm(), (0.9, 1.0), (0.0, 1.0))
     with pytest.raises(CountError, match="are -1 and -1"):
         unknown._confirm(nothing, stretch, 3e-4)
+
+
+@pytest.mark.parametrize(("told_from", "confirms"), [(1e-11, True), (1e-6, False)])
+def test_a_start_on_the_boundary_confirms_what_is_next_to_it(told_from, confirms):
+    def count(t):
+        return -1 if t < told_from else 0
+
+    ray = Ray(DualArm(), (0.9, 1.0), (0.0, 1.0))
+    ray.count = count
+    with nullcontext() if confirms else pytest.raises(CountError, match="are -1 and 0"):
+        ray._confirm(rays._NONE, np.array([[0.0, 2e-4]]), 3e-4)
 
 
 @pytest.mark.parametrize("zeros", [(), (-0.5,)])

@@ -29,7 +29,7 @@ from armlock import (
     spectral_radius,
     unstable_roots,
 )
-from armlock.axis import contour
+from armlock.axis import contour, threads
 from armlock.axis.rounding import ROUNDING
 from armlock.loops import LoopAt
 from armlock.performance.pulling import pulling
@@ -185,8 +185,8 @@ def ends_when_interrupted(call):
 @pytest.mark.parametrize("name", LONG)
 def test_an_interrupt_ends_a_walk_within_a_second(name):
     walk, *arguments = LONG[name]
-    contour.heard(walk, *arguments, most=1)  # compiles
-    assert ends_when_interrupted(lambda: contour.heard(walk, *arguments)) < 1.0
+    threads.interruptible(walk, *arguments, most=1)  # compiles
+    assert ends_when_interrupted(lambda: threads.interruptible(walk, *arguments)) < 1.0
 
 
 def test_an_interrupt_ends_free_phases_within_a_second():

@@ -114,8 +114,8 @@ def test_formulas_of_the_paper():
     frequency = np.geomspace(1e-3, 50.0, 50)
     laser = LaserNoise(1, cutoff=1e-9)
     assert laser.asd(frequency) == pytest.approx(30.0 / frequency, rel=1e-9)
-    eta = PerturbationNoise(1, cutoff=1e-9, scale=2.0)
-    printed = 2.0 * 3.6e-5 * np.sqrt(1.0 + (2.8e-3 / frequency) ** 4)
+    eta = PerturbationNoise(1, cutoff=1e-9)
+    printed = 3.6e-5 * np.sqrt(1.0 + (2.8e-3 / frequency) ** 4)
     assert eta.asd(frequency) == pytest.approx(printed, rel=1e-9)
 
 

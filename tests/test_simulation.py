@@ -30,7 +30,8 @@ from armlock import (
 )
 from armlock.sensors import COMMON, SINGLE, SignalMapping
 from armlock.timedomain import simulation
-from armlock.timedomain.simulation import BLOCK, LANES, lagrange_delay
+from armlock.timedomain.delays import lagrange_delay
+from armlock.timedomain.simulation import BLOCK, LANES
 from tests import independent
 
 RATE = 200.0
@@ -48,7 +49,7 @@ def relative_error(found, expected):
 def test_accuracy_over_a_million_samples():
     """With c1 and c2 that change."""
     noise = LaserNoise(1).draw(1_200_000)
-    c1, c2 = (1.0 + PerturbationNoise(k, scale=1e-4).draw(noise.size) for k in (2, 3))
+    c1, c2 = (1.0 + 1e-4 * PerturbationNoise(k).draw(noise.size) for k in (2, 3))
     expected = independent.locked_paper_loop(noise, c1, c2, RATE)
     assert c1.std() > 1e-7
     assert c2.std() > 1e-7

@@ -21,7 +21,7 @@ from armlock import (
     unstable_roots,
 )
 from armlock.robustness.rays import Ray
-from armlock.stability.counts import axis_zeros
+from armlock.stability.zeros import axis_zeros
 from tests import independent
 from tests.systems import NEUTRAL, RETARDED, with_roots
 from tests.test_in_time import ends_when_interrupted

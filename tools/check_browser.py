@@ -4,11 +4,10 @@ Usage: python tools/check_browser.py FOLDER [PAGE ...]
 
 Each page is opened from disk in headless Chromium, in light and dark mode and at the widths of
 a screen, a tablet and two telephones. A page must ask nothing of the network, report no error,
-show no raw TeX, describe every image, not scroll sideways, have no finding of axe, and be
+show no raw TeX, not scroll sideways, have no finding of axe, and be
 readable in time; what it loads must not weigh too much. Code, tables and formulas that are
-wider than their column must scroll, and say so. Of the listings of the package's sources, which
-differ in their text only, one is opened. Search must find something, and what reacts to the
-pointer must react:
+wider than their column must scroll, and say so. Search must find something, and what reacts to
+the pointer must react:
 
 - `data-check="hover"` on an element: its text must change while the pointer crosses it, and
   where a finger taps it;
@@ -22,7 +21,7 @@ import os
 import shutil
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import get_context
@@ -40,7 +39,7 @@ MIDDLE = {"width": 768, "height": 1024}
 NARROW = {"width": 390, "height": 844}
 NARROWEST = {"width": 320, "height": 640}
 LONGEST = 3.0  # seconds of processor time until a page is readable
-HEAVIEST = 6e6  # bytes that a page loads
+HEAVIEST = 3e6  # bytes that a page loads
 # A word that the search of any book here must find.
 WORD = "delay"
 
@@ -59,15 +58,6 @@ RAW = r"""() => {
   }
   return found;
 }"""
-
-IMAGES = r"""() => [...document.querySelectorAll('img, svg[role=img]')].filter(image => {
-  if (image.closest('[aria-hidden=true]') || image.getAttribute('role') === 'presentation')
-    return false;
-  const text = image.getAttribute('alt') || image.getAttribute('aria-label')
-    || image.getAttribute('aria-labelledby') || image.querySelector?.('title')?.textContent;
-  return !text || !text.trim() || /\.(png|svg|jpe?g)$/.test(text);
-}).map(image => 'no alternative text: ' + (image.getAttribute('src') || image.outerHTML)
-  .slice(0, 80))"""
 
 SIDEWAYS = r"""() => {
   const width = document.documentElement.clientWidth;
@@ -157,6 +147,21 @@ def browser() -> Iterator[Any]:
             chromium.close()
 
 
+def clock(page: Any) -> Callable[[], float]:
+    """Return what tells for how long a page has worked since it was opened, in s.
+
+    It is time of the processor, which other programs may have meanwhile.
+    """
+    session = page.context.new_cdp_session(page)
+    session.send("Performance.enable", {"timeDomain": "threadTicks"})
+
+    def worked() -> float:
+        metrics = session.send("Performance.getMetrics")["metrics"]
+        return float(next(m["value"] for m in metrics if m["name"] == "TaskDuration"))
+
+    return worked
+
+
 class Book:
     """The pages of a built book, and what was found on them."""
 
@@ -167,33 +172,16 @@ class Book:
         self.axe = Axe()
         self.colours: list[str] = []
         self.problems: list[str] = []
-        self.pages = 0
-        self.slowest = (0.0, "")
-        self.heaviest = (0, "")
         self.file = self.folder
         self.requests: set[str] = set()
         context = chromium.new_context(viewport=WIDE, offline=True, reduced_motion="reduce")
         self.page = context.new_page()
         telephone = chromium.new_context(viewport=NARROW, offline=True, has_touch=True)
         self.telephone = telephone.new_page()
-        # Time of the processor, since other programs may have it meanwhile.
-        self.session = context.new_cdp_session(self.page)
-        self.session.send("Performance.enable", {"timeDomain": "threadTicks"})
+        self.worked = clock(self.page)
         self.page.on("request", lambda request: self.requests.add(request.url))
         self.page.on("pageerror", lambda error: self.report(f"script error: {error}"))
         self.page.on("console", self.read_console)
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return what was found: the browser stays in its process."""
-        kept = ("problems", "pages", "slowest", "heaviest")
-        return {name: vars(self)[name] for name in kept}
-
-    def join(self, other: "Book") -> None:
-        """Add what was found on other pages."""
-        self.problems += other.problems
-        self.pages += other.pages
-        self.slowest = max(self.slowest, other.slowest)
-        self.heaviest = max(self.heaviest, other.heaviest)
 
     def report(self, problem: str) -> None:
         """Note a problem of the page that is open."""
@@ -206,29 +194,20 @@ class Book:
         if message.type == "error":
             self.report(f"console: {message.text}")
 
-    def busy(self) -> float:
-        """Return for how long the page has worked since it was opened, in s."""
-        metrics = self.session.send("Performance.getMetrics")["metrics"]
-        return float(next(m["value"] for m in metrics if m["name"] == "TaskDuration"))
-
     def open(self, file: Path, query: str = "") -> float:
         """Open a page, wait for its formulas, and return what work that was, in s."""
         self.file, self.requests = file, set()
         self.page.goto(file.as_uri() + query, wait_until="load")
         self.page.evaluate(TYPESET)
-        return self.busy()
+        return self.worked()
 
     def check(self, file: Path) -> None:
         """Do all checks of one page."""
         seconds = self.open(file)
-        name = str(file.relative_to(self.folder))
-        self.slowest = max(self.slowest, (seconds, name))
         if seconds > LONGEST:
             self.report(f"takes {seconds:.1f} s to load, more than {LONGEST:.0f}")
-        self.pages += 1
-        for script in (RAW, IMAGES):
-            for problem in self.page.evaluate(script):
-                self.report(problem)
+        for problem in self.page.evaluate(RAW):
+            self.report(problem)
         self.check_interaction()
         if self.page.locator("[data-check=hover]").count():
             self.check_touch(file)
@@ -243,9 +222,9 @@ class Book:
             for problem in [*self.page.evaluate(SIDEWAYS), *self.page.evaluate(CUT)]:
                 self.report(problem)
         self.page.set_viewport_size(WIDE)
-        self.check_requests(name)
+        self.check_requests()
 
-    def check_requests(self, name: str) -> None:
+    def check_requests(self) -> None:
         """See that everything came from disk, and how much it was."""
         size = 0
         for url in self.requests:
@@ -255,7 +234,6 @@ class Book:
                 size += path.stat().st_size if path.is_file() else 0
             elif parts.scheme not in {"data", "blob", "about"}:
                 self.report(f"asks the network for {url}")
-        self.heaviest = max(self.heaviest, (size, name))
         if size > HEAVIEST:
             self.report(f"loads {size / 1e6:.1f} MB, more than {HEAVIEST / 1e6:.0f}")
 
@@ -281,7 +259,7 @@ class Book:
         """Move the pointer over what reacts to it, and sliders."""
         page = self.page
         for element in page.locator("[data-check=hover]").all():
-            if not self.sweep(element):
+            if not self.reacts(page, element, page.mouse.move):
                 self.report("an element that should react to the pointer does not")
         for slider in page.locator("main input[type=range]").all():
             slider.scroll_into_view_if_needed()
@@ -299,27 +277,21 @@ class Book:
 
     def check_touch(self, file: Path) -> None:
         """Tap on what reacts to the pointer."""
-        self.telephone.goto(file.as_uri(), wait_until="load")
-        for element in self.telephone.locator("[data-check=hover]").all():
-            element.scroll_into_view_if_needed()
-            before, box = element.inner_text(), element.bounding_box()
-            for share in (0.3, 0.5, 0.7):
-                self.telephone.touchscreen.tap(
-                    box["x"] + share * box["width"], box["y"] + 0.4 * box["height"]
-                )
-            self.telephone.wait_for_timeout(60)
-            if element.inner_text() == before:
+        page = self.telephone
+        page.goto(file.as_uri(), wait_until="load")
+        for element in page.locator("[data-check=hover]").all():
+            if not self.reacts(page, element, page.touchscreen.tap):
                 self.report("an element that should react to a finger does not")
 
-    def sweep(self, element: Any) -> bool:
-        """Move the pointer across an element until its text changes."""
+    def reacts(self, page: Any, element: Any, poke: Callable[[float, float], None]) -> bool:
+        """Poke at places all over an element until its text changes."""
         element.scroll_into_view_if_needed()
         before, box = element.inner_text(), element.bounding_box()
         for i in range(1, 40):
             x = box["x"] + box["width"] * ((0.37 * i) % 0.96 + 0.02)
             y = box["y"] + box["height"] * ((0.61 * i) % 0.96 + 0.02)
-            self.page.mouse.move(x, y)
-            self.page.wait_for_timeout(60)
+            poke(x, y)
+            page.wait_for_timeout(60)
             if element.inner_text() != before:
                 return True
         return False
@@ -337,62 +309,50 @@ class Book:
 
 
 def pages(folder: Path) -> list[Path]:
-    """Return the pages of the book, without redirects and the theme's templates."""
-    found = []
-    for file in sorted(folder.resolve().rglob("*.html")):
-        if file.relative_to(folder.resolve()).parts[0] == "_static":
-            continue
-        if 'http-equiv="refresh"' not in file.read_text(encoding="utf-8")[:500].lower():
+    """Return the pages of the book, without redirects and the theme's templates.
+
+    Of the listings of the package's sources, which differ in their text only, there is one.
+    """
+    found, listed = [], False
+    for file in sorted(folder.rglob("*.html")):
+        within = file.relative_to(folder).parts[0]
+        listing = within == "_modules" and file.name != "index.html"
+        redirect = 'http-equiv="refresh"' in file.read_text(encoding="utf-8")[:500].lower()
+        if not (within == "_static" or redirect or (listing and listed)):
             found.append(file)
+            listed |= listing
     return found
 
 
-def listing(folder: Path, file: Path) -> bool:
-    """Return whether a page lists a source file."""
-    return file.relative_to(folder).parts[0] == "_modules" and file.name != "index.html"
-
-
-def check_some(folder: Path, files: list[Path], search: bool) -> Book:
-    """Check some pages, and the search."""
+def check(folder: Path, files: list[Path], search: bool) -> list[str]:
+    """Return the problems of some pages, and of the search."""
     with browser() as chromium:
         book = Book(folder, chromium)
         for file in files:
             book.check(file)
         if search:
             book.check_search()
-    return book
-
-
-def check(folder: Path, names: list[str] | None = None) -> Book:
-    """Check all pages of a folder, or those that are named, two at a time."""
-    folder = folder.resolve()
-    files = [folder / name for name in names] if names else pages(folder)
-    listings = [] if names else [file for file in files if listing(folder, file)]
-    opened = [file for file in files if file not in listings[1:]]
-    opened.sort(key=lambda file: file.stat().st_size)
-    with ProcessPoolExecutor(2, get_context("spawn")) as pool:
-        parts = [opened[::2], opened[1::2]]
-        book, other = pool.map(check_some, [folder] * 2, parts, [not names, False])
-    book.join(other)
-    return book
+    return book.problems
 
 
 def main() -> int:
     """Check the folder named on the command line."""
-    folder = Path(sys.argv[1])
+    folder = Path(sys.argv[1]).resolve()
     if find_chromium() is None:
         print("No Chromium was found; on Debian and Ubuntu: apt-get install chromium")
         return 1
     started = time.monotonic()
-    book = check(folder, sys.argv[2:])
-    print(*book.problems, sep="\n", end="\n" if book.problems else "")
+    named = [folder / name for name in sys.argv[2:]]
+    files = sorted(named or pages(folder), key=lambda file: file.stat().st_size)
+    with ProcessPoolExecutor(2, get_context("spawn")) as pool:
+        parts = pool.map(check, [folder] * 2, [files[::2], files[1::2]], [not named, False])
+    problems = [problem for part in parts for problem in part]
+    print(*problems, sep="\n", end="\n" if problems else "")
     print(
-        f"{book.pages} pages in Chromium, {time.monotonic() - started:.0f} s; slowest: "
-        f"{book.slowest[1]}, {book.slowest[0]:.2f} s; heaviest: {book.heaviest[1]}, "
-        f"{book.heaviest[0] / 1e6:.1f} MB"
+        f"{len(files)} pages in Chromium, {time.monotonic() - started:.0f} s: the book has "
+        f"{len(problems) or 'no'} problems in a browser"
     )
-    print(f"The book has {len(book.problems) or 'no'} problems in a browser")
-    return 1 if book.problems else 0
+    return 1 if problems else 0
 
 
 if __name__ == "__main__":

@@ -29,16 +29,14 @@ zero. Who asks, and what each does with it:
 - D-curves (`armlock.stability.dcurve`) are cut at its middle: their points do not depend on it.
 
 A count that cannot be told (-1) confirms nothing: who asks for one looks beside it, up to a
-thousandth away (`armlock.robustness.rays.count_beside`), and refuses where that does not help.
+thousandth away (`armlock.stability.zeros.count_beside`), and refuses where that does not help.
 
 All functions here work on exponential sums, piece by piece, see `armlock.axis.exponentials`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -51,9 +49,11 @@ from armlock.axis.exponentials import (
     curvature_from_zero,
     evaluate,
     expand,
+    rounding_bound,
     tangent_distance,
 )
-from armlock.axis.rounding import CAUTION, EPSILON, ROUNDING, rounding_bound
+from armlock.axis.rounding import CAUTION, EPSILON, ROUNDING
+from armlock.axis.threads import MOST_STEPS
 from armlock.checks import BoolArray, ComplexArray, FloatArray
 
 # Share of a certified bound that a step may use up.
@@ -61,9 +61,8 @@ SAFETY = 0.95
 
 # Turns of the longest delay after which `winding` tries again to follow the slow terms alone.
 _BLOCK = 32.0
-# Most steps of one walk: some three seconds. A turn of the longest delay takes about ten, but
-# where slow terms are followed alone. No plain int, for which numba would compile walks twice.
-MOST_STEPS = np.int64(10_000_000)
+
+
 # A walk over which the fastest exponential turns by more radians than this is not begun.
 MOST_RADIANS = 20.0 * MOST_STEPS
 # Most samples of a grid.
@@ -71,52 +70,12 @@ MOST_SAMPLES = 10_000_000
 
 # A zero walk crawls where steps are shorter than this share of omega, and of a radian of the
 # fastest exponential: a zero at a place of its own takes far less than a thousand such steps.
-# After so many the error is taken for larger, by the square root of 1 / _SHORT, which lets the
-# next steps be that much longer; where that happened once, it is not waited for so long again.
+# After so many the error is taken for larger, so that the next steps are longer by the root of
+# that factor. Where that happened once, it is not waited for so long again.
 _SHORT, _PATIENCE, _LESS_PATIENCE, _MORE_CAUTION = 1e-6, 1000, 50, 1e3
 # In a stretch without a sign steps grow in proportion to it, and are no shorter than this share
 # of the whole axis.
 _BLIND_GROWTH, _SHORTEST_BLIND = 0.25, 1e-14
-
-
-# Steps that a walk may take before it is left to another thread: about a tenth of a second.
-_FEW_STEPS = 300_000
-
-
-def heard(walk: Callable[..., Any], *arguments: Any, most: int = int(MOST_STEPS)) -> Any:
-    """Return what a compiled walk does, and let an interrupt end it.
-
-    Compiled functions hear no interrupt. A short walk is over before that matters. A long one
-    is taken in another thread, from its start: this thread only waits, and tells it to stop.
-
-    Parameters
-    ----------
-    walk : callable
-        A function that releases the interpreter's lock. Its last two arguments are the most
-        steps, and an array whose entry stops it; the last of what it returns is whether it came
-        to its end.
-    *arguments
-        All others.
-    most : int, optional
-        The most steps.
-    """
-    stop = np.zeros(1, dtype=np.bool_)
-    try:
-        found = walk(*arguments, min(most, _FEW_STEPS), stop)
-    except SystemError as error:
-        # What numba makes of an interrupt that it meets while it packs its results.
-        cause: BaseException = error
-        while isinstance(cause, SystemError) and cause.__cause__ is not None:
-            cause = cause.__cause__
-        raise cause from None
-    if found[-1] or most <= _FEW_STEPS:
-        return found
-    with ThreadPoolExecutor(1) as pool:
-        longer = pool.submit(walk, *arguments, most, stop)
-        try:
-            return longer.result()
-        finally:
-            stop[0] = True
 
 
 @njit(cache=True)
@@ -128,19 +87,20 @@ def _follow(
     end: float,
     step: float,
     shortest: float,
+    most: int,
 ) -> tuple[float, float, float, int]:
     """Argument gathered by an exponential sum from omega to `end`, within one piece.
 
     `bound` and `error` are polynomials in u that bound the second derivative and how far the
     values may be off. Returns the argument, the frequency up to which it is certain, the last
     step, and the number of steps. It is not certain up to `end` where that takes a step below
-    `shortest`, or where the sum is within its error.
+    `shortest` or more than `most` steps, or where the sum is within its error.
     """
     argument, steps = 0.0, 0
     value, slope = evaluate(piece, omega)
     if abs(value) <= bound_at(error, piece, omega):
         return argument, omega, step, steps
-    while omega < end and steps <= MOST_STEPS:
+    while omega < end and steps <= most:
         steps += 1
         step = min(4.0 * step, end - omega)
         while True:
@@ -186,7 +146,8 @@ def _slow_terms(piece: Piece) -> tuple[Piece, FloatArray]:
             magnitudes[0] += magnitudes[g + 1]
             fast += np.abs(slow[g + 1])
             slow[g + 1], magnitudes[g + 1], rates[g] = 0.0, 0.0, 0.0
-    return Piece(piece.start, piece.end, piece.per_reach, slow, magnitudes, rates), fast
+    start, end, per_reach, _, _, _, direct = piece
+    return Piece(start, end, per_reach, slow, magnitudes, rates, direct), fast
 
 
 @njit(cache=True, nogil=True)
@@ -229,7 +190,7 @@ def winding(
         while omega < end:
             if many and end - omega > block:
                 gained, following, _, more = _follow(
-                    slow, slow_bound, slow_error, omega, end, end - omega, block
+                    slow, slow_bound, slow_error, omega, end, end - omega, block, most
                 )
                 steps += more + 1
                 if following > omega:
@@ -239,7 +200,7 @@ def winding(
                     omega = following
             until = min(end, omega + block)
             gained, following, step, more = _follow(
-                piece, bound, error, omega, until, step, 0.0
+                piece, bound, error, omega, until, step, 0.0, most
             )
             steps += more
             if steps > most or stop[0]:
@@ -413,14 +374,14 @@ def _imaginary_bounds(
 
     On its second derivative, next to omega = 0 and everywhere; and on its rounding error.
     """
-    start, end, per_reach, local, sizes, phases = piece
+    start, end, per_reach, local, sizes, phases, direct = piece
     local, sizes = local.copy(), sizes.copy()
     for m in range(local.shape[1]):
-        if per_reach == 1.0 and local[0, m].imag == 0.0:
-            # In powers of omega the coefficients are real or imaginary.
+        if direct and local[0, m].imag == 0.0:
+            # It is exactly zero.
             sizes[0, m] = 0.0
         local[0, m] = local[0, m].imag
-    imaginary = Piece(start, end, per_reach, local, sizes, phases)
+    imaginary = Piece(start, end, per_reach, local, sizes, phases, direct)
     everywhere = curvature_bound(imaginary)
     near = curvature_from_zero(piece) if start == 0.0 else everywhere
     return near, everywhere, rounding_bound(imaginary, rounding)
@@ -555,7 +516,8 @@ def imaginary_zeros(
     For a row x = N / M of a chart the sum is N conj(M), and `measure` is |M|^2. Where the
     imaginary part is odd in omega, as it is there, omega = 0 is one of the zeros. Of a map
     `omega_end` is pi / step. Returns a row for each zero and each hidden stretch, and whether
-    these are all: they are not if the walk would take more than `most` steps, or `stop` is set.
+    these are all: they are not if the walk would take more than `most` steps, or turn by more
+    than MOST_RADIANS, or `stop` is set.
     Its columns:
 
     - OMEGA, polished; of a hidden stretch its middle, or `omega_start` or `omega_end` where it

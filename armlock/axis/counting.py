@@ -6,20 +6,15 @@ functions take: `PointModel` for points, `RowModel` for rows.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numba import config
 
 from armlock.axis.compiled import njit
 from armlock.axis.contour import (
     HIDDEN,
     JUMP,
     MOST_RADIANS,
-    MOST_STEPS,
     POSITION,
     SPREAD,
     angle_between,
@@ -27,13 +22,14 @@ from armlock.axis.contour import (
     imaginary_zeros,
     winding,
 )
-from armlock.axis.exponentials import CompiledSum
+from armlock.axis.exponentials import CompiledSum, with_smaller_terms
 from armlock.axis.rounding import CAUTION, EPSILON
+from armlock.axis.threads import MOST_STEPS, on_all_cores
 from armlock.checks import BoolArray, ComplexArray, FloatArray, IntArray
 
 # What `count_point` returns where it is no number of roots.
 # `armlock.stability.counts.unstable_roots` returns the first two as well, and makes errors of
-# DOUBTFUL and TOO_LONG.
+# CONTRADICTORY and TOO_LONG.
 #
 # A root lies on the axis: `winding` meets a value within its rounding error, or can certify no
 # step.
@@ -42,7 +38,7 @@ BOUNDARY = -1
 UNCONFINED = -2
 # D and the roots of A contradict each other, or the count is below zero. Of a row of a chart:
 # its points are to be counted one by one.
-DOUBTFUL = -3
+CONTRADICTORY = -3
 # The walk takes too many steps.
 TOO_LONG = -4
 # A point after one that took too long.
@@ -152,18 +148,12 @@ def count_point(model: PointModel, x: float, y: float, end: float, stop: BoolArr
     for phase in constant.phases:
         if end * abs(phase) > MOST_RADIANS:
             return TOO_LONG
-    dx, dy = x - model.reference[0], y - model.reference[1]
+    x0, y0 = model.reference
     sums, uncertain = constant.sums.copy(), np.empty_like(constant.sums)
     weights = constant.weights.copy()
     for k in range(sums.size):
-        # Of two ways to add up, the one with the smaller terms.
-        near, far = dx * b1[k], dy * b2[k]
-        all_near = model.reference[0] * b1[k] + model.reference[1] * b2[k]
-        all_far = x * b1[k] + y * b2[k]
-        if abs(all_near) + abs(all_far) < abs(near) + abs(far):
-            sums[k] += all_near - all_far
-        else:
-            sums[k] -= near + far
+        there, here = x0 * b1[k] + y0 * b2[k], x * b1[k] + y * b2[k]
+        sums[k] += with_smaller_terms(there, -here, (x0 - x) * b1[k], (y0 - y) * b2[k])
         # The parameters are rounded numbers themselves.
         uncertain[k] = EPSILON * (abs(x * b1[k]) + abs(y * b2[k]))
         for g in range(weights.shape[0]):
@@ -182,14 +172,14 @@ def count_point(model: PointModel, x: float, y: float, end: float, stop: BoolArr
         offset = angle_between(value, model.sign * np.exp(1j * final))
         if abs(offset) > 0.51 * np.pi:
             # More than rounding explains: the roots of A are not those of A.
-            return DOUBTFUL
+            return CONTRADICTORY
         final += offset
     count = (final - model.begun - argument) / np.pi
     # It is a whole number but for rounding, because D is real at both ends of the axis.
-    return int(np.floor(count + 0.5)) if -0.5 < count < np.inf else DOUBTFUL
+    return int(np.floor(count + 0.5)) if -0.5 < count < np.inf else CONTRADICTORY
 
 
-# So few points or rows are left to one core: threads take half a millisecond to begin.
+# So few points are left to one core: threads take half a millisecond to begin.
 _FEW = 16
 # Points up to which the fastest exponential turns by more radians than this are left to others
 # all the same: to wait for them can be interrupted.
@@ -224,42 +214,8 @@ def count_points(model: PointModel, x: FloatArray, y: FloatArray, ends: FloatArr
     if x.size < _FEW and ends.max(initial=0.0) * fastest <= _LONG:
         _count_range(0, x.size, model, x, y, ends, counts, stop)
         return counts
-    _on_all_cores(_count_range, x.size, model, x, y, ends, counts, stop=stop)
+    on_all_cores(_count_range, x.size, model, x, y, ends, counts, stop=stop)
     return counts
-
-
-def _on_all_cores(
-    function: Callable[..., None], size: int, *arguments: object, stop: BoolArray
-) -> None:
-    """Call function(first, last, ...) for ranges that cover `size`, in a thread each.
-
-    The function is compiled to release the interpreter's lock. Ranges are short, because some
-    points or rows take much longer than others. An interrupt is heard at once, since this
-    thread only waits; the others end because the last argument, `stop`, is set.
-    """
-    cores = config.NUMBA_NUM_THREADS
-    edges = np.unique(np.linspace(0, size, 16 * cores + 1).astype(int)).tolist()
-    ranges = list(pairwise(edges))[::-1]
-
-    def work() -> None:
-        """Take the next range until there is none: a list gives each to one thread."""
-        while ranges:
-            try:
-                first, last = ranges.pop()
-            except IndexError:
-                return
-            function(first, last, *arguments, stop)
-
-    pool = ThreadPoolExecutor(cores)
-    try:
-        for thread in [pool.submit(work) for _ in range(cores)]:
-            thread.result()
-    except BaseException:
-        ranges.clear()
-        stop[0] = True
-        raise
-    finally:
-        pool.shutdown(wait=False)
 
 
 @njit(cache=True)
@@ -271,19 +227,15 @@ def _fill_row(
     stop: BoolArray,
 ) -> None:
     """Fill row i of a chart, see `fill_rows`."""
-    counts, doubtful, last = filled
+    counts, doubtful, reached = filled
     x, lower, upper = rows.x, rows.lower[i], rows.upper[i]
     fixed, y = model.fixed, rows.y[i]
     weights = fixed.weights - y * model.weights
     sums = fixed.sums.copy()
     for k in range(sums.size):
-        # Of two ways to add up, the one with the smaller terms.
-        at_zero = fixed.sums[k] + model.reference * model.sums[k]
-        near, far = (y - model.reference) * model.sums[k], y * model.sums[k]
-        if abs(at_zero) + abs(far) < abs(fixed.sums[k]) + abs(near):
-            sums[k] = at_zero - far
-        else:
-            sums[k] -= near
+        lost, y0 = model.sums[k], model.reference
+        at_zero = fixed.sums[k] + y0 * lost
+        sums[k] = with_smaller_terms(at_zero, -y * lost, fixed.sums[k], (y0 - y) * lost)
     crossing = CompiledSum(fixed.polynomials, weights, sums, fixed.phases, fixed.uncertain)
     zeros, complete = imaginary_zeros(
         crossing, model.measure, 0.0, rows.ends[i], model.is_map, CAUTION, MOST_STEPS, stop
@@ -301,14 +253,14 @@ def _fill_row(
             total += jump
             change[np.searchsorted(x, position)] += jump
         if position + spread >= x[0] and position - spread <= x[-1]:
-            near = np.searchsorted(x, position - spread)
-            while near < x.size and x[near] <= position + spread:
-                doubtful[i, near] = True
-                near += 1
+            k = np.searchsorted(x, position - spread)
+            while k < x.size and x[k] <= position + spread:
+                doubtful[i, k] = True
+                k += 1
     for k in range(x.size):
         running += change[k]
         counts[i, k] = running
-    last[i] = total if complete and rows.base[i] >= 0 else DOUBTFUL
+    reached[i] = total if complete and rows.base[i] >= 0 else CONTRADICTORY
 
 
 @njit(cache=True, nogil=True)
@@ -329,8 +281,8 @@ def fill_rows(model: RowModel, rows: Rows) -> tuple[IntArray, BoolArray, IntArra
     """Fill rows of a chart with counts, from the crossings of each row.
 
     Returns the counts, which of them lie too near a crossing to be trusted, and the count at
-    the end of each row. That is DOUBTFUL, and the row's counts mean nothing, where `base` is
-    below zero, or the walk was given up.
+    the end of each row. That is CONTRADICTORY where `base` is below zero, or the walk was given
+    up: the row's counts then mean nothing.
     """
     shape = rows.y.size, rows.x.size
     filled = (
@@ -339,5 +291,5 @@ def fill_rows(model: RowModel, rows: Rows) -> tuple[IntArray, BoolArray, IntArra
         np.empty(shape[0], dtype=np.int64),
     )
     stop = np.zeros(1, dtype=np.bool_)
-    _on_all_cores(_fill_range, shape[0], filled, model, rows, stop=stop)
+    on_all_cores(_fill_range, shape[0], filled, model, rows, stop=stop)
     return filled

@@ -9,7 +9,7 @@ where that cancels: next to a cluster of lightly damped roots. There, and of hig
 everywhere, they are expanded anew in each *piece* of the axis, from their roots.
 
 Within a piece a sum has a value and a derivative, a bound on its second derivative, and one on
-its rounding error (`armlock.axis.rounding`). The walks along the axis need no more.
+its rounding error. The walks along the axis need no more.
 """
 
 from __future__ import annotations
@@ -18,12 +18,11 @@ from collections.abc import Sequence
 from functools import reduce
 from typing import Any, NamedTuple
 
-import mpmath
 import numpy as np
 import numpy.typing as npt
-from numpy.polynomial import polynomial as poly
 
 from armlock.axis.compiled import njit
+from armlock.axis.polynomials import Polynomial
 from armlock.axis.rounding import EPSILON, ROUNDING
 from armlock.checks import ComplexArray, FloatArray, IntArray
 
@@ -33,7 +32,7 @@ LOW_DEGREE = 20
 # is evaluated from its roots: up to here rounding takes four of its sixteen digits.
 _CANCELLED = 1e4
 # Roots within this share of the axis are looked at for that. Other roots cancel by less than a
-# factor of 20 each, all of 20 such roots together next to one another seldom.
+# factor of 20 each. That many of them do so at one frequency is rare, and costs time alone.
 _LIGHT = 0.1
 # How many roots of a polynomial, each weighed by reach / (reach + distance), a piece may have
 # around it. Roots exactly at its start are not counted. Then LOW_DEGREE powers hold the
@@ -41,134 +40,22 @@ _LIGHT = 0.1
 _CROWD = 1.5
 
 
-def quotients(
-    zeros: ComplexArray, poles: ComplexArray, lead: float, s: ComplexArray
-) -> ComplexArray:
-    """Evaluate `lead` times the product of s - zeros over that of s - poles, at any s."""
-    found: ComplexArray = _quotients(zeros, poles, complex(lead), np.ravel(s))
-    return found.reshape(s.shape)
-
-
-@njit(cache=True, error_model="numpy")
-def _quotients(
-    zeros: ComplexArray, poles: ComplexArray, lead: complex, s: ComplexArray
-) -> ComplexArray:
-    found = np.full(s.size, lead)
-    for i in range(s.size):
-        # In turn, so that the product neither overflows nor underflows on the way.
-        for k in range(max(zeros.size, poles.size)):
-            if k < zeros.size:
-                found[i] *= s[i] - zeros[k]
-            if k < poles.size:
-                found[i] /= s[i] - poles[k]
-    return found
-
-
-class Polynomial(NamedTuple):
-    """A real polynomial of s: its coefficients in ascending powers, and its roots.
-
-    Attributes
-    ----------
-    coefficients : float array, shape (n + 1,)
-        In ascending powers of s.
-    roots : complex array, shape (n,)
-        They define the polynomial where they are known; else they are found.
-    leads : tuple of float
-        Of a product the highest coefficients of its factors: their product may be no float.
-    missed : float
-        By how much the roots miss the polynomial at s, over its highest coefficient times the
-        product of |s| + |root|. Zero where the roots define it.
-    """
-
-    coefficients: FloatArray
-    roots: ComplexArray
-    leads: tuple[float, ...] = ()
-    missed: float = 0.0
-
-    @classmethod
-    def of(cls, coefficients: FloatArray, guess: ComplexArray | None = None) -> Polynomial:
-        """Return the polynomial with these coefficients, and roots that are found.
-
-        They are a guess, or found in double precision, if that gives the coefficients to a part
-        in a million; if not, in extended precision. What they miss is kept, see `missed`.
-        """
-        found = poly.polyroots(coefficients).astype(np.complex128) if guess is None else guess
-        missed = _missed(found, coefficients)
-        if missed <= 1e-6:
-            return cls(coefficients, found, missed=missed)
-        if guess is not None:
-            return cls.of(coefficients)
-        start = {"asc": True, "roots_init": found.tolist()}
-        with mpmath.workdps(60):
-            try:
-                exact = mpmath.polyroots(
-                    coefficients.tolist(), maxsteps=500, extraprec=400, **start
-                )
-            except mpmath.libmp.NoConvergence:
-                raise ValueError(
-                    f"no roots of the polynomial {coefficients} are found"
-                ) from None
-        found = np.array([complex(root) for root in exact])
-        return cls(coefficients, found, missed=_missed(found, coefficients))
-
-    def evaluated(self, s: Any) -> tuple[Any, Any]:
-        """Value and derivative at s, in numpy's or mpmath's numbers."""
-        value, slope = 0.0 * s, 0.0 * s
-        if self.missed:
-            for coefficient in self.coefficients[::-1].tolist():
-                value, slope = value * s + coefficient, slope * s + value
-            return value, slope
-        value = value + float(self.coefficients[-1])
-        for root in self.roots.tolist():
-            value, slope = value * (s - root), slope * (s - root) + value
-        return value, slope
-
-    def without_zeros(self, number: int) -> Polynomial:
-        """Return p(s) / s^number, for as many roots that are exactly zero."""
-        others = np.concatenate(
-            (self.roots[self.roots == 0.0][number:], self.roots[self.roots != 0.0])
-        )
-        return Polynomial(self.coefficients[number:], others, self.leads, self.missed)
-
-    def over(self, other: Polynomial, s: ComplexArray) -> ComplexArray:
-        """Evaluate p(s) / q(s), factor by factor."""
-        lead = float(self.coefficients[-1] / other.coefficients[-1])
-        return quotients(self.roots, other.roots, lead, s)
-
-    def times_conjugate(self, other: Polynomial) -> Polynomial:
-        """Return p q*, where q*(j omega) is the complex conjugate of q(j omega)."""
-        # The coefficients are real: q*(s) = q(-s).
-        signs = (-1.0) ** np.arange(other.coefficients.size)
-        with np.errstate(over="ignore", invalid="ignore"):
-            product = np.convolve(self.coefficients, signs * other.coefficients)
-        leads = self.coefficients[-1], signs[-1] * other.coefficients[-1]
-        missed = (1.0 + self.missed) * (1.0 + other.missed) - 1.0
-        return Polynomial(product, np.concatenate((self.roots, -other.roots)), leads, missed)
-
-
-def _missed(roots: ComplexArray, coefficients: FloatArray) -> float:
-    """By how much roots miss the polynomial with these coefficients, see `Polynomial.missed`.
-
-    A power of s that is off by no more than this share of what the magnitudes of the roots give
-    is off by no more than it at any s. The product itself rounds, two EPSILON a root.
-    """
-    product = np.array(coefficients[-1:], dtype=np.complex128)
-    magnitude = np.abs(coefficients[-1:])
-    for root in roots[np.argsort(np.abs(roots))]:
-        product = np.convolve(product, [-root, 1.0])
-        magnitude = np.convolve(magnitude, [abs(root), 1.0])
-    off = np.abs(product - coefficients)
-    if not (off <= magnitude).all():
-        return np.inf
-    shares = off[magnitude > 0.0] / magnitude[magnitude > 0.0]
-    return float(shares.max(initial=0.0)) + 2.0 * EPSILON * roots.size
-
-
 def _cancellation(roots: ComplexArray, omega: FloatArray) -> FloatArray:
     """Return log of the product of (omega + |root|) / |j omega - root| at frequencies."""
     with np.errstate(divide="ignore"):
         ratios = (omega[:, None] + np.abs(roots)) / np.abs(1j * omega[:, None] - roots)
         return np.asarray(np.log(ratios).sum(axis=1))
+
+
+def merged(ranges: FloatArray) -> list[tuple[float, float]]:
+    """Intervals of shape (n, 2), ascending, with those that overlap made one."""
+    found: list[tuple[float, float]] = []
+    for low, high in sorted(map(tuple, ranges.tolist())):
+        if found and low <= found[-1][1]:
+            found[-1] = found[-1][0], max(high, found[-1][1])
+        else:
+            found.append((low, high))
+    return found
 
 
 def _crowded(polynomials: Sequence[Polynomial]) -> FloatArray:
@@ -191,13 +78,7 @@ def _crowded(polynomials: Sequence[Polynomial]) -> FloatArray:
                 far = _cancellation(roots, peak * (1.0 + side * shares)) > np.log(_CANCELLED)
                 reach = max(reach, 2.0 * shares[far].max())
             found.append((peak * max(1.0 - reach, 0.0), peak * (1.0 + reach)))
-    merged: list[tuple[float, float]] = []
-    for low, high in sorted(found):
-        if merged and low <= merged[-1][1]:
-            merged[-1] = merged[-1][0], max(high, merged[-1][1])
-        else:
-            merged.append((low, high))
-    return np.array(merged).reshape(-1, 2)
+    return np.reshape(merged(np.reshape(found, (-1, 2))), (-1, 2))
 
 
 def _gathered(
@@ -338,7 +219,8 @@ class CompiledSum(NamedTuple):
     weights, sums, phases : arrays
         Those of `ExponentialSum`.
     uncertain : float array, shape (polynomials,)
-        How far the entries of `sums` may be off.
+        How far the entries of `sums` may be off. A parameter that is off by d moves the whole
+        sum by at most d times its polynomial's magnitude: so `weights` need none.
     """
 
     polynomials: CompiledPolynomials
@@ -405,6 +287,12 @@ def without_unused(*sums: ExponentialSum) -> tuple[ExponentialSum, ...]:
         ExponentialSum(polynomials, s.weights.compress(used, axis=1), s.phases, s.sums[used])
         for s in sums
     )
+
+
+@njit(cache=True)
+def with_smaller_terms(a: float, b: float, c: float, d: float) -> float:
+    """Return a + b or c + d, two ways to add up one number: the one that cancels less."""
+    return a + b if abs(a) + abs(b) < abs(c) + abs(d) else c + d
 
 
 @njit(cache=True)
@@ -512,6 +400,8 @@ class Piece(NamedTuple):
         EPSILON: `rounding_bound` multiplies all by EPSILON and more.
     phases : float array, shape (groups,)
         Those of the sum.
+    direct : bool
+        Whether it is made from coefficients in powers of omega: these are real or imaginary.
     """
 
     start: float
@@ -520,13 +410,15 @@ class Piece(NamedTuple):
     local: ComplexArray
     sizes: FloatArray
     phases: FloatArray
+    direct: bool
 
 
 @njit(cache=True)
 def expand(whole: CompiledSum, omega: float) -> Piece:
-    """Expand an exponential sum over the piece of the axis that starts at omega.
+    """Return an exponential sum over the piece of the axis that holds omega.
 
-    The magnitudes contain what is uncertain in the sum.
+    One that is expanded from roots starts there, one from coefficients at zero. The magnitudes
+    contain what is uncertain in the sum.
     """
     polynomials, weights, sums, phases, uncertain = whole
     coefficients = polynomials.coefficients
@@ -563,7 +455,7 @@ def expand(whole: CompiledSum, omega: float) -> Piece:
                         sizes[g, m] += moved * abs(coefficients[k, m])
                 sizes[g, size] += (magnitude / EPSILON + moved) * left_out[k]
     if not expanded:
-        return Piece(0.0, piece_end, 1.0, local, sizes, phases)
+        return Piece(0.0, piece_end, 1.0, local, sizes, phases, True)
     # Powers that rounding hides are not worth their time.
     powers = sizes[:, :size].sum(axis=0)
     used, dropped, hidden = size, powers[size - 1], 1e-3 * EPSILON * powers.sum()
@@ -572,7 +464,7 @@ def expand(whole: CompiledSum, omega: float) -> Piece:
         dropped += powers[used - 1]
     sizes[:, used] = sizes[:, size] + sizes[:, used:size].sum(axis=1) / EPSILON
     local, sizes = local[:, :used].copy(), sizes[:, : used + 1].copy()
-    return Piece(omega, piece_end, 1.0 / reach, local, sizes, phases)
+    return Piece(omega, piece_end, 1.0 / reach, local, sizes, phases, False)
 
 
 @njit(cache=True)
@@ -635,9 +527,29 @@ def bound_at(bound: FloatArray, piece: Piece, omega: float) -> float:
 
 
 @njit(cache=True)
+def rounding_bound(piece: Piece, rounding: float) -> FloatArray:
+    """Polynomial in u that bounds the rounding error of an exponential sum in a piece.
+
+    A group counts with |phase| omega. This bounds |exp(j omega phase) - 1|, and by as much the
+    rounding of the angle omega phase moves it. No coefficient is negative.
+    """
+    sizes = piece.sizes
+    groups, size = sizes.shape
+    bound = np.zeros(size + 1)
+    for k in range(size):
+        bound[k] += rounding * EPSILON * sizes[0, k]
+        for g in range(1, groups):
+            error = rounding * EPSILON * sizes[g, k] * abs(piece.phases[g - 1])
+            bound[k] += error * piece.start
+            bound[k + 1] += error / piece.per_reach
+    return bound
+
+
+@njit(cache=True)
 def curvature_bound(piece: Piece) -> FloatArray:
     """Polynomial in u that bounds the second derivative of an exponential sum in a piece.
 
+    None of its coefficients is negative: its value at the end of a step bounds the whole step.
     Where a polynomial is differentiated twice, |exp(j omega phase) - 1| is at most
     min(|phase| start, 2) + |phase| reach u.
     """

@@ -279,6 +279,3 @@ def kepler(arm_length: float = 2.5e9) -> Constellation:
     one, two, three = (partial(_ellipse, alpha, k * 2.0 * np.pi / 3.0) for k in range(3))
     span = (-_KEPLER_SPAN, _KEPLER_SPAN)
     return Constellation("that of the elements", "TCB", span, 0.0, (one, two, three))
-
-
-__all__ = ["ASTRONOMICAL_UNIT", "SPEED_OF_LIGHT", "SUN", "Constellation", "kepler"]

@@ -166,10 +166,10 @@ def held_range(
     Returns
     -------
     low, high : float
-        The loop is certified as stable at one, and at every ratio from low to high. This much
-        outside of an edge it is not: a root crosses the axis, or that none does could not be
-        shown. 0 or inf where there is no edge within a factor of 1e5, or before the half
-        difference reaches the mean.
+        The loop is certified as stable at one, and at every ratio from low to high. At a ratio
+        outside, farther from the edge than `precision`, it could not be: a root crosses the
+        axis, or no proof was found that none does. 0 or inf where there is no edge within a
+        factor of 1e5, or before the half difference reaches the mean.
 
     Raises
     ------
@@ -390,25 +390,3 @@ def switches(halves: Mapping[int, Course], floor: float) -> list[tuple[float, in
         found.append((now, master))
         now = reach
     return found
-
-
-__all__ = [
-    "DAY",
-    "MONTH",
-    "YEAR",
-    "Course",
-    "Hold",
-    "LoopInOrbit",
-    "days",
-    "flight",
-    "frozen_rate",
-    "growth",
-    "half_difference",
-    "held_range",
-    "largest_half",
-    "loops",
-    "lost",
-    "on_dual",
-    "policies",
-    "switches",
-]

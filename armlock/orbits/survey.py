@@ -32,8 +32,8 @@ from armlock.performance.transfer import transfer
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: X2 is told at this frequency, in Hz, for a ranging error of so many metres.
-FREQUENCY, RANGING_ERROR = 3e-3, 1.0
+# X2 is told at this frequency, in Hz, for a ranging error of so many metres.
+_FREQUENCY, _RANGING_ERROR = 3e-3, 1.0
 # Edges are those at this share of the largest half difference.
 _SHARE = 0.25
 # Masters are kept until their half difference is this share of what can always be had.
@@ -109,9 +109,9 @@ class Survey:
         For an error of 1 m in the range of arm 1, and for the moving arms with exact ranging,
         which add up at worst.
         """
-        omega, noise = 2.0 * np.pi * FREQUENCY, float(free_running(np.array(FREQUENCY)))
+        omega, noise = 2.0 * np.pi * _FREQUENCY, float(free_running(np.array(_FREQUENCY)))
         tau1, tau2 = self.orbits.round_trips(t, self.master)
-        ranging = ranging_residual(omega, tau1, tau2, RANGING_ERROR / SPEED_OF_LIGHT)[1]
+        ranging = ranging_residual(omega, tau1, tau2, _RANGING_ERROR / SPEED_OF_LIGHT)[1]
         moving = omega * np.abs(flexing(self.orbits, t, 2, self.master))
         locked = [
             abs(transfer(self.loop(one, two, 0.5 * (one - two)), "laser", 1j * omega))
@@ -269,6 +269,3 @@ def survey(
         differential,
         abs(held),
     )
-
-
-__all__ = ["Survey", "outages", "survey"]

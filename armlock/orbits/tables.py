@@ -19,8 +19,8 @@ from scipy.interpolate import make_interp_spline
 from armlock.checks import FloatArray, axis, finite_series, one_of
 from armlock.orbits.constellation import SPEED_OF_LIGHT, Constellation
 
-#: Time scales that a table may have.
-SCALES = ("TCB", "TDB")
+# Time scales that a table may have.
+_SCALES = ("TCB", "TDB")
 
 # No spacecraft is within the Sun, radius in m: positions in km, or not from the Sun, would be.
 _SUN_RADIUS = 6.957e8
@@ -66,7 +66,7 @@ def from_table(
         be interpolated to 1e-6 s of light, or faster than light.
     """
     time, places = axis("time", time), finite_series("positions", positions, 3)
-    one_of("scale", scale, SCALES)
+    one_of("scale", scale, _SCALES)
     if places.shape != (time.size, 3, 3):
         raise ValueError(
             f"positions must be of shape ({time.size}, 3, 3), as many as times, for three "
@@ -186,7 +186,7 @@ def read_oem(paths: Sequence[str | Path]) -> Constellation:
 _ALLOWED = {
     "CENTER_NAME": ("SUN",),
     "REF_FRAME": ("EME2000", "ICRF", "GCRF"),
-    "TIME_SYSTEM": SCALES,
+    "TIME_SYSTEM": _SCALES,
 }
 
 
@@ -226,6 +226,3 @@ def _read(path: Path) -> tuple[tuple[str, str], npt.NDArray[np.datetime64], Floa
             f"{apart.max():.3g} m apart at {epochs[apart.argmax()]}"
         )
     return (header[1], header[2]), epochs[~again], places[~again]
-
-
-__all__ = ["from_table", "read_oem", "read_table"]

@@ -125,6 +125,3 @@ def flexing(
             for earlier, later in zip(before, after, strict=True)
         )
     return np.asarray(rate1 * tau2 - rate2 * tau1)
-
-
-__all__ = ["flexing", "ranging_residual"]

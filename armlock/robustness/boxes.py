@@ -9,7 +9,8 @@ import math
 
 import numpy as np
 
-from armlock.axis.contour import heard, winding
+from armlock.axis.contour import winding
+from armlock.axis.threads import interruptible
 from armlock.checks import IntArray, positive_number
 from armlock.loops import Loop, LoopAt, checked_loop
 from armlock.robustness.free_phases import clear_above, count_at
@@ -117,5 +118,5 @@ def _stays_clear(
     # The centre is a rounded number itself.
     uncertain = (half + 1e-15) * (np.abs(b1.sums) + np.abs(b2.sums))
     followed = whole.compiled()._replace(uncertain=uncertain)
-    _, _, clear, steps, _ = heard(winding, followed, 0.0, end)
+    _, _, clear, steps, _ = interruptible(winding, followed, 0.0, end)
     return bool(clear), steps

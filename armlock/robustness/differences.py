@@ -31,7 +31,7 @@ from armlock.stability.bounds import last_frequency
 # one of this share of omega is not clear yet, a root is on the axis but for rounding.
 _STRIPS, _RECTANGLES, _NARROWEST = 200, 1_000_000, 1e-12
 # What a sum of some ten terms rounds by, of their magnitudes.
-_ROUNDING = 32.0 * EPSILON
+_RELATIVE_ROUNDING = 32.0 * EPSILON
 
 
 class _Parts(NamedTuple):
@@ -171,16 +171,16 @@ def _clear(
         change = off_r + off_s * np.abs(returned) + off_q * size
         change += most_s * (dead + far * np.abs(cosine) + turn * (size + turn))
         change += most_q * (far * size + turn)
-        clear = np.abs(d) > change + _ROUNDING * (most_r + most_s + most_q * size)
+        clear = np.abs(d) > change + _RELATIVE_ROUNDING * (most_r + most_s + most_q * size)
 
         # The mean open, and then the phase too.
         a, b = np.abs(common) ** 2 - np.abs(opposed) ** 2, (common * opposed.conj()).imag
         off_a = 2.0 * (most_s * off_s + most_q * off_q)
-        off_a += _ROUNDING * (most_s**2 + most_q**2)
-        off_b = most_s * off_q + most_q * off_s + _ROUNDING * most_s * most_q
+        off_a += _RELATIVE_ROUNDING * (most_s**2 + most_q**2)
+        off_b = most_s * off_q + most_q * off_s + _RELATIVE_ROUNDING * most_s * most_q
         least = np.abs(rest) ** 2 + 2.0 * (common * late * rest.conj()).real
         off = (most_r + most_s) * off_r + most_r * (off_s + most_s * dead)
-        least -= 2.0 * off + _ROUNDING * most_r * (most_r + most_s)
+        least -= 2.0 * off + _RELATIVE_ROUNDING * most_r * (most_r + most_s)
         known = sine**2 * (a - off_a) + 2.0 * (cosine * sine * b - size * off_b)
         known -= turn * (2.0 * size + turn) * (np.abs(a) + off_a)
         known -= 2.0 * turn * (np.abs(b) + off_b)

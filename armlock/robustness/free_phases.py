@@ -17,6 +17,7 @@ import numpy as np
 from numpy.polynomial import polynomial as poly
 
 from armlock.axis import contour
+from armlock.axis.threads import interruptible
 from armlock.checks import ComplexArray, FloatArray, IntArray
 from armlock.loops import Loop, LoopAt
 from armlock.robustness import discs
@@ -189,7 +190,7 @@ def meeting_intervals(
     all smaller |c1| and |c2|, too.
     """
     found: FloatArray
-    found, _ = contour.heard(
+    found, _ = interruptible(
         discs.intervals_not_clear,
         arms_of(point, free=free),
         np.array(segment),
@@ -269,7 +270,7 @@ def clear_above(point: LoopAt, free_above: float) -> bool:
     if end <= free_above:
         return True
     least = np.array([_TOUCHING, 0.0, 0.0, 0.0])
-    nearest, _, complete = contour.heard(
+    nearest, _, complete = interruptible(
         discs.free_margins, arms_of(point, free=True), free_above, end, least, np.zeros(4)
     )
     return bool(complete) and nearest[discs.MODULUS] == _TOUCHING
@@ -303,7 +304,7 @@ def _count_below(point: LoopAt, omega: float) -> int | None:
         begin, whole = walk_begins(*at), at.loop.sum_at(at.c1, at.c2)
         if begin is None or begin[0] >= omega:
             return None
-        argument, value, clear, _, _ = contour.heard(
+        argument, value, clear, _, _ = interruptible(
             contour.winding, whole.compiled(), begin[0], omega
         )
         if not clear:
@@ -317,7 +318,7 @@ def _count_below(point: LoopAt, omega: float) -> int | None:
 
 
 def require_stable(point: LoopAt, free_above: float = np.inf) -> None:
-    """Raise unless all zeros of 1 + L lie in the open left half-plane."""
+    """Raise unless all the loop's own roots lie in the open left half-plane."""
     count = count_at(point, free_above)
     if count != 0:
         raise ValueError(

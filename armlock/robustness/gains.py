@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from armlock.axis.exponentials import merged
 from armlock.checks import FloatArray
 from armlock.loops import Loop, LoopAt
 from armlock.robustness.free_phases import (
@@ -25,9 +26,9 @@ from armlock.robustness.free_phases import (
     require_stable,
     search_outwards,
 )
-from armlock.robustness.rays import count_beside, merged
 from armlock.stability.bounds import last_larger, last_root_bound
-from armlock.stability.counts import axis_zeros, loop_count
+from armlock.stability.counts import loop_count
+from armlock.stability.zeros import axis_zeros, count_beside
 
 #: Gain factors up to this, and down to one over it, are looked at.
 LARGEST_GAIN = 1e6

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from armlock.axis.contour import heard
+from armlock.axis.threads import interruptible
 from armlock.checks import FloatArray, positive_number
 from armlock.loops import Loop, LoopAt, checked_loop
 from armlock.robustness import discs
@@ -159,7 +159,7 @@ def _free_margins(
     best, where = np.minimum(known, least), np.where(least < known, nearest, np.inf)
     # Past it no distance is smaller, either.
     end = max(end, no_smaller_from(point.loop, weights, (1.0 - _FREE_TOLERANCES) * best))
-    smaller, places, complete = heard(
+    smaller, places, complete = interruptible(
         discs.free_margins, arms, lowest, end, best, _FREE_TOLERANCES
     )
     if not complete:
@@ -201,8 +201,9 @@ def margins(
 
     Notes
     -----
-    Stable are the zeros of 1 + L. A root at s = 0 that D has because numerator and denominator
-    of L cancel, as at the ideal point of a loop with an integrator, is none of them.
+    Stable are the loop's own roots. One at s = 0 that D has because numerator and denominator
+    of L cancel, as at the ideal point of a loop with an integrator, is none of them, see
+    `armlock.stability.counts.loop_count`.
 
     Phase and delay margins are taken over all crossovers. A neutral loop may have crossovers
     without end; they then approach those of the disc below, and the phase margin is certified

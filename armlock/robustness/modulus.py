@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armlock.axis import contour
 from armlock.axis.compiled import njit
 from armlock.axis.exponentials import (
     CompiledSum,
@@ -21,9 +20,11 @@ from armlock.axis.exponentials import (
     curvature_bound,
     evaluate,
     expand,
+    rounding_bound,
     tangent_distance,
 )
-from armlock.axis.rounding import ROUNDING, rounding_bound
+from armlock.axis.rounding import ROUNDING
+from armlock.axis.threads import MOST_STEPS, interruptible
 from armlock.checks import BoolArray, FloatArray
 from armlock.loops import LoopAt
 from armlock.robustness import discs
@@ -245,11 +246,11 @@ def smallest_distances(
             improve(np.linspace(low, high, 2 + 2000 // len(intervals)))
             # What that has found narrows them.
             for start, stop in meeting((low, high)):
-                found, places, complete = contour.heard(
+                found, places, complete = interruptible(
                     _walk, *parts, start, stop, best, TOLERANCE
                 )
                 if not complete:
-                    why = f"following it takes more than {contour.MOST_STEPS:.0e} steps"
+                    why = f"following it takes more than {MOST_STEPS:.0e} steps"
                     raise no_margin(point, f"rounding hides L, or {why}")
                 best, where = found, np.where(np.isnan(places), where, places)
     return best, where

@@ -17,8 +17,9 @@ from armlock.axis.exponentials import (
     curvature_bound,
     evaluate,
     expand,
+    rounding_bound,
 )
-from armlock.axis.rounding import ROUNDING, rounding_bound
+from armlock.axis.rounding import ROUNDING
 from armlock.checks import ComplexArray, FloatArray
 from armlock.loops import LoopAt
 from armlock.robustness import discs
@@ -35,7 +36,7 @@ from armlock.robustness.free_phases import (
     search_outwards,
 )
 from armlock.stability.bounds import last_larger
-from armlock.stability.counts import axis_zeros, polished
+from armlock.stability.zeros import axis_zeros, polished
 
 #: Relative accuracy of |L| at a crossover, and of a phase margin that L has at high frequency.
 TOLERANCE = 1e-6

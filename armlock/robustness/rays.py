@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
-from armlock.axis.exponentials import conjugates_without_zeros
+from armlock.axis.exponentials import conjugates_without_zeros, merged
 from armlock.axis.rounding import EPSILON
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import ComplexArray, FloatArray, IntArray, axis, positive_number
@@ -32,24 +32,16 @@ from armlock.robustness.free_phases import (
     search_outwards,
 )
 from armlock.stability.bounds import last_frequency
-from armlock.stability.counts import (
-    BOUNDARY,
-    CountError,
-    axis_zeros,
-    loop_count,
-    polished,
-    unstable_roots,
-)
+from armlock.stability.counts import BOUNDARY, CountError, loop_count, unstable_roots
+from armlock.stability.zeros import axis_zeros, count_beside, polished
 
 #: Nothing is looked at where the parameters are this many times as large as the start, or as 1.
 FARTHEST = 1e9
-# Of a start on the boundary, crossings up to this share of it are the start's own.
+# Of a start on the boundary, crossings up to this share of `scale` are the start's own.
 _NEAR_START = 1e-10
 # Next to the limit of the neutral root chain, roots cross at ever higher frequency. They are
 # followed up to so many turns of the longest delay, which takes about a tenth of a second.
 _TURNS_NEXT_TO_THE_CHAIN = 50_000
-# A count that cannot be told at a point is looked for beside it, up to this share of t.
-_FARTHEST_BESIDE = 1e-3
 
 
 class Crossings(NamedTuple):
@@ -82,35 +74,6 @@ class Crossing(NamedTuple):
     change: int
 
 
-def merged(ranges: FloatArray) -> list[tuple[float, float]]:
-    """Ranges that overlap, made one."""
-    found: list[tuple[float, float]] = []
-    for low, high in sorted(map(tuple, ranges.tolist())):
-        if found and low <= found[-1][1]:
-            found[-1] = found[-1][0], max(high, found[-1][1])
-        else:
-            found.append((low, high))
-    return found
-
-
-def count_beside(
-    count: Callable[[float], int], t: float, side: int, nearest: float, scale: float = 1.0
-) -> tuple[float, int]:
-    """Count the unstable roots next to a parameter t on which the loop depends.
-
-    At t times 1 + side `nearest`, and as long as that cannot be told farther away, up to a
-    thousandth; from t = 0 on at shares of `scale`. Returns the place and the count, that may
-    still be below zero: then it is no confirmation.
-    """
-    place, found = t, BOUNDARY
-    for share in (nearest, *np.geomspace(max(nearest, 1e-9), _FARTHEST_BESIDE, 4)):
-        place = float(t * (1.0 + side * share) if t else share * scale)
-        found = count(place)
-        if found != BOUNDARY:
-            break
-    return place, found
-
-
 _NONE = Crossings(np.empty(0), np.empty(0), np.empty(0, dtype=np.int64))
 
 
@@ -127,10 +90,10 @@ class Ray:
                 raise ValueError(f"{name} must hold two numbers, got {value.size}")
         if not self.direction.any():
             raise ValueError("direction must not have length zero, got (0, 0)")
-        #: The t at which the distance from the start is the start's from zero, or one.
+        #: The t at which the point has moved by |start|, or by one if that is more.
         self.scale = max(1.0, float(np.hypot(*self.start))) / float(np.hypot(*self.direction))
-        #: Count the unstable roots at a point of the ray, given its t. A search and who asks
-        #: for it confirm at the same points.
+        #: Count the unstable roots at a point of the ray, given its t; kept, because a search
+        #: and who asks for it confirm at the same points.
         self.count: Callable[[float], int] = cache(self._count)
         #: D0 conj(M) and |M|^2 at s = j omega, over the power of omega that both have.
         self.product, self.square = conjugates_without_zeros(
@@ -373,6 +336,11 @@ class Ray:
         """`count_beside` of the ray's counts."""
         return count_beside(self.count, t, side, nearest, self.scale)
 
+    def _count_at_start(self) -> tuple[float, int]:
+        """Count at the start; of one on the boundary, past the crossings that are its own."""
+        t = _NEAR_START * self.scale if self.count(0.0) == BOUNDARY else 0.0
+        return t, self.count(t)
+
     def _confirm(self, found: Crossings, hidden: FloatArray, stop: float) -> None:
         """Raise unless counts say that nothing crosses where rounding hides it.
 
@@ -380,7 +348,7 @@ class Ray:
         what was found in between, or a crossing is hidden there.
         """
         for low, high in merged(hidden):
-            before = self.count_beside(low, -1, 0.0)
+            before = self.count_beside(low, -1, 0.0) if low else self._count_at_start()
             after = self.count_beside(high, -1 if high >= stop else 1, 0.0)
             between = (found.position > before[0]) & (found.position <= after[0])
             told = min(before[1], after[1]) >= 0

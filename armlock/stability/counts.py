@@ -15,28 +15,25 @@ walk can be certified. To that error the one of x and y contributes
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache, partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import elementwise
 
 from armlock.axis import contour, counting
 from armlock.axis.counting import PointModel, RowModel, Rows
 from armlock.axis.exponentials import (
-    ExponentialSum,
     aligned,
     conjugates_without_zeros,
     evaluate,
     expand,
     without_unused,
 )
-from armlock.axis.rounding import ROUNDING
+from armlock.axis.threads import MOST_STEPS
 from armlock.characteristic import CharacteristicFunction, broadcast_parameters, checked_system
 from armlock.checks import (
     BoolArray,
@@ -67,12 +64,11 @@ _OUTSIDE = (0.38196601125, 0.27639320225)
 _BYTES_A_POINT = 32
 # Most tiles, of whole rows, into which a chart is cut for an executor.
 _TILES = 64
-_NO_POINTS = np.empty((0, 2))
 # What becomes an error, and the reason that it gives.
 _WHY_NOT = {
-    counting.TOO_LONG: f"following D takes more than {contour.MOST_STEPS:.0e} steps, because "
+    counting.TOO_LONG: f"following D takes more than {MOST_STEPS:.0e} steps, because "
     "the gain, with these parameters, times the delay is too large",
-    counting.DOUBTFUL: "the argument of D does not add up",
+    counting.CONTRADICTORY: "the argument of D does not add up",
 }
 
 
@@ -88,11 +84,10 @@ class CountError(RuntimeError):
     --------
     >>> from armlock import CommonArm, CountError, unstable_roots
     >>> try:
-    ...     count = int(unstable_roots(CommonArm(), 0.9, 1.05))
+    ...     unstable_roots(CommonArm(gain=1e10, delay=0.001), 0.5, 0.5)
     ... except CountError as error:
     ...     print("undecided at", error.points)
-    >>> count
-    0
+    undecided at [[0.5 0.5]]
     """
 
     def __init__(self, message: str, points: FloatArray) -> None:
@@ -121,106 +116,6 @@ def _point_model(system: CharacteristicFunction) -> PointModel:
         start=0.0,
         begun=0.0,
     )
-
-
-class AxisZeros(NamedTuple):
-    """Zeros of an imaginary part along the axis, and hidden stretches, ascending by interval.
-
-    Columns of `armlock.axis.contour.imaginary_zeros`, where it also stands what a hidden
-    stretch means to each caller.
-
-    Attributes
-    ----------
-    omega, width : float array, shape (n,)
-        Where, in rad/s, and how far rounding lets it move or a stretch reaches to either side.
-    jump : int array, shape (n,)
-        Twice the sign of the change; once at an end of the axis.
-    hidden : bool array, shape (n,)
-        Whether it is a hidden stretch.
-    position, spread : float array, shape (n,)
-        The real part over the measure, and how far from it that may be within the width;
-        without a measure the real part and the size of the slope.
-    """
-
-    omega: FloatArray
-    jump: IntArray
-    width: FloatArray
-    hidden: BoolArray
-    position: FloatArray
-    spread: FloatArray
-
-
-def axis_zeros(
-    whole: ExponentialSum,
-    intervals: npt.ArrayLike,
-    measure: ExponentialSum | None = None,
-    *,
-    is_map: bool = False,
-) -> AxisZeros:
-    """Zeros of the imaginary part of an exponential sum on intervals of the axis.
-
-    The intervals have shape (n, 2), in rad/s. The measure is a positive sum of the same
-    polynomials.
-
-    Raises
-    ------
-    CountError
-        If there are too many of them, a number overflows, or the sum vanishes to rounding.
-    """
-    sums = without_unused(whole) if measure is None else without_unused(whole, measure)
-    if not sums[0].polynomials:
-        raise CountError("no crossings: rounding hides all of the sum that crosses", _NO_POINTS)
-    summed = [one.compiled() for one in sums]
-    under = None if measure is None else summed[1]
-    parts = [np.empty((0, 6))]
-    for start, end in np.reshape(intervals, (-1, 2)):
-        if not np.isfinite(end):
-            raise CountError(
-                f"no crossings up to omega = {end}: a number overflows", _NO_POINTS
-            )
-        zeros, complete = contour.heard(
-            contour.imaginary_zeros, summed[0], under, start, end, is_map, ROUNDING
-        )
-        if not complete:
-            raise CountError(
-                f"no crossings up to omega = {end} rad/s: more than {contour.MOST_STEPS:.0e} "
-                f"steps, because gain times delay is too large",
-                _NO_POINTS,
-            )
-        parts.append(zeros)
-    zeros = np.concatenate(parts)
-    return AxisZeros(
-        zeros[:, contour.OMEGA],
-        zeros[:, contour.JUMP].astype(np.int64),
-        zeros[:, contour.WIDTH],
-        zeros[:, contour.HIDDEN] > 0.0,
-        zeros[:, contour.POSITION],
-        zeros[:, contour.SPREAD],
-    )
-
-
-def polished(
-    function: Callable[[FloatArray], FloatArray],
-    omega: FloatArray,
-    reaches: Iterable[FloatArray],
-) -> FloatArray:
-    """Zeros of a function next to those that `axis_zeros` found on the expanded sums.
-
-    Each is looked for within the first of the reaches around it over which the sign changes,
-    and stays as it is where there is none.
-    """
-    omega, left = omega.copy(), np.arange(omega.size)
-    for reach in reaches:
-        if not left.size:
-            break
-        low, high = omega[left] - reach[left], omega[left] + reach[left]
-        enclosed = function(low) * function(high) < 0.0
-        if enclosed.any():
-            ends, exact = (low[enclosed], high[enclosed]), {"xatol": 0.0, "xrtol": 1e-15}
-            found = elementwise.find_root(function, ends, tolerances=exact)
-            omega[left[enclosed]] = found.x
-        left = left[~enclosed]
-    return omega
 
 
 def _count(
@@ -375,7 +270,7 @@ def _log(value: Fraction) -> float:
 def loop_count(
     loop: CharacteristicFunction, c1: float | Fraction = 1.0, c2: float | Fraction = 1.0
 ) -> int:
-    r"""Count the zeros of 1 + L with positive real part, at one point.
+    r"""Count the loop's own roots with positive real part, at one point.
 
     Where numerator and denominator of L cancel a factor s, D = R (1 + L) has a root at s = 0
     that comes from clearing the denominator R, and is not the loop's. `unstable_roots` counts
@@ -407,6 +302,9 @@ def loop_count(
     -----
     With k such factors, the walk along D / s^k starts at a small frequency. Up to there a bound
     on its Taylor series shows that it has no root, and how far it has turned.
+
+    A pole off s = 0 that a zero of the controller or the sensor cancels is no pole of L. It
+    remains a root of D and counts: right of the axis something in the loop grows all the same.
 
     Examples
     --------
@@ -573,24 +471,24 @@ def _chart_rows(system: CharacteristicFunction, x: FloatArray, y: FloatArray) ->
     elif system.b2.any():
         sides = np.array([left, right])
         at_low, at_high = (_count(system, sides, np.full(2, at)) for at in (low, high))
-        columns, unsure, reached = _fill(
+        columns, doubtful, reached = _fill(
             system.exchanged(), y, sides, at_low, np.full(2, low), np.full(2, high)
         )
-        unsure[(reached != at_high) | (reached < 0)] = True
+        doubtful[(reached != at_high) | (reached < 0)] = True
         for k in range(2):
-            here = unsure[k]
+            here = doubtful[k]
             columns[k, here] = _count(system, np.full(here.sum(), sides[k]), y[here])
         base, top = columns
     else:
         corners = _count(system, np.array([left, right]), np.full(2, low))
         base, top = np.repeat(corners[:, None], y.size, axis=1)
-    counts, singly, reached = _fill(system, x, y, base, lower, upper)
+    counts, doubtful, reached = _fill(system, x, y, base, lower, upper)
     # Next to a crossing, and in rows whose crossings do not add up to the count at their end.
-    singly[(reached < 0) | (reached != top)] = True
+    doubtful[(reached < 0) | (reached != top)] = True
     if system.neutral:
-        singly &= confined
+        doubtful &= confined
         counts[~confined] = UNCONFINED
-    rows, across = np.nonzero(singly)
+    rows, across = np.nonzero(doubtful)
     counts[rows, across] = _count(system, x[across], y[rows])
     return counts
 

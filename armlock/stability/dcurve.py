@@ -17,7 +17,7 @@ from numpy.polynomial import polynomial as poly
 from armlock.axis.rounding import EPSILON
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import FloatArray, check_memory, positive_number, real_array
-from armlock.stability.counts import axis_zeros
+from armlock.stability.zeros import axis_zeros
 
 
 class Line(NamedTuple):

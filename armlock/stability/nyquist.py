@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from armlock.axis.contour import MOST_SAMPLES, argument_at, heard, resolved_grid
+from armlock.axis.contour import MOST_SAMPLES, argument_at, resolved_grid
+from armlock.axis.threads import interruptible
 from armlock.checks import (
     BoolArray,
     ComplexArray,
@@ -23,11 +24,8 @@ from armlock.checks import (
 )
 from armlock.loops import Loop, LoopAt
 from armlock.stability.bounds import last_frequency, last_larger
-from armlock.stability.counts import (
-    CountError,
-    axis_zeros,
-    loop_count,
-)
+from armlock.stability.counts import CountError, loop_count
+from armlock.stability.zeros import axis_zeros
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -67,7 +65,7 @@ class NyquistCurve:
     open_loop_poles : int
         P, poles of L in the open right half-plane.
     closed_loop_roots : int
-        Z = N + P, zeros of 1 + L in the right half-plane.
+        Z = N + P, the loop's own roots in the right half-plane.
     point : LoopAt
         The loop, c1 and c2.
 
@@ -163,7 +161,7 @@ def _resolving_grid(loop: Loop, c1: float, c2: float, end: float) -> FloatArray:
     """Frequencies from 0 to `end` between which neither D nor R turns by much."""
     grids = []
     for part in (loop.sum_at(c1, c2), loop.rest_on_boundary()):
-        grid, complete = heard(
+        grid, complete = interruptible(
             resolved_grid, part.compiled(), end, _STRAIGHT, most=MOST_SAMPLES
         )
         if not complete:
@@ -249,8 +247,8 @@ def nyquist(
 
     Notes
     -----
-    Z counts the zeros of 1 + L. A root at s = 0 that D has because a pole of L cancels there
-    is none of them, see `armlock.stability.counts.loop_count`.
+    Z counts the loop's own roots: one at s = 0 that D has because a pole of L cancels there is
+    none of them, see `armlock.stability.counts.loop_count`.
 
     Examples
     --------

@@ -16,8 +16,9 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
-from armlock.axis.contour import heard, resolved_grid
+from armlock.axis.contour import resolved_grid
 from armlock.axis.rounding import EPSILON
+from armlock.axis.threads import interruptible
 from armlock.characteristic import CharacteristicFunction, broadcast_parameters, checked_system
 from armlock.checks import (
     ComplexArray,
@@ -33,35 +34,36 @@ from armlock.stability.counts import BOUNDARY, CountError, unstable_roots
 # Real parts that differ by less count as equal; relative to |s| or one over the longest delay.
 _EQUAL = 1e-11
 # How far right of its root the last count may stand, relative to |Re s| or the same.
-_FARTHEST = 1e-6
-# Longest walk along a line to count, and to look for roots, in turns of the longest delay's
-# exponential: a second each.
+_COUNT_WITHIN = 1e-6
+# Longest walk along a line, in turns of the longest delay's exponential: to count, and to look
+# for roots. Either walk takes about a second.
 _LONGEST_COUNT = 1e6
 _LONGEST_SEARCH = 1e5
-# The search for one root ends once it has cost so many steps of a walk, some five seconds. A
-# count that cannot be told costs the second number. So does a root that extended precision does
-# not settle at, a fifth of it; one that it does settle at takes a twentieth of its steps.
+# The search for one root ends once it has cost so much, some five seconds. The unit is a turn
+# that is counted, or a point that Newton's method takes a step from.
 _ALL_STEPS = 3e6
+# What a count costs that cannot be told; and extended precision where Newton's method does not
+# settle at a root, and where it does.
 _DOUBTFUL_COUNT = 5e5
 _LOST_ROOT, _POLISHED_ROOT = 1e5, 5e3
 # Most points of one line: where rounding hides D, there would be no end of them.
 _MOST_POINTS = 1_000_000
 # Roots left of a line may lie further up than those right of it. They are looked for so many
 # turns further: few at first, at most so many.
-_FURTHER = 4.0
-_FURTHEST = 3e4
-# Most roots are slow: first looked for within this many times those turns.
-_SLOW_ONES = 1e3
+_FIRST_TURNS_FURTHER = 4.0
+_MOST_TURNS_FURTHER = 3e4
+# Most roots are of low frequency: first looked for within this many times those turns.
+_MOST_OF_THEM = 1e3
 # Most points of a line from which Newton's method starts, and most of its steps in extended
 # precision: at a multiple root they only shrink by a share.
 _MOST_STARTS = 4096
 _NEWTON_STEPS = 12
-_MOST_STEPS = 100
+_EXTENDED_STEPS = 100
 # Most roots near a line that are tried in extended precision.
 _MOST_TRIED = 8
 # Most roots that are looked for right of a line.
 _MOST_ROOTS = 20_000
-# Directions from s = 0 in which slow ones are looked for.
+# Directions from s = 0 in which roots of low frequency are looked for.
 _ANGLES = np.linspace(1.6, np.pi, 8)
 # Roots down to so many times one over the longest delay are looked for in steps of their size.
 _SLOWEST = 1e-9
@@ -139,7 +141,7 @@ def extended_root(
     with mpmath.workdps(digits + _GUARD_DIGITS):
         s = mpmath.mpc(complex(complex_array("start", start)[()]))
         point = mpmath.mpf(x), mpmath.mpf(y)
-        for _ in range(_MOST_STEPS):
+        for _ in range(_EXTENDED_STEPS):
             value, slope = system._value(s, *point, mpmath), system._slope(s, *point, mpmath)
             if value == 0:
                 return +s
@@ -179,7 +181,7 @@ def _acting(
         none = {"b1": nothing, "b2": nothing, "tau1": 0.0, "tau2": 0.0}
         system = system.plain().replace(rest=left, **none)
     elif set(acting) != {system.tau1, system.tau2}:
-        # Before a parameter of zero any delay will do.
+        # Where the parameter is zero any delay will do.
         delay = acting[0] if acting else 0.0
         system = system.plain().replace(tau1=delay, tau2=delay)
     return system, values[0], values[1]
@@ -194,7 +196,7 @@ class _Line:
         How far up roots can lie right of the line, in turns of the longest delay's
         exponential; inf past the limit of a neutral root chain, or where a number overflows.
     steps : float
-        What its walks have cost so far.
+        What its searches have cost so far, in the unit of `_ALL_STEPS`.
     """
 
     def __init__(
@@ -236,7 +238,7 @@ class _Line:
             return 0.0
         if self.system.step:
             return self.turns
-        return min(self.turns, _SLOW_ONES * further, _LONGEST_SEARCH) + further
+        return min(self.turns, _MOST_OF_THEM * further, _LONGEST_SEARCH) + further
 
     def near(self, turns: float, most: int) -> tuple[ComplexArray, FloatArray]:
         """Follow Newton's method to roots near the line; return them and the last steps.
@@ -244,15 +246,16 @@ class _Line:
         Up to so many turns, from those `most` starts whose first step leads furthest right.
         """
         whole = self.shifted.sum_at(self.x, self.y).compiled()
-        grid, _ = heard(resolved_grid, whole, turns * self.per_turn, 1.0, most=_MOST_POINTS)
+        end = turns * self.per_turn
+        grid, _ = interruptible(resolved_grid, whole, end, 1.0, most=_MOST_POINTS)
         s = self.sigma + 1j * grid
         # A point costs a step of the walk, and one of Newton's method.
         self.steps += 2 * s.size
-        # From where a step of Newton's method is locally shortest: no root close to the line
-        # lies between two of its points.
         # Part by part, because arrays of millions would spend their time on memory.
         parts = np.array_split(s, 1 + s.size // 2**15)
         s, length = map(np.concatenate, zip(*map(self._step, parts), strict=True))
+        # From where a step of Newton's method is locally shortest: no root close to the line
+        # lies between two of its points.
         wider = np.pad(length, 1, constant_values=np.inf)
         s = s[(length <= wider[:-2]) & (length < wider[2:])]
         return self.followed(s[np.argsort(-s.real, kind="stable")][:most], _NEWTON_STEPS)
@@ -266,9 +269,9 @@ class _Line:
         return s.real + 1j * np.abs(s.imag), length
 
     def rightmost(self, further: float) -> tuple[complex, float] | None:
-        """Return the rightmost root near the line, and how far a faster one is ahead of it.
+        """Return the rightmost root near the line, and how far right an equal one may lie.
 
-        Of roots that count as equal it is the slowest.
+        Of roots that count as equal it is the one of lowest frequency.
         """
         turns = self.search(further)
         if not turns:
@@ -278,14 +281,14 @@ class _Line:
         unit = self.per_turn / (2.0 * np.pi)
         for top in sorted(found, key=lambda s: -s.real)[:_MOST_TRIED]:
             equal = found[found.real >= top.real - _EQUAL * max(abs(top), unit)]
-            slowest = equal[np.argmin(equal.imag)]
+            lowest = equal[np.argmin(equal.imag)]
             try:
-                root = _polished(self.system, self.x, self.y, slowest)
+                root = _polished(self.system, self.x, self.y, lowest)
             except RootError:
                 self.steps += _LOST_ROOT
                 continue
             self.steps += _POLISHED_ROOT
-            return root, float(top.real - slowest.real)
+            return root, float(top.real - lowest.real)
         return None
 
 
@@ -357,7 +360,7 @@ def _all_near(line: _Line, unit: float) -> Iterator[tuple[ComplexArray, FloatArr
     # Others along the line, ever further up, or closer to the axis.
     turns, steps = 0.0, 0.0
     while turns < line.turns:
-        turns = min(8.0 * max(turns, _FURTHER), line.turns)
+        turns = min(8.0 * max(turns, _FIRST_TURNS_FURTHER), line.turns)
         for share in (1.0, 0.3, 0.1, 0.0):
             one = _Line(line.system, line.x, line.y, share * line.sigma)
             # That of the delays that act on no root so far to the right, if none is left.
@@ -422,12 +425,12 @@ def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
     best = complex(np.nan, np.nan)
     # There are roots right of `low`, as far as can be told, and none right of `high`.
     low, high, sigma, width, walked = -np.inf, np.inf, 0.0, unit, 0.0
-    further = _FURTHER
+    further = _FIRST_TURNS_FURTHER
     while walked < _ALL_STEPS and sigma not in (low, high):
         line = _Line(acting, p, q, sigma)
         root, ahead = line.rightmost(further) or (complex(np.nan, np.nan), 0.0)
-        further = min(2.0 * further, _FURTHEST)
-        farthest = _FARTHEST * max(abs(root.real), unit)
+        further = min(2.0 * further, _MOST_TURNS_FURTHER)
+        farthest = _COUNT_WITHIN * max(abs(root.real), unit)
         # Next to the limit of the chain no count tells that roots lie right of `low`.
         if root.real + farthest > low:
             best = root

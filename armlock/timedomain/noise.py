@@ -312,7 +312,7 @@ class PerturbationNoise(ShapedNoise):
     .. math::
 
         \text{printed}(f) &= \text{level} \sqrt{1 + \left( \frac{f_0}{f} \right)^4} , \\
-        \text{asd}(f) &= \text{scale} \cdot \text{level}\,
+        \text{asd}(f) &= \text{level}\,
         \frac{\sqrt{f^4 + f_0^4}}{f^2 + \text{cutoff}^2} ,
 
     with the level and the corner :math:`f_0` of `armlock.paper`.
@@ -323,8 +323,6 @@ class PerturbationNoise(ShapedNoise):
         Of the random numbers.
     sample_rate : float, optional
         In Hz.
-    scale : float, optional
-        Factor before the spectrum as printed.
     cutoff : float, optional
         Frequency in Hz below which the density is flat. The standard deviation grows as
         cutoff^(-3/2), so that this number decides it.
@@ -338,7 +336,7 @@ class PerturbationNoise(ShapedNoise):
 
     .. math::
 
-        H(s) = \text{scale} \cdot \text{level}\,
+        H(s) = \text{level}\,
         \frac{s^2 + \sqrt{2}\, \omega_0 s + \omega_0^2}{(s + \omega_c)^2} ,
 
     because at s = j omega
@@ -360,16 +358,13 @@ class PerturbationNoise(ShapedNoise):
         seed: int,
         sample_rate: float = 200.0,
         *,
-        scale: float = 1.0,
         cutoff: float = 5e-6,
         at_rest: bool = False,
     ) -> None:
-        self.scale = positive_number("scale", scale)
         self.cutoff = positive_number("cutoff", cutoff)
         corner = 2.0 * math.pi * self.cutoff
         root = 2.0 * math.pi * paper.PHASE_NOISE_CORNER * math.sqrt(0.5)
         super().__init__(
             (complex(-root, root), complex(-root, -root)), (-corner, -corner),
-            self.scale * paper.PHASE_NOISE_LEVEL,
-            seed=seed, sample_rate=sample_rate, at_rest=at_rest,
+            paper.PHASE_NOISE_LEVEL, seed=seed, sample_rate=sample_rate, at_rest=at_rest,
         )  # fmt: skip

@@ -8,9 +8,8 @@ With phi the frequency noise of the locked laser, every loop of `armlock.loops` 
 Sensor and controller are sampled by the trapezoidal rule, see `armlock.timedomain.discretize`.
 Without a dead time the present phi is on both sides, with a weight of thousands; each sample
 solves for it. A rule that took the previous phi instead would be unstable by itself as soon as
-gain times step exceeds about one, and is not offered. A delay that is no whole number of
-samples is interpolated, with the weights of `lagrange_delay`; those of a delay that moves
-follow it sample by sample.
+gain times step exceeds about one, and is not offered. Delays between samples are interpolated,
+see `armlock.timedomain.delays`.
 
 Because s = j omega becomes (2 j / T) tan(omega T / 2) while the delays stay what they are,
 what is simulated has an open loop in closed form, `sampled_open_loop`.
@@ -18,10 +17,9 @@ what is simulated has an open loop in closed form, `sampled_open_loop`.
 
 from __future__ import annotations
 
-import math
 import sys
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -39,12 +37,20 @@ from armlock.checks import (
 )
 from armlock.loops import Loop, checked_loop
 from armlock.progress import progress
+from armlock.timedomain.delays import (
+    Arm,
+    Delay,
+    GivenDelay,
+    MovingDelay,
+    between,
+    delayed,
+    reach,
+    sampled_delays,
+)
 from armlock.timedomain.discretize import SampledFilter, SampledSensor, sampled_loop, warped
 
-#: Order of the Lagrange interpolation for delays that are not whole samples.
-INTERPOLATION_ORDER = 7
-#: Samples that are computed at a time, of all runs, or more where the past is long, which is
-#: moved with each block; results do not depend on it.
+#: Samples that are computed at a time, of all runs together. Where delays reach far back there
+#: are more, because each block moves the past. Results do not depend on their number.
 BLOCK = 1 << 16
 #: Runs of an ensemble that go side by side. Fewer than half as many go one by one.
 LANES = 32
@@ -52,29 +58,12 @@ LANES = 32
 #: the arms hold at the start, the history, is input too.
 LIMIT = 1e6
 
-#: A constant delay in samples, phi(t - tau) = sum_k weights[k] phi[n - first - k].
-Delay = tuple[int, tuple[float, ...]]
-#: A delay that moves, in samples with a run in each column, and the scales of `_between`.
-MovingDelay = tuple[FloatArray, tuple[float, ...]]
-#: What the caller gives for tau1 and tau2: a number, a series, or a function of the time in s.
-GivenDelay = npt.ArrayLike | Callable[[FloatArray], npt.ArrayLike]
 #: A loop in samples: delays of both arms and the dead time, sensor, controller.
 SampledLoop = tuple[tuple[Delay | MovingDelay, ...], SampledSensor, SampledFilter]
 #: Shares of the signals of both arms in the sensor's output, in what the controller sends, and
 #: in what it sends with the next sample.
 Shares = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
 
-# Delays closer to whole samples than this, in samples, are whole.
-_WHOLE = 1e-6
-# Interpolated are so many samples on either side of a delay.
-_SIDE = (INTERPOLATION_ORDER + 1) // 2
-# Factors of a pair of samples, see `_between`: 1 / prod (k - j) over all nodes j but k.
-_SCALES = tuple(
-    1.0 / math.prod(k - j for j in range(2 * _SIDE) if j != k) for k in range(_SIDE, 2 * _SIDE)
-)
-# A round trip is 1 - (1 - v1 / c) (1 - v2 / c) longer a second, where the ends part at speeds
-# v1 and v2: between these, whatever moves slower than light.
-_SLOWEST, _FASTEST = -3.0, 1.0
 # Samples kept behind the longest delay, for arms that have grown during a gap of the run.
 _SPARE = 64
 
@@ -124,119 +113,6 @@ class DivergenceError(ArithmeticError):
         return type(self), (self.time, self.detected, self.output)
 
 
-def lagrange_delay(name: str, tau: float, sample_rate: float) -> Delay:
-    r"""Return the weights of a delay, a single one where it is whole samples.
-
-    Otherwise they are those of Lagrange's polynomial of order m, `INTERPOLATION_ORDER`,
-
-    .. math::
-
-        \ell_i = \prod_{j \ne i} \frac{x - j}{i - j} , \qquad i, j = 0, \ldots, m ,
-
-    with x the delay in samples, less `first`.
-
-    Parameters
-    ----------
-    name : str
-        What messages call it.
-    tau : float
-        Delay in s, zero included.
-    sample_rate : float
-        In Hz.
-
-    Returns
-    -------
-    first : int
-        The smallest delay in samples that has a weight.
-    weights : tuple of float
-        Of this delay, and of those that follow sample by sample.
-
-    Raises
-    ------
-    ValueError
-        If the delay is too short for the sample rate.
-
-    Notes
-    -----
-    With an odd order and the delay between the two middle samples, no frequency is amplified,
-    so that interpolation adds no instability of its own.
-    """
-    samples = tau * sample_rate
-    whole = round(samples)
-    first = math.floor(samples) - _SIDE + 1
-    if tau == 0.0 or (whole > 0 and abs(samples - whole) <= _WHOLE):
-        return whole, (1.0,)
-    if first < 1:
-        raise ValueError(
-            f"sample_rate must be at least {_SIDE / tau:.9g} Hz to interpolate {name} = {tau} "
-            f"s, or a multiple of {1.0 / tau:.9g} Hz, got {sample_rate:.9g}"
-        )
-    x = samples - first
-    nodes = range(INTERPOLATION_ORDER + 1)
-    weights = [math.prod((x - j) / (k - j) for j in nodes if j != k) for k in nodes]
-    return first, tuple(weights)
-
-
-def _sampled_delays(loop: Loop, sample_rate: float) -> tuple[Delay, ...]:
-    """Return the delays of both arms and the dead time, or say why they have no samples."""
-    arms = [lagrange_delay(name, getattr(loop, name), sample_rate) for name in ("tau1", "tau2")]
-    try:
-        return (*arms, lagrange_delay("delay", loop.delay, sample_rate))
-    except ValueError as error:
-        phase = math.pi * sample_rate * loop.delay
-        raise ValueError(
-            f"{error}; loop.replace(delay=0.0) neglects the dead time, which changes the phase "
-            f"of L by {phase:.3g} rad at {0.5 * sample_rate:g} Hz, the highest frequency "
-            f"simulated, and by less below"
-        ) from None
-
-
-def _reach(delay: Delay | MovingDelay) -> int:
-    """Return how many samples a delay reaches back, at most."""
-    first, weights = delay
-    return first + len(weights) - 1 if isinstance(first, int) else int(first.max()) + _SIDE
-
-
-def _past_history(begin: int, rate: float) -> str:
-    """Say what a delay must not do that reaches back past sample number `begin`."""
-    return f"not reach back past the history, which begins at t = {begin / rate:.9g} s"
-
-
-@njit(cache=True)
-def _delayed(signal: FloatArray, row: int, column: int, delay: Delay) -> float:
-    """Return a column of a signal as it was a constant delay before a row."""
-    first, weights = delay
-    value = 0.0
-    for k in range(len(weights)):
-        value += weights[k] * signal[np.uintp(row - first - k), column]
-    return value
-
-
-@njit(cache=True)
-def _between(
-    signal: FloatArray, middle: int, column: int, u: float, scales: tuple[float, ...]
-) -> float:
-    """Return a column of a signal between two rows, at middle - 1/2 - u with abs(u) <= 1/2.
-
-    Lagrange's polynomial, as in `lagrange_delay`, its nodes taken by twos: with u counted from
-    the middle, those at h and -h contribute, of q(i) = u^2 - i^2 for i = 1/2, 3/2, ...
-
-        prod_{i != h} q(i) scale(h) ((u + h) y(h) - (u - h) y(-h)) .
-
-    At a node it is that sample, bit by bit.
-    """
-    square, value = u * u, 0.0
-    q1, q2, q3, q4 = square - 0.25, square - 2.25, square - 6.25, square - 12.25
-    near, far = q1 * q2, q3 * q4
-    products = q2 * far, q1 * far, near * q4, near * q3
-    for k in range(4):
-        h = k + 0.5
-        later = signal[np.uintp(middle + k), column]
-        earlier = signal[np.uintp(middle - 1 - k), column]
-        value += (products[k] * scales[k]) * ((u + h) * earlier - (u - h) * later)
-    return value
-
-
 @njit(cache=True)
 def _place(row: int, lanes: tuple[int, ...], w: int) -> np.uintp:
     """Return where in `work` the entry of lane w in a row stands.
@@ -263,31 +139,26 @@ def _receive(
     `now` is the present row of phi, and `i` that of c, unless it has only one, and of a delay
     that moves. See `_compute` for the rest.
     """
-    start, weights = delay
     at = np.uintp(i * (len(c) > 1))
-    if isinstance(start, int):  # known when it is compiled
+    if isinstance(delay, tuple):  # known when it is compiled
         for w in range(len(lanes)):
             column = np.uintp(first + w)
-            work[_place(target, lanes, w)] = c[at, column] * _delayed(phi, now, column, delay)
-    else:
-        # Where all lanes have the same whole samples, they read from the same rows.
-        whole, others = np.floor(start[i, first]), 0
+            work[_place(target, lanes, w)] = c[at, column] * delayed(phi, now, column, delay)
+    elif delay.shape[1] == 1:
+        whole = np.floor(delay[i, 0])
+        middle = now - int(whole)
         for w in range(len(lanes)):
-            others += np.floor(start[i, np.uintp(first + w)]) != whole
-        if others == 0:
+            column = np.uintp(first + w)
+            # Outside of this loop it would halve the speed of a single run.
+            u = delay[i, 0] - whole - 0.5
+            work[_place(target, lanes, w)] = c[at, column] * between(phi, middle, column, u)
+    else:
+        for w in range(len(lanes)):
+            column = np.uintp(first + w)
+            whole = np.floor(delay[i, column])
+            u = delay[i, column] - whole - 0.5
             middle = now - int(whole)
-            for w in range(len(lanes)):
-                column = np.uintp(first + w)
-                u = start[i, column] - whole - 0.5
-                received = _between(phi, middle, column, u, weights)
-                work[_place(target, lanes, w)] = c[at, column] * received
-        else:
-            for w in range(len(lanes)):
-                column = np.uintp(first + w)
-                whole = np.floor(start[i, column])
-                u = start[i, column] - whole - 0.5
-                received = _between(phi, now - int(whole), column, u, weights)
-                work[_place(target, lanes, w)] = c[at, column] * received
+            work[_place(target, lanes, w)] = c[at, column] * between(phi, middle, column, u)
 
 
 @njit(cache=True)
@@ -324,7 +195,7 @@ def _close(
             # phi = noise - predicted - now1 (phi - a1) - now2 (phi - a2), solved for phi.
             x = (x + (now1 * a1 + now2 * a2) - predicted) * inverse
         else:
-            x -= _delayed(sent, now, column, dead)
+            x -= delayed(sent, now, column, dead)
             sending = now1 * (x - a1) + now2 * (x - a2)
             sent[np.uintp(now), column] = predicted + sending
         work[_place(_OUTPUT, lanes, w)] = x
@@ -440,6 +311,13 @@ def _series(name: str, value: npt.ArrayLike, like: FloatArray) -> FloatArray:
     return np.atleast_2d(array).T
 
 
+def _in_lanes(delay: Delay | MovingDelay, number: int) -> Delay | MovingDelay:
+    """Return a delay with a column for each lane, if the runs have their own."""
+    if isinstance(delay, tuple) or delay.shape[1] == 1:
+        return delay
+    return _in_columns(delay, number)
+
+
 def _in_columns(series: FloatArray, number: int) -> FloatArray:
     """Return samples in rows, as compiled code takes them, the last run repeated at the end."""
     if series.shape[1] == 1 < number:
@@ -508,7 +386,7 @@ def sampled_open_loop(
     True
     """
     rate = positive_number("sample_rate", sample_rate)
-    delays = _sampled_delays(checked_loop(loop), rate)
+    delays = sampled_delays(checked_loop(loop), rate)
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
     omega = positive_array("omega", omega)
     delayed1, delayed2, dead = (
@@ -519,74 +397,6 @@ def sampled_open_loop(
     m1, m2 = loop.mapping.weights(s)
     sensor = m1 * (1.0 - c1 * delayed1) + m2 * (1.0 - c2 * delayed2)
     return np.asarray(dead * loop.controller(s) * sensor)
-
-
-@dataclass
-class _MovingArm:
-    """The delay of one arm during a call: a series, or a function of time.
-
-    `begin` is the number of the call's first sample in the run, `last` the last delay so far.
-    """
-
-    name: str
-    given: FloatArray | Callable[[FloatArray], npt.ArrayLike]
-    rate: float
-    begin: int
-    last: FloatArray | None = None
-
-    def part(self, noise: FloatArray, number: int, known: int) -> FloatArray:
-        """Return the delays of a block in samples, in rows.
-
-        `noise` is that of the block, `number` that of its first sample in the run, and so many
-        samples are `known` before it.
-        """
-        if callable(self.given):
-            tau = self._called(self.given, number, noise)
-        else:
-            tau = self.given[number - self.begin :][: len(noise)]
-        # Behind the last sample of the block before, in few arrays: new memory takes time.
-        rows = np.empty((len(tau) + 1, tau.shape[1]))
-        samples = np.multiply(tau, self.rate, out=rows[1:])
-        rows[0] = samples[0] if self.last is None else self.last
-        self.last = samples[-1].copy()
-        change = np.diff(rows, axis=0)
-        if change.min() <= _SLOWEST or change.max() >= _FASTEST:
-            constraint = (
-                f"change by more than {_SLOWEST:g} and less than {_FASTEST:g} s a second, as "
-                f"round trips do at less than the speed of light"
-            )
-            wrong = (change <= _SLOWEST) | (change >= _FASTEST)
-        elif samples.min() < _SIDE:
-            constraint = f"be at least {_SIDE / self.rate} s where it is not constant"
-            wrong = samples < _SIDE
-        elif _reach((samples[:1], _SCALES)) > known:
-            # No later sample reaches further back.
-            constraint = _past_history(number - known, self.rate)
-            wrong = samples[:1] == samples[0].max()
-        else:
-            return samples
-        i, w = np.argwhere(wrong)[0]
-        raise ValueError(
-            f"{self.name} must {constraint}, got {tau[i, w]} s at "
-            f"t = {(number + i) / self.rate:.9g} s"
-        )
-
-    def _called(
-        self,
-        function: Callable[[FloatArray], npt.ArrayLike],
-        number: int,
-        noise: FloatArray,
-    ) -> FloatArray:
-        """Return what a function of time gives, in rows."""
-        time = np.arange(number, number + len(noise), dtype=np.float64)
-        time /= self.rate
-        name = f"{self.name}(t), for t from {time[0]:.9g} s on,"
-        tau = finite_series(name, function(time), 0, 1, 2)
-        if tau.shape not in ((), time.shape, noise.T.shape):
-            raise ValueError(
-                f"{name} must be a number or have the shape of t, {time.shape}; got {tau.shape}"
-            )
-        return np.atleast_2d(tau if tau.ndim else np.full(time.shape, tau)).T
 
 
 class Simulation:
@@ -690,10 +500,11 @@ class Simulation:
         self.sample_rate = positive_number("sample_rate", sample_rate)
         self.limit = positive_number("limit", limit)
         self.draws = None if draws is None else whole_number("draws", draws, 1)
-        self._delays = _sampled_delays(loop, self.sample_rate)
+        delays = sampled_delays(loop, self.sample_rate)
         sensor, controller = sampled_loop(loop.controller, loop.mapping, self.sample_rate)
         self._filters = sensor, controller
-        self.history_samples = max(_reach(delay) for delay in self._delays)
+        self._dead = delays[2]
+        self.history_samples = max(map(reach, delays))
         before = finite_series("history", history, 0, 1)
         if before.ndim and before.size < self.history_samples:
             raise ValueError(
@@ -765,7 +576,7 @@ class Simulation:
         if self.draws not in (None, len(given)):
             raise ValueError(f"noise must have {self.draws} rows, got shape {given.shape}")
         inputs = [np.atleast_2d(given).T, _series("c1", c1, given), _series("c2", c2, given)]
-        arms = [self._arm(k, tau, given) for k, tau in enumerate((tau1, tau2))]
+        arms = self._arm("tau1", tau1, given), self._arm("tau2", tau2, given)
         if self._in_block:
             raise RuntimeError(
                 "this run was interrupted in the middle of a block, and cannot go on: begin "
@@ -786,39 +597,28 @@ class Simulation:
                 say(at + self._block)
         return shaped
 
-    def _arm(self, k: int, tau: GivenDelay | None, like: FloatArray) -> Delay | _MovingArm:
-        """Return a constant delay in samples, or one that moves; the loop's own for None."""
-        name, delay = f"tau{k + 1}", self._delays[k]
-        if callable(tau):
-            return _MovingArm(name, tau, self.sample_rate, self.samples)
-        if tau is not None:
-            series = _series(name, tau, like)
-            if np.ndim(tau) > 0:
-                return _MovingArm(name, series, self.sample_rate, self.samples)
-            delay = lagrange_delay(name, positive_number(name, tau), self.sample_rate)
-        if _reach(delay) > self._known:
-            constraint = _past_history(self.samples - self._known, self.sample_rate)
-            raise ValueError(
-                f"{name} must {constraint}, got "
-                f"{getattr(self.loop, name) if tau is None else tau} s at "
-                f"t = {self.samples / self.sample_rate:.9g} s"
-            )
-        return delay
+    def _arm(self, name: str, tau: GivenDelay | None, like: FloatArray) -> Arm:
+        """Return the delay of an arm during a call, the loop's own for None."""
+        given: Any = getattr(self.loop, name) if tau is None else tau
+        if not callable(given):
+            series = _series(name, given, like)
+            given = series if np.ndim(given) > 0 else positive_number(name, given)
+        return Arm(name, given, self.sample_rate, self.samples)
 
     def _fill(
         self,
         output: FloatArray,
         inputs: Sequence[FloatArray],
-        arms: Sequence[Delay | _MovingArm],
+        arms: Sequence[Arm],
     ) -> None:
         """Compute the next samples, each in a row, unless the run stops before."""
         stop, first, columns = len(output), 0, self._signals.shape[2]
-        delays = (*(self._delay(arm, inputs[0]) for arm in arms), self._delays[2])
-        keep = self._make_room(max(map(_reach, delays)))
+        delays = [arm.part(inputs[0], self.samples, self._known) for arm in arms]
+        keep = self._make_room(max(map(reach, (*delays, self._dead))))
         known = self._known
         phi, sent = self._signals[:, : known + stop]
         series = tuple(_in_columns(given, columns) for given in inputs)
-        sampled = delays, *self._filters
+        sampled = (*(_in_lanes(delay, columns) for delay in delays), self._dead), *self._filters
         self._in_block = True
         for work in self._groups:
             lanes = work.shape[1]
@@ -839,19 +639,12 @@ class Simulation:
         self.samples += stop
         self._in_block = False
 
-    def _delay(self, arm: Delay | _MovingArm, noise: FloatArray) -> Delay | MovingDelay:
-        """Return an arm's delay during a block."""
-        if not isinstance(arm, _MovingArm):
-            return arm
-        samples = arm.part(noise, self.samples, self._known)
-        return _in_columns(samples, self._signals.shape[2]), _SCALES
-
-    def _make_room(self, reach: int) -> int:
+    def _make_room(self, longest: int) -> int:
         """Make room for a block whose delays reach so far back; return what to keep after it.
 
         That is some samples more, for the arms of the next block.
         """
-        keep = max(self.history_samples, reach) + _SPARE
+        keep = max(self.history_samples, longest) + _SPARE
         if self.samples == 0:
             self._known = min(self._known, keep)
         shape = 2, max(keep, self._known) + self._block, self._signals.shape[2]
@@ -864,7 +657,7 @@ class Simulation:
             history = self._history[-keep:, None] if self._history.ndim else self._history
             self._signals[0, : self._known] = history
             for work in self._groups:
-                work[_LARGEST] = np.abs(self._signals[0, : self._known][-reach:]).max()
+                work[_LARGEST] = np.abs(self._signals[0, : self._known][-longest:]).max()
         return keep
 
 

@@ -7,13 +7,15 @@ pages' scripts are shipped without comments, and with no space that says nothing
 """
 
 import re
+from itertools import pairwise
 from pathlib import Path
+
+import tinycss2
 
 ICON = re.compile(
     r'"?([a-z0-9-]+)"?:\[\d+,\d+,\[[^\]]*\],"[0-9a-f]+",(?:"[^"]*"|\[[^\]]*\])\](,?)'
 )
 ICON_NAME = re.compile(r"\bfa-([a-z0-9-]+)")
-CLASS = re.compile(r"\.(-?[A-Za-z_][\w-]*)")
 WORD = re.compile(r"[\w-]+")
 COMMENT = re.compile(r"(?m)^[ ]*(?:/\*(?:.|\n)*?\*/|//.*)\n")
 # In a script, what stays as it is: texts, regular expressions, and where a template begins.
@@ -21,6 +23,8 @@ LITERAL = re.compile(
     r"""(?x) "(?:[^"\\\n]|\\.)*" | '(?:[^'\\\n]|\\.)*' | `
     | (?<=[(,=:!&|?{};\n])\s* /(?![*/]) (?:[^/\\\n[] | \\. | \[(?:[^]\\\n]|\\.)*\])+ /[a-z]*"""
 )
+# At-rules that hold other rules.
+GROUPS = {"media", "supports", "layer", "container"}
 # Bootstrap joins these from parts.
 KEPT = (
     "bs-",
@@ -35,58 +39,34 @@ KEPT = (
 )
 
 
-def rules(text):
-    """Split a style sheet into (head, body), a body being text or the rules of a block."""
-    found, at = [], 0
-    while (brace := text.find("{", at)) >= 0:
-        head = text[at:brace]
-        # Statements such as @import end without a block.
-        *statements, head = head.split(";") if head.lstrip().startswith("@") else [head]
-        found += [(f"{statement};", None) for statement in statements]
-        depth, end = 1, brace + 1
-        while depth:
-            depth += {"{": 1, "}": -1}.get(text[end], 0)
-            end += 1
-        found.append((head, text[brace + 1 : end - 1]))
-        at = end
-    return [*found, (text[at:], None)]
-
-
-def thin(text, words):
-    """Return a style sheet without the rules that no page can match."""
+def thin(rules, words):
+    """Return the text of a style sheet's rules without those that no page can match."""
     kept = []
-    for head, body in rules(text):
-        name = head.strip()
-        if body is None:
-            kept.append(head)
-        elif name.startswith(("@media", "@supports", "@layer", "@container")):
-            inner = thin(body, words)
-            if inner.strip():
-                kept.append(f"{head}{{{inner}}}")
-        elif name.startswith("@"):
-            kept.append(f"{head}{{{body}}}")
-        else:
-            used = [one for one in selectors(name) if matches(one, words)]
+    for rule in rules:
+        if rule.type == "qualified-rule":
+            used = [one for one in selectors(rule.prelude) if matches(one, words)]
             if used:
-                kept.append(f"{','.join(used)}{{{body}}}")
+                text = ",".join(map(tinycss2.serialize, used)).strip()
+                kept.append(f"{text}{{{tinycss2.serialize(rule.content)}}}")
+        elif rule.type == "at-rule" and rule.content and rule.lower_at_keyword in GROUPS:
+            inner = thin(tinycss2.parse_rule_list(rule.content, skip_whitespace=True), words)
+            if inner:
+                head = tinycss2.serialize(rule.prelude)
+                kept.append(f"@{rule.at_keyword}{head}{{{inner}}}")
+        else:
+            kept.append(rule.serialize())
     return "".join(kept)
 
 
-def selectors(text):
-    """Split a list of selectors at its commas, but for those within brackets."""
-    found, depth, start = [], 0, 0
-    for at, letter in enumerate(text):
-        depth += {"(": 1, "[": 1, ")": -1, "]": -1}.get(letter, 0)
-        if letter == "," and depth == 0:
-            found.append(text[start:at])
-            start = at + 1
-    return [*found, text[start:]]
+def selectors(prelude):
+    """Split the tokens before a rule's block at their commas."""
+    commas = [at for at, token in enumerate(prelude) if token == ","]
+    return [prelude[i + 1 : j] for i, j in pairwise([-1, *commas, len(prelude)])]
 
 
 def matches(selector, words):
-    """Whether all classes that a selector asks for occur somewhere; those in brackets do."""
-    bare = re.sub(r"\[[^\]]*\]|:(?:not|is|where|has)\((?:[^()]|\([^()]*\))*\)", "", selector)
-    names = CLASS.findall(bare.replace("\\", ""))
+    """Whether all classes that a selector asks for, outside of brackets, occur somewhere."""
+    names = [token.value for dot, token in pairwise(selector) if dot == "."]
     return all(name in words or name.startswith(KEPT) for name in names)
 
 
@@ -151,7 +131,8 @@ def lean(app, exception):
     words = {word for text in [*pages, *scripts] for word in WORD.findall(text)}
     for file, text in styles.items():
         bare = re.sub(r"/\*(?!!)(?:.|\n)*?\*/", "", text)
-        file.write_text(thin(bare, words), encoding="utf-8")
+        rules = tinycss2.parse_stylesheet(bare, skip_whitespace=True)
+        file.write_text(thin(rules, words), encoding="utf-8")
     for file in (static / "live").glob("*.js"):
         file.write_text(shortened(file.read_text(encoding="utf-8")), encoding="utf-8")
 
