@@ -352,9 +352,9 @@ def intervals_not_clear(
     """Intervals, shape (n, 2), of a span of the axis outside which L stays off a target.
 
     The target is a segment of the negative real axis, given by its ends, the one nearer to zero
-    first; or, where that is empty, all that has margins below `levels`. What is left of the span
-    after `most` steps, or once `stop` is set, belongs to the last interval. Returns them, and
-    whether nothing was left.
+    first; or, where that is empty, all that has margins below `levels`. What is left of the
+    span after `most` steps, or once `stop` is set, belongs to the last interval. Returns them,
+    and whether nothing was left.
     """
     found, number, compared = np.empty((64, 2)), 0, 0
     omega, omega_end = span
