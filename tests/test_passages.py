@@ -15,8 +15,6 @@ from armlock.orbits.passages import (
     Course,
     Hold,
     days,
-    frozen_rate,
-    growth,
     half_difference,
     held_range,
     largest_half,
@@ -25,6 +23,7 @@ from armlock.orbits.passages import (
     policies,
     switches,
 )
+from book.companion.orbits import frozen_rate, growth
 
 KEPLER, MEAN, HELD = kepler(), 16.65, 0.0325469
 LOOPS = loops()
