@@ -109,15 +109,17 @@ $(PACKAGE_READY): $(ENV_READY) pyproject.toml
 
 # nbmake runs them once, on all cores, for the tests and for the book: a copy, which keeps the
 # outputs. The claims are checked before, once for all notebooks and tests, which share what these
-# have computed. The two longest notebooks go to two processes, which begin with two each: the
-# ledger, a short one, stands between them.
+# have computed. The longest notebooks come first; two short ones stand between them, because each
+# process begins with two.
+LONGEST := $(addsuffix .ipynb,07_simulation 09_ledger 08d_orbits 10_errata 08c_design 08a_flight \
+	08b_noise_and_pulling 04_dual_arm 08f_own_loop)
 PYTEST := $(PY) -m pytest --numprocesses auto --maxprocesses 4 --dist worksteal
 execute = export ARMLOCK_FIGURES="$(CURDIR)/$(1)"; \
 	$(PYTEST) --dist load --maxschedchunk 1 --nbmake --overwrite $(addprefix $(2)/,$(3))
 run-notebooks = rm -rf $(1) build/shared $(2); export ARMLOCK_FIGURES="$(CURDIR)/$(1)"; \
 	echo "Checking every claim of the paper: build/claims.txt ..."; \
 	$(PY) -m book.companion.claims $(1) > build/claims.txt && cp -R notebooks $(2) && \
-	$(call execute,$(1),$(2),07_simulation.ipynb 09_ledger.ipynb 08c_design.ipynb *.ipynb)
+	$(call execute,$(1),$(2),$(LONGEST) *.ipynb)
 
 # Where notebooks alone have changed since the last run, only these run again. The stamp goes
 # first: what an interrupted run has left is not taken for a whole one.

@@ -124,24 +124,19 @@ def test_a_build_fails_on_each_fault(tmp_path):
     """Each fault is a warning about its notebook, and every warning fails the build."""
     missing = TEXT + " {numref}`fig-missing` {doc}`/book/missing`"
     silent = nbformat.v4.new_code_cell(DRAW)
-    faulty = {
-        "raises": notebook(
-            nbformat.v4.new_markdown_cell("# A chapter"),
-            nbformat.v4.new_code_cell("assert 1 > 2, 'a check of the notebook'"),
-        ),
-        "links": small(silent, text=missing, alt="At {nowhere:.1f} Hz"),
-    }
-    code, output, pages = build(tmp_path, faulty)
+    raises = nbformat.v4.new_code_cell("assert 1 > 2, 'a check of the notebook'")
+    faulty = small(silent, raises, text=missing, alt="At {nowhere:.1f} Hz")
+    code, output, pages = build(tmp_path, {"faulty": faulty})
     assert code != 0
     warnings = "\n".join(line for line in output.splitlines() if "WARNING: " in line)
-    for name, sign in (
-        ("raises", "Executing notebook failed"),
-        ("links", "nothing is glued as 'nowhere'"),
-        ("links", "a picture has no alternative text"),
-        ("links", "fig-missing"),
-        ("links", "/book/missing"),
+    for sign in (
+        "Executing notebook failed",
+        "nothing is glued as 'nowhere'",
+        "a picture has no alternative text",
+        "fig-missing",
+        "/book/missing",
     ):
-        assert re.search(rf"notebooks/{name}\.ipynb.*{sign}", warnings), (name, sign, output)
+        assert re.search(rf"notebooks/faulty\.ipynb.*{sign}", warnings), (sign, output)
     assert ": a check of the notebook" in output
     # Nothing links to a repository whose address is not known.
     for page in pages.rglob("*.html"):

@@ -48,7 +48,8 @@ def test_a_worker_that_is_killed_costs_no_result(tmp_path):
 def test_the_lines_of_the_page_run(tmp_path):
     """As a script, whose workers import it again."""
     pytest.importorskip("h5py")
-    (tmp_path / "page.py").write_text(PAGE[0].replace("200)", "6)"))
+    lines = PAGE[0].replace("200)", "6)").replace("n_workers=2", "n_workers=1")
+    (tmp_path / "page.py").write_text(lines)
     done = subprocess.run(
         [sys.executable, "page.py"],
         cwd=tmp_path,

@@ -20,14 +20,6 @@ LOADED = (
 )
 
 
-@pytest.fixture
-def package(tmp_path):
-    """A copy of the package that has never run."""
-    target = tmp_path / "here" / "armlock"
-    shutil.copytree(ROOT / "armlock", target, ignore=shutil.ignore_patterns("__pycache__"))
-    return target
-
-
 def run(package, code, stderr=subprocess.PIPE, **settings):
     environment = os.environ | {"PYTHONPATH": str(package.parent), **settings}
     environment.pop("NUMBA_CACHE_DIR", None)
@@ -43,7 +35,30 @@ def run(package, code, stderr=subprocess.PIPE, **settings):
     return done.stdout, done.stderr
 
 
+@pytest.fixture(scope="module")
+def first(tmp_path_factory):
+    """A copy of the package that has run once; what it printed, and a terminal showed."""
+    folder = tmp_path_factory.mktemp("here")
+    package, ours, theirs = folder / "armlock", *pty.openpty()
+    shutil.copytree(ROOT / "armlock", package, ignore=shutil.ignore_patterns("__pycache__"))
+    printed, _ = run(package, DRAW, stderr=theirs, XDG_CACHE_HOME=str(folder / "elsewhere"))
+    os.close(theirs)
+    return package, printed, os.read(ours, 1000).decode()
+
+
+@pytest.fixture
+def package(first, tmp_path):
+    """A copy of that package, where it has not run."""
+    return Path(shutil.copytree(first[0], tmp_path / "here" / "armlock"))
+
+
+def test_a_terminal_says_that_something_is_compiled(first):
+    assert first[2].startswith("armlock compiles, once")
+    assert first[2].endswith("\r\033[K")
+
+
 def test_where_nothing_can_be_written_it_works_all_the_same(package):
+    shutil.rmtree(package / "__pycache__")
     (package / "__pycache__").write_text("in the way")
     nowhere = {"HOME": "/dev/null", "XDG_CACHE_HOME": "/dev/null"}
     printed, word = run(package, DRAW, **nowhere)
@@ -52,37 +67,26 @@ def test_where_nothing_can_be_written_it_works_all_the_same(package):
     assert "NUMBA_CACHE_DIR" in word
 
 
-def test_what_others_could_have_written_is_not_run(package, tmp_path):
-    elsewhere = {"XDG_CACHE_HOME": str(tmp_path)}
-    run(package, DRAW, **elsewhere)
-    assert not (tmp_path / "armlock-compiled").exists()
+def test_what_others_could_have_written_is_not_run(first, package, tmp_path):
+    assert not (first[0].parent / "elsewhere" / "armlock-compiled").exists()
     for folder in (package / "__pycache__" / "armlock-compiled").iterdir():
         folder.chmod(0o777)
-    run(package, DRAW, **elsewhere)
+    run(package, DRAW, XDG_CACHE_HOME=str(tmp_path))
     assert (tmp_path / "armlock-compiled").exists()
 
 
-def test_only_a_change_of_what_a_function_uses_compiles_it_anew(package):
-    first, _ = run(package, DRAW)
-    assert run(package, f"{DRAW}; {LOADED}") == (f"{first}1\n", "")
+def test_only_a_change_of_what_a_function_uses_compiles_it_anew(first):
+    package, printed, _ = first
     # A comment, in a module that the function does not stand in.
     changed = package / "timedomain" / "discretize.py"
     source = changed.read_text()
     changed.write_text(source + "# A comment.\n")
-    assert run(package, f"{DRAW}; {LOADED}") == (f"{first}1\n", "")
+    assert run(package, f"{DRAW}; {LOADED}") == (f"{printed}1\n", "")
     # Of the two functions, the one that has changed is part of the other.
     changed.write_text(source.replace("y = v + (t1 * w1 + t2 * w2)", "y = v"))
     assert source != changed.read_text()
-    assert run(package, DRAW)[0] != first
-
-
-def test_a_terminal_says_that_something_is_compiled(package):
-    ours, theirs = pty.openpty()
-    run(package, DRAW, stderr=theirs)
-    os.close(theirs)
-    shown = os.read(ours, 1000).decode()
-    assert shown.startswith("armlock compiles, once")
-    assert shown.endswith("\r\033[K")
+    assert run(package, DRAW)[0] != printed
+    changed.write_text(source)
 
 
 def test_a_function_without_a_module_compiles_beside_the_package():

@@ -64,7 +64,7 @@ def test_an_argument_that_does_not_add_up_is_doubted():
     go = np.zeros(1, dtype=bool)
     assert counting.count_point(model, *point, end, go) == unstable_roots(system, *point)
     other = model._replace(roots=np.zeros(3, dtype=complex))
-    assert counting.count_point(other, *point, end, go) == counting.DOUBTFUL
+    assert counting.count_point(other, *point, end, go) == counting.CONTRADICTORY
     assert counting.count_point(model, *point, end, ~go) == counting.TOO_LONG
 
 

@@ -102,15 +102,15 @@ def test_a_loop_with_a_dead_time_is_certified_at_all_frequencies():
     assert found.measures["modulus"] == modulus_margin(found.loop)
 
 
-@pytest.mark.parametrize("gain", [3.0, 300.0, 3000.0])
-def test_a_stable_start_is_seen_and_the_constraint_that_is_missed_is_named(gain):
+@pytest.mark.parametrize("gain", [3.0, 3000.0])
+def test_a_stable_start_is_seen_and_what_is_missed_is_named_with_how_much(gain):
     start = Loop(([], [-0.1], gain), "single", 20.0)
     bounds = {"phase": np.radians(20)}
     if gain == 3.0:
         assert design(start, "suppression", bounds).measures["phase"] > bounds["phase"]
     else:
         with pytest.raises(
-            ValueError, match=r"the best candidate has phase 0\.\d+ rad in place"
+            ValueError, match=r"best candidate has phase 0\.\d+ rad in place of 0\.349"
         ):
             design(start, "suppression", bounds)
 
@@ -122,11 +122,6 @@ def test_a_perturbation_above_one_is_made_larger():
     k = found.loop.controller(0.0).real
     assert found.measures["critical_perturbation"] == pytest.approx(1.0 / k, rel=1e-9)
     assert k == pytest.approx(0.03 * 10.0**-0.5, rel=1e-2)
-
-
-def test_contradictory_constraints_say_which_was_missed_and_by_how_much():
-    with pytest.raises(ValueError, match=r"modulus 0\.\d+ in place of 1\.5"):
-        design(robust_loop(), "suppression", {"modulus": 1.5})
 
 
 @given(st.integers(1, 4), st.data())

@@ -76,14 +76,12 @@ def test_the_perturbations_follow_the_formula_up_to_the_end():
     assert source.sampled_asd(frequency) == pytest.approx(source.asd(frequency), rel=1e-8)
 
 
-@pytest.mark.parametrize(
-    ("zeros", "poles"), [([], [-2.0, -0.3]), ([-5.0], [-1 + 9j, -1 - 9j, -4.0])]
-)
-def test_a_series_starts_in_the_middle_of_its_course(zeros, poles):
+def test_a_series_starts_in_the_middle_of_its_course():
     """Covariance of the first samples, over many seeds, is that of samples much later."""
 
     def source(seed):
-        return ShapedNoise(zeros, poles, 1.0, seed=seed, sample_rate=10.0)
+        poles = [-1 + 9j, -1 - 9j, -4.0]
+        return ShapedNoise([-5.0], poles, 1.0, seed=seed, sample_rate=10.0)
 
     first = np.array([source(seed).draw(4) for seed in range(3000)])
     later = source(5000).draw(2_000_000)

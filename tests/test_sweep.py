@@ -151,7 +151,7 @@ def function(point):
 
 if __name__ == "__main__":
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(2, mp_context=context) as executor:
+    with ProcessPoolExecutor(1, mp_context=context) as executor:
         sweep(function, range(10_000), executor=executor)
 """
 
@@ -163,11 +163,11 @@ def test_workers_end_with_a_parent_that_is_killed(tmp_path):
     with subprocess.Popen([sys.executable, script, told], env=env) as parent:
         workers: set[str] = set()
         until = time.monotonic() + 60.0
-        while len(workers) < 2 and time.monotonic() < until:
+        while not workers and time.monotonic() < until:
             time.sleep(0.1)
             workers = set(told.read_text().split()) if told.exists() else set()
         parent.kill()
-    assert len(workers) == 2
+    assert workers
     until = time.monotonic() + 10.0
     while any(Path("/proc", worker).exists() for worker in workers):
         assert time.monotonic() < until

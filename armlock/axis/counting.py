@@ -29,7 +29,7 @@ from armlock.checks import BoolArray, ComplexArray, FloatArray, IntArray
 
 # What `count_point` returns where it is no number of roots.
 # `armlock.stability.counts.unstable_roots` returns the first two as well, and makes errors of
-# DOUBTFUL and TOO_LONG.
+# CONTRADICTORY and TOO_LONG.
 #
 # A root lies on the axis: `winding` meets a value within its rounding error, or can certify no
 # step.
@@ -38,7 +38,7 @@ BOUNDARY = -1
 UNCONFINED = -2
 # D and the roots of A contradict each other, or the count is below zero. Of a row of a chart:
 # its points are to be counted one by one.
-DOUBTFUL = -3
+CONTRADICTORY = -3
 # The walk takes too many steps.
 TOO_LONG = -4
 # A point after one that took too long.
@@ -172,11 +172,11 @@ def count_point(model: PointModel, x: float, y: float, end: float, stop: BoolArr
         offset = angle_between(value, model.sign * np.exp(1j * final))
         if abs(offset) > 0.51 * np.pi:
             # More than rounding explains: the roots of A are not those of A.
-            return DOUBTFUL
+            return CONTRADICTORY
         final += offset
     count = (final - model.begun - argument) / np.pi
     # It is a whole number but for rounding, because D is real at both ends of the axis.
-    return int(np.floor(count + 0.5)) if -0.5 < count < np.inf else DOUBTFUL
+    return int(np.floor(count + 0.5)) if -0.5 < count < np.inf else CONTRADICTORY
 
 
 # So few points are left to one core: threads take half a millisecond to begin.
@@ -227,7 +227,7 @@ def _fill_row(
     stop: BoolArray,
 ) -> None:
     """Fill row i of a chart, see `fill_rows`."""
-    counts, doubtful, last = filled
+    counts, doubtful, reached = filled
     x, lower, upper = rows.x, rows.lower[i], rows.upper[i]
     fixed, y = model.fixed, rows.y[i]
     weights = fixed.weights - y * model.weights
@@ -260,7 +260,7 @@ def _fill_row(
     for k in range(x.size):
         running += change[k]
         counts[i, k] = running
-    last[i] = total if complete and rows.base[i] >= 0 else DOUBTFUL
+    reached[i] = total if complete and rows.base[i] >= 0 else CONTRADICTORY
 
 
 @njit(cache=True, nogil=True)
@@ -281,8 +281,8 @@ def fill_rows(model: RowModel, rows: Rows) -> tuple[IntArray, BoolArray, IntArra
     """Fill rows of a chart with counts, from the crossings of each row.
 
     Returns the counts, which of them lie too near a crossing to be trusted, and the count at
-    the end of each row. That is DOUBTFUL, and the row's counts mean nothing, where `base` is
-    below zero, or the walk was given up.
+    the end of each row. That is CONTRADICTORY where `base` is below zero, or the walk was given
+    up: the row's counts then mean nothing.
     """
     shape = rows.y.size, rows.x.size
     filled = (

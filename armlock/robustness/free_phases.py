@@ -318,7 +318,7 @@ def _count_below(point: LoopAt, omega: float) -> int | None:
 
 
 def require_stable(point: LoopAt, free_above: float = np.inf) -> None:
-    """Raise unless all zeros of 1 + L lie in the open left half-plane."""
+    """Raise unless all the loop's own roots lie in the open left half-plane."""
     count = count_at(point, free_above)
     if count != 0:
         raise ValueError(

@@ -201,8 +201,9 @@ def margins(
 
     Notes
     -----
-    Stable are the zeros of 1 + L. A root at s = 0 that D has because numerator and denominator
-    of L cancel, as at the ideal point of a loop with an integrator, is none of them.
+    Stable are the loop's own roots. One at s = 0 that D has because numerator and denominator
+    of L cancel, as at the ideal point of a loop with an integrator, is none of them, see
+    `armlock.stability.counts.loop_count`.
 
     Phase and delay margins are taken over all crossovers. A neutral loop may have crossovers
     without end; they then approach those of the disc below, and the phase margin is certified

@@ -68,7 +68,7 @@ _TILES = 64
 _WHY_NOT = {
     counting.TOO_LONG: f"following D takes more than {MOST_STEPS:.0e} steps, because "
     "the gain, with these parameters, times the delay is too large",
-    counting.DOUBTFUL: "the argument of D does not add up",
+    counting.CONTRADICTORY: "the argument of D does not add up",
 }
 
 
@@ -84,11 +84,10 @@ class CountError(RuntimeError):
     --------
     >>> from armlock import CommonArm, CountError, unstable_roots
     >>> try:
-    ...     count = int(unstable_roots(CommonArm(), 0.9, 1.05))
+    ...     unstable_roots(CommonArm(gain=1e10, delay=0.001), 0.5, 0.5)
     ... except CountError as error:
     ...     print("undecided at", error.points)
-    >>> count
-    0
+    undecided at [[0.5 0.5]]
     """
 
     def __init__(self, message: str, points: FloatArray) -> None:
@@ -271,7 +270,7 @@ def _log(value: Fraction) -> float:
 def loop_count(
     loop: CharacteristicFunction, c1: float | Fraction = 1.0, c2: float | Fraction = 1.0
 ) -> int:
-    r"""Count the zeros of 1 + L with positive real part, at one point.
+    r"""Count the loop's own roots with positive real part, at one point.
 
     Where numerator and denominator of L cancel a factor s, D = R (1 + L) has a root at s = 0
     that comes from clearing the denominator R, and is not the loop's. `unstable_roots` counts
@@ -303,6 +302,9 @@ def loop_count(
     -----
     With k such factors, the walk along D / s^k starts at a small frequency. Up to there a bound
     on its Taylor series shows that it has no root, and how far it has turned.
+
+    A pole off s = 0 that a zero of the controller or the sensor cancels is no pole of L. It
+    remains a root of D and counts: right of the axis something in the loop grows all the same.
 
     Examples
     --------
@@ -469,24 +471,24 @@ def _chart_rows(system: CharacteristicFunction, x: FloatArray, y: FloatArray) ->
     elif system.b2.any():
         sides = np.array([left, right])
         at_low, at_high = (_count(system, sides, np.full(2, at)) for at in (low, high))
-        columns, unsure, reached = _fill(
+        columns, doubtful, reached = _fill(
             system.exchanged(), y, sides, at_low, np.full(2, low), np.full(2, high)
         )
-        unsure[(reached != at_high) | (reached < 0)] = True
+        doubtful[(reached != at_high) | (reached < 0)] = True
         for k in range(2):
-            here = unsure[k]
+            here = doubtful[k]
             columns[k, here] = _count(system, np.full(here.sum(), sides[k]), y[here])
         base, top = columns
     else:
         corners = _count(system, np.array([left, right]), np.full(2, low))
         base, top = np.repeat(corners[:, None], y.size, axis=1)
-    counts, singly, reached = _fill(system, x, y, base, lower, upper)
+    counts, doubtful, reached = _fill(system, x, y, base, lower, upper)
     # Next to a crossing, and in rows whose crossings do not add up to the count at their end.
-    singly[(reached < 0) | (reached != top)] = True
+    doubtful[(reached < 0) | (reached != top)] = True
     if system.neutral:
-        singly &= confined
+        doubtful &= confined
         counts[~confined] = UNCONFINED
-    rows, across = np.nonzero(singly)
+    rows, across = np.nonzero(doubtful)
     counts[rows, across] = _count(system, x[across], y[rows])
     return counts
 

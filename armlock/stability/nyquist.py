@@ -65,7 +65,7 @@ class NyquistCurve:
     open_loop_poles : int
         P, poles of L in the open right half-plane.
     closed_loop_roots : int
-        Z = N + P, zeros of 1 + L in the right half-plane.
+        Z = N + P, the loop's own roots in the right half-plane.
     point : LoopAt
         The loop, c1 and c2.
 
@@ -247,8 +247,8 @@ def nyquist(
 
     Notes
     -----
-    Z counts the zeros of 1 + L. A root at s = 0 that D has because a pole of L cancels there
-    is none of them, see `armlock.stability.counts.loop_count`.
+    Z counts the loop's own roots: one at s = 0 that D has because a pole of L cancels there is
+    none of them, see `armlock.stability.counts.loop_count`.
 
     Examples
     --------

@@ -35,14 +35,15 @@ from armlock.stability.counts import BOUNDARY, CountError, unstable_roots
 _EQUAL = 1e-11
 # How far right of its root the last count may stand, relative to |Re s| or the same.
 _COUNT_WITHIN = 1e-6
-# Longest walk along a line to count, and to look for roots, in turns of the longest delay's
-# exponential: a second each.
+# Longest walk along a line, in turns of the longest delay's exponential: to count, and to look
+# for roots. Either walk takes about a second.
 _LONGEST_COUNT = 1e6
 _LONGEST_SEARCH = 1e5
-# The search for one root ends once it has cost so many steps of a walk, some five seconds. A
-# count that cannot be told costs the second number. So does a root that extended precision does
-# not settle at, a fifth of it; one that it does settle at takes a twentieth of its steps.
+# The search for one root ends once it has cost so much, some five seconds. The unit is a turn
+# that is counted, or a point that Newton's method takes a step from.
 _ALL_STEPS = 3e6
+# What a count costs that cannot be told; and extended precision where Newton's method does not
+# settle at a root, and where it does.
 _DOUBTFUL_COUNT = 5e5
 _LOST_ROOT, _POLISHED_ROOT = 1e5, 5e3
 # Most points of one line: where rounding hides D, there would be no end of them.
@@ -51,7 +52,7 @@ _MOST_POINTS = 1_000_000
 # turns further: few at first, at most so many.
 _FIRST_TURNS_FURTHER = 4.0
 _MOST_TURNS_FURTHER = 3e4
-# Most roots are slow: first looked for within this many times those turns.
+# Most roots are of low frequency: first looked for within this many times those turns.
 _MOST_OF_THEM = 1e3
 # Most points of a line from which Newton's method starts, and most of its steps in extended
 # precision: at a multiple root they only shrink by a share.
@@ -62,7 +63,7 @@ _EXTENDED_STEPS = 100
 _MOST_TRIED = 8
 # Most roots that are looked for right of a line.
 _MOST_ROOTS = 20_000
-# Directions from s = 0 in which slow ones are looked for.
+# Directions from s = 0 in which roots of low frequency are looked for.
 _ANGLES = np.linspace(1.6, np.pi, 8)
 # Roots down to so many times one over the longest delay are looked for in steps of their size.
 _SLOWEST = 1e-9
@@ -180,7 +181,7 @@ def _acting(
         none = {"b1": nothing, "b2": nothing, "tau1": 0.0, "tau2": 0.0}
         system = system.plain().replace(rest=left, **none)
     elif set(acting) != {system.tau1, system.tau2}:
-        # Before a parameter of zero any delay will do.
+        # Where the parameter is zero any delay will do.
         delay = acting[0] if acting else 0.0
         system = system.plain().replace(tau1=delay, tau2=delay)
     return system, values[0], values[1]
@@ -195,7 +196,7 @@ class _Line:
         How far up roots can lie right of the line, in turns of the longest delay's
         exponential; inf past the limit of a neutral root chain, or where a number overflows.
     steps : float
-        What its walks have cost so far.
+        What its searches have cost so far, in the unit of `_ALL_STEPS`.
     """
 
     def __init__(
@@ -250,11 +251,11 @@ class _Line:
         s = self.sigma + 1j * grid
         # A point costs a step of the walk, and one of Newton's method.
         self.steps += 2 * s.size
-        # From where a step of Newton's method is locally shortest: no root close to the line
-        # lies between two of its points.
         # Part by part, because arrays of millions would spend their time on memory.
         parts = np.array_split(s, 1 + s.size // 2**15)
         s, length = map(np.concatenate, zip(*map(self._step, parts), strict=True))
+        # From where a step of Newton's method is locally shortest: no root close to the line
+        # lies between two of its points.
         wider = np.pad(length, 1, constant_values=np.inf)
         s = s[(length <= wider[:-2]) & (length < wider[2:])]
         return self.followed(s[np.argsort(-s.real, kind="stable")][:most], _NEWTON_STEPS)
@@ -268,9 +269,9 @@ class _Line:
         return s.real + 1j * np.abs(s.imag), length
 
     def rightmost(self, further: float) -> tuple[complex, float] | None:
-        """Return the rightmost root near the line, and how far a faster one is ahead of it.
+        """Return the rightmost root near the line, and how far right an equal one may lie.
 
-        Of roots that count as equal it is the slowest.
+        Of roots that count as equal it is the one of lowest frequency.
         """
         turns = self.search(further)
         if not turns:
@@ -280,14 +281,14 @@ class _Line:
         unit = self.per_turn / (2.0 * np.pi)
         for top in sorted(found, key=lambda s: -s.real)[:_MOST_TRIED]:
             equal = found[found.real >= top.real - _EQUAL * max(abs(top), unit)]
-            slowest = equal[np.argmin(equal.imag)]
+            lowest = equal[np.argmin(equal.imag)]
             try:
-                root = _polished(self.system, self.x, self.y, slowest)
+                root = _polished(self.system, self.x, self.y, lowest)
             except RootError:
                 self.steps += _LOST_ROOT
                 continue
             self.steps += _POLISHED_ROOT
-            return root, float(top.real - slowest.real)
+            return root, float(top.real - lowest.real)
         return None
 
 

@@ -30,6 +30,7 @@ from armlock.timedomain.noise import LaserNoise
 from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, decide
 from book.companion.extremes import smallest
+from book.companion.shared import shared
 
 stability = partial(ledger.claim, chapter="08a_flight")
 noise = partial(ledger.claim, chapter="08b_noise_and_pulling")
@@ -129,7 +130,7 @@ def density(source: str) -> Callable[[FloatArray], FloatArray]:
     return asd
 
 
-@cache
+@shared
 def largest_answers() -> FloatArray:
     """Return the laser's largest answer to an error of the sum of 1 Hz, 1 Hz/s and 1 Hz/s^2."""
     errors = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)

@@ -457,10 +457,10 @@ def check_in_parallel() -> Ledger:
         All claims. Those of a chapter share what they need, such as one simulation, and so
         stay together.
     """
-    # The longest first. It needs few of the compiled functions: the other process has compiled
-    # the rest before this one comes to need them.
-    longest, others = "08_perturbations", (entry.chapter for entry in reversed(all_claims()))
-    chapters = dict.fromkeys([longest, *others])
+    # The longest first, and side by side those that compile different functions: what one
+    # process has compiled, the other one then finds.
+    first = "08_perturbations", "08b_noise_and_pulling", "08a_flight", "03_common_arm"
+    chapters = dict.fromkeys([*first, *(entry.chapter for entry in all_claims())])
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
         parts = pool.map(_check_chapter, chapters)
         found = {name: finding for part in parts for name, finding in part.items()}

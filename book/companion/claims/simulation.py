@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache, partial
-from time import process_time
 from typing import NamedTuple
 
 import numpy as np
@@ -277,6 +276,7 @@ def sensitivity(frequency: FloatArray, c1: float, c2: float) -> ComplexArray:
     return np.asarray(1.0 / (1.0 + loop))
 
 
+@shared
 def sensitivity_change() -> dict[str, float]:
     """Return where, and by how much, the constant perturbation changes the closed loop.
 
@@ -290,11 +290,11 @@ def sensitivity_change() -> dict[str, float]:
         f = np.asarray(f)
         return np.asarray(sensitivity(f, *STRONG) / sensitivity(f, *IDEAL))
 
-    def apart(f: float) -> float:
-        return float(np.abs(np.abs(ratio(f)) - 1.0)) - 0.1
+    def apart(f: npt.ArrayLike) -> FloatArray:
+        return np.asarray(np.abs(np.abs(ratio(f)) - 1.0) - 0.1)
 
     size = largest(lambda f: np.abs(ratio(f)), frequency)
-    last = int(np.flatnonzero([apart(f) > 0.0 for f in frequency])[-1])
+    last = int(np.flatnonzero(apart(frequency) > 0.0)[-1])
     return {
         "ratio": size.value,
         "at": size.at,
@@ -448,14 +448,11 @@ class Ensemble:
         Output at System 1's size in Hz, once a second.
     largest : dict of float to float array, shape (draws,)
         Largest output in Hz, by the size of the perturbations.
-    seconds : float
-        Time of all processors together, in s.
     """
 
     difference: FloatArray
     series: FloatArray
     largest: dict[float, FloatArray]
-    seconds: float
 
     def predicted(self, size: float) -> FloatArray:
         """Return the factors of e by which the frozen loop grows in each draw."""
@@ -482,33 +479,32 @@ def ensemble_sources() -> list[list[PerturbationNoise]]:
 
 @cache
 def ensemble(duration: float = DURATION) -> Ensemble:
-    """Run System 1, and larger sizes, with many draws of c1 and c2 side by side.
+    """Run System 1, and larger sizes, with many draws of c1 and c2.
 
     Parameters
     ----------
     duration : float, optional
         In s, a multiple of 100 s.
     """
-    begun = process_time()
-    laser, sources = LaserNoise(SEED, SAMPLE_RATE, at_rest=True), ensemble_sources()
+    laser = LaserNoise(SEED, SAMPLE_RATE, at_rest=True)
     sizes = unit_size() * np.array(ENSEMBLE_SIZES)
-    # All sizes side by side. Above all growth: one that diverges would stop the others.
-    number = sizes.size * ENSEMBLE
-    run = Simulation(paper_loop(), SAMPLE_RATE, limit=1e100, draws=number)
-    kept, gaps, block = [], [], 100 * _EVERY
-    for noise in laser.blocks(round(duration * SAMPLE_RATE), block):
-        eta = np.array([[source.draw(block) for source in pair] for pair in sources])
-        gaps.append(unit_size() * (eta[:, 0, 0] - eta[:, 1, 0]))
-        # Samples in rows, as the simulation takes them.
-        c1, c2 = (
-            (1.0 + sizes[:, None] * arm[:, None]).reshape(block, number).T
-            for arm in np.ascontiguousarray(eta.transpose(1, 2, 0))
-        )
-        alike = np.broadcast_to(noise, (number, block))
-        kept.append(run.advance(alike, c1, c2)[:, ::_EVERY].copy())
-    series = np.concatenate(kept, axis=1).reshape(sizes.size, ENSEMBLE, -1)
+    # One by one: each stays in the processor's cache. None is stopped, however far it grows.
+    draws = [
+        (pair, [Simulation(paper_loop(), SAMPLE_RATE, limit=1e100) for _ in sizes])
+        for pair in ensemble_sources()
+    ]
+    gaps, kept = [], []
+    for noise in laser.blocks(round(duration * SAMPLE_RATE), 100 * _EVERY):
+        for pair, runs in draws:
+            first, second = (source.draw(noise.size) for source in pair)
+            gaps.append(unit_size() * (first[0] - second[0]))
+            for size, run in zip(sizes, runs, strict=True):
+                output = run.advance(noise, 1.0 + size * first, 1.0 + size * second)
+                kept.append(output[::_EVERY].copy())
+    blocks = np.array(kept).reshape(-1, ENSEMBLE, sizes.size, 100)
+    series = blocks.transpose(2, 1, 0, 3).reshape(sizes.size, ENSEMBLE, -1)
     largest = dict(zip(ENSEMBLE_SIZES, np.abs(series).max(axis=2), strict=True))
-    return Ensemble(np.array(gaps).T, series[0], largest, process_time() - begun)
+    return Ensemble(np.array(gaps).reshape(-1, ENSEMBLE).T, series[0], largest)
 
 
 def chain_exponent(run: Run, until: float) -> float:
