@@ -15,8 +15,6 @@ from armlock.orbits.passages import (
     Course,
     Hold,
     days,
-    frozen_rate,
-    growth,
     half_difference,
     held_range,
     largest_half,
@@ -25,7 +23,7 @@ from armlock.orbits.passages import (
     policies,
     switches,
 )
-from book.companion.orbits import HELD, MEAN, ranges
+from book.companion.orbits import HELD, MEAN, frozen_rate, growth, ranges
 
 KEPLER = kepler()
 LOOPS = loops()

@@ -211,17 +211,12 @@ def _link(receiver: _Path, emitter: _Path, t: FloatArray) -> tuple[FloatArray, F
             f"t = {t[np.argmax(moved)]} s"
         )
     emitted = emitter(t - light, 1)
-    receding, leaving = (_dot(between, v) / d for v in (velocity - emitted, emitted))
+    receding, leaving = (np.vecdot(between, v) / d for v in (velocity - emitted, emitted))
     # The source has moved for 1 - d'/c of each second at the receiver.
     d_rate = receding / (1.0 - leaving / SPEED_OF_LIGHT)
-    both_rate = _dot(place, velocity) / far + _dot(source, emitted) / (both - far)
+    both_rate = np.vecdot(place, velocity) / far + np.vecdot(source, emitted) / (both - far)
     bend = (d_rate * both - d * both_rate) / (both**2 - d**2)
     return light, d_rate / SPEED_OF_LIGHT + _SHAPIRO * bend
-
-
-def _dot(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return scalar products along the last axis."""
-    return np.asarray((first * second).sum(axis=-1))
 
 
 def _ellipse(alpha: float, theta: float, t: FloatArray, derivative: int) -> FloatArray:

@@ -26,7 +26,6 @@ from armlock.orbits.constellation import Constellation
 from armlock.robustness.differences import no_root_crosses
 from armlock.robustness.regions import is_stable
 from armlock.sensors import dual
-from armlock.stability.roots import rightmost_root
 
 #: A loop of two round trips and of the half difference that its sensor holds, all in s.
 LoopInOrbit = Callable[[float, float, float], Loop]
@@ -42,8 +41,6 @@ MONTH = YEAR / 12.0
 _SPACING, _DEGREE = DAY, 5
 # An edge is looked for in such steps away from one, up to the last.
 _TRIED, _FARTHEST = 1.25, 1e5
-# Gauss-Legendre points along a part of a passage.
-_POINTS = 8
 
 
 def flight(tau1: float, tau2: float, held: float) -> Loop:
@@ -294,35 +291,6 @@ def lost(half: Course, holds: Sequence[Hold], edges: tuple[float, float]) -> lis
 def days(stretches: Sequence[Hold]) -> float:
     """Return how long stretches are together, in days."""
     return sum(stop - start for start, stop, _ in stretches) / DAY
-
-
-def frozen_rate(
-    loop: LoopInOrbit, orbits: Constellation, t: float, held: float, master: int = 1
-) -> float:
-    """Return Re s of the rightmost root of the loop frozen at t, in 1/s."""
-    tau1, tau2 = orbits.round_trips(t, master)
-    return float(rightmost_root(loop(float(tau1), float(tau2), held), 1.0, 1.0).real)
-
-
-def growth(
-    loop: LoopInOrbit,
-    orbits: Constellation,
-    half: Course,
-    stretch: Hold,
-    master: int = 1,
-) -> float:
-    """Sum up the frozen loop's rate over a stretch: the number of e-folds.
-
-    Where the half difference is zero the rate changes its form, and the sum is split there.
-    """
-    start, stop, held = stretch
-    nodes, weights = np.polynomial.legendre.leggauss(_POINTS)
-    total = 0.0
-    for low, high, _ in half.cut([0.0], start, stop):
-        times = [low + 0.5 * (high - low) * (float(x) + 1.0) for x in nodes]
-        rates = [frozen_rate(loop, orbits, t, held, master) for t in times]
-        total += 0.5 * (high - low) * float(np.dot(weights, rates))
-    return total
 
 
 def largest_half(halves: Mapping[int, Course]) -> tuple[float, float]:

@@ -9,16 +9,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armlock import DivergenceError, critical_perturbation, simulate
+from armlock import DivergenceError, critical_perturbation, rightmost_root, simulate
 from armlock.checks import FloatArray
 from armlock.orbits import Constellation, kepler, read_table
 from armlock.orbits.passages import (
     DAY,
     YEAR,
     Course,
+    Hold,
+    LoopInOrbit,
     days,
-    frozen_rate,
-    growth,
     half_difference,
     held_range,
     loops,
@@ -31,6 +31,8 @@ from book.companion.shared import shared
 HELD, MEAN = 0.0325469, 16.65
 DATA = Path(__file__).parents[1] / "data"
 MASTERS = (1, 2, 3)
+# Gauss-Legendre points along a part of a passage.
+_NODES = 8
 #: The ways to hold a value, as `policies` names them.
 POLICIES = ("constant", "right sign", "month's start", "month's middle")
 
@@ -118,6 +120,35 @@ def days_above(orbit: str, level: float, master: int = 1) -> float:
     stretches = course.cut([level, -level], course.start, course.stop)
     above = sum(stop - start for start, stop, value in stretches if abs(value) > level)
     return 365.25 * above / (course.stop - course.start)
+
+
+def frozen_rate(
+    loop: LoopInOrbit, orbits: Constellation, t: float, held: float, master: int = 1
+) -> float:
+    """Return Re s of the rightmost root of the loop frozen at t, in 1/s."""
+    tau1, tau2 = orbits.round_trips(t, master)
+    return float(rightmost_root(loop(float(tau1), float(tau2), held), 1.0, 1.0).real)
+
+
+def growth(
+    loop: LoopInOrbit,
+    orbits: Constellation,
+    half: Course,
+    stretch: Hold,
+    master: int = 1,
+) -> float:
+    """Sum up the frozen loop's rate over a stretch: the number of e-folds.
+
+    Where the half difference is zero the rate changes its form, and the sum is split there.
+    """
+    start, stop, held = stretch
+    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+    total = 0.0
+    for low, high, _ in half.cut([0.0], start, stop):
+        times = [low + 0.5 * (high - low) * (float(x) + 1.0) for x in nodes]
+        rates = [frozen_rate(loop, orbits, t, held, master) for t in times]
+        total += 0.5 * (high - low) * float(np.dot(weights, rates))
+    return total
 
 
 class Stretch(NamedTuple):
