@@ -38,7 +38,7 @@ def test_a_worker_that_is_killed_costs_no_result(tmp_path):
     place = tmp_path / "killed"
     tasks = [(seed, str(place)) for seed in range(12)]
     with distributed.Client(
-        n_workers=2, threads_per_worker=1, dashboard_address=None
+        n_workers=1, threads_per_worker=1, dashboard_address=None
     ) as client:
         found = sweep(draw_or_die, tasks, executor=client.get_executor())
     assert place.exists()
