@@ -23,6 +23,7 @@ from armlock import (
 from armlock.robustness import rays
 from armlock.robustness.rays import Ray, first_crossing
 from armlock.sensors import COMMON, DIFFERENCE, dual
+from tests import independent
 
 
 def test_a_crossing_that_rounding_hides_is_refused():
@@ -183,19 +184,13 @@ def test_a_crossing_keeps_its_digits_where_both_arms_cancel_through_a_resonance(
     loop = Loop(Controller([-1e-3], poles, 1e5), DIFFERENCE, 0.1325, 0.1320, delay=0.115)
     crossing = first_crossing(loop, (5e-8, 5e-8), (1.0, 1.0), stop=1e-2)
 
-    def characteristic(omega, t):
-        s = mpmath.mpc(0, omega)
-        k = (
-            1e5
-            * (s + mpmath.mpf(1e-3))
-            / ((s - mpmath.mpc(poles[0])) * (s - mpmath.mpc(poles[1])))
-        )
-        arms = mpmath.exp(-s * loop.tau1) - mpmath.exp(-s * loop.tau2)
-        d = 1 + k * mpmath.exp(-s * loop.delay) * (mpmath.mpf(5e-8) + t) * arms
-        return [d.real, d.imag]
+    def parts(omega, t):
+        c = mpmath.mpf(5e-8) + t
+        value = independent.exact(loop, mpmath.mpc(0, omega), c, c)
+        return value.real, value.imag
 
     with mpmath.workdps(50):
-        _, exact = mpmath.findroot(characteristic, (crossing.omega, crossing.position))
+        _, exact = mpmath.findroot(parts, (crossing.omega, crossing.position))
     assert crossing.position == pytest.approx(float(exact), rel=1e-11)
 
 

@@ -13,6 +13,7 @@ from armlock.controllers import integrating_actuator
 from armlock.loops import LoopAt
 from armlock.paper import DUAL_SENSOR_CORNER
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, SignalMapping, dual, modified_dual
+from tests import independent
 
 MODIFIED = modified_dual(0.5 * (33.855 + 33.345), 0.5 * (33.855 - 33.345))
 S = np.array([0.01j, 0.3 + 0.2j, -0.1 + 2j, 1.5])
@@ -97,11 +98,5 @@ def test_next_to_equal_parameters_the_response_keeps_its_digits():
     c1, c2, omega = 0.5, 0.5 + 2.0**-38, 1e-14
     loop = DualArm(gain=1.0, corner=0.7)
     with mpmath.workdps(50):
-        s = mpmath.mpc(0, omega)
-        p, apart = mpmath.mpf(0.7), mpmath.mpf(loop.tau1 - loop.tau2)
-        one, two = (
-            1 - mpmath.mpf(c) * mpmath.exp(-s * tau)
-            for c, tau in ((c1, loop.tau1), (c2, loop.tau2))
-        )
-        expected = complex((one + two + p / ((s + p) * s * apart) * (one - two)) / s)
+        expected = complex(independent.exact(loop, mpmath.mpc(0, omega), c1, c2) - 1)
     assert LoopAt(loop, c1, c2).response([omega])[0] == pytest.approx(expected, rel=1e-12)
