@@ -1,12 +1,9 @@
 """Polynomials times exponentials on the imaginary axis, with bounds on all that is uncertain.
 
-D, its terms and their products are exponential sums at s = j omega,
-
-    f(omega) = sum_k sums_k p_k + sum_g sum_k weights_gk p_k (exp(j omega phase_g) - 1)
-
-with polynomials p_k of s. Polynomials of low degree are one expansion in powers of omega, but
-where that cancels: next to a cluster of lightly damped roots. There, and of high degree
-everywhere, they are expanded anew in each *piece* of the axis, from their roots.
+D, its terms and their products are such sums at s = j omega, see `ExponentialSum`. Polynomials
+of low degree are one expansion in powers of omega, but where that cancels: next to a cluster of
+lightly damped roots. There, and of high degree everywhere, they are expanded anew in each
+*piece* of the axis, from their roots.
 
 Within a piece a sum has a value and a derivative, a bound on its second derivative, and one on
 its rounding error. The walks along the axis need no more.

@@ -49,10 +49,10 @@ class Polynomial(NamedTuple):
     roots : complex array, shape (n,)
         They define the polynomial where they are known; else they are found.
     leads : tuple of float
-        Of a product the highest coefficients of its factors: their product may be no float.
+        Of a product the highest coefficients of its factors: their product may overflow.
     missed : float
-        By how much the roots miss the polynomial at s, over its highest coefficient times the
-        product of |s| + |root|. Zero where the roots define it.
+        By how much the roots miss the polynomial at any s, over its highest coefficient times
+        the product of |s| + |root|. Zero where the roots define it.
     """
 
     coefficients: FloatArray

@@ -1,11 +1,10 @@
-"""Compiled: the disc that L fills at a frequency when the phases of the arms are free.
+"""The disc that L fills at a frequency when the phases of the arms are free.
 
-Whatever these phases are, L lies in that disc. (At low frequency the phase between the two
-arms is taken as it is, and only their common one is free.) Bounds on how the parts of the disc
-change certify that it stays off a target over a step of the axis. So `intervals_not_clear`
-tells which parts of the axis need a walk. At high frequency, where the phases turn much faster
-than anything else changes, this spares most of the work. `free_margins` finds the smallest
-margins of the disc.
+Phases are free where omega tau1 and omega tau2 may be any angles. Whatever they are, L lies in
+that disc. Bounds on how its parts change certify that it stays off a target over a step of the
+axis. So `intervals_not_clear` tells which parts of the axis need a walk. At high frequency,
+where the phases turn much faster than anything else changes, this spares most of the work.
+`free_margins` finds the smallest margins of the disc.
 """
 
 from __future__ import annotations
@@ -28,7 +27,8 @@ _SHORTEST = 1e-12
 # the axis than this, over omega, are not passed.
 _GROWN = 1e-9
 
-#: Places of the four margins in what `free_margins_at` returns, and in levels.
+#: Places of the four margins in every array of margins, levels or tolerances here. RATIO, the
+#: smallest |1 + L| / |1 - L|, is half the disk margin.
 MODULUS, RATIO, PHASE, DELAY = 0, 1, 2, 3
 
 
@@ -36,8 +36,8 @@ MODULUS, RATIO, PHASE, DELAY = 0, 1, 2, 3
 def excluded_disc(value: float, m: int) -> tuple[float, float]:
     """Centre and radius of the disc in which the distance of L from -1 is below a value.
 
-    The distance is |1 + L| where m is MODULUS, and |1 + L| / |1 - L| where it is RATIO. Level
-    lines of the latter are the circles of Apollonius.
+    The distance is |1 + L| where m is MODULUS, and |1 + L| / |1 - L| where it is RATIO, with a
+    value below one. Level lines of the latter are the circles of Apollonius.
     """
     if m == MODULUS:
         return -1.0, value
@@ -59,7 +59,8 @@ class Arms(NamedTuple):
     c1, c2 : float
         The perturbations. Where phases are free, only their magnitudes matter.
     tau_difference : float
-        tau2 - tau1 in s; nan where both phases are free at all frequencies.
+        tau2 - tau1 in s. While omega times it is below one, the phase between the two arms is
+        taken as it is, and only their common one is free. nan: both are free everywhere.
     delay : float
         The dead time in s.
     """
@@ -350,10 +351,10 @@ def intervals_not_clear(
 ) -> tuple[FloatArray, bool]:
     """Intervals, shape (n, 2), of a span of the axis outside which L stays off a target.
 
-    The target is a segment of the negative real axis, given by its nearer and its farther end;
-    or, where that is empty, all that has margins below `levels`. What is left of the span after
-    `most` steps, or once `stop` is set, belongs to the last interval. Returns them, and whether
-    nothing was left.
+    The target is a segment of the negative real axis, given by its ends, the one nearer to zero
+    first; or, where that is empty, all that has margins below `levels`. What is left of the
+    span after `most` steps, or once `stop` is set, belongs to the last interval. Returns them,
+    and whether nothing was left.
     """
     found, number, compared = np.empty((64, 2)), 0, 0
     omega, omega_end = span
@@ -450,7 +451,10 @@ def _longest_step(
 
 @njit(cache=True)
 def _keep_smaller(best: FloatArray, where: FloatArray, here: FloatArray, omega: float) -> bool:
-    """Put margins that are smaller than `best` into it, and omega into `where`; if any is."""
+    """Put margins that are smaller than `best` into it, and omega into `where`.
+
+    Returns whether any is smaller.
+    """
     smaller = False
     for m in range(4):
         if here[m] < best[m]:

@@ -31,7 +31,7 @@ _TOUCHING = 1e-6
 #: decide in which order the axis is looked at, and none of them which number is found.
 FIRST_TURNS = 1e3
 # Then it looks at so many on either side of a likely place, about as many as before in all, and
-# so many times more when it has to look again: three times, and 10^7 turns are covered.
+# so many times more when it has to look again: the third time that is 10^7 turns.
 _TURNS_AROUND, _WIDER = 300.0, 30.0
 
 
@@ -151,7 +151,7 @@ def _factors(loop: Loop) -> tuple[ComplexArray, IntArray, FloatArray]:
     leads = np.array([float(p.coefficients[-1] / rest.coefficients[-1]) for p in arms])
     powers: dict[complex, list[int]] = {}
     for k in range(2):
-        # A response of zero takes part in nothing; as the other one's multiple it costs least.
+        # An arm without weight gets the roots of the other one: so it adds no factors.
         zeros = arms[k if leads[k] else 1 - k].roots
         for roots, change in ((zeros, 1), (rest.roots, -1)):
             for root in roots:
@@ -208,7 +208,10 @@ def crossing_intervals(point: LoopAt, span: tuple[float, float]) -> FloatArray:
 
 
 def least_at(point: LoopAt, omega: FloatArray, margins: slice) -> FloatArray:
-    """Return at which of some frequencies each of some margins of the disc is smallest."""
+    """Return at which of some frequencies each margin of the disc is smallest.
+
+    `margins` takes columns of `armlock.robustness.discs.free_margins_over`.
+    """
     found: FloatArray = discs.free_margins_over(arms_of(point), omega)
     nearest: FloatArray = omega[np.argmin(found[:, margins], axis=0)]
     return nearest
