@@ -45,9 +45,9 @@ _POINTS = np.vstack((np.zeros(2), CORNERS))
 _ALONG = 1
 # The band in Hz of the suppression by default, and the number of its frequencies.
 _GOAL_BAND = (1e-4, 1.0, 60)
-# Bounds are searched for with so much to spare, as a share: samples miss a little.
+# The search asks for this share more than each bound, because samples miss a little.
 _SPARE = 4e-3
-# The box that is searched for, over the one asked for: its certificate needs room at the edge.
+# The search asks for a box larger by this factor: the certificate needs room at the edge.
 _WIDER = 1.1
 # How many samples a decade has at low frequency, and how many there are above.
 _PER_DECADE, _ABOVE = 50, 360

@@ -405,22 +405,21 @@ def plot_bode(
     upper, lower = plt.gcf().subplots(2, sharex=True) if axes is None else axes
     style = {"color": BLUE, "linewidth": 1.0, **style}
     upper.loglog(shown, np.abs(response), **style)
-    lower.semilogx(shown, np.degrees(np.angle(response)), **style)
+    lower.semilogx(shown, np.angle(response, deg=True), **style)
     upper.axhline(1.0, color="0.6", linewidth=0.6)
     lower.set(xlabel=r"$\omega$ [rad/s]", ylabel=r"$\arg L$ [deg]", yticks=range(-180, 181, 90))
     upper.set(ylabel=r"$|L|$ [1]")
     if margins:
         found = find_margins(loop, c1, c2)
-        for ax, value, at, name in (
-            (upper, 1.0 / found.gain_upper, found.gain_omega, f"gain {found.gain_upper:.3g}"),
-            (lower, None, found.phase_omega, f"phase {np.degrees(found.phase):.3g} deg"),
+        for ax, edge, at, name in (
+            (upper, 1.0, found.gain_omega, f"gain {found.gain_upper:.3g}"),
+            (lower, 180.0, found.phase_omega, f"phase {np.degrees(found.phase):.3g} deg"),
         ):
-            if not 0.0 < at < np.inf:
-                continue
-            if value is None:
-                value = float(np.degrees(np.angle(loop.open_loop(1j * at, c1, c2))))
-            edge = 1.0 if ax is upper else math.copysign(180.0, value)
-            ax.plot([at, at], [edge, value], color=ORANGE, label=f"{name} at {at:.3g} rad/s")
-            ax.plot(at, value, "o", color=ORANGE, markersize=4)
-            ax.legend()
+            if 0.0 < at < np.inf:
+                there = loop.open_loop(1j * at, c1, c2)
+                value = float(np.abs(there) if ax is upper else np.angle(there, deg=True))
+                ends = [math.copysign(edge, value), value]
+                ax.plot([at, at], ends, color=ORANGE, label=f"{name} at {at:.3g} rad/s")
+                ax.plot(at, value, "o", color=ORANGE, markersize=4)
+                ax.legend()
     return upper, lower

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-# What takes no longer, in s, says nothing; what does says so as often.
+# For so many s nothing is said; after that the line is written anew so often, in s.
 _SHORT, _EVERY = 5.0, 0.5
 
 

@@ -17,7 +17,7 @@ from armlock.store import opened
 _P = TypeVar("_P")
 _R = TypeVar("_R")
 
-#: Most tasks of a sweep. Of more points than this, a task takes several, one after the other.
+#: A sweep has at most so many tasks. With more points, a task computes several, one by one.
 TASKS = 4096
 
 
@@ -75,10 +75,10 @@ def sweep(
     -----
     What takes longer than some seconds says how far it is, in a terminal and in Jupyter.
 
-    A task is one point, or as many as make `TASKS` tasks of all. A worker holds its task's
-    points and results, and what the function takes. An error of the function ends the sweep; a
-    function that catches it, for instance `CountError` of one loop among many, and returns nan
-    goes on.
+    A task is one point, or as many as make `TASKS` tasks of all. A worker holds the points and
+    results of its task, and what the function itself needs. An error of the function ends the
+    sweep. A function that catches it, for instance `CountError` of one loop among many, and
+    returns nan goes on.
 
     The file holds the datasets `points` (as numbers, or else as text), `results`, and `done`,
     which is 0 where there is no result, and else the result's checksum: one that is damaged is

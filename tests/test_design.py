@@ -168,6 +168,7 @@ UNSTABLE = Loop(([], [-0.1], 300.0), "single", 20.0, delay=1.0)
         ({"goal": ([1e-3, 1e-2], [1.0])}, "goal must hold as many gains as frequencies"),
         ({"goal": ([-1e-3], [1.0])}, "goal must be positive"),
         ({"box": 0.0}, "box must be positive"),
+        ({"box": 1e-5}, "structure must be a loop whose stability the samples show"),
     ],
 )
 def test_what_cannot_be_searched_is_refused(changes, message):

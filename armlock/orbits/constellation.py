@@ -32,7 +32,7 @@ _SHAPIRO = 4.0 * SUN / SPEED_OF_LIGHT**3
 # Of a spacecraft: its place, or with 1 its velocity, at times of shape (n,); shape (n, 3).
 _Path = Callable[[FloatArray, int], FloatArray]
 # Light moves ten thousand times as fast as a spacecraft: each round of the iteration gives four
-# digits. A round trip that has not settled after so many is none.
+# digits. A round trip that has not settled after so many rounds is refused.
 _ROUNDS = 6
 _SETTLED = 1e-12
 # Within so many s of their epoch Kepler's orbits are good to 5e-11 s in spite of rounding.

@@ -39,7 +39,8 @@ MONTH = YEAR / 12.0
 
 # Time between the nodes of a course's spline, in s, and its degree.
 _SPACING, _DEGREE = DAY, 5
-# An edge is looked for in such steps away from one, up to the last.
+# An edge is looked for from a ratio of one on, each step larger by the first factor, as far as
+# the second.
 _TRIED, _FARTHEST = 1.25, 1e5
 
 

@@ -34,9 +34,9 @@ if TYPE_CHECKING:
 
 # X2 is told at this frequency, in Hz, for a ranging error of so many metres.
 _FREQUENCY, _RANGING_ERROR = 3e-3, 1.0
-# Edges are those at this share of the largest half difference.
+# The edges are found with this share of the largest half difference held.
 _SHARE = 0.25
-# Masters are kept until their half difference is this share of what can always be had.
+# A master is kept while its half difference is above this share of what some master always has.
 _FLOOR = 0.9
 
 

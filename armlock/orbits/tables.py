@@ -27,10 +27,10 @@ _SUN_RADIUS = 6.957e8
 # Degree of the splines through positions, and the fewest states: half of them make a spline.
 _DEGREE = 7
 _FEWEST = 2 * (_DEGREE + 1)
-# By so much twice as many states are better, at least. On a smooth curve they would gain 256;
-# ESA's states, which do not lie on one, gain ten.
+# Twice as many states put interpolation off by less, by this factor at least. On a smooth curve
+# it would be 256; of ESA's states, which do not lie on one, it is ten.
 _GAINED = 8.0
-# Interpolated arms may be off by so much, in s of light; the states left out tell.
+# Interpolation may put an arm off by so much, in s of light, as it is estimated.
 _LARGEST_ERROR = 1e-6
 # The last state of a segment and the first of the next, at one epoch, differ by less, in m.
 _SAME_STATE = 1.0

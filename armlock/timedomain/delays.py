@@ -17,8 +17,6 @@ from armlock.axis.compiled import njit
 from armlock.checks import FloatArray, finite_series
 from armlock.loops import Loop
 
-#: Order of the Lagrange interpolation for delays that are not whole samples.
-INTERPOLATION_ORDER = 7
 #: A constant delay in samples, phi(t - tau) = sum_k weights[k] phi[n - first - k].
 Delay = tuple[int, tuple[float, ...]]
 #: A delay that moves, in samples: a row for each sample, a column for each run, or for all.
@@ -27,8 +25,8 @@ MovingDelay = FloatArray
 GivenDelay = npt.ArrayLike | Callable[[FloatArray], npt.ArrayLike]
 # Delays closer to whole samples than this, in samples, are whole.
 _WHOLE = 1e-6
-# Interpolated are so many samples on either side of a delay.
-_SIDE = (INTERPOLATION_ORDER + 1) // 2
+# Interpolated are so many samples on either side of a delay; `between` writes them out.
+_SIDE = 4
 # Factors of a pair of samples, see `between`: 1 / prod (k - j) over all nodes j but k.
 _SCALES = tuple(
     1.0 / math.prod(k - j for j in range(2 * _SIDE) if j != k) for k in range(_SIDE, 2 * _SIDE)
@@ -41,7 +39,7 @@ _SLOWEST, _FASTEST = -3.0, 1.0
 def lagrange_delay(name: str, tau: float, sample_rate: float) -> Delay:
     r"""Return the weights of a delay, a single one where it is whole samples.
 
-    Otherwise they are those of Lagrange's polynomial of order m, `INTERPOLATION_ORDER`,
+    Otherwise they are those of Lagrange's polynomial of order m = 7,
 
     .. math::
 
@@ -86,7 +84,7 @@ def lagrange_delay(name: str, tau: float, sample_rate: float) -> Delay:
             f"s, or a multiple of {1.0 / tau:.9g} Hz, got {sample_rate:.9g}"
         )
     x = samples - first
-    nodes = range(INTERPOLATION_ORDER + 1)
+    nodes = range(2 * _SIDE)
     weights = [math.prod((x - j) / (k - j) for j in nodes if j != k) for k in nodes]
     return first, tuple(weights)
 
@@ -159,7 +157,7 @@ class Arm:
     begin: int
     last: FloatArray | None = None
 
-    def part(self, noise: FloatArray, number: int, known: int) -> Delay | MovingDelay:
+    def during(self, noise: FloatArray, number: int, known: int) -> Delay | MovingDelay:
         """Return the delay during a block, in samples.
 
         `noise` is that of the block, `number` that of its first sample in the run, and so many

@@ -613,7 +613,7 @@ class Simulation:
     ) -> None:
         """Compute the next samples, each in a row, unless the run stops before."""
         stop, first, columns = len(output), 0, self._signals.shape[2]
-        delays = [arm.part(inputs[0], self.samples, self._known) for arm in arms]
+        delays = [arm.during(inputs[0], self.samples, self._known) for arm in arms]
         keep = self._make_room(max(map(reach, (*delays, self._dead))))
         known = self._known
         phi, sent = self._signals[:, : known + stop]

@@ -45,8 +45,8 @@ BANDS = 12
 #: Bins next to zero that the window's main lobe spoils.
 SPOILED = 8
 
-# A rate gives its bins from this one on and leaves those below to the next rate, whose filter
-# changes them by 2e-6 at most; from `SPOILED` on while the next rate has fewer segments.
+# Bins below the first are left to the next rate, whose filter changes them by 2e-6 at most.
+# Until that rate has enough segments, they are taken here, from `SPOILED` on.
 _FIRST_BIN = 92
 _ENOUGH_SEGMENTS = 8
 # The filter before a lower rate: side lobes in dB below its pass band, and its length.

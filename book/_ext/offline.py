@@ -17,8 +17,8 @@ Thebe, which Jupyter Book always adds, would run cells on a server elsewhere. It
 
 import re
 import shutil
+from importlib import resources
 from importlib.metadata import files
-from importlib.util import find_spec
 from pathlib import Path
 
 from sphinx_thebe import init_thebe_core, update_thebe_context
@@ -41,21 +41,12 @@ SHIPPED = [
 ]
 
 
-def mathjax_folder():
-    """Return the folder of the installed MathJax."""
-    spec = find_spec("sphinx-mathjax-offline")
-    if spec is None or not spec.submodule_search_locations:
-        raise RuntimeError("sphinx-mathjax-offline is not installed; run `make env`")
-    return Path(spec.submodule_search_locations[0]) / "static" / "mathjax"
-
-
-def copy_mathjax(app, exception):
+def copy_mathjax(static):
     """Copy what is needed of MathJax into the built book."""
-    if exception is not None or app.builder.format != "html":
-        return
+    installed = Path(str(resources.files("sphinx-mathjax-offline")))
     for name in NEEDED:
-        source = mathjax_folder() / name
-        target = Path(app.outdir) / "_static" / "mathjax" / name
+        source = installed / "static" / "mathjax" / name
+        target = static / "mathjax" / name
         if source.is_dir():
             ignore = shutil.ignore_patterns("all-packages.js")
             shutil.copytree(source, target, dirs_exist_ok=True, ignore=ignore)
@@ -64,27 +55,29 @@ def copy_mathjax(app, exception):
             shutil.copyfile(source, target)
 
 
-def copy_licenses(app, exception):
+def copy_licenses(static):
     """Copy the licences of the packages whose files the pages load."""
-    if exception is not None or app.builder.format != "html":
-        return
-    target = Path(app.outdir) / "_static" / "licenses"
+    target = static / "licenses"
     target.mkdir(parents=True, exist_ok=True)
     for name in SHIPPED:
         text = next(file for file in files(name) or [] if "LICEN" in file.name.upper())
         shutil.copyfile(text.locate(), target / f"{name}.txt")
 
 
-def drop_unread(app, exception):
+def drop_unread(static):
     """Take out what no reader's browser asks for."""
-    if exception is not None or app.builder.format != "html":
-        return
-    static = Path(app.outdir) / "_static"
     for file in [*static.rglob("*.map"), *static.rglob("*.ttf")]:
         file.unlink()
     for file in static.rglob("*.css"):
         text = file.read_text(encoding="utf-8")
         file.write_text(TRUETYPE.sub("", text), encoding="utf-8")
+
+
+def finish(app, exception):
+    """Put in and take out what differs from Sphinx's own pages."""
+    if exception is None and app.builder.format == "html":
+        for change in (copy_mathjax, copy_licenses, drop_unread):
+            change(Path(app.outdir) / "_static")
 
 
 def drop_thebe(app, config):
@@ -103,7 +96,5 @@ def setup(app):
     app.config.mathjax_path = SCRIPT
     app.config.mathjax3_config = {"loader": {"load": PARTS}}
     app.connect("config-inited", drop_thebe)
-    app.connect("build-finished", copy_mathjax)
-    app.connect("build-finished", copy_licenses)
-    app.connect("build-finished", drop_unread)
+    app.connect("build-finished", finish)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
