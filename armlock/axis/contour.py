@@ -57,7 +57,7 @@ from armlock.axis.threads import MOST_STEPS
 from armlock.checks import BoolArray, ComplexArray, FloatArray
 
 # Share of a certified bound that a step may use up.
-SAFETY = 0.95
+_SAFETY = 0.95
 
 # Turns of the longest delay after which `winding` tries again to follow the slow terms alone.
 _BLOCK = 32.0
@@ -107,7 +107,7 @@ def _follow(
             distance = tangent_distance(value, slope, step)
             # Rounding moves the tangent, too: closer to the origin nothing is certain.
             departure = 0.5 * bound_at(bound, piece, omega + step) * step * step
-            if departure + bound_at(error, piece, omega + step) <= SAFETY * distance:
+            if departure + bound_at(error, piece, omega + step) <= _SAFETY * distance:
                 break
             step *= 0.5
             if step <= max(shortest, 4.0 * EPSILON * omega) or step < 1e-300:
@@ -288,7 +288,7 @@ def _safe_step(h: float, dh: float, curvature: float, error: float) -> float:
         toward = dh if h > 0.0 else -dh
         root = np.sqrt(dh * dh + 2.0 * curvature * abs(h))
         certified = max(certified, (toward + root) / curvature)
-    return SAFETY * certified
+    return _SAFETY * certified
 
 
 # Columns of what `imaginary_zeros` returns.

@@ -42,7 +42,7 @@ CONTRADICTORY = -3
 # The walk takes too many steps.
 TOO_LONG = -4
 # A point after one that took too long.
-UNTRIED = -5
+_UNTRIED = -5
 
 
 class PointModel(NamedTuple):
@@ -199,7 +199,7 @@ def _count_range(
 ) -> None:
     """Count at points `first` to `last`, until one of them takes too long."""
     for i in range(first, last):
-        counts[i] = UNTRIED if stop[0] else count_point(model, x[i], y[i], ends[i], stop)
+        counts[i] = _UNTRIED if stop[0] else count_point(model, x[i], y[i], ends[i], stop)
         if counts[i] == TOO_LONG:
             stop[0] = True
 

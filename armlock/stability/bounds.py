@@ -137,7 +137,7 @@ def _outgrown_from(squares: FloatArray, factors: FloatArray, shares: FloatArray)
     return float(last_root_bound(q))
 
 
-def squared_magnitudes(polynomials: Sequence[FloatArray]) -> tuple[FloatArray, float]:
+def _squared_magnitudes(polynomials: Sequence[FloatArray]) -> tuple[FloatArray, float]:
     """Return |p(j omega)|^2 as polynomials in (omega / unit)^2, and the unit in rad/s.
 
     The first polynomial is of the highest degree. In this unit, a power of two, its lowest and
@@ -180,8 +180,8 @@ def _last_frequencies(
 
 @lru_cache(maxsize=64)
 def _squares(system: CharacteristicFunction) -> tuple[FloatArray, float]:
-    """Return the `squared_magnitudes` of A, B1, B2 and C."""
-    return squared_magnitudes((system.a, system.b1, system.b2, system.c))
+    """Return the `_squared_magnitudes` of A, B1, B2 and C."""
+    return _squared_magnitudes((system.a, system.b1, system.b2, system.c))
 
 
 def last_frequency(
@@ -225,6 +225,6 @@ def last_larger(
         return np.inf
     tops = [abs(float(p[-1])) if p.size == first.size else 0.0 for p in others]
     reserve = float(left_of(lead, float(factors @ np.array(tops))))
-    squares, unit = squared_magnitudes((first, *others))
+    squares, unit = _squared_magnitudes((first, *others))
     found: float = _last_frequency(squares, unit, factors, reserve)
     return found
