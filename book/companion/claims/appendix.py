@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import partial
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -104,11 +104,13 @@ def sources() -> tuple[ShapedNoise, ShapedNoise]:
     return phase, PerturbationNoise(12, RATE, cutoff=2e-4)
 
 
-def convolved_density(frequency: FloatArray) -> FloatArray:
-    """Density of the product of phase and perturbation, by convolution, in rad/sqrt(Hz).
+@cache
+def _convolved() -> tuple[FloatArray, FloatArray]:
+    """Return frequencies in Hz and the density of the product of phase and perturbation there.
 
-    On a grid fine enough for the narrowest of their features: that of a periodic function
-    without a kink, the sum then is the integral but for rounding.
+    By convolution, in rad^2/Hz on both sides of zero. The grid is fine enough for the narrowest
+    of their features: that of a periodic function without a kink, the sum then is the integral
+    but for rounding.
     """
     points = 1 << 18
     grid = np.fft.fftshift(np.fft.fftfreq(points, 1.0 / RATE))
@@ -120,7 +122,12 @@ def convolved_density(frequency: FloatArray) -> FloatArray:
     # Of sampled series, the convolution goes around the sampling band.
     whole = np.fft.fftshift(np.fft.ifft(both[0] * both[1]).real) * (RATE / points)
     half = grid >= 0.0
-    return np.sqrt(2.0 * np.interp(frequency, grid[half], whole[half]))
+    return grid[half], whole[half]
+
+
+def convolved_density(frequency: FloatArray) -> FloatArray:
+    """Density of the product of phase and perturbation, by convolution, in rad/sqrt(Hz)."""
+    return np.sqrt(2.0 * np.interp(frequency, *_convolved()))
 
 
 @shared
