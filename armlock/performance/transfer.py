@@ -12,9 +12,6 @@ import numpy.typing as npt
 from armlock.checks import ComplexArray, one_of
 from armlock.loops import Loop, checked_loop
 
-#: The inputs of a loop: the laser, both arms, and the sum and difference of the arms.
-INPUTS = ("laser", "arm 1", "arm 2", "common", "differential")
-
 
 def transfer(
     loop: Loop,
@@ -64,7 +61,8 @@ def transfer(
     >>> print(f"{abs(transfer(flight_loop(), 'laser', 2j * 3.141592653589793 * 3e-3)):.2e}")
     1.13e-05
     """
-    return responses(loop, s, c1, c2)[one_of("source", source, INPUTS)]
+    found = responses(loop, s, c1, c2)
+    return found[one_of("source", source, found)]
 
 
 def responses(
