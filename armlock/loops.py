@@ -14,7 +14,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 from functools import cached_property
-from math import factorial
+from itertools import zip_longest
+from math import factorial, lcm
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import mpmath
@@ -398,6 +399,12 @@ def checked_loop(loop: Loop) -> Loop:
     return loop
 
 
+def _over_one(values: list[Fraction]) -> tuple[npt.NDArray[np.object_], int]:
+    """Return the numerators of fractions over one denominator, and that."""
+    below = lcm(*(value.denominator for value in values))
+    return np.array([int(value * below) for value in values], dtype=object), below
+
+
 def power_series(
     system: CharacteristicFunction, x: float | Fraction, y: float | Fraction, number: int
 ) -> tuple[list[Fraction], list[Fraction]]:
@@ -407,10 +414,15 @@ def power_series(
     numerator, dead = [Fraction(0)] * number, -Fraction(system.delay)
     for b, tau, origin, parameter in system.arms(x, y):
         late, here, there = dead - Fraction(tau), Fraction(parameter), Fraction(origin)
-        for i, value in enumerate(b.tolist()[:number]):
-            for j in range(number - i if value else 0):
-                turn = there * dead**j - here * late**j
-                numerator[i + j] += Fraction(value) * turn / factorial(j)
+        turns = [(there * dead**j - here * late**j) / factorial(j) for j in range(number)]
+        # Of whole numbers, because fractions would look for common divisors at each step.
+        above, below = _over_one([Fraction(value) for value in b.tolist()[:number]])
+        turned, divisor = _over_one(turns)
+        product = np.convolve(above, turned)[:number].tolist()
+        numerator = [
+            n + Fraction(whole, below * divisor)
+            for n, whole in zip_longest(numerator, product, fillvalue=0)
+        ]
     return rest, numerator
 
 
