@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import polynomial as poly
+from scipy.linalg import hankel
 from scipy.special import comb
 
 from armlock.axis.rounding import EPSILON
@@ -193,10 +194,9 @@ def _with_change(
 ) -> tuple[ComplexArray, FloatArray]:
     """Return a polynomial at s, and what it may be off by within half a width, and rounding."""
     orders = np.arange(p.size)[:, None]
-    # Taylor's coefficients at s are those of p, shifted, times binomials.
-    shifted = np.array([np.pad(p[k:], (0, k)) for k in range(p.size)])
     # Not by @, whose threads wait for each other on a machine that is in use.
-    taylor = np.einsum("kj,jm->km", shifted * comb(orders + orders.T, orders), s**orders)
+    # Taylor's coefficients at s are those of p, shifted, times binomials.
+    taylor = np.einsum("kj,jm->km", hankel(p) * comb(orders + orders.T, orders), s**orders)
     change = (np.abs(taylor[1:]) * half ** orders[1:]).sum(axis=0)
     # The coefficients are products of a few numbers; the derivatives share their rounding.
     magnitude = np.abs(p) @ (np.abs(s) + half) ** orders
