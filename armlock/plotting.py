@@ -156,6 +156,8 @@ def _label_regions(ax: Axes, chart: StabilityChart) -> None:
     room = _ROOM * min(chart.counts.shape)
     for count in np.unique(chart.counts[chart.counts >= 0]):
         depth = ndimage.distance_transform_edt(np.pad(chart.counts == count, 1))
+        if depth.max() < room:
+            continue
         regions, number = ndimage.label(depth)
         for row, column in ndimage.maximum_position(depth, regions, range(1, number + 1)):
             if depth[row, column] >= room:

@@ -111,7 +111,8 @@ def _point_model(system: CharacteristicFunction) -> PointModel:
         sums=np.array([b1.sums, b2.sums]),
         reference=system.reference,
         sign=float(np.sign(system.a[-1])),
-        roots=system.roots_of_a,
+        # A copy can be written to: for arrays that cannot, numba would compile all again.
+        roots=system.roots_of_a.copy(),
         is_map=system.step > 0.0,
         start=0.0,
         begun=0.0,
