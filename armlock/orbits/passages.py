@@ -178,10 +178,13 @@ def held_range(
         If the held value is zero or no number, the mean is not positive, the loop is not stable
         where the held value is the true one, or something in it but its two round trips changes
         with their difference.
+    CountError
+        If following D takes too many steps, or a number overflows.
 
     Notes
     -----
-    One count at a ratio of one, and from there on `armlock.robustness.differences`.
+    One count at a ratio of one, and from there on `armlock.robustness.differences`. Counts at
+    the far ends spare searches in vain; they certify nothing.
 
     Examples
     --------
