@@ -21,6 +21,7 @@ from armlock import (
     unstable_roots,
 )
 from armlock.robustness.rays import Ray
+from armlock.stability.counts import loop_count
 from armlock.stability.zeros import axis_zeros
 from tests import independent
 from tests.systems import NEUTRAL, RETARDED, with_roots
@@ -322,6 +323,15 @@ def test_a_sign_that_is_hidden_to_the_end_is_reported():
     zeros = axis_zeros(ray.product, [(0.0, 3.0)])
     assert (zeros.hidden.tolist(), zeros.jump.tolist()) == ([True], [0])
     assert zeros.width[0] == 3.0
+
+
+@pytest.mark.parametrize(("root", "unstable"), [(-1.0, 0), (1.0, 1)])
+def test_a_root_at_zero_is_taken_out_where_r_is_zero_too(root, unstable):
+    # D = s (s - root) (2 - 0.3 exp(-s) - 0.3 exp(-2 s)).
+    b = [0.0, -root, 1.0]
+    system = CharacteristicFunction([0.0], b, b, 1.0, 2.0, reference=(1.0, 1.0))
+    assert unstable_roots(system, 0.3, 0.3) == BOUNDARY
+    assert loop_count(system, 0.3, 0.3) == unstable
 
 
 def test_an_interrupt_is_heard_while_points_are_counted():

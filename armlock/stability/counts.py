@@ -233,12 +233,13 @@ def walk_begins(
     is at most 1/2: D / s^k has no root on that part of the axis, and turns by 30 degrees at
     most.
     """
-    lowest = int(np.flatnonzero(loop.rest)[0])
-    both = zip(*power_series(loop, c1, c2, lowest + 1), strict=True)
-    shared = next(k for k, pair in enumerate(both) if any(pair))
+    number = loop.degree + 21
+    # No more factors cancel than R has, unless R is zero.
+    most = int(np.append(np.flatnonzero(loop.rest), number - 1)[0])
+    both = zip(*power_series(loop, c1, c2, most + 1), strict=True)
+    shared = next((k for k, pair in enumerate(both) if any(pair)), 0)
     if shared == 0:
         return 0.0, 0.0
-    number = loop.degree + 21
     rest, numerator = power_series(loop, c1, c2, number)
     series = [r + n for r, n in zip(rest, numerator, strict=True)]
     first, longest = series[shared], loop.longest_delay
