@@ -402,7 +402,8 @@ def checked_loop(loop: Loop) -> Loop:
 def _over_one(values: list[Fraction]) -> tuple[npt.NDArray[np.object_], int]:
     """Return the numerators of fractions over one denominator, and that."""
     below = lcm(*(value.denominator for value in values))
-    return np.array([int(value * below) for value in values], dtype=object), below
+    above = [value.numerator * (below // value.denominator) for value in values]
+    return np.array(above, dtype=object), below
 
 
 def power_series(

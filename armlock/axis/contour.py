@@ -61,8 +61,6 @@ _SAFETY = 0.95
 
 # Turns of the longest delay after which `winding` tries again to follow the slow terms alone.
 _BLOCK = 32.0
-
-
 # A walk over which the fastest exponential turns by more radians than this is not begun.
 MOST_RADIANS = 20.0 * MOST_STEPS
 # Most samples of a grid.
