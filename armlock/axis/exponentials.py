@@ -360,13 +360,13 @@ def _reach(roots: ComplexArray, starts: IntArray, omega: float) -> float:
     Around each polynomial the crowd, the sum of reach / (reach + distance), is concave in the
     reach: Newton's method from below never passes the length at which it is _CROWD.
     """
+    distances = np.abs(1j * omega - roots)
     shortest = 1e300
     for k in range(starts.size - 1):
         reach = 0.0
         for _ in range(6):
             crowd, rate = 0.0, 0.0
-            for root in roots[starts[k] : starts[k + 1]]:
-                distance = abs(1j * omega - root)
+            for distance in distances[starts[k] : starts[k + 1]]:
                 if distance > 0.0:
                     crowd += reach / (reach + distance)
                     rate += distance / (reach + distance) ** 2
