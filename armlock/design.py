@@ -73,8 +73,9 @@ class Design:
 
     Examples
     --------
-    >>> from armlock import design, robust_loop
-    >>> found = design(robust_loop(), "modulus", {"suppression": -0.1})
+    >>> from armlock import Loop, design
+    >>> start = Loop(([], [-0.1], 3.0), "single", 20.0)
+    >>> found = design(start, "suppression", {"phase": 0.35})
     >>> bool(found.counts.any())
     False
     """
@@ -138,9 +139,12 @@ def design(
 
     Examples
     --------
-    >>> from armlock import design, robust_loop
-    >>> found = design(robust_loop(), "modulus", {"suppression": -0.1})
-    >>> found.measures["modulus"] > 0.707
+    As much suppression as leaves a phase margin of 0.35 rad, or 20 degrees:
+
+    >>> from armlock import Loop, design
+    >>> start = Loop(([], [-0.1], 3.0), "single", 20.0)
+    >>> found = design(start, "suppression", {"phase": 0.35})
+    >>> found.measures["phase"] >= 0.35
     True
     """
     bounds = _checked_bounds(objective, constraints)

@@ -42,6 +42,8 @@ LONGEST = 3.0  # seconds of processor time until a page is readable
 HEAVIEST = 3e6  # bytes that a page loads
 # A word that the search of any book here must find.
 WORD = "delay"
+#: Places at which an element is poked that should react, and does not.
+POKES = 39
 
 # What a reader sees outside code and typeset formulas, and what TeX or MyST left in it.
 RAW = r"""() => {
@@ -287,7 +289,7 @@ class Book:
         """Poke at places all over an element until its text changes."""
         element.scroll_into_view_if_needed()
         before, box = element.inner_text(), element.bounding_box()
-        for i in range(1, 40):
+        for i in range(1, POKES + 1):
             x = box["x"] + box["width"] * ((0.37 * i) % 0.96 + 0.02)
             y = box["y"] + box["height"] * ((0.61 * i) % 0.96 + 0.02)
             poke(x, y)
