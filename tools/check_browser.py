@@ -42,7 +42,7 @@ LONGEST = 3.0  # seconds of processor time until a page is readable
 HEAVIEST = 3e6  # bytes that a page loads
 # A word that the search of any book here must find.
 WORD = "delay"
-#: Places at which an element is poked that should react, and does not.
+# An element that should react is poked at so many places, at most.
 POKES = 39
 
 # What a reader sees outside code and typeset formulas, and what TeX or MyST left in it.

@@ -543,7 +543,6 @@ def imaginary_zeros(
         piece, first, entered = expand(whole, omega), found, omega
         end = min(piece.end, omega_end)
         near, everywhere, error = _imaginary_bounds(piece, rounding)
-        next_to_zero = False
         value, slope = evaluate(piece, omega)
         uncertain = bound_at(error, piece, omega)
         if omega == omega_start:
@@ -587,8 +586,7 @@ def imaginary_zeros(
                     found += 1
             known = _Known(omega, now, False)
         if omega >= omega_end and (is_map or known.hidden):
-            bounds = (near if next_to_zero else everywhere, error)
-            row = _ends(piece, bounds, entered, known, omega_end, is_map)
+            row = _ends(piece, (everywhere, error), entered, known, omega_end, is_map)
             zeros = _with_zero(zeros, found, row, (value, slope))
             found += 1
         if found > first and measure is not None:

@@ -491,7 +491,7 @@ def _chart_rows(system: CharacteristicFunction, x: FloatArray, y: FloatArray) ->
     if system.neutral:
         doubtful &= confined
         counts[~confined] = UNCONFINED
-    # In a flat array numpy finds few entries five times as fast.
+    # Few entries are found many times as fast in a flat array.
     rows, across = np.divmod(np.flatnonzero(doubtful), x.size)
     counts[rows, across] = _count(system, x[across], y[rows])
     return counts

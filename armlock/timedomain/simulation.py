@@ -516,19 +516,20 @@ class Simulation:
                 f"longest delay reaches, got {before.size}"
             )
         self._history = before.copy()
-        # A block of samples of the output stands behind those before that are known, and with a
-        # dead time one of what the controller has sent. They come with the first block.
-        columns, signals = self.draws or 1, 1 if self._dead[0] == 0 else 2
+        # Kinds of samples: the output, and with a dead time what the controller has sent. Of
+        # each a block stands behind those before that are known. They come with the first one.
+        kinds = 1 if self._dead[0] == 0 else 2
+        columns = self.draws or 1
         past = self.history_samples
         self._block = max(BLOCK // columns, 4 * past)
         for name, number in (("sample_rate", 1), ("draws", columns)):
-            check_memory(name, (signals, past + self._block, number), 8)
+            check_memory(name, (kinds, past + self._block, number), 8)
         full, rest = divmod(columns, LANES)
         # The last runs may be few, and are then faster one by one.
         groups = [LANES] * full + ([1] * rest if 2 * rest < LANES else [LANES])
         rows = _STATES + len(sensor.states) + 2 * len(controller.sections)
         self._groups = [np.zeros((rows, lanes)) for lanes in groups]
-        self._signals = np.zeros((signals, 0, sum(groups)))
+        self._signals = np.zeros((kinds, 0, sum(groups)))
         self._known = before.size if before.ndim else sys.maxsize
         self._stopped: tuple[float, float] | None = None
         self._in_block = False
@@ -631,6 +632,7 @@ class Simulation:
         delays = [arm.during(inputs[0], self.samples, self._known) for arm in arms]
         keep = self._make_room(max(map(reach, (*delays, self._dead))))
         known = self._known
+        # Without a dead time the last kind is the output, too, and nothing is sent.
         phi, sent = (self._signals[k, : known + stop] for k in (0, -1))
         series = tuple(_in_columns(given, columns) for given in inputs)
         sampled = (*(_in_lanes(delay, columns) for delay in delays), self._dead), *self._filters
