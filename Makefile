@@ -111,8 +111,8 @@ $(PACKAGE_READY): $(ENV_READY) pyproject.toml
 # outputs. The claims are checked before, once for all notebooks and tests, which share what these
 # have computed. The longest notebooks come first; two short ones stand between them, because each
 # process begins with two.
-LONGEST := $(addsuffix .ipynb,07_simulation 09_ledger 08d_orbits 10_errata 08c_design 08a_flight \
-	08b_noise_and_pulling 04_dual_arm 08f_own_loop)
+LONGEST := $(addsuffix .ipynb,09_simulation 15_ledger 13_orbits 16_errata 12_robust_controller 11_flight \
+	11b_noise_and_pulling 05_dual_arm 10_own_loop)
 PYTEST := $(PY) -m pytest --numprocesses auto --maxprocesses 4 --dist worksteal
 execute = export ARMLOCK_FIGURES="$(CURDIR)/$(1)"; \
 	$(PYTEST) --dist load --maxschedchunk 1 --nbmake --overwrite $(addprefix $(2)/,$(3))

@@ -535,7 +535,7 @@ def test_the_year_marks_the_days_on_which_the_package_finds_no_stable_loop(show,
     t = half.start + DAY * np.arange(366)
     starts = half.start + MONTH * np.floor((t - half.start) / MONTH)
     ratio = half(t) / half(starts)
-    # The edges of chapter 08d.
+    # The edges of chapter 13.
     low, high = 0.20038, 3.9974
     clear = np.abs(np.log(np.abs(ratio)[:, None] / [low, high])).min(axis=1) > 1e-3
     expected = (ratio < low) | (ratio > high)

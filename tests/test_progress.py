@@ -49,7 +49,7 @@ def test_a_notebook_is_watched_if_a_server_opened_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "ipykernel", sys)
     monkeypatch.delenv("JPY_SESSION_NAME", raising=False)
     assert not is_watched()
-    monkeypatch.setenv("JPY_SESSION_NAME", "07_simulation.ipynb")
+    monkeypatch.setenv("JPY_SESSION_NAME", "09_simulation.ipynb")
     assert is_watched()
     # A worker process that it starts inherits the name, but is no kernel.
     monkeypatch.delitem(sys.modules, "ipykernel")

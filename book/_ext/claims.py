@@ -6,7 +6,7 @@ from sphinx.util import logging
 from book.companion.claims import all_claims
 from book.companion.claims.ledger import NAME, NAMING
 
-LEDGER = "notebooks/09_ledger"
+LEDGER = "notebooks/15_ledger"
 LOGGER = logging.getLogger(__name__)
 
 

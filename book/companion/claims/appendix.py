@@ -31,7 +31,7 @@ from book.companion.claims.simulation import (
 )
 from book.companion.shared import shared
 
-claim = partial(ledger.claim, chapter="08_perturbations")
+claim = partial(ledger.claim, chapter="07_perturbations")
 
 #: Gain errors of the two channels at which the model is tried, and their difference.
 MISMATCH = (2e-6, -1e-6)

@@ -30,7 +30,7 @@ from book.companion.outline import boundary_radius, outline, perimeter, rays
 from book.companion.schemes import pseudospectral_roots, sampled_loop, standard_schemes
 from book.companion.shared import shared
 
-claim = partial(ledger.claim, chapter="03_common_arm")
+claim = partial(ledger.claim, chapter="04_common_arm")
 
 #: Half-width of a window that holds the whole stable region, and of one that shows branches.
 WINDOW = 7.0

@@ -33,7 +33,7 @@ from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 from book.companion.extremes import largest, smallest
 
-claim = partial(ledger.claim, chapter="06_controller")
+claim = partial(ledger.claim, chapter="08_controller")
 TURN = 2.0 * np.pi
 
 #: The three perturbations of the paper's Bode plot, as its text means them (claim K7).

@@ -37,7 +37,7 @@ from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 from book.companion.claims.table1 import FULL_DIFFERENCE, HALF_DIFFERENCE, MEAN_DELAY
 from book.companion.shared import shared
 
-claim = partial(ledger.claim, chapter="04_dual_arm")
+claim = partial(ledger.claim, chapter="05_dual_arm")
 
 #: A fixed window around point A, the same in c1 and c2.
 WINDOW = (0.9, 1.1)

@@ -32,8 +32,8 @@ from book.companion.claims.ledger import Finding, Verdict, decide
 from book.companion.extremes import smallest
 from book.companion.shared import shared
 
-stability = partial(ledger.claim, chapter="08a_flight")
-noise = partial(ledger.claim, chapter="08b_noise_and_pulling")
+stability = partial(ledger.claim, chapter="11_flight")
+noise = partial(ledger.claim, chapter="11b_noise_and_pulling")
 TURN = 2.0 * np.pi
 DAY = 86400.0
 

@@ -3,13 +3,13 @@
 A claim is a function without arguments that computes a `Finding`. The decorator holds all the
 rest, and enters it in the register. A module names its chapter once:
 
-    claim = partial(ledger.claim, chapter="03_common_arm")
+    claim = partial(ledger.claim, chapter="04_common_arm")
 
     @claim("C2", place="Eq. (5b)", says="...", pinned=(Verdict.REPRODUCED, 0.0, 1e-12))
     def straight_line() -> Finding:
         ...
 
-The chapter shows `chapter_claims("03_common_arm")`, and calls its `confirm`.
+The chapter shows `chapter_claims("04_common_arm")`, and calls its `confirm`.
 
 Texts are plain, with formulas between dollar signs. What a terminal shows as it is, such as
 c₁ or 10⁻⁶, becomes TeX on a page (`typeset`); TeX may be written as well.
@@ -351,7 +351,7 @@ def typeset(text: str) -> str:
 
 def ledger_link(identifier: str, attributes: str = "") -> str:
     """Return a link from a chapter to a claim's row in the ledger."""
-    return f'<a {attributes}href="09_ledger.html#ledger-{identifier}">{identifier}</a>'
+    return f'<a {attributes}href="15_ledger.html#ledger-{identifier}">{identifier}</a>'
 
 
 #: Verdicts that are too long for the narrow column of a table, as it shows them.
@@ -423,7 +423,7 @@ def chapter_claims(chapter: str) -> Ledger:
     Parameters
     ----------
     chapter : str
-        Stem of its notebook, for instance "03_common_arm".
+        Stem of its notebook, for instance "04_common_arm".
 
     Returns
     -------
@@ -459,7 +459,7 @@ def check_in_parallel() -> Ledger:
     """
     # The longest first, and side by side those that compile different functions: what one
     # process has compiled, the other one then finds.
-    first = "08_perturbations", "08b_noise_and_pulling", "08a_flight", "03_common_arm"
+    first = "07_perturbations", "11b_noise_and_pulling", "11_flight", "04_common_arm"
     chapters = dict.fromkeys([*first, *(entry.chapter for entry in all_claims())])
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
         parts = pool.map(_check_chapter, chapters)

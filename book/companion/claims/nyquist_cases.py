@@ -27,7 +27,7 @@ from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 from book.companion.extremes import smallest
 
-claim = partial(ledger.claim, chapter="05_nyquist")
+claim = partial(ledger.claim, chapter="06_nyquist")
 Arm = SingleArm | CommonArm | DualArm
 
 #: The loops of the section, at the gains of the paper's charts.

@@ -33,15 +33,15 @@ from book.companion.claims.ledger import (
 #: Section of the paper that a chapter with claims is about.
 SECTIONS = {
     "01_opening": "Sec. I and Table I",
-    "02_hayes": "Sec. II, single arm",
-    "03_common_arm": "Sec. III.A, common arm",
-    "04_dual_arm": "Sec. III.B, dual arm",
-    "05_nyquist": "Sec. IV.A, frequency domain",
-    "06_controller": "Sec. IV.B, controller",
-    "07_simulation": "Sec. IV.C, simulation",
-    "08_perturbations": "Appendix",
-    "08a_flight": "White paper, the loop",
-    "08b_noise_and_pulling": "White paper, noise and pulling",
+    "02_single_arm": "Sec. II, single arm",
+    "04_common_arm": "Sec. III.A, common arm",
+    "05_dual_arm": "Sec. III.B, dual arm",
+    "06_nyquist": "Sec. IV.A, frequency domain",
+    "08_controller": "Sec. IV.B, controller",
+    "09_simulation": "Sec. IV.C, simulation",
+    "07_perturbations": "Appendix",
+    "11_flight": "White paper, the loop",
+    "11b_noise_and_pulling": "White paper, noise and pulling",
 }
 #: Those of them that are about the paper; the others are about the white paper.
 OF_THE_PAPER = [name for name, part in SECTIONS.items() if not part.startswith("White")]

@@ -29,7 +29,7 @@ from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 from book.companion.extremes import largest, smallest
 from book.companion.shared import shared
 
-claim = partial(ledger.claim, chapter="07_simulation")
+claim = partial(ledger.claim, chapter="09_simulation")
 
 #: Band in Hz over which the paper states the suppression.
 BAND = (1e-4, 1.0)

@@ -23,7 +23,7 @@ from armlock.stability.roots import rightmost_root
 from book.companion.claims import ledger
 from book.companion.claims.ledger import Finding, Verdict, Weight, decide
 
-claim = partial(ledger.claim, chapter="02_hayes")
+claim = partial(ledger.claim, chapter="02_single_arm")
 
 #: Nominal gain of Sec. II in rad/s (k1 = 1 + n with n = 0).
 NOMINAL_GAIN = 1.0
