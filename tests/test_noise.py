@@ -134,3 +134,20 @@ def test_what_cannot_be_a_block_or_a_flag_is_refused_before_anything_is_drawn():
     assert np.array_equal(source.draw(3), LaserNoise(1).draw(3))
     with pytest.raises(TypeError, match=r"^at_rest must be True or False"):
         LaserNoise(1, at_rest="no")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["perturbation", "own filter"])
+def test_rms_is_that_of_what_is_drawn(name):
+    source = SOURCES[name](5, sample_rate=10.0)
+    frequency = np.geomspace(1e-11, 0.499999 * source.sample_rate, 200_001)
+    variance = np.trapezoid(source.sampled_asd(frequency) ** 2 * frequency, np.log(frequency))
+    assert source.rms == pytest.approx(np.sqrt(variance), rel=1e-4)
+    quick = [SOURCES[name](seed, sample_rate=10.0).draw(1)[0] for seed in range(4000)]
+    assert np.std(quick) == pytest.approx(source.rms, rel=0.05)
+
+
+def test_rms_of_the_perturbations_has_the_closed_form_of_the_docstring():
+    """A spectrum that ends sharply at the cut-off would have sqrt(3 pi / 4) less."""
+    level, corner, cutoff = 3.6e-5, 2.8e-3, 5e-6
+    variance = level**2 * (100.0 + np.pi * corner**4 / (4.0 * cutoff**3))
+    assert PerturbationNoise(1, cutoff=cutoff).rms == pytest.approx(np.sqrt(variance), rel=1e-9)

@@ -3,7 +3,7 @@
 The sampled loop has an exact prediction of its own; it says nothing certain about stability.
 """
 
-from armlock.timedomain.noise import LaserNoise, PerturbationNoise, ShapedNoise, band_rms
+from armlock.timedomain.noise import LaserNoise, PerturbationNoise, ShapedNoise
 from armlock.timedomain.simulation import (
     DivergenceError,
     Simulation,
@@ -21,7 +21,6 @@ __all__ = [
     "Spectrum",
     "SpectrumEstimator",
     "amplitude_spectrum",
-    "band_rms",
     "sampled_open_loop",
     "simulate",
 ]

@@ -205,6 +205,12 @@ def through(sections: Rows, state: FloatArray, v: float) -> float:
     return v
 
 
+def readout(sampled: SampledFilter) -> FloatArray:
+    """Return by how much each state adds to the output, the gain left out: shape (order,)."""
+    shares = [share for *_, t1, t2 in sampled.sections for share in (t1, t2)]
+    return np.array(shares[: sampled.order])
+
+
 def stationary_root(sampled: SampledFilter) -> FloatArray:
     """Return a square root of the covariance of a filter's states under white noise.
 
@@ -220,12 +226,12 @@ def stationary_root(sampled: SampledFilter) -> FloatArray:
         one.
     """
     n = 2 * len(sampled.sections)
-    change, drive, carried = np.zeros((n, n)), np.zeros(n), np.zeros(n)
-    for j, (r1, r2, k, t1, t2) in enumerate(sampled.sections):
+    change, drive, shares = np.zeros((n, n)), np.zeros(n), readout(sampled)
+    for j, (r1, r2, k, _, _) in enumerate(sampled.sections):
         here, drive[2 * j] = slice(2 * j, 2 * j + 2), 1.0
-        change[2 * j] = carried
+        # A section takes in what all those before it put out.
+        change[2 * j, : 2 * j] = shares[: 2 * j]
         change[here, here] = [[r1, -k], [1.0, r2]]
-        carried[here] = t1, t2
     change, drive = change[: sampled.order, : sampled.order], drive[: sampled.order]
     # The trapezoidal rule undone: the continuous system whose samples these are.
     undone = np.linalg.inv(np.eye(sampled.order) + 0.5 * change)

@@ -28,6 +28,7 @@ from armlock.controllers import Controller
 from armlock.progress import progress
 from armlock.timedomain.discretize import (
     Rows,
+    readout,
     sampled_filter,
     stationary_root,
     through,
@@ -119,9 +120,10 @@ class ShapedNoise:
         # White samples of variance one have the one-sided density 2 / sample_rate.
         self._scale = math.sqrt(0.5 * self.sample_rate)
         self._state = np.zeros(2 * len(self._sampled.sections))
+        self._root = stationary_root(self._sampled)
         if not self.at_rest:
             order = self._sampled.order
-            start = stationary_root(self._sampled) @ self._random.standard_normal(order)
+            start = self._root @ self._random.standard_normal(order)
             self._state[:order] = self._scale * start
 
     def __repr__(self) -> str:
@@ -152,6 +154,19 @@ class ShapedNoise:
         """Density of the samples in closed form; see `asd`."""
         omega = 2.0 * np.pi * real_array("frequency", frequency)
         return np.asarray(np.abs(self._filter(1j * warped(omega, self.sample_rate))))
+
+    @property
+    def rms(self) -> float:
+        r"""Standard deviation of the samples of the stationary series, in its unit.
+
+        It is exact, and includes all frequencies up to half the sample rate:
+
+        .. math::
+
+            \text{rms}^2 = \int_0^{f_s/2} \text{asd}_T^2(f)\, \mathrm{d}f .
+        """
+        states = self._root.T @ readout(self._sampled)
+        return float(abs(self._sampled.gain) * self._scale * np.sqrt(1.0 + states @ states))
 
     def draw(self, samples: int) -> FloatArray:
         """Return the next samples of the series.
@@ -211,33 +226,6 @@ def _shape(series: FloatArray, gain: float, sections: Rows, state: FloatArray) -
     """Replace a series by its filtered self."""
     for i in range(series.size):
         series[i] = gain * through(sections, state, series[i])
-
-
-def band_rms(low: float, high: float) -> float:
-    r"""R.m.s. of the perturbations' spectrum, as printed, between two frequencies.
-
-    With level and corner :math:`f_0` of the paper's appendix
-
-    .. math::
-
-        \left[ \int_{\text{low}}^{\text{high}} \text{level}^2
-        \left( 1 + \left( \frac{f_0}{f} \right)^4 \right) \mathrm{d}f \right]^{1/2} .
-
-    Parameters
-    ----------
-    low, high : float
-        In Hz, positive, the second one larger.
-
-    Returns
-    -------
-    float
-        In closed form.
-    """
-    low, high = positive_number("low", low), positive_number("high", high)
-    if high <= low:
-        raise ValueError(f"high must exceed low = {low}, got {high}")
-    red = paper.PHASE_NOISE_CORNER**4 * (low**-3 - high**-3) / 3.0
-    return paper.PHASE_NOISE_LEVEL * math.sqrt(high - low + red)
 
 
 class LaserNoise(ShapedNoise):
@@ -324,8 +312,8 @@ class PerturbationNoise(ShapedNoise):
     sample_rate : float, optional
         In Hz.
     cutoff : float, optional
-        Frequency in Hz below which the density is flat. The standard deviation grows as
-        cutoff^(-3/2), so that this number decides it.
+        Frequency in Hz below which the density is flat. It decides the r.m.s., which grows as
+        cutoff^(-3/2).
     at_rest : bool, optional
         Whether the series starts without what it would have built up before; see
         `ShapedNoise`.
@@ -345,9 +333,21 @@ class PerturbationNoise(ShapedNoise):
 
         \left| s^2 + \sqrt{2}\, \omega_0 s + \omega_0^2 \right|^2 = \omega^4 + \omega_0^4 .
 
+    The r.m.s. of what is drawn includes the flat part below the cutoff:
+
+    .. math::
+
+        \text{rms}^2 = \text{level}^2 \left( \frac{f_s}{2}
+        + \frac{\pi f_0^4}{4\,\text{cutoff}^3} \right) .
+
+    An integral of the printed density that begins at the cutoff has :math:`4 / (3\pi)` of the
+    second term, and an r.m.s. that is smaller by a factor of up to 1.53.
+
     Examples
     --------
     >>> from armlock import PerturbationNoise
+    >>> print(f"{PerturbationNoise(seed=1).rms:.4f}")
+    0.0224
     >>> c1 = 1.0 + PerturbationNoise(seed=1, sample_rate=10.0, at_rest=True).draw(100)
     >>> c1.shape
     (100,)

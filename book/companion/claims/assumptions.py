@@ -23,7 +23,7 @@ from armlock.paper import (
 from armlock.robustness.margins import critical_perturbation
 from armlock.stability.counts import unstable_roots
 from armlock.stability.roots import rightmost_root
-from armlock.timedomain.noise import LaserNoise, band_rms
+from armlock.timedomain.noise import LaserNoise, PerturbationNoise
 from armlock.timedomain.simulation import sampled_open_loop
 from book.companion.claims import flight
 from book.companion.claims.controller import (
@@ -209,15 +209,17 @@ def _scale() -> Assumption:
 @assumption
 def _lowest() -> Assumption:
     total, later, latest, earlier = (
-        band_rms(low, 0.5 * SAMPLE_RATE) for low in (LOWEST, 1e-4, 1e-3, 0.1 * LOWEST)
+        PerturbationNoise(0, SAMPLE_RATE, cutoff=end).rms
+        for end in (LOWEST, 1e-4, 1e-3, 0.1 * LOWEST)
     )
     return Assumption(
         "Where the spectrum of η(t) ends at low frequency",
         f"At {LOWEST:g} Hz, one over the duration; flat below",
         "The printed spectrum rises as $1/f^2$ without end. A run cannot hold slower parts.",
-        f"The slowest parts are nearly all of it: the r.m.s. is {total:.2g}, {later:.2g} from "
-        f"0.1 mHz on, {latest:.2g} from 1 mHz on, and {earlier:.2g} if it ended ten times "
-        "lower. At face value the end decides whether System 1 diverges (claim M2).",
+        f"The slowest parts are nearly all of it: the r.m.s. is {total:.2g}. It would be "
+        f"{later:.2g} if the spectrum were flat below 0.1 mHz, {latest:.2g} for 1 mHz, and "
+        f"{earlier:.2g} for {0.1 * LOWEST:g} Hz. At face value the end decides whether "
+        "System 1 diverges (claim M2).",
     )
 
 
@@ -245,7 +247,7 @@ def _seeds() -> Assumption:
         f"One draw, with seeds {PERTURBATION_SEEDS[0]} and {PERTURBATION_SEEDS[1]} for $c₁$, "
         "$c₂$",
         "The paper shows one draw and gives no seed.",
-        f"Of {DRAWS} other draws of System 1, {100 * growing_probability():.1f} % stay outside "
+        f"Of {DRAWS} other draws of System 1, {100 * growing_probability():.2f} % stay outside "
         "the stable region for long enough to grow by a factor e.",
     )
 

@@ -21,7 +21,7 @@ from armlock.paper import DURATION, LASER_NOISE, PERTURBATION, SAMPLE_RATE
 from armlock.robustness.margins import critical_perturbation
 from armlock.stability.counts import unstable_roots
 from armlock.stability.roots import rightmost_root
-from armlock.timedomain.noise import LaserNoise, PerturbationNoise, band_rms
+from armlock.timedomain.noise import LaserNoise, PerturbationNoise
 from armlock.timedomain.simulation import DivergenceError, Simulation, sampled_open_loop
 from armlock.timedomain.spectra import Spectrum, SpectrumEstimator, amplitude_spectrum
 from book.companion.claims import ledger
@@ -38,8 +38,8 @@ STRONG = (1.0, 1.0 - PERTURBATION)
 IDEAL = (1.0, 1.0)
 #: Lowest frequency of the simulated band in Hz, where the perturbations' spectrum ends.
 LOWEST = 1.0 / DURATION
-#: Factors before the spectrum of the perturbations at which System 1 is tried, as r.m.s.
-#: over the simulated band in units of the largest perturbation that the paper considers.
+#: Sizes of the perturbations at which System 1 is tried: their r.m.s. in units of the largest
+#: perturbation that the paper considers.
 SIZES = (1.0, 3.0, 10.0, 30.0, 100.0, 1000.0)
 #: Cut-offs in Hz at which the spectrum of the perturbations is tried at face value as well.
 CUTOFFS = (1e-4, 1e-3)
@@ -108,12 +108,12 @@ class Run:
 
 
 def face_value_rms() -> float:
-    """R.m.s. of the printed spectrum over the simulated band.
+    """R.m.s. of what is drawn from the printed spectrum, flat below one over the duration.
 
-    Series drawn from it have more, because their spectrum does not end at the cut-off; see
-    `drawn_sizes` for those of the run.
+    It is that of the random process. A single draw of the length of the run differs, because
+    most of the variance is slower than the run: see `drawn_sizes`.
     """
-    return band_rms(LOWEST, 0.5 * SAMPLE_RATE)
+    return PerturbationNoise(0, SAMPLE_RATE, cutoff=LOWEST).rms
 
 
 def unit_size() -> float:
@@ -400,7 +400,7 @@ def leaving_probability(size: float = 1.0) -> float:
     --------
     >>> from book.companion.claims.simulation import leaving_probability
     >>> print(f"{leaving_probability():.1f}")
-    0.4
+    0.1
     """
     return float((size * drawn_differences().max(axis=1) > stable_up_to()).mean())
 
@@ -671,7 +671,7 @@ def suppression_reached() -> Finding:
     "M4",
     place="Sec. IV.C, Figs. 9, 10b and 10c",
     says="The spectra of System 1 (varying $c₁$, $c₂$) and 2 (constant) are nearly alike.",
-    pinned=(Verdict.OPEN, 5.0068e-4, 1e-6),
+    pinned=(Verdict.OPEN, 4.2915e-4, 1e-6),
     printed="nearly identical ... because ... the magnitude responses in the Bode plot ... are "
     "almost the same above $10^{-6}$Hz",
 )
@@ -697,7 +697,7 @@ def spectra_alike() -> Finding:
     "M5",
     place="Sec. IV.C, Fig. 10a",
     says="Over long times the outputs of System 1 and System 2 differ noticeably.",
-    pinned=(Verdict.REPRODUCED, 0.2192, 1e-3),
+    pinned=(Verdict.REPRODUCED, 0.2099, 1e-3),
 )
 def long_times() -> Finding:
     """R.m.s. of the difference of the outputs, relative to the output, over the run."""
