@@ -12,6 +12,7 @@ from importlib.metadata import requires, version
 from pathlib import Path
 
 import nbformat
+from nbclient import NotebookClient
 
 from tools import check_html
 
@@ -27,7 +28,7 @@ fig, ax = plt.subplots()
 ax.plot(np.sin(omega), np.cos(omega), label="Curve")
 ax.set(xlabel="a [1/s]", ylabel="b [1/s]");
 """
-PUBLISH = 'figures.publish(fig, "small", points=omega.size)'
+GLUE = "figures.glue(points=omega.size)"
 PAGES = ("bibliography.md", "status.md")
 OFFERED = ("LICENSE", "LICENSE-docs", "CITATION.cff", "CHANGELOG.md")
 ADDRESS = "https://github.com/someone/something"
@@ -51,12 +52,12 @@ def small(*more, text=TEXT, alt=ALT):
     return notebook(
         nbformat.v4.new_markdown_cell(text),
         nbformat.v4.new_code_cell(DRAW, metadata=figure),
-        nbformat.v4.new_code_cell(PUBLISH, metadata={"tags": ["remove-input"]}),
+        nbformat.v4.new_code_cell(GLUE, metadata={"tags": ["remove-input"]}),
         *more,
     )
 
 
-def build(folder, notebooks, address=None):
+def build(folder, notebooks, address=None, run_before=False):
     """Build a copy of the book with other notebooks; return exit code, output and pages."""
     (folder / "notebooks").mkdir(parents=True)
     (folder / "book").mkdir()
@@ -77,12 +78,22 @@ def build(folder, notebooks, address=None):
     )
     for name, notebook in notebooks.items():
         nbformat.write(notebook, folder / "notebooks" / f"{name}.ipynb")
+    environment = dict(os.environ)
+    environment.pop("MPLBACKEND", None)  # the kernel chooses its own, which shows figures
     pages = folder / "build" / "_build" / "html"
+    if run_before:
+        executed = folder / "build" / "executed"
+        executed.mkdir(parents=True)
+        for name, notebook in notebooks.items():
+            NotebookClient(notebook).execute(env=environment)
+            nbformat.write(notebook, executed / f"{name}.ipynb")
+        cache = pages.parent / ".jupyter_cache"
+        command = [sys.executable, str(ROOT / "tools" / "collect_figures.py")]
+        command += map(str, (executed, pages / "figures", cache))
+        subprocess.run(command, check=True)
     command = [str(Path(sys.executable).with_name("jupyter-book")), "build", ".", "--all"]
     command += ["--config", "book/_config.yml", "--toc", "book/_toc.yml"]
     command += ["--path-output", "build", "-W", "-n", "--keep-going"]
-    environment = os.environ | {"ARMLOCK_FIGURES": str(pages / "figures")}
-    environment.pop("MPLBACKEND", None)  # the kernel chooses its own, which shows figures
     if address is not None:
         # The metadata of the package as they are with an address in pyproject.toml.
         metadata = folder / "first" / f"armlock-{version('armlock')}.dist-info" / "METADATA"
@@ -102,11 +113,14 @@ def build(folder, notebooks, address=None):
 
 
 def test_a_book_has_its_data_numbers_and_links_and_needs_no_network(tmp_path):
-    code, output, pages = build(tmp_path, {"small": small()}, ADDRESS)
+    code, output, pages = build(tmp_path, {"small": small()}, ADDRESS, run_before=True)
     assert code == 0, output[-3000:]
     table = (pages / "figures" / "small.csv").read_bytes()
     assert table.startswith(b'"Curve, a [1/s]","Curve, b [1/s]"\n')
     page = (pages / "notebooks/small.html").read_text()
+    for name in ("small.csv", "small.svg"):
+        assert (pages / "figures" / name).is_file()
+        assert f'href="../figures/{name}" download' in page
     assert 'alt="A curve of 200 points."' in page
     assert r"\(2.0 \times 10^{2}\)" in page
     for page, link in LINKS.items():

@@ -2,6 +2,7 @@ import control
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from IPython.core.interactiveshell import InteractiveShell
 from matplotlib.colors import to_rgba
 
 from armlock import (
@@ -155,21 +156,21 @@ def test_polar_axes_keep_directions_and_end_at_infinity():
     plt.close()
 
 
-def test_publishing_writes_figure_and_data(ax, chart, tmp_path, monkeypatch):
-    monkeypatch.setenv("ARMLOCK_FIGURES", str(tmp_path))
+def test_a_figure_carries_its_data_and_an_svg(ax, chart):
     ax.plot([1.0, 2.0], [0.5, 0.25], label="$c_1$")
     ax.plot([1.0, 2.0], [3.0, 4.0])
     ax.axhline(7.0)
     ax.fill([0.0, 1.0, 1.0], [0.0, 0.0, 1.0], label="area")
     ax.set(xlabel=r"$\omega$ [rad/s]", ylabel="gain, $g$ [1]")
-    links = figures.publish(ax.figure, "name")
-    assert {path.name for path in tmp_path.iterdir()} == {"name.csv", "name.png", "name.svg"}
-    head, *rows = (tmp_path / "name.csv").read_text().splitlines()
+    shell = InteractiveShell()
+    figures.load_ipython_extension(shell)
+    carried, _ = shell.display_formatter.format(ax.figure)
+    assert carried["image/svg+xml"].startswith("<?xml")
+    head, *rows = carried["text/csv"].splitlines()
     assert head.startswith('"c_1, omega [rad/s]","c_1, gain, g [1]","2, gain, g [1]"')
     assert rows[0].startswith("1,0.5,3")
     assert rows[1].startswith("2,0.25,4")
     assert "7" not in rows[0] + rows[1]
-    assert "name.svg" in links._repr_html_()
 
 
 def test_the_data_of_a_chart_are_its_counts_at_its_points(chart):
@@ -184,16 +185,7 @@ def test_the_data_of_a_chart_are_its_counts_at_its_points(chart):
         assert np.isnan(shown) if count < 0 else shown == count
 
 
-def test_a_drawing_has_no_data(ax, tmp_path, monkeypatch):
-    monkeypatch.setenv("ARMLOCK_FIGURES", str(tmp_path))
+def test_a_drawing_has_no_data(ax):
     ax.plot([0.0, 1.0], [0.0, 1.0])
     ax.set_axis_off()
-    assert "name.csv" not in figures.publish(ax.figure, "name")._repr_html_()
-    assert not (tmp_path / "name.csv").exists()
-
-
-def test_publishing_without_a_folder_writes_nothing(ax, tmp_path, monkeypatch):
-    monkeypatch.delenv("ARMLOCK_FIGURES", raising=False)
-    monkeypatch.chdir(tmp_path)
-    assert "written by make book" in repr(figures.publish(ax.figure, "name"))
-    assert list(tmp_path.iterdir()) == []
+    assert figures.as_csv(ax.figure) == ""

@@ -1,6 +1,5 @@
 """The printed book, and two makes in one folder."""
 
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -56,15 +55,3 @@ def test_a_second_make_waits_for_the_first(tmp_path):
         second = subprocess.run([*command, "echo", "done"], capture_output=True, text=True)
         assert first.poll() == 0
     assert second.stdout == "Another make is building here: waiting for it ...\ndone\n"
-
-
-def test_a_folder_that_the_locale_cannot_name_is_refused(tmp_path):
-    folder = tmp_path / "größe"
-    folder.mkdir()
-    for setting, code in (("C", 1), ("C.UTF-8", 0)):
-        command = [sys.executable, str(ROOT / "tools" / "alone.py"), "lock", "true"]
-        done = subprocess.run(
-            command, cwd=folder, env=os.environ | {"LC_ALL": setting}, capture_output=True
-        )
-        assert done.returncode == code
-        assert (b"set LC_ALL=C.UTF-8" in done.stderr) == (code == 1)
