@@ -15,10 +15,10 @@ So both are one class here, and one set of algorithms serves both.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from types import SimpleNamespace
-from typing import Any, NoReturn, Self
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -45,6 +45,7 @@ _LARGEST_EXPONENT = 700.0
 _PERTURBATIONS = ("c1", "c2")
 
 
+@dataclass(frozen=True)
 class CharacteristicFunction:
     r"""A characteristic function that is affine in two free parameters x and y.
 
@@ -82,8 +83,8 @@ class CharacteristicFunction:
 
     Attributes
     ----------
-    a, c : float array
-        The coefficients of A and C above; c is zero without a dead time.
+    rest, b1, b2 : armlock.axis.polynomials.Polynomial
+        R, B1 and B2 with their coefficients and roots.
 
     Raises
     ------
@@ -94,9 +95,8 @@ class CharacteristicFunction:
 
     Notes
     -----
-    It is a value: it cannot be changed, its arrays are read-only, and two of one type that are
-    made from equal arguments are equal. `replace` makes another one. A subclass calls
-    `made_from` with its own arguments once it is made.
+    It is a frozen dataclass: `replace`, `dataclasses.replace` and `copy.replace` make another
+    one with some arguments changed.
 
     The equation is of *retarded* type if all delayed terms are of lower degree than A, and of
     *neutral* type (`neutral` is true) if one of them reaches it. The roots of a neutral
@@ -114,19 +114,15 @@ class CharacteristicFunction:
     array([0, 2])
     """
 
-    rest: FloatArray
-    b1: FloatArray
-    b2: FloatArray
-    a: FloatArray
-    c: FloatArray
+    rest: Polynomial
+    b1: Polynomial
+    b2: Polynomial
     tau1: float
     tau2: float
     delay: float
     step: float
     parameters: tuple[str, str]
     reference: tuple[float, float]
-    _polynomials: tuple[Polynomial, ...]
-    _arguments: dict[str, Any]
 
     def __init__(
         self,
@@ -141,74 +137,54 @@ class CharacteristicFunction:
         parameters: tuple[str, str] = ("x", "y"),
         reference: tuple[float, float] = (0.0, 0.0),
     ) -> None:
-        named = {"rest": rest, "b1": b1, "b2": b2}
-        polynomials = {name: _polynomial(name, p) for name, p in named.items()}
-        r, p1, p2 = (p.coefficients for p in polynomials.values())
+        polynomials = {"rest": rest, "b1": b1, "b2": b2}
+        polynomials = {name: _polynomial(name, p) for name, p in polynomials.items()}
         pair = axis("reference", reference)
         if pair.size != 2:
             raise ValueError(f"reference must hold two numbers, got {pair.size}")
-        x0, y0 = pair.tolist()
         times = {"tau1": tau1, "tau2": tau2, "delay": delay, "step": step}
         times = {name: _not_negative(name, value) for name, value in times.items()}
-        if times["step"]:
+        # The fields of a frozen dataclass are set once, here.
+        vars(self).update(polynomials, **times)
+        vars(self).update(parameters=tuple(parameters), reference=tuple(pair.tolist()))
+        self._check()
+
+    def _check(self) -> None:
+        """Raise if a delay is no whole number of steps, or a term is too high in degree."""
+        if self.step:
             for name in ("delay", "tau1", "tau2"):
-                whole_steps(name, times[name], times["step"])
-        c = poly.polyadd(x0 * p1, y0 * p2)
-        if times["delay"]:
-            a, c = r, _trimmed("c", np.asarray(c))
-        else:
-            # Nothing delays C: it is part of A.
-            a, c = _trimmed("a", np.asarray(poly.polyadd(r, c))), _trimmed("c", [0.0])
-        if not a.any():
+                whole_steps(name, getattr(self, name), self.step)
+        if not self.a.any():
             raise ValueError(
-                f"A, the term without a delay, must not vanish, got rest={r.tolist()}"
+                f"A, the term without a delay, must not vanish, got rest={self.rest!r}"
             )
-        degree = a.size - 1
-        for name, b in (("b1", p1), ("b2", p2), ("c", c)):
-            if b.size > a.size:
+        b1, b2 = self.b1.coefficients, self.b2.coefficients
+        for name, b in (("b1", b1), ("b2", b2), ("c", self.c)):
+            if b.size > self.a.size:
                 raise ValueError(
-                    f"{name} must not exceed the degree of A ({degree}), "
+                    f"{name} must not exceed the degree of A ({self.degree}), "
                     f"got degree {b.size - 1}: the equation would be of advanced type"
                 )
-        for name, b, tau in (("b1", p1, times["tau1"]), ("b2", p2, times["tau2"])):
-            if tau + times["delay"] == 0.0 and b.size == a.size:
+        for name, b, tau in (("b1", b1, self.tau1), ("b2", b2, self.tau2)):
+            if tau + self.delay == 0.0 and b.size == self.a.size:
                 raise ValueError(
-                    f"{name} without a delay must be of lower degree than A ({degree}), "
+                    f"{name} without a delay must be of lower degree than A ({self.degree}), "
                     f"or its parameter would change the order of the equation"
                 )
-        vars(self).update(
-            times, rest=r, b1=p1, b2=p2, a=a, c=c, parameters=tuple(parameters),
-            reference=(x0, y0), _polynomials=tuple(polynomials.values()),
-        )  # fmt: skip
-        self.made_from(
-            **polynomials, **times, parameters=self.parameters, reference=self.reference
-        )
-
-    def made_from(self, **arguments: Any) -> None:
-        """Keep the arguments that make this once more, at the end of a class's `__init__`.
-
-        Parameters
-        ----------
-        **arguments
-            Checked, and such that nobody changes them. They become attributes too, but for
-            those that there are already.
-        """
-        vars(self).update({**arguments, **vars(self), "_arguments": arguments})
 
     def replace(self, **changes: Any) -> Self:
-        """Return another one of the same class, made with other values of some arguments.
+        """Return another one, made with other values of some arguments.
 
         Parameters
         ----------
         **changes
-            Arguments of the class, by name. All others are as they were given: a signal mapping
-            that was given as an object stays as it is when the delays change, one that was
-            given by its name is made anew.
+            Arguments of the class, by name. All others stay as they are. The sensor of a loop
+            stays too when its delays change.
 
         Returns
         -------
         CharacteristicFunction
-            Of the same class. `copy.replace` calls this, from Python 3.13 on.
+            Of the same class.
 
         Raises
         ------
@@ -221,70 +197,32 @@ class CharacteristicFunction:
         >>> CommonArm(delay=20e-6).replace(delay=0.0) == CommonArm()
         True
         """
-        return type(self)(**{**self._arguments, **changes})
-
-    __replace__ = replace
-
-    @property
-    def __dataclass_fields__(self) -> NoReturn:
-        """Say what to write in place of `dataclasses.replace`, which reads this first."""
-        raise AttributeError(
-            f"a {type(self).__name__} is no dataclass: make another one with its method "
-            f"replace, for instance replace({next(reversed(self._arguments))}=...)"
-        )
-
-    # What `pprint` reads of all that have the former.
-    __dataclass_params__ = SimpleNamespace(repr=False)
+        return replace(self, **changes)
 
     def plain(self) -> CharacteristicFunction:
         """Return D alone, with the arguments of `CharacteristicFunction`."""
-        rest, b1, b2 = self._polynomials
         return CharacteristicFunction(
-            rest, b1, b2, self.tau1, self.tau2, delay=self.delay, step=self.step,
-            parameters=self.parameters, reference=self.reference,
+            self.rest, self.b1, self.b2, self.tau1, self.tau2, delay=self.delay,
+            step=self.step, parameters=self.parameters, reference=self.reference,
         )  # fmt: skip
 
-    def __setattr__(self, name: str, value: object) -> NoReturn:
-        """Refuse changes: results are kept with the system they belong to."""
-        raise AttributeError(
-            f"a {type(self).__name__} cannot be changed, got {name} = {value!r:.60}: make "
-            f"another one with replace({name}=...)"
-        )
-
-    def __delattr__(self, name: str) -> NoReturn:
-        """Refuse changes."""
-        raise AttributeError(f"a {type(self).__name__} cannot be changed, got del {name}")
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Take what was pickled or copied; arrays are read-only again."""
-        vars(self).update(state)
-        for p in self._polynomials:
-            _sealed(p)
-        for array in (self.rest, self.b1, self.b2, self.a, self.c):
-            array.setflags(write=False)
-
-    def _identity(self) -> tuple[Any, ...]:
-        """Return what two equal ones have in common, hashable."""
-        polynomials = [(*p.coefficients.tolist(), *p.roots.tolist()) for p in self._polynomials]
-        times = self.tau1, self.tau2, self.delay, self.step
-        return *polynomials, times, self.parameters, self.reference
-
-    def __eq__(self, other: object) -> bool:
-        """Whether the other one is of the same class, with equal arguments."""
-        if type(other) is not type(self):
-            return NotImplemented
-        assert isinstance(other, CharacteristicFunction)
-        return self._identity() == other._identity()
+    @cached_property
+    def c(self) -> FloatArray:
+        """Coefficients of C, what the dead time alone delays; zero without a dead time."""
+        return _trimmed("c", self._undelayed_arms() if self.delay else [0.0])
 
     @cached_property
-    def _hash(self) -> int:
-        """Of numbers alone, whose hash is the same in every process: it is pickled along."""
-        numbers = self.rest.tolist(), self.b1.tolist(), self.b2.tolist()
-        return hash((*map(tuple, numbers), self.tau1, self.tau2, self.delay))
+    def a(self) -> FloatArray:
+        """Coefficients of A, what nothing delays."""
+        rest = self.rest.coefficients
+        if not self.delay:
+            rest = np.asarray(poly.polyadd(rest, self._undelayed_arms()))
+        return _trimmed("a", rest)
 
-    def __hash__(self) -> int:
-        """Return a number that equal ones share."""
-        return self._hash
+    def _undelayed_arms(self) -> FloatArray:
+        """Return the coefficients of x0 B1 + y0 B2."""
+        x0, y0 = self.reference
+        return np.asarray(poly.polyadd(x0 * self.b1.coefficients, y0 * self.b2.coefficients))
 
     @property
     def degree(self) -> int:
@@ -301,7 +239,7 @@ class CharacteristicFunction:
         """Coefficients of the highest power of A in A, B1, B2 and C."""
         a, b1, b2, c = (
             float(p[-1]) if p.size == self.a.size else 0.0
-            for p in (self.a, self.b1, self.b2, self.c)
+            for p in (self.a, self.b1.coefficients, self.b2.coefficients, self.c)
         )
         return a, b1, b2, c
 
@@ -357,15 +295,6 @@ class CharacteristicFunction:
         """Change of omega, in rad/s, that is one turn of the longest delay; inf without one."""
         return 2.0 * np.pi / self.longest_delay if self.longest_delay else np.inf
 
-    def __repr__(self) -> str:
-        """Name the class and its arguments, as they are written to make it again."""
-        shown = {
-            name: value.coefficients.tolist() if isinstance(value, Polynomial) else value
-            for name, value in self._arguments.items()
-        }
-        listed = ", ".join(f"{name}={value!r}" for name, value in shown.items())
-        return f"{type(self).__name__}({listed})"
-
     def parts(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """Evaluate the three terms of D, which is the first less x, y times the others.
 
@@ -393,7 +322,7 @@ class CharacteristicFunction:
             np.asarray(b2 * np.exp(-s * self.tau2) * dead),
         )
 
-    def __call__(
+    def characteristic(
         self, s: npt.ArrayLike, x: npt.ArrayLike | None = None, y: npt.ArrayLike | None = None
     ) -> ComplexArray:
         """Evaluate D(s; x, y); the three arguments broadcast. Of a loop x and y default to one.
@@ -419,12 +348,15 @@ class CharacteristicFunction:
     def arms(self, x: Any, y: Any) -> tuple[tuple[FloatArray, float, Any, Any], ...]:
         """Return B, the delay, the reference and the parameter of either arm."""
         x0, y0 = self.reference
-        return (self.b1, self.tau1, x0, x), (self.b2, self.tau2, y0, y)
+        return (
+            (self.b1.coefficients, self.tau1, x0, x),
+            (self.b2.coefficients, self.tau2, y0, y),
+        )
 
     def _evaluated(self, s: Any, library: Any) -> list[tuple[Any, Any]]:
         """Return R, B1 and B2 at s, and their derivatives by z."""
         z = library.exp(s * self.step) if self.step else s
-        return [p.evaluated(z) for p in self._polynomials]
+        return [p.evaluated(z) for p in self.polynomials()]
 
     def _value(self, s: Any, x: Any, y: Any, library: Any = np) -> Any:
         """Evaluate D(s; x, y) unchecked.
@@ -453,7 +385,7 @@ class CharacteristicFunction:
         Raises
         ------
         TypeError, ValueError
-            As a call does.
+            As `characteristic` does.
         """
         return np.asarray(self._slope(*self._checked(s, x, y)))
 
@@ -482,10 +414,9 @@ class CharacteristicFunction:
 
     def exchanged(self) -> CharacteristicFunction:
         """Return the same function with its two free parameters exchanged."""
-        _, b1, b2 = self._polynomials
         return self.plain().replace(
-            b1=b2,
-            b2=b1,
+            b1=self.b2,
+            b2=self.b1,
             tau1=self.tau2,
             tau2=self.tau1,
             parameters=self.parameters[::-1],
@@ -494,7 +425,7 @@ class CharacteristicFunction:
 
     def polynomials(self) -> tuple[Polynomial, ...]:
         """Return R, B1 and B2 with their roots."""
-        return self._polynomials
+        return self.rest, self.b1, self.b2
 
     @cached_property
     def roots_of_a(self) -> ComplexArray:
@@ -502,7 +433,7 @@ class CharacteristicFunction:
 
         With a dead time A is R, whose roots are known.
         """
-        return self._polynomials[0].roots if self.delay else Polynomial.of(self.a).roots
+        return self.rest.roots if self.delay else Polynomial.of(self.a).roots
 
     def _delayed(
         self, k: int, lag: float, weight: float = 1.0, *, rows: bool = False
@@ -515,12 +446,12 @@ class CharacteristicFunction:
         """
         if not self.step:
             polynomials, shares = self._basis
-            if rows and len(polynomials) == len(self._polynomials):
+            if rows and len(polynomials) == len(self.polynomials()):
                 # A row has products with B1 only: the fewer terms in that the better.
-                polynomials, shares = self._polynomials, np.eye(3)
+                polynomials, shares = self.polynomials(), np.eye(3)
             share = weight * shares[k]
             return ExponentialSum(polynomials, share[None, :], np.array([-lag]), share)
-        factors = [p.coefficients for p in self._polynomials]
+        factors = [p.coefficients for p in self.polynomials()]
         ends = np.cumsum([p.size for p in factors])
         polynomials = (Polynomial(np.ones(1), np.zeros(0, dtype=np.complex128)),) * ends[-1]
         place = np.split(np.eye(len(polynomials)), ends[:-1])[k]
@@ -531,7 +462,7 @@ class CharacteristicFunction:
     @cached_property
     def _basis(self) -> tuple[tuple[Polynomial, ...], FloatArray]:
         """Polynomials, and the shares of them in R, B1 and B2, shape (3, polynomials)."""
-        return self._polynomials, np.eye(3)
+        return self.polynomials(), np.eye(3)
 
     def on_boundary(
         self, *, rows: bool = False
@@ -656,7 +587,7 @@ class _Shifted(CharacteristicFunction):
             # It moves along, so that nothing has to cancel in `rest`.
             reference=(x0 * np.exp(sigma * origin.tau1), y0 * np.exp(sigma * origin.tau2)),
         )
-        self.made_from(origin=origin, sigma=sigma)
+        vars(self).update(origin=origin, sigma=sigma)
 
     @cached_property
     def roots_of_a(self) -> ComplexArray:
@@ -693,26 +624,15 @@ def _with_moved(
 
 
 def _polynomial(name: str, given: Sequence[float] | FloatArray | Polynomial) -> Polynomial:
-    """Return a polynomial with trimmed, read-only coefficients, and its roots."""
+    """Return a polynomial with trimmed coefficients, and its roots."""
     if isinstance(given, Polynomial):
-        coefficients, roots = _trimmed(name, given.coefficients), given.roots.copy()
-        return _sealed(given._replace(coefficients=coefficients, roots=roots))
-    return _sealed(Polynomial.of(_trimmed(name, given)))
-
-
-def _sealed(p: Polynomial) -> Polynomial:
-    """Make the arrays of a polynomial read-only."""
-    for array in (p.coefficients, p.roots):
-        array.setflags(write=False)
-    return p
+        return given._replace(coefficients=_trimmed(name, given.coefficients))
+    return Polynomial.of(_trimmed(name, given))
 
 
 def _trimmed(name: str, coefficients: Sequence[float] | FloatArray) -> FloatArray:
-    """Return trimmed, read-only coefficients with at least one entry."""
-    values = axis(name, coefficients)
-    trimmed = np.array(poly.polytrim(values, tol=0.0), dtype=np.float64)
-    trimmed.setflags(write=False)
-    return trimmed
+    """Return trimmed coefficients with at least one entry."""
+    return np.array(poly.polytrim(axis(name, coefficients), tol=0.0), dtype=np.float64)
 
 
 def _not_negative(name: str, value: float) -> float:

@@ -12,11 +12,12 @@ of `armlock.characteristic`. The Hayes equation, which has no sensor, is one mor
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from itertools import zip_longest
 from math import factorial, lcm
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
 import mpmath
 import numpy as np
@@ -43,12 +44,19 @@ from armlock.sensors import COMMON, SINGLE, SignalMapping, modified_dual
 
 if TYPE_CHECKING:
     import control
-    from matplotlib.axes import Axes
 
 # Where the terms of L cancel by more than this, in L or in 1 + L, rounding takes too much.
 _MOST_CANCELLED = 1e6
 
 
+# What python-control is told that wants a system without delays.
+_USE_FRD = (
+    "python-control's systems have no delays: take loop.frd(omega), the exact response at "
+    "chosen frequencies, or the controller alone, loop.controller"
+)
+
+
+@dataclass(frozen=True, init=False)
 class HayesEquation(CharacteristicFunction):
     r"""The equation x'(t) = a x(t) + b x(t - tau), with free parameters (a, b).
 
@@ -75,14 +83,24 @@ class HayesEquation(CharacteristicFunction):
     array([0, 2])
     """
 
+    rest: Polynomial = field(init=False, repr=False, compare=False)
+    b1: Polynomial = field(init=False, repr=False, compare=False)
+    b2: Polynomial = field(init=False, repr=False, compare=False)
+    tau1: float = field(init=False, repr=False, compare=False)
+    tau2: float = field(init=False, repr=False, compare=False)
+    delay: float = field(init=False, repr=False, compare=False)
+    step: float = field(init=False, repr=False, compare=False)
+    parameters: tuple[str, str] = field(init=False, repr=False, compare=False)
+    reference: tuple[float, float] = field(init=False, repr=False, compare=False)
     tau: float
 
     def __init__(self, tau: float = 1.0) -> None:
         tau = positive_number("tau", tau)
         super().__init__((0.0, 1.0), (1.0,), (1.0,), 0.0, tau, parameters=("a", "b"))
-        self.made_from(tau=tau)
+        vars(self).update(tau=tau)
 
 
+@dataclass(frozen=True, init=False)
 class Loop(CharacteristicFunction):
     r"""An arm-locking loop, with free parameters (c1, c2).
 
@@ -144,6 +162,12 @@ class Loop(CharacteristicFunction):
     array(0)
     """
 
+    rest: Polynomial = field(init=False, repr=False, compare=False)
+    b1: Polynomial = field(init=False, repr=False, compare=False)
+    b2: Polynomial = field(init=False, repr=False, compare=False)
+    step: float = field(init=False, repr=False, compare=False)
+    parameters: tuple[str, str] = field(init=False, repr=False, compare=False)
+    reference: tuple[float, float] = field(init=False, repr=False, compare=False)
     controller: Controller
     mapping: SignalMapping
 
@@ -187,13 +211,6 @@ class Loop(CharacteristicFunction):
             reference=(1.0, 1.0),
         )
         vars(self).update(controller=k, mapping=m)
-        given = mapping if isinstance(mapping, str) else m
-        delays = {"tau1": tau1} | ({"tau2": tau2} if any(m.numerator2) else {})
-        self.made_from(controller=k, mapping=given, **delays, delay=delay)
-
-    def _identity(self) -> tuple[Any, ...]:
-        """Return what two equal loops have in common: controller and mapping too."""
-        return *super()._identity(), self.controller, self.mapping
 
     @cached_property
     def _basis(self) -> tuple[tuple[Polynomial, ...], FloatArray]:
@@ -203,10 +220,10 @@ class Loop(CharacteristicFunction):
         so in these polynomials, and not in what a walk evaluates.
         """
         k, m = self.controller, self.mapping
-        if not self.b1.any() or not self.b2.any():
+        if not self.b1.coefficients.any() or not self.b2.coefficients.any():
             return super()._basis
-        common = len(k.zeros) + len(m.numerator1) - self.b1.size
-        polynomials, shares = [self.polynomials()[0]], [(1.0, 0.0, 0.0)]
+        common = len(k.zeros) + len(m.numerator1) - self.b1.coefficients.size
+        polynomials, shares = [self.rest], [(1.0, 0.0, 0.0)]
         for sign in (1.0, -1.0):
             both = np.asarray(
                 poly.polyadd(m.numerator1, sign * np.array(m.numerator2)), dtype=np.float64
@@ -235,20 +252,19 @@ class Loop(CharacteristicFunction):
             If s does not hold finite numbers, or holds a pole of K, m1 or m2.
         """
         s = complex_array("s", s)
-        rest, b1, b2 = self.polynomials()
-        for pole in set(rest.roots.tolist()):
+        for pole in set(self.rest.roots.tolist()):
             if (s == pole).any():
                 raise ValueError(
                     f"s must not be a pole of the open loop, got {pole}: a limit there is not "
                     f"computed"
                 )
         dead = np.exp(-s * self.delay)
-        return b1.over(rest, s) * dead, b2.over(rest, s) * dead
+        return self.b1.over(self.rest, s) * dead, self.b2.over(self.rest, s) * dead
 
-    def open_loop(
+    def __call__(
         self, s: npt.ArrayLike, c1: npt.ArrayLike = 1.0, c2: npt.ArrayLike = 1.0
     ) -> ComplexArray:
-        """Evaluate the open loop L(s; c1, c2).
+        """Evaluate the open loop L(s; c1, c2), as python-control does.
 
         Parameters
         ----------
@@ -306,35 +322,23 @@ class Loop(CharacteristicFunction):
 
         omega = axis("omega", positive_array("omega", omega))
         c1, c2 = real_number("c1", c1), real_number("c2", c2)
-        response = self.open_loop(1j * omega, c1, c2)
+        response = self(1j * omega, c1, c2)
         # Its plots need a name.
         return control.frd(response, omega, sysname=type(self).__name__)
 
-    def bode(
-        self,
-        omega: npt.ArrayLike | None = None,
-        c1: float = 1.0,
-        c2: float = 1.0,
-        **options: Any,
-    ) -> tuple[Axes, Axes]:
-        """Draw magnitude and phase of the open loop over frequency.
+    def feedback(self, *_: object, **__: object) -> NoReturn:
+        """Refuse what `control.feedback` asks for: the closed loop has delays too."""
+        raise ValueError(_USE_FRD)
 
-        Parameters
-        ----------
-        omega : array_like of float, optional
-            Angular frequencies in rad/s; by default over all corners of the loop.
-        c1, c2 : float, optional
-            Multiplicative perturbations.
-        **options
-            As `armlock.plotting.plot_bode` takes them, for instance ``margins=True``.
+    # `control.ss` takes what has a call for a nonlinear system. It asks with `hasattr`, which
+    # ends up here; a call itself does not.
+    if not TYPE_CHECKING:
 
-        Returns
-        -------
-        tuple of two matplotlib Axes
-        """
-        from armlock.plotting import plot_bode
-
-        return plot_bode(self, omega, c1, c2, **options)
+        def __getattribute__(self, name: str) -> Any:
+            """Return an attribute, or say what to give to python-control."""
+            if name == "__call__":
+                raise TypeError(_USE_FRD)
+            return super().__getattribute__(name)
 
 
 def _mapping_and_tau2(
@@ -360,21 +364,6 @@ def _mapping_and_tau2(
     if not any(mapping.numerator1) and not any(mapping.numerator2):
         raise ValueError("mapping must not be zero: there would be no loop")
     return mapping, tau2
-
-
-def _actuated(
-    gain: float | None, default: float, controller: Any
-) -> tuple[Controller, dict[str, Any]]:
-    """Return K, gain / s or what stands in its place, and the argument that makes it."""
-    if controller is None:
-        gain = positive_number("gain", default if gain is None else gain)
-        return integrating_actuator(gain), {"gain": gain}
-    if gain is not None:
-        raise ValueError(
-            f"gain must be None where a controller takes the place of gain / s, got {gain}"
-        )
-    own = Controller.of(controller)
-    return own, {"controller": own}
 
 
 def _factored(
@@ -410,7 +399,7 @@ def power_series(
     system: CharacteristicFunction, x: float | Fraction, y: float | Fraction, number: int
 ) -> tuple[list[Fraction], list[Fraction]]:
     """Return the first coefficients of R and of D - R in ascending powers of s, exactly."""
-    rest = [Fraction(value) for value in system.rest.tolist()[:number]]
+    rest = [Fraction(value) for value in system.rest.coefficients.tolist()[:number]]
     rest += [Fraction(0)] * (number - len(rest))
     numerator, dead = [Fraction(0)] * number, -Fraction(system.delay)
     for b, tau, origin, parameter in system.arms(x, y):
@@ -492,13 +481,14 @@ class LoopAt(NamedTuple):
         Exact for the coefficients, delays and parameters as they are given.
         """
         loop, c1, c2 = self
-        rest, numerator = power_series(loop, c1, c2, int(np.flatnonzero(loop.rest)[0]) + 1)
+        lowest = int(np.flatnonzero(loop.rest.coefficients)[0])
+        rest, numerator = power_series(loop, c1, c2, lowest + 1)
         pairs = enumerate(zip(numerator, rest, strict=True))
         return next((k, above, below) for k, (above, below) in pairs if above or below)
 
     def poles_at_zero(self) -> int:
         """Order of the pole of L at s = 0 once numerator and denominator have cancelled."""
-        return int(np.flatnonzero(self.loop.rest)[0]) - self.at_zero()[0]
+        return int(np.flatnonzero(self.loop.rest.coefficients)[0]) - self.at_zero()[0]
 
     def leading_radius(self) -> float:
         """Radius around s = 0 within which L is as simple as it gets, or the last one tried.
@@ -510,7 +500,7 @@ class LoopAt(NamedTuple):
         sizes = np.abs(np.concatenate([p.roots for p in loop.polynomials()]))
         radius = 1e-3 * float(sizes[sizes > 0.0].min(initial=1.0 / loop.longest_delay))
         for _ in range(40):
-            near, nearer = loop.open_loop([radius, 0.5 * radius], self.c1, self.c2)
+            near, nearer = loop([radius, 0.5 * radius], self.c1, self.c2)
             if order:
                 settled = abs(nearer / near - 2.0**order) < 1e-3 and abs(near) > 1e3
             else:
@@ -521,6 +511,7 @@ class LoopAt(NamedTuple):
         return radius
 
 
+@dataclass(frozen=True, init=False)
 class SingleArm(Loop):
     r"""Single-arm locking with an integrating actuator (paper, Secs. II and IV.A).
 
@@ -539,14 +530,11 @@ class SingleArm(Loop):
         Round-trip delay in s.
     delay : float, optional
         Dead time in s, see `Loop`.
-    controller : Controller, python-control system, or (zeros, poles, gain), optional
-        K(s) in place of g / s, see `armlock.Controller.of`. The loop then has no gain.
 
     Raises
     ------
     TypeError, ValueError
-        If gain or tau is not a positive finite number, there are both gain and controller, or
-        as `Loop` does.
+        If gain or tau is not a positive finite number, or as `Loop` does.
 
     Examples
     --------
@@ -555,23 +543,25 @@ class SingleArm(Loop):
     array([ 0, -1,  1])
     """
 
+    controller: Controller = field(init=False, repr=False, compare=False)
+    mapping: SignalMapping = field(init=False, repr=False, compare=False)
+    tau1: float = field(init=False, repr=False, compare=False)
+    tau2: float = field(init=False, repr=False, compare=False)
     gain: float
     tau: float
 
     def __init__(
         self,
-        gain: float | None = None,
+        gain: float = paper.COMMON_ARM_GAIN,
         tau: float = paper.TAU1,
         delay: float = 0.0,
-        *,
-        controller: Any = None,
     ) -> None:
-        k, made = _actuated(gain, paper.COMMON_ARM_GAIN, controller)
-        tau = positive_number("tau", tau)
-        super().__init__(k, sensors.SINGLE, tau, delay=delay)
-        self.made_from(**made, tau=tau, delay=self.delay)
+        gain, tau = positive_number("gain", gain), positive_number("tau", tau)
+        super().__init__(integrating_actuator(gain), sensors.SINGLE, tau, delay=delay)
+        vars(self).update(gain=gain, tau=tau)
 
 
+@dataclass(frozen=True, init=False)
 class CommonArm(Loop):
     r"""Common-arm locking with an integrating actuator (paper, Eq. 4).
 
@@ -589,14 +579,11 @@ class CommonArm(Loop):
         Round-trip delays in s.
     delay : float, optional
         Dead time in s, see `Loop`.
-    controller : Controller, python-control system, or (zeros, poles, gain), optional
-        K(s) in place of g / s, see `armlock.Controller.of`. The loop then has no gain.
 
     Raises
     ------
     TypeError, ValueError
-        If gain or a delay is not a positive finite number, there are both gain and controller,
-        or as `Loop` does.
+        If gain or a delay is not a positive finite number, or as `Loop` does.
 
     Examples
     --------
@@ -605,22 +592,23 @@ class CommonArm(Loop):
     array(0)
     """
 
+    controller: Controller = field(init=False, repr=False, compare=False)
+    mapping: SignalMapping = field(init=False, repr=False, compare=False)
     gain: float
 
     def __init__(
         self,
-        gain: float | None = None,
+        gain: float = paper.COMMON_ARM_GAIN,
         tau1: float = paper.TAU1,
         tau2: float = paper.TAU2,
         delay: float = 0.0,
-        *,
-        controller: Any = None,
     ) -> None:
-        k, made = _actuated(gain, paper.COMMON_ARM_GAIN, controller)
-        super().__init__(k, sensors.COMMON, tau1, tau2, delay)
-        self.made_from(**made, tau1=self.tau1, tau2=self.tau2, delay=self.delay)
+        gain = positive_number("gain", gain)
+        super().__init__(integrating_actuator(gain), sensors.COMMON, tau1, tau2, delay)
+        vars(self).update(gain=gain)
 
 
+@dataclass(frozen=True, init=False)
 class DualArm(Loop):
     r"""Dual-arm locking with an integrating actuator (paper, Sec. III.B).
 
@@ -643,14 +631,12 @@ class DualArm(Loop):
         Sec. III.B. The source of Table I takes half of it.
     delay : float, optional
         Dead time in s, see `Loop`.
-    controller : Controller, python-control system, or (zeros, poles, gain), optional
-        K(s) in place of g / s, see `armlock.Controller.of`. The loop then has no gain.
 
     Raises
     ------
     TypeError, ValueError
-        If gain, corner or a delay is not a positive finite number, the dtau is zero, there are
-        both gain and controller, or as `Loop` does.
+        If gain, corner or a delay is not a positive finite number, the dtau is zero,
+        or as `Loop` does.
 
     Notes
     -----
@@ -671,31 +657,27 @@ class DualArm(Loop):
     array([ 1, -1,  0])
     """
 
+    controller: Controller = field(init=False, repr=False, compare=False)
+    mapping: SignalMapping = field(init=False, repr=False, compare=False)
     gain: float
     corner: float
     difference: float
 
     def __init__(
         self,
-        gain: float | None = None,
+        gain: float = paper.DUAL_ARM_GAIN,
         tau1: float = paper.TAU1,
         tau2: float = paper.TAU2,
         corner: float = paper.DUAL_SENSOR_CORNER,
         *,
         difference: float | None = None,
         delay: float = 0.0,
-        controller: Any = None,
     ) -> None:
-        k, made = _actuated(gain, paper.DUAL_ARM_GAIN, controller)
+        gain = positive_number("gain", gain)
         between = _delay_difference(tau1, tau2, difference)
         mapping = sensors.dual(corner, between)
-        super().__init__(k, mapping, tau1, tau2, delay)
-        vars(self).update(difference=between)
-        # The dtau as it was given: by default it follows the delays.
-        self.made_from(
-            **made, tau1=self.tau1, tau2=self.tau2, corner=float(corner),
-            difference=None if difference is None else between, delay=self.delay,
-        )  # fmt: skip
+        super().__init__(integrating_actuator(gain), mapping, tau1, tau2, delay)
+        vars(self).update(gain=gain, corner=float(corner), difference=between)
 
 
 def paper_loop(

@@ -1,12 +1,11 @@
-"""How results are drawn: the book's style, charts, D-curves, Nyquist curves, Bode plots.
+"""How results are drawn: the book's style, charts, D-curves and Nyquist curves.
 
-Results draw themselves, `chart.plot()` and `loop.bode()`, by the functions here, and import
-this module when they are first drawn.
+Results draw themselves, as `chart.plot()` does, by the functions here, and import this module
+when they are first drawn. python-control draws `loop.frd(omega)`.
 """
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -14,17 +13,14 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib.pyplot as plt
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.projections.polar import PolarAxes
 from scipy import ndimage
 
-from armlock.checks import ComplexArray, FloatArray, IntArray, axis, positive_array
-from armlock.robustness.margins import margins as find_margins
+from armlock.checks import ComplexArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
-    from armlock.loops import Loop
     from armlock.stability.counts import StabilityChart
     from armlock.stability.dcurve import Branch, Line
     from armlock.stability.nyquist import NyquistCurve
@@ -220,7 +216,6 @@ def plot_nyquist(
     omega_max: float = np.inf,
     color: str = BLUE,
     label: str | None = None,
-    margins: bool = False,
     **style: Any,
 ) -> Axes:
     """Draw a Nyquist curve, both signs of omega, with -1 and the infinite branch.
@@ -243,20 +238,12 @@ def plot_nyquist(
         Of the curve.
     label : str, optional
         Name of the curve in a legend; by default its two halves are named by the sign of omega.
-    margins : bool, optional
-        Mark where the upper gain margin and the phase margin are taken, at both signs of omega,
-        and draw the circle around -1 that the modulus margin leaves free.
     **style
         As `matplotlib.axes.Axes.plot` takes it.
 
     Returns
     -------
     Axes
-
-    Raises
-    ------
-    ValueError, CountError
-        As `armlock.margins` does, for the marks.
 
     Examples
     --------
@@ -284,8 +271,6 @@ def plot_nyquist(
         _arrow(ax, forward[index : index + 2], color)
     minus_one = _coordinates(ax, np.array([-1.0 + 0.0j]))
     ax.plot(*minus_one, "+", color="black", markersize=10, markeredgewidth=1.8, zorder=5)
-    if margins:
-        _mark_margins(ax, curve)
     if isinstance(ax, PolarAxes):
         _infinite_branch(ax, curve)
         ax.spines["polar"].set(edgecolor="0.8", linewidth=0.6, zorder=0)
@@ -310,26 +295,6 @@ def _coordinates(ax: Axes, values: ComplexArray) -> tuple[FloatArray, FloatArray
     return values.real, values.imag
 
 
-def _mark_margins(ax: Axes, curve: NyquistCurve) -> None:
-    """Mark the margins in a Nyquist plot, whose curve is drawn for both signs of omega."""
-    found = find_margins(*curve.point)
-    circle = -1.0 + found.modulus * np.exp(2j * np.pi * np.linspace(0.0, 1.0, 361))
-    ax.plot(
-        *_coordinates(ax, circle), "--", color=GREEN, linewidth=1.0,
-        label=f"modulus {found.modulus:.3g}",
-    )  # fmt: skip
-    marks = (
-        (np.isfinite(found.gain_upper), [-1.0 / found.gain_upper], "o",
-         f"gain {found.gain_upper:.3g}"),
-        (np.isfinite(found.phase), -np.exp([1j * found.phase, -1j * found.phase]), "s",
-         f"phase {np.degrees(found.phase):.3g} deg"),
-    )  # fmt: skip
-    for there, values, marker, name in marks:
-        if there:
-            places = _coordinates(ax, np.asarray(values, dtype=np.complex128))
-            ax.plot(*places, marker, color=GREEN, markersize=5, label=name, zorder=4)
-
-
 def _arrow(ax: Axes, values: ComplexArray, color: str) -> None:
     """Draw an arrow head at the second of two values, seen from the first."""
     start, stop = np.transpose(_coordinates(ax, values))
@@ -347,81 +312,3 @@ def _infinite_branch(ax: Axes, curve: NyquistCurve) -> None:
                 *_coordinates(ax, arc), color=ORANGE, linestyle="--", label=name, clip_on=False
             )
             _arrow(ax, arc[arc.size // 2 :][:2], ORANGE)
-
-
-# Bode plots ---------------------------------------------------------------------------------
-
-
-def plot_bode(
-    loop: Loop,
-    omega: npt.ArrayLike | None = None,
-    c1: float = 1.0,
-    c2: float = 1.0,
-    *,
-    margins: bool = False,
-    axes: Sequence[Axes] | None = None,
-    **style: Any,
-) -> tuple[Axes, Axes]:
-    """Draw magnitude and phase of an open loop over frequency.
-
-    Parameters
-    ----------
-    loop : Loop
-        The loop.
-    omega : float array, optional
-        Angular frequencies in rad/s; by default 4000, from a tenth of the lowest to ten times
-        the highest corner of the loop.
-    c1, c2 : float, optional
-        Multiplicative perturbations.
-    margins : bool, optional
-        Mark where the upper gain margin and the phase margin are taken.
-    axes : two Axes, optional
-        For magnitude and phase; new ones in matplotlib's current figure by default.
-    **style
-        As `matplotlib.axes.Axes.plot` takes it.
-
-    Returns
-    -------
-    tuple of two Axes
-        The phase is the principal value, in degrees: between samples it cannot be told how
-        often a delay has turned.
-
-    Raises
-    ------
-    TypeError, ValueError, CountError
-        As `Loop.open_loop` does, and for the marks as `armlock.margins` does.
-
-    Examples
-    --------
-    >>> from armlock import paper_loop
-    >>> magnitude, phase = paper_loop().bode(margins=True)
-    >>> [text.get_text() for text in phase.get_legend().get_texts()]
-    ['phase 36 deg at 2.19e-05 rad/s']
-    """
-    if omega is None:
-        roots = np.abs(np.concatenate([p.roots for p in loop.polynomials()]))
-        corners = np.append(roots[roots > 0.0], [1.0 / loop.longest_delay, loop.omega_per_turn])
-        omega = np.geomspace(0.1 * corners.min(), 10.0 * corners.max(), 4000)
-    shown = axis("omega", positive_array("omega", omega))
-    response = loop.open_loop(1j * shown, c1, c2)
-    upper, lower = plt.gcf().subplots(2, sharex=True) if axes is None else axes
-    style = {"color": BLUE, "linewidth": 1.0, **style}
-    upper.loglog(shown, np.abs(response), **style)
-    lower.semilogx(shown, np.angle(response, deg=True), **style)
-    upper.axhline(1.0, color="0.6", linewidth=0.6)
-    lower.set(xlabel=r"$\omega$ [rad/s]", ylabel=r"$\arg L$ [deg]", yticks=range(-180, 181, 90))
-    upper.set(ylabel=r"$|L|$ [1]")
-    if margins:
-        found = find_margins(loop, c1, c2)
-        for ax, edge, at, name in (
-            (upper, 1.0, found.gain_omega, f"gain {found.gain_upper:.3g}"),
-            (lower, 180.0, found.phase_omega, f"phase {np.degrees(found.phase):.3g} deg"),
-        ):
-            if 0.0 < at < np.inf:
-                there = loop.open_loop(1j * at, c1, c2)
-                value = float(np.abs(there) if ax is upper else np.angle(there, deg=True))
-                ends = [math.copysign(edge, value), value]
-                ax.plot([at, at], ends, color=ORANGE, label=f"{name} at {at:.3g} rad/s")
-                ax.plot(at, value, "o", color=ORANGE, markersize=4)
-                ax.legend()
-    return upper, lower

@@ -99,7 +99,7 @@ def by_grid(samples: int) -> Callable[[Point], int]:
     def count(point: Point) -> int:
         loop, c1, c2 = point
         omega = np.geomspace(1e-4, 1e3, samples)
-        value = loop(1j * omega, c1, c2)
+        value = loop.characteristic(1j * omega, c1, c2)
         turned = np.angle(value[1:] / value[:-1]).sum() + np.angle(value[0] / value[0].real)
         return round(loop.degree / 2 - float(turned) / np.pi)
 

@@ -317,19 +317,19 @@ class Tally:
         if self.patient:
             print(f"{line}\n   of loop {self.where}", flush=True)
 
-    def near(self, name, arguments, got, expected, unsure=False, upward=False, exact=EXACT):
+    def near(self, name, arguments, got, expected, unsure=False, upward=False):
         """Compare a number with the judge's, or with its bound on one side."""
         if unsure:
             self.skipped[f"{name}: one-sided"] += 1
             good = (
-                got >= expected * (1 - exact)
+                got >= expected * (1 - EXACT)
                 if upward
-                else got <= expected * (1 + exact) + 1e-9
+                else got <= expected * (1 + EXACT) + 1e-9
             )
         elif np.isfinite(expected) and np.isfinite(got):
             off = abs(got - expected) / max(abs(expected), 1e-4)
             self.worst[name] = max(self.worst.get(name, 0.0), off)
-            good = off <= exact
+            good = off <= EXACT
         else:
             good = got == expected
         if not good:
@@ -425,12 +425,10 @@ def check_free(tally, rng, sketch, loop, point):
         if found is not None and found.modulus > 1e-9:
             tally.note("margins.modulus, free", (*point, above), found.modulus, 0.0)
         return
-    for name in judge.NAMES[:4] if found is not None else ():
+    for name in judge.NAMES[:3] if found is not None else ():
         unsure = name in verdict.unsure
         got, expected = getattr(found, name), getattr(verdict, name)
-        # `margins` certifies the free disk to less.
-        exact = 1.1e-4 if name == "disk" else EXACT
-        tally.near(f"margins.{name}, free", (*point, above), got, expected, unsure, exact=exact)
+        tally.near(f"margins.{name}, free", (*point, above), got, expected, unsure)
 
 
 def check_rays(tally, rng, sketch, loop, point):

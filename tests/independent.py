@@ -20,8 +20,8 @@ def delayed_terms(system, x, y):
     """What D holds beside A: coefficients and delay of each term."""
     return (
         (system.c, system.delay),
-        (-x * system.b1, system.delay + system.tau1),
-        (-y * system.b2, system.delay + system.tau2),
+        (-x * system.b1.coefficients, system.delay + system.tau1),
+        (-y * system.b2.coefficients, system.delay + system.tau2),
     )
 
 
@@ -48,7 +48,7 @@ def exact(system, s, x, y):
         rest, b1, b2 = 1, gain * first / below, gain * second / below
     else:
         z = mpmath.exp(s * system.step) if system.step else s
-        polynomials = system.rest, system.b1, system.b2
+        polynomials = system.rest.coefficients, system.b1.coefficients, system.b2.coefficients
         rest, b1, b2 = (mpmath.polyval(p.tolist(), z, asc=True) for p in polynomials)
     x0, y0 = system.reference
     arms = b1 * (x0 - x * mpmath.exp(-s * system.tau1))

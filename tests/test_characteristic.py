@@ -1,8 +1,8 @@
 import copy
 import dataclasses
 import pickle
-import pprint
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -37,14 +37,16 @@ frequencies = st.builds(complex, st.floats(-1.0, 1.0), st.floats(-5.0, 5.0))
 def test_value_is_the_definition(system, s, x, y):
     a, b1, b2 = system.parts(s)
     scale = abs(a) + abs(x * b1) + abs(y * b2)
-    assert abs(system(s, x, y) - independent.value(system, s, x, y)) <= 1e-13 * (1.0 + scale)
-    assert abs(system(s, x, y) - (a - x * b1 - y * b2)) <= 1e-13 * (1.0 + scale)
+    found, expected = system.characteristic(s, x, y), independent.value(system, s, x, y)
+    assert abs(found - expected) <= 1e-13 * (1.0 + scale)
+    assert abs(found - (a - x * b1 - y * b2)) <= 1e-13 * (1.0 + scale)
 
 
 @given(st.sampled_from(SYSTEMS), frequencies, reals, reals)
 def test_derivative_agrees_with_a_central_difference(system, s, x, y):
     step = 1e-5
-    difference = (system(s + step, x, y) - system(s - step, x, y)) / (2.0 * step)
+    values = system.characteristic(np.array([s + step, s - step]), x, y)
+    difference = (values[0] - values[1]) / (2.0 * step)
     scale = sum(abs(part) for part in system.parts(s)) * (1.0 + system.longest_delay) ** 3
     assert abs(system.derivative(s, x, y) - difference) <= 1e-8 * (scale + 10.0)
 
@@ -52,14 +54,15 @@ def test_derivative_agrees_with_a_central_difference(system, s, x, y):
 @given(st.sampled_from(SYSTEMS), frequencies, reals, reals, st.floats(-0.5, 0.5))
 def test_shifting_moves_the_argument(system, s, x, y, sigma):
     scale = sum(abs(part) for part in system.parts(s + sigma)) * (1.0 + abs(x) + abs(y))
-    moved = system.shifted(sigma)(s, x, y)
-    assert abs(moved - system(s + sigma, x, y)) <= 1e-12 * (1.0 + scale)
+    moved = system.shifted(sigma).characteristic(s, x, y)
+    assert abs(moved - system.characteristic(s + sigma, x, y)) <= 1e-12 * (1.0 + scale)
 
 
 @given(st.sampled_from(SYSTEMS), frequencies, reals, reals)
 def test_exchanging_swaps_the_parameters(system, s, x, y):
     exchanged = system.exchanged()
-    assert exchanged(s, y, x) == pytest.approx(system(s, x, y), rel=1e-12, abs=1e-12)
+    expected = system.characteristic(s, x, y)
+    assert exchanged.characteristic(s, y, x) == pytest.approx(expected, rel=1e-12, abs=1e-12)
     assert exchanged.parameters == system.parameters[::-1]
 
 
@@ -79,7 +82,7 @@ SYSTEMS_OF_ALL_KINDS = [
     Loop(Controller([-0.02], [0.0, -0.1 + 1j, -0.1 - 1j], 2.0), DIFFERENCE, 20.1, 19.9),
     semi_discretization(CommonArm(tau1=2.0, tau2=1.5), 0.5),
     CommonArm().exchanged(),
-    SingleArm(controller=([-0.1], [0.0, -3.0], 2.0), tau=20.0, delay=20e-6),
+    Loop(([-0.1], [0.0, -3.0], 2.0), "single", 20.0, delay=20e-6),
     Loop(Controller([], [-1e-3] * 5, 1e-14), "dual", 20.1, 19.9),
     Loop(Controller([], [0.0], 1.0), "single", tau1=20.0),
     CharacteristicFunction([1.0, 0.2, 1.0], [1.0], [0.5], 1.0, 2.0, parameters=("k", "d")),
@@ -88,45 +91,41 @@ SYSTEMS_OF_ALL_KINDS = [
 
 @pytest.mark.parametrize("system", SYSTEMS_OF_ALL_KINDS, ids=lambda system: repr(system)[:40])
 def test_a_system_is_a_value(system):
-    """Its representation and copies are equal to it, and none can be changed."""
-    hash(system)  # which is pickled along
+    """Its representation and copies are equal to it, and no field can be changed."""
     made = eval(repr(system), vars(armlock) | {"SignalMapping": SignalMapping})
-    copies = made, copy.deepcopy(system), pickle.loads(pickle.dumps(system)), system.replace()
-    for again in copies:
+    for again in (made, copy.deepcopy(system), pickle.loads(pickle.dumps(system))):
         assert type(again) is type(system)
-        assert repr(again) == repr(system)
         assert (again, hash(again)) == (system, hash(system))
-        assert not again.rest.flags.writeable
-        assert not again.polynomials()[0].roots.flags.writeable
-        assert again(0.1 + 0.3j, 0.9, 1.05) == system(0.1 + 0.3j, 0.9, 1.05)
+        assert again.characteristic(0.3j, 0.9, 1.05) == system.characteristic(0.3j, 0.9, 1.05)
         assert unstable_roots(again, 0.9, 1.05) == unstable_roots(system, 0.9, 1.05)
-        for name in (*vars(system), "anything"):
-            with pytest.raises(AttributeError, match=rf"cannot be changed, got {name} = 3\.0"):
-                setattr(again, name, 3.0)
+    for field in dataclasses.fields(system):
+        with pytest.raises(dataclasses.FrozenInstanceError):
+            setattr(system, field.name, 3.0)
 
 
 def test_one_thing_is_replaced_and_all_else_stays():
     loop = CommonArm(gain=2.0, delay=20e-6)
     assert loop.replace(delay=0.0) == CommonArm(gain=2.0) != loop
     assert margins(loop.replace(delay=0.0), 0.9, 0.9).delay > 0.0
-    assert hash(loop.replace(gain=3.0)) != hash(loop)
-    # `dataclasses.replace` would hold a default fixed that follows the delays.
-    with pytest.raises(AttributeError, match=r"no dataclass.* replace\(delay=...\)"):
-        dataclasses.replace(loop, gain=3.0)  # type: ignore[type-var]
-    assert pprint.pformat(loop) == repr(loop)
+    assert dataclasses.replace(loop, gain=3.0) == loop.replace(gain=3.0) != loop
     if hasattr(copy, "replace"):
         assert copy.replace(loop, gain=3.0) == loop.replace(gain=3.0)
     with pytest.raises(TypeError, match="unexpected keyword argument 'dead_time'"):
         loop.replace(dead_time=0.0)
-    # By default the sensor's dtau follows the delays; one that is given does not.
-    assert DualArm().replace(tau1=21.0) == DualArm(tau1=21.0)
-    assert DualArm(difference=0.4).replace(tau1=21.0).difference == 0.4
+    with pytest.raises((TypeError, ValueError), match="mapping is declared with init=False"):
+        loop.replace(mapping=DIFFERENCE)
+    # The sensor keeps the difference that it divides by.
+    assert DualArm().replace(tau1=21.0) == DualArm(tau1=21.0, difference=DualArm().difference)
+    assert Loop(((), (0.0,), 1.0), "dual", 20.0, 19.0).replace(tau1=30.0).mapping.name == "dual"
     assert Loop(((), (0.0,), 1.0), "single", 20.0).replace(tau1=30.0).tau2 == 30.0
+    # Polynomials keep roots that are known.
+    plain = paper_loop().plain()
+    assert plain.replace(tau1=21.0).rest.roots.tolist() == plain.rest.roots.tolist()
     # Two loops of one D are not one loop: what is simulated are controller and sensor.
     low_pass = SignalMapping([1.0], [0.0], [1.0, 1.0], "low pass")
     one = Loop(((), (0.0, -1.0), 1.0), "single", 20.0)
     other = Loop(((), (0.0,), 1.0), low_pass, 20.0)
-    assert (one.rest == other.rest).all()
+    assert one.rest == other.rest
     assert one != other
     assert one.plain() == other.plain()
 
@@ -143,7 +142,7 @@ def test_the_perturbations_of_a_loop_are_one_by_default():
     loop = DualArm(gain=3.0)
     for made in (loop, loop.replace(delay=1e-3), loop.shifted(-1e-3), loop.exchanged()):
         assert unstable_roots(made, y=0.999) == unstable_roots(made, 1.0, 0.999)
-        assert made(0.1j) == made(0.1j, 1.0, 1.0)
+        assert made.characteristic(0.1j) == made.characteristic(0.1j, 1.0, 1.0)
     assert rightmost_root(paper_loop()) == rightmost_root(paper_loop(), 1.0, 1.0)
     for name, arguments in (("a", {"y": -1.0}), ("b", {"x": -1.0})):
         with pytest.raises(TypeError, match=f"^{name} must be given"):

@@ -51,8 +51,8 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     stage_one: {"gain": 1.0},
     table_two: {"gain": 1.0, "denominator": "table"},
     COMMON.weights: {"s": 1j},
-    ARMS: {"s": 1j} | AT,
-    ARMS.open_loop: {"s": 1j} | POINT,
+    ARMS: {"s": 1j} | POINT,
+    ARMS.characteristic: {"s": 1j} | AT,
     ARMS.derivative: {"s": 1j} | AT,
     ARMS.shifted: {"sigma": 0.1},
     ARMS.chain_reserve: AT,
@@ -202,7 +202,7 @@ def test_what_breaks_a_constraint_is_refused_with_it(function, name, value, cons
         function(**CALLS[function] | {name: value})
 
 
-@pytest.mark.parametrize("function", [ARMS, armlock.unstable_roots])
+@pytest.mark.parametrize("function", [ARMS.characteristic, armlock.unstable_roots])
 def test_arrays_broadcast_to_one_shape_or_are_refused(function):
     points = {"x": [1.0, 2.0], "y": [1.0, 2.0, 3.0]}
     with pytest.raises(ValueError, match=r"c1 and c2 must broadcast together, got shapes "):

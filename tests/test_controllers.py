@@ -36,9 +36,9 @@ def test_all_forms_give_one_loop(zeros, poles, gain):
     ]
     loops = [Loop(form, COMMON, 2.1, 1.9) for form in forms]
     x, y = np.meshgrid([0.5, 0.9, 1.2], [0.3, 0.95, 1.1])
-    expected = loops[0].open_loop(S[2:], 0.9, 1.1)
+    expected = loops[0](S[2:], 0.9, 1.1)
     for loop in loops:
-        np.testing.assert_allclose(loop.open_loop(S[2:], 0.9, 1.1), expected, rtol=1e-12)
+        np.testing.assert_allclose(loop(S[2:], 0.9, 1.1), expected, rtol=1e-12)
         np.testing.assert_array_equal(
             unstable_roots(loop, x, y), unstable_roots(loops[0], x, y)
         )

@@ -14,7 +14,6 @@ from armlock import (
     CountError,
     DualArm,
     Loop,
-    SingleArm,
     axis_crossings,
     critical_perturbation,
     margins,
@@ -137,7 +136,7 @@ def test_a_factor_before_the_equation_moves_no_crossing():
 
 def test_an_arm_that_is_not_used_changes_no_crossing():
     """The polynomial zero stands for it, also where s cancels along the ray."""
-    loop = SingleArm(controller=Controller([0.0, 0.0], [-1.0, -2.0, -3.0], 30.0))
+    loop = Loop(Controller([0.0, 0.0], [-1.0, -2.0, -3.0], 30.0), "single", 20.1)
     ways = (1.0, 2.0), (1.0, 0.0)
     found, expected = (first_crossing(loop, (1.0, 1.0), way) for way in ways)
     assert found == expected

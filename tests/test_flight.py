@@ -22,7 +22,7 @@ def test_the_open_loop_has_its_digits_over_thirteen_decades(table):
         frequency, c1, c2, delay, real, imaginary = map(float, row.values())
         if frequency == 1e5:  # a null, of which rounding of omega tau leaves no digits
             continue
-        found = flight_loop(delay=delay).open_loop(2j * np.pi * frequency, c1, c2)
+        found = flight_loop(delay=delay)(2j * np.pi * frequency, c1, c2)
         expected = complex(real, imaginary)
         # Next to zero both arms cancel; the phase of an arm is known to rounding of omega tau.
         bound = 1e-12 + 1e-7 * abs(c1 - 1.0) + 3e-14 * frequency

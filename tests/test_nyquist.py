@@ -160,14 +160,14 @@ def test_a_loop_that_is_not_well_posed_is_refused(mapping, gain):
 def test_no_crossing_is_missed_and_none_is_invented(loop, c1, c2, end):
     crossings = axis_crossings(loop, c1, c2, omega_max=end)
     omega = np.concatenate((np.geomspace(1e-9, 0.02, 40_000), np.linspace(0.02, end, 900_000)))
-    imaginary = np.imag(loop.open_loop(1j * omega, c1, c2))
+    imaginary = np.imag(loop(1j * omega, c1, c2))
     places = np.flatnonzero(imaginary[1:] * imaginary[:-1] < 0.0)
     middle = 0.5 * (omega[places] + omega[places + 1])
     step = omega[places + 1] - omega[places]
-    negative = np.real(loop.open_loop(1j * middle, c1, c2)) < 0.0
+    negative = np.real(loop(1j * middle, c1, c2)) < 0.0
     assert crossings.omega.size == negative.sum() > 0
     assert (np.abs(crossings.omega - middle[negative]) <= step[negative]).all()
-    value = loop.open_loop(1j * crossings.omega, c1, c2)
+    value = loop(1j * crossings.omega, c1, c2)
     assert (np.abs(value.imag) <= 1e-9 * (np.abs(value) + np.abs(1e-3 / crossings.omega))).all()
     np.testing.assert_array_equal(value.real, crossings.value)
 

@@ -10,7 +10,6 @@ from armlock import (
     SingleArm,
     d_curve_branches,
     d_curve_line,
-    margins,
     nyquist,
     paper_loop,
     plotting,
@@ -107,31 +106,10 @@ def test_a_curve_can_be_drawn_in_part_and_under_a_name(ax):
     assert ax.get_legend_handles_labels()[1] == ["part"]
 
 
-def test_margins_are_marked_where_they_are_taken(ax):
-    loop = paper_loop()
-    found = margins(loop)
-    curve = nyquist(loop, omega_max=1e-3)
-    curve.plot(ax, margins=True, linestyle=":")
-    assert ax.lines[0].get_linestyle() == ":"
-    gain, phase = (line for line in ax.lines if line.get_marker() in ("o", "s"))
-    assert gain.get_xdata() == pytest.approx([loop.open_loop(1j * found.gain_omega).real])
-    crossing = complex(loop.open_loop(1j * found.phase_omega))
-    assert min(abs(crossing - complex(*z)) for z in phase.get_xydata()) < 1e-9
-    figure = plt.figure()
-    upper, lower = loop.bode([1e-6, 1e-3], margins=True, axes=figure.subplots(2), color="red")
-    assert upper.lines[0].get_color() == "red"
-    assert upper.lines[-1].get_ydata() == pytest.approx([abs(gain.get_xdata()[0])])
-    turned = np.degrees(found.phase)
-    assert lower.lines[-1].get_ydata() == pytest.approx([180.0 - turned])
-    with pytest.raises(ValueError, match="stable"):
-        SingleArm().bode(c1=1.5, margins=True)
-    plt.close("all")
-
-
 def test_the_open_loop_goes_to_python_control_with_exact_delays():
     loop, omega = paper_loop(delay=1e-3), np.array([0.01, 0.3])
     response = loop.frd(omega, 0.9, 1.1)
-    np.testing.assert_array_equal(response(1j * omega), loop.open_loop(1j * omega, 0.9, 1.1))
+    np.testing.assert_array_equal(response(1j * omega), loop(1j * omega, 0.9, 1.1))
     control.bode_plot([response, SingleArm().frd(omega)])
     plt.close("all")
 

@@ -95,7 +95,7 @@ def test_impulse_response_is_the_closed_form(name):
 def test_sampled_loop_tends_to_the_continuous_one():
     loop = paper_loop()
     omega = np.geomspace(1e-4, 2.0 * np.pi, 80)
-    exact = loop.open_loop(1j * omega, 1.0, 1.0 - 1e-6)
+    exact = loop(1j * omega, 1.0, 1.0 - 1e-6)
     closed = [
         np.abs(sampled_open_loop(loop, omega, 1.0, 1.0 - 1e-6, rate) / exact - 1.0).max()
         for rate in (100.0, 200.0)
@@ -229,7 +229,7 @@ def test_a_dead_time_below_the_step_comes_with_the_ways_out():
         Simulation(loop, 20.0)
     without, at = loop.replace(delay=0.0), 2j * np.pi * 10.0
     assert Simulation(without, 20.0).advance(np.ones(3)).shape == (3,)
-    turned = np.angle(without.open_loop(at) / loop.open_loop(at))
+    turned = np.angle(without(at) / loop(at))
     assert turned == pytest.approx(0.00126, abs=5e-6)
 
 

@@ -151,7 +151,7 @@ class TestOtherLoops:
     @pytest.mark.parametrize("name", NEUTRAL)
     def test_a_neutral_chain_that_is_not_confined_has_no_count(self, name):
         system = NEUTRAL[name]
-        polynomials = system.b1, system.b2, system.c
+        polynomials = system.b1.coefficients, system.b2.coefficients, system.c
         leads = [abs(p[-1]) if p.size == system.a.size else 0.0 for p in polynomials]
         room = abs(system.a[-1]) - leads.pop()
         x, y = np.random.default_rng(2).uniform(-3.0, 3.0, (2, 200))

@@ -160,12 +160,12 @@ SCRIPT = """
 
     def at_points(point):
         print("called")
-        return abs(LOOP.open_loop(1j * point.half))
+        return abs(LOOP(1j * point.half))
 
     def function(omega):
         print("called")
         known = "one" in NAMES or omega in {{"four", "five"}}
-        return compiled(abs(LOOP.open_loop(1j * omega)))
+        return compiled(abs(LOOP(1j * omega)))
 
     for swept, points, store in (
         (at_points, [Point(x / 7) for x in range(1, 4)], "points.h5"),

@@ -60,6 +60,21 @@ class Polynomial(NamedTuple):
     leads: tuple[float, ...] = ()
     missed: float = 0.0
 
+    def __eq__(self, other: object) -> bool:
+        """Whether coefficients and roots are equal."""
+        return isinstance(other, Polynomial) and self._numbers() == other._numbers()
+
+    def __hash__(self) -> int:
+        """Return a number that equal ones share."""
+        return hash(self._numbers())
+
+    def __repr__(self) -> str:
+        """List the coefficients."""
+        return repr(self.coefficients.tolist())
+
+    def _numbers(self) -> tuple[complex, ...]:
+        return *self.coefficients.tolist(), *self.roots.tolist()
+
     @classmethod
     def of(cls, coefficients: FloatArray, guess: ComplexArray | None = None) -> Polynomial:
         """Return the polynomial with these coefficients, and roots that are found.

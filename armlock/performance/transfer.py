@@ -79,7 +79,7 @@ def responses(
     -------
     dict of str to complex array, of the broadcast shape
     """
-    sensitivity = 1.0 / (1.0 + checked_loop(loop).open_loop(s, c1, c2))
+    sensitivity = 1.0 / (1.0 + checked_loop(loop)(s, c1, c2))
     first, second = loop.arm_responses(s)
     errors = {
         "arm 1": first,

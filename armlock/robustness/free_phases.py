@@ -42,10 +42,8 @@ def polynomial_sum(p: FloatArray, q: FloatArray) -> FloatArray:
 
 def limit_responses(loop: Loop) -> tuple[float, float]:
     """Return the responses to both arms at high frequency, dead time left out."""
-    first, second = (
-        float(b[-1] / loop.rest[-1]) if b.size == loop.rest.size else 0.0
-        for b in (loop.b1, loop.b2)
-    )
+    rest, *arms = (p.coefficients for p in loop.polynomials())
+    first, second = (float(b[-1] / rest[-1]) if b.size == rest.size else 0.0 for b in arms)
     return first, second
 
 
@@ -106,9 +104,10 @@ def arm_weights(point: LoopAt) -> FloatArray:
     |c1 + ratio c2| and 0.
     """
     loop, c1, c2 = point
-    if loop.tau1 == loop.tau2 and loop.b1.any():
-        ratio = float(loop.b2[-1] / loop.b1[-1])
-        if np.array_equal(loop.b2, ratio * loop.b1):
+    b1, b2 = loop.b1.coefficients, loop.b2.coefficients
+    if loop.tau1 == loop.tau2 and b1.any():
+        ratio = float(b2[-1] / b1[-1])
+        if np.array_equal(b2, ratio * b1):
             return np.array([abs(c1 + c2 * ratio), 0.0])
     return np.array([abs(c1), abs(c2)])
 
@@ -120,8 +119,9 @@ def clear_from(loop: Loop, weights: FloatArray, centre: float, radius: float) ->
     |B1 + B2 - centre R| exceeds radius |R| + |c1 B1| + |c2 B2|. With a dead time B1 + B2 may
     have any phase, too: then |centre R| has to exceed that and |B1 + B2|.
     """
-    first, c = -centre * loop.rest, polynomial_sum(loop.b1, loop.b2)
-    others, factors = (loop.rest, loop.b1, loop.b2), [radius, *weights]
+    rest, b1, b2 = (p.coefficients for p in loop.polynomials())
+    first, c = -centre * rest, polynomial_sum(b1, b2)
+    others, factors = (rest, b1, b2), [radius, *weights]
     if loop.delay:
         return last_larger(first, (*others, c), np.array([*factors, 1.0]))
     return last_larger(polynomial_sum(first, c), others, np.array(factors))
@@ -132,8 +132,9 @@ def last_crossover(loop: Loop, weights: FloatArray, gain: float = 1.0) -> float:
 
     `weights` are those of `arm_weights`.
     """
-    c = polynomial_sum(loop.b1, loop.b2)
-    return last_larger(loop.rest, (c, loop.b1, loop.b2), gain * np.array([1.0, *weights]))
+    rest, b1, b2 = (p.coefficients for p in loop.polynomials())
+    c = polynomial_sum(b1, b2)
+    return last_larger(rest, (c, b1, b2), gain * np.array([1.0, *weights]))
 
 
 def no_smaller_from(loop: Loop, weights: FloatArray, levels: FloatArray) -> float:

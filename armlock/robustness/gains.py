@@ -61,13 +61,14 @@ def _no_crossing_from(point: LoopAt, low: float, high: float) -> float:
     interval, it is smallest there; if it descends at the upper end, there.
     """
     loop, weights = point.loop, arm_weights(point)
-    c = polynomial_sum(loop.b1, loop.b2)
+    rest, b1, b2 = (p.coefficients for p in loop.polynomials())
+    c = polynomial_sum(b1, b2)
     found = [last_crossover(loop, weights, high)]
     if not loop.delay:
         for t, sign in ((1.0 / high, 1.0), (1.0 / low, -1.0)):
-            ascends = math.sqrt(last_root_bound(_ascent(loop.rest, c, t, sign)))
-            first = polynomial_sum(t * loop.rest, c)
-            found.append(max(ascends, last_larger(first, (loop.b1, loop.b2), weights)))
+            ascends = math.sqrt(last_root_bound(_ascent(rest, c, t, sign)))
+            first = polynomial_sum(t * rest, c)
+            found.append(max(ascends, last_larger(first, (b1, b2), weights)))
     return min(found)
 
 

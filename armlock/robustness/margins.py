@@ -31,8 +31,7 @@ from armlock.robustness.rays import FARTHEST, Ray
 from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError
 
 # Relative accuracy with free phases, in the order of
-# `armlock.robustness.discs.free_margins_at`. The disk margin may be flat over decades of
-# frequency, where a finer one would take too long.
+# `armlock.robustness.discs.free_margins_at`.
 _FREE_TOLERANCES = np.array([1e-5, 1e-4, 1e-5, 1e-5])
 # So close to (1, 1), relative, a loop is as stable as next to it.
 _NEXT_TO_START = 1e-9
@@ -50,8 +49,7 @@ class Margins:
         \text{phase} &= \min_{|L| = 1} |\arg(-L)| , \quad -\pi < \arg \le \pi , \\
         \text{delay} &= \min_{|L| = 1} \frac{\arg(-L)}{\omega} ,
         \quad 0 \le \arg < 2\pi , \\
-        \text{modulus} &= \inf_\omega |1 + L| , \\
-        \text{disk} &= 2 \min \left( 1, \inf_\omega \frac{|1 + L|}{|1 - L|} \right)
+        \text{modulus} &= \inf_\omega |1 + L| ,
 
     with L at s = j omega.
 
@@ -70,9 +68,6 @@ class Margins:
         at high frequency.
     modulus : float
         Smallest |1 + L|.
-    disk : float
-        Symmetric disk margin: 2 min |1 + L| / |1 - L|. At most 2, where no gain factor and no
-        turn up to 90 degrees makes the loop unstable.
     gain_omega, phase_omega, modulus_omega : float
         Where the upper gain margin, the phase margin and the modulus margin are taken, in
         rad/s; inf where it is the limit at high frequency, nan where there is none.
@@ -92,7 +87,6 @@ class Margins:
     phase: float
     delay: float
     modulus: float
-    disk: float
     gain_omega: float
     phase_omega: float
     modulus_omega: float
@@ -134,7 +128,7 @@ def modulus_margin(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> float:
     >>> print(f"{modulus_margin(paper_loop()):.4f}")
     0.6156
     """
-    (modulus, _), _ = smallest_distances(LoopAt.of(loop, c1, c2), disk=False)
+    (modulus, _), _ = smallest_distances(LoopAt.of(loop, c1, c2))
     return float(modulus)
 
 
@@ -217,10 +211,10 @@ def margins(
         \le |K| \left( |c_1 m_1| + |c_2 m_2| \right) .
 
     The distances from -1 of this disc, and of its share of the unit circle, are known in
-    closed form at each frequency; their minima over frequency are certified to 1e-5, the disk
-    margin to 1e-4. Where the disc only touches the unit circle, phase and delay may be those
-    of a disc that is larger by a part in 1e9. A disc that holds -1 has margins of zero. A gain
-    interval is not given: the edge of such a disc may run along the real axis.
+    closed form at each frequency; their minima over frequency are certified to 1e-5. Where the
+    disc only touches the unit circle, phase and delay may be those of a disc that is larger by
+    a part in 1e9. A disc that holds -1 has margins of zero. A gain interval is not given: the
+    edge of such a disc may run along the real axis.
     With equal weights m and c1 = c2 = 1 the disc has the centre 2 K m exp(-s delay), and a
     radius of the same magnitude: it stays clear of -1, for arms of any lengths, where
     Re [K m exp(-s delay)] > -1/4.
@@ -235,26 +229,26 @@ def margins(
     point = LoopAt.of(loop, c1, c2)
     highest = np.inf if free_above is None else positive_number("free_above", free_above)
     require_stable(point, highest)
-    (modulus, ratio), (modulus_omega, _) = smallest_distances(point, disk=True, highest=highest)
+    (modulus, _), (modulus_omega, _) = smallest_distances(point, highest=highest)
     phase, delay, phase_omega = phase_and_delay(point, highest)
     if free_above is None:
         lower, upper, gain_omega = gain_interval_of_stable(point)
     else:
         lower, upper, gain_omega = np.nan, np.nan, np.nan
-        known = np.array([modulus, ratio, phase, delay])
+        # No smallest |1 + L| / |1 - L| is asked for.
+        known = np.array([modulus, 0.0, phase, delay])
         free, where = _free_margins(point, highest, known)
         if free[discs.MODULUS] < modulus:
             modulus, modulus_omega = free[discs.MODULUS], where[discs.MODULUS]
         if free[discs.PHASE] < phase:
             phase, phase_omega = free[discs.PHASE], where[discs.PHASE]
-        ratio, delay = min(ratio, free[discs.RATIO]), min(delay, free[discs.DELAY])
+        delay = min(delay, free[discs.DELAY])
     return Margins(
         gain_lower=lower,
         gain_upper=upper,
         phase=float(phase),
         delay=float(delay),
         modulus=float(modulus),
-        disk=2.0 * float(ratio),
         gain_omega=gain_omega,
         phase_omega=float(phase_omega),
         modulus_omega=float(modulus_omega),

@@ -40,7 +40,7 @@ from armlock.robustness.free_phases import (
     unconfined,
 )
 
-#: Relative accuracy of the smallest distances, and so of modulus and disk margins.
+#: Relative accuracy of the smallest distances, and so of the modulus margin.
 TOLERANCE = 1e-6
 
 
@@ -202,16 +202,15 @@ def _walk(
 
 
 def smallest_distances(
-    point: LoopAt, *, disk: bool, highest: float = np.inf
+    point: LoopAt, *, highest: float = np.inf
 ) -> tuple[FloatArray, FloatArray]:
-    """Smallest |1 + L| and |1 + L| / |1 - L| up to a frequency, the limit included; and where.
+    """Smallest |1 + L| up to a frequency, the limit included, beside a zero; and where.
 
-    `highest` and the places are in rad/s, a place is inf for the limit at high frequency. The
-    second distance is one if no smaller one occurs, and zero unless `disk` asks for it.
+    `highest` and the places are in rad/s, a place is inf for the limit at high frequency.
     """
     loop, weights = point.loop, arm_weights(point)
     best = limit_margins(point)[:2]
-    best[discs.RATIO] = min(best[discs.RATIO], 1.0) if disk else 0.0
+    best[discs.RATIO] = 0.0
     where = np.full(2, np.inf)
 
     def end() -> float:

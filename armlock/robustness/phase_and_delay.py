@@ -194,15 +194,16 @@ def _settled_from(point: LoopAt, phase: float) -> float:
     slack = 1e-3
     while phase_within(slack) < (1.0 - TOLERANCE) * phase and slack > 1e-12:
         slack *= 0.1
+    rest, *arms = (p.coefficients for p in loop.polynomials())
     left = [
-        polynomial_sum(b, -limit * loop.rest)
-        for b, limit in zip((loop.b1, loop.b2), limit_responses(loop), strict=True)
+        polynomial_sum(b, -limit * rest)
+        for b, limit in zip(arms, limit_responses(loop), strict=True)
     ]
     for remainder in left:
         # The highest power cancels.
-        remainder[loop.rest.size - 1 :] = 0.0
+        remainder[rest.size - 1 :] = 0.0
     weights = 1.0 + np.abs([c1, c2])
-    return last_larger(loop.rest, (left[0], left[1]), weights / slack)
+    return last_larger(rest, (left[0], left[1]), weights / slack)
 
 
 def phase_and_delay(point: LoopAt, highest: float) -> tuple[float, float, float]:

@@ -142,9 +142,10 @@ class Ray:
     def acts(self) -> bool:
         """Whether D changes along the ray."""
         system, (d1, d2) = self.system, self.direction
+        moved1, moved2 = d1 * system.b1.coefficients, d2 * system.b2.coefficients
         if system.tau1 != system.tau2:
-            return bool((d1 * system.b1).any() or (d2 * system.b2).any())
-        return bool(poly.polyadd(d1 * system.b1, d2 * system.b2).any())
+            return bool(moved1.any() or moved2.any())
+        return bool(poly.polyadd(moved1, moved2).any())
 
     def quotient(self, omega: npt.ArrayLike) -> ComplexArray:
         """D0 / M at s = j omega, shaped like `omega`; nan where M vanishes."""
@@ -162,7 +163,7 @@ class Ray:
 
             `between` is u2 - u1, the sum of both polynomials is made from their coefficients.
             """
-            both = poly.polyadd(w1 * system.b1, w2 * system.b2)
+            both = poly.polyadd(w1 * system.b1.coefficients, w2 * system.b2.coefficients)
             size = poly.polyval(np.abs(z), np.abs(both)) * np.abs(u1)
             separate = np.abs(w1 * b1 * u1) + np.abs(w2 * b2 * u2)
             together = poly.polyval(z, both) * u1 + w2 * b2 * between
@@ -277,7 +278,7 @@ class Ray:
     @cached_property
     def _terms_at_zero(self) -> tuple[list[Fraction], list[Fraction]]:
         """p_k and q_k of D(s; t) = sum_k (p_k + t q_k) s^k, up to one past the first of R."""
-        number = int(np.flatnonzero(self.system.rest)[0]) + 2
+        number = int(np.flatnonzero(self.system.rest.coefficients)[0]) + 2
         begin = [Fraction(value) for value in self.start.tolist()]
         end = [a + Fraction(d) for a, d in zip(begin, self.direction.tolist(), strict=True)]
         here, there = (

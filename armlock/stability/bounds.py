@@ -181,7 +181,8 @@ def _last_frequencies(
 @lru_cache(maxsize=64)
 def _squares(system: CharacteristicFunction) -> tuple[FloatArray, float]:
     """Return the `_squared_magnitudes` of A, B1, B2 and C."""
-    return _squared_magnitudes((system.a, system.b1, system.b2, system.c))
+    b1, b2 = system.b1.coefficients, system.b2.coefficients
+    return _squared_magnitudes((system.a, b1, b2, system.c))
 
 
 def last_frequency(

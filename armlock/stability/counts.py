@@ -235,7 +235,7 @@ def walk_begins(
     """
     number = loop.degree + 21
     # No more factors cancel than R has, unless R is zero.
-    most = int(np.append(np.flatnonzero(loop.rest), number - 1)[0])
+    most = int(np.append(np.flatnonzero(loop.rest.coefficients), number - 1)[0])
     both = zip(*power_series(loop, c1, c2, most + 1), strict=True)
     shared = next((k for k, pair in enumerate(both) if any(pair)), 0)
     if shared == 0:
@@ -246,9 +246,10 @@ def walk_begins(
     if first == 0:
         return None
     unit = Fraction(longest)
+    arms = loop.b1.coefficients, loop.b2.coefficients
     past = sum(
         abs(Fraction(value)) / unit**i * (abs(Fraction(origin)) + abs(Fraction(c)))
-        for b, c, origin in zip((loop.b1, loop.b2), (c1, c2), loop.reference, strict=True)
+        for b, c, origin in zip(arms, (c1, c2), loop.reference, strict=True)
         for i, value in enumerate(b.tolist())
     )
     # Below 1 / T an exponential's terms add up to less than e in all.
@@ -447,7 +448,7 @@ def stability_chart(
         charts = sweep(partial(stability_chart, system, xs), tiles, executor=executor)
         return StabilityChart(system, xs, ys, np.vstack([chart.counts for chart in charts]))
     order_x, order_y = np.argsort(xs, kind="stable"), np.argsort(ys, kind="stable")
-    if system.b1.any():
+    if system.b1.coefficients.any():
         counts = _chart_rows(system, xs[order_x], ys[order_y])
     else:
         # Without B1 nothing crosses along a row: walk along the columns instead.
@@ -471,7 +472,7 @@ def _chart_rows(system: CharacteristicFunction, x: FloatArray, y: FloatArray) ->
             ends_at = inside + 0.5 * system.chain_reserve(inside, y) / b1
             lower, upper = np.maximum(lower, -ends_at), np.minimum(upper, ends_at)
         base, top = _count(system, lower, y), _count(system, upper, y)
-    elif system.b2.any():
+    elif system.b2.coefficients.any():
         sides = np.array([left, right])
         at_low, at_high = (_count(system, sides, np.full(2, at)) for at in (low, high))
         columns, doubtful, reached = _fill(

@@ -46,17 +46,16 @@ class Branch(NamedTuple):
 
 def _require_two_parameters(system: CharacteristicFunction) -> None:
     """Raise if D(j omega) = 0 does not determine both free parameters."""
-    for name, b in zip(system.parameters, (system.b1, system.b2), strict=True):
+    b1, b2 = system.b1.coefficients, system.b2.coefficients
+    for name, b in zip(system.parameters, (b1, b2), strict=True):
         if not b.any():
             raise ValueError(
                 f"system must depend on both free parameters, but {system!r} does not "
                 f"depend on {name}: there is no D-curve"
             )
     if system.tau1 == system.tau2:
-        ratio = system.b1[-1] / system.b2[-1]
-        if system.b1.size == system.b2.size and np.allclose(
-            system.b1, ratio * system.b2, rtol=4 * EPSILON, atol=0.0
-        ):
+        ratio = b1[-1] / b2[-1]
+        if b1.size == b2.size and np.allclose(b1, ratio * b2, rtol=4 * EPSILON, atol=0.0):
             raise ValueError(
                 f"tau1 and tau2 must differ, got {system.tau1} for both: only one "
                 f"combination of {' and '.join(system.parameters)} enters, and the D-curve "

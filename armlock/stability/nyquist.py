@@ -206,7 +206,7 @@ def _turn_beyond(loop: Loop, last: complex, end: float) -> float:
     are known from their roots. The two are of one degree, and turn alike along the arc.
     """
     gathered = argument_at(loop.polynomials()[0].roots, end) - argument_at(loop.roots_of_a, end)
-    ratio = loop.a[-1] / loop.rest[-1] * np.exp(-1j * gathered)
+    ratio = loop.a[-1] / loop.rest.coefficients[-1] * np.exp(-1j * gathered)
     return float(gathered - np.angle(last / ratio))
 
 
@@ -274,7 +274,7 @@ def nyquist(
     grid = _resolving_grid(loop, c1, c2, end)
     omega = np.concatenate(([radius], grid[(grid > radius) & (grid < end)], [end]))
     arc = radius * np.exp(0.5j * np.pi * np.linspace(0.0, 1.0, 64))
-    contour = loop.open_loop(np.concatenate((arc[:-1], 1j * omega)), c1, c2)
+    contour = loop(np.concatenate((arc[:-1], 1j * omega)), c1, c2)
     turned = np.angle((1.0 + contour[1:]) / (1.0 + contour[:-1]))
     if np.abs(turned).max() > _MOST_TURN:
         raise refused("the curve passes through -1")
@@ -297,7 +297,7 @@ def nyquist(
         every = np.concatenate((omega, more))
         order_of = np.argsort(every, kind="stable")
         omega = every[order_of]
-        response = np.concatenate((response, loop.open_loop(1j * more, c1, c2)))[order_of]
+        response = np.concatenate((response, loop(1j * more, c1, c2)))[order_of]
     if omega.size > _MOST_SHOWN:
         shown = _shown(response)
         omega, response = omega[shown], response[shown]
@@ -365,7 +365,8 @@ def axis_crossings(
     open_loop_poles(loop)
     if omega_max is None:
         factors = np.array([1.0 + abs(c1), 1.0 + abs(c2)]) / _SMALL
-        omega_max = last_larger(loop.rest, (loop.b1, loop.b2), factors)
+        rest, *arms = (p.coefficients for p in loop.polynomials())
+        omega_max = last_larger(rest, (arms[0], arms[1]), factors)
         if not np.isfinite(omega_max):
             raise ValueError(
                 "omega_max must be given for a loop whose |L| does not fall to zero at high "

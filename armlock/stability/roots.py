@@ -168,15 +168,16 @@ def _acting(
     Their exponentials may be no floats, and zero times infinity is no number.
     """
     values, delays = [x, y], [system.tau1, system.tau2]
-    if delays[0] == delays[1] and not poly.polyadd(x * system.b1, y * system.b2).any():
+    b1, b2 = system.b1.coefficients, system.b2.coefficients
+    if delays[0] == delays[1] and not poly.polyadd(x * b1, y * b2).any():
         values = [0.0, 0.0]
-    for k, b in enumerate((system.b1, system.b2)):
+    for k, b in enumerate((b1, b2)):
         if not b.any() or sigma * delays[k] > _VANISHED:
             values[k] = 0.0
     acting = [delay for delay, value in zip(delays, values, strict=True) if value]
     if not any(acting) and not system.delay:
-        left = poly.polysub(system.a, values[0] * system.b1)
-        left = poly.polysub(left, values[1] * system.b2)
+        left = poly.polysub(system.a, values[0] * b1)
+        left = poly.polysub(left, values[1] * b2)
         nothing, values = [0.0], [0.0, 0.0]
         none = {"b1": nothing, "b2": nothing, "tau1": 0.0, "tau2": 0.0}
         system = system.plain().replace(rest=left, **none)

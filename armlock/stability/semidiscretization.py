@@ -93,8 +93,8 @@ def realize(
     terms = []
     for weight, b, delay in (
         (-1.0, system.c, system.delay),
-        (x, system.b1, system.delay + system.tau1),
-        (y, system.b2, system.delay + system.tau2),
+        (x, system.b1.coefficients, system.delay + system.tau1),
+        (y, system.b2.coefficients, system.delay + system.tau2),
     ):
         padded = np.zeros_like(undelayed)
         padded[: b.size] = weight * b
@@ -328,7 +328,8 @@ def _delayed_only(
     """Return system and parameters with what is not delayed as a part of A."""
     for k, tau in enumerate((system.tau1, system.tau2)):
         if system.delay + tau == 0.0:
-            left = poly.polysub(system.a, (x, y)[k] * (system.b1, system.b2)[k])
+            b = (system.b1, system.b2)[k].coefficients
+            left = poly.polysub(system.a, (x, y)[k] * b)
             # Before a term of zero any delay will do.
             none = {f"b{k + 1}": [0.0], f"tau{k + 1}": system.longest_delay or 1.0}
             system = system.plain().replace(rest=left, reference=(0.0, 0.0), **none)

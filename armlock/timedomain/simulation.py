@@ -385,7 +385,7 @@ def sampled_open_loop(
     >>> import numpy as np
     >>> from armlock import paper_loop, sampled_open_loop
     >>> loop, omega = paper_loop(), np.array([0.01])
-    >>> bool(np.allclose(sampled_open_loop(loop, omega), loop.open_loop(1j * omega), rtol=1e-5))
+    >>> bool(np.allclose(sampled_open_loop(loop, omega), loop(1j * omega), rtol=1e-5))
     True
     """
     rate = positive_number("sample_rate", sample_rate)

@@ -577,7 +577,7 @@ def local_boundary() -> Finding:
 )
 def ideal_point() -> Finding:
     """Evaluate D at s = 0, and count around the point."""
-    at_zero = abs(complex(ARM(0.0, 1.0, 1.0)))
+    at_zero = abs(complex(ARM.characteristic(0.0, 1.0, 1.0)))
     counts = unstable_roots(ARM, 1.0, 1.0 + np.array([-1e-12, 0.0, 1e-12]))
     others = unstable_roots(ARM.shifted(-1e-4), 1.0, 1.0)
     return Finding(

@@ -78,7 +78,7 @@ def nearest_in_box(frequency: FloatArray) -> FloatArray:
     s = 1j * TURN * np.asarray(frequency)
     first, second = LOOP.arm_responses(s)
     arms = first * np.exp(-s * TAU1), second * np.exp(-s * TAU2)
-    middle, least = 1.0 + LOOP.open_loop(s), np.full(s.shape, np.inf)
+    middle, least = 1.0 + LOOP(s), np.full(s.shape, np.inf)
     for (fixed, moved), side in product((arms, arms[::-1]), (PERTURBATION, -PERTURBATION)):
         edge = middle - side * fixed
         along = (edge * moved.conj()).real / np.abs(moved) ** 2
@@ -147,7 +147,7 @@ def low_crossings(loop: Loop, point: str) -> AxisCrossings:
 
 def response(frequency: FloatArray | float, c1: float = 1.0, c2: float = 1.0) -> ComplexArray:
     """Return L of the controlled loop at frequencies in Hz."""
-    return LOOP.open_loop(1j * TURN * frequency, c1, c2)
+    return LOOP(1j * TURN * frequency, c1, c2)
 
 
 def dense(band: tuple[float, float]) -> FloatArray:
@@ -215,7 +215,7 @@ def stage_one_unstable() -> Finding:
     order = max(nyquist(STAGE_ONE, *c).pole_order for c in POINTS.values())
     plain = paper_loop(controller=Controller((), (), CONTROLLER_GAIN))
     bare = nyquist(plain, *POINTS["Area 2"]).pole_order
-    first, last = STAGE_ONE.open_loop(np.array([1e-12, 1e-11]), *POINTS["Area 2"])
+    first, last = STAGE_ONE(np.array([1e-12, 1e-11]), *POINTS["Area 2"])
     slope = float(np.log10(abs(last / first)))
     days = 1.0 / rightmost_root(STAGE_ONE, *POINTS["Area 2"]).real / 86400.0
     linear = abs(slope - 1.0) < 0.01 and first.real < 0.0

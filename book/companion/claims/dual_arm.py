@@ -268,7 +268,7 @@ def printed_deviation(c1: float, c2: float, *, restored: bool = False) -> tuple[
 
     def off(log_omega: Any) -> Any:
         omega = np.exp(log_omega)
-        truth = DualArm().open_loop(1j * omega, c1, c2)
+        truth = DualArm()(1j * omega, c1, c2)
         return np.abs(printed_open_loop(omega, c1, c2, restored=restored) / truth - 1.0)
 
     grid = np.log(2.0 * np.pi * np.logspace(-3.0, 1.0, 40_001))

@@ -61,7 +61,7 @@ def _crossing(loop: Loop, low: float, high: float) -> float:
     """Return a frequency in Hz between two others at which |L| is one."""
 
     def level(u: float) -> float:
-        return float(np.log(np.abs(loop.open_loop(1j * TURN * np.exp(u)))))
+        return float(np.log(np.abs(loop(1j * TURN * np.exp(u)))))
 
     return float(np.exp(brentq(level, np.log(low), np.log(high), xtol=1e-14)))
 
@@ -203,7 +203,7 @@ def unity_gain() -> Finding:
 )
 def gain_in_the_band() -> Finding:
     """Evaluate |L| at 3 mHz."""
-    gain = abs(complex(LOOP.open_loop(1j * TURN * 3e-3)))
+    gain = abs(complex(LOOP(1j * TURN * 3e-3)))
     return Finding(
         decide(abs(gain / 87e3 - 1.0) < 0.03),
         gain,
@@ -220,7 +220,7 @@ def gain_in_the_band() -> Finding:
 )
 def phase_margins() -> Finding:
     """Take the smallest margin over all crossings, and for all phases of the arms."""
-    lowest = complex(LOOP.open_loop(1j * TURN * _crossing(LOOP, 1e-6, 1e-5)))
+    lowest = complex(LOOP(1j * TURN * _crossing(LOOP, 1e-6, 1e-5)))
     low = 180.0 - abs(float(np.degrees(np.angle(lowest))))
     faster = flight_loop(MEAN_DELAY, corner=TURN * 0.8)
     longer = [flight_loop(delay) for delay in OTHER_DELAYS]

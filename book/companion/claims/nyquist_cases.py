@@ -173,7 +173,7 @@ def size_of_perturbations() -> Finding:
 def single_arm_ideal() -> Finding:
     """Look at the curve around 2 pi / tau, for crossings, and at counts over all gains."""
     turn = 2.0 * np.pi / SINGLE.tau
-    before, at, after = SINGLE.open_loop(1j * turn * np.array([1.0 - 1e-5, 1.0, 1.0 + 1e-5]))
+    before, at, after = SINGLE(1j * turn * np.array([1.0 - 1e-5, 1.0, 1.0 + 1e-5]))
     tangent = abs(at) < 1e-9 and abs(np.angle(after - before)) < 1e-4
     crossings = axis_crossings(SINGLE).omega.size
     highest = max(nyquist(at_gain(SINGLE, k)).closed_loop_roots for k in FACTORS)
@@ -220,7 +220,7 @@ def single_arm_branch() -> Finding:
 def value_at_full_turn() -> Finding:
     """Evaluate the loop with and without the integrating actuator at 2 pi / tau."""
     s, c1 = 2j * np.pi / SINGLE.tau, SINGLE_POINT[0]
-    value = complex(SINGLE.open_loop(s, c1))
+    value = complex(SINGLE(s, c1))
     without = value * s / SINGLE.gain
     return Finding(
         decide(abs(value - (1.0 - c1)) < 1e-9, corrected=abs(without - (1.0 - c1)) < 1e-9),
@@ -275,7 +275,7 @@ def common_arm_alike() -> Finding:
     """Measure how far the ideal curve misses the origin, and what the crossing needs."""
     near = 4.0 * np.pi / (TAU1 + TAU2)
     around = np.linspace(0.99 * near, 1.01 * near, 201)
-    miss = smallest(lambda omega: np.abs(COMMON.open_loop(1j * omega)), around).value
+    miss = smallest(lambda omega: np.abs(COMMON(1j * omega)), around).value
     curve = nyquist(COMMON, *COMMON_POINT)
     threshold = common_threshold()
     below, above = (
@@ -331,7 +331,7 @@ def dual_arm_branch() -> Finding:
     turns = phase_of_branch(curve)[1] / (2.0 * np.pi)
     radius = float(np.abs(curve.indentation[0]))
     leading = DUAL.gain * (c2 - c1) / (TAU1 - TAU2)
-    size = complex(DUAL.open_loop(radius, c1, c2)) * radius**2
+    size = complex(DUAL(radius, c1, c2)) * radius**2
     growth = rightmost_of_loop(DUAL, c1, c2).real
     of_order_two = curve.pole_order == 2 and abs(size / leading - 1.0) < 1e-2
     clockwise = abs(turns + 1.0) < 1e-3

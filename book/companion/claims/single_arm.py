@@ -129,7 +129,7 @@ def differentiated_equation() -> Finding:
         end = 40.0 / s.real
         integral, _ = quad(integrand, 0.0, end, limit=2000, epsabs=1e-12, complex_func=True)
         left = s * (1.0 + k1 * integral)
-        right = complex(HayesEquation(TAU1)(s, *parameters(k1, k2)))
+        right = complex(HayesEquation(TAU1).characteristic(s, *parameters(k1, k2)))
         worst = max(worst, abs(left - right) / abs(right))
     return Finding(
         decide(worst < 1e-8),
@@ -155,7 +155,9 @@ def hayes_correspondence() -> Finding:
     pairs = ((0.5, 0.9), (1.0, 0.3), (1.0, 1.2), (2.0, -0.7))
     for k1, k2 in pairs:
         loop, (a, b) = SingleArm(k1, TAU1), parameters(k1, k2)
-        off += [*np.abs(hayes(points, a, b) / loop(points, k2, 0.0) - 1.0), abs(-b / a - k2)]
+        of_hayes = hayes.characteristic(points, a, b)
+        of_loop = loop.characteristic(points, k2, 0.0)
+        off += [*np.abs(of_hayes / of_loop - 1.0), abs(-b / a - k2)]
         root = complex(rightmost_root(loop, k2, 0.0))
         for other in (rightmost_root(hayes, a, b), lambert_root(a, b, TAU1)):
             # Of a conjugate pair either one.
@@ -281,12 +283,12 @@ def additional_root() -> Finding:
     extra = {}
     for k2 in (0.9, 1.0, 1.1):
         # L has a simple pole at zero where its integrand does not vanish there.
-        pole = int(abs(loop.open_loop(1e-12, k2)) > 1e6)
-        roots_of_loop = _winding(1.0 + loop.open_loop(s, k2)) + pole
-        extra[k2] = _winding(loop(s, k2, 0.0)) - roots_of_loop
+        pole = int(abs(loop(1e-12, k2)) > 1e6)
+        roots_of_loop = _winding(1.0 + loop(s, k2)) + pole
+        extra[k2] = _winding(loop.characteristic(s, k2, 0.0)) - roots_of_loop
     return Finding(
         decide(extra[1.0] == 1, beyond=extra[0.9] == extra[1.1] == 1),
-        float(np.real(1.0 + loop.open_loop(1e-12, 1.0))),
+        float(np.real(1.0 + loop(1e-12, 1.0))),
         f"$1 + L(0)$ at $k₂ = 1$, $k₁ = {NOMINAL_GAIN:g}$/s, $τ = {TAU1}$ s: not zero",
         "True at $k₂ = 1$, of which the remark speaks: there $s(1 + L)$, with the open loop L "
         f"of Eq. (2), has {extra[1.0]} root more than $1 + L$. For every other $k₂$ the open "
@@ -369,7 +371,7 @@ def ideal_loop_is_stable() -> Finding:
         int(unstable_roots(loop.shifted(following.real * factor), 1.0, 0.0))
         for factor in (0.99, 1.01)
     ]
-    of_loop = abs(complex(1.0 + loop.open_loop(following))) < 1e-9
+    of_loop = abs(complex(1.0 + loop(following))) < 1e-9
     return Finding(
         decide(abs(zero) < 1e-12 and right_of == [1, 3] and of_loop and following.real < 0.0),
         following.real,
@@ -482,7 +484,7 @@ def gain_drift() -> Finding:
     gain = min(1.0 - found.gain_lower, found.gain_upper - 1.0)
     arms = critical_perturbation(loop, (1.0, -1.0))
     drifted = paper_loop(controller=table_two((1.0 + gain) * CONTROLLER_GAIN))
-    same = abs(complex(drifted.open_loop(0.1j) / loop.open_loop(0.1j)) - 1.0 - gain)
+    same = abs(complex(drifted(0.1j) / loop(0.1j)) - 1.0 - gain)
     return Finding(
         decide(same < 1e-12, gain < 10.0 * arms),
         gain / arms,

@@ -159,7 +159,7 @@ def printed_difference(omega: npt.ArrayLike, difference: float, mean: float) -> 
 
 def response(sensor: sensors.SignalMapping, omega: npt.ArrayLike) -> Any:
     """Evaluate a sensor's P with the paper's round trips, at omega in rad/s."""
-    return Loop(Controller((), (), 1.0), sensor, TAU1, TAU2).open_loop(1j * np.asarray(omega))
+    return Loop(Controller((), (), 1.0), sensor, TAU1, TAU2)(1j * np.asarray(omega))
 
 
 def dual_response(
