@@ -97,7 +97,7 @@ SINGLE = SignalMapping((1.0,), (0.0,), (1.0,), "single")
 #:
 #:     P_+(s) = 2 - c_1 e^{-s\tau_1} - c_2 e^{-s\tau_2}
 COMMON = SignalMapping((1.0,), (1.0,), (1.0,), "common")
-#: Arm 2 minus arm 1, so that arm 1 is the longer one where the response is P_- of Table I.
+#: Arm 2 minus arm 1. Arm 1 is the longer one where the response is :math:`P_-` of Table I.
 #:
 #: .. math::
 #:

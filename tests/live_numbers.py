@@ -21,7 +21,6 @@ from pathlib import Path
 import numpy as np
 
 from armlock import CountError, critical_perturbation, margins, rightmost_root, unstable_roots
-from book._ext.lean import shortened
 from tests import attack_judge as judge
 from tests.attack import between, draw_arm, draw_delays, draw_paper, draw_point, roots, to_loop
 from tests.attack_judge import Sketch, View
@@ -54,10 +53,10 @@ ASK = """cases => cases.map(([spec, c1, c2]) => {
 
 
 def open_engine(chromium):
-    """A page with the engine as it is shipped, and nothing else."""
+    """A page with the engine and nothing else."""
     page = chromium.new_page()
     for name in ENGINE:
-        page.add_script_tag(content=shortened((LIVE / name).read_text()))
+        page.add_script_tag(content=(LIVE / name).read_text())
     page.evaluate(LOAD)
     return page
 

@@ -30,7 +30,7 @@ ax.set(xlabel="a [1/s]", ylabel="b [1/s]");
 """
 GLUE = "figures.glue(points=omega.size)"
 PAGES = ("bibliography.md", "status.md")
-OFFERED = ("LICENSE", "LICENSE-docs", "CITATION.cff", "CHANGELOG.md")
+OFFERED = ("LICENSE", "LICENSE-docs", "CITATION.cff", "CHANGELOG.md", "environment.txt")
 ADDRESS = "https://github.com/someone/something"
 LINKS = {
     "book/bibliography.html": f'href="{ADDRESS}"',

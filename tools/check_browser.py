@@ -39,7 +39,7 @@ MIDDLE = {"width": 768, "height": 1024}
 NARROW = {"width": 390, "height": 844}
 NARROWEST = {"width": 320, "height": 640}
 LONGEST = 3.0  # seconds of processor time until a page is readable
-HEAVIEST = 3e6  # bytes that a page loads
+HEAVIEST = 5e6  # bytes that a page loads
 # A word that the search of any book here must find.
 WORD = "delay"
 # An element that should react is poked at so many places, at most.

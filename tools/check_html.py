@@ -23,7 +23,7 @@ from urllib.parse import unquote, urlsplit
 # What a link says of its target when it is not loaded: it is somewhere to go.
 NOT_LOADED = {"alternate", "author", "canonical", "help", "license", "next", "prev", "search"}
 OPENED = {".csv", ".png", ".svg", ".ipynb", ".json"}
-LARGEST_BOOK, LARGEST_FIGURE = 30e6, 2e6  # bytes
+LARGEST_BOOK, LARGEST_FIGURE = 60e6, 2e6  # bytes
 CSS_URL = re.compile(r"""@import\s+["']([^"']+)|url\(\s*["']?([^"')]+)""")
 
 

@@ -38,7 +38,7 @@ def transfer(
     loop : Loop
         The loop.
     source : {"laser", "arm 1", "arm 2", "common", "differential"}
-        The input: S, Y_1, Y_2, Y_+ or Y_-.
+        The input: `S`, `Y_1`, `Y_2`, `Y_+` or `Y_-`.
     s : array_like of complex
         Laplace variable in rad/s.
     c1, c2 : array_like of float, optional
