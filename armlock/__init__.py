@@ -1,6 +1,31 @@
-"""Stability and simulation of laser loops locked to delays of tens of seconds.
+"""Stability and simulation of laser loops that are locked to long delays (arm locking).
 
-The reproducible companion to "Robustness Analysis and Controller Design of Arm-locking
+A loop has a controller, a sensor, the round-trip times ``tau1`` and ``tau2`` of its two arms,
+and two free parameters: the factors c1 and c2 of the arms, which are ideally 1. Counts and
+margins are certified: a number is right, or the function says that it is not decided.
+
+The calls that matter most:
+
+- ``Loop(controller, "common", tau1=20.1, tau2=19.9)`` is a loop of your own. `paper_loop` and
+  `flight_loop` are published ones.
+- ``unstable_roots(loop, c1, c2)`` counts the roots with positive real part. 0 means stable,
+  -1 a root on the imaginary axis, -2 unstable roots at arbitrarily high frequency.
+- ``stability_chart(loop, c1, c2)`` counts on a grid; ``chart.plot()`` draws the chart.
+- ``margins(loop, c1, c2)`` finds the gain, phase, delay and modulus margins of a stable loop.
+- ``critical_perturbation(loop, direction)`` is the distance from (1, 1) to instability.
+- ``rightmost_root(loop, c1, c2)`` is the root that decays slowest or grows fastest.
+- ``nyquist(loop, omega_max=10.0)`` is the Nyquist curve with its encirclements of -1.
+- ``simulate(loop, noise)`` is the frequency noise of the locked laser, in Hz, from that of
+  the free laser, such as ``LaserNoise(seed=1).draw(20_000)``.
+- ``amplitude_spectrum(series, sample_rate)`` estimates a spectrum with its confidence band.
+- ``noise_budget(loop, frequency)`` is the noise of the locked laser, source by source.
+
+Angular frequencies are in rad/s, frequencies in Hz, and delays in s. The first call of a
+function compiles it, which takes 10 to 30 s. ``help(armlock.margins)`` describes one
+function. The modules `armlock.controllers`, `armlock.sensors`, `armlock.orbits` and
+`armlock.paper` hold controllers, sensors, real arms and the numbers of the paper.
+
+This package is the companion to "Robustness Analysis and Controller Design of Arm-locking
 System in Space-based Gravitational Wave Detectors".
 """
 

@@ -1,0 +1,21 @@
+"""The code of the page of recipes runs, block after block."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+PAGE = Path(__file__).parents[1] / "book" / "recipes.md"
+
+
+def test_the_recipes_run_and_print_what_a_reader_expects(tmp_path):
+    blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
+    (tmp_path / "recipes.py").write_text("\n\n".join(blocks))
+    command = [sys.executable, "-W", "error", "recipes.py"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert lines[0] == "[ 0 -1  1]"
+    assert lines[1].split()[0] == "0.5"
+    assert "nan" in lines[5]
+    assert lines[6] == "True"
