@@ -3,8 +3,7 @@
 from docutils import nodes
 from sphinx.util import logging
 
-from book.companion.claims import all_claims
-from book.companion.claims.ledger import NAME, NAMING
+from book.companion.claims.ledger import NAME, NAMING, all_names
 
 LEDGER = "notebooks/15_ledger"
 LOGGER = logging.getLogger(__name__)
@@ -12,7 +11,7 @@ LOGGER = logging.getLogger(__name__)
 
 def link(app, doctree, docname):
     """Link the names of claims on a page; a name that no claim has is a warning."""
-    known = {claim.identifier for claim in all_claims()}
+    known = all_names()
     page = app.builder.get_relative_uri(docname, LEDGER)
     for text in list(doctree.findall(nodes.Text)):
         if isinstance(text.parent, nodes.reference | nodes.literal | nodes.literal_block):

@@ -22,6 +22,7 @@ from book.companion.claims.ledger import (
     Weight,
     all_claims,
     badge,
+    chapter_of,
     check,
     check_in_parallel,
     ledger_link,
@@ -30,21 +31,6 @@ from book.companion.claims.ledger import (
     typeset,
 )
 
-#: Section of the paper that a chapter with claims is about.
-SECTIONS = {
-    "01_opening": "Sec. I and Table I",
-    "02_single_arm": "Sec. II, single arm",
-    "04_common_arm": "Sec. III.A, common arm",
-    "05_dual_arm": "Sec. III.B, dual arm",
-    "06_nyquist": "Sec. IV.A, frequency domain",
-    "08_controller": "Sec. IV.B, controller",
-    "09_simulation": "Sec. IV.C, simulation",
-    "07_perturbations": "Appendix",
-    "11_flight": "White paper, the loop",
-    "11b_noise_and_pulling": "White paper, noise and pulling",
-}
-#: Those of them that are about the paper; the others are about the white paper.
-OF_THE_PAPER = [name for name, part in SECTIONS.items() if not part.startswith("White")]
 #: What filters and sorts the table.
 SCRIPT = Path(__file__).with_name("ledger.js")
 
@@ -107,7 +93,7 @@ class VerdictCounts:
     def __init__(self, ledger: Ledger) -> None:
         entries: dict[bool, list[tuple[Claim, Finding]]] = {True: [], False: []}
         for claim, finding in ledger:
-            entries[claim.chapter in OF_THE_PAPER].append((claim, finding))
+            entries[not claim.section.startswith("White")].append((claim, finding))
         paper, white = (Ledger(entries[of]) for of in (True, False))
         met = {f"of {weight}": paper.counts(weight) for weight in Weight}
         met["of the white paper"] = white.counts()
@@ -185,7 +171,7 @@ def _controls(ledger: Ledger) -> str:
 
     shown = [(v.name.lower(), badge(v, f"{v} ({verdicts[v]})")) for v in Verdict if verdicts[v]]
     kinds = [(w.name.lower(), f"{w} ({weights[w]})") for w in Weight if weights[w]]
-    sections = dict.fromkeys(SECTIONS[claim.chapter] for claim, _ in ledger)
+    sections = dict.fromkeys(claim.section for claim, _ in ledger)
     options = "".join(f"<option>{html.escape(name)}</option>" for name in sections)
     return (
         '<form class="ledger-filter" hidden><fieldset><legend>Verdict</legend>'
@@ -207,14 +193,16 @@ def _row(claim: Claim, finding: Finding) -> str:
         where = f'<a href="{html.escape(url)}/blob/main/{file}#L{line}">{where}</a>'
     attributes = (
         f'id="ledger-{name}" data-verdict="{finding.verdict.name.lower()}" '
-        f'data-weight="{claim.weight}" data-section="{html.escape(SECTIONS[claim.chapter])}"'
+        f'data-weight="{claim.weight}" data-section="{html.escape(claim.section)}"'
     )
     code = (
-        f'<p>Shown in its <a href="{claim.chapter}.html#claim-{name}">chapter</a>.</p>'
+        f'<p>Shown in its <a href="{chapter_of(name)}.html#claim-{name}">chapter</a>.</p>'
         f"<details><summary>Source of {name}</summary><p>{where}</p>"
         f'<pre tabindex="0">{html.escape(text)}</pre></details>'
     )
-    return row(claim, finding, attributes, ledger_link(name), code)
+    # Links that name one of the other places lead to this row, too.
+    others = "".join(f'<span id="ledger-{other}"> {other}</span>' for other in claim.also)
+    return row(claim, finding, attributes, ledger_link(name) + others, code)
 
 
 class Errata:
@@ -253,7 +241,7 @@ class Errata:
 
     def _block(self, claim: Claim, finding: Finding) -> str:
         name = claim.identifier
-        affected = ((c, f) for c, f in self.ledger if c.identifier in claim.affects)
+        affected = ((c, f) for c, f in self.ledger if set(c.names) & set(claim.affects))
         parts = {
             "Printed" if claim.printed else "In our words": typeset(
                 claim.printed or claim.says
@@ -269,6 +257,6 @@ class Errata:
         )
         return (
             f'<section class="erratum" id="erratum-{name}"><p><strong>{ledger_link(name)}, '
-            f"{typeset(claim.place)}</strong> {badge(finding.verdict, finding.verdict)}</p>"
+            f"{typeset(claim.places)}</strong> {badge(finding.verdict)}</p>"
             f"<dl>{items}</dl></section>"
         )
