@@ -251,14 +251,15 @@ def claim(
     """
 
     def enter(check: Callable[[], Finding]) -> shared[Finding]:
+        names = identifier, *(also or {})
+        for name in names:
+            if name in _REGISTER:
+                raise ValueError(f"identifier must be new, got {name!r} a second time")
         remembered = shared(check)
         entry = Claim(
             identifier, place, says, pinned, also or {}, affects, weight, printed, remembered,
         )  # fmt: skip
-        for name in entry.names:
-            if name in _REGISTER:
-                raise ValueError(f"identifier must be new, got {name!r} a second time")
-            _REGISTER[name] = entry
+        _REGISTER.update(dict.fromkeys(names, entry))
         return remembered
 
     return enter
