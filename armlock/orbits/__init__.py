@@ -1,6 +1,0 @@
-"""What do real arms do to a loop? First: how long are they, and how fast do they move."""
-
-from armlock.orbits.constellation import Constellation, kepler
-from armlock.orbits.tables import from_table, read_oem, read_table
-
-__all__ = ["Constellation", "from_table", "kepler", "read_oem", "read_table"]
