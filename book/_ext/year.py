@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from book.companion.orbits import constellations, interval
+from armlock.orbits import esa, kepler
 
 DAY, STEP, FIRST = 86400.0, 5.0, 16.5
 # Two steps past the year, for the interpolation at its end.
@@ -20,8 +20,9 @@ DAYS = STEP * np.arange(0, 76)
 def table():
     """Return the text of the script: a name, and under each orbit's name its numbers."""
     rows = []
-    for name, orbit in constellations().items():
-        t = interval(name)[0] + DAY * DAYS
+    orbits = {"Kepler": kepler(), "trailing": esa("trailing"), "leading": esa("leading")}
+    for name, orbit in orbits.items():
+        t = max(orbit.span[0], 0.0) + DAY * DAYS
         numbers = []
         for master in (1, 2, 3):
             arm = 1e6 * (orbit.round_trips(t, master)[0] - FIRST)
