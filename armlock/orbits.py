@@ -286,6 +286,8 @@ def from_table(
         )
     _check_gravity(t, places)
     arms = np.linalg.norm(places - np.roll(places, 1, axis=1), axis=2) / SPEED_OF_LIGHT
+    if arms.min() == 0.0:
+        raise ValueError("positions must be of three spacecraft, got two in one place")
     error = 0.0
     for first in (0, 1):
         every_second = make_interp_spline(t[first::2], places[first::2], k=_DEGREE)

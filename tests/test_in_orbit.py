@@ -76,7 +76,7 @@ def test_stable_times_agree_with_counts_at_random_times(chapter, weak, name, rul
     x, edges = chapter["half"][case], weak[1] if name == "weak" else chapter["ranges"][name]
     r = chapter["ratio"](x, rule)
     start, stop = chapter["unstable_times"](r, *edges)
-    for t in np.random.default_rng(8).uniform(*x.x[[0, -1]], 60):
+    for t in np.random.default_rng(8).uniform(x.x[0], x.x[-1], 60):
         tau1, tau2 = (float(one(t)) for one in chapter["tau"][case])
         h = float(x(t) / r(t))
         if min(abs(float(r(t)) / edge - 1.0) for edge in edges) < 1e-3:
@@ -212,4 +212,4 @@ def test_the_page_gives_the_range_and_the_days_of_the_chapter(chapter, weak):
     assert abs(names["low"] - weak[1][0]) < 1e-5
     x = chapter["half"]["Kepler", 1]
     days = chapter["stable_days"](chapter["ratio"](x), *weak[1])
-    assert f"constant         {days:7.2f} stable days" in printed
+    assert f"constant        {days:7.2f} stable days" in printed

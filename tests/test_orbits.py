@@ -186,6 +186,7 @@ BAD_TABLES = {
     "every second state must give the others": changed(
         time=12 * (TIME - TIME[0]), positions=sampled(12 * (TIME - TIME[0]))
     ),
+    "of three spacecraft, got two in one place": changed(positions=PLACES[:, [0, 0, 2]]),
     "positions must be finite": changed(positions=np.where(PLACES > 1e11, np.nan, PLACES)),
 }
 
