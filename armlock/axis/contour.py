@@ -76,7 +76,7 @@ _SHORT, _PATIENCE, _LESS_PATIENCE, _MORE_CAUTION = 1e-6, 1000, 50, 1e3
 _BLIND_GROWTH, _SHORTEST_BLIND = 0.25, 1e-14
 
 
-@njit(cache=True)
+@njit()
 def _follow(
     piece: Piece,
     bound: FloatArray,
@@ -121,14 +121,14 @@ def _follow(
     return argument, omega, step, steps
 
 
-@njit(cache=True)
+@njit()
 def angle_between(value: complex, other: complex) -> float:
     """Principal argument of value / other."""
     ratio = value * other.conjugate()
     return float(np.arctan2(ratio.imag, ratio.real))
 
 
-@njit(cache=True)
+@njit()
 def _slow_terms(piece: Piece) -> tuple[Piece, FloatArray]:
     """Split the terms that turn fast off an exponential sum, within one piece.
 
@@ -148,7 +148,7 @@ def _slow_terms(piece: Piece) -> tuple[Piece, FloatArray]:
     return Piece(start, end, per_reach, slow, magnitudes, rates, direct), fast
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def winding(
     whole: CompiledSum,
     omega: float,
@@ -212,7 +212,7 @@ def winding(
             return argument, value, True, steps, True
 
 
-@njit(cache=True)
+@njit()
 def argument_at(roots: ComplexArray, omega: float) -> float:
     """Argument at j omega of the polynomial with these roots, up to the sign of its lead.
 
@@ -227,7 +227,7 @@ def argument_at(roots: ComplexArray, omega: float) -> float:
     return argument
 
 
-@njit(cache=True)
+@njit()
 def _polish(
     piece: Piece, bound: FloatArray, bracket: tuple[float, float], guess: float, sign: int
 ) -> tuple[float, tuple[complex, complex]]:
@@ -259,7 +259,7 @@ def _polish(
     return omega, (value, slope)
 
 
-@njit(cache=True)
+@njit()
 def _zero_between(
     low: float, high: float, h: tuple[float, float], dh: tuple[float, float]
 ) -> float:
@@ -274,7 +274,7 @@ def _zero_between(
     return low + (high - low) * t
 
 
-@njit(cache=True)
+@njit()
 def _safe_step(h: float, dh: float, curvature: float, error: float) -> float:
     """Step over which a real function has one zero at most.
 
@@ -293,7 +293,7 @@ def _safe_step(h: float, dh: float, curvature: float, error: float) -> float:
 OMEGA, JUMP, WIDTH, HIDDEN, POSITION, SPREAD = 0, 1, 2, 3, 4, 5
 
 
-@njit(cache=True)
+@njit()
 def _with_zero(
     zeros: FloatArray,
     found: int,
@@ -312,7 +312,7 @@ def _with_zero(
     return zeros
 
 
-@njit(cache=True)
+@njit()
 def _place(zeros: FloatArray, piece: Piece, square: Piece, entered: float) -> None:
     """Turn value and slope of zeros in one piece, from `entered` on, into POSITION and SPREAD.
 
@@ -344,7 +344,7 @@ def _place(zeros: FloatArray, piece: Piece, square: Piece, entered: float) -> No
             zero[SPREAD] = (moved + abs(position) * shrunk + rounding) / least
 
 
-@njit(cache=True)
+@njit()
 def _is_monotonic(
     piece: Piece, bound: FloatArray, error: FloatArray, omega: float, width: float
 ) -> bool:
@@ -364,7 +364,7 @@ def _is_monotonic(
     return bool(abs(slope.imag) > bound_at(bound, piece, last) * width + rounding)
 
 
-@njit(cache=True)
+@njit()
 def _imaginary_bounds(
     piece: Piece, rounding: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -403,7 +403,7 @@ class _Known(NamedTuple):
     hidden: bool
 
 
-@njit(cache=True)
+@njit()
 def _begins(
     piece: Piece, error: FloatArray, omega: float, value: complex, slope: complex
 ) -> tuple[_Known, bool]:
@@ -415,7 +415,7 @@ def _begins(
     return _Known(omega, 0, True), False
 
 
-@njit(cache=True)
+@njit()
 def _imaginary_step(
     at: tuple[float, complex, complex],
     step: float,
@@ -437,7 +437,7 @@ def _imaginary_step(
     return float(min(step, certified))
 
 
-@njit(cache=True)
+@njit()
 def _passed(
     piece: Piece,
     bounds: tuple[FloatArray, FloatArray],
@@ -477,7 +477,7 @@ def _passed(
     return (at, jump, half, False), there
 
 
-@njit(cache=True)
+@njit()
 def _ends(
     piece: Piece,
     bounds: tuple[FloatArray, FloatArray],
@@ -498,7 +498,7 @@ def _ends(
     return omega, -known.sign if is_map else 0, width, not single
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def imaginary_zeros(
     whole: CompiledSum,
     measure: CompiledSum | None,
@@ -594,7 +594,7 @@ def imaginary_zeros(
     return zeros[:found], omega >= omega_end
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def resolved_grid(
     whole: CompiledSum, omega_end: float, tolerance: float, most: int, stop: BoolArray
 ) -> tuple[FloatArray, bool]:

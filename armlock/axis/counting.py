@@ -132,7 +132,7 @@ class Rows(NamedTuple):
     upper: FloatArray
 
 
-@njit(cache=True)
+@njit()
 def count_point(model: PointModel, x: float, y: float, end: float, stop: BoolArray) -> int:
     """Return the number of unstable roots at one point, or a status code below zero.
 
@@ -186,7 +186,7 @@ _FEW = 16
 _LONG = 1e5
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _count_range(
     first: int,
     last: int,
@@ -218,7 +218,7 @@ def count_points(model: PointModel, x: FloatArray, y: FloatArray, ends: FloatArr
     return counts
 
 
-@njit(cache=True)
+@njit()
 def _fill_row(
     filled: tuple[IntArray, BoolArray, IntArray],
     model: RowModel,
@@ -263,7 +263,7 @@ def _fill_row(
     reached[i] = total if complete and rows.base[i] >= 0 else CONTRADICTORY
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _fill_range(
     first: int,
     last: int,

@@ -286,13 +286,13 @@ def without_unused(*sums: ExponentialSum) -> tuple[ExponentialSum, ...]:
     )
 
 
-@njit(cache=True)
+@njit()
 def with_smaller_terms(a: float, b: float, c: float, d: float) -> float:
     """Return a + b or c + d, two ways to add up one number: the one that cancels less."""
     return a + b if abs(a) + abs(b) < abs(c) + abs(d) else c + d
 
 
-@njit(cache=True)
+@njit()
 def real_horner(p: FloatArray, u: float) -> float:
     """Value of a real polynomial with ascending coefficients."""
     value = 0.0
@@ -301,7 +301,7 @@ def real_horner(p: FloatArray, u: float) -> float:
     return value
 
 
-@njit(cache=True)
+@njit()
 def _from_roots(
     polynomials: CompiledPolynomials, omega: float, reach: float
 ) -> tuple[ComplexArray, FloatArray, FloatArray]:
@@ -353,7 +353,7 @@ def _from_roots(
     return found, sizes, left_out
 
 
-@njit(cache=True)
+@njit()
 def _reach(roots: ComplexArray, starts: IntArray, omega: float) -> float:
     """How far from omega the expansion of `_from_roots` is accurate, at most 1e300.
 
@@ -410,7 +410,7 @@ class Piece(NamedTuple):
     direct: bool
 
 
-@njit(cache=True)
+@njit()
 def expand(whole: CompiledSum, omega: float) -> Piece:
     """Return an exponential sum over the piece of the axis that holds omega.
 
@@ -464,7 +464,7 @@ def expand(whole: CompiledSum, omega: float) -> Piece:
     return Piece(omega, piece_end, 1.0 / reach, local, sizes, phases, False)
 
 
-@njit(cache=True)
+@njit()
 def evaluate(piece: Piece, omega: float) -> tuple[complex, complex]:
     """Value and derivative of an exponential sum within a piece.
 
@@ -506,7 +506,7 @@ def evaluate(piece: Piece, omega: float) -> tuple[complex, complex]:
     return complex(value_re, value_im), complex(slope_re, slope_im)
 
 
-@njit(cache=True)
+@njit()
 def tangent_distance(value: complex, slope: complex, step: float) -> float:
     """Smallest distance from zero of the tangent over a step."""
     speed = slope.real * slope.real + slope.imag * slope.imag
@@ -517,13 +517,13 @@ def tangent_distance(value: complex, slope: complex, step: float) -> float:
     return abs(value + place * slope)
 
 
-@njit(cache=True)
+@njit()
 def bound_at(bound: FloatArray, piece: Piece, omega: float) -> float:
     """Value of a bound that is a polynomial in u."""
     return float(real_horner(bound, (omega - piece.start) * piece.per_reach))
 
 
-@njit(cache=True)
+@njit()
 def rounding_bound(piece: Piece, rounding: float) -> FloatArray:
     """Polynomial in u that bounds the rounding error of an exponential sum in a piece.
 
@@ -542,7 +542,7 @@ def rounding_bound(piece: Piece, rounding: float) -> FloatArray:
     return bound
 
 
-@njit(cache=True)
+@njit()
 def curvature_bound(piece: Piece) -> FloatArray:
     """Polynomial in u that bounds the second derivative of an exponential sum in a piece.
 
@@ -568,7 +568,7 @@ def curvature_bound(piece: Piece) -> FloatArray:
     return bound
 
 
-@njit(cache=True)
+@njit()
 def curvature_from_zero(piece: Piece) -> FloatArray:
     """Bound the second derivative of an imaginary part, in a piece that starts at omega = 0.
 

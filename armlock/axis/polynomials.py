@@ -24,7 +24,7 @@ def quotients(
     return found.reshape(s.shape)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _quotients(
     zeros: ComplexArray, poles: ComplexArray, lead: complex, s: ComplexArray
 ) -> ComplexArray:

@@ -32,7 +32,7 @@ _GROWN = 1e-9
 MODULUS, RATIO, PHASE, DELAY = 0, 1, 2, 3
 
 
-@njit(cache=True)
+@njit()
 def excluded_disc(value: float, m: int) -> tuple[float, float]:
     """Centre and radius of the disc in which the distance of L from -1 is below a value.
 
@@ -140,7 +140,7 @@ class _Ahead(NamedTuple):
     other_change: float
 
 
-@njit(cache=True)
+@njit()
 def _disc(arms: Arms, omega: float) -> _Disc:
     """Return the disc that L fills at s = j omega, and how it changes with omega.
 
@@ -192,27 +192,27 @@ def _disc(arms: Arms, omega: float) -> _Disc:
     )  # fmt: skip
 
 
-@njit(cache=True)
+@njit()
 def _centre_and_radius(disc: _Disc) -> tuple[complex, float]:
     radius = abs(disc.larger) * abs(disc.radius_larger + disc.radius_other)
     return disc.larger * (1.0 + disc.other), radius
 
 
-@njit(cache=True)
+@njit()
 def _rounding(disc: _Disc) -> float:
     """Bound on the rounding error of centre and radius, whose terms may cancel."""
     terms = 1.0 + abs(disc.other) + abs(disc.radius_larger) + abs(disc.radius_other)
     return float(disc.rounding * abs(disc.larger) * terms)
 
 
-@njit(cache=True)
+@njit()
 def _beyond_first_order(rate: complex, bend: float, step: float) -> float:
     """Bound on |exp(z) - 1 - rate step|, where |z - rate step| <= bend."""
     size = abs(rate) * step + bend
     return float(bend + 0.5 * size * size * np.exp(size))
 
 
-@njit(cache=True)
+@njit()
 def _ahead(disc: _Disc, step: float) -> _Ahead:
     """How the parts of a disc change over a step."""
     second = 0.5 * step * step / (1.0 - step / disc.nearest)
@@ -229,7 +229,7 @@ def _ahead(disc: _Disc, step: float) -> _Ahead:
     return _Ahead(slope, larger_beyond, other_beyond, larger_change, other_change)
 
 
-@njit(cache=True)
+@njit()
 def _largest(disc: _Disc, ahead: _Ahead, step: float) -> float:
     """Bound on |L| over a step, whatever the free phases."""
     centre, spread = _centre_and_radius(disc)
@@ -238,7 +238,7 @@ def _largest(disc: _Disc, ahead: _Ahead, step: float) -> float:
     return float(largest * np.exp(ahead.larger_change))
 
 
-@njit(cache=True)
+@njit()
 def _clear(disc: _Disc, ahead: _Ahead, step: float, target: complex, radius: float) -> bool:
     """Whether L stays outside a disc around `target` over a step, whatever the free phases.
 
@@ -264,7 +264,7 @@ def _clear(disc: _Disc, ahead: _Ahead, step: float, target: complex, radius: flo
     return bool(min(begin, begin + total * step) > beyond + rounding)
 
 
-@njit(cache=True)
+@njit()
 def _nothing_smaller(disc: _Disc, omega: float, step: float, levels: FloatArray) -> bool:
     """Whether no margin is below its level over a step, whatever the free phases.
 
@@ -299,7 +299,7 @@ def _nothing_smaller(disc: _Disc, omega: float, step: float, levels: FloatArray)
     return bool(min(centre_lag - lag, 2.0 * np.pi - lead - centre_lag) > turn)
 
 
-@njit(cache=True)
+@njit()
 def _on_one_side(disc: _Disc, ahead: _Ahead, step: float) -> bool:
     """Whether L stays on one side of the real axis over a step, whatever the free phases.
 
@@ -317,7 +317,7 @@ def _on_one_side(disc: _Disc, ahead: _Ahead, step: float) -> bool:
     return bool(min(begin, begin + total * step) > beyond + _rounding(disc))
 
 
-@njit(cache=True)
+@njit()
 def _misses_segment(disc: _Disc, step: float, near: float, far: float) -> bool:
     """Whether L stays off a segment of the negative real axis, whatever the free phases.
 
@@ -339,7 +339,7 @@ def _misses_segment(disc: _Disc, step: float, near: float, far: float) -> bool:
     return False
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def intervals_not_clear(
     arms: Arms,
     segment: FloatArray,
@@ -389,7 +389,7 @@ def intervals_not_clear(
     return found[:number], complete
 
 
-@njit(cache=True)
+@njit()
 def free_margins_at(centre: complex, radius: float, omega: float) -> FloatArray:
     """Smallest margins of all L in a disc, at one frequency.
 
@@ -417,7 +417,7 @@ def free_margins_at(centre: complex, radius: float, omega: float) -> FloatArray:
     return found
 
 
-@njit(cache=True)
+@njit()
 def free_margins_over(arms: Arms, omega: FloatArray) -> FloatArray:
     """Smallest margins of the disc that L fills with free phases, at given frequencies.
 
@@ -432,7 +432,7 @@ def free_margins_over(arms: Arms, omega: FloatArray) -> FloatArray:
     return found
 
 
-@njit(cache=True)
+@njit()
 def _longest_step(
     disc: _Disc, omega: float, step: float, levels: FloatArray
 ) -> tuple[float, int]:
@@ -449,7 +449,7 @@ def _longest_step(
     return 0.0, compared
 
 
-@njit(cache=True)
+@njit()
 def _keep_smaller(best: FloatArray, where: FloatArray, here: FloatArray, omega: float) -> bool:
     """Put margins that are smaller than `best` into it, and omega into `where`.
 
@@ -462,7 +462,7 @@ def _keep_smaller(best: FloatArray, where: FloatArray, here: FloatArray, omega: 
     return smaller
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def free_margins(
     arms: Arms,
     omega: float,

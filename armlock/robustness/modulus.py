@@ -44,14 +44,14 @@ from armlock.robustness.free_phases import (
 TOLERANCE = 1e-6
 
 
-@njit(cache=True)
+@njit()
 def _distance(n: complex, r: complex, m: int) -> float:
     """|1 + L|, or |1 + L| / |1 - L| where m is RATIO, of L = n / r."""
     below = abs(r - n) if m == discs.RATIO else abs(r)
     return abs(r + n) / below if below > 0.0 else np.inf
 
 
-@njit(cache=True)
+@njit()
 def _stays_above(
     over: complex, over_slope: complex, under: complex, under_slope: complex, level: float,
     step: float,
@@ -70,7 +70,7 @@ def _stays_above(
     return min(begin, begin + rate * step) - second
 
 
-@njit(cache=True)
+@njit()
 def _downhill(
     n: Piece, r: Piece, m: int, omega: float, step: float, end: float
 ) -> tuple[float, float]:
@@ -117,14 +117,14 @@ class _Room(NamedTuple):
     least: float
 
 
-@njit(cache=True)
+@njit()
 def _tangents(n: Piece, r: Piece, omega: float) -> _Tangents:
     """Return N, R and their slopes."""
     (above, above_slope), (below, below_slope) = evaluate(n, omega), evaluate(r, omega)
     return _Tangents(above, above_slope, below, below_slope)
 
 
-@njit(cache=True)
+@njit()
 def _stays_larger(at: _Tangents, room: _Room, step: float, level: float, m: int) -> bool:
     """Whether a distance of L from -1 stays above a level over a step."""
     over, over_slope = at.below + at.above, at.below_slope + at.above_slope
@@ -141,7 +141,7 @@ def _stays_larger(at: _Tangents, room: _Room, step: float, level: float, m: int)
     return bool(above + allowed >= room.both + level * bent + unknown)
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _walk(
     numerator: CompiledSum,
     denominator: CompiledSum,

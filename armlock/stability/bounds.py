@@ -18,7 +18,7 @@ from armlock.characteristic import CharacteristicFunction, broadcast_parameters,
 from armlock.checks import FloatArray
 
 
-@njit(cache=True)
+@njit()
 def _taylor_signs_positive(q: FloatArray, shift: float, room: FloatArray) -> bool:
     """Whether all coefficients of q(w + shift) are positive beyond rounding, or zero.
 
@@ -36,7 +36,7 @@ def _taylor_signs_positive(q: FloatArray, shift: float, room: FloatArray) -> boo
     return bool(p[q.size - 1] >= 0.0)
 
 
-@njit(cache=True)
+@njit()
 def last_root_bound(q: FloatArray) -> float:
     """Bound past which a real polynomial is positive, or zero throughout; inf if there is none.
 
@@ -75,7 +75,7 @@ def last_root_bound(q: FloatArray) -> float:
     return upper
 
 
-@njit(cache=True)
+@njit()
 def _last_frequency(
     squares: FloatArray, unit: float, factors: FloatArray, reserve: float
 ) -> float:
@@ -121,7 +121,7 @@ def _last_frequency(
     return float(np.sqrt(bound) * unit)
 
 
-@njit(cache=True)
+@njit()
 def _outgrown_from(squares: FloatArray, factors: FloatArray, shares: FloatArray) -> float:
     """Bound in w for `_last_frequency`, with the shares as a_i."""
     together = 0.0
@@ -166,7 +166,7 @@ def _squared_magnitudes(polynomials: Sequence[FloatArray]) -> tuple[FloatArray, 
     return squares, float(np.ldexp(1.0, exponent))
 
 
-@njit(cache=True)
+@njit()
 def _last_frequencies(
     squares: FloatArray, unit: float, x: FloatArray, y: FloatArray, reserve: FloatArray
 ) -> FloatArray:

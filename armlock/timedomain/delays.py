@@ -111,7 +111,7 @@ def reach(delay: Delay | MovingDelay) -> int:
     return int(delay.max()) + _SIDE
 
 
-@njit(cache=True)
+@njit()
 def delayed(signal: FloatArray, row: int, column: int, delay: Delay) -> float:
     """Return a column of a signal as it was a constant delay before a row."""
     first, weights = delay
@@ -121,7 +121,7 @@ def delayed(signal: FloatArray, row: int, column: int, delay: Delay) -> float:
     return value
 
 
-@njit(cache=True)
+@njit()
 def between(signal: FloatArray, middle: int, column: int, u: float) -> float:
     """Return a column of a signal between two rows, at middle - 1/2 - u with abs(u) <= 1/2.
 

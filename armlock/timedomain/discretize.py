@@ -189,7 +189,7 @@ def _pairs(roots: list[complex]) -> Rows:
     return tuple(pairs + last)
 
 
-@njit(cache=True)
+@njit()
 def through(sections: Rows, state: FloatArray, v: float) -> float:
     """Return what the sections of a filter, without its gain, make of a sample.
 

@@ -117,7 +117,7 @@ class DivergenceError(ArithmeticError):
         return type(self), (self.time, self.detected, self.output)
 
 
-@njit(cache=True)
+@njit()
 def _place(row: int, lanes: Lanes, w: int) -> np.uintp:
     """Return where in `work` the entry of lane w in a row stands.
 
@@ -126,7 +126,7 @@ def _place(row: int, lanes: Lanes, w: int) -> np.uintp:
     return np.uintp(row * len(lanes) + w)
 
 
-@njit(cache=True)
+@njit()
 def _receive(
     lanes: Lanes,
     first: int,
@@ -165,7 +165,7 @@ def _receive(
             work[_place(target, lanes, w)] = c[at, column] * between(phi, middle, column, u)
 
 
-@njit(cache=True)
+@njit()
 def _shares(sensor: SampledSensor, controller: SampledFilter) -> Shares:
     """Return what the signals of the arms add at once: see `Shares`."""
     sections, gain = controller.sections, controller.gain
@@ -178,7 +178,7 @@ def _shares(sensor: SampledSensor, controller: SampledFilter) -> Shares:
     return (direct1, direct2), (now1, now2), (next1, next2)
 
 
-@njit(cache=True)
+@njit()
 def _close(
     lanes: Lanes,
     first: int,
@@ -205,7 +205,7 @@ def _close(
         work[_place(_OUTPUT, lanes, w)] = x
 
 
-@njit(cache=True)
+@njit()
 def _move_on(
     lanes: Lanes,
     sensor: SampledSensor,
@@ -246,7 +246,7 @@ def _move_on(
         work[_place(_PREDICTED, lanes, w)] = predicted
 
 
-@njit(cache=True)
+@njit()
 def _exceeding(lanes: Lanes, work: FloatArray, number: float, limit: float) -> int:
     """Return how many outputs exceed the limit; note the largest inputs, and when not above."""
     exceeding = 0
@@ -261,7 +261,7 @@ def _exceeding(lanes: Lanes, work: FloatArray, number: float, limit: float) -> i
     return exceeding
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _compute(
     lanes: Lanes,
     first: int,
