@@ -31,7 +31,6 @@ System in Space-based Gravitational Wave Detectors".
 
 from armlock.characteristic import CharacteristicFunction
 from armlock.controllers import Controller
-from armlock.design import Design, design
 from armlock.loops import (
     CommonArm,
     DualArm,
@@ -98,7 +97,6 @@ __all__ = [
     "CommonArm",
     "Controller",
     "CountError",
-    "Design",
     "DivergenceError",
     "DualArm",
     "HayesEquation",
@@ -123,7 +121,6 @@ __all__ = [
     "d_curve",
     "d_curve_branches",
     "d_curve_line",
-    "design",
     "flight_loop",
     "is_stable",
     "margins",

@@ -873,7 +873,7 @@ def robust_loop() -> Loop:
     1.464e-06
     4.375e-06
     """
-    # What a search found, rounded; the chapter on design finds one like it from round numbers.
+    # What a search found, rounded; chapter 12 finds one like it from round numbers.
     zeros = _at_hertz(0.37e-6, *[16.75e-6] * 3)
     poles = _at_hertz(0.25e-6, 0.108e-6, *[114.7e-6] * 4)
     return paper_loop(controller=((0.0, 0.0, *zeros), poles, paper.CONTROLLER_GAIN))
@@ -899,7 +899,7 @@ def buildable_loop() -> Loop:
     >>> int(unstable_roots(loop, 1.0 + 1e-6, 1.0 - 1e-6))
     0
     """
-    # What a search found, rounded; the chapter on design finds one like it.
+    # What a search found, rounded.
     zeros = _at_hertz(0.111, 4.67, 29.5, 186.0, 1266.0, 15450.0)
     poles = _at_hertz(0.0059, 0.82, 8.91, 54.6, 342.0, 2228.0, 40e3)
     # A gain of one at low frequency.
