@@ -24,7 +24,6 @@ LAYERS = [
     "robustness",
     "timedomain",
     "performance",
-    "design",
     "plotting",
     "orbits",
 ]
