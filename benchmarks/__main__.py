@@ -12,15 +12,13 @@ import numba
 import numpy as np
 
 import armlock
-from benchmarks import calls, charts, cluster, frames, measure, peers, simulation
+from benchmarks import calls, charts, measure, peers, simulation
 from benchmarks.report import Row, Topic, agree, closing_line, markdown
 
 TOPICS = {
     "charts": charts,
     "calls": calls,
     "simulation": simulation,
-    "cluster": cluster,
-    "frames": frames,
     "peers": peers,
 }
 

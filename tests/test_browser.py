@@ -42,8 +42,6 @@ FAULTS = {
         "a slider changes nothing: dead"
     ),
     '<p data-check="hover">still</p>': "to the pointer does not",
-    '<p data-check="hover" onpointermove="if (event.pointerType === \'mouse\') '
-    "this.textContent = 'here'\">Move over this.</p>": "to a finger does not",
 }
 
 

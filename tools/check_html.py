@@ -7,8 +7,7 @@ be a file in the folder, and must exist. Links that a reader may follow can lead
 but those that stay within the book must lead to a page and an anchor that exist, and files that
 are offered must open. A chapter offers its notebook.
 
-The book, of twenty-one chapters, is to stay below 30 MB, and a figure's SVG below 2 MB: dense
-curves are rasterised in it. What each page weighs is checked in a browser.
+A figure's SVG stays below 2 MB: dense curves are rasterised in it.
 """
 
 import csv
@@ -23,7 +22,7 @@ from urllib.parse import unquote, urlsplit
 # What a link says of its target when it is not loaded: it is somewhere to go.
 NOT_LOADED = {"alternate", "author", "canonical", "help", "license", "next", "prev", "search"}
 OPENED = {".csv", ".png", ".svg", ".ipynb", ".json"}
-LARGEST_BOOK, LARGEST_FIGURE = 60e6, 2e6  # bytes
+LARGEST_FIGURE = 2e6  # bytes
 CSS_URL = re.compile(r"""@import\s+["']([^"']+)|url\(\s*["']?([^"')]+)""")
 
 
@@ -154,14 +153,12 @@ def read_download(file: Path) -> None:
 
 
 def sizes(folder: Path) -> list[str]:
-    """Return what is too large in a folder."""
-    files = {f: f.stat().st_size for f in folder.rglob("*") if f.is_file()}
-    found = [(folder, sum(files.values()), LARGEST_BOOK)]
-    found += [(f, size, LARGEST_FIGURE) for f, size in files.items() if f.suffix == ".svg"]
+    """Return the figures in a folder that are too large."""
+    files = {file: file.stat().st_size for file in folder.rglob("*.svg")}
     return [
-        f"{name} has {size / 1e6:.1f} MB, more than {largest / 1e6:.0f}"
-        for name, size, largest in found
-        if size > largest
+        f"{file} has {size / 1e6:.1f} MB, more than {LARGEST_FIGURE / 1e6:.0f}"
+        for file, size in files.items()
+        if size > LARGEST_FIGURE
     ]
 
 
