@@ -158,8 +158,9 @@ bench: $(PACKAGE) ## Measure speed and memory, and print a table
 	$(PY) -m benchmarks
 
 dist: $(PACKAGE) ## Build the source archive and the wheel into dist/, and check them
-	$(PY) tools/build_dist.py dist
-	$(PY) -m twine check --strict dist/*
+	rm -rf dist
+	$(PY) -m uv build --quiet --no-build-isolation --python $(PY) --out-dir dist
+	$(PY) -m twine check --strict dist/*.whl dist/*.tar.gz
 
 ## Upkeep --------------------------------------------------------------------------------
 
