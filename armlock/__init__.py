@@ -46,12 +46,9 @@ from armlock.loops import (
 from armlock.performance import NoiseBudget, noise_budget, pulling, transfer
 from armlock.robustness import (
     Margins,
-    StabilityRegion,
     critical_perturbation,
-    is_stable,
     margins,
     modulus_margin,
-    stability_region,
 )
 from armlock.stability import (
     BOUNDARY,
@@ -73,7 +70,6 @@ from armlock.stability import (
     transition_matrix,
     unstable_roots,
 )
-from armlock.sweep import sweep
 from armlock.timedomain import (
     DivergenceError,
     LaserNoise,
@@ -113,7 +109,6 @@ __all__ = [
     "Spectrum",
     "SpectrumEstimator",
     "StabilityChart",
-    "StabilityRegion",
     "amplitude_spectrum",
     "axis_crossings",
     "buildable_loop",
@@ -122,7 +117,6 @@ __all__ = [
     "d_curve_branches",
     "d_curve_line",
     "flight_loop",
-    "is_stable",
     "margins",
     "modulus_margin",
     "noise_budget",
@@ -137,8 +131,6 @@ __all__ = [
     "simulate",
     "spectral_radius",
     "stability_chart",
-    "stability_region",
-    "sweep",
     "transfer",
     "transition_matrix",
     "unstable_roots",

@@ -58,10 +58,6 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     ARMS.chain_reserve: AT,
     armlock.unstable_roots: {"system": ARMS} | AT,
     armlock.stability_chart: {"system": ARMS, "x": [1.0], "y": [1.0]},
-    armlock.is_stable: {"system": ARMS} | AT,
-    # Its arguments have the names of the free parameters, as those of ARMS.
-    armlock.stability_region: {"make_loop": lambda c1, c2: SingleArm(c1, c2), "x": [1.0],
-                               "y": [1.0]} | POINT,
     armlock.rightmost_root: {"system": ARMS} | AT,
     extended_root: {"system": ARMS, "start": 0.0, "digits": 20} | AT,
     armlock.d_curve: {"system": ARMS, "omega": 1.0},
@@ -129,7 +125,7 @@ def test_every_public_function_is_called_above():
     called = {getattr(function, "__name__", "") for function in CALLS}
     public = {name for name in armlock.__all__ if inspect.isfunction(getattr(armlock, name))}
     # They take no number, or have a test of what they refuse beside their own tests.
-    elsewhere = {"published_loops", "robust_loop", "buildable_loop", "sweep"}
+    elsewhere = {"published_loops", "robust_loop", "buildable_loop"}
     assert public - called == elsewhere
 
 

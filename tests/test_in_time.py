@@ -20,7 +20,6 @@ from armlock import (
     axis_crossings,
     critical_perturbation,
     d_curve,
-    is_stable,
     margins,
     modulus_margin,
     nyquist,
@@ -85,7 +84,6 @@ def asked(rng, loop, point):
     step = loop.tau1 / int(rng.integers(2, 20))
     return {
         "unstable_roots": partial(unstable_roots, loop, *point),
-        "is_stable": partial(is_stable, loop, *point),
         "margins": partial(margins, loop, *point),
         "margins, free": lambda: margins(loop, point[0], point[1], above),
         "modulus_margin": partial(modulus_margin, loop, *point),

@@ -12,8 +12,6 @@ LAYERS = [
     "checks",
     "paper",
     "progress",
-    "store",
-    "sweep",
     "axis",
     "engine",
     "controllers",

@@ -8,20 +8,16 @@ from armlock.robustness.boxes import box_counts
 from armlock.robustness.gains import gain_interval
 from armlock.robustness.margins import Margins, critical_perturbation, margins, modulus_margin
 from armlock.robustness.rays import Crossing, Crossings, Ray, first_crossing
-from armlock.robustness.regions import StabilityRegion, is_stable, stability_region
 
 __all__ = [
     "Crossing",
     "Crossings",
     "Margins",
     "Ray",
-    "StabilityRegion",
     "box_counts",
     "critical_perturbation",
     "first_crossing",
     "gain_interval",
-    "is_stable",
     "margins",
     "modulus_margin",
-    "stability_region",
 ]

@@ -15,10 +15,9 @@ walk can be certified. To that error the one of x and y contributes
 from __future__ import annotations
 
 import math
-from concurrent.futures import Executor
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -45,7 +44,6 @@ from armlock.checks import (
 )
 from armlock.loops import power_series
 from armlock.stability.bounds import last_frequency
-from armlock.sweep import sweep
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,8 +60,6 @@ _OUTSIDE = (0.38196601125, 0.27639320225)
 
 # Memory that a chart takes for each point: counts, flags, and a copy of them.
 _BYTES_A_POINT = 32
-# Most tiles, of whole rows, into which a chart is cut for an executor.
-_TILES = 64
 # What becomes an error, and the reason that it gives.
 _WHY_NOT = {
     counting.TOO_LONG: f"following D takes more than {MOST_STEPS:.0e} steps, because "
@@ -391,8 +387,6 @@ def stability_chart(
     system: CharacteristicFunction,
     x: npt.ArrayLike,
     y: npt.ArrayLike,
-    *,
-    executor: Executor | None = None,
 ) -> StabilityChart:
     r"""Count the unstable roots over a grid.
 
@@ -402,8 +396,6 @@ def stability_chart(
         The loop, for instance `CommonArm()`.
     x, y : array_like of float, one-dimensional
         Axes of the two free parameters, in any order and spacing.
-    executor : concurrent.futures.Executor, optional
-        What computes the rows, in tiles, as for `armlock.sweep`; the same chart.
 
     Returns
     -------
@@ -443,10 +435,6 @@ def stability_chart(
     name1, name2 = checked_system(system).parameters
     xs, ys = axis(name1, x), axis(name2, y)
     check_memory(f"{name1} and {name2}", (ys.size, xs.size), _BYTES_A_POINT)
-    if executor is not None:
-        tiles = np.array_split(ys, min(ys.size, _TILES))
-        charts = sweep(partial(stability_chart, system, xs), tiles, executor=executor)
-        return StabilityChart(system, xs, ys, np.vstack([chart.counts for chart in charts]))
     order_x, order_y = np.argsort(xs, kind="stable"), np.argsort(ys, kind="stable")
     if system.b1.coefficients.any():
         counts = _chart_rows(system, xs[order_x], ys[order_y])
