@@ -187,28 +187,38 @@ def test_frozen_rates_are_those_of_simulations_with_moving_delays(chapter):
     assert min(rates) < 0.0 < max(rates)
 
 
+PAGE = (ROOT / "book" / "in_orbit.md").read_text("utf-8")
+*BLOCKS, LISAORBITS = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+
+
 def page(**changes):
     """Run the code of the page, with other text for some of it; return names and output."""
-    text = (ROOT / "book" / "in_orbit.md").read_text("utf-8")
-    *blocks, last = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
-    assert "lisaorbits" in last
-    code = "\n".join(blocks)
+    code = "\n".join(BLOCKS)
     for old, new in changes.items():
         assert code.count(f"\n{old} = ") == 1
         code = re.sub(rf"\n{old} = .*", f"\n{old} = {new}", code)
     names: dict[str, Any] = {}
     with contextlib.redirect_stdout(io.StringIO()) as out:
         exec(code, names)
-    return names, out.getvalue(), text
+    return names, out.getvalue()
 
 
 def test_the_page_prints_what_it_shows():
-    _, printed, text = page()
-    assert f"```text\n{printed}```" in text
+    _, printed = page()
+    assert f"```text\n{printed}```" in PAGE
+
+
+def test_orbits_of_lisaorbits_are_read_as_the_page_shows():
+    pytest.importorskip("lisaorbits")
+    names: dict[str, Any] = {"np": np}
+    exec(LISAORBITS, names)
+    t = np.linspace(1e3, 3e7, 50)
+    off = np.subtract(names["orbit"].round_trips(t), kepler().round_trips(t))
+    assert np.abs(off).max() < 1e-10
 
 
 def test_the_page_gives_the_range_and_the_days_of_the_chapter(chapter, weak):
-    names, printed, _ = page(controller="1 / (s + 0.1)")
+    names, printed = page(controller="1 / (s + 0.1)")
     assert abs(names["low"] - weak[1][0]) < 1e-5
     x = chapter["half"]["Kepler", 1]
     days = chapter["stable_days"](chapter["ratio"](x), *weak[1])
