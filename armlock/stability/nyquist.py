@@ -1,10 +1,8 @@
 """The open loop on the imaginary axis: Nyquist curve, encirclements, crossings.
 
 The contour goes up the imaginary axis, indented to the right around the pole of L at s = 0,
-and back at infinity. It is sampled so finely that the argument of 1 + L is known without doubt,
-up to past the last root on the axis; what 1 + L gathers from there on follows from the roots of
-its numerator and denominator without delays. The encirclements are then held against the count
-of unstable roots: Z = N + P.
+and back at infinity. The encirclements N = Z - P follow from the certified count Z of unstable
+roots and the number P of unstable poles of L. The samples of the curve are for pictures.
 """
 
 from __future__ import annotations
@@ -14,30 +12,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from armlock.axis.contour import MOST_SAMPLES, argument_at, resolved_grid
-from armlock.axis.threads import interruptible
 from armlock.checks import (
-    BoolArray,
     ComplexArray,
     FloatArray,
     positive_number,
 )
 from armlock.loops import Loop, LoopAt
 from armlock.stability.bounds import last_frequency, last_larger
-from armlock.stability.counts import CountError, loop_count
+from armlock.stability.counts import UNCONFINED, CountError, loop_count
 from armlock.stability.zeros import axis_zeros
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# How far numerator and denominator of 1 + L may be from straight lines between two samples,
-# relative to their distance from zero. Neither turns by more than 0.31 rad then.
-_STRAIGHT = 0.1
-# Most that 1 + L turns between two samples, in rad, unless it passes through zero.
-_MOST_TURN = 1.0
-# Up to which |L| a picture is linear; it is logarithmic beyond. And most samples that it takes.
-_LINEAR = 0.01
-_MOST_SHOWN = 1_000_000
 # Where |L| is below it no crossing of the negative real axis is of interest.
 _SMALL = 1e-3
 
@@ -49,8 +36,7 @@ class NyquistCurve:
     Attributes
     ----------
     omega : float array, shape (n,)
-        Ascending frequencies in rad/s, from the indentation up. There are at most a million,
-        where a picture would show them apart.
+        Ascending frequencies in rad/s, from the indentation up, close enough for a picture.
     response : complex array, shape (n,)
         L(j omega).
     indentation : complex array, shape (k,)
@@ -61,7 +47,7 @@ class NyquistCurve:
     pole_order : int
         Order of the pole of L at s = 0, after cancellation.
     encirclements : int
-        N, clockwise turns around -1 of the whole contour, both signs of omega.
+        N = Z - P, clockwise turns around -1 of the whole contour, both signs of omega.
     open_loop_poles : int
         P, poles of L in the open right half-plane.
     closed_loop_roots : int
@@ -157,23 +143,6 @@ def open_loop_poles(loop: Loop) -> int:
     return int((poles.real > 0.0).sum())
 
 
-def _resolving_grid(loop: Loop, c1: float, c2: float, end: float) -> FloatArray:
-    """Frequencies from 0 to `end` between which neither D nor R turns by much."""
-    grids = []
-    for part in (loop.sum_at(c1, c2), loop.rest_on_boundary()):
-        grid, complete = interruptible(
-            resolved_grid, part.compiled(), end, _STRAIGHT, most=MOST_SAMPLES
-        )
-        if not complete:
-            raise CountError(
-                f"no samples up to omega = {end} rad/s: more than {MOST_SAMPLES:.0e}, "
-                f"because gain times delay is too large",
-                np.empty((0, 2)),
-            )
-        grids.append(grid)
-    return np.unique(np.concatenate(grids))
-
-
 def _drawing_grid(loop: Loop, start: float, end: float) -> FloatArray:
     """Frequencies close enough to draw the curve; finer at first, where L changes most.
 
@@ -184,36 +153,14 @@ def _drawing_grid(loop: Loop, start: float, end: float) -> FloatArray:
     resolved = min(1000.0 * per_turn, end)
     whole = np.arange(0.0, resolved, per_turn / 400.0)
     far = np.geomspace(resolved, end, 100_000) if end > resolved else whole[:0]
-    return np.concatenate((np.geomspace(start, end, 1000), first, whole, far))
-
-
-def _shown(response: ComplexArray) -> BoolArray:
-    """Which of many samples a picture shows apart, on the scale of `plot_nyquist`."""
-    size = np.abs(response)
-    far = np.arcsinh(size / _LINEAR) * response / np.where(size > 0.0, size, 1.0)
-    length = np.cumsum(np.abs(np.diff(far, prepend=far[0])))
-    share = length / max(float(length[-1]), 1e-300)
-    kept = np.diff(np.floor(share * _MOST_SHOWN), prepend=-1.0) > 0.0
-    kept[-1] = True
-    return np.asarray(kept)
-
-
-def _turn_beyond(loop: Loop, last: complex, end: float) -> float:
-    """Argument that 1 + L gathers from j `end`, where it is `last`, to infinity and back.
-
-    1 + L is D / A times A / R. From `end` on |D / A - 1| < 1, up the axis and along the arc at
-    infinity, on which D / A tends to one: its argument at `end` is taken back. Those of A and R
-    are known from their roots. The two are of one degree, and turn alike along the arc.
-    """
-    gathered = argument_at(loop.polynomials()[0].roots, end) - argument_at(loop.roots_of_a, end)
-    ratio = loop.a[-1] / loop.rest.coefficients[-1] * np.exp(-1j * gathered)
-    return float(gathered - np.angle(last / ratio))
+    every = np.concatenate((np.geomspace(start, end, 4000), first, whole, far, [end]))
+    return np.unique(every[(every >= start) & (every <= end)])
 
 
 def nyquist(
     loop: Loop, c1: float = 1.0, c2: float = 1.0, *, omega_max: float | None = None
 ) -> NyquistCurve:
-    r"""Trace the Nyquist curve and count its encirclements of -1.
+    r"""Return the Nyquist curve for a picture, and its certified encirclements of -1.
 
     .. math::
 
@@ -228,8 +175,7 @@ def nyquist(
     c1, c2 : float, optional
         Multiplicative perturbations.
     omega_max : float, optional
-        Trace at least up to this frequency in rad/s, with samples close enough to draw. The
-        count needs neither, and takes other samples.
+        Sample at least up to this frequency in rad/s.
 
     Returns
     -------
@@ -241,9 +187,8 @@ def nyquist(
         If `loop` is no `Loop`, an argument is not finite and real, `omega_max` is not
         positive, or L has poles on the imaginary axis elsewhere than at s = 0.
     CountError
-        If the curve passes through -1, the loop's high-frequency chain is not confined, the
-        curve takes too many samples, or the encirclements and the independent count of roots
-        disagree.
+        If the curve passes through -1, the loop's high-frequency chain is not confined, or the
+        roots cannot be counted.
 
     Notes
     -----
@@ -261,53 +206,25 @@ def nyquist(
     loop, c1, c2 = point = LoopAt.of(loop, c1, c2)
     poles = open_loop_poles(loop)
     order = point.poles_at_zero()
-    end = float(last_frequency(loop, c1, c2))
-
-    def refused(why: str) -> CountError:
+    count = loop_count(loop, c1, c2)
+    if count < 0:
+        chain = "its high-frequency chain of roots is not confined"
+        why = chain if count == UNCONFINED else "the curve passes through -1"
         where = f"(c1, c2) = ({c1}, {c2})"
-        return CountError(f"no Nyquist count at {where}: {why}", np.array([[c1, c2]]))
-
-    if not np.isfinite(end):
-        raise refused("the loop's high-frequency chain of roots is not confined")
-    radius = point.leading_radius()
-    end = max(1.05 * end, 10.0 / loop.longest_delay, 10.0 * radius)
-    grid = _resolving_grid(loop, c1, c2, end)
-    omega = np.concatenate(([radius], grid[(grid > radius) & (grid < end)], [end]))
-    arc = radius * np.exp(0.5j * np.pi * np.linspace(0.0, 1.0, 64))
-    contour = loop(np.concatenate((arc[:-1], 1j * omega)), c1, c2)
-    turned = np.angle((1.0 + contour[1:]) / (1.0 + contour[:-1]))
-    if np.abs(turned).max() > _MOST_TURN:
-        raise refused("the curve passes through -1")
-    # Half of the contour, for omega >= 0, in the direction of ascending omega.
-    turns = (float(turned.sum()) + _turn_beyond(loop, 1.0 + contour[-1], end)) / np.pi
-    encirclements = -round(turns)
-    count = encirclements + poles
-    expected = loop_count(loop, c1, c2)
-    if expected != count:
-        raise refused(
-            f"{encirclements} encirclements and {poles} open-loop poles against {expected} "
-            "roots"
-        )
-    indented = slice(arc.size if order else 0)
-    response = contour[arc.size - 1 :]
+        raise CountError(f"no Nyquist count at {where}: {why}", np.array([[c1, c2]]))
+    radius, last = point.leading_radius(), float(last_frequency(loop, c1, c2))
+    end = max(1.05 * last, 10.0 / loop.longest_delay, 10.0 * radius)
     if omega_max is not None:
-        last = max(end, positive_number("omega_max", omega_max))
-        more = np.setdiff1d(_drawing_grid(loop, radius, last), omega)
-        more = np.append(more[(more > radius) & (more < last)], last if last > end else [])
-        every = np.concatenate((omega, more))
-        order_of = np.argsort(every, kind="stable")
-        omega = every[order_of]
-        response = np.concatenate((response, loop(1j * more, c1, c2)))[order_of]
-    if omega.size > _MOST_SHOWN:
-        shown = _shown(response)
-        omega, response = omega[shown], response[shown]
+        end = max(end, positive_number("omega_max", omega_max))
+    omega = _drawing_grid(loop, radius, end)
+    arc = radius * np.exp(0.5j * np.pi * np.linspace(0.0, 1.0, 64))[slice(64 if order else 0)]
     return NyquistCurve(
         omega=omega,
-        response=response,
-        indentation=arc[indented],
-        indentation_response=contour[indented],
+        response=loop(1j * omega, c1, c2),
+        indentation=arc,
+        indentation_response=loop(arc, c1, c2),
         pole_order=order,
-        encirclements=encirclements,
+        encirclements=count - poles,
         open_loop_poles=poles,
         closed_loop_roots=count,
         point=point,
