@@ -189,7 +189,7 @@ def test_the_pole_at_zero_cancels_only_where_it_does(loop, c1, order):
 
 
 def test_a_count_that_takes_too_many_steps_is_refused():
-    with pytest.raises(CountError, match="takes more than .* steps"):
+    with pytest.raises(CountError, match="takes more than"):
         nyquist(CommonArm(1e9), 1.2, 1.05)
 
 
