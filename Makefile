@@ -79,7 +79,7 @@ $(PACKAGE): $(ENVIRONMENT) pyproject.toml book/kernel.json
 
 # nbmake runs copies of the notebooks for the tests and for the book, the longest first. All
 # claims are checked before: chapters and tests take what was found.
-LONGEST := $(wildcard notebooks/09_* notebooks/15_* notebooks/13_* notebooks/16_*)
+LONGEST := $(wildcard notebooks/09_* notebooks/13_* notebooks/16_*)
 PYTEST := $(PY) -m pytest --numprocesses auto --maxprocesses 4 --dist worksteal
 execute = export ARMLOCK_FIGURES=$(CURDIR)/$(1); \
 	$(PYTEST) --dist load --maxschedchunk 1 --nbmake --overwrite $(2) && \

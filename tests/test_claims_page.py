@@ -67,11 +67,11 @@ def test_counts_are_of_physics_and_of_the_white_paper_by_itself():
 
 
 def test_errata_are_what_is_not_as_printed(ledger):
-    found = Errata(ledger)
+    found = Errata(ledger, Verdict.NOT_AS_WRITTEN)
     assert [claim.identifier for claim, _ in found.entries] == ["D10"]
     assert Ids(found._repr_html_()).ids == ["erratum-D10"]
     assert "<dt>Printed</dt>" in found._repr_html_()
-    assert len(Errata(ledger, Weight.PHYSICS)) == 0
+    assert len(Errata(ledger, Verdict.NOT_AS_WRITTEN, Weight.PHYSICS)) == 0
 
 
 def test_a_loop_that_is_unstable_has_no_first_break():

@@ -1,12 +1,26 @@
-"""Claims that the text names, as in "claims K5 and K6", link to their rows in the ledger."""
+"""The ledger of claims as a page, and links to it from all claims that a text names."""
 
 from docutils import nodes
 from sphinx.util import logging
+from sphinx.util.docutils import SphinxDirective
 
 from book.companion.claims.ledger import NAME, NAMING, all_names
+from book.companion.claims.page import LedgerPage, VerdictCounts, whole_ledger
 
 LEDGER = "notebooks/15_ledger"
 LOGGER = logging.getLogger(__name__)
+
+
+class Ledger(SphinxDirective):
+    """Show the counts of verdicts and the table of all claims."""
+
+    def run(self):
+        """Return them as HTML, in which MathJax sets the formulas."""
+        ledger = whole_ledger()
+        shown = "".join(
+            part._repr_html_() for part in (VerdictCounts(ledger), LedgerPage(ledger))
+        )
+        return [nodes.raw("", f'<div class="tex2jax_process">{shown}</div>', format="html")]
 
 
 def link(app, doctree, docname):
@@ -34,5 +48,6 @@ def link(app, doctree, docname):
 
 def setup(app):
     """Register with Sphinx."""
+    app.add_directive("ledger", Ledger)
     app.connect("doctree-resolved", link)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -183,27 +183,29 @@ def plot_constellation(ax: Axes) -> None:
     ax.set_aspect("equal")
     master, remote = np.zeros(2), 6.0 * np.array([[-0.5, 0.866], [0.5, 0.866]])
     ax.plot(*remote.T, ":", color="#999999", zorder=0)
-    for spacecraft, name in ((master, "master"), *zip(remote, ("2", "1"), strict=True)):
+    for spacecraft in (master, *remote):
         ax.plot(*spacecraft, "s", color="white", markeredgecolor="black", ms=15, zorder=3)
-        above = 0.0 if name == "master" else 0.75
-        ax.text(spacecraft[0] - (1.75 if name == "master" else 0.0), spacecraft[1] + above,
-                name if name == "master" else f"spacecraft {name}", ha="center", va="center")  # fmt: skip
+    ax.text(-0.7, 0.0, "master spacecraft,\nwith the laser", ha="right", va="center")
+    for far, number in zip(remote, ("2", "1"), strict=True):
+        ax.text(far[0], far[1] + 0.75, f"spacecraft {number}", ha="center", va="center")
     for far, number in zip(remote, ("2", "1"), strict=True):
         along = far / np.hypot(*far)
         aside = 0.14 * np.array([-along[1], along[0]])
-        for start, end in ((0.6 * along + aside, far - 0.6 * along + aside),
-                           (far - 0.6 * along - aside, 0.6 * along - aside)):  # fmt: skip
+        near, end = 0.6 * along, far - 0.6 * along
+        for start, stop in ((near + aside, end + aside), (end - aside, near - aside)):
             arrow = {"arrowstyle": "-|>", "color": ORANGE, "shrinkA": 0.0, "shrinkB": 0.0}
-            ax.annotate("", end, start, arrowprops=arrow)
+            ax.annotate("", stop, start, arrowprops=arrow)
         side = 1.0 if number == "1" else -1.0
-        place = 0.5 * far + side * np.array([0.45, 0.0])
-        ax.text(*place, f"arm {number}", ha="left" if side > 0 else "right", va="center")
+        x, y = 0.5 * far
+        ax.text(
+            x + 0.45 * side, y, f"arm {number}", ha=("right", "left")[side > 0], va="center"
+        )
     ax.text(0.0, 3.9, "out and back:\nabout 20 s", ha="center", va="center", color=ORANGE)
     arrow = {"arrowstyle": "-|>", "color": BLUE, "linestyle": "--", "shrinkA": 0.0}
-    for start, end in (((0.35, -0.35), (2.6, -1.9)), ((-2.6, -1.9), (-0.35, -0.35))):
+    for start, end in (((0.35, -0.35), (2.6, -1.7)), ((-2.6, -1.7), (-0.35, -0.35))):
         ax.annotate("", end, start, arrowprops=arrow)
     ax.annotate("", (-1.35, -2.3), (1.35, -2.3), arrowprops=arrow)
     box = {"boxstyle": "round,pad=0.3", "facecolor": "white", "edgecolor": BLUE}
-    ax.text(2.7, -2.3, "returned light\nminus laser", ha="center", va="center", bbox=box)
+    ax.text(2.7, -2.3, "compare with\nreturned light", ha="center", va="center", bbox=box)
     ax.text(-2.7, -2.3, "controller\nsteers laser", ha="center", va="center", bbox=box)
     ax.set(xlim=(-4.6, 4.6), ylim=(-3.2, 6.6))

@@ -212,16 +212,17 @@ class Errata:
     ----------
     ledger : Ledger
         The claims and their findings.
+    verdict : Verdict
+        Which claims to take.
     *weights : Weight
-        Which ones to take; by default all.
+        Of which weight; by default all.
     """
 
-    def __init__(self, ledger: Ledger, *weights: Weight) -> None:
+    def __init__(self, ledger: Ledger, verdict: Verdict, *weights: Weight) -> None:
         self.entries = [
             (claim, finding)
             for claim, finding in ledger
-            if finding.verdict in (Verdict.NOT_AS_WRITTEN, Verdict.DIFFERS)
-            and claim.weight in (weights or Weight)
+            if finding.verdict is verdict and claim.weight in (weights or Weight)
         ]
         self.ledger = ledger
 
