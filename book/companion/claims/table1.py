@@ -17,7 +17,6 @@ from armlock.loops import (
     Loop,
     SingleArm,
     flight_loop,
-    paper_loop,
     published_loops,
 )
 from armlock.orbits import kepler
@@ -404,10 +403,9 @@ def round_trips() -> Finding:
     orbit = kepler(TAIJI_ARM_LENGTH)
     time = np.linspace(0.0, 365.25 * 86400.0, 2001)
     half = 0.5e3 * float(np.abs(np.subtract(*orbit.round_trips(time))).max())
-    here = Loop(
-        table_two(), paper_loop().mapping, MEAN_DELAY + 1e-3 * half, MEAN_DELAY - 1e-3 * half
-    )
-    breaks = critical_perturbation(here, (1.0, -1.0))
+    arms = MEAN_DELAY + 1e-3 * half, MEAN_DELAY - 1e-3 * half
+    sensor = sensors.dual(DUAL_SENSOR_CORNER, 2e-3 * half)
+    breaks = critical_perturbation(Loop(table_two(), sensor, *arms), (1.0, -1.0))
     return Finding(
         {
             "": {
