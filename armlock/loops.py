@@ -366,6 +366,15 @@ def _mapping_and_tau2(
     return mapping, tau2
 
 
+def _gain(gain: float, sensor: str) -> float:
+    """Return a positive gain, or say what to write with a controller in its place."""
+    try:
+        return positive_number("gain", gain)
+    except TypeError as error:
+        advice = f'with a controller of your own write Loop(controller, "{sensor}", ...)'
+        raise TypeError(f"{error}; {advice}") from None
+
+
 def _factored(
     product: FloatArray, roots: tuple[complex, ...], other: Sequence[float] | FloatArray
 ) -> Polynomial:
@@ -556,7 +565,7 @@ class SingleArm(Loop):
         tau: float = paper.TAU1,
         delay: float = 0.0,
     ) -> None:
-        gain, tau = positive_number("gain", gain), positive_number("tau", tau)
+        gain, tau = _gain(gain, "single"), positive_number("tau", tau)
         super().__init__(integrating_actuator(gain), sensors.SINGLE, tau, delay=delay)
         vars(self).update(gain=gain, tau=tau)
 
@@ -603,7 +612,7 @@ class CommonArm(Loop):
         tau2: float = paper.TAU2,
         delay: float = 0.0,
     ) -> None:
-        gain = positive_number("gain", gain)
+        gain = _gain(gain, "common")
         super().__init__(integrating_actuator(gain), sensors.COMMON, tau1, tau2, delay)
         vars(self).update(gain=gain)
 
@@ -673,7 +682,7 @@ class DualArm(Loop):
         difference: float | None = None,
         delay: float = 0.0,
     ) -> None:
-        gain = positive_number("gain", gain)
+        gain = _gain(gain, "dual")
         between = _delay_difference(tau1, tau2, difference)
         mapping = sensors.dual(corner, between)
         super().__init__(integrating_actuator(gain), mapping, tau1, tau2, delay)

@@ -5,6 +5,7 @@ import pytest
 
 from armlock import (
     CommonArm,
+    Controller,
     DualArm,
     Loop,
     SingleArm,
@@ -106,6 +107,12 @@ def test_a_system_without_delays_cannot_be_made_of_a_loop(convert):
 def test_other_functions_of_python_control_refuse_a_loop(convert):
     with pytest.raises((TypeError, AttributeError, ValueError)):
         convert(CommonArm())
+
+
+@pytest.mark.parametrize("arm", [SingleArm, CommonArm, DualArm])
+def test_a_controller_in_place_of_a_gain_is_told_what_to_write(arm):
+    with pytest.raises(TypeError, match=r"^gain must .* write Loop\(controller, "):
+        arm(Controller([], [0.0], 1.0))
 
 
 def test_what_is_missing_is_named():
