@@ -63,6 +63,11 @@ def _crossing(loop: Loop, low: float, high: float) -> float:
     return float(np.exp(brentq(level, np.log(low), np.log(high), xtol=1e-14)))
 
 
+def lower_unity_gain(loop: Loop) -> float:
+    """Return the unity-gain frequency in Hz near 5 uHz."""
+    return _crossing(loop, 1e-6, 1e-5)
+
+
 def highest_unity_gain(loop: Loop) -> float:
     """Return the frequency in Hz past which |L| is below one for all phases of the arms."""
 
@@ -182,7 +187,7 @@ def acquisition_pulling(laser: str, averaging: float = 200.0) -> float:
 )
 def unity_gain() -> Finding:
     """Solve |L| = 1 below, and for the arms' phases of the largest |L| above."""
-    low, high = _crossing(LOOP, 1e-6, 1e-5), highest_unity_gain(LOOP)
+    low, high = lower_unity_gain(LOOP), highest_unity_gain(LOOP)
     return Finding(
         {
             "": {

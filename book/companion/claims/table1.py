@@ -261,17 +261,6 @@ def dual_response(
     return response(sensors.COMMON, omega) - factor / (s * difference) * apart
 
 
-def published_filters(s: npt.ArrayLike, mean: float, half: float) -> tuple[Any, Any]:
-    """Return H_+ and H_- as the white paper prints them, for mean and half difference in s."""
-    s, turn = np.asarray(s), 2.0 * np.pi
-    zero, pole = turn * 5.0 / (13.0 * mean), turn * 5.0 / (2.0 * mean)
-    common = (pole / zero) * (s + zero) / (mean * s * (s + pole))
-    last = turn / (90.0 * mean)
-    dual = s**4 / ((s + 7.0 / (5.0 * mean)) * (s + 11.0 / (20.0 * mean)) * (s + last) ** 2)
-    low_pass = DUAL_SENSOR_CORNER / (s + DUAL_SENSOR_CORNER)
-    return common + dual, low_pass * dual / (s * half)
-
-
 def _largest(values: Any) -> float:
     return float(np.abs(values).max())
 
