@@ -85,7 +85,7 @@ class VerdictCounts:
     --------
     >>> from book.companion.claims import check
     >>> from book.companion.claims.page import VerdictCounts
-    >>> VerdictCounts(check("T1", "S4"))
+    >>> VerdictCounts(check("S2", "S4"))
     1 claim of physics: 1 reproduced
     1 claim of derivation: 1 reproduced
     """

@@ -784,7 +784,7 @@ def which_point() -> Finding:
     apart = float(np.abs(strong.asd / ideal.asd - 1.0).max())
     return Finding(
         # The two captions contradict each other.
-        {PRINTED: False, "with $(1, 1 - 10⁻⁶)$ in both captions": apart < 0.01},
+        {PRINTED: STRONG == IDEAL, "with $(1, 1 - 10⁻⁶)$ in both captions": apart < 0.01},
         apart,
         f"largest relative difference of the spectra at the two points, {1e3 * BAND[0]:g} mHz "
         f"to {BAND[1]:g} Hz",
