@@ -34,15 +34,13 @@ def ledger():
     return check("T1", "D10", "C12")
 
 
-def test_the_page_has_a_row_a_claim_with_its_chapter_and_source(ledger, monkeypatch):
-    monkeypatch.delenv("ARMLOCK_FIGURES", raising=False)
+def test_the_page_has_a_row_a_claim_with_its_chapter_and_source(ledger):
     text = LedgerPage(ledger)._repr_html_()
     page = Ids(text)
     assert page.open == []
     assert page.ids == ["ledger-T1", "ledger-D10", "ledger-C6", "ledger-C12"]
     assert 'href="01_opening.html#claim-T1"' in text
     assert "def convention_of_difference()" in text
-    assert "claims.csv" not in text
     assert 'data-verdict="not_as_written"' in text
     assert "τ the round trip: not found" in text
     assert Verdict.ONE_READING.clause in text
@@ -50,13 +48,12 @@ def test_the_page_has_a_row_a_claim_with_its_chapter_and_source(ledger, monkeypa
     assert 'data-section="Sec. I and Table I"' in text
 
 
-def test_the_page_offers_the_ledger_as_data(ledger, monkeypatch, tmp_path):
-    monkeypatch.setenv("ARMLOCK_FIGURES", str(tmp_path))
-    text = LedgerPage(ledger)._repr_html_()
-    assert 'href="../figures/claims.csv"' in text
-    with (tmp_path / "claims.csv").open() as stream:
+def test_the_ledger_is_written_as_data(ledger, tmp_path):
+    table, tree = ledger.write(tmp_path)
+    assert f'href="../figures/{table.name}"' in LedgerPage(ledger)._repr_html_()
+    with table.open() as stream:
         assert [row["claim"] for row in csv.DictReader(stream)] == ["T1", "D10", "C6 C12"]
-    assert len(json.loads((tmp_path / "claims.json").read_text())) == 3
+    assert len(json.loads(tree.read_text())) == 3
 
 
 def test_counts_are_of_physics_and_of_the_white_paper_by_itself():

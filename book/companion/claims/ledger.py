@@ -339,6 +339,7 @@ class Ledger:
                 "chapter": chapter_of(entry.identifier),
                 "weight": str(entry.weight),
                 "verdict": str(finding.verdict),
+                "clause": finding.verdict.clause,
                 "readings": "; ".join(finding.tried),
                 "value": finding.value,
                 "quantity": finding.quantity,

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import html
 import inspect
-import os
 from collections import Counter
 from collections.abc import Callable, Iterable
 from importlib import metadata
@@ -127,33 +126,24 @@ class LedgerPage:
     Parameters
     ----------
     ledger : Ledger
-        The claims and their findings.
-
-    Notes
-    -----
-    The folder that the environment variable ARMLOCK_FIGURES names, if there is one, gets the
-    ledger as claims.csv and claims.json, which the page then links to.
+        The claims and their findings. The page links to claims.csv and claims.json, which
+        `make claims` and a build of the book write.
     """
 
     def __init__(self, ledger: Ledger) -> None:
         self.ledger = ledger
-        folder = os.environ.get("ARMLOCK_FIGURES")
-        self.files = [path.name for path in ledger.write(Path(folder))] if folder else []
-
-    def __repr__(self) -> str:
-        """Return the table as text."""
-        return repr(self.ledger)
 
     def _repr_html_(self) -> str:
         """Return controls, table and script."""
         rows = "".join(_row(claim, finding) for claim, finding in self.ledger)
         links = " · ".join(
-            f'<a href="../figures/{name}" download>{name}</a>' for name in self.files
+            f'<a href="../figures/claims.{ending}" download>claims.{ending}</a>'
+            for ending in ("csv", "json")
         )
-        downloads = f'<p class="figure-downloads">The ledger as data: {links}</p>'
         return (
             f'<div class="ledger">{_controls(self.ledger)}{table(rows)}'
-            f"{downloads if links else ''}</div><script>{SCRIPT.read_text('utf-8')}</script>"
+            f'<p class="figure-downloads">The ledger as data: {links}</p></div>'
+            f"<script>{SCRIPT.read_text('utf-8')}</script>"
         )
 
 
