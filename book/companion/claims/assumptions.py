@@ -132,27 +132,6 @@ def _difference() -> Assumption:
 
 
 @assumption
-def _actuator() -> Assumption:
-    return Assumption(
-        "The integrating actuator $1/s$ in the controlled loop",
-        "Absent in Sec. IV, present in Secs. II and III",
-        "What the paper says of its controller fits only a loop without the actuator.",
-        "With the actuator the controlled loop is unstable at the point that the paper "
-        "simulates (claim K13).",
-    )
-
-
-@assumption
-def _denominator() -> Assumption:
-    return Assumption(
-        "The last factor of the controller's denominator",
-        "$s + p₂₄$, from Table II",
-        "Eq. (11) prints $s + z₂₄$, which cancels a zero and leaves $p₂₄$ without use.",
-        "With $s + z₂₄$ the loop is unstable at (1, 1) (claim K4).",
-    )
-
-
-@assumption
 def _gain() -> Assumption:
     here, higher = (
         break_along(paper_loop(controller=table_two(factor * CONTROLLER_GAIN)))
@@ -164,18 +143,6 @@ def _gain() -> Assumption:
         "The paper gives a number without unit; $g/s$ is a rate over s in rad/s.",
         r"Were it in Hz, g would be $2\pi$ times larger: the critical perturbation "
         f"along $(1, -1)$ would be {higher:.4g}, not {here:.4g}.",
-    )
-
-
-@assumption
-def _order() -> Assumption:
-    return Assumption(
-        "Which arm is the longer",
-        f"Arm 1: $τ₁ = {TAU1}$ s, $τ₂ = {TAU2}$ s",
-        "The example of Fig. 4 has this order. The text of Sec. III.A says $τ₁ < τ₂$ (claim "
-        "C4).",
-        "Exchanging the arms exchanges $c₁$ and $c₂$. The box of perturbations is "
-        "symmetric, and the verdict on it the same.",
     )
 
 
