@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import bisect, brentq, minimize_scalar
 
 from armlock.characteristic import CharacteristicFunction
 from armlock.checks import FloatArray
@@ -345,7 +345,12 @@ def edges_against_gain() -> Finding:
     high = GAINS >= 1e4
     slope = log_slope(GAINS[high], corner[high])
     falls = np.diff(corner) < -1e-9 * corner[:-1]
-    first = GAINS[int(np.argmax(falls))]
+    k = int(np.argmax(falls))
+
+    def stays(log_gain: float) -> float:
+        return 0.5 - float(edges(float(np.exp(log_gain))).corner < (1.0 - 1e-9) * corner[0])
+
+    first = float(np.exp(bisect(stays, *np.log(GAINS[k : k + 2]), xtol=1e-3)))
     return Finding(
         {
             "from the gain of Fig. 5 up": bool((falls[GAINS[:-1] >= DUAL_ARM_GAIN]).all())
