@@ -8,7 +8,7 @@ and five times that of whole samples.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -22,12 +22,10 @@ from armlock.timedomain.discretize import sampled_loop
 from benchmarks.measure import in_turn
 from benchmarks.report import Row, Topic, at_least
 
-ENSEMBLE_RATIO = 2.5
 BETWEEN_RATIO, WHOLE_RATIO = 2.0, 5.0
 # Delays between samples, in s, and their change in s/s: as that of ESA's arms, some samples.
 BETWEEN = (TAU1 + 0.4 / SAMPLE_RATE, 6e-8), (TAU2 + 0.3 / SAMPLE_RATE, -5e-8)
 ACCURACY = 1e-10
-DRAWS = 32
 
 #: The noise and both perturbations.
 Inputs = tuple[FloatArray, FloatArray, FloatArray]
@@ -100,23 +98,17 @@ def part(series: Inputs, samples: int) -> Inputs:
     return noise[:samples], c1[:samples], c2[:samples]
 
 
-def side_by_side(series: Inputs) -> Inputs:
-    """Cut series into draws, the same sample of all side by side, as `Simulation` has it."""
-    samples = min(series[0].size // DRAWS, 100_000)
-    noise, c1, c2 = (x.reshape(samples, DRAWS).T for x in part(series, samples * DRAWS))
-    return noise, c1, c2
-
-
 def plain_rows(loop: Loop, series: Inputs, passes: int) -> list[Row]:
     """Compare `simulate` with the plain loop."""
     arguments = plain_arguments(loop)
     calls = [
-        lambda: simulate(loop, *series).size,
+        lambda: locked_size(loop, series, (None, None)),
         lambda: plain_output(series, arguments).size,
     ]
     ours, theirs = in_turn(calls, passes).min(axis=0)
     some = part(series, 4_000_000)
-    output, phi = simulate(loop, *some), plain_output(some, arguments)
+    output = simulate(loop, some[0], c1=some[1], c2=some[2])
+    phi = plain_output(some, arguments)
     differ = float(np.abs(output - phi).max() / np.abs(output).max())
     return [
         Row("simulate", ours),
@@ -126,72 +118,41 @@ def plain_rows(loop: Loop, series: Inputs, passes: int) -> list[Row]:
     ]  # fmt: skip
 
 
-def ensemble_rows(loop: Loop, series: Inputs, passes: int) -> list[Row]:
-    """Compare an ensemble with its runs one by one."""
-    together = side_by_side(series)
-    rows = list(zip(*map(np.ascontiguousarray, together), strict=True))
-    same = np.array_equal(simulate(loop, *together), [simulate(loop, *row) for row in rows])
-    calls: list[Callable[[], object]] = [
-        lambda: simulate(loop, *together).size,
-        lambda: [simulate(loop, *row).size for row in rows],
-    ]
-    times = in_turn(calls, passes, time.process_time)
-    ratio = float(np.median(times[:, 1] / times[:, 0]))
-    what = f"ensemble of {DRAWS}, {together[0].shape[1]:.3g} samples each [b]"
-    return [
-        at_least(what, float(times[:, 0].min()), ratio, ENSEMBLE_RATIO),
-        Row("ensemble and single runs agree", None, None, "bit by bit", same, correctness=True),
-    ]
-
-
 def moving_rows(loop: Loop, series: Inputs, passes: int) -> list[Row]:
     """Compare arms that move with constant delays, whole ones and others."""
-    alike, own = (
-        [partial(moving, shift=shift, tau=tau, rate=rate) for tau, rate in BETWEEN]
-        for shift in (np.zeros(()), np.arange(DRAWS)[:, None] / SAMPLE_RATE)
-    )
-    together, rows = side_by_side(series), []
-    for what, arrays, moves in (
-        ("one run", series, alike),
-        (f"ensemble of {DRAWS}", together, alike),
-        (f"ensemble of {DRAWS}, each its own arms", together, own),
-    ):
-        calls = [
-            partial(locked_size, loop, arrays, delays)
-            for delays in ((None, None), [tau for tau, _ in BETWEEN], moves)
-        ]
-        times = in_turn(calls, passes, time.process_time)
-        whole, between = np.median(times[:, 2:] / times[:, :2], axis=0)
-        met = bool(between <= BETWEEN_RATIO and whole <= WHOLE_RATIO)
-        rows.append(
-            Row(f"arms that move, {what} [c]; {whole:.2f}", float(times[:, 2].min()),
-                float(between), f"at most {BETWEEN_RATIO:g}; {WHOLE_RATIO:g}", met)
-        )  # fmt: skip
-    return rows
+    moves = [partial(moving, tau=tau, rate=rate) for tau, rate in BETWEEN]
+    calls = [
+        partial(locked_size, loop, series, delays)
+        for delays in ((None, None), [tau for tau, _ in BETWEEN], moves)
+    ]
+    times = in_turn(calls, passes, time.process_time)
+    whole, between = np.median(times[:, 2:] / times[:, :2], axis=0)
+    met = bool(between <= BETWEEN_RATIO and whole <= WHOLE_RATIO)
+    return [
+        Row(f"arms that move [b]; {whole:.2f}", float(times[:, 2].min()), float(between),
+            f"at most {BETWEEN_RATIO:g}; {WHOLE_RATIO:g}", met)
+    ]  # fmt: skip
 
 
-def moving(t: FloatArray, *, shift: FloatArray, tau: float, rate: float) -> FloatArray:
-    """Return a delay that grows from `tau` on, with a constant more for each run."""
-    return np.asarray(shift + (tau + rate * t))
+def moving(t: FloatArray, *, tau: float, rate: float) -> FloatArray:
+    """Return a delay that grows at a constant rate."""
+    return np.asarray(tau + rate * t)
 
 
 def locked_size(loop: Loop, series: Inputs, delays: Sequence[Any]) -> int:
     """Run a loop; nothing is kept."""
-    return simulate(loop, *series, tau1=delays[0], tau2=delays[1]).size
+    noise, c1, c2 = series
+    return simulate(loop, noise, c1=c1, c2=c2, tau1=delays[0], tau2=delays[1]).size
 
 
 def run(*, quick: bool) -> Topic:
     """Measure speed and accuracy of the simulation."""
     samples, passes = (30_000, 1) if quick else (40_000_000, 4)
     loop, series = paper_loop(), inputs(samples)
-    rows = plain_rows(loop, series, passes)
-    rows += ensemble_rows(loop, series, 5 * passes)
-    rows += moving_rows(loop, series, 2 * passes + 1)
+    rows = plain_rows(loop, series, passes) + moving_rows(loop, series, 2 * passes + 1)
     notes = [
         f"[a] Both loops make their output; the best of {passes} runs each.",
-        f"[b] The ratio is that to the same runs one by one: the median of {5 * passes} "
-        f"passes, in processor time.",
-        f"[c] The ratio is that to constant delays between samples: the median of "
+        f"[b] The ratio is that to constant delays between samples: the median of "
         f"{2 * passes + 1} passes, in processor time; behind it that to whole samples.",
     ]
     return Topic(f"Simulation of the paper's loop, {samples:.3g} samples", rows, notes)

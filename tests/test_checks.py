@@ -184,7 +184,7 @@ WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
         "maser",
         "be one of 'free-running', 'Mach-Zehnder', 'cavity'",
     ),
-    (armlock.noise_budget, "laser", [1.0, 2.0], "be one number or hold one a frequency, 1 of"),
+    (armlock.noise_budget, "laser", [1.0, 2.0], "be one number or hold one for each of the 1"),
     (armlock.noise_budget, "laser", -1.0, "not be negative, got -1.0"),
     (armlock.performance.pulling, "time", [0.0, 1.0], "be positive"),
     (armlock.performance.pulling, "common", (1.0,), "hold nu0, gamma and alpha"),

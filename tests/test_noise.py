@@ -44,7 +44,7 @@ def test_density_is_the_prescribed_one(name):
         estimator.add(block)
     found = estimator.spectrum()
     ratio = (found.asd / found.expected(source.sampled_asd)) ** 2
-    deviation = (ratio - 1.0) * np.sqrt(0.5 * found.degrees)
+    deviation = (ratio - 1.0) * np.sqrt(found.averages)
     assert np.abs(deviation).max() < 4.5
     assert 0.7 < deviation.std() < 1.3
     assert found.frequency[-1] / found.frequency[0] > 1e4
@@ -53,7 +53,7 @@ def test_density_is_the_prescribed_one(name):
     assert np.abs(ratio[fast] - 1.0).max() < 0.004
     # And against the formula as printed, where the docstring promises it.
     ratio = (found.asd / found.expected(source.asd)) ** 2
-    deviation = (ratio - 1.0) * np.sqrt(0.5 * found.degrees)
+    deviation = (ratio - 1.0) * np.sqrt(found.averages)
     assert np.abs(deviation)[found.frequency < 20.0].max() < 4.5
 
 

@@ -1,12 +1,12 @@
-"""What noise is left on the locked laser, source by source.
+"""Noise of the locked laser, source by source.
 
-Levels are those of the LISA Frequency Control White Paper (2009), Sec. 3, or the caller's. Each
-source reaches the laser through the closed-form responses of `armlock.performance.transfer`.
+Levels are those of the LISA Frequency Control White Paper (2009), Sec. 3. Each source reaches
+the laser through the closed-form responses of `armlock.performance.transfer`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import cycle
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -22,17 +22,15 @@ from armlock.checks import (
     real_array,
     real_number,
 )
-from armlock.controllers import Controller
-from armlock.loops import Loop, checked_loop
-from armlock.performance.transfer import responses
-from armlock.timedomain.noise import LaserNoise, ShapedNoise
+from armlock.loops import Loop
+from armlock.performance.transfer import require_stable, responses
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
 class Levels(NamedTuple):
-    """Levels of the white paper, as they are: another level is a source of one's own.
+    """Noise levels of the white paper.
 
     Attributes
     ----------
@@ -61,20 +59,6 @@ class Levels(NamedTuple):
 
 #: The white paper's levels, which cannot be changed.
 LEVELS: Final = Levels()
-#: What disturbs the locked laser, if nothing else is said.
-SOURCES: Final = ("laser", "shot", "clock", "motion")
-
-# Rational functions of s whose magnitudes are the densities of an arm's noises, in Hz/sqrt(Hz);
-# of the clocks' for a beat note of 1 Hz. The zero of the others turns cycles into Hz.
-_SHOT = Controller((0.0,), (), np.sqrt(2.0) * LEVELS.shot)
-_CORNER = 2.0 * np.pi * LEVELS.motion_corner * np.exp(0.75j * np.pi)
-_MOTION = Controller((0.0,), (_CORNER, _CORNER.conjugate()), LEVELS.motion * abs(_CORNER) ** 2)
-# Two poles a decade from 1 uHz on, each with a zero midway to the next, fall as 1/sqrt(f).
-_POLES = -2.0 * np.pi * 10.0 ** (0.5 * np.arange(20) - 6.0)
-_ZEROS = 10.0**0.25 * _POLES
-# Not a controller's value: to import the package must compile nothing.
-_AT_1_HZ = np.prod((2j * np.pi - _ZEROS) / (2j * np.pi - _POLES))
-_CLOCK = Controller(_ZEROS.tolist(), _POLES.tolist(), LEVELS.clock / abs(_AT_1_HZ))
 
 
 def free_running(frequency: FloatArray) -> FloatArray:
@@ -118,10 +102,9 @@ class NoiseBudget:
     frequency : float array, shape (n,)
         In Hz.
     sources : dict of str to float array, shape (n,)
-        What each source leaves on the locked laser: "laser", "shot", "clock", "motion", and
-        those of one's own.
+        What each source leaves on the locked laser: "laser", "shot", "clock" and "motion".
     requirement : float array, shape (n,)
-        What the total is held against.
+        Requirement on the total.
 
     Examples
     --------
@@ -172,32 +155,27 @@ class NoiseBudget:
         return ax
 
 
-def _densities(
-    name: str, value: npt.ArrayLike, frequency: FloatArray, arms: int = 0
-) -> FloatArray:
-    """Return densities at the frequencies, or a row of them for each arm, or raise."""
+def _density(name: str, value: npt.ArrayLike, frequency: FloatArray) -> FloatArray:
+    """Return a density at each frequency, or raise."""
     asd = real_array(name, value)
     if (asd < 0.0).any():
         raise ValueError(f"{name} must not be negative, got {asd.min()} among its values")
-    rows = (arms, frequency.size)
-    if asd.shape not in ((), frequency.shape, rows):
-        each = f", or {arms} rows of them" if arms else ""
+    if asd.shape not in ((), frequency.shape):
         raise ValueError(
-            f"{name} must be one number or hold one a frequency, {frequency.size} of them"
-            f"{each}; got shape {asd.shape}"
+            f"{name} must be one number or hold one for each of the {frequency.size} "
+            f"frequencies; got shape {asd.shape}"
         )
-    return np.asarray(np.broadcast_to(asd, rows if arms else frequency.shape))
+    return np.asarray(np.broadcast_to(asd, frequency.shape))
 
 
 def noise_budget(
     loop: Loop,
     frequency: npt.ArrayLike,
+    *,
     laser: str | npt.ArrayLike = "free-running",
     requirement: npt.ArrayLike | None = None,
-    *,
     c1: float = 1.0,
     c2: float = 1.0,
-    sources: Mapping[str, npt.ArrayLike] | None = None,
 ) -> NoiseBudget:
     r"""Compute what noise is left on the locked laser.
 
@@ -224,16 +202,12 @@ def noise_budget(
     frequency : array_like of float, one-dimensional
         In Hz, positive.
     laser : {"free-running", "Mach-Zehnder", "cavity"} or array_like of float, optional
-        Noise of the laser before it is locked, in Hz/sqrt(Hz): by name, or a value a frequency.
+        Noise of the laser before it is locked: by name, or in Hz/sqrt(Hz) at each frequency.
     requirement : array_like of float, optional
-        What the total is held against, a value a frequency in Hz/sqrt(Hz); by default the
-        capability of time-delay interferometry, 300 (1 + (3 mHz / f)^2).
+        Requirement on the total in Hz/sqrt(Hz) at each frequency; by default the capability of
+        time-delay interferometry, 300 (1 + (3 mHz / f)^2).
     c1, c2 : float, optional
         Multiplicative perturbations.
-    sources : mapping of str to array_like of float, optional
-        Sources of one's own: densities in Hz/sqrt(Hz) of what adds to the signal of each arm,
-        independent in the two. One number, a value a frequency, or two rows of them, for arm 1
-        and arm 2. One called "shot", "clock" or "motion" takes the place of that source.
 
     Returns
     -------
@@ -242,9 +216,9 @@ def noise_budget(
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no `Loop`, the frequencies are not positive and one-dimensional, there is
-        no laser of that name, densities are negative or not of the frequencies' shape, c1 or c2
-        is no finite real number, or `sources` has one called "laser".
+        If `loop` is no `Loop` or not stable at c1, c2, the frequencies are not positive and
+        one-dimensional, there is no laser of that name, or densities are negative or not of the
+        frequencies' shape.
 
     References
     ----------
@@ -257,25 +231,21 @@ def noise_budget(
     >>> print(f"{found.total[0]:.0f} Hz/sqrt(Hz), {found.factor[0]:.1f} times below")
     113 Hz/sqrt(Hz), 5.3 times below
 
-    With ten times the shot noise, and a noise of one's own in arm 1 alone:
-
-    >>> import numpy as np
-    >>> f = np.array([3e-3, 0.1])
-    >>> shot = 2e-4 * np.pi * f * np.sqrt(2.0)
-    >>> mine = [0.01 * f, 0.0 * f]
-    >>> found = noise_budget(flight_loop(), f, sources={"shot": shot, "mine": mine})
-    >>> list(found.sources)
-    ['laser', 'shot', 'clock', 'motion', 'mine']
-
     As a table: ``pandas.DataFrame(found.sources, index=found.frequency)``.
     """
     f = axis("frequency", positive_array("frequency", frequency))
     if isinstance(laser, str):
         laser = LASERS[one_of("laser", laser, LASERS)](f)
     s = 2j * np.pi * f
-    found = responses(loop, s, real_number("c1", c1), real_number("c2", c2))
+    c1, c2 = real_number("c1", c1), real_number("c2", c2)
+    require_stable(loop, c1, c2)
+    found = responses(loop, s, c1, c2)
     arms = np.array([found["arm 1"], found["arm 2"]])
     beats, tau = np.array(LEVELS.beat_notes)[:, None], np.array([[loop.tau1], [loop.tau2]])
+    # An arm's noise in cycles is turned into a frequency by 2 pi f.
+    shot = np.sqrt(2.0) * LEVELS.shot * np.abs(s)
+    clock = LEVELS.clock / np.sqrt(f)
+    motion = LEVELS.motion * np.abs(s) / np.sqrt(1.0 + (f / LEVELS.motion_corner) ** 4)
 
     def through(shared: npt.ArrayLike, separate: npt.ArrayLike) -> FloatArray:
         """Return the response to one noise in both arms and one in each, by their weights."""
@@ -283,97 +253,10 @@ def noise_budget(
         return np.asarray(np.hypot(together, np.linalg.norm(separate * arms, axis=0)))
 
     locked = {
-        "laser": np.abs(found["laser"]) * _densities("laser", laser, f),
-        "shot": np.abs(_SHOT(s)) * through(0.0, 1.0),
-        "clock": LEVELS.clock / np.sqrt(f) * through(beats, beats),
-        "motion": np.abs(_MOTION(s)) * through(1.0 + np.exp(-s * tau), 2.0),
+        "laser": np.abs(found["laser"]) * _density("laser", laser, f),
+        "shot": shot * through(0.0, 1.0),
+        "clock": clock * through(beats, beats),
+        "motion": motion * through(1.0 + np.exp(-s * tau), 2.0),
     }
-    for name, given in (sources or {}).items():
-        if name == "laser":
-            raise ValueError("sources must not hold 'laser': its noise is given as laser=...")
-        locked[name] = through(0.0, _densities(f"sources[{name!r}]", given, f, arms=2))
     required = tdi_capability(f) if requirement is None else requirement
-    return NoiseBudget(f, locked, _densities("requirement", required, f))
-
-
-def noise_series(
-    loop: Loop, source: str, samples: int, seed: int, sample_rate: float = 200.0
-) -> FloatArray:
-    r"""Draw one source of the budget, as a noise of the laser that drives a simulation.
-
-    With N_1 and N_2 as in `noise_budget`, what adds to the arms acts as a laser's noise that
-    has gone through the controller and the sensor's weights,
-
-    .. math::
-
-        \phi_L = -K m_1 N_1 - K m_2 N_2 .
-
-    Parameters
-    ----------
-    loop : Loop
-        The loop; its dead time is left out of K.
-    source : {"laser", "shot", "clock", "motion"}
-        The source; the laser is the free-running one.
-    samples : int
-        How many.
-    seed : int
-        Of the random numbers; sources with the same seed are independent.
-    sample_rate : float, optional
-        In Hz.
-
-    Returns
-    -------
-    float array, shape (samples,)
-        In Hz, for `armlock.simulate`, from rest at time zero.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If `loop` is no `Loop`, there is no such source, or a number is out of range. All but
-        the laser's noise, which asks nothing of the loop, need open-loop poles left of s = 0,
-        or it grows without end, and shot noise an open loop that rolls off.
-
-    Notes
-    -----
-    All filters are rational but for the clocks' 1/sqrt(f), which twenty pairs of poles and
-    zeros from 1 uHz on follow to 4e-4 between 0.1 mHz and 10 Hz.
-
-    Examples
-    --------
-    >>> from armlock import flight_loop, simulate
-    >>> from armlock.performance.budget import noise_series
-    >>> loop = flight_loop()
-    >>> locked = simulate(loop, noise_series(loop, "clock", 10_000, seed=1))
-    """
-    checked_loop(loop)
-    one_of("source", source, SOURCES)
-    streams = np.random.SeedSequence([seed, SOURCES.index(source)]).generate_state(3).tolist()
-    if source == "laser":
-        laser = LaserNoise(streams[0], sample_rate, level=LEVELS.free_running, at_rest=True)
-        return laser.draw(samples)
-
-    def drawn(shape: Controller, stream: int) -> FloatArray:
-        noise = ShapedNoise(
-            shape.zeros, shape.poles, shape.gain,
-            seed=stream, sample_rate=sample_rate, at_rest=True,
-        )  # fmt: skip
-        return noise.draw(samples)
-
-    total = np.zeros(samples)
-    rest, *arms = loop.polynomials()
-    delays = loop.tau1, loop.tau2
-    for b, tau, beat, stream in zip(arms, delays, LEVELS.beat_notes, streams[1:], strict=True):
-        gain = -float(b.coefficients[-1] / rest.coefficients[-1])
-        if not gain:
-            continue
-        arm = Controller(b.roots.tolist(), rest.roots.tolist(), gain)
-        if source == "shot":
-            total += drawn(_SHOT * arm, stream)
-        elif source == "clock":
-            total += beat * (drawn(_CLOCK * arm, streams[0]) + drawn(_CLOCK * arm, stream))
-        else:
-            here = drawn(_MOTION * arm, streams[0])
-            total += here + 2.0 * drawn(_MOTION * arm, stream)
-            delayed = total[round(tau * sample_rate) :]
-            delayed += here[: delayed.size]
-    return total
+    return NoiseBudget(f, locked, _density("requirement", required, f))

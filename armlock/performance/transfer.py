@@ -1,7 +1,7 @@
 """The closed loop from each of its inputs to the locked laser.
 
 An input is the laser's own noise, or an error in what is measured on an arm. Noise budget and
-laser pulling are made from these responses.
+laser pulling are computed from these responses.
 """
 
 from __future__ import annotations
@@ -11,12 +11,14 @@ import numpy.typing as npt
 
 from armlock.checks import ComplexArray, one_of
 from armlock.loops import Loop, checked_loop
+from armlock.stability.counts import loop_count
 
 
 def transfer(
     loop: Loop,
     source: str,
     s: npt.ArrayLike,
+    *,
     c1: npt.ArrayLike = 1.0,
     c2: npt.ArrayLike = 1.0,
 ) -> ComplexArray:
@@ -89,3 +91,16 @@ def responses(
     }
     found = {name: np.asarray(-error * sensitivity) for name, error in errors.items()}
     return {"laser": np.asarray(sensitivity), **found}
+
+
+def require_stable(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> None:
+    """Raise unless all roots of a loop lie in the open left half-plane.
+
+    The response of an unstable loop at s = j omega looks like that of a stable one. A root at
+    s = 0 that cancels in L is not the loop's, see `armlock.stability.counts.loop_count`.
+    """
+    count = loop_count(checked_loop(loop), c1, c2)
+    if count != 0:
+        raise ValueError(
+            f"loop must be stable at (c1, c2) = ({c1:g}, {c2:g}), but loop_count gives {count}"
+        )

@@ -1,6 +1,7 @@
-"""What a loop does in time: from a series of noise to the locked laser, and its spectrum.
+"""A loop in time: noise of the laser, simulation of the locked laser, and spectra.
 
-The sampled loop has an exact prediction of its own; it says nothing certain about stability.
+A simulation does not decide stability, because growth may take days. Counts of unstable roots
+decide it.
 """
 
 from armlock.timedomain.noise import LaserNoise, PerturbationNoise, ShapedNoise

@@ -1,14 +1,14 @@
-"""Noise of a prescribed amplitude spectral density, from a seed, in blocks.
+"""Noise of a prescribed amplitude spectral density, drawn from a seed.
 
-White Gaussian samples go through a filter whose response has the prescribed magnitude, so
-that a series of any length can be drawn without ever being held as a whole. All spectral
-densities are one-sided.
+White Gaussian samples go through a filter whose response has the prescribed magnitude. Series
+of any length are drawn block by block. All spectral densities are one-sided.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -25,7 +25,6 @@ from armlock.checks import (
     whole_number,
 )
 from armlock.controllers import Controller
-from armlock.progress import progress
 from armlock.timedomain.discretize import (
     Rows,
     readout,
@@ -35,11 +34,36 @@ from armlock.timedomain.discretize import (
     warped,
 )
 
-# Samples that are drawn at a time.
+# Samples of a block.
 _BLOCK = 1 << 20
-
-#: Zeros and pole, in rad per sample, that raise the sampled 1/f density to the prescribed one.
+# Zeros and pole in rad per sample that raise the sampled 1/f density to the prescribed one.
 _LASER_ZEROS, _LASER_POLE = (2.37, 7.87), 6.03
+
+
+class Samples(np.ndarray[Any, np.dtype[np.float64]]):
+    """A drawn series that remembers its sample rate in Hz, for `armlock.simulate` to compare.
+
+    Arithmetic and contiguous slices keep the rate. Every other index forgets it.
+    """
+
+    sample_rate: float | None
+
+    def __array_finalize__(self, other: object) -> None:
+        """Take over the rate of the array that this one was made from."""
+        self.sample_rate = getattr(other, "sample_rate", None)
+
+    def __array_wrap__(
+        self, array: Any, context: Any = None, return_scalar: bool = False
+    ) -> Any:
+        """Return a sum, a maximum and the like as a plain number."""
+        return array[()] if array.ndim == 0 else super().__array_wrap__(array, context)
+
+    def __getitem__(self, key: Any) -> Any:
+        """Return samples; those that are not contiguous have no rate."""
+        found = super().__getitem__(key)
+        if isinstance(found, Samples) and not (isinstance(key, slice) and key.step is None):
+            return found.view(np.ndarray)
+        return found
 
 
 class ShapedNoise:
@@ -179,6 +203,7 @@ class ShapedNoise:
         Returns
         -------
         float array, shape (samples,)
+            A simulation at another sample rate refuses it.
 
         Raises
         ------
@@ -187,15 +212,11 @@ class ShapedNoise:
         """
         count = whole_number("samples", samples, 0)
         check_memory("samples", (count,), 8)
-        series = np.empty(count)
-        with progress("noise", count) as say:
-            for at in range(0, count, _BLOCK):
-                part = series[at : at + _BLOCK]
-                self._random.standard_normal(out=part)
-                part *= self._scale
-                _shape(part, self._sampled.gain, self._sampled.sections, self._state)
-                say(at + _BLOCK)
-        return series
+        series = self._random.standard_normal(count) * self._scale
+        _shape(series, self._sampled.gain, self._sampled.sections, self._state)
+        drawn = series.view(Samples)
+        drawn.sample_rate = self.sample_rate
+        return drawn
 
     def blocks(self, samples: int, size: int = _BLOCK) -> Iterator[FloatArray]:
         """Yield the next samples in blocks.

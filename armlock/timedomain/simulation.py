@@ -1,25 +1,17 @@
-"""The loop in the time domain, sample by sample, closed exactly in each.
+"""The loop in the time domain, sample by sample.
 
 With phi the frequency noise of the locked laser, every loop of `armlock.loops` reads
 
-    phi(t) = noise(t) - K [m1 u1 + m2 u2](t - delay),
+    phi(t) = noise(t) - K [m1 u1 + m2 u2](t),
     u_k(t) = phi(t) - c_k(t) phi(t - tau_k).
 
-Sensor and controller are sampled by the trapezoidal rule, see `armlock.timedomain.discretize`.
-Without a dead time the present phi is on both sides, with a weight of thousands; each sample
-solves for it. A rule that took the previous phi instead would be unstable by itself as soon as
-gain times step exceeds about one, and is not offered. Delays between samples are interpolated,
-see `armlock.timedomain.delays`.
-
-Because s = j omega becomes (2 j / T) tan(omega T / 2) while the delays stay what they are,
-what is simulated has an open loop in closed form, `sampled_open_loop`.
+Controller and sensor are sampled by the trapezoidal rule (`armlock.timedomain.discretize`). The
+present phi stands on both sides with a weight of thousands, and each sample solves for it: a
+rule that took the previous phi instead would be unstable. `sampled_open_loop` is the exact open
+loop of the simulation.
 """
 
 from __future__ import annotations
-
-import sys
-from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -33,64 +25,42 @@ from armlock.checks import (
     positive_array,
     positive_number,
     real_number,
-    whole_number,
 )
 from armlock.loops import Loop, checked_loop
-from armlock.progress import progress
 from armlock.timedomain.delays import (
-    Arm,
+    AnyDelay,
     Delay,
     GivenDelay,
-    MovingDelay,
-    between,
+    arm_delay,
     delayed,
+    lagrange_delay,
+    longest,
     reach,
-    sampled_delays,
 )
 from armlock.timedomain.discretize import SampledFilter, SampledSensor, sampled_loop, warped
 
-#: Samples that are computed at a time, of all runs together. Where delays reach far back there
-#: are more, because each block moves the past. Results do not depend on their number.
-BLOCK = 1 << 16
-#: Runs of an ensemble that go side by side. Fewer than half as many go one by one.
-LANES = 32
-#: The output counts as diverged when it exceeds the largest input so far by this factor. What
-#: the arms hold at the start, the history, is input too.
+#: The output counts as diverged when it exceeds the largest input so far by this factor.
 LIMIT = 1e6
-
-#: A loop in samples: delays of both arms and the dead time, sensor, controller.
-SampledLoop = tuple[tuple[Delay | MovingDelay, ...], SampledSensor, SampledFilter]
-#: Shares of the signals of both arms in the sensor's output, in what the controller sends, and
-#: in what it sends with the next sample.
-Shares = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
-
-#: One entry for each run that goes side by side with others. The compiler knows their number,
-#: and hands nothing on, because the entries are empty.
-Lanes = tuple[tuple[()], ...]
-
 # Samples kept behind the longest delay, for arms that have grown during a gap of the run.
 _SPARE = 64
-
-# Rows of the working memory of a run, of lanes side by side: what the controller sends with the
-# next sample if no input comes; what both arms return, the input and the output of this sample;
-# the largest input so far, and the number of the last output not above it. The states of sensor
-# and controller follow.
-_PREDICTED, _DELAYED1, _DELAYED2, _INPUT, _OUTPUT, _LARGEST, _BOUNDED, _STATES = range(8)
+# The numbers that a run keeps: what the controller would send with the next sample if no input
+# came, the largest input so far, and the number of the last output that was not larger. The
+# states of sensor and controller follow.
+_PREDICTED, _LARGEST, _BOUNDED, _STATES = range(4)
 
 
 class DivergenceError(ArithmeticError):
-    """The locked laser's noise has left all bounds.
+    """The output of a simulated loop has exceeded its limit.
 
     Attributes
     ----------
     time : float
-        When it began, in s: the last time at which the output was no larger than the largest
+        When it began in s: the last time at which the output was no larger than the largest
         input so far, noise or history.
     detected : float
-        When the output exceeded that input by the limit, in s.
+        When the output exceeded that input by the factor `limit`, in s.
     output : float array
-        What was computed up to then, the sample that exceeds the limit left out; every sample
-        of it is finite. Empty where a run that has stopped is asked to go on.
+        The samples of this call before that time; all are finite.
 
     Examples
     --------
@@ -113,253 +83,122 @@ class DivergenceError(ArithmeticError):
         self.output = output
 
     def __reduce__(self) -> tuple[type[DivergenceError], tuple[float, float, FloatArray]]:
-        """Return what makes the same error again, in another process too."""
+        """Return what makes the same error again in another process, as joblib does."""
         return type(self), (self.time, self.detected, self.output)
-
-
-@njit()
-def _place(row: int, lanes: Lanes, w: int) -> np.uintp:
-    """Return where in `work` the entry of lane w in a row stands.
-
-    Unsigned, because a negative index would count from the end, which takes time to check.
-    """
-    return np.uintp(row * len(lanes) + w)
-
-
-@njit()
-def _receive(
-    lanes: Lanes,
-    first: int,
-    phi: FloatArray,
-    now: int,
-    c: FloatArray,
-    delay: Delay | MovingDelay,
-    i: int,
-    work: FloatArray,
-    target: int,
-) -> None:
-    """Put what an arm returns, c(t) phi(t - tau(t)), into the row `target` of `work`.
-
-    `now` is the present row of phi, and `i` that of c, unless it has only one, and of a delay
-    that moves. See `_compute` for the rest.
-    """
-    at = np.uintp(i * (len(c) > 1))
-    if isinstance(delay, tuple):  # known when it is compiled
-        for w in range(len(lanes)):
-            column = np.uintp(first + w)
-            work[_place(target, lanes, w)] = c[at, column] * delayed(phi, now, column, delay)
-    elif delay.shape[1] == 1:
-        whole = np.floor(delay[i, 0])
-        middle = now - int(whole)
-        for w in range(len(lanes)):
-            column = np.uintp(first + w)
-            # Outside of this loop it would halve the speed of a single run.
-            u = delay[i, 0] - whole - 0.5
-            work[_place(target, lanes, w)] = c[at, column] * between(phi, middle, column, u)
-    else:
-        for w in range(len(lanes)):
-            column = np.uintp(first + w)
-            whole = np.floor(delay[i, column])
-            u = delay[i, column] - whole - 0.5
-            middle = now - int(whole)
-            work[_place(target, lanes, w)] = c[at, column] * between(phi, middle, column, u)
-
-
-@njit()
-def _shares(sensor: SampledSensor, controller: SampledFilter) -> Shares:
-    """Return what the signals of the arms add at once: see `Shares`."""
-    sections, gain = controller.sections, controller.gain
-    direct1, direct2 = sensor.direct
-    _, next1, next2 = sensor.states[len(sensor.states) - 1]
-    for j in range(len(sections)):
-        next1 += direct1 * sections[j][3]
-        next2 += direct2 * sections[j][3]
-    now1, now2, next1, next2 = gain * direct1, gain * direct2, gain * next1, gain * next2
-    return (direct1, direct2), (now1, now2), (next1, next2)
-
-
-@njit()
-def _close(
-    lanes: Lanes,
-    first: int,
-    sent: FloatArray,
-    now: int,
-    dead: Delay,
-    shares: Shares,
-    work: FloatArray,
-) -> None:
-    """Compute this sample's output, and with a dead time what the controller sends."""
-    now1, now2 = shares[1]
-    inverse = 1.0 / (1.0 + now1 + now2)
-    for w in range(len(lanes)):
-        column = np.uintp(first + w)
-        a1, a2 = work[_place(_DELAYED1, lanes, w)], work[_place(_DELAYED2, lanes, w)]
-        x, predicted = work[_place(_INPUT, lanes, w)], work[_place(_PREDICTED, lanes, w)]
-        if dead[0] == 0:
-            # phi = noise - predicted - now1 (phi - a1) - now2 (phi - a2), solved for phi.
-            x = (x + (now1 * a1 + now2 * a2) - predicted) * inverse
-        else:
-            x -= delayed(sent, now, column, dead)
-            sending = now1 * (x - a1) + now2 * (x - a2)
-            sent[np.uintp(now), column] = predicted + sending
-        work[_place(_OUTPUT, lanes, w)] = x
-
-
-@njit()
-def _move_on(
-    lanes: Lanes,
-    sensor: SampledSensor,
-    controller: SampledFilter,
-    shares: Shares,
-    work: FloatArray,
-) -> None:
-    """Take the states of sensor and controller to the next sample.
-
-    What they send next does not wait for what the signals of the arms do to them.
-    """
-    (direct1, direct2), _, (next1, next2) = shares
-    rows, sections = sensor.states, controller.sections
-    m, n = len(rows), len(sections)
-    for w in range(len(lanes)):
-        x = work[_place(_OUTPUT, lanes, w)]
-        u1, u2 = x - work[_place(_DELAYED1, lanes, w)], x - work[_place(_DELAYED2, lanes, w)]
-        top, below, ready = work[_place(_STATES + m - 1, lanes, w)], 0.0, 0.0
-        for j in range(m):
-            q, b1, b2 = rows[j]
-            state = _place(_STATES + j, lanes, w)
-            old = work[state]
-            ready = old + (below - q * top)
-            work[state] = ready + (b1 * u1 + b2 * u2)
-            below = old
-        v, direct = top, direct1 * u1 + direct2 * u2
-        for j in range(n):
-            r1, r2, k, t1, t2 = sections[j]
-            state1 = _place(_STATES + m + 2 * j, lanes, w)
-            state2 = _place(_STATES + m + 2 * j + 1, lanes, w)
-            w1, w2 = work[state1], work[state2]
-            new1 = w1 + (r1 * w1 - k * w2 + v)
-            new2 = w2 + (r2 * w2 + w1)
-            ready += t1 * new1 + t2 * new2
-            v += t1 * w1 + t2 * w2
-            work[state1], work[state2] = new1 + direct, new2
-        predicted = controller.gain * ready + (next1 * u1 + next2 * u2)
-        work[_place(_PREDICTED, lanes, w)] = predicted
-
-
-@njit()
-def _exceeding(lanes: Lanes, work: FloatArray, number: float, limit: float) -> int:
-    """Return how many outputs exceed the limit; note the largest inputs, and when not above."""
-    exceeding = 0
-    for w in range(len(lanes)):
-        size = abs(work[_place(_OUTPUT, lanes, w)])
-        given = abs(work[_place(_INPUT, lanes, w)])
-        most, bounded = work[_place(_LARGEST, lanes, w)], _place(_BOUNDED, lanes, w)
-        most = given if given > most else most
-        work[_place(_LARGEST, lanes, w)] = most
-        work[bounded] = number if size <= most else work[bounded]
-        exceeding += 0 if size <= limit * most else 1
-    return exceeding
 
 
 @njit(nogil=True)
 def _compute(
-    lanes: Lanes,
-    first: int,
     phi: FloatArray,
-    sent: FloatArray,
     inputs: tuple[FloatArray, ...],
-    sampled: SampledLoop,
+    arms: tuple[AnyDelay, AnyDelay],
+    sensor: SampledSensor,
+    controller: SampledFilter,
     work: FloatArray,
     limit: float,
     done: int,
 ) -> int:
-    """Compute the last rows of phi, and of what the controller sends, from those before.
+    """Compute the last samples of phi from those before, one for each sample of the noise.
 
-    These and `inputs`, which are noise, c1 and c2, hold a sample in each row and a run in each
-    column, as delays that move do; of c1 and c2 a single row is for all samples. The runs from
-    column `first` on go side by side in lanes, so that one instruction works on several of
-    them. `work` holds their rows one behind the other: see `_STATES`. It is one array, because
-    the compiler would have to check that several do not overlap.
-
-    Returns the index of the sample at which an output exceeds `limit` times the largest input,
-    or how many there are.
+    `inputs` are noise, c1 and c2; c1 and c2 may have one sample for all. `work` is described at
+    `_STATES`, and `done` counts the samples of the run before this call. Returns the index of
+    the sample that exceeds `limit` times the largest input, or the number of samples.
     """
     noise, c1, c2 = inputs
-    (arm1, arm2, dead), sensor, controller = sampled
-    shares = _shares(sensor, controller)
+    rows, sections, gain = sensor.states, controller.sections, controller.gain
+    m, n = len(rows), len(sections)
+    direct1, direct2 = sensor.direct
+    # What the signals of the arms add to the next sample at once, and to this one.
+    _, next1, next2 = rows[m - 1]
+    for j in range(n):
+        next1 += direct1 * sections[j][3]
+        next2 += direct2 * sections[j][3]
+    now1, now2, next1, next2 = gain * direct1, gain * direct2, gain * next1, gain * next2
+    inverse = 1.0 / (1.0 + now1 + now2)
+    predicted, most, bounded = work[_PREDICTED], work[_LARGEST], work[_BOUNDED]
+    end = len(noise)
     for i in range(len(noise)):
         now = len(phi) - len(noise) + i
-        _receive(lanes, first, phi, now, c1, arm1, i, work, _DELAYED1)
-        _receive(lanes, first, phi, now, c2, arm2, i, work, _DELAYED2)
-        for w in range(len(lanes)):
-            work[_place(_INPUT, lanes, w)] = noise[np.uintp(i), np.uintp(first + w)]
-        _close(lanes, first, sent, now, dead, shares, work)
-        _move_on(lanes, sensor, controller, shares, work)
-        exceeding = _exceeding(lanes, work, float(done + i), limit)
-        for w in range(len(lanes)):
-            phi[np.uintp(now), np.uintp(first + w)] = work[_place(_OUTPUT, lanes, w)]
-        if exceeding:
-            return i
-    return len(noise)
+        a1 = c1[np.uintp(i * (len(c1) > 1))] * delayed(phi, now, arms[0], i)
+        a2 = c2[np.uintp(i * (len(c2) > 1))] * delayed(phi, now, arms[1], i)
+        given = noise[np.uintp(i)]
+        # x = given - predicted - now1 (x - a1) - now2 (x - a2), solved for x.
+        x = (given + (now1 * a1 + now2 * a2) - predicted) * inverse
+        u1, u2 = x - a1, x - a2
+        top, below, ready = work[_STATES + m - 1], 0.0, 0.0
+        for j in range(m):
+            q, b1, b2 = rows[j]
+            old = work[_STATES + j]
+            ready = old + (below - q * top)
+            work[_STATES + j] = ready + (b1 * u1 + b2 * u2)
+            below = old
+        # What is sent next is prepared before the inputs of this sample enter.
+        v, direct = top, direct1 * u1 + direct2 * u2
+        for j in range(n):
+            r1, r2, k, t1, t2 = sections[j]
+            state = np.uintp(_STATES + m + 2 * j)
+            w1, w2 = work[state], work[state + np.uintp(1)]
+            new1 = w1 + (r1 * w1 - k * w2 + v)
+            new2 = w2 + (r2 * w2 + w1)
+            ready += t1 * new1 + t2 * new2
+            v += t1 * w1 + t2 * w2
+            work[state], work[state + np.uintp(1)] = new1 + direct, new2
+        predicted = gain * ready + (next1 * u1 + next2 * u2)
+        most = max(most, abs(given))
+        if abs(x) <= most:
+            bounded = float(done + i)
+        elif not abs(x) <= limit * most:
+            end = i
+            break
+        phi[np.uintp(now)] = x
+    work[_PREDICTED], work[_LARGEST], work[_BOUNDED] = predicted, most, bounded
+    return end
 
 
-def _series(name: str, value: npt.ArrayLike, like: FloatArray) -> FloatArray:
-    """Return c1 or c2, a number or shaped like the noise, with a sample in each row."""
-    array = finite_series(name, value, 0, like.ndim)
-    if array.shape not in ((), like.shape):
+def _without_dead_time(loop: Loop, sample_rate: float) -> Loop:
+    """Return the loop, or raise if it has a dead time."""
+    if checked_loop(loop).delay:
+        phase = np.pi * sample_rate * loop.delay
         raise ValueError(
-            f"{name} must be a number or have the shape of noise, {like.shape}; got "
-            f"{array.shape}"
+            f"loop must have no dead time to be simulated, got delay = {loop.delay} s; "
+            f"loop.replace(delay=0.0) neglects it, which changes the phase of L by "
+            f"{phase:.3g} rad at {0.5 * sample_rate:g} Hz, the highest frequency simulated, "
+            f"and by less below"
         )
-    return np.atleast_2d(array).T
+    return loop
 
 
-def _in_lanes(delay: Delay | MovingDelay, number: int) -> Delay | MovingDelay:
-    """Return a delay with a column for each lane, if the runs have their own."""
-    if isinstance(delay, tuple) or delay.shape[1] == 1:
-        return delay
-    return _in_columns(delay, number)
-
-
-def _in_columns(series: FloatArray, number: int) -> FloatArray:
-    """Return samples in rows, as compiled code takes them, the last run repeated at the end."""
-    if series.shape[1] == 1 < number:
-        series = np.broadcast_to(series, (len(series), number))
-    elif series.shape[1] < number:
-        series = series[:, np.minimum(np.arange(number), series.shape[1] - 1)]
-    return np.require(series, requirements=["C", "W"])
+def _delays(loop: Loop, sample_rate: float) -> list[Delay]:
+    """Return the loop's own delays in samples."""
+    return [lagrange_delay(n, getattr(loop, n), sample_rate) for n in ("tau1", "tau2")]
 
 
 def sampled_open_loop(
     loop: Loop,
     omega: npt.ArrayLike,
+    *,
     c1: float = 1.0,
     c2: float = 1.0,
     sample_rate: float = 200.0,
 ) -> ComplexArray:
-    r"""Open loop of what is simulated, in closed form.
+    r"""Open loop of a simulation, in closed form.
 
-    With the sampling step T, and the weights :math:`\ell_{k,i}` that interpolate delay k from
-    the samples :math:`f_k + i` back, it is
+    With the sampling step T, and the weights :math:`\ell_{k,i}` that interpolate the delay of
+    arm k from the samples :math:`f_k + i` back, it is
 
     .. math::
 
-        L_T(\omega) &= H_0(\omega)\, K(\mathrm{j}\Omega)
-        \sum_{k=1}^{2} m_k(\mathrm{j}\Omega)
+        L_T(\omega) &= K(\mathrm{j}\Omega) \sum_{k=1}^{2} m_k(\mathrm{j}\Omega)
         \left( 1 - c_k H_k(\omega) \right) , \\
         \Omega &= \frac{2}{T} \tan \frac{\omega T}{2} , \\
-        H_k(\omega) &= \sum_i \ell_{k,i}\, e^{-\mathrm{j}\omega (f_k + i) T} ,
+        H_k(\omega) &= \sum_i \ell_{k,i}\, e^{-\mathrm{j}\omega (f_k + i) T} .
 
-    where k = 0 is the dead time. A delay of whole samples has
-
-    .. math::
-
-        H_k(\omega) = e^{-\mathrm{j}\omega\tau_k} .
+    A delay of whole samples has :math:`H_k(\omega) = e^{-\mathrm{j}\omega\tau_k}`.
 
     Parameters
     ----------
     loop : Loop
-        The loop.
+        The loop, without dead time.
     omega : array_like of float
         In rad/s, positive.
     c1, c2 : float, optional
@@ -370,13 +209,11 @@ def sampled_open_loop(
     Returns
     -------
     complex array, shaped like `omega`
-        Controller and sensor at the warped frequency, delays at the true one.
 
     Raises
     ------
     TypeError, ValueError
-        If a frequency is not finite, real and positive, or the sample rate is too low for a
-        delay, as for `Simulation`.
+        If a frequency is not finite, real and positive, or as for `Simulation`.
 
     Examples
     --------
@@ -389,17 +226,16 @@ def sampled_open_loop(
     True
     """
     rate = positive_number("sample_rate", sample_rate)
-    delays = sampled_delays(checked_loop(loop), rate)
+    loop = _without_dead_time(loop, rate)
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
     omega = positive_array("omega", omega)
-    delayed1, delayed2, dead = (
+    back1, back2 = (
         np.exp(-1j * omega[..., None] * (first + np.arange(len(weights))) / rate) @ weights
-        for first, weights in delays
+        for first, weights in _delays(loop, rate)
     )
     s = 1j * warped(omega, rate)
     m1, m2 = loop.mapping.weights(s)
-    sensor = m1 * (1.0 - c1 * delayed1) + m2 * (1.0 - c2 * delayed2)
-    return np.asarray(dead * loop.controller(s) * sensor)
+    return np.asarray(loop.controller(s) * (m1 * (1.0 - c1 * back1) + m2 * (1.0 - c2 * back2)))
 
 
 class Simulation:
@@ -408,70 +244,44 @@ class Simulation:
     Parameters
     ----------
     loop : Loop
-        Any loop of `armlock.loops`.
+        The loop, without dead time.
     sample_rate : float, optional
         In Hz.
     history : float or array_like, optional
-        The locked laser's noise before the first sample, the latest value last: a constant,
-        or at least `history_samples` values, and as many as delays that move reach back at
-        the start. Controller and sensor start at rest.
+        Noise of the locked laser before the first sample, the latest value last: a constant, or
+        a series that is as long as the longest delay. Controller and sensor start at rest.
     limit : float, optional
-        The run counts as diverged when the output exceeds the largest input so far, noise or
-        history, by this factor.
-    draws : int, optional
-        Runs an ensemble of so many, side by side: noise, c1 and c2 have a row for each.
+        The run has diverged when the output exceeds the largest input so far, noise or history,
+        by this factor.
 
     Attributes
     ----------
     samples : int
-        How many samples were computed.
-    history_samples : int
-        How many samples the loop's own longest delay reaches back.
+        Number of samples computed so far.
 
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no loop, the sample rate is too low for its delays (the dead time
-        included), or the history is too short or not finite.
+        If `loop` is no loop or has a dead time, the sample rate is too low for its delays, or
+        the history is too short or not finite.
 
     Notes
     -----
-    With :math:`\varphi_0` the noise of the free-running laser, a sample is
+    With :math:`\varphi_0` the noise of the free-running laser, and with r the part of the
+    controller's output that earlier samples determine, a sample is
 
     .. math::
 
         a_k[n] &= c_k[n] \sum_i \ell_{k,i}\, \varphi[n - f_k - i] , \\
-        y[n] &= r[n] + g \sum_{k=1}^{2} d_k \left( \varphi[n] - a_k[n] \right) , \\
-        \varphi[n] &= \varphi_0[n] - \sum_i \ell_{0,i}\, y[n - f_0 - i] .
-
-    Here y is what the controller sends, of gain g behind the sensor's direct shares d_k, and r
-    what their states make of earlier samples (`armlock.timedomain.discretize`). The returns
-    a_k and the dead time, k = 0, are interpolated as for `sampled_open_loop`. Without a dead
-    time y[n] enters its own sample, and the loop is closed within it:
-
-    .. math::
-
-        \varphi[n] = \frac{\varphi_0[n] - r[n] + g \left( d_1 a_1[n] + d_2 a_2[n] \right)}
+        \varphi[n] &= \frac{\varphi_0[n] - r[n] + g \left( d_1 a_1[n] + d_2 a_2[n] \right)}
         {1 + g \left( d_1 + d_2 \right)} .
 
-    A delay that moves is interpolated in every sample, with the weights that the same formula
-    gives for :math:`\tau_k[n]`: where it is whole samples, that sample. In a second it changes
-    by more than -3 and less than 1 s, as round trips do whose ends move at less than the speed
-    of light: with speeds :math:`v_1`, :math:`v_2` of the ends apart,
+    Here g is the gain of the sampled controller, and d_k are the direct shares of the arms in
+    the sensor's output. The weights :math:`\ell_{k,i}` are those of `sampled_open_loop`.
 
-    .. math::
-
-        \dot\tau = 1 - \left( 1 - \frac{v_1}{c} \right) \left( 1 - \frac{v_2}{c} \right) .
-
-    One call and many give the same samples, bit by bit, and so do an ensemble and its runs one
-    by one. A run goes on after a gap as if there were none: its arms hold what they held. Its
-    state is the output as far back as delays reach, with a dead time what the controller has
-    sent as well, and some numbers more: 35 kB for the paper's loop at 200 Hz.
-    ``copy.deepcopy(run)`` and ``pickle.dumps(run)`` keep it.
-
-    An ensemble takes `LANES` runs at a time, whose samples the processor's vector units
-    compute together. Of arrays in Fortran order, where the same sample of all runs stands side
-    by side, nothing has to be copied.
+    One call and many give the same samples, bit by bit. ``copy.deepcopy(run)`` and
+    ``pickle.dumps(run)`` keep the state. After a gap in the input a run continues as if there
+    were none.
 
     Examples
     --------
@@ -481,14 +291,6 @@ class Simulation:
     >>> first, second = run.advance(np.ones(400)), run.advance(np.ones(400))
     >>> run.samples
     800
-
-    The state goes into a file, and another process goes on from there:
-
-    >>> import pickle
-    >>> saved = pickle.dumps(run)
-    >>> later = pickle.loads(saved)
-    >>> bool(np.array_equal(later.advance(np.ones(400)), run.advance(np.ones(400))))
-    True
     """
 
     def __init__(
@@ -498,53 +300,35 @@ class Simulation:
         *,
         history: npt.ArrayLike = 0.0,
         limit: float = LIMIT,
-        draws: int | None = None,
     ) -> None:
-        self.loop = checked_loop(loop)
         self.sample_rate = positive_number("sample_rate", sample_rate)
+        self.loop = _without_dead_time(loop, self.sample_rate)
         self.limit = positive_number("limit", limit)
-        self.draws = None if draws is None else whole_number("draws", draws, 1)
-        delays = sampled_delays(loop, self.sample_rate)
-        sensor, controller = sampled_loop(loop.controller, loop.mapping, self.sample_rate)
-        self._filters = sensor, controller
-        self._dead = delays[2]
-        self.history_samples = max(map(reach, delays))
-        before = finite_series("history", history, 0, 1)
-        if before.ndim and before.size < self.history_samples:
-            raise ValueError(
-                f"history must hold at least {self.history_samples} samples, as far as the "
-                f"longest delay reaches, got {before.size}"
-            )
-        self._history = before.copy()
-        # Kinds of samples: the output, and with a dead time what the controller has sent. Of
-        # each a block stands behind those before that are known. They come with the first one.
-        kinds = 1 if self._dead[0] == 0 else 2
-        columns = self.draws or 1
-        past = self.history_samples
-        self._block = max(BLOCK // columns, 4 * past)
-        for name, number in (("sample_rate", 1), ("draws", columns)):
-            check_memory(name, (kinds, past + self._block, number), 8)
-        full, rest = divmod(columns, LANES)
-        # The last runs may be few, and are then faster one by one.
-        groups = [LANES] * full + ([1] * rest if 2 * rest < LANES else [LANES])
-        rows = _STATES + len(sensor.states) + 2 * len(controller.sections)
-        self._groups = [np.zeros((rows, lanes)) for lanes in groups]
-        self._signals = np.zeros((kinds, 0, sum(groups)))
-        self._known = before.size if before.ndim else sys.maxsize
-        self._stopped: tuple[float, float] | None = None
-        self._in_block = False
         self.samples = 0
-
-    def __getstate__(self) -> dict[str, object]:
-        """Leave out the room for the next block."""
-        return self.__dict__ | {"_signals": self._signals[:, : self._known].copy()}
+        self._stopped: tuple[float, float] | None = None
+        self._sensor, self._controller = sampled_loop(
+            loop.controller, loop.mapping, self.sample_rate
+        )
+        states = len(self._sensor.states) + 2 * len(self._controller.sections)
+        self._work = np.zeros(_STATES + states)
+        needed = max(map(reach, _delays(loop, self.sample_rate)))
+        check_memory("sample_rate", (needed,), 8)
+        before = finite_series("history", history, 0, 1)
+        if before.ndim and before.size < needed:
+            raise ValueError(
+                f"history must hold at least {needed} samples, as far as the longest delay "
+                f"reaches, got {before.size}"
+            )
+        self._past = before.copy() if before.ndim else np.full(needed, before)
+        # A constant history has no beginning.
+        self._endless = not before.ndim
 
     def advance(
         self,
         noise: npt.ArrayLike,
+        *,
         c1: npt.ArrayLike = 1.0,
         c2: npt.ArrayLike = 1.0,
-        *,
         tau1: GivenDelay | None = None,
         tau2: GivenDelay | None = None,
     ) -> FloatArray:
@@ -552,139 +336,98 @@ class Simulation:
 
         Parameters
         ----------
-        noise : array_like, shape (n,), or (draws, n) for an ensemble
-            Free-running noise of the laser; the output has its unit.
-        c1, c2 : float or array_like of the same shape, optional
+        noise : array_like, shape (n,)
+            Noise of the free-running laser; the output has its unit.
+        c1, c2 : float or array_like, shape (n,), optional
             Multiplicative perturbations.
-        tau1, tau2 : float, array_like of the same shape, or callable, optional
-            Delays of the arms in s, in place of the loop's own. A callable takes an array of
-            times in s from the first sample of the run on, and returns a number, an array of
-            the same shape, or for an ensemble one of shape (draws, n). It is called for some
-            ten thousand samples at a time.
+        tau1, tau2 : float, array_like, shape (n,), or callable, optional
+            Round-trip delays of the arms in s, in place of the loop's own. A callable takes an
+            array of times in s since the first sample of the run.
 
         Returns
         -------
-        float array, of the same shape
+        float array, shape (n,)
             Noise of the locked laser.
 
         Raises
         ------
         TypeError, ValueError
-            If an argument is not finite and real, or of another shape; nothing is computed.
-            If a delay is shorter than four samples, though not constant, reaches back past the
-            history, or changes faster than light allows; the message names the time, and
-            `samples` says how far the run has come.
+            If an argument is not finite and real, has another shape, or was drawn at another
+            sample rate. If a delay is shorter than four samples though not constant, reaches
+            back past the history, or changes faster than light allows. Nothing is computed.
         DivergenceError
-            If the output leaves all bounds. The run cannot be continued.
+            If the output exceeds its limit. The run cannot be continued.
         """
-        given = finite_series("noise", noise, 1 if self.draws is None else 2)
-        if self.draws not in (None, len(given)):
-            raise ValueError(f"noise must have {self.draws} rows, got shape {given.shape}")
-        return self._advance(given, c1, c2, tau1, tau2)
+        given = self._series("noise", noise)
+        inputs = given, self._series("c1", c1, given), self._series("c2", c2, given)
+        time = np.arange(self.samples, self.samples + given.size) / self.sample_rate
+        arms = self._arms(tau1, tau2, time)
+        if self._stopped is not None:
+            raise DivergenceError(*self._stopped, np.empty(0))
+        if not given.size:
+            return np.empty(0)
+        known = self._past.size
+        phi, work = np.empty(known + given.size), self._work.copy()
+        phi[:known] = self._past
+        if not self.samples:
+            work[_LARGEST] = np.abs(self._past).max()
+        sampled = self._sensor, self._controller
+        end = _compute(phi, inputs, arms, *sampled, work, self.limit, self.samples)
+        self.samples, self._work = self.samples + end, work
+        if end < given.size:
+            self._stopped = work[_BOUNDED] / self.sample_rate, self.samples / self.sample_rate
+            raise DivergenceError(*self._stopped, phi[known : known + end].copy())
+        keep = max(known, max(map(longest, arms)) + _SPARE)
+        self._past, self._endless = phi[-keep:].copy(), False
+        return phi[known:]
 
-    def _advance(
-        self,
-        given: FloatArray,
-        c1: npt.ArrayLike,
-        c2: npt.ArrayLike,
-        tau1: GivenDelay | None,
-        tau2: GivenDelay | None,
+    def _series(
+        self, name: str, value: npt.ArrayLike, like: FloatArray | None = None
     ) -> FloatArray:
-        """Compute the next block, from noise that has been checked."""
-        inputs = [np.atleast_2d(given).T, _series("c1", c1, given), _series("c2", c2, given)]
-        arms = self._arm("tau1", tau1, given), self._arm("tau2", tau2, given)
-        if self._in_block:
-            raise RuntimeError(
-                "this run was interrupted in the middle of a block, and cannot go on: begin "
-                "again, or with a copy made before"
+        """Return a finite series, or a number or a series that has the shape of another."""
+        rate = getattr(value, "sample_rate", None)
+        if rate not in (None, self.sample_rate):
+            raise ValueError(
+                f"{name} must have the sample rate of the simulation, {self.sample_rate:g} Hz; "
+                f"it was drawn at {rate:g} Hz"
             )
-        output, begin = np.empty(inputs[0].shape), self.samples
-        shaped = output.T.reshape(given.shape)
-        with progress("simulation", len(output)) as say:
-            for at in range(0, len(output), self._block):
-                part = slice(at, at + self._block)
-                if self._stopped is None:
-                    block = [s[part] if len(s) > 1 else s for s in inputs]
-                    self._fill(output[part], block, arms)
-                if self._stopped is not None:
-                    # A copy, so that the error does not hold all the memory of the run.
-                    until = shaped[..., : self.samples - begin].copy()
-                    raise DivergenceError(*self._stopped, until)
-                say(at + self._block)
-        return shaped
+        array = np.asarray(finite_series(name, value, *([1] if like is None else [0, 1])))
+        if like is not None and array.shape not in ((), like.shape):
+            raise ValueError(
+                f"{name} must be a number or have the shape of noise, {like.shape}; got "
+                f"{array.shape}"
+            )
+        return np.require(np.atleast_1d(array), requirements=["C", "W"])
 
-    def _arm(self, name: str, tau: GivenDelay | None, like: FloatArray) -> Arm:
-        """Return the delay of an arm during a call, the loop's own for None."""
-        given: Any = getattr(self.loop, name) if tau is None else tau
-        if not callable(given):
-            series = _series(name, given, like)
-            given = series if np.ndim(given) > 0 else positive_number(name, given)
-        return Arm(name, given, self.sample_rate, self.samples)
-
-    def _fill(
-        self,
-        output: FloatArray,
-        inputs: Sequence[FloatArray],
-        arms: Sequence[Arm],
-    ) -> None:
-        """Compute the next samples, each in a row, unless the run stops before."""
-        stop, first, columns = len(output), 0, self._signals.shape[2]
-        delays = [arm.during(inputs[0], self.samples, self._known) for arm in arms]
-        keep = self._make_room(max(map(reach, (*delays, self._dead))))
-        known = self._known
-        # Without a dead time the last kind is the output, too, and nothing is sent.
-        phi, sent = (self._signals[k, : known + stop] for k in (0, -1))
-        series = tuple(_in_columns(given, columns) for given in inputs)
-        sampled = (*(_in_lanes(delay, columns) for delay in delays), self._dead), *self._filters
-        self._in_block = True
-        for work in self._groups:
-            lanes = work.shape[1]
-            run = first, phi, sent, series, sampled, work.ravel(), self.limit
-            end = _compute(((),) * lanes, *run, self.samples)
-            if end < stop:
-                size = np.abs(phi[known + end, first : first + lanes])
-                began = work[_BOUNDED, np.argmin(size <= self.limit * work[_LARGEST])]
-                self._stopped = (
-                    began / self.sample_rate,
-                    (self.samples + end) / self.sample_rate,
+    def _arms(
+        self, tau1: GivenDelay | None, tau2: GivenDelay | None, time: FloatArray
+    ) -> tuple[AnyDelay, AnyDelay]:
+        """Return the delays of both arms during a block that the past covers."""
+        found: list[AnyDelay] = []
+        for name, tau in (("tau1", tau1), ("tau2", tau2)):
+            given = getattr(self.loop, name) if tau is None else tau
+            delay = arm_delay(name, given, time, self.sample_rate)
+            short = (reach(delay) if time.size else 0) - self._past.size
+            if short > 0 and not self._endless:
+                begins = (self.samples - self._past.size) / self.sample_rate
+                raise ValueError(
+                    f"{name} must not reach back past the history, which begins at t = "
+                    f"{begins:.9g} s, at t = {self.samples / self.sample_rate:.9g} s"
                 )
-                stop = end
-            first += lanes
-        output[:stop] = phi[known : known + stop, : output.shape[1]]
-        self._known, end = min(known + stop, keep), known + stop
-        self._signals[:, : self._known] = self._signals[:, end - self._known : end]
-        self.samples += stop
-        self._in_block = False
-
-    def _make_room(self, longest: int) -> int:
-        """Make room for a block whose delays reach so far back; return what to keep after it.
-
-        That is some samples more, for the arms of the next block.
-        """
-        keep = max(self.history_samples, longest) + _SPARE
-        if self.samples == 0:
-            self._known = min(self._known, keep)
-        shape = len(self._signals), max(keep, self._known) + self._block, self._signals.shape[2]
-        if self._signals.shape[1] < shape[1]:
-            check_memory("tau1 and tau2", shape, 8)
-            signals, before = np.zeros(shape), self._signals[:, : self._known]
-            signals[:, : before.shape[1]] = before
-            self._signals = signals
-        if self.samples == 0:
-            history = self._history[-keep:, None] if self._history.ndim else self._history
-            self._signals[0, : self._known] = history
-            for work in self._groups:
-                work[_LARGEST] = np.abs(self._signals[0, : self._known][-longest:]).max()
-        return keep
+            if short > 0:
+                check_memory(name, (self._past.size + short,), 8)
+                self._past = np.append(np.full(short, self._past[0]), self._past)
+            found.append(delay)
+        return found[0], found[1]
 
 
 def simulate(
     loop: Loop,
     noise: npt.ArrayLike,
+    *,
     c1: npt.ArrayLike = 1.0,
     c2: npt.ArrayLike = 1.0,
     sample_rate: float = 200.0,
-    *,
     tau1: GivenDelay | None = None,
     tau2: GivenDelay | None = None,
     history: npt.ArrayLike = 0.0,
@@ -697,47 +440,42 @@ def simulate(
     .. math::
 
         \varphi(t) &= \varphi_0(t) - K \left[ m_1 u_1 + m_2 u_2 \right](t) , \\
-        u_k(t) &= \varphi(t) - c_k(t)\, \varphi(t - \tau_k(t)) ,
-
-    sampled as `Simulation` describes it.
+        u_k(t) &= \varphi(t) - c_k(t)\, \varphi(t - \tau_k(t)) .
 
     Parameters
     ----------
     loop : Loop
-        For instance `paper_loop()`.
-    noise : array_like, shape (n,), or (draws, n) for an ensemble
+        For instance `paper_loop()`; without dead time.
+    noise : array_like, shape (n,)
         Frequency noise of the free-running laser, for instance in Hz.
-    c1, c2 : float or array_like of the same shape, optional
-        Multiplicative perturbations of the two arms, constant or sample by sample.
+    c1, c2 : float or array_like, shape (n,), optional
+        Multiplicative perturbations of the two arms.
     sample_rate : float, optional
         In Hz.
-    tau1, tau2 : float, array_like of the same shape, or callable, optional
-        Delays of the arms in s, in place of the loop's own; see `Simulation.advance`.
-    history : float or array_like, optional
-        Output before the first sample, zero by default; see `Simulation`.
-    limit : float, optional
-        Size of the output that counts as diverged, in units of the largest input so far, noise
-        or history.
+    tau1, tau2 : float, array_like, shape (n,), or callable, optional
+        Round-trip delays of the arms in s, in place of the loop's own; see
+        `Simulation.advance`.
+    history, limit
+        As for `Simulation`.
 
     Returns
     -------
-    float array, of the same shape
-        In the unit of `noise`. Each row of an ensemble equals a run of its own, bit by bit.
+    float array, shape (n,)
+        In the unit of `noise`.
 
     Raises
     ------
     TypeError, ValueError
-        If an argument is unsuitable; before anything is computed, but for delays that move.
+        As for `Simulation` and `Simulation.advance`.
     DivergenceError
-        If the output leaves all bounds, in an ensemble that of the first run to do so. It
-        carries the time at which that began and the part computed so far. An unstable loop
-        that has not grown so far by the end of the run returns its output.
+        If the output exceeds its limit. An unstable loop that has not grown so far by the end
+        of the run returns its output: count roots to decide stability.
 
     Notes
     -----
-    An arm returns c(t) times the signal as it was tau(t) ago, and no more. Where the signal is
-    a phase, that is all that a moving arm does to it. Where it is a frequency, the arm returns
-    :math:`(1 - \dot\tau)\, \nu(t - \tau)`: then c holds the factor :math:`1 - \dot\tau`.
+    An arm returns c(t) times the signal as it was tau(t) ago. For a phase this is all that a
+    moving arm does. For a frequency the arm returns :math:`(1 - \dot\tau)\, \nu(t - \tau)`, and
+    c has to hold the factor :math:`1 - \dot\tau`.
 
     Examples
     --------
@@ -752,7 +490,5 @@ def simulate(
     >>> drift = 2 * 10.0 / 299_792_458.0
     >>> step = simulate(paper_loop(), np.ones(2000), tau1=lambda t: 20.1 + drift * t)
     """
-    given = finite_series("noise", noise, 1, 2)
-    draws = len(given) if given.ndim == 2 else None
-    run = Simulation(loop, sample_rate, history=history, limit=limit, draws=draws)
-    return run._advance(given, c1, c2, tau1, tau2)
+    run = Simulation(loop, sample_rate, history=history, limit=limit)
+    return run.advance(noise, c1=c1, c2=c2, tau1=tau1, tau2=tau2)

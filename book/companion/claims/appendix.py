@@ -226,7 +226,7 @@ def convolution_of_spectra() -> Finding:
     """Multiply series and convolve spectra; find the factor for the paper's laser."""
     found = convolution()
     deviation = np.abs(found.measured.asd / found.expected - 1.0)
-    close = float(deviation[found.measured.degrees > 2000.0].max())
+    close = float(deviation[found.measured.averages > 1000.0].max())
     factor = laser_phase_rms()
     # By this factor eta must lie below the additive noise: one or several orders, it says.
     return Finding(

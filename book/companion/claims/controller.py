@@ -566,7 +566,7 @@ def like_anti_pulling() -> Finding:
     zeros = [sum(abs(z) == 0.0 for z in one.zeros) for one in (here, there)]
     slowest = [min(abs(p) for p in one.poles) for one in (here, there)]
     ratio = float(slowest[0] / slowest[1])
-    peak = largest_pulling(LOOP, "differential")
+    peak = largest_pulling(LOOP, differential=(1.0, 0.0, 0.0))
     return Finding(
         {"": {"zeros at $s = 0$": min(zeros) >= 2, "poles": 0.5 < ratio < 2.0}},
         float(zeros[0]),

@@ -42,6 +42,7 @@ MEAN_DELAY = 2.0 * 5e9 / speed_of_light
 #: Others that are tried: as rounded elsewhere, and of arms that are 0.7 % longer.
 OTHER_DELAYS = (33.4, 33.6)
 LOOP = flight_loop(MEAN_DELAY)
+LONG_ARM = SingleArm(100.0, MEAN_DELAY)
 DELAYED = flight_loop(MEAN_DELAY, delay=DEAD_TIME)
 PRESTABILISED = flight_loop(MEAN_DELAY, delay=DEAD_TIME + TRANSPONDER)
 #: Frequency in Hz from which on the arms' phases are taken as free.
@@ -136,7 +137,7 @@ def density(source: str) -> Callable[[FloatArray], FloatArray]:
 def largest_answers() -> FloatArray:
     """Return the laser's largest answer to an error of the sum of 1 Hz, 1 Hz/s and 1 Hz/s^2."""
     errors = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-    return np.array([largest_pulling(LOOP, "common", error).size for error in errors])
+    return np.array([largest_pulling(LOOP, common=error).size for error in errors])
 
 
 def doppler_errors(laser: str, averaging: float = 200.0) -> tuple[float, float]:
@@ -359,7 +360,7 @@ def below_the_capability() -> Finding:
 def single_arm() -> Finding:
     """Pull a single arm of the source's length by 100 kHz for four days."""
     error = (1e5, 0.0, 0.0)
-    pulled = abs(float(pulling(SingleArm(100.0, MEAN_DELAY), 4.0 * DAY, error, error)))
+    pulled = abs(float(pulling(LONG_ARM, 4.0 * DAY, common=error, differential=error)))
     return Finding(
         {"": abs(pulled / 1e9 - 1.0) < 0.05},
         pulled,
