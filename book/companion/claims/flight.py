@@ -14,7 +14,6 @@ from armlock.loops import Loop, LoopAt, SingleArm, flight_loop
 from armlock.performance.budget import (
     LASERS,
     LEVELS,
-    NoiseBudget,
     free_running,
     noise_budget,
     tdi_capability,
@@ -26,7 +25,6 @@ from armlock.robustness.free_phases import arms_of
 from armlock.robustness.margins import Margins, critical_perturbation, margins
 from armlock.sensors import modified_dual
 from armlock.stability.counts import unstable_roots
-from armlock.timedomain.noise import LaserNoise
 from book.companion.claims.ledger import Finding, Verdict, claim
 from book.companion.extremes import smallest
 from book.companion.shared import shared
@@ -94,14 +92,6 @@ def free_margins(loop: Loop, frequency: FloatArray) -> FloatArray:
     return np.array([found[:, MODULUS], np.degrees(found[:, PHASE])])
 
 
-@cache
-def budget(laser: str = "free-running") -> NoiseBudget:
-    """Return the noise budget from 0.1 mHz to 2 Hz, 60 points to a null of the mean arm."""
-    step = 1.0 / MEAN_DELAY / 60.0
-    low, high = np.geomspace(1e-4, 0.03, 500), np.arange(0.03, 2.0, step)
-    return noise_budget(LOOP, np.concatenate((low, high)), laser=laser)
-
-
 def most_laser(loop: Loop, frequency: FloatArray) -> FloatArray:
     """Return what is left of a free-running laser in Hz/sqrt(Hz), at most.
 
@@ -115,22 +105,6 @@ def most_laser(loop: Loop, frequency: FloatArray) -> FloatArray:
     radius = np.abs(first / turned + second * turned)
     nearest = np.abs(np.abs(1.0 + first + second) - radius)
     return np.asarray(free_running(frequency) / nearest)
-
-
-def density(source: str) -> Callable[[FloatArray], FloatArray]:
-    """Return the density of one source at the locked laser as a function of frequency in Hz.
-
-    As `Spectrum.expected` takes it: from zero on, where the drawn noise of the laser is flat.
-    """
-
-    def asd(frequency: FloatArray) -> FloatArray:
-        f = np.maximum(frequency.ravel(), 1e-9)
-        found = noise_budget(
-            LOOP, f, laser=LaserNoise(seed=0, level=LEVELS.free_running).asd(f)
-        )
-        return found.sources[source].reshape(frequency.shape)
-
-    return asd
 
 
 @shared

@@ -23,7 +23,7 @@ from armlock.stability.counts import unstable_roots
 from armlock.stability.roots import rightmost_root
 from armlock.timedomain.noise import LaserNoise, PerturbationNoise
 from armlock.timedomain.simulation import DivergenceError, Simulation, sampled_open_loop
-from armlock.timedomain.spectra import Spectrum, SpectrumEstimator, amplitude_spectrum
+from armlock.timedomain.spectra import Spectrum, SpectrumEstimator
 from book.companion.claims.ledger import PRINTED, Finding, Verdict, Weight, claim
 from book.companion.claims.table1 import HALF_DIFFERENCE
 from book.companion.extremes import largest, smallest
@@ -41,8 +41,6 @@ LOWEST = 1.0 / DURATION
 SIZES = (1.0, 3.0, 10.0, 30.0, 100.0, 1000.0)
 #: Cut-offs in Hz at which the spectrum of the perturbations is tried at face value as well.
 CUTOFFS = (1e-4, 1e-3)
-#: Where the spectra after a start are taken, in s from it.
-SETTLED = (2_000.0, 22_000.0)
 #: A free-running laser of the kind used has about this density at 1 Hz, in Hz/sqrt(Hz).
 FREE_RUNNING = 30_000.0
 
@@ -51,8 +49,6 @@ SEED = 1
 PERTURBATION_SEEDS = (SEED + 1, SEED + 2)
 #: Number of random draws of c1 and c2.
 DRAWS = 4000
-#: Number of those that run in time, what one core does within a minute; and their sizes.
-ENSEMBLE, ENSEMBLE_SIZES = 12, (1.0, 3.0)
 # Series are kept once a second.
 _EVERY = int(SAMPLE_RATE)
 _BLOCK = 1 << 18
@@ -109,7 +105,7 @@ def face_value_rms() -> float:
     """R.m.s. of what is drawn from the printed spectrum, flat below one over the duration.
 
     It is that of the random process. A single draw of the length of the run differs, because
-    most of the variance is slower than the run: see `drawn_sizes`.
+    most of the variance is slower than the run.
     """
     return PerturbationNoise(0, SAMPLE_RATE, cutoff=LOWEST).rms
 
@@ -233,26 +229,6 @@ def full_run(duration: float = DURATION, seed: int = SEED) -> Run:
     return Run(time, np.stack(perturbations), perturbation.spectrum(), traces, spectra)
 
 
-def envelope(trace: Trace) -> tuple[FloatArray, FloatArray]:
-    """Return the largest magnitude in stretches of 500 s of a series, for a figure.
-
-    Parameters
-    ----------
-    trace : Trace
-        With a value every second.
-
-    Returns
-    -------
-    time, size : float arrays
-        Middle of each stretch in s, and the largest magnitude in it.
-    """
-    length = 500
-    number = trace.series.size // length
-    parts = np.abs(trace.series[: number * length]).reshape(number, length)
-    middle = length * (np.arange(number, dtype=np.float64) + 0.5)
-    return np.asarray(middle), np.asarray(parts.max(axis=1))
-
-
 class Suppression(NamedTuple):
     """Suppression of the laser's noise, measured and expected.
 
@@ -346,12 +322,6 @@ def exponent(run: Run, size: float) -> float:
     return float(growth_rate(run.difference(size)).sum() * _EVERY / SAMPLE_RATE)
 
 
-def drawn_sizes(run: Run) -> tuple[FloatArray, FloatArray]:
-    """Return the r.m.s. and the peak of c1 - 1 and of c2 - 1 of System 1, each shape (2,)."""
-    eta = run.perturbations * unit_size()
-    return np.sqrt(np.mean(eta**2, axis=1)), np.abs(eta).max(axis=1)
-
-
 @cache
 def drawn_differences() -> FloatArray:
     """Return `DRAWS` random courses of c1 - c2, of the run's length and System 1's size.
@@ -426,77 +396,6 @@ def reduction_quantile(share: float) -> float:
     return widest / stable_up_to() / unit_size()
 
 
-@dataclass(frozen=True, eq=False)
-class Ensemble:
-    """Random draws of c1 and c2 at the real rate, on the laser's noise of `full_run`.
-
-    Attributes
-    ----------
-    difference : float array, shape (draws, m)
-        c1 - c2 at System 1's size, every 100 s.
-    series : float array, shape (draws, n)
-        Output at System 1's size in Hz, once a second.
-    largest : dict of float to float array, shape (draws,)
-        Largest output in Hz, by the size of the perturbations.
-    """
-
-    difference: FloatArray
-    series: FloatArray
-    largest: dict[float, FloatArray]
-
-    def predicted(self, size: float) -> FloatArray:
-        """Return the factors of e by which the frozen loop grows in each draw."""
-        return np.asarray(growth_rate(size * self.difference).sum(axis=1) / _DRAW_RATE)
-
-    def suppression(self, free: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return frequencies in `BAND`, up to 10 mHz, and the suppression of each draw.
-
-        Parameters
-        ----------
-        free : float array, shape (n,)
-            The laser's noise in Hz, once a second.
-        """
-        free_running, *locked = (
-            amplitude_spectrum(row, 1.0).within(BAND[0], 1e-2) for row in (free, *self.series)
-        )
-        return free_running.frequency, np.array([free_running.asd / one.asd for one in locked])
-
-
-def ensemble_sources() -> list[list[PerturbationNoise]]:
-    """Return the sources of c1 - 1 and c2 - 1 of each draw, the first as in `full_run`."""
-    return [_sources(SEED + 2 * draw, LOWEST) for draw in range(ENSEMBLE)]
-
-
-@cache
-def ensemble(duration: float = DURATION) -> Ensemble:
-    """Run System 1, and larger sizes, with many draws of c1 and c2.
-
-    Parameters
-    ----------
-    duration : float, optional
-        In s, a multiple of 100 s.
-    """
-    laser = LaserNoise(SEED, SAMPLE_RATE, at_rest=True)
-    sizes = unit_size() * np.array(ENSEMBLE_SIZES)
-    # One by one: each stays in the processor's cache. None is stopped, however far it grows.
-    draws = [
-        (pair, [Simulation(paper_loop(), SAMPLE_RATE, limit=1e100) for _ in sizes])
-        for pair in ensemble_sources()
-    ]
-    gaps, kept = [], []
-    for noise in laser.blocks(round(duration * SAMPLE_RATE), 100 * _EVERY):
-        for pair, runs in draws:
-            first, second = (source.draw(noise.size) for source in pair)
-            gaps.append(unit_size() * (first[0] - second[0]))
-            for size, run in zip(sizes, runs, strict=True):
-                output = run.advance(noise, c1=1.0 + size * first, c2=1.0 + size * second)
-                kept.append(output[::_EVERY].copy())
-    blocks = np.array(kept).reshape(-1, ENSEMBLE, sizes.size, 100)
-    series = blocks.transpose(2, 1, 0, 3).reshape(sizes.size, ENSEMBLE, -1)
-    largest = dict(zip(ENSEMBLE_SIZES, np.abs(series).max(axis=2), strict=True))
-    return Ensemble(np.array(gaps).reshape(-1, ENSEMBLE).T, series[0], largest)
-
-
 def chain_exponent(run: Run, until: float) -> float:
     """Growth of the neutral root chain, with c1 = c2 at face value.
 
@@ -520,46 +419,6 @@ def chain_exponent(run: Run, until: float) -> float:
     c = 1.0 + run.perturbations[0, run.time < until]
     course = np.cumsum(np.log(c / (1.0 + 0.5 / gain))) * (_EVERY / SAMPLE_RATE / delay)
     return float((course - np.minimum.accumulate(course)).max())
-
-
-@shared
-def starts() -> dict[str, Spectrum]:
-    """Spectra of the ideal loop after three ways to switch it on, once it has settled.
-
-    They are taken over the seconds `SETTLED` from t = 0. The laser's noise starts at zero,
-    with nothing in the arms; or it is there at once, in the middle of its course, with nothing
-    in the arms; or it has filled them before.
-    """
-    settling, until = (round(t * SAMPLE_RATE) for t in SETTLED)
-    reach = round(paper_loop().longest_delay * SAMPLE_RATE)
-    found = {}
-    for name, rest, filled in (
-        ("noise starts at zero", True, False),
-        ("noise is there, arms empty", False, False),
-        ("noise is there, arms filled", False, True),
-    ):
-        laser = LaserNoise(SEED, SAMPLE_RATE, at_rest=rest)
-        history: FloatArray | float = laser.draw(reach) if filled else 0.0
-        run = Simulation(paper_loop(), SAMPLE_RATE, history=history)
-        estimator = SpectrumEstimator(SAMPLE_RATE)
-        run.advance(laser.draw(settling))
-        for noise in laser.blocks(until - settling, _BLOCK):
-            estimator.add(run.advance(noise))
-        found[name] = estimator.spectrum()
-    return found
-
-
-def chain_decay() -> float:
-    """Time constant in s of the slowest root of the neutral root chain."""
-    loop = paper_loop()
-    delay = 0.5 * (loop.tau1 + loop.tau2)
-    return delay / float(np.log1p(0.5 / abs(float(loop.controller.gain))))
-
-
-def filled_from() -> float:
-    """Frequency in Hz from which filled arms leave twice the noise that empty ones do."""
-    quiet, _, filled = starts().values()
-    return float(quiet.frequency[filled.asd > 2.0 * quiet.asd].min())
 
 
 def alike_from(run: Run) -> float:
