@@ -165,9 +165,10 @@ def pulling_of_the_sensors() -> Finding:
     modified = flight_loop(MEAN_DELAY, HALF_DIFFERENCE)
     sensor = sensors.dual(DUAL_SENSOR_CORNER, HALF_DIFFERENCE)
     plain = Loop(modified.controller, sensor, TAU1, TAU2)
+    errors = {mode: {mode: (1.0, 0.0, 0.0)} for mode in ("differential", "common")}
     ratios = {
-        mode: largest_pulling(plain, mode).size / largest_pulling(modified, mode).size
-        for mode in ("differential", "common")
+        mode: largest_pulling(plain, **error).size / largest_pulling(modified, **error).size
+        for mode, error in errors.items()
     }
     return Finding(
         {
