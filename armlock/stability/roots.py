@@ -8,7 +8,6 @@ and goes on in extended precision; a last count says that no root lies further r
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import overload
 
 import mpmath
@@ -27,7 +26,6 @@ from armlock.checks import (
     real_number,
     whole_number,
 )
-from armlock.loops import power_series
 from armlock.stability.bounds import last_frequency
 from armlock.stability.counts import BOUNDARY, CountError, unstable_roots
 
@@ -61,10 +59,6 @@ _NEWTON_STEPS = 12
 _EXTENDED_STEPS = 100
 # Most roots near a line that are tried in extended precision.
 _MOST_TRIED = 8
-# Most roots that are looked for right of a line.
-_MOST_ROOTS = 20_000
-# Directions from s = 0 in which roots of low frequency are looked for.
-_ANGLES = np.linspace(1.6, np.pi, 8)
 # Roots down to so many times one over the longest delay are looked for in steps of their size.
 _SLOWEST = 1e-9
 # Past this a delayed term is nothing right of a line, and its factor no float.
@@ -299,95 +293,6 @@ def count_right_of(system: CharacteristicFunction, x: float, y: float, sigma: fl
     Delays that do not act at these parameters, or that far to the right, are left out.
     """
     return _Line(system, x, y, sigma).count()
-
-
-def roots_right_of(
-    system: CharacteristicFunction, x: float, y: float, sigma: float
-) -> ComplexArray:
-    """Find all characteristic roots right of a line Re s = sigma, but for those at s = 0.
-
-    Parameters
-    ----------
-    system : CharacteristicFunction
-        The loop, with polynomials in s.
-    x, y : float
-        The free parameters.
-    sigma : float
-        Where the line is, in rad/s; negative.
-
-    Returns
-    -------
-    complex array, shape (n,)
-        In rad/s, ascending in magnitude; of pairs those with Im s > 0. With their conjugates,
-        and the roots that D has exactly at s = 0, they are as many as a certified count says.
-
-    Raises
-    ------
-    RootError
-        If there is no such count, if there are too many roots, or not all are found.
-
-    Examples
-    --------
-    >>> from armlock import HayesEquation
-    >>> from armlock.stability.roots import roots_right_of
-    >>> len(roots_right_of(HayesEquation(tau=1.0), 0.0, -1.0, -3.0))
-    3
-    """
-    line = _Line(system, x, y, sigma)
-    wanted = line.count()
-    if wanted < 0 or wanted > _MOST_ROOTS:
-        why = "their number cannot be told" if wanted < 0 else f"there are {wanted}"
-        raise RootError(
-            f"the roots right of {sigma} rad/s are not found: {why}", complex(sigma)
-        )
-    wanted -= _order_at_zero(system, x, y)
-    unit, found, number = line.per_turn / (2.0 * np.pi), np.empty(0, dtype=np.complex128), 0
-    for s, length in _all_near(line, unit):
-        kept = (length <= 1e-10 * np.abs(s)) & (np.abs(s) > 1e-13 * unit) & (s.real > sigma)
-        found = _distinct(np.concatenate((found, s[kept])))
-        number = found.size + int(np.count_nonzero(found.imag))
-        if number == wanted:
-            return found[np.argsort(np.abs(found))]
-    raise RootError(
-        f"of {wanted} roots right of {sigma} rad/s only {number} are found", complex(sigma)
-    )
-
-
-def _all_near(line: _Line, unit: float) -> Iterator[tuple[ComplexArray, FloatArray]]:
-    """Yield where Newton's method leads, and its last steps, until all walks are too long."""
-    # Slow roots lie close to each other, anywhere around zero.
-    sizes = unit * np.geomspace(_SLOWEST, 4.0, 200)
-    yield line.followed(np.outer(sizes, np.exp(1j * _ANGLES)).ravel(), 40)
-    # Others along the line, ever further up, or closer to the axis.
-    turns, steps = 0.0, 0.0
-    while turns < line.turns:
-        turns = min(8.0 * max(turns, _FIRST_TURNS_FURTHER), line.turns)
-        for share in (1.0, 0.3, 0.1, 0.0):
-            one = _Line(line.system, line.x, line.y, share * line.sigma)
-            # That of the delays that act on no root so far to the right, if none is left.
-            one.per_turn = line.per_turn
-            yield one.near(turns, 2 * _MOST_ROOTS)
-            steps += one.steps
-            if steps > _ALL_STEPS:
-                return
-
-
-def _order_at_zero(system: CharacteristicFunction, x: float, y: float) -> int:
-    """How many roots D has exactly at s = 0."""
-    whole = zip(*power_series(system, x, y, system.degree + 1), strict=True)
-    return next((k for k, pair in enumerate(whole) if sum(pair)), 0)
-
-
-def _distinct(s: ComplexArray) -> ComplexArray:
-    """Return the upper one of each pair, and each root once."""
-    s = np.where(np.abs(s.imag) <= 1e-9 * np.abs(s), s.real, s)
-    s = s[np.lexsort((s.real, np.abs(s.imag)))]
-    kept = np.ones(s.size, dtype=bool)
-    # Those that differ by rounding alone are neighbours, or next to one.
-    for apart in range(1, 4):
-        same = np.abs(s[apart:] - s[:-apart]) <= 1e-7 * np.abs(s[apart:])
-        kept[apart:] &= ~same
-    return s[kept]
 
 
 def _polished(system: CharacteristicFunction, x: float, y: float, start: complex) -> complex:
