@@ -131,11 +131,6 @@ def glue(**values: object) -> None:
             glue_one(part, number, display=False)
 
 
-def publish(figure: Figure, name: str, **values: object) -> None:
-    """Glue values, as `glue` does. The build takes figures from the notebooks by itself."""
-    glue(**values)
-
-
 def as_csv(figure: Figure) -> str:
     """Return the data that a figure shows as the text of a table, empty where it has none."""
     columns = drawn(figure)
