@@ -5,7 +5,7 @@ Usage: python tools/check_html.py FOLDER
 Every script, style sheet, font, image, frame and other part that a page loads by itself must
 be a file in the folder, and must exist. Links that a reader may follow can lead anywhere,
 but those that stay within the book must lead to a page and an anchor that exist, and files that
-are offered must open. A chapter offers its notebook.
+are offered must open. A chapter offers its source.
 
 A figure's SVG stays below 2 MB: dense curves are rasterised in it.
 """
@@ -103,9 +103,9 @@ def check(folder: Path) -> list[str]:
             if target.suffix in OPENED and target.is_file():
                 offered.add(target)
         if file.parent.name == "notebooks" and not any(
-            a.endswith(".ipynb") for a in page.linked
+            a.endswith((".ipynb", ".md")) for a in page.linked
         ):
-            found.append((file, "has no link to download the notebook"))
+            found.append((file, "has no link to download its source"))
     found += [(file, unread(file)) for file in sorted(offered)]
     return [f"{file.relative_to(folder)} {what}" for file, what in found if what]
 
@@ -119,14 +119,6 @@ def unread(file: Path) -> str | None:
     return None
 
 
-def is_number(text: str) -> bool:
-    """Return whether a field of a table is a number, or empty."""
-    try:
-        return not text or isinstance(float(text), float)
-    except ValueError:
-        return False
-
-
 def read_download(file: Path) -> None:
     """Open a file that the book offers, or raise."""
     if file.suffix == ".csv":
@@ -134,13 +126,6 @@ def read_download(file: Path) -> None:
             rows = list(csv.reader(stream))
         if len(rows) < 2 or any(len(row) != len(rows[0]) for row in rows):
             raise ValueError("not a table with a header")
-        bare = [
-            name
-            for name, *values in zip(*rows, strict=True)
-            if "[" not in name and all(is_number(value) for value in values)
-        ]
-        if file.parent.name == "figures" and bare:
-            raise ValueError(f"columns without a unit: {', '.join(bare)}")
     elif file.suffix == ".svg":
         ElementTree.parse(file)
     elif file.suffix == ".png":
