@@ -70,7 +70,9 @@ def build(folder, notebooks, address=None, run_before=False):
     works.write_text(re.sub(r"{doc}`(beside|in_orbit)`", r"\1", text))
     for name in OFFERED:
         shutil.copyfile(ROOT / name, folder / name)
-    (folder / "book" / "intro.md").write_text("# A book\n\n{cite:t}`shao_robustness`\n")
+    (folder / "book" / "intro.md").write_text(
+        "(assumptions)=\n# A book\n\n{cite:t}`shao_robustness`\n"
+    )
     chapters = [f"notebooks/{name}" for name in notebooks] + [f"book/{name}" for name in PAGES]
     (folder / "book" / "_toc.yml").write_text(
         "format: jb-book\nroot: book/intro\nchapters:\n"

@@ -30,4 +30,6 @@ addEventListener("DOMContentLoaded", () => {
   set("#pst-primary-sidebar", "role", "complementary");
   set("#pst-primary-sidebar", "aria-label", "The book");
   set(".citation-list, .citation", "role");
+  for (const corner of document.querySelectorAll("th.head"))
+    if (!corner.textContent.trim()) corner.outerHTML = "<td></td>";
 });
