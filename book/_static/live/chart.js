@@ -175,7 +175,8 @@ function armlockChart(api) {
       by = clamp(0, y0, y1) + (y1 > 0 ? 1 : -1) * (0.276393 + k) * py;
       base = count(loop, bx, by, { most: samples });
     }
-    if (base < 0) return { counts: counts.fill(base === UNCONFINED ? base : UNSURE), sure: 0 };
+    // Where no chain is confined at this point, none is in the whole chart: that is certain.
+    if (base < 0) return base === UNCONFINED ? { counts, sure: 1 } : { counts: counts.fill(UNSURE), sure: 0 };
     const most = [Math.max(Math.abs(x0), Math.abs(x1), Math.abs(bx)),
       Math.max(Math.abs(y0), Math.abs(y1), Math.abs(by))];
     // Next to the limit of the chain, roots cross at ever higher frequency.

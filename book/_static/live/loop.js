@@ -115,9 +115,9 @@ function armlockLoop() {
     }
   }
 
-  function positive(name, value) {
+  function positive(field, name, value) {
     if (!(value > 0 && Number.isFinite(value)))
-      throw new FieldError(name, `${name} must be a positive number, got ${value}`);
+      throw new FieldError(field, `${name} must be a positive number, got ${value}`);
     return value;
   }
 
@@ -264,7 +264,7 @@ function armlockLoop() {
         difference: some(m2) ? of(plus(m1, m2, -1)) : null };
     }
     if (!SENSORS.includes(spec.sensor)) throw new RangeError(`unknown sensor ${spec.sensor}`);
-    const corner = positive("corner", spec.corner);
+    const corner = positive("corner", "the corner", spec.corner);
     if (!Number.isFinite(spec.difference) || spec.difference === 0)
       throw new FieldError("difference", "the sensor's \u0394\u03c4 must be a number other than "
         + `zero, got ${spec.difference}`);
@@ -289,7 +289,8 @@ function armlockLoop() {
    * the dual sensors corner in rad/s and difference in s; for one's own m1, m2 and below,
    * coefficients with the highest power first. */
   function make(spec, sigma = 0) {
-    const tau1 = positive("tau1", spec.tau1), tau2 = positive("tau2", spec.tau2);
+    const tau1 = positive("tau1", "\u03c4\u2081", spec.tau1);
+    const tau2 = positive("tau2", "\u03c4\u2082", spec.tau2);
     const delay = spec.delay || 0;
     if (!(delay >= 0 && Number.isFinite(delay)))
       throw new FieldError("delay", `the dead time must be zero or positive, got ${spec.delay}`);
@@ -522,10 +523,11 @@ function armlockLoop() {
    * can tell, UNCONFINED where the neutral root chain is not confined, UNSURE where it would
    * take too many steps.
    *
-   * With hidden = true a root at s = 0 is left out where numerator and denominator of L both
-   * vanish there: it is not the loop's own. F then begins as its derivative does. Whether they
-   * vanish is decided by the point as it is given: `exact` may tell it from (1, 1). */
-  function count(loop, c1, c2, { hidden = false, most = MOST_STEPS, exact = null } = {}) {
+   * A root at s = 0 is left out where numerator and denominator of L both vanish there: it comes
+   * from clearing the denominator, and 1 + L does not have it. F then begins as its derivative
+   * does. Whether they vanish is decided by the point as it is given: `exact` may tell it from
+   * (1, 1). */
+  function count(loop, c1, c2, { most = MOST_STEPS, exact = null } = {}) {
     if (!Number.isFinite(c1) || !Number.isFinite(c2))
       throw new RangeError(`c1 and c2 must be finite numbers, got ${c1} and ${c2}`);
     const point = exact || at(loop, c1, c2);
@@ -536,7 +538,7 @@ function armlockLoop() {
     curve.at(0);
     curve.over(0);
     if (Math.hypot(curve.vr, curve.vi) <= curve.error) {
-      if (!hidden || !vanishes(curve)) return BOUNDARY;
+      if (!vanishes(curve)) return BOUNDARY;
       // |F - j omega F'(0)| is at most |F'(0)| omega / 2 there: F turns by 30 degrees at most.
       const slope = Math.hypot(curve.dr, curve.di);
       do step *= 0.5, curve.over(step); while (curve.bend * step > slope && step > 1e-300);
@@ -593,9 +595,11 @@ function armlockLoop() {
   }
 
 
-  /* Frequencies close enough to draw and to follow D by: in decades, then in turns. */
+  /* Frequencies close enough to draw and to follow D by: in decades, then in turns. Where these would
+   * be too many they are farther apart, down to eight in a turn: then the last ones are missing. */
   function frequencies(loop, top, lowest, most = MOST_SAMPLES) {
-    const grow = 10 ** (1 / A_DECADE), step = 1 / (A_RADIAN * loop.longest), found = [];
+    const grow = 10 ** (1 / A_DECADE), found = [], apart = top * loop.longest / most;
+    const step = Math.min(Math.max(apart, 1 / A_RADIAN), 0.25 * Math.PI) / loop.longest;
     for (let omega = lowest; omega < top && found.length < most;) {
       found.push(omega);
       omega = Math.min(omega * grow, omega + step);
@@ -607,11 +611,12 @@ function armlockLoop() {
   function around(loop, c1, c2, most) {
     const end = tail(loop, c1, c2, loop.longest);
     const top = Math.max(end ? 3 * end.omega : 0, 20 / loop.longest);
-    return frequencies(loop, top, 1e-2 * Math.min(...loop.scales), most);
+    return frequencies(loop, top, 0.1 * Math.min(...loop.scales), most);
   }
 
   /* The open loop for pictures. What does not depend on (c1, c2) is computed once, so that
-   * `to` gives L at another point within a frame: arrays omega, re, im. */
+   * `to` gives L at another point within a frame: arrays omega, re, im, and `at`, which gives
+   * [re, im] at any other frequency. */
   function response(loop, c1, c2, most = 9000) {
     const omega = around(loop, c1, c2, most), n = omega.length;
     const ones = new Curve(loop, at(loop, 0, 0)), arms = [along(-1, 0), along(0, -1)].map(
@@ -633,23 +638,33 @@ function armlockLoop() {
         re[i] = br[i] - x * ur[i] - y * vr[i];
         im[i] = bi[i] - x * ui[i] - y * vi[i];
       }
-      return { omega, re, im };
+      const here = new Curve(loop, at(loop, x, y));
+      return { omega, re, im, at: w => {
+        here.at(w);
+        const { vr, vi } = loop.rest, square = vr * vr + vi * vi, { lr, li } = here;
+        return [(lr * vr + li * vi) / square, (li * vr - lr * vi) / square];
+      } };
     };
-    return { omega, re, im, to };
+    return { to };
   }
 
   /* The rightmost root at (c1, c2), null where counts right and left of it do not confirm it. Lines
-   * Re s = low and high have it between them, by counts; Newton's method looks from one of them. */
+   * Re s = low and high have it between them, by counts; Newton's method looks from one of them, at
+   * first from few frequencies. The root at s = 0 that `count` leaves out is not the loop's. */
   function rightmost(spec, c1, c2) {
     let low = -Infinity, high = Infinity, line = 0, step = 1 / Math.max(spec.tau1, spec.tau2);
+    const loop = make(spec), curve = new Curve(loop, at(loop, c1, c2));
+    curve.at(0);
+    const cleared = vanishes(curve);
     const beyond = sigma => {
-      const number = count(make(spec, sigma), c1, c2);
+      const all = count(make(spec, sigma), c1, c2), number = all - (cleared && sigma < 0 && all > 0);
       if (number > 0) low = Math.max(low, sigma); else if (number === 0) high = Math.min(high, sigma);
       return number;
     };
     for (let attempt = 0; attempt < 16; attempt++) {
       if (beyond(line) < 0) return null;
-      const found = newton(spec, line, c1, c2).find(([re]) => re > low && re < high);
+      const found = newton(spec, line, c1, c2, attempt ? MOST_SAMPLES : 6000).find(([re, im]) =>
+        re > low && re < high && !(cleared && Math.hypot(re, im) < 1e-9 * loop.scales[0]));
       if (found) {
         const [re] = found, margin = 1e-4 * Math.abs(re), right = beyond(re + margin);
         const left = right === 0 ? beyond(re - margin) : 0;
@@ -663,8 +678,8 @@ function armlockLoop() {
   }
 
   /* The roots that Newton's method reaches from a line Re s = sigma, the rightmost first. */
-  function newton(spec, sigma, c1, c2) {
-    const loop = make(spec, sigma), omega = around(loop, c1, c2);
+  function newton(spec, sigma, c1, c2, most) {
+    const loop = make(spec, sigma), omega = around(loop, c1, c2, most);
     const curve = new Curve(loop, at(loop, c1, c2)), seeds = [], found = [];
     // ds = -D / D', where D = F Q with Q' / Q = sum 1 / (s + a)
     const step = ({ vr, vi, dr, di, omega, loop: { below } }) => {
@@ -681,12 +696,13 @@ function armlockLoop() {
     for (const w of omega) {
       curve.at(w);
       const move = step(curve), length = Math.hypot(...move);
-      if (!last) seeds.push([sigma + move[0], w + move[1]]);
+      if (!last) seeds.push([sigma + move[0], w + move[1], length]);
       else if (size[1] <= size[0] && size[1] <= length) seeds.push(last);
       size = [size[1], length];
-      last = [sigma + move[0], w + move[1]];
+      last = [sigma + move[0], w + move[1], length];
     }
-    seeds.sort((p, q) => q[0] - p[0]);
+    // A short step leads to a root near the line.
+    seeds.sort((p, q) => p[2] - q[2]);
     for (let [re, im] of seeds.slice(0, 12)) {
       for (let k = 0; k < 40; k++) {
         const there = make(spec, re), point = new Curve(there, at(there, c1, c2));

@@ -3,7 +3,7 @@
  * How far a loop is from instability, certified: margins at a point, and the first break along a
  * ray from (1, 1). No sample decides a number. Each is the smallest value met along a walk of the
  * axis whose every step is certified to hide none that is smaller by more than a part in a
- * thousand; it is nan, "not sure", where the walk takes too long or rounding hides what decides.
+ * thousand; it is nan, "undecided", where the walk takes too long or rounding hides what decides.
  *
  * A step is certified in one of two ways: by the tangents of numerator and denominator, and
  * bounds on what they leave out; or, where the delays turn faster than all else changes, by the
@@ -370,9 +370,9 @@ function armlockMargins(api) {
     pair() { return [this.rr, this.ri, this.ur, this.ui, this.nr, this.ni, this.or, this.oi]; }
     left() { return [this.dr, this.dn]; }
 
-    take(k) {
-      if (k > this.low && k <= 1) this.low = k;
-      if (k > 1 && k < this.high) this.high = k;
+    take(k, omega) {
+      if (k > this.low && k <= 1) [this.low, this.lowerAt] = [k, omega];
+      if (k > 1 && k < this.high) [this.high, this.upperAt] = [k, omega];
     }
 
     interval() {
@@ -444,7 +444,7 @@ function armlockMargins(api) {
    * first; nan where that is not certain, null where the loop is not stable at (1, 1). */
   function firstBreak(loop, d1, d2) {
     const inside = t => count(loop, 1 + t * d1, 1 + t * d2,
-      { hidden: true, most: COUNTED, exact: beside(t * d1, t * d2) });
+      { most: COUNTED, exact: beside(t * d1, t * d2) });
     const begun = inside(0);
     // Whether a loop that is on the boundary as far as rounding can tell is stable, nobody can tell.
     if (begun === UNSURE || begun === BOUNDARY) return NaN;
@@ -479,18 +479,19 @@ function armlockMargins(api) {
 
   /* Margins of a stable loop, null of another: gain factors `lower` and `upper` between which it
    * stays stable (0 and infinity where none from 1 / `most` to `most` bounds them), `phase` in
-   * rad, infinity without a crossover, and `modulus`; each nan where it is not certain. */
+   * rad, infinity without a crossover, and `modulus`; each nan where it is not certain. The names
+   * with `At` have the frequency of each in rad/s: infinity, or none, where it is a limit. */
   function margins(spec, c1, c2) {
-    const loop = make(spec), begun = count(loop, c1, c2, { hidden: true, most: COUNTED });
-    let [lower, upper, most] = [NaN, NaN, LARGEST[0]];
+    const loop = make(spec), begun = count(loop, c1, c2, { most: COUNTED });
+    let [lower, upper, most, gains] = [NaN, NaN, LARGEST[0], null];
     if (begun !== 0)
       return begun === UNSURE ? { lower, upper, most, phase: NaN, modulus: NaN } : null;
     for (most of LARGEST) {
-      [lower, upper] = new Gains(loop, c1, c2, most).found();
+      gains = new Gains(loop, c1, c2, most);
+      [lower, upper] = gains.found();
       if (!Number.isNaN(lower)) break;
     }
-    const scaled = k =>
-      count(make({ ...spec, gain: spec.gain * k }), c1, c2, { hidden: true, most: COUNTED });
+    const scaled = k => count(make({ ...spec, gain: spec.gain * k }), c1, c2, { most: COUNTED });
     // A second opinion from counts on both sides.
     const confirmed = (k, inside, outside) => {
       const out = scaled(k * outside);
@@ -498,8 +499,9 @@ function armlockMargins(api) {
     };
     if (lower > 0 && !confirmed(lower, 1 + NEAR, 1 - 1e-6)) lower = NaN;
     if (upper < Infinity && !confirmed(upper, 1 - NEAR, 1 + 1e-6)) upper = NaN;
-    return { lower, upper, most, phase: new Phase(loop, c1, c2).found(),
-      modulus: new Modulus(loop, c1, c2).found() };
+    const [phase, modulus] = [new Phase(loop, c1, c2), new Modulus(loop, c1, c2)];
+    return { lower, upper, most, phase: phase.found(), modulus: modulus.found(), lowerAt: gains.lowerAt,
+      upperAt: gains.upperAt, phaseAt: phase.where, modulusAt: modulus.where };
   }
 
   return { FARTHEST, LARGEST, NEAR, firstBreak, margins };
