@@ -1,8 +1,8 @@
 "use strict";
 /*
- * What the live pages draw: the chart over (c1, c2) with the D-curve, the Nyquist curve with what
- * happens at -1, Bode's plot, and the loop in time. Plain canvases, because charts of many
- * thousand points have to follow the pointer in every frame.
+ * What the live pages draw: the chart over (c1, c2) with the D-curve, the Nyquist curve, Bode's plot,
+ * poles and zeros, and a year. Plain canvases, because charts of many thousand points have to follow
+ * the pointer in every frame.
  */
 const armlockDraw = (function () {
   const { TURN, say, scientific, power } = armlockText;
@@ -22,21 +22,31 @@ const armlockDraw = (function () {
   function palette() {
     const dark = document.documentElement.dataset.theme === "dark";
     return dark
-      ? { dark, text: "#e3e6e9", grid: "#55606a", line: "#56b4e9", mark: "#f0a060", ground: "#12181d",
+      ? { dark, text: "#e3e6e9", grid: "#55606a", line: "#56b4e9", other: "#3ecf9c", mark: "#f0a060", ground: "#12181d",
         stable: [70, 98, 124], few: [150, 84, 40], many: [255, 186, 120], lost: [112, 88, 148],
         unsure: [[18, 24, 29], [96, 104, 112]] }
-      : { dark, text: "#222832", grid: "#c9d0d6", line: "#0072b2", mark: "#d55e00", ground: "#ffffff",
+      : { dark, text: "#222832", grid: "#c9d0d6", line: "#0072b2", other: "#00755a", mark: "#d55e00", ground: "#ffffff",
         stable: [184, 196, 206], few: [255, 232, 208], many: [209, 85, 34], lost: [147, 132, 160],
         unsure: [[255, 255, 255], [190, 196, 202]] };
   }
 
-  /* A canvas as wide as its place, sharp on every screen, drawn once a frame at most. */
+  /* The place in an ascending array that is nearest to a value. */
+  function nearest(values, value) {
+    let low = 0, high = values.length - 1;
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (values[middle] < value) low = middle; else high = middle;
+    }
+    return value - values[low] < values[high] - value ? low : high;
+  }
+
+  /* A canvas as wide as its place, sharp on every screen, drawn once a frame at most. `shape` is its
+   * height over its width, wide and on a telephone. */
   class Sheet {
     constructor(attributes, shape, draw) {
       this.canvas = element("canvas", attributes);
       this.paint = draw;
-      this.shape = shape;
-      this.canvas.style.aspectRatio = String(1 / shape);
+      this.shape = () => [].concat(shape).at(innerWidth < 600 ? -1 : 0);
       new ResizeObserver(() => this.now()).observe(this.canvas);
       new MutationObserver(() => this.now()).observe(document.documentElement,
         { attributes: true, attributeFilter: ["data-theme"] });
@@ -50,15 +60,27 @@ const armlockDraw = (function () {
 
     now() {
       this.waiting = false;
-      const wide = this.canvas.clientWidth;
-      if (!wide) return;
-      const ratio = window.devicePixelRatio || 1, high = Math.round(wide * this.shape);
-      if (this.canvas.width !== Math.round(wide * ratio)
-        || this.canvas.height !== Math.round(high * ratio)) {
-        this.canvas.width = Math.round(wide * ratio);
-        this.canvas.height = Math.round(high * ratio);
-      }
-      const pen = this.canvas.getContext("2d"), colours = palette();
+      this.canvas.style.aspectRatio = String(1 / this.shape());
+      if (this.canvas.clientWidth) this.render(this.canvas, window.devicePixelRatio || 1);
+    }
+
+    /* The picture as a file: 1600 pixels wide, on the page's ground. */
+    picture(done) {
+      const copy = element("canvas");
+      this.render(copy, 1600 / this.canvas.clientWidth);
+      const pen = copy.getContext("2d");
+      pen.globalCompositeOperation = "destination-over";
+      pen.setTransform(1, 0, 0, 1, 0, 0);
+      pen.fillStyle = palette().ground;
+      pen.fillRect(0, 0, copy.width, copy.height);
+      copy.toBlob(done);
+    }
+
+    render(canvas, ratio) {
+      const wide = this.canvas.clientWidth, high = Math.round(wide * this.shape());
+      const size = [wide, high].map(v => Math.round(v * ratio));
+      if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width, canvas.height] = size;
+      const pen = canvas.getContext("2d"), colours = palette();
       pen.setTransform(ratio, 0, 0, ratio, 0, 0);
       pen.clearRect(0, 0, wide, high);
       pen.font = "13px sans-serif";
@@ -104,20 +126,27 @@ const armlockDraw = (function () {
     pen.lineWidth = 1;
   }
 
-  /* The chart over (c1, c2). `centre` and `half` say what it shows. */
+  /* The chart over (c1, c2). `centre` and `half` say what it shows. The pointer's place is a preview;
+   * a click or a tap holds the point, and Escape or another click on it releases it. */
   class Chart {
     constructor(label, { changed, pointed }) {
-      Object.assign(this, { changed, pointed, centre: [1, 1], half: 3, marked: null, broken: null,
+      Object.assign(this, { changed, pointed, centre: [1, 1], half: 3, held: null, hover: null, broken: null,
         grid: null, picture: null, curve: null, ghost: null, lit: null, stale: false, fingers: new Map() });
       this.sheet = new Sheet({ tabindex: 0, role: "application", "aria-label": `${label} Arrow keys `
-        + "move the point, with shift by ten steps, with control the view; plus and minus zoom." }, 1,
+        + "move the point, with shift by ten steps, with control the view; plus and minus zoom; Escape "
+        + "releases the point." }, 1,
         (pen, wide, high, colours) => this.draw(pen, wide, high, colours));
       const canvas = this.canvas = this.sheet.canvas;
       canvas.addEventListener("pointermove", event => this.move(event));
       canvas.addEventListener("pointerdown", event => this.press(event));
       for (const name of ["pointerup", "pointercancel"])
         canvas.addEventListener(name, event => this.lift(event));
+      canvas.addEventListener("pointerleave", () => this.preview(null));
       canvas.addEventListener("keydown", event => this.key(event));
+      // A vertical swipe scrolls the page (touch-action), but neither a pinch nor the held point.
+      canvas.addEventListener("touchstart", event => {
+        if (event.touches.length > 1 || this.onPoint) event.preventDefault();
+      }, { passive: false });
       // The wheel scrolls the page; with control it zooms, as on a map.
       canvas.addEventListener("wheel", event => {
         if (!event.ctrlKey && !event.metaKey) return;
@@ -131,6 +160,8 @@ const armlockDraw = (function () {
         y0: this.centre[1] - this.half, y1: this.centre[1] + this.half };
     }
 
+    get marked() { return this.held || this.hover; }
+
     show(centre, half) {
       this.centre = centre;
       this.half = Math.min(Math.max(half, 1e-12), 1e3);
@@ -139,7 +170,7 @@ const armlockDraw = (function () {
     }
 
     zoom(factor, around) {
-      const [x, y] = around || this.marked || this.centre;
+      const [x, y] = around || this.held || this.centre;
       const half = this.half * factor;
       this.show([x + (this.centre[0] - x) * factor, y + (this.centre[1] - y) * factor], half);
     }
@@ -157,7 +188,7 @@ const armlockDraw = (function () {
       this.sheet.draw();
     }
 
-    /* The counts as a picture. What is not sure is striped. */
+    /* The counts as a picture. What is undecided is striped. */
     paint(colours) {
       const { counts, n } = this.grid;
       let largest = 1;
@@ -241,7 +272,13 @@ const armlockDraw = (function () {
         pen.fill();
         pen.stroke();
       }
-      if (this.marked) ring(pen, px(this.marked[0]), py(this.marked[1]), 7, colours);
+      if (this.marked) ring(pen, px(this.marked[0]), py(this.marked[1]), this.held ? 8 : 5, colours);
+      if (this.held) {
+        pen.fillStyle = colours.line;
+        pen.beginPath();
+        pen.arc(px(this.held[0]), py(this.held[1]), 3, 0, 7);
+        pen.fill();
+      }
       pen.restore();
       this.axes(pen, frame, high, colours);
     }
@@ -320,30 +357,32 @@ const armlockDraw = (function () {
         centre: this.centre, half: this.half };
     }
 
-    /* A drag moves the view, and two fingers zoom; a tap sets the point, and a finger on it moves it. */
+    /* A drag moves the view, two fingers zoom, and what begins on the held point moves it. */
     press(event) {
-      const found = this.at(event);
-      if (!found || event.button) return;
-      const place = this.canvas.getBoundingClientRect(), mouse = event.pointerType === "mouse";
+      if (!this.at(event) || event.button) return;
+      const place = this.canvas.getBoundingClientRect();
       this.canvas.setPointerCapture(event.pointerId);
       this.fingers.set(event.pointerId, [event.clientX, event.clientY]);
-      this.held = this.grip();
+      this.gripped = this.grip();
       this.moved = this.fingers.size > 1;
-      this.onPoint = !mouse && this.marked && this.fingers.size === 1 && Math.hypot(event.clientX - place.left
-        - this.px(this.marked[0]), event.clientY - place.top - this.py(this.marked[1])) < 24;
-      if (mouse) this.mark(found);
+      this.onPoint = this.held && !this.moved && Math.hypot(event.clientX - place.left - this.px(this.held[0]),
+        event.clientY - place.top - this.py(this.held[1])) < (event.pointerType === "mouse" ? 10 : 24);
     }
 
     move(event) {
-      if (!this.fingers.has(event.pointerId) || this.onPoint) {
-        const found = this.at(event);
-        if (found) this.mark(found);
+      if (!this.fingers.has(event.pointerId)) {
+        this.preview(this.at(event));
         return;
       }
       this.fingers.set(event.pointerId, [event.clientX, event.clientY]);
-      const now = this.grip(), from = this.held, place = this.canvas.getBoundingClientRect();
+      const now = this.grip(), from = this.gripped, place = this.canvas.getBoundingClientRect();
       if (!this.moved && Math.hypot(now.x - from.x, now.y - from.y) < 4) return;
       this.moved = true;
+      if (this.onPoint) {
+        const found = this.at(event);
+        if (found) this.hold(found);
+        return;
+      }
       this.canvas.style.cursor = "grabbing";
       const frame = this.frame(place.width, place.height);
       const half = from.apart && now.apart ? from.half * from.apart / now.apart : from.half;
@@ -357,19 +396,27 @@ const armlockDraw = (function () {
     lift(event) {
       const tapped = this.fingers.delete(event.pointerId) && !this.moved && event.type === "pointerup";
       const found = tapped && this.at(event);
-      if (found) this.mark(found);
+      if (found) this.hold(this.onPoint ? null : found);
       this.onPoint = false;
       this.canvas.style.cursor = "";
-      if (this.fingers.size) this.held = this.grip();
+      if (this.fingers.size) this.gripped = this.grip();
     }
 
-    mark(point) {
-      this.marked = point;
+    preview(point) {
+      if (this.held || this.hover === point) return;
+      this.hover = point;
       this.sheet.draw();
-      this.pointed(point);
+      this.pointed();
+    }
+
+    hold(point) {
+      [this.held, this.hover] = [point, null];
+      this.sheet.draw();
+      this.pointed();
     }
 
     key(event) {
+      if (event.key === "Escape" && this.held) this.hold(null);
       const zoom = { "+": 0.5, "=": 0.5, "-": 2 }[event.key];
       if (zoom && !event.ctrlKey && !event.metaKey) {
         event.preventDefault();
@@ -385,8 +432,8 @@ const armlockDraw = (function () {
         this.show(this.centre.map((v, k) => v + step * move[k]), this.half);
         return;
       }
-      const { x0, x1, y0, y1 } = this.box, [x, y] = this.marked || this.centre;
-      this.mark([Math.min(x1, Math.max(x0, x + step * move[0])),
+      const { x0, x1, y0, y1 } = this.box, [x, y] = this.held || this.centre;
+      this.hold([Math.min(x1, Math.max(x0, x + step * move[0])),
         Math.min(y1, Math.max(y0, y + step * move[1]))]);
     }
 
@@ -445,265 +492,255 @@ const armlockDraw = (function () {
     }
   }
 
-  /* Where the sampled |L| passes one: [index, phase in rad], the smallest phases first. */
-  function crossovers({ omega, re, im }) {
-    const found = [];
-    for (let i = 1, before = Math.hypot(re[0], im[0]); i < omega.length; i++) {
-      const size = Math.hypot(re[i], im[i]);
-      if (before < 1 !== size < 1) {
-        const k = Math.abs(size - 1) < Math.abs(before - 1) ? i : i - 1;
-        found.push([k, Math.abs(Math.atan2(-im[k], -re[k]))]);
-      }
-      before = size;
-    }
-    return found.sort((p, q) => p[1] - q[1]).slice(0, 12);
+  /* Text that stays readable over a curve. */
+  function label(pen, text, x, y, colours) {
+    pen.lineJoin = "round";
+    pen.lineWidth = 4;
+    pen.strokeStyle = colours.ground;
+    pen.strokeText(text, x, y);
+    pen.lineWidth = 1;
+    pen.fillText(text, x, y);
   }
 
   const hertz = omega => `${say(omega / TURN)} Hz`;
+  const degrees = angle => `${say(angle * 180 / Math.PI)}\u00b0`;
+  const decibels = size => 20 * Math.log10(size + 1e-300);
 
-  /* The Nyquist curve, its distance from 0 on a logarithmic scale: angles stay as they are. The
-   * inset shows what is around -1 as it is, with the margin's arc. Returns where a sample is. */
-  function drawNyquist([{ omega, re, im }, pinned], lit, pen, wide, high, colours) {
-    const n = omega.length, far = v => Math.log10(1 + v);
-    let most = 2, nearest = Infinity;
-    for (let i = 0; i < n; i++) {
-      most = Math.max(most, Math.hypot(re[i], im[i]));
-      nearest = Math.min(nearest, Math.hypot(1 + re[i], im[i]));
-    }
-    most = Math.min(most, 1e6);
-    const scale = 0.46 * Math.min(wide, high) / far(most), cx = wide / 2, cy = high / 2;
+  /* Rings of distances from the middle, with their labels where the fewest of the places lie. */
+  function rings(pen, [cx, cy], sizes, radius, write, places, colours) {
+    const crowd = new Array(16).fill(0), outer = 0.3 * radius(sizes.at(-1));
+    for (const [x, y] of places) if (Math.hypot(x - cx, y - cy) > outer)
+      crowd[Math.floor((Math.atan2(y - cy, x - cx) / TURN + 1) * 16) % 16]++;
+    const angle = (crowd.indexOf(Math.min(...crowd)) + 0.5) * TURN / 16;
     pen.strokeStyle = colours.grid;
-    pen.textAlign = "left";
-    pen.textBaseline = "bottom";
-    for (let size = 1; size <= most; size *= 10) {
+    for (const size of sizes) {
       pen.beginPath();
-      pen.arc(cx, cy, scale * far(size), 0, 7);
+      pen.arc(cx, cy, radius(size), 0, 7);
       pen.stroke();
-      pen.fillText(power(Math.round(Math.log10(size))), cx + 3, cy - scale * far(size));
     }
-    const bent = (x, y) => {
-      const size = Math.sqrt(x * x + y * y) || 1e-300, k = scale * far(Math.min(size, most)) / size;
-      return [cx + k * x, cy - k * y];
-    };
-    const place = i => bent(re[i], im[i]);
-    // Both halves, mirrored at an axis, and the pinned loop's.
-    const both = (to, axis) => {
-      const half = Array.from(re, (x, i) => to(x, im[i]));
-      pen.strokeStyle = colours.grid;
-      curve(pen, n, i => [half[i][0], 2 * axis - half[i][1]]);
-      pen.strokeStyle = colours.line;
-      curve(pen, n, i => half[i]);
-      if (pinned) ghost(pen, colours, () => curve(pen, pinned.omega.length,
-        i => to(pinned.re[i], pinned.im[i])));
-    };
-    both(bent, cy);
-    const cross = (x, y) => {
-      pen.strokeStyle = colours.mark;
-      pen.lineWidth = 2;
-      for (const d of [-1, 1]) {
-        pen.beginPath();
-        pen.moveTo(x - 5, y - 5 * d);
-        pen.lineTo(x + 5, y + 5 * d);
-        pen.stroke();
-      }
-      pen.lineWidth = 1;
-    };
-    cross(cx - scale * far(1), cy);
-    const found = crossovers({ omega, re, im }), [worst] = found;
-    // The inset, in the corner: twice as wide as the curve is near, within reason.
-    const side = 0.36 * Math.min(wide, high), room = Math.min(1.5, Math.max(3 * nearest, 0.02));
-    const zoom = 0.5 * side / room, ix = wide - 0.5 * side - 4, iy = 0.5 * side + 4;
-    pen.fillStyle = colours.ground;
-    pen.fillRect(ix - 0.5 * side, iy - 0.5 * side, side, side);
-    pen.save();
-    pen.beginPath();
-    pen.rect(ix - 0.5 * side, iy - 0.5 * side, side, side);
-    pen.clip();
-    const inX = x => ix + zoom * (1 + x), inY = y => iy - zoom * y;
-    pen.strokeStyle = colours.grid;
-    pen.beginPath();
-    pen.arc(inX(0), inY(0), zoom, 0, 7);
-    pen.stroke();
-    both((x, y) => [inX(x), inY(y)], iy);
-    if (worst) {
-      const angle = Math.atan2(-im[worst[0]], re[worst[0]]), half = angle > 0 ? Math.PI : -Math.PI;
-      pen.strokeStyle = colours.mark;
-      pen.lineWidth = 2.5;
-      pen.beginPath();
-      pen.arc(inX(0), inY(0), zoom, Math.min(angle, half), Math.max(angle, half));
-      pen.stroke();
-      pen.lineWidth = 1;
-    }
-    cross(inX(-1), inY(0));
-    if (lit !== null) ring(pen, inX(re[lit]), inY(im[lit]), 5, colours);
-    pen.restore();
-    pen.strokeStyle = pen.fillStyle = colours.text;
-    pen.strokeRect(ix - 0.5 * side, iy - 0.5 * side, side, side);
-    pen.textAlign = "left";
-    pen.textBaseline = "top";
-    pen.fillText(`\u22121 \u00b1 ${say(room, 2)}`, ix - 0.5 * side + 4, iy - 0.5 * side + 4);
-    pen.textAlign = "left";
+    pen.textAlign = "center";
     pen.textBaseline = "middle";
-    found.forEach(([i], k) => {
-      const [x, y] = place(i);
-      pen.beginPath();
-      pen.arc(x, y, 3, 0, 7);
-      pen.fill();
-      if (k < 1) pen.fillText(hertz(omega[i]), x + 7, y);
-    });
-    if (lit !== null) ring(pen, ...place(lit), 6, colours);
-    return place;
+    return () => {
+      for (const size of sizes) label(pen, write(size), cx + radius(size) * Math.cos(angle),
+        cy + radius(size) * Math.sin(angle), colours);
+    };
   }
 
+  /* The Nyquist curve. Its distance from 0 is linear up to 1, so that the unit circle and what is in it
+   * are seen as they are, and a logarithm of the logarithm beyond; angles stay. Returns where a sample
+   * is. */
+  function drawNyquist([now, pinned], lit, pen, wide, high, colours) {
+    const { omega, re, im, margins } = now, cx = wide / 2, cy = high / 2, full = 0.47 * Math.min(wide, high);
+    let most = 10;
+    for (let i = 0; i < omega.length; i++) most = Math.max(most, Math.hypot(re[i], im[i]));
+    most = Math.min(most, 1e6);
+    const bend = v => v <= 1 ? v : 1 + Math.log1p(Math.log(Math.min(v, most)));
+    const radius = v => full * bend(v) / bend(most);
+    const bent = (x, y) => {
+      const size = Math.hypot(x, y) || 1e-300, k = radius(size) / size;
+      return [cx + k * x, cy - k * y];
+    };
+    // Between two samples that are far apart in the picture the curve is followed, not cut short.
+    const path = one => {
+      let [u, v] = bent(one.re[0], one.im[0]), from = one.omega[0], left = one.rough ? 400 : 4000;
+      const found = [[u, v]], go = (x, y, to, depth) => {
+        if (Math.abs(x - u) + Math.abs(y - v) > 8 && depth < 8 && left-- > 0) {
+          const middle = 0.5 * (from + to), [a, b] = bent(...one.at(middle));
+          if (Math.hypot(a - 0.5 * (u + x), b - 0.5 * (v + y)) > 1) {
+            go(a, b, middle, depth + 1);
+            go(x, y, to, depth + 1);
+            return;
+          }
+        }
+        found.push([x, y]);
+        [u, v, from] = [x, y, to];
+      };
+      for (let i = 1; i < one.omega.length; i++) {
+        const [x, y] = bent(one.re[i], one.im[i]);
+        if (Math.abs(x - u) + Math.abs(y - v) > 0.7) go(x, y, one.omega[i], 0);
+      }
+      return found;
+    };
+    const half = path(now), other = pinned && path(pinned), sizes = [1];
+    while (10 * sizes.at(-1) <= most) sizes.push(10 * sizes.at(-1));
+    const named = rings(pen, [cx, cy], sizes, radius, size => power(Math.round(Math.log10(size))),
+      half.flatMap(([x, y]) => [[x, y], [x, 2 * cy - y]]), colours);
+    pen.strokeStyle = colours.grid;
+    curve(pen, half.length, i => [half[i][0], 2 * cy - half[i][1]]);
+    pen.strokeStyle = colours.line;
+    curve(pen, half.length, i => half[i]);
+    if (other) ghost(pen, colours, () => curve(pen, other.length, i => other[i]));
+    named();
+    pen.strokeStyle = colours.mark;
+    pen.lineWidth = 2;
+    const x = cx - radius(1);
+    for (const d of [-5, 5]) {
+      pen.beginPath();
+      pen.moveTo(x - 5, cy - d);
+      pen.lineTo(x + 5, cy + d);
+      pen.stroke();
+    }
+    if (margins?.phaseAt > 0 && margins.phase > 0) {
+      const [a, b] = now.at(margins.phaseAt), angle = Math.atan2(-b, a), to = angle > 0 ? Math.PI : -Math.PI;
+      pen.lineWidth = 3;
+      pen.beginPath();
+      pen.arc(cx, cy, radius(1), Math.min(angle, to), Math.max(angle, to));
+      pen.stroke();
+      pen.textAlign = "center";
+      const text = `${degrees(margins.phase)} at ${hertz(margins.phaseAt)}`;
+      label(pen, text, Math.max(x, 0.5 * pen.measureText(text).width + 4), cy + (b < 0 ? 1 : -1)
+        * (radius(1) + 14), colours);
+    }
+    pen.lineWidth = 1;
+    if (lit !== null) ring(pen, ...bent(re[lit], im[lit]), 6, colours);
+    return i => bent(re[i], im[i]);
+  }
+
+  /* |L| and |S| above, the phase of L below, with the margins where the certified walk met them. */
   function drawBode([now, pinned], lit, pen, wide, high, colours) {
-    const read = ({ omega, re, im }) => ({ omega, size: omega.map((_, i) =>
-      10 * Math.log10(re[i] * re[i] + im[i] * im[i] + 1e-300)),
-    phase: omega.map((_, i) => Math.atan2(im[i], re[i]) * 180 / Math.PI) });
-    const shown = [now, pinned].filter(one => one).map(read), [{ omega, size, phase }] = shown;
-    const n = omega.length, top = size.reduce((a, b) => Math.max(a, b));
-    const low = size.reduce((a, b) => Math.min(a, Math.max(b, top - 160)), top);
-    const first = Math.log10(omega[0] / TURN), last = Math.log10(omega[n - 1] / TURN);
+    const of = ({ omega, re, im }) => ({ omega, size: omega.map((_, i) => decibels(Math.hypot(re[i], im[i]))),
+      left: omega.map((_, i) => -decibels(Math.hypot(1 + re[i], im[i]))),
+      phase: omega.map((_, i) => Math.atan2(im[i], re[i]) * 180 / Math.PI) });
+    const shown = [now, pinned].filter(one => one).map(of), [{ omega, size, left: rest, phase }] = shown;
+    const margins = now.margins || {}, n = omega.length, faint = -50;
+    // What is too small to matter at both ends of the axis is left out.
+    const from = Math.max(0, size.findIndex(v => v > faint)), to = size.findLastIndex(v => v > faint);
+    const first = Math.log10(omega[from] / TURN), last = Math.log10(omega[to > from ? to : n - 1] / TURN);
+    const top = size.reduce((a, b) => Math.max(a, b), rest.reduce((a, b) => Math.max(a, b), 0));
+    const low = Math.max(-top - 10, Math.min(faint, rest.reduce((a, b) => Math.min(a, b))));
     const left = 56, right = 8, room = (high - 62) / 2, span = wide - left - right;
-    const at = w => left + span * (Math.log10(w / TURN) - first) / (last - first), px = i => at(omega[i]);
-    const panel = (above, part, least, most, name, step) => {
+    const px = w => left + span * (Math.log10(w / TURN) - first) / (last - first);
+    const inside = w => w > 0 && px(w) >= left && px(w) <= wide - right;
+    const panel = (above, parts, least, most, name, step) => {
       const py = v => above + room * (most - v) / (most - least);
-      lines(pen, step || ticks(least, most, 4), v => say(v), py, left, wide - right, colours);
+      lines(pen, step || ticks(least, most, 5), v => say(v), py, left, wide - right, colours);
       upright(pen, name, 2, above + room / 2);
       pen.save();
       pen.beginPath();
       pen.rect(left, above, span, room);
       pen.clip();
       // A phase that passes 180 degrees is drawn anew from the other side.
-      const trace = one => {
+      const trace = (one, part) => {
         pen.beginPath();
         one[part].forEach((v, i) => {
           const on = i && Math.abs(v - one[part][i - 1]) < 300;
-          if (on) pen.lineTo(at(one.omega[i]), py(v)); else pen.moveTo(at(one.omega[i]), py(v));
+          if (on) pen.lineTo(px(one.omega[i]), py(v)); else pen.moveTo(px(one.omega[i]), py(v));
         });
         pen.stroke();
       };
-      pen.strokeStyle = colours.line;
-      trace(shown[0]);
-      if (shown[1]) ghost(pen, colours, () => trace(shown[1]));
+      for (const [part, colour] of parts) {
+        if (shown[1]) ghost(pen, colours, () => trace(shown[1], part));
+        pen.strokeStyle = colour;
+        trace(shown[0], part);
+      }
       pen.restore();
       return py;
     };
-    const of = panel(8, "size", low - 5, top + 5, "|L| in dB");
-    const turned = panel(22 + room, "phase", -180, 180, "phase in degrees", [-180, -90, 0, 90, 180]);
-    pen.fillStyle = colours.text;
-    crossovers(now).forEach(([i], k) => {
+    const gain = panel(8, [["left", colours.other], ["size", colours.line]], low, top + 5, "dB");
+    const turned = panel(22 + room, [["phase", colours.line]], -180, 180, "phase in \u00b0", [-180, -90, 0, 90, 180]);
+    // From the curve to where the loop would be on the limit.
+    const margin = (w, a, b, text) => {
+      if (!inside(w)) return;
+      const x = px(w), close = x > wide - 110;
+      pen.strokeStyle = colours.mark;
+      pen.lineWidth = 3;
       pen.beginPath();
-      pen.arc(px(i), of(0), 3, 0, 7);
+      pen.moveTo(x, a);
+      pen.lineTo(x, b);
+      pen.stroke();
+      pen.beginPath();
+      pen.arc(x, a, 3, 0, 7);
+      pen.fillStyle = colours.mark;
       pen.fill();
-      pen.textAlign = px(i) > wide - 90 ? "right" : "left";
-      pen.textBaseline = "bottom";
-      if (k < 1) pen.fillText(hertz(omega[i]), px(i) + (px(i) > wide - 90 ? -6 : 6), of(0) - 4);
-    });
+      pen.fillStyle = colours.text;
+      pen.textAlign = close ? "right" : "left";
+      pen.textBaseline = "middle";
+      label(pen, text, x + (close ? -7 : 7), Math.min(0.5 * (a + b), high - 60), colours);
+    };
+    for (const name of ["lower", "upper"]) if (margins[`${name}At`] > 0)
+      margin(margins[`${name}At`], gain(-decibels(margins[name])), gain(0), `gain \u00d7 ${say(margins[name])}`);
+    if (margins.phaseAt > 0) {
+      const [a, b] = now.at(margins.phaseAt), edge = b < 0 ? -180 : 180;
+      margin(margins.phaseAt, turned(edge - Math.sign(edge) * margins.phase * 180 / Math.PI), turned(edge),
+        degrees(margins.phase));
+    }
+    if (margins.modulus > 0 && margins.modulusAt > 0) {
+      const y = gain(-decibels(margins.modulus));
+      margin(margins.modulusAt, y, y, `|S| \u2264 ${say(-decibels(margins.modulus))} dB`);
+    }
+    // The names stand at the curves.
+    pen.textAlign = "left";
+    pen.textBaseline = "bottom";
+    for (const [name, part, colour, at] of [["|L|", size, colours.line, 0.03], ["|S|", rest, colours.other, 0.4]]) {
+      const i = nearest(omega, TURN * 10 ** (first + at * (last - first)));
+      pen.fillStyle = colour;
+      label(pen, name, px(omega[i]), Math.min(Math.max(gain(part[i]) - 3, 22), 8 + room), colours);
+    }
+    pen.fillStyle = colours.text;
     if (lit !== null) {
+      const x = px(omega[lit]);
       pen.strokeStyle = colours.mark;
       pen.beginPath();
-      pen.moveTo(px(lit), 8);
-      pen.lineTo(px(lit), 22 + 2 * room);
+      pen.moveTo(x, 8);
+      pen.lineTo(x, 22 + 2 * room);
       pen.stroke();
-      ring(pen, px(lit), of(size[lit]), 5, colours);
-      ring(pen, px(lit), turned(phase[lit]), 5, colours);
+      for (const y of [gain(size[lit]), gain(rest[lit]), turned(phase[lit])]) ring(pen, x, y, 4, colours);
     }
     powersBelow(pen, first, last, left, span, 26 + 2 * room, wide, high);
-    return i => [px(i), null];
-  }
-
-  /* The noise that is left, source by source; what time-delay interferometry takes out is dashed. */
-  function drawNoise([now, pinned], lit, pen, wide, high, colours) {
-    const { omega } = now, n = omega.length, left = 56, right = 8, top = 44, span = wide - left - right;
-    const first = Math.log10(omega[0] / TURN), last = Math.log10(omega[n - 1] / TURN);
-    const sources = [["laser", "laser", "#d55e00"], ["shot", "shot noise", "#009e73"],
-      ["clock", "clocks", "#cc79a7"], ["motion", "motion", colours.dark ? "#56b4e9" : "#0072b2"],
-      ["total", "all of it", colours.text]];
-    const most = Math.ceil(Math.log10(Math.max(...now.total, ...now.required)));
-    const least = Math.max(most - 9, Math.floor(Math.log10(Math.min(...now.total, ...now.clock, ...now.motion))));
-    const px = w => left + span * (Math.log10(w / TURN) - first) / (last - first);
-    const py = v => top + (high - top - 46) * (most - Math.log10(v + 1e-300)) / (most - least);
-    const every = Math.ceil((most - least) / 6), powers = [];
-    for (let k = least; k <= most; k += every) powers.push(10 ** k);
-    lines(pen, powers, v => power(Math.round(Math.log10(v))), py, left, wide - right, colours);
-    upright(pen, "Hz/\u221aHz", 2, top + (high - top) / 2);
-    pen.textAlign = "left";
-    pen.textBaseline = "top";
-    [...sources, ["", "dashed: what TDI takes out", colours.mark]].reduce(([x, y], [, name, colour]) => {
-      const long = pen.measureText(name).width + 28;
-      const [u, v] = x + long > wide ? [left, y + 18] : [x, y];
-      pen.fillStyle = colour;
-      pen.fillRect(u, v + 5, 12, 3);
-      pen.fillStyle = colours.text;
-      pen.fillText(name, u + 16, v);
-      return [u + long, v];
-    }, [left, 4]);
-    pen.save();
-    pen.beginPath();
-    pen.rect(left, top, span, high - top - 46);
-    pen.clip();
-    const trace = (found, name) => curve(pen, found.omega.length, i => [px(found.omega[i]), py(found[name][i])]);
-    ghost(pen, { text: colours.mark }, () => trace(now, "required"));
-    for (const [name, , colour] of sources) {
-      pen.strokeStyle = colour;
-      pen.lineWidth = name === "total" ? 2 : 1.2;
-      trace(now, name);
-    }
-    pen.lineWidth = 1;
-    if (pinned) ghost(pen, colours, () => trace(pinned, "total"));
-    pen.restore();
-    if (lit !== null) ring(pen, px(omega[lit]), py(now.total[lit]), 5, colours);
-    powersBelow(pen, first, last, left, span, high - 42, wide, high);
     return i => [px(omega[i]), null];
   }
 
-  /* The loop in time: the laser's frequency after a step of its own, a round trip a line. The scale
-   * is linear around zero and logarithmic beyond, so that step, echo and what is left are seen. */
-  function drawTime({ values, step, trip, shown }, pen, wide, high, colours) {
-    const left = 56, right = 8, top = 8, below = 46, span = wide - left - right;
-    const n = Math.max(2, Math.min(values.length, shown)), whole = values.length;
-    let low = 0, most = 0, later = 0;
-    for (let i = 0; i < whole; i++) {
-      low = Math.min(low, values[i]);
-      most = Math.max(most, values[i]);
-      if (i > whole / 2) later = Math.max(later, Math.abs(values[i]));
-    }
-    const largest = Math.max(most, -low), small = Math.min(Math.max(0.3 * later, 1e-6 * largest), largest);
-    const bent = v => Math.asinh(v / small), high0 = high - top - below;
-    const room = 0.06 * (bent(most) - bent(low)) || 1, first = bent(low) - room, last = bent(most) + room;
-    const px = i => left + span * i / (whole - 1);
-    const py = v => top + high0 * (last - bent(v)) / (last - first);
-    const decades = [0];
-    for (let k = Math.ceil(Math.log10(small)); k <= Math.log10(largest); k++)
-      decades.push(...[10 ** k, -(10 ** k)].filter(v => v <= most && v >= low));
-    lines(pen, decades, v => v ? `${v < 0 ? "\u2212" : ""}${power(Math.round(Math.log10(Math.abs(v))))}` : "0",
-      py, left, wide - right, colours);
-    pen.textAlign = "center";
-    pen.textBaseline = "top";
-    const trips = whole * step / trip, every = Math.ceil(trips / (wide / 50));
-    for (let k = 0; k <= trips; k += every) {
-      const x = left + span * k / trips;
-      pen.beginPath();
-      pen.moveTo(x, top);
-      pen.lineTo(x, top + high0);
-      pen.stroke();
-      pen.fillText(say(+(k * trip).toPrecision(6), 4), x, top + high0 + 6);
-    }
-    pen.strokeStyle = colours.line;
-    pen.lineWidth = 1.5;
-    curve(pen, n, i => [px(i), py(values[i])]);
-    pen.fillStyle = colours.mark;
+  /* Poles and zeros of the controller in the s-plane, the distance from 0 on a logarithmic scale.
+   * Returns where each is, and what root a place is. */
+  function drawRoots({ zeros, poles, unit, range }, pen, wide, high, colours) {
+    const cx = wide / 2, cy = high / 2, full = 0.46 * Math.min(wide, high), [least, most] = range;
+    const share = v => Math.min(Math.max(0.15 + 0.75 * Math.log(v / least) / Math.log(most / least), 0), 1);
+    const place = ([re, im]) => {
+      const size = Math.hypot(re, im), k = size ? full * share(size) / size : 0;
+      return [cx + k * re, cy - k * im];
+    };
+    const sizes = [], places = [...zeros, ...poles].map(place);
+    const every = Math.ceil(Math.log10(most / least) / 5);
+    for (let k = Math.ceil(Math.log10(least / unit)); 10 ** k <= 1.01 * most / unit; k += every) sizes.push(10 ** k);
+    pen.strokeStyle = colours.grid;
     pen.beginPath();
-    pen.arc(px(n - 1), py(values[n - 1]), 4, 0, 7);
-    pen.fill();
-    pen.fillStyle = colours.text;
+    pen.moveTo(cx, cy - full);
+    pen.lineTo(cx, cy + full);
+    pen.moveTo(cx - full, cy);
+    pen.lineTo(cx + full, cy);
+    pen.stroke();
+    if (sizes.length) rings(pen, [cx, cy], sizes, v => full * share(v * unit),
+      v => power(Math.round(Math.log10(v))), places, colours)();
+    pen.lineWidth = 2;
+    for (const root of zeros) {
+      pen.strokeStyle = colours.line;
+      pen.beginPath();
+      pen.arc(...place(root), 6, 0, 7);
+      pen.stroke();
+    }
+    for (const root of poles) {
+      const [x, y] = place(root);
+      pen.strokeStyle = colours.mark;
+      pen.beginPath();
+      for (const d of [-5, 5]) {
+        pen.moveTo(x - 5, y - d);
+        pen.lineTo(x + 5, y + d);
+      }
+      pen.stroke();
+    }
+    pen.lineWidth = 1;
+    pen.textAlign = "left";
     pen.textBaseline = "bottom";
-    pen.fillText("time in s, a line each round trip", (left + wide - right) / 2, high - 2);
-    upright(pen, "laser's frequency", 2, top + high0 / 2);
+    pen.fillText(unit === 1 ? "in rad/s" : "in Hz", 4, high - 4);
+    return { place, root: (x, y) => {
+      const far = Math.hypot(x - cx, y - cy) / full, angle = Math.atan2(cy - y, x - cx);
+      const size = least * Math.exp((Math.max(far, 0.05) - 0.15) / 0.75 * Math.log(most / least));
+      return [size * Math.cos(angle), size * Math.sin(angle)];
+    } };
   }
 
-  /* A year: half differences above, true and held (dashed), and the critical perturbation below. Days
-   * that were counted and are not stable are shaded in both. */
+  /* A year: half differences above, true and assumed (dashed), and the critical perturbation below.
+   * Days that were counted and are not stable are shaded in both. */
   function drawYear({ values, days, day }, pen, wide, high, colours) {
     const left = 56, right = 8, span = wide - left - right, room = (high - 74) / 2, last = values.length - 1;
     const px = t => left + span * t / last;
@@ -729,13 +766,16 @@ const armlockDraw = (function () {
     curve(pen, values.length, t => [px(t), above(1e3 * values[t][0])]);
     pen.lineWidth = 1;
     ghost(pen, colours, () => curve(pen, values.length, t => [px(t), above(1e3 * values[t][1])]));
+    pen.textAlign = "right";
+    pen.textBaseline = "bottom";
+    label(pen, "\u2014 true   \u2013 \u2013 assumed by the sensor", wide - right - 6, 4 + room, colours);
     const found = days.map((v, t) => [t, v]).filter(([, v]) => v > 0 && v < Infinity);
     const sizes = found.map(([, v]) => Math.log10(v)), first = Math.floor(Math.min(-1, ...sizes));
     const top = Math.max(first + 1, ...sizes.map(Math.ceil));
     const below = v => 26 + room + room * (top - Math.log10(v)) / (top - first);
     lines(pen, Array.from({ length: top - first + 1 }, (_, k) => 10 ** (first + k)),
       v => power(Math.round(Math.log10(v))), below, left, wide - right, colours);
-    upright(pen, "least that breaks it", 2, 26 + 1.5 * room);
+    upright(pen, "critical perturbation", 2, 26 + 1.5 * room);
     pen.fillStyle = colours.line;
     for (const [t, v] of found) pen.fillRect(px(t) - 1.5, below(v) - 1.5, 3, 3);
     pen.strokeStyle = colours.mark;
@@ -752,5 +792,5 @@ const armlockDraw = (function () {
     pen.fillText("day", left + span / 2, high - 2);
   }
 
-  return { element, Sheet, Chart, drawNyquist, drawBode, drawNoise, drawTime, drawYear };
+  return { element, nearest, Sheet, Chart, drawNyquist, drawBode, drawRoots, drawYear };
 })();

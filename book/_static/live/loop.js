@@ -721,5 +721,5 @@ function armlockLoop() {
   }
 
   return { EPSILON, BOUNDARY, UNCONFINED, UNSURE, MOST_STEPS, SENSORS, make, at, beside, along, Curve, tail,
-    chainLeads, tangentDistance, vanishes, count, frequencies, response, rightmost, rootsOf };
+    chainLeads, tangentDistance, vanishes, count, response, rightmost, rootsOf, times };
 }

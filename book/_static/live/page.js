@@ -3,14 +3,13 @@
  * The live pages: a form, a chart of the stable region that answers the pointer, plots that follow.
  *
  * A page loads this file. It loads those beside it, each with one job: loop.js counts, margins.js
- * and chart.js certify, time.js steps, noise.js weighs noise, text.js reads and writes, draw.js draws. What takes long
- * runs in workers, which are made of the functions' own text: a page that is opened from disk may
- * load no script into one.
+ * and chart.js certify, text.js reads and writes, draw.js draws. What takes long runs in workers, which
+ * are made of the functions' own text: a page that is opened from disk may load no script into one.
  */
 (function () {
   const here = document.currentScript.src;
-  const files = ["loop.js", "margins.js", "chart.js", "time.js", "noise.js", "text.js",
-    "draw.js", ...document.querySelector("[data-live=year]") ? ["orbits.js"] : []];
+  const files = ["loop.js", "margins.js", "chart.js", "text.js", "draw.js",
+    ...document.querySelector("[data-live=year]") ? ["orbits.js"] : []];
   const missing = files.filter(name =>
     !Array.from(document.scripts).some(script => script.src.endsWith(`/live/${name}`)));
   Promise.all(missing.map(name => new Promise((done, failed) => {
@@ -28,12 +27,11 @@
 })();
 
 function armlockPages() {
-  const { TURN, say, duration, written, list, readRoots, readPolynomial, readNumber, python, address,
-    fromAddress, exact } = armlockText;
-  const { element, Sheet, Chart, drawNyquist, drawBode, drawNoise, drawTime, drawYear }
-    = armlockDraw;
+  const { TURN, say, duration, shortest, exact, written, list, readRoots, readPolynomial, readFraction,
+    readNumber, python, address, fromAddress } = armlockText;
+  const { element, nearest, Sheet, Chart, drawNyquist, drawBode, drawRoots, drawYear } = armlockDraw;
   const api = armlockLoop();
-  Object.assign(api, armlockChart(api), armlockNoise(api));
+  Object.assign(api, armlockChart(api));
 
   const hertz = values => values.map(f => [-TURN * f, 0]);
   const real = values => values.map(v => [v, 0]);
@@ -65,8 +63,8 @@ function armlockPages() {
   const SENSORS = [["single", "single arm"], ["common", "common arm"],
     ["difference", "difference of the arms"], ["dual", "dual"], ["modified", "modified dual"],
     ["own", "one of your own"]];
-  const WORDS = { [-1]: "on the boundary", [-3]: "not sure",
-    [-2]: "not stable: the high-frequency chain of roots is not confined" };
+  const LOST = "unstable at arbitrarily high frequency";
+  const WORDS = { [-1]: "a root on the imaginary axis", [-2]: LOST, [-3]: "undecided" };
 
   function counted(count) {
     return count === 0 ? "stable" : count > 0
@@ -77,22 +75,24 @@ function armlockPages() {
 
   /* Runs in a worker: `api` is what the engine's files give. */
   function tasks(api) {
+    const breaks = (spec, ways) => ways.map(([x, y]) => api.firstBreak(api.make(spec), x, y));
     const look = {
       chart: (spec, x0, x1, y0, y1, n, samples) => ({ n, box: { x0, x1, y0, y1 },
         ...api.chart(api.make(spec), x0, x1, n, y0, y1, n, samples) }),
       point: (spec, c1, c2) => api.count(api.make(spec), c1, c2),
-      // With ten times the steps, for who waits.
+      // With ten times the steps, for a reader who waits.
       count: (spec, c1, c2) => api.count(api.make(spec), c1, c2, { most: 4000000 }),
       root: (spec, c1, c2) => api.rightmost(spec, c1, c2),
-      breaks: spec => [[1, -1], [-1, 1], [1, 1], [-1, -1]].map(
-        ([x, y]) => api.firstBreak(api.make(spec), x, y)),
+      breaks: spec => breaks(spec, [[1, -1], [-1, 1], [1, 1], [-1, -1]]),
       margins: (spec, c1, c2) => api.margins(spec, c1, c2),
-      // Of one day of a year: the least that breaks the loop, the arms perturbed against each other.
-      day: spec => {
-        const found = [1, -1].map(way => api.firstBreak(api.make(spec), way, -way));
+      // Of one day of a year: the critical perturbation of the arms in opposite directions, null where
+      // the loop is unstable. Without `whole` only whether it is.
+      day: (spec, whole) => {
+        const count = api.count(api.make(spec), 1, 1);
+        if (count > 0 || count === -2) return null;
+        const found = whole || count ? breaks(spec, [[1, -1], [-1, 1]]) : [NaN];
         return found.includes(null) ? null : Math.min(...found);
       },
-      time: (spec, c1, c2, trips) => api.inTime(spec, c1, c2, trips),
     };
     return ({ data: { kind, version, input } }) => {
       let result = null, error = null;
@@ -105,8 +105,7 @@ function armlockPages() {
   class Desk {
     constructor(order) {
       const text = `const api = (${armlockLoop})();
-        for (const more of [${armlockMargins}, ${armlockChart}, ${armlockTime}])
-          Object.assign(api, more(api));
+        for (const more of [${armlockMargins}, ${armlockChart}]) Object.assign(api, more(api));
         onmessage = (${tasks})(api);`;
       this.worker = new Worker(URL.createObjectURL(new Blob([text], { type: "text/javascript" })));
       this.worker.onmessage = ({ data }) => {
@@ -150,94 +149,58 @@ function armlockPages() {
   const TOLD = ["count", "root", "breaks", "margins"];
   const UNTOLD = { count: -3, root: null, breaks: [NaN, NaN, NaN, NaN],
     margins: { lower: NaN, upper: NaN, phase: NaN, modulus: NaN } };
-  const UNSTABLE = "none: not stable";
-  const SOURCES = { laser: "laser", shot: "shot noise", clock: "clocks", motion: "spacecraft's motion",
-    total: "all of it" };
-  const HINT = "Point at the chart, touch it, or move with the arrow keys. Drag to move the "
-    + "view; two fingers zoom.";
   let number = 0;
-
-  /* Whether a loop is stable at its point, but for a hidden root at s = 0; undefined as long as that is
-   * not known. */
-  function stable({ told: { count, margins } }) {
-    if (count > 0 || count === -2 || margins === null) return false;
-    return count === 0 || margins ? true : undefined;
-  }
-
-  /* The place in an ascending array that is nearest to a value. */
-  function nearest(values, value) {
-    let low = 0, high = values.length - 1;
-    while (high - low > 1) {
-      const middle = (low + high) >> 1;
-      if (values[middle] < value) low = middle; else high = middle;
-    }
-    return value - values[low] < values[high] - value ? low : high;
-  }
 
   /* What all pages have: a chart that answers, plots that follow it, and the loop's numbers. */
   class Live {
     constructor(label) {
       this.id = `live-${++number}`;
       // What answers the pointer waits for nothing else.
-      this.near = new Desk(["point", "root"]);
-      this.wide = new Desk(["chart"]);
-      this.slow = new Desk(["time", ...TOLD, ...TOLD.map(kind => `${kind} of the pinned`), "day"]);
+      this.near = new Desk(["point"]);
+      this.wide = new Desk(["chart", "day"]);
+      this.slow = new Desk([...TOLD, ...TOLD.map(kind => `${kind} of the pinned`), "day"]);
       this.out = element("output", { role: "status", "aria-live": "polite" });
       this.note = element("p", { class: "live-note", role: "status" });
       this.numbers = element("table", { class: "live-numbers" });
       // For who hears the page: said once all numbers are there.
       this.ready = element("p", { class: "visually-hidden", role: "status" });
-      this.chart = new Chart(label, { changed: () => this.redraw(),
-        pointed: point => this.tell(point) });
-      this.figure = element("div", { class: "live-chart", "data-check": "hover" },
-        this.chart.canvas, this.out, this.ready);
+      this.chart = new Chart(label, {
+        changed: () => { this.redraw(); this.moved(null); },
+        pointed: () => { this.tell(true); if (!this.chart.hover) this.moved("point"); },
+      });
+      this.figure = element("figure", { class: "live-chart", "data-check": "hover" },
+        element("figcaption", {}, "Number of unstable roots over c1 and c2"), this.chart.canvas, this.out, this.ready);
       this.lit = null;
       // The loop as it is, and the one that was pinned.
       this.design = this.pinned = null;
-      // What a page does besides when loop or point are others.
-      this.told = () => {};
-      const pair = read => () => this.design && [this.design, this.pinned].map(one => one && read(one));
+      // What a page does besides where the view, the held "point" or the "loop" is another.
+      this.moved = () => {};
       this.plots = [
-        ["Nyquist curve of L at the point, distances from 0 on a logarithmic scale; inset: around -1, "
-          + "with the arc of the smallest phase at a crossover.", drawNyquist, pair(one => one.response)],
-        ["Magnitude and phase of L at the point against frequency.", drawBode, pair(one => one.response)],
-      ].map(plot => this.plot(...plot));
+        this.plot("Nyquist curve of L, compressed beyond 1", drawNyquist, 1),
+        this.plot("Bode\u2019s plot of L, and the sensitivity S = 1/(1 + L)", drawBode, [0.46, 0.9]),
+      ];
       this.following = element("p", { class: "live-note", role: "status" });
-      this.forget();
     }
 
     get spec() { return this.design?.spec; }
+    /* The point that all plots and numbers are of. */
+    get point() { return this.chart.marked || [1, 1]; }
+    /* The point that a link, the Python lines and a pinned loop are of. */
+    get kept() { return this.chart.held || [1, 1]; }
+    get name() { return this.chart.marked ? this.chart.name(this.point) : "(1, 1)"; }
+    get designs() { return [this.design, this.pinned].filter(one => one); }
 
-    /* One more plot: the noise that is left. */
-    budget(laser) {
-      this.laser = laser;
-      this.plots.push(this.plot("Noise left on the locked laser at the point, source by source, against "
-        + "frequency.", drawNoise, () => {
-        const found = [this.design, this.pinned].map(one => one && this.noise(one));
-        return found[0] && found;
-      }));
-    }
-
-    /* The noise of a design in the band; none once it is known not to be stable. */
-    noise(design) {
-      if (stable(design) === false) return null;
-      if (design.laser !== this.laser)
-        [design.laser, design.weighed] = [this.laser, api.noise(design.loop, this.laser)];
-      return design.weighed.to(...this.shown);
-    }
-
-    /* A plot over frequencies, on which one can be pointed at. `read` gives what it draws. */
-    plot(label, draw, read) {
+    /* A plot over frequencies, on which one can be pointed at. */
+    plot(title, draw, shape) {
       let place = null, shown = null;
-      const sheet = new Sheet({ role: "application", tabindex: 0, "aria-label": `${label} Arrow keys `
-        + "move along the frequencies." }, 0.85, (pen, wide, high, colours) => {
-        shown = read();
-        pen.textAlign = "center";
-        if (this.design && !shown) pen.fillText("not stable at the point", wide / 2, high / 2);
-        if (shown) place = draw(shown, this.lit && nearest(shown[0].omega, this.lit), pen, wide, high, colours);
+      const sheet = new Sheet({ role: "application", tabindex: 0, "aria-label": `${title}. Arrow keys `
+        + "move along the frequencies." }, shape, (pen, wide, high, colours) => {
+        if (!this.design) return;
+        shown = this.designs.map(({ response, told }) => ({ ...response, margins: told.margins, rough: this.rough }));
+        place = draw(shown, this.lit && nearest(shown[0].omega, this.lit), pen, wide, high, colours);
       });
       for (const name of ["pointermove", "pointerdown"]) sheet.canvas.addEventListener(name, event => {
-        if (!shown || !place) return;
+        if (!this.design || !place) return;
         const box = sheet.canvas.getBoundingClientRect(), { omega } = shown[0];
         const x = event.clientX - box.left, y = event.clientY - box.top;
         let best = Infinity, found = null;
@@ -253,11 +216,12 @@ function armlockPages() {
       });
       sheet.canvas.addEventListener("keydown", event => {
         const move = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key];
-        if (!move || !shown) return;
+        if (!move || !this.design) return;
         event.preventDefault();
         const { omega } = shown[0], from = this.lit ? nearest(omega, this.lit) : omega.length >> 1;
         this.light(omega[Math.min(omega.length - 1, Math.max(0, from + move * (event.shiftKey ? 20 : 1)))]);
       });
+      sheet.figure = element("figure", {}, element("figcaption", {}, title), sheet.canvas);
       return sheet;
     }
 
@@ -270,19 +234,16 @@ function armlockPages() {
       if (omega) {
         const { loop, response } = this.design, [x, y] = api.crossing(loop, omega);
         if (Number.isFinite(x + y)) this.chart.lit = [x, y];
-        const i = nearest(response.omega, omega), re = response.re[i], im = response.im[i];
-        this.following.textContent = `${say(omega / TURN)} Hz: |L| = ${say(Math.hypot(re, im))}, `
-          + `phase ${say(Math.atan2(im, re) * 180 / Math.PI)}\u00b0`;
+        const [re, im] = response.at(omega);
+        this.following.textContent = `${say(omega / TURN)} Hz: |L| = ${say(Math.hypot(re, im))}, phase `
+          + `${say(Math.atan2(im, re) * 180 / Math.PI)}\u00b0, |S| = ${say(1 / Math.hypot(1 + re, im))}`;
       }
-      this.chart.sheet.draw();
-      for (const plot of this.plots) plot.draw();
-      if (this.laser) this.list();
+      this.draw();
     }
 
-    /* Nobody has pointed at a place yet. */
-    forget() {
-      this.chart.marked = null;
-      this.shown = [1, 1];
+    draw() {
+      this.chart.sheet.draw();
+      for (const plot of this.plots) plot.draw();
     }
 
     /* What was asked of a loop is asked no more. */
@@ -294,10 +255,9 @@ function armlockPages() {
 
     /* There is no loop: nothing of the one before stays. */
     none(why) {
-      this.near.drop("point", "root");
+      this.near.drop("point");
       this.wide.drop("chart");
       this.counting = false;
-      this.slow.drop("time");
       this.drop(this.design);
       clearTimeout(this.rest);
       this.design = this.lit = null;
@@ -305,46 +265,31 @@ function armlockPages() {
       this.out.textContent = why;
       this.note.textContent = this.following.textContent = this.ready.textContent = "";
       this.numbers.replaceChildren();
-      for (const plot of this.plots) plot.draw();
+      this.draw();
     }
 
     /* Take another loop. While a slider moves, `moving`, pictures are coarser and nothing is asked
      * that takes long. */
     set(spec, moving = false) {
-      this.near.drop("point", "root");
-      this.slow.drop("time");
       this.drop(this.design);
-      this.design = { spec, loop: api.make(spec), told: {} };
+      this.design = this.made(spec, moving ? 1200 : 9000);
       this.chart.broken = null;
       this.lit = this.chart.lit = null;
-      this.design.responded = api.response(this.design.loop, ...this.most(), moving ? 2500 : 9000);
-      this.follow(this.shown);
-      this.list();
       this.redraw(moving);
-      if (this.chart.marked) this.tell(this.chart.marked);
-      else {
-        this.out.textContent = HINT;
-        this.wait();
-      }
-      this.told();
+      this.tell(moving);
     }
 
-    /* Parameters as large as the view has them: their response shows the most. */
-    most() {
-      const { x0, x1, y0, y1 } = this.chart.box;
-      return [[x0, x1], [y0, y1]].map(pair => Math.max(...pair.map(Math.abs), 1));
-    }
-
-    /* The responses at a point, in this frame. */
-    follow(point) {
-      for (const one of [this.design, this.pinned]) if (one) one.response = one.responded.to(...point);
-      for (const plot of this.plots) plot.draw();
+    made(spec, samples) {
+      const loop = api.make(spec), { x0, x1, y0, y1 } = this.chart.box;
+      // Parameters as large as the view has them: their response shows the most.
+      const most = [[x0, x1], [y0, y1]].map(pair => Math.max(...pair.map(Math.abs), 1));
+      return { spec, loop, kept: {}, told: {}, responded: api.response(loop, ...most, samples) };
     }
 
     redraw(moving = false) {
       if (!this.spec) return;
       this.chart.stale = true;
-      this.chart.curve = this.dcurve(moving ? 3000 : 20000);
+      this.chart.curve = this.dcurve(moving ? 1500 : 20000);
       this.chart.sheet.draw();
       // A chart that is being counted while a slider moves is waited for: dropped at each frame, none
       // would ever be drawn.
@@ -369,10 +314,10 @@ function armlockPages() {
         this.wide.ask("chart", [...input, 400, 3000000], finer => {
           this.chart.fill(finer);
           const share = 1 - finer.sure;
-          this.note.textContent = share === 0
-            ? "Every pixel of the chart is certain, lines between areas to a pixel."
-            : `${share > 0.999 ? "All" : `${say(100 * share, 2)} %`} of the chart is not sure, and striped; `
-              + "the rest is certain, lines between areas to a pixel.";
+          this.note.textContent = share ? `${share > 0.999 ? "All" : `${say(100 * share, 2)} %`} of the chart is `
+            + "undecided, and striped." : finer.counts.every(count => count === -2)
+            ? `The loop is ${LOST} in the whole chart. This is certain.`
+            : "Every pixel of the chart is certain, and lines between areas to a pixel.";
         });
       });
     }
@@ -387,61 +332,58 @@ function armlockPages() {
       return { ...found, range };
     }
 
-    tell(point) {
+    /* The point is another, or the loop: the plots follow in this frame, the numbers once pointer and
+     * sliders rest. What was told of the held point is kept while others are looked at. */
+    tell(rough) {
       if (!this.spec) return;
-      const name = this.chart.name(point);
-      this.near.drop("root");
-      clearTimeout(this.asked);
-      this.shown = point;
-      // What is told of a point is not told of another; the critical perturbation stays.
-      for (const one of [this.design, this.pinned]) if (one) {
+      const { point } = this;
+      this.rough = rough;
+      for (const one of this.designs) {
         this.drop(one, TOLD.filter(kind => kind !== "breaks"));
-        one.told = { breaks: one.told.breaks };
+        one.told = this.chart.hover ? {} : one.kept[point] ||= {};
+        one.response = one.responded.to(...point);
       }
-      this.follow(point);
-      this.out.textContent = `${name}: counting \u2026`;
-      if (!this.empty) this.list();
-      this.near.ask("point", [this.spec, ...point], (count, error) => {
-        this.out.textContent = error || `${name}: ${counted(count)}`;
-        if (count > -3) this.design.told.count = count;
-        // What is left of the noise is drawn of stable loops only.
-        if (this.laser && count) this.plots.at(-1).draw();
-        if (!error && count >= 0) this.asked = setTimeout(() => this.root(point, this.out.textContent), 60);
+      this.draw();
+      this.write();
+      const { told } = this.design;
+      if (told.count === undefined) this.near.ask("point", [this.spec, ...point], (count, error) => {
+        if (error) this.out.textContent = error;
+        else if (count > -3 && told === this.design?.told) {
+          told.count = count;
+          this.write();
+        }
       });
-      this.wait();
-      this.told();
-    }
-
-    root(point, before) {
-      this.near.ask("root", [this.spec, ...point], root => {
-        if (!root || this.out.textContent !== before) return;
-        const im = root[1] ? ` \u00b1 ${say(Math.abs(root[1]))}j` : "";
-        const rate = root[0] < 0 ? "decays" : "grows";
-        this.out.textContent = `${before}; rightmost root ${say(root[0])}${im} rad/s: ${rate} by e in `
-          + `${duration(1 / Math.abs(root[0]))}`;
-      });
-    }
-
-    /* Ask for what takes longer once pointer and sliders rest. */
-    wait() {
+      else this.near.drop("point");
       clearTimeout(this.rest);
-      this.rest = setTimeout(() => this.settle(this.shown), 250);
+      this.rest = setTimeout(() => this.settle(), 250);
     }
 
-    settle(point) {
+    write() {
+      const { count, root } = this.design.told;
+      const parts = [`${this.name}: ${count === undefined ? "counting \u2026" : counted(count)}`];
+      if (root && count >= 0) parts.push(`rightmost root ${this.rootText(root)} rad/s, which `
+        + `${root[0] < 0 ? "decays" : "grows"} by e in ${duration(1 / Math.abs(root[0]))}`);
+      this.out.textContent = `${parts.join("; ")}.${this.chart.held ? " Held: Escape, or a click on the point, "
+        + "releases it." : ""}`;
       this.list();
-      for (const one of [this.design, this.pinned]) for (const kind of one ? TOLD : []) {
-        if (one.told[kind] !== undefined || kind === "breaks" && one.breaking) continue;
-        one.breaking ||= kind === "breaks";
-        const input = kind === "breaks" ? [one.spec] : [one.spec, ...point];
-        this.slow.ask(this.named(one, kind), input, (found, error) => {
-          one.told[kind] = error ? UNTOLD[kind] : found;
-          if (kind === "breaks" && one === this.design) this.chart.broken = one.told.breaks[0];
-          if (kind === "count" && one === this.design && this.out.textContent.endsWith(WORDS[-3]))
-            this.out.textContent = `${this.chart.name(point)}: ${counted(one.told.count)}`;
-          for (const plot of this.plots) plot.draw();
-          this.chart.sheet.draw();
-          this.list();
+    }
+
+    rootText([re, im]) { return `${say(re)}${im ? ` \u00b1 ${say(Math.abs(im))}j` : ""}`; }
+
+    /* Ask for what takes longer. */
+    settle() {
+      const { point } = this;
+      this.rough = false;
+      this.draw();
+      for (const one of this.designs) for (const kind of TOLD) {
+        const { told } = one, breaks = kind === "breaks";
+        if ((breaks ? one.breaks : told[kind]) !== undefined || breaks && one.breaking) continue;
+        one.breaking ||= breaks;
+        this.slow.ask(this.named(one, kind), breaks ? [one.spec] : [one.spec, ...point], (found, error) => {
+          (breaks ? one : told)[kind] = error ? UNTOLD[kind] : found;
+          if (breaks && one === this.design) this.chart.broken = one.breaks[0];
+          this.draw();
+          if (this.design) this.write();
         });
       }
     }
@@ -449,61 +391,43 @@ function armlockPages() {
     /* The numbers of the loop, and of the pinned one beside it. */
     list() {
       if (!this.numbers.isConnected) return;
-      this.empty = !this.design || this.design.told.count === undefined;
-      const designs = [this.design, this.pinned].filter(one => one), wait = "\u2026";
-      const where = this.chart.marked ? this.chart.name(this.shown) : "(1, 1)";
-      const or = (value, special, words) => Number.isNaN(value) ? "not sure"
-        : value === special ? words : say(value);
-      const broken = value => value === null ? "not stable at (1, 1)"
-        : value === 0 ? "0: the least breaks it" : or(value, Infinity, "none up to 2");
-      const of = (kind, read) => designs.map(({ told }) => told[kind] === undefined ? wait : read(told[kind]));
-      const margin = read => of("margins", found => found ? read(found) : UNSTABLE);
-      const degrees = value => `${say(value * 180 / Math.PI)}\u00b0`;
+      const { designs } = this, wait = "\u2026";
+      const or = (value, special, words, at) => Number.isNaN(value) ? "undecided" : value === special ? words
+        : `${say(value)}${at > 0 && at < Infinity ? ` at ${say(at / TURN)} Hz` : ""}`;
+      const broken = value => value === null ? "unstable at (1, 1)"
+        : value === 0 ? "0: any perturbation" : or(value, Infinity, "none up to 2");
+      const of = (read, found) => designs.map(one => found(one) === undefined ? wait : read(found(one)));
+      const margin = read => of(found => found ? read(found) : "none: unstable", one => one.told.margins);
       const parts = [
-        ["Critical perturbation from (1, 1)", ["along (1, \u22121)", of("breaks", b => broken(b[0]))],
-          ["along (\u22121, 1)", of("breaks", b => broken(b[1]))],
-          ["along (1, 1)", of("breaks", b => broken(b[2]))],
-          ["along (\u22121, \u22121)", of("breaks", b => broken(b[3]))]],
-        [`At ${where}`, ["Unstable roots", of("count", n => n >= 0 ? String(n) : WORDS[n])],
-          ["Rightmost root: real part in rad/s", designs.map(({ told: { count, root } }) =>
-            count < 0 ? "none" : root === undefined ? wait : root ? say(root[0]) : "not sure")],
-          ["Smallest gain factor that keeps it stable", margin(m => or(m.lower, 0, `none above 1/${m.most}`))],
-          ["Largest gain factor", margin(m => or(m.upper, Infinity, `none up to ${m.most}`))],
-          ["Phase margin", margin(({ phase }) => phase < Infinity ? degrees(phase)
-            : Number.isNaN(phase) ? "not sure" : "no crossover")],
-          ["Smallest |1 + L|", margin(m => or(m.modulus))]],
+        [`At ${this.name}`, ["Unstable roots", of(n => n >= 0 ? String(n) : WORDS[n], one => one.told.count)],
+          ["Rightmost root in rad/s", designs.map(({ told: { count, root } }) => count < 0 ? WORDS[count]
+            : root === undefined ? wait : root ? this.rootText(root) : "undecided")],
+          ["Smallest gain factor that keeps it stable", margin(m => or(m.lower, 0, `none above 1/${m.most}`, m.lowerAt))],
+          ["Largest gain factor", margin(m => or(m.upper, Infinity, `none up to ${m.most}`, m.upperAt))],
+          ["Phase margin in degrees", margin(m => or(m.phase * 180 / Math.PI, Infinity, "no crossover", m.phaseAt))],
+          ["Smallest |1 + L|", margin(m => or(m.modulus, Infinity, "", m.modulusAt))]],
+        ["Critical perturbation from (1, 1)", ...["(1, \u22121)", "(\u22121, 1)", "(1, 1)", "(\u22121, \u22121)"].map(
+          (way, k) => [`along ${way}`, of(b => broken(b[k]), one => one.breaks)])],
       ];
-      if (this.laser) {
-        const omega = this.lit || TURN * 3e-3;
-        const left = designs.map(({ loop }) => api.noise(loop, this.laser, [omega]).to(...this.shown));
-        const level = name => designs.map((one, k) => ({ true: say(left[k][name][0]), false: UNSTABLE,
-          undefined: wait })[stable(one)]);
-        parts.push([`Noise left at ${say(omega / TURN)} Hz, in Hz/\u221aHz`,
-          ...[...api.SOURCES, "total"].map(name => [SOURCES[name], level(name)]),
-          ["what TDI takes out", designs.map(() => say(300 * (1 + (TURN * 3e-3 / omega) ** 2)))]]);
-      }
-      const cell = (tag, attributes, text) => element(tag, attributes, text);
       this.numbers.replaceChildren(element("thead", {}, element("tr", {},
         ...["Number", "This loop", "Pinned"].slice(0, 1 + designs.length)
-          .map(text => cell("th", { scope: "col" }, text)))),
+          .map(text => element("th", { scope: "col" }, text)))),
       ...parts.map(([title, ...rows]) => element("tbody", {},
-        element("tr", {}, cell("th", { scope: "rowgroup", colspan: 1 + designs.length }, title)),
-        ...rows.map(([name, values]) => element("tr", {}, cell("th", { scope: "row" }, name),
-          ...values.map(value => cell("td", {}, value)))))));
-      const done = designs.length && designs.every(({ told }) => TOLD.every(kind => told[kind] !== undefined));
-      this.ready.textContent = done ? `The table has all numbers at ${where}: ${parts[1].slice(1)
+        element("tr", {}, element("th", { scope: "rowgroup", colspan: 1 + designs.length }, title)),
+        ...rows.map(([name, values]) => element("tr", {}, element("th", { scope: "row" }, name),
+          ...values.map(value => element("td", {}, value)))))));
+      const done = designs.length && designs.every(one => one.breaks && TOLD.every(
+        kind => kind === "breaks" || one.told[kind] !== undefined));
+      this.ready.textContent = done ? `The table has all numbers at ${this.name}: ${parts[0].slice(1)
         .map(([name, [value]]) => `${name}: ${value}`).join("; ")}.` : "";
     }
 
     /* Pin the design as it is: what follows is seen against it, in all plots and numbers. */
     pin() {
       if (this.pinned) this.drop(this.pinned);
-      this.pinned = this.pinned || !this.design ? null : { ...this.design, told: { ...this.design.told },
-        breaking: Boolean(this.design.told.breaks), responded: api.response(this.design.loop, ...this.most()) };
+      this.pinned = this.pinned || !this.design ? null : { ...this.made(this.spec, 9000), breaks: this.design.breaks };
       this.chart.ghost = this.pinned && this.chart.curve;
-      this.follow(this.shown);
-      this.list();
-      this.wait();
+      this.tell(false);
       return Boolean(this.pinned);
     }
   }
@@ -511,19 +435,30 @@ function armlockPages() {
   /* ---------------------------------------------------------------------------- controls */
 
   const button = (text, done) => element("button", { type: "button", onclick: done }, text);
+  const buttons = (...all) => element("p", { class: "live-buttons" }, ...all);
 
-  /* A slider. `moved(value, moving)` hears every move, and the last one with moving = false. */
+  /* A slider. `moved(value, moving)` hears a move in each frame, and the last one with moving = false.
+   * `to` sets it, and gives a value past its end twice the room. */
   function slider(id, name, low, high, value, write, moved) {
+    let waiting = 0;
     const shown = element("output", { id: `${id}-value` }, write(value));
     const input = element("input", { type: "range", id, min: low, max: high, step: (high - low) / 200,
       "aria-controls": `${id}-value`, oninput: () => {
         shown.textContent = write(Number(input.value));
-        moved(Number(input.value), true);
-      }, onchange: () => moved(Number(input.value), false) });
+        waiting ||= requestAnimationFrame(() => {
+          waiting = 0;
+          moved(Number(input.value), true);
+        });
+      }, onchange: () => {
+        cancelAnimationFrame(waiting);
+        waiting = 0;
+        moved(Number(input.value), false);
+      } });
     input.value = value;
     const label = element("label", { class: "live-field" }, element("span", {}, name, " ", shown), input);
     label.to = at => {
-      if (at > Number(input.max)) [input.max, input.step] = [at, at / 200];
+      const end = at > high ? 2 * at : high;
+      [input.max, input.step] = [end, (end - low) / 200];
       input.value = at;
       shown.textContent = write(at);
     };
@@ -543,7 +478,7 @@ function armlockPages() {
   }
 
   /* Zoom, download, and the ghost, of any explorer. */
-  function tools(live, file) {
+  function tools(live, file, ...more) {
     const counts = () => {
       if (!live.chart.grid) return;
       const { counts, n, x0, x1, y0, y1 } = live.chart.grid;
@@ -555,67 +490,23 @@ function armlockPages() {
     const pin = element("button", { type: "button", "aria-pressed": "false", onclick: () => {
       pin.setAttribute("aria-pressed", String(live.pin()));
     } }, "Pin this loop");
-    return element("p", { class: "live-buttons" },
-      button("Zoom in", () => live.chart.zoom(0.5)), button("Zoom out", () => live.chart.zoom(2)),
-      pin, button("Download CSV", counts),
-      button("Download PNG", () => live.chart.canvas.toBlob(blob => save(`${file}.png`, blob))));
+    return buttons(button("Zoom in", () => live.chart.zoom(0.5)), button("Zoom out", () => live.chart.zoom(2)),
+      ...more, pin, button("CSV", counts),
+      button("PNG", () => live.chart.sheet.picture(blob => save(`${file}.png`, blob))));
   }
 
-  function legend(half) {
+  function legend() {
     const colour = (text, name) =>
       element("span", { class: "live-key" }, element("i", { class: name }), text);
-    const found = element("p", { class: "live-note" }, colour("stable", "live-stable"),
-      colour("unstable, stronger with more roots", "live-unstable"),
-      colour("unstable at arbitrarily high frequency", "live-lost"),
-      colour("not sure", "live-unsure"), "curve: a root on the imaginary axis, from low frequency (blue) to high "
-      + "(yellow); + the ideal point (1, 1)");
-    if (half < 1e-4)
-      found.append("; square: the paper\u2019s perturbations; dot: first to break along (1, \u22121)");
-    return found;
+    return element("p", { class: "live-note" }, "Move over the chart for a preview; click or tap to hold a point. ",
+      colour("stable", "live-stable"), colour("unstable, stronger with more roots", "live-unstable"),
+      colour(LOST, "live-lost"), colour("undecided", "live-unsure"), "Curve: a root on the imaginary axis, from "
+      + "low frequency (blue) to high (yellow). + is the ideal point (1, 1). The dot is the critical "
+      + "perturbation along (1, \u22121). The square, in small charts, is the paper\u2019s: perturbations up to "
+      + "10\u207b\u2076. Dashed: the pinned loop.");
   }
 
-  const plots = live => element("div", { class: "live-plots" },
-    ...live.plots.map(plot => plot.canvas));
-
-  /* The loop in time at the point, played so that a person can follow. */
-  function inTime(live) {
-    const TRIPS = 12, still = matchMedia("(prefers-reduced-motion: reduce)").matches;
-    let run = null, playing = 0;
-    const words = element("p", { class: "live-note", role: "status" });
-    const sheet = new Sheet({ role: "img", "aria-label": "The laser's frequency in time, from rest." },
-      0.4, (pen, wide, high, colours) => { if (run) drawTime(run, pen, wide, high, colours); });
-    sheet.canvas.hidden = true;
-    const play = () => {
-      if (!live.spec) return;
-      const [c1, c2] = live.shown, name = live.chart.marked ? live.chart.name(live.shown) : "(1, 1)";
-      words.textContent = "Stepping \u2026";
-      live.slow.ask("time", [live.spec, c1, c2, TRIPS], (found, error) => {
-        cancelAnimationFrame(playing);
-        if (error || !found.values.length) {
-          words.textContent = error || "The first step already is too large to show.";
-          return;
-        }
-        run = { ...found, shown: still ? Infinity : 2 };
-        sheet.canvas.hidden = false;
-        const { step, trip, missed, values } = found, last = Math.abs(values[values.length - 1]);
-        words.textContent = `At ${name}: a step of the laser by 1 at t = 0, silence for ${say(trip)} s, then `
-          + `what the arms send back. After ${TRIPS} round trips it is off by ${say(last)}. Steps of `
-          + `${say(1000 * step)} ms${missed > 1e-6 ? "; delays between two steps are interpolated" : ""}`
-          + `${found.fast ? "; the loop reacts faster than these steps, so that fast ringing is not to be "
-            + "trusted" : ""}.`;
-        const begun = performance.now(), whole = values.length;
-        const frame = now => {
-          // A round trip a second.
-          run.shown = 2 + (now - begun) / 1000 * trip / step;
-          sheet.draw();
-          if (run.shown < whole) playing = requestAnimationFrame(frame);
-        };
-        if (still) sheet.draw(); else playing = requestAnimationFrame(frame);
-      });
-    };
-    return element("div", { class: "live-time" },
-      element("p", { class: "live-buttons" }, button("Watch it lock, or not", play)), sheet.canvas, words);
-  }
+  const figures = (...all) => element("div", { class: "live-two" }, ...all);
 
   /* ---------------------------------------------------------------------------- pages */
 
@@ -640,19 +531,17 @@ function armlockPages() {
         v => `${say(10 ** v)} Hz`, (v, moving) => { state.corner = 10 ** v; update(moving); }),
       slider(`${live.id}-delay`, "Dead time:", 0, 10, 0, v => `${say(v)} ms`,
         (v, moving) => { state.delay = 1e-3 * v; update(moving); }));
-    place.replaceChildren(form, element("div", { class: "live-pair" },
-      element("div", {}, live.figure, legend(3e-6)),
-      element("div", {}, live.numbers, live.note)));
+    place.replaceChildren(form, figures(element("div", {}, live.figure, legend(), live.note), live.numbers));
     live.chart.show([1, 1], 3e-6);
     update();
   }
 
   /* The chart of a chapter: one of the presets in the window that the page asks for. */
   function chapter(place) {
-    const { live: name, centre, half } = place.dataset;
-    const live = new Live(`${name}: number of unstable roots over c1 and c2.`);
-    place.replaceChildren(element("div", { class: "live-one" }, live.figure, legend(half),
-      tools(live, name.toLowerCase().replace(/\W+/g, "-")), live.note), plots(live), live.following);
+    const { live: name, centre, half } = place.dataset, live = new Live(`${name}: number of unstable roots over `
+      + "c1 and c2.");
+    place.replaceChildren(figures(live.figure, live.plots[0].figure), tools(live, name.toLowerCase().replace(/\W+/g, "-")),
+      legend(), live.note, live.plots[1].figure, live.following);
     live.chart.show([Number(centre), Number(centre)], Number(half));
     live.set(PRESETS[name][0]);
   }
@@ -660,86 +549,106 @@ function armlockPages() {
   /* Your own loop. */
   function own(place) {
     const live = new Live("Number of unstable roots over c1 and c2.");
-    const id = name => `${live.id}-${name}`;
-    const fields = {}, errors = {};
+    const id = name => `${live.id}-${name}`, fields = {}, errors = {};
     const code = element("pre", { class: "live-code", "aria-label": "Python" });
-    let unit = 1, base = 1, chosen = null;
+    const orbit = element("a", {}, "Open this loop in orbit");
+    // The unit of the fields, the gain from which its slider goes, the preset, the steps that Undo can
+    // take back; `quiet` while the page itself changes what it shows.
+    let unit = 1, base = 1, chosen = null, depth = 0, quiet = true, before = null, later = 0;
 
-    const settle = live.settle.bind(live);
-    live.settle = point => {
-      settle(point);
-      remember();
+    /* The address holds the loop, and its history undoes what was done to it. */
+    live.moved = step => {
+      if (!live.spec) return;
+      const hash = address(live.spec, live.chart, unit);
+      code.textContent = python(live.spec, live.kept, unit);
+      orbit.href = `in_orbit.html${hash}`;
+      if (quiet) return;
+      // A point that goes on moving is one step, and another view is none.
+      const further = step && hash !== location.hash && !(step === "point" && before === "point");
+      before = step || before;
+      const write = () => {
+        const values = Object.entries(fields).map(([name, field]) => [name, field.value]);
+        history[further ? "pushState" : "replaceState"]({ values, chosen, depth }, "", hash);
+        undo.disabled = !depth;
+      };
+      clearTimeout(later);
+      if (further) depth++;
+      if (further) write(); else later = setTimeout(write, 200);
     };
-    live.told = () => { code.textContent = python(live.spec, live.shown); };
-    const remember = () => {
-      if (live.spec) history.replaceState(null, "", address(live.spec, live.chart, unit));
-    };
-    const redraw = live.redraw.bind(live);
-    live.redraw = moving => { redraw(moving); if (!moving) remember(); };
+    const undo = button("Undo", () => history.back());
 
     /* An error stands at its field. */
     const blame = (name, message) => {
-      const field = fields[name];
-      if (!field) return;
-      if (message) field.setAttribute("aria-invalid", "true"); else field.removeAttribute("aria-invalid");
+      if (message) fields[name].setAttribute("aria-invalid", "true");
+      else fields[name].removeAttribute("aria-invalid");
       errors[name].textContent = message || "";
     };
     const NAMES = { tau1: "\u03c4\u2081", tau2: "\u03c4\u2082", delay: "The dead time", gain: "The gain",
       corner: "The corner", difference: "\u0394\u03c4" };
-    const scaled = { corner: () => unit, zeros: () => unit, poles: () => unit };
+    const fraction = () => fields.form.value === "fraction";
 
     /* The loop that the fields hold; throws an error that names its field. */
-    const held = () => {
+    const read = () => {
       const spec = { sensor: fields.sensor.value };
-      for (const name of ["tau1", "tau2", "delay"])
-        spec[name] = readNumber(name, fields[name].value, NAMES[name]);
-      const two = ["dual", "modified"].includes(spec.sensor);
-      for (const name of ["corner", "difference"]) {
-        const text = fields[name].value;
-        if (two) spec[name] = readNumber(name, text, NAMES[name]) * (scaled[name]?.() ?? 1);
-      }
+      for (const name of ["tau1", "tau2", "delay", "gain"]) spec[name] = readNumber(name, fields[name].value, NAMES[name]);
+      if (["dual", "modified"].includes(spec.sensor)) for (const name of ["corner", "difference"])
+        spec[name] = readNumber(name, fields[name].value, NAMES[name]) * (name === "corner" ? unit : 1);
       if (spec.sensor === "own") for (const name of ["m1", "m2", "below"])
         spec[name] = readPolynomial(name, fields[name].value, "It");
-      if (fields.form.value === "roots") {
-        spec.gain = readNumber("gain", fields.gain.value, NAMES.gain);
+      if (fraction()) {
+        const [above, under] = ["above", "under"].map(name => {
+          const found = readPolynomial(name, fields[name].value, "It");
+          if (found.some(v => v !== 0)) return found;
+          throw Object.assign(new RangeError("It must not be zero."), { field: name });
+        });
+        [spec.zeros, spec.poles] = [above, under].map(api.rootsOf);
+        spec.gain *= above.find(v => v !== 0) / under.find(v => v !== 0);
+      } else {
         for (const [name, title] of [["zeros", "Zeros"], ["poles", "Poles"]])
           spec[name] = readRoots(name, fields[name].value, title).map(v => v.map(x => x * unit));
-      } else {
-        const [above, below] = ["above", "under"].map(name => readPolynomial(name, fields[name].value, "It"));
-        const lead = [above, below].map(p => p.find(v => v !== 0));
-        if (!lead[0]) throw Object.assign(new RangeError("It must not be zero."), { field: "above" });
-        if (!lead[1]) throw Object.assign(new RangeError("It must not be zero."), { field: "under" });
-        [spec.gain, spec.zeros, spec.poles] = [lead[0] / lead[1], api.rootsOf(above), api.rootsOf(below)];
       }
       api.make(spec);
       return spec;
     };
 
-    const take = (moving = false, dragged = false) => {
+    /* Take what the fields hold. `edited` is the field that has changed. */
+    const take = (edited = null, moving = false, dragged = false) => {
       for (const name of Object.keys(errors)) blame(name, "");
       try {
-        const spec = held();
+        // A whole fraction goes to its two fields.
+        const found = ["zeros", "poles", "above", "under"].includes(edited) && readFraction(edited, fields[edited].value);
+        if (found) {
+          [fields.above.value, fields.under.value, fields.gain.value] = [...found, "1"];
+          fields.form.value = form = "fraction";
+          shape();
+        }
+        const spec = read();
         wrong.textContent = "";
-        follow(spec, dragged);
+        if (!dragged) {
+          base = Number(fields.gain.value) || 1;
+          gain.to(0);
+          dead.to(spec.delay);
+          const root = [...spec.zeros, ...spec.poles].map(v => Math.hypot(...v)).filter(v => v);
+          range = [Math.min(...root, 1 / spec.tau1), Math.max(...root, 1 / spec.tau1)];
+          if (range[1] < 100 * range[0]) range = [range[0] / 10, range[1] * 10];
+        }
+        const changed = chosen !== null && !same(spec, PRESETS[chosen][0]);
+        state.textContent = chosen === null ? "from a link" : changed ? "changed" : "";
+        reset.hidden = !changed;
         live.set(spec, moving);
+        roots.draw();
+        if (!moving) live.moved("loop");
       } catch (error) {
-        const name = fields[error.field] ? error.field
-          : { zeros: "above", poles: "under" }[error.field] || "sensor";
+        const pair = fraction() ? ["above", "under"] : ["zeros", "poles"];
+        // Too few poles are too many zeros: the field that was edited is the one to look at.
+        const name = error.field === "zeros" || error.field === "poles"
+          ? pair.includes(edited) ? edited : pair[Number(error.field === "poles")]
+          : fields[error.field] ? error.field : "sensor";
         blame(name, error.message);
         wrong.textContent = error.message;
-        live.none("There is no loop to show: a field above holds none.");
+        live.none("There is no loop to show: a field holds none.");
+        roots.draw();
       }
-    };
-    /* Sliders and "Start from" follow what is there. */
-    const follow = (spec, dragged) => {
-      if (!dragged) {
-        base = spec.gain;
-        gain.to(0);
-        dead.to(spec.delay);
-      }
-      const changed = chosen !== null && !same(spec, PRESETS[chosen][0]);
-      state.textContent = chosen === null ? "from a link" : changed ? "changed" : "";
-      reset.hidden = !changed;
     };
     const same = (a, b) => {
       const plain = spec => JSON.stringify([spec.sensor, spec.tau1, spec.tau2, spec.delay, spec.gain,
@@ -749,47 +658,44 @@ function armlockPages() {
     };
 
     const put = spec => {
-      fields.form.value = "roots";
+      fields.form.value = form = "roots";
       for (const name of ["sensor", "tau1", "tau2", "delay", "gain", "difference"])
         if (spec[name] !== undefined) fields[name].value = String(spec[name]);
-      if (spec.corner !== undefined) fields.corner.value = String(spec.corner / unit);
-      for (const name of ["zeros", "poles"])
-        fields[name].value = written(spec[name].map(v => v.map(x => x / unit)));
+      if (spec.corner !== undefined) fields.corner.value = shortest(spec.corner, unit);
+      for (const name of ["zeros", "poles"]) fields[name].value = written(spec[name], unit);
       for (const name of ["m1", "m2", "below"]) if (spec[name]) fields[name].value = list(spec[name]);
       shape();
     };
     const shape = () => {
-      const sensor = fields.sensor.value, roots = fields.form.value === "roots";
-      const shown = { corner: ["dual", "modified"].includes(sensor), m1: sensor === "own",
-        zeros: roots, above: !roots };
-      Object.assign(shown, { difference: shown.corner, m2: shown.m1, below: shown.m1, poles: roots,
-        gain: roots, under: !roots });
+      const two = ["dual", "modified"].includes(fields.sensor.value), mapped = fields.sensor.value === "own";
+      const shown = { corner: two, difference: two, m1: mapped, m2: mapped, below: mapped, zeros: !fraction(),
+        poles: !fraction(), above: fraction(), under: fraction() };
       for (const [name, on] of Object.entries(shown)) fields[name].closest(".live-field").hidden = !on;
-      gain.hidden = !roots;
+    };
+    /* The same controller in the other form. */
+    let form = "roots";
+    const convert = () => {
+      const { spec } = live, next = fields.form.value;
+      if (spec && next !== form) {
+        put(spec);
+        const product = all => all.reduce((p, [re, im]) => im < 0 ? p : api.times(p,
+          im ? [1, -2 * re, re * re + im * im] : [1, -re]), [1]);
+        [fields.above.value, fields.under.value] = [spec.zeros, spec.poles].map(all => list(product(all)));
+        fields.form.value = next;
+      }
+      form = next;
+      shape();
+      take("form");
     };
     const field = (name, label, { area = false, value = "", wide = area } = {}) => {
       fields[name] = element(area ? "textarea" : "input", { id: id(name), spellcheck: "false",
         autocomplete: "off", autocapitalize: "off", rows: area ? 2 : null,
-        "aria-describedby": id(`${name}-wrong`), onchange: () => take() });
+        "aria-describedby": id(`${name}-wrong`), onchange: () => take(name) });
       fields[name].value = value;
       errors[name] = element("span", { id: id(`${name}-wrong`), class: "live-wrong" });
       return element("div", { class: `live-field${wide ? " live-wide" : ""}` },
         element("label", { for: id(name) }, label), fields[name], errors[name]);
     };
-    const start = name => {
-      const [spec, centre, half] = PRESETS[chosen = name];
-      put(spec);
-      live.none("");
-      live.forget();
-      live.chart.show([centre, centre], half);
-      take();
-    };
-
-    const state = element("span", { class: "live-state", role: "status" });
-    const reset = button("Reset", () => start(chosen));
-    reset.hidden = true;
-    const preset = choice(id("preset"), "Start from", Object.keys(PRESETS).map(name => [name, name]), start);
-    const starts = element("div", { class: "live-start" }, preset, state, reset);
     const select = (name, title, options, changed) => {
       const made = choice(id(name), title, options, changed);
       fields[name] = made.querySelector("select");
@@ -798,85 +704,170 @@ function armlockPages() {
       made.append(errors[name]);
       return made;
     };
-    const units = choice(id("unit"), "Unit of zeros, poles and corner", [["1", "rad/s"], ["hz", "Hz"]],
-      value => {
-        // The loop stays what it is; the fields say it in the other unit.
-        const spec = live.spec;
-        unit = value === "hz" ? TURN : 1;
-        if (spec && fields.form.value === "roots") put(spec);
-        take();
-      });
+    /* Show another loop, with its view. Hertz where their numbers are shorter. */
+    const show = (spec, centre, half, held, given) => {
+      unit = given || ([1, TURN].map(one => [...spec.zeros, ...spec.poles, [spec.corner || 0, 0]].map(
+        v => written([v], one)).join("").length).reduce((a, b) => b < a) ? TURN : 1);
+      fields.unit.value = unit === 1 ? "1" : "hz";
+      put(spec);
+      live.none("");
+      live.chart.held = held;
+      live.chart.show(centre, half);
+      take();
+    };
+    const start = name => {
+      preset.querySelector("select").value = chosen = name;
+      const [spec, centre, half] = PRESETS[name];
+      show(spec, [centre, centre], half, null);
+    };
+
+    const state = element("span", { class: "live-state", role: "status" });
+    const reset = button("Reset", () => start(chosen));
+    const preset = choice(id("preset"), "Start from", Object.keys(PRESETS).map(name => [name, name]), start);
     const gain = slider(id("factor"), "Drag the gain: times", -2, 2, 0, v => say(10 ** v), (v, moving) => {
       fields.gain.value = exact(+(base * 10 ** v).toPrecision(6));
-      take(moving, true);
+      take("gain", moving, true);
     });
     const dead = slider(id("dead"), "Drag the dead time:", 0, 1, 0, v => `${say(v)} s`, (v, moving) => {
-      fields.delay.value = String(v);
-      take(moving, true);
+      fields.delay.value = exact(v);
+      take("delay", moving, true);
     });
     const wrong = element("p", { class: "live-note live-wrong", role: "alert" });
-    const form = element("form", { class: "live-form", onsubmit: event => event.preventDefault() },
-      gain, dead,
-      select("sensor", "Sensor", SENSORS, () => { shape(); take(); }),
+    const inputs = element("form", { class: "live-form", onsubmit: event => event.preventDefault() },
+      select("sensor", "Sensor", SENSORS, () => { shape(); take("sensor"); }),
+      field("gain", "Gain"),
       field("tau1", "Delay \u03c4\u2081 in s"), field("tau2", "Delay \u03c4\u2082 in s"),
-      field("delay", "Dead time in s"), field("corner", "Sensor\u2019s corner"),
-      field("difference", "Sensor\u2019s \u0394\u03c4 in s"),
+      field("delay", "Dead time in s"),
+      select("unit", "Unit of roots", [["1", "rad/s"], ["hz", "Hz"]], value => {
+        // The loop stays what it is; the fields say it in the other unit.
+        const { spec } = live;
+        unit = value === "hz" ? TURN : 1;
+        if (spec && fraction()) fields.corner.value = shortest(spec.corner || 0, unit);
+        else if (spec) put(spec);
+        take("unit");
+      }),
+      field("corner", "Sensor\u2019s corner"), field("difference", "Sensor\u2019s \u0394\u03c4 in s"),
       field("m1", "Weight m1: numerator", { value: "1", wide: true }),
       field("m2", "Weight m2: numerator", { value: "1", wide: true }),
       field("below", "Their denominator", { value: "1", wide: true }),
       select("form", "Controller given by", [["roots", "zeros and poles"],
-        ["fraction", "numerator and denominator"]], () => { shape(); take(); }),
-      field("gain", "Gain"), units,
+        ["fraction", "numerator and denominator"]], convert),
       field("zeros", "Zeros", { area: true }), field("poles", "Poles", { area: true }),
       field("above", "Numerator, highest power first, or in s", { area: true, value: "1" }),
       field("under", "Denominator", { area: true, value: "s" }));
-    const laser = choice(id("laser"), "Laser before it is locked", Object.keys(api.LASERS).map(name =>
-      [name, name]), value => {
-      live.laser = value;
-      for (const plot of live.plots) plot.draw();
-      live.list();
+    inputs.querySelector(`#${id("form")}`).closest("label").classList.add("live-wide");
+
+    /* The s-plane: a root follows the pointer, a pair together; a root at 0 stays. */
+    let range = [0.01, 1], plane = null, caught = null;
+    const roots = new Sheet({ role: "img", "aria-label": "Poles and zeros of the controller. The fields Zeros "
+      + "and Poles have them as text." }, 1, (pen, wide, high, colours) => {
+      const { spec } = live;
+      plane = spec && drawRoots({ ...spec, unit, range }, pen, wide, high, colours);
     });
-    live.budget("free-running");
-    const view = tools(live, "loop");
-    view.append(button("Paper\u2019s square", () => live.chart.show([1, 1], 3e-6)),
-      button("Whole", () => live.chart.show([0, 0], 3)));
+    const pointer = event => {
+      const box = roots.canvas.getBoundingClientRect();
+      return [event.clientX - box.left, event.clientY - box.top];
+    };
+    const near = event => {
+      if (!plane) return null;
+      const [x, y] = pointer(event), all = ["zeros", "poles"].flatMap(kind => live.spec[kind].map((root, k) => {
+        const [u, v] = plane.place(root);
+        return { kind, k, root, gap: Math.hypot(u - x, v - y) };
+      })).filter(({ root, gap }) => gap < 16 && Math.hypot(...root)).sort((p, q) => p.gap - q.gap);
+      return all[0] || null;
+    };
+    const drag = (event, moving) => {
+      const { kind, k, root: [re, im], spec } = caught, [x, y] = plane.root(...pointer(event));
+      const round = v => Number((v / unit).toPrecision(3)) * unit, moved = spec[kind].map(v => v);
+      const to = im ? [round(x), round(Math.max(Math.abs(y), 1e-3 * Math.hypot(x, y)))]
+        : [Math.sign(x) * round(Math.hypot(x, y)), 0];
+      moved[k] = [to[0], Math.sign(im) * to[1]];
+      if (im) moved[spec[kind].findIndex(([a, b]) => a === re && b === -im)] = [to[0], -Math.sign(im) * to[1]];
+      put({ ...spec, [kind]: moved });
+      take(kind, moving, moving);
+    };
+    const on = (name, done) => roots.canvas.addEventListener(name, done);
+    on("pointerdown", event => {
+      caught = near(event);
+      if (!caught) return;
+      caught.spec = live.spec;
+      roots.canvas.setPointerCapture(event.pointerId);
+    });
+    on("pointermove", event => {
+      if (caught) drag(event, true); else roots.canvas.style.cursor = near(event) ? "grab" : "";
+    });
+    on("pointerup", event => {
+      if (caught) drag(event, false);
+      caught = null;
+    });
+    on("pointercancel", () => { caught = null; });
+    on("touchstart", event => { if (caught) event.preventDefault(); });
+
     const copied = button("Copy as Python", async () => {
       try {
         await navigator.clipboard.writeText(code.textContent);
         copied.textContent = "Copied";
       } catch {
         // A browser may refuse the clipboard to a page from disk: the lines are there to mark.
+        lines.open = true;
         getSelection().selectAllChildren(code);
         copied.textContent = "Marked: copy it with Ctrl+C";
       }
       setTimeout(() => { copied.textContent = "Copy as Python"; }, 3000);
     });
+    const lines = element("details", {}, element("summary", {}, "This loop in Python"), code);
+    const [nyquist, bode] = live.plots;
     place.replaceChildren(element("div", { class: "live-own" },
-      element("div", { class: "live-main" }, live.figure, view, legend(1), live.note),
-      element("div", { class: "live-side" }, starts, wrong, form)),
-      live.numbers, laser, plots(live), live.following, inTime(live), element("p", { class: "live-buttons" }, copied), code);
+      element("div", { class: "live-top" }, element("div", { class: "live-start" }, preset, state, reset, undo),
+        wrong, gain, dead),
+      element("div", { class: "live-main" }, figures(live.figure, nyquist.figure),
+        tools(live, "loop", button("Paper\u2019s square", () => live.chart.show([1, 1], 3e-6)),
+          button("Whole", () => live.chart.show([0, 0], 3))),
+        element("div", { class: "live-wide-first" }, element("div", {}, bode.figure, live.following),
+          element("figure", {}, element("figcaption", {}, "Drag a pole (\u00d7) or a zero (\u25cb)"), roots.canvas))),
+      element("div", { class: "live-fields" }, inputs)),
+    figures(live.numbers, element("div", {}, live.note, legend(), buttons(copied, orbit), lines)));
 
     const open = () => {
+      quiet = true;
+      clearTimeout(later);
+      preset.querySelector("select").value = "";
       try {
         const given = fromAddress(location.hash);
-        if (!given) return false;
-        chosen = null;
-        unit = given.unit;
-        units.querySelector("select").value = unit === 1 ? "1" : "hz";
-        put(given.spec);
-        live.none("");
-        live.forget();
-        if (given.marked) live.chart.marked = live.shown = given.marked;
-        live.chart.show(given.centre, given.half);
-        take();
-        return true;
+        if (given) {
+          chosen = null;
+          api.make(given.spec);
+          show(given.spec, given.centre, given.half, given.held, given.unit);
+        } else start(Object.keys(PRESETS)[0]);
       } catch (error) {
-        wrong.textContent = `This address holds no loop: ${error.message}`;
-        return false;
+        live.none("There is no loop to show.");
+        roots.draw();
+        state.textContent = "";
+        wrong.textContent = `The address of this page holds no loop: ${error.message.replace(/\.$/, "")}. It was left as it is. Choose `
+          + "a loop to start from, or mend the address.";
       }
+      quiet = false;
     };
-    window.addEventListener("hashchange", open);
-    if (!open()) start(Object.keys(PRESETS)[0]);
+    addEventListener("popstate", ({ state: kept }) => {
+      depth = kept?.depth || 0;
+      undo.disabled = !depth;
+      before = null;
+      if (!kept) { open(); return; }
+      quiet = true;
+      clearTimeout(later);
+      const { centre, half, held, unit: then } = fromAddress(location.hash);
+      [unit, chosen] = [then, kept.chosen];
+      for (const [name, value] of kept.values) fields[name].value = value;
+      form = fields.form.value;
+      preset.querySelector("select").value = chosen;
+      live.chart.held = held;
+      shape();
+      live.chart.show(centre, half);
+      take();
+      quiet = false;
+    });
+    undo.disabled = true;
+    open();
   }
 
   /* A year in orbit: the arms, what the sensor holds, and where the loop stands each day. */
@@ -904,18 +895,30 @@ function armlockPages() {
 
   function year(place) {
     const LOOPS = { "the white paper's": [FLIGHT, 6e-3], "the paper's": [PAPER, 1.5e-6] };
+    const wrong = element("p", { class: "live-note live-wrong", role: "alert" }), MINE = "yours, from the link";
+    // "Your own loop" opens this page with its loop in the address.
+    try {
+      const given = fromAddress(location.hash);
+      if (given) {
+        api.make(given.spec);
+        LOOPS[MINE] = [given.spec, given.half, given.unit];
+      }
+    } catch (error) {
+      wrong.textContent = `The address of this page holds no loop: ${error.message}`;
+    }
     const live = new Live("Number of unstable roots over c1 and c2 on this day.");
-    const state = { loop: Object.keys(LOOPS)[0], orbit: Object.keys(armlockOrbits)[0], master: "1",
+    const state = { loop: LOOPS[MINE] ? MINE : Object.keys(LOOPS)[0], orbit: Object.keys(armlockOrbits)[0], master: "1",
       hold: HOLDS[0], day: 20 };
     // Of each day that was counted: where the loop breaks, null where it is not stable.
-    let days = [], trips = null, half = null, values = [];
+    let days = [], trips = null, half = null, values = [], finished = 0;
+    const back = element("a", {}, "Open the loop of this day in \u201cYour own loop\u201d");
     const words = element("p", { class: "live-note", role: "status" });
     const spec = day => {
       const [tau1, tau2] = trips.map(trip => trip(day));
       return { ...LOOPS[state.loop][0], tau1, tau2, difference: 2 * held(half, state.hold, day) };
     };
-    const sheet = new Sheet({ role: "img", "aria-label": "The year: true and held half difference, days on "
-      + "which the loop is not stable, and the least perturbation against each other that breaks it." }, innerWidth < 600 ? 1.2 : 0.55,
+    const sheet = new Sheet({ role: "img", "aria-label": "The year: true and assumed half difference, days on "
+      + "which the loop is unstable, and the critical perturbation of the arms in opposite directions." }, [0.5, 1.2],
     (pen, ...rest) => drawYear({ values, days, day: state.day }, pen, ...rest));
     for (const name of ["pointerdown", "pointermove"]) sheet.canvas.addEventListener(name, event => {
       const box = sheet.canvas.getBoundingClientRect(), at = (event.clientX - box.left - 56) / (box.width - 64);
@@ -923,23 +926,26 @@ function armlockPages() {
     });
     sheet.canvas.addEventListener("pointerup", () => move(state.day, false));
 
-    /* Every sixteenth day first, then those between. */
+    /* Every sixteenth day first, then those between, by two workers. Each day has its count, and every
+     * fourth day its critical perturbation. */
     const count = () => {
       days = Array(YEAR + 1);
+      finished = 0;
       const order = [16, 8, 4, 2, 1].flatMap((step, k) => Array.from({ length: Math.ceil((YEAR + 1) / step) },
         (_, i) => i * step).filter(day => !k || day % (2 * step)));
-      const next = () => {
+      const next = desk => {
         const day = order.shift();
-        if (day === undefined) { summary(); return; }
-        live.slow.ask("day", [spec(day)], (found, error) => {
+        if (day !== undefined) desk.ask("day", [spec(day), day % 4 === 0], (found, error) => {
           // A sensor that would divide by zero is no loop, and so not a stable one.
           days[day] = error ? null : found;
           sheet.draw();
-          next();
+          if (++finished > YEAR) summary(); else next(desk);
         });
       };
-      live.slow.drop("day");
-      next();
+      for (const desk of [live.slow, live.wide]) {
+        desk.drop("day");
+        next(desk);
+      }
     };
     const summary = () => {
       const parts = [];
@@ -948,9 +954,10 @@ function armlockPages() {
         while (days[day + 1] === null) day++;
         parts.push(from === day ? `${day}` : `${from} to ${day}`);
       }
-      lost.textContent = parts.length ? `Not stable on days ${parts.join(", ")}.`
+      lost.textContent = parts.length ? `Unstable on days ${parts.join(", ")}.`
         : "Stable on every day of the year.";
-      lost.textContent += " Counted once a day: what is shorter is not seen. No dot: not sure, or none up to 2.";
+      lost.textContent += " The roots are counted once a day, so that shorter changes are not seen. The critical "
+        + "perturbation is computed every fourth day. A dot is missing where it is undecided, or larger than 2.";
     };
     const lost = element("p", { class: "live-note", role: "status" });
     const move = (day, moving) => {
@@ -959,7 +966,8 @@ function armlockPages() {
       if (now.difference) live.set(now, moving);
       else live.none("The sensor would divide by zero: there is no loop on this day.");
       words.textContent = `Day ${Math.round(day)}: round trips ${now.tau1.toFixed(4)} s and ${now.tau2.toFixed(4)} s; `
-        + `half difference ${ms(half(day))}, held ${ms(now.difference / 2)}.`;
+        + `half difference ${ms(half(day))}, assumed ${ms(now.difference / 2)}.`;
+      back.href = `live.html${address({ ...now, difference: now.difference || 1 }, live.chart, LOOPS[state.loop][2] || TURN)}`;
       sheet.draw();
     };
     const update = () => {
@@ -1012,10 +1020,11 @@ function armlockPages() {
     stop();
     const form = element("form", { class: "live-form", onsubmit: event => event.preventDefault() },
       pick("loop", "Loop", Object.keys(LOOPS)), pick("orbit", "Orbit", Object.keys(armlockOrbits)),
-      pick("master", "Master", Object.keys(ARMS)), pick("hold", "The sensor holds", HOLDS));
-    place.replaceChildren(form, element("div", { class: "live-day" }, today, play),
-      sheet.canvas, words, lost, element("div", { class: "live-pair" },
-        element("div", {}, live.figure, legend(1), live.note), element("div", {}, live.numbers)));
+      pick("master", "Master", Object.keys(ARMS)), pick("hold", "The sensor assumes", HOLDS));
+    place.replaceChildren(form, wrong, element("div", { class: "live-day" }, today, play),
+      sheet.canvas, words, lost, figures(element("div", {}, live.figure, legend(), live.note),
+        element("div", {}, live.numbers, buttons(back))));
+    addEventListener("hashchange", () => location.reload());
     update();
   }
 

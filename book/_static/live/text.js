@@ -41,19 +41,26 @@ const armlockText = (function () {
     return scientific.length < plain.length ? scientific : plain;
   }
 
-  const root = ([re, im]) => im ? `${exact(re)}${im < 0 ? "-" : "+"}${exact(Math.abs(im))}j` : exact(re);
+  /* The shortest text of the number that times the unit gives this one. */
+  function shortest(number, unit) {
+    for (let digits = 1; digits < 17; digits++) {
+      const found = Number((number / unit).toPrecision(digits));
+      if (found * unit === number) return exact(found);
+    }
+    return exact(number / unit);
+  }
 
-  function written(roots) {
+  const root = ([re, im], unit = 1) => im ? `${shortest(re, unit)}${im < 0 ? "-" : "+"}`
+    + `${shortest(Math.abs(im), unit)}j` : shortest(re, unit);
+
+  function written(roots, unit = 1) {
     const left = [...roots], parts = [];
     while (left.length) {
       const [re, im] = left.shift();
       const partner = im ? left.findIndex(([x, y]) => x === re && y === -im) : -1;
-      if (partner >= 0) {
-        left.splice(partner, 1);
-        parts.push(`${exact(re)}\u00b1${exact(Math.abs(im))}j`);
-      } else {
-        parts.push(root([re, im]));
-      }
+      if (partner >= 0) left.splice(partner, 1);
+      parts.push(partner < 0 ? root([re, im], unit)
+        : `${shortest(re, unit)}\u00b1${shortest(Math.abs(im), unit)}j`);
     }
     return parts.join(", ");
   }
@@ -128,8 +135,8 @@ const armlockText = (function () {
       }
     };
     const sum = () => {
-      let sign = 1;
-      while (tokens[next] === "+" || tokens[next] === "-") if (tokens[next++] === "-") sign = -sign;
+      const sign = tokens[next] === "-" ? -1 : 1;
+      if (tokens[next] === "+" || tokens[next] === "-") next++;
       let value = tokens[next] === "\u00b1" ? [[0, 0]] : plus([[0, 0]], product(), sign);
       for (;;) {
         const token = tokens[next];
@@ -224,6 +231,36 @@ const armlockText = (function () {
     });
   }
 
+  /* Numerator and denominator of a fraction as MATLAB and python-control print it, over a line of
+   * dashes, or as (...)/(...) in one line; null where the text is no fraction. */
+  function readFraction(field, text) {
+    const refuse = why => { throw wrong(field, `This printed fraction is not understood: ${why}.`); };
+    const plain = text.replace(/[\u2500\u2013\u2014\u2212]/g, "-").trim();
+    const parts = plain.split(/\n[ \t]*-+[ \t]*(?=\n)|\s*\/?\s*-{3,}\s*\/?\s*/);
+    if (parts.length === 1) {
+      const group = part => {
+        let depth = 0;
+        return part[0] === "(" && [...part].every((c, k) =>
+          (depth += (c === "(") - (c === ")")) > 0 || k === part.length - 1);
+      };
+      for (let k = plain.length - 1, depth = 0; k >= 0; k--) {
+        depth += (plain[k] === ")") - (plain[k] === "(");
+        const [above, under] = [plain.slice(0, k).trim(), plain.slice(k + 1).trim()];
+        if (plain[k] === "/" && depth === 0 && under.includes("s"))
+          return above && (group(under) || /^[\w.^ ]+$/.test(under)) ? [above, under]
+            : refuse("write it as (numerator)/(denominator)");
+      }
+      return null;
+    }
+    if (/\bdt\s*=|sample time|discrete|\bz\b/i.test(plain)) refuse("it is discrete in time");
+    if (/exp/i.test(plain)) refuse("write its dead time into the field of the dead time");
+    if (parts.length > 2) refuse("it has more than one line of dashes");
+    // Without headings and remarks, which have words or signs that no polynomial has.
+    const found = parts.map(part => part.split("\n").filter(line => !/[:=<>'[\]]|[a-z]{3,}/i.test(line))
+      .join(" ").trim());
+    return found.every(part => part) ? found : refuse("it needs a polynomial above and below the line");
+  }
+
   /* One real number; `name` is the field's own. */
   function readNumber(field, text, name) {
     const plain = text.trim().replace(/\u2212/g, "-").replace(/\u03c0/g, "pi");
@@ -239,18 +276,23 @@ const armlockText = (function () {
   /* ---------------------------------------------------------------------------- a whole loop */
 
   /* The lines that make the same loop with the package. */
-  function python(spec, [c1, c2]) {
-    const roots = all => `[${all.map(root).join(", ")}]`, low = p => `[${list([...p].reverse())}]`;
+  function python(spec, [c1, c2], unit) {
+    const times = text => unit === 1 || text === "0" ? text : `${text} * hertz`;
+    const one = ([re, im]) => times(im && unit !== 1 ? `(${root([re, im], unit)})` : root([re, im], unit));
+    const roots = all => `[${all.map(one).join(", ")}]`, low = p => `[${list([...p].reverse())}]`;
+    const corner = () => times(shortest(spec.corner, unit));
     const sensors = {
-      dual: () => ["dual", `dual(corner=${spec.corner}, difference=${spec.difference})`],
+      dual: () => ["dual", `dual(corner=${corner()}, difference=${spec.difference})`],
       modified: () => ["modified_dual", `modified_dual(\n        mean_delay=`
-        + `${(spec.tau1 + spec.tau2) / 2}, half_difference=${spec.difference / 2}, corner=${spec.corner}\n    )`],
+        + `${(spec.tau1 + spec.tau2) / 2}, half_difference=${spec.difference / 2}, corner=${corner()}\n    )`],
       own: () => ["SignalMapping", `SignalMapping(\n        ${low(spec.m1)}, ${low(spec.m2)}, `
         + `${low(spec.below)}\n    )`],
     };
     const [name, sensor] = (sensors[spec.sensor] || (() => Array(2).fill(spec.sensor.toUpperCase())))();
-    return ["from armlock import Controller, Loop, unstable_roots", `from armlock.sensors import ${name}`,
-      "", "controller = Controller(", `    zeros=${roots(spec.zeros)},`, `    poles=${roots(spec.poles)},`,
+    return [...unit === 1 ? [] : ["from math import pi", ""],
+      "from armlock import Controller, Loop, unstable_roots", `from armlock.sensors import ${name}`,
+      "", ...unit === 1 ? [] : ["hertz = 2 * pi"],
+      "controller = Controller(", `    zeros=${roots(spec.zeros)},`, `    poles=${roots(spec.poles)},`,
       `    gain=${spec.gain},`, ")", "loop = Loop(", `    controller, ${sensor},`,
       `    tau1=${spec.tau1}, tau2=${spec.tau2}, delay=${spec.delay},`, ")",
       `print(unstable_roots(loop, ${c1}, ${c2}))`, ""].join("\n");
@@ -259,8 +301,8 @@ const armlockText = (function () {
   const SHORT = { sensor: "s", tau1: "t1", tau2: "t2", delay: "d", gain: "g", corner: "p",
     difference: "dt", zeros: "z", poles: "q", m1: "m1", m2: "m2", below: "mb" };
 
-  /* The address holds all: loop, view, the marked point and the unit of the fields. */
-  function address(spec, { centre, half, marked }, unit) {
+  /* The address holds all: loop, view, the held point and the unit of the fields. */
+  function address(spec, { centre, half, held }, unit) {
     const parts = new URLSearchParams();
     for (const [name, key] of Object.entries(SHORT)) {
       const value = spec[name];
@@ -269,30 +311,39 @@ const armlockText = (function () {
         : Array.isArray(value) ? list(value) : value);
     }
     parts.set("at", [...centre, half].join(","));
-    if (marked) parts.set("pt", marked.join(","));
+    if (held) parts.set("pt", held.join(","));
     if (unit !== 1) parts.set("u", "Hz");
     return `#${parts}`;
   }
 
+  /* What an address holds; null where it is none of a loop. An error says what it lacks. */
   function fromAddress(hash) {
-    const parts = new URLSearchParams(hash.slice(1));
-    if (!parts.has("s")) return null;
-    const spec = {};
+    const parts = new URLSearchParams(hash.slice(1)), sensor = parts.get("s");
+    if (!hash.includes("=")) return null;
+    const needed = ["sensor", "tau1", "tau2", "gain", "zeros", "poles",
+      ...{ dual: ["corner", "difference"], modified: ["corner", "difference"], own: ["m1", "m2", "below"] }[sensor]
+        || []];
+    const spec = { delay: 0 };
     for (const [name, key] of Object.entries(SHORT)) {
       const text = parts.get(key);
+      if (text === null && needed.includes(name)) throw wrong(name, `it has no \u201c${key}=\u201d`);
       if (text === null) continue;
       spec[name] = name === "sensor" ? text
         : name === "zeros" || name === "poles" ? readRoots(name, text, name)
-          : ["m1", "m2", "below"].includes(name) ? readPolynomial(name, text, name) : Number(text);
+          : ["m1", "m2", "below"].includes(name) ? readPolynomial(name, text, name)
+            : readNumber(name, text, `\u201c${key}\u201d`);
     }
-    const numbers = (key, other) => (parts.get(key) || other).split(",").map(Number);
-    const [x, y, half] = numbers("at", "1,1,1");
-    if (![x, y].every(Number.isFinite) || !(half > 0)) throw wrong("at", "its view is no view");
-    const marked = parts.has("pt") ? numbers("pt", "") : null;
+    const numbers = (key, size) => {
+      const found = parts.get(key).split(",").map(text => text.trim() ? Number(text) : NaN);
+      if (found.length === size && found.every(Number.isFinite)) return found;
+      throw wrong(key, `\u201c${key}=${parts.get(key)}\u201d is not ${size} numbers`);
+    };
+    const [x, y, half] = parts.has("at") ? numbers("at", 3) : [1, 1, 1];
+    if (!(half > 0)) throw wrong("at", `its view has no width: ${half}`);
     return { spec, centre: [x, y], half, unit: parts.get("u") === "Hz" ? TURN : 1,
-      marked: marked && marked.length === 2 && marked.every(Number.isFinite) ? marked : null };
+      held: parts.has("pt") ? numbers("pt", 2) : null };
   }
 
-  return { TURN, say, scientific, power, duration, exact, written, list, readRoots, readPolynomial,
-    readNumber, python, address, fromAddress };
+  return { TURN, say, scientific, power, duration, exact, shortest, written, list, readRoots, readPolynomial,
+    readFraction, readNumber, python, address, fromAddress };
 })();
