@@ -502,6 +502,15 @@ const armlockDraw = (function () {
     pen.fillText(text, x, y);
   }
 
+  /* The same at the first place near (x, y) where it covers no other of `taken`. */
+  function labelBeside(pen, text, x, y, colours, taken) {
+    const long = pen.measureText(text).width, left = pen.textAlign === "right" ? x - long : x;
+    const free = v => taken.every(([a, b, c]) => left > b || left + long < a || Math.abs(v - c) > 15);
+    const found = [0, -15, 15, -30, 30].map(d => y + d).find(free) ?? y;
+    taken.push([left, left + long, found]);
+    label(pen, text, x, found, colours);
+  }
+
   const hertz = omega => `${say(omega / TURN)} Hz`;
   const degrees = angle => `${say(angle * 180 / Math.PI)}\u00b0`;
   const decibels = size => 20 * Math.log10(size + 1e-300);
@@ -521,8 +530,11 @@ const armlockDraw = (function () {
     pen.textAlign = "center";
     pen.textBaseline = "middle";
     return () => {
-      for (const size of sizes) label(pen, write(size), cx + radius(size) * Math.cos(angle),
-        cy + radius(size) * Math.sin(angle), colours);
+      let last = 0;
+      for (const size of sizes) if (radius(size) > last + 22) {
+        last = radius(size);
+        label(pen, write(size), cx + last * Math.cos(angle), cy + last * Math.sin(angle), colours);
+      }
     };
   }
 
@@ -563,6 +575,13 @@ const armlockDraw = (function () {
     };
     const half = path(now), other = pinned && path(pinned), sizes = [1];
     while (10 * sizes.at(-1) <= most) sizes.push(10 * sizes.at(-1));
+    pen.strokeStyle = colours.text;
+    pen.globalAlpha = 0.6;
+    pen.beginPath();
+    pen.arc(cx, cy, radius(1), 0, 7);
+    pen.stroke();
+    pen.globalAlpha = 1;
+    sizes.shift();
     const named = rings(pen, [cx, cy], sizes, radius, size => power(Math.round(Math.log10(size))),
       half.flatMap(([x, y]) => [[x, y], [x, 2 * cy - y]]), colours);
     pen.strokeStyle = colours.grid;
@@ -638,6 +657,7 @@ const armlockDraw = (function () {
     };
     const gain = panel(8, [["left", colours.other], ["size", colours.line]], low, top + 5, "dB");
     const turned = panel(22 + room, [["phase", colours.line]], -180, 180, "phase in \u00b0", [-180, -90, 0, 90, 180]);
+    const taken = [];
     // From the curve to where the loop would be on the limit.
     const margin = (w, a, b, text) => {
       if (!inside(w)) return;
@@ -655,7 +675,7 @@ const armlockDraw = (function () {
       pen.fillStyle = colours.text;
       pen.textAlign = close ? "right" : "left";
       pen.textBaseline = "middle";
-      label(pen, text, x + (close ? -7 : 7), Math.min(0.5 * (a + b), high - 60), colours);
+      labelBeside(pen, text, x + (close ? -7 : 7), Math.min(0.5 * (a + b), high - 60), colours, taken);
     };
     for (const name of ["lower", "upper"]) if (margins[`${name}At`] > 0)
       margin(margins[`${name}At`], gain(-decibels(margins[name])), gain(0), `gain \u00d7 ${say(margins[name])}`);
@@ -670,11 +690,11 @@ const armlockDraw = (function () {
     }
     // The names stand at the curves.
     pen.textAlign = "left";
-    pen.textBaseline = "bottom";
+    pen.textBaseline = "middle";
     for (const [name, part, colour, at] of [["|L|", size, colours.line, 0.03], ["|S|", rest, colours.other, 0.4]]) {
       const i = nearest(omega, TURN * 10 ** (first + at * (last - first)));
       pen.fillStyle = colour;
-      label(pen, name, px(omega[i]), Math.min(Math.max(gain(part[i]) - 3, 22), 8 + room), colours);
+      labelBeside(pen, name, px(omega[i]), Math.min(Math.max(gain(part[i]) - 10, 15), 2 + room), colours, taken);
     }
     pen.fillStyle = colours.text;
     if (lit !== null) {

@@ -177,7 +177,7 @@ function armlockPages() {
       this.moved = () => {};
       this.plots = [
         this.plot("Nyquist curve of L, compressed beyond 1", drawNyquist, 1),
-        this.plot("Bode\u2019s plot of L, and the sensitivity S = 1/(1 + L)", drawBode, [0.46, 0.9]),
+        this.plot("Bode\u2019s plot of L, and the sensitivity S = 1/(1 + L)", drawBode, [0.42, 0.9]),
       ];
       this.following = element("p", { class: "live-note", role: "status" });
     }
@@ -651,9 +651,9 @@ function armlockPages() {
       }
     };
     const same = (a, b) => {
-      const plain = spec => JSON.stringify([spec.sensor, spec.tau1, spec.tau2, spec.delay, spec.gain,
-        written(spec.zeros), written(spec.poles), ...["dual", "modified"].includes(spec.sensor)
-          ? [spec.corner, spec.difference] : []]);
+      const plain = spec => JSON.stringify([spec.sensor, spec.tau1, spec.tau2, spec.delay, spec.gain, spec.zeros,
+        spec.poles, ...["dual", "modified"].includes(spec.sensor) ? [spec.corner, spec.difference] : []],
+      (_, v) => typeof v === "number" ? v.toPrecision(12) : v);
       return plain(a) === plain(b);
     };
 
@@ -755,12 +755,12 @@ function armlockPages() {
       field("zeros", "Zeros", { area: true }), field("poles", "Poles", { area: true }),
       field("above", "Numerator, highest power first, or in s", { area: true, value: "1" }),
       field("under", "Denominator", { area: true, value: "s" }));
-    inputs.querySelector(`#${id("form")}`).closest("label").classList.add("live-wide");
+    fields.form.closest("label").classList.add("live-wide");
 
     /* The s-plane: a root follows the pointer, a pair together; a root at 0 stays. */
     let range = [0.01, 1], plane = null, caught = null;
     const roots = new Sheet({ role: "img", "aria-label": "Poles and zeros of the controller. The fields Zeros "
-      + "and Poles have them as text." }, 1, (pen, wide, high, colours) => {
+      + "and Poles have them as text." }, 0.8, (pen, wide, high, colours) => {
       const { spec } = live;
       plane = spec && drawRoots({ ...spec, unit, range }, pen, wide, high, colours);
     });
@@ -822,11 +822,10 @@ function armlockPages() {
         wrong, gain, dead),
       element("div", { class: "live-main" }, figures(live.figure, nyquist.figure),
         tools(live, "loop", button("Paper\u2019s square", () => live.chart.show([1, 1], 3e-6)),
-          button("Whole", () => live.chart.show([0, 0], 3))),
-        element("div", { class: "live-wide-first" }, element("div", {}, bode.figure, live.following),
-          element("figure", {}, element("figcaption", {}, "Drag a pole (\u00d7) or a zero (\u25cb)"), roots.canvas))),
-      element("div", { class: "live-fields" }, inputs)),
-    figures(live.numbers, element("div", {}, live.note, legend(), buttons(copied, orbit), lines)));
+          button("Whole", () => live.chart.show([0, 0], 3))), live.note, bode.figure, live.following, live.numbers),
+      element("div", { class: "live-fields" },
+        element("figure", {}, element("figcaption", {}, "Drag a pole (\u00d7) or a zero (\u25cb)"), roots.canvas),
+        inputs, legend(), buttons(copied, orbit), lines)));
 
     const open = () => {
       quiet = true;
