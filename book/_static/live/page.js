@@ -560,7 +560,7 @@ function armlockPages() {
     live.moved = step => {
       if (!live.spec) return;
       const hash = address(live.spec, live.chart, unit);
-      code.textContent = python(live.spec, live.kept, unit);
+      code.textContent = python(live.spec, live.kept, fraction() ? 1 : unit);
       orbit.href = `in_orbit.html${hash}`;
       if (quiet) return;
       // A point that goes on moving is one step, and another view is none.
@@ -651,9 +651,11 @@ function armlockPages() {
       }
     };
     const same = (a, b) => {
-      const plain = spec => JSON.stringify([spec.sensor, spec.tau1, spec.tau2, spec.delay, spec.gain, spec.zeros,
-        spec.poles, ...["dual", "modified"].includes(spec.sensor) ? [spec.corner, spec.difference] : []],
-      (_, v) => typeof v === "number" ? v.toPrecision(12) : v);
+      const digits = (_, v) => typeof v === "number" ? v.toPrecision(12) : v;
+      const sorted = all => all.map(v => JSON.stringify(v, digits)).sort();
+      const plain = spec => JSON.stringify([spec.sensor, spec.tau1, spec.tau2, spec.delay, spec.gain,
+        sorted(spec.zeros), sorted(spec.poles), ...["dual", "modified"].includes(spec.sensor)
+          ? [spec.corner, spec.difference] : []], digits);
       return plain(a) === plain(b);
     };
 
@@ -759,7 +761,7 @@ function armlockPages() {
 
     /* The s-plane: a root follows the pointer, a pair together; a root at 0 stays. */
     let range = [0.01, 1], plane = null, caught = null;
-    const roots = new Sheet({ role: "img", "aria-label": "Poles and zeros of the controller. The fields Zeros "
+    const roots = new Sheet({ role: "img", "aria-label": "Roots of the controller in the s-plane. The fields Zeros "
       + "and Poles have them as text." }, 0.8, (pen, wide, high, colours) => {
       const { spec } = live;
       plane = spec && drawRoots({ ...spec, unit, range }, pen, wide, high, colours);
@@ -815,7 +817,9 @@ function armlockPages() {
       }
       setTimeout(() => { copied.textContent = "Copy as Python"; }, 3000);
     });
-    const lines = element("details", {}, element("summary", {}, "This loop in Python"), code);
+    // Open where the column has the room.
+    const lines = element("details", innerWidth > 1500 ? { open: "" } : {},
+      element("summary", {}, "This loop in Python"), code);
     const [nyquist, bode] = live.plots;
     place.replaceChildren(element("div", { class: "live-own" },
       element("div", { class: "live-top" }, element("div", { class: "live-start" }, preset, state, reset, undo),
