@@ -817,9 +817,7 @@ function armlockPages() {
       }
       setTimeout(() => { copied.textContent = "Copy as Python"; }, 3000);
     });
-    // Open where the column has the room.
-    const lines = element("details", innerWidth > 1500 ? { open: "" } : {},
-      element("summary", {}, "This loop in Python"), code);
+    const lines = element("details", {}, element("summary", {}, "This loop in Python"), code);
     const [nyquist, bode] = live.plots;
     place.replaceChildren(element("div", { class: "live-own" },
       element("div", { class: "live-top" }, element("div", { class: "live-start" }, preset, state, reset, undo),
@@ -829,7 +827,7 @@ function armlockPages() {
           button("Whole", () => live.chart.show([0, 0], 3))), live.note, bode.figure, live.following, live.numbers),
       element("div", { class: "live-fields" },
         element("figure", {}, element("figcaption", {}, "Drag a pole (\u00d7) or a zero (\u25cb)"), roots.canvas),
-        inputs, legend(), buttons(copied, orbit), lines)));
+        inputs, legend(), buttons(copied, orbit))), lines);
 
     const open = () => {
       quiet = true;
