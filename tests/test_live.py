@@ -702,7 +702,7 @@ def test_the_year_takes_the_loop_of_the_page(opened, year_page):
     back = tab.get_by_role("link", name="Open the loop of this day")
     assert "g=7&" in back.get_attribute("href")
     assert tab.locator("select").first.input_value().startswith("yours")
-    assert "— true   – – assumed by the sensor" in tab.evaluate("drawn")
+    assert "Dashed: the half difference" in tab.locator("figcaption").first.inner_text()
 
 
 def test_the_year_marks_the_days_on_which_the_package_finds_no_stable_loop(year_page):

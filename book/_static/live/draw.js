@@ -786,9 +786,6 @@ const armlockDraw = (function () {
     curve(pen, values.length, t => [px(t), above(1e3 * values[t][0])]);
     pen.lineWidth = 1;
     ghost(pen, colours, () => curve(pen, values.length, t => [px(t), above(1e3 * values[t][1])]));
-    pen.textAlign = "right";
-    pen.textBaseline = "bottom";
-    label(pen, "\u2014 true   \u2013 \u2013 assumed by the sensor", wide - right - 6, 4 + room, colours);
     const found = days.map((v, t) => [t, v]).filter(([, v]) => v > 0 && v < Infinity);
     const sizes = found.map(([, v]) => Math.log10(v)), first = Math.floor(Math.min(-1, ...sizes));
     const top = Math.max(first + 1, ...sizes.map(Math.ceil));

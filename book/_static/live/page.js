@@ -958,7 +958,7 @@ function armlockPages() {
       lost.textContent = parts.length ? `Unstable on days ${parts.join(", ")}.`
         : "Stable on every day of the year.";
       lost.textContent += " The roots are counted once a day, so that shorter changes are not seen. The critical "
-        + "perturbation is computed every fourth day. A dot is missing where it is undecided, or larger than 2.";
+        + "perturbation is computed every fourth day. A dot is missing where it is undecided, 0, or larger than 2.";
     };
     const lost = element("p", { class: "live-note", role: "status" });
     const move = (day, moving) => {
@@ -1023,7 +1023,9 @@ function armlockPages() {
       pick("loop", "Loop", Object.keys(LOOPS)), pick("orbit", "Orbit", Object.keys(armlockOrbits)),
       pick("master", "Master", Object.keys(ARMS)), pick("hold", "The sensor assumes", HOLDS));
     place.replaceChildren(form, wrong, element("div", { class: "live-day" }, today, play),
-      sheet.canvas, words, lost, figures(element("div", {}, live.figure, legend(), live.note),
+      element("figure", {}, element("figcaption", {}, "Solid: the true half difference. Dashed: the half difference "
+        + "that the sensor assumes. Dots: the critical perturbation of the arms in opposite directions."), sheet.canvas),
+      words, lost, figures(element("div", {}, live.figure, legend(), live.note),
         element("div", {}, live.numbers, buttons(back))));
     addEventListener("hashchange", () => location.reload());
     update();
