@@ -39,8 +39,8 @@ BOUNDARY, UNCONFINED, UNSURE = -1, -2, -3
 #: chain both sides take the limit for roots that cross closer to it.
 NEAR = 1.001e-3
 DIRECTIONS = ((1, -1), (1, 1), (-1, -1))
-#: The unstable roots of the closed loop, as the page counts them: where numerator and denominator
-#: of L share a root at s = 0 it is left out.
+#: The unstable roots of the closed loop, as the page counts them: where numerator and
+#: denominator of L share a root at s = 0 it is left out.
 closed_loop_count = loop_count
 #: All that the page shows of a loop at a point. JSON has no infinity and no nan.
 ASK = """cases => cases.map(([spec, c1, c2]) => {
@@ -267,7 +267,7 @@ def main():
         )
     for name, asked in found.asked.items():
         print(
-            f"{name}: {asked} numbers, {found.unsure[name] / asked:.2%} not sure, worst "
+            f"{name}: {asked} numbers, {found.unsure[name] / asked:.2%} undecided, worst "
             f"{found.worst[name]:.1e}"
         )
     print(f"{len(found.wrong)} differ; the package refused {dict(found.refused)}")

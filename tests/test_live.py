@@ -248,7 +248,8 @@ def show(chromium, tmp_path):
         head = "<meta name=viewport content='width=device-width'>"
         file.write_text(
             f"<!DOCTYPE html>{head}<style>* {{ box-sizing: border-box }} {style}</style>"
-            f"<main class='bd-content' style='max-width: 81rem'><div class='live' data-live='{part}'></div>"
+            "<main class='bd-content' style='max-width: 81rem'>"
+            f"<div class='live' data-live='{part}'></div>"
             f"<script src='{script}'></script></main>"
         )
         contexts.append(chromium.new_context(**{"viewport": WIDE, **window}))
@@ -376,7 +377,12 @@ def test_pictures_stand_together_at_the_top_and_the_table_last(opened, width, sc
     assert page.evaluate("document.documentElement.scrollWidth") <= width
 
 
-PRINTED = "<TransferFunction>: sys[1]\nInputs (1): ['u[0]']\n\n    s + 0.02\n  -----------\n  s^2 + 0.1 s"
+PRINTED = """<TransferFunction>: sys[1]
+Inputs (1): ['u[0]']
+
+    s + 0.02
+  -----------
+  s^2 + 0.1 s"""
 
 
 def test_a_printed_fraction_is_understood_or_refused(opened):
@@ -472,7 +478,7 @@ def test_numbers_in_the_fields_are_short(opened):
         == "0, 0, -1e-8, -5e-6, -5e-6, -5e-6"
     )
     code = page.locator("pre")
-    scopes = []
+    scopes: list[dict[str, object]] = []
     for unit in ("hz", "1"):
         page.get_by_label("Unit of roots").select_option(unit)
         scopes.append({})
@@ -527,8 +533,10 @@ def test_undo_goes_back_through_the_address(opened):
     for gain, held in (("4000", True), ("4000", False), ("5000", False)):
         undo.click()
         page.wait_for_function(
-            "([gain, held]) => document.querySelector('pre').textContent.includes(`gain=${gain},`)"
-            " && document.querySelector('.live-chart output').textContent.includes('Held') === held",
+            """([gain, held]) => {
+                const text = name => document.querySelector(name).textContent;
+                return text('pre').includes(`gain=${gain},`)
+                    && text('.live-chart output').includes('Held') === held; }""",
             arg=[gain, held],
         )
     assert page.get_by_label("Zeros", exact=True).is_visible()

@@ -7,7 +7,7 @@
  * is zero, at x = Re((N - y O) / M), and crosses to the right with growing x where h ascends. The
  * axis is cut until every interval is certain for every row: it holds no zero of h, or one whose
  * place is known to a pixel, or only such whose x lies outside of the chart. What is left at the
- * smallest intervals is marked as not sure. Rows begin with counts that follow from one certified
+ * smallest intervals is marked as undecided. Rows begin with counts that follow from one certified
  * count, along one column, in the same way.
  */
 function armlockChart(api) {
@@ -162,7 +162,7 @@ function armlockChart(api) {
     return omega;
   }
 
-  /* Counts over a grid, and where they are not sure: UNSURE. A picture in passing may take fewer
+  /* Counts over a grid, and where they are undecided: UNSURE. A picture in passing may take fewer
    * samples of the axis, and leaves more unsure. */
   function chart(loop, x0, x1, nx, y0, y1, ny, samples = 3000000) {
     const counts = new Int16Array(nx * ny).fill(UNCONFINED);
