@@ -363,8 +363,7 @@ function armlockPages() {
       const parts = [`${this.name}: ${count === undefined ? "counting \u2026" : counted(count)}`];
       if (root && count >= 0) parts.push(`rightmost root ${this.rootText(root)} rad/s, which `
         + `${root[0] < 0 ? "decays" : "grows"} by e in ${duration(1 / Math.abs(root[0]))}`);
-      this.out.textContent = `${parts.join("; ")}.${this.chart.held ? " Held: Escape, or a click on the point, "
-        + "releases it." : ""}`;
+      this.out.textContent = `${parts.join("; ")}.${this.chart.held ? " Held: Escape releases it." : ""}`;
       this.list();
     }
 
