@@ -412,7 +412,7 @@ const armlockDraw = (function () {
     hold(point) {
       [this.held, this.hover] = [point, null];
       this.sheet.draw();
-      this.pointed();
+      this.pointed(true);
     }
 
     key(event) {

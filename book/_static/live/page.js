@@ -166,7 +166,7 @@ function armlockPages() {
       this.ready = element("p", { class: "visually-hidden", role: "status" });
       this.chart = new Chart(label, {
         changed: () => { this.redraw(); this.moved(null); },
-        pointed: () => { this.tell(true); if (!this.chart.hover) this.moved("point"); },
+        pointed: held => { this.tell(true); if (held) this.moved("point"); },
       });
       this.figure = element("figure", { class: "live-chart", "data-check": "hover" },
         element("figcaption", {}, "Number of unstable roots over c1 and c2"), this.chart.canvas, this.out, this.ready);
@@ -646,6 +646,8 @@ function armlockPages() {
         blame(name, error.message);
         wrong.textContent = error.message;
         live.none("There is no loop to show: a field holds none.");
+        code.textContent = "";
+        orbit.removeAttribute("href");
         roots.draw();
       }
     };
