@@ -267,8 +267,13 @@ def show(chromium, tmp_path):
 
 
 WIDE = {"width": 1280, "height": 900}
-#: Keeps what is written on canvases, newest last.
+#: Keeps what is written on canvases, newest last, and each canvas's places of lines.
 RECORD = """window.drawn = [];
+    const lineTo = CanvasRenderingContext2D.prototype.lineTo;
+    CanvasRenderingContext2D.prototype.lineTo = function (x, y) {
+        (this.places ||= []).push([x, y]);
+        lineTo.call(this, x, y);
+    };
     const fillText = CanvasRenderingContext2D.prototype.fillText;
     CanvasRenderingContext2D.prototype.fillText = function (text, ...more) {
         drawn.push(text);
@@ -443,6 +448,30 @@ def test_the_pictures_show_the_margins_of_the_table(opened):
     assert "28.6° at 1.95 Hz" in written
     assert "28.6°" in written
     assert {"gain × 0.241", "gain × 4.27"} <= set(written)
+
+
+#: Of the Nyquist curve, drawn anew: places where two long lines turn back, as at a spike.
+SPIKES = """async () => {
+    const canvas = document.querySelectorAll('.live-main canvas')[1];
+    canvas.getContext('2d').places = [];
+    canvas.dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowRight' }));
+    await new Promise(done => setTimeout(done, 1000));
+    const places = canvas.getContext('2d').places;
+    const line = k => [0, 1].map(m => places[k][m] - places[k - 1][m]);
+    return [places.length, places.slice(2).filter((_, k) => {
+        const [a, b] = [line(k + 1), line(k + 2)], sizes = [a, b].map(v => Math.hypot(...v));
+        return Math.min(...sizes) > 15
+            && a[0] * b[0] + a[1] * b[1] < -0.8 * sizes[0] * sizes[1];
+    }).length]; }"""
+
+
+def test_the_nyquist_curve_has_no_spikes(opened):
+    page = opened()
+    start(page, "The white paper's loop (modified dual)")
+    table(page)
+    places, spikes = page.evaluate(SPIKES)
+    assert places > 1000
+    assert spikes == 0
 
 
 def test_an_unstable_chart_is_not_called_undecided(opened):

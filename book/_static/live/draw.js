@@ -554,7 +554,9 @@ const armlockDraw = (function () {
     };
     // Between two samples that are far apart in the picture the curve is followed, not cut short.
     const path = one => {
-      let [u, v] = bent(one.re[0], one.im[0]), from = one.omega[0], left = one.rough ? 400 : 4000;
+      const key = [full, most, one.rough].join();
+      if (one.cache.key === key) return one.cache.path;
+      let [u, v] = bent(one.re[0], one.im[0]), from = one.omega[0], left = one.rough ? 400 : 40000;
       const found = [[u, v]], go = (x, y, to, depth) => {
         if (Math.abs(x - u) + Math.abs(y - v) > 8 && depth < 8 && left-- > 0) {
           const middle = 0.5 * (from + to), [a, b] = bent(...one.at(middle));
@@ -571,6 +573,7 @@ const armlockDraw = (function () {
         const [x, y] = bent(one.re[i], one.im[i]);
         if (Math.abs(x - u) + Math.abs(y - v) > 0.7) go(x, y, one.omega[i], 0);
       }
+      [one.cache.key, one.cache.path] = [key, found];
       return found;
     };
     const half = path(now), other = pinned && path(pinned), sizes = [1];

@@ -615,8 +615,8 @@ function armlockLoop() {
   }
 
   /* The open loop for pictures. What does not depend on (c1, c2) is computed once, so that
-   * `to` gives L at another point within a frame: arrays omega, re, im, and `at`, which gives
-   * [re, im] at any other frequency. */
+   * `to` gives L at another point within a frame: arrays omega, re, im, `at`, which gives [re, im]
+   * at any other frequency, and `cache` for what a picture made of them. */
   function response(loop, c1, c2, most = 9000) {
     const omega = around(loop, c1, c2, most), n = omega.length;
     const ones = new Curve(loop, at(loop, 0, 0)), arms = [along(-1, 0), along(0, -1)].map(
@@ -639,7 +639,7 @@ function armlockLoop() {
         im[i] = bi[i] - x * ui[i] - y * vi[i];
       }
       const here = new Curve(loop, at(loop, x, y));
-      return { omega, re, im, at: w => {
+      return { omega, re, im, cache: {}, at: w => {
         here.at(w);
         const { vr, vi } = loop.rest, square = vr * vr + vi * vi, { lr, li } = here;
         return [(lr * vr + li * vi) / square, (li * vr - lr * vi) / square];

@@ -284,7 +284,7 @@ const armlockText = (function () {
     const sensors = {
       dual: () => ["dual", `dual(corner=${corner()}, difference=${spec.difference})`],
       modified: () => ["modified_dual", `modified_dual(\n        mean_delay=`
-        + `${(spec.tau1 + spec.tau2) / 2}, half_difference=${spec.difference / 2}, corner=${corner()}\n    )`],
+        + `${Number((0.5 * (spec.tau1 + spec.tau2)).toPrecision(15))}, half_difference=${spec.difference / 2}, corner=${corner()}\n    )`],
       own: () => ["SignalMapping", `SignalMapping(\n        ${low(spec.m1)}, ${low(spec.m2)}, `
         + `${low(spec.below)}\n    )`],
     };
