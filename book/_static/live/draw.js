@@ -556,11 +556,11 @@ const armlockDraw = (function () {
     const path = one => {
       const key = [full, most, one.rough].join();
       if (one.cache.key === key) return one.cache.path;
-      let [u, v] = bent(one.re[0], one.im[0]), from = one.omega[0], left = one.rough ? 400 : 40000;
+      let [u, v] = bent(one.re[0], one.im[0]), from = one.omega[0], left = one.rough ? 400 : 100000;
       const found = [[u, v]], go = (x, y, to, depth) => {
-        if (Math.abs(x - u) + Math.abs(y - v) > 8 && depth < 8 && left-- > 0) {
+        if (Math.abs(x - u) + Math.abs(y - v) > 12 && depth < 8 && left-- > 0) {
           const middle = 0.5 * (from + to), [a, b] = bent(...one.at(middle));
-          if (Math.hypot(a - 0.5 * (u + x), b - 0.5 * (v + y)) > 1) {
+          if (Math.hypot(a - 0.5 * (u + x), b - 0.5 * (v + y)) > 2) {
             go(a, b, middle, depth + 1);
             go(x, y, to, depth + 1);
             return;
