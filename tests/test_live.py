@@ -433,6 +433,7 @@ def test_a_bad_link_is_said_and_left_as_it_is(opened, fragment, why):
     page.wait_for_timeout(500)
     assert page.evaluate("location.hash") == fragment
     assert page.locator(".live-numbers").inner_text() == ""
+    assert not page.get_by_role("button", name="Reset").is_visible()
     start(page, "Dual arm")
     assert "stable" in said(page)
     assert page.locator("[role=alert]").text_content() == ""

@@ -843,8 +843,10 @@ function armlockPages() {
         } else start(Object.keys(PRESETS)[0]);
       } catch (error) {
         live.none("There is no loop to show.");
+        shape();
         roots.draw();
-        state.textContent = "";
+        code.textContent = state.textContent = "";
+        reset.hidden = true;
         wrong.textContent = `The address of this page holds no loop: ${error.message.replace(/\.$/, "")}. It was left as it is. Choose `
           + "a loop to start from, or mend the address.";
       }
