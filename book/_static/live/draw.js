@@ -558,10 +558,11 @@ const armlockDraw = (function () {
       if (one.cache.key === key) return one.cache.path;
       let [u, v] = bent(one.re[0], one.im[0]), from = one.omega[0], left = one.rough ? 400 : 100000;
       const found = [[u, v]], go = (x, y, to, depth) => {
-        if (Math.abs(x - u) + Math.abs(y - v) > 12 && depth < 8 && left-- > 0) {
-          const middle = 0.5 * (from + to), [a, b] = bent(...one.at(middle));
-          if (Math.hypot(a - 0.5 * (u + x), b - 0.5 * (v + y)) > 2) {
-            go(a, b, middle, depth + 1);
+        // At two places, none of them the middle: a detour may cross its own chord.
+        if (Math.abs(x - u) + Math.abs(y - v) > 8 && depth < 24) for (const share of [0.4, 0.75]) {
+          const between = from + share * (to - from), [a, b] = left-- > 0 ? bent(...one.at(between)) : [];
+          if (Math.hypot(a - u - share * (x - u), b - v - share * (y - v)) > 2) {
+            go(a, b, between, depth + 1);
             go(x, y, to, depth + 1);
             return;
           }
