@@ -31,6 +31,7 @@ System in Space-based Gravitational Wave Detectors".
 
 from armlock.characteristic import CharacteristicFunction
 from armlock.controllers import Controller
+from armlock.delays import DelaySystem, delay
 from armlock.loops import (
     CommonArm,
     DualArm,
@@ -79,8 +80,10 @@ from armlock.timedomain import (
     Spectrum,
     SpectrumEstimator,
     amplitude_spectrum,
+    impulse_response,
     sampled_open_loop,
     simulate,
+    step_response,
 )
 
 __version__ = "0.1.0"
@@ -93,6 +96,7 @@ __all__ = [
     "CommonArm",
     "Controller",
     "CountError",
+    "DelaySystem",
     "DivergenceError",
     "DualArm",
     "HayesEquation",
@@ -116,7 +120,9 @@ __all__ = [
     "d_curve",
     "d_curve_branches",
     "d_curve_line",
+    "delay",
     "flight_loop",
+    "impulse_response",
     "margins",
     "modulus_margin",
     "noise_budget",
@@ -131,6 +137,7 @@ __all__ = [
     "simulate",
     "spectral_radius",
     "stability_chart",
+    "step_response",
     "transfer",
     "transition_matrix",
     "unstable_roots",

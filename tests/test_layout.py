@@ -15,6 +15,7 @@ LAYERS = [
     "axis",
     "engine",
     "controllers",
+    "delays",
     "sensors",
     "characteristic",
     "loops",

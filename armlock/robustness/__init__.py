@@ -4,9 +4,10 @@ Each margin comes from a certified search of the axis and is confirmed by counts
 cannot be certified is refused.
 """
 
+from armlock.engine.margins import Margins
 from armlock.robustness.boxes import box_counts
 from armlock.robustness.gains import gain_interval
-from armlock.robustness.margins import Margins, critical_perturbation, margins, modulus_margin
+from armlock.robustness.margins import critical_perturbation, margins, modulus_margin
 from armlock.robustness.rays import Crossing, Crossings, Ray, first_crossing
 
 __all__ = [

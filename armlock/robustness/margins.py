@@ -8,13 +8,18 @@ possible. At high frequency the limit is known in closed form.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from armlock.axis.threads import interruptible
 from armlock.checks import FloatArray, positive_number
+from armlock.delays import DelaySystem
+from armlock.engine.decide import UndecidedError
+from armlock.engine.functions import Function
+from armlock.engine.margins import Margins, margins_of, modulus_of
 from armlock.loops import Loop, LoopAt, checked_loop
 from armlock.robustness import discs
 from armlock.robustness.free_phases import (
@@ -30,6 +35,8 @@ from armlock.robustness.phase_and_delay import crossovers_end, phase_and_delay
 from armlock.robustness.rays import FARTHEST, Ray
 from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError
 
+_T = TypeVar("_T")
+
 # Relative accuracy with free phases, in the order of
 # `armlock.robustness.discs.free_margins_at`.
 _FREE_TOLERANCES = np.array([1e-5, 1e-4, 1e-5, 1e-5])
@@ -37,62 +44,19 @@ _FREE_TOLERANCES = np.array([1e-5, 1e-4, 1e-5, 1e-5])
 _NEXT_TO_START = 1e-9
 
 
-@dataclass(frozen=True)
-class Margins:
-    r"""Distances of a stable loop from instability.
-
-    Gain and phase are taken where L is real and negative, and where its magnitude is one:
-
-    .. math::
-
-        \text{gain} &= -1 / L \quad \text{where } \mathrm{Im}\, L = 0 > \mathrm{Re}\, L , \\
-        \text{phase} &= \min_{|L| = 1} |\arg(-L)| , \quad -\pi < \arg \le \pi , \\
-        \text{delay} &= \min_{|L| = 1} \frac{\arg(-L)}{\omega} ,
-        \quad 0 \le \arg < 2\pi , \\
-        \text{modulus} &= \inf_\omega |1 + L| ,
-
-    with L at s = j omega.
-
-    Attributes
-    ----------
-    gain_lower, gain_upper : float
-        The loop stays stable for every gain factor between the two; 0 and inf where nothing
-        between factors of 1e-6 and 1e6, next to nulls of L up to 1e4, bounds it; nan where the
-        arms' phases are free.
-    phase : float
-        Smallest turn in rad, lag or lead, at a gain crossover that makes the loop marginal;
-        inf without a crossover.
-    delay : float
-        Smallest additional loop delay in s that makes the loop unstable; inf if none does.
-        0 where the loop does not roll off: an arbitrarily small delay then destabilises it
-        at high frequency.
-    modulus : float
-        Smallest |1 + L|.
-    gain_omega, phase_omega, modulus_omega : float
-        Where the upper gain margin, the phase margin and the modulus margin are taken, in
-        rad/s; inf where it is the limit at high frequency, nan where there is none.
-
-    Examples
-    --------
-    >>> from armlock import margins, paper_loop
-    >>> found = margins(paper_loop())
-    >>> print(f"stable for gains from {found.gain_lower:.3f} to {found.gain_upper:.2f}")
-    stable for gains from 0.195 to 6.61
-
-    As a Series of pandas: ``pd.Series(vars(found))``.
-    """
-
-    gain_lower: float
-    gain_upper: float
-    phase: float
-    delay: float
-    modulus: float
-    gain_omega: float
-    phase_omega: float
-    modulus_omega: float
+def _of_functions(
+    compute: Callable[[Function, Function], _T], loop: DelaySystem, c1: float, c2: float
+) -> _T:
+    """Return what the engine makes of numerator and denominator of a system with delays."""
+    if (c1, c2) != (1.0, 1.0):
+        raise TypeError(f"a DelaySystem has no free parameters, got c1 = {c1}, c2 = {c2}")
+    try:
+        return compute(*loop.functions)
+    except UndecidedError as error:
+        raise CountError(f"no margin: {error}", np.empty((0, 2))) from None
 
 
-def modulus_margin(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> float:
+def modulus_margin(loop: Loop | DelaySystem, c1: float = 1.0, c2: float = 1.0) -> float:
     r"""Smallest distance of the Nyquist curve from -1, min over omega of |1 + L|.
 
     .. math::
@@ -103,10 +67,10 @@ def modulus_margin(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> float:
 
     Parameters
     ----------
-    loop : Loop
+    loop : Loop or DelaySystem
         The loop, stable or not.
     c1, c2 : float, optional
-        Multiplicative perturbations.
+        Multiplicative perturbations of a `Loop`.
 
     Returns
     -------
@@ -128,6 +92,8 @@ def modulus_margin(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> float:
     >>> print(f"{modulus_margin(paper_loop()):.4f}")
     0.6156
     """
+    if isinstance(loop, DelaySystem):
+        return _of_functions(modulus_of, loop, c1, c2)[0]
     (modulus, _), _ = smallest_distances(LoopAt.of(loop, c1, c2))
     return float(modulus)
 
@@ -163,16 +129,16 @@ def _free_margins(
 
 
 def margins(
-    loop: Loop, c1: float = 1.0, c2: float = 1.0, free_above: float | None = None
+    loop: Loop | DelaySystem, c1: float = 1.0, c2: float = 1.0, free_above: float | None = None
 ) -> Margins:
     r"""Compute all margins of a stable loop.
 
     Parameters
     ----------
-    loop : Loop
+    loop : Loop or DelaySystem
         The loop.
     c1, c2 : float, optional
-        Multiplicative perturbations.
+        Multiplicative perturbations of a `Loop`.
     free_above : float, optional
         Angular frequency in rad/s above which the phases of both arms are taken as free, as
         they are once the arms have drifted by a fraction of the modulation's wavelength: the
@@ -226,6 +192,10 @@ def margins(
     >>> print(f"{math.degrees(margins(paper_loop()).phase):.1f} degrees")
     36.0 degrees
     """
+    if isinstance(loop, DelaySystem):
+        if free_above is not None:
+            raise TypeError(f"free_above is for a Loop and its arms, got {free_above}")
+        return _of_functions(margins_of, loop, c1, c2)
     point = LoopAt.of(loop, c1, c2)
     highest = np.inf if free_above is None else positive_number("free_above", free_above)
     require_stable(point, highest)

@@ -42,6 +42,8 @@ from armlock.checks import (
     check_memory,
     real_number,
 )
+from armlock.delays import DelaySystem
+from armlock.engine import decide
 from armlock.loops import power_series
 from armlock.stability.bounds import last_frequency
 
@@ -141,8 +143,17 @@ def _count(
     return counts
 
 
+def _count_closed(loop: DelaySystem) -> int:
+    """Count the unstable roots of 1 + L."""
+    n, m = loop.functions
+    try:
+        return decide.count(n + m, loop.common)
+    except decide.UndecidedError as error:
+        raise CountError(f"no count: {error}", np.empty((0, 2))) from None
+
+
 def unstable_roots(
-    system: CharacteristicFunction,
+    system: CharacteristicFunction | DelaySystem,
     x: npt.ArrayLike | None = None,
     y: npt.ArrayLike | None = None,
 ) -> IntArray:
@@ -150,11 +161,11 @@ def unstable_roots(
 
     Parameters
     ----------
-    system : CharacteristicFunction
-        The loop, for instance `CommonArm()`.
+    system : CharacteristicFunction or DelaySystem
+        The loop, for instance `CommonArm()`; of a `DelaySystem` L the closed loop 1 + L.
     x, y : array_like of float, optional
         The free parameters; they broadcast. Those of a loop, c1 and c2, are one if they are not
-        given; others have to be.
+        given; others have to be. A `DelaySystem` has none.
 
     Returns
     -------
@@ -203,6 +214,10 @@ def unstable_roots(
     >>> unstable_roots(CommonArm(), [0.9, 0.5, 1.0], [1.05, 1.6, 1.0])
     array([ 0,  5, -1])
     """
+    if isinstance(system, DelaySystem):
+        if x is not None or y is not None:
+            raise TypeError(f"a DelaySystem has no free parameters, got {x!r} and {y!r}")
+        return np.array(_count_closed(system))
     xs, ys = broadcast_parameters(system, x, y)
     return _count(system, xs.ravel(), ys.ravel()).reshape(xs.shape)
 

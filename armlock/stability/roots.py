@@ -26,6 +26,8 @@ from armlock.checks import (
     real_number,
     whole_number,
 )
+from armlock.delays import DelaySystem
+from armlock.engine.roots import RootError, rightmost_zero
 from armlock.stability.bounds import last_frequency
 from armlock.stability.counts import BOUNDARY, CountError, unstable_roots
 
@@ -65,29 +67,6 @@ _SLOWEST = 1e-9
 _VANISHED = 600.0
 # Digits that extended precision keeps besides those that are asked for.
 _GUARD_DIGITS = 40
-
-
-class RootError(RuntimeError):
-    """No root could be certified as the rightmost one; `estimate` is the best candidate.
-
-    Examples
-    --------
-    >>> from armlock import CommonArm, RootError, rightmost_root
-    >>> try:
-    ...     root = rightmost_root(CommonArm(), 1.01, 1.0)
-    ... except RootError as error:
-    ...     root = error.estimate
-    >>> print(f"{root.real:.2e}")
-    2.43e-04
-    """
-
-    def __init__(self, message: str, estimate: complex) -> None:
-        super().__init__(message)
-        self.estimate = estimate
-
-    def __reduce__(self) -> tuple[type[RootError], tuple[str, complex]]:
-        """Pickle the estimate along, so that the error passes from process to process."""
-        return type(self), (str(self), self.estimate)
 
 
 def extended_root(
@@ -383,7 +362,7 @@ def _rightmost(system: CharacteristicFunction, x: float, y: float) -> complex:
 
 @overload
 def rightmost_root(
-    system: CharacteristicFunction, x: float | None = None, y: float | None = None
+    system: CharacteristicFunction | DelaySystem, x: float | None = None, y: float | None = None
 ) -> complex: ...
 
 
@@ -394,7 +373,7 @@ def rightmost_root(
 
 
 def rightmost_root(
-    system: CharacteristicFunction,
+    system: CharacteristicFunction | DelaySystem,
     x: npt.ArrayLike | None = None,
     y: npt.ArrayLike | None = None,
 ) -> complex | ComplexArray:
@@ -402,8 +381,8 @@ def rightmost_root(
 
     Parameters
     ----------
-    system : CharacteristicFunction
-        The loop, for instance `CommonArm()`, or a map.
+    system : CharacteristicFunction or DelaySystem
+        The loop, for instance `CommonArm()`, or a map; of a `DelaySystem` L the closed loop.
     x, y : array_like of float, optional
         The free parameters; they broadcast. Those of a loop, c1 and c2, are one if they are not
         given; others have to be.
@@ -448,6 +427,11 @@ def rightmost_root(
     >>> print(f"{root:.10f}")
     -0.3181315052+1.3372357014j
     """
+    if isinstance(system, DelaySystem):
+        if x is not None or y is not None:
+            raise TypeError(f"a DelaySystem has no free parameters, got {x!r} and {y!r}")
+        n, m = system.functions
+        return rightmost_zero(n + m, system.common)
     xs, ys = broadcast_parameters(system, x, y)
     if xs.ndim == 0:
         return _rightmost(system, float(xs), float(ys))

@@ -5,6 +5,7 @@ decide it.
 """
 
 from armlock.timedomain.noise import LaserNoise, PerturbationNoise, ShapedNoise
+from armlock.timedomain.responses import impulse_response, step_response
 from armlock.timedomain.simulation import (
     DivergenceError,
     Simulation,
@@ -22,6 +23,8 @@ __all__ = [
     "Spectrum",
     "SpectrumEstimator",
     "amplitude_spectrum",
+    "impulse_response",
     "sampled_open_loop",
     "simulate",
+    "step_response",
 ]

@@ -10,6 +10,7 @@ from scipy.constants import speed_of_light
 from scipy.optimize import brentq
 
 from armlock.checks import FloatArray
+from armlock.engine.margins import Margins
 from armlock.loops import Loop, LoopAt, SingleArm, flight_loop
 from armlock.performance.budget import (
     LASERS,
@@ -22,7 +23,7 @@ from armlock.performance.pulling import largest_pulling, pulling
 from armlock.performance.transfer import transfer
 from armlock.robustness.discs import MODULUS, PHASE, free_margins_over
 from armlock.robustness.free_phases import arms_of
-from armlock.robustness.margins import Margins, critical_perturbation, margins
+from armlock.robustness.margins import critical_perturbation, margins
 from armlock.sensors import modified_dual
 from armlock.stability.counts import unstable_roots
 from book.companion.claims.ledger import Finding, Verdict, claim

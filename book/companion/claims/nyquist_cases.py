@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import bisect, minimize_scalar
 
+from armlock.engine.margins import Margins
 from armlock.loops import CommonArm, DualArm, Loop, SingleArm
 from armlock.paper import (
     DURATION,
@@ -18,7 +19,7 @@ from armlock.paper import (
     TAU2,
 )
 from armlock.robustness.gains import gain_interval
-from armlock.robustness.margins import Margins, margins
+from armlock.robustness.margins import margins
 from armlock.stability.counts import BOUNDARY, unstable_roots
 from armlock.stability.nyquist import AxisCrossings, NyquistCurve, axis_crossings, nyquist
 from armlock.stability.roots import rightmost_root

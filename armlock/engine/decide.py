@@ -1,0 +1,400 @@
+"""What is decided on the imaginary axis: counts, and whether a family of functions has a zero.
+
+`count` follows the argument of one function. `Family` states functions of which none may have
+a zero, up to a level; `least` finds the largest level at which none has. Both stop where double
+precision does not decide: then they say at which frequency.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numba
+import numpy as np
+
+from armlock.checks import FloatArray, IntArray
+from armlock.engine import inclusion
+from armlock.engine.functions import Function, Leading, Space, at, stacked
+from armlock.engine.inclusion import DISTANCE, Question
+
+#: What a count is where a root lies on the axis, or rounding does not decide on which side.
+BOUNDARY = -1
+#: What a count is where infinitely many roots do not stay left of the axis.
+UNCONFINED = -2
+
+# Most steps of a count, and of a search; some three seconds each.
+_MOST_STEPS = np.int64(3_000_000)
+_MOST_SEARCHED = 6_000_000
+# Steps between two looks at the keyboard.
+_A_WHILE = np.int64(100_000)
+# Points that one thread counts at a time.
+_BLOCK = 256
+# Undecided intervals after which a search ends.
+_FEW = np.int64(16)
+# Narrower intervals, as shares of their frequency, are undecided.
+_NARROWEST = 1e-14
+
+
+class UndecidedError(RuntimeError):
+    """Double precision, or the steps allowed, did not decide; `omega` is where, in rad/s."""
+
+    def __init__(self, message: str, omega: float) -> None:
+        super().__init__(message)
+        self.omega = omega
+
+
+def in_threads(function: Callable[[slice], Any], size: int, block: int) -> list[Any]:
+    """Return what a compiled function makes of the blocks of a range; Ctrl-C ends it."""
+    blocks = [slice(first, min(first + block, size)) for first in range(0, size, block)]
+    if len(blocks) == 1:
+        return [function(blocks[0])]
+    pool = ThreadPoolExecutor(numba.config.NUMBA_NUM_THREADS)
+    try:
+        return list(pool.map(function, blocks))
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+def counts(
+    space: Space,
+    steady: FloatArray,
+    delayed: FloatArray,
+    uncertain: FloatArray,
+    *,
+    leading: Leading | None = None,
+) -> IntArray:
+    """Count the zeros with positive real part of n functions (Lemma 9).
+
+    Parameters
+    ----------
+    space : Space
+        Of all functions.
+    steady, delayed, uncertain : float arrays, shapes (n, J), (n, J, K) and (n, J)
+        Weights S and W, and the error of S.
+    leading : Leading, optional
+        Of one function, with zeros at s = 0 that are not to count.
+
+    Returns
+    -------
+    int array, shape (n,)
+        BOUNDARY and UNCONFINED included.
+
+    Raises
+    ------
+    UndecidedError
+        If a count takes too many steps.
+    """
+    n = len(steady)
+    ends = 2.0 * space.confined_from(steady, delayed)
+    order, begin = (leading.order, leading.radius) if leading else (0, 0.0)
+    found = np.full(n, UNCONFINED, dtype=np.int64)
+    here = np.flatnonzero(np.isfinite(ends))
+    ends = np.maximum(ends, 2.0 * begin)
+    if not here.size:
+        return found
+
+    def some(block: slice) -> tuple[Any, ...]:
+        k = here[block]
+        result: tuple[Any, ...] = inclusion.wind_many(
+            space.arrays, steady[k], delayed[k], uncertain[k],
+            np.full(k.size, begin), ends[k], _MOST_STEPS,
+        )  # fmt: skip
+        return result
+
+    turn, first, last, undecided, steps = map(
+        np.concatenate, zip(*in_threads(some, here.size, _BLOCK), strict=True)
+    )
+    if (steps >= _MOST_STEPS).any():
+        k = int(np.argmax(steps >= _MOST_STEPS))
+        raise UndecidedError(
+            f"a count takes more than {_MOST_STEPS:.0e} steps, up to {undecided[k]:.3g} rad/s",
+            float(undecided[k]),
+        )
+    # At s = 0 all is real.
+    values = inclusion.values(space.arrays, steady[here], delayed[here], np.zeros(1))[0]
+    direction = leading.direction if leading else np.sign(values[:, 0].real)
+    still = np.sign(space.limits(steady[here], delayed[here])[0]) * 1j ** (space.degree % 4)
+    with np.errstate(all="ignore"):
+        turn = turn + np.angle(first / direction) - np.angle(last / still)
+    number = 0.5 * (space.degree - order) - turn / np.pi
+    with np.errstate(invalid="ignore"):
+        sure = np.isnan(undecided) & (np.abs(number - np.round(number)) < 1e-2)
+        found[here] = np.where(sure & (number > -0.5), np.round(number), BOUNDARY)
+    return found
+
+
+def count(function: Function, common: int = 0) -> int:
+    """Count the zeros of a function with positive real part.
+
+    Parameters
+    ----------
+    function : Function
+        With exact weights.
+    common : int, optional
+        Order of a zero at s = 0 that is not to count.
+
+    Returns
+    -------
+    int
+        BOUNDARY with another zero on the axis, or where rounding does not decide; UNCONFINED.
+    """
+    leading = function.leading()
+    steady, delayed = stacked([function])
+    if leading is None or leading.order > common:
+        confined = np.isfinite(function.space.confined_from(steady, delayed)[0])
+        return BOUNDARY if confined else UNCONFINED
+    exact = np.zeros_like(steady)
+    begin = leading if leading.order else None
+    return int(counts(function.space, steady, delayed, exact, leading=begin)[0])
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """Functions of which none has a zero if one test holds at each frequency.
+
+    Attributes
+    ----------
+    functions : sequence of Function
+        Of one space.
+    tests : sequence of tests
+        Each a sequence of members (kind, weights, slopes): a vertex (1) or a term of any phase
+        (2), the combination of the functions with weights + level slopes. A test holds where
+        zero is in no convex combination of the vertices, whatever the terms add.
+    arc : tuple of tuples, optional
+        One more test: f_0 + exp(j psi) f_1 with psi from a + b omega to c + d omega;
+        (a, b, c, d), and their slopes in the level.
+    """
+
+    functions: Sequence[Function]
+    tests: Sequence[Sequence[tuple[int, Sequence[float], Sequence[float]]]]
+    arc: tuple[tuple[float, ...], tuple[float, ...]] | None = None
+
+    @property
+    def space(self) -> Space:
+        """The space of the functions."""
+        return self.functions[0].space
+
+    def question(self) -> Question:
+        """Return the family as compiled functions take it."""
+        shape = len(self.tests), max(map(len, self.tests))
+        kind = np.zeros(shape, np.int64)
+        weights = np.zeros((*shape, len(self.functions)), np.complex128)
+        slopes = np.zeros_like(weights)
+        for i, test in enumerate(self.tests):
+            for n, member in enumerate(test):
+                kind[i, n], weights[i, n], slopes[i, n] = member
+        arc = np.zeros((0, 4)) if self.arc is None else np.array(self.arc, np.float64)
+        return Question(kind, weights, slopes, arc)
+
+    def _members(
+        self, test: Sequence[tuple[int, Sequence[float], Sequence[float]]], level: float
+    ) -> tuple[list[Function], list[Function]]:
+        """Return vertices and terms of a test."""
+        found: tuple[list[Function], list[Function]] = [], []
+        for kind, weights, slopes in test:
+            member = self.functions[0] * 0
+            for f, a, b in zip(self.functions, weights, slopes, strict=True):
+                member = member + f * (Fraction(a) + Fraction(b) * Fraction(level))
+            found[kind - 1].append(member)
+        return found
+
+    def begins(self, level: float) -> float:
+        """Frequency up to which a test holds by leading terms at s = 0 (Lemma 10), or zero."""
+        share, best = 1e-8, 0.0
+        for test in self.tests:
+            vertices, terms = self._members(test, level)
+            leads = [f.leading(share) for f in vertices]
+            others = [lead for f in terms if (lead := f.leading(share))]
+            known = [lead for lead in leads if lead]
+            middle = sum(lead.direction for lead in known) / len(leads)
+            if len(known) < len(leads) or abs(middle) < 0.5:
+                continue
+            turned = [(lead.direction * np.conj(middle)).real / abs(middle) for lead in known]
+            room, radius = min(turned) - 4.0 * share, min(lead.radius for lead in known)
+            for a in known:
+                for b in others:
+                    ratio = abs(float(b.coefficient / a.coefficient)) * len(others) / room
+                    radius, power = min(radius, b.radius), b.order - a.order
+                    if power < 0 or (power == 0 and ratio >= 1.0 - 4.0 * share):
+                        radius = 0.0
+                    elif power > 0 and ratio:
+                        radius = min(radius, (1.0 - 4.0 * share) * ratio ** (-1.0 / power))
+            best = max(best, radius)
+        return best
+
+    def ends(self, level: float) -> float:
+        """Frequency past which a test holds, because one term exceeds all others (Lemma 9)."""
+        found = [np.inf]
+        for test in self.tests:
+            vertices, terms = self._members(test, level)
+            steady, delayed = stacked(vertices)
+            whole, _ = self.space.limits(steady, delayed)
+            if (whole > 0.0).any() and (whole < 0.0).any():
+                continue
+            size = sum(
+                (abs(s - w.sum(1)) + abs(w).sum(1) for s, w in (f.weights for f in terms)),
+                np.zeros(steady.shape[1]),
+            )
+            tops = (self.space.limits(*f.weights) for f in terms)
+            top = float(sum(abs(still) + abs(turned).sum() for still, turned in tops))
+            ends = self.space.confined_from(steady, delayed, size, top_terms=top)
+            found.append(float(ends.max()))
+        if self.arc is not None and self.arc[0][3] == self.arc[1][3] == 0.0:
+            found.append(self._arc_ends(self.arc[0][2] + level * self.arc[1][2]))
+        return min(found)
+
+    def _arc_ends(self, angle: float) -> float:
+        """Do what `ends` does for an arc around zero: abs(1 + c exp(j psi)) is monotonic."""
+        if angle >= np.pi:
+            return np.inf
+        (n, m), (wn, wm) = stacked(self.functions[:2])
+        turns = np.exp(1j * np.array([0.0, angle]))[:, None]
+        steady = (n - wn.sum(1)) + turns * (m - wm.sum(1))
+        parts = np.abs(wn) + np.abs(wm)
+        # All that turns, as terms; and what the sum at other angles may have more.
+        more = np.abs(n - wn.sum(1)) + np.abs(m - wm.sum(1))
+        return float(
+            self.space.confined_from(
+                steady, np.zeros((2, *parts.shape)), parts.sum(1), extra=more
+            ).max()
+        )
+
+
+class _Search:
+    """A family, and how it is walked."""
+
+    def __init__(self, family: Family, goal: int) -> None:
+        space = family.space
+        self.family, self.goal, self.steps = family, goal, 0
+        self.fixed = (space.arrays, *stacked(family.functions))
+        self.question = family.question()
+
+    def run(
+        self, pending: FloatArray, best: float, where: float, start: float, tolerance: float
+    ) -> tuple[float, float, FloatArray]:
+        """Walk over intervals, the last first; return the best, where, and what is left."""
+        undecided = np.zeros((0, 2))
+        while len(pending) and len(undecided) < _FEW:
+            pending, more, best, where, steps = inclusion.walk(
+                *self.fixed, self.question, np.ascontiguousarray(pending), self.goal,
+                best, where, start, tolerance, _NARROWEST, _A_WHILE, _FEW,
+            )  # fmt: skip
+            undecided = np.concatenate((undecided, more))
+            self.steps += steps
+            if self.steps > _MOST_SEARCHED:
+                omega = float(pending[-1, 0])
+                raise UndecidedError(
+                    f"a search takes more than {_MOST_SEARCHED:.0e} steps, at {omega:.3g}"
+                    " rad/s",
+                    omega,
+                )
+        return best, where, undecided
+
+
+def least(
+    family: Family,
+    goal: int,
+    best: float = np.inf,
+    where: float = np.nan,
+    *,
+    start: float = 0.0,
+    tolerance: float = 1e-6,
+) -> tuple[float, float]:
+    """Find the largest level up to which no function of a family has a zero.
+
+    Parameters
+    ----------
+    family : Family
+        Whose members at a smaller level are among those at a larger one.
+    goal : int
+        What is looked for, of `armlock.engine.inclusion`.
+    best, where : float, optional
+        A level that is known to have a zero, and at which frequency; inf, nan.
+    start : float, optional
+        A level without a zero.
+    tolerance : float, optional
+        No zero has a level below start + (best - start) (1 - tolerance).
+
+    Returns
+    -------
+    tuple of two floats
+        The level in rad, s or without a unit, and the frequency in rad/s.
+
+    Raises
+    ------
+    UndecidedError
+        If double precision, or the steps allowed, do not decide it.
+    """
+    search = _Search(family, goal)
+    spaces, level = family.space, min(best, 1e300)
+    begin = family.begins(level)
+    floor = begin or 1e-4 * spaces.corners[0]
+    end = family.ends(level)
+    ceiling = end if np.isfinite(end) else 1e4 * spaces.corners[-1]
+    likely = _likely(family, goal, floor, max(ceiling, 2.0 * floor), start)
+    best, where, _ = search.run(likely, best, where, start, tolerance)
+    level = start + (best - start) * (1.0 - tolerance)
+    if np.isfinite(level):
+        begin, end = family.begins(level), family.ends(level)
+    if not begin > 0.0:
+        raise UndecidedError("the behaviour at s = 0 is not decided", 0.0)
+    if not np.isfinite(end):
+        raise UndecidedError("the behaviour at high frequency is not decided", np.inf)
+    if end <= begin:
+        return best, where
+    edges = np.geomspace(begin, end, int(200 * np.log10(end / begin)) + 2)
+    edges[0], edges[-1] = begin, end
+    cover = np.column_stack((edges[:-1], edges[1:]))
+    order = np.argsort(np.modf(np.arange(len(cover)) * 0.6180339887498949)[0])
+    best, where, left = search.run(cover[order], best, where, start, tolerance)
+    if len(left):
+        omega = float(left[0, 0])
+        raise UndecidedError(f"rounding does not decide at {omega:.6g} rad/s", omega)
+    return best, where
+
+
+def _likely(family: Family, goal: int, low: float, high: float, start: float) -> FloatArray:
+    """Intervals of a sample that look best: only what is looked at first depends on them."""
+    space = family.space
+    decades = np.geomspace(low, high, 500)
+    grids = [decades]
+    if space.longest:
+        # One turn of the longest delay at each frequency, and the first hundred turns.
+        point = np.arange(16) * (2.0 * np.pi / (16.0 * space.longest))
+        grids += [np.add.outer(decades, point).ravel(), point[1] * np.arange(1, 1600)]
+    for root in set(space.arrays.roots[space.arrays.present].tolist()):
+        if root.imag > 0.0:
+            off = max(abs(root.real), 1e-9 * root.imag) * np.geomspace(1e-2, 1e3, 24)
+            grids += [root.imag - off, root.imag + off]
+    omega = np.unique(np.concatenate(grids))
+    omega = omega[(omega >= low) & (omega <= high)]
+    if omega.size < 3:
+        return np.array([[low, high]])
+    f, g = at(family.functions[:2], omega)
+    with np.errstate(all="ignore"):
+        if goal == DISTANCE:
+            value = np.abs(f / g)
+            k = 1 + np.argsort(value[1:-1])[:8]
+            spans = np.column_stack((omega[k - 1], omega[k + 1]))
+        else:
+            if goal == inclusion.REAL:
+                crossing, value = (f * g.conj()).imag, -(g / f).real
+            else:
+                crossing, angle = np.abs(f) - np.abs(g), np.angle(-f / g)
+                value = (
+                    np.abs(angle) if goal == inclusion.PHASE else angle % (2 * np.pi) / omega
+                )
+            k = np.flatnonzero((crossing[1:] < 0.0) != (crossing[:-1] < 0.0))
+            share = crossing[k] / (crossing[k] - crossing[k + 1])
+            rough = value[k] + share * (value[k + 1] - value[k])
+            if goal == inclusion.REAL:
+                rough = np.where(rough > 0.0, 1.0 / rough, np.inf)
+            rough = np.where(rough > start, rough, np.inf)
+            k = k[np.argsort(rough)][:60]
+            spans = np.column_stack((omega[k], omega[k + 1]))
+    # The best last: the last interval is walked first.
+    return spans[::-1]
