@@ -39,7 +39,7 @@ INFINITY, LINEAR = 1e6, 0.01
 
 
 def use_style() -> None:
-    """Use the book's matplotlib style from here on."""
+    """Use the book's style for all matplotlib figures that follow."""
     plt.style.use(Path(__file__).with_name("armlock.mplstyle"))
 
 
