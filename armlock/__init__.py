@@ -17,7 +17,7 @@ The calls that matter most:
 - ``nyquist(loop, omega_max=10.0)`` is the Nyquist curve with its encirclements of -1.
 - ``simulate(loop, noise)`` is the frequency noise of the locked laser, in Hz, from that of
   the free laser, such as ``LaserNoise(seed=1).draw(20_000)``.
-- ``amplitude_spectrum(series, sample_rate)`` estimates a spectrum with its confidence band.
+- ``amplitude_spectrum(series, sample_rate)`` estimates an amplitude spectral density.
 - ``noise_budget(loop, frequency)`` is the noise of the locked laser, source by source.
 
 Angular frequencies are in rad/s, frequencies in Hz, and delays in s. The first call of a

@@ -43,7 +43,7 @@ def positive_number(name: str, value: object) -> float:
 def whole_number(name: str, value: object, lowest: int) -> int:
     """Return a Python or NumPy integer that is no smaller than a bound, or raise."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < lowest:
-        raise ValueError(f"{name} must be an integer from {lowest} on, got {value!r}")
+        raise ValueError(f"{name} must be an integer of at least {lowest}, got {value!r}")
     return int(value)
 
 
@@ -63,7 +63,7 @@ def one_of(name: str, value: object, allowed: Collection[str]) -> str:
 
 
 def whole_steps(name: str, delay: float, step: float) -> int:
-    """Return delay / step, or raise if it is not a whole number but for rounding."""
+    """Return delay / step, or raise if it is not a whole number (apart from rounding)."""
     steps = delay / step
     allowed = min(_OFF_A_DELAY * steps, _OFF_A_STEP)
     if not steps < 1e15 or abs(steps - round(steps)) > allowed:

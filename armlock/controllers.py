@@ -387,7 +387,7 @@ def roll_off(first: float, last: float, pairs: int, slope: float = 2.0 / 3.0) ->
     ------
     TypeError, ValueError
         If `first` or the slope is not positive, `last` is not above `first`, the slope is not
-        below one, or `pairs` is no whole number from one on.
+        below one, or `pairs` is not a positive whole number.
 
     Examples
     --------

@@ -39,7 +39,7 @@ INFINITY, LINEAR = 1e6, 0.01
 
 
 def use_style() -> None:
-    """Use the book's matplotlib style from here on."""
+    """Use the book's style for all matplotlib figures that follow."""
     plt.style.use(Path(__file__).with_name("armlock.mplstyle"))
 
 
@@ -164,10 +164,8 @@ def _label_regions(ax: Axes, chart: StabilityChart) -> None:
 
 def label_parameters(ax: Axes, parameters: tuple[str, str]) -> None:
     """Label both axes with the names of two parameters, of one letter as symbols."""
-    # The perturbations of a loop are numbers; of other parameters the unit is not known here.
-    unit = " [1]" if parameters == ("c1", "c2") else ""
     x, y = map(_written, parameters)
-    ax.set(xlabel=f"{x}{unit}", ylabel=f"{y}{unit}")
+    ax.set(xlabel=x, ylabel=y)
 
 
 def _written(name: str) -> str:
@@ -225,10 +223,10 @@ def plot_nyquist(
     curve : NyquistCurve
         From `nyquist` with `omega_max`, so that its samples are close.
     ax : Axes, optional
-        Where to draw; matplotlib's current axes by default, or new polar ones. Polar axes show
-        every direction as it is and compress the distance from the origin, which is linear up
-        to 0.01 and logarithmic beyond, as far as the circle that stands for infinity. Other
-        axes show the plain complex plane, without the infinite branch.
+        Where to draw. By default, the current axes of matplotlib, or new axes that show the
+        neighbourhood of -1. Plain axes do not show the infinite branch. Polar axes show the
+        whole curve: the angle is that of L, and the distance from the origin is linear up to
+        0.01 and logarithmic beyond, up to a circle that stands for infinity.
     arrows : iterable of float, optional
         Frequencies in rad/s at which an arrow points in the direction of rising omega; past
         the end of the curve it stands there.
@@ -251,10 +249,12 @@ def plot_nyquist(
     >>> from armlock import SingleArm, nyquist
     >>> ax = nyquist(SingleArm(), omega_max=1.0).plot(plt.figure().subplots())
     >>> ax.get_xlabel()
-    'Re $L$ [1]'
+    'real part of $L$'
     """
     if ax is None:
-        ax = plt.gca() if plt.gcf().axes else plt.subplot(projection="polar")
+        ax = plt.gca()
+        if not ax.has_data():
+            ax.set(xlim=(-3.0, 3.0), ylim=(-3.0, 3.0), aspect="equal")
     compressed = isinstance(ax, PolarAxes)
     drawn = curve.omega <= omega_max
     forward, omega = curve.response[drawn], curve.omega[drawn]
@@ -284,7 +284,7 @@ def plot_nyquist(
     else:
         ax.axhline(0.0, color="black", linewidth=0.6)
         ax.axvline(0.0, color="black", linewidth=0.6)
-        ax.set(xlabel="Re $L$ [1]", ylabel="Im $L$ [1]")
+        ax.set(xlabel="real part of $L$", ylabel="imaginary part of $L$")
     return ax
 
 

@@ -11,7 +11,6 @@ MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path != PACKAGE / "__
 LAYERS = [
     "checks",
     "paper",
-    "progress",
     "axis",
     "engine",
     "controllers",

@@ -35,7 +35,7 @@ def test_the_shaded_region_is_the_stable_one(ax, chart):
     (image,) = ax.images
     np.testing.assert_array_equal(~np.ma.getmaskarray(image.get_array()), chart.stable)
     assert image.cmap(0) == to_rgba(plotting.STABLE)
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$c_{1}$ [1]", "$c_{2}$ [1]")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$c_{1}$", "$c_{2}$")
 
 
 def test_large_counts_share_a_colour_and_boundary_points_have_none(ax, chart):
@@ -124,9 +124,11 @@ def test_polar_axes_keep_directions_and_end_at_infinity():
     assert branch == pytest.approx(plotting.INFINITY)
     assert figures.drawn(figure) == {}
     plt.close(figure)
-    # Without any axes, polar ones are made.
+    # Without any axes, the neighbourhood of -1 is shown.
     plt.figure()
-    assert curve.plot().name == "polar"
+    ax = curve.plot()
+    assert ax.name == "rectilinear"
+    assert ax.get_xlim() == (-3.0, 3.0)
     plt.close()
 
 

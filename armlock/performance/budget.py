@@ -74,8 +74,8 @@ def cavity(frequency: FloatArray) -> FloatArray:
 def mach_zehnder(frequency: FloatArray) -> FloatArray:
     """Return the noise of a laser stabilised to a Mach-Zehnder interferometer in Hz/sqrt(Hz).
 
-    Two readouts of 1 pm/sqrt(Hz), over a path difference of 0.5 m; as the source has it in
-    Sec. 2.5 but for its loop, of 20 Hz, which gives the free-running laser back above.
+    Two readouts of 1 pm/sqrt(Hz), over a path difference of 0.5 m (Sec. 2.5 of the source).
+    The source's loop has a bandwidth of 20 Hz, which is left out here.
     """
     return 800.0 * np.sqrt(1.0 + (2.8e-3 / frequency) ** 4)
 

@@ -28,7 +28,7 @@ _DAMPED = 20.0
 _SMOOTHED = 3.0
 # A series of duration T gives the times from T / 64 to T, to 4e-4 of themselves.
 _RATIO = 64.0
-# `largest_pulling` looks from 1 s on, over ten round trips, an hour and twenty days.
+# `largest_pulling` searches these times, from 1 s to twenty days.
 _EARLIEST, _ROUND_TRIPS, _SPANS = 1.0, 10.0, (3600.0, 1728e3)
 
 
@@ -140,7 +140,7 @@ def _error(name: str, values: Sequence[float]) -> FloatArray:
 
 
 def _series(loop: Loop, duration: float, errors: Errors) -> tuple[FloatArray, FloatArray]:
-    """Return times from zero on and the laser's frequency at these times."""
+    """Return times, beginning with zero, and the frequency of the laser at these times."""
     step = 2.0 * duration / _SAMPLES
     shift = _DAMPED / (2.0 * duration)
     omega = 2.0 * np.pi * np.fft.rfftfreq(_SAMPLES, step)

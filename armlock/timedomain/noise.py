@@ -236,7 +236,7 @@ class ShapedNoise:
         Raises
         ------
         ValueError
-            If `samples` is not a whole number from zero on, or `size` not one from one on.
+            If `samples` is not a whole number or negative, or `size` is not a positive one.
         """
         samples, size = whole_number("samples", samples, 0), whole_number("size", size, 1)
         return (self.draw(min(size, samples - at)) for at in range(0, samples, size))
@@ -271,11 +271,11 @@ class LaserNoise(ShapedNoise):
 
     Notes
     -----
-    A 1/f density falls until half the sample rate, where the trapezoidal rule alone would
-    give none at all. Zeros at 2.37 and 7.87 and a pole at 6.03 times the sample rate, in
-    rad/s, make up for that, but for 0.02 percent at a tenth of the sample rate (20 Hz at
-    200 Hz), 0.7 percent at a quarter and 1.6 percent at most up to half of it.
-    That holds for cutoffs far below the sample rate; `sampled_asd` is exact for all.
+    At half the sample rate the trapezoidal rule alone would give a density of zero. Zeros at
+    2.37 and 7.87 and a pole at 6.03 times the sample rate, in rad/s, correct this. The
+    remaining error is 0.02 percent at a tenth of the sample rate (20 Hz at 200 Hz), 0.7
+    percent at a quarter, and 1.6 percent at most. These numbers are for cutoffs far below the
+    sample rate; `sampled_asd` is exact for all.
 
     Examples
     --------

@@ -95,7 +95,7 @@ def drawn(figure: Figure) -> dict[str, npt.NDArray[np.float64]]:
             y = low + (high - low) * (rows + 0.5) / values.shape[0]
             places = np.meshgrid(x, y)
             columns[f"{panel}chart, {across}"], columns[f"{panel}chart, {up}"] = places
-            columns[f"{panel}chart, colour [1]"] = values[np.ix_(rows, cells)]
+            columns[f"{panel}chart, colour"] = values[np.ix_(rows, cells)]
     return {name: np.ravel(column) for name, column in columns.items()}
 
 

@@ -65,21 +65,6 @@ def charts(points: int = 401) -> tuple[StabilityChart, StabilityChart, Stability
     return exact, maps[0], maps[1]
 
 
-def stable_by_magnitude(chart: StabilityChart) -> float:
-    """Share of a chart's stable points at which magnitudes alone exclude a crossing.
-
-    There |c1 + c2 exp(j omega (tau1 - tau2))| < |2 + j omega / g| for every omega, whatever
-    the phase the two delays have in common.
-    """
-    row, column = np.nonzero(chart.stable)
-    c1, c2 = chart.x[column], chart.y[row]
-    excluded = np.abs(c1 + c2) < 2.0
-    for omega in np.linspace(0.0, 4.0 * ARM.gain * WINDOW, 561)[1:]:
-        common = 2.0 * c1 * c2 * np.cos(omega * (ARM.tau1 - ARM.tau2))
-        excluded &= c1**2 + c2**2 + common < 4.0 + (omega / ARM.gain) ** 2
-    return float(excluded.mean())
-
-
 def straight_edge() -> tuple[float, float]:
     """Return c1 at both ends of the part of c1 + c2 = 2 that bounds the stable region."""
     left, right = (
@@ -248,12 +233,6 @@ def excess(system: CharacteristicFunction, x: float, y: float) -> float:
     return float(np.expm1(rightmost_root(system, x, y).real * system.step))
 
 
-def balanced_perturbation(system: CharacteristicFunction) -> float:
-    """Value of c1 = c2 at which the map has the eigenvalue one."""
-    line = d_curve_line(system)
-    return line.value / (line.weight_x + line.weight_y)
-
-
 class MapErrors(NamedTuple):
     """Errors of a map against the exact loop.
 
@@ -313,15 +292,6 @@ def convergence(order: int) -> tuple[FloatArray, FloatArray]:
     """
     found = [errors_of(semi_discretization(ARM, step, order)) for step in STEPS]
     return np.array([e.roots[1] for e in found]), np.array([abs(e.boundary) for e in found])
-
-
-@cache
-def lower_edge_errors() -> FloatArray:
-    """Distance along c1 = c2 < 0 of the boundary of order 0 from the exact, over `STEPS`."""
-    down = np.full((2, 1), -np.sqrt(0.5))
-    exact = boundary_radius(ARM, down)
-    maps = (semi_discretization(ARM, step) for step in STEPS)
-    return np.array([abs(boundary_radius(m, down) - exact)[0] for m in maps])
 
 
 # Claims ------------------------------------------------------------------------------------

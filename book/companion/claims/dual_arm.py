@@ -27,9 +27,8 @@ from armlock.paper import (
 )
 from armlock.robustness.gains import gain_interval
 from armlock.robustness.rays import Crossing, first_crossing
-from armlock.stability.counts import BOUNDARY, stability_chart, unstable_roots
+from armlock.stability.counts import unstable_roots
 from armlock.stability.dcurve import d_curve, d_curve_line
-from armlock.stability.roots import rightmost_root
 from armlock.stability.semidiscretization import semi_discretization
 from book.companion.claims.common_arm import log_slope
 from book.companion.claims.ledger import PRINTED, Finding, Verdict, Weight, claim
@@ -49,10 +48,6 @@ ABOVE = ((1.0, 1.0 + PERTURBATION), (1.001, 1.002), (1.1, 1.105))
 BELOW = ((0.999, 1.0), (0.9, 0.905))
 #: Point at which the printed open loop is compared with the derived one.
 PRINTED_AT = (1.01, 0.98)
-#: Points of both kinds at which every verdict is taken twice.
-POINTS = ((0.95, 0.955), (1.0, 1.005), (1.0, 0.995), (1.0, 1.03), (1.2, 1.21), (1.3, 1.31))
-
-
 # Edges of the stable region -----------------------------------------------------------------
 
 
@@ -109,47 +104,6 @@ def edges(
     return Edges(upper.position - 0.5, upper.omega, far.position)
 
 
-def corner_sweep(gain: float, corners: FloatArray, difference: float | None = None) -> Edges:
-    """Sweep `edges` over corner frequencies in rad/s, each field an array."""
-    return Edges(*np.transpose([edges(gain, float(p), difference) for p in corners]))
-
-
-def corner_estimate(
-    gain: npt.ArrayLike, periods: int, corner: float = DUAL_SENSOR_CORNER
-) -> Any:
-    """Estimate the upper end of the straight edge at high gain, as c - 1.
-
-    Parameters
-    ----------
-    gain : array_like of float
-        In rad/s.
-    periods : int
-        The delay difference in periods: 1 near 5 Hz, where the delayed signals come back with
-        the wrong sign and the frequency is off by half a turn of the mean delay; 2 near 10 Hz.
-    corner : float, optional
-        p in rad/s.
-    """
-    omega = periods * ONE_PERIOD
-    off = 0.0 if periods % 2 == 0 else 0.5 * np.pi * FULL_DIFFERENCE / MEAN_DELAY
-    share = corner**2 / (corner**2 + omega**2)
-    detuned = 0.5 * off**2 - share * off / (2.0 * np.pi * periods)
-    return omega**2 / (8.0 * np.asarray(gain) ** 2) + detuned
-
-
-def width_estimate(common: npt.ArrayLike) -> Any:
-    """Estimate c2 - c1 at the far edge, for a high gain and frequencies far below p.
-
-    Parameters
-    ----------
-    common : array_like of float
-        (c1 + c2) / 2.
-    """
-    # 2 exp(j x) = c + j d / (x ratio), with x = omega times the mean delay.
-    cosine = 0.5 * np.asarray(common, dtype=float)
-    ratio = FULL_DIFFERENCE / MEAN_DELAY
-    return 2.0 * ratio * np.arccos(cosine) * np.sqrt(1.0 - cosine**2)
-
-
 @shared
 def top_of_strip(gain: float, low: float = WINDOW[0]) -> tuple[FloatArray, FloatArray]:
     """Trace the far and the upper edge of the strip, from c1 + c2 = 2 low up to 2.4.
@@ -183,27 +137,6 @@ def window_area(gain: float) -> float:
     # Both c1 = common - d / 2 and c2 = common + d / 2 are to be inside.
     length = np.minimum(top, high - 0.5 * difference) - (low + 0.5 * difference)
     return float(np.trapezoid(np.clip(length, 0.0, None), difference))
-
-
-@shared
-def chart_area(gain: float, points: int = 401) -> float:
-    """Area as `window_area` has it, from a chart of counts: a second opinion."""
-    axis = np.linspace(*WINDOW, points)
-    # Cells centred on the points, half of them outside the window at its edges.
-    weight = np.full(points, axis[1] - axis[0])
-    weight[[0, -1]] *= 0.5
-    counts = stability_chart(DualArm(gain), axis, axis).counts
-    # Half of a cell that the straight edge cuts is stable.
-    inside = np.where(counts == BOUNDARY, 0.5 * (axis[:, None] + axis < 2.0), counts == 0)
-    return float(weight @ inside @ weight)
-
-
-@cache
-def area_excess() -> tuple[FloatArray, FloatArray]:
-    """Return gains, and the area in the window beyond what is left at the highest gain."""
-    gains = np.logspace(1.7, 2.5, 5)
-    least = window_area(float(GAINS[-1]))
-    return gains, np.array([window_area(float(gain)) - least for gain in gains])
 
 
 @shared
@@ -273,17 +206,6 @@ def printed_deviation(c1: float, c2: float, *, restored: bool = False) -> tuple[
     around = best + (grid[1] - grid[0]) * np.array([-1.0, 1.0])
     found = minimize_scalar(lambda x: -float(off(x)), bounds=tuple(around), method="bounded")
     return -float(found.fun), float(np.exp(found.x))
-
-
-@shared
-def stable_both_ways() -> tuple[tuple[int, float], ...]:
-    """Count and real part of the rightmost root in 1/s at each of `POINTS`."""
-    loop = DualArm()
-    found = []
-    for point in POINTS:
-        root = complex(np.asarray(rightmost_root(loop, *point)))
-        found.append((int(unstable_roots(loop, *point)), root.real))
-    return tuple(found)
 
 
 @cache

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import bisect, minimize_scalar
@@ -41,23 +40,6 @@ FACTORS = np.logspace(-4.0, 3.0, 15)
 SIZES = np.geomspace(1e-6, 1e-2, 13)
 #: Sizes at which all its margins are compared: up to that of the paper's example.
 SMALL = (PERTURBATION, 1e-5, 1e-4, 5e-3)
-
-
-class Panel(NamedTuple):
-    """One panel of the paper's Fig. 7: what is drawn, and the loop and point behind it."""
-
-    name: str
-    loop: Loop
-    point: tuple[float, float]
-
-
-#: The four panels, in the paper's order.
-PANELS = (
-    Panel("a  single arm, $c_1 = 1$", SINGLE, (1.0, 1.0)),
-    Panel("b  single arm, $c_1 = 1.001$", SINGLE, SINGLE_POINT),
-    Panel("c  dual arm, (1, 1)", DUAL, (1.0, 1.0)),
-    Panel("d  dual arm, (1, 0.995)", DUAL, DUAL_POINT),
-)
 
 
 def rightmost_of_loop(loop: Loop, c1: float, c2: float) -> complex:
