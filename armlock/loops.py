@@ -549,7 +549,7 @@ class SingleArm(Loop):
     --------
     >>> from armlock import SingleArm, unstable_roots
     >>> unstable_roots(SingleArm(gain=1.0, tau=20.1), [0.99, 1.0, 1.01], 0.0)
-    array([ 0, -1,  1])
+    array([0, 0, 1])
     """
 
     controller: Controller = field(init=False, repr=False, compare=False)
@@ -656,14 +656,13 @@ class DualArm(Loop):
         D(0) = g\, p\, (c_2 - c_1) .
 
     On the line c1 = c2 one of the two poles of L at s = 0 cancels: the root s = 0 that D has
-    there is a hidden mode, not a zero of 1 + L. A count is reported as a boundary point all
-    the same, for the mode does not decay.
+    there is a hidden mode of the actuator, not a zero of 1 + L.
 
     Examples
     --------
     >>> from armlock import DualArm, unstable_roots
     >>> unstable_roots(DualArm(gain=10.0), [1.0, 1.0, 1.0], [0.995, 1.0, 1.001])
-    array([ 1, -1,  0])
+    array([1, 0, 0])
     """
 
     controller: Controller = field(init=False, repr=False, compare=False)

@@ -95,9 +95,9 @@ def test_roots_that_cancel_at_zero_hide_no_other(seed):
     loop = Loop(controller, mapping, 2.0, 1.5, delay=float(rng.choice([0.0, 0.3])))
     if mapping is DIFFERENCE and c == 0.0:
         cancelled = integrators
-    assert unstable_roots(loop, *point) == -1
+    assert unstable_roots(loop.plain(), *point) == -1
     expected = independent.rectangle_count(loop, point[0], point[1], at_zero=cancelled)
-    assert loop_count(loop, *point) == expected
+    assert loop_count(loop, *point) == unstable_roots(loop, *point) == expected
     assert nyquist(loop, *point).closed_loop_roots == expected
 
 

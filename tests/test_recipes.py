@@ -17,7 +17,7 @@ def test_the_recipes_run_and_print_what_a_reader_expects(tmp_path):
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
-    assert lines[0] == "[ 0 -1  1]"
+    assert lines[0] == "[0 0 1]"
     assert lines[1].split()[0] == "0.5"
     assert "nan" in lines[5]
     assert lines[6] == "True"

@@ -44,7 +44,7 @@ from armlock.checks import (
 )
 from armlock.delays import DelaySystem
 from armlock.engine import decide
-from armlock.loops import power_series
+from armlock.loops import Loop, power_series
 from armlock.stability.bounds import last_frequency
 
 if TYPE_CHECKING:
@@ -172,7 +172,9 @@ def unstable_roots(
     int array, of the broadcast shape
         Number of unstable roots, multiplicity included. The point is stable, with all roots
         in the open left half-plane, where it is 0. `BOUNDARY` (-1) where a root lies on the
-        imaginary axis, or nearer to it than rounding can tell. The rounding of the phase
+        imaginary axis, or nearer to it than rounding can tell. Of a `Loop` these are the roots
+        of the closed loop: a root s = 0 that D has because numerator and denominator of L
+        cancel there is none. ``loop.plain()`` counts the roots of D. The rounding of the phase
         omega tau is the largest: a point within some 8 EPSILON omega tau of the boundary,
         relative to its parameters, may be given as -1 (4e-10 where a root crosses at 1e4 rad/s,
         with 20 s). `UNCONFINED` (-2) where the neutral root chain is not confined to the left
@@ -212,14 +214,24 @@ def unstable_roots(
     --------
     >>> from armlock import CommonArm, unstable_roots
     >>> unstable_roots(CommonArm(), [0.9, 0.5, 1.0], [1.05, 1.6, 1.0])
-    array([ 0,  5, -1])
+    array([0, 5, 0])
+
+    At (1, 1) the pole of L at s = 0 cancels. D keeps a root there:
+
+    >>> int(unstable_roots(CommonArm().plain(), 1.0, 1.0))
+    -1
     """
     if isinstance(system, DelaySystem):
         if x is not None or y is not None:
             raise TypeError(f"a DelaySystem has no free parameters, got {x!r} and {y!r}")
         return np.array(_count_closed(system))
     xs, ys = broadcast_parameters(system, x, y)
-    return _count(system, xs.ravel(), ys.ravel()).reshape(xs.shape)
+    counts = _count(system, xs.ravel(), ys.ravel())
+    if isinstance(system, Loop):
+        # Where numerator and denominator of L cancel at s = 0, the loop has no root there.
+        for i in np.flatnonzero(counts == BOUNDARY):
+            counts[i] = loop_count(system, float(xs.flat[i]), float(ys.flat[i]))
+    return counts.reshape(xs.shape)
 
 
 def walk_begins(
@@ -288,9 +300,9 @@ def loop_count(
     r"""Count the loop's own roots with positive real part, at one point.
 
     Where numerator and denominator of L cancel a factor s, D = R (1 + L) has a root at s = 0
-    that comes from clearing the denominator R, and is not the loop's. `unstable_roots` counts
-    -1 there, however many roots are unstable; here that root is taken out, exactly. This is
-    so at (1, 1) for every loop with an integrator.
+    that comes from clearing the denominator R, and is not the loop's. That root is taken out
+    here, exactly, as in `unstable_roots`. This is so at (1, 1) for every loop with an
+    integrator.
 
     Parameters
     ----------
@@ -303,7 +315,7 @@ def loop_count(
     Returns
     -------
     int
-        As `unstable_roots`, which it is where nothing cancels. `BOUNDARY` (-1) remains where
+        As `unstable_roots`. `BOUNDARY` (-1) remains where
         1 + L itself is zero on the axis, or so close to it that rounding hides what it is.
 
     Raises
@@ -326,7 +338,7 @@ def loop_count(
     >>> from armlock import SingleArm, unstable_roots
     >>> from armlock.stability.counts import loop_count
     >>> loop = SingleArm(gain=50.0, tau=10.0, delay=0.05)
-    >>> int(unstable_roots(loop)), loop_count(loop)
+    >>> int(unstable_roots(loop.plain(), 1.0, 1.0)), loop_count(loop)
     (-1, 166)
     """
     if checked_system(loop).step or loop.reference != (1.0, 1.0):
@@ -415,7 +427,8 @@ def stability_chart(
     Returns
     -------
     StabilityChart
-        With `.counts` of shape (len(y), len(x)), equal to `unstable_roots` at each point.
+        With `.counts` of shape (len(y), len(x)): at each point the count of D, which is -1 on
+        the line D(0) = 0.
 
     Raises
     ------
