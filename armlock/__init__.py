@@ -14,6 +14,8 @@ The calls that matter most:
 - ``margins(loop, c1, c2)`` finds the gain, phase, delay and modulus margins of a stable loop.
 - ``critical_perturbation(loop, direction)`` is the distance from (1, 1) to instability.
 - ``rightmost_root(loop, c1, c2)`` is the root that decays slowest or grows fastest.
+- ``control.tf([1], [10, 1]) * delay(3.0)`` is a system with a dead time, for loops with any
+  number of delays, also inside the controller.
 - ``nyquist(loop, omega_max=10.0)`` is the Nyquist curve with its encirclements of -1.
 - ``simulate(loop, noise)`` is the frequency noise of the locked laser, in Hz, from that of
   the free laser, such as ``LaserNoise(seed=1).draw(20_000)``.

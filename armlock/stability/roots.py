@@ -379,6 +379,8 @@ def rightmost_root(
 ) -> complex | ComplexArray:
     r"""Return the characteristic root with the largest real part.
 
+    Of a `Loop` it is a root of D, and so 0 where a root s = 0 of D cancels in the loop.
+
     Parameters
     ----------
     system : CharacteristicFunction or DelaySystem

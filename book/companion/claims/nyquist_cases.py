@@ -44,7 +44,7 @@ SMALL = (PERTURBATION, 1e-5, 1e-4, 5e-3)
 
 def rightmost_of_loop(loop: Loop, c1: float, c2: float) -> complex:
     """Return the rightmost root of 1 + L in rad/s, leaving out a root s = 0 that only D has."""
-    if unstable_roots(loop, c1, c2) != BOUNDARY:
+    if unstable_roots(loop.plain(), c1, c2) != BOUNDARY:
         return rightmost_root(loop, c1, c2)
 
     def others(exponent: float) -> float:

@@ -433,7 +433,8 @@ def linear_controller() -> Finding:
     alters = []
     for name, controller in controllers.items():
         loop = Loop(controller * integrating_actuator(), SINGLE, TAU1, TAU1)
-        inside, edge, outside = unstable_roots(loop, sides, 0.0)
+        # Of D, which has a root s = 0 at the ideal point.
+        inside, edge, outside = unstable_roots(loop.plain(), sides, 0.0)
         if not (inside == 0 and edge == -1 and outside > 0):
             alters.append(name)
     return Finding(

@@ -71,7 +71,8 @@ def _on_edge(name: str, loop: Loop) -> bool:
     """Whether (1, 1) is on the line of s = 0, with a stable side and an unstable one."""
     line = d_curve_line(loop)
     sizes = np.array([-PERTURBATION, 0.0, PERTURBATION])
-    inside, edge, outside = unstable_roots(loop, *perturbed(name, sizes))
+    # Of D, which has a root s = 0 at (1, 1).
+    inside, edge, outside = unstable_roots(loop.plain(), *perturbed(name, sizes))
     on_line = line.weight_x + line.weight_y == line.value
     return bool(on_line and inside == 0 and edge == -1 and outside >= 1)
 
