@@ -57,5 +57,7 @@ def test_bad_parallel_branches_are_refused():
 @pytest.mark.parametrize("name", published_loops())
 def test_published_loops_are_stable_or_at_the_boundary(name):
     loop = published_loops()[name]
-    # The plain PI loops sit on the boundary at the ideal point, as every such loop does.
-    assert unstable_roots(loop, 1.0, 1.0) == {"PI": -1, "high-gain single arm": -1}.get(name, 0)
+    assert unstable_roots(loop, 1.0, 1.0) == 0
+    # D of the plain PI loops has a root s = 0 at the ideal point, as of every such loop.
+    of_d = {"PI": -1, "high-gain single arm": -1}.get(name, 0)
+    assert unstable_roots(loop.plain(), 1.0, 1.0) == of_d
