@@ -218,7 +218,7 @@ class CharacteristicFunction:
         )  # fmt: skip
 
     def basis(self) -> tuple[list[polynomials.Polynomial], list[list[Fraction]]]:
-        """Return polynomials, and the shares of them in R, B1 and B2, shape (3, polynomials)."""
+        """Return polynomials, and their shares in R, B1 and B2, shape (3, polynomials)."""
         given = [p.coefficients for p in self.polynomials()]
         made = [polynomials.Polynomial.of(p) for p in given if p.any()]
         places = np.cumsum([bool(p.any()) for p in given]) - 1
@@ -230,7 +230,7 @@ class CharacteristicFunction:
 
     @cached_property
     def terms(self) -> Terms:
-        """R and the three terms of D = C0 - x C1 - y C2, exactly, as functions of the engine."""
+        """R and the terms of D, exactly, as functions of the engine."""
         made, shares = self.basis()
         lags = [Fraction(lag) for lag in (0.0, self.delay, self.tau1, self.tau2)]
         powers = [[(Fraction(1), Fraction(0))]] * 3
