@@ -85,7 +85,7 @@ def asked(rng, loop, point):
     return {
         "unstable_roots": partial(unstable_roots, loop, *point),
         "margins": partial(margins, loop, *point),
-        "margins, free": lambda: margins(loop, point[0], point[1], above),
+        "margins, free": lambda: margins(loop, *point, free_above=above),
         "modulus_margin": partial(modulus_margin, loop, *point),
         "gain_interval": partial(gain_interval, loop, *point),
         "critical_perturbation": partial(critical_perturbation, loop, way),
