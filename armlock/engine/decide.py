@@ -27,8 +27,8 @@ BOUNDARY = -1
 UNCONFINED = -2
 
 # Most steps of a count, and of a search; some three seconds each.
-_MOST_STEPS = np.int64(3_000_000)
-_MOST_SEARCHED = 6_000_000
+_MOST_STEPS = np.int64(1_500_000)
+_MOST_SEARCHED = 2_000_000
 # Steps between two looks at the keyboard.
 _A_WHILE = np.int64(100_000)
 # Steps of a look at likely intervals before a search.
@@ -52,8 +52,7 @@ class UndecidedError(RuntimeError):
 def in_threads(function: Callable[[slice], Any], size: int, block: int) -> list[Any]:
     """Return what a compiled function makes of the blocks of a range; Ctrl-C ends it."""
     blocks = [slice(first, min(first + block, size)) for first in range(0, size, block)]
-    if len(blocks) == 1:
-        return [function(blocks[0])]
+    # A single block goes to a thread too: compiled functions do not react to Ctrl-C.
     pool = ThreadPoolExecutor(numba.config.NUMBA_NUM_THREADS)
     try:
         return list(pool.map(function, blocks))
