@@ -18,15 +18,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
+from itertools import zip_longest
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
-from numpy.polynomial import polynomial as poly
 
-from armlock.axis.exponentials import LOW_DEGREE, ExponentialSum
-from armlock.axis.polynomials import Polynomial
-from armlock.axis.rounding import EPSILON
 from armlock.checks import (
     ComplexArray,
     FloatArray,
@@ -38,11 +35,10 @@ from armlock.checks import (
     real_number,
     whole_steps,
 )
-from armlock.engine import polynomials
 from armlock.engine.functions import Function, Space
+from armlock.engine.inclusion import EPSILON
+from armlock.engine.polynomials import Polynomial, rounded
 
-# Past this an exponential is no float.
-_LARGEST_EXPONENT = 700.0
 # The free parameters of a loop, the perturbations of its arms: one where there is none.
 _PERTURBATIONS = ("c1", "c2")
 
@@ -77,7 +73,7 @@ class CharacteristicFunction:
 
     Parameters
     ----------
-    rest, b1, b2 : sequence of float, or armlock.axis.polynomials.Polynomial
+    rest, b1, b2 : sequence of float, or armlock.engine.polynomials.Polynomial
         Coefficients of R, B1 and B2 in ascending powers of s (of z = exp(s step) for a map);
         or polynomials with known roots, which are then kept.
     tau1, tau2 : float
@@ -94,7 +90,7 @@ class CharacteristicFunction:
 
     Attributes
     ----------
-    rest, b1, b2 : armlock.axis.polynomials.Polynomial
+    rest, b1, b2 : armlock.engine.polynomials.Polynomial
         R, B1 and B2 with their coefficients and roots.
 
     Raises
@@ -217,13 +213,13 @@ class CharacteristicFunction:
             step=self.step, parameters=self.parameters, reference=self.reference,
         )  # fmt: skip
 
-    def basis(self) -> tuple[list[polynomials.Polynomial], list[list[Fraction]]]:
+    def basis(self) -> tuple[list[Polynomial], list[list[Fraction]]]:
         """Return polynomials, and their shares in R, B1 and B2, shape (3, polynomials)."""
-        given = [p.coefficients for p in self.polynomials()]
-        made = [polynomials.Polynomial.of(p) for p in given if p.any()]
-        places = np.cumsum([bool(p.any()) for p in given]) - 1
+        given = self.polynomials()
+        places = np.cumsum([bool(p) for p in given]) - 1
+        made = [p for p in given if p]
         shares = [
-            [Fraction(int(p.any() and k == place)) for k in range(len(made))]
+            [Fraction(int(bool(p) and k == place)) for k in range(len(made))]
             for p, place in zip(given, places, strict=True)
         ]
         return made, shares
@@ -238,7 +234,7 @@ class CharacteristicFunction:
             # Over z^n each power of z is a delay of its own, and the only polynomial is one.
             step = Fraction(self.step)
             lags = [round(lag / step) * step for lag in lags]
-            made, shares = [polynomials.Polynomial(Fraction(1), ())], [[Fraction(1)]] * 3
+            made, shares = [Polynomial(Fraction(1), ())], [[Fraction(1)]] * 3
             powers = [
                 [(Fraction(c), (self.degree - k) * step) for k, c in enumerate(p.coefficients)]
                 for p in self.polynomials()
@@ -274,20 +270,17 @@ class CharacteristicFunction:
     @cached_property
     def c(self) -> FloatArray:
         """Coefficients of C, what the dead time alone delays; zero without a dead time."""
-        return _trimmed("c", self._undelayed_arms() if self.delay else [0.0])
+        return _trimmed(self._at_reference() if self.delay else [])
 
     @cached_property
     def a(self) -> FloatArray:
         """Coefficients of A, what nothing delays."""
-        rest = self.rest.coefficients
-        if not self.delay:
-            rest = np.asarray(poly.polyadd(rest, self._undelayed_arms()))
-        return _trimmed("a", rest)
+        return _trimmed(_sum(self.rest.exact, [] if self.delay else self._at_reference()))
 
-    def _undelayed_arms(self) -> FloatArray:
-        """Return the coefficients of x0 B1 + y0 B2."""
-        x0, y0 = self.reference
-        return np.asarray(poly.polyadd(x0 * self.b1.coefficients, y0 * self.b2.coefficients))
+    def _at_reference(self) -> list[Fraction]:
+        """Return the coefficients of x0 B1 + y0 B2, exactly."""
+        x0, y0 = (Fraction(value) for value in self.reference)
+        return _sum([x0 * c for c in self.b1.exact], [y0 * c for c in self.b2.exact])
 
     @property
     def degree(self) -> int:
@@ -465,111 +458,9 @@ class CharacteristicFunction:
             arms = arms + b * here * tau * (1.0 + change)
         return dr * dz + library.exp(-s * self.delay) * arms
 
-    def shifted(self, sigma: float) -> CharacteristicFunction:
-        """Return the function s -> D(s + sigma), whose roots lie `sigma` further left.
-
-        Counting its unstable roots counts the roots of D to the right of Re s = sigma.
-
-        Raises
-        ------
-        TypeError, ValueError
-            If sigma is not finite and real, or so large that exp(sigma delay) is not.
-        """
-        return _Shifted(self, sigma)
-
-    def exchanged(self) -> CharacteristicFunction:
-        """Return the same function with its two free parameters exchanged."""
-        return self.plain().replace(
-            b1=self.b2,
-            b2=self.b1,
-            tau1=self.tau2,
-            tau2=self.tau1,
-            parameters=self.parameters[::-1],
-            reference=self.reference[::-1],
-        )
-
     def polynomials(self) -> tuple[Polynomial, ...]:
         """Return R, B1 and B2 with their roots."""
         return self.rest, self.b1, self.b2
-
-    @cached_property
-    def roots_of_a(self) -> ComplexArray:
-        """Roots of A: they enter a count through the argument of A, past the last frequency.
-
-        With a dead time A is R, whose roots are known.
-        """
-        return self.rest.roots if self.delay else Polynomial.of(self.a).roots
-
-    def _delayed(
-        self, k: int, lag: float, weight: float = 1.0, *, rows: bool = False
-    ) -> ExponentialSum:
-        """Return `weight` times R, B1 or B2, delayed by a time, at s = j omega.
-
-        In the polynomials of `_basis`. For a map each power of z is an exponential, its
-        polynomial is 1. Each coefficient keeps a polynomial of its own, so that its rounding is
-        not forgotten.
-        """
-        if not self.step:
-            polynomials, shares = self._basis
-            if rows and len(polynomials) == len(self.polynomials()):
-                # A row has products with B1 only: the fewer terms in that the better.
-                polynomials, shares = self.polynomials(), np.eye(3)
-            share = weight * shares[k]
-            return ExponentialSum(polynomials, share[None, :], np.array([-lag]), share)
-        factors = [p.coefficients for p in self.polynomials()]
-        ends = np.cumsum([p.size for p in factors])
-        polynomials = (Polynomial(np.ones(1), np.zeros(0, dtype=np.complex128)),) * ends[-1]
-        place = np.split(np.eye(len(polynomials)), ends[:-1])[k]
-        p = weight * factors[k]
-        phases = np.asarray(self.step * np.arange(p.size) - lag, dtype=np.float64)
-        return ExponentialSum(polynomials, p[:, None] * place, phases, p @ place)
-
-    @cached_property
-    def _basis(self) -> tuple[tuple[Polynomial, ...], FloatArray]:
-        """Polynomials, and the shares of them in R, B1 and B2, shape (3, polynomials)."""
-        return self.polynomials(), np.eye(3)
-
-    def on_boundary(
-        self, *, rows: bool = False
-    ) -> tuple[ExponentialSum, ExponentialSum, ExponentialSum]:
-        """Return the three terms of `parts` at s = j omega as exponential sums.
-
-        With `rows` in the polynomials that suit the rows of a chart.
-        """
-        x0, y0 = self.reference
-        undelayed = self.rest_on_boundary(rows=rows).plus(
-            self._delayed(1, self.delay, x0, rows=rows)
-        )
-        return (
-            undelayed.plus(self._delayed(2, self.delay, y0, rows=rows)),
-            self._delayed(1, self.delay + self.tau1, rows=rows),
-            self._delayed(2, self.delay + self.tau2, rows=rows),
-        )
-
-    def sum_at(self, x: float, y: float) -> ExponentialSum:
-        """Return D(j omega; x, y) at one point as an exponential sum."""
-        x0, y0 = self.reference
-        constant, b1, b2 = self.on_boundary()
-        combined = constant.plus(b1.scaled(-x)).plus(b2.scaled(-y))
-        # What is left where all exponentials are one, without the digits lost by cancelling.
-        # Of two ways to add up, the one with the smaller terms.
-        near, far = (x0 - x) * b1.sums, (y0 - y) * b2.sums
-        all_near, all_far = x0 * b1.sums + y0 * b2.sums, x * b1.sums + y * b2.sums
-        smaller = np.abs(all_near) + np.abs(all_far) < np.abs(near) + np.abs(far)
-        left = np.where(smaller, all_near - all_far, near + far)
-        return combined._replace(sums=self.rest_on_boundary().sums + left)
-
-    def deviation(self, x: float, y: float) -> ExponentialSum:
-        """Return x B1 exp(-s (delay + tau1)) + y B2 exp(-s (delay + tau2)) at s = j omega.
-
-        That is what D subtracts from its first term.
-        """
-        _, b1, b2 = self.on_boundary()
-        return b1.scaled(x).plus(b2.scaled(y))
-
-    def rest_on_boundary(self, *, rows: bool = False) -> ExponentialSum:
-        """Return R at s = j omega as an exponential sum, as `on_boundary` does."""
-        return self._delayed(0, 0.0, rows=rows)
 
 
 def left_of(whole: float, others: npt.ArrayLike) -> FloatArray:
@@ -617,87 +508,20 @@ def given_or_one(
     return given[0], given[1]
 
 
-class _Shifted(CharacteristicFunction):
-    """The function s -> D(s + sigma), see `CharacteristicFunction.shifted`."""
-
-    origin: CharacteristicFunction
-    sigma: float
-
-    def __init__(self, origin: CharacteristicFunction, sigma: float) -> None:
-        sigma = real_number("sigma", sigma)
-        reach = abs(sigma) * max(origin.longest_delay, origin.step * origin.degree)
-        if reach > _LARGEST_EXPONENT:
-            raise ValueError(
-                f"sigma must be at most {_LARGEST_EXPONENT:.0f} over the longest delay in "
-                f"magnitude, got {sigma}: its exponential is no float"
-            )
-
-        def moved(p: Polynomial, lag: float) -> Polynomial:
-            late = np.exp(-sigma * lag)
-            if origin.step:
-                powers = np.exp(sigma * origin.step * np.arange(p.coefficients.size))
-                return _with_moved(origin, sigma, late * powers * p.coefficients, p)
-            return _with_moved(origin, sigma, late * _taylor(p.coefficients, sigma), p)
-
-        (x0, y0), (rest, b1, b2) = origin.reference, origin.polynomials()
-        super().__init__(
-            moved(rest, 0.0),
-            moved(b1, origin.delay + origin.tau1),
-            moved(b2, origin.delay + origin.tau2),
-            origin.tau1,
-            origin.tau2,
-            delay=origin.delay,
-            step=origin.step,
-            parameters=origin.parameters,
-            # It moves along, so that nothing has to cancel in `rest`.
-            reference=(x0 * np.exp(sigma * origin.tau1), y0 * np.exp(sigma * origin.tau2)),
-        )
-        vars(self).update(origin=origin, sigma=sigma)
-
-    @cached_property
-    def roots_of_a(self) -> ComplexArray:
-        """Those of the origin, moved: to find them in extended precision takes a second."""
-        if self.delay:
-            return super().roots_of_a
-        guess = Polynomial(self.origin.a, self.origin.roots_of_a, missed=EPSILON)
-        return _with_moved(self.origin, self.sigma, self.a, guess).roots
-
-
-def _taylor(coefficients: FloatArray, sigma: float) -> FloatArray:
-    """Return the coefficients of p(s + sigma) in powers of s."""
-    # Where D is evaluated from these: exactly, because powers of sigma may cancel.
-    number = Fraction if coefficients.size <= LOW_DEGREE + 1 else float
-    moved: list[Any] = []
-    for value in reversed(coefficients.tolist()):
-        # Horner's rule, with s + sigma in place of s.
-        left = [number(sigma) * c for c in moved]
-        moved = [a + b for a, b in zip([number(value), *moved], [*left, 0], strict=True)]
-    return np.array(moved, dtype=np.float64)
-
-
-def _with_moved(
-    origin: CharacteristicFunction, sigma: float, coefficients: FloatArray, before: Polynomial
-) -> Polynomial:
-    """Return a shifted polynomial from its coefficients, and the one before the shift."""
-    if origin.step:
-        roots = before.roots * np.exp(-sigma * origin.step)
-    else:
-        roots = before.roots - sigma
-        if before.missed and coefficients.size <= LOW_DEGREE + 1:
-            return Polynomial.of(coefficients, roots)
-    return before._replace(coefficients=coefficients, roots=roots)
-
-
 def _polynomial(name: str, given: Sequence[float] | FloatArray | Polynomial) -> Polynomial:
     """Return a polynomial with trimmed coefficients, and its roots."""
-    if isinstance(given, Polynomial):
-        return given._replace(coefficients=_trimmed(name, given.coefficients))
-    return Polynomial.of(_trimmed(name, given))
+    return given if isinstance(given, Polynomial) else Polynomial.of(axis(name, given).tolist())
 
 
-def _trimmed(name: str, coefficients: Sequence[float] | FloatArray) -> FloatArray:
-    """Return trimmed coefficients with at least one entry."""
-    return np.array(poly.polytrim(axis(name, coefficients), tol=0.0), dtype=np.float64)
+def _sum(p: Sequence[Fraction], q: Sequence[Fraction]) -> list[Fraction]:
+    """Add two polynomials in ascending powers."""
+    return [a + b for a, b in zip_longest(p, q, fillvalue=Fraction(0))]
+
+
+def _trimmed(coefficients: Sequence[Fraction]) -> FloatArray:
+    """Return coefficients without zeros in front of the highest power, rounded."""
+    size = max((k + 1 for k, value in enumerate(coefficients) if value), default=1)
+    return rounded([*coefficients, Fraction(0)][:size])
 
 
 def _not_negative(name: str, value: float) -> float:

@@ -18,7 +18,6 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
 from armlock import paper
-from armlock.axis.polynomials import quotients
 from armlock.checks import (
     ComplexArray,
     FloatArray,
@@ -28,6 +27,7 @@ from armlock.checks import (
     real_number,
     whole_number,
 )
+from armlock.engine.polynomials import quotients
 
 if TYPE_CHECKING:
     import control
@@ -149,8 +149,7 @@ class Controller:
 
     def __call__(self, s: npt.ArrayLike) -> ComplexArray:
         """Evaluate K(s), factor by factor; `s` in rad/s, any shape."""
-        zeros, poles = np.array(self.zeros, dtype=complex), np.array(self.poles, dtype=complex)
-        return quotients(zeros, poles, self.gain, complex_array("s", s))
+        return quotients(self.zeros, self.poles, self.gain, complex_array("s", s))
 
     def __mul__(self, other: Controller) -> Controller:
         """Return the two in series."""
@@ -203,7 +202,7 @@ def _factored(system: control.StateSpace) -> tuple[ComplexArray, ComplexArray, f
     # What rounding left of a zero at s = 0 is none of the places to look at.
     sizes = sizes[sizes > 1e-12 * sizes.max()] if sizes.any() else np.ones(1)
     s = np.geomspace(0.1 * sizes.min(), 10.0 * sizes.max(), 40) * np.exp(0.7j)
-    given, found = system(s), quotients(zeros + 0j, poles + 0j, gain, s)
+    given, found = system(s), quotients(zeros, poles, gain, s)
     if not (np.abs(found - given) <= 1e-6 * np.abs(given)).all():
         raise ValueError(
             "controller must be a state space whose zeros and poles are found to a part in a "

@@ -11,10 +11,8 @@ of `armlock.characteristic`. The Hayes equation, which has no sensor, is one mor
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property
 from itertools import zip_longest
 from math import factorial, lcm
 from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
@@ -22,15 +20,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 import mpmath
 import numpy as np
 import numpy.typing as npt
-from numpy.polynomial import polynomial as poly
 
 from armlock import paper, sensors
-from armlock.axis.exponentials import ExponentialSum
-from armlock.axis.polynomials import Polynomial
 from armlock.characteristic import CharacteristicFunction
 from armlock.checks import (
     ComplexArray,
-    FloatArray,
     axis,
     complex_array,
     one_of,
@@ -40,9 +34,9 @@ from armlock.checks import (
     true_or_false,
 )
 from armlock.controllers import Controller, integrating_actuator, table_two, white_paper
-from armlock.engine import polynomials
 from armlock.engine.functions import Function, Space
 from armlock.engine.margins import Free
+from armlock.engine.polynomials import Polynomial
 from armlock.sensors import COMMON, SINGLE, SignalMapping, modified_dual
 
 if TYPE_CHECKING:
@@ -185,28 +179,26 @@ class Loop(CharacteristicFunction):
         tau1 = positive_number("tau1", tau1)
         delay = real_number("delay", delay)
         k, m, tau2 = Controller.of(controller), *_mapping_and_tau2(mapping, tau1, tau2)
-        rest = np.convolve(k.denominator, m.denominator)
-        arms = [np.convolve(k.numerator, p) for p in (m.numerator1, m.numerator2)]
+        rest = Polynomial.of_roots(k.poles) * Polynomial.of(m.denominator)
+        zeros = Polynomial.of_roots(k.zeros, k.gain)
+        arms = [zeros * Polynomial.of(p) for p in (m.numerator1, m.numerator2)]
         for name, b in zip(("m1", "m2"), arms, strict=True):
-            if b.any() and b.size > rest.size:
+            if b.degree > rest.degree:
                 raise ValueError(
                     f"controller times signal mapping {name} must be proper, got "
-                    f"{b.size - 1} zeros and {rest.size - 1} poles"
+                    f"{b.degree} zeros and {rest.degree} poles"
                 )
-        # The highest power of R (1 + L).
-        highest = rest[-1] + sum(b[-1] for b in arms if b.size == rest.size)
-        if not delay and abs(highest) <= 1e-12 * abs(rest[-1]):
+        # The highest power of 1 + L.
+        highest = 1 + sum(b.lead for b in arms if b.degree == rest.degree) / rest.lead
+        if not delay and abs(highest) <= 1e-12:
             raise ValueError(
                 f"the loop is not well posed: 1 + K (m1 + m2) must not vanish at high "
-                f"frequency, got {highest / rest[-1]}"
+                f"frequency, got {float(highest)}"
             )
         # As many poles at s = 0 as all three have zeros there.
-        common = min(int(np.flatnonzero(p)[0]) for p in (rest, *arms) if p.any())
-        rest, b1, b2 = (p[common:] if p.any() else p for p in (rest, *arms))
+        common = min(p.order for p in (rest, *arms) if p)
         super().__init__(
-            _factored(rest, k.poles, m.denominator),
-            _factored(b1, k.zeros, m.numerator1),
-            _factored(b2, k.zeros, m.numerator2),
+            *(p.over_powers(common) for p in (rest, *arms)),
             tau1,
             tau2,
             delay=delay,
@@ -215,52 +207,26 @@ class Loop(CharacteristicFunction):
         )
         vars(self).update(controller=k, mapping=m)
 
-    @cached_property
-    def _basis(self) -> tuple[tuple[Polynomial, ...], FloatArray]:
-        """R, B1 + B2 and B1 - B2, and the shares of them in R, B1 and B2.
-
-        Where the arms cancel, as in a difference or in the integral of the dual sensor, they do
-        so in these polynomials, and not in what a walk evaluates.
-        """
-        k, m = self.controller, self.mapping
-        if not self.b1.coefficients.any() or not self.b2.coefficients.any():
-            return super()._basis
-        common = len(k.zeros) + len(m.numerator1) - self.b1.coefficients.size
-        polynomials, shares = [self.rest], [(1.0, 0.0, 0.0)]
-        for sign in (1.0, -1.0):
-            both = np.asarray(
-                poly.polyadd(m.numerator1, sign * np.array(m.numerator2)), dtype=np.float64
-            )
-            if both.any():
-                product = np.convolve(k.numerator, both)[common:]
-                polynomials.append(_factored(product, k.zeros, both))
-                shares.append((0.0, 0.5, 0.5 * sign))
-        return tuple(polynomials), np.array(shares).T.copy()
-
-    def basis(self) -> tuple[list[polynomials.Polynomial], list[list[Fraction]]]:
+    def basis(self) -> tuple[list[Polynomial], list[list[Fraction]]]:
         """Return R, B1 + B2 and B1 - B2, and the shares of them in R, B1 and B2.
 
         Where the arms cancel, as in a difference or in the integral of the dual sensor, they do
         so in these polynomials, and not in what a walk evaluates.
         """
-        of, of_roots = polynomials.Polynomial.of, polynomials.Polynomial.of_roots
+        if not (self.b1 and self.b2):
+            return super().basis()
         k, m = self.controller, self.mapping
-        arms = [[Fraction(value) for value in p] for p in (m.numerator1, m.numerator2)]
-        rest = of_roots(k.poles) * of(m.denominator)
-        if all(map(any, arms)):
-            pairs = list(zip_longest(*arms, fillvalue=Fraction(0)))
-            half = Fraction(1, 2)
-            parts = [[a + b for a, b in pairs], [a - b for a, b in pairs]]
-            shares = [[Fraction(0), Fraction(0)], [half, half], [half, -half]]
-        else:
-            parts = arms
-            shares = [[Fraction(int(i == k)) for k in (1, 2)] for i in range(3)]
-        kept = [k for k, p in enumerate(parts) if any(p)]
-        made = [rest, *(of_roots(k.zeros, k.gain) * of(parts[i]) for i in kept)]
-        common = min(p.order for p in made)
-        return [p.over_powers(common) for p in made], [
-            [Fraction(int(i == 0)), *(shares[i][j] for j in kept)] for i in range(3)
-        ]
+        zeros = Polynomial.of_roots(k.zeros, k.gain)
+        common = zeros.order + Polynomial.of(m.numerator1).order - self.b1.order
+        made, shares = [self.rest], [[Fraction(1)], [Fraction(0)], [Fraction(0)]]
+        pairs = list(zip_longest(m.numerator1, m.numerator2, fillvalue=0.0))
+        for sign in (1, -1):
+            both = Polynomial.of([Fraction(a) + sign * Fraction(b) for a, b in pairs])
+            if both:
+                made.append((zeros * both).over_powers(common))
+                for row, share in zip(shares, (0, 1, sign), strict=True):
+                    row.append(Fraction(share, 2))
+        return made, shares
 
     def quotient(
         self, c1: float | Fraction = 1.0, c2: float | Fraction = 1.0
@@ -307,7 +273,7 @@ class Loop(CharacteristicFunction):
             If s does not hold finite numbers, or holds a pole of K, m1 or m2.
         """
         s = complex_array("s", s)
-        for pole in set(self.rest.roots.tolist()):
+        for pole in set(self.rest.roots):
             if (s == pole).any():
                 raise ValueError(
                     f"s must not be a pole of the open loop, got {pole}: a limit there is not "
@@ -428,21 +394,6 @@ def _gain(gain: float, sensor: str) -> float:
     except TypeError as error:
         advice = f'with a controller of your own write Loop(controller, "{sensor}", ...)'
         raise TypeError(f"{error}; {advice}") from None
-
-
-def _factored(
-    product: FloatArray, roots: tuple[complex, ...], other: Sequence[float] | FloatArray
-) -> Polynomial:
-    """Return the product of two polynomials with the roots of both.
-
-    Roots at s = 0 may have cancelled: as many are left as the degree says.
-    """
-    rest = np.asarray(other, dtype=float)
-    rest = rest[np.flatnonzero(rest)[:1].sum() :]
-    found = np.concatenate((roots, Polynomial.of(rest).roots))
-    found = found[found != 0.0]
-    at_zero = np.zeros(max(product.size - 1 - found.size, 0))
-    return Polynomial(product, np.concatenate((found, at_zero)).astype(np.complex128))
 
 
 def checked_loop(loop: Loop) -> Loop:

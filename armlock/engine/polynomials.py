@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
+from itertools import zip_longest
 from typing import Any
 
 import mpmath
@@ -18,7 +19,7 @@ from armlock.engine.inclusion import EPSILON
 
 @dataclass(frozen=True)
 class Polynomial:
-    """A real polynomial of s that is not zero, exactly.
+    """A real polynomial of s, exactly.
 
     Attributes
     ----------
@@ -46,7 +47,7 @@ class Polynomial:
 
     @classmethod
     def of(cls, coefficients: Iterable[Any]) -> Polynomial:
-        """Return the polynomial with these coefficients, ascending, of which one is not zero.
+        """Return the polynomial with these coefficients, ascending; zero has degree 0.
 
         Raises
         ------
@@ -54,8 +55,10 @@ class Polynomial:
             If its roots are not found.
         """
         exact = [Fraction(value) for value in coefficients]
-        while exact[-1] == 0:
+        while exact and exact[-1] == 0:
             exact.pop()
+        if not exact:
+            return cls(Fraction(0), ())
         at_zero = next(k for k, value in enumerate(exact) if value)
         other = np.array([float(value) for value in exact[at_zero:]])
         roots = _roots(other)
@@ -76,6 +79,8 @@ class Polynomial:
 
     def __mul__(self, other: Polynomial) -> Polynomial:
         """Return the product, with the roots of both."""
+        if not (self and other):
+            return Polynomial(Fraction(0), ())
         moved = frozenset(len(self.roots) + k for k in other.computed)
         return Polynomial(
             self.lead * other.lead,
@@ -84,6 +89,14 @@ class Polynomial:
             self.factors + other.factors,
             (1.0 + self.missed) * (1.0 + other.missed) - 1.0,
         )
+
+    def __bool__(self) -> bool:
+        """Whether it is not zero."""
+        return self.lead != 0
+
+    def __repr__(self) -> str:
+        """List the coefficients."""
+        return repr(self.coefficients.tolist())
 
     @property
     def degree(self) -> int:
@@ -119,7 +132,11 @@ class Polynomial:
     @cached_property
     def coefficients(self) -> FloatArray:
         """Coefficients in ascending powers of s, rounded; inf where a number overflows."""
-        return np.array([_rounded(value) for value in self.exact])
+        return rounded(self.exact)
+
+    def over(self, other: Polynomial, s: ComplexArray) -> ComplexArray:
+        """Evaluate p(s) / q(s), factor by factor."""
+        return quotients(self.roots, other.roots, float(self.lead / other.lead), s)
 
     def evaluated(self, s: Any) -> tuple[Any, Any]:
         """Value and derivative at s, in numpy's or mpmath's numbers."""
@@ -135,6 +152,21 @@ class Polynomial:
         return value, slope
 
 
+def quotients(
+    zeros: Sequence[complex], poles: Sequence[complex], lead: float, s: ComplexArray
+) -> ComplexArray:
+    """Evaluate `lead` times the product of s - zeros over that of s - poles, at any s."""
+    found = np.full(s.shape, complex(lead))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # In turn, so that the product neither overflows nor underflows on the way.
+        for zero, pole in zip_longest(zeros, poles):
+            if zero is not None:
+                found *= s - zero
+            if pole is not None:
+                found /= s - pole
+    return found
+
+
 def _product(p: Sequence[Fraction], q: Sequence[Fraction]) -> list[Fraction]:
     """Multiply two polynomials in ascending powers."""
     found = [Fraction(0)] * (len(p) + len(q) - 1)
@@ -144,12 +176,15 @@ def _product(p: Sequence[Fraction], q: Sequence[Fraction]) -> list[Fraction]:
     return found
 
 
-def _rounded(value: Fraction) -> float:
-    """Return a fraction as a float; inf where that overflows."""
-    try:
-        return float(value)
-    except OverflowError:
-        return np.inf if value > 0 else -np.inf
+def rounded(coefficients: Iterable[Fraction]) -> FloatArray:
+    """Return fractions as floats; inf where one overflows."""
+    found = []
+    for value in coefficients:
+        try:
+            found.append(float(value))
+        except OverflowError:
+            found.append(np.inf if value > 0 else -np.inf)
+    return np.array(found)
 
 
 def _in(s: Any, value: Fraction) -> Any:
