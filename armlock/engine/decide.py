@@ -169,8 +169,8 @@ class Family:
         (2), the combination of the functions with weights + level slopes. A test holds where
         zero is in no convex combination of the vertices, whatever the terms add.
     arc : tuple of tuples, optional
-        One more test: f_0 + exp(j psi) f_1 with psi from a + b omega to c + d omega;
-        (a, b, c, d), and their slopes in the level.
+        One more test: f_0 + exp(j psi) f_1 with psi from a + b omega to c + d omega; if there
+        is an f_2, with exp(-j psi) f_2 added. (a, b, c, d), and their slopes in the level.
     """
 
     functions: Sequence[Function]

@@ -486,8 +486,9 @@ class Question(NamedTuple):
     weights, slopes : complex arrays, shape (tests, members, functions)
         A member is the combination of the functions with weights + level slopes.
     arc : float array, shape (0, 4) or (2, 4)
-        One more test: f_0 + exp(j psi) f_1 with psi from a + b omega to c + d omega. The rows
-        are (a, b, c, d), and their slopes in the level.
+        One more test: f_0 + exp(j psi) f_1 with psi from a + b omega to c + d omega; if there
+        is an f_2, with exp(-j psi) f_2 added. The rows are (a, b, c, d), and their slopes in
+        the level.
     """
 
     kind: IntArray
@@ -676,6 +677,8 @@ def walk(
                     weights[1] = complex(np.cos(angle), np.sin(angle))
                     if n == 1:
                         weights[1] /= np.cos(half)
+                    if functions > 2:
+                        weights[2] = weights[1].conjugate()
                     mix(weights, work, room, n)
                 held = excludes_zero(room)
                 if not held:
