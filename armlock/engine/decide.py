@@ -169,8 +169,9 @@ class Family:
         (2), the combination of the functions with weights + level slopes. A test holds where
         zero is in no convex combination of the vertices, whatever the terms add.
     arc : tuple of tuples, optional
-        One more test: f_0 + exp(j psi) f_1 with psi from a + b omega to c + d omega; if there
-        is an f_2, with exp(-j psi) f_2 added. (a, b, c, d), and their slopes in the level.
+        One more test: f_0 + exp(j psi) f_1, or f_0 + (cos psi - 1) f_1 + j sin psi f_2 of three
+        functions, with psi from a + b omega to c + d omega; (a, b, c, d), and their slopes in
+        the level.
     """
 
     functions: Sequence[Function]
@@ -247,7 +248,8 @@ class Family:
             top = float(sum(abs(still) + abs(turned).sum() for still, turned in tops))
             ends = self.space.confined_from(steady, delayed, size, top_terms=top)
             found.append(float(ends.max()))
-        if self.arc is not None and self.arc[0][3] == self.arc[1][3] == 0.0:
+        two = len(self.functions) == 2
+        if two and self.arc is not None and self.arc[0][3] == self.arc[1][3] == 0.0:
             found.append(self._arc_ends(self.arc[0][2] + level * self.arc[1][2]))
         return min(found)
 
@@ -359,6 +361,37 @@ def least(
         omega = float(left[0, 0])
         raise UndecidedError(f"rounding does not decide at {omega:.6g} rad/s", omega)
     return best, where
+
+
+def excludes(family: Family, begin: float = 0.0) -> bool:
+    """Tell whether no function of a family has a zero on the axis, but perhaps at s = 0.
+
+    Parameters
+    ----------
+    family : Family
+        At its level zero.
+    begin : float, optional
+        Frequency in rad/s up to which this is known; by default that of leading terms.
+
+    Returns
+    -------
+    bool
+        True is certified. False: there is a zero, or double precision does not decide.
+
+    Raises
+    ------
+    UndecidedError
+        If it takes too many steps.
+    """
+    begin, end = begin or family.begins(0.0), family.ends(0.0)
+    if not (begin > 0.0 and np.isfinite(end)):
+        return False
+    if end <= begin:
+        return True
+    # At a distance of zero nothing is nearer, so that nothing is searched.
+    nothing = 0.0, np.nan, 0.0, 0.0
+    _, _, left = _Search(family, DISTANCE).run(np.array([[begin, end]]), *nothing)
+    return not len(left)
 
 
 def _likely(family: Family, goal: int, low: float, high: float, start: float) -> FloatArray:

@@ -486,9 +486,9 @@ class Question(NamedTuple):
     weights, slopes : complex arrays, shape (tests, members, functions)
         A member is the combination of the functions with weights + level slopes.
     arc : float array, shape (0, 4) or (2, 4)
-        One more test: f_0 + exp(j psi) f_1 with psi from a + b omega to c + d omega; if there
-        is an f_2, with exp(-j psi) f_2 added. The rows are (a, b, c, d), and their slopes in
-        the level.
+        One more test: f_0 + exp(j psi) f_1, or f_0 + (cos psi - 1) f_1 + j sin psi f_2 of three
+        functions, with psi from a + b omega to c + d omega. The rows are (a, b, c, d), and
+        their slopes in the level.
     """
 
     kind: IntArray
@@ -665,7 +665,8 @@ def walk(
             span = arc[2] + max(arc[3] * low, arc[3] * high) - begin
             span = min(span, 2.0 * np.pi)
             parts = int(span / 0.35) + 1
-            half = 0.5 * span / parts
+            # Neighbours overlap by more than angles are rounded by.
+            half = 0.5 * span / parts + 4.0 * EPSILON * (abs(begin) + span)
             room.kind[:] = corner
             for i in range(parts):
                 # A triangle that holds this part of the arc (Lemma 11).
@@ -674,11 +675,14 @@ def walk(
                     weights[:] = 0.0
                     weights[0] = 1.0
                     angle = turn + (n - 1) * half
-                    weights[1] = complex(np.cos(angle), np.sin(angle))
+                    # Of the corner exp(j angle), or of the one in the middle, over cos(half).
+                    less, sine = -2.0 * np.sin(0.5 * angle) ** 2, np.sin(angle)
                     if n == 1:
-                        weights[1] /= np.cos(half)
+                        least = -2.0 * np.sin(0.5 * half) ** 2
+                        less, sine = (less - least) / (1.0 + least), sine / (1.0 + least)
+                    weights[1] = complex(1.0 + less, sine)
                     if functions > 2:
-                        weights[2] = weights[1].conjugate()
+                        weights[1], weights[2] = less, complex(0.0, sine)
                     mix(weights, work, room, n)
                 held = excludes_zero(room)
                 if not held:
