@@ -220,6 +220,8 @@ class Family:
                 continue
             turned = [(lead.direction * np.conj(middle)).real / abs(middle) for lead in known]
             room, radius = min(turned) - 4.0 * share, min(lead.radius for lead in known)
+            if room <= 0.0:
+                continue
             for a in known:
                 for b in others:
                     ratio = abs(float(b.coefficient / a.coefficient)) * len(others) / room
