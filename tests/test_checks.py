@@ -14,7 +14,7 @@ import armlock
 from armlock import CharacteristicFunction, CommonArm, HayesEquation, SingleArm, paper_loop
 from armlock.checks import axis, complex_array, finite_series, real_array
 from armlock.controllers import integrating_actuator, roll_off, stage_one, table_two
-from armlock.robustness.rays import first_crossing
+from armlock.robustness import first_crossing
 from armlock.sensors import COMMON, SignalMapping, dual
 from armlock.stability.roots import extended_root
 from armlock.timedomain.discretize import warped

@@ -13,7 +13,7 @@ from armlock import (
     transition_matrix,
     unstable_roots,
 )
-from armlock.robustness.rays import first_crossing
+from armlock.robustness import first_crossing
 from tests.systems import RETARDED
 
 NAMES = "oscillator", "third order, unstable A", "zero of B1 on the axis"

@@ -124,7 +124,7 @@ def counts(
     with np.errstate(all="ignore"):
         turn = turn + np.angle(first / direction) - np.angle(last / still)
     # A map counts zeros in the strip |Im s| < pi / step, at whose right end it is constant.
-    number = (0.0 if space.step else 0.5 * (space.degree - order)) - turn / np.pi
+    number = 0.5 * ((0 if space.step else space.degree) - order) - turn / np.pi
     with np.errstate(invalid="ignore"):
         sure = np.isnan(undecided) & (np.abs(number - np.round(number)) < 1e-2)
         found[here] = np.where(sure & (number > -0.5), np.round(number), BOUNDARY)

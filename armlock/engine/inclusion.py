@@ -509,7 +509,8 @@ def _aim(goal: int, f: complex, g: complex, omega: float) -> tuple[float, float]
     if goal == DISTANCE:
         return 0.0, abs(f) / abs(g)
     if goal == REAL:
-        return (f * g.conjugate()).imag, -(f / g).real
+        # Where g vanishes, no t makes f + t g zero.
+        return (f * g.conjugate()).imag, -(f / g).real if g != 0.0 else np.inf
     # The angle of L = f / g from -1.
     level = (f * f.conjugate()).real - (g * g.conjugate()).real
     ratio = -f * g.conjugate()

@@ -17,7 +17,7 @@ from armlock.paper import (
     TAU1,
     TAU2,
 )
-from armlock.robustness.gains import gain_interval
+from armlock.robustness import gain_interval
 from armlock.robustness.margins import margins
 from armlock.stability.counts import BOUNDARY, unstable_roots
 from armlock.stability.nyquist import AxisCrossings, NyquistCurve, axis_crossings, nyquist
