@@ -13,12 +13,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import zip_longest
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from armlock.checks import ComplexArray, complex_array, real_array, real_number
+from armlock.checks import ComplexArray, WithDelays, complex_array, real_array, real_number
 from armlock.controllers import Controller
 from armlock.engine.decide import count
 from armlock.engine.functions import Function, Space
@@ -167,7 +167,7 @@ _ONE = QuasiPolynomial(((Fraction(0), (Fraction(1),)),))
 
 
 @dataclass(frozen=True)
-class DelaySystem:
+class DelaySystem(WithDelays):
     r"""A system with one input, one output and any number of delays.
 
     .. math::
@@ -214,6 +214,15 @@ class DelaySystem:
 
     # numpy leaves arithmetic with such an object to it.
     __array_ufunc__ = None
+    _instead: ClassVar[str] = (
+        "for plots write system.frequency_response(omega), for a closed loop "
+        "DelaySystem.of(plant).feedback(back), for a quotient DelaySystem.of(plant) / system, "
+        "for responses armlock.step_response(system, timepts), for margins "
+        "armlock.margins(loop), for poles armlock.rightmost_root(loop)"
+    )
+    _taken_by: ClassVar[tuple[str, ...]] = (
+        "__add__", "__sub__", "__mul__", "frequency_response", "_determine_omega_vector",
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         """Divide out a common delay and a common power of s, exactly."""
@@ -353,15 +362,6 @@ class DelaySystem:
         with np.errstate(divide="ignore", invalid="ignore"):
             value: ComplexArray = self.numerator(s) / self.denominator(s)
         return value
-
-    def __getattr__(self, name: str) -> Any:
-        """Say what python-control's functions take instead, which ask for other attributes."""
-        raise AttributeError(
-            f"a DelaySystem has no attribute {name!r}; for python-control's plots write "
-            "system.frequency_response(omega), for its feedback system.feedback(), for its "
-            "step_response armlock.step_response(system, timepts), for margins "
-            "armlock.margins(system)"
-        )
 
     @cached_property
     def functions(self) -> tuple[Function, Function]:

@@ -258,13 +258,29 @@ def test_a_bode_plot():
     loop, omega = PI * PLANT * delay(0.5), np.geomspace(0.01, 10.0, 200)
     response = control.frequency_response(loop, omega)
     assert response.frdata[0, 0] == pytest.approx(loop(1j * omega), rel=1e-12)
-    with pytest.raises(AttributeError, match=r"system.frequency_response\(omega\)"):
-        control.bode_plot(loop)
     assert control.bode_plot(response) is not None
     plt.close("all")
     assert control.margin(response)[1] == pytest.approx(
         math.degrees(margins(loop).phase), rel=1e-3
     )
+
+
+@pytest.mark.parametrize(
+    "guess",
+    [
+        control.bode_plot,
+        control.ss,
+        control.tf,
+        control.step_response,
+        control.poles,
+        lambda system: control.feedback(PLANT, system),
+        lambda system: PLANT / system,
+        lambda system: system.step_response(),
+    ],
+)
+def test_python_control_says_what_to_write_for_a_delay(guess):
+    with pytest.raises((TypeError, AttributeError), match=r"system\.frequency_response\("):
+        guess(PLANT * delay(0.5))
 
 
 @pytest.mark.parametrize(
