@@ -13,12 +13,12 @@
  */
 function armlockLoop() {
   const EPSILON = 2 ** -52;
-  const BOUNDARY = -1, UNCONFINED = -2, UNSURE = -3;
+  const BOUNDARY = -1, UNCONFINED = -2, UNDECIDED = -3;
   // Share of a certified bound that a step may use up, and the most steps of one walk.
   const SAFETY = 0.95, MOST_STEPS = 400000;
   // Samples of the frequency in a radian of the longest delay, in a decade, and at most.
   const A_RADIAN = 12, A_DECADE = 80, MOST_SAMPLES = 60000;
-  const SENSORS = ["single", "common", "difference", "dual", "modified", "own"];
+  const SENSORS = ["single", "common", "difference", "dual", "modified"];
 
   /* gain prod (s - zero_k) / prod (s + below_k), all below_k > 0, as a function of omega.
    *
@@ -232,9 +232,9 @@ function armlockLoop() {
     return product;
   };
 
-  const plus = (p, q, sign = 1) => {
+  const plus = (p, q) => {
     const size = Math.max(p.length, q.length), at = (r, k) => r[k - size + r.length] || 0;
-    return Array.from({ length: size }, (_, k) => at(p, k) + sign * at(q, k));
+    return Array.from({ length: size }, (_, k) => at(p, k) + at(q, k));
   };
 
   /* The sensor of a loop: the arms' weights are m1 = sum + difference and m2 = second sum -
@@ -246,23 +246,6 @@ function armlockLoop() {
     if (spec.sensor === "single") return { ...none, second: 0, sum: fraction(1, []) };
     if (spec.sensor === "common") return { ...none, sum: fraction(1, []) };
     if (spec.sensor === "difference") return { ...none, difference: fraction(-1, []) };
-    if (spec.sensor === "own") {
-      const { m1, m2, below } = spec, degree = p => p.length - 1 - p.findIndex(v => v !== 0);
-      const some = p => p.some(v => v !== 0);
-      if (!some(below)) throw new FieldError("below", "the sensor's denominator must not be zero");
-      if (!some(m1) && !some(m2)) throw new FieldError("m1", "m1 and m2 must not both be zero");
-      for (const [name, p] of [["m1", m1], ["m2", m2]])
-        if (some(p) && degree(p) > degree(below))
-          throw new FieldError(name, `${name} must have at most the denominator's degree `
-            + `${degree(below)}, got ${degree(p)}`);
-      const lead = below.find(v => v !== 0), half = some(m2) ? 0.5 : 1;
-      const of = p => {
-        const scaled = p.map(v => half * v / lead), gain = scaled.find(v => v !== 0) || 0;
-        return fraction(gain, rootsOf(scaled));
-      };
-      return { second: some(m2) ? 1 : 0, sum: of(plus(m1, m2)), poles: rootsOf(below),
-        difference: some(m2) ? of(plus(m1, m2, -1)) : null };
-    }
     if (!SENSORS.includes(spec.sensor)) throw new RangeError(`unknown sensor ${spec.sensor}`);
     const corner = positive("corner", "the corner", spec.corner);
     if (!Number.isFinite(spec.difference) || spec.difference === 0)
@@ -286,8 +269,7 @@ function armlockLoop() {
   /* Make a loop. With sigma its roots are those of D less sigma, to count right of a line.
    *
    * spec: sensor, tau1, tau2, delay in s; zeros and poles as pairs [re, im] in rad/s, gain; for
-   * the dual sensors corner in rad/s and difference in s; for one's own m1, m2 and below,
-   * coefficients with the highest power first. */
+   * the dual sensors corner in rad/s and difference in s. */
   function make(spec, sigma = 0) {
     const tau1 = positive("tau1", "\u03c4\u2081", spec.tau1);
     const tau2 = positive("tau2", "\u03c4\u2082", spec.tau2);
@@ -330,6 +312,12 @@ function armlockLoop() {
     loop.scales = [1 / loop.longest,
       ...loop.parts.flatMap(part => [...part.a, ...part.re].map(Math.abs))].filter(a => a > 0);
     return loop;
+  }
+
+  /* Where equal arms return the same, the dual sensor has only their sum, and its poles cancel. */
+  function reduced(loop, c1, c2) {
+    const { spec, tau1, tau2, sigma } = loop;
+    return spec.sensor === "dual" && tau1 === tau2 && c1 === c2 ? make({ ...spec, sensor: "common" }, sigma) : loop;
   }
 
   /* The parameters of one point, with what is left of 1 - c and c2 - c1 after cancelling. */
@@ -520,7 +508,7 @@ function armlockLoop() {
   }
 
   /* Number of unstable roots at (c1, c2); BOUNDARY where one is on the axis as far as rounding
-   * can tell, UNCONFINED where the neutral root chain is not confined, UNSURE where it would
+   * can tell, UNCONFINED where the neutral root chain is not confined, UNDECIDED where it would
    * take too many steps.
    *
    * A root at s = 0 is left out where numerator and denominator of L both vanish there: it comes
@@ -531,6 +519,7 @@ function armlockLoop() {
     if (!Number.isFinite(c1) || !Number.isFinite(c2))
       throw new RangeError(`c1 and c2 must be finite numbers, got ${c1} and ${c2}`);
     const point = exact || at(loop, c1, c2);
+    if (point.between === 0) loop = reduced(loop, c1, c2);
     const end = tail(loop, point.c1, point.c2, loop.longest);
     if (!end) return UNCONFINED;
     const curve = new Curve(loop, point);
@@ -542,16 +531,16 @@ function armlockLoop() {
       // |F - j omega F'(0)| is at most |F'(0)| omega / 2 there: F turns by 30 degrees at most.
       const slope = Math.hypot(curve.dr, curve.di);
       do step *= 0.5, curve.over(step); while (curve.bend * step > slope && step > 1e-300);
-      if (!(slope > 0) || step <= 1e-300) return UNSURE;
+      if (!(slope > 0) || step <= 1e-300) return UNDECIDED;
       const { dr, di } = curve;
       curve.at(omega = step);
       argument = Math.atan2(curve.vi * dr - curve.vr * di, curve.vr * dr + curve.vi * di);
       // A quarter turn around the root, which is left of the path.
-      if (!(Math.abs(argument) < 0.6)) return UNSURE;
+      if (!(Math.abs(argument) < 0.6)) return UNDECIDED;
       argument += 0.5 * Math.PI;
     }
     for (let steps = 0; omega < end.omega; steps++) {
-      if (steps > most) return UNSURE;
+      if (steps > most) return UNDECIDED;
       const { vr, vi, dr, di } = curve;
       step = Math.min(4 * step, end.omega - omega);
       for (;;) {
@@ -576,7 +565,7 @@ function armlockLoop() {
       curve.vr * end.ar + curve.vi * end.ai);
     const found = (end.argument + last - argument) / Math.PI;
     const nearest = Math.round(found);
-    return Math.abs(found - nearest) < 1e-3 && nearest >= 0 ? nearest + 0 : UNSURE;
+    return Math.abs(found - nearest) < 1e-3 && nearest >= 0 ? nearest + 0 : UNDECIDED;
   }
 
   /* Whether numerator and denominator of L are both zero at s = 0, where a curve is. */
@@ -648,12 +637,31 @@ function armlockLoop() {
     return { to };
   }
 
+  /* The largest Re s to which the real parts of a neutral root chain tend, for all small changes of the
+   * delays; minus infinity without a chain. Where equal arms act against each other it is not looked for. */
+  function chainLimit(spec, c1, c2) {
+    const lost = sigma => {
+      const loop = make(spec, sigma), point = at(loop, c1, c2), [a, b1, b2] = chainLeads(loop);
+      return Math.abs(point.c1) * b1 + Math.abs(point.c2) * b2 >= a;
+    };
+    const { difference, second } = make(spec), apart = spec.tau1 !== spec.tau2;
+    let low = -50 / Math.max(spec.tau1, spec.tau2), high = 0;
+    if (!lost(low) || lost(high) || !apart && (difference || second * c1 * c2 < 0)) return -Infinity;
+    while (high - low > -1e-9 * low) {
+      const middle = 0.5 * (low + high);
+      if (lost(middle)) low = middle; else high = middle;
+    }
+    return low;
+  }
+
   /* The rightmost root at (c1, c2), null where counts right and left of it do not confirm it. Lines
    * Re s = low and high have it between them, by counts; Newton's method looks from one of them, at
-   * first from few frequencies. The root at s = 0 that `count` leaves out is not the loop's. */
+   * first from few frequencies. The root at s = 0 that `count` leaves out is not the loop's. Where no
+   * root lies right of the chain's limit the limit is given, with an infinite frequency. */
   function rightmost(spec, c1, c2) {
-    let low = -Infinity, high = Infinity, line = 0, step = 1 / Math.max(spec.tau1, spec.tau2);
-    const loop = make(spec), curve = new Curve(loop, at(loop, c1, c2));
+    const loop = reduced(make(spec), c1, c2), curve = new Curve(loop, at(loop, c1, c2));
+    ({ spec } = loop);
+    let low = chainLimit(spec, c1, c2), high = Infinity, line = 0, step = 1 / Math.max(spec.tau1, spec.tau2);
     curve.at(0);
     const cleared = vanishes(curve);
     const beyond = sigma => {
@@ -661,6 +669,7 @@ function armlockLoop() {
       if (number > 0) low = Math.max(low, sigma); else if (number === 0) high = Math.min(high, sigma);
       return number;
     };
+    if (low > -Infinity && beyond((1 - 1e-4) * low) === 0) return [low, Infinity];
     for (let attempt = 0; attempt < 16; attempt++) {
       if (beyond(line) < 0) return null;
       const found = newton(spec, line, c1, c2, attempt ? MOST_SAMPLES : 6000).find(([re, im]) =>
@@ -720,6 +729,6 @@ function armlockLoop() {
     return found.sort((p, q) => q[0] - p[0]);
   }
 
-  return { EPSILON, BOUNDARY, UNCONFINED, UNSURE, MOST_STEPS, SENSORS, make, at, beside, along, Curve, tail,
-    chainLeads, tangentDistance, vanishes, count, response, rightmost, rootsOf, times };
+  return { EPSILON, BOUNDARY, UNCONFINED, UNDECIDED, MOST_STEPS, SENSORS, make, reduced, at, beside, along, Curve, tail,
+    chainLeads, tangentDistance, vanishes, count, response, rightmost, rootsOf };
 }

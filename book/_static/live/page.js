@@ -27,8 +27,8 @@
 })();
 
 function armlockPages() {
-  const { TURN, say, duration, shortest, exact, written, list, readRoots, readPolynomial, readFraction,
-    readNumber, python, address, fromAddress } = armlockText;
+  const { TURN, say, duration, shortest, exact, written, readRoots, readController, readNumber, python, address,
+    fromAddress } = armlockText;
   const { element, nearest, Sheet, Chart, drawNyquist, drawBode, drawRoots, drawYear } = armlockDraw;
   const api = armlockLoop();
   Object.assign(api, armlockChart(api));
@@ -61,8 +61,7 @@ function armlockPages() {
     "The white paper's loop (modified dual)": [FLIGHT, 1, 2e-3],
   };
   const SENSORS = [["single", "single arm"], ["common", "common arm"],
-    ["difference", "difference of the arms"], ["dual", "dual"], ["modified", "modified dual"],
-    ["own", "one of your own"]];
+    ["difference", "difference of the arms"], ["dual", "dual"], ["modified", "modified dual"]];
   const LOST = "unstable at arbitrarily high frequency";
   const WORDS = { [-1]: "a root on the imaginary axis", [-2]: LOST, [-3]: "undecided" };
 
@@ -470,28 +469,17 @@ function armlockPages() {
     return element("label", { class: "live-field" }, element("span", {}, name), select);
   }
 
-  function save(name, blob) {
-    const link = element("a", { href: URL.createObjectURL(blob), download: name });
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-  }
-
   /* Zoom, download, and the ghost, of any explorer. */
   function tools(live, file, ...more) {
-    const counts = () => {
-      if (!live.chart.grid) return;
-      const { counts, n, x0, x1, y0, y1 } = live.chart.grid;
-      const at = (low, high, i) => low + (high - low) * i / (n - 1);
-      const rows = Array.from(counts, (count, k) =>
-        `${at(x0, x1, k % n)},${at(y0, y1, Math.floor(k / n))},${count}\n`);
-      save(`${file}.csv`, new Blob(["c1 [1],c2 [1],unstable roots [1]\n", ...rows]));
-    };
     const pin = element("button", { type: "button", "aria-pressed": "false", onclick: () => {
       pin.setAttribute("aria-pressed", String(live.pin()));
     } }, "Pin this loop");
     return buttons(button("Zoom in", () => live.chart.zoom(0.5)), button("Zoom out", () => live.chart.zoom(2)),
-      ...more, pin, button("CSV", counts),
-      button("PNG", () => live.chart.sheet.picture(blob => save(`${file}.png`, blob))));
+      ...more, pin, button("PNG", () => live.chart.sheet.picture(blob => {
+        const link = element("a", { href: URL.createObjectURL(blob), download: `${file}.png` });
+        link.click();
+        setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+      })));
   }
 
   function legend() {
@@ -559,15 +547,14 @@ function armlockPages() {
     live.moved = step => {
       if (!live.spec) return;
       const hash = address(live.spec, live.chart, unit);
-      code.textContent = python(live.spec, live.kept, fraction() ? 1 : unit);
+      code.textContent = python(live.spec, live.kept, unit);
       orbit.href = `in_orbit.html${hash}`;
       if (quiet) return;
       // A point that goes on moving is one step, and another view is none.
       const further = step && hash !== location.hash && !(step === "point" && before === "point");
       before = step || before;
       const write = () => {
-        const values = Object.entries(fields).map(([name, field]) => [name, field.value]);
-        history[further ? "pushState" : "replaceState"]({ values, chosen, depth }, "", hash);
+        history[further ? "pushState" : "replaceState"]({ chosen, depth }, "", hash);
         undo.disabled = !depth;
       };
       clearTimeout(later);
@@ -584,7 +571,6 @@ function armlockPages() {
     };
     const NAMES = { tau1: "\u03c4\u2081", tau2: "\u03c4\u2082", delay: "The dead time", gain: "The gain",
       corner: "The corner", difference: "\u0394\u03c4" };
-    const fraction = () => fields.form.value === "fraction";
 
     /* The loop that the fields hold; throws an error that names its field. */
     const read = () => {
@@ -592,20 +578,8 @@ function armlockPages() {
       for (const name of ["tau1", "tau2", "delay", "gain"]) spec[name] = readNumber(name, fields[name].value, NAMES[name]);
       if (["dual", "modified"].includes(spec.sensor)) for (const name of ["corner", "difference"])
         spec[name] = readNumber(name, fields[name].value, NAMES[name]) * (name === "corner" ? unit : 1);
-      if (spec.sensor === "own") for (const name of ["m1", "m2", "below"])
-        spec[name] = readPolynomial(name, fields[name].value, "It");
-      if (fraction()) {
-        const [above, under] = ["above", "under"].map(name => {
-          const found = readPolynomial(name, fields[name].value, "It");
-          if (found.some(v => v !== 0)) return found;
-          throw Object.assign(new RangeError("It must not be zero."), { field: name });
-        });
-        [spec.zeros, spec.poles] = [above, under].map(api.rootsOf);
-        spec.gain *= above.find(v => v !== 0) / under.find(v => v !== 0);
-      } else {
-        for (const [name, title] of [["zeros", "Zeros"], ["poles", "Poles"]])
-          spec[name] = readRoots(name, fields[name].value, title).map(v => v.map(x => x * unit));
-      }
+      for (const [name, title] of [["zeros", "Zeros"], ["poles", "Poles"]])
+        spec[name] = readRoots(name, fields[name].value, title).map(v => v.map(x => x * unit));
       api.make(spec);
       return spec;
     };
@@ -614,12 +588,12 @@ function armlockPages() {
     const take = (edited = null, moving = false, dragged = false) => {
       for (const name of Object.keys(errors)) blame(name, "");
       try {
-        // A whole fraction goes to its two fields.
-        const found = ["zeros", "poles", "above", "under"].includes(edited) && readFraction(edited, fields[edited].value);
-        if (found) {
-          [fields.above.value, fields.under.value, fields.gain.value] = [...found, "1"];
-          fields.form.value = form = "fraction";
-          shape();
+        if (edited === "pasted") {
+          const [above, under] = readController("pasted", fields.pasted.value);
+          if (!above.some(v => v)) throw Object.assign(new RangeError("It must not be zero."), { field: "pasted" });
+          fields.gain.value = exact(above.find(v => v) / under.find(v => v));
+          [fields.zeros.value, fields.poles.value] = [above, under].map(part => written(api.rootsOf(part), unit));
+          fields.pasted.value = "";
         }
         const spec = read();
         wrong.textContent = "";
@@ -631,18 +605,15 @@ function armlockPages() {
           range = [Math.min(...root, 1 / spec.tau1), Math.max(...root, 1 / spec.tau1)];
           if (range[1] < 100 * range[0]) range = [range[0] / 10, range[1] * 10];
         }
-        const changed = chosen !== null && !same(spec, PRESETS[chosen][0]);
+        const changed = chosen !== null && python(spec, [1, 1], 1) !== python(PRESETS[chosen][0], [1, 1], 1);
         state.textContent = chosen === null ? "from a link" : changed ? "changed" : "";
         reset.hidden = !changed;
         live.set(spec, moving);
         roots.draw();
         if (!moving) live.moved("loop");
       } catch (error) {
-        const pair = fraction() ? ["above", "under"] : ["zeros", "poles"];
         // Too few poles are too many zeros: the field that was edited is the one to look at.
-        const name = error.field === "zeros" || error.field === "poles"
-          ? pair.includes(edited) ? edited : pair[Number(error.field === "poles")]
-          : fields[error.field] ? error.field : "sensor";
+        const name = error.field === "zeros" && edited === "poles" ? edited : fields[error.field] ? error.field : "sensor";
         blame(name, error.message);
         wrong.textContent = error.message;
         live.none("There is no loop to show: a field holds none.");
@@ -651,52 +622,23 @@ function armlockPages() {
         roots.draw();
       }
     };
-    const same = (a, b) => {
-      const digits = (_, v) => typeof v === "number" ? v.toPrecision(12) : v;
-      const sorted = all => all.map(v => JSON.stringify(v, digits)).sort();
-      const plain = spec => JSON.stringify([spec.sensor, spec.tau1, spec.tau2, spec.delay, spec.gain,
-        sorted(spec.zeros), sorted(spec.poles), ...["dual", "modified"].includes(spec.sensor)
-          ? [spec.corner, spec.difference] : []], digits);
-      return plain(a) === plain(b);
-    };
-
     const put = spec => {
-      fields.form.value = form = "roots";
       for (const name of ["sensor", "tau1", "tau2", "delay", "gain", "difference"])
         if (spec[name] !== undefined) fields[name].value = String(spec[name]);
       if (spec.corner !== undefined) fields.corner.value = shortest(spec.corner, unit);
       for (const name of ["zeros", "poles"]) fields[name].value = written(spec[name], unit);
-      for (const name of ["m1", "m2", "below"]) if (spec[name]) fields[name].value = list(spec[name]);
       shape();
     };
     const shape = () => {
-      const two = ["dual", "modified"].includes(fields.sensor.value), mapped = fields.sensor.value === "own";
-      const shown = { corner: two, difference: two, m1: mapped, m2: mapped, below: mapped, zeros: !fraction(),
-        poles: !fraction(), above: fraction(), under: fraction() };
-      for (const [name, on] of Object.entries(shown)) fields[name].closest(".live-field").hidden = !on;
+      const two = ["dual", "modified"].includes(fields.sensor.value);
+      for (const name of ["corner", "difference"]) fields[name].closest(".live-field").hidden = !two;
     };
-    /* The same controller in the other form. */
-    let form = "roots";
-    const convert = () => {
-      const { spec } = live, next = fields.form.value;
-      if (spec && next !== form) {
-        put(spec);
-        const product = all => all.reduce((p, [re, im]) => im < 0 ? p : api.times(p,
-          im ? [1, -2 * re, re * re + im * im] : [1, -re]), [1]);
-        [fields.above.value, fields.under.value] = [spec.zeros, spec.poles].map(all => list(product(all)));
-        fields.form.value = next;
-      }
-      form = next;
-      shape();
-      take("form");
-    };
-    const field = (name, label, { area = false, value = "", wide = area } = {}) => {
+    const field = (name, label, area = false) => {
       fields[name] = element(area ? "textarea" : "input", { id: id(name), spellcheck: "false",
         autocomplete: "off", autocapitalize: "off", rows: area ? 2 : null,
         "aria-describedby": id(`${name}-wrong`), onchange: () => take(name) });
-      fields[name].value = value;
       errors[name] = element("span", { id: id(`${name}-wrong`), class: "live-wrong" });
-      return element("div", { class: `live-field${wide ? " live-wide" : ""}` },
+      return element("div", { class: `live-field${area ? " live-wide" : ""}` },
         element("label", { for: id(name) }, label), fields[name], errors[name]);
     };
     const select = (name, title, options, changed) => {
@@ -745,20 +687,13 @@ function armlockPages() {
         // The loop stays what it is; the fields say it in the other unit.
         const { spec } = live;
         unit = value === "hz" ? TURN : 1;
-        if (spec && fraction()) fields.corner.value = shortest(spec.corner || 0, unit);
-        else if (spec) put(spec);
+        if (spec) put(spec);
         take("unit");
       }),
       field("corner", "Sensor\u2019s corner"), field("difference", "Sensor\u2019s \u0394\u03c4 in s"),
-      field("m1", "Weight m1: numerator", { value: "1", wide: true }),
-      field("m2", "Weight m2: numerator", { value: "1", wide: true }),
-      field("below", "Their denominator", { value: "1", wide: true }),
-      select("form", "Controller given by", [["roots", "zeros and poles"],
-        ["fraction", "numerator and denominator"]], convert),
-      field("zeros", "Zeros", { area: true }), field("poles", "Poles", { area: true }),
-      field("above", "Numerator, highest power first, or in s", { area: true, value: "1" }),
-      field("under", "Denominator", { area: true, value: "s" }));
-    fields.form.closest("label").classList.add("live-wide");
+      field("pasted", "Paste a controller in s, as MATLAB or python-control print it", true),
+      field("zeros", "Zeros", true), field("poles", "Poles", true));
+    fields.pasted.placeholder = "(s + 0.02)/(s^2 + 0.1 s)";
 
     /* The s-plane: a root follows the pointer, a pair together; a root at 0 stays. */
     let range = [0.01, 1], plane = null, caught = null;
@@ -830,14 +765,14 @@ function armlockPages() {
         element("figure", {}, element("figcaption", {}, "Drag a pole (\u00d7) or a zero (\u25cb)"), roots.canvas),
         inputs, legend(), buttons(copied, orbit))), lines);
 
-    const open = () => {
+    const open = name => {
       quiet = true;
       clearTimeout(later);
-      preset.querySelector("select").value = "";
+      preset.querySelector("select").value = name || "";
       try {
         const given = fromAddress(location.hash);
         if (given) {
-          chosen = null;
+          chosen = name;
           api.make(given.spec);
           show(given.spec, given.centre, given.half, given.held, given.unit);
         } else start(Object.keys(PRESETS)[0]);
@@ -856,22 +791,10 @@ function armlockPages() {
       depth = kept?.depth || 0;
       undo.disabled = !depth;
       before = null;
-      if (!kept) { open(); return; }
-      quiet = true;
-      clearTimeout(later);
-      const { centre, half, held, unit: then } = fromAddress(location.hash);
-      [unit, chosen] = [then, kept.chosen];
-      for (const [name, value] of kept.values) fields[name].value = value;
-      form = fields.form.value;
-      preset.querySelector("select").value = chosen;
-      live.chart.held = held;
-      shape();
-      live.chart.show(centre, half);
-      take();
-      quiet = false;
+      open(kept?.chosen ?? null);
     });
     undo.disabled = true;
-    open();
+    open(null);
   }
 
   /* A year in orbit: the arms, what the sensor holds, and where the loop stands each day. */
