@@ -598,7 +598,7 @@ function armlockLoop() {
 
   /* Frequencies that show the loop at one point, and the roots near the axis. */
   function around(loop, c1, c2, most) {
-    const end = tail(loop, c1, c2, loop.longest);
+    const point = at(loop, c1, c2), end = tail(loop, point.c1, point.c2, loop.longest);
     const top = Math.max(end ? 3 * end.omega : 0, 20 / loop.longest);
     return frequencies(loop, top, 0.1 * Math.min(...loop.scales), most);
   }
