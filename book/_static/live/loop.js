@@ -307,7 +307,8 @@ function armlockLoop() {
     const loop = { spec, sigma, tau1, tau2, delay, second: sensor.second, below: all,
       rest: new Product(1, above, all), common: new Product(gain, zeros.map(shifted), own),
       sum: part(sensor.sum, 0), difference: part(sensor.difference, 1),
-      longest: Math.max(tau1, tau2) + delay };
+      longest: Math.max(tau1, tau2) + delay,
+      phase: { omega: NaN, x1: 0, y1: 0, x2: 0, y2: 0, er: 0, ei: 0, fr: 1, fi: 0 } };
     loop.parts = [loop.rest, loop.common, loop.sum, loop.difference].filter(part => part);
     loop.scales = [1 / loop.longest,
       ...loop.parts.flatMap(part => [...part.a, ...part.re].map(Math.abs))].filter(a => a > 0);
@@ -342,6 +343,23 @@ function armlockLoop() {
     return { c1: d1, c2: d2, left1: -d1, left2: -d2, between: d2 - d1 };
   }
 
+  /* exp(-s tau) - 1 of both arms, so that nothing cancels where omega is small, 1 - exp(-s (tau1 - tau2)),
+   * and the dead time's exponential: once for all curves of a loop. */
+  function phases({ phase, tau1, tau2, delay }, omega) {
+    if (phase.omega === omega) return phase;
+    phase.omega = omega;
+    const s1 = Math.sin(0.5 * omega * tau1), s2 = Math.sin(0.5 * omega * tau2);
+    phase.x1 = -2 * s1 * s1;
+    phase.y1 = -2 * s1 * Math.cos(0.5 * omega * tau1);
+    phase.x2 = -2 * s2 * s2;
+    phase.y2 = -2 * s2 * Math.cos(0.5 * omega * tau2);
+    const half = 0.5 * omega * (tau1 - tau2), s = Math.sin(half);
+    phase.er = 2 * s * s;
+    phase.ei = 2 * s * Math.cos(half);
+    if (delay) [phase.fr, phase.fi] = [Math.cos(omega * delay), -Math.sin(omega * delay)];
+    return phase;
+  }
+
   /* F along the axis at one point: value and derivative, and bounds over a step. */
   class Curve {
     constructor(loop, point) {
@@ -358,11 +376,8 @@ function armlockLoop() {
     join(omega) {
       const { rest, common, sum, difference, tau1, tau2, delay, second } = this.loop;
       const { c1, c2, left1, left2, between } = this.point;
+      const { x1, y1, x2, y2, er, ei, fr, fi } = phases(this.loop, omega);
       this.omega = omega;
-      const s1 = Math.sin(0.5 * omega * tau1), k1 = Math.cos(0.5 * omega * tau1);
-      const s2 = Math.sin(0.5 * omega * tau2), k2 = Math.cos(0.5 * omega * tau2);
-      // E - 1, so that nothing cancels where omega is small.
-      const x1 = -2 * s1 * s1, y1 = -2 * s1 * k1, x2 = -2 * s2 * s2, y2 = -2 * s2 * k2;
       let vr = 0, vi = 0, dr = 0, di = 0;
       // d(1 - c E)/d omega = j c tau E
       const p1r = -c1 * tau1 * y1, p1i = c1 * tau1 * (1 + x1);
@@ -379,9 +394,6 @@ function armlockLoop() {
       }
       if (difference) {
         // c2 E2 - c1 E1 = (c2 - c1) E1 + c2 E2 (1 - exp(-s (tau1 - tau2)))
-        const half = 0.5 * omega * (tau1 - tau2);
-        const sh = Math.sin(half), ch = Math.cos(half);
-        const er = 2 * sh * sh, ei = 2 * sh * ch;
         const wr = between * (1 + x1) + c2 * ((1 + x2) * er - y2 * ei);
         const wi = between * y1 + c2 * ((1 + x2) * ei + y2 * er);
         const tr = p1r - p2r, ti = p1i - p2i;
@@ -395,10 +407,9 @@ function armlockLoop() {
         common.dr * vi + common.di * vr + common.vr * di + common.vi * dr];
       [vr, vi] = [common.vr * vr - common.vi * vi, common.vr * vi + common.vi * vr];
       if (delay) {
-        const er = Math.cos(omega * delay), ei = -Math.sin(omega * delay);
         [dr, di] = [dr + delay * vi, di - delay * vr];
-        [dr, di] = [dr * er - di * ei, dr * ei + di * er];
-        [vr, vi] = [vr * er - vi * ei, vr * ei + vi * er];
+        [dr, di] = [dr * fr - di * fi, dr * fi + di * fr];
+        [vr, vi] = [vr * fr - vi * fi, vr * fi + vi * fr];
       }
       // The open loop is L = (lr + j li) / rest.
       this.lr = vr; this.li = vi;

@@ -264,6 +264,7 @@ function armlockPages() {
       this.out.textContent = why;
       this.note.textContent = this.following.textContent = this.ready.textContent = "";
       this.numbers.replaceChildren();
+      this.listed = null;
       this.draw();
     }
 
@@ -407,6 +408,9 @@ function armlockPages() {
         ["Critical perturbation from (1, 1)", ...["(1, \u22121)", "(\u22121, 1)", "(1, 1)", "(\u22121, \u22121)"].map(
           (way, k) => [`along ${way}`, of(b => broken(b[k]), one => one.breaks)])],
       ];
+      const text = JSON.stringify(parts);
+      if (text === this.listed) return;
+      this.listed = text;
       this.numbers.replaceChildren(element("thead", {}, element("tr", {},
         ...["Number", "This loop", "Pinned"].slice(0, 1 + designs.length)
           .map(text => element("th", { scope: "col" }, text)))),
@@ -609,7 +613,7 @@ function armlockPages() {
         state.textContent = chosen === null ? "from a link" : changed ? "changed" : "";
         reset.hidden = !changed;
         live.set(spec, moving);
-        roots.draw();
+        if (!dragged || caught) roots.draw();
         if (!moving) live.moved("loop");
       } catch (error) {
         // Too few poles are too many zeros: the field that was edited is the one to look at.
