@@ -184,7 +184,7 @@ function armlockChart(api) {
     const endOf = share => tail(loop, share * most[0], share * most[1], loop.longest)?.omega ?? Infinity;
     let end = endOf(reach);
     const starts = new Int32Array(ny).fill(base), doubtful = new Uint8Array(ny);
-    if (loop.second || loop.difference) {
+    if (loop.second || loop.difference.gain) {
       const change = new Int32Array(ny + 1), lines = new Lines(loop, true);
       let total = base;
       const came = crossings(lines, [bx - 1], Math.min(y0, by) - 1, Math.max(y1, by) - 1, py, end, samples,

@@ -32,8 +32,7 @@ function armlockMargins(api) {
     /* From the loop's factors at omega; at infinity and down from it, omega is null. */
     look(omega) {
       const { rest, common, sum, difference, second, delay } = this.loop;
-      const sr = sum ? sum.vr : 0, si = sum ? sum.vi : 0;
-      const tr = difference ? difference.vr : 0, ti = difference ? difference.vi : 0;
+      const { vr: sr, vi: si } = sum, { vr: tr, vi: ti } = difference;
       let cr = (1 + second) * (common.vr * sr - common.vi * si);
       let ci = (1 + second) * (common.vr * si + common.vi * sr);
       const k = Math.hypot(common.vr, common.vi);
@@ -58,8 +57,7 @@ function armlockMargins(api) {
     /* Radius of a disc around the same centre that holds those of the whole step. */
     over(h) {
       const { rest, common, sum, difference, second } = this.loop;
-      const s0 = sum ? sum.b0 : 0, s1 = sum ? sum.b1 : 0;
-      const t0 = difference ? difference.b0 : 0, t1 = difference ? difference.b1 : 0;
+      const { b0: s0, b1: s1 } = sum, { b0: t0, b1: t1 } = difference;
       const least = this.size - h * rest.b1, size = Math.hypot(this.re, this.im);
       if (!(least > 0)) return Infinity;
       const centre = (1 + second)

@@ -272,18 +272,19 @@ function armlockPages() {
      * that takes long. */
     set(spec, moving = false) {
       this.drop(this.design);
-      this.design = this.made(spec, moving ? 1200 : 9000);
+      this.design = this.made(spec);
       this.chart.broken = null;
       this.lit = this.chart.lit = null;
       this.redraw(moving);
       this.tell(moving);
     }
 
-    made(spec, samples) {
-      const loop = api.make(spec), { x0, x1, y0, y1 } = this.chart.box;
-      // Parameters as large as the view has them: their response shows the most.
-      const most = [[x0, x1], [y0, y1]].map(pair => Math.max(...pair.map(Math.abs), 1));
-      return { spec, loop, kept: {}, told: {}, responded: api.response(loop, ...most, samples) };
+    made(spec) { return { spec, loop: api.make(spec), kept: {}, told: {} }; }
+
+    /* The open loop at the point, from few frequencies while the hand moves. */
+    respond() {
+      for (const one of this.designs) one.response = api.response(one.loop, ...this.point, this.rough ? 1200 : 9000);
+      this.draw();
     }
 
     redraw(moving = false) {
@@ -341,9 +342,8 @@ function armlockPages() {
       for (const one of this.designs) {
         this.drop(one, TOLD.filter(kind => kind !== "breaks"));
         one.told = this.chart.hover ? {} : one.kept[point] ||= {};
-        one.response = one.responded.to(...point);
       }
-      this.draw();
+      this.respond();
       this.write();
       const { told } = this.design;
       if (told.count === undefined) this.near.ask("point", [this.spec, ...point], (count, error) => {
@@ -372,8 +372,10 @@ function armlockPages() {
     /* Ask for what takes longer. */
     settle() {
       const { point } = this;
-      this.rough = false;
-      this.draw();
+      if (this.rough) {
+        this.rough = false;
+        this.respond();
+      }
       for (const one of this.designs) for (const kind of TOLD) {
         const { told } = one, breaks = kind === "breaks";
         if ((breaks ? one.breaks : told[kind]) !== undefined || breaks && one.breaking) continue;
@@ -427,7 +429,7 @@ function armlockPages() {
     /* Pin the design as it is: what follows is seen against it, in all plots and numbers. */
     pin() {
       if (this.pinned) this.drop(this.pinned);
-      this.pinned = this.pinned || !this.design ? null : { ...this.made(this.spec, 9000), breaks: this.design.breaks };
+      this.pinned = this.pinned || !this.design ? null : { ...this.made(this.spec), breaks: this.design.breaks };
       this.chart.ghost = this.pinned && this.chart.curve;
       this.tell(false);
       return Boolean(this.pinned);
@@ -543,9 +545,9 @@ function armlockPages() {
     const id = name => `${live.id}-${name}`, fields = {}, errors = {};
     const code = element("pre", { class: "live-code", "aria-label": "Python" });
     const orbit = element("a", {}, "Open this loop in orbit");
-    // The unit of the fields, the gain from which its slider goes, the preset, the steps that Undo can
-    // take back; `quiet` while the page itself changes what it shows.
-    let unit = 1, base = 1, chosen = null, depth = 0, quiet = true, before = null, later = 0;
+    // The unit of the fields, the gain from which its slider goes, the steps that Undo can take back;
+    // `quiet` while the page itself changes what it shows.
+    let unit = 1, base = 1, depth = 0, quiet = true, before = null, later = 0;
 
     /* The address holds the loop, and its history undoes what was done to it. */
     live.moved = step => {
@@ -558,7 +560,7 @@ function armlockPages() {
       const further = step && hash !== location.hash && !(step === "point" && before === "point");
       before = step || before;
       const write = () => {
-        history[further ? "pushState" : "replaceState"]({ chosen, depth }, "", hash);
+        history[further ? "pushState" : "replaceState"]({ depth }, "", hash);
         undo.disabled = !depth;
       };
       clearTimeout(later);
@@ -609,9 +611,7 @@ function armlockPages() {
           range = [Math.min(...root, 1 / spec.tau1), Math.max(...root, 1 / spec.tau1)];
           if (range[1] < 100 * range[0]) range = [range[0] / 10, range[1] * 10];
         }
-        const changed = chosen !== null && python(spec, [1, 1], 1) !== python(PRESETS[chosen][0], [1, 1], 1);
-        state.textContent = chosen === null ? "from a link" : changed ? "changed" : "";
-        reset.hidden = !changed;
+        presets.value = Object.keys(PRESETS).find(name => same(spec, PRESETS[name][0])) || "";
         live.set(spec, moving);
         if (!dragged || caught) roots.draw();
         if (!moving) live.moved("loop");
@@ -626,6 +626,13 @@ function armlockPages() {
         roots.draw();
       }
     };
+    const same = (a, b) => {
+      const all = spec => ["sensor", "tau1", "tau2", "delay", "gain", "zeros", "poles",
+        ...["dual", "modified"].includes(spec.sensor) ? ["corner", "difference"] : []].map(name =>
+        [spec[name]].flat(2).map(v => typeof v === "number" ? v.toPrecision(12) : v).sort()).join("|");
+      return all(a) === all(b);
+    };
+
     const put = spec => {
       for (const name of ["sensor", "tau1", "tau2", "delay", "gain", "difference"])
         if (spec[name] !== undefined) fields[name].value = String(spec[name]);
@@ -665,14 +672,13 @@ function armlockPages() {
       take();
     };
     const start = name => {
-      preset.querySelector("select").value = chosen = name;
       const [spec, centre, half] = PRESETS[name];
       show(spec, [centre, centre], half, null);
     };
 
-    const state = element("span", { class: "live-state", role: "status" });
-    const reset = button("Reset", () => start(chosen));
-    const preset = choice(id("preset"), "Start from", Object.keys(PRESETS).map(name => [name, name]), start);
+    const preset = choice(id("preset"), "Start from", [["", "\u2014 your own loop \u2014"],
+      ...Object.keys(PRESETS).map(name => [name, name])], name => { if (name) start(name); });
+    const presets = preset.querySelector("select");
     const gain = slider(id("factor"), "Drag the gain: times", -2, 2, 0, v => say(10 ** v), (v, moving) => {
       fields.gain.value = exact(+(base * 10 ** v).toPrecision(6));
       take("gain", moving, true);
@@ -760,7 +766,7 @@ function armlockPages() {
     const lines = element("details", {}, element("summary", {}, "This loop in Python"), code);
     const [nyquist, bode] = live.plots;
     place.replaceChildren(element("div", { class: "live-own" },
-      element("div", { class: "live-top" }, element("div", { class: "live-start" }, preset, state, reset, undo),
+      element("div", { class: "live-top" }, element("div", { class: "live-start" }, preset, undo),
         wrong, gain, dead),
       element("div", { class: "live-main" }, figures(live.figure, nyquist.figure),
         tools(live, "loop", button("Paper\u2019s square", () => live.chart.show([1, 1], 3e-6)),
@@ -769,14 +775,13 @@ function armlockPages() {
         element("figure", {}, element("figcaption", {}, "Drag a pole (\u00d7) or a zero (\u25cb)"), roots.canvas),
         inputs, legend(), buttons(copied, orbit))), lines);
 
-    const open = name => {
+    const open = () => {
       quiet = true;
       clearTimeout(later);
-      preset.querySelector("select").value = name || "";
+      presets.value = "";
       try {
         const given = fromAddress(location.hash);
         if (given) {
-          chosen = name;
           api.make(given.spec);
           show(given.spec, given.centre, given.half, given.held, given.unit);
         } else start(Object.keys(PRESETS)[0]);
@@ -784,8 +789,7 @@ function armlockPages() {
         live.none("There is no loop to show.");
         shape();
         roots.draw();
-        code.textContent = state.textContent = "";
-        reset.hidden = true;
+        code.textContent = "";
         wrong.textContent = `The address of this page holds no loop: ${error.message.replace(/\.$/, "")}. It was left as it is. Choose `
           + "a loop to start from, or mend the address.";
       }
@@ -795,10 +799,10 @@ function armlockPages() {
       depth = kept?.depth || 0;
       undo.disabled = !depth;
       before = null;
-      open(kept?.chosen ?? null);
+      open();
     });
     undo.disabled = true;
-    open(null);
+    open();
   }
 
   /* A year in orbit: the arms, what the sensor holds, and where the loop stands each day. */
