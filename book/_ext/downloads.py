@@ -1,4 +1,4 @@
-"""Below each figure: links to its files, `figures/NAME.svg` and `figures/NAME.csv`, and to its cell.
+"""Links below each figure: to its files, `figures/NAME.svg` and `.csv`, and to its cell.
 
 `tools/collect_figures.py` writes the files. NAME is the name of the figure without `fig-`.
 """
@@ -30,7 +30,8 @@ def link(app, doctree):
                     f'<a href="{up}figures/{file.name}" download>{file.suffix[1:].upper()}</a>'
                     for file in files
                 )
-                text = f'<p class="figure-downloads">This figure: {links}, {made_by(figure)}</p>'
+                text = f"{links}, {made_by(figure)}"
+                text = f'<p class="figure-downloads">This figure: {text}</p>'
                 figure.parent.insert(
                     figure.parent.index(figure) + 1, nodes.raw("", text, format="html")
                 )
