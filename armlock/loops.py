@@ -40,6 +40,8 @@ from armlock.checks import (
     true_or_false,
 )
 from armlock.controllers import Controller, integrating_actuator, table_two, white_paper
+from armlock.engine import polynomials
+from armlock.engine.functions import Function
 from armlock.sensors import COMMON, SINGLE, SignalMapping, modified_dual
 
 if TYPE_CHECKING:
@@ -233,6 +235,38 @@ class Loop(CharacteristicFunction):
                 polynomials.append(_factored(product, k.zeros, both))
                 shares.append((0.0, 0.5, 0.5 * sign))
         return tuple(polynomials), np.array(shares).T.copy()
+
+    def basis(self) -> tuple[list[polynomials.Polynomial], list[list[Fraction]]]:
+        """Return R, B1 + B2 and B1 - B2, and the shares of them in R, B1 and B2.
+
+        Where the arms cancel, as in a difference or in the integral of the dual sensor, they do
+        so in these polynomials, and not in what a walk evaluates.
+        """
+        of, of_roots = polynomials.Polynomial.of, polynomials.Polynomial.of_roots
+        k, m = self.controller, self.mapping
+        arms = [[Fraction(value) for value in p] for p in (m.numerator1, m.numerator2)]
+        rest = of_roots(k.poles) * of(m.denominator)
+        if all(map(any, arms)):
+            pairs = list(zip_longest(*arms, fillvalue=Fraction(0)))
+            half = Fraction(1, 2)
+            parts = [[a + b for a, b in pairs], [a - b for a, b in pairs]]
+            shares = [[Fraction(0), Fraction(0)], [half, half], [half, -half]]
+        else:
+            parts = arms
+            shares = [[Fraction(int(i == k)) for k in (1, 2)] for i in range(3)]
+        kept = [k for k, p in enumerate(parts) if any(p)]
+        made = [rest, *(of_roots(k.zeros, k.gain) * of(parts[i]) for i in kept)]
+        common = min(p.order for p in made)
+        return [p.over_powers(common) for p in made], [
+            [Fraction(int(i == 0)), *(shares[i][j] for j in kept)] for i in range(3)
+        ]
+
+    def quotient(
+        self, c1: float | Fraction = 1.0, c2: float | Fraction = 1.0
+    ) -> tuple[Function, Function]:
+        """Return N and M of L = N / M at one point as functions of the engine, exactly."""
+        below = self.terms.rest
+        return self.function(c1, c2) + below * -1, below
 
     def arm_responses(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """Evaluate K m1 exp(-s delay) and K m2 exp(-s delay), factor by factor.

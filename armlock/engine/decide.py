@@ -89,7 +89,7 @@ def counts(
         If a count takes too many steps.
     """
     n = len(steady)
-    ends = 2.0 * space.confined_from(steady, delayed)
+    ends = space.confined_from(steady, delayed) * (1.0 if space.step else 2.0)
     order, begin = (leading.order, leading.radius) if leading else (0, 0.0)
     found = np.full(n, UNCONFINED, dtype=np.int64)
     here = np.flatnonzero(np.isfinite(ends))
@@ -118,9 +118,13 @@ def counts(
     values = inclusion.values(space.arrays, steady[here], delayed[here], np.zeros(1))[0]
     direction = leading.direction if leading else np.sign(values[:, 0].real)
     still = np.sign(space.limits(steady[here], delayed[here])[0]) * 1j ** (space.degree % 4)
+    if space.step:
+        # There the function of a map is real.
+        still = np.sign(last.real)
     with np.errstate(all="ignore"):
         turn = turn + np.angle(first / direction) - np.angle(last / still)
-    number = 0.5 * (space.degree - order) - turn / np.pi
+    # A map counts zeros in the strip |Im s| < pi / step, at whose right end it is constant.
+    number = (0.0 if space.step else 0.5 * (space.degree - order)) - turn / np.pi
     with np.errstate(invalid="ignore"):
         sure = np.isnan(undecided) & (np.abs(number - np.round(number)) < 1e-2)
         found[here] = np.where(sure & (number > -0.5), np.round(number), BOUNDARY)
