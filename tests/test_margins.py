@@ -144,7 +144,7 @@ def test_critical_perturbation_to_nine_digits(angle):
     ("loop", "direction"),
     [
         (SingleArm(), (-1.0, 0.0)),
-        (SingleArm(gain=3.0, tau=2.0), (-2.0, 5.0)),
+        (SingleArm(gain=3.0, tau1=2.0), (-2.0, 5.0)),
         (CommonArm(), (-1.0, 0.3)),
         (CommonArm(), (-1.0, -1.0)),
         (CommonArm(gain=0.1), (-0.2, -1.0)),

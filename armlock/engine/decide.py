@@ -444,7 +444,7 @@ def _likely(family: Family, goal: int, low: float, high: float, start: float) ->
     else:
         k = np.flatnonzero((crossing[1:] < 0.0) != (crossing[:-1] < 0.0))
         share = crossing[k] / (crossing[k] - crossing[k + 1])
-        with np.errstate(invalid="ignore"):
+        with np.errstate(invalid="ignore", divide="ignore"):
             if goal == REAL:
                 # It may pass through infinity, but one over it does not.
                 rough = 1.0 / value[k] + share * (1.0 / value[k + 1] - 1.0 / value[k])
