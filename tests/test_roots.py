@@ -24,7 +24,6 @@ from armlock import (
 )
 from armlock.loops import flight_loop
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
-from armlock.stability.roots import extended_root
 from book.companion.schemes import pseudospectral_roots
 from tests import independent
 

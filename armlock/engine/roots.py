@@ -181,6 +181,9 @@ class _Search:
         wider = np.pad(length, 1, constant_values=np.inf)
         s = s[(length <= wider[:-2]) & (length < wider[2:])]
         s = s[np.argsort(-s.real, kind="stable")][:_MOST_STARTS]
+        # Next to lightly damped poles rounding may hide D; its zeros there lie next to them.
+        own = self.function.space.arrays
+        s = np.append(s, np.unique(own.roots[own.present]) + 1e-3j * _SLOWEST * line.turn)
         self.steps += _STEPS * s.size
         for _ in range(_STEPS):
             with np.errstate(all="ignore"):
