@@ -39,7 +39,7 @@ _STEPS, _EXTENDED_STEPS = 12, 100
 _MOST_TRIED = 8
 # Zeros down to so many times one over the longest delay are looked for in steps of their size.
 _SLOWEST = 1e-9
-# Right of a line so many times one over the longest delay to the left an exponential is no float.
+# So many times one over the longest delay left of the axis an exponential is no float.
 _LARGEST_EXPONENT = 600.0
 # Digits of a zero, and those that cancelling terms and multiple zeros take besides.
 _DIGITS, _GUARD_DIGITS = 20, 80
@@ -150,7 +150,10 @@ class _Search:
         return found
 
     def _moved(self, s: ComplexArray, move: ComplexArray) -> tuple[ComplexArray, FloatArray]:
-        """Return where steps F over F' of Newton's method lead for F(s) / s^common, and how far."""
+        """Return where Newton's method for F(s) / s^common leads, and how far.
+
+        `move` is F over its derivative at s.
+        """
         with np.errstate(all="ignore"):
             if self.common:
                 move = move / (1.0 - self.common * move / s)
@@ -174,8 +177,7 @@ class _Search:
             _MOST_POINTS,
         )  # fmt: skip
         self.steps += grid.size
-        s = sigma + 1j * grid
-        s, length = self._moved(s, move)
+        s, length = self._moved(sigma + 1j * grid, move)
         # From where a step of Newton's method is locally shortest: no zero close to the line
         # lies between two of its points.
         wider = np.pad(length, 1, constant_values=np.inf)

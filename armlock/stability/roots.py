@@ -14,7 +14,7 @@ from armlock.characteristic import CharacteristicFunction, broadcast_parameters
 from armlock.checks import ComplexArray
 from armlock.delays import DelaySystem
 from armlock.engine.margins import common_zeros
-from armlock.engine.roots import RootError, rightmost_zero
+from armlock.engine.roots import rightmost_zero
 from armlock.loops import Loop
 
 
@@ -35,6 +35,61 @@ def rightmost_root(
     x: npt.ArrayLike | None = None,
     y: npt.ArrayLike | None = None,
 ) -> complex | ComplexArray:
+    r"""Return the characteristic root with the largest real part.
+
+    Of a `Loop` it is a root of the closed loop, as `unstable_roots` counts these: a root s = 0
+    of D that numerator and denominator of L cancel is none. ``loop.plain()`` keeps that root.
+
+    Parameters
+    ----------
+    system : CharacteristicFunction or DelaySystem
+        The loop, for instance `CommonArm()`, or a map; of a `DelaySystem` L the closed loop.
+    x, y : array_like of float, optional
+        The free parameters; they broadcast. Those of a loop, c1 and c2, are one if they are not
+        given; others have to be.
+
+    Returns
+    -------
+    complex, or complex array of the broadcast shape
+        In rad/s, rounded from extended precision; of a conjugate pair the one with Im >= 0.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If x or y is not finite and real, the two do not broadcast, or D has no root at all
+        there because it is constant.
+    RootError
+        If no root can be certified within a few seconds; its `estimate` is the best candidate,
+        nan if there is none.
+
+    Notes
+    -----
+    Certified means that no root is counted right of Re s + m. Here m is 1e-11 of |s| or of one
+    over the longest delay, whichever is larger. Where so fine a count is not decided, m is 1e-6
+    of |Re s| or of one over the longest delay. Roots whose real parts differ by less than the
+    first m count as equal, and the one of lowest frequency that was found is returned.
+
+    The sign of a real part smaller than the second m is one that `unstable_roots` confirms.
+    Where that count is not decided, the root is refused unless its real part is smaller than
+    the first m.
+
+    The real parts on a neutral root chain may tend to a limit that none of them reaches. Where
+    no root lies right of it, a root up to m left of the limit is returned. Without a delay the
+    roots are those of a polynomial, and nothing is counted.
+
+    For the Hayes equation it is, with the principal branch of Lambert's function,
+
+    .. math::
+
+        s = a + \frac{1}{\tau} W_0 \left( b\, \tau\, e^{-a\tau} \right) .
+
+    Examples
+    --------
+    >>> from armlock import HayesEquation, rightmost_root
+    >>> root = rightmost_root(HayesEquation(tau=1.0), 0.0, -1.0)
+    >>> print(f"{root:.10f}")
+    -0.3181315052+1.3372357014j
+    """
     if isinstance(system, DelaySystem):
         if x is not None or y is not None:
             raise TypeError(f"a DelaySystem has no free parameters, got {x!r} and {y!r}")
@@ -47,6 +102,7 @@ def rightmost_root(
     return np.array(flat, dtype=np.complex128).reshape(xs.shape)
 
 
-def _at(system, x, y):
+def _at(system: CharacteristicFunction, x: float, y: float) -> complex:
+    """Return the rightmost root at one point."""
     common = common_zeros(*system.quotient(x, y)) if isinstance(system, Loop) else 0
     return rightmost_zero(system.function(x, y), common)
