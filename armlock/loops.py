@@ -41,7 +41,8 @@ from armlock.checks import (
 )
 from armlock.controllers import Controller, integrating_actuator, table_two, white_paper
 from armlock.engine import polynomials
-from armlock.engine.functions import Function
+from armlock.engine.functions import Function, Space
+from armlock.engine.margins import Free
 from armlock.sensors import COMMON, SINGLE, SignalMapping, modified_dual
 
 if TYPE_CHECKING:
@@ -267,6 +268,26 @@ class Loop(CharacteristicFunction):
         """Return N and M of L = N / M at one point as functions of the engine, exactly."""
         below = self.terms.rest
         return self.function(c1, c2) + below * -1, below
+
+    def with_free_phases(self, c1: float, c2: float, above: float) -> Free:
+        """Return L with free phases of both arms above a frequency in rad/s, for the engine."""
+        made, shares = self.basis()
+        space = Space(made, [Fraction(self.delay)])
+
+        def function(weights: list[Fraction], late: bool = False) -> Function:
+            steady = np.array(weights, object)
+            turned = np.repeat(steady[:, None] * int(late), len(space.delays), axis=1)
+            return Function(space, steady, turned)
+
+        rest, b1, b2 = shares
+        both = [a + b for a, b in zip(b1, b2, strict=True)]
+        arms = (function(b1) * c1, function(b2) * c2)
+        return Free(
+            function(both, late=True),
+            function(rest),
+            tuple(a for a in arms if not a.is_zero),
+            above,
+        )
 
     def arm_responses(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """Evaluate K m1 exp(-s delay) and K m2 exp(-s delay), factor by factor.
