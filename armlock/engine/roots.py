@@ -109,7 +109,7 @@ class _Line(NamedTuple):
     steady: FloatArray
     delayed: FloatArray
     uncertain: FloatArray
-    #: How far up zeros can lie right of the line, in rad/s; inf past the limit of a chain.
+    #: Up to about where zeros can lie right of the line, in rad/s; inf past a chain's limit.
     end: float
     #: One turn of the longest delay that acts, in rad/s.
     turn: float
@@ -127,6 +127,8 @@ class _Search:
         """Return the function on the line Re s = sigma."""
         space, steady, delayed, uncertain = self.function.shifted(sigma)
         end = float(space.confined_from(steady[None], delayed[None])[0])
+        if np.isfinite(end) and not space.step:
+            end = _last_crossing(space, steady, delayed)
         # Far to the right the longer delays no longer act.
         acting = float(space.arrays.delays[delayed.any(axis=0)].max(initial=0.0))
         turn = 2.0 * np.pi / (acting or space.longest)
@@ -170,7 +172,7 @@ class _Search:
             return None
         end = line.end
         if not line.space.step:
-            end = min(_last_crossing(line), 1e3 * self.further * line.turn)
+            end = min(end, 1e3 * self.further * line.turn)
             end += self.further * line.turn
         grid, move = inclusion.resolved(
             line.space.arrays, line.steady, line.delayed, 1e-3 * _SLOWEST * line.turn, end,
@@ -220,18 +222,17 @@ class _Search:
         return root if count == 0 else None
 
 
-def _last_crossing(line: _Line) -> float:
+def _last_crossing(space: Space, steady: FloatArray, delayed: FloatArray) -> float:
     """Frequency up to which delayed terms are as large as all else, from samples.
 
     What a search finds depends on it, but no count.
     """
-    corners = line.space.corners
-    omega = np.geomspace(1e-3 * corners[0], 1e6 * corners[-1], 500)
-    weights = np.vstack((line.steady - line.delayed.sum(1), line.delayed.T))
-    still = np.zeros((*weights.shape, line.delayed.shape[1]))
-    sizes = np.abs(inclusion.values(line.space.arrays, weights, still, omega)[0])
+    omega = np.geomspace(1e-3 * space.corners[0], 1e6 * space.corners[-1], 500)
+    weights = np.vstack((steady - delayed.sum(1), delayed.T))
+    still = np.zeros((*weights.shape, delayed.shape[1]))
+    sizes = np.abs(inclusion.values(space.arrays, weights, still, omega)[0])
     met = np.flatnonzero(sizes[0] <= sizes[1:].sum(0))
-    return float(omega[min(met[-1] + 1, 499)]) if met.size else line.turn
+    return float(omega[min(met[-1] + 1, 499)]) if met.size else 2.0 * np.pi / space.longest
 
 
 def _without_delay(function: Function, common: int) -> complex:

@@ -329,7 +329,8 @@ def spectral_radius(
     0.941189374167
     """
     xs, ys = broadcast_parameters(system, x, y)
-    radii = [_radius(system, p, q, step, order) for p, q in zip(xs.flat, ys.flat, strict=True)]
+    h = _checked(system, step, order)
+    radii = [_radius(system, p, q, h, order) for p, q in zip(xs.flat, ys.flat, strict=True)]
     return np.array(radii, np.float64).reshape(xs.shape)
 
 
