@@ -27,7 +27,7 @@ BOUNDARY = -1
 UNCONFINED = -2
 
 # Most steps of a count, and of a search; some three seconds each.
-_MOST_STEPS = np.int64(1_500_000)
+_MOST_STEPS = 1_500_000
 _MOST_SEARCHED = 2_000_000
 # Steps between two looks at the keyboard.
 _A_WHILE = np.int64(100_000)
@@ -67,6 +67,7 @@ def counts(
     uncertain: FloatArray,
     *,
     leading: Leading | None = None,
+    most: int = _MOST_STEPS,
 ) -> IntArray:
     """Count the zeros with positive real part of n functions (Lemma 9).
 
@@ -78,6 +79,8 @@ def counts(
         Weights S and W, and the error of S.
     leading : Leading, optional
         Of one function, with zeros at s = 0 that are not to count.
+    most : int, optional
+        Most steps of a count.
 
     Returns
     -------
@@ -102,17 +105,17 @@ def counts(
         k = here[block]
         result: tuple[Any, ...] = inclusion.wind_many(
             space.arrays, steady[k], delayed[k], uncertain[k],
-            np.full(k.size, begin), ends[k], _MOST_STEPS,
+            np.full(k.size, begin), ends[k], most,
         )  # fmt: skip
         return result
 
     turn, first, last, undecided, steps = map(
         np.concatenate, zip(*in_threads(some, here.size, _BLOCK), strict=True)
     )
-    if (steps >= _MOST_STEPS).any():
-        k = int(np.argmax(steps >= _MOST_STEPS))
+    if (steps >= most).any():
+        k = int(np.argmax(steps >= most))
         raise UndecidedError(
-            f"a count takes more than {_MOST_STEPS:.0e} steps, up to {undecided[k]:.3g} rad/s",
+            f"a count takes more than {most:.0e} steps, up to {undecided[k]:.3g} rad/s",
             float(undecided[k]),
         )
     # At s = 0 all is real.
@@ -132,7 +135,7 @@ def counts(
     return found
 
 
-def count(function: Function, common: int = 0) -> int:
+def count(function: Function, common: int = 0, *, most: int = _MOST_STEPS) -> int:
     """Count the zeros of a function with positive real part.
 
     Parameters
@@ -141,6 +144,8 @@ def count(function: Function, common: int = 0) -> int:
         With exact weights.
     common : int, optional
         Order of a zero at s = 0 that is not to count.
+    most : int, optional
+        Most steps.
 
     Returns
     -------
@@ -154,7 +159,7 @@ def count(function: Function, common: int = 0) -> int:
         return BOUNDARY if confined else UNCONFINED
     exact = np.zeros_like(steady)
     begin = leading if leading.order else None
-    return int(counts(function.space, steady, delayed, exact, leading=begin)[0])
+    return int(counts(function.space, steady, delayed, exact, leading=begin, most=most)[0])
 
 
 @dataclass(frozen=True, eq=False)

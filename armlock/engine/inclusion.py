@@ -193,7 +193,7 @@ def expand(space: Arrays, m: float, r: float, work: Workspace) -> None:
 
     The polynomials come from an expansion on a longer piece of the axis where one serves.
     """
-    inside = abs(m - work.piece[0]) + r <= work.piece[1]
+    inside, own = abs(m - work.piece[0]) + r <= work.piece[1], False
     if not inside or r < work.piece[1] / _SUBINTERVALS:
         nearest = 0.0
         for j in range(space.lead.size):
@@ -204,7 +204,8 @@ def expand(space: Arrays, m: float, r: float, work: Workspace) -> None:
                     total += 1.0 / np.sqrt(z.real * z.real + (m - z.imag) * (m - z.imag))
             nearest = max(nearest, total)
         length = min(_PIECE / nearest, 0.5 * _SUBINTERVALS * r) if nearest > 0.0 else 2.0 * r
-        _expand_piece(space, m, length if length > 4.0 * r else r, work)
+        own = length <= 4.0 * r
+        _expand_piece(space, m, r if own else length, work)
     ratio = r / work.piece[1] if work.piece[1] > 0.0 else 1.0
     u = (m - work.piece[0]) / work.piece[1] if work.piece[1] > 0.0 else 0.0
     for j in range(space.lead.size):
@@ -241,6 +242,9 @@ def expand(space: Arrays, m: float, r: float, work: Workspace) -> None:
         for i in range(1, ORDER):
             q = complex(q.imag, -q.real) * (work.angle[k] / i)
             work.turn[k, i] = q
+    if own:
+        # An expansion on a piece this long is too coarse for the parts of the interval.
+        work.piece[1] = -1.0
 
 
 @njit(nogil=True, error_model="numpy")
@@ -874,10 +878,14 @@ def resolved(
     begin: float,
     end: float,
     most: int,
-) -> FloatArray:
-    """Frequencies so close that a Taylor polynomial represents a function between them."""
+) -> tuple[FloatArray, ComplexArray]:
+    """Frequencies so close that a Taylor polynomial represents a function between them.
+
+    With the step of Newton's method at each, F over its derivative by s.
+    """
     work, exact = workspace(space, 1), np.zeros(steady.size)
-    stack, top, found, n = np.empty((300, 2)), 1, np.empty(most), 0
+    stack, top, n = np.empty((300, 2)), 1, 0
+    found, moves = np.empty(most), np.empty(most, np.complex128)
     stack[0, 0], stack[0, 1] = begin, end
     while top > 0 and n < most:
         top -= 1
@@ -897,10 +905,11 @@ def resolved(
         close = close or (short and size <= 2.0 * rest)
         if (close and turns <= 0.3) or top > 290 or r <= 4.0 * EPSILON * m:
             found[n] = m
+            moves[n] = complex(0.0, r) * f[0] / f[1]
             n += 1
             continue
         middle = np.sqrt(low * high) if high > 4.0 * low else m
         stack[top, 0], stack[top, 1] = middle, high
         stack[top + 1, 0], stack[top + 1, 1] = low, middle
         top += 2
-    return found[:n].copy()
+    return found[:n].copy(), moves[:n].copy()
