@@ -597,7 +597,7 @@ def _measure(
     exact = np.zeros(steady.shape[1])
     expand(space, omega, 0.0, spare)
     radius = 0.0
-    for f in range(steady.shape[0]):
+    for f in range(spare.f.shape[0]):
         combine(space, steady[f], delayed[f], exact, spare, f)
         if f >= 2:
             radius += abs(spare.f[f, 0])
@@ -622,10 +622,10 @@ def _candidate(
     The Taylor polynomials say where it may be; the functions themselves say what it is.
     """
     found, where = best, np.nan
-    h, v, loose = np.empty(9), np.empty(9), steady.shape[0] > 2
+    h, v, loose = np.empty(9), np.empty(9), spare.f.shape[0] > 2
     for i in range(9):
         t, radius = 0.25 * i - 1.0, 0.0
-        for f in range(2, steady.shape[0]):
+        for f in range(2, spare.f.shape[0]):
             radius += abs(_at(work.f[f], t))
         h[i], v[i] = _aim(goal, _at(work.f[0], t), _at(work.f[1], t), radius, m + r * t)
     if goal == DISTANCE or loose:
@@ -696,6 +696,7 @@ def walk(
     """
     functions, tests = steady.shape[0], question.kind.shape[0]
     loose = question.loose
+    # What is looked for are the first two functions and the loose ones.
     work, spare = workspace(space, functions), workspace(space, 2 + loose)
     size = max(question.kind.shape[1], 3 + loose)
     room, corner = members(size, space.delays.size), np.zeros(size, np.int64)

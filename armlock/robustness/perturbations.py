@@ -410,7 +410,7 @@ def gain_interval(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> tuple[float, 
     lower, upper, omega : float
         The two factors, and where the upper one is taken, in rad/s: 0 for a real root, inf for
         the limit of the neutral root chain. 0, inf and nan where nothing between factors of
-        1e-6 and 1e6 bounds them, next to nulls of L nothing up to 1e4.
+        1e-4 and 1e4 bounds them.
 
     Raises
     ------
