@@ -165,15 +165,18 @@ class CharacteristicFunction:
             raise ValueError(
                 f"A, the term without a delay, must not vanish, got rest={self.rest!r}"
             )
-        b1, b2 = self.b1.coefficients, self.b2.coefficients
-        for name, b in (("b1", b1), ("b2", b2), ("c", self.c)):
-            if b.size > self.a.size:
+        for name, degree in (
+            ("b1", self.b1.degree),
+            ("b2", self.b2.degree),
+            ("c", self.c.size - 1),
+        ):
+            if degree > self.degree:
                 raise ValueError(
                     f"{name} must not exceed the degree of A ({self.degree}), "
-                    f"got degree {b.size - 1}: the equation would be of advanced type"
+                    f"got degree {degree}: the equation would be of advanced type"
                 )
-        for name, b, tau in (("b1", b1, self.tau1), ("b2", b2, self.tau2)):
-            if tau + self.delay == 0.0 and b.size == self.a.size:
+        for name, b, tau in (("b1", self.b1, self.tau1), ("b2", self.b2, self.tau2)):
+            if tau + self.delay == 0.0 and b and b.degree == self.degree:
                 raise ValueError(
                     f"{name} without a delay must be of lower degree than A ({self.degree}), "
                     f"or its parameter would change the order of the equation"
@@ -236,7 +239,7 @@ class CharacteristicFunction:
             lags = [round(lag / step) * step for lag in lags]
             made, shares = [Polynomial(Fraction(1), ())], [[Fraction(1)]] * 3
             powers = [
-                [(Fraction(c), (self.degree - k) * step) for k, c in enumerate(p.coefficients)]
+                [(c, (self.degree - k) * step) for k, c in enumerate(p.exact)]
                 for p in self.polynomials()
             ]
         zero, dead, tau1, tau2 = lags
@@ -411,8 +414,8 @@ class CharacteristicFunction:
         """Return B, the delay, the reference and the parameter of either arm."""
         x0, y0 = self.reference
         return (
-            (self.b1.coefficients, self.tau1, x0, x),
-            (self.b2.coefficients, self.tau2, y0, y),
+            (self.b1, self.tau1, x0, x),
+            (self.b2, self.tau2, y0, y),
         )
 
     def _evaluated(self, s: Any, library: Any) -> list[tuple[Any, Any]]:

@@ -14,11 +14,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import zip_longest
-from math import factorial, lcm
 from numbers import Real
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar
 
-import mpmath
 import numpy as np
 import numpy.typing as npt
 
@@ -43,9 +41,6 @@ from armlock.sensors import COMMON, SINGLE, SignalMapping, modified_dual
 
 if TYPE_CHECKING:
     import control
-
-# Where the terms of L cancel by more than this, in L or in 1 + L, rounding takes too much.
-_MOST_CANCELLED = 1e6
 
 
 @dataclass(frozen=True, init=False)
@@ -390,129 +385,6 @@ def checked_loop(loop: Loop) -> Loop:
     if not isinstance(loop, Loop):
         raise TypeError(f"loop must be a Loop, for instance CommonArm(), got {loop!r:.200}")
     return loop
-
-
-def _over_one(values: list[Fraction]) -> tuple[npt.NDArray[np.object_], int]:
-    """Return the numerators of fractions over one denominator, and that."""
-    below = lcm(*(value.denominator for value in values))
-    above = [value.numerator * (below // value.denominator) for value in values]
-    return np.array(above, dtype=object), below
-
-
-def power_series(
-    system: CharacteristicFunction, x: float | Fraction, y: float | Fraction, number: int
-) -> tuple[list[Fraction], list[Fraction]]:
-    """Return the first coefficients of R and of D - R in ascending powers of s, exactly."""
-    rest = [Fraction(value) for value in system.rest.coefficients.tolist()[:number]]
-    rest += [Fraction(0)] * (number - len(rest))
-    numerator, dead = [Fraction(0)] * number, -Fraction(system.delay)
-    for b, tau, origin, parameter in system.arms(x, y):
-        late, here, there = dead - Fraction(tau), Fraction(parameter), Fraction(origin)
-        turns = [(there * dead**j - here * late**j) / factorial(j) for j in range(number)]
-        # Of whole numbers, because fractions would look for common divisors at each step.
-        above, below = _over_one([Fraction(value) for value in b.tolist()[:number]])
-        turned, divisor = _over_one(turns)
-        product = np.convolve(above, turned)[:number].tolist()
-        numerator = [
-            n + Fraction(whole, below * divisor)
-            for n, whole in zip_longest(numerator, product, fillvalue=0)
-        ]
-    return rest, numerator
-
-
-class LoopAt(NamedTuple):
-    """A loop at one pair of perturbations, L = N / R.
-
-    Attributes
-    ----------
-    loop : Loop
-        The loop.
-    c1, c2 : float
-        Multiplicative perturbations.
-    """
-
-    loop: Loop
-    c1: float
-    c2: float
-
-    @classmethod
-    def of(cls, loop: Loop, c1: float, c2: float) -> LoopAt:
-        """Check a loop and its perturbations."""
-        return cls(checked_loop(loop), real_number("c1", c1), real_number("c2", c2))
-
-    def response(self, omega: npt.ArrayLike) -> ComplexArray:
-        """Evaluate L(j omega), with omega in rad/s; in 40 digits where its terms cancel."""
-        s = 1j * np.asarray(omega, dtype=float)
-        first, second = self.loop.arm_responses(s)
-        moved1 = self.c1 * np.expm1(-s * self.loop.tau1)
-        moved2 = self.c2 * np.expm1(-s * self.loop.tau2)
-        found = np.asarray(
-            first * ((1.0 - self.c1) - moved1) + second * ((1.0 - self.c2) - moved2)
-        )
-        larger1 = np.abs(first) * np.maximum(abs(1.0 - self.c1), np.abs(moved1))
-        larger2 = np.abs(second) * np.maximum(abs(1.0 - self.c2), np.abs(moved2))
-        largest = np.maximum(larger1, larger2)
-        cancelled = largest > _MOST_CANCELLED * np.minimum(np.abs(found), np.abs(1.0 + found))
-        for at in np.argwhere(cancelled):
-            found[tuple(at)] = self._response_exactly(complex(s[tuple(at)]))
-        return found
-
-    def _response_exactly(self, s: complex) -> complex:
-        loop, k, m = self.loop, self.loop.controller, self.loop.mapping
-        with mpmath.workdps(40):
-            at = mpmath.mpc(s)
-            gain = k.gain * mpmath.exp(-at * loop.delay)
-            for zero in k.zeros:
-                gain *= at - zero
-            for pole in k.poles:
-                gain /= at - pole
-            signals = mpmath.mpc(0.0)
-            arms = (m.numerator1, self.c1, loop.tau1), (m.numerator2, self.c2, loop.tau2)
-            for above, c, tau in arms:
-                passed = 1 - mpmath.mpf(c) * mpmath.exp(-at * tau)
-                signals += mpmath.polyval(list(above), at, asc=True) * passed
-            return complex(gain * signals / mpmath.polyval(list(m.denominator), at, asc=True))
-
-    def numerator(self) -> ExponentialSum:
-        """Return N at s = j omega as an exponential sum."""
-        return self.loop.sum_at(self.c1, self.c2).plus(
-            self.loop.rest_on_boundary().scaled(-1.0)
-        )
-
-    def at_zero(self) -> tuple[int, Fraction, Fraction]:
-        """Return how many factors s cancel in L = N / R, and N and R at s = 0 without them.
-
-        Exact for the coefficients, delays and parameters as they are given.
-        """
-        loop, c1, c2 = self
-        lowest = int(np.flatnonzero(loop.rest.coefficients)[0])
-        rest, numerator = power_series(loop, c1, c2, lowest + 1)
-        pairs = enumerate(zip(numerator, rest, strict=True))
-        return next((k, above, below) for k, (above, below) in pairs if above or below)
-
-    def poles_at_zero(self) -> int:
-        """Order of the pole of L at s = 0 once numerator and denominator have cancelled."""
-        return int(np.flatnonzero(self.loop.rest.coefficients)[0]) - self.at_zero()[0]
-
-    def leading_radius(self) -> float:
-        """Radius around s = 0 within which L is as simple as it gets, or the last one tried.
-
-        With a pole of order n at s = 0, L s^n is constant to a part in 1000, and |L| is above
-        1000. Without one L changes by less than a thousandth of |1 + L|.
-        """
-        loop, order = self.loop, self.poles_at_zero()
-        sizes = np.abs(np.concatenate([p.roots for p in loop.polynomials()]))
-        radius = 1e-3 * float(sizes[sizes > 0.0].min(initial=1.0 / loop.longest_delay))
-        for _ in range(40):
-            near, nearer = loop([radius, 0.5 * radius], self.c1, self.c2)
-            if order:
-                settled = abs(nearer / near - 2.0**order) < 1e-3 and abs(near) > 1e3
-            else:
-                settled = abs(nearer - near) < 1e-3 * abs(1.0 + near)
-            if settled:
-                break
-            radius *= 0.1
-        return radius
 
 
 @dataclass(frozen=True, init=False)
