@@ -379,7 +379,7 @@ class CharacteristicFunction:
             If s does not hold finite numbers.
         """
         s = complex_array("s", s)
-        (rest, _), (b1, _), (b2, _) = self._evaluated(s, np)
+        (rest, _), (b1, _), (b2, _) = self._evaluated(s)
         dead, (x0, y0) = np.exp(-s * self.delay), self.reference
         return (
             np.asarray(rest + (x0 * b1 + y0 * b2) * dead),
@@ -398,7 +398,12 @@ class CharacteristicFunction:
             If s does not hold finite numbers, x or y is not finite and real, or the three do
             not broadcast.
         """
-        return np.asarray(self._value(*self._checked(s, x, y)))
+        s, x, y = self._checked(s, x, y)
+        (rest, _), (b1, _), (b2, _) = self._evaluated(s)
+        x0, y0 = self.reference
+        arms = b1 * ((x0 - x) - x * np.expm1(-s * self.tau1))
+        arms = arms + b2 * ((y0 - y) - y * np.expm1(-s * self.tau2))
+        return np.asarray(rest + np.exp(-s * self.delay) * arms)
 
     def _checked(
         self, s: npt.ArrayLike, x: npt.ArrayLike | None, y: npt.ArrayLike | None
@@ -410,29 +415,10 @@ class CharacteristicFunction:
         broadcast_shape(("s", name1, name2), arrays)
         return arrays
 
-    def arms(self, x: Any, y: Any) -> tuple[tuple[FloatArray, float, Any, Any], ...]:
-        """Return B, the delay, the reference and the parameter of either arm."""
-        x0, y0 = self.reference
-        return (
-            (self.b1, self.tau1, x0, x),
-            (self.b2, self.tau2, y0, y),
-        )
-
-    def _evaluated(self, s: Any, library: Any) -> list[tuple[Any, Any]]:
-        """Return R, B1 and B2 at s, and their derivatives by z."""
-        z = library.exp(s * self.step) if self.step else s
+    def _evaluated(self, s: ComplexArray) -> list[tuple[ComplexArray, ComplexArray]]:
+        """Return R, B1 and B2 at s, and their derivatives by s or, for a map, by z."""
+        z = np.exp(s * self.step) if self.step else s
         return [p.evaluated(z) for p in self.polynomials()]
-
-    def _value(self, s: Any, x: Any, y: Any, library: Any = np) -> Any:
-        """Evaluate D(s; x, y) unchecked.
-
-        The functions are those of numpy, or of mpmath for one number in extended precision.
-        """
-        (rest, _), *evaluated = self._evaluated(s, library)
-        arms = 0.0
-        for (b, _), (_, tau, origin, here) in zip(evaluated, self.arms(x, y), strict=True):
-            arms = arms + b * ((origin - here) - here * library.expm1(-s * tau))
-        return rest + library.exp(-s * self.delay) * arms
 
     def derivative(
         self, s: npt.ArrayLike, x: npt.ArrayLike | None = None, y: npt.ArrayLike | None = None
@@ -452,18 +438,16 @@ class CharacteristicFunction:
         TypeError, ValueError
             As `characteristic` does.
         """
-        return np.asarray(self._slope(*self._checked(s, x, y)))
-
-    def _slope(self, s: Any, x: Any, y: Any, library: Any = np) -> Any:
-        """Evaluate dD/ds unchecked, as `_value`."""
-        dz = self.step * library.exp(s * self.step) if self.step else 1.0
-        (_, dr), *evaluated = self._evaluated(s, library)
+        s, x, y = self._checked(s, x, y)
+        dz = self.step * np.exp(s * self.step) if self.step else 1.0
+        (_, dr), *evaluated = self._evaluated(s)
         arms = 0.0
-        for (b, db), (_, tau, origin, here) in zip(evaluated, self.arms(x, y), strict=True):
-            change = library.expm1(-s * tau)
+        pairs = zip((x, y), self.reference, (self.tau1, self.tau2), strict=True)
+        for (b, db), (here, origin, tau) in zip(evaluated, pairs, strict=True):
+            change = np.expm1(-s * tau)
             arms = arms + (db * dz - self.delay * b) * ((origin - here) - here * change)
             arms = arms + b * here * tau * (1.0 + change)
-        return dr * dz + library.exp(-s * self.delay) * arms
+        return np.asarray(dr * dz + np.exp(-s * self.delay) * arms)
 
     def polynomials(self) -> tuple[Polynomial, ...]:
         """Return R, B1 and B2 with their roots."""
