@@ -205,7 +205,7 @@ def test_roots_far_slower_than_the_delays_or_far_up_are_certified(loop, point):
     root = rightmost_root(loop, *point)
     assert time.process_time() - begun < 5.0
     margin = 1.001e-6 * max(abs(root.real), 1.0 / loop.longest_delay)
-    assert unstable_roots(loop.shifted(root.real + margin), *point) == 0
+    assert unstable_roots(loop, *point, right_of=root.real + margin) == 0
     with mpmath.workdps(40):
         exact = extended_root(loop, point[0], point[1], root, digits=20)
         assert abs(exact - root) <= 1e-12 * abs(root)
@@ -269,8 +269,8 @@ def test_next_to_a_cluster_of_modes_it_is_answered_or_refused_in_time(seed):
     assert root is not None or seed != 13
     if root is not None:
         for margin, least, most in ((1e-6, 0, 0), (-1e-6, 1, 2)):
-            shifted = loop.shifted(root.real + margin * max(abs(root.real), 0.05))
-            assert least <= unstable_roots(shifted, 1.0, 1.0) <= most
+            line = root.real + margin * max(abs(root.real), 0.05)
+            assert least <= unstable_roots(loop, right_of=line) <= most
         with mpmath.workdps(60):
             value, slope = (
                 mpmath.diff(lambda s: independent.exact(loop, s, 1.0, 1.0), root, n)

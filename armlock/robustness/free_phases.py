@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from fractions import Fraction
 from functools import lru_cache
 from itertools import zip_longest
 
@@ -17,12 +18,14 @@ import numpy as np
 from numpy.polynomial import polynomial as poly
 
 from armlock.axis import contour
+from armlock.axis.exponentials import evaluate, expand
 from armlock.axis.threads import interruptible
+from armlock.characteristic import CharacteristicFunction
 from armlock.checks import ComplexArray, FloatArray, IntArray
-from armlock.loops import Loop, LoopAt
+from armlock.loops import Loop, LoopAt, power_series
 from armlock.robustness import discs
 from armlock.stability.bounds import last_larger
-from armlock.stability.counts import CountError, loop_count, walk_begins
+from armlock.stability.counts import CountError, unstable_roots
 
 # A distance of L from -1 below it is as good as none.
 _TOUCHING = 1e-6
@@ -280,8 +283,68 @@ def clear_above(point: LoopAt, free_above: float) -> bool:
     return bool(complete) and nearest[discs.MODULUS] == _TOUCHING
 
 
+def walk_begins(
+    loop: CharacteristicFunction, c1: float | Fraction, c2: float | Fraction
+) -> tuple[float, float] | None:
+    r"""Where a walk along D begins if the roots at s = 0 that cancel in L are not to count.
+
+    Returns a frequency in rad/s, and the argument of D there, in rad; zeros where none cancels,
+    and None where L(0) = -1, or rounding hides what it is.
+
+    With D - R = N, k factors s cancel where N and R both have them, and D / s^k begins with
+    d_k. From the series of D up to any power J,
+
+    .. math::
+
+        \left| \frac{D}{d_k s^k} - 1 \right| \le
+        \sum_{k < j \le J} \left| \frac{d_j}{d_k} \right| \omega^{j - k}
+        + \left| \frac{M}{d_k} \right| T^{J + 1} \omega^{J + 1 - k} ,
+
+    with T the longest delay and M a bound on |N| up to 1 / T, where all coefficients count as
+    positive. No term exceeds 2^-(j - k) / 2 up to the frequency that is returned, and the sum
+    is at most 1/2: D / s^k has no root on that part of the axis, and turns by 30 degrees at
+    most.
+    """
+    number = loop.degree + 21
+    # No more factors cancel than R has, unless R is zero.
+    most = int(np.append(np.flatnonzero(loop.rest.coefficients), number - 1)[0])
+    both = zip(*power_series(loop, c1, c2, most + 1), strict=True)
+    shared = next((k for k, pair in enumerate(both) if any(pair)), 0)
+    if shared == 0:
+        return 0.0, 0.0
+    rest, numerator = power_series(loop, c1, c2, number)
+    series = [r + n for r, n in zip(rest, numerator, strict=True)]
+    first, longest = series[shared], loop.longest_delay
+    if first == 0:
+        return None
+    unit = Fraction(longest)
+    arms = loop.b1.coefficients, loop.b2.coefficients
+    past = sum(
+        abs(Fraction(value)) / unit**i * (abs(Fraction(origin)) + abs(Fraction(c)))
+        for b, c, origin in zip(arms, (c1, c2), loop.reference, strict=True)
+        for i, value in enumerate(b.tolist())
+    )
+    # Below 1 / T an exponential's terms add up to less than e in all.
+    series.append(3 * past * unit**number)
+    logs = [
+        (_log(first) - _log(2 * value)) / (j - shared)
+        for j, value in enumerate(series)
+        if j > shared and value
+    ]
+    start = 0.5 * min(math.exp(min([*logs, 700.0])), 1.0 / longest)
+    value = evaluate(expand(loop.sum_at(float(c1), float(c2)).compiled(), start), start)[0]
+    turn = contour.angle_between(value, (1.0 if first > 0 else -1.0) * 1j**shared)
+    # More than the bound: rounding hides D there, or its coefficients are not those in use.
+    return (start, 0.5 * math.pi * shared + turn) if abs(turn) < 0.6 else None
+
+
+def _log(value: Fraction) -> float:
+    """Natural logarithm of the size of a fraction, of which a float may be too large."""
+    return math.log(abs(value.numerator)) - math.log(value.denominator)
+
+
 def count_at(point: LoopAt, free_above: float) -> int:
-    """Count the unstable roots as `loop_count` does.
+    """Count the unstable roots as `unstable_roots` does.
 
     It takes less time where no phases above the frequency `free_above`, in rad/s, matter.
     """
@@ -289,7 +352,7 @@ def count_at(point: LoopAt, free_above: float) -> int:
         count = _count_below(point, free_above)
         if count is not None:
             return count
-    return loop_count(*point)
+    return int(unstable_roots(*point))
 
 
 def _count_below(point: LoopAt, omega: float) -> int | None:
@@ -316,7 +379,7 @@ def _count_below(point: LoopAt, omega: float) -> int | None:
         arguments.append(begin[1] + argument)
         values.append(value)
     gained = arguments[0] - arguments[1] - contour.angle_between(values[0], values[1])
-    below = loop_count(*low)
+    below = int(unstable_roots(*low))
     count = below - gained / math.pi
     return round(count) if below >= 0 and abs(count - round(count)) < 1e-3 else None
 
@@ -327,5 +390,5 @@ def require_stable(point: LoopAt, free_above: float = np.inf) -> None:
     if count != 0:
         raise ValueError(
             f"the loop must be stable at (c1, c2) = {point[1:]} to have margins, but "
-            f"loop_count gives {count}"
+            f"unstable_roots gives {count}"
         )

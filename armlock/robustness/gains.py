@@ -8,11 +8,14 @@ axis where free phases would allow a factor closer to one than is known.
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 
 import numpy as np
 
 from armlock.axis.exponentials import merged
 from armlock.checks import FloatArray
+from armlock.engine import decide
+from armlock.engine.margins import common_zeros
 from armlock.loops import Loop, LoopAt
 from armlock.robustness.free_phases import (
     arm_weights,
@@ -27,7 +30,6 @@ from armlock.robustness.free_phases import (
     search_outwards,
 )
 from armlock.stability.bounds import last_larger, last_root_bound
-from armlock.stability.counts import loop_count
 from armlock.stability.zeros import axis_zeros, count_beside
 
 #: Gain factors up to this, and down to one over it, are looked at.
@@ -171,11 +173,11 @@ def _require_nothing_hidden(
     side, too, or a crossing is hidden.
     """
     loop, c1, c2 = point
-    rest = loop.polynomials()[0]
 
     def count(factor: float) -> int:
-        scaled = rest._replace(coefficients=rest.coefficients / factor)
-        return loop_count(loop.plain().replace(rest=scaled), c1, c2)
+        scale = Fraction(1) / Fraction(factor)
+        n, m = loop.quotient(c1, c2)
+        return decide.count(n + m * scale, common_zeros(n, m))
 
     with np.errstate(divide="ignore"):
         # Without a negative value nothing crosses; with zero among them any large factor may.

@@ -163,7 +163,7 @@ def margins(
     -----
     Stable are the loop's own roots. One at s = 0 that D has because numerator and denominator
     of L cancel, as at the ideal point of a loop with an integrator, is none of them, see
-    `armlock.stability.counts.loop_count`.
+    `armlock.unstable_roots`.
 
     Phase and delay margins are taken over all crossovers. A neutral loop may have crossovers
     without end; they then approach those of the disc below, and the phase margin is certified
@@ -239,7 +239,7 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
     -------
     float
         Smallest eps > 0 such that the count of the loop's unstable roots at (1, 1) +
-        eps (d1, d2), `armlock.stability.counts.loop_count`, is not zero: a root reaches the
+        eps (d1, d2), `armlock.unstable_roots`, is not zero: a root reaches the
         imaginary axis there, or the neutral root chain does. 0 if the loop is not stable next
         to (1, 1), inf if no eps breaks it, up to parameters of 1e9. How near to the limit of
         the chain roots are followed, `armlock.robustness.rays.first_crossing` says.
@@ -277,7 +277,7 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
     if at_start > 0 or at_start == UNCONFINED:
         raise ValueError(
             f"the loop must be stable at (c1, c2) = (1, 1) to lose stability, but "
-            f"loop_count gives {at_start}"
+            f"unstable_roots gives {at_start}"
         )
     # From there a root at s = 0 that cancels at (1, 1) may turn into the loop's own.
     may_leave_zero = at_start != 0 or LoopAt(loop, 1.0, 1.0).at_zero()[0] > 0

@@ -32,7 +32,7 @@ from armlock.robustness.free_phases import (
     search_outwards,
 )
 from armlock.stability.bounds import last_frequency
-from armlock.stability.counts import BOUNDARY, CountError, loop_count, unstable_roots
+from armlock.stability.counts import BOUNDARY, CountError, unstable_roots
 from armlock.stability.zeros import axis_zeros, count_beside, polished
 
 #: Nothing is looked at where the parameters are this many times as large as the start, or as 1.
@@ -263,7 +263,7 @@ class Ray:
         )
 
     def _count(self, t: float) -> int:
-        """Count the unstable roots at a point of the ray, of a loop as `loop_count` does.
+        """Count the unstable roots at a point of the ray, of a loop those of the closed loop.
 
         There the point is not rounded: what cancels along the ray does so at it.
         """
@@ -273,7 +273,7 @@ class Ray:
         c1, c2 = (
             Fraction(a) + Fraction(t) * Fraction(d) for a, d in zip(begin, way, strict=True)
         )
-        return loop_count(self.system, c1, c2)
+        return int(unstable_roots(self.system, c1, c2))
 
     @cached_property
     def _terms_at_zero(self) -> tuple[list[Fraction], list[Fraction]]:

@@ -48,8 +48,7 @@ def rightmost_of_loop(loop: Loop, c1: float, c2: float) -> complex:
         return rightmost_root(loop, c1, c2)
 
     def others(exponent: float) -> float:
-        # Roots right of Re s = -10^exponent, besides s = 0.
-        return int(unstable_roots(loop.shifted(-(10.0**exponent)), c1, c2)) - 1.5
+        return int(unstable_roots(loop, c1, c2, right_of=-(10.0**exponent))) - 0.5
 
     return complex(-(10.0 ** bisect(others, -9.0, -1.0)))
 
