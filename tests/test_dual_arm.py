@@ -44,7 +44,7 @@ def test_a_count_that_cannot_be_told_confirms_no_crossing(monkeypatch):
     nothing = ray.crossings(3e-4)
     assert nothing.position.size == 0
     ray._confirm(nothing, stretch, 3e-4)
-    monkeypatch.setattr(rays, "loop_count", lambda *_: -1)
+    monkeypatch.setattr(rays, "unstable_roots", lambda *_: -1)
     unknown = Ray(DualArm(), (0.9, 1.0), (0.0, 1.0))
     with pytest.raises(CountError, match="are -1 and -1"):
         unknown._confirm(nothing, stretch, 3e-4)

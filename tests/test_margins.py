@@ -29,7 +29,6 @@ from armlock.robustness import free_phases, gains, phase_and_delay, rays
 from armlock.robustness.gains import gain_interval
 from armlock.robustness.rays import first_crossing
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
-from armlock.stability.counts import loop_count
 from tests import independent
 from tests.attack import Tally, check_margins, to_loop
 from tests.systems import sketch_of
@@ -219,7 +218,7 @@ def test_along_the_line_on_which_the_root_at_zero_cancels_another_root_is_first(
     for loop, direction in ((CommonArm(), (size, -size)), (DualArm(), (size, size))):
         eps = critical_perturbation(loop, direction)
         found = [
-            loop_count(loop, *(1 + Fraction(share * eps) * Fraction(d) for d in direction))
+            unstable_roots(loop, *(1 + Fraction(share * eps) * Fraction(d) for d in direction))
             for share in (1e-6, 0.5, 1.0 - 1e-9, 1.0 + 1e-9)
         ]
         assert found == [0, 0, 0, 2]
@@ -245,9 +244,9 @@ def test_a_gain_that_takes_a_real_root_to_zero_is_that_of_the_finite_open_loop()
 def test_roots_behind_the_one_at_zero_are_not_passed_over(loop):
     assert unstable_roots(loop.plain(), 1.0, 1.0) == BOUNDARY
     assert unstable_roots(loop) > 0
-    with pytest.raises(ValueError, match=r"must be stable at .* but loop_count gives \d"):
+    with pytest.raises(ValueError, match=r"must be stable at .* but unstable_roots gives \d"):
         margins(loop)
-    with pytest.raises(ValueError, match=r"to lose stability, but loop_count gives \d"):
+    with pytest.raises(ValueError, match=r"to lose stability, but unstable_roots gives \d"):
         critical_perturbation(loop, (-1.0, -1.0))
 
 
@@ -268,7 +267,7 @@ def test_a_count_that_cannot_be_told_confirms_no_gain(hidden, monkeypatch):
     point = LoopAt(paper_loop(), 1.0, 1.0)
     lower, upper, _ = gains.gain_interval(*point)
     gains._require_nothing_hidden(point, np.array([hidden]), lower, upper)
-    monkeypatch.setattr(gains, "loop_count", lambda *_: -1)
+    monkeypatch.setattr(gains.decide, "count", lambda *_: -1)
     with pytest.raises(CountError, match="times the gain is -1"):
         gains._require_nothing_hidden(point, np.array([hidden]), lower, upper)
     # What gives only factors past the two decides nothing.
@@ -276,7 +275,7 @@ def test_a_count_that_cannot_be_told_confirms_no_gain(hidden, monkeypatch):
 
 
 def test_a_count_that_cannot_be_told_next_to_the_start_breaks_no_loop(monkeypatch):
-    monkeypatch.setattr(rays, "loop_count", lambda *_: -1)
+    monkeypatch.setattr(rays, "unstable_roots", lambda *_: -1)
     with pytest.raises(CountError, match="cannot be told"):
         critical_perturbation(DualArm(), (1.0, 1.0))
 

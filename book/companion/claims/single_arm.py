@@ -344,8 +344,7 @@ def ideal_loop_is_stable() -> Finding:
     zero, following = (complex(lambert_root(*point, TAU1, branch)) for branch in (0, 1))
     loop = SingleArm(NOMINAL_GAIN, TAU1)
     right_of = [
-        int(unstable_roots(loop, right_of=following.real * factor))
-        for factor in (0.99, 1.01)
+        int(unstable_roots(loop, right_of=following.real * factor)) for factor in (0.99, 1.01)
     ]
     of_loop = abs(complex(1.0 + loop(following))) < 1e-9
     return Finding(
