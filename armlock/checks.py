@@ -171,6 +171,7 @@ def broadcast_pair(
     """Return two finite real arrays of one shape, or name both shapes and raise."""
     first, second = real_array(name1, value1), real_array(name2, value2)
     shape = broadcast_shape((name1, name2), (first, second))
+    check_memory(f"{name1} and {name2}", shape, 64)
     # Copies, because broadcast views are not to be written to.
     return np.broadcast_to(first, shape).copy(), np.broadcast_to(second, shape).copy()
 

@@ -20,8 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from armlock import CountError, critical_perturbation, margins, rightmost_root
-from armlock.stability.counts import loop_count
+from armlock import CountError, critical_perturbation, margins, rightmost_root, unstable_roots
 from tests import attack_judge as judge
 from tests.attack import between, draw_arm, draw_delays, draw_paper, draw_point, roots, to_loop
 from tests.attack_judge import Sketch, View
@@ -41,7 +40,7 @@ NEAR = 1.001e-3
 DIRECTIONS = ((1, -1), (1, 1), (-1, -1))
 #: The unstable roots of the closed loop, as the page counts them: where numerator and
 #: denominator of L share a root at s = 0 it is left out.
-closed_loop_count = loop_count
+closed_loop_count = unstable_roots
 #: All that the page shows of a loop at a point. JSON has no infinity and no nan.
 ASK = """cases => cases.map(([spec, c1, c2]) => {
     const loop = live.make(spec), say = v => typeof v === 'number' ? String(v) : v;

@@ -23,7 +23,6 @@ from armlock import (
     unstable_roots,
 )
 from armlock.sensors import DIFFERENCE, SignalMapping
-from armlock.stability import last_frequency
 from tests import independent
 from tests.systems import NEUTRAL, RETARDED
 
@@ -51,21 +50,6 @@ def test_derivative_agrees_with_a_central_difference(system, s, x, y):
     assert abs(system.derivative(s, x, y) - difference) <= 1e-8 * (scale + 10.0)
 
 
-@given(st.sampled_from(SYSTEMS), frequencies, reals, reals, st.floats(-0.5, 0.5))
-def test_shifting_moves_the_argument(system, s, x, y, sigma):
-    scale = sum(abs(part) for part in system.parts(s + sigma)) * (1.0 + abs(x) + abs(y))
-    moved = system.shifted(sigma).characteristic(s, x, y)
-    assert abs(moved - system.characteristic(s + sigma, x, y)) <= 1e-12 * (1.0 + scale)
-
-
-@given(st.sampled_from(SYSTEMS), frequencies, reals, reals)
-def test_exchanging_swaps_the_parameters(system, s, x, y):
-    exchanged = system.exchanged()
-    expected = system.characteristic(s, x, y)
-    assert exchanged.characteristic(s, y, x) == pytest.approx(expected, rel=1e-12, abs=1e-12)
-    assert exchanged.parameters == system.parameters[::-1]
-
-
 def test_a_parameter_that_would_change_the_order_is_refused():
     with pytest.raises(ValueError, match=r"^b1 without a delay must be of lower degree than A"):
         CharacteristicFunction([1.0, 1.0], [0.0, 1.0], [1.0], 0.0, 1.0)
@@ -81,7 +65,6 @@ SYSTEMS_OF_ALL_KINDS = [
     paper_loop(),
     Loop(Controller([-0.02], [0.0, -0.1 + 1j, -0.1 - 1j], 2.0), DIFFERENCE, 20.1, 19.9),
     semi_discretization(CommonArm(tau1=2.0, tau2=1.5), 0.5),
-    CommonArm().exchanged(),
     Loop(([-0.1], [0.0, -3.0], 2.0), "single", 20.0, delay=20e-6),
     Loop(Controller([], [-1e-3] * 5, 1e-14), "dual", 20.1, 19.9),
     Loop(Controller([], [0.0], 1.0), "single", tau1=20.0),
@@ -120,7 +103,7 @@ def test_one_thing_is_replaced_and_all_else_stays():
     assert Loop(((), (0.0,), 1.0), "single", 20.0).replace(tau1=30.0).tau2 == 30.0
     # Polynomials keep roots that are known.
     plain = paper_loop().plain()
-    assert plain.replace(tau1=21.0).rest.roots.tolist() == plain.rest.roots.tolist()
+    assert plain.replace(tau1=21.0).rest.roots == plain.rest.roots
     # Two loops of one D are not one loop: what is simulated are controller and sensor.
     low_pass = SignalMapping([1.0], [0.0], [1.0, 1.0], "low pass")
     one = Loop(((), (0.0, -1.0), 1.0), "single", 20.0)
@@ -130,17 +113,9 @@ def test_one_thing_is_replaced_and_all_else_stays():
     assert one.plain() == other.plain()
 
 
-def test_results_are_kept_for_equal_loops():
-    kept = last_frequency.__globals__["_squares"]
-    last_frequency(CommonArm(gain=0.123), 0.9, 0.9)
-    before = kept.cache_info().misses
-    last_frequency(CommonArm(gain=0.123), 0.8, 0.9)
-    assert kept.cache_info().misses == before
-
-
 def test_the_perturbations_of_a_loop_are_one_by_default():
     loop = DualArm(gain=3.0)
-    for made in (loop, loop.replace(delay=1e-3), loop.shifted(-1e-3), loop.exchanged()):
+    for made in (loop, loop.replace(delay=1e-3)):
         assert unstable_roots(made, y=0.999) == unstable_roots(made, 1.0, 0.999)
         assert made.characteristic(0.1j) == made.characteristic(0.1j, 1.0, 1.0)
     assert rightmost_root(paper_loop()) == rightmost_root(paper_loop(), 1.0, 1.0)

@@ -25,7 +25,6 @@ from armlock import (
 )
 from armlock.robustness import gain_interval, perturbations
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
-from armlock.stability.counts import loop_count
 from tests import independent
 from tests.attack import Tally, check_margins, to_loop
 from tests.systems import sketch_of
@@ -204,7 +203,7 @@ def test_along_the_line_on_which_the_root_at_zero_cancels_another_root_is_first(
     for loop, direction in ((CommonArm(), (size, -size)), (DualArm(), (size, size))):
         eps = critical_perturbation(loop, direction)
         found = [
-            loop_count(loop, *(1 + Fraction(share * eps) * Fraction(d) for d in direction))
+            unstable_roots(loop, *(1 + Fraction(share * eps) * Fraction(d) for d in direction))
             for share in (1e-6, 0.5, 1.0 - 1e-9, 1.0 + 1e-9)
         ]
         assert found == [0, 0, 0, 2]

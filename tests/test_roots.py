@@ -25,7 +25,6 @@ from armlock import (
     rightmost_root,
     unstable_roots,
 )
-from armlock.engine import decide
 from armlock.loops import flight_loop
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
 from book.companion.schemes import pseudospectral_roots
@@ -34,12 +33,6 @@ from tests import independent
 PAPER = paper_loop(actuator=True).controller
 # Twenty-six poles over four decades.
 MANY = -np.geomspace(1e-5, 4e-2, 26)
-
-
-def roots_right_of(loop, point, sigma):
-    """Count the roots of D right of a line."""
-    space, *weights = loop.function(*point).shifted(sigma)
-    return int(decide.counts(space, *(value[None] for value in weights))[0])
 
 
 def newton_step(loop, root, *point):
@@ -205,7 +198,7 @@ def test_roots_far_slower_than_the_delays_or_far_up_are_certified(loop, point):
     root = rightmost_root(loop, *point)
     assert time.process_time() - begun < 5.0
     margin = 1.001e-6 * max(abs(root.real), 1.0 / loop.longest_delay)
-    assert roots_right_of(loop, point, root.real + margin) == 0
+    assert unstable_roots(loop, *point, right_of=root.real + margin) == 0
     with mpmath.workdps(60):
         off = newton_step(loop, root, *point)
         assert off <= 1e-12 * abs(root)
@@ -292,6 +285,6 @@ def test_next_to_a_cluster_of_modes_it_is_answered_or_refused_in_time(seed):
     if root is not None:
         for margin, least, most in ((1e-6, 0, 0), (-1e-6, 1, 2)):
             line = root.real + margin * max(abs(root.real), 0.05)
-            assert least <= roots_right_of(loop, (1.0, 1.0), line) <= most
+            assert least <= unstable_roots(loop, right_of=line) <= most
         with mpmath.workdps(60):
             assert newton_step(loop, root, 1.0, 1.0) < 1e-13 * abs(root)

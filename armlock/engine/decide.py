@@ -42,11 +42,14 @@ _NARROWEST = 1e-14
 
 
 class UndecidedError(RuntimeError):
-    """Double precision, or the steps allowed, did not decide; `omega` is where, in rad/s."""
+    """Double precision, or the steps allowed, did not decide.
 
-    def __init__(self, message: str, omega: float) -> None:
+    `omega` is where, in rad/s, and `index` of which of many functions.
+    """
+
+    def __init__(self, message: str, omega: float, index: int = 0) -> None:
         super().__init__(message)
-        self.omega = omega
+        self.omega, self.index = omega, index
 
 
 def in_threads(function: Callable[[slice], Any], size: int, block: int) -> list[Any]:
@@ -117,6 +120,7 @@ def counts(
         raise UndecidedError(
             f"a count takes more than {most:.0e} steps, up to {undecided[k]:.3g} rad/s",
             float(undecided[k]),
+            int(here[k]),
         )
     # At s = 0 all is real.
     values = inclusion.values(space.arrays, steady[here], delayed[here], np.zeros(1))[0]

@@ -134,7 +134,7 @@ class Space:
         terms: float | FloatArray = 0.0,
         *,
         extra: float | FloatArray = 0.0,
-        top_terms: float | None = None,
+        top_terms: float | FloatArray | None = None,
     ) -> FloatArray:
         """Frequency past which, for Re s >= 0, what nothing delays exceeds all else (Lemma 9).
 
@@ -146,7 +146,7 @@ class Space:
             Sizes of further terms of any phase, as weights of the polynomials.
         extra : float array, shape (n, J) or one that broadcasts, optional
             Sizes of weights that leave the limit at infinity as it is.
-        top_terms : float, optional
+        top_terms : float or float array, shape (n,), optional
             Size of the terms over s^degree at infinity; that of their weights by default.
             Polynomials that cancel there make it less.
 
@@ -248,12 +248,22 @@ class Function:
         k = next(i for i, value in enumerate(c) if value)
         return Leading(k, c[k], self.radius(k, abs(c[k]), share))
 
-    def radius(self, order: int, coefficient: Fraction, share: float) -> float:
+    def radius(
+        self, order: int, coefficient: Fraction, share: float, other: Function | None = None
+    ) -> float:
         """Up to where all terms past a power are at most a share of a term of that power.
 
-        By Cauchy's bound of all coefficients, on circles of several radii (Lemma 10).
+        By Cauchy's bound of all coefficients, on circles of several radii (Lemma 10); of the
+        product with another function, if there is one.
         """
         rho = np.geomspace(1e-4, 10.0, 24) * self.space.corners[0]
+        most = self._largest(rho) if other is None else self._largest(rho) + other._largest(rho)
+        ratio = np.log(0.9 * share) + _log(coefficient) + order * np.log(rho) - most
+        shares = np.exp(np.minimum(ratio, -np.log(10.0)))
+        return float((shares * rho).max()) * (1.0 - 1e-9)
+
+    def _largest(self, rho: FloatArray) -> FloatArray:
+        """Logarithm of a bound of the function on circles around s = 0."""
         arrays, (s, w) = self.space.arrays, self.weights
         with np.errstate(divide="ignore", over="ignore"):
             distances = np.log(np.abs(arrays.roots)[..., None] + rho)
@@ -261,10 +271,8 @@ class Function:
             sizes = sizes + np.log(np.abs(arrays.lead) * (1.0 + arrays.missed))[:, None]
             turned = np.expm1(np.multiply.outer(arrays.delays, rho))
             sizes = sizes + np.log(np.abs(s)[:, None] + np.abs(w) @ turned)
-        most = np.logaddexp.reduce(sizes, axis=0)
-        ratio = np.log(0.9 * share) + _log(coefficient) + order * np.log(rho) - most
-        shares = np.exp(np.minimum(ratio, -np.log(10.0)))
-        return float((shares * rho).max()) * (1.0 - 1e-9)
+        most: FloatArray = np.logaddexp.reduce(sizes, axis=0)
+        return most
 
     def value_and_slope(self, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """F and its derivative at any s, shape (n,), both times one number at each s."""

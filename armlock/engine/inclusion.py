@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from armlock.axis.compiled import njit
 from armlock.checks import BoolArray, ComplexArray, FloatArray, IntArray
+from armlock.compiled import njit
 
 EPSILON = 2.0**-52
 #: Number of Taylor coefficients that are kept.
@@ -860,7 +860,7 @@ def wind_many(
     end: FloatArray,
     most: int,
 ) -> tuple[FloatArray, ComplexArray, ComplexArray, FloatArray, IntArray]:
-    """`wind` for many functions of a space."""
+    """`wind` for many functions of a space, until one takes too many steps."""
     n = begin.size
     total, undecided, steps = np.empty(n), np.empty(n), np.empty(n, np.int64)
     first, last = np.empty(n, np.complex128), np.empty(n, np.complex128)
@@ -868,6 +868,9 @@ def wind_many(
         total[i], first[i], last[i], undecided[i], steps[i] = wind(
             space, steady[i], delayed[i], uncertain[i], begin[i], end[i], most
         )
+        if steps[i] >= most:
+            steps[i:] = steps[i]
+            break
     return total, first, last, undecided, steps
 
 
@@ -914,3 +917,296 @@ def resolved(
         stack[top + 1, 0], stack[top + 1, 1] = low, middle
         top += 2
     return found[:n].copy(), moves[:n].copy()
+
+
+class Crossed(NamedTuple):
+    """Where members of rows N - x M have zeros on the axis, see `cross`."""
+
+    row: IntArray  # (n,)
+    x: FloatArray  # (n,): where the zero is, and how far from it at most
+    spread: FloatArray
+    omega: FloatArray  # (n,): its frequency in rad/s, and how far from it at most
+    width: FloatArray
+    jump: IntArray  # (n,): by how many the zeros on the right increase with x
+
+
+@njit(nogil=True, error_model="numpy")
+def _appended(table: FloatArray, n: int) -> FloatArray:
+    """Return a table with room for entry n."""
+    if n < table.shape[0]:
+        return table
+    longer = np.empty((2 * n, table.shape[1]))
+    longer[:n] = table
+    return longer
+
+
+@njit(nogil=True, error_model="numpy")
+def _times_conjugate(f: ComplexArray, g: ComplexArray, product: ComplexArray) -> None:
+    """Multiply one Taylor polynomial by the conjugate of another."""
+    product[:] = 0.0
+    for i in range(ORDER):
+        for k in range(ORDER):
+            product[i + k] += f[i] * g[k].conjugate()
+
+
+@njit(nogil=True, error_model="numpy")
+def _row_excludes_zero(
+    low: float, high: float, first: float, last: float, work: Workspace, room: Members
+) -> bool:
+    """Whether zero is in no f_0 - y f_1 - x f_2, x from `low` to `high`, y from first to last.
+
+    Of one row two corners suffice.
+    """
+    weights = np.ones(3, np.complex128)
+    room.kind[:] = 0
+    for n in range(4 if first < last else 2):
+        room.kind[n] = 1
+        weights[1], weights[2] = -(first if n < 2 else last), -(low if n % 2 == 0 else high)
+        mix(weights, work, room, n)
+    return bool(excludes_zero(room) > 0)
+
+
+@njit(nogil=True, error_model="numpy")
+def _evaluate(
+    space: Arrays,
+    steady: FloatArray,
+    delayed: FloatArray,
+    exact: FloatArray,
+    omega: float,
+    y: float,
+    w: Workspace,
+) -> tuple[complex, complex, float, float]:
+    """Return N = f_0 - y f_1 and M = f_2 at a frequency, and their errors."""
+    expand(space, omega, 0.0, w)
+    for f in range(3):
+        combine(space, steady[f], delayed[f], exact, w, f)
+    size = abs(w.f[0, 0]) + abs(y * w.f[1, 0])
+    return (
+        w.f[0, 0] - y * w.f[1, 0],
+        w.f[2, 0],
+        w.rest[0] + abs(y) * w.rest[1] + 2.0 * EPSILON * size,
+        w.rest[2],
+    )
+
+
+@njit(nogil=True, error_model="numpy")
+def cross(
+    space: Arrays,
+    steady: FloatArray,
+    delayed: FloatArray,
+    y: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    begin: float,
+    end: float,
+    is_map: bool,
+    fine: float,
+    most: int,
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Find the zeros on the axis of each row f_0 - y f_1 - x f_2, `lower` <= x <= `upper`.
+
+    With N = f_0 - y f_1 and M = f_2 they are where h = Im(N conj M) is zero, at x = Re(N / M)
+    (Lemma 12). All rows share the expansion of an interval. Between infinite bounds all zeros
+    of h are found, those of M included. `begin` is 0 for the axis from s = 0, and a map's ends
+    at `end`: there N / M is real, and a root crosses alone.
+
+    Returns a table of crossings with the columns of `Crossed`, exact to `fine` in x where
+    rounding allows; a table of intervals that are not decided (row, least and largest x there,
+    the two frequencies); and the rows for which so many steps, in all, did not suffice.
+    """
+    rows, work, spare = y.size, workspace(space, 3), workspace(space, 3)
+    room, exact = members(4, space.delays.size), np.zeros(steady.shape[1])
+    everywhere, steps = upper[0] == np.inf, 0
+    found, n, undecided, left = np.empty((64, 6)), 0, np.empty((16, 5)), 0
+    size = 2 * ORDER - 1
+    products = np.empty((4, size), np.complex128)
+    a, b, square, z = products[0], products[1], products[2], products[3]
+    ends, unfinished = np.empty((2, 2)), np.zeros(rows, np.bool_)
+    pool, number = np.empty((300, rows), np.int64), np.zeros(300, np.int64)
+    pool[0], number[0] = np.arange(rows), rows
+    stack, depth, top = np.empty((300, 2)), np.zeros(300, np.int64), 1
+    low_cut = begin if begin > 0.0 else 1e-3 * end
+    high_cut = end if not is_map else end - 1e-3 * end
+    stack[0, 0], stack[0, 1] = low_cut, high_cut
+    if begin == 0.0:
+        # An interval around the end of the axis, where h is odd.
+        stack[top, 0], stack[top, 1] = -low_cut, low_cut
+        top += 1
+    if is_map:
+        stack[top, 0], stack[top, 1] = high_cut, 2.0 * end - high_cut
+        top += 1
+    while top > 0:
+        top -= 1
+        low, high, d = stack[top, 0], stack[top, 1], depth[top]
+        around = low < 0.0 or (is_map and high > end)
+        m, r = 0.5 * (low + high), 0.5 * (high - low) + 2.0 * EPSILON * high
+        if around:
+            m = 0.0 if low < 0.0 else end
+        steps += 1
+        if steps > most:
+            for i in range(number[d]):
+                unfinished[pool[d, i]] = True
+            continue
+        expand(space, m, r, work)
+        for f in range(3):
+            combine(space, steady[f], delayed[f], exact, work, f)
+        fast, settled = False, True
+        for k in range(work.angle.size):
+            fast |= work.lead[k] >= 0
+            settled &= space.delays[k] * r < 3e-4
+        for j in range(work.p.shape[0]):
+            settled &= work.bound[j, ORDER] <= EPSILON * work.bound[j, 0]
+        narrow = r <= 1e-13 * m or r < 1e-280
+        if not everywhere and number[d] > 1:
+            first, last, lowest, highest = np.inf, -np.inf, np.inf, -np.inf
+            for i in range(number[d]):
+                row = pool[d, i]
+                first, last = min(first, y[row]), max(last, y[row])
+                lowest, highest = min(lowest, lower[row]), max(highest, upper[row])
+            if _row_excludes_zero(lowest, highest, first, last, work, room):
+                continue
+        _times_conjugate(work.f[0], work.f[2], a)
+        _times_conjugate(work.f[1], work.f[2], b)
+        _times_conjugate(work.f[2], work.f[2], square)
+        size_a, size_b, size_m = 0.0, 0.0, 0.0
+        for i in range(ORDER):
+            size_a += abs(work.f[0, i])
+            size_b += abs(work.f[1, i])
+            size_m += abs(work.f[2, i])
+        least = 2.0 * abs(work.f[2, 0]) - size_m - work.rest[2]
+        known, kept = False, 0
+        for i in range(number[d]):
+            row = pool[d, i]
+            v = y[row]
+            alone = narrow or number[d] == 1 or (not fast and least <= 0.0)
+            if (
+                not everywhere
+                and alone
+                and _row_excludes_zero(lower[row], upper[row], v, v, work, room)
+            ):
+                continue
+            if fast and not narrow:
+                pool[d + 1, kept] = row
+                kept += 1
+                continue
+            rest = work.rest[0] + abs(v) * work.rest[1]
+            size_n = size_a + abs(v) * size_b
+            off = (rest + 32.0 * EPSILON * size_n) * size_m + work.rest[2] * (size_n + rest)
+            varied, bent = 0.0, 0.0
+            for k in range(size):
+                z[k] = a[k] - v * b[k]
+                if k > 0:
+                    varied += abs(z[k].imag)
+                if k > 1:
+                    bent += k * abs(z[k].imag)
+            if abs(z[0].imag) > varied + off:
+                continue
+            if not everywhere:
+                above, below, more = z[0].real, z[0].real, off
+                above -= upper[row] * square[0].real
+                below -= lower[row] * square[0].real
+                more += (
+                    3.0
+                    * max(abs(lower[row]), abs(upper[row]))
+                    * size_m
+                    * (work.rest[2] + 32.0 * EPSILON * size_m)
+                )
+                for k in range(1, size):
+                    above -= abs(z[k].real - upper[row] * square[k].real)
+                    below += abs(z[k].real - lower[row] * square[k].real)
+                if above > more or below < -more:
+                    continue
+            # Errors of the coefficients, and that of the remainder's slope (Lemma 12).
+            slope = abs(z[1].imag) - bent - 10.0 * off
+            if slope > 0.0 and (least > 0.0 or everywhere):
+                if not known and not around:
+                    known = True
+                    for e in range(2):
+                        at = low if e == 0 else high
+                        _evaluate(space, steady, delayed, exact, at, 0.0, spare)
+                        m_end = spare.f[2, 0].conjugate()
+                        ends[e, 0] = (spare.f[0, 0] * m_end).imag
+                        ends[e, 1] = (spare.f[1, 0] * m_end).imag
+                if not around and (ends[0, 0] - v * ends[0, 1] < 0.0) == (
+                    ends[1, 0] - v * ends[1, 1] < 0.0
+                ):
+                    continue
+                t, inclined = 0.0, z[1].imag
+                if not around:
+                    for _ in range(4):
+                        p, inclined = 0.0, 0.0
+                        for k in range(size - 1, -1, -1):
+                            inclined = inclined * t + p
+                            p = p * t + z[k].imag
+                        t = min(max(t - p / inclined, -1.0), 1.0)
+                # The functions themselves have another common factor than their polynomials,
+                # from which h over |N|^2 + |M|^2 is free.
+                f, g = _at(work.f[0], t) - v * _at(work.f[1], t), _at(work.f[2], t)
+                slide = 3.0 * size_n * (1.0 + size_m / least) / least if least > 0.0 else np.inf
+                off_t, x = min(2.0 * off / slope, 2.0), (f / g).real
+                spread = slide * off_t + 2.0 * (rest + abs(x) * work.rest[2]) / abs(g)
+                outside = x + spread < lower[row] or x - spread > upper[row]
+                if not around and outside:
+                    continue
+                inclined /= (f * f.conjugate()).real + (g * g.conjugate()).real
+                largest = (size_n + rest) ** 2 + (size_m + work.rest[2]) ** 2
+                before, at = 0.0, 0.0
+                for step in range(8):
+                    f, g, error_f, error_g = _evaluate(
+                        space, steady, delayed, exact, m + r * t, v, spare
+                    )
+                    total = (f * f.conjugate()).real + (g * g.conjugate()).real
+                    value = (f * g.conjugate()).imag / total
+                    wrong = 2.0 * (error_f * abs(g) + error_g * abs(f)) / total
+                    # Of the two around s = 0 and a map's end the place is known.
+                    off_t = 0.0 if around else min((abs(value) + wrong) * largest / slope, 2.0)
+                    x = (f / g).real
+                    near = abs(_at(work.f[2], t)) - work.rest[2] - ORDER * off_t * size_m
+                    if near > least > 0.0:
+                        slide = 3.0 * size_n * (1.0 + size_m / near) / near
+                    spread = slide * off_t + 2.0 * (error_f + abs(x) * error_g) / abs(g)
+                    outside = x + spread < lower[row] or x - spread > upper[row]
+                    if around or outside or spread <= fine or abs(value) <= wrong:
+                        break
+                    if step > 0 and t != at and value != before:
+                        inclined = (value - before) / (t - at)
+                    before, at = value, t
+                    t = min(max(t - value / inclined, -1.0), 1.0)
+                if outside:
+                    continue
+                found = _appended(found, n)
+                sign = 1.0 if z[1].imag > 0.0 else -1.0
+                found[n, 0], found[n, 1], found[n, 2] = row, x, spread
+                found[n, 3], found[n, 4] = m + r * t, r * off_t
+                found[n, 5] = sign if around else 2.0 * sign
+                n += 1
+                continue
+            if narrow or (settled and abs(z[0].imag) + varied <= 2.0 * off):
+                # In shorter intervals rounding hides h as well.
+                undecided = _appended(undecided, left)
+                middle, reach = 0.0, np.inf
+                if least > 0.0:
+                    middle = z[0].real / square[0].real
+                    reach = off + 3.0 * abs(middle) * size_m * work.rest[2]
+                    for k in range(1, size):
+                        reach += abs(z[k].real - middle * square[k].real)
+                    reach = 1.01 * reach / (least * least)
+                undecided[left, 0] = row
+                undecided[left, 1], undecided[left, 2] = middle - reach, middle + reach
+                undecided[left, 3], undecided[left, 4] = max(low, 0.0), min(high, end)
+                left += 1
+                continue
+            pool[d + 1, kept] = row
+            kept += 1
+        if kept:
+            number[d + 1] = kept
+            middle = m if high <= 4.0 * low else np.sqrt(low) * np.sqrt(high)
+            parts = (low, middle), (middle, high)
+            if around:
+                q = r / 16.0
+                parts = ((q, high), (-q, q)) if low < 0.0 else ((low, m - q), (m - q, m + q))
+            for part in parts:
+                stack[top, 0], stack[top, 1] = part
+                depth[top] = d + 1
+                top += 1
+    return found[:n].copy(), undecided[:left].copy(), unfinished

@@ -5,15 +5,8 @@ root chain that is not confined is -2.
 """
 
 from armlock.engine.roots import RootError
-from armlock.stability.bounds import last_frequency
-from armlock.stability.counts import (
-    BOUNDARY,
-    UNCONFINED,
-    CountError,
-    StabilityChart,
-    stability_chart,
-    unstable_roots,
-)
+from armlock.stability.charts import StabilityChart, stability_chart
+from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError, unstable_roots
 from armlock.stability.dcurve import d_curve, d_curve_branches, d_curve_line
 from armlock.stability.nyquist import AxisCrossings, NyquistCurve, axis_crossings, nyquist
 from armlock.stability.roots import rightmost_root
@@ -35,7 +28,6 @@ __all__ = [
     "d_curve",
     "d_curve_branches",
     "d_curve_line",
-    "last_frequency",
     "nyquist",
     "rightmost_root",
     "semi_discretization",

@@ -14,10 +14,11 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
-from armlock.axis.rounding import EPSILON
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import FloatArray, check_memory, positive_number, real_array
-from armlock.stability.zeros import axis_zeros
+from armlock.engine.inclusion import EPSILON
+from armlock.stability.counts import CountError
+from armlock.stability.crossings import crossings
 
 
 class Line(NamedTuple):
@@ -202,6 +203,28 @@ def d_curve_line(system: CharacteristicFunction) -> Line:
     return Line(b1 / scale, b2 / scale, a / scale)
 
 
+def _poles(system: CharacteristicFunction, omega_max: float) -> list[tuple[float, float]]:
+    """Return the intervals, ascending, in which the curve has a pole, or may have one."""
+    _, _, first, second = system.terms
+    bound = np.array([np.inf])
+    found, undecided, unfinished = crossings(
+        (first, first * 0, second), np.zeros(1), -bound, bound, np.array([omega_max])
+    )
+    if unfinished.any():
+        raise CountError(
+            f"no branches up to omega_max = {omega_max}: there are too many poles",
+            np.empty((0, 2)),
+        )
+    off = found.width + 4.0 * EPSILON * found.omega
+    low, high = found.omega - off, found.omega + off
+    inside = found.omega > 0.0
+    low, high = (
+        np.append(a[inside], b) for a, b in ((low, undecided.low), (high, undecided.high))
+    )
+    order = np.argsort(low)
+    return list(zip(low[order].tolist(), high[order].tolist(), strict=True))
+
+
 def d_curve_branches(
     system: CharacteristicFunction, omega_max: float, *, points_per_turn: int = 48
 ) -> list[Branch]:
@@ -238,7 +261,7 @@ def d_curve_branches(
         \mathrm{Im} \left[ B_1(\mathrm{j}\omega)\, \overline{B_2(\mathrm{j}\omega)}\,
         e^{-\mathrm{j}\omega (\theta_1 - \theta_2)} \right] = 0 ,
 
-    found with certified steps (`armlock.axis.contour.imaginary_zeros`).
+    found with certified steps (`armlock.engine.inclusion.cross`).
 
     Examples
     --------
@@ -257,12 +280,11 @@ def d_curve_branches(
     _require_two_parameters(system)
     turns = omega_max / system.omega_per_turn
     check_memory("omega_max", (int(min(density * turns, 1e18)),), 256)
-    _, b1, b2 = system.on_boundary()
-    determinant = b1.times_conjugate(b2)
-    poles = axis_zeros(determinant, [(0.0, omega_max)]).omega
-    edges = np.unique(np.concatenate(([0.0], poles, [omega_max])))
+    poles = _poles(system, omega_max)
     branches = []
-    for start, stop in pairwise(edges):
+    for (_, start), (stop, _) in pairwise([(0.0, 0.0), *poles, (omega_max, omega_max)]):
+        if stop <= start:
+            continue
         turns = (stop - start) / system.omega_per_turn
         count = int(np.ceil(density * max(turns, 4.0)))
         # Closer towards both ends, where the curve runs off to its poles.

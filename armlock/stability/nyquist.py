@@ -8,25 +8,28 @@ roots and the number P of unstable poles of L. The samples of the curve are for 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from armlock.checks import (
-    ComplexArray,
-    FloatArray,
-    positive_number,
-)
-from armlock.loops import Loop, LoopAt
-from armlock.stability.bounds import last_frequency, last_larger
-from armlock.stability.counts import UNCONFINED, CountError, loop_count
-from armlock.stability.zeros import axis_zeros
+from armlock.checks import ComplexArray, FloatArray, positive_number, real_number
+from armlock.delays import DelaySystem
+from armlock.engine import decide
+from armlock.engine.functions import Function, at, stacked
+from armlock.engine.margins import common_zeros
+from armlock.loops import Loop, checked_loop
+from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError
+from armlock.stability.crossings import crossings
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Where |L| is below it no crossing of the negative real axis is of interest.
-_SMALL = 1e-3
+# Where |L| is below it no crossing of the negative real axis is of interest, and above the
+# other one a pole is on the axis.
+_SMALL, _LARGE = 1e-3, 1e12
+# The share of a leading term that all others are at most, where a picture begins.
+_NEGLIGIBLE = 5e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +55,6 @@ class NyquistCurve:
         P, poles of L in the open right half-plane.
     closed_loop_roots : int
         Z = N + P, the loop's own roots in the right half-plane.
-    point : LoopAt
-        The loop, c1 and c2.
 
     Examples
     --------
@@ -71,7 +72,6 @@ class NyquistCurve:
     encirclements: int
     open_loop_poles: int
     closed_loop_roots: int
-    point: LoopAt
 
     def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
         """Draw the curve, both signs of omega, with -1 and the infinite branch.
@@ -115,40 +115,45 @@ class AxisCrossings:
     value: FloatArray
 
 
-def open_loop_poles(loop: Loop) -> int:
-    """Count the poles of L in the open right half-plane.
+def _quotient(loop: Loop | DelaySystem, c1: float, c2: float) -> tuple[Function, Function]:
+    """Return N and M of L = N / M, or say what was given in place of a loop."""
+    c1, c2 = real_number("c1", c1), real_number("c2", c2)
+    if not isinstance(loop, DelaySystem):
+        return checked_loop(loop).quotient(c1, c2)
+    if (c1, c2) != (1.0, 1.0):
+        raise TypeError(f"a DelaySystem has no perturbations, got c1 = {c1} and c2 = {c2}")
+    return loop.functions
 
-    Parameters
-    ----------
-    loop : Loop
-        The loop.
 
-    Returns
-    -------
-    int
+def open_loop_poles(m: Function) -> int:
+    """Count the poles of L = N / M in the open right half-plane.
 
     Raises
     ------
     ValueError
         If L has poles on the imaginary axis elsewhere than at s = 0: the contour is indented
-        there only.
+        there only. Or if infinitely many poles do not stay left of the axis.
     """
-    poles = loop.polynomials()[0].roots
-    on_axis = (np.abs(poles.real) <= 1e-12 * np.abs(poles)) & (poles != 0.0)
-    if on_axis.any():
+    lead = m.leading()
+    count = decide.count(m, lead.order if lead else 0)
+    if count == BOUNDARY:
         raise ValueError(
-            "the open loop must have no pole on the imaginary axis except at s = 0, got one "
-            f"at {poles[on_axis][0]}; unstable_roots counts such a loop all the same"
+            "the open loop must have no pole on the imaginary axis except at s = 0, got one; "
+            "unstable_roots counts such a loop all the same"
         )
-    return int((poles.real > 0.0).sum())
+    if count == UNCONFINED:
+        raise ValueError(
+            "the open loop must have finitely many poles on the right, got a chain of them "
+            "that is not confined to the left"
+        )
+    return count
 
 
-def _drawing_grid(loop: Loop, start: float, end: float) -> FloatArray:
+def _drawing_grid(per_turn: float, start: float, end: float) -> FloatArray:
     """Frequencies close enough to draw the curve; finer at first, where L changes most.
 
     Past a thousand turns of the delays no picture shows one turn beside the next.
     """
-    per_turn = loop.omega_per_turn
     first = np.arange(0.0, min(4.0 * per_turn, end), per_turn / 2000.0)
     resolved = min(1000.0 * per_turn, end)
     whole = np.arange(0.0, resolved, per_turn / 400.0)
@@ -157,8 +162,28 @@ def _drawing_grid(loop: Loop, start: float, end: float) -> FloatArray:
     return np.unique(every[(every >= start) & (every <= end)])
 
 
+def _leading_radius(n: Function, m: Function) -> tuple[int, float]:
+    """Order of the pole of N / M at s = 0, and up to which abs(s) L is as simple as it gets.
+
+    With a pole, L is its leading term to a part in 1000, and |L| is above 1000. Without one L
+    is constant to a part in 1000, and so is 1 + L.
+    """
+    leads = [f.leading(_NEGLIGIBLE) for f in (n, m, n + m)]
+    above, below, _ = leads
+    radius = min(lead.radius for lead in leads if lead)
+    if above is None or below is None or below.order <= above.order:
+        return 0, radius
+    order = below.order - above.order
+    size = abs(float(above.coefficient / below.coefficient))
+    return order, min(radius, (_SMALL * size) ** (1.0 / order))
+
+
 def nyquist(
-    loop: Loop, c1: float = 1.0, c2: float = 1.0, *, omega_max: float | None = None
+    loop: Loop | DelaySystem,
+    c1: float = 1.0,
+    c2: float = 1.0,
+    *,
+    omega_max: float | None = None,
 ) -> NyquistCurve:
     r"""Return the Nyquist curve for a picture, and its certified encirclements of -1.
 
@@ -170,10 +195,10 @@ def nyquist(
 
     Parameters
     ----------
-    loop : Loop
-        The loop.
+    loop : Loop or DelaySystem
+        The open loop.
     c1, c2 : float, optional
-        Multiplicative perturbations.
+        Multiplicative perturbations of a `Loop`.
     omega_max : float, optional
         Sample at least up to this frequency in rad/s.
 
@@ -184,8 +209,8 @@ def nyquist(
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no `Loop`, an argument is not finite and real, `omega_max` is not
-        positive, or L has poles on the imaginary axis elsewhere than at s = 0.
+        If `loop` is none, an argument is not finite and real, `omega_max` is not positive,
+        or L has poles on the imaginary axis elsewhere than at s = 0.
     CountError
         If the curve passes through -1, the loop's high-frequency chain is not confined, or the
         roots cannot be counted.
@@ -193,7 +218,7 @@ def nyquist(
     Notes
     -----
     Z counts the loop's own roots: one at s = 0 that D has because a pole of L cancels there is
-    none of them, see `armlock.stability.counts.loop_count`.
+    none of them, see `armlock.unstable_roots`.
 
     Examples
     --------
@@ -203,36 +228,49 @@ def nyquist(
     >>> curve.encirclements, curve.open_loop_poles, curve.closed_loop_roots
     (1, 0, 1)
     """
-    loop, c1, c2 = point = LoopAt.of(loop, c1, c2)
-    poles = open_loop_poles(loop)
-    order = point.poles_at_zero()
-    count = loop_count(loop, c1, c2)
+    n, m = _quotient(loop, c1, c2)
+    poles = open_loop_poles(m)
+    order, radius = _leading_radius(n, m)
+    try:
+        count = decide.count(n + m, common_zeros(n, m))
+    except decide.UndecidedError as error:
+        raise CountError(f"no Nyquist count: {error}", np.array([[c1, c2]])) from None
     if count < 0:
         chain = "its high-frequency chain of roots is not confined"
         why = chain if count == UNCONFINED else "the curve passes through -1"
         where = f"(c1, c2) = ({c1}, {c2})"
         raise CountError(f"no Nyquist count at {where}: {why}", np.array([[c1, c2]]))
-    radius, last = point.leading_radius(), float(last_frequency(loop, c1, c2))
-    end = max(1.05 * last, 10.0 / loop.longest_delay, 10.0 * radius)
+    last = float(n.space.confined_from(*stacked([n + m]))[0])
+    longest = n.space.longest or 1.0 / last
+    end = max(1.05 * last, 10.0 / longest, 10.0 * radius)
     if omega_max is not None:
         end = max(end, positive_number("omega_max", omega_max))
-    omega = _drawing_grid(loop, radius, end)
+    omega = _drawing_grid(2.0 * np.pi / longest, radius, end)
     arc = radius * np.exp(0.5j * np.pi * np.linspace(0.0, 1.0, 64))[slice(64 if order else 0)]
     return NyquistCurve(
         omega=omega,
-        response=loop(1j * omega, c1, c2),
+        response=_response(n, m, omega),
         indentation=arc,
-        indentation_response=loop(arc, c1, c2),
+        indentation_response=n.value_and_slope(arc)[0] / m.value_and_slope(arc)[0],
         pole_order=order,
         encirclements=count - poles,
         open_loop_poles=poles,
         closed_loop_roots=count,
-        point=point,
     )
 
 
+def _response(n: Function, m: Function, omega: FloatArray) -> ComplexArray:
+    """Evaluate L = N / M on the axis."""
+    above, below = at([n, m], omega)
+    return np.asarray(above / below)
+
+
 def axis_crossings(
-    loop: Loop, c1: float = 1.0, c2: float = 1.0, *, omega_max: float | None = None
+    loop: Loop | DelaySystem,
+    c1: float = 1.0,
+    c2: float = 1.0,
+    *,
+    omega_max: float | None = None,
 ) -> AxisCrossings:
     r"""Find every crossing of the negative real axis by the Nyquist curve.
 
@@ -242,13 +280,13 @@ def axis_crossings(
 
     Parameters
     ----------
-    loop : Loop
-        The loop.
+    loop : Loop or DelaySystem
+        The open loop.
     c1, c2 : float, optional
-        Multiplicative perturbations.
+        Multiplicative perturbations of a `Loop`.
     omega_max : float, optional
-        Highest frequency in rad/s. By default where |L| has fallen below 1e-3 for good; a
-        loop whose |L| does not fall needs it.
+        Highest frequency in rad/s. By default all crossings with |L| above 1e-3 are found; a
+        loop whose |L| does not fall below it needs the frequency.
 
     Returns
     -------
@@ -257,17 +295,16 @@ def axis_crossings(
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no `Loop`, an argument is not finite and real, `omega_max` is not positive,
-        or not given where |L| does not fall below 1e-3, or L has poles on the imaginary axis
-        elsewhere than at s = 0.
+        If `loop` is none, an argument is not finite and real, or `omega_max` is not positive,
+        or not given where |L| does not fall below 1e-3.
     CountError
         If there are too many crossings to be found, or rounding hides some.
 
     Notes
     -----
     Zeros of Im L at omega > 0, found with certified steps: none is missed, however close to
-    another. Where rounding may hide one they are refused, but next to a null of L, and where
-    |L| is below 1e-3. Where L(0) is finite the whole curve also meets the axis there.
+    another. A pole on the axis is none, nor is what exceeds 1e12. Where rounding may hide one
+    they are refused, but not where |L| is below 1e-3.
 
     Examples
     --------
@@ -278,12 +315,13 @@ def axis_crossings(
     5.63e-05 rad/s: -5.13
     1.96e-04 rad/s: -113.07
     """
-    loop, c1, c2 = point = LoopAt.of(loop, c1, c2)
-    open_loop_poles(loop)
+    n, m = _quotient(loop, c1, c2)
+    least = 0.0
     if omega_max is None:
-        factors = np.array([1.0 + abs(c1), 1.0 + abs(c2)]) / _SMALL
-        rest, *arms = (p.coefficients for p in loop.polynomials())
-        omega_max = last_larger(rest, (arms[0], arms[1]), factors)
+        least = _SMALL
+        steady, delayed = n.weights
+        sizes = (np.abs(steady - delayed.sum(axis=1)) + np.abs(delayed).sum(axis=1)) / _SMALL
+        omega_max = float(n.space.confined_from(*stacked([m]), sizes)[0])
         if not np.isfinite(omega_max):
             raise ValueError(
                 "omega_max must be given for a loop whose |L| does not fall to zero at high "
@@ -291,18 +329,42 @@ def axis_crossings(
             )
     else:
         omega_max = positive_number("omega_max", omega_max)
-    below = loop.rest_on_boundary()
-    crossing, measure = point.numerator().times_conjugate(below), below.times_conjugate(below)
-    zeros = axis_zeros(crossing, [(0.0, omega_max)], measure)
-    inside = zeros.omega > 0.0
-    # A stretch that L = 0 may lie in is taken for a null, next to which L is small.
-    hidden = inside & zeros.hidden & ~(zeros.position + zeros.spread > -_SMALL)
-    if hidden.any():
+    point = np.array([[c1, c2]])
+    begin = _constant_sign_up_to(n, m)
+    if not begin > 0.0:
         raise CountError(
-            f"no crossings at (c1, c2) = ({c1}, {c2}): rounding hides some around "
-            f"{zeros.omega[hidden][0]} rad/s",
-            np.array([[c1, c2]]),
+            f"no crossings at (c1, c2) = ({c1}, {c2}): L is real near s = 0", point
         )
-    omega = zeros.omega[inside & ~zeros.hidden]
-    value = point.response(omega).real
-    return AxisCrossings(omega[value < 0.0], value[value < 0.0])
+    if begin >= omega_max:
+        return AxisCrossings(np.empty(0), np.empty(0))
+    found, undecided, unfinished = crossings(
+        (n, n * 0, m), np.zeros(1), np.array([-_LARGE]), np.array([-least]),
+        np.array([omega_max]), begin=begin,
+    )  # fmt: skip
+    hidden = (undecided.least < -_SMALL) & (undecided.most > -_LARGE)
+    if unfinished.any() or hidden.any():
+        why = "they take too many steps"
+        if hidden.any():
+            why = f"rounding hides some around {undecided.low[hidden][0]} rad/s"
+        raise CountError(f"no crossings at (c1, c2) = ({c1}, {c2}): {why}", point)
+    order = np.argsort(found.omega)
+    omega = found.omega[order]
+    value = _response(n, m, omega).real
+    kept = (value < -least) & (value > -_LARGE)
+    return AxisCrossings(omega[kept], value[kept])
+
+
+def _constant_sign_up_to(n: Function, m: Function) -> float:
+    """Frequency up to which the imaginary part of L has one sign; zero if it is not known.
+
+    Its leading term there, as in Lemma 10: Im(N conj M) is the odd part of N(s) M(-s).
+    """
+    number = 16
+    above, below = n.series(number), m.series(number)
+    for k in range(number):
+        product = sum(
+            a * b * (-1) ** i for i, b in enumerate(below[: k + 1]) for a in [above[k - i]]
+        )
+        if k % 2 and product:
+            return n.radius(k, abs(Fraction(product)), 0.5, m)
+    return 0.0

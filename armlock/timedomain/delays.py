@@ -12,8 +12,8 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from armlock.axis.compiled import njit
 from armlock.checks import FloatArray, finite_series, positive_number
+from armlock.compiled import njit
 
 #: A constant delay in samples: phi(t - tau) = sum_k weights[k] phi[n - first - k].
 Delay = tuple[int, tuple[float, ...]]

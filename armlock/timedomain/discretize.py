@@ -25,8 +25,8 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 from scipy.linalg import solve_continuous_lyapunov
 
-from armlock.axis.compiled import njit
 from armlock.checks import ComplexArray, FloatArray, positive_number, real_array
+from armlock.compiled import njit
 from armlock.controllers import Controller
 from armlock.sensors import SignalMapping
 

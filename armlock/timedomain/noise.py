@@ -14,7 +14,6 @@ import numpy as np
 import numpy.typing as npt
 
 from armlock import paper
-from armlock.axis.compiled import njit
 from armlock.checks import (
     FloatArray,
     as_written,
@@ -24,6 +23,7 @@ from armlock.checks import (
     true_or_false,
     whole_number,
 )
+from armlock.compiled import njit
 from armlock.controllers import Controller
 from armlock.timedomain.discretize import (
     Rows,

@@ -16,7 +16,6 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from armlock.axis.compiled import njit
 from armlock.checks import (
     ComplexArray,
     FloatArray,
@@ -26,6 +25,7 @@ from armlock.checks import (
     positive_number,
     real_number,
 )
+from armlock.compiled import njit
 from armlock.loops import Loop, checked_loop
 from armlock.timedomain.delays import (
     AnyDelay,

@@ -344,12 +344,11 @@ def ideal_loop_is_stable() -> Finding:
     zero, following = (complex(lambert_root(*point, TAU1, branch)) for branch in (0, 1))
     loop = SingleArm(NOMINAL_GAIN, TAU1)
     right_of = [
-        int(unstable_roots(loop.shifted(following.real * factor), 1.0, 0.0))
-        for factor in (0.99, 1.01)
+        int(unstable_roots(loop, right_of=following.real * factor)) for factor in (0.99, 1.01)
     ]
     of_loop = abs(complex(1.0 + loop(following))) < 1e-9
     return Finding(
-        {"": abs(zero) < 1e-12 and right_of == [1, 3] and of_loop and following.real < 0.0},
+        {"": abs(zero) < 1e-12 and right_of == [0, 2] and of_loop and following.real < 0.0},
         following.real,
         f"real part in 1/s of the loop's rightmost roots at $k₂ = 1$ ($k₁ = {NOMINAL_GAIN:g}$"
         f"/s, $τ = {TAU1}$ s)",
