@@ -441,7 +441,7 @@ class CharacteristicFunction:
         s, x, y = self._checked(s, x, y)
         dz = self.step * np.exp(s * self.step) if self.step else 1.0
         (_, dr), *evaluated = self._evaluated(s)
-        arms = 0.0
+        arms = np.zeros_like(dr)
         pairs = zip((x, y), self.reference, (self.tau1, self.tau2), strict=True)
         for (b, db), (here, origin, tau) in zip(evaluated, pairs, strict=True):
             change = np.expm1(-s * tau)

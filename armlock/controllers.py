@@ -209,7 +209,7 @@ def _factored(system: control.StateSpace) -> tuple[ComplexArray, ComplexArray, f
     # What rounding left of a zero at s = 0 is none of the places to look at.
     sizes = sizes[sizes > 1e-12 * sizes.max()] if sizes.any() else np.ones(1)
     s = np.geomspace(0.1 * sizes.min(), 10.0 * sizes.max(), 40) * np.exp(0.7j)
-    given, found = system(s), quotients(zeros, poles, gain, s)
+    given, found = system(s), quotients(zeros.tolist(), poles.tolist(), gain, s)
     if not (np.abs(found - given) <= 1e-6 * np.abs(given)).all():
         raise ValueError(
             "controller must be a state space whose zeros and poles are found to a part in a "

@@ -192,7 +192,9 @@ class Loop(WithDelays, CharacteristicFunction):
         # As many poles at s = 0 as all three have zeros there.
         common = min(p.order for p in (rest, *arms) if p)
         super().__init__(
-            *(p.over_powers(common) for p in (rest, *arms)),
+            rest.over_powers(common),
+            arms[0].over_powers(common),
+            arms[1].over_powers(common),
             tau1,
             tau2,
             delay=delay,

@@ -21,7 +21,7 @@ from scipy import ndimage
 from armlock.checks import ComplexArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
-    from armlock.stability.counts import StabilityChart
+    from armlock.stability.charts import StabilityChart
     from armlock.stability.dcurve import Branch, Line
     from armlock.stability.nyquist import NyquistCurve
 

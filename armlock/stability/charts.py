@@ -200,8 +200,8 @@ def _chart_rows(
     doubtful &= confined
     counts[~confined] = UNCONFINED
     # Few entries are found many times as fast in a flat array.
-    i, k = np.divmod(np.flatnonzero(doubtful), x.size)
-    counts[i, k] = count(x[k], y[i])
+    row, column = np.divmod(np.flatnonzero(doubtful), x.size)
+    counts[row, column] = count(x[column], y[row])
     return counts
 
 
@@ -279,11 +279,11 @@ class _Rows:
         doubtful = np.repeat(doubted[:, None], x.size, axis=1)
         # Centre and crossing are rounded, and so is their sum.
         rounding = 4.0 * EPSILON * (abs(x0) + np.abs(found.x))
-        for row, low, high in (
+        for rows, low, high in (
             (found.row, at - found.spread - rounding, at + found.spread + rounding),
             (undecided.row, x0 + undecided.least, x0 + undecided.most),
         ):
             from_k, to_k = np.searchsorted(x, low), np.searchsorted(x, high, side="right")
             for i in np.flatnonzero(from_k < to_k):
-                doubtful[row[i], from_k[i] : to_k[i]] = True
+                doubtful[rows[i], from_k[i] : to_k[i]] = True
         return counts[:, :-1], doubtful

@@ -130,8 +130,8 @@ def count_points(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -
 
 def unstable_roots(
     system: CharacteristicFunction | DelaySystem,
-    x: npt.ArrayLike | None = None,
-    y: npt.ArrayLike | None = None,
+    x: npt.ArrayLike | Fraction | None = None,
+    y: npt.ArrayLike | Fraction | None = None,
     *,
     right_of: float = 0.0,
 ) -> IntArray:

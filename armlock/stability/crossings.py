@@ -89,9 +89,9 @@ def crossings(
     found, undecided, unfinished = map(
         np.concatenate, zip(*decide.in_threads(some, y.size, block), strict=True)
     )
-    row, *numbers, jump = found.T
+    row, x, spread, omega, width, jump = found.T
     return Crossings(
-        Crossed(row.astype(np.int64), *numbers, jump.astype(np.int64)),
+        Crossed(row.astype(np.int64), x, spread, omega, width, jump.astype(np.int64)),
         Undecided(undecided[:, 0].astype(np.int64), *undecided.T[1:]),
         unfinished,
     )

@@ -16,7 +16,8 @@ from armlock.checks import FloatArray
 from armlock.loops import CommonArm, DualArm
 from armlock.paper import COMMON_ARM_GAIN, STEP, TAU1, TAU2
 from armlock.robustness import first_crossing
-from armlock.stability.counts import StabilityChart, stability_chart, unstable_roots
+from armlock.stability.charts import StabilityChart, stability_chart
+from armlock.stability.counts import unstable_roots
 from armlock.stability.dcurve import Branch, d_curve, d_curve_branches, d_curve_line
 from armlock.stability.roots import rightmost_root
 from armlock.stability.semidiscretization import (

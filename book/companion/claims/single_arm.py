@@ -16,7 +16,8 @@ from armlock.loops import HayesEquation, Loop, SingleArm, paper_loop
 from armlock.paper import CONTROLLER_GAIN, PERTURBATION, TAU1
 from armlock.robustness import critical_perturbation, margins
 from armlock.sensors import SINGLE
-from armlock.stability.counts import stability_chart, unstable_roots
+from armlock.stability.charts import stability_chart
+from armlock.stability.counts import unstable_roots
 from armlock.stability.dcurve import d_curve
 from armlock.stability.roots import rightmost_root
 from book.companion.claims.ledger import PRINTED, Finding, Verdict, Weight, claim
