@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+import armlock
 from armlock import CountError, critical_perturbation, margins, rightmost_root
 from tests import attack_judge as judge
 from tests.attack import between, draw_arm, draw_delays, draw_paper, draw_point, roots, to_loop
