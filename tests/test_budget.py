@@ -71,9 +71,7 @@ def test_unstable_loops_have_no_noise_budget():
     """Their responses at s = j omega look like those of a stable loop."""
     loop = paper_loop()
     assert unstable_roots(loop, 1.0, 1.0 - 1e-5) == 2
-    message = (
-        r"^loop must be stable at \(c1, c2\) = \(1, 0\.99999\), but unstable_roots gives 2"
-    )
+    message = r"^loop must be stable at \(c1, c2\) = \(1, 0\.99999\), but unstable_.* 2"
     with pytest.raises(ValueError, match=message):
         noise_budget(loop, [1e-3], c2=1.0 - 1e-5)
     with pytest.raises(ValueError, match=r"^loop must be stable .* gives 36"):
@@ -147,7 +145,8 @@ def test_pulling_is_what_the_method_of_steps_gives(seed):
     while unstable_roots(loop := Loop(([], poles, gain), SINGLE, tau, tau)):
         gain *= 0.5
     phi = steps_answer(poles, gain, tau, 40.0 * tau, 60)
-    at = np.array([12.0, 13.35, 20.0, 31.0, 39.0]) * tau
+    # Within the first round trip too.
+    at = np.array([0.3, 0.8, 12.0, 13.35, 20.0, 31.0, 39.0]) * tau
     found = pulling(loop, at, common=(1.0, 0.0, 0.0), differential=(1.0, 0.0, 0.0))
     expected = np.interp(at, np.arange(phi.size) * tau / 60, phi)
     np.testing.assert_allclose(found, expected, rtol=2e-4, atol=2e-5 * np.abs(phi).max())

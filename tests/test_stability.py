@@ -21,7 +21,7 @@ from armlock import (
     stability_chart,
     unstable_roots,
 )
-from armlock.robustness.rays import Ray
+from armlock.engine.margins import chain_limit
 from tests import independent
 from tests.systems import NEUTRAL, RETARDED, with_roots
 from tests.test_in_time import ends_when_interrupted
@@ -170,9 +170,10 @@ class TestOtherLoops:
     def test_a_ray_leaves_a_neutral_chain_where_its_reserve_ends(self, name, x, y, dx, dy):
         system = NEUTRAL[name]
         assume(dx or dy)
-        ray = Ray(system, (0.1 * x, 0.1 * y), (0.01 * dx, 0.01 * dy))
-        limit = min(ray.chain_limit(), 1e12)
-        near = [ray.at(limit * share) for share in (1.0 - 1e-9, 1.0 + 1e-9)]
+        start, way = 0.1 * np.array([x, y]), 0.01 * np.array([dx, dy])
+        change = system.terms.first * -way[0] + system.terms.second * -way[1]
+        limit = min(chain_limit(system.function(*start), change, 0.0), 1e12)
+        near = [start + limit * share * way for share in (1.0 - 1e-9, 1.0 + 1e-9)]
         inside, outside = (system.chain_reserve(*point) for point in near)
         assert inside > 0.0 or limit == 0.0
         assert outside <= 0.0 or limit == 1e12

@@ -94,14 +94,13 @@ def responses(
 
 
 def require_stable(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> None:
-    """Raise unless all roots of a loop lie in the open left half-plane.
+    """Raise unless all roots of a closed loop lie in the open left half-plane.
 
-    The response of an unstable loop at s = j omega looks like that of a stable one. A root at
-    s = 0 that cancels in L is not the loop's, see `armlock.unstable_roots`.
+    The response of an unstable loop at s = j omega looks like that of a stable one.
     """
     count = int(unstable_roots(checked_loop(loop), c1, c2))
     if count != 0:
         raise ValueError(
-            f"loop must be stable at (c1, c2) = ({c1:g}, {c2:g}), but unstable_roots gives "
-            f"{count}"
+            f"loop must be stable at (c1, c2) = ({c1:g}, {c2:g}), but "
+            f"unstable_roots gives {count}"
         )
