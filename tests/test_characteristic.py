@@ -23,7 +23,6 @@ from armlock import (
     unstable_roots,
 )
 from armlock.sensors import DIFFERENCE, SignalMapping
-from armlock.stability import last_frequency
 from tests import independent
 from tests.systems import NEUTRAL, RETARDED
 
@@ -128,14 +127,6 @@ def test_one_thing_is_replaced_and_all_else_stays():
     assert one.rest == other.rest
     assert one != other
     assert one.plain() == other.plain()
-
-
-def test_results_are_kept_for_equal_loops():
-    kept = last_frequency.__globals__["_squares"]
-    last_frequency(CommonArm(gain=0.123), 0.9, 0.9)
-    before = kept.cache_info().misses
-    last_frequency(CommonArm(gain=0.123), 0.8, 0.9)
-    assert kept.cache_info().misses == before
 
 
 def test_the_perturbations_of_a_loop_are_one_by_default():
