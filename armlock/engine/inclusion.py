@@ -979,7 +979,7 @@ def _evaluate(
     """Return N = f_0 - y f_1 and M = f_2 at a frequency, and their errors."""
     expand(space, omega, 0.0, w)
     for f in range(3):
-        combine(space, omega, steady[f], delayed[f], exact, w, f)
+        combine(space, steady[f], delayed[f], exact, w, f)
     size = abs(w.f[0, 0]) + abs(y * w.f[1, 0])
     return (
         w.f[0, 0] - y * w.f[1, 0],
@@ -1049,7 +1049,7 @@ def cross(
             continue
         expand(space, m, r, work)
         for f in range(3):
-            combine(space, m, steady[f], delayed[f], exact, work, f)
+            combine(space, steady[f], delayed[f], exact, work, f)
         fast, settled = False, True
         for k in range(work.angle.size):
             fast |= work.angle[k] > _FAST
