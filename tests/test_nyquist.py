@@ -219,7 +219,8 @@ def test_a_system_with_three_delays_has_a_curve_and_crossings():
     assert (curve.pole_order, curve.open_loop_poles) == (1, 0)
     assert curve.closed_loop_roots == unstable_roots(loop)
     np.testing.assert_allclose(curve.response, loop(1j * curve.omega), rtol=1e-9)
-    crossings, omega = axis_crossings(loop), np.linspace(1e-3, 300.0, 1_000_001)
+    crossings = axis_crossings(loop)
+    omega = np.linspace(1e-3, 1.001 * crossings.omega[-1], 1_000_001)
     value = loop(1j * omega)
     change = (value.imag[1:] * value.imag[:-1] < 0.0) & (value.real[1:] < -1e-3)
     assert crossings.omega.size == change.sum() > 0
@@ -235,8 +236,9 @@ def test_a_picture_takes_fewer_than_a_million_samples():
     assert plain.closed_loop_roots == far.closed_loop_roots == 0
     for curve, drawn in ((plain, loop), (far, CommonArm())):
         assert curve.omega.size < 1e6
-        np.testing.assert_allclose(
-            curve.response[::997], drawn(1j * curve.omega[::997]), rtol=1e-9
-        )
+        some = curve.omega[::997]
+        # The phase omega tau of the reference is rounded.
+        allowed = 1e-9 + 1e-15 * some * drawn.longest_delay
+        assert (abs(curve.response[::997] / drawn(1j * some) - 1.0) < allowed).all()
         assert (np.diff(curve.omega) > 0.0).all()
     assert far.omega[-1] == 1e9

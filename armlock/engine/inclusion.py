@@ -1143,7 +1143,8 @@ def cross(
                 # from which h over |N|^2 + |M|^2 is free.
                 f, g = _at(work.f[0], t) - v * _at(work.f[1], t), _at(work.f[2], t)
                 slide = 3.0 * size_n * (1.0 + size_m / least) / least if least > 0.0 else np.inf
-                off_t, x = min(2.0 * off / slope, 2.0), (f / g).real
+                off_t = min(2.0 * off / slope, 2.0)
+                x = (f * g.conjugate()).real / (g * g.conjugate()).real
                 spread = slide * off_t + 2.0 * (rest + abs(x) * work.rest[2]) / abs(g)
                 outside = x + spread < lower[row] or x - spread > upper[row]
                 if not around and outside:
@@ -1160,7 +1161,7 @@ def cross(
                     wrong = 2.0 * (error_f * abs(g) + error_g * abs(f)) / total
                     # Of the two around s = 0 and a map's end the place is known.
                     off_t = 0.0 if around else min((abs(value) + wrong) * largest / slope, 2.0)
-                    x = (f / g).real
+                    x = (f * g.conjugate()).real / (g * g.conjugate()).real
                     near = abs(_at(work.f[2], t)) - work.rest[2] - ORDER * off_t * size_m
                     if near > least > 0.0:
                         slide = 3.0 * size_n * (1.0 + size_m / near) / near

@@ -120,10 +120,10 @@ def count_points(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -
     a, b, c = (term.series(1)[0] for term in terms)
     for i in np.flatnonzero(found == BOUNDARY):
         at = float(x[i]), float(y[i])
-        on_line = (
+        at_zero = (
             a + b * (Fraction(x0) - Fraction(at[0])) + c * (Fraction(y0) - Fraction(at[1]))
         )
-        if on_line or isinstance(system, Loop):
+        if at_zero or isinstance(system, Loop):
             found[i] = _count_exactly(system, *at, 0.0)
     return found
 
