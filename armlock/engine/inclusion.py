@@ -26,6 +26,8 @@ ORDER = 4
 _FAST = 1.5
 # Two of them that turn by no more than this beside each other share a free phase.
 _TOGETHER = 0.3
+# An interval over which an exponential turns by more than twice this, in rad, is a long one.
+_FAR = 30.0
 # Polynomials are rescaled before they leave these bounds.
 _HUGE = 1e150
 # A piece of the axis is this share of the distance to the roots, together; it serves intervals
@@ -1050,9 +1052,10 @@ def cross(
         expand(space, m, r, work)
         for f in range(3):
             combine(space, steady[f], delayed[f], exact, work, f)
-        fast, settled = False, True
+        fast, settled, far = False, True, False
         for k in range(work.angle.size):
             fast |= work.lead[k] >= 0
+            far |= space.delays[k] * r > _FAR
             settled &= space.delays[k] * r < 3e-4
         for j in range(work.p.shape[0]):
             settled &= work.bound[j, ORDER] <= EPSILON * work.bound[j, 0]
@@ -1078,7 +1081,8 @@ def cross(
         for i in range(number[d]):
             row = pool[d, i]
             v = y[row]
-            alone = narrow or number[d] == 1 or (not fast and least <= 0.0)
+            # Rows are tested one by one where a long interval may be spared, or a short one.
+            alone = narrow or number[d] == 1 or far or (not fast and least <= 0.0)
             if (
                 not everywhere
                 and alone

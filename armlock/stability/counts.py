@@ -103,9 +103,20 @@ def count_points(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -
     # Differences from the reference: next to it, where a loop is used, nothing cancels.
     terms = system.function(x0, y0), system.terms.first, system.terms.second
     (steady, delayed), exact = stacked(terms), np.ones_like(x)
-    found = np.empty(x.size, dtype=np.int64)
-    for start in range(0, x.size, _AT_A_TIME):
-        some = slice(start, start + _AT_A_TIME)
+    # D has a root at s = 0 on a line, which is known exactly. A loop may have none there.
+    on_line = np.zeros(x.size, np.bool_)
+    if not isinstance(system, Loop):
+        a, b, c = (term.series(1)[0] for term in terms)
+        sums = float(a), float(b) * (x0 - x), float(c) * (y0 - y)
+        sizes = np.abs(sums[0]) + np.abs(sums[1]) + np.abs(sums[2])
+        for i in np.flatnonzero(np.abs(sums[0] + sums[1] + sums[2]) <= 8.0 * EPSILON * sizes):
+            dx, dy = Fraction(x0) - Fraction(x[i]), Fraction(y0) - Fraction(y[i])
+            on_line[i] = a + b * dx + c * dy == 0
+    confined = system.chain_reserve(x, y) > 0.0
+    found = np.where(confined, BOUNDARY, UNCONFINED)
+    left = np.flatnonzero(confined & ~on_line)
+    for start in range(0, left.size, _AT_A_TIME):
+        some = left[start : start + _AT_A_TIME]
         shares = np.stack((exact[some], x0 - x[some], y0 - y[some]), axis=-1)
         # A share, a weight, their product and two sums round by half an EPSILON each. The
         # factors exp(-s theta) - 1 of delayed weights are at most two.
@@ -116,15 +127,8 @@ def count_points(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -
             x[some],
             y[some],
         )
-    # What is left is counted exactly. Most of these points lie on the line D(0) = 0.
-    a, b, c = (term.series(1)[0] for term in terms)
-    for i in np.flatnonzero(found == BOUNDARY):
-        at = float(x[i]), float(y[i])
-        at_zero = (
-            a + b * (Fraction(x0) - Fraction(at[0])) + c * (Fraction(y0) - Fraction(at[1]))
-        )
-        if at_zero or isinstance(system, Loop):
-            found[i] = _count_exactly(system, *at, 0.0)
+    for i in left[found[left] == BOUNDARY]:
+        found[i] = _count_exactly(system, float(x[i]), float(y[i]), 0.0)
     return found
 
 
@@ -209,7 +213,8 @@ def unstable_roots(
         except UndecidedError as error:
             raise CountError(f"no count: {error}", np.empty((0, 2))) from None
     if isinstance(x, Fraction) or isinstance(y, Fraction):
-        pair = zip(checked_system(system).parameters, given_or_one(system, x, y), strict=True)
+        given = given_or_one(checked_system(system), x, y)
+        pair = zip(system.parameters, given, strict=True)
         x, y = (v if isinstance(v, Fraction) else real_number(name, v) for name, v in pair)
         return np.array(_count_exactly(system, x, y, right_of))
     xs, ys = broadcast_parameters(system, x, y)
