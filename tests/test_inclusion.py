@@ -50,12 +50,14 @@ def draw_polynomial(rng, degree):
     return Polynomial.of(p.coefficients.tolist()) if rng.random() < 0.4 else p
 
 
-def draw(rng, most=6, delays=4, slowest=-2.0):
-    """Draw a function with up to four polynomials."""
+def draw(rng, most=6, delays=4, longest=2.0):
+    """Draw a function with up to three polynomials."""
     polynomials = [
         draw_polynomial(rng, rng.integers(most + 1)) for _ in range(rng.integers(1, 4))
     ]
-    lags = [Fraction(10.0 ** rng.uniform(slowest, 2)) for _ in range(rng.integers(delays + 1))]
+    lags = [Fraction(10.0 ** rng.uniform(-2, longest)) for _ in range(rng.integers(delays + 1))]
+    if len(lags) > 1 and rng.random() < 0.5:
+        lags[1] = lags[0] * (1 + Fraction(10.0 ** rng.uniform(-15, -1)))
     space = Space(polynomials, lags)
     shape = len(polynomials), len(lags)
     steady = rng.normal(size=shape[0]) * 10.0 ** rng.uniform(-1, 2, shape[0])
@@ -86,7 +88,7 @@ def enclosed(function, middle, half, work, index=0):
     space = function.space
     none = np.zeros(len(space.polynomials))
     inclusion.expand(space.arrays, middle, half, work)
-    inclusion.combine(space.arrays, middle, *function.weights, none, work, index)
+    inclusion.combine(space.arrays, *function.weights, none, work, index)
 
 
 def divisor(work):
@@ -109,8 +111,9 @@ def share_of_bound(function, exact, middle, half, work, t):
 
 def test_enclosures_hold_on_intervals_and_on_parts_of_them():
     rng, shares = np.random.default_rng(1), []
-    for _ in range(70):
-        function = draw(rng)
+    for trial in range(70):
+        # Exponentials of very long delays are fast on intervals where rounding prevails.
+        function = draw(rng, longest=9.0 if trial % 3 == 0 else 2.0)
         exact, space = Exact(function), function.space
         work = inclusion.workspace(space.arrays, 1)
         for _ in range(2):
@@ -219,7 +222,7 @@ def test_leading_term_up_to_its_radius():
 def test_beyond_the_end_of_the_axis_the_leading_power_prevails():
     rng, least = np.random.default_rng(6), np.inf
     for _ in range(150):
-        function = draw(rng, 4, slowest=0.0)
+        function = draw(rng, 4)
         space = function.space
         steady, delayed = (v[None] for v in function.weights)
         end = float(space.confined_from(steady, delayed)[0])
@@ -248,6 +251,7 @@ def test_zero_is_excluded_only_where_all_members_stay_on_one_side(shares):
         enclosed(function, middle, half, work)
         enclosed(other, middle, half, work, 1)
         along = work.f[0] / abs(work.f[0, 0])
+        along[1:] *= rng.uniform(-1, 1, 3)
         gamma = abs(along[0]) - np.abs(along[1:]).sum()
         if shares and gamma <= 0.0:
             continue
@@ -281,12 +285,15 @@ def test_a_function_moved_along_the_real_axis():
         function = draw(rng, 3)
         if not function.space.delays:
             continue
-        sigma = rng.choice([-1, 1]) * 10.0 ** rng.uniform(-2, 1.5) / function.space.longest
+        sigma = rng.choice([-1, 1]) * 10.0 ** rng.uniform(-2, 2) / function.space.longest
         space, *weights = function.shifted(float(sigma))
         omega = 10.0 ** rng.uniform(-2, 1) / max(function.space.longest, 1.0)
+        if rng.random() < 0.5:
+            # Next to a root, where a small error of the root is a large one of its factor.
+            omega = np.abs(space.arrays.roots.imag).max(initial=0.0) * (1.0 + 1e-12) or omega
         work = inclusion.workspace(space.arrays, 1)
         inclusion.expand(space.arrays, omega, 0.0, work)
-        inclusion.combine(space.arrays, omega, *weights, work, 0)
+        inclusion.combine(space.arrays, *weights, work, 0)
         exact = Exact(function)(mp.mpc(float(sigma), omega)) * divisor(work)
         off = abs(exact - mp.mpc(complex(work.f[0, 0])))
         shares.append(float(off / mp.mpf(float(work.rest[0]))))

@@ -72,7 +72,7 @@ def counts(
     leading: Leading | None = None,
     most: int = _MOST_STEPS,
 ) -> IntArray:
-    """Count the zeros with positive real part of n functions (Lemma 9).
+    """Count the zeros with positive real part of n functions (Lemma 13).
 
     Parameters
     ----------
@@ -221,7 +221,7 @@ class Family:
         return found
 
     def begins(self, level: float) -> float:
-        """Frequency up to which a test holds by leading terms at s = 0 (Lemma 10), or zero."""
+        """Frequency up to which a test holds by leading terms at s = 0 (Lemma 15), or zero."""
         share, best = 1e-8, 0.0
         for test in self.tests:
             vertices, terms = self._members(test, level)
@@ -247,7 +247,7 @@ class Family:
         return best
 
     def ends(self, level: float) -> float:
-        """Frequency past which a test holds, because one term exceeds all others (Lemma 9)."""
+        """Frequency past which a test holds, because one term exceeds all others (Lemma 15)."""
         found = [np.inf]
         for test in self.tests:
             vertices, terms = self._members(test, level)

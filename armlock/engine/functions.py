@@ -40,7 +40,7 @@ class Leading(NamedTuple):
     coefficient : Fraction
         The coefficient c.
     radius : float
-        Up to this abs(s), all other terms together are at most a share of it (Lemma 10).
+        Up to this abs(s), all other terms together are at most a share of it (Lemma 11).
     """
 
     order: int
@@ -136,7 +136,7 @@ class Space:
         extra: float | FloatArray = 0.0,
         top_terms: float | FloatArray | None = None,
     ) -> FloatArray:
-        """Frequency past which, for Re s >= 0, what nothing delays exceeds all else (Lemma 9).
+        """Frequency past which, for Re s >= 0, what nothing delays exceeds all else (Lemma 12).
 
         Parameters
         ----------
@@ -253,7 +253,7 @@ class Function:
     ) -> float:
         """Up to where all terms past a power are at most a share of a term of that power.
 
-        By Cauchy's bound of all coefficients, on circles of several radii (Lemma 10); of the
+        By Cauchy's bound of all coefficients, on circles of several radii (Lemma 11); of the
         product with another function, if there is one.
         """
         rho = np.geomspace(1e-4, 10.0, 24) * self.space.corners[0]
@@ -312,7 +312,7 @@ class Function:
     def shifted(self, sigma: float) -> tuple[Space, FloatArray, FloatArray, FloatArray]:
         """Return the function s -> F(s + sigma): its space, S, W, and the error of S.
 
-        What exponentials and weights round by is part of that error.
+        What exponentials and weights round by is part of that error (Lemma 17).
         """
         polynomials = []
         for p in self.space.polynomials:

@@ -175,7 +175,7 @@ _MOST_TURNS = 2.0**26
 
 @njit(nogil=True, error_model="numpy")
 def _phase(theta: float, tail: float, m: float) -> tuple[float, float]:
-    """Return (theta + tail) m less whole turns, and a bound of its error in rad (Lemma 4)."""
+    """Return (theta + tail) m less whole turns, and a bound of its error in rad (Lemma 6)."""
     product = theta * m
     turns = np.round(product / 6.283185307179586)
     if turns > _MOST_TURNS:
@@ -191,7 +191,7 @@ def _phase(theta: float, tail: float, m: float) -> tuple[float, float]:
 
 @njit(nogil=True, error_model="numpy")
 def expand(space: Arrays, m: float, r: float, work: Workspace) -> None:
-    """Expand polynomials and exponentials about j m (Lemmas 1 and 2).
+    """Expand polynomials and exponentials about j m (Lemmas 1 to 3).
 
     The polynomials come from an expansion on a longer piece of the axis where one serves.
     """
@@ -258,7 +258,7 @@ def combine(
     work: Workspace,
     index: int,
 ) -> None:
-    """Enclose function `index` with weights S and W on the expanded interval (Lemma 3).
+    """Enclose function `index` with weights S and W on the expanded interval (Lemmas 4, 7).
 
     `uncertain` holds the errors of S.
     """
@@ -344,7 +344,7 @@ def values(
 
 @njit(nogil=True, error_model="numpy")
 def _divide(c: ComplexArray, by: ComplexArray, quotient: ComplexArray) -> float:
-    """Divide Taylor polynomials; return a bound of what is left of higher powers (Lemma 6)."""
+    """Divide Taylor polynomials; return a bound of what is left of higher powers (Lemma 9)."""
     left = 0.0
     for n in range(2 * ORDER - 1):
         v = c[n] if n < ORDER else 0j
@@ -455,7 +455,7 @@ def _holds(room: Members, gamma: float) -> bool:
 
 @njit(nogil=True, error_model="numpy")
 def excludes_zero(room: Members) -> int:
-    """Whether zero is in no member of the hull of the vertices, after any terms (Lemmas 5, 6).
+    """Whether zero is in no member of the hull of the vertices, after any terms (Lemmas 8, 9).
 
     0 if that is not shown; 1 along a direction, which is along[0] then; 2 by shares of the
     polynomial `along`.
@@ -747,7 +747,7 @@ def walk(
                 weights[functions - loose + n] = 1.0
                 mix(weights, work, room, 3 + n)
             for i in range(parts):
-                # A triangle that holds this part of the arc (Lemma 11).
+                # A triangle that holds this part of the arc (Lemma 16).
                 turn = begin + (2 * i + 1) * half
                 for n in range(3):
                     weights[:] = 0.0
@@ -803,7 +803,7 @@ def wind(
     end: float,
     most: int,
 ) -> tuple[float, complex, complex, float, int]:
-    """Follow the argument of a function along the axis (Lemma 7).
+    """Follow the argument of a function along the axis (Lemma 10).
 
     Returns the argument gathered from `begin` to `end`, the values at both, the frequency
     where zero is not excluded (nan if there is none), and the steps.

@@ -132,7 +132,7 @@ def at_zero(f: Function, g: Function) -> float:
 
 
 def chain_limit(f: Function, g: Function, start: float) -> float:
-    """First t >= start at which the neutral root chain of f + t g is not confined (Lemma 13).
+    """First t >= start at which the neutral root chain of f + t g is not confined (Lemma 14).
 
     What is left of the undelayed term is linear in t between the t at which a term vanishes.
     A map has no such chain.

@@ -214,7 +214,7 @@ def _roots(coefficients: FloatArray) -> ComplexArray:
 
 
 def _missed(roots: ComplexArray, coefficients: FloatArray) -> float:
-    """By how much roots miss the polynomial with these coefficients, see `Polynomial.missed`.
+    """By how much roots miss the polynomial with these coefficients, see Lemma 5.
 
     A power of s that is off by no more than this share of what the magnitudes of the roots give
     is off by no more than it at any s. The product itself rounds, two EPSILON a root.
