@@ -57,7 +57,7 @@ def draw(rng, most=6, delays=4, longest=2.0):
     ]
     lags = [Fraction(10.0 ** rng.uniform(-2, longest)) for _ in range(rng.integers(delays + 1))]
     if len(lags) > 1 and rng.random() < 0.5:
-        lags[1] = lags[0] * (1 + Fraction(10.0 ** rng.uniform(-15, -1)))
+        lags[1] = lags[0] * (1 + Fraction(10.0 ** rng.uniform(-18, -1)))
     space = Space(polynomials, lags)
     shape = len(polynomials), len(lags)
     steady = rng.normal(size=shape[0]) * 10.0 ** rng.uniform(-1, 2, shape[0])
@@ -285,7 +285,7 @@ def test_a_function_moved_along_the_real_axis():
         function = draw(rng, 3)
         if not function.space.delays:
             continue
-        sigma = rng.choice([-1, 1]) * 10.0 ** rng.uniform(-2, 2) / function.space.longest
+        sigma = rng.choice([-1, 1]) * 10.0 ** rng.uniform(-2, 2.7) / function.space.longest
         space, *weights = function.shifted(float(sigma))
         omega = 10.0 ** rng.uniform(-2, 1) / max(function.space.longest, 1.0)
         if rng.random() < 0.5:
@@ -299,3 +299,12 @@ def test_a_function_moved_along_the_real_axis():
         shares.append(float(off / mp.mpf(float(work.rest[0]))))
     assert max(shares) <= 1.0
     assert max(shares) > 0.02
+
+
+def test_delays_that_are_equal_but_for_rounding():
+    lags = [Fraction(1000), Fraction(1000) + Fraction(3, 10**14)]
+    function = Space([Polynomial.of([1])], lags).function([0], [[1, -1]])
+    work = inclusion.workspace(function.space.arrays, 1)
+    enclosed(function, 1e7, 1e6, work)
+    for t in (-1.0, 1.0):
+        assert share_of_bound(function, Exact(function), 1e7, 1e6, work, t) <= 1.0

@@ -122,9 +122,8 @@ def counts(
             float(undecided[k]),
             int(here[k]),
         )
-    # At s = 0 all is real.
-    values = inclusion.values(space.arrays, steady[here], delayed[here], np.zeros(1))[0]
-    direction = leading.direction if leading else np.sign(values[:, 0].real)
+    # At s = 0 all is real; the value found there is off by less than a quarter turn.
+    direction = leading.direction if leading else np.sign(first.real)
     still = np.sign(space.limits(steady[here], delayed[here])[0]) * 1j ** (space.degree % 4)
     if space.step:
         # There the function of a map is real.
@@ -226,10 +225,10 @@ class Family:
         for test in self.tests:
             vertices, terms = self._members(test, level)
             leads = [f.leading(share) for f in vertices]
-            others = [lead for f in terms if (lead := f.leading(share))]
+            others = [f.leading(share) for f in terms if not f.is_zero]
             known = [lead for lead in leads if lead]
             middle = sum(lead.direction for lead in known) / len(leads)
-            if len(known) < len(leads) or abs(middle) < 0.5:
+            if len(known) < len(leads) or None in others or abs(middle) < 0.5:
                 continue
             turned = [(lead.direction * np.conj(middle)).real / abs(middle) for lead in known]
             room, radius = min(turned) - 4.0 * share, min(lead.radius for lead in known)

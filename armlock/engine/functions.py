@@ -81,7 +81,7 @@ class Space:
         scale = np.array([abs(root) or unit for root in whole.roots])
         shape = len(self.polynomials), self.degree
         roots, present = np.zeros(shape, np.complex128), np.zeros(shape, np.bool_)
-        computed, rounding = np.zeros(shape, np.bool_), np.zeros(shape)
+        computed = np.zeros(shape, np.bool_)
         for j, p in enumerate(self.polynomials):
             left = list(range(self.degree))
             for i, root in sorted(enumerate(p.roots), key=lambda pair: -abs(pair[1])):
@@ -89,12 +89,10 @@ class Space:
                 k = min(left, key=lambda k: abs(np.log(scale[k]) - size))
                 left.remove(k)
                 roots[j, k], present[j, k], computed[j, k] = root, True, i in p.computed
-                rounding[j, k] = EPSILON * abs(root) if p.rounded else 0.0
         self.arrays = Arrays(
             roots,
             present,
             computed,
-            rounding,
             scale,
             np.array([float(p.lead) for p in self.polynomials]),
             np.array([p.missed for p in self.polynomials]),
@@ -168,13 +166,14 @@ class Space:
         others = others + (terms @ np.abs(lead) if top_terms is None else top_terms)
         top = np.abs(whole @ lead)
         found = np.full(len(steady), np.inf)
-        rounding = 64.0 * EPSILON * (np.abs(whole) @ np.abs(lead) + others)
+        rounding = 64.0 * EPSILON * ((np.abs(whole) + parts) @ np.abs(lead))
         left = np.flatnonzero(top - others > rounding)
         omega = self.corners[-1]
         for _ in range(300):
             if not left.size:
                 break
             grown = np.expm1(np.minimum(self.sums / omega, 50.0))
+            grown += self.arrays.missed * (1.0 + grown)
             with np.errstate(under="ignore", over="ignore"):
                 share = size * float(omega) ** -gap.astype(float)
             off = np.where(full, share * grown, share * (1.0 + grown))
@@ -326,13 +325,14 @@ class Function:
                 sizes[np.isnan(sizes)] = 1.0
                 missed *= float(np.maximum(sizes, 1.0).prod())
             polynomials.append(
-                Polynomial(p.lead, tuple(roots.tolist()), p.computed, (), missed, True)
+                Polynomial(p.lead, tuple(roots.tolist()), p.computed, (), missed)
             )
         space = Space(polynomials, self.space.delays, self.space.step)
         steady, delayed = self.weights
         change = np.expm1(-sigma * space.arrays.delays)
         moved = delayed * (1.0 + change)
-        sizes = np.abs(steady) + np.abs(delayed) @ (np.abs(change) + 1.0 + change)
+        grown = (np.abs(change) + 1.0 + change) * (1.0 + abs(sigma) * space.arrays.delays)
+        sizes = np.abs(steady) + np.abs(delayed) @ grown
         return space, steady + delayed @ change, moved, 8.0 * EPSILON * sizes
 
     def at(self, omega: npt.ArrayLike) -> ComplexArray:

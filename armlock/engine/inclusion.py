@@ -48,8 +48,6 @@ class Arrays(NamedTuple):
         Whether polynomial j has a root in this column.
     computed : bool array, shape (J, n)
         Whether a root was computed, so that `missed` is a share of its factor too.
-    rounding : float array, shape (J, n)
-        By how much a root may be off.
     scale : float array, shape (n,)
         The polynomials are divided by abs(s + scale) of each column.
     lead, missed : float arrays, shape (J,)
@@ -61,7 +59,6 @@ class Arrays(NamedTuple):
     roots: ComplexArray
     present: BoolArray
     computed: BoolArray
-    rounding: FloatArray
     scale: FloatArray
     lead: FloatArray
     missed: FloatArray
@@ -128,7 +125,7 @@ def _expand_piece(space: Arrays, m: float, r: float, work: Workspace) -> None:
         p[:] = 0.0
         bound[:] = 0.0
         p[0], bound[0] = space.lead[j], abs(space.lead[j])
-        missed, grown, shift = space.missed[j], 1.0, 0
+        missed, shift = space.missed[j], 0
         for k in range(n):
             f = work.factor[k]
             if space.present[j, k]:
@@ -145,8 +142,6 @@ def _expand_piece(space: Arrays, m: float, r: float, work: Workspace) -> None:
                 if space.computed[j, k]:
                     # What is missed is a share of the product of abs(s) + abs(root).
                     missed *= (m + r + abs(z)) * f / size
-                if space.rounding[j, k] > 0.0:
-                    grown *= 1.0 + space.rounding[j, k] * f / size
             else:
                 for i in range(ORDER):
                     p[i] *= f
@@ -157,7 +152,7 @@ def _expand_piece(space: Arrays, m: float, r: float, work: Workspace) -> None:
                 shift += 1 if bound[0] > 1.0 else -1
                 p *= by
                 bound *= by
-        work.error[j] = 8.0 * (n + 1) * EPSILON + missed + (grown - 1.0)
+        work.error[j] = 8.0 * (n + 1) * EPSILON + missed
         work.shift[j] = shift
         top = shift if j == 0 else max(top, shift)
     for j in range(space.lead.size):
@@ -217,10 +212,9 @@ def expand(space: Arrays, m: float, r: float, work: Workspace) -> None:
         work.p[j, 2] = ratio * ratio * (c[2] + 3.0 * u * c[3])
         work.p[j, 3] = ratio * ratio * ratio * c[3]
         # The remainder stays that of the piece; derivatives shrink with the interval.
-        more = 0.0 if ratio == 1.0 else 6.0 * bound[ORDER]
         power = 1.0
         for i in range(ORDER):
-            work.bound[j, i] = power * (bound[i] + more)
+            work.bound[j, i] = power * bound[i]
             power *= ratio
         work.bound[j, ORDER] = bound[ORDER]
     lead = -1
@@ -235,7 +229,7 @@ def expand(space: Arrays, m: float, r: float, work: Workspace) -> None:
             back = since - space.delays[k]
             tail += space.delays[k] - (since - back) - (space.delays[lead] + back)
             tail -= space.tails[lead]
-        work.lead[k], work.angle[k] = lead, since * r
+        work.lead[k], work.angle[k] = lead, (since + tail) * r
         phase, work.slip[k] = _phase(since, tail, m)
         sine, cosine = np.sin(0.5 * phase), np.cos(0.5 * phase)
         # exp(-j a) - 1 = -2 sin^2(a/2) - 2 j sin(a/2) cos(a/2) keeps its digits.
@@ -264,6 +258,7 @@ def combine(
     """
     delays = space.delays.size
     sums, rest = (16.0 + 2.0 * (steady.size + delays)) * EPSILON, 0.0
+    few = (2.0 + delays) * EPSILON
     for i in range(ORDER):
         work.f[index, i] = 0.0
         for k in range(delays):
@@ -271,11 +266,11 @@ def combine(
     for j in range(steady.size):
         # First what no free phase turns, then in turn what follows each free phase.
         k, lead, used = 0, -1, steady[j] != 0.0 or uncertain[j] != 0.0
-        first, wrong = steady[j], uncertain[j] + abs(steady[j]) * EPSILON
+        first, wrong = steady[j], uncertain[j] + abs(steady[j]) * few
         for fast in range(delays):
             if work.lead[fast] >= 0 and delayed[j, fast] != 0.0:
                 first -= delayed[j, fast]
-                wrong += 2.0 * abs(delayed[j, fast]) * EPSILON
+                wrong += abs(delayed[j, fast]) * few
                 used = True
         while True:
             for i in range(ORDER):
@@ -287,12 +282,12 @@ def combine(
                     used, power, grown = True, size, x + x * x
                     if lead >= 0:
                         work.g[0] += weight
-                        wrong += 2.0 * size * EPSILON
+                        wrong += size * few
                     for i in range(ORDER):
                         work.g[i] += weight * work.turn[k, i]
                         power *= x / (i + 1)
                     work.b[ORDER] += power
-                    wrong += size * EPSILON * (2.0 * abs(work.turn[k, 0]) + 12.0 * grown)
+                    wrong += size * few * (abs(work.turn[k, 0]) + 6.0 * grown)
                     wrong += size * work.slip[k] * (1.0 + grown)
                 k += 1
             if used:
@@ -312,7 +307,8 @@ def combine(
             if k == delays:
                 break
             lead, first, wrong, used = work.lead[k], 0.0, 0.0, False
-    work.rest[index] = rest
+    # The bounds round too.
+    work.rest[index] = rest * (1.0 + 1e-12)
 
 
 @njit(nogil=True, error_model="numpy")
@@ -371,7 +367,8 @@ def _least(
         for i in range(ORDER):
             q[i] = c[i] * turned
     else:
-        off = _divide(c, along, q) / gamma
+        # The quotient rounds by less than 64 EPSILON.
+        off = (_divide(c, along, q) + 64.0 * EPSILON * np.abs(c).sum()) / gamma
     if vertex:
         for i in range(2, ORDER):
             off += abs(q[i].real)
@@ -433,7 +430,6 @@ def mix(weights: ComplexArray, work: Workspace, room: Members, n: int) -> None:
 def _holds(room: Members, gamma: float) -> bool:
     """Whether every vertex exceeds all terms of any phase, along a direction or in shares."""
     unit = gamma if gamma > 0.0 else 1.0
-    enough = 64.0 * EPSILON if gamma > 0.0 else 0.0
     low, high = 0.0, 0.0
     for kind in (2, 1):
         for n in range(room.kind.size):
@@ -448,7 +444,7 @@ def _holds(room: Members, gamma: float) -> bool:
                         a, b = a + e, b + f
             if kind == 2:
                 low, high = low + a, high + b
-            elif not min(low + a, high + b) > enough:
+            elif not min(low + a, high + b) > 0.0:
                 return False
     return True
 
@@ -504,7 +500,7 @@ def excludes_zero(room: Members) -> int:
         room.along[0] = direction / size
         if _holds(room, 0.0):
             return 1
-    gamma = abs(slow[0])
+    gamma = (1.0 - 16.0 * EPSILON) * abs(slow[0])
     for i in range(1, ORDER):
         gamma -= abs(slow[i])
     if gamma > 0.0 and (common > 0.0 or vertices > 1 or room.used[last]):
@@ -831,11 +827,12 @@ def wind(
             # An end takes part in two intervals with one value. What that is off by is below
             # a quarter turn, and cancels.
             if low == begin:
-                first = value = _at(work.f[0], -1.0)
-            for sign in (-1.0, 1.0):
+                first = value = _at(work.f[0], (low - m) / r)
+            for sign, edge in ((-1.0, low), (1.0, high)):
+                t = (edge - m) / r
                 if sign > 0.0:
-                    value = _at(work.f[0], 1.0)
-                g = _at(kept, sign)
+                    value = _at(work.f[0], t)
+                g = _at(kept, t)
                 a, b = value * g.conjugate(), g * kept[0].conjugate()
                 turn = np.arctan2(a.imag, a.real) + np.arctan2(b.imag, b.real)
                 total += sign * turn

@@ -34,8 +34,6 @@ class Polynomial:
     missed : float
         By how much the polynomial that has the computed roots is missed at any s, over the
         product of abs(s) + abs(root) of these roots.
-    rounded : bool
-        Whether all roots are rounded, by half an EPSILON of their size each.
     """
 
     lead: Fraction
@@ -43,7 +41,6 @@ class Polynomial:
     computed: frozenset[int] = frozenset()
     factors: tuple[tuple[Fraction, ...], ...] = ()
     missed: float = 0.0
-    rounded: bool = False
 
     @classmethod
     def of(cls, coefficients: Iterable[Any]) -> Polynomial:
