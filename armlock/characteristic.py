@@ -485,9 +485,7 @@ def broadcast_parameters(
     return broadcast_pair(name1, x, name2, y)
 
 
-def given_or_one(
-    system: CharacteristicFunction, x: npt.ArrayLike | None, y: npt.ArrayLike | None
-) -> tuple[npt.ArrayLike, npt.ArrayLike]:
+def given_or_one(system: CharacteristicFunction, x: Any, y: Any) -> tuple[Any, Any]:
     """Return both parameters, one for a perturbation that is not given; raise for others."""
     given = []
     for name, value in zip(system.parameters, (x, y), strict=True):

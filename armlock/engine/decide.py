@@ -226,16 +226,17 @@ class Family:
             vertices, terms = self._members(test, level)
             leads = [f.leading(share) for f in vertices]
             others = [f.leading(share) for f in terms if not f.is_zero]
-            known = [lead for lead in leads if lead]
+            known, terms_at_zero = ([lead for lead in some if lead] for some in (leads, others))
             middle = sum(lead.direction for lead in known) / len(leads)
-            if len(known) < len(leads) or None in others or abs(middle) < 0.5:
+            decided = len(known) == len(leads) and len(terms_at_zero) == len(others)
+            if not decided or abs(middle) < 0.5:
                 continue
             turned = [(lead.direction * np.conj(middle)).real / abs(middle) for lead in known]
             room, radius = min(turned) - 4.0 * share, min(lead.radius for lead in known)
             if room <= 0.0:
                 continue
             for a in known:
-                for b in others:
+                for b in terms_at_zero:
                     ratio = abs(float(b.coefficient / a.coefficient)) * len(others) / room
                     radius, power = min(radius, b.radius), b.order - a.order
                     if power < 0 or (power == 0 and ratio >= 1.0 - 4.0 * share):

@@ -1005,7 +1005,7 @@ def cross(
     """Find the zeros on the axis of each row f_0 - y f_1 - x f_2, `lower` <= x <= `upper`.
 
     With N = f_0 - y f_1 and M = f_2 they are where h = Im(N conj M) is zero, at x = Re(N / M)
-    (Lemma 12). All rows share the expansion of an interval. Between infinite bounds all zeros
+    (Lemma 18). All rows share the expansion of an interval. Between infinite bounds all zeros
     of h are found, those of M included. `begin` is 0 for the axis from s = 0, and a map's ends
     at `end`: there N / M is real, and a root crosses alone.
 
@@ -1117,7 +1117,7 @@ def cross(
                     below += abs(z[k].real - lower[row] * square[k].real)
                 if above > more or below < -more:
                     continue
-            # Errors of the coefficients, and that of the remainder's slope (Lemma 12).
+            # Errors of the coefficients, and that of the remainder's slope (Lemma 18).
             slope = abs(z[1].imag) - bent - 10.0 * off
             if slope > 0.0 and (least > 0.0 or everywhere):
                 if not known and not around:

@@ -357,7 +357,7 @@ def axis_crossings(
 def _constant_sign_up_to(n: Function, m: Function) -> float:
     """Frequency up to which the imaginary part of L has one sign; zero if it is not known.
 
-    Its leading term there, as in Lemma 10: Im(N conj M) is the odd part of N(s) M(-s).
+    Its leading term there, as in Lemma 11: Im(N conj M) is the odd part of N(s) M(-s).
     """
     number = 16
     above, below = n.series(number), m.series(number)
