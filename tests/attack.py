@@ -20,6 +20,7 @@ import sys
 import time
 from collections import Counter
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -419,7 +420,7 @@ def check_free(tally, rng, sketch, loop, point):
     if judge.count(sketch, *point) != 0:
         return
     verdict = judge.margins(sketch, *point, free_above=above)
-    found = tally.ask("margins, free", margins, loop, *point, above)
+    found = tally.ask("margins, free", partial(margins, free_above=above), loop, *point)
     if verdict.modulus <= 0.0:
         # Some phases make it unstable: whatever is said then, no margin may be left.
         if found is not None and found.modulus > 1e-9:

@@ -37,7 +37,7 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
                              "tau2": 2.0, "delay": 0.0, "step": 0.0,
                              "reference": (0.0, 0.0)},
     HayesEquation: {"tau": 1.0},
-    SingleArm: {"gain": 1.0, "tau": 1.0, "delay": 0.0},
+    SingleArm: {"gain": 1.0, "tau1": 1.0, "delay": 0.0},
     CommonArm: {"gain": 1.0} | LOOP,
     armlock.DualArm: {"gain": 1.0, "corner": 2.0, "difference": 0.1} | LOOP,
     paper_loop: {"corner": 2.0, "controller": table_two(),

@@ -19,7 +19,7 @@ import numpy as np
 from armlock.checks import FloatArray, IntArray
 from armlock.engine import inclusion
 from armlock.engine.functions import Function, Leading, Space, at, stacked
-from armlock.engine.inclusion import DISTANCE, Question
+from armlock.engine.inclusion import DISTANCE, REAL, Question
 
 #: What a count is where a root lies on the axis, or rounding does not decide on which side.
 BOUNDARY = -1
@@ -27,10 +27,12 @@ BOUNDARY = -1
 UNCONFINED = -2
 
 # Most steps of a count, and of a search; some three seconds each.
-_MOST_STEPS = np.int64(3_000_000)
-_MOST_SEARCHED = 6_000_000
+_MOST_STEPS = np.int64(1_500_000)
+_MOST_SEARCHED = 2_000_000
 # Steps between two looks at the keyboard.
 _A_WHILE = np.int64(100_000)
+# Steps of a look at likely intervals before a search.
+_A_LOOK = np.int64(2_000)
 # Points that one thread counts at a time.
 _BLOCK = 256
 # Undecided intervals after which a search ends.
@@ -50,8 +52,7 @@ class UndecidedError(RuntimeError):
 def in_threads(function: Callable[[slice], Any], size: int, block: int) -> list[Any]:
     """Return what a compiled function makes of the blocks of a range; Ctrl-C ends it."""
     blocks = [slice(first, min(first + block, size)) for first in range(0, size, block)]
-    if len(blocks) == 1:
-        return [function(blocks[0])]
+    # A single block goes to a thread too: compiled functions do not react to Ctrl-C.
     pool = ThreadPoolExecutor(numba.config.NUMBA_NUM_THREADS)
     try:
         return list(pool.map(function, blocks))
@@ -171,11 +172,14 @@ class Family:
     arc : tuple of tuples, optional
         One more test: f_0 + exp(j psi) f_1 with psi from a + b omega to c + d omega;
         (a, b, c, d), and their slopes in the level.
+    loose : int, optional
+        So many functions, the last ones, are terms of any phase in that test.
     """
 
     functions: Sequence[Function]
     tests: Sequence[Sequence[tuple[int, Sequence[float], Sequence[float]]]]
     arc: tuple[tuple[float, ...], tuple[float, ...]] | None = None
+    loose: int = 0
 
     @property
     def space(self) -> Space:
@@ -192,7 +196,7 @@ class Family:
             for n, member in enumerate(test):
                 kind[i, n], weights[i, n], slopes[i, n] = member
         arc = np.zeros((0, 4)) if self.arc is None else np.array(self.arc, np.float64)
-        return Question(kind, weights, slopes, arc)
+        return Question(kind, weights, slopes, arc, self.loose)
 
     def _members(
         self, test: Sequence[tuple[int, Sequence[float], Sequence[float]]], level: float
@@ -255,15 +259,18 @@ class Family:
         """Do what `ends` does for an arc around zero: abs(1 + c exp(j psi)) is monotonic."""
         if angle >= np.pi:
             return np.inf
-        (n, m), (wn, wm) = stacked(self.functions[:2])
+        (n, m, *free), (wn, wm, *turned) = stacked(self.functions)
         turns = np.exp(1j * np.array([0.0, angle]))[:, None]
         steady = (n - wn.sum(1)) + turns * (m - wm.sum(1))
         parts = np.abs(wn) + np.abs(wm)
+        terms = parts.sum(1)
+        for s, w in zip(free, turned, strict=True):
+            terms = terms + np.abs(s - w.sum(1)) + np.abs(w).sum(1)
         # All that turns, as terms; and what the sum at other angles may have more.
         more = np.abs(n - wn.sum(1)) + np.abs(m - wm.sum(1))
         return float(
             self.space.confined_from(
-                steady, np.zeros((2, *parts.shape)), parts.sum(1), extra=more
+                steady, np.zeros((2, *parts.shape)), terms, extra=more
             ).max()
         )
 
@@ -276,6 +283,16 @@ class _Search:
         self.family, self.goal, self.steps = family, goal, 0
         self.fixed = (space.arrays, *stacked(family.functions))
         self.question = family.question()
+
+    def look(
+        self, likely: FloatArray, best: float, where: float, start: float, tolerance: float
+    ) -> tuple[float, float]:
+        """Look for good values in intervals for a few steps; return the best, and where."""
+        _, _, best, where, _ = inclusion.walk(
+            *self.fixed, self.question, np.ascontiguousarray(likely), self.goal,
+            best, where, start, tolerance, _NARROWEST, _A_LOOK, _FEW,
+        )  # fmt: skip
+        return best, where
 
     def run(
         self, pending: FloatArray, best: float, where: float, start: float, tolerance: float
@@ -307,6 +324,8 @@ def least(
     *,
     start: float = 0.0,
     tolerance: float = 1e-6,
+    low: float = 0.0,
+    high: float = np.inf,
 ) -> tuple[float, float]:
     """Find the largest level up to which no function of a family has a zero.
 
@@ -322,6 +341,8 @@ def least(
         A level without a zero.
     tolerance : float, optional
         No zero has a level below start + (best - start) (1 - tolerance).
+    low, high : float, optional
+        The frequencies in rad/s between which zeros count; all by default.
 
     Returns
     -------
@@ -334,16 +355,18 @@ def least(
         If double precision, or the steps allowed, do not decide it.
     """
     search = _Search(family, goal)
-    spaces, level = family.space, min(best, 1e300)
-    begin = family.begins(level)
-    floor = begin or 1e-4 * spaces.corners[0]
-    end = family.ends(level)
-    ceiling = end if np.isfinite(end) else 1e4 * spaces.corners[-1]
+    corners, level = family.space.corners, min(best, 1e300)
+    floor = low or family.begins(level) or 1e-4 * corners[0]
+    end = min(family.ends(level), high)
+    ceiling = end if np.isfinite(end) else 1e4 * corners[-1]
     likely = _likely(family, goal, floor, max(ceiling, 2.0 * floor), start)
-    best, where, _ = search.run(likely, best, where, start, tolerance)
+    best, where = search.look(likely, best, where, start, tolerance)
+    if best <= start:
+        return best, where
     level = start + (best - start) * (1.0 - tolerance)
-    if np.isfinite(level):
-        begin, end = family.begins(level), family.ends(level)
+    known = np.isfinite(level)
+    begin = low or (family.begins(level) if known else floor)
+    end = min(family.ends(level), high) if known else end
     if not begin > 0.0:
         raise UndecidedError("the behaviour at s = 0 is not decided", 0.0)
     if not np.isfinite(end):
@@ -364,12 +387,11 @@ def least(
 def _likely(family: Family, goal: int, low: float, high: float, start: float) -> FloatArray:
     """Intervals of a sample that look best: only what is looked at first depends on them."""
     space = family.space
-    decades = np.geomspace(low, high, 500)
-    grids = [decades]
+    grids = [np.geomspace(low, high, 500)]
     if space.longest:
         # One turn of the longest delay at each frequency, and the first hundred turns.
         point = np.arange(16) * (2.0 * np.pi / (16.0 * space.longest))
-        grids += [np.add.outer(decades, point).ravel(), point[1] * np.arange(1, 1600)]
+        grids += [np.add.outer(grids[0], point).ravel(), point[1] * np.arange(1, 1600)]
     for root in set(space.arrays.roots[space.arrays.present].tolist()):
         if root.imag > 0.0:
             off = max(abs(root.real), 1e-9 * root.imag) * np.geomspace(1e-2, 1e3, 24)
@@ -378,27 +400,24 @@ def _likely(family: Family, goal: int, low: float, high: float, start: float) ->
     omega = omega[(omega >= low) & (omega <= high)]
     if omega.size < 3:
         return np.array([[low, high]])
-    f, g = at(family.functions[:2], omega)
-    with np.errstate(all="ignore"):
-        if goal == DISTANCE:
-            value = np.abs(f / g)
-            k = 1 + np.argsort(value[1:-1])[:8]
-            spans = np.column_stack((omega[k - 1], omega[k + 1]))
-        else:
-            if goal == inclusion.REAL:
-                crossing, value = (f * g.conj()).imag, -(g / f).real
-            else:
-                crossing, angle = np.abs(f) - np.abs(g), np.angle(-f / g)
-                value = (
-                    np.abs(angle) if goal == inclusion.PHASE else angle % (2 * np.pi) / omega
-                )
-            k = np.flatnonzero((crossing[1:] < 0.0) != (crossing[:-1] < 0.0))
-            share = crossing[k] / (crossing[k] - crossing[k + 1])
-            rough = value[k] + share * (value[k + 1] - value[k])
-            if goal == inclusion.REAL:
+    f, g, *loose = at(family.functions, omega)
+    radius = sum((np.abs(r) for r in loose), np.zeros(omega.size))
+    crossing, value = inclusion.aims(goal, f, g, radius, omega)
+    if goal == DISTANCE or loose:
+        k = 1 + np.argsort(value[1:-1])[:8]
+        spans = np.column_stack((omega[k - 1], omega[k + 1]))
+    else:
+        k = np.flatnonzero((crossing[1:] < 0.0) != (crossing[:-1] < 0.0))
+        share = crossing[k] / (crossing[k] - crossing[k + 1])
+        with np.errstate(invalid="ignore"):
+            if goal == REAL:
+                # It may pass through infinity, but one over it does not.
+                rough = 1.0 / value[k] + share * (1.0 / value[k + 1] - 1.0 / value[k])
                 rough = np.where(rough > 0.0, 1.0 / rough, np.inf)
-            rough = np.where(rough > start, rough, np.inf)
-            k = k[np.argsort(rough)][:60]
-            spans = np.column_stack((omega[k], omega[k + 1]))
+            else:
+                rough = value[k] + share * (value[k + 1] - value[k])
+        rough = np.where(rough > start, rough, np.inf)
+        k = k[np.argsort(rough)][:60]
+        spans = np.column_stack((omega[k], omega[k + 1]))
     # The best last: the last interval is walked first.
     return spans[::-1]

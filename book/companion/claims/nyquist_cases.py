@@ -156,7 +156,7 @@ def size_of_perturbations() -> Finding:
 )
 def single_arm_ideal() -> Finding:
     """Look at the curve around 2 pi / tau, for crossings, and at counts over all gains."""
-    turn = 2.0 * np.pi / SINGLE.tau
+    turn = 2.0 * np.pi / SINGLE.tau1
     before, at, after = SINGLE(1j * turn * np.array([1.0 - 1e-5, 1.0, 1.0 + 1e-5]))
     tangent = abs(at) < 1e-9 and abs(np.angle(after - before)) < 1e-4
     crossings = axis_crossings(SINGLE).omega.size
@@ -203,7 +203,7 @@ def single_arm_branch() -> Finding:
 )
 def value_at_full_turn() -> Finding:
     """Evaluate the loop with and without the integrating actuator at 2 pi / tau."""
-    s, c1 = 2j * np.pi / SINGLE.tau, SINGLE_POINT[0]
+    s, c1 = 2j * np.pi / SINGLE.tau1, SINGLE_POINT[0]
     value = complex(SINGLE(s, c1))
     without = value * s / SINGLE.gain
     return Finding(
@@ -230,7 +230,7 @@ def value_at_full_turn() -> Finding:
 def single_arm_crossing() -> Finding:
     """Find the crossing, compare it with its closed form, and count over all gains."""
     c1 = SINGLE_POINT[0]
-    turn = 2.0 * np.pi / SINGLE.tau
+    turn = 2.0 * np.pi / SINGLE.tau1
     found = crossing_near(SINGLE, *SINGLE_POINT, turn)
     omega, value = float(found.omega[0]), float(found.value[0])
     closed = -SINGLE.gain * np.sqrt(c1 * c1 - 1.0) / omega
