@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from armlock.checks import ComplexArray, FloatArray
-from armlock.engine.inclusion import EPSILON, Arrays, values
+from armlock.engine.inclusion import EPSILON, Arrays
 from armlock.engine.polynomials import Polynomial
 
 Exact = npt.NDArray[np.object_]
@@ -351,6 +351,14 @@ def stacked(functions: Sequence[Function]) -> tuple[FloatArray, FloatArray]:
 
 def at(functions: Sequence[Function], omega: npt.ArrayLike) -> ComplexArray:
     """Evaluate functions at frequencies, all times one positive number at each frequency."""
-    flat = np.ascontiguousarray(np.ravel(omega), np.float64)
-    found: ComplexArray = values(functions[0].space.arrays, *stacked(functions), flat)[0]
+    arrays, (steady, delayed) = functions[0].space.arrays, stacked(functions)
+    flat = np.ravel(omega)
+    turn = np.expm1(-1j * np.multiply.outer(flat, arrays.delays))
+    found = np.zeros((len(functions), flat.size), np.complex128)
+    by = 1.0 / np.hypot(flat, arrays.scale[:, None])
+    for j, lead in enumerate(arrays.lead):
+        p = np.full(flat.size, complex(lead))
+        for root, present, share in zip(arrays.roots[j], arrays.present[j], by, strict=True):
+            p *= (1j * flat - root) * share if present else share
+        found += p * (steady[:, j, None] + delayed[:, j] @ turn.T)
     return found.reshape(len(functions), *np.shape(omega))

@@ -11,7 +11,7 @@
  * count, along one column, in the same way.
  */
 function armlockChart(api) {
-  const { BOUNDARY, UNCONFINED, UNSURE, at, along, Curve, tail, chainLeads, tangentDistance,
+  const { BOUNDARY, UNCONFINED, UNDECIDED, at, along, Curve, tail, chainLeads, tangentDistance,
     count } = api;
   // Samples in a radian of the longest delay, in a decade; halvings of an interval.
   const A_RADIAN = 6, A_DECADE = 24, DEEPEST = 14;
@@ -162,21 +162,21 @@ function armlockChart(api) {
     return omega;
   }
 
-  /* Counts over a grid, and where they are undecided: UNSURE. A picture in passing may take fewer
+  /* Counts over a grid, and where they are undecided: UNDECIDED. A picture in passing may take fewer
    * samples of the axis, and leaves more unsure. */
   function chart(loop, x0, x1, nx, y0, y1, ny, samples = 3000000) {
     const counts = new Int16Array(nx * ny).fill(UNCONFINED);
     const px = (x1 - x0) / (nx - 1), py = (y1 - y0) / (ny - 1);
     const [a, b1, b2] = chainLeads(loop), lost = (x, y) => Math.abs(x) * b1 + Math.abs(y) * b2;
     // The point that is confined if any is, off every line that a reader would choose.
-    let bx, by, base = UNSURE;
+    let bx, by, base = UNDECIDED;
     for (let k = 0; k < 5 && (k === 0 || base === BOUNDARY); k++) {
       bx = clamp(0, x0, x1) + (x1 > 0 ? 1 : -1) * (0.381966 + k) * px;
       by = clamp(0, y0, y1) + (y1 > 0 ? 1 : -1) * (0.276393 + k) * py;
       base = count(loop, bx, by, { most: samples });
     }
     // Where no chain is confined at this point, none is in the whole chart: that is certain.
-    if (base < 0) return base === UNCONFINED ? { counts, sure: 1 } : { counts: counts.fill(UNSURE), sure: 0 };
+    if (base < 0) return base === UNCONFINED ? { counts, sure: 1 } : { counts: counts.fill(UNDECIDED), sure: 0 };
     const most = [Math.max(Math.abs(x0), Math.abs(x1), Math.abs(bx)),
       Math.max(Math.abs(y0), Math.abs(y1), Math.abs(by))];
     // Next to the limit of the chain, roots cross at ever higher frequency.
@@ -184,7 +184,7 @@ function armlockChart(api) {
     const endOf = share => tail(loop, share * most[0], share * most[1], loop.longest)?.omega ?? Infinity;
     let end = endOf(reach);
     const starts = new Int32Array(ny).fill(base), doubtful = new Uint8Array(ny);
-    if (loop.second || loop.difference) {
+    if (loop.second || loop.difference.gain) {
       const change = new Int32Array(ny + 1), lines = new Lines(loop, true);
       let total = base;
       const came = crossings(lines, [bx - 1], Math.min(y0, by) - 1, Math.max(y1, by) - 1, py, end, samples,
@@ -235,8 +235,8 @@ function armlockChart(api) {
         const beyond = seen < reach && Math.max(Math.abs(x) / most[0], Math.abs(y) / most[1]) > seen
           || reach < 1 && share > 0.98;
         counts[j * nx + i] = share >= 1 - 1e-14 ? UNCONFINED
-          : beyond || doubts || doubtful[j] || total < 0 ? UNSURE : Math.min(total, 30000);
-        sure += counts[j * nx + i] !== UNSURE;
+          : beyond || doubts || doubtful[j] || total < 0 ? UNDECIDED : Math.min(total, 30000);
+        sure += counts[j * nx + i] !== UNDECIDED;
       }
     }
     return { counts, sure: sure / (nx * ny), samples: lines.evaluated };

@@ -46,8 +46,15 @@ const armlockDraw = (function () {
     constructor(attributes, shape, draw) {
       this.canvas = element("canvas", attributes);
       this.paint = draw;
-      this.shape = () => [].concat(shape).at(innerWidth < 600 ? -1 : 0);
-      new ResizeObserver(() => this.now()).observe(this.canvas);
+      this.wide = this.high = 0;
+      // Its size is asked for once, not in each frame: that would lay out the page anew.
+      new ResizeObserver(() => {
+        const ratio = [].concat(shape).at(innerWidth < 600 ? -1 : 0);
+        this.wide = this.canvas.clientWidth;
+        this.high = Math.round(this.wide * ratio);
+        this.canvas.style.aspectRatio = String(1 / ratio);
+        this.now();
+      }).observe(this.canvas);
       new MutationObserver(() => this.now()).observe(document.documentElement,
         { attributes: true, attributeFilter: ["data-theme"] });
     }
@@ -60,14 +67,13 @@ const armlockDraw = (function () {
 
     now() {
       this.waiting = false;
-      this.canvas.style.aspectRatio = String(1 / this.shape());
-      if (this.canvas.clientWidth) this.render(this.canvas, window.devicePixelRatio || 1);
+      if (this.wide) this.render(this.canvas, window.devicePixelRatio || 1);
     }
 
     /* The picture as a file: 1600 pixels wide, on the page's ground. */
     picture(done) {
       const copy = element("canvas");
-      this.render(copy, 1600 / this.canvas.clientWidth);
+      this.render(copy, 1600 / this.wide);
       const pen = copy.getContext("2d");
       pen.globalCompositeOperation = "destination-over";
       pen.setTransform(1, 0, 0, 1, 0, 0);
@@ -77,7 +83,7 @@ const armlockDraw = (function () {
     }
 
     render(canvas, ratio) {
-      const wide = this.canvas.clientWidth, high = Math.round(wide * this.shape());
+      const { wide, high } = this;
       const size = [wide, high].map(v => Math.round(v * ratio));
       if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width, canvas.height] = size;
       const pen = canvas.getContext("2d"), colours = palette();
@@ -633,6 +639,7 @@ const armlockDraw = (function () {
     const low = Math.max(-top - 10, Math.min(faint, rest.reduce((a, b) => Math.min(a, b))));
     const left = 56, right = 8, room = (high - 62) / 2, span = wide - left - right;
     const px = w => left + span * (Math.log10(w / TURN) - first) / (last - first);
+    for (const one of shown) one.at = one.omega.map(px);
     const inside = w => w > 0 && px(w) >= left && px(w) <= wide - right;
     const panel = (above, parts, least, most, name, step) => {
       const py = v => above + room * (most - v) / (most - least);
@@ -647,7 +654,7 @@ const armlockDraw = (function () {
         pen.beginPath();
         one[part].forEach((v, i) => {
           const on = i && Math.abs(v - one[part][i - 1]) < 300;
-          if (on) pen.lineTo(px(one.omega[i]), py(v)); else pen.moveTo(px(one.omega[i]), py(v));
+          if (on) pen.lineTo(one.at[i], py(v)); else pen.moveTo(one.at[i], py(v));
         });
         pen.stroke();
       };

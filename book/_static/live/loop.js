@@ -13,12 +13,12 @@
  */
 function armlockLoop() {
   const EPSILON = 2 ** -52;
-  const BOUNDARY = -1, UNCONFINED = -2, UNSURE = -3;
+  const BOUNDARY = -1, UNCONFINED = -2, UNDECIDED = -3;
   // Share of a certified bound that a step may use up, and the most steps of one walk.
   const SAFETY = 0.95, MOST_STEPS = 400000;
   // Samples of the frequency in a radian of the longest delay, in a decade, and at most.
   const A_RADIAN = 12, A_DECADE = 80, MOST_SAMPLES = 60000;
-  const SENSORS = ["single", "common", "difference", "dual", "modified", "own"];
+  const SENSORS = ["single", "common", "difference", "dual", "modified"];
 
   /* gain prod (s - zero_k) / prod (s + below_k), all below_k > 0, as a function of omega.
    *
@@ -232,52 +232,35 @@ function armlockLoop() {
     return product;
   };
 
-  const plus = (p, q, sign = 1) => {
+  const plus = (p, q) => {
     const size = Math.max(p.length, q.length), at = (r, k) => r[k - size + r.length] || 0;
-    return Array.from({ length: size }, (_, k) => at(p, k) + sign * at(q, k));
+    return Array.from({ length: size }, (_, k) => at(p, k) + at(q, k));
   };
 
   /* The sensor of a loop: the arms' weights are m1 = sum + difference and m2 = second sum -
    * difference, each a gain and zeros over the sensor's poles. Kept so, what nearly cancels
    * between the arms does so before it is rounded. */
   function sensorOf(spec, tau1, tau2) {
-    const none = { second: 1, sum: null, difference: null, poles: [] };
-    const fraction = (gain, zeros) => gain ? { gain, zeros } : null;
-    if (spec.sensor === "single") return { ...none, second: 0, sum: fraction(1, []) };
-    if (spec.sensor === "common") return { ...none, sum: fraction(1, []) };
-    if (spec.sensor === "difference") return { ...none, difference: fraction(-1, []) };
-    if (spec.sensor === "own") {
-      const { m1, m2, below } = spec, degree = p => p.length - 1 - p.findIndex(v => v !== 0);
-      const some = p => p.some(v => v !== 0);
-      if (!some(below)) throw new FieldError("below", "the sensor's denominator must not be zero");
-      if (!some(m1) && !some(m2)) throw new FieldError("m1", "m1 and m2 must not both be zero");
-      for (const [name, p] of [["m1", m1], ["m2", m2]])
-        if (some(p) && degree(p) > degree(below))
-          throw new FieldError(name, `${name} must have at most the denominator's degree `
-            + `${degree(below)}, got ${degree(p)}`);
-      const lead = below.find(v => v !== 0), half = some(m2) ? 0.5 : 1;
-      const of = p => {
-        const scaled = p.map(v => half * v / lead), gain = scaled.find(v => v !== 0) || 0;
-        return fraction(gain, rootsOf(scaled));
-      };
-      return { second: some(m2) ? 1 : 0, sum: of(plus(m1, m2)), poles: rootsOf(below),
-        difference: some(m2) ? of(plus(m1, m2, -1)) : null };
-    }
+    const fraction = (gain, zeros = []) => ({ gain, zeros });
+    const plain = { second: 1, sum: fraction(1), difference: fraction(0), poles: [] };
+    if (spec.sensor === "single") return { ...plain, second: 0 };
+    if (spec.sensor === "common") return plain;
+    if (spec.sensor === "difference") return { ...plain, sum: fraction(0), difference: fraction(-1) };
     if (!SENSORS.includes(spec.sensor)) throw new RangeError(`unknown sensor ${spec.sensor}`);
     const corner = positive("corner", "the corner", spec.corner);
     if (!Number.isFinite(spec.difference) || spec.difference === 0)
       throw new FieldError("difference", "the sensor's \u0394\u03c4 must be a number other than "
         + `zero, got ${spec.difference}`);
     if (spec.sensor === "dual")
-      return { ...none, sum: fraction(1, [[0, 0], [-corner, 0]]),
-        difference: fraction(corner / spec.difference, []), poles: [[0, 0], [-corner, 0]] };
+      return { ...plain, sum: fraction(1, [[0, 0], [-corner, 0]]),
+        difference: fraction(corner / spec.difference), poles: [[0, 0], [-corner, 0]] };
     // The white paper's: common arm at low frequency, dual arm in the band.
     const mean = 0.5 * (tau1 + tau2), zb = 10 * Math.PI / (13 * mean), pb = 5 * Math.PI / mean;
     const pe = 2 * Math.PI / (90 * mean), fast = [7 / (5 * mean), 11 / (20 * mean), pe, pe];
     const real = a => [-a, 0], product = roots => roots.reduce((p, a) => times(p, [1, a]), [1]);
     const gain = pb / (zb * mean), slow = [1, pb, 0, 0, 0, 0, 0];
     const plusZeros = rootsOf(plus(product([zb, ...fast]).map(v => gain * v), slow));
-    return { ...none, poles: [[0, 0], ...[pb, ...fast, corner].map(real)],
+    return { ...plain, poles: [[0, 0], ...[pb, ...fast, corner].map(real)],
       sum: fraction(1, [...plusZeros, real(corner)]),
       difference: fraction(2 * corner / spec.difference,
         [[0, 0], [0, 0], [0, 0], [0, 0], real(pb)]) };
@@ -286,8 +269,7 @@ function armlockLoop() {
   /* Make a loop. With sigma its roots are those of D less sigma, to count right of a line.
    *
    * spec: sensor, tau1, tau2, delay in s; zeros and poles as pairs [re, im] in rad/s, gain; for
-   * the dual sensors corner in rad/s and difference in s; for one's own m1, m2 and below,
-   * coefficients with the highest power first. */
+   * the dual sensors corner in rad/s and difference in s. */
   function make(spec, sigma = 0) {
     const tau1 = positive("tau1", "\u03c4\u2081", spec.tau1);
     const tau2 = positive("tau2", "\u03c4\u2082", spec.tau2);
@@ -302,34 +284,35 @@ function armlockLoop() {
     if (zeros.length > poles.length)
       throw new FieldError("zeros", "the controller must have as many poles as zeros or more, got "
         + `${zeros.length} zeros and ${poles.length} poles`);
-    const shares = [sensor.sum, sensor.difference].map(part => part && [...part.zeros]);
-    const given = shares.filter(part => part);
     const isZero = ([re, im]) => re === 0 && im === 0;
     const has = list => list.some(isZero), drop = list => list.splice(list.findIndex(isZero), 1);
     // Zeros and poles at s = 0 cancel. One factor of Q then belongs to the other product.
     while (has(zeros) && has(poles)) { drop(zeros); drop(poles); }
-    while (given.every(has) && has(ends)) { given.forEach(drop); drop(ends); }
     let lent = 0;
     while (has(zeros) && has(ends)) { drop(zeros); drop(ends); lent++; }
-    while (given.every(has) && has(poles)) { given.forEach(drop); drop(poles); lent--; }
     const shifted = ([re, im]) => [re - sigma, im];
     // Roots of Q: where a pole is stable and real, the pole itself.
     const mirror = ([re, im]) => Math.hypot(re, im) || 1 / Math.max(tau1, tau2);
     const above = [...poles, ...ends].map(shifted), all = above.map(mirror);
     const own = all.slice(0, poles.length), theirs = all.slice(poles.length);
-    const lend = (from, to) => to.push(...from.splice(from.indexOf(Math.min(...from)), 1));
-    for (; lent > 0; lent--) lend(own, theirs);
-    for (; lent < 0; lent++) lend(theirs, own);
+    for (; lent > 0; lent--) theirs.push(...own.splice(own.indexOf(Math.min(...own)), 1));
     const gain = spec.gain * Math.exp(-sigma * delay);
-    const part = (given, k) => given && new Product(given.gain, shares[k].map(shifted), theirs);
+    const part = ({ gain, zeros }) => new Product(gain, zeros.map(shifted), theirs);
     const loop = { spec, sigma, tau1, tau2, delay, second: sensor.second, below: all,
       rest: new Product(1, above, all), common: new Product(gain, zeros.map(shifted), own),
-      sum: part(sensor.sum, 0), difference: part(sensor.difference, 1),
-      longest: Math.max(tau1, tau2) + delay };
-    loop.parts = [loop.rest, loop.common, loop.sum, loop.difference].filter(part => part);
+      sum: part(sensor.sum), difference: part(sensor.difference),
+      longest: Math.max(tau1, tau2) + delay,
+      phase: { omega: NaN, x1: 0, y1: 0, x2: 0, y2: 0, er: 0, ei: 0, fr: 1, fi: 0 } };
+    loop.parts = [loop.rest, loop.common, loop.sum, loop.difference];
     loop.scales = [1 / loop.longest,
       ...loop.parts.flatMap(part => [...part.a, ...part.re].map(Math.abs))].filter(a => a > 0);
     return loop;
+  }
+
+  /* Where equal arms return the same, the dual sensor has only their sum, and its poles cancel. */
+  function reduced(loop, c1, c2) {
+    const { spec, tau1, tau2, sigma } = loop;
+    return spec.sensor === "dual" && tau1 === tau2 && c1 === c2 ? make({ ...spec, sensor: "common" }, sigma) : loop;
   }
 
   /* The parameters of one point, with what is left of 1 - c and c2 - c1 after cancelling. */
@@ -354,6 +337,23 @@ function armlockLoop() {
     return { c1: d1, c2: d2, left1: -d1, left2: -d2, between: d2 - d1 };
   }
 
+  /* exp(-s tau) - 1 of both arms, so that nothing cancels where omega is small, 1 - exp(-s (tau1 - tau2)),
+   * and the dead time's exponential: once for all curves of a loop. */
+  function phases({ phase, tau1, tau2, delay }, omega) {
+    if (phase.omega === omega) return phase;
+    phase.omega = omega;
+    const s1 = Math.sin(0.5 * omega * tau1), s2 = Math.sin(0.5 * omega * tau2);
+    phase.x1 = -2 * s1 * s1;
+    phase.y1 = -2 * s1 * Math.cos(0.5 * omega * tau1);
+    phase.x2 = -2 * s2 * s2;
+    phase.y2 = -2 * s2 * Math.cos(0.5 * omega * tau2);
+    const half = 0.5 * omega * (tau1 - tau2), s = Math.sin(half);
+    phase.er = 2 * s * s;
+    phase.ei = 2 * s * Math.cos(half);
+    if (delay) [phase.fr, phase.fi] = [Math.cos(omega * delay), -Math.sin(omega * delay)];
+    return phase;
+  }
+
   /* F along the axis at one point: value and derivative, and bounds over a step. */
   class Curve {
     constructor(loop, point) {
@@ -370,47 +370,33 @@ function armlockLoop() {
     join(omega) {
       const { rest, common, sum, difference, tau1, tau2, delay, second } = this.loop;
       const { c1, c2, left1, left2, between } = this.point;
+      const { x1, y1, x2, y2, er, ei, fr, fi } = phases(this.loop, omega);
       this.omega = omega;
-      const s1 = Math.sin(0.5 * omega * tau1), k1 = Math.cos(0.5 * omega * tau1);
-      const s2 = Math.sin(0.5 * omega * tau2), k2 = Math.cos(0.5 * omega * tau2);
-      // E - 1, so that nothing cancels where omega is small.
-      const x1 = -2 * s1 * s1, y1 = -2 * s1 * k1, x2 = -2 * s2 * s2, y2 = -2 * s2 * k2;
-      let vr = 0, vi = 0, dr = 0, di = 0;
       // d(1 - c E)/d omega = j c tau E
       const p1r = -c1 * tau1 * y1, p1i = c1 * tau1 * (1 + x1);
       const p2r = -c2 * tau2 * y2, p2i = c2 * tau2 * (1 + x2);
-      if (sum) {
-        const wr = left1 - c1 * x1 + second * (left2 - c2 * x2);
-        const wi = -c1 * y1 - second * c2 * y2;
-        const tr = p1r + second * p2r, ti = p1i + second * p2i;
-        vr = sum.vr * wr - sum.vi * wi;
-        vi = sum.vr * wi + sum.vi * wr;
-        dr = sum.dr * wr - sum.di * wi + sum.vr * tr - sum.vi * ti;
-        di = sum.dr * wi + sum.di * wr + sum.vr * ti + sum.vi * tr;
-        this.wsum = Math.sqrt(wr * wr + wi * wi);
-      }
-      if (difference) {
-        // c2 E2 - c1 E1 = (c2 - c1) E1 + c2 E2 (1 - exp(-s (tau1 - tau2)))
-        const half = 0.5 * omega * (tau1 - tau2);
-        const sh = Math.sin(half), ch = Math.cos(half);
-        const er = 2 * sh * sh, ei = 2 * sh * ch;
-        const wr = between * (1 + x1) + c2 * ((1 + x2) * er - y2 * ei);
-        const wi = between * y1 + c2 * ((1 + x2) * ei + y2 * er);
-        const tr = p1r - p2r, ti = p1i - p2i;
-        vr += difference.vr * wr - difference.vi * wi;
-        vi += difference.vr * wi + difference.vi * wr;
-        dr += difference.dr * wr - difference.di * wi + difference.vr * tr - difference.vi * ti;
-        di += difference.dr * wi + difference.di * wr + difference.vr * ti + difference.vi * tr;
-        this.wdifference = Math.sqrt(wr * wr + wi * wi);
-      }
+      const wr = left1 - c1 * x1 + second * (left2 - c2 * x2);
+      const wi = -c1 * y1 - second * c2 * y2;
+      const tr = p1r + second * p2r, ti = p1i + second * p2i;
+      this.wsum = Math.sqrt(wr * wr + wi * wi);
+      // c2 E2 - c1 E1 = (c2 - c1) E1 + c2 E2 (1 - exp(-s (tau1 - tau2)))
+      const ur = between * (1 + x1) + c2 * ((1 + x2) * er - y2 * ei);
+      const ui = between * y1 + c2 * ((1 + x2) * ei + y2 * er);
+      const qr = p1r - p2r, qi = p1i - p2i;
+      this.wdifference = Math.sqrt(ur * ur + ui * ui);
+      let vr = sum.vr * wr - sum.vi * wi + difference.vr * ur - difference.vi * ui;
+      let vi = sum.vr * wi + sum.vi * wr + difference.vr * ui + difference.vi * ur;
+      let dr = sum.dr * wr - sum.di * wi + sum.vr * tr - sum.vi * ti
+        + difference.dr * ur - difference.di * ui + difference.vr * qr - difference.vi * qi;
+      let di = sum.dr * wi + sum.di * wr + sum.vr * ti + sum.vi * tr
+        + difference.dr * ui + difference.di * ur + difference.vr * qi + difference.vi * qr;
       [dr, di] = [common.dr * vr - common.di * vi + common.vr * dr - common.vi * di,
         common.dr * vi + common.di * vr + common.vr * di + common.vi * dr];
       [vr, vi] = [common.vr * vr - common.vi * vi, common.vr * vi + common.vi * vr];
       if (delay) {
-        const er = Math.cos(omega * delay), ei = -Math.sin(omega * delay);
         [dr, di] = [dr + delay * vi, di - delay * vr];
-        [dr, di] = [dr * er - di * ei, dr * ei + di * er];
-        [vr, vi] = [vr * er - vi * ei, vr * ei + vi * er];
+        [dr, di] = [dr * fr - di * fi, dr * fi + di * fr];
+        [vr, vi] = [vr * fr - vi * fi, vr * fi + vi * fr];
       }
       // The open loop is L = (lr + j li) / rest.
       this.lr = vr; this.li = vi;
@@ -430,29 +416,19 @@ function armlockLoop() {
       const { rest, common, sum, difference, tau1, tau2, delay, second } = this.loop;
       const { c1, c2, between } = this.point;
       const end = this.omega + h, a1 = Math.abs(c1), a2 = Math.abs(c2);
-      let i0 = 0, i1 = 0, i2 = 0, error = 0;
+      const w1 = a1 * tau1 + second * a2 * tau2, w0 = this.wsum + h * w1;
+      const w2 = a1 * tau1 * tau1 + second * a2 * tau2 * tau2;
+      const apart = Math.abs(tau1 - tau2), e = Math.abs(between), x = Math.min(end * apart, 2);
+      const u1 = e * tau1 + a2 * (apart + tau2 * x), u0 = this.wdifference + h * u1;
+      const u2 = e * tau1 * tau1 + a2 * (apart * apart + 2 * tau2 * apart + tau2 * tau2 * x);
+      const i0 = sum.b0 * w0 + difference.b0 * u0;
+      let i1 = sum.b1 * w0 + sum.b0 * w1 + difference.b1 * u0 + difference.b0 * u1;
+      let i2 = sum.b2 * w0 + 2 * sum.b1 * w1 + sum.b0 * w2
+        + difference.b2 * u0 + 2 * difference.b1 * u1 + difference.b0 * u2;
       // The parameters are rounded numbers themselves, and so are the phases.
       const rounded = a1 * (1 + end * tau1) + a2 * (1 + end * tau2);
-      if (sum) {
-        const w1 = a1 * tau1 + second * a2 * tau2;
-        const w2 = a1 * tau1 * tau1 + second * a2 * tau2 * tau2;
-        const w0 = this.wsum + h * w1;
-        i0 = sum.b0 * w0;
-        i1 = sum.b1 * w0 + sum.b0 * w1;
-        i2 = sum.b2 * w0 + 2 * sum.b1 * w1 + sum.b0 * w2;
-        error = sum.b0 * (sum.relative * w0 + rounded);
-      }
-      if (difference) {
-        const apart = Math.abs(tau1 - tau2), e = Math.abs(between);
-        const x = Math.min(end * apart, 2);
-        const w1 = e * tau1 + a2 * (apart + tau2 * x);
-        const w2 = e * tau1 * tau1 + a2 * (apart * apart + 2 * tau2 * apart + tau2 * tau2 * x);
-        const w0 = this.wdifference + h * w1;
-        i0 += difference.b0 * w0;
-        i1 += difference.b1 * w0 + difference.b0 * w1;
-        i2 += difference.b2 * w0 + 2 * difference.b1 * w1 + difference.b0 * w2;
-        error += difference.b0 * (difference.relative * w0 + rounded);
-      }
+      const error = sum.b0 * (sum.relative * w0 + rounded)
+        + difference.b0 * (difference.relative * u0 + rounded);
       i2 += delay * (2 * i1 + delay * i0);
       i1 += delay * i0;
       this.l0 = common.b0 * i0;
@@ -473,9 +449,7 @@ function armlockLoop() {
     const a1 = Math.abs(c1), a2 = Math.abs(c2);
     const look = t => {
       for (const part of parts) part.far(t);
-      const sr = sum ? sum.vr : 0, si = sum ? sum.vi : 0;
-      const tr = difference ? difference.vr : 0, ti = difference ? difference.vi : 0;
-      const k = Math.hypot(common.vr, common.vi);
+      const { vr: sr, vi: si } = sum, { vr: tr, vi: ti } = difference, k = Math.hypot(common.vr, common.vi);
       const cr = (1 + second) * (common.vr * sr - common.vi * si);
       const ci = (1 + second) * (common.vr * si + common.vi * sr);
       const ar = delay ? rest.vr : rest.vr + cr, ai = delay ? rest.vi : rest.vi + ci;
@@ -486,8 +460,7 @@ function armlockLoop() {
     };
     const rate = h => {
       for (const part of parts) part.over(h);
-      const s0 = sum ? sum.b0 : 0, s1 = sum ? sum.b1 : 0;
-      const t0 = difference ? difference.b0 : 0, t1 = difference ? difference.b1 : 0;
+      const { b0: s0, b1: s1 } = sum, { b0: t0, b1: t1 } = difference;
       const both = (1 + second) * (common.b0 * s1 + common.b1 * s0);
       const arms = common.b0 * ((a1 + second * a2) * s1 + (a1 + a2) * t1)
         + common.b1 * ((a1 + second * a2) * s0 + (a1 + a2) * t0);
@@ -520,7 +493,7 @@ function armlockLoop() {
   }
 
   /* Number of unstable roots at (c1, c2); BOUNDARY where one is on the axis as far as rounding
-   * can tell, UNCONFINED where the neutral root chain is not confined, UNSURE where it would
+   * can tell, UNCONFINED where the neutral root chain is not confined, UNDECIDED where it would
    * take too many steps.
    *
    * A root at s = 0 is left out where numerator and denominator of L both vanish there: it comes
@@ -531,6 +504,7 @@ function armlockLoop() {
     if (!Number.isFinite(c1) || !Number.isFinite(c2))
       throw new RangeError(`c1 and c2 must be finite numbers, got ${c1} and ${c2}`);
     const point = exact || at(loop, c1, c2);
+    if (point.between === 0) loop = reduced(loop, c1, c2);
     const end = tail(loop, point.c1, point.c2, loop.longest);
     if (!end) return UNCONFINED;
     const curve = new Curve(loop, point);
@@ -542,16 +516,16 @@ function armlockLoop() {
       // |F - j omega F'(0)| is at most |F'(0)| omega / 2 there: F turns by 30 degrees at most.
       const slope = Math.hypot(curve.dr, curve.di);
       do step *= 0.5, curve.over(step); while (curve.bend * step > slope && step > 1e-300);
-      if (!(slope > 0) || step <= 1e-300) return UNSURE;
+      if (!(slope > 0) || step <= 1e-300) return UNDECIDED;
       const { dr, di } = curve;
       curve.at(omega = step);
       argument = Math.atan2(curve.vi * dr - curve.vr * di, curve.vr * dr + curve.vi * di);
       // A quarter turn around the root, which is left of the path.
-      if (!(Math.abs(argument) < 0.6)) return UNSURE;
+      if (!(Math.abs(argument) < 0.6)) return UNDECIDED;
       argument += 0.5 * Math.PI;
     }
     for (let steps = 0; omega < end.omega; steps++) {
-      if (steps > most) return UNSURE;
+      if (steps > most) return UNDECIDED;
       const { vr, vi, dr, di } = curve;
       step = Math.min(4 * step, end.omega - omega);
       for (;;) {
@@ -576,7 +550,7 @@ function armlockLoop() {
       curve.vr * end.ar + curve.vi * end.ai);
     const found = (end.argument + last - argument) / Math.PI;
     const nearest = Math.round(found);
-    return Math.abs(found - nearest) < 1e-3 && nearest >= 0 ? nearest + 0 : UNSURE;
+    return Math.abs(found - nearest) < 1e-3 && nearest >= 0 ? nearest + 0 : UNDECIDED;
   }
 
   /* Whether numerator and denominator of L are both zero at s = 0, where a curve is. */
@@ -588,7 +562,7 @@ function armlockLoop() {
   function chainLeads(loop) {
     const { rest, common, sum, difference, second, delay, parts } = loop;
     for (const part of parts) part.far(0);
-    const s = common.vr * (sum ? sum.vr : 0), t = common.vr * (difference ? difference.vr : 0);
+    const s = common.vr * sum.vr, t = common.vr * difference.vr;
     const both = (1 + second) * s;
     return [delay ? Math.abs(rest.vr) - Math.abs(both) : Math.abs(rest.vr + both),
       Math.abs(s + t), Math.abs(second * s - t)];
@@ -609,51 +583,50 @@ function armlockLoop() {
 
   /* Frequencies that show the loop at one point, and the roots near the axis. */
   function around(loop, c1, c2, most) {
-    const end = tail(loop, c1, c2, loop.longest);
+    const point = at(loop, c1, c2), end = tail(loop, point.c1, point.c2, loop.longest);
     const top = Math.max(end ? 3 * end.omega : 0, 20 / loop.longest);
     return frequencies(loop, top, 0.1 * Math.min(...loop.scales), most);
   }
 
-  /* The open loop for pictures. What does not depend on (c1, c2) is computed once, so that
-   * `to` gives L at another point within a frame: arrays omega, re, im, `at`, which gives [re, im]
-   * at any other frequency, and `cache` for what a picture made of them. */
-  function response(loop, c1, c2, most = 9000) {
-    const omega = around(loop, c1, c2, most), n = omega.length;
-    const ones = new Curve(loop, at(loop, 0, 0)), arms = [along(-1, 0), along(0, -1)].map(
-      point => new Curve(loop, point));
-    // L = (both + c1 late1 + c2 late2) / rest
-    const parts = Array.from({ length: 6 }, () => new Float64Array(n));
-    for (let i = 0; i < n; i++) {
-      ones.at(omega[i]);
-      for (const arm of arms) arm.join(omega[i]);
-      const { vr, vi } = loop.rest, square = vr * vr + vi * vi;
-      [ones, ...arms].forEach(({ lr, li }, k) => {
-        parts[2 * k][i] = (lr * vr + li * vi) / square;
-        parts[2 * k + 1][i] = (li * vr - lr * vi) / square;
-      });
-    }
-    const [br, bi, ur, ui, vr, vi] = parts, re = new Float64Array(n), im = new Float64Array(n);
-    const to = (x, y) => {
-      for (let i = 0; i < n; i++) {
-        re[i] = br[i] - x * ur[i] - y * vr[i];
-        im[i] = bi[i] - x * ui[i] - y * vi[i];
-      }
-      const here = new Curve(loop, at(loop, x, y));
-      return { omega, re, im, cache: {}, at: w => {
-        here.at(w);
-        const { vr, vi } = loop.rest, square = vr * vr + vi * vi, { lr, li } = here;
-        return [(lr * vr + li * vi) / square, (li * vr - lr * vi) / square];
-      } };
+  /* The open loop for pictures: arrays omega, re, im, `at`, which gives [re, im] at any other frequency,
+   * and `cache` for what a picture made of them. */
+  function response(loop, c1, c2, most) {
+    const omega = around(loop, c1, c2, most), curve = new Curve(loop, at(loop, c1, c2));
+    const find = w => {
+      curve.at(w);
+      const { vr, vi } = loop.rest, square = vr * vr + vi * vi, { lr, li } = curve;
+      return [(lr * vr + li * vi) / square, (li * vr - lr * vi) / square];
     };
-    return { to };
+    const re = new Float64Array(omega.length), im = new Float64Array(omega.length);
+    for (let i = 0; i < omega.length; i++) [re[i], im[i]] = find(omega[i]);
+    return { omega, re, im, at: find, cache: {} };
+  }
+
+  /* The largest Re s to which the real parts of a neutral root chain tend, for all small changes of the
+   * delays; minus infinity without a chain. Where equal arms act against each other it is not looked for. */
+  function chainLimit(spec, c1, c2) {
+    const lost = sigma => {
+      const loop = make(spec, sigma), point = at(loop, c1, c2), [a, b1, b2] = chainLeads(loop);
+      return Math.abs(point.c1) * b1 + Math.abs(point.c2) * b2 >= a;
+    };
+    const { difference, second } = make(spec), apart = spec.tau1 !== spec.tau2;
+    let low = -50 / Math.max(spec.tau1, spec.tau2), high = 0;
+    if (!lost(low) || lost(high) || !apart && (difference.gain || second * c1 * c2 < 0)) return -Infinity;
+    while (high - low > -1e-9 * low) {
+      const middle = 0.5 * (low + high);
+      if (lost(middle)) low = middle; else high = middle;
+    }
+    return low;
   }
 
   /* The rightmost root at (c1, c2), null where counts right and left of it do not confirm it. Lines
    * Re s = low and high have it between them, by counts; Newton's method looks from one of them, at
-   * first from few frequencies. The root at s = 0 that `count` leaves out is not the loop's. */
+   * first from few frequencies. The root at s = 0 that `count` leaves out is not the loop's. Where no
+   * root lies right of the chain's limit the limit is given, with an infinite frequency. */
   function rightmost(spec, c1, c2) {
-    let low = -Infinity, high = Infinity, line = 0, step = 1 / Math.max(spec.tau1, spec.tau2);
-    const loop = make(spec), curve = new Curve(loop, at(loop, c1, c2));
+    const loop = reduced(make(spec), c1, c2), curve = new Curve(loop, at(loop, c1, c2));
+    ({ spec } = loop);
+    let low = chainLimit(spec, c1, c2), high = Infinity, line = 0, step = 1 / Math.max(spec.tau1, spec.tau2);
     curve.at(0);
     const cleared = vanishes(curve);
     const beyond = sigma => {
@@ -661,6 +634,7 @@ function armlockLoop() {
       if (number > 0) low = Math.max(low, sigma); else if (number === 0) high = Math.min(high, sigma);
       return number;
     };
+    if (low > -Infinity && beyond((1 - 1e-4) * low) === 0) return [low, Infinity];
     for (let attempt = 0; attempt < 16; attempt++) {
       if (beyond(line) < 0) return null;
       const found = newton(spec, line, c1, c2, attempt ? MOST_SAMPLES : 6000).find(([re, im]) =>
@@ -720,6 +694,6 @@ function armlockLoop() {
     return found.sort((p, q) => q[0] - p[0]);
   }
 
-  return { EPSILON, BOUNDARY, UNCONFINED, UNSURE, MOST_STEPS, SENSORS, make, at, beside, along, Curve, tail,
-    chainLeads, tangentDistance, vanishes, count, response, rightmost, rootsOf, times };
+  return { EPSILON, BOUNDARY, UNCONFINED, UNDECIDED, MOST_STEPS, SENSORS, make, reduced, at, beside, along, Curve, tail,
+    chainLeads, tangentDistance, vanishes, count, response, rightmost, rootsOf };
 }

@@ -11,7 +11,7 @@
  * frequency on nothing is smaller.
  */
 function armlockMargins(api) {
-  const { EPSILON, UNSURE, BOUNDARY, make, at, beside, along, Curve, chainLeads, vanishes, count } = api;
+  const { EPSILON, UNDECIDED, BOUNDARY, make, reduced, at, beside, along, Curve, chainLeads, vanishes, count } = api;
   // How much smaller than what is shown a number may be, as a share.
   const NEAR = 1e-3;
   // Perturbations up to this, gain factors up to this, steps of one walk and of one count.
@@ -32,8 +32,7 @@ function armlockMargins(api) {
     /* From the loop's factors at omega; at infinity and down from it, omega is null. */
     look(omega) {
       const { rest, common, sum, difference, second, delay } = this.loop;
-      const sr = sum ? sum.vr : 0, si = sum ? sum.vi : 0;
-      const tr = difference ? difference.vr : 0, ti = difference ? difference.vi : 0;
+      const { vr: sr, vi: si } = sum, { vr: tr, vi: ti } = difference;
       let cr = (1 + second) * (common.vr * sr - common.vi * si);
       let ci = (1 + second) * (common.vr * si + common.vi * sr);
       const k = Math.hypot(common.vr, common.vi);
@@ -58,8 +57,7 @@ function armlockMargins(api) {
     /* Radius of a disc around the same centre that holds those of the whole step. */
     over(h) {
       const { rest, common, sum, difference, second } = this.loop;
-      const s0 = sum ? sum.b0 : 0, s1 = sum ? sum.b1 : 0;
-      const t0 = difference ? difference.b0 : 0, t1 = difference ? difference.b1 : 0;
+      const { b0: s0, b1: s1 } = sum, { b0: t0, b1: t1 } = difference;
       const least = this.size - h * rest.b1, size = Math.hypot(this.re, this.im);
       if (!(least > 0)) return Infinity;
       const centre = (1 + second)
@@ -443,11 +441,12 @@ function armlockMargins(api) {
    * infinity where there is none up to |c - 1| = 2, the limit where the neutral root chain is lost
    * first; nan where that is not certain, null where the loop is not stable at (1, 1). */
   function firstBreak(loop, d1, d2) {
+    if (d1 === d2) loop = reduced(loop, 1, 1);
     const inside = t => count(loop, 1 + t * d1, 1 + t * d2,
       { most: COUNTED, exact: beside(t * d1, t * d2) });
     const begun = inside(0);
     // Whether a loop that is on the boundary as far as rounding can tell is stable, nobody can tell.
-    if (begun === UNSURE || begun === BOUNDARY) return NaN;
+    if (begun === UNDECIDED || begun === BOUNDARY) return NaN;
     if (begun > 0 || begun < BOUNDARY) return null;
     const [a, b1, b2] = chainLeads(loop);
     const lost = t => Math.abs(1 + t * d1) * b1 + Math.abs(1 + t * d2) * b2 >= a;
@@ -464,7 +463,7 @@ function armlockMargins(api) {
     if (vanishes(target.curve)) {
       low = OWN;
       const next = inside(1e-9);
-      if (next === UNSURE) return NaN;
+      if (next === UNDECIDED) return NaN;
       // Not zero where the loop is stable still nearer.
       if (next !== 0) return [1e-10, 1e-11, 1e-12].some(t => inside(t) === 0) ? NaN : 0;
     }
@@ -474,7 +473,7 @@ function armlockMargins(api) {
     if (found === last)
       return inside((1 - 2 * NEAR) * last) === 0 ? limit : NaN;
     const next = inside(found * (1 + 1e-6));
-    return inside(found * (1 - NEAR)) === 0 && next !== 0 && next !== UNSURE ? found : NaN;
+    return inside(found * (1 - NEAR)) === 0 && next !== 0 && next !== UNDECIDED ? found : NaN;
   }
 
   /* Margins of a stable loop, null of another: gain factors `lower` and `upper` between which it
@@ -482,20 +481,20 @@ function armlockMargins(api) {
    * rad, infinity without a crossover, and `modulus`; each nan where it is not certain. The names
    * with `At` have the frequency of each in rad/s: infinity, or none, where it is a limit. */
   function margins(spec, c1, c2) {
-    const loop = make(spec), begun = count(loop, c1, c2, { most: COUNTED });
+    const loop = reduced(make(spec), c1, c2), begun = count(loop, c1, c2, { most: COUNTED });
     let [lower, upper, most, gains] = [NaN, NaN, LARGEST[0], null];
     if (begun !== 0)
-      return begun === UNSURE ? { lower, upper, most, phase: NaN, modulus: NaN } : null;
+      return begun === UNDECIDED ? { lower, upper, most, phase: NaN, modulus: NaN } : null;
     for (most of LARGEST) {
       gains = new Gains(loop, c1, c2, most);
       [lower, upper] = gains.found();
       if (!Number.isNaN(lower)) break;
     }
-    const scaled = k => count(make({ ...spec, gain: spec.gain * k }), c1, c2, { most: COUNTED });
+    const scaled = k => count(make({ ...loop.spec, gain: spec.gain * k }), c1, c2, { most: COUNTED });
     // A second opinion from counts on both sides.
     const confirmed = (k, inside, outside) => {
       const out = scaled(k * outside);
-      return scaled(k * inside) === 0 && out !== 0 && out !== UNSURE;
+      return scaled(k * inside) === 0 && out !== 0 && out !== UNDECIDED;
     };
     if (lower > 0 && !confirmed(lower, 1 + NEAR, 1 - 1e-6)) lower = NaN;
     if (upper < Infinity && !confirmed(upper, 1 - NEAR, 1 + 1e-6)) upper = NaN;

@@ -27,8 +27,8 @@
 })();
 
 function armlockPages() {
-  const { TURN, say, duration, shortest, exact, written, list, readRoots, readPolynomial, readFraction,
-    readNumber, python, address, fromAddress } = armlockText;
+  const { TURN, say, duration, shortest, exact, written, readRoots, readController, readNumber, python, address,
+    fromAddress } = armlockText;
   const { element, nearest, Sheet, Chart, drawNyquist, drawBode, drawRoots, drawYear } = armlockDraw;
   const api = armlockLoop();
   Object.assign(api, armlockChart(api));
@@ -61,8 +61,7 @@ function armlockPages() {
     "The white paper's loop (modified dual)": [FLIGHT, 1, 2e-3],
   };
   const SENSORS = [["single", "single arm"], ["common", "common arm"],
-    ["difference", "difference of the arms"], ["dual", "dual"], ["modified", "modified dual"],
-    ["own", "one of your own"]];
+    ["difference", "difference of the arms"], ["dual", "dual"], ["modified", "modified dual"]];
   const LOST = "unstable at arbitrarily high frequency";
   const WORDS = { [-1]: "a root on the imaginary axis", [-2]: LOST, [-3]: "undecided" };
 
@@ -265,6 +264,7 @@ function armlockPages() {
       this.out.textContent = why;
       this.note.textContent = this.following.textContent = this.ready.textContent = "";
       this.numbers.replaceChildren();
+      this.listed = null;
       this.draw();
     }
 
@@ -272,18 +272,19 @@ function armlockPages() {
      * that takes long. */
     set(spec, moving = false) {
       this.drop(this.design);
-      this.design = this.made(spec, moving ? 1200 : 9000);
+      this.design = this.made(spec);
       this.chart.broken = null;
       this.lit = this.chart.lit = null;
       this.redraw(moving);
       this.tell(moving);
     }
 
-    made(spec, samples) {
-      const loop = api.make(spec), { x0, x1, y0, y1 } = this.chart.box;
-      // Parameters as large as the view has them: their response shows the most.
-      const most = [[x0, x1], [y0, y1]].map(pair => Math.max(...pair.map(Math.abs), 1));
-      return { spec, loop, kept: {}, told: {}, responded: api.response(loop, ...most, samples) };
+    made(spec) { return { spec, loop: api.make(spec), kept: {}, told: {} }; }
+
+    /* The open loop at the point, from few frequencies while the hand moves. */
+    respond() {
+      for (const one of this.designs) one.response = api.response(one.loop, ...this.point, this.rough ? 1200 : 9000);
+      this.draw();
     }
 
     redraw(moving = false) {
@@ -341,9 +342,8 @@ function armlockPages() {
       for (const one of this.designs) {
         this.drop(one, TOLD.filter(kind => kind !== "breaks"));
         one.told = this.chart.hover ? {} : one.kept[point] ||= {};
-        one.response = one.responded.to(...point);
       }
-      this.draw();
+      this.respond();
       this.write();
       const { told } = this.design;
       if (told.count === undefined) this.near.ask("point", [this.spec, ...point], (count, error) => {
@@ -372,8 +372,10 @@ function armlockPages() {
     /* Ask for what takes longer. */
     settle() {
       const { point } = this;
-      this.rough = false;
-      this.draw();
+      if (this.rough) {
+        this.rough = false;
+        this.respond();
+      }
       for (const one of this.designs) for (const kind of TOLD) {
         const { told } = one, breaks = kind === "breaks";
         if ((breaks ? one.breaks : told[kind]) !== undefined || breaks && one.breaking) continue;
@@ -408,6 +410,9 @@ function armlockPages() {
         ["Critical perturbation from (1, 1)", ...["(1, \u22121)", "(\u22121, 1)", "(1, 1)", "(\u22121, \u22121)"].map(
           (way, k) => [`along ${way}`, of(b => broken(b[k]), one => one.breaks)])],
       ];
+      const text = JSON.stringify(parts);
+      if (text === this.listed) return;
+      this.listed = text;
       this.numbers.replaceChildren(element("thead", {}, element("tr", {},
         ...["Number", "This loop", "Pinned"].slice(0, 1 + designs.length)
           .map(text => element("th", { scope: "col" }, text)))),
@@ -424,7 +429,7 @@ function armlockPages() {
     /* Pin the design as it is: what follows is seen against it, in all plots and numbers. */
     pin() {
       if (this.pinned) this.drop(this.pinned);
-      this.pinned = this.pinned || !this.design ? null : { ...this.made(this.spec, 9000), breaks: this.design.breaks };
+      this.pinned = this.pinned || !this.design ? null : { ...this.made(this.spec), breaks: this.design.breaks };
       this.chart.ghost = this.pinned && this.chart.curve;
       this.tell(false);
       return Boolean(this.pinned);
@@ -470,28 +475,17 @@ function armlockPages() {
     return element("label", { class: "live-field" }, element("span", {}, name), select);
   }
 
-  function save(name, blob) {
-    const link = element("a", { href: URL.createObjectURL(blob), download: name });
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-  }
-
   /* Zoom, download, and the ghost, of any explorer. */
   function tools(live, file, ...more) {
-    const counts = () => {
-      if (!live.chart.grid) return;
-      const { counts, n, x0, x1, y0, y1 } = live.chart.grid;
-      const at = (low, high, i) => low + (high - low) * i / (n - 1);
-      const rows = Array.from(counts, (count, k) =>
-        `${at(x0, x1, k % n)},${at(y0, y1, Math.floor(k / n))},${count}\n`);
-      save(`${file}.csv`, new Blob(["c1 [1],c2 [1],unstable roots [1]\n", ...rows]));
-    };
     const pin = element("button", { type: "button", "aria-pressed": "false", onclick: () => {
       pin.setAttribute("aria-pressed", String(live.pin()));
     } }, "Pin this loop");
     return buttons(button("Zoom in", () => live.chart.zoom(0.5)), button("Zoom out", () => live.chart.zoom(2)),
-      ...more, pin, button("CSV", counts),
-      button("PNG", () => live.chart.sheet.picture(blob => save(`${file}.png`, blob))));
+      ...more, pin, button("PNG", () => live.chart.sheet.picture(blob => {
+        const link = element("a", { href: URL.createObjectURL(blob), download: `${file}.png` });
+        link.click();
+        setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+      })));
   }
 
   function legend() {
@@ -551,23 +545,22 @@ function armlockPages() {
     const id = name => `${live.id}-${name}`, fields = {}, errors = {};
     const code = element("pre", { class: "live-code", "aria-label": "Python" });
     const orbit = element("a", {}, "Open this loop in orbit");
-    // The unit of the fields, the gain from which its slider goes, the preset, the steps that Undo can
-    // take back; `quiet` while the page itself changes what it shows.
-    let unit = 1, base = 1, chosen = null, depth = 0, quiet = true, before = null, later = 0;
+    // The unit of the fields, the gain from which its slider goes, the steps that Undo can take back;
+    // `quiet` while the page itself changes what it shows.
+    let unit = 1, base = 1, depth = 0, quiet = true, before = null, later = 0;
 
     /* The address holds the loop, and its history undoes what was done to it. */
     live.moved = step => {
       if (!live.spec) return;
       const hash = address(live.spec, live.chart, unit);
-      code.textContent = python(live.spec, live.kept, fraction() ? 1 : unit);
+      code.textContent = python(live.spec, live.kept, unit);
       orbit.href = `in_orbit.html${hash}`;
       if (quiet) return;
       // A point that goes on moving is one step, and another view is none.
       const further = step && hash !== location.hash && !(step === "point" && before === "point");
       before = step || before;
       const write = () => {
-        const values = Object.entries(fields).map(([name, field]) => [name, field.value]);
-        history[further ? "pushState" : "replaceState"]({ values, chosen, depth }, "", hash);
+        history[further ? "pushState" : "replaceState"]({ depth }, "", hash);
         undo.disabled = !depth;
       };
       clearTimeout(later);
@@ -584,7 +577,6 @@ function armlockPages() {
     };
     const NAMES = { tau1: "\u03c4\u2081", tau2: "\u03c4\u2082", delay: "The dead time", gain: "The gain",
       corner: "The corner", difference: "\u0394\u03c4" };
-    const fraction = () => fields.form.value === "fraction";
 
     /* The loop that the fields hold; throws an error that names its field. */
     const read = () => {
@@ -592,20 +584,8 @@ function armlockPages() {
       for (const name of ["tau1", "tau2", "delay", "gain"]) spec[name] = readNumber(name, fields[name].value, NAMES[name]);
       if (["dual", "modified"].includes(spec.sensor)) for (const name of ["corner", "difference"])
         spec[name] = readNumber(name, fields[name].value, NAMES[name]) * (name === "corner" ? unit : 1);
-      if (spec.sensor === "own") for (const name of ["m1", "m2", "below"])
-        spec[name] = readPolynomial(name, fields[name].value, "It");
-      if (fraction()) {
-        const [above, under] = ["above", "under"].map(name => {
-          const found = readPolynomial(name, fields[name].value, "It");
-          if (found.some(v => v !== 0)) return found;
-          throw Object.assign(new RangeError("It must not be zero."), { field: name });
-        });
-        [spec.zeros, spec.poles] = [above, under].map(api.rootsOf);
-        spec.gain *= above.find(v => v !== 0) / under.find(v => v !== 0);
-      } else {
-        for (const [name, title] of [["zeros", "Zeros"], ["poles", "Poles"]])
-          spec[name] = readRoots(name, fields[name].value, title).map(v => v.map(x => x * unit));
-      }
+      for (const [name, title] of [["zeros", "Zeros"], ["poles", "Poles"]])
+        spec[name] = readRoots(name, fields[name].value, title).map(v => v.map(x => x * unit));
       api.make(spec);
       return spec;
     };
@@ -614,12 +594,12 @@ function armlockPages() {
     const take = (edited = null, moving = false, dragged = false) => {
       for (const name of Object.keys(errors)) blame(name, "");
       try {
-        // A whole fraction goes to its two fields.
-        const found = ["zeros", "poles", "above", "under"].includes(edited) && readFraction(edited, fields[edited].value);
-        if (found) {
-          [fields.above.value, fields.under.value, fields.gain.value] = [...found, "1"];
-          fields.form.value = form = "fraction";
-          shape();
+        if (edited === "pasted") {
+          const [above, under] = readController("pasted", fields.pasted.value);
+          if (!above.some(v => v)) throw Object.assign(new RangeError("It must not be zero."), { field: "pasted" });
+          fields.gain.value = exact(above.find(v => v) / under.find(v => v));
+          [fields.zeros.value, fields.poles.value] = [above, under].map(part => written(api.rootsOf(part), unit));
+          fields.pasted.value = "";
         }
         const spec = read();
         wrong.textContent = "";
@@ -631,18 +611,13 @@ function armlockPages() {
           range = [Math.min(...root, 1 / spec.tau1), Math.max(...root, 1 / spec.tau1)];
           if (range[1] < 100 * range[0]) range = [range[0] / 10, range[1] * 10];
         }
-        const changed = chosen !== null && !same(spec, PRESETS[chosen][0]);
-        state.textContent = chosen === null ? "from a link" : changed ? "changed" : "";
-        reset.hidden = !changed;
+        presets.value = Object.keys(PRESETS).find(name => same(spec, PRESETS[name][0])) || "";
         live.set(spec, moving);
-        roots.draw();
+        if (!dragged || caught) roots.draw();
         if (!moving) live.moved("loop");
       } catch (error) {
-        const pair = fraction() ? ["above", "under"] : ["zeros", "poles"];
         // Too few poles are too many zeros: the field that was edited is the one to look at.
-        const name = error.field === "zeros" || error.field === "poles"
-          ? pair.includes(edited) ? edited : pair[Number(error.field === "poles")]
-          : fields[error.field] ? error.field : "sensor";
+        const name = error.field === "zeros" && edited === "poles" ? edited : fields[error.field] ? error.field : "sensor";
         blame(name, error.message);
         wrong.textContent = error.message;
         live.none("There is no loop to show: a field holds none.");
@@ -652,51 +627,29 @@ function armlockPages() {
       }
     };
     const same = (a, b) => {
-      const digits = (_, v) => typeof v === "number" ? v.toPrecision(12) : v;
-      const sorted = all => all.map(v => JSON.stringify(v, digits)).sort();
-      const plain = spec => JSON.stringify([spec.sensor, spec.tau1, spec.tau2, spec.delay, spec.gain,
-        sorted(spec.zeros), sorted(spec.poles), ...["dual", "modified"].includes(spec.sensor)
-          ? [spec.corner, spec.difference] : []], digits);
-      return plain(a) === plain(b);
+      const all = spec => ["sensor", "tau1", "tau2", "delay", "gain", "zeros", "poles",
+        ...["dual", "modified"].includes(spec.sensor) ? ["corner", "difference"] : []].map(name =>
+        [spec[name]].flat(2).map(v => typeof v === "number" ? v.toPrecision(12) : v).sort()).join("|");
+      return all(a) === all(b);
     };
 
     const put = spec => {
-      fields.form.value = form = "roots";
       for (const name of ["sensor", "tau1", "tau2", "delay", "gain", "difference"])
         if (spec[name] !== undefined) fields[name].value = String(spec[name]);
       if (spec.corner !== undefined) fields.corner.value = shortest(spec.corner, unit);
       for (const name of ["zeros", "poles"]) fields[name].value = written(spec[name], unit);
-      for (const name of ["m1", "m2", "below"]) if (spec[name]) fields[name].value = list(spec[name]);
       shape();
     };
     const shape = () => {
-      const two = ["dual", "modified"].includes(fields.sensor.value), mapped = fields.sensor.value === "own";
-      const shown = { corner: two, difference: two, m1: mapped, m2: mapped, below: mapped, zeros: !fraction(),
-        poles: !fraction(), above: fraction(), under: fraction() };
-      for (const [name, on] of Object.entries(shown)) fields[name].closest(".live-field").hidden = !on;
+      const two = ["dual", "modified"].includes(fields.sensor.value);
+      for (const name of ["corner", "difference"]) fields[name].closest(".live-field").hidden = !two;
     };
-    /* The same controller in the other form. */
-    let form = "roots";
-    const convert = () => {
-      const { spec } = live, next = fields.form.value;
-      if (spec && next !== form) {
-        put(spec);
-        const product = all => all.reduce((p, [re, im]) => im < 0 ? p : api.times(p,
-          im ? [1, -2 * re, re * re + im * im] : [1, -re]), [1]);
-        [fields.above.value, fields.under.value] = [spec.zeros, spec.poles].map(all => list(product(all)));
-        fields.form.value = next;
-      }
-      form = next;
-      shape();
-      take("form");
-    };
-    const field = (name, label, { area = false, value = "", wide = area } = {}) => {
+    const field = (name, label, area = false) => {
       fields[name] = element(area ? "textarea" : "input", { id: id(name), spellcheck: "false",
         autocomplete: "off", autocapitalize: "off", rows: area ? 2 : null,
         "aria-describedby": id(`${name}-wrong`), onchange: () => take(name) });
-      fields[name].value = value;
       errors[name] = element("span", { id: id(`${name}-wrong`), class: "live-wrong" });
-      return element("div", { class: `live-field${wide ? " live-wide" : ""}` },
+      return element("div", { class: `live-field${area ? " live-wide" : ""}` },
         element("label", { for: id(name) }, label), fields[name], errors[name]);
     };
     const select = (name, title, options, changed) => {
@@ -719,14 +672,13 @@ function armlockPages() {
       take();
     };
     const start = name => {
-      preset.querySelector("select").value = chosen = name;
       const [spec, centre, half] = PRESETS[name];
       show(spec, [centre, centre], half, null);
     };
 
-    const state = element("span", { class: "live-state", role: "status" });
-    const reset = button("Reset", () => start(chosen));
-    const preset = choice(id("preset"), "Start from", Object.keys(PRESETS).map(name => [name, name]), start);
+    const preset = choice(id("preset"), "Start from", [["", "\u2014 your own loop \u2014"],
+      ...Object.keys(PRESETS).map(name => [name, name])], name => { if (name) start(name); });
+    const presets = preset.querySelector("select");
     const gain = slider(id("factor"), "Drag the gain: times", -2, 2, 0, v => say(10 ** v), (v, moving) => {
       fields.gain.value = exact(+(base * 10 ** v).toPrecision(6));
       take("gain", moving, true);
@@ -745,20 +697,13 @@ function armlockPages() {
         // The loop stays what it is; the fields say it in the other unit.
         const { spec } = live;
         unit = value === "hz" ? TURN : 1;
-        if (spec && fraction()) fields.corner.value = shortest(spec.corner || 0, unit);
-        else if (spec) put(spec);
+        if (spec) put(spec);
         take("unit");
       }),
       field("corner", "Sensor\u2019s corner"), field("difference", "Sensor\u2019s \u0394\u03c4 in s"),
-      field("m1", "Weight m1: numerator", { value: "1", wide: true }),
-      field("m2", "Weight m2: numerator", { value: "1", wide: true }),
-      field("below", "Their denominator", { value: "1", wide: true }),
-      select("form", "Controller given by", [["roots", "zeros and poles"],
-        ["fraction", "numerator and denominator"]], convert),
-      field("zeros", "Zeros", { area: true }), field("poles", "Poles", { area: true }),
-      field("above", "Numerator, highest power first, or in s", { area: true, value: "1" }),
-      field("under", "Denominator", { area: true, value: "s" }));
-    fields.form.closest("label").classList.add("live-wide");
+      field("pasted", "Paste a controller in s, as MATLAB or python-control print it", true),
+      field("zeros", "Zeros", true), field("poles", "Poles", true));
+    fields.pasted.placeholder = "(s + 0.02)/(s^2 + 0.1 s)";
 
     /* The s-plane: a root follows the pointer, a pair together; a root at 0 stays. */
     let range = [0.01, 1], plane = null, caught = null;
@@ -821,7 +766,7 @@ function armlockPages() {
     const lines = element("details", {}, element("summary", {}, "This loop in Python"), code);
     const [nyquist, bode] = live.plots;
     place.replaceChildren(element("div", { class: "live-own" },
-      element("div", { class: "live-top" }, element("div", { class: "live-start" }, preset, state, reset, undo),
+      element("div", { class: "live-top" }, element("div", { class: "live-start" }, preset, undo),
         wrong, gain, dead),
       element("div", { class: "live-main" }, figures(live.figure, nyquist.figure),
         tools(live, "loop", button("Paper\u2019s square", () => live.chart.show([1, 1], 3e-6)),
@@ -833,11 +778,10 @@ function armlockPages() {
     const open = () => {
       quiet = true;
       clearTimeout(later);
-      preset.querySelector("select").value = "";
+      presets.value = "";
       try {
         const given = fromAddress(location.hash);
         if (given) {
-          chosen = null;
           api.make(given.spec);
           show(given.spec, given.centre, given.half, given.held, given.unit);
         } else start(Object.keys(PRESETS)[0]);
@@ -845,8 +789,7 @@ function armlockPages() {
         live.none("There is no loop to show.");
         shape();
         roots.draw();
-        code.textContent = state.textContent = "";
-        reset.hidden = true;
+        code.textContent = "";
         wrong.textContent = `The address of this page holds no loop: ${error.message.replace(/\.$/, "")}. It was left as it is. Choose `
           + "a loop to start from, or mend the address.";
       }
@@ -856,19 +799,7 @@ function armlockPages() {
       depth = kept?.depth || 0;
       undo.disabled = !depth;
       before = null;
-      if (!kept) { open(); return; }
-      quiet = true;
-      clearTimeout(later);
-      const { centre, half, held, unit: then } = fromAddress(location.hash);
-      [unit, chosen] = [then, kept.chosen];
-      for (const [name, value] of kept.values) fields[name].value = value;
-      form = fields.form.value;
-      preset.querySelector("select").value = chosen;
-      live.chart.held = held;
-      shape();
-      live.chart.show(centre, half);
-      take();
-      quiet = false;
+      open();
     });
     undo.disabled = true;
     open();

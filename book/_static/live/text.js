@@ -65,40 +65,42 @@ const armlockText = (function () {
     return parts.join(", ");
   }
 
-  const list = numbers => numbers.map(exact).join(", ");
-
   /* ---------------------------------------------------------------------------- in */
 
   const TOKEN = /\s*(?:((?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)|(pi)|([ij](?![a-z]))|(s(?![a-z]))|(\*\*|[-+*/^()\u00b1]))/iy;
 
-  /* Values of an expression are polynomials in s with complex coefficients, the lowest power
-   * first: [[re, im], ...]. Two values where there is a plus-minus. */
+  /* Polynomials in s have complex coefficients, the lowest power first: [[re, im], ...]. */
+  const times = (p, q) => {
+    const product = Array.from({ length: p.length + q.length - 1 }, () => [0, 0]);
+    p.forEach(([a, b], i) => q.forEach(([c, d], k) => {
+      product[i + k][0] += a * c - b * d;
+      product[i + k][1] += a * d + b * c;
+    }));
+    return product;
+  };
+  const plus = (p, q, sign) => Array.from({ length: Math.max(p.length, q.length) }, (_, k) =>
+    [0, 1].map(m => (p[k]?.[m] || 0) + sign * (q[k]?.[m] || 0)));
+
+  /* The value of an expression, as [numerator, denominator]; two values where it has a plus-minus. */
   function parse(text, refuse) {
-    const tokens = [];
+    const tokens = [], one = [[1, 0]];
     for (TOKEN.lastIndex = 0; TOKEN.lastIndex < text.trimEnd().length;) {
       const match = TOKEN.exec(text);
       if (!match) refuse();
       const [, number, pi, unit, s, sign] = match;
-      if (number) tokens.push([[Number(number), 0]]);
-      else if (pi) tokens.push([[Math.PI, 0]]);
-      else if (unit) tokens.push([[0, 1]]);
-      else if (s) tokens.push([[0, 0], [1, 0]]);
+      if (number) tokens.push([[[Number(number), 0]], one]);
+      else if (pi) tokens.push([[[Math.PI, 0]], one]);
+      else if (unit) tokens.push([[[0, 1]], one]);
+      else if (s) tokens.push([[[0, 0], [1, 0]], one]);
       else tokens.push(sign === "**" ? "^" : sign);
     }
     let next = 0, second = null;
-    const times = (p, q) => {
-      const product = Array.from({ length: p.length + q.length - 1 }, () => [0, 0]);
-      p.forEach(([a, b], i) => q.forEach(([c, d], k) => {
-        product[i + k][0] += a * c - b * d;
-        product[i + k][1] += a * d + b * c;
-      }));
-      return product;
-    };
-    const plus = (p, q, sign) => Array.from({ length: Math.max(p.length, q.length) }, (_, k) =>
-      [0, 1].map(m => (p[k]?.[m] || 0) + sign * (q[k]?.[m] || 0)));
+    const multiply = ([a, b], [c, d]) => [times(a, c), times(b, d)];
+    const add = ([a, b], [c, d], sign) => String(b) === String(d) ? [plus(a, c, sign), b]
+      : [plus(times(a, d), times(c, b), sign), times(b, d)];
     const atom = () => {
       const token = tokens[next++];
-      if (token === "-") return times([[-1, 0]], raised());
+      if (token === "-") return multiply([[[-1, 0]], one], raised());
       if (token === "(") {
         const value = sum();
         if (tokens[next++] !== ")") refuse();
@@ -111,12 +113,10 @@ const armlockText = (function () {
       let value = atom();
       if (tokens[next] === "^") {
         next++;
-        const by = atom();
-        const n = by.length === 1 && by[0][1] === 0 ? by[0][0] : NaN;
-        if (!(Number.isInteger(n) && n >= 0 && n < 100)) refuse();
-        const base = value;
-        value = [[1, 0]];
-        for (let k = 0; k < n; k++) value = times(value, base);
+        const [n, left] = constant(atom(), refuse), base = value;
+        if (!(Number.isInteger(n) && left === 0 && n >= 0 && n < 100)) refuse();
+        value = [one, one];
+        for (let k = 0; k < n; k++) value = multiply(value, base);
       }
       return value;
     };
@@ -124,30 +124,30 @@ const armlockText = (function () {
       let value = raised();
       for (;;) {
         const token = tokens[next];
-        if (token === "*") { next++; value = times(value, raised()); }
+        if (token === "*") { next++; value = multiply(value, raised()); }
         else if (token === "/") {
           next++;
-          const by = raised(), [a, b] = by[0], size = a * a + b * b;
-          if (by.length > 1 || !size) refuse();
-          value = times(value, [[a / size, -b / size]]);
-        } else if (Array.isArray(token) || token === "(") value = times(value, raised());
+          const [above, under] = raised();
+          if (above.every(([a, b]) => a === 0 && b === 0)) refuse();
+          value = multiply(value, [under, above]);
+        } else if (Array.isArray(token) || token === "(") value = multiply(value, raised());
         else return value;
       }
     };
     const sum = () => {
       const sign = tokens[next] === "-" ? -1 : 1;
       if (tokens[next] === "+" || tokens[next] === "-") next++;
-      let value = tokens[next] === "\u00b1" ? [[0, 0]] : plus([[0, 0]], product(), sign);
+      let value = tokens[next] === "\u00b1" ? [[[0, 0]], one] : multiply([[[sign, 0]], one], product());
       for (;;) {
         const token = tokens[next];
         if (token === "+" || token === "-") {
           next++;
-          value = plus(value, product(), token === "+" ? 1 : -1);
+          value = add(value, product(), token === "+" ? 1 : -1);
         } else if (token === "\u00b1" && !second) {
           next++;
           const part = product();
-          second = plus(value, part, -1);
-          value = plus(value, part, 1);
+          second = add(value, part, -1);
+          value = add(value, part, 1);
         } else return value;
       }
     };
@@ -157,6 +157,22 @@ const armlockText = (function () {
     return second ? [value, second] : [value];
   }
 
+  /* A value without s as a complex number. */
+  function constant([above, under], refuse) {
+    if (above.length > 1 || under.length > 1) refuse();
+    const [[a, b]] = above, [[c, d]] = under, size = c * c + d * d;
+    return d === 0 ? [a / c, b / c] : [(a * c + b * d) / size, (b * c - a * d) / size];
+  }
+
+  /* The real coefficients of a polynomial, the highest power first. */
+  function real(polynomial, refuse) {
+    if (polynomial.some(([, im]) => im !== 0)) refuse();
+    return polynomial.map(([re]) => re).reverse();
+  }
+
+  const plainSigns = text => text.replace(/[\u2212\u2013\u2014\u2500]/g, "-").replace(/\u03c0/g, "pi")
+    .replace(/\u00b7/g, "*");
+
   /* Bad text, with the name of the field that holds it. */
   function wrong(field, message) {
     return Object.assign(new RangeError(message), { field });
@@ -165,8 +181,7 @@ const armlockText = (function () {
   /* The elements of a list as MATLAB or Python print it: [..], array(..), columns, a common
    * factor in front. A sign with a space on both sides belongs inside of an element. */
   function elements(field, text) {
-    let plain = text.replace(/\u2212/g, "-").replace(/[\u03c0]/g, "pi").replace(/\u00b7/g, "*")
-      .replace(/\+\/-/g, "\u00b1").replace(/(np\.|numpy\.)?array\s*\(\s*\[/g, " ")
+    let plain = plainSigns(text).replace(/\+\/-/g, "\u00b1").replace(/(np\.|numpy\.)?array\s*\(\s*\[/g, " ")
       .replace(/\]\s*(,\s*dtype=\w+\s*)?\)/g, " ");
     const comma = /[-+]?\d+,\d+/.exec(plain);
     if (comma)
@@ -189,10 +204,7 @@ const armlockText = (function () {
       const extra = part.split("(").length - part.split(")").length;
       const balanced = extra > 0 ? part.replace("(", "") : extra < 0 ? part.replace(/\)$/, "") : part;
       const refuse = () => { throw wrong(field, `${name} are numbers ${SUCH}; \u201c${part}\u201d is none.`); };
-      for (const value of parse(balanced, refuse)) {
-        if (value.length > 1) refuse();
-        found.push(value[0].map(v => factor * v));
-      }
+      for (const value of parse(balanced, refuse)) found.push(constant(value, refuse).map(v => factor * v));
     }
     const left = found.filter(([, im]) => im !== 0), paired = found.filter(([, im]) => im === 0);
     while (left.length) {
@@ -208,69 +220,45 @@ const armlockText = (function () {
     return paired;
   }
 
-  /* Real coefficients, the highest power first: a list, or a polynomial in s. */
-  function readPolynomial(field, text, name) {
-    const refuse = () => {
-      throw wrong(field, `${name} is a list of coefficients, the highest power first, or a polynomial `
-        + `such as s^2 + 0.1 s; \u201c${text.trim() || "nothing"}\u201d is none.`);
-    };
-    if (/(?<![a-z])s(?![a-z])/i.test(text)) {
-      const plain = text.replace(/\u2212/g, "-").replace(/\u03c0/g, "pi").replace(/\u00b7/g, "*");
-      const comma = /\d+,\d+/.exec(plain);
-      if (comma) throw wrong(field, `Write decimals with a point, not as in ${comma[0]}.`);
-      const [value, second] = parse(plain, refuse);
-      if (second || value.some(([, im]) => im !== 0)) refuse();
-      return value.map(([re]) => re).reverse();
-    }
-    const [parts, factor] = elements(field, text);
-    if (!parts.length) refuse();
-    return parts.map(part => {
-      const [value, second] = parse(part, refuse);
-      if (second || value.length > 1 || value[0][1] !== 0) refuse();
-      return factor * value[0][0];
-    });
-  }
+  // tf(numerator, denominator, ...), its coefficients as one number or in brackets.
+  const CALL = /\b(?:tf|TransferFunction)\s*\(\s*(?:[\w.]*array\()?(\[[^[\]]*\]|[-+\d.e]+)\)?\s*,\s*(?:[\w.]*array\()?(\[[^[\]]*\]|[-+\d.e]+)(.*)/is;
 
-  /* Numerator and denominator of a fraction as MATLAB and python-control print it, over a line of
-   * dashes, or as (...)/(...) in one line; null where the text is no fraction. */
-  function readFraction(field, text) {
-    const refuse = why => { throw wrong(field, `This printed fraction is not understood: ${why}.`); };
-    const plain = text.replace(/[\u2500\u2013\u2014\u2212]/g, "-").trim();
-    const parts = plain.split(/\n[ \t]*-+[ \t]*(?=\n)|\s*\/?\s*-{3,}\s*\/?\s*/);
-    if (parts.length === 1) {
-      const group = part => {
-        let depth = 0;
-        return part[0] === "(" && [...part].every((c, k) =>
-          (depth += (c === "(") - (c === ")")) > 0 || k === part.length - 1);
-      };
-      for (let k = plain.length - 1, depth = 0; k >= 0; k--) {
-        depth += (plain[k] === ")") - (plain[k] === "(");
-        const [above, under] = [plain.slice(0, k).trim(), plain.slice(k + 1).trim()];
-        if (plain[k] === "/" && depth === 0 && under.includes("s"))
-          return above && (group(under) || /^[\w.^ ]+$/.test(under)) ? [above, under]
-            : refuse("write it as (numerator)/(denominator)");
-      }
-      return null;
-    }
-    if (/\bdt\s*=|sample time|discrete|\bz\b/i.test(plain)) refuse("it is discrete in time");
+  /* Numerator and denominator of a controller, the highest power first. It is written as a fraction over a
+   * line of dashes, as MATLAB and python-control print it, as tf([1 0.02], [1 0.1 0]), or as an expression. */
+  function readController(field, text) {
+    const refuse = why => {
+      throw wrong(field, `This controller is not understood: ${why
+        || "write it such as (s + 0.02)/(s^2 + 0.1 s) or tf([1 0.02], [1 0.1 0])"}.`);
+    };
+    const none = () => refuse();
+    const plain = plainSigns(text).replace(/^\s*\w+\s*=(?=\s*\S)/, ""), comma = /\d+,\d+/.exec(plain);
+    const given = CALL.exec(plain);
+    if (/\bdt\s*=|sample time|discrete|\bz\b/i.test(plain) || /^\)?\s*,\s*\d/.test(given?.[3]))
+      refuse("it is discrete in time");
     if (/exp/i.test(plain)) refuse("write its dead time into the field of the dead time");
-    if (parts.length > 2) refuse("it has more than one line of dashes");
+    if (given) return given.slice(1, 3).map(part => elements(field, part)[0].map(
+      entry => real(parse(entry, none)[0][0], none)[0]));
+    if (comma) throw wrong(field, `Write decimals with a point, not as in ${comma[0]}.`);
     // Without headings and remarks, which have words or signs that no polynomial has.
-    const found = parts.map(part => part.split("\n").filter(line => !/[:=<>'[\]]|[a-z]{3,}/i.test(line))
-      .join(" ").trim());
-    return found.every(part => part) ? found : refuse("it needs a polynomial above and below the line");
+    const parts = plain.split(/\n[ \t]*-+[ \t]*(?=\n)|\s*\/?\s*-{3,}\s*\/?\s*/).map(part => part.split("\n")
+      .filter(line => !/[:=<>'[\]]|[a-z]{3,}/i.test(line)).join(" "));
+    if (parts.length > 2) refuse("it has more than one line of dashes");
+    const values = parts.map(part => parse(part, none));
+    if (values.some(value => value.length > 1)) refuse();
+    const [[above, under], [over, below] = [[[1, 0]], [[1, 0]]]] = values.map(([value]) => value);
+    return [times(above, below), times(under, over)].map(part => real(part, none));
   }
 
   /* One real number; `name` is the field's own. */
   function readNumber(field, text, name) {
-    const plain = text.trim().replace(/\u2212/g, "-").replace(/\u03c0/g, "pi");
+    const plain = plainSigns(text.trim());
     if (/\d,\d/.test(plain)) throw wrong(field, `Write ${name} with a decimal point, not as ${plain}.`);
     const refuse = () => {
       throw wrong(field, `${name} must be a number, got ${plain ? `\u201c${plain}\u201d` : "nothing"}.`);
     };
-    const [value, second] = parse(plain, refuse);
-    if (second || value.length > 1 || value[0][1] !== 0 || !Number.isFinite(value[0][0])) refuse();
-    return value[0][0];
+    const [value, second] = parse(plain, refuse), [re, im] = constant(value, refuse);
+    if (second || im !== 0 || !Number.isFinite(re)) refuse();
+    return re;
   }
 
   /* ---------------------------------------------------------------------------- a whole loop */
@@ -279,14 +267,12 @@ const armlockText = (function () {
   function python(spec, [c1, c2], unit) {
     const times = text => unit === 1 || text === "0" ? text : `${text} * hertz`;
     const one = ([re, im]) => times(im && unit !== 1 ? `(${root([re, im], unit)})` : root([re, im], unit));
-    const roots = all => `[${all.map(one).join(", ")}]`, low = p => `[${list([...p].reverse())}]`;
+    const roots = all => `[${all.map(one).join(", ")}]`;
     const corner = () => times(shortest(spec.corner, unit));
     const sensors = {
       dual: () => ["dual", `dual(corner=${corner()}, difference=${spec.difference})`],
       modified: () => ["modified_dual", `modified_dual(\n        mean_delay=`
         + `${Number((0.5 * (spec.tau1 + spec.tau2)).toPrecision(15))}, half_difference=${spec.difference / 2}, corner=${corner()}\n    )`],
-      own: () => ["SignalMapping", `SignalMapping(\n        ${low(spec.m1)}, ${low(spec.m2)}, `
-        + `${low(spec.below)}\n    )`],
     };
     const [name, sensor] = (sensors[spec.sensor] || (() => Array(2).fill(spec.sensor.toUpperCase())))();
     return [...unit === 1 ? [] : ["from math import pi", ""],
@@ -299,7 +285,7 @@ const armlockText = (function () {
   }
 
   const SHORT = { sensor: "s", tau1: "t1", tau2: "t2", delay: "d", gain: "g", corner: "p",
-    difference: "dt", zeros: "z", poles: "q", m1: "m1", m2: "m2", below: "mb" };
+    difference: "dt", zeros: "z", poles: "q" };
 
   /* The address holds all: loop, view, the held point and the unit of the fields. */
   function address(spec, { centre, half, held }, unit) {
@@ -307,8 +293,7 @@ const armlockText = (function () {
     for (const [name, key] of Object.entries(SHORT)) {
       const value = spec[name];
       if (value === undefined) continue;
-      parts.set(key, name === "zeros" || name === "poles" ? written(value)
-        : Array.isArray(value) ? list(value) : value);
+      parts.set(key, Array.isArray(value) ? written(value) : value);
     }
     parts.set("at", [...centre, half].join(","));
     if (held) parts.set("pt", held.join(","));
@@ -321,8 +306,7 @@ const armlockText = (function () {
     const parts = new URLSearchParams(hash.slice(1)), sensor = parts.get("s");
     if (!hash.includes("=")) return null;
     const needed = ["sensor", "tau1", "tau2", "gain", "zeros", "poles",
-      ...{ dual: ["corner", "difference"], modified: ["corner", "difference"], own: ["m1", "m2", "below"] }[sensor]
-        || []];
+      ...["dual", "modified"].includes(sensor) ? ["corner", "difference"] : []];
     const spec = { delay: 0 };
     for (const [name, key] of Object.entries(SHORT)) {
       const text = parts.get(key);
@@ -330,8 +314,7 @@ const armlockText = (function () {
       if (text === null) continue;
       spec[name] = name === "sensor" ? text
         : name === "zeros" || name === "poles" ? readRoots(name, text, name)
-          : ["m1", "m2", "below"].includes(name) ? readPolynomial(name, text, name)
-            : readNumber(name, text, `\u201c${key}\u201d`);
+          : readNumber(name, text, `\u201c${key}\u201d`);
     }
     const numbers = (key, size) => {
       const found = parts.get(key).split(",").map(text => text.trim() ? Number(text) : NaN);
@@ -344,6 +327,6 @@ const armlockText = (function () {
       held: parts.has("pt") ? numbers("pt", 2) : null };
   }
 
-  return { TURN, say, scientific, power, duration, exact, shortest, written, list, readRoots, readPolynomial,
-    readFraction, readNumber, python, address, fromAddress };
+  return { TURN, say, scientific, power, duration, exact, shortest, written, readRoots, readController, readNumber,
+    python, address, fromAddress };
 })();
