@@ -14,6 +14,7 @@ PAGE = """<html><head><link rel="stylesheet" href="../_static/a.css"></head><bod
 <a href="../figures/a.csv">CSV</a> <a href="https://example.org">out</a>
 <a href="notebooks/00_front.html#nowhere">Fig. 2</a>
 <a href="#document-notebooks/00_front">front</a>
+<div class="live"><a href="live.html#s=dual">open</a></div>
 <figure id="fig"></figure><div class="citation" id="id2">A</div></article></body></html>"""
 FOOT = "<p>Code: MIT License.</p>"
 

@@ -32,7 +32,8 @@ script, details.hide > summary, details details, .toggle-button
     padding: 0 !important; margin: 0 !important; }
 [id^="document-"] + section { break-before: page; }
 summary { list-style: none; }
-figure, .cell_output table tr, pre { break-inside: avoid; }
+figure, .cell_output table tr, .cell_input, pre { break-inside: avoid; }
+dt { break-after: avoid; }
 pre { white-space: pre-wrap !important; overflow-wrap: anywhere; }
 .math, mjx-container, .cell_output, table { overflow: visible !important; }
 table { font-size: 80%; }
@@ -53,7 +54,8 @@ LINKS = """FRONT => {
     if (found) link.setAttribute("href", "#" + found);
     else {
       link.removeAttribute("href");
-      if (name && link.closest("article")) broken.push(href);
+      // What is live is not printed.
+      if (name && link.closest("article") && !link.closest(".live")) broken.push(href);
     }
   }
   return broken;
