@@ -561,13 +561,13 @@ function armlockPages() {
       before = step || before;
       const write = () => {
         history[further ? "pushState" : "replaceState"]({ depth }, "", hash);
-        undo.disabled = !depth;
       };
       clearTimeout(later);
-      if (further) depth++;
+      if (further) undo.disabled = !++depth;
       if (further) write(); else later = setTimeout(write, 200);
     };
-    const undo = button("Undo", () => history.back());
+    // What the fields hold and is no loop is in no address: to undo it takes the loop of the address.
+    const undo = button("Undo", () => { if (live.spec) history.back(); else open(); });
 
     /* An error stands at its field. */
     const blame = (name, message) => {
@@ -614,12 +614,14 @@ function armlockPages() {
         presets.value = Object.keys(PRESETS).find(name => same(spec, PRESETS[name][0])) || "";
         live.set(spec, moving);
         if (!dragged || caught) roots.draw();
+        undo.disabled = !depth;
         if (!moving) live.moved("loop");
       } catch (error) {
         // Too few poles are too many zeros: the field that was edited is the one to look at.
         const name = error.field === "zeros" && edited === "poles" ? edited : fields[error.field] ? error.field : "sensor";
         blame(name, error.message);
         wrong.textContent = error.message;
+        undo.disabled = false;
         live.none("There is no loop to show: a field holds none.");
         code.textContent = "";
         orbit.removeAttribute("href");
@@ -701,7 +703,7 @@ function armlockPages() {
         take("unit");
       }),
       field("corner", "Sensor\u2019s corner"), field("difference", "Sensor\u2019s \u0394\u03c4 in s"),
-      field("pasted", "Paste a controller in s, as MATLAB or python-control print it", true),
+      field("pasted", "Paste a controller, as MATLAB or python-control print it", true),
       field("zeros", "Zeros", true), field("poles", "Poles", true));
     fields.pasted.placeholder = "(s + 0.02)/(s^2 + 0.1 s)";
 
