@@ -34,7 +34,7 @@ LOAD = """() => {
     Object.assign(live, armlockMargins(live), armlockChart(live));
 }"""
 #: What a count in a browser is where it is no number of roots, as `loop.js` has it.
-BOUNDARY, UNCONFINED, UNSURE = -1, -2, -3
+BOUNDARY, UNCONFINED, UNDECIDED = -1, -2, -3
 #: What a number may differ by, relative; `margins.js` has it as NEAR. Next to a limit of the
 #: chain both sides take the limit for roots that cross closer to it.
 NEAR = 1.001e-3
@@ -195,7 +195,7 @@ class Comparison:
         count = self.package("count", closed_loop_count, loop, *point)
         if not isinstance(count, Exception):
             self.asked["count"] += 1
-            if page["count"] == UNSURE or (page["count"] == BOUNDARY != count):
+            if page["count"] == UNDECIDED or (page["count"] == BOUNDARY != count):
                 self.unsure["count"] += 1
             elif count not in (page["count"], BOUNDARY):
                 self.wrong.append(("count", case, page["count"], int(count)))
