@@ -2,13 +2,12 @@
 # Works with GNU make 3.81 (macOS) and newer.
 
 PYTHON ?= python3
-
 VENV := .venv
 PY := $(VENV)/bin/python
-ENVIRONMENT := $(VENV)/.environment-complete
-PACKAGE := $(VENV)/.package-complete
+READY := $(VENV)/.complete
 EXECUTED := build/executed/.complete
 BOOK := build/html/index.html
+NOTEBOOKS := $(wildcard notebooks/*.ipynb)
 
 # What the reader has set up for other projects must not reach this one.
 export PYTHONNOUSERSITE := 1
@@ -18,82 +17,67 @@ export MPLCONFIGDIR := $(CURDIR)/$(VENV)/matplotlib
 export IPYTHONDIR := $(CURDIR)/$(VENV)/ipython
 # The matrices here are small, and several processes share the machine.
 export OPENBLAS_NUM_THREADS := 1
-unexport PYTHONPATH PYTHONHOME VIRTUAL_ENV MPLBACKEND
 # Claims, notebooks and tests find here what one of them has computed.
 export ARMLOCK_SHARED := $(CURDIR)/build/shared
+unexport PYTHONPATH PYTHONHOME VIRTUAL_ENV MPLBACKEND
 
 # Two makes in one folder must not build the same files: the second waits for the first.
 alone = mkdir -p build; $(PYTHON) tools/alone.py build/lock $(MAKE) --no-print-directory
-
 sources = $(shell find $(1) -type f -not -name '*.py[co]' -not -name '*.nb[ic]' -not -path '*/.*')
-NOTEBOOKS := $(wildcard notebooks/*.ipynb)
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help env book pdf print browser same lab test tests claims attack bench dist \
+.PHONY: help env book pdf print browser same lab test tests claims bench dist \
 	lint format lock clean
 
 help: ## List the targets
-	@sed -n 's/^\([a-z]*\):.*## \(.*\)/\1|\2/p' $(firstword $(MAKEFILE_LIST)) \
-		| awk -F'|' '{ printf "  make %-11s%s\n", $$1, $$2 }'
-	@echo "Variable: PYTHON=python3.12 (for env)"
+	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{printf "%-15s%s\n", $$1, $$2}'
 
-## Environment ---------------------------------------------------------------------------
-
-env: ## Make .venv with every package of environment.txt, and this one
-	+@$(alone) $(PACKAGE)
+env: ## Make .venv with every package of environment.txt, and this one (PYTHON=python3.12)
+	+@$(alone) $(READY)
 	@echo "The environment is ready: $(VENV)"
 
 # The programs of an environment hold the path of their folder: a moved one is made anew.
-ifneq ($(shell cat $(ENVIRONMENT) 2>/dev/null),$(CURDIR))
-$(shell rm -f $(ENVIRONMENT) $(PACKAGE))
+ifneq ($(shell cat $(READY) 2>/dev/null),$(CURDIR))
+$(shell rm -f $(READY))
 endif
 
-install = $(PY) -m pip install --quiet --no-deps --no-compile --require-hashes --only-binary :all:
-
 # uv installs in a fifth of pip's time, and does not know pip's settings: where uv fails, pip
-# installs. The lock is complete, so nothing is resolved; `pip check` confirms it.
-$(ENVIRONMENT): environment.txt
+# installs. The lock is complete, so nothing is resolved.
+install = -m pip install --quiet --no-deps --no-compile --require-hashes --only-binary :all: -r
+$(READY): environment.txt book/kernel.json
 	@$(PYTHON) -c 'import sys, ensurepip, venv; sys.exit(sys.version_info < (3, 11))' || { \
 		echo "armlock needs Python 3.11 or newer with venv (Debian: apt-get install" \
 			"python3-venv). To name one: make $(MAKECMDGOALS) PYTHON=/path/to/python3"; exit 1; }
 	@echo "Installing the packages of environment.txt into $(VENV), once: a minute or two ..."
-	@rm -f $(PACKAGE)
 	@$(PYTHON) -m venv --clear $(VENV)
-	@sed -n '/^uv==/,/[^\\]$$/p' environment.txt > $(VENV)/installer.txt
-	@$(install) -r $(VENV)/installer.txt
+	@sed -n '/^uv==/,/[^\\]$$/p' environment.txt > $(VENV)/uv.txt
+	@$(PY) $(install) $(VENV)/uv.txt
 	@$(PY) -m uv pip install --quiet --no-config --python $(PY) --no-deps --require-hashes \
-		--only-binary :all: -r environment.txt 2> $(VENV)/uv.log \
-		|| $(install) -r environment.txt
-	@$(PY) -c 'import matplotlib.font_manager'
-	@echo "$(CURDIR)" > $@
-
-$(PACKAGE): $(ENVIRONMENT) pyproject.toml book/kernel.json
+		--only-binary :all: -r environment.txt 2> $(VENV)/uv.log || $(PY) $(install) environment.txt
 	@$(PY) -m pip install --quiet --no-index --no-deps --no-build-isolation --editable .
-	@$(PY) -m pip check
+	@$(PY) -m pip check && $(PY) -c 'import matplotlib.font_manager'
 	@mkdir -p $(VENV)/etc/ipython
 	@cp book/kernel.json $(VENV)/etc/ipython/ipython_kernel_config.json
-	@touch $@
-
-## Notebooks -----------------------------------------------------------------------------
+	@echo "$(CURDIR)" > $@
 
 # nbmake runs copies of the notebooks for the tests and for the book, the longest first. All
 # claims are checked before: chapters and tests take what was found.
 LONGEST := $(wildcard notebooks/09_* notebooks/13_* notebooks/16_*)
 PYTEST := $(PY) -m pytest --numprocesses auto --maxprocesses 4 --dist worksteal
 execute = export ARMLOCK_FIGURES=$(CURDIR)/$(1); \
-	$(PYTEST) --dist load --maxschedchunk 1 --nbmake --overwrite $(2) && \
+	$(PYTEST) --dist load --maxschedchunk 1 --nbmake --overwrite $(2:notebooks/%=build/executed/%) && \
 	$(PY) tools/collect_figures.py build/executed $(1) build/cache
 execute-all = rm -rf $(1) build/shared build/executed; \
 	echo "Checking every claim of the paper: build/claims.txt ..."; \
 	$(PY) -m book.companion.claims $(1) > build/claims.txt && cp -R notebooks build/executed && \
-	$(call execute,$(1),$(LONGEST:notebooks/%=build/executed/%) build/executed/*.ipynb)
+	$(call execute,$(1),$(LONGEST) $(NOTEBOOKS))
 
 # If notebooks alone have changed, only these run again.
-$(EXECUTED): $(PACKAGE) $(call sources,armlock book/companion notebooks)
+$(EXECUTED): $(READY) $(call sources,armlock book/companion notebooks)
 	@rm -f $@
 	@$(if $(filter-out notebooks/%.ipynb,$?),$(call execute-all,build/figures),\
-		cp $? build/executed && $(call execute,build/figures,$(?:notebooks/%=build/executed/%)))
+		cp $? build/executed && $(call execute,build/figures,$?))
 	@touch $@
 
 same: $(EXECUTED) ## Run all notebooks again: the data of all figures, equal byte for byte
@@ -101,19 +85,14 @@ same: $(EXECUTED) ## Run all notebooks again: the data of all figures, equal byt
 	@touch $(EXECUTED)
 	diff --recursive --brief --exclude='*.json' --exclude='*.svg' build/figures build/figures-again
 
-## Book ----------------------------------------------------------------------------------
-
 book: ## Run all notebooks and build the book, as HTML that needs no network
 	+@$(alone) $(BOOK)
 	@echo "The book is ready. Open it in a browser: file://$(CURDIR)/$(BOOK)"
 
-prepare = rm -rf $(1); mkdir -p $(1)/$(2); cp -R build/figures $(1)/$(2); \
-	cp -R build/cache $(1)/.jupyter_cache
-jupyter-book = $(VENV)/bin/jupyter-book build . --all --config book/_config.yml \
-	--toc book/_toc.yml
+prepare = rm -rf $(1); mkdir -p $(1)/$(2); cp -R build/figures $(1)/$(2); cp -R build/cache $(1)/.jupyter_cache
+jupyter-book = $(VENV)/bin/jupyter-book build . --all --config book/_config.yml --toc book/_toc.yml
 
-# The new book replaces the old one when it is complete. The link keeps the path right that
-# Jupyter Book has printed.
+# The new book replaces the old one when it is complete.
 $(BOOK): $(EXECUTED) $(call sources,book tools) codecheck.yml
 	@$(call prepare,build/_build,html)
 	$(jupyter-book) --path-output build -W -n --keep-going
@@ -121,7 +100,6 @@ $(BOOK): $(EXECUTED) $(call sources,book tools) codecheck.yml
 	$(PY) tools/write_codecheck.py --check build/_build/html
 	@rm -rf build/html
 	@mv build/_build/html build/html
-	@ln -s ../html build/_build/html
 	@touch $@
 
 pdf: ## Print the book with Chromium: build/html/armlock.pdf
@@ -137,10 +115,8 @@ browser: ## Check every page in Chromium, without network; run the code as it sh
 	$(PY) tools/check_browser.py build/html
 	$(PY) tools/check_cells.py build/html
 
-lab: $(PACKAGE) ## Open the notebooks in JupyterLab
+lab: $(READY) ## Open the notebooks in JupyterLab
 	$(VENV)/bin/jupyter-lab --notebook-dir notebooks $(if $(filter 0,$(shell id -u)),--allow-root)
-
-## Tests ---------------------------------------------------------------------------------
 
 test: ## Run all tests, notebooks included
 	+@$(alone) tests
@@ -148,48 +124,40 @@ test: ## Run all tests, notebooks included
 tests: $(EXECUTED)
 	$(PYTEST) tests
 
-claims: $(PACKAGE) ## Check every claim; print the ledger, write it as CSV and JSON
+claims: $(READY) ## Check every claim; print the ledger, write it as CSV and JSON
 	$(PY) -m book.companion.claims build/claims
 
-attack: $(PACKAGE) ## Hold margins, counts and roots of random loops against brute force
-	$(PY) -m tests.attack
-
-bench: $(PACKAGE) ## Measure speed and memory, and print a table
+bench: $(READY) ## Measure speed and memory, and print a table
 	$(PY) -m benchmarks
 
-dist: $(PACKAGE) ## Build the source archive and the wheel into dist/, and check them
+dist: $(READY) ## Build the source archive and the wheel into dist/, and check them
 	rm -rf dist
 	$(PY) -m uv build --quiet --no-build-isolation --python $(PY) --out-dir dist
 	$(PY) -m twine check --strict dist/*.whl dist/*.tar.gz
 
-## Upkeep --------------------------------------------------------------------------------
-
-# All that environment.txt has to hold. `lint` asks whether what was installed from it is within
-# the ranges; where packages come from is for the reader's settings to say, not for that file.
+# All that environment.txt has to hold; `lint` checks that what was installed is in the ranges.
 REQUIRED := pyproject.toml --all-extras --group build --group test --group browser --group lab \
 	--group lint --group dist --group lock
 
-lint: $(PACKAGE) ## Check style, types, stripped notebooks, and what is written by tools
+lint: $(READY) ## Check style, types, stripped notebooks, and what is written by tools
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
 	$(PY) -m mypy
 	$(PY) -m nbstripout --verify --keep-id $(NOTEBOOKS)
-	$(PY) -m uv pip install --dry-run --quiet --no-index --no-deps --no-build \
-		--python $(PY) -r $(REQUIRED)
-	! grep -n '://' environment.txt
+	$(PY) -m uv pip install --dry-run --quiet --no-index --no-deps --no-build --python $(PY) -r $(REQUIRED)
 	$(PY) tools/write_codecheck.py --check
 
-format: $(PACKAGE) ## Format the code, strip the notebooks, list their figures
+format: $(READY) ## Format the code, strip the notebooks, list their figures
 	$(PY) -m ruff check --fix .
 	$(PY) -m ruff format .
 	$(PY) -m nbstripout --keep-id $(NOTEBOOKS)
 	$(PY) tools/write_codecheck.py
 
-lock: $(ENVIRONMENT) ## Write environment.txt from pyproject.toml (UPGRADE=1: newest versions)
-	$(PY) -m uv pip compile $(REQUIRED) \
-		--universal --python-version 3.11 --fork-strategy fewest --only-binary :all: \
-		--generate-hashes --no-emit-index-url --no-emit-find-links --quiet \
-		--custom-compile-command "make lock" $(if $(UPGRADE),--upgrade) -o environment.txt
+lock: $(READY) ## Write environment.txt from pyproject.toml (UPGRADE=1: newest versions)
+	$(PY) -m uv pip compile $(REQUIRED) --universal --python-version 3.11 \
+		--fork-strategy fewest --only-binary :all: --generate-hashes --no-emit-index-url \
+		--no-emit-find-links --quiet --custom-compile-command "make lock" \
+		$(if $(UPGRADE),--upgrade) -o environment.txt
 
 clean: ## Remove what was built
 	rm -rf build dist .pytest_cache .ruff_cache .mypy_cache .hypothesis

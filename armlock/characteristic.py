@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -38,11 +38,22 @@ from armlock.checks import (
     real_number,
     whole_steps,
 )
+from armlock.engine import polynomials
+from armlock.engine.functions import Function, Space
 
 # Past this an exponential is no float.
 _LARGEST_EXPONENT = 700.0
 # The free parameters of a loop, the perturbations of its arms: one where there is none.
 _PERTURBATIONS = ("c1", "c2")
+
+
+class Terms(NamedTuple):
+    """R, and the terms of D = constant - x first - y second."""
+
+    rest: Function
+    constant: Function
+    first: Function
+    second: Function
 
 
 @dataclass(frozen=True)
@@ -205,6 +216,64 @@ class CharacteristicFunction:
             self.rest, self.b1, self.b2, self.tau1, self.tau2, delay=self.delay,
             step=self.step, parameters=self.parameters, reference=self.reference,
         )  # fmt: skip
+
+    def basis(self) -> tuple[list[polynomials.Polynomial], list[list[Fraction]]]:
+        """Return polynomials, and their shares in R, B1 and B2, shape (3, polynomials)."""
+        given = [p.coefficients for p in self.polynomials()]
+        made = [polynomials.Polynomial.of(p) for p in given if p.any()]
+        places = np.cumsum([bool(p.any()) for p in given]) - 1
+        shares = [
+            [Fraction(int(p.any() and k == place)) for k in range(len(made))]
+            for p, place in zip(given, places, strict=True)
+        ]
+        return made, shares
+
+    @cached_property
+    def terms(self) -> Terms:
+        """R and the terms of D, exactly, as functions of the engine."""
+        made, shares = self.basis()
+        lags = [Fraction(lag) for lag in (0.0, self.delay, self.tau1, self.tau2)]
+        powers = [[(Fraction(1), Fraction(0))]] * 3
+        if self.step:
+            # Over z^n each power of z is a delay of its own, and the only polynomial is one.
+            step = Fraction(self.step)
+            lags = [round(lag / step) * step for lag in lags]
+            made, shares = [polynomials.Polynomial(Fraction(1), ())], [[Fraction(1)]] * 3
+            powers = [
+                [(Fraction(c), (self.degree - k) * step) for k, c in enumerate(p.coefficients)]
+                for p in self.polynomials()
+            ]
+        zero, dead, tau1, tau2 = lags
+        if self.neutral and tau1 == tau2:
+            # Equal arms are two delays for the neutral root chain, which is to stay where it is
+            # for all small changes of either.
+            tau2 += tau2 / 2**300
+        delays = {
+            lag + power
+            for lag in (zero, dead, dead + tau1, dead + tau2)
+            for part in powers
+            for _, power in part
+        }
+        space = Space(made, delays, self.step)
+
+        def delayed(k: int, lag: Fraction) -> Function:
+            steady = np.zeros(len(made), object)
+            turned = np.zeros((len(made), len(space.delays)), object)
+            for j, share in enumerate(shares[k]):
+                for weight, power in powers[k]:
+                    steady[j] += share * weight
+                    if lag + power:
+                        turned[j, space.place(lag + power)] += share * weight
+            return Function(space, steady, turned)
+
+        (x0, y0), rest = self.reference, delayed(0, zero)
+        constant = rest + delayed(1, dead) * x0 + delayed(2, dead) * y0
+        return Terms(rest, constant, delayed(1, dead + tau1), delayed(2, dead + tau2))
+
+    def function(self, x: float | Fraction, y: float | Fraction) -> Function:
+        """Return D at one point as a function of the engine, exactly."""
+        _, constant, first, second = self.terms
+        return constant + first * -Fraction(x) + second * -Fraction(y)
 
     @cached_property
     def c(self) -> FloatArray:

@@ -115,21 +115,7 @@ class Controller:
             return cls(*controller)
         import control
 
-        if not isinstance(controller, control.TransferFunction | control.StateSpace):
-            raise TypeError(
-                "controller must be a Controller, a transfer function or state space of "
-                f"python-control or a triple (zeros, poles, gain), got {controller!r:.200}"
-            )
-        if not controller.issiso():
-            raise ValueError(
-                "controller must have one input and one output, got "
-                f"{controller.ninputs} and {controller.noutputs}"
-            )
-        if controller.isdtime(strict=True):
-            raise ValueError(
-                f"controller must be continuous in time, got sampling time "
-                f"{controller.dt}: give the one that was sampled"
-            )
+        check_system("controller", controller, "a Controller, a triple (zeros, poles, gain)")
         if isinstance(controller, control.StateSpace):
             zeros, poles, gain = _factored(controller)
             return cls(zeros.tolist(), poles.tolist(), gain)
@@ -181,6 +167,27 @@ class Controller:
                 zeros = mpmath.polyroots(coefficients, maxsteps=500, extraprec=400, asc=True)
             poles = self.poles + only_yours
             return Controller([complex(z) for z in zeros], poles, float(coefficients[-1]))
+
+
+def check_system(name: str, system: Any, others: str) -> None:
+    """Raise if this is no system of python-control in continuous time, with one channel."""
+    import control
+
+    if not isinstance(system, control.TransferFunction | control.StateSpace):
+        raise TypeError(
+            f"{name} must be {others}, or a transfer function or state space of "
+            f"python-control, got {system!r:.200}"
+        )
+    if not system.issiso():
+        raise ValueError(
+            f"{name} must have one input and one output, got {system.ninputs} and "
+            f"{system.noutputs}"
+        )
+    if system.isdtime(strict=True):
+        raise ValueError(
+            f"{name} must be continuous in time, got sampling time {system.dt}: give the one "
+            "that was sampled"
+        )
 
 
 def _factored(system: control.StateSpace) -> tuple[ComplexArray, ComplexArray, float]:

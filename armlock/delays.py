@@ -8,19 +8,18 @@ sums to the engine, which counts zeros and certifies margins.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from itertools import zip_longest
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
+from numpy.polynomial import polynomial as poly
 
-from armlock.checks import ComplexArray, complex_array, real_array, real_number
-from armlock.controllers import Controller
-from armlock.engine.decide import count
+from armlock.checks import ComplexArray, WithDelays, complex_array, real_array, real_number
+from armlock.controllers import Controller, check_system
 from armlock.engine.functions import Function, Space
 from armlock.engine.polynomials import Polynomial
 
@@ -28,32 +27,6 @@ if TYPE_CHECKING:
     import control
 
 _Coefficients = tuple[Fraction, ...]
-
-
-def _sum(p: Sequence[Fraction], q: Sequence[Fraction]) -> list[Fraction]:
-    """Add two polynomials in ascending powers."""
-    return [a + b for a, b in zip_longest(p, q, fillvalue=Fraction(0))]
-
-
-def _product(p: Sequence[Fraction], q: Sequence[Fraction]) -> list[Fraction]:
-    """Multiply two polynomials in ascending powers."""
-    found = [Fraction(0)] * (len(p) + len(q) - 1)
-    for i, a in enumerate(p):
-        for k, b in enumerate(q):
-            found[i + k] += a * b
-    return found
-
-
-def _of_roots(roots: Sequence[complex], gain: float) -> list[Fraction]:
-    """Multiply the factors of roots that come in conjugate pairs."""
-    found = [Fraction(gain)]
-    for root in roots:
-        a, b = Fraction(root.real), Fraction(root.imag)
-        if b == 0:
-            found = _product(found, [-a, Fraction(1)])
-        elif b > 0:
-            found = _product(found, [a * a + b * b, -2 * a, Fraction(1)])
-    return found
 
 
 @dataclass(frozen=True)
@@ -69,18 +42,12 @@ class QuasiPolynomial:
     terms: tuple[tuple[Fraction, _Coefficients], ...]
 
     @classmethod
-    def of(cls, terms: Iterable[tuple[Fraction, Sequence[Fraction]]]) -> QuasiPolynomial:
+    def of(cls, terms: Iterable[tuple[Fraction, Any]]) -> QuasiPolynomial:
         """Return the sum of terms, of which several may have one delay."""
-        found: dict[Fraction, list[Fraction]] = {}
+        found: dict[Fraction, Any] = {}
         for theta, coefficients in terms:
-            found[theta] = _sum(found.get(theta, []), coefficients)
-        kept = []
-        for theta, total in sorted(found.items()):
-            while total and not total[-1]:
-                total.pop()
-            if total:
-                kept.append((theta, tuple(total)))
-        return cls(tuple(kept))
+            found[theta] = poly.polyadd(found.get(theta, [Fraction(0)]), coefficients)
+        return cls(tuple((theta, tuple(p)) for theta, p in sorted(found.items()) if p.any()))
 
     def __add__(self, other: QuasiPolynomial) -> QuasiPolynomial:
         """Return the sum."""
@@ -93,7 +60,7 @@ class QuasiPolynomial:
     def __mul__(self, other: QuasiPolynomial) -> QuasiPolynomial:
         """Return the product."""
         return QuasiPolynomial.of(
-            (t + u, _product(p, q)) for t, p in self.terms for u, q in other.terms
+            (t + u, poly.polymul(p, q)) for t, p in self.terms for u, q in other.terms
         )
 
     def __str__(self) -> str:
@@ -122,20 +89,24 @@ class QuasiPolynomial:
         """Evaluate at s."""
         found = np.zeros_like(s)
         for theta, coefficients in self.parts:
-            value = np.polynomial.polynomial.polyval(s, [float(c) for c in coefficients])
+            value = poly.polyval(s, [float(c) for c in coefficients])
             found += value * np.expm1(-s * float(theta)) if theta else value
         return found
 
     def shifted(self, sigma: float) -> QuasiPolynomial:
         """Return the function of s + sigma; its exponentials are rounded."""
-        terms = []
-        for theta, coefficients in self.terms:
-            moved: list[Fraction] = []
-            for value in reversed(coefficients):
-                moved = _sum(_product(moved, [Fraction(sigma), Fraction(1)]), [value])
-            factor = Fraction(float(np.exp(-sigma * float(theta))))
-            terms.append((theta, [factor * value for value in moved]))
-        return QuasiPolynomial.of(terms)
+        return QuasiPolynomial.of(
+            (theta, Fraction(float(np.exp(-sigma * float(theta)))) * moved(p, sigma))
+            for theta, p in self.terms
+        )
+
+
+def moved(coefficients: _Coefficients, sigma: float) -> Any:
+    """Return the coefficients of p(s + sigma), exactly."""
+    found = np.array([Fraction(0)])
+    for value in reversed(coefficients):
+        found = poly.polyadd(poly.polymul(found, [Fraction(sigma), Fraction(1)]), [value])
+    return found
 
 
 def functions(*sums: QuasiPolynomial) -> list[Function]:
@@ -167,7 +138,7 @@ _ONE = QuasiPolynomial(((Fraction(0), (Fraction(1),)),))
 
 
 @dataclass(frozen=True)
-class DelaySystem:
+class DelaySystem(WithDelays):
     r"""A system with one input, one output and any number of delays.
 
     .. math::
@@ -214,6 +185,15 @@ class DelaySystem:
 
     # numpy leaves arithmetic with such an object to it.
     __array_ufunc__ = None
+    _instead: ClassVar[str] = (
+        "for plots write system.frequency_response(omega), for a closed loop "
+        "DelaySystem.of(plant).feedback(back), for a quotient DelaySystem.of(plant) / system, "
+        "for responses armlock.step_response(system, timepts), for margins "
+        "armlock.margins(loop), for poles armlock.rightmost_root(loop)"
+    )
+    _taken_by: ClassVar[tuple[str, ...]] = (
+        "__add__", "__sub__", "__mul__", "frequency_response", "_determine_omega_vector",
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         """Divide out a common delay and a common power of s, exactly."""
@@ -254,34 +234,21 @@ class DelaySystem:
             value = system if isinstance(system, Fraction) else real_number("system", system)
             return cls(QuasiPolynomial.of([(zero, [Fraction(value)])]), _ONE)
         if isinstance(system, Controller):
-            n, m = _of_roots(system.zeros, system.gain), _of_roots(system.poles, 1.0)
-            return cls(QuasiPolynomial.of([(zero, n)]), QuasiPolynomial.of([(zero, m)]))
+            n = Polynomial.of_roots(system.zeros, system.gain)
+            m = Polynomial.of_roots(system.poles)
+            return cls(QuasiPolynomial(((zero, n.exact),)), QuasiPolynomial(((zero, m.exact),)))
         import control
 
-        if not isinstance(system, control.TransferFunction | control.StateSpace):
-            raise TypeError(
-                "system must be a DelaySystem, a number, a Controller, or a transfer function "
-                f"or state space of python-control, got {system!r:.200}"
-            )
-        if not system.issiso():
-            raise ValueError(
-                "system must have one input and one output, got "
-                f"{system.ninputs} and {system.noutputs}"
-            )
-        if system.isdtime(strict=True):
-            raise ValueError(
-                f"system must be continuous in time, got sampling time {system.dt}: "
-                "give the one that was sampled"
-            )
+        check_system("system", system, "a DelaySystem, a number, a Controller")
         if isinstance(system, control.StateSpace):
             # A controller is not zero, a system may be.
             zero_everywhere = not (system.B.any() or system.D.any())
             return cls.of(0.0 if zero_everywhere else Controller.of(system))
-        n, m = (
+        above, below = (
             [Fraction(c) for c in real_array("system", p[0][0])[::-1].tolist()]
             for p in (system.num, system.den)
         )
-        return cls(QuasiPolynomial.of([(zero, n)]), QuasiPolynomial.of([(zero, m)]))
+        return cls(QuasiPolynomial.of([(zero, above)]), QuasiPolynomial.of([(zero, below)]))
 
     def __str__(self) -> str:
         """Return numerator and denominator as one writes them."""
@@ -307,7 +274,7 @@ class DelaySystem:
 
     def __rsub__(self, other: Any) -> DelaySystem:
         """Return the difference."""
-        return DelaySystem.of(other) + -self
+        return DelaySystem.of(other) - self
 
     def __mul__(self, other: Any) -> DelaySystem:
         """Return the two in series; common factors stay."""
@@ -327,10 +294,7 @@ class DelaySystem:
 
     def __rtruediv__(self, other: Any) -> DelaySystem:
         """Return the quotient."""
-        first = DelaySystem.of(other)
-        return DelaySystem(
-            first.numerator * self.denominator, first.denominator * self.numerator
-        )
+        return DelaySystem.of(other) / self
 
     def feedback(self, other: Any = 1, sign: float = -1) -> DelaySystem:
         """Return the closed loop, with negative feedback by default.
@@ -354,15 +318,6 @@ class DelaySystem:
             value: ComplexArray = self.numerator(s) / self.denominator(s)
         return value
 
-    def __getattr__(self, name: str) -> Any:
-        """Say what python-control's functions take instead, which ask for other attributes."""
-        raise AttributeError(
-            f"a DelaySystem has no attribute {name!r}; for python-control's plots write "
-            "system.frequency_response(omega), for its feedback system.feedback(), for its "
-            "step_response armlock.step_response(system, timepts), for margins "
-            "armlock.margins(system)"
-        )
-
     @cached_property
     def functions(self) -> tuple[Function, Function]:
         """N and M as functions of the engine, of one space."""
@@ -373,21 +328,6 @@ class DelaySystem:
     def common(self) -> int:
         """Order of the zero at s = 0 that N and M have in common."""
         return min(lead.order for f in self.functions if (lead := f.leading()))
-
-    def unstable_poles(self) -> int:
-        """Count the poles of the system itself with positive real part, P of Nyquist's rule.
-
-        `armlock.unstable_roots` counts those of the closed loop.
-
-        Returns
-        -------
-        int
-            Poles at s = 0 are left out. -1 with others on the imaginary axis, -2 with a chain
-            of poles that is not confined to the left.
-        """
-        (denominator,) = functions(self.denominator)
-        lead = denominator.leading()
-        return count(denominator, lead.order if lead else 0)
 
     def isdtime(self, strict: bool = False) -> bool:
         """Whether time is discrete: it is not. So python-control's plots take the system."""

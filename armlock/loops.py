@@ -17,7 +17,8 @@ from fractions import Fraction
 from functools import cached_property
 from itertools import zip_longest
 from math import factorial, lcm
-from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
+from numbers import Real
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import mpmath
 import numpy as np
@@ -31,6 +32,7 @@ from armlock.characteristic import CharacteristicFunction
 from armlock.checks import (
     ComplexArray,
     FloatArray,
+    WithDelays,
     axis,
     complex_array,
     one_of,
@@ -40,6 +42,9 @@ from armlock.checks import (
     true_or_false,
 )
 from armlock.controllers import Controller, integrating_actuator, table_two, white_paper
+from armlock.engine import polynomials
+from armlock.engine.functions import Function, Space
+from armlock.engine.margins import Free
 from armlock.sensors import COMMON, SINGLE, SignalMapping, modified_dual
 
 if TYPE_CHECKING:
@@ -47,13 +52,6 @@ if TYPE_CHECKING:
 
 # Where the terms of L cancel by more than this, in L or in 1 + L, rounding takes too much.
 _MOST_CANCELLED = 1e6
-
-
-# What python-control is told that wants a system without delays.
-_USE_FRD = (
-    "python-control's systems have no delays: take loop.frd(omega), the exact response at "
-    "chosen frequencies, or the controller alone, loop.controller"
-)
 
 
 @dataclass(frozen=True, init=False)
@@ -101,7 +99,7 @@ class HayesEquation(CharacteristicFunction):
 
 
 @dataclass(frozen=True, init=False)
-class Loop(CharacteristicFunction):
+class Loop(WithDelays, CharacteristicFunction):
     r"""An arm-locking loop, with free parameters (c1, c2).
 
     Of a controller K and a signal mapping with weights m1 and m2, its open loop and its
@@ -171,17 +169,21 @@ class Loop(CharacteristicFunction):
     controller: Controller
     mapping: SignalMapping
 
+    _instead: ClassVar[str] = (
+        "for plots write loop.frd(omega), the exact response at some frequencies, for margins "
+        "armlock.margins(loop), and for the controller alone loop.controller"
+    )
+
     def __init__(
         self,
         controller: Any,
         mapping: SignalMapping | str,
-        tau1: float,
+        tau1: float | None = None,
         tau2: float | None = None,
         delay: float = 0.0,
     ) -> None:
-        tau1 = positive_number("tau1", tau1)
-        delay = real_number("delay", delay)
-        k, m, tau2 = Controller.of(controller), *_mapping_and_tau2(mapping, tau1, tau2)
+        k, delay = Controller.of(controller), real_number("delay", delay)
+        m, tau1, tau2 = _mapping_and_delays(mapping, tau1, tau2)
         rest = np.convolve(k.denominator, m.denominator)
         arms = [np.convolve(k.numerator, p) for p in (m.numerator1, m.numerator2)]
         for name, b in zip(("m1", "m2"), arms, strict=True):
@@ -233,6 +235,58 @@ class Loop(CharacteristicFunction):
                 polynomials.append(_factored(product, k.zeros, both))
                 shares.append((0.0, 0.5, 0.5 * sign))
         return tuple(polynomials), np.array(shares).T.copy()
+
+    def basis(self) -> tuple[list[polynomials.Polynomial], list[list[Fraction]]]:
+        """Return R, B1 + B2 and B1 - B2, and the shares of them in R, B1 and B2.
+
+        Where the arms cancel, as in a difference or in the integral of the dual sensor, they do
+        so in these polynomials, and not in what a walk evaluates.
+        """
+        of, of_roots = polynomials.Polynomial.of, polynomials.Polynomial.of_roots
+        k, m = self.controller, self.mapping
+        arms = [[Fraction(value) for value in p] for p in (m.numerator1, m.numerator2)]
+        rest = of_roots(k.poles) * of(m.denominator)
+        if all(map(any, arms)):
+            pairs = list(zip_longest(*arms, fillvalue=Fraction(0)))
+            half = Fraction(1, 2)
+            parts = [[a + b for a, b in pairs], [a - b for a, b in pairs]]
+            shares = [[Fraction(0), Fraction(0)], [half, half], [half, -half]]
+        else:
+            parts = arms
+            shares = [[Fraction(int(i == k)) for k in (1, 2)] for i in range(3)]
+        kept = [k for k, p in enumerate(parts) if any(p)]
+        made = [rest, *(of_roots(k.zeros, k.gain) * of(parts[i]) for i in kept)]
+        common = min(p.order for p in made)
+        return [p.over_powers(common) for p in made], [
+            [Fraction(int(i == 0)), *(shares[i][j] for j in kept)] for i in range(3)
+        ]
+
+    def quotient(
+        self, c1: float | Fraction = 1.0, c2: float | Fraction = 1.0
+    ) -> tuple[Function, Function]:
+        """Return N and M of L = N / M at one point as functions of the engine, exactly."""
+        below = self.terms.rest
+        return self.function(c1, c2) + below * -1, below
+
+    def with_free_phases(self, c1: float, c2: float, above: float) -> Free:
+        """Return L with free phases of both arms above a frequency in rad/s, for the engine."""
+        made, shares = self.basis()
+        space = Space(made, [Fraction(self.delay)])
+
+        def function(weights: list[Fraction], late: bool = False) -> Function:
+            steady = np.array(weights, object)
+            turned = np.repeat(steady[:, None] * int(late), len(space.delays), axis=1)
+            return Function(space, steady, turned)
+
+        rest, b1, b2 = shares
+        both = [a + b for a, b in zip(b1, b2, strict=True)]
+        arms = (function(b1) * c1, function(b2) * c2)
+        return Free(
+            function(both, late=True),
+            function(rest),
+            tuple(a for a in arms if not a.is_zero),
+            above,
+        )
 
     def arm_responses(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """Evaluate K m1 exp(-s delay) and K m2 exp(-s delay), factor by factor.
@@ -326,30 +380,19 @@ class Loop(CharacteristicFunction):
         # Its plots need a name.
         return control.frd(response, omega, sysname=type(self).__name__)
 
-    def feedback(self, *_: object, **__: object) -> NoReturn:
-        """Refuse what `control.feedback` asks for: the closed loop has delays too."""
-        raise ValueError(_USE_FRD)
 
-    # `control.ss` takes what has a call for a nonlinear system. It asks with `hasattr`, which
-    # ends up here; a call itself does not.
-    if not TYPE_CHECKING:
-
-        def __getattribute__(self, name: str) -> Any:
-            """Return an attribute, or say what to give to python-control."""
-            if name == "__call__":
-                raise TypeError(_USE_FRD)
-            return super().__getattribute__(name)
-
-
-def _mapping_and_tau2(
-    mapping: SignalMapping | str, tau1: float, tau2: float | None
-) -> tuple[SignalMapping, float]:
-    """Return the signal mapping as an object, and tau2: tau1 where there is no arm 2."""
+def _mapping_and_delays(
+    mapping: SignalMapping | str, tau1: float | None, tau2: float | None
+) -> tuple[SignalMapping, float, float]:
+    """Return the signal mapping as an object, and both delays: tau1 where there is no arm 2."""
     if not isinstance(mapping, SignalMapping | str):
         raise TypeError(
-            f"mapping must be a SignalMapping, for instance armlock.sensors.COMMON, or a name "
-            f"such as 'common', got {mapping!r}"
+            "mapping must be a SignalMapping or a name, as in Loop(controller, 'single', tau1) "
+            f"or Loop(controller, 'common', tau1, tau2), got {mapping!r}"
         )
+    if tau1 is None:
+        raise TypeError("tau1 must be given, the round-trip delay of arm 1 in s")
+    tau1 = positive_number("tau1", tau1)
     if isinstance(mapping, str):
         one_of("mapping", mapping, sensors.NAMES)
     if mapping == "single" or (
@@ -360,19 +403,20 @@ def _mapping_and_tau2(
         raise TypeError(f"tau2 must be given: the signal mapping {mapping!r} has two arms")
     tau2 = positive_number("tau2", tau2)
     if isinstance(mapping, str):
-        return sensors.named(mapping, tau1, tau2), tau2
+        return sensors.named(mapping, tau1, tau2), tau1, tau2
     if not any(mapping.numerator1) and not any(mapping.numerator2):
         raise ValueError("mapping must not be zero: there would be no loop")
-    return mapping, tau2
+    return mapping, tau1, tau2
 
 
-def _gain(gain: float, sensor: str) -> float:
+def _gain(gain: object, sensor: str) -> float:
     """Return a positive gain, or say what to write with a controller in its place."""
-    try:
+    if isinstance(gain, Real):
         return positive_number("gain", gain)
-    except TypeError as error:
-        advice = f'with a controller of your own write Loop(controller, "{sensor}", ...)'
-        raise TypeError(f"{error}; {advice}") from None
+    raise TypeError(
+        f"gain must be a real number, got {gain!r:.200}; with a controller of your own write "
+        f'Loop(controller, "{sensor}", ...)'
+    )
 
 
 def _factored(
@@ -526,8 +570,8 @@ class SingleArm(Loop):
 
     .. math::
 
-        L(s) &= \frac{g}{s} \left( 1 - c_1 e^{-s\tau} \right) , \\
-        D(s) &= s + g - g\, c_1 e^{-s\tau} .
+        L(s) &= \frac{g}{s} \left( 1 - c_1 e^{-s\tau_1} \right) , \\
+        D(s) &= s + g - g\, c_1 e^{-s\tau_1} .
 
     The free parameter c1 is the paper's k2 and the gain its k1; c2 has no effect.
 
@@ -535,7 +579,7 @@ class SingleArm(Loop):
     ----------
     gain : float, optional
         Loop gain g in rad/s, 1 by default.
-    tau : float, optional
+    tau1 : float, optional
         Round-trip delay in s.
     delay : float, optional
         Dead time in s, see `Loop`.
@@ -543,31 +587,29 @@ class SingleArm(Loop):
     Raises
     ------
     TypeError, ValueError
-        If gain or tau is not a positive finite number, or as `Loop` does.
+        If gain or tau1 is not a positive finite number, or as `Loop` does.
 
     Examples
     --------
     >>> from armlock import SingleArm, unstable_roots
-    >>> unstable_roots(SingleArm(gain=1.0, tau=20.1), [0.99, 1.0, 1.01], 0.0)
+    >>> unstable_roots(SingleArm(gain=1.0, tau1=20.1), [0.99, 1.0, 1.01], 0.0)
     array([0, 0, 1])
     """
 
     controller: Controller = field(init=False, repr=False, compare=False)
     mapping: SignalMapping = field(init=False, repr=False, compare=False)
-    tau1: float = field(init=False, repr=False, compare=False)
     tau2: float = field(init=False, repr=False, compare=False)
     gain: float
-    tau: float
 
     def __init__(
         self,
         gain: float = paper.COMMON_ARM_GAIN,
-        tau: float = paper.TAU1,
+        tau1: float = paper.TAU1,
         delay: float = 0.0,
     ) -> None:
-        gain, tau = _gain(gain, "single"), positive_number("tau", tau)
-        super().__init__(integrating_actuator(gain), sensors.SINGLE, tau, delay=delay)
-        vars(self).update(gain=gain, tau=tau)
+        gain = _gain(gain, "single")
+        super().__init__(integrating_actuator(gain), sensors.SINGLE, tau1, delay=delay)
+        vars(self).update(gain=gain)
 
 
 @dataclass(frozen=True, init=False)

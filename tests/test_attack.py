@@ -1,4 +1,4 @@
-"""A few of the random loops of `tests.attack`; `make attack` takes ten thousand."""
+"""A few of the random loops of `tests.attack`; `python -m tests.attack` takes ten thousand."""
 
 import numpy as np
 import pytest

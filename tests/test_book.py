@@ -123,6 +123,8 @@ def test_a_book_has_its_data_numbers_and_links_and_needs_no_network(tmp_path):
     for name in ("small.csv", "small.svg"):
         assert (pages / "figures" / name).is_file()
         assert f'href="../figures/{name}" download' in page
+    assert 'href="#cell-1"' in page  # a figure names the cell that made it
+    assert 'id="cell-1"' in page
     assert 'alt="A curve of 200 points."' in page
     assert "Reading time: 1 min" in page
     assert r"\(2.0 \times 10^{2}\)" in page

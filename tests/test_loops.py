@@ -1,3 +1,6 @@
+import copy
+import pickle
+
 import control
 import mpmath
 import numpy as np
@@ -74,6 +77,7 @@ def test_a_loop_of_ones_own_as_one_guesses_it():
     """Sensors by name, and no tau2 without an arm 2."""
     pairs = [
         (Loop(K, "single", 20.0, delay=20e-6), Loop(K, SINGLE, 20.0, 20.0, 20e-6)),
+        (SingleArm(tau1=20.0).replace(tau1=19.0), Loop(((), (0.0,), 1.0), SINGLE, 19.0)),
         (Loop(K, "common", 20.1, 19.9), Loop(K, COMMON, 20.1, 19.9)),
         (Loop(K, "dual", 20.1, 19.9), Loop(K, dual(DUAL_SENSOR_CORNER, 0.2), 20.1, 19.9)),
         (Loop(K, "single", tau1=20.0), Loop(K, SINGLE, 20.0, 19.0)),
@@ -86,36 +90,62 @@ def test_a_loop_of_ones_own_as_one_guesses_it():
             np.testing.assert_allclose(p.coefficients, q.coefficients, rtol=1e-12)
 
 
-@pytest.mark.parametrize("convert", [control.ss, control.feedback])
-def test_a_system_without_delays_cannot_be_made_of_a_loop(convert):
-    """`control.ss` would take what can be called for a nonlinear system."""
-    with pytest.raises((TypeError, ValueError), match=r"take loop\.frd\(omega\)"):
-        convert(CommonArm())
+PLANT = control.tf([1.0], [1.0, 1.0])
 
 
 @pytest.mark.parametrize(
-    "convert",
+    "guess",
     [
+        control.ss,
         control.tf,
-        control.margin,
+        control.frd,
+        control.feedback,
         control.bode_plot,
+        control.nyquist_plot,
         control.step_response,
-        lambda loop: control.feedback(control.tf([1.0], [1.0, 1.0]), loop),
-        lambda loop: control.series(control.tf([1.0], [1.0, 1.0]), loop),
+        control.poles,
+        lambda loop: control.feedback(PLANT, loop),
+        lambda loop: control.series(PLANT, loop),
+        lambda loop: control.parallel(loop, PLANT),
+        lambda loop: control.frequency_response(loop, [0.1, 1.0]),
+        lambda loop: loop * PLANT,
+        lambda loop: PLANT * loop,
+        lambda loop: loop.feedback(),
     ],
 )
-def test_other_functions_of_python_control_refuse_a_loop(convert):
-    with pytest.raises((TypeError, AttributeError, ValueError)):
-        convert(CommonArm())
+def test_python_control_says_what_to_write_for_a_loop(guess):
+    for loop in (CommonArm(), Loop(K, "single", 20.0)):
+        with pytest.raises((TypeError, AttributeError), match=r"write loop\.frd\(omega\)"):
+            guess(loop)
+
+
+def test_python_control_reports_another_error_for_margins_of_a_loop(capsys):
+    """It catches what it is told, prints this, and raises its own error from it."""
+    with pytest.raises(ValueError, match="Margin sysdata") as error:
+        control.margin(CommonArm())
+    assert "armlock.margins(loop)" in str(error.value.__context__)
+    assert "armlock.margins(loop)" in capsys.readouterr().out
+
+
+def test_advice_does_not_change_what_a_loop_is():
+    loop = CommonArm()
+    assert loop.__class__ is CommonArm
+    assert not hasattr(loop, "gains")
+    assert copy.copy(loop) == pickle.loads(pickle.dumps(loop)) == loop
 
 
 @pytest.mark.parametrize("arm", [SingleArm, CommonArm, DualArm])
-def test_a_controller_in_place_of_a_gain_is_told_what_to_write(arm):
-    with pytest.raises(TypeError, match=r"^gain must .* write Loop\(controller, "):
-        arm(Controller([], [0.0], 1.0))
+@pytest.mark.parametrize("controller", [Controller(*K), K, PLANT])
+def test_a_controller_in_place_of_a_gain_is_told_what_to_write(arm, controller):
+    with pytest.raises(TypeError, match=r"(?s)^gain must .* write Loop\(controller, "):
+        arm(controller, 20.0)
 
 
 def test_what_is_missing_is_named():
+    with pytest.raises(TypeError, match=r"^mapping must be .* as in Loop\(controller, 's"):
+        Loop(K, 20.0)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match=r"^tau1 must be given"):
+        Loop(K, "single")
     with pytest.raises(TypeError, match=r"^tau2 must be given: the signal mapping 'common'"):
         Loop(K, "common", tau1=20.0)
     with pytest.raises(ValueError, match=r"^mapping must be .* 'modified dual'; got 'triple'"):

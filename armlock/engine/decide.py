@@ -19,7 +19,7 @@ import numpy as np
 from armlock.checks import FloatArray, IntArray
 from armlock.engine import inclusion
 from armlock.engine.functions import Function, Leading, Space, at, stacked
-from armlock.engine.inclusion import DISTANCE, Question
+from armlock.engine.inclusion import DISTANCE, REAL, Question
 
 #: What a count is where a root lies on the axis, or rounding does not decide on which side.
 BOUNDARY = -1
@@ -27,10 +27,12 @@ BOUNDARY = -1
 UNCONFINED = -2
 
 # Most steps of a count, and of a search; some three seconds each.
-_MOST_STEPS = np.int64(3_000_000)
-_MOST_SEARCHED = 6_000_000
+_MOST_STEPS = 1_500_000
+_MOST_SEARCHED = 2_000_000
 # Steps between two looks at the keyboard.
 _A_WHILE = np.int64(100_000)
+# Steps of a look at likely intervals before a search.
+_A_LOOK = np.int64(2_000)
 # Points that one thread counts at a time.
 _BLOCK = 256
 # Undecided intervals after which a search ends.
@@ -50,8 +52,7 @@ class UndecidedError(RuntimeError):
 def in_threads(function: Callable[[slice], Any], size: int, block: int) -> list[Any]:
     """Return what a compiled function makes of the blocks of a range; Ctrl-C ends it."""
     blocks = [slice(first, min(first + block, size)) for first in range(0, size, block)]
-    if len(blocks) == 1:
-        return [function(blocks[0])]
+    # A single block goes to a thread too: compiled functions do not react to Ctrl-C.
     pool = ThreadPoolExecutor(numba.config.NUMBA_NUM_THREADS)
     try:
         return list(pool.map(function, blocks))
@@ -66,6 +67,7 @@ def counts(
     uncertain: FloatArray,
     *,
     leading: Leading | None = None,
+    most: int = _MOST_STEPS,
 ) -> IntArray:
     """Count the zeros with positive real part of n functions (Lemma 9).
 
@@ -77,6 +79,8 @@ def counts(
         Weights S and W, and the error of S.
     leading : Leading, optional
         Of one function, with zeros at s = 0 that are not to count.
+    most : int, optional
+        Most steps of a count.
 
     Returns
     -------
@@ -89,7 +93,7 @@ def counts(
         If a count takes too many steps.
     """
     n = len(steady)
-    ends = 2.0 * space.confined_from(steady, delayed)
+    ends = space.confined_from(steady, delayed) * (1.0 if space.step else 2.0)
     order, begin = (leading.order, leading.radius) if leading else (0, 0.0)
     found = np.full(n, UNCONFINED, dtype=np.int64)
     here = np.flatnonzero(np.isfinite(ends))
@@ -101,33 +105,37 @@ def counts(
         k = here[block]
         result: tuple[Any, ...] = inclusion.wind_many(
             space.arrays, steady[k], delayed[k], uncertain[k],
-            np.full(k.size, begin), ends[k], _MOST_STEPS,
+            np.full(k.size, begin), ends[k], most,
         )  # fmt: skip
         return result
 
     turn, first, last, undecided, steps = map(
         np.concatenate, zip(*in_threads(some, here.size, _BLOCK), strict=True)
     )
-    if (steps >= _MOST_STEPS).any():
-        k = int(np.argmax(steps >= _MOST_STEPS))
+    if (steps >= most).any():
+        k = int(np.argmax(steps >= most))
         raise UndecidedError(
-            f"a count takes more than {_MOST_STEPS:.0e} steps, up to {undecided[k]:.3g} rad/s",
+            f"a count takes more than {most:.0e} steps, up to {undecided[k]:.3g} rad/s",
             float(undecided[k]),
         )
     # At s = 0 all is real.
     values = inclusion.values(space.arrays, steady[here], delayed[here], np.zeros(1))[0]
     direction = leading.direction if leading else np.sign(values[:, 0].real)
     still = np.sign(space.limits(steady[here], delayed[here])[0]) * 1j ** (space.degree % 4)
+    if space.step:
+        # There the function of a map is real.
+        still = np.sign(last.real)
     with np.errstate(all="ignore"):
         turn = turn + np.angle(first / direction) - np.angle(last / still)
-    number = 0.5 * (space.degree - order) - turn / np.pi
+    # A map counts zeros in the strip |Im s| < pi / step, at whose right end it is constant.
+    number = 0.5 * ((0 if space.step else space.degree) - order) - turn / np.pi
     with np.errstate(invalid="ignore"):
         sure = np.isnan(undecided) & (np.abs(number - np.round(number)) < 1e-2)
         found[here] = np.where(sure & (number > -0.5), np.round(number), BOUNDARY)
     return found
 
 
-def count(function: Function, common: int = 0) -> int:
+def count(function: Function, common: int = 0, *, most: int = _MOST_STEPS) -> int:
     """Count the zeros of a function with positive real part.
 
     Parameters
@@ -136,6 +144,8 @@ def count(function: Function, common: int = 0) -> int:
         With exact weights.
     common : int, optional
         Order of a zero at s = 0 that is not to count.
+    most : int, optional
+        Most steps.
 
     Returns
     -------
@@ -149,7 +159,7 @@ def count(function: Function, common: int = 0) -> int:
         return BOUNDARY if confined else UNCONFINED
     exact = np.zeros_like(steady)
     begin = leading if leading.order else None
-    return int(counts(function.space, steady, delayed, exact, leading=begin)[0])
+    return int(counts(function.space, steady, delayed, exact, leading=begin, most=most)[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,13 +175,17 @@ class Family:
         (2), the combination of the functions with weights + level slopes. A test holds where
         zero is in no convex combination of the vertices, whatever the terms add.
     arc : tuple of tuples, optional
-        One more test: f_0 + exp(j psi) f_1 with psi from a + b omega to c + d omega;
-        (a, b, c, d), and their slopes in the level.
+        One more test: f_0 + exp(j psi) f_1, or f_0 + (cos psi - 1) f_1 + j sin psi f_2 of three
+        functions, with psi from a + b omega to c + d omega; (a, b, c, d), and their slopes in
+        the level.
+    loose : int, optional
+        So many functions, the last ones, are terms of any phase in that test.
     """
 
     functions: Sequence[Function]
     tests: Sequence[Sequence[tuple[int, Sequence[float], Sequence[float]]]]
     arc: tuple[tuple[float, ...], tuple[float, ...]] | None = None
+    loose: int = 0
 
     @property
     def space(self) -> Space:
@@ -188,7 +202,7 @@ class Family:
             for n, member in enumerate(test):
                 kind[i, n], weights[i, n], slopes[i, n] = member
         arc = np.zeros((0, 4)) if self.arc is None else np.array(self.arc, np.float64)
-        return Question(kind, weights, slopes, arc)
+        return Question(kind, weights, slopes, arc, self.loose)
 
     def _members(
         self, test: Sequence[tuple[int, Sequence[float], Sequence[float]]], level: float
@@ -215,6 +229,8 @@ class Family:
                 continue
             turned = [(lead.direction * np.conj(middle)).real / abs(middle) for lead in known]
             room, radius = min(turned) - 4.0 * share, min(lead.radius for lead in known)
+            if room <= 0.0:
+                continue
             for a in known:
                 for b in others:
                     ratio = abs(float(b.coefficient / a.coefficient)) * len(others) / room
@@ -243,7 +259,8 @@ class Family:
             top = float(sum(abs(still) + abs(turned).sum() for still, turned in tops))
             ends = self.space.confined_from(steady, delayed, size, top_terms=top)
             found.append(float(ends.max()))
-        if self.arc is not None and self.arc[0][3] == self.arc[1][3] == 0.0:
+        two = len(self.functions) - self.loose == 2
+        if two and self.arc is not None and self.arc[0][3] == self.arc[1][3] == 0.0:
             found.append(self._arc_ends(self.arc[0][2] + level * self.arc[1][2]))
         return min(found)
 
@@ -251,15 +268,18 @@ class Family:
         """Do what `ends` does for an arc around zero: abs(1 + c exp(j psi)) is monotonic."""
         if angle >= np.pi:
             return np.inf
-        (n, m), (wn, wm) = stacked(self.functions[:2])
+        (n, m, *free), (wn, wm, *turned) = stacked(self.functions)
         turns = np.exp(1j * np.array([0.0, angle]))[:, None]
         steady = (n - wn.sum(1)) + turns * (m - wm.sum(1))
         parts = np.abs(wn) + np.abs(wm)
+        terms = parts.sum(1)
+        for s, w in zip(free, turned, strict=True):
+            terms = terms + np.abs(s - w.sum(1)) + np.abs(w).sum(1)
         # All that turns, as terms; and what the sum at other angles may have more.
         more = np.abs(n - wn.sum(1)) + np.abs(m - wm.sum(1))
         return float(
             self.space.confined_from(
-                steady, np.zeros((2, *parts.shape)), parts.sum(1), extra=more
+                steady, np.zeros((2, *parts.shape)), terms, extra=more
             ).max()
         )
 
@@ -272,6 +292,16 @@ class _Search:
         self.family, self.goal, self.steps = family, goal, 0
         self.fixed = (space.arrays, *stacked(family.functions))
         self.question = family.question()
+
+    def look(
+        self, likely: FloatArray, best: float, where: float, start: float, tolerance: float
+    ) -> tuple[float, float]:
+        """Look for good values in intervals for a few steps; return the best, and where."""
+        _, _, best, where, _ = inclusion.walk(
+            *self.fixed, self.question, np.ascontiguousarray(likely), self.goal,
+            best, where, start, tolerance, _NARROWEST, _A_LOOK, _FEW,
+        )  # fmt: skip
+        return best, where
 
     def run(
         self, pending: FloatArray, best: float, where: float, start: float, tolerance: float
@@ -303,6 +333,8 @@ def least(
     *,
     start: float = 0.0,
     tolerance: float = 1e-6,
+    low: float = 0.0,
+    high: float = np.inf,
 ) -> tuple[float, float]:
     """Find the largest level up to which no function of a family has a zero.
 
@@ -318,6 +350,8 @@ def least(
         A level without a zero.
     tolerance : float, optional
         No zero has a level below start + (best - start) (1 - tolerance).
+    low, high : float, optional
+        The frequencies in rad/s between which zeros count; all by default.
 
     Returns
     -------
@@ -330,16 +364,18 @@ def least(
         If double precision, or the steps allowed, do not decide it.
     """
     search = _Search(family, goal)
-    spaces, level = family.space, min(best, 1e300)
-    begin = family.begins(level)
-    floor = begin or 1e-4 * spaces.corners[0]
-    end = family.ends(level)
-    ceiling = end if np.isfinite(end) else 1e4 * spaces.corners[-1]
+    corners, level = family.space.corners, min(best, 1e300)
+    floor = low or family.begins(level) or 1e-4 * corners[0]
+    end = min(family.ends(level), high)
+    ceiling = end if np.isfinite(end) else 1e4 * corners[-1]
     likely = _likely(family, goal, floor, max(ceiling, 2.0 * floor), start)
-    best, where, _ = search.run(likely, best, where, start, tolerance)
+    best, where = search.look(likely, best, where, start, tolerance)
+    if best <= start:
+        return best, where
     level = start + (best - start) * (1.0 - tolerance)
-    if np.isfinite(level):
-        begin, end = family.begins(level), family.ends(level)
+    known = np.isfinite(level)
+    begin = low or (family.begins(level) if known else floor)
+    end = min(family.ends(level), high) if known else end
     if not begin > 0.0:
         raise UndecidedError("the behaviour at s = 0 is not decided", 0.0)
     if not np.isfinite(end):
@@ -357,15 +393,45 @@ def least(
     return best, where
 
 
+def excludes(family: Family, begin: float = 0.0) -> bool:
+    """Tell whether no function of a family has a zero on the axis, but perhaps at s = 0.
+
+    Parameters
+    ----------
+    family : Family
+        At its level zero.
+    begin : float, optional
+        Frequency in rad/s up to which this is known; by default that of leading terms.
+
+    Returns
+    -------
+    bool
+        True is certified. False: there is a zero, or double precision does not decide.
+
+    Raises
+    ------
+    UndecidedError
+        If it takes too many steps.
+    """
+    begin, end = begin or family.begins(0.0), family.ends(0.0)
+    if not (begin > 0.0 and np.isfinite(end)):
+        return False
+    if end <= begin:
+        return True
+    # At a distance of zero nothing is nearer, so that nothing is searched.
+    nothing = 0.0, np.nan, 0.0, 0.0
+    _, _, left = _Search(family, DISTANCE).run(np.array([[begin, end]]), *nothing)
+    return not len(left)
+
+
 def _likely(family: Family, goal: int, low: float, high: float, start: float) -> FloatArray:
     """Intervals of a sample that look best: only what is looked at first depends on them."""
     space = family.space
-    decades = np.geomspace(low, high, 500)
-    grids = [decades]
+    grids = [np.geomspace(low, high, 500)]
     if space.longest:
         # One turn of the longest delay at each frequency, and the first hundred turns.
         point = np.arange(16) * (2.0 * np.pi / (16.0 * space.longest))
-        grids += [np.add.outer(decades, point).ravel(), point[1] * np.arange(1, 1600)]
+        grids += [np.add.outer(grids[0], point).ravel(), point[1] * np.arange(1, 1600)]
     for root in set(space.arrays.roots[space.arrays.present].tolist()):
         if root.imag > 0.0:
             off = max(abs(root.real), 1e-9 * root.imag) * np.geomspace(1e-2, 1e3, 24)
@@ -374,27 +440,24 @@ def _likely(family: Family, goal: int, low: float, high: float, start: float) ->
     omega = omega[(omega >= low) & (omega <= high)]
     if omega.size < 3:
         return np.array([[low, high]])
-    f, g = at(family.functions[:2], omega)
-    with np.errstate(all="ignore"):
-        if goal == DISTANCE:
-            value = np.abs(f / g)
-            k = 1 + np.argsort(value[1:-1])[:8]
-            spans = np.column_stack((omega[k - 1], omega[k + 1]))
-        else:
-            if goal == inclusion.REAL:
-                crossing, value = (f * g.conj()).imag, -(g / f).real
-            else:
-                crossing, angle = np.abs(f) - np.abs(g), np.angle(-f / g)
-                value = (
-                    np.abs(angle) if goal == inclusion.PHASE else angle % (2 * np.pi) / omega
-                )
-            k = np.flatnonzero((crossing[1:] < 0.0) != (crossing[:-1] < 0.0))
-            share = crossing[k] / (crossing[k] - crossing[k + 1])
-            rough = value[k] + share * (value[k + 1] - value[k])
-            if goal == inclusion.REAL:
+    f, g, *loose = at(family.functions, omega)
+    radius = sum((np.abs(r) for r in loose), np.zeros(omega.size))
+    crossing, value = inclusion.aims(goal, f, g, radius, omega)
+    if goal == DISTANCE or loose:
+        k = 1 + np.argsort(value[1:-1])[:8]
+        spans = np.column_stack((omega[k - 1], omega[k + 1]))
+    else:
+        k = np.flatnonzero((crossing[1:] < 0.0) != (crossing[:-1] < 0.0))
+        share = crossing[k] / (crossing[k] - crossing[k + 1])
+        with np.errstate(invalid="ignore", divide="ignore"):
+            if goal == REAL:
+                # It may pass through infinity, but one over it does not.
+                rough = 1.0 / value[k] + share * (1.0 / value[k + 1] - 1.0 / value[k])
                 rough = np.where(rough > 0.0, 1.0 / rough, np.inf)
-            rough = np.where(rough > start, rough, np.inf)
-            k = k[np.argsort(rough)][:60]
-            spans = np.column_stack((omega[k], omega[k + 1]))
+            else:
+                rough = value[k] + share * (value[k + 1] - value[k])
+        rough = np.where(rough > start, rough, np.inf)
+        k = k[np.argsort(rough)][:60]
+        spans = np.column_stack((omega[k], omega[k + 1]))
     # The best last: the last interval is walked first.
     return spans[::-1]

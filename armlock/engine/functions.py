@@ -10,7 +10,7 @@ of the imaginary axis: a frequency past which one term exceeds all others.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
@@ -22,10 +22,12 @@ import numpy as np
 import numpy.typing as npt
 
 from armlock.checks import ComplexArray, FloatArray
-from armlock.engine.inclusion import EPSILON, Arrays, values
-from armlock.engine.polynomials import LOWEST, Polynomial
+from armlock.engine.inclusion import EPSILON, Arrays
+from armlock.engine.polynomials import Polynomial
 
 Exact = npt.NDArray[np.object_]
+# Most coefficients of a series at s = 0 of which one has to differ from zero.
+_MOST_TERMS = 16
 
 
 class Leading(NamedTuple):
@@ -61,10 +63,16 @@ class Space:
         Not zero.
     delays : iterable of Fraction
         Delays in s; those that are not zero count, each of them once.
+    step : float, optional
+        Sampling step in s of which all delays are multiples, if the functions are those of a
+        map. They repeat along the axis, which then ends at pi / step.
     """
 
-    def __init__(self, polynomials: Sequence[Polynomial], delays: Sequence[Fraction]) -> None:
+    def __init__(
+        self, polynomials: Sequence[Polynomial], delays: Iterable[Fraction], step: float = 0.0
+    ) -> None:
         self.polynomials = tuple(polynomials)
+        self.step = step
         self.delays = tuple(sorted({Fraction(theta) for theta in delays} - {Fraction(0)}))
         self.degree = max(p.degree for p in self.polynomials)
         self.longest = float(max(self.delays, default=Fraction(0)))
@@ -88,7 +96,7 @@ class Space:
             computed,
             rounding,
             scale,
-            np.array([p.lead for p in self.polynomials]),
+            np.array([float(p.lead) for p in self.polynomials]),
             np.array([p.missed for p in self.polynomials]),
             np.array([float(theta) for theta in self.delays]),
             np.array([float(theta - Fraction(float(theta))) for theta in self.delays]),
@@ -145,8 +153,10 @@ class Space:
         Returns
         -------
         float array, shape (n,)
-            In rad/s; inf where it does not at infinity.
+            In rad/s; inf where it does not at infinity. The end of the axis of a map.
         """
+        if self.step:
+            return np.full(len(steady), np.pi / self.step)
         full = np.array([p.degree == self.degree for p in self.polynomials])
         gap = np.array([self.degree - p.degree for p in self.polynomials])
         lead, size = np.where(full, self.arrays.lead, 0.0), np.abs(self.arrays.lead)
@@ -213,7 +223,7 @@ class Function:
                 sum((w * (-t) ** i for w, t in acting), Fraction(0)) / factorial(i)
                 for i in range(1, number)
             ]
-            for i, a in enumerate(p.lowest[:number]):
+            for i, a in enumerate(p.exact[:number]):
                 if a:
                     for k in range(number - i):
                         if e[k]:
@@ -232,9 +242,9 @@ class Function:
     def _leading(self, share: float) -> Leading | None:
         number = 2
         while not any(c := self.series(number)):
-            if number == LOWEST:
+            if number == _MOST_TERMS:
                 return None
-            number = min(2 * number, LOWEST)
+            number = min(2 * number, _MOST_TERMS)
         k = next(i for i, value in enumerate(c) if value)
         return Leading(k, c[k], self.radius(k, abs(c[k]), share))
 
@@ -308,9 +318,9 @@ class Function:
                 sizes[np.isnan(sizes)] = 1.0
                 missed *= float(np.maximum(sizes, 1.0).prod())
             polynomials.append(
-                Polynomial(p.lead, tuple(roots.tolist()), (), p.computed, (), missed, True)
+                Polynomial(p.lead, tuple(roots.tolist()), p.computed, (), missed, True)
             )
-        space = Space(polynomials, self.space.delays)
+        space = Space(polynomials, self.space.delays, self.space.step)
         steady, delayed = self.weights
         change = np.expm1(-sigma * space.arrays.delays)
         moved = delayed * (1.0 + change)
@@ -341,6 +351,14 @@ def stacked(functions: Sequence[Function]) -> tuple[FloatArray, FloatArray]:
 
 def at(functions: Sequence[Function], omega: npt.ArrayLike) -> ComplexArray:
     """Evaluate functions at frequencies, all times one positive number at each frequency."""
-    flat = np.ascontiguousarray(np.ravel(omega), np.float64)
-    found: ComplexArray = values(functions[0].space.arrays, *stacked(functions), flat)[0]
+    arrays, (steady, delayed) = functions[0].space.arrays, stacked(functions)
+    flat = np.ravel(omega)
+    turn = np.expm1(-1j * np.multiply.outer(flat, arrays.delays))
+    found = np.zeros((len(functions), flat.size), np.complex128)
+    by = 1.0 / np.hypot(flat, arrays.scale[:, None])
+    for j, lead in enumerate(arrays.lead):
+        p = np.full(flat.size, complex(lead))
+        for root, present, share in zip(arrays.roots[j], arrays.present[j], by, strict=True):
+            p *= (1j * flat - root) * share if present else share
+        found += p * (steady[:, j, None] + delayed[:, j] @ turn.T)
     return found.reshape(len(functions), *np.shape(omega))

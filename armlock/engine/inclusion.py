@@ -24,6 +24,8 @@ EPSILON = 2.0**-52
 ORDER = 4
 # An exponential that turns by more than this, in rad, over half an interval is not resolved.
 _FAST = 1.5
+# Two of them that turn by no more than this beside each other share a free phase.
+_TOGETHER = 0.3
 # Polynomials are rescaled before they leave these bounds.
 _HUGE = 1e150
 # A piece of the axis is this share of the distance to the roots, together; it serves intervals
@@ -76,11 +78,12 @@ class Workspace(NamedTuple):
     p: ComplexArray  # (J, ORDER): Taylor coefficients of the polynomials
     bound: FloatArray  # (J, ORDER + 1): bounds of them on the interval
     error: FloatArray  # (J,): rounding error of p over its bound, but for `missed`
-    turn: ComplexArray  # (K, ORDER): Taylor coefficients of the exponentials, less one
-    angle: FloatArray  # (K,): theta r
-    slip: FloatArray  # (K,): error of the phase theta m
+    lead: IntArray  # (K,): the delay that each delay is taken relative to; -1 for none
+    turn: ComplexArray  # (K, ORDER): Taylor coefficients of these exponentials, less one
+    angle: FloatArray  # (K,): by how much they turn, in rad, over half the interval
+    slip: FloatArray  # (K,): error of their phases at the middle
     f: ComplexArray  # (functions, ORDER)
-    c: ComplexArray  # (functions, K, ORDER): terms of any phase
+    c: ComplexArray  # (functions, K, ORDER): terms of any phase, by the delay that leads
     rest: FloatArray  # (functions,): remainder and rounding
     g: ComplexArray  # (ORDER,), and (ORDER + 1,) bounds
     b: FloatArray
@@ -99,6 +102,7 @@ def workspace(space: Arrays, functions: int) -> Workspace:
         np.zeros((j, ORDER), np.complex128),
         np.zeros((j, ORDER + 1)),
         np.zeros(j),
+        np.zeros(k, np.int64),
         np.zeros((k, ORDER), np.complex128),
         np.zeros(k),
         np.zeros(k),
@@ -189,7 +193,7 @@ def expand(space: Arrays, m: float, r: float, work: Workspace) -> None:
 
     The polynomials come from an expansion on a longer piece of the axis where one serves.
     """
-    inside = abs(m - work.piece[0]) + r <= work.piece[1]
+    inside, own = abs(m - work.piece[0]) + r <= work.piece[1], False
     if not inside or r < work.piece[1] / _SUBINTERVALS:
         nearest = 0.0
         for j in range(space.lead.size):
@@ -200,7 +204,8 @@ def expand(space: Arrays, m: float, r: float, work: Workspace) -> None:
                     total += 1.0 / np.sqrt(z.real * z.real + (m - z.imag) * (m - z.imag))
             nearest = max(nearest, total)
         length = min(_PIECE / nearest, 0.5 * _SUBINTERVALS * r) if nearest > 0.0 else 2.0 * r
-        _expand_piece(space, m, length if length > 4.0 * r else r, work)
+        own = length <= 4.0 * r
+        _expand_piece(space, m, r if own else length, work)
     ratio = r / work.piece[1] if work.piece[1] > 0.0 else 1.0
     u = (m - work.piece[0]) / work.piece[1] if work.piece[1] > 0.0 else 0.0
     for j in range(space.lead.size):
@@ -216,9 +221,20 @@ def expand(space: Arrays, m: float, r: float, work: Workspace) -> None:
             work.bound[j, i] = power * (bound[i] + more)
             power *= ratio
         work.bound[j, ORDER] = bound[ORDER]
+    lead = -1
     for k in range(space.delays.size):
-        work.angle[k] = space.delays[k] * r
-        phase, work.slip[k] = _phase(space.delays[k], space.tails[k], m)
+        # Delays whose exponentials turn fast share one free phase with those next to them.
+        since = space.delays[k] - (space.delays[lead] if lead >= 0 else 0.0)
+        tail = space.tails[k]
+        if since * r > (_FAST if lead < 0 else _TOGETHER):
+            lead, since, tail = k, 0.0, 0.0
+        elif lead >= 0:
+            # What the difference rounds by.
+            back = since - space.delays[k]
+            tail += space.delays[k] - (since - back) - (space.delays[lead] + back)
+            tail -= space.tails[lead]
+        work.lead[k], work.angle[k] = lead, since * r
+        phase, work.slip[k] = _phase(since, tail, m)
         sine, cosine = np.sin(0.5 * phase), np.cos(0.5 * phase)
         # exp(-j a) - 1 = -2 sin^2(a/2) - 2 j sin(a/2) cos(a/2) keeps its digits.
         work.turn[k, 0] = complex(-2.0 * sine * sine, -2.0 * sine * cosine)
@@ -226,12 +242,14 @@ def expand(space: Arrays, m: float, r: float, work: Workspace) -> None:
         for i in range(1, ORDER):
             q = complex(q.imag, -q.real) * (work.angle[k] / i)
             work.turn[k, i] = q
+    if own:
+        # An expansion on a piece this long is too coarse for the parts of the interval.
+        work.piece[1] = -1.0
 
 
 @njit(nogil=True, error_model="numpy")
 def combine(
     space: Arrays,
-    m: float,
     steady: FloatArray,
     delayed: FloatArray,
     uncertain: FloatArray,
@@ -242,48 +260,66 @@ def combine(
 
     `uncertain` holds the errors of S.
     """
-    f, c, g, b = work.f[index], work.c[index], work.g, work.b
-    f[:] = 0.0
-    c[:] = 0.0
-    rest = 0.0
-    polynomials, delays = steady.size, space.delays.size
-    sums = (16.0 + 2.0 * (polynomials + delays)) * EPSILON
-    for j in range(polynomials):
-        g[:] = 0.0
-        b[:] = 0.0
-        g[0], wrong, used = complex(steady[j]), uncertain[j] + abs(steady[j]) * EPSILON, False
+    delays = space.delays.size
+    sums, rest = (16.0 + 2.0 * (steady.size + delays)) * EPSILON, 0.0
+    for i in range(ORDER):
+        work.f[index, i] = 0.0
         for k in range(delays):
-            weight = delayed[j, k]
-            if weight == 0.0:
-                continue
-            used = True
-            size, x = abs(weight), work.angle[k]
-            if x > _FAST:
-                g[0] -= weight
+            work.c[index, k, i] = 0.0
+    for j in range(steady.size):
+        # First what no free phase turns, then in turn what follows each free phase.
+        k, lead, used = 0, -1, steady[j] != 0.0 or uncertain[j] != 0.0
+        first, wrong = steady[j], uncertain[j] + abs(steady[j]) * EPSILON
+        for fast in range(delays):
+            if work.lead[fast] >= 0 and delayed[j, fast] != 0.0:
+                first -= delayed[j, fast]
+                wrong += 2.0 * abs(delayed[j, fast]) * EPSILON
+                used = True
+        while True:
+            for i in range(ORDER):
+                work.g[i] = 0.0
+            work.g[0], work.b[ORDER] = first, 0.0
+            while k < delays and work.lead[k] == lead:
+                weight, size, x = delayed[j, k], abs(delayed[j, k]), work.angle[k]
+                if weight != 0.0:
+                    used, power, grown = True, size, x + x * x
+                    if lead >= 0:
+                        work.g[0] += weight
+                        wrong += 2.0 * size * EPSILON
+                    for i in range(ORDER):
+                        work.g[i] += weight * work.turn[k, i]
+                        power *= x / (i + 1)
+                    work.b[ORDER] += power
+                    wrong += size * EPSILON * (2.0 * abs(work.turn[k, 0]) + 12.0 * grown)
+                    wrong += size * work.slip[k] * (1.0 + grown)
+                k += 1
+            if used:
+                for i in range(ORDER - 1, -1, -1):
+                    work.b[i] = abs(work.g[i]) + (i + 1) * work.b[i + 1]
+                rest += work.bound[j, ORDER] * work.b[0]
+                rest += work.bound[j, 0] * ((work.error[j] + sums) * work.b[0] + wrong)
                 for i in range(ORDER):
-                    c[k, i] += weight * work.p[j, i]
-                rest += size * (work.bound[j, ORDER] + work.error[j] * work.bound[j, 0])
-                wrong += 2.0 * size * EPSILON
-            else:
-                power = size
-                for i in range(ORDER):
-                    g[i] += weight * work.turn[k, i]
-                    power *= x / (i + 1)
-                b[ORDER] += power
-                grown = x + x * x
-                wrong += size * EPSILON * (2.0 * abs(work.turn[k, 0]) + 12.0 * grown)
-                wrong += size * work.slip[k] * (1.0 + grown)
-        if not used and steady[j] == 0.0 and uncertain[j] == 0.0:
-            continue
-        for i in range(ORDER - 1, -1, -1):
-            b[i] = abs(g[i]) + (i + 1) * b[i + 1]
-        for i in range(ORDER):
-            for low in range(i + 1):
-                f[i] += work.p[j, low] * g[i - low]
-        for low in range(ORDER + 1):
-            rest += work.bound[j, low] * b[ORDER - low]
-        rest += work.bound[j, 0] * ((work.error[j] + sums) * b[0] + wrong)
+                    total = 0j
+                    for low in range(i + 1):
+                        total += work.p[j, low] * work.g[i - low]
+                    rest += work.bound[j, i] * work.b[ORDER - i]
+                    if lead < 0:
+                        work.f[index, i] += total
+                    else:
+                        work.c[index, lead, i] += total
+            if k == delays:
+                break
+            lead, first, wrong, used = work.lead[k], 0.0, 0.0, False
     work.rest[index] = rest
+
+
+@njit(nogil=True, error_model="numpy")
+def _acts(terms: ComplexArray, n: int, k: int) -> bool:
+    """Whether term k of a function or member is not zero."""
+    size = 0.0
+    for i in range(ORDER):
+        size += abs(terms[n, k, i])
+    return size > 0.0
 
 
 @njit(nogil=True, error_model="numpy")
@@ -299,7 +335,7 @@ def values(
     for n in range(omega.size):
         expand(space, omega[n], 0.0, work)
         for i in range(functions):
-            combine(space, omega[n], steady[i], delayed[i], exact, work, i)
+            combine(space, steady[i], delayed[i], exact, work, i)
             found[i, n], errors[i, n] = work.f[i, 0], work.rest[i]
     return found, errors
 
@@ -384,7 +420,7 @@ def mix(weights: ComplexArray, work: Workspace, room: Members, n: int) -> None:
             for i in range(ORDER):
                 room.v[n, i] += a * work.f[f, i]
             for k in range(work.c.shape[1]):
-                if work.c[f, k, 0] != 0.0 or work.c[f, k, 1] != 0.0:
+                if _acts(work.c, f, k):
                     room.used[n] = True
                     for i in range(ORDER):
                         room.c[n, k, i] += a * work.c[f, k, i]
@@ -405,7 +441,7 @@ def _holds(room: Members, gamma: float) -> bool:
             a, b = a - room.rest[n] / unit, b - room.rest[n] / unit
             if room.used[n]:
                 for k in range(room.c.shape[1]):
-                    if room.c[n, k, 0] != 0.0 or room.c[n, k, 1] != 0.0:
+                    if _acts(room.c, n, k):
                         e, f = _least(room.c[n, k], room.along, gamma, False, room.q)
                         a, b = a + e, b + f
             if kind == 2:
@@ -486,14 +522,19 @@ class Question(NamedTuple):
     weights, slopes : complex arrays, shape (tests, members, functions)
         A member is the combination of the functions with weights + level slopes.
     arc : float array, shape (0, 4) or (2, 4)
-        One more test: f_0 + exp(j psi) f_1 with psi from a + b omega to c + d omega. The rows
-        are (a, b, c, d), and their slopes in the level.
+        One more test: f_0 + exp(j psi) f_1, or f_0 + (cos psi - 1) f_1 + j sin psi f_2 of three
+        functions, with psi from a + b omega to c + d omega. The rows are (a, b, c, d), and
+        their slopes in the level.
+    loose : int
+        So many functions, the last ones, are terms of any phase in that test, and in what a
+        search looks for.
     """
 
     kind: IntArray
     weights: ComplexArray
     slopes: ComplexArray
     arc: FloatArray
+    loose: int
 
 
 @njit(nogil=True, error_model="numpy")
@@ -503,19 +544,44 @@ def _at(c: ComplexArray, t: float) -> Any:
 
 
 @njit(nogil=True, error_model="numpy")
-def _aim(goal: int, f: complex, g: complex, omega: float) -> tuple[float, float]:
-    """Return what a search looks for: a function that is zero there, and the value."""
+def _aim(goal: int, f: complex, g: complex, radius: float, omega: float) -> tuple[float, float]:
+    """Return what a search looks for: a function that is zero there, and the value.
+
+    L = f / g is known up to a disc of radius `radius` / abs(g). If that is not zero, or for a
+    distance, the value itself is to be small, and there is no function.
+    """
     if goal == DISTANCE:
-        return 0.0, abs(f) / abs(g)
+        return 0.0, max(abs(f) - radius, 0.0) / abs(g)
     if goal == REAL:
-        return (f * g.conjugate()).imag, -(f / g).real
+        # Where g vanishes, no t makes f + t g zero.
+        return (f * g.conjugate()).imag, -(f / g).real if g != 0.0 else np.inf
     # The angle of L = f / g from -1.
     level = (f * f.conjugate()).real - (g * g.conjugate()).real
     ratio = -f * g.conjugate()
-    angle = np.arctan2(ratio.imag, ratio.real)
+    angle, half = np.arctan2(ratio.imag, ratio.real), 0.0
+    if radius > 0.0:
+        # Half the angle under which the disc covers the unit circle.
+        size, radius, level = abs(f / g), radius / abs(g), 0.0
+        if radius <= abs(size - 1.0):
+            return 0.0, np.inf if radius < 1.0 + size else 0.0
+        cosine = (1.0 + size * size - radius * radius) / (2.0 * size)
+        half = np.arccos(min(max(cosine, -1.0), 1.0))
     if goal == PHASE:
-        return level, abs(angle)
-    return level, (angle if angle >= 0.0 else angle + 2.0 * np.pi) / omega
+        return level, max(abs(angle) - half, 0.0)
+    if abs(angle) < half:
+        return level, 0.0
+    return level, ((angle if angle >= 0.0 else angle + 2.0 * np.pi) - half) / omega
+
+
+@njit(nogil=True, error_model="numpy")
+def aims(
+    goal: int, f: ComplexArray, g: ComplexArray, radius: FloatArray, omega: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """`_aim` at many frequencies."""
+    crossing, value = np.empty(omega.size), np.empty(omega.size)
+    for i in range(omega.size):
+        crossing[i], value[i] = _aim(goal, f[i], g[i], radius[i], omega[i])
+    return crossing, value
 
 
 @njit(nogil=True, error_model="numpy")
@@ -530,9 +596,12 @@ def _measure(
     """`_aim` at a frequency."""
     exact = np.zeros(steady.shape[1])
     expand(space, omega, 0.0, spare)
-    for f in range(2):
-        combine(space, omega, steady[f], delayed[f], exact, spare, f)
-    return _aim(goal, spare.f[0, 0], spare.f[1, 0], omega)
+    radius = 0.0
+    for f in range(spare.f.shape[0]):
+        combine(space, steady[f], delayed[f], exact, spare, f)
+        if f >= 2:
+            radius += abs(spare.f[f, 0])
+    return _aim(goal, spare.f[0, 0], spare.f[1, 0], radius, omega)
 
 
 @njit(nogil=True, error_model="numpy")
@@ -553,11 +622,13 @@ def _candidate(
     The Taylor polynomials say where it may be; the functions themselves say what it is.
     """
     found, where = best, np.nan
-    h, v = np.empty(9), np.empty(9)
+    h, v, loose = np.empty(9), np.empty(9), spare.f.shape[0] > 2
     for i in range(9):
-        t = 0.25 * i - 1.0
-        h[i], v[i] = _aim(goal, _at(work.f[0], t), _at(work.f[1], t), m + r * t)
-    if goal == DISTANCE:
+        t, radius = 0.25 * i - 1.0, 0.0
+        for f in range(2, spare.f.shape[0]):
+            radius += abs(_at(work.f[f], t))
+        h[i], v[i] = _aim(goal, _at(work.f[0], t), _at(work.f[1], t), radius, m + r * t)
+    if goal == DISTANCE or loose:
         i = int(np.argmin(v))
         t = 0.25 * i - 1.0
         if 0 < i < 8 and np.isfinite(v[i - 1] + v[i + 1]):
@@ -566,7 +637,7 @@ def _candidate(
                 t += 0.125 * (v[i - 1] - v[i + 1]) / bent
         omega = max(m + r * t, 0.0)
         _, value = _measure(space, steady, delayed, goal, omega, spare)
-        if start < value < found:
+        if (start < value or (loose and start == value)) and value < found:
             found, where = value, omega
         return found, where
     for i in range(8):
@@ -624,10 +695,12 @@ def walk(
     their frequency on which no test holds, the best value, where it is, and the steps.
     """
     functions, tests = steady.shape[0], question.kind.shape[0]
-    work, spare = workspace(space, functions), workspace(space, 2)
-    size = max(question.kind.shape[1], 3)
+    loose = question.loose
+    # What is looked for are the first two functions and the loose ones.
+    work, spare = workspace(space, functions), workspace(space, 2 + loose)
+    size = max(question.kind.shape[1], 3 + loose)
     room, corner = members(size, space.delays.size), np.zeros(size, np.int64)
-    corner[:3] = 1
+    corner[:3], corner[3 : 3 + loose] = 1, 2
     exact, weights = np.zeros(steady.shape[1]), np.zeros(functions, np.complex128)
     stack, top = np.empty((pending.shape[0] + 300, 2)), pending.shape[0]
     stack[:top] = pending
@@ -640,7 +713,7 @@ def walk(
         level = start + (best - start) * (1.0 - tolerance)
         expand(space, m, r, work)
         for f in range(functions):
-            combine(space, m, steady[f], delayed[f], exact, work, f)
+            combine(space, steady[f], delayed[f], exact, work, f)
         held = 0
         for i in range(tests):
             room.kind[:] = 0
@@ -664,8 +737,13 @@ def walk(
             span = arc[2] + max(arc[3] * low, arc[3] * high) - begin
             span = min(span, 2.0 * np.pi)
             parts = int(span / 0.35) + 1
-            half = 0.5 * span / parts
+            # Neighbours overlap by more than angles are rounded by.
+            half = 0.5 * span / parts + 4.0 * EPSILON * (abs(begin) + span)
             room.kind[:] = corner
+            for n in range(loose):
+                weights[:] = 0.0
+                weights[functions - loose + n] = 1.0
+                mix(weights, work, room, 3 + n)
             for i in range(parts):
                 # A triangle that holds this part of the arc (Lemma 11).
                 turn = begin + (2 * i + 1) * half
@@ -673,9 +751,14 @@ def walk(
                     weights[:] = 0.0
                     weights[0] = 1.0
                     angle = turn + (n - 1) * half
-                    weights[1] = complex(np.cos(angle), np.sin(angle))
+                    # Of the corner exp(j angle), or of the one in the middle, over cos(half).
+                    less, sine = -2.0 * np.sin(0.5 * angle) ** 2, np.sin(angle)
                     if n == 1:
-                        weights[1] /= np.cos(half)
+                        least = -2.0 * np.sin(0.5 * half) ** 2
+                        less, sine = (less - least) / (1.0 + least), sine / (1.0 + least)
+                    weights[1] = complex(1.0 + less, sine)
+                    if functions - loose > 2:
+                        weights[1], weights[2] = less, complex(0.0, sine)
                     mix(weights, work, room, n)
                 held = excludes_zero(room)
                 if not held:
@@ -685,13 +768,15 @@ def walk(
         middle = m
         if high > 4.0 * low:
             middle = np.sqrt(low * high) if low > 0.0 else high / 64.0
-        resolved = work.angle.size == 0 or work.angle.max() < _FAST
-        if resolved:
+        resolved = work.lead.size == 0 or work.lead[-1] < 0
+        if resolved and best > start:
             better, at = _candidate(
                 space, steady, delayed, goal, m, r, best, start, work, spare
             )
             if better < best:
                 best, where = better, at
+                if best <= start:
+                    return stack[:0].copy(), undecided[:0].copy(), best, where, steps
         if high - low <= narrowest * high or middle <= low or middle >= high:
             undecided[left, 0], undecided[left, 1] = low, high
             left += 1
@@ -734,7 +819,7 @@ def wind(
         m, r = 0.5 * (low + high), 0.5 * (high - low) + 2.0 * EPSILON * high
         steps += 1
         expand(space, m, r, work)
-        combine(space, m, steady, delayed, uncertain, work, 0)
+        combine(space, steady, delayed, uncertain, work, 0)
         mix(one, work, room, 0)
         held = excludes_zero(room)
         if held:
@@ -794,33 +879,38 @@ def resolved(
     begin: float,
     end: float,
     most: int,
-) -> FloatArray:
-    """Frequencies so close that a Taylor polynomial represents a function between them."""
+) -> tuple[FloatArray, ComplexArray]:
+    """Frequencies so close that a Taylor polynomial represents a function between them.
+
+    With the step of Newton's method at each, F over its derivative by s.
+    """
     work, exact = workspace(space, 1), np.zeros(steady.size)
-    stack, top, found, n = np.empty((300, 2)), 1, np.empty(most), 0
+    stack, top, n = np.empty((300, 2)), 1, 0
+    found, moves = np.empty(most), np.empty(most, np.complex128)
     stack[0, 0], stack[0, 1] = begin, end
     while top > 0 and n < most:
         top -= 1
         low, high = stack[top, 0], stack[top, 1]
         m, r = 0.5 * (low + high), 0.5 * (high - low)
         expand(space, m, r, work)
-        combine(space, m, steady, delayed, exact, work, 0)
+        combine(space, steady, delayed, exact, work, 0)
         f = work.f[0]
         bent = abs(f[2]) + abs(f[3]) + np.abs(work.c[0]).sum()
         turns = 0.0
-        for k in range(work.angle.size):
+        for k in range(space.delays.size):
             if np.abs(delayed[:, k]).sum() > 0.0:
-                turns = max(turns, work.angle[k])
+                turns = max(turns, space.delays[k] * r)
         size, rest, short = abs(f[0]) + abs(f[1]), work.rest[0], r <= 0.02 * m
         close = 8.0 * bent <= size and (8.0 * rest <= size or short)
         # Where rounding hides the function, shorter steps do not help.
         close = close or (short and size <= 2.0 * rest)
         if (close and turns <= 0.3) or top > 290 or r <= 4.0 * EPSILON * m:
             found[n] = m
+            moves[n] = complex(0.0, r) * f[0] / f[1]
             n += 1
             continue
         middle = np.sqrt(low * high) if high > 4.0 * low else m
         stack[top, 0], stack[top, 1] = middle, high
         stack[top + 1, 0], stack[top + 1, 1] = low, middle
         top += 2
-    return found[:n].copy()
+    return found[:n].copy(), moves[:n].copy()

@@ -13,25 +13,47 @@ from typing import NamedTuple
 import numpy as np
 
 from armlock.engine import decide
-from armlock.engine.decide import Family, UndecidedError, least
+from armlock.engine.decide import Family, least
 from armlock.engine.functions import Function, stacked
 from armlock.engine.inclusion import DELAY, DISTANCE, EPSILON, PHASE, REAL
 
 #: Gain factors up to this, and down to one over it, are looked at.
-LARGEST_GAIN = 1e6
-#: Next to a null of L only up to this, if that is not decided.
-LARGEST_NEXT_TO_A_NULL = 1e4
+LARGEST_GAIN = 1e4
 # So close to the limit of the neutral root chain, as a share, the limit is taken for roots.
 _NEXT_TO_THE_CHAIN = 1e-5
 # Largest delay margin in s: beyond it there is none.
 _LARGEST_DELAY = 1e300
 
+# Relative accuracy where phases are free.
+_FREE_TOLERANCE = 1e-5
+
 _VERTEX, _TERM = 1, 2
-# abs(f_0) exceeds abs(f_1), or the other way round: zero is not in f_0 + exp(j psi) f_1.
-_UNEQUAL = [
-    [(_VERTEX, (1, 0), (0, 0)), (_TERM, (0, 1), (0, 0))],
-    [(_VERTEX, (0, 1), (0, 0)), (_TERM, (1, 0), (0, 0))],
-]
+
+
+class Free(NamedTuple):
+    """A loop with terms of any phase above a frequency: L = (centre + arms) / denominator."""
+
+    centre: Function
+    denominator: Function
+    arms: tuple[Function, ...]
+    above: float
+
+
+def _unit(k: int, number: int) -> tuple[float, ...]:
+    """Return the weights of one of so many functions."""
+    return tuple(float(i == k) for i in range(number))
+
+
+def _unequal(number: int) -> list[list[tuple[int, tuple[float, ...], tuple[float, ...]]]]:
+    """Return tests: abs(f_0) exceeds abs(f_1) and all other functions, or abs(f_1) does.
+
+    Zero is then not in f_0 + exp(j psi) f_1, whatever the phases of the other functions are.
+    """
+    zero = (0.0,) * number
+    return [
+        [(_TERM if k != most else _VERTEX, _unit(k, number), zero) for k in range(number)]
+        for most in (0, 1)
+    ]
 
 
 @dataclass(frozen=True)
@@ -54,8 +76,7 @@ class Margins:
     ----------
     gain_lower, gain_upper : float
         The loop stays stable for every gain factor between the two; 0 and inf where nothing
-        between factors of 1e-6 and 1e6, next to nulls of L up to 1e4, bounds it; nan where the
-        arms' phases are free.
+        between factors of 1e-4 and 1e4 bounds it; nan where the arms' phases are free.
     phase : float
         Smallest turn in rad, lag or lead, at a gain crossover that makes the loop marginal;
         inf without a crossover.
@@ -114,7 +135,10 @@ def chain_limit(f: Function, g: Function, start: float) -> float:
     """First t >= start at which the neutral root chain of f + t g is not confined (Lemma 13).
 
     What is left of the undelayed term is linear in t between the t at which a term vanishes.
+    A map has no such chain.
     """
+    if f.space.step:
+        return math.inf
     whole, turned = f.space.limits(*stacked([f, g]))
     a, b = (np.append(whole[k], turned[k]) for k in range(2))
     a, b = (np.where(np.abs(v) <= 16.0 * EPSILON * np.abs(v).max(), 0.0, v) for v in (a, b))
@@ -159,47 +183,78 @@ def first_zero(f: Function, g: Function, most: float, start: float) -> tuple[flo
     return (chain, where) if where == math.inf else (best, where)
 
 
-def modulus_of(n: Function, m: Function) -> tuple[float, float]:
+def modulus_of(n: Function, m: Function, free: Free | None = None) -> tuple[float, float]:
     """Smallest |1 + L|, and where."""
     d, (centre, radius) = n + m, Limit.of(n, m)
     best, where = max(abs(1.0 + centre) - radius, 0.0), math.inf
     zero = abs(at_zero(d, m))
     if zero < best:
         best, where = zero, 0.0
+
+    def family(f: Function, g: Function, *arms: Function) -> Family:
+        number = 2 + len(arms)
+        zero = (0.0,) * number
+        test = [(_VERTEX, _unit(0, number), zero), (_TERM, zero, _unit(1, number))]
+        test += [(_TERM, _unit(k, number), zero) for k in range(2, number)]
+        return Family([f, g, *arms], [test], loose=len(arms))
+
+    if free is None:
+        return _over_axis(family(d, m), None, None, DISTANCE, best, where)
+    other = family(free.centre + free.denominator, free.denominator, *free.arms)
+    return _over_axis(family(d, m), other, free, DISTANCE, best, where)
+
+
+def _over_axis(
+    exact: Family, other: Family | None, free: Free | None, goal: int, best: float, where: float
+) -> tuple[float, float]:
+    """Find the least level of a family and, above a frequency, of another one."""
     if not best > 0.0:
         return best, where
-    test = [(_VERTEX, (1.0, 0.0), (0.0, 0.0)), (_TERM, (0.0, 0.0), (0.0, 1.0))]
-    return least(Family([d, m], [test]), DISTANCE, best, where)
+    best, where = least(exact, goal, best, where, high=free.above if free else math.inf)
+    if not (free and other and best > 0.0):
+        return best, where
+    return least(other, goal, best, where, low=free.above, tolerance=_FREE_TOLERANCE)
 
 
-def _phase(n: Function, m: Function) -> tuple[float, float]:
+def _crossover(
+    n: Function,
+    m: Function,
+    free: Free | None,
+    goal: int,
+    slope: tuple[float, float, float, float],
+    best: float,
+    where: float,
+) -> tuple[float, float]:
+    """Find the least turn or delay that puts L on -1; `slope` says how the arc grows."""
+    arc, other = ((0.0, 0.0, 0.0, 0.0), slope), None
+    if free is not None:
+        functions = [free.centre, free.denominator, *free.arms]
+        other = Family(functions, _unequal(len(functions)), arc, len(free.arms))
+    return _over_axis(Family([n, m], _unequal(2), arc), other, free, goal, best, where)
+
+
+def _phase(n: Function, m: Function, free: Free | None) -> tuple[float, float]:
     """Smallest |arg(-L)| where |L| = 1, and where."""
     centre, radius = Limit.of(n, m)
     best, where = math.pi, math.nan
     if abs(abs(centre) - radius) <= 1.0 <= abs(centre) + radius:
         cosine = (radius**2 - 1.0 - centre**2) / (2.0 * centre) if centre else 1.0
         best, where = math.acos(min(max(cosine, -1.0), 1.0)), math.inf
-    if not best > 0.0:
-        return best, where
-    arc = (0.0, 0.0, 0.0, 0.0), (-1.0, 0.0, 1.0, 0.0)
-    return least(Family([n, m], _UNEQUAL, arc), PHASE, best, where)
+    return _crossover(n, m, free, PHASE, (-1.0, 0.0, 1.0, 0.0), best, where)
 
 
-def _delay(n: Function, m: Function) -> tuple[float, float]:
+def _delay(n: Function, m: Function, free: Free | None) -> tuple[float, float]:
     """Smallest arg(-L) / omega where |L| = 1, and where."""
     centre, radius = Limit.of(n, m)
     if abs(centre) + radius >= 1.0:
         return 0.0, math.inf
-    arc = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
-    return least(Family([n, m], _UNEQUAL, arc), DELAY, _LARGEST_DELAY)
+    arc = 0.0, 0.0, 0.0, 1.0
+    return _crossover(n, m, free, DELAY, arc, _LARGEST_DELAY, math.nan)
 
 
 def _gain_up(m: Function, n: Function) -> tuple[float, float]:
     """First k > 1 at which M + k N has a zero on the axis, and where; inf, nan without one."""
-    try:
-        found, where = first_zero(m, n, LARGEST_GAIN, 1.0)
-    except UndecidedError:
-        found, where = first_zero(m, n, LARGEST_NEXT_TO_A_NULL, 1.0)
+    found, where = first_zero(m, n, LARGEST_GAIN, 1.0)
     return (math.inf, math.nan) if math.isnan(where) else (found, where)
 
 
@@ -211,13 +266,15 @@ def gain_range(n: Function, m: Function) -> tuple[float, float, float]:
     return 1.0 / lower, upper, where
 
 
-def margins_of(n: Function, m: Function) -> Margins:
+def margins_of(n: Function, m: Function, free: Free | None = None) -> Margins:
     """Compute all margins of the loop L = N / M.
 
     Parameters
     ----------
     n, m : Function
         Numerator and denominator, of one space.
+    free : Free, optional
+        The same loop with free phases, for all frequencies above one.
 
     Raises
     ------
@@ -227,10 +284,10 @@ def margins_of(n: Function, m: Function) -> Margins:
         If a margin is not decided.
     """
     require_stable(n, m)
-    lower, upper, gain_omega = gain_range(n, m)
-    phase, phase_omega = _phase(n, m)
-    delay, _ = _delay(n, m)
-    modulus, modulus_omega = modulus_of(n, m)
+    lower, upper, gain_omega = (math.nan,) * 3 if free else gain_range(n, m)
+    phase, phase_omega = _phase(n, m, free)
+    delay, _ = _delay(n, m, free)
+    modulus, modulus_omega = modulus_of(n, m, free)
     return Margins(
         gain_lower=lower,
         gain_upper=upper,

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -15,22 +15,17 @@ from numpy.polynomial import polynomial as poly
 from armlock.checks import ComplexArray, FloatArray
 from armlock.engine.inclusion import EPSILON
 
-#: Number of lowest coefficients that are kept exactly.
-LOWEST = 16
-
 
 @dataclass(frozen=True)
 class Polynomial:
-    """A real polynomial of s.
+    """A real polynomial of s that is not zero, exactly.
 
     Attributes
     ----------
-    lead : float
+    lead : Fraction
         The highest coefficient.
     roots : tuple of complex
         In conjugate pairs. They define the polynomial, or were computed.
-    lowest : tuple of Fraction
-        The lowest coefficients, up to 16 of them, exactly.
     computed : frozenset of int
         Places of the roots that were computed; the others are exact.
     factors : tuple of tuple of Fraction
@@ -42,9 +37,8 @@ class Polynomial:
         Whether all roots are rounded, by half an EPSILON of their size each.
     """
 
-    lead: float
+    lead: Fraction
     roots: tuple[complex, ...]
-    lowest: tuple[Fraction, ...]
     computed: frozenset[int] = frozenset()
     factors: tuple[tuple[Fraction, ...], ...] = ()
     missed: float = 0.0
@@ -52,7 +46,7 @@ class Polynomial:
 
     @classmethod
     def of(cls, coefficients: Iterable[Any]) -> Polynomial:
-        """Return the polynomial with these coefficients, ascending; zero has none.
+        """Return the polynomial with these coefficients, ascending, of which one is not zero.
 
         Raises
         ------
@@ -60,41 +54,76 @@ class Polynomial:
             If its roots are not found.
         """
         exact = [Fraction(value) for value in coefficients]
-        while exact and exact[-1] == 0:
+        while exact[-1] == 0:
             exact.pop()
-        if not exact:
-            return cls(0.0, (), ())
         at_zero = next(k for k, value in enumerate(exact) if value)
         other = np.array([float(value) for value in exact[at_zero:]])
         roots = _roots(other)
-        missed = _missed(roots, other) if roots.size else 0.0
+        if not roots.size:
+            return cls(exact[-1], (0j,) * at_zero)
         return cls(
-            float(exact[-1]),
+            exact[-1],
             (0j,) * at_zero + tuple(roots.tolist()),
-            tuple(exact[:LOWEST]),
             frozenset(range(at_zero, at_zero + roots.size)),
-            (tuple(value / exact[-1] for value in exact[at_zero:]),) if roots.size else (),
-            missed,
+            (tuple(value / exact[-1] for value in exact[at_zero:]),),
+            _missed(roots, other),
+        )
+
+    @classmethod
+    def of_roots(cls, roots: Iterable[complex], lead: float = 1.0) -> Polynomial:
+        """Return the polynomial with these roots, which come in conjugate pairs."""
+        return cls(Fraction(lead), tuple(complex(root) for root in roots))
+
+    def __mul__(self, other: Polynomial) -> Polynomial:
+        """Return the product, with the roots of both."""
+        moved = frozenset(len(self.roots) + k for k in other.computed)
+        return Polynomial(
+            self.lead * other.lead,
+            self.roots + other.roots,
+            self.computed | moved,
+            self.factors + other.factors,
+            (1.0 + self.missed) * (1.0 + other.missed) - 1.0,
         )
 
     @property
     def degree(self) -> int:
-        """The degree; 0 of zero."""
+        """The degree."""
         return len(self.roots)
+
+    @property
+    def order(self) -> int:
+        """Order of the root at s = 0."""
+        return self.roots.count(0j)
+
+    def over_powers(self, number: int) -> Polynomial:
+        """Return p(s) / s^number, for as many roots at s = 0."""
+        gone = [k for k, root in enumerate(self.roots) if root == 0j][:number]
+        left = [k for k in range(len(self.roots)) if k not in gone]
+        computed = frozenset(i for i, k in enumerate(left) if k in self.computed)
+        return replace(self, roots=tuple(self.roots[k] for k in left), computed=computed)
+
+    @cached_property
+    def exact(self) -> tuple[Fraction, ...]:
+        """Coefficients in ascending powers of s, exactly."""
+        found = [self.lead]
+        for k, root in enumerate(self.roots):
+            a, b = Fraction(root.real), Fraction(root.imag)
+            if k not in self.computed and b == 0:
+                found = _product(found, [-a, Fraction(1)])
+            elif k not in self.computed and b > 0:
+                found = _product(found, [a * a + b * b, -2 * a, Fraction(1)])
+        for factor in self.factors:
+            found = _product(found, factor)
+        return tuple(found)
 
     @cached_property
     def coefficients(self) -> FloatArray:
-        """Coefficients in ascending powers of s."""
-        if len(self.lowest) == len(self.roots) + 1:
-            return np.array([float(value) for value in self.lowest])
-        found = np.array([complex(self.lead)])
-        for root in sorted(self.roots, key=abs):
-            found = np.convolve(found, [-root, 1.0])
-        return np.array(found.real if self else [0.0], dtype=np.float64)
+        """Coefficients in ascending powers of s, rounded; inf where a number overflows."""
+        return np.array([_rounded(value) for value in self.exact])
 
     def evaluated(self, s: Any) -> tuple[Any, Any]:
         """Value and derivative at s, in numpy's or mpmath's numbers."""
-        value, slope = 0.0 * s + self.lead, 0.0 * s
+        value, slope = 0.0 * s + _in(s, self.lead), 0.0 * s
         for k, root in enumerate(self.roots):
             if k not in self.computed:
                 value, slope = value * (s - root), slope * (s - root) + value
@@ -104,6 +133,23 @@ class Polynomial:
                 p, dp = p * s + _in(s, c), dp * s + p
             value, slope = value * p, slope * p + value * dp
         return value, slope
+
+
+def _product(p: Sequence[Fraction], q: Sequence[Fraction]) -> list[Fraction]:
+    """Multiply two polynomials in ascending powers."""
+    found = [Fraction(0)] * (len(p) + len(q) - 1)
+    for i, a in enumerate(p):
+        for k, b in enumerate(q):
+            found[i + k] += a * b
+    return found
+
+
+def _rounded(value: Fraction) -> float:
+    """Return a fraction as a float; inf where that overflows."""
+    try:
+        return float(value)
+    except OverflowError:
+        return np.inf if value > 0 else -np.inf
 
 
 def _in(s: Any, value: Fraction) -> Any:

@@ -337,7 +337,7 @@ def loop_count(
     --------
     >>> from armlock import SingleArm, unstable_roots
     >>> from armlock.stability.counts import loop_count
-    >>> loop = SingleArm(gain=50.0, tau=10.0, delay=0.05)
+    >>> loop = SingleArm(gain=50.0, tau1=10.0, delay=0.05)
     >>> int(unstable_roots(loop.plain(), 1.0, 1.0)), loop_count(loop)
     (-1, 166)
     """

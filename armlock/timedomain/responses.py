@@ -5,7 +5,7 @@ With sigma to the right of all poles, the response is a Fourier integral,
     y(t) = exp(sigma t) / (2 pi) int Y(sigma + j omega) exp(j omega t) d omega .
 
 Jumps and kinks would make it converge slowly. They follow from the expansion of G in powers of
-1/s, whose coefficients are sums of delays, and are taken out and put back exactly.
+1 / (s + corner), whose coefficients are sums of delays, and are taken out and put back exactly.
 """
 
 from __future__ import annotations
@@ -21,13 +21,14 @@ import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
 from armlock.checks import ComplexArray, FloatArray, finite_series, positive_number
-from armlock.delays import DelaySystem, QuasiPolynomial, functions
+from armlock.controllers import Controller
+from armlock.delays import DelaySystem, QuasiPolynomial, functions, moved
 from armlock.engine.decide import count
 
 if TYPE_CHECKING:
     import control
 
-# Powers of 1/s that are taken out.
+# Powers of 1 / (s + corner) that are taken out.
 _ORDERS = 3
 # By how many powers of e what comes after the period is damped, to 3e-10. As half of them
 # multiply rounding errors, there are no more.
@@ -38,6 +39,8 @@ _FIRST, _MOST = 2**13, 2**21
 _TOLERANCE = 1e-7
 # Jumps and kinks that are followed.
 _MOST_JUMPS = 20_000
+
+_INTEGRATOR = DelaySystem.of(Controller([], [0.0], 1.0))
 
 #: A sum of exponentials exp(-s theta): delays and coefficients.
 _Jumps = dict[Fraction, float]
@@ -61,8 +64,14 @@ def step_response(system: DelaySystem, timepts: npt.ArrayLike) -> control.TimeRe
     Raises
     ------
     TypeError, ValueError
-        If `timepts` is not finite and ascending from 0 on, the system has more zeros than
-        poles or an unconfined chain, or the times end too late for its fastest root.
+        If `timepts` is not finite and ascending from 0 on, the response has derivatives of
+        impulses, the system has an unconfined chain, or the times end too late for its
+        fastest root.
+
+    Warns
+    -----
+    UserWarning
+        If the response contains impulses. They are no part of the outputs.
 
     Notes
     -----
@@ -77,7 +86,8 @@ def step_response(system: DelaySystem, timepts: npt.ArrayLike) -> control.TimeRe
     >>> print(step_response(loop.feedback(), [0.5, 1.5, 2.5]).outputs.round(6))
     [0.    0.5   1.375]
     """
-    return _response(DelaySystem.of(system), timepts, step=True)
+    integrated = DelaySystem.of(system) * _INTEGRATOR
+    return _response(integrated, timepts, "Step")
 
 
 def impulse_response(system: DelaySystem, timepts: npt.ArrayLike) -> control.TimeResponseData:
@@ -103,7 +113,7 @@ def impulse_response(system: DelaySystem, timepts: npt.ArrayLike) -> control.Tim
     Warns
     -----
     UserWarning
-        If the response contains impulses. They are no part of the outputs.
+        As that of `step_response`.
 
     Notes
     -----
@@ -117,13 +127,13 @@ def impulse_response(system: DelaySystem, timepts: npt.ArrayLike) -> control.Tim
     >>> print(found.outputs.round(6))
     [0.       1.       0.367879]
     """
-    return _response(DelaySystem.of(system), timepts, step=False)
+    return _response(DelaySystem.of(system), timepts, "Impulse")
 
 
 def _response(
-    system: DelaySystem, timepts: npt.ArrayLike, *, step: bool
+    system: DelaySystem, timepts: npt.ArrayLike, what: str
 ) -> control.TimeResponseData:
-    """Return one of the two responses."""
+    """Return the response to an impulse."""
     import control
 
     if np.ndim(timepts) == 0:
@@ -131,37 +141,32 @@ def _response(
     time = finite_series("timepts", timepts)
     if time.size == 0 or time[0] < 0.0 or (np.diff(time) <= 0.0).any() or time[-1] == 0.0:
         raise ValueError(f"timepts must ascend from 0 s on, got {time}")
-    outputs = _inverted(system, time, step)
-    inputs = np.ones(time.size) if step else np.zeros(time.size)
-    what = "Step" if step else "Impulse"
+    inputs = np.full(time.size, float(what == "Step"))
     return control.TimeResponseData(
-        time, outputs, inputs=inputs, issiso=True, title=f"{what} response"
+        time, _inverted(system, time), inputs=inputs, issiso=True, title=f"{what} response"
     )
 
 
-def _inverted(system: DelaySystem, time: FloatArray, step: bool) -> FloatArray:
-    """Invert G(s) / s or G(s) at some times."""
-    last = float(time[-1])
-    n, m = (_powers(q, _degree(system)) for q in (system.numerator, system.denominator))
+def _inverted(system: DelaySystem, time: FloatArray) -> FloatArray:
+    """Invert G(s) at some times."""
+    last, degree = float(time[-1]), _degree(system)
     corner = float(functions(system.denominator)[0].space.corners[-1])
-    jumps = _expansion(n, m, last * (1.0 + 1e-9))
-    if not step:
-        if jumps[0]:
-            at = ", ".join(f"{float(theta):g}" for theta in sorted(jumps[0])[:5])
-            warnings.warn(f"impulses at t = {at} s are not in the outputs", stacklevel=4)
-        jumps = jumps[1:]
-    jumps = _about(jumps[:_ORDERS], corner)
+    n, m = (_powers(q, degree, corner) for q in (system.numerator, system.denominator))
+    impulses, *jumps = _expansion(n, m, last * (1.0 + 1e-9))
+    if impulses:
+        at = ", ".join(f"{float(theta):g}" for theta in sorted(impulses)[:5])
+        warnings.warn(f"impulses at t = {at} s are not in the outputs", stacklevel=4)
     known = np.sum(
         [_after(time, part, k, corner, last) for k, part in enumerate(jumps)], axis=0
     )
     period = 2.0 * last
     sigma = _right_of_poles(system, last) + _DAMPED / period
     # Where nothing is left without the impulses, rounding is.
-    least = float(np.abs(system(sigma))) / (1.0 if step else last)
+    least = float(np.abs(system(sigma))) / last
     before, points = None, _FIRST
     while points <= _MOST:
         s = np.asarray(sigma + 2j * np.pi / period * np.arange(points))
-        found: FloatArray = known + _smooth(system, n, m, s, corner, step, period, time)
+        found: FloatArray = known + _smooth(system, n, m, s, corner, period, time)
         size = max(float(np.abs(found).max()), least)
         if before is not None and np.abs(found - before).max() <= _TOLERANCE * size:
             return found
@@ -183,16 +188,17 @@ def _degree(system: DelaySystem) -> int:
     return len(whole) - 1
 
 
-def _powers(q: QuasiPolynomial, degree: int) -> list[_Jumps]:
-    """Coefficients of s^degree, s^(degree - 1), ...: sums of delays."""
+def _powers(q: QuasiPolynomial, degree: int, corner: float) -> list[_Jumps]:
+    """Coefficients of the highest powers of s + corner, from `degree` on: sums of delays."""
+    of = [(theta, moved(p, -corner)) for theta, p in q.terms]
     return [
-        {theta: float(p[i]) for theta, p in q.terms if 0 <= i < len(p) and p[i]}
+        {theta: float(p[i]) for theta, p in of if 0 <= i < len(p) and p[i]}
         for i in range(degree, degree - _ORDERS - 1, -1)
     ]
 
 
 def _expansion(n: list[_Jumps], m: list[_Jumps], last: float) -> list[_Jumps]:
-    """Coefficients of N / M in powers of 1/s, up to the last time."""
+    """Coefficients of N / M in powers of 1 / (s + corner), up to the last time."""
     found: list[_Jumps] = []
     for order, above in enumerate(n):
         left = dict(above)
@@ -229,19 +235,6 @@ def _quotient(left: _Jumps, by: _Jumps, last: float) -> _Jumps:
     return found
 
 
-def _about(h: list[_Jumps], corner: float) -> list[_Jumps]:
-    """Turn coefficients of 1/s, 1/s^2, 1/s^3 into those of powers of 1 / (s + corner)."""
-    factors = ((1.0,), (corner, 1.0), (corner**2, 2.0 * corner, 1.0))
-    found: list[_Jumps] = []
-    for row in factors:
-        total: _Jumps = {}
-        for factor, part in zip(row, h, strict=False):
-            for theta, value in part.items():
-                total[theta] = total.get(theta, 0.0) + factor * value
-        found.append(total)
-    return found
-
-
 def _after(time: FloatArray, part: _Jumps, k: int, corner: float, last: float) -> FloatArray:
     """Sum t^k / k! exp(-corner t) after each delay; a time just before counts as at it."""
     found = np.zeros(time.size)
@@ -272,7 +265,6 @@ def _smooth(
     m: list[_Jumps],
     s: ComplexArray,
     corner: float,
-    step: bool,
     period: float,
     time: FloatArray,
 ) -> FloatArray:
@@ -290,12 +282,7 @@ def _smooth(
     for order in range(_ORDERS + 1):
         left = above[order] - sum(below[k] * g[order - k] for k in range(1, order + 1))
         g.append(left / below[0])
-    left = system(s) / s if step else system(s) - g[0]
-    h1, h2, h3 = g[:3] if step else g[1:]
-    w = 1.0 / (s + corner)
-    left = left - w * (
-        h1 + w * (h2 + corner * h1 + w * (h3 + 2.0 * corner * h2 + corner**2 * h1))
-    )
+    left = system(s) - sum(part / (s + corner) ** k for k, part in enumerate(g))
     size = 2 * s.size
     wave = np.fft.irfft(left, size)[: s.size + 1] * (size / period)
     even = np.arange(s.size + 1) * (period / size)

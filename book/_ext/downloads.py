@@ -1,4 +1,4 @@
-"""Links to the files of a figure, `figures/NAME.svg` and `figures/NAME.csv`, below the figure.
+"""Links below each figure: to its files, `figures/NAME.svg` and `.csv`, and to its cell.
 
 `tools/collect_figures.py` writes the files. NAME is the name of the figure without `fig-`.
 """
@@ -6,6 +6,16 @@
 from pathlib import Path
 
 from docutils import nodes
+
+
+def made_by(figure):
+    """Return a link to the cell that made a figure, by its number after a run."""
+    cell = figure.parent
+    while cell.get("nb_element") != "cell_code":
+        cell = cell.parent
+    number = cell["exec_count"]
+    cell["ids"] = [f"cell-{number}"]
+    return f'made by <a href="#cell-{number}">cell [{number}]</a> of the notebook'
 
 
 def link(app, doctree):
@@ -20,7 +30,8 @@ def link(app, doctree):
                     f'<a href="{up}figures/{file.name}" download>{file.suffix[1:].upper()}</a>'
                     for file in files
                 )
-                text = f'<p class="figure-downloads">Download this figure: {links}</p>'
+                text = f"{links}, {made_by(figure)}"
+                text = f'<p class="figure-downloads">This figure: {text}</p>'
                 figure.parent.insert(
                     figure.parent.index(figure) + 1, nodes.raw("", text, format="html")
                 )

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from armlock.checks import FloatArray
 from armlock.engine.margins import Margins
-from armlock.loops import Loop, LoopAt, SingleArm, flight_loop
+from armlock.loops import Loop, SingleArm, flight_loop
 from armlock.performance.budget import (
     LASERS,
     LEVELS,
@@ -21,9 +21,7 @@ from armlock.performance.budget import (
 )
 from armlock.performance.pulling import largest_pulling, pulling
 from armlock.performance.transfer import transfer
-from armlock.robustness.discs import MODULUS, PHASE, free_margins_over
-from armlock.robustness.free_phases import arms_of
-from armlock.robustness.margins import critical_perturbation, margins
+from armlock.robustness import critical_perturbation, margins
 from armlock.sensors import modified_dual
 from armlock.stability.counts import unstable_roots
 from book.companion.claims.ledger import Finding, Verdict, claim
@@ -87,10 +85,18 @@ def uniform(loop: Loop, free_from: float = FREE_FROM) -> Margins:
 def free_margins(loop: Loop, frequency: FloatArray) -> FloatArray:
     """Return modulus margin and phase margin in degrees over all phases of both arms.
 
-    At each frequency in closed form; shape (2, n).
+    At each frequency in closed form; shape (2, n). L fills a disc, which covers the unit circle
+    up to half an angle on both sides of its centre.
     """
-    found = free_margins_over(arms_of(LoopAt(loop, 1.0, 1.0), free=True), TURN * frequency)
-    return np.array([found[:, MODULUS], np.degrees(found[:, PHASE])])
+    first, second = loop.arm_responses(1j * TURN * frequency)
+    centre, radius = first + second, np.abs(first) + np.abs(second)
+    size = np.abs(centre)
+    cosine = (1.0 + size**2 - radius**2) / (2.0 * size)
+    half = np.arccos(np.clip(cosine, -1.0, 1.0))
+    phase = np.maximum(np.abs(np.angle(-centre)) - half, 0.0)
+    phase = np.where(radius <= np.abs(size - 1.0), np.inf, phase)
+    phase = np.where(radius >= size + 1.0, 0.0, phase)
+    return np.array([np.maximum(np.abs(1.0 + centre) - radius, 0.0), np.degrees(phase)])
 
 
 def most_laser(loop: Loop, frequency: FloatArray) -> FloatArray:
