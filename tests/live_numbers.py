@@ -33,7 +33,7 @@ LOAD = """() => {
     Object.assign(live, armlockMargins(live), armlockChart(live));
 }"""
 #: What a count in a browser is where it is no number of roots, as `loop.js` has it.
-BOUNDARY, UNCONFINED, UNSURE = -1, -2, -3
+BOUNDARY, UNCONFINED, UNDECIDED = -1, -2, -3
 #: What a number may differ by, relative; `margins.js` has it as NEAR. Next to a limit of the
 #: chain both sides take the limit for roots that cross closer to it.
 NEAR = 1.001e-3
@@ -147,7 +147,8 @@ class Comparison:
     def number(self, name, case, hers, ours, verdict=None):
         """Hers is the page's number as text, ours the package's.
 
-        Where they differ, `verdict` asks a third one, which shares no code with the two.
+        Where they differ, `verdict` asks a third one: one that shares no code with the two, or
+        the package's counts.
         """
         self.asked[name] += 1
         hers = float(hers)
@@ -193,7 +194,7 @@ class Comparison:
         count = self.package("count", closed_loop_count, loop, *point)
         if not isinstance(count, Exception):
             self.asked["count"] += 1
-            if page["count"] == UNSURE or (page["count"] == BOUNDARY != count):
+            if page["count"] == UNDECIDED or (page["count"] == BOUNDARY != count):
                 self.unsure["count"] += 1
             elif count not in (page["count"], BOUNDARY):
                 self.wrong.append(("count", case, page["count"], int(count)))
@@ -212,8 +213,18 @@ class Comparison:
             ours = self.package("break", critical_perturbation, loop, direction)
             if self.one_has_none(f"break {direction}", case, hers, ours):
                 continue
+
+            def lost_earlier(first=float(hers), ours=ours, direction=direction):
+                # The package's own counts say that the loop is lost at the smaller one.
+                near = [
+                    1.0 + first * share * np.array(direction) for share in (1 - NEAR, 1 + NEAR)
+                ]
+                inside, outside = (closed_loop_count(loop, *point) for point in near)
+                return first if first < ours and inside == 0 < outside else math.nan
+
             # The page looks no farther than 2.
-            self.number(f"break {direction}", case, hers, ours if ours <= 2.0 else math.inf)
+            ours = ours if ours <= 2.0 else math.inf
+            self.number(f"break {direction}", case, hers, ours, lost_earlier)
         ours = self.package("margins", margins, loop, *point)
         hers = page["margins"]
         if self.one_has_none("margins", case, hers, ours):
@@ -267,9 +278,7 @@ def main():
     for name, case, hers, ours in found.wrong:
         print(f"WRONG {name}: page {hers}, package {ours}\n   {case}")
     for name, case, hers, ours in found.judged:
-        print(
-            f"THE PACKAGE IS WRONG {name}: {ours}, the judge says as the page {hers}\n   {case}"
-        )
+        print(f"THE PACKAGE IS WRONG {name}: {ours}, but the page is right: {hers}\n   {case}")
     for name, asked in found.asked.items():
         print(
             f"{name}: {asked} numbers, {found.unsure[name] / asked:.2%} undecided, worst "

@@ -5,7 +5,7 @@
  * the pointer in every frame.
  */
 const armlockDraw = (function () {
-  const { TURN, say, scientific, power } = armlockText;
+  const { TURN, say, scientific, power } = armlockText, { UNCONFINED } = armlockLoop();
   // The paper's perturbations.
   const SQUARE = 1e-6;
 
@@ -208,7 +208,7 @@ const armlockDraw = (function () {
       const pixels = new Uint32Array(image.data.buffer);
       for (let j = 0; j < n; j++) for (let i = 0; i < n; i++) {
         const count = counts[j * n + i];
-        pixels[(n - 1 - j) * n + i] = count >= 0 ? shades[count] : count === -2 ? lost
+        pixels[(n - 1 - j) * n + i] = count >= 0 ? shades[count] : count === UNCONFINED ? lost
           : unsure[(i + j) * 100 / n % 8 < 4 ? 0 : 1];
       }
       picture.getContext("2d").putImageData(image, 0, 0);
@@ -510,7 +510,7 @@ const armlockDraw = (function () {
 
   /* The same at the first place near (x, y) where it covers no other of `taken`. */
   function labelBeside(pen, text, x, y, colours, taken) {
-    const long = pen.measureText(text).width, left = pen.textAlign === "right" ? x - long : x;
+    const long = pen.measureText(text).width, left = x - { left: 0, center: 0.5, right: 1 }[pen.textAlign] * long;
     const free = v => taken.every(([a, b, c]) => left > b || left + long < a || Math.abs(v - c) > 15);
     const found = [0, -15, 15, -30, 30].map(d => y + d).find(free) ?? y;
     taken.push([left, left + long, found]);
@@ -535,11 +535,11 @@ const armlockDraw = (function () {
     }
     pen.textAlign = "center";
     pen.textBaseline = "middle";
-    return () => {
+    return taken => {
       let last = 0;
       for (const size of sizes) if (radius(size) > last + 22) {
         last = radius(size);
-        label(pen, write(size), cx + last * Math.cos(angle), cy + last * Math.sin(angle), colours);
+        labelBeside(pen, write(size), cx + last * Math.cos(angle), cy + last * Math.sin(angle), colours, taken);
       }
     };
   }
@@ -599,7 +599,8 @@ const armlockDraw = (function () {
     pen.strokeStyle = colours.line;
     curve(pen, half.length, i => half[i]);
     if (other) ghost(pen, colours, () => curve(pen, other.length, i => other[i]));
-    named();
+    const taken = [];
+    named(taken);
     pen.strokeStyle = colours.mark;
     pen.lineWidth = 2;
     const x = cx - radius(1);
@@ -617,8 +618,8 @@ const armlockDraw = (function () {
       pen.stroke();
       pen.textAlign = "center";
       const text = `${degrees(margins.phase)} at ${hertz(margins.phaseAt)}`;
-      label(pen, text, Math.max(x, 0.5 * pen.measureText(text).width + 4), cy + (b < 0 ? 1 : -1)
-        * (radius(1) + 14), colours);
+      labelBeside(pen, text, Math.max(x, 0.5 * pen.measureText(text).width + 4), cy + (b < 0 ? 1 : -1)
+        * (radius(1) + 14), colours, taken);
     }
     pen.lineWidth = 1;
     if (lit !== null) ring(pen, ...bent(re[lit], im[lit]), 6, colours);
@@ -741,7 +742,7 @@ const armlockDraw = (function () {
     pen.lineTo(cx + full, cy);
     pen.stroke();
     if (sizes.length) rings(pen, [cx, cy], sizes, v => full * share(v * unit),
-      v => power(Math.round(Math.log10(v))), places, colours)();
+      v => power(Math.round(Math.log10(v))), places, colours)([]);
     pen.lineWidth = 2;
     for (const root of zeros) {
       pen.strokeStyle = colours.line;

@@ -694,6 +694,6 @@ function armlockLoop() {
     return found.sort((p, q) => q[0] - p[0]);
   }
 
-  return { EPSILON, BOUNDARY, UNCONFINED, UNDECIDED, MOST_STEPS, SENSORS, make, reduced, at, beside, along, Curve, tail,
+  return { EPSILON, BOUNDARY, UNCONFINED, UNDECIDED, make, reduced, at, beside, along, Curve, tail,
     chainLeads, tangentDistance, vanishes, count, response, rightmost, rootsOf };
 }

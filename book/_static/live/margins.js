@@ -503,5 +503,5 @@ function armlockMargins(api) {
       upperAt: gains.upperAt, phaseAt: phase.where, modulusAt: modulus.where };
   }
 
-  return { FARTHEST, LARGEST, NEAR, firstBreak, margins };
+  return { firstBreak, margins };
 }

@@ -63,7 +63,8 @@ function armlockPages() {
   const SENSORS = [["single", "single arm"], ["common", "common arm"],
     ["difference", "difference of the arms"], ["dual", "dual"], ["modified", "modified dual"]];
   const LOST = "unstable at arbitrarily high frequency";
-  const WORDS = { [-1]: "a root on the imaginary axis", [-2]: LOST, [-3]: "undecided" };
+  const { BOUNDARY, UNCONFINED, UNDECIDED } = api;
+  const WORDS = { [BOUNDARY]: "a root on the imaginary axis", [UNCONFINED]: LOST, [UNDECIDED]: "undecided" };
 
   function counted(count) {
     return count === 0 ? "stable" : count > 0
@@ -88,15 +89,15 @@ function armlockPages() {
       // the loop is unstable. Without `whole` only whether it is.
       day: (spec, whole) => {
         const count = api.count(api.make(spec), 1, 1);
-        if (count > 0 || count === -2) return null;
+        if (count > 0 || count === api.UNCONFINED) return null;
         const found = whole || count ? breaks(spec, [[1, -1], [-1, 1]]) : [NaN];
         return found.includes(null) ? null : Math.min(...found);
       },
     };
-    return ({ data: { kind, version, input } }) => {
+    return ({ data: { kind, input } }) => {
       let result = null, error = null;
       try { result = look[kind.split(" ")[0]](...input); } catch (problem) { error = problem.message; }
-      postMessage({ kind, version, result, error }, result?.counts ? [result.counts.buffer] : []);
+      postMessage({ result, error }, result?.counts ? [result.counts.buffer] : []);
     };
   }
 
@@ -108,27 +109,26 @@ function armlockPages() {
         onmessage = (${tasks})(api);`;
       this.worker = new Worker(URL.createObjectURL(new Blob([text], { type: "text/javascript" })));
       this.worker.onmessage = ({ data }) => {
-        const { kind, version, result, error } = data, { heard } = this.running;
+        const { running } = this;
         this.running = null;
-        if (version === this.versions[kind]) heard(result, error);
+        if (this.last[running.kind] === running) running.heard(data.result, data.error);
         this.next();
       };
       this.order = order;
-      this.versions = {};
+      this.last = {};
       this.waiting = {};
       this.running = null;
     }
 
     ask(kind, input, heard) {
-      this.versions[kind] = (this.versions[kind] || 0) + 1;
-      this.waiting[kind] = { kind, version: this.versions[kind], input, heard };
+      this.last[kind] = this.waiting[kind] = { kind, input, heard };
       this.next();
     }
 
     drop(...kinds) {
       for (const kind of kinds) {
         delete this.waiting[kind];
-        this.versions[kind] = (this.versions[kind] || 0) + 1;
+        delete this.last[kind];
       }
     }
 
@@ -137,8 +137,7 @@ function armlockPages() {
       if (this.running || !kind) return;
       this.running = this.waiting[kind];
       delete this.waiting[kind];
-      const { version, input } = this.running;
-      this.worker.postMessage({ kind, version, input });
+      this.worker.postMessage({ kind, input: this.running.input });
     }
   }
 
@@ -146,7 +145,7 @@ function armlockPages() {
 
   // What the table has of a loop, in the order in which it is found, and what it says where it is not.
   const TOLD = ["count", "root", "breaks", "margins"];
-  const UNTOLD = { count: -3, root: null, breaks: [NaN, NaN, NaN, NaN],
+  const UNTOLD = { count: UNDECIDED, root: null, breaks: [NaN, NaN, NaN, NaN],
     margins: { lower: NaN, upper: NaN, phase: NaN, modulus: NaN } };
   let number = 0;
 
@@ -316,9 +315,9 @@ function armlockPages() {
           this.chart.fill(finer);
           const share = 1 - finer.sure;
           this.note.textContent = share ? `${share > 0.999 ? "All" : `${say(100 * share, 2)} %`} of the chart is `
-            + "undecided, and striped." : finer.counts.every(count => count === -2)
+            + "undecided (striped)." : finer.counts.every(count => count === UNCONFINED)
             ? `The loop is ${LOST} in the whole chart. This is certain.`
-            : "Every pixel of the chart is certain, and lines between areas to a pixel.";
+            : "Every pixel of the chart is certain. The lines between areas are true to a pixel.";
         });
       });
     }
@@ -348,7 +347,7 @@ function armlockPages() {
       const { told } = this.design;
       if (told.count === undefined) this.near.ask("point", [this.spec, ...point], (count, error) => {
         if (error) this.out.textContent = error;
-        else if (count > -3 && told === this.design?.told) {
+        else if (count !== UNDECIDED && told === this.design?.told) {
           told.count = count;
           this.write();
         }
@@ -361,13 +360,15 @@ function armlockPages() {
     write() {
       const { count, root } = this.design.told;
       const parts = [`${this.name}: ${count === undefined ? "counting \u2026" : counted(count)}`];
-      if (root && count >= 0) parts.push(`rightmost root ${this.rootText(root)} rad/s, which `
-        + `${root[0] < 0 ? "decays" : "grows"} by e in ${duration(1 / Math.abs(root[0]))}`);
+      if (root && count >= 0) parts.push(`rightmost root in rad/s: ${this.rootText(root)}; it `
+        + `${root[0] < 0 ? "decays" : "grows"} by a factor of e in ${duration(1 / Math.abs(root[0]))}`);
       this.out.textContent = `${parts.join("; ")}.${this.chart.held ? " Held: Escape releases it." : ""}`;
       this.list();
     }
 
-    rootText([re, im]) { return `${say(re)}${im ? ` \u00b1 ${say(Math.abs(im))}j` : ""}`; }
+    rootText([re, im]) {
+      return `${say(re)}${im === Infinity ? ", the limit at high frequency" : im ? ` \u00b1 ${say(Math.abs(im))}j` : ""}`;
+    }
 
     /* Ask for what takes longer. */
     settle() {
@@ -396,15 +397,15 @@ function armlockPages() {
       const or = (value, special, words, at) => Number.isNaN(value) ? "undecided" : value === special ? words
         : `${say(value)}${at > 0 && at < Infinity ? ` at ${say(at / TURN)} Hz` : ""}`;
       const broken = value => value === null ? "unstable at (1, 1)"
-        : value === 0 ? "0: any perturbation" : or(value, Infinity, "none up to 2");
+        : value === 0 ? "0: none is tolerated" : or(value, Infinity, "none up to 2");
       const of = (read, found) => designs.map(one => found(one) === undefined ? wait : read(found(one)));
       const margin = read => of(found => found ? read(found) : "none: unstable", one => one.told.margins);
       const parts = [
         [`At ${this.name}`, ["Unstable roots", of(n => n >= 0 ? String(n) : WORDS[n], one => one.told.count)],
           ["Rightmost root in rad/s", designs.map(({ told: { count, root } }) => count < 0 ? WORDS[count]
             : root === undefined ? wait : root ? this.rootText(root) : "undecided")],
-          ["Smallest gain factor that keeps it stable", margin(m => or(m.lower, 0, `none above 1/${m.most}`, m.lowerAt))],
-          ["Largest gain factor", margin(m => or(m.upper, Infinity, `none up to ${m.most}`, m.upperAt))],
+          ["Smallest gain factor of a stable loop", margin(m => or(m.lower, 0, `none above 1/${m.most}`, m.lowerAt))],
+          ["Largest gain factor of a stable loop", margin(m => or(m.upper, Infinity, `none up to ${m.most}`, m.upperAt))],
           ["Phase margin in degrees", margin(m => or(m.phase * 180 / Math.PI, Infinity, "no crossover", m.phaseAt))],
           ["Smallest |1 + L|", margin(m => or(m.modulus, Infinity, "", m.modulusAt))]],
         ["Critical perturbation from (1, 1)", ...["(1, \u22121)", "(\u22121, 1)", "(1, 1)", "(\u22121, \u22121)"].map(
@@ -561,13 +562,13 @@ function armlockPages() {
       before = step || before;
       const write = () => {
         history[further ? "pushState" : "replaceState"]({ depth }, "", hash);
-        undo.disabled = !depth;
       };
       clearTimeout(later);
-      if (further) depth++;
+      if (further) undo.disabled = !++depth;
       if (further) write(); else later = setTimeout(write, 200);
     };
-    const undo = button("Undo", () => history.back());
+    // What the fields hold and is no loop is in no address: to undo it takes the loop of the address.
+    const undo = button("Undo", () => { if (live.spec) history.back(); else open(); });
 
     /* An error stands at its field. */
     const blame = (name, message) => {
@@ -583,7 +584,7 @@ function armlockPages() {
       const spec = { sensor: fields.sensor.value };
       for (const name of ["tau1", "tau2", "delay", "gain"]) spec[name] = readNumber(name, fields[name].value, NAMES[name]);
       if (["dual", "modified"].includes(spec.sensor)) for (const name of ["corner", "difference"])
-        spec[name] = readNumber(name, fields[name].value, NAMES[name]) * (name === "corner" ? unit : 1);
+        spec[name] = readNumber(name, fields[name].value, NAMES[name]) * (name === "corner" ? TURN : 1);
       for (const [name, title] of [["zeros", "Zeros"], ["poles", "Poles"]])
         spec[name] = readRoots(name, fields[name].value, title).map(v => v.map(x => x * unit));
       api.make(spec);
@@ -597,8 +598,11 @@ function armlockPages() {
         if (edited === "pasted") {
           const [above, under] = readController("pasted", fields.pasted.value);
           if (!above.some(v => v)) throw Object.assign(new RangeError("It must not be zero."), { field: "pasted" });
+          // Its coefficients are those of s in rad/s.
+          unit = 1;
+          fields.unit.value = "1";
           fields.gain.value = exact(above.find(v => v) / under.find(v => v));
-          [fields.zeros.value, fields.poles.value] = [above, under].map(part => written(api.rootsOf(part), unit));
+          [fields.zeros.value, fields.poles.value] = [above, under].map(part => written(api.rootsOf(part)));
           fields.pasted.value = "";
         }
         const spec = read();
@@ -614,13 +618,15 @@ function armlockPages() {
         presets.value = Object.keys(PRESETS).find(name => same(spec, PRESETS[name][0])) || "";
         live.set(spec, moving);
         if (!dragged || caught) roots.draw();
+        undo.disabled = !depth;
         if (!moving) live.moved("loop");
       } catch (error) {
         // Too few poles are too many zeros: the field that was edited is the one to look at.
         const name = error.field === "zeros" && edited === "poles" ? edited : fields[error.field] ? error.field : "sensor";
         blame(name, error.message);
         wrong.textContent = error.message;
-        live.none("There is no loop to show: a field holds none.");
+        undo.disabled = false;
+        live.none("There is no loop to show, because a field has an error.");
         code.textContent = "";
         orbit.removeAttribute("href");
         roots.draw();
@@ -636,7 +642,7 @@ function armlockPages() {
     const put = spec => {
       for (const name of ["sensor", "tau1", "tau2", "delay", "gain", "difference"])
         if (spec[name] !== undefined) fields[name].value = String(spec[name]);
-      if (spec.corner !== undefined) fields.corner.value = shortest(spec.corner, unit);
+      if (spec.corner !== undefined) fields.corner.value = shortest(spec.corner, TURN);
       for (const name of ["zeros", "poles"]) fields[name].value = written(spec[name], unit);
       shape();
     };
@@ -662,8 +668,7 @@ function armlockPages() {
     };
     /* Show another loop, with its view. Hertz where their numbers are shorter. */
     const show = (spec, centre, half, held, given) => {
-      unit = given || ([1, TURN].map(one => [...spec.zeros, ...spec.poles, [spec.corner || 0, 0]].map(
-        v => written([v], one)).join("").length).reduce((a, b) => b < a) ? TURN : 1);
+      unit = given || ([1, TURN].map(one => [...spec.zeros, ...spec.poles].map(v => written([v], one)).join("").length).reduce((a, b) => b < a) ? TURN : 1);
       fields.unit.value = unit === 1 ? "1" : "hz";
       put(spec);
       live.none("");
@@ -679,11 +684,11 @@ function armlockPages() {
     const preset = choice(id("preset"), "Start from", [["", "\u2014 your own loop \u2014"],
       ...Object.keys(PRESETS).map(name => [name, name])], name => { if (name) start(name); });
     const presets = preset.querySelector("select");
-    const gain = slider(id("factor"), "Drag the gain: times", -2, 2, 0, v => say(10 ** v), (v, moving) => {
+    const gain = slider(id("factor"), "Gain factor:", -2, 2, 0, v => say(10 ** v), (v, moving) => {
       fields.gain.value = exact(+(base * 10 ** v).toPrecision(6));
       take("gain", moving, true);
     });
-    const dead = slider(id("dead"), "Drag the dead time:", 0, 1, 0, v => `${say(v)} s`, (v, moving) => {
+    const dead = slider(id("dead"), "Dead time:", 0, 1, 0, v => `${say(v)} s`, (v, moving) => {
       fields.delay.value = exact(v);
       take("delay", moving, true);
     });
@@ -700,8 +705,8 @@ function armlockPages() {
         if (spec) put(spec);
         take("unit");
       }),
-      field("corner", "Sensor\u2019s corner"), field("difference", "Sensor\u2019s \u0394\u03c4 in s"),
-      field("pasted", "Paste a controller in s, as MATLAB or python-control print it", true),
+      field("corner", "Sensor\u2019s corner in Hz"), field("difference", "Sensor\u2019s \u0394\u03c4 in s"),
+      field("pasted", "Paste a controller, as MATLAB or python-control print it", true),
       field("zeros", "Zeros", true), field("poles", "Poles", true));
     fields.pasted.placeholder = "(s + 0.02)/(s^2 + 0.1 s)";
 
