@@ -244,6 +244,10 @@ class CharacteristicFunction:
                 for p in self.polynomials()
             ]
         zero, dead, tau1, tau2 = lags
+        if self.neutral and tau1 == tau2:
+            # Equal arms are two delays for the neutral root chain, which is to stay where it is
+            # for all small changes of either.
+            tau2 += tau2 / 2**300
         delays = {
             lag + power
             for lag in (zero, dead, dead + tau1, dead + tau2)

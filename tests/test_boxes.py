@@ -3,28 +3,62 @@
 import numpy as np
 import pytest
 
-from armlock import BOUNDARY, Loop, buildable_loop, paper_loop, robust_loop
+from armlock import (
+    BOUNDARY,
+    UNCONFINED,
+    CommonArm,
+    Controller,
+    DualArm,
+    Loop,
+    buildable_loop,
+    paper_loop,
+    robust_loop,
+    unstable_roots,
+)
 from armlock.controllers import roll_off, table_two
-from armlock.paper import PERTURBATION
-from armlock.robustness.boxes import box_counts
+from armlock.robustness import box_count
+from armlock.sensors import COMMON
+from tests.attack import between, draw, to_loop
+from tests.attack_judge import UndecidedError
 
 TURN = 2.0 * np.pi
+CORNERS = [(a, b) for a in (-1.0, 1.0) for b in (-1.0, 1.0)]
 
 
-@pytest.mark.parametrize(("size", "stable"), [(1.4e-6, True), (1.466e-6, False)])
-def test_a_box_is_stable_as_far_as_its_worst_corner(size, stable):
-    """The limit of the paper's loop along (1, -1) is 1.4643e-6: 0.1 percent more is found."""
-    loop = paper_loop()
-    counts = box_counts(loop, size)
-    assert counts.any() != stable
-    assert counts.size > 16 or counts.tolist() == [BOUNDARY]
+@pytest.mark.parametrize(
+    ("size", "count"), [(1.46432e-6, 0), (1.46433e-6, BOUNDARY), (1e-4, UNCONFINED)]
+)
+def test_a_box_is_stable_as_far_as_its_worst_corner(size, count):
+    """The paper's loop: up to 1.46432051e-6 along (1, -1); its chain is lost at 1e-4."""
+    assert box_count(paper_loop(), size) == count
 
 
-def test_phases_that_let_a_root_cross_are_not_called_stable():
-    """With the dead time of 40 us the disc of all phases holds -1."""
-    k = buildable_loop()
-    slower = Loop(k.controller, k.mapping, k.tau1, k.tau2, 40e-6)
-    assert box_counts(slower, PERTURBATION, TURN * 2.0).tolist() == [BOUNDARY]
+def test_a_box_around_unstable_points_has_their_count():
+    loop = Loop(Controller([], [1.0, -2.0], 0.1), COMMON, 2.0, 1.5)
+    assert box_count(loop, 1e-3) == unstable_roots(loop) > 0
+
+
+@pytest.mark.parametrize("loop", [CommonArm(), DualArm()])
+def test_where_a_pole_at_zero_cancels_a_real_root_crosses_in_every_box(loop):
+    """At s = 0, where leading terms of opposite corners are opposed."""
+    assert box_count(loop, 1e-12) == BOUNDARY
+
+
+def test_points_of_boxes_have_the_count_of_the_box():
+    rng, found = np.random.default_rng(3), set()
+    for index in range(40):
+        try:
+            loop = to_loop(draw(np.random.default_rng([5, index]))[0])
+        except UndecidedError:
+            continue
+        size = between(rng, 1e-6, 1e-1)
+        count = box_count(loop, size)
+        points = 1.0 + size * np.append(rng.uniform(-1.0, 1.0, (6, 2)), CORNERS, axis=0)
+        counts = unstable_roots(loop, *points.T)
+        assert count < 0 or (counts == count).all()
+        assert (counts >= 0).all() or count < 0
+        found.add(count)
+    assert found >= {BOUNDARY, UNCONFINED, 0, 2}
 
 
 def test_the_robust_loop_keeps_the_papers_suppression():

@@ -14,9 +14,8 @@ import armlock
 from armlock import CharacteristicFunction, CommonArm, HayesEquation, SingleArm, paper_loop
 from armlock.checks import axis, complex_array, finite_series, real_array
 from armlock.controllers import integrating_actuator, roll_off, stage_one, table_two
-from armlock.robustness.rays import first_crossing
+from armlock.robustness import first_crossing
 from armlock.sensors import COMMON, SignalMapping, dual
-from armlock.stability.roots import extended_root
 from armlock.timedomain.discretize import warped
 from tests.systems import NEUTRAL
 
@@ -59,7 +58,6 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     armlock.unstable_roots: {"system": ARMS} | AT,
     armlock.stability_chart: {"system": ARMS, "x": [1.0], "y": [1.0]},
     armlock.rightmost_root: {"system": ARMS} | AT,
-    extended_root: {"system": ARMS, "start": 0.0, "digits": 20} | AT,
     armlock.d_curve: {"system": ARMS, "omega": 1.0},
     armlock.d_curve_line: {"system": ARMS},
     armlock.d_curve_branches: {"system": ARMS, "omega_max": 1.0, "points_per_turn": 24},

@@ -29,7 +29,7 @@ from armlock import (
     unstable_roots,
 )
 from armlock.performance.pulling import pulling
-from armlock.robustness import box_counts, first_crossing, gain_interval
+from armlock.robustness import box_count, first_crossing, gain_interval
 from tests import attack
 from tests.attack_judge import Sketch, UndecidedError, View
 
@@ -91,7 +91,7 @@ def asked(rng, loop, point):
         "nyquist": partial(nyquist, loop, *point),
         "axis_crossings": partial(axis_crossings, loop, *point),
         "axis_crossings, up to": partial(axis_crossings, loop, *point, omega_max=100 * above),
-        "box_counts": partial(box_counts, loop, attack.between(rng, 1e-9, 1e-2)),
+        "box_count": partial(box_count, loop, attack.between(rng, 1e-9, 1e-2)),
         "pulling": partial(pulling, loop, [0.1, 10.0, 1e3, 1e5]),
         "spectral_radius": lambda: spectral_radius(loop, point[0], point[1], step),
         "d_curve": partial(d_curve, loop, omega),

@@ -36,7 +36,8 @@ def polynomial_at(coefficients, x):
 
 def draw_polynomial(rng, degree):
     """Draw roots over decades, weakly damped pairs among them; some have to be computed."""
-    size, roots = 10.0 ** rng.uniform(-2, 2), []
+    size = 10.0 ** rng.uniform(-2, 2)
+    roots: list[complex] = []
     while len(roots) < degree:
         near = size * 10.0 ** rng.normal(0, 0.4)
         if degree - len(roots) > 1 and rng.random() < 0.6:
@@ -186,9 +187,8 @@ def test_computed_roots_miss_a_polynomial_by_no_more_than_stated():
     rng, shares = np.random.default_rng(4), []
     for trial in range(600):
         degree = rng.integers(1, 9)
-        coefficients = rng.normal(size=degree + 1)
-        if trial % 2:
-            coefficients = np.poly(-rng.uniform(0.9, 1.1, degree))[::-1]
+        near = np.poly(-rng.uniform(0.9, 1.1, degree))[::-1]
+        coefficients = near if trial % 2 else rng.normal(size=degree + 1)
         p = Polynomial.of([Fraction(c) / 3 for c in coefficients])
         found, size = [number(p.lead)], [abs(number(p.lead))]
         for root in p.roots:

@@ -1,11 +1,12 @@
+import mpmath
 import numpy as np
 import pytest
 
 from armlock import (
     CommonArm,
-    CountError,
     DualArm,
     HayesEquation,
+    RootError,
     paper_loop,
     rightmost_root,
     semi_discretization,
@@ -13,7 +14,8 @@ from armlock import (
     transition_matrix,
     unstable_roots,
 )
-from armlock.robustness.rays import first_crossing
+from armlock.robustness import first_crossing
+from armlock.stability.semidiscretization import _within
 from tests.systems import RETARDED
 
 NAMES = "oscillator", "third order, unstable A", "zero of B1 on the axis"
@@ -100,17 +102,23 @@ def test_a_frequency_at_which_the_direction_has_no_effect_is_no_crossing(order):
 
 
 @pytest.mark.parametrize("point", [(0.5, 0.5), (1.0, 1.0)])
-def test_slow_poles_that_rounding_scatters_have_no_spectral_radius(point):
-    # Dense eigenvalues give 1.00002; the exact map has none beyond 1 + 1e-9.
+def test_slow_poles_that_rounding_scatters_have_a_spectral_radius(point):
+    # Dense eigenvalues give 1.00002; the map's own root lies next to the loop's.
     loop = paper_loop(actuator=True)
     eigenvalues = np.linalg.eigvals(transition_matrix(loop, point[0], point[1], 0.1))
     assert np.abs(eigenvalues).max() > 1.0 + 1e-5
-    with pytest.raises(
-        CountError, match=r"^no spectral radius at \(c1, c2\) = .* do not confirm the 1"
-    ):
-        spectral_radius(loop, point[0], point[1], 0.1)
+    radius = float(spectral_radius(loop, point[0], point[1], 0.1))
+    rate = rightmost_root(loop, *point).real
+    assert radius - 1.0 == pytest.approx(0.1 * rate, rel=1e-4)
+
+
+def test_a_radius_that_some_root_exceeds_is_not_certified():
+    powers = [mpmath.mpf(value) for value in np.poly([0.5, -0.9, 0.3])[::-1]]
+    radius = mpmath.mpf(0.9)
+    assert _within(powers, radius * (1 + 1e-9))
+    assert not _within(powers, radius * (1 - 1e-9))
 
 
 def test_parameters_at_which_eigenvalues_are_lost_are_refused():
-    with pytest.raises(CountError, match="counts of the map do not confirm"):
+    with pytest.raises(RootError, match="no spectral radius is certified"):
         spectral_radius(CommonArm(), 1e20, 1e20, 0.1)

@@ -17,13 +17,8 @@ it may hold any number of them, whatever the signs at its two ends are. Nobody m
 zero. Who asks, and what each does with it:
 
 - rows of charts (`armlock.axis.counting`) count points one by one whose parameter it may cross;
-- rays (`armlock.robustness.rays`) ask counts on both sides of the parameters that it may cross,
-  and refuse where these differ by other than what was found, or cannot be told;
 - phase and delay margins (`armlock.robustness.phase_and_delay`) refuse where L in it would have
   a smaller margin than the best one;
-- gain margins (`armlock.robustness.gains`) ask a count on the far side of the factors that it
-  may give, and refuse where that is not zero, or cannot be told; next to a null of L they say
-  nothing of factors above 1e4;
 - crossings of the negative real axis (`armlock.stability.nyquist`) refuse where L in it may be
   below -1e-3, and pass over it where L may be closer to zero;
 - D-curves (`armlock.stability.dcurve`) are cut at its middle: their points do not depend on it.

@@ -27,7 +27,7 @@ BOUNDARY = -1
 UNCONFINED = -2
 
 # Most steps of a count, and of a search; some three seconds each.
-_MOST_STEPS = np.int64(1_500_000)
+_MOST_STEPS = 1_500_000
 _MOST_SEARCHED = 2_000_000
 # Steps between two looks at the keyboard.
 _A_WHILE = np.int64(100_000)
@@ -67,6 +67,7 @@ def counts(
     uncertain: FloatArray,
     *,
     leading: Leading | None = None,
+    most: int = _MOST_STEPS,
 ) -> IntArray:
     """Count the zeros with positive real part of n functions (Lemma 9).
 
@@ -78,6 +79,8 @@ def counts(
         Weights S and W, and the error of S.
     leading : Leading, optional
         Of one function, with zeros at s = 0 that are not to count.
+    most : int, optional
+        Most steps of a count.
 
     Returns
     -------
@@ -102,17 +105,17 @@ def counts(
         k = here[block]
         result: tuple[Any, ...] = inclusion.wind_many(
             space.arrays, steady[k], delayed[k], uncertain[k],
-            np.full(k.size, begin), ends[k], _MOST_STEPS,
+            np.full(k.size, begin), ends[k], most,
         )  # fmt: skip
         return result
 
     turn, first, last, undecided, steps = map(
         np.concatenate, zip(*in_threads(some, here.size, _BLOCK), strict=True)
     )
-    if (steps >= _MOST_STEPS).any():
-        k = int(np.argmax(steps >= _MOST_STEPS))
+    if (steps >= most).any():
+        k = int(np.argmax(steps >= most))
         raise UndecidedError(
-            f"a count takes more than {_MOST_STEPS:.0e} steps, up to {undecided[k]:.3g} rad/s",
+            f"a count takes more than {most:.0e} steps, up to {undecided[k]:.3g} rad/s",
             float(undecided[k]),
         )
     # At s = 0 all is real.
@@ -125,14 +128,14 @@ def counts(
     with np.errstate(all="ignore"):
         turn = turn + np.angle(first / direction) - np.angle(last / still)
     # A map counts zeros in the strip |Im s| < pi / step, at whose right end it is constant.
-    number = (0.0 if space.step else 0.5 * (space.degree - order)) - turn / np.pi
+    number = 0.5 * ((0 if space.step else space.degree) - order) - turn / np.pi
     with np.errstate(invalid="ignore"):
         sure = np.isnan(undecided) & (np.abs(number - np.round(number)) < 1e-2)
         found[here] = np.where(sure & (number > -0.5), np.round(number), BOUNDARY)
     return found
 
 
-def count(function: Function, common: int = 0) -> int:
+def count(function: Function, common: int = 0, *, most: int = _MOST_STEPS) -> int:
     """Count the zeros of a function with positive real part.
 
     Parameters
@@ -141,6 +144,8 @@ def count(function: Function, common: int = 0) -> int:
         With exact weights.
     common : int, optional
         Order of a zero at s = 0 that is not to count.
+    most : int, optional
+        Most steps.
 
     Returns
     -------
@@ -154,7 +159,7 @@ def count(function: Function, common: int = 0) -> int:
         return BOUNDARY if confined else UNCONFINED
     exact = np.zeros_like(steady)
     begin = leading if leading.order else None
-    return int(counts(function.space, steady, delayed, exact, leading=begin)[0])
+    return int(counts(function.space, steady, delayed, exact, leading=begin, most=most)[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,8 +175,9 @@ class Family:
         (2), the combination of the functions with weights + level slopes. A test holds where
         zero is in no convex combination of the vertices, whatever the terms add.
     arc : tuple of tuples, optional
-        One more test: f_0 + exp(j psi) f_1 with psi from a + b omega to c + d omega;
-        (a, b, c, d), and their slopes in the level.
+        One more test: f_0 + exp(j psi) f_1, or f_0 + (cos psi - 1) f_1 + j sin psi f_2 of three
+        functions, with psi from a + b omega to c + d omega; (a, b, c, d), and their slopes in
+        the level.
     loose : int, optional
         So many functions, the last ones, are terms of any phase in that test.
     """
@@ -223,6 +229,8 @@ class Family:
                 continue
             turned = [(lead.direction * np.conj(middle)).real / abs(middle) for lead in known]
             room, radius = min(turned) - 4.0 * share, min(lead.radius for lead in known)
+            if room <= 0.0:
+                continue
             for a in known:
                 for b in others:
                     ratio = abs(float(b.coefficient / a.coefficient)) * len(others) / room
@@ -251,7 +259,8 @@ class Family:
             top = float(sum(abs(still) + abs(turned).sum() for still, turned in tops))
             ends = self.space.confined_from(steady, delayed, size, top_terms=top)
             found.append(float(ends.max()))
-        if self.arc is not None and self.arc[0][3] == self.arc[1][3] == 0.0:
+        two = len(self.functions) - self.loose == 2
+        if two and self.arc is not None and self.arc[0][3] == self.arc[1][3] == 0.0:
             found.append(self._arc_ends(self.arc[0][2] + level * self.arc[1][2]))
         return min(found)
 
@@ -384,6 +393,37 @@ def least(
     return best, where
 
 
+def excludes(family: Family, begin: float = 0.0) -> bool:
+    """Tell whether no function of a family has a zero on the axis, but perhaps at s = 0.
+
+    Parameters
+    ----------
+    family : Family
+        At its level zero.
+    begin : float, optional
+        Frequency in rad/s up to which this is known; by default that of leading terms.
+
+    Returns
+    -------
+    bool
+        True is certified. False: there is a zero, or double precision does not decide.
+
+    Raises
+    ------
+    UndecidedError
+        If it takes too many steps.
+    """
+    begin, end = begin or family.begins(0.0), family.ends(0.0)
+    if not (begin > 0.0 and np.isfinite(end)):
+        return False
+    if end <= begin:
+        return True
+    # At a distance of zero nothing is nearer, so that nothing is searched.
+    nothing = 0.0, np.nan, 0.0, 0.0
+    _, _, left = _Search(family, DISTANCE).run(np.array([[begin, end]]), *nothing)
+    return not len(left)
+
+
 def _likely(family: Family, goal: int, low: float, high: float, start: float) -> FloatArray:
     """Intervals of a sample that look best: only what is looked at first depends on them."""
     space = family.space
@@ -409,7 +449,7 @@ def _likely(family: Family, goal: int, low: float, high: float, start: float) ->
     else:
         k = np.flatnonzero((crossing[1:] < 0.0) != (crossing[:-1] < 0.0))
         share = crossing[k] / (crossing[k] - crossing[k + 1])
-        with np.errstate(invalid="ignore"):
+        with np.errstate(invalid="ignore", divide="ignore"):
             if goal == REAL:
                 # It may pass through infinity, but one over it does not.
                 rough = 1.0 / value[k] + share * (1.0 / value[k + 1] - 1.0 / value[k])

@@ -193,7 +193,7 @@ def expand(space: Arrays, m: float, r: float, work: Workspace) -> None:
 
     The polynomials come from an expansion on a longer piece of the axis where one serves.
     """
-    inside = abs(m - work.piece[0]) + r <= work.piece[1]
+    inside, own = abs(m - work.piece[0]) + r <= work.piece[1], False
     if not inside or r < work.piece[1] / _SUBINTERVALS:
         nearest = 0.0
         for j in range(space.lead.size):
@@ -204,7 +204,8 @@ def expand(space: Arrays, m: float, r: float, work: Workspace) -> None:
                     total += 1.0 / np.sqrt(z.real * z.real + (m - z.imag) * (m - z.imag))
             nearest = max(nearest, total)
         length = min(_PIECE / nearest, 0.5 * _SUBINTERVALS * r) if nearest > 0.0 else 2.0 * r
-        _expand_piece(space, m, length if length > 4.0 * r else r, work)
+        own = length <= 4.0 * r
+        _expand_piece(space, m, r if own else length, work)
     ratio = r / work.piece[1] if work.piece[1] > 0.0 else 1.0
     u = (m - work.piece[0]) / work.piece[1] if work.piece[1] > 0.0 else 0.0
     for j in range(space.lead.size):
@@ -241,6 +242,9 @@ def expand(space: Arrays, m: float, r: float, work: Workspace) -> None:
         for i in range(1, ORDER):
             q = complex(q.imag, -q.real) * (work.angle[k] / i)
             work.turn[k, i] = q
+    if own:
+        # An expansion on a piece this long is too coarse for the parts of the interval.
+        work.piece[1] = -1.0
 
 
 @njit(nogil=True, error_model="numpy")
@@ -518,8 +522,9 @@ class Question(NamedTuple):
     weights, slopes : complex arrays, shape (tests, members, functions)
         A member is the combination of the functions with weights + level slopes.
     arc : float array, shape (0, 4) or (2, 4)
-        One more test: f_0 + exp(j psi) f_1 with psi from a + b omega to c + d omega. The rows
-        are (a, b, c, d), and their slopes in the level.
+        One more test: f_0 + exp(j psi) f_1, or f_0 + (cos psi - 1) f_1 + j sin psi f_2 of three
+        functions, with psi from a + b omega to c + d omega. The rows are (a, b, c, d), and
+        their slopes in the level.
     loose : int
         So many functions, the last ones, are terms of any phase in that test, and in what a
         search looks for.
@@ -548,7 +553,8 @@ def _aim(goal: int, f: complex, g: complex, radius: float, omega: float) -> tupl
     if goal == DISTANCE:
         return 0.0, max(abs(f) - radius, 0.0) / abs(g)
     if goal == REAL:
-        return (f * g.conjugate()).imag, -(f / g).real
+        # Where g vanishes, no t makes f + t g zero.
+        return (f * g.conjugate()).imag, -(f / g).real if g != 0.0 else np.inf
     # The angle of L = f / g from -1.
     level = (f * f.conjugate()).real - (g * g.conjugate()).real
     ratio = -f * g.conjugate()
@@ -591,7 +597,7 @@ def _measure(
     exact = np.zeros(steady.shape[1])
     expand(space, omega, 0.0, spare)
     radius = 0.0
-    for f in range(steady.shape[0]):
+    for f in range(spare.f.shape[0]):
         combine(space, steady[f], delayed[f], exact, spare, f)
         if f >= 2:
             radius += abs(spare.f[f, 0])
@@ -616,10 +622,10 @@ def _candidate(
     The Taylor polynomials say where it may be; the functions themselves say what it is.
     """
     found, where = best, np.nan
-    h, v, loose = np.empty(9), np.empty(9), steady.shape[0] > 2
+    h, v, loose = np.empty(9), np.empty(9), spare.f.shape[0] > 2
     for i in range(9):
         t, radius = 0.25 * i - 1.0, 0.0
-        for f in range(2, steady.shape[0]):
+        for f in range(2, spare.f.shape[0]):
             radius += abs(_at(work.f[f], t))
         h[i], v[i] = _aim(goal, _at(work.f[0], t), _at(work.f[1], t), radius, m + r * t)
     if goal == DISTANCE or loose:
@@ -690,6 +696,7 @@ def walk(
     """
     functions, tests = steady.shape[0], question.kind.shape[0]
     loose = question.loose
+    # What is looked for are the first two functions and the loose ones.
     work, spare = workspace(space, functions), workspace(space, 2 + loose)
     size = max(question.kind.shape[1], 3 + loose)
     room, corner = members(size, space.delays.size), np.zeros(size, np.int64)
@@ -730,7 +737,8 @@ def walk(
             span = arc[2] + max(arc[3] * low, arc[3] * high) - begin
             span = min(span, 2.0 * np.pi)
             parts = int(span / 0.35) + 1
-            half = 0.5 * span / parts
+            # Neighbours overlap by more than angles are rounded by.
+            half = 0.5 * span / parts + 4.0 * EPSILON * (abs(begin) + span)
             room.kind[:] = corner
             for n in range(loose):
                 weights[:] = 0.0
@@ -743,9 +751,14 @@ def walk(
                     weights[:] = 0.0
                     weights[0] = 1.0
                     angle = turn + (n - 1) * half
-                    weights[1] = complex(np.cos(angle), np.sin(angle))
+                    # Of the corner exp(j angle), or of the one in the middle, over cos(half).
+                    less, sine = -2.0 * np.sin(0.5 * angle) ** 2, np.sin(angle)
                     if n == 1:
-                        weights[1] /= np.cos(half)
+                        least = -2.0 * np.sin(0.5 * half) ** 2
+                        less, sine = (less - least) / (1.0 + least), sine / (1.0 + least)
+                    weights[1] = complex(1.0 + less, sine)
+                    if functions - loose > 2:
+                        weights[1], weights[2] = less, complex(0.0, sine)
                     mix(weights, work, room, n)
                 held = excludes_zero(room)
                 if not held:
@@ -756,7 +769,7 @@ def walk(
         if high > 4.0 * low:
             middle = np.sqrt(low * high) if low > 0.0 else high / 64.0
         resolved = work.lead.size == 0 or work.lead[-1] < 0
-        if resolved:
+        if resolved and best > start:
             better, at = _candidate(
                 space, steady, delayed, goal, m, r, best, start, work, spare
             )
@@ -866,10 +879,14 @@ def resolved(
     begin: float,
     end: float,
     most: int,
-) -> FloatArray:
-    """Frequencies so close that a Taylor polynomial represents a function between them."""
+) -> tuple[FloatArray, ComplexArray]:
+    """Frequencies so close that a Taylor polynomial represents a function between them.
+
+    With the step of Newton's method at each, F over its derivative by s.
+    """
     work, exact = workspace(space, 1), np.zeros(steady.size)
-    stack, top, found, n = np.empty((300, 2)), 1, np.empty(most), 0
+    stack, top, n = np.empty((300, 2)), 1, 0
+    found, moves = np.empty(most), np.empty(most, np.complex128)
     stack[0, 0], stack[0, 1] = begin, end
     while top > 0 and n < most:
         top -= 1
@@ -889,10 +906,11 @@ def resolved(
         close = close or (short and size <= 2.0 * rest)
         if (close and turns <= 0.3) or top > 290 or r <= 4.0 * EPSILON * m:
             found[n] = m
+            moves[n] = complex(0.0, r) * f[0] / f[1]
             n += 1
             continue
         middle = np.sqrt(low * high) if high > 4.0 * low else m
         stack[top, 0], stack[top, 1] = middle, high
         stack[top + 1, 0], stack[top + 1, 1] = low, middle
         top += 2
-    return found[:n].copy()
+    return found[:n].copy(), moves[:n].copy()

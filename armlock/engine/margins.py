@@ -135,7 +135,10 @@ def chain_limit(f: Function, g: Function, start: float) -> float:
     """First t >= start at which the neutral root chain of f + t g is not confined (Lemma 13).
 
     What is left of the undelayed term is linear in t between the t at which a term vanishes.
+    A map has no such chain.
     """
+    if f.space.step:
+        return math.inf
     whole, turned = f.space.limits(*stacked([f, g]))
     a, b = (np.append(whole[k], turned[k]) for k in range(2))
     a, b = (np.where(np.abs(v) <= 16.0 * EPSILON * np.abs(v).max(), 0.0, v) for v in (a, b))

@@ -8,47 +8,41 @@ last count says that no zero lies further right.
 
 from __future__ import annotations
 
+from fractions import Fraction
+from itertools import zip_longest
+from typing import NamedTuple
+
 import mpmath
 import numpy as np
-from numpy.polynomial import polynomial as poly
 
 from armlock.checks import ComplexArray, FloatArray
 from armlock.engine import decide, inclusion
-from armlock.engine.decide import BOUNDARY, UndecidedError
+from armlock.engine.decide import BOUNDARY, UNCONFINED, UndecidedError
 from armlock.engine.functions import Function, Space
-from armlock.engine.inclusion import EPSILON
+from armlock.engine.polynomials import Polynomial
 
-# Real parts that differ by less count as equal; relative to |s| or one over the longest delay.
-_EQUAL = 1e-11
-# How far right of its root the last count may stand, relative to |Re s| or the same.
-_COUNT_WITHIN = 1e-6
-# Longest way along a line, in turns of the longest delay: to count, and to look for roots.
-_LONGEST_COUNT, _LONGEST_SEARCH = 1e6, 1e5
-# The search for one root ends once it has cost so much, some five seconds. The unit is a turn
-# that is counted, or a point that Newton's method takes a step from.
-_ALL_STEPS = 3e6
-# What an undecided count costs; and extended precision where Newton's method does not settle at
-# a root, and where it does.
-_UNDECIDED_COUNT = 5e5
-_LOST_ROOT, _POLISHED_ROOT = 1e5, 5e3
-# Most points of one line.
-_MOST_POINTS = np.int64(1_000_000)
-# Roots left of a line may lie further up than those right of it. They are looked for so many
-# turns further: few at first, at most so many.
-_FIRST_TURNS_FURTHER, _MOST_TURNS_FURTHER = 4.0, 3e4
-# Most roots are of low frequency: first looked for within this many times those turns.
-_MOST_OF_THEM = 1e3
-# Most points of a line from which Newton's method starts, and most of its steps in extended
-# precision: at a multiple root they only shrink by a share.
-_MOST_STARTS, _NEWTON_STEPS, _EXTENDED_STEPS = 4096, 12, 100
-# Most roots near a line that are tried in extended precision.
+# No zero lies further right than the one returned by more than these shares of abs(Re s), or of
+# one over the longest delay; the first if so fine a count is decided in so many steps. Real
+# parts that differ by less than the first count as equal.
+_FINEST, _FINE = 1e-11, 1e-6
+_FEW_STEPS, _MANY_STEPS = 200_000, 2_000_000
+# The search for one zero ends once it has cost so many steps, some five seconds.
+_ALL_STEPS = 4e6
+# Most points of one line, and from how many of them Newton's method starts.
+_MOST_POINTS, _MOST_STARTS = np.int64(1_000_000), 1000
+# A line is followed up to where zeros can lie right of it, and so many turns of the longest
+# delay further, but at first no longer than 1000 times that; with each line twice as far.
+_TURNS_FURTHER, _MOST_TURNS_FURTHER = 4.0, 3e4
+# Steps of Newton's method: in double precision, and most in extended precision.
+_STEPS, _EXTENDED_STEPS = 12, 100
+# Most zeros near a line that are tried in extended precision.
 _MOST_TRIED = 8
-# Roots down to so many times one over the longest delay are looked for in steps of their size.
+# Zeros down to so many times one over the longest delay are looked for in steps of their size.
 _SLOWEST = 1e-9
-# Past this an exponential is no float.
+# So many times one over the longest delay left of the axis an exponential is no float.
 _LARGEST_EXPONENT = 600.0
-# Digits that extended precision keeps besides those that are asked for.
-_GUARD_DIGITS = 40
+# Digits of a zero, and those that cancelling terms and multiple zeros take besides.
+_DIGITS, _GUARD_DIGITS = 20, 80
 
 
 class RootError(RuntimeError):
@@ -74,229 +68,238 @@ class RootError(RuntimeError):
         return type(self), (str(self), self.estimate)
 
 
-def _followed(function: Function, common: int, start: complex, digits: int) -> mpmath.mpc:
-    """Follow Newton's method for F(s) / s^common in extended precision, or raise."""
-    # Next to s = 0 the terms of D cancel, and take as many digits with them.
-    with mpmath.workdps(digits + _GUARD_DIGITS):
-        s = mpmath.mpc(start)
+def _polished(function: Function, common: int, start: complex) -> complex | None:
+    """Follow Newton's method for F(s) / s^common in extended precision to a zero.
+
+    Of a pair it is the upper one. None if the method does not settle.
+    """
+    with mpmath.workdps(_DIGITS + _GUARD_DIGITS):
+        # From a start on the real axis the method would never lead to a pair next to it.
+        s, last = mpmath.mpc(start) * (1 + 1e-9j), mpmath.inf
+        digits = mpmath.mpf(10) ** -_DIGITS
         for _ in range(_EXTENDED_STEPS):
             value, slope = function.exact_value_and_slope(s)
-            if value == 0 and not (common and s == 0):
-                return +s
+            if common and s == 0:
+                return None
             if value == 0:
                 break
             slope = slope / value - (common / s if common else 0)
             if slope == 0:
-                break
+                return None
             move = 1 / slope
-            s -= move
-            # To a root at zero, of which the digits never settle, the method goes straight.
+            # Next to a zero of order m each step goes 1 / m of the way that is left.
+            share, last = abs(move) / last, abs(move)
+            s -= move * (mpmath.nint(1 / (1 - share)) if 0.4 < share < 0.9 else 1)
+            # To a zero at s = 0, of which the digits never settle, the method goes straight.
             if abs(s) < mpmath.eps**2:
                 s = mpmath.mpc(0)
-            elif abs(move) <= mpmath.mpf(10) ** -digits * abs(s):
-                with mpmath.workdps(digits):
-                    return +s
-    raise RootError(f"start={start} is not close enough to a root", complex(start))
+            if last <= digits * abs(s):
+                break
+        else:
+            return None
+        least = 100 * digits * abs(s)
+        real, imag = (v if abs(v) > least else 0.0 for v in (s.real, abs(s.imag)))
+        return complex(real, imag)
 
 
-class _Line:
-    """The line Re s = sigma: how many roots lie right of it, and which lie near it.
+class _Line(NamedTuple):
+    """The function s -> F(s + sigma), as `Function.shifted` returns it, and its extent."""
 
-    Attributes
-    ----------
-    turns : float
-        How far up roots can lie right of the line, in turns of the longest delay's
-        exponential; inf past the limit of a neutral root chain, or where a number overflows.
-    steps : float
-        What its searches have cost so far, in the unit of `_ALL_STEPS`.
-    """
+    space: Space
+    steady: FloatArray
+    delayed: FloatArray
+    uncertain: FloatArray
+    #: Up to about where zeros can lie right of the line, in rad/s; inf past a chain's limit.
+    end: float
+    #: One turn of the longest delay that acts, in rad/s.
+    turn: float
 
-    def __init__(self, function: Function, common: int, sigma: float) -> None:
-        self.function, self.common, self.sigma = function, common, sigma
-        self.turns, self.steps = np.inf, 0.0
-        self.per_turn = 2.0 * np.pi / function.space.longest
-        if -sigma * function.space.longest <= _LARGEST_EXPONENT:
-            self.shifted = function.shifted(sigma)
-            space, steady, delayed, _ = self.shifted
-            # Far to the right the longer delays no longer act.
-            acting = space.arrays.delays[delayed.any(axis=0)]
-            if acting.size:
-                self.per_turn = 2.0 * np.pi / float(acting.max())
-            confined = np.isfinite(space.confined_from(steady[None], delayed[None]))[0]
+
+class _Search:
+    """A search for the rightmost zero of F(s) / s^common, and how many steps it has taken."""
+
+    def __init__(self, function: Function, common: int) -> None:
+        self.function, self.common, self.steps = function, common, 0.0
+        self.unit = 1.0 / function.space.longest
+        self.further = _TURNS_FURTHER
+
+    def _line(self, sigma: float) -> _Line:
+        """Return the function on the line Re s = sigma."""
+        space, steady, delayed, uncertain = self.function.shifted(sigma)
+        end = float(space.confined_from(steady[None], delayed[None])[0])
+        if np.isfinite(end) and not space.step:
             end = _last_crossing(space, steady, delayed)
-            self.turns = end / self.per_turn if confined else np.inf
-        self.known = self.turns <= _LONGEST_COUNT
+        # Far to the right the longer delays no longer act.
+        acting = float(space.arrays.delays[delayed.any(axis=0)].max(initial=0.0))
+        turn = 2.0 * np.pi / (acting or space.longest)
+        return _Line(space, steady, delayed, uncertain, end, turn)
 
-    def count(self) -> int:
-        """Count the roots right of the line; below zero where that is not decided."""
-        if not self.known:
-            return BOUNDARY
+    def count(self, sigma: float, most: int) -> int:
+        """Count the zeros right of a line; below zero where that is not decided."""
+        line = self._line(sigma)
+        if not np.isfinite(line.end):
+            return UNCONFINED
         try:
-            if self.sigma == 0.0:
-                found = decide.count(self.function, self.common)
+            if sigma == 0.0:
+                found = decide.count(self.function, self.common, most=most)
             else:
-                space, *weights = self.shifted
-                arrays = (value[None] for value in weights)
-                found = int(decide.counts(space, *arrays)[0])
-                if found >= 0 and self.sigma < 0.0:
-                    found -= self.common
+                weights = (value[None] for value in line[1:4])
+                found = int(decide.counts(line.space, *weights, most=most)[0])
+                found -= self.common if found >= 0 and sigma < 0.0 else 0
         except UndecidedError:
             found = BOUNDARY
-        self.steps += self.turns if found >= 0 else _UNDECIDED_COUNT
+        self.steps += min(line.end / line.turn, most) if found >= 0 else most
         return found
 
-    def _newton(self, s: ComplexArray) -> tuple[ComplexArray, FloatArray]:
-        """Return where a step of Newton's method leads from each s, and its length."""
+    def _moved(self, s: ComplexArray, move: ComplexArray) -> tuple[ComplexArray, FloatArray]:
+        """Return where Newton's method for F(s) / s^common leads, and how far.
+
+        `move` is F over its derivative at s.
+        """
         with np.errstate(all="ignore"):
-            value, slope = self.function.value_and_slope(s)
-            slope = slope - value * (self.common / s) if self.common else slope
-            move = np.where(value == 0.0, 0.0, value / slope)
-        length = np.abs(move)
+            if self.common:
+                move = move / (1.0 - self.common * move / s)
+            length = np.abs(move)
         return s - move, np.where(np.isnan(length), np.inf, length)
 
-    def search(self, further: float) -> float:
-        """Return up to how many turns roots near the line are looked for."""
-        if not self.known:
-            return 0.0
-        return min(self.turns, _MOST_OF_THEM * further, _LONGEST_SEARCH) + further
+    def near(self, sigma: float) -> tuple[complex, float] | None:
+        """Return the rightmost zero found near a line, and the real part of those equal to it.
 
-    def near(self, turns: float, most: int) -> tuple[ComplexArray, FloatArray]:
-        """Follow Newton's method to roots near the line; return them and the last steps.
-
-        Up to so many turns, from those `most` starts whose first step leads furthest right.
+        Of these it is the one of lowest frequency.
         """
-        space, steady, delayed, _ = self.shifted
-        grid = inclusion.resolved(
-            space.arrays, steady, delayed, 1e-3 * _SLOWEST * self.per_turn,
-            turns * self.per_turn, _MOST_POINTS,
+        line = self._line(sigma)
+        if not np.isfinite(line.end):
+            return None
+        end = line.end
+        if not line.space.step:
+            end = min(end, 1e3 * self.further * line.turn)
+            end += self.further * line.turn
+        grid, move = inclusion.resolved(
+            line.space.arrays, line.steady, line.delayed, 1e-3 * _SLOWEST * line.turn, end,
+            _MOST_POINTS,
         )  # fmt: skip
-        s = self.sigma + 1j * grid
-        # A point costs a step of the walk, and one of Newton's method.
-        self.steps += 2 * s.size
-        # Part by part, because arrays of millions would spend their time on memory.
-        parts = np.array_split(s, 1 + s.size // 2**13)
-        s, length = map(np.concatenate, zip(*map(self._newton, parts), strict=True))
-        # From where a step of Newton's method is locally shortest: no root close to the line
+        self.steps += grid.size
+        s, length = self._moved(sigma + 1j * grid, move)
+        # From where a step of Newton's method is locally shortest: no zero close to the line
         # lies between two of its points.
         wider = np.pad(length, 1, constant_values=np.inf)
         s = s[(length <= wider[:-2]) & (length < wider[2:])]
-        s = s[np.argsort(-s.real, kind="stable")][:most]
-        self.steps += _NEWTON_STEPS * s.size
-        for _ in range(_NEWTON_STEPS):
-            s, length = self._newton(s)
-        return s.real + 1j * np.abs(s.imag), length
-
-    def rightmost(self, further: float) -> tuple[complex, float] | None:
-        """Return the rightmost root near the line, and how far right an equal one may lie.
-
-        Of roots that count as equal it is the one of lowest frequency.
-        """
-        turns = self.search(further)
-        if not turns:
-            return None
-        found, length = self.near(turns, _MOST_STARTS)
-        found = found[length <= 1e-5 * self.per_turn]
-        unit = self.per_turn / (2.0 * np.pi)
-        for top in sorted(found, key=lambda s: -s.real)[:_MOST_TRIED]:
-            equal = found[found.real >= top.real - _EQUAL * max(abs(top), unit)]
-            lowest = equal[np.argmin(equal.imag)]
-            try:
-                root = _polished(self.function, self.common, lowest)
-            except RootError:
-                self.steps += _LOST_ROOT
-                continue
-            self.steps += _POLISHED_ROOT
-            return root, float(top.real - lowest.real)
+        s = s[np.argsort(-s.real, kind="stable")][:_MOST_STARTS]
+        # Next to lightly damped poles rounding may hide D; its zeros there lie next to them.
+        own = self.function.space.arrays
+        s = np.append(s, np.unique(own.roots[own.present]) + 1e-3j * _SLOWEST * line.turn)
+        self.steps += _STEPS * s.size
+        for _ in range(_STEPS):
+            with np.errstate(all="ignore"):
+                value, slope = self.function.value_and_slope(s)
+                move = np.where(value == 0.0, 0.0, value / slope)
+            s, length = self._moved(s, move)
+        found = s[length <= 1e-5 * line.turn]
+        for top in found[np.argsort(-found.real, kind="stable")][:_MOST_TRIED]:
+            equal = found[found.real >= top.real - _FINEST * max(abs(top), self.unit)]
+            lowest = equal[np.argmin(np.abs(equal.imag))]
+            root = _polished(self.function, self.common, complex(lowest))
+            if root is not None:
+                return root, root.real + float(top.real - lowest.real)
         return None
+
+    def certified(self, root: complex, equal: float) -> complex | None:
+        """Return the root, or one between it and a line without zeros on its right, or None."""
+        finest = _FINEST * max(abs(root), self.unit)
+        fine = max(finest, _FINE * max(abs(root.real), self.unit))
+        count = self.count(equal + finest, _FEW_STEPS)
+        if count < 0:
+            count = self.count(equal + fine, _MANY_STEPS)
+            between = self.near(equal + fine) if count == 0 else None
+            if between is not None and between[0].real > root.real + finest:
+                root = between[0]
+        if count == 0 and 0.0 < abs(root.real) <= fine:
+            # The side of the axis is that of the count.
+            count = self.count(0.0, _MANY_STEPS)
+            if count < 0:
+                return root if abs(root.real) <= finest else None
+            return root if (count > 0) == (root.real > 0.0) else None
+        return root if count == 0 else None
 
 
 def _last_crossing(space: Space, steady: FloatArray, delayed: FloatArray) -> float:
     """Frequency up to which delayed terms are as large as all else, from samples.
 
-    The time of a search depends on it, but no count.
+    What a search finds depends on it, but no count.
     """
-    omega = np.geomspace(1e-3 * space.corners[0], 1e6 * space.corners[-1], 2000)
+    omega = np.geomspace(1e-3 * space.corners[0], 1e6 * space.corners[-1], 500)
     weights = np.vstack((steady - delayed.sum(1), delayed.T))
     still = np.zeros((*weights.shape, delayed.shape[1]))
     sizes = np.abs(inclusion.values(space.arrays, weights, still, omega)[0])
     met = np.flatnonzero(sizes[0] <= sizes[1:].sum(0))
-    return max(float(omega[met[-1]]) if met.size else 0.0, 2.0 * np.pi / space.longest)
-
-
-def _polished(function: Function, common: int, start: complex) -> complex:
-    """Return a root to the last bit, the same for every start; of a pair the upper one."""
-    # From a start on the real axis the method would never lead to a pair next to it.
-    root = complex(_followed(function, common, start * (1.0 + 1e-9j), 20))
-    turns = abs(root.imag) > EPSILON * abs(root.real)
-    return complex(root.real, abs(root.imag) if turns else 0.0)
+    return float(omega[min(met[-1] + 1, 499)]) if met.size else 2.0 * np.pi / space.longest
 
 
 def _without_delay(function: Function, common: int) -> complex:
-    """Return the rightmost root of a function that no delay acts on."""
-    polynomials = zip(function.space.polynomials, function.weights[0], strict=True)
-    coefficients: FloatArray = np.zeros(1)
-    for p, weight in polynomials:
-        coefficients = np.asarray(poly.polyadd(coefficients, weight * p.coefficients))
-    coefficients = np.asarray(poly.polytrim(coefficients, tol=0.0)[common:])
-    if coefficients.size <= 1:
-        raise ValueError(f"the parameters must leave a loop with roots: D is {coefficients}")
-    roots = poly.polyroots(coefficients)
-    return _polished(function, common, roots[np.argmax(roots.real)])
+    """Return the rightmost zero of a function that no delay acts on."""
+    parts = [
+        [weight * c for c in p.exact]
+        for p, weight in zip(function.space.polynomials, function.steady, strict=True)
+    ]
+    whole = [sum(powers) for powers in zip_longest(*parts, fillvalue=Fraction(0))][common:]
+    starts = Polynomial.of(whole).roots if any(whole) else ()
+    roots = [_polished(function, common, s) for s in starts]
+    if not roots:
+        raise ValueError("the parameters must leave a loop with roots: D is constant")
+    if None in roots:
+        k = roots.index(None)
+        raise RootError(f"no root could be found from {starts[k]}", starts[k])
+    return max((s for s in roots if s is not None), key=lambda s: (s.real, -s.imag))
 
 
 def rightmost_zero(function: Function, common: int = 0) -> complex:
-    """Return the zero of a function with the largest real part, or raise `RootError`.
+    """Return the zero of a function with the largest real part.
 
-    Line after line is tried. Roots near a line are candidates, and a count just right of the
-    rightmost of them tells whether it is the one. The counts on the lines enclose it, so that
-    the interval between two lines is halved until it is found. `common` zeros at s = 0 are
-    left out.
+    Line after line is tried. The rightmost zero near a line is the one if a count just right of
+    it is zero. The counts on the lines enclose it, so that the interval between two lines is
+    halved until it is found.
+
+    Parameters
+    ----------
+    function : Function
+        Not zero.
+    common : int, optional
+        Order of a zero at s = 0 that is left out.
+
+    Raises
+    ------
+    ValueError
+        If the function has no zeros because it is constant.
+    RootError
+        If no zero is certified.
     """
     if not function.delayed.any():
         return _without_delay(function, common)
-    unit = 1.0 / function.space.longest
-    small = _SLOWEST * unit
-    best = complex(np.nan, np.nan)
-    # There are roots right of `low`, as far as is decided, and none right of `high`.
-    low, high, sigma, width, walked = -np.inf, np.inf, 0.0, unit, 0.0
-    further = _FIRST_TURNS_FURTHER
-    while walked < _ALL_STEPS and sigma not in (low, high):
-        line = _Line(function, common, sigma)
-        root, ahead = line.rightmost(further) or (complex(np.nan, np.nan), 0.0)
-        further = min(2.0 * further, _MOST_TURNS_FURTHER)
-        farthest = _COUNT_WITHIN * max(abs(root.real), unit)
-        # Next to the limit of the chain no count tells that roots lie right of `low`.
-        if root.real + farthest > low:
-            best = root
-            nearest = _EQUAL * max(abs(best), unit)
-            for margin in np.geomspace(nearest, max(nearest, farthest), 6):
-                right_of_it = _Line(function, common, best.real + ahead + margin)
-                count = right_of_it.count()
-                walked += right_of_it.steps
-                if count == 0:
-                    # Another one may lie between the root and the line.
-                    between = right_of_it.rightmost(further) if margin > nearest else None
-                    if between is not None and between[0].real > best.real + nearest:
-                        return between[0]
-                    if 0.0 < abs(best.real) <= farthest:
-                        # D may vanish so slowly there that rounding decides the sign. Of a pair
-                        # on the axis no count tells it, and it need not.
-                        on_axis = _Line(function, common, 0.0).count()
-                        decided = on_axis >= 0 or (best.imag and abs(best.real) <= nearest)
-                        if not decided or (on_axis >= 0 and (on_axis > 0) != (best.real > 0)):
-                            break
-                    return best
-                if count > 0:
-                    break
+    search, best = _Search(function, common), complex(np.nan, np.nan)
+    # There are zeros right of `low`, as far as is decided, and none right of `high`.
+    low, high, sigma, width = -np.inf, np.inf, 0.0, search.unit
+    small = _SLOWEST * search.unit
+    while (
+        search.steps < _ALL_STEPS
+        and sigma not in (low, high)
+        and sigma > -_LARGEST_EXPONENT * search.unit
+    ):
+        found = search.near(sigma)
+        search.further = min(2.0 * search.further, _MOST_TURNS_FURTHER)
+        # Next to the limit of a chain no count tells that zeros lie right of `low`.
+        if found and found[0].real + _FINE * max(abs(found[0].real), search.unit) > low:
+            best = found[0]
+            root = search.certified(*found)
+            if root is not None:
+                return root
             low = max(low, best.real)
         if sigma > low:
-            if line.count() == 0:
+            if search.count(sigma, _MANY_STEPS) == 0:
                 high = sigma
             else:
                 low = sigma
-        walked += line.steps
         if low > -np.inf and high < np.inf:
-            # Roots next to the axis may be slower than the delays by many decades.
+            # Zeros next to the axis may be slower than the delays by many decades.
             sigma = float(small * np.sinh(0.5 * sum(np.arcsinh(np.array([low, high]) / small))))
         else:
             sigma = low + width if low > -np.inf else high - width

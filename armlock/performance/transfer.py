@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from armlock.checks import ComplexArray, one_of
 from armlock.loops import Loop, checked_loop
-from armlock.stability.counts import loop_count
+from armlock.stability.counts import unstable_roots
 
 
 def transfer(
@@ -94,13 +94,13 @@ def responses(
 
 
 def require_stable(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> None:
-    """Raise unless all roots of a loop lie in the open left half-plane.
+    """Raise unless all roots of a closed loop lie in the open left half-plane.
 
-    The response of an unstable loop at s = j omega looks like that of a stable one. A root at
-    s = 0 that cancels in L is not the loop's, see `armlock.stability.counts.loop_count`.
+    The response of an unstable loop at s = j omega looks like that of a stable one.
     """
-    count = loop_count(checked_loop(loop), c1, c2)
+    count = int(unstable_roots(checked_loop(loop), c1, c2))
     if count != 0:
         raise ValueError(
-            f"loop must be stable at (c1, c2) = ({c1:g}, {c2:g}), but loop_count gives {count}"
+            f"loop must be stable at (c1, c2) = ({c1:g}, {c2:g}), but "
+            f"unstable_roots gives {count}"
         )

@@ -5,20 +5,24 @@ cannot be certified is refused.
 """
 
 from armlock.engine.margins import Margins
-from armlock.robustness.boxes import box_counts
-from armlock.robustness.gains import gain_interval
-from armlock.robustness.margins import critical_perturbation, margins, modulus_margin
-from armlock.robustness.rays import Crossing, Crossings, Ray, first_crossing
+from armlock.robustness.margins import margins, modulus_margin
+from armlock.robustness.perturbations import (
+    Crossing,
+    box_count,
+    critical_perturbation,
+    first_crossing,
+    gain_interval,
+    no_root_crosses,
+)
 
 __all__ = [
     "Crossing",
-    "Crossings",
     "Margins",
-    "Ray",
-    "box_counts",
+    "box_count",
     "critical_perturbation",
     "first_crossing",
     "gain_interval",
     "margins",
     "modulus_margin",
+    "no_root_crosses",
 ]

@@ -11,22 +11,16 @@ from functools import partial
 from typing import TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
 from armlock.checks import positive_number, real_number
 from armlock.delays import DelaySystem
 from armlock.engine.decide import UndecidedError
 from armlock.engine.functions import Function
 from armlock.engine.margins import Margins, margins_of, modulus_of
-from armlock.loops import Loop, LoopAt, checked_loop
-from armlock.robustness.free_phases import no_margin
-from armlock.robustness.rays import FARTHEST, Ray
-from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError
+from armlock.loops import Loop, checked_loop
+from armlock.stability.counts import CountError
 
 _T = TypeVar("_T")
-
-# So close to (1, 1), relative, a loop is as stable as next to it.
-_NEXT_TO_START = 1e-9
 
 
 def _certified(
@@ -156,90 +150,3 @@ def margins(
         real_number("c1", c1), real_number("c2", c2), above
     )
     return _certified(partial(margins_of, free=free), loop, c1, c2)
-
-
-def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
-    r"""Return the smallest perturbation of (1, 1) in a direction that breaks the loop.
-
-    Parameters
-    ----------
-    loop : Loop
-        The loop.
-    direction : array_like of two floats
-        (d1, d2), taken as given and not normalised.
-
-    Returns
-    -------
-    float
-        Smallest eps > 0 such that the count of the loop's unstable roots at (1, 1) +
-        eps (d1, d2), `armlock.stability.counts.loop_count`, is not zero: a root reaches the
-        imaginary axis there, or the neutral root chain does. 0 if the loop is not stable next
-        to (1, 1), inf if no eps breaks it, up to parameters of 1e9. How near to the limit of
-        the chain roots are followed, `armlock.robustness.rays.first_crossing` says.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If `loop` is no `Loop`, the direction is not two finite real numbers or has length
-        zero, or the loop is unstable at (1, 1) itself. A boundary point is allowed there.
-    CountError
-        If the counts next to (1, 1) cannot be told, or those on the two sides of the result
-        contradict it, or gain times delay is too large to follow.
-
-    See Also
-    --------
-    armlock.robustness.rays.first_crossing : from other points, and with the frequency.
-
-    Notes
-    -----
-    Along the ray D is affine in eps, and a root is at s = j omega where
-
-    .. math::
-
-        \varepsilon = \frac{D(s; 1, 1)\, e^{s\delta}}
-        {d_1 B_1 e^{-s\tau_1} + d_2 B_2 e^{-s\tau_2}} \text{ is real.}
-
-    Examples
-    --------
-    >>> from armlock import critical_perturbation, paper_loop
-    >>> print(f"{critical_perturbation(paper_loop(), (0, -1)):.4e}")
-    2.9286e-06
-    """
-    ray = Ray(checked_loop(loop), (1.0, 1.0), direction)
-    at_start = ray.count(0.0)
-    if at_start > 0 or at_start == UNCONFINED:
-        raise ValueError(
-            f"the loop must be stable at (c1, c2) = (1, 1) to lose stability, but "
-            f"loop_count gives {at_start}"
-        )
-    # From there a root at s = 0 that cancels at (1, 1) may turn into the loop's own.
-    may_leave_zero = at_start != 0 or LoopAt(loop, 1.0, 1.0).at_zero()[0] > 0
-    where_to = ray.from_zero() if may_leave_zero else 0
-    if where_to > 0:
-        return 0.0
-    if may_leave_zero and not (where_to < 0 and at_start == 0):
-        nearest, count = ray.count_beside(0.0, 1, _NEXT_TO_START)
-        if count == BOUNDARY:
-            where = ray.at(nearest)
-            why = f"the counts next to (1, 1), up to {where}, cannot be told"
-            raise no_margin(LoopAt(loop, *where), why)
-        if count != 0 and nearest == _NEXT_TO_START * ray.scale:
-            return 0.0
-    farthest = FARTHEST * ray.scale
-    eps = ray.first(farthest).position
-    if eps < np.inf:
-        # So close to the result, rounding may hide on which side of the boundary a point is:
-        # then a count farther away tells.
-        beside = [ray.count_beside(eps, side, 1e-6)[1] for side in (-1, 1)]
-        counts = [ray.count(0.5 * eps), *beside]
-        agree = counts[:2] == [0, 0] and counts[2] not in (0, BOUNDARY)
-    else:
-        counts = [ray.count(0.5 * farthest)] if ray.acts() else []
-        agree = not any(counts)
-    if not agree:
-        raise CountError(
-            f"the first crossing along {tuple(ray.direction.tolist())} lies at {eps}, but "
-            f"counts on the way there and past it contradict it: {counts}",
-            np.array([ray.at(min(eps, farthest))]),
-        )
-    return eps

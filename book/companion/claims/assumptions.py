@@ -20,7 +20,7 @@ from armlock.paper import (
     TAU1,
     TAU2,
 )
-from armlock.robustness.margins import critical_perturbation
+from armlock.robustness import critical_perturbation
 from armlock.stability.counts import unstable_roots
 from armlock.stability.roots import rightmost_root
 from armlock.timedomain.noise import LaserNoise, PerturbationNoise

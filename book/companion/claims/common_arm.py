@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import NamedTuple
 
+import mpmath
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq, minimize_scalar
@@ -14,10 +15,10 @@ from armlock.characteristic import CharacteristicFunction
 from armlock.checks import FloatArray
 from armlock.loops import CommonArm, DualArm
 from armlock.paper import COMMON_ARM_GAIN, STEP, TAU1, TAU2
-from armlock.robustness.rays import first_crossing
+from armlock.robustness import first_crossing
 from armlock.stability.counts import StabilityChart, stability_chart, unstable_roots
 from armlock.stability.dcurve import Branch, d_curve, d_curve_branches, d_curve_line
-from armlock.stability.roots import extended_root, rightmost_root
+from armlock.stability.roots import rightmost_root
 from armlock.stability.semidiscretization import (
     semi_discretization,
     spectral_radius,
@@ -254,6 +255,15 @@ def exact_roots() -> tuple[complex, ...]:
     return tuple(complex(rightmost_root(ARM, *point)) for point in POINTS)
 
 
+def extended_root(
+    system: CharacteristicFunction, point: tuple[float, float], start: complex
+) -> mpmath.mpc:
+    """Follow the secant method from a start to a root, in 60 digits."""
+    function = system.function(*point)
+    with mpmath.workdps(60):
+        return mpmath.findroot(lambda s: function.exact_value_and_slope(s)[0], start)
+
+
 @cache
 def errors_of(system: CharacteristicFunction) -> MapErrors:
     """Compare a map's rightmost roots and its boundary with the loop's.
@@ -261,7 +271,7 @@ def errors_of(system: CharacteristicFunction) -> MapErrors:
     The roots in extended precision: some agree to all but two digits of a double.
     """
     roots = [
-        float(abs(extended_root(system, *p, root) - extended_root(ARM, *p, root)))
+        float(abs(extended_root(system, p, root) - extended_root(ARM, p, root)))
         for p, root in zip(POINTS, exact_roots(), strict=True)
     ]
     shift = boundary_radius(system, rays(RAYS)) - exact_radius()

@@ -25,8 +25,7 @@ from armlock.paper import (
     TAU1,
     TAU2,
 )
-from armlock.robustness.gains import gain_interval
-from armlock.robustness.rays import Crossing, first_crossing
+from armlock.robustness import Crossing, first_crossing, gain_interval
 from armlock.stability.counts import unstable_roots
 from armlock.stability.dcurve import d_curve, d_curve_line
 from armlock.stability.semidiscretization import semi_discretization

@@ -21,7 +21,7 @@ from armlock.performance.budget import (
 )
 from armlock.performance.pulling import largest_pulling, pulling
 from armlock.performance.transfer import transfer
-from armlock.robustness.margins import critical_perturbation, margins
+from armlock.robustness import critical_perturbation, margins
 from armlock.sensors import modified_dual
 from armlock.stability.counts import unstable_roots
 from book.companion.claims.ledger import Finding, Verdict, claim

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from scipy.optimize import bisect, minimize_scalar
+from scipy.optimize import minimize_scalar
 
 from armlock.engine.margins import Margins
 from armlock.loops import CommonArm, DualArm, Loop, SingleArm
@@ -17,9 +17,8 @@ from armlock.paper import (
     TAU1,
     TAU2,
 )
-from armlock.robustness.gains import gain_interval
+from armlock.robustness import gain_interval
 from armlock.robustness.margins import margins
-from armlock.stability.counts import BOUNDARY, unstable_roots
 from armlock.stability.nyquist import AxisCrossings, NyquistCurve, axis_crossings, nyquist
 from armlock.stability.roots import rightmost_root
 from armlock.timedomain.noise import PerturbationNoise
@@ -40,18 +39,6 @@ FACTORS = np.logspace(-4.0, 3.0, 15)
 SIZES = np.geomspace(1e-6, 1e-2, 13)
 #: Sizes at which all its margins are compared: up to that of the paper's example.
 SMALL = (PERTURBATION, 1e-5, 1e-4, 5e-3)
-
-
-def rightmost_of_loop(loop: Loop, c1: float, c2: float) -> complex:
-    """Return the rightmost root of 1 + L in rad/s, leaving out a root s = 0 that only D has."""
-    if unstable_roots(loop.plain(), c1, c2) != BOUNDARY:
-        return rightmost_root(loop, c1, c2)
-
-    def others(exponent: float) -> float:
-        # Roots right of Re s = -10^exponent, besides s = 0.
-        return int(unstable_roots(loop.shifted(-(10.0**exponent)), c1, c2)) - 1.5
-
-    return complex(-(10.0 ** bisect(others, -9.0, -1.0)))
 
 
 def phase_of_branch(curve: NyquistCurve) -> tuple[float, float]:
@@ -309,7 +296,7 @@ def dual_arm_branch() -> Finding:
     radius = float(np.abs(curve.indentation[0]))
     leading = DUAL.gain * (c2 - c1) / (TAU1 - TAU2)
     size = complex(DUAL(radius, c1, c2)) * radius**2
-    growth = rightmost_of_loop(DUAL, c1, c2).real
+    growth = rightmost_root(DUAL, c1, c2).real
     of_order_two = curve.pole_order == 2 and abs(size / leading - 1.0) < 1e-2
     clockwise = abs(turns + 1.0) < 1e-3
     return Finding(
@@ -370,7 +357,7 @@ def margins_near_ideal() -> Finding:
     """Compare gain, modulus and phase margin on the stable side, near (1, 1) and far."""
     found = small_margins()
     phases = np.degrees([result.phase for result in found])
-    rate = rightmost_of_loop(DUAL, 1.0, 1.0 - PERTURBATION).real
+    rate = rightmost_root(DUAL, 1.0, 1.0 - PERTURBATION).real
     fall = found[0].gain_upper / found[-1].gain_upper
     return Finding(
         {

@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 from armlock.checks import ComplexArray, FloatArray
 from armlock.loops import paper_loop
 from armlock.paper import DURATION, PERTURBATION, SAMPLE_RATE
-from armlock.robustness.margins import critical_perturbation
+from armlock.robustness import critical_perturbation
 from armlock.stability.counts import unstable_roots
 from armlock.stability.roots import rightmost_root
 from armlock.timedomain.noise import LaserNoise, PerturbationNoise

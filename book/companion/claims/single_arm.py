@@ -14,7 +14,7 @@ from armlock.checks import ComplexArray, IntArray
 from armlock.controllers import Controller, integrating_actuator, stage_one, table_two
 from armlock.loops import HayesEquation, Loop, SingleArm, paper_loop
 from armlock.paper import CONTROLLER_GAIN, PERTURBATION, TAU1
-from armlock.robustness.margins import critical_perturbation, margins
+from armlock.robustness import critical_perturbation, margins
 from armlock.sensors import SINGLE
 from armlock.stability.counts import stability_chart, unstable_roots
 from armlock.stability.dcurve import d_curve

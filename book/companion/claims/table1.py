@@ -31,7 +31,7 @@ from armlock.paper import (
 )
 from armlock.performance.pulling import largest_pulling
 from armlock.performance.transfer import transfer
-from armlock.robustness.margins import critical_perturbation
+from armlock.robustness import critical_perturbation
 from armlock.stability.counts import unstable_roots
 from armlock.stability.dcurve import d_curve_line
 from armlock.stability.roots import rightmost_root
