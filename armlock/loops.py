@@ -300,10 +300,16 @@ class Loop(WithDelays, CharacteristicFunction):
             If s does not hold finite numbers, or holds a pole of K, m1 or m2, c1 or c2 is not
             finite and real, or the three do not broadcast.
         """
+        return self.with_arms(s, c1, c2)[0]
+
+    def with_arms(
+        self, s: npt.ArrayLike, c1: npt.ArrayLike, c2: npt.ArrayLike
+    ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        """Evaluate L and both `arm_responses`, of which it is made."""
         s, c1, c2 = self._checked(s, c1, c2)
         first, second = self.arm_responses(s)
         result: ComplexArray = first * ((1.0 - c1) - c1 * np.expm1(-s * self.tau1))
-        return result + second * ((1.0 - c2) - c2 * np.expm1(-s * self.tau2))
+        return result + second * ((1.0 - c2) - c2 * np.expm1(-s * self.tau2)), first, second
 
     def frd(
         self, omega: npt.ArrayLike, c1: float = 1.0, c2: float = 1.0

@@ -211,9 +211,6 @@ def plot_nyquist(
     ax: Axes | None = None,
     *,
     arrows: Iterable[float] = (),
-    omega_max: float = np.inf,
-    color: str = BLUE,
-    label: str | None = None,
     **style: Any,
 ) -> Axes:
     """Draw a Nyquist curve, both signs of omega, with -1 and the infinite branch.
@@ -230,12 +227,6 @@ def plot_nyquist(
     arrows : iterable of float, optional
         Frequencies in rad/s at which an arrow points in the direction of rising omega; past
         the end of the curve it stands there.
-    omega_max : float, optional
-        Frequency in rad/s up to which the curve is drawn.
-    color : str, optional
-        Of the curve.
-    label : str, optional
-        Name of the curve in a legend; by default its two halves are named by the sign of omega.
     **style
         As `matplotlib.axes.Axes.plot` takes it.
 
@@ -256,19 +247,17 @@ def plot_nyquist(
         if not ax.has_data():
             ax.set(xlim=(-3.0, 3.0), ylim=(-3.0, 3.0), aspect="equal")
     compressed = isinstance(ax, PolarAxes)
-    drawn = curve.omega <= omega_max
-    forward, omega = curve.response[drawn], curve.omega[drawn]
+    forward, omega = curve.response, curve.omega
     if compressed and curve.indentation.size:
         # On to the infinite branch, in the direction in which the curve leaves for it.
         far = INFINITY * forward[:1] / np.abs(forward[:1])
         forward, omega = np.append(far, forward), np.append(0.0, omega)
-    positive, negative = (r"$\omega > 0$", r"$\omega < 0$") if label is None else (label, "_")
-    for half, width, name in ((forward, 1.5, positive), (forward.conj(), 0.7, negative)):
-        shown = {"color": color, "linewidth": width, "label": name, **style}
+    for half, width, sign in ((forward, 1.5, ">"), (forward.conj(), 0.7, "<")):
+        shown = {"color": BLUE, "linewidth": width, "label": rf"$\omega {sign} 0$", **style}
         ax.plot(*_coordinates(ax, half), **shown)
     for frequency in arrows:
         index = min(int(np.searchsorted(omega, frequency)), omega.size - 2)
-        _arrow(ax, forward[index : index + 2], color)
+        _arrow(ax, forward[index : index + 2], BLUE)
     minus_one = _coordinates(ax, np.array([-1.0 + 0.0j]))
     ax.plot(*minus_one, "+", color="black", markersize=10, markeredgewidth=1.8, zorder=5)
     if isinstance(ax, PolarAxes):

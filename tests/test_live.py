@@ -364,9 +364,8 @@ def test_the_pointer_previews_and_a_click_holds_until_escape(opened):
 
 
 @pytest.mark.parametrize("width", [1920, 1280, 390])
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_pictures_stand_together_at_the_top_and_the_table_last(opened, width, scheme):
-    page = opened(viewport={"width": width, "height": 900}, color_scheme=scheme)
+def test_pictures_stand_together_at_the_top_and_the_table_last(opened, width):
+    page = opened(viewport={"width": width, "height": 900})
     said(page)
     canvases = page.locator(".live-main canvas")
     chart, nyquist, bode = (canvases.nth(k).bounding_box() for k in range(3))

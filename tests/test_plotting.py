@@ -91,15 +91,14 @@ def test_d_curves_are_drawn_branch_by_branch_and_with_their_line(ax):
         assert x + y == pytest.approx(2.0)
 
 
-def test_a_curve_can_be_drawn_in_part_and_under_a_name(ax):
+def test_a_curve_has_two_halves(ax):
     curve = nyquist(CommonArm(), 0.9, 0.9, omega_max=3.0)
-    curve.plot(ax, omega_max=1.0, color=plotting.GREEN, label="part")
+    curve.plot(ax, color=plotting.GREEN)
     positive, negative = ax.lines[:2]
-    shown = curve.response[curve.omega <= 1.0]
-    np.testing.assert_array_equal(positive.get_xdata(), shown.real)
-    np.testing.assert_array_equal(negative.get_ydata(), -shown.imag)
+    np.testing.assert_array_equal(positive.get_xdata(), curve.response.real)
+    np.testing.assert_array_equal(negative.get_ydata(), -curve.response.imag)
     assert positive.get_color() == negative.get_color() == plotting.GREEN
-    assert ax.get_legend_handles_labels()[1] == ["part"]
+    assert ax.get_legend_handles_labels()[1] == [r"$\omega > 0$", r"$\omega < 0$"]
 
 
 def test_the_open_loop_goes_to_python_control_with_exact_delays():

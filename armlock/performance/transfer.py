@@ -81,8 +81,8 @@ def responses(
     -------
     dict of str to complex array, of the broadcast shape
     """
-    sensitivity = 1.0 / (1.0 + checked_loop(loop)(s, c1, c2))
-    first, second = loop.arm_responses(s)
+    open_loop, first, second = checked_loop(loop).with_arms(s, c1, c2)
+    sensitivity = 1.0 / (1.0 + open_loop)
     errors = {
         "arm 1": first,
         "arm 2": second,
