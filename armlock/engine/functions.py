@@ -28,6 +28,8 @@ from armlock.engine.polynomials import Polynomial
 Exact = npt.NDArray[np.object_]
 # Most coefficients of a series at s = 0 of which one has to differ from zero.
 _MOST_TERMS = 16
+# A moved polynomial may be missed by this share, see `Polynomial.missed`.
+_MOST_MISSED = 1e-12
 
 
 class Leading(NamedTuple):
@@ -324,16 +326,16 @@ class Function:
                     sizes = (np.abs(np.array(p.roots)[k]) + abs(sigma)) / np.abs(roots[k])
                 sizes[np.isnan(sizes)] = 1.0
                 missed *= float(np.maximum(sizes, 1.0).prod())
-            polynomials.append(
-                Polynomial(p.lead, tuple(roots.tolist()), p.computed, (), missed)
-            )
+            moved = Polynomial(p.lead, tuple(roots.tolist()), p.computed, (), missed)
+            # Next to a root that was computed, the roots are computed again.
+            polynomials.append(p.shifted(sigma) if missed > _MOST_MISSED else moved)
         space = Space(polynomials, self.space.delays, self.space.step)
         steady, delayed = self.weights
         change = np.expm1(-sigma * space.arrays.delays)
-        moved = delayed * (1.0 + change)
+        turned = delayed * (1.0 + change)
         grown = (np.abs(change) + 1.0 + change) * (1.0 + abs(sigma) * space.arrays.delays)
         sizes = np.abs(steady) + np.abs(delayed) @ grown
-        return space, steady + delayed @ change, moved, 8.0 * EPSILON * sizes
+        return space, steady + delayed @ change, turned, 8.0 * EPSILON * sizes
 
     def at(self, omega: npt.ArrayLike) -> ComplexArray:
         """Evaluate at s = j omega, times one positive number at each frequency."""

@@ -1150,7 +1150,8 @@ def cross(
                 outside = x + spread < lower[row] or x - spread > upper[row]
                 if not around and outside:
                     continue
-                inclined /= (f * f.conjugate()).real + (g * g.conjugate()).real
+                total = (f * f.conjugate()).real + (g * g.conjugate()).real
+                inclined = inclined / total if total > 0.0 else 0.0
                 largest = (size_n + rest) ** 2 + (size_m + work.rest[2]) ** 2
                 before, at = 0.0, 0.0
                 for step in range(8):
@@ -1158,6 +1159,9 @@ def cross(
                         space, steady, delayed, exact, m + r * t, v, spare
                     )
                     total = (f * f.conjugate()).real + (g * g.conjugate()).real
+                    if not (total > 0.0 and inclined != 0.0):
+                        # N and M have a common zero here.
+                        break
                     value = (f * g.conjugate()).imag / total
                     wrong = 2.0 * (error_f * abs(g) + error_g * abs(f)) / total
                     # Of the two around s = 0 and a map's end the place is known.

@@ -131,6 +131,15 @@ class Polynomial:
         """Coefficients in ascending powers of s, rounded; inf where a number overflows."""
         return rounded(self.exact)
 
+    def shifted(self, sigma: float) -> Polynomial:
+        """Return p(s + sigma), from its coefficients."""
+        moved: list[Fraction] = []
+        for value in reversed(self.exact):
+            # Horner's rule, with s + sigma in place of s.
+            moved = _product(moved, [Fraction(sigma), Fraction(1)]) if moved else [Fraction(0)]
+            moved[0] += value
+        return Polynomial.of(moved)
+
     def over(self, other: Polynomial, s: ComplexArray) -> ComplexArray:
         """Evaluate p(s) / q(s), factor by factor."""
         return quotients(self.roots, other.roots, float(self.lead / other.lead), s)
