@@ -389,13 +389,16 @@ def check_margins(tally, rng, sketch, loop, point):
             name in verdict.unsure,
             name == "gain_lower",
         )
-    low, high = max(found.gain_lower, 1e-6), min(found.gain_upper, 1e6)
+    low, high = max(found.gain_lower, 1.0 / judge.GAINS), min(found.gain_upper, judge.GAINS)
 
     def unstable(*factors):
         """Whether the loop is unstable at one of these gain factors; None if that is open."""
         counts = []
         for factor in factors:
-            if not 1e-6 <= factor <= 1e6 or turns(sketch.scaled(factor)) > 5e4:
+            if (
+                not 1.0 / judge.GAINS <= factor <= judge.GAINS
+                or turns(sketch.scaled(factor)) > 5e4
+            ):
                 return None
             try:
                 counts.append(judge.count(sketch.scaled(factor), *point))

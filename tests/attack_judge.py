@@ -24,7 +24,7 @@ MOST_CELLS = 40_000
 CHUNK = 20_000
 # Of a product of factors, relative.
 EPS = 1e-15
-GAINS = 1e6
+GAINS = 1e4
 NAMES = ("modulus", "phase", "delay", "gain_upper", "gain_lower")
 
 

@@ -108,9 +108,8 @@ def test_one_thing_is_replaced_and_all_else_stays():
     low_pass = SignalMapping([1.0], [0.0], [1.0, 1.0], "low pass")
     one = Loop(((), (0.0, -1.0), 1.0), "single", 20.0)
     other = Loop(((), (0.0,), 1.0), low_pass, 20.0)
-    assert one.rest == other.rest
+    np.testing.assert_array_equal(one.rest.coefficients, other.rest.coefficients)
     assert one != other
-    assert one.plain() == other.plain()
 
 
 def test_the_perturbations_of_a_loop_are_one_by_default():

@@ -11,7 +11,7 @@ MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path != PACKAGE / "__
 LAYERS = [
     "checks",
     "paper",
-    "axis",
+    "compiled",
     "engine",
     "controllers",
     "delays",

@@ -199,10 +199,10 @@ def test_crossings_are_none_of_a_weak_loop():
 
 
 def test_a_pole_on_the_axis_is_no_crossing():
-    loop = Loop(((), (2j, -2j, -1.0), 0.3), SINGLE, 2.0, 2.0)
-    crossings = axis_crossings(loop, 0.5, omega_max=20.0)
+    loop = Loop(((), (2j, -2j, -1.0), 8.0), SINGLE, 2.0, 2.0)
+    crossings = axis_crossings(loop, 1.5, omega_max=20.0)
     omega = np.linspace(1e-4, 20.0, 1_000_001)
-    value = loop(1j * omega[omega != 2.0], 0.5)
+    value = loop(1j * omega[omega != 2.0], 1.5)
     change = (value.imag[1:] * value.imag[:-1] < 0.0) & (abs(value[1:]) < 1e3)
     assert crossings.omega.size == (change & (value.real[1:] < 0.0)).sum() > 0
     assert (abs(crossings.omega - 2.0) > 1e-3).all()

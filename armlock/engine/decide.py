@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
 import numba
@@ -288,6 +289,12 @@ class Family:
         )
 
 
+def _walk(arguments: tuple[Any, ...], _: slice) -> tuple[Any, ...]:
+    """Walk in a thread, so that Ctrl-C reaches the other one."""
+    found: tuple[Any, ...] = inclusion.walk(*arguments)
+    return found
+
+
 class _Search:
     """A family, and how it is walked."""
 
@@ -313,10 +320,12 @@ class _Search:
         """Walk over intervals, the last first; return the best, where, and what is left."""
         undecided = np.zeros((0, 2))
         while len(pending) and len(undecided) < _FEW:
-            pending, more, best, where, steps = inclusion.walk(
+            arguments = (
                 *self.fixed, self.question, np.ascontiguousarray(pending), self.goal,
                 best, where, start, tolerance, _NARROWEST, _A_WHILE, _FEW,
             )  # fmt: skip
+            [found] = in_threads(partial(_walk, arguments), 1, 1)
+            pending, more, best, where, steps = found
             undecided = np.concatenate((undecided, more))
             self.steps += steps
             if self.steps > _MOST_SEARCHED:

@@ -1144,7 +1144,7 @@ def cross(
                 # from which h over |N|^2 + |M|^2 is free.
                 f, g = _at(work.f[0], t) - v * _at(work.f[1], t), _at(work.f[2], t)
                 slide = 3.0 * size_n * (1.0 + size_m / least) / least if least > 0.0 else np.inf
-                off_t = min(2.0 * off / slope, 2.0)
+                off_t = rough = min(2.0 * off / slope, 2.0)
                 x = (f * g.conjugate()).real / (g * g.conjugate()).real
                 spread = slide * off_t + 2.0 * (rest + abs(x) * work.rest[2]) / abs(g)
                 outside = x + spread < lower[row] or x - spread > upper[row]
@@ -1180,6 +1180,7 @@ def cross(
                     t = min(max(t - value / inclined, -1.0), 1.0)
                 if outside:
                     continue
+                off_t = off_t if off_t <= 2.0 else rough
                 found = _appended(found, n)
                 sign = 1.0 if z[1].imag > 0.0 else -1.0
                 found[n, 0], found[n, 1], found[n, 2] = row, x, spread
