@@ -186,8 +186,9 @@ class DelaySystem(WithDelays):
     # numpy leaves arithmetic with such an object to it.
     __array_ufunc__ = None
     _instead: ClassVar[str] = (
-        "for plots write system.frequency_response(omega), for a closed loop "
-        "DelaySystem.of(plant).feedback(back), for a quotient DelaySystem.of(plant) / system, "
+        "combine systems with + - * /; for plots write system.frequency_response(omega), for "
+        "a closed loop DelaySystem.of(plant).feedback(back), for a quotient "
+        "DelaySystem.of(plant) / system, "
         "for responses armlock.step_response(system, timepts), for margins "
         "armlock.margins(loop), for poles armlock.rightmost_root(loop)"
     )
@@ -197,6 +198,12 @@ class DelaySystem(WithDelays):
 
     def __post_init__(self) -> None:
         """Divide out a common delay and a common power of s, exactly."""
+        for name, given in (("numerator", self.numerator), ("denominator", self.denominator)):
+            if not isinstance(given, QuasiPolynomial):
+                raise TypeError(
+                    f"{name} must be a QuasiPolynomial, got {given!r:.200}: to delay a system "
+                    "of python-control write plant * delay(theta)"
+                )
         n, m = self.numerator.terms, self.denominator.terms
         if not m:
             raise ZeroDivisionError("denominator must not be zero")

@@ -391,7 +391,10 @@ def _gain(gain: object, sensor: str) -> float:
 def checked_loop(loop: Loop) -> Loop:
     """Return the loop, or say what was given in its place."""
     if not isinstance(loop, Loop):
-        raise TypeError(f"loop must be a Loop, for instance CommonArm(), got {loop!r:.200}")
+        raise TypeError(
+            "loop must be a Loop, for instance CommonArm(), or, for counts, margins and the "
+            f"rightmost root, a DelaySystem, as DelaySystem.of(system), got {loop!r:.200}"
+        )
     return loop
 
 

@@ -231,6 +231,13 @@ def test_a_plant_times_a_delay():
     assert "exp(-0.5 s)" in str(PLANT * delay(0.5))
 
 
+def test_what_is_no_plant_with_a_delay_is_told_what_to_write():
+    with pytest.raises(TypeError, match=r"(?s)^numerator must .* write plant \* delay"):
+        DelaySystem(plant := control.ss(PLANT), 0.5)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match=r"as DelaySystem\.of\(system\)"):
+        margins(plant)
+
+
 def test_feedback_is_negative_and_takes_delays_on_the_way_back():
     closed = (PI * PLANT * delay(0.5)).feedback(delay(0.1))
     forward, back = PI(1j) * PLANT(1j) * np.exp(-0.5j), np.exp(-0.1j)
