@@ -194,7 +194,10 @@ class _Search:
                 value, slope = self.function.value_and_slope(s)
                 move = np.where(value == 0.0, 0.0, value / slope)
             s, length = self._moved(s, move)
-        found = s[length <= 1e-5 * line.turn]
+        # Slow zeros are far smaller than a turn.
+        found = s[
+            length <= np.minimum(1e-5 * line.turn, 1e-3 * np.abs(s) + _SLOWEST * line.turn)
+        ]
         for top in found[np.argsort(-found.real, kind="stable")][:_MOST_TRIED]:
             equal = found[found.real >= top.real - _FINEST * max(abs(top), self.unit)]
             lowest = equal[np.argmin(np.abs(equal.imag))]
