@@ -259,10 +259,12 @@ def exact_roots() -> tuple[complex, ...]:
 def extended_root(
     system: CharacteristicFunction, point: tuple[float, float], start: complex
 ) -> mpmath.mpc:
-    """Follow the secant method from a start to a root, in 60 digits."""
-    function = system.function(*point)
+    """Follow Newton's method from a start to a root, in 60 digits."""
+    at = system.function(*point).exact_value_and_slope
     with mpmath.workdps(60):
-        return mpmath.findroot(lambda s: function.exact_value_and_slope(s)[0], start)
+        return mpmath.findroot(
+            lambda s: at(s)[0], start, solver="newton", df=lambda s: at(s)[1]
+        )
 
 
 @cache
