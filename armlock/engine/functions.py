@@ -333,7 +333,7 @@ class Function:
         steady, delayed = self.weights
         change = np.expm1(-sigma * space.arrays.delays)
         turned = delayed * (1.0 + change)
-        grown = (np.abs(change) + 1.0 + change) * (1.0 + abs(sigma) * space.arrays.delays)
+        grown = np.abs(change) + (1.0 + change) * (1.0 + abs(sigma) * space.arrays.delays)
         sizes = np.abs(steady) + np.abs(delayed) @ grown
         return space, steady + delayed @ change, turned, 8.0 * EPSILON * sizes
 
