@@ -355,3 +355,17 @@ def test_a_difference_of_nearly_equal_delays_that_is_small_everywhere_is_answere
     found = margins(loop)
     assert found.modulus == pytest.approx(1.0, abs=1e-6)
     assert (found.phase, found.gain_upper) == (np.inf, np.inf)
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e9])
+def test_forty_poles_do_not_overflow(size):
+    # The product of the poles is 1e360, or one over it: no float.
+    poles = [-size * (1.0 + 0.01 * k) for k in range(40)]
+    zeros = [-0.3 * size * (1.0 + 0.01 * k) for k in range(39)]
+    slow = Loop(Controller(zeros, poles, 1e-3 * size), SINGLE, 20.0)
+    assert unstable_roots(slow, 0.5) == 0
+    weak = Loop(Controller([], poles, 0.1), SINGLE, 20.0)
+    # |L| is far below one, or far above it up to 40 times the poles, where L turns ten times.
+    assert unstable_roots(weak, 0.5) == (0 if size > 1.0 else 20)
+    if size > 1.0:
+        assert margins(weak, 0.5).modulus == pytest.approx(1.0, rel=1e-6)

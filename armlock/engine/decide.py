@@ -21,6 +21,7 @@ from armlock.checks import FloatArray, IntArray
 from armlock.engine import inclusion
 from armlock.engine.functions import Function, Leading, Space, at, stacked
 from armlock.engine.inclusion import DISTANCE, REAL, Question
+from armlock.engine.polynomials import rounded
 
 #: What a count is where a root lies on the axis, or rounding does not decide on which side.
 BOUNDARY = -1
@@ -238,7 +239,9 @@ class Family:
                 continue
             for a in known:
                 for b in terms_at_zero:
-                    ratio = abs(float(b.coefficient / a.coefficient)) * len(others) / room
+                    ratio = (
+                        abs(rounded([b.coefficient / a.coefficient])[0]) * len(others) / room
+                    )
                     radius, power = min(radius, b.radius), b.order - a.order
                     if power < 0 or (power == 0 and ratio >= 1.0 - 4.0 * share):
                         radius = 0.0

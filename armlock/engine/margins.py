@@ -16,6 +16,7 @@ from armlock.engine import decide
 from armlock.engine.decide import Family, least
 from armlock.engine.functions import Function, stacked
 from armlock.engine.inclusion import DELAY, DISTANCE, EPSILON, PHASE, REAL
+from armlock.engine.polynomials import rounded
 
 #: Gain factors up to this, and down to one over it, are looked at.
 LARGEST_GAIN = 1e4
@@ -124,11 +125,14 @@ class Limit(NamedTuple):
 
 
 def at_zero(f: Function, g: Function) -> float:
-    """Return the t at which f + t g loses its leading term at s = 0; nan where none does."""
+    """Return the t at which f + t g loses its leading term at s = 0; nan where none does.
+
+    It may be too large for a float: then it is inf.
+    """
     first, other = f.leading(), g.leading()
     if first is None or other is None or first.order != other.order:
         return math.nan
-    return float(-first.coefficient / other.coefficient)
+    return float(rounded([-first.coefficient / other.coefficient])[0])
 
 
 def chain_limit(f: Function, g: Function, start: float) -> float:
