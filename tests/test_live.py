@@ -346,7 +346,8 @@ def test_the_pointer_previews_and_a_click_holds_until_escape(opened):
     preview = said(page)
     assert "2 unstable roots" in preview
     page.mouse.move(5, 5)
-    assert said(page) == at_first
+    # What follows a semicolon may come later.
+    assert said(page).startswith(at_first.split(";")[0].rstrip("."))
     page.mouse.click(*place(page, 0.9, 0.85))
     page.mouse.move(*place(page, 0.4, 0.3))
     page.mouse.move(*place(page, 0.5, 0.5, ".live-top label:last-child input"))
