@@ -78,7 +78,10 @@ def _count_exactly(
 ) -> int:
     """Count the roots at one point, of a Loop those of the closed loop."""
     function = system.function(x, y)
-    common = common_zeros(*system.quotient(x, y)) if isinstance(system, Loop) else 0
+    common = 0
+    # No root cancels where D has none at s = 0.
+    if isinstance(system, Loop) and not function.series(1)[0]:
+        common = common_zeros(*system.quotient(x, y))
     at = np.array([float(x)]), np.array([float(y)])
     return int(_decided(lambda: np.array([_count(function, common, right_of)]), *at)[0])
 
