@@ -481,8 +481,10 @@ def check_critical(tally, rng, sketch, loop, point):
                 tally.note("critical_perturbation", (way, share * farthest), eps, counts)
                 return
         return
-    # The parameters are numbers next to one, and rounded as these are.
-    near = max(1e-6, 1e-15 / (eps * np.abs(way).max()))
+    # The parameters are numbers next to one, and rounded as these are. The limit of the chain
+    # is taken for roots that cross within 1e-5 of it.
+    at_limit = judge.count(sketch, *(1.0 + 1.0001 * eps * way)) == -2
+    near = max(2e-5 if at_limit else 1e-6, 1e-15 / (eps * np.abs(way).max()))
     if near > 0.1:
         tally.skipped["critical_perturbation: below rounding"] += 1
         return
@@ -497,7 +499,8 @@ def check_root(tally, rng, sketch, loop, point):
     number = judge.count(sketch, *point)
     if number == -2:
         return
-    root = tally.ask("rightmost_root", rightmost_root, loop, *point)
+    # The judge counts the roots of D, with one at s = 0 that cancels in the loop.
+    root = tally.ask("rightmost_root", rightmost_root, loop.plain(), *point)
     if root is None:
         return
     longest = max(sketch.tau1, sketch.tau2)
