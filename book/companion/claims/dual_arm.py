@@ -11,8 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from matplotlib.figure import Figure
 from scipy.optimize import bisect, brentq, minimize_scalar
 
+from armlock import plotting
 from armlock.characteristic import CharacteristicFunction
 from armlock.checks import FloatArray
 from armlock.loops import DualArm
@@ -32,6 +34,7 @@ from armlock.stability.semidiscretization import semi_discretization
 from book.companion.claims.common_arm import log_slope
 from book.companion.claims.ledger import PRINTED, Finding, Verdict, Weight, claim
 from book.companion.claims.table1 import FULL_DIFFERENCE, HALF_DIFFERENCE, MEAN_DELAY
+from book.companion.figures import svg
 from book.companion.shared import shared
 
 #: A fixed window around point A, the same in c1 and c2.
@@ -136,6 +139,24 @@ def window_area(gain: float) -> float:
     # Both c1 = common - d / 2 and c2 = common + d / 2 are to be inside.
     length = np.minimum(top, high - 0.5 * difference) - (low + 0.5 * difference)
     return float(np.trapezoid(np.clip(length, 0.0, None), difference))
+
+
+def strip_picture(gain: float) -> bytes:
+    """Draw the stable strip in the window around point A, as SVG: one frame of a slider."""
+    low, high = WINDOW
+    below = low - 0.03  # outside of the window
+    difference, common = (values[::100] for values in top_of_strip(gain, below))
+    c1, c2 = common - 0.5 * difference, common + 0.5 * difference
+    corner = [below]
+    fig = Figure(figsize=(5.0, 4.6))
+    ax = fig.subplots()
+    ax.fill([*corner, *c1], [*corner, *c2], color=plotting.STABLE, label="stable")
+    ax.plot(c1, c2, label="far and upper edge")
+    ax.plot([below, c1[0]], [below, c2[0]], label="straight edge")
+    ax.plot(1, 1, "ko", fillstyle="none", label="A")
+    ax.set(xlim=(low, high), ylim=(low, high), xlabel="$c_1$", ylabel="$c_2$")
+    ax.legend(loc="lower right")
+    return svg(fig)
 
 
 @shared
