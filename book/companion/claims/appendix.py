@@ -102,9 +102,9 @@ def sources() -> tuple[ShapedNoise, ShapedNoise]:
 def _convolved() -> tuple[FloatArray, FloatArray]:
     """Return frequencies in Hz and the density of the product of phase and perturbation there.
 
-    By convolution, in rad^2/Hz on both sides of zero. The grid is fine enough for the narrowest
-    of their features: that of a periodic function without a kink, the sum then is the integral
-    but for rounding.
+    The density is two-sided, in rad^2/Hz. The grid is fine enough for the narrowest feature.
+    The sum over it equals the integral to rounding, because the functions are smooth and
+    periodic.
     """
     points = 1 << 18
     grid = np.fft.fftshift(np.fft.fftfreq(points, 1.0 / RATE))
@@ -228,7 +228,7 @@ def convolution_of_spectra() -> Finding:
     deviation = np.abs(found.measured.asd / found.expected - 1.0)
     close = float(deviation[found.measured.averages > 1000.0].max())
     factor = laser_phase_rms()
-    # By this factor eta must lie below the additive noise: one or several orders, it says.
+    # By this factor eta must lie below the additive noise; the paper says: some orders.
     return Finding(
         {"": {"a convolution": close < 0.05, "one or several orders below": factor < 1e3}},
         close,
@@ -269,9 +269,9 @@ def quadrature_error() -> Finding:
         at_zero,
         "relative error of a small phase about zero, from channels that are "
         f"{error:g} rad off a quarter turn",
-        "A phase near zero, of which the appendix speaks, has an offset and an error of "
-        f"second order only. Around 45 degrees the factor deviates by {most:.1e}, which is of "
-        "first order.",
+        "Near a phase of zero, the case of the appendix, the channels add an offset and an "
+        f"error of second order only. Around 45 degrees the factor deviates by {most:.1e}, "
+        "which is of first order.",
     )
 
 

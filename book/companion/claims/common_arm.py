@@ -112,10 +112,10 @@ def largest_parameter(x: FloatArray, y: FloatArray) -> FloatArray:
 def cusp_conditions(omega_max: float = OMEGA_SEARCHED) -> tuple[FloatArray, FloatArray]:
     """Frequencies at which each of the two conditions for a cusp holds.
 
-    At a cusp both derivatives of the curve vanish, which is to say that D and dD/ds have a
-    common root j omega. Solved for the delayed terms, that asks for two increasing phases,
-    omega tau1 + atan(omega tau2 / (1/g + 2 tau2) / g) and the same with the arms exchanged,
-    to be multiples of pi at one omega.
+    At a cusp both derivatives of the curve vanish: D and dD/ds have a common root j omega.
+    Solved for the delayed terms, this means that two increasing phases are multiples of pi at
+    one omega: omega tau1 + atan(omega tau2 / (1/g + 2 tau2) / g), and the same with the arms
+    exchanged.
 
     Returns
     -------
@@ -231,7 +231,7 @@ def printed_maps(step: float = STEP) -> dict[str, CharacteristicFunction]:
 
 
 def excess(system: CharacteristicFunction, x: float, y: float) -> float:
-    """Spectral radius of a map less one."""
+    """Spectral radius of a map minus one."""
     return float(np.expm1(rightmost_root(system, x, y).real * system.step))
 
 
@@ -388,8 +388,8 @@ def shape_of_the_curve() -> Finding:
             }
         },
         radius,
-        "radius of the sharpest turn of the dual arm's D-curve at $g = 10$, which the text "
-        "names, too; a cusp has the radius zero",
+        "radius of the sharpest turn of the dual arm's D-curve at $g = 10$ (the text names the "
+        "dual arm, too); a cusp has the radius zero",
         f"For the common arm the count changes by {jumps.max()} across the curve, {shown} "
         f"branches enter a window of half-width {WIDE_WINDOW:g}, and the first one runs "
         f"{turns:.1f} times around the origin. Its sharpest turn there has a radius of "
@@ -445,7 +445,7 @@ def recurrence() -> Finding:
             and abs(package - own_stable) < 1e-11,
         },
         other,
-        f"spectral radius less one at (1, 1), $h = {STEP:g}$ s, as printed (exact: 0)",
+        f"spectral radius minus one at (1, 1), $h = {STEP:g}$ s, as printed (exact: 0)",
         "The exponent needs $t_{i+1} - ν$. As printed the exponential grows, and R is "
         f"{gain:.4f} times too large. With the corrected weights, which the matrix of Eq. (8) "
         "suggests, the spectral radius at (1, 1) is 1 for every h.",
@@ -484,8 +484,8 @@ def spectral_radius_decides() -> Finding:
             "the loop, with $h = 0.05$ s": not (radius > 1.0 and count == 0),
         },
         radius - 1.0,
-        f"spectral radius less one, $h = {STEP:g}$ s, at ({c1:.3f}, {c2:.3f}), where the loop "
-        "is stable",
+        f"spectral radius minus one, $h = {STEP:g}$ s, at ({c1:.3f}, {c2:.3f}), where the "
+        "loop is stable",
         f"At {x.size} random points the number of eigenvalues outside the unit circle, up to "
         f"{outside.max()}, equals the number of unstable roots of the discrete system. For the "
         f"loop the matrix errs within {float((exact - inside).max()):.3f} of the boundary, at "
@@ -642,7 +642,7 @@ def less_precise() -> Finding:
 @claim(
     "C13",
     place="Sec. III.A, after the example",
-    says="In practice D-subdivision may miss part of the boundary, for it is sampled.",
+    says="In practice D-subdivision may miss part of the boundary, because it is sampled.",
     pinned=(Verdict.REPRODUCED, 0.0761516, 1e-6),
     weight=Weight.DERIVATION,
     printed="its practical application suffers from numerical implementation, such as the "

@@ -132,7 +132,8 @@ def top_of_strip(gain: float, low: float = WINDOW[0]) -> tuple[FloatArray, Float
 def window_area(gain: float) -> float:
     """Area of the part of the stable region in which both parameters are in the window.
 
-    From `top_of_strip`, and so to a part in 1e5, as many rays confirm; it is not certified.
+    It is computed from `top_of_strip`. Many rays confirm it to a part in 1e5, but it is not
+    certified.
     """
     difference, top = top_of_strip(gain)
     low, high = WINDOW
@@ -237,7 +238,7 @@ def gain_factors(c1: float, c2: float) -> tuple[float, float]:
 def middle_corner(system: CharacteristicFunction) -> float:
     """Return (c1 + c2) / 2 - 1 at the upper edge in the strip's middle.
 
-    On the straight edge the root z = 1 of a map is known to rounding only.
+    On the straight edge rounding would decide whether the root z = 1 of a map is unstable.
     """
     return upper_end(system, 0.25 * FULL_DIFFERENCE / MEAN_DELAY).position - 0.1
 
@@ -383,8 +384,8 @@ def shrinking_region() -> Finding:
         area[-1] / area[0],
         f"stable area within $[{WINDOW[0]:g}, {WINDOW[1]:g}]^2$, at $g = 10⁵$ over that at "
         "$g = 10$",
-        "Most of what lies below $c₁ + c₂ = 2$ stays stable at every gain. The far edge, where "
-        f"a slow oscillation sets in, moves outwards by {further:.2f} % of the width from "
+        "Most of the region below $c₁ + c₂ = 2$ stays stable at every gain. The far edge, at "
+        f"which a slow oscillation sets in, moves outwards by {further:.2f} % of the width from "
         f"$g = 10$ up. The point ({point[0]:.4f}, {point[1]:.4f}) has {gained[0]} unstable "
         f"roots at $g = {GAINS[0]:g}$ and {gained[1]} at the highest gain.",
     )
@@ -411,9 +412,9 @@ def never_reached() -> Finding:
         f"{PERTURBATION:g}, of (1, 1)",
         f"Along $c₁ = c₂$ the upper edge is {at_ten:.3g} away at $g = 10$ and "
         f"{at_controller:.3g} at the controller's $g = {CONTROLLER_GAIN:g}$, "
-        f"{at_controller / PERTURBATION:.0f} times the largest perturbation. It falls as "
-        f"$1/g^2$. At $g = {CONTROLLER_GAIN:g}$ the claim stands for every p up to "
-        f"{corner:.2f} rad/s.",
+        f"{at_controller / PERTURBATION:.0f} times the largest perturbation. This "
+        f"distance falls as $1/g^2$. At $g = {CONTROLLER_GAIN:g}$ the claim holds for every p "
+        f"up to {corner:.2f} rad/s.",
     )
 
 
@@ -434,8 +435,8 @@ def sampled_framework() -> Finding:
             "at ten times that gain": abs(at_hundred - 1.0) < 0.05,
         },
         at_hundred,
-        f"distance from A to the upper edge in the strip's middle, map ($h = {STEP:g}$ s) over "
-        "exact, $g = 100$",
+        "distance from A to the upper edge in the strip's middle at $g = 100$, of the map "
+        f"($h = {STEP:g}$ s) divided by the exact one",
         f"At $g = 10$ the ratio is {at_ten:.3f}. At $g = 100$ the roots that cross oscillate "
         f"with {ONE_PERIOD / (2 * np.pi):g} and {TWO_PERIODS / (2 * np.pi):g} Hz, and a step "
         f"of {STEP:g} s resolves up to {0.5 / STEP:g} Hz. The step is that of Fig. 4(b), "
@@ -466,7 +467,7 @@ def convention_of_difference() -> Finding:
             "with two letters": lines[0] == lines[1],
         },
         ratio,
-        "weight of the integrated difference in Table I over that of Sec. III.B",
+        "weight of the integrated difference in Table I, divided by that of Sec. III.B",
         "Table I needs half the difference of the round trips, as the work that it cites has "
         "it (claims T2 and T3), and Sec. III.B defines the whole. Claims on the dual arm are "
         "tried with both where it matters. The straight edge is the same for both; at "

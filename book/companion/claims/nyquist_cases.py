@@ -173,9 +173,10 @@ def single_arm_branch() -> Finding:
         {"": starts_as_the_single_arm(curve)},
         change / np.pi,
         r"change of the phase from $ω = 0^-$ to $0^+$, in units of $\pi$",
-        rf"From ${start / np.pi:.2f} \pi$ clockwise to ${(start + change) / np.pi:.2f} \pi$, "
-        r"the direction of $+\pi/2$. The words fix the contour: it passes the pole at $s = 0$ "
-        f"on its right, with {curve.encirclements} encirclement of -1.",
+        rf"The phase turns clockwise from ${start / np.pi:.2f} \pi$ to "
+        rf"${(start + change) / np.pi:.2f} \pi$, the direction of $+\pi/2$. By the paper's "
+        "words the contour passes the pole at $s = 0$ on its right, with "
+        f"{curve.encirclements} encirclement of -1.",
     )
 
 
@@ -247,7 +248,8 @@ def single_arm_crossing() -> Finding:
 @claim(
     "N6",
     place="Sec. IV.A, on the common arm",
-    says="The common arm is alike: tangent, unstable by its branch, with a crossing.",
+    says="The common arm behaves alike: its curve is tangent to the origin, an infinite branch "
+    "makes it unstable, and the curve crosses the negative real axis.",
     pinned=(Verdict.IN_PART, 9.87346e-4, 1e-8),
     printed="the Nyquist curve is also tangent to the origin",
 )
@@ -271,9 +273,9 @@ def common_arm_alike() -> Finding:
             }
         },
         threshold,
-        r"$c₂ - 1$ from which on the curve crosses the negative real axis near $2\pi$ over the "
-        "mean delay",
-        "The two delays complete no turn together below 10 Hz. The ideal curve therefore "
+        r"smallest $c₂ - 1$ at which the curve crosses the negative real axis near $2\pi$ over "
+        "the mean delay",
+        "Below 10 Hz the round trips are never both whole numbers of periods. The ideal curve "
         f"passes the origin at a distance of {miss:.1e}, and a perturbation of "
         f"{PERTURBATION:g} does not move it across the negative real axis.",
     )
@@ -349,7 +351,7 @@ def dual_arm_gain_margin() -> Finding:
 @claim(
     "N10",
     place="Sec. IV.A, end of the paragraph on the dual arm",
-    says="Even small deviations of $c₁$ and $c₂$ can change the stability margins much.",
+    says="Even small deviations of $c₁$ and $c₂$ can change the margins strongly.",
     pinned=(Verdict.ONE_READING, 139.6103, 1e-3),
     printed="even small deviations ... may significantly alter the stability margins",
 )

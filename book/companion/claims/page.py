@@ -1,7 +1,7 @@
 """The whole ledger as one page: a table that can be searched, and the errata.
 
-What this writes is plain HTML with one short script each, needs no network, and shows
-everything where no script runs.
+The output is plain HTML with one short script. It needs no network, and it shows everything
+when no script runs.
 """
 
 from __future__ import annotations
@@ -30,17 +30,17 @@ from book.companion.claims.ledger import (
     typeset,
 )
 
-#: What filters and sorts the table.
+#: The script that filters and sorts the table.
 SCRIPT = Path(__file__).with_name("ledger.js")
 
 
 def whole_ledger() -> Ledger:
-    """Check every registered claim, once a build or test run.
+    """Check every registered claim, once in a build or a test run.
 
     Returns
     -------
     Ledger
-        All claims. A build of the book has checked them before its first page. Elsewhere each
+        All claims. A build of the book checks them before its first page. Without a build each
         process checks them, which takes most of a minute.
     """
     claims = all_claims()
@@ -96,7 +96,7 @@ class VerdictCounts:
         paper, white = (Ledger(entries[of]) for of in (True, False))
         met = {f"of {weight}": paper.counts(weight) for weight in Weight}
         met["of the white paper"] = white.counts()
-        #: What is counted, and how many met each verdict.
+        #: The kind of claims, and how many of them met each verdict.
         self.lines = [
             (f"{counts.total()} claim{'s' * (counts.total() != 1)} {of}", counts)
             for of, counts in met.items()
@@ -148,7 +148,7 @@ class LedgerPage:
 
 
 def _controls(ledger: Ledger) -> str:
-    """Return the form above the table, hidden until the script is there to serve it."""
+    """Return the form above the table, hidden until the script runs."""
     verdicts = Counter(finding.verdict for _, finding in ledger)
     weights = Counter(claim.weight for claim, _ in ledger)
 
@@ -196,7 +196,7 @@ def _row(claim: Claim, finding: Finding) -> str:
 
 
 class Errata:
-    """What is printed and does not follow: printed, what follows, and what depends on it.
+    """Printed text that does not hold: the text, the correction, and what depends on it.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ class Errata:
         ).replace("$", "")
 
     def _repr_html_(self) -> str:
-        """Return one block an erratum; a table of four columns would not fit a phone."""
+        """Return one block for each erratum; four columns would not fit a phone."""
         return "".join(self._block(*entry) for entry in self.entries)
 
     def _block(self, claim: Claim, finding: Finding) -> str:

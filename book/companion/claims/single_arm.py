@@ -180,7 +180,7 @@ def hayes_correspondence() -> Finding:
     pinned=(Verdict.REPRODUCED, 1.0, 0.0),
 )
 def above_one() -> Finding:
-    """Count above k2 = 1, and see the real root that D(0) < 0 < D(infinity) forces."""
+    """Count above k2 = 1, and find the real root that follows from D(0) < 0 < D(infinity)."""
     k2 = 1.0 + np.logspace(-9.0, 1.0, 41)
     counts = _counts(GAIN_DELAYS[:, None], k2)
     real = lambert_root(*parameters(MODERATE[:, None], k2), 1.0).real
@@ -189,10 +189,10 @@ def above_one() -> Finding:
         {"": bool(counts.min() >= 1 and (real > 0.0).all())},
         int(counts.min()),
         "fewest unstable roots over a grid of $k₂ > 1$ and $k₁ > 0$",
-        "$D(s) = s + k₁ - k₁k₂ e^{-sτ}$ is negative at $s = 0$ and grows to infinity, which "
-        "forces a positive real root at every gain. Near 1 it is slow: at $k₂ = 1$ plus "
-        f"{PERTURBATION:g}, $k₁ = {NOMINAL_GAIN:g}$/s and $τ = {TAU1}$ s the loop grows by a "
-        f"factor e in {1.0 / rate / 86400.0:.0f} days.",
+        "$D(s) = s + k₁ - k₁k₂ e^{-sτ}$ is negative at $s = 0$ and grows to infinity. So there "
+        "is a positive real root at every gain. The root is slow near $k₂ = 1$: at $k₂ = 1$ "
+        f"plus {PERTURBATION:g}, $k₁ = {NOMINAL_GAIN:g}$/s and $τ = {TAU1}$ s the phase grows "
+        f"by a factor e in {1.0 / rate / 86400.0:.0f} days.",
     )
 
 
@@ -449,11 +449,11 @@ def linear_controller() -> Finding:
             "any linear controller": not alters,
         },
         len(alters),
-        f"of {len(controllers)} linear controllers before the actuator, those with which "
+        f"linear controllers, of {len(controllers)} tried before the actuator, with which "
         "$k₂ = 1$ is not the edge of stability",
         f"The exceptions are {', '.join(alters[:-1])} and {alters[-1]}. A low pass delays the "
         "phase and makes the arm unstable on both sides of $k₂ = 1$. Zeros at $s = 0$ move the "
-        "edge away from $k₂ = 1$, which is what the controller of Sec. IV uses.",
+        "edge away from $k₂ = 1$; the controller of Sec. IV uses this.",
     )
 
 
@@ -479,8 +479,8 @@ def gain_drift() -> Finding:
             "a perturbation of the returned phase, $c₁$ or $c₂$": gain < 10.0 * arms,
         },
         gain / arms,
-        "relative drift of the gain that the controlled loop tolerates, over that of $c₁$ and "
-        "$c₂$",
+        "relative drift of the gain that the controlled loop tolerates, divided by the "
+        "perturbation of $c₁$ and $c₂$ that it tolerates",
         "A drift of the gain changes $k₁$, which does not decide stability (claim S9). The "
         "factors $c₁$ and $c₂$, which the paper goes on to study, multiply the returned phase "
         f"alone. The gain may fall by {100.0 * gain:.0f} %, but $c₁$ and $c₂$ together may not "

@@ -86,8 +86,8 @@ def _on_edge(name: str, loop: Loop) -> bool:
         "D2": "Fig. 5",
         "N7": "Sec. IV.A and Fig. 7c",
     },
-    says="Without perturbations the single, the common and the dual arm stand on the boundary "
-    "of stability, the single arm for every gain $k₁$.",
+    says="Without perturbations the single, the common and the dual arm lie on the boundary "
+    "of stability, the single arm at every gain $k₁$.",
     pinned=(Verdict.REPRODUCED, 0.0, 0.0),
     printed="arm-locking loops operate near at the stability boundary in the parameter space",
 )
@@ -111,8 +111,8 @@ def ideal_point_on_boundary() -> Finding:
     return Finding(
         {"": {name: all(found) for name, found in on_edge.items()}},
         sum(found.count(False) for found in on_edge.values()),
-        f"of {sum(map(len, tried.values()))} loops, with other gains, p and Δτ, those for "
-        "which (1, 1) is not on the edge of the stable region",
+        f"loops, of {sum(map(len, tried.values()))} with other gains, p and Δτ, for which "
+        "(1, 1) is not on the edge of the stable region",
         f"The edge does not imply a fast instability: a perturbation of {PERTURBATION:g} to "
         f"the unstable side grows by a factor e in {days[0]:.0f} days (single), {days[1]:.0f} "
         f"days (common) and {days[2]:.1f} days (dual). The root $s = 0$ at (1, 1) belongs to "
@@ -177,8 +177,9 @@ def pulling_of_the_sensors() -> Finding:
             "an error of their sum": ratios["common"] > 1.0,
         },
         ratios["differential"],
-        "largest pulling by an error of the difference of the shifts, dual sensor over "
-        "modified dual sensor, both with the white paper's controller and the paper's arms",
+        "largest pulling by an error of the difference of the shifts with the dual sensor, "
+        "divided by that with the modified dual sensor, both with the white paper's controller "
+        "and the paper's arms",
         "The dual sensor divides the difference of the arms by Δτ, and the modified one does "
         f"not at low frequency. An error of the sum pulls the modified dual arm "
         f"{1.0 / ratios['common']:.0f} times as far.",
@@ -208,12 +209,12 @@ def common_against_modified_dual() -> Finding:
     return Finding(
         {"ideal loops": ratio > 1.0, "with a microsecond of dead time": rolls_off},
         ratio,
-        "laser noise at 3 mHz that a modified dual arm leaves, over that of a common arm: more "
-        "than one speaks for the claim",
+        "laser noise at 3 mHz with a modified dual arm, divided by that with a common arm; a "
+        "number above one supports the claim",
         "Two published loops were compared, PI control of the common arm and the white paper's "
         f"loop. They leave at most {most[0]:.1e} and {most[1]:.1e} of the laser's noise from "
-        "10 mHz to 1 Hz. The gain of the first does not roll off, so that a microsecond of "
-        "dead time makes it unstable.",
+        "10 mHz to 1 Hz. The gain of the first loop does not roll off, so a microsecond of "
+        "dead time makes this loop unstable.",
         missing="the loop of the work that is cited",
     )
 
@@ -411,6 +412,6 @@ def round_trips() -> Finding:
         f"The mean length is {off.mean():+.2f} % off three million kilometres. The half "
         f"difference of the example, {1e3 * HALF_DIFFERENCE:.0f} ms, is "
         f"{1e3 * HALF_DIFFERENCE / half:.1f} times the largest on Kepler's orbits. With that "
-        f"largest one the controlled loop is unstable from a perturbation of {breaks:.2g} on, "
-        f"so that it is stable over the paper's box of {PERTURBATION:g} on no day.",
+        f"largest one the controlled loop becomes unstable at a perturbation of {breaks:.2g}. "
+        f"So on no day is it stable for all perturbations up to {PERTURBATION:g}.",
     )
