@@ -385,9 +385,9 @@ def shrinking_region() -> Finding:
         f"stable area within $[{WINDOW[0]:g}, {WINDOW[1]:g}]^2$, at $g = 10⁵$ over that at "
         "$g = 10$",
         "Most of the region below $c₁ + c₂ = 2$ stays stable at every gain. The far edge, at "
-        f"which a slow oscillation sets in, moves outwards by {further:.2f} % of the width from "
-        f"$g = 10$ up. The point ({point[0]:.4f}, {point[1]:.4f}) has {gained[0]} unstable "
-        f"roots at $g = {GAINS[0]:g}$ and {gained[1]} at the highest gain.",
+        f"which a slow oscillation sets in, moves outwards by {further:.2f} % of the width "
+        f"from $g = 10$ up. The point ({point[0]:.4f}, {point[1]:.4f}) has {gained[0]} "
+        f"unstable roots at $g = {GAINS[0]:g}$ and {gained[1]} at the highest gain.",
     )
 
 
