@@ -412,6 +412,6 @@ def round_trips() -> Finding:
         f"The mean length is {off.mean():+.2f} % off three million kilometres. The half "
         f"difference of the example, {1e3 * HALF_DIFFERENCE:.0f} ms, is "
         f"{1e3 * HALF_DIFFERENCE / half:.1f} times the largest on Kepler's orbits. With that "
-        f"largest one the controlled loop becomes unstable at a perturbation of {breaks:.2g}. "
-        f"So on no day is it stable for all perturbations up to {PERTURBATION:g}.",
+        f"largest one the controlled loop becomes unstable at a perturbation of {breaks:.2g}: "
+        f"on no day is it stable for all perturbations up to {PERTURBATION:g}.",
     )
