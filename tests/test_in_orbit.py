@@ -108,19 +108,14 @@ def nested(orbits, t, beams):
     return lengths[0] - lengths[1]
 
 
-def test_moving_arms_make_the_beams_differ_as_the_formulas_say(chapter):
+def test_moving_arms_make_the_beams_differ_as_the_formula_says(chapter):
     # Near t = 0, where times are exact enough, and on long arms, which move more.
-    long = kepler(1.2e10)
-    trips = {
-        orbit: chapter["arms"](orbit, 1, 1) for orbit in (chapter["orbits"]["Kepler"], long)
-    }
-    for t in (1e5, 1.1e6, 3e6):
-        for orbit, (one, two) in trips.items():
-            first, second = chapter["moving"](t / DAY, one, two)
+    for orbit in (chapter["orbits"]["Kepler"], kepler(1.2e10)):
+        one, two = chapter["arms"](orbit, 1, 1)
+        for t in (1e5, 1.1e6, 3e6):
+            found = chapter["moving"](t / DAY, one, two)
             beams = nested(orbit, t, ((1, 2), (2, 1)))
-            assert abs(first - beams) < 2e-3 * abs(beams) + 1e-12
-        beams = nested(long, t, ((1, 2, 2, 1), (2, 1, 1, 2)))
-        assert abs(second - beams) < 0.02 * abs(beams) + 3e-12
+            assert abs(found - beams) < 2e-3 * abs(beams) + 1e-12
 
 
 def test_a_metre_leaves_what_is_known(chapter):

@@ -141,8 +141,8 @@ def _gain() -> Assumption:
         "The unit of g",
         "rad/s with the actuator, a plain number without it",
         "The paper gives a number without unit; $g/s$ is a rate over s in rad/s.",
-        r"Were it in Hz, g would be $2\pi$ times larger: the critical perturbation "
-        f"along $(1, -1)$ would be {higher:.4g}, not {here:.4g}.",
+        r"If the number is in Hz, g is $2\pi$ times larger. The critical perturbation "
+        f"along $(1, -1)$ is then {higher:.4g} instead of {here:.4g}.",
     )
 
 
@@ -153,7 +153,7 @@ def _history() -> Assumption:
         "What the loop was doing before $t = 0$",
         "At rest: all signals zero",
         "The paper does not say. A simulation in blocks starts at rest by default.",
-        "The loop is linear, so that another history adds a transient. The slowest part of the "
+        "The loop is linear, so another history only adds a transient. The slowest part of the "
         f"transient falls by a factor e in {days:.3g} days at $(1, 1 - 10⁻⁶)$. The paper's "
         f"simulation takes {DURATION / 86400.0:.3g} days. The choice therefore changes "
         "long-term differences, and no claim on stability depends on it.",
@@ -170,9 +170,10 @@ def _scale() -> Assumption:
         f"The appendix takes a phase noise for η; Sec. IV.A limits η to {PERTURBATION:g}, and "
         "does not say whether that is an r.m.s. or a bound.",
         f"The printed spectrum has an r.m.s. of {rms:.3g}, {rms / PERTURBATION:.3g} times the "
-        f"limit. Of random courses reduced to the limit, {100 * leaving_probability():.0f} % "
-        f"leave the stable region for a time ($c₁ - c₂$ above {stable_up_to():.3g}). Of those "
-        f"reduced to a third of the limit, {100 * leaving_probability(1.0 / 3.0):.1f} % do. "
+        f"limit. With the r.m.s. reduced to the limit, {100 * leaving_probability():.0f} % "
+        f"of random draws leave the stable region for a time ($c₁ - c₂$ above "
+        f"{stable_up_to():.3g}). With a third of the limit "
+        f"{100 * leaving_probability(1.0 / 3.0):.1f} % leave it. "
         "Claims N1 and M2 to M5 cannot be settled without the scale.",
     )
 
@@ -187,7 +188,7 @@ def _lowest() -> Assumption:
         "Where the spectrum of η(t) ends at low frequency",
         f"At {LOWEST:g} Hz, one over the duration; flat below",
         "The printed spectrum rises as $1/f^2$ without end. A run cannot hold slower parts.",
-        f"The slowest parts are nearly all of it: the r.m.s. is {total:.2g}. It would be "
+        f"The slowest parts make up nearly all of η. Its r.m.s. is {total:.2g}. It would be "
         f"{later:.2g} if the spectrum were flat below 0.1 mHz, {latest:.2g} for 1 mHz, and "
         f"{earlier:.2g} for {0.1 * LOWEST:g} Hz. At face value the end decides whether "
         "System 1 diverges (claim M2).",
@@ -204,10 +205,10 @@ def _laser() -> Assumption:
         f"At {cutoff:g} Hz; flat below",
         "$1/f$ has an infinite variance. The end lies below all that a run of "
         f"{DURATION / 86400.0:.2g} days resolves.",
-        f"At {1e3 * low:g} mHz, where the suppression is measured from, the density is lower "
-        f"by {change:.1g} of itself. The slow wandering of input and outputs in the time "
-        r"series grows as one over the root of the cut-off: $\sqrt{10}$ times larger for one "
-        "ten times lower.",
+        f"At {1e3 * low:g} mHz, the lowest frequency of the suppression, the density is lower "
+        f"by a fraction of {change:.1g}. The slow wandering of input and outputs in the time "
+        r"series grows as one over the root of the cut-off. With a tenth of the cut-off it is "
+        r"$\sqrt{10}$ times larger.",
     )
 
 
@@ -231,8 +232,8 @@ def _requirement() -> Assumption:
     return Assumption(
         "The basic noise requirement that $g = 5000$ meets",
         r"$30\sqrt{1 + (2.8\ \mathrm{mHz}/f)^4}$ Hz/√Hz for the locked laser",
-        "The paper names no requirement. Missions of this kind require about this of a laser "
-        "before time-delay interferometry.",
+        "The paper names no requirement. Missions of this kind have a similar requirement on a "
+        "laser before time-delay interferometry.",
         f"The paper's $30/f$ Hz/√Hz meets this requirement {spare:.3g} times over. A "
         f"free-running laser of ${FREE_RUNNING:g}/f$ Hz/√Hz would meet it {free:.2g} times, "
         "and so would miss it.",

@@ -382,8 +382,8 @@ def constant_gain() -> Finding:
         "largest $|L|$ over the smallest, from 0.01 mHz to 1 Hz at $c₁ = c₂ = 1$",
         f"Above 1 mHz $|L|$ still varies between {low_science:.0f} and {high_science:.0f}. The "
         f"perturbations of the Bode plot change $|L|$ by {100 * shown:.2f} % at most, and "
-        f"those at the corners of the box by {100 * most:.1f} %; but the sentence speaks of "
-        "the frequency.",
+        f"those at the corners of the box by {100 * most:.1f} %. The sentence, however, is "
+        "about the frequency.",
     )
 
 
@@ -450,7 +450,7 @@ def poles_below() -> Finding:
         {"": stage1 < 1e-4},
         stage1,
         "frequency in Hz of the double pole of Stage I",
-        f"One pole of Stage II, of which the sentence does not speak, is at "
+        f"One pole of Stage II, which the sentence does not mention, is at "
         f"{1e3 * highest:.1g} mHz.",
     )
 
@@ -571,7 +571,7 @@ def like_anti_pulling() -> Finding:
         float(zeros[0]),
         f"zeros of Stage I at $s = 0$, where the white paper's controller has {zeros[1]}",
         f"The pole of Stage I is {ratio:.3g} times the lowest pole of the white paper's "
-        "controller. The form is similar and the effect is not, because the paper's sensor "
+        "controller. The form is similar, but the effect differs, because the paper's sensor "
         f"integrates the difference of the arms: an error of 1 Hz in it pulls the laser by "
         f"{peak.size:.2g} Hz within {peak.time / 86400.0:.1f} days.",
     )

@@ -102,9 +102,8 @@ def free_margins(loop: Loop, frequency: FloatArray) -> FloatArray:
 def most_laser(loop: Loop, frequency: FloatArray) -> FloatArray:
     """Return what is left of a free-running laser in Hz/sqrt(Hz), at most.
 
-    For all mean lengths of the arms, their difference being what it is: L then runs around a
-    circle. So the narrow lines, one at each multiple of one over the round trip, do not have to
-    be resolved.
+    The maximum is over all mean lengths of the arms, at their true difference. L then runs
+    around a circle, so the narrow lines at the nulls need not be resolved.
     """
     s = 1j * TURN * frequency
     first, second = loop.arm_responses(s)
@@ -124,9 +123,8 @@ def largest_answers() -> FloatArray:
 def doppler_errors(laser: str, averaging: float = 200.0) -> tuple[float, float]:
     """Return standard deviations in Hz and Hz/s of Doppler shift and rate as first measured.
 
-    Of the sum of both arms: what the laser's own noise leaves in the mean, and in the slope of
-    a straight line, of phases that are measured for so many seconds. Noise below 1 uHz is left
-    out.
+    A straight line is fitted to the phase of the sum of both arms, over `averaging` seconds.
+    The laser's own noise above 1 uHz disturbs the fit.
     """
     f = np.concatenate((np.geomspace(1e-6, 1e-4, 2000), np.arange(1e-4, 3.0, 5e-6)))
     x = np.pi * f * averaging
@@ -153,8 +151,8 @@ def orbit_shifts() -> tuple[float, float]:
 def acquisition_pulling(laser: str, averaging: float = 200.0) -> float:
     """Return the pulling in Hz at acquisition, as the sum of three largest answers.
 
-    Shift and rate are those of `doppler_errors`. A rate or a curvature that is known no better
-    than that, the free-running laser's rate and all curvatures, is that of the orbit.
+    The errors of shift and rate are those of `doppler_errors`. The orbit gives the curvature,
+    and the rate where its rate is smaller.
     """
     shift, rate = doppler_errors(laser, averaging)
     of_orbit = DOPPLER * YEARLY, DOPPLER * YEARLY**2

@@ -434,7 +434,7 @@ def alike_from(run: Run) -> float:
     pinned=(Verdict.REPRODUCED, 0.0, 0.0),
 )
 def constant_perturbation() -> Finding:
-    """Count, and look at the run."""
+    """Count the unstable roots, and check the run."""
     count = int(unstable_roots(paper_loop(), *STRONG))
     half = int(unstable_roots(paper_loop(difference=HALF_DIFFERENCE), *STRONG))
     root = complex(rightmost_root(paper_loop(), *STRONG))
@@ -530,7 +530,7 @@ def suppression_reached() -> Finding:
     "almost the same above $10^{-6}$Hz",
 )
 def spectra_alike() -> Finding:
-    """From which frequency on the spectra agree, and the Bode plots."""
+    """Find the frequency above which the spectra agree, and compare the Bode plots."""
     run = full_run()
     first, second = (run.spectra[name].within(*BAND) for name in ("system 1", "system 2"))
     start, ratio = alike_from(run), float(first.asd[0] / second.asd[0])
@@ -581,7 +581,7 @@ def long_times() -> Finding:
     "differences",
 )
 def phase_shifts() -> Finding:
-    """Take the largest phase between the closed loops, which no time enlarges if both decay."""
+    """Take the largest phase between the two closed loops."""
     stable = not any(int(unstable_roots(paper_loop(), *c)) for c in (IDEAL, STRONG))
     most = sensitivity_change()
     return Finding(
@@ -589,7 +589,7 @@ def phase_shifts() -> Finding:
         float(np.degrees(most["phase"])),
         "largest phase in degrees, at any frequency, between the closed loops at (1, 1) and "
         "$(1, 1 - 10⁻⁶)$",
-        "Both loops are stable, so that the phase between their outputs is constant at each "
+        "Both loops are stable, so the phase between their outputs is constant at each "
         "frequency and does not grow with time. The outputs differ because the noise below "
         f"{1e6 * most['below']:.0f} µHz passes the two loops differently, by a factor of up to "
         f"{most['ratio']:.2f}; such slow noise shows only in a long run.",
@@ -628,7 +628,7 @@ def agreement_with_theory() -> Finding:
     "perturbation $(c_1,c_2)=(1,1)$",
 )
 def which_point() -> Finding:
-    """Whether the figure's spectrum could tell the two points apart."""
+    """Compare the spectra at the two points."""
     run = full_run()
     strong, ideal = (run.spectra[name].within(*BAND) for name in ("system 2", "ideal"))
     apart = float(np.abs(strong.asd / ideal.asd - 1.0).max())
@@ -638,6 +638,6 @@ def which_point() -> Finding:
         apart,
         f"largest relative difference of the spectra at the two points, {1e3 * BAND[0]:g} mHz "
         f"to {BAND[1]:g} Hz",
-        "The text speaks of a constant perturbation of System 2, which (1, 1) is not. In panel "
-        "(c) the two points differ by less than the width of a line.",
+        "The text gives System 2 a constant perturbation, and at (1, 1) there is none. In "
+        "panel (c) the two points differ by less than the width of a line.",
     )
