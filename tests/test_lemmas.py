@@ -1,7 +1,7 @@
-"""Lemmas 6, 15 and 18 of the appendix "The lemmas behind a count", against 50 digits.
+"""Lemmas 6, 15, 17 and 18 of the appendix "The lemmas behind a count", against 50 digits.
 
-They concern differences of delays, families of functions, and crossings of the axis;
-`test_inclusion` has the other lemmas.
+They concern differences of delays, families of functions, moved functions, and crossings of the
+axis; `test_inclusion` has the other lemmas.
 """
 
 from fractions import Fraction
@@ -9,8 +9,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from armlock.engine import inclusion
-from armlock.engine.decide import Family
+from armlock.engine import decide, inclusion
+from armlock.engine.decide import UNCONFINED, Family
 from armlock.engine.functions import Space, stacked
 from armlock.engine.polynomials import Polynomial
 from tests.test_inclusion import Exact, draw, enclosed, mp, share_of_bound
@@ -133,3 +133,15 @@ def test_a_family_is_clear_at_both_ends_of_the_axis(where):
                 turned = (value * mp.conj(mp.mpc(complex(along)))).real
                 least.append(float((turned - others) / (abs(value) + others)))
     assert 0.0 < min(least) < 0.1
+
+
+def test_rounding_does_not_confine_the_zeros_of_a_moved_function():
+    # Only delays act on the highest power: zeros of F lie arbitrarily far to the right.
+    polynomials = [Polynomial.of([1]), Polynomial.of([0, 1])]
+    space = Space(polynomials, [Fraction(1), Fraction(11, 10)])
+    rng = np.random.default_rng(14)
+    for _ in range(400):
+        weights = rng.uniform(0.1, 3.0, 2).tolist()
+        function = space.function([1, sum(map(Fraction, weights))], [[0, 0], weights])
+        moved, *arrays = function.shifted(rng.uniform(30.0, 40.0))
+        assert decide.counts(moved, *(v[None] for v in arrays), most=1000) == UNCONFINED
