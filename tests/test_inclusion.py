@@ -1,4 +1,4 @@
-"""The lemmas of the chapter "Why a count is certain", against values in 50 digits.
+"""The lemmas of the appendix "The lemmas behind a count", against values in 50 digits.
 
 Each bound of the engine is compared with the exact error on spaces, intervals and points that
 are drawn at random. A bound must hold everywhere, and must be nearly reached somewhere: a test

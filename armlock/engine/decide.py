@@ -98,7 +98,8 @@ def counts(
         If a count takes too many steps.
     """
     n = len(steady)
-    ends = space.confined_from(steady, delayed) * (1.0 if space.step else 2.0)
+    # What weights are uncertain by counts as a term of any phase.
+    ends = space.confined_from(steady, delayed, uncertain) * (1.0 if space.step else 2.0)
     order, begin = (leading.order, leading.radius) if leading else (0, 0.0)
     found = np.full(n, UNCONFINED, dtype=np.int64)
     here = np.flatnonzero(np.isfinite(ends))

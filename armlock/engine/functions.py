@@ -335,7 +335,7 @@ class Function:
         turned = delayed * (1.0 + change)
         grown = np.abs(change) + (1.0 + change) * (1.0 + abs(sigma) * space.arrays.delays)
         sizes = np.abs(steady) + np.abs(delayed) @ grown
-        return space, steady + delayed @ change, turned, 8.0 * EPSILON * sizes
+        return space, steady + delayed @ change, turned, (8.0 + change.size) * EPSILON * sizes
 
     def at(self, omega: npt.ArrayLike) -> ComplexArray:
         """Evaluate at s = j omega, times one positive number at each frequency."""

@@ -5,9 +5,9 @@ A space holds polynomials p_j and delays theta_k, and a function of the space is
     F(s) = sum_j p_j(s) [S_j + sum_k W_jk (exp(-s theta_k) - 1)] .
 
 On the interval s = j (m + r t) with -1 <= t <= 1, F is enclosed by F_0 + F_1 t + F_2 t^2 +
-F_3 t^3, terms C_k(t) of any phase, and a remainder. The lemmas are those of the chapter "Why a
-count is certain". All polynomials are divided by one positive number for each interval, so
-that arguments and signs remain.
+F_3 t^3, terms C_k(t) of any phase, and a remainder. The lemmas are those of the book's appendix
+"The lemmas behind a count". All polynomials are divided by one positive number for each
+interval, so that arguments and signs remain.
 """
 
 from __future__ import annotations
@@ -171,17 +171,19 @@ _MOST_TURNS = 2.0**26
 @njit(nogil=True, error_model="numpy")
 def _phase(theta: float, tail: float, m: float) -> tuple[float, float]:
     """Return (theta + tail) m less whole turns, and a bound of its error in rad (Lemma 6)."""
-    product = theta * m
+    product, off = theta * m, tail * m
+    # The tail of a difference of two delays may exceed what its float rounds by.
+    wrong = 3.0 * EPSILON * abs(off)
     turns = np.round(product / 6.283185307179586)
     if turns > _MOST_TURNS:
-        return product % 6.283185307179586, 4.0 * EPSILON * product
+        return product % 6.283185307179586 + off, 4.0 * EPSILON * product + wrong
     # What the product rounds by, after Dekker: both factors are split in halves.
     a, b = theta * 134217729.0, m * 134217729.0
     a, b = a - (a - theta), b - (b - m)
     c, d = theta - a, m - b
     low = ((a * b - product) + a * d + c * b) + c * d
     phase = ((product - turns * _TURN[0]) - turns * _TURN[1]) - turns * _TURN[2]
-    return phase + (low + tail * m), EPSILON * min(2.0 * product, 16.0)
+    return phase + (low + off), EPSILON * min(2.0 * product, 16.0) + wrong
 
 
 @njit(nogil=True, error_model="numpy")
@@ -1086,9 +1088,16 @@ def cross(
                 and _row_excludes_zero(lower[row], upper[row], v, v, work, room)
             ):
                 continue
-            if fast and not narrow:
-                pool[d + 1, kept] = row
-                kept += 1
+            if fast:
+                if narrow:
+                    undecided = _appended(undecided, left)
+                    undecided[left, 0] = row
+                    undecided[left, 1], undecided[left, 2] = -np.inf, np.inf
+                    undecided[left, 3], undecided[left, 4] = max(low, 0.0), min(high, end)
+                    left += 1
+                else:
+                    pool[d + 1, kept] = row
+                    kept += 1
                 continue
             rest = work.rest[0] + abs(v) * work.rest[1]
             size_n = size_a + abs(v) * size_b

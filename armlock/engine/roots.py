@@ -126,7 +126,7 @@ class _Search:
     def _line(self, sigma: float) -> _Line:
         """Return the function on the line Re s = sigma."""
         space, steady, delayed, uncertain = self.function.shifted(sigma)
-        end = float(space.confined_from(steady[None], delayed[None])[0])
+        end = float(space.confined_from(steady[None], delayed[None], uncertain[None])[0])
         if np.isfinite(end) and not space.step:
             end = _last_crossing(space, steady, delayed)
         # Far to the right the longer delays no longer act.
