@@ -187,7 +187,8 @@ def compared(
         equal = a == b or math.isclose(a, b, rel_tol=1e-5)
         if too_good or not (equal or neutral):
             wrong.append(f"{name} {a} for {b}")
-    return found, wrong + too_good_ones(*loop.functions, certified, controls)
+    n, m = loop.functions
+    return found, wrong + too_good_ones(n, m, certified, controls)
 
 
 def is_certified(n, m, name, level):
