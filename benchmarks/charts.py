@@ -8,7 +8,6 @@ loop over 1 +- 5e-6 takes at most 10 s; none needs 1 GiB; and counts agree.
 from __future__ import annotations
 
 import math
-import tempfile
 from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
@@ -119,10 +118,6 @@ def run(*, quick: bool) -> Topic:
         rows += chart_rows(name, side, points)
         if name in COMMON:
             rows += dense_rows(name, side, dense, passes)
-    if not quick:
-        with tempfile.TemporaryDirectory() as cache:
-            first, second, _ = alone(chart_alone, COMMON[0], 100, NUMBA_CACHE_DIR=cache)
-        rows.append(Row("compiling for a chart, once after installation", first - second))
     notes = [
         "[a] Argument principle, point by point: another method than the chart's crossings.",
         f"[b] Extrapolated from {dense} random points: the best of {passes} runs at each, on "

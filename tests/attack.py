@@ -1,15 +1,16 @@
 """Random loops of every kind, held against computations that share no code with armlock.
 
     python -m tests.attack [--loops N] [--seed S] [--first I] [--kinds counts margins ...]
-        [--families mixed clusters zero]
+        [--families mixed clusters zero delays]
 
 Loop I of seed S and a family is the same in every run. Each loop of the mixed family is drawn
 from all kinds at once: retarded or neutral; up to 12 poles (one in twenty: up to 30) over many
 decades, lightly damped pairs far above the delays' frequencies, unstable ones, ones at 0; any
 sensor; equal, nearly equal and commensurate delays; c from 1e-6 to 3, at and around (1, 1);
 dead times. Clusters are 2 to 8 modes, spaced by 1e-3 to 1e-1, of a Q from 10 to 1e5; zero is
-the family of points next to zero parameters. `tests.attack_judge` says what is right. Refusals
-are counted: at most one in a hundred, within clusters one in five, none later than 5 s.
+the family of points next to zero parameters. `tests.attack_judge` says what is right. Loops
+with three to six delays are drawn and judged by `tests.dense_judge`. Refusals are counted: at
+most one in a hundred, within clusters one in five, none later than 5 s.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ from armlock.robustness import first_crossing
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
 from armlock.stability.semidiscretization import semi_discretization
 from tests import attack_judge as judge
-from tests import independent
+from tests import dense_judge, independent
 from tests.attack_judge import Sketch, UndecidedError, View
 
 #: What a number may be off, relative.
@@ -52,7 +53,10 @@ REFUSALS = CountError, RootError, ValueError, ArithmeticError, TimeoutError, Sys
 
 
 def to_loop(sketch):
-    """The armlock loop of a sketch."""
+    """The armlock loop of a sketch, or of the terms of its numerator and denominator."""
+    if isinstance(sketch, tuple):
+        above, below = map(dense_judge.system, sketch)
+        return above / below
     mapping = {"single": SINGLE, "common": COMMON, "difference": DIFFERENCE}.get(sketch.sensor)
     if mapping is None:
         mapping = dual(sketch.corner, sketch.difference)
@@ -258,9 +262,10 @@ FAMILIES = {
     "mixed": (draw, draw, draw, draw, draw_paper, draw_arm),
     "clusters": (draw_cluster,),
     "zero": (draw_near_zero,),
+    "delays": (lambda rng: (dense_judge.drawn(rng), None),),
 }
 #: How many refusals among its calls are too many.
-REFUSED = {"mixed": 1e-2, "clusters": 0.2, "zero": 1e-2}
+REFUSED = {"mixed": 1e-2, "clusters": 0.2, "zero": 1e-2, "delays": 1e-2}
 
 
 # ---------------------------------------------------------------------------- what is checked
@@ -281,6 +286,7 @@ class Tally:
     refused: list = field(default_factory=list)
     wrong: list = field(default_factory=list)
     skipped: Counter = field(default_factory=Counter)
+    controls: Counter = field(default_factory=Counter)
     where: object = None
     worst: dict = field(default_factory=dict)
     patient: bool = hasattr(signal, "setitimer")
@@ -587,6 +593,33 @@ def check_maps(tally, rng, sketch, loop, point):
                 tally.note(name, (step, order, x[k], y[k]), int(count), expected)
 
 
+def check_controls(tally, rng, sketch, loop, point):
+    """No margin that is 1e-5 too good is certified; nearly all that are 3e-5 worse are."""
+    try:
+        found = margins(loop, *point)
+    except REFUSALS:
+        return
+    for what in dense_judge.too_good_ones(*loop.quotient(*point), found, tally.controls):
+        tally.note("controls", point, what, "no certificate")
+
+
+def check_delays(tally, rng, sketch, loop, point):
+    """Three to six delays: counts, margins and the rightmost root."""
+    count, wrong = dense_judge.compared(*sketch, tally.ask, tally.controls)
+    for what in wrong:
+        tally.note("delays", point, what, "the judge's")
+    root = None if count == -2 else tally.ask("rightmost_root", rightmost_root, loop)
+    if root is None:
+        return
+    near = 1e-6 * (1.0 + abs(root))
+    right, left = (
+        dense_judge.Judge(*(dense_judge.shifted(terms, sigma) for terms in sketch)).count()
+        for sigma in (root.real + near, root.real - near)
+    )
+    if right > 0 or left == 0 or (count >= 0 and (root.real > 0.0) != (count > 0)):
+        tally.note("rightmost_root", point, root, f"{right} right, {left} with it, {count}")
+
+
 CHECKS = {
     "counts": (check_counts, 1.0),
     "margins": (check_margins, 1.0),
@@ -597,12 +630,17 @@ CHECKS = {
     "charts": (check_chart, 0.3),
     "dcurve": (check_dcurve, 0.3),
     "maps": (check_maps, 0.3),
+    "controls": (check_controls, 0.1),
 }
+#: The checks of loops with more delays.
+MORE_DELAYS = {"delays": (check_delays, 1.0)}
+KINDS = tuple(CHECKS | MORE_DELAYS)
 
 
-def attack(seed, loops, kinds=tuple(CHECKS), tally=None, family="mixed"):
+def attack(seed, loops, kinds=KINDS, tally=None, family="mixed"):
     """Check the loops of these indices of a family; return the tally."""
     tally, place = tally or Tally(), list(FAMILIES).index(family)
+    checks = MORE_DELAYS if family == "delays" else CHECKS
     for index in loops:
         rng = np.random.default_rng([seed, index, *((1000 + place,) if place else ())])
         maker = rng.choice(FAMILIES[family])
@@ -614,7 +652,7 @@ def attack(seed, loops, kinds=tuple(CHECKS), tally=None, family="mixed"):
             continue
         tally.where = (index, sketch)
         tally.calls["loops"] += 1
-        for number, (kind, (check, share)) in enumerate(CHECKS.items()):
+        for number, (kind, (check, share)) in enumerate(checks.items()):
             own = np.random.default_rng([seed, index, number + 100 * place])
             if kind in kinds and own.random() < share:
                 try:
@@ -635,18 +673,20 @@ def main():
     parser.add_argument("--loops", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--first", type=int, default=0, help="index of the first loop")
-    parser.add_argument("--kinds", nargs="*", default=list(CHECKS), choices=list(CHECKS))
+    parser.add_argument("--kinds", nargs="*", default=KINDS, choices=KINDS)
     parser.add_argument("--families", nargs="*", default=list(FAMILIES), choices=list(FAMILIES))
     given = parser.parse_args()
     numbers, bad = range(given.first, given.first + given.loops), False
-    attack(given.seed, numbers[:10], tally=Tally(patient=False))  # compiles
     for family in given.families:
+        # The first call of a kind compiles.
+        attack(given.seed, numbers[:10], given.kinds, Tally(patient=False), family)
         start = time.perf_counter()
-        tally = attack(given.seed, numbers, tuple(given.kinds), family=family)
+        tally = attack(given.seed, numbers, given.kinds, family=family)
         calls = sum(tally.calls.values()) - tally.calls["loops"]
         print(f"\n{family}, seed {given.seed}, in {time.perf_counter() - start:.0f} s:")
         print(dict(tally.calls))
         print("not decided by the judge:", dict(tally.skipped))
+        print("negative controls:", dict(tally.controls))
         print("largest deviations:", {k: f"{v:.1e}" for k, v in tally.worst.items()})
         print("wrong:", len(tally.wrong), dict(Counter(entry[0] for entry in tally.wrong)))
         refused = dict(Counter(entry[0] for entry in tally.refused))

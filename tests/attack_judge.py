@@ -251,8 +251,8 @@ class View:
         return edges[:-1], edges[1:]
 
 
-def cut(a, b, parts=8):
-    share = np.arange(parts + 1) / parts
+def cut(a, b):
+    share = np.arange(9) / 8
     edges = a[:, None] + (b - a)[:, None] * share
     edges[:, -1] = b
     return edges[:, :-1].ravel(), edges[:, 1:].ravel()
@@ -342,7 +342,6 @@ class Verdict:
     gain_upper: float = np.inf
     gain_lower: float = 0.0
     unsure: tuple = ()
-    used: int = 0
 
 
 def lag(value):
@@ -362,12 +361,13 @@ def zeros_of(view, a, b, excess):
 
 
 @quiet
-def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
+def margins(sketch, c1, c2, stable=True, free_above=np.inf):
     """All margins; of a loop that is not stable the modulus only.
 
     Above `free_above`, in rad/s, both arms' phases are free: L fills a disc. Gains are not
     looked at then.
     """
+    used = 0
     asked = 1 if not stable else 3 if np.isfinite(free_above) else len(NAMES)
     view = View(sketch, c1, c2)
     # The limits, first.
@@ -454,7 +454,8 @@ def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
 
     def examine(a, b):
         """Leave out cells on which nothing smaller can lie; return the others, cut."""
-        best.used += a.size
+        nonlocal used
+        used += a.size
         m, h = 0.5 * (a + b), 0.5 * (b - a)
         value, slope, rest, middle, radius = view.enclose(m, h)
         free = a >= free_above
@@ -467,7 +468,7 @@ def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
             centre, size = view.enclose(m[free], 0.0 * m[free])[3:]
             improve_free(best, m[free], centre, size, stable)
         keep &= kept(middle, 0.0 * m, radius, h, a, b)
-        if best.used > most / 2:
+        if used > MOST_CELLS / 2:
             # Nulls of L ask for ever larger gains: leave the cells to the others.
             opened[3:] |= keep[3:].any(axis=1)
             keep[3:] = False
@@ -498,7 +499,7 @@ def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
             opened |= fine
             if a.size:
                 pending.append((rows, a, b))
-            if best.used > most:
+            if used > MOST_CELLS:
                 left = [entry[0] for entry in pending]
                 return done(np.any([opened, past(high), *left], axis=0))
         keep = past(high)

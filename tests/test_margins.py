@@ -14,15 +14,19 @@ from armlock import (
     CommonArm,
     Controller,
     CountError,
+    DelaySystem,
     DualArm,
     Loop,
     SingleArm,
     critical_perturbation,
+    delay,
     margins,
     modulus_margin,
     paper_loop,
+    stability_chart,
     unstable_roots,
 )
+from armlock.engine.polynomials import Polynomial
 from armlock.robustness import gain_interval, perturbations
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
 from tests import independent
@@ -247,6 +251,9 @@ def test_undamped_poles_bound_no_gain():
     response = 0.5 * (1j * crossing + 0.5) / (1.0 - crossing**2) * np.exp(-0.1j * crossing)
     near = np.argmin(np.abs(crossing - omega))
     assert -1.0 / response[near].real == pytest.approx(upper, rel=1e-4)
+    found = margins(loop, 0.0)
+    others = found.phase, found.delay, found.modulus
+    assert others == pytest.approx((1.0741, 0.82432, 0.898115), rel=1e-4)
     assert (np.abs(response.imag[response.real < -1.0 / upper * (1.0 + 1e-6)]) > 0.0).all()
 
 
@@ -295,6 +302,24 @@ def test_the_phase_next_to_where_a_pole_cancels_is_that_of_the_first_terms():
     assert found.phase == pytest.approx(2.0376, rel=1e-4)
     assert found.delay == pytest.approx(lag * 0.2 * np.sqrt(1 / 0.09 - 2.25) / 1e-8, rel=1e-6)
     assert found.delay == pytest.approx(1.2e8, rel=2e-2)
+
+
+@pytest.mark.parametrize("gain", [1.0 - 1e-9, 1.0 - 1e-12])
+def test_a_constant_just_below_one_has_no_crossover(gain):
+    found = margins(Loop(((), (), gain), SINGLE, 2.0, 1.5), 0.0)
+    assert (found.phase, found.delay, found.gain_upper) == (np.inf, np.inf, np.inf)
+    assert found.modulus == pytest.approx(1.0 + gain, rel=1e-9)
+
+
+@pytest.mark.parametrize("gain", [1.0 - 1e-9, 1.0 - 1e-12])
+def test_an_all_pass_just_below_unity_gain_is_stable_up_to_unity_gain(gain):
+    # |L| is `gain` everywhere, and its phase takes all values.
+    all_pass = Controller([1.0], [-1.0], gain)
+    loop = Loop(all_pass, SINGLE, 1.0, 1.0, delay=0.5)
+    assert unstable_roots(loop, 0.0) == 0
+    lower, upper, omega = gain_interval(loop, 0.0)
+    assert (lower, omega) == (0.0, np.inf)
+    assert upper == pytest.approx(1.0 / gain, rel=1e-14)
 
 
 def test_what_l_fills_may_have_one_on_its_edge():
@@ -367,5 +392,16 @@ def test_forty_poles_do_not_overflow(size):
     weak = Loop(Controller([], poles, 0.1), SINGLE, 20.0)
     # |L| is far below one, or far above it up to 40 times the poles, where L turns ten times.
     assert unstable_roots(weak, 0.5) == (0 if size > 1.0 else 20)
+    by_sums = DelaySystem.of(weak.controller) * (1 - 0.5 * delay(20.0))
+    assert unstable_roots(by_sums) == unstable_roots(weak, 0.5)
+    assert stability_chart(weak, [0.5], [0.0]).counts == unstable_roots(weak, 0.5)
     if size > 1.0:
         assert margins(weak, 0.5).modulus == pytest.approx(1.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("size", [1e-20, 1e20])
+def test_coefficients_that_are_no_floats_keep_their_roots(size):
+    # The lowest of them is 1e-367 or 1e433.
+    poles = -size * 1.5 ** np.arange(20)
+    found = Polynomial.of(Polynomial.of_roots(poles).exact)
+    assert np.sort(np.real(found.roots)) == pytest.approx(np.sort(poles), rel=1e-6)

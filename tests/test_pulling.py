@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy import signal
 
 from armlock import Controller, Loop, SingleArm, paper_loop, pulling
 from armlock.performance.pulling import largest_pulling
-from armlock.sensors import dual
+from armlock.sensors import SINGLE, dual
 
 STEP = (1.0, 0.0, 0.0)
 
@@ -17,6 +18,25 @@ def test_before_the_light_comes_back_the_loop_has_no_delay():
         found = pulling(SingleArm(0.5, 20.0), np.append(time, longest), common=STEP)
         expected = -0.5 * (1.0 - np.exp(-0.5 * time.ravel()))
         np.testing.assert_allclose(found[:-1], expected, rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    "controller",
+    [
+        Controller([], [-0.05 + 1j, -0.05 - 1j], 0.02),  # a resonance
+        Controller([-0.01, -1.0], [-0.001, -10.0], 0.2),  # a lag and a lead
+    ],
+)
+def test_before_the_light_comes_back_a_loop_without_an_integrator_follows_its_controller(
+    controller,
+):
+    """Then Y of a single arm is -K / (1 + K), and half of that for the sum."""
+    time = np.linspace(0.0, 32.0, 65)
+    above = controller.gain * np.poly(controller.zeros)
+    below = np.polyadd(np.poly(controller.poles), above)
+    _, expected = signal.step((above.real, below.real), T=time)
+    found = pulling(Loop(controller, SINGLE, 33.0, 33.0), time[1:], common=STEP)
+    np.testing.assert_allclose(found, -0.5 * expected[1:], rtol=2e-3, atol=1e-6)
 
 
 def test_errors_add_up():

@@ -14,14 +14,18 @@ from armlock import (
     UNCONFINED,
     CharacteristicFunction,
     CommonArm,
+    Controller,
     CountError,
     DualArm,
     HayesEquation,
+    Loop,
     d_curve,
     stability_chart,
     unstable_roots,
 )
 from armlock.engine.margins import chain_limit
+from armlock.sensors import DIFFERENCE
+from armlock.stability import crossings
 from tests import independent
 from tests.systems import NEUTRAL, RETARDED, with_roots
 from tests.test_in_time import ends_when_interrupted
@@ -341,6 +345,17 @@ def test_fractions_are_taken_exactly():
 def test_more_points_than_memory_holds_are_refused():
     with pytest.raises(ValueError, match=r"^c1 and c2 must be of a size that memory holds"):
         unstable_roots(CommonArm(), np.zeros((300_000, 1)), np.zeros(400_000))
+
+
+def test_where_rounding_hides_all_crossings_few_intervals_are_kept(monkeypatch):
+    # N is c2 times M, but for a part in 1e16: each step leaves an interval undecided.
+    monkeypatch.setattr(crossings, "_MOST_STEPS", 20_000)
+    loop = Loop(Controller([], [-1.0], 1e16), DIFFERENCE, 20.0, 20.0)
+    functions = loop.terms.constant, loop.terms.second, loop.terms.first
+    y, one = np.array([0.5, 0.6]), np.ones(2)
+    found = crossings.crossings(functions, y, -one, one, 1e4 * one)
+    assert found.unfinished.all()
+    assert 0 < found.undecided.row.size <= 4096 * y.size
 
 
 def test_all_points_real_are_boundary_points_up_to_the_end():

@@ -28,6 +28,8 @@ _FAST = 1.5
 _TOGETHER = 0.3
 # An interval over which an exponential turns by more than twice this, in rad, is a long one.
 _FAR = 30.0
+# Most undecided intervals of a row, on average over the rows of a call.
+_MOST_UNDECIDED = 4096
 # Polynomials are rescaled before they leave these bounds.
 _HUGE = 1e150
 # A piece of the axis is this share of the distance to the roots, together; it serves intervals
@@ -1198,7 +1200,11 @@ def cross(
                 n += 1
                 continue
             if narrow or (settled and abs(z[0].imag) + varied <= 2.0 * off):
-                # In shorter intervals rounding hides h as well.
+                # In shorter intervals rounding hides h as well. If it hides h on much of the
+                # axis, as where N is nearly a multiple of M, no row is followed further.
+                if left == _MOST_UNDECIDED * rows:
+                    unfinished[:] = True
+                    return found[:n].copy(), undecided[:left].copy(), unfinished
                 undecided = _appended(undecided, left)
                 middle, reach = 0.0, np.inf
                 if least > 0.0:

@@ -22,6 +22,8 @@ from armlock.engine.polynomials import rounded
 LARGEST_GAIN = 1e4
 # So close to the limit of the neutral root chain, as a share, the limit is taken for roots.
 _NEXT_TO_THE_CHAIN = 1e-5
+# What is left of the undelayed term at high frequency is decided if it is this share of it.
+_DECIDED = 256.0 * EPSILON
 # Largest delay margin in s: beyond it there is none.
 _LARGEST_DELAY = 1e300
 
@@ -135,11 +137,13 @@ def at_zero(f: Function, g: Function) -> float:
     return float(rounded([-first.coefficient / other.coefficient])[0])
 
 
-def chain_limit(f: Function, g: Function, start: float) -> float:
+def chain_limit(
+    f: Function, g: Function, start: float, rounding: float = 16.0 * EPSILON
+) -> float:
     """First t >= start at which the neutral root chain of f + t g is not confined (Lemma 14).
 
     What is left of the undelayed term is linear in t between the t at which a term vanishes.
-    A map has no such chain.
+    At least a share `rounding` of that term has to be left. A map has no such chain.
     """
     if f.space.step:
         return math.inf
@@ -152,7 +156,7 @@ def chain_limit(f: Function, g: Function, start: float) -> float:
 
     def left(t: float) -> float:
         v = np.abs(a + b * t)
-        return float(v[0] - v[1:].sum() - 16.0 * EPSILON * v[0])
+        return float(v[0] - v[1:].sum() - rounding * v[0])
 
     for low, high in zip(breaks, [*breaks[1:], math.inf], strict=True):
         at_low = left(low)
@@ -178,6 +182,7 @@ def first_zero(f: Function, g: Function, most: float, start: float) -> tuple[flo
         return start, math.inf
     if chain < most:
         best, where = start + (chain - start) * (1.0 - _NEXT_TO_THE_CHAIN), math.inf
+        best = min(best, chain_limit(f, g, start, _DECIDED))
     zero = at_zero(f, g)
     if start < zero < best:
         best, where = zero, 0.0
@@ -191,6 +196,8 @@ def modulus_of(n: Function, m: Function, free: Free | None = None) -> tuple[floa
     """Smallest |1 + L|, and where."""
     d, (centre, radius) = n + m, Limit.of(n, m)
     best, where = max(abs(1.0 + centre) - radius, 0.0), math.inf
+    # A smaller one is excluded to a part in a million, or to what is decided at high frequency.
+    tolerance = min(max(1e-6, 2.0 * _DECIDED / best), 1.0) if best else 1e-6
     zero = abs(at_zero(d, m))
     if zero < best:
         best, where = zero, 0.0
@@ -203,21 +210,29 @@ def modulus_of(n: Function, m: Function, free: Free | None = None) -> tuple[floa
         return Family([f, g, *arms], [test], loose=len(arms))
 
     if free is None:
-        return _over_axis(family(d, m), None, None, DISTANCE, best, where)
+        return _over_axis(family(d, m), None, None, DISTANCE, best, where, tolerance)
     other = family(free.centre + free.denominator, free.denominator, *free.arms)
-    return _over_axis(family(d, m), other, free, DISTANCE, best, where)
+    return _over_axis(family(d, m), other, free, DISTANCE, best, where, tolerance)
 
 
 def _over_axis(
-    exact: Family, other: Family | None, free: Free | None, goal: int, best: float, where: float
+    exact: Family,
+    other: Family | None,
+    free: Free | None,
+    goal: int,
+    best: float,
+    where: float,
+    tolerance: float = 1e-6,
 ) -> tuple[float, float]:
     """Find the least level of a family and, above a frequency, of another one."""
     if not best > 0.0:
         return best, where
-    best, where = least(exact, goal, best, where, high=free.above if free else math.inf)
+    high = free.above if free else math.inf
+    best, where = least(exact, goal, best, where, high=high, tolerance=tolerance)
     if not (free and other and best > 0.0):
         return best, where
-    return least(other, goal, best, where, low=free.above, tolerance=_FREE_TOLERANCE)
+    tolerance = max(tolerance, _FREE_TOLERANCE)
+    return least(other, goal, best, where, low=free.above, tolerance=tolerance)
 
 
 def _crossover(

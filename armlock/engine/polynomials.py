@@ -57,13 +57,14 @@ class Polynomial:
         if not exact:
             return cls(Fraction(0), ())
         at_zero = next(k for k, value in enumerate(exact) if value)
-        other = np.array([float(value) for value in exact[at_zero:]])
+        scaled, scale = _scaled(exact[at_zero:])
+        other = np.array([float(value) for value in scaled])
         roots = _roots(other)
         if not roots.size:
             return cls(exact[-1], (0j,) * at_zero)
         return cls(
             exact[-1],
-            (0j,) * at_zero + tuple(roots.tolist()),
+            (0j,) * at_zero + tuple((scale * roots).tolist()),
             frozenset(range(at_zero, at_zero + roots.size)),
             (tuple(value / exact[-1] for value in exact[at_zero:]),),
             _missed(roots, other),
@@ -198,6 +199,21 @@ def _in(s: Any, value: Fraction) -> Any:
     if isinstance(s, mpmath.ctx_mp_python.mpnumeric):
         return mpmath.mpf(value.numerator) / value.denominator
     return float(value)
+
+
+def _scaled(exact: Sequence[Fraction]) -> tuple[Sequence[Fraction], float]:
+    """Return a polynomial in s / scale, so that its coefficients are floats."""
+    sizes = np.abs(rounded(exact))
+    if all(
+        1e-250 < size < 1e250 or not value for value, size in zip(exact, sizes, strict=True)
+    ):
+        return exact, 1.0
+    n = len(exact) - 1
+    ratio = abs(exact[0] / exact[-1])
+    power = (ratio.numerator.bit_length() - ratio.denominator.bit_length()) // max(n, 1)
+    # A power of two changes no digits.
+    scale = Fraction(2) ** power
+    return [v * scale ** (k - n) / exact[-1] for k, v in enumerate(exact)], float(scale)
 
 
 def _roots(coefficients: FloatArray) -> ComplexArray:

@@ -429,7 +429,8 @@ def gain_interval(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> tuple[float, 
         R + k N = 0 , \qquad k = -\frac{1}{L} \text{ is real.}
 
     A factor closer to one by more than a part in a million is excluded. The limits of the
-    neutral root chain are given in place of factors that lie within 1e-5 of them.
+    neutral root chain are given in place of factors that lie within 1e-5 of them, or within
+    rounding.
 
     Examples
     --------

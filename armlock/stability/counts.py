@@ -109,7 +109,9 @@ def count_points(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -
     # D has a root at s = 0 on a line, which is known exactly. A loop may have none there.
     on_line = np.zeros(x.size, np.bool_)
     if not isinstance(system, Loop):
-        a, b, c = (term.series(1)[0] for term in terms)
+        at_zero = [term.series(1)[0] for term in terms]
+        # Of many fast poles the product is no float.
+        a, b, c = (value / (max(map(abs, at_zero)) or 1) for value in at_zero)
         sums = float(a), float(b) * (x0 - x), float(c) * (y0 - y)
         sizes = np.abs(sums[0]) + np.abs(sums[1]) + np.abs(sums[2])
         for i in np.flatnonzero(np.abs(sums[0] + sums[1] + sums[2]) <= 8.0 * EPSILON * sizes):
@@ -166,7 +168,9 @@ def unstable_roots(
         relative to its parameters, may be given as -1 (4e-10 where a root crosses at 1e4 rad/s,
         with 20 s). `UNCONFINED` (-2) where the neutral root chain is not confined to the left
         half-plane (`CharacteristicFunction.chain_reserve` is not positive): an arbitrarily
-        small change of the delays can then make infinitely many roots unstable.
+        small change of the delays can then make infinitely many roots unstable. A chain that is
+        confined by no more than rounding, about 1e-14, counts as not confined, and such a loop
+        has no margins.
 
     Raises
     ------

@@ -18,6 +18,7 @@ from armlock.delays import DelaySystem
 from armlock.engine import decide
 from armlock.engine.functions import Function, at, stacked
 from armlock.engine.margins import common_zeros
+from armlock.engine.polynomials import rounded
 from armlock.loops import Loop, checked_loop
 from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError
 from armlock.stability.crossings import crossings
@@ -174,7 +175,7 @@ def _leading_radius(n: Function, m: Function) -> tuple[int, float]:
     if above is None or below is None or below.order <= above.order:
         return 0, radius
     order = below.order - above.order
-    size = abs(float(above.coefficient / below.coefficient))
+    size = abs(float(rounded([above.coefficient / below.coefficient])[0]))
     return order, min(radius, (_SMALL * size) ** (1.0 / order))
 
 
