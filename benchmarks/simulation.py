@@ -102,7 +102,7 @@ def plain_rows(loop: Loop, series: Inputs, passes: int) -> list[Row]:
     """Compare `simulate` with the plain loop."""
     arguments = plain_arguments(loop)
     calls = [
-        lambda: locked_size(loop, series, (None, None)),
+        lambda: locked_size(loop, series),
         lambda: plain_output(series, arguments).size,
     ]
     ours, theirs = in_turn(calls, passes).min(axis=0)
@@ -120,10 +120,11 @@ def plain_rows(loop: Loop, series: Inputs, passes: int) -> list[Row]:
 
 def moving_rows(loop: Loop, series: Inputs, passes: int) -> list[Row]:
     """Compare arms that move with constant delays, whole ones and others."""
+    near = loop.replace(tau1=BETWEEN[0][0], tau2=BETWEEN[1][0])
     moves = [partial(moving, tau=tau, rate=rate) for tau, rate in BETWEEN]
     calls = [
-        partial(locked_size, loop, series, delays)
-        for delays in ((None, None), [tau for tau, _ in BETWEEN], moves)
+        partial(locked_size, *arguments)
+        for arguments in ((loop, series), (near, series), (loop, series, moves))
     ]
     times = in_turn(calls, passes, time.process_time)
     whole, between = np.median(times[:, 2:] / times[:, :2], axis=0)
@@ -139,7 +140,7 @@ def moving(t: FloatArray, *, tau: float, rate: float) -> FloatArray:
     return np.asarray(tau + rate * t)
 
 
-def locked_size(loop: Loop, series: Inputs, delays: Sequence[Any]) -> int:
+def locked_size(loop: Loop, series: Inputs, delays: Sequence[Any] = (None, None)) -> int:
     """Run a loop; nothing is kept."""
     noise, c1, c2 = series
     return simulate(loop, noise, c1=c1, c2=c2, tau1=delays[0], tau2=delays[1]).size
