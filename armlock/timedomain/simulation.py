@@ -75,10 +75,11 @@ def _delayed(phi: FloatArray, now: int, weights: Weights, i: int) -> float:
     """Return phi as it was one delay before row `now`; i is the sample of the delay."""
     first, shares = weights
     row = np.uintp(i * (len(first) > 1))
-    newest, value = now - first[row], 0.0
-    for k in range(shares.shape[1]):
+    newest = now - first[row]
+    value = shares[row, np.uintp(0)] * phi[np.uintp(newest)]
+    for k in range(1, shares.shape[1]):
         value += shares[row, np.uintp(k)] * phi[np.uintp(newest - k)]
-    return value
+    return float(value)
 
 
 @njit(nogil=True)
@@ -347,38 +348,44 @@ class Simulation:
         """
         given = self._series("noise", noise, None)
         inputs = given, self._series("c1", c1, given), self._series("c2", c2, given)
-        found = [np.empty(0)]
-        for at in range(0, given.size, _TOGETHER):
-            part = tuple(series[at : at + _TOGETHER].copy() for series in inputs)
-            found.append(self._advance(part))
-            if self._diverged:
-                began = self._work[_BOUNDED] / self.sample_rate
-                error = DivergenceError(
-                    f"the loop diverges: its output has exceeded all input since t = "
-                    f"{began:.6g} s, and exceeds it beyond the limit at t = "
-                    f"{self.samples / self.sample_rate:.6g} s"
-                )
-                error.time, error.output = float(began), np.concatenate(found)
-                raise error
-        return np.concatenate(found)
+        output, done = np.empty(given.size), 0
+        while done < given.size and not self._diverged:
+            part = tuple(
+                np.require(series[done : done + _TOGETHER], requirements=["C", "W"])
+                for series in inputs
+            )
+            computed = self._advance(part)
+            output[done : done + computed.size] = computed
+            done += computed.size
+        if self._diverged:
+            began = float(self._work[_BOUNDED]) / self.sample_rate
+            now = self.samples / self.sample_rate
+            error = DivergenceError(
+                f"the loop diverges: its output has exceeded all input since t = {began:.6g} "
+                f"s, and exceeds it beyond the limit at t = {now:.6g} s"
+            )
+            error.time, error.output = began, output[:done].copy()
+            raise error
+        return output
 
     def _advance(self, inputs: tuple[FloatArray, ...]) -> FloatArray:
         """Compute samples that fit into memory with their delays."""
         size = inputs[0].size
-        if self._diverged:
-            return np.empty(0)
         arms = self._arms(size)
         needed = max(map(reach, arms))
         check_memory("sample_rate", (needed,), 8)
-        past = np.append(np.zeros(max(needed - self._past.size, 0)), self._past)
-        phi = np.append(past, np.empty(size))
+        known = max(needed, self._past.size)
+        phi = np.empty(known + size)
+        # Before the first sample the arms are at rest.
+        phi[: known - self._past.size] = 0.0
+        phi[known - self._past.size : known] = self._past
         sampled = self._sensor, self._controller
         end = _compute(phi, inputs, arms, *sampled, self._work, self.limit, self.samples)
         self.samples, self._diverged = self.samples + end, end < size
         # The next sample needs no older one than the last sample did.
         oldest = max(int(first[-1]) + shares.shape[1] for first, shares in arms)
         self._past = phi[-oldest:].copy()
-        return phi[past.size : past.size + end]
+        return phi[known : known + end]
 
     def _series(self, name: str, value: npt.ArrayLike, like: FloatArray | None) -> FloatArray:
         """Return a finite series, or a number or a series in the shape of another one."""
@@ -396,15 +403,15 @@ class Simulation:
                 f"{name} must be a number or have the shape of noise, {like.shape}; got "
                 f"{array.shape}"
             )
-        return np.broadcast_to(array, like.shape)
+        return array if array.ndim else np.broadcast_to(array, like.shape)
 
     def _arms(self, size: int) -> tuple[Weights, Weights]:
         """Return the delays of both arms during the next samples."""
-        time = np.arange(self.samples, self.samples + size) / self.sample_rate
         found = list(self._weights)
         for k, (name, move) in enumerate(self._moving.items()):
             if move is None:
                 continue
+            time = np.arange(self.samples, self.samples + size) / self.sample_rate
             tau = finite_series(f"{name}(t)", move(time), 1)
             if tau.shape != time.shape:
                 raise ValueError(

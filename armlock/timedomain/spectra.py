@@ -34,8 +34,9 @@ _FIRST_BIN = 92
 _ENOUGH_SEGMENTS = 8
 # Length of the filter before a lower rate; its side lobes lie 120 dB below the pass band.
 _TAPS = 113
-# Samples taken in together: few enough for the cache.
-_BLOCK = 1 << 16
+# Segments transformed together, and samples taken in together: few enough for the cache.
+_TOGETHER = 64
+_BLOCK = 1 << 20
 
 _WINDOW = np.kaiser(SEGMENT + 1, 20.0)[:-1]
 # Points per bin at which `Spectrum.expected` samples a density.
@@ -160,6 +161,7 @@ def _averages(segments: int, bins: int) -> float:
 
 @cache
 def _filter() -> FloatArray:
+    # Importing scipy.signal takes as long as importing this package.
     from scipy.signal import firwin, kaiser_beta
 
     return np.asarray(firwin(_TAPS, 1.0 / FACTOR, window=("kaiser", kaiser_beta(120.0))))
@@ -169,7 +171,7 @@ class _Rate:
     """One rate of the ladder."""
 
     def __init__(self, sample_rate: float, depth: int) -> None:
-        self.sample_rate = sample_rate / FACTOR**depth
+        self.width = sample_rate / FACTOR**depth / SEGMENT
         self.power = np.zeros(SEGMENT // 2 + 1)
         self.segments = 0
         self.waiting = np.empty(0)
@@ -177,16 +179,16 @@ class _Rate:
 
     def add(self, samples: FloatArray) -> FloatArray:
         """Take in samples; return those of the next rate."""
-        # Importing scipy.signal takes as long as importing this package.
-        from scipy.signal import welch
-
         series = np.concatenate((self.waiting, samples))
-        segments = max((series.size - SEGMENT) // HOP + 1, 0)
-        if segments:
-            _, power = welch(series, self.sample_rate, _WINDOW, noverlap=SEGMENT - HOP)
-            self.power += segments * power
-            self.segments += segments
-        self.waiting = series[segments * HOP :].copy()
+        if series.size >= SEGMENT:
+            windows = sliding_window_view(series, SEGMENT)[::HOP]
+            for first in range(0, len(windows), _TOGETHER):
+                batch = windows[first : first + _TOGETHER]
+                spectra = np.fft.rfft((batch - batch.mean(axis=1, keepdims=True)) * _WINDOW)
+                self.power += (spectra.real**2 + spectra.imag**2).sum(axis=0)
+            self.segments += len(windows)
+            series = series[len(windows) * HOP :]
+        self.waiting = series.copy()
         series = np.concatenate((self.unfiltered, samples))
         count = max((series.size - _TAPS) // FACTOR + 1, 0)
         self.unfiltered = series[count * FACTOR :].copy()
@@ -197,14 +199,14 @@ class _Rate:
 
     def bands(self, numbers: IntArray) -> list[tuple[float, ...]]:
         """Average bins in bands; rows (frequency, power, averages, width, number of bins)."""
-        width = self.sample_rate / SEGMENT
-        index = np.floor(BANDS * np.log10(numbers * width))
+        scale = 0.5 * self.segments * self.width * SEGMENT * np.sum(_WINDOW**2)
+        index = np.floor(BANDS * np.log10(numbers * self.width))
         return [
             (
-                float(chosen.mean() * width),
-                float(self.power[chosen].mean() / self.segments),
+                float(chosen.mean() * self.width),
+                float(self.power[chosen].mean() / scale),
                 _averages(self.segments, chosen.size),
-                width,
+                self.width,
                 float(chosen.size),
             )
             for chosen in (numbers[index == band] for band in np.unique(index))
