@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import math
 import os
 import sys
@@ -103,16 +102,6 @@ def whole_steps(name: str, delay: float, step: float) -> int:
             f"({steps:g} steps)"
         )
     return round(steps)
-
-
-def as_written(thing: object) -> str:
-    """Return the call that makes a thing again; its attributes are named like its arguments."""
-    shown = []
-    for name in inspect.signature(type(thing)).parameters:
-        # A subclass need not keep all that it was given.
-        value = getattr(thing, name, "...")
-        shown.append(f"{name}={value.tolist() if isinstance(value, np.ndarray) else value!r}")
-    return f"{type(thing).__name__}({', '.join(shown)})"
 
 
 def real_array(name: str, value: object) -> FloatArray:

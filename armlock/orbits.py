@@ -13,7 +13,6 @@ tau(t) = l_back(t) + l_out(t - l_back(t)).
 
 from __future__ import annotations
 
-import gzip
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -54,13 +53,18 @@ _LARGEST_ERROR = 1e-5
 # How far the mean acceleration of the spacecraft may be from the Sun's gravity, relative to it:
 # the Moon's pull on spacecraft around the Earth is 0.6 %.
 _GRAVITY = 0.05
-# Positions in two segments at one epoch differ by less, in m.
-_SAME_STATE = 1.0
 # What an OEM may say of itself; the axes of these frames do not rotate.
 _OEM = {
     "CENTER_NAME": ("SUN",),
     "REF_FRAME": ("EME2000", "ICRF", "GCRF"),
     "TIME_SYSTEM": ("TCB", "TDB"),
+}
+
+
+# The first epochs of ESA's tables.
+_ESA = {
+    "trailing": "2036-12-09T00:00:29.327664000 TCB",
+    "leading": "2037-06-11T00:00:29.574159000 TCB",
 }
 
 
@@ -338,7 +342,7 @@ def read_table(path: str | Path, *, epoch: str = "") -> Constellation:
         spacecraft 1, of 2 and of 3. One line with names may come first, as pandas writes it
         with ``index=False``. Lines with ``#`` are comments. A name in .gz is unpacked.
     epoch : str, optional
-        The date and time scale of the first time; by default from a comment ``# epoch: ...``.
+        The date and time scale of the first time.
 
     Returns
     -------
@@ -351,30 +355,15 @@ def read_table(path: str | Path, *, epoch: str = "") -> Constellation:
     TypeError, ValueError
         If a row does not hold ten numbers, or as for `from_table`.
     """
-    path = Path(path)
-    with (gzip.open if path.suffix == ".gz" else open)(path, "rt", encoding="utf-8") as file:
-        text = file.read()
-    said = re.search(r"^# *epoch: *(.*?) *$", text, re.MULTILINE)
-    rows = [line.split(",") for line in re.findall(r"^[^#\n].*$", text, re.MULTILINE)]
-    if rows and not _is_number(rows[0][0]):
-        del rows[0]
-    wrong = [row for row in rows if len(row) != 10 or not all(map(_is_number, row))]
-    if wrong or not rows:
+    # What is no number is read as nan, and a row of another length raises.
+    values = np.genfromtxt(path, delimiter=",", encoding="utf-8")
+    if values.ndim != 2 or values.shape[1] != 10:
         raise ValueError(
-            f"{path} must hold ten numbers a row: time in s, then x, y and z in m of "
-            f"spacecraft 1, 2 and 3; got {','.join(wrong[0]) if wrong else 'no row'!r}"
+            f"{path} must hold rows of ten numbers: time in s, then x, y and z in m of "
+            f"spacecraft 1, 2 and 3; got a table of shape {values.shape}"
         )
-    values = np.array(rows, dtype=np.float64)
-    begun = epoch or (said[1] if said else "")
-    return from_table(values[:, 0], values[:, 1:].reshape(-1, 3, 3), epoch=begun)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+    rows = values[1:] if np.isnan(values[0]).all() else values
+    return from_table(rows[:, 0], rows[:, 1:].reshape(-1, 3, 3), epoch=epoch)
 
 
 def esa(name: str) -> Constellation:
@@ -399,8 +388,8 @@ def esa(name: str) -> Constellation:
     W. Martens and E. Joffre, J. Astronaut. Sci. 68, 402 (2021). Data by W. Martens, ESA/ESOC,
     CC BY 4.0; ``armlock/data/README.md`` says what was changed.
     """
-    one_of("name", name, ("trailing", "leading"))
-    return read_table(Path(__file__).parent / "data" / f"esa_{name}.csv.gz")
+    epoch = _ESA[one_of("name", name, _ESA)]
+    return read_table(Path(__file__).parent / "data" / f"esa_{name}.csv.gz", epoch=epoch)
 
 
 def read_oem(paths: Sequence[str | Path]) -> Constellation:
@@ -424,8 +413,8 @@ def read_oem(paths: Sequence[str | Path]) -> Constellation:
         If a file cannot be read.
     TypeError, ValueError
         If there are not three files; if a file is no OEM; if centre, frame or time scale is
-        another one; if the files differ in frame, time scale or epochs; if two segments differ
-        at their common epoch; or as for `from_table`, for instance at a gap between segments.
+        another one; if the files differ in frame, time scale or epochs; or as for `from_table`,
+        for instance at a gap between segments.
     """
     if isinstance(paths, str | Path) or len(paths) != 3:
         raise ValueError(f"paths must hold three files, one a spacecraft, got {paths!r}")
@@ -454,24 +443,16 @@ def _read_oem(path: Path) -> tuple[tuple[str, ...], npt.NDArray[np.datetime64], 
             )
         header.append(said.pop())
     rows = [line.split() for line in re.findall(r"^\s*\d+-\S*T.*", text, re.MULTILINE)]
-    wrong = [" ".join(row) for row in rows if len(row) not in (7, 10)] or ["none"] * (not rows)
-    if wrong:
-        raise ValueError(
-            f"states of {path} must have an epoch, position and velocity, and may have an "
-            f"acceleration, got {wrong[0]}"
-        )
     try:
-        epochs = np.array([row[0].removesuffix("Z") for row in rows], dtype="datetime64[ns]")
-        values = [[float(number) for number in row[1:4]] for row in rows]
+        dates = np.array([row[0].removesuffix("Z") for row in rows], dtype="datetime64[ns]")
+        states = np.array([row[1:] for row in rows], dtype=np.float64)
     except ValueError as error:
         raise ValueError(f"states of {path} must hold dates and numbers: {error}") from None
-    places = 1e3 * finite_series(f"positions of {path}", values, 2)
-    # Where a segment ends and the next begins, the epoch stands twice.
-    again = np.append(False, np.diff(epochs) == np.timedelta64(0))
-    apart = np.abs(places - np.roll(places, 1, axis=0)).max(axis=1) * again
-    if apart.max() > _SAME_STATE:
+    if states.ndim != 2 or states.shape[1] not in (6, 9):
         raise ValueError(
-            f"states of {path} must agree where an epoch stands twice, got positions "
-            f"{apart.max():.3g} m apart at {epochs[apart.argmax()]}"
+            f"states of {path} must have an epoch, position and velocity, and may have an "
+            f"acceleration, got a table of shape {states.shape}"
         )
-    return tuple(header), epochs[~again], places[~again]
+    # Where a segment ends and the next begins, the epoch stands twice.
+    epochs, kept = np.unique(dates, return_index=True)
+    return tuple(header), epochs, 1e3 * states[kept, :3]

@@ -61,19 +61,13 @@ def test_the_budget_is_held_against_a_requirement_and_draws_itself():
     f = np.geomspace(1e-4, 1.0, 30)
     budget = noise_budget(FLIGHT, f)
     np.testing.assert_allclose(budget.factor, tdi_capability(f) / budget.total, rtol=1e-12)
-    same = noise_budget(FLIGHT, f, laser=3e4 / f, requirement=tdi_capability(f))
-    np.testing.assert_array_equal(same.total, budget.total)
-    assert noise_budget(FLIGHT, f, laser="cavity").total[20] < budget.total[20]
+    laser = np.abs(transfer(FLIGHT, "laser", 2j * np.pi * f)) * 3e4 / f
+    np.testing.assert_allclose(budget.sources["laser"], laser, rtol=1e-12)
     assert len(budget.plot().lines) == len(budget.sources) + 2
 
 
 def test_unstable_loops_have_no_noise_budget():
     """Their responses at s = j omega look like those of a stable loop."""
-    loop = paper_loop()
-    assert unstable_roots(loop, 1.0, 1.0 - 1e-5) == 2
-    message = r"^loop must be stable at \(c1, c2\) = \(1, 0\.99999\), but unstable_.* 2"
-    with pytest.raises(ValueError, match=message):
-        noise_budget(loop, [1e-3], c2=1.0 - 1e-5)
     with pytest.raises(ValueError, match=r"^loop must be stable .* gives 36"):
         noise_budget(DualArm(gain=10.0, delay=1.0), [1e-3])
     # A root at s = 0 that cancels in L is not the loop's.

@@ -52,19 +52,21 @@ def kept(folder):
     return len(list((folder / "kept").rglob("output.pkl")))
 
 
-def check(folder):
-    """Compare what a script has saved with calls one after the other."""
-    expected = [critical_perturbation(CommonArm(gain), (-1.0, -1.0)) for gain in GAINS]
-    np.testing.assert_array_equal(np.load(folder / "found.npy"), expected)
+@pytest.fixture(scope="module")
+def expected():
+    """Call the function for one gain after the other; so it is compiled before a run starts."""
+    return [critical_perturbation(CommonArm(gain), (-1.0, -1.0)) for gain in GAINS]
 
 
-def test_joblib_finds_what_single_calls_find(tmp_path):
+def test_joblib_finds_what_single_calls_find(tmp_path, expected):
     pytest.importorskip("joblib")
     assert start(tmp_path, SCRIPTS[0]).wait(timeout=120) == 0
-    check(tmp_path)
+    np.testing.assert_array_equal(np.load(tmp_path / "found.npy"), expected)
 
 
-def test_a_run_whose_worker_and_program_are_killed_goes_on_and_finds_the_same(tmp_path):
+def test_a_run_whose_worker_and_program_are_killed_goes_on_and_finds_the_same(
+    tmp_path, expected
+):
     pytest.importorskip("distributed")
     (tmp_path / "kill").touch()
     first = start(tmp_path, SCRIPTS[1])
@@ -81,5 +83,5 @@ def test_a_run_whose_worker_and_program_are_killed_goes_on_and_finds_the_same(tm
     assert start(tmp_path, SCRIPTS[1]).wait(timeout=120) == 0
     # What was kept is not computed again.
     assert len(calls(tmp_path)) - before == GAINS.size - found
-    check(tmp_path)
+    np.testing.assert_array_equal(np.load(tmp_path / "found.npy"), expected)
     assert not (tmp_path / "kill").exists()

@@ -99,15 +99,6 @@ def test_a_filter_without_poles_leaves_white_noise():
     assert source.sampled_asd([0.0, 25.0]).tolist() == [2.0, 2.0]
 
 
-def test_noises_say_what_they_are():
-    """As the call that makes the same one again."""
-    for source in (
-        LaserNoise(3, 20.0, level=2.0, cutoff=1e-4, at_rest=True),
-        ShapedNoise([-1], [-3 + 9j, -3 - 9j], 4, seed=5, sample_rate=50),
-    ):
-        assert np.array_equal(eval(repr(source)).draw(50), source.draw(50))
-
-
 def test_formulas_of_the_paper():
     frequency = np.geomspace(1e-3, 50.0, 50)
     laser = LaserNoise(1, cutoff=1e-9)

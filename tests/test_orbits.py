@@ -288,8 +288,8 @@ def test_a_file_of_another_frame_is_refused(tmp_path, wrong, message):
     [
         (lambda text: text.replace("CCSDS_OEM_VERS", "OPM"), "must be a CCSDS OEM"),
         (lambda text: text.replace("TIME_SYSTEM", "SYSTEM"), "TIME_SYSTEM of .*, got none"),
-        (lambda text: text[: text.rindex(" ")], "position and velocity, .* got 2035-01-30"),
-        (lambda text: text.split("META_STOP")[0], "have an acceleration, got none"),
+        (lambda text: text[: text.rindex(" ")], "hold dates and numbers: "),
+        (lambda text: text.split("META_STOP")[0], "position and velocity, .* shape \\(0,\\)"),
         (lambda text: text.replace("2035-01-05", "2034-01-05"), "same epochs"),
         (lambda text: text.replace("2035-01-05", "2035-005"), "hold dates and numbers: "),
     ],
@@ -299,20 +299,6 @@ def test_a_file_that_is_damaged_is_refused(tmp_path, change, message):
     files = [oem(tmp_path / f"{k}.oem", k, t) for k in (1, 2, 3)]
     files[1].write_text(change(files[1].read_text("utf-8")), "utf-8")
     with pytest.raises(ValueError, match=message):
-        read_oem(files)
-
-
-def test_states_that_disagree_at_a_border_are_refused(tmp_path):
-    t = np.arange(0.0, 30 * DAY, DAY)
-    files = [oem(tmp_path / f"{k}.oem", k, t, border=9) for k in (1, 2, 3)]
-    lines = files[0].read_text("utf-8").splitlines()
-    at = 6 + 9
-    first, place, *rest = lines[at].split()
-    lines[at] = " ".join((first, str(float(place) + 0.1), *rest))
-    files[0].write_text("\n".join(lines), "utf-8")
-    with pytest.raises(
-        ValueError, match="agree where an epoch stands twice, got positions 100"
-    ):
         read_oem(files)
 
 
@@ -332,7 +318,7 @@ def test_the_packages_tables_are_esas_orbits():
 NAMES = "time," + ",".join(f"{axis}{k}" for k in (1, 2, 3) for axis in "xyz") + "\n"
 
 
-@pytest.mark.parametrize("head", ["", "# epoch: now, TDB\n", NAMES, f"# mine\n{NAMES}"])
+@pytest.mark.parametrize("head", ["", NAMES, f"# mine\n{NAMES}"])
 def test_a_table_is_read_with_and_without_names(tmp_path, head):
     """A line of names comes first where pandas has written the file."""
     time, positions = weeks(span=30.0)
@@ -340,20 +326,25 @@ def test_a_table_is_read_with_and_without_names(tmp_path, head):
     text = "\n".join(",".join(f"{value:.17g}" for value in row) for row in rows)
     file = tmp_path / "mine.csv"
     file.write_text(head + text, "utf-8")
-    table = read_table(file)
-    assert table.epoch == ("now, TDB" if "epoch" in head else "1000000000.0 s")
+    table = read_table(file, epoch="now, TDB")
+    assert table.epoch == "now, TDB"
     off = np.subtract(table.round_trips(10 * DAY), KEPLER.round_trips(10 * DAY))
     assert np.abs(off).max() < 1e-9
-    assert read_table(file, epoch="later").epoch == "later"
 
 
 @pytest.mark.parametrize(
-    "text", ["1,2,3\n", "", NAMES, f"{NAMES}{','.join('1234567890')},11\n", f"{NAMES}x,2\n"]
+    ("text", "message"),
+    [
+        ("1,2,3\n", r"must hold rows of ten numbers: time in s, .* shape \(3,\)"),
+        (NAMES, "must hold rows of ten numbers"),
+        (f"{NAMES}{','.join('1234567890')},11\n", "11 columns instead of 10"),
+        (NAMES + 20 * "x,2,3,4,5,6,7,8,9,0\n", "time must be finite, got nan"),
+    ],
 )
-def test_a_file_that_is_no_table_is_refused(tmp_path, text):
+def test_a_file_that_is_no_table_is_refused(tmp_path, text, message):
     file = tmp_path / "mine.csv"
     file.write_text(text, "utf-8")
-    with pytest.raises(ValueError, match="must hold ten numbers a row: time in s, then x, y"):
+    with pytest.raises(ValueError, match=message):
         read_table(file)
 
 

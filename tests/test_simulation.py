@@ -2,16 +2,12 @@
 
 import copy
 import pickle
-import re
-from functools import partial
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from scipy.interpolate import BarycentricInterpolator
-from scipy.signal import bilinear_zpk, lfilter, zpk2tf
 
 from armlock import (
     CommonArm,
@@ -21,7 +17,6 @@ from armlock import (
     Loop,
     PerturbationNoise,
     Simulation,
-    SingleArm,
     paper_loop,
     rightmost_root,
     sampled_open_loop,
@@ -29,15 +24,10 @@ from armlock import (
     unstable_roots,
 )
 from armlock.sensors import COMMON, SINGLE, SignalMapping
-from armlock.timedomain.delays import lagrange_delay
+from armlock.timedomain.delays import lagrange_weights
 from tests import independent
 
 RATE = 200.0
-# Arms that move for hours.
-SLOW_MOVES: dict[str, Any] = {
-    "tau1": lambda t: 20.13 + 1e-5 * t,
-    "tau2": lambda t: 19.957 - 1e-5 * t,
-}
 
 
 def relative_error(found, expected):
@@ -104,22 +94,6 @@ def test_sampled_loop_tends_to_the_continuous_one():
     assert np.abs(between / whole - 1.0).max() < 1e-4
 
 
-def test_history_acts_like_noise_behind_the_controller():
-    """What is in the arms when a run starts comes back, and goes through the controller."""
-    loop = Loop(Controller([], [-0.1], 0.2), COMMON, 2.0, 1.5)
-    run = partial(simulate, loop, c1=0.9, c2=0.8, sample_rate=10.0)
-    noise, past = np.random.default_rng(1).standard_normal((2, 300))
-    late = np.zeros(300)
-    late[:20] += 0.9 * past[-20:]
-    late[:15] += 0.8 * past[-15:]
-    above, below = zpk2tf(*bilinear_zpk([], [-0.1], 0.2, 10.0))
-    expected = run(noise + lfilter(above, below, late))
-    assert run(noise, history=past) == pytest.approx(expected, rel=1e-11)
-    assert np.array_equal(run(noise, history=0.5), run(noise, history=[0.5] * 20))
-    with pytest.raises(ValueError, match=r"^history must hold at least 20 samples"):
-        run(noise, history=past[:19])
-
-
 def test_divergence_is_reported_with_its_time():
     loop = CommonArm(1.0, tau1=1.2, tau2=0.8)
     assert unstable_roots(loop, 1.2, 1.2) == 1
@@ -130,15 +104,15 @@ def test_divergence_is_reported_with_its_time():
         simulate(loop, noise, c1=1.2, c2=1.2)
     error = caught.value
     assert np.isfinite(error.output).all()
-    assert error.output.size == round(error.detected * RATE)
     began = round(error.time * RATE)
     assert np.abs(error.output[began]) <= 1.0
     assert np.abs(error.output[began + 1 :]).min() > 0.0
-    assert np.abs(error.output).max() <= 1e6
+    assert 1e5 < np.abs(error.output[-1]) <= 1e6
     # It takes the limit's 14 e-folds from the one to the other.
-    assert error.detected - error.time == pytest.approx(np.log(1e6) / rate, rel=0.02)
+    took = error.output.size / RATE - error.time
+    assert took == pytest.approx(np.log(1e6) / rate, rel=0.02)
     other = pickle.loads(pickle.dumps(error))
-    assert (str(other), other.time, other.detected) == (str(error), error.time, error.detected)
+    assert (str(other), other.time) == (str(error), error.time)
     assert np.array_equal(other.output, error.output)
 
 
@@ -150,7 +124,7 @@ def test_divergence_does_not_depend_on_blocks():
     blocks = np.split(noise, 400)
     with pytest.raises(DivergenceError) as parts:
         [run.advance(block, c1=1.2, c2=1.2) for block in blocks]
-    assert (whole.value.time, whole.value.detected) == (parts.value.time, parts.value.detected)
+    assert str(whole.value) == str(parts.value)
     assert run.samples == whole.value.output.size
     last = parts.value.output
     assert np.array_equal(last, whole.value.output[run.samples - last.size :])
@@ -158,32 +132,21 @@ def test_divergence_does_not_depend_on_blocks():
         run.advance(noise[:10])
 
 
-def test_a_run_goes_on_from_its_saved_state_with_the_same_bits():
-    """Before its first block, in the middle, with arms that move; it takes little room."""
+def test_blocks_and_a_saved_state_give_the_same_bits():
+    """With arms that move, over more samples than are computed together."""
     noise = np.random.default_rng(1).standard_normal(70_000)
     loop = Loop(Controller([], [-0.1], 0.02), COMMON, 20.1, 19.9)
-    whole = simulate(loop, noise, sample_rate=10.0, history=0.5, **SLOW_MOVES)
-    run, parts = Simulation(loop, 10.0, history=0.5), []
+    arms: dict[str, Any] = {
+        "tau1": lambda t: 20.13 + 1e-5 * t,
+        "tau2": lambda t: 19.957 - 1e-5 * t,
+    }
+    whole = simulate(loop, noise, c1=0.9, sample_rate=10.0, **arms)
+    run, parts = Simulation(loop, 10.0, **arms), []
     for a, b in pairwise([0, 3, 500, 500, noise.size]):
-        saved = pickle.dumps(run)
-        run = pickle.loads(saved)
-        assert len(saved) < 20_000
-        parts.append(run.advance(noise[a:b], **SLOW_MOVES))
-        aside = copy.deepcopy(run)
-        aside.advance(noise[:9], **SLOW_MOVES)
+        run = copy.deepcopy(run)
+        parts.append(run.advance(noise[a:b], c1=0.9))
+        copy.deepcopy(run).advance(noise[:9])
     assert np.array_equal(np.concatenate(parts), whole)
-
-
-def test_an_arm_may_have_grown_during_a_gap():
-    """By some samples, as arms do in a month; what it then reaches back to is still there."""
-    loop = Loop(Controller([], [], 0.2), SINGLE, 2.0, 2.0)
-    noise = np.random.default_rng(1).standard_normal(2000)
-    run = Simulation(loop, 20.0, history=np.zeros(50))
-    before = run.advance(noise[:1000], c1=0.5)
-    first = run.advance(noise[1000:], c1=0.5, tau1=2.5)[0]
-    assert first == pytest.approx((noise[1000] + 0.2 * 0.5 * before[-50]) / 1.2)
-    with pytest.raises(ValueError, match=r"^tau1 must not reach back .* at t = 100 s"):
-        run.advance(noise, c1=0.5, tau1=9.0)
 
 
 @pytest.mark.parametrize("name", ["noise", "c1", "c2"])
@@ -205,16 +168,6 @@ def test_numbers_after_the_noise_have_names():
         simulate(CommonArm(), np.ones(100), 20.0)  # type: ignore[call-arg]
 
 
-def test_the_history_is_input_for_the_divergence_test():
-    """A loop that is left alone with what its arms hold is judged by that."""
-    with pytest.raises(DivergenceError) as caught:
-        simulate(SingleArm(), np.zeros(20_000), c1=3.0, history=1e-3, limit=10.0)
-    size = np.abs(caught.value.output)
-    assert 9.9e-3 < size[-1] <= 1e-2
-    began = round(caught.value.time * RATE)
-    assert size[began] <= 1e-3 < size[began + 1 :].min()
-
-
 def test_a_dead_time_is_refused_with_the_phase_that_it_has():
     loop = paper_loop(delay=20e-6)
     message = (
@@ -232,17 +185,16 @@ def test_a_dead_time_is_refused_with_the_phase_that_it_has():
 def test_what_memory_cannot_hold_is_refused():
     with pytest.raises(ValueError, match=r"^sample_rate must be of a size that memory holds"):
         simulate(CommonArm(), np.ones(9), sample_rate=1e9)
-    with pytest.raises(ValueError, match=r"^tau1 must be of a size that memory holds"):
-        simulate(CommonArm(), np.ones(9), tau1=1e9)
 
 
 def test_a_share_of_a_sample_is_seen_at_any_rate():
     """A thousandth of a sample in 2 10^7, which is no rounding error."""
-    first, weights = lagrange_delay("tau", 20.0 + 1e-9, 1e6)
-    assert (first, len(weights)) == (20_000_000 - 3, 8)
-    assert sum(k * weight for k, weight in enumerate(weights)) == pytest.approx(3.001)
+    first, weights = lagrange_weights("tau", np.array([20.0 + 1e-9]), 1e6)
+    assert (first[0], weights.shape) == (20_000_000 - 3, (1, 8))
+    assert weights[0] @ np.arange(8) == pytest.approx(3.001)
     # The last digit of 20.1 * 1e5 = 2010000.0000000002 is.
-    assert lagrange_delay("tau", 20.1, 1e5) == (2_010_000, (1.0,))
+    first, weights = lagrange_weights("tau", np.array([20.1]), 1e5)
+    assert (first.tolist(), weights.tolist()) == ([2_010_000], [[1.0]])
 
 
 def test_a_refused_block_leaves_the_run_where_it_is():
@@ -266,17 +218,12 @@ MOVES: dict[str, Any] = {
 }
 
 
-def moves(samples, rate):
-    t = np.arange(samples) / rate
-    return {name: move(t) for name, move in MOVES.items()}
-
-
 def test_moving_arms_against_plain_python():
     """An integrating controller with a zero, by the trapezoidal rule, and eight samples."""
     rate, (gain, zero, pole) = 10.0, (0.02, -0.5, -0.1)
     loop = Loop(Controller([zero], [pole], gain), COMMON, 20.0, 19.0)
     noise, c1, c2 = np.random.default_rng(6).uniform(-0.9, 0.9, (3, 2000))
-    delays = moves(noise.size, rate)
+    delays = {name: move(np.arange(noise.size) / rate) for name, move in MOVES.items()}
     past = 300
     phi = np.zeros(past + noise.size)
     # K = gain + residue / (s - pole), its state by the trapezoidal rule.
@@ -295,69 +242,21 @@ def test_moving_arms_against_plain_python():
         phi[now] = (given - residue * carried + share * light) / (1.0 + 2.0 * share)
         before = 2.0 * phi[now] - light
         state = carried + half * before / (1.0 - half * pole)
-    for given_delays in (delays, MOVES):
-        found = simulate(loop, noise, c1=c1, c2=c2, sample_rate=rate, **given_delays)
-        assert relative_error(found, phi[past:]) < 1e-12
-
-
-@pytest.mark.parametrize(("controller", "order"), [([], 8), ([-0.1], 2)])
-def test_a_manufactured_solution_converges_as_the_order_says(controller, order):
-    """The input that makes the output a sine; the arm grows by 1e-3 s a second."""
-
-    def phi(t):
-        return np.sin(2.0 * t + 0.4)
-
-    def tau(t):
-        return 2.005 + 1e-3 * t
-
-    def u(t):
-        return 0.2 * (phi(t) + 0.5 * phi(t - tau(t)))
-
-    loop, errors = Loop(Controller([], controller, 0.2), SINGLE, 2.0, 2.0), []
-    for rate in (10.0, 20.0):
-        t, before = np.arange(80 * rate) / rate, np.arange(-6 * rate, 0) / rate
-        sent = u(t)
-        if controller:
-            found = solve_ivp(
-                lambda x, y: controller[0] * y + u(x), (0.0, 80.0), [0.0], "DOP853", t,
-                rtol=1e-12, atol=1e-13,
-            )  # fmt: skip
-            sent = found.y[0]
-        output = simulate(
-            loop, phi(t) + sent, c1=-0.5, sample_rate=rate, tau1=tau, history=phi(before)
-        )
-        # The sampled controller is at rest half a sample earlier; that is forgotten by then.
-        errors.append(np.abs(output - phi(t))[t > 30.0].max())
-    assert errors[0] / errors[1] == pytest.approx(2.0**order, rel=0.05)
+    found = simulate(loop, noise, c1=c1, c2=c2, sample_rate=rate, **MOVES)
+    assert relative_error(found, phi[past:]) < 1e-12
 
 
 def test_a_moving_delay_that_stands_still_is_a_constant_one():
     """Bit by bit where it is whole samples; otherwise up to rounding."""
     noise = np.random.default_rng(7).standard_normal(3000)
-    run = partial(simulate, noise=noise, c1=0.9, c2=0.8, sample_rate=20.0)
     for delay, accuracy in ((2.0, 0.0), (2.03, 1e-14)):
         loop = Loop(Controller([], [-0.1], 0.2), COMMON, delay, 1.97)
-        constant = run(loop)
-        for tau in (np.full(noise.size, delay), lambda t: np.full(t.size, delay)):  # noqa: B023
-            assert relative_error(run(loop, tau1=tau), constant) <= accuracy
-        for other in (loop, Loop(loop.controller, COMMON, 2.1, 1.93)):
-            assert np.array_equal(run(other, tau1=delay, tau2=1.97), constant)
-
-
-def test_moving_arms_do_not_depend_on_blocks():
-    """Nor on whether they are given as series or as functions."""
-    rate, loop = 10.0, Loop(Controller([], [-0.1], 0.02), COMMON, 20.1, 19.9)
-    noise = np.random.default_rng(4).standard_normal(700)
-    whole = simulate(loop, noise, c1=0.9, c2=0.8, sample_rate=rate, **MOVES)
-    series = moves(700, rate)
-    run, other = Simulation(loop, rate), Simulation(loop, rate)
-    parts, again = [], []
-    for a, b in pairwise([0, 1, 2, 300, 700]):
-        parts.append(run.advance(noise[a:b], c1=0.9, c2=0.8, **MOVES))
-        part = {name: tau[a:b] for name, tau in series.items()}
-        again.append(other.advance(noise[a:b], c1=0.9, c2=0.8, **part))
-    assert np.array_equal(np.concatenate(parts), whole)
-    assert np.array_equal(np.concatenate(again), whole)
+        constant = simulate(loop, noise, c1=0.9, c2=0.8, sample_rate=20.0)
+        still = simulate(
+            loop, noise, c1=0.9, c2=0.8, sample_rate=20.0,
+            tau1=lambda t: np.full(t.size, delay),  # noqa: B023
+        )  # fmt: skip
+        assert relative_error(still, constant) <= accuracy
 
 
 def test_a_delay_may_outgrow_what_the_run_began_with():
@@ -377,47 +276,20 @@ def test_a_delay_may_outgrow_what_the_run_began_with():
     assert relative_error(found[known], expected[known]) < 1e-11
 
 
-SLOW = Loop(Controller([], [-0.1], 0.2), SINGLE, 2.0, 2.0)
-
-
 @pytest.mark.parametrize(
-    ("tau", "constraint"),
+    ("tau", "message"),
     [
-        (lambda t: 2.0 - 0.5 * t, "be at least 0.2 s where it is not constant, got 0.1"),
-        (lambda t: -t, "be at least 0.2 s where it is not constant, got -0.0 s at t = 0 s"),
-        (lambda t: 2.0 + 1.1 * t, "change by more than -3 and less than 1 s a second, got"),
-        (lambda t: 9.0 - 4.0 * t, "change by more than -3 and less than 1 s a second, got"),
-        (lambda t: 2.6 + 0.1 * t, "not reach back past the history, which begins at t = -2.5"),
-        (2.6, "not reach back past the history, which begins at t = -2.5 s"),
-        (-1.0, "be positive, got -1.0"),
-        (np.full(99, 2.0), "be a number or have the shape of noise, (100,); got (99,)"),
-        (np.append(np.full(99, 2.0), np.nan), "be finite, got nan at index 99"),
+        (lambda t: 2.0 - 0.5 * t, r"tau1\(t\) must be at least 4 samples .*: 0.2 s"),
+        (
+            lambda t: 2.0 + 1.1 * t,
+            r"tau1\(t\) must grow by less than 1 s a second, got",
+        ),
+        (lambda t: t[:-1], r"tau1\(t\) must have the shape of t, \(100,\), got \(99,\)"),
+        (lambda t: np.where(t < 1.0, 2.0, np.nan), r"tau1\(t\) must be finite, got nan .* 20"),
+        (2.6, r"tau1 must be a function of the time in s, got 2.6; loop.replace\(tau1"),
     ],
-)  # fmt: skip
-def test_a_delay_that_cannot_be_is_refused_with_its_time(tau, constraint):
-    call = partial(simulate, SLOW, np.ones(100), sample_rate=20.0, history=np.zeros(50))
-    name = r"tau1\(t\)" if callable(tau) and "history" not in constraint else "tau1"
-    with pytest.raises(ValueError, match=f"^{name} must {re.escape(constraint)}"):
-        call(tau1=tau)
-    if callable(tau):
-        with pytest.raises(ValueError, match=f"^tau1 must {re.escape(constraint)}"):
-            call(tau1=tau(np.arange(100) / 20.0))
-
-
-def test_what_a_function_of_time_returns_is_checked():
-    for wrong, message in (
-        (lambda t: t[:-1], r"have the shape of noise, \(100,\); got \(99,\)"),
-        (lambda t: np.where(t < 1.0, 2.0, np.nan), "be finite, got nan at index 20"),
-        (lambda t: "two", "hold real numbers"),
-    ):
-        with pytest.raises((TypeError, ValueError), match=rf"^tau1\(t\) must .*{message}"):
-            simulate(SLOW, np.ones(100), sample_rate=20.0, tau1=wrong)
-
-
-def test_no_run_and_no_call_reaches_back_past_the_history():
-    """However little has been computed since."""
-    begins = r"^tau1 must not reach back past the history, which begins at t = -2\.5 s, at t = "
-    run = Simulation(SLOW, 20.0, history=np.zeros(50))
-    run.advance([1.0])
-    with pytest.raises(ValueError, match=rf"{begins}0\.05 s"):
-        run.advance([1.0], tau1=2.6)
+)
+def test_a_delay_that_cannot_be_is_refused(tau, message):
+    loop = Loop(Controller([], [-0.1], 0.2), SINGLE, 2.0, 2.0)
+    with pytest.raises((TypeError, ValueError), match=f"^{message}"):
+        simulate(loop, np.ones(100), sample_rate=20.0, tau1=tau)

@@ -64,31 +64,20 @@ def test_a_constant_has_no_density():
     assert found.asd.max() <= 1e-14
 
 
-LEVELS = {
-    # Samples, and the first and last bin at each rate, from the highest rate down.
-    1024: [(8, 504)],
-    # The second rate has seven segments, and eight.
-    11_372: [(8, 504), (8, 31)],
-    11_373: [(92, 504), (8, 367)],
-    20_000: [(92, 504), (8, 367), (8, 31)],
-    400_000: [(92, 504), (92, 367), (92, 367), (8, 367), (8, 31)],
-}
-
-
-@pytest.mark.parametrize("samples", LEVELS)
-def test_every_bin_has_its_place(samples):
-    """Each rate gives the bins that the next one, finer, does not give."""
-    rate = 50.0
-    found = amplitude_spectrum(np.random.default_rng(1).standard_normal(samples), rate)
+@pytest.mark.parametrize("samples", [1024, 11_372, 11_373, 20_000, 400_000])
+def test_bands_leave_no_gap(samples):
+    """Where a slower rate takes over, its last bin ends within half a bin of the next one."""
+    found = amplitude_spectrum(np.random.default_rng(1).standard_normal(samples), 50.0)
     half = 0.5 * found.bins * found.resolution
-    for depth, (first, last) in enumerate(LEVELS[samples]):
-        width = rate / 4**depth / SEGMENT
-        mine = np.isclose(found.resolution, width, rtol=1e-12)
-        assert found.bins[mine].sum() == last - first + 1
-        low, high = (found.frequency - half)[mine].min(), (found.frequency + half)[mine].max()
-        assert low / width == pytest.approx(first - 0.5, rel=1e-9)
-        assert high / width == pytest.approx(last + 0.5, rel=1e-9)
-    assert np.unique(np.round(np.log2(found.resolution), 6)).size == len(LEVELS[samples])
+    overlap = ((found.frequency + half)[:-1] - (found.frequency - half)[1:]) / found.resolution[
+        1:
+    ]
+    assert (overlap > -1e-6).all()
+    assert (overlap < 0.5).all()
+    slower = found.resolution[0] / found.resolution[-1]
+    assert slower == {1024: 1.0, 11_372: 0.25, 11_373: 0.25, 20_000: 1 / 16}.get(
+        samples, 1 / 256
+    )
 
 
 @given(st.lists(st.sampled_from([0, 1, 2, 3, 255, 256, 257, 1023, 1500]), max_size=14))
@@ -111,7 +100,7 @@ def test_a_part_of_a_spectrum_lies_between_two_frequencies():
     inside = (found.frequency >= 0.1) & (found.frequency <= 0.5)
     assert np.array_equal(part.asd, found.asd[inside])
     assert np.array_equal(part.bins, found.bins[inside])
-    assert repr(found.within(2.0, 3.0)) == "Spectrum(0 bands)"
+    assert found.within(2.0, 3.0).asd.size == 0
     with pytest.raises(ValueError, match=r"^high must not lie below low = 1\.0, got 0\.1"):
         found.within(1.0, 0.1)
     with pytest.raises(TypeError, match=r"^asd must be a function of the frequency, got 1\.0"):

@@ -14,14 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from armlock.checks import (
-    FloatArray,
-    axis,
-    one_of,
-    positive_array,
-    real_array,
-    real_number,
-)
+from armlock.checks import FloatArray, axis, positive_array
 from armlock.loops import Loop
 from armlock.performance.transfer import require_stable, responses
 
@@ -155,29 +148,11 @@ class NoiseBudget:
         return ax
 
 
-def _density(name: str, value: npt.ArrayLike, frequency: FloatArray) -> FloatArray:
-    """Return a density at each frequency, or raise."""
-    asd = real_array(name, value)
-    if (asd < 0.0).any():
-        raise ValueError(f"{name} must not be negative, got {asd.min()} among its values")
-    if asd.shape not in ((), frequency.shape):
-        raise ValueError(
-            f"{name} must be one number or hold one for each of the {frequency.size} "
-            f"frequencies; got shape {asd.shape}"
-        )
-    return np.asarray(np.broadcast_to(asd, frequency.shape))
-
-
 def noise_budget(
     loop: Loop,
     frequency: npt.ArrayLike,
-    *,
-    laser: str | npt.ArrayLike = "free-running",
-    requirement: npt.ArrayLike | None = None,
-    c1: float = 1.0,
-    c2: float = 1.0,
 ) -> NoiseBudget:
-    r"""Compute what noise is left on the locked laser.
+    r"""Compute what noise is left on the locked laser, at c1 = c2 = 1.
 
     .. math::
 
@@ -201,24 +176,18 @@ def noise_budget(
         The loop.
     frequency : array_like of float, one-dimensional
         In Hz, positive.
-    laser : {"free-running", "Mach-Zehnder", "cavity"} or array_like of float, optional
-        Noise of the laser before it is locked: by name, or in Hz/sqrt(Hz) at each frequency.
-    requirement : array_like of float, optional
-        Requirement on the total in Hz/sqrt(Hz) at each frequency; by default the capability of
-        time-delay interferometry, 300 (1 + (3 mHz / f)^2).
-    c1, c2 : float, optional
-        Multiplicative perturbations.
 
     Returns
     -------
     NoiseBudget
+        With a free-running laser, and the capability of time-delay interferometry as the
+        requirement, 300 (1 + (3 mHz / f)^2).
 
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no `Loop` or not stable at c1, c2, the frequencies are not positive and
-        one-dimensional, there is no laser of that name, or densities are negative or not of the
-        frequencies' shape.
+        If `loop` is no `Loop` or not stable, or the frequencies are not positive and
+        one-dimensional.
 
     References
     ----------
@@ -234,12 +203,9 @@ def noise_budget(
     As a table: ``pandas.DataFrame(found.sources, index=found.frequency)``.
     """
     f = axis("frequency", positive_array("frequency", frequency))
-    if isinstance(laser, str):
-        laser = LASERS[one_of("laser", laser, LASERS)](f)
+    require_stable(loop)
     s = 2j * np.pi * f
-    c1, c2 = real_number("c1", c1), real_number("c2", c2)
-    require_stable(loop, c1, c2)
-    found = responses(loop, s, c1, c2)
+    found = responses(loop, s)
     arms = np.array([found["arm 1"], found["arm 2"]])
     beats, tau = np.array(LEVELS.beat_notes)[:, None], np.array([[loop.tau1], [loop.tau2]])
     # An arm's noise in cycles is turned into a frequency by 2 pi f.
@@ -253,10 +219,9 @@ def noise_budget(
         return np.asarray(np.hypot(together, np.linalg.norm(separate * arms, axis=0)))
 
     locked = {
-        "laser": np.abs(found["laser"]) * _density("laser", laser, f),
+        "laser": np.abs(found["laser"]) * free_running(f),
         "shot": shot * through(0.0, 1.0),
         "clock": clock * through(beats, beats),
         "motion": motion * through(1.0 + np.exp(-s * tau), 2.0),
     }
-    required = tdi_capability(f) if requirement is None else requirement
-    return NoiseBudget(f, locked, _density("requirement", required, f))
+    return NoiseBudget(f, locked, tdi_capability(f))

@@ -18,11 +18,8 @@ def transfer(
     loop: Loop,
     source: str,
     s: npt.ArrayLike,
-    *,
-    c1: npt.ArrayLike = 1.0,
-    c2: npt.ArrayLike = 1.0,
 ) -> ComplexArray:
-    r"""Evaluate the response of the locked laser to one of the inputs.
+    r"""Evaluate the response of the locked laser to one of the inputs, at c1 = c2 = 1.
 
     With the controller K and the sensor's weights m1 and m2
 
@@ -43,19 +40,17 @@ def transfer(
         The input: `S`, `Y_1`, `Y_2`, `Y_+` or `Y_-`.
     s : array_like of complex
         Laplace variable in rad/s.
-    c1, c2 : array_like of float, optional
-        Multiplicative perturbations. All three broadcast.
 
     Returns
     -------
-    complex array, of the broadcast shape
+    complex array, shaped like `s`
         From phase to phase, or from frequency to frequency.
 
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no `Loop`, there is no such input, or s, c1 or c2 is refused by
-        `Loop.open_loop`, for instance s at a pole of the open loop.
+        If `loop` is no `Loop`, there is no such input, or s is refused by `Loop.open_loop`, for
+        instance at a pole of the open loop.
 
     Examples
     --------
@@ -63,25 +58,13 @@ def transfer(
     >>> print(f"{abs(transfer(flight_loop(), 'laser', 2j * 3.141592653589793 * 3e-3)):.2e}")
     1.13e-05
     """
-    found = responses(loop, s, c1, c2)
+    found = responses(loop, s)
     return found[one_of("source", source, found)]
 
 
-def responses(
-    loop: Loop, s: npt.ArrayLike, c1: npt.ArrayLike = 1.0, c2: npt.ArrayLike = 1.0
-) -> dict[str, ComplexArray]:
-    """Evaluate the responses to all inputs at once, as `transfer` gives them one by one.
-
-    Parameters
-    ----------
-    loop, s, c1, c2
-        As for `transfer`.
-
-    Returns
-    -------
-    dict of str to complex array, of the broadcast shape
-    """
-    open_loop, first, second = checked_loop(loop).with_arms(s, c1, c2)
+def responses(loop: Loop, s: npt.ArrayLike) -> dict[str, ComplexArray]:
+    """Evaluate the responses to all inputs at once, as `transfer` gives them one by one."""
+    open_loop, first, second = checked_loop(loop).with_arms(s, 1.0, 1.0)
     sensitivity = 1.0 / (1.0 + open_loop)
     errors = {
         "arm 1": first,
@@ -93,14 +76,13 @@ def responses(
     return {"laser": np.asarray(sensitivity), **found}
 
 
-def require_stable(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> None:
+def require_stable(loop: Loop) -> None:
     """Raise unless all roots of a closed loop lie in the open left half-plane.
 
     The response of an unstable loop at s = j omega looks like that of a stable one.
     """
-    count = int(unstable_roots(checked_loop(loop), c1, c2))
+    count = int(unstable_roots(checked_loop(loop), 1.0, 1.0))
     if count != 0:
         raise ValueError(
-            f"loop must be stable at (c1, c2) = ({c1:g}, {c2:g}), but "
-            f"unstable_roots gives {count}"
+            f"loop must be stable at c1 = c2 = 1, but unstable_roots gives {count}"
         )

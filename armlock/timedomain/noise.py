@@ -16,7 +16,6 @@ import numpy.typing as npt
 from armlock import paper
 from armlock.checks import (
     FloatArray,
-    as_written,
     check_memory,
     positive_number,
     real_array,
@@ -149,10 +148,6 @@ class ShapedNoise:
             order = self._sampled.order
             start = self._root @ self._random.standard_normal(order)
             self._state[:order] = self._scale * start
-
-    def __repr__(self) -> str:
-        """Name the class and its arguments, as they are written to make it again."""
-        return as_written(self)
 
     def asd(self, frequency: npt.ArrayLike) -> FloatArray:
         """Prescribed density at a frequency in Hz, in the series' unit per sqrt(Hz).

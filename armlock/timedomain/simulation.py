@@ -13,6 +13,8 @@ loop of the simulation.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import numpy.typing as npt
 
@@ -27,22 +29,15 @@ from armlock.checks import (
 )
 from armlock.compiled import njit
 from armlock.loops import Loop, checked_loop
-from armlock.timedomain.delays import (
-    AnyDelay,
-    Delay,
-    GivenDelay,
-    arm_delay,
-    delayed,
-    lagrange_delay,
-    longest,
-    reach,
-)
+from armlock.timedomain.delays import Weights, lagrange_weights, reach
 from armlock.timedomain.discretize import SampledFilter, SampledSensor, sampled_loop, warped
 
+#: A round trip that changes: its delay in s at times in s, an array of shape (n,).
+Moving = Callable[[FloatArray], npt.ArrayLike]
 #: The output counts as diverged when it exceeds the largest input so far by this factor.
 LIMIT = 1e6
-# Samples kept behind the longest delay, for arms that have grown during a gap of the run.
-_SPARE = 64
+# Samples computed together: the weights of arms that move are made for as many.
+_TOGETHER = 1 << 16
 # The numbers that a run keeps: what the controller would send with the next sample if no input
 # came, the largest input so far, and the number of the last output that was not larger. The
 # states of sensor and controller follow.
@@ -56,11 +51,9 @@ class DivergenceError(ArithmeticError):
     ----------
     time : float
         When it began in s: the last time at which the output was no larger than the largest
-        input so far, noise or history.
-    detected : float
-        When the output exceeded that input by the factor `limit`, in s.
+        input so far.
     output : float array
-        The samples of this call before that time; all are finite.
+        The samples of this call before the output exceeded the limit; all are finite.
 
     Examples
     --------
@@ -69,29 +62,31 @@ class DivergenceError(ArithmeticError):
     >>> try:
     ...     locked = simulate(SingleArm(), np.ones(20_000), c1=3.0, limit=10.0)
     ... except DivergenceError as error:
-    ...     print(error.time < error.detected, bool(np.isfinite(error.output).all()))
-    True True
+    ...     print(0.0 <= error.time < error.output.size / 200.0)
+    True
     """
 
-    def __init__(self, time: float, detected: float, output: FloatArray) -> None:
-        super().__init__(
-            f"the loop diverges: its output has exceeded all input since t = {time:.6g} s, "
-            f"and exceeds it beyond the limit at t = {detected:.6g} s"
-        )
-        self.time = time
-        self.detected = detected
-        self.output = output
+    time: float
+    output: FloatArray
 
-    def __reduce__(self) -> tuple[type[DivergenceError], tuple[float, float, FloatArray]]:
-        """Return what makes the same error again in another process, as joblib does."""
-        return type(self), (self.time, self.detected, self.output)
+
+@njit()
+def _delayed(phi: FloatArray, now: int, weights: Weights, i: int) -> float:
+    """Return phi as it was one delay before row `now`; i is the sample of the delay."""
+    first, shares = weights
+    row = np.uintp(i * (len(first) > 1))
+    newest = now - first[row]
+    value = shares[row, np.uintp(0)] * phi[np.uintp(newest)]
+    for k in range(1, shares.shape[1]):
+        value += shares[row, np.uintp(k)] * phi[np.uintp(newest - k)]
+    return float(value)
 
 
 @njit(nogil=True)
 def _compute(
     phi: FloatArray,
     inputs: tuple[FloatArray, ...],
-    arms: tuple[AnyDelay, AnyDelay],
+    arms: tuple[Weights, Weights],
     sensor: SampledSensor,
     controller: SampledFilter,
     work: FloatArray,
@@ -100,9 +95,9 @@ def _compute(
 ) -> int:
     """Compute the last samples of phi from those before, one for each sample of the noise.
 
-    `inputs` are noise, c1 and c2; c1 and c2 may have one sample for all. `work` is described at
-    `_STATES`, and `done` counts the samples of the run before this call. Returns the index of
-    the sample that exceeds `limit` times the largest input, or the number of samples.
+    `inputs` are noise, c1 and c2. `work` is described at `_STATES`, and `done` counts the
+    samples of the run before this call. Returns the index of the sample that exceeds `limit`
+    times the largest input, or the number of samples.
     """
     noise, c1, c2 = inputs
     rows, sections, gain = sensor.states, controller.sections, controller.gain
@@ -119,8 +114,8 @@ def _compute(
     end = len(noise)
     for i in range(len(noise)):
         now = len(phi) - len(noise) + i
-        a1 = c1[np.uintp(i * (len(c1) > 1))] * delayed(phi, now, arms[0], i)
-        a2 = c2[np.uintp(i * (len(c2) > 1))] * delayed(phi, now, arms[1], i)
+        a1 = c1[np.uintp(i)] * _delayed(phi, now, arms[0], i)
+        a2 = c2[np.uintp(i)] * _delayed(phi, now, arms[1], i)
         given = noise[np.uintp(i)]
         # x = given - predicted - now1 (x - a1) - now2 (x - a2), solved for x.
         x = (given + (now1 * a1 + now2 * a2) - predicted) * inverse
@@ -168,9 +163,12 @@ def _without_dead_time(loop: Loop, sample_rate: float) -> Loop:
     return loop
 
 
-def _delays(loop: Loop, sample_rate: float) -> list[Delay]:
-    """Return the loop's own delays in samples."""
-    return [lagrange_delay(n, getattr(loop, n), sample_rate) for n in ("tau1", "tau2")]
+def _constant(loop: Loop, sample_rate: float) -> list[Weights]:
+    """Return the weights of the loop's own delays."""
+    return [
+        lagrange_weights(name, np.array([getattr(loop, name)]), sample_rate)
+        for name in ("tau1", "tau2")
+    ]
 
 
 def sampled_open_loop(
@@ -230,8 +228,8 @@ def sampled_open_loop(
     c1, c2 = real_number("c1", c1), real_number("c2", c2)
     omega = positive_array("omega", omega)
     back1, back2 = (
-        np.exp(-1j * omega[..., None] * (first + np.arange(len(weights))) / rate) @ weights
-        for first, weights in _delays(loop, rate)
+        np.exp(-1j * omega[..., None] * (first + np.arange(shares.size)) / rate) @ shares[0]
+        for first, shares in _constant(loop, rate)
     )
     s = 1j * warped(omega, rate)
     m1, m2 = loop.mapping.weights(s)
@@ -241,18 +239,19 @@ def sampled_open_loop(
 class Simulation:
     r"""A loop that is run block by block, and remembers where it is.
 
+    Controller, sensor and arms start at rest.
+
     Parameters
     ----------
     loop : Loop
         The loop, without dead time.
     sample_rate : float, optional
         In Hz.
-    history : float or array_like, optional
-        Noise of the locked laser before the first sample, the latest value last: a constant, or
-        a series that is as long as the longest delay. Controller and sensor start at rest.
+    tau1, tau2 : callable, optional
+        Round-trip delays of arms that move, in place of the loop's own: functions that take an
+        array of times in s since the first sample, and return the delays in s.
     limit : float, optional
-        The run has diverged when the output exceeds the largest input so far, noise or history,
-        by this factor.
+        The run has diverged when the output exceeds the largest input so far by this factor.
 
     Attributes
     ----------
@@ -263,7 +262,7 @@ class Simulation:
     ------
     TypeError, ValueError
         If `loop` is no loop or has a dead time, the sample rate is too low for its delays, or
-        the history is too short or not finite.
+        `tau1` or `tau2` is no function.
 
     Notes
     -----
@@ -279,9 +278,7 @@ class Simulation:
     Here g is the gain of the sampled controller, and d_k are the direct shares of the arms in
     the sensor's output. The weights :math:`\ell_{k,i}` are those of `sampled_open_loop`.
 
-    One call and many give the same samples, bit by bit. ``copy.deepcopy(run)`` and
-    ``pickle.dumps(run)`` keep the state. After a gap in the input a run continues as if there
-    were none.
+    One call and many give the same samples, bit by bit. ``copy.deepcopy(run)`` keeps the state.
 
     Examples
     --------
@@ -298,39 +295,33 @@ class Simulation:
         loop: Loop,
         sample_rate: float = 200.0,
         *,
-        history: npt.ArrayLike = 0.0,
+        tau1: Moving | None = None,
+        tau2: Moving | None = None,
         limit: float = LIMIT,
     ) -> None:
         self.sample_rate = positive_number("sample_rate", sample_rate)
         self.loop = _without_dead_time(loop, self.sample_rate)
         self.limit = positive_number("limit", limit)
         self.samples = 0
-        self._stopped: tuple[float, float] | None = None
+        self._moving = {"tau1": tau1, "tau2": tau2}
+        for name, move in self._moving.items():
+            if move is not None and not callable(move):
+                raise TypeError(
+                    f"{name} must be a function of the time in s, got {move!r}; "
+                    f"loop.replace({name}=...) has another constant delay"
+                )
+        self._weights = _constant(loop, self.sample_rate)
+        self._latest: dict[str, float] = {}
+        self._diverged = False
         self._sensor, self._controller = sampled_loop(
             loop.controller, loop.mapping, self.sample_rate
         )
         states = len(self._sensor.states) + 2 * len(self._controller.sections)
         self._work = np.zeros(_STATES + states)
-        needed = max(map(reach, _delays(loop, self.sample_rate)))
-        check_memory("sample_rate", (needed,), 8)
-        before = finite_series("history", history, 0, 1)
-        if before.ndim and before.size < needed:
-            raise ValueError(
-                f"history must hold at least {needed} samples, as far as the longest delay "
-                f"reaches, got {before.size}"
-            )
-        self._past = before.copy() if before.ndim else np.full(needed, before)
-        # A constant history has no beginning.
-        self._endless = not before.ndim
+        self._past = np.empty(0)
 
     def advance(
-        self,
-        noise: npt.ArrayLike,
-        *,
-        c1: npt.ArrayLike = 1.0,
-        c2: npt.ArrayLike = 1.0,
-        tau1: GivenDelay | None = None,
-        tau2: GivenDelay | None = None,
+        self, noise: npt.ArrayLike, *, c1: npt.ArrayLike = 1.0, c2: npt.ArrayLike = 1.0
     ) -> FloatArray:
         """Compute the next block.
 
@@ -340,9 +331,6 @@ class Simulation:
             Noise of the free-running laser; the output has its unit.
         c1, c2 : float or array_like, shape (n,), optional
             Multiplicative perturbations.
-        tau1, tau2 : float, array_like, shape (n,), or callable, optional
-            Round-trip delays of the arms in s, in place of the loop's own. A callable takes an
-            array of times in s since the first sample of the run.
 
         Returns
         -------
@@ -353,38 +341,54 @@ class Simulation:
         ------
         TypeError, ValueError
             If an argument is not finite and real, has another shape, or was drawn at another
-            sample rate. If a delay is shorter than four samples though not constant, reaches
-            back past the history, or changes faster than light allows. Nothing is computed.
+            sample rate: nothing is computed. If a delay that moves is shorter than four
+            samples, or grows by a second a second or more.
         DivergenceError
             If the output exceeds its limit. The run cannot be continued.
         """
-        given = self._series("noise", noise)
+        given = self._series("noise", noise, None)
         inputs = given, self._series("c1", c1, given), self._series("c2", c2, given)
-        time = np.arange(self.samples, self.samples + given.size) / self.sample_rate
-        arms = self._arms(tau1, tau2, time)
-        if self._stopped is not None:
-            raise DivergenceError(*self._stopped, np.empty(0))
-        if not given.size:
-            return np.empty(0)
-        known = self._past.size
-        phi, work = np.empty(known + given.size), self._work.copy()
-        phi[:known] = self._past
-        if not self.samples:
-            work[_LARGEST] = np.abs(self._past).max()
-        sampled = self._sensor, self._controller
-        end = _compute(phi, inputs, arms, *sampled, work, self.limit, self.samples)
-        self.samples, self._work = self.samples + end, work
-        if end < given.size:
-            self._stopped = work[_BOUNDED] / self.sample_rate, self.samples / self.sample_rate
-            raise DivergenceError(*self._stopped, phi[known : known + end].copy())
-        keep = max(known, max(map(longest, arms)) + _SPARE)
-        self._past, self._endless = phi[-keep:].copy(), False
-        return phi[known:]
+        output, done = np.empty(given.size), 0
+        while done < given.size and not self._diverged:
+            part = tuple(
+                np.require(series[done : done + _TOGETHER], requirements=["C", "W"])
+                for series in inputs
+            )
+            computed = self._advance(part)
+            output[done : done + computed.size] = computed
+            done += computed.size
+        if self._diverged:
+            began = float(self._work[_BOUNDED]) / self.sample_rate
+            now = self.samples / self.sample_rate
+            error = DivergenceError(
+                f"the loop diverges: its output has exceeded all input since t = {began:.6g} "
+                f"s, and exceeds it beyond the limit at t = {now:.6g} s"
+            )
+            error.time, error.output = began, output[:done].copy()
+            raise error
+        return output
 
-    def _series(
-        self, name: str, value: npt.ArrayLike, like: FloatArray | None = None
-    ) -> FloatArray:
-        """Return a finite series, or a number or a series that has the shape of another."""
+    def _advance(self, inputs: tuple[FloatArray, ...]) -> FloatArray:
+        """Compute samples that fit into memory with their delays."""
+        size = inputs[0].size
+        arms = self._arms(size)
+        needed = max(map(reach, arms))
+        check_memory("sample_rate", (needed,), 8)
+        known = max(needed, self._past.size)
+        phi = np.empty(known + size)
+        # Before the first sample the arms are at rest.
+        phi[: known - self._past.size] = 0.0
+        phi[known - self._past.size : known] = self._past
+        sampled = self._sensor, self._controller
+        end = _compute(phi, inputs, arms, *sampled, self._work, self.limit, self.samples)
+        self.samples, self._diverged = self.samples + end, end < size
+        # The next sample needs no older one than the last sample did.
+        oldest = max(int(first[-1]) + shares.shape[1] for first, shares in arms)
+        self._past = phi[-oldest:].copy()
+        return phi[known : known + end]
+
+    def _series(self, name: str, value: npt.ArrayLike, like: FloatArray | None) -> FloatArray:
+        """Return a finite series, or a number or a series in the shape of another one."""
         rate = getattr(value, "sample_rate", None)
         if rate not in (None, self.sample_rate):
             raise ValueError(
@@ -392,32 +396,36 @@ class Simulation:
                 f"it was drawn at {rate:g} Hz"
             )
         array = np.asarray(finite_series(name, value, *([1] if like is None else [0, 1])))
-        if like is not None and array.shape not in ((), like.shape):
+        if like is None:
+            return array
+        if array.shape not in ((), like.shape):
             raise ValueError(
                 f"{name} must be a number or have the shape of noise, {like.shape}; got "
                 f"{array.shape}"
             )
-        return np.require(np.atleast_1d(array), requirements=["C", "W"])
+        return array if array.ndim else np.broadcast_to(array, like.shape)
 
-    def _arms(
-        self, tau1: GivenDelay | None, tau2: GivenDelay | None, time: FloatArray
-    ) -> tuple[AnyDelay, AnyDelay]:
-        """Return the delays of both arms during a block that the past covers."""
-        found: list[AnyDelay] = []
-        for name, tau in (("tau1", tau1), ("tau2", tau2)):
-            given = getattr(self.loop, name) if tau is None else tau
-            delay = arm_delay(name, given, time, self.sample_rate)
-            short = (reach(delay) if time.size else 0) - self._past.size
-            if short > 0 and not self._endless:
-                begins = (self.samples - self._past.size) / self.sample_rate
+    def _arms(self, size: int) -> tuple[Weights, Weights]:
+        """Return the delays of both arms during the next samples."""
+        found = list(self._weights)
+        for k, (name, move) in enumerate(self._moving.items()):
+            if move is None:
+                continue
+            time = np.arange(self.samples, self.samples + size) / self.sample_rate
+            tau = finite_series(f"{name}(t)", move(time), 1)
+            if tau.shape != time.shape:
                 raise ValueError(
-                    f"{name} must not reach back past the history, which begins at t = "
-                    f"{begins:.9g} s, at t = {self.samples / self.sample_rate:.9g} s"
+                    f"{name}(t) must have the shape of t, {time.shape}, got {tau.shape}"
                 )
-            if short > 0:
-                check_memory(name, (self._past.size + short,), 8)
-                self._past = np.append(np.full(short, self._past[0]), self._past)
-            found.append(delay)
+            growth = np.diff(tau, prepend=self._latest.get(name, tau[0])) * self.sample_rate
+            if growth.max() >= 1.0:
+                at = int(growth.argmax())
+                raise ValueError(
+                    f"{name}(t) must grow by less than 1 s a second, got {tau[at]} s at t = "
+                    f"{time[at]:.9g} s"
+                )
+            found[k] = lagrange_weights(f"{name}(t)", tau, self.sample_rate)
+            self._latest[name] = float(tau[-1])
         return found[0], found[1]
 
 
@@ -428,9 +436,8 @@ def simulate(
     c1: npt.ArrayLike = 1.0,
     c2: npt.ArrayLike = 1.0,
     sample_rate: float = 200.0,
-    tau1: GivenDelay | None = None,
-    tau2: GivenDelay | None = None,
-    history: npt.ArrayLike = 0.0,
+    tau1: Moving | None = None,
+    tau2: Moving | None = None,
     limit: float = LIMIT,
 ) -> FloatArray:
     r"""Run a loop, and return the frequency noise of the locked laser.
@@ -452,10 +459,7 @@ def simulate(
         Multiplicative perturbations of the two arms.
     sample_rate : float, optional
         In Hz.
-    tau1, tau2 : float, array_like, shape (n,), or callable, optional
-        Round-trip delays of the arms in s, in place of the loop's own; see
-        `Simulation.advance`.
-    history, limit
+    tau1, tau2, limit
         As for `Simulation`.
 
     Returns
@@ -490,5 +494,5 @@ def simulate(
     >>> drift = 2 * 10.0 / 299_792_458.0
     >>> step = simulate(paper_loop(), np.ones(2000), tau1=lambda t: 20.1 + drift * t)
     """
-    run = Simulation(loop, sample_rate, history=history, limit=limit)
-    return run.advance(noise, c1=c1, c2=c2, tau1=tau1, tau2=tau2)
+    run = Simulation(loop, sample_rate, tau1=tau1, tau2=tau2, limit=limit)
+    return run.advance(noise, c1=c1, c2=c2)

@@ -43,7 +43,7 @@ _WINDOW = np.kaiser(SEGMENT + 1, 20.0)[:-1]
 _FINE = 8
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False)
 class Spectrum:
     r"""An estimate of a one-sided amplitude spectral density.
 
@@ -84,10 +84,6 @@ class Spectrum:
     averages: FloatArray
     resolution: FloatArray
     bins: IntArray
-
-    def __repr__(self) -> str:
-        """Say how many bands there are."""
-        return f"Spectrum({self.frequency.size} bands)"
 
     def expected(self, asd: Callable[[FloatArray], npt.ArrayLike]) -> FloatArray:
         r"""Return what the estimator gives on average for a known density.

@@ -69,17 +69,6 @@ def outline(radius: FloatArray, directions: FloatArray) -> FloatArray:
     return np.concatenate((corners, corners[:, :1]), axis=1)
 
 
-def enclosed_area(closed: FloatArray) -> float:
-    r"""Area inside a closed polygon of shape (2, n + 1), by the shoelace formula.
-
-    .. math::
-
-        \frac{1}{2} \left| \sum_{i=0}^{n-1} (x_i\, y_{i+1} - x_{i+1}\, y_i) \right|
-    """
-    x, y = closed
-    return float(0.5 * abs(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])))
-
-
 def perimeter(closed: FloatArray) -> float:
     r"""Length of a closed polygon of shape (2, n + 1).
 
