@@ -474,7 +474,7 @@ function armlockLoop() {
         + this.most(common.b0 * (s1 + t1) + common.b1 * (s0 + t0),
           common.b0 * (second * s1 + t1) + common.b1 * (second * s0 + t0));
       const moved = h * ((this.free ? 0 : centre) + size * rest.b1) / least;
-      return ((this.radius + h * arms) / least + moved) * (1 + 1e-9) + 1e-12 * (1 + size);
+      return ((this.radius + h * arms) / least + moved) * (1 + 1e-12) + 1e-12 * (1 + size);
     }
   }
 
@@ -490,7 +490,7 @@ function armlockLoop() {
       for (;; h *= 0.5) {
         for (const part of parts) part.over(h);
         if (clear(disc.re, disc.im, disc.over(h))) break;
-        if (h < Math.max(0.02 * t, 1e-13 * longest)) return t ? 1 / t : Infinity;
+        if (h < Math.max(0.005 * t, 1e-13 * longest)) return t ? 1 / t : Infinity;
       }
     }
   }
