@@ -266,7 +266,9 @@ def show(chromium, tmp_path):
         file, script = tmp_path / "page.html", (live / "page.js").as_uri()
         head = "<meta name=viewport content='width=device-width'>"
         file.write_text(
-            f"<!DOCTYPE html>{head}<style>* {{ box-sizing: border-box }} {style}</style>"
+            f"<!DOCTYPE html>{head}<style>* {{ box-sizing: border-box }} {style}"
+            # As the book's theme has it.
+            ".visually-hidden { clip-path: inset(50%); position: absolute; width: 1px }</style>"
             "<main class='bd-content' style='max-width: 81rem'>"
             f"<div class='live' data-live='{part}'></div>"
             f"<script src='{script}'></script></main>"
