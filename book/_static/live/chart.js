@@ -11,7 +11,7 @@
  * count, along one column, in the same way.
  */
 function armlockChart(api) {
-  const { BOUNDARY, UNCONFINED, UNDECIDED, at, along, Curve, tail, chainLeads, tangentDistance,
+  const { BOUNDARY, UNCONFINED, UNDECIDED, at, along, Curve, tail, LOST, chain, tangentDistance,
     count } = api;
   // Samples in a radian of the longest delay, in a decade; halvings of an interval.
   const A_RADIAN = 6, A_DECADE = 24, DEEPEST = 14;
@@ -167,7 +167,7 @@ function armlockChart(api) {
   function chart(loop, x0, x1, nx, y0, y1, ny, samples = 3000000) {
     const counts = new Int16Array(nx * ny).fill(UNCONFINED);
     const px = (x1 - x0) / (nx - 1), py = (y1 - y0) / (ny - 1);
-    const [a, b1, b2] = chainLeads(loop), lost = (x, y) => Math.abs(x) * b1 + Math.abs(y) * b2;
+    const share = chain(loop);
     // The point that is confined if any is, off every line that a reader would choose.
     let bx, by, base = UNDECIDED;
     for (let k = 0; k < 5 && (k === 0 || base === BOUNDARY); k++) {
@@ -180,8 +180,8 @@ function armlockChart(api) {
     const most = [Math.max(Math.abs(x0), Math.abs(x1), Math.abs(bx)),
       Math.max(Math.abs(y0), Math.abs(y1), Math.abs(by))];
     // Next to the limit of the chain, roots cross at ever higher frequency.
-    const reach = lost(...most) < a ? 1 : 0.98 * a / lost(...most);
-    const endOf = share => tail(loop, share * most[0], share * most[1], loop.longest)?.omega ?? Infinity;
+    const reach = share(...most) < 1 ? 1 : 0.98 / share(...most);
+    const endOf = part => tail(loop, part * most[0], part * most[1]).omega;
     let end = endOf(reach);
     const starts = new Int32Array(ny).fill(base), doubtful = new Uint8Array(ny);
     if (loop.second || loop.difference.gain) {
@@ -229,12 +229,12 @@ function armlockChart(api) {
     for (let j = 0; j < ny; j++) {
       const y = y0 + j * py;
       for (let i = 0, total = starts[j], doubts = 0; i < nx; i++) {
-        const x = x0 + i * px, share = lost(x, y) / a;
+        const x = x0 + i * px, taken = share(x, y);
         total += change[j * wide + i];
         doubts += marks[j * wide + i];
         const beyond = seen < reach && Math.max(Math.abs(x) / most[0], Math.abs(y) / most[1]) > seen
-          || reach < 1 && share > 0.98;
-        counts[j * nx + i] = share >= 1 - 1e-14 ? UNCONFINED
+          || reach < 1 && taken > 0.98;
+        counts[j * nx + i] = taken >= LOST ? UNCONFINED
           : beyond || doubts || doubtful[j] || total < 0 ? UNDECIDED : Math.min(total, 30000);
         sure += counts[j * nx + i] !== UNDECIDED;
       }
@@ -274,7 +274,7 @@ function armlockChart(api) {
       }
     };
     const corner = [Math.max(Math.abs(x0), Math.abs(x1)), Math.max(Math.abs(y0), Math.abs(y1))];
-    const end = Math.min(tail(loop, ...corner, longest)?.omega ?? Infinity, 400 * 2 * Math.PI / longest);
+    const end = Math.min(tail(loop, ...corner).omega, 400 * 2 * Math.PI / longest);
     const lowest = 1e-2 * Math.min(...loop.scales);
     let p = spot(lowest);
     for (let omega = lowest; omega < end && lines.evaluated < most;) {

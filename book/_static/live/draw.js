@@ -139,8 +139,7 @@ const armlockDraw = (function () {
       Object.assign(this, { changed, pointed, centre: [1, 1], half: 3, held: null, hover: null, broken: null,
         grid: null, picture: null, curve: null, ghost: null, lit: null, stale: false, fingers: new Map() });
       this.sheet = new Sheet({ tabindex: 0, role: "application", "aria-label": `${label} Arrow keys `
-        + "move the point, with shift by ten steps, with control the view; plus and minus zoom; Escape "
-        + "releases the point." }, 1,
+        + "move the point, with shift by ten steps; plus and minus zoom; Escape releases the point." }, 1,
         (pen, wide, high, colours) => this.draw(pen, wide, high, colours));
       const canvas = this.canvas = this.sheet.canvas;
       canvas.addEventListener("pointermove", event => this.move(event));
@@ -331,7 +330,7 @@ const armlockDraw = (function () {
       pen.beginPath();
       for (let i = 0; i < curve.length; i += 3) {
         if (Number.isNaN(curve[i])) { down = false; continue; }
-        const t = Math.log(curve[i + 2] / first) / Math.log(last / first || 2);
+        const t = Math.log(curve[i + 2] / first) / (Math.log(last / first) || 1);
         const x = px(curve[i]), y = py(curve[i + 1]), next = pinned ? 0 : Math.floor(24 * t);
         if (next !== bin) {
           if (down) pen.lineTo(x, y);
@@ -433,14 +432,12 @@ const armlockDraw = (function () {
         ArrowDown: [0, -1] }[event.key];
       if (!move) return;
       event.preventDefault();
-      const step = this.half / 100 * (event.shiftKey || event.ctrlKey ? 10 : 1);
-      if (event.ctrlKey) {
-        this.show(this.centre.map((v, k) => v + step * move[k]), this.half);
-        return;
-      }
-      const { x0, x1, y0, y1 } = this.box, [x, y] = this.held || this.centre;
-      this.hold([Math.min(x1, Math.max(x0, x + step * move[0])),
-        Math.min(y1, Math.max(y0, y + step * move[1]))]);
+      const step = this.half / 100 * (event.shiftKey ? 10 : 1);
+      const found = (this.held || this.centre).map((v, k) => v + step * move[k]);
+      // The view follows a point that leaves it.
+      const off = found.map((v, k) => v - Math.min(Math.max(v, this.centre[k] - this.half), this.centre[k] + this.half));
+      if (off.some(v => v)) this.show(this.centre.map((v, k) => v + off[k]), this.half);
+      this.hold(found);
     }
 
     name(point) {

@@ -18,6 +18,8 @@ function armlockLoop() {
   const SAFETY = 0.95, MOST_STEPS = 400000;
   // Samples of the frequency in a radian of the longest delay, in a decade, and at most.
   const A_RADIAN = 12, A_DECADE = 80, MOST_SAMPLES = 60000;
+  // The share of its room from which on a chain counts as lost: 1, less what rounding leaves.
+  const LOST = 1 - 1e-14;
   const SENSORS = ["single", "common", "difference", "dual", "modified"];
 
   /* gain prod (s - zero_k) / prod (s + below_k), all below_k > 0, as a function of omega.
@@ -108,32 +110,12 @@ function armlockLoop() {
   }
 
   /* Bad input, with the name of the field that holds it. */
-  class FieldError extends RangeError {
-    constructor(field, message) {
-      super(message);
-      this.field = field;
-    }
-  }
+  const wrong = (field, message) => Object.assign(new RangeError(message), { field });
 
   function positive(field, name, value) {
     if (!(value > 0 && Number.isFinite(value)))
-      throw new FieldError(field, `${name} must be a positive number, got ${value}`);
+      throw wrong(field, `${name} must be a positive number, got ${value}`);
     return value;
-  }
-
-  function checkedRoots(name, roots) {
-    const left = [];
-    for (const [re, im] of roots) {
-      if (!Number.isFinite(re) || !Number.isFinite(im))
-        throw new FieldError(name, `${name} must be finite numbers`);
-      if (im === 0) continue;
-      const partner = left.findIndex(([x, y]) => x === re && y === -im);
-      if (partner < 0) left.push([re, im]); else left.splice(partner, 1);
-    }
-    if (left.length)
-      throw new FieldError(name, `${name} must be real or in conjugate pairs, got ${left[0][0]} `
-        + `${left[0][1] < 0 ? "-" : "+"} ${Math.abs(left[0][1])}j alone`);
-    return roots;
   }
 
   /* Roots of a polynomial with real coefficients, the highest power first, by Aberth's method.
@@ -249,7 +231,7 @@ function armlockLoop() {
     if (!SENSORS.includes(spec.sensor)) throw new RangeError(`unknown sensor ${spec.sensor}`);
     const corner = positive("corner", "the corner", spec.corner);
     if (!Number.isFinite(spec.difference) || spec.difference === 0)
-      throw new FieldError("difference", "the sensor's \u0394\u03c4 must be a number other than "
+      throw wrong("difference", "the sensor's \u0394\u03c4 must be a number other than "
         + `zero, got ${spec.difference}`);
     if (spec.sensor === "dual")
       return { ...plain, sum: fraction(1, [[0, 0], [-corner, 0]]),
@@ -275,14 +257,13 @@ function armlockLoop() {
     const tau2 = positive("tau2", "\u03c4\u2082", spec.tau2);
     const delay = spec.delay || 0;
     if (!(delay >= 0 && Number.isFinite(delay)))
-      throw new FieldError("delay", `the dead time must be zero or positive, got ${spec.delay}`);
+      throw wrong("delay", `the dead time must be zero or positive, got ${spec.delay}`);
     if (!Number.isFinite(spec.gain) || spec.gain === 0)
-      throw new FieldError("gain", `the gain must be a number other than zero, got ${spec.gain}`);
+      throw wrong("gain", `the gain must be a number other than zero, got ${spec.gain}`);
     const sensor = sensorOf(spec, tau1, tau2);
-    const zeros = [...checkedRoots("zeros", spec.zeros)];
-    const poles = [...checkedRoots("poles", spec.poles)], ends = [...sensor.poles];
+    const zeros = [...spec.zeros], poles = [...spec.poles], ends = [...sensor.poles];
     if (zeros.length > poles.length)
-      throw new FieldError("zeros", "the controller must have as many poles as zeros or more, got "
+      throw wrong("zeros", "the controller must have as many poles as zeros or more, got "
         + `${zeros.length} zeros and ${poles.length} poles`);
     const isZero = ([re, im]) => re === 0 && im === 0;
     const has = list => list.some(isZero), drop = list => list.splice(list.findIndex(isZero), 1);
@@ -359,6 +340,11 @@ function armlockLoop() {
     constructor(loop, point) {
       this.loop = loop;
       this.point = point;
+      // What the terms of the parameters are rounded by, in units of EPSILON. They may cancel in `at`.
+      const { sigma, tau1, tau2, second } = loop, { c1, c2, left1, left2, between } = point;
+      const size = (left, c, tau) => Math.abs(left) + 2 * Math.abs(c) * Math.expm1(Math.abs(sigma * tau));
+      this.rsum = size(left1, c1, tau1) + second * size(left2, c2, tau2);
+      this.rdifference = size(between, c2, tau1 - tau2);
     }
 
     at(omega) {
@@ -425,10 +411,10 @@ function armlockLoop() {
       let i1 = sum.b1 * w0 + sum.b0 * w1 + difference.b1 * u0 + difference.b0 * u1;
       let i2 = sum.b2 * w0 + 2 * sum.b1 * w1 + sum.b0 * w2
         + difference.b2 * u0 + 2 * difference.b1 * u1 + difference.b0 * u2;
-      // The parameters are rounded numbers themselves, and so are the phases.
-      const rounded = a1 * (1 + end * tau1) + a2 * (1 + end * tau2);
-      const error = sum.b0 * (sum.relative * w0 + rounded)
-        + difference.b0 * (difference.relative * u0 + rounded);
+      // A phase is rounded as well, relative to itself.
+      const turned = 1 + end * (tau1 + tau2);
+      const error = sum.b0 * (sum.relative * w0 + this.rsum + end * w1)
+        + difference.b0 * (difference.relative * u0 + (this.rdifference + a2 * x) * turned);
       i2 += delay * (2 * i1 + delay * i0);
       i1 += delay * i0;
       this.l0 = common.b0 * i0;
@@ -441,48 +427,83 @@ function armlockLoop() {
     }
   }
 
-  /* Look at A = R + B1 + B2 (with a dead time: R) from omega = infinity down, as long as
-   * |A| > |C| + |c1 B1| + |c2 B2| is certain: no root crosses there. Returns the frequency, and
-   * the argument that A gathers from infinity to it; null where the chain is not confined. */
-  function tail(loop, c1, c2, longest) {
-    const { rest, common, sum, difference, second, delay, parts } = loop;
-    const a1 = Math.abs(c1), a2 = Math.abs(c2);
-    const look = t => {
-      for (const part of parts) part.far(t);
-      const { vr: sr, vi: si } = sum, { vr: tr, vi: ti } = difference, k = Math.hypot(common.vr, common.vi);
-      const cr = (1 + second) * (common.vr * sr - common.vi * si);
-      const ci = (1 + second) * (common.vr * si + common.vi * sr);
-      const ar = delay ? rest.vr : rest.vr + cr, ai = delay ? rest.vi : rest.vi + ci;
-      const others = a1 * k * Math.hypot(sr + tr, si + ti)
-        + a2 * k * Math.hypot(second * sr - tr, second * si - ti)
-        + (delay ? Math.hypot(cr, ci) : 0);
-      return { ar, ai, reserve: Math.hypot(ar, ai) - others, others };
-    };
-    const rate = h => {
-      for (const part of parts) part.over(h);
-      const { b0: s0, b1: s1 } = sum, { b0: t0, b1: t1 } = difference;
-      const both = (1 + second) * (common.b0 * s1 + common.b1 * s0);
-      const arms = common.b0 * ((a1 + second * a2) * s1 + (a1 + a2) * t1)
-        + common.b1 * ((a1 + second * a2) * s0 + (a1 + a2) * t0);
-      return rest.b1 + both + arms;
-    };
-    let here = look(0), t = 0, argument = 0;
-    const size = Math.hypot(here.ar, here.ai);
-    if (!(here.reserve > 16 * EPSILON * size)) return null;
-    for (let i = 0; i < 400; i++) {
-      let h = SAFETY * here.reserve / rate(0);
-      if (!(h < 1e300)) h = 1e300;
-      while (rate(h) * h > SAFETY * here.reserve) h *= 0.5;
-      const next = look(t + h);
-      // Rounding must not decide.
-      if (!(next.reserve > 1e-12 * (next.others + size))) break;
-      argument += Math.atan2(next.ai * here.ar - next.ar * here.ai,
-        next.ar * here.ar + next.ai * here.ai);
-      t += h;
-      here = next;
-      if (h < 0.003 * t || longest > 0 && t > 2 * longest) break;
+  /* The disc that L fills with free phases of the arms, with c1 and c2 between two points: what
+   * they add up to is convex, and so largest at one of the two. */
+  class Disc {
+    constructor(loop, ...points) {
+      this.loop = loop;
+      this.points = points.map(([c1, c2]) => [Math.abs(c1), Math.abs(c2)]);
     }
-    return { omega: 1 / t, argument, ar: here.ar, ai: here.ai };
+
+    most(one, two) { return Math.max(...this.points.map(([a1, a2]) => a1 * one + a2 * two)); }
+
+    /* From the loop's factors at omega; at infinity and down from it, omega is null. */
+    look(omega) {
+      const { rest, common, sum, difference, second, delay } = this.loop;
+      const { vr: sr, vi: si } = sum, { vr: tr, vi: ti } = difference;
+      let cr = (1 + second) * (common.vr * sr - common.vi * si);
+      let ci = (1 + second) * (common.vr * si + common.vi * sr);
+      const k = Math.hypot(common.vr, common.vi);
+      this.radius = k * this.most(Math.hypot(sr + tr, si + ti),
+        Math.hypot(second * sr - tr, second * si - ti));
+      this.turning = delay;
+      if (delay && omega === null) {
+        // So far up the dead time's phase is as free as the arms'.
+        this.radius += Math.hypot(cr, ci);
+        cr = ci = this.turning = 0;
+      } else if (delay) {
+        const er = Math.cos(omega * delay), ei = -Math.sin(omega * delay);
+        [cr, ci] = [cr * er - ci * ei, cr * ei + ci * er];
+      }
+      const square = rest.vr * rest.vr + rest.vi * rest.vi;
+      this.size = Math.sqrt(square);
+      this.re = (cr * rest.vr + ci * rest.vi) / square;
+      this.im = (ci * rest.vr - cr * rest.vi) / square;
+      this.free = delay !== 0 && omega === null;
+    }
+
+    /* Radius of a disc around the same centre that holds those of the whole step. */
+    over(h) {
+      const { rest, common, sum, difference, second } = this.loop;
+      const { b0: s0, b1: s1 } = sum, { b0: t0, b1: t1 } = difference;
+      const least = this.size - h * rest.b1, size = Math.hypot(this.re, this.im);
+      if (!(least > 0)) return Infinity;
+      const centre = (1 + second)
+        * (common.b0 * s1 + common.b1 * s0 + this.turning * common.b0 * s0);
+      const arms = (this.free ? centre : 0)
+        + this.most(common.b0 * (s1 + t1) + common.b1 * (s0 + t0),
+          common.b0 * (second * s1 + t1) + common.b1 * (second * s0 + t0));
+      const moved = h * ((this.free ? 0 : centre) + size * rest.b1) / least;
+      return ((this.radius + h * arms) / least + moved) * (1 + 1e-12) + 1e-12 * (1 + size);
+    }
+  }
+
+  /* The frequency past which a disc stays clear of what would be smaller; infinity where that
+   * is not so at infinity itself. `visit` hears of each place, from infinity down. */
+  function clearFrom(disc, clear, visit = () => {}) {
+    const { loop: { parts, longest } } = disc;
+    for (let t = 0, h = longest, k = 0; ; t += h, h *= 2, k++) {
+      for (const part of parts) part.far(t);
+      disc.look(null);
+      visit();
+      if (k === 300 || t >= 2 * longest) return 1 / t;
+      for (;; h *= 0.5) {
+        for (const part of parts) part.over(h);
+        if (clear(disc.re, disc.im, disc.over(h))) break;
+        if (h < Math.max(0.005 * t, 1e-13 * longest)) return t ? 1 / t : Infinity;
+      }
+    }
+  }
+  /* The frequency past which no root crosses the axis, whatever the arms' phases are, and the argument
+   * that R (1 + L) gathers from infinity to it with L at the middle of its disc. */
+  function tail(loop, c1, c2) {
+    const { rest } = loop, disc = new Disc(loop, [c1, c2]), end = { omega: 0, argument: 0, ar: 0, ai: 0 };
+    end.omega = clearFrom(disc, (re, im, radius) => Math.hypot(1 + re, im) > radius, () => {
+      const ar = rest.vr * (1 + disc.re) - rest.vi * disc.im, ai = rest.vi * (1 + disc.re) + rest.vr * disc.im;
+      end.argument += Math.atan2(ai * end.ar - ar * end.ai, ar * end.ar + ai * end.ai);
+      [end.ar, end.ai] = [ar, ai];
+    });
+    return end;
   }
 
   /* Distance of the tangent from zero over a step. */
@@ -501,13 +522,11 @@ function armlockLoop() {
    * does. Whether they vanish is decided by the point as it is given: `exact` may tell it from
    * (1, 1). */
   function count(loop, c1, c2, { most = MOST_STEPS, exact = null } = {}) {
-    if (!Number.isFinite(c1) || !Number.isFinite(c2))
-      throw new RangeError(`c1 and c2 must be finite numbers, got ${c1} and ${c2}`);
     const point = exact || at(loop, c1, c2);
     if (point.between === 0) loop = reduced(loop, c1, c2);
-    const end = tail(loop, point.c1, point.c2, loop.longest);
-    if (!end) return UNCONFINED;
-    const curve = new Curve(loop, point);
+    if (chain(loop)(point.c1, point.c2) >= LOST) return UNCONFINED;
+    const end = tail(loop, point.c1, point.c2), curve = new Curve(loop, point);
+    if (end.omega === Infinity) return UNDECIDED;
     let omega = 0, argument = 0, step = end.omega;
     curve.at(0);
     curve.over(0);
@@ -558,16 +577,15 @@ function armlockLoop() {
     return lr === 0 && li === 0 && rest.vr === 0 && rest.vi === 0;
   }
 
-  /* [a, b1, b2]: the neutral root chain is confined where |c1| b1 + |c2| b2 < a. */
-  function chainLeads(loop) {
+  /* Of the room that a neutral root chain has, the share that it takes at (c1, c2): confined below 1. */
+  function chain(loop) {
     const { rest, common, sum, difference, second, delay, parts } = loop;
     for (const part of parts) part.far(0);
-    const s = common.vr * sum.vr, t = common.vr * difference.vr;
-    const both = (1 + second) * s;
-    return [delay ? Math.abs(rest.vr) - Math.abs(both) : Math.abs(rest.vr + both),
-      Math.abs(s + t), Math.abs(second * s - t)];
+    const s = common.vr * sum.vr, t = common.vr * difference.vr, both = (1 + second) * s;
+    const room = delay ? Math.abs(rest.vr) - Math.abs(both) : Math.abs(rest.vr + both);
+    const b1 = Math.abs(s + t), b2 = Math.abs(second * s - t);
+    return (c1, c2) => room > 0 ? (Math.abs(c1) * b1 + Math.abs(c2) * b2) / room : Infinity;
   }
-
 
   /* Frequencies close enough to draw and to follow D by: in decades, then in turns. Where these would
    * be too many they are farther apart, down to eight in a turn: then the last ones are missing. */
@@ -583,8 +601,8 @@ function armlockLoop() {
 
   /* Frequencies that show the loop at one point, and the roots near the axis. */
   function around(loop, c1, c2, most) {
-    const point = at(loop, c1, c2), end = tail(loop, point.c1, point.c2, loop.longest);
-    const top = Math.max(end ? 3 * end.omega : 0, 20 / loop.longest);
+    const point = at(loop, c1, c2), end = tail(loop, point.c1, point.c2).omega;
+    const top = Math.max(end < Infinity ? 3 * end : 0, 20 / loop.longest);
     return frequencies(loop, top, 0.1 * Math.min(...loop.scales), most);
   }
 
@@ -606,8 +624,8 @@ function armlockLoop() {
    * delays; minus infinity without a chain. Where equal arms act against each other it is not looked for. */
   function chainLimit(spec, c1, c2) {
     const lost = sigma => {
-      const loop = make(spec, sigma), point = at(loop, c1, c2), [a, b1, b2] = chainLeads(loop);
-      return Math.abs(point.c1) * b1 + Math.abs(point.c2) * b2 >= a;
+      const loop = make(spec, sigma), point = at(loop, c1, c2);
+      return chain(loop)(point.c1, point.c2) >= LOST;
     };
     const { difference, second } = make(spec), apart = spec.tau1 !== spec.tau2;
     let low = -50 / Math.max(spec.tau1, spec.tau2), high = 0;
@@ -695,5 +713,5 @@ function armlockLoop() {
   }
 
   return { EPSILON, BOUNDARY, UNCONFINED, UNDECIDED, make, reduced, at, beside, along, Curve, tail,
-    chainLeads, tangentDistance, vanishes, count, response, rightmost, rootsOf };
+    LOST, chain, Disc, clearFrom, tangentDistance, vanishes, count, response, rightmost, rootsOf };
 }

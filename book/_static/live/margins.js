@@ -11,83 +11,14 @@
  * frequency on nothing is smaller.
  */
 function armlockMargins(api) {
-  const { EPSILON, UNDECIDED, BOUNDARY, make, reduced, at, beside, along, Curve, chainLeads, vanishes, count } = api;
+  const { EPSILON, UNDECIDED, BOUNDARY, make, reduced, at, beside, along, Curve, LOST, chain, Disc, clearFrom,
+    vanishes, count } = api;
   // How much smaller than what is shown a number may be, as a share.
   const NEAR = 1e-3;
   // Perturbations up to this, gain factors up to this, steps of one walk and of one count.
   const FARTHEST = 2, LARGEST = [1000, 10], STEPS = 1000000, COUNTED = 4000000;
   // Of a start on the boundary, crossings up to this share are the start's own.
   const OWN = 1e-10;
-
-  /* The disc that L fills with free phases of the arms, with c1 and c2 between two points: what
-   * they add up to is convex, and so largest at one of the two. */
-  class Disc {
-    constructor(loop, ...points) {
-      this.loop = loop;
-      this.points = points.map(([c1, c2]) => [Math.abs(c1), Math.abs(c2)]);
-    }
-
-    most(one, two) { return Math.max(...this.points.map(([a1, a2]) => a1 * one + a2 * two)); }
-
-    /* From the loop's factors at omega; at infinity and down from it, omega is null. */
-    look(omega) {
-      const { rest, common, sum, difference, second, delay } = this.loop;
-      const { vr: sr, vi: si } = sum, { vr: tr, vi: ti } = difference;
-      let cr = (1 + second) * (common.vr * sr - common.vi * si);
-      let ci = (1 + second) * (common.vr * si + common.vi * sr);
-      const k = Math.hypot(common.vr, common.vi);
-      this.radius = k * this.most(Math.hypot(sr + tr, si + ti),
-        Math.hypot(second * sr - tr, second * si - ti));
-      this.turning = delay;
-      if (delay && omega === null) {
-        // So far up the dead time's phase is as free as the arms'.
-        this.radius += Math.hypot(cr, ci);
-        cr = ci = this.turning = 0;
-      } else if (delay) {
-        const er = Math.cos(omega * delay), ei = -Math.sin(omega * delay);
-        [cr, ci] = [cr * er - ci * ei, cr * ei + ci * er];
-      }
-      const square = rest.vr * rest.vr + rest.vi * rest.vi;
-      this.size = Math.sqrt(square);
-      this.re = (cr * rest.vr + ci * rest.vi) / square;
-      this.im = (ci * rest.vr - cr * rest.vi) / square;
-      this.free = delay !== 0 && omega === null;
-    }
-
-    /* Radius of a disc around the same centre that holds those of the whole step. */
-    over(h) {
-      const { rest, common, sum, difference, second } = this.loop;
-      const { b0: s0, b1: s1 } = sum, { b0: t0, b1: t1 } = difference;
-      const least = this.size - h * rest.b1, size = Math.hypot(this.re, this.im);
-      if (!(least > 0)) return Infinity;
-      const centre = (1 + second)
-        * (common.b0 * s1 + common.b1 * s0 + this.turning * common.b0 * s0);
-      const arms = (this.free ? centre : 0)
-        + this.most(common.b0 * (s1 + t1) + common.b1 * (s0 + t0),
-          common.b0 * (second * s1 + t1) + common.b1 * (second * s0 + t0));
-      const moved = h * ((this.free ? 0 : centre) + size * rest.b1) / least;
-      return ((this.radius + h * arms) / least + moved) * (1 + 1e-9) + 1e-12 * (1 + size);
-    }
-  }
-
-  /* The frequency past which a disc stays clear of what would be smaller; infinity where that
-   * is not so at infinity itself. */
-  function clearFrom(disc, clear) {
-    const { loop } = disc, { parts, longest } = loop;
-    let t = 0, h = longest;
-    for (let k = 0; k < 300 && t < 2 * longest; k++) {
-      for (const part of parts) part.far(t);
-      disc.look(null);
-      for (;; h *= 0.5) {
-        for (const part of parts) part.over(h);
-        if (clear(disc.re, disc.im, disc.over(h))) break;
-        if (h < Math.max(0.02 * t, 1e-13 * longest)) return t ? 1 / t : Infinity;
-      }
-      t += h;
-      h *= 2;
-    }
-    return 1 / t;
-  }
 
   /* Whether |a| > level |b| over a step h, where a0 + a1 x and b0 + b1 x are off by da and db. */
   function exceeds(ar, ai, sr, si, da, br, bi, ur, ui, db, level, h) {
@@ -448,8 +379,7 @@ function armlockMargins(api) {
     // Whether a loop that is on the boundary as far as rounding can tell is stable, nobody can tell.
     if (begun === UNDECIDED || begun === BOUNDARY) return NaN;
     if (begun > 0 || begun < BOUNDARY) return null;
-    const [a, b1, b2] = chainLeads(loop);
-    const lost = t => Math.abs(1 + t * d1) * b1 + Math.abs(1 + t * d2) * b2 >= a;
+    const share = chain(loop), lost = t => share(1 + t * d1, 1 + t * d2) >= LOST;
     let [confined, limit] = [0, lost(FARTHEST) ? FARTHEST : Infinity];
     for (let k = 0; k < 100 && limit < Infinity; k++) {
       const middle = 0.5 * (confined + limit);
@@ -484,7 +414,7 @@ function armlockMargins(api) {
     const loop = reduced(make(spec), c1, c2), begun = count(loop, c1, c2, { most: COUNTED });
     let [lower, upper, most, gains] = [NaN, NaN, LARGEST[0], null];
     if (begun !== 0)
-      return begun === UNDECIDED ? { lower, upper, most, phase: NaN, modulus: NaN } : null;
+      return begun === UNDECIDED || begun === BOUNDARY ? { lower, upper, most, phase: NaN, modulus: NaN } : null;
     for (most of LARGEST) {
       gains = new Gains(loop, c1, c2, most);
       [lower, upper] = gains.found();

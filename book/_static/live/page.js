@@ -156,7 +156,7 @@ function armlockPages() {
       // What answers the pointer waits for nothing else.
       this.near = new Desk(["point"]);
       this.wide = new Desk(["chart", "day"]);
-      this.slow = new Desk([...TOLD, ...TOLD.map(kind => `${kind} of the pinned`), "day"]);
+      this.slow = new Desk([...TOLD, "day"]);
       this.out = element("output", { role: "status", "aria-live": "polite" });
       this.note = element("p", { class: "live-note", role: "status" });
       this.numbers = element("table", { class: "live-numbers" });
@@ -167,9 +167,9 @@ function armlockPages() {
         pointed: held => { this.tell(true); if (held) this.moved("point"); },
       });
       this.figure = element("figure", { class: "live-chart", "data-check": "hover" },
-        element("figcaption", {}, "Number of unstable roots over c1 and c2"), this.chart.canvas, this.out, this.ready);
+        element("figcaption", {}, "Number of unstable roots over c1 and c2"), this.chart.canvas, keys(), this.out, this.ready);
       this.lit = null;
-      // The loop as it is, and the one that was pinned.
+      // The loop as it is, and what was pinned, which stays as it was.
       this.design = this.pinned = null;
       // What a page does besides where the view, the held "point" or the "loop" is another.
       this.moved = () => {};
@@ -244,19 +244,12 @@ function armlockPages() {
       for (const plot of this.plots) plot.draw();
     }
 
-    /* What was asked of a loop is asked no more. */
-    drop(one, kinds = TOLD) {
-      this.slow.drop(...kinds.map(kind => this.named(one, kind)));
-    }
-
-    named(one, kind) { return one === this.pinned ? `${kind} of the pinned` : kind; }
-
     /* There is no loop: nothing of the one before stays. */
     none(why) {
       this.near.drop("point");
       this.wide.drop("chart");
       this.counting = false;
-      this.drop(this.design);
+      this.slow.drop(...TOLD);
       clearTimeout(this.rest);
       this.design = this.lit = null;
       this.chart.clear();
@@ -270,19 +263,17 @@ function armlockPages() {
     /* Take another loop. While a slider moves, `moving`, pictures are coarser and nothing is asked
      * that takes long. */
     set(spec, moving = false) {
-      this.drop(this.design);
-      this.design = this.made(spec);
+      this.slow.drop(...TOLD);
+      this.design = { spec, loop: api.make(spec), kept: {}, told: {} };
       this.chart.broken = null;
       this.lit = this.chart.lit = null;
       this.redraw(moving);
       this.tell(moving);
     }
 
-    made(spec) { return { spec, loop: api.make(spec), kept: {}, told: {} }; }
-
     /* The open loop at the point, from few frequencies while the hand moves. */
     respond() {
-      for (const one of this.designs) one.response = api.response(one.loop, ...this.point, this.rough ? 1200 : 9000);
+      this.design.response = api.response(this.design.loop, ...this.point, this.rough ? 1200 : 9000);
       this.draw();
     }
 
@@ -336,15 +327,13 @@ function armlockPages() {
      * sliders rest. What was told of the held point is kept while others are looked at. */
     tell(rough) {
       if (!this.spec) return;
-      const { point } = this;
+      const { point, design } = this;
       this.rough = rough;
-      for (const one of this.designs) {
-        this.drop(one, TOLD.filter(kind => kind !== "breaks"));
-        one.told = this.chart.hover ? {} : one.kept[point] ||= {};
-      }
+      this.slow.drop(...TOLD.filter(kind => kind !== "breaks"));
+      design.told = this.chart.hover ? {} : design.kept[point] ||= {};
       this.respond();
       this.write();
-      const { told } = this.design;
+      const { told } = design;
       if (told.count === undefined) this.near.ask("point", [this.spec, ...point], (count, error) => {
         if (error) this.out.textContent = error;
         else if (count !== UNDECIDED && told === this.design?.told) {
@@ -372,20 +361,20 @@ function armlockPages() {
 
     /* Ask for what takes longer. */
     settle() {
-      const { point } = this;
+      const { point, design } = this, { told } = design;
       if (this.rough) {
         this.rough = false;
         this.respond();
       }
-      for (const one of this.designs) for (const kind of TOLD) {
-        const { told } = one, breaks = kind === "breaks";
-        if ((breaks ? one.breaks : told[kind]) !== undefined || breaks && one.breaking) continue;
-        one.breaking ||= breaks;
-        this.slow.ask(this.named(one, kind), breaks ? [one.spec] : [one.spec, ...point], (found, error) => {
-          (breaks ? one : told)[kind] = error ? UNTOLD[kind] : found;
-          if (breaks && one === this.design) this.chart.broken = one.breaks[0];
+      for (const kind of TOLD) {
+        const breaks = kind === "breaks";
+        if ((breaks ? design.breaks : told[kind]) !== undefined || breaks && design.breaking) continue;
+        design.breaking ||= breaks;
+        this.slow.ask(kind, breaks ? [design.spec] : [design.spec, ...point], (found, error) => {
+          (breaks ? design : told)[kind] = error ? UNTOLD[kind] : found;
+          if (breaks) this.chart.broken = found?.[0];
           this.draw();
-          if (this.design) this.write();
+          this.write();
         });
       }
     }
@@ -415,24 +404,24 @@ function armlockPages() {
       if (text === this.listed) return;
       this.listed = text;
       this.numbers.replaceChildren(element("thead", {}, element("tr", {},
-        ...["Number", "This loop", "Pinned"].slice(0, 1 + designs.length)
+        ...["Number", "This loop", `Pinned at ${this.pinned?.at}`].slice(0, 1 + designs.length)
           .map(text => element("th", { scope: "col" }, text)))),
       ...parts.map(([title, ...rows]) => element("tbody", {},
         element("tr", {}, element("th", { scope: "rowgroup", colspan: 1 + designs.length }, title)),
         ...rows.map(([name, values]) => element("tr", {}, element("th", { scope: "row" }, name),
           ...values.map(value => element("td", {}, value)))))));
-      const done = designs.length && designs.every(one => one.breaks && TOLD.every(
-        kind => kind === "breaks" || one.told[kind] !== undefined));
+      const { design } = this, done = design?.breaks && ["count", "root", "margins"].every(
+        kind => design.told[kind] !== undefined);
       this.ready.textContent = done ? `The table has all numbers at ${this.name}: ${parts[0].slice(1)
         .map(([name, [value]]) => `${name}: ${value}`).join("; ")}.` : "";
     }
 
-    /* Pin the design as it is: what follows is seen against it, in all plots and numbers. */
+    /* Pin curves and numbers as they are: what follows is seen against them. */
     pin() {
-      if (this.pinned) this.drop(this.pinned);
-      this.pinned = this.pinned || !this.design ? null : { ...this.made(this.spec), breaks: this.design.breaks };
+      this.pinned = this.pinned || !this.design ? null : { ...this.design, at: this.name };
       this.chart.ghost = this.pinned && this.chart.curve;
-      this.tell(false);
+      this.draw();
+      if (this.design) this.list();
       return Boolean(this.pinned);
     }
   }
@@ -489,15 +478,16 @@ function armlockPages() {
       })));
   }
 
+  const key = (text, name) => element("span", { class: "live-key" }, element("i", { class: name }), text);
+  const keys = () => element("p", { class: "live-note" }, key("stable", "live-stable"),
+    key("unstable, few to many roots", "live-unstable"), key("unstable at high frequency", "live-lost"),
+    key("undecided", "live-unsure"));
+
   function legend() {
-    const colour = (text, name) =>
-      element("span", { class: "live-key" }, element("i", { class: name }), text);
-    return element("p", { class: "live-note" }, "Move over the chart for a preview; click or tap to hold a point. ",
-      colour("stable", "live-stable"), colour("unstable, stronger with more roots", "live-unstable"),
-      colour(LOST, "live-lost"), colour("undecided", "live-unsure"), "Curve: a root on the imaginary axis, from "
-      + "low frequency (blue) to high (yellow). + is the ideal point (1, 1). The dot is the critical "
-      + "perturbation along (1, \u22121). The square, in small charts, is the paper\u2019s: perturbations up to "
-      + "10\u207b\u2076. Dashed: the pinned loop.");
+    return element("p", { class: "live-note" }, "Move over the chart for a preview. A click or a tap holds the point. "
+      + "The curve shows where a root lies on the imaginary axis, from low frequency (blue) to high (yellow). "
+      + "Cross: the ideal point (1, 1). Dot: the critical perturbation along (1, \u22121). Square, in small charts: "
+      + "the paper\u2019s perturbations, up to 10\u207b\u2076. Dashed: the pinned loop.");
   }
 
   const figures = (...all) => element("div", { class: "live-two" }, ...all);
@@ -577,7 +567,7 @@ function armlockPages() {
       errors[name].textContent = message || "";
     };
     const NAMES = { tau1: "\u03c4\u2081", tau2: "\u03c4\u2082", delay: "The dead time", gain: "The gain",
-      corner: "The corner", difference: "\u0394\u03c4" };
+      corner: "The corner p", difference: "\u0394\u03c4" };
 
     /* The loop that the fields hold; throws an error that names its field. */
     const read = () => {
@@ -602,7 +592,9 @@ function armlockPages() {
           unit = 1;
           fields.unit.value = "1";
           fields.gain.value = exact(above.find(v => v) / under.find(v => v));
-          [fields.zeros.value, fields.poles.value] = [above, under].map(part => written(api.rootsOf(part)));
+          // Without the digits that finding the roots has rounded.
+          [fields.zeros.value, fields.poles.value] = [above, under].map(part => written(
+            api.rootsOf(part).map(root => root.map(v => Number(v.toPrecision(14))))));
           fields.pasted.value = "";
         }
         const spec = read();
@@ -615,7 +607,7 @@ function armlockPages() {
           range = [Math.min(...root, 1 / spec.tau1), Math.max(...root, 1 / spec.tau1)];
           if (range[1] < 100 * range[0]) range = [range[0] / 10, range[1] * 10];
         }
-        presets.value = Object.keys(PRESETS).find(name => same(spec, PRESETS[name][0])) || "";
+        if (edited && edited !== "unit") presets.value = "";
         live.set(spec, moving);
         if (!dragged || caught) roots.draw();
         undo.disabled = !depth;
@@ -631,12 +623,6 @@ function armlockPages() {
         orbit.removeAttribute("href");
         roots.draw();
       }
-    };
-    const same = (a, b) => {
-      const all = spec => ["sensor", "tau1", "tau2", "delay", "gain", "zeros", "poles",
-        ...["dual", "modified"].includes(spec.sensor) ? ["corner", "difference"] : []].map(name =>
-        [spec[name]].flat(2).map(v => typeof v === "number" ? v.toPrecision(12) : v).sort()).join("|");
-      return all(a) === all(b);
     };
 
     const put = spec => {
@@ -678,6 +664,7 @@ function armlockPages() {
     };
     const start = name => {
       const [spec, centre, half] = PRESETS[name];
+      presets.value = name;
       show(spec, [centre, centre], half, null);
     };
 
@@ -693,6 +680,7 @@ function armlockPages() {
       take("delay", moving, true);
     });
     const wrong = element("p", { class: "live-note live-wrong", role: "alert" });
+    const pasted = field("pasted", "Paste a controller from MATLAB or python-control", true);
     const inputs = element("form", { class: "live-form", onsubmit: event => event.preventDefault() },
       select("sensor", "Sensor", SENSORS, () => { shape(); take("sensor"); }),
       field("gain", "Gain"),
@@ -705,8 +693,7 @@ function armlockPages() {
         if (spec) put(spec);
         take("unit");
       }),
-      field("corner", "Sensor\u2019s corner in Hz"), field("difference", "Sensor\u2019s \u0394\u03c4 in s"),
-      field("pasted", "Paste a controller, as MATLAB or python-control print it", true),
+      field("corner", "Corner p in Hz"), field("difference", "\u0394\u03c4 in s"),
       field("zeros", "Zeros", true), field("poles", "Poles", true));
     fields.pasted.placeholder = "(s + 0.02)/(s^2 + 0.1 s)";
 
@@ -756,19 +743,6 @@ function armlockPages() {
     on("pointercancel", () => { caught = null; });
     on("touchstart", event => { if (caught) event.preventDefault(); });
 
-    const copied = button("Copy as Python", async () => {
-      try {
-        await navigator.clipboard.writeText(code.textContent);
-        copied.textContent = "Copied";
-      } catch {
-        // A browser may refuse the clipboard to a page from disk: the lines are there to mark.
-        lines.open = true;
-        getSelection().selectAllChildren(code);
-        copied.textContent = "Marked: copy it with Ctrl+C";
-      }
-      setTimeout(() => { copied.textContent = "Copy as Python"; }, 3000);
-    });
-    const lines = element("details", {}, element("summary", {}, "This loop in Python"), code);
     const [nyquist, bode] = live.plots;
     place.replaceChildren(element("div", { class: "live-own" },
       element("div", { class: "live-top" }, element("div", { class: "live-start" }, preset, undo),
@@ -776,9 +750,10 @@ function armlockPages() {
       element("div", { class: "live-main" }, figures(live.figure, nyquist.figure),
         tools(live, "loop", button("Paper\u2019s square", () => live.chart.show([1, 1], 3e-6)),
           button("Whole", () => live.chart.show([0, 0], 3))), live.note, bode.figure, live.following, live.numbers),
-      element("div", { class: "live-fields" },
+      element("div", { class: "live-fields" }, pasted,
         element("figure", {}, element("figcaption", {}, "Drag a pole (\u00d7) or a zero (\u25cb)"), roots.canvas),
-        inputs, legend(), buttons(copied, orbit))), lines);
+        inputs, legend(), element("p", {}, orbit))),
+    element("details", {}, element("summary", {}, "This loop in Python"), code));
 
     const open = () => {
       quiet = true;
@@ -867,7 +842,7 @@ function armlockPages() {
     sheet.canvas.addEventListener("pointerup", () => move(state.day, false));
 
     /* Every sixteenth day first, then those between, by two workers. Each day has its count, and every
-     * fourth day its critical perturbation. */
+     * eighth day its critical perturbation. */
     const count = () => {
       days = Array(YEAR + 1);
       finished = 0;
@@ -875,7 +850,7 @@ function armlockPages() {
         (_, i) => i * step).filter(day => !k || day % (2 * step)));
       const next = desk => {
         const day = order.shift();
-        if (day !== undefined) desk.ask("day", [spec(day), day % 4 === 0], (found, error) => {
+        if (day !== undefined) desk.ask("day", [spec(day), day % 8 === 0], (found, error) => {
           // A sensor that would divide by zero is no loop, and so not a stable one.
           days[day] = error ? null : found;
           sheet.draw();
@@ -897,7 +872,7 @@ function armlockPages() {
       lost.textContent = parts.length ? `Unstable on days ${parts.join(", ")}.`
         : "Stable on every day of the year.";
       lost.textContent += " The roots are counted once a day, so that shorter changes are not seen. The critical "
-        + "perturbation is computed every fourth day. A dot is missing where it is undecided, 0, or larger than 2.";
+        + "perturbation is computed every eighth day. A dot is missing where it is undecided, 0, or larger than 2.";
     };
     const lost = element("p", { class: "live-note", role: "status" });
     const move = (day, moving) => {
@@ -928,40 +903,13 @@ function armlockPages() {
       return label;
     };
     const today = slider(`${live.id}-day`, "Day", 0, YEAR, state.day, v => String(Math.round(v)),
-      (v, moving) => { stop(); move(v, moving); });
+      (v, moving) => move(v, moving));
+    today.classList.add("live-wide");
     today.querySelector("input").step = 1;
-    // Who wants no motion goes on by a week at a time.
-    let playing = 0;
-    const still = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
-    const stop = () => {
-      cancelAnimationFrame(playing);
-      if (playing) move(state.day, false);
-      playing = 0;
-      play.textContent = still() ? "A week on" : "Play the year";
-    };
-    const play = button("", () => {
-      if (playing) { stop(); return; }
-      const from = state.day >= YEAR ? 0 : state.day, begun = performance.now();
-      if (still()) {
-        const day = Math.min(YEAR, from + 7);
-        today.to(day);
-        move(day, false);
-        return;
-      }
-      play.textContent = "Pause";
-      const frame = now => {
-        const day = Math.min(YEAR, from + 15 * (now - begun) / 1000);
-        today.to(day);
-        move(day, true);
-        if (day < YEAR) playing = requestAnimationFrame(frame); else stop();
-      };
-      playing = requestAnimationFrame(frame);
-    });
-    stop();
     const form = element("form", { class: "live-form", onsubmit: event => event.preventDefault() },
       pick("loop", "Loop", Object.keys(LOOPS)), pick("orbit", "Orbit", Object.keys(armlockOrbits)),
-      pick("master", "Master", Object.keys(ARMS)), pick("hold", "The sensor assumes", HOLDS));
-    place.replaceChildren(form, wrong, element("div", { class: "live-day" }, today, play),
+      pick("master", "Master", Object.keys(ARMS)), pick("hold", "The sensor assumes", HOLDS), today);
+    place.replaceChildren(form, wrong,
       element("figure", {}, element("figcaption", {}, "Solid: the true half difference. Dashed: the half difference "
         + "that the sensor assumes. Dots: the critical perturbation of the arms in opposite directions."), sheet.canvas),
       words, lost, figures(element("div", {}, live.figure, legend(), live.note),

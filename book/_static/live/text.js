@@ -67,7 +67,7 @@ const armlockText = (function () {
 
   /* ---------------------------------------------------------------------------- in */
 
-  const TOKEN = /\s*(?:((?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)|(pi)|([ij](?![a-z]))|(s(?![a-z]))|(\*\*|[-+*/^()\u00b1]))/iy;
+  const TOKEN = /\s*(?:((?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)|(pi)|([ij](?![a-z]))|(s(?![a-z]))|(\*\*|[-+*/^()]))/iy;
 
   /* Polynomials in s have complex coefficients, the lowest power first: [[re, im], ...]. */
   const times = (p, q) => {
@@ -81,7 +81,7 @@ const armlockText = (function () {
   const plus = (p, q, sign) => Array.from({ length: Math.max(p.length, q.length) }, (_, k) =>
     [0, 1].map(m => (p[k]?.[m] || 0) + sign * (q[k]?.[m] || 0)));
 
-  /* The value of an expression, as [numerator, denominator]; two values where it has a plus-minus. */
+  /* The value of an expression, as [numerator, denominator]. */
   function parse(text, refuse) {
     const tokens = [], one = [[1, 0]];
     for (TOKEN.lastIndex = 0; TOKEN.lastIndex < text.trimEnd().length;) {
@@ -94,7 +94,7 @@ const armlockText = (function () {
       else if (s) tokens.push([[[0, 0], [1, 0]], one]);
       else tokens.push(sign === "**" ? "^" : sign);
     }
-    let next = 0, second = null;
+    let next = 0;
     const multiply = ([a, b], [c, d]) => [times(a, c), times(b, d)];
     const add = ([a, b], [c, d], sign) => String(b) === String(d) ? [plus(a, c, sign), b]
       : [plus(times(a, d), times(c, b), sign), times(b, d)];
@@ -137,31 +137,26 @@ const armlockText = (function () {
     const sum = () => {
       const sign = tokens[next] === "-" ? -1 : 1;
       if (tokens[next] === "+" || tokens[next] === "-") next++;
-      let value = tokens[next] === "\u00b1" ? [[[0, 0]], one] : multiply([[[sign, 0]], one], product());
+      let value = multiply([[[sign, 0]], one], product());
       for (;;) {
         const token = tokens[next];
-        if (token === "+" || token === "-") {
-          next++;
-          value = add(value, product(), token === "+" ? 1 : -1);
-        } else if (token === "\u00b1" && !second) {
-          next++;
-          const part = product();
-          second = add(value, part, -1);
-          value = add(value, part, 1);
-        } else return value;
+        if (token !== "+" && token !== "-") return value;
+        next++;
+        value = add(value, product(), token === "+" ? 1 : -1);
       }
     };
     if (!tokens.length) refuse();
     const value = sum();
     if (next < tokens.length) refuse();
-    return second ? [value, second] : [value];
+    return value;
   }
 
-  /* A value without s as a complex number. */
+  /* A value without s as a finite complex number. */
   function constant([above, under], refuse) {
-    if (above.length > 1 || under.length > 1) refuse();
     const [[a, b]] = above, [[c, d]] = under, size = c * c + d * d;
-    return d === 0 ? [a / c, b / c] : [(a * c + b * d) / size, (b * c - a * d) / size];
+    const found = d === 0 ? [a / c, b / c] : [(a * c + b * d) / size, (b * c - a * d) / size];
+    if (above.length > 1 || under.length > 1 || !found.every(Number.isFinite)) refuse();
+    return found;
   }
 
   /* The real coefficients of a polynomial, the highest power first. */
@@ -204,7 +199,8 @@ const armlockText = (function () {
       const extra = part.split("(").length - part.split(")").length;
       const balanced = extra > 0 ? part.replace("(", "") : extra < 0 ? part.replace(/\)$/, "") : part;
       const refuse = () => { throw wrong(field, `${name} are numbers ${SUCH}; \u201c${part}\u201d is none.`); };
-      for (const value of parse(balanced, refuse)) found.push(constant(value, refuse).map(v => factor * v));
+      for (const one of balanced.includes("\u00b1") ? [balanced.replace("\u00b1", "+"), balanced.replace("\u00b1", "-")]
+        : [balanced]) found.push(constant(parse(one.replace(/^\+/, ""), refuse), refuse).map(v => factor * v));
     }
     const left = found.filter(([, im]) => im !== 0), paired = found.filter(([, im]) => im === 0);
     while (left.length) {
@@ -237,15 +233,14 @@ const armlockText = (function () {
       refuse("it is discrete in time");
     if (/exp/i.test(plain)) refuse("write its dead time into the field of the dead time");
     if (given) return given.slice(1, 3).map(part => elements(field, part)[0].map(
-      entry => real(parse(entry, none)[0][0], none)[0]));
+      entry => constant(parse(entry, none), none)[0]));
     if (comma) throw wrong(field, `Write decimals with a point, not as in ${comma[0]}.`);
     // Without headings and remarks, which have words or signs that no polynomial has.
     const parts = plain.split(/\n[ \t]*-+[ \t]*(?=\n)|\s*\/?\s*-{3,}\s*\/?\s*/).map(part => part.split("\n")
       .filter(line => !/[:=<>'[\]]|[a-z]{3,}/i.test(line)).join(" "));
     if (parts.length > 2) refuse("it has more than one line of dashes");
     const values = parts.map(part => parse(part, none));
-    if (values.some(value => value.length > 1)) refuse();
-    const [[above, under], [over, below] = [[[1, 0]], [[1, 0]]]] = values.map(([value]) => value);
+    const [[above, under], [over, below] = [[[1, 0]], [[1, 0]]]] = values;
     return [times(above, below), times(under, over)].map(part => real(part, none));
   }
 
@@ -256,8 +251,8 @@ const armlockText = (function () {
     const refuse = () => {
       throw wrong(field, `${name} must be a number, got ${plain ? `\u201c${plain}\u201d` : "nothing"}.`);
     };
-    const [value, second] = parse(plain, refuse), [re, im] = constant(value, refuse);
-    if (second || im !== 0 || !Number.isFinite(re)) refuse();
+    const [re, im] = constant(parse(plain, refuse), refuse);
+    if (im !== 0) refuse();
     return re;
   }
 
@@ -286,13 +281,15 @@ const armlockText = (function () {
 
   const SHORT = { sensor: "s", tau1: "t1", tau2: "t2", delay: "d", gain: "g", corner: "p",
     difference: "dt", zeros: "z", poles: "q" };
+  const NEEDED = sensor => ["sensor", "tau1", "tau2", "delay", "gain", "zeros", "poles",
+    ...["dual", "modified"].includes(sensor) ? ["corner", "difference"] : []];
 
   /* The address holds all: loop, view, the held point and the unit of the fields. */
   function address(spec, { centre, half, held }, unit) {
     const parts = new URLSearchParams();
     for (const [name, key] of Object.entries(SHORT)) {
       const value = spec[name];
-      if (value === undefined) continue;
+      if (value === undefined || !NEEDED(spec.sensor).includes(name)) continue;
       parts.set(key, Array.isArray(value) ? written(value) : value);
     }
     parts.set("at", [...centre, half].join(","));
@@ -305,9 +302,7 @@ const armlockText = (function () {
   function fromAddress(hash) {
     const parts = new URLSearchParams(hash.slice(1)), sensor = parts.get("s");
     if (!hash.includes("=")) return null;
-    const needed = ["sensor", "tau1", "tau2", "gain", "zeros", "poles",
-      ...["dual", "modified"].includes(sensor) ? ["corner", "difference"] : []];
-    const spec = { delay: 0 };
+    const needed = NEEDED(sensor).filter(name => name !== "delay"), spec = { delay: 0 };
     for (const [name, key] of Object.entries(SHORT)) {
       const text = parts.get(key);
       if (text === null && needed.includes(name)) throw wrong(name, `it has no \u201c${key}=\u201d`);
