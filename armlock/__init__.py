@@ -31,7 +31,7 @@ This package is the companion to "Robustness Analysis and Controller Design of A
 System in Space-based Gravitational Wave Detectors".
 """
 
-from armlock.characteristic import CharacteristicFunction
+from armlock.characteristic import CharacteristicFunction, DelayEquation
 from armlock.controllers import Controller
 from armlock.delays import DelaySystem, delay
 from armlock.loops import (
@@ -43,7 +43,6 @@ from armlock.loops import (
     buildable_loop,
     flight_loop,
     paper_loop,
-    published_loops,
     robust_loop,
 )
 from armlock.performance import NoiseBudget, noise_budget, pulling, transfer
@@ -98,6 +97,7 @@ __all__ = [
     "CommonArm",
     "Controller",
     "CountError",
+    "DelayEquation",
     "DelaySystem",
     "DivergenceError",
     "DualArm",
@@ -130,7 +130,6 @@ __all__ = [
     "noise_budget",
     "nyquist",
     "paper_loop",
-    "published_loops",
     "pulling",
     "rightmost_root",
     "robust_loop",

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import armlock
-from armlock import CharacteristicFunction, CommonArm, HayesEquation, SingleArm, paper_loop
+from armlock import CommonArm, DelayEquation, HayesEquation, SingleArm, paper_loop
 from armlock.checks import axis, complex_array, finite_series, real_array
 from armlock.controllers import integrating_actuator, roll_off, stage_one, table_two
 from armlock.robustness import first_crossing
@@ -22,7 +22,7 @@ from tests.systems import NEUTRAL
 ARMS = CommonArm()
 LASER = armlock.LaserNoise(1)
 # Depends on no free parameter at s = 0.
-FLAT = CharacteristicFunction([1.0, 1.0, 1.0], [0.0, 1.0], [0.0, 1.0], 1.0, 2.0)
+FLAT = DelayEquation([1.0, 1.0, 1.0], [0.0, 1.0], [0.0, 1.0], 1.0, 2.0)
 RUN: dict[str, Any] = {"sample_rate": 10.0, "history": 0.0, "limit": 1e6}
 LOOP: dict[str, Any] = {"tau1": 20.1, "tau2": 19.9, "delay": 0.0}
 POINT: dict[str, Any] = {"c1": 1.0, "c2": 1.0}
@@ -32,7 +32,7 @@ NOISE: dict[str, Any] = {"seed": 1, "sample_rate": 10.0, "cutoff": 1e-3}
 
 # A call of everything that takes arguments, with sensible ones.
 CALLS: dict[Callable[..., object], dict[str, Any]] = {
-    CharacteristicFunction: {"rest": [1.0, 1.0], "b1": [1.0], "b2": [1.0], "tau1": 1.0,
+    DelayEquation: {"rest": [1.0, 1.0], "b1": [1.0], "b2": [1.0], "tau1": 1.0,
                              "tau2": 2.0, "delay": 0.0, "step": 0.0,
                              "reference": (0.0, 0.0)},
     HayesEquation: {"tau": 1.0},
@@ -53,7 +53,7 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     ARMS: {"s": 1j} | POINT,
     ARMS.characteristic: {"s": 1j} | AT,
     ARMS.derivative: {"s": 1j} | AT,
-    ARMS.chain_reserve: AT,
+    ARMS.neutral_margin: AT,
     armlock.unstable_roots: {"system": ARMS} | AT,
     armlock.stability_chart: {"system": ARMS, "x": [1.0], "y": [1.0]},
     armlock.rightmost_root: {"system": ARMS} | AT,
@@ -123,19 +123,19 @@ def test_every_public_function_is_called_above():
     called = {getattr(function, "__name__", "") for function in CALLS}
     public = {name for name in armlock.__all__ if inspect.isfunction(getattr(armlock, name))}
     # They take no number, or have a test of what they refuse beside their own tests.
-    elsewhere = {"published_loops", "robust_loop", "buildable_loop"}
+    elsewhere = {"robust_loop", "buildable_loop"}
     elsewhere |= {"step_response", "impulse_response"}
     assert public - called == elsewhere
 
 
 # Beyond that, what each argument must be: one value past the constraint.
 WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
-    (CharacteristicFunction, "b1", [1.0, 1.0, 1.0], "not exceed the degree"),
-    (CharacteristicFunction, "delay", -1.0, "not be negative, got -1.0"),
-    (CharacteristicFunction, "step", 0.3, "divide every delay, got step=0.3 for tau1"),
+    (DelayEquation, "b1", [1.0, 1.0, 1.0], "not exceed the degree"),
+    (DelayEquation, "delay", -1.0, "not be negative, got -1.0"),
+    (DelayEquation, "step", 0.3, "divide every delay, got step=0.3 for tau1"),
     (CommonArm, "gain", 0.0, "be positive, got 0.0"),
     (CommonArm, "delay", np.array([0.1, 0.2]), "be a real number, got array([0.1, 0.2])"),
-    (ARMS.chain_reserve, "x", "1.0", "hold real numbers"),
+    (ARMS.neutral_margin, "x", "1.0", "hold real numbers"),
     (paper_loop, "actuator", "no", "be True or False, got 'no'"),
     (armlock.performance.transfer, "s", 0.0, "not be a pole of the open loop, got 0j"),
     (armlock.Controller, "gain", 0.0, "not be zero"),

@@ -163,7 +163,7 @@ def _chart_rows(
         return count_points(plain, *((y, x) if swapped else (x, y)))
 
     def reserve(x: FloatArray, y: FloatArray) -> FloatArray:
-        return system.chain_reserve(*((y, x) if swapped else (x, y)))
+        return system.neutral_margin(*((y, x) if swapped else (x, y)))
 
     plain, (_, _, first, second) = system.plain(), system.terms
     centre = float(x[x.size // 2]), float(y[y.size // 2])

@@ -115,7 +115,7 @@ def count_points(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -
         for i in np.flatnonzero(np.abs(sums[0] + sums[1] + sums[2]) <= 8.0 * EPSILON * sizes):
             dx, dy = Fraction(x0) - Fraction(x[i]), Fraction(y0) - Fraction(y[i])
             on_line[i] = a + b * dx + c * dy == 0
-    confined = system.chain_reserve(x, y) > 0.0
+    confined = system.neutral_margin(x, y) > 0.0
     found = np.where(confined, BOUNDARY, UNCONFINED)
     left = np.flatnonzero(confined & ~on_line)
     for start in range(0, left.size, _AT_A_TIME):
@@ -165,7 +165,7 @@ def unstable_roots(
         omega tau is the largest: a point within some 8 EPSILON omega tau of the boundary,
         relative to its parameters, may be given as -1 (4e-10 where a root crosses at 1e4 rad/s,
         with 20 s). `UNCONFINED` (-2) where the neutral root chain is not confined to the left
-        half-plane (`CharacteristicFunction.chain_reserve` is not positive): an arbitrarily
+        half-plane (`CharacteristicFunction.neutral_margin` is not positive): an arbitrarily
         small change of the delays can then make infinitely many roots unstable.
 
     Raises

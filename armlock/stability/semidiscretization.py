@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 from armlock.characteristic import (
     CharacteristicFunction,
+    DelayEquation,
     broadcast_parameters,
     checked_system,
     given_or_one,
@@ -464,7 +465,7 @@ def semi_discretization(
         a, b = _map(*realize(system, 1.0, 1.0), step, order)
     # Those before x and y; with a dead time there is a third one, x0 B1 + y0 B2.
     a, b1, b2 = ([float(value) for value in p] for p in (a, *b[-2:]))
-    return CharacteristicFunction(
+    return DelayEquation(
         a, b1, b2, system.tau1, system.tau2, delay=system.delay, step=step,
         parameters=system.parameters,
         # Without a dead time x0 B1 + y0 B2 is a part of the flow.
