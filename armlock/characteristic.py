@@ -91,6 +91,12 @@ class CharacteristicFunction:
     The equation is of *retarded* type if all delayed terms are of lower degree than A, and of
     *neutral* type (`neutral` is true) if one of them reaches it. The roots of a neutral
     equation at high frequency form the *neutral root chain*, see `neutral_margin`.
+
+    Examples
+    --------
+    >>> from armlock import CommonArm
+    >>> print(f"{CommonArm().characteristic(0.1j, 0.9, 1.05):.4f}")
+    2.8101+1.8737j
     """
 
     rest: Polynomial
