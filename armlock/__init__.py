@@ -33,7 +33,7 @@ System in Space-based Gravitational Wave Detectors".
 
 from armlock.characteristic import CharacteristicFunction, DelayEquation
 from armlock.controllers import Controller
-from armlock.delays import DelaySystem, delay
+from armlock.delays import DelaySystem, WithDelays, delay
 from armlock.loops import (
     CommonArm,
     DualArm,
@@ -115,6 +115,7 @@ __all__ = [
     "Spectrum",
     "SpectrumEstimator",
     "StabilityChart",
+    "WithDelays",
     "amplitude_spectrum",
     "axis_crossings",
     "buildable_loop",

@@ -214,15 +214,15 @@ class CharacteristicFunction:
         sums = self.a, self.c, self.b1.coefficients, self.b2.coefficients
         return [abs(float(p[-1])) if p.size == self.a.size else 0.0 for p in sums]
 
-    def neutral_margin(self, x: npt.ArrayLike, y: npt.ArrayLike) -> FloatArray:
+    def neutral_margin(self, c1: npt.ArrayLike, c2: npt.ArrayLike) -> FloatArray:
         r"""How far the neutral root chain is from reaching the imaginary axis.
 
         At high frequency D is its highest power of s times
 
         .. math::
 
-            a + c\, e^{-s\delta} - x\, b_1 e^{-s(\delta + \tau_1)}
-            - y\, b_2 e^{-s(\delta + \tau_2)} ,
+            a + c\, e^{-s\delta} - c_1\, b_1 e^{-s(\delta + \tau_1)}
+            - c_2\, b_2 e^{-s(\delta + \tau_2)} ,
 
         with the highest coefficients of A, C, B1 and B2. The roots of this sum repeat along
         the imaginary axis for ever: they are the neutral root chain. The chain stays in the
@@ -230,11 +230,11 @@ class CharacteristicFunction:
 
         .. math::
 
-            |a| > |c| + |x\, b_1| + |y\, b_2| .
+            |a| > |c| + |c_1\, b_1| + |c_2\, b_2| .
 
         Parameters
         ----------
-        x, y : array_like of float
+        c1, c2 : array_like of float
             The free parameters; they broadcast.
 
         Returns
@@ -247,14 +247,14 @@ class CharacteristicFunction:
         Raises
         ------
         TypeError, ValueError
-            If x or y is not finite and real.
+            If c1 or c2 is not finite and real.
         """
         name1, name2 = self.parameters
-        x, y = real_array(name1, x), real_array(name2, y)
+        c1, c2 = real_array(name1, c1), real_array(name2, c2)
         if self.step:
-            return np.ones(np.broadcast_shapes(x.shape, y.shape))
+            return np.ones(np.broadcast_shapes(c1.shape, c2.shape))
         a, c, b1, b2 = self._highest()
-        left = (a - (c + np.abs(x) * b1 + np.abs(y) * b2)) / a
+        left = (a - (c + np.abs(c1) * b1 + np.abs(c2) * b2)) / a
         # A few products and sums round by half an EPSILON each, and so do the coefficients.
         return np.asarray(np.where(np.abs(left) <= 16.0 * EPSILON, 0.0, left))
 
@@ -269,22 +269,22 @@ class CharacteristicFunction:
         return 2.0 * np.pi / self.longest_delay if self.longest_delay else np.inf
 
     def characteristic(
-        self, s: npt.ArrayLike, x: npt.ArrayLike | None = None, y: npt.ArrayLike | None = None
+        self, s: npt.ArrayLike, c1: npt.ArrayLike | None = None, c2: npt.ArrayLike | None = None
     ) -> ComplexArray:
-        """Evaluate D(s; x, y); the three arguments broadcast. Of a loop x and y default to one.
+        """Evaluate D(s; c1, c2); all broadcast. Of a loop c1 and c2 are one by default.
 
         Raises
         ------
         TypeError, ValueError
-            If s does not hold finite numbers, x or y is not finite and real, or the three do
+            If s does not hold finite numbers, c1 or c2 is not finite and real, or the three do
             not broadcast.
         """
-        return np.asarray(self._value_and_slope(s, x, y)[0])
+        return np.asarray(self._value_and_slope(s, c1, c2)[0])
 
     def derivative(
-        self, s: npt.ArrayLike, x: npt.ArrayLike | None = None, y: npt.ArrayLike | None = None
+        self, s: npt.ArrayLike, c1: npt.ArrayLike | None = None, c2: npt.ArrayLike | None = None
     ) -> ComplexArray:
-        r"""Evaluate dD/ds; the three arguments broadcast. Of a loop x and y default to one.
+        r"""Evaluate dD/ds; all broadcast. Of a loop c1 and c2 are one by default.
 
         .. math::
 
@@ -292,14 +292,14 @@ class CharacteristicFunction:
             \left( B_k' - \delta B_k \right) \left( x_{0k} - x_k\, e^{-s\tau_k} \right)
             + x_k\, \tau_k B_k e^{-s\tau_k} \right]
 
-        with :math:`(x_1, x_2) = (x, y)`.
+        with :math:`(x_1, x_2) = (c_1, c_2)`.
 
         Raises
         ------
         TypeError, ValueError
             As `characteristic` does.
         """
-        return np.asarray(self._value_and_slope(s, x, y)[1])
+        return np.asarray(self._value_and_slope(s, c1, c2)[1])
 
     def _checked(
         self, s: npt.ArrayLike, x: npt.ArrayLike | None, y: npt.ArrayLike | None

@@ -156,7 +156,15 @@ class WithDelays:
 
     Functions of python-control refuse them with advice, because its systems have no delays.
     Each of these functions asks for an attribute, or asks `isinstance`, which asks for
-    `__class__`. Its plots need only the response, and take them.
+    `__class__`. Its plots need only the response.
+
+    Examples
+    --------
+    >>> import control
+    >>> from armlock import SingleArm
+    >>> filtered = SingleArm() * control.tf([1], [0.1, 1])
+    >>> print(filtered.feedback())
+    [(1) + (-1) exp(-20.1 s)] / [(0.1 s^2 +1 s +1) + (-1) exp(-20.1 s)]
     """
 
     _instead: ClassVar[str]

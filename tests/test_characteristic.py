@@ -114,9 +114,9 @@ def test_one_thing_is_replaced_and_all_else_stays():
 def test_the_perturbations_of_a_loop_are_one_by_default():
     loop = DualArm(gain=3.0)
     for made in (loop, loop.replace(delay=1e-3)):
-        assert unstable_roots(made, y=0.999) == unstable_roots(made, 1.0, 0.999)
+        assert unstable_roots(made, c2=0.999) == unstable_roots(made, 1.0, 0.999)
         assert made.characteristic(0.1j) == made.characteristic(0.1j, 1.0, 1.0)
     assert rightmost_root(paper_loop()) == rightmost_root(paper_loop(), 1.0, 1.0)
-    for name, arguments in (("a", {"y": -1.0}), ("b", {"x": -1.0})):
+    for name, arguments in (("a", {"c2": -1.0}), ("b", {"c1": -1.0})):
         with pytest.raises(TypeError, match=f"^{name} must be given"):
             unstable_roots(HayesEquation(), **arguments)
