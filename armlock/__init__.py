@@ -31,9 +31,9 @@ This package is the companion to "Robustness Analysis and Controller Design of A
 System in Space-based Gravitational Wave Detectors".
 """
 
-from armlock.characteristic import CharacteristicFunction
+from armlock.characteristic import CharacteristicFunction, DelayEquation
 from armlock.controllers import Controller
-from armlock.delays import DelaySystem, delay
+from armlock.delays import DelaySystem, WithDelays, delay
 from armlock.loops import (
     CommonArm,
     DualArm,
@@ -43,7 +43,6 @@ from armlock.loops import (
     buildable_loop,
     flight_loop,
     paper_loop,
-    published_loops,
     robust_loop,
 )
 from armlock.performance import NoiseBudget, noise_budget, pulling, transfer
@@ -98,6 +97,7 @@ __all__ = [
     "CommonArm",
     "Controller",
     "CountError",
+    "DelayEquation",
     "DelaySystem",
     "DivergenceError",
     "DualArm",
@@ -115,6 +115,7 @@ __all__ = [
     "Spectrum",
     "SpectrumEstimator",
     "StabilityChart",
+    "WithDelays",
     "amplitude_spectrum",
     "axis_crossings",
     "buildable_loop",
@@ -130,7 +131,6 @@ __all__ = [
     "noise_budget",
     "nyquist",
     "paper_loop",
-    "published_loops",
     "pulling",
     "rightmost_root",
     "robust_loop",

@@ -9,20 +9,19 @@ with real polynomials R, B1, B2 of s: affine in the two free parameters x and y.
 arm-locking loop, both parentheses are zero at s = 0. Near that point no large terms cancel.
 
 The semi-discretized loop has the same form with polynomials in z = exp(s step) instead of s.
-So both are one class here, and one set of algorithms serves both.
+So one set of algorithms serves both.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from itertools import zip_longest
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
+from numpy.polynomial import polynomial as poly
 
 from armlock.checks import (
     ComplexArray,
@@ -31,14 +30,16 @@ from armlock.checks import (
     broadcast_pair,
     broadcast_shape,
     complex_array,
+    not_negative,
     real_array,
-    real_number,
     whole_steps,
 )
-from armlock.engine.functions import Function, Space
+from armlock.delays import Term, functions
+from armlock.engine.functions import Function
 from armlock.engine.inclusion import EPSILON
 from armlock.engine.polynomials import Polynomial, rounded
 
+_ZERO = Fraction(0)
 # The free parameters of a loop, the perturbations of its arms: one where there is none.
 _PERTURBATIONS = ("c1", "c2")
 
@@ -52,7 +53,6 @@ class Terms(NamedTuple):
     second: Function
 
 
-@dataclass(frozen=True)
 class CharacteristicFunction:
     r"""A characteristic function that is affine in two free parameters x and y.
 
@@ -71,54 +71,32 @@ class CharacteristicFunction:
 
     With a dead time A = R and C = x0 B1 + y0 B2. Without one A = R + x0 B1 + y0 B2 and C = 0.
 
-    Parameters
-    ----------
-    rest, b1, b2 : sequence of float, or armlock.engine.polynomials.Polynomial
-        Coefficients of R, B1 and B2 in ascending powers of s (of z = exp(s step) for a map);
-        or polynomials with known roots, which are then kept.
-    tau1, tau2 : float
-        Delays in s, zero or positive.
-    delay : float, optional
-        Dead time in s, by which both terms are delayed; zero or positive.
-    step : float, optional
-        Zero (default) for polynomials in s; the sampling step in s for a map, which must
-        divide all delays.
-    parameters : pair of str, optional
-        Names of the two free parameters, used in messages and on axes.
-    reference : pair of float, optional
-        The constants (x0, y0); (1, 1) for a loop, where R is the denominator of L.
+    This is the base of `Loop` and of `DelayEquation`, which are frozen dataclasses.
 
     Attributes
     ----------
     rest, b1, b2 : armlock.engine.polynomials.Polynomial
         R, B1 and B2 with their coefficients and roots.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If a coefficient is not finite and real, a delay is negative or not a whole number of
-        steps, A is zero, or another term has a higher degree than A (an advanced equation has
-        no stable region).
+    tau1, tau2, delay : float
+        The delays and the dead time in s.
+    step : float
+        Zero for polynomials in s; the sampling step in s of a map.
+    parameters : pair of str
+        Names of the two free parameters.
+    reference : pair of float
+        The constants (x0, y0).
 
     Notes
     -----
-    It is a frozen dataclass: `replace`, `dataclasses.replace` and `copy.replace` make another
-    one with some arguments changed.
-
     The equation is of *retarded* type if all delayed terms are of lower degree than A, and of
     *neutral* type (`neutral` is true) if one of them reaches it. The roots of a neutral
-    equation at high frequency form the *neutral root chain*, see `chain_reserve`.
+    equation at high frequency form the *neutral root chain*, see `neutral_margin`.
 
     Examples
     --------
-    An oscillator with two delayed forces, x'' + 0.2 x' + x = x1 x(t - 1) + x2 x(t - 2). The
-    reference is (0, 0), so that R is A:
-
-    >>> from armlock import CharacteristicFunction, unstable_roots
-    >>> rest, b1, b2 = [1.0, 0.2, 1.0], [1.0], [1.0]
-    >>> forced = CharacteristicFunction(rest, b1, b2, tau1=1.0, tau2=2.0)
-    >>> unstable_roots(forced, [0.1, -0.5], 0.05)
-    array([0, 2])
+    >>> from armlock import CommonArm
+    >>> print(f"{CommonArm().characteristic(0.1j, 0.9, 1.05):.4f}")
+    2.8101+1.8737j
     """
 
     rest: Polynomial
@@ -131,29 +109,292 @@ class CharacteristicFunction:
     parameters: tuple[str, str]
     reference: tuple[float, float]
 
-    def __init__(
-        self,
-        rest: Sequence[float] | FloatArray | Polynomial,
-        b1: Sequence[float] | FloatArray | Polynomial,
-        b2: Sequence[float] | FloatArray | Polynomial,
-        tau1: float,
-        tau2: float,
-        *,
-        delay: float = 0.0,
-        step: float = 0.0,
-        parameters: tuple[str, str] = ("x", "y"),
-        reference: tuple[float, float] = (0.0, 0.0),
-    ) -> None:
-        polynomials = {"rest": rest, "b1": b1, "b2": b2}
-        polynomials = {name: _polynomial(name, p) for name, p in polynomials.items()}
-        pair = axis("reference", reference)
+    def replace(self, **changes: Any) -> Self:
+        """Return another one, made with other values of some arguments.
+
+        Parameters
+        ----------
+        **changes
+            Arguments of the class, by name. All others stay as they are. The sensor of a loop
+            stays too when its delays change.
+
+        Returns
+        -------
+        CharacteristicFunction
+            Of the same class.
+
+        Raises
+        ------
+        TypeError, ValueError
+            As the class does.
+
+        Examples
+        --------
+        >>> from armlock import CommonArm
+        >>> CommonArm(delay=20e-6).replace(delay=0.0) == CommonArm()
+        True
+        """
+        return replace(self, **changes)  # type: ignore[type-var]
+
+    def plain(self) -> DelayEquation:
+        """Return D alone, with the arguments of `DelayEquation`."""
+        return DelayEquation(
+            self.rest, self.b1, self.b2, self.tau1, self.tau2, delay=self.delay,
+            step=self.step, parameters=self.parameters, reference=self.reference,
+        )  # fmt: skip
+
+    def polynomials(self) -> tuple[Polynomial, Polynomial, Polynomial]:
+        """Return R, B1 and B2 with their roots."""
+        return self.rest, self.b1, self.b2
+
+    def parts(self) -> tuple[list[Term], list[Term], list[Term]]:
+        """Return R, B1 and B2 as sums of terms; delays stand for powers of z in a map."""
+        one, zero = Fraction(1), Fraction(0)
+        if not self.step:
+            r, b1, b2 = ([(one, p, zero)] for p in self.polynomials())
+            return r, b1, b2
+        # Over z^n each power of z is a delay of its own, and the only polynomial is one.
+        step, unit = Fraction(self.step), Polynomial(one, ())
+        r, b1, b2 = (
+            [(c, unit, (self.degree - k) * step) for k, c in enumerate(p.exact)]
+            for p in self.polynomials()
+        )
+        return r, b1, b2
+
+    @cached_property
+    def terms(self) -> Terms:
+        """R and the terms of D, exactly, as functions of the engine."""
+        rest, b1, b2 = self.parts()
+        dead, tau1, tau2 = (Fraction(lag) for lag in (self.delay, self.tau1, self.tau2))
+        if self.step:
+            step = Fraction(self.step)
+            dead, tau1, tau2 = (round(lag / step) * step for lag in (dead, tau1, tau2))
+        if self.neutral and tau1 == tau2:
+            # Equal arms are two delays for the neutral root chain, which is to stay where it is
+            # for all small changes of either.
+            tau2 += tau2 / 2**300
+        x0, y0 = self.reference
+        constant = [*late(rest), *late(b1, dead, x0), *late(b2, dead, y0)]
+        first, second = late(b1, dead + tau1), late(b2, dead + tau2)
+        return Terms(*functions(late(rest), constant, first, second, step=self.step))
+
+    def function(self, x: float | Fraction, y: float | Fraction) -> Function:
+        """Return D at one point as a function of the engine, exactly."""
+        _, constant, first, second = self.terms
+        return constant + first * -Fraction(x) + second * -Fraction(y)
+
+    @cached_property
+    def c(self) -> FloatArray:
+        """Coefficients of C, what the dead time alone delays; zero without a dead time."""
+        return rounded(self._at_reference() if self.delay else [_ZERO])
+
+    @cached_property
+    def a(self) -> FloatArray:
+        """Coefficients of A, what nothing delays."""
+        other = [_ZERO] if self.delay else self._at_reference()
+        return rounded(poly.polyadd(self.rest.exact, other))
+
+    def _at_reference(self) -> Any:
+        """Return the coefficients of x0 B1 + y0 B2, exactly."""
+        pairs = zip(self.reference, (self.b1, self.b2), strict=True)
+        return poly.polyadd(*(Fraction(origin) * np.array(b.exact) for origin, b in pairs))
+
+    @property
+    def degree(self) -> int:
+        """Degree of A, the order of the equation."""
+        return int(self.a.size - 1)
+
+    @property
+    def neutral(self) -> bool:
+        """Whether a delayed term is of the same order as A."""
+        return not self.step and any(self._highest()[1:])
+
+    def _highest(self) -> list[float]:
+        """Magnitudes of the coefficients of the highest power of A in A, C, B1 and B2."""
+        sums = self.a, self.c, self.b1.coefficients, self.b2.coefficients
+        return [abs(float(p[-1])) if p.size == self.a.size else 0.0 for p in sums]
+
+    def neutral_margin(self, c1: npt.ArrayLike, c2: npt.ArrayLike) -> FloatArray:
+        r"""How far the neutral root chain is from reaching the imaginary axis.
+
+        At high frequency D is its highest power of s times
+
+        .. math::
+
+            a + c\, e^{-s\delta} - c_1\, b_1 e^{-s(\delta + \tau_1)}
+            - c_2\, b_2 e^{-s(\delta + \tau_2)} ,
+
+        with the highest coefficients of A, C, B1 and B2. The roots of this sum repeat along
+        the imaginary axis for ever: they are the neutral root chain. The chain stays in the
+        left half-plane, for these delays and for all small changes of them, where
+
+        .. math::
+
+            |a| > |c| + |c_1\, b_1| + |c_2\, b_2| .
+
+        Parameters
+        ----------
+        c1, c2 : array_like of float
+            The free parameters; they broadcast.
+
+        Returns
+        -------
+        float array, of the broadcast shape
+            Left less right side over |a|, and zero where rounding hides the sign. Negative or
+            zero: the chain is not confined to the left half-plane. One for a retarded
+            equation and for a map, which has no such chain.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If c1 or c2 is not finite and real.
+        """
+        name1, name2 = self.parameters
+        c1, c2 = real_array(name1, c1), real_array(name2, c2)
+        if self.step:
+            return np.ones(np.broadcast_shapes(c1.shape, c2.shape))
+        a, c, b1, b2 = self._highest()
+        left = (a - (c + np.abs(c1) * b1 + np.abs(c2) * b2)) / a
+        # A few products and sums round by half an EPSILON each, and so do the coefficients.
+        return np.asarray(np.where(np.abs(left) <= 16.0 * EPSILON, 0.0, left))
+
+    @property
+    def longest_delay(self) -> float:
+        """The longest time in s by which a term is delayed, dead time included."""
+        return self.delay + max(self.tau1, self.tau2)
+
+    @property
+    def omega_per_turn(self) -> float:
+        """Change of omega, in rad/s, that is one turn of the longest delay; inf without one."""
+        return 2.0 * np.pi / self.longest_delay if self.longest_delay else np.inf
+
+    def characteristic(
+        self, s: npt.ArrayLike, c1: npt.ArrayLike | None = None, c2: npt.ArrayLike | None = None
+    ) -> ComplexArray:
+        """Evaluate D(s; c1, c2); all broadcast. Of a loop c1 and c2 are one by default.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If s does not hold finite numbers, c1 or c2 is not finite and real, or the three do
+            not broadcast.
+        """
+        return np.asarray(self._value_and_slope(s, c1, c2)[0])
+
+    def derivative(
+        self, s: npt.ArrayLike, c1: npt.ArrayLike | None = None, c2: npt.ArrayLike | None = None
+    ) -> ComplexArray:
+        r"""Evaluate dD/ds; all broadcast. Of a loop c1 and c2 are one by default.
+
+        .. math::
+
+            \frac{\partial D}{\partial s} = R' + e^{-s\delta} \sum_k \left[
+            \left( B_k' - \delta B_k \right) \left( x_{0k} - x_k\, e^{-s\tau_k} \right)
+            + x_k\, \tau_k B_k e^{-s\tau_k} \right]
+
+        with :math:`(x_1, x_2) = (c_1, c_2)`.
+
+        Raises
+        ------
+        TypeError, ValueError
+            As `characteristic` does.
+        """
+        return np.asarray(self._value_and_slope(s, c1, c2)[1])
+
+    def _checked(
+        self, s: npt.ArrayLike, x: npt.ArrayLike | None, y: npt.ArrayLike | None
+    ) -> tuple[ComplexArray, FloatArray, FloatArray]:
+        """Return s, x and y as arrays that broadcast, or raise."""
+        x, y = given_or_one(self, x, y)
+        name1, name2 = self.parameters
+        arrays = complex_array("s", s), real_array(name1, x), real_array(name2, y)
+        broadcast_shape(("s", name1, name2), arrays)
+        return arrays
+
+    def _value_and_slope(self, s: Any, x: Any, y: Any) -> tuple[Any, Any]:
+        """Evaluate D and dD/ds."""
+        s, x, y = self._checked(s, x, y)
+        z = np.exp(s * self.step) if self.step else s
+        dz = self.step * z if self.step else 1.0
+        (value, slope), *evaluated = (p.evaluated(z) for p in self.polynomials())
+        slope, dead = slope * dz, np.exp(-s * self.delay)
+        arms = zip((x, y), self.reference, (self.tau1, self.tau2), strict=True)
+        for (b, db), (here, origin, tau) in zip(evaluated, arms, strict=True):
+            change = np.expm1(-s * tau)
+            arm = (origin - here) - here * change
+            value = value + dead * b * arm
+            slope = slope + dead * ((db * dz - self.delay * b) * arm)
+            slope = slope + dead * b * here * tau * (1.0 + change)
+        return value, slope
+
+
+@dataclass(frozen=True)
+class DelayEquation(CharacteristicFunction):
+    r"""An equation with two delays and two free parameters x and y, by its polynomials.
+
+    Parameters
+    ----------
+    rest, b1, b2 : sequence of float, or armlock.engine.polynomials.Polynomial
+        Coefficients of R, B1 and B2 of the `CharacteristicFunction` in ascending powers of s
+        (of z = exp(s step) for a map); or polynomials with known roots, which are then kept.
+    tau1, tau2 : float
+        Delays in s, zero or positive.
+    delay : float, optional
+        Dead time in s, by which both terms are delayed; zero or positive.
+    step : float, optional
+        Zero (default) for polynomials in s; the sampling step in s for a map, which must
+        divide all delays.
+    parameters : pair of str, optional
+        Names of the two free parameters, used in messages and on axes.
+    reference : pair of float, optional
+        The constants (x0, y0); (1, 1) for a loop, where R is the denominator of L.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a coefficient is not finite and real, a delay is negative or not a whole number of
+        steps, A is zero, or another term has a higher degree than A (an advanced equation has
+        no stable region).
+
+    Examples
+    --------
+    An oscillator with two delayed forces, x'' + 0.2 x' + x = x1 x(t - 1) + x2 x(t - 2). The
+    reference is (0, 0), so that R is A:
+
+    >>> from armlock import DelayEquation, unstable_roots
+    >>> rest, b1, b2 = [1.0, 0.2, 1.0], [1.0], [1.0]
+    >>> forced = DelayEquation(rest, b1, b2, tau1=1.0, tau2=2.0)
+    >>> unstable_roots(forced, [0.1, -0.5], 0.05)
+    array([0, 2])
+    """
+
+    # Polynomials once they are checked.
+    rest: Any
+    b1: Any
+    b2: Any
+    tau1: float
+    tau2: float
+    _: KW_ONLY
+    delay: float = 0.0
+    step: float = 0.0
+    parameters: tuple[str, str] = ("x", "y")
+    reference: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        """Check the arguments, and keep them in one form."""
+        kept: dict[str, Any] = {}
+        for name in ("rest", "b1", "b2"):
+            p = getattr(self, name)
+            known = isinstance(p, Polynomial)
+            kept[name] = p if known else Polynomial.of(axis(name, p).tolist())
+        for name in ("tau1", "tau2", "delay", "step"):
+            kept[name] = not_negative(name, getattr(self, name))
+        pair = axis("reference", self.reference)
         if pair.size != 2:
             raise ValueError(f"reference must hold two numbers, got {pair.size}")
-        times = {"tau1": tau1, "tau2": tau2, "delay": delay, "step": step}
-        times = {name: _not_negative(name, value) for name, value in times.items()}
-        # The fields of a frozen dataclass are set once, here.
-        vars(self).update(polynomials, **times)
-        vars(self).update(parameters=tuple(parameters), reference=tuple(pair.tolist()))
+        kept |= {"parameters": tuple(self.parameters), "reference": tuple(pair.tolist())}
+        for name, value in kept.items():
+            object.__setattr__(self, name, value)
         self._check()
 
     def _check(self) -> None:
@@ -182,293 +423,20 @@ class CharacteristicFunction:
                     f"or its parameter would change the order of the equation"
                 )
 
-    def replace(self, **changes: Any) -> Self:
-        """Return another one, made with other values of some arguments.
 
-        Parameters
-        ----------
-        **changes
-            Arguments of the class, by name. All others stay as they are. The sensor of a loop
-            stays too when its delays change.
-
-        Returns
-        -------
-        CharacteristicFunction
-            Of the same class.
-
-        Raises
-        ------
-        TypeError, ValueError
-            As the class does.
-
-        Examples
-        --------
-        >>> from armlock import CommonArm
-        >>> CommonArm(delay=20e-6).replace(delay=0.0) == CommonArm()
-        True
-        """
-        return replace(self, **changes)
-
-    def plain(self) -> CharacteristicFunction:
-        """Return D alone, with the arguments of `CharacteristicFunction`."""
-        return CharacteristicFunction(
-            self.rest, self.b1, self.b2, self.tau1, self.tau2, delay=self.delay,
-            step=self.step, parameters=self.parameters, reference=self.reference,
-        )  # fmt: skip
-
-    def basis(self) -> tuple[list[Polynomial], list[list[Fraction]]]:
-        """Return polynomials, and their shares in R, B1 and B2, shape (3, polynomials)."""
-        given = self.polynomials()
-        places = np.cumsum([bool(p) for p in given]) - 1
-        made = [p for p in given if p]
-        shares = [
-            [Fraction(int(bool(p) and k == place)) for k in range(len(made))]
-            for p, place in zip(given, places, strict=True)
-        ]
-        return made, shares
-
-    @cached_property
-    def terms(self) -> Terms:
-        """R and the terms of D, exactly, as functions of the engine."""
-        made, shares = self.basis()
-        lags = [Fraction(lag) for lag in (0.0, self.delay, self.tau1, self.tau2)]
-        powers = [[(Fraction(1), Fraction(0))]] * 3
-        if self.step:
-            # Over z^n each power of z is a delay of its own, and the only polynomial is one.
-            step = Fraction(self.step)
-            lags = [round(lag / step) * step for lag in lags]
-            made, shares = [Polynomial(Fraction(1), ())], [[Fraction(1)]] * 3
-            powers = [
-                [(c, (self.degree - k) * step) for k, c in enumerate(p.exact)]
-                for p in self.polynomials()
-            ]
-        zero, dead, tau1, tau2 = lags
-        if self.neutral and tau1 == tau2:
-            # Equal arms are two delays for the neutral root chain, which is to stay where it is
-            # for all small changes of either.
-            tau2 += tau2 / 2**300
-        delays = {
-            lag + power
-            for lag in (zero, dead, dead + tau1, dead + tau2)
-            for part in powers
-            for _, power in part
-        }
-        space = Space(made, delays, self.step)
-
-        def delayed(k: int, lag: Fraction) -> Function:
-            steady = np.zeros(len(made), object)
-            turned = np.zeros((len(made), len(space.delays)), object)
-            for j, share in enumerate(shares[k]):
-                for weight, power in powers[k]:
-                    steady[j] += share * weight
-                    if lag + power:
-                        turned[j, space.place(lag + power)] += share * weight
-            return Function(space, steady, turned)
-
-        (x0, y0), rest = self.reference, delayed(0, zero)
-        constant = rest + delayed(1, dead) * x0 + delayed(2, dead) * y0
-        return Terms(rest, constant, delayed(1, dead + tau1), delayed(2, dead + tau2))
-
-    def function(self, x: float | Fraction, y: float | Fraction) -> Function:
-        """Return D at one point as a function of the engine, exactly."""
-        _, constant, first, second = self.terms
-        return constant + first * -Fraction(x) + second * -Fraction(y)
-
-    @cached_property
-    def c(self) -> FloatArray:
-        """Coefficients of C, what the dead time alone delays; zero without a dead time."""
-        return _trimmed(self._at_reference() if self.delay else [])
-
-    @cached_property
-    def a(self) -> FloatArray:
-        """Coefficients of A, what nothing delays."""
-        return _trimmed(_sum(self.rest.exact, [] if self.delay else self._at_reference()))
-
-    def _at_reference(self) -> list[Fraction]:
-        """Return the coefficients of x0 B1 + y0 B2, exactly."""
-        x0, y0 = (Fraction(value) for value in self.reference)
-        return _sum([x0 * c for c in self.b1.exact], [y0 * c for c in self.b2.exact])
-
-    @property
-    def degree(self) -> int:
-        """Degree of A, the order of the equation."""
-        return int(self.a.size - 1)
-
-    @property
-    def neutral(self) -> bool:
-        """Whether a delayed term is of the same order as A."""
-        return not self.step and any(self.highest_coefficients[1:])
-
-    @property
-    def highest_coefficients(self) -> tuple[float, float, float, float]:
-        """Coefficients of the highest power of A in A, B1, B2 and C."""
-        a, b1, b2, c = (
-            float(p[-1]) if p.size == self.a.size else 0.0
-            for p in (self.a, self.b1.coefficients, self.b2.coefficients, self.c)
-        )
-        return a, b1, b2, c
-
-    def chain_reserve(self, x: npt.ArrayLike, y: npt.ArrayLike) -> FloatArray:
-        r"""How far the neutral root chain is from reaching the imaginary axis.
-
-        At high frequency D is its highest power of s times
-
-        .. math::
-
-            a + c\, e^{-s\delta} - x\, b_1 e^{-s(\delta + \tau_1)}
-            - y\, b_2 e^{-s(\delta + \tau_2)} ,
-
-        with the highest coefficients of A, C, B1 and B2. The roots of this sum repeat along
-        the imaginary axis for ever: they are the neutral root chain. The chain stays in the
-        left half-plane, for these delays and for all small changes of them, where
-
-        .. math::
-
-            |a| > |c| + |x\, b_1| + |y\, b_2| .
-
-        Parameters
-        ----------
-        x, y : array_like of float
-            The free parameters; they broadcast.
-
-        Returns
-        -------
-        float array, of the broadcast shape
-            Left less right side over |a|, and zero where rounding hides the sign. Negative or
-            zero: the chain is not confined to the left half-plane. One for a retarded
-            equation and for a map, which has no such chain.
-
-        Raises
-        ------
-        TypeError, ValueError
-            If x or y is not finite and real.
-        """
-        name1, name2 = self.parameters
-        x, y = real_array(name1, x), real_array(name2, y)
-        if self.step:
-            return np.ones(np.broadcast_shapes(x.shape, y.shape))
-        a, b1, b2, c = (abs(value) for value in self.highest_coefficients)
-        return left_of(a, c + np.abs(x) * b1 + np.abs(y) * b2)
-
-    @property
-    def longest_delay(self) -> float:
-        """The longest time in s by which a term is delayed, dead time included."""
-        return self.delay + max(self.tau1, self.tau2)
-
-    @property
-    def omega_per_turn(self) -> float:
-        """Change of omega, in rad/s, that is one turn of the longest delay; inf without one."""
-        return 2.0 * np.pi / self.longest_delay if self.longest_delay else np.inf
-
-    def parts(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Evaluate the three terms of D, which is the first less x, y times the others.
-
-        Parameters
-        ----------
-        s : array_like of complex
-            Laplace variable in rad/s, any shape.
-
-        Returns
-        -------
-        tuple of three complex arrays, shaped like `s`
-            A + C exp(-s delay), B1 exp(-s (delay + tau1)) and B2 exp(-s (delay + tau2)).
-
-        Raises
-        ------
-        TypeError, ValueError
-            If s does not hold finite numbers.
-        """
-        s = complex_array("s", s)
-        (rest, _), (b1, _), (b2, _) = self._evaluated(s)
-        dead, (x0, y0) = np.exp(-s * self.delay), self.reference
-        return (
-            np.asarray(rest + (x0 * b1 + y0 * b2) * dead),
-            np.asarray(b1 * np.exp(-s * self.tau1) * dead),
-            np.asarray(b2 * np.exp(-s * self.tau2) * dead),
-        )
-
-    def characteristic(
-        self, s: npt.ArrayLike, x: npt.ArrayLike | None = None, y: npt.ArrayLike | None = None
-    ) -> ComplexArray:
-        """Evaluate D(s; x, y); the three arguments broadcast. Of a loop x and y default to one.
-
-        Raises
-        ------
-        TypeError, ValueError
-            If s does not hold finite numbers, x or y is not finite and real, or the three do
-            not broadcast.
-        """
-        s, x, y = self._checked(s, x, y)
-        (rest, _), (b1, _), (b2, _) = self._evaluated(s)
-        x0, y0 = self.reference
-        arms = b1 * ((x0 - x) - x * np.expm1(-s * self.tau1))
-        arms = arms + b2 * ((y0 - y) - y * np.expm1(-s * self.tau2))
-        return np.asarray(rest + np.exp(-s * self.delay) * arms)
-
-    def _checked(
-        self, s: npt.ArrayLike, x: npt.ArrayLike | None, y: npt.ArrayLike | None
-    ) -> tuple[ComplexArray, FloatArray, FloatArray]:
-        """Return s, x and y as arrays that broadcast, or raise."""
-        x, y = given_or_one(self, x, y)
-        name1, name2 = self.parameters
-        arrays = complex_array("s", s), real_array(name1, x), real_array(name2, y)
-        broadcast_shape(("s", name1, name2), arrays)
-        return arrays
-
-    def _evaluated(self, s: ComplexArray) -> list[tuple[ComplexArray, ComplexArray]]:
-        """Return R, B1 and B2 at s, and their derivatives by s or, for a map, by z."""
-        z = np.exp(s * self.step) if self.step else s
-        return [p.evaluated(z) for p in self.polynomials()]
-
-    def derivative(
-        self, s: npt.ArrayLike, x: npt.ArrayLike | None = None, y: npt.ArrayLike | None = None
-    ) -> ComplexArray:
-        r"""Evaluate dD/ds; the three arguments broadcast. Of a loop x and y default to one.
-
-        .. math::
-
-            \frac{\partial D}{\partial s} = R' + e^{-s\delta} \sum_k \left[
-            \left( B_k' - \delta B_k \right) \left( x_{0k} - x_k\, e^{-s\tau_k} \right)
-            + x_k\, \tau_k B_k e^{-s\tau_k} \right]
-
-        with :math:`(x_1, x_2) = (x, y)`.
-
-        Raises
-        ------
-        TypeError, ValueError
-            As `characteristic` does.
-        """
-        s, x, y = self._checked(s, x, y)
-        dz = self.step * np.exp(s * self.step) if self.step else 1.0
-        (_, dr), *evaluated = self._evaluated(s)
-        arms = np.zeros_like(dr)
-        pairs = zip((x, y), self.reference, (self.tau1, self.tau2), strict=True)
-        for (b, db), (here, origin, tau) in zip(evaluated, pairs, strict=True):
-            change = np.expm1(-s * tau)
-            arms = arms + (db * dz - self.delay * b) * ((origin - here) - here * change)
-            arms = arms + b * here * tau * (1.0 + change)
-        return np.asarray(dr * dz + np.exp(-s * self.delay) * arms)
-
-    def polynomials(self) -> tuple[Polynomial, ...]:
-        """Return R, B1 and B2 with their roots."""
-        return self.rest, self.b1, self.b2
-
-
-def left_of(whole: float, others: npt.ArrayLike) -> FloatArray:
-    """Share of a positive number that others leave of it, zero where rounding hides its sign.
-
-    Of highest coefficients, and sums of such times parameters: a few products and sums, each of
-    which rounds by half an EPSILON, and the coefficients, which are products of a few numbers.
-    """
-    left = (whole - np.asarray(others, dtype=float)) / whole
-    return np.asarray(np.where(np.abs(left) <= 16.0 * EPSILON, 0.0, left))
+def late(part: list[Term], theta: Fraction = _ZERO, factor: float = 1.0) -> list[Term]:
+    """Return a sum of terms times exp(-s theta) and a factor."""
+    found = [(weight * Fraction(factor), p, lag + theta) for weight, p, lag in part]
+    return [(weight, p, _ZERO) for weight, p, _ in found] + [term for term in found if term[2]]
 
 
 def checked_system(system: CharacteristicFunction) -> CharacteristicFunction:
     """Return the system, or say what was given in its place."""
     if not isinstance(system, CharacteristicFunction):
         raise TypeError(
-            f"system must be a CharacteristicFunction, for instance CommonArm(), got {system!r}"
+            "system must be a CharacteristicFunction, for instance CommonArm(), or, for counts "
+            "and the rightmost root, a DelaySystem, as DelaySystem.of(system), got "
+            f"{system!r:.200}"
         )
     return system
 
@@ -495,27 +463,3 @@ def given_or_one(system: CharacteristicFunction, x: Any, y: Any) -> tuple[Any, A
             )
         given.append(1.0 if value is None else value)
     return given[0], given[1]
-
-
-def _polynomial(name: str, given: Sequence[float] | FloatArray | Polynomial) -> Polynomial:
-    """Return a polynomial with trimmed coefficients, and its roots."""
-    return given if isinstance(given, Polynomial) else Polynomial.of(axis(name, given).tolist())
-
-
-def _sum(p: Sequence[Fraction], q: Sequence[Fraction]) -> list[Fraction]:
-    """Add two polynomials in ascending powers."""
-    return [a + b for a, b in zip_longest(p, q, fillvalue=Fraction(0))]
-
-
-def _trimmed(coefficients: Sequence[Fraction]) -> FloatArray:
-    """Return coefficients without zeros in front of the highest power, rounded."""
-    size = max((k + 1 for k, value in enumerate(coefficients) if value), default=1)
-    return rounded([*coefficients, Fraction(0)][:size])
-
-
-def _not_negative(name: str, value: float) -> float:
-    """Return a finite number that is zero or positive."""
-    number = real_number(name, value)
-    if number < 0.0:
-        raise ValueError(f"{name} must not be negative, got {number}")
-    return number

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-import sys
 from collections.abc import Collection
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -24,36 +23,6 @@ _MEMORY_SHARE = 0.5
 _OFF_A_DELAY, _OFF_A_STEP = 1e-9, 1e-3
 
 
-class WithDelays:
-    """A system that functions of python-control refuse with advice: theirs have no delays.
-
-    Each of them asks for an attribute, or asks `isinstance`, which asks for `__class__`.
-    """
-
-    _instead: ClassVar[str]
-    #: Functions and operators of python-control that take such a system all the same.
-    _taken_by: ClassVar[tuple[str, ...]] = ()
-
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any:
-            """Say what to write in place of an attribute that is missing."""
-            raise AttributeError(
-                f"{type(self).__name__!r} object has no attribute {name!r}: {self._instead}",
-                name=name,
-                obj=self,
-            )
-
-        @property
-        def __class__(self) -> type:
-            """Return the class, or say what to write in place of a call of python-control."""
-            caller = sys._getframe(1)
-            module = caller.f_globals.get("__name__", "")
-            if module.startswith("control.") and caller.f_code.co_name not in self._taken_by:
-                raise TypeError(f"python-control's systems have no delays: {self._instead}")
-            return type(self)
-
-
 def real_number(name: str, value: object) -> float:
     """Return `value` as a float, or say why it is not a finite real number."""
     array = _numbers(name, value, _REAL)
@@ -67,6 +36,14 @@ def positive_number(name: str, value: object) -> float:
     number = real_number(name, value)
     if number <= 0.0:
         raise ValueError(f"{name} must be positive, got {number}")
+    return number
+
+
+def not_negative(name: str, value: object) -> float:
+    """Return `value` as a finite float that is zero or positive, or raise."""
+    number = real_number(name, value)
+    if number < 0.0:
+        raise ValueError(f"{name} must not be negative, got {number}")
     return number
 
 

@@ -3,22 +3,24 @@
     L(s) = N(s) / M(s) ,   N, M = sums of real polynomials of s, each times exp(-s theta)
 
 All coefficients and delays are kept exactly, as fractions. `DelaySystem.functions` hands both
-sums to the engine, which counts zeros and certifies margins.
+sums to the engine, which counts zeros and certifies margins. A `Loop` is combined in the same
+way; `DelaySystem.of` gives its open loop.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import sys
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
-from armlock.checks import ComplexArray, WithDelays, complex_array, real_array, real_number
+from armlock.checks import ComplexArray, complex_array, real_array, real_number
 from armlock.controllers import Controller, check_system
 from armlock.engine.functions import Function, Space
 from armlock.engine.polynomials import Polynomial
@@ -85,6 +87,11 @@ class QuasiPolynomial:
         whole = QuasiPolynomial.of((Fraction(0), p) for _, p in self.terms).terms
         return whole + tuple((theta, p) for theta, p in self.terms if theta)
 
+    def __iter__(self) -> Iterator[Term]:
+        """Return the terms as `functions` takes them, of monic polynomials."""
+        for theta, p in self.parts:
+            yield p[-1], _polynomial(tuple(value / p[-1] for value in p)), theta
+
     def __call__(self, s: ComplexArray) -> ComplexArray:
         """Evaluate at s."""
         found = np.zeros_like(s)
@@ -109,32 +116,179 @@ def moved(coefficients: _Coefficients, sigma: float) -> Any:
     return found
 
 
-def functions(*sums: QuasiPolynomial) -> list[Function]:
-    """Return quasi-polynomials as functions of the engine, all of one space.
+#: A weight, a polynomial of s, and a delay in s.
+Term = tuple[Fraction, Polynomial, Fraction]
 
-    Polynomials that are multiples of each other are one polynomial of the space.
+
+def functions(*sums: Iterable[Term], step: float = 0.0) -> list[Function]:
+    """Return sums of terms as functions of the engine, all of one space.
+
+    A term without a delay is weight p(s), and one with a delay theta is
+    weight p(s) (exp(-s theta) - 1).
     """
-    basis: dict[_Coefficients, int] = {}
-    placed = []
-    for item in sums:
-        for theta, p in item.parts:
-            monic = tuple(value / p[-1] for value in p)
-            placed.append((item, theta, basis.setdefault(monic, len(basis)), p[-1]))
-    space = Space([Polynomial.of(p) for p in basis], [theta for _, theta, *_ in placed])
+    given = [[term for term in terms if term[1]] for terms in sums]
+    basis = list(dict.fromkeys(p for terms in given for _, p, _ in terms))
+    space = Space(basis, [theta for terms in given for *_, theta in terms], step)
     found = []
-    for item in sums:
+    for terms in given:
         steady = np.zeros(len(basis), object)
         delayed = np.zeros((len(basis), len(space.delays)), object)
-        for owner, theta, j, weight in placed:
-            if owner is item and theta:
-                delayed[j, space.place(theta)] += weight
-            elif owner is item:
-                steady[j] += weight
-        found.append(space.function(list(steady), list(delayed)))
+        for weight, p, theta in terms:
+            if theta:
+                delayed[basis.index(p), space.place(theta)] += weight
+            else:
+                steady[basis.index(p)] += weight
+        found.append(Function(space, steady, delayed))
     return found
 
 
+@lru_cache
+def _polynomial(coefficients: _Coefficients) -> Polynomial:
+    """Return a polynomial, with roots that are computed once."""
+    return Polynomial.of(coefficients)
+
+
 _ONE = QuasiPolynomial(((Fraction(0), (Fraction(1),)),))
+
+
+class WithDelays:
+    """What all systems with delays have: arithmetic, feedback and a frequency response.
+
+    Functions of python-control refuse them with advice, because its systems have no delays.
+    Each of these functions asks for an attribute, or asks `isinstance`, which asks for
+    `__class__`. Its plots need only the response.
+
+    Examples
+    --------
+    >>> import control
+    >>> from armlock import SingleArm
+    >>> filtered = SingleArm() * control.tf([1], [0.1, 1])
+    >>> print(filtered.feedback())
+    [(1) + (-1) exp(-20.1 s)] / [(0.1 s^2 +1 s +1) + (-1) exp(-20.1 s)]
+    """
+
+    _instead: ClassVar[str]
+    # Functions and operators of python-control that take such a system all the same.
+    _taken_by = (
+        "__add__", "__sub__", "__mul__", "frequency_response", "_determine_omega_vector",
+    )  # fmt: skip
+    # numpy leaves arithmetic with such an object to it.
+    __array_ufunc__ = None
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """Say what to write in place of an attribute that is missing."""
+            raise AttributeError(
+                f"{type(self).__name__!r} object has no attribute {name!r}: {self._instead}",
+                name=name,
+                obj=self,
+            )
+
+        @property
+        def __class__(self) -> type:
+            """Return the class, or say what to write in place of a call of python-control."""
+            caller = sys._getframe(1)
+            module = caller.f_globals.get("__name__", "")
+            if module.startswith("control.") and caller.f_code.co_name not in self._taken_by:
+                raise TypeError(f"python-control's systems have no delays: {self._instead}")
+            return type(self)
+
+    def __add__(self, other: Any) -> DelaySystem:
+        """Return the two in parallel; an equal denominator is kept."""
+        (n1, m1), (n2, m2) = _quotient(self), _quotient(other)
+        return DelaySystem(n1 + n2, m1) if m1 == m2 else DelaySystem(n1 * m2 + n2 * m1, m1 * m2)
+
+    __radd__ = __add__
+
+    def __neg__(self) -> DelaySystem:
+        """Return the negative."""
+        n, m = _quotient(self)
+        return DelaySystem(-n, m)
+
+    def __sub__(self, other: Any) -> DelaySystem:
+        """Return the difference."""
+        return self + -DelaySystem.of(other)
+
+    def __rsub__(self, other: Any) -> DelaySystem:
+        """Return the difference."""
+        return DelaySystem.of(other) - self
+
+    def __mul__(self, other: Any) -> DelaySystem:
+        """Return the two in series; common factors stay."""
+        (n1, m1), (n2, m2) = _quotient(self), _quotient(other)
+        return DelaySystem(n1 * n2, m1 * m2)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> DelaySystem:
+        """Return the quotient; common factors stay."""
+        (n1, m1), (n2, m2) = _quotient(self), _quotient(other)
+        return DelaySystem(n1 * m2, m1 * n2)
+
+    def __rtruediv__(self, other: Any) -> DelaySystem:
+        """Return the quotient."""
+        return DelaySystem.of(other) / self
+
+    def feedback(self, other: Any = 1, sign: float = -1) -> DelaySystem:
+        """Return the closed loop, with negative feedback by default.
+
+        Parameters
+        ----------
+        other : system, optional
+            In the feedback path, as `of` takes it.
+        sign : float, optional
+            Of the feedback.
+        """
+        (n1, m1), (n2, m2) = _quotient(self), _quotient(other)
+        back = DelaySystem.of(-sign).numerator
+        return DelaySystem(n1 * m2, m1 * m2 + back * n1 * n2)
+
+    def __call__(self, s: npt.ArrayLike) -> ComplexArray:
+        """Evaluate at s in rad/s."""
+        raise NotImplementedError
+
+    def open_loop(self) -> DelaySystem:
+        """Return the system as numerator and denominator."""
+        raise NotImplementedError
+
+    def update_names(self, **names: Any) -> None:
+        """Keep no names of signals, so that ``control.series`` takes the system."""
+
+    def isdtime(self, strict: bool = False) -> bool:
+        """Whether time is discrete: it is not. So python-control's plots take the system."""
+        return False
+
+    def frequency_response(
+        self, omega: npt.ArrayLike, squeeze: bool | None = None
+    ) -> control.FrequencyResponseData:
+        """Return the response as python-control's plots and functions take it.
+
+        Parameters
+        ----------
+        omega : array_like of float
+            In rad/s. Choose them dense enough for the delays: exp(-j omega theta) turns once in
+            2 pi / theta.
+        squeeze : bool, optional
+            As in python-control.
+
+        Returns
+        -------
+        control.FrequencyResponseData
+        """
+        import control
+
+        omega = np.atleast_1d(real_array("omega", omega))
+        return control.FrequencyResponseData(
+            self(1j * omega), omega, squeeze=squeeze, return_magphase=True,
+            sysname="system with delays", plot_type="bode",
+        )  # fmt: skip
+
+
+def _quotient(system: Any) -> tuple[QuasiPolynomial, QuasiPolynomial]:
+    """Return numerator and denominator of what `DelaySystem.of` takes."""
+    found = DelaySystem.of(system)
+    return found.numerator, found.denominator
 
 
 @dataclass(frozen=True)
@@ -183,18 +337,14 @@ class DelaySystem(WithDelays):
     numerator: QuasiPolynomial
     denominator: QuasiPolynomial
 
-    # numpy leaves arithmetic with such an object to it.
-    __array_ufunc__ = None
-    _instead: ClassVar[str] = (
-        "combine systems with + - * /; for plots write system.frequency_response(omega), for "
-        "a closed loop DelaySystem.of(plant).feedback(back), for a quotient "
-        "DelaySystem.of(plant) / system, "
+    _instead = (
+        "combine systems with + - * /; for plots write "
+        "control.bode_plot(system.frequency_response(omega)) or "
+        "armlock.nyquist(system, omega_max=omega_max).plot(), for a closed loop "
+        "DelaySystem.of(plant).feedback(back), for a quotient DelaySystem.of(plant) / system, "
         "for responses armlock.step_response(system, timepts), for margins "
         "armlock.margins(loop), for poles armlock.rightmost_root(loop)"
     )
-    _taken_by: ClassVar[tuple[str, ...]] = (
-        "__add__", "__sub__", "__mul__", "frequency_response", "_determine_omega_vector",
-    )  # fmt: skip
 
     def __post_init__(self) -> None:
         """Divide out a common delay and a common power of s, exactly."""
@@ -224,18 +374,18 @@ class DelaySystem(WithDelays):
 
         Parameters
         ----------
-        system : DelaySystem, real number, Controller, or python-control system
-            A transfer function or state space must be continuous in time, with one input and
-            one output. Use a `Controller` for many or repeated factors: python-control
-            multiplies them out.
+        system : DelaySystem, Loop, real number, Controller, or python-control system
+            Of a `Loop` it is the open loop at c1 = c2 = 1. A transfer function or state space
+            must be continuous in time, with one input and one output. Use a `Controller` for
+            many or repeated factors: python-control multiplies them out.
 
         Raises
         ------
         TypeError, ValueError
             If it is none of these, or not finite.
         """
-        if isinstance(system, cls):
-            return system
+        if isinstance(system, WithDelays):
+            return system.open_loop()
         zero = Fraction(0)
         if isinstance(system, Fraction | float | int | np.number | np.ndarray):
             value = system if isinstance(system, Fraction) else real_number("system", system)
@@ -257,66 +407,13 @@ class DelaySystem(WithDelays):
         )
         return cls(QuasiPolynomial.of([(zero, above)]), QuasiPolynomial.of([(zero, below)]))
 
+    def open_loop(self) -> DelaySystem:
+        """Return the system itself."""
+        return self
+
     def __str__(self) -> str:
         """Return numerator and denominator as one writes them."""
         return f"[{self.numerator}] / [{self.denominator}]"
-
-    def __add__(self, other: Any) -> DelaySystem:
-        """Return the two in parallel; an equal denominator is kept."""
-        other = DelaySystem.of(other)
-        n, m = self.numerator, self.denominator
-        if m == other.denominator:
-            return DelaySystem(n + other.numerator, m)
-        return DelaySystem(n * other.denominator + other.numerator * m, m * other.denominator)
-
-    __radd__ = __add__
-
-    def __neg__(self) -> DelaySystem:
-        """Return the negative."""
-        return DelaySystem(-self.numerator, self.denominator)
-
-    def __sub__(self, other: Any) -> DelaySystem:
-        """Return the difference."""
-        return self + -DelaySystem.of(other)
-
-    def __rsub__(self, other: Any) -> DelaySystem:
-        """Return the difference."""
-        return DelaySystem.of(other) - self
-
-    def __mul__(self, other: Any) -> DelaySystem:
-        """Return the two in series; common factors stay."""
-        other = DelaySystem.of(other)
-        return DelaySystem(
-            self.numerator * other.numerator, self.denominator * other.denominator
-        )
-
-    __rmul__ = __mul__
-
-    def __truediv__(self, other: Any) -> DelaySystem:
-        """Return the quotient; common factors stay."""
-        other = DelaySystem.of(other)
-        return DelaySystem(
-            self.numerator * other.denominator, self.denominator * other.numerator
-        )
-
-    def __rtruediv__(self, other: Any) -> DelaySystem:
-        """Return the quotient."""
-        return DelaySystem.of(other) / self
-
-    def feedback(self, other: Any = 1, sign: float = -1) -> DelaySystem:
-        """Return the closed loop, with negative feedback by default.
-
-        Parameters
-        ----------
-        other : system, optional
-            In the feedback path, as `of` takes it.
-        sign : float, optional
-            Of the feedback.
-        """
-        other = DelaySystem.of(other)
-        back = DelaySystem.of(-sign).numerator
-        m = self.denominator * other.denominator + back * self.numerator * other.numerator
-        return DelaySystem(self.numerator * other.denominator, m)
 
     def __call__(self, s: npt.ArrayLike) -> ComplexArray:
         """Evaluate at s in rad/s, of any shape."""
@@ -335,35 +432,6 @@ class DelaySystem(WithDelays):
     def common(self) -> int:
         """Order of the zero at s = 0 that N and M have in common."""
         return min(lead.order for f in self.functions if (lead := f.leading()))
-
-    def isdtime(self, strict: bool = False) -> bool:
-        """Whether time is discrete: it is not. So python-control's plots take the system."""
-        return False
-
-    def frequency_response(
-        self, omega: npt.ArrayLike, squeeze: bool | None = None
-    ) -> control.FrequencyResponseData:
-        """Return the response as python-control's plots and functions take it.
-
-        Parameters
-        ----------
-        omega : array_like of float
-            In rad/s. Choose them dense enough for the delays: exp(-j omega theta) turns once in
-            2 pi / theta.
-        squeeze : bool, optional
-            As in python-control.
-
-        Returns
-        -------
-        control.FrequencyResponseData
-        """
-        import control
-
-        omega = np.atleast_1d(real_array("omega", omega))
-        return control.FrequencyResponseData(
-            self(1j * omega), omega, squeeze=squeeze, return_magphase=True,
-            sysname="system with delays", plot_type="bode",
-        )  # fmt: skip
 
 
 def delay(theta: float | Fraction) -> DelaySystem:

@@ -15,18 +15,18 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import zip_longest
 from numbers import Real
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from armlock import paper, sensors
-from armlock.characteristic import CharacteristicFunction
+from armlock.characteristic import CharacteristicFunction, DelayEquation, late
 from armlock.checks import (
     ComplexArray,
-    WithDelays,
     axis,
     complex_array,
+    not_negative,
     one_of,
     positive_array,
     positive_number,
@@ -34,7 +34,8 @@ from armlock.checks import (
     true_or_false,
 )
 from armlock.controllers import Controller, integrating_actuator, table_two, white_paper
-from armlock.engine.functions import Function, Space
+from armlock.delays import DelaySystem, QuasiPolynomial, Term, WithDelays, functions
+from armlock.engine.functions import Function
 from armlock.engine.margins import Free
 from armlock.engine.polynomials import Polynomial
 from armlock.sensors import COMMON, SINGLE, SignalMapping, modified_dual
@@ -43,9 +44,8 @@ if TYPE_CHECKING:
     import control
 
 
-@dataclass(frozen=True, init=False)
-class HayesEquation(CharacteristicFunction):
-    r"""The equation x'(t) = a x(t) + b x(t - tau), with free parameters (a, b).
+def HayesEquation(tau: float = 1.0) -> DelayEquation:
+    r"""Return the equation x'(t) = a x(t) + b x(t - tau), with free parameters (a, b).
 
     Its characteristic function is (paper, Sec. II, after Eq. 3)
 
@@ -58,6 +58,10 @@ class HayesEquation(CharacteristicFunction):
     tau : float, optional
         Delay in s.
 
+    Returns
+    -------
+    DelayEquation
+
     Raises
     ------
     TypeError, ValueError
@@ -69,25 +73,11 @@ class HayesEquation(CharacteristicFunction):
     >>> unstable_roots(HayesEquation(tau=1.0), -1.0, [-2.2, -2.4])
     array([0, 2])
     """
-
-    rest: Polynomial = field(init=False, repr=False, compare=False)
-    b1: Polynomial = field(init=False, repr=False, compare=False)
-    b2: Polynomial = field(init=False, repr=False, compare=False)
-    tau1: float = field(init=False, repr=False, compare=False)
-    tau2: float = field(init=False, repr=False, compare=False)
-    delay: float = field(init=False, repr=False, compare=False)
-    step: float = field(init=False, repr=False, compare=False)
-    parameters: tuple[str, str] = field(init=False, repr=False, compare=False)
-    reference: tuple[float, float] = field(init=False, repr=False, compare=False)
-    tau: float
-
-    def __init__(self, tau: float = 1.0) -> None:
-        tau = positive_number("tau", tau)
-        super().__init__((0.0, 1.0), (1.0,), (1.0,), 0.0, tau, parameters=("a", "b"))
-        vars(self).update(tau=tau)
+    tau = positive_number("tau", tau)
+    return DelayEquation((0.0, 1.0), (1.0,), (1.0,), 0.0, tau, parameters=("a", "b"))
 
 
-@dataclass(frozen=True, init=False)
+@dataclass(frozen=True)
 class Loop(WithDelays, CharacteristicFunction):
     r"""An arm-locking loop, with free parameters (c1, c2).
 
@@ -149,30 +139,33 @@ class Loop(WithDelays, CharacteristicFunction):
     array(0)
     """
 
+    # Anything that `Controller.of` takes, and a name, until they are checked.
+    controller: Any
+    mapping: Any
+    tau1: float = None  # type: ignore[assignment]
+    tau2: float = None  # type: ignore[assignment]
+    delay: float = 0.0
     rest: Polynomial = field(init=False, repr=False, compare=False)
     b1: Polynomial = field(init=False, repr=False, compare=False)
     b2: Polynomial = field(init=False, repr=False, compare=False)
-    step: float = field(init=False, repr=False, compare=False)
-    parameters: tuple[str, str] = field(init=False, repr=False, compare=False)
-    reference: tuple[float, float] = field(init=False, repr=False, compare=False)
-    controller: Controller
-    mapping: SignalMapping
 
-    _instead: ClassVar[str] = (
-        "for plots write loop.frd(omega), the exact response at some frequencies, for margins "
-        "armlock.margins(loop), and for the controller alone loop.controller"
+    step = 0.0
+    parameters = ("c1", "c2")
+    reference = (1.0, 1.0)
+
+    _instead = (
+        "for plots write loop.frd(omega), the exact response at some frequencies, for a closed "
+        "loop loop.feedback(), for margins armlock.margins(loop), for responses "
+        "armlock.step_response(loop.feedback(), timepts), and for the controller alone "
+        "loop.controller"
     )
 
-    def __init__(
-        self,
-        controller: Any,
-        mapping: SignalMapping | str,
-        tau1: float | None = None,
-        tau2: float | None = None,
-        delay: float = 0.0,
-    ) -> None:
-        k, delay = Controller.of(controller), real_number("delay", delay)
-        m, tau1, tau2 = _mapping_and_delays(mapping, tau1, tau2)
+    def __post_init__(self) -> None:
+        """Check the arguments, keep them in one form, and clear the denominators of 1 + L."""
+        k = Controller.of(self.controller)
+        m, tau1, tau2 = _mapping_and_delays(self.mapping, self.tau1, self.tau2)
+        kept = {"controller": k, "mapping": m, "tau1": tau1, "tau2": tau2}
+        kept["delay"] = delay = not_negative("delay", self.delay)
         rest = Polynomial.of_roots(k.poles) * Polynomial.of(m.denominator)
         zeros = Polynomial.of_roots(k.zeros, k.gain)
         arms = [zeros * Polynomial.of(p) for p in (m.numerator1, m.numerator2)]
@@ -191,38 +184,31 @@ class Loop(WithDelays, CharacteristicFunction):
             )
         # As many poles at s = 0 as all three have zeros there.
         common = min(p.order for p in (rest, *arms) if p)
-        super().__init__(
-            rest.over_powers(common),
-            arms[0].over_powers(common),
-            arms[1].over_powers(common),
-            tau1,
-            tau2,
-            delay=delay,
-            parameters=("c1", "c2"),
-            reference=(1.0, 1.0),
-        )
-        vars(self).update(controller=k, mapping=m)
+        cleared = (p.over_powers(common) for p in (rest, *arms))
+        kept |= zip(("rest", "b1", "b2"), cleared, strict=True)
+        for name, value in kept.items():
+            object.__setattr__(self, name, value)
 
-    def basis(self) -> tuple[list[Polynomial], list[list[Fraction]]]:
-        """Return R, B1 + B2 and B1 - B2, and the shares of them in R, B1 and B2.
+    def parts(self) -> tuple[list[Term], list[Term], list[Term]]:
+        """Return R, B1 and B2, the last two by their half sum and half difference.
 
         Where the arms cancel, as in a difference or in the integral of the dual sensor, they do
         so in these polynomials, and not in what a walk evaluates.
         """
         if not (self.b1 and self.b2):
-            return super().basis()
+            return super().parts()
         k, m = self.controller, self.mapping
         zeros = Polynomial.of_roots(k.zeros, k.gain)
         common = zeros.order + Polynomial.of(m.numerator1).order - self.b1.order
-        made, shares = [self.rest], [[Fraction(1)], [Fraction(0)], [Fraction(0)]]
-        pairs = list(zip_longest(m.numerator1, m.numerator2, fillvalue=0.0))
+        halves = []
         for sign in (1, -1):
+            pairs = zip_longest(m.numerator1, m.numerator2, fillvalue=0.0)
             both = Polynomial.of([Fraction(a) + sign * Fraction(b) for a, b in pairs])
             if both:
-                made.append((zeros * both).over_powers(common))
-                for row, share in zip(shares, (0, 1, sign), strict=True):
-                    row.append(Fraction(share, 2))
-        return made, shares
+                both = (zeros * both).over_powers(common)
+                halves.append((Fraction(1, 2), both, Fraction(0), sign))
+        b1, b2 = ([(w * s**k, p, lag) for w, p, lag, s in halves] for k in (0, 1))
+        return [(Fraction(1), self.rest, Fraction(0))], b1, b2
 
     def quotient(
         self, c1: float | Fraction = 1.0, c2: float | Fraction = 1.0
@@ -231,25 +217,45 @@ class Loop(WithDelays, CharacteristicFunction):
         below = self.terms.rest
         return self.function(c1, c2) + below * -1, below
 
+    def open_loop(self, c1: float = 1.0, c2: float = 1.0) -> DelaySystem:
+        """Return L as a system that is combined with others, for instance by `feedback`.
+
+        Parameters
+        ----------
+        c1, c2 : float, optional
+            Multiplicative perturbations.
+
+        Returns
+        -------
+        DelaySystem
+
+        Raises
+        ------
+        TypeError, ValueError
+            If c1 or c2 is no finite real number.
+
+        Examples
+        --------
+        >>> from armlock import SingleArm
+        >>> print(SingleArm(gain=2.0, tau1=20.0).open_loop(c1=0.9))
+        [(2) + (-1.8) exp(-20 s)] / [(1 s)]
+        """
+        dead, above = Fraction(self.delay), []
+        for name, c, b, tau in (
+            ("c1", c1, self.b1, self.tau1), ("c2", c2, self.b2, self.tau2)
+        ):  # fmt: skip
+            factor = Fraction(real_number(name, c))
+            above += [(dead, b.exact), (dead + Fraction(tau), [-factor * p for p in b.exact])]
+        below = [(Fraction(0), self.rest.exact)]
+        return DelaySystem(QuasiPolynomial.of(above), QuasiPolynomial.of(below))
+
     def with_free_phases(self, c1: float, c2: float, above: float) -> Free:
         """Return L with free phases of both arms above a frequency in rad/s, for the engine."""
-        made, shares = self.basis()
-        space = Space(made, [Fraction(self.delay)])
-
-        def function(weights: list[Fraction], late: bool = False) -> Function:
-            steady = np.array(weights, object)
-            turned = np.repeat(steady[:, None] * int(late), len(space.delays), axis=1)
-            return Function(space, steady, turned)
-
-        rest, b1, b2 = shares
-        both = [a + b for a, b in zip(b1, b2, strict=True)]
-        arms = (function(b1) * c1, function(b2) * c2)
-        return Free(
-            function(both, late=True),
-            function(rest),
-            tuple(a for a in arms if not a.is_zero),
-            above,
-        )
+        rest, b1, b2 = self.parts()
+        zero = Fraction(0)
+        free = [late(b, zero, c) for b, c in ((b1, c1), (b2, c2))]
+        centre, below, *arms = functions(late(b1 + b2, Fraction(self.delay)), rest, *free)
+        return Free(centre, below, tuple(arm for arm in arms if not arm.is_zero), above)
 
     def arm_responses(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """Evaluate K m1 exp(-s delay) and K m2 exp(-s delay), factor by factor.
@@ -347,7 +353,7 @@ class Loop(WithDelays, CharacteristicFunction):
         c1, c2 = real_number("c1", c1), real_number("c2", c2)
         response = self(1j * omega, c1, c2)
         # Its plots need a name.
-        return control.frd(response, omega, sysname=type(self).__name__)
+        return control.frd(response, omega, sysname="Loop")
 
 
 def _mapping_and_delays(
@@ -357,7 +363,8 @@ def _mapping_and_delays(
     if not isinstance(mapping, SignalMapping | str):
         raise TypeError(
             "mapping must be a SignalMapping or a name, as in Loop(controller, 'single', tau1) "
-            f"or Loop(controller, 'common', tau1, tau2), got {mapping!r}"
+            "or Loop(controller, 'common', tau1, tau2); with more arms write "
+            f"controller * (m1 * (1 - delay(tau1)) + ...), got {mapping!r:.200}"
         )
     if tau1 is None:
         raise TypeError("tau1 must be given, the round-trip delay of arm 1 in s")
@@ -398,9 +405,12 @@ def checked_loop(loop: Loop) -> Loop:
     return loop
 
 
-@dataclass(frozen=True, init=False)
-class SingleArm(Loop):
-    r"""Single-arm locking with an integrating actuator (paper, Secs. II and IV.A).
+def SingleArm(
+    gain: float = paper.COMMON_ARM_GAIN,
+    tau1: float = paper.TAU1,
+    delay: float = 0.0,
+) -> Loop:
+    r"""Return single-arm locking with an integrating actuator (paper, Secs. II and IV.A).
 
     .. math::
 
@@ -418,6 +428,10 @@ class SingleArm(Loop):
     delay : float, optional
         Dead time in s, see `Loop`.
 
+    Returns
+    -------
+    Loop
+
     Raises
     ------
     TypeError, ValueError
@@ -429,26 +443,16 @@ class SingleArm(Loop):
     >>> unstable_roots(SingleArm(gain=1.0, tau1=20.1), [0.99, 1.0, 1.01], 0.0)
     array([0, 0, 1])
     """
-
-    controller: Controller = field(init=False, repr=False, compare=False)
-    mapping: SignalMapping = field(init=False, repr=False, compare=False)
-    tau2: float = field(init=False, repr=False, compare=False)
-    gain: float
-
-    def __init__(
-        self,
-        gain: float = paper.COMMON_ARM_GAIN,
-        tau1: float = paper.TAU1,
-        delay: float = 0.0,
-    ) -> None:
-        gain = _gain(gain, "single")
-        super().__init__(integrating_actuator(gain), sensors.SINGLE, tau1, delay=delay)
-        vars(self).update(gain=gain)
+    return Loop(integrating_actuator(_gain(gain, "single")), SINGLE, tau1, delay=delay)
 
 
-@dataclass(frozen=True, init=False)
-class CommonArm(Loop):
-    r"""Common-arm locking with an integrating actuator (paper, Eq. 4).
+def CommonArm(
+    gain: float = paper.COMMON_ARM_GAIN,
+    tau1: float = paper.TAU1,
+    tau2: float = paper.TAU2,
+    delay: float = 0.0,
+) -> Loop:
+    r"""Return common-arm locking with an integrating actuator (paper, Eq. 4).
 
     .. math::
 
@@ -465,6 +469,10 @@ class CommonArm(Loop):
     delay : float, optional
         Dead time in s, see `Loop`.
 
+    Returns
+    -------
+    Loop
+
     Raises
     ------
     TypeError, ValueError
@@ -476,26 +484,19 @@ class CommonArm(Loop):
     >>> unstable_roots(CommonArm(gain=10.0), 1.0, 0.999)
     array(0)
     """
-
-    controller: Controller = field(init=False, repr=False, compare=False)
-    mapping: SignalMapping = field(init=False, repr=False, compare=False)
-    gain: float
-
-    def __init__(
-        self,
-        gain: float = paper.COMMON_ARM_GAIN,
-        tau1: float = paper.TAU1,
-        tau2: float = paper.TAU2,
-        delay: float = 0.0,
-    ) -> None:
-        gain = _gain(gain, "common")
-        super().__init__(integrating_actuator(gain), sensors.COMMON, tau1, tau2, delay)
-        vars(self).update(gain=gain)
+    return Loop(integrating_actuator(_gain(gain, "common")), COMMON, tau1, tau2, delay)
 
 
-@dataclass(frozen=True, init=False)
-class DualArm(Loop):
-    r"""Dual-arm locking with an integrating actuator (paper, Sec. III.B).
+def DualArm(
+    gain: float = paper.DUAL_ARM_GAIN,
+    tau1: float = paper.TAU1,
+    tau2: float = paper.TAU2,
+    corner: float = paper.DUAL_SENSOR_CORNER,
+    *,
+    difference: float | None = None,
+    delay: float = 0.0,
+) -> Loop:
+    r"""Return dual-arm locking with an integrating actuator (paper, Sec. III.B).
 
     .. math::
 
@@ -516,6 +517,10 @@ class DualArm(Loop):
         Sec. III.B. The source of Table I takes half of it.
     delay : float, optional
         Dead time in s, see `Loop`.
+
+    Returns
+    -------
+    Loop
 
     Raises
     ------
@@ -540,28 +545,9 @@ class DualArm(Loop):
     >>> unstable_roots(DualArm(gain=10.0), [1.0, 1.0, 1.0], [0.995, 1.0, 1.001])
     array([1, 0, 0])
     """
-
-    controller: Controller = field(init=False, repr=False, compare=False)
-    mapping: SignalMapping = field(init=False, repr=False, compare=False)
-    gain: float
-    corner: float
-    difference: float
-
-    def __init__(
-        self,
-        gain: float = paper.DUAL_ARM_GAIN,
-        tau1: float = paper.TAU1,
-        tau2: float = paper.TAU2,
-        corner: float = paper.DUAL_SENSOR_CORNER,
-        *,
-        difference: float | None = None,
-        delay: float = 0.0,
-    ) -> None:
-        gain = _gain(gain, "dual")
-        between = _delay_difference(tau1, tau2, difference)
-        mapping = sensors.dual(corner, between)
-        super().__init__(integrating_actuator(gain), mapping, tau1, tau2, delay)
-        vars(self).update(gain=gain, corner=float(corner), difference=between)
+    gain = _gain(gain, "dual")
+    mapping = sensors.dual(corner, _delay_difference(tau1, tau2, difference))
+    return Loop(integrating_actuator(gain), mapping, tau1, tau2, delay)
 
 
 def paper_loop(
@@ -690,39 +676,6 @@ def flight_loop(
     controller = white_paper(0.5 * positive_number("g2", g2))
     tau1, tau2 = mean_delay + half_difference, mean_delay - half_difference
     return Loop(controller, mapping, tau1, tau2, delay)
-
-
-def published_loops() -> dict[str, Loop]:
-    """Return the published loops by name, without a dead time.
-
-    Returns
-    -------
-    dict of str to Loop
-        - "white paper": `flight_loop()`, from the LISA Frequency Control White Paper (2009),
-          Sec. 3; g2 and the sensor's corner are assumed
-        - "Table II": `paper_loop()`, from Table II of Y. Shao, X. Zhao, L. Ma and M. Xin; the
-          sensor's corner is assumed
-        - "PI": gain 1e4, integral below 100 rad/s and arms of 20.1 s and 19.9 s, from the
-          public code quickTDI, module TJ_lock
-        - "high-gain single arm": the same controller on an arm of 20 s
-
-    Examples
-    --------
-    >>> from armlock import published_loops
-    >>> for name, loop in published_loops().items():
-    ...     print(f"{name}: {loop.mapping.name}")
-    white paper: modified dual
-    Table II: dual
-    PI: common
-    high-gain single arm: single
-    """
-    proportional_integral = Controller((-100.0,), (0.0,), 1e4)
-    return {
-        "white paper": flight_loop(),
-        "Table II": paper_loop(),
-        "PI": Loop(proportional_integral, COMMON, 20.1, 19.9),
-        "high-gain single arm": Loop(proportional_integral, SINGLE, 20.0, 20.0),
-    }
 
 
 def _at_hertz(*corners: float) -> list[float]:

@@ -49,7 +49,7 @@ def two_arms() -> list[Case]:
             cases.append(
                 Case(
                     partial(unstable_roots, loop, c1, c2),
-                    partial(loop.characteristic, x=c1, y=c2),
+                    partial(loop.characteristic, c1=c1, c2=c2),
                     [state, *(_first_column(term.column) for term in delayed)],
                     [0.0, *(term.delay for term in delayed)],
                     (loop, c1, c2),

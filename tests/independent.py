@@ -34,6 +34,14 @@ def value(system, s, x, y):
     )
 
 
+def size(system, s, x, y):
+    """Sum of the magnitudes of the terms of D(s; x, y)."""
+    s = complex(s)
+    z = np.exp(s * system.step) if system.step else s
+    terms = [(system.a, 0.0), *delayed_terms(system, x, y)]
+    return sum(abs(np.polyval(b[::-1], z) * np.exp(-s * delay)) for b, delay in terms)
+
+
 def exact(system, s, x, y):
     """D(s; x, y) in mpmath's precision; of a loop 1 + L, from its controller and sensor."""
     s = mpmath.mpc(s)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from armlock import (
-    CharacteristicFunction,
     CommonArm,
     Controller,
+    DelayEquation,
     DualArm,
     HayesEquation,
     Loop,
@@ -30,49 +30,43 @@ RETARDED = {
     "dual arm": DualArm(gain=0.3),
     "common arm, dead time": CommonArm(0.4, 3.0, 2.1, delay=0.7),
     "dual arm, dead time": DualArm(0.3, 2.1, 1.7, 1.5, delay=0.4),
-    "oscillator": CharacteristicFunction([2.0, 0.3, 1.0], [1.0], [0.0, 1.0], 1.0, 2.5),
-    "unstable oscillator": CharacteristicFunction(
-        [2.0, -0.3, 1.0], [1.0, 0.5], [0.7], 0.4, 1.3
-    ),
-    "double integrator": CharacteristicFunction([0.0, 0.0, 1.0], [-0.3, -1.1], [0.2], 0.5, 0.9),
-    "roots of A on the axis": CharacteristicFunction(
+    "oscillator": DelayEquation([2.0, 0.3, 1.0], [1.0], [0.0, 1.0], 1.0, 2.5),
+    "unstable oscillator": DelayEquation([2.0, -0.3, 1.0], [1.0, 0.5], [0.7], 0.4, 1.3),
+    "double integrator": DelayEquation([0.0, 0.0, 1.0], [-0.3, -1.1], [0.2], 0.5, 0.9),
+    "roots of A on the axis": DelayEquation(
         with_roots(1j, -1j, 0.0), [-0.4, 0.1, -0.9], [0.2, 0.3], 0.7, 1.1
     ),
-    "third order, unstable A": CharacteristicFunction(
+    "third order, unstable A": DelayEquation(
         with_roots(0.4, -1.0, -2.0), [1.0, 0.2, 0.5], [0.6, -1.0], 1.0, 3.0
     ),
-    "fourth order, two roots on the axis twice": CharacteristicFunction(
+    "fourth order, two roots on the axis twice": DelayEquation(
         with_roots(2j, -2j, 2j, -2j), [0.5, -3.0, 0.0, 1.0], [1.0, 1.0], 0.3, 0.8
     ),
-    "fifth order, mixed": CharacteristicFunction(
+    "fifth order, mixed": DelayEquation(
         with_roots(0.1 + 1j, 0.1 - 1j, -1.0, -0.5 + 2j, -0.5 - 2j),
         [1.0, 0.0, -1.0, 0.4],
         [0.5, 1.0, 0.0, 0.0, 0.8],
         2.0,
         1.2,
     ),
-    "no first parameter": CharacteristicFunction([1.0, 1.0], [0.0], [1.0], 1.0, 2.0),
-    "no second parameter": CharacteristicFunction([1.0, 0.2, 1.0], [1.0], [0.0], 1.0, 2.0),
-    "no parameter": CharacteristicFunction(with_roots(0.5, -1.0), [0.0], [0.0], 1.0, 2.0),
-    "undelayed first parameter": CharacteristicFunction(
-        [0.5, 0.1, 1.0], [1.0, 1.0], [1.0], 0.0, 1.5
-    ),
-    "equal delays": CharacteristicFunction([1.0, 0.5, 1.0], [1.0, 0.2], [0.3, 1.0], 2.0, 2.0),
-    "zero of B1 on the axis": CharacteristicFunction(
+    "no first parameter": DelayEquation([1.0, 1.0], [0.0], [1.0], 1.0, 2.0),
+    "no second parameter": DelayEquation([1.0, 0.2, 1.0], [1.0], [0.0], 1.0, 2.0),
+    "no parameter": DelayEquation(with_roots(0.5, -1.0), [0.0], [0.0], 1.0, 2.0),
+    "undelayed first parameter": DelayEquation([0.5, 0.1, 1.0], [1.0, 1.0], [1.0], 0.0, 1.5),
+    "equal delays": DelayEquation([1.0, 0.5, 1.0], [1.0, 0.2], [0.3, 1.0], 2.0, 2.0),
+    "zero of B1 on the axis": DelayEquation(
         [1.0, 2.0, 3.0, 1.0], [1.0, 0.0, 1.0], [1.0], 1.0, 2.0
     ),
-    "zero of B1 at the origin": CharacteristicFunction(
-        [1.0, 2.0, 1.0], [0.0, 1.0], [1.5], 1.0, 2.0
-    ),
+    "zero of B1 at the origin": DelayEquation([1.0, 2.0, 1.0], [0.0, 1.0], [1.5], 1.0, 2.0),
 }
 
 NEUTRAL = {
-    "first order": CharacteristicFunction([1.0, 1.0], [0.5, 1.0], [0.2, -0.5], 1.0, 1.7),
-    "integrator": CharacteristicFunction([0.0, 1.0], [-1.0, 0.8], [0.5], 1.0, 0.6),
-    "second order, one neutral term": CharacteristicFunction(
+    "first order": DelayEquation([1.0, 1.0], [0.5, 1.0], [0.2, -0.5], 1.0, 1.7),
+    "integrator": DelayEquation([0.0, 1.0], [-1.0, 0.8], [0.5], 1.0, 0.6),
+    "second order, one neutral term": DelayEquation(
         [1.0, -0.2, 1.0], [0.3, 0.1], [0.4, 0.0, 1.0], 2.0, 1.0
     ),
-    "third order, unstable A": CharacteristicFunction(
+    "third order, unstable A": DelayEquation(
         with_roots(0.3, -1.0, -1.0), [1.0, 0.0, 0.0, 0.5], [0.0, 1.0, 0.0, 0.5], 0.8, 1.5
     ),
     "dead time": Loop(Controller([-0.3], [0.2], 0.2), COMMON, 2.0, 1.5, 0.6),

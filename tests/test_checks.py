@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import armlock
-from armlock import CharacteristicFunction, CommonArm, HayesEquation, SingleArm, paper_loop
+from armlock import CommonArm, DelayEquation, HayesEquation, SingleArm, paper_loop
 from armlock.checks import axis, complex_array, finite_series, real_array
 from armlock.controllers import integrating_actuator, roll_off, stage_one, table_two
 from armlock.robustness import first_crossing
@@ -22,17 +22,16 @@ from tests.systems import NEUTRAL
 ARMS = CommonArm()
 LASER = armlock.LaserNoise(1)
 # Depends on no free parameter at s = 0.
-FLAT = CharacteristicFunction([1.0, 1.0, 1.0], [0.0, 1.0], [0.0, 1.0], 1.0, 2.0)
+FLAT = DelayEquation([1.0, 1.0, 1.0], [0.0, 1.0], [0.0, 1.0], 1.0, 2.0)
 RUN: dict[str, Any] = {"sample_rate": 10.0, "limit": 1e6}
 LOOP: dict[str, Any] = {"tau1": 20.1, "tau2": 19.9, "delay": 0.0}
 POINT: dict[str, Any] = {"c1": 1.0, "c2": 1.0}
-AT: dict[str, Any] = {"x": 1.0, "y": 1.0}
 SHAPE: dict[str, Any] = {"zeros": [], "poles": [-1.0], "gain": 1.0}
 NOISE: dict[str, Any] = {"seed": 1, "sample_rate": 10.0, "cutoff": 1e-3}
 
 # A call of everything that takes arguments, with sensible ones.
 CALLS: dict[Callable[..., object], dict[str, Any]] = {
-    CharacteristicFunction: {"rest": [1.0, 1.0], "b1": [1.0], "b2": [1.0], "tau1": 1.0,
+    DelayEquation: {"rest": [1.0, 1.0], "b1": [1.0], "b2": [1.0], "tau1": 1.0,
                              "tau2": 2.0, "delay": 0.0, "step": 0.0,
                              "reference": (0.0, 0.0)},
     HayesEquation: {"tau": 1.0},
@@ -51,12 +50,12 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     table_two: {"gain": 1.0, "denominator": "table"},
     COMMON.weights: {"s": 1j},
     ARMS: {"s": 1j} | POINT,
-    ARMS.characteristic: {"s": 1j} | AT,
-    ARMS.derivative: {"s": 1j} | AT,
-    ARMS.chain_reserve: AT,
-    armlock.unstable_roots: {"system": ARMS} | AT,
-    armlock.stability_chart: {"system": ARMS, "x": [1.0], "y": [1.0]},
-    armlock.rightmost_root: {"system": ARMS} | AT,
+    ARMS.characteristic: {"s": 1j} | POINT,
+    ARMS.derivative: {"s": 1j} | POINT,
+    ARMS.neutral_margin: POINT,
+    armlock.unstable_roots: {"system": ARMS} | POINT,
+    armlock.stability_chart: {"system": ARMS, "c1": [1.0], "c2": [1.0]},
+    armlock.rightmost_root: {"system": ARMS} | POINT,
     armlock.d_curve: {"system": ARMS, "omega": 1.0},
     armlock.d_curve_line: {"system": ARMS},
     armlock.d_curve_branches: {"system": ARMS, "omega_max": 1.0, "points_per_turn": 24},
@@ -66,8 +65,8 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     armlock.robustness.margins: {"loop": ARMS, "c1": 0.9, "c2": 0.9, "free_above": 1.0},
     armlock.modulus_margin: {"loop": ARMS, "c1": 0.9, "c2": 0.9},
     armlock.critical_perturbation: {"loop": ARMS, "direction": (1.0, 1.0)},
-    armlock.spectral_radius: {"system": ARMS, "step": 0.1, "order": 1} | AT,
-    armlock.transition_matrix: {"system": ARMS, "step": 0.1, "order": 1} | AT,
+    armlock.spectral_radius: {"system": ARMS, "step": 0.1, "order": 1} | POINT,
+    armlock.transition_matrix: {"system": ARMS, "step": 0.1, "order": 1} | POINT,
     armlock.semi_discretization: {"system": ARMS, "step": 0.1, "order": 1},
     armlock.simulate: {"loop": ARMS, "noise": np.ones(9)}
     | POINT | RUN,
@@ -100,10 +99,6 @@ JUNK = {
 }
 
 
-# The free parameters of ARMS are called c1 and c2.
-SHOWN = {"x": "c1", "y": "c2"}
-
-
 @pytest.mark.parametrize(
     "function", CALLS, ids=lambda function: getattr(function, "__qualname__", "instance")
 )
@@ -112,9 +107,7 @@ def test_what_an_argument_cannot_be_is_refused_by_its_name(function):
     function(**arguments)
     for name, junk in itertools.product(arguments, JUNK):
         if name != "name":
-            with pytest.raises(
-                (TypeError, ValueError), match=f"^{SHOWN.get(name, name)} must "
-            ):
+            with pytest.raises((TypeError, ValueError), match=f"^{name} must "):
                 function(**arguments | {name: JUNK[junk]})
 
 
@@ -122,19 +115,19 @@ def test_every_public_function_is_called_above():
     called = {getattr(function, "__name__", "") for function in CALLS}
     public = {name for name in armlock.__all__ if inspect.isfunction(getattr(armlock, name))}
     # They take no number, or have a test of what they refuse beside their own tests.
-    elsewhere = {"published_loops", "robust_loop", "buildable_loop"}
+    elsewhere = {"robust_loop", "buildable_loop"}
     elsewhere |= {"step_response", "impulse_response"}
     assert public - called == elsewhere
 
 
 # Beyond that, what each argument must be: one value past the constraint.
 WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
-    (CharacteristicFunction, "b1", [1.0, 1.0, 1.0], "not exceed the degree"),
-    (CharacteristicFunction, "delay", -1.0, "not be negative, got -1.0"),
-    (CharacteristicFunction, "step", 0.3, "divide every delay, got step=0.3 for tau1"),
+    (DelayEquation, "b1", [1.0, 1.0, 1.0], "not exceed the degree"),
+    (DelayEquation, "delay", -1.0, "not be negative, got -1.0"),
+    (DelayEquation, "step", 0.3, "divide every delay, got step=0.3 for tau1"),
     (CommonArm, "gain", 0.0, "be positive, got 0.0"),
     (CommonArm, "delay", np.array([0.1, 0.2]), "be a real number, got array([0.1, 0.2])"),
-    (ARMS.chain_reserve, "x", "1.0", "hold real numbers"),
+    (ARMS.neutral_margin, "c1", "1.0", "hold real numbers"),
     (paper_loop, "actuator", "no", "be True or False, got 'no'"),
     (armlock.performance.transfer, "s", 0.0, "not be a pole of the open loop, got 0j"),
     (armlock.Controller, "gain", 0.0, "not be zero"),
@@ -146,8 +139,8 @@ WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
     (armlock.Loop, "mapping", SignalMapping([0.0], [0.0], [1.0], "none"), "not be zero"),
     (SignalMapping, "denominator", [0.0], "not be zero, got (0.0,)"),
     (dual, "difference", 0.0, "not be zero"),
-    (armlock.stability_chart, "x", [], "hold at least one value, got 0"),
-    (armlock.stability_chart, "y", 1.0, "be of dimension 1, got shape ()"),
+    (armlock.stability_chart, "c1", [], "hold at least one value, got 0"),
+    (armlock.stability_chart, "c2", 1.0, "be of dimension 1, got shape ()"),
     (armlock.d_curve, "system", SingleArm(), "depend on both free parameters"),
     (armlock.d_curve_line, "system", FLAT, "depend on a free parameter at s = 0"),
     (first_crossing, "start", (0.0,), "hold two numbers, got 1"),
@@ -181,14 +174,14 @@ WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
 
 @pytest.mark.parametrize(("function", "name", "value", "constraint"), WRONG)
 def test_what_breaks_a_constraint_is_refused_with_it(function, name, value, constraint):
-    expected = re.escape(f"{SHOWN.get(name, name)} must {constraint}")
+    expected = re.escape(f"{name} must {constraint}")
     with pytest.raises((TypeError, ValueError), match=f"^{expected}"):
         function(**CALLS[function] | {name: value})
 
 
 @pytest.mark.parametrize("function", [ARMS.characteristic, armlock.unstable_roots])
 def test_arrays_broadcast_to_one_shape_or_are_refused(function):
-    points = {"x": [1.0, 2.0], "y": [1.0, 2.0, 3.0]}
+    points = {"c1": [1.0, 2.0], "c2": [1.0, 2.0, 3.0]}
     with pytest.raises(ValueError, match=r"c1 and c2 must broadcast together, got shapes "):
         function(**CALLS[function] | points)
 

@@ -6,9 +6,9 @@ import pytest
 
 from armlock import (
     BOUNDARY,
-    CharacteristicFunction,
     CommonArm,
     Controller,
+    DelayEquation,
     DualArm,
     Loop,
     critical_perturbation,
@@ -65,7 +65,7 @@ def test_a_lost_chain_is_not_passed_over():
 
 
 # An oscillator with two delayed forces, and one of its crossings, known to rounding.
-OSCILLATOR = CharacteristicFunction([1.0, 0.2, 1.0], [1.0], [1.0], 1.0, 2.0)
+OSCILLATOR = DelayEquation([1.0, 0.2, 1.0], [1.0], [1.0], 1.0, 2.0)
 BOUNDARY_POINT = (-0.40709479644622093, 0.185983667443698)
 
 
@@ -90,15 +90,14 @@ def test_a_first_crossing_may_lie_many_turns_up():
     # The resonance is 1.5e5 turns of the delay up, and damps until x is 4 pi 1.5e5 1e-6.
     resonance = 2.0 * np.pi * 1.5e5
     squared = [resonance**2, 2e-6 * resonance, 1.0]
-    system = CharacteristicFunction(squared, [0.0, 1.0], [0.0], 1.0, 1.0)
+    system = DelayEquation(squared, [0.0, 1.0], [0.0], 1.0, 1.0)
     found = first_crossing(system, (0.0, 0.0), (1.0, 0.0))
     assert found.position == pytest.approx(2e-6 * resonance, rel=1e-9)
 
 
 def test_a_factor_before_the_equation_moves_no_crossing():
     plain, scaled = (
-        CharacteristicFunction([2.0 * f, 0.3 * f, f], [f], [0.0, f], 1.0, 2.5)
-        for f in (1.0, 1e-158)
+        DelayEquation([2.0 * f, 0.3 * f, f], [f], [0.0, f], 1.0, 2.5) for f in (1.0, 1e-158)
     )
     for direction in ((1.0, 0.5), (-1.0, 1.0)):
         found, expected = (

@@ -9,10 +9,13 @@ import pytest
 from armlock import (
     CommonArm,
     Controller,
+    DelaySystem,
     DualArm,
     Loop,
     SingleArm,
+    margins,
     paper_loop,
+    unstable_roots,
 )
 from armlock.controllers import integrating_actuator
 from armlock.paper import DUAL_SENSOR_CORNER
@@ -98,24 +101,37 @@ PLANT = control.tf([1.0], [1.0, 1.0])
         control.ss,
         control.tf,
         control.frd,
-        control.feedback,
-        control.bode_plot,
-        control.nyquist_plot,
         control.step_response,
         control.poles,
         lambda loop: control.feedback(PLANT, loop),
-        lambda loop: control.series(PLANT, loop),
-        lambda loop: control.parallel(loop, PLANT),
-        lambda loop: control.frequency_response(loop, [0.1, 1.0]),
-        lambda loop: loop * PLANT,
-        lambda loop: PLANT * loop,
-        lambda loop: loop.feedback(),
     ],
 )
 def test_python_control_says_what_to_write_for_a_loop(guess):
     for loop in (CommonArm(), Loop(K, "single", 20.0)):
         with pytest.raises((TypeError, AttributeError), match=r"write loop\.frd\(omega\)"):
             guess(loop)
+
+
+def test_a_loop_is_combined_as_any_system_with_delays():
+    s = np.array([0.3j, 1.0 + 2j])
+    for loop in (CommonArm(delay=1e-3), Loop(K, "dual", 20.1, 19.9)):
+        pairs = [
+            (loop * PLANT, loop(s) * PLANT(s)),
+            (PLANT * loop, loop(s) * PLANT(s)),
+            (control.series(loop, PLANT), loop(s) * PLANT(s)),
+            (control.parallel(PLANT, loop), loop(s) + PLANT(s)),
+            (2.0 * loop - 1, 2.0 * loop(s) - 1.0),
+            (1 / (1 + loop), 1.0 / (1.0 + loop(s))),
+            (loop.feedback(), loop(s) / (1.0 + loop(s))),
+            (control.feedback(loop, PLANT), loop(s) / (1.0 + PLANT(s) * loop(s))),
+            (loop.open_loop(0.9, 1.2), loop(s, 0.9, 1.2)),
+        ]
+        for system, expected in pairs:
+            np.testing.assert_allclose(system(s), expected, rtol=1e-10)
+        same = DelaySystem.of(loop)
+        assert unstable_roots(same) == unstable_roots(loop) == 0
+        assert margins(same).phase == pytest.approx(margins(loop).phase, rel=1e-6)
+        np.testing.assert_array_equal(loop.frequency_response([0.3])(0.3j), loop(0.3j))
 
 
 def test_python_control_reports_another_error_for_margins_of_a_loop(capsys):
@@ -128,7 +144,7 @@ def test_python_control_reports_another_error_for_margins_of_a_loop(capsys):
 
 def test_advice_does_not_change_what_a_loop_is():
     loop = CommonArm()
-    assert loop.__class__ is CommonArm
+    assert loop.__class__ is Loop
     assert not hasattr(loop, "gains")
     assert copy.copy(loop) == pickle.loads(pickle.dumps(loop)) == loop
 
@@ -142,7 +158,7 @@ def test_a_controller_in_place_of_a_gain_is_told_what_to_write(arm, controller):
 
 def test_what_is_missing_is_named():
     with pytest.raises(TypeError, match=r"^mapping must be .* as in Loop\(controller, 's"):
-        Loop(K, 20.0)  # type: ignore[arg-type]
+        Loop(K, 20.0)
     with pytest.raises(TypeError, match=r"^tau1 must be given"):
         Loop(K, "single")
     with pytest.raises(TypeError, match=r"^tau2 must be given: the signal mapping 'common'"):

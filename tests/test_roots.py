@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from scipy.special import lambertw
 
 from armlock import (
-    CharacteristicFunction,
     CommonArm,
+    DelayEquation,
     DelaySystem,
     DualArm,
     HayesEquation,
@@ -26,6 +26,7 @@ from armlock import (
     unstable_roots,
 )
 from armlock.loops import flight_loop
+from armlock.paper import DUAL_SENSOR_CORNER
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
 from book.companion.schemes import pseudospectral_roots
 from tests import independent
@@ -72,9 +73,9 @@ def test_hayes_root_is_the_principal_branch_of_lambert(a, b, tau):
     assert root.imag == pytest.approx(abs(expected.imag), rel=1e-9, abs=1e-7 / tau)
 
 
-DEADBEAT = CharacteristicFunction([0.0, 1.0], [1.0], [0.0], 1.0, 1.0, step=1.0)
-OSCILLATOR = CharacteristicFunction([1.0, 0.0, 1.0], [1.0, 1.0], [1.0], 0.0, 0.0)
-LOST = CharacteristicFunction(
+DEADBEAT = DelayEquation([0.0, 1.0], [1.0], [0.0], 1.0, 1.0, step=1.0)
+OSCILLATOR = DelayEquation([1.0, 0.0, 1.0], [1.0, 1.0], [1.0], 0.0, 0.0)
+LOST = DelayEquation(
     [-0.3585, -0.0848, -0.4575, -2.4528, 0.02115],
     [0.1308, 0.238, -0.497, 0.172, 0.10785],
     [-0.884, -1.101, 0.238, -0.477, 0.5011],
@@ -213,10 +214,10 @@ def test_a_root_that_cancels_in_the_loop_is_none_of_its_roots():
     assert unstable_roots(loop, 1.0, 1.0) == 0
     assert root.real < 0.0
     # L is a loop with the same delays, made in another way.
-    s, p = control.tf([1, 0], [1]), loop.corner
+    s, p = control.tf([1, 0], [1]), DUAL_SENSOR_CORNER
     first, second = (1 - delay(tau) for tau in (loop.tau1, loop.tau2))
-    integral = control.tf([p], [1, p]) / s / loop.difference
-    same = loop.gain / s * (first + second + integral * (first - second))
+    integral = control.tf([p], [1, p]) / s / (loop.tau1 - loop.tau2)
+    same = loop.controller.gain / s * (first + second + integral * (first - second))
     assert rightmost_root(same) == pytest.approx(root, rel=1e-9)
 
 

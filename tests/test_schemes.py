@@ -15,7 +15,7 @@ NAMES = list(standard_schemes(LOOP, STEP))
 def recurrence(name, point, samples):
     """Step one scheme by hand, from its textbook form, after a unit impulse."""
     (c1, c2), (r1, r2) = point, (22, 18)
-    g, h = LOOP.gain, STEP
+    g, h = LOOP.controller.gain, STEP
     phi = np.zeros(samples + 30)
     phi[29] = 1.0
 

@@ -12,10 +12,10 @@ from scipy.optimize import minimize_scalar
 from armlock import (
     BOUNDARY,
     UNCONFINED,
-    CharacteristicFunction,
     CommonArm,
     Controller,
     CountError,
+    DelayEquation,
     DualArm,
     HayesEquation,
     Loop,
@@ -178,7 +178,7 @@ class TestOtherLoops:
         change = system.terms.first * -way[0] + system.terms.second * -way[1]
         limit = min(chain_limit(system.function(*start), change, 0.0), 1e12)
         near = [start + limit * share * way for share in (1.0 - 1e-9, 1.0 + 1e-9)]
-        inside, outside = (system.chain_reserve(*point) for point in near)
+        inside, outside = (system.neutral_margin(*point) for point in near)
         assert inside > 0.0 or limit == 0.0
         assert outside <= 0.0 or limit == 1e12
 
@@ -197,11 +197,11 @@ class TestOtherLoops:
     )
     def test_without_parameters_the_roots_of_a_count(self, roots, count):
         b1, b2 = [1.0], [0.5]
-        system = CharacteristicFunction(with_roots(*roots), b1, b2, 1.0, 2.0)
+        system = DelayEquation(with_roots(*roots), b1, b2, 1.0, 2.0)
         assert unstable_roots(system, 0.0, 0.0) == count
 
     def test_without_delays_the_roots_of_a_polynomial_count(self):
-        system = CharacteristicFunction([2.0, 1.0, 3.0, 1.0], [1.0, 1.0], [0.0, 0.0, 1.0], 0, 0)
+        system = DelayEquation([2.0, 1.0, 3.0, 1.0], [1.0, 1.0], [0.0, 0.0, 1.0], 0, 0)
         x, y = np.random.default_rng(3).uniform(-5.0, 5.0, (2, 50))
         for p, q in zip(x, y, strict=True):
             roots = np.roots([1.0, 3.0 - q, 1.0 - p, 2.0 - p])
@@ -275,14 +275,14 @@ class TestLimits:
     @pytest.mark.parametrize("scale", [1e-170, 1e-20, 1e20])
     def test_a_common_factor_changes_no_count(self, scale):
         x, y = np.array([1.0, 20.0, 5.0, -20.0, -35.0]), np.array([1.0, -3.0])
-        plain = CharacteristicFunction([1.0, 1.0], [0.1], [0.1], 1.0, 2.0)
-        system = CharacteristicFunction([scale, scale], [0.1 * scale], [0.1 * scale], 1.0, 2.0)
+        plain = DelayEquation([1.0, 1.0], [0.1], [0.1], 1.0, 2.0)
+        system = DelayEquation([scale, scale], [0.1 * scale], [0.1 * scale], 1.0, 2.0)
         expected = unstable_roots(plain, x, y[:, None])
         assert set(expected.ravel()) == {0, 1, 2}
         np.testing.assert_array_equal(pointwise(system, x, y).counts, expected)
 
     def test_a_delayed_term_of_order_zero_has_no_sign(self):
-        system = CharacteristicFunction([1.0], [1.0], [1.0], 1.0, 2.0)
+        system = DelayEquation([1.0], [1.0], [1.0], 1.0, 2.0)
         counts = unstable_roots(system, [0.4, -0.4, -5.0, 0.5], [0.4, 0.5, 2.0, 0.5])
         np.testing.assert_array_equal(counts, [0, 0, UNCONFINED, UNCONFINED])
 
@@ -313,14 +313,14 @@ class TestLimits:
 
 def test_equal_roots_are_counted_where_a_shift_takes_them():
     # Ten roots at -0.002 after the shift, of which doubles alone would scatter some.
-    equal = CharacteristicFunction(np.poly([-1.0] * 10)[::-1].tolist(), [1.0], [1.0], 1.0, 2.0)
+    equal = DelayEquation(np.poly([-1.0] * 10)[::-1].tolist(), [1.0], [1.0], 1.0, 2.0)
     assert unstable_roots(equal, 0.0, 0.0, right_of=-0.998) == 0
     assert unstable_roots(equal, 0.0, 0.0, right_of=-1.002) == 10
 
 
 def test_a_row_that_starts_hidden_doubts_the_points_around_its_crossing():
     # Im D of this row is 0.2 omega^5 next to zero, and hidden up to some 1e-3 rad/s.
-    system, y = CharacteristicFunction([-11.0 / 6.0, 1.0], [1.0], [1.0], 2.0, 1.0), -8.0 / 3.0
+    system, y = DelayEquation([-11.0 / 6.0, 1.0], [1.0], [1.0], 2.0, 1.0), -8.0 / 3.0
     x = 5.0 / 6.0 + np.array([-1.0, -1e-8, 1e-8, 1e-6, 1.0])
     counts = stability_chart(system, x, [y]).counts[0]
     np.testing.assert_array_equal(counts, unstable_roots(system, x, y))
@@ -360,7 +360,7 @@ def test_where_rounding_hides_all_crossings_few_intervals_are_kept(monkeypatch):
 
 def test_all_points_real_are_boundary_points_up_to_the_end():
     # D = s^2 + 1 - x: real on all of the axis, zero where omega^2 = 1 - x.
-    real = CharacteristicFunction([1.0, 0.0, 1.0], [1.0], [0.0], 0.0, 0.0)
+    real = DelayEquation([1.0, 0.0, 1.0], [1.0], [0.0], 0.0, 0.0)
     counts = stability_chart(real, [-3.0, 0.5, 2.0], [0.0]).counts
     np.testing.assert_array_equal(counts, [[BOUNDARY, BOUNDARY, 1]])
 

@@ -112,6 +112,14 @@ class Margins:
     phase_omega: float
     modulus_omega: float
 
+    def __repr__(self) -> str:
+        """List the margins with their units."""
+        units = dict.fromkeys(vars(self), "")
+        units |= {name: " rad/s" for name in units if name.endswith("_omega")}
+        units |= {"phase": " rad", "delay": " s"}
+        shown = (f"{name}={value}{units[name]}" for name, value in vars(self).items())
+        return f"Margins({', '.join(shown)})"
+
 
 class Limit(NamedTuple):
     """The disc that L fills at infinite frequency: its centre and radius."""

@@ -91,8 +91,8 @@ class StabilityChart:
 
 def stability_chart(
     system: CharacteristicFunction,
-    x: npt.ArrayLike,
-    y: npt.ArrayLike,
+    c1: npt.ArrayLike,
+    c2: npt.ArrayLike,
 ) -> StabilityChart:
     r"""Count the unstable roots over a grid.
 
@@ -100,13 +100,13 @@ def stability_chart(
     ----------
     system : CharacteristicFunction
         The loop, for instance `CommonArm()`.
-    x, y : array_like of float, one-dimensional
+    c1, c2 : array_like of float, one-dimensional
         Axes of the two free parameters, in any order and spacing.
 
     Returns
     -------
     StabilityChart
-        With `.counts` of shape (len(y), len(x)): at each point the count of D, which is -1 on
+        With `.counts` of shape (len(c2), len(c1)): at each point the count of D, which is -1 on
         the line D(0) = 0.
 
     Raises
@@ -119,15 +119,15 @@ def stability_chart(
 
     Notes
     -----
-    D-subdivision along each row. With y fixed, a root is at s = j omega where
+    D-subdivision along each row. With c2 fixed, a root is at s = j omega where
 
     .. math::
 
-        x = \frac{N}{M} , \qquad \mathrm{Im}\, \frac{N}{M} = 0 , \qquad
-        N = A + C\, e^{-s\delta} - y\, B_2\, e^{-s(\delta + \theta_2)} , \quad
+        c_1 = \frac{N}{M} , \qquad \mathrm{Im}\, \frac{N}{M} = 0 , \qquad
+        N = A + C\, e^{-s\delta} - c_2\, B_2\, e^{-s(\delta + \theta_2)} , \quad
         M = B_1\, e^{-s(\delta + \theta_1)} .
 
-    Past it, towards larger x, a conjugate pair has become unstable if Im(N / M) ascends with
+    Past it, towards larger c1, a conjugate pair has become unstable if Im(N / M) ascends with
     omega there, and stable if it descends; at omega = 0 one root. Of a retarded system the
     counts at the two ends of all rows come from two columns, and those of the columns from four
     single counts; of a neutral one each end is counted.
@@ -140,7 +140,7 @@ def stability_chart(
            [ 0,  9, 13]])
     """
     name1, name2 = checked_system(system).parameters
-    xs, ys = axis(name1, x), axis(name2, y)
+    xs, ys = axis(name1, c1), axis(name2, c2)
     check_memory(f"{name1} and {name2}", (ys.size, xs.size), _BYTES_A_POINT)
     order_x, order_y = np.argsort(xs, kind="stable"), np.argsort(ys, kind="stable")
     if system.terms.first.is_zero:
@@ -163,7 +163,7 @@ def _chart_rows(
         return count_points(plain, *((y, x) if swapped else (x, y)))
 
     def reserve(x: FloatArray, y: FloatArray) -> FloatArray:
-        return system.chain_reserve(*((y, x) if swapped else (x, y)))
+        return system.neutral_margin(*((y, x) if swapped else (x, y)))
 
     plain, (_, _, first, second) = system.plain(), system.terms
     centre = float(x[x.size // 2]), float(y[y.size // 2])

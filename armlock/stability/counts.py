@@ -117,7 +117,7 @@ def count_points(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -
         for i in np.flatnonzero(np.abs(sums[0] + sums[1] + sums[2]) <= 8.0 * EPSILON * sizes):
             dx, dy = Fraction(x0) - Fraction(x[i]), Fraction(y0) - Fraction(y[i])
             on_line[i] = a + b * dx + c * dy == 0
-    confined = system.chain_reserve(x, y) > 0.0
+    confined = system.neutral_margin(x, y) > 0.0
     found = np.where(confined, BOUNDARY, UNCONFINED)
     left = np.flatnonzero(confined & ~on_line)
     for start in range(0, left.size, _AT_A_TIME):
@@ -139,8 +139,8 @@ def count_points(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -
 
 def unstable_roots(
     system: CharacteristicFunction | DelaySystem,
-    x: npt.ArrayLike | Fraction | None = None,
-    y: npt.ArrayLike | Fraction | None = None,
+    c1: npt.ArrayLike | Fraction | None = None,
+    c2: npt.ArrayLike | Fraction | None = None,
     *,
     right_of: float = 0.0,
 ) -> IntArray:
@@ -150,9 +150,9 @@ def unstable_roots(
     ----------
     system : CharacteristicFunction or DelaySystem
         The loop, for instance `CommonArm()`; of a `DelaySystem` L the closed loop 1 + L.
-    x, y : array_like of float, or Fraction, optional
-        The free parameters; they broadcast. Those of a loop, c1 and c2, are one if they are not
-        given; others have to be. A `DelaySystem` has none.
+    c1, c2 : array_like of float, or Fraction, optional
+        The two free parameters; they broadcast. Those of a loop are one if they are not given.
+        Others, such as a and b of `HayesEquation`, have to be given. A `DelaySystem` has none.
     right_of : float, optional
         Count the roots with a larger real part than this, in rad/s.
 
@@ -167,7 +167,7 @@ def unstable_roots(
         omega tau is the largest: a point within some 8 EPSILON omega tau of the boundary,
         relative to its parameters, may be given as -1 (4e-10 where a root crosses at 1e4 rad/s,
         with 20 s). `UNCONFINED` (-2) where the neutral root chain is not confined to the left
-        half-plane (`CharacteristicFunction.chain_reserve` is not positive): an arbitrarily
+        half-plane (`CharacteristicFunction.neutral_margin` is not positive): an arbitrarily
         small change of the delays can then make infinitely many roots unstable. A chain that is
         confined by no more than rounding, about 1e-14, counts as not confined, and such a loop
         has no margins.
@@ -175,7 +175,7 @@ def unstable_roots(
     Raises
     ------
     TypeError, ValueError
-        If a number is not finite and real, or x and y do not broadcast or fit into the memory.
+        If a number is not finite and real, or c1 and c2 do not broadcast or fit into memory.
     CountError
         If a count takes too many steps. Nothing is guessed.
 
@@ -186,7 +186,7 @@ def unstable_roots(
     .. math::
 
         N = \frac{n}{2} - \frac{1}{\pi}\,
-        \Delta\!\arg_{0 \le \omega < \infty} D(\mathrm{j}\omega; x, y) ,
+        \Delta\!\arg_{0 \le \omega < \infty} D(\mathrm{j}\omega; c_1, c_2) ,
 
     which holds for retarded loops, and for neutral ones whose root chain is confined.
 
@@ -195,9 +195,9 @@ def unstable_roots(
     .. math::
 
         N = n - \frac{1}{\pi}\,
-        \Delta\!\arg_{0 \le \omega \le \pi / h} D(\mathrm{j}\omega; x, y) .
+        \Delta\!\arg_{0 \le \omega \le \pi / h} D(\mathrm{j}\omega; c_1, c_2) .
 
-    The argument is followed up to the frequency past which |A| > |C| + |x B1| + |y B2|.
+    The argument is followed up to the frequency past which |A| > |C| + |c1 B1| + |c2 B2|.
 
     Examples
     --------
@@ -212,19 +212,19 @@ def unstable_roots(
     """
     right_of = real_number("right_of", right_of)
     if isinstance(system, DelaySystem):
-        if x is not None or y is not None:
-            raise TypeError(f"a DelaySystem has no free parameters, got {x!r} and {y!r}")
+        if c1 is not None or c2 is not None:
+            raise TypeError(f"a DelaySystem has no free parameters, got {c1!r} and {c2!r}")
         n, m = system.functions
         try:
             return np.array(_count(n + m, system.common, right_of))
         except UndecidedError as error:
             raise CountError(f"no count: {error}", np.empty((0, 2))) from None
-    if isinstance(x, Fraction) or isinstance(y, Fraction):
-        given = given_or_one(checked_system(system), x, y)
+    if isinstance(c1, Fraction) or isinstance(c2, Fraction):
+        given = given_or_one(checked_system(system), c1, c2)
         pair = zip(system.parameters, given, strict=True)
-        x, y = (v if isinstance(v, Fraction) else real_number(name, v) for name, v in pair)
-        return np.array(_count_exactly(system, x, y, right_of))
-    xs, ys = broadcast_parameters(system, x, y)
+        c1, c2 = (v if isinstance(v, Fraction) else real_number(name, v) for name, v in pair)
+        return np.array(_count_exactly(system, c1, c2, right_of))
+    xs, ys = broadcast_parameters(system, c1, c2)
     if xs.size > 1 and right_of == 0.0:
         return count_points(system, xs.ravel(), ys.ravel()).reshape(xs.shape)
     points = zip(xs.ravel().tolist(), ys.ravel().tolist(), strict=True)

@@ -20,20 +20,22 @@ from armlock.loops import Loop
 
 @overload
 def rightmost_root(
-    system: CharacteristicFunction | DelaySystem, x: float | None = None, y: float | None = None
+    system: CharacteristicFunction | DelaySystem,
+    c1: float | None = None,
+    c2: float | None = None,
 ) -> complex: ...
 
 
 @overload
 def rightmost_root(
-    system: CharacteristicFunction, x: npt.ArrayLike, y: npt.ArrayLike
+    system: CharacteristicFunction, c1: npt.ArrayLike, c2: npt.ArrayLike
 ) -> ComplexArray: ...
 
 
 def rightmost_root(
     system: CharacteristicFunction | DelaySystem,
-    x: npt.ArrayLike | None = None,
-    y: npt.ArrayLike | None = None,
+    c1: npt.ArrayLike | None = None,
+    c2: npt.ArrayLike | None = None,
 ) -> complex | ComplexArray:
     r"""Return the characteristic root with the largest real part.
 
@@ -44,9 +46,9 @@ def rightmost_root(
     ----------
     system : CharacteristicFunction or DelaySystem
         The loop, for instance `CommonArm()`, or a map; of a `DelaySystem` L the closed loop.
-    x, y : array_like of float, optional
-        The free parameters; they broadcast. Those of a loop, c1 and c2, are one if they are not
-        given; others have to be.
+    c1, c2 : array_like of float, optional
+        The two free parameters; they broadcast. Those of a loop are one if they are not given.
+        Others, such as a and b of `HayesEquation`, have to be given.
 
     Returns
     -------
@@ -56,7 +58,7 @@ def rightmost_root(
     Raises
     ------
     TypeError, ValueError
-        If x or y is not finite and real, the two do not broadcast, or D has no root at all
+        If c1 or c2 is not finite and real, the two do not broadcast, or D has no root at all
         there because it is constant.
     RootError
         If no root can be certified within a few seconds; its `estimate` is the best candidate,
@@ -91,11 +93,11 @@ def rightmost_root(
     -0.3181315052+1.3372357014j
     """
     if isinstance(system, DelaySystem):
-        if x is not None or y is not None:
-            raise TypeError(f"a DelaySystem has no free parameters, got {x!r} and {y!r}")
+        if c1 is not None or c2 is not None:
+            raise TypeError(f"a DelaySystem has no free parameters, got {c1!r} and {c2!r}")
         n, m = system.functions
         return rightmost_zero(n + m, system.common)
-    xs, ys = broadcast_parameters(system, x, y)
+    xs, ys = broadcast_parameters(system, c1, c2)
     if xs.ndim == 0:
         return _at(system, float(xs), float(ys))
     flat = [_at(system, float(p), float(q)) for p, q in zip(xs.flat, ys.flat, strict=True)]

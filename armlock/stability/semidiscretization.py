@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 from armlock.characteristic import (
     CharacteristicFunction,
+    DelayEquation,
     broadcast_parameters,
     checked_system,
     given_or_one,
@@ -181,8 +182,8 @@ def _map(
 
 def transition_matrix(
     system: CharacteristicFunction,
-    x: float | None = None,
-    y: float | None = None,
+    c1: float | None = None,
+    c2: float | None = None,
     step: float | None = None,
     order: int = 0,
 ) -> FloatArray:
@@ -192,8 +193,8 @@ def transition_matrix(
     ----------
     system : CharacteristicFunction
         A retarded loop, for instance `CommonArm()`.
-    x, y : float, optional
-        The free parameters. Those of a loop, c1 and c2, are one if they are not given.
+    c1, c2 : float, optional
+        The two free parameters. Those of a loop are one if they are not given.
     step : float
         Sampling step h in s; it must divide all delays.
     order : {0, 1}, optional
@@ -209,13 +210,13 @@ def transition_matrix(
     Raises
     ------
     TypeError, ValueError
-        If x or y is not a finite real number, the step does not divide a delay, the order is
+        If c1 or c2 is not a finite real number, the step does not divide a delay, the order is
         not 0 or 1, the loop is neutral, or the matrix does not fit into the memory.
 
     Notes
     -----
     In state space the loop is z' = F z + sum_k G_k xi(t - theta_k), where xi is the first
-    state, G_1 contains x and G_2 contains y, and what is not delayed is part of F (`realize`).
+    state, G_1 contains c1 and G_2 contains c2. What is not delayed is part of F (`realize`).
     With :math:`\theta_k = r_k h`, a step is
 
     .. math::
@@ -257,7 +258,7 @@ def transition_matrix(
     step = _checked(system, step, order)
     # The matrix, and what its eigenvalues take.
     check_memory("step", (system.degree + round(system.longest_delay / step),) * 2, 24)
-    state, delayed = realize(system, x, y)
+    state, delayed = realize(system, c1, c2)
     with mpmath.workdps(_DIGITS):
         flow, columns = _sampled(state, delayed, step, order)
     states = len(state)
@@ -277,8 +278,8 @@ def transition_matrix(
 
 def spectral_radius(
     system: CharacteristicFunction,
-    x: npt.ArrayLike | None = None,
-    y: npt.ArrayLike | None = None,
+    c1: npt.ArrayLike | None = None,
+    c2: npt.ArrayLike | None = None,
     step: float | None = None,
     order: int = 0,
 ) -> FloatArray:
@@ -294,9 +295,9 @@ def spectral_radius(
     ----------
     system : CharacteristicFunction
         A retarded loop, for instance `CommonArm()` or `HayesEquation()`.
-    x, y : array_like of float, optional
-        The free parameters; they broadcast. Those of a loop, c1 and c2, are one if they are not
-        given; others have to be.
+    c1, c2 : array_like of float, optional
+        The two free parameters; they broadcast. Those of a loop are one if they are not given.
+        Others, such as a and b of `HayesEquation`, have to be given.
     step : float
         Sampling step h in s; it must divide all delays.
     order : {0, 1}, optional
@@ -310,7 +311,7 @@ def spectral_radius(
     Raises
     ------
     TypeError, ValueError
-        If x or y is not finite and real or the two do not broadcast, if the step does not
+        If c1 or c2 is not finite and real or the two do not broadcast, if the step does not
         divide a delay, if the order is not 0 or 1, if the loop is neutral, or if the matrix
         does not fit into the memory.
     RootError
@@ -328,7 +329,7 @@ def spectral_radius(
     >>> print(round(float(spectral_radius(HayesEquation(), -1, -1, step=0.1, order=1)), 12))
     0.941189374167
     """
-    xs, ys = broadcast_parameters(system, x, y)
+    xs, ys = broadcast_parameters(system, c1, c2)
     h = _checked(system, step, order)
     radii = [_radius(system, p, q, h, order) for p, q in zip(xs.flat, ys.flat, strict=True)]
     return np.array(radii, np.float64).reshape(xs.shape)
@@ -464,7 +465,7 @@ def semi_discretization(
         a, b = _map(*realize(system, 1.0, 1.0), step, order)
     # Those before x and y; with a dead time there is a third one, x0 B1 + y0 B2.
     a, b1, b2 = ([float(value) for value in p] for p in (a, *b[-2:]))
-    return CharacteristicFunction(
+    return DelayEquation(
         a, b1, b2, system.tau1, system.tau2, delay=system.delay, step=step,
         parameters=system.parameters,
         # Without a dead time x0 B1 + y0 B2 is a part of the flow.

@@ -143,8 +143,9 @@ def _response(
         raise ValueError(f"timepts must ascend from 0 s on, got {time}")
     inputs = np.full(time.size, float(what == "Step"))
     return control.TimeResponseData(
-        time, _inverted(system, time), inputs=inputs, issiso=True, title=f"{what} response"
-    )
+        time, _inverted(system, time), inputs=inputs, issiso=True, title=f"{what} response",
+        input_labels=["u[0]"], output_labels=["y[0]"], plot_inputs=False,
+    )  # fmt: skip
 
 
 def _inverted(system: DelaySystem, time: FloatArray) -> FloatArray:

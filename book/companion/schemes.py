@@ -10,14 +10,14 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import BarycentricInterpolator
 
-from armlock.characteristic import CharacteristicFunction
+from armlock.characteristic import CharacteristicFunction, DelayEquation
 from armlock.checks import ComplexArray
-from armlock.loops import CommonArm
+from armlock.loops import Loop
 from armlock.stability.semidiscretization import realize, semi_discretization
 
 
 def sampled_loop(
-    loop: CommonArm,
+    loop: Loop,
     step: float,
     present: float,
     held: tuple[float, float],
@@ -37,7 +37,7 @@ def sampled_loop(
 
     Parameters
     ----------
-    loop : CommonArm
+    loop : Loop
         The loop that the scheme discretizes.
     step : float
         Sampling step h in s, which divides both delays.
@@ -55,7 +55,7 @@ def sampled_loop(
     CharacteristicFunction
         With free parameters (c1, c2).
     """
-    return CharacteristicFunction(
+    return DelayEquation(
         (-present, lead),
         (held[0], newer),
         (held[1], newer),
@@ -66,17 +66,17 @@ def sampled_loop(
     )
 
 
-def standard_schemes(loop: CommonArm, step: float) -> dict[str, CharacteristicFunction]:
+def standard_schemes(loop: Loop, step: float) -> dict[str, CharacteristicFunction]:
     """Return the maps of semi-discretization and of standard schemes, by name.
 
     Parameters
     ----------
-    loop : CommonArm
+    loop : Loop
         The loop.
     step : float
         Sampling step h in s, which divides both delays.
     """
-    gain = loop.gain * step
+    gain = loop.controller.gain * step
     # Runge-Kutta's polynomial for exp(-2 g h), the delayed signals constant over the step.
     stages = sum((-2.0 * gain) ** k / f for k, f in enumerate((1.0, 1.0, 2.0, 6.0, 24.0)))
     driven = 0.5 * (1.0 - stages)

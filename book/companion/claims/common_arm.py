@@ -125,7 +125,7 @@ def cusp_conditions(omega_max: float = OMEGA_SEARCHED) -> tuple[FloatArray, Floa
 
     def solve(tau: float, other: float) -> FloatArray:
         def phase(omega: float, turns: int = 0) -> float:
-            lag = np.arctan2(omega * other, 1.0 + 2.0 * ARM.gain * other)
+            lag = np.arctan2(omega * other, 1.0 + 2.0 * ARM.controller.gain * other)
             return float(omega * tau + lag - np.pi * turns)
 
         turns = range(1, int(phase(omega_max) / np.pi) + 1)
@@ -198,7 +198,7 @@ def sharpest_turn(loop: CharacteristicFunction = ARM) -> tuple[float, float]:
 
 def curve_jumps() -> FloatArray:
     """Change of the count across the D-curve, at points spread over the window."""
-    branches = d_curve_branches(ARM, ARM.gain * np.sqrt(4.0 * WINDOW**2 - 4.0))
+    branches = d_curve_branches(ARM, ARM.controller.gain * np.sqrt(4.0 * WINDOW**2 - 4.0))
     omega, x, y = (np.concatenate(parts) for parts in zip(*branches, strict=True))
     inside = largest_parameter(x, y) < WINDOW
     ahead, behind = (np.array(d_curve(ARM, omega[inside] + d)) for d in (1e-6, -1e-6))
@@ -218,10 +218,10 @@ def printed_maps(step: float = STEP) -> dict[str, CharacteristicFunction]:
     Derived: both delayed samples have the weight c (1 - exp(-2 g h)) / 2. The printed
     integral has (exp(2 g h) - 1) / 2 instead, and Eq. (7) weighs the second one with g h.
     """
-    present = float(np.exp(-2.0 * ARM.gain * step))
+    present = float(np.exp(-2.0 * ARM.controller.gain * step))
     derived = 0.5 * (1.0 - present)
     printed = 0.5 * (1.0 / present - 1.0)
-    plain = ARM.gain * step
+    plain = ARM.controller.gain * step
     return {
         "derived": sampled_loop(ARM, step, present, (derived, derived)),
         "integral as printed": sampled_loop(ARM, step, present, (printed, printed)),
@@ -321,11 +321,11 @@ def parametric_curve() -> Finding:
     """Put Eq. (5a), line by line, into the characteristic equation, in either order."""
     omega = np.linspace(0.001, 30.0, 20_001)
     worst = 0.0
-    for arm in (ARM, CommonArm(ARM.gain, ARM.tau2, ARM.tau1)):
-        c1, c2 = printed_d_curve(omega, arm.gain, arm.tau1, arm.tau2)
-        a, b1, b2 = arm.parts(1j * omega)
-        terms = np.array([a, -c1 * b1, -c2 * b2])
-        residual = np.abs(terms.sum(axis=0)) / np.abs(terms).sum(axis=0)
+    for arm in (ARM, CommonArm(ARM.controller.gain, ARM.tau2, ARM.tau1)):
+        c1, c2 = printed_d_curve(omega, arm.controller.gain, arm.tau1, arm.tau2)
+        s, gain = 1j * omega, arm.controller.gain
+        sizes = np.abs(s + 2.0 * gain) + gain * (np.abs(c1) + np.abs(c2))
+        residual = np.abs(arm.characteristic(s, c1, c2)) / sizes
         worst = max(worst, float(residual.max()))
     return Finding(
         {"": worst < 1e-11},
@@ -410,7 +410,7 @@ def shape_of_the_curve() -> Finding:
 def order_of_the_delays() -> Finding:
     """Compare the charts of both orders."""
     chart = charts()[0]
-    exchanged = stability_chart(CommonArm(ARM.gain, TAU2, TAU1), chart.x, chart.y)
+    exchanged = stability_chart(CommonArm(ARM.controller.gain, TAU2, TAU1), chart.x, chart.y)
     mirrored = int((chart.counts != exchanged.counts.T).sum())
     return Finding(
         {PRINTED: TAU1 < TAU2, "with the arms exchanged in the text": mirrored == 0},
@@ -437,7 +437,7 @@ def recurrence() -> Finding:
     own, other = (excess(readings[k], 1.0, 1.0) for k in ("derived", "both as printed"))
     own_stable = excess(readings["derived"], 0.9, 1.05)
     package = float(spectral_radius(ARM, 0.9, 1.05, STEP)) - 1.0
-    gain = float(np.exp(2.0 * ARM.gain * STEP))
+    gain = float(np.exp(2.0 * ARM.controller.gain * STEP))
     return Finding(
         {
             PRINTED: abs(other) < 1e-9,
@@ -651,7 +651,7 @@ def less_precise() -> Finding:
 )
 def d_subdivision_alone() -> Finding:
     """Draw the curve from few samples and from many."""
-    last, turn = ARM.gain * np.sqrt(4.0 * WINDOW**2 - 4.0), 2.0 * np.pi / TAU1
+    last, turn = ARM.controller.gain * np.sqrt(4.0 * WINDOW**2 - 4.0), 2.0 * np.pi / TAU1
     few, many, short = (
         float(np.abs(drawn_radius(n, end) - exact_radius()).max())
         for n, end in ((DRAWN_SAMPLES, last), (20_000, last), (20_000, 5.0))

@@ -17,7 +17,7 @@ from scipy.optimize import bisect, brentq, minimize_scalar
 from armlock import plotting
 from armlock.characteristic import CharacteristicFunction
 from armlock.checks import FloatArray
-from armlock.loops import DualArm
+from armlock.loops import DualArm, Loop
 from armlock.paper import (
     CONTROLLER_GAIN,
     DUAL_ARM_GAIN,
@@ -91,7 +91,7 @@ def upper_end(
     return first_crossing(system, start, (sign, sign), stop=10.0)
 
 
-def far_edge(loop: DualArm, common: float) -> Crossing:
+def far_edge(loop: Loop, common: float) -> Crossing:
     """Find the far edge at a given (c1 + c2) / 2; its position is c2 - c1."""
     return first_crossing(loop, (common, common), (-0.5, 0.5), stop=1.0)
 

@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from armlock.controllers import integrating_actuator
 from armlock.engine.margins import Margins
 from armlock.loops import CommonArm, DualArm, Loop, SingleArm
 from armlock.paper import (
@@ -24,8 +25,6 @@ from armlock.stability.roots import rightmost_root
 from armlock.timedomain.noise import PerturbationNoise
 from book.companion.claims.ledger import PRINTED, Finding, Verdict, Weight, claim
 from book.companion.extremes import smallest
-
-Arm = SingleArm | CommonArm | DualArm
 
 #: The loops of the section, at the gains of the paper's charts.
 SINGLE, COMMON, DUAL = SingleArm(), CommonArm(), DualArm()
@@ -68,12 +67,12 @@ def crossing_near(loop: Loop, c1: float, c2: float, omega: float) -> AxisCrossin
     return AxisCrossings(found.omega[kept], found.value[kept])
 
 
-def at_gain(loop: Arm, factor: float) -> Arm:
+def at_gain(loop: Loop, factor: float) -> Loop:
     """Return one of the section's loops with its gain times a factor."""
-    return type(loop)(loop.gain * factor)
+    return loop.replace(controller=integrating_actuator(factor * loop.controller.gain))
 
 
-def fewest_roots(loop: Arm, c1: float, c2: float) -> int:
+def fewest_roots(loop: Loop, c1: float, c2: float) -> int:
     """Return the smallest number of unstable roots of 1 + L over all gains tried."""
     return min(nyquist(at_gain(loop, k), c1, c2).closed_loop_roots for k in FACTORS)
 
@@ -193,7 +192,7 @@ def value_at_full_turn() -> Finding:
     """Evaluate the loop with and without the integrating actuator at 2 pi / tau."""
     s, c1 = 2j * np.pi / SINGLE.tau1, SINGLE_POINT[0]
     value = complex(SINGLE(s, c1))
-    without = value * s / SINGLE.gain
+    without = value * s / SINGLE.controller.gain
     return Finding(
         {
             PRINTED: abs(value - (1.0 - c1)) < 1e-9,
@@ -221,7 +220,7 @@ def single_arm_crossing() -> Finding:
     turn = 2.0 * np.pi / SINGLE.tau1
     found = crossing_near(SINGLE, *SINGLE_POINT, turn)
     omega, value = float(found.omega[0]), float(found.value[0])
-    closed = -SINGLE.gain * np.sqrt(c1 * c1 - 1.0) / omega
+    closed = -SINGLE.controller.gain * np.sqrt(c1 * c1 - 1.0) / omega
     factor = -1.0 / value
     below, above = (
         nyquist(at_gain(SINGLE, factor * k), *SINGLE_POINT).closed_loop_roots
@@ -296,7 +295,7 @@ def dual_arm_branch() -> Finding:
     curve = nyquist(DUAL, c1, c2)
     turns = phase_of_branch(curve)[1] / (2.0 * np.pi)
     radius = float(np.abs(curve.indentation[0]))
-    leading = DUAL.gain * (c2 - c1) / (TAU1 - TAU2)
+    leading = DUAL.controller.gain * (c2 - c1) / (TAU1 - TAU2)
     size = complex(DUAL(radius, c1, c2)) * radius**2
     growth = rightmost_root(DUAL, c1, c2).real
     of_order_two = curve.pole_order == 2 and abs(size / leading - 1.0) < 1e-2
@@ -341,7 +340,7 @@ def dual_arm_gain_margin() -> Finding:
         },
         float(factor[0]),
         f"gain factor up to which the dual arm stays stable at (1, 1 + {SIZES[0]:g}), $g = "
-        f"{DUAL.gain:g}$ rad/s",
+        f"{DUAL.controller.gain:g}$ rad/s",
         f"On the stable side the margin falls to {factor[-1]:.1f} at (1, 1 + {SIZES[-1]:g}). "
         "At (1, 1) the curve does not cross the negative real axis. At the paper's (1, "
         f"{DUAL_POINT[1]:g}) at least {fewest} root is unstable at every gain.",
