@@ -228,3 +228,10 @@ def test_many_factors_are_kept_by_a_controller():
     loop = DelaySystem.of(controller) * delay(Fraction(1, 3))
     s = 1j * np.geomspace(1e-7, 10.0, 30)
     assert loop(s) == pytest.approx(controller(s) * np.exp(-s / 3), rel=1e-9)
+
+
+def test_a_response_is_drawn_by_python_control():
+    found = step_response(control.tf([1], [1, 1]) * delay(1.0), 3.0)
+    axes = found.plot().axes
+    assert axes.shape == (1, 1)
+    np.testing.assert_array_equal(axes[0, 0].lines[0].get_ydata(), found.outputs)
