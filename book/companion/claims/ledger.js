@@ -37,7 +37,7 @@
     });
   });
   function unfold() {
-    const row = document.getElementById(location.hash.slice(1))?.closest('.ledger tbody tr');
+    const row = rows.find(row => '#' + row.id === location.hash);
     if (!row) return;
     form.reset();
     row.hidden = false;
