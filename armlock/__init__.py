@@ -1,24 +1,58 @@
-"""Stability and simulation of laser loops locked to delays of tens of seconds.
+"""Stability and simulation of laser loops that are locked to long delays (arm locking).
 
-The reproducible companion to "Robustness Analysis and Controller Design of Arm-locking
+A loop has a controller, a sensor, the round-trip times ``tau1`` and ``tau2`` of its two arms,
+and two free parameters: the factors c1 and c2 of the arms, which are ideally 1. Counts and
+margins are certified: a number is right, or the function says that it is not decided.
+
+The calls that matter most:
+
+- ``Loop(controller, "common", tau1=20.1, tau2=19.9)`` is a loop of your own. `paper_loop` and
+  `flight_loop` are published ones.
+- ``unstable_roots(loop, c1, c2)`` counts the roots with positive real part. 0 means stable,
+  -1 a root on the imaginary axis, -2 unstable roots at arbitrarily high frequency.
+- ``stability_chart(loop, c1, c2)`` counts on a grid; ``chart.plot()`` draws the chart.
+- ``margins(loop, c1, c2)`` finds the gain, phase, delay and modulus margins of a stable loop.
+- ``critical_perturbation(loop, direction)`` is the distance from (1, 1) to instability.
+- ``rightmost_root(loop, c1, c2)`` is the root that decays slowest or grows fastest.
+- ``control.tf([1], [10, 1]) * delay(3.0)`` is a system with a dead time, for loops with any
+  number of delays, also inside the controller.
+- ``nyquist(loop, omega_max=10.0)`` is the Nyquist curve with its encirclements of -1.
+- ``simulate(loop, noise)`` is the frequency noise of the locked laser, in Hz, from that of
+  the free laser, such as ``LaserNoise(seed=1).draw(20_000)``.
+- ``amplitude_spectrum(series, sample_rate)`` estimates an amplitude spectral density.
+- ``noise_budget(loop, frequency)`` is the noise of the locked laser, source by source.
+
+Angular frequencies are in rad/s, frequencies in Hz, and delays in s. The first call of a
+function compiles it, which takes 10 to 30 s. ``help(armlock.margins)`` describes one
+function. The modules `armlock.controllers`, `armlock.sensors`, `armlock.orbits` and
+`armlock.paper` hold controllers, sensors, real arms and the numbers of the paper.
+
+This package is the companion to "Robustness Analysis and Controller Design of Arm-locking
 System in Space-based Gravitational Wave Detectors".
 """
 
 from armlock.characteristic import CharacteristicFunction
 from armlock.controllers import Controller
-from armlock.design import Design, buildable_loop, design, robust_loop
+from armlock.delays import DelaySystem, delay
 from armlock.loops import (
     CommonArm,
     DualArm,
     HayesEquation,
     Loop,
     SingleArm,
+    buildable_loop,
     flight_loop,
     paper_loop,
     published_loops,
+    robust_loop,
 )
-from armlock.performance import NoiseBudget, closed_loop, noise_budget, pulling, transfer
-from armlock.robustness import Margins, critical_perturbation, margins, modulus_margin
+from armlock.performance import NoiseBudget, noise_budget, pulling, transfer
+from armlock.robustness import (
+    Margins,
+    critical_perturbation,
+    margins,
+    modulus_margin,
+)
 from armlock.stability import (
     BOUNDARY,
     UNCONFINED,
@@ -39,7 +73,6 @@ from armlock.stability import (
     transition_matrix,
     unstable_roots,
 )
-from armlock.sweep import sweep
 from armlock.timedomain import (
     DivergenceError,
     LaserNoise,
@@ -49,10 +82,10 @@ from armlock.timedomain import (
     Spectrum,
     SpectrumEstimator,
     amplitude_spectrum,
+    impulse_response,
     sampled_open_loop,
-    save_series,
     simulate,
-    simulate_blocks,
+    step_response,
 )
 
 __version__ = "0.1.0"
@@ -65,7 +98,7 @@ __all__ = [
     "CommonArm",
     "Controller",
     "CountError",
-    "Design",
+    "DelaySystem",
     "DivergenceError",
     "DualArm",
     "HayesEquation",
@@ -85,13 +118,13 @@ __all__ = [
     "amplitude_spectrum",
     "axis_crossings",
     "buildable_loop",
-    "closed_loop",
     "critical_perturbation",
     "d_curve",
     "d_curve_branches",
     "d_curve_line",
-    "design",
+    "delay",
     "flight_loop",
+    "impulse_response",
     "margins",
     "modulus_margin",
     "noise_budget",
@@ -102,13 +135,11 @@ __all__ = [
     "rightmost_root",
     "robust_loop",
     "sampled_open_loop",
-    "save_series",
     "semi_discretization",
     "simulate",
-    "simulate_blocks",
     "spectral_radius",
     "stability_chart",
-    "sweep",
+    "step_response",
     "transfer",
     "transition_matrix",
     "unstable_roots",

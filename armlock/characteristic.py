@@ -15,15 +15,15 @@ So both are one class here, and one set of algorithms serves both.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, NoReturn, Self
+from itertools import zip_longest
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
-from numpy.polynomial import polynomial as poly
 
-from armlock.axis.exponentials import EPSILON, LOW_DEGREE, ExponentialSum, Polynomial
 from armlock.checks import (
     ComplexArray,
     FloatArray,
@@ -35,13 +35,24 @@ from armlock.checks import (
     real_number,
     whole_steps,
 )
+from armlock.engine.functions import Function, Space
+from armlock.engine.inclusion import EPSILON
+from armlock.engine.polynomials import Polynomial, rounded
 
-# Past this an exponential is no float.
-_LARGEST_EXPONENT = 700.0
 # The free parameters of a loop, the perturbations of its arms: one where there is none.
 _PERTURBATIONS = ("c1", "c2")
 
 
+class Terms(NamedTuple):
+    """R, and the terms of D = constant - x first - y second."""
+
+    rest: Function
+    constant: Function
+    first: Function
+    second: Function
+
+
+@dataclass(frozen=True)
 class CharacteristicFunction:
     r"""A characteristic function that is affine in two free parameters x and y.
 
@@ -62,7 +73,7 @@ class CharacteristicFunction:
 
     Parameters
     ----------
-    rest, b1, b2 : sequence of float, or armlock.axis.exponentials.Polynomial
+    rest, b1, b2 : sequence of float, or armlock.engine.polynomials.Polynomial
         Coefficients of R, B1 and B2 in ascending powers of s (of z = exp(s step) for a map);
         or polynomials with known roots, which are then kept.
     tau1, tau2 : float
@@ -79,8 +90,8 @@ class CharacteristicFunction:
 
     Attributes
     ----------
-    a, c : float array
-        The coefficients of A and C above; c is zero without a dead time.
+    rest, b1, b2 : armlock.engine.polynomials.Polynomial
+        R, B1 and B2 with their coefficients and roots.
 
     Raises
     ------
@@ -91,9 +102,8 @@ class CharacteristicFunction:
 
     Notes
     -----
-    It is a value: it cannot be changed, its arrays are read-only, and two of one type that are
-    made from equal arguments are equal. `replace` makes another one. A subclass calls
-    `made_from` with its own arguments once it is made.
+    It is a frozen dataclass: `replace`, `dataclasses.replace` and `copy.replace` make another
+    one with some arguments changed.
 
     The equation is of *retarded* type if all delayed terms are of lower degree than A, and of
     *neutral* type (`neutral` is true) if one of them reaches it. The roots of a neutral
@@ -101,28 +111,25 @@ class CharacteristicFunction:
 
     Examples
     --------
-    An oscillator with two delayed forces, x'' + 0.2 x' + x = x1 x(t - 1) + x2 x(t - 2):
+    An oscillator with two delayed forces, x'' + 0.2 x' + x = x1 x(t - 1) + x2 x(t - 2). The
+    reference is (0, 0), so that R is A:
 
     >>> from armlock import CharacteristicFunction, unstable_roots
-    >>> a, b1, b2 = [1.0, 0.2, 1.0], [1.0], [1.0]
-    >>> forced = CharacteristicFunction(a, b1, b2, tau1=1.0, tau2=2.0)
+    >>> rest, b1, b2 = [1.0, 0.2, 1.0], [1.0], [1.0]
+    >>> forced = CharacteristicFunction(rest, b1, b2, tau1=1.0, tau2=2.0)
     >>> unstable_roots(forced, [0.1, -0.5], 0.05)
     array([0, 2])
     """
 
-    rest: FloatArray
-    b1: FloatArray
-    b2: FloatArray
-    a: FloatArray
-    c: FloatArray
+    rest: Polynomial
+    b1: Polynomial
+    b2: Polynomial
     tau1: float
     tau2: float
     delay: float
     step: float
     parameters: tuple[str, str]
     reference: tuple[float, float]
-    _polynomials: tuple[Polynomial, ...]
-    _arguments: dict[str, Any]
 
     def __init__(
         self,
@@ -137,74 +144,57 @@ class CharacteristicFunction:
         parameters: tuple[str, str] = ("x", "y"),
         reference: tuple[float, float] = (0.0, 0.0),
     ) -> None:
-        named = {"rest": rest, "b1": b1, "b2": b2}
-        polynomials = {name: _polynomial(name, p) for name, p in named.items()}
-        r, p1, p2 = (p.coefficients for p in polynomials.values())
+        polynomials = {"rest": rest, "b1": b1, "b2": b2}
+        polynomials = {name: _polynomial(name, p) for name, p in polynomials.items()}
         pair = axis("reference", reference)
         if pair.size != 2:
             raise ValueError(f"reference must hold two numbers, got {pair.size}")
-        x0, y0 = pair.tolist()
         times = {"tau1": tau1, "tau2": tau2, "delay": delay, "step": step}
         times = {name: _not_negative(name, value) for name, value in times.items()}
-        if times["step"]:
+        # The fields of a frozen dataclass are set once, here.
+        vars(self).update(polynomials, **times)
+        vars(self).update(parameters=tuple(parameters), reference=tuple(pair.tolist()))
+        self._check()
+
+    def _check(self) -> None:
+        """Raise if a delay is no whole number of steps, or a term is too high in degree."""
+        if self.step:
             for name in ("delay", "tau1", "tau2"):
-                whole_steps(name, times[name], times["step"])
-        c = poly.polyadd(x0 * p1, y0 * p2)
-        if times["delay"]:
-            a, c = r, _trimmed("c", np.asarray(c))
-        else:
-            # Nothing delays C: it is part of A.
-            a, c = _trimmed("a", np.asarray(poly.polyadd(r, c))), _trimmed("c", [0.0])
-        if not a.any():
+                whole_steps(name, getattr(self, name), self.step)
+        if not self.a.any():
             raise ValueError(
-                f"A, the term without a delay, must not vanish, got rest={r.tolist()}"
+                f"A, the term without a delay, must not vanish, got rest={self.rest!r}"
             )
-        degree = a.size - 1
-        for name, b in (("b1", p1), ("b2", p2), ("c", c)):
-            if b.size > a.size:
+        for name, degree in (
+            ("b1", self.b1.degree),
+            ("b2", self.b2.degree),
+            ("c", self.c.size - 1),
+        ):
+            if degree > self.degree:
                 raise ValueError(
-                    f"{name} must not exceed the degree of A ({degree}), "
-                    f"got degree {b.size - 1}: the equation would be of advanced type"
+                    f"{name} must not exceed the degree of A ({self.degree}), "
+                    f"got degree {degree}: the equation would be of advanced type"
                 )
-        for name, b, tau in (("b1", p1, times["tau1"]), ("b2", p2, times["tau2"])):
-            if tau + times["delay"] == 0.0 and b.size == a.size:
+        for name, b, tau in (("b1", self.b1, self.tau1), ("b2", self.b2, self.tau2)):
+            if tau + self.delay == 0.0 and b and b.degree == self.degree:
                 raise ValueError(
-                    f"{name} without a delay must be of lower degree than A ({degree}), "
+                    f"{name} without a delay must be of lower degree than A ({self.degree}), "
                     f"or its parameter would change the order of the equation"
                 )
-        vars(self).update(
-            times, rest=r, b1=p1, b2=p2, a=a, c=c, parameters=tuple(parameters),
-            reference=(x0, y0), _polynomials=tuple(polynomials.values()),
-        )  # fmt: skip
-        self.made_from(
-            **polynomials, **times, parameters=self.parameters, reference=self.reference
-        )
-
-    def made_from(self, **arguments: Any) -> None:
-        """Keep the arguments that make this once more, at the end of a class's `__init__`.
-
-        Parameters
-        ----------
-        **arguments
-            Checked, and such that nobody changes them. They become attributes too, but for
-            those that there are already.
-        """
-        vars(self).update({**arguments, **vars(self), "_arguments": arguments})
 
     def replace(self, **changes: Any) -> Self:
-        """Return another one of the same class, made with other values of some arguments.
+        """Return another one, made with other values of some arguments.
 
         Parameters
         ----------
         **changes
-            Arguments of the class, by name. All others are as they were given: a signal mapping
-            that was given as an object stays as it is when the delays change, one that was
-            given by its name is made anew.
+            Arguments of the class, by name. All others stay as they are. The sensor of a loop
+            stays too when its delays change.
 
         Returns
         -------
         CharacteristicFunction
-            Of the same class. `copy.replace` calls this, from Python 3.13 on.
+            Of the same class.
 
         Raises
         ------
@@ -217,59 +207,91 @@ class CharacteristicFunction:
         >>> CommonArm(delay=20e-6).replace(delay=0.0) == CommonArm()
         True
         """
-        return type(self)(**{**self._arguments, **changes})
-
-    __replace__ = replace
+        return replace(self, **changes)
 
     def plain(self) -> CharacteristicFunction:
         """Return D alone, with the arguments of `CharacteristicFunction`."""
-        rest, b1, b2 = self._polynomials
         return CharacteristicFunction(
-            rest, b1, b2, self.tau1, self.tau2, delay=self.delay, step=self.step,
-            parameters=self.parameters, reference=self.reference,
+            self.rest, self.b1, self.b2, self.tau1, self.tau2, delay=self.delay,
+            step=self.step, parameters=self.parameters, reference=self.reference,
         )  # fmt: skip
 
-    def __setattr__(self, name: str, value: object) -> NoReturn:
-        """Refuse changes: results are kept with the system they belong to."""
-        raise AttributeError(
-            f"a {type(self).__name__} cannot be changed, got {name} = {value!r:.60}: make "
-            f"another one with replace({name}=...)"
-        )
-
-    def __delattr__(self, name: str) -> NoReturn:
-        """Refuse changes."""
-        raise AttributeError(f"a {type(self).__name__} cannot be changed, got del {name}")
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Take what was pickled or copied; arrays are read-only again."""
-        vars(self).update(state)
-        for p in self._polynomials:
-            _sealed(p)
-        for array in (self.rest, self.b1, self.b2, self.a, self.c):
-            array.setflags(write=False)
-
-    def _identity(self) -> tuple[Any, ...]:
-        """Return what two equal ones have in common, hashable."""
-        polynomials = [(*p.coefficients.tolist(), *p.roots.tolist()) for p in self._polynomials]
-        times = self.tau1, self.tau2, self.delay, self.step
-        return *polynomials, times, self.parameters, self.reference
-
-    def __eq__(self, other: object) -> bool:
-        """Whether the other one is of the same class, with equal arguments."""
-        if type(other) is not type(self):
-            return NotImplemented
-        assert isinstance(other, CharacteristicFunction)
-        return self._identity() == other._identity()
+    def basis(self) -> tuple[list[Polynomial], list[list[Fraction]]]:
+        """Return polynomials, and their shares in R, B1 and B2, shape (3, polynomials)."""
+        given = self.polynomials()
+        places = np.cumsum([bool(p) for p in given]) - 1
+        made = [p for p in given if p]
+        shares = [
+            [Fraction(int(bool(p) and k == place)) for k in range(len(made))]
+            for p, place in zip(given, places, strict=True)
+        ]
+        return made, shares
 
     @cached_property
-    def _hash(self) -> int:
-        """Of numbers alone, whose hash is the same in every process: it is pickled along."""
-        numbers = self.rest.tolist(), self.b1.tolist(), self.b2.tolist()
-        return hash((*map(tuple, numbers), self.tau1, self.tau2, self.delay))
+    def terms(self) -> Terms:
+        """R and the terms of D, exactly, as functions of the engine."""
+        made, shares = self.basis()
+        lags = [Fraction(lag) for lag in (0.0, self.delay, self.tau1, self.tau2)]
+        powers = [[(Fraction(1), Fraction(0))]] * 3
+        if self.step:
+            # Over z^n each power of z is a delay of its own, and the only polynomial is one.
+            step = Fraction(self.step)
+            lags = [round(lag / step) * step for lag in lags]
+            made, shares = [Polynomial(Fraction(1), ())], [[Fraction(1)]] * 3
+            powers = [
+                [(c, (self.degree - k) * step) for k, c in enumerate(p.exact)]
+                for p in self.polynomials()
+            ]
+        zero, dead, tau1, tau2 = lags
+        if self.neutral and tau1 == tau2:
+            # Equal arms are two delays for the neutral root chain, which is to stay where it is
+            # for all small changes of either.
+            tau2 += tau2 / 2**300
+        delays = {
+            lag + power
+            for lag in (zero, dead, dead + tau1, dead + tau2)
+            for part in powers
+            for _, power in part
+        }
+        space = Space(made, delays, self.step)
 
-    def __hash__(self) -> int:
-        """Return a number that equal ones share."""
-        return self._hash
+        def delayed(k: int, lag: Fraction) -> Function:
+            steady = np.zeros(len(made), object)
+            turned = np.zeros((len(made), len(space.delays)), object)
+            for j, share in enumerate(shares[k]):
+                for weight, power in powers[k]:
+                    steady[j] += share * weight
+                    if lag + power:
+                        turned[j, space.place(lag + power)] += share * weight
+            return Function(space, steady, turned)
+
+        (x0, y0), rest = self.reference, delayed(0, zero)
+        constant = rest + delayed(1, dead) * x0 + delayed(2, dead) * y0
+        return Terms(rest, constant, delayed(1, dead + tau1), delayed(2, dead + tau2))
+
+    def function(self, x: float | Fraction, y: float | Fraction) -> Function:
+        """Return D at one point as a function of the engine, exactly."""
+        _, constant, first, second = self.terms
+        return constant + first * -Fraction(x) + second * -Fraction(y)
+
+    def cancelled(self, x: float | Fraction, y: float | Fraction) -> int:
+        """Order of the root at s = 0 that D has and the system has not: 0, but for a loop."""
+        return 0
+
+    @cached_property
+    def c(self) -> FloatArray:
+        """Coefficients of C, what the dead time alone delays; zero without a dead time."""
+        return _trimmed(self._at_reference() if self.delay else [])
+
+    @cached_property
+    def a(self) -> FloatArray:
+        """Coefficients of A, what nothing delays."""
+        return _trimmed(_sum(self.rest.exact, [] if self.delay else self._at_reference()))
+
+    def _at_reference(self) -> list[Fraction]:
+        """Return the coefficients of x0 B1 + y0 B2, exactly."""
+        x0, y0 = (Fraction(value) for value in self.reference)
+        return _sum([x0 * c for c in self.b1.exact], [y0 * c for c in self.b2.exact])
 
     @property
     def degree(self) -> int:
@@ -286,7 +308,7 @@ class CharacteristicFunction:
         """Coefficients of the highest power of A in A, B1, B2 and C."""
         a, b1, b2, c = (
             float(p[-1]) if p.size == self.a.size else 0.0
-            for p in (self.a, self.b1, self.b2, self.c)
+            for p in (self.a, self.b1.coefficients, self.b2.coefficients, self.c)
         )
         return a, b1, b2, c
 
@@ -330,8 +352,7 @@ class CharacteristicFunction:
         if self.step:
             return np.ones(np.broadcast_shapes(x.shape, y.shape))
         a, b1, b2, c = (abs(value) for value in self.highest_coefficients)
-        reserve = (a - c - np.abs(x) * b1 - np.abs(y) * b2) / a
-        return np.asarray(np.where(np.abs(reserve) <= 16.0 * EPSILON, 0.0, reserve))
+        return left_of(a, c + np.abs(x) * b1 + np.abs(y) * b2)
 
     @property
     def longest_delay(self) -> float:
@@ -342,15 +363,6 @@ class CharacteristicFunction:
     def omega_per_turn(self) -> float:
         """Change of omega, in rad/s, that is one turn of the longest delay; inf without one."""
         return 2.0 * np.pi / self.longest_delay if self.longest_delay else np.inf
-
-    def __repr__(self) -> str:
-        """Name the class and its arguments, as they are written to make it again."""
-        shown = {
-            name: value.coefficients.tolist() if isinstance(value, Polynomial) else value
-            for name, value in self._arguments.items()
-        }
-        listed = ", ".join(f"{name}={value!r}" for name, value in shown.items())
-        return f"{type(self).__name__}({listed})"
 
     def parts(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """Evaluate the three terms of D, which is the first less x, y times the others.
@@ -371,15 +383,15 @@ class CharacteristicFunction:
             If s does not hold finite numbers.
         """
         s = complex_array("s", s)
-        z = np.exp(s * self.step) if self.step else s
-        dead = np.exp(-s * self.delay)
+        (rest, _), (b1, _), (b2, _) = self._evaluated(s)
+        dead, (x0, y0) = np.exp(-s * self.delay), self.reference
         return (
-            np.asarray(poly.polyval(z, self.a) + poly.polyval(z, self.c) * dead),
-            np.asarray(poly.polyval(z, self.b1) * np.exp(-s * self.tau1) * dead),
-            np.asarray(poly.polyval(z, self.b2) * np.exp(-s * self.tau2) * dead),
+            np.asarray(rest + (x0 * b1 + y0 * b2) * dead),
+            np.asarray(b1 * np.exp(-s * self.tau1) * dead),
+            np.asarray(b2 * np.exp(-s * self.tau2) * dead),
         )
 
-    def __call__(
+    def characteristic(
         self, s: npt.ArrayLike, x: npt.ArrayLike | None = None, y: npt.ArrayLike | None = None
     ) -> ComplexArray:
         """Evaluate D(s; x, y); the three arguments broadcast. Of a loop x and y default to one.
@@ -390,7 +402,12 @@ class CharacteristicFunction:
             If s does not hold finite numbers, x or y is not finite and real, or the three do
             not broadcast.
         """
-        return np.asarray(self.with_slope(*self._checked(s, x, y))[0])
+        s, x, y = self._checked(s, x, y)
+        (rest, _), (b1, _), (b2, _) = self._evaluated(s)
+        x0, y0 = self.reference
+        arms = b1 * ((x0 - x) - x * np.expm1(-s * self.tau1))
+        arms = arms + b2 * ((y0 - y) - y * np.expm1(-s * self.tau2))
+        return np.asarray(rest + np.exp(-s * self.delay) * arms)
 
     def _checked(
         self, s: npt.ArrayLike, x: npt.ArrayLike | None, y: npt.ArrayLike | None
@@ -402,31 +419,10 @@ class CharacteristicFunction:
         broadcast_shape(("s", name1, name2), arrays)
         return arrays
 
-    def arms(self, x: Any, y: Any) -> tuple[tuple[FloatArray, float, Any, Any], ...]:
-        """Return B, the delay, the reference and the parameter of either arm."""
-        x0, y0 = self.reference
-        return (self.b1, self.tau1, x0, x), (self.b2, self.tau2, y0, y)
-
-    def with_slope(self, s: Any, x: Any, y: Any, library: Any = np) -> tuple[Any, Any]:
-        """Evaluate D(s; x, y) and its derivative in s, unchecked.
-
-        The functions are those of numpy, or of mpmath for one number in extended precision.
-        """
-        number = complex if library is np else library.mpc
-        z = library.exp(s * self.step) if self.step else s
-        dz = self.step * z if self.step else 1.0
-        value, slope = 0.0, 0.0
-        for p, (_, tau, origin, here) in zip(
-            self._polynomials[1:], self.arms(x, y), strict=True
-        ):
-            b, db = p.with_slope(z, number)
-            change = library.expm1(-s * tau)
-            arm = (origin - here) - here * change
-            value = value + b * arm
-            slope = slope + (db * dz - self.delay * b) * arm + b * here * tau * (1.0 + change)
-        dead = library.exp(-s * self.delay)
-        rest, own = self._polynomials[0].with_slope(z, number)
-        return rest + dead * value, own * dz + dead * slope
+    def _evaluated(self, s: ComplexArray) -> list[tuple[ComplexArray, ComplexArray]]:
+        """Return R, B1 and B2 at s, and their derivatives by s or, for a map, by z."""
+        z = np.exp(s * self.step) if self.step else s
+        return [p.evaluated(z) for p in self.polynomials()]
 
     def derivative(
         self, s: npt.ArrayLike, x: npt.ArrayLike | None = None, y: npt.ArrayLike | None = None
@@ -444,93 +440,32 @@ class CharacteristicFunction:
         Raises
         ------
         TypeError, ValueError
-            As a call does.
+            As `characteristic` does.
         """
-        return np.asarray(self.with_slope(*self._checked(s, x, y))[1])
-
-    def shifted(self, sigma: float) -> CharacteristicFunction:
-        """Return the function s -> D(s + sigma), whose roots lie `sigma` further left.
-
-        Counting its unstable roots counts the roots of D to the right of Re s = sigma.
-
-        Raises
-        ------
-        TypeError, ValueError
-            If sigma is not finite and real, or so large that exp(sigma delay) is not.
-        """
-        return _Shifted(self, sigma)
-
-    def exchanged(self) -> CharacteristicFunction:
-        """Return the same function with its two free parameters exchanged."""
-        _, b1, b2 = self._polynomials
-        return self.plain().replace(
-            b1=b2,
-            b2=b1,
-            tau1=self.tau2,
-            tau2=self.tau1,
-            parameters=self.parameters[::-1],
-            reference=self.reference[::-1],
-        )
+        s, x, y = self._checked(s, x, y)
+        dz = self.step * np.exp(s * self.step) if self.step else 1.0
+        (_, dr), *evaluated = self._evaluated(s)
+        arms = np.zeros_like(dr)
+        pairs = zip((x, y), self.reference, (self.tau1, self.tau2), strict=True)
+        for (b, db), (here, origin, tau) in zip(evaluated, pairs, strict=True):
+            change = np.expm1(-s * tau)
+            arms = arms + (db * dz - self.delay * b) * ((origin - here) - here * change)
+            arms = arms + b * here * tau * (1.0 + change)
+        return np.asarray(dr * dz + np.exp(-s * self.delay) * arms)
 
     def polynomials(self) -> tuple[Polynomial, ...]:
         """Return R, B1 and B2 with their roots."""
-        return self._polynomials
+        return self.rest, self.b1, self.b2
 
-    @cached_property
-    def roots_of_a(self) -> ComplexArray:
-        """Roots of A: they enter a count through the argument of A, past the last frequency.
 
-        With a dead time A is R, whose roots are known.
-        """
-        return self._polynomials[0].roots if self.delay else Polynomial.of(self.a).roots
+def left_of(whole: float, others: npt.ArrayLike) -> FloatArray:
+    """Share of a positive number that others leave of it, zero where rounding hides its sign.
 
-    def _delayed(self, k: int, lag: float, weight: float = 1.0) -> ExponentialSum:
-        """Return `weight` times R, B1 or B2, delayed by a time, at s = j omega.
-
-        For a map each power of z is an exponential, its polynomial is 1. Each coefficient keeps
-        a polynomial of its own, so that its rounding is not forgotten.
-        """
-        factors, polynomials = [np.ones(1)] * 3, self._polynomials
-        if self.step:
-            factors = [p.coefficients for p in self._polynomials]
-            number = sum(p.size for p in factors)
-            polynomials = (Polynomial(np.ones(1), np.zeros(0, dtype=np.complex128)),) * number
-        ends = np.cumsum([p.size for p in factors])
-        place = np.split(np.eye(len(polynomials)), ends[:-1])[k]
-        p = weight * factors[k]
-        phases = np.asarray(self.step * np.arange(p.size) - lag, dtype=np.float64)
-        return ExponentialSum(polynomials, p[:, None] * place, phases, p @ place)
-
-    def on_boundary(self) -> tuple[ExponentialSum, ExponentialSum, ExponentialSum]:
-        """Return the three terms of `parts` at s = j omega as exponential sums."""
-        x0, y0 = self.reference
-        undelayed = self.rest_on_boundary().plus(self._delayed(1, self.delay, x0))
-        return (
-            undelayed.plus(self._delayed(2, self.delay, y0)),
-            self._delayed(1, self.delay + self.tau1),
-            self._delayed(2, self.delay + self.tau2),
-        )
-
-    def sum_at(self, x: float, y: float) -> ExponentialSum:
-        """Return D(j omega; x, y) at one point as an exponential sum."""
-        x0, y0 = self.reference
-        constant, b1, b2 = self.on_boundary()
-        combined = constant.plus(b1.scaled(-x)).plus(b2.scaled(-y))
-        # What is left where all exponentials are one, without the digits lost by cancelling.
-        left = self.rest_on_boundary().sums + (x0 - x) * b1.sums + (y0 - y) * b2.sums
-        return combined._replace(sums=left)
-
-    def deviation(self, x: float, y: float) -> ExponentialSum:
-        """Return x B1 exp(-s (delay + tau1)) + y B2 exp(-s (delay + tau2)) at s = j omega.
-
-        That is what D subtracts from its first term.
-        """
-        _, b1, b2 = self.on_boundary()
-        return b1.scaled(x).plus(b2.scaled(y))
-
-    def rest_on_boundary(self) -> ExponentialSum:
-        """Return R at s = j omega as an exponential sum."""
-        return self._delayed(0, 0.0)
+    Of highest coefficients, and sums of such times parameters: a few products and sums, each of
+    which rounds by half an EPSILON, and the coefficients, which are products of a few numbers.
+    """
+    left = (whole - np.asarray(others, dtype=float)) / whole
+    return np.asarray(np.where(np.abs(left) <= 16.0 * EPSILON, 0.0, left))
 
 
 def checked_system(system: CharacteristicFunction) -> CharacteristicFunction:
@@ -543,20 +478,27 @@ def checked_system(system: CharacteristicFunction) -> CharacteristicFunction:
 
 
 def broadcast_parameters(
-    system: CharacteristicFunction, x: npt.ArrayLike | None, y: npt.ArrayLike | None
+    system: CharacteristicFunction,
+    x: npt.ArrayLike | Fraction | None,
+    y: npt.ArrayLike | Fraction | None,
 ) -> tuple[FloatArray, FloatArray]:
     """Return the two free parameters of a system as finite real arrays of one shape.
 
-    Those of a loop, c1 and c2, are one where they are not given. Others have to be given.
+    Those of a loop, c1 and c2, are one where they are not given. Others have to be given. A
+    Fraction stays one, in an array of a single point.
     """
     x, y = given_or_one(checked_system(system), x, y)
     name1, name2 = system.parameters
+    if isinstance(x, Fraction) or isinstance(y, Fraction):
+        pair = [
+            value if isinstance(value, Fraction) else real_number(name, value)
+            for name, value in zip(system.parameters, (x, y), strict=True)
+        ]
+        return np.array(pair[0], dtype=object), np.array(pair[1], dtype=object)
     return broadcast_pair(name1, x, name2, y)
 
 
-def given_or_one(
-    system: CharacteristicFunction, x: npt.ArrayLike | None, y: npt.ArrayLike | None
-) -> tuple[npt.ArrayLike, npt.ArrayLike]:
+def given_or_one(system: CharacteristicFunction, x: Any, y: Any) -> tuple[Any, Any]:
     """Return both parameters, one for a perturbation that is not given; raise for others."""
     given = []
     for name, value in zip(system.parameters, (x, y), strict=True):
@@ -568,95 +510,20 @@ def given_or_one(
     return given[0], given[1]
 
 
-class _Shifted(CharacteristicFunction):
-    """The function s -> D(s + sigma), see `CharacteristicFunction.shifted`."""
-
-    origin: CharacteristicFunction
-    sigma: float
-
-    def __init__(self, origin: CharacteristicFunction, sigma: float) -> None:
-        sigma = real_number("sigma", sigma)
-        reach = abs(sigma) * max(origin.longest_delay, origin.step * origin.degree)
-        if reach > _LARGEST_EXPONENT:
-            raise ValueError(
-                f"sigma must be at most {_LARGEST_EXPONENT:.0f} over the longest delay in "
-                f"magnitude, got {sigma}: its exponential is no float"
-            )
-
-        def moved(p: Polynomial, lag: float) -> Polynomial:
-            late = np.exp(-sigma * lag)
-            if origin.step:
-                powers = np.exp(sigma * origin.step * np.arange(p.coefficients.size))
-                return _with_moved(origin, sigma, late * powers * p.coefficients, p.roots)
-            return _with_moved(origin, sigma, late * _taylor(p.coefficients, sigma), p.roots)
-
-        (x0, y0), (rest, b1, b2) = origin.reference, origin.polynomials()
-        super().__init__(
-            moved(rest, 0.0),
-            moved(b1, origin.delay + origin.tau1),
-            moved(b2, origin.delay + origin.tau2),
-            origin.tau1,
-            origin.tau2,
-            delay=origin.delay,
-            step=origin.step,
-            parameters=origin.parameters,
-            # It moves along, so that nothing has to cancel in `rest`.
-            reference=(x0 * np.exp(sigma * origin.tau1), y0 * np.exp(sigma * origin.tau2)),
-        )
-        self.made_from(origin=origin, sigma=sigma)
-
-    @cached_property
-    def roots_of_a(self) -> ComplexArray:
-        """Those of the origin, moved: to find them in extended precision takes a second."""
-        if self.delay:
-            return super().roots_of_a
-        return _with_moved(self.origin, self.sigma, self.a, self.origin.roots_of_a).roots
-
-
-def _taylor(coefficients: FloatArray, sigma: float) -> FloatArray:
-    """Return the coefficients of p(s + sigma) in powers of s."""
-    # Where D is evaluated from these: exactly, because powers of sigma may cancel.
-    number = Fraction if coefficients.size <= LOW_DEGREE + 1 else float
-    moved: list[Any] = []
-    for value in reversed(coefficients.tolist()):
-        # Horner's rule, with s + sigma in place of s.
-        left = [number(sigma) * c for c in moved]
-        moved = [a + b for a, b in zip([number(value), *moved], [*left, 0], strict=True)]
-    return np.array(moved, dtype=np.float64)
-
-
-def _with_moved(
-    origin: CharacteristicFunction, sigma: float, coefficients: FloatArray, roots: ComplexArray
-) -> Polynomial:
-    """Return a shifted polynomial from its coefficients, and its roots before the shift."""
-    if origin.step:
-        return Polynomial(coefficients, roots * np.exp(-sigma * origin.step))
-    if coefficients.size > LOW_DEGREE + 1:
-        return Polynomial(coefficients, roots - sigma)
-    return Polynomial.of(coefficients, roots - sigma)
-
-
 def _polynomial(name: str, given: Sequence[float] | FloatArray | Polynomial) -> Polynomial:
-    """Return a polynomial with trimmed, read-only coefficients, and its roots."""
-    if isinstance(given, Polynomial):
-        coefficients = _trimmed(name, given.coefficients)
-        return _sealed(given._replace(coefficients=coefficients, roots=given.roots.copy()))
-    return _sealed(Polynomial.of(_trimmed(name, given)))
+    """Return a polynomial with trimmed coefficients, and its roots."""
+    return given if isinstance(given, Polynomial) else Polynomial.of(axis(name, given).tolist())
 
 
-def _sealed(p: Polynomial) -> Polynomial:
-    """Make the arrays of a polynomial read-only."""
-    for array in (p.coefficients, p.roots):
-        array.setflags(write=False)
-    return p
+def _sum(p: Sequence[Fraction], q: Sequence[Fraction]) -> list[Fraction]:
+    """Add two polynomials in ascending powers."""
+    return [a + b for a, b in zip_longest(p, q, fillvalue=Fraction(0))]
 
 
-def _trimmed(name: str, coefficients: Sequence[float] | FloatArray) -> FloatArray:
-    """Return trimmed, read-only coefficients with at least one entry."""
-    values = axis(name, coefficients)
-    trimmed = np.array(poly.polytrim(values, tol=0.0), dtype=np.float64)
-    trimmed.setflags(write=False)
-    return trimmed
+def _trimmed(coefficients: Sequence[Fraction]) -> FloatArray:
+    """Return coefficients without zeros in front of the highest power, rounded."""
+    size = max((k + 1 for k, value in enumerate(coefficients) if value), default=1)
+    return rounded([*coefficients, Fraction(0)][:size])
 
 
 def _not_negative(name: str, value: float) -> float:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import inspect
 import math
 import os
+import sys
 from collections.abc import Collection
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +23,36 @@ _REAL = "iuf"
 _MEMORY_SHARE = 0.5
 # How far a delay may be from a whole number of steps: as a share of the delay, and of a step.
 _OFF_A_DELAY, _OFF_A_STEP = 1e-9, 1e-3
+
+
+class WithDelays:
+    """A system that functions of python-control refuse with advice: theirs have no delays.
+
+    Each of them asks for an attribute, or asks `isinstance`, which asks for `__class__`.
+    """
+
+    _instead: ClassVar[str]
+    #: Functions and operators of python-control that take such a system all the same.
+    _taken_by: ClassVar[tuple[str, ...]] = ()
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """Say what to write in place of an attribute that is missing."""
+            raise AttributeError(
+                f"{type(self).__name__!r} object has no attribute {name!r}: {self._instead}",
+                name=name,
+                obj=self,
+            )
+
+        @property
+        def __class__(self) -> type:
+            """Return the class, or say what to write in place of a call of python-control."""
+            caller = sys._getframe(1)
+            module = caller.f_globals.get("__name__", "")
+            if module.startswith("control.") and caller.f_code.co_name not in self._taken_by:
+                raise TypeError(f"python-control's systems have no delays: {self._instead}")
+            return type(self)
 
 
 def real_number(name: str, value: object) -> float:
@@ -43,7 +74,7 @@ def positive_number(name: str, value: object) -> float:
 def whole_number(name: str, value: object, lowest: int) -> int:
     """Return a Python or NumPy integer that is no smaller than a bound, or raise."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < lowest:
-        raise ValueError(f"{name} must be an integer from {lowest} on, got {value!r}")
+        raise ValueError(f"{name} must be an integer of at least {lowest}, got {value!r}")
     return int(value)
 
 
@@ -63,7 +94,7 @@ def one_of(name: str, value: object, allowed: Collection[str]) -> str:
 
 
 def whole_steps(name: str, delay: float, step: float) -> int:
-    """Return delay / step, or raise if it is not a whole number but for rounding."""
+    """Return delay / step, or raise if it is not a whole number (apart from rounding)."""
     steps = delay / step
     allowed = min(_OFF_A_DELAY * steps, _OFF_A_STEP)
     if not steps < 1e15 or abs(steps - round(steps)) > allowed:
@@ -140,6 +171,7 @@ def broadcast_pair(
     """Return two finite real arrays of one shape, or name both shapes and raise."""
     first, second = real_array(name1, value1), real_array(name2, value2)
     shape = broadcast_shape((name1, name2), (first, second))
+    check_memory(f"{name1} and {name2}", shape, 64)
     # Copies, because broadcast views are not to be written to.
     return np.broadcast_to(first, shape).copy(), np.broadcast_to(second, shape).copy()
 

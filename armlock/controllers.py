@@ -18,7 +18,6 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
 from armlock import paper
-from armlock.axis.exponentials import quotients
 from armlock.checks import (
     ComplexArray,
     FloatArray,
@@ -28,6 +27,7 @@ from armlock.checks import (
     real_number,
     whole_number,
 )
+from armlock.engine.polynomials import quotients
 
 if TYPE_CHECKING:
     import control
@@ -115,20 +115,7 @@ class Controller:
             return cls(*controller)
         import control
 
-        if not isinstance(controller, control.TransferFunction | control.StateSpace):
-            raise TypeError(
-                "controller must be a Controller, a transfer function or state space of "
-                f"python-control or a triple (zeros, poles, gain), got {controller!r:.200}"
-            )
-        if not controller.issiso():
-            raise ValueError(
-                "controller must have one input and one output, got "
-                f"{controller.ninputs} and {controller.noutputs}"
-            )
-        if controller.isdtime(strict=True):
-            raise ValueError(
-                f"controller must be continuous in time, got sampling time {controller.dt}"
-            )
+        check_system("controller", controller, "a Controller, a triple (zeros, poles, gain)")
         if isinstance(controller, control.StateSpace):
             zeros, poles, gain = _factored(controller)
             return cls(zeros.tolist(), poles.tolist(), gain)
@@ -148,8 +135,7 @@ class Controller:
 
     def __call__(self, s: npt.ArrayLike) -> ComplexArray:
         """Evaluate K(s), factor by factor; `s` in rad/s, any shape."""
-        zeros, poles = np.array(self.zeros, dtype=complex), np.array(self.poles, dtype=complex)
-        return quotients(zeros, poles, self.gain, complex_array("s", s))
+        return quotients(self.zeros, self.poles, self.gain, complex_array("s", s))
 
     def __mul__(self, other: Controller) -> Controller:
         """Return the two in series."""
@@ -182,6 +168,27 @@ class Controller:
             return Controller([complex(z) for z in zeros], poles, float(coefficients[-1]))
 
 
+def check_system(name: str, system: Any, others: str) -> None:
+    """Raise if this is no system of python-control in continuous time, with one channel."""
+    import control
+
+    if not isinstance(system, control.TransferFunction | control.StateSpace):
+        raise TypeError(
+            f"{name} must be {others}, or a transfer function or state space of "
+            f"python-control, got {system!r:.200}"
+        )
+    if not system.issiso():
+        raise ValueError(
+            f"{name} must have one input and one output, got {system.ninputs} and "
+            f"{system.noutputs}"
+        )
+    if system.isdtime(strict=True):
+        raise ValueError(
+            f"{name} must be continuous in time, got sampling time {system.dt}: give the one "
+            "that was sampled"
+        )
+
+
 def _factored(system: control.StateSpace) -> tuple[ComplexArray, ComplexArray, float]:
     """Return zeros, poles and gain of a state space, which give its response back.
 
@@ -202,7 +209,7 @@ def _factored(system: control.StateSpace) -> tuple[ComplexArray, ComplexArray, f
     # What rounding left of a zero at s = 0 is none of the places to look at.
     sizes = sizes[sizes > 1e-12 * sizes.max()] if sizes.any() else np.ones(1)
     s = np.geomspace(0.1 * sizes.min(), 10.0 * sizes.max(), 40) * np.exp(0.7j)
-    given, found = system(s), quotients(zeros + 0j, poles + 0j, gain, s)
+    given, found = system(s), quotients(zeros.tolist(), poles.tolist(), gain, s)
     if not (np.abs(found - given) <= 1e-6 * np.abs(given)).all():
         raise ValueError(
             "controller must be a state space whose zeros and poles are found to a part in a "
@@ -386,7 +393,7 @@ def roll_off(first: float, last: float, pairs: int, slope: float = 2.0 / 3.0) ->
     ------
     TypeError, ValueError
         If `first` or the slope is not positive, `last` is not above `first`, the slope is not
-        below one, or `pairs` is no whole number from one on.
+        below one, or `pairs` is not a positive whole number.
 
     Examples
     --------

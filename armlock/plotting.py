@@ -1,7 +1,7 @@
 """How results are drawn: the book's style, charts, D-curves and Nyquist curves.
 
-Results draw themselves, `chart.plot()` and `nyquist(...).plot()`, by the functions here. They
-import this module when they are first drawn, and nothing here imports them.
+Results draw themselves, as `chart.plot()` does, by the functions here, and import this module
+when they are first drawn. python-control draws `loop.frd(omega)`.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from matplotlib.colors import ListedColormap
 from matplotlib.projections.polar import PolarAxes
 from scipy import ndimage
 
-from armlock.checks import ComplexArray, FloatArray
+from armlock.checks import ComplexArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
-    from armlock.stability.counts import StabilityChart
+    from armlock.stability.charts import StabilityChart
     from armlock.stability.dcurve import Branch, Line
     from armlock.stability.nyquist import NyquistCurve
 
@@ -39,7 +39,7 @@ INFINITY, LINEAR = 1e6, 0.01
 
 
 def use_style() -> None:
-    """Use the book's matplotlib style from here on."""
+    """Use the book's style for all matplotlib figures that follow."""
     plt.style.use(Path(__file__).with_name("armlock.mplstyle"))
 
 
@@ -53,13 +53,15 @@ def plot_chart(
     counts: bool = True,
     largest: int = 12,
     labels: bool = False,
+    **style: Any,
 ) -> Axes:
     """Colour a chart by its number of unstable roots, the stable region apart.
 
     Parameters
     ----------
     chart : StabilityChart
-        Points with a root on the boundary stay white.
+        Points with a root on the boundary stay white. An axis whose values have equal ratios,
+        as those of `numpy.geomspace`, is drawn logarithmic.
     ax : Axes, optional
         Where to draw; matplotlib's current axes by default.
     counts : bool, optional
@@ -68,6 +70,8 @@ def plot_chart(
         Counts above this share one colour.
     labels : bool, optional
         Write the count into each region that has room for it.
+    **style
+        As `matplotlib.axes.Axes.pcolormesh` takes it, for instance `cmap`.
 
     Returns
     -------
@@ -87,27 +91,58 @@ def plot_chart(
     >>> ax.texts[0].get_text()
     '0'
     """
-    ax = plt.gca() if ax is None else ax
-    shown = chart.counts >= 0 if counts else chart.stable
-    unstable = plt.get_cmap("Oranges")(np.linspace(0.08, 0.75, largest))
-    ax.pcolorfast(
-        _edges("chart.x", chart.x),
-        _edges("chart.y", chart.y),
-        np.where(shown, np.minimum(chart.counts, largest), np.nan),
-        cmap=ListedColormap([STABLE, *unstable]),
-        vmin=0.0,
-        vmax=largest,
-    )
-    label_parameters(ax, chart.system.parameters)
+    shown = chart.counts if counts else np.where(chart.stable, 0, -1)
+    ax = plot_counts(chart.x, chart.y, shown, chart.system.parameters, ax, largest, **style)
     if labels:
         _label_regions(ax, chart)
     return ax
+
+
+def plot_counts(
+    x: FloatArray,
+    y: FloatArray,
+    counts: IntArray,
+    parameters: tuple[str, str],
+    ax: Axes | None = None,
+    largest: int = 12,
+    **style: Any,
+) -> Axes:
+    """Colour counts over a grid as `plot_chart` does; those below zero stay white."""
+    ax = plt.gca() if ax is None else ax
+    unstable = plt.get_cmap("Oranges")(np.linspace(0.08, 0.75, largest))
+    style = {"cmap": ListedColormap([STABLE, *unstable]), "vmin": 0, "vmax": largest, **style}
+    shown = np.where(counts >= 0, np.minimum(counts, largest), np.nan)
+    across, up = _edges("chart.x", x), _edges("chart.y", y)
+    if _even(x) and _even(y):
+        ax.pcolorfast(across, up, shown, **style)
+    else:
+        # An image of uneven cells is drawn wrongly where an axis is logarithmic.
+        ax.pcolormesh(across, up, shown, rasterized=True, **style)
+    if _geometric(x):
+        ax.set_xscale("log")
+    if _geometric(y):
+        ax.set_yscale("log")
+    label_parameters(ax, parameters)
+    return ax
+
+
+def _even(values: FloatArray) -> bool:
+    """Whether points have equal distances, to a hundredth."""
+    steps = np.diff(values)
+    return bool(np.ptp(steps) < 0.01 * abs(steps.mean()))
+
+
+def _geometric(values: FloatArray) -> bool:
+    """Whether points are positive, with equal ratios, and no equal distances."""
+    return bool((values > 0.0).all()) and not _even(values) and _even(np.log(values))
 
 
 def _edges(name: str, axis: FloatArray) -> FloatArray:
     """Return the edges of cells around the points of an axis."""
     if axis.size == 1:
         raise ValueError(f"{name} must hold at least two values to be drawn, got {axis}")
+    if _geometric(axis):
+        return np.exp(_edges(name, np.log(axis)))
     inner = 0.5 * (axis[1:] + axis[:-1])
     return np.concatenate(([2.0 * axis[0] - inner[0]], inner, [2.0 * axis[-1] - inner[-1]]))
 
@@ -117,6 +152,8 @@ def _label_regions(ax: Axes, chart: StabilityChart) -> None:
     room = _ROOM * min(chart.counts.shape)
     for count in np.unique(chart.counts[chart.counts >= 0]):
         depth = ndimage.distance_transform_edt(np.pad(chart.counts == count, 1))
+        if depth.max() < room:
+            continue
         regions, number = ndimage.label(depth)
         for row, column in ndimage.maximum_position(depth, regions, range(1, number + 1)):
             if depth[row, column] >= room:
@@ -126,11 +163,18 @@ def _label_regions(ax: Axes, chart: StabilityChart) -> None:
 
 
 def label_parameters(ax: Axes, parameters: tuple[str, str]) -> None:
-    """Label both axes with the names of the free parameters, digits as subscripts."""
-    x, y = (re.sub(r"(\d+)$", r"_{\1}", name) for name in parameters)
-    # The perturbations of a loop are numbers; of other parameters the unit is not known here.
-    unit = " [1]" if parameters == ("c1", "c2") else ""
-    ax.set(xlabel=f"${x}${unit}", ylabel=f"${y}${unit}")
+    """Label both axes with the names of two parameters, of one letter as symbols."""
+    x, y = map(_written, parameters)
+    ax.set(xlabel=x, ylabel=y)
+
+
+def _written(name: str) -> str:
+    """Return a name as it is shown: one letter as a symbol, with digits as its subscript."""
+    symbol = re.fullmatch(r"([^\W\d_])(\d*)", name)
+    if symbol is None:
+        return name.replace("_", " ")
+    letter, digits = symbol.groups()
+    return f"${letter}_{{{digits}}}$" if digits else f"${letter}$"
 
 
 def plot_branches(branches: Sequence[Branch], ax: Axes | None = None, **style: Any) -> Axes:
@@ -167,9 +211,7 @@ def plot_nyquist(
     ax: Axes | None = None,
     *,
     arrows: Iterable[float] = (),
-    omega_max: float = np.inf,
-    color: str = BLUE,
-    label: str | None = None,
+    **style: Any,
 ) -> Axes:
     """Draw a Nyquist curve, both signs of omega, with -1 and the infinite branch.
 
@@ -178,19 +220,15 @@ def plot_nyquist(
     curve : NyquistCurve
         From `nyquist` with `omega_max`, so that its samples are close.
     ax : Axes, optional
-        Where to draw; matplotlib's current axes by default, or new polar ones. Polar axes show
-        every direction as it is and compress the distance from the origin, which is linear up
-        to 0.01 and logarithmic beyond, as far as the circle that stands for infinity. Other
-        axes show the plain complex plane, without the infinite branch.
+        Where to draw. By default, the current axes of matplotlib, or new axes that show the
+        neighbourhood of -1. Plain axes do not show the infinite branch. Polar axes show the
+        whole curve: the angle is that of L, and the distance from the origin is linear up to
+        0.01 and logarithmic beyond, up to a circle that stands for infinity.
     arrows : iterable of float, optional
         Frequencies in rad/s at which an arrow points in the direction of rising omega; past
         the end of the curve it stands there.
-    omega_max : float, optional
-        Frequency in rad/s up to which the curve is drawn.
-    color : str, optional
-        Of the curve.
-    label : str, optional
-        Name of the curve in a legend; by default its two halves are named by the sign of omega.
+    **style
+        As `matplotlib.axes.Axes.plot` takes it.
 
     Returns
     -------
@@ -202,23 +240,24 @@ def plot_nyquist(
     >>> from armlock import SingleArm, nyquist
     >>> ax = nyquist(SingleArm(), omega_max=1.0).plot(plt.figure().subplots())
     >>> ax.get_xlabel()
-    'Re $L$ [1]'
+    'real part of $L$'
     """
     if ax is None:
-        ax = plt.gca() if plt.gcf().axes else plt.subplot(projection="polar")
+        ax = plt.gca()
+        if not ax.has_data():
+            ax.set(xlim=(-3.0, 3.0), ylim=(-3.0, 3.0), aspect="equal")
     compressed = isinstance(ax, PolarAxes)
-    drawn = curve.omega <= omega_max
-    forward, omega = curve.response[drawn], curve.omega[drawn]
+    forward, omega = curve.response, curve.omega
     if compressed and curve.indentation.size:
         # On to the infinite branch, in the direction in which the curve leaves for it.
         far = INFINITY * forward[:1] / np.abs(forward[:1])
         forward, omega = np.append(far, forward), np.append(0.0, omega)
-    positive, negative = (r"$\omega > 0$", r"$\omega < 0$") if label is None else (label, "_")
-    for half, width, name in ((forward, 1.5, positive), (forward.conj(), 0.7, negative)):
-        ax.plot(*_coordinates(ax, half), "-", color=color, linewidth=width, label=name)
+    for half, width, sign in ((forward, 1.5, ">"), (forward.conj(), 0.7, "<")):
+        shown = {"color": BLUE, "linewidth": width, "label": rf"$\omega {sign} 0$", **style}
+        ax.plot(*_coordinates(ax, half), **shown)
     for frequency in arrows:
         index = min(int(np.searchsorted(omega, frequency)), omega.size - 2)
-        _arrow(ax, forward[index : index + 2], color)
+        _arrow(ax, forward[index : index + 2], BLUE)
     minus_one = _coordinates(ax, np.array([-1.0 + 0.0j]))
     ax.plot(*minus_one, "+", color="black", markersize=10, markeredgewidth=1.8, zorder=5)
     if isinstance(ax, PolarAxes):
@@ -234,7 +273,7 @@ def plot_nyquist(
     else:
         ax.axhline(0.0, color="black", linewidth=0.6)
         ax.axvline(0.0, color="black", linewidth=0.6)
-        ax.set(xlabel="Re $L$ [1]", ylabel="Im $L$ [1]")
+        ax.set(xlabel="real part of $L$", ylabel="imaginary part of $L$")
     return ax
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -96,7 +97,7 @@ SINGLE = SignalMapping((1.0,), (0.0,), (1.0,), "single")
 #:
 #:     P_+(s) = 2 - c_1 e^{-s\tau_1} - c_2 e^{-s\tau_2}
 COMMON = SignalMapping((1.0,), (1.0,), (1.0,), "common")
-#: Arm 2 minus arm 1, so that arm 1 is the longer one where the response is P_- of Table I.
+#: Arm 2 minus arm 1. Arm 1 is the longer one where the response is :math:`P_-` of Table I.
 #:
 #: .. math::
 #:
@@ -153,7 +154,8 @@ def modified_dual(
         F_C &= \frac{p_b}{z_b\, \bar\tau}\, \frac{s + z_b}{s\, (s + p_b)} , \quad
         F_D = \frac{s^4}{(s + p_c)(s + p_d)(s + p_e)^2}
 
-    with :math:`z_b = 2\pi \cdot 5 / (13 \bar\tau)`,
+    with the mean delay :math:`\bar\tau`, half the delays' difference :math:`\Delta\tau`,
+    :math:`z_b = 2\pi \cdot 5 / (13 \bar\tau)`,
     :math:`p_b = 2\pi \cdot 5 / (2 \bar\tau)`, :math:`p_c = 7 / (5 \bar\tau)`,
     :math:`p_d = 11 / (20 \bar\tau)` and :math:`p_e = 2\pi / (90 \bar\tau)`.
 
@@ -189,7 +191,12 @@ def modified_dual(
         raise ValueError(
             "half_difference must not be zero: the modified dual sensor divides by it"
         )
-    w0 = positive_number("corner", corner)
+    return _modified_dual(mean, half, positive_number("corner", corner))
+
+
+@lru_cache
+def _modified_dual(mean: float, half: float, w0: float) -> SignalMapping:
+    """Multiply the sensor's polynomials out: loops of one sensor are made by the thousand."""
     zb, pb = 2.0 * np.pi * 5.0 / (13.0 * mean), 2.0 * np.pi * 5.0 / (2.0 * mean)
     pc, pd, pe = 7.0 / (5.0 * mean), 11.0 / (20.0 * mean), 2.0 * np.pi / (90.0 * mean)
     s = poly.Polynomial([0.0, 1.0])

@@ -1,4 +1,4 @@
-"""Other tools on the same twenty loops: how many they count rightly, and how long it takes.
+"""Other tools on twenty loops of two arms, and twenty of more delays: right counts and times.
 
 tdcpy and tdscontrol are no dependency of this package; what is not installed is left out.
 """
@@ -6,77 +6,121 @@ tdcpy and tdscontrol are no dependency of this package; what is not installed is
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from importlib.metadata import version
-from pathlib import Path
+from importlib.util import find_spec
 from typing import Any
 
 import control
 import numpy as np
 
-from armlock import CommonArm, DualArm, Loop, transition_matrix, unstable_roots
-from armlock.checks import FloatArray
+from armlock import CommonArm, DualArm, Loop, delay, transition_matrix, unstable_roots
+from armlock.checks import ComplexArray, FloatArray
 from armlock.stability.semidiscretization import realize
-from benchmarks.report import Row, Topic, timed
+from benchmarks.measure import timed
+from benchmarks.report import Row, Topic
 
 SEED = 28
 Point = tuple[Loop, float, float]
 
 
-def twenty_loops() -> list[Point]:
+@dataclass(frozen=True)
+class Case:
+    """A loop as x'(t) = sum_k A_k x(t - h_k), in which x_1 alone is delayed."""
+
+    count: Callable[[], Any]
+    characteristic: Callable[[ComplexArray], ComplexArray]
+    matrices: list[FloatArray]
+    delays: list[float]
+    point: Point | None = None
+
+
+def two_arms() -> list[Case]:
     """Draw ten common and ten dual arms, with points of the plane around them."""
     rng = np.random.default_rng(SEED)
-    points: list[Point] = []
+    cases = []
     for _ in range(10):
         gain = float(10.0 ** rng.uniform(-1.0, 0.5))
-        common, dual = CommonArm(gain=gain), DualArm(gain=gain)
-        c1, c2, d1, d2 = rng.uniform(-2.5, 2.5, 4)
-        points += [(common, float(c1), float(c2)), (dual, float(0.4 * d1), float(0.4 * d2))]
-    return points
+        c = rng.uniform(-2.5, 2.5, 4) * (1.0, 1.0, 0.4, 0.4)
+        for loop, c1, c2 in ((CommonArm(gain=gain), *c[:2]), (DualArm(gain=gain), *c[2:])):
+            state, delayed = realize(loop, c1, c2)
+            cases.append(
+                Case(
+                    partial(unstable_roots, loop, c1, c2),
+                    partial(loop.characteristic, x=c1, y=c2),
+                    [state, *(_first_column(term.column) for term in delayed)],
+                    [0.0, *(term.delay for term in delayed)],
+                    (loop, c1, c2),
+                )
+            )
+    return cases
 
 
-def delay_equation(point: Point) -> tuple[list[FloatArray], list[float]]:
-    """Return the matrices of x'(t) = sum_k A_k x(t - h_k), and the h_k."""
-    state, delayed = realize(*point)
-    matrices, delays = [state], [0.0]
-    for term in delayed:
-        matrix = np.zeros_like(state)
-        matrix[:, 0] = term.column
-        matrices.append(matrix)
-        delays.append(term.delay)
-    return matrices, delays
+def many_delays() -> list[Case]:
+    """Draw twenty loops sum_k b_k exp(-s theta_k) / q with three to six delays."""
+    rng = np.random.default_rng(SEED)
+    cases = []
+    for _ in range(20):
+        order, number = int(rng.integers(2, 5)), int(rng.integers(3, 7))
+        q: FloatArray = np.poly(-(10.0 ** rng.uniform(-1.0, 0.5, order))).astype(float)
+        theta = 10.0 ** rng.uniform(np.log10(0.3), np.log10(20.0), number)
+        b = rng.normal(size=(number, order)) * q[1:] * 10.0 ** rng.uniform(-0.5, 2.0) / number
+        cases.append(
+            Case(
+                partial(_count, q, theta, b),
+                partial(_characteristic, q, theta, b),
+                [np.eye(order, k=1) - _first_column(q[1:]), *(-_first_column(p) for p in b)],
+                [0.0, *theta.tolist()],
+            )
+        )
+    return cases
 
 
-def by_tdcpy(point: Point) -> int:
+def _count(q: FloatArray, theta: FloatArray, b: FloatArray) -> Any:
+    terms = zip(theta, b, strict=True)
+    return unstable_roots(sum(control.tf(p, q) * delay(h) for h, p in terms))
+
+
+def _characteristic(q: FloatArray, theta: FloatArray, b: FloatArray, s: Any) -> Any:
+    terms = zip(theta, b, strict=True)
+    return np.polyval(q, s) + sum(np.polyval(p, s) * np.exp(-s * h) for h, p in terms)
+
+
+def _first_column(column: FloatArray) -> FloatArray:
+    """Return a matrix whose first column is this one."""
+    return np.outer(column, np.eye(1, column.size))
+
+
+def by_tdcpy(case: Case) -> int:
     """Count by tdcpy; its largest eigenvalue problem may have 2 000 rows in place of 600.
 
     What its own Newton's method has not brought to a root is left out.
     """
     tdcpy: Any = import_module("tdcpy")
-    matrices, delays = delay_equation(point)
-    system = tdcpy.RDDE(np.stack(matrices, axis=2), np.array(delays))
+    system = tdcpy.RDDE(np.stack(case.matrices, axis=2), np.array(case.delays))
     found, _ = tdcpy.roots(system, 0.0, max_size_evp=2000)
-    return int((np.abs(point[0](found, *point[1:])) < 1e-6).sum())
+    return int((np.abs(case.characteristic(found)) < 1e-6).sum())
 
 
-def by_tdscontrol(point: Point) -> int:
+def by_tdscontrol(case: Case) -> int:
     """Count by tdscontrol."""
     tdscontrol: Any = import_module("tdscontrol")
-    matrices, delays = delay_equation(point)
-    system = tdscontrol.tds([np.asfortranarray(m) for m in matrices], delays)
+    system = tdscontrol.tds([np.asfortranarray(m) for m in case.matrices], case.delays)
     return len(tdscontrol.roots(system, 0.0))
 
 
-def by_pade(order: int) -> Callable[[Point], int]:
+def by_pade(order: int) -> Callable[[Case], int]:
     """Count the poles of a loop whose delays are Padé approximants, by python-control."""
 
-    def count(point: Point) -> int:
-        (state, *others), (_, *delays) = delay_equation(point)
+    def count(case: Case) -> int:
+        state, *others = case.matrices
         size = len(state)
         plant = control.ss(state, np.eye(size), np.eye(size), np.zeros((size, size)))
         feedback: Any = control.ss([], [], [], np.zeros((size, size)))
-        for matrix, delay in zip(others, delays, strict=True):
-            lag = control.tf2ss(control.tf(*control.pade(delay, order)))
+        for matrix, theta in zip(others, case.delays[1:], strict=True):
+            lag = control.tf2ss(control.tf(*control.pade(theta, order)))
             first = np.eye(1, size)
             column = control.ss([], [], [], matrix[:, :1])
             feedback += column * lag * control.ss([], [], [], first)
@@ -86,59 +130,63 @@ def by_pade(order: int) -> Callable[[Point], int]:
     return count
 
 
-def by_map(point: Point) -> int:
+def without_delays(case: Case) -> int:
+    """Count eigenvalues as if there were no delays."""
+    return int((np.linalg.eigvals(np.sum(case.matrices, axis=0)).real > 0.0).sum())
+
+
+def by_map(case: Case) -> int:
     """Count eigenvalues outside the unit circle of the semi-discretized map, step 0.1 s."""
-    loop, c1, c2 = point
-    return int((np.abs(np.linalg.eigvals(transition_matrix(loop, c1, c2, 0.1))) > 1.0).sum())
+    assert case.point is not None
+    return int((np.abs(np.linalg.eigvals(transition_matrix(*case.point, 0.1))) > 1.0).sum())
 
 
-def by_grid(samples: int) -> Callable[[Point], int]:
+def by_grid(samples: int) -> Callable[[Case], int]:
     """Count by the argument of D on frequencies that a Nyquist plot would have."""
 
-    def count(point: Point) -> int:
-        loop, c1, c2 = point
-        omega = np.geomspace(1e-4, 1e3, samples)
-        value = loop(1j * omega, c1, c2)
+    def count(case: Case) -> int:
+        omega: ComplexArray = (1j * np.geomspace(1e-4, 1e3, samples)).astype(complex)
+        value = case.characteristic(omega)
         turned = np.angle(value[1:] / value[:-1]).sum() + np.angle(value[0] / value[0].real)
-        return round(loop.degree / 2 - turned / np.pi)
+        return round(len(case.matrices[0]) / 2 - float(turned) / np.pi)
 
     return count
 
 
-def run(*, quick: bool, folder: Path) -> Topic:
-    """Let every tool that is there count the loops."""
-    points = twenty_loops()[: 2 if quick else None]
-    exact = [int(unstable_roots(*point)) for point in points]
-    tools: dict[str, Callable[[Point], int]] = {
-        "this package": lambda point: int(unstable_roots(*point)),
+def run(*, quick: bool) -> Topic:
+    """Let every tool that is there count the loops of both tables."""
+    tools: dict[str, Callable[[Case], int]] = {
+        "this package": lambda case: int(case.count()),
+        "poles without the delays": without_delays,
+        "python-control, Padé of order 4": by_pade(4),
         "python-control, Padé of order 10": by_pade(10),
         "python-control, Padé of order 30": by_pade(30),
         "eigenvalues of the map, step 0.1 s": by_map,
         "argument on 1 000 frequencies": by_grid(1_000),
+        "argument on 10 000 frequencies": by_grid(10_000),
         "argument on 100 000 frequencies": by_grid(100_000),
     }
-    for name, count in {"tdcpy": by_tdcpy, "tdscontrol": by_tdscontrol}.items():
-        try:
-            import_module(name)
-        except ImportError:
-            continue
-        tools[f"{name} {version(name)}"] = count
-    rows = []
-    for name, count in tools.items():
-        seconds, right = [], 0
-        for point, expected in zip(points, exact, strict=True):
-            time, found = timed(_or_none, count, point)
-            seconds.append(time)
-            right += found == expected
-        median = float(np.median(seconds))
-        rows.append(Row(f"{name}: {right} of {len(points)} right", median))
-    note = f"Counts from {min(exact)} to {max(exact)}, seed {SEED}; the time is a median."
-    return Topic("Beside other tools", rows, notes=[note])
+    for name, by_other in (("tdcpy", by_tdcpy), ("tdscontrol", by_tdscontrol)):
+        if find_spec(name):
+            tools[f"{name} {version(name)}"] = by_other
+    rows, notes = [], []
+    for what, all_cases in (("two arms", two_arms()), ("3 to 6 delays", many_delays())):
+        cases = all_cases[: 2 if quick else None]
+        exact = [int(case.count()) for case in cases]
+        notes.append(f"{what}: counts from {min(exact)} to {max(exact)}, seed {SEED}.")
+        for name, count in tools.items():
+            if count is by_map and cases[0].point is None:
+                continue
+            measured = [timed(_or_none, count, case) for case in cases]
+            right = sum(found == n for (_, found), n in zip(measured, exact, strict=True))
+            median = float(np.median([seconds for seconds, _ in measured]))
+            rows.append(Row(f"{what}, {name}: {right} of {len(cases)} right", median))
+    return Topic("Beside other tools", rows, notes=[*notes, "The time is a median."])
 
 
-def _or_none(count: Callable[[Point], int], point: Point) -> int | None:
+def _or_none(count: Callable[[Case], int], case: Case) -> int | None:
     """Return a count, or None where the tool ends in an error."""
     try:
-        return count(point)
+        return count(case)
     except Exception:  # whatever a tool of somebody else raises
         return None

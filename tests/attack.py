@@ -1,12 +1,16 @@
 """Random loops of every kind, held against computations that share no code with armlock.
 
     python -m tests.attack [--loops N] [--seed S] [--first I] [--kinds counts margins ...]
+        [--families mixed clusters zero delays]
 
-Loop I of seed S is the same in every run. Each is drawn from all kinds at once: retarded or
-neutral; up to 12 poles (one in twenty: up to 30) over many decades, lightly damped pairs far
-above the delays' frequencies, unstable ones, ones at 0; any sensor; equal, nearly equal and
-commensurate delays; c from 1e-6 to 3, at and around (1, 1); dead times. `tests.attack_judge`
-says what is right. Refusals are counted: at most one in a thousand, none later than 5 s.
+Loop I of seed S and a family is the same in every run. Each loop of the mixed family is drawn
+from all kinds at once: retarded or neutral; up to 12 poles (one in twenty: up to 30) over many
+decades, lightly damped pairs far above the delays' frequencies, unstable ones, ones at 0; any
+sensor; equal, nearly equal and commensurate delays; c from 1e-6 to 3, at and around (1, 1);
+dead times. Clusters are 2 to 8 modes, spaced by 1e-3 to 1e-1, of a Q from 10 to 1e5; zero is
+the family of points next to zero parameters. `tests.attack_judge` says what is right. Loops
+with three to six delays are drawn and judged by `tests.dense_judge`. Refusals are counted: at
+most one in a hundred, within clusters one in five, none later than 5 s.
 """
 
 from __future__ import annotations
@@ -17,6 +21,7 @@ import sys
 import time
 from collections import Counter
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -33,11 +38,11 @@ from armlock import (
     stability_chart,
     unstable_roots,
 )
-from armlock.robustness.rays import Ray, first_crossing
+from armlock.robustness import first_crossing
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
 from armlock.stability.semidiscretization import semi_discretization
 from tests import attack_judge as judge
-from tests import independent
+from tests import dense_judge, independent
 from tests.attack_judge import Sketch, UndecidedError, View
 
 #: What a number may be off, relative.
@@ -48,7 +53,10 @@ REFUSALS = CountError, RootError, ValueError, ArithmeticError, TimeoutError, Sys
 
 
 def to_loop(sketch):
-    """The armlock loop of a sketch."""
+    """The armlock loop of a sketch, or of the terms of its numerator and denominator."""
+    if isinstance(sketch, tuple):
+        above, below = map(dense_judge.system, sketch)
+        return above / below
     mapping = {"single": SINGLE, "common": COMMON, "difference": DIFFERENCE}.get(sketch.sensor)
     if mapping is None:
         mapping = dual(sketch.corner, sketch.difference)
@@ -201,6 +209,65 @@ def draw_arm(rng):
     return Sketch((), (0j,), gain, sensor, tau1, tau2, delay, 2.5, difference), draw_point(rng)
 
 
+def draw_cluster(rng):
+    """Lightly damped modes next to one another, as structures and cavities have them."""
+    tau1, tau2 = draw_delays(rng)
+    sensor = str(rng.choice(["single", "common", "difference", "dual"]))
+    number = int(rng.integers(2, 9))
+    spacing, quality = between(rng, 1e-3, 1e-1), between(rng, 10.0, 1e5)
+    centre = between(rng, 1.0, 300.0) / max(tau1, tau2)
+
+    def modes(places):
+        sizes = centre * (1.0 + spacing * (places + 0.1 * rng.normal(size=places.size)))
+        damping = 0.5 / quality * 10.0 ** rng.uniform(-0.3, 0.3, places.size)
+        upper = sizes * (-damping + 1j * np.sqrt(1.0 - damping**2))
+        return [
+            complex(root) for pair in zip(upper, upper.conj(), strict=True) for root in pair
+        ]
+
+    places = np.arange(number) - 0.5 * (number - 1)
+    poles = modes(places)
+    # Zeros between the modes, as where force and sensor are at one place.
+    zeros = modes(places[1:] - 0.5) if rng.random() < 0.4 else []
+    if rng.random() < 0.3:
+        poles.append(0j)
+    difference = (tau1 - tau2 or tau1) * float(rng.choice([1.0, 0.5]))
+    delay = between(rng, 1e-6, 1.0) if rng.random() < 0.3 else 0.0
+    sketch = Sketch(tuple(zeros), tuple(poles), 1.0, sensor, tau1, tau2, delay, 2.5, difference)
+    point = draw_point(rng)
+    if sensor == "difference" and tau1 == tau2 and point[0] == point[1]:
+        raise UndecidedError("the difference of equal arms is zero")
+    peaks = np.array([abs(pole) for pole in poles if pole])
+    largest = np.abs(View(sketch, *point).at(peaks)).max()
+    return sketch.scaled(between(rng, 0.03, 30.0) / largest), point
+
+
+def draw_near_zero(rng):
+    """A loop at parameters next to zero; |L| may be one far below all its corners."""
+    sketch, _ = draw(rng)
+    sizes = [rng.choice([-1, 1]) * between(rng, 1e-12, 1e-3) for _ in range(2)]
+    kind = rng.choice(["both", "one", "equal", "close"])
+    if kind == "one":
+        sizes[1] = float(rng.choice([0.0, 1.0]))
+    if kind == "equal":
+        sizes[1] = sizes[0]
+    if kind == "close":
+        sizes = [0.5, 0.5 + sizes[0]]
+    if sketch.sensor == "difference" and sketch.tau1 == sketch.tau2 and sizes[0] == sizes[1]:
+        raise UndecidedError("the difference of equal arms is zero")
+    return sketch, (float(sizes[0]), float(sizes[1]))
+
+
+FAMILIES = {
+    "mixed": (draw, draw, draw, draw, draw_paper, draw_arm),
+    "clusters": (draw_cluster,),
+    "zero": (draw_near_zero,),
+    "delays": (lambda rng: (dense_judge.drawn(rng), None),),
+}
+#: How many refusals among its calls are too many.
+REFUSED = {"mixed": 1e-2, "clusters": 0.2, "zero": 1e-2, "delays": 1e-2}
+
+
 # ---------------------------------------------------------------------------- what is checked
 
 
@@ -219,6 +286,7 @@ class Tally:
     refused: list = field(default_factory=list)
     wrong: list = field(default_factory=list)
     skipped: Counter = field(default_factory=Counter)
+    controls: Counter = field(default_factory=Counter)
     where: object = None
     worst: dict = field(default_factory=dict)
     patient: bool = hasattr(signal, "setitimer")
@@ -327,24 +395,32 @@ def check_margins(tally, rng, sketch, loop, point):
             name in verdict.unsure,
             name == "gain_lower",
         )
-    low, high = max(found.gain_lower, 1e-6), min(found.gain_upper, 1e6)
-    inside = [low * 1.00001, high * 0.99999, *(low * (high / low) ** rng.random(2))]
-    outside = [found.gain_lower * 0.99999, found.gain_upper * 1.00001]
-    for factor, stable in [*((k, True) for k in inside), *((k, False) for k in outside)]:
-        if not 1e-6 <= factor <= 1e6 or turns(sketch.scaled(factor)) > 5e4:
-            continue
-        try:
-            counts = judge.count(sketch.scaled(factor), *point)
-        except UndecidedError:
-            tally.skipped["gain interval: judge undecided"] += 1
-            continue
-        if (counts == 0) != stable and counts != -1:
-            tally.note(
-                "gain interval",
-                (*point, factor),
-                f"{found.gain_lower, found.gain_upper}",
-                counts,
-            )
+    low, high = max(found.gain_lower, 1.0 / judge.GAINS), min(found.gain_upper, judge.GAINS)
+
+    def unstable(*factors):
+        """Whether the loop is unstable at one of these gain factors; None if that is open."""
+        counts = []
+        for factor in factors:
+            if (
+                not 1.0 / judge.GAINS <= factor <= judge.GAINS
+                or turns(sketch.scaled(factor)) > 5e4
+            ):
+                return None
+            try:
+                counts.append(judge.count(sketch.scaled(factor), *point))
+            except UndecidedError:
+                tally.skipped["gain interval: judge undecided"] += 1
+                return None
+        return None if -1 in counts else any(counts)
+
+    interval = f"{found.gain_lower, found.gain_upper}"
+    for factor in (low * 1.00001, high * 0.99999, *(low * (high / low) ** rng.random(2))):
+        if unstable(factor):
+            tally.note("gain interval", (*point, factor), interval, "unstable")
+    # Past its end a pair that has crossed may cross back at once.
+    for edge, way in ((found.gain_lower, -1.0), (found.gain_upper, 1.0)):
+        if unstable(*(edge * (1.0 + way * past) for past in (1e-5, 1e-6, 1e-7))) is False:
+            tally.note("gain interval", (*point, edge), interval, "stable past it")
 
 
 def check_free(tally, rng, sketch, loop, point):
@@ -353,13 +429,13 @@ def check_free(tally, rng, sketch, loop, point):
     if judge.count(sketch, *point) != 0:
         return
     verdict = judge.margins(sketch, *point, free_above=above)
-    found = tally.ask("margins, free", margins, loop, *point, above)
+    found = tally.ask("margins, free", partial(margins, free_above=above), loop, *point)
     if verdict.modulus <= 0.0:
         # Some phases make it unstable: whatever is said then, no margin may be left.
         if found is not None and found.modulus > 1e-9:
             tally.note("margins.modulus, free", (*point, above), found.modulus, 0.0)
         return
-    for name in judge.NAMES[:4] if found is not None else ():
+    for name in judge.NAMES[:3] if found is not None else ():
         unsure = name in verdict.unsure
         got, expected = getattr(found, name), getattr(verdict, name)
         tally.near(f"margins.{name}, free", (*point, above), got, expected, unsure)
@@ -377,26 +453,21 @@ def check_rays(tally, rng, sketch, loop, point):
         stop *= 0.7
     if stop <= 1e-9 or not View(sketch, *start).confined():
         return
-    found = tally.ask("crossings", Ray(loop, start, way).crossings, stop)
-    one = tally.ask("first_crossing", first_crossing, loop, start, way, stop)
+    found = tally.ask("first_crossing", first_crossing, loop, start, way, stop)
     if found is None:
         return
-    # A boundary at the start itself, to rounding, is none beyond it.
-    beyond = found.position[found.position > 1e-15 * np.abs(start).max()]
-    expected = beyond[0] if beyond.size else np.inf
-    if one is not None and not np.isclose(one.position, expected, rtol=1e-9):
-        tally.note("first_crossing", (start, way, stop), one.position, expected)
-    first, last = (judge.count(sketch, *(start + t * way)) for t in (0.0, stop))
-    if first >= 0 and last >= 0 and first + found.change.sum() != last:
-        tally.note("crossings", (start, way, stop), found.change.tolist(), (first, last))
-    for t in rng.permutation(found.position)[:2]:
-        near = 1e-7 * t
-        if near < 1e-10 * np.hypot(*start):
-            continue
-        counts = [judge.count(sketch, *(start + s * way)) for s in (t - near, t + near)]
-        change = found.change[np.abs(found.position - t) < near]
-        if min(counts) >= 0 and counts[1] - counts[0] != change.sum():
-            tally.note("crossings", (start, way, stop, t), change, counts)
+    t = min(found.position, stop)
+    # Crossings so near to the limit of the neutral chain are not looked for.
+    near = 1e-6 if np.isfinite(found.omega) else 2e-5
+    if near * t < 1e-10 * np.hypot(*start):
+        tally.skipped["first_crossing: below rounding"] += 1
+        return
+    shares = np.array([1e-3, *rng.random(3) * (1.0 - near), 1.0 - near, 1.0 + near])
+    counts = [judge.count(sketch, *(start + share * t * way)) for share in shares]
+    told = [count for count in counts[:-1] if count != -1]
+    past = counts[-1] if np.isfinite(found.position) else -1
+    if len(set(told)) > 1 or past in told:
+        tally.note("first_crossing", (start, way, stop), found, (shares, counts))
 
 
 def check_critical(tally, rng, sketch, loop, point):
@@ -408,11 +479,18 @@ def check_critical(tally, rng, sketch, loop, point):
     if eps is None:
         return
     if np.isinf(eps):
-        if sketch.sensor != "single" or way[0] * loop.b1.any():
-            tally.note("critical_perturbation", way, eps, "finite")
+        # Parameters past 1e9 times those of the start are not looked at.
+        farthest = 0.99e9 * np.sqrt(2.0) / np.hypot(*way)
+        for share in (*rng.random(3), 1.0):
+            counts = judge.count(sketch, *(1.0 + share * farthest * way))
+            if counts not in (0, -1):
+                tally.note("critical_perturbation", (way, share * farthest), eps, counts)
+                return
         return
-    # The parameters are numbers next to one, and rounded as these are.
-    near = max(1e-6, 1e-15 / (eps * np.abs(way).max()))
+    # The parameters are numbers next to one, and rounded as these are. The limit of the chain
+    # is taken for roots that cross within 1e-5 of it.
+    at_limit = judge.count(sketch, *(1.0 + 1.0001 * eps * way)) == -2
+    near = max(2e-5 if at_limit else 1e-6, 1e-15 / (eps * np.abs(way).max()))
     if near > 0.1:
         tally.skipped["critical_perturbation: below rounding"] += 1
         return
@@ -427,7 +505,8 @@ def check_root(tally, rng, sketch, loop, point):
     number = judge.count(sketch, *point)
     if number == -2:
         return
-    root = tally.ask("rightmost_root", rightmost_root, loop, *point)
+    # The judge counts the roots of D, with one at s = 0 that cancels in the loop.
+    root = tally.ask("rightmost_root", rightmost_root, loop.plain(), *point)
     if root is None:
         return
     longest = max(sketch.tau1, sketch.tau2)
@@ -451,9 +530,11 @@ def check_chart(tally, rng, sketch, loop, point):
         return
     chart = tally.ask("stability_chart", stability_chart, loop, x, y)
     single = tally.ask("unstable_roots", unstable_roots, loop, *np.meshgrid(x, y))
-    if chart is None or single is None:
+    of_d = tally.ask("unstable_roots", unstable_roots, loop.plain(), *np.meshgrid(x, y))
+    if chart is None or single is None or of_d is None:
         return
-    for j, i in np.argwhere(chart.counts != single):
+    # A chart is that of D, which has a root at s = 0 where one cancels in the loop.
+    for j, i in np.argwhere((chart.counts != single) & (chart.counts != of_d)):
         tally.note("stability_chart", (x[i], y[j]), chart.counts[j, i], single[j, i])
     for _ in range(2):
         i, j = rng.integers(x.size), rng.integers(y.size)
@@ -512,6 +593,33 @@ def check_maps(tally, rng, sketch, loop, point):
                 tally.note(name, (step, order, x[k], y[k]), int(count), expected)
 
 
+def check_controls(tally, rng, sketch, loop, point):
+    """No margin that is 1e-5 too good is certified; nearly all that are 3e-5 worse are."""
+    try:
+        found = margins(loop, *point)
+    except REFUSALS:
+        return
+    for what in dense_judge.too_good_ones(*loop.quotient(*point), found, tally.controls):
+        tally.note("controls", point, what, "no certificate")
+
+
+def check_delays(tally, rng, sketch, loop, point):
+    """Three to six delays: counts, margins and the rightmost root."""
+    count, wrong = dense_judge.compared(*sketch, tally.ask, tally.controls)
+    for what in wrong:
+        tally.note("delays", point, what, "the judge's")
+    root = None if count == -2 else tally.ask("rightmost_root", rightmost_root, loop)
+    if root is None:
+        return
+    near = 1e-6 * (1.0 + abs(root))
+    right, left = (
+        dense_judge.Judge(*(dense_judge.shifted(terms, sigma) for terms in sketch)).count()
+        for sigma in (root.real + near, root.real - near)
+    )
+    if right > 0 or left == 0 or (count >= 0 and (root.real > 0.0) != (count > 0)):
+        tally.note("rightmost_root", point, root, f"{right} right, {left} with it, {count}")
+
+
 CHECKS = {
     "counts": (check_counts, 1.0),
     "margins": (check_margins, 1.0),
@@ -522,15 +630,20 @@ CHECKS = {
     "charts": (check_chart, 0.3),
     "dcurve": (check_dcurve, 0.3),
     "maps": (check_maps, 0.3),
+    "controls": (check_controls, 0.1),
 }
+#: The checks of loops with more delays.
+MORE_DELAYS = {"delays": (check_delays, 1.0)}
+KINDS = tuple(CHECKS | MORE_DELAYS)
 
 
-def attack(seed, loops, kinds=tuple(CHECKS), tally=None):
-    """Check the loops of these indices; return the tally."""
-    tally = tally or Tally()
+def attack(seed, loops, kinds=KINDS, tally=None, family="mixed"):
+    """Check the loops of these indices of a family; return the tally."""
+    tally, place = tally or Tally(), list(FAMILIES).index(family)
+    checks = MORE_DELAYS if family == "delays" else CHECKS
     for index in loops:
-        rng = np.random.default_rng([seed, index])
-        maker = rng.choice([draw, draw, draw, draw, draw_paper, draw_arm])
+        rng = np.random.default_rng([seed, index, *((1000 + place,) if place else ())])
+        maker = rng.choice(FAMILIES[family])
         try:
             sketch, point = maker(rng)
             loop = to_loop(sketch)
@@ -539,8 +652,8 @@ def attack(seed, loops, kinds=tuple(CHECKS), tally=None):
             continue
         tally.where = (index, sketch)
         tally.calls["loops"] += 1
-        for number, (kind, (check, share)) in enumerate(CHECKS.items()):
-            own = np.random.default_rng([seed, index, number])
+        for number, (kind, (check, share)) in enumerate(checks.items()):
+            own = np.random.default_rng([seed, index, number + 100 * place])
             if kind in kinds and own.random() < share:
                 try:
                     check(tally, own, sketch, loop, point)
@@ -548,7 +661,8 @@ def attack(seed, loops, kinds=tuple(CHECKS), tally=None):
                     tally.skipped[f"{kind}: judge undecided"] += 1
         if tally.patient and index % 100 == 99:
             print(
-                f"... {index + 1}: {len(tally.wrong)} wrong, {len(tally.refused)} refused",
+                f"... {family} {index + 1}: {len(tally.wrong)} wrong, "
+                f"{len(tally.refused)} refused",
                 flush=True,
             )
     return tally
@@ -559,21 +673,26 @@ def main():
     parser.add_argument("--loops", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--first", type=int, default=0, help="index of the first loop")
-    parser.add_argument("--kinds", nargs="*", default=list(CHECKS), choices=list(CHECKS))
+    parser.add_argument("--kinds", nargs="*", default=KINDS, choices=KINDS)
+    parser.add_argument("--families", nargs="*", default=list(FAMILIES), choices=list(FAMILIES))
     given = parser.parse_args()
-    start = time.perf_counter()
-    numbers = range(given.first, given.first + given.loops)
-    attack(given.seed, numbers[:10], tally=Tally(patient=False))  # compiles
-    tally = attack(given.seed, numbers, tuple(given.kinds))
-    print(f"\nin {time.perf_counter() - start:.0f} s:", dict(tally.calls))
-    print("not decided by the judge:", dict(tally.skipped))
-    print("largest deviations:", {k: f"{v:.1e}" for k, v in tally.worst.items()})
-    print("wrong:", len(tally.wrong), dict(Counter(entry[0] for entry in tally.wrong)))
-    calls = sum(tally.calls.values()) - tally.calls["loops"]
-    print(
-        "refused:", len(tally.refused), "of", calls, dict(Counter(e[0] for e in tally.refused))
-    )
-    return int(bool(tally.wrong) or len(tally.refused) > 1e-3 * calls)
+    numbers, bad = range(given.first, given.first + given.loops), False
+    for family in given.families:
+        # The first call of a kind compiles.
+        attack(given.seed, numbers[:10], given.kinds, Tally(patient=False), family)
+        start = time.perf_counter()
+        tally = attack(given.seed, numbers, given.kinds, family=family)
+        calls = sum(tally.calls.values()) - tally.calls["loops"]
+        print(f"\n{family}, seed {given.seed}, in {time.perf_counter() - start:.0f} s:")
+        print(dict(tally.calls))
+        print("not decided by the judge:", dict(tally.skipped))
+        print("negative controls:", dict(tally.controls))
+        print("largest deviations:", {k: f"{v:.1e}" for k, v in tally.worst.items()})
+        print("wrong:", len(tally.wrong), dict(Counter(entry[0] for entry in tally.wrong)))
+        refused = dict(Counter(entry[0] for entry in tally.refused))
+        print("refused:", len(tally.refused), "of", calls, refused, flush=True)
+        bad |= bool(tally.wrong) or len(tally.refused) > REFUSED[family] * calls
+    return int(bad)
 
 
 if __name__ == "__main__":

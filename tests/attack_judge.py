@@ -24,8 +24,8 @@ MOST_CELLS = 40_000
 CHUNK = 20_000
 # Of a product of factors, relative.
 EPS = 1e-15
-GAINS = 1e6
-NAMES = ("modulus", "disk", "phase", "delay", "gain_upper", "gain_lower")
+GAINS = 1e4
+NAMES = ("modulus", "phase", "delay", "gain_upper", "gain_lower")
 
 
 #: 1/0 is inf, and 0/0 is looked at.
@@ -251,8 +251,8 @@ class View:
         return edges[:-1], edges[1:]
 
 
-def cut(a, b, parts=8):
-    share = np.arange(parts + 1) / parts
+def cut(a, b):
+    share = np.arange(9) / 8
     edges = a[:, None] + (b - a)[:, None] * share
     edges[:, -1] = b
     return edges[:, :-1].ravel(), edges[:, 1:].ravel()
@@ -337,25 +337,11 @@ class Verdict:
     """The infima, and those of which cells ran out: bounds on one side only."""
 
     modulus: float = np.inf
-    disk: float = np.inf
     phase: float = np.inf
     delay: float = np.inf
     gain_upper: float = np.inf
     gain_lower: float = 0.0
     unsure: tuple = ()
-    used: int = 0
-
-
-def apollonius(k):
-    """Where |1 + L| < k |1 - L|: inside a disc (k < 1) or outside one."""
-    k = min(max(k, 1e-300), 1e300)
-    if k == 1.0:
-        k = 1.0 - 1e-15
-    return -(1.0 + k * k) / (1.0 - k * k), abs(2.0 * k / (1.0 - k * k)), k < 1.0
-
-
-def ratio(value):
-    return np.abs(1.0 + value) / np.maximum(np.abs(1.0 - value), 1e-300)
 
 
 def lag(value):
@@ -375,19 +361,18 @@ def zeros_of(view, a, b, excess):
 
 
 @quiet
-def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
-    """All margins; of a loop that is not stable the modulus and the disk only.
+def margins(sketch, c1, c2, stable=True, free_above=np.inf):
+    """All margins; of a loop that is not stable the modulus only.
 
     Above `free_above`, in rad/s, both arms' phases are free: L fills a disc. Gains are not
     looked at then.
     """
-    asked = 2 if not stable else 4 if np.isfinite(free_above) else len(NAMES)
+    used = 0
+    asked = 1 if not stable else 3 if np.isfinite(free_above) else len(NAMES)
     view = View(sketch, c1, c2)
-    # The limits, first. The ratio is a Moebius map: its least value on the disc is on the real
-    # axis or where a circle of constant ratio touches, which by symmetry is there, too.
+    # The limits, first.
     centre, radius = view.limit()
-    ends = np.array([centre - radius, centre + radius])
-    best = Verdict(abs(1.0 + centre) - radius, float(ratio(ends).min()))
+    best = Verdict(abs(1.0 + centre) - radius)
     # Gain factors at which the neutral root chain is lost.
     lost = [1.0 / r for r in (radius - centre, -centre - radius) if r > 0.0]
     best.gain_lower = max([k for k in lost if k < 1.0], default=0.0)
@@ -399,7 +384,6 @@ def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
             best.phase = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
     first = view.at(np.array([view.low]))
     best.modulus = min(best.modulus, float(np.abs(1.0 + first[0])))
-    best.disk = min(best.disk, float(ratio(first)[0]))
 
     def limit_gain(value):
         """Take in a value of L on the negative real axis."""
@@ -417,33 +401,27 @@ def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
         away, _ = to_segment(-1.0, value, slope, h)
         keep = np.zeros((len(NAMES), value.size), dtype=bool)
         keep[0] = away <= best.modulus * (1.0 - TOL) + rest
-        at, size, inside = apollonius(best.disk * (1.0 - TOL))
-        if inside:
-            keep[1] = to_segment(at, value, slope, h)[0] <= size + rest
-        else:
-            far = np.maximum(np.abs(value - slope * h - at), np.abs(value + slope * h - at))
-            keep[1] = far >= size - rest
         spread = np.abs(slope) * h + rest
         turn = np.where(best.phase < np.pi, best.phase * (1.0 - TOL), np.pi) * np.ones(
             value.size
         )
-        keep[2] = to_arc(value * np.exp(1j * turn), 2.0 * turn) <= spread
+        keep[1] = to_arc(value * np.exp(1j * turn), 2.0 * turn) <= spread
         turn = np.minimum(best.delay * (1.0 - TOL) * b, 2.0 * np.pi)
-        keep[3] = (to_arc(value, turn) <= spread) & (turn > 0.0)
+        keep[2] = (to_arc(value, turn) <= spread) & (turn > 0.0)
         real = np.abs(value.imag) <= np.abs(slope.imag) * h + rest
         half = np.abs(slope.real) * h + rest
         smallest, largest = value.real - half, value.real + half
         top = min(best.gain_upper * (1.0 - TOL), GAINS * 1.01)
         bottom = max(best.gain_lower * (1.0 + TOL), 0.99 / GAINS)
-        keep[4] = real & (largest > -1.0) & (smallest < -1.0 / top) & (top > 1.0)
-        keep[5] = real & (smallest < -1.0) & (largest > -1.0 / bottom) & (bottom < 1.0)
+        keep[3] = real & (largest > -1.0) & (smallest < -1.0 / top) & (top > 1.0)
+        keep[4] = real & (smallest < -1.0) & (largest > -1.0 / bottom) & (bottom < 1.0)
         keep[asked:] = False
         return keep
 
     def improve(omega):
-        value = view.at(omega)
+        # Past there phases are rounded away: L's values are none.
+        value = view.at(omega[omega * view.tau.max() * EPS < 1e-8])
         best.modulus = min(best.modulus, float(np.abs(1.0 + value).min(initial=np.inf)))
-        best.disk = min(best.disk, float(ratio(value).min(initial=np.inf)))
 
     def cross(a, b):
         """Crossovers in cells whose ends differ, the most promising of them."""
@@ -469,7 +447,6 @@ def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
                 limit_gain(met)
 
     def done(undecided):
-        best.disk = 2.0 * min(best.disk, 1.0)
         best.unsure = tuple(
             name for name, is_open in zip(NAMES, undecided, strict=True) if is_open
         )
@@ -477,7 +454,8 @@ def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
 
     def examine(a, b):
         """Leave out cells on which nothing smaller can lie; return the others, cut."""
-        best.used += a.size
+        nonlocal used
+        used += a.size
         m, h = 0.5 * (a + b), 0.5 * (b - a)
         value, slope, rest, middle, radius = view.enclose(m, h)
         free = a >= free_above
@@ -490,10 +468,10 @@ def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
             centre, size = view.enclose(m[free], 0.0 * m[free])[3:]
             improve_free(best, m[free], centre, size, stable)
         keep &= kept(middle, 0.0 * m, radius, h, a, b)
-        if best.used > most / 2:
+        if used > MOST_CELLS / 2:
             # Nulls of L ask for ever larger gains: leave the cells to the others.
-            opened[4:] |= keep[4:].any(axis=1)
-            keep[4:] = False
+            opened[3:] |= keep[3:].any(axis=1)
+            keep[3:] = False
         # As close as floats are: what is open there stays open.
         fine = (b - a) < 3e-14 * b
         rows = keep[:, fine].any(axis=1)
@@ -521,7 +499,7 @@ def margins(sketch, c1, c2, stable=True, free_above=np.inf, most=MOST_CELLS):
             opened |= fine
             if a.size:
                 pending.append((rows, a, b))
-            if best.used > most:
+            if used > MOST_CELLS:
                 left = [entry[0] for entry in pending]
                 return done(np.any([opened, past(high), *left], axis=0))
         keep = past(high)
@@ -538,11 +516,6 @@ def improve_free(best, omega, centre, radius, stable):
     best.modulus = min(
         best.modulus, float(np.maximum(np.abs(1.0 + centre) - radius, 0.0).min())
     )
-    # (1 + L) / (1 - L) = 2 / (1 - L) - 1 takes the disc to a disc, or to the outside of one.
-    power = np.abs(1.0 - centre) ** 2 - radius**2
-    image, size = 2.0 * np.conj(1.0 - centre) / power - 1.0, 2.0 * radius / np.abs(power)
-    gap = np.where(power > 0.0, np.abs(image) - size, size - np.abs(image))
-    best.disk = min(best.disk, float(np.maximum(gap, 0.0).min()))
     if not stable:
         return
     cosine = (1.0 + np.abs(centre) ** 2 - radius**2) / (2.0 * np.abs(centre))

@@ -20,8 +20,8 @@ def delayed_terms(system, x, y):
     """What D holds beside A: coefficients and delay of each term."""
     return (
         (system.c, system.delay),
-        (-x * system.b1, system.delay + system.tau1),
-        (-y * system.b2, system.delay + system.tau2),
+        (-x * system.b1.coefficients, system.delay + system.tau1),
+        (-y * system.b2.coefficients, system.delay + system.tau2),
     )
 
 
@@ -48,7 +48,7 @@ def exact(system, s, x, y):
         rest, b1, b2 = 1, gain * first / below, gain * second / below
     else:
         z = mpmath.exp(s * system.step) if system.step else s
-        polynomials = system.rest, system.b1, system.b2
+        polynomials = system.rest.coefficients, system.b1.coefficients, system.b2.coefficients
         rest, b1, b2 = (mpmath.polyval(p.tolist(), z, asc=True) for p in polynomials)
     x0, y0 = system.reference
     arms = b1 * (x0 - x * mpmath.exp(-s * system.tau1))
@@ -149,35 +149,6 @@ def spectral_count(system, x, y, nodes=80):
     return int(np.count_nonzero(generator_eigenvalues(system, x, y, nodes).real > 0.0))
 
 
-def held_map(system, x, y, step, order):
-    """Transition matrix of a first-order delay equation, from its closed-form integrals.
-
-    The state is (xi_i, xi_{i-1}, ..., xi_{i-r}).
-    """
-    c0, c1 = system.a
-    rate = -c0 / c1
-    gains = []
-    for b, delay in delayed_terms(system, x, y):
-        if delay == 0.0:
-            rate -= b[0] / c1
-        else:
-            gains.append((round(delay / step), -b[0] / c1))
-    decay = np.exp(rate * step)
-    longest = max(back for back, _ in gains)
-    matrix = np.diag(np.ones(longest), -1)
-    matrix[0, 0] = decay
-    whole = np.expm1(rate * step) / rate
-    # Integral of (u / h) exp(rate (h - u)) over the step: the share of the newer sample.
-    newer = (np.expm1(rate * step) - rate * step) / (rate * rate * step)
-    for back, gain in gains:
-        if order == 0:
-            matrix[0, back] += gain * whole
-        else:
-            matrix[0, back] += gain * (whole - newer)
-            matrix[0, back - 1] += gain * newer
-    return matrix
-
-
 def map_eigenvalues(system, x, y):
     """Roots of z^r D for a map, r the longest delay in steps, by a companion matrix."""
     return np.roots(map_polynomial(system, x, y)[::-1])
@@ -191,11 +162,6 @@ def map_polynomial(system, x, y):
     for (b, _), back in zip(terms, steps, strict=True):
         polynomial[max(steps) - back : max(steps) - back + b.size] += b
     return polynomial
-
-
-def map_count(system, x, y):
-    """Eigenvalues of a map outside the unit circle."""
-    return int(np.count_nonzero(np.abs(map_eigenvalues(system, x, y)) > 1.0))
 
 
 def series(zeros, poles, gain):

@@ -13,9 +13,9 @@ PAGE = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>A page</title>
 <meta name="viewport" content="width=device-width"></head>
 <body><main><h1 id="top">A page</h1>{}</main></body></html>"""
-GOOD = """<p><a href="#top">Up</a>, <a href="table.csv" download>data</a>, and
-<code>$\\frac$</code> in code.</p><img src="data:," alt="A curve">
-<figure><output id="shown">1</output><label>Gain <input type="range" id="gain"
+GOOD = """<p><a href="#top">Up</a>, and <code>$\\frac$</code> in code.</p>
+<img src="data:," alt="A curve"><figure>
+<output id="shown">1</output><label>Gain <input type="range" id="gain"
 oninput="document.getElementById('shown').textContent = this.value"></label></figure>
 <p data-check="hover" onmousemove="this.textContent = 'here'">Move over this.</p>"""
 #: All on one page, each with what is to be said of it.
@@ -23,10 +23,7 @@ FAULTS = {
     r"<p>The root \(s = 0\).</p>": r"raw TeX: The root \(s",
     "<p>The root $s_1$.</p>": "raw TeX: The root $s_1$",
     "<p>See {numref}`fig`.</p>": "raw TeX: See {numref}",
-    '<img src="data:,">': "no alternative text",
-    '<a href="missing.html">There</a>': "broken link: missing.html",
-    '<a href="#missing">There</a>': "broken anchor: #missing",
-    '<a href="ragged.csv">data</a>': "does not open: not a table",
+    '<img src="data:,">': "axe, light: Images must have alternative text",
     "<script>missing()</script>": "script error: missing is not defined",
     "<script>console.error('no')</script>": "console: no",
     '<script src="http://192.0.2.1/x.js"></script>': "asks the network for http://192",
@@ -45,20 +42,15 @@ FAULTS = {
         "a slider changes nothing: dead"
     ),
     '<p data-check="hover">still</p>': "to the pointer does not",
-    '<p data-check="hover" onpointermove="if (event.pointerType === \'mouse\') '
-    "this.textContent = 'here'\">Move over this.</p>": "to a finger does not",
 }
 
 
 @needs_chromium
-def test_it_finds_each_fault_and_none_on_a_good_page(tmp_path):
-    (tmp_path / "table.csv").write_text("omega [rad/s]\n1\n")
-    (tmp_path / "ragged.csv").write_text("omega [rad/s]\n1,2\n")
+def test_it_finds_each_fault_and_none_on_a_good_page(tmp_path, monkeypatch):
+    monkeypatch.setattr(check_browser, "POKES", 5)
     (tmp_path / "good.html").write_text(PAGE.format(GOOD))
     (tmp_path / "bad.html").write_text(PAGE.format("\n".join(FAULTS)))
-    book = check_browser.check_some(tmp_path, check_browser.pages(tmp_path), search=False)
-    book.check_links()
-    found = book.problems
-    assert [problem for problem in found if problem.startswith(("good", "table"))] == []
+    found = check_browser.check(tmp_path, check_browser.pages(tmp_path), search=False)
+    assert [problem for problem in found if problem.startswith("good")] == []
     for fault, sign in FAULTS.items():
         assert any(sign in problem for problem in found), (fault, sign, found)

@@ -1,4 +1,4 @@
-"""Sweeps on a Dask cluster of two processes."""
+"""The lines of the page "Many machines", also with a worker and the program killed."""
 
 import os
 import re
@@ -7,65 +7,79 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from armlock import LaserNoise, paper_loop, simulate, sweep
-from tests.test_sweep import draw
+from armlock import CommonArm, critical_perturbation
 
 ROOT = Path(__file__).parents[1]
-#: The lines of the book's page, piece by piece.
-PAGE = re.findall(r"```python\n(.*?)```", (ROOT / "book/cluster.md").read_text(), re.DOTALL)
-distributed = pytest.importorskip("distributed")
-
-# Dask warns of ports that are taken and of workers that restart: neither is a failure here.
-pytestmark = pytest.mark.filterwarnings("default")
-
-
-def draw_or_die(task):
-    """Kill the process that computes one of the tasks, the first time."""
-    seed, place = task
-    if seed == 3 and not Path(place).exists():
-        Path(place).touch()
+#: The scripts of the page: for the cores of one machine, and for Dask.
+SCRIPTS = re.findall(r"```python\n(.*?)```", (ROOT / "book/cluster.md").read_text(), re.DOTALL)
+GAINS = np.geomspace(0.01, 10.0, 8)
+#: Put into the function: each call is logged, one kills its worker, all take a while.
+WATCHED = """def reach(gain):
+    import os, signal, time
+    with open("log", "a") as log:
+        log.write(f"{gain!r}\\n")
+    if os.path.exists("kill") and gain > 0.03:
+        os.remove("kill")
         os.kill(os.getpid(), signal.SIGKILL)
-    time.sleep(0.05)
-    return draw(seed)
+    time.sleep(0.3)
+"""
 
 
-def test_a_worker_that_is_killed_costs_no_result(tmp_path):
-    place = tmp_path / "killed"
-    tasks = [(seed, str(place)) for seed in range(12)]
-    with distributed.Client(
-        n_workers=2, threads_per_worker=1, dashboard_address=None
-    ) as client:
-        found = sweep(draw_or_die, tasks, executor=client.get_executor())
-    assert place.exists()
-    assert np.array_equal(found, [draw(seed) for seed in range(12)])
-
-
-def test_the_lines_of_the_page_run(tmp_path):
-    """As a script, whose workers import it again."""
-    pytest.importorskip("h5py")
-    (tmp_path / "page.py").write_text(PAGE[0].replace("200)", "6)"))
-    done = subprocess.run(
-        [sys.executable, "page.py"],
-        cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=True,
+def start(folder, script):
+    """Run a script of the page, which saves what it finds."""
+    lines = script.replace("10.0, 200)", f"10.0, {GAINS.size})").replace(
+        "n_jobs=-1", "n_jobs=2"
     )
-    assert re.fullmatch(r"between \d+\.\d+ and \d+\.\d+\n", done.stdout)
-    assert "6 of 6" in done.stderr
+    lines = lines.replace("n_workers=2", "n_workers=2, dashboard_address=None")
+    lines = lines.replace("def reach(gain):\n", WATCHED)
+    (folder / "page.py").write_text(f'{lines}    np.save("found.npy", found)\n')
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "default"}
+    return subprocess.Popen(
+        [sys.executable, "page.py"], cwd=folder, env=environment, stderr=subprocess.DEVNULL
+    )
 
 
-def test_the_full_draws_of_the_page_are_single_runs():
-    function = PAGE[1].partition("\n\n\nfound")[0].replace("2000", "2").replace("20_000", "500")
-    names: dict[str, Any] = {"np": np}
-    exec(function, names)
-    loop = paper_loop()
-    for k, peak in enumerate(names["largest"](7)[:3]):
-        single = simulate(loop, LaserNoise(7 + k, at_rest=True).draw(1000))
-        assert peak == np.abs(single).max()
+def calls(folder):
+    log = folder / "log"
+    return log.read_text().split() if log.exists() else []
+
+
+def kept(folder):
+    return len(list((folder / "kept").rglob("output.pkl")))
+
+
+def check(folder):
+    """Compare what a script has saved with calls one after the other."""
+    expected = [critical_perturbation(CommonArm(gain), (-1.0, -1.0)) for gain in GAINS]
+    np.testing.assert_array_equal(np.load(folder / "found.npy"), expected)
+
+
+def test_joblib_finds_what_single_calls_find(tmp_path):
+    pytest.importorskip("joblib")
+    assert start(tmp_path, SCRIPTS[0]).wait(timeout=120) == 0
+    check(tmp_path)
+
+
+def test_a_run_whose_worker_and_program_are_killed_goes_on_and_finds_the_same(tmp_path):
+    pytest.importorskip("distributed")
+    (tmp_path / "kill").touch()
+    first = start(tmp_path, SCRIPTS[1])
+    end = time.monotonic() + 120
+    while kept(tmp_path) < 2 and first.poll() is None and time.monotonic() < end:
+        time.sleep(0.05)
+    first.send_signal(signal.SIGKILL)
+    first.wait()
+    time.sleep(2.0)  # its workers end
+    before = len(calls(tmp_path))
+    found = kept(tmp_path)
+    assert 2 <= found < GAINS.size
+    assert not (tmp_path / "found.npy").exists()
+    assert start(tmp_path, SCRIPTS[1]).wait(timeout=120) == 0
+    # What was kept is not computed again.
+    assert len(calls(tmp_path)) - before == GAINS.size - found
+    check(tmp_path)
+    assert not (tmp_path / "kill").exists()

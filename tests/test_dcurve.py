@@ -26,7 +26,7 @@ LOOPS = {
 CURVED = {
     name: system
     for name, system in {**RETARDED, **NEUTRAL, **LOOPS}.items()
-    if system.b1.any() and system.b2.any()
+    if system.b1.coefficients.any() and system.b2.coefficients.any()
 }
 
 

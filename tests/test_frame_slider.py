@@ -1,8 +1,6 @@
 import re
 
-from matplotlib import pyplot as plt
-
-from book.companion.figures import FrameSlider, svg
+from book.companion.figures import FrameSlider
 
 
 def test_slider_shows_one_frame_and_names_each():
@@ -15,9 +13,3 @@ def test_slider_shows_one_frame_and_names_each():
     assert 'aria-valuetext="2 &amp; 3"' in page
     assert "http" not in page
     assert repr(slider) == "FrameSlider('s', 3 frames)"
-
-
-def test_svg_closes_its_figure():
-    figure, _ = plt.subplots()
-    assert b"<svg" in svg(figure)
-    assert not plt.fignum_exists(figure.number)

@@ -1,34 +1,31 @@
-"""The book's live pages count as the package does: loop.js in Chromium against armlock."""
+"""The book's live pages say what the package says: their engine in Chromium against armlock."""
 
 from __future__ import annotations
 
 import itertools
-from dataclasses import asdict, replace
-from pathlib import Path
+import re
+import secrets
 
 import numpy as np
 import pytest
+from matplotlib.pyplot import imread
 
-from armlock import (
-    CommonArm,
-    CountError,
-    DualArm,
-    critical_perturbation,
-    margins,
-    paper_loop,
-    rightmost_root,
-    stability_chart,
-    unstable_roots,
+from armlock import CommonArm, DualArm, paper_loop, stability_chart
+from armlock.orbits import esa
+from book._ext import year
+from tests.attack_judge import Sketch
+from tests.live_numbers import (
+    BOUNDARY,
+    LIVE,
+    UNDECIDED,
+    compare,
+    described,
+    draw,
+    open_engine,
 )
-from tests.attack import between, draw_arm, draw_delays, draw_paper, draw_point, roots, to_loop
-from tests.attack_judge import Sketch, View
 from tests.systems import sketch_of
 from tests.test_browser import needs_chromium
 from tools import check_browser
-
-LIVE = Path(__file__).parents[1] / "book" / "_static" / "live"
-#: What a count in a browser is where it is no number of roots, as `loop.js` has it.
-BOUNDARY, UNCONFINED, UNSURE = -1, -2, -3
 
 pytestmark = needs_chromium
 
@@ -41,84 +38,27 @@ def chromium():
 
 @pytest.fixture(scope="module")
 def page(chromium):
-    page = chromium.new_page()
-    page.add_script_tag(path=LIVE / "loop.js")
-    page.evaluate("() => { window.live = armlockLoop(); }")
-    return page
-
-
-def described(sketch):
-    """The description of a loop that `loop.js` takes."""
-    found = asdict(sketch)
-    for name in ("zeros", "poles"):
-        found[name] = [[complex(root).real, complex(root).imag] for root in found[name]]
-    return found
+    return open_engine(chromium)
 
 
 PAPER, COMMON, DUAL = (
     described(sketch_of(loop)) for loop in (paper_loop(), CommonArm(), DualArm())
 )
+EQUAL = {**DUAL, "tau1": 3.39, "tau2": 3.39, "difference": 0.2}
 
 
-def draw_any(rng):
-    """A loop of any sensor and up to eight poles, and a point."""
-    tau1, tau2 = draw_delays(rng)
-    longest = max(tau1, tau2)
-    low, high = 1e-4 / longest, 30.0 / longest
-    count, neutral = int(rng.integers(1, 9)), rng.random() < 0.4
-    poles = roots(rng, count, low, high, 0.15 if rng.random() < 0.3 else 0.0)
-    zeros = roots(rng, count if neutral else int(rng.integers(0, count)), low, high, 0.15)
-    for found in (zeros, poles):
-        if found and found[0].imag == 0.0 and rng.random() < 0.3:
-            found[0] = 0j
-    sketch = Sketch(
-        tuple(zeros), tuple(poles), 1.0,
-        str(rng.choice(["single", "common", "difference", "dual"])), tau1, tau2,
-        between(rng, 1e-3, 1.0) if rng.random() < 0.3 else 0.0,
-        between(rng, 0.05, 20.0), tau1 - tau2 or longest,
-    )  # fmt: skip
-    size = 1.0
-    if not neutral:
-        at = between(rng, 0.1, 30.0) / longest
-        size = abs(View(sketch, 0.3, -0.2).at(np.array([at]))[0])
-    sign = -1.0 if rng.random() < 0.15 else 1.0
-    return sketch.scaled(sign * between(rng, 0.01, 3.0) / size), draw_point(rng)
-
-
-#: Loops and points of each kind. A browser takes 70 ms for the paper's loop with its actuator.
-PAIRS = {draw_any: 2000, draw_paper: 300, draw_arm: 2700}
-
-
-def test_no_count_of_5000_differs_off_the_boundary(page):
-    """The walks share no code: other polynomials, other bounds, another end of the axis."""
-    rng = np.random.default_rng(20260)
-    cases, counts = [], []
-    for make, number in PAIRS.items():
-        for _ in range(number):
-            sketch, point = make(rng)
-            if make is draw_paper and 0.0 in sketch.poles:
-                # With a dead time these have tens of thousands of unstable roots.
-                sketch = replace(sketch, delay=0.0)
-            try:
-                counts.append(int(unstable_roots(to_loop(sketch), *point)))
-            except CountError:
-                continue
-            cases.append([described(sketch), *map(float, point)])
-    found = []
-    for first in range(0, len(cases), 500):
-        found += page.evaluate(
-            "cases => cases.map(([spec, c1, c2]) => live.count(live.make(spec), c1, c2))",
-            cases[first : first + 500],
-        )
-    hers, ours = np.array(found), np.array(counts)
-    undecided = (hers == UNSURE) | (hers == BOUNDARY) | (ours == BOUNDARY)
-    differs = np.flatnonzero((hers != ours) & ~undecided)
-    assert [(cases[k], hers[k], ours[k]) for k in differs] == []
-    # Where one of the two says that it cannot tell, the other may be able to.
-    assert ((hers == UNSURE) | ((hers == BOUNDARY) & (ours != BOUNDARY))).mean() < 0.01
-    assert len(cases) >= 4990
-    # All kinds are among them.
-    assert min((ours == 0).sum(), (ours > 0).sum(), (ours == UNCONFINED).sum()) > 100
+def test_no_number_of_loops_drawn_anew_differs(page):
+    """Those of `python -m tests.live_numbers --seed ...`, which draws more, and slow ones."""
+    seed = secrets.randbits(32)
+    print("seed", seed)
+    rng = np.random.default_rng(seed)
+    cases = (draw(rng) for _ in range(14))
+    # The paper's loop with its actuator takes 5 s in the page.
+    found = compare(page, (c for c in cases if 0.0 not in c[0].poles or len(c[0].poles) < 6))
+    assert found.wrong == []
+    # Few refusals, some 2 % of each number, and something to compare.
+    assert all(found.unsure[name] < 3 + 0.1 * asked for name, asked in found.asked.items())
+    assert min(found.asked["phase"], found.asked["root"]) >= 1
 
 
 @pytest.mark.parametrize(
@@ -128,6 +68,8 @@ def test_no_count_of_5000_differs_off_the_boundary(page):
         # One line was off by two from end to end: a crossing passed its begin.
         (COMMON, CommonArm(), -7.0, 7.0, 400),
         (DUAL, DualArm(), 0.7, 1.3, 60),
+        # Sampled frequencies were wrong here at 3 412 of 160 000 pixels.
+        (EQUAL, DualArm(tau1=3.39, tau2=3.39, difference=0.2), -3.0, 3.0, 60),
         (PAPER, paper_loop(), 1.0 - 3e-6, 1.0 + 3e-6, 60),
         (PAPER, paper_loop(), -1.2, 1.2, 60),
     ],
@@ -143,65 +85,36 @@ def test_a_chart_is_that_of_the_package_to_a_pixel(page, spec, loop, low, high, 
         for shift in itertools.product((-1, 0, 1), repeat=2)
     ]
     inner = found[1:-1, 1:-1]
-    sure = inner != UNSURE
-    assert sure.mean() > 0.95
+    sure = inner != UNDECIDED
+    assert sure.mean() > 0.97
     within = (np.min(near, axis=0) <= inner) & (inner <= np.max(near, axis=0))
     assert within[sure].all()
     clear = sure & (expected[1:-1, 1:-1] != BOUNDARY)
     assert (found == expected)[1:-1, 1:-1][clear].mean() > 0.97
 
 
-def test_break_and_margins_are_those_of_the_package(page):
-    call = "spec => live.firstBreak(live.make(spec), 1, -1)"
-    for difference in (PAPER["difference"], 0.1):
-        edge = critical_perturbation(paper_loop(difference=difference), (1, -1))
-        found = page.evaluate(call, {**PAPER, "difference": difference})
-        assert found == pytest.approx(edge, rel=1e-7)
-    found = page.evaluate("spec => live.margins(spec, 1, 1)", PAPER)
-    expected = margins(paper_loop())
-    assert found["lower"] == pytest.approx(expected.gain_lower, rel=1e-6)
-    assert found["upper"] == pytest.approx(expected.gain_upper, rel=1e-6)
-    assert found["phase"] == pytest.approx(expected.phase, rel=1e-6)
-    assert found["modulus"] == pytest.approx(expected.modulus, rel=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("spec", "loop", "centre", "half", "number"),
-    [
-        (COMMON, CommonArm(), 0.0, 7.0, 1000),
-        ({**COMMON, "delay": 0.1}, CommonArm(delay=0.1), 0.5, 1.2, 20),
-        (DUAL, DualArm(), 1.0, 0.1, 960),
-        (PAPER, paper_loop(), 1.0, 3e-6, 40),
-    ],
-)
-def test_root_and_count_at_2000_places_of_the_chapters_do_not_contradict(
-    page, spec, loop, centre, half, number
-):
-    points = centre + half * np.random.default_rng(10).uniform(-1.0, 1.0, (number, 2))
-    call = """([spec, points]) => points.map(
-        ([x, y]) => [live.count(live.make(spec), x, y), live.rightmost(spec, x, y)])"""
-    told = page.evaluate(call, [spec, points.tolist()])
-    counts = unstable_roots(loop, *points.T)
-    assert [count for count, _ in told] == counts.tolist()
-    shown = np.array([root is not None for _, root in told])
-    assert shown.mean() > 0.7
-    hers = np.array([complex(*root) if root else np.nan for _, root in told])
-    assert ((hers.real > 0) == (counts > 0))[shown].all()
-    some = np.flatnonzero(shown)[:20]
-    ours = rightmost_root(loop, *points[some].T)
-    np.testing.assert_allclose(hers.real[some], ours.real, rtol=1e-6)
-    np.testing.assert_allclose(abs(hers.imag[some]), abs(ours.imag), rtol=1e-6, atol=1e-12)
+def test_what_the_chart_cannot_decide_is_marked(page):
+    """With few samples of the axis, all that is drawn is certain still."""
+    call = (
+        "([spec, n, most]) => [...live.chart(live.make(spec), -3, 3, n, -3, 3, n, most).counts]"
+    )
+    found = np.array(page.evaluate(call, [COMMON, 20, 500])).reshape(20, 20)
+    axis = np.linspace(-3.0, 3.0, 20)
+    expected = stability_chart(CommonArm(), axis, axis).counts
+    assert 0.5 < (found == UNDECIDED).mean() < 0.95
+    assert (found == expected)[found != UNDECIDED].all()
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"tau1": 0}, "tau1 must be a positive number, got 0"),
+        ({"tau1": 0}, "τ₁ must be a positive number, got 0"),
         ({"delay": -1}, "dead time must be zero or positive"),
         ({"gain": 0}, "gain must be a number other than zero"),
         ({"zeros": [[-1, 0]] * 9}, "9 zeros and 6 poles"),
         ({"poles": [[-1, 2], [-2, 0]]}, "in conjugate pairs"),
-        ({"difference": 0}, "dtau must be a number other than zero"),
+        ({"difference": 0}, "must be a number other than zero, got 0"),
+        ({"sensor": "own"}, "unknown sensor own"),
     ],
 )
 def test_a_loop_that_is_none_is_refused_in_words(page, change, message):
@@ -209,86 +122,659 @@ def test_a_loop_that_is_none_is_refused_in_words(page, change, message):
     assert message in page.evaluate(call, {**PAPER, **change})
 
 
-@pytest.fixture
-def opened(chromium, tmp_path):
-    """Open a page with one's own loop from disk, with what follows its address."""
-    page = tmp_path / "page.html"
-    scripts = "".join(
-        f'<script src="{(LIVE / name).as_uri()}"></script>' for name in ("loop.js", "page.js")
+def test_equal_arms_and_the_limit_of_a_chain_are_decided(page):
+    """Two kinds of loop for which the page had no number."""
+    equal = Sketch((), (0j,), 0.7, "dual", 6.6, 6.6, 0.35, 2.5, 6.6)
+    delays = (0.24891151690719762, 0.24891151690719762, 0.0040138159908349605)
+    neutral = Sketch(
+        (-0.1954994891251281,), (-6.234360686368717,), 0.2623950404316682, "single", *delays
     )
-    page.write_text(f'<!DOCTYPE html><main><div data-live="loop"></div>{scripts}</main>')
-    tab, errors = chromium.new_page(), []
-    tab.on("pageerror", lambda error: errors.append(str(error)))
+    point = (0.9720616685027581, 1.0)
+    found = compare(page, iter([(equal, (1.0, 1.0)), (neutral, point)]))
+    assert found.wrong == []
+    assert found.unsure.total() == 0
+    assert found.asked["root"] >= 1
+    assert found.asked["break (1, -1)"] == 2
 
-    def open_page(fragment=""):
-        tab.goto("about:blank")
-        tab.goto(page.as_uri() + fragment)
+
+@pytest.fixture(scope="module")
+def text(chromium):
+    page = chromium.new_page()
+    page.add_script_tag(path=LIVE / "text.js")
+    return page
+
+
+READ = """([reader, typed]) => {
+    try { return armlockText[reader]("zeros", typed, "Zeros"); }
+    catch (error) { return error.field + " " + error.message; } }"""
+
+
+@pytest.mark.parametrize(
+    ("typed", "roots"),
+    [
+        ("-0.1, -0.5±2j", [-0.1, -0.5 + 2j, -0.5 - 2j]),
+        ("-0.1000 + 2.0000i\n  -0.1000 - 2.0000i", [-0.1 + 2j, -0.1 - 2j]),
+        ("[-0.1+2.j -0.1-2.j]", [-0.1 + 2j, -0.1 - 2j]),
+        ("array([(-0.1+2j), (-0.1-2j), 0j])", [0, -0.1 + 2j, -0.1 - 2j]),
+        ("1.0e+03 *\n\n  -0.5000\n  -1.0000", [-500, -1000]),
+        ("2j, -2j", [2j, -2j]),
+        ("-2*pi*0.1; 0", [-0.2 * np.pi, 0]),
+        # Rounded apart.
+        ("-0.1000+2.0001i -0.1000-2.0000i", [-0.1 + 2.00005j, -0.1 - 2.00005j]),
+        ("", []),
+    ],
+)
+def test_what_programs_print_is_read(text, typed, roots):
+    found = [complex(*pair) for pair in text.evaluate(READ, ["readRoots", typed])]
+    one, other = (np.sort_complex(np.array(v, dtype=complex)) for v in (found, roots))
+    np.testing.assert_allclose(one, other, rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("typed", "parts"),
+    [
+        ("s + 0.02\n------\ns^2 + 0.1 s", [[1, 0.02], [1, 0.1, 0]]),
+        (
+            "\nsys =\n \n  1\n  -\n  s\n \nContinuous-time transfer function.\n",
+            [[1], [1, 0]],
+        ),
+        (
+            " 5 (s+0.02)\n ----------\n  s (s+0.1)\n\nContinuous-time zero/pole/gain model.",
+            [[5, 0.1], [1, 0.1, 0]],
+        ),
+        ("(s + 1)/(s^2 + s)", [[1, 1], [1, 1, 0]]),
+        ("s + 0.02 / ------ / s^2", [[1, 0.02], [1, 0, 0]]),
+        ("C = 0.3 + 5/s", [[0.3, 5], [1, 0]]),
+        ("1/s*(s+1)", [[1, 1], [1, 0]]),
+        ("2.5e-3 s**2 - 1", [[2.5e-3, 0, -1], [1]]),
+        ("5 (s+0.02) (s^2 + 0.2s + 1)", [[5, 1.1, 5.02, 0.1], [1]]),
+        ("tf([1 0.02], [1 0.1 0])", [[1, 0.02], [1, 0.1, 0]]),
+        ("C = tf(5, [1 0]);", [[5], [1, 0]]),
+        (
+            "TransferFunction(\narray([1.  , 0.02]),\narray([1. , 0.1, 0. ]),\nname='sys[0]')",
+            [[1, 0.02], [1, 0.1, 0]],
+        ),
+        ("1\n---\nz\ndt = 0.1", "it is discrete"),
+        ("tf([1 0.02], [1 0.1 0], 0.1)", "it is discrete"),
+        ("exp(-2*s) *\n1\n---\ns", "write its dead time into the field"),
+        ("1\n---\n", "write it such as"),
+        ("s^2\n---\ns\n---\n1", "more than one line of dashes"),
+        ("s + 2j", "write it such as"),
+        ("much", "write it such as"),
+        ("", "write it such as"),
+    ],
+)
+def test_a_controller_is_read_as_programs_print_it(text, typed, parts):
+    found = text.evaluate(READ, ["readController", typed])
+    if isinstance(parts, str):
+        assert found.startswith("zeros This controller is not understood: ")
+        assert parts in found
+    else:
+        assert len(found) == 2
+        for coefficients, expected in zip(found, parts, strict=True):
+            assert coefficients == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("reader", "typed", "why"),
+    [
+        ("readRoots", "-0,1", "decimals with a point"),
+        ("readRoots", "-1,5±2j", "decimals with a point"),
+        ("readRoots", "much", "“much” is none"),
+        ("readRoots", "-0.1+2j", "come in pairs"),
+        ("readRoots", "1/0", "is none"),
+        ("readRoots", "s + 1", "is none"),
+        ("readController", "0,5 s", "decimals with a point"),
+    ],
+)
+def test_what_is_no_number_is_refused_at_its_field(text, reader, typed, why):
+    found = text.evaluate(READ, [reader, typed])
+    assert found.startswith("zeros ")
+    assert why in found
+
+
+@pytest.mark.parametrize(
+    "roots",
+    [[-1, -1, -1, -1], [-1e-6, -1e-6, -1e3, 0], [-0.1 + 3j, -0.1 - 3j, 2, 5e4]],
+)
+def test_roots_of_a_polynomial_give_it_back(page, roots):
+    coefficients = np.real(np.poly(roots))
+    found = page.evaluate("c => live.rootsOf(c)", coefficients.tolist())
+    again = np.poly([complex(*pair) for pair in found])
+    np.testing.assert_allclose(again.real, coefficients, rtol=1e-12, atol=1e-30)
+    assert abs(again.imag).max() == 0.0
+
+
+@pytest.fixture
+def show(chromium, tmp_path):
+    """Open a live part from disk, with what follows its address, in a window like this."""
+    contexts, errors = [], []
+    style = (LIVE.parent / "live.css").read_text()
+
+    def open_page(part, fragment="", live=LIVE, **window):
+        file, script = tmp_path / "page.html", (live / "page.js").as_uri()
+        head = "<meta name=viewport content='width=device-width'>"
+        file.write_text(
+            f"<!DOCTYPE html>{head}<style>* {{ box-sizing: border-box }} {style}</style>"
+            "<main class='bd-content' style='max-width: 81rem'>"
+            f"<div class='live' data-live='{part}'></div>"
+            f"<script src='{script}'></script></main>"
+        )
+        contexts.append(chromium.new_context(**{"viewport": WIDE, **window}))
+        tab = contexts[-1].new_page()
+        tab.set_default_timeout(25_000)
+        tab.add_init_script(RECORD)
+        tab.on("pageerror", lambda error: errors.append(str(error)))
+        tab.goto(file.as_uri() + fragment)
         return tab
 
     yield open_page
     assert errors == []
-    tab.close()
+    for context in contexts:
+        context.close()
+
+
+WIDE = {"width": 1280, "height": 900}
+#: Keeps what is written on canvases, newest last, and each canvas's places of lines.
+RECORD = """window.drawn = [];
+    const lineTo = CanvasRenderingContext2D.prototype.lineTo;
+    CanvasRenderingContext2D.prototype.lineTo = function (x, y) {
+        (this.places ||= []).push([x, y]);
+        lineTo.call(this, x, y);
+    };
+    const fillText = CanvasRenderingContext2D.prototype.fillText;
+    CanvasRenderingContext2D.prototype.fillText = function (text, ...more) {
+        drawn.push(text);
+        fillText.call(this, text, ...more);
+    };"""
+#: All numbers of the table are there.
+DONE = """() => document.querySelector('.live-chart [role=status].visually-hidden')
+    .textContent.includes('all numbers')"""
+
+
+@pytest.fixture
+def opened(show):
+    """Open a page with one's own loop."""
+
+    def open_page(*fragment, **window):
+        tab = show("loop", *fragment, **window)
+        tab.wait_for_selector("textarea", state="attached")
+        return tab
+
+    return open_page
+
+
+def place(page, across, down, selector=".live-chart canvas"):
+    """Return a place on a canvas, from shares of its width and height."""
+    canvas = page.locator(selector)
+    canvas.scroll_into_view_if_needed()
+    box = canvas.bounding_box()
+    return box["x"] + across * box["width"], box["y"] + down * box["height"]
 
 
 def said(page):
-    """What the chart says at a point in its middle, once the worker has answered."""
-    canvas = page.locator(".live-chart canvas")
-    canvas.scroll_into_view_if_needed()
-    box = canvas.bounding_box()
-    page.mouse.move(0, 0)
-    page.mouse.move(box["x"] + 0.4 * box["width"], box["y"] + 0.3 * box["height"])
+    """What the chart says of its point, once the worker has answered."""
     page.wait_for_function(
-        "() => /stable|root|boundary|sure/"
-        ".test(document.querySelector('.live-chart output').textContent)"
+        "() => !/counting/.test(document.querySelector('.live-chart output').textContent)"
     )
     return page.locator(".live-chart output").inner_text()
 
 
-def test_the_python_lines_make_the_loop_of_the_page(opened):
+def type_in(page, label, text):
+    field = page.get_by_label(label, exact=True)
+    field.fill(text)
+    field.blur()
+    return field
+
+
+def start(page, name):
+    page.get_by_label("Start from").select_option(name)
+
+
+def table(page):
+    page.wait_for_function(DONE)
+    rows = page.locator(".live-numbers tbody tr").all_inner_texts()
+    return {row[0]: row[1:] for row in (row.split("\t") for row in rows)}
+
+
+def test_the_pointer_previews_and_a_click_holds_until_escape(opened):
     page = opened()
-    presets = page.locator("select").first
-    names = presets.locator("option").all_inner_texts()
-    assert len(names) == 5
-    counts = set()
-    for name in names:
-        presets.select_option(name)
-        found = said(page)
-        # The lines name the point once the pointer rests.
-        page.wait_for_function(
-            "() => !document.querySelector('pre').textContent.includes('loop, 1, 1)')"
+    at_first = said(page)
+    page.mouse.move(*place(page, 0.4, 0.3))
+    assert said(page) != at_first
+    page.mouse.move(*place(page, 0.9, 0.85))
+    preview = said(page)
+    assert "2 unstable roots" in preview
+    page.mouse.move(5, 5)
+    # What follows a semicolon may come later.
+    assert said(page).startswith(at_first.split(";")[0].rstrip("."))
+    page.mouse.click(*place(page, 0.9, 0.85))
+    page.mouse.move(*place(page, 0.4, 0.3))
+    page.mouse.move(*place(page, 0.5, 0.5, ".live-top label:last-child input"))
+    held = said(page)
+    assert held.startswith(preview.split(";")[0].rstrip("."))
+    assert "Held" in held
+    page.wait_for_function("() => location.hash.includes('pt=')")
+    point = page.locator("pre").text_content().split("unstable_roots(loop, ")[1]
+    assert not point.startswith("1, 1")
+    page.locator(".live-chart canvas").focus()
+    page.keyboard.press("Escape")
+    assert said(page).startswith("(1, 1): stable")
+    page.keyboard.press("ArrowRight")
+    assert "Held" in said(page)
+
+
+@pytest.mark.parametrize("width", [1920, 1280, 390])
+def test_pictures_stand_together_at_the_top_and_the_table_last(opened, width):
+    page = opened(viewport={"width": width, "height": 900})
+    said(page)
+    canvases = page.locator(".live-main canvas")
+    chart, nyquist, bode = (canvases.nth(k).bounding_box() for k in range(3))
+    numbers = page.locator(".live-numbers").bounding_box()
+    if width > 1000:
+        assert chart["y"] == nyquist["y"] < 200
+        assert nyquist["x"] >= chart["x"] + chart["width"]
+        assert bode["y"] < 800
+        # The numbers and the fields end at about the same height: no column is empty.
+        ends = [
+            page.locator(part).evaluate(
+                "e => e.lastElementChild.getBoundingClientRect().bottom"
+            )
+            for part in (".live-main", ".live-fields")
+        ]
+        assert abs(ends[0] - ends[1]) < 600
+    else:
+        assert chart["y"] + chart["height"] < nyquist["y"] < 844
+    assert bode["y"] > nyquist["y"] + nyquist["height"]
+    assert numbers["y"] > bode["y"] + bode["height"]
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+PRINTED = """<TransferFunction>: sys[1]
+Inputs (1): ['u[0]']
+
+    s + 0.02
+  -----------
+  s^2 + 0.1 s"""
+
+
+PASTE = "Paste a controller, as MATLAB or python-control print it"
+
+
+def test_a_printed_controller_is_understood_or_refused(opened):
+    page = opened()
+    type_in(page, PASTE, PRINTED)
+    assert page.get_by_label("Start from").input_value() == ""
+    code = page.locator("pre").text_content()
+    assert "zeros=[-0.02]" in code
+    assert "poles=[0, -0.1]" in code or "poles=[-0.1, 0]" in code
+    assert page.get_by_label("Unit of roots").input_value() == "1"
+    assert "0.4 * hertz" not in code
+    assert "gain=1," in code
+    assert page.get_by_label(PASTE).input_value() == ""
+    gain = page.locator(".live-top input").first
+    gain.focus()
+    page.keyboard.press("End")
+    page.wait_for_function("() => /gain=100,/.test(document.querySelector('pre').textContent)")
+    type_in(page, PASTE, "s^2\n---\ns\n---\n1")
+    assert "more than one line of dashes" in page.locator("[role=alert]").text_content()
+    assert page.get_by_label(PASTE).get_attribute("aria-invalid") == "true"
+    page.get_by_role("button", name="Undo").click()
+    assert page.locator("[role=alert]").text_content() == ""
+    assert "gain=100," in page.locator("pre").text_content()
+    type_in(page, PASTE, "(s^3 + 1)/(s^2 + 0.1 s)")
+    assert "3 zeros and 2 poles" in page.locator("[role=alert]").text_content()
+
+
+@pytest.mark.parametrize(
+    ("fragment", "why"),
+    [
+        ("#s=dual&t1=20&t2=19", "no “g=”"),
+        ("#t1=20", "no “s=”"),
+        ("#s=single&t1=20&t2=x&g=1&z=&q=0", "“t2” must be a number"),
+        ("#s=single&t1=20&t2=19&g=1&z=&q=0&pt=1", "“pt=1” is not 2 numbers"),
+        ("#s=triple&t1=20&t2=19&g=1&z=&q=0", "unknown sensor triple"),
+        ("#s=single&t1=20&t2=19&g=1&z=-1,-2&q=0", "2 zeros and 1 poles"),
+    ],
+)
+def test_a_bad_link_is_said_and_left_as_it_is(opened, fragment, why):
+    page = opened(fragment)
+    assert why in page.locator("[role=alert]").text_content()
+    page.wait_for_timeout(500)
+    assert page.evaluate("location.hash") == fragment
+    assert page.locator(".live-numbers").inner_text() == ""
+    start(page, "Dual arm")
+    assert "stable" in said(page)
+    assert page.locator("[role=alert]").text_content() == ""
+
+
+def test_the_pictures_show_the_margins_of_the_table(opened):
+    page = opened()
+    start(page, "The white paper's loop (modified dual)")
+    phase = table(page)["Phase margin in degrees"][0]
+    assert phase == "28.6 at 1.95 Hz"
+    page.wait_for_timeout(200)
+    written = page.evaluate("drawn.slice(-400)")
+    assert "28.6° at 1.95 Hz" in written
+    assert "28.6°" in written
+    assert {"gain × 0.241", "gain × 4.27"} <= set(written)
+
+
+#: Of the Nyquist curve, drawn anew: places where two long lines turn back, as at a spike.
+SPIKES = """async () => {
+    const canvas = document.querySelectorAll('.live-main canvas')[1];
+    canvas.getContext('2d').places = [];
+    canvas.dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowRight' }));
+    await new Promise(done => setTimeout(done, 1000));
+    const places = canvas.getContext('2d').places;
+    const line = k => [0, 1].map(m => places[k][m] - places[k - 1][m]);
+    return [places.length, places.slice(2).filter((_, k) => {
+        const [a, b] = [line(k + 1), line(k + 2)], sizes = [a, b].map(v => Math.hypot(...v));
+        return Math.min(...sizes) > 15
+            && a[0] * b[0] + a[1] * b[1] < -0.8 * sizes[0] * sizes[1];
+    }).length]; }"""
+
+
+def test_the_nyquist_curve_has_no_spikes(opened):
+    page = opened()
+    start(page, "The white paper's loop (modified dual)")
+    table(page)
+    places, spikes = page.evaluate(SPIKES)
+    assert places > 1000
+    assert spikes == 0
+
+
+def test_an_unstable_chart_is_not_called_undecided(opened):
+    page = opened()
+    page.locator(".live-top input").nth(1).focus()
+    page.keyboard.press("ArrowRight")
+    assert "unstable at arbitrarily high frequency" in said(page)
+    page.wait_for_function(
+        "() => [...document.querySelectorAll('.live-note')].some(e => /in the whole chart."
+        " This is certain/.test(e.textContent))"
+    )
+
+
+def test_no_preset_has_an_undecided_number_and_all_are_closed_loops(opened):
+    page = opened()
+    assert page.get_by_role("button", name="Watch").count() == 0
+    names = page.get_by_label("Start from").locator("option").all_inner_texts()
+    assert len(names) == 7
+    for name in names[1:]:
+        start(page, name)
+        found = table(page)
+        assert found["Unstable roots"] == ["0"], name
+        assert float(found["Rightmost root in rad/s"][0].replace("−", "-").split()[0]) < 0
+        assert "undecided" not in str(found), name
+        assert page.get_by_label("Start from").input_value() == name
+
+
+def test_numbers_in_the_fields_are_short(opened):
+    page = opened()
+    assert page.get_by_label("Sensor’s corner").input_value() == "0.4"
+    assert (
+        page.get_by_label("Zeros", exact=True).input_value()
+        == "0, 0, -1e-8, -5e-6, -5e-6, -5e-6"
+    )
+    code = page.locator("pre")
+    scopes: list[dict[str, object]] = []
+    for unit in ("hz", "1"):
+        page.get_by_label("Unit of roots").select_option(unit)
+        scopes.append({})
+        exec(code.text_content(), scopes[-1])
+        assert scopes[-1]["controller"] == paper_loop().controller
+
+
+def test_errors_stand_at_the_field_that_was_edited(opened):
+    page = opened()
+    for label, typed, message in (
+        ("Gain", "much", "The gain must be a number, got “much”."),
+        ("Poles", "-0,1", "Write decimals with a point"),
+        ("Poles", "-0.1", "6 zeros and 1 poles"),
+        ("Zeros", "1, 2, 3, 4, 5, 6, 7", "7 zeros and 6 poles"),
+        ("Delay τ₁ in s", "0", "τ₁ must be a positive number"),
+    ):
+        before = page.get_by_label(label, exact=True).input_value()
+        field = type_in(page, label, typed)
+        assert (
+            message in page.locator(f"#{field.get_attribute('aria-describedby')}").inner_text()
         )
-        scope: dict[str, object] = {}
-        lines = page.locator("pre").inner_text().replace("print(", "count = (")
-        exec(lines, scope)
-        count = int(scope["count"])  # type: ignore[call-overload]
-        word = "stable" if count == 0 else f"{count} unstable root"
-        assert word in found, (name, found, count)
-        counts.add(count)
-    assert len(counts) > 1
+        assert field.get_attribute("aria-invalid") == "true"
+        assert "no loop" in page.locator(".live-chart output").inner_text()
+        assert page.locator(".live-numbers").inner_text() == ""
+        assert page.locator("pre").text_content() == ""
+        type_in(page, label, before)
+        assert field.get_attribute("aria-invalid") is None
 
 
-def test_the_address_holds_loop_and_view(opened):
+def test_sliders_follow_what_is_typed(opened):
     page = opened()
-    page.locator("select").first.select_option("Dual arm")
-    page.locator("textarea").first.fill("-0.5±2j")
-    page.locator("textarea").last.fill("0, -0.1, -3±1j")
-    page.locator("textarea").last.blur()
+    dead = page.locator(".live-top input").nth(1)
+    field = type_in(page, "Dead time in s", "1e9")
+    type_in(page, "Dead time in s", "0.25")
+    assert float(dead.input_value()) == pytest.approx(0.25)
+    assert float(dead.get_attribute("step")) == pytest.approx(0.005)
+    assert page.get_by_label("Start from").input_value() == ""
+    start(page, "The paper's controlled loop")
+    assert field.input_value() == "0"
+    # No error in the page, though this count takes long.
+    type_in(page, "Delay τ₁ in s", "1e9")
+    page.wait_for_timeout(500)
+
+
+def test_undo_goes_back_through_the_address(opened):
+    page = opened()
+    undo = page.get_by_role("button", name="Undo")
+    assert undo.is_disabled()
+    type_in(page, "Gain", "4000")
+    page.mouse.click(*place(page, 0.9, 0.85))
+    page.get_by_role("button", name="Zoom out").click()
+    type_in(page, PASTE, PRINTED)
+    for gain, held in (("4000", True), ("4000", False), ("5000", False)):
+        undo.click()
+        page.wait_for_function(
+            """([gain, held]) => {
+                const text = name => document.querySelector(name).textContent;
+                return text('pre').includes(`gain=${gain},`)
+                    && text('.live-chart output').includes('Held') === held; }""",
+            arg=[gain, held],
+        )
+    assert page.get_by_label("Zeros", exact=True).is_visible()
+
+
+def test_a_pole_follows_the_pointer(opened):
+    page = opened()
+    start(page, "Common arm with a lead filter and a dead time")
+    poles = page.get_by_label("Poles", exact=True)
+    before = table(page)["Rightmost root in rad/s"]
+    assert poles.input_value() == "0, -0.1"
+    for across in range(5, 50):
+        page.mouse.move(*place(page, across / 100, 0.5, ".live-fields canvas"))
+        if page.locator(".live-fields canvas").evaluate("c => c.style.cursor") == "grab":
+            break
+    page.mouse.down()
+    page.mouse.move(*place(page, 0.12, 0.6, ".live-fields canvas"), steps=5)
+    page.mouse.up()
+    moved = (
+        poles.input_value() + page.get_by_label("Zeros", exact=True).input_value()
+    ).replace("0, ", "")
+    assert moved != "-0.1-0.02"
+    assert "j" not in moved
+    assert table(page)["Rightmost root in rad/s"] != before
+
+
+def test_the_address_holds_all(opened):
+    page = opened()
+    start(page, "Dual arm")
+    type_in(page, "Zeros", "-0.5±2j")
+    type_in(page, "Poles", "0, -0.1, -3±1j")
     page.get_by_role("button", name="Zoom in").click()
-    page.wait_for_function("() => location.hash.includes('0.15')")
-    fragment = page.evaluate("location.hash")
-    read = "() => [...document.querySelectorAll('input, textarea')].map(e => e.value)"
-    before = page.evaluate(read)
-    again = opened(fragment)
-    again.wait_for_function("() => location.hash.includes('0.15')")
+    page.mouse.click(*place(page, 0.6, 0.4))
+    page.wait_for_function(
+        "() => location.hash.includes('0.15') && location.hash.includes('pt=')"
+    )
+    read = """() => [...document.querySelectorAll('input:not([type=range]), textarea, select')]
+        .slice(1).map(e => e.value)"""
+    before, point = page.evaluate(read), said(page)
+    again = opened(page.evaluate("location.hash"))
     assert again.evaluate(read) == before
-    assert "-0.5±2j" in before
-    assert "0, -0.1, -3±1j" in before
+    assert {"-0.5±2j", "0, -0.1, -3±1j"} <= set(before)
+    assert said(again).split(":")[0] == point.split(":")[0]
 
 
-def test_a_wrong_number_is_named_and_changes_nothing(opened):
+def test_the_regions_are_drawn_while_a_slider_is_held(opened):
+    # A chart dropped at each move would leave the one before until the slider rests.
     page = opened()
-    gain = page.get_by_label("Gain", exact=True)
-    gain.fill("much")
-    gain.blur()
-    assert "gain must be a number, got much" in page.locator(".live-wrong").inner_text()
-    assert "gain=5000," in page.locator("pre").inner_text()
+    start(page, "Common arm")
+    said(page)
+    # How orange a corner is: full of roots, which at ten times the gain a coarse chart cannot
+    # tell.
+    read = """() => { const c = document.querySelector('.live-chart canvas'), n = c.width;
+        const { data } = c.getContext('2d').getImageData(0.85 * n, 0.1 * n, 0.08 * n, 0.08 * n);
+        let sum = 0;
+        for (let i = 0; i < data.length; i += 4) sum += data[i] - data[i + 2];
+        return 4 * sum / data.length; }"""
+    page.wait_for_function(f"() => ({read})() > 20")
+    before = page.evaluate(read)
+    page.evaluate(
+        """() => { const slider = document.querySelector('input[type=range]'); let k = 0;
+            const drag = () => { slider.value = 1 + 1e-3 * (k++ % 100);
+                slider.dispatchEvent(new Event('input', { bubbles: true }));
+                requestAnimationFrame(drag); };
+            drag(); }"""
+    )
+    page.wait_for_function(f"before => ({read})() < 0.25 * before", arg=before)
+
+
+def test_a_frequency_lights_up_in_all_plots(opened):
+    page = opened()
+    start(page, "Common arm")
+    table(page)
+    nyquist = page.locator(".live-main canvas").nth(1)
+    before = nyquist.evaluate("c => c.toDataURL()")
+    page.mouse.move(*place(page, 0.6, 0.3, ".live-main canvas >> nth=2"))
+    page.wait_for_function(
+        "() => [...document.querySelectorAll('.live-note')]"
+        ".some(e => /Hz: \\|L\\| = .*\\|S\\| =/.test(e.textContent))"
+    )
+    assert nyquist.evaluate("c => c.toDataURL()") != before
+
+
+def test_two_designs_stand_side_by_side(opened):
+    page = opened()
+    start(page, "Common arm")
+    alone = table(page)
+    page.get_by_role("button", name="Pin this loop").click()
+    type_in(page, "Gain", "0.5")
+    beside = table(page)
+    assert [row[-1:] for row in beside.values()] == [row[-1:] for row in alone.values()]
+    assert sum(row[:1] != row[1:] for row in beside.values() if row) >= 3
+
+
+def test_the_picture_that_is_saved_is_wide_and_has_a_ground(opened, tmp_path):
+    page = opened()
+    said(page)
+    with page.expect_download() as download:
+        page.get_by_role("button", name="PNG").click()
+    file = tmp_path / "loop.png"
+    download.value.save_as(file)
+    picture = imread(file)
+    assert picture.shape[:2] == (1600, 1600)
+    assert picture.shape[2] == 3 or (picture[..., 3] == 1.0).all()
+
+
+def test_fingers_scroll_past_drag_zoom_and_hold(opened):
+    tab = opened(viewport={"width": 390, "height": 844}, has_touch=True)
+    said(tab)
+    x, y = place(tab, 0.5, 0.4)
+    session = tab.context.new_cdp_session(tab)
+
+    def touch(kind, *points):
+        places = [{"x": u, "y": v, "id": k} for k, (u, v) in enumerate(points)]
+        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": places})
+
+    def drag(start, stop):
+        touch("touchStart", *start)
+        for share in (0.1, 0.3, 0.6, 1.0):
+            touch("touchMove", *[
+                (a + share * (u - a), b + share * (v - b))
+                for (a, b), (u, v) in zip(start, stop, strict=True)
+            ])  # fmt: skip
+        touch("touchEnd")
+
+    def view():
+        tab.wait_for_timeout(400)
+        return tuple(
+            float(v)
+            for v in tab.evaluate("location.hash").split("at=")[1].split("&")[0].split("%2C")
+        )
+
+    tab.get_by_role("button", name="Zoom out").click()
+    x, y = place(tab, 0.5, 0.4)
+    before = view()
+    drag([(x, y)], [(x + 60, y)])
+    moved = view()
+    assert moved[0] < before[0]
+    assert moved[2] == pytest.approx(before[2])
+    drag([(x - 20, y), (x + 20, y)], [(x - 60, y), (x + 60, y)])
+    assert view()[2] == pytest.approx(before[2] / 3, rel=0.2)
+    tab.touchscreen.tap(x, y)
+    assert "Held" in said(tab)
+    # A vertical swipe is the page's.
+    tab.evaluate("window.scrollTo(0, 0)")
+    x, y = place(tab, 0.3, 0.7)
+    at = tab.evaluate("scrollY")
+    drag([(x, y)], [(x, y - 200)])
+    tab.wait_for_function("at => scrollY > at + 50", arg=at)
+
+
+@pytest.fixture
+def year_page(show, tmp_path):
+    """Open the page of a year."""
+    live = tmp_path / "live"
+    live.mkdir()
+    for file in LIVE.glob("*.js"):
+        (live / file.name).write_text(file.read_text())
+    (live / "orbits.js").write_text(year.table())
+    return lambda *fragment: show("year", *fragment, live=live, reduced_motion="reduce")
+
+
+def test_the_year_takes_the_loop_of_the_page(opened, year_page):
+    page = opened()
+    start(page, "Dual arm")
+    type_in(page, "Gain", "7")
+    link = page.get_by_role("link", name="Open this loop in orbit").get_attribute("href")
+    assert link.startswith("in_orbit.html#s=dual")
+    tab = year_page(link.removeprefix("in_orbit.html"))
+    back = tab.get_by_role("link", name="Open the loop of this day")
+    assert "g=7&" in back.get_attribute("href")
+    assert tab.locator("select").first.input_value().startswith("yours")
+    assert "Dashed: the half difference" in tab.locator("figcaption").first.inner_text()
+
+
+def test_the_year_marks_the_days_on_which_the_package_finds_no_stable_loop(year_page):
+    tab = year_page()
+    for k, name in enumerate(("the paper's", "trailing", "2", "a month's start")):
+        tab.locator("select").nth(k).select_option(name)
+    words = tab.locator("p", has_text="counted once a day")
+    words.wait_for()
+    told = re.findall(r"(\d+)(?: to (\d+))?", words.inner_text().split(".")[0])
+    shown = {day for low, high in told for day in range(int(low), int(high or low) + 1)}
+    orbit, days = esa("trailing"), np.arange(366.0)
+    month = 365.25 / 12
+    starts = month * np.floor(days / month)
+    first = orbit.span[0]
+    now, assumed = (orbit.round_trips(first + 86400.0 * t, 2) for t in (days, starts))
+    ratio = (now[0] - now[1]) / (assumed[0] - assumed[1])
+    # The edges of chapter 13.
+    low, high = 0.20038, 3.9974
+    clear = np.abs(np.log(np.abs(ratio)[:, None] / [low, high])).min(axis=1) > 1e-3
+    expected = (ratio < low) | (ratio > high)
+    assert expected[clear].any()
+    assert [d for d in np.flatnonzero(clear) if (d in shown) != expected[d]] == []
+    day = tab.locator(".live-day output")
+    before = int(day.inner_text())
+    tab.get_by_role("button", name="A week on").click()
+    assert int(day.inner_text()) == before + 7
+    one, two = (tau[before + 7] for tau in now)
+    assert f"{one:.4f} s and {two:.4f} s" in tab.locator("main").inner_text()

@@ -1,8 +1,14 @@
+import copy
+import pickle
+
+import control
+import mpmath
 import numpy as np
 import pytest
 
 from armlock import (
     CommonArm,
+    Controller,
     DualArm,
     Loop,
     SingleArm,
@@ -11,6 +17,7 @@ from armlock import (
 from armlock.controllers import integrating_actuator
 from armlock.paper import DUAL_SENSOR_CORNER
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, SignalMapping, dual, modified_dual
+from tests import independent
 
 MODIFIED = modified_dual(0.5 * (33.855 + 33.345), 0.5 * (33.855 - 33.345))
 S = np.array([0.01j, 0.3 + 0.2j, -0.1 + 2j, 1.5])
@@ -19,15 +26,17 @@ S = np.array([0.01j, 0.3 + 0.2j, -0.1 + 2j, 1.5])
 def test_single_and_common_arm_are_the_equations_of_the_paper():
     g, tau1, tau2, c1, c2 = 0.7, 2.1, 1.9, 0.9, 1.2
     late1, late2 = g * c1 * np.exp(-S * tau1), g * c2 * np.exp(-S * tau2)
-    np.testing.assert_allclose(SingleArm(g, tau1)(S, c1, 5.0), S + g - late1, rtol=1e-13)
+    single = SingleArm(g, tau1).characteristic(S, c1, 5.0)
+    np.testing.assert_allclose(single, S + g - late1, rtol=1e-13)
     common = S + 2.0 * g - late1 - late2
-    np.testing.assert_allclose(CommonArm(g, tau1, tau2)(S, c1, c2), common, rtol=1e-13)
+    found = CommonArm(g, tau1, tau2).characteristic(S, c1, c2)
+    np.testing.assert_allclose(found, common, rtol=1e-13)
 
 
 @pytest.mark.parametrize("mapping", [SINGLE, COMMON, DIFFERENCE, dual(2.0, 0.2)])
 def test_characteristic_function_vanishes_where_the_return_difference_does(mapping):
     loop = Loop(integrating_actuator(0.4), mapping, 2.1, 1.9)
-    ratio = loop(S, 0.9, 1.1) / (1.0 + loop.open_loop(S, 0.9, 1.1))
+    ratio = loop.characteristic(S, 0.9, 1.1) / (1.0 + loop(S, 0.9, 1.1))
     denominator = S * np.polyval(list(mapping.denominator)[::-1], S)
     np.testing.assert_allclose(ratio, denominator, rtol=1e-11)
 
@@ -44,7 +53,8 @@ def test_polynomials_of_different_length_share_their_zeros_at_zero():
         Loop(((), (-1.0,), 0.5), mapping, 2.0, 1.5) for mapping in (cancelled, SINGLE)
     )
     for name in ("rest", "b1", "b2"):
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+        left, right = getattr(one, name), getattr(other, name)
+        np.testing.assert_array_equal(left.coefficients, right.coefficients)
 
 
 def test_zeros_in_front_of_a_denominator_do_not_make_a_loop_proper():
@@ -56,35 +66,98 @@ def test_zeros_in_front_of_a_denominator_do_not_make_a_loop_proper():
 def test_a_controller_given_as_a_triple_takes_the_actuator():
     one = paper_loop(controller=((), (-1.0,), 2.0), actuator=True)
     other = paper_loop(controller=((), (-1.0, 0.0), 2.0))
-    np.testing.assert_array_equal(one.open_loop(S), other.open_loop(S))
+    np.testing.assert_array_equal(one(S), other(S))
 
 
 K = ((-0.02,), (0.0, -0.1), 1.0)
 
 
 def test_a_loop_of_ones_own_as_one_guesses_it():
-    """Sensors by name, no tau2 without an arm 2, the paper's arms with another controller."""
+    """Sensors by name, and no tau2 without an arm 2."""
     pairs = [
-        (SingleArm(controller=K, tau=20.0, delay=20e-6), Loop(K, SINGLE, 20.0, 20.0, 20e-6)),
-        (CommonArm(controller=K), Loop(K, "common", 20.1, 19.9)),
-        (DualArm(controller=K), Loop(K, "dual", 20.1, 19.9)),
-        (Loop(K, dual(DUAL_SENSOR_CORNER, 20.1 - 19.9), 20.1, 19.9), DualArm(controller=K)),
+        (Loop(K, "single", 20.0, delay=20e-6), Loop(K, SINGLE, 20.0, 20.0, 20e-6)),
+        (SingleArm(tau1=20.0).replace(tau1=19.0), Loop(((), (0.0,), 1.0), SINGLE, 19.0)),
+        (Loop(K, "common", 20.1, 19.9), Loop(K, COMMON, 20.1, 19.9)),
+        (Loop(K, "dual", 20.1, 19.9), Loop(K, dual(DUAL_SENSOR_CORNER, 0.2), 20.1, 19.9)),
         (Loop(K, "single", tau1=20.0), Loop(K, SINGLE, 20.0, 19.0)),
         (Loop(K, "difference", 20.1, 19.9), Loop(K, DIFFERENCE, 20.1, 19.9)),
         (Loop(K, "modified dual", 33.855, 33.345), Loop(K, MODIFIED, 33.855, 33.345)),
     ]
     for one, other in pairs:
-        assert one.plain() == other.plain()
         assert one.controller == other.controller
+        for p, q in zip(one.polynomials(), other.polynomials(), strict=True):
+            np.testing.assert_allclose(p.coefficients, q.coefficients, rtol=1e-12)
 
 
-def test_what_is_missing_or_doubled_is_named():
+PLANT = control.tf([1.0], [1.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    "guess",
+    [
+        control.ss,
+        control.tf,
+        control.frd,
+        control.feedback,
+        control.bode_plot,
+        control.nyquist_plot,
+        control.step_response,
+        control.poles,
+        lambda loop: control.feedback(PLANT, loop),
+        lambda loop: control.series(PLANT, loop),
+        lambda loop: control.parallel(loop, PLANT),
+        lambda loop: control.frequency_response(loop, [0.1, 1.0]),
+        lambda loop: loop * PLANT,
+        lambda loop: PLANT * loop,
+        lambda loop: loop.feedback(),
+    ],
+)
+def test_python_control_says_what_to_write_for_a_loop(guess):
+    for loop in (CommonArm(), Loop(K, "single", 20.0)):
+        with pytest.raises((TypeError, AttributeError), match=r"write loop\.frd\(omega\)"):
+            guess(loop)
+
+
+def test_python_control_reports_another_error_for_margins_of_a_loop(capsys):
+    """It catches what it is told, prints this, and raises its own error from it."""
+    with pytest.raises(ValueError, match="Margin sysdata") as error:
+        control.margin(CommonArm())
+    assert "armlock.margins(loop)" in str(error.value.__context__)
+    assert "armlock.margins(loop)" in capsys.readouterr().out
+
+
+def test_advice_does_not_change_what_a_loop_is():
+    loop = CommonArm()
+    assert loop.__class__ is CommonArm
+    assert not hasattr(loop, "gains")
+    assert copy.copy(loop) == pickle.loads(pickle.dumps(loop)) == loop
+
+
+@pytest.mark.parametrize("arm", [SingleArm, CommonArm, DualArm])
+@pytest.mark.parametrize("controller", [Controller(*K), K, PLANT])
+def test_a_controller_in_place_of_a_gain_is_told_what_to_write(arm, controller):
+    with pytest.raises(TypeError, match=r"(?s)^gain must .* write Loop\(controller, "):
+        arm(controller, 20.0)
+
+
+def test_what_is_missing_is_named():
+    with pytest.raises(TypeError, match=r"^mapping must be .* as in Loop\(controller, 's"):
+        Loop(K, 20.0)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match=r"^tau1 must be given"):
+        Loop(K, "single")
     with pytest.raises(TypeError, match=r"^tau2 must be given: the signal mapping 'common'"):
         Loop(K, "common", tau1=20.0)
     with pytest.raises(ValueError, match=r"^mapping must be .* 'modified dual'; got 'triple'"):
-        Loop(K, "triple", 20.1, 19.9)
-    with pytest.raises(ValueError, match=r"^gain must be None where a controller takes"):
-        CommonArm().replace(controller=K)
-    assert CommonArm().replace(gain=None, controller=K) == CommonArm(controller=K)
+        Loop(K, "triple", tau1=20.0)
     with pytest.raises(ValueError, match=r"^s must not be a pole of the open loop, got 0j"):
-        CommonArm().open_loop([1j, 0.0])
+        CommonArm()([1j, 0.0])
+
+
+def test_next_to_equal_parameters_the_response_keeps_its_digits():
+    """There the integrated difference of the dual arm is small beside the two signals."""
+    c1, c2, omega = 0.5, 0.5 + 2.0**-38, 1e-14
+    loop = DualArm(gain=1.0, corner=0.7)
+    with mpmath.workdps(50):
+        expected = complex(independent.exact(loop, mpmath.mpc(0, omega), c1, c2) - 1)
+    above, below = loop.quotient(c1, c2)
+    assert (above.at([omega]) / below.at([omega]))[0] == pytest.approx(expected, rel=1e-12)

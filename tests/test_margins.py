@@ -7,28 +7,28 @@ from fractions import Fraction
 import mpmath
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from armlock import (
     BOUNDARY,
     CommonArm,
     Controller,
     CountError,
+    DelaySystem,
     DualArm,
     Loop,
     SingleArm,
     critical_perturbation,
-    flight_loop,
+    delay,
     margins,
     modulus_margin,
     paper_loop,
+    stability_chart,
     unstable_roots,
 )
-from armlock.loops import LoopAt
-from armlock.robustness import free_phases, gains
-from armlock.robustness.gains import gain_interval
-from armlock.robustness.rays import first_crossing
+from armlock.engine.polynomials import Polynomial
+from armlock.robustness import gain_interval, perturbations
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
-from armlock.stability.counts import loop_count
 from tests import independent
 from tests.attack import Tally, check_margins, to_loop
 from tests.systems import sketch_of
@@ -97,10 +97,10 @@ def test_margins_are_those_of_branch_and_bound(name):
             assert [unstable_roots(k, *point) == 0 for k in near] == [True, False]
     # Gain and phase are met where they are said to be taken.
     if np.isfinite(found.gain_omega):
-        value = complex(loop.open_loop(1j * found.gain_omega, *point))
+        value = complex(loop(1j * found.gain_omega, *point))
         assert found.gain_upper * value == pytest.approx(-1.0, rel=1e-6)
     if np.isfinite(found.phase_omega):
-        value = complex(loop.open_loop(1j * found.phase_omega, *point))
+        value = complex(loop(1j * found.phase_omega, *point))
         assert abs(value) == pytest.approx(1.0, rel=1e-9)
         assert abs(np.angle(-value)) == pytest.approx(found.phase, abs=1e-9)
 
@@ -111,29 +111,6 @@ def test_the_limit_of_the_chain_limits_the_gain():
     found = margins(loop, *point)
     assert found.gain_upper == pytest.approx(1.0 / 0.78, rel=1e-12)
     assert found.gain_omega == np.inf
-
-
-def test_the_factors_of_a_loop_show_where_it_is_real():
-    """This is looked at where rounding hides the sign of Im L in sums of exponentials."""
-    loop, (c1, c2) = STABLE["oscillator"]
-    omega = margins(loop, c1, c2).gain_omega
-    stretch = omega + 1e-6 * np.array([[-2.0], [0.5], [1.0]])
-    assert gains._real_within(LoopAt(loop, c1, c2), stretch) == pytest.approx(
-        [omega], rel=1e-12
-    )
-
-
-@pytest.mark.parametrize("direction", [(0, -1), (1, 0), (0, 1), (-1, 0), (1, -1)])
-def test_the_modulus_margin_vanishes_where_the_loop_breaks(direction):
-    """A root next to the axis makes a dip of |1 + L| that hides between samples."""
-    loop = paper_loop()
-    eps = critical_perturbation(loop, direction)
-    margin = [
-        modulus_margin(loop, *(1.0 + eps * (1.0 - gap) * np.array(direction)))
-        for gap in (1e-4, 1e-5)
-    ]
-    assert margin[1] < 0.05
-    assert margin[1] == pytest.approx(0.1 * margin[0], rel=0.01)
 
 
 # ---------------------------------------------------------- the first perturbation that breaks
@@ -159,7 +136,7 @@ def test_critical_perturbation_to_nine_digits(angle):
     omega = np.concatenate(
         (np.geomspace(1e-7, 60.0, 200_001), 62.831853072 + np.linspace(-1e-8, 1e-8, 20_001))
     )
-    away = np.abs(1.0 + loop.open_loop(1j * omega, *(1.0 + eps * direction)))
+    away = np.abs(1.0 + loop(1j * omega, *(1.0 + eps * direction)))
     near = float(omega[np.argmin(away)])
     where, truth = exact(loop, direction, near, eps)
     assert where == pytest.approx(near, rel=1e-3)
@@ -170,7 +147,7 @@ def test_critical_perturbation_to_nine_digits(angle):
     ("loop", "direction"),
     [
         (SingleArm(), (-1.0, 0.0)),
-        (SingleArm(gain=3.0, tau=2.0), (-2.0, 5.0)),
+        (SingleArm(gain=3.0, tau1=2.0), (-2.0, 5.0)),
         (CommonArm(), (-1.0, 0.3)),
         (CommonArm(), (-1.0, -1.0)),
         (CommonArm(gain=0.1), (-0.2, -1.0)),
@@ -180,7 +157,7 @@ def test_critical_perturbation_to_nine_digits(angle):
     ],
 )
 def test_critical_perturbation_from_the_boundary_inwards(loop, direction):
-    assert unstable_roots(loop, 1.0, 1.0) == BOUNDARY
+    assert unstable_roots(loop.plain(), 1.0, 1.0) == BOUNDARY
     eps = critical_perturbation(loop, direction)
     shares = [*np.geomspace(1e-5, 0.99, 20), 1.0 - 1e-9, 1.0 + 1e-9]
     counts = unstable_roots(loop, *(1.0 + eps * np.outer(direction, shares)))
@@ -188,29 +165,49 @@ def test_critical_perturbation_from_the_boundary_inwards(loop, direction):
     assert counts[-1] > 0
 
 
-@pytest.mark.parametrize(
-    ("loop", "direction"),
-    [
-        (SingleArm(), (1.0, 0.0)),
-        (CommonArm(), (1.0, 0.0)),
-        (CommonArm(), (1.0, -0.5)),
-        (DualArm(), (0.0, -1.0)),
-        # Out of its way along the boundary by a rounding of the direction.
-        (CommonArm(), (1.0, np.nextafter(-1.0, 0.0))),
-    ],
-)
-def test_nothing_is_left_where_the_direction_leads_out(loop, direction):
-    assert critical_perturbation(loop, direction) == 0.0
+def weak(gain, sensor):
+    return Loop(((), (-1.0,), gain), sensor, 20.0, 19.0)
+
+
+KNOWN = [
+    # Out of the stable region at once, the last by a rounding of the direction.
+    (SingleArm(), (1.0, 0.0), 0.0),
+    (CommonArm(), (1.0, -0.5), 0.0),
+    (DualArm(), (0.0, -1.0), 0.0),
+    (CommonArm(), (1.0, np.nextafter(-1.0, 0.0)), 0.0),
+    # s + 1 + k (1 - c1 e1) has the real root 0 where k c1 = 1 + k.
+    (weak(1e-5, COMMON), (1.0, 0.0), 1e5),
+    (weak(1e-8, SINGLE), (1.0, 0.0), 1e8),
+    (weak(1e-8, COMMON), (1.0, 0.0), 1e8),
+    # Not within parameters of a billion; an arm that the sensor does not see.
+    (weak(1e-12, COMMON), (1.0, 0.0), np.inf),
+    (weak(1e-5, SINGLE), (0.0, 1.0), np.inf),
+    # No pair comes to the axis of a common arm with equal arms: only c1 + c2 acts.
+    (CommonArm(1.0, 20.0, 20.0), (1.0, -1.0), np.inf),
+    # The chain, at 1 / (5000 1e-4).
+    (paper_loop(), (1.0, 1.0), 1e-4),
+]
+
+
+@pytest.mark.parametrize(("loop", "direction", "eps"), KNOWN)
+def test_critical_perturbation_where_it_is_known(loop, direction, eps):
+    assert critical_perturbation(loop, direction) == pytest.approx(eps, rel=1e-9)
+
+
+def test_a_direction_that_leads_in_by_a_rounding_does_not_lead_out():
+    """The root that leaves s = 0 goes left, by 1e-16 rad/s; another root crosses first."""
+    inwards, along = (
+        critical_perturbation(CommonArm(), (1.0, d2)) for d2 in (np.nextafter(-1.0, -2.0), -1.0)
+    )
+    assert inwards == pytest.approx(along, rel=1e-9)
 
 
 @pytest.mark.parametrize("size", [1.0, 0.3])
 def test_along_the_line_on_which_the_root_at_zero_cancels_another_root_is_first(size):
-    # No pair comes to the axis of a common arm with equal arms: only c1 + c2 acts.
-    assert critical_perturbation(CommonArm(1.0, 20.0, 20.0), (size, -size)) == np.inf
     for loop, direction in ((CommonArm(), (size, -size)), (DualArm(), (size, size))):
         eps = critical_perturbation(loop, direction)
         found = [
-            loop_count(loop, *(1 + Fraction(share * eps) * Fraction(d) for d in direction))
+            unstable_roots(loop, *(1 + Fraction(share * eps) * Fraction(d) for d in direction))
             for share in (1e-6, 0.5, 1.0 - 1e-9, 1.0 + 1e-9)
         ]
         assert found == [0, 0, 0, 2]
@@ -222,7 +219,7 @@ def test_along_the_line_on_which_the_root_at_zero_cancels_another_root_is_first(
 def test_the_ideal_point_has_the_margins_that_its_neighbours_tend_to(loop):
     # Next to it, inside, a slow real root leaves all as it is at higher frequency.
     ideal, near = margins(loop), margins(loop, 1.0 - 2e-9, 1.0 - 1e-9)
-    for name in ("gain_upper", "phase", "delay", "modulus", "disk", "modulus_omega"):
+    for name in ("gain_upper", "phase", "delay", "modulus", "modulus_omega"):
         assert getattr(ideal, name) == pytest.approx(getattr(near, name), rel=1e-5), name
 
 
@@ -234,154 +231,139 @@ def test_a_gain_that_takes_a_real_root_to_zero_is_that_of_the_finite_open_loop()
 
 @pytest.mark.parametrize("loop", [SingleArm(50.0, 10.0, 0.05), DualArm(gain=10.0, delay=1.0)])
 def test_roots_behind_the_one_at_zero_are_not_passed_over(loop):
-    assert unstable_roots(loop, 1.0, 1.0) == BOUNDARY
-    with pytest.raises(ValueError, match=r"must be stable at .* but loop_count gives \d"):
+    assert unstable_roots(loop.plain(), 1.0, 1.0) == BOUNDARY
+    assert unstable_roots(loop) > 0
+    with pytest.raises(
+        ValueError, match=r"must be stable to have margins, but it has \d+ unstable roots"
+    ):
         margins(loop)
-    with pytest.raises(ValueError, match=r"to lose stability, but loop_count gives \d"):
+    with pytest.raises(ValueError, match=r"to lose stability, but unstable_roots gives \d"):
         critical_perturbation(loop, (-1.0, -1.0))
 
 
-@pytest.mark.parametrize(
-    ("mapping", "gain", "direction"),
-    [
-        (SINGLE, 0.3, (0.0, 1.0)),  # an arm that the sensor does not see
-        (COMMON, 1e-12, (1.0, 0.0)),  # not within parameters of a billion
-    ],
-)
-def test_what_never_breaks_is_said_not_to(mapping, gain, direction):
-    loop = Loop(((), (-1.0,), gain), mapping, 20.0, 19.0)
-    assert critical_perturbation(loop, direction) == np.inf
+def test_undamped_poles_bound_no_gain():
+    """A crossing through infinity is none; the two factors are those of a dense sample."""
+    plant = Controller([-0.5], [1j, -1j], 0.5)
+    loop = Loop(plant, SINGLE, 0.1, 0.1, delay=0.1)
+    lower, upper, omega = gain_interval(loop, 0.0)
+    assert (lower, round(upper, 2)) == (0.0, 30.62)
+    crossing = np.linspace(1.5, 40.0, 400_001)
+    response = 0.5 * (1j * crossing + 0.5) / (1.0 - crossing**2) * np.exp(-0.1j * crossing)
+    near = np.argmin(np.abs(crossing - omega))
+    assert -1.0 / response[near].real == pytest.approx(upper, rel=1e-4)
+    found = margins(loop, 0.0)
+    others = found.phase, found.delay, found.modulus
+    assert others == pytest.approx((1.0741, 0.82432, 0.898115), rel=1e-4)
+    assert (np.abs(response.imag[response.real < -1.0 / upper * (1.0 + 1e-6)]) > 0.0).all()
 
 
-def test_the_length_of_the_direction_scales_the_result():
-    expected = critical_perturbation(paper_loop(), (0.5, -1.0))
-    for size in (1e-8, 10.0, 1e8):
-        found = critical_perturbation(paper_loop(), (0.5 * size, -size))
-        assert found == pytest.approx(expected / size, rel=1e-9)
+def test_a_count_that_contradicts_the_first_break_is_refused(monkeypatch):
+    monkeypatch.setattr(perturbations, "first_zero", lambda *_: (1e-6, 1.0))
+    with pytest.raises(CountError, match="contradict"):
+        critical_perturbation(paper_loop(), (1.0, -1.0))
 
 
-@pytest.mark.parametrize("direction", [(0.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, -1.0)])
-def test_a_dead_time_far_below_the_crossing_period_changes_little(direction):
-    """With it the chain ends at 1e5 rad/s only; these crossings lie below 30 rad/s."""
-    plain = critical_perturbation(flight_loop(), direction)
-    found = critical_perturbation(flight_loop(delay=1e-6), direction)
-    assert found != plain
-    assert found == pytest.approx(plain, rel=1e-7)
+@pytest.mark.parametrize("seed", range(8))
+def test_gains_of_nearly_equal_arms_at_a_resonance_are_those_of_one_delay(seed):
+    """The difference of equal arms is L = K (c1 - c2) exp(-s tau): its phase only descends.
+
+    Where it is an odd number of half turns, L is real and negative.
+    """
+    rng = np.random.default_rng(seed)
+    tau, quality = 10.0 ** rng.uniform([-1.0, 2.0], [1.5, 5.5])
+    size, apart = 10.0 ** rng.uniform(-1.0, 2.0) / tau, 10.0 ** rng.uniform(-9.0, -6.0)
+    pole = size * complex(-0.5 / quality, np.sqrt(1.0 - 0.25 / quality**2))
+    c1, c2 = 1.0, 1.0 + float(rng.choice([-1, 1])) * apart
+    gain = size**2 * 10.0 ** rng.uniform(-3.0, -0.5) / quality / apart
+
+    def phase(omega):
+        turned = np.angle(1j * omega - pole) + np.angle(1j * omega - pole.conjugate())
+        return (0.0 if c1 > c2 else np.pi) - omega * tau - turned
+
+    end = 3.0 * size + 20.0 * np.pi / tau
+    turns = np.arange(np.ceil((phase(end) / np.pi - 1.0) / 2.0), 1.0)
+    at = [
+        brentq(lambda w, t=t: phase(w) - np.pi * (2.0 * t + 1.0), 1e-12 * size, end)
+        for t in turns
+        if phase(1e-12 * size) > np.pi * (2.0 * t + 1.0)
+    ]
+    s = 1j * np.array([*at, *([0.0] if c1 < c2 else [])])
+    factors = np.abs((s - pole) * (s - pole.conjugate())) / abs(gain * (c1 - c2))
+    loop = Loop(Controller([], [pole, pole.conjugate()], gain), DIFFERENCE, tau, tau)
+    assert gain_interval(loop, c1, c2)[1] == pytest.approx(factors.min(), rel=1e-6)
 
 
-def test_counts_contradict_gains_between_which_the_loop_is_not_stable():
-    """As they do where rounding hides a crossing."""
-    point = LoopAt(paper_loop(), 1.0, 1.0)
-    lower, upper, _ = gains.gain_interval(*point)
-    gains._require_stable_inside(point, lower, upper)
-    for low, high in ((0.99 * lower, upper), (lower, 1.01 * upper)):
-        with pytest.raises(CountError, match="rounding hides a crossing"):
-            gains._require_stable_inside(point, low, high)
+def test_the_phase_next_to_where_a_pole_cancels_is_that_of_the_first_terms():
+    # L = 0.3 (1.5 - 1e-8 j / (0.2 omega)) up to far above where it is one.
+    loop = Loop(Controller([], [], 0.3), paper_loop().mapping, 20.1, 19.9)
+    found = margins(loop, 0.5, 0.5 + 1e-8)
+    lag = np.pi - np.arccos(0.3 * 1.5)
+    assert found.phase == pytest.approx(lag, rel=1e-6)
+    assert found.phase == pytest.approx(2.0376, rel=1e-4)
+    assert found.delay == pytest.approx(lag * 0.2 * np.sqrt(1 / 0.09 - 2.25) / 1e-8, rel=1e-6)
+    assert found.delay == pytest.approx(1.2e8, rel=2e-2)
 
 
-@pytest.mark.parametrize("name", STABLE)
-@pytest.mark.parametrize("direction", [(1.0, 0.3), (-1.0, 0.7), (0.4, -1.0)])
-def test_free_phases_pass_over_no_first_crossing(name, direction):
-    """As a plain characteristic function a loop is walked without them."""
-    loop, point = STABLE[name]
-    found, expected = (
-        first_crossing(system, point, direction, 5.0) for system in (loop, loop.plain())
-    )
-    assert found == pytest.approx(expected, rel=1e-9, nan_ok=True)
+@pytest.mark.parametrize("gain", [1.0 - 1e-9, 1.0 - 1e-12])
+def test_a_constant_just_below_one_has_no_crossover(gain):
+    found = margins(Loop(((), (), gain), SINGLE, 2.0, 1.5), 0.0)
+    assert (found.phase, found.delay, found.gain_upper) == (np.inf, np.inf, np.inf)
+    assert found.modulus == pytest.approx(1.0 + gain, rel=1e-9)
+
+
+@pytest.mark.parametrize("gain", [1.0 - 1e-9, 1.0 - 1e-12])
+def test_an_all_pass_just_below_unity_gain_is_stable_up_to_unity_gain(gain):
+    # |L| is `gain` everywhere, and its phase takes all values.
+    all_pass = Controller([1.0], [-1.0], gain)
+    loop = Loop(all_pass, SINGLE, 1.0, 1.0, delay=0.5)
+    assert unstable_roots(loop, 0.0) == 0
+    lower, upper, omega = gain_interval(loop, 0.0)
+    assert (lower, omega) == (0.0, np.inf)
+    assert upper == pytest.approx(1.0 / gain, rel=1e-14)
 
 
 def test_what_l_fills_may_have_one_on_its_edge():
-    # L = 4 - 4 c exp(-2 s) is nearest to -1 at 4 - 4 c, and comes to 1 for c = 0.75 only.
-    constant = Loop(((), (), 4.0), SINGLE, 2.0, 1.5)
-    for c1, nearest, phase, place in ((0.75, 2.0, np.pi, np.inf), (0.5, 3.0, np.inf, np.nan)):
-        found = margins(constant, c1)
-        assert found.modulus == pytest.approx(nearest, rel=1e-12)
-        assert (found.disk, found.phase, found.delay) == (2.0, phase, 0.0)
-        np.testing.assert_equal(found.phase_omega, place)
-    # L falls from 2 to 1, where |1 - L| vanishes.
+    # L = 4 - 2 exp(-2 s) is nearest to -1 at 2, and never of magnitude one.
+    found = margins(Loop(((), (), 4.0), SINGLE, 2.0, 1.5), 0.5)
+    assert found.modulus == pytest.approx(3.0, rel=1e-12)
+    assert (found.phase, found.delay) == (np.inf, 0.0)
+    # L falls from 2 to 1, where it comes nearest to -1.
     lag = Loop(((-2.0,), (-1.0,), 1.0), SINGLE, 2.0, 1.5)
     assert margins(lag, 0.0).modulus == pytest.approx(2.0, rel=1e-6)
-    assert margins(lag, 0.0).disk == 2.0
 
 
-def test_gain_factors_past_a_million_are_not_told():
+def test_gain_factors_past_the_largest_are_not_told():
     # A real root would cross at 1e11, but a pair has done so at some 4e7.
     weak = Loop(((), (-1.0, -1.0, -1.0), 1e-7), SINGLE, 2.0, 1.5)
     assert gain_interval(weak, 1.0001, 1.0)[:2] == (0.0, np.inf)
 
 
-@pytest.mark.parametrize("lowest", [0.5, 1.0])
+@pytest.mark.parametrize("lowest", [0.5, 1.0, 1.5])
 def test_free_phases_do_not_step_over_a_root_on_the_axis(lowest):
     notch = ((1j, -1j), (-0.25 + 0.97j, -0.25 - 0.97j, -1.0, -1.0), 0.9)
     loop = Loop(notch, SINGLE, 2.0, 1.5)
-    with pytest.raises(CountError, match="a root on the imaginary axis"):
-        margins(loop, 0.1, 0.0, free_above=lowest)
-    assert margins(loop, 0.1, 0.0, free_above=1.5).modulus > 0.0
+    below, above = np.linspace(1e-6, lowest, 100_001), np.linspace(lowest, 20.0, 400_001)
+    k = loop.controller(1j * above)
+    least = min(
+        np.abs(1.0 + loop(1j * below, 0.1, 0.0)).min(),
+        (np.abs(1.0 + k) - 0.1 * np.abs(k)).min(),
+    )
+    found = margins(loop, 0.1, 0.0, free_above=lowest).modulus
+    assert found == pytest.approx(least, rel=2e-5)
 
 
-def test_an_unstable_loop_has_no_margins_and_nothing_to_lose():
-    loop = Loop(((), (0.5, -1.0), 0.1), SINGLE, 2.0, 1.5)
-    with pytest.raises(ValueError, match="must be stable at"):
-        margins(loop)
-    with pytest.raises(ValueError, match=r"^the loop must be stable at .* = \(1, 1\) to lose"):
-        critical_perturbation(loop, (1.0, 0.0))
-
-
-def test_an_unconfined_chain_has_no_margin():
-    with pytest.raises(CountError, match="not confined to the left half-plane"):
-        modulus_margin(Loop(((), (), 5.0), SINGLE, 2.0, 1.5), 1.3, 1.0)
-
-
-@pytest.mark.parametrize("gain", [1e-5, 1e-7, 1e-8])
-def test_a_weak_loop_breaks_far_away(gain):
-    # s + 1 + k (1 - c1 e1) has the real root 0 where k c1 = 1 + k.
-    for mapping, tau2 in ((SINGLE, 20.0), (COMMON, 19.0)):
-        loop = Loop(((), (-1.0,), gain), mapping, 20.0, tau2)
-        assert critical_perturbation(loop, (1.0, 0.0)) == pytest.approx(1.0 / gain, rel=1e-9)
+def test_an_unconfined_chain_has_no_distance():
+    assert modulus_margin(Loop(((), (), 5.0), SINGLE, 2.0, 1.5), 1.3, 1.0) == 0.0
 
 
 def test_roots_that_cross_just_below_the_limit_of_the_chain_come_first():
     loop = paper_loop(0.19514549562262062 / 0.16687092308813156, 14.207314169676076, 14.04)
     for direction in [(0.2, 1.04), (1.0, 1.0), (0.3, 1.0)]:
         eps = critical_perturbation(loop, direction)
-        tries = eps * (1.0 - np.array([1e-5, 1e-6, 3e-7]))
+        tries = eps * (1.0 - np.array([1e-3, 1e-4, 2e-5]))
         counts = unstable_roots(loop, 1.0 + tries * direction[0], 1.0 + tries * direction[1])
         assert (counts <= 0).all()
         assert counts[0] == 0
-
-
-@pytest.mark.parametrize("lowest", [1e-2, 1.0])
-def test_free_phases_of_a_common_arm_have_margins_in_closed_form(lowest):
-    # L fills a disc around -j a of radius c a, with a = 2 gain / omega: it comes closest to -1
-    # at a = c / sqrt(1 - c^2), and its share of the unit circle at a = 1 / sqrt(1 - c^2).
-    c = 0.999
-    nearest = np.sqrt(1.0 - c * c)
-    loop = Loop(((), (0.0,), np.pi * 14.7e3), COMMON, 33.6, 33.1)
-    found = margins(loop, c, c, lowest)
-    assert found.modulus == pytest.approx(nearest, rel=1e-5)
-    assert found.phase == pytest.approx(np.arcsin(nearest), rel=1e-5)
-    assert found.modulus_omega == pytest.approx(2.0 * np.pi * 14.7e3 * nearest / c, rel=1e-2)
-    assert np.isnan([found.gain_lower, found.gain_upper, found.gain_omega]).all()
-
-
-def test_a_dead_time_with_free_phases_takes_the_phase_it_should():
-    # With c = 0 the disc is the point K exp(-s delay): phase and delay margin are textbook's.
-    loop = Loop(((), (0.0,), 3.0), SINGLE, 2.0, 1.0, delay=0.1)
-    found = margins(loop, 0.0, 0.0, 0.01)
-    assert found.phase == pytest.approx(0.5 * np.pi - 0.3, rel=1e-5)
-    assert found.delay == pytest.approx((0.5 * np.pi - 0.3) / 3.0, rel=1e-5)
-
-
-def test_arms_of_equal_delay_have_free_phases_of_their_own():
-    loop = Loop(((), (-60.0 + 60j, -60.0 - 60j), 1000.0), COMMON, 2.0, 2.0)
-    # The smallest distance lies past twenty times this frequency.
-    c1, c2, above = 0.7, -0.9, 4.2
-    omega = np.geomspace(above, 1e4, 200_001)
-    first, second = loop.arm_responses(1j * omega)
-    away = np.abs(1.0 + first + second) - np.abs(c1 * first) - np.abs(c2 * second)
-    found = margins(loop, c1, c2, above)
-    assert found.modulus == pytest.approx(away.min(), rel=1e-4)
-    assert found.modulus_omega == pytest.approx(omega[away.argmin()], rel=1e-3)
 
 
 @pytest.mark.parametrize(("gain", "damping"), [(1e-3, 1e-2), (1e-3, 1e-3), (1e-2, 1e-2)])
@@ -393,17 +375,33 @@ def test_free_phases_of_a_difference_fill_a_disc_around_zero(gain, damping):
     assert found.modulus == pytest.approx(max(1.0 - largest, 0.0), rel=1e-5)
 
 
-@pytest.mark.parametrize("factor", [0.3, 1.0, 3.0, 30.0])
-def test_a_count_up_to_free_phases_is_that_of_all_frequencies(factor):
-    """Above it no phases let a root cross, so that what lies below decides."""
-    found = []
-    for loop, (c1, c2) in STABLE.values():
-        changed = to_loop(sketch_of(loop).scaled(factor))
-        for omega in np.geomspace(1e-2, 1e2, 9):
-            point = LoopAt(changed, c1, c2)
-            if free_phases.clear_above(point, omega):
-                expected = int(unstable_roots(changed, c1, c2))
-                assert free_phases._count_below(point, omega) == expected
-                found.append(expected)
-    assert len(found) > 10
-    assert factor < 30.0 or max(found) > 0
+def test_a_difference_of_nearly_equal_delays_that_is_small_everywhere_is_answered():
+    loop = Loop(Controller([], [-1.0], 1.0), DIFFERENCE, 10.0, 10.0 * (1.0 - 1e-8))
+    found = margins(loop)
+    assert found.modulus == pytest.approx(1.0, abs=1e-6)
+    assert (found.phase, found.gain_upper) == (np.inf, np.inf)
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e9])
+def test_forty_poles_do_not_overflow(size):
+    # The product of the poles is 1e360, or one over it: no float.
+    poles = [-size * (1.0 + 0.01 * k) for k in range(40)]
+    zeros = [-0.3 * size * (1.0 + 0.01 * k) for k in range(39)]
+    slow = Loop(Controller(zeros, poles, 1e-3 * size), SINGLE, 20.0)
+    assert unstable_roots(slow, 0.5) == 0
+    weak = Loop(Controller([], poles, 0.1), SINGLE, 20.0)
+    # |L| is far below one, or far above it up to 40 times the poles, where L turns ten times.
+    assert unstable_roots(weak, 0.5) == (0 if size > 1.0 else 20)
+    by_sums = DelaySystem.of(weak.controller) * (1 - 0.5 * delay(20.0))
+    assert unstable_roots(by_sums) == unstable_roots(weak, 0.5)
+    assert stability_chart(weak, [0.5], [0.0]).counts == unstable_roots(weak, 0.5)
+    if size > 1.0:
+        assert margins(weak, 0.5).modulus == pytest.approx(1.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("size", [1e-20, 1e20])
+def test_coefficients_that_are_no_floats_keep_their_roots(size):
+    # The lowest of them is 1e-367 or 1e433.
+    poles = -size * 1.5 ** np.arange(20)
+    found = Polynomial.of(Polynomial.of_roots(poles).exact)
+    assert np.sort(np.real(found.roots)) == pytest.approx(np.sort(poles), rel=1e-6)

@@ -44,7 +44,7 @@ def test_density_is_the_prescribed_one(name):
         estimator.add(block)
     found = estimator.spectrum()
     ratio = (found.asd / found.expected(source.sampled_asd)) ** 2
-    deviation = (ratio - 1.0) * np.sqrt(0.5 * found.degrees)
+    deviation = (ratio - 1.0) * np.sqrt(found.averages)
     assert np.abs(deviation).max() < 4.5
     assert 0.7 < deviation.std() < 1.3
     assert found.frequency[-1] / found.frequency[0] > 1e4
@@ -53,7 +53,7 @@ def test_density_is_the_prescribed_one(name):
     assert np.abs(ratio[fast] - 1.0).max() < 0.004
     # And against the formula as printed, where the docstring promises it.
     ratio = (found.asd / found.expected(source.asd)) ** 2
-    deviation = (ratio - 1.0) * np.sqrt(0.5 * found.degrees)
+    deviation = (ratio - 1.0) * np.sqrt(found.averages)
     assert np.abs(deviation)[found.frequency < 20.0].max() < 4.5
 
 
@@ -76,14 +76,12 @@ def test_the_perturbations_follow_the_formula_up_to_the_end():
     assert source.sampled_asd(frequency) == pytest.approx(source.asd(frequency), rel=1e-8)
 
 
-@pytest.mark.parametrize(
-    ("zeros", "poles"), [([], [-2.0, -0.3]), ([-5.0], [-1 + 9j, -1 - 9j, -4.0])]
-)
-def test_a_series_starts_in_the_middle_of_its_course(zeros, poles):
+def test_a_series_starts_in_the_middle_of_its_course():
     """Covariance of the first samples, over many seeds, is that of samples much later."""
 
     def source(seed):
-        return ShapedNoise(zeros, poles, 1.0, seed=seed, sample_rate=10.0)
+        poles = [-1 + 9j, -1 - 9j, -4.0]
+        return ShapedNoise([-5.0], poles, 1.0, seed=seed, sample_rate=10.0)
 
     first = np.array([source(seed).draw(4) for seed in range(3000)])
     later = source(5000).draw(2_000_000)
@@ -114,8 +112,8 @@ def test_formulas_of_the_paper():
     frequency = np.geomspace(1e-3, 50.0, 50)
     laser = LaserNoise(1, cutoff=1e-9)
     assert laser.asd(frequency) == pytest.approx(30.0 / frequency, rel=1e-9)
-    eta = PerturbationNoise(1, cutoff=1e-9, scale=2.0)
-    printed = 2.0 * 3.6e-5 * np.sqrt(1.0 + (2.8e-3 / frequency) ** 4)
+    eta = PerturbationNoise(1, cutoff=1e-9)
+    printed = 3.6e-5 * np.sqrt(1.0 + (2.8e-3 / frequency) ** 4)
     assert eta.asd(frequency) == pytest.approx(printed, rel=1e-9)
 
 
@@ -124,3 +122,32 @@ def test_at_rest_starts_at_zero():
     full = LaserNoise(4).draw(200)
     assert np.abs(quiet).max() < 100.0
     assert np.abs(full).min() > 100.0
+
+
+def test_what_cannot_be_a_block_or_a_flag_is_refused_before_anything_is_drawn():
+    source = LaserNoise(1)
+    for name, arguments in (
+        ("size", (10, -1)), ("size", (10, 0)), ("samples", (-1,)), ("samples", (1.5,)),
+    ):  # fmt: skip
+        with pytest.raises(ValueError, match=f"^{name} must be an integer"):
+            source.blocks(*arguments)
+    assert np.array_equal(source.draw(3), LaserNoise(1).draw(3))
+    with pytest.raises(TypeError, match=r"^at_rest must be True or False"):
+        LaserNoise(1, at_rest="no")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["perturbation", "own filter"])
+def test_rms_is_that_of_what_is_drawn(name):
+    source = SOURCES[name](5, sample_rate=10.0)
+    frequency = np.geomspace(1e-11, 0.499999 * source.sample_rate, 200_001)
+    variance = np.trapezoid(source.sampled_asd(frequency) ** 2 * frequency, np.log(frequency))
+    assert source.rms == pytest.approx(np.sqrt(variance), rel=1e-4)
+    quick = [SOURCES[name](seed, sample_rate=10.0).draw(1)[0] for seed in range(4000)]
+    assert np.std(quick) == pytest.approx(source.rms, rel=0.05)
+
+
+def test_rms_of_the_perturbations_has_the_closed_form_of_the_docstring():
+    """A spectrum that ends sharply at the cut-off would have sqrt(3 pi / 4) less."""
+    level, corner, cutoff = 3.6e-5, 2.8e-3, 5e-6
+    variance = level**2 * (100.0 + np.pi * corner**4 / (4.0 * cutoff**3))
+    assert PerturbationNoise(1, cutoff=cutoff).rms == pytest.approx(np.sqrt(variance), rel=1e-9)

@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from armlock.orbits import from_table, kepler, read_oem
+from armlock.orbits import (
+    ASTRONOMICAL_UNIT,
+    SUN,
+    esa,
+    from_table,
+    kepler,
+    read_oem,
+    read_table,
+)
 
 DAY = 86400.0
 YEAR = 365.25 * DAY
@@ -17,6 +25,8 @@ KEPLER = kepler()
 KNOWN = """
 10,16.669558636078,16.658559847233,5.499394422348e-03,6.3869069e-09,-6.2226665e-09
 100,16.675856900420,16.611372223321,3.224233854951e-02,-5.9189755e-09,-4.1467694e-09
+200,16.621618884312,16.641018450237,-9.699782962603e-03,-6.3548351e-09,6.1681212e-09
+300,16.628953210588,16.687288651981,-2.916772069645e-02,6.6050206e-09,8.8452625e-10
 """
 
 
@@ -47,6 +57,14 @@ def test_a_year_of_kepler_has_the_known_extremes_and_zeros():
         assert abs(KEPLER.round_trips(where)[0] - extreme) < 1e-8
     assert abs(brentq(half, -100.0, 100.0) - 8.332) < 1e-3
     assert abs(brentq(half, 182 * DAY, 183 * DAY, xtol=1e-6) / DAY - 182.6285454) < 1e-7
+
+
+def test_a_century_later_the_arms_are_the_same():
+    period = 2.0 * np.pi * np.sqrt(ASTRONOMICAL_UNIT**3 / SUN)
+    t = np.linspace(0.0, period, 300)
+    for periods in (-94, 94):
+        off = np.subtract(KEPLER.round_trips(t + periods * period), KEPLER.round_trips(t))
+        assert np.abs(off).max() < 5e-11
 
 
 def test_light_times_against_lisaorbits():
@@ -81,7 +99,7 @@ def test_shapes_are_kept_and_masters_are_three():
     t = np.zeros((2, 3)) + 1e6
     assert KEPLER.round_trips(t)[0].shape == KEPLER.rates(t, 3)[1].shape == (2, 3)
     assert KEPLER.round_trips(1e6)[0].shape == ()
-    wrong: list[Any] = [0, 4, 1.5, True, "1"]
+    wrong: list[Any] = [0, 4, 1.5, True, "1", [1]]
     for master in wrong:
         with pytest.raises(ValueError, match="master must be 1, 2 or 3"):
             KEPLER.round_trips(0.0, master)
@@ -96,27 +114,48 @@ def weeks(days=1.0, span=210.0, first=1e9):
 
 
 def test_a_table_gives_the_round_trips_it_was_sampled_from():
-    table = from_table(*weeks(), epoch="an evening", scale="TDB")
-    assert (table.epoch, table.scale) == ("an evening", "TDB")
+    table = from_table(*weeks(), epoch="an evening, TDB")
+    assert table.epoch == "an evening, TDB"
     t = np.linspace(*table.span, 300)
     for master in (1, 2, 3):
         off = np.subtract(table.round_trips(t, master), KEPLER.round_trips(t, master))
         assert np.abs(off).max() < 1e-11
-    assert table.error < 1e-11
+    assert table.error < 1e-10
     assert from_table(*weeks()).epoch == "1000000000.0 s"
+
+
+@pytest.mark.parametrize("number", [209, 210])
+def test_a_wrong_state_shows_in_the_error_wherever_it_is(number):
+    """At the ends too, and for even and odd numbers of states."""
+    time, positions = weeks()
+    for k in (0, 1, 100, 101, number - 2, number - 1):
+        moved = positions[:number].copy()
+        moved[k, 0] += 1.2e-9 * (moved[k, 1] - moved[k, 0])  # 3 m
+        assert from_table(time[:number], moved).error > 1e-9
 
 
 def test_the_span_begins_when_the_first_light_is_back():
     table = from_table(*weeks())
     first, last = table.span
     longest = max(max(table.round_trips(first, master)) for master in (1, 2, 3))
-    assert abs(first - longest) < 1e-9
+    assert 0.0 < first - longest < 0.1
     assert last == 209 * DAY
-    for t in (first - 1e-3, last + 1.0, [1e6, 1e9]):
+    for t in (0.0, last + 1.0, [1e6, 1e9]):
         with pytest.raises(ValueError, match=r"t must lie within the span 16\.\d+ to 18057600"):
             table.round_trips(t)
     with pytest.raises(ValueError, match="t must be finite"):
         table.rates(np.nan)
+
+
+def test_orbits_around_the_earth_follow_the_sun_too():
+    """As TianQin's: 1e8 m from the Earth, once around it in 3.65 days."""
+    t = 7200.0 * np.arange(400)
+    year = np.sqrt(SUN / ASTRONOMICAL_UNIT**3) * t
+    earth = ASTRONOMICAL_UNIT * np.stack([np.cos(year), np.sin(year), 0.0 * year], axis=1)
+    turns = 2 * np.pi * (t[:, None] / (3.65 * DAY) + np.arange(3) / 3.0)
+    around = 1e8 * np.stack([np.cos(turns), 0.0 * turns, np.sin(turns)], axis=2)
+    tau1, _ = from_table(t, earth[:, None] + around).round_trips(5 * DAY)
+    assert abs(float(tau1) / 1.1556 - 1.0) < 1e-3
 
 
 def changed(**wrong):
@@ -124,18 +163,32 @@ def changed(**wrong):
     return {"time": time, "positions": positions, **wrong}
 
 
+def rotating(t, positions):
+    """Return positions in axes that follow the constellation around the Sun."""
+    angle = 2 * np.pi * t / YEAR
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    flat = np.einsum("ijn,nkj->nki", turn, positions[:, :, :2])
+    return np.concatenate((flat, positions[:, :, 2:]), axis=2)
+
+
 TIME, PLACES = weeks(span=40.0)
+GAP = np.r_[0:20, 25:40]
 BAD_TABLES = {
     "at least 16 states, got 12": changed(time=TIME[:12], positions=PLACES[:12]),
-    r"ascend, got 0\.0 s after 86400": changed(time=np.r_[TIME[:2], TIME[0], TIME[3:]]),
-    r"of shape \(40, 3, 3\)": changed(positions=PLACES[:, :2]),
-    r"in m from the Sun, got one 1\.4": changed(positions=PLACES / 1e3),
-    "slower than light": changed(time=np.linspace(0.0, 300.0, 40)),
-    "longer than a round trip": changed(
-        time=np.linspace(0, 16, 40), positions=sampled(np.linspace(0, 16, 40))
+    r"ascend, got 1000000000\.0 s after 10000": changed(
+        time=np.r_[TIME[:2], TIME[0], TIME[3:]]
     ),
-    "close enough": changed(time=30 * TIME, positions=sampled(30 * TIME)),
-    "scale must be one of TCB, TDB, got 'UTC'": changed(scale="UTC"),
+    r"shape \(40, 3, 3\): by time, spacecraft": changed(positions=PLACES[:, :2]),
+    "gap of 518400 s after t = 1641600 s": changed(time=TIME[GAP], positions=PLACES[GAP]),
+    r"accelerate by 5\.\d+e\+03 m/s": changed(positions=PLACES / 1e3),
+    r"got 5\.\d+e-09 m/s": changed(time=1e3 * (TIME - TIME[0])),
+    "do not rotate": changed(positions=rotating(TIME, PLACES)),
+    "in m from the Sun": changed(positions=PLACES.transpose(0, 2, 1)),
+    "times in s": changed(time=TIME / DAY),
+    "every second state must give the others": changed(
+        time=12 * (TIME - TIME[0]), positions=sampled(12 * (TIME - TIME[0]))
+    ),
+    "of three spacecraft, got two in one place": changed(positions=PLACES[:, [0, 0, 2]]),
     "positions must be finite": changed(positions=np.where(PLACES > 1e11, np.nan, PLACES)),
 }
 
@@ -163,8 +216,13 @@ META_STOP
 """
 
 
-def oem(path, spacecraft, t, *, border=None, centre="SUN", frame="EME2000", scale="TCB"):
-    """Write an OEM of Kepler's orbits, with a border of segments after state `border`."""
+def oem(
+    path, spacecraft, t, *, border=None, pulled=True, centre="SUN", frame="EME2000", scale="TCB"
+):
+    """Write an OEM of Kepler's orbits, with a border of segments after state `border`.
+
+    Accelerations are left out if it is not `pulled`.
+    """
     head = HEADER.format(centre=centre, frame=frame, scale=scale)
     orbit = KEPLER._paths[spacecraft - 1]
     place, velocity = orbit(t, 0), orbit(t, 1)
@@ -172,7 +230,9 @@ def oem(path, spacecraft, t, *, border=None, centre="SUN", frame="EME2000", scal
     epochs = np.datetime64("2035-01-01T00:00:29") + (t * 1e9).astype("timedelta64[ns]")
     lines = [
         f"{epoch} " + " ".join(f"{value / 1e3:.17g}" for value in state)
-        for epoch, state in zip(epochs, np.hstack((place, velocity, pull)), strict=True)
+        for epoch, state in zip(
+            epochs, np.hstack((place, velocity, pull)[: 2 + pulled]), strict=True
+        )
     ]
     if border is not None:
         lines[border:border] = [lines[border], *head.splitlines()[1:]]
@@ -182,12 +242,23 @@ def oem(path, spacecraft, t, *, border=None, centre="SUN", frame="EME2000", scal
 
 def test_files_in_segments_give_what_they_were_written_from(tmp_path):
     t = np.arange(0.0, 60 * DAY, DAY)
-    files = [oem(tmp_path / f"{k}.oem", k, t, border=k * 10) for k in (1, 2, 3)]
+    files = [oem(tmp_path / f"{k}.oem", k, t, border=k * 10, pulled=k < 3) for k in (1, 2, 3)]
     orbits = read_oem(files)
-    assert (orbits.scale, orbits.epoch[:19]) == ("TCB", "2035-01-01T00:00:29")
+    assert orbits.epoch == "2035-01-01T00:00:29.000000000 TCB"
     when = np.linspace(*orbits.span, 200)
     off = np.subtract(orbits.round_trips(when, 2), KEPLER.round_trips(when, 2))
     assert np.abs(off).max() < 5e-11
+    # A covariance is no state.
+    with files[0].open("a", encoding="utf-8") as file:
+        file.write("COVARIANCE_START\nEPOCH = 2035-03-01T00:00:00\n3.3e-04\n4.6e-04 6.7e-04\n")
+    assert read_oem(files).span == orbits.span
+
+
+def test_a_gap_between_segments_is_refused(tmp_path):
+    t = np.r_[np.arange(0.0, 30 * DAY, DAY), np.arange(60 * DAY, 90 * DAY, DAY)]
+    files = [oem(tmp_path / f"{k}.oem", k, t, border=30) for k in (1, 2, 3)]
+    with pytest.raises(ValueError, match="gap of 2678400 s after t = 2505600 s"):
+        read_oem(files)
 
 
 @pytest.mark.parametrize(
@@ -217,9 +288,10 @@ def test_a_file_of_another_frame_is_refused(tmp_path, wrong, message):
     [
         (lambda text: text.replace("CCSDS_OEM_VERS", "OPM"), "must be a CCSDS OEM"),
         (lambda text: text.replace("TIME_SYSTEM", "SYSTEM"), "TIME_SYSTEM of .*, got none"),
-        (lambda text: text[: text.rindex(" ")], "position, velocity and acceleration"),
-        (lambda text: text.split("META_STOP")[0], "acceleration, got none"),
+        (lambda text: text[: text.rindex(" ")], "position and velocity, .* got 2035-01-30"),
+        (lambda text: text.split("META_STOP")[0], "have an acceleration, got none"),
         (lambda text: text.replace("2035-01-05", "2034-01-05"), "same epochs"),
+        (lambda text: text.replace("2035-01-05", "2035-005"), "hold dates and numbers: "),
     ],
 )
 def test_a_file_that_is_damaged_is_refused(tmp_path, change, message):
@@ -242,3 +314,56 @@ def test_states_that_disagree_at_a_border_are_refused(tmp_path):
         ValueError, match="agree where an epoch stands twice, got positions 100"
     ):
         read_oem(files)
+
+
+def test_the_packages_tables_are_esas_orbits():
+    for name, most in (("trailing", 0.1457), ("leading", 0.16)):
+        table = esa(name)
+        assert table.epoch.startswith(("2036-12-09T00:00:29.327664", "2037-06-11T00:00:29.574"))
+        assert table.epoch.endswith(" TCB")
+        assert table.error < 2e-7
+        t = np.linspace(*table.span, 20_000)
+        assert abs(np.abs(half(t, orbits=table)).max() - most) < 1e-4
+        assert max(np.abs(rate).max() for rate in table.rates(t)) < 6.8e-8
+    with pytest.raises(ValueError, match="name must be one of 'trailing', 'leading'"):
+        esa("Kepler")
+
+
+NAMES = "time," + ",".join(f"{axis}{k}" for k in (1, 2, 3) for axis in "xyz") + "\n"
+
+
+@pytest.mark.parametrize("head", ["", "# epoch: now, TDB\n", NAMES, f"# mine\n{NAMES}"])
+def test_a_table_is_read_with_and_without_names(tmp_path, head):
+    """A line of names comes first where pandas has written the file."""
+    time, positions = weeks(span=30.0)
+    rows = np.column_stack((time, positions.reshape(-1, 9)))
+    text = "\n".join(",".join(f"{value:.17g}" for value in row) for row in rows)
+    file = tmp_path / "mine.csv"
+    file.write_text(head + text, "utf-8")
+    table = read_table(file)
+    assert table.epoch == ("now, TDB" if "epoch" in head else "1000000000.0 s")
+    off = np.subtract(table.round_trips(10 * DAY), KEPLER.round_trips(10 * DAY))
+    assert np.abs(off).max() < 1e-9
+    assert read_table(file, epoch="later").epoch == "later"
+
+
+@pytest.mark.parametrize(
+    "text", ["1,2,3\n", "", NAMES, f"{NAMES}{','.join('1234567890')},11\n", f"{NAMES}x,2\n"]
+)
+def test_a_file_that_is_no_table_is_refused(tmp_path, text):
+    file = tmp_path / "mine.csv"
+    file.write_text(text, "utf-8")
+    with pytest.raises(ValueError, match="must hold ten numbers a row: time in s, then x, y"):
+        read_table(file)
+
+
+def test_links_add_up_to_round_trips():
+    t = np.linspace(0.0, YEAR, 7)
+    back = KEPLER.light_time(t, 1, 2)
+    trip = back + KEPLER.light_time(t - back, 2, 1)
+    assert np.abs(trip - KEPLER.round_trips(t)[0]).max() == 0.0
+    for pair in ((1, 1), (0, 2), (1, 4)):
+        with pytest.raises(ValueError, match="receiver and emitter must be two of 1, 2, 3"):
+            KEPLER.light_time(t, *pair)
+    with pytest.raises(ValueError, match="t must lie within the span"):
+        KEPLER.light_time([1e10], 1, 2)

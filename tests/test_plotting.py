@@ -1,6 +1,8 @@
+import control
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from IPython.core.interactiveshell import InteractiveShell
 from matplotlib.colors import to_rgba
 
 from armlock import (
@@ -9,6 +11,7 @@ from armlock import (
     d_curve_branches,
     d_curve_line,
     nyquist,
+    paper_loop,
     plotting,
     stability_chart,
 )
@@ -32,7 +35,7 @@ def test_the_shaded_region_is_the_stable_one(ax, chart):
     (image,) = ax.images
     np.testing.assert_array_equal(~np.ma.getmaskarray(image.get_array()), chart.stable)
     assert image.cmap(0) == to_rgba(plotting.STABLE)
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$c_{1}$ [1]", "$c_{2}$ [1]")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$c_{1}$", "$c_{2}$")
 
 
 def test_large_counts_share_a_colour_and_boundary_points_have_none(ax, chart):
@@ -56,11 +59,24 @@ def test_labels_stand_in_regions_of_their_count(ax, chart):
 def test_cells_lie_around_the_points_of_any_axes(ax):
     even, uneven = np.linspace(-1, 1, 5), np.array([0.0, 0.2, 1.0])
     stability_chart(CommonArm(), even, uneven).plot(ax)
-    assert ax.images[0].get_extent() == pytest.approx([-1.25, 1.25, -0.1, 1.4])
+    corners = ax.collections[0].get_coordinates()[[0, -1], [0, -1]]
+    np.testing.assert_allclose(corners, [[-1.25, -0.1], [1.25, 1.4]])
     with pytest.raises(ValueError, match=r"^chart\.y must hold at least two values"):
         stability_chart(CommonArm(), even, [1.0]).plot(ax)
     near = 1.0 + np.linspace(-1e-9, 1e-9, 200)
     stability_chart(CommonArm(), near, near).plot(ax)
+
+
+def test_a_chart_over_logarithmic_axes_is_the_chart_that_is_drawn(ax):
+    chart = stability_chart(CommonArm(), np.geomspace(0.1, 3.0, 8), np.geomspace(0.2, 5.0, 6))
+    chart.plot(ax, counts=False)
+    assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
+    ax.figure.canvas.draw()
+    drawn = np.asarray(ax.figure.canvas.buffer_rgba())[::-1, :, :3] / 255.0
+    for i, j in np.ndindex(chart.counts.shape):
+        across, up = ax.transData.transform((chart.x[j], chart.y[i])).astype(int)
+        seen = np.allclose(drawn[up, across], to_rgba(plotting.STABLE)[:3], atol=0.01)
+        assert seen == chart.stable[i, j]
 
 
 def test_d_curves_are_drawn_branch_by_branch_and_with_their_line(ax):
@@ -75,15 +91,22 @@ def test_d_curves_are_drawn_branch_by_branch_and_with_their_line(ax):
         assert x + y == pytest.approx(2.0)
 
 
-def test_a_curve_can_be_drawn_in_part_and_under_a_name(ax):
+def test_a_curve_has_two_halves(ax):
     curve = nyquist(CommonArm(), 0.9, 0.9, omega_max=3.0)
-    curve.plot(ax, omega_max=1.0, color=plotting.GREEN, label="part")
+    curve.plot(ax, color=plotting.GREEN)
     positive, negative = ax.lines[:2]
-    shown = curve.response[curve.omega <= 1.0]
-    np.testing.assert_array_equal(positive.get_xdata(), shown.real)
-    np.testing.assert_array_equal(negative.get_ydata(), -shown.imag)
+    np.testing.assert_array_equal(positive.get_xdata(), curve.response.real)
+    np.testing.assert_array_equal(negative.get_ydata(), -curve.response.imag)
     assert positive.get_color() == negative.get_color() == plotting.GREEN
-    assert ax.get_legend_handles_labels()[1] == ["part"]
+    assert ax.get_legend_handles_labels()[1] == [r"$\omega > 0$", r"$\omega < 0$"]
+
+
+def test_the_open_loop_goes_to_python_control_with_exact_delays():
+    loop, omega = paper_loop(delay=1e-3), np.array([0.01, 0.3])
+    response = loop.frd(omega, 0.9, 1.1)
+    np.testing.assert_array_equal(response(1j * omega), loop(1j * omega, 0.9, 1.1))
+    control.bode_plot([response, SingleArm().frd(omega)])
+    plt.close("all")
 
 
 def test_polar_axes_keep_directions_and_end_at_infinity():
@@ -100,27 +123,29 @@ def test_polar_axes_keep_directions_and_end_at_infinity():
     assert branch == pytest.approx(plotting.INFINITY)
     assert figures.drawn(figure) == {}
     plt.close(figure)
-    # Without any axes, polar ones are made.
+    # Without any axes, the neighbourhood of -1 is shown.
     plt.figure()
-    assert curve.plot().name == "polar"
+    ax = curve.plot()
+    assert ax.name == "rectilinear"
+    assert ax.get_xlim() == (-3.0, 3.0)
     plt.close()
 
 
-def test_publishing_writes_figure_and_data(ax, chart, tmp_path, monkeypatch):
-    monkeypatch.setenv("ARMLOCK_FIGURES", str(tmp_path))
+def test_a_figure_carries_its_data_and_an_svg(ax, chart):
     ax.plot([1.0, 2.0], [0.5, 0.25], label="$c_1$")
     ax.plot([1.0, 2.0], [3.0, 4.0])
     ax.axhline(7.0)
     ax.fill([0.0, 1.0, 1.0], [0.0, 0.0, 1.0], label="area")
     ax.set(xlabel=r"$\omega$ [rad/s]", ylabel="gain, $g$ [1]")
-    links = figures.publish(ax.figure, "name")
-    assert {path.name for path in tmp_path.iterdir()} == {"name.csv", "name.png", "name.svg"}
-    head, *rows = (tmp_path / "name.csv").read_text().splitlines()
+    shell = InteractiveShell()
+    figures.load_ipython_extension(shell)
+    carried, _ = shell.display_formatter.format(ax.figure)
+    assert carried["image/svg+xml"].startswith("<?xml")
+    head, *rows = carried["text/csv"].splitlines()
     assert head.startswith('"c_1, omega [rad/s]","c_1, gain, g [1]","2, gain, g [1]"')
     assert rows[0].startswith("1,0.5,3")
     assert rows[1].startswith("2,0.25,4")
     assert "7" not in rows[0] + rows[1]
-    assert "name.svg" in links._repr_html_()
 
 
 def test_the_data_of_a_chart_are_its_counts_at_its_points(chart):
@@ -135,16 +160,7 @@ def test_the_data_of_a_chart_are_its_counts_at_its_points(chart):
         assert np.isnan(shown) if count < 0 else shown == count
 
 
-def test_a_drawing_has_no_data(ax, tmp_path, monkeypatch):
-    monkeypatch.setenv("ARMLOCK_FIGURES", str(tmp_path))
+def test_a_drawing_has_no_data(ax):
     ax.plot([0.0, 1.0], [0.0, 1.0])
     ax.set_axis_off()
-    assert "name.csv" not in figures.publish(ax.figure, "name")._repr_html_()
-    assert not (tmp_path / "name.csv").exists()
-
-
-def test_publishing_without_a_folder_writes_nothing(ax, tmp_path, monkeypatch):
-    monkeypatch.delenv("ARMLOCK_FIGURES", raising=False)
-    monkeypatch.chdir(tmp_path)
-    assert "written by make book" in repr(figures.publish(ax.figure, "name"))
-    assert list(tmp_path.iterdir()) == []
+    assert figures.as_csv(ax.figure) == ""

@@ -1,6 +1,5 @@
 """The printed book, and two makes in one folder."""
 
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -15,6 +14,7 @@ PAGE = """<html><head><link rel="stylesheet" href="../_static/a.css"></head><bod
 <a href="../figures/a.csv">CSV</a> <a href="https://example.org">out</a>
 <a href="notebooks/00_front.html#nowhere">Fig. 2</a>
 <a href="#document-notebooks/00_front">front</a>
+<div class="live"><a href="live.html#s=dual">open</a></div>
 <figure id="fig"></figure><div class="citation" id="id2">A</div></article></body></html>"""
 FOOT = "<p>Code: MIT License.</p>"
 
@@ -39,14 +39,12 @@ def test_what_a_page_keeps_folded_is_printed():
     with browser() as chromium:
         page = chromium.new_page()
         page.set_content(
-            "<article><div class='claims'><details><summary>line</summary>more</details></div>"
-            "<div class='ledger'><div class='claims'><details><summary>claim</summary>verdict"
-            "</details></div></div>"
+            "<article><details><summary>claim</summary>verdict</details>"
             "<details class='hide'><summary>Show code</summary>code</details></article>"
         )
         page.add_style_tag(content=STYLE)
         page.evaluate(LINKS, "front")
-        assert page.inner_text("article").split() == ["line", "claim", "verdict", "code"]
+        assert page.inner_text("article").split() == ["claim", "verdict", "code"]
 
 
 def test_a_second_make_waits_for_the_first(tmp_path):
@@ -58,15 +56,3 @@ def test_a_second_make_waits_for_the_first(tmp_path):
         second = subprocess.run([*command, "echo", "done"], capture_output=True, text=True)
         assert first.poll() == 0
     assert second.stdout == "Another make is building here: waiting for it ...\ndone\n"
-
-
-def test_a_folder_that_the_locale_cannot_name_is_refused(tmp_path):
-    folder = tmp_path / "größe"
-    folder.mkdir()
-    for setting, code in (("C", 1), ("C.UTF-8", 0)):
-        command = [sys.executable, str(ROOT / "tools" / "alone.py"), "lock", "true"]
-        done = subprocess.run(
-            command, cwd=folder, env=os.environ | {"LC_ALL": setting}, capture_output=True
-        )
-        assert done.returncode == code
-        assert (b"set LC_ALL=C.UTF-8" in done.stderr) == (code == 1)

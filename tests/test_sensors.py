@@ -30,7 +30,7 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_responses_are_those_of_table_one(name):
     sensor, expected = CASES[name]
-    found = Loop(Controller((), (), 1.0), sensor, TAU1, TAU2).open_loop(S)
+    found = Loop(Controller((), (), 1.0), sensor, TAU1, TAU2)(S)
     np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-14)
 
 

@@ -3,7 +3,8 @@
 Usage: python -m tools.print_book SINGLEHTML BOOK
 
 SINGLEHTML is what Sphinx's builder of this name has made, BOOK the folder of the built HTML,
-which gets the file armlock.pdf, and a link to it at the foot of each page. Chromium prints.
+which gets the file armlock.pdf, a link to it at the foot of each page, and sheet.pdf, the page
+to pin to the wall. Chromium prints.
 """
 
 import os
@@ -13,6 +14,7 @@ from pathlib import Path
 from tools.check_browser import TYPESET, browser, find_chromium
 
 NAME = "armlock.pdf"
+SHEET = "notebooks/14_summary.html"
 FOOT = "Code: MIT License.</p>"
 NUMBER = (
     '<div style="width: 100%; font-size: 8px; text-align: center"><span class="pageNumber">'
@@ -30,7 +32,8 @@ script, details.hide > summary, details details, .toggle-button
     padding: 0 !important; margin: 0 !important; }
 [id^="document-"] + section { break-before: page; }
 summary { list-style: none; }
-figure, .cell_output table tr, pre { break-inside: avoid; }
+figure, .cell_output table tr, .cell_input, pre { break-inside: avoid; }
+dt { break-after: avoid; }
 pre { white-space: pre-wrap !important; overflow-wrap: anywhere; }
 .math, mjx-container, .cell_output, table { overflow: visible !important; }
 table { font-size: 80%; }
@@ -41,9 +44,7 @@ LINKS = """FRONT => {
   document.querySelector("article").id = "document-" + FRONT;
   for (const entry of document.querySelectorAll("div.citation[id]"))
     entry.id = "cite-" + entry.id;
-  // A chapter's table of claims stays one of lines: the ledger has the rest.
-  for (const folded of document.querySelectorAll("details"))
-    folded.open = folded.closest(".ledger") || !folded.closest(".claims");
+  for (const folded of document.querySelectorAll("details")) folded.open = true;
   const broken = [];
   for (const link of document.querySelectorAll("a[href]")) {
     const href = link.getAttribute("href");
@@ -53,7 +54,8 @@ LINKS = """FRONT => {
     if (found) link.setAttribute("href", "#" + found);
     else {
       link.removeAttribute("href");
-      if (name && link.closest("article")) broken.push(href);
+      // What is live is not printed.
+      if (name && link.closest("article") && !link.closest(".live")) broken.push(href);
     }
   }
   return broken;
@@ -95,6 +97,8 @@ def main() -> int:
     page_file = single / "book.html"
     page_file.write_text(source.read_text().replace("../_static/", "_static/"))
     broken = print_pdf(page_file, source.stem, book / NAME)
+    if (book / SHEET).exists():
+        print_pdf(book / SHEET, source.stem, book / "sheet.pdf")
     for href in sorted(set(broken)):
         print(f"{NAME}: a reference leads nowhere: {href}")
     for page in book.rglob("*.html"):

@@ -2,12 +2,11 @@
 
 Usage: python tools/write_codecheck.py [--check [FOLDER]]
 
-Every figure that a notebook publishes is listed with the first sentence of its caption. So is
+Every picture that a notebook names is listed with the first sentence of its caption. So is
 the ledger of claims. With --check nothing is written, and a manifest that is out of date is an
 error. FOLDER is a built book: it must hold what is listed, and no other figures.
 """
 
-import ast
 import json
 import re
 import sys
@@ -37,19 +36,16 @@ CLAIMS = {
 }
 
 
-def published(notebook: Path) -> list[tuple[str, str]]:
-    """Return the files that a notebook publishes, each with the caption of its figure."""
-    found, caption = [], ""
-    for cell in json.loads(notebook.read_text(encoding="utf-8"))["cells"]:
-        if cell["cell_type"] != "code":
-            continue
-        figure = cell["metadata"].get("mystnb", {}).get("figure", {})
-        caption = figure.get("caption", caption)
-        for node in ast.walk(ast.parse("".join(cell["source"]))):
-            if isinstance(node, ast.Call) and ast.unparse(node.func) == "figures.publish":
-                name = ast.literal_eval(node.args[1])
-                found.append((f"{name}.svg", first_sentence(caption)))
-    return found
+def published(notebook: Path) -> dict[str, str]:
+    """Return the figures of a notebook, each with the first sentence of its caption."""
+    cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+    shown = [cell["metadata"].get("mystnb", {}) for cell in cells]
+    figures = [one["figure"] for one in shown if "image" in one and "figure" in one]
+    return {
+        f"{figure['name'].removeprefix('fig-')}.svg": first_sentence(figure.get("caption", ""))
+        for figure in figures
+        if "name" in figure
+    }
 
 
 def first_sentence(text: str) -> str:
@@ -64,7 +60,7 @@ def first_sentence(text: str) -> str:
 def listed() -> dict[str, str]:
     """Return the files in the folder of figures, each with what it holds."""
     notebooks = sorted(Path("notebooks").glob("*.ipynb"))
-    return CLAIMS | {file: text for notebook in notebooks for file, text in published(notebook)}
+    return CLAIMS | {k: text for path in notebooks for k, text in published(path).items()}
 
 
 def manifest(files: dict[str, str]) -> str:

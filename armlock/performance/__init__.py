@@ -1,10 +1,10 @@
-"""What noise is left on the locked laser, and how far its frequency is pulled.
+"""Noise of the locked laser, and how far Doppler errors pull its frequency.
 
-Responses are evaluated at the frequencies asked for, of a loop whose stability was counted.
+Both need a stable loop and refuse others.
 """
 
 from armlock.performance.budget import NoiseBudget, noise_budget
 from armlock.performance.pulling import pulling
-from armlock.performance.transfer import closed_loop, transfer
+from armlock.performance.transfer import transfer
 
-__all__ = ["NoiseBudget", "closed_loop", "noise_budget", "pulling", "transfer"]
+__all__ = ["NoiseBudget", "noise_budget", "pulling", "transfer"]

@@ -1,4 +1,4 @@
-"""What noise is left on the locked laser, source by source.
+"""Noise of the locked laser, source by source.
 
 Levels are those of the LISA Frequency Control White Paper (2009), Sec. 3. Each source reaches
 the laser through the closed-form responses of `armlock.performance.transfer`.
@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from itertools import cycle
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,51 +17,53 @@ import numpy.typing as npt
 from armlock.checks import (
     FloatArray,
     axis,
+    one_of,
     positive_array,
     real_array,
+    real_number,
 )
-from armlock.controllers import Controller
-from armlock.loops import Loop, checked_loop
-from armlock.performance.transfer import responses
-from armlock.timedomain.noise import LaserNoise, ShapedNoise
+from armlock.loops import Loop
+from armlock.performance.transfer import require_stable, responses
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: Shot noise of one link in cycles/sqrt(Hz); a round trip has two, independent.
-SHOT_NOISE = 10e-6
-#: Fractional frequency noise of a clock at 1 Hz in 1/sqrt(Hz); it falls as 1/sqrt(f).
-CLOCK_NOISE = 2.4e-12
-#: Doppler shifts of the two arms' beat notes in Hz, which the clock noise comes with.
-BEAT_NOTES = (15e6, -14e6)
-#: Motion of a spacecraft along one arm in cycles/sqrt(Hz), at low frequency.
-SPACECRAFT_MOTION = 2.5e-3
-#: Corner in Hz of the roll-off 1/sqrt(1 + (f / corner)^4) of that motion.
-MOTION_CORNER = 0.3
-#: Noise of a free-running laser at 1 Hz in Hz/sqrt(Hz); it falls as 1/f. The paper's is
-#: `armlock.paper.LASER_NOISE`.
-FREE_RUNNING = 3e4
-#: What disturbs the locked laser.
-SOURCES = ("laser", "shot", "clock", "motion")
 
-# Rational functions of s whose magnitudes are the densities of an arm's noises, in Hz/sqrt(Hz);
-# of the clocks' for a beat note of 1 Hz. The zero of the others turns cycles into Hz.
-_SHOT = Controller((0.0,), (), np.sqrt(2.0) * SHOT_NOISE)
-_CORNER = 2.0 * np.pi * MOTION_CORNER * np.exp(0.75j * np.pi)
-_MOTION = Controller(
-    (0.0,), (_CORNER, _CORNER.conjugate()), SPACECRAFT_MOTION * abs(_CORNER) ** 2
-)
-# Two poles a decade from 1 uHz on, each with a zero midway to the next, fall as 1/sqrt(f).
-_POLES = -2.0 * np.pi * 10.0 ** (0.5 * np.arange(20) - 6.0)
-_ZEROS = 10.0**0.25 * _POLES
-# Not a controller's value: to import the package must compile nothing.
-_AT_1_HZ = np.prod((2j * np.pi - _ZEROS) / (2j * np.pi - _POLES))
-_CLOCK = Controller(_ZEROS.tolist(), _POLES.tolist(), CLOCK_NOISE / abs(_AT_1_HZ))
+class Levels(NamedTuple):
+    """Noise levels of the white paper.
+
+    Attributes
+    ----------
+    shot : float
+        Shot noise of one link in cycles/sqrt(Hz); a round trip has two, independent.
+    clock : float
+        Fractional frequency noise of a clock at 1 Hz in 1/sqrt(Hz); it falls as 1/sqrt(f).
+    beat_notes : tuple of two float
+        Doppler shifts of the two arms' beat notes in Hz, which the clock noise comes with.
+    motion : float
+        Motion of a spacecraft along one arm in cycles/sqrt(Hz), at low frequency.
+    motion_corner : float
+        Corner in Hz of the roll-off 1/sqrt(1 + (f / corner)^4) of that motion.
+    free_running : float
+        Noise of a free-running laser at 1 Hz in Hz/sqrt(Hz); it falls as 1/f. The paper's is
+        `armlock.paper.LASER_NOISE`.
+    """
+
+    shot: float = 10e-6
+    clock: float = 2.4e-12
+    beat_notes: tuple[float, float] = (15e6, -14e6)
+    motion: float = 2.5e-3
+    motion_corner: float = 0.3
+    free_running: float = 3e4
+
+
+#: The white paper's levels, which cannot be changed.
+LEVELS: Final = Levels()
 
 
 def free_running(frequency: FloatArray) -> FloatArray:
     """Return the noise of a free-running laser in Hz/sqrt(Hz): 30 kHz at 1 Hz, as 1/f."""
-    return FREE_RUNNING / frequency
+    return LEVELS.free_running / frequency
 
 
 def cavity(frequency: FloatArray) -> FloatArray:
@@ -71,8 +74,8 @@ def cavity(frequency: FloatArray) -> FloatArray:
 def mach_zehnder(frequency: FloatArray) -> FloatArray:
     """Return the noise of a laser stabilised to a Mach-Zehnder interferometer in Hz/sqrt(Hz).
 
-    Two readouts of 1 pm/sqrt(Hz), over a path difference of 0.5 m; as the source has it in
-    Sec. 2.5 but for its loop, of 20 Hz, which gives the free-running laser back above.
+    Two readouts of 1 pm/sqrt(Hz), over a path difference of 0.5 m (Sec. 2.5 of the source).
+    The source's loop has a bandwidth of 20 Hz, which is left out here.
     """
     return 800.0 * np.sqrt(1.0 + (2.8e-3 / frequency) ** 4)
 
@@ -99,9 +102,9 @@ class NoiseBudget:
     frequency : float array, shape (n,)
         In Hz.
     sources : dict of str to float array, shape (n,)
-        What each source leaves on the locked laser: "laser", "shot", "clock", "motion".
+        What each source leaves on the locked laser: "laser", "shot", "clock" and "motion".
     requirement : float array, shape (n,)
-        What the total is held against.
+        Requirement on the total.
 
     Examples
     --------
@@ -124,13 +127,15 @@ class NoiseBudget:
         """How many times the total lies below the requirement."""
         return self.requirement / self.total
 
-    def plot(self, ax: Axes | None = None) -> Axes:
+    def plot(self, ax: Axes | None = None, **style: Any) -> Axes:
         """Draw the sources, the total and the requirement over frequency.
 
         Parameters
         ----------
         ax : matplotlib Axes, optional
             Where to draw; the current ones by default.
+        **style
+            Of the sources, as `matplotlib.axes.Axes.loglog` takes it.
 
         Returns
         -------
@@ -139,8 +144,9 @@ class NoiseBudget:
         import matplotlib.pyplot as plt
 
         ax = plt.gca() if ax is None else ax
-        for line, (name, asd) in zip(("-", "--", "-.", ":"), self.sources.items(), strict=True):
-            ax.loglog(self.frequency, asd, line, linewidth=0.9, label=name)
+        for line, (name, asd) in zip(cycle(("-", "--", "-.", ":")), self.sources.items()):
+            shown = {"linestyle": line, "linewidth": 0.9, "label": name, **style}
+            ax.loglog(self.frequency, asd, **shown)
         ax.loglog(self.frequency, self.total, color="black", linewidth=1.4, label="total")
         ax.loglog(
             self.frequency, self.requirement, color="0.5", dashes=(6, 2), label="required"
@@ -149,15 +155,15 @@ class NoiseBudget:
         return ax
 
 
-def _densities(name: str, value: npt.ArrayLike, frequency: FloatArray) -> FloatArray:
-    """Return densities at the frequencies, or raise."""
+def _density(name: str, value: npt.ArrayLike, frequency: FloatArray) -> FloatArray:
+    """Return a density at each frequency, or raise."""
     asd = real_array(name, value)
     if (asd < 0.0).any():
         raise ValueError(f"{name} must not be negative, got {asd.min()} among its values")
     if asd.shape not in ((), frequency.shape):
         raise ValueError(
-            f"{name} must be one number or hold one a frequency, {frequency.size} of them; got "
-            f"shape {asd.shape}"
+            f"{name} must be one number or hold one for each of the {frequency.size} "
+            f"frequencies; got shape {asd.shape}"
         )
     return np.asarray(np.broadcast_to(asd, frequency.shape))
 
@@ -165,8 +171,11 @@ def _densities(name: str, value: npt.ArrayLike, frequency: FloatArray) -> FloatA
 def noise_budget(
     loop: Loop,
     frequency: npt.ArrayLike,
+    *,
     laser: str | npt.ArrayLike = "free-running",
     requirement: npt.ArrayLike | None = None,
+    c1: float = 1.0,
+    c2: float = 1.0,
 ) -> NoiseBudget:
     r"""Compute what noise is left on the locked laser.
 
@@ -189,14 +198,16 @@ def noise_budget(
     Parameters
     ----------
     loop : Loop
-        The loop, at c1 = c2 = 1.
+        The loop.
     frequency : array_like of float, one-dimensional
         In Hz, positive.
     laser : {"free-running", "Mach-Zehnder", "cavity"} or array_like of float, optional
-        Noise of the laser before it is locked, in Hz/sqrt(Hz): by name, or a value a frequency.
+        Noise of the laser before it is locked: by name, or in Hz/sqrt(Hz) at each frequency.
     requirement : array_like of float, optional
-        What the total is held against, a value a frequency in Hz/sqrt(Hz); by default the
-        capability of time-delay interferometry, 300 (1 + (3 mHz / f)^2).
+        Requirement on the total in Hz/sqrt(Hz) at each frequency; by default the capability of
+        time-delay interferometry, 300 (1 + (3 mHz / f)^2).
+    c1, c2 : float, optional
+        Multiplicative perturbations.
 
     Returns
     -------
@@ -205,8 +216,9 @@ def noise_budget(
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no `Loop`, the frequencies are not positive and one-dimensional, there is
-        no laser of that name, or densities are negative or not of the frequencies' shape.
+        If `loop` is no `Loop` or not stable at c1, c2, the frequencies are not positive and
+        one-dimensional, there is no laser of that name, or densities are negative or not of the
+        frequencies' shape.
 
     References
     ----------
@@ -218,111 +230,33 @@ def noise_budget(
     >>> found = noise_budget(flight_loop(), [3e-3])
     >>> print(f"{found.total[0]:.0f} Hz/sqrt(Hz), {found.factor[0]:.1f} times below")
     113 Hz/sqrt(Hz), 5.3 times below
+
+    As a table: ``pandas.DataFrame(found.sources, index=found.frequency)``.
     """
     f = axis("frequency", positive_array("frequency", frequency))
     if isinstance(laser, str):
-        if laser not in LASERS:
-            raise ValueError(f"laser must be one of {', '.join(LASERS)}; got {laser!r}")
-        laser = LASERS[laser](f)
+        laser = LASERS[one_of("laser", laser, LASERS)](f)
     s = 2j * np.pi * f
-    found = responses(loop, s)
+    c1, c2 = real_number("c1", c1), real_number("c2", c2)
+    require_stable(loop, c1, c2)
+    found = responses(loop, s, c1, c2)
     arms = np.array([found["arm 1"], found["arm 2"]])
-    beats, tau = np.array(BEAT_NOTES)[:, None], np.array([[loop.tau1], [loop.tau2]])
+    beats, tau = np.array(LEVELS.beat_notes)[:, None], np.array([[loop.tau1], [loop.tau2]])
+    # An arm's noise in cycles is turned into a frequency by 2 pi f.
+    shot = np.sqrt(2.0) * LEVELS.shot * np.abs(s)
+    clock = LEVELS.clock / np.sqrt(f)
+    motion = LEVELS.motion * np.abs(s) / np.sqrt(1.0 + (f / LEVELS.motion_corner) ** 4)
 
-    def through(shared: npt.ArrayLike, own: npt.ArrayLike) -> FloatArray:
+    def through(shared: npt.ArrayLike, separate: npt.ArrayLike) -> FloatArray:
         """Return the response to one noise in both arms and one in each, by their weights."""
         together = np.abs(np.sum(shared * arms, axis=0))
-        return np.asarray(np.hypot(together, np.linalg.norm(own * arms, axis=0)))
+        return np.asarray(np.hypot(together, np.linalg.norm(separate * arms, axis=0)))
 
-    sources = {
-        "laser": np.abs(found["laser"]) * _densities("laser", laser, f),
-        "shot": np.abs(_SHOT(s)) * through(0.0, 1.0),
-        "clock": CLOCK_NOISE / np.sqrt(f) * through(beats, beats),
-        "motion": np.abs(_MOTION(s)) * through(1.0 + np.exp(-s * tau), 2.0),
+    locked = {
+        "laser": np.abs(found["laser"]) * _density("laser", laser, f),
+        "shot": shot * through(0.0, 1.0),
+        "clock": clock * through(beats, beats),
+        "motion": motion * through(1.0 + np.exp(-s * tau), 2.0),
     }
     required = tdi_capability(f) if requirement is None else requirement
-    return NoiseBudget(f, sources, _densities("requirement", required, f))
-
-
-def noise_series(
-    loop: Loop, source: str, samples: int, seed: int, sample_rate: float = 200.0
-) -> FloatArray:
-    r"""Draw one source of the budget, as a noise of the laser that drives a simulation.
-
-    With N_1 and N_2 as in `noise_budget`, what adds to the arms acts as a laser's noise that
-    has gone through the controller and the sensor's weights,
-
-    .. math::
-
-        \phi_L = -K m_1 N_1 - K m_2 N_2 .
-
-    Parameters
-    ----------
-    loop : Loop
-        The loop; its dead time is left out of K.
-    source : {"laser", "shot", "clock", "motion"}
-        The source; the laser is the free-running one.
-    samples : int
-        How many.
-    seed : int
-        Of the random numbers; sources with the same seed are independent.
-    sample_rate : float, optional
-        In Hz.
-
-    Returns
-    -------
-    float array, shape (samples,)
-        In Hz, for `armlock.simulate`, from rest at time zero.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If `loop` is no `Loop`, there is no such source, or a number is out of range. All but
-        the laser's noise, which asks nothing of the loop, need open-loop poles left of s = 0,
-        or it grows without end, and shot noise an open loop that rolls off.
-
-    Notes
-    -----
-    All filters are rational but for the clocks' 1/sqrt(f), which twenty pairs of poles and
-    zeros from 1 uHz on follow to 4e-4 between 0.1 mHz and 10 Hz.
-
-    Examples
-    --------
-    >>> from armlock import flight_loop, simulate
-    >>> from armlock.performance.budget import noise_series
-    >>> loop = flight_loop()
-    >>> locked = simulate(loop, noise_series(loop, "clock", 10_000, seed=1))
-    """
-    checked_loop(loop)
-    if source not in SOURCES:
-        raise ValueError(f"source must be one of {', '.join(SOURCES)}; got {source!r}")
-    streams = np.random.SeedSequence([seed, SOURCES.index(source)]).generate_state(3).tolist()
-    if source == "laser":
-        laser = LaserNoise(streams[0], sample_rate, level=FREE_RUNNING, at_rest=True)
-        return laser.draw(samples)
-
-    def drawn(shape: Controller, stream: int) -> FloatArray:
-        noise = ShapedNoise(
-            shape.zeros, shape.poles, shape.gain,
-            seed=stream, sample_rate=sample_rate, at_rest=True,
-        )  # fmt: skip
-        return noise.draw(samples)
-
-    total = np.zeros(samples)
-    rest, *arms = loop.polynomials()
-    delays = loop.tau1, loop.tau2
-    for b, tau, beat, own in zip(arms, delays, BEAT_NOTES, streams[1:], strict=True):
-        gain = -float(b.coefficients[-1] / rest.coefficients[-1])
-        if not gain:
-            continue
-        arm = Controller(b.roots.tolist(), rest.roots.tolist(), gain)
-        if source == "shot":
-            total += drawn(_SHOT * arm, own)
-        elif source == "clock":
-            total += beat * (drawn(_CLOCK * arm, streams[0]) + drawn(_CLOCK * arm, own))
-        else:
-            here = drawn(_MOTION * arm, streams[0])
-            total += here + 2.0 * drawn(_MOTION * arm, own)
-            late = total[round(tau * sample_rate) :]
-            late += here[: late.size]
-    return total
+    return NoiseBudget(f, locked, _density("requirement", required, f))

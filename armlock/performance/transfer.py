@@ -1,30 +1,24 @@
 """The closed loop from each of its inputs to the locked laser.
 
 An input is the laser's own noise, or an error in what is measured on an arm. Noise budget and
-laser pulling are made from these responses.
+laser pulling are computed from these responses.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import numpy.typing as npt
 
-from armlock.checks import ComplexArray, axis, one_of, positive_array, real_number
+from armlock.checks import ComplexArray, one_of
 from armlock.loops import Loop, checked_loop
-
-if TYPE_CHECKING:
-    import control
-
-#: The inputs of a loop: the laser, both arms, and the sum and difference of the arms.
-INPUTS = ("laser", "arm 1", "arm 2", "common", "differential")
+from armlock.stability.counts import unstable_roots
 
 
 def transfer(
     loop: Loop,
     source: str,
     s: npt.ArrayLike,
+    *,
     c1: npt.ArrayLike = 1.0,
     c2: npt.ArrayLike = 1.0,
 ) -> ComplexArray:
@@ -46,7 +40,7 @@ def transfer(
     loop : Loop
         The loop.
     source : {"laser", "arm 1", "arm 2", "common", "differential"}
-        The input: S, Y_1, Y_2, Y_+ or Y_-.
+        The input: `S`, `Y_1`, `Y_2`, `Y_+` or `Y_-`.
     s : array_like of complex
         Laplace variable in rad/s.
     c1, c2 : array_like of float, optional
@@ -69,7 +63,8 @@ def transfer(
     >>> print(f"{abs(transfer(flight_loop(), 'laser', 2j * 3.141592653589793 * 3e-3)):.2e}")
     1.13e-05
     """
-    return responses(loop, s, c1, c2)[one_of("source", source, INPUTS)]
+    found = responses(loop, s, c1, c2)
+    return found[one_of("source", source, found)]
 
 
 def responses(
@@ -86,8 +81,8 @@ def responses(
     -------
     dict of str to complex array, of the broadcast shape
     """
-    sensitivity = 1.0 / (1.0 + checked_loop(loop).open_loop(s, c1, c2))
-    first, second = loop.arm_responses(s)
+    open_loop, first, second = checked_loop(loop).with_arms(s, c1, c2)
+    sensitivity = 1.0 / (1.0 + open_loop)
     errors = {
         "arm 1": first,
         "arm 2": second,
@@ -98,42 +93,14 @@ def responses(
     return {"laser": np.asarray(sensitivity), **found}
 
 
-def closed_loop(
-    loop: Loop, omega: npt.ArrayLike, c1: float = 1.0, c2: float = 1.0
-) -> control.FrequencyResponseData:
-    """Return the responses to all inputs as one python-control object, with exact delays.
+def require_stable(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> None:
+    """Raise unless all roots of a closed loop lie in the open left half-plane.
 
-    Parameters
-    ----------
-    loop : Loop
-        The loop.
-    omega : array_like of float, one-dimensional
-        Angular frequencies in rad/s, positive.
-    c1, c2 : float, optional
-        Multiplicative perturbations.
-
-    Returns
-    -------
-    control.FrequencyResponseData
-        With one output, "locked laser", and the inputs of `transfer`.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If `loop` is no `Loop`, omega is not positive and one-dimensional, or c1 or c2 is not
-        finite and real.
-
-    Examples
-    --------
-    >>> from armlock import closed_loop, flight_loop
-    >>> response = closed_loop(flight_loop(), [0.01, 0.1])
-    >>> response.input_labels
-    ['laser', 'arm 1', 'arm 2', 'common', 'differential']
+    The response of an unstable loop at s = j omega looks like that of a stable one.
     """
-    import control
-
-    omega = axis("omega", np.atleast_1d(positive_array("omega", omega)))
-    found = responses(loop, 1j * omega, real_number("c1", c1), real_number("c2", c2))
-    return control.frd(
-        np.array([[*found.values()]]), omega, inputs=list(INPUTS), outputs=["locked laser"]
-    )
+    count = int(unstable_roots(checked_loop(loop), c1, c2))
+    if count != 0:
+        raise ValueError(
+            f"loop must be stable at (c1, c2) = ({c1:g}, {c2:g}), but "
+            f"unstable_roots gives {count}"
+        )

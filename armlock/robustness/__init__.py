@@ -4,21 +4,25 @@ Each margin comes from a certified search of the axis and is confirmed by counts
 cannot be certified is refused.
 """
 
-from armlock.robustness.boxes import box_counts, edge_crossings
-from armlock.robustness.gains import gain_interval
-from armlock.robustness.margins import Margins, critical_perturbation, margins, modulus_margin
-from armlock.robustness.rays import Crossing, Crossings, Ray, first_crossing
+from armlock.engine.margins import Margins
+from armlock.robustness.margins import margins, modulus_margin
+from armlock.robustness.perturbations import (
+    Crossing,
+    box_count,
+    critical_perturbation,
+    first_crossing,
+    gain_interval,
+    no_root_crosses,
+)
 
 __all__ = [
     "Crossing",
-    "Crossings",
     "Margins",
-    "Ray",
-    "box_counts",
+    "box_count",
     "critical_perturbation",
-    "edge_crossings",
     "first_crossing",
     "gain_interval",
     "margins",
     "modulus_margin",
+    "no_root_crosses",
 ]

@@ -4,18 +4,12 @@ Counts, and the charts made of them, are certified: what rounding hides is -1, a
 root chain that is not confined is -2.
 """
 
-from armlock.stability.bounds import last_frequency
-from armlock.stability.counts import (
-    BOUNDARY,
-    UNCONFINED,
-    CountError,
-    StabilityChart,
-    stability_chart,
-    unstable_roots,
-)
+from armlock.engine.roots import RootError
+from armlock.stability.charts import StabilityChart, stability_chart
+from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError, unstable_roots
 from armlock.stability.dcurve import d_curve, d_curve_branches, d_curve_line
 from armlock.stability.nyquist import AxisCrossings, NyquistCurve, axis_crossings, nyquist
-from armlock.stability.roots import RootError, rightmost_root
+from armlock.stability.roots import rightmost_root
 from armlock.stability.semidiscretization import (
     semi_discretization,
     spectral_radius,
@@ -34,7 +28,6 @@ __all__ = [
     "d_curve",
     "d_curve_branches",
     "d_curve_line",
-    "last_frequency",
     "nyquist",
     "rightmost_root",
     "semi_discretization",

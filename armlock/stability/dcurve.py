@@ -12,11 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from numpy.polynomial import polynomial as poly
 
-from armlock.axis.exponentials import EPSILON
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import FloatArray, check_memory, positive_number, real_array
-from armlock.stability.counts import sign_changes
+from armlock.engine.inclusion import EPSILON
+from armlock.stability.counts import CountError
+from armlock.stability.crossings import crossings
 
 
 class Line(NamedTuple):
@@ -45,17 +47,16 @@ class Branch(NamedTuple):
 
 def _require_two_parameters(system: CharacteristicFunction) -> None:
     """Raise if D(j omega) = 0 does not determine both free parameters."""
-    for name, b in zip(system.parameters, (system.b1, system.b2), strict=True):
+    b1, b2 = system.b1.coefficients, system.b2.coefficients
+    for name, b in zip(system.parameters, (b1, b2), strict=True):
         if not b.any():
             raise ValueError(
                 f"system must depend on both free parameters, but {system!r} does not "
                 f"depend on {name}: there is no D-curve"
             )
     if system.tau1 == system.tau2:
-        ratio = system.b1[-1] / system.b2[-1]
-        if system.b1.size == system.b2.size and np.allclose(
-            system.b1, ratio * system.b2, rtol=4 * EPSILON, atol=0.0
-        ):
+        ratio = b1[-1] / b2[-1]
+        if b1.size == b2.size and np.allclose(b1, ratio * b2, rtol=4 * EPSILON, atol=0.0):
             raise ValueError(
                 f"tau1 and tau2 must differ, got {system.tau1} for both: only one "
                 f"combination of {' and '.join(system.parameters)} enters, and the D-curve "
@@ -190,13 +191,36 @@ def d_curve_line(system: CharacteristicFunction) -> Line:
     Line(weight_x=1.0, weight_y=1.0, value=2.0)
     """
     checked_system(system)
-    a, b1, b2 = (float(part.real) for part in system.parts(0.0))
+    # From coefficients, which are exact there.
+    at = 1.0 if system.step else 0.0
+    rest, b1, b2 = (float(poly.polyval(at, p.coefficients)) for p in system.polynomials())
+    a = rest + system.reference[0] * b1 + system.reference[1] * b2
     scale = max(b1, b2, key=abs)
     if scale == 0.0:
         raise ValueError(
             f"system must depend on a free parameter at s = 0, but {system!r} does not"
         )
     return Line(b1 / scale, b2 / scale, a / scale)
+
+
+def _poles(system: CharacteristicFunction, omega_max: float) -> list[tuple[float, float]]:
+    """Return the intervals, ascending, in which the curve has a pole, or may have one."""
+    _, _, first, second = system.terms
+    bound = np.array([np.inf])
+    found = crossings(
+        (first, first * 0, second), np.zeros(1), -bound, bound, np.array([omega_max])
+    )
+    if found.unfinished.any():
+        raise CountError(
+            f"no branches up to omega_max = {omega_max}: there are too many poles",
+            np.empty((0, 2)),
+        )
+    off = found.width + 4.0 * EPSILON * found.omega
+    # A pole at s = 0 is on no branch.
+    low, high = np.maximum(found.omega - off, 0.0), found.omega + off
+    inside = np.flatnonzero((found.omega > 0.0) | (found.jump == 0))
+    order = inside[np.argsort(low[inside])]
+    return list(zip(low[order].tolist(), high[order].tolist(), strict=True))
 
 
 def d_curve_branches(
@@ -235,7 +259,7 @@ def d_curve_branches(
         \mathrm{Im} \left[ B_1(\mathrm{j}\omega)\, \overline{B_2(\mathrm{j}\omega)}\,
         e^{-\mathrm{j}\omega (\theta_1 - \theta_2)} \right] = 0 ,
 
-    found with certified steps (`armlock.axis.contour.imaginary_zeros`).
+    found with certified steps (`armlock.engine.inclusion.cross`).
 
     Examples
     --------
@@ -254,12 +278,11 @@ def d_curve_branches(
     _require_two_parameters(system)
     turns = omega_max / system.omega_per_turn
     check_memory("omega_max", (int(min(density * turns, 1e18)),), 256)
-    _, b1, b2 = system.on_boundary()
-    determinant = b1.times_conjugate(b2)
-    poles = sign_changes(determinant, [(0.0, omega_max)])[0]
-    edges = np.unique(np.concatenate(([0.0], poles, [omega_max])))
+    poles = _poles(system, omega_max)
     branches = []
-    for start, stop in pairwise(edges):
+    for (_, start), (stop, _) in pairwise([(0.0, 0.0), *poles, (omega_max, omega_max)]):
+        if stop <= start:
+            continue
         turns = (stop - start) / system.omega_per_turn
         count = int(np.ceil(density * max(turns, 4.0)))
         # Closer towards both ends, where the curve runs off to its poles.

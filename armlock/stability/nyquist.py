@@ -1,42 +1,35 @@
 """The open loop on the imaginary axis: Nyquist curve, encirclements, crossings.
 
 The contour goes up the imaginary axis, indented to the right around the pole of L at s = 0,
-and back at infinity. It is sampled so finely that the argument of 1 + L is known without doubt,
-up to past the last root on the axis; what 1 + L gathers from there on follows from the roots of
-its numerator and denominator without delays. The encirclements are then held against the count
-of unstable roots: Z = N + P.
+and back at infinity. The encirclements N = Z - P follow from the certified count Z of unstable
+roots and the number P of unstable poles of L. The samples of the curve are for pictures.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from armlock.axis.contour import MOST_SAMPLES, argument_at, resolved_grid
-from armlock.checks import (
-    ComplexArray,
-    FloatArray,
-    check_memory,
-    positive_number,
-)
-from armlock.loops import Loop, LoopAt
-from armlock.stability.bounds import last_frequency, last_larger
-from armlock.stability.counts import (
-    CountError,
-    loop_count,
-    sign_changes,
-)
+from armlock.checks import ComplexArray, FloatArray, positive_number, real_number
+from armlock.delays import DelaySystem
+from armlock.engine import decide
+from armlock.engine.functions import Function, at, common_zeros, stacked
+from armlock.engine.polynomials import rounded
+from armlock.loops import Loop, checked_loop
+from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError
+from armlock.stability.crossings import crossings
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# How far numerator and denominator of 1 + L may be from straight lines between two samples,
-# relative to their distance from zero. Neither turns by more than 0.31 rad then.
-_STRAIGHT = 0.1
-# Most that 1 + L turns between two samples, in rad, unless it passes through zero.
-_MOST_TURN = 1.0
+# Where |L| is below it no crossing of the negative real axis is of interest, and above the
+# other one a pole is on the axis.
+_SMALL, _LARGE = 1e-3, 1e12
+# The share of a leading term that all others are at most, where a picture begins.
+_NEGLIGIBLE = 5e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +39,7 @@ class NyquistCurve:
     Attributes
     ----------
     omega : float array, shape (n,)
-        Ascending frequencies in rad/s, from the indentation up.
+        Ascending frequencies in rad/s, from the indentation up, close enough for a picture.
     response : complex array, shape (n,)
         L(j omega).
     indentation : complex array, shape (k,)
@@ -57,11 +50,11 @@ class NyquistCurve:
     pole_order : int
         Order of the pole of L at s = 0, after cancellation.
     encirclements : int
-        N, clockwise turns around -1 of the whole contour, both signs of omega.
+        N = Z - P, clockwise turns around -1 of the whole contour, both signs of omega.
     open_loop_poles : int
         P, poles of L in the open right half-plane.
     closed_loop_roots : int
-        Z = N + P, zeros of 1 + L in the right half-plane.
+        Z = N + P, the loop's own roots in the right half-plane.
 
     Examples
     --------
@@ -122,73 +115,77 @@ class AxisCrossings:
     value: FloatArray
 
 
-def open_loop_poles(loop: Loop) -> int:
-    """Count the poles of L in the open right half-plane.
+def _quotient(loop: Loop | DelaySystem, c1: float, c2: float) -> tuple[Function, Function]:
+    """Return N and M of L = N / M, or say what was given in place of a loop."""
+    c1, c2 = real_number("c1", c1), real_number("c2", c2)
+    if not isinstance(loop, DelaySystem):
+        return checked_loop(loop).quotient(c1, c2)
+    if (c1, c2) != (1.0, 1.0):
+        raise TypeError(f"a DelaySystem has no perturbations, got c1 = {c1} and c2 = {c2}")
+    return loop.functions
 
-    Parameters
-    ----------
-    loop : Loop
-        The loop.
 
-    Returns
-    -------
-    int
+def open_loop_poles(m: Function) -> int:
+    """Count the poles of L = N / M in the open right half-plane.
 
     Raises
     ------
     ValueError
         If L has poles on the imaginary axis elsewhere than at s = 0: the contour is indented
-        there only.
+        there only. Or if infinitely many poles do not stay left of the axis.
     """
-    poles = loop.polynomials()[0].roots
-    on_axis = (np.abs(poles.real) <= 1e-12 * np.abs(poles)) & (poles != 0.0)
-    if on_axis.any():
+    lead = m.leading()
+    count = decide.count(m, lead.order if lead else 0)
+    if count == BOUNDARY:
         raise ValueError(
-            "the open loop must have no pole on the imaginary axis except at s = 0, got one "
-            f"at {poles[on_axis][0]}; unstable_roots counts such a loop all the same"
+            "the open loop must have no pole on the imaginary axis except at s = 0, got one; "
+            "unstable_roots counts such a loop all the same"
         )
-    return int((poles.real > 0.0).sum())
-
-
-def _resolving_grid(loop: Loop, c1: float, c2: float, end: float) -> FloatArray:
-    """Frequencies from 0 to `end` between which neither D nor R turns by much."""
-    grids = []
-    for part in (loop.sum_at(c1, c2), loop.rest_on_boundary()):
-        grids.append(resolved_grid(part.compiled(), end, _STRAIGHT, MOST_SAMPLES))
-    if any(grid[-1] < end for grid in grids):
-        raise CountError(
-            f"no samples up to omega = {end} rad/s: more than {MOST_SAMPLES:.0e}, "
-            f"because gain times delay is too large",
-            np.empty((0, 2)),
+    if count == UNCONFINED:
+        raise ValueError(
+            "the open loop must have finitely many poles on the right, got a chain of them "
+            "that is not confined to the left"
         )
-    return np.unique(np.concatenate(grids))
+    return count
 
 
-def _drawing_grid(loop: Loop, start: float, end: float) -> FloatArray:
-    """Frequencies close enough to draw the curve; finer at first, where L changes most."""
-    per_turn = loop.omega_per_turn
-    check_memory("omega_max", (int(min(400.0 * end / per_turn, 1e18)),), 64)
-    first = np.arange(0.0, min(4.0 * per_turn, end), per_turn / 2000.0)
-    whole = np.arange(0.0, end, per_turn / 400.0)
-    return np.concatenate((np.geomspace(start, end, 1000), first, whole))
+def _drawing_grid(per_turn: float, start: float, end: float) -> FloatArray:
+    """Frequencies close enough to draw the curve; finer at first, where L changes most.
 
-
-def _turn_beyond(loop: Loop, last: complex, end: float) -> float:
-    """Argument that 1 + L gathers from j `end`, where it is `last`, to infinity and back.
-
-    1 + L is D / A times A / R. From `end` on |D / A - 1| < 1, up the axis and along the arc at
-    infinity, on which D / A tends to one: its argument at `end` is taken back. Those of A and R
-    are known from their roots. The two are of one degree, and turn alike along the arc.
+    Past a thousand turns of the delays no picture shows one turn beside the next.
     """
-    gathered = argument_at(loop.polynomials()[0].roots, end) - argument_at(loop.roots_of_a, end)
-    ratio = loop.a[-1] / loop.rest[-1] * np.exp(-1j * gathered)
-    return float(gathered - np.angle(last / ratio))
+    first = np.arange(0.0, min(4.0 * per_turn, end), per_turn / 2000.0)
+    resolved = min(1000.0 * per_turn, end)
+    whole = np.arange(0.0, resolved, per_turn / 400.0)
+    far = np.geomspace(resolved, end, 100_000) if end > resolved else whole[:0]
+    every = np.concatenate((np.geomspace(start, end, 4000), first, whole, far, [end]))
+    return np.unique(every[(every >= start) & (every <= end)])
+
+
+def _leading_radius(n: Function, m: Function) -> tuple[int, float]:
+    """Order of the pole of N / M at s = 0, and up to which abs(s) L is as simple as it gets.
+
+    With a pole, L is its leading term to a part in 1000, and |L| is above 1000. Without one L
+    is constant to a part in 1000, and so is 1 + L.
+    """
+    leads = [f.leading(_NEGLIGIBLE) for f in (n, m, n + m)]
+    above, below, _ = leads
+    radius = min(lead.radius for lead in leads if lead)
+    if above is None or below is None or below.order <= above.order:
+        return 0, radius
+    order = below.order - above.order
+    size = abs(float(rounded([above.coefficient / below.coefficient])[0]))
+    return order, min(radius, (_SMALL * size) ** (1.0 / order))
 
 
 def nyquist(
-    loop: Loop, c1: float = 1.0, c2: float = 1.0, *, omega_max: float | None = None
+    loop: Loop | DelaySystem,
+    c1: float = 1.0,
+    c2: float = 1.0,
+    *,
+    omega_max: float | None = None,
 ) -> NyquistCurve:
-    r"""Trace the Nyquist curve and count its encirclements of -1.
+    r"""Return the Nyquist curve for a picture, and its certified encirclements of -1.
 
     .. math::
 
@@ -198,13 +195,12 @@ def nyquist(
 
     Parameters
     ----------
-    loop : Loop
-        The loop.
+    loop : Loop or DelaySystem
+        The open loop.
     c1, c2 : float, optional
-        Multiplicative perturbations.
+        Multiplicative perturbations of a `Loop`.
     omega_max : float, optional
-        Trace at least up to this frequency in rad/s, with samples close enough to draw. The
-        count needs neither.
+        Sample at least up to this frequency in rad/s.
 
     Returns
     -------
@@ -213,17 +209,16 @@ def nyquist(
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no `Loop`, an argument is not finite and real, `omega_max` is not
-        positive, or L has poles on the imaginary axis elsewhere than at s = 0.
+        If `loop` is none, an argument is not finite and real, `omega_max` is not positive,
+        or L has poles on the imaginary axis elsewhere than at s = 0.
     CountError
-        If the curve passes through -1, the loop's high-frequency chain is not confined, the
-        curve takes too many samples, or the encirclements and the independent count of roots
-        disagree.
+        If the curve passes through -1, the loop's high-frequency chain is not confined, or the
+        roots cannot be counted.
 
     Notes
     -----
-    Z counts the zeros of 1 + L. A root at s = 0 that D has because a pole of L cancels there
-    is none of them, see `armlock.stability.counts.loop_count`.
+    Z counts the loop's own roots: one at s = 0 that D has because a pole of L cancels there is
+    none of them, see `armlock.unstable_roots`.
 
     Examples
     --------
@@ -233,55 +228,49 @@ def nyquist(
     >>> curve.encirclements, curve.open_loop_poles, curve.closed_loop_roots
     (1, 0, 1)
     """
-    loop, c1, c2 = point = LoopAt.of(loop, c1, c2)
-    poles = open_loop_poles(loop)
-    order = point.poles_at_zero()
-    end = float(last_frequency(loop, c1, c2))
-
-    def refused(why: str) -> CountError:
+    n, m = _quotient(loop, c1, c2)
+    poles = open_loop_poles(m)
+    order, radius = _leading_radius(n, m)
+    try:
+        count = decide.count(n + m, common_zeros(n, m))
+    except decide.UndecidedError as error:
+        raise CountError(f"no Nyquist count: {error}", np.array([[c1, c2]])) from None
+    if count < 0:
+        chain = "its high-frequency chain of roots is not confined"
+        why = chain if count == UNCONFINED else "the curve passes through -1"
         where = f"(c1, c2) = ({c1}, {c2})"
-        return CountError(f"no Nyquist count at {where}: {why}", np.array([[c1, c2]]))
-
-    if not np.isfinite(end):
-        raise refused("the loop's high-frequency chain of roots is not confined")
-    radius = point.leading_radius()
-    end = max(1.05 * end, 10.0 / loop.longest_delay, 10.0 * radius)
+        raise CountError(f"no Nyquist count at {where}: {why}", np.array([[c1, c2]]))
+    last = float(n.space.confined_from(*stacked([n + m]))[0])
+    longest = n.space.longest or 1.0 / last
+    end = max(1.05 * last, 10.0 / longest, 10.0 * radius)
     if omega_max is not None:
         end = max(end, positive_number("omega_max", omega_max))
-    grid = _resolving_grid(loop, c1, c2, end)
-    if omega_max is not None:
-        grid = np.union1d(grid, _drawing_grid(loop, radius, end))
-    omega = np.concatenate(([radius], grid[(grid > radius) & (grid < end)], [end]))
-    arc = radius * np.exp(0.5j * np.pi * np.linspace(0.0, 1.0, 64))
-    contour = loop.open_loop(np.concatenate((arc[:-1], 1j * omega)), c1, c2)
-    turned = np.angle((1.0 + contour[1:]) / (1.0 + contour[:-1]))
-    if np.abs(turned).max() > _MOST_TURN:
-        raise refused("the curve passes through -1")
-    # Half of the contour, for omega >= 0, in the direction of ascending omega.
-    turns = (float(turned.sum()) + _turn_beyond(loop, 1.0 + contour[-1], end)) / np.pi
-    encirclements = -round(turns)
-    count = encirclements + poles
-    expected = loop_count(loop, c1, c2)
-    if expected != count:
-        raise refused(
-            f"{encirclements} encirclements and {poles} open-loop poles against {expected} "
-            "roots"
-        )
-    indented = slice(arc.size if order else 0)
+    omega = _drawing_grid(2.0 * np.pi / longest, radius, end)
+    arc = radius * np.exp(0.5j * np.pi * np.linspace(0.0, 1.0, 64))[slice(64 if order else 0)]
     return NyquistCurve(
         omega=omega,
-        response=contour[arc.size - 1 :],
-        indentation=arc[indented],
-        indentation_response=contour[indented],
+        response=_response(n, m, omega),
+        indentation=arc,
+        indentation_response=n.value_and_slope(arc)[0] / m.value_and_slope(arc)[0],
         pole_order=order,
-        encirclements=encirclements,
+        encirclements=count - poles,
         open_loop_poles=poles,
         closed_loop_roots=count,
     )
 
 
+def _response(n: Function, m: Function, omega: FloatArray) -> ComplexArray:
+    """Evaluate L = N / M on the axis."""
+    above, below = at([n, m], omega)
+    return np.asarray(above / below)
+
+
 def axis_crossings(
-    loop: Loop, c1: float = 1.0, c2: float = 1.0, *, omega_max: float | None = None
+    loop: Loop | DelaySystem,
+    c1: float = 1.0,
+    c2: float = 1.0,
+    *,
+    omega_max: float | None = None,
 ) -> AxisCrossings:
     r"""Find every crossing of the negative real axis by the Nyquist curve.
 
@@ -291,13 +280,13 @@ def axis_crossings(
 
     Parameters
     ----------
-    loop : Loop
-        The loop.
+    loop : Loop or DelaySystem
+        The open loop.
     c1, c2 : float, optional
-        Multiplicative perturbations.
+        Multiplicative perturbations of a `Loop`.
     omega_max : float, optional
-        Highest frequency in rad/s. By default where |L| has fallen below 1e-3 for good; a
-        loop whose |L| does not fall needs it.
+        Highest frequency in rad/s. By default all crossings with |L| above 1e-3 are found; a
+        loop whose |L| does not fall below it needs the frequency.
 
     Returns
     -------
@@ -306,16 +295,16 @@ def axis_crossings(
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no `Loop`, an argument is not finite and real, `omega_max` is not positive,
-        or not given where |L| does not fall below 1e-3, or L has poles on the imaginary axis
-        elsewhere than at s = 0.
+        If `loop` is none, an argument is not finite and real, or `omega_max` is not positive,
+        or not given where |L| does not fall below 1e-3.
     CountError
-        If there are too many crossings to be found.
+        If there are too many crossings to be found, or rounding hides some.
 
     Notes
     -----
     Zeros of Im L at omega > 0, found with certified steps: none is missed, however close to
-    another. Where L(0) is finite the whole curve also meets the axis there.
+    another. A pole on the axis is none, nor is what exceeds 1e12. Where rounding may hide one
+    they are refused, but not where |L| is below 1e-3.
 
     Examples
     --------
@@ -326,11 +315,13 @@ def axis_crossings(
     5.63e-05 rad/s: -5.13
     1.96e-04 rad/s: -113.07
     """
-    loop, c1, c2 = point = LoopAt.of(loop, c1, c2)
-    open_loop_poles(loop)
+    n, m = _quotient(loop, c1, c2)
+    least = 0.0
     if omega_max is None:
-        factors = np.array([1.0 + abs(c1), 1.0 + abs(c2)]) / 1e-3
-        omega_max = last_larger(loop.rest, (loop.b1, loop.b2), factors)
+        least = _SMALL
+        steady, delayed = n.weights
+        sizes = (np.abs(steady - delayed.sum(axis=1)) + np.abs(delayed).sum(axis=1)) / _SMALL
+        omega_max = float(n.space.confined_from(*stacked([m]), sizes)[0])
         if not np.isfinite(omega_max):
             raise ValueError(
                 "omega_max must be given for a loop whose |L| does not fall to zero at high "
@@ -338,8 +329,42 @@ def axis_crossings(
             )
     else:
         omega_max = positive_number("omega_max", omega_max)
-    crossing = point.numerator().times_conjugate(loop.rest_on_boundary())
-    omega, jump, _ = sign_changes(crossing, [(0.0, omega_max)])
-    omega = omega[(omega > 0.0) & (jump != 0)]
-    value = point.response(omega).real
-    return AxisCrossings(omega[value < 0.0], value[value < 0.0])
+    point = np.array([[c1, c2]])
+    begin = _constant_sign_up_to(n, m)
+    if not begin > 0.0:
+        raise CountError(
+            f"no crossings at (c1, c2) = ({c1}, {c2}): L is real near s = 0", point
+        )
+    if begin >= omega_max:
+        return AxisCrossings(np.empty(0), np.empty(0))
+    found = crossings(
+        (n, n * 0, m), np.zeros(1), np.array([-_LARGE]), np.array([-least]),
+        np.array([omega_max]), begin=begin,
+    )  # fmt: skip
+    told = found.jump != 0
+    hidden = ~told & (found.x - found.spread < -_SMALL) & (found.x + found.spread > -_LARGE)
+    if found.unfinished.any() or hidden.any():
+        why = "they take too many steps"
+        if hidden.any():
+            why = f"rounding hides some around {found.omega[hidden][0]} rad/s"
+        raise CountError(f"no crossings at (c1, c2) = ({c1}, {c2}): {why}", point)
+    omega = np.sort(found.omega[told])
+    value = _response(n, m, omega).real
+    kept = (value < -least) & (value > -_LARGE)
+    return AxisCrossings(omega[kept], value[kept])
+
+
+def _constant_sign_up_to(n: Function, m: Function) -> float:
+    """Frequency up to which the imaginary part of L has one sign; zero if it is not known.
+
+    Its leading term there, as in Lemma 11: Im(N conj M) is the odd part of N(s) M(-s).
+    """
+    number = 16
+    above, below = n.series(number), m.series(number)
+    for k in range(number):
+        product = sum(
+            a * b * (-1) ** i for i, b in enumerate(below[: k + 1]) for a in [above[k - i]]
+        )
+        if k % 2 and product:
+            return n.radius(k, abs(Fraction(product)), 0.5, m)
+    return 0.0

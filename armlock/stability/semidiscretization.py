@@ -11,11 +11,12 @@ unit circle instead of the imaginary axis, so that `unstable_roots`, `stability_
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import contextlib
+from typing import Any, NamedTuple
 
+import mpmath
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import expm
 
 from armlock.characteristic import (
     CharacteristicFunction,
@@ -31,6 +32,15 @@ from armlock.checks import (
     whole_number,
     whole_steps,
 )
+from armlock.engine.roots import RootError
+from armlock.stability.roots import rightmost_root
+
+# Digits of a map's coefficients, and bits of Schur's test.
+_DIGITS, _BITS = 100, 1600
+# Eigenvalues that are tried as the largest one: so many, down to this share below it.
+_TRIED, _SCATTERED = 16, 1e-4
+# No root exceeds the spectral radius by more than this share.
+_MARGIN = 1e-12
 
 
 class DelayedTerm(NamedTuple):
@@ -90,8 +100,8 @@ def realize(
     terms = []
     for weight, b, delay in (
         (-1.0, system.c, system.delay),
-        (x, system.b1, system.delay + system.tau1),
-        (y, system.b2, system.delay + system.tau2),
+        (x, system.b1.coefficients, system.delay + system.tau1),
+        (y, system.b2.coefficients, system.delay + system.tau2),
     ):
         padded = np.zeros_like(undelayed)
         padded[: b.size] = weight * b
@@ -128,20 +138,45 @@ def _checked(system: CharacteristicFunction, step: float | None, order: int) -> 
 
 def _sampled(
     state: FloatArray, delayed: list[DelayedTerm], step: float, order: int
-) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
-    """Return exp(F h) and, per delayed term, the columns of its older and newer sample."""
-    states = len(state)
-    columns = []
+) -> tuple[Any, list[tuple[Any, Any]]]:
+    """Return exp(F h) and, per delayed term, the columns of its older and newer sample.
+
+    In extended precision: slow poles lie next to each other at z = 1, where rounded
+    coefficients would scatter them.
+    """
+    states, h = len(state), mpmath.mpf(step)
+    flow, columns = mpmath.expm(mpmath.matrix(state.tolist()) * h), []
     for term in delayed:
         # exp of this block matrix holds the integrals of exp(F u) G and of u exp(F u) G.
-        block = np.zeros((states + 2, states + 2))
-        block[:states, :states] = state
-        block[:states, states] = term.column
-        block[states, states + 1] = 1.0 / step
-        integrals = expm(block * step)[:states, states:]
-        held, ramp = integrals[:, 0], integrals[:, 1]
-        columns.append((held, np.zeros(states)) if order == 0 else (held - ramp, ramp))
-    return np.asarray(expm(state * step)), columns
+        block = mpmath.zeros(states + 2)
+        block[:states, :states] = mpmath.matrix(state.tolist())
+        block[:states, states] = mpmath.matrix(term.column.tolist())
+        block[states, states + 1] = 1 / h
+        integrals = mpmath.expm(block * h)
+        held, ramp = integrals[:states, states], integrals[:states, states + 1]
+        columns.append((held, 0 * held) if order == 0 else (held - ramp, ramp))
+    return flow, columns
+
+
+def _map(
+    state: FloatArray, delayed: list[DelayedTerm], step: float, order: int
+) -> tuple[list[Any], list[list[Any]]]:
+    """Return A and the B_k of `semi_discretization` in ascending powers of z.
+
+    By the recursion of Faddeev and LeVerrier for the adjugate of z - exp(F h).
+    """
+    flow, columns = _sampled(state, delayed, step, order)
+    states = len(state)
+    a, b = [mpmath.mpf(1)], [[mpmath.mpf(0)] * (states + 1) for _ in columns]
+    power = mpmath.eye(states)
+    for k in range(1, states + 1):
+        for numerator, (older, newer) in zip(b, columns, strict=True):
+            numerator[states - k] += (power[0, :] * older)[0]
+            numerator[states - k + 1] += (power[0, :] * newer)[0]
+        power = flow * power
+        a.append(-sum(power[i, i] for i in range(states)) / k)
+        power += a[-1] * mpmath.eye(states)
+    return a[::-1], b
 
 
 def transition_matrix(
@@ -223,17 +258,18 @@ def transition_matrix(
     # The matrix, and what its eigenvalues take.
     check_memory("step", (system.degree + round(system.longest_delay / step),) * 2, 24)
     state, delayed = realize(system, x, y)
-    flow, columns = _sampled(state, delayed, step, order)
+    with mpmath.workdps(_DIGITS):
+        flow, columns = _sampled(state, delayed, step, order)
     states = len(state)
     steps = [whole_steps("delay", term.delay, step) for term in delayed]
     longest = max(steps, default=0)
     matrix = np.zeros((states + longest, states + longest))
-    matrix[:states, :states] = flow
+    matrix[:states, :states] = np.array(flow.tolist(), np.float64)
     # The present sample is the first state, older ones stand behind the states.
     place = [0, *range(states, states + longest)]
     for back, (older, newer) in zip(steps, columns, strict=True):
-        matrix[:states, place[back]] += older
-        matrix[:states, place[back - 1]] += newer
+        matrix[:states, place[back]] += np.array(list(older), np.float64)
+        matrix[:states, place[back - 1]] += np.array(list(newer), np.float64)
     # A step later each sample is one step older.
     matrix[place[1:], place[:-1]] = 1.0
     return matrix
@@ -246,7 +282,7 @@ def spectral_radius(
     step: float | None = None,
     order: int = 0,
 ) -> FloatArray:
-    r"""Spectral radius of the semi-discretized loop, from dense eigenvalues.
+    r"""Spectral radius of the semi-discretized loop, certified.
 
     .. math::
 
@@ -277,6 +313,14 @@ def spectral_radius(
         If x or y is not finite and real or the two do not broadcast, if the step does not
         divide a delay, if the order is not 0 or 1, if the loop is neutral, or if the matrix
         does not fit into the memory.
+    RootError
+        If it is not certified, because no eigenvalue leads to the largest root.
+
+    Notes
+    -----
+    Eigenvalues of the transition matrix, and the loop's rightmost root, are starts for Newton's
+    method with 100 digits. Schur's test of the characteristic polynomial, with a bound of its
+    rounding, says that no root exceeds the largest one found by a share of more than 1e-12.
 
     Examples
     --------
@@ -285,11 +329,73 @@ def spectral_radius(
     0.941189374167
     """
     xs, ys = broadcast_parameters(system, x, y)
-    radii = [
-        np.abs(np.linalg.eigvals(transition_matrix(system, p, q, step, order))).max()
-        for p, q in zip(xs.flat, ys.flat, strict=True)
-    ]
-    return np.array(radii, dtype=np.float64).reshape(xs.shape)
+    h = _checked(system, step, order)
+    radii = [_radius(system, p, q, h, order) for p, q in zip(xs.flat, ys.flat, strict=True)]
+    return np.array(radii, np.float64).reshape(xs.shape)
+
+
+def _radius(
+    system: CharacteristicFunction, x: float, y: float, step: float, order: int
+) -> float:
+    """Return the spectral radius at one point, or raise `RootError`."""
+    starts = np.linalg.eigvals(transition_matrix(system, x, y, step, order))
+    starts = starts[np.abs(starts) >= (1.0 - _SCATTERED) * np.abs(starts).max()]
+    starts = starts[starts.imag >= 0.0]
+    starts = starts[np.argsort(-np.abs(starts))][:_TRIED].tolist()
+    with contextlib.suppress(RootError):
+        # Rounding scatters eigenvalues of slow poles; the map's own lie next to the loop's.
+        starts.append(np.exp(step * rightmost_root(system, x, y)))
+    state, delayed = realize(system, x, y)
+    with mpmath.workdps(_DIGITS):
+        a, b = _map(state, delayed, step, order)
+        longest = max((whole_steps("delay", term.delay, step) for term in delayed), default=0)
+        powers = [mpmath.mpf(0)] * longest + a
+        for term, numerator in zip(delayed, b, strict=True):
+            late = longest - whole_steps("delay", term.delay, step)
+            for k, value in enumerate(numerator):
+                powers[late + k] -= value
+        found = [mpmath.mpf(0)]
+        for start in starts:
+            # A start that does not settle leads to no root.
+            with contextlib.suppress(ValueError, ZeroDivisionError):
+                found.append(abs(_root(powers, start)))
+        radius = max(found)
+        if not _within(powers, radius * (1 + mpmath.mpf(_MARGIN))):
+            name1, name2 = system.parameters
+            raise RootError(
+                f"no spectral radius is certified at ({name1}, {name2}) = ({x}, {y}); the best "
+                f"candidate is {float(radius)}", complex(radius),
+            )  # fmt: skip
+        return float(radius)
+
+
+def _root(powers: list[Any], start: complex) -> Any:
+    """Return a root of a polynomial in ascending powers; ValueError if none is found."""
+    return mpmath.findroot(
+        lambda z: mpmath.polyval(powers, z, asc=True), mpmath.mpc(start),
+        df=lambda z: mpmath.polyval(powers, z, derivative=True, asc=True)[1],
+        solver="newton", maxsteps=60, tol=mpmath.mpf(10) ** (-_DIGITS // 2),
+    )  # fmt: skip
+
+
+def _within(powers: list[Any], radius: Any) -> bool:
+    """Whether all roots of a polynomial lie within a radius: Schur's test, step by step.
+
+    In whole multiples of 2^-_BITS, with a bound of what they are off by.
+    """
+    with mpmath.workprec(_BITS):
+        scaled = [value * radius**k for k, value in enumerate(powers)]
+        largest = max(map(abs, scaled))
+        p = np.array([int(mpmath.ldexp(v / largest, _BITS)) for v in scaled], dtype=object)
+    off = 8 * len(p)
+    while len(p) > 1:
+        lead = abs(p[-1]) - off
+        if abs(p[0]) + off >= lead:
+            return False
+        share, wrong = (p[0] << _BITS) // p[-1], (2 * off << _BITS) // lead + 1
+        off = 2 * off + (wrong * (abs(p).max() + off) >> _BITS) + 3
+        p = p[1:] - (p[-2::-1] * share >> _BITS)
+    return True
 
 
 def semi_discretization(
@@ -354,29 +460,13 @@ def semi_discretization(
                 f"so that the map is not affine in it; use transition_matrix or "
                 f"spectral_radius at single points"
             )
-    flow, columns = _sampled(*realize(system, 1.0, 1.0), step, order)
+    with mpmath.workdps(_DIGITS):
+        a, b = _map(*realize(system, 1.0, 1.0), step, order)
     # Those before x and y; with a dead time there is a third one, x0 B1 + y0 B2.
-    b1, b2 = (_numerator(flow, *both) for both in columns[-2:])
+    a, b1, b2 = ([float(value) for value in p] for p in (a, *b[-2:]))
     return CharacteristicFunction(
-        np.asarray(np.poly(flow)[::-1], dtype=np.float64),
-        b1,
-        b2,
-        system.tau1,
-        system.tau2,
-        delay=system.delay,
-        step=step,
+        a, b1, b2, system.tau1, system.tau2, delay=system.delay, step=step,
         parameters=system.parameters,
         # Without a dead time x0 B1 + y0 B2 is a part of the flow.
         reference=system.reference if system.delay else (0.0, 0.0),
-    )
-
-
-def _numerator(flow: FloatArray, older: FloatArray, newer: FloatArray) -> FloatArray:
-    """Ascending coefficients of the numerator from a delayed signal to the first state."""
-    from scipy.signal import ss2tf
-
-    # z W / (z - flow) = W + flow W / (z - flow), where W is the newer sample's column.
-    column = older + flow @ newer
-    output = np.eye(1, flow.shape[0])
-    above, _ = ss2tf(flow, column[:, None], output, newer[:1, None])
-    return np.asarray(above[0, ::-1], dtype=np.float64)
+    )  # fmt: skip

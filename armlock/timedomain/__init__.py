@@ -1,16 +1,16 @@
-"""What a loop does in time: from a series of noise to the locked laser, and its spectrum.
+"""A loop in time: noise of the laser, simulation of the locked laser, and spectra.
 
-The sampled loop has an exact prediction of its own; it says nothing certain about stability.
+A simulation does not decide stability, because growth may take days. Counts of unstable roots
+decide it.
 """
 
-from armlock.timedomain.noise import LaserNoise, PerturbationNoise, ShapedNoise, band_rms
+from armlock.timedomain.noise import LaserNoise, PerturbationNoise, ShapedNoise
+from armlock.timedomain.responses import impulse_response, step_response
 from armlock.timedomain.simulation import (
     DivergenceError,
     Simulation,
     sampled_open_loop,
-    save_series,
     simulate,
-    simulate_blocks,
 )
 from armlock.timedomain.spectra import Spectrum, SpectrumEstimator, amplitude_spectrum
 
@@ -23,9 +23,8 @@ __all__ = [
     "Spectrum",
     "SpectrumEstimator",
     "amplitude_spectrum",
-    "band_rms",
+    "impulse_response",
     "sampled_open_loop",
-    "save_series",
     "simulate",
-    "simulate_blocks",
+    "step_response",
 ]

@@ -25,8 +25,8 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 from scipy.linalg import solve_continuous_lyapunov
 
-from armlock.axis.compiled import njit
 from armlock.checks import ComplexArray, FloatArray, positive_number, real_array
+from armlock.compiled import njit
 from armlock.controllers import Controller
 from armlock.sensors import SignalMapping
 
@@ -185,11 +185,11 @@ def _pairs(roots: list[complex]) -> Rows:
     real = sorted((float(r.real) for r in roots if r.imag == 0.0), key=abs, reverse=True)
     pairs += [(r1, r2, 0.0) for r1, r2 in zip(real[::2], real[1::2], strict=False)]
     pairs.sort(key=lambda pair: math.hypot(pair[0], math.sqrt(pair[2])), reverse=True)
-    left = [(real[-1], -1.0, 0.0)] if len(real) % 2 else []
-    return tuple(pairs + left)
+    last = [(real[-1], -1.0, 0.0)] if len(real) % 2 else []
+    return tuple(pairs + last)
 
 
-@njit(cache=True)
+@njit()
 def through(sections: Rows, state: FloatArray, v: float) -> float:
     """Return what the sections of a filter, without its gain, make of a sample.
 
@@ -203,6 +203,12 @@ def through(sections: Rows, state: FloatArray, v: float) -> float:
         state[2 * j + 1] = w2 + (r2 * w2 + w1)
         v = y
     return v
+
+
+def readout(sampled: SampledFilter) -> FloatArray:
+    """Return by how much each state adds to the output, the gain left out: shape (order,)."""
+    shares = [share for *_, t1, t2 in sampled.sections for share in (t1, t2)]
+    return np.array(shares[: sampled.order])
 
 
 def stationary_root(sampled: SampledFilter) -> FloatArray:
@@ -220,12 +226,12 @@ def stationary_root(sampled: SampledFilter) -> FloatArray:
         one.
     """
     n = 2 * len(sampled.sections)
-    change, drive, carried = np.zeros((n, n)), np.zeros(n), np.zeros(n)
-    for j, (r1, r2, k, t1, t2) in enumerate(sampled.sections):
+    change, drive, shares = np.zeros((n, n)), np.zeros(n), readout(sampled)
+    for j, (r1, r2, k, _, _) in enumerate(sampled.sections):
         here, drive[2 * j] = slice(2 * j, 2 * j + 2), 1.0
-        change[2 * j] = carried
+        # A section takes in what all those before it put out.
+        change[2 * j, : 2 * j] = shares[: 2 * j]
         change[here, here] = [[r1, -k], [1.0, r2]]
-        carried[here] = t1, t2
     change, drive = change[: sampled.order, : sampled.order], drive[: sampled.order]
     # The trapezoidal rule undone: the continuous system whose samples these are.
     undone = np.linalg.inv(np.eye(sampled.order) + 0.5 * change)

@@ -50,6 +50,8 @@ def fill(app, doctree):
 
 def setup(app):
     """Register with Sphinx."""
+    # A page may have formulas in the outputs of its cells only, which Sphinx does not see.
+    app.set_html_assets_policy("always")
     app.connect("doctree-read", typeset)
     app.connect("doctree-read", fill)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

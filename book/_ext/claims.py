@@ -1,18 +1,31 @@
-"""Claims that the text names, as in "claims K5 and K6", link to their rows in the ledger."""
+"""The ledger of claims as a page, and links to it from all claims that a text names."""
 
 from docutils import nodes
 from sphinx.util import logging
+from sphinx.util.docutils import SphinxDirective
 
-from book.companion.claims import all_claims
-from book.companion.claims.ledger import NAME, NAMING
+from book.companion.claims.ledger import NAME, NAMING, all_names
+from book.companion.claims.page import LedgerPage, VerdictCounts, whole_ledger
 
-LEDGER = "notebooks/09_ledger"
+LEDGER = "notebooks/15_ledger"
 LOGGER = logging.getLogger(__name__)
+
+
+class Ledger(SphinxDirective):
+    """Show the counts of verdicts and the table of all claims."""
+
+    def run(self):
+        """Return them as HTML, in which MathJax sets the formulas."""
+        ledger = whole_ledger()
+        shown = "".join(
+            part._repr_html_() for part in (VerdictCounts(ledger), LedgerPage(ledger))
+        )
+        return [nodes.raw("", f'<div class="tex2jax_process">{shown}</div>', format="html")]
 
 
 def link(app, doctree, docname):
     """Link the names of claims on a page; a name that no claim has is a warning."""
-    known = {claim.identifier for claim in all_claims()}
+    known = all_names()
     page = app.builder.get_relative_uri(docname, LEDGER)
     for text in list(doctree.findall(nodes.Text)):
         if isinstance(text.parent, nodes.reference | nodes.literal | nodes.literal_block):
@@ -35,5 +48,6 @@ def link(app, doctree, docname):
 
 def setup(app):
     """Register with Sphinx."""
+    app.add_directive("ledger", Ledger)
     app.connect("doctree-resolved", link)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

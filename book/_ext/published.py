@@ -2,7 +2,8 @@
 
 The address stands in one place, `[project.urls]` of pyproject.toml. Until it does, no page
 links to a repository, and chapters have no buttons that launch them elsewhere. Once it does,
-pages have both, and the directive `published` shows its content, with ADDRESS replaced.
+pages have both, and the directive `published` shows its content, with ADDRESS replaced. Thebe,
+which Jupyter Book always adds, goes: it would need the network.
 """
 
 from sphinx.util.docutils import SphinxDirective
@@ -40,8 +41,15 @@ def show_links(app, config):
         }
 
 
+def drop_thebe(app, pagename, templatename, context, doctree):
+    """Take out the scripts of Thebe, which also declare their names twice."""
+    scripts = context["script_files"]
+    context["script_files"] = [one for one in scripts if "thebe" not in repr(vars(one)).lower()]
+
+
 def setup(app):
     """Register with Sphinx."""
+    app.connect("html-page-context", drop_thebe)
     app.add_directive("published", Published)
     app.connect("config-inited", show_links)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

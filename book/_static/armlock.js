@@ -21,3 +21,15 @@ addEventListener("load", () => {
     for (const one of [part, ...part.children]) sizes.observe(one);
   }
 });
+
+// What the theme and docutils leave unnamed for a screen reader, or call by a role that is gone.
+addEventListener("DOMContentLoaded", () => {
+  const set = (selector, name, value) => document.querySelectorAll(selector).forEach(
+    element => value ? element.setAttribute(name, value) : element.removeAttribute(name));
+  set("summary:has(.toctree-toggle)", "aria-label", "Unfold the pages of this part");
+  set("#pst-primary-sidebar", "role", "complementary");
+  set("#pst-primary-sidebar", "aria-label", "The book");
+  set(".citation-list, .citation", "role");
+  for (const corner of document.querySelectorAll("th.head"))
+    if (!corner.textContent.trim()) corner.outerHTML = "<td></td>";
+});

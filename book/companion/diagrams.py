@@ -1,9 +1,10 @@
-"""The two conceptual diagrams: what takes part in arm locking, and its loop."""
+"""Conceptual diagrams: the constellation, what takes part in arm locking, and its loop."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import schemdraw
 from matplotlib.axes import Axes
 from schemdraw import dsp as blocks
@@ -157,3 +158,54 @@ def plot_loop(ax: Axes) -> None:
     ax.text(14.4, 1.75, r"$\varphi$", ha="right", va="bottom", fontsize=11)
     ax.text(0.2, 0.75, "−", ha="right", va="center", fontsize=11)
     ax.set(xlim=(-1.9, 14.7), ylim=(-5.6, 2.6))
+
+
+def plot_constellation(ax: Axes) -> None:
+    """Draw three spacecraft, the two arms of the master, the light's way, and the loop.
+
+    Light is drawn solid and orange, signals of the loop dashed and blue.
+
+    Parameters
+    ----------
+    ax : Axes
+        An empty drawing area.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> from book.companion.diagrams import plot_constellation
+    >>> ax = Figure().subplots()
+    >>> plot_constellation(ax)
+    >>> len(ax.texts) > 3
+    True
+    """
+    ax.set_axis_off()
+    ax.set_aspect("equal")
+    master, remote = np.zeros(2), 6.0 * np.array([[-0.5, 0.866], [0.5, 0.866]])
+    ax.plot(*remote.T, ":", color="#999999", zorder=0)
+    for spacecraft in (master, *remote):
+        ax.plot(*spacecraft, "s", color="white", markeredgecolor="black", ms=15, zorder=3)
+    ax.text(-0.7, 0.0, "master spacecraft,\nwith the laser", ha="right", va="center")
+    for far, number in zip(remote, ("2", "1"), strict=True):
+        ax.text(far[0], far[1] + 0.75, f"spacecraft {number}", ha="center", va="center")
+    for far, number in zip(remote, ("2", "1"), strict=True):
+        along = far / np.hypot(*far)
+        aside = 0.14 * np.array([-along[1], along[0]])
+        near, end = 0.6 * along, far - 0.6 * along
+        for start, stop in ((near + aside, end + aside), (end - aside, near - aside)):
+            arrow = {"arrowstyle": "-|>", "color": ORANGE, "shrinkA": 0.0, "shrinkB": 0.0}
+            ax.annotate("", stop, start, arrowprops=arrow)
+        side = 1.0 if number == "1" else -1.0
+        x, y = 0.5 * far
+        ax.text(
+            x + 0.45 * side, y, f"arm {number}", ha=("right", "left")[side > 0], va="center"
+        )
+    ax.text(0.0, 3.9, "out and back:\nabout 20 s", ha="center", va="center", color=ORANGE)
+    arrow = {"arrowstyle": "-|>", "color": BLUE, "linestyle": "--", "shrinkA": 0.0}
+    for start, end in (((0.35, -0.35), (2.6, -1.7)), ((-2.6, -1.7), (-0.35, -0.35))):
+        ax.annotate("", end, start, arrowprops=arrow)
+    ax.annotate("", (-1.35, -2.3), (1.35, -2.3), arrowprops=arrow)
+    box = {"boxstyle": "round,pad=0.3", "facecolor": "white", "edgecolor": BLUE}
+    ax.text(2.7, -2.3, "compare with\nreturned light", ha="center", va="center", bbox=box)
+    ax.text(-2.7, -2.3, "controller\nsteers laser", ha="center", va="center", bbox=box)
+    ax.set(xlim=(-4.6, 4.6), ylim=(-3.2, 6.6))

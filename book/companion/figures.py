@@ -1,4 +1,4 @@
-"""Figures for the book: their files and data to download, and pictures behind a slider."""
+"""Figures for the book: their data to download, numbers for the prose, and a slider."""
 
 from __future__ import annotations
 
@@ -6,22 +6,19 @@ import base64
 import csv
 import html
 import io
-import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
-from pathlib import Path
 from string import ascii_lowercase
 from typing import SupportsFloat
 
-import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
+from IPython.core.interactiveshell import InteractiveShell
 from matplotlib.collections import Collection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from PIL import Image
 
 from armlock.plotting import BLUE
 
@@ -98,7 +95,7 @@ def drawn(figure: Figure) -> dict[str, npt.NDArray[np.float64]]:
             y = low + (high - low) * (rows + 0.5) / values.shape[0]
             places = np.meshgrid(x, y)
             columns[f"{panel}chart, {across}"], columns[f"{panel}chart, {up}"] = places
-            columns[f"{panel}chart, colour [1]"] = values[np.ix_(rows, cells)]
+            columns[f"{panel}chart, colour"] = values[np.ix_(rows, cells)]
     return {name: np.ravel(column) for name, column in columns.items()}
 
 
@@ -134,67 +131,28 @@ def glue(**values: object) -> None:
             glue_one(part, number, display=False)
 
 
-@dataclass(frozen=True, repr=False)
-class Downloads:
-    """Links to a figure's files, shown below it in the book."""
-
-    name: str
-    files: Sequence[str]
-
-    def __repr__(self) -> str:
-        """Name the files."""
-        return f"{self.name}: {', '.join(self.files) or 'files are written by make book'}"
-
-    def _repr_html_(self) -> str:
-        """Return links relative to a page one folder below the book's root."""
-        if not self.files:
-            return f"<p>The files of <code>{self.name}</code> are written by the book.</p>"
-        links = " · ".join(
-            f'<a href="../figures/{file}" download>{file.rsplit(".", 1)[1].upper()}</a>'
-            for file in self.files
-        )
-        return f'<p class="figure-downloads">Download this figure: {links}</p>'
-
-
-def publish(figure: Figure, name: str, **values: object) -> Downloads:
-    """Write a figure as PNG and SVG and its data as CSV, and link to them.
-
-    Parameters
-    ----------
-    figure : Figure
-        The figure.
-    name : str
-        Stem of the files, unique in the book.
-    **values : object
-        For the prose around the figure, as `glue` takes them.
-
-    Returns
-    -------
-    Downloads
-        Shows links in a notebook. The files go to the folder named by the environment
-        variable ARMLOCK_FIGURES, which the book's build sets; without it none are written.
-    """
-    glue(**values)
-    if not os.environ.get("ARMLOCK_FIGURES"):
-        return Downloads(name, [])
-    stem = Path(os.environ["ARMLOCK_FIGURES"]) / name
-    stem.parent.mkdir(parents=True, exist_ok=True)
+def as_csv(figure: Figure) -> str:
+    """Return the data that a figure shows as the text of a table, empty where it has none."""
     columns = drawn(figure)
-    if columns:
-        with stem.with_suffix(".csv").open("w", newline="") as stream:
-            table = csv.writer(stream, lineterminator="\n")
-            table.writerow(columns)
-            written = ([f"{value:.9g}" for value in column] for column in columns.values())
-            table.writerows(zip_longest(*written, fillvalue=""))
-    # A palette of 128 colours is all a figure needs, at a third of the size.
-    pixels = io.BytesIO()
-    figure.savefig(pixels, format="png")
-    image = Image.open(pixels).convert("RGB").quantize(128, dither=Image.Dither.NONE)
-    image.save(stem.with_suffix(".png"), optimize=True)
-    figure.set_layout_engine("none")  # the one that was found holds for both
-    stem.with_suffix(".svg").write_bytes(svg(figure))
-    endings = ("csv", "png", "svg") if columns else ("png", "svg")
-    return Downloads(name, [f"{name}.{ending}" for ending in endings])
+    if not columns:
+        return ""
+    stream = io.StringIO()
+    table = csv.writer(stream, lineterminator="\n")
+    table.writerow(columns)
+    written = ([f"{value:.9g}" for value in column] for column in columns.values())
+    table.writerows(zip_longest(*written, fillvalue=""))
+    return stream.getvalue()
+
+
+def load_ipython_extension(shell: InteractiveShell) -> None:
+    """Let each figure that a notebook shows carry its data and an SVG, for the build."""
+
+    def files(figure: Figure, **_: object) -> dict[str, str]:
+        table = as_csv(figure)
+        return {"image/svg+xml": svg(figure).decode()} | ({"text/csv": table} if table else {})
+
+    assert shell.display_formatter is not None
+    shell.display_formatter.mimebundle_formatter.for_type(Figure, files)
 
 
 # Shows the picture that the slider stands at, and says its label.
@@ -266,8 +224,7 @@ class FrameSlider:
 
 
 def svg(figure: Figure) -> bytes:
-    """Return a figure as SVG, with coordinates to a hundredth of a point, and close it."""
+    """Return a figure as SVG, with coordinates to a hundredth of a point."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="svg", metadata={"Date": None})
-    plt.close(figure)
     return _PATH.sub(lambda path: _DIGITS.sub(rb"\1", path[0]), buffer.getvalue())

@@ -6,7 +6,7 @@ import numpy as np
 
 from armlock.characteristic import CharacteristicFunction
 from armlock.checks import FloatArray
-from armlock.robustness.rays import first_crossing
+from armlock.robustness import first_crossing
 
 # Length over width of the ellipse along x = -y on which the rays are evenly spread.
 _ELONGATION = 5.0

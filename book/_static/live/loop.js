@@ -1,6 +1,6 @@
 "use strict";
 /*
- * Arm-locking loops in a browser: certified counts of unstable roots, charts, margins.
+ * Arm-locking loops in a browser: factors, bounds over a step, certified counts of unstable roots.
  *
  * A loop is D(s) = R + exp(-s delay) [B1 (1 - c1 E1) + B2 (1 - c2 E2)], E1 = exp(-s tau1).
  * Everything is kept as factors and divided by a polynomial Q of R's degree whose roots are
@@ -8,15 +8,17 @@
  * so that their number is minus the argument that F gathers from s = 0 to j infinity, over pi.
  *
  * One function holds all, so that a page can hand its text to a worker: a page that is opened
- * from disk may load no script into one.
+ * from disk may load no script into one. So do those of the other files here: margins.js and
+ * chart.js take what this one returns.
  */
 function armlockLoop() {
   const EPSILON = 2 ** -52;
-  const BOUNDARY = -1, UNCONFINED = -2, UNSURE = -3;
+  const BOUNDARY = -1, UNCONFINED = -2, UNDECIDED = -3;
   // Share of a certified bound that a step may use up, and the most steps of one walk.
   const SAFETY = 0.95, MOST_STEPS = 400000;
   // Samples of the frequency in a radian of the longest delay, in a decade, and at most.
   const A_RADIAN = 12, A_DECADE = 80, MOST_SAMPLES = 60000;
+  const SENSORS = ["single", "common", "difference", "dual", "modified"];
 
   /* gain prod (s - zero_k) / prod (s + below_k), all below_k > 0, as a function of omega.
    *
@@ -105,9 +107,17 @@ function armlockLoop() {
     }
   }
 
-  function positive(name, value) {
+  /* Bad input, with the name of the field that holds it. */
+  class FieldError extends RangeError {
+    constructor(field, message) {
+      super(message);
+      this.field = field;
+    }
+  }
+
+  function positive(field, name, value) {
     if (!(value > 0 && Number.isFinite(value)))
-      throw new RangeError(`${name} must be a positive number, got ${value}`);
+      throw new FieldError(field, `${name} must be a positive number, got ${value}`);
     return value;
   }
 
@@ -115,81 +125,194 @@ function armlockLoop() {
     const left = [];
     for (const [re, im] of roots) {
       if (!Number.isFinite(re) || !Number.isFinite(im))
-        throw new RangeError(`${name} must be finite numbers`);
+        throw new FieldError(name, `${name} must be finite numbers`);
       if (im === 0) continue;
       const partner = left.findIndex(([x, y]) => x === re && y === -im);
       if (partner < 0) left.push([re, im]); else left.splice(partner, 1);
     }
     if (left.length)
-      throw new RangeError(`${name} must be real or in conjugate pairs, got ${left[0][0]} `
+      throw new FieldError(name, `${name} must be real or in conjugate pairs, got ${left[0][0]} `
         + `${left[0][1] < 0 ? "-" : "+"} ${Math.abs(left[0][1])}j alone`);
     return roots;
   }
 
+  /* Roots of a polynomial with real coefficients, the highest power first, by Aberth's method.
+   * They come in exact pairs. The first guesses lie where the polynomial's Newton polygon has
+   * its slopes, so that sizes over many decades do no harm. */
+  function rootsOf(coefficients) {
+    const from = coefficients.findIndex(c => c !== 0);
+    if (from < 0) return [];
+    const c = coefficients.slice(from).reverse(), found = [];
+    while (c[0] === 0) { c.shift(); found.push([0, 0]); }
+    const n = c.length - 1, x = [], y = [];
+    for (let low = 0; low < n;) {
+      const rise = k => (Math.log(Math.abs(c[k])) - Math.log(Math.abs(c[low]))) / (k - low);
+      let high = low + 1;
+      while (c[high] === 0) high++;
+      for (let k = high + 1; k <= n; k++) if (c[k] !== 0 && rise(k) >= rise(high)) high = k;
+      for (let k = low; k < high; k++) {
+        const size = Math.exp(-rise(high)), turn = 2 * Math.PI * (k - low) / (high - low) + 0.7 * n;
+        x.push(size * Math.cos(turn));
+        y.push(size * Math.sin(turn));
+      }
+      low = high;
+    }
+    // f' / f at a point; outside of the unit circle from the reversed polynomial, with z = 1 / s:
+    // n z - z^2 f' / f.
+    const slope = (c, re, im) => {
+      const n = c.length - 1, square = re * re + im * im, far = square > 1;
+      const [a, b] = far ? [re / square, -im / square] : [re, im];
+      let [p, q, dp, dq] = [0, 0, 0, 0];
+      for (let k = 0; k <= n; k++) {
+        [dp, dq] = [dp * a - dq * b + p, dp * b + dq * a + q];
+        [p, q] = [p * a - q * b + c[far ? k : n - k], p * b + q * a];
+      }
+      const size = p * p + q * q;
+      const [u, v] = size ? [(dp * p + dq * q) / size, (dq * p - dp * q) / size] : [Infinity, 0];
+      if (!far) return [u, v];
+      const zr = a * a - b * b, zi = 2 * a * b;
+      return [n * a - (zr * u - zi * v), n * b - (zr * v + zi * u)];
+    };
+    for (let round = 0, moved = 1; round < 200 && moved > 1e-15; round++) {
+      moved = 0;
+      for (let i = 0; i < n; i++) {
+        let [u, v] = slope(c, x[i], y[i]);
+        if (!Number.isFinite(u + v)) continue;
+        for (let k = 0; k < n; k++) if (k !== i) {
+          const dx = x[i] - x[k], dy = y[i] - y[k], square = dx * dx + dy * dy || 1e-300;
+          u -= dx / square;
+          v += dy / square;
+        }
+        const square = u * u + v * v, mx = u / square, my = -v / square;
+        if (!Number.isFinite(mx + my)) continue;
+        x[i] -= mx;
+        y[i] -= my;
+        moved = Math.max(moved, Math.hypot(mx, my) / (Math.hypot(x[i], y[i]) || 1));
+      }
+    }
+    // Roots as close as rounding of the coefficients could part one of m are one of m, which is a
+    // simple root of the derivative of order m - 1.
+    const left = x.map((re, k) => [re, y[k]]), settled = new Set();
+    for (let m = n; m > 1; m--) for (const root of left) {
+      const size = Math.hypot(...root), gap = r => Math.hypot(r[0] - root[0], r[1] - root[1]);
+      const group = left.filter(r => !settled.has(r)).sort((p, q) => gap(p) - gap(q)).slice(0, m);
+      const apart = 4 * (n * EPSILON) ** (1 / m) * size;
+      if (settled.has(root) || group.length < m || gap(group[m - 1]) > apart) continue;
+      const mean = [0, 1].map(k => group.reduce((sum, r) => sum + r[k], 0) / m);
+      let high = c;
+      for (let k = 1; k < m; k++) high = high.slice(1).map((v, i) => v * (i + 1));
+      for (let k = 0; k < 5; k++) {
+        const [u, v] = slope(high, ...mean), square = u * u + v * v;
+        if (square > 0 && square < Infinity) [mean[0], mean[1]] = [mean[0] - u / square, mean[1] + v / square];
+      }
+      if (Math.abs(mean[1]) < 1e-9 * size) mean[1] = 0;
+      for (const r of group) { [r[0], r[1]] = mean; settled.add(r); }
+    }
+    // The upper one of each pair, the rest real.
+    while (left.length) {
+      const most = left.reduce((a, b) => Math.abs(b[1]) / Math.hypot(...b)
+        > Math.abs(a[1]) / Math.hypot(...a) ? b : a);
+      left.splice(left.indexOf(most), 1);
+      const gap = r => Math.hypot(r[0] - most[0], r[1] + most[1]);
+      const partner = left.length ? left.reduce((a, b) => gap(b) < gap(a) ? b : a) : null;
+      if (!partner || Math.abs(most[1]) < 1e-12 * Math.abs(most[0]) || gap(most) < gap(partner)) {
+        found.push([most[0], 0]);
+      } else {
+        left.splice(left.indexOf(partner), 1);
+        const re = 0.5 * (most[0] + partner[0]), im = 0.5 * Math.abs(most[1] - partner[1]);
+        found.push([re, im], [re, -im]);
+      }
+    }
+    return found;
+  }
+
+  const times = (p, q) => {
+    const product = new Array(p.length + q.length - 1).fill(0);
+    p.forEach((a, i) => q.forEach((b, k) => { product[i + k] += a * b; }));
+    return product;
+  };
+
+  const plus = (p, q) => {
+    const size = Math.max(p.length, q.length), at = (r, k) => r[k - size + r.length] || 0;
+    return Array.from({ length: size }, (_, k) => at(p, k) + at(q, k));
+  };
+
+  /* The sensor of a loop: the arms' weights are m1 = sum + difference and m2 = second sum -
+   * difference, each a gain and zeros over the sensor's poles. Kept so, what nearly cancels
+   * between the arms does so before it is rounded. */
+  function sensorOf(spec, tau1, tau2) {
+    const fraction = (gain, zeros = []) => ({ gain, zeros });
+    const plain = { second: 1, sum: fraction(1), difference: fraction(0), poles: [] };
+    if (spec.sensor === "single") return { ...plain, second: 0 };
+    if (spec.sensor === "common") return plain;
+    if (spec.sensor === "difference") return { ...plain, sum: fraction(0), difference: fraction(-1) };
+    if (!SENSORS.includes(spec.sensor)) throw new RangeError(`unknown sensor ${spec.sensor}`);
+    const corner = positive("corner", "the corner", spec.corner);
+    if (!Number.isFinite(spec.difference) || spec.difference === 0)
+      throw new FieldError("difference", "the sensor's \u0394\u03c4 must be a number other than "
+        + `zero, got ${spec.difference}`);
+    if (spec.sensor === "dual")
+      return { ...plain, sum: fraction(1, [[0, 0], [-corner, 0]]),
+        difference: fraction(corner / spec.difference), poles: [[0, 0], [-corner, 0]] };
+    // The white paper's: common arm at low frequency, dual arm in the band.
+    const mean = 0.5 * (tau1 + tau2), zb = 10 * Math.PI / (13 * mean), pb = 5 * Math.PI / mean;
+    const pe = 2 * Math.PI / (90 * mean), fast = [7 / (5 * mean), 11 / (20 * mean), pe, pe];
+    const real = a => [-a, 0], product = roots => roots.reduce((p, a) => times(p, [1, a]), [1]);
+    const gain = pb / (zb * mean), slow = [1, pb, 0, 0, 0, 0, 0];
+    const plusZeros = rootsOf(plus(product([zb, ...fast]).map(v => gain * v), slow));
+    return { ...plain, poles: [[0, 0], ...[pb, ...fast, corner].map(real)],
+      sum: fraction(1, [...plusZeros, real(corner)]),
+      difference: fraction(2 * corner / spec.difference,
+        [[0, 0], [0, 0], [0, 0], [0, 0], real(pb)]) };
+  }
+
   /* Make a loop. With sigma its roots are those of D less sigma, to count right of a line.
    *
-   * spec: sensor ("single", "common", "difference", "dual"), tau1, tau2, delay in s; zeros and
-   * poles as pairs [re, im] in rad/s, gain; for the dual sensor corner in rad/s and
-   * difference in s. */
+   * spec: sensor, tau1, tau2, delay in s; zeros and poles as pairs [re, im] in rad/s, gain; for
+   * the dual sensors corner in rad/s and difference in s. */
   function make(spec, sigma = 0) {
-    const tau1 = positive("tau1", spec.tau1), tau2 = positive("tau2", spec.tau2);
+    const tau1 = positive("tau1", "\u03c4\u2081", spec.tau1);
+    const tau2 = positive("tau2", "\u03c4\u2082", spec.tau2);
     const delay = spec.delay || 0;
     if (!(delay >= 0 && Number.isFinite(delay)))
-      throw new RangeError(`dead time must be zero or positive, got ${spec.delay}`);
+      throw new FieldError("delay", `the dead time must be zero or positive, got ${spec.delay}`);
     if (!Number.isFinite(spec.gain) || spec.gain === 0)
-      throw new RangeError(`gain must be a number other than zero, got ${spec.gain}`);
+      throw new FieldError("gain", `the gain must be a number other than zero, got ${spec.gain}`);
+    const sensor = sensorOf(spec, tau1, tau2);
     const zeros = [...checkedRoots("zeros", spec.zeros)];
-    const poles = [...checkedRoots("poles", spec.poles)];
+    const poles = [...checkedRoots("poles", spec.poles)], ends = [...sensor.poles];
     if (zeros.length > poles.length)
-      throw new RangeError(`the controller must have as many poles as zeros or more, got `
+      throw new FieldError("zeros", "the controller must have as many poles as zeros or more, got "
         + `${zeros.length} zeros and ${poles.length} poles`);
     const isZero = ([re, im]) => re === 0 && im === 0;
-    while (zeros.some(isZero) && poles.some(isZero)) {
-      zeros.splice(zeros.findIndex(isZero), 1);
-      poles.splice(poles.findIndex(isZero), 1);
-    }
+    const has = list => list.some(isZero), drop = list => list.splice(list.findIndex(isZero), 1);
+    // Zeros and poles at s = 0 cancel. One factor of Q then belongs to the other product.
+    while (has(zeros) && has(poles)) { drop(zeros); drop(poles); }
+    let lent = 0;
+    while (has(zeros) && has(ends)) { drop(zeros); drop(ends); lent++; }
     const shifted = ([re, im]) => [re - sigma, im];
     // Roots of Q: where a pole is stable and real, the pole itself.
     const mirror = ([re, im]) => Math.hypot(re, im) || 1 / Math.max(tau1, tau2);
-    const moved = poles.map(shifted);
-    const below = moved.map(mirror);
+    const above = [...poles, ...ends].map(shifted), all = above.map(mirror);
+    const own = all.slice(0, poles.length), theirs = all.slice(poles.length);
+    for (; lent > 0; lent--) theirs.push(...own.splice(own.indexOf(Math.min(...own)), 1));
     const gain = spec.gain * Math.exp(-sigma * delay);
-    const loop = { spec, sigma, tau1, tau2, delay, second: spec.sensor === "single" ? 0 : 1,
-      sum: null, difference: null };
-    if (spec.sensor === "dual") {
-      const corner = positive("corner", spec.corner);
-      if (!Number.isFinite(spec.difference) || spec.difference === 0)
-        throw new RangeError("the sensor's dtau must be a number other than zero, "
-          + `got ${spec.difference}`);
-      const low = shifted([0, 0]), high = shifted([-corner, 0]);
-      const above = [...moved, high], all = [...below, mirror(high)];
-      let own, rest = [...below];
-      if (zeros.some(isZero)) {
-        // The sensor's pole at 0 cancels against a zero of the controller.
-        zeros.splice(zeros.findIndex(isZero), 1);
-        own = rest.splice(rest.indexOf(Math.min(...rest)), 1)[0];
-      } else {
-        own = mirror(low);
-        above.push(low);
-        all.push(own);
-      }
-      const ends = [own, mirror(high)];
-      loop.rest = new Product(1, above, all);
-      loop.common = new Product(gain, zeros.map(shifted), rest);
-      loop.sum = new Product(1, [low, high], ends);
-      loop.difference = new Product(corner / spec.difference, [], ends);
-    } else if (["single", "common", "difference"].includes(spec.sensor)) {
-      loop.rest = new Product(1, moved, below);
-      loop.common = new Product(gain, zeros.map(shifted), below);
-      if (spec.sensor === "difference") loop.difference = new Product(-1, [], []);
-      else loop.sum = new Product(1, [], []);
-    } else {
-      throw new RangeError(`unknown sensor ${spec.sensor}`);
-    }
-    loop.parts = [loop.rest, loop.common, loop.sum, loop.difference].filter(part => part);
-    loop.scales = [1 / (Math.max(tau1, tau2) + delay),
+    const part = ({ gain, zeros }) => new Product(gain, zeros.map(shifted), theirs);
+    const loop = { spec, sigma, tau1, tau2, delay, second: sensor.second, below: all,
+      rest: new Product(1, above, all), common: new Product(gain, zeros.map(shifted), own),
+      sum: part(sensor.sum), difference: part(sensor.difference),
+      longest: Math.max(tau1, tau2) + delay,
+      phase: { omega: NaN, x1: 0, y1: 0, x2: 0, y2: 0, er: 0, ei: 0, fr: 1, fi: 0 } };
+    loop.parts = [loop.rest, loop.common, loop.sum, loop.difference];
+    loop.scales = [1 / loop.longest,
       ...loop.parts.flatMap(part => [...part.a, ...part.re].map(Math.abs))].filter(a => a > 0);
     return loop;
+  }
+
+  /* Where equal arms return the same, the dual sensor has only their sum, and its poles cancel. */
+  function reduced(loop, c1, c2) {
+    const { spec, tau1, tau2, sigma } = loop;
+    return spec.sensor === "dual" && tau1 === tau2 && c1 === c2 ? make({ ...spec, sensor: "common" }, sigma) : loop;
   }
 
   /* The parameters of one point, with what is left of 1 - c and c2 - c1 after cancelling. */
@@ -204,6 +327,33 @@ function armlockLoop() {
     };
   }
 
+  /* The parameters at (1 + x, 1 + y), as far from (1, 1) as x and y say without rounding. */
+  function beside(x, y) {
+    return { c1: 1 + x, c2: 1 + y, left1: -x, left2: -y, between: y - x };
+  }
+
+  /* Minus what F loses where (c1, c2) moves by (d1, d2): the same terms, without R. */
+  function along(d1, d2) {
+    return { c1: d1, c2: d2, left1: -d1, left2: -d2, between: d2 - d1 };
+  }
+
+  /* exp(-s tau) - 1 of both arms, so that nothing cancels where omega is small, 1 - exp(-s (tau1 - tau2)),
+   * and the dead time's exponential: once for all curves of a loop. */
+  function phases({ phase, tau1, tau2, delay }, omega) {
+    if (phase.omega === omega) return phase;
+    phase.omega = omega;
+    const s1 = Math.sin(0.5 * omega * tau1), s2 = Math.sin(0.5 * omega * tau2);
+    phase.x1 = -2 * s1 * s1;
+    phase.y1 = -2 * s1 * Math.cos(0.5 * omega * tau1);
+    phase.x2 = -2 * s2 * s2;
+    phase.y2 = -2 * s2 * Math.cos(0.5 * omega * tau2);
+    const half = 0.5 * omega * (tau1 - tau2), s = Math.sin(half);
+    phase.er = 2 * s * s;
+    phase.ei = 2 * s * Math.cos(half);
+    if (delay) [phase.fr, phase.fi] = [Math.cos(omega * delay), -Math.sin(omega * delay)];
+    return phase;
+  }
+
   /* F along the axis at one point: value and derivative, and bounds over a step. */
   class Curve {
     constructor(loop, point) {
@@ -212,89 +362,79 @@ function armlockLoop() {
     }
 
     at(omega) {
-      const { rest, common, sum, difference, tau1, tau2, delay, second, parts } = this.loop;
+      for (const part of this.loop.parts) part.at(omega);
+      this.join(omega);
+    }
+
+    /* Put together what the loop's factors are at omega. */
+    join(omega) {
+      const { rest, common, sum, difference, tau1, tau2, delay, second } = this.loop;
       const { c1, c2, left1, left2, between } = this.point;
+      const { x1, y1, x2, y2, er, ei, fr, fi } = phases(this.loop, omega);
       this.omega = omega;
-      for (const part of parts) part.at(omega);
-      const s1 = Math.sin(0.5 * omega * tau1), k1 = Math.cos(0.5 * omega * tau1);
-      const s2 = Math.sin(0.5 * omega * tau2), k2 = Math.cos(0.5 * omega * tau2);
-      // E - 1, so that nothing cancels where omega is small.
-      const x1 = -2 * s1 * s1, y1 = -2 * s1 * k1, x2 = -2 * s2 * s2, y2 = -2 * s2 * k2;
-      let vr = 0, vi = 0, dr = 0, di = 0;
       // d(1 - c E)/d omega = j c tau E
       const p1r = -c1 * tau1 * y1, p1i = c1 * tau1 * (1 + x1);
       const p2r = -c2 * tau2 * y2, p2i = c2 * tau2 * (1 + x2);
-      if (sum) {
-        const wr = left1 - c1 * x1 + second * (left2 - c2 * x2);
-        const wi = -c1 * y1 - second * c2 * y2;
-        const tr = p1r + second * p2r, ti = p1i + second * p2i;
-        vr = sum.vr * wr - sum.vi * wi;
-        vi = sum.vr * wi + sum.vi * wr;
-        dr = sum.dr * wr - sum.di * wi + sum.vr * tr - sum.vi * ti;
-        di = sum.dr * wi + sum.di * wr + sum.vr * ti + sum.vi * tr;
-        this.wsum = Math.sqrt(wr * wr + wi * wi);
-      }
-      if (difference) {
-        // c2 E2 - c1 E1 = (c2 - c1) E1 + c2 E2 (1 - exp(-s (tau1 - tau2)))
-        const half = 0.5 * omega * (tau1 - tau2);
-        const sh = Math.sin(half), ch = Math.cos(half);
-        const er = 2 * sh * sh, ei = 2 * sh * ch;
-        const wr = between * (1 + x1) + c2 * ((1 + x2) * er - y2 * ei);
-        const wi = between * y1 + c2 * ((1 + x2) * ei + y2 * er);
-        const tr = p1r - p2r, ti = p1i - p2i;
-        vr += difference.vr * wr - difference.vi * wi;
-        vi += difference.vr * wi + difference.vi * wr;
-        dr += difference.dr * wr - difference.di * wi + difference.vr * tr - difference.vi * ti;
-        di += difference.dr * wi + difference.di * wr + difference.vr * ti + difference.vi * tr;
-        this.wdifference = Math.sqrt(wr * wr + wi * wi);
-      }
+      const wr = left1 - c1 * x1 + second * (left2 - c2 * x2);
+      const wi = -c1 * y1 - second * c2 * y2;
+      const tr = p1r + second * p2r, ti = p1i + second * p2i;
+      this.wsum = Math.sqrt(wr * wr + wi * wi);
+      // c2 E2 - c1 E1 = (c2 - c1) E1 + c2 E2 (1 - exp(-s (tau1 - tau2)))
+      const ur = between * (1 + x1) + c2 * ((1 + x2) * er - y2 * ei);
+      const ui = between * y1 + c2 * ((1 + x2) * ei + y2 * er);
+      const qr = p1r - p2r, qi = p1i - p2i;
+      this.wdifference = Math.sqrt(ur * ur + ui * ui);
+      let vr = sum.vr * wr - sum.vi * wi + difference.vr * ur - difference.vi * ui;
+      let vi = sum.vr * wi + sum.vi * wr + difference.vr * ui + difference.vi * ur;
+      let dr = sum.dr * wr - sum.di * wi + sum.vr * tr - sum.vi * ti
+        + difference.dr * ur - difference.di * ui + difference.vr * qr - difference.vi * qi;
+      let di = sum.dr * wi + sum.di * wr + sum.vr * ti + sum.vi * tr
+        + difference.dr * ui + difference.di * ur + difference.vr * qi + difference.vi * qr;
       [dr, di] = [common.dr * vr - common.di * vi + common.vr * dr - common.vi * di,
         common.dr * vi + common.di * vr + common.vr * di + common.vi * dr];
       [vr, vi] = [common.vr * vr - common.vi * vi, common.vr * vi + common.vi * vr];
       if (delay) {
-        const er = Math.cos(omega * delay), ei = -Math.sin(omega * delay);
         [dr, di] = [dr + delay * vi, di - delay * vr];
-        [dr, di] = [dr * er - di * ei, dr * ei + di * er];
-        [vr, vi] = [vr * er - vi * ei, vr * ei + vi * er];
+        [dr, di] = [dr * fr - di * fi, dr * fi + di * fr];
+        [vr, vi] = [vr * fr - vi * fi, vr * fi + vi * fr];
       }
       // The open loop is L = (lr + j li) / rest.
       this.lr = vr; this.li = vi;
+      this.mr = dr; this.mi = di;
       this.vr = rest.vr + vr; this.vi = rest.vi + vi;
       this.dr = rest.dr + dr; this.di = rest.di + di;
     }
 
     /* Bounds of |F''| and of the rounding error over a step. */
     over(h) {
-      const { rest, common, sum, difference, tau1, tau2, delay, second, parts } = this.loop;
+      for (const part of this.loop.parts) part.over(h);
+      this.reach(h);
+    }
+
+    /* The same from bounds of the loop's factors; l0, l1, l2 bound L's numerator. */
+    reach(h) {
+      const { rest, common, sum, difference, tau1, tau2, delay, second } = this.loop;
       const { c1, c2, between } = this.point;
       const end = this.omega + h, a1 = Math.abs(c1), a2 = Math.abs(c2);
-      for (const part of parts) part.over(h);
-      let i0 = 0, i1 = 0, i2 = 0, error = 0;
+      const w1 = a1 * tau1 + second * a2 * tau2, w0 = this.wsum + h * w1;
+      const w2 = a1 * tau1 * tau1 + second * a2 * tau2 * tau2;
+      const apart = Math.abs(tau1 - tau2), e = Math.abs(between), x = Math.min(end * apart, 2);
+      const u1 = e * tau1 + a2 * (apart + tau2 * x), u0 = this.wdifference + h * u1;
+      const u2 = e * tau1 * tau1 + a2 * (apart * apart + 2 * tau2 * apart + tau2 * tau2 * x);
+      const i0 = sum.b0 * w0 + difference.b0 * u0;
+      let i1 = sum.b1 * w0 + sum.b0 * w1 + difference.b1 * u0 + difference.b0 * u1;
+      let i2 = sum.b2 * w0 + 2 * sum.b1 * w1 + sum.b0 * w2
+        + difference.b2 * u0 + 2 * difference.b1 * u1 + difference.b0 * u2;
       // The parameters are rounded numbers themselves, and so are the phases.
       const rounded = a1 * (1 + end * tau1) + a2 * (1 + end * tau2);
-      if (sum) {
-        const w1 = a1 * tau1 + second * a2 * tau2;
-        const w2 = a1 * tau1 * tau1 + second * a2 * tau2 * tau2;
-        const w0 = this.wsum + h * w1;
-        i0 = sum.b0 * w0;
-        i1 = sum.b1 * w0 + sum.b0 * w1;
-        i2 = sum.b2 * w0 + 2 * sum.b1 * w1 + sum.b0 * w2;
-        error = sum.b0 * (sum.relative * w0 + rounded);
-      }
-      if (difference) {
-        const apart = Math.abs(tau1 - tau2), e = Math.abs(between);
-        const x = Math.min(end * apart, 2);
-        const w1 = e * tau1 + a2 * (apart + tau2 * x);
-        const w2 = e * tau1 * tau1 + a2 * (apart * apart + 2 * tau2 * apart + tau2 * tau2 * x);
-        const w0 = this.wdifference + h * w1;
-        i0 += difference.b0 * w0;
-        i1 += difference.b1 * w0 + difference.b0 * w1;
-        i2 += difference.b2 * w0 + 2 * difference.b1 * w1 + difference.b0 * w2;
-        error += difference.b0 * (difference.relative * w0 + rounded);
-      }
+      const error = sum.b0 * (sum.relative * w0 + rounded)
+        + difference.b0 * (difference.relative * u0 + rounded);
       i2 += delay * (2 * i1 + delay * i0);
       i1 += delay * i0;
-      this.bend = rest.b2 + common.b2 * i0 + 2 * common.b1 * i1 + common.b0 * i2;
+      this.l0 = common.b0 * i0;
+      this.l1 = common.b1 * i0 + common.b0 * i1;
+      this.l2 = common.b2 * i0 + 2 * common.b1 * i1 + common.b0 * i2;
+      this.bend = rest.b2 + this.l2;
       const phase = 1 + end * delay;
       this.error = EPSILON * (4 * rest.relative * rest.b0
         + common.b0 * 4 * (error + (common.relative + phase) * i0));
@@ -309,9 +449,7 @@ function armlockLoop() {
     const a1 = Math.abs(c1), a2 = Math.abs(c2);
     const look = t => {
       for (const part of parts) part.far(t);
-      const sr = sum ? sum.vr : 0, si = sum ? sum.vi : 0;
-      const tr = difference ? difference.vr : 0, ti = difference ? difference.vi : 0;
-      const k = Math.hypot(common.vr, common.vi);
+      const { vr: sr, vi: si } = sum, { vr: tr, vi: ti } = difference, k = Math.hypot(common.vr, common.vi);
       const cr = (1 + second) * (common.vr * sr - common.vi * si);
       const ci = (1 + second) * (common.vr * si + common.vi * sr);
       const ar = delay ? rest.vr : rest.vr + cr, ai = delay ? rest.vi : rest.vi + ci;
@@ -322,8 +460,7 @@ function armlockLoop() {
     };
     const rate = h => {
       for (const part of parts) part.over(h);
-      const s0 = sum ? sum.b0 : 0, s1 = sum ? sum.b1 : 0;
-      const t0 = difference ? difference.b0 : 0, t1 = difference ? difference.b1 : 0;
+      const { b0: s0, b1: s1 } = sum, { b0: t0, b1: t1 } = difference;
       const both = (1 + second) * (common.b0 * s1 + common.b1 * s0);
       const arms = common.b0 * ((a1 + second * a2) * s1 + (a1 + a2) * t1)
         + common.b1 * ((a1 + second * a2) * s0 + (a1 + a2) * t0);
@@ -356,21 +493,39 @@ function armlockLoop() {
   }
 
   /* Number of unstable roots at (c1, c2); BOUNDARY where one is on the axis as far as rounding
-   * can tell, UNCONFINED where the neutral root chain is not confined, UNSURE where it would
-   * take too many steps. */
-  function count(loop, c1, c2) {
+   * can tell, UNCONFINED where the neutral root chain is not confined, UNDECIDED where it would
+   * take too many steps.
+   *
+   * A root at s = 0 is left out where numerator and denominator of L both vanish there: it comes
+   * from clearing the denominator, and 1 + L does not have it. F then begins as its derivative
+   * does. Whether they vanish is decided by the point as it is given: `exact` may tell it from
+   * (1, 1). */
+  function count(loop, c1, c2, { most = MOST_STEPS, exact = null } = {}) {
     if (!Number.isFinite(c1) || !Number.isFinite(c2))
       throw new RangeError(`c1 and c2 must be finite numbers, got ${c1} and ${c2}`);
-    const point = at(loop, c1, c2);
-    const end = tail(loop, point.c1, point.c2, Math.max(loop.tau1, loop.tau2) + loop.delay);
+    const point = exact || at(loop, c1, c2);
+    if (point.between === 0) loop = reduced(loop, c1, c2);
+    const end = tail(loop, point.c1, point.c2, loop.longest);
     if (!end) return UNCONFINED;
     const curve = new Curve(loop, point);
     let omega = 0, argument = 0, step = end.omega;
     curve.at(0);
     curve.over(0);
-    if (Math.hypot(curve.vr, curve.vi) <= curve.error) return BOUNDARY;
+    if (Math.hypot(curve.vr, curve.vi) <= curve.error) {
+      if (!vanishes(curve)) return BOUNDARY;
+      // |F - j omega F'(0)| is at most |F'(0)| omega / 2 there: F turns by 30 degrees at most.
+      const slope = Math.hypot(curve.dr, curve.di);
+      do step *= 0.5, curve.over(step); while (curve.bend * step > slope && step > 1e-300);
+      if (!(slope > 0) || step <= 1e-300) return UNDECIDED;
+      const { dr, di } = curve;
+      curve.at(omega = step);
+      argument = Math.atan2(curve.vi * dr - curve.vr * di, curve.vr * dr + curve.vi * di);
+      // A quarter turn around the root, which is left of the path.
+      if (!(Math.abs(argument) < 0.6)) return UNDECIDED;
+      argument += 0.5 * Math.PI;
+    }
     for (let steps = 0; omega < end.omega; steps++) {
-      if (steps > MOST_STEPS) return UNSURE;
+      if (steps > most) return UNDECIDED;
       const { vr, vi, dr, di } = curve;
       step = Math.min(4 * step, end.omega - omega);
       for (;;) {
@@ -395,330 +550,133 @@ function armlockLoop() {
       curve.vr * end.ar + curve.vi * end.ai);
     const found = (end.argument + last - argument) / Math.PI;
     const nearest = Math.round(found);
-    return Math.abs(found - nearest) < 1e-3 && nearest >= 0 ? nearest + 0 : UNSURE;
+    return Math.abs(found - nearest) < 1e-3 && nearest >= 0 ? nearest + 0 : UNDECIDED;
+  }
+
+  /* Whether numerator and denominator of L are both zero at s = 0, where a curve is. */
+  function vanishes({ lr, li, loop: { rest } }) {
+    return lr === 0 && li === 0 && rest.vr === 0 && rest.vi === 0;
   }
 
   /* [a, b1, b2]: the neutral root chain is confined where |c1| b1 + |c2| b2 < a. */
   function chainLeads(loop) {
     const { rest, common, sum, difference, second, delay, parts } = loop;
     for (const part of parts) part.far(0);
-    const s = common.vr * (sum ? sum.vr : 0), t = common.vr * (difference ? difference.vr : 0);
+    const s = common.vr * sum.vr, t = common.vr * difference.vr;
     const both = (1 + second) * s;
     return [delay ? Math.abs(rest.vr) - Math.abs(both) : Math.abs(rest.vr + both),
       Math.abs(s + t), Math.abs(second * s - t)];
   }
 
 
-  /* Frequencies close enough to draw and to follow D by: in decades, then in turns. */
-  function frequencies(loop, top, lowest) {
-    const grow = 10 ** (1 / A_DECADE);
-    const step = 1 / (A_RADIAN * (Math.max(loop.tau1, loop.tau2) + loop.delay));
-    const found = [];
-    for (let omega = lowest; omega < top && found.length < MOST_SAMPLES;) {
+  /* Frequencies close enough to draw and to follow D by: in decades, then in turns. Where these would
+   * be too many they are farther apart, down to eight in a turn: then the last ones are missing. */
+  function frequencies(loop, top, lowest, most = MOST_SAMPLES) {
+    const grow = 10 ** (1 / A_DECADE), found = [], apart = top * loop.longest / most;
+    const step = Math.min(Math.max(apart, 1 / A_RADIAN), 0.25 * Math.PI) / loop.longest;
+    for (let omega = lowest; omega < top && found.length < most;) {
       found.push(omega);
       omega = Math.min(omega * grow, omega + step);
     }
     return Float64Array.from(found);
   }
 
-  /* The three terms of D(j omega) = F - dx M1 - dy M2 around (c1, c2) = (1, 1). */
-  function terms(loop, curve, omega) {
-    const { common, sum, difference, second, tau1, tau2, delay } = loop;
-    curve.at(omega);
-    const sr = sum ? sum.vr : 0, si = sum ? sum.vi : 0;
-    const tr = difference ? difference.vr : 0, ti = difference ? difference.vi : 0;
-    const arm = (r, i, tau) => {
-      const er = Math.cos(omega * (tau + delay)), ei = -Math.sin(omega * (tau + delay));
-      const br = common.vr * r - common.vi * i, bi = common.vr * i + common.vi * r;
-      return [br * er - bi * ei, br * ei + bi * er];
-    };
-    return [curve.vr, curve.vi, ...arm(sr + tr, si + ti, tau1),
-      ...arm(second * sr - tr, second * si - ti, tau2)];
-  }
-
-  /* Those terms at sampled frequencies, for |c1|, |c2| up to the given ones. */
-  function scan(loop, c1, c2, window) {
-    const longest = Math.max(loop.tau1, loop.tau2) + loop.delay;
-    const leads = chainLeads(loop), lost = c1 * leads[1] + c2 * leads[2];
-    // Next to the limit of the chain, roots cross at ever higher frequency.
-    const reach = lost < leads[0] ? 1 : 0.98 * leads[0] / lost;
-    const end = tail(loop, reach * c1, reach * c2, longest);
-    const lowest = 1e-3 * Math.min(...loop.scales) * Math.min(1, window);
-    const omega = frequencies(loop, end ? 1.01 * end.omega : lowest, lowest);
-    const curve = new Curve(loop, at(loop, 1, 1));
-    const all = Array.from(omega, w => terms(loop, curve, w));
-    return { loop, curve, omega, all, reach,
-      complete: Boolean(end) && omega.length < MOST_SAMPLES };
-  }
-
-  /* D along parallel lines: N - e O - x M with M = a1 M1 + a2 M2, where O belongs to the
-   * other parameter. A root is on the axis where h = h0 - e h1 is zero, at x = g0 - e g1. */
-  function family(from, a1, a2) {
-    const values = (w, [nr, ni, r1, i1, r2, i2]) => {
-      const mr = a1 * r1 + a2 * r2, mi = a1 * i1 + a2 * i2, square = mr * mr + mi * mi;
-      const or = a1 * r2 + a2 * r1, oi = a1 * i2 + a2 * i1;
-      return [w, ni * mr - nr * mi, oi * mr - or * mi,
-        (nr * mr + ni * mi) / square, (or * mr + oi * mi) / square];
-    };
-    const { loop, curve, omega, all } = from;
-    const rows = all.map((found, i) => values(omega[i], found));
-    const exactly = w => values(w, terms(loop, curve, w));
-    // At s = 0 a real root crosses, at a finite x unless M vanishes there.
-    const zero = exactly(0);
-    return { rows, exactly, zero: Number.isFinite(zero[3]) ? zero : null };
-  }
-
-  /* Samples between those of a family, where a crossing may come between low and high for a
-   * line e0 <= e <= e1, until it is known to some pixels. Returns columns. */
-  function refined(lines, e0, e1, low, high, pixel) {
-    const kept = [];
-    const between = (p, q, depth) => {
-      const below = (p[1] - e0 * p[2] < 0) + (p[1] - e1 * p[2] < 0)
-        + (q[1] - e0 * q[2] < 0) + (q[1] - e1 * q[2] < 0);
-      const pa = p[3] - e0 * p[4], pb = p[3] - e1 * p[4];
-      const qa = q[3] - e0 * q[4], qb = q[3] - e1 * q[4];
-      const wide = Math.max(Math.abs(qa - pa), Math.abs(qb - pb));
-      if (below > 0 && below < 4 && depth < 50 && wide > 4 * pixel
-          && Math.max(pa, pb, qa, qb) + 0.5 * wide > low
-          && Math.min(pa, pb, qa, qb) - 0.5 * wide < high) {
-        const middle = lines.exactly(0.5 * (p[0] + q[0]));
-        between(p, middle, depth + 1);
-        between(middle, q, depth + 1);
-      } else {
-        kept.push(q);
-      }
-    };
-    const { rows } = lines;
-    if (rows.length) kept.push(rows[0]);
-    for (let i = 1; i < rows.length; i++) between(rows[i - 1], rows[i], 0);
-    const columns = [0, 1, 2, 3, 4].map(k => Float64Array.from(kept, row => row[k]));
-    return { ...lines, columns };
-  }
-
-  /* Calls found(x, change, i) with the change of the count towards larger x at every crossing
-   * of a line, i the sample after it. Crossings between two samples that cancel each other are
-   * not seen. */
-  function crossings(lines, e, found) {
-    const [, h0, h1, g0, g1] = lines.columns;
-    let h = h0[0] - e * h1[0];
-    if (lines.zero && h0.length) found(lines.zero[3] - e * lines.zero[4], Math.sign(h), 0);
-    for (let i = 1; i < h0.length; i++) {
-      const g = h0[i] - e * h1[i];
-      if (h < 0 !== g < 0) {
-        const p = g0[i - 1] - e * g1[i - 1], q = g0[i] - e * g1[i];
-        found(p + (q - p) * h / (h - g), g > h ? 2 : -2, i);
-      }
-      h = g;
-    }
-  }
-
-  /* The crossing before sample i of a line: chords, kept off the ends, and halvings. */
-  function placed(lines, i, e = 0) {
-    const [omega, h0, h1] = lines.columns;
-    if (i === 0) return lines.zero[3] - e * lines.zero[4];
-    let [a, ha, b, hb, x] = [omega[i - 1], h0[i - 1] - e * h1[i - 1],
-      omega[i], h0[i] - e * h1[i], NaN];
-    for (let k = 0; k < 60 && b - a > 1e-15 * b; k++) {
-      const share = k % 3 === 2 ? 0.5 : clamp(ha / (ha - hb), 0.01, 0.99), w = a + (b - a) * share;
-      const row = lines.exactly(w), h = row[1] - e * row[2];
-      x = row[3] - e * row[4];
-      if (h === 0) break;
-      if (h < 0 === ha < 0) [a, ha] = [w, h]; else [b, hb] = [w, h];
-    }
-    return x;
-  }
-
-  const clamp = (value, low, high) => Math.min(high, Math.max(low, value));
-
-  /* Counts over a grid. They start from one certified count, and follow the crossings of
-   * sampled frequencies along one column and then along each row. */
-  function chart(loop, x0, x1, nx, y0, y1, ny) {
-    const counts = new Int16Array(nx * ny).fill(UNCONFINED);
-    const px = (x1 - x0) / (nx - 1), py = (y1 - y0) / (ny - 1);
-    const largest = (a, b) => Math.max(Math.abs(a), Math.abs(b));
-    const from = scan(loop, largest(x0, x1), largest(y0, y1), largest(x1 - x0, y1 - y0));
-    // The point that is confined if any is, off every line that a reader would choose.
-    let bx, by, base = UNSURE;
-    for (let k = 0; k < 5 && (base === UNSURE || base === BOUNDARY); k++) {
-      bx = clamp(0, x0, x1) + (x1 > 0 ? 1 : -1) * (0.381966 + k) * px;
-      by = clamp(0, y0, y1) + (y1 > 0 ? 1 : -1) * (0.276393 + k) * py;
-      base = count(loop, bx, by);
-    }
-    if (base < 0) return { counts: counts.fill(base), complete: base === UNCONFINED, from };
-    const ends = (low, step, n, begin) =>
-      [Math.min(low, begin), Math.max(low + (n - 1) * step, begin), step];
-    const walk = (lines, e, low, step, n, begin, reach, write) => {
-      const change = new Int32Array(n + 1);
-      let total = 0;
-      crossings(lines, e, (sampled, jump, i) => {
-        // What is within reach of the begin decides where a whole line starts.
-        const exact = Math.abs(sampled - begin) < reach ? placed(lines, i, e) : NaN;
-        const x = Number.isFinite(exact) ? exact : sampled;
-        if (x < begin) total -= jump;
-        const k = Math.ceil((x - low) / step);
-        if (k <= n) change[Math.max(k, 0)] += jump;
-      });
-      for (let i = 0; i < n; i++) write(i, total += change[i]);
-    };
-    const starts = new Int32Array(ny).fill(base);
-    if (loop.second || loop.difference)
-      walk(refined(family(from, 0, 1), bx - 1, bx - 1, ...ends(y0 - 1, py, ny, by - 1)),
-        bx - 1, y0 - 1, py, ny, by - 1, Infinity, (j, extra) => { starts[j] = base + extra; });
-    const rows = refined(family(from, 1, 0), y0 - 1, y1 - 1, ...ends(x0 - 1, px, nx, bx - 1));
-    const leads = chainLeads(loop);
-    for (let j = 0; j < ny; j++) {
-      const y = y0 + j * py;
-      walk(rows, y - 1, x0 - 1, px, nx, bx - 1, 8 * px, (i, extra) => {
-        const x = x0 + i * px;
-        const share = (Math.abs(x) * leads[1] + Math.abs(y) * leads[2]) / leads[0];
-        const n = starts[j] + extra;
-        counts[j * nx + i] = share >= 1 - 1e-14 ? UNCONFINED
-          : share > 0.98 && from.reach < 1 || n < 0 ? UNSURE : Math.min(n, 30000);
-      });
-    }
-    return { counts, complete: from.complete, from };
-  }
-
-  /* The critical perturbation along a ray from (1, 1), from sampled frequencies, then counted for
-   * certain on both sides: nan where that fails, infinity where there is none up to |c - 1| = 2.
-   * Where the chain is lost first, its limit. */
-  function firstBreak(loop, d1, d2) {
-    const inside = t => count(loop, 1 + t * d1, 1 + t * d2);
-    const begun = count(loop, 1, 1);
-    if (begun > 0 || begun < BOUNDARY || begun === BOUNDARY && inside(1e-9) !== 0) return 0;
-    const [a, b1, b2] = chainLeads(loop);
-    const lost = t => Math.abs(1 + t * d1) * b1 + Math.abs(1 + t * d2) * b2 >= a;
-    let [confined, limit] = [0, lost(2) ? 2 : Infinity];
-    for (let k = 0; k < 100 && limit < Infinity; k++) {
-      const middle = 0.5 * (confined + limit);
-      if (lost(middle)) limit = middle; else confined = middle;
-    }
-    for (const wanted of [1e-5, 1e-2, 2]) {
-      const stop = Math.min(wanted, 0.98 * limit);
-      const from = scan(loop, 1 + stop * Math.abs(d1), 1 + stop * Math.abs(d2), stop);
-      const lines = refined(family(from, d1, d2), 0, 0, 0, stop, 1e-3 * stop);
-      let first = Infinity, sample = 0;
-      crossings(lines, 0, (x, change, i) => {
-        if (x > 1e-14 && x < first) [first, sample] = [x, i];
-      });
-      if (first <= stop) first = placed(lines, sample);
-      if (first <= stop)
-        return inside(first * (1 - 1e-6)) === 0 && inside(first * (1 + 1e-6)) !== 0 ? first : NaN;
-      if (inside(stop) !== 0) return NaN;
-    }
-    return limit === Infinity || inside(0.999 * limit) === 0 ? limit : NaN;
-  }
-
   /* Frequencies that show the loop at one point, and the roots near the axis. */
-  function around(loop, c1, c2) {
-    const longest = Math.max(loop.tau1, loop.tau2) + loop.delay;
-    const end = tail(loop, c1, c2, longest);
-    const top = Math.max(end ? 3 * end.omega : 0, 20 / longest);
-    return frequencies(loop, top, 1e-2 * Math.min(...loop.scales));
+  function around(loop, c1, c2, most) {
+    const point = at(loop, c1, c2), end = tail(loop, point.c1, point.c2, loop.longest);
+    const top = Math.max(end ? 3 * end.omega : 0, 20 / loop.longest);
+    return frequencies(loop, top, 0.1 * Math.min(...loop.scales), most);
   }
 
-  /* The open loop at sampled frequencies: columns omega, Re L, Im L. */
-  function response(loop, c1, c2) {
-    const omega = around(loop, c1, c2);
-    const curve = new Curve(loop, at(loop, c1, c2));
-    const re = new Float64Array(omega.length), im = new Float64Array(omega.length);
-    for (let i = 0; i < omega.length; i++) [re[i], im[i]] = openLoop(curve, omega[i]);
-    return { omega, re, im, curve };
-  }
-
-  function openLoop(curve, omega) {
-    curve.at(omega);
-    const { vr, vi } = curve.loop.rest, square = vr * vr + vi * vi;
-    return [(curve.lr * vr + curve.li * vi) / square, (curve.li * vr - curve.lr * vi) / square];
-  }
-
-  /* Margins of a stable loop. The gains are counted for certain on both sides (nan where that
-   * fails); modulus and phase come from sampled frequencies, polished. */
-  function margins(spec, c1, c2) {
-    const loop = make(spec), { omega, re, im, curve } = response(loop, c1, c2);
-    const zero = (read, a, b) => {
-      let low = read(a) < 0;
-      for (let k = 0; k < 60 && b - a > 1e-14 * b; k++) {
-        const w = 0.5 * (a + b);
-        if (read(w) < 0 === low) a = w; else b = w;
-      }
-      return 0.5 * (a + b);
+  /* The open loop for pictures: arrays omega, re, im, `at`, which gives [re, im] at any other frequency,
+   * and `cache` for what a picture made of them. */
+  function response(loop, c1, c2, most) {
+    const omega = around(loop, c1, c2, most), curve = new Curve(loop, at(loop, c1, c2));
+    const find = w => {
+      curve.at(w);
+      const { vr, vi } = loop.rest, square = vr * vr + vi * vi, { lr, li } = curve;
+      return [(lr * vr + li * vi) / square, (li * vr - lr * vi) / square];
     };
-    const imaginary = w => openLoop(curve, w)[1];
-    const excess = w => Math.hypot(...openLoop(curve, w)) - 1;
-    const apart = w => { const [x, y] = openLoop(curve, w); return Math.hypot(1 + x, y); };
-    const distance = re.map((x, i) => Math.hypot(1 + x, im[i]));
-    let lower = 0, upper = Infinity, phase = Infinity, modulus = distance[0];
-    for (let i = 1; i < omega.length; i++) {
-      if (im[i - 1] < 0 !== im[i] < 0 && (re[i] < 0 || re[i - 1] < 0)) {
-        const factor = -1 / openLoop(curve, zero(imaginary, omega[i - 1], omega[i]))[0];
-        if (factor > 1) upper = Math.min(upper, factor);
-        else if (factor > 0) lower = Math.max(lower, factor);
-      }
-      const before = Math.hypot(re[i - 1], im[i - 1]), after = Math.hypot(re[i], im[i]);
-      if (before < 1 !== after < 1) {
-        const [x, y] = openLoop(curve, zero(excess, omega[i - 1], omega[i]));
-        phase = Math.min(phase, Math.abs(Math.atan2(-y, -x)));
-      }
-      modulus = Math.min(modulus, distance[i]);
-      if (distance[i] < 2 * modulus && distance[i] <= distance[i - 1]
-          && distance[i] <= distance[i + 1]) {
-        // The smallest value between the neighbours, by golden sections.
-        let a = omega[i - 1], b = omega[i + 1];
-        for (let k = 0; k < 30; k++) {
-          const p = a + 0.381966 * (b - a), q = b - 0.381966 * (b - a);
-          if (apart(p) < apart(q)) b = q; else a = p;
-        }
-        modulus = Math.min(modulus, apart(0.5 * (a + b)));
-      }
-    }
-    const scaled = factor => count(make({ ...spec, gain: spec.gain * factor }), c1, c2);
-    const sides = (factor, inside, outside) =>
-      scaled(factor * inside) === 0 && scaled(factor * outside) !== 0 ? factor : NaN;
-    if (upper < Infinity) upper = sides(upper, 1 - 1e-6, 1 + 1e-6);
-    else if (scaled(1000) !== 0) upper = NaN;
-    if (lower > 0) lower = sides(lower, 1 + 1e-6, 1 - 1e-6);
-    else if (scaled(0.001) !== 0) lower = NaN;
-    return { lower, upper, phase, modulus };
+    const re = new Float64Array(omega.length), im = new Float64Array(omega.length);
+    for (let i = 0; i < omega.length; i++) [re[i], im[i]] = find(omega[i]);
+    return { omega, re, im, at: find, cache: {} };
   }
 
-  /* The rightmost root at (c1, c2): Newton's method from along the axis, and counts right and
-   * left of what it finds. Null where the counts do not confirm it. */
+  /* The largest Re s to which the real parts of a neutral root chain tend, for all small changes of the
+   * delays; minus infinity without a chain. Where equal arms act against each other it is not looked for. */
+  function chainLimit(spec, c1, c2) {
+    const lost = sigma => {
+      const loop = make(spec, sigma), point = at(loop, c1, c2), [a, b1, b2] = chainLeads(loop);
+      return Math.abs(point.c1) * b1 + Math.abs(point.c2) * b2 >= a;
+    };
+    const { difference, second } = make(spec), apart = spec.tau1 !== spec.tau2;
+    let low = -50 / Math.max(spec.tau1, spec.tau2), high = 0;
+    if (!lost(low) || lost(high) || !apart && (difference.gain || second * c1 * c2 < 0)) return -Infinity;
+    while (high - low > -1e-9 * low) {
+      const middle = 0.5 * (low + high);
+      if (lost(middle)) low = middle; else high = middle;
+    }
+    return low;
+  }
+
+  /* The rightmost root at (c1, c2), null where counts right and left of it do not confirm it. Lines
+   * Re s = low and high have it between them, by counts; Newton's method looks from one of them, at
+   * first from few frequencies. The root at s = 0 that `count` leaves out is not the loop's. Where no
+   * root lies right of the chain's limit the limit is given, with an infinite frequency. */
   function rightmost(spec, c1, c2) {
-    let line = 0;
-    for (let attempt = 0; attempt < 4; attempt++) {
-      const found = newton(spec, line, c1, c2);
-      if (!found) return null;
-      const [re, im] = found, margin = 1e-4 * Math.abs(re);
-      const beyond = count(make(spec, re + margin), c1, c2);
-      if (beyond === 0) return count(make(spec, re - margin), c1, c2) > 0 ? [re, im] : null;
-      if (beyond < 0) return null;
-      line = re + 10 * margin;
+    const loop = reduced(make(spec), c1, c2), curve = new Curve(loop, at(loop, c1, c2));
+    ({ spec } = loop);
+    let low = chainLimit(spec, c1, c2), high = Infinity, line = 0, step = 1 / Math.max(spec.tau1, spec.tau2);
+    curve.at(0);
+    const cleared = vanishes(curve);
+    const beyond = sigma => {
+      const all = count(make(spec, sigma), c1, c2), number = all - (cleared && sigma < 0 && all > 0);
+      if (number > 0) low = Math.max(low, sigma); else if (number === 0) high = Math.min(high, sigma);
+      return number;
+    };
+    if (low > -Infinity && beyond((1 - 1e-4) * low) === 0) return [low, Infinity];
+    for (let attempt = 0; attempt < 16; attempt++) {
+      if (beyond(line) < 0) return null;
+      const found = newton(spec, line, c1, c2, attempt ? MOST_SAMPLES : 6000).find(([re, im]) =>
+        re > low && re < high && !(cleared && Math.hypot(re, im) < 1e-9 * loop.scales[0]));
+      if (found) {
+        const [re] = found, margin = 1e-4 * Math.abs(re), right = beyond(re + margin);
+        const left = right === 0 ? beyond(re - margin) : 0;
+        if (right < 0 || left < 0) return null;
+        if (left > 0) return found;
+      }
+      line = low === -Infinity ? high - step : high === Infinity ? low + step : 0.5 * (low + high);
+      step *= 2;
     }
     return null;
   }
 
-  /* The rightmost of the roots that Newton's method reaches from a line Re s = sigma. */
-  function newton(spec, sigma, c1, c2) {
-    const loop = make(spec, sigma), omega = around(loop, c1, c2);
-    const curve = new Curve(loop, at(loop, c1, c2)), seeds = [];
-    // ds = -D / D' with D' = dD/d(j omega)
-    const step = from => {
-      const square = from.dr * from.dr + from.di * from.di;
-      return [(from.vi * from.dr - from.vr * from.di) / square,
-        -(from.vr * from.dr + from.vi * from.di) / square];
+  /* The roots that Newton's method reaches from a line Re s = sigma, the rightmost first. */
+  function newton(spec, sigma, c1, c2, most) {
+    const loop = make(spec, sigma), omega = around(loop, c1, c2, most);
+    const curve = new Curve(loop, at(loop, c1, c2)), seeds = [], found = [];
+    // ds = -D / D', where D = F Q with Q' / Q = sum 1 / (s + a)
+    const step = ({ vr, vi, dr, di, omega, loop: { below } }) => {
+      const square = vr * vr + vi * vi;
+      if (!square) return [0, 0];
+      let re = (di * vr - dr * vi) / square, im = -(dr * vr + di * vi) / square;
+      for (const a of below) {
+        re += a / (a * a + omega * omega);
+        im -= omega / (a * a + omega * omega);
+      }
+      return [-re / (re * re + im * im), im / (re * re + im * im)];
     };
     let size = [Infinity, Infinity], last = null;
     for (const w of omega) {
       curve.at(w);
       const move = step(curve), length = Math.hypot(...move);
-      if (!last) seeds.push([sigma + move[0], w + move[1]]);
+      if (!last) seeds.push([sigma + move[0], w + move[1], length]);
       else if (size[1] <= size[0] && size[1] <= length) seeds.push(last);
       size = [size[1], length];
-      last = [sigma + move[0], w + move[1]];
+      last = [sigma + move[0], w + move[1], length];
     }
-    seeds.sort((p, q) => q[0] - p[0]);
-    let best = null;
+    // A short step leads to a root near the line.
+    seeds.sort((p, q) => p[2] - q[2]);
     for (let [re, im] of seeds.slice(0, 12)) {
       for (let k = 0; k < 40; k++) {
         const there = make(spec, re), point = new Curve(there, at(there, c1, c2));
@@ -728,14 +686,14 @@ function armlockLoop() {
         im += dy;
         if (!Number.isFinite(re + im)) break;
         if (Math.hypot(dx, dy) <= 1e-7 * Math.abs(re) + 1e-14 * Math.abs(im)) {
-          if (!best || re > best[0]) best = [re, Math.abs(im) < 1e-9 * Math.abs(re) ? 0 : im];
+          found.push([re, Math.abs(im) < 1e-9 * Math.abs(re) ? 0 : im]);
           break;
         }
       }
     }
-    return best;
+    return found.sort((p, q) => q[0] - p[0]);
   }
 
-  return { BOUNDARY, UNCONFINED, UNSURE, make, count, chart, firstBreak, response, margins,
-    rightmost };
+  return { EPSILON, BOUNDARY, UNCONFINED, UNDECIDED, make, reduced, at, beside, along, Curve, tail,
+    chainLeads, tangentDistance, vanishes, count, response, rightmost, rootsOf };
 }

@@ -1,13 +1,40 @@
 "use strict";
 /*
- * The live pages: a form, a chart of the stable region that answers the pointer, plots.
+ * The live pages: a form, a chart of the stable region that answers the pointer, plots that follow.
  *
- * All mathematics is in loop.js and runs in one worker. A page that is opened from disk may not
- * load a worker's script, so that the worker is made of the functions' own text.
+ * A page loads this file. It loads those beside it, each with one job: loop.js counts, margins.js
+ * and chart.js certify, text.js reads and writes, draw.js draws. What takes long runs in workers, which
+ * are made of the functions' own text: a page that is opened from disk may load no script into one.
  */
 (function () {
-  const TURN = 2 * Math.PI;
+  const here = document.currentScript.src;
+  const files = ["loop.js", "margins.js", "chart.js", "text.js", "draw.js",
+    ...document.querySelector("[data-live=year]") ? ["orbits.js"] : []];
+  const missing = files.filter(name =>
+    !Array.from(document.scripts).some(script => script.src.endsWith(`/live/${name}`)));
+  Promise.all(missing.map(name => new Promise((done, failed) => {
+    const script = document.createElement("script");
+    // In the order of the list.
+    script.async = false;
+    script.onload = done;
+    script.onerror = () => failed(new Error(`${name} is missing beside page.js`));
+    script.src = new URL(name, here).href;
+    document.head.append(script);
+  }))).then(() => {
+    if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", armlockPages);
+    else armlockPages();
+  });
+})();
+
+function armlockPages() {
+  const { TURN, say, duration, shortest, exact, written, readRoots, readController, readNumber, python, address,
+    fromAddress } = armlockText;
+  const { element, nearest, Sheet, Chart, drawNyquist, drawBode, drawRoots, drawYear } = armlockDraw;
+  const api = armlockLoop();
+  Object.assign(api, armlockChart(api));
+
   const hertz = values => values.map(f => [-TURN * f, 0]);
+  const real = values => values.map(v => [v, 0]);
   const PAPER = {
     sensor: "dual", tau1: 20.1, tau2: 19.9, delay: 0, corner: TURN * 0.4,
     difference: 0.2, gain: 5000,
@@ -15,6 +42,15 @@
     poles: hertz([1e-6, 1e-6, 1e-6, 5e-5, 4e-4, 5e-5]),
   };
   const ARM = { ...PAPER, zeros: [], poles: [[0, 0]], gain: 1 };
+  // As the package has it, `flight_loop()`: the zeros of the sum of ten terms are computed there.
+  const FLIGHT = { sensor: "modified", tau1: 33.855, tau2: 33.345, delay: 0, corner: TURN * 0.4,
+    difference: 0.51, gain: 83425.53428423413,
+    zeros: [...real([0, 0, 0, 0]), ...hertz(Array(5).fill(36.6e-6)), ...real([-909686.7705117954,
+      -79277.49256135186, -9812.456529020996, -852.8835173889007, -86.46434550283912,
+      -2.0732204903372633, -0.1640373233692247]),
+      [-4.11185038643452, -2.2259179668023865], [-4.11185038643452, 2.2259179668023865]],
+    poles: hertz([8e-7, 8e-7, 8e-7, 2.1e-4, ...Array(5).fill(1.85e-4), 3e-3, 0.238,
+      0.03, 0.3, 3, 30, 300, 3e3, 3e4, 3e5]) };
   const PRESETS = {
     "The paper's controlled loop": [PAPER, 1, 3e-6],
     "Common arm": [{ ...ARM, sensor: "common" }, 0, 3],
@@ -22,93 +58,77 @@
     "Single arm": [{ ...ARM, sensor: "single" }, 0, 3],
     "Common arm with a lead filter and a dead time": [{ ...ARM, sensor: "common", delay: 0.1,
       zeros: [[-0.02, 0]], poles: [[0, 0], [-0.1, 0]] }, 0, 1.5],
+    "The white paper's loop (modified dual)": [FLIGHT, 1, 2e-3],
   };
-  const SQUARE = 1e-6;
-  const WORDS = { [-1]: "on the boundary", [-2]: "not stable: the high-frequency chain of roots is not confined",
-    [-3]: "not sure" };
-
-  function say(number, digits = 3) {
-    if (number === 0) return "0";
-    const size = Math.abs(number);
-    const text = size < 1e-3 || size >= 1e5 ? scientific(number, digits - 1)
-      : String(+number.toPrecision(digits));
-    return text.replace(/-/g, "\u2212");
-  }
-
-  function scientific(number, digits) {
-    const [factor, exponent] = number.toExponential(digits).split("e");
-    return `${factor} \u00d7 ${power(Number(exponent))}`;
-  }
-
-  function power(exponent) {
-    const digits = "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079";
-    return `10${String(exponent).replace(/./g, d => d === "-" ? "\u207b" : digits[d])}`;
-  }
+  const SENSORS = [["single", "single arm"], ["common", "common arm"],
+    ["difference", "difference of the arms"], ["dual", "dual"], ["modified", "modified dual"]];
+  const LOST = "unstable at arbitrarily high frequency";
+  const { BOUNDARY, UNCONFINED, UNDECIDED } = api;
+  const WORDS = { [BOUNDARY]: "a root on the imaginary axis", [UNCONFINED]: LOST, [UNDECIDED]: "undecided" };
 
   function counted(count) {
     return count === 0 ? "stable" : count > 0
       ? `${count} unstable root${count > 1 ? "s" : ""}` : WORDS[count];
   }
 
-  /* ---------------------------------------------------------------------------- worker */
+  /* ---------------------------------------------------------------------------- workers */
 
-  /* Runs in the worker: `api` is what loop.js gives. */
+  /* Runs in a worker: `api` is what the engine's files give. */
   function tasks(api) {
+    const breaks = (spec, ways) => ways.map(([x, y]) => api.firstBreak(api.make(spec), x, y));
     const look = {
-      chart: (spec, x0, x1, y0, y1, n) => {
-        const { counts, complete } = api.chart(api.make(spec), x0, x1, n, y0, y1, n);
-        return { counts, complete, n };
-      },
+      chart: (spec, x0, x1, y0, y1, n, samples) => ({ n, box: { x0, x1, y0, y1 },
+        ...api.chart(api.make(spec), x0, x1, n, y0, y1, n, samples) }),
       point: (spec, c1, c2) => api.count(api.make(spec), c1, c2),
+      // With ten times the steps, for a reader who waits.
+      count: (spec, c1, c2) => api.count(api.make(spec), c1, c2, { most: 4000000 }),
       root: (spec, c1, c2) => api.rightmost(spec, c1, c2),
-      breaks: spec => [[1, -1], [1, 1], [-1, -1]].map(
-        ([x, y]) => api.firstBreak(api.make(spec), x, y)),
-      margins: (spec, c1, c2) => api.count(api.make(spec), c1, c2) === 0
-        ? api.margins(spec, c1, c2) : null,
-      plots: (spec, c1, c2) => {
-        const { omega, re, im } = api.response(api.make(spec), c1, c2);
-        // Forty turns of the longest delay are what a picture can hold.
-        const last = 40 * 2 * Math.PI / (Math.max(spec.tau1, spec.tau2) + spec.delay);
-        const n = omega.findIndex(w => w > last);
-        return [omega, re, im].map(values => values.slice(0, n < 0 ? values.length : n));
+      breaks: spec => breaks(spec, [[1, -1], [-1, 1], [1, 1], [-1, -1]]),
+      margins: (spec, c1, c2) => api.margins(spec, c1, c2),
+      // Of one day of a year: the critical perturbation of the arms in opposite directions, null where
+      // the loop is unstable. Without `whole` only whether it is.
+      day: (spec, whole) => {
+        const count = api.count(api.make(spec), 1, 1);
+        if (count > 0 || count === api.UNCONFINED) return null;
+        const found = whole || count ? breaks(spec, [[1, -1], [-1, 1]]) : [NaN];
+        return found.includes(null) ? null : Math.min(...found);
       },
-      // Counts at points of a chart, each for certain.
-      check: (spec, points) => points.map(([x, y]) => api.count(api.make(spec), x, y)),
     };
-    return ({ data: { kind, version, input } }) => {
+    return ({ data: { kind, input } }) => {
       let result = null, error = null;
-      try { result = look[kind](...input); } catch (problem) { error = problem.message; }
-      postMessage({ kind, version, result, error });
+      try { result = look[kind.split(" ")[0]](...input); } catch (problem) { error = problem.message; }
+      postMessage({ result, error }, result?.counts ? [result.counts.buffer] : []);
     };
   }
 
-  /* Asks the worker one thing at a time, the most urgent first; of each kind only the last. */
+  /* Asks a worker one thing at a time, the most urgent first; of each kind only the last. */
   class Desk {
     constructor(order) {
-      const text = `onmessage = (${tasks})((${armlockLoop})());`;
+      const text = `const api = (${armlockLoop})();
+        for (const more of [${armlockMargins}, ${armlockChart}]) Object.assign(api, more(api));
+        onmessage = (${tasks})(api);`;
       this.worker = new Worker(URL.createObjectURL(new Blob([text], { type: "text/javascript" })));
       this.worker.onmessage = ({ data }) => {
-        const { kind, version, result, error } = data, { heard } = this.running;
+        const { running } = this;
         this.running = null;
-        if (version === this.versions[kind]) heard(result, error);
+        if (this.last[running.kind] === running) running.heard(data.result, data.error);
         this.next();
       };
       this.order = order;
-      this.versions = {};
+      this.last = {};
       this.waiting = {};
       this.running = null;
     }
 
     ask(kind, input, heard) {
-      this.versions[kind] = (this.versions[kind] || 0) + 1;
-      this.waiting[kind] = { kind, version: this.versions[kind], input, heard };
+      this.last[kind] = this.waiting[kind] = { kind, input, heard };
       this.next();
     }
 
     drop(...kinds) {
       for (const kind of kinds) {
         delete this.waiting[kind];
-        this.versions[kind] = (this.versions[kind] || 0) + 1;
+        delete this.last[kind];
       }
     }
 
@@ -117,584 +137,337 @@
       if (this.running || !kind) return;
       this.running = this.waiting[kind];
       delete this.waiting[kind];
-      const { version, input } = this.running;
-      this.worker.postMessage({ kind, version, input });
+      this.worker.postMessage({ kind, input: this.running.input });
     }
   }
 
-  /* ---------------------------------------------------------------------------- drawing */
+  /* ---------------------------------------------------------------------------- an explorer */
 
-  function element(tag, attributes = {}, ...children) {
-    const made = document.createElement(tag);
-    for (const [name, value] of Object.entries(attributes)) {
-      if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
-      else if (value !== null) made.setAttribute(name, value);
-    }
-    made.append(...children);
-    return made;
-  }
-
-  /* A canvas as wide as its place, sharp on every screen. */
-  class Sheet {
-    constructor(attributes, shape, draw) {
-      this.canvas = element("canvas", attributes);
-      this.shape = shape;
-      this.draw = () => {
-        const wide = this.canvas.clientWidth;
-        if (!wide) return;
-        const ratio = window.devicePixelRatio || 1, high = Math.round(wide * shape);
-        this.canvas.width = wide * ratio;
-        this.canvas.height = high * ratio;
-        const pen = this.canvas.getContext("2d");
-        pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-        const style = getComputedStyle(this.canvas);
-        pen.font = "13px sans-serif";
-        pen.fillStyle = pen.strokeStyle = style.color;
-        const dark = document.documentElement.dataset.theme === "dark";
-        draw(pen, wide, high, { dark, text: style.color, grid: dark ? "#55606a" : "#c9d0d6",
-          line: dark ? "#56b4e9" : "#0072b2", mark: dark ? "#f0a060" : "#d55e00" });
-      };
-      this.canvas.style.aspectRatio = String(1 / shape);
-      new ResizeObserver(this.draw).observe(this.canvas);
-      new MutationObserver(this.draw).observe(document.documentElement,
-        { attributes: true, attributeFilter: ["data-theme"] });
-    }
-  }
-
-  function ticks(low, high, most) {
-    const rough = (high - low) / most, power = 10 ** Math.floor(Math.log10(rough));
-    const step = [1, 2, 5, 10].map(k => k * power).find(k => k >= rough);
-    const found = [];
-    for (let k = Math.ceil(low / step); k * step <= high; k++) found.push(k * step);
-    return found;
-  }
-
-  const COLOURS = { [-1]: [0, 0, 0], [-2]: [147, 132, 160], [-3]: [255, 255, 255] };
-
-  /* The chart over (c1, c2). `centre` and `half` say what it shows; it is drawn and named in
-   * units of a power of ten from (1, 1) where it is small. */
-  class Chart {
-    constructor(label, changed, pointed) {
-      this.changed = changed;
-      this.pointed = pointed;
-      this.centre = [1, 1];
-      this.half = 3;
-      this.marked = null;
-      this.broken = null;
-      this.picture = null;
-      this.sheet = new Sheet({ tabindex: 0, role: "application", "aria-label": `${label} Arrow keys `
-        + "move the point, with shift by ten steps; plus and minus zoom." }, 1,
-        (pen, wide, high, colours) => this.draw(pen, wide, high, colours));
-      const canvas = this.canvas = this.sheet.canvas;
-      canvas.addEventListener("pointermove", event => this.point(event, false));
-      canvas.addEventListener("pointerdown", event => this.point(event, true));
-      canvas.addEventListener("keydown", event => this.key(event));
-      canvas.addEventListener("wheel", event => {
-        event.preventDefault();
-        this.zoom(event.deltaY > 0 ? 1.5 : 1 / 1.5, this.at(event));
-      }, { passive: false });
-    }
-
-    get box() {
-      return { x0: this.centre[0] - this.half, x1: this.centre[0] + this.half,
-        y0: this.centre[1] - this.half, y1: this.centre[1] + this.half };
-    }
-
-    show(centre, half) {
-      this.centre = centre;
-      this.half = Math.min(Math.max(half, 1e-12), 1e3);
-      this.picture = null;
-      this.sheet.draw();
-      this.changed();
-    }
-
-    zoom(factor, around) {
-      const [x, y] = around || this.marked || this.centre;
-      const half = this.half * factor;
-      this.show([x + (this.centre[0] - x) * factor, y + (this.centre[1] - y) * factor], half);
-    }
-
-    fill({ counts, n }) {
-      let largest = 1;
-      for (const count of counts) if (count > largest) largest = count;
-      const picture = element("canvas", { width: n, height: n }), image = new ImageData(n, n);
-      for (let j = 0; j < n; j++) for (let i = 0; i < n; i++) {
-        const count = counts[j * n + i], t = Math.sqrt(count / largest);
-        const colour = count < 0 ? COLOURS[count] : count === 0 ? [184, 196, 206]
-          : [255 - 46 * t, 240 - 155 * t, 224 - 190 * t];
-        image.data.set([...colour, 255], 4 * ((n - 1 - j) * n + i));
-      }
-      picture.getContext("2d").putImageData(image, 0, 0);
-      this.picture = picture;
-      this.grid = { counts, n, ...this.box };
-      this.sheet.draw();
-    }
-
-    /* The chart's own count at a point: of the nearest grid point, and of all around it. */
-    around(c1, c2) {
-      const { counts, n, x0, x1, y0, y1 } = this.grid;
-      const i = Math.round((c1 - x0) / (x1 - x0) * (n - 1));
-      const j = Math.round((c2 - y0) / (y1 - y0) * (n - 1));
-      const found = [];
-      for (let b = Math.max(j - 1, 0); b <= Math.min(j + 1, n - 1); b++)
-        for (let a = Math.max(i - 1, 0); a <= Math.min(i + 1, n - 1); a++)
-          found.push(counts[b * n + a]);
-      return found;
-    }
-
-    get unit() {
-      const { x0, x1, y0, y1 } = this.box;
-      const far = Math.max(...[x0, x1, y0, y1].map(v => Math.abs(v - 1)));
-      return far < 0.01 ? 10 ** Math.floor(Math.log10(far)) : 0;
-    }
-
-    frame(wide, high) {
-      return { left: 58, top: 10, wide: wide - 58 - 12, high: high - 10 - 48 };
-    }
-
-    draw(pen, wide, high, colours) {
-      const frame = this.frame(wide, high), { x0, x1, y0, y1 } = this.box, unit = this.unit;
-      const px = x => frame.left + frame.wide * (x - x0) / (x1 - x0);
-      const py = y => frame.top + frame.high * (y1 - y) / (y1 - y0);
-      pen.imageSmoothingEnabled = false;
-      // In dark mode as armlock.css turns the figures.
-      if (colours.dark) pen.filter = "invert(0.93) hue-rotate(180deg)";
-      if (this.picture)
-        pen.drawImage(this.picture, frame.left, frame.top, frame.wide, frame.high);
-      pen.filter = "none";
-      const read = v => unit ? (v - 1) / unit : v, write = v => unit ? 1 + v * unit : v;
-      pen.strokeStyle = colours.text;
-      pen.strokeRect(frame.left, frame.top, frame.wide, frame.high);
-      pen.textAlign = "center";
-      pen.textBaseline = "top";
-      for (const v of ticks(read(x0), read(x1), 6))
-        pen.fillText(say(+v.toPrecision(6), 6), px(write(v)), frame.top + frame.high + 6);
-      pen.textAlign = "right";
-      pen.textBaseline = "middle";
-      for (const v of ticks(read(y0), read(y1), 6))
-        pen.fillText(say(+v.toPrecision(6), 6), frame.left - 6, py(write(v)));
-      const name = k => unit ? `${power(Math.round(-Math.log10(unit)))} (c${k} \u2212 1)` : `c${k}`;
-      pen.textAlign = "center";
-      pen.textBaseline = "bottom";
-      pen.fillText(name(1), frame.left + frame.wide / 2, high - 4);
-      pen.save();
-      pen.translate(4, frame.top + frame.high / 2);
-      pen.rotate(-Math.PI / 2);
-      pen.textBaseline = "top";
-      pen.fillText(name(2), 0, 0);
-      pen.restore();
-      pen.save();
-      pen.beginPath();
-      pen.rect(frame.left, frame.top, frame.wide, frame.high);
-      pen.clip();
-      if (this.half < 1e-4) {
-        pen.strokeStyle = colours.line;
-        pen.lineWidth = 2;
-        pen.strokeRect(px(1 - SQUARE), py(1 + SQUARE), px(1 + SQUARE) - px(1 - SQUARE),
-          py(1 - SQUARE) - py(1 + SQUARE));
-      }
-      // The ideal point.
-      pen.strokeStyle = colours.text;
-      pen.lineWidth = 1.5;
-      pen.beginPath();
-      for (const [dx, dy] of [[7, 0], [0, 7]]) {
-        pen.moveTo(px(1) - dx, py(1) - dy);
-        pen.lineTo(px(1) + dx, py(1) + dy);
-      }
-      pen.stroke();
-      if (this.broken > 0 && this.broken < Infinity) {
-        pen.fillStyle = colours.text;
-        pen.strokeStyle = colours.dark ? "#000" : "#fff";
-        pen.beginPath();
-        pen.arc(px(1 + this.broken), py(1 - this.broken), 5, 0, 7);
-        pen.fill();
-        pen.stroke();
-      }
-      if (this.marked) for (const [colour, width] of [["#fff", 5], ["#0072b2", 2]]) {
-        pen.strokeStyle = colour;
-        pen.lineWidth = width;
-        pen.beginPath();
-        pen.arc(px(this.marked[0]), py(this.marked[1]), 7, 0, 7);
-        pen.stroke();
-      }
-      pen.restore();
-    }
-
-    at(event) {
-      const place = this.canvas.getBoundingClientRect();
-      const frame = this.frame(place.width, place.height), { x0, x1, y0, y1 } = this.box;
-      const x = (event.clientX - place.left - frame.left) / frame.wide;
-      const y = 1 - (event.clientY - place.top - frame.top) / frame.high;
-      if (x < 0 || x > 1 || y < 0 || y > 1) return null;
-      return [x0 + x * (x1 - x0), y0 + y * (y1 - y0)];
-    }
-
-    point(event, firmly) {
-      const found = this.at(event);
-      if (found) this.mark(found, firmly);
-    }
-
-    mark(point, firmly) {
-      this.marked = point;
-      this.sheet.draw();
-      this.pointed(point, firmly);
-    }
-
-    key(event) {
-      const zoom = { "+": 0.5, "=": 0.5, "-": 2 }[event.key];
-      if (zoom) {
-        event.preventDefault();
-        this.zoom(zoom);
-        return;
-      }
-      const move = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1],
-        ArrowDown: [0, -1] }[event.key];
-      if (!move) return;
-      event.preventDefault();
-      const step = this.half / 100 * (event.shiftKey ? 10 : 1), { x0, x1, y0, y1 } = this.box;
-      const [x, y] = this.marked || this.centre;
-      this.mark([Math.min(x1, Math.max(x0, x + step * move[0])),
-        Math.min(y1, Math.max(y0, y + step * move[1]))], true);
-    }
-
-    name([x, y]) {
-      const text = v => this.unit
-      ? `1 ${v < 1 ? "\u2212" : "+"} ${scientific(Math.abs(v - 1), 2)}` : say(v, 4);
-      return `c1 = ${text(x)}, c2 = ${text(y)}`;
-    }
-  }
-
-  function curve(pen, n, x, y) {
-    pen.beginPath();
-    for (let i = 0; i < n; i++) if (i) pen.lineTo(x(i), y(i)); else pen.moveTo(x(i), y(i));
-    pen.stroke();
-  }
-
-  /* The Nyquist curve, its distance from 0 on a logarithmic scale: angles stay as they are. */
-  function drawNyquist([omega, re, im], pen, wide, high, colours) {
-    const n = omega.length;
-    const far = v => Math.log10(1 + v);
-    let most = 2;
-    for (let i = 0; i < n; i++) most = Math.max(most, Math.hypot(re[i], im[i]));
-    most = Math.min(most, 1e6);
-    const scale = 0.46 * Math.min(wide, high) / far(most), cx = wide / 2, cy = high / 2;
-    pen.strokeStyle = colours.grid;
-    pen.textAlign = "left";
-    pen.textBaseline = "bottom";
-    for (let size = 1; size <= most; size *= 10) {
-      pen.beginPath();
-      pen.arc(cx, cy, scale * far(size), 0, 7);
-      pen.stroke();
-      pen.fillText(power(Math.round(Math.log10(size))), cx + 3, cy - scale * far(size));
-    }
-    const place = (i, sign) => {
-      const size = Math.hypot(re[i], im[i]) || 1e-300, k = scale * far(Math.min(size, most)) / size;
-      return [cx + k * re[i], cy - sign * k * im[i]];
-    };
-    for (const sign of [-1, 1]) {
-      pen.strokeStyle = sign > 0 ? colours.line : colours.grid;
-      curve(pen, n, i => place(i, sign)[0], i => place(i, sign)[1]);
-    }
-    pen.strokeStyle = colours.mark;
-    pen.lineWidth = 2;
-    const x = cx - scale * far(1);
-    for (const d of [-1, 1]) {
-      pen.beginPath();
-      pen.moveTo(x - 5, cy - 5 * d);
-      pen.lineTo(x + 5, cy + 5 * d);
-      pen.stroke();
-    }
-  }
-
-  function drawBode([omega, re, im], pen, wide, high, colours) {
-    const n = omega.length, size = [], phase = [];
-    for (let i = 0; i < n; i++) {
-      size.push(20 * Math.log10(Math.hypot(re[i], im[i]) + 1e-300));
-      phase.push(Math.atan2(im[i], re[i]) * 180 / Math.PI);
-    }
-    const first = Math.log10(omega[0] / TURN), last = Math.log10(omega[n - 1] / TURN);
-    const left = 56, right = 8, room = (high - 62) / 2;
-    const px = i => left + (wide - left - right) * (Math.log10(omega[i] / TURN) - first) / (last - first);
-    const panel = (top, values, low, most, name, step) => {
-      const py = v => top + room * (most - v) / (most - low);
-      pen.strokeStyle = colours.grid;
-      pen.textAlign = "right";
-      pen.textBaseline = "middle";
-      for (const v of step || ticks(low, most, 4)) {
-        pen.beginPath();
-        pen.moveTo(left, py(v));
-        pen.lineTo(wide - right, py(v));
-        pen.stroke();
-        pen.fillText(say(v), left - 5, py(v));
-      }
-      pen.save();
-      pen.translate(2, top + room / 2);
-      pen.rotate(-Math.PI / 2);
-      pen.textAlign = "center";
-      pen.textBaseline = "top";
-      pen.fillText(name, 0, 0);
-      pen.restore();
-      pen.save();
-      pen.beginPath();
-      pen.rect(left, top, wide - left - right, room);
-      pen.clip();
-      pen.strokeStyle = colours.line;
-      // A phase that passes 180 degrees is drawn anew from the other side.
-      pen.beginPath();
-      for (let i = 0; i < n; i++) {
-        const on = i && Math.abs(values[i] - values[i - 1]) < 300;
-        if (on) pen.lineTo(px(i), py(values[i])); else pen.moveTo(px(i), py(values[i]));
-      }
-      pen.stroke();
-      pen.restore();
-    };
-    let top = -Infinity;
-    for (const v of size) top = Math.max(top, v);
-    const low = size.reduce((a, v) => Math.min(a, Math.max(v, top - 160)), top);
-    panel(8, size, low - 5, top + 5, "|L| in dB");
-    panel(22 + room, phase, -180, 180, "phase in degrees", [-180, -90, 0, 90, 180]);
-    pen.fillStyle = colours.text;
-    pen.textAlign = "center";
-    pen.textBaseline = "top";
-    const every = Math.ceil((last - first) / (wide / 60));
-    for (let k = Math.ceil(first); k <= last; k += every) {
-      const x = left + (wide - left - right) * (k - first) / (last - first);
-      pen.fillText(power(k), x, 26 + 2 * room);
-    }
-    pen.textBaseline = "bottom";
-    pen.fillText("frequency in Hz", (left + wide - right) / 2, high - 2);
-  }
-
-  /* ---------------------------------------------------------------------------- state */
-
-  /* A number in as few characters as hold all its digits. */
-  function exact(number) {
-    const plain = String(number), scientific = number.toExponential();
-    return scientific.length < plain.length ? scientific : plain;
-  }
-
-  function written(roots) {
-    const left = [...roots], parts = [];
-    while (left.length) {
-      const [re, im] = left.shift();
-      const partner = im ? left.findIndex(([x, y]) => x === re && y === -im) : -1;
-      if (partner >= 0) {
-        left.splice(partner, 1);
-        parts.push(`${exact(re)}\u00b1${exact(Math.abs(im))}j`);
-      } else {
-        parts.push(im ? `${exact(re)}${im < 0 ? "-" : "+"}${exact(Math.abs(im))}j` : exact(re));
-      }
-    }
-    return parts.join(", ");
-  }
-
-  const NUMBER = "[+-]?(?:\\d+\\.?\\d*|\\.\\d+)(?:e[+-]?\\d+)?";
-  const REAL = new RegExp(`^${NUMBER}$`, "i");
-  const COMPLEX = new RegExp(`^(${NUMBER})?([+-]|\u00b1)((?:\\d+\\.?\\d*|\\.\\d+)(?:e[+-]?\\d+)?)[ij]$`, "i");
-
-  function read(name, text) {
-    const found = [];
-    for (const part of text.replace(/\u2212/g, "-").split(/[,;\s]+/).filter(p => p)) {
-      const match = COMPLEX.exec(part);
-      if (match) {
-        const re = Number(match[1] || 0), im = Number(match[3]);
-        if (match[2] !== "-") found.push([re, im]);
-        if (match[2] !== "+") found.push([re, -im]);
-      } else if (REAL.test(part)) {
-        found.push([Number(part), 0]);
-      } else {
-        throw new RangeError(`${name} must be numbers such as -0.1 or -0.1\u00b12j, got ${part}`);
-      }
-    }
-    return found;
-  }
-
-  /* The lines that make the same loop with the package. */
-  function python(spec, [c1, c2]) {
-    const root = ([re, im]) =>
-      im ? `${exact(re)}${im < 0 ? "-" : "+"}${exact(Math.abs(im))}j` : exact(re);
-    const list = roots => `[${roots.map(root).join(", ")}]`;
-    const dual = spec.sensor === "dual";
-    const sensor = dual ? `dual(corner=${spec.corner}, difference=${spec.difference})`
-      : spec.sensor.toUpperCase();
-    return `from armlock import Controller, Loop, unstable_roots
-from armlock.sensors import ${dual ? "dual" : sensor}
-
-controller = Controller(
-    zeros=${list(spec.zeros)},
-    poles=${list(spec.poles)},
-    gain=${spec.gain},
-)
-loop = Loop(
-    controller, ${sensor},
-    tau1=${spec.tau1}, tau2=${spec.tau2}, delay=${spec.delay},
-)
-print(unstable_roots(loop, ${c1}, ${c2}))
-`;
-  }
-
-  const SHORT = { sensor: "s", tau1: "t1", tau2: "t2", delay: "d", gain: "g", corner: "p",
-    difference: "dt", zeros: "z", poles: "q" };
-
-  function address(spec, chart) {
-    const parts = new URLSearchParams();
-    for (const [name, key] of Object.entries(SHORT))
-      parts.set(key, Array.isArray(spec[name]) ? written(spec[name]) : spec[name]);
-    parts.set("at", [...chart.centre, chart.half].join(","));
-    return `#${parts}`;
-  }
-
-  function fromAddress(hash) {
-    const parts = new URLSearchParams(hash.slice(1));
-    if (!parts.has("s")) return null;
-    const spec = {};
-    for (const [name, key] of Object.entries(SHORT)) {
-      const text = parts.get(key) ?? "";
-      spec[name] = name === "sensor" ? text
-        : name === "zeros" || name === "poles" ? read(name, text) : Number(text);
-    }
-    const [x, y, half] = (parts.get("at") || "1,1,1").split(",").map(Number);
-    return [spec, [x, y], half];
-  }
-
-  /* ---------------------------------------------------------------------------- pages */
-
+  // What the table has of a loop, in the order in which it is found, and what it says where it is not.
+  const TOLD = ["count", "root", "breaks", "margins"];
+  const UNTOLD = { count: UNDECIDED, root: null, breaks: [NaN, NaN, NaN, NaN],
+    margins: { lower: NaN, upper: NaN, phase: NaN, modulus: NaN } };
   let number = 0;
 
-  /* What both pages have: a chart that answers, and the numbers of the loop. */
+  /* What all pages have: a chart that answers, plots that follow it, and the loop's numbers. */
   class Live {
     constructor(label) {
       this.id = `live-${++number}`;
-      this.desk = new Desk(["point", "chart", "root", "breaks", "margins", "plots", "check"]);
+      // What answers the pointer waits for nothing else.
+      this.near = new Desk(["point"]);
+      this.wide = new Desk(["chart", "day"]);
+      this.slow = new Desk([...TOLD, ...TOLD.map(kind => `${kind} of the pinned`), "day"]);
       this.out = element("output", { role: "status", "aria-live": "polite" });
-      this.note = element("p", { class: "live-note" });
-      this.numbers = element("dl", { class: "live-numbers" });
-      this.chart = new Chart(label, () => this.redraw(), point => this.tell(point));
-      this.figure = element("div", { class: "live-chart", "data-check": "hover" },
-        this.chart.canvas, this.out);
-      this.forget();
+      this.note = element("p", { class: "live-note", role: "status" });
+      this.numbers = element("table", { class: "live-numbers" });
+      // For who hears the page: said once all numbers are there.
+      this.ready = element("p", { class: "visually-hidden", role: "status" });
+      this.chart = new Chart(label, {
+        changed: () => { this.redraw(); this.moved(null); },
+        pointed: held => { this.tell(true); if (held) this.moved("point"); },
+      });
+      this.figure = element("figure", { class: "live-chart", "data-check": "hover" },
+        element("figcaption", {}, "Number of unstable roots over c1 and c2"), this.chart.canvas, this.out, this.ready);
+      this.lit = null;
+      // The loop as it is, and the one that was pinned.
+      this.design = this.pinned = null;
+      // What a page does besides where the view, the held "point" or the "loop" is another.
+      this.moved = () => {};
+      this.plots = [
+        this.plot("Nyquist curve of L, compressed beyond 1", drawNyquist, 1),
+        this.plot("Bode\u2019s plot of L, and the sensitivity S = 1/(1 + L)", drawBode, [0.42, 0.9]),
+      ];
+      this.following = element("p", { class: "live-note", role: "status" });
     }
 
-    /* Nobody has pointed at a place yet. */
-    forget() {
-      this.chart.marked = null;
-      this.shown = [1, 1];
-      this.out.textContent = "Point at the chart, touch it, or move with the arrow keys.";
+    get spec() { return this.design?.spec; }
+    /* The point that all plots and numbers are of. */
+    get point() { return this.chart.marked || [1, 1]; }
+    /* The point that a link, the Python lines and a pinned loop are of. */
+    get kept() { return this.chart.held || [1, 1]; }
+    get name() { return this.chart.marked ? this.chart.name(this.point) : "(1, 1)"; }
+    get designs() { return [this.design, this.pinned].filter(one => one); }
+
+    /* A plot over frequencies, on which one can be pointed at. */
+    plot(title, draw, shape) {
+      let place = null, shown = null;
+      const sheet = new Sheet({ role: "application", tabindex: 0, "aria-label": `${title}. Arrow keys `
+        + "move along the frequencies." }, shape, (pen, wide, high, colours) => {
+        if (!this.design) return;
+        shown = this.designs.map(({ response, told }) => ({ ...response, margins: told.margins, rough: this.rough }));
+        place = draw(shown, this.lit && nearest(shown[0].omega, this.lit), pen, wide, high, colours);
+      });
+      for (const name of ["pointermove", "pointerdown"]) sheet.canvas.addEventListener(name, event => {
+        if (!this.design || !place) return;
+        const box = sheet.canvas.getBoundingClientRect(), { omega } = shown[0];
+        const x = event.clientX - box.left, y = event.clientY - box.top;
+        let best = Infinity, found = null;
+        for (let i = 0; i < omega.length; i++) {
+          const [u, v] = place(i), gap = Math.abs(u - x) + (v === null ? 0 : Math.abs(v - y));
+          if (gap < best) [best, found] = [gap, omega[i]];
+        }
+        this.light(found);
+      });
+      sheet.canvas.addEventListener("pointerleave", event => {
+        // A finger that was lifted has left what it pointed at lit.
+        if (event.pointerType !== "touch") this.light(null);
+      });
+      sheet.canvas.addEventListener("keydown", event => {
+        const move = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key];
+        if (!move || !this.design) return;
+        event.preventDefault();
+        const { omega } = shown[0], from = this.lit ? nearest(omega, this.lit) : omega.length >> 1;
+        this.light(omega[Math.min(omega.length - 1, Math.max(0, from + move * (event.shiftKey ? 20 : 1)))]);
+      });
+      sheet.figure = element("figure", {}, element("figcaption", {}, title), sheet.canvas);
+      return sheet;
     }
 
-    /* Take another loop. */
-    set(spec) {
-      this.spec = spec;
+    /* Light one frequency in all plots, and where the D-curve has it. */
+    light(omega) {
+      if (omega === this.lit) return;
+      this.lit = omega;
+      this.chart.lit = null;
+      this.following.textContent = "";
+      if (omega) {
+        const { loop, response } = this.design, [x, y] = api.crossing(loop, omega);
+        if (Number.isFinite(x + y)) this.chart.lit = [x, y];
+        const [re, im] = response.at(omega);
+        this.following.textContent = `${say(omega / TURN)} Hz: |L| = ${say(Math.hypot(re, im))}, phase `
+          + `${say(Math.atan2(im, re) * 180 / Math.PI)}\u00b0, |S| = ${say(1 / Math.hypot(1 + re, im))}`;
+      }
+      this.draw();
+    }
+
+    draw() {
+      this.chart.sheet.draw();
+      for (const plot of this.plots) plot.draw();
+    }
+
+    /* What was asked of a loop is asked no more. */
+    drop(one, kinds = TOLD) {
+      this.slow.drop(...kinds.map(kind => this.named(one, kind)));
+    }
+
+    named(one, kind) { return one === this.pinned ? `${kind} of the pinned` : kind; }
+
+    /* There is no loop: nothing of the one before stays. */
+    none(why) {
+      this.near.drop("point");
+      this.wide.drop("chart");
+      this.counting = false;
+      this.drop(this.design);
+      clearTimeout(this.rest);
+      this.design = this.lit = null;
+      this.chart.clear();
+      this.out.textContent = why;
+      this.note.textContent = this.following.textContent = this.ready.textContent = "";
+      this.numbers.replaceChildren();
+      this.listed = null;
+      this.draw();
+    }
+
+    /* Take another loop. While a slider moves, `moving`, pictures are coarser and nothing is asked
+     * that takes long. */
+    set(spec, moving = false) {
+      this.drop(this.design);
+      this.design = this.made(spec);
       this.chart.broken = null;
-      this.desk.drop("point", "root", "margins", "plots", "check");
-      this.redraw();
-      this.desk.ask("breaks", [spec], found => {
-        this.breaks = found;
-        this.chart.broken = found ? found[0] : null;
-        this.chart.sheet.draw();
-        this.list();
-      });
-      this.settle(this.shown, 0);
-      if (this.chart.marked) this.tell(this.chart.marked);
+      this.lit = this.chart.lit = null;
+      this.redraw(moving);
+      this.tell(moving);
     }
 
-    redraw() {
+    made(spec) { return { spec, loop: api.make(spec), kept: {}, told: {} }; }
+
+    /* The open loop at the point, from few frequencies while the hand moves. */
+    respond() {
+      for (const one of this.designs) one.response = api.response(one.loop, ...this.point, this.rough ? 1200 : 9000);
+      this.draw();
+    }
+
+    redraw(moving = false) {
       if (!this.spec) return;
-      const { x0, x1, y0, y1 } = this.chart.box;
-      this.desk.drop("check");
-      const input = [this.spec, x0, x1, y0, y1];
-      this.desk.ask("chart", [...input, 200], (found, error) => {
-        if (error) { this.note.textContent = error; return; }
-        this.chart.fill(found);
-        this.note.textContent = "Refining \u2026";
-        this.desk.ask("chart", [...input, 400], finer => {
+      this.chart.stale = true;
+      this.chart.curve = this.dcurve(moving ? 1500 : 20000);
+      this.chart.sheet.draw();
+      // A chart that is being counted while a slider moves is waited for: dropped at each frame, none
+      // would ever be drawn.
+      if (!(moving && this.counting)) this.count(moving);
+    }
+
+    /* Ask for the chart: a coarse one, and unless a slider moves a finer one after it. */
+    count(moving) {
+      const { spec } = this, { x0, x1, y0, y1 } = this.chart.box, input = [spec, x0, x1, y0, y1];
+      this.counting = true;
+      this.wide.ask("chart", [...input, 100, 60000], (found, error) => {
+        this.counting = false;
+        this.note.textContent = error || "Refining \u2026";
+        if (!error) this.chart.fill(found);
+        if (spec !== this.spec) {
+          // It stays faint, because the loop has moved on.
+          this.chart.stale = true;
+          this.count(true);
+          return;
+        }
+        if (moving || error) return;
+        this.wide.ask("chart", [...input, 400, 3000000], finer => {
           this.chart.fill(finer);
-          this.verify(finer.complete);
+          const share = 1 - finer.sure;
+          this.note.textContent = share ? `${share > 0.999 ? "All" : `${say(100 * share, 2)} %`} of the chart is `
+            + "undecided (striped)." : finer.counts.every(count => count === UNCONFINED)
+            ? `The loop is ${LOST} in the whole chart. This is certain.`
+            : "Every pixel of the chart is certain. The lines between areas are true to a pixel.";
         });
       });
     }
 
-    /* Count some points of the chart for certain, and say how they compare. */
-    verify(complete) {
-      const { x0, x1, y0, y1 } = this.chart.box, points = [];
-      for (let k = 1; k <= 24; k++)
-        points.push([x0 + (x1 - x0) * (0.7548776662 * k % 1), y0 + (y1 - y0) * (0.5698402910 * k % 1)]);
-      this.desk.ask("check", [this.spec, points], found => {
-        let same = 0, sure = 0;
-        found.forEach((count, k) => {
-          if (count === -3) return;
-          sure++;
-          const around = this.chart.around(...points[k]);
-          same += count >= Math.min(...around) && count <= Math.max(...around);
-        });
-        this.note.textContent = `The chart is drawn from sampled frequencies. ${sure} of its points `
-          + `were counted for certain: ${same === sure ? "all agree" : `${sure - same} differ`}.`
-          + (complete ? "" : " Crossings at still higher frequencies are left out.");
-      });
+    dcurve(most) {
+      const { x0, x1, y0, y1 } = this.chart.box, range = [Infinity, 0];
+      const found = api.dcurve(this.design.loop, x0, x1, y0, y1, most);
+      for (let i = 2; i < found.curve.length; i += 3) {
+        if (found.curve[i] < range[0]) range[0] = found.curve[i];
+        if (found.curve[i] > range[1]) range[1] = found.curve[i];
+      }
+      return { ...found, range };
     }
 
-    tell(point) {
-      const name = this.chart.name(point);
-      this.out.textContent = `${name}: counting \u2026`;
-      this.desk.drop("root");
-      this.desk.ask("point", [this.spec, ...point], (count, error) => {
-        this.out.textContent = error || `${name}: ${counted(count)}`;
-        if (error) return;
-        clearTimeout(this.rest);
-        this.rest = setTimeout(() => this.settle(point, count), 200);
+    /* The point is another, or the loop: the plots follow in this frame, the numbers once pointer and
+     * sliders rest. What was told of the held point is kept while others are looked at. */
+    tell(rough) {
+      if (!this.spec) return;
+      const { point } = this;
+      this.rough = rough;
+      for (const one of this.designs) {
+        this.drop(one, TOLD.filter(kind => kind !== "breaks"));
+        one.told = this.chart.hover ? {} : one.kept[point] ||= {};
+      }
+      this.respond();
+      this.write();
+      const { told } = this.design;
+      if (told.count === undefined) this.near.ask("point", [this.spec, ...point], (count, error) => {
+        if (error) this.out.textContent = error;
+        else if (count !== UNDECIDED && told === this.design?.told) {
+          told.count = count;
+          this.write();
+        }
       });
+      else this.near.drop("point");
+      clearTimeout(this.rest);
+      this.rest = setTimeout(() => this.settle(), 250);
     }
 
-    /* Once the pointer rests: what takes longer. */
-    settle(point, count) {
-      this.shown = point;
-      if (count >= 0 && this.chart.marked) {
-        const before = this.out.textContent;
-        this.desk.ask("root", [this.spec, ...point], root => {
-          if (!root || this.out.textContent !== before) return;
-          const im = root[1] ? ` \u00b1 ${say(Math.abs(root[1]))}j` : "";
-          this.out.textContent = `${before}; rightmost root ${say(root[0])}${im} rad/s`;
+    write() {
+      const { count, root } = this.design.told;
+      const parts = [`${this.name}: ${count === undefined ? "counting \u2026" : counted(count)}`];
+      if (root && count >= 0) parts.push(`rightmost root in rad/s: ${this.rootText(root)}; it `
+        + `${root[0] < 0 ? "decays" : "grows"} by a factor of e in ${duration(1 / Math.abs(root[0]))}`);
+      this.out.textContent = `${parts.join("; ")}.${this.chart.held ? " Held: Escape releases it." : ""}`;
+      this.list();
+    }
+
+    rootText([re, im]) {
+      return `${say(re)}${im === Infinity ? ", the limit at high frequency" : im ? ` \u00b1 ${say(Math.abs(im))}j` : ""}`;
+    }
+
+    /* Ask for what takes longer. */
+    settle() {
+      const { point } = this;
+      if (this.rough) {
+        this.rough = false;
+        this.respond();
+      }
+      for (const one of this.designs) for (const kind of TOLD) {
+        const { told } = one, breaks = kind === "breaks";
+        if ((breaks ? one.breaks : told[kind]) !== undefined || breaks && one.breaking) continue;
+        one.breaking ||= breaks;
+        this.slow.ask(this.named(one, kind), breaks ? [one.spec] : [one.spec, ...point], (found, error) => {
+          (breaks ? one : told)[kind] = error ? UNTOLD[kind] : found;
+          if (breaks && one === this.design) this.chart.broken = one.breaks[0];
+          this.draw();
+          if (this.design) this.write();
         });
       }
-      this.desk.ask("margins", [this.spec, ...point], found => {
-        this.margins = found;
-        this.list();
-      });
     }
 
+    /* The numbers of the loop, and of the pinned one beside it. */
     list() {
-      const rows = [];
-      const part = value => Number.isNaN(value) ? "not sure" : value === 0 ? "none"
-        : value === Infinity ? "more than 2" : say(value, 4);
-      if (this.breaks) {
-        const [minus, plus, down] = this.breaks;
-        rows.push(["Critical perturbation from (1, 1)", ""], ["along (1, \u22121)", part(minus)],
-          ["along (1, 1)", part(plus)], ["along (\u22121, \u22121)", part(down)]);
-      }
-      const m = this.margins;
-      const where = this.chart.marked ? this.chart.name(this.shown) : "(1, 1)";
-      const limit = (value, none) =>
-        Number.isNaN(value) ? "not sure" : value === none ? "none found" : say(value, 4);
-      if (m !== undefined) rows.push([`At ${where}`, m ? "" : "no margins: not stable"]);
-      if (m) rows.push(["Smallest gain factor that keeps it stable", limit(m.lower, 0)],
-        ["Largest", limit(m.upper, Infinity)],
-        ["Phase margin (sampled)",
-          m.phase === Infinity ? "no crossover" : `${say(m.phase * 180 / Math.PI)}\u00b0`],
-        ["Smallest |1 + L| (sampled)", say(m.modulus)]);
-      this.numbers.replaceChildren(...rows.map(([name, value]) =>
-        element("div", {}, element("dt", {}, name), element("dd", {}, value))));
+      if (!this.numbers.isConnected) return;
+      const { designs } = this, wait = "\u2026";
+      const or = (value, special, words, at) => Number.isNaN(value) ? "undecided" : value === special ? words
+        : `${say(value)}${at > 0 && at < Infinity ? ` at ${say(at / TURN)} Hz` : ""}`;
+      const broken = value => value === null ? "unstable at (1, 1)"
+        : value === 0 ? "0: none is tolerated" : or(value, Infinity, "none up to 2");
+      const of = (read, found) => designs.map(one => found(one) === undefined ? wait : read(found(one)));
+      const margin = read => of(found => found ? read(found) : "none: unstable", one => one.told.margins);
+      const parts = [
+        [`At ${this.name}`, ["Unstable roots", of(n => n >= 0 ? String(n) : WORDS[n], one => one.told.count)],
+          ["Rightmost root in rad/s", designs.map(({ told: { count, root } }) => count < 0 ? WORDS[count]
+            : root === undefined ? wait : root ? this.rootText(root) : "undecided")],
+          ["Smallest gain factor of a stable loop", margin(m => or(m.lower, 0, `none above 1/${m.most}`, m.lowerAt))],
+          ["Largest gain factor of a stable loop", margin(m => or(m.upper, Infinity, `none up to ${m.most}`, m.upperAt))],
+          ["Phase margin in degrees", margin(m => or(m.phase * 180 / Math.PI, Infinity, "no crossover", m.phaseAt))],
+          ["Smallest |1 + L|", margin(m => or(m.modulus, Infinity, "", m.modulusAt))]],
+        ["Critical perturbation from (1, 1)", ...["(1, \u22121)", "(\u22121, 1)", "(1, 1)", "(\u22121, \u22121)"].map(
+          (way, k) => [`along ${way}`, of(b => broken(b[k]), one => one.breaks)])],
+      ];
+      const text = JSON.stringify(parts);
+      if (text === this.listed) return;
+      this.listed = text;
+      this.numbers.replaceChildren(element("thead", {}, element("tr", {},
+        ...["Number", "This loop", "Pinned"].slice(0, 1 + designs.length)
+          .map(text => element("th", { scope: "col" }, text)))),
+      ...parts.map(([title, ...rows]) => element("tbody", {},
+        element("tr", {}, element("th", { scope: "rowgroup", colspan: 1 + designs.length }, title)),
+        ...rows.map(([name, values]) => element("tr", {}, element("th", { scope: "row" }, name),
+          ...values.map(value => element("td", {}, value)))))));
+      const done = designs.length && designs.every(one => one.breaks && TOLD.every(
+        kind => kind === "breaks" || one.told[kind] !== undefined));
+      this.ready.textContent = done ? `The table has all numbers at ${this.name}: ${parts[0].slice(1)
+        .map(([name, [value]]) => `${name}: ${value}`).join("; ")}.` : "";
+    }
+
+    /* Pin the design as it is: what follows is seen against it, in all plots and numbers. */
+    pin() {
+      if (this.pinned) this.drop(this.pinned);
+      this.pinned = this.pinned || !this.design ? null : { ...this.made(this.spec), breaks: this.design.breaks };
+      this.chart.ghost = this.pinned && this.chart.curve;
+      this.tell(false);
+      return Boolean(this.pinned);
     }
   }
 
+  /* ---------------------------------------------------------------------------- controls */
+
+  const button = (text, done) => element("button", { type: "button", onclick: done }, text);
+  const buttons = (...all) => element("p", { class: "live-buttons" }, ...all);
+
+  /* A slider. `moved(value, moving)` hears a move in each frame, and the last one with moving = false.
+   * `to` sets it, and gives a value past its end twice the room. */
   function slider(id, name, low, high, value, write, moved) {
+    let waiting = 0;
     const shown = element("output", { id: `${id}-value` }, write(value));
     const input = element("input", { type: "range", id, min: low, max: high, step: (high - low) / 200,
       "aria-controls": `${id}-value`, oninput: () => {
         shown.textContent = write(Number(input.value));
-        moved(Number(input.value));
+        waiting ||= requestAnimationFrame(() => {
+          waiting = 0;
+          moved(Number(input.value), true);
+        });
+      }, onchange: () => {
+        cancelAnimationFrame(waiting);
+        waiting = 0;
+        moved(Number(input.value), false);
       } });
     input.value = value;
-    return element("label", { class: "live-field" }, element("span", {}, name, " ", shown), input);
+    const label = element("label", { class: "live-field" }, element("span", {}, name, " ", shown), input);
+    label.to = at => {
+      const end = at > high ? 2 * at : high;
+      [input.max, input.step] = [end, (end - low) / 200];
+      input.value = at;
+      shown.textContent = write(at);
+    };
+    return label;
   }
 
   function choice(id, name, options, changed) {
@@ -703,16 +476,44 @@ print(unstable_roots(loop, ${c1}, ${c2}))
     return element("label", { class: "live-field" }, element("span", {}, name), select);
   }
 
+  /* Zoom, download, and the ghost, of any explorer. */
+  function tools(live, file, ...more) {
+    const pin = element("button", { type: "button", "aria-pressed": "false", onclick: () => {
+      pin.setAttribute("aria-pressed", String(live.pin()));
+    } }, "Pin this loop");
+    return buttons(button("Zoom in", () => live.chart.zoom(0.5)), button("Zoom out", () => live.chart.zoom(2)),
+      ...more, pin, button("PNG", () => live.chart.sheet.picture(blob => {
+        const link = element("a", { href: URL.createObjectURL(blob), download: `${file}.png` });
+        link.click();
+        setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+      })));
+  }
+
+  function legend() {
+    const colour = (text, name) =>
+      element("span", { class: "live-key" }, element("i", { class: name }), text);
+    return element("p", { class: "live-note" }, "Move over the chart for a preview; click or tap to hold a point. ",
+      colour("stable", "live-stable"), colour("unstable, stronger with more roots", "live-unstable"),
+      colour(LOST, "live-lost"), colour("undecided", "live-unsure"), "Curve: a root on the imaginary axis, from "
+      + "low frequency (blue) to high (yellow). + is the ideal point (1, 1). The dot is the critical "
+      + "perturbation along (1, \u22121). The square, in small charts, is the paper\u2019s: perturbations up to "
+      + "10\u207b\u2076. Dashed: the pinned loop.");
+  }
+
+  const figures = (...all) => element("div", { class: "live-two" }, ...all);
+
+  /* ---------------------------------------------------------------------------- pages */
+
   /* The controlled loop of the paper, with what it leaves open as switches. */
   function front(place) {
     const live = new Live("Stability of the paper's controlled loop near (1, 1).");
     const state = { half: false, actuator: false, printed: false, corner: 0.4, delay: 0 };
-    const update = () => {
+    const update = moving => {
       const poles = [...PAPER.poles], zeros = [...PAPER.zeros];
       if (state.printed) { zeros.pop(); poles.pop(); }
       if (state.actuator) poles.push([0, 0]);
       live.set({ ...PAPER, zeros, poles, corner: TURN * state.corner, delay: state.delay,
-        difference: (state.half ? 0.5 : 1) * PAPER.difference });
+        difference: (state.half ? 0.5 : 1) * PAPER.difference }, moving);
     };
     const flag = (key, name, off, on) => choice(`${live.id}-${key}`, name, [["", off], ["1", on]],
       value => { state[key] = Boolean(value); update(); });
@@ -721,45 +522,20 @@ print(unstable_roots(loop, ${c1}, ${c2}))
       flag("actuator", "Actuator 1/s", "left out", "in the loop"),
       flag("printed", "Last pole of the controller", "p24 (Table II)", "z24 (as Eq. 11 prints it)"),
       slider(`${live.id}-corner`, "Corner p of the sensor:", -2, 1, Math.log10(0.4),
-        v => `${say(10 ** v)} Hz`, v => { state.corner = 10 ** v; update(); }),
+        v => `${say(10 ** v)} Hz`, (v, moving) => { state.corner = 10 ** v; update(moving); }),
       slider(`${live.id}-delay`, "Dead time:", 0, 10, 0, v => `${say(v)} ms`,
-        v => { state.delay = 1e-3 * v; update(); }));
-    place.replaceChildren(form, element("div", { class: "live-pair" }, live.figure,
-      element("div", {}, live.numbers, live.note)));
+        (v, moving) => { state.delay = 1e-3 * v; update(moving); }));
+    place.replaceChildren(form, figures(element("div", {}, live.figure, legend(), live.note), live.numbers));
     live.chart.show([1, 1], 3e-6);
     update();
   }
 
-  function save(name, blob) {
-    const link = element("a", { href: URL.createObjectURL(blob), download: name });
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-  }
-
   /* The chart of a chapter: one of the presets in the window that the page asks for. */
   function chapter(place) {
-    const { live: name, centre, half } = place.dataset;
-    const live = new Live(`${name}: number of unstable roots over c1 and c2.`);
-    const colour = (text, shown) =>
-      element("span", { class: "live-key" }, element("i", { style: `background: ${shown}` }), text);
-    const legend = element("p", { class: "live-note" }, colour("stable", "rgb(184,196,206)"),
-      colour("unstable, stronger with more roots", "rgb(232,163,129)"), "+ the ideal point (1, 1)");
-    if (half < 1e-4)
-      legend.append("; square: the paper\u2019s perturbations; dot: first to break along (1, \u22121)");
-    const button = (text, done) => element("button", { type: "button", onclick: done }, text);
-    const file = name.toLowerCase().replace(/\W+/g, "-");
-    const counts = () => {
-      const { counts, n, x0, x1, y0, y1 } = live.chart.grid;
-      const at = (low, high, i) => low + (high - low) * i / (n - 1);
-      const rows = Array.from(counts, (count, k) =>
-        `${at(x0, x1, k % n)},${at(y0, y1, Math.floor(k / n))},${count}\n`);
-      save(`${file}.csv`, new Blob(["c1 [1],c2 [1],unstable roots [1]\n", ...rows]));
-    };
-    const tools = element("p", { class: "live-buttons" },
-      button("Zoom in", () => live.chart.zoom(0.5)), button("Zoom out", () => live.chart.zoom(2)),
-      button("Download CSV", counts),
-      button("Download PNG", () => live.chart.canvas.toBlob(blob => save(`${file}.png`, blob))));
-    place.replaceChildren(element("div", { class: "live-one" }, live.figure, legend, tools, live.note));
+    const { live: name, centre, half } = place.dataset, live = new Live(`${name}: number of unstable roots over `
+      + "c1 and c2.");
+    place.replaceChildren(figures(live.figure, live.plots[0].figure), tools(live, name.toLowerCase().replace(/\W+/g, "-")),
+      legend(), live.note, live.plots[1].figure, live.following);
     live.chart.show([Number(centre), Number(centre)], Number(half));
     live.set(PRESETS[name][0]);
   }
@@ -767,135 +543,433 @@ print(unstable_roots(loop, ${c1}, ${c2}))
   /* Your own loop. */
   function own(place) {
     const live = new Live("Number of unstable roots over c1 and c2.");
-    const id = name => `${live.id}-${name}`;
-    const fields = {};
-    const wrong = element("p", { class: "live-wrong", role: "alert" });
+    const id = name => `${live.id}-${name}`, fields = {}, errors = {};
     const code = element("pre", { class: "live-code", "aria-label": "Python" });
-    let response = null, factor = 1;
-    const picture = (draw, label) => new Sheet({ role: "img", "aria-label": label }, 0.85,
-      (pen, wide, high, colours) => { if (response) draw(response, pen, wide, high, colours); });
-    const nyquist = picture(drawNyquist, "Nyquist curve of L at the point, distances from 0 on a "
-      + "logarithmic scale, -1 marked");
-    const bode = picture(drawBode, "Magnitude and phase of L at the point against frequency");
+    const orbit = element("a", {}, "Open this loop in orbit");
+    // The unit of the fields, the gain from which its slider goes, the steps that Undo can take back;
+    // `quiet` while the page itself changes what it shows.
+    let unit = 1, base = 1, depth = 0, quiet = true, before = null, later = 0;
 
-    const settle = live.settle.bind(live);
-    live.settle = (point, count) => {
-      settle(point, count);
-      code.textContent = python(live.spec, point);
-      live.desk.ask("plots", [live.spec, ...point], found => {
-        response = found;
-        nyquist.draw();
-        bode.draw();
-      });
+    /* The address holds the loop, and its history undoes what was done to it. */
+    live.moved = step => {
+      if (!live.spec) return;
+      const hash = address(live.spec, live.chart, unit);
+      code.textContent = python(live.spec, live.kept, unit);
+      orbit.href = `in_orbit.html${hash}`;
+      if (quiet) return;
+      // A point that goes on moving is one step, and another view is none.
+      const further = step && hash !== location.hash && !(step === "point" && before === "point");
+      before = step || before;
+      const write = () => {
+        history[further ? "pushState" : "replaceState"]({ depth }, "", hash);
+      };
+      clearTimeout(later);
+      if (further) undo.disabled = !++depth;
+      if (further) write(); else later = setTimeout(write, 200);
     };
-    const remember = () => history.replaceState(null, "", address(live.spec, live.chart));
-    const redraw = live.redraw.bind(live);
-    live.redraw = () => { redraw(); if (live.spec) remember(); };
+    // What the fields hold and is no loop is in no address: to undo it takes the loop of the address.
+    const undo = button("Undo", () => { if (live.spec) history.back(); else open(); });
 
-    const take = () => {
+    /* An error stands at its field. */
+    const blame = (name, message) => {
+      if (message) fields[name].setAttribute("aria-invalid", "true");
+      else fields[name].removeAttribute("aria-invalid");
+      errors[name].textContent = message || "";
+    };
+    const NAMES = { tau1: "\u03c4\u2081", tau2: "\u03c4\u2082", delay: "The dead time", gain: "The gain",
+      corner: "The corner", difference: "\u0394\u03c4" };
+
+    /* The loop that the fields hold; throws an error that names its field. */
+    const read = () => {
+      const spec = { sensor: fields.sensor.value };
+      for (const name of ["tau1", "tau2", "delay", "gain"]) spec[name] = readNumber(name, fields[name].value, NAMES[name]);
+      if (["dual", "modified"].includes(spec.sensor)) for (const name of ["corner", "difference"])
+        spec[name] = readNumber(name, fields[name].value, NAMES[name]) * (name === "corner" ? TURN : 1);
+      for (const [name, title] of [["zeros", "Zeros"], ["poles", "Poles"]])
+        spec[name] = readRoots(name, fields[name].value, title).map(v => v.map(x => x * unit));
+      api.make(spec);
+      return spec;
+    };
+
+    /* Take what the fields hold. `edited` is the field that has changed. */
+    const take = (edited = null, moving = false, dragged = false) => {
+      for (const name of Object.keys(errors)) blame(name, "");
       try {
-        const spec = { sensor: fields.sensor.value };
-        for (const name of ["tau1", "tau2", "delay", "gain", "corner", "difference"]) {
-          const text = fields[name].value.trim().replace(/\u2212/g, "-");
-          if (!REAL.test(text)) throw new RangeError(`${name} must be a number, got ${text || "nothing"}`);
-          spec[name] = Number(text);
+        if (edited === "pasted") {
+          const [above, under] = readController("pasted", fields.pasted.value);
+          if (!above.some(v => v)) throw Object.assign(new RangeError("It must not be zero."), { field: "pasted" });
+          // Its coefficients are those of s in rad/s.
+          unit = 1;
+          fields.unit.value = "1";
+          fields.gain.value = exact(above.find(v => v) / under.find(v => v));
+          [fields.zeros.value, fields.poles.value] = [above, under].map(part => written(api.rootsOf(part)));
+          fields.pasted.value = "";
         }
-        for (const name of ["zeros", "poles"]) spec[name] = read(name, fields[name].value);
-        armlockLoop().make(spec);
+        const spec = read();
         wrong.textContent = "";
-        live.set(spec);
+        if (!dragged) {
+          base = Number(fields.gain.value) || 1;
+          gain.to(0);
+          dead.to(spec.delay);
+          const root = [...spec.zeros, ...spec.poles].map(v => Math.hypot(...v)).filter(v => v);
+          range = [Math.min(...root, 1 / spec.tau1), Math.max(...root, 1 / spec.tau1)];
+          if (range[1] < 100 * range[0]) range = [range[0] / 10, range[1] * 10];
+        }
+        presets.value = Object.keys(PRESETS).find(name => same(spec, PRESETS[name][0])) || "";
+        live.set(spec, moving);
+        if (!dragged || caught) roots.draw();
+        undo.disabled = !depth;
+        if (!moving) live.moved("loop");
       } catch (error) {
+        // Too few poles are too many zeros: the field that was edited is the one to look at.
+        const name = error.field === "zeros" && edited === "poles" ? edited : fields[error.field] ? error.field : "sensor";
+        blame(name, error.message);
         wrong.textContent = error.message;
+        undo.disabled = false;
+        live.none("There is no loop to show, because a field has an error.");
+        code.textContent = "";
+        orbit.removeAttribute("href");
+        roots.draw();
       }
     };
+    const same = (a, b) => {
+      const all = spec => ["sensor", "tau1", "tau2", "delay", "gain", "zeros", "poles",
+        ...["dual", "modified"].includes(spec.sensor) ? ["corner", "difference"] : []].map(name =>
+        [spec[name]].flat(2).map(v => typeof v === "number" ? v.toPrecision(12) : v).sort()).join("|");
+      return all(a) === all(b);
+    };
+
     const put = spec => {
-      for (const name of Object.keys(SHORT))
-        fields[name].value = Array.isArray(spec[name]) ? written(spec[name]) : String(spec[name]);
-      fields.gain.dataset.base = spec.gain;
+      for (const name of ["sensor", "tau1", "tau2", "delay", "gain", "difference"])
+        if (spec[name] !== undefined) fields[name].value = String(spec[name]);
+      if (spec.corner !== undefined) fields.corner.value = shortest(spec.corner, TURN);
+      for (const name of ["zeros", "poles"]) fields[name].value = written(spec[name], unit);
       shape();
     };
     const shape = () => {
-      for (const name of ["corner", "difference"])
-        fields[name].closest("label").hidden = fields.sensor.value !== "dual";
+      const two = ["dual", "modified"].includes(fields.sensor.value);
+      for (const name of ["corner", "difference"]) fields[name].closest(".live-field").hidden = !two;
     };
-    const field = (name, label, tag = "input") => {
-      fields[name] = element(tag, { id: id(name), spellcheck: "false", autocomplete: "off",
-        inputmode: tag === "input" ? "text" : null, rows: tag === "textarea" ? 2 : null,
-        onchange: () => { fields.gain.dataset.base = fields.gain.value; take(); } });
-      return element("label", { class: `live-field${tag === "textarea" ? " live-wide" : ""}` },
-        element("span", {}, label), fields[name]);
+    const field = (name, label, area = false) => {
+      fields[name] = element(area ? "textarea" : "input", { id: id(name), spellcheck: "false",
+        autocomplete: "off", autocapitalize: "off", rows: area ? 2 : null,
+        "aria-describedby": id(`${name}-wrong`), onchange: () => take(name) });
+      errors[name] = element("span", { id: id(`${name}-wrong`), class: "live-wrong" });
+      return element("div", { class: `live-field${area ? " live-wide" : ""}` },
+        element("label", { for: id(name) }, label), fields[name], errors[name]);
     };
-    const preset = choice(id("preset"), "Start from", Object.keys(PRESETS).map(name => [name, name]),
-      name => {
-        const [spec, centre, half] = PRESETS[name];
-        put(spec);
-        live.forget();
-        live.spec = null;
-        live.chart.show([centre, centre], half);
-        take();
-      });
-    const sensor = choice(id("sensor"), "Sensor", [["single", "single arm"], ["common", "common arm"],
-      ["difference", "difference of the arms"], ["dual", "dual"]], () => { shape(); take(); });
-    fields.sensor = sensor.querySelector("select");
-    preset.classList.add("live-wide");
-    const form = element("form", { class: "live-form", onsubmit: event => event.preventDefault() },
-      preset, sensor, field("tau1", "Delay \u03c4\u2081 in s"), field("tau2", "Delay \u03c4\u2082 in s"),
-      field("delay", "Dead time in s"), field("gain", "Gain"),
-      field("corner", "Sensor's corner p in rad/s"), field("difference", "Sensor's \u0394\u03c4 in s"),
-      field("zeros", "Zeros in rad/s, such as \u22120.1 or \u22120.1\u00b12j", "textarea"),
-      field("poles", "Poles in rad/s", "textarea"),
-      slider(id("factor"), "Drag the gain: times", -2, 2, 0, v => say(10 ** v), v => {
-        factor = 10 ** v;
-        fields.gain.value = String(+(Number(fields.gain.dataset.base) * factor).toPrecision(6));
-        take();
+    const select = (name, title, options, changed) => {
+      const made = choice(id(name), title, options, changed);
+      fields[name] = made.querySelector("select");
+      errors[name] = element("span", { id: id(`${name}-wrong`), class: "live-wrong" });
+      fields[name].setAttribute("aria-describedby", id(`${name}-wrong`));
+      made.append(errors[name]);
+      return made;
+    };
+    /* Show another loop, with its view. Hertz where their numbers are shorter. */
+    const show = (spec, centre, half, held, given) => {
+      unit = given || ([1, TURN].map(one => [...spec.zeros, ...spec.poles].map(v => written([v], one)).join("").length).reduce((a, b) => b < a) ? TURN : 1);
+      fields.unit.value = unit === 1 ? "1" : "hz";
+      put(spec);
+      live.none("");
+      live.chart.held = held;
+      live.chart.show(centre, half);
+      take();
+    };
+    const start = name => {
+      const [spec, centre, half] = PRESETS[name];
+      show(spec, [centre, centre], half, null);
+    };
+
+    const preset = choice(id("preset"), "Start from", [["", "\u2014 your own loop \u2014"],
+      ...Object.keys(PRESETS).map(name => [name, name])], name => { if (name) start(name); });
+    const presets = preset.querySelector("select");
+    const gain = slider(id("factor"), "Gain factor:", -2, 2, 0, v => say(10 ** v), (v, moving) => {
+      fields.gain.value = exact(+(base * 10 ** v).toPrecision(6));
+      take("gain", moving, true);
+    });
+    const dead = slider(id("dead"), "Dead time:", 0, 1, 0, v => `${say(v)} s`, (v, moving) => {
+      fields.delay.value = exact(v);
+      take("delay", moving, true);
+    });
+    const wrong = element("p", { class: "live-note live-wrong", role: "alert" });
+    const inputs = element("form", { class: "live-form", onsubmit: event => event.preventDefault() },
+      select("sensor", "Sensor", SENSORS, () => { shape(); take("sensor"); }),
+      field("gain", "Gain"),
+      field("tau1", "Delay \u03c4\u2081 in s"), field("tau2", "Delay \u03c4\u2082 in s"),
+      field("delay", "Dead time in s"),
+      select("unit", "Unit of roots", [["1", "rad/s"], ["hz", "Hz"]], value => {
+        // The loop stays what it is; the fields say it in the other unit.
+        const { spec } = live;
+        unit = value === "hz" ? TURN : 1;
+        if (spec) put(spec);
+        take("unit");
       }),
-      slider(id("dead"), "Drag the dead time:", 0, 1, 0, v => `${say(v)} s`, v => {
-        fields.delay.value = String(v);
-        take();
-      }));
-    const button = (text, done) => element("button", { type: "button", onclick: done }, text);
-    const view = element("p", { class: "live-buttons" },
-      button("Zoom in", () => live.chart.zoom(0.5)), button("Zoom out", () => live.chart.zoom(2)),
-      button("Paper's square", () => live.chart.show([1, 1], 3e-6)),
-      button("Whole", () => live.chart.show([0, 0], 3)));
+      field("corner", "Sensor\u2019s corner in Hz"), field("difference", "Sensor\u2019s \u0394\u03c4 in s"),
+      field("pasted", "Paste a controller, as MATLAB or python-control print it", true),
+      field("zeros", "Zeros", true), field("poles", "Poles", true));
+    fields.pasted.placeholder = "(s + 0.02)/(s^2 + 0.1 s)";
+
+    /* The s-plane: a root follows the pointer, a pair together; a root at 0 stays. */
+    let range = [0.01, 1], plane = null, caught = null;
+    const roots = new Sheet({ role: "img", "aria-label": "Roots of the controller in the s-plane. The fields Zeros "
+      + "and Poles have them as text." }, 0.8, (pen, wide, high, colours) => {
+      const { spec } = live;
+      plane = spec && drawRoots({ ...spec, unit, range }, pen, wide, high, colours);
+    });
+    const pointer = event => {
+      const box = roots.canvas.getBoundingClientRect();
+      return [event.clientX - box.left, event.clientY - box.top];
+    };
+    const near = event => {
+      if (!plane) return null;
+      const [x, y] = pointer(event), all = ["zeros", "poles"].flatMap(kind => live.spec[kind].map((root, k) => {
+        const [u, v] = plane.place(root);
+        return { kind, k, root, gap: Math.hypot(u - x, v - y) };
+      })).filter(({ root, gap }) => gap < 16 && Math.hypot(...root)).sort((p, q) => p.gap - q.gap);
+      return all[0] || null;
+    };
+    const drag = (event, moving) => {
+      const { kind, k, root: [re, im], spec } = caught, [x, y] = plane.root(...pointer(event));
+      const round = v => Number((v / unit).toPrecision(3)) * unit, moved = spec[kind].map(v => v);
+      const to = im ? [round(x), round(Math.max(Math.abs(y), 1e-3 * Math.hypot(x, y)))]
+        : [Math.sign(x) * round(Math.hypot(x, y)), 0];
+      moved[k] = [to[0], Math.sign(im) * to[1]];
+      if (im) moved[spec[kind].findIndex(([a, b]) => a === re && b === -im)] = [to[0], -Math.sign(im) * to[1]];
+      put({ ...spec, [kind]: moved });
+      take(kind, moving, moving);
+    };
+    const on = (name, done) => roots.canvas.addEventListener(name, done);
+    on("pointerdown", event => {
+      caught = near(event);
+      if (!caught) return;
+      caught.spec = live.spec;
+      roots.canvas.setPointerCapture(event.pointerId);
+    });
+    on("pointermove", event => {
+      if (caught) drag(event, true); else roots.canvas.style.cursor = near(event) ? "grab" : "";
+    });
+    on("pointerup", event => {
+      if (caught) drag(event, false);
+      caught = null;
+    });
+    on("pointercancel", () => { caught = null; });
+    on("touchstart", event => { if (caught) event.preventDefault(); });
+
     const copied = button("Copy as Python", async () => {
       try {
         await navigator.clipboard.writeText(code.textContent);
         copied.textContent = "Copied";
       } catch {
         // A browser may refuse the clipboard to a page from disk: the lines are there to mark.
+        lines.open = true;
         getSelection().selectAllChildren(code);
         copied.textContent = "Marked: copy it with Ctrl+C";
       }
       setTimeout(() => { copied.textContent = "Copy as Python"; }, 3000);
     });
-    place.replaceChildren(form, wrong, element("div", { class: "live-pair" },
-      element("div", {}, live.figure, view), element("div", {}, live.numbers, live.note)),
-      element("div", { class: "live-plots" }, nyquist.canvas, bode.canvas),
-      element("p", { class: "live-buttons" }, copied), code);
+    const lines = element("details", {}, element("summary", {}, "This loop in Python"), code);
+    const [nyquist, bode] = live.plots;
+    place.replaceChildren(element("div", { class: "live-own" },
+      element("div", { class: "live-top" }, element("div", { class: "live-start" }, preset, undo),
+        wrong, gain, dead),
+      element("div", { class: "live-main" }, figures(live.figure, nyquist.figure),
+        tools(live, "loop", button("Paper\u2019s square", () => live.chart.show([1, 1], 3e-6)),
+          button("Whole", () => live.chart.show([0, 0], 3))), live.note, bode.figure, live.following, live.numbers),
+      element("div", { class: "live-fields" },
+        element("figure", {}, element("figcaption", {}, "Drag a pole (\u00d7) or a zero (\u25cb)"), roots.canvas),
+        inputs, legend(), buttons(copied, orbit))), lines);
 
     const open = () => {
+      quiet = true;
+      clearTimeout(later);
+      presets.value = "";
       try {
         const given = fromAddress(location.hash);
-        if (!given) return false;
-        put(given[0]);
-        live.spec = null;
-        live.chart.show(given[1], given[2]);
-        take();
-        return true;
+        if (given) {
+          api.make(given.spec);
+          show(given.spec, given.centre, given.half, given.held, given.unit);
+        } else start(Object.keys(PRESETS)[0]);
       } catch (error) {
-        wrong.textContent = `This address holds no loop: ${error.message}`;
-        return false;
+        live.none("There is no loop to show.");
+        shape();
+        roots.draw();
+        code.textContent = "";
+        wrong.textContent = `The address of this page holds no loop: ${error.message.replace(/\.$/, "")}. It was left as it is. Choose `
+          + "a loop to start from, or mend the address.";
       }
+      quiet = false;
     };
-    window.addEventListener("hashchange", open);
-    if (!open()) preset.querySelector("select").dispatchEvent(new Event("change"));
+    addEventListener("popstate", ({ state: kept }) => {
+      depth = kept?.depth || 0;
+      undo.disabled = !depth;
+      before = null;
+      open();
+    });
+    undo.disabled = true;
+    open();
   }
 
-  function start() {
-    for (const place of document.querySelectorAll("[data-live]"))
-      ({ front, loop: own }[place.dataset.live] || chapter)(place);
+  /* A year in orbit: the arms, what the sensor holds, and where the loop stands each day. */
+  const ARMS = { 1: [0, 2], 2: [1, 0], 3: [2, 1] }, STEP = 5, YEAR = 365, MONTH = 365.25 / 12;
+  const HOLDS = ["largest, all year", "largest, right sign", "a month's start",
+    "a month's middle"];
+
+  /* Both round trips in s, as [t => tau1, t => tau2] with t in days: cubics through four entries. */
+  function arms(orbit, master) {
+    return ARMS[master].map(arm => t => {
+      const v = armlockOrbits[orbit][arm], k = Math.min(v.length - 4, Math.max(0, Math.floor(t / STEP)));
+      const x = t / STEP - k, [a, b, c, d] = v.slice(k, k + 4);
+      return 16.5 + 1e-6 * (b + 0.5 * x * (c - a + x * (2 * a - 5 * b + 4 * c - d
+        + x * (3 * (b - c) + d - a))));
+    });
   }
-  if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", start);
-  else start();
-})();
+
+  function held(half, hold, t) {
+    if (hold === HOLDS[2]) return half(MONTH * Math.floor(t / MONTH));
+    if (hold === HOLDS[3]) return half(Math.min(YEAR, MONTH * (Math.floor(t / MONTH) + 0.5)));
+    let largest = 0;
+    for (let day = 0; day <= YEAR; day++) if (Math.abs(half(day)) > Math.abs(largest)) largest = half(day);
+    return hold === HOLDS[0] || half(t) < 0 === largest < 0 ? largest : -largest;
+  }
+
+  function year(place) {
+    const LOOPS = { "the white paper's": [FLIGHT, 6e-3], "the paper's": [PAPER, 1.5e-6] };
+    const wrong = element("p", { class: "live-note live-wrong", role: "alert" }), MINE = "yours, from the link";
+    // "Your own loop" opens this page with its loop in the address.
+    try {
+      const given = fromAddress(location.hash);
+      if (given) {
+        api.make(given.spec);
+        LOOPS[MINE] = [given.spec, given.half, given.unit];
+      }
+    } catch (error) {
+      wrong.textContent = `The address of this page holds no loop: ${error.message}`;
+    }
+    const live = new Live("Number of unstable roots over c1 and c2 on this day.");
+    const state = { loop: LOOPS[MINE] ? MINE : Object.keys(LOOPS)[0], orbit: Object.keys(armlockOrbits)[0], master: "1",
+      hold: HOLDS[0], day: 20 };
+    // Of each day that was counted: where the loop breaks, null where it is not stable.
+    let days = [], trips = null, half = null, values = [], finished = 0;
+    const back = element("a", {}, "Open the loop of this day in \u201cYour own loop\u201d");
+    const words = element("p", { class: "live-note", role: "status" });
+    const spec = day => {
+      const [tau1, tau2] = trips.map(trip => trip(day));
+      return { ...LOOPS[state.loop][0], tau1, tau2, difference: 2 * held(half, state.hold, day) };
+    };
+    const sheet = new Sheet({ role: "img", "aria-label": "The year: true and assumed half difference, days on "
+      + "which the loop is unstable, and the critical perturbation of the arms in opposite directions." }, [0.5, 1.2],
+    (pen, ...rest) => drawYear({ values, days, day: state.day }, pen, ...rest));
+    for (const name of ["pointerdown", "pointermove"]) sheet.canvas.addEventListener(name, event => {
+      const box = sheet.canvas.getBoundingClientRect(), at = (event.clientX - box.left - 56) / (box.width - 64);
+      if (event.buttons && at >= 0 && at <= 1) { today.to(Math.round(at * YEAR)); move(Math.round(at * YEAR), true); }
+    });
+    sheet.canvas.addEventListener("pointerup", () => move(state.day, false));
+
+    /* Every sixteenth day first, then those between, by two workers. Each day has its count, and every
+     * fourth day its critical perturbation. */
+    const count = () => {
+      days = Array(YEAR + 1);
+      finished = 0;
+      const order = [16, 8, 4, 2, 1].flatMap((step, k) => Array.from({ length: Math.ceil((YEAR + 1) / step) },
+        (_, i) => i * step).filter(day => !k || day % (2 * step)));
+      const next = desk => {
+        const day = order.shift();
+        if (day !== undefined) desk.ask("day", [spec(day), day % 4 === 0], (found, error) => {
+          // A sensor that would divide by zero is no loop, and so not a stable one.
+          days[day] = error ? null : found;
+          sheet.draw();
+          if (++finished > YEAR) summary(); else next(desk);
+        });
+      };
+      for (const desk of [live.slow, live.wide]) {
+        desk.drop("day");
+        next(desk);
+      }
+    };
+    const summary = () => {
+      const parts = [];
+      for (let day = 0; day <= YEAR; day++) if (days[day] === null) {
+        const from = day;
+        while (days[day + 1] === null) day++;
+        parts.push(from === day ? `${day}` : `${from} to ${day}`);
+      }
+      lost.textContent = parts.length ? `Unstable on days ${parts.join(", ")}.`
+        : "Stable on every day of the year.";
+      lost.textContent += " The roots are counted once a day, so that shorter changes are not seen. The critical "
+        + "perturbation is computed every fourth day. A dot is missing where it is undecided, 0, or larger than 2.";
+    };
+    const lost = element("p", { class: "live-note", role: "status" });
+    const move = (day, moving) => {
+      state.day = day;
+      const now = spec(day), ms = v => `${say(1e3 * v)} ms`;
+      if (now.difference) live.set(now, moving);
+      else live.none("The sensor would divide by zero: there is no loop on this day.");
+      words.textContent = `Day ${Math.round(day)}: round trips ${now.tau1.toFixed(4)} s and ${now.tau2.toFixed(4)} s; `
+        + `half difference ${ms(half(day))}, assumed ${ms(now.difference / 2)}.`;
+      back.href = `live.html${address({ ...now, difference: now.difference || 1 }, live.chart, LOOPS[state.loop][2] || TURN)}`;
+      sheet.draw();
+    };
+    const update = () => {
+      trips = arms(state.orbit, state.master);
+      half = t => 0.5 * (trips[0](t) - trips[1](t));
+      values = Array.from({ length: YEAR + 1 }, (_, day) => [half(day), held(half, state.hold, day)]);
+      lost.textContent = "Counting the days \u2026";
+      live.chart.show([1, 1], LOOPS[state.loop][1]);
+      move(state.day, false);
+      count();
+    };
+    const pick = (key, name, options) => {
+      const label = choice(`${live.id}-${key}`, name, options.map(text => [text, text]), value => {
+        state[key] = value;
+        update();
+      });
+      label.querySelector("select").value = state[key];
+      return label;
+    };
+    const today = slider(`${live.id}-day`, "Day", 0, YEAR, state.day, v => String(Math.round(v)),
+      (v, moving) => { stop(); move(v, moving); });
+    today.querySelector("input").step = 1;
+    // Who wants no motion goes on by a week at a time.
+    let playing = 0;
+    const still = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
+    const stop = () => {
+      cancelAnimationFrame(playing);
+      if (playing) move(state.day, false);
+      playing = 0;
+      play.textContent = still() ? "A week on" : "Play the year";
+    };
+    const play = button("", () => {
+      if (playing) { stop(); return; }
+      const from = state.day >= YEAR ? 0 : state.day, begun = performance.now();
+      if (still()) {
+        const day = Math.min(YEAR, from + 7);
+        today.to(day);
+        move(day, false);
+        return;
+      }
+      play.textContent = "Pause";
+      const frame = now => {
+        const day = Math.min(YEAR, from + 15 * (now - begun) / 1000);
+        today.to(day);
+        move(day, true);
+        if (day < YEAR) playing = requestAnimationFrame(frame); else stop();
+      };
+      playing = requestAnimationFrame(frame);
+    });
+    stop();
+    const form = element("form", { class: "live-form", onsubmit: event => event.preventDefault() },
+      pick("loop", "Loop", Object.keys(LOOPS)), pick("orbit", "Orbit", Object.keys(armlockOrbits)),
+      pick("master", "Master", Object.keys(ARMS)), pick("hold", "The sensor assumes", HOLDS));
+    place.replaceChildren(form, wrong, element("div", { class: "live-day" }, today, play),
+      element("figure", {}, element("figcaption", {}, "Solid: the true half difference. Dashed: the half difference "
+        + "that the sensor assumes. Dots: the critical perturbation of the arms in opposite directions."), sheet.canvas),
+      words, lost, figures(element("div", {}, live.figure, legend(), live.note),
+        element("div", {}, live.numbers, buttons(back))));
+    addEventListener("hashchange", () => location.reload());
+    update();
+  }
+
+  for (const place of document.querySelectorAll("[data-live]"))
+    ({ front, loop: own, year }[place.dataset.live] || chapter)(place);
+}

@@ -37,7 +37,7 @@
     });
   });
   function unfold() {
-    const row = rows.find(row => '#' + row.id === location.hash);
+    const row = document.getElementById(location.hash.slice(1))?.closest('.ledger tbody tr');
     if (!row) return;
     form.reset();
     row.hidden = false;

@@ -1,15 +1,14 @@
 """How a claim of the paper is written down, decided, checked and shown.
 
-A claim is a function without arguments that computes a `Finding`. The decorator holds all the
-rest, and enters it in the register. A module names its chapter once:
-
-    claim = partial(ledger.claim, chapter="03_common_arm")
+A claim is a function without arguments that computes a `Finding`: which readings of the claim
+hold, and the number that shows it. The verdict follows from the readings by `verdict`, the rule
+of this book, and no check chooses its verdict. The decorator `claim` enters the rest:
 
     @claim("C2", place="Eq. (5b)", says="...", pinned=(Verdict.REPRODUCED, 0.0, 1e-12))
     def straight_line() -> Finding:
         ...
 
-The chapter shows `chapter_claims("03_common_arm")`, and calls its `confirm`.
+The letter of a claim names its chapter, which shows `chapter_claims("04_common_arm")`.
 
 Texts are plain, with formulas between dollar signs. What a terminal shows as it is, such as
 c₁ or 10⁻⁶, becomes TeX on a page (`typeset`); TeX may be written as well.
@@ -22,9 +21,9 @@ import html
 import json
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from multiprocessing import get_context
 from pathlib import Path
@@ -33,16 +32,46 @@ import numpy as np
 
 from book.companion.shared import shared
 
+#: Notebook of a claim by its letter, and the part of the paper that the claim is from.
+CHAPTERS = {
+    "Z": ("01_opening", "Sec. I and Table I"),
+    "T": ("01_opening", "Sec. I and Table I"),
+    "S": ("02_single_arm", "Sec. II, single arm"),
+    "C": ("04_common_arm", "Sec. III.A, common arm"),
+    "D": ("05_dual_arm", "Sec. III.B, dual arm"),
+    "N": ("06_nyquist", "Sec. IV.A, frequency domain"),
+    "K": ("08_controller", "Sec. IV.B, controller"),
+    "M": ("09_simulation", "Sec. IV.C, simulation"),
+    "A": ("07_perturbations", "Appendix"),
+    "W": ("11_flight", "White paper"),
+}
+
 
 class Verdict(StrEnum):
     """What became of a claim."""
 
     REPRODUCED = "reproduced"
-    WHERE_USED = "holds where the paper uses it"
-    IN_PART = "reproduced in part"
+    ONE_READING = "reproduced in one reading"
+    IN_PART = "in part"
     DIFFERS = "differs"
     NOT_AS_WRITTEN = "not as written"
-    OPEN = "cannot be settled from the paper"
+    OPEN = "cannot be settled"
+
+    @property
+    def clause(self) -> str:
+        """The clause of the rule that leads to this verdict."""
+        return _CLAUSES[self]
+
+
+_CLAUSES = {
+    Verdict.REPRODUCED: "found under every reading that the text allows",
+    Verdict.ONE_READING: "found under one reading and not under another; the verdict names it",
+    Verdict.IN_PART: "one stated part of the claim is found, another is not",
+    Verdict.DIFFERS: "found under no reading that the text allows",
+    Verdict.NOT_AS_WRITTEN: "the text has an error whose correction is evident, and the "
+    "corrected text is found",
+    Verdict.OPEN: "the source does not print what decides it",
+}
 
 
 class Weight(StrEnum):
@@ -53,48 +82,46 @@ class Weight(StrEnum):
     WORDING = "wording"
 
 
-def decide(
-    *holds: bool | np.bool_,
-    beyond: bool | np.bool_ = True,
-    corrected: bool | np.bool_ = False,
-    settled: bool | np.bool_ = True,
-) -> Verdict:
-    """Return the verdict that follows from which parts of a claim hold.
+#: Whether a claim holds in one reading; of a claim in several parts, whether each part holds.
+Holds = bool | np.bool_ | Mapping[str, bool | np.bool_]
+#: Name of the literal reading of a text with an error; the others are then the corrected text.
+PRINTED = "as printed"
+
+
+def verdict(readings: Mapping[str, Holds], missing: str = "") -> Verdict:
+    """Return the verdict that follows from the readings of a claim: the rule of this book.
 
     Parameters
     ----------
-    *holds : bool
-        For each part of the claim, whether it holds in the range in which the paper uses it,
-        in the reading most favourable to the paper.
-    beyond : bool, optional
-        Whether it holds outside that range as well.
-    corrected : bool, optional
-        Whether the claim holds with a slip in the paper mended.
-    settled : bool, optional
-        False if the answer depends on something that the paper does not say.
+    readings : mapping of str to bool, or to a mapping of str to bool
+        For each reading that the text allows, whether the claim holds, or which of its parts
+        do. If the source does not print a value, a reading for each value that was tried.
+    missing : str, optional
+        What the source does not print.
 
     Returns
     -------
     Verdict
-        All parts hold: reproduced, or where the paper uses it. Otherwise, if the mended claim
-        holds: not as written. Otherwise some parts hold: reproduced in part; none: differs.
 
     Examples
     --------
-    >>> decide(True, False)
-    <Verdict.IN_PART: 'reproduced in part'>
-    >>> decide(True, beyond=False)
-    <Verdict.WHERE_USED: 'holds where the paper uses it'>
-    >>> decide(False, corrected=True)
+    >>> verdict({"near (1, 1)": True, "everywhere": False})
+    <Verdict.ONE_READING: 'reproduced in one reading'>
+    >>> verdict({"": {"stable": True, "flat": False}})
+    <Verdict.IN_PART: 'in part'>
+    >>> verdict({"as printed": False, "with the sign changed": True})
     <Verdict.NOT_AS_WRITTEN: 'not as written'>
     """
-    if not settled:
+    parts = [list(h.values()) if isinstance(h, Mapping) else [h] for h in readings.values()]
+    whole = [all(part) for part in parts]
+    if missing and len(set(whole)) != 1:
         return Verdict.OPEN
-    if all(holds):
-        return Verdict.REPRODUCED if beyond else Verdict.WHERE_USED
-    if corrected:
-        return Verdict.NOT_AS_WRITTEN
-    return Verdict.IN_PART if any(holds) else Verdict.DIFFERS
+    if all(whole):
+        return Verdict.REPRODUCED
+    if any(whole):
+        literal = dict(zip(readings, whole, strict=True)).get(PRINTED, True)
+        return Verdict.ONE_READING if literal else Verdict.NOT_AS_WRITTEN
+    return Verdict.IN_PART if any(map(any, parts)) else Verdict.DIFFERS
 
 
 @dataclass(frozen=True)
@@ -103,26 +130,48 @@ class Finding:
 
     Attributes
     ----------
-    verdict : Verdict
-        What became of the claim.
+    readings : mapping
+        Which readings of the claim hold, as `verdict` takes them; a single one is called "".
     value : float
         The number that decides it.
     quantity : str
         What that number is, unit included.
     note : str
-        Why the verdict follows, and under which reading, in three sentences at most; numbers
-        in it are computed.
+        What else is worth knowing, in three sentences at most; numbers in it are computed.
+    missing : str
+        What the source does not print.
     """
 
-    verdict: Verdict
+    readings: Mapping[str, Holds]
     value: float
     quantity: str
     note: str
+    missing: str = ""
+    verdict: Verdict = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Derive the verdict, the only way to one."""
+        object.__setattr__(self, "verdict", verdict(self.readings, self.missing))
 
     @property
     def shown(self) -> str:
         """The number as a reader sees it; "0 to rounding" where only rounding is left."""
-        return "0 to rounding" if 0.0 < abs(self.value) < 1e-11 else f"{self.value:.6g}"
+        if 0.0 < abs(self.value) < 1e-11:
+            return "0 to rounding"
+        # Four digits decide; a number of some ten thousand is not given as a power of ten.
+        return f"{self.value:.0f}" if 1e4 <= abs(self.value) < 1e6 else f"{self.value:.4g}"
+
+    @property
+    def tried(self) -> list[str]:
+        """Each reading or part in words, with what was found."""
+        lines = []
+        for name, holds in self.readings.items():
+            parts = holds if isinstance(holds, Mapping) else {"": holds}
+            for part, found in parts.items():
+                label = ", ".join(filter(None, (name, part)))
+                lines.append(f"{label}: {'' if found else 'not '}found" if label else "")
+        lines.append(f"not printed: {self.missing}" if self.missing else "")
+        return [line for line in lines if line]
 
 
 @dataclass(frozen=True)
@@ -132,13 +181,32 @@ class Claim:
     identifier: str
     place: str
     says: str
-    chapter: str
     pinned: tuple[Verdict, float, float]
+    also: Mapping[str, str]
     affects: tuple[str, ...]
     weight: Weight
     printed: str
-    same_as: str
     check: shared[Finding]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Its identifier, and those of the other places at which the paper makes it."""
+        return self.identifier, *self.also
+
+    @property
+    def places(self) -> str:
+        """All places at which the paper makes it."""
+        return "; ".join((self.place, *self.also.values()))
+
+    @property
+    def section(self) -> str:
+        """The part of the paper that it is from."""
+        return CHAPTERS[self.identifier[0]][1]
+
+
+def chapter_of(identifier: str) -> str:
+    """Return the stem of the notebook that shows a claim."""
+    return CHAPTERS[identifier[0]][0]
 
 
 _REGISTER: dict[str, Claim] = {}
@@ -149,12 +217,11 @@ def claim(
     *,
     place: str,
     says: str,
-    chapter: str,
     pinned: tuple[Verdict, float, float],
+    also: Mapping[str, str] | None = None,
     affects: tuple[str, ...] = (),
     weight: Weight = Weight.PHYSICS,
     printed: str = "",
-    same_as: str = "",
 ) -> Callable[[Callable[[], Finding]], shared[Finding]]:
     """Enter the decorated check in the register of claims.
 
@@ -166,45 +233,50 @@ def claim(
         Where the paper makes the claim.
     says : str
         What it says, in our words.
-    chapter : str
-        Stem of the notebook that shows it.
     pinned : (Verdict, float, float)
-        The verdict, the number that decides it, and the absolute tolerance of that number.
+        The verdict that was found, the number that decides it, and its absolute tolerance.
+    also : mapping of str to str, optional
+        Further places at which the paper makes the same claim, by the identifier of each.
     affects : tuple of str, optional
         Claims whose verdict or number uses what this one corrects, for the errata.
     weight : Weight, optional
         What the claim is about.
     printed : str, optional
         The formula, or the few words, as the paper prints them.
-    same_as : str, optional
-        The claim with the same finding, which then counts once.
 
     Raises
     ------
     ValueError
-        If the identifier is taken.
+        If an identifier is taken.
     """
 
     def enter(check: Callable[[], Finding]) -> shared[Finding]:
-        if identifier in _REGISTER:
-            raise ValueError(f"identifier must be new, got {identifier!r} a second time")
+        names = identifier, *(also or {})
+        for name in names:
+            if name in _REGISTER:
+                raise ValueError(f"identifier must be new, got {name!r} a second time")
         remembered = shared(check)
-        _REGISTER[identifier] = Claim(
-            identifier, place, says, chapter, pinned, affects, weight, printed, same_as,
-            remembered,
+        entry = Claim(
+            identifier, place, says, pinned, also or {}, affects, weight, printed, remembered,
         )  # fmt: skip
+        _REGISTER.update(dict.fromkeys(names, entry))
         return remembered
 
     return enter
 
 
 def all_claims() -> list[Claim]:
-    """Return every registered claim, in the order of the paper's sections."""
-    return list(_REGISTER.values())
+    """Return every registered claim once, in the order of the paper's sections."""
+    return list({entry.identifier: entry for entry in _REGISTER.values()}.values())
+
+
+def all_names() -> list[str]:
+    """Return the identifiers of all claims and of all their places."""
+    return list(_REGISTER)
 
 
 class Ledger:
-    """Claims with their findings, shown as a table.
+    """Claims with their findings, shown under their verdicts.
 
     Parameters
     ----------
@@ -216,8 +288,10 @@ class Ledger:
         self.entries = list(entries)
 
     def __getitem__(self, identifier: str) -> Finding:
-        """Return the finding of one claim."""
-        return {entry.identifier: finding for entry, finding in self.entries}[identifier]
+        """Return the finding of one claim, by any of its identifiers."""
+        return {name: finding for entry, finding in self.entries for name in entry.names}[
+            identifier
+        ]
 
     def __iter__(self) -> Iterator[tuple[Claim, Finding]]:
         """Iterate over (claim, finding)."""
@@ -237,10 +311,10 @@ class Ledger:
         """
         wrong = []
         for entry, finding in self.entries:
-            verdict, value, tolerance = entry.pinned
-            if finding.verdict is not verdict or not abs(finding.value - value) <= tolerance:
+            pinned, value, tolerance = entry.pinned
+            if finding.verdict is not pinned or not abs(finding.value - value) <= tolerance:
                 wrong.append(
-                    f"{entry.identifier} is pinned as {verdict}, {value!r} within "
+                    f"{entry.identifier} is pinned as {pinned}, {value!r} within "
                     f"{tolerance:g}; found {finding.verdict}, {finding.value!r}"
                 )
         if wrong:
@@ -251,20 +325,22 @@ class Ledger:
         return Counter(
             finding.verdict
             for entry, finding in self.entries
-            if not entry.same_as and entry.weight in (weights or Weight)
+            if entry.weight in (weights or Weight)
         )
 
     def records(self) -> list[dict[str, str | float]]:
         """Return the ledger as one flat record a claim."""
         return [
             {
-                "claim": entry.identifier,
-                "place": entry.place,
+                "claim": " ".join(entry.names),
+                "place": entry.places,
                 "says": entry.says,
                 "printed": entry.printed,
-                "chapter": entry.chapter,
+                "chapter": chapter_of(entry.identifier),
                 "weight": str(entry.weight),
                 "verdict": str(finding.verdict),
+                "clause": finding.verdict.clause,
+                "readings": "; ".join(finding.tried),
                 "value": finding.value,
                 "quantity": finding.quantity,
                 "note": finding.note,
@@ -293,19 +369,21 @@ class Ledger:
     def __repr__(self) -> str:
         """Return the table as text."""
         return "\n".join(
-            f"{c.identifier:4s} {f.verdict}: {f.shown} ({f.quantity}). {f.note}"
+            f"{c.identifier:4s} {f.verdict}: {f.shown} ({f.quantity}). "
+            + "".join(f"{tried}. " for tried in f.tried)
+            + f.note
             for c, f in self.entries
         ).replace("$", "")
 
     def _repr_html_(self) -> str:
-        """Return the table as HTML, for a chapter; what is behind a row is in the ledger."""
-        rows = "".join(
-            f'<tr id="claim-{c.identifier}"><td>{ledger_link(c.identifier)}</td>'
-            f"<td>{badge(f.verdict)}</td><td>{c.weight}</td><td>{typeset(c.says)}"
-            f"<br><strong>{typeset(f.shown)}</strong>: {typeset(f.quantity)}.</td></tr>"
-            for c, f in self.entries
-        )
-        return table(rows)
+        """Return links to the claims, under their verdicts, as HTML for a chapter."""
+        found: dict[Verdict, list[str]] = {}
+        for c, f in self.entries:
+            says = html.escape(c.says.replace("$", ""))
+            link = ledger_link(c.identifier, f'id="claim-{c.identifier}" title="{says}" ')
+            found.setdefault(f.verdict, []).append(link)
+        lines = (f"{badge(v, v)} {', '.join(found[v])}" for v in Verdict if v in found)
+        return f'<p class="verdict-counts">{"<br>".join(lines)}</p>'
 
 
 # HTML ----------------------------------------------------------------------------------------
@@ -351,26 +429,28 @@ def typeset(text: str) -> str:
     return "".join(parts)
 
 
-def ledger_link(identifier: str) -> str:
+def ledger_link(identifier: str, attributes: str = "") -> str:
     """Return a link from a chapter to a claim's row in the ledger."""
-    return f'<a href="09_ledger.html#ledger-{identifier}">{identifier}</a>'
+    return f'<a {attributes}href="15_ledger.html#ledger-{identifier}">{identifier}</a>'
 
 
 def badge(verdict: Verdict, text: str = "") -> str:
-    """Return a text as HTML in the colour of a verdict; by default the verdict in short."""
-    name = verdict.name.lower()
-    return f'<span class="verdict verdict-{name}">{text or name.replace("_", " ")}</span>'
+    """Return a text as HTML in the colour of a verdict; by default the verdict itself."""
+    return f'<span class="verdict verdict-{verdict.name.lower()}">{text or verdict}</span>'
 
 
 def row(claim: Claim, finding: Finding, attributes: str, link: str, more: str) -> str:
     """Return a claim as a row of the ledger: one line, and what unfolds below it."""
-    printed = f"<p>Printed ({typeset(claim.place)}): {typeset(claim.printed)}.</p>"
-    place = f"<p>{typeset(claim.place)}, in our words.</p>"
+    printed = f"Printed ({typeset(claim.places)}): {typeset(claim.printed)}."
+    place = f"{typeset(claim.places)}, in our words."
+    tried = "".join(f"<li>{typeset(line)}</li>" for line in finding.tried)
     return (
         f"<tr {attributes}><td>{link}</td><td>{badge(finding.verdict)}</td>"
         f"<td>{claim.weight}</td><td><details><summary>{typeset(claim.says)}</summary>"
-        f"{printed if claim.printed else place}<p>{badge(finding.verdict, finding.verdict)} "
-        f"<strong>{typeset(finding.shown)}</strong>: {typeset(finding.quantity)}.</p>"
+        f"<p>{printed if claim.printed else place}</p>"
+        f"<p>{badge(finding.verdict)} {finding.verdict.clause}.</p>"
+        f"{f'<ul>{tried}</ul>' if tried else ''}<p>{typeset(finding.quantity)}: "
+        f"<strong>{typeset(finding.shown)}</strong>.</p>"
         f"<p>{typeset(finding.note)}</p>{more}</details></td></tr>"
     )
 
@@ -406,8 +486,8 @@ def check(*identifiers: str) -> Ledger:
             raise ValueError(
                 f"identifier must be one of {', '.join(_REGISTER)}; got {identifier!r}"
             )
-    chosen = [_REGISTER[identifier] for identifier in identifiers]
-    return Ledger((entry, entry.check()) for entry in chosen)
+    chosen = {_REGISTER[name].identifier: _REGISTER[name] for name in identifiers}
+    return Ledger((entry, entry.check()) for entry in chosen.values())
 
 
 def chapter_claims(chapter: str) -> Ledger:
@@ -416,7 +496,7 @@ def chapter_claims(chapter: str) -> Ledger:
     Parameters
     ----------
     chapter : str
-        Stem of its notebook, for instance "03_common_arm".
+        Stem of its notebook, for instance "04_common_arm".
 
     Returns
     -------
@@ -427,9 +507,9 @@ def chapter_claims(chapter: str) -> Ledger:
     ValueError
         If no claim names this chapter.
     """
-    names = [entry.identifier for entry in all_claims() if entry.chapter == chapter]
+    names = [name for name in _REGISTER if chapter_of(name) == chapter]
     if not names:
-        known = ", ".join(dict.fromkeys(entry.chapter for entry in all_claims()))
+        known = ", ".join(dict.fromkeys(map(chapter_of, _REGISTER)))
         raise ValueError(f"chapter must be one of {known}; got {chapter!r}")
     return check(*names)
 
@@ -450,10 +530,10 @@ def check_in_parallel() -> Ledger:
         All claims. Those of a chapter share what they need, such as one simulation, and so
         stay together.
     """
-    # The longest first. It needs few of the compiled functions: the other process has compiled
-    # the rest before this one comes to need them.
-    longest, others = "08_perturbations", (entry.chapter for entry in reversed(all_claims()))
-    chapters = dict.fromkeys([longest, *others])
+    # The longest first, and side by side those that compile different functions: what one
+    # process has compiled, the other one then finds.
+    first = "07_perturbations", "11_flight", "04_common_arm"
+    chapters = dict.fromkeys([*first, *map(chapter_of, _REGISTER)])
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
         parts = pool.map(_check_chapter, chapters)
         found = {name: finding for part in parts for name, finding in part.items()}

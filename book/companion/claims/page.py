@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import html
 import inspect
-import os
 from collections import Counter
 from collections.abc import Callable, Iterable
 from importlib import metadata
@@ -22,6 +21,7 @@ from book.companion.claims.ledger import (
     Weight,
     all_claims,
     badge,
+    chapter_of,
     check,
     check_in_parallel,
     ledger_link,
@@ -30,21 +30,6 @@ from book.companion.claims.ledger import (
     typeset,
 )
 
-#: Section of the paper that a chapter with claims is about.
-SECTIONS = {
-    "01_opening": "Sec. I and Table I",
-    "02_hayes": "Sec. II, single arm",
-    "03_common_arm": "Sec. III.A, common arm",
-    "04_dual_arm": "Sec. III.B, dual arm",
-    "05_nyquist": "Sec. IV.A, frequency domain",
-    "06_controller": "Sec. IV.B, controller",
-    "07_simulation": "Sec. IV.C, simulation",
-    "08_perturbations": "Appendix",
-    "08a_flight": "White paper, the loop",
-    "08b_noise_and_pulling": "White paper, noise and pulling",
-}
-#: Those of them that are about the paper; the others are about the white paper.
-OF_THE_PAPER = [name for name, part in SECTIONS.items() if not part.startswith("White")]
 #: What filters and sorts the table.
 SCRIPT = Path(__file__).with_name("ledger.js")
 
@@ -93,33 +78,30 @@ def project_url() -> str | None:
 
 
 class VerdictCounts:
-    """How many findings of physics met each verdict, and how many others there are.
-
-    Claims with the same finding count once, those of the white paper by themselves.
+    """How many claims met each verdict: of the paper by weight, and of the white paper.
 
     Examples
     --------
     >>> from book.companion.claims import check
     >>> from book.companion.claims.page import VerdictCounts
-    >>> VerdictCounts(check("T2", "T6"))
-    1 finding of physics: 1 reproduced
-    Besides, 1 of derivation and 0 of wording
+    >>> VerdictCounts(check("S2", "S4"))
+    1 claim of physics: 1 reproduced
+    1 claim of derivation: 1 reproduced
     """
 
     def __init__(self, ledger: Ledger) -> None:
         entries: dict[bool, list[tuple[Claim, Finding]]] = {True: [], False: []}
         for claim, finding in ledger:
-            entries[claim.chapter in OF_THE_PAPER].append((claim, finding))
-        paper = Ledger(entries[True])
-        physics, white = paper.counts(Weight.PHYSICS), Ledger(entries[False]).counts()
-        number = physics.total()
-        others = " and ".join(f"{paper.counts(w).total()} of {w}" for w in list(Weight)[1:])
+            entries[not claim.section.startswith("White")].append((claim, finding))
+        paper, white = (Ledger(entries[of]) for of in (True, False))
+        met = {f"of {weight}": paper.counts(weight) for weight in Weight}
+        met["of the white paper"] = white.counts()
         #: What is counted, and how many met each verdict.
-        self.lines = [(f"{number} finding{'s' * (number != 1)} of physics", physics)]
-        if white:
-            self.lines.append((f"{white.total()} of the white paper", white))
-        #: What is said below that.
-        self.others = f"Besides, {others}"
+        self.lines = [
+            (f"{counts.total()} claim{'s' * (counts.total() != 1)} {of}", counts)
+            for of, counts in met.items()
+            if counts
+        ]
 
     def _met(self, shown: Callable[[Verdict, str], str]) -> list[tuple[str, list[str]]]:
         return [
@@ -130,13 +112,12 @@ class VerdictCounts:
     def __repr__(self) -> str:
         """Return the lines as text."""
         lines = self._met(lambda verdict, text: text)
-        found = [f"{head}: {', '.join(verdicts)}" for head, verdicts in lines]
-        return "\n".join([*found, self.others])
+        return "\n".join(f"{head}: {', '.join(verdicts)}" for head, verdicts in lines)
 
     def _repr_html_(self) -> str:
         """Return the lines as HTML."""
         found = [f"{head}: {' '.join(badges)}" for head, badges in self._met(badge)]
-        return f'<p class="verdict-counts">{"<br>".join([*found, self.others])}</p>'
+        return f'<p class="verdict-counts">{"<br>".join(found)}</p>'
 
 
 class LedgerPage:
@@ -145,33 +126,24 @@ class LedgerPage:
     Parameters
     ----------
     ledger : Ledger
-        The claims and their findings.
-
-    Notes
-    -----
-    The folder that the environment variable ARMLOCK_FIGURES names, if there is one, gets the
-    ledger as claims.csv and claims.json, which the page then links to.
+        The claims and their findings. The page links to claims.csv and claims.json, which
+        `make claims` and a build of the book write.
     """
 
     def __init__(self, ledger: Ledger) -> None:
         self.ledger = ledger
-        folder = os.environ.get("ARMLOCK_FIGURES")
-        self.files = [path.name for path in ledger.write(Path(folder))] if folder else []
-
-    def __repr__(self) -> str:
-        """Return the table as text."""
-        return repr(self.ledger)
 
     def _repr_html_(self) -> str:
         """Return controls, table and script."""
         rows = "".join(_row(claim, finding) for claim, finding in self.ledger)
         links = " · ".join(
-            f'<a href="../figures/{name}" download>{name}</a>' for name in self.files
+            f'<a href="../figures/claims.{ending}" download>claims.{ending}</a>'
+            for ending in ("csv", "json")
         )
-        downloads = f'<p class="figure-downloads">The ledger as data: {links}</p>'
         return (
             f'<div class="ledger">{_controls(self.ledger)}{table(rows)}'
-            f"{downloads if links else ''}</div><script>{SCRIPT.read_text('utf-8')}</script>"
+            f'<p class="figure-downloads">The ledger as data: {links}</p></div>'
+            f"<script>{SCRIPT.read_text('utf-8')}</script>"
         )
 
 
@@ -189,7 +161,7 @@ def _controls(ledger: Ledger) -> str:
 
     shown = [(v.name.lower(), badge(v, f"{v} ({verdicts[v]})")) for v in Verdict if verdicts[v]]
     kinds = [(w.name.lower(), f"{w} ({weights[w]})") for w in Weight if weights[w]]
-    sections = dict.fromkeys(SECTIONS[claim.chapter] for claim, _ in ledger)
+    sections = dict.fromkeys(claim.section for claim, _ in ledger)
     options = "".join(f"<option>{html.escape(name)}</option>" for name in sections)
     return (
         '<form class="ledger-filter" hidden><fieldset><legend>Verdict</legend>'
@@ -211,14 +183,16 @@ def _row(claim: Claim, finding: Finding) -> str:
         where = f'<a href="{html.escape(url)}/blob/main/{file}#L{line}">{where}</a>'
     attributes = (
         f'id="ledger-{name}" data-verdict="{finding.verdict.name.lower()}" '
-        f'data-weight="{claim.weight}" data-section="{html.escape(SECTIONS[claim.chapter])}"'
+        f'data-weight="{claim.weight}" data-section="{html.escape(claim.section)}"'
     )
     code = (
-        f'<p>Shown in its <a href="{claim.chapter}.html#claim-{name}">chapter</a>.</p>'
+        f'<p>Shown in its <a href="{chapter_of(name)}.html#claim-{name}">chapter</a>.</p>'
         f"<details><summary>Source of {name}</summary><p>{where}</p>"
         f'<pre tabindex="0">{html.escape(text)}</pre></details>'
     )
-    return row(claim, finding, attributes, ledger_link(name), code)
+    # Links that name one of the other places lead to this row, too.
+    others = "".join(f'<span id="ledger-{other}"> {other}</span>' for other in claim.also)
+    return row(claim, finding, attributes, ledger_link(name) + others, code)
 
 
 class Errata:
@@ -228,17 +202,17 @@ class Errata:
     ----------
     ledger : Ledger
         The claims and their findings.
+    verdict : Verdict
+        Which claims to take.
     *weights : Weight
-        Which ones to take; by default all.
+        Of which weight; by default all.
     """
 
-    def __init__(self, ledger: Ledger, *weights: Weight) -> None:
+    def __init__(self, ledger: Ledger, verdict: Verdict, *weights: Weight) -> None:
         self.entries = [
             (claim, finding)
             for claim, finding in ledger
-            if finding.verdict in (Verdict.NOT_AS_WRITTEN, Verdict.DIFFERS)
-            and claim.weight in (weights or Weight)
-            and not claim.same_as
+            if finding.verdict is verdict and claim.weight in (weights or Weight)
         ]
         self.ledger = ledger
 
@@ -258,24 +232,22 @@ class Errata:
 
     def _block(self, claim: Claim, finding: Finding) -> str:
         name = claim.identifier
-        affected = ((c, f) for c, f in self.ledger if c.identifier in claim.affects)
-        same = (ledger_link(c.identifier) for c, _ in self.ledger if c.same_as == name)
+        affected = ((c, f) for c, f in self.ledger if set(c.names) & set(claim.affects))
         parts = {
             "Printed" if claim.printed else "In our words": typeset(
                 claim.printed or claim.says
             ),
-            "What follows": f"<strong>{typeset(finding.shown)}</strong>: "
-            f"{typeset(finding.quantity)}. {typeset(finding.note)}",
+            "What follows": f"{typeset(finding.quantity)}: "
+            f"<strong>{typeset(finding.shown)}</strong>. {typeset(finding.note)}",
             "What depends on it": ", ".join(
                 f"{ledger_link(c.identifier)} ({f.verdict})" for c, f in affected
             ),
-            "The same finding": ", ".join(same),
         }
         items = "".join(
             f"<dt>{term}</dt><dd>{text}</dd>" for term, text in parts.items() if text
         )
         return (
             f'<section class="erratum" id="erratum-{name}"><p><strong>{ledger_link(name)}, '
-            f"{typeset(claim.place)}</strong> {badge(finding.verdict, finding.verdict)}</p>"
+            f"{typeset(claim.places)}</strong> {badge(finding.verdict)}</p>"
             f"<dl>{items}</dl></section>"
         )

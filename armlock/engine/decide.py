@@ -1,0 +1,442 @@
+"""What is decided on the imaginary axis: counts, and whether a family of functions has a zero.
+
+`count` follows the argument of one function. `Family` states functions of which none may have
+a zero, up to a level; `least` finds the largest level at which none has. Both stop where double
+precision does not decide: then they say at which frequency.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import partial
+from typing import Any
+
+import numba
+import numpy as np
+
+from armlock.checks import FloatArray, IntArray
+from armlock.engine import inclusion
+from armlock.engine.functions import Function, Leading, Space, compiled, stacked
+from armlock.engine.inclusion import DISTANCE, Functions, Question
+from armlock.engine.polynomials import rounded
+
+#: What a count is where a root lies on the axis, or rounding does not decide on which side.
+BOUNDARY = -1
+#: What a count is where infinitely many roots do not stay left of the axis.
+UNCONFINED = -2
+
+# Most steps of a count, and of a search; some three seconds each.
+_MOST_STEPS = 1_500_000
+_MOST_SEARCHED = 2_000_000
+# Steps between two looks at the keyboard.
+_A_WHILE = 100_000
+# Steps in likely intervals before a search.
+_A_LOOK = 2_000
+# Points that one thread counts at a time.
+_BLOCK = 256
+
+
+class UndecidedError(RuntimeError):
+    """Double precision, or the steps allowed, did not decide.
+
+    `omega` is where, in rad/s, and `index` of which of many functions.
+    """
+
+    def __init__(self, message: str, omega: float, index: int = 0) -> None:
+        super().__init__(message)
+        self.omega, self.index = omega, index
+
+
+def in_threads(function: Callable[[Any], Any], items: Iterable[Any]) -> list[Any]:
+    """Return what a compiled function makes of some items; Ctrl-C ends it."""
+    # A single item goes to a thread too: compiled functions do not react to Ctrl-C.
+    pool = ThreadPoolExecutor(numba.config.NUMBA_NUM_THREADS)
+    try:
+        return list(pool.map(function, items))
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+def blocks(size: int, block: int) -> list[slice]:
+    """Return the blocks of a range."""
+    return [slice(first, min(first + block, size)) for first in range(0, size, block)]
+
+
+def counts(
+    space: Space,
+    functions: Functions,
+    *,
+    leading: Leading | None = None,
+    most: int = _MOST_STEPS,
+) -> IntArray:
+    """Count the zeros with positive real part of n functions (Lemma 13).
+
+    Parameters
+    ----------
+    space : Space
+        Of all functions.
+    functions : Functions
+        The n functions, by their weights.
+    leading : Leading, optional
+        Of one function, with zeros at s = 0 that are not to count.
+    most : int, optional
+        Most steps of a count.
+
+    Returns
+    -------
+    int array, shape (n,)
+        BOUNDARY and UNCONFINED included.
+
+    Raises
+    ------
+    UndecidedError
+        If a count takes too many steps.
+    """
+    _, steady, delayed, uncertain = functions
+    n = len(steady)
+    # What weights are uncertain by counts as a term of any phase.
+    ends = space.confined_from(steady, delayed, uncertain) * (1.0 if space.step else 2.0)
+    order, begin = (leading.order, leading.radius) if leading else (0, 0.0)
+    found = np.full(n, UNCONFINED, dtype=np.int64)
+    here = np.flatnonzero(np.isfinite(ends))
+    ends = np.maximum(ends, 2.0 * begin)
+    if not here.size:
+        return found
+
+    def some(block: slice) -> tuple[Any, ...]:
+        k = here[block]
+        chosen = Functions(space.arrays, steady[k], delayed[k], uncertain[k])
+        found: tuple[Any, ...] = inclusion.wind(chosen, np.full(k.size, begin), ends[k], most)
+        return found
+
+    turn, first, last, undecided, steps = map(
+        np.concatenate, zip(*in_threads(some, blocks(here.size, _BLOCK)), strict=True)
+    )
+    if (steps >= most).any():
+        k = int(np.argmax(steps >= most))
+        raise UndecidedError(
+            f"a count takes more than {most:.0e} steps, up to {undecided[k]:.3g} rad/s",
+            float(undecided[k]),
+            int(here[k]),
+        )
+    # At s = 0 all is real; the value found there is off by less than a quarter turn.
+    direction = leading.direction if leading else np.sign(first.real)
+    still = np.sign(space.limits(steady[here], delayed[here])[0]) * 1j ** (space.degree % 4)
+    if space.step:
+        # There the function of a map is real.
+        still = np.sign(last.real)
+    with np.errstate(all="ignore"):
+        turn = turn + np.angle(first / direction) - np.angle(last / still)
+    # A map counts zeros in the strip |Im s| < pi / step, at whose right end it is constant.
+    number = 0.5 * ((0 if space.step else space.degree) - order) - turn / np.pi
+    with np.errstate(invalid="ignore"):
+        sure = np.isnan(undecided) & (np.abs(number - np.round(number)) < 1e-2)
+        found[here] = np.where(sure & (number > -0.5), np.round(number), BOUNDARY)
+    return found
+
+
+def count(function: Function, common: int = 0, *, most: int = _MOST_STEPS) -> int:
+    """Count the zeros of a function with positive real part.
+
+    Parameters
+    ----------
+    function : Function
+        With exact weights.
+    common : int, optional
+        Order of a zero at s = 0 that is not to count.
+    most : int, optional
+        Most steps.
+
+    Returns
+    -------
+    int
+        BOUNDARY with another zero on the axis, or where rounding does not decide; UNCONFINED.
+    """
+    leading = function.leading()
+    functions = compiled([function])
+    if leading is None or leading.order > common:
+        end = function.space.confined_from(functions.steady, functions.delayed)[0]
+        return BOUNDARY if np.isfinite(end) else UNCONFINED
+    begin = leading if leading.order else None
+    return int(counts(function.space, functions, leading=begin, most=most)[0])
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """Functions of which none has a zero if one test holds at each frequency.
+
+    Attributes
+    ----------
+    functions : sequence of Function
+        Of one space.
+    tests : sequence of tests
+        Each a sequence of members (kind, weights, slopes): a vertex (1) or a term of any phase
+        (2), the combination of the functions with weights + level slopes. A test holds where
+        zero is in no convex combination of the vertices, whatever the terms add.
+    arc : tuple of tuples, optional
+        One more test: f_0 + exp(j psi) f_1, or f_0 + (cos psi - 1) f_1 + j sin psi f_2 of three
+        functions, with psi from a + b omega to c + d omega; (a, b, c, d), and their slopes in
+        the level.
+    loose : int, optional
+        So many functions, the last ones, are terms of any phase in that test.
+    """
+
+    functions: Sequence[Function]
+    tests: Sequence[Sequence[tuple[int, Sequence[float], Sequence[float]]]]
+    arc: tuple[tuple[float, ...], tuple[float, ...]] | None = None
+    loose: int = 0
+
+    @property
+    def space(self) -> Space:
+        """The space of the functions."""
+        return self.functions[0].space
+
+    def question(self, goal: int, start: float, tolerance: float) -> Question:
+        """Return the family, and what is looked for, as compiled functions take them."""
+        shape = len(self.tests), max(map(len, self.tests))
+        kind = np.zeros(shape, np.int64)
+        weights = np.zeros((*shape, len(self.functions)), np.complex128)
+        slopes = np.zeros_like(weights)
+        for i, test in enumerate(self.tests):
+            for n, member in enumerate(test):
+                kind[i, n], weights[i, n], slopes[i, n] = member
+        arc = np.array(self.arc or np.zeros((0, 4)), np.float64)
+        return Question(kind, weights, slopes, arc, self.loose, goal, start, tolerance)
+
+    def _members(
+        self, test: Sequence[tuple[int, Sequence[float], Sequence[float]]], level: float
+    ) -> tuple[list[Function], list[Function]]:
+        """Return vertices and terms of a test."""
+        found: tuple[list[Function], list[Function]] = [], []
+        for kind, weights, slopes in test:
+            member = self.functions[0] * 0
+            for f, a, b in zip(self.functions, weights, slopes, strict=True):
+                member = member + f * (Fraction(a) + Fraction(b) * Fraction(level))
+            found[kind - 1].append(member)
+        return found
+
+    def begins(self, level: float) -> float:
+        """Frequency up to which a test holds by leading terms at s = 0 (Lemma 15), or zero."""
+        # Terms that are nearly as large as a vertex ask for a smaller share of all others.
+        return self._begins(level, 1e-8) or self._begins(level, 1e-14)
+
+    def _begins(self, level: float, share: float) -> float:
+        """Do what `begins` does, where all other terms are at most a share of the leading."""
+        best = 0.0
+        for test in self.tests:
+            vertices, terms = self._members(test, level)
+            leads = [f.leading(share) for f in vertices]
+            others = [f.leading(share) for f in terms if not f.is_zero]
+            known, terms_at_zero = ([lead for lead in some if lead] for some in (leads, others))
+            middle = sum(lead.direction for lead in known) / len(leads)
+            decided = len(known) == len(leads) and len(terms_at_zero) == len(others)
+            if not decided or abs(middle) < 0.5:
+                continue
+            turned = [(lead.direction * np.conj(middle)).real / abs(middle) for lead in known]
+            room, radius = min(turned) - 4.0 * share, min(lead.radius for lead in known)
+            if room <= 0.0:
+                continue
+            for a in known:
+                for b in terms_at_zero:
+                    ratio = (
+                        abs(rounded([b.coefficient / a.coefficient])[0]) * len(others) / room
+                    )
+                    radius, power = min(radius, b.radius), b.order - a.order
+                    if power < 0 or (power == 0 and ratio >= 1.0 - 4.0 * share):
+                        radius = 0.0
+                    elif power > 0 and ratio:
+                        radius = min(radius, (1.0 - 4.0 * share) * ratio ** (-1.0 / power))
+            best = max(best, radius)
+        return best
+
+    def ends(self, level: float) -> float:
+        """Frequency past which a test holds, because one term exceeds all others (Lemma 15)."""
+        found = [np.inf]
+        for test in self.tests:
+            vertices, terms = self._members(test, level)
+            steady, delayed = stacked(vertices)
+            whole, _ = self.space.limits(steady, delayed)
+            if (whole > 0.0).any() and (whole < 0.0).any():
+                continue
+            size = sum(
+                (abs(s - w.sum(1)) + abs(w).sum(1) for s, w in (f.weights for f in terms)),
+                np.zeros(steady.shape[1]),
+            )
+            tops = (self.space.limits(*f.weights) for f in terms)
+            top = float(sum(abs(still) + abs(turned).sum() for still, turned in tops))
+            ends = self.space.confined_from(steady, delayed, size, top_terms=top)
+            found.append(float(ends.max()))
+        two = len(self.functions) - self.loose == 2
+        if two and self.arc is not None and self.arc[0][3] == self.arc[1][3] == 0.0:
+            found.append(self._arc_ends(self.arc[0][2] + level * self.arc[1][2]))
+        return min(found)
+
+    def _arc_ends(self, angle: float) -> float:
+        """Do what `ends` does for an arc around zero: abs(1 + c exp(j psi)) is monotonic."""
+        if angle >= np.pi:
+            return np.inf
+        (n, m, *free), (wn, wm, *turned) = stacked(self.functions)
+        turns = np.exp(1j * np.array([0.0, angle]))[:, None]
+        steady = (n - wn.sum(1)) + turns * (m - wm.sum(1))
+        parts = np.abs(wn) + np.abs(wm)
+        terms = parts.sum(1)
+        for s, w in zip(free, turned, strict=True):
+            terms = terms + np.abs(s - w.sum(1)) + np.abs(w).sum(1)
+        # All that turns, as terms; and what the sum at other angles may have more.
+        more = np.abs(n - wn.sum(1)) + np.abs(m - wm.sum(1))
+        return float(
+            self.space.confined_from(
+                steady, np.zeros((2, *parts.shape)), terms, extra=more
+            ).max()
+        )
+
+
+def _searched(
+    functions: Functions, question: Question, pending: FloatArray, best: float, where: float
+) -> tuple[float, float, FloatArray]:
+    """Walk over intervals, the last first; return the best value, where, and what is undecided.
+
+    Raises
+    ------
+    UndecidedError
+        If it takes too many steps.
+    """
+    steps, undecided = 0, np.zeros((0, 2))
+    while len(pending) and len(undecided) < inclusion.FEW_UNDECIDED:
+        walk = partial(inclusion.walk, functions, question, pending, best, where)
+        [(pending, more, best, where, taken)] = in_threads(walk, [_A_WHILE])
+        undecided, steps = np.concatenate((undecided, more)), steps + taken
+        if steps > _MOST_SEARCHED:
+            omega = float(pending[-1, 0])
+            raise UndecidedError(
+                f"a search takes more than {_MOST_SEARCHED:.0e} steps, at {omega:.3g} rad/s",
+                omega,
+            )
+    return best, where, undecided
+
+
+def least(
+    family: Family,
+    goal: int,
+    best: float = np.inf,
+    where: float = np.nan,
+    *,
+    start: float = 0.0,
+    tolerance: float = 1e-6,
+    low: float = 0.0,
+    high: float = np.inf,
+) -> tuple[float, float]:
+    """Find the largest level up to which no function of a family has a zero.
+
+    Parameters
+    ----------
+    family : Family
+        Whose members at a smaller level are among those at a larger one.
+    goal : int
+        What is looked for, of `armlock.engine.inclusion`.
+    best, where : float, optional
+        A level that is known to have a zero, and at which frequency; inf, nan.
+    start : float, optional
+        A level without a zero.
+    tolerance : float, optional
+        No zero has a level below start + (best - start) (1 - tolerance).
+    low, high : float, optional
+        The frequencies in rad/s between which zeros count; all by default.
+
+    Returns
+    -------
+    tuple of two floats
+        The level in rad, s or without a unit, and the frequency in rad/s.
+
+    Raises
+    ------
+    UndecidedError
+        If double precision, or the steps allowed, do not decide it.
+    """
+    functions, question = compiled(family.functions), family.question(goal, start, tolerance)
+    corners, level = family.space.corners, min(best, 1e300)
+    floor = low or family.begins(level) or 1e-4 * corners[0]
+    end = min(family.ends(level), high)
+    ceiling = end if np.isfinite(end) else 1e4 * corners[-1]
+    likely = _likely(family.space, functions, question, floor, max(ceiling, 2.0 * floor))
+    _, _, best, where, _ = inclusion.walk(functions, question, likely, best, where, _A_LOOK)
+    if best <= start:
+        return best, where
+    level = start + (best - start) * (1.0 - tolerance)
+    known = np.isfinite(level)
+    begin = low or (family.begins(level) if known else floor)
+    end = min(family.ends(level), high) if known else end
+    if not begin > 0.0:
+        raise UndecidedError("the behaviour at s = 0 is not decided", 0.0)
+    if not np.isfinite(end):
+        raise UndecidedError("the behaviour at high frequency is not decided", np.inf)
+    if end <= begin:
+        return best, where
+    edges = np.geomspace(begin, end, int(200 * np.log10(end / begin)) + 2)
+    edges[0], edges[-1] = begin, end
+    cover = np.column_stack((edges[:-1], edges[1:]))
+    order = np.argsort(np.modf(np.arange(len(cover)) * 0.6180339887498949)[0])
+    best, where, left = _searched(functions, question, cover[order], best, where)
+    if len(left):
+        omega = float(left[0, 0])
+        raise UndecidedError(f"rounding does not decide at {omega:.6g} rad/s", omega)
+    return best, where
+
+
+def excludes(family: Family, begin: float = 0.0) -> bool:
+    """Tell whether no function of a family has a zero on the axis, but perhaps at s = 0.
+
+    Parameters
+    ----------
+    family : Family
+        At its level zero.
+    begin : float, optional
+        Frequency in rad/s up to which this is known; by default that of leading terms.
+
+    Returns
+    -------
+    bool
+        True is certified. False: there is a zero, or double precision does not decide.
+
+    Raises
+    ------
+    UndecidedError
+        If it takes too many steps.
+    """
+    begin, end = begin or family.begins(0.0), family.ends(0.0)
+    if not (begin > 0.0 and np.isfinite(end)):
+        return False
+    if end <= begin:
+        return True
+    # At a distance of zero nothing is nearer, so that nothing is searched.
+    question, axis = family.question(DISTANCE, 0.0, 0.0), np.array([[begin, end]])
+    *_, left = _searched(compiled(family.functions), question, axis, 0.0, np.nan)
+    return not len(left)
+
+
+def _likely(
+    space: Space, functions: Functions, question: Question, low: float, high: float
+) -> FloatArray:
+    """Intervals of a sample that look best: only what is looked at first depends on them."""
+    grids = [np.geomspace(low, high, 500)]
+    if space.longest:
+        # One turn of the longest delay at each frequency, and the first hundred turns.
+        point = np.arange(16) * (2.0 * np.pi / (16.0 * space.longest))
+        grids += [np.add.outer(grids[0], point).ravel(), point[1] * np.arange(1, 1600)]
+    for root in set(space.arrays.roots[space.arrays.present].tolist()):
+        if root.imag > 0.0:
+            off = max(abs(root.real), 1e-9 * root.imag) * np.geomspace(1e-2, 1e3, 24)
+            grids += [root.imag - off, root.imag + off]
+    omega = np.unique(np.concatenate(grids).clip(low, high))
+    crossing, value = inclusion.sample(functions, question, omega)
+    rank = np.minimum(value[1:], value[:-1])
+    if question.goal != DISTANCE and not question.loose:
+        changes = (crossing[1:] < 0.0) != (crossing[:-1] < 0.0)
+        highest = np.maximum(value[1:], value[:-1])
+        rank = np.where(changes & (rank > question.start), highest, np.inf)
+    # The best last: the last interval is walked first.
+    k = np.argsort(rank)[59::-1]
+    return np.column_stack((omega[k], omega[k + 1]))

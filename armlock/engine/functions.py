@@ -1,0 +1,381 @@
+"""Quasi-polynomials with any number of delays, as vectors over common polynomials and delays.
+
+A function of a space is
+
+    F(s) = sum_j p_j(s) [S_j + sum_k W_jk (exp(-s theta_k) - 1)]
+
+with exact weights S and W. Its behaviour at s = 0 is decided here, exactly, and so is the end
+of the imaginary axis: a frequency past which one term exceeds all others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+from math import factorial
+from typing import Any, NamedTuple
+
+import mpmath
+import numpy as np
+import numpy.typing as npt
+
+from armlock.checks import ComplexArray, FloatArray
+from armlock.engine import inclusion
+from armlock.engine.inclusion import EPSILON, Arrays
+from armlock.engine.polynomials import Polynomial
+
+Exact = npt.NDArray[np.object_]
+# Most coefficients of a series at s = 0 of which one has to differ from zero.
+_MOST_TERMS = 16
+# A moved polynomial may be missed by this share, see `Polynomial.missed`.
+_MOST_MISSED = 1e-12
+
+
+class Leading(NamedTuple):
+    """The leading term c s^k of a function at s = 0.
+
+    Attributes
+    ----------
+    order : int
+        The power k.
+    coefficient : Fraction
+        The coefficient c.
+    radius : float
+        Up to this abs(s), all other terms together are at most a share of it (Lemma 11).
+    """
+
+    order: int
+    coefficient: Fraction
+    radius: float
+
+    @property
+    def direction(self) -> complex:
+        """Direction of c s^k for s = j omega, omega > 0."""
+        turn: complex = (1.0, 1j, -1.0, -1j)[self.order % 4]
+        return turn if self.coefficient > 0 else -turn
+
+
+class Space:
+    """Polynomials and delays that functions are made of.
+
+    Parameters
+    ----------
+    polynomials : sequence of Polynomial
+        Not zero.
+    delays : iterable of Fraction
+        Delays in s; those that are not zero count, each of them once.
+    step : float, optional
+        Sampling step in s of which all delays are multiples, if the functions are those of a
+        map. They repeat along the axis, which then ends at pi / step.
+    """
+
+    def __init__(
+        self, polynomials: Sequence[Polynomial], delays: Iterable[Fraction], step: float = 0.0
+    ) -> None:
+        self.polynomials = tuple(polynomials)
+        self.step = step
+        self.delays = tuple(sorted({Fraction(theta) for theta in delays} - {Fraction(0)}))
+        self.degree = max(p.degree for p in self.polynomials)
+        self.longest = float(max(self.delays, default=Fraction(0)))
+        unit = 1.0 / self.longest if self.longest else 1.0
+        whole = next(p for p in self.polynomials if p.degree == self.degree)
+        scale = np.array([abs(root) or unit for root in whole.roots])
+        shape = len(self.polynomials), self.degree
+        roots, present = np.zeros(shape, np.complex128), np.zeros(shape, np.bool_)
+        computed = np.zeros(shape, np.bool_)
+        for j, p in enumerate(self.polynomials):
+            left = list(range(self.degree))
+            for i, root in sorted(enumerate(p.roots), key=lambda pair: -abs(pair[1])):
+                size = np.log(abs(root) or unit)
+                k = min(left, key=lambda k: abs(np.log(scale[k]) - size))
+                left.remove(k)
+                roots[j, k], present[j, k], computed[j, k] = root, True, i in p.computed
+        self.arrays = Arrays(
+            roots,
+            present,
+            computed,
+            scale,
+            np.array([float(p.lead) for p in self.polynomials]),
+            np.array([p.missed for p in self.polynomials]),
+            np.array([float(theta) for theta in self.delays]),
+            np.array([float(theta - Fraction(float(theta))) for theta in self.delays]),
+        )
+        sizes = np.abs(roots[present])
+        #: Sizes of roots and of one over the longest delay, ascending, in rad/s.
+        self.corners = np.unique(np.append(sizes[sizes > 0.0], unit))
+        self.sums = np.abs(roots).sum(axis=1)
+
+    def place(self, delay: Fraction) -> int:
+        """Index of a delay."""
+        return self.delays.index(delay)
+
+    def function(self, steady: Sequence[Any], delayed: Sequence[Sequence[Any]]) -> Function:
+        """Return the function with weights S, shape (J,), and W, shape (J, K)."""
+        shape = len(self.polynomials), len(self.delays)
+        s = np.array([Fraction(v) for v in steady], dtype=object)
+        w = np.array([Fraction(v) for row in delayed for v in row], dtype=object)
+        return Function(self, s, w.reshape(shape))
+
+    def limits(self, steady: Any, delayed: FloatArray) -> tuple[Any, FloatArray]:
+        """Of functions over s^degree at infinity: what nothing delays, and what delays do.
+
+        The weights have shapes (..., J) and (..., J, K), the results (...) and (..., K).
+        """
+        lead = np.where(
+            [p.degree == self.degree for p in self.polynomials], self.arrays.lead, 0.0
+        )
+        return (steady - delayed.sum(-1)) @ lead, np.einsum("...jk,j->...k", delayed, lead)
+
+    def confined_from(
+        self,
+        steady: FloatArray | ComplexArray,
+        delayed: FloatArray,
+        terms: float | FloatArray = 0.0,
+        *,
+        extra: float | FloatArray = 0.0,
+        top_terms: float | FloatArray | None = None,
+    ) -> FloatArray:
+        """Frequency past which, for Re s >= 0, what nothing delays exceeds all else (Lemma 12).
+
+        Parameters
+        ----------
+        steady, delayed : float arrays, shapes (n, J) and (n, J, K)
+            Weights of n functions.
+        terms : float array, shape (n, J) or one that broadcasts, optional
+            Sizes of further terms of any phase, as weights of the polynomials.
+        extra : float array, shape (n, J) or one that broadcasts, optional
+            Sizes of weights that leave the limit at infinity as it is.
+        top_terms : float or float array, shape (n,), optional
+            Size of the terms over s^degree at infinity; that of their weights by default.
+            Polynomials that cancel there make it less.
+
+        Returns
+        -------
+        float array, shape (n,)
+            In rad/s; inf where it does not at infinity. The end of the axis of a map.
+        """
+        if self.step:
+            return np.full(len(steady), np.pi / self.step)
+        full = np.array([p.degree == self.degree for p in self.polynomials])
+        gap = np.array([self.degree - p.degree for p in self.polynomials])
+        lead, size = np.where(full, self.arrays.lead, 0.0), np.abs(self.arrays.lead)
+        whole, parts = steady - delayed.sum(-1), np.abs(delayed).sum(-1)
+        terms = np.broadcast_to(np.abs(terms), whole.shape)
+        parts = parts + terms + np.abs(extra)
+        _, turned = self.limits(steady, delayed)
+        others = np.abs(turned).sum(-1)
+        others = others + (terms @ np.abs(lead) if top_terms is None else top_terms)
+        top = np.abs(whole @ lead)
+        found = np.full(len(steady), np.inf)
+        rounding = 64.0 * EPSILON * ((np.abs(whole) + parts) @ np.abs(lead))
+        left = np.flatnonzero(top - others > rounding)
+        omega = self.corners[-1]
+        for _ in range(300):
+            if not left.size:
+                break
+            grown = np.expm1(np.minimum(self.sums / omega, 50.0))
+            grown += self.arrays.missed * (1.0 + grown)
+            with np.errstate(under="ignore", over="ignore"):
+                share = size * float(omega) ** -gap.astype(float)
+            off = np.where(full, share * grown, share * (1.0 + grown))
+            spent = (np.abs(whole[left]) + parts[left]) @ off
+            done = top[left] - others[left] - rounding[left] > spent
+            found[left[done]] = omega
+            left = left[~done]
+            omega *= 2.0
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Function:
+    """A function of a space, by its weights S, shape (J,), and W, shape (J, K)."""
+
+    space: Space
+    steady: Exact
+    delayed: Exact
+    _kept: dict[float, Leading | None] = field(default_factory=dict, repr=False)
+
+    def __add__(self, other: Function) -> Function:
+        """Return the sum."""
+        return Function(self.space, self.steady + other.steady, self.delayed + other.delayed)
+
+    def __mul__(self, factor: float | Fraction) -> Function:
+        """Return a multiple."""
+        factor = Fraction(factor)
+        return Function(self.space, self.steady * factor, self.delayed * factor)
+
+    @cached_property
+    def weights(self) -> tuple[FloatArray, FloatArray]:
+        """S and W, rounded."""
+        return self.steady.astype(np.float64), self.delayed.astype(np.float64)
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether the function is zero everywhere."""
+        return not (self.steady.any() or self.delayed.any())
+
+    def series(self, number: int) -> list[Fraction]:
+        """First coefficients of the Taylor series at s = 0, exactly; at most 16."""
+        out = [Fraction(0)] * number
+        for p, s, row in zip(self.space.polynomials, self.steady, self.delayed, strict=True):
+            acting = [(w, t) for w, t in zip(row, self.space.delays, strict=True) if w]
+            e = [s] + [
+                sum((w * (-t) ** i for w, t in acting), Fraction(0)) / factorial(i)
+                for i in range(1, number)
+            ]
+            for i, a in enumerate(p.exact[:number]):
+                if a:
+                    for k in range(number - i):
+                        if e[k]:
+                            out[i + k] += a * e[k]
+        return out
+
+    def leading(self, share: float = 0.25) -> Leading | None:
+        """Leading term at s = 0, and up to where all others are at most a share of it.
+
+        None of a function whose first 16 coefficients are zero.
+        """
+        if share not in self._kept:
+            self._kept[share] = self._leading(share)
+        return self._kept[share]
+
+    def _leading(self, share: float) -> Leading | None:
+        number = 2
+        while not any(c := self.series(number)):
+            if number == _MOST_TERMS:
+                return None
+            number = min(2 * number, _MOST_TERMS)
+        k = next(i for i, value in enumerate(c) if value)
+        return Leading(k, c[k], self.radius(k, abs(c[k]), share))
+
+    def radius(
+        self, order: int, coefficient: Fraction, share: float, other: Function | None = None
+    ) -> float:
+        """Up to where all terms past a power are at most a share of a term of that power.
+
+        By Cauchy's bound of all coefficients, on circles of several radii (Lemma 11); of the
+        product with another function, if there is one.
+        """
+        rho = np.geomspace(1e-4, 10.0, 24) * self.space.corners[0]
+        most = self._largest(rho) if other is None else self._largest(rho) + other._largest(rho)
+        ratio = np.log(0.9 * share) + _log(coefficient) + order * np.log(rho) - most
+        shares = np.exp(np.minimum(ratio, -np.log(10.0)))
+        return float((shares * rho).max()) * (1.0 - 1e-9)
+
+    def _largest(self, rho: FloatArray) -> FloatArray:
+        """Logarithm of a bound of the function on circles around s = 0."""
+        arrays, (s, w) = self.space.arrays, self.weights
+        with np.errstate(divide="ignore", over="ignore"):
+            distances = np.log(np.abs(arrays.roots)[..., None] + rho)
+            sizes = np.where(arrays.present[..., None], distances, 0.0).sum(1)
+            sizes = sizes + np.log(np.abs(arrays.lead) * (1.0 + arrays.missed))[:, None]
+            turned = np.expm1(np.multiply.outer(arrays.delays, rho))
+            sizes = sizes + np.log(np.abs(s)[:, None] + np.abs(w) @ turned)
+        most: FloatArray = np.logaddexp.reduce(sizes, axis=0)
+        return most
+
+    def value_and_slope(self, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        """F and its derivative at any s, shape (n,), both times one number at each s."""
+        arrays, (steady, delayed) = self.space.arrays, self.weights
+        value, slope = np.zeros_like(s), np.zeros_like(s)
+        by = 1.0 / (np.abs(s)[:, None] + arrays.scale)
+        delays = arrays.delays
+        turn = np.expm1(-np.multiply.outer(s, delays))
+        for j, lead in enumerate(arrays.lead):
+            p, dp = np.full(s.shape, complex(lead)), np.zeros_like(s)
+            for k, present in enumerate(arrays.present[j]):
+                if present:
+                    w = (s - arrays.roots[j, k]) * by[:, k]
+                    p, dp = p * w, dp * w + p * by[:, k]
+                else:
+                    p, dp = p * by[:, k], dp * by[:, k]
+            g = steady[j] + turn @ delayed[j]
+            value += p * g
+            slope += dp * g - p * ((1.0 + turn) @ (delays * delayed[j]))
+        return value, slope
+
+    def exact_value_and_slope(self, s: Any) -> tuple[Any, Any]:
+        """F and its derivative at an mpmath number, in mpmath's precision."""
+        value, slope = mpmath.mpf(0), mpmath.mpf(0)
+        for p, steady, row in zip(
+            self.space.polynomials, self.steady, self.delayed, strict=True
+        ):
+            q, dq = p.evaluated(s)
+            g, dg = _exactly(steady), mpmath.mpf(0)
+            for weight, theta in zip(row, self.space.delays, strict=True):
+                if weight:
+                    w, t = _exactly(weight), _exactly(theta)
+                    g, dg = g + w * mpmath.expm1(-s * t), dg - w * t * mpmath.exp(-s * t)
+            value, slope = value + q * g, slope + dq * g + q * dg
+        return value, slope
+
+    def shifted(self, sigma: float) -> tuple[Space, inclusion.Functions]:
+        """Return the function s -> F(s + sigma): its space, and its weights.
+
+        What exponentials and weights round by is part of the error of S (Lemma 17).
+        """
+        polynomials = []
+        for p in self.space.polynomials:
+            roots = np.array(p.roots) - sigma
+            missed = p.missed
+            if missed:
+                # What computed roots miss was measured by their distance from s = 0.
+                k = list(p.computed)
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    sizes = (np.abs(np.array(p.roots)[k]) + abs(sigma)) / np.abs(roots[k])
+                sizes[np.isnan(sizes)] = 1.0
+                missed *= float(np.maximum(sizes, 1.0).prod())
+            moved = Polynomial(p.lead, tuple(roots.tolist()), p.computed, (), missed)
+            # Next to a root that was computed, the roots are computed again.
+            polynomials.append(p.shifted(sigma) if missed > _MOST_MISSED else moved)
+        space = Space(polynomials, self.space.delays, self.space.step)
+        steady, delayed = self.weights
+        change = np.expm1(-sigma * space.arrays.delays)
+        turned = delayed * (1.0 + change)
+        grown = np.abs(change) + (1.0 + change) * (1.0 + abs(sigma) * space.arrays.delays)
+        sizes = np.abs(steady) + np.abs(delayed) @ grown
+        parts = steady + delayed @ change, turned, (8.0 + change.size) * EPSILON * sizes
+        return space, inclusion.Functions(space.arrays, *(part[None] for part in parts))
+
+    def at(self, omega: npt.ArrayLike) -> ComplexArray:
+        """Evaluate at s = j omega, times one positive number at each frequency."""
+        value: ComplexArray = at([self], omega)[0]
+        return value
+
+
+def common_zeros(n: Function, m: Function) -> int:
+    """Order of the zero at s = 0 that two functions have in common."""
+    return min((lead.order for f in (n, m) if (lead := f.leading())), default=0)
+
+
+def _exactly(value: Fraction) -> Any:
+    """Return a fraction in mpmath's precision."""
+    return mpmath.mpf(value.numerator) / value.denominator
+
+
+def _log(value: Fraction) -> float:
+    """Natural logarithm of a positive fraction, of which a float may overflow."""
+    return float(mpmath.log(value.numerator) - mpmath.log(value.denominator))
+
+
+def stacked(functions: Sequence[Function]) -> tuple[FloatArray, FloatArray]:
+    """Return rounded weights of functions, shapes (functions, J) and (functions, J, K)."""
+    s, w = zip(*(f.weights for f in functions), strict=True)
+    return np.array(s), np.array(w)
+
+
+def compiled(functions: Sequence[Function]) -> inclusion.Functions:
+    """Return functions of one space, with rounded weights, as compiled functions take them."""
+    steady, delayed = stacked(functions)
+    return inclusion.Functions(
+        functions[0].space.arrays, steady, delayed, np.zeros_like(steady)
+    )
+
+
+def at(functions: Sequence[Function], omega: npt.ArrayLike) -> ComplexArray:
+    """Evaluate functions at frequencies, all times one positive number at each frequency."""
+    flat = np.ravel(np.asarray(omega, np.float64))
+    found: ComplexArray = inclusion.values(compiled(functions), flat)
+    return found.reshape(len(functions), *np.shape(omega))

@@ -1,0 +1,329 @@
+"""Margins of a loop L = N / M, of any two functions of one space.
+
+Each margin is the level up to which no member of a family of functions has a root on the
+imaginary axis (`armlock.engine.decide`). The limit at high frequency is known in closed form.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from armlock.engine import decide
+from armlock.engine.decide import Family, least
+from armlock.engine.functions import Function, common_zeros, stacked
+from armlock.engine.inclusion import DELAY, DISTANCE, EPSILON, PHASE, REAL
+from armlock.engine.polynomials import rounded
+
+#: Gain factors up to this, and down to one over it, are looked at.
+LARGEST_GAIN = 1e4
+# So close to the limit of the neutral root chain, as a share, the limit is taken for roots.
+_NEXT_TO_THE_CHAIN = 1e-5
+# What is left of the undelayed term at high frequency is decided if it is this share of it.
+_DECIDED = 256.0 * EPSILON
+# Largest delay margin in s: beyond it there is none.
+_LARGEST_DELAY = 1e300
+
+# Relative accuracy where phases are free.
+_FREE_TOLERANCE = 1e-5
+
+_VERTEX, _TERM = 1, 2
+
+
+class Free(NamedTuple):
+    """A loop with terms of any phase above a frequency: L = (centre + arms) / denominator."""
+
+    centre: Function
+    denominator: Function
+    arms: tuple[Function, ...]
+    above: float
+
+
+def _unit(k: int, number: int) -> tuple[float, ...]:
+    """Return the weights of one of so many functions."""
+    return tuple(float(i == k) for i in range(number))
+
+
+def _unequal(number: int) -> list[list[tuple[int, tuple[float, ...], tuple[float, ...]]]]:
+    """Return tests: abs(f_0) exceeds abs(f_1) and all other functions, or abs(f_1) does.
+
+    Zero is then not in f_0 + exp(j psi) f_1, whatever the phases of the other functions are.
+    """
+    zero = (0.0,) * number
+    return [
+        [(_TERM if k != most else _VERTEX, _unit(k, number), zero) for k in range(number)]
+        for most in (0, 1)
+    ]
+
+
+@dataclass(frozen=True)
+class Margins:
+    r"""Distances of a stable loop from instability.
+
+    Gain and phase are taken where L is real and negative, and where its magnitude is one:
+
+    .. math::
+
+        \text{gain} &= -1 / L \quad \text{where } \mathrm{Im}\, L = 0 > \mathrm{Re}\, L , \\
+        \text{phase} &= \min_{|L| = 1} |\arg(-L)| , \quad -\pi < \arg \le \pi , \\
+        \text{delay} &= \min_{|L| = 1} \frac{\arg(-L)}{\omega} ,
+        \quad 0 \le \arg < 2\pi , \\
+        \text{modulus} &= \inf_\omega |1 + L| ,
+
+    with L at s = j omega.
+
+    Attributes
+    ----------
+    gain_lower, gain_upper : float
+        The loop stays stable for every gain factor between the two; 0 and inf where nothing
+        between factors of 1e-4 and 1e4 bounds it; nan where the arms' phases are free.
+    phase : float
+        Smallest turn in rad, lag or lead, at a gain crossover that makes the loop marginal;
+        inf without a crossover.
+    delay : float
+        Smallest additional loop delay in s that makes the loop unstable; inf if none does.
+        0 where the loop does not roll off: an arbitrarily small delay then destabilises it
+        at high frequency.
+    modulus : float
+        Smallest |1 + L|.
+    gain_omega, phase_omega, modulus_omega : float
+        Where the upper gain margin, the phase margin and the modulus margin are taken, in
+        rad/s; inf where it is the limit at high frequency, nan where there is none.
+
+    Examples
+    --------
+    >>> from armlock import margins, paper_loop
+    >>> found = margins(paper_loop())
+    >>> print(f"stable for gains from {found.gain_lower:.3f} to {found.gain_upper:.2f}")
+    stable for gains from 0.195 to 6.61
+
+    As a Series of pandas: ``pd.Series(vars(found))``.
+    """
+
+    gain_lower: float
+    gain_upper: float
+    phase: float
+    delay: float
+    modulus: float
+    gain_omega: float
+    phase_omega: float
+    modulus_omega: float
+
+
+def _disc_at_infinity(n: Function, m: Function) -> tuple[float, float]:
+    """Centre and radius of the disc that L = N / M fills at infinite frequency.
+
+    M is not delayed at the highest power.
+    """
+    whole, turned = n.space.limits(*stacked([n, m]))
+    return float(whole[0] / whole[1]), float(np.abs(turned[0]).sum() / abs(whole[1]))
+
+
+def at_zero(f: Function, g: Function) -> float:
+    """Return the t at which f + t g loses its leading term at s = 0; nan where none does.
+
+    It may be too large for a float: then it is inf.
+    """
+    first, other = f.leading(), g.leading()
+    if first is None or other is None or first.order != other.order:
+        return math.nan
+    return float(rounded([-first.coefficient / other.coefficient])[0])
+
+
+def chain_limit(
+    f: Function, g: Function, start: float, rounding: float = 16.0 * EPSILON
+) -> float:
+    """First t >= start at which the neutral root chain of f + t g is not confined (Lemma 14).
+
+    What is left of the undelayed term is linear in t between the t at which a term vanishes.
+    At least a share `rounding` of that term has to be left. A map has no such chain.
+    """
+    if f.space.step:
+        return math.inf
+    whole, turned = f.space.limits(*stacked([f, g]))
+    a, b = (np.append(whole[k], turned[k]) for k in range(2))
+    a, b = (np.where(np.abs(v) <= 16.0 * EPSILON * np.abs(v).max(), 0.0, v) for v in (a, b))
+    with np.errstate(all="ignore"):
+        breaks = (-a / b)[b != 0.0]
+    breaks = [start, *np.unique(breaks[breaks > start]).tolist()]
+
+    def left(t: float) -> float:
+        v = np.abs(a + b * t)
+        return float(v[0] - v[1:].sum() - rounding * v[0])
+
+    for low, high in zip(breaks, [*breaks[1:], math.inf], strict=True):
+        at_low = left(low)
+        if at_low <= 0.0:
+            return float(low)
+        inside = low + min(0.5 * (high - low), 1.0 + abs(low))
+        slope = (left(inside) - at_low) / (inside - low)
+        t = low - at_low / slope if slope < 0.0 else math.inf
+        if t <= high and math.isfinite(t):
+            return float(t)
+    return math.inf
+
+
+def first_zero(f: Function, g: Function, most: float, start: float) -> tuple[float, float]:
+    """Find the smallest t > start up to `most` at which f + t g has a zero on the axis.
+
+    Returns t and the frequency in rad/s: 0 for a zero at s = 0, inf where the neutral root
+    chain is not confined, nan where nothing is found up to `most`.
+    """
+    best, where = most, math.nan
+    chain = chain_limit(f, g, start)
+    if chain <= start:
+        return start, math.inf
+    if chain < most:
+        best, where = start + (chain - start) * (1.0 - _NEXT_TO_THE_CHAIN), math.inf
+        best = min(best, chain_limit(f, g, start, _DECIDED))
+    zero = at_zero(f, g)
+    if start < zero < best:
+        best, where = zero, 0.0
+    if not g.is_zero:
+        hull = [(_VERTEX, (1.0, start), (0.0, 0.0)), (_VERTEX, (1.0, 0.0), (0.0, 1.0))]
+        best, where = least(Family([f, g], [hull]), REAL, best, where, start=start)
+    return (chain, where) if where == math.inf else (best, where)
+
+
+def modulus_of(n: Function, m: Function, free: Free | None = None) -> tuple[float, float]:
+    """Smallest |1 + L|, and where."""
+    d, (centre, radius) = n + m, _disc_at_infinity(n, m)
+    best, where = max(abs(1.0 + centre) - radius, 0.0), math.inf
+    # A smaller one is excluded to a part in a million, or to what is decided at high frequency.
+    tolerance = min(max(1e-6, 2.0 * _DECIDED / best), 1.0) if best else 1e-6
+    zero = abs(at_zero(d, m))
+    if zero < best:
+        best, where = zero, 0.0
+
+    def family(f: Function, g: Function, *arms: Function) -> Family:
+        number = 2 + len(arms)
+        zero = (0.0,) * number
+        test = [(_VERTEX, _unit(0, number), zero), (_TERM, zero, _unit(1, number))]
+        test += [(_TERM, _unit(k, number), zero) for k in range(2, number)]
+        return Family([f, g, *arms], [test], loose=len(arms))
+
+    if free is None:
+        return _over_axis(family(d, m), None, None, DISTANCE, best, where, tolerance)
+    other = family(free.centre + free.denominator, free.denominator, *free.arms)
+    return _over_axis(family(d, m), other, free, DISTANCE, best, where, tolerance)
+
+
+def _over_axis(
+    exact: Family,
+    other: Family | None,
+    free: Free | None,
+    goal: int,
+    best: float,
+    where: float,
+    tolerance: float = 1e-6,
+) -> tuple[float, float]:
+    """Find the least level of a family and, above a frequency, of another one."""
+    if not best > 0.0:
+        return best, where
+    high = free.above if free else math.inf
+    best, where = least(exact, goal, best, where, high=high, tolerance=tolerance)
+    if not (free and other and best > 0.0):
+        return best, where
+    tolerance = max(tolerance, _FREE_TOLERANCE)
+    return least(other, goal, best, where, low=free.above, tolerance=tolerance)
+
+
+def _crossover(
+    n: Function,
+    m: Function,
+    free: Free | None,
+    goal: int,
+    slope: tuple[float, float, float, float],
+    best: float,
+    where: float,
+) -> tuple[float, float]:
+    """Find the least turn or delay that puts L on -1; `slope` says how the arc grows."""
+    arc, other = ((0.0, 0.0, 0.0, 0.0), slope), None
+    if free is not None:
+        functions = [free.centre, free.denominator, *free.arms]
+        other = Family(functions, _unequal(len(functions)), arc, len(free.arms))
+    return _over_axis(Family([n, m], _unequal(2), arc), other, free, goal, best, where)
+
+
+def _phase(n: Function, m: Function, free: Free | None) -> tuple[float, float]:
+    """Smallest |arg(-L)| where |L| = 1, and where."""
+    centre, radius = _disc_at_infinity(n, m)
+    best, where = math.pi, math.nan
+    if abs(abs(centre) - radius) <= 1.0 <= abs(centre) + radius:
+        cosine = (radius**2 - 1.0 - centre**2) / (2.0 * centre) if centre else 1.0
+        best, where = math.acos(min(max(cosine, -1.0), 1.0)), math.inf
+    return _crossover(n, m, free, PHASE, (-1.0, 0.0, 1.0, 0.0), best, where)
+
+
+def _delay(n: Function, m: Function, free: Free | None) -> tuple[float, float]:
+    """Smallest arg(-L) / omega where |L| = 1, and where."""
+    centre, radius = _disc_at_infinity(n, m)
+    if abs(centre) + radius >= 1.0:
+        return 0.0, math.inf
+    arc = 0.0, 0.0, 0.0, 1.0
+    return _crossover(n, m, free, DELAY, arc, _LARGEST_DELAY, math.nan)
+
+
+def _gain_up(m: Function, n: Function) -> tuple[float, float]:
+    """First k > 1 at which M + k N has a zero on the axis, and where; inf, nan without one."""
+    found, where = first_zero(m, n, LARGEST_GAIN, 1.0)
+    return (math.inf, math.nan) if math.isnan(where) else (found, where)
+
+
+def gain_range(n: Function, m: Function) -> tuple[float, float, float]:
+    """Gain factors around one between which N / M stays stable, and where the upper one is."""
+    upper, where = _gain_up(m, n)
+    # With t = 1 / k the same.
+    lower, _ = _gain_up(n, m)
+    return 1.0 / lower, upper, where
+
+
+def margins_of(n: Function, m: Function, free: Free | None = None) -> Margins:
+    """Compute all margins of the loop L = N / M.
+
+    Parameters
+    ----------
+    n, m : Function
+        Numerator and denominator, of one space.
+    free : Free, optional
+        The same loop with free phases, for all frequencies above one.
+
+    Raises
+    ------
+    ValueError
+        If the closed loop is not stable.
+    UndecidedError
+        If a margin is not decided.
+    """
+    require_stable(n, m)
+    lower, upper, gain_omega = (math.nan,) * 3 if free else gain_range(n, m)
+    phase, phase_omega = _phase(n, m, free)
+    delay, _ = _delay(n, m, free)
+    modulus, modulus_omega = modulus_of(n, m, free)
+    return Margins(
+        gain_lower=lower,
+        gain_upper=upper,
+        phase=phase if phase_omega == phase_omega else math.inf,
+        delay=delay if delay < _LARGEST_DELAY else math.inf,
+        modulus=modulus,
+        gain_omega=gain_omega,
+        phase_omega=phase_omega,
+        modulus_omega=modulus_omega,
+    )
+
+
+def require_stable(n: Function, m: Function) -> None:
+    """Raise unless the loop N / M is stable."""
+    count = decide.count(n + m, common_zeros(n, m))
+    if count != 0:
+        reasons = {
+            decide.BOUNDARY: "a root on the axis",
+            decide.UNCONFINED: "no confined chain",
+        }
+        raise ValueError(
+            f"the loop must be stable to have margins, but it has "
+            f"{reasons.get(count, f'{count} unstable roots')}"
+        )

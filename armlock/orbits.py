@@ -1,0 +1,477 @@
+"""Round trips between three spacecraft on Kepler's orbits, from a table, or from OEM files.
+
+`kepler`, `esa`, `read_table`, `from_table` and `read_oem` return a `Constellation`. Its methods
+give the round-trip delays, their rates and the light times of single links. A link received at
+time t has the light time l that solves
+
+    l = d / c + (4 G M / c^3) artanh(d / (r_receiver + r_emitter)) ,
+    d = |x_receiver(t) - x_emitter(t - l)| .
+
+The second term is the Sun's Shapiro delay. The round trip that is back at time t takes
+tau(t) = l_back(t) + l_out(t - l_back(t)).
+"""
+
+from __future__ import annotations
+
+import gzip
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import make_interp_spline
+
+from armlock.checks import FloatArray, axis, finite_series, one_of, positive_number, real_array
+
+#: Speed of light in m/s.
+SPEED_OF_LIGHT = 299_792_458.0
+#: Astronomical unit in m.
+ASTRONOMICAL_UNIT = 149_597_870_700.0
+#: G M of the Sun in m^3/s^2, compatible with TCB.
+SUN = 1.32712440017987e20
+
+_SHAPIRO = 4.0 * SUN / SPEED_OF_LIGHT**3
+# Each iteration of a light time gains four digits, and of Kepler's equation doubles them.
+_ITERATIONS = 6
+# Positions, or with 1 velocities, shape (n, 3), at times of shape (n,).
+_Path = Callable[[FloatArray, int], FloatArray]
+# Kepler's orbits are good to 5e-11 s within so many s of their epoch.
+_KEPLER_SPAN = 3e9
+# Arm 1 leads from the master to the first of these spacecraft, arm 2 to the second.
+_FAR = {1: (2, 3), 2: (3, 1), 3: (1, 2)}
+
+# Degree of the splines through a table, and the fewest states: half of them make a spline.
+_DEGREE = 7
+_FEWEST = 2 * (_DEGREE + 1)
+# The largest step between states over the typical one: the estimate of the error comes from
+# splines through every second state, whose steps are twice as long.
+_LARGEST_GAP = 2.0
+# The largest error of interpolation, in s of light.
+_LARGEST_ERROR = 1e-5
+# How far the mean acceleration of the spacecraft may be from the Sun's gravity, relative to it:
+# the Moon's pull on spacecraft around the Earth is 0.6 %.
+_GRAVITY = 0.05
+# Positions in two segments at one epoch differ by less, in m.
+_SAME_STATE = 1.0
+# What an OEM may say of itself; the axes of these frames do not rotate.
+_OEM = {
+    "CENTER_NAME": ("SUN",),
+    "REF_FRAME": ("EME2000", "ICRF", "GCRF"),
+    "TIME_SYSTEM": ("TCB", "TDB"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Constellation:
+    """Three spacecraft, 1 to 3, in orbit around the Sun.
+
+    Attributes
+    ----------
+    epoch : str
+        The date and time scale of t = 0.
+    span : tuple of two floats
+        The first and last t in s at which all round trips exist.
+    error : float
+        How far interpolation may put a light time off, in s: the largest difference between
+        the states and splines through every second state. The splines through all states are
+        better, by a factor of ten for ESA's orbits. It is 0 for Kepler's orbits.
+    """
+
+    epoch: str
+    span: tuple[float, float]
+    error: float
+    _paths: tuple[_Path, ...]
+
+    def round_trips(self, t: npt.ArrayLike, master: int = 1) -> tuple[FloatArray, FloatArray]:
+        """Return the delays of the two round trips that start and end at the master.
+
+        Parameters
+        ----------
+        t : array_like of float
+            The time at which the light is back, in s since `epoch`, of any shape.
+        master : {1, 2, 3}, optional
+            The spacecraft with the locked laser.
+
+        Returns
+        -------
+        tau1, tau2 : float arrays, shaped like `t`
+            In s. Arm 1 leads from master 1 to spacecraft 2, from 2 to 3, from 3 to 1. Arm 2
+            leads to the remaining spacecraft.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If t is not finite and real or lies outside `span`, or there is no such master.
+
+        Examples
+        --------
+        >>> from armlock.orbits import kepler
+        >>> tau1, tau2 = kepler().round_trips(100 * 86400.0)
+        >>> print(f"{tau1:.9f} {tau2:.9f}")
+        16.675856900 16.611372223
+        """
+        (tau1, _), (tau2, _) = self._arms(t, master)
+        return tau1, tau2
+
+    def rates(self, t: npt.ArrayLike, master: int = 1) -> tuple[FloatArray, FloatArray]:
+        """Return dtau1/dt and dtau2/dt in s/s; arguments and errors as for `round_trips`.
+
+        An arm returns the frequency of the laser multiplied by 1 - rate, and its phase delayed.
+        """
+        (_, rate1), (_, rate2) = self._arms(t, master)
+        return rate1, rate2
+
+    def light_time(self, t: npt.ArrayLike, receiver: int, emitter: int) -> FloatArray:
+        """Return the light time in s of what a spacecraft receives from another at t.
+
+        Arguments and errors as for `round_trips`; `receiver` and `emitter` are two of 1, 2, 3.
+        """
+        if receiver not in _FAR or emitter not in _FAR[receiver]:
+            raise ValueError(
+                f"receiver and emitter must be two of 1, 2, 3, got {receiver!r} and {emitter!r}"
+            )
+        t = self._within(t)
+        here, there = self._paths[receiver - 1], self._paths[emitter - 1]
+        return _link(here, there, t.ravel())[0].reshape(t.shape)
+
+    def _arms(self, t: npt.ArrayLike, master: int) -> list[tuple[FloatArray, FloatArray]]:
+        """Return the delay and the rate of both arms."""
+        t = self._within(t)
+        if master not in (1, 2, 3) or isinstance(master, bool):
+            raise ValueError(f"master must be 1, 2 or 3, got {master!r}")
+        found, here = [], self._paths[master - 1]
+        for far in _FAR[master]:
+            there = self._paths[far - 1]
+            back, back_rate = _link(here, there, t.ravel())
+            out, out_rate = _link(there, here, t.ravel() - back)
+            rate = back_rate + out_rate - back_rate * out_rate
+            found.append(((back + out).reshape(t.shape), rate.reshape(t.shape)))
+        return found
+
+    def _within(self, t: npt.ArrayLike) -> FloatArray:
+        """Return times as an array, or raise if one lies outside the span."""
+        times, (first, last) = real_array("t", t), self.span
+        outside = times[(times < first) | (times > last)]
+        if outside.size:
+            raise ValueError(
+                f"t must lie within the span {first} to {last} s, got {outside.flat[0]}"
+            )
+        return times
+
+
+def _link(receiver: _Path, emitter: _Path, t: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the light time received at times of shape (n,), and its derivative."""
+    place, velocity = receiver(t, 0), receiver(t, 1)
+    r = np.linalg.norm(place, axis=1)
+    light = np.zeros(t.shape)
+    for _ in range(_ITERATIONS):
+        source = emitter(t - light, 0)
+        d = np.linalg.norm(place - source, axis=1)
+        both = r + np.linalg.norm(source, axis=1)
+        light = d / SPEED_OF_LIGHT + _SHAPIRO * np.arctanh(d / both)
+    sent = emitter(t - light, 1)
+    receding, leaving = (np.vecdot(place - source, v) / d for v in (velocity - sent, sent))
+    # The source moves for 1 - d'/c of each second at the receiver.
+    d_rate = receding / (1.0 - leaving / SPEED_OF_LIGHT)
+    both_rate = np.vecdot(place, velocity) / r + np.vecdot(source, sent) / (both - r)
+    bend = (d_rate * both - d * both_rate) / (both**2 - d**2)
+    return light, d_rate / SPEED_OF_LIGHT + _SHAPIRO * bend
+
+
+def kepler(arm_length: float = 2.5e9) -> Constellation:
+    """Return two-body orbits with the elements of Dhurandhar et al. (2005), delta = 5/8.
+
+    Parameters
+    ----------
+    arm_length : float, optional
+        Mean distance of the spacecraft in m, at most a tenth of the astronomical unit.
+
+    Returns
+    -------
+    Constellation
+        With t = 0 at the epoch of the elements, and a span of a century around it.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the arm length is not positive or too long for these elements.
+
+    References
+    ----------
+    S. V. Dhurandhar, K. Rajesh Nayak, S. Koshti and J.-Y. Vinet, Class. Quantum Grav. 22,
+    481 (2005); the elements are those that lisaorbits documents.
+    """
+    length = positive_number("arm_length", arm_length)
+    if length > 0.1 * ASTRONOMICAL_UNIT:
+        raise ValueError(
+            f"arm_length must be at most {0.1 * ASTRONOMICAL_UNIT:.4g} m, a tenth of the "
+            f"astronomical unit, got {length}"
+        )
+    alpha = length / (2.0 * ASTRONOMICAL_UNIT)
+    paths = tuple(partial(_ellipse, alpha, k * 2.0 * np.pi / 3.0) for k in range(3))
+    span = (-_KEPLER_SPAN, _KEPLER_SPAN)
+    return Constellation("that of the elements, TCB", span, 0.0, paths)
+
+
+def _ellipse(alpha: float, theta: float, t: FloatArray, derivative: int) -> FloatArray:
+    """Return the position or the velocity of the spacecraft with phase theta."""
+    nu = np.pi / 3.0 + 0.625 * alpha
+    e = np.sqrt(1 + 4 * alpha * np.cos(nu) / np.sqrt(3) + 4 * alpha**2 / 3) - 1
+    tilt = np.arctan2(alpha * np.sin(nu), np.sqrt(3) / 2 + alpha * np.cos(nu))
+    a, n = ASTRONOMICAL_UNIT, np.sqrt(SUN / ASTRONOMICAL_UNIT**3)
+    # The remainder keeps the digits of the phase over a century.
+    mean = n * np.remainder(t, 2.0 * np.pi / n) - theta
+    u = mean + e * np.sin(mean)
+    for _ in range(_ITERATIONS):
+        u = u - (u - e * np.sin(u) - mean) / (1.0 - e * np.cos(u))
+    width = a * np.sqrt(1.0 - e**2)
+    x, y = a * (np.cos(u) - e), width * np.sin(u)
+    if derivative:
+        du = n / (1.0 - e * np.cos(u))
+        x, y = -a * np.sin(u) * du, width * np.cos(u) * du
+    cosine, sine = np.cos(theta), np.sin(theta)
+    flat, up = x * np.cos(tilt), -x * np.sin(tilt)
+    return np.column_stack((cosine * flat - sine * y, sine * flat + cosine * y, up))
+
+
+def from_table(
+    time: npt.ArrayLike, positions: npt.ArrayLike, *, epoch: str = ""
+) -> Constellation:
+    """Return a constellation from a table of positions, by splines of degree 7.
+
+    Parameters
+    ----------
+    time : array_like of float, shape (n,)
+        Ascending times in s, at least 16, with no gap above twice the typical step.
+    positions : array_like of float, shape (n, 3, 3)
+        Positions in m from the Sun, by time, spacecraft and coordinate, in axes that do not
+        rotate.
+    epoch : str, optional
+        The date and time scale of the first time.
+
+    Returns
+    -------
+    Constellation
+        With t = 0 at the first time.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the shape, the order or the number of the states is wrong; if there is a gap; if
+        the mean of the three positions does not follow the Sun's gravity within 5 %, as in
+        other units or rotating axes; or if the states are too far apart to be interpolated to
+        1e-5 s of light.
+    """
+    time, places = axis("time", time), finite_series("positions", positions, 3)
+    if places.shape != (time.size, 3, 3):
+        raise ValueError(
+            f"positions must have shape ({time.size}, 3, 3): by time, spacecraft and "
+            f"coordinate, got {places.shape}"
+        )
+    if time.size < _FEWEST:
+        raise ValueError(f"a table must hold at least {_FEWEST} states, got {time.size}")
+    t = time - time[0]
+    steps = np.diff(t)
+    at = int(np.argmin(steps))
+    if steps[at] <= 0.0:
+        raise ValueError(f"times must ascend, got {time[at + 1]} s after {time[at]} s")
+    at, typical = int(np.argmax(steps)), float(np.median(steps))
+    if steps[at] > _LARGEST_GAP * typical:
+        raise ValueError(
+            f"steps between states must be at most {_LARGEST_GAP:g} times the typical one of "
+            f"{typical:.10g} s, got a gap of {steps[at]:.10g} s after t = {t[at]:.10g} s"
+        )
+    _check_gravity(t, places)
+    arms = np.linalg.norm(places - np.roll(places, 1, axis=1), axis=2) / SPEED_OF_LIGHT
+    if arms.min() == 0.0:
+        raise ValueError("positions must be of three spacecraft, got two in one place")
+    error = 0.0
+    for first in (0, 1):
+        every_second = make_interp_spline(t[first::2], places[first::2], k=_DEGREE)
+        inside = slice(first, t[first::2].size * 2 - 1 + first)
+        again = every_second(t[inside])
+        off = np.linalg.norm(again - np.roll(again, 1, axis=1), axis=2) / SPEED_OF_LIGHT
+        error = max(error, float(np.abs(off - arms[inside]).max()))
+    if not error <= _LARGEST_ERROR:
+        raise ValueError(
+            f"every second state must give the others to {_LARGEST_ERROR} s of light, got an "
+            f"error of {error:.2g} s: a state is wrong, or the steps are too long"
+        )
+    paths = tuple(make_interp_spline(t, places[:, k], k=_DEGREE) for k in range(3))
+    # A round trip that ends here begins after the first state.
+    begin = 2.001 * float(arms.max())
+    return Constellation(epoch or f"{time[0]} s", (begin, float(t[-1])), error, paths)
+
+
+def _check_gravity(t: FloatArray, places: FloatArray) -> None:
+    """Raise if the mean of the three positions is not accelerated as the Sun's gravity says."""
+    mean = make_interp_spline(t, places.mean(axis=1), k=_DEGREE)
+    # Over a day, so that rounded positions do not count.
+    day = min(86400.0, 0.25 * t[-1])
+    middle = np.linspace(day, t[-1] - day, 4 * t.size)
+    place = mean(middle)
+    found = (mean(middle - day) - 2.0 * place + mean(middle + day)) / day**2
+    distance = np.linalg.norm(place, axis=1, keepdims=True)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        gravity = -SUN * place / distance**3
+        ratio = np.linalg.norm(found - gravity, axis=1) / np.linalg.norm(gravity, axis=1)
+    worst = int(np.argmax(ratio))
+    if not ratio[worst] <= _GRAVITY:
+        raise ValueError(
+            "positions must be in m from the Sun at times in s, in axes that do not rotate; at "
+            f"t = {middle[worst]:.4g} s their mean has to accelerate by "
+            f"{np.linalg.norm(gravity[worst]):.3g} m/s^2 towards the Sun, got "
+            f"{np.linalg.norm(found[worst]):.3g} m/s^2 or another direction"
+        )
+
+
+def read_table(path: str | Path, *, epoch: str = "") -> Constellation:
+    """Read a table of positions from a text file, as `from_table` takes it.
+
+    Parameters
+    ----------
+    path : str or Path
+        Ten columns, separated by commas: time in s, then x, y and z in m from the Sun of
+        spacecraft 1, of 2 and of 3. One line with names may come first, as pandas writes it
+        with ``index=False``. Lines with ``#`` are comments. A name in .gz is unpacked.
+    epoch : str, optional
+        The date and time scale of the first time; by default from a comment ``# epoch: ...``.
+
+    Returns
+    -------
+    Constellation
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    TypeError, ValueError
+        If a row does not hold ten numbers, or as for `from_table`.
+    """
+    path = Path(path)
+    with (gzip.open if path.suffix == ".gz" else open)(path, "rt", encoding="utf-8") as file:
+        text = file.read()
+    said = re.search(r"^# *epoch: *(.*?) *$", text, re.MULTILINE)
+    rows = [line.split(",") for line in re.findall(r"^[^#\n].*$", text, re.MULTILINE)]
+    if rows and not _is_number(rows[0][0]):
+        del rows[0]
+    wrong = [row for row in rows if len(row) != 10 or not all(map(_is_number, row))]
+    if wrong or not rows:
+        raise ValueError(
+            f"{path} must hold ten numbers a row: time in s, then x, y and z in m of "
+            f"spacecraft 1, 2 and 3; got {','.join(wrong[0]) if wrong else 'no row'!r}"
+        )
+    values = np.array(rows, dtype=np.float64)
+    begun = epoch or (said[1] if said else "")
+    return from_table(values[:, 0], values[:, 1:].reshape(-1, 3, 3), epoch=begun)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def esa(name: str) -> Constellation:
+    """Return LISA's orbits as ESA has published them, over 10.7 years.
+
+    Parameters
+    ----------
+    name : {"trailing", "leading"}
+        Whether the spacecraft are 20 degrees behind the Earth or ahead of it.
+
+    Returns
+    -------
+    Constellation
+
+    Raises
+    ------
+    ValueError
+        If there are no orbits of this name.
+
+    References
+    ----------
+    W. Martens and E. Joffre, J. Astronaut. Sci. 68, 402 (2021). Data by W. Martens, ESA/ESOC,
+    CC BY 4.0; ``armlock/data/README.md`` says what was changed.
+    """
+    one_of("name", name, ("trailing", "leading"))
+    return read_table(Path(__file__).parent / "data" / f"esa_{name}.csv.gz")
+
+
+def read_oem(paths: Sequence[str | Path]) -> Constellation:
+    """Read the orbits of three spacecraft from Orbit Ephemeris Messages (CCSDS OEM, text).
+
+    Parameters
+    ----------
+    paths : sequence of three paths
+        One file for each of the spacecraft 1 to 3: states around the Sun in TCB or TDB, in one
+        frame that does not rotate, as ESA publishes them.
+
+    Returns
+    -------
+    Constellation
+        From the positions, as `from_table` makes it, with t = 0 at the first epoch. Velocities
+        are not used.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be read.
+    TypeError, ValueError
+        If there are not three files; if a file is no OEM; if centre, frame or time scale is
+        another one; if the files differ in frame, time scale or epochs; if two segments differ
+        at their common epoch; or as for `from_table`, for instance at a gap between segments.
+    """
+    if isinstance(paths, str | Path) or len(paths) != 3:
+        raise ValueError(f"paths must hold three files, one a spacecraft, got {paths!r}")
+    headers, epochs, places = zip(*(_read_oem(Path(path)) for path in paths), strict=True)
+    if len(set(headers)) > 1:
+        raise ValueError(f"paths must be of one frame and time scale, got {headers}")
+    if not all(np.array_equal(epochs[0], other) for other in epochs[1:]):
+        raise ValueError(f"paths must have the same epochs, got {[e.size for e in epochs]}")
+    t = (epochs[0] - epochs[0][0]) / np.timedelta64(1, "ns") * 1e-9
+    begun = f"{epochs[0][0]} {headers[0][-1]}"
+    return from_table(t, np.stack(places, axis=1), epoch=begun)
+
+
+def _read_oem(path: Path) -> tuple[tuple[str, ...], npt.NDArray[np.datetime64], FloatArray]:
+    """Return centre, frame and scale, epochs of shape (n,) and positions (n, 3) in m."""
+    text = path.read_text("utf-8", errors="replace")
+    if "CCSDS_OEM_VERS" not in text:
+        raise ValueError(f"{path} must be a CCSDS OEM in text form, with CCSDS_OEM_VERS")
+    header = []
+    for key, allowed in _OEM.items():
+        said = set(re.findall(rf"^\s*{key}\s*=\s*(.*?)\s*$", text.upper(), re.MULTILINE))
+        if len(said) != 1 or not said <= set(allowed):
+            raise ValueError(
+                f"{key} of {path} must be one of {', '.join(allowed)}, got "
+                f"{', '.join(sorted(said)) or 'none'}"
+            )
+        header.append(said.pop())
+    rows = [line.split() for line in re.findall(r"^\s*\d+-\S*T.*", text, re.MULTILINE)]
+    wrong = [" ".join(row) for row in rows if len(row) not in (7, 10)] or ["none"] * (not rows)
+    if wrong:
+        raise ValueError(
+            f"states of {path} must have an epoch, position and velocity, and may have an "
+            f"acceleration, got {wrong[0]}"
+        )
+    try:
+        epochs = np.array([row[0].removesuffix("Z") for row in rows], dtype="datetime64[ns]")
+        values = [[float(number) for number in row[1:4]] for row in rows]
+    except ValueError as error:
+        raise ValueError(f"states of {path} must hold dates and numbers: {error}") from None
+    places = 1e3 * finite_series(f"positions of {path}", values, 2)
+    # Where a segment ends and the next begins, the epoch stands twice.
+    again = np.append(False, np.diff(epochs) == np.timedelta64(0))
+    apart = np.abs(places - np.roll(places, 1, axis=0)).max(axis=1) * again
+    if apart.max() > _SAME_STATE:
+        raise ValueError(
+            f"states of {path} must agree where an epoch stands twice, got positions "
+            f"{apart.max():.3g} m apart at {epochs[apart.argmax()]}"
+        )
+    return tuple(header), epochs[~again], places[~again]

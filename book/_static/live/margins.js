@@ -1,0 +1,507 @@
+"use strict";
+/*
+ * How far a loop is from instability, certified: margins at a point, and the first break along a
+ * ray from (1, 1). No sample decides a number. Each is the smallest value met along a walk of the
+ * axis whose every step is certified to hide none that is smaller by more than a part in a
+ * thousand; it is nan, "undecided", where the walk takes too long or rounding hides what decides.
+ *
+ * A step is certified in one of two ways: by the tangents of numerator and denominator, and
+ * bounds on what they leave out; or, where the delays turn faster than all else changes, by the
+ * disc that L fills over the step whatever the arms' phases are. That disc also tells from which
+ * frequency on nothing is smaller.
+ */
+function armlockMargins(api) {
+  const { EPSILON, UNDECIDED, BOUNDARY, make, reduced, at, beside, along, Curve, chainLeads, vanishes, count } = api;
+  // How much smaller than what is shown a number may be, as a share.
+  const NEAR = 1e-3;
+  // Perturbations up to this, gain factors up to this, steps of one walk and of one count.
+  const FARTHEST = 2, LARGEST = [1000, 10], STEPS = 1000000, COUNTED = 4000000;
+  // Of a start on the boundary, crossings up to this share are the start's own.
+  const OWN = 1e-10;
+
+  /* The disc that L fills with free phases of the arms, with c1 and c2 between two points: what
+   * they add up to is convex, and so largest at one of the two. */
+  class Disc {
+    constructor(loop, ...points) {
+      this.loop = loop;
+      this.points = points.map(([c1, c2]) => [Math.abs(c1), Math.abs(c2)]);
+    }
+
+    most(one, two) { return Math.max(...this.points.map(([a1, a2]) => a1 * one + a2 * two)); }
+
+    /* From the loop's factors at omega; at infinity and down from it, omega is null. */
+    look(omega) {
+      const { rest, common, sum, difference, second, delay } = this.loop;
+      const { vr: sr, vi: si } = sum, { vr: tr, vi: ti } = difference;
+      let cr = (1 + second) * (common.vr * sr - common.vi * si);
+      let ci = (1 + second) * (common.vr * si + common.vi * sr);
+      const k = Math.hypot(common.vr, common.vi);
+      this.radius = k * this.most(Math.hypot(sr + tr, si + ti),
+        Math.hypot(second * sr - tr, second * si - ti));
+      this.turning = delay;
+      if (delay && omega === null) {
+        // So far up the dead time's phase is as free as the arms'.
+        this.radius += Math.hypot(cr, ci);
+        cr = ci = this.turning = 0;
+      } else if (delay) {
+        const er = Math.cos(omega * delay), ei = -Math.sin(omega * delay);
+        [cr, ci] = [cr * er - ci * ei, cr * ei + ci * er];
+      }
+      const square = rest.vr * rest.vr + rest.vi * rest.vi;
+      this.size = Math.sqrt(square);
+      this.re = (cr * rest.vr + ci * rest.vi) / square;
+      this.im = (ci * rest.vr - cr * rest.vi) / square;
+      this.free = delay !== 0 && omega === null;
+    }
+
+    /* Radius of a disc around the same centre that holds those of the whole step. */
+    over(h) {
+      const { rest, common, sum, difference, second } = this.loop;
+      const { b0: s0, b1: s1 } = sum, { b0: t0, b1: t1 } = difference;
+      const least = this.size - h * rest.b1, size = Math.hypot(this.re, this.im);
+      if (!(least > 0)) return Infinity;
+      const centre = (1 + second)
+        * (common.b0 * s1 + common.b1 * s0 + this.turning * common.b0 * s0);
+      const arms = (this.free ? centre : 0)
+        + this.most(common.b0 * (s1 + t1) + common.b1 * (s0 + t0),
+          common.b0 * (second * s1 + t1) + common.b1 * (second * s0 + t0));
+      const moved = h * ((this.free ? 0 : centre) + size * rest.b1) / least;
+      return ((this.radius + h * arms) / least + moved) * (1 + 1e-9) + 1e-12 * (1 + size);
+    }
+  }
+
+  /* The frequency past which a disc stays clear of what would be smaller; infinity where that
+   * is not so at infinity itself. */
+  function clearFrom(disc, clear) {
+    const { loop } = disc, { parts, longest } = loop;
+    let t = 0, h = longest;
+    for (let k = 0; k < 300 && t < 2 * longest; k++) {
+      for (const part of parts) part.far(t);
+      disc.look(null);
+      for (;; h *= 0.5) {
+        for (const part of parts) part.over(h);
+        if (clear(disc.re, disc.im, disc.over(h))) break;
+        if (h < Math.max(0.02 * t, 1e-13 * longest)) return t ? 1 / t : Infinity;
+      }
+      t += h;
+      h *= 2;
+    }
+    return 1 / t;
+  }
+
+  /* Whether |a| > level |b| over a step h, where a0 + a1 x and b0 + b1 x are off by da and db. */
+  function exceeds(ar, ai, sr, si, da, br, bi, ur, ui, db, level, h) {
+    const l = level * level;
+    const p0 = ar * ar + ai * ai - l * (br * br + bi * bi);
+    const p1 = 2 * (ar * sr + ai * si - l * (br * ur + bi * ui));
+    const p2 = sr * sr + si * si - l * (ur * ur + ui * ui);
+    let least = Math.min(p0, p0 + h * (p1 + h * p2));
+    const place = -p1 / (2 * p2);
+    if (p2 > 0 && place > 0 && place < h) least = p0 - p1 * p1 / (4 * p2);
+    const am = Math.max(Math.hypot(ar, ai), Math.hypot(ar + h * sr, ai + h * si));
+    const bm = Math.max(Math.hypot(br, bi), Math.hypot(br + h * ur, bi + h * ui));
+    return least > da * (2 * am + da) + l * db * (2 * bm + db)
+      + 8 * EPSILON * (am * am + l * bm * bm);
+  }
+
+  /* What all walks have: the curve F at a point, the denominator, and their values where the walk
+   * is. Where both vanish at s = 0, the first step is taken of F / omega and of the rest. */
+  class Target {
+    constructor(loop, c1, c2) {
+      this.loop = loop;
+      this.curve = new Curve(loop, at(loop, c1, c2));
+      this.disc = new Disc(loop, [c1, c2]);
+      this.other = null;
+    }
+
+    /* The disc at infinite frequency: centre and radius. */
+    limit() {
+      for (const part of this.loop.parts) part.far(0);
+      this.disc.look(null);
+      return [this.disc.re, this.disc.im, this.disc.radius / this.disc.size];
+    }
+
+    place(omega) {
+      const { loop: { parts, rest }, curve, other } = this;
+      for (const part of parts) part.at(omega);
+      curve.join(omega);
+      if (other) other.join(omega);
+      this.disc.look(omega);
+      this.omega = omega;
+      this.hidden = omega === 0 && vanishes(curve) && (!other || other.lr === 0 && other.li === 0);
+      const values = this.hidden ? [curve.dr, curve.di, 0, 0, curve.mr, curve.mi, 0, 0,
+        rest.dr, rest.di, 0, 0] : [curve.vr, curve.vi, curve.dr, curve.di,
+        curve.lr, curve.li, curve.mr, curve.mi, rest.vr, rest.vi, rest.dr, rest.di];
+      [this.fr, this.fi, this.gr, this.gi, this.nr, this.ni, this.or, this.oi,
+        this.rr, this.ri, this.ur, this.ui] = values;
+    }
+
+    /* Bounds on what the tangents leave out over a step. */
+    over(h) {
+      for (const part of this.loop.parts) part.over(h);
+      this.curve.reach(h);
+      const { rest } = this.loop, left = this.hidden ? 0.5 * h : 0.5 * h * h;
+      const error = this.hidden ? 0 : this.curve.error;
+      const rounded = this.hidden ? 0 : EPSILON * 4 * rest.relative * rest.b0;
+      this.df = left * this.curve.bend + error;
+      this.dn = left * this.curve.l2 + error;
+      this.dr = left * rest.b2 + rounded;
+    }
+
+    /* Read something of L = N / R at omega: at s = 0 of what is left where both vanish. */
+    read(omega, what) {
+      this.place(omega);
+      return what.call(this);
+    }
+  }
+
+  /* Walk a target from s = 0 up to where it ends. Whether that was certain all along. */
+  function walk(target, most = STEPS) {
+    let omega = 0, step = 0.01 / target.loop.longest, end = target.end(), known = target.state();
+    target.place(0);
+    target.visit();
+    for (let steps = 0; omega < end; steps++) {
+      if (steps > most || !(end < Infinity)) return false;
+      let h = Math.min(2 * step, end - omega);
+      for (let tries = 1; !target.safe(h); tries++) {
+        if (tries === 3 && target.probe(omega, omega + 4 * h)) tries = 0;
+        else h *= 0.5;
+        if (tries === 3 || tries === 0) target.place(omega);
+        if (h <= 8 * EPSILON * omega || h < 1e-300) return false;
+      }
+      omega += h;
+      step = h;
+      target.place(omega);
+      target.visit();
+      if (target.state() < 0.9 * known) {
+        known = target.state();
+        end = target.end();
+        target.place(omega);
+      }
+    }
+    return true;
+  }
+
+  /* Where a function of omega changes its sign between two frequencies. */
+  function root(value, low, high) {
+    const begins = value(low) < 0;
+    for (let k = 0; k < 80 && high - low > 1e-15 * high; k++) {
+      const middle = 0.5 * (low + high);
+      if (value(middle) < 0 === begins) low = middle; else high = middle;
+    }
+    return 0.5 * (low + high);
+  }
+
+  /* inf |1 + L| */
+  class Modulus extends Target {
+    constructor(loop, c1, c2) {
+      super(loop, c1, c2);
+      const [re, im, radius] = this.limit();
+      // The limit at high frequency, for all small changes of the delays.
+      this.best = Math.hypot(1 + re, im) - radius;
+      this.where = Infinity;
+    }
+
+    state() { return this.best; }
+
+    end() {
+      const level = (1 - NEAR) * this.best;
+      return clearFrom(this.disc, (re, im, radius) => Math.hypot(1 + re, im) - radius >= level);
+    }
+
+    now() { return Math.hypot(this.fr, this.fi) / Math.hypot(this.rr, this.ri); }
+
+    visit() {
+      const here = this.now();
+      if (here < this.best) [this.best, this.where] = [here, this.omega];
+    }
+
+    probe() { return false; }
+
+    safe(h) {
+      this.over(h);
+      const { fr, fi, gr, gi, df, rr, ri, ur, ui, dr, best } = this;
+      let level = (1 - NEAR) * best;
+      if (this.scouting) {
+        const ahead = Math.hypot(fr + h * gr, fi + h * gi) / Math.hypot(rr + h * ur, ri + h * ui);
+        if (ahead > 0.5 * best) level = Math.min(level, (1 - NEAR) * ahead);
+      }
+      return exceeds(fr, fi, gr, gi, df, rr, ri, ur, ui, dr, level, h)
+        || Math.hypot(1 + this.disc.re, this.disc.im) - this.disc.over(h) >= (1 - NEAR) * best;
+    }
+
+    found() {
+      // On the way down to a minimum, a first walk takes what lies ahead for met already: it
+      // finds small values fast. The second one certifies.
+      this.scouting = true;
+      walk(this);
+      this.scouting = false;
+      return walk(this) ? this.best : NaN;
+    }
+  }
+
+  /* Of a disc: the smallest |arg(-L)| where it meets the unit circle, infinity where it does not. */
+  function discPhase(re, im, radius) {
+    const size = Math.hypot(re, im);
+    if (size + radius < 1 || size - radius > 1) return Infinity;
+    if (radius - size >= 1) return 0;
+    const half = Math.acos(Math.max(-1, Math.min(1,
+      (1 + size * size - radius * radius) / (2 * size))));
+    return Math.max(0, Math.abs(Math.atan2(-im, -re)) - half);
+  }
+
+  /* The smallest |arg(-L)| where |L| = 1 */
+  class Phase extends Target {
+    constructor(loop, c1, c2) {
+      super(loop, c1, c2);
+      this.best = discPhase(...this.limit());
+    }
+
+    state() { return this.best; }
+
+    end() {
+      return clearFrom(this.disc,
+        (re, im, radius) => discPhase(re, im, radius) >= (1 - NEAR) * this.best);
+    }
+
+    visit() {}
+
+    excess() { return Math.hypot(this.nr, this.ni) - Math.hypot(this.rr, this.ri); }
+
+    probe(low, high) {
+      const excess = w => this.read(w, this.excess), before = this.best;
+      if (excess(low) < 0 === excess(high) < 0) return false;
+      const w = root(excess, low, high), { nr, ni, rr, ri } = (this.place(w), this);
+      const found = Math.abs(Math.atan2(nr * ri - ni * rr, -(nr * rr + ni * ri)));
+      if (found < before) [this.best, this.where] = [found, w];
+      return this.best < before;
+    }
+
+    safe(h) {
+      this.over(h);
+      const { fr, fi, gr, gi, df, nr, ni, or, oi, dn, rr, ri, ur, ui, dr, best } = this;
+      return exceeds(nr, ni, or, oi, dn, rr, ri, ur, ui, dr, 1, h)
+        || exceeds(rr, ri, ur, ui, dr, nr, ni, or, oi, dn, 1, h)
+        || best < Infinity && exceeds(fr, fi, gr, gi, df, rr, ri, ur, ui, dr,
+          2 * Math.sin(0.5 * (1 - NEAR) * best), h)
+        || discPhase(this.disc.re, this.disc.im, this.disc.over(h)) >= (1 - NEAR) * best;
+    }
+
+    found() { return walk(this) ? this.best : NaN; }
+  }
+
+  /* U + k V = 0 for a k of an interval, on the axis. The interval shrinks to what is found. */
+  class Pencil extends Target {
+    constructor(loop, c1, c2, low, high) {
+      super(loop, c1, c2);
+      [this.low, this.high] = [low, high];
+    }
+
+    /* -U / V where that is real: the k of a root on the axis. */
+    k() {
+      const { pr, pi, vr, vi } = this;
+      return -(pr * vr + pi * vi) / (vr * vr + vi * vi);
+    }
+
+    place(omega) {
+      super.place(omega);
+      [this.pr, this.pi, this.qr, this.qi, this.vr, this.vi, this.wr, this.wi] = this.pair();
+    }
+
+    visit() { if (this.omega === 0) this.take(this.k(), 0); }
+
+    cross() { return this.pi * this.vr - this.pr * this.vi; }
+
+    probe(low, high) {
+      const cross = w => this.read(w, this.cross), before = this.state();
+      // At s = 0 everything is real.
+      const begin = low || 1e-6 * high;
+      if (cross(begin) < 0 === cross(high) < 0) return false;
+      const w = root(cross, begin, high);
+      this.take(this.read(w, this.k), w);
+      return this.state() < before;
+    }
+
+    safe(h) {
+      this.over(h);
+      const { pr, pi, qr, qi, vr, vi, wr, wi } = this, [dp, dv] = this.left();
+      // No k at all is real where the sign of Im(U conj V) stays.
+      const g0 = pi * vr - pr * vi, g1 = qi * vr - qr * vi + pi * wr - pr * wi;
+      const g2 = qi * wr - qr * wi, last = g0 + h * (g1 + h * g2), place = -g1 / (2 * g2);
+      const inner = place > 0 && place < h ? g0 + 0.5 * place * g1 : g0;
+      const pm = Math.max(Math.hypot(pr, pi), Math.hypot(pr + h * qr, pi + h * qi));
+      const vm = Math.max(Math.hypot(vr, vi), Math.hypot(vr + h * wr, vi + h * wi));
+      const slack = dp * vm + dv * pm + dp * dv + 8 * EPSILON * pm * vm;
+      if (Math.min(g0, last, inner) > slack || Math.max(g0, last, inner) < -slack) return true;
+      // |U + k V| stays larger than what it moves by, for all k of the interval.
+      const a = h * Math.hypot(qr, qi) + dp, b = h * Math.hypot(wr, wi) + dv;
+      const [low, high] = this.interval();
+      const two = vr * vr + vi * vi - b * b, one = pr * vr + pi * vi - a * b;
+      const none = pr * pr + pi * pi - a * a, q = k => none + k * (2 * one + k * two);
+      const least = two > 0 ? Math.min(high, Math.max(low, -one / two)) : low;
+      if (Math.min(q(low), q(high), q(least)) > 1e-14 * (pr * pr + pi * pi)) return true;
+      return this.clear(this.disc.re, this.disc.im, this.disc.over(h));
+    }
+
+    end() { return clearFrom(this.disc, (re, im, radius) => this.clear(re, im, radius)); }
+  }
+
+  /* The gain factors next to one that take a root to the axis: R + k N = 0. */
+  class Gains extends Pencil {
+    constructor(loop, c1, c2, most) {
+      super(loop, c1, c2, 1 / most, most);
+      this.most = most;
+      const [re, , radius] = this.limit();
+      // The neutral root chain bounds them as well.
+      this.chain = [0, Infinity];
+      for (const edge of [re - radius, re + radius]) {
+        const k = -1 / edge;
+        if (k > 0 && k < 1) this.chain[0] = Math.max(this.chain[0], k);
+        if (k > 1 && k < Infinity) this.chain[1] = Math.min(this.chain[1], k);
+      }
+      this.base = [Math.max(this.low, this.chain[0] * (1 + NEAR)),
+        Math.min(this.high, this.chain[1] * (1 - NEAR))];
+      [this.low, this.high] = this.base;
+    }
+
+    state() { return this.high / this.low; }
+    pair() { return [this.rr, this.ri, this.ur, this.ui, this.nr, this.ni, this.or, this.oi]; }
+    left() { return [this.dr, this.dn]; }
+
+    take(k, omega) {
+      if (k > this.low && k <= 1) [this.low, this.lowerAt] = [k, omega];
+      if (k > 1 && k < this.high) [this.high, this.upperAt] = [k, omega];
+    }
+
+    interval() {
+      return [Math.min(1, this.low * (1 + NEAR)), Math.max(1, this.high * (1 - NEAR))];
+    }
+
+    clear(re, im, radius) {
+      const [low, high] = this.interval(), [from, to] = [-1 / low, -1 / high];
+      return Math.hypot(re - Math.min(to, Math.max(from, re)), im) > radius;
+    }
+
+    found() {
+      if (!walk(this)) return [NaN, NaN];
+      const { low, high, base, chain, most } = this;
+      return [low > base[0] ? low : chain[0] > 1 / most ? chain[0] : 0,
+        high < base[1] ? high : chain[1] < most ? chain[1] : Infinity];
+    }
+  }
+
+  /* The first t at which D has a root on the axis at (1, 1) + t (d1, d2). */
+  class Break extends Pencil {
+    constructor(loop, d1, d2, low, high) {
+      super(loop, 1, 1, low, high);
+      this.other = new Curve(loop, along(d1, d2));
+      this.direction = [d1, d2];
+      this.reach();
+    }
+
+    /* The disc is that of the whole ray, as far as it is still looked at. */
+    reach() {
+      const { loop, high, direction: [d1, d2] } = this;
+      this.disc = new Disc(loop, [1, 1], [1 + high * d1, 1 + high * d2]);
+    }
+
+    state() { return this.high; }
+
+    pair() {
+      const { fr, fi, gr, gi, other } = this;
+      if (this.hidden) return [fr, fi, 0, 0, other.mr, other.mi, 0, 0];
+      return [fr, fi, gr, gi, other.lr, other.li, other.mr, other.mi];
+    }
+
+    over(h) {
+      super.over(h);
+      this.other.reach(h);
+      this.step = h;
+    }
+
+    left() {
+      const { other } = this;
+      const left = 0.5 * this.step * other.l2;
+      return [this.df, this.hidden ? left : left * this.step + other.error];
+    }
+
+    take(t) { if (t > this.low && t < this.high) this.high = t; }
+    interval() { return [this.low, Math.max(this.low, this.high * (1 - NEAR))]; }
+    clear(re, im, radius) { return Math.hypot(1 + re, im) > radius; }
+
+    end() {
+      this.reach();
+      return super.end();
+    }
+
+    found() { return walk(this) ? this.high : NaN; }
+  }
+
+  /* The critical perturbation along a ray from (1, 1): 0 where the loop is not stable next to it,
+   * infinity where there is none up to |c - 1| = 2, the limit where the neutral root chain is lost
+   * first; nan where that is not certain, null where the loop is not stable at (1, 1). */
+  function firstBreak(loop, d1, d2) {
+    if (d1 === d2) loop = reduced(loop, 1, 1);
+    const inside = t => count(loop, 1 + t * d1, 1 + t * d2,
+      { most: COUNTED, exact: beside(t * d1, t * d2) });
+    const begun = inside(0);
+    // Whether a loop that is on the boundary as far as rounding can tell is stable, nobody can tell.
+    if (begun === UNDECIDED || begun === BOUNDARY) return NaN;
+    if (begun > 0 || begun < BOUNDARY) return null;
+    const [a, b1, b2] = chainLeads(loop);
+    const lost = t => Math.abs(1 + t * d1) * b1 + Math.abs(1 + t * d2) * b2 >= a;
+    let [confined, limit] = [0, lost(FARTHEST) ? FARTHEST : Infinity];
+    for (let k = 0; k < 100 && limit < Infinity; k++) {
+      const middle = 0.5 * (confined + limit);
+      if (lost(middle)) limit = middle; else confined = middle;
+    }
+    const last = Math.min(FARTHEST, limit * (1 - NEAR));
+    const target = new Break(loop, d1, d2, 0, last);
+    target.place(0);
+    let low = 0;
+    // A root at s = 0 that cancels at (1, 1) may turn into the loop's own next to it.
+    if (vanishes(target.curve)) {
+      low = OWN;
+      const next = inside(1e-9);
+      if (next === UNDECIDED) return NaN;
+      // Not zero where the loop is stable still nearer.
+      if (next !== 0) return [1e-10, 1e-11, 1e-12].some(t => inside(t) === 0) ? NaN : 0;
+    }
+    target.low = low;
+    const found = target.found();
+    if (Number.isNaN(found)) return NaN;
+    if (found === last)
+      return inside((1 - 2 * NEAR) * last) === 0 ? limit : NaN;
+    const next = inside(found * (1 + 1e-6));
+    return inside(found * (1 - NEAR)) === 0 && next !== 0 && next !== UNDECIDED ? found : NaN;
+  }
+
+  /* Margins of a stable loop, null of another: gain factors `lower` and `upper` between which it
+   * stays stable (0 and infinity where none from 1 / `most` to `most` bounds them), `phase` in
+   * rad, infinity without a crossover, and `modulus`; each nan where it is not certain. The names
+   * with `At` have the frequency of each in rad/s: infinity, or none, where it is a limit. */
+  function margins(spec, c1, c2) {
+    const loop = reduced(make(spec), c1, c2), begun = count(loop, c1, c2, { most: COUNTED });
+    let [lower, upper, most, gains] = [NaN, NaN, LARGEST[0], null];
+    if (begun !== 0)
+      return begun === UNDECIDED ? { lower, upper, most, phase: NaN, modulus: NaN } : null;
+    for (most of LARGEST) {
+      gains = new Gains(loop, c1, c2, most);
+      [lower, upper] = gains.found();
+      if (!Number.isNaN(lower)) break;
+    }
+    const scaled = k => count(make({ ...loop.spec, gain: spec.gain * k }), c1, c2, { most: COUNTED });
+    // A second opinion from counts on both sides.
+    const confirmed = (k, inside, outside) => {
+      const out = scaled(k * outside);
+      return scaled(k * inside) === 0 && out !== 0 && out !== UNDECIDED;
+    };
+    if (lower > 0 && !confirmed(lower, 1 + NEAR, 1 - 1e-6)) lower = NaN;
+    if (upper < Infinity && !confirmed(upper, 1 - NEAR, 1 + 1e-6)) upper = NaN;
+    const [phase, modulus] = [new Phase(loop, c1, c2), new Modulus(loop, c1, c2)];
+    return { lower, upper, most, phase: phase.found(), modulus: modulus.found(), lowerAt: gains.lowerAt,
+      upperAt: gains.upperAt, phaseAt: phase.where, modulusAt: modulus.where };
+  }
+
+  return { firstBreak, margins };
+}

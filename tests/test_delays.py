@@ -1,0 +1,230 @@
+"""Systems with any number of delays, as people who know python-control make them."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import control
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+from armlock import (
+    Controller,
+    DelaySystem,
+    Loop,
+    delay,
+    impulse_response,
+    margins,
+    modulus_margin,
+    rightmost_root,
+    step_response,
+    unstable_roots,
+)
+from armlock.sensors import dual
+from tests.dense_judge import compared, drawn
+
+S = control.tf("s")
+PLANT, PI = control.tf([1], [2, 1]), control.tf([4, 2.2], [1, 0])
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_loops_agree_with_a_dense_grid(seed):
+    _, wrong = compared(*drawn(np.random.default_rng([39, seed])))
+    assert not wrong
+
+
+def test_a_plant_times_a_delay():
+    for plant in (PLANT, control.ss(PLANT), control.zpk([], [-0.5], 0.5)):
+        for loop in (plant * delay(0.5), delay(0.5) * plant):
+            assert loop(2j) == pytest.approx(np.exp(-1j) / (4j + 1), rel=1e-12)
+    loop = np.float64(2.0) * PI * PLANT * delay(0.5) - 1
+    assert loop(2j) == pytest.approx(2 * PI(2j) * PLANT(2j) * np.exp(-1j) - 1, rel=1e-12)
+    assert (3 - delay(1.0))(0.0) == 2.0
+    assert (delay(1.0) / delay(0.25))(1.0) == pytest.approx(np.exp(-0.75))
+    assert (1 / (PLANT * delay(0.0)))(1.0) == 3.0
+    assert "exp(-0.5 s)" in str(PLANT * delay(0.5))
+
+
+def test_what_is_no_plant_with_a_delay_is_told_what_to_write():
+    with pytest.raises(TypeError, match=r"(?s)^numerator must .* write plant \* delay"):
+        DelaySystem(plant := control.ss(PLANT), 0.5)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match=r"as DelaySystem\.of\(system\)"):
+        margins(plant)
+
+
+def test_feedback_is_negative_and_takes_delays_on_the_way_back():
+    closed = (PI * PLANT * delay(0.5)).feedback(delay(0.1))
+    forward, back = PI(1j) * PLANT(1j) * np.exp(-0.5j), np.exp(-0.1j)
+    assert closed(1j) == pytest.approx(forward / (1 + forward * back), rel=1e-12)
+    positive = (PLANT * delay(0.5)).feedback(sign=1)
+    assert positive(1j) == pytest.approx(
+        PLANT(1j) * np.exp(-0.5j) / (1 - PLANT(1j) * np.exp(-0.5j)), rel=1e-12
+    )
+
+
+def test_margins_of_an_integrator_with_dead_time():
+    loop = control.tf([1], [1, 0]) * delay(0.5)
+    found = margins(loop)
+    assert found.gain_upper == pytest.approx(math.pi, rel=1e-6)
+    assert found.phase == pytest.approx(0.5 * math.pi - 0.5, rel=1e-6)
+    assert found.delay == pytest.approx(0.5 * math.pi - 0.5, rel=1e-6)
+    assert modulus_margin(loop) == found.modulus
+    assert unstable_roots(4 * loop) == 2
+    root = rightmost_root(4 * loop)
+    assert root.real > 0
+    assert abs(1 + (4 * loop)(root)) < 1e-9
+
+
+def test_a_bode_plot():
+    loop, omega = PI * PLANT * delay(0.5), np.geomspace(0.01, 10.0, 200)
+    response = control.frequency_response(loop, omega)
+    assert response.frdata[0, 0] == pytest.approx(loop(1j * omega), rel=1e-12)
+    assert control.bode_plot(response) is not None
+    plt.close("all")
+    assert control.margin(response)[1] == pytest.approx(
+        math.degrees(margins(loop).phase), rel=1e-3
+    )
+
+
+@pytest.mark.parametrize(
+    "guess",
+    [
+        control.bode_plot,
+        control.ss,
+        control.tf,
+        control.step_response,
+        control.poles,
+        lambda system: control.feedback(PLANT, system),
+        lambda system: PLANT / system,
+        lambda system: system.step_response(),
+    ],
+)
+def test_python_control_says_what_to_write_for_a_delay(guess):
+    with pytest.raises((TypeError, AttributeError), match=r"system\.frequency_response\("):
+        guess(PLANT * delay(0.5))
+
+
+@pytest.mark.parametrize(
+    ("system", "word"),
+    [
+        (control.ss(-np.eye(2), np.eye(2), np.eye(2), np.zeros((2, 2))), "one input"),
+        (control.tf([1], [1, 0.5], 0.1), "continuous in time"),
+        ("plant", "got 'plant'"),
+        (1j, "DelaySystem, a number"),
+        (math.nan, "finite"),
+    ],
+)
+def test_what_is_no_such_system_is_refused_with_a_word(system, word):
+    with pytest.raises((TypeError, ValueError), match=word):
+        delay(1.0) * system
+    with pytest.raises((TypeError, ValueError), match=word):
+        DelaySystem.of(system)
+
+
+def test_a_system_that_answers_before_it_is_asked_is_refused():
+    with pytest.raises(ValueError, match="delayed no more than the numerator"):
+        1 / delay(1.0)
+    with pytest.raises(ValueError, match="theta must not be negative, got -1"):
+        delay(-1.0)
+    with pytest.raises(ZeroDivisionError):
+        delay(1.0) / 0
+
+
+def test_common_factors():
+    # (1 - exp(-s)) / s has no pole at s = 0, and a power of s in both is divided out.
+    average = (1 - delay(1.0)) / control.tf([1, 0], [1])
+    assert unstable_roots(average) == 0
+    assert len((S * average / S).numerator.terms) == len(average.numerator.terms)
+    assert unstable_roots(control.tf([1, 0], [1, 0]) * delay(1.0) * 0.5) == 0
+    # An unstable factor stays, because the state behind it grows.
+    hidden = control.tf([1, -1], [1, 2]) * delay(0.1) * control.tf([1], [1, -1])
+    assert unstable_roots(hidden) == 1
+
+
+def test_what_is_advanced_or_next_to_it_is_unconfined():
+    assert unstable_roots(S * delay(1.0)) == -2
+    assert unstable_roots(1.001 * delay(1.0)) == -2
+    assert unstable_roots(0.999 * delay(1.0)) == 0
+
+
+def test_a_loop_of_two_arms_has_the_numbers_of_the_loop_class():
+    loop = Loop(control.tf([2], [1, 0]), dual(1.5, 0.2), 20.1, 19.9, delay=0.02)
+    e = 1.5 / ((S + 1.5) * S * 0.2)
+    arms = (1 + e) * (1 - delay(20.1)) + (1 - e) * (1 - delay(19.9))
+    same = control.tf([2], [1, 0]) * delay(0.02) * arms
+    omega = np.geomspace(1e-4, 10.0, 50)
+    assert same(1j * omega) == pytest.approx(loop(1j * omega), rel=1e-9)
+    assert unstable_roots(same) == unstable_roots(loop)
+    ours, theirs = margins(same), margins(loop)
+    assert ours.phase == pytest.approx(theirs.phase, rel=1e-5)
+    assert ours.modulus == pytest.approx(theirs.modulus, rel=1e-5)
+    three = sum(m * (1 - delay(tau)) for m, tau in ((0.5, 20.1), (0.3, 19.9), (0.2, 16.6)))
+    assert unstable_roots(three * control.tf([0.1], [1, 0]) * delay(0.02)) == 0
+
+
+def steps(gain, time, derivative=0):
+    """Response of gain exp(-s) / s under feedback, by the method of steps."""
+    return np.array([
+        sum(
+            (-1) ** k * gain ** (k + 1) * (t - k - 1) ** (k + 1 - derivative)
+            / math.factorial(k + 1 - derivative)
+            for k in range(30)
+            if t >= k + 1
+        )
+        for t in time
+    ])  # fmt: skip
+
+
+@pytest.mark.parametrize("gain", [0.3, 1.0, 3.0])
+def test_responses_are_those_of_the_method_of_steps(gain):
+    closed = (control.tf([gain], [1, 0]) * delay(1.0)).feedback()
+    time = np.linspace(0.0, 12.0, 481)
+    for respond, derivative in ((step_response, 0), (impulse_response, 1)):
+        expected = steps(gain, time, derivative)
+        found = respond(closed, time)
+        assert isinstance(found, control.TimeResponseData)
+        assert np.abs(found.outputs - expected).max() < 1e-6 * np.abs(expected).max()
+    t, y = step_response(closed, 12.0)
+    assert (t[0], t[-1], t.shape, y.shape) == (0.0, 12.0, (1001,), (1001,))
+
+
+def test_a_response_without_a_delay_is_that_of_python_control():
+    plant = control.tf([1, 3], [1, 0.4, 4])
+    time = np.linspace(0.0, 20.0, 801)
+    for ours, theirs in (
+        (step_response, control.step_response),
+        (impulse_response, control.impulse_response),
+    ):
+        expected = theirs(plant, time).outputs
+        assert np.abs(ours(plant, time).outputs - expected).max() < 1e-6
+
+
+def test_jumps_of_a_neutral_loop_are_not_smeared():
+    # 0.5 exp(-s) fed back: 0.5, -0.25, 0.125, ... from t = 1, 2, 3, ...
+    closed = (0.5 * delay(1.0)).feedback()
+    time = np.array([0.999999, 1.0, 1.999999, 2.0, 2.999999, 3.0])
+    expected = [0.0, 0.5, 0.5, 0.25, 0.25, 0.375]
+    assert step_response(closed, time).outputs == pytest.approx(expected, abs=1e-6)
+    with pytest.warns(UserWarning, match="impulses at t = 1, 2, 3 s"):
+        impulse_response(closed, 3.5)
+
+
+def test_a_response_that_is_not_found_is_refused():
+    with pytest.raises(ValueError, match="timepts must end earlier"):
+        step_response(control.tf([1], [1e-9, 1]) * delay(1.0), 1e3)
+    with pytest.raises(ValueError, match="no more zeros than poles"):
+        step_response(S * S * delay(1.0), 10.0)
+    with pytest.warns(UserWarning, match="impulses at t = 1 s"):
+        found = step_response(S * delay(1.0), 10.0).outputs
+    assert np.abs(found).max() < 1e-7
+    with pytest.raises(ValueError, match="timepts must ascend"):
+        step_response(delay(1.0), [1.0, 0.5])
+
+
+def test_many_factors_are_kept_by_a_controller():
+    controller = Controller([-1e-3] * 2, [-1e-6] * 3 + [-2 + 3j, -2 - 3j], 5.0)
+    loop = DelaySystem.of(controller) * delay(Fraction(1, 3))
+    s = 1j * np.geomspace(1e-7, 10.0, 30)
+    assert loop(s) == pytest.approx(controller(s) * np.exp(-s / 3), rel=1e-9)

@@ -1,0 +1,66 @@
+"""Pulling by an inverse Laplace transform, held against closed forms and against itself."""
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from armlock import Controller, Loop, SingleArm, paper_loop, pulling
+from armlock.performance.pulling import largest_pulling
+from armlock.sensors import SINGLE, dual
+
+STEP = (1.0, 0.0, 0.0)
+
+
+def test_before_the_light_comes_back_the_loop_has_no_delay():
+    """Then Y of a single arm is -g / (s + g), and half of that for the sum."""
+    time = np.geomspace(1e-3, 19.0, 40).reshape(4, 10)
+    for longest in (19.0, 1e6):
+        found = pulling(SingleArm(0.5, 20.0), np.append(time, longest), common=STEP)
+        expected = -0.5 * (1.0 - np.exp(-0.5 * time.ravel()))
+        np.testing.assert_allclose(found[:-1], expected, rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    "controller",
+    [
+        Controller([], [-0.05 + 1j, -0.05 - 1j], 0.02),  # a resonance
+        Controller([-0.01, -1.0], [-0.001, -10.0], 0.2),  # a lag and a lead
+    ],
+)
+def test_before_the_light_comes_back_a_loop_without_an_integrator_follows_its_controller(
+    controller,
+):
+    """Then Y of a single arm is -K / (1 + K), and half of that for the sum."""
+    time = np.linspace(0.0, 32.0, 65)
+    above = controller.gain * np.poly(controller.zeros)
+    below = np.polyadd(np.poly(controller.poles), above)
+    _, expected = signal.step((above.real, below.real), T=time)
+    found = pulling(Loop(controller, SINGLE, 33.0, 33.0), time[1:], common=STEP)
+    np.testing.assert_allclose(found, -0.5 * expected[1:], rtol=2e-3, atol=1e-6)
+
+
+def test_errors_add_up():
+    loop, time = paper_loop(), np.array([10.0, 1e4])
+    one = pulling(loop, time, common=(1.0, 0.1, 0.0))
+    other = pulling(loop, time, common=(0.0, 0.0, 0.0), differential=(0.0, 0.0, 1e-3))
+    both = pulling(loop, time, common=(1.0, 0.1, 0.0), differential=(0.0, 0.0, 1e-3))
+    np.testing.assert_allclose(both, one + other, rtol=1e-12)
+
+
+def test_the_largest_pulling_is_not_exceeded_at_other_times():
+    simple = Loop(Controller([-0.1], [0, 0], 3.0), dual(2.5, 0.065), 16.68, 16.615)
+    for loop, source in ((simple, "common"), (paper_loop(), "differential")):
+        peak = largest_pulling(loop, **{source: STEP})
+        error = {"common": (0.0, 0.0, 0.0), source: STEP}
+        found = pulling(loop, np.geomspace(1.0, 1.7e6, 4001), **error)
+        assert np.abs(found).max() < peak.size * (1 + 1e-4)
+        at_peak = pulling(loop, peak.time, **error)
+        assert abs(float(at_peak)) == pytest.approx(peak.size, rel=1e-3)
+
+
+def test_a_peak_next_to_an_echo_is_not_rounded_off():
+    """Undelayed, the paper's loop answers at once and jumps with each echo."""
+    loop = paper_loop(tau1=16.68, tau2=16.62)
+    peak = largest_pulling(loop, common=STEP)
+    found = pulling(loop, np.linspace(1.0, 70.0, 200_000), common=STEP)
+    assert abs(np.abs(found).max() / peak.size - 1) < 5e-3

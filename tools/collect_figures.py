@@ -1,0 +1,65 @@
+"""Take figures and run times out of executed notebooks, and fill the cache of the book's build.
+
+Usage: python tools/collect_figures.py EXECUTED FIGURES CACHE
+
+Each figure carries its data and an SVG: `book.companion.figures` extends IPython. They
+become the files NAME.csv and NAME.svg in the folder FIGURES; `fig-NAME` is the name in the
+metadata of the cell. The book's build takes a notebook from CACHE if code and metadata of its
+cells are the same. So the times that nbmake notes in the metadata are left out; the page on the
+book's status shows their sum.
+"""
+
+import shutil
+import sys
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import nbformat
+from jupyter_cache import get_cache
+from jupyter_cache.base import CacheBundleIn
+
+ENDINGS = {"image/svg+xml": "svg", "text/csv": "csv"}
+GLUED = "application/papermill.record/"  # before the type of what a notebook glues
+
+
+def take_figures(cell: Any, folder: Path) -> None:
+    """Write the files of the figure that a cell shows; leave the cell its PNG."""
+    name = cell.metadata.get("mystnb", {}).get("figure", {}).get("name", "")
+    for output in cell.get("outputs", []):
+        data = output.get("data", {})
+        for mime in list(data):
+            if ending := ENDINGS.get(mime.removeprefix(GLUED)):
+                text = data.pop(mime)
+                if name and not mime.startswith(GLUED):
+                    file = folder / f"{name.removeprefix('fig-')}.{ending}"
+                    file.write_text(text, encoding="utf-8")
+
+
+def seconds(cell: Any) -> float:
+    """Return how long a cell ran, and take the times out of its metadata."""
+    times = cell.metadata.pop("execution", {})
+    if "iopub.status.idle" not in times:
+        return 0.0
+    start, end = (
+        datetime.fromisoformat(times[f"iopub.status.{state}"]) for state in ("busy", "idle")
+    )
+    return (end - start).total_seconds()
+
+
+def main() -> None:
+    """Collect what the notebooks of one folder have made."""
+    executed, figures, cached = map(Path, sys.argv[1:])
+    figures.mkdir(parents=True, exist_ok=True)
+    shutil.rmtree(cached, ignore_errors=True)
+    cache = get_cache(cached)
+    for path in sorted(executed.glob("*.ipynb")):
+        notebook = nbformat.read(path, as_version=4)  # type: ignore[no-untyped-call]
+        for cell in notebook.cells:
+            take_figures(cell, figures)
+        data = {"execution_seconds": sum(map(seconds, notebook.cells))}
+        cache.cache_notebook_bundle(CacheBundleIn(notebook, str(path), data=data))
+
+
+if __name__ == "__main__":
+    main()

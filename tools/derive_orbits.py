@@ -1,0 +1,57 @@
+"""Write the package's tables of ESA's orbits from the files that ESA has published.
+
+    python -m tools.derive_orbits FOLDER
+
+FOLDER holds `trailing_lisa1.oem` ... `leading_lisa3.oem`. The tables hold the published
+positions, rounded to metres.
+"""
+
+from __future__ import annotations
+
+import gzip
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from armlock import orbits
+
+DATA = Path(orbits.__file__).parent / "data"
+ORIGINAL = {
+    "trailing": "mida-20deg/trajectory_out_mida-20deg_cw_sg-2nmss_may_launch_lisa{1,2,3}.oem",
+    "leading": "mida+20deg/trajectory_out_mida+20deg_cw_sg-2nmss_nov_launch_lisa{1,2,3}.oem",
+}
+HEADER = """\
+# Orbits of LISA, {name} the Earth: positions of spacecraft 1, 2 and 3 from the Sun, EME2000.
+# Author of the data: Waldemar Martens, ESA/ESOC. Licence: CC BY 4.0.
+# Source: repository esa/lisa-orbit-files, commit bf87d559f67c5ac65a32418471a9a9d41012a166,
+#   crema_2p0/tcb_time_scale/{original}
+# Changed: rounded to metres, written into one file; velocities and accelerations left out. By
+#   tools/derive_orbits.py.
+# epoch: {epoch}
+# Columns: time since that epoch in s; x, y, z of 1, of 2, of 3 in m.
+"""
+
+
+def main() -> None:
+    """Write both tables."""
+    for name, original in ORIGINAL.items():
+        files = [Path(sys.argv[1]) / f"{name}_lisa{k}.oem" for k in (1, 2, 3)]
+        read = orbits.read_oem(files)
+        _, epochs, _ = orbits._read_oem(files[0])
+        places = np.hstack([orbits._read_oem(file)[2] for file in files])
+        times = (epochs - epochs[0]) / np.timedelta64(1, "s")
+        lines = [
+            ",".join([f"{time:.6f}", *(f"{value:.0f}" for value in row)])
+            for time, row in zip(times, places, strict=True)
+        ]
+        text = HEADER.format(name=name, original=original, epoch=read.epoch)
+        text += "\n".join(lines) + "\n"
+        # Without a date, so that the same files give the same bytes.
+        file = DATA / f"esa_{name}.csv.gz"
+        file.write_bytes(gzip.compress(text.encode(), 9, mtime=0))
+        print(f"{file.name}: {times.size} rows, {file.stat().st_size / 1e3:.0f} kB")
+
+
+if __name__ == "__main__":
+    main()
