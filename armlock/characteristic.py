@@ -32,6 +32,7 @@ from armlock.checks import (
     complex_array,
     not_negative,
     real_array,
+    real_number,
     whole_steps,
 )
 from armlock.delays import Term, functions
@@ -182,6 +183,10 @@ class CharacteristicFunction:
         """Return D at one point as a function of the engine, exactly."""
         _, constant, first, second = self.terms
         return constant + first * -Fraction(x) + second * -Fraction(y)
+
+    def cancelled(self, x: float | Fraction, y: float | Fraction) -> int:
+        """Order of the root at s = 0 that D has and the system has not: 0, but for a loop."""
+        return 0
 
     @cached_property
     def c(self) -> FloatArray:
@@ -442,14 +447,23 @@ def checked_system(system: CharacteristicFunction) -> CharacteristicFunction:
 
 
 def broadcast_parameters(
-    system: CharacteristicFunction, x: npt.ArrayLike | None, y: npt.ArrayLike | None
+    system: CharacteristicFunction,
+    x: npt.ArrayLike | Fraction | None,
+    y: npt.ArrayLike | Fraction | None,
 ) -> tuple[FloatArray, FloatArray]:
     """Return the two free parameters of a system as finite real arrays of one shape.
 
-    Those of a loop, c1 and c2, are one where they are not given. Others have to be given.
+    Those of a loop, c1 and c2, are one where they are not given. Others have to be given. A
+    Fraction stays one, in an array of a single point.
     """
     x, y = given_or_one(checked_system(system), x, y)
     name1, name2 = system.parameters
+    if isinstance(x, Fraction) or isinstance(y, Fraction):
+        pair = [
+            value if isinstance(value, Fraction) else real_number(name, value)
+            for name, value in zip(system.parameters, (x, y), strict=True)
+        ]
+        return np.array(pair[0], dtype=object), np.array(pair[1], dtype=object)
     return broadcast_pair(name1, x, name2, y)
 
 

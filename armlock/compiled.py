@@ -13,7 +13,7 @@ import numba
 
 
 def njit(
-    *, nogil: bool = False, error_model: str = "python"
+    *, nogil: bool = False, error_model: str = "python", inner: bool = False
 ) -> Callable[[Callable[..., Any]], Any]:
     """Compile a function when it is first called with arguments of these types.
 
@@ -23,13 +23,20 @@ def njit(
         Whether other threads run while the function does.
     error_model : str, optional
         What a division by zero does: it raises, or with "numpy" gives inf or nan.
+    inner : bool, optional
+        Whether only compiled functions call it. Then it compiles in less time.
 
     Returns
     -------
     callable
         The decorator.
     """
-    options = {"nogil": nogil, "error_model": error_model, "no_cfunc_wrapper": True}
+    options = {
+        "nogil": nogil,
+        "error_model": error_model,
+        "no_cfunc_wrapper": True,
+        "no_cpython_wrapper": inner,
+    }
 
     def decorate(function: Callable[..., Any]) -> Any:
         try:

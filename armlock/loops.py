@@ -35,7 +35,7 @@ from armlock.checks import (
 )
 from armlock.controllers import Controller, integrating_actuator, table_two, white_paper
 from armlock.delays import DelaySystem, QuasiPolynomial, Term, WithDelays, functions
-from armlock.engine.functions import Function
+from armlock.engine.functions import Function, common_zeros
 from armlock.engine.margins import Free
 from armlock.engine.polynomials import Polynomial
 from armlock.sensors import COMMON, SINGLE, SignalMapping, modified_dual
@@ -209,6 +209,10 @@ class Loop(WithDelays, CharacteristicFunction):
                 halves.append((Fraction(1, 2), both, Fraction(0), sign))
         b1, b2 = ([(w * s**k, p, lag) for w, p, lag, s in halves] for k in (0, 1))
         return [(Fraction(1), self.rest, Fraction(0))], b1, b2
+
+    def cancelled(self, c1: float | Fraction, c2: float | Fraction) -> int:
+        """Order of the root at s = 0 that cancels in L, so that the closed loop has it not."""
+        return common_zeros(*self.quotient(c1, c2))
 
     def quotient(
         self, c1: float | Fraction = 1.0, c2: float | Fraction = 1.0

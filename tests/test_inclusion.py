@@ -8,11 +8,12 @@ that stays far below its bound would not notice a smaller one.
 from fractions import Fraction
 
 import mpmath
+import numba
 import numpy as np
 import pytest
 
 from armlock.engine import inclusion
-from armlock.engine.functions import Function, Space
+from armlock.engine.functions import Function, Space, compiled
 from armlock.engine.inclusion import EPSILON
 from armlock.engine.polynomials import Polynomial
 
@@ -83,12 +84,38 @@ class Exact:
         )
 
 
-def enclosed(function, middle, half, work, index=0):
+@numba.njit
+def workspace(space, functions):
+    return inclusion.workspace(space, functions)
+
+
+@numba.njit
+def members(kind, delays):
+    return inclusion.members(kind, delays)
+
+
+@numba.njit
+def enclose(functions, middle, half, work):
+    inclusion.enclose(functions, middle, half, work)
+
+
+@numba.njit
+def phase_of(theta, tail, omega):
+    return inclusion._phase(theta, tail, omega)
+
+
+@numba.njit
+def holds(weights, along, gamma, work, room):
+    """Whether members with these weights exclude zero."""
+    for n in range(weights.shape[0]):
+        inclusion.mix(weights[n], work, room, n)
+    room.along[:] = along
+    return inclusion._holds(room, gamma)
+
+
+def enclosed(function, middle, half, work):
     """Enclose a function on an interval."""
-    space = function.space
-    none = np.zeros(len(space.polynomials))
-    inclusion.expand(space.arrays, middle, half, work)
-    inclusion.combine(space.arrays, *function.weights, none, work, index)
+    enclose(compiled([function]), middle, half, work)
 
 
 def divisor(work):
@@ -100,11 +127,10 @@ def divisor(work):
 def share_of_bound(function, exact, middle, half, work, t):
     """Exact error of an enclosure at a point of its interval, over its bound."""
     omega, t = mp.mpf(middle) + mp.mpf(half) * mp.mpf(t), mp.mpf(t)
-    centre = polynomial_at(work.f[0], t)
-    for k, theta in enumerate(exact.delays):
-        if work.c[0, k].any():
-            term = polynomial_at(work.c[0, k], t)
-            centre += term * mp.expj(-omega * theta)
+    centre = polynomial_at(work.f[0, 0], t)
+    for term, theta in zip(work.f[0, 1:], exact.delays, strict=True):
+        if term.any():
+            centre += polynomial_at(term, t) * mp.expj(-omega * theta)
     off = abs(exact(mp.mpc(0, omega)) * divisor(work) - centre)
     return float(off / mp.mpf(float(work.rest[0])))
 
@@ -115,7 +141,7 @@ def test_enclosures_hold_on_intervals_and_on_parts_of_them():
         # Exponentials of very long delays are fast on intervals where rounding prevails.
         function = draw(rng, longest=9.0 if trial % 3 == 0 else 2.0)
         exact, space = Exact(function), function.space
-        work = inclusion.workspace(space.arrays, 1)
+        work = workspace(space.arrays, 1)
         for _ in range(2):
             middle = float(rng.choice(space.corners)) * 10.0 ** rng.uniform(-1, 1)
             half = middle * 10.0 ** rng.uniform(-6, 0)
@@ -135,12 +161,12 @@ def test_a_factor_of_each_power_reaches_the_remainder():
     # (s - z)^4 has a constant fourth derivative: its remainder is the bound.
     for roots in ([-1e-3] * 4, [-1e-3] * 3 + [-1.0], [-2.0] * 7):
         function = Space([Polynomial.of_roots(roots)], []).function([1], [[]])
-        work = inclusion.workspace(function.space.arrays, 1)
+        work = workspace(function.space.arrays, 1)
         enclosed(function, 1.0, 0.3, work)
         assert share_of_bound(function, Exact(function), 1.0, 0.3, work, 1.0) <= 1.0
     # A part of a long piece keeps its remainder, here with an exponential on the part.
     function = Space([Polynomial.of_roots([-1.0] * 4)], [Fraction(1)]).function([0], [[1]])
-    exact, work = Exact(function), inclusion.workspace(function.space.arrays, 1)
+    exact, work = Exact(function), workspace(function.space.arrays, 1)
     for middle, half in ((1.0, 0.5), (1.4, 0.1), (1.45, 0.05)):
         enclosed(function, middle, half, work)
         for t in (-1.0, 0.0, 1.0):
@@ -164,7 +190,7 @@ def test_rounding_at_a_frequency(kind):
             kept = np.linalg.svd(rows)[2][2:].T
             chosen = [kept @ rng.normal(size=kept.shape[1]) for _ in space.polynomials]
             function = space.function([v[0] for v in chosen], [v[1:] for v in chosen])
-        work = inclusion.workspace(space.arrays, 1)
+        work = workspace(space.arrays, 1)
         enclosed(function, omega, 0.0, work)
         shares.append(share_of_bound(function, Exact(function), omega, 0.0, work, 0.0))
     assert max(shares) <= 1.0
@@ -177,7 +203,7 @@ def test_phase_of_an_exponential():
         theta = Fraction(10.0 ** rng.uniform(-3, 3)) / 3
         omega = 10.0 ** rng.uniform(-8, 7)
         near = float(theta)
-        phase, slip = inclusion._phase(near, float(theta - Fraction(near)), omega)
+        phase, slip = phase_of(near, float(theta - Fraction(near)), omega)
         exact = number(theta) * mp.mpf(omega)
         turn = abs(mp.expj(exact) - 1)
         off = abs(mp.expj(mp.mpf(phase) - exact) - 1) + 1.5 * EPSILON * turn
@@ -242,29 +268,23 @@ def test_zero_is_excluded_only_where_all_members_stay_on_one_side(shares):
         function = draw(rng, 4)
         space = function.space
         other = space.function(rng.normal(size=len(space.polynomials)), 0.0 * function.delayed)
-        work, room = (
-            inclusion.workspace(space.arrays, 2),
-            inclusion.members(3, len(space.delays)),
-        )
+        work = workspace(space.arrays, 2)
+        room = members(np.array([1, 1, 2]), len(space.delays))
         middle = float(rng.choice(space.corners)) * 10.0 ** rng.uniform(-1, 1)
         half = middle * 10.0 ** rng.uniform(-4, -0.3)
-        enclosed(function, middle, half, work)
-        enclosed(other, middle, half, work, 1)
-        along = work.f[0] / abs(work.f[0, 0])
+        enclose(compiled([function, other]), middle, half, work)
+        along = work.f[0, 0] / abs(work.f[0, 0, 0])
         along[1:] *= rng.uniform(-1, 1, 3)
         gamma = abs(along[0]) - np.abs(along[1:]).sum()
         if shares and gamma <= 0.0:
             continue
-        room.kind[:] = 1, 1, 2
-        size = abs(work.f[0, 0] / work.f[1, 0])
+        size = abs(work.f[0, 0, 0] / work.f[1, 0, 0])
         # The largest level at which the hull of two vertices excludes zero, with a term.
         level, step = 0.0, 0.5
         for _ in range(30):
-            for n, share in enumerate((0.0, 0.3j, 1.0)):
-                pair = [float(n < 2), share * (level + step) * size]
-                inclusion.mix(np.array(pair, complex), work, room, n)
-            room.along[:] = along
-            level += step * inclusion._holds(room, gamma if shares else 0.0)
+            shifts = np.array([0.0, 0.3j, 1.0]) * (level + step) * size
+            weights = np.column_stack(([1.0, 1.0, 0.0], shifts))
+            level += step * holds(weights, along, gamma if shares else 0.0, work, room)
             step *= 0.5
         if level == 0.0:
             continue
@@ -286,16 +306,15 @@ def test_a_function_moved_along_the_real_axis():
         if not function.space.delays:
             continue
         sigma = rng.choice([-1, 1]) * 10.0 ** rng.uniform(-2, 2.7) / function.space.longest
-        space, *weights = function.shifted(float(sigma))
+        space, functions = function.shifted(float(sigma))
         omega = 10.0 ** rng.uniform(-2, 1) / max(function.space.longest, 1.0)
         if rng.random() < 0.5:
             # Next to a root, where a small error of the root is a large one of its factor.
             omega = np.abs(space.arrays.roots.imag).max(initial=0.0) * (1.0 + 1e-12) or omega
-        work = inclusion.workspace(space.arrays, 1)
-        inclusion.expand(space.arrays, omega, 0.0, work)
-        inclusion.combine(space.arrays, *weights, work, 0)
+        work = workspace(space.arrays, 1)
+        enclose(functions, float(omega), 0.0, work)
         exact = Exact(function)(mp.mpc(float(sigma), omega)) * divisor(work)
-        off = abs(exact - mp.mpc(complex(work.f[0, 0])))
+        off = abs(exact - mp.mpc(complex(work.f[0, 0, 0])))
         shares.append(float(off / mp.mpf(float(work.rest[0]))))
     assert max(shares) <= 1.0
     assert max(shares) > 0.02
@@ -304,7 +323,7 @@ def test_a_function_moved_along_the_real_axis():
 def test_delays_that_are_equal_but_for_rounding():
     lags = [Fraction(1000), Fraction(1000) + Fraction(3, 10**14)]
     function = Space([Polynomial.of([1])], lags).function([0], [[1, -1]])
-    work = inclusion.workspace(function.space.arrays, 1)
+    work = workspace(function.space.arrays, 1)
     enclosed(function, 1e7, 1e6, work)
     for t in (-1.0, 1.0):
         assert share_of_bound(function, Exact(function), 1e7, 1e6, work, t) <= 1.0

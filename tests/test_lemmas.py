@@ -11,9 +11,9 @@ import pytest
 
 from armlock.engine import decide, inclusion
 from armlock.engine.decide import UNCONFINED, Family
-from armlock.engine.functions import Space, stacked
+from armlock.engine.functions import Space, compiled, stacked
 from armlock.engine.polynomials import Polynomial
-from tests.test_inclusion import Exact, draw, enclosed, mp, share_of_bound
+from tests.test_inclusion import Exact, draw, enclosed, mp, share_of_bound, workspace
 
 
 def test_differences_of_delays_that_are_no_floats():
@@ -28,7 +28,7 @@ def test_differences_of_delays_that_are_no_floats():
             continue
         space = Space([Polynomial.of([1])], [first, first + apart])
         function = space.function([0], [[1, -1]])
-        work = inclusion.workspace(space.arrays, 1)
+        work = workspace(space.arrays, 1)
         enclosed(function, middle, half, work)
         exact = Exact(function)
         for t in (-1.0, 0.0, 1.0):
@@ -49,11 +49,11 @@ def rows_of(rng):
     return space, [function, *others]
 
 
-def crossings_of(space, functions, y, lower, upper, begin, end):
+def crossings_of(functions, y, lower, upper, begin, end):
     """Find the crossings of rows, and the intervals that are not decided."""
-    return inclusion.cross(
-        space.arrays, *stacked(functions), y, lower, upper, begin, end, False, 1e-9, 5_000
-    )[:2]
+    rows = inclusion.Rows(y, lower, upper)
+    table, _ = inclusion.cross(compiled(functions), rows, begin, end, False, 1e-9, 5_000)
+    return table[table[:, 5] != 0.0], table[table[:, 5] == 0.0]
 
 
 def pair(functions, y, omega):
@@ -69,7 +69,7 @@ def test_each_crossing_is_where_it_is_said_to_be():
         space, functions = rows_of(rng)
         size = float(np.median(space.corners))
         y, most = rng.normal(size=3), np.full(3, 30.0)
-        table, _ = crossings_of(space, functions, y, -most, most, 1e-2 * size, 20.0 * size)
+        table, _ = crossings_of(functions, y, -most, most, 1e-2 * size, 20.0 * size)
         exact = [Exact(f) for f in functions]
         for row, x, spread, omega, width, jump in table[:20]:
             low, high = (mp.mpf(omega) + side * mp.mpf(width) for side in (-1, 1))
@@ -87,18 +87,19 @@ def test_each_crossing_is_where_it_is_said_to_be():
 
 
 def test_an_exponential_that_is_not_resolved_leaves_a_crossing_undecided():
-    # exp(-1e9 s) - x (1 + 1e-6 s) has zeros at abs(x) near 0.7, but no float resolves them.
-    space = Space([Polynomial.of([1]), Polynomial.of([1e6, 1.0])], [Fraction(10**9)])
+    # exp(-1e10 s) - x (1 + 1e-6 s) has zeros at abs(x) near 0.7, but no float resolves them.
+    space = Space([Polynomial.of([1]), Polynomial.of([1e6, 1.0])], [Fraction(10**10)])
     delayed = space.function([1, 0], [[1], [0]])
     other = space.function([0, Fraction(1, 10**6)], [[0], [0]])
     rows = [delayed, delayed * 0, other]
     one = np.ones(1)
-    found, undecided = crossings_of(space, rows, 0.0 * one, -one, one, 1e6, 1e6 + 5e-7)
+    found, undecided = crossings_of(rows, 0.0 * one, -one, one, 1e6, 1e6 + 5e-7)
     assert not len(found)
-    assert (undecided[:, 1] < -0.71).all()
-    assert (undecided[:, 2] > 0.71).all()
-    assert undecided[:, 3].min() == 1e6
-    assert undecided[:, 4].max() == 1e6 + 5e-7
+    _, x, spread, omega, width, _ = undecided.T
+    assert (x - spread < -0.71).all()
+    assert (x + spread > 0.71).all()
+    assert (omega - width).min() <= 1e6
+    assert (omega + width).max() >= 1e6 + 5e-7
 
 
 @pytest.mark.parametrize("where", ["begins", "ends"])
@@ -143,5 +144,5 @@ def test_rounding_does_not_confine_the_zeros_of_a_moved_function():
     for _ in range(400):
         weights = rng.uniform(0.1, 3.0, 2).tolist()
         function = space.function([1, sum(map(Fraction, weights))], [[0, 0], weights])
-        moved, *arrays = function.shifted(rng.uniform(30.0, 40.0))
-        assert decide.counts(moved, *(v[None] for v in arrays), most=1000) == UNCONFINED
+        moved = function.shifted(rng.uniform(30.0, 40.0))
+        assert decide.counts(*moved, most=1000) == UNCONFINED

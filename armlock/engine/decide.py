@@ -7,7 +7,7 @@ precision does not decide: then they say at which frequency.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from fractions import Fraction
@@ -19,8 +19,8 @@ import numpy as np
 
 from armlock.checks import FloatArray, IntArray
 from armlock.engine import inclusion
-from armlock.engine.functions import Function, Leading, Space, at, stacked
-from armlock.engine.inclusion import DISTANCE, REAL, Question
+from armlock.engine.functions import Function, Leading, Space, compiled, stacked
+from armlock.engine.inclusion import DISTANCE, Functions, Question
 from armlock.engine.polynomials import rounded
 
 #: What a count is where a root lies on the axis, or rounding does not decide on which side.
@@ -32,15 +32,11 @@ UNCONFINED = -2
 _MOST_STEPS = 1_500_000
 _MOST_SEARCHED = 2_000_000
 # Steps between two looks at the keyboard.
-_A_WHILE = np.int64(100_000)
-# Steps of a look at likely intervals before a search.
-_A_LOOK = np.int64(2_000)
+_A_WHILE = 100_000
+# Steps in likely intervals before a search.
+_A_LOOK = 2_000
 # Points that one thread counts at a time.
 _BLOCK = 256
-# Undecided intervals after which a search ends.
-_FEW = np.int64(16)
-# Narrower intervals, as shares of their frequency, are undecided.
-_NARROWEST = 1e-14
 
 
 class UndecidedError(RuntimeError):
@@ -54,22 +50,24 @@ class UndecidedError(RuntimeError):
         self.omega, self.index = omega, index
 
 
-def in_threads(function: Callable[[slice], Any], size: int, block: int) -> list[Any]:
-    """Return what a compiled function makes of the blocks of a range; Ctrl-C ends it."""
-    blocks = [slice(first, min(first + block, size)) for first in range(0, size, block)]
-    # A single block goes to a thread too: compiled functions do not react to Ctrl-C.
+def in_threads(function: Callable[[Any], Any], items: Iterable[Any]) -> list[Any]:
+    """Return what a compiled function makes of some items; Ctrl-C ends it."""
+    # A single item goes to a thread too: compiled functions do not react to Ctrl-C.
     pool = ThreadPoolExecutor(numba.config.NUMBA_NUM_THREADS)
     try:
-        return list(pool.map(function, blocks))
+        return list(pool.map(function, items))
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
 
 
+def blocks(size: int, block: int) -> list[slice]:
+    """Return the blocks of a range."""
+    return [slice(first, min(first + block, size)) for first in range(0, size, block)]
+
+
 def counts(
     space: Space,
-    steady: FloatArray,
-    delayed: FloatArray,
-    uncertain: FloatArray,
+    functions: Functions,
     *,
     leading: Leading | None = None,
     most: int = _MOST_STEPS,
@@ -80,8 +78,8 @@ def counts(
     ----------
     space : Space
         Of all functions.
-    steady, delayed, uncertain : float arrays, shapes (n, J), (n, J, K) and (n, J)
-        Weights S and W, and the error of S.
+    functions : Functions
+        The n functions, by their weights.
     leading : Leading, optional
         Of one function, with zeros at s = 0 that are not to count.
     most : int, optional
@@ -97,6 +95,7 @@ def counts(
     UndecidedError
         If a count takes too many steps.
     """
+    _, steady, delayed, uncertain = functions
     n = len(steady)
     # What weights are uncertain by counts as a term of any phase.
     ends = space.confined_from(steady, delayed, uncertain) * (1.0 if space.step else 2.0)
@@ -109,14 +108,12 @@ def counts(
 
     def some(block: slice) -> tuple[Any, ...]:
         k = here[block]
-        result: tuple[Any, ...] = inclusion.wind_many(
-            space.arrays, steady[k], delayed[k], uncertain[k],
-            np.full(k.size, begin), ends[k], most,
-        )  # fmt: skip
-        return result
+        chosen = Functions(space.arrays, steady[k], delayed[k], uncertain[k])
+        found: tuple[Any, ...] = inclusion.wind(chosen, np.full(k.size, begin), ends[k], most)
+        return found
 
     turn, first, last, undecided, steps = map(
-        np.concatenate, zip(*in_threads(some, here.size, _BLOCK), strict=True)
+        np.concatenate, zip(*in_threads(some, blocks(here.size, _BLOCK)), strict=True)
     )
     if (steps >= most).any():
         k = int(np.argmax(steps >= most))
@@ -159,13 +156,12 @@ def count(function: Function, common: int = 0, *, most: int = _MOST_STEPS) -> in
         BOUNDARY with another zero on the axis, or where rounding does not decide; UNCONFINED.
     """
     leading = function.leading()
-    steady, delayed = stacked([function])
+    functions = compiled([function])
     if leading is None or leading.order > common:
-        confined = np.isfinite(function.space.confined_from(steady, delayed)[0])
-        return BOUNDARY if confined else UNCONFINED
-    exact = np.zeros_like(steady)
+        end = function.space.confined_from(functions.steady, functions.delayed)[0]
+        return BOUNDARY if np.isfinite(end) else UNCONFINED
     begin = leading if leading.order else None
-    return int(counts(function.space, steady, delayed, exact, leading=begin, most=most)[0])
+    return int(counts(function.space, functions, leading=begin, most=most)[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,8 +194,8 @@ class Family:
         """The space of the functions."""
         return self.functions[0].space
 
-    def question(self) -> Question:
-        """Return the family as compiled functions take it."""
+    def question(self, goal: int, start: float, tolerance: float) -> Question:
+        """Return the family, and what is looked for, as compiled functions take them."""
         shape = len(self.tests), max(map(len, self.tests))
         kind = np.zeros(shape, np.int64)
         weights = np.zeros((*shape, len(self.functions)), np.complex128)
@@ -207,8 +203,8 @@ class Family:
         for i, test in enumerate(self.tests):
             for n, member in enumerate(test):
                 kind[i, n], weights[i, n], slopes[i, n] = member
-        arc = np.zeros((0, 4)) if self.arc is None else np.array(self.arc, np.float64)
-        return Question(kind, weights, slopes, arc, self.loose)
+        arc = np.array(self.arc or np.zeros((0, 4)), np.float64)
+        return Question(kind, weights, slopes, arc, self.loose, goal, start, tolerance)
 
     def _members(
         self, test: Sequence[tuple[int, Sequence[float], Sequence[float]]], level: float
@@ -298,53 +294,28 @@ class Family:
         )
 
 
-def _walk(arguments: tuple[Any, ...], _: slice) -> tuple[Any, ...]:
-    """Walk in a thread, so that Ctrl-C reaches the other one."""
-    found: tuple[Any, ...] = inclusion.walk(*arguments)
-    return found
+def _searched(
+    functions: Functions, question: Question, pending: FloatArray, best: float, where: float
+) -> tuple[float, float, FloatArray]:
+    """Walk over intervals, the last first; return the best value, where, and what is undecided.
 
-
-class _Search:
-    """A family, and how it is walked."""
-
-    def __init__(self, family: Family, goal: int) -> None:
-        space = family.space
-        self.family, self.goal, self.steps = family, goal, 0
-        self.fixed = (space.arrays, *stacked(family.functions))
-        self.question = family.question()
-
-    def look(
-        self, likely: FloatArray, best: float, where: float, start: float, tolerance: float
-    ) -> tuple[float, float]:
-        """Look for good values in intervals for a few steps; return the best, and where."""
-        _, _, best, where, _ = inclusion.walk(
-            *self.fixed, self.question, np.ascontiguousarray(likely), self.goal,
-            best, where, start, tolerance, _NARROWEST, _A_LOOK, _FEW,
-        )  # fmt: skip
-        return best, where
-
-    def run(
-        self, pending: FloatArray, best: float, where: float, start: float, tolerance: float
-    ) -> tuple[float, float, FloatArray]:
-        """Walk over intervals, the last first; return the best, where, and what is left."""
-        undecided = np.zeros((0, 2))
-        while len(pending) and len(undecided) < _FEW:
-            arguments = (
-                *self.fixed, self.question, np.ascontiguousarray(pending), self.goal,
-                best, where, start, tolerance, _NARROWEST, _A_WHILE, _FEW,
-            )  # fmt: skip
-            [found] = in_threads(partial(_walk, arguments), 1, 1)
-            pending, more, best, where, steps = found
-            undecided = np.concatenate((undecided, more))
-            self.steps += steps
-            if self.steps > _MOST_SEARCHED:
-                omega = float(pending[-1, 0])
-                raise UndecidedError(
-                    f"a search takes more than {_MOST_SEARCHED:.0e} steps, at {omega:.3g}"
-                    " rad/s",
-                    omega,
-                )
-        return best, where, undecided
+    Raises
+    ------
+    UndecidedError
+        If it takes too many steps.
+    """
+    steps, undecided = 0, np.zeros((0, 2))
+    while len(pending) and len(undecided) < inclusion.FEW_UNDECIDED:
+        walk = partial(inclusion.walk, functions, question, pending, best, where)
+        [(pending, more, best, where, taken)] = in_threads(walk, [_A_WHILE])
+        undecided, steps = np.concatenate((undecided, more)), steps + taken
+        if steps > _MOST_SEARCHED:
+            omega = float(pending[-1, 0])
+            raise UndecidedError(
+                f"a search takes more than {_MOST_SEARCHED:.0e} steps, at {omega:.3g} rad/s",
+                omega,
+            )
+    return best, where, undecided
 
 
 def least(
@@ -385,13 +356,13 @@ def least(
     UndecidedError
         If double precision, or the steps allowed, do not decide it.
     """
-    search = _Search(family, goal)
+    functions, question = compiled(family.functions), family.question(goal, start, tolerance)
     corners, level = family.space.corners, min(best, 1e300)
     floor = low or family.begins(level) or 1e-4 * corners[0]
     end = min(family.ends(level), high)
     ceiling = end if np.isfinite(end) else 1e4 * corners[-1]
-    likely = _likely(family, goal, floor, max(ceiling, 2.0 * floor), start)
-    best, where = search.look(likely, best, where, start, tolerance)
+    likely = _likely(family.space, functions, question, floor, max(ceiling, 2.0 * floor))
+    _, _, best, where, _ = inclusion.walk(functions, question, likely, best, where, _A_LOOK)
     if best <= start:
         return best, where
     level = start + (best - start) * (1.0 - tolerance)
@@ -408,7 +379,7 @@ def least(
     edges[0], edges[-1] = begin, end
     cover = np.column_stack((edges[:-1], edges[1:]))
     order = np.argsort(np.modf(np.arange(len(cover)) * 0.6180339887498949)[0])
-    best, where, left = search.run(cover[order], best, where, start, tolerance)
+    best, where, left = _searched(functions, question, cover[order], best, where)
     if len(left):
         omega = float(left[0, 0])
         raise UndecidedError(f"rounding does not decide at {omega:.6g} rad/s", omega)
@@ -441,14 +412,15 @@ def excludes(family: Family, begin: float = 0.0) -> bool:
     if end <= begin:
         return True
     # At a distance of zero nothing is nearer, so that nothing is searched.
-    nothing = 0.0, np.nan, 0.0, 0.0
-    _, _, left = _Search(family, DISTANCE).run(np.array([[begin, end]]), *nothing)
+    question, axis = family.question(DISTANCE, 0.0, 0.0), np.array([[begin, end]])
+    *_, left = _searched(compiled(family.functions), question, axis, 0.0, np.nan)
     return not len(left)
 
 
-def _likely(family: Family, goal: int, low: float, high: float, start: float) -> FloatArray:
+def _likely(
+    space: Space, functions: Functions, question: Question, low: float, high: float
+) -> FloatArray:
     """Intervals of a sample that look best: only what is looked at first depends on them."""
-    space = family.space
     grids = [np.geomspace(low, high, 500)]
     if space.longest:
         # One turn of the longest delay at each frequency, and the first hundred turns.
@@ -458,28 +430,13 @@ def _likely(family: Family, goal: int, low: float, high: float, start: float) ->
         if root.imag > 0.0:
             off = max(abs(root.real), 1e-9 * root.imag) * np.geomspace(1e-2, 1e3, 24)
             grids += [root.imag - off, root.imag + off]
-    omega = np.unique(np.concatenate(grids))
-    omega = omega[(omega >= low) & (omega <= high)]
-    if omega.size < 3:
-        return np.array([[low, high]])
-    f, g, *loose = at(family.functions, omega)
-    radius = sum((np.abs(r) for r in loose), np.zeros(omega.size))
-    crossing, value = inclusion.aims(goal, f, g, radius, omega)
-    if goal == DISTANCE or loose:
-        k = 1 + np.argsort(value[1:-1])[:8]
-        spans = np.column_stack((omega[k - 1], omega[k + 1]))
-    else:
-        k = np.flatnonzero((crossing[1:] < 0.0) != (crossing[:-1] < 0.0))
-        share = crossing[k] / (crossing[k] - crossing[k + 1])
-        with np.errstate(invalid="ignore", divide="ignore"):
-            if goal == REAL:
-                # It may pass through infinity, but one over it does not.
-                rough = 1.0 / value[k] + share * (1.0 / value[k + 1] - 1.0 / value[k])
-                rough = np.where(rough > 0.0, 1.0 / rough, np.inf)
-            else:
-                rough = value[k] + share * (value[k + 1] - value[k])
-        rough = np.where(rough > start, rough, np.inf)
-        k = k[np.argsort(rough)][:60]
-        spans = np.column_stack((omega[k], omega[k + 1]))
+    omega = np.unique(np.concatenate(grids).clip(low, high))
+    crossing, value = inclusion.sample(functions, question, omega)
+    rank = np.minimum(value[1:], value[:-1])
+    if question.goal != DISTANCE and not question.loose:
+        changes = (crossing[1:] < 0.0) != (crossing[:-1] < 0.0)
+        highest = np.maximum(value[1:], value[:-1])
+        rank = np.where(changes & (rank > question.start), highest, np.inf)
     # The best last: the last interval is walked first.
-    return spans[::-1]
+    k = np.argsort(rank)[59::-1]
+    return np.column_stack((omega[k], omega[k + 1]))

@@ -22,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from armlock.checks import ComplexArray, FloatArray
+from armlock.engine import inclusion
 from armlock.engine.inclusion import EPSILON, Arrays
 from armlock.engine.polynomials import Polynomial
 
@@ -310,10 +311,10 @@ class Function:
             value, slope = value + q * g, slope + dq * g + q * dg
         return value, slope
 
-    def shifted(self, sigma: float) -> tuple[Space, FloatArray, FloatArray, FloatArray]:
-        """Return the function s -> F(s + sigma): its space, S, W, and the error of S.
+    def shifted(self, sigma: float) -> tuple[Space, inclusion.Functions]:
+        """Return the function s -> F(s + sigma): its space, and its weights.
 
-        What exponentials and weights round by is part of that error (Lemma 17).
+        What exponentials and weights round by is part of the error of S (Lemma 17).
         """
         polynomials = []
         for p in self.space.polynomials:
@@ -335,12 +336,18 @@ class Function:
         turned = delayed * (1.0 + change)
         grown = np.abs(change) + (1.0 + change) * (1.0 + abs(sigma) * space.arrays.delays)
         sizes = np.abs(steady) + np.abs(delayed) @ grown
-        return space, steady + delayed @ change, turned, (8.0 + change.size) * EPSILON * sizes
+        parts = steady + delayed @ change, turned, (8.0 + change.size) * EPSILON * sizes
+        return space, inclusion.Functions(space.arrays, *(part[None] for part in parts))
 
     def at(self, omega: npt.ArrayLike) -> ComplexArray:
         """Evaluate at s = j omega, times one positive number at each frequency."""
         value: ComplexArray = at([self], omega)[0]
         return value
+
+
+def common_zeros(n: Function, m: Function) -> int:
+    """Order of the zero at s = 0 that two functions have in common."""
+    return min((lead.order for f in (n, m) if (lead := f.leading())), default=0)
 
 
 def _exactly(value: Fraction) -> Any:
@@ -359,16 +366,16 @@ def stacked(functions: Sequence[Function]) -> tuple[FloatArray, FloatArray]:
     return np.array(s), np.array(w)
 
 
+def compiled(functions: Sequence[Function]) -> inclusion.Functions:
+    """Return functions of one space, with rounded weights, as compiled functions take them."""
+    steady, delayed = stacked(functions)
+    return inclusion.Functions(
+        functions[0].space.arrays, steady, delayed, np.zeros_like(steady)
+    )
+
+
 def at(functions: Sequence[Function], omega: npt.ArrayLike) -> ComplexArray:
     """Evaluate functions at frequencies, all times one positive number at each frequency."""
-    arrays, (steady, delayed) = functions[0].space.arrays, stacked(functions)
-    flat = np.ravel(omega)
-    turn = np.expm1(-1j * np.multiply.outer(flat, arrays.delays))
-    found = np.zeros((len(functions), flat.size), np.complex128)
-    by = 1.0 / np.hypot(flat, arrays.scale[:, None])
-    for j, lead in enumerate(arrays.lead):
-        p = np.full(flat.size, complex(lead))
-        for root, present, share in zip(arrays.roots[j], arrays.present[j], by, strict=True):
-            p *= (1j * flat - root) * share if present else share
-        found += p * (steady[:, j, None] + delayed[:, j] @ turn.T)
+    flat = np.ravel(np.asarray(omega, np.float64))
+    found: ComplexArray = inclusion.values(compiled(functions), flat)
     return found.reshape(len(functions), *np.shape(omega))

@@ -1,4 +1,4 @@
-"""Functions on an interval of the imaginary axis, enclosed by Taylor polynomials; compiled.
+"""Functions on intervals of the imaginary axis, enclosed by Taylor polynomials; compiled.
 
 A space holds polynomials p_j and delays theta_k, and a function of the space is
 
@@ -8,6 +8,12 @@ On the interval s = j (m + r t) with -1 <= t <= 1, F is enclosed by F_0 + F_1 t 
 F_3 t^3, terms C_k(t) of any phase, and a remainder. The lemmas are those of the book's appendix
 "The lemmas behind a count". All polynomials are divided by one positive number for each
 interval, so that arguments and signs remain.
+
+In order: the enclosure; whether it excludes zero; and the walks along the axis, which halve
+intervals until each is decided. An interval that double precision does not halve any more is
+undecided (`_halve`). All compiled code of the engine is in this module, because numba compiles
+a function again when its own file changes, but not when that of a function it calls does. No
+number is written out as an argument of a function: numba would compile it again for that one.
 """
 
 from __future__ import annotations
@@ -27,16 +33,25 @@ _FAST = 1.5
 # Two of them that turn by no more than this beside each other share a free phase.
 _TOGETHER = 0.3
 # An interval over which an exponential turns by more than twice this, in rad, is a long one.
-_FAR = 30.0
-# Most undecided intervals of a row, on average over the rows of a call.
-_MOST_UNDECIDED = 4096
+_LONG = 30.0
 # Polynomials are rescaled before they leave these bounds.
 _HUGE = 1e150
 # A piece of the axis is this share of the distance to the roots, together; it serves intervals
 # down to one of so many of its length.
 _PIECE, _SUBINTERVALS = 0.02, 4096.0
+# Undecided intervals after which a search ends; and, of a row on average, after which rows are
+# followed no further. Rounding hides much of the axis where N is nearly a multiple of M.
+FEW_UNDECIDED, _MANY_UNDECIDED = 16, 4096
+# Room for halves of halves: geometric ones to a few rad/s apart, and 52 more.
+_DEEPEST = 300
 # The goals of a search, see `_aim`.
 DISTANCE, PHASE, DELAY, REAL = range(4)
+
+_inner = njit(nogil=True, error_model="numpy", inner=True)
+_entry = njit(nogil=True, error_model="numpy")
+
+
+# ------------------------------------------------------------------------------ the enclosure
 
 
 class Arrays(NamedTuple):
@@ -68,6 +83,25 @@ class Arrays(NamedTuple):
     tails: FloatArray
 
 
+class Functions(NamedTuple):
+    """Functions of one space, as compiled functions take them.
+
+    Attributes
+    ----------
+    space : Arrays
+        Of all functions.
+    steady, delayed : float arrays, shapes (n, J) and (n, J, K)
+        The weights S and W.
+    uncertain : float array, shape (n, J)
+        The error of S.
+    """
+
+    space: Arrays
+    steady: FloatArray
+    delayed: FloatArray
+    uncertain: FloatArray
+
+
 class Workspace(NamedTuple):
     """Arrays that an inclusion of some functions fills, see `include`."""
 
@@ -83,14 +117,15 @@ class Workspace(NamedTuple):
     turn: ComplexArray  # (K, ORDER): Taylor coefficients of these exponentials, less one
     angle: FloatArray  # (K,): by how much they turn, in rad, over half the interval
     slip: FloatArray  # (K,): error of their phases at the middle
-    f: ComplexArray  # (functions, ORDER)
-    c: ComplexArray  # (functions, K, ORDER): terms of any phase, by the delay that leads
+    # (functions, 1 + K, ORDER): what no free phase turns, then what that of each delay turns.
+    f: ComplexArray
     rest: FloatArray  # (functions,): remainder and rounding
+    rounding: FloatArray  # (functions,): the rounding alone
     g: ComplexArray  # (ORDER,), and (ORDER + 1,) bounds
     b: FloatArray
 
 
-@njit(nogil=True, error_model="numpy")
+@_inner
 def workspace(space: Arrays, functions: int) -> Workspace:
     """Return a workspace for so many functions."""
     j, k = space.lead.size, space.delays.size
@@ -107,15 +142,15 @@ def workspace(space: Arrays, functions: int) -> Workspace:
         np.zeros((k, ORDER), np.complex128),
         np.zeros(k),
         np.zeros(k),
-        np.zeros((functions, ORDER), np.complex128),
-        np.zeros((functions, k, ORDER), np.complex128),
+        np.zeros((functions, 1 + k, ORDER), np.complex128),
+        np.zeros(functions),
         np.zeros(functions),
         np.zeros(ORDER, np.complex128),
         np.zeros(ORDER + 1),
     )
 
 
-@njit(nogil=True, error_model="numpy")
+@_inner
 def _expand_piece(space: Arrays, m: float, r: float, work: Workspace) -> None:
     """Expand all polynomials on a piece of the axis, factor by factor (Lemma 1)."""
     n, top = space.scale.size, 0
@@ -170,7 +205,7 @@ _TURN = 6.283185303211212, 3.968374295837407e-09, 2.2884754904439327e-17
 _MOST_TURNS = 2.0**26
 
 
-@njit(nogil=True, error_model="numpy")
+@_inner
 def _phase(theta: float, tail: float, m: float) -> tuple[float, float]:
     """Return (theta + tail) m less whole turns, and a bound of its error in rad (Lemma 6)."""
     product, off = theta * m, tail * m
@@ -188,13 +223,11 @@ def _phase(theta: float, tail: float, m: float) -> tuple[float, float]:
     return phase + (low + off), EPSILON * min(2.0 * product, 16.0) + wrong
 
 
-@njit(nogil=True, error_model="numpy")
-def expand(space: Arrays, m: float, r: float, work: Workspace) -> None:
-    """Expand polynomials and exponentials about j m (Lemmas 1 to 3).
-
-    The polynomials come from an expansion on a longer piece of the axis where one serves.
-    """
-    inside, own = abs(m - work.piece[0]) + r <= work.piece[1], False
+@_inner
+def _expand_polynomials(space: Arrays, m: float, r: float, work: Workspace) -> None:
+    """Expand all polynomials about j m, from a longer piece of the axis where one serves."""
+    own = False
+    inside = abs(m - work.piece[0]) + r <= work.piece[1]
     if not inside or r < work.piece[1] / _SUBINTERVALS:
         nearest = 0.0
         for j in range(space.lead.size):
@@ -204,7 +237,7 @@ def expand(space: Arrays, m: float, r: float, work: Workspace) -> None:
                     z = space.roots[j, k]
                     total += 1.0 / np.sqrt(z.real * z.real + (m - z.imag) * (m - z.imag))
             nearest = max(nearest, total)
-        length = min(_PIECE / nearest, 0.5 * _SUBINTERVALS * r) if nearest > 0.0 else 2.0 * r
+        length = min(_PIECE / nearest, 0.5 * _SUBINTERVALS * r) if nearest > 0.0 else 0.0
         own = length <= 4.0 * r
         _expand_piece(space, m, r if own else length, work)
     ratio = r / work.piece[1] if work.piece[1] > 0.0 else 1.0
@@ -221,6 +254,14 @@ def expand(space: Arrays, m: float, r: float, work: Workspace) -> None:
             work.bound[j, i] = power * bound[i]
             power *= ratio
         work.bound[j, ORDER] = bound[ORDER]
+    if own:
+        # An expansion on a piece this long is too coarse for the parts of the interval.
+        work.piece[1] = -1.0
+
+
+@_inner
+def _expand_exponentials(space: Arrays, m: float, r: float, work: Workspace) -> None:
+    """Expand all exponentials about j m, those that turn fast relative to a free phase."""
     lead = -1
     for k in range(space.delays.size):
         # Delays whose exponentials turn fast share one free phase with those next to them.
@@ -242,107 +283,124 @@ def expand(space: Arrays, m: float, r: float, work: Workspace) -> None:
         for i in range(1, ORDER):
             q = complex(q.imag, -q.real) * (work.angle[k] / i)
             work.turn[k, i] = q
-    if own:
-        # An expansion on a piece this long is too coarse for the parts of the interval.
-        work.piece[1] = -1.0
 
 
-@njit(nogil=True, error_model="numpy")
-def combine(
-    space: Arrays,
-    steady: FloatArray,
-    delayed: FloatArray,
-    uncertain: FloatArray,
-    work: Workspace,
-    index: int,
-) -> None:
-    """Enclose function `index` with weights S and W on the expanded interval (Lemmas 4, 7).
+@_inner
+def expand(space: Arrays, m: float, r: float, work: Workspace) -> None:
+    """Expand polynomials and exponentials about j m (Lemmas 1 to 3)."""
+    _expand_polynomials(space, m, r, work)
+    _expand_exponentials(space, m, r, work)
 
-    `uncertain` holds the errors of S.
+
+@_inner
+def _bracket(
+    steady: float, row: FloatArray, uncertain: float, lead: int, work: Workspace
+) -> tuple[bool, float]:
+    """Expand S + sum_k W_k (exp(-s theta_k) - 1), as far as it follows one free phase.
+
+    With `lead` -1 it is what no free phase turns, and otherwise what the free phase of that
+    delay does. Fills `g` and its bounds `b`; returns whether a weight acts, and the error of g.
     """
-    delays = space.delays.size
-    sums, rest = (16.0 + 2.0 * (steady.size + delays)) * EPSILON, 0.0
-    few = (2.0 + delays) * EPSILON
-    for i in range(ORDER):
-        work.f[index, i] = 0.0
-        for k in range(delays):
-            work.c[index, k, i] = 0.0
-    for j in range(steady.size):
-        # First what no free phase turns, then in turn what follows each free phase.
-        k, lead, used = 0, -1, steady[j] != 0.0 or uncertain[j] != 0.0
-        first, wrong = steady[j], uncertain[j] + abs(steady[j]) * few
-        for fast in range(delays):
-            if work.lead[fast] >= 0 and delayed[j, fast] != 0.0:
-                first -= delayed[j, fast]
-                wrong += abs(delayed[j, fast]) * few
+    few, wrong, used = (2.0 + row.size) * EPSILON, 0.0, False
+    work.g[:] = 0.0
+    work.b[ORDER] = 0.0
+    if lead < 0:
+        used = steady != 0.0 or uncertain != 0.0
+        wrong = uncertain + abs(steady) * few
+        for k in range(row.size):
+            if work.lead[k] >= 0 and row[k] != 0.0:
+                steady -= row[k]
+                wrong += abs(row[k]) * few
                 used = True
-        while True:
+        work.g[0] = steady
+    for k in range(row.size):
+        weight, size, x = row[k], abs(row[k]), work.angle[k]
+        if work.lead[k] != lead or weight == 0.0:
+            continue
+        used, power, grown = True, size, x + x * x
+        if lead >= 0:
+            work.g[0] += weight
+            wrong += size * few
+        for i in range(ORDER):
+            work.g[i] += weight * work.turn[k, i]
+            power *= x / (i + 1)
+        work.b[ORDER] += power
+        wrong += size * few * (abs(work.turn[k, 0]) + 6.0 * grown)
+        wrong += size * work.slip[k] * (1.0 + grown)
+    for i in range(ORDER - 1, -1, -1):
+        work.b[i] = abs(work.g[i]) + (i + 1) * work.b[i + 1]
+    return used, wrong
+
+
+@_inner
+def combine(functions: Functions, n: int, work: Workspace) -> None:
+    """Enclose function n on the expanded interval (Lemmas 4, 7)."""
+    steady, delayed, uncertain = (
+        functions.steady[n],
+        functions.delayed[n],
+        functions.uncertain[n],
+    )
+    delays = functions.space.delays.size
+    sums, rest, rounding = (16.0 + 2.0 * (steady.size + delays)) * EPSILON, 0.0, 0.0
+    work.f[n] = 0.0
+    for j in range(steady.size):
+        for lead in range(-1, delays):
+            if lead >= 0 and work.lead[lead] != lead:
+                continue
+            used, wrong = _bracket(steady[j], delayed[j], uncertain[j], lead, work)
+            if not used:
+                continue
+            rest += work.bound[j, ORDER] * work.b[0]
+            rounding += work.bound[j, 0] * ((work.error[j] + sums) * work.b[0] + wrong)
             for i in range(ORDER):
-                work.g[i] = 0.0
-            work.g[0], work.b[ORDER] = first, 0.0
-            while k < delays and work.lead[k] == lead:
-                weight, size, x = delayed[j, k], abs(delayed[j, k]), work.angle[k]
-                if weight != 0.0:
-                    used, power, grown = True, size, x + x * x
-                    if lead >= 0:
-                        work.g[0] += weight
-                        wrong += size * few
-                    for i in range(ORDER):
-                        work.g[i] += weight * work.turn[k, i]
-                        power *= x / (i + 1)
-                    work.b[ORDER] += power
-                    wrong += size * few * (abs(work.turn[k, 0]) + 6.0 * grown)
-                    wrong += size * work.slip[k] * (1.0 + grown)
-                k += 1
-            if used:
-                for i in range(ORDER - 1, -1, -1):
-                    work.b[i] = abs(work.g[i]) + (i + 1) * work.b[i + 1]
-                rest += work.bound[j, ORDER] * work.b[0]
-                rest += work.bound[j, 0] * ((work.error[j] + sums) * work.b[0] + wrong)
-                for i in range(ORDER):
-                    total = 0j
-                    for low in range(i + 1):
-                        total += work.p[j, low] * work.g[i - low]
-                    rest += work.bound[j, i] * work.b[ORDER - i]
-                    if lead < 0:
-                        work.f[index, i] += total
-                    else:
-                        work.c[index, lead, i] += total
-            if k == delays:
-                break
-            lead, first, wrong, used = work.lead[k], 0.0, 0.0, False
+                total = 0j
+                for low in range(i + 1):
+                    total += work.p[j, low] * work.g[i - low]
+                rest += work.bound[j, i] * work.b[ORDER - i]
+                work.f[n, 1 + lead, i] += total
     # The bounds round too.
-    work.rest[index] = rest * (1.0 + 1e-12)
+    work.rest[n] = (rest + rounding) * (1.0 + 1e-12)
+    work.rounding[n] = rounding
 
 
-@njit(nogil=True, error_model="numpy")
-def _acts(terms: ComplexArray, n: int, k: int) -> bool:
-    """Whether term k of a function or member is not zero."""
-    size = 0.0
+@_inner
+def enclose(functions: Functions, m: float, r: float, work: Workspace) -> None:
+    """Enclose functions on an interval, as many as the workspace has room for."""
+    expand(functions.space, m, r, work)
+    for n in range(work.f.shape[0]):
+        combine(functions, n, work)
+
+
+@_entry
+def values(functions: Functions, omega: FloatArray) -> ComplexArray:
+    """Functions at frequencies, times positive numbers, shape (functions, frequencies)."""
+    n = functions.steady.shape[0]
+    found, work = np.empty((n, omega.size), np.complex128), workspace(functions.space, n)
+    for i in range(omega.size):
+        enclose(functions, omega[i], 0.0, work)
+        found[:, i] = work.f[:, 0, 0]
+    return found
+
+
+@_inner
+def _at(c: ComplexArray, t: float) -> Any:
+    """Evaluate a Taylor polynomial."""
+    return c[0] + t * (c[1] + t * (c[2] + t * c[3]))
+
+
+# -------------------------------------------------------------------- whether zero is excluded
+
+
+@_inner
+def _acts(parts: ComplexArray, k: int) -> bool:
+    """Whether part k of a function or member counts: the first, or a term that is not zero."""
+    acts = k == 0
     for i in range(ORDER):
-        size += abs(terms[n, k, i])
-    return size > 0.0
+        acts |= parts[k, i] != 0.0
+    return acts
 
 
-@njit(nogil=True, error_model="numpy")
-def values(
-    space: Arrays, steady: FloatArray, delayed: FloatArray, omega: FloatArray
-) -> tuple[ComplexArray, FloatArray]:
-    """Return functions at frequencies, times positive numbers, and bounds of rounding."""
-    functions = steady.shape[0]
-    found = np.empty((functions, omega.size), np.complex128)
-    errors = np.empty((functions, omega.size))
-    work = workspace(space, functions)
-    exact = np.zeros(space.lead.size)
-    for n in range(omega.size):
-        expand(space, omega[n], 0.0, work)
-        for i in range(functions):
-            combine(space, steady[i], delayed[i], exact, work, i)
-            found[i, n], errors[i, n] = work.f[i, 0], work.rest[i]
-    return found, errors
-
-
-@njit(nogil=True, error_model="numpy")
+@_inner
 def _divide(c: ComplexArray, by: ComplexArray, quotient: ComplexArray) -> float:
     """Divide Taylor polynomials; return a bound of what is left of higher powers (Lemma 9)."""
     left = 0.0
@@ -357,7 +415,7 @@ def _divide(c: ComplexArray, by: ComplexArray, quotient: ComplexArray) -> float:
     return left
 
 
-@njit(nogil=True, error_model="numpy")
+@_inner
 def _least(
     c: ComplexArray, along: ComplexArray, gamma: float, vertex: bool, q: ComplexArray
 ) -> tuple[float, float]:
@@ -386,51 +444,43 @@ class Members(NamedTuple):
     """Members of a test: vertices (kind 1) and terms of any phase (kind 2), see `mix`."""
 
     kind: IntArray  # (members,)
-    v: ComplexArray  # (members, ORDER)
-    c: ComplexArray  # (members, K, ORDER)
+    v: ComplexArray  # (members, 1 + K, ORDER), as `f` of a workspace
     rest: FloatArray  # (members,)
-    used: BoolArray  # (members,): whether a member has terms of its own
     along: ComplexArray  # (ORDER,), of the last test that held: direction or polynomial
     slow: ComplexArray  # (ORDER,)
     q: ComplexArray  # (ORDER,)
 
 
-@njit(nogil=True, error_model="numpy")
-def members(size: int, delays: int) -> Members:
-    """Return room for so many members."""
+@_inner
+def members(kind: IntArray, delays: int) -> Members:
+    """Return room for members of these kinds."""
+    size = kind.size
     return Members(
-        np.zeros(size, np.int64),
-        np.zeros((size, ORDER), np.complex128),
-        np.zeros((size, delays, ORDER), np.complex128),
+        kind,
+        np.zeros((size, 1 + delays, ORDER), np.complex128),
         np.zeros(size),
-        np.zeros(size, np.bool_),
         np.zeros(ORDER, np.complex128),
         np.zeros(ORDER, np.complex128),
         np.zeros(ORDER, np.complex128),
     )
 
 
-@njit(nogil=True, error_model="numpy")
+@_inner
 def mix(weights: ComplexArray, work: Workspace, room: Members, n: int) -> None:
     """Make member n, a linear combination of the functions."""
     room.v[n] = 0.0
-    room.c[n] = 0.0
     room.rest[n] = 0.0
-    room.used[n] = False
     for f in range(weights.size):
         a = weights[f]
         if a != 0.0:
-            for i in range(ORDER):
-                room.v[n, i] += a * work.f[f, i]
-            for k in range(work.c.shape[1]):
-                if _acts(work.c, f, k):
-                    room.used[n] = True
+            for k in range(work.f.shape[1]):
+                if _acts(work.f[f], k):
                     for i in range(ORDER):
-                        room.c[n, k, i] += a * work.c[f, k, i]
-            room.rest[n] += abs(a) * (work.rest[f] + 4.0 * EPSILON * abs(work.f[f, 0]))
+                        room.v[n, k, i] += a * work.f[f, k, i]
+            room.rest[n] += abs(a) * (work.rest[f] + 4.0 * EPSILON * abs(work.f[f, 0, 0]))
 
 
-@njit(nogil=True, error_model="numpy")
+@_inner
 def _holds(room: Members, gamma: float) -> bool:
     """Whether every vertex exceeds all terms of any phase, along a direction or in shares."""
     unit = gamma if gamma > 0.0 else 1.0
@@ -439,13 +489,12 @@ def _holds(room: Members, gamma: float) -> bool:
         for n in range(room.kind.size):
             if room.kind[n] != kind:
                 continue
-            a, b = _least(room.v[n], room.along, gamma, kind == 1, room.q)
-            a, b = a - room.rest[n] / unit, b - room.rest[n] / unit
-            if room.used[n]:
-                for k in range(room.c.shape[1]):
-                    if _acts(room.c, n, k):
-                        e, f = _least(room.c[n, k], room.along, gamma, False, room.q)
-                        a, b = a + e, b + f
+            a, b = -room.rest[n] / unit, -room.rest[n] / unit
+            for k in range(room.v.shape[1]):
+                if _acts(room.v[n], k):
+                    vertex = kind == 1 and k == 0
+                    e, f = _least(room.v[n, k], room.along, gamma, vertex, room.q)
+                    a, b = a + e, b + f
             if kind == 2:
                 low, high = low + a, high + b
             elif not min(low + a, high + b) > 0.0:
@@ -453,7 +502,7 @@ def _holds(room: Members, gamma: float) -> bool:
     return True
 
 
-@njit(nogil=True, error_model="numpy")
+@_inner
 def excludes_zero(room: Members) -> int:
     """Whether zero is in no member of the hull of the vertices, after any terms (Lemmas 8, 9).
 
@@ -464,33 +513,30 @@ def excludes_zero(room: Members) -> int:
     slow[:] = 0.0
     for n in range(room.kind.size):
         if room.kind[n] == 2:
-            common += abs(room.v[n, 0])
-            for k in range(room.c.shape[1]):
-                common += abs(room.c[n, k, 0])
-    turned, low, high, last = 1.0 + 0j, 10.0, -10.0, 0
+            for k in range(room.v.shape[1]):
+                common += abs(room.v[n, k, 0])
+    turned, low, high, last, own = 1.0 + 0j, 10.0, -10.0, 0, 0.0
     for n in range(room.kind.size):
         if room.kind[n] != 1:
             continue
-        size = abs(room.v[n, 0])
-        own = common
-        if room.used[n]:
-            for k in range(room.c.shape[1]):
-                own += abs(room.c[n, k, 0])
+        size, own = abs(room.v[n, 0, 0]), common
+        for k in range(1, room.v.shape[1]):
+            own += abs(room.v[n, k, 0])
         if not own < size < np.inf:
             return 0
         if vertices == 0:
-            turned = room.v[n, 0] / size
+            turned = room.v[n, 0, 0] / size
         vertices, last = vertices + 1, n
         for i in range(ORDER):
-            slow[i] += room.v[n, i] / size
+            slow[i] += room.v[n, 0, i] / size
         half = np.arcsin(own / size) if own > 0.0 else 0.0
         for sign in (-1.0, 1.0):
-            end = (room.v[n, 0] + sign * room.v[n, 1]) * turned.conjugate()
+            end = (room.v[n, 0, 0] + sign * room.v[n, 0, 1]) * turned.conjugate()
             angle = np.arctan2(end.imag, end.real)
             low, high = min(low, angle - half), max(high, angle + half)
-    if vertices == 1 and common == 0.0 and not room.used[last]:
+    if vertices == 1 and own == 0.0:
         # Of a single line the direction of its point nearest to zero.
-        v0, v1 = room.v[last, 0], room.v[last, 1]
+        v0, v1 = room.v[last, 0, 0], room.v[last, 0, 1]
         length = v1.real * v1.real + v1.imag * v1.imag
         t = -(v0.real * v1.real + v0.imag * v1.imag) / length if length > 0.0 else 0.0
         direction = v0 + min(max(t, -1.0), 1.0) * v1
@@ -507,7 +553,7 @@ def excludes_zero(room: Members) -> int:
     gamma = (1.0 - 16.0 * EPSILON) * abs(slow[0])
     for i in range(1, ORDER):
         gamma -= abs(slow[i])
-    if gamma > 0.0 and (common > 0.0 or vertices > 1 or room.used[last]):
+    if gamma > 0.0 and (vertices > 1 or own > 0.0):
         room.along[:] = slow
         if _holds(room, gamma):
             return 2
@@ -515,7 +561,7 @@ def excludes_zero(room: Members) -> int:
 
 
 class Question(NamedTuple):
-    """Tests of which one has to hold on each interval; affine in a level.
+    """Tests of which one has to hold on each interval, affine in a level; and what is sought.
 
     Attributes
     ----------
@@ -530,6 +576,11 @@ class Question(NamedTuple):
     loose : int
         So many functions, the last ones, are terms of any phase in that test, and in what a
         search looks for.
+    goal : int
+        What a search looks for, see `_aim`.
+    start, tolerance : float
+        The tests have to hold at the level start + (best - start) (1 - tolerance), where `best`
+        is the best value so far.
     """
 
     kind: IntArray
@@ -537,15 +588,191 @@ class Question(NamedTuple):
     slopes: ComplexArray
     arc: FloatArray
     loose: int
+    goal: int
+    start: float
+    tolerance: float
 
 
-@njit(nogil=True, error_model="numpy")
-def _at(c: ComplexArray, t: float) -> Any:
-    """Evaluate a Taylor polynomial."""
-    return c[0] + t * (c[1] + t * (c[2] + t * c[3]))
+@_inner
+def _test_holds(
+    question: Question, level: float, work: Workspace, room: Members, weights: ComplexArray
+) -> bool:
+    """Whether a test excludes zero at a level."""
+    for i in range(question.kind.shape[0]):
+        room.kind[:] = 0
+        for n in range(question.kind.shape[1]):
+            room.kind[n] = question.kind[i, n]
+            if room.kind[n]:
+                for f in range(weights.size):
+                    weights[f] = question.weights[i, n, f] + level * question.slopes[i, n, f]
+                mix(weights, work, room, n)
+        if excludes_zero(room):
+            return True
+    return False
 
 
-@njit(nogil=True, error_model="numpy")
+@_inner
+def _arc_holds(
+    question: Question,
+    level: float,
+    low: float,
+    high: float,
+    work: Workspace,
+    room: Members,
+    weights: ComplexArray,
+) -> bool:
+    """Whether zero is excluded for all psi of the arc, triangle by triangle (Lemma 16)."""
+    if not question.arc.size:
+        return False
+    loose, functions = question.loose, weights.size
+    arc = question.arc[0] + level * question.arc[1]
+    begin = arc[0] + min(arc[1] * low, arc[1] * high)
+    span = min(arc[2] + max(arc[3] * low, arc[3] * high) - begin, 2.0 * np.pi)
+    parts = int(span / 0.35) + 1
+    # Neighbours overlap by more than angles are rounded by.
+    half = 0.5 * span / parts + 4.0 * EPSILON * (abs(begin) + span)
+    room.kind[:] = 0
+    room.kind[:3] = 1
+    for n in range(loose):
+        weights[:] = 0.0
+        weights[functions - loose + n] = 1.0
+        room.kind[3 + n] = 2
+        mix(weights, work, room, 3 + n)
+    for i in range(parts):
+        turn = begin + (2 * i + 1) * half
+        for n in range(3):
+            # Of the corner exp(j angle), or of the one in the middle, over cos(half).
+            angle = turn + (n - 1) * half
+            less, sine = -2.0 * np.sin(0.5 * angle) ** 2, np.sin(angle)
+            if n == 1:
+                least = -2.0 * np.sin(0.5 * half) ** 2
+                less, sine = (less - least) / (1.0 + least), sine / (1.0 + least)
+            weights[:] = 0.0
+            weights[0], weights[1] = 1.0, complex(1.0 + less, sine)
+            if functions - loose > 2:
+                weights[1], weights[2] = less, complex(0.0, sine)
+            mix(weights, work, room, n)
+        if not excludes_zero(room):
+            return False
+    return True
+
+
+# ------------------------------------------------------------------------ walks along the axis
+
+
+@_inner
+def _halve(stack: FloatArray, top: int, low: float, high: float) -> bool:
+    """Put the halves of an interval on a stack, unless double precision tells none apart.
+
+    This is the one rule for what double precision cannot decide: such an interval is undecided.
+    """
+    middle = 0.5 * (low + high)
+    if high > 4.0 * low:
+        middle = np.sqrt(low) * np.sqrt(high) if low > 0.0 else high / 64.0
+    narrow = high - low <= 4.0 * EPSILON * high or high < 1e-290
+    if narrow or not low < middle < high or top + 2 > stack.shape[0]:
+        return False
+    stack[top, 0], stack[top, 1] = middle, high
+    stack[top + 1, 0], stack[top + 1, 1] = low, middle
+    return True
+
+
+@_entry
+def wind(
+    functions: Functions, begin: FloatArray, end: FloatArray, most: int
+) -> tuple[FloatArray, ComplexArray, ComplexArray, FloatArray, IntArray]:
+    """Follow the arguments of functions along the axis, until one takes too many steps.
+
+    Returns of each the argument gathered from `begin` to `end` (Lemma 10), the values at both,
+    the frequency where zero is not excluded (nan if there is none), and the steps.
+    """
+    number, space = begin.size, functions.space
+    total, undecided, steps = np.zeros(number), np.zeros(number), np.zeros(number, np.int64)
+    first, last = np.zeros(number, np.complex128), np.zeros(number, np.complex128)
+    room, stack = members(np.ones(1, np.int64), space.delays.size), np.empty((_DEEPEST, 2))
+    work, along = workspace(space, room.kind.size), np.zeros(ORDER, np.complex128)
+    for n in range(number):
+        # What is found of a function does not depend on those before it.
+        work.piece[:] = -1.0
+        undecided[n] = np.nan
+        steady, delayed = functions.steady[n : n + 1], functions.delayed[n : n + 1]
+        one = Functions(space, steady, delayed, functions.uncertain[n : n + 1])
+        stack[0, 0], stack[0, 1], top = begin[n], end[n], 1
+        while top > 0:
+            top -= 1
+            low, high = stack[top, 0], stack[top, 1]
+            m, r = 0.5 * (low + high), 0.5 * (high - low) + 2.0 * EPSILON * high
+            steps[n] += 1
+            enclose(one, m, r, work)
+            room.v[0] = work.f[0]
+            room.rest[0] = work.rest[0]
+            held = excludes_zero(room)
+            if not held:
+                if steps[n] >= most or not _halve(stack, top, low, high):
+                    undecided[n] = m
+                    break
+                top += 2
+                continue
+            along[:] = room.along
+            if held == 1:
+                along[1:] = 0.0
+            # An end takes part in two intervals with one value. What that is off by is below a
+            # quarter turn, and cancels.
+            if low == begin[n]:
+                first[n] = last[n] = _at(work.f[0, 0], (low - m) / r)
+            for sign, edge in ((-1.0, low), (1.0, high)):
+                t = (edge - m) / r
+                if sign > 0.0:
+                    last[n] = _at(work.f[0, 0], t)
+                g = _at(along, t)
+                a, b = last[n] * g.conjugate(), g * along[0].conjugate()
+                total[n] += sign * (np.arctan2(a.imag, a.real) + np.arctan2(b.imag, b.real))
+        if steps[n] >= most:
+            steps[n:] = steps[n]
+            break
+    return total, first, last, undecided, steps
+
+
+@_entry
+def resolved(
+    functions: Functions, begin: float, end: float, most: int
+) -> tuple[FloatArray, ComplexArray]:
+    """Frequencies so close that a Taylor polynomial represents a function between them.
+
+    With the step of Newton's method at each, F over its derivative by s.
+    """
+    space, work = functions.space, workspace(functions.space, functions.steady.shape[0])
+    stack, top, n = np.empty((_DEEPEST, 2)), 1, 0
+    found, moves = np.empty(most), np.empty(most, np.complex128)
+    longest = 0.0
+    for k in range(space.delays.size):
+        if np.abs(functions.delayed[0, :, k]).sum() > 0.0:
+            longest = space.delays[k]
+    stack[0, 0], stack[0, 1] = begin, end
+    while top > 0 and n < most:
+        top -= 1
+        low, high = stack[top, 0], stack[top, 1]
+        m, r = 0.5 * (low + high), 0.5 * (high - low)
+        enclose(functions, m, r, work)
+        f = work.f[0, 0]
+        bent = abs(f[2]) + abs(f[3]) + np.abs(work.f[0, 1:]).sum()
+        size, rest, short = abs(f[0]) + abs(f[1]), work.rest[0], r <= 0.02 * m
+        close = 8.0 * bent <= size and (8.0 * rest <= size or short)
+        # Where rounding hides the function, shorter steps do not help.
+        close = close or (short and size <= 2.0 * rest)
+        if (close and longest * r <= 0.3) or not _halve(stack, top, low, high):
+            found[n] = m
+            moves[n] = complex(0.0, r) * f[0] / f[1]
+            n += 1
+        else:
+            top += 2
+    return found[:n].copy(), moves[:n].copy()
+
+
+# ------------------------------------------------------------------------------------ a search
+
+
+@_inner
 def _aim(goal: int, f: complex, g: complex, radius: float, omega: float) -> tuple[float, float]:
     """Return what a search looks for: a function that is zero there, and the value.
 
@@ -575,47 +802,65 @@ def _aim(goal: int, f: complex, g: complex, radius: float, omega: float) -> tupl
     return level, ((angle if angle >= 0.0 else angle + 2.0 * np.pi) - half) / omega
 
 
-@njit(nogil=True, error_model="numpy")
-def aims(
-    goal: int, f: ComplexArray, g: ComplexArray, radius: FloatArray, omega: FloatArray
+@_inner
+def _measure(functions: Functions, goal: int, omega: float, spare: Workspace) -> Any:
+    """`_aim` at a frequency."""
+    enclose(functions, omega, 0.0, spare)
+    radius = 0.0
+    for f in range(2, spare.f.shape[0]):
+        radius += abs(spare.f[f, 0, 0])
+    return _aim(goal, spare.f[0, 0, 0], spare.f[1, 0, 0], radius, omega)
+
+
+@_entry
+def sample(
+    functions: Functions, question: Question, omega: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """`_aim` at many frequencies."""
+    spare = workspace(functions.space, 2 + question.loose)
     crossing, value = np.empty(omega.size), np.empty(omega.size)
     for i in range(omega.size):
-        crossing[i], value[i] = _aim(goal, f[i], g[i], radius[i], omega[i])
+        crossing[i], value[i] = _measure(functions, question.goal, omega[i], spare)
     return crossing, value
 
 
-@njit(nogil=True, error_model="numpy")
-def _measure(
-    space: Arrays,
-    steady: FloatArray,
-    delayed: FloatArray,
-    goal: int,
-    omega: float,
-    spare: Workspace,
-) -> Any:
-    """`_aim` at a frequency."""
-    exact = np.zeros(steady.shape[1])
-    expand(space, omega, 0.0, spare)
-    radius = 0.0
-    for f in range(spare.f.shape[0]):
-        combine(space, steady[f], delayed[f], exact, spare, f)
-        if f >= 2:
-            radius += abs(spare.f[f, 0])
-    return _aim(goal, spare.f[0, 0], spare.f[1, 0], radius, omega)
+@_inner
+def _crossing(
+    functions: Functions, goal: int, a: float, b: float, spare: Workspace
+) -> tuple[float, float]:
+    """Return the value where a function of `_aim` is zero between two frequencies, and where.
+
+    By the rule of false position, with the weight of an end halved that stays (Illinois); inf
+    where the function has one sign at both.
+    """
+    at_a, _ = _measure(functions, goal, a, spare)
+    at_b, _ = _measure(functions, goal, b, spare)
+    if (at_a < 0.0) == (at_b < 0.0):
+        return np.inf, a
+    side, value, omega = 0, np.inf, a
+    for _ in range(60):
+        last, omega = omega, (a * at_b - b * at_a) / (at_b - at_a)
+        here, value = _measure(functions, goal, omega, spare)
+        if here == 0.0 or abs(omega - last) <= 2.0 * EPSILON * omega:
+            break
+        if (here < 0.0) == (at_b < 0.0):
+            b, at_b = omega, here
+            at_a = 0.5 * at_a if side == 1 else at_a
+            side = 1
+        else:
+            a, at_a = omega, here
+            at_b = 0.5 * at_b if side == -1 else at_b
+            side = -1
+    return value, omega
 
 
-@njit(nogil=True, error_model="numpy")
+@_inner
 def _candidate(
-    space: Arrays,
-    steady: FloatArray,
-    delayed: FloatArray,
-    goal: int,
+    functions: Functions,
+    question: Question,
     m: float,
     r: float,
     best: float,
-    start: float,
     work: Workspace,
     spare: Workspace,
 ) -> tuple[float, float]:
@@ -623,612 +868,467 @@ def _candidate(
 
     The Taylor polynomials say where it may be; the functions themselves say what it is.
     """
+    goal, start, loose = question.goal, question.start, question.loose > 0
     found, where = best, np.nan
-    h, v, loose = np.empty(9), np.empty(9), spare.f.shape[0] > 2
+    h, v = np.empty(9), np.empty(9)
     for i in range(9):
         t, radius = 0.25 * i - 1.0, 0.0
         for f in range(2, spare.f.shape[0]):
-            radius += abs(_at(work.f[f], t))
-        h[i], v[i] = _aim(goal, _at(work.f[0], t), _at(work.f[1], t), radius, m + r * t)
+            radius += abs(_at(work.f[f, 0], t))
+        h[i], v[i] = _aim(goal, _at(work.f[0, 0], t), _at(work.f[1, 0], t), radius, m + r * t)
     if goal == DISTANCE or loose:
         i = int(np.argmin(v))
         t = 0.25 * i - 1.0
         if 0 < i < 8 and np.isfinite(v[i - 1] + v[i + 1]):
+            # The lowest point of a parabola through three.
             bent = v[i - 1] - 2.0 * v[i] + v[i + 1]
             if bent > 0.0:
                 t += 0.125 * (v[i - 1] - v[i + 1]) / bent
         omega = max(m + r * t, 0.0)
-        _, value = _measure(space, steady, delayed, goal, omega, spare)
+        _, value = _measure(functions, goal, omega, spare)
         if (start < value or (loose and start == value)) and value < found:
             found, where = value, omega
         return found, where
     for i in range(8):
-        if (h[i] < 0.0) == (h[i + 1] < 0.0):
-            continue
-        if not min(v[i], v[i + 1]) < found + abs(v[i] - v[i + 1]):
-            continue
-        a, b = m + r * (0.25 * i - 1.0), m + r * (0.25 * i - 0.75)
-        ha, _ = _measure(space, steady, delayed, goal, a, spare)
-        hb, _ = _measure(space, steady, delayed, goal, b, spare)
-        if (ha < 0.0) == (hb < 0.0):
-            continue
-        # The rule of false position, with the weight of an end halved that stays (Illinois).
-        side, value, omega, last = 0, np.nan, a, 0.0
-        for _ in range(60):
-            last, omega = omega, (a * hb - b * ha) / (hb - ha)
-            hc, value = _measure(space, steady, delayed, goal, omega, spare)
-            if hc == 0.0 or abs(omega - last) <= 2.0 * EPSILON * omega:
-                break
-            if (hc < 0.0) == (hb < 0.0):
-                b, hb = omega, hc
-                ha = 0.5 * ha if side == 1 else ha
-                side = 1
-            else:
-                a, ha = omega, hc
-                hb = 0.5 * hb if side == -1 else hb
-                side = -1
-        if start < value < found:
-            found, where = value, omega
+        changes = (h[i] < 0.0) != (h[i + 1] < 0.0)
+        if changes and min(v[i], v[i + 1]) < found + abs(v[i] - v[i + 1]):
+            a, b = m + r * (0.25 * i - 1.0), m + r * (0.25 * i - 0.75)
+            value, omega = _crossing(functions, goal, a, b, spare)
+            if start < value < found:
+                found, where = value, omega
     return found, where
 
 
-@njit(nogil=True, error_model="numpy")
+@_entry
 def walk(
-    space: Arrays,
-    steady: FloatArray,
-    delayed: FloatArray,
+    functions: Functions,
     question: Question,
     pending: FloatArray,
-    goal: int,
     best: float,
     where: float,
-    start: float,
-    tolerance: float,
-    narrowest: float,
     most: int,
-    most_left: int,
 ) -> tuple[FloatArray, FloatArray, float, float, int]:
     """Halve intervals until a test holds on each, at the level of the best value so far.
 
-    The level is start + (best - start) (1 - tolerance). An interval on which no test holds may
-    hold a better value, which is looked for there.
+    An interval on which no test holds may hold a better value, which is looked for there. Past
+    that of the start nothing is: then no interval is left.
 
-    Returns the intervals that are left after so many steps, those narrower than `narrowest` of
-    their frequency on which no test holds, the best value, where it is, and the steps.
+    Returns the intervals that are left after so many steps, those that are undecided, the best
+    value, where it is, and the steps.
     """
-    functions, tests = steady.shape[0], question.kind.shape[0]
-    loose = question.loose
+    number, start, space = functions.steady.shape[0], question.start, functions.space
     # What is looked for are the first two functions and the loose ones.
-    work, spare = workspace(space, functions), workspace(space, 2 + loose)
-    size = max(question.kind.shape[1], 3 + loose)
-    room, corner = members(size, space.delays.size), np.zeros(size, np.int64)
-    corner[:3], corner[3 : 3 + loose] = 1, 2
-    exact, weights = np.zeros(steady.shape[1]), np.zeros(functions, np.complex128)
-    stack, top = np.empty((pending.shape[0] + 300, 2)), pending.shape[0]
+    work, spare = workspace(space, number), workspace(space, 2 + question.loose)
+    size = max(question.kind.shape[1], 3 + question.loose)
+    room = members(np.zeros(size, np.int64), space.delays.size)
+    weights = np.zeros(number, np.complex128)
+    top = pending.shape[0]
+    stack = np.empty((top + _DEEPEST, 2))
     stack[:top] = pending
-    undecided, left, steps = np.empty((most_left, 2)), 0, 0
-    while top > 0 and steps < most and left < most_left:
+    undecided, left, steps = np.empty((FEW_UNDECIDED, 2)), 0, 0
+    while top > 0 and steps < most and left < FEW_UNDECIDED:
         top -= 1
         low, high = stack[top, 0], stack[top, 1]
         m, r = 0.5 * (low + high), 0.5 * (high - low) + 2.0 * EPSILON * high
         steps += 1
-        level = start + (best - start) * (1.0 - tolerance)
-        expand(space, m, r, work)
-        for f in range(functions):
-            combine(space, steady[f], delayed[f], exact, work, f)
-        held = 0
-        for i in range(tests):
-            room.kind[:] = 0
-            for n in range(question.kind.shape[1]):
-                room.kind[n] = question.kind[i, n]
-                if room.kind[n]:
-                    weights[:] = question.weights[i, n]
-                    for f in range(functions):
-                        if question.slopes[i, n, f] != 0.0:
-                            weights[f] += level * question.slopes[i, n, f]
-                    mix(weights, work, room, n)
-            held = excludes_zero(room)
-            if held:
-                break
-        if not held and question.arc.size:
-            arc = question.arc[0].copy()
-            for n in range(4):
-                if question.arc[1, n] != 0.0:
-                    arc[n] += level * question.arc[1, n]
-            begin = arc[0] + min(arc[1] * low, arc[1] * high)
-            span = arc[2] + max(arc[3] * low, arc[3] * high) - begin
-            span = min(span, 2.0 * np.pi)
-            parts = int(span / 0.35) + 1
-            # Neighbours overlap by more than angles are rounded by.
-            half = 0.5 * span / parts + 4.0 * EPSILON * (abs(begin) + span)
-            room.kind[:] = corner
-            for n in range(loose):
-                weights[:] = 0.0
-                weights[functions - loose + n] = 1.0
-                mix(weights, work, room, 3 + n)
-            for i in range(parts):
-                # A triangle that holds this part of the arc (Lemma 16).
-                turn = begin + (2 * i + 1) * half
-                for n in range(3):
-                    weights[:] = 0.0
-                    weights[0] = 1.0
-                    angle = turn + (n - 1) * half
-                    # Of the corner exp(j angle), or of the one in the middle, over cos(half).
-                    less, sine = -2.0 * np.sin(0.5 * angle) ** 2, np.sin(angle)
-                    if n == 1:
-                        least = -2.0 * np.sin(0.5 * half) ** 2
-                        less, sine = (less - least) / (1.0 + least), sine / (1.0 + least)
-                    weights[1] = complex(1.0 + less, sine)
-                    if functions - loose > 2:
-                        weights[1], weights[2] = less, complex(0.0, sine)
-                    mix(weights, work, room, n)
-                held = excludes_zero(room)
-                if not held:
-                    break
-        if held:
+        level = min(start + (best - start) * (1.0 - question.tolerance), 1e300)
+        enclose(functions, m, r, work)
+        if _test_holds(question, level, work, room, weights):
             continue
-        middle = m
-        if high > 4.0 * low:
-            middle = np.sqrt(low * high) if low > 0.0 else high / 64.0
+        if _arc_holds(question, level, low, high, work, room, weights):
+            continue
         resolved = work.lead.size == 0 or work.lead[-1] < 0
         if resolved and best > start:
-            better, at = _candidate(
-                space, steady, delayed, goal, m, r, best, start, work, spare
-            )
+            better, at = _candidate(functions, question, m, r, best, work, spare)
             if better < best:
                 best, where = better, at
                 if best <= start:
                     return stack[:0].copy(), undecided[:0].copy(), best, where, steps
-        if high - low <= narrowest * high or middle <= low or middle >= high:
+        if not _halve(stack, top, low, high):
             undecided[left, 0], undecided[left, 1] = low, high
             left += 1
             continue
         # Which half comes first changes from step to step: in a random order the best value so
         # far improves a few times, in ascending order it may do so at each turn of a delay.
-        first = top + (steps & 1)
-        stack[first, 0], stack[first, 1] = middle, high
-        second = top + 1 - (steps & 1)
-        stack[second, 0], stack[second, 1] = low, middle
+        if steps % 2 == 1:
+            for k in range(2):
+                stack[top, k], stack[top + 1, k] = stack[top + 1, k], stack[top, k]
         top += 2
     return stack[:top].copy(), undecided[:left].copy(), best, where, steps
 
 
-@njit(nogil=True, error_model="numpy")
-def wind(
-    space: Arrays,
-    steady: FloatArray,
-    delayed: FloatArray,
-    uncertain: FloatArray,
-    begin: float,
-    end: float,
-    most: int,
-) -> tuple[float, complex, complex, float, int]:
-    """Follow the argument of a function along the axis (Lemma 10).
-
-    Returns the argument gathered from `begin` to `end`, the values at both, the frequency
-    where zero is not excluded (nan if there is none), and the steps.
-    """
-    work, room = workspace(space, 1), members(1, space.delays.size)
-    one = np.ones(1, np.complex128)
-    room.kind[0] = 1
-    kept = room.along.copy()
-    stack, top, steps = np.empty((300, 2)), 1, 0
-    stack[0, 0], stack[0, 1] = begin, end
-    total, first, value = 0.0, 0j, 0j
-    while top > 0:
-        top -= 1
-        low, high = stack[top, 0], stack[top, 1]
-        m, r = 0.5 * (low + high), 0.5 * (high - low) + 2.0 * EPSILON * high
-        steps += 1
-        expand(space, m, r, work)
-        combine(space, steady, delayed, uncertain, work, 0)
-        mix(one, work, room, 0)
-        held = excludes_zero(room)
-        if held:
-            kept[:] = room.along
-            if held == 1:
-                kept[1:] = 0.0
-            # An end takes part in two intervals with one value. What that is off by is below
-            # a quarter turn, and cancels.
-            if low == begin:
-                first = value = _at(work.f[0], (low - m) / r)
-            for sign, edge in ((-1.0, low), (1.0, high)):
-                t = (edge - m) / r
-                if sign > 0.0:
-                    value = _at(work.f[0], t)
-                g = _at(kept, t)
-                a, b = value * g.conjugate(), g * kept[0].conjugate()
-                turn = np.arctan2(a.imag, a.real) + np.arctan2(b.imag, b.real)
-                total += sign * turn
-            continue
-        middle = m
-        if high > 4.0 * low:
-            middle = np.sqrt(low * high) if low > 0.0 else high / 64.0
-        narrow = high - low <= 4.0 * EPSILON * high or high < 1e-290
-        if narrow or middle <= low or middle >= high or steps >= most:
-            return total, first, value, m, steps
-        stack[top, 0], stack[top, 1] = middle, high
-        stack[top + 1, 0], stack[top + 1, 1] = low, middle
-        top += 2
-    return total, first, value, np.nan, steps
+# ------------------------------------------------------------------------- crossings of rows
 
 
-@njit(nogil=True, error_model="numpy")
-def wind_many(
-    space: Arrays,
-    steady: FloatArray,
-    delayed: FloatArray,
-    uncertain: FloatArray,
-    begin: FloatArray,
-    end: FloatArray,
-    most: int,
-) -> tuple[FloatArray, ComplexArray, ComplexArray, FloatArray, IntArray]:
-    """`wind` for many functions of a space, until one takes too many steps."""
-    n = begin.size
-    total, undecided, steps = np.empty(n), np.empty(n), np.empty(n, np.int64)
-    first, last = np.empty(n, np.complex128), np.empty(n, np.complex128)
-    for i in range(n):
-        total[i], first[i], last[i], undecided[i], steps[i] = wind(
-            space, steady[i], delayed[i], uncertain[i], begin[i], end[i], most
-        )
-        if steps[i] >= most:
-            steps[i:] = steps[i]
-            break
-    return total, first, last, undecided, steps
+class Rows(NamedTuple):
+    """Rows f_0 - y f_1 - x f_2 of three functions, and between which x zeros count."""
+
+    y: FloatArray
+    lower: FloatArray
+    upper: FloatArray
 
 
-@njit(nogil=True, error_model="numpy")
-def resolved(
-    space: Arrays,
-    steady: FloatArray,
-    delayed: FloatArray,
-    begin: float,
-    end: float,
-    most: int,
-) -> tuple[FloatArray, ComplexArray]:
-    """Frequencies so close that a Taylor polynomial represents a function between them.
+class Shared(NamedTuple):
+    """What all rows share on an interval."""
 
-    With the step of Newton's method at each, F over its derivative by s.
-    """
-    work, exact = workspace(space, 1), np.zeros(steady.size)
-    stack, top, n = np.empty((300, 2)), 1, 0
-    found, moves = np.empty(most), np.empty(most, np.complex128)
-    stack[0, 0], stack[0, 1] = begin, end
-    while top > 0 and n < most:
-        top -= 1
-        low, high = stack[top, 0], stack[top, 1]
-        m, r = 0.5 * (low + high), 0.5 * (high - low)
-        expand(space, m, r, work)
-        combine(space, steady, delayed, exact, work, 0)
-        f = work.f[0]
-        bent = abs(f[2]) + abs(f[3]) + np.abs(work.c[0]).sum()
-        turns = 0.0
-        for k in range(space.delays.size):
-            if np.abs(delayed[:, k]).sum() > 0.0:
-                turns = max(turns, space.delays[k] * r)
-        size, rest, short = abs(f[0]) + abs(f[1]), work.rest[0], r <= 0.02 * m
-        close = 8.0 * bent <= size and (8.0 * rest <= size or short)
-        # Where rounding hides the function, shorter steps do not help.
-        close = close or (short and size <= 2.0 * rest)
-        if (close and turns <= 0.3) or top > 290 or r <= 4.0 * EPSILON * m:
-            found[n] = m
-            moves[n] = complex(0.0, r) * f[0] / f[1]
-            n += 1
-            continue
-        middle = np.sqrt(low * high) if high > 4.0 * low else m
-        stack[top, 0], stack[top, 1] = middle, high
-        stack[top + 1, 0], stack[top + 1, 1] = low, middle
-        top += 2
-    return found[:n].copy(), moves[:n].copy()
+    low: float
+    high: float
+    m: float
+    r: float
+    around: bool  # whether the middle is s = 0, or the end of a map's axis
+    fast: bool  # whether an exponential is not resolved
+    long: bool  # whether the interval is long
+    products: ComplexArray  # (3, 2 ORDER - 1): the functions times the conjugate of M = f_2
+    sizes: FloatArray  # (3,): most of the functions, but for their remainders
+    least: float  # least of M; negative where this is not known
+    z: ComplexArray  # (2 ORDER - 1): room for a row
+    ends: FloatArray  # (2, 2): Im(f_0 conj M) and Im(f_1 conj M) at both ends; nan before
 
 
-class Crossed(NamedTuple):
-    """Where members of rows N - x M have zeros on the axis, see `cross`."""
+class Row(NamedTuple):
+    """One row on an interval, with N = f_0 - y f_1."""
 
-    row: IntArray  # (n,)
-    x: FloatArray  # (n,): where the zero is, and how far from it at most
-    spread: FloatArray
-    omega: FloatArray  # (n,): its frequency in rad/s, and how far from it at most
-    width: FloatArray
-    jump: IntArray  # (n,): by how many the zeros on the right increase with x
-
-
-@njit(nogil=True, error_model="numpy")
-def _appended(table: FloatArray, n: int) -> FloatArray:
-    """Return a table with room for entry n."""
-    if n < table.shape[0]:
-        return table
-    longer = np.empty((2 * n, table.shape[1]))
-    longer[:n] = table
-    return longer
+    y: float
+    lower: float
+    upper: float
+    size: float  # most of N, but for its remainder
+    rest: float
+    z: ComplexArray  # (2 ORDER - 1): N conj M
+    off: float  # its error
 
 
-@njit(nogil=True, error_model="numpy")
-def _times_conjugate(f: ComplexArray, g: ComplexArray, product: ComplexArray) -> None:
-    """Multiply one Taylor polynomial by the conjugate of another."""
-    product[:] = 0.0
-    for i in range(ORDER):
-        for k in range(ORDER):
-            product[i + k] += f[i] * g[k].conjugate()
+# What is known of a row on an interval: no zero, one at most, not enough; or rounding hides it.
+_NONE, _ONE, _OPEN, _HIDDEN = range(4)
 
 
-@njit(nogil=True, error_model="numpy")
-def _row_excludes_zero(
-    low: float, high: float, first: float, last: float, work: Workspace, room: Members
-) -> bool:
-    """Whether zero is in no f_0 - y f_1 - x f_2, x from `low` to `high`, y from first to last.
+@_inner
+def _share(
+    space: Arrays, interval: tuple[float, float, float, float], around: bool, work: Workspace
+) -> Shared:
+    """Multiply the enclosed functions by the conjugate of M."""
+    products, sizes = np.zeros((3, 2 * ORDER - 1), np.complex128), np.zeros(3)
+    for f in range(3):
+        for i in range(ORDER):
+            sizes[f] += abs(work.f[f, 0, i])
+            for k in range(ORDER):
+                products[f, i + k] += work.f[f, 0, i] * work.f[2, 0, k].conjugate()
+    low, high, m, r = interval
+    fast, long = False, False
+    for k in range(space.delays.size):
+        fast |= work.lead[k] >= 0
+        long |= space.delays[k] * r > _LONG
+    least = -1.0 if fast else 2.0 * abs(work.f[2, 0, 0]) - sizes[2] - work.rest[2]
+    z, ends = np.zeros(2 * ORDER - 1, np.complex128), np.full((2, 2), np.nan)
+    return Shared(low, high, m, r, around, fast, long, products, sizes, least, z, ends)
 
-    Of one row two corners suffice.
-    """
+
+@_inner
+def _rows_exclude_zero(rows: Rows, here: IntArray, work: Workspace, room: Members) -> bool:
+    """Whether zero is in none of some rows, for any x that counts."""
+    y0, y1, x0, x1 = np.inf, -np.inf, np.inf, -np.inf
+    for row in here:
+        y0, y1 = min(y0, rows.y[row]), max(y1, rows.y[row])
+        x0, x1 = min(x0, rows.lower[row]), max(x1, rows.upper[row])
+    if x1 == np.inf:
+        return False
     weights = np.ones(3, np.complex128)
     room.kind[:] = 0
-    for n in range(4 if first < last else 2):
+    # Of one row two corners suffice.
+    for n in range(4 if y0 < y1 else 2):
         room.kind[n] = 1
-        weights[1], weights[2] = -(first if n < 2 else last), -(low if n % 2 == 0 else high)
+        weights[1], weights[2] = -(y0 if n < 2 else y1), -(x0 if n % 2 == 0 else x1)
         mix(weights, work, room, n)
     return bool(excludes_zero(room) > 0)
 
 
-@njit(nogil=True, error_model="numpy")
-def _evaluate(
-    space: Arrays,
-    steady: FloatArray,
-    delayed: FloatArray,
-    exact: FloatArray,
-    omega: float,
-    y: float,
-    w: Workspace,
-) -> tuple[complex, complex, float, float]:
-    """Return N = f_0 - y f_1 and M = f_2 at a frequency, and their errors."""
-    expand(space, omega, 0.0, w)
+@_inner
+def _row(rows: Rows, row: int, shared: Shared, work: Workspace) -> Row:
+    """Return a row on an interval."""
+    y, z, size_m, rest_m = rows.y[row], shared.z, shared.sizes[2], work.rest[2]
+    for k in range(z.size):
+        z[k] = shared.products[0, k] - y * shared.products[1, k]
+    size = shared.sizes[0] + abs(y) * shared.sizes[1]
+    rest = work.rest[0] + abs(y) * work.rest[1]
+    off = (rest + 32.0 * EPSILON * size) * size_m + rest_m * (size + rest)
+    return Row(y, rows.lower[row], rows.upper[row], size, rest, z, off)
+
+
+@_inner
+def _is_outside(row: Row, shared: Shared, work: Workspace) -> bool:
+    """Whether Re(N / M) is below `lower` or above `upper` on the whole interval."""
+    z, square, size_m = row.z, shared.products[2], shared.sizes[2]
+    above = (z[0] - row.upper * square[0]).real
+    below = (z[0] - row.lower * square[0]).real
+    for k in range(1, z.size):
+        above -= abs((z[k] - row.upper * square[k]).real)
+        below += abs((z[k] - row.lower * square[k]).real)
+    off_square = size_m * (work.rest[2] + 32.0 * EPSILON * size_m)
+    off = row.off + 3.0 * max(abs(row.lower), abs(row.upper)) * off_square
+    return bool(above > off or below < -off)
+
+
+@_inner
+def _decide(row: Row, shared: Shared, work: Workspace) -> tuple[int, float]:
+    """Tell what is known of h = Im(N conj M), and its least slope if it is monotonic."""
+    varied, bent, everywhere = 0.0, 0.0, row.upper == np.inf
+    for k in range(1, row.z.size):
+        varied += abs(row.z[k].imag)
+        bent += k * abs(row.z[k].imag) if k > 1 else 0.0
+    middle = abs(row.z[0].imag)
+    if middle > varied + row.off or (not everywhere and _is_outside(row, shared, work)):
+        return _NONE, 0.0
+    # Errors of the coefficients, and that of the remainder's slope (Lemma 18).
+    slope = abs(row.z[1].imag) - bent - 10.0 * row.off
+    if slope > 0.0 and (shared.least > 0.0 or everywhere):
+        return _ONE, slope
+    settled = middle + varied <= 2.0 * row.off
     for f in range(3):
-        combine(space, steady[f], delayed[f], exact, w, f)
-    size = abs(w.f[0, 0]) + abs(y * w.f[1, 0])
-    return (
-        w.f[0, 0] - y * w.f[1, 0],
-        w.f[2, 0],
-        w.rest[0] + abs(y) * w.rest[1] + 2.0 * EPSILON * size,
-        w.rest[2],
-    )
+        settled &= work.rest[f] <= 2.0 * work.rounding[f]
+    # In shorter intervals rounding hides h as well.
+    return (_HIDDEN if settled else _OPEN), 0.0
 
 
-@njit(nogil=True, error_model="numpy")
+@_inner
+def _sign_changes(functions: Functions, row: Row, shared: Shared, spare: Workspace) -> bool:
+    """Whether h has two signs at the ends of an interval, of which all rows share the values.
+
+    Neighbours share them too: each zero is found in one of them.
+    """
+    ends = shared.ends
+    if np.isnan(ends[0, 0]):
+        for e in range(2):
+            enclose(functions, shared.low if e == 0 else shared.high, 0.0, spare)
+            for f in range(2):
+                ends[e, f] = (spare.f[f, 0, 0] * spare.f[2, 0, 0].conjugate()).imag
+    a, b = ends[0, 0] - row.y * ends[0, 1], ends[1, 0] - row.y * ends[1, 1]
+    return bool((a < 0.0) != (b < 0.0))
+
+
+@_inner
+def _zero_of_polynomial(z: ComplexArray) -> tuple[float, float]:
+    """Return where the imaginary part of a monotonic polynomial is zero, and its slope."""
+    t, slope = 0.0, z[1].imag
+    for _ in range(4):
+        value, slope = 0.0, 0.0
+        for k in range(z.size - 1, -1, -1):
+            slope = slope * t + value
+            value = value * t + z[k].imag
+        t = min(max(t - value / slope, -1.0), 1.0)
+    return t, slope
+
+
+@_inner
+def _locate(
+    functions: Functions,
+    row: Row,
+    shared: Shared,
+    least_slope: float,
+    fine: float,
+    work: Workspace,
+    spare: Workspace,
+) -> tuple[float, float, float, float]:
+    """Return x at the zero of h and how far it is off, and the same of its place t.
+
+    Newton's method finds it for the Taylor polynomials, then for the functions themselves. They
+    have another common factor, from which h over |N|^2 + |M|^2 is free (Lemma 18).
+    """
+    size_m, rest_m = shared.sizes[2], work.rest[2]
+    t, slope = (0.0, row.z[1].imag) if shared.around else _zero_of_polynomial(row.z)
+    f, g = _at(work.f[0, 0], t) - row.y * _at(work.f[1, 0], t), _at(work.f[2, 0], t)
+    slope /= abs(f) ** 2 + abs(g) ** 2
+    least_slope /= (row.size + row.rest) ** 2 + (size_m + rest_m) ** 2
+    off_t = min(2.0 * row.off / least_slope, 2.0)
+    x, spread, before, at = 0.0, np.inf, 0.0, 0.0
+    for step in range(8):
+        enclose(functions, shared.m + shared.r * t, 0.0, spare)
+        f, g, turned = spare.f[0, 0, 0], spare.f[2, 0, 0], row.y * spare.f[1, 0, 0]
+        off_f = spare.rest[0] + abs(row.y) * spare.rest[1]
+        off_f += 2.0 * EPSILON * (abs(f) + abs(turned))
+        f, off_g = f - turned, spare.rest[2]
+        total = abs(f) ** 2 + abs(g) ** 2
+        if not (total > 0.0 and np.isfinite(slope) and slope != 0.0):
+            # N and M have a common zero here.
+            break
+        value = (f * g.conjugate()).imag / total
+        off = 2.0 * (off_f * abs(g) + off_g * abs(f)) / total
+        # Of the two around s = 0 and a map's end the place is known.
+        off_t = 0.0 if shared.around else min((abs(value) + off) / least_slope, 2.0)
+        x = (f * g.conjugate()).real / abs(g) ** 2
+        near = abs(_at(work.f[2, 0], t)) - rest_m - ORDER * off_t * size_m
+        near = max(near, shared.least)
+        slide = 3.0 * row.size * (1.0 + size_m / near) / near if near > 0.0 else np.inf
+        spread = slide * off_t + 2.0 * (off_f + abs(x) * off_g) / abs(g)
+        outside = x + spread < row.lower or x - spread > row.upper
+        if shared.around or outside or spread <= fine or abs(value) <= off:
+            break
+        if step > 0 and t != at and value != before:
+            slope = (value - before) / (t - at)
+        before, at = value, t
+        t = min(max(t - value / slope, -1.0), 1.0)
+    return x, spread, t, off_t
+
+
+@_inner
+def _hidden(row: Row, shared: Shared, work: Workspace) -> tuple[float, float]:
+    """Return around which x zeros may lie on an interval, and how far from it."""
+    if not shared.least > 0.0:
+        return 0.0, np.inf
+    x = row.z[0].real / shared.products[2, 0].real
+    reach = row.off + 3.0 * abs(x) * shared.sizes[2] * work.rest[2]
+    for k in range(1, row.z.size):
+        reach += abs(row.z[k].real - x * shared.products[2, k].real)
+    return x, 1.01 * reach / (shared.least * shared.least)
+
+
+@_inner
+def _append(table: FloatArray, n: int, entry: tuple[float, ...]) -> FloatArray:
+    """Return a table with entry n, for which room is made."""
+    if n == table.shape[0]:
+        longer = np.empty((2 * n, table.shape[1]))
+        longer[:n] = table
+        table = longer
+    for k, value in enumerate(entry):
+        table[n, k] = value
+    return table
+
+
+@_inner
+def _first_intervals(stack: FloatArray, begin: float, end: float, is_map: bool) -> int:
+    """Put the axis on a stack, with intervals around s = 0 and a map's end, where h is odd."""
+    low, high, top = begin if begin > 0.0 else 1e-3 * end, end, 1
+    if is_map:
+        high = end - 1e-3 * end
+        stack[top, 0], stack[top, 1] = high, 2.0 * end - high
+        top += 1
+    if begin == 0.0:
+        stack[top, 0], stack[top, 1] = -low, low
+        top += 1
+    stack[0, 0], stack[0, 1] = low, high
+    return top
+
+
+@_inner
+def _cut_around(stack: FloatArray, top: int, low: float, m: float, r: float) -> bool:
+    """Cut an interval around s = 0 or a map's end: a shorter one, and what lies beside it."""
+    q = r / 16.0
+    if q <= 4.0 * EPSILON * m or q < 1e-290:
+        return False
+    stack[top, 0], stack[top, 1] = (q, r) if low < 0.0 else (low, m - q)
+    stack[top + 1, 0], stack[top + 1, 1] = m - q, m + q
+    return True
+
+
+@_inner
+def _follow(
+    functions: Functions,
+    rows: Rows,
+    here: IntArray,
+    still_open: IntArray,
+    shared: Shared,
+    fine: float,
+    work: Workspace,
+    spare: Workspace,
+    room: Members,
+    found: FloatArray,
+    n: int,
+) -> tuple[FloatArray, int, int]:
+    """Decide on an interval what can be decided of some rows.
+
+    Returns the table of crossings, their number, and how many rows are still open.
+    """
+    kept = 0
+    for i in range(here.size):
+        # Rows are tested one by one where that spares a long interval, or M may vanish.
+        alone = here.size == 1 or shared.long or not (shared.fast or shared.least > 0.0)
+        if alone and _rows_exclude_zero(rows, here[i : i + 1], work, room):
+            continue
+        row, state, slope = _row(rows, here[i], shared, work), _OPEN, 0.0
+        if not shared.fast:
+            state, slope = _decide(row, shared, work)
+        if state == _ONE:
+            if not (shared.around or _sign_changes(functions, row, shared, spare)):
+                continue
+            x, spread, t, off_t = _locate(functions, row, shared, slope, fine, work, spare)
+            # Where M vanishes x is no number, and the zero counts.
+            if not (x + spread < row.lower or x - spread > row.upper):
+                jump = (1.0 if shared.around else 2.0) * np.sign(row.z[1].imag)
+                omega, width = shared.m + shared.r * t, shared.r * off_t
+                found = _append(found, n, (float(here[i]), x, spread, omega, width, jump))
+                n += 1
+        elif state == _HIDDEN:
+            x, spread = _hidden(row, shared, work)
+            found = _append(found, n, (float(here[i]), x, spread, shared.m, shared.r, 0.0))
+            n += 1
+        elif state == _OPEN:
+            still_open[kept] = here[i]
+            kept += 1
+    return found, n, kept
+
+
+@_entry
 def cross(
-    space: Arrays,
-    steady: FloatArray,
-    delayed: FloatArray,
-    y: FloatArray,
-    lower: FloatArray,
-    upper: FloatArray,
+    functions: Functions,
+    rows: Rows,
     begin: float,
     end: float,
     is_map: bool,
     fine: float,
     most: int,
-) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Find the zeros on the axis of each row f_0 - y f_1 - x f_2, `lower` <= x <= `upper`.
+) -> tuple[FloatArray, BoolArray]:
+    """Find the zeros on the axis of rows f_0 - y f_1 - x f_2.
 
     With N = f_0 - y f_1 and M = f_2 they are where h = Im(N conj M) is zero, at x = Re(N / M)
     (Lemma 18). All rows share the expansion of an interval. Between infinite bounds all zeros
     of h are found, those of M included. `begin` is 0 for the axis from s = 0, and a map's ends
     at `end`: there N / M is real, and a root crosses alone.
 
-    Returns a table of crossings with the columns of `Crossed`, exact to `fine` in x where
-    rounding allows; a table of intervals that are not decided (row, least and largest x there,
-    the two frequencies); and the rows for which so many steps, in all, did not suffice.
+    Returns a table of crossings: row; x, exact to `fine` where rounding allows, and how far
+    from it at most; frequency, and how far from it; by how many the zeros on the right increase
+    with x, or 0 for an interval that is undecided, which may hold any number. And the rows for
+    which so many steps, in all, did not suffice.
     """
-    rows, work, spare = y.size, workspace(space, 3), workspace(space, 3)
-    room, exact = members(4, space.delays.size), np.zeros(steady.shape[1])
-    everywhere, steps = upper[0] == np.inf, 0
-    found, n, undecided, left = np.empty((64, 6)), 0, np.empty((16, 5)), 0
-    size = 2 * ORDER - 1
-    products = np.empty((4, size), np.complex128)
-    a, b, square, z = products[0], products[1], products[2], products[3]
-    ends, unfinished = np.empty((2, 2)), np.zeros(rows, np.bool_)
-    pool, number = np.empty((300, rows), np.int64), np.zeros(300, np.int64)
-    pool[0], number[0] = np.arange(rows), rows
-    stack, depth, top = np.empty((300, 2)), np.zeros(300, np.int64), 1
-    low_cut = begin if begin > 0.0 else 1e-3 * end
-    high_cut = end if not is_map else end - 1e-3 * end
-    stack[0, 0], stack[0, 1] = low_cut, high_cut
-    if begin == 0.0:
-        # An interval around the end of the axis, where h is odd.
-        stack[top, 0], stack[top, 1] = -low_cut, low_cut
-        top += 1
-    if is_map:
-        stack[top, 0], stack[top, 1] = high_cut, 2.0 * end - high_cut
-        top += 1
+    number, space = rows.y.size, functions.space
+    three = functions.steady.shape[0]
+    work, spare = workspace(space, three), workspace(space, three)
+    room = members(np.zeros(4, np.int64), space.delays.size)
+    found, n, unfinished = np.empty((64, 6)), 0, np.zeros(number, np.bool_)
+    # Which rows are open, after so many halvings.
+    pool, size = np.empty((_DEEPEST + 1, number), np.int64), np.zeros(_DEEPEST + 1, np.int64)
+    pool[0], size[0] = np.arange(number), number
+    stack, depth = np.empty((_DEEPEST + 3, 2)), np.zeros(_DEEPEST + 3, np.int64)
+    top, steps, undecided = _first_intervals(stack, begin, end, is_map), 0, 0
     while top > 0:
         top -= 1
         low, high, d = stack[top, 0], stack[top, 1], depth[top]
+        here, steps = pool[d, : size[d]], steps + 1
+        if steps > most or undecided >= _MANY_UNDECIDED * number:
+            for row in here:
+                unfinished[row] = True
+            continue
         around = low < 0.0 or (is_map and high > end)
         m, r = 0.5 * (low + high), 0.5 * (high - low) + 2.0 * EPSILON * high
         if around:
             m = 0.0 if low < 0.0 else end
-        steps += 1
-        if steps > most:
-            for i in range(number[d]):
-                unfinished[pool[d, i]] = True
+        enclose(functions, m, r, work)
+        if size[d] > 1 and _rows_exclude_zero(rows, here, work, room):
             continue
-        expand(space, m, r, work)
-        for f in range(3):
-            combine(space, steady[f], delayed[f], exact, work, f)
-        fast, settled, far = False, True, False
-        for k in range(work.angle.size):
-            fast |= work.lead[k] >= 0
-            far |= space.delays[k] * r > _FAR
-            settled &= space.delays[k] * r < 3e-4
-        for j in range(work.p.shape[0]):
-            settled &= work.bound[j, ORDER] <= EPSILON * work.bound[j, 0]
-        narrow = r <= 1e-13 * m or r < 1e-280
-        if not everywhere and number[d] > 1:
-            first, last, lowest, highest = np.inf, -np.inf, np.inf, -np.inf
-            for i in range(number[d]):
-                row = pool[d, i]
-                first, last = min(first, y[row]), max(last, y[row])
-                lowest, highest = min(lowest, lower[row]), max(highest, upper[row])
-            if _row_excludes_zero(lowest, highest, first, last, work, room):
-                continue
-        _times_conjugate(work.f[0], work.f[2], a)
-        _times_conjugate(work.f[1], work.f[2], b)
-        _times_conjugate(work.f[2], work.f[2], square)
-        size_a, size_b, size_m = 0.0, 0.0, 0.0
-        for i in range(ORDER):
-            size_a += abs(work.f[0, i])
-            size_b += abs(work.f[1, i])
-            size_m += abs(work.f[2, i])
-        least = 2.0 * abs(work.f[2, 0]) - size_m - work.rest[2]
-        known, kept = False, 0
-        for i in range(number[d]):
-            row = pool[d, i]
-            v = y[row]
-            # Rows are tested one by one where a long interval may be spared, or a short one.
-            alone = narrow or number[d] == 1 or far or (not fast and least <= 0.0)
-            if (
-                not everywhere
-                and alone
-                and _row_excludes_zero(lower[row], upper[row], v, v, work, room)
-            ):
-                continue
-            if fast:
-                if narrow:
-                    undecided = _appended(undecided, left)
-                    undecided[left, 0] = row
-                    undecided[left, 1], undecided[left, 2] = -np.inf, np.inf
-                    undecided[left, 3], undecided[left, 4] = max(low, 0.0), min(high, end)
-                    left += 1
-                else:
-                    pool[d + 1, kept] = row
-                    kept += 1
-                continue
-            rest = work.rest[0] + abs(v) * work.rest[1]
-            size_n = size_a + abs(v) * size_b
-            off = (rest + 32.0 * EPSILON * size_n) * size_m + work.rest[2] * (size_n + rest)
-            varied, bent = 0.0, 0.0
-            for k in range(size):
-                z[k] = a[k] - v * b[k]
-                if k > 0:
-                    varied += abs(z[k].imag)
-                if k > 1:
-                    bent += k * abs(z[k].imag)
-            if abs(z[0].imag) > varied + off:
-                continue
-            if not everywhere:
-                above, below, more = z[0].real, z[0].real, off
-                above -= upper[row] * square[0].real
-                below -= lower[row] * square[0].real
-                more += (
-                    3.0
-                    * max(abs(lower[row]), abs(upper[row]))
-                    * size_m
-                    * (work.rest[2] + 32.0 * EPSILON * size_m)
-                )
-                for k in range(1, size):
-                    above -= abs(z[k].real - upper[row] * square[k].real)
-                    below += abs(z[k].real - lower[row] * square[k].real)
-                if above > more or below < -more:
-                    continue
-            # Errors of the coefficients, and that of the remainder's slope (Lemma 18).
-            slope = abs(z[1].imag) - bent - 10.0 * off
-            if slope > 0.0 and (least > 0.0 or everywhere):
-                if not known and not around:
-                    known = True
-                    for e in range(2):
-                        at = low if e == 0 else high
-                        _evaluate(space, steady, delayed, exact, at, 0.0, spare)
-                        m_end = spare.f[2, 0].conjugate()
-                        ends[e, 0] = (spare.f[0, 0] * m_end).imag
-                        ends[e, 1] = (spare.f[1, 0] * m_end).imag
-                if not around and (ends[0, 0] - v * ends[0, 1] < 0.0) == (
-                    ends[1, 0] - v * ends[1, 1] < 0.0
-                ):
-                    continue
-                t, inclined = 0.0, z[1].imag
-                if not around:
-                    for _ in range(4):
-                        p, inclined = 0.0, 0.0
-                        for k in range(size - 1, -1, -1):
-                            inclined = inclined * t + p
-                            p = p * t + z[k].imag
-                        t = min(max(t - p / inclined, -1.0), 1.0)
-                # The functions themselves have another common factor than their polynomials,
-                # from which h over |N|^2 + |M|^2 is free.
-                f, g = _at(work.f[0], t) - v * _at(work.f[1], t), _at(work.f[2], t)
-                slide = 3.0 * size_n * (1.0 + size_m / least) / least if least > 0.0 else np.inf
-                off_t = rough = min(2.0 * off / slope, 2.0)
-                x = (f * g.conjugate()).real / (g * g.conjugate()).real
-                spread = slide * off_t + 2.0 * (rest + abs(x) * work.rest[2]) / abs(g)
-                outside = x + spread < lower[row] or x - spread > upper[row]
-                if not around and outside:
-                    continue
-                total = (f * f.conjugate()).real + (g * g.conjugate()).real
-                inclined = inclined / total if total > 0.0 else 0.0
-                largest = (size_n + rest) ** 2 + (size_m + work.rest[2]) ** 2
-                before, at = 0.0, 0.0
-                for step in range(8):
-                    f, g, error_f, error_g = _evaluate(
-                        space, steady, delayed, exact, m + r * t, v, spare
-                    )
-                    total = (f * f.conjugate()).real + (g * g.conjugate()).real
-                    if not (total > 0.0 and inclined != 0.0):
-                        # N and M have a common zero here.
-                        break
-                    value = (f * g.conjugate()).imag / total
-                    wrong = 2.0 * (error_f * abs(g) + error_g * abs(f)) / total
-                    # Of the two around s = 0 and a map's end the place is known.
-                    off_t = 0.0 if around else min((abs(value) + wrong) * largest / slope, 2.0)
-                    x = (f * g.conjugate()).real / (g * g.conjugate()).real
-                    near = abs(_at(work.f[2], t)) - work.rest[2] - ORDER * off_t * size_m
-                    if near > least > 0.0:
-                        slide = 3.0 * size_n * (1.0 + size_m / near) / near
-                    spread = slide * off_t + 2.0 * (error_f + abs(x) * error_g) / abs(g)
-                    outside = x + spread < lower[row] or x - spread > upper[row]
-                    if around or outside or spread <= fine or abs(value) <= wrong:
-                        break
-                    if step > 0 and t != at and value != before:
-                        inclined = (value - before) / (t - at)
-                    before, at = value, t
-                    t = min(max(t - value / inclined, -1.0), 1.0)
-                if outside:
-                    continue
-                off_t = off_t if off_t <= 2.0 else rough
-                found = _appended(found, n)
-                sign = 1.0 if z[1].imag > 0.0 else -1.0
-                found[n, 0], found[n, 1], found[n, 2] = row, x, spread
-                found[n, 3], found[n, 4] = m + r * t, r * off_t
-                found[n, 5] = sign if around else 2.0 * sign
+        shared, known = _share(space, (low, high, m, r), around, work), n
+        found, n, kept = _follow(
+            functions, rows, here, pool[d + 1], shared, fine, work, spare, room, found, n
+        )
+        halved = kept > 0 and d + 1 < _DEEPEST
+        if halved and around:
+            halved = _cut_around(stack, top, low, m, r)
+        elif halved:
+            halved = _halve(stack, top, low, high)
+        if halved:
+            depth[top], depth[top + 1], size[d + 1] = d + 1, d + 1, kept
+            top += 2
+        else:
+            for row in pool[d + 1, :kept]:
+                x, spread = _hidden(_row(rows, row, shared, work), shared, work)
+                found = _append(found, n, (float(row), x, spread, m, r, 0.0))
                 n += 1
-                continue
-            if narrow or (settled and abs(z[0].imag) + varied <= 2.0 * off):
-                # In shorter intervals rounding hides h as well. If it hides h on much of the
-                # axis, as where N is nearly a multiple of M, no row is followed further.
-                if left == _MOST_UNDECIDED * rows:
-                    unfinished[:] = True
-                    return found[:n].copy(), undecided[:left].copy(), unfinished
-                undecided = _appended(undecided, left)
-                middle, reach = 0.0, np.inf
-                if least > 0.0:
-                    middle = z[0].real / square[0].real
-                    reach = off + 3.0 * abs(middle) * size_m * work.rest[2]
-                    for k in range(1, size):
-                        reach += abs(z[k].real - middle * square[k].real)
-                    reach = 1.01 * reach / (least * least)
-                undecided[left, 0] = row
-                undecided[left, 1], undecided[left, 2] = middle - reach, middle + reach
-                undecided[left, 3], undecided[left, 4] = max(low, 0.0), min(high, end)
-                left += 1
-                continue
-            pool[d + 1, kept] = row
-            kept += 1
-        if kept:
-            number[d + 1] = kept
-            middle = m if high <= 4.0 * low else np.sqrt(low) * np.sqrt(high)
-            parts = (low, middle), (middle, high)
-            if around:
-                q = r / 16.0
-                parts = ((q, high), (-q, q)) if low < 0.0 else ((low, m - q), (m - q, m + q))
-            for part in parts:
-                stack[top, 0], stack[top, 1] = part
-                depth[top] = d + 1
-                top += 1
-    return found[:n].copy(), undecided[:left].copy(), unfinished
+        for i in range(known, n):
+            undecided += found[i, 5] == 0.0
+    return found[:n].copy(), unfinished

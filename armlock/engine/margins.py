@@ -14,7 +14,7 @@ import numpy as np
 
 from armlock.engine import decide
 from armlock.engine.decide import Family, least
-from armlock.engine.functions import Function, stacked
+from armlock.engine.functions import Function, common_zeros, stacked
 from armlock.engine.inclusion import DELAY, DISTANCE, EPSILON, PHASE, REAL
 from armlock.engine.polynomials import rounded
 
@@ -121,17 +121,13 @@ class Margins:
         return f"Margins({', '.join(shown)})"
 
 
-class Limit(NamedTuple):
-    """The disc that L fills at infinite frequency: its centre and radius."""
+def _disc_at_infinity(n: Function, m: Function) -> tuple[float, float]:
+    """Centre and radius of the disc that L = N / M fills at infinite frequency.
 
-    centre: float
-    radius: float
-
-    @classmethod
-    def of(cls, n: Function, m: Function) -> Limit:
-        """Return the disc of N / M, of which M is not delayed at the highest power."""
-        whole, turned = n.space.limits(*stacked([n, m]))
-        return cls(float(whole[0] / whole[1]), float(np.abs(turned[0]).sum() / abs(whole[1])))
+    M is not delayed at the highest power.
+    """
+    whole, turned = n.space.limits(*stacked([n, m]))
+    return float(whole[0] / whole[1]), float(np.abs(turned[0]).sum() / abs(whole[1]))
 
 
 def at_zero(f: Function, g: Function) -> float:
@@ -202,7 +198,7 @@ def first_zero(f: Function, g: Function, most: float, start: float) -> tuple[flo
 
 def modulus_of(n: Function, m: Function, free: Free | None = None) -> tuple[float, float]:
     """Smallest |1 + L|, and where."""
-    d, (centre, radius) = n + m, Limit.of(n, m)
+    d, (centre, radius) = n + m, _disc_at_infinity(n, m)
     best, where = max(abs(1.0 + centre) - radius, 0.0), math.inf
     # A smaller one is excluded to a part in a million, or to what is decided at high frequency.
     tolerance = min(max(1e-6, 2.0 * _DECIDED / best), 1.0) if best else 1e-6
@@ -262,7 +258,7 @@ def _crossover(
 
 def _phase(n: Function, m: Function, free: Free | None) -> tuple[float, float]:
     """Smallest |arg(-L)| where |L| = 1, and where."""
-    centre, radius = Limit.of(n, m)
+    centre, radius = _disc_at_infinity(n, m)
     best, where = math.pi, math.nan
     if abs(abs(centre) - radius) <= 1.0 <= abs(centre) + radius:
         cosine = (radius**2 - 1.0 - centre**2) / (2.0 * centre) if centre else 1.0
@@ -272,7 +268,7 @@ def _phase(n: Function, m: Function, free: Free | None) -> tuple[float, float]:
 
 def _delay(n: Function, m: Function, free: Free | None) -> tuple[float, float]:
     """Smallest arg(-L) / omega where |L| = 1, and where."""
-    centre, radius = Limit.of(n, m)
+    centre, radius = _disc_at_infinity(n, m)
     if abs(centre) + radius >= 1.0:
         return 0.0, math.inf
     arc = 0.0, 0.0, 0.0, 1.0
@@ -325,11 +321,6 @@ def margins_of(n: Function, m: Function, free: Free | None = None) -> Margins:
         phase_omega=phase_omega,
         modulus_omega=modulus_omega,
     )
-
-
-def common_zeros(n: Function, m: Function) -> int:
-    """Order of the zero at s = 0 that numerator and denominator have in common."""
-    return min((lead.order for f in (n, m) if (lead := f.leading())), default=0)
 
 
 def require_stable(n: Function, m: Function) -> None:

@@ -29,7 +29,7 @@ _FEW_STEPS, _MANY_STEPS = 200_000, 2_000_000
 # The search for one zero ends once it has cost so many steps, some five seconds.
 _ALL_STEPS = 4e6
 # Most points of one line, and from how many of them Newton's method starts.
-_MOST_POINTS, _MOST_STARTS = np.int64(1_000_000), 1000
+_MOST_POINTS, _MOST_STARTS = 1_000_000, 1000
 # A line is followed up to where zeros can lie right of it, and so many turns of the longest
 # delay further, but at first no longer than 1000 times that; with each line twice as far.
 _TURNS_FURTHER, _MOST_TURNS_FURTHER = 4.0, 3e4
@@ -106,9 +106,7 @@ class _Line(NamedTuple):
     """The function s -> F(s + sigma), as `Function.shifted` returns it, and its extent."""
 
     space: Space
-    steady: FloatArray
-    delayed: FloatArray
-    uncertain: FloatArray
+    functions: inclusion.Functions
     #: Up to about where zeros can lie right of the line, in rad/s; inf past a chain's limit.
     end: float
     #: One turn of the longest delay that acts, in rad/s.
@@ -125,14 +123,15 @@ class _Search:
 
     def _line(self, sigma: float) -> _Line:
         """Return the function on the line Re s = sigma."""
-        space, steady, delayed, uncertain = self.function.shifted(sigma)
-        end = float(space.confined_from(steady[None], delayed[None], uncertain[None])[0])
+        space, functions = self.function.shifted(sigma)
+        _, steady, delayed, uncertain = functions
+        end = float(space.confined_from(steady, delayed, uncertain)[0])
         if np.isfinite(end) and not space.step:
-            end = _last_crossing(space, steady, delayed)
+            end = _last_crossing(space, steady[0], delayed[0])
         # Far to the right the longer delays no longer act.
-        acting = float(space.arrays.delays[delayed.any(axis=0)].max(initial=0.0))
+        acting = float(space.arrays.delays[delayed[0].any(axis=0)].max(initial=0.0))
         turn = 2.0 * np.pi / (acting or space.longest)
-        return _Line(space, steady, delayed, uncertain, end, turn)
+        return _Line(space, functions, end, turn)
 
     def count(self, sigma: float, most: int) -> int:
         """Count the zeros right of a line; below zero where that is not decided."""
@@ -143,8 +142,7 @@ class _Search:
             if sigma == 0.0:
                 found = decide.count(self.function, self.common, most=most)
             else:
-                weights = (value[None] for value in line[1:4])
-                found = int(decide.counts(line.space, *weights, most=most)[0])
+                found = int(decide.counts(line.space, line.functions, most=most)[0])
                 found -= self.common if found >= 0 and sigma < 0.0 else 0
         except UndecidedError:
             found = BOUNDARY
@@ -174,10 +172,8 @@ class _Search:
         if not line.space.step:
             end = min(end, 1e3 * self.further * line.turn)
             end += self.further * line.turn
-        grid, move = inclusion.resolved(
-            line.space.arrays, line.steady, line.delayed, 1e-3 * _SLOWEST * line.turn, end,
-            _MOST_POINTS,
-        )  # fmt: skip
+        begin = 1e-3 * _SLOWEST * line.turn
+        grid, move = inclusion.resolved(line.functions, begin, end, _MOST_POINTS)
         self.steps += grid.size
         s, length = self._moved(sigma + 1j * grid, move)
         # From where a step of Newton's method is locally shortest: no zero close to the line
@@ -233,7 +229,8 @@ def _last_crossing(space: Space, steady: FloatArray, delayed: FloatArray) -> flo
     omega = np.geomspace(1e-3 * space.corners[0], 1e6 * space.corners[-1], 500)
     weights = np.vstack((steady - delayed.sum(1), delayed.T))
     still = np.zeros((*weights.shape, delayed.shape[1]))
-    sizes = np.abs(inclusion.values(space.arrays, weights, still, omega)[0])
+    functions = inclusion.Functions(space.arrays, weights, still, np.zeros_like(weights))
+    sizes = np.abs(inclusion.values(functions, omega))
     met = np.flatnonzero(sizes[0] <= sizes[1:].sum(0))
     return float(omega[min(met[-1] + 1, 499)]) if met.size else 2.0 * np.pi / space.longest
 

@@ -19,9 +19,9 @@ from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import axis, positive_number, real_number
 from armlock.engine import decide
 from armlock.engine.decide import BOUNDARY, UNCONFINED, Family, UndecidedError
-from armlock.engine.functions import Function
+from armlock.engine.functions import Function, common_zeros
 from armlock.engine.inclusion import EPSILON
-from armlock.engine.margins import common_zeros, first_zero, gain_range, require_stable
+from armlock.engine.margins import first_zero, gain_range, require_stable
 from armlock.loops import Loop, checked_loop
 from armlock.stability.counts import CountError
 

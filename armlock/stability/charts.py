@@ -261,7 +261,7 @@ class _Rows:
         The counts at x = lower and at x = upper are `base` and `top`.
         """
         x0, y0 = self.centre
-        found, undecided, doubted = crossings(
+        found = crossings(
             (self.at_centre, self.second, self.first),
             y - y0,
             lower - x0,
@@ -275,15 +275,12 @@ class _Rows:
         change = np.zeros((y.size, x.size + 1), dtype=np.int64)
         np.add.at(change, (row, np.searchsorted(x, at[inside])), jump)
         counts = base[:, None] + np.cumsum(change, axis=1)
-        doubted |= (base < 0) | (counts[:, -1] != top)
+        doubted = found.unfinished | (base < 0) | (counts[:, -1] != top)
         doubtful = np.repeat(doubted[:, None], x.size, axis=1)
         # Centre and crossing are rounded, and so is their sum.
         rounding = 4.0 * EPSILON * (abs(x0) + np.abs(found.x))
-        for rows, low, high in (
-            (found.row, at - found.spread - rounding, at + found.spread + rounding),
-            (undecided.row, x0 + undecided.least, x0 + undecided.most),
-        ):
-            from_k, to_k = np.searchsorted(x, low), np.searchsorted(x, high, side="right")
-            for i in np.flatnonzero(from_k < to_k):
-                doubtful[rows[i], from_k[i] : to_k[i]] = True
+        off = found.spread + rounding
+        from_k, to_k = np.searchsorted(x, at - off), np.searchsorted(x, at + off, side="right")
+        for i in np.flatnonzero(from_k < to_k):
+            doubtful[found.row[i], from_k[i] : to_k[i]] = True
         return counts[:, :-1], doubtful

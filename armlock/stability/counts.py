@@ -14,19 +14,13 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
-from armlock.characteristic import (
-    CharacteristicFunction,
-    broadcast_parameters,
-    checked_system,
-    given_or_one,
-)
+from armlock.characteristic import CharacteristicFunction, broadcast_parameters
 from armlock.checks import FloatArray, IntArray, real_number
 from armlock.delays import DelaySystem
 from armlock.engine import decide
 from armlock.engine.decide import BOUNDARY, UNCONFINED, UndecidedError
 from armlock.engine.functions import Function, stacked
-from armlock.engine.inclusion import EPSILON
-from armlock.engine.margins import common_zeros
+from armlock.engine.inclusion import EPSILON, Functions
 from armlock.loops import Loop
 
 __all__ = ["BOUNDARY", "UNCONFINED", "CountError", "unstable_roots"]
@@ -78,10 +72,8 @@ def _count_exactly(
 ) -> int:
     """Count the roots at one point, of a Loop those of the closed loop."""
     function = system.function(x, y)
-    common = 0
     # No root cancels where D has none at s = 0.
-    if isinstance(system, Loop) and not function.series(1)[0]:
-        common = common_zeros(*system.quotient(x, y))
+    common = 0 if function.series(1)[0] else system.cancelled(x, y)
     at = np.array([float(x)]), np.array([float(y)])
     return int(_decided(lambda: np.array([_count(function, common, right_of)]), *at)[0])
 
@@ -95,8 +87,7 @@ def _count(function: Function, common: int, right_of: float) -> int:
             f"right_of must be at most {_LARGEST_EXPONENT:.0f} over the longest delay in "
             f"magnitude, got {right_of}: its exponential is no float"
         )
-    space, *weights = function.shifted(right_of)
-    found = int(decide.counts(space, *(part[None] for part in weights))[0])
+    found = int(decide.counts(*function.shifted(right_of))[0])
     return found - common if right_of < 0.0 <= found else found
 
 
@@ -105,16 +96,17 @@ def count_points(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -
     x0, y0 = system.reference
     # Differences from the reference: next to it, where a loop is used, nothing cancels.
     terms = system.function(x0, y0), system.terms.first, system.terms.second
-    (steady, delayed), exact = stacked(terms), np.ones_like(x)
+    (steady, delayed), space = stacked(terms), terms[0].space
+    shares = np.stack((np.ones_like(x), x0 - x, y0 - y), axis=-1)
     # D has a root at s = 0 on a line, which is known exactly. A loop may have none there.
     on_line = np.zeros(x.size, np.bool_)
     if not isinstance(system, Loop):
         at_zero = [term.series(1)[0] for term in terms]
         # Of many fast poles the product is no float.
         a, b, c = (value / (max(map(abs, at_zero)) or 1) for value in at_zero)
-        sums = float(a), float(b) * (x0 - x), float(c) * (y0 - y)
-        sizes = np.abs(sums[0]) + np.abs(sums[1]) + np.abs(sums[2])
-        for i in np.flatnonzero(np.abs(sums[0] + sums[1] + sums[2]) <= 8.0 * EPSILON * sizes):
+        sums = shares * (float(a), float(b), float(c))
+        near = np.abs(sums.sum(axis=1)) <= 8.0 * EPSILON * np.abs(sums).sum(axis=1)
+        for i in np.flatnonzero(near):
             dx, dy = Fraction(x0) - Fraction(x[i]), Fraction(y0) - Fraction(y[i])
             on_line[i] = a + b * dx + c * dy == 0
     confined = system.neutral_margin(x, y) > 0.0
@@ -122,16 +114,12 @@ def count_points(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -
     left = np.flatnonzero(confined & ~on_line)
     for start in range(0, left.size, _AT_A_TIME):
         some = left[start : start + _AT_A_TIME]
-        shares = np.stack((exact[some], x0 - x[some], y0 - y[some]), axis=-1)
         # A share, a weight, their product and two sums round by half an EPSILON each. The
         # factors exp(-s theta) - 1 of delayed weights are at most two.
-        sizes = np.abs(shares) @ (np.abs(steady) + 2.0 * np.abs(delayed).sum(axis=-1))
-        weights = shares @ steady, np.einsum("nf,fjk->njk", shares, delayed)
-        found[some] = _decided(
-            partial(decide.counts, terms[0].space, *weights, 4.0 * EPSILON * sizes),
-            x[some],
-            y[some],
-        )
+        sizes = np.abs(shares[some]) @ (np.abs(steady) + 2.0 * np.abs(delayed).sum(axis=-1))
+        weights = shares[some] @ steady, np.tensordot(shares[some], delayed, axes=1)
+        functions = Functions(space.arrays, *weights, 4.0 * EPSILON * sizes)
+        found[some] = _decided(partial(decide.counts, space, functions), x[some], y[some])
     for i in left[found[left] == BOUNDARY]:
         found[i] = _count_exactly(system, float(x[i]), float(y[i]), 0.0)
     return found
@@ -219,11 +207,6 @@ def unstable_roots(
             return np.array(_count(n + m, system.common, right_of))
         except UndecidedError as error:
             raise CountError(f"no count: {error}", np.empty((0, 2))) from None
-    if isinstance(c1, Fraction) or isinstance(c2, Fraction):
-        given = given_or_one(checked_system(system), c1, c2)
-        pair = zip(system.parameters, given, strict=True)
-        c1, c2 = (v if isinstance(v, Fraction) else real_number(name, v) for name, v in pair)
-        return np.array(_count_exactly(system, c1, c2, right_of))
     xs, ys = broadcast_parameters(system, c1, c2)
     if xs.size > 1 and right_of == 0.0:
         return count_points(system, xs.ravel(), ys.ravel()).reshape(xs.shape)

@@ -8,40 +8,39 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 
-from armlock.checks import BoolArray, FloatArray
-from armlock.engine import decide, inclusion
-from armlock.engine.functions import Function, stacked
-from armlock.engine.inclusion import Crossed
+from armlock.checks import BoolArray, FloatArray, IntArray
+from armlock.engine import inclusion
+from armlock.engine.decide import blocks, in_threads
+from armlock.engine.functions import Function, compiled
 
 # Most steps for some rows: some ten seconds.
 _MOST_STEPS = 3_000_000
 
 
-class Undecided(NamedTuple):
-    """Intervals of the axis in which rounding hides crossings, and where these may be.
+class Crossings(NamedTuple):
+    """Zeros on the axis, and intervals of the axis in which rounding hides them.
 
     Attributes
     ----------
     row : int array, shape (n,)
         Of which row.
-    least, most : float array, shape (n,)
-        Between which x.
-    low, high : float array, shape (n,)
-        Between which frequencies in rad/s.
+    x, spread : float arrays, shape (n,)
+        Where the zero is, and how far from it at most.
+    omega, width : float arrays, shape (n,)
+        Its frequency in rad/s, and how far from it at most.
+    jump : int array, shape (n,)
+        By how many the zeros on the right increase with x. 0: an undecided interval, which may
+        hold any number of zeros.
+    unfinished : bool array, shape (rows,)
+        Which rows take too many steps.
     """
 
-    row: FloatArray
-    least: FloatArray
-    most: FloatArray
-    low: FloatArray
-    high: FloatArray
-
-
-class Crossings(NamedTuple):
-    """Crossings, intervals that are undecided, and rows that take too many steps."""
-
-    found: Crossed
-    undecided: Undecided
+    row: IntArray
+    x: FloatArray
+    spread: FloatArray
+    omega: FloatArray
+    width: FloatArray
+    jump: IntArray
     unfinished: BoolArray
 
 
@@ -70,28 +69,23 @@ def crossings(
     fine : float, optional
         How exact x has to be.
     """
-    space, rows = functions[0].space, stacked(functions)
+    three, step = compiled(functions), functions[0].space.step
     # Rows of one block share intervals, and those that end at different x share few.
     alike = (lower == lower[0]).all() and (upper == upper[0]).all()
     block = -(-y.size // (4 * numba.config.NUMBA_NUM_THREADS)) if alike else 4
 
     def some(k: slice) -> tuple[Any, ...]:
         last = float(end[k].max())
-        is_map = bool(space.step) and last >= np.pi / space.step
-        result: tuple[Any, ...] = inclusion.cross(
-            space.arrays, *rows, y[k], lower[k], upper[k], begin, last, is_map, fine,
-            _MOST_STEPS,
-        )  # fmt: skip
-        for table in result[:2]:
-            table[:, 0] += k.start
-        return result
+        is_map = bool(step) and last >= np.pi / step
+        rows = inclusion.Rows(y[k], lower[k], upper[k])
+        table, unfinished = inclusion.cross(three, rows, begin, last, is_map, fine, _MOST_STEPS)
+        table[:, 0] += k.start
+        return table, unfinished
 
-    found, undecided, unfinished = map(
-        np.concatenate, zip(*decide.in_threads(some, y.size, block), strict=True)
+    table, unfinished = map(
+        np.concatenate, zip(*in_threads(some, blocks(y.size, block)), strict=True)
     )
-    row, x, spread, omega, width, jump = found.T
+    row, x, spread, omega, width, jump = table.T
     return Crossings(
-        Crossed(row.astype(np.int64), x, spread, omega, width, jump.astype(np.int64)),
-        Undecided(undecided[:, 0].astype(np.int64), *undecided.T[1:]),
-        unfinished,
+        row.astype(np.int64), x, spread, omega, width, jump.astype(np.int64), unfinished
     )

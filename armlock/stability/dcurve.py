@@ -207,21 +207,19 @@ def _poles(system: CharacteristicFunction, omega_max: float) -> list[tuple[float
     """Return the intervals, ascending, in which the curve has a pole, or may have one."""
     _, _, first, second = system.terms
     bound = np.array([np.inf])
-    found, undecided, unfinished = crossings(
+    found = crossings(
         (first, first * 0, second), np.zeros(1), -bound, bound, np.array([omega_max])
     )
-    if unfinished.any():
+    if found.unfinished.any():
         raise CountError(
             f"no branches up to omega_max = {omega_max}: there are too many poles",
             np.empty((0, 2)),
         )
     off = found.width + 4.0 * EPSILON * found.omega
-    low, high = found.omega - off, found.omega + off
-    inside = found.omega > 0.0
-    low, high = (
-        np.append(a[inside], b) for a, b in ((low, undecided.low), (high, undecided.high))
-    )
-    order = np.argsort(low)
+    # A pole at s = 0 is on no branch.
+    low, high = np.maximum(found.omega - off, 0.0), found.omega + off
+    inside = np.flatnonzero((found.omega > 0.0) | (found.jump == 0))
+    order = inside[np.argsort(low[inside])]
     return list(zip(low[order].tolist(), high[order].tolist(), strict=True))
 
 

@@ -16,8 +16,7 @@ import numpy as np
 from armlock.checks import ComplexArray, FloatArray, positive_number, real_number
 from armlock.delays import DelaySystem
 from armlock.engine import decide
-from armlock.engine.functions import Function, at, stacked
-from armlock.engine.margins import common_zeros
+from armlock.engine.functions import Function, at, common_zeros, stacked
 from armlock.engine.polynomials import rounded
 from armlock.loops import Loop, checked_loop
 from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError
@@ -338,18 +337,18 @@ def axis_crossings(
         )
     if begin >= omega_max:
         return AxisCrossings(np.empty(0), np.empty(0))
-    found, undecided, unfinished = crossings(
+    found = crossings(
         (n, n * 0, m), np.zeros(1), np.array([-_LARGE]), np.array([-least]),
         np.array([omega_max]), begin=begin,
     )  # fmt: skip
-    hidden = (undecided.least < -_SMALL) & (undecided.most > -_LARGE)
-    if unfinished.any() or hidden.any():
+    told = found.jump != 0
+    hidden = ~told & (found.x - found.spread < -_SMALL) & (found.x + found.spread > -_LARGE)
+    if found.unfinished.any() or hidden.any():
         why = "they take too many steps"
         if hidden.any():
-            why = f"rounding hides some around {undecided.low[hidden][0]} rad/s"
+            why = f"rounding hides some around {found.omega[hidden][0]} rad/s"
         raise CountError(f"no crossings at (c1, c2) = ({c1}, {c2}): {why}", point)
-    order = np.argsort(found.omega)
-    omega = found.omega[order]
+    omega = np.sort(found.omega[told])
     value = _response(n, m, omega).real
     kept = (value < -least) & (value > -_LARGE)
     return AxisCrossings(omega[kept], value[kept])

@@ -13,9 +13,7 @@ import numpy.typing as npt
 from armlock.characteristic import CharacteristicFunction, broadcast_parameters
 from armlock.checks import ComplexArray
 from armlock.delays import DelaySystem
-from armlock.engine.margins import common_zeros
 from armlock.engine.roots import rightmost_zero
-from armlock.loops import Loop
 
 
 @overload
@@ -106,5 +104,4 @@ def rightmost_root(
 
 def _at(system: CharacteristicFunction, x: float, y: float) -> complex:
     """Return the rightmost root at one point."""
-    common = common_zeros(*system.quotient(x, y)) if isinstance(system, Loop) else 0
-    return rightmost_zero(system.function(x, y), common)
+    return rightmost_zero(system.function(x, y), system.cancelled(x, y))
