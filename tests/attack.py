@@ -595,9 +595,10 @@ def check_maps(tally, rng, sketch, loop, point):
 
 def check_controls(tally, rng, sketch, loop, point):
     """No margin that is 1e-5 too good is certified; nearly all that are 3e-5 worse are."""
-    try:
-        found = margins(loop, *point)
-    except REFUSALS:
+    if judge.count(sketch, *point) != 0:
+        return
+    found = tally.ask("margins", margins, loop, *point)
+    if found is None:
         return
     for what in dense_judge.too_good_ones(*loop.quotient(*point), found, tally.controls):
         tally.note("controls", point, what, "no certificate")
@@ -630,7 +631,7 @@ CHECKS = {
     "charts": (check_chart, 0.3),
     "dcurve": (check_dcurve, 0.3),
     "maps": (check_maps, 0.3),
-    "controls": (check_controls, 0.1),
+    "controls": (check_controls, 0.3),
 }
 #: The checks of loops with more delays.
 MORE_DELAYS = {"delays": (check_delays, 1.0)}

@@ -91,7 +91,8 @@ class Judge:
                 self.loop(w), at_zero if abs(at_zero.imag) < 1e-3 * abs(at_zero) else np.inf
             ).real
         )
-        k = k[(k > 1e-6) & (k < 1e6)]
+        # Gain factors past 1e4 are not looked at.
+        k = k[(k > 1e-4) & (k < 1e4)]
         w = zeros(lambda v: np.abs(v) - 1.0)
         angle = np.angle(-self.loop(w))
         near = np.argsort(np.abs(1.0 + value))[:50]

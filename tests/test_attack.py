@@ -67,11 +67,20 @@ def test_random_loops_agree_with_brute_force(kind):
     assert listed(tally) == []
 
 
-@pytest.mark.parametrize("family", ["clusters", "zero"])
-def test_random_loops_of_a_family_agree_with_brute_force(family):
+@pytest.mark.parametrize(("family", "calls"), [("clusters", 3), ("zero", 3), ("delays", 2)])
+def test_random_loops_of_a_family_agree_with_brute_force(family, calls):
     tally = attack.attack(26, range(5), tally=attack.Tally(patient=False), family=family)
-    assert tally.calls.total() > 4 * tally.calls["loops"]
+    assert tally.calls.total() > (calls + 1) * tally.calls["loops"] - 1
     assert listed(tally) == []
+
+
+def test_margins_that_are_too_good_are_not_certified():
+    tally = attack.attack(7, range(40), ("controls",), attack.Tally(patient=False))
+    assert listed(tally) == []
+    assert tally.controls["too good: certified"] == 0
+    assert tally.controls["too good: not certified"] >= 10
+    # Where the limit of the chain is next, or gains end, less is certified.
+    assert tally.controls["too small: certified"] >= 10
 
 
 @pytest.mark.parametrize(
