@@ -1135,9 +1135,9 @@ def _locate(
     size_m, rest_m = shared.sizes[2], work.rest[2]
     t, slope = (0.0, row.z[1].imag) if shared.around else _zero_of_polynomial(row.z)
     f, g = _at(work.f[0, 0], t) - row.y * _at(work.f[1, 0], t), _at(work.f[2, 0], t)
+    off_t = min(2.0 * row.off / least_slope, 2.0)
     slope /= abs(f) ** 2 + abs(g) ** 2
     least_slope /= (row.size + row.rest) ** 2 + (size_m + rest_m) ** 2
-    off_t = min(2.0 * row.off / least_slope, 2.0)
     x, spread, before, at = 0.0, np.inf, 0.0, 0.0
     for step in range(8):
         enclose(functions, shared.m + shared.r * t, 0.0, spare)
