@@ -21,6 +21,7 @@ from armlock.engine import decide
 from armlock.engine.decide import BOUNDARY, UNCONFINED, UndecidedError
 from armlock.engine.functions import Function, stacked
 from armlock.engine.inclusion import EPSILON, Functions
+from armlock.engine.polynomials import rounded
 from armlock.loops import Loop
 
 __all__ = ["BOUNDARY", "UNCONFINED", "CountError", "unstable_roots"]
@@ -98,17 +99,13 @@ def count_points(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -
     terms = system.function(x0, y0), system.terms.first, system.terms.second
     (steady, delayed), space = stacked(terms), terms[0].space
     shares = np.stack((np.ones_like(x), x0 - x, y0 - y), axis=-1)
-    # D has a root at s = 0 on a line, which is known exactly. A loop may have none there.
+    # D has a root at s = 0 on a line. A loop may have none there.
     on_line = np.zeros(x.size, np.bool_)
     if not isinstance(system, Loop):
         at_zero = [term.series(1)[0] for term in terms]
         # Of many fast poles the product is no float.
-        a, b, c = (value / (max(map(abs, at_zero)) or 1) for value in at_zero)
-        sums = shares * (float(a), float(b), float(c))
-        near = np.abs(sums.sum(axis=1)) <= 8.0 * EPSILON * np.abs(sums).sum(axis=1)
-        for i in np.flatnonzero(near):
-            dx, dy = Fraction(x0) - Fraction(x[i]), Fraction(y0) - Fraction(y[i])
-            on_line[i] = a + b * dx + c * dy == 0
+        sums = shares * rounded([value / (max(map(abs, at_zero)) or 1) for value in at_zero])
+        on_line = np.abs(sums.sum(axis=1)) <= 8.0 * EPSILON * np.abs(sums).sum(axis=1)
     confined = system.neutral_margin(x, y) > 0.0
     found = np.where(confined, BOUNDARY, UNCONFINED)
     left = np.flatnonzero(confined & ~on_line)
