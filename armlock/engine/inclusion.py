@@ -1135,7 +1135,8 @@ def _locate(
     size_m, rest_m = shared.sizes[2], work.rest[2]
     t, slope = (0.0, row.z[1].imag) if shared.around else _zero_of_polynomial(row.z)
     f, g = _at(work.f[0, 0], t) - row.y * _at(work.f[1, 0], t), _at(work.f[2, 0], t)
-    off_t = min(2.0 * row.off / least_slope, 2.0)
+    rough = min(2.0 * row.off / least_slope, 2.0)
+    off_t = rough
     slope /= abs(f) ** 2 + abs(g) ** 2
     least_slope /= (row.size + row.rest) ** 2 + (size_m + rest_m) ** 2
     x, spread, before, at = 0.0, np.inf, 0.0, 0.0
@@ -1165,7 +1166,8 @@ def _locate(
             slope = (value - before) / (t - at)
         before, at = value, t
         t = min(max(t - value / slope, -1.0), 1.0)
-    return x, spread, t, off_t
+    # At a root that was computed the error of one value is not known: it is no number.
+    return x, spread, t, off_t if off_t <= 2.0 else rough
 
 
 @_inner
