@@ -365,10 +365,8 @@ def least(
     _, _, best, where, _ = inclusion.walk(functions, question, likely, best, where, _A_LOOK)
     if best <= start:
         return best, where
-    level = start + (best - start) * (1.0 - tolerance)
-    known = np.isfinite(level)
-    begin = low or (family.begins(level) if known else floor)
-    end = min(family.ends(level), high) if known else end
+    level = min(start + (best - start) * (1.0 - tolerance), 1e300)
+    begin, end = low or family.begins(level), min(family.ends(level), high)
     if not begin > 0.0:
         raise UndecidedError("the behaviour at s = 0 is not decided", 0.0)
     if not np.isfinite(end):
