@@ -664,5 +664,6 @@ def d_subdivision_alone() -> Finding:
         f"One turn takes {turn:.3g} rad/s, and {DRAWN_SAMPLES} samples are "
         f"{DRAWN_SAMPLES * turn / last:.0f} a turn; with 20 000 the drawing is off by "
         f"{many:.1e}, but by {short:.2g} if it ends at 5 rad/s. Exact counts need no drawing: "
-        "crossings lie where $|2 + jω/g| ≤ |c₁| + |c₂|$, and certified steps find them all.",
+        "crossings lie where $|2 + jω/g| ≤ |c₁| + |c₂|$, and certified intervals find all of "
+        "them.",
     )
