@@ -90,8 +90,8 @@ class CharacteristicFunction:
     Notes
     -----
     The equation is of *retarded* type if all delayed terms are of lower degree than A, and of
-    *neutral* type (`neutral` is true) if one of them reaches it. The roots of a neutral
-    equation at high frequency form the *neutral root chain*, see `neutral_margin`.
+    *neutral* type (`neutral` is true) if one of them has the degree of A. The roots of a
+    neutral equation at high frequency form the *neutral root chain*, see `neutral_margin`.
 
     Examples
     --------
@@ -245,9 +245,9 @@ class CharacteristicFunction:
         Returns
         -------
         float array, of the broadcast shape
-            Left less right side over |a|, and zero where rounding hides the sign. Negative or
-            zero: the chain is not confined to the left half-plane. One for a retarded
-            equation and for a map, which has no such chain.
+            Left side minus right side, divided by |a|; zero where rounding hides the sign. If
+            it is negative or zero, the chain is not confined to the left half-plane. It is one
+            for a retarded equation and for a map, which have no such chain.
 
         Raises
         ------

@@ -91,16 +91,16 @@ class Controller:
         Raises
         ------
         TypeError, ValueError
-            If it is none of these, a system in discrete time or with several channels, or a
-            state space whose zeros and poles do not give its response back to a part in a
+            If it is none of these, is in discrete time, or has several inputs or outputs; or if
+            the zeros and poles of a state space do not reproduce its response to a part in a
             million.
 
         Notes
         -----
-        Repeated zeros and poles stay what they are in a `Controller` or a triple. In
-        python-control they do not: it multiplies all factors out, those of `control.zpk` too,
-        and ``control.zpk([], [-1e-3] * 5, 1)`` comes back as five complex poles around -1e-3.
-        Write ``Controller([], [-1e-3] * 5, 1)`` in its place.
+        A `Controller` or a triple keeps repeated zeros and poles. python-control does not: it
+        multiplies all factors out, those of `control.zpk` too. It turns
+        ``control.zpk([], [-1e-3] * 5, 1)`` into five complex poles around -1e-3. Write
+        ``Controller([], [-1e-3] * 5, 1)`` instead.
 
         Examples
         --------
@@ -184,8 +184,8 @@ def check_system(name: str, system: Any, others: str) -> None:
         )
     if system.isdtime(strict=True):
         raise ValueError(
-            f"{name} must be continuous in time, got sampling time {system.dt}: give the one "
-            "that was sampled"
+            f"{name} must be continuous in time, got sampling time {system.dt}: give the "
+            "continuous system from which it was sampled"
         )
 
 
@@ -365,7 +365,7 @@ def white_paper(gain: float = 40.0) -> Controller:
 def roll_off(first: float, last: float, pairs: int, slope: float = 2.0 / 3.0) -> Controller:
     r"""Return a controller whose gain falls by a share of a power of the frequency.
 
-    Poles and zeros take turns. With n pairs, and r = (last / first)^(1 / n), it is
+    Poles and zeros alternate. With n pairs, and r = (last / first)^(1 / n), it is
 
     .. math::
 

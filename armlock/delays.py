@@ -238,7 +238,7 @@ class WithDelays:
         other : system, optional
             In the feedback path, as `of` takes it.
         sign : float, optional
-            Of the feedback.
+            Factor of the feedback path, -1 by default.
         """
         (n1, m1), (n2, m2) = _quotient(self), _quotient(other)
         back = DelaySystem.of(-sign).numerator
@@ -301,9 +301,9 @@ class DelaySystem(WithDelays):
         N, M = \sum_k p_k(s)\, e^{-s\theta_k} , \quad \theta_k \ge 0
 
     Write ``control.tf([1], [2, 1]) * delay(0.5)`` to make one. Systems are combined with
-    ``+ - * /`` and `feedback`, and ``L(s)`` is the value at s. python-control's systems know no
-    delays: to divide one by a `DelaySystem`, or to close it with one, write
-    ``DelaySystem.of(plant)`` in its place.
+    ``+ - * /`` and `feedback`, and ``L(s)`` is the value at s. The systems of python-control
+    have no delays. To divide such a system by a `DelaySystem`, or to close it with a
+    `DelaySystem`, write ``DelaySystem.of(plant)`` instead of ``plant``.
 
     Parameters
     ----------
@@ -314,12 +314,12 @@ class DelaySystem(WithDelays):
     ------
     ZeroDivisionError, ValueError
         If the denominator is zero, or all of it is delayed more than the numerator: such a
-        system would answer before it is asked.
+        system is not causal.
 
     Notes
     -----
-    A power of s that N and M have in common is divided out, and a root at s = 0 that both have
-    is no root of the loop. Other common factors stay, and their roots count.
+    A common power of s is cancelled in N and M, so a root at s = 0 that both have is not a root
+    of the loop. Other common factors are not cancelled, and their roots count.
 
     Examples
     --------

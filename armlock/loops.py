@@ -81,7 +81,7 @@ def HayesEquation(tau: float = 1.0) -> DelayEquation:
 class Loop(WithDelays, CharacteristicFunction):
     r"""An arm-locking loop, with free parameters (c1, c2).
 
-    Of a controller K and a signal mapping with weights m1 and m2, its open loop and its
+    With a controller K and a signal mapping with weights m1 and m2, the open loop and the
     characteristic function are
 
     .. math::
@@ -121,8 +121,8 @@ class Loop(WithDelays, CharacteristicFunction):
 
     Notes
     -----
-    Poles at s = 0 that controller, sensor or actuator cancel against zeros there drop out
-    here, by construction, so that they leave no root at s = 0 in D.
+    A pole of controller, sensor or actuator at s = 0 that a zero cancels is removed by
+    construction. It leaves no root of D at s = 0.
 
     Examples
     --------
@@ -193,7 +193,7 @@ class Loop(WithDelays, CharacteristicFunction):
         """Return R, B1 and B2, the last two by their half sum and half difference.
 
         Where the arms cancel, as in a difference or in the integral of the dual sensor, they do
-        so in these polynomials, and not in what a walk evaluates.
+        so in these polynomials, and not in the numerical evaluation.
         """
         if not (self.b1 and self.b2):
             return super().parts()
@@ -315,7 +315,7 @@ class Loop(WithDelays, CharacteristicFunction):
     def with_arms(
         self, s: npt.ArrayLike, c1: npt.ArrayLike, c2: npt.ArrayLike
     ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Evaluate L and both `arm_responses`, of which it is made."""
+        """Evaluate L and both `arm_responses`."""
         s, c1, c2 = self._checked(s, c1, c2)
         first, second = self.arm_responses(s)
         result: ComplexArray = first * ((1.0 - c1) - c1 * np.expm1(-s * self.tau1))
@@ -336,8 +336,8 @@ class Loop(WithDelays, CharacteristicFunction):
         Returns
         -------
         control.FrequencyResponseData
-            For its plots. Its own margins see only these frequencies; `armlock.margins` misses
-            none.
+            For the plots of python-control. Its margins use only these frequencies;
+            `armlock.margins` covers all frequencies.
 
         Raises
         ------
@@ -584,7 +584,7 @@ def paper_loop(
         Table II by default; `armlock.controllers` has its stages and the printed variant.
     actuator : bool, optional
         Whether the integrating actuator 1/s of Secs. II and III is in the loop. Without it,
-        the default, the paper's claims on the controller come true.
+        the default, the paper's claims on the controller hold.
     difference : float, optional
         The dtau of the sensor in s, tau1 - tau2 by default.
     delay : float, optional
@@ -688,7 +688,7 @@ def _at_hertz(*corners: float) -> list[float]:
 
 
 def robust_loop() -> Loop:
-    r"""Return a loop of the paper's structure that withstands nearly three times as much.
+    r"""Return a loop of the paper's structure that tolerates nearly three times as much.
 
     The controller has the two high-pass factors, the four lead-lag factors and the gain of
     Table II, on the paper's sensor and delays:
@@ -698,9 +698,9 @@ def robust_loop() -> Loop:
         C(s) = g\, \frac{s}{s + p_1}\, \frac{s}{s + p_2}\, \frac{s + z_1}{s + p_3}
         \left( \frac{s + z_2}{s + p_3} \right)^3
 
-    with p1, p2, z1, z2 and p3 at 0.25, 0.108, 0.37, 16.75 and 114.7 microhertz. Nowhere from
-    0.1 mHz to 1 Hz is its gain more than 0.05 dB below that of Table II. It was found by a
-    search; no proof says that there is none better.
+    with p1, p2, z1, z2 and p3 at 0.25, 0.108, 0.37, 16.75 and 114.7 microhertz. From
+    0.1 mHz to 1 Hz its gain is at most 0.05 dB below the gain of Table II. A search found the
+    controller; a better one may exist.
 
     Returns
     -------
@@ -723,10 +723,10 @@ def robust_loop() -> Loop:
 def buildable_loop() -> Loop:
     r"""Return a loop that rolls off, with a dead time, stable over the paper's box.
 
-    The controller of `robust_loop` with six zeros and seven poles from 6 mHz on, which take
-    turns. So the gain falls by two thirds of a power of the frequency, and the phase by about
-    sixty degrees. Sensor and delays are the paper's; the dead time is 12.3 microseconds.
-    It was found by a search; no proof says that there is none better.
+    The controller is that of `robust_loop` with seven poles and six zeros above 6 mHz, in
+    alternating order. Its gain falls with about the power 2/3 of the frequency, and its phase
+    by about sixty degrees. Sensor and delays are the paper's; the dead time is 12.3
+    microseconds. A search found the controller; a better one may exist.
 
     Returns
     -------

@@ -417,7 +417,7 @@ def read_oem(paths: Sequence[str | Path]) -> Constellation:
         for instance at a gap between segments.
     """
     if isinstance(paths, str | Path) or len(paths) != 3:
-        raise ValueError(f"paths must hold three files, one a spacecraft, got {paths!r}")
+        raise ValueError(f"paths must hold three files, one for each spacecraft, got {paths!r}")
     headers, epochs, places = zip(*(_read_oem(Path(path)) for path in paths), strict=True)
     if len(set(headers)) > 1:
         raise ValueError(f"paths must be of one frame and time scale, got {headers}")

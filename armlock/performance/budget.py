@@ -117,7 +117,7 @@ class NoiseBudget:
 
     @property
     def factor(self) -> FloatArray:
-        """How many times the total lies below the requirement."""
+        """The requirement divided by the total."""
         return self.requirement / self.total
 
     def plot(self, ax: Axes | None = None, **style: Any) -> Axes:
@@ -128,7 +128,7 @@ class NoiseBudget:
         ax : matplotlib Axes, optional
             Where to draw; the current ones by default.
         **style
-            Of the sources, as `matplotlib.axes.Axes.loglog` takes it.
+            Style of the sources, as for `matplotlib.axes.Axes.loglog`.
 
         Returns
         -------

@@ -80,8 +80,8 @@ def pulling(
     Notes
     -----
     The transform is inverted on a line :math:`s = \sigma + \mathrm{j}\omega` to the right of
-    all roots, as a sum over equal steps of :math:`\omega`. It is not certified. What changes
-    faster than 4e-4 of the time is rounded off, such as the echo of an undelayed part.
+    all roots, as a sum over equal steps of :math:`\omega`. The result is not certified. Changes
+    within less than 4e-4 of the time are smoothed, such as the echo of an undelayed part.
 
     Examples
     --------

@@ -181,7 +181,7 @@ def d_curve_line(system: CharacteristicFunction) -> Line:
     Raises
     ------
     TypeError, ValueError
-        If `system` is none, or D(0) depends on neither parameter, so that there is no line.
+        If `system` is of another type, or D(0) depends on neither parameter: there is no line.
 
     Examples
     --------

@@ -209,7 +209,7 @@ def nyquist(
     Raises
     ------
     TypeError, ValueError
-        If `loop` is none, an argument is not finite and real, `omega_max` is not positive,
+        If `loop` is no loop, an argument is not finite and real, `omega_max` is not positive,
         or L has poles on the imaginary axis elsewhere than at s = 0.
     CountError
         If the curve passes through -1, the loop's high-frequency chain is not confined, or the
@@ -217,8 +217,8 @@ def nyquist(
 
     Notes
     -----
-    Z counts the loop's own roots: one at s = 0 that D has because a pole of L cancels there is
-    none of them, see `armlock.unstable_roots`.
+    Z does not include a root of D at s = 0 that is there because a pole of L cancels, see
+    `armlock.unstable_roots`.
 
     Examples
     --------
@@ -295,16 +295,16 @@ def axis_crossings(
     Raises
     ------
     TypeError, ValueError
-        If `loop` is none, an argument is not finite and real, or `omega_max` is not positive,
-        or not given where |L| does not fall below 1e-3.
+        If `loop` is no loop, an argument is not finite and real, or `omega_max` is not
+        positive, or not given where |L| does not fall below 1e-3.
     CountError
         If there are too many crossings to be found, or rounding hides some.
 
     Notes
     -----
-    Zeros of Im L at omega > 0, found with certified steps: none is missed, however close to
-    another. A pole on the axis is none, nor is what exceeds 1e12. Where rounding may hide one
-    they are refused, but not where |L| is below 1e-3.
+    These are zeros of Im L at omega > 0. Certified steps find them, so none is missed, however
+    close to another. A pole on the axis, or a value beyond 1e12, is not a crossing. Where |L|
+    is above 1e-3 and rounding may hide a crossing, `CountError` is raised.
 
     Examples
     --------

@@ -319,9 +319,10 @@ def spectral_radius(
 
     Notes
     -----
-    Eigenvalues of the transition matrix, and the loop's rightmost root, are starts for Newton's
-    method with 100 digits. Schur's test of the characteristic polynomial, with a bound of its
-    rounding, says that no root exceeds the largest one found by a share of more than 1e-12.
+    Newton's method with 100 digits starts from eigenvalues of the transition matrix and from
+    the loop's rightmost root. Schur's test of the characteristic polynomial, with a bound of
+    its rounding, proves that no root exceeds the largest root found by a share of more than
+    1e-12.
 
     Examples
     --------

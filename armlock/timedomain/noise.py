@@ -86,9 +86,8 @@ class ShapedNoise:
     sample_rate : float, optional
         In Hz.
     at_rest : bool, optional
-        Whether the filter starts at rest, and the series at about zero, as a simulation that
-        is switched on would have it. By default it starts in the middle of its stationary
-        course.
+        Whether the filter starts at rest, so that the series starts near zero, as when a
+        simulation is switched on. By default the series is stationary from the start.
 
     Raises
     ------
@@ -105,8 +104,8 @@ class ShapedNoise:
 
         \text{asd}_T(f) = \text{asd} \left( \frac{\tan \pi f T}{\pi T} \right) ,
 
-    see `armlock.timedomain.discretize.warped`. One draw and many give the same series, bit by
-    bit.
+    see `armlock.timedomain.discretize.warped`. One long draw and many short ones give the same
+    series, bit by bit.
 
     Examples
     --------
@@ -331,8 +330,7 @@ class PerturbationNoise(ShapedNoise):
         Frequency in Hz below which the density is flat. It decides the r.m.s., which grows as
         cutoff^(-3/2).
     at_rest : bool, optional
-        Whether the series starts without what it would have built up before; see
-        `ShapedNoise`.
+        Whether the series starts near zero; see `ShapedNoise`.
 
     Notes
     -----

@@ -54,7 +54,7 @@ def step_response(system: DelaySystem, timepts: npt.ArrayLike) -> control.TimeRe
     system : DelaySystem
         Stable or not, for instance ``loop.feedback()``.
     timepts : array_like of float, or float
-        Ascending times in s from 0 on, evenly spaced or not; or the last of 1001 even ones.
+        Ascending times in s from 0 on, evenly spaced or not; or the last of 1001 even times.
 
     Returns
     -------
@@ -65,7 +65,7 @@ def step_response(system: DelaySystem, timepts: npt.ArrayLike) -> control.TimeRe
     ------
     TypeError, ValueError
         If `timepts` is not finite and ascending from 0 on, the response has derivatives of
-        impulses, the system has an unconfined chain, or the times end too late for its
+        impulses, its neutral chain is not confined, or the times end too late for its
         fastest root.
 
     Warns
@@ -98,7 +98,7 @@ def impulse_response(system: DelaySystem, timepts: npt.ArrayLike) -> control.Tim
     system : DelaySystem
         Stable or not.
     timepts : array_like of float, or float
-        Ascending times in s from 0 on; or the last of 1001 even ones.
+        Ascending times in s from 0 on; or the last of 1001 even times.
 
     Returns
     -------
@@ -183,8 +183,8 @@ def _degree(system: DelaySystem) -> int:
     top = max(len(p) for _, p in system.numerator.terms + system.denominator.terms)
     if theta or len(whole) < top:
         raise ValueError(
-            "system must have no more zeros than poles, and its highest power of s in the "
-            f"denominator without a delay, got s^{top - 1} over s^{len(whole) - 1}"
+            "system must have no more zeros than poles, and the highest power of s in its "
+            f"denominator must have no delay, got s^{top - 1} over s^{len(whole) - 1}"
         )
     return len(whole) - 1
 

@@ -50,8 +50,8 @@ class DivergenceError(ArithmeticError):
     Attributes
     ----------
     time : float
-        When it began in s: the last time at which the output was no larger than the largest
-        input so far.
+        Begin of the divergence in s: the last time at which the output was no larger than the
+        largest input so far.
     output : float array
         The samples of this call before the output exceeded the limit; all are finite.
 
@@ -237,7 +237,7 @@ def sampled_open_loop(
 
 
 class Simulation:
-    r"""A loop that is run block by block, and remembers where it is.
+    r"""A simulation of a loop, block by block, that keeps its state between blocks.
 
     Controller, sensor and arms start at rest.
 
@@ -278,7 +278,8 @@ class Simulation:
     Here g is the gain of the sampled controller, and d_k are the direct shares of the arms in
     the sensor's output. The weights :math:`\ell_{k,i}` are those of `sampled_open_loop`.
 
-    One call and many give the same samples, bit by bit. ``copy.deepcopy(run)`` keeps the state.
+    One long call and many short ones give the same samples, bit by bit.
+    ``copy.deepcopy(run)`` keeps the state.
 
     Examples
     --------
@@ -308,7 +309,7 @@ class Simulation:
             if move is not None and not callable(move):
                 raise TypeError(
                     f"{name} must be a function of the time in s, got {move!r}; "
-                    f"loop.replace({name}=...) has another constant delay"
+                    f"loop.replace({name}=...) gives the loop another constant delay"
                 )
         self._weights = _constant(loop, self.sample_rate)
         self._latest: dict[str, float] = {}

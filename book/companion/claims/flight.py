@@ -123,7 +123,7 @@ def largest_answers() -> FloatArray:
 def doppler_errors(laser: str, averaging: float = 200.0) -> tuple[float, float]:
     """Return standard deviations in Hz and Hz/s of Doppler shift and rate as first measured.
 
-    A straight line is fitted to the phase of the sum of both arms, over `averaging` seconds.
+    A straight line is fitted to the frequency of the sum of both arms, in `averaging` seconds.
     The laser's own noise above 1 uHz disturbs the fit.
     """
     f = np.concatenate((np.geomspace(1e-6, 1e-4, 2000), np.arange(1e-4, 3.0, 5e-6)))
