@@ -70,6 +70,12 @@ const armlockDraw = (function () {
       if (this.wide) this.render(this.canvas, window.devicePixelRatio || 1);
     }
 
+    /* Where on the canvas the pointer is. */
+    place({ clientX, clientY }) {
+      const { left, top } = this.canvas.getBoundingClientRect();
+      return [clientX - left, clientY - top];
+    }
+
     /* The picture as a file: 1600 pixels wide, on the page's ground. */
     picture(done) {
       const copy = element("canvas");
@@ -130,6 +136,26 @@ const armlockDraw = (function () {
       pen.stroke();
     }
     pen.lineWidth = 1;
+  }
+
+  function dot(pen, x, y, radius, colour, edge = null) {
+    pen.fillStyle = colour;
+    pen.beginPath();
+    pen.arc(x, y, radius, 0, 7);
+    pen.fill();
+    if (!edge) return;
+    pen.strokeStyle = edge;
+    pen.stroke();
+  }
+
+  /* A cross as of a pole. */
+  function cross(pen, x, y) {
+    pen.beginPath();
+    for (const d of [-5, 5]) {
+      pen.moveTo(x - 5, y - d);
+      pen.lineTo(x + 5, y + d);
+    }
+    pen.stroke();
   }
 
   /* The chart over (c1, c2). `centre` and `half` say what it shows. The pointer's place is a preview;
@@ -224,12 +250,13 @@ const armlockDraw = (function () {
       return [reference, 10 ** Math.floor(Math.log10(Math.abs(centre - reference) + this.half))];
     }
 
-    frame(wide, high) {
+    get frame() {
+      const { wide, high } = this.sheet;
       return { left: 58, top: 10, wide: wide - 58 - 12, high: high - 10 - 48 };
     }
 
     draw(pen, wide, high, colours) {
-      const frame = this.frame(wide, high), { x0, x1, y0, y1 } = this.box;
+      const { frame } = this, { x0, x1, y0, y1 } = this.box;
       const px = this.px = x => frame.left + frame.wide * (x - x0) / (x1 - x0);
       const py = this.py = y => frame.top + frame.high * (y1 - y) / (y1 - y0);
       pen.save();
@@ -261,29 +288,11 @@ const armlockDraw = (function () {
         pen.lineTo(px(1) + dx, py(1) + dy);
       }
       pen.stroke();
-      if (this.broken > 0 && this.broken < Infinity) {
-        pen.fillStyle = colours.text;
-        pen.strokeStyle = colours.ground;
-        pen.beginPath();
-        pen.arc(px(1 + this.broken), py(1 - this.broken), 5, 0, 7);
-        pen.fill();
-        pen.stroke();
-      }
-      if (this.lit) {
-        pen.fillStyle = colours.mark;
-        pen.strokeStyle = colours.ground;
-        pen.beginPath();
-        pen.arc(px(this.lit[0]), py(this.lit[1]), 6, 0, 7);
-        pen.fill();
-        pen.stroke();
-      }
+      if (this.broken > 0 && this.broken < Infinity)
+        dot(pen, px(1 + this.broken), py(1 - this.broken), 5, colours.text, colours.ground);
+      if (this.lit) dot(pen, px(this.lit[0]), py(this.lit[1]), 6, colours.mark, colours.ground);
       if (this.marked) ring(pen, px(this.marked[0]), py(this.marked[1]), this.held ? 8 : 5, colours);
-      if (this.held) {
-        pen.fillStyle = colours.line;
-        pen.beginPath();
-        pen.arc(px(this.held[0]), py(this.held[1]), 3, 0, 7);
-        pen.fill();
-      }
+      if (this.held) dot(pen, px(this.held[0]), py(this.held[1]), 3, colours.line);
       pen.restore();
       this.axes(pen, frame, high, colours);
     }
@@ -347,10 +356,8 @@ const armlockDraw = (function () {
     }
 
     at(event) {
-      const place = this.canvas.getBoundingClientRect();
-      const frame = this.frame(place.width, place.height), { x0, x1, y0, y1 } = this.box;
-      const x = (event.clientX - place.left - frame.left) / frame.wide;
-      const y = 1 - (event.clientY - place.top - frame.top) / frame.high;
+      const { frame } = this, { x0, x1, y0, y1 } = this.box, [u, v] = this.sheet.place(event);
+      const x = (u - frame.left) / frame.wide, y = 1 - (v - frame.top) / frame.high;
       if (x < 0 || x > 1 || y < 0 || y > 1) return null;
       return [x0 + x * (x1 - x0), y0 + y * (y1 - y0)];
     }
@@ -365,13 +372,13 @@ const armlockDraw = (function () {
     /* A drag moves the view, two fingers zoom, and what begins on the held point moves it. */
     press(event) {
       if (!this.at(event) || event.button) return;
-      const place = this.canvas.getBoundingClientRect();
+      const [x, y] = this.sheet.place(event);
       this.canvas.setPointerCapture(event.pointerId);
-      this.fingers.set(event.pointerId, [event.clientX, event.clientY]);
+      this.fingers.set(event.pointerId, [x, y]);
       this.gripped = this.grip();
       this.moved = this.fingers.size > 1;
-      this.onPoint = this.held && !this.moved && Math.hypot(event.clientX - place.left - this.px(this.held[0]),
-        event.clientY - place.top - this.py(this.held[1])) < (event.pointerType === "mouse" ? 10 : 24);
+      this.onPoint = this.held && !this.moved
+        && Math.hypot(x - this.px(this.held[0]), y - this.py(this.held[1])) < (event.pointerType === "mouse" ? 10 : 24);
     }
 
     move(event) {
@@ -379,8 +386,8 @@ const armlockDraw = (function () {
         this.preview(this.at(event));
         return;
       }
-      this.fingers.set(event.pointerId, [event.clientX, event.clientY]);
-      const now = this.grip(), from = this.gripped, place = this.canvas.getBoundingClientRect();
+      this.fingers.set(event.pointerId, this.sheet.place(event));
+      const now = this.grip(), from = this.gripped, { frame } = this;
       if (!this.moved && Math.hypot(now.x - from.x, now.y - from.y) < 4) return;
       this.moved = true;
       if (this.onPoint) {
@@ -389,11 +396,9 @@ const armlockDraw = (function () {
         return;
       }
       this.canvas.style.cursor = "grabbing";
-      const frame = this.frame(place.width, place.height);
       const half = from.apart && now.apart ? from.half * from.apart / now.apart : from.half;
       // What was below the fingers stays there.
-      const off = ({ x, y }) => [2 * (x - place.left - frame.left) / frame.wide - 1,
-        1 - 2 * (y - place.top - frame.top) / frame.high];
+      const off = ({ x, y }) => [2 * (x - frame.left) / frame.wide - 1, 1 - 2 * (y - frame.top) / frame.high];
       const [p, q] = [off(from), off(now)];
       this.show(from.centre.map((v, k) => v + p[k] * from.half - q[k] * half), half);
     }
@@ -534,7 +539,7 @@ const armlockDraw = (function () {
     pen.textBaseline = "middle";
     return taken => {
       let last = 0;
-      for (const size of sizes) if (radius(size) > last + 22) {
+      for (const size of sizes) if (radius(size) > last + 28) {
         last = radius(size);
         labelBeside(pen, write(size), cx + last * Math.cos(angle), cy + last * Math.sin(angle), colours, taken);
       }
@@ -601,12 +606,7 @@ const armlockDraw = (function () {
     pen.strokeStyle = colours.mark;
     pen.lineWidth = 2;
     const x = cx - radius(1);
-    for (const d of [-5, 5]) {
-      pen.beginPath();
-      pen.moveTo(x - 5, cy - d);
-      pen.lineTo(x + 5, cy + d);
-      pen.stroke();
-    }
+    cross(pen, x, cy);
     if (margins?.phaseAt > 0 && margins.phase > 0) {
       const [a, b] = now.at(margins.phaseAt), angle = Math.atan2(-b, a), to = angle > 0 ? Math.PI : -Math.PI;
       pen.lineWidth = 3;
@@ -677,10 +677,7 @@ const armlockDraw = (function () {
       pen.moveTo(x, a);
       pen.lineTo(x, b);
       pen.stroke();
-      pen.beginPath();
-      pen.arc(x, a, 3, 0, 7);
-      pen.fillStyle = colours.mark;
-      pen.fill();
+      dot(pen, x, a, 3, colours.mark);
       pen.fillStyle = colours.text;
       pen.textAlign = close ? "right" : "left";
       pen.textBaseline = "middle";
@@ -741,22 +738,14 @@ const armlockDraw = (function () {
     if (sizes.length) rings(pen, [cx, cy], sizes, v => full * share(v * unit),
       v => power(Math.round(Math.log10(v))), places, colours)([]);
     pen.lineWidth = 2;
+    pen.strokeStyle = colours.line;
     for (const root of zeros) {
-      pen.strokeStyle = colours.line;
       pen.beginPath();
       pen.arc(...place(root), 6, 0, 7);
       pen.stroke();
     }
-    for (const root of poles) {
-      const [x, y] = place(root);
-      pen.strokeStyle = colours.mark;
-      pen.beginPath();
-      for (const d of [-5, 5]) {
-        pen.moveTo(x - 5, y - d);
-        pen.lineTo(x + 5, y + d);
-      }
-      pen.stroke();
-    }
+    pen.strokeStyle = colours.mark;
+    for (const root of poles) cross(pen, ...place(root));
     pen.lineWidth = 1;
     pen.textAlign = "left";
     pen.textBaseline = "bottom";

@@ -290,10 +290,14 @@ function armlockLoop() {
     return loop;
   }
 
-  /* Where equal arms return the same, the dual sensor has only their sum, and its poles cancel. */
+  /* Where equal arms return the same, the dual sensor has only their sum. Its integrator then cancels and
+   * goes. Its corner cancels as well, but s = -corner stays a root of the closed loop: as in the package
+   * only common roots at s = 0 are left out. */
   function reduced(loop, c1, c2) {
-    const { spec, tau1, tau2, sigma } = loop;
-    return spec.sensor === "dual" && tau1 === tau2 && c1 === c2 ? make({ ...spec, sensor: "common" }, sigma) : loop;
+    const { spec, tau1, tau2, sigma } = loop, corner = [-spec.corner, 0];
+    if (spec.sensor !== "dual" || tau1 !== tau2 || c1 !== c2) return loop;
+    const zeros = [...spec.zeros, corner], poles = [...spec.poles, corner];
+    return make({ ...spec, sensor: "common", zeros, poles }, sigma);
   }
 
   /* The parameters of one point, with what is left of 1 - c and c2 - c1 after cancelling. */

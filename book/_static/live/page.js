@@ -199,8 +199,7 @@ function armlockPages() {
       });
       for (const name of ["pointermove", "pointerdown"]) sheet.canvas.addEventListener(name, event => {
         if (!this.design || !place) return;
-        const box = sheet.canvas.getBoundingClientRect(), { omega } = shown[0];
-        const x = event.clientX - box.left, y = event.clientY - box.top;
+        const { omega } = shown[0], [x, y] = sheet.place(event);
         let best = Infinity, found = null;
         for (let i = 0; i < omega.length; i++) {
           const [u, v] = place(i), gap = Math.abs(u - x) + (v === null ? 0 : Math.abs(v - y));
@@ -704,20 +703,16 @@ function armlockPages() {
       const { spec } = live;
       plane = spec && drawRoots({ ...spec, unit, range }, pen, wide, high, colours);
     });
-    const pointer = event => {
-      const box = roots.canvas.getBoundingClientRect();
-      return [event.clientX - box.left, event.clientY - box.top];
-    };
     const near = event => {
       if (!plane) return null;
-      const [x, y] = pointer(event), all = ["zeros", "poles"].flatMap(kind => live.spec[kind].map((root, k) => {
+      const [x, y] = roots.place(event), all = ["zeros", "poles"].flatMap(kind => live.spec[kind].map((root, k) => {
         const [u, v] = plane.place(root);
         return { kind, k, root, gap: Math.hypot(u - x, v - y) };
       })).filter(({ root, gap }) => gap < 16 && Math.hypot(...root)).sort((p, q) => p.gap - q.gap);
       return all[0] || null;
     };
     const drag = (event, moving) => {
-      const { kind, k, root: [re, im], spec } = caught, [x, y] = plane.root(...pointer(event));
+      const { kind, k, root: [re, im], spec } = caught, [x, y] = plane.root(...roots.place(event));
       const round = v => Number((v / unit).toPrecision(3)) * unit, moved = spec[kind].map(v => v);
       const to = im ? [round(x), round(Math.max(Math.abs(y), 1e-3 * Math.hypot(x, y)))]
         : [Math.sign(x) * round(Math.hypot(x, y)), 0];
@@ -836,7 +831,7 @@ function armlockPages() {
       + "which the loop is unstable, and the critical perturbation of the arms in opposite directions." }, [0.5, 1.2],
     (pen, ...rest) => drawYear({ values, days, day: state.day }, pen, ...rest));
     for (const name of ["pointerdown", "pointermove"]) sheet.canvas.addEventListener(name, event => {
-      const box = sheet.canvas.getBoundingClientRect(), at = (event.clientX - box.left - 56) / (box.width - 64);
+      const at = (sheet.place(event)[0] - 56) / (sheet.wide - 64);
       if (event.buttons && at >= 0 && at <= 1) { today.to(Math.round(at * YEAR)); move(Math.round(at * YEAR), true); }
     });
     sheet.canvas.addEventListener("pointerup", () => move(state.day, false));
