@@ -11,7 +11,6 @@ unit circle instead of the imaginary axis, so that `unstable_roots`, `stability_
 
 from __future__ import annotations
 
-import contextlib
 from typing import Any, NamedTuple
 
 import mpmath
@@ -34,14 +33,13 @@ from armlock.checks import (
     whole_steps,
 )
 from armlock.engine.roots import RootError
-from armlock.stability.roots import rightmost_root
 
-# Digits of a map's coefficients, and bits of Schur's test.
-_DIGITS, _BITS = 100, 1600
-# Eigenvalues that are tried as the largest one: so many, down to this share below it.
-_TRIED, _SCATTERED = 16, 1e-4
-# No root exceeds the spectral radius by more than this share.
-_MARGIN = 1e-12
+# Digits of a map's coefficients.
+_DIGITS = 100
+# Bits of Schur's test, at first and at most.
+_BITS, _MOST_BITS = 800, 25600
+# Halvings of the interval that holds a spectral radius: some more than a float has bits.
+_HALVINGS = 56
 
 
 class DelayedTerm(NamedTuple):
@@ -312,17 +310,16 @@ def spectral_radius(
     ------
     TypeError, ValueError
         If c1 or c2 is not finite and real or the two do not broadcast, if the step does not
-        divide a delay, if the order is not 0 or 1, if the loop is neutral, or if the matrix
-        does not fit into the memory.
+        divide a delay, if the order is not 0 or 1, or if the loop is neutral.
     RootError
-        If it is not certified, because no eigenvalue leads to the largest root.
+        If Schur's test is not decided.
 
     Notes
     -----
-    Newton's method with 100 digits starts from eigenvalues of the transition matrix and from
-    the loop's rightmost root. Schur's test of the characteristic polynomial, with a bound of
-    its rounding, proves that no root exceeds the largest root found by a share of more than
-    1e-12.
+    Schur's test tells whether all roots of the characteristic polynomial lie within a circle.
+    The coefficients have 100 digits, and the rounding of the test is bounded. The spectral
+    radius lies between a circle that passes the test and one that does not, found by halving
+    an interval.
 
     Examples
     --------
@@ -339,14 +336,7 @@ def spectral_radius(
 def _radius(
     system: CharacteristicFunction, x: float, y: float, step: float, order: int
 ) -> float:
-    """Return the spectral radius at one point, or raise `RootError`."""
-    starts = np.linalg.eigvals(transition_matrix(system, x, y, step, order))
-    starts = starts[np.abs(starts) >= (1.0 - _SCATTERED) * np.abs(starts).max()]
-    starts = starts[starts.imag >= 0.0]
-    starts = starts[np.argsort(-np.abs(starts))][:_TRIED].tolist()
-    with contextlib.suppress(RootError):
-        # Rounding scatters eigenvalues of slow poles; the map's own lie next to the loop's.
-        starts.append(np.exp(step * rightmost_root(system, x, y)))
+    """Return the spectral radius at one point."""
     state, delayed = realize(system, x, y)
     with mpmath.workdps(_DIGITS):
         a, b = _map(state, delayed, step, order)
@@ -356,47 +346,45 @@ def _radius(
             late = longest - whole_steps("delay", term.delay, step)
             for k, value in enumerate(numerator):
                 powers[late + k] -= value
-        found = [mpmath.mpf(0)]
-        for start in starts:
-            # A start that does not settle leads to no root.
-            with contextlib.suppress(ValueError, ZeroDivisionError):
-                found.append(abs(_root(powers, start)))
-        radius = max(found)
-        if not _within(powers, radius * (1 + mpmath.mpf(_MARGIN))):
-            name1, name2 = system.parameters
-            raise RootError(
-                f"no spectral radius is certified at ({name1}, {name2}) = ({x}, {y}); the best "
-                f"candidate is {float(radius)}", complex(radius),
-            )  # fmt: skip
-        return float(radius)
-
-
-def _root(powers: list[Any], start: complex) -> Any:
-    """Return a root of a polynomial in ascending powers; ValueError if none is found."""
-    return mpmath.findroot(
-        lambda z: mpmath.polyval(powers, z, asc=True), mpmath.mpc(start),
-        df=lambda z: mpmath.polyval(powers, z, derivative=True, asc=True)[1],
-        solver="newton", maxsteps=60, tol=mpmath.mpf(10) ** (-_DIGITS // 2),
-    )  # fmt: skip
+        # Halving leads to no circle of radius one, on which a root often lies.
+        low, high = mpmath.mpf(0), mpmath.mpf(3) / 2
+        while not _within(powers, high):
+            low, high = high, 2 * high
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2
+            low, high = (low, middle) if _within(powers, middle) else (middle, high)
+        return float(high)
 
 
 def _within(powers: list[Any], radius: Any) -> bool:
-    """Whether all roots of a polynomial lie within a radius: Schur's test, step by step.
+    """Whether all roots of a polynomial lie within a radius."""
+    bits = _BITS
+    while (found := _schur(powers, radius, bits)) is None:
+        bits *= 2
+        if bits > _MOST_BITS:
+            raise RootError(
+                f"it is not decided whether a root exceeds {radius}", complex(radius)
+            )
+    return found
 
-    In whole multiples of 2^-_BITS, with a bound of what they are off by.
+
+def _schur(powers: list[Any], radius: Any, bits: int) -> bool | None:
+    """Test step by step whether all roots lie within a radius; None if it is not decided.
+
+    In whole multiples of 2^-bits, with a bound of what they are off by.
     """
-    with mpmath.workprec(_BITS):
+    with mpmath.workprec(bits):
         scaled = [value * radius**k for k, value in enumerate(powers)]
         largest = max(map(abs, scaled))
-        p = np.array([int(mpmath.ldexp(v / largest, _BITS)) for v in scaled], dtype=object)
+        p = np.array([int(mpmath.ldexp(v / largest, bits)) for v in scaled], dtype=object)
     off = 8 * len(p)
     while len(p) > 1:
-        lead = abs(p[-1]) - off
-        if abs(p[0]) + off >= lead:
-            return False
-        share, wrong = (p[0] << _BITS) // p[-1], (2 * off << _BITS) // lead + 1
-        off = 2 * off + (wrong * (abs(p).max() + off) >> _BITS) + 3
-        p = p[1:] - (p[-2::-1] * share >> _BITS)
+        lead, last = abs(p[-1]) - off, abs(p[0]) + off
+        if last >= lead:
+            return False if last - lead > 4 * off else None
+        share, wrong = (p[0] << bits) // p[-1], (2 * off << bits) // lead + 1
+        off = 2 * off + (wrong * (abs(p).max() + off) >> bits) + 3
+        p = p[1:] - (p[-2::-1] * share >> bits)
     return True
 
 
