@@ -1,7 +1,7 @@
 """How results are drawn: the book's style, charts, D-curves and Nyquist curves.
 
 Results draw themselves, as `chart.plot()` does, by the functions here, and import this module
-when they are first drawn. python-control draws `loop.frd(omega)`.
+when they are first drawn. python-control draws `loop.frequency_response(omega)`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.projections.polar import PolarAxes
 from scipy import ndimage
 
-from armlock.checks import ComplexArray, FloatArray, IntArray
+from armlock.checks import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
     from armlock.stability.charts import StabilityChart
@@ -60,8 +60,7 @@ def plot_chart(
     Parameters
     ----------
     chart : StabilityChart
-        Points with a root on the boundary stay white. An axis whose values have equal ratios,
-        as those of `numpy.geomspace`, is drawn logarithmic.
+        Points with a root on the boundary stay white. The axes of the figure are linear.
     ax : Axes, optional
         Where to draw; matplotlib's current axes by default.
     counts : bool, optional
@@ -71,7 +70,7 @@ def plot_chart(
     labels : bool, optional
         Write the count into each region that has room for it.
     **style
-        As `matplotlib.axes.Axes.pcolormesh` takes it, for instance `cmap`.
+        As `matplotlib.axes.Axes.pcolorfast` takes it, for instance `cmap`.
 
     Returns
     -------
@@ -91,58 +90,22 @@ def plot_chart(
     >>> ax.texts[0].get_text()
     '0'
     """
-    shown = chart.counts if counts else np.where(chart.stable, 0, -1)
-    ax = plot_counts(chart.x, chart.y, shown, chart.system.parameters, ax, largest, **style)
-    if labels:
-        _label_regions(ax, chart)
-    return ax
-
-
-def plot_counts(
-    x: FloatArray,
-    y: FloatArray,
-    counts: IntArray,
-    parameters: tuple[str, str],
-    ax: Axes | None = None,
-    largest: int = 12,
-    **style: Any,
-) -> Axes:
-    """Colour counts over a grid as `plot_chart` does; those below zero stay white."""
     ax = plt.gca() if ax is None else ax
     unstable = plt.get_cmap("Oranges")(np.linspace(0.08, 0.75, largest))
     style = {"cmap": ListedColormap([STABLE, *unstable]), "vmin": 0, "vmax": largest, **style}
-    shown = np.where(counts >= 0, np.minimum(counts, largest), np.nan)
-    across, up = _edges("chart.x", x), _edges("chart.y", y)
-    if _even(x) and _even(y):
-        ax.pcolorfast(across, up, shown, **style)
-    else:
-        # An image of uneven cells is drawn wrongly where an axis is logarithmic.
-        ax.pcolormesh(across, up, shown, rasterized=True, **style)
-    if _geometric(x):
-        ax.set_xscale("log")
-    if _geometric(y):
-        ax.set_yscale("log")
-    label_parameters(ax, parameters)
+    shown = chart.counts if counts else np.where(chart.stable, 0, -1)
+    shown = np.where(shown >= 0, np.minimum(shown, largest), np.nan)
+    ax.pcolorfast(_edges("chart.x", chart.x), _edges("chart.y", chart.y), shown, **style)
+    label_parameters(ax, chart.system.parameters)
+    if labels:
+        _label_regions(ax, chart)
     return ax
-
-
-def _even(values: FloatArray) -> bool:
-    """Whether points have equal distances, to a hundredth."""
-    steps = np.diff(values)
-    return bool(np.ptp(steps) < 0.01 * abs(steps.mean()))
-
-
-def _geometric(values: FloatArray) -> bool:
-    """Whether points are positive, with equal ratios, and no equal distances."""
-    return bool((values > 0.0).all()) and not _even(values) and _even(np.log(values))
 
 
 def _edges(name: str, axis: FloatArray) -> FloatArray:
     """Return the edges of cells around the points of an axis."""
     if axis.size == 1:
         raise ValueError(f"{name} must hold at least two values to be drawn, got {axis}")
-    if _geometric(axis):
-        return np.exp(_edges(name, np.log(axis)))
     inner = 0.5 * (axis[1:] + axis[:-1])
     return np.concatenate(([2.0 * axis[0] - inner[0]], inner, [2.0 * axis[-1] - inner[-1]]))
 

@@ -59,24 +59,11 @@ def test_labels_stand_in_regions_of_their_count(ax, chart):
 def test_cells_lie_around_the_points_of_any_axes(ax):
     even, uneven = np.linspace(-1, 1, 5), np.array([0.0, 0.2, 1.0])
     stability_chart(CommonArm(), even, uneven).plot(ax)
-    corners = ax.collections[0].get_coordinates()[[0, -1], [0, -1]]
-    np.testing.assert_allclose(corners, [[-1.25, -0.1], [1.25, 1.4]])
+    assert ax.images[0].get_extent() == pytest.approx((-1.25, 1.25, -0.1, 1.4))
     with pytest.raises(ValueError, match=r"^chart\.y must hold at least two values"):
         stability_chart(CommonArm(), even, [1.0]).plot(ax)
     near = 1.0 + np.linspace(-1e-9, 1e-9, 200)
     stability_chart(CommonArm(), near, near).plot(ax)
-
-
-def test_a_chart_over_logarithmic_axes_is_the_chart_that_is_drawn(ax):
-    chart = stability_chart(CommonArm(), np.geomspace(0.1, 3.0, 8), np.geomspace(0.2, 5.0, 6))
-    chart.plot(ax, counts=False)
-    assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
-    ax.figure.canvas.draw()
-    drawn = np.asarray(ax.figure.canvas.buffer_rgba())[::-1, :, :3] / 255.0
-    for i, j in np.ndindex(chart.counts.shape):
-        across, up = ax.transData.transform((chart.x[j], chart.y[i])).astype(int)
-        seen = np.allclose(drawn[up, across], to_rgba(plotting.STABLE)[:3], atol=0.01)
-        assert seen == chart.stable[i, j]
 
 
 def test_d_curves_are_drawn_branch_by_branch_and_with_their_line(ax):
@@ -103,9 +90,9 @@ def test_a_curve_has_two_halves(ax):
 
 def test_the_open_loop_goes_to_python_control_with_exact_delays():
     loop, omega = paper_loop(delay=1e-3), np.array([0.01, 0.3])
-    response = loop.frd(omega, 0.9, 1.1)
-    np.testing.assert_array_equal(response(1j * omega), loop(1j * omega, 0.9, 1.1))
-    control.bode_plot([response, SingleArm().frd(omega)])
+    response = loop.frequency_response(omega)
+    np.testing.assert_array_equal(response(1j * omega), loop(1j * omega))
+    control.bode_plot([response, SingleArm().frequency_response(omega)])
     plt.close("all")
 
 
