@@ -34,6 +34,7 @@ System in Space-based Gravitational Wave Detectors".
 from armlock.characteristic import CharacteristicFunction, DelayEquation
 from armlock.controllers import Controller
 from armlock.delays import DelaySystem, WithDelays, delay
+from armlock.engine.roots import RootError
 from armlock.loops import (
     CommonArm,
     DualArm,
@@ -45,47 +46,29 @@ from armlock.loops import (
     paper_loop,
     robust_loop,
 )
-from armlock.performance import NoiseBudget, noise_budget, pulling, transfer
-from armlock.robustness import (
-    Margins,
-    critical_perturbation,
-    margins,
-    modulus_margin,
-)
-from armlock.stability import (
-    BOUNDARY,
-    UNCONFINED,
-    AxisCrossings,
-    CountError,
-    NyquistCurve,
-    RootError,
-    StabilityChart,
-    axis_crossings,
-    d_curve,
-    d_curve_branches,
-    d_curve_line,
-    nyquist,
-    rightmost_root,
+from armlock.performance.budget import NoiseBudget, noise_budget
+from armlock.performance.pulling import pulling
+from armlock.performance.transfer import transfer
+from armlock.robustness import Margins, critical_perturbation, margins, modulus_margin
+from armlock.stability.charts import StabilityChart, stability_chart
+from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError, unstable_roots
+from armlock.stability.dcurve import d_curve, d_curve_branches, d_curve_line
+from armlock.stability.nyquist import AxisCrossings, NyquistCurve, axis_crossings, nyquist
+from armlock.stability.roots import rightmost_root
+from armlock.stability.semidiscretization import (
     semi_discretization,
     spectral_radius,
-    stability_chart,
     transition_matrix,
-    unstable_roots,
 )
-from armlock.timedomain import (
+from armlock.timedomain.noise import LaserNoise, PerturbationNoise, ShapedNoise
+from armlock.timedomain.responses import impulse_response, step_response
+from armlock.timedomain.simulation import (
     DivergenceError,
-    LaserNoise,
-    PerturbationNoise,
-    ShapedNoise,
     Simulation,
-    Spectrum,
-    SpectrumEstimator,
-    amplitude_spectrum,
-    impulse_response,
     sampled_open_loop,
     simulate,
-    step_response,
 )
+from armlock.timedomain.spectra import Spectrum, SpectrumEstimator, amplitude_spectrum
 
 __version__ = "0.1.0"
 

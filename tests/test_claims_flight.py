@@ -6,8 +6,8 @@ import numpy as np
 
 from armlock import LaserNoise, Loop
 from armlock.orbits import SPEED_OF_LIGHT, kepler
-from armlock.performance import transfer
 from armlock.performance.budget import LEVELS
+from armlock.performance.transfer import transfer
 from book.companion.claims import flight
 
 

@@ -2,9 +2,3 @@
 
 Both need a stable loop and refuse others.
 """
-
-from armlock.performance.budget import NoiseBudget, noise_budget
-from armlock.performance.pulling import pulling
-from armlock.performance.transfer import transfer
-
-__all__ = ["NoiseBudget", "noise_budget", "pulling", "transfer"]
