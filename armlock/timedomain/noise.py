@@ -19,7 +19,6 @@ from armlock.checks import (
     check_memory,
     positive_number,
     real_array,
-    true_or_false,
     whole_number,
 )
 from armlock.compiled import njit
@@ -130,20 +129,16 @@ class ShapedNoise:
     ) -> None:
         self.sample_rate = positive_number("sample_rate", sample_rate)
         self._filter = Controller(zeros, poles, gain)
-        self.zeros, self.poles = self._filter.zeros, self._filter.poles
-        self.gain = self._filter.gain
-        for pole in self.poles:
+        for pole in self._filter.poles:
             if pole.real >= 0.0:
                 raise ValueError(f"poles must lie in the left half-plane, got {pole} rad/s")
-        self.seed = whole_number("seed", seed, 0)
-        self.at_rest = true_or_false("at_rest", at_rest)
-        self._random = np.random.default_rng(self.seed)
+        self._random = np.random.default_rng(whole_number("seed", seed, 0))
         self._sampled = sampled_filter(self._filter, self.sample_rate)
         # White samples of variance one have the one-sided density 2 / sample_rate.
         self._scale = math.sqrt(0.5 * self.sample_rate)
         self._state = np.zeros(2 * len(self._sampled.sections))
         self._root = stationary_root(self._sampled)
-        if not self.at_rest:
+        if not at_rest:
             order = self._sampled.order
             start = self._root @ self._random.standard_normal(order)
             self._state[:order] = self._scale * start

@@ -29,8 +29,8 @@ from armlock.checks import (
 )
 from armlock.compiled import njit
 from armlock.loops import Loop, checked_loop
-from armlock.timedomain.delays import Weights, lagrange_weights, reach
 from armlock.timedomain.discretize import SampledFilter, SampledSensor, sampled_loop, warped
+from armlock.timedomain.interpolation import Weights, lagrange_weights, reach
 
 #: A round trip that changes: its delay in s at times in s, an array of shape (n,).
 Moving = Callable[[FloatArray], npt.ArrayLike]
@@ -261,8 +261,7 @@ class Simulation:
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no loop or has a dead time, the sample rate is too low for its delays, or
-        `tau1` or `tau2` is no function.
+        If `loop` is no loop or has a dead time, or the sample rate is too low for its delays.
 
     Notes
     -----
@@ -305,12 +304,6 @@ class Simulation:
         self.limit = positive_number("limit", limit)
         self.samples = 0
         self._moving = {"tau1": tau1, "tau2": tau2}
-        for name, move in self._moving.items():
-            if move is not None and not callable(move):
-                raise TypeError(
-                    f"{name} must be a function of the time in s, got {move!r}; "
-                    f"loop.replace({name}=...) gives the loop another constant delay"
-                )
         self._weights = _constant(loop, self.sample_rate)
         self._latest: dict[str, float] = {}
         self._diverged = False
