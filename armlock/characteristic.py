@@ -32,7 +32,6 @@ from armlock.checks import (
     complex_array,
     not_negative,
     real_array,
-    real_number,
     whole_steps,
 )
 from armlock.delays import Term, functions
@@ -268,11 +267,6 @@ class CharacteristicFunction:
         """The longest time in s by which a term is delayed, dead time included."""
         return self.delay + max(self.tau1, self.tau2)
 
-    @property
-    def omega_per_turn(self) -> float:
-        """Change of omega, in rad/s, that is one turn of the longest delay; inf without one."""
-        return 2.0 * np.pi / self.longest_delay if self.longest_delay else np.inf
-
     def characteristic(
         self, s: npt.ArrayLike, c1: npt.ArrayLike | None = None, c2: npt.ArrayLike | None = None
     ) -> ComplexArray:
@@ -284,27 +278,14 @@ class CharacteristicFunction:
             If s does not hold finite numbers, c1 or c2 is not finite and real, or the three do
             not broadcast.
         """
-        return np.asarray(self._value_and_slope(s, c1, c2)[0])
-
-    def derivative(
-        self, s: npt.ArrayLike, c1: npt.ArrayLike | None = None, c2: npt.ArrayLike | None = None
-    ) -> ComplexArray:
-        r"""Evaluate dD/ds; all broadcast. Of a loop c1 and c2 are one by default.
-
-        .. math::
-
-            \frac{\partial D}{\partial s} = R' + e^{-s\delta} \sum_k \left[
-            \left( B_k' - \delta B_k \right) \left( x_{0k} - x_k\, e^{-s\tau_k} \right)
-            + x_k\, \tau_k B_k e^{-s\tau_k} \right]
-
-        with :math:`(x_1, x_2) = (c_1, c_2)`.
-
-        Raises
-        ------
-        TypeError, ValueError
-            As `characteristic` does.
-        """
-        return np.asarray(self._value_and_slope(s, c1, c2)[1])
+        s, x, y = self._checked(s, c1, c2)
+        z = np.exp(s * self.step) if self.step else s
+        (value, _), *weights = (p.evaluated(z) for p in self.polynomials())
+        dead = np.exp(-s * self.delay)
+        arms = zip((x, y), self.reference, (self.tau1, self.tau2), strict=True)
+        for (b, _), (here, origin, tau) in zip(weights, arms, strict=True):
+            value = value + dead * b * ((origin - here) - here * np.expm1(-s * tau))
+        return np.asarray(value)
 
     def _checked(
         self, s: npt.ArrayLike, x: npt.ArrayLike | None, y: npt.ArrayLike | None
@@ -315,22 +296,6 @@ class CharacteristicFunction:
         arrays = complex_array("s", s), real_array(name1, x), real_array(name2, y)
         broadcast_shape(("s", name1, name2), arrays)
         return arrays
-
-    def _value_and_slope(self, s: Any, x: Any, y: Any) -> tuple[Any, Any]:
-        """Evaluate D and dD/ds."""
-        s, x, y = self._checked(s, x, y)
-        z = np.exp(s * self.step) if self.step else s
-        dz = self.step * z if self.step else 1.0
-        (value, slope), *evaluated = (p.evaluated(z) for p in self.polynomials())
-        slope, dead = slope * dz, np.exp(-s * self.delay)
-        arms = zip((x, y), self.reference, (self.tau1, self.tau2), strict=True)
-        for (b, db), (here, origin, tau) in zip(evaluated, arms, strict=True):
-            change = np.expm1(-s * tau)
-            arm = (origin - here) - here * change
-            value = value + dead * b * arm
-            slope = slope + dead * ((db * dz - self.delay * b) * arm)
-            slope = slope + dead * b * here * tau * (1.0 + change)
-        return value, slope
 
 
 @dataclass(frozen=True)
@@ -411,17 +376,12 @@ class DelayEquation(CharacteristicFunction):
             raise ValueError(
                 f"A, the term without a delay, must not vanish, got rest={self.rest!r}"
             )
-        for name, degree in (
-            ("b1", self.b1.degree),
-            ("b2", self.b2.degree),
-            ("c", self.c.size - 1),
-        ):
-            if degree > self.degree:
+        for name, b, tau in (("b1", self.b1, self.tau1), ("b2", self.b2, self.tau2)):
+            if b.degree > self.degree:
                 raise ValueError(
                     f"{name} must not exceed the degree of A ({self.degree}), "
-                    f"got degree {degree}: the equation would be of advanced type"
+                    f"got degree {b.degree}: the equation would be of advanced type"
                 )
-        for name, b, tau in (("b1", self.b1, self.tau1), ("b2", self.b2, self.tau2)):
             if tau + self.delay == 0.0 and b and b.degree == self.degree:
                 raise ValueError(
                     f"{name} without a delay must be of lower degree than A ({self.degree}), "
@@ -447,23 +407,14 @@ def checked_system(system: CharacteristicFunction) -> CharacteristicFunction:
 
 
 def broadcast_parameters(
-    system: CharacteristicFunction,
-    x: npt.ArrayLike | Fraction | None,
-    y: npt.ArrayLike | Fraction | None,
+    system: CharacteristicFunction, x: npt.ArrayLike | None, y: npt.ArrayLike | None
 ) -> tuple[FloatArray, FloatArray]:
     """Return the two free parameters of a system as finite real arrays of one shape.
 
-    Those of a loop, c1 and c2, are one where they are not given. Others have to be given. A
-    Fraction stays one, in an array of a single point.
+    Those of a loop, c1 and c2, are one where they are not given. Others have to be given.
     """
     x, y = given_or_one(checked_system(system), x, y)
     name1, name2 = system.parameters
-    if isinstance(x, Fraction) or isinstance(y, Fraction):
-        pair = [
-            value if isinstance(value, Fraction) else real_number(name, value)
-            for name, value in zip(system.parameters, (x, y), strict=True)
-        ]
-        return np.array(pair[0], dtype=object), np.array(pair[1], dtype=object)
     return broadcast_pair(name1, x, name2, y)
 
 

@@ -20,7 +20,6 @@ from numpy.polynomial import polynomial as poly
 from armlock import paper
 from armlock.checks import (
     ComplexArray,
-    FloatArray,
     complex_array,
     one_of,
     positive_number,
@@ -123,16 +122,6 @@ class Controller:
         gain = float(controller.num[0][0][0] / controller.den[0][0][0])
         return cls(controller.zeros(), controller.poles(), gain)
 
-    @property
-    def numerator(self) -> FloatArray:
-        """Coefficients of the numerator in ascending powers of s, gain included."""
-        return self.gain * _expanded(self.zeros)
-
-    @property
-    def denominator(self) -> FloatArray:
-        """Coefficients of the denominator in ascending powers of s."""
-        return _expanded(self.poles)
-
     def __call__(self, s: npt.ArrayLike) -> ComplexArray:
         """Evaluate K(s), factor by factor; `s` in rad/s, any shape."""
         return quotients(self.zeros, self.poles, self.gain, complex_array("s", s))
@@ -230,11 +219,6 @@ def _factors(name: str, values: Sequence[complex]) -> tuple[complex, ...]:
     return tuple(complex(root) for root in roots)
 
 
-def _expanded(roots: tuple[complex, ...]) -> FloatArray:
-    """Return the coefficients of prod(s - roots), ascending."""
-    return np.ascontiguousarray(np.atleast_1d(np.poly(np.array(roots))).real[::-1])
-
-
 def _precise(roots: tuple[complex, ...], gain: float) -> npt.NDArray[Any]:
     """Return the coefficients of gain prod(s - roots), ascending, in extended precision."""
     factors = [np.array([-mpmath.mpc(root), mpmath.mpf(1)]) for root in roots]
@@ -272,32 +256,6 @@ def stage_one(gain: float = paper.CONTROLLER_GAIN) -> Controller:
     return Controller((0.0, 0.0), (-corner, -corner), positive_number("gain", gain))
 
 
-def stage_two(*, denominator: str = "table") -> Controller:
-    r"""Return G_c, the phase-lead compensators of the paper's Stage II.
-
-    .. math::
-
-        G_c(s) = \prod_{k=1}^{4} \frac{s + z_{2k}}{s + p_{2k}}
-
-    Parameters
-    ----------
-    denominator : {"table", "printed"}, optional
-        "table" has the pole p24 of Table II; "printed" has s + z24 as Eq. (11) prints it,
-        which cancels the last zero.
-
-    Raises
-    ------
-    ValueError
-        If `denominator` is neither.
-    """
-    one_of("denominator", denominator, ("table", "printed"))
-    zeros = [-z for z in paper.TABLE_2_ZEROS]
-    poles = [-p for p in paper.TABLE_2_POLES]
-    if denominator == "printed":
-        zeros, poles = zeros[:-1], poles[:-1]
-    return Controller(zeros, poles, 1.0)
-
-
 def table_two(gain: float = paper.CONTROLLER_GAIN, *, denominator: str = "table") -> Controller:
     r"""Return the complete controller of Table II, Stage I times Stage II.
 
@@ -311,9 +269,20 @@ def table_two(gain: float = paper.CONTROLLER_GAIN, *, denominator: str = "table"
     gain : float, optional
         The paper's g.
     denominator : {"table", "printed"}, optional
-        As for `stage_two`.
+        "table" has the pole p24 of Table II; "printed" has s + z24 as Eq. (11) prints it,
+        which cancels the last zero.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the gain is not positive and finite, or `denominator` is neither.
     """
-    return stage_one(gain) * stage_two(denominator=denominator)
+    one_of("denominator", denominator, ("table", "printed"))
+    zeros = [-z for z in paper.TABLE_2_ZEROS]
+    poles = [-p for p in paper.TABLE_2_POLES]
+    if denominator == "printed":
+        zeros, poles = zeros[:-1], poles[:-1]
+    return stage_one(gain) * Controller(zeros, poles, 1.0)
 
 
 @lru_cache

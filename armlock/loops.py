@@ -14,8 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import zip_longest
-from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -24,14 +23,11 @@ from armlock import paper, sensors
 from armlock.characteristic import CharacteristicFunction, DelayEquation, late
 from armlock.checks import (
     ComplexArray,
-    axis,
     complex_array,
     not_negative,
     one_of,
-    positive_array,
     positive_number,
     real_number,
-    true_or_false,
 )
 from armlock.controllers import Controller, integrating_actuator, table_two, white_paper
 from armlock.delays import DelaySystem, QuasiPolynomial, Term, WithDelays, functions
@@ -39,9 +35,6 @@ from armlock.engine.functions import Function, common_zeros
 from armlock.engine.margins import Free
 from armlock.engine.polynomials import Polynomial
 from armlock.sensors import COMMON, SINGLE, SignalMapping, modified_dual
-
-if TYPE_CHECKING:
-    import control
 
 
 def HayesEquation(tau: float = 1.0) -> DelayEquation:
@@ -142,7 +135,7 @@ class Loop(WithDelays, CharacteristicFunction):
     # Anything that `Controller.of` takes, and a name, until they are checked.
     controller: Any
     mapping: Any
-    tau1: float = None  # type: ignore[assignment]
+    tau1: float
     tau2: float = None  # type: ignore[assignment]
     delay: float = 0.0
     rest: Polynomial = field(init=False, repr=False, compare=False)
@@ -154,8 +147,8 @@ class Loop(WithDelays, CharacteristicFunction):
     reference = (1.0, 1.0)
 
     _instead = (
-        "for plots write loop.frd(omega), the exact response at some frequencies, for a closed "
-        "loop loop.feedback(), for margins armlock.margins(loop), for responses "
+        "for plots write control.bode_plot(loop.frequency_response(omega)), for a closed loop "
+        "loop.feedback(), for margins armlock.margins(loop), for responses "
         "armlock.step_response(loop.feedback(), timepts), and for the controller alone "
         "loop.controller"
     )
@@ -310,58 +303,14 @@ class Loop(WithDelays, CharacteristicFunction):
             If s does not hold finite numbers, or holds a pole of K, m1 or m2, c1 or c2 is not
             finite and real, or the three do not broadcast.
         """
-        return self.with_arms(s, c1, c2)[0]
-
-    def with_arms(
-        self, s: npt.ArrayLike, c1: npt.ArrayLike, c2: npt.ArrayLike
-    ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Evaluate L and both `arm_responses`."""
         s, c1, c2 = self._checked(s, c1, c2)
         first, second = self.arm_responses(s)
         result: ComplexArray = first * ((1.0 - c1) - c1 * np.expm1(-s * self.tau1))
-        return result + second * ((1.0 - c2) - c2 * np.expm1(-s * self.tau2)), first, second
-
-    def frd(
-        self, omega: npt.ArrayLike, c1: float = 1.0, c2: float = 1.0
-    ) -> control.FrequencyResponseData:
-        """Return the open loop as frequency response data of python-control, exact delays.
-
-        Parameters
-        ----------
-        omega : array_like of float, one-dimensional
-            Angular frequencies in rad/s, positive.
-        c1, c2 : float, optional
-            Multiplicative perturbations.
-
-        Returns
-        -------
-        control.FrequencyResponseData
-            For the plots of python-control. Its margins use only these frequencies;
-            `armlock.margins` covers all frequencies.
-
-        Raises
-        ------
-        TypeError, ValueError
-            If omega is not positive and one-dimensional, or c1 or c2 is no finite real number.
-
-        Examples
-        --------
-        >>> from armlock import paper_loop
-        >>> response = paper_loop().frd([0.01, 0.1])
-        >>> print(f"{abs(response(0.1j)):.4f}")
-        12770.0033
-        """
-        import control
-
-        omega = axis("omega", positive_array("omega", omega))
-        c1, c2 = real_number("c1", c1), real_number("c2", c2)
-        response = self(1j * omega, c1, c2)
-        # Its plots need a name.
-        return control.frd(response, omega, sysname="Loop")
+        return result + second * ((1.0 - c2) - c2 * np.expm1(-s * self.tau2))
 
 
 def _mapping_and_delays(
-    mapping: SignalMapping | str, tau1: float | None, tau2: float | None
+    mapping: SignalMapping | str, tau1: float, tau2: float | None
 ) -> tuple[SignalMapping, float, float]:
     """Return the signal mapping as an object, and both delays: tau1 where there is no arm 2."""
     if not isinstance(mapping, SignalMapping | str):
@@ -370,8 +319,6 @@ def _mapping_and_delays(
             "or Loop(controller, 'common', tau1, tau2); with more arms write "
             f"controller * (m1 * (1 - delay(tau1)) + ...), got {mapping!r:.200}"
         )
-    if tau1 is None:
-        raise TypeError("tau1 must be given, the round-trip delay of arm 1 in s")
     tau1 = positive_number("tau1", tau1)
     if isinstance(mapping, str):
         one_of("mapping", mapping, sensors.NAMES)
@@ -389,16 +336,6 @@ def _mapping_and_delays(
     return mapping, tau1, tau2
 
 
-def _gain(gain: object, sensor: str) -> float:
-    """Return a positive gain, or say what to write with a controller in its place."""
-    if isinstance(gain, Real):
-        return positive_number("gain", gain)
-    raise TypeError(
-        f"gain must be a real number, got {gain!r:.200}; with a controller of your own write "
-        f'Loop(controller, "{sensor}", ...)'
-    )
-
-
 def checked_loop(loop: Loop) -> Loop:
     """Return the loop, or say what was given in its place."""
     if not isinstance(loop, Loop):
@@ -407,6 +344,16 @@ def checked_loop(loop: Loop) -> Loop:
             f"rightmost root, a DelaySystem, as DelaySystem.of(system), got {loop!r:.200}"
         )
     return loop
+
+
+def quotient_of(loop: Loop | DelaySystem, c1: float, c2: float) -> tuple[Function, Function]:
+    """Return N and M of L = N / M, or say what was given in place of a loop."""
+    c1, c2 = real_number("c1", c1), real_number("c2", c2)
+    if not isinstance(loop, DelaySystem):
+        return checked_loop(loop).quotient(c1, c2)
+    if (c1, c2) != (1.0, 1.0):
+        raise TypeError(f"a DelaySystem has no perturbations, got c1 = {c1} and c2 = {c2}")
+    return loop.functions
 
 
 def SingleArm(
@@ -447,7 +394,7 @@ def SingleArm(
     >>> unstable_roots(SingleArm(gain=1.0, tau1=20.1), [0.99, 1.0, 1.01], 0.0)
     array([0, 0, 1])
     """
-    return Loop(integrating_actuator(_gain(gain, "single")), SINGLE, tau1, delay=delay)
+    return Loop(integrating_actuator(gain), SINGLE, tau1, delay=delay)
 
 
 def CommonArm(
@@ -488,7 +435,7 @@ def CommonArm(
     >>> unstable_roots(CommonArm(gain=10.0), 1.0, 0.999)
     array(0)
     """
-    return Loop(integrating_actuator(_gain(gain, "common")), COMMON, tau1, tau2, delay)
+    return Loop(integrating_actuator(gain), COMMON, tau1, tau2, delay)
 
 
 def DualArm(
@@ -549,8 +496,7 @@ def DualArm(
     >>> unstable_roots(DualArm(gain=10.0), [1.0, 1.0, 1.0], [0.995, 1.0, 1.001])
     array([1, 0, 0])
     """
-    gain = _gain(gain, "dual")
-    mapping = sensors.dual(corner, _delay_difference(tau1, tau2, difference))
+    mapping = sensors.dual(corner, tau1 - tau2 if difference is None else difference)
     return Loop(integrating_actuator(gain), mapping, tau1, tau2, delay)
 
 
@@ -607,17 +553,10 @@ def paper_loop(
     array([0, 0])
     """
     chosen = table_two() if controller is None else Controller.of(controller)
-    if true_or_false("actuator", actuator):
+    if actuator:
         chosen = chosen * integrating_actuator()
-    mapping = sensors.dual(corner, _delay_difference(tau1, tau2, difference))
+    mapping = sensors.dual(corner, tau1 - tau2 if difference is None else difference)
     return Loop(chosen, mapping, tau1, tau2, delay)
-
-
-def _delay_difference(tau1: float, tau2: float, difference: float | None) -> float:
-    """Return the dtau of the dual sensor, tau1 - tau2 unless it is given."""
-    if difference is not None:
-        return real_number("difference", difference)
-    return sensors.delay_difference(tau1, tau2)
 
 
 def flight_loop(
@@ -673,13 +612,8 @@ def flight_loop(
     array([0, 2])
     """
     mapping = modified_dual(mean_delay, half_difference, corner)
-    if abs(half_difference) >= mean_delay:
-        raise ValueError(
-            f"half_difference must be below mean_delay ({mean_delay}), got {half_difference}"
-        )
-    controller = white_paper(0.5 * positive_number("g2", g2))
     tau1, tau2 = mean_delay + half_difference, mean_delay - half_difference
-    return Loop(controller, mapping, tau1, tau2, delay)
+    return Loop(white_paper(0.5 * positive_number("g2", g2)), mapping, tau1, tau2, delay)
 
 
 def _at_hertz(*corners: float) -> list[float]:

@@ -210,17 +210,6 @@ def _modified_dual(mean: float, half: float, w0: float) -> SignalMapping:
     )
 
 
-def delay_difference(tau1: float, tau2: float) -> float:
-    """Return tau1 - tau2, by which the dual sensors divide, or raise if it is zero."""
-    between = positive_number("tau1", tau1) - positive_number("tau2", tau2)
-    if between == 0.0:
-        raise ValueError(
-            f"tau1 and tau2 must differ, got {tau1} for both: the dual sensor divides by "
-            f"their difference"
-        )
-    return between
-
-
 #: Names of the signal mappings that `Loop` takes in place of an object.
 NAMES = ("single", "common", "difference", "dual", "modified dual")
 
@@ -252,9 +241,9 @@ def named(name: str, tau1: float, tau2: float) -> SignalMapping:
     True
     """
     if name == "dual":
-        return dual(paper.DUAL_SENSOR_CORNER, delay_difference(tau1, tau2))
+        return dual(paper.DUAL_SENSOR_CORNER, tau1 - tau2)
     if name == "modified dual":
-        half = 0.5 * delay_difference(tau1, tau2)
+        half = 0.5 * (tau1 - tau2)
         return modified_dual(0.5 * (tau1 + tau2), half)
     plain = {mapping.name: mapping for mapping in (SINGLE, COMMON, DIFFERENCE)}
     return plain[one_of("mapping", name, NAMES)]

@@ -40,15 +40,6 @@ def test_value_is_the_definition(system, s, x, y):
     assert abs(found - expected) <= 1e-13 * (1.0 + independent.size(system, s, x, y))
 
 
-@given(st.sampled_from(SYSTEMS), frequencies, reals, reals)
-def test_derivative_agrees_with_a_central_difference(system, s, x, y):
-    step = 1e-5
-    values = system.characteristic(np.array([s + step, s - step]), x, y)
-    difference = (values[0] - values[1]) / (2.0 * step)
-    scale = independent.size(system, s, 1.0, 1.0) * (1.0 + system.longest_delay) ** 3
-    assert abs(system.derivative(s, x, y) - difference) <= 1e-8 * (scale + 10.0)
-
-
 def test_a_parameter_that_would_change_the_order_is_refused():
     with pytest.raises(ValueError, match=r"^b1 without a delay must be of lower degree than A"):
         DelayEquation([1.0, 1.0], [0.0, 1.0], [1.0], 0.0, 1.0)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from armlock import Controller, Loop, unstable_roots
-from armlock.controllers import stage_one, stage_two, table_two
+from armlock.controllers import table_two
 from armlock.paper import TABLE_2_POLES, TABLE_2_STAGE_1_POLE, TABLE_2_ZEROS
 from armlock.sensors import COMMON
 
@@ -50,7 +50,6 @@ def test_table_two_is_the_product_of_its_factors():
     for zero, pole in zip(TABLE_2_ZEROS, TABLE_2_POLES, strict=True):
         value = value * (s + zero) / (s + pole)
     np.testing.assert_allclose(table_two()(s), value, rtol=1e-13)
-    np.testing.assert_allclose((stage_one() * stage_two())(s), value, rtol=1e-13)
 
 
 def test_a_state_space_is_taken_or_refused_by_its_response():

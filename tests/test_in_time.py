@@ -29,7 +29,7 @@ from armlock import (
     unstable_roots,
 )
 from armlock.performance.pulling import pulling
-from armlock.robustness import box_count, first_crossing, gain_interval
+from armlock.robustness import box_count, first_crossing
 from tests import attack
 from tests.attack_judge import Sketch, UndecidedError, View
 
@@ -84,7 +84,6 @@ def asked(rng, loop, point):
         "margins": partial(margins, loop, *point),
         "margins, free": lambda: margins(loop, *point, free_above=above),
         "modulus_margin": partial(modulus_margin, loop, *point),
-        "gain_interval": partial(gain_interval, loop, *point),
         "critical_perturbation": partial(critical_perturbation, loop, way),
         "first_crossing": partial(first_crossing, loop, point, way),
         "rightmost_root": partial(rightmost_root, loop, *point),

@@ -1,6 +1,5 @@
 import pickle
 import time
-from fractions import Fraction
 
 import mpmath
 import numpy as np
@@ -334,12 +333,6 @@ def test_right_of_a_line_the_closed_loop_is_counted():
         assert unstable_roots(loop, right_of=right_of) == plain - (right_of < 0.0)
     with pytest.raises(ValueError, match=r"^right_of must be at most 700 over the longest"):
         unstable_roots(loop, right_of=-1e3)
-
-
-def test_fractions_are_taken_exactly():
-    tiny = Fraction(1, 10**30)
-    assert unstable_roots(CommonArm().plain(), 1 - tiny, 1.0) == 0
-    assert unstable_roots(CommonArm().plain(), 1 - tiny, 1 + tiny) == BOUNDARY
 
 
 def test_more_points_than_memory_holds_are_refused():

@@ -49,8 +49,7 @@ def transfer(
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no `Loop`, there is no such input, or s is refused by `Loop.open_loop`, for
-        instance at a pole of the open loop.
+        If `loop` is no `Loop`, there is no such input, or s is a pole of the open loop.
 
     Examples
     --------
@@ -64,8 +63,8 @@ def transfer(
 
 def responses(loop: Loop, s: npt.ArrayLike) -> dict[str, ComplexArray]:
     """Evaluate the responses to all inputs at once, as `transfer` gives them one by one."""
-    open_loop, first, second = checked_loop(loop).with_arms(s, 1.0, 1.0)
-    sensitivity = 1.0 / (1.0 + open_loop)
+    sensitivity = 1.0 / (1.0 + checked_loop(loop)(s))
+    first, second = loop.arm_responses(s)
     errors = {
         "arm 1": first,
         "arm 2": second,

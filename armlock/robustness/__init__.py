@@ -11,7 +11,6 @@ from armlock.robustness.perturbations import (
     box_count,
     critical_perturbation,
     first_crossing,
-    gain_interval,
     no_root_crosses,
 )
 
@@ -21,7 +20,6 @@ __all__ = [
     "box_count",
     "critical_perturbation",
     "first_crossing",
-    "gain_interval",
     "margins",
     "modulus_margin",
     "no_root_crosses",

@@ -17,7 +17,7 @@ from armlock.delays import DelaySystem
 from armlock.engine.decide import UndecidedError
 from armlock.engine.functions import Function
 from armlock.engine.margins import Margins, margins_of, modulus_of
-from armlock.loops import Loop, checked_loop
+from armlock.loops import Loop, checked_loop, quotient_of
 from armlock.stability.counts import CountError
 
 _T = TypeVar("_T")
@@ -27,12 +27,7 @@ def _certified(
     compute: Callable[[Function, Function], _T], loop: Loop | DelaySystem, c1: float, c2: float
 ) -> _T:
     """Return what the engine makes of numerator and denominator of a loop."""
-    if isinstance(loop, DelaySystem):
-        if (c1, c2) != (1.0, 1.0):
-            raise TypeError(f"a DelaySystem has no free parameters, got c1 = {c1}, c2 = {c2}")
-        n, m = loop.functions
-    else:
-        n, m = checked_loop(loop).quotient(real_number("c1", c1), real_number("c2", c2))
+    n, m = quotient_of(loop, c1, c2)
     try:
         return compute(n, m)
     except UndecidedError as error:

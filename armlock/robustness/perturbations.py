@@ -1,4 +1,4 @@
-"""Perturbations that a loop withstands: along a ray, over a box, in gain, and of its arms.
+"""Perturbations that a loop withstands: along a ray, over a box, and of its arms.
 
 On a ray start + t direction the characteristic function is f + t g, over a box a convex
 combination of those at its corners. `armlock.engine` finds the first t at which f + t g has a
@@ -21,7 +21,7 @@ from armlock.engine import decide
 from armlock.engine.decide import BOUNDARY, UNCONFINED, Family, UndecidedError
 from armlock.engine.functions import Function, common_zeros
 from armlock.engine.inclusion import EPSILON
-from armlock.engine.margins import first_zero, gain_range, require_stable
+from armlock.engine.margins import first_zero
 from armlock.loops import Loop, checked_loop
 from armlock.stability.counts import CountError
 
@@ -393,65 +393,3 @@ def no_root_crosses(loop: Loop, low: float, high: float) -> bool:
     arc = (0.0, low, 0.0, high), (0.0, 0.0, 0.0, 0.0)
     with _refusals(loop, 1.0, 1.0):
         return decide.excludes(Family(functions, [test], arc), begin)
-
-
-def gain_interval(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> tuple[float, float, float]:
-    r"""Find the gain factors around one between which a stable loop stays stable.
-
-    Parameters
-    ----------
-    loop : Loop
-        The loop.
-    c1, c2 : float
-        Multiplicative perturbations, at which the loop is stable.
-
-    Returns
-    -------
-    lower, upper, omega : float
-        The two factors, and where the upper one is taken, in rad/s: 0 for a real root, inf for
-        the limit of the neutral root chain. 0, inf and nan where nothing between factors of
-        1e-4 and 1e4 bounds them.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If `loop` is no `Loop`, or c1 or c2 is not finite and real, or the loop is not stable
-        there.
-    CountError
-        If rounding, or the steps allowed, do not decide it.
-
-    Notes
-    -----
-    With a factor k, and L = N / R, a root is at s = j omega where
-
-    .. math::
-
-        R + k N = 0 , \qquad k = -\frac{1}{L} \text{ is real.}
-
-    A factor closer to one by more than a part in a million is excluded. The limits of the
-    neutral root chain are given in place of factors that lie within 1e-5 of them, or within
-    rounding.
-
-    Examples
-    --------
-    >>> from armlock import DualArm
-    >>> from armlock.robustness import gain_interval
-    >>> lower, upper, omega = gain_interval(DualArm(), 1.001, 1.002)
-    >>> print(f"{upper:.2f}")
-    29.58
-    """
-    c1, c2 = real_number("c1", c1), real_number("c2", c2)
-    n, m = checked_loop(loop).quotient(c1, c2)
-    with _refusals(loop, c1, c2):
-        require_stable(n, m)
-        return gain_range(n, m)
-
-
-__all__ = [
-    "Crossing",
-    "box_count",
-    "critical_perturbation",
-    "first_crossing",
-    "gain_interval",
-    "no_root_crosses",
-]

@@ -8,7 +8,6 @@ bounded. Those that this leaves undecided are counted again, exactly.
 from __future__ import annotations
 
 from collections.abc import Callable
-from fractions import Fraction
 from functools import partial
 
 import numpy as np
@@ -68,14 +67,12 @@ def _decided(count: Callable[[], IntArray], x: FloatArray, y: FloatArray) -> Int
         raise CountError(f"no count at {tuple(at[0].tolist())}: {error}", at) from None
 
 
-def _count_exactly(
-    system: CharacteristicFunction, x: float | Fraction, y: float | Fraction, right_of: float
-) -> int:
+def _count_exactly(system: CharacteristicFunction, x: float, y: float, right_of: float) -> int:
     """Count the roots at one point, of a Loop those of the closed loop."""
     function = system.function(x, y)
     # No root cancels where D has none at s = 0.
     common = 0 if function.series(1)[0] else system.cancelled(x, y)
-    at = np.array([float(x)]), np.array([float(y)])
+    at = np.array([x]), np.array([y])
     return int(_decided(lambda: np.array([_count(function, common, right_of)]), *at)[0])
 
 
@@ -124,8 +121,8 @@ def count_points(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -
 
 def unstable_roots(
     system: CharacteristicFunction | DelaySystem,
-    c1: npt.ArrayLike | Fraction | None = None,
-    c2: npt.ArrayLike | Fraction | None = None,
+    c1: npt.ArrayLike | None = None,
+    c2: npt.ArrayLike | None = None,
     *,
     right_of: float = 0.0,
 ) -> IntArray:
@@ -135,7 +132,7 @@ def unstable_roots(
     ----------
     system : CharacteristicFunction or DelaySystem
         The loop, for instance `CommonArm()`; of a `DelaySystem` L the closed loop 1 + L.
-    c1, c2 : array_like of float, or Fraction, optional
+    c1, c2 : array_like of float, optional
         The two free parameters; they broadcast. Those of a loop are one if they are not given.
         Others, such as a and b of `HayesEquation`, have to be given. A `DelaySystem` has none.
     right_of : float, optional

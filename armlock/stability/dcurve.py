@@ -276,15 +276,15 @@ def d_curve_branches(
         omega_max = min(omega_max, np.pi / system.step)
     density = positive_number("points_per_turn", points_per_turn)
     _require_two_parameters(system)
-    turns = omega_max / system.omega_per_turn
-    check_memory("omega_max", (int(min(density * turns, 1e18)),), 256)
+    # Samples in an interval of 1 rad/s.
+    density *= system.longest_delay / (2.0 * np.pi)
+    check_memory("omega_max", (int(min(density * omega_max, 1e18)),), 256)
     poles = _poles(system, omega_max)
     branches = []
     for (_, start), (stop, _) in pairwise([(0.0, 0.0), *poles, (omega_max, omega_max)]):
         if stop <= start:
             continue
-        turns = (stop - start) / system.omega_per_turn
-        count = int(np.ceil(density * max(turns, 4.0)))
+        count = int(np.ceil(max(density * (stop - start), 4.0 * points_per_turn)))
         # Closer towards both ends, where the curve runs off to its poles.
         share = 0.5 * (1.0 - np.cos(np.pi * (np.arange(count) + 0.5) / count))
         omega = start + (stop - start) * share

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from armlock.checks import ComplexArray, FloatArray, positive_number, real_number
+from armlock.checks import ComplexArray, FloatArray, positive_number
 from armlock.delays import DelaySystem
 from armlock.engine import decide
 from armlock.engine.functions import Function, at, common_zeros, stacked
 from armlock.engine.polynomials import rounded
-from armlock.loops import Loop, checked_loop
+from armlock.loops import Loop, quotient_of
 from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError
 from armlock.stability.crossings import crossings
 
@@ -113,16 +113,6 @@ class AxisCrossings:
 
     omega: FloatArray
     value: FloatArray
-
-
-def _quotient(loop: Loop | DelaySystem, c1: float, c2: float) -> tuple[Function, Function]:
-    """Return N and M of L = N / M, or say what was given in place of a loop."""
-    c1, c2 = real_number("c1", c1), real_number("c2", c2)
-    if not isinstance(loop, DelaySystem):
-        return checked_loop(loop).quotient(c1, c2)
-    if (c1, c2) != (1.0, 1.0):
-        raise TypeError(f"a DelaySystem has no perturbations, got c1 = {c1} and c2 = {c2}")
-    return loop.functions
 
 
 def open_loop_poles(m: Function) -> int:
@@ -228,7 +218,7 @@ def nyquist(
     >>> curve.encirclements, curve.open_loop_poles, curve.closed_loop_roots
     (1, 0, 1)
     """
-    n, m = _quotient(loop, c1, c2)
+    n, m = quotient_of(loop, c1, c2)
     poles = open_loop_poles(m)
     order, radius = _leading_radius(n, m)
     try:
@@ -315,7 +305,7 @@ def axis_crossings(
     5.63e-05 rad/s: -5.13
     1.96e-04 rad/s: -113.07
     """
-    n, m = _quotient(loop, c1, c2)
+    n, m = quotient_of(loop, c1, c2)
     least = 0.0
     if omega_max is None:
         least = _SMALL

@@ -27,7 +27,7 @@ from armlock.paper import (
     TAU1,
     TAU2,
 )
-from armlock.robustness import Crossing, first_crossing, gain_interval
+from armlock.robustness import Crossing, first_crossing, margins
 from armlock.stability.counts import unstable_roots
 from armlock.stability.dcurve import d_curve, d_curve_line
 from armlock.stability.semidiscretization import semi_discretization
@@ -232,7 +232,8 @@ def printed_deviation(c1: float, c2: float, *, restored: bool = False) -> tuple[
 @cache
 def gain_factors(c1: float, c2: float) -> tuple[float, float]:
     """Return the gain factors between which the loop stays stable, from g = 10."""
-    return gain_interval(DualArm(), c1, c2)[:2]
+    found = margins(DualArm(), c1, c2)
+    return found.gain_lower, found.gain_upper
 
 
 def middle_corner(system: CharacteristicFunction) -> float:

@@ -18,7 +18,6 @@ from armlock.paper import (
     TAU1,
     TAU2,
 )
-from armlock.robustness import gain_interval
 from armlock.robustness.margins import margins
 from armlock.stability.nyquist import AxisCrossings, NyquistCurve, axis_crossings, nyquist
 from armlock.stability.roots import rightmost_root
@@ -326,7 +325,7 @@ def dual_arm_branch() -> Finding:
 )
 def dual_arm_gain_margin() -> Finding:
     """Compute the margin on the stable side, and look for one at the paper's points."""
-    factor = np.array([gain_interval(DUAL, 1.0, 1.0 + float(e))[1] for e in SIZES])
+    factor = np.array([margins(DUAL, 1.0, 1.0 + float(e)).gain_upper for e in SIZES])
     falls = bool(np.isfinite(factor).all() and (np.diff(factor) < 0.0).all())
     bounded = axis_crossings(DUAL).omega.size > 0
     fewest = fewest_roots(DUAL, *DUAL_POINT)
