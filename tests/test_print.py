@@ -40,7 +40,8 @@ def test_what_a_page_keeps_folded_is_printed():
         page = chromium.new_page()
         page.set_content(
             "<article><details><summary>claim</summary>verdict</details>"
-            "<details class='hide'><summary>Show code</summary>code</details></article>"
+            "<details class='hide'><summary>Show code</summary>code</details>"
+            "<p>Point at this chart:</p><div class='live'>chart</div></article>"
         )
         page.add_style_tag(content=STYLE)
         page.evaluate(LINKS, "front")
