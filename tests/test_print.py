@@ -1,4 +1,4 @@
-"""The printed book, and two makes in one folder."""
+"""Lines of text and formulas, the printed book, and two makes in one folder."""
 
 import subprocess
 import sys
@@ -17,6 +17,25 @@ PAGE = """<html><head><link rel="stylesheet" href="../_static/a.css"></head><bod
 <div class="live"><a href="live.html#s=dual">open</a></div>
 <figure id="fig"></figure><div class="citation" id="id2">A</div></article></body></html>"""
 FOOT = "<p>Code: MIT License.</p>"
+LINE = """<article class="bd-content bd-article"><p style="width: 100px">At ({}), and {}.</p>
+</article>"""
+FORMULA = '<span class="math"><mjx-container style="display: inline-block"><i style="{}">x</i>'
+FORMULA += "</mjx-container></span>"
+
+
+@needs_chromium
+def test_a_formula_stays_with_its_comma_and_scrolls_where_it_is_wide():
+    wide = "display: inline-block; width: 300px"
+    style, script = ((ROOT / f"book/_static/armlock.{s}").read_text() for s in ("css", "js"))
+    with browser() as chromium:
+        page = chromium.new_page()
+        line = LINE.format(FORMULA.format(""), FORMULA.format(wide))
+        page.set_content(f"{line}<style>{style}</style><script>{script}</script>")
+        page.wait_for_selector("mjx-container.wide[data-more]")
+        assert page.locator(".unbroken").all_inner_texts() == ["(x),", "x."]
+        assert page.evaluate("document.querySelector('p').scrollWidth") == 100
+        page.evaluate("document.querySelector('.wide').scrollLeft = 300")
+        page.wait_for_selector("mjx-container.wide:not([data-more])")
 
 
 @needs_chromium
@@ -40,7 +59,8 @@ def test_what_a_page_keeps_folded_is_printed():
         page = chromium.new_page()
         page.set_content(
             "<article><details><summary>claim</summary>verdict</details>"
-            "<details class='hide'><summary>Show code</summary>code</details></article>"
+            "<details class='hide'><summary>Show code</summary>code</details>"
+            "<p>Point at this chart:</p><div class='live'>chart</div></article>"
         )
         page.add_style_tag(content=STYLE)
         page.evaluate(LINKS, "front")

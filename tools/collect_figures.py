@@ -36,6 +36,19 @@ def take_figures(cell: Any, folder: Path) -> None:
                     file.write_text(text, encoding="utf-8")
 
 
+def join_streams(cell: Any) -> None:
+    """Join what a cell prints, which MyST-NB would do with a new line between the parts."""
+    joined: list[Any] = []
+    for output in cell.get("outputs", []):
+        last = joined[-1] if joined else {}
+        if "text" in output and output.get("name") == last.get("name"):
+            last["text"] += output["text"]
+        else:
+            joined.append(output)
+    if "outputs" in cell:
+        cell["outputs"] = joined
+
+
 def seconds(cell: Any) -> float:
     """Return how long a cell ran, and take the times out of its metadata."""
     times = cell.metadata.pop("execution", {})
@@ -57,6 +70,7 @@ def main() -> None:
         notebook = nbformat.read(path, as_version=4)  # type: ignore[no-untyped-call]
         for cell in notebook.cells:
             take_figures(cell, figures)
+            join_streams(cell)
         data = {"execution_seconds": sum(map(seconds, notebook.cells))}
         cache.cache_notebook_bundle(CacheBundleIn(notebook, str(path), data=data))
 

@@ -25,7 +25,8 @@ STYLE = """
 .bd-header, .bd-header-article, .bd-sidebar, .bd-sidebar-secondary, .bd-footer, .headerlink,
 .prev-next-footer, .search-button, .live, .copybtn, .skip-link, .pst-async-banner-revealer,
 .bd-header-announcement, #pst-back-to-top, .figure-downloads, .ledger-filter, footer, noscript,
-script, details.hide > summary, details details, .toggle-button
+script, details.hide > summary, details details, .toggle-button, #contents > h2,
+#try-the-readings, p:has(+ .live)
   { display: none !important; }
 .bd-page-width, .bd-main, .bd-content, .bd-article-container, .bd-container, .bd-article
   { max-width: none !important; display: block !important; width: auto !important;

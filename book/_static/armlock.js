@@ -7,18 +7,44 @@ if (location.protocol === "file:" && typeof DOCUMENTATION_OPTIONS !== "undefined
 // Code, tables and formulas that are wider than the text can be scrolled, with the keys as well,
 // and fade at the right as long as there is more.
 const WIDE = ".bd-article :is(pre, div.math, .text_html, .pst-scrollable-table-container)";
+const look = part => {
+  const cut = part.scrollWidth > part.clientWidth + 1;
+  const more = part.scrollWidth - part.clientWidth - part.scrollLeft > 1;
+  part.toggleAttribute("data-more", cut && more);
+  if (cut) part.tabIndex = 0;
+};
 addEventListener("load", () => {
-  const look = part => {
-    const cut = part.scrollWidth > part.clientWidth + 1;
-    const more = part.scrollWidth - part.clientWidth - part.scrollLeft > 1;
-    part.toggleAttribute("data-more", cut && more);
-    if (cut) part.tabIndex = 0;
-  };
   const sizes = new ResizeObserver(entries => entries.forEach(entry => look(
     entry.target.matches(WIDE) ? entry.target : entry.target.parentElement)));
   for (const part of document.querySelectorAll(WIDE)) {
     part.addEventListener("scroll", () => look(part), {passive: true});
     for (const one of [part, ...part.children]) sizes.observe(one);
+  }
+});
+
+// In a line of text, a formula stays with the comma behind it and the bracket before it. One that
+// is wider than the line, on a telephone, scrolls.
+addEventListener("load", async () => {
+  await window.MathJax?.startup?.promise;
+  const formulas = [...document.querySelectorAll(".bd-article mjx-container:not([display])")];
+  for (const formula of formulas) {
+    const part = formula.closest("span.math") ?? formula;
+    const before = /\S*[([“]$/.exec(part.previousSibling?.data ?? "");
+    const after = /^[.,;:)\]”?]+/.exec(part.nextSibling?.data ?? "")?.[0] ?? "";
+    if (!before && !after) continue;
+    const whole = document.createElement("span");
+    whole.className = "unbroken";
+    part.before(whole);
+    whole.append(part, after);
+    if (before) whole.prepend(whole.previousSibling.splitText(before.index));
+    if (after) whole.nextSibling.deleteData(0, after.length);
+  }
+  const isWide = formula => formula.offsetWidth > (
+    formula.closest("p, dd, li, figcaption")?.clientWidth ?? Infinity);
+  for (const formula of formulas.filter(isWide)) {
+    formula.classList.add("wide");
+    formula.addEventListener("scroll", () => look(formula), {passive: true});
+    look(formula);
   }
 });
 
