@@ -174,6 +174,8 @@ const armlockDraw = (function () {
         canvas.addEventListener(name, event => this.lift(event));
       canvas.addEventListener("pointerleave", () => this.preview(null));
       canvas.addEventListener("keydown", event => this.key(event));
+      // From wherever the reader is by now: at a slider, say.
+      addEventListener("keydown", event => { if (event.key === "Escape" && this.held) this.hold(null); });
       // A vertical swipe scrolls the page (touch-action), but neither a pinch nor the held point.
       canvas.addEventListener("touchstart", event => {
         if (event.touches.length > 1 || this.onPoint) event.preventDefault();
@@ -426,7 +428,6 @@ const armlockDraw = (function () {
     }
 
     key(event) {
-      if (event.key === "Escape" && this.held) this.hold(null);
       const zoom = { "+": 0.5, "=": 0.5, "-": 2 }[event.key];
       if (zoom && !event.ctrlKey && !event.metaKey) {
         event.preventDefault();

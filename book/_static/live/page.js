@@ -350,7 +350,7 @@ function armlockPages() {
       const parts = [`${this.name}: ${count === undefined ? "counting \u2026" : counted(count)}`];
       if (root && count >= 0) parts.push(`rightmost root in rad/s: ${this.rootText(root)}; it `
         + `${root[0] < 0 ? "decays" : "grows"} by a factor of e in ${duration(1 / Math.abs(root[0]))}`);
-      this.out.textContent = `${parts.join("; ")}.${this.chart.held ? " Held: Escape releases it." : ""}`;
+      this.out.textContent = `${parts.join("; ")}.${this.chart.held ? " Held: a second click or Escape releases it." : ""}`;
       this.list();
     }
 
@@ -448,7 +448,8 @@ function armlockPages() {
         moved(Number(input.value), false);
       } });
     input.value = value;
-    const label = element("label", { class: "live-field" }, element("span", {}, name, " ", shown), input);
+    // Without `for` it would be the label of the output.
+    const label = element("label", { class: "live-field", for: id }, element("span", {}, name, " ", shown), input);
     label.to = at => {
       const end = at > high ? 2 * at : high;
       [input.max, input.step] = [end, (end - low) / 200];
