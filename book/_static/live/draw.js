@@ -511,11 +511,12 @@ const armlockDraw = (function () {
     pen.fillText(text, x, y);
   }
 
-  /* The same at the first place near (x, y) where it covers no other of `taken`. */
-  function labelBeside(pen, text, x, y, colours, taken) {
+  /* The same near (x, y), where it covers none of the labels `taken` and the fewest of the places of curves. */
+  function labelBeside(pen, text, x, y, colours, taken, places) {
     const long = pen.measureText(text).width, left = x - { left: 0, center: 0.5, right: 1 }[pen.textAlign] * long;
-    const free = v => taken.every(([a, b, c]) => left > b || left + long < a || Math.abs(v - c) > 15);
-    const found = [0, -15, 15, -30, 30].map(d => y + d).find(free) ?? y;
+    const below = v => places.filter(([a, b]) => a > left && a < left + long && Math.abs(b - v) < 9).length
+      + (v < 9 || taken.some(([a, b, c]) => left < b && left + long > a && Math.abs(v - c) < 15) ? 1e6 : 0);
+    const [[, found]] = [0, -15, 15, -30, 30].map(d => [below(y + d), y + d]).sort(([a], [b]) => a - b);
     taken.push([left, left + long, found]);
     label(pen, text, x, found, colours);
   }
@@ -542,7 +543,7 @@ const armlockDraw = (function () {
       let last = 0;
       for (const size of sizes) if (radius(size) > last + 28) {
         last = radius(size);
-        labelBeside(pen, write(size), cx + last * Math.cos(angle), cy + last * Math.sin(angle), colours, taken);
+        labelBeside(pen, write(size), cx + last * Math.cos(angle), cy + last * Math.sin(angle), colours, taken, []);
       }
     };
   }
@@ -595,8 +596,8 @@ const armlockDraw = (function () {
     pen.stroke();
     pen.globalAlpha = 1;
     sizes.shift();
-    const named = rings(pen, [cx, cy], sizes, radius, size => power(Math.round(Math.log10(size))),
-      half.flatMap(([x, y]) => [[x, y], [x, 2 * cy - y]]), colours);
+    const places = half.flatMap(([x, y]) => [[x, y], [x, 2 * cy - y]]);
+    const named = rings(pen, [cx, cy], sizes, radius, size => power(Math.round(Math.log10(size))), places, colours);
     pen.strokeStyle = colours.grid;
     curve(pen, half.length, i => [half[i][0], 2 * cy - half[i][1]]);
     pen.strokeStyle = colours.line;
@@ -614,10 +615,10 @@ const armlockDraw = (function () {
       pen.beginPath();
       pen.arc(cx, cy, radius(1), Math.min(angle, to), Math.max(angle, to));
       pen.stroke();
-      pen.textAlign = "center";
-      const text = `${degrees(margins.phase)} at ${hertz(margins.phaseAt)}`;
-      labelBeside(pen, text, Math.max(x, 0.5 * pen.measureText(text).width + 4), cy + (b < 0 ? 1 : -1)
-        * (radius(1) + 14), colours, taken);
+      // To the left of the imaginary axis, which an integrator's curve follows.
+      pen.textAlign = "right";
+      labelBeside(pen, `${degrees(margins.phase)} at ${hertz(margins.phaseAt)}`, cx - 6, cy + (b < 0 ? 1 : -1)
+        * (radius(1) + 14), colours, taken, places);
     }
     pen.lineWidth = 1;
     if (lit !== null) ring(pen, ...bent(re[lit], im[lit]), 6, colours);
@@ -667,7 +668,9 @@ const armlockDraw = (function () {
     };
     const gain = panel(8, [["left", colours.other], ["size", colours.line]], low, top + 5, "dB");
     const turned = panel(22 + room, [["phase", colours.line]], -180, 180, "phase in \u00b0", [-180, -90, 0, 90, 180]);
-    const taken = [];
+    const taken = [], places = [];
+    for (let i = 0; i < n; i += Math.ceil(n / 600)) for (const [py, part] of [[gain, size], [gain, rest], [turned, phase]])
+      places.push([shown[0].at[i], py(part[i])]);
     // From the curve to where the loop would be on the limit.
     const margin = (w, a, b, text) => {
       if (!inside(w)) return;
@@ -682,7 +685,7 @@ const armlockDraw = (function () {
       pen.fillStyle = colours.text;
       pen.textAlign = close ? "right" : "left";
       pen.textBaseline = "middle";
-      labelBeside(pen, text, x + (close ? -7 : 7), Math.min(0.5 * (a + b), high - 60), colours, taken);
+      labelBeside(pen, text, x + (close ? -7 : 7), Math.min(0.5 * (a + b), high - 60), colours, taken, places);
     };
     for (const name of ["lower", "upper"]) if (margins[`${name}At`] > 0)
       margin(margins[`${name}At`], gain(-decibels(margins[name])), gain(0), `gain \u00d7 ${say(margins[name])}`);
@@ -701,7 +704,7 @@ const armlockDraw = (function () {
     for (const [name, part, colour, at] of [["|L|", size, colours.line, 0.03], ["|S|", rest, colours.other, 0.4]]) {
       const i = nearest(omega, TURN * 10 ** (first + at * (last - first)));
       pen.fillStyle = colour;
-      labelBeside(pen, name, px(omega[i]), Math.min(Math.max(gain(part[i]) - 10, 15), 2 + room), colours, taken);
+      labelBeside(pen, name, px(omega[i]), Math.min(Math.max(gain(part[i]) - 10, 15), 2 + room), colours, taken, places);
     }
     pen.fillStyle = colours.text;
     if (lit !== null) {
