@@ -430,22 +430,18 @@ def slide(page, label, share):
     return slider
 
 
-def touch(page, kind, *points):
-    session = page.context.new_cdp_session(page)
-    places = [{"x": u, "y": v, "id": k} for k, (u, v) in enumerate(points)]
-    session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": places})
-
-
 def drag(page, start, stop):
     """Drag from places to others, with as many fingers, or with the mouse."""
     if page.by == "touch":
-        touch(page, "touchStart", *start)
-        for share in (0.1, 0.3, 0.6, 1.0):
-            touch(page, "touchMove", *[
-                (a + share * (u - a), b + share * (v - b))
-                for (a, b), (u, v) in zip(start, stop, strict=True)
-            ])  # fmt: skip
-        touch(page, "touchEnd")
+        session = page.context.new_cdp_session(page)
+        for share in (0.0, 0.1, 0.3, 0.6, 1.0):
+            points = [
+                {"x": a + share * (u - a), "y": b + share * (v - b), "id": k}
+                for k, ((a, b), (u, v)) in enumerate(zip(start, stop, strict=True))
+            ]
+            kind = "touchMove" if share else "touchStart"
+            session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+        session.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
     else:
         page.mouse.move(*start[0])
         page.mouse.down()

@@ -477,17 +477,7 @@ const armlockDraw = (function () {
     pen.setLineDash([]);
   }
 
-  /* Frequencies in Hz below a plot, and lines at values beside it. */
-  function powersBelow(pen, first, last, left, span, y, wide, high) {
-    pen.textAlign = "center";
-    pen.textBaseline = "top";
-    const every = Math.ceil((last - first) / (wide / 60));
-    for (let k = Math.ceil(first); k <= last; k += every)
-      pen.fillText(power(k), left + span * (k - first) / (last - first), y);
-    pen.textBaseline = "bottom";
-    pen.fillText("frequency in Hz", left + span / 2, high - 2);
-  }
-
+  /* Lines at values beside a plot. */
   function lines(pen, values, write, py, left, right, colours) {
     pen.textAlign = "right";
     pen.textBaseline = "middle";
@@ -501,27 +491,22 @@ const armlockDraw = (function () {
     }
   }
 
-  /* Text that stays readable over a curve. */
-  function label(pen, text, x, y, colours) {
-    pen.lineJoin = "round";
-    pen.lineWidth = 4;
-    pen.strokeStyle = colours.ground;
-    pen.strokeText(text, x, y);
-    pen.lineWidth = 1;
-    pen.fillText(text, x, y);
-  }
-
-  /* The same near (x, y), where it covers none of the labels `taken` and the fewest of the places of curves. */
+  /* Text near (x, y), where it covers none of the labels `taken` and the fewest of the places of curves. */
   function labelBeside(pen, text, x, y, colours, taken, places) {
     const long = pen.measureText(text).width, left = x - { left: 0, center: 0.5, right: 1 }[pen.textAlign] * long;
     const below = v => places.filter(([a, b]) => a > left && a < left + long && Math.abs(b - v) < 9).length
       + (v < 9 || taken.some(([a, b, c]) => left < b && left + long > a && Math.abs(v - c) < 15) ? 1e6 : 0);
     const [[, found]] = [0, -15, 15, -30, 30].map(d => [below(y + d), y + d]).sort(([a], [b]) => a - b);
     taken.push([left, left + long, found]);
-    label(pen, text, x, found, colours);
+    // Over a curve it stays readable.
+    pen.lineJoin = "round";
+    pen.lineWidth = 4;
+    pen.strokeStyle = colours.ground;
+    pen.strokeText(text, x, found);
+    pen.lineWidth = 1;
+    pen.fillText(text, x, found);
   }
 
-  const hertz = omega => `${say(omega / TURN)} Hz`;
   const degrees = angle => `${say(angle * 180 / Math.PI)}\u00b0`;
   const decibels = size => 20 * Math.log10(size + 1e-300);
 
@@ -617,7 +602,7 @@ const armlockDraw = (function () {
       pen.stroke();
       // To the left of the imaginary axis, which an integrator's curve follows.
       pen.textAlign = "right";
-      labelBeside(pen, `${degrees(margins.phase)} at ${hertz(margins.phaseAt)}`, cx - 6, cy + (b < 0 ? 1 : -1)
+      labelBeside(pen, `${degrees(margins.phase)} at ${say(margins.phaseAt / TURN)} Hz`, cx - 6, cy + (b < 0 ? 1 : -1)
         * (radius(1) + 14), colours, taken, places);
     }
     pen.lineWidth = 1;
@@ -716,7 +701,12 @@ const armlockDraw = (function () {
       pen.stroke();
       for (const y of [gain(size[lit]), gain(rest[lit]), turned(phase[lit])]) ring(pen, x, y, 4, colours);
     }
-    powersBelow(pen, first, last, left, span, 26 + 2 * room, wide, high);
+    pen.textAlign = "center";
+    pen.textBaseline = "top";
+    for (let k = Math.ceil(first); k <= last; k += Math.ceil(60 * (last - first) / wide))
+      pen.fillText(power(k), px(TURN * 10 ** k), 26 + 2 * room);
+    pen.textBaseline = "bottom";
+    pen.fillText("frequency in Hz", left + span / 2, high - 2);
     return i => [px(omega[i]), null];
   }
 
