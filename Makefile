@@ -110,10 +110,11 @@ print: $(BOOK)
 	$(jupyter-book) --path-output build/print --builder custom --custom-builder singlehtml --quiet
 	$(PY) -m tools.print_book build/print/_build/singlehtml build/html
 
-browser: ## Check every page in Chromium, without network; run the code as it shows it
+browser: ## Check every page and all windows in Chromium; run the code as it shows it
 	+@$(alone) $(BOOK)
 	$(PY) tools/check_browser.py build/html
 	$(PY) tools/check_cells.py build/html
+	EVERY_WINDOW=1 $(PYTEST) tests/test_live.py
 
 lab: $(READY) ## Open the notebooks in JupyterLab
 	$(VENV)/bin/jupyter-lab --notebook-dir notebooks $(if $(filter 0,$(shell id -u)),--allow-root)

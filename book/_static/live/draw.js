@@ -174,6 +174,8 @@ const armlockDraw = (function () {
         canvas.addEventListener(name, event => this.lift(event));
       canvas.addEventListener("pointerleave", () => this.preview(null));
       canvas.addEventListener("keydown", event => this.key(event));
+      // From wherever the reader is by now: at a slider, say.
+      addEventListener("keydown", event => { if (event.key === "Escape" && this.held) this.hold(null); });
       // A vertical swipe scrolls the page (touch-action), but neither a pinch nor the held point.
       canvas.addEventListener("touchstart", event => {
         if (event.touches.length > 1 || this.onPoint) event.preventDefault();
@@ -426,7 +428,6 @@ const armlockDraw = (function () {
     }
 
     key(event) {
-      if (event.key === "Escape" && this.held) this.hold(null);
       const zoom = { "+": 0.5, "=": 0.5, "-": 2 }[event.key];
       if (zoom && !event.ctrlKey && !event.metaKey) {
         event.preventDefault();
@@ -476,17 +477,7 @@ const armlockDraw = (function () {
     pen.setLineDash([]);
   }
 
-  /* Frequencies in Hz below a plot, and lines at values beside it. */
-  function powersBelow(pen, first, last, left, span, y, wide, high) {
-    pen.textAlign = "center";
-    pen.textBaseline = "top";
-    const every = Math.ceil((last - first) / (wide / 60));
-    for (let k = Math.ceil(first); k <= last; k += every)
-      pen.fillText(power(k), left + span * (k - first) / (last - first), y);
-    pen.textBaseline = "bottom";
-    pen.fillText("frequency in Hz", left + span / 2, high - 2);
-  }
-
+  /* Lines at values beside a plot. */
   function lines(pen, values, write, py, left, right, colours) {
     pen.textAlign = "right";
     pen.textBaseline = "middle";
@@ -500,26 +491,22 @@ const armlockDraw = (function () {
     }
   }
 
-  /* Text that stays readable over a curve. */
-  function label(pen, text, x, y, colours) {
+  /* Text near (x, y), where it covers none of the labels `taken` and the fewest of the places of curves. */
+  function labelBeside(pen, text, x, y, colours, taken, places) {
+    const long = pen.measureText(text).width, left = x - { left: 0, center: 0.5, right: 1 }[pen.textAlign] * long;
+    const below = v => places.filter(([a, b]) => a > left && a < left + long && Math.abs(b - v) < 9).length
+      + (v < 9 || taken.some(([a, b, c]) => left < b && left + long > a && Math.abs(v - c) < 15) ? 1e6 : 0);
+    const [[, found]] = [0, -15, 15, -30, 30].map(d => [below(y + d), y + d]).sort(([a], [b]) => a - b);
+    taken.push([left, left + long, found]);
+    // Over a curve it stays readable.
     pen.lineJoin = "round";
     pen.lineWidth = 4;
     pen.strokeStyle = colours.ground;
-    pen.strokeText(text, x, y);
+    pen.strokeText(text, x, found);
     pen.lineWidth = 1;
-    pen.fillText(text, x, y);
+    pen.fillText(text, x, found);
   }
 
-  /* The same at the first place near (x, y) where it covers no other of `taken`. */
-  function labelBeside(pen, text, x, y, colours, taken) {
-    const long = pen.measureText(text).width, left = x - { left: 0, center: 0.5, right: 1 }[pen.textAlign] * long;
-    const free = v => taken.every(([a, b, c]) => left > b || left + long < a || Math.abs(v - c) > 15);
-    const found = [0, -15, 15, -30, 30].map(d => y + d).find(free) ?? y;
-    taken.push([left, left + long, found]);
-    label(pen, text, x, found, colours);
-  }
-
-  const hertz = omega => `${say(omega / TURN)} Hz`;
   const degrees = angle => `${say(angle * 180 / Math.PI)}\u00b0`;
   const decibels = size => 20 * Math.log10(size + 1e-300);
 
@@ -541,7 +528,7 @@ const armlockDraw = (function () {
       let last = 0;
       for (const size of sizes) if (radius(size) > last + 28) {
         last = radius(size);
-        labelBeside(pen, write(size), cx + last * Math.cos(angle), cy + last * Math.sin(angle), colours, taken);
+        labelBeside(pen, write(size), cx + last * Math.cos(angle), cy + last * Math.sin(angle), colours, taken, []);
       }
     };
   }
@@ -594,8 +581,8 @@ const armlockDraw = (function () {
     pen.stroke();
     pen.globalAlpha = 1;
     sizes.shift();
-    const named = rings(pen, [cx, cy], sizes, radius, size => power(Math.round(Math.log10(size))),
-      half.flatMap(([x, y]) => [[x, y], [x, 2 * cy - y]]), colours);
+    const places = half.flatMap(([x, y]) => [[x, y], [x, 2 * cy - y]]);
+    const named = rings(pen, [cx, cy], sizes, radius, size => power(Math.round(Math.log10(size))), places, colours);
     pen.strokeStyle = colours.grid;
     curve(pen, half.length, i => [half[i][0], 2 * cy - half[i][1]]);
     pen.strokeStyle = colours.line;
@@ -613,10 +600,10 @@ const armlockDraw = (function () {
       pen.beginPath();
       pen.arc(cx, cy, radius(1), Math.min(angle, to), Math.max(angle, to));
       pen.stroke();
-      pen.textAlign = "center";
-      const text = `${degrees(margins.phase)} at ${hertz(margins.phaseAt)}`;
-      labelBeside(pen, text, Math.max(x, 0.5 * pen.measureText(text).width + 4), cy + (b < 0 ? 1 : -1)
-        * (radius(1) + 14), colours, taken);
+      // To the left of the imaginary axis, which an integrator's curve follows.
+      pen.textAlign = "right";
+      labelBeside(pen, `${degrees(margins.phase)} at ${say(margins.phaseAt / TURN)} Hz`, cx - 6, cy + (b < 0 ? 1 : -1)
+        * (radius(1) + 14), colours, taken, places);
     }
     pen.lineWidth = 1;
     if (lit !== null) ring(pen, ...bent(re[lit], im[lit]), 6, colours);
@@ -666,7 +653,9 @@ const armlockDraw = (function () {
     };
     const gain = panel(8, [["left", colours.other], ["size", colours.line]], low, top + 5, "dB");
     const turned = panel(22 + room, [["phase", colours.line]], -180, 180, "phase in \u00b0", [-180, -90, 0, 90, 180]);
-    const taken = [];
+    const taken = [], places = [];
+    for (let i = 0; i < n; i += Math.ceil(n / 600)) for (const [py, part] of [[gain, size], [gain, rest], [turned, phase]])
+      places.push([shown[0].at[i], py(part[i])]);
     // From the curve to where the loop would be on the limit.
     const margin = (w, a, b, text) => {
       if (!inside(w)) return;
@@ -681,7 +670,7 @@ const armlockDraw = (function () {
       pen.fillStyle = colours.text;
       pen.textAlign = close ? "right" : "left";
       pen.textBaseline = "middle";
-      labelBeside(pen, text, x + (close ? -7 : 7), Math.min(0.5 * (a + b), high - 60), colours, taken);
+      labelBeside(pen, text, x + (close ? -7 : 7), Math.min(0.5 * (a + b), high - 60), colours, taken, places);
     };
     for (const name of ["lower", "upper"]) if (margins[`${name}At`] > 0)
       margin(margins[`${name}At`], gain(-decibels(margins[name])), gain(0), `gain \u00d7 ${say(margins[name])}`);
@@ -700,7 +689,7 @@ const armlockDraw = (function () {
     for (const [name, part, colour, at] of [["|L|", size, colours.line, 0.03], ["|S|", rest, colours.other, 0.4]]) {
       const i = nearest(omega, TURN * 10 ** (first + at * (last - first)));
       pen.fillStyle = colour;
-      labelBeside(pen, name, px(omega[i]), Math.min(Math.max(gain(part[i]) - 10, 15), 2 + room), colours, taken);
+      labelBeside(pen, name, px(omega[i]), Math.min(Math.max(gain(part[i]) - 10, 15), 2 + room), colours, taken, places);
     }
     pen.fillStyle = colours.text;
     if (lit !== null) {
@@ -712,7 +701,12 @@ const armlockDraw = (function () {
       pen.stroke();
       for (const y of [gain(size[lit]), gain(rest[lit]), turned(phase[lit])]) ring(pen, x, y, 4, colours);
     }
-    powersBelow(pen, first, last, left, span, 26 + 2 * room, wide, high);
+    pen.textAlign = "center";
+    pen.textBaseline = "top";
+    for (let k = Math.ceil(first); k <= last; k += Math.ceil(60 * (last - first) / wide))
+      pen.fillText(power(k), px(TURN * 10 ** k), 26 + 2 * room);
+    pen.textBaseline = "bottom";
+    pen.fillText("frequency in Hz", left + span / 2, high - 2);
     return i => [px(omega[i]), null];
   }
 

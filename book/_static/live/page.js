@@ -56,9 +56,9 @@ function armlockPages() {
     "Common arm": [{ ...ARM, sensor: "common" }, 0, 3],
     "Dual arm": [{ ...ARM, gain: 10 }, 1, 0.3],
     "Single arm": [{ ...ARM, sensor: "single" }, 0, 3],
-    "Common arm with a lead filter and a dead time": [{ ...ARM, sensor: "common", delay: 0.1,
+    "Common arm with lead filter": [{ ...ARM, sensor: "common", delay: 0.1,
       zeros: [[-0.02, 0]], poles: [[0, 0], [-0.1, 0]] }, 0, 1.5],
-    "The white paper's loop (modified dual)": [FLIGHT, 1, 2e-3],
+    "The white paper's loop": [FLIGHT, 1, 2e-3],
   };
   const SENSORS = [["single", "single arm"], ["common", "common arm"],
     ["difference", "difference of the arms"], ["dual", "dual"], ["modified", "modified dual"]];
@@ -350,7 +350,7 @@ function armlockPages() {
       const parts = [`${this.name}: ${count === undefined ? "counting \u2026" : counted(count)}`];
       if (root && count >= 0) parts.push(`rightmost root in rad/s: ${this.rootText(root)}; it `
         + `${root[0] < 0 ? "decays" : "grows"} by a factor of e in ${duration(1 / Math.abs(root[0]))}`);
-      this.out.textContent = `${parts.join("; ")}.${this.chart.held ? " Held: Escape releases it." : ""}`;
+      this.out.textContent = `${parts.join("; ")}.${this.chart.held ? " Held: Escape or a click on it releases it." : ""}`;
       this.list();
     }
 
@@ -383,7 +383,7 @@ function armlockPages() {
       if (!this.numbers.isConnected) return;
       const { designs } = this, wait = "\u2026";
       const or = (value, special, words, at) => Number.isNaN(value) ? "undecided" : value === special ? words
-        : `${say(value)}${at > 0 && at < Infinity ? ` at ${say(at / TURN)} Hz` : ""}`;
+        : `${say(value)}${at > 0 && at < Infinity ? ` at ${say(at / TURN)}\u00a0Hz` : ""}`;
       const broken = value => value === null ? "unstable at (1, 1)"
         : value === 0 ? "0: none is tolerated" : or(value, Infinity, "none up to 2");
       const of = (read, found) => designs.map(one => found(one) === undefined ? wait : read(found(one)));
@@ -448,7 +448,8 @@ function armlockPages() {
         moved(Number(input.value), false);
       } });
     input.value = value;
-    const label = element("label", { class: "live-field" }, element("span", {}, name, " ", shown), input);
+    // Without `for` it would be the label of the output.
+    const label = element("label", { class: "live-field", for: id }, element("span", {}, name, " ", shown), input);
     label.to = at => {
       const end = at > high ? 2 * at : high;
       [input.max, input.step] = [end, (end - low) / 200];
@@ -484,7 +485,8 @@ function armlockPages() {
 
   function legend() {
     return element("p", { class: "live-note" }, "Move over the chart for a preview. A click or a tap holds the point. "
-      + "The curve shows where a root lies on the imaginary axis, from low frequency (blue) to high (yellow). "
+      + "The curve shows where a root lies on the imaginary axis, from low frequency (blue) to high (yellow); "
+      + "on the straight line, a root is 0. "
       + "Cross: the ideal point (1, 1). Dot: the critical perturbation along (1, \u22121). Square, in small charts: "
       + "the paper\u2019s perturbations, up to 10\u207b\u2076. Dashed: the pinned loop.");
   }
@@ -595,6 +597,8 @@ function armlockPages() {
           [fields.zeros.value, fields.poles.value] = [above, under].map(part => written(
             api.rootsOf(part).map(root => root.map(v => Number(v.toPrecision(14))))));
           fields.pasted.value = "";
+          // Another loop is seen whole, and at the ideal point.
+          Object.assign(live.chart, { centre: [0, 0], half: 3, held: null });
         }
         const spec = read();
         wrong.textContent = "";
@@ -613,8 +617,8 @@ function armlockPages() {
         if (!moving) live.moved("loop");
       } catch (error) {
         // Too few poles are too many zeros: the field that was edited is the one to look at.
-        const name = error.field === "zeros" && edited === "poles" ? edited : fields[error.field] ? error.field : "sensor";
-        blame(name, error.message);
+        const name = error.field === "zeros" && edited === "poles" ? edited : error.field;
+        if (errors[name]) blame(name, error.message);
         wrong.textContent = error.message;
         undo.disabled = false;
         live.none("There is no loop to show, because a field has an error.");
@@ -646,9 +650,7 @@ function armlockPages() {
     const select = (name, title, options, changed) => {
       const made = choice(id(name), title, options, changed);
       fields[name] = made.querySelector("select");
-      errors[name] = element("span", { id: id(`${name}-wrong`), class: "live-wrong" });
-      fields[name].setAttribute("aria-describedby", id(`${name}-wrong`));
-      made.append(errors[name]);
+      made.classList.add("live-wide");
       return made;
     };
     /* Show another loop, with its view. Hertz where their numbers are shorter. */
@@ -682,9 +684,9 @@ function armlockPages() {
     const pasted = field("pasted", "Paste a controller from MATLAB or python-control", true);
     const inputs = element("form", { class: "live-form", onsubmit: event => event.preventDefault() },
       select("sensor", "Sensor", SENSORS, () => { shape(); take("sensor"); }),
-      field("gain", "Gain"),
+      field("gain", "Gain"), field("delay", "Dead time in s"),
       field("tau1", "Delay \u03c4\u2081 in s"), field("tau2", "Delay \u03c4\u2082 in s"),
-      field("delay", "Dead time in s"),
+      field("corner", "Corner p in Hz"), field("difference", "\u0394\u03c4 in s"),
       select("unit", "Unit of roots", [["1", "rad/s"], ["hz", "Hz"]], value => {
         // The loop stays what it is; the fields say it in the other unit.
         const { spec } = live;
@@ -692,7 +694,6 @@ function armlockPages() {
         if (spec) put(spec);
         take("unit");
       }),
-      field("corner", "Corner p in Hz"), field("difference", "\u0394\u03c4 in s"),
       field("zeros", "Zeros", true), field("poles", "Poles", true));
     fields.pasted.placeholder = "(s + 0.02)/(s^2 + 0.1 s)";
 
@@ -740,10 +741,9 @@ function armlockPages() {
 
     const [nyquist, bode] = live.plots;
     place.replaceChildren(element("div", { class: "live-own" },
-      element("div", { class: "live-top" }, element("div", { class: "live-start" }, preset, undo),
-        wrong, gain, dead),
+      element("div", { class: "live-top" }, preset, wrong, gain, dead),
       element("div", { class: "live-main" }, figures(live.figure, nyquist.figure),
-        tools(live, "loop", button("Paper\u2019s square", () => live.chart.show([1, 1], 3e-6)),
+        tools(live, "loop", undo, button("Paper\u2019s square", () => live.chart.show([1, 1], 3e-6)),
           button("Whole", () => live.chart.show([0, 0], 3))), live.note, bode.figure, live.following, live.numbers),
       element("div", { class: "live-fields" }, pasted,
         element("figure", {}, element("figcaption", {}, "Drag a pole (\u00d7) or a zero (\u25cb)"), roots.canvas),

@@ -19,7 +19,7 @@ const armlockText = (function () {
 
   function scientific(number, digits) {
     const [factor, exponent] = number.toExponential(digits).split("e");
-    return `${factor} \u00d7 ${power(Number(exponent))}`;
+    return `${factor}\u00a0\u00d7\u00a0${power(Number(exponent))}`;
   }
 
   function power(exponent) {
@@ -159,9 +159,9 @@ const armlockText = (function () {
     return found;
   }
 
-  /* The real coefficients of a polynomial, the highest power first. */
+  /* The real coefficients of a polynomial, the highest power first. The product of a conjugate pair is rounded. */
   function real(polynomial, refuse) {
-    if (polynomial.some(([, im]) => im !== 0)) refuse();
+    if (polynomial.some(([re, im]) => Math.abs(im) > 1e-12 * Math.abs(re))) refuse();
     return polynomial.map(([re]) => re).reverse();
   }
 
@@ -173,15 +173,19 @@ const armlockText = (function () {
     return Object.assign(new RangeError(message), { field });
   }
 
+  function refuseCommas(field, plain) {
+    const comma = /[-+]?\d+,\d+/.exec(plain);
+    if (comma)
+      throw wrong(field, `Write decimals with a point, and a space after the comma between two numbers: ${comma[0]} `
+        + "could be either.");
+  }
+
   /* The elements of a list as MATLAB or Python print it: [..], array(..), columns, a common
    * factor in front. A sign with a space on both sides belongs inside of an element. */
   function elements(field, text) {
     let plain = plainSigns(text).replace(/\+\/-/g, "\u00b1").replace(/(np\.|numpy\.)?array\s*\(\s*\[/g, " ")
       .replace(/\]\s*(,\s*dtype=\w+\s*)?\)/g, " ");
-    const comma = /[-+]?\d+,\d+/.exec(plain);
-    if (comma)
-      throw wrong(field, `Write decimals with a point, and a space after the comma between two `
-        + `numbers: ${comma[0]} could be either.`);
+    refuseCommas(field, plain);
     let factor = 1;
     const scale = /^[\s=a-z]*((?:\d+\.?\d*)e[+-]?\d+)\s*\*\s*\n/i.exec(plain);
     if (scale) [factor, plain] = [Number(scale[1]), plain.slice(scale[0].length)];
@@ -217,7 +221,7 @@ const armlockText = (function () {
   }
 
   // tf(numerator, denominator, ...), its coefficients as one number or in brackets.
-  const CALL = /\b(?:tf|TransferFunction)\s*\(\s*(?:[\w.]*array\()?(\[[^[\]]*\]|[-+\d.e]+)\)?\s*,\s*(?:[\w.]*array\()?(\[[^[\]]*\]|[-+\d.e]+)(.*)/is;
+  const CALL = /\b(?:tf|TransferFunction\w*)\s*\(\s*(?:[\w.]*array\()?(\[[^[\]]*\]|[-+\d.e]+)\)?\s*,\s*(?:[\w.]*array\()?(\[[^[\]]*\]|[-+\d.e]+)(.*)/is;
 
   /* Numerator and denominator of a controller, the highest power first. It is written as a fraction over a
    * line of dashes, as MATLAB and python-control print it, as tf([1 0.02], [1 0.1 0]), or as an expression. */
@@ -227,14 +231,13 @@ const armlockText = (function () {
         || "write it such as (s + 0.02)/(s^2 + 0.1 s) or tf([1 0.02], [1 0.1 0])"}.`);
     };
     const none = () => refuse();
-    const plain = plainSigns(text).replace(/^\s*\w+\s*=(?=\s*\S)/, ""), comma = /\d+,\d+/.exec(plain);
-    const given = CALL.exec(plain);
-    if (/\bdt\s*=|sample time|discrete|\bz\b/i.test(plain) || /^\)?\s*,\s*\d/.test(given?.[3]))
+    const plain = plainSigns(text).replace(/^\s*\w+\s*=(?=\s*\S)/, ""), given = CALL.exec(plain);
+    if (/\bdt\s*[=:](?!\s*None)|sample time|discrete|\bz\b/i.test(plain) || /^\)?\s*,\s*\d/.test(given?.[3]))
       refuse("it is discrete in time");
     if (/exp/i.test(plain)) refuse("write its dead time into the field of the dead time");
     if (given) return given.slice(1, 3).map(part => elements(field, part)[0].map(
       entry => constant(parse(entry, none), none)[0]));
-    if (comma) throw wrong(field, `Write decimals with a point, not as in ${comma[0]}.`);
+    refuseCommas(field, plain);
     // Without headings and remarks, which have words or signs that no polynomial has.
     const parts = plain.split(/\n[ \t]*-+[ \t]*(?=\n)|\s*\/?\s*-{3,}\s*\/?\s*/).map(part => part.split("\n")
       .filter(line => !/[:=<>'[\]]|[a-z]{3,}/i.test(line)).join(" "));
@@ -247,7 +250,7 @@ const armlockText = (function () {
   /* One real number; `name` is the field's own. */
   function readNumber(field, text, name) {
     const plain = plainSigns(text.trim());
-    if (/\d,\d/.test(plain)) throw wrong(field, `Write ${name} with a decimal point, not as ${plain}.`);
+    refuseCommas(field, plain);
     const refuse = () => {
       throw wrong(field, `${name} must be a number, got ${plain ? `\u201c${plain}\u201d` : "nothing"}.`);
     };
