@@ -147,8 +147,8 @@ class _Search:
     def first_line(self) -> float:
         """Return a line just right of the limit of a neutral chain, or -inf without a chain.
 
-        The limit is where delayed terms of the highest power are as large as the one that
-        nothing delays.
+        At the limit, the delayed terms of the highest power are together as large as the term
+        of this power that nothing delays. Left of it no count is decided.
         """
         still, turned = self.function.space.limits(*self.function.weights)
         delays, sizes = self.function.space.arrays.delays, np.abs(turned)
