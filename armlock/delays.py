@@ -10,8 +10,10 @@ way; `DelaySystem.of` gives its open loop.
 from __future__ import annotations
 
 import sys
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -70,7 +72,7 @@ class QuasiPolynomial:
         shown = []
         for theta, p in self.terms:
             powers = [
-                f"{float(c):+.6g}" + ("", " s", f" s^{k}")[min(k, 2)]
+                f"{_printable(c):+.6g}" + ("", " s", f" s^{k}")[min(k, 2)]
                 for k, c in enumerate(p)
                 if c
             ]
@@ -92,11 +94,12 @@ class QuasiPolynomial:
         for theta, p in self.parts:
             yield p[-1], _polynomial(tuple(value / p[-1] for value in p)), theta
 
-    def __call__(self, s: ComplexArray) -> ComplexArray:
-        """Evaluate at s."""
+    def at(self, s: ComplexArray, unit: Fraction, size: Fraction) -> ComplexArray:
+        """Evaluate at s, over a size, by coefficients of powers of s / unit."""
         found = np.zeros_like(s)
         for theta, coefficients in self.parts:
-            value = poly.polyval(s, [float(c) for c in coefficients])
+            scaled = [float(c * unit**k / size) for k, c in enumerate(coefficients)]
+            value = poly.polyval(s / float(unit), scaled)
             found += value * np.expm1(-s * float(theta)) if theta else value
         return found
 
@@ -106,6 +109,13 @@ class QuasiPolynomial:
             (theta, Fraction(float(np.exp(-sigma * float(theta)))) * moved(p, sigma))
             for theta, p in self.terms
         )
+
+
+def _printable(value: Fraction) -> float | Decimal:
+    """Return a number that prints as the fraction does, which may be no float."""
+    if 1e-300 < abs(value) < 1e300:
+        return float(value)
+    return Decimal(value.numerator) / value.denominator
 
 
 def moved(coefficients: _Coefficients, sigma: float) -> Any:
@@ -151,7 +161,7 @@ def _polynomial(coefficients: _Coefficients) -> Polynomial:
 _ONE = QuasiPolynomial(((Fraction(0), (Fraction(1),)),))
 
 
-class WithDelays:
+class WithDelays(ABC):
     """What all systems with delays have: arithmetic, feedback and a frequency response.
 
     Functions of python-control refuse them with advice, because its systems have no delays.
@@ -244,16 +254,17 @@ class WithDelays:
         back = DelaySystem.of(-sign).numerator
         return DelaySystem(n1 * m2, m1 * m2 + back * n1 * n2)
 
+    @abstractmethod
     def __call__(self, s: npt.ArrayLike) -> ComplexArray:
         """Evaluate at s in rad/s."""
-        raise NotImplementedError
 
+    @abstractmethod
     def open_loop(self) -> DelaySystem:
         """Return the system as numerator and denominator."""
-        raise NotImplementedError
 
     def update_names(self, **names: Any) -> None:
         """Keep no names of signals, so that ``control.series`` takes the system."""
+        return
 
     def isdtime(self, strict: bool = False) -> bool:
         """Whether time is discrete: it is not. So python-control's plots take the system."""
@@ -342,8 +353,8 @@ class DelaySystem(WithDelays):
         "control.bode_plot(system.frequency_response(omega)) or "
         "armlock.nyquist(system, omega_max=omega_max).plot(), for a closed loop "
         "DelaySystem.of(plant).feedback(back), for a quotient DelaySystem.of(plant) / system, "
-        "for responses armlock.step_response(system, timepts), for margins "
-        "armlock.margins(loop), for poles armlock.rightmost_root(loop)"
+        "for responses armlock.step_response(system, timepts), for the DC gain system(0), for "
+        "margins armlock.margins(loop), for poles armlock.rightmost_root(loop)"
     )
 
     def __post_init__(self) -> None:
@@ -418,8 +429,15 @@ class DelaySystem(WithDelays):
     def __call__(self, s: npt.ArrayLike) -> ComplexArray:
         """Evaluate at s in rad/s, of any shape."""
         s = complex_array("s", s)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            value: ComplexArray = self.numerator(s) / self.denominator(s)
+        # In a unit as large as the roots of M: powers of many fast poles would overflow.
+        _, p = max(self.denominator.terms, key=lambda term: len(term[1]))
+        ratio = abs(next(c for c in p if c) / p[-1])
+        bits = ratio.numerator.bit_length() - ratio.denominator.bit_length()
+        unit = Fraction(2) ** (bits // max(len(p) - 1, 1))
+        size = abs(p[-1]) * unit ** (len(p) - 1)
+        with np.errstate(all="ignore"):
+            n, m = (f.at(s, unit, size) for f in (self.numerator, self.denominator))
+            value: ComplexArray = n / m
         return value
 
     @cached_property

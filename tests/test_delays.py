@@ -22,6 +22,7 @@ from armlock import (
     step_response,
     unstable_roots,
 )
+from armlock.delays import WithDelays
 from armlock.sensors import dual
 from tests.dense_judge import compared, drawn
 
@@ -235,3 +236,17 @@ def test_a_response_is_drawn_by_python_control():
     axes = found.plot().axes
     assert axes.shape == (1, 1)
     np.testing.assert_array_equal(axes[0, 0].lines[0].get_ydata(), found.outputs)
+
+
+def test_many_fast_poles_overflow_neither_in_values_nor_in_print():
+    lag = DelaySystem.of(control.tf([1e9], [1.0, 1e9]))
+    system = math.prod([lag] * 40) * delay(1e-9)
+    s = np.array([0.0, 1e9j, 2e9j])
+    assert system(s) == pytest.approx((1.0 + s / 1e9) ** -40.0 * np.exp(-1e-9 * s), rel=1e-12)
+    assert "s^39" in str(system)
+    assert "+1.00000e+360" in str(system)
+
+
+def test_a_kind_of_system_needs_a_value_and_an_open_loop():
+    with pytest.raises(TypeError, match="abstract"):
+        type("Nothing", (WithDelays,), {})()

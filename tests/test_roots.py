@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from scipy.optimize import brentq
 from scipy.special import lambertw
 
 from armlock import (
@@ -154,6 +155,20 @@ def test_a_root_that_cannot_be_certified_is_refused_at_once():
     assert str(again) == str(caught.value)
 
 
+def test_a_neutral_loop_whose_roots_tend_to_the_limit_of_the_chain_is_refused_soon():
+    # The four delays have no common period, so that no root comes close to the limit.
+    delays = np.sqrt([0.1, 2.0, 3.0, 10.0])
+    loop = sum(control.tf([0.2, 1.0], [1.0, 5.0]) * delay(theta) for theta in delays)
+    limit = brentq(lambda x: 0.2 * np.exp(-x * delays).sum() - 1.0, -5.0, 5.0)
+    begun = time.process_time()
+    with pytest.raises(RootError, match="the limit to which neutral root chains tend") as error:
+        rightmost_root(loop)
+    assert time.process_time() - begun < 10.0
+    named = float(str(error.value).split("Re s = ")[1].split(",")[0])
+    assert named == pytest.approx(limit, rel=1e-5)
+    assert error.value.estimate.real < limit
+
+
 def test_a_map_without_memory_has_no_root():
     with pytest.raises(ValueError, match=r"^the parameters must leave a loop with roots"):
         rightmost_root(DEADBEAT, 0.0, 0.0)
@@ -228,6 +243,15 @@ def test_a_multiple_root_is_found(poles):
     root = complex(poles[0])
     assert abs(rightmost_root(loop, 0.4, 0.4) - root) < 1e-15
     assert rightmost_root(loop, 0.4, 0.4).real == root.real
+
+
+def test_a_multiple_root_with_rounded_coefficients_is_a_cluster():
+    # (s + 0.1)^4: four roots about 1e-5 from one another are those of the floats.
+    p = [1.0, 0.4, 0.06, 0.004, 0.0001]
+    root = rightmost_root(DelaySystem.of(control.tf(p, [1.0, 2.0, 1.0, 4.0, 3.0])) - 1)
+    with mpmath.workdps(60):
+        exact = mpmath.polyroots(p[::-1], maxsteps=500, extraprec=500, asc=True)
+        assert abs(root - max(exact, key=lambda s: s.real)) < 1e-15
 
 
 def test_a_double_real_root_of_a_loop_with_delays():

@@ -29,12 +29,17 @@ _FEW_STEPS, _MANY_STEPS = 200_000, 2_000_000
 # The search for one zero ends once it has cost so many steps, some five seconds.
 _ALL_STEPS = 4e6
 # Most points of one line, and from how many of them Newton's method starts.
-_MOST_POINTS, _MOST_STARTS = 1_000_000, 1000
+_MOST_POINTS, _MOST_STARTS = 500_000, 1000
+# The line next to the limit of a neutral chain has been searched with so many points.
+_ENOUGH_POINTS = 200_000
+# Steps of Newton's method for that limit.
+_LIMIT_STEPS = 30
 # A line is followed up to where zeros can lie right of it, and so many turns of the longest
 # delay further, but at first no longer than 1000 times that; with each line twice as far.
 _TURNS_FURTHER, _MOST_TURNS_FURTHER = 4.0, 3e4
-# Steps of Newton's method: in double precision, and most in extended precision.
-_STEPS, _EXTENDED_STEPS = 12, 100
+# Steps of Newton's method: in double precision, and most in extended precision, up to so many
+# of which may be those for a multiple zero.
+_STEPS, _EXTENDED_STEPS, _MULTIPLE_STEPS = 12, 100, 50
 # Most zeros near a line that are tried in extended precision.
 _MOST_TRIED = 8
 # Zeros down to so many times one over the longest delay are looked for in steps of their size.
@@ -77,7 +82,7 @@ def _polished(function: Function, common: int, start: complex) -> complex | None
         # From a start on the real axis the method would never lead to a pair next to it.
         s, last = mpmath.mpc(start) * (1 + 1e-9j), mpmath.inf
         digits = mpmath.mpf(10) ** -_DIGITS
-        for _ in range(_EXTENDED_STEPS):
+        for step in range(_EXTENDED_STEPS):
             value, slope = function.exact_value_and_slope(s)
             if common and s == 0:
                 return None
@@ -87,9 +92,11 @@ def _polished(function: Function, common: int, start: complex) -> complex | None
             if slope == 0:
                 return None
             move = 1 / slope
-            # Next to a zero of order m each step goes 1 / m of the way that is left.
+            # Next to a zero of order m each step goes 1 / m of the way that is left. Of a
+            # cluster of m zeros longer steps would miss all, so that the last steps are short.
             share, last = abs(move) / last, abs(move)
-            s -= move * (mpmath.nint(1 / (1 - share)) if 0.4 < share < 0.9 else 1)
+            multiple = 0.4 < share < 0.9 and step < _MULTIPLE_STEPS
+            s -= move * (mpmath.nint(1 / (1 - share)) if multiple else 1)
             # To a zero at s = 0, of which the digits never settle, the method goes straight.
             if abs(s) < mpmath.eps**2:
                 s = mpmath.mpc(0)
@@ -119,7 +126,7 @@ class _Search:
     def __init__(self, function: Function, common: int) -> None:
         self.function, self.common, self.steps = function, common, 0.0
         self.unit = 1.0 / function.space.longest
-        self.further = _TURNS_FURTHER
+        self.further, self.points = _TURNS_FURTHER, 0
 
     def _line(self, sigma: float) -> _Line:
         """Return the function on the line Re s = sigma."""
@@ -132,6 +139,36 @@ class _Search:
         acting = float(space.arrays.delays[delayed[0].any(axis=0)].max(initial=0.0))
         turn = 2.0 * np.pi / (acting or space.longest)
         return _Line(space, functions, end, turn)
+
+    def fine(self, root: complex) -> float:
+        """How far right of a zero no other one lies, at most."""
+        return _FINE * max(abs(root.real), self.unit)
+
+    def first_line(self) -> float:
+        """Return a line just right of the limit of a neutral chain, or -inf without a chain.
+
+        At the limit, the delayed terms of the highest power are together as large as the term
+        of this power that nothing delays. Left of it no count is decided.
+        """
+        still, turned = self.function.space.limits(*self.function.weights)
+        delays, sizes = self.function.space.arrays.delays, np.abs(turned)
+        if self.function.space.step or not sizes.any():
+            return -np.inf
+        if still == 0.0:
+            return np.inf
+        delays, sizes = delays[sizes > 0.0], sizes[sizes > 0.0] / abs(still)
+        limit = 0.0
+        # The logarithm of the sum is convex, so that Newton's method leads to its only zero.
+        for _ in range(_LIMIT_STEPS):
+            logs = np.log(sizes) - delays * limit
+            whole = np.logaddexp.reduce(logs)
+            limit += float(whole / (np.exp(logs - whole) @ delays))
+        if limit < -_LARGEST_EXPONENT * self.unit:
+            return -np.inf
+        step = 0.25 * self.fine(limit)
+        while not np.isfinite(self._line(limit + step).end):
+            step *= 2.0
+        return limit + step
 
     def count(self, sigma: float, most: int) -> int:
         """Count the zeros right of a line; below zero where that is not decided."""
@@ -166,15 +203,14 @@ class _Search:
         Of these it is the one of lowest frequency.
         """
         line = self._line(sigma)
-        if not np.isfinite(line.end):
-            return None
         end = line.end
         if not line.space.step:
             end = min(end, 1e3 * self.further * line.turn)
             end += self.further * line.turn
         begin = 1e-3 * _SLOWEST * line.turn
         grid, move = inclusion.resolved(line.functions, begin, end, _MOST_POINTS)
-        self.steps += grid.size
+        self.points = grid.size
+        self.steps += self.points
         s, length = self._moved(sigma + 1j * grid, move)
         # From where a step of Newton's method is locally shortest: no zero close to the line
         # lies between two of its points.
@@ -205,7 +241,7 @@ class _Search:
     def certified(self, root: complex, equal: float) -> complex | None:
         """Return the root, or one between it and a line without zeros on its right, or None."""
         finest = _FINEST * max(abs(root), self.unit)
-        fine = max(finest, _FINE * max(abs(root.real), self.unit))
+        fine = max(finest, self.fine(root))
         count = self.count(equal + finest, _FEW_STEPS)
         if count < 0:
             count = self.count(equal + fine, _MANY_STEPS)
@@ -277,31 +313,41 @@ def rightmost_zero(function: Function, common: int = 0) -> complex:
         return _without_delay(function, common)
     search, best = _Search(function, common), complex(np.nan, np.nan)
     # There are zeros right of `low`, as far as is decided, and none right of `high`.
-    low, high, sigma, width = -np.inf, np.inf, 0.0, search.unit
-    small = _SLOWEST * search.unit
-    while (
-        search.steps < _ALL_STEPS
-        and sigma not in (low, high)
-        and sigma > -_LARGEST_EXPONENT * search.unit
-    ):
+    first = search.first_line()
+    low, high, sigma, width = -np.inf, np.inf, max(0.0, first), search.unit
+    small, why = _SLOWEST * search.unit, ""
+    while search.steps < _ALL_STEPS and -_LARGEST_EXPONENT * search.unit < sigma < np.inf:
         found = search.near(sigma)
-        search.further = min(2.0 * search.further, _MOST_TURNS_FURTHER)
         # Next to the limit of a chain no count tells that zeros lie right of `low`.
-        if found and found[0].real + _FINE * max(abs(found[0].real), search.unit) > low:
+        if found and found[0].real + search.fine(found[0]) > low:
             best = found[0]
             root = search.certified(*found)
             if root is not None:
                 return root
             low = max(low, best.real)
-        if sigma > low:
+        if low < sigma < high:
             if search.count(sigma, _MANY_STEPS) == 0:
                 high = sigma
             else:
                 low = sigma
+        if high == first and search.points > _ENOUGH_POINTS:
+            why = (
+                f": no root lies right of Re s = {first:.6g}, the limit to which neutral root "
+                "chains tend"
+            )
+            break
+        search.further = min(2.0 * search.further, _MOST_TURNS_FURTHER)
         if low > -np.inf and high < np.inf:
             # Zeros next to the axis may be slower than the delays by many decades.
             sigma = float(small * np.sinh(0.5 * sum(np.arcsinh(np.array([low, high]) / small))))
         else:
             sigma = low + width if low > -np.inf else high - width
             width *= 4.0
-    raise RootError(f"no rightmost root could be certified; the best candidate is {best}", best)
+        # No zero is known between the limit of a chain and `high`.
+        if -np.inf < low < first or sigma < first:
+            sigma = first
+        elif sigma in (low, high):
+            break
+    raise RootError(
+        f"no rightmost root could be certified{why}; the best candidate is {best}", best
+    )

@@ -74,8 +74,9 @@ def rightmost_root(
     the first m.
 
     The real parts on a neutral root chain may tend to a limit that none of them reaches. Where
-    no root lies right of it, a root up to m left of the limit is returned. Without a delay the
-    roots are those of a polynomial, and nothing is counted.
+    no root lies right of it, a root up to m left of the limit is returned. If none is found
+    there, the error names the limit. Without a delay the roots are those of a polynomial, and
+    nothing is counted.
 
     For the Hayes equation it is, with the principal branch of Lambert's function,
 
