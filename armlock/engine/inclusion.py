@@ -47,7 +47,8 @@ _DEEPEST = 300
 # The goals of a search, see `_aim`.
 DISTANCE, PHASE, DELAY, REAL = range(4)
 
-_inner = njit(nogil=True, error_model="numpy", inner=True)
+_inner = njit(nogil=True, error_model="numpy", inner=True, allocates=False)
+_maker = njit(nogil=True, error_model="numpy", inner=True)
 _entry = njit(nogil=True, error_model="numpy")
 
 
@@ -125,7 +126,7 @@ class Workspace(NamedTuple):
     b: FloatArray
 
 
-@_inner
+@_maker
 def workspace(space: Arrays, functions: int) -> Workspace:
     """Return a workspace for so many functions."""
     j, k = space.lead.size, space.delays.size
@@ -148,6 +149,13 @@ def workspace(space: Arrays, functions: int) -> Workspace:
         np.zeros(ORDER, np.complex128),
         np.zeros(ORDER + 1),
     )
+
+
+@_inner
+def _size(z: complex) -> float:
+    """Magnitude of a complex number; `abs` takes three times as long."""
+    square = z.real * z.real + z.imag * z.imag
+    return float(np.sqrt(square)) if 1e-280 < square < 1e300 else abs(z)
 
 
 @_inner
@@ -178,7 +186,7 @@ def _expand_piece(space: Arrays, m: float, r: float, work: Workspace) -> None:
                 p[0] *= w
                 if space.computed[j, k]:
                     # What is missed is a share of the product of abs(s) + abs(root).
-                    missed *= (m + r + abs(z)) * f / size
+                    missed *= (m + r + _size(z)) * f / size
             else:
                 for i in range(ORDER):
                     p[i] *= f
@@ -187,16 +195,20 @@ def _expand_piece(space: Arrays, m: float, r: float, work: Workspace) -> None:
             if bound[0] > _HUGE or 0.0 < bound[0] < 1.0 / _HUGE:
                 by = 1.0 / _HUGE if bound[0] > 1.0 else _HUGE
                 shift += 1 if bound[0] > 1.0 else -1
-                p *= by
-                bound *= by
+                for i in range(ORDER):
+                    p[i] *= by
+                    bound[i] *= by
+                bound[ORDER] *= by
         work.error[j] = 8.0 * (n + 1) * EPSILON + missed
         work.shift[j] = shift
         top = shift if j == 0 else max(top, shift)
     for j in range(space.lead.size):
         if work.shift[j] != top:
             by = _HUGE ** float(max(work.shift[j] - top, -2))
-            work.piece_p[j] *= by
-            work.piece_bound[j] *= by
+            for i in range(ORDER):
+                work.piece_p[j, i] *= by
+                work.piece_bound[j, i] *= by
+            work.piece_bound[j, ORDER] *= by
 
 
 # Two pi in three parts, of which the first two have 27 digits: their products with a number of
@@ -325,10 +337,10 @@ def _bracket(
             work.g[i] += weight * work.turn[k, i]
             power *= x / (i + 1)
         work.b[ORDER] += power
-        wrong += size * few * (abs(work.turn[k, 0]) + 6.0 * grown)
+        wrong += size * few * (_size(work.turn[k, 0]) + 6.0 * grown)
         wrong += size * work.slip[k] * (1.0 + grown)
     for i in range(ORDER - 1, -1, -1):
-        work.b[i] = abs(work.g[i]) + (i + 1) * work.b[i + 1]
+        work.b[i] = _size(work.g[i]) + (i + 1) * work.b[i + 1]
     return used, wrong
 
 
@@ -411,7 +423,7 @@ def _divide(c: ComplexArray, by: ComplexArray, quotient: ComplexArray) -> float:
         if n < ORDER:
             quotient[n] = v / by[0]
         else:
-            left += abs(v)
+            left += _size(v)
     return left
 
 
@@ -430,14 +442,17 @@ def _least(
             q[i] = c[i] * turned
     else:
         # The quotient rounds by less than 64 EPSILON.
-        off = (_divide(c, along, q) + 64.0 * EPSILON * np.abs(c).sum()) / gamma
+        off = _divide(c, along, q)
+        for i in range(ORDER):
+            off += 64.0 * EPSILON * _size(c[i])
+        off /= gamma
     if vertex:
         for i in range(2, ORDER):
             off += abs(q[i].real)
         return (q[0] - q[1]).real - off, (q[0] + q[1]).real - off
     for i in range(2, ORDER):
-        off += abs(q[i])
-    return -abs(q[0] - q[1]) - off, -abs(q[0] + q[1]) - off
+        off += _size(q[i])
+    return -_size(q[0] - q[1]) - off, -_size(q[0] + q[1]) - off
 
 
 class Members(NamedTuple):
@@ -451,7 +466,7 @@ class Members(NamedTuple):
     q: ComplexArray  # (ORDER,)
 
 
-@_inner
+@_maker
 def members(kind: IntArray, delays: int) -> Members:
     """Return room for members of these kinds."""
     size = kind.size
@@ -477,7 +492,8 @@ def mix(weights: ComplexArray, work: Workspace, room: Members, n: int) -> None:
                 if _acts(work.f[f], k):
                     for i in range(ORDER):
                         room.v[n, k, i] += a * work.f[f, k, i]
-            room.rest[n] += abs(a) * (work.rest[f] + 4.0 * EPSILON * abs(work.f[f, 0, 0]))
+            size = _size(a)
+            room.rest[n] += size * (work.rest[f] + 4.0 * EPSILON * _size(work.f[f, 0, 0]))
 
 
 @_inner
@@ -514,14 +530,14 @@ def excludes_zero(room: Members) -> int:
     for n in range(room.kind.size):
         if room.kind[n] == 2:
             for k in range(room.v.shape[1]):
-                common += abs(room.v[n, k, 0])
+                common += _size(room.v[n, k, 0])
     turned, low, high, last, own = 1.0 + 0j, 10.0, -10.0, 0, 0.0
     for n in range(room.kind.size):
         if room.kind[n] != 1:
             continue
-        size, own = abs(room.v[n, 0, 0]), common
+        size, own = _size(room.v[n, 0, 0]), common
         for k in range(1, room.v.shape[1]):
-            own += abs(room.v[n, k, 0])
+            own += _size(room.v[n, k, 0])
         if not own < size < np.inf:
             return 0
         if vertices == 0:
@@ -545,16 +561,17 @@ def excludes_zero(room: Members) -> int:
         direction = turned * complex(np.cos(middle), np.sin(middle))
     else:
         direction = 0j
-    size = abs(direction)
+    size = _size(direction)
     if size > 0.0:
         room.along[0] = direction / size
         if _holds(room, 0.0):
             return 1
-    gamma = (1.0 - 16.0 * EPSILON) * abs(slow[0])
+    gamma = (1.0 - 16.0 * EPSILON) * _size(slow[0])
     for i in range(1, ORDER):
-        gamma -= abs(slow[i])
+        gamma -= _size(slow[i])
     if gamma > 0.0 and (vertices > 1 or own > 0.0):
-        room.along[:] = slow
+        for i in range(ORDER):
+            room.along[i] = slow[i]
         if _holds(room, gamma):
             return 2
     return 0
@@ -611,7 +628,7 @@ def _test_holds(
     return False
 
 
-@_inner
+@_maker
 def _arc_holds(
     question: Question,
     level: float,
@@ -854,7 +871,7 @@ def _crossing(
     return value, omega
 
 
-@_inner
+@_maker
 def _candidate(
     functions: Functions,
     question: Question,
@@ -981,7 +998,7 @@ class Shared(NamedTuple):
     products: ComplexArray  # (3, 2 ORDER - 1): the functions times the conjugate of M = f_2
     sizes: FloatArray  # (3,): most of the functions, but for their remainders
     least: float  # least of M; negative where this is not known
-    z: ComplexArray  # (2 ORDER - 1): room for a row
+    z: ComplexArray  # (2 ORDER - 1): N conj M of the row that is looked at
     ends: FloatArray  # (2, 2): Im(f_0 conj M) and Im(f_1 conj M) at both ends; nan before
 
 
@@ -993,15 +1010,14 @@ class Row(NamedTuple):
     upper: float
     size: float  # most of N, but for its remainder
     rest: float
-    z: ComplexArray  # (2 ORDER - 1): N conj M
-    off: float  # its error
+    off: float  # error of N conj M, which is z of what is shared
 
 
 # What is known of a row on an interval: no zero, one at most, not enough; or rounding hides it.
 _NONE, _ONE, _OPEN, _HIDDEN = range(4)
 
 
-@_inner
+@_maker
 def _share(
     space: Arrays, interval: tuple[float, float, float, float], around: bool, work: Workspace
 ) -> Shared:
@@ -1009,7 +1025,7 @@ def _share(
     products, sizes = np.zeros((3, 2 * ORDER - 1), np.complex128), np.zeros(3)
     for f in range(3):
         for i in range(ORDER):
-            sizes[f] += abs(work.f[f, 0, i])
+            sizes[f] += _size(work.f[f, 0, i])
             for k in range(ORDER):
                 products[f, i + k] += work.f[f, 0, i] * work.f[2, 0, k].conjugate()
     low, high, m, r = interval
@@ -1017,12 +1033,12 @@ def _share(
     for k in range(space.delays.size):
         fast |= work.lead[k] >= 0
         long |= space.delays[k] * r > _LONG
-    least = -1.0 if fast else 2.0 * abs(work.f[2, 0, 0]) - sizes[2] - work.rest[2]
+    least = -1.0 if fast else 2.0 * _size(work.f[2, 0, 0]) - sizes[2] - work.rest[2]
     z, ends = np.zeros(2 * ORDER - 1, np.complex128), np.full((2, 2), np.nan)
     return Shared(low, high, m, r, around, fast, long, products, sizes, least, z, ends)
 
 
-@_inner
+@_maker
 def _rows_exclude_zero(rows: Rows, here: IntArray, work: Workspace, room: Members) -> bool:
     """Whether zero is in none of some rows, for any x that counts."""
     y0, y1, x0, x1 = np.inf, -np.inf, np.inf, -np.inf
@@ -1050,13 +1066,13 @@ def _row(rows: Rows, row: int, shared: Shared, work: Workspace) -> Row:
     size = shared.sizes[0] + abs(y) * shared.sizes[1]
     rest = work.rest[0] + abs(y) * work.rest[1]
     off = (rest + 32.0 * EPSILON * size) * size_m + rest_m * (size + rest)
-    return Row(y, rows.lower[row], rows.upper[row], size, rest, z, off)
+    return Row(y, rows.lower[row], rows.upper[row], size, rest, off)
 
 
 @_inner
 def _is_outside(row: Row, shared: Shared, work: Workspace) -> bool:
     """Whether Re(N / M) is below `lower` or above `upper` on the whole interval."""
-    z, square, size_m = row.z, shared.products[2], shared.sizes[2]
+    z, square, size_m = shared.z, shared.products[2], shared.sizes[2]
     above = (z[0] - row.upper * square[0]).real
     below = (z[0] - row.lower * square[0]).real
     for k in range(1, z.size):
@@ -1071,14 +1087,14 @@ def _is_outside(row: Row, shared: Shared, work: Workspace) -> bool:
 def _decide(row: Row, shared: Shared, work: Workspace) -> tuple[int, float]:
     """Tell what is known of h = Im(N conj M), and its least slope if it is monotonic."""
     varied, bent, everywhere = 0.0, 0.0, row.upper == np.inf
-    for k in range(1, row.z.size):
-        varied += abs(row.z[k].imag)
-        bent += k * abs(row.z[k].imag) if k > 1 else 0.0
-    middle = abs(row.z[0].imag)
+    for k in range(1, shared.z.size):
+        varied += abs(shared.z[k].imag)
+        bent += k * abs(shared.z[k].imag) if k > 1 else 0.0
+    middle = abs(shared.z[0].imag)
     if middle > varied + row.off or (not everywhere and _is_outside(row, shared, work)):
         return _NONE, 0.0
     # Errors of the coefficients, and that of the remainder's slope (Lemma 18).
-    slope = abs(row.z[1].imag) - bent - 10.0 * row.off
+    slope = abs(shared.z[1].imag) - bent - 10.0 * row.off
     if slope > 0.0 and (shared.least > 0.0 or everywhere):
         return _ONE, slope
     settled = middle + varied <= 2.0 * row.off
@@ -1133,11 +1149,11 @@ def _locate(
     have another common factor, from which h over |N|^2 + |M|^2 is free (Lemma 18).
     """
     size_m, rest_m = shared.sizes[2], work.rest[2]
-    t, slope = (0.0, row.z[1].imag) if shared.around else _zero_of_polynomial(row.z)
+    t, slope = (0.0, shared.z[1].imag) if shared.around else _zero_of_polynomial(shared.z)
     f, g = _at(work.f[0, 0], t) - row.y * _at(work.f[1, 0], t), _at(work.f[2, 0], t)
     rough = min(2.0 * row.off / least_slope, 2.0)
     off_t = rough
-    slope /= abs(f) ** 2 + abs(g) ** 2
+    slope /= _size(f) ** 2 + _size(g) ** 2
     least_slope /= (row.size + row.rest) ** 2 + (size_m + rest_m) ** 2
     x, spread, before, at = 0.0, np.inf, 0.0, 0.0
     for step in range(8):
@@ -1175,14 +1191,14 @@ def _hidden(row: Row, shared: Shared, work: Workspace) -> tuple[float, float]:
     """Return around which x zeros may lie on an interval, and how far from it."""
     if not shared.least > 0.0:
         return 0.0, np.inf
-    x = row.z[0].real / shared.products[2, 0].real
+    x = shared.z[0].real / shared.products[2, 0].real
     reach = row.off + 3.0 * abs(x) * shared.sizes[2] * work.rest[2]
-    for k in range(1, row.z.size):
-        reach += abs(row.z[k].real - x * shared.products[2, k].real)
+    for k in range(1, shared.z.size):
+        reach += abs(shared.z[k].real - x * shared.products[2, k].real)
     return x, 1.01 * reach / (shared.least * shared.least)
 
 
-@_inner
+@_maker
 def _append(table: FloatArray, n: int, entry: tuple[float, ...]) -> FloatArray:
     """Return a table with entry n, for which room is made."""
     if n == table.shape[0]:
@@ -1220,7 +1236,7 @@ def _cut_around(stack: FloatArray, top: int, low: float, m: float, r: float) -> 
     return True
 
 
-@_inner
+@_maker
 def _follow(
     functions: Functions,
     rows: Rows,
@@ -1238,22 +1254,23 @@ def _follow(
 
     Returns the table of crossings, their number, and how many rows are still open.
     """
+    # Rows are tested one by one where that spares a long interval, or M may vanish.
+    alone = here.size == 1 or shared.long or not (shared.fast or shared.least > 0.0)
     kept = 0
     for i in range(here.size):
-        # Rows are tested one by one where that spares a long interval, or M may vanish.
-        alone = here.size == 1 or shared.long or not (shared.fast or shared.least > 0.0)
-        if alone and _rows_exclude_zero(rows, here[i : i + 1], work, room):
-            continue
         row, state, slope = _row(rows, here[i], shared, work), _OPEN, 0.0
         if not shared.fast:
             state, slope = _decide(row, shared, work)
+        undecided = state == _OPEN or state == _HIDDEN
+        if undecided and alone and _rows_exclude_zero(rows, here[i : i + 1], work, room):
+            continue
         if state == _ONE:
             if not (shared.around or _sign_changes(functions, row, shared, spare)):
                 continue
             x, spread, t, off_t = _locate(functions, row, shared, slope, fine, work, spare)
             # Where M vanishes x is no number, and the zero counts.
             if not (x + spread < row.lower or x - spread > row.upper):
-                jump = (1.0 if shared.around else 2.0) * np.sign(row.z[1].imag)
+                jump = (1.0 if shared.around else 2.0) * np.sign(shared.z[1].imag)
                 omega, width = shared.m + shared.r * t, shared.r * off_t
                 found = _append(found, n, (float(here[i]), x, spread, omega, width, jump))
                 n += 1
