@@ -18,6 +18,7 @@ def njit(
     error_model: str = "python",
     inner: bool = False,
     allocates: bool = True,
+    once: bool = False,
 ) -> Callable[[Callable[..., Any]], Any]:
     """Compile a function when it is first called with arguments of these types.
 
@@ -44,6 +45,7 @@ def njit(
         "no_cfunc_wrapper": True,
         "no_cpython_wrapper": inner,
         "_nrt": allocates,
+        "inline": "always" if once else "never",
     }
 
     def decorate(function: Callable[..., Any]) -> Any:

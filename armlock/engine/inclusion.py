@@ -48,6 +48,7 @@ _DEEPEST = 300
 DISTANCE, PHASE, DELAY, REAL = range(4)
 
 _inner = njit(nogil=True, error_model="numpy", inner=True, allocates=False)
+_once = njit(nogil=True, error_model="numpy", inner=True, allocates=False, once=True)
 _maker = njit(nogil=True, error_model="numpy", inner=True)
 _entry = njit(nogil=True, error_model="numpy")
 
@@ -158,7 +159,7 @@ def _size(z: complex) -> float:
     return float(np.sqrt(square)) if 1e-280 < square < 1e300 else abs(z)
 
 
-@_inner
+@_once
 def _expand_piece(space: Arrays, m: float, r: float, work: Workspace) -> None:
     """Expand all polynomials on a piece of the axis, factor by factor (Lemma 1)."""
     n, top = space.scale.size, 0
@@ -217,7 +218,7 @@ _TURN = 6.283185303211212, 3.968374295837407e-09, 2.2884754904439327e-17
 _MOST_TURNS = 2.0**26
 
 
-@_inner
+@_once
 def _phase(theta: float, tail: float, m: float) -> tuple[float, float]:
     """Return (theta + tail) m less whole turns, and a bound of its error in rad (Lemma 6)."""
     product, off = theta * m, tail * m
@@ -235,7 +236,7 @@ def _phase(theta: float, tail: float, m: float) -> tuple[float, float]:
     return phase + (low + off), EPSILON * min(2.0 * product, 16.0) + wrong
 
 
-@_inner
+@_once
 def _expand_polynomials(space: Arrays, m: float, r: float, work: Workspace) -> None:
     """Expand all polynomials about j m, from a longer piece of the axis where one serves."""
     own = False
@@ -271,7 +272,7 @@ def _expand_polynomials(space: Arrays, m: float, r: float, work: Workspace) -> N
         work.piece[1] = -1.0
 
 
-@_inner
+@_once
 def _expand_exponentials(space: Arrays, m: float, r: float, work: Workspace) -> None:
     """Expand all exponentials about j m, those that turn fast relative to a free phase."""
     lead = -1
@@ -297,16 +298,21 @@ def _expand_exponentials(space: Arrays, m: float, r: float, work: Workspace) -> 
             work.turn[k, i] = q
 
 
-@_inner
+@_once
 def expand(space: Arrays, m: float, r: float, work: Workspace) -> None:
     """Expand polynomials and exponentials about j m (Lemmas 1 to 3)."""
     _expand_polynomials(space, m, r, work)
     _expand_exponentials(space, m, r, work)
 
 
-@_inner
+@_once
 def _bracket(
-    steady: float, row: FloatArray, uncertain: float, lead: int, work: Workspace
+    steady: float,
+    row: FloatArray,
+    uncertain: float,
+    lead: int,
+    order: int,
+    work: Workspace,
 ) -> tuple[bool, float]:
     """Expand S + sum_k W_k (exp(-s theta_k) - 1), as far as it follows one free phase.
 
@@ -333,19 +339,19 @@ def _bracket(
         if lead >= 0:
             work.g[0] += weight
             wrong += size * few
-        for i in range(ORDER):
+        for i in range(order):
             work.g[i] += weight * work.turn[k, i]
             power *= x / (i + 1)
         work.b[ORDER] += power
         wrong += size * few * (_size(work.turn[k, 0]) + 6.0 * grown)
         wrong += size * work.slip[k] * (1.0 + grown)
-    for i in range(ORDER - 1, -1, -1):
+    for i in range(order - 1 if used else -1, -1, -1):
         work.b[i] = _size(work.g[i]) + (i + 1) * work.b[i + 1]
     return used, wrong
 
 
-@_inner
-def combine(functions: Functions, n: int, work: Workspace) -> None:
+@_once
+def combine(functions: Functions, n: int, order: int, work: Workspace) -> None:
     """Enclose function n on the expanded interval (Lemmas 4, 7)."""
     steady, delayed, uncertain = (
         functions.steady[n],
@@ -359,12 +365,12 @@ def combine(functions: Functions, n: int, work: Workspace) -> None:
         for lead in range(-1, delays):
             if lead >= 0 and work.lead[lead] != lead:
                 continue
-            used, wrong = _bracket(steady[j], delayed[j], uncertain[j], lead, work)
+            used, wrong = _bracket(steady[j], delayed[j], uncertain[j], lead, order, work)
             if not used:
                 continue
             rest += work.bound[j, ORDER] * work.b[0]
             rounding += work.bound[j, 0] * ((work.error[j] + sums) * work.b[0] + wrong)
-            for i in range(ORDER):
+            for i in range(order):
                 total = 0j
                 for low in range(i + 1):
                     total += work.p[j, low] * work.g[i - low]
@@ -379,8 +385,9 @@ def combine(functions: Functions, n: int, work: Workspace) -> None:
 def enclose(functions: Functions, m: float, r: float, work: Workspace) -> None:
     """Enclose functions on an interval, as many as the workspace has room for."""
     expand(functions.space, m, r, work)
+    # At a point there is a value, and nothing else.
     for n in range(work.f.shape[0]):
-        combine(functions, n, work)
+        combine(functions, n, ORDER if r > 0.0 else 1, work)
 
 
 @_entry
