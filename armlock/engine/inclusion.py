@@ -48,7 +48,7 @@ _DEEPEST = 300
 DISTANCE, PHASE, DELAY, REAL = range(4)
 
 _inner = njit(nogil=True, error_model="numpy", inner=True, allocates=False)
-_once = njit(nogil=True, error_model="numpy", inner=True, allocates=False, once=True)
+_inlined = njit(nogil=True, error_model="numpy", inner=True, allocates=False, once=True)
 _maker = njit(nogil=True, error_model="numpy", inner=True)
 _entry = njit(nogil=True, error_model="numpy")
 
@@ -159,7 +159,7 @@ def _size(z: complex) -> float:
     return float(np.sqrt(square)) if 1e-280 < square < 1e300 else abs(z)
 
 
-@_once
+@_inlined
 def _expand_piece(space: Arrays, m: float, r: float, work: Workspace) -> None:
     """Expand all polynomials on a piece of the axis, factor by factor (Lemma 1)."""
     n, top = space.scale.size, 0
@@ -218,7 +218,7 @@ _TURN = 6.283185303211212, 3.968374295837407e-09, 2.2884754904439327e-17
 _MOST_TURNS = 2.0**26
 
 
-@_once
+@_inlined
 def _phase(theta: float, tail: float, m: float) -> tuple[float, float]:
     """Return (theta + tail) m less whole turns, and a bound of its error in rad (Lemma 6)."""
     product, off = theta * m, tail * m
@@ -236,7 +236,7 @@ def _phase(theta: float, tail: float, m: float) -> tuple[float, float]:
     return phase + (low + off), EPSILON * min(2.0 * product, 16.0) + wrong
 
 
-@_once
+@_inlined
 def _expand_polynomials(space: Arrays, m: float, r: float, work: Workspace) -> None:
     """Expand all polynomials about j m, from a longer piece of the axis where one serves."""
     own = False
@@ -272,7 +272,7 @@ def _expand_polynomials(space: Arrays, m: float, r: float, work: Workspace) -> N
         work.piece[1] = -1.0
 
 
-@_once
+@_inlined
 def _expand_exponentials(space: Arrays, m: float, r: float, work: Workspace) -> None:
     """Expand all exponentials about j m, those that turn fast relative to a free phase."""
     lead = -1
@@ -298,14 +298,14 @@ def _expand_exponentials(space: Arrays, m: float, r: float, work: Workspace) -> 
             work.turn[k, i] = q
 
 
-@_once
+@_inlined
 def expand(space: Arrays, m: float, r: float, work: Workspace) -> None:
     """Expand polynomials and exponentials about j m (Lemmas 1 to 3)."""
     _expand_polynomials(space, m, r, work)
     _expand_exponentials(space, m, r, work)
 
 
-@_once
+@_inlined
 def _bracket(
     steady: float,
     row: FloatArray,
@@ -350,7 +350,7 @@ def _bracket(
     return used, wrong
 
 
-@_once
+@_inlined
 def combine(functions: Functions, n: int, order: int, work: Workspace) -> None:
     """Enclose function n on the expanded interval (Lemmas 4, 7)."""
     steady, delayed, uncertain = (
@@ -471,12 +471,13 @@ class Members(NamedTuple):
     along: ComplexArray  # (ORDER,), of the last test that held: direction or polynomial
     slow: ComplexArray  # (ORDER,)
     q: ComplexArray  # (ORDER,)
+    weights: ComplexArray  # (functions,), of the member that is made next
 
 
 @_maker
-def members(kind: IntArray, delays: int) -> Members:
-    """Return room for members of these kinds."""
-    size = kind.size
+def members(kind: IntArray, functions: Functions) -> Members:
+    """Return room for members of these kinds, combinations of these functions."""
+    size, delays = kind.size, functions.space.delays.size
     return Members(
         kind,
         np.zeros((size, 1 + delays, ORDER), np.complex128),
@@ -484,16 +485,17 @@ def members(kind: IntArray, delays: int) -> Members:
         np.zeros(ORDER, np.complex128),
         np.zeros(ORDER, np.complex128),
         np.zeros(ORDER, np.complex128),
+        np.zeros(functions.steady.shape[0], np.complex128),
     )
 
 
 @_inner
-def mix(weights: ComplexArray, work: Workspace, room: Members, n: int) -> None:
-    """Make member n, a linear combination of the functions."""
+def mix(work: Workspace, room: Members, n: int) -> None:
+    """Make member n, the combination of the functions with the weights."""
     room.v[n] = 0.0
     room.rest[n] = 0.0
-    for f in range(weights.size):
-        a = weights[f]
+    for f in range(room.weights.size):
+        a = room.weights[f]
         if a != 0.0:
             for k in range(work.f.shape[1]):
                 if _acts(work.f[f], k):
@@ -618,10 +620,9 @@ class Question(NamedTuple):
 
 
 @_inner
-def _test_holds(
-    question: Question, level: float, work: Workspace, room: Members, weights: ComplexArray
-) -> bool:
+def _test_holds(question: Question, level: float, work: Workspace, room: Members) -> bool:
     """Whether a test excludes zero at a level."""
+    weights = room.weights
     for i in range(question.kind.shape[0]):
         room.kind[:] = 0
         for n in range(question.kind.shape[1]):
@@ -629,7 +630,7 @@ def _test_holds(
             if room.kind[n]:
                 for f in range(weights.size):
                     weights[f] = question.weights[i, n, f] + level * question.slopes[i, n, f]
-                mix(weights, work, room, n)
+                mix(work, room, n)
         if excludes_zero(room):
             return True
     return False
@@ -643,12 +644,11 @@ def _arc_holds(
     high: float,
     work: Workspace,
     room: Members,
-    weights: ComplexArray,
 ) -> bool:
     """Whether zero is excluded for all psi of the arc, triangle by triangle (Lemma 16)."""
     if not question.arc.size:
         return False
-    loose, functions = question.loose, weights.size
+    weights, loose, functions = room.weights, question.loose, room.weights.size
     arc = question.arc[0] + level * question.arc[1]
     begin = arc[0] + min(arc[1] * low, arc[1] * high)
     span = min(arc[2] + max(arc[3] * low, arc[3] * high) - begin, 2.0 * np.pi)
@@ -661,7 +661,7 @@ def _arc_holds(
         weights[:] = 0.0
         weights[functions - loose + n] = 1.0
         room.kind[3 + n] = 2
-        mix(weights, work, room, 3 + n)
+        mix(work, room, 3 + n)
     for i in range(parts):
         turn = begin + (2 * i + 1) * half
         for n in range(3):
@@ -675,7 +675,7 @@ def _arc_holds(
             weights[0], weights[1] = 1.0, complex(1.0 + less, sine)
             if functions - loose > 2:
                 weights[1], weights[2] = less, complex(0.0, sine)
-            mix(weights, work, room, n)
+            mix(work, room, n)
         if not excludes_zero(room):
             return False
     return True
@@ -713,7 +713,8 @@ def wind(
     number, space = begin.size, functions.space
     total, undecided, steps = np.zeros(number), np.zeros(number), np.zeros(number, np.int64)
     first, last = np.zeros(number, np.complex128), np.zeros(number, np.complex128)
-    room, stack = members(np.ones(1, np.int64), space.delays.size), np.empty((_DEEPEST, 2))
+    stack = np.empty((_DEEPEST, 2))
+    room = members(np.ones(1, np.int64), functions)
     work, along = workspace(space, room.kind.size), np.zeros(ORDER, np.complex128)
     for n in range(number):
         # What is found of a function does not depend on those before it.
@@ -944,8 +945,7 @@ def walk(
     # What is looked for are the first two functions and the loose ones.
     work, spare = workspace(space, number), workspace(space, 2 + question.loose)
     size = max(question.kind.shape[1], 3 + question.loose)
-    room = members(np.zeros(size, np.int64), space.delays.size)
-    weights = np.zeros(number, np.complex128)
+    room = members(np.zeros(size, np.int64), functions)
     top = pending.shape[0]
     stack = np.empty((top + _DEEPEST, 2))
     stack[:top] = pending
@@ -957,9 +957,9 @@ def walk(
         steps += 1
         level = min(start + (best - start) * (1.0 - question.tolerance), 1e300)
         enclose(functions, m, r, work)
-        if _test_holds(question, level, work, room, weights):
+        if _test_holds(question, level, work, room):
             continue
-        if _arc_holds(question, level, low, high, work, room, weights):
+        if _arc_holds(question, level, low, high, work, room):
             continue
         resolved = work.lead.size == 0 or work.lead[-1] < 0
         if resolved and best > start:
@@ -1045,7 +1045,7 @@ def _share(
     return Shared(low, high, m, r, around, fast, long, products, sizes, least, z, ends)
 
 
-@_maker
+@_inner
 def _rows_exclude_zero(rows: Rows, here: IntArray, work: Workspace, room: Members) -> bool:
     """Whether zero is in none of some rows, for any x that counts."""
     y0, y1, x0, x1 = np.inf, -np.inf, np.inf, -np.inf
@@ -1054,17 +1054,18 @@ def _rows_exclude_zero(rows: Rows, here: IntArray, work: Workspace, room: Member
         x0, x1 = min(x0, rows.lower[row]), max(x1, rows.upper[row])
     if x1 == np.inf:
         return False
-    weights = np.ones(3, np.complex128)
+    room.weights[0] = 1.0
     room.kind[:] = 0
     # Of one row two corners suffice.
     for n in range(4 if y0 < y1 else 2):
         room.kind[n] = 1
-        weights[1], weights[2] = -(y0 if n < 2 else y1), -(x0 if n % 2 == 0 else x1)
-        mix(weights, work, room, n)
+        room.weights[1] = -(y0 if n < 2 else y1)
+        room.weights[2] = -(x0 if n % 2 == 0 else x1)
+        mix(work, room, n)
     return bool(excludes_zero(room) > 0)
 
 
-@_inner
+@_inlined
 def _row(rows: Rows, row: int, shared: Shared, work: Workspace) -> Row:
     """Return a row on an interval."""
     y, z, size_m, rest_m = rows.y[row], shared.z, shared.sizes[2], work.rest[2]
@@ -1076,7 +1077,7 @@ def _row(rows: Rows, row: int, shared: Shared, work: Workspace) -> Row:
     return Row(y, rows.lower[row], rows.upper[row], size, rest, off)
 
 
-@_inner
+@_inlined
 def _is_outside(row: Row, shared: Shared, work: Workspace) -> bool:
     """Whether Re(N / M) is below `lower` or above `upper` on the whole interval."""
     z, square, size_m = shared.z, shared.products[2], shared.sizes[2]
@@ -1090,7 +1091,7 @@ def _is_outside(row: Row, shared: Shared, work: Workspace) -> bool:
     return bool(above > off or below < -off)
 
 
-@_inner
+@_inlined
 def _decide(row: Row, shared: Shared, work: Workspace) -> tuple[int, float]:
     """Tell what is known of h = Im(N conj M), and its least slope if it is monotonic."""
     varied, bent, everywhere = 0.0, 0.0, row.upper == np.inf
@@ -1111,7 +1112,7 @@ def _decide(row: Row, shared: Shared, work: Workspace) -> tuple[int, float]:
     return (_HIDDEN if settled else _OPEN), 0.0
 
 
-@_inner
+@_inlined
 def _sign_changes(functions: Functions, row: Row, shared: Shared, spare: Workspace) -> bool:
     """Whether h has two signs at the ends of an interval, of which all rows share the values.
 
@@ -1127,7 +1128,7 @@ def _sign_changes(functions: Functions, row: Row, shared: Shared, spare: Workspa
     return bool((a < 0.0) != (b < 0.0))
 
 
-@_inner
+@_inlined
 def _zero_of_polynomial(z: ComplexArray) -> tuple[float, float]:
     """Return where the imaginary part of a monotonic polynomial is zero, and its slope."""
     t, slope = 0.0, z[1].imag
@@ -1140,7 +1141,7 @@ def _zero_of_polynomial(z: ComplexArray) -> tuple[float, float]:
     return t, slope
 
 
-@_inner
+@_inlined
 def _locate(
     functions: Functions,
     row: Row,
@@ -1193,27 +1194,36 @@ def _locate(
     return x, spread, t, off_t if off_t <= 2.0 else rough
 
 
+@_inlined
+def _note(
+    entry: FloatArray, row: int, x: float, spread: float, omega: float, width: float, jump: float
+) -> None:
+    """Write an entry of the table of `cross`."""
+    entry[0], entry[1], entry[2] = row, x, spread
+    entry[3], entry[4], entry[5] = omega, width, jump
+
+
 @_inner
-def _hidden(row: Row, shared: Shared, work: Workspace) -> tuple[float, float]:
-    """Return around which x zeros may lie on an interval, and how far from it."""
-    if not shared.least > 0.0:
-        return 0.0, np.inf
-    x = shared.z[0].real / shared.products[2, 0].real
-    reach = row.off + 3.0 * abs(x) * shared.sizes[2] * work.rest[2]
-    for k in range(1, shared.z.size):
-        reach += abs(shared.z[k].real - x * shared.products[2, k].real)
-    return x, 1.01 * reach / (shared.least * shared.least)
+def _note_hidden(rows: Rows, k: int, shared: Shared, work: Workspace, entry: FloatArray) -> None:
+    """Note an undecided interval of a row, and around which x zeros may lie on it."""
+    row, x, spread = _row(rows, k, shared, work), 0.0, np.inf
+    if shared.least > 0.0:
+        x = shared.z[0].real / shared.products[2, 0].real
+        reach = row.off + 3.0 * abs(x) * shared.sizes[2] * work.rest[2]
+        for i in range(1, shared.z.size):
+            reach += abs(shared.z[i].real - x * shared.products[2, i].real)
+        spread = 1.01 * reach / (shared.least * shared.least)
+    _note(entry, k, x, spread, shared.m, shared.r, 0.0)
 
 
 @_maker
-def _append(table: FloatArray, n: int, entry: tuple[float, ...]) -> FloatArray:
-    """Return a table with entry n, for which room is made."""
-    if n == table.shape[0]:
-        longer = np.empty((2 * n, table.shape[1]))
-        longer[:n] = table
+def _append(table: FloatArray, n: int, entries: FloatArray) -> FloatArray:
+    """Return a table of n entries with more, for which room is made."""
+    if n + len(entries) > len(table):
+        longer = np.empty((2 * (n + len(entries)), table.shape[1]))
+        longer[:n] = table[:n]
         table = longer
-    for k, value in enumerate(entry):
-        table[n, k] = value
+    table[n : n + len(entries)] = entries
     return table
 
 
@@ -1243,7 +1253,7 @@ def _cut_around(stack: FloatArray, top: int, low: float, m: float, r: float) -> 
     return True
 
 
-@_maker
+@_inner
 def _follow(
     functions: Functions,
     rows: Rows,
@@ -1254,16 +1264,15 @@ def _follow(
     work: Workspace,
     spare: Workspace,
     room: Members,
-    found: FloatArray,
-    n: int,
-) -> tuple[FloatArray, int, int]:
+    entries: FloatArray,
+) -> tuple[int, int]:
     """Decide on an interval what can be decided of some rows.
 
-    Returns the table of crossings, their number, and how many rows are still open.
+    Returns the number of entries, one at most of each row, and how many rows are still open.
     """
     # Rows are tested one by one where that spares a long interval, or M may vanish.
     alone = here.size == 1 or shared.long or not (shared.fast or shared.least > 0.0)
-    kept = 0
+    n, kept = 0, 0
     for i in range(here.size):
         row, state, slope = _row(rows, here[i], shared, work), _OPEN, 0.0
         if not shared.fast:
@@ -1279,16 +1288,15 @@ def _follow(
             if not (x + spread < row.lower or x - spread > row.upper):
                 jump = (1.0 if shared.around else 2.0) * np.sign(shared.z[1].imag)
                 omega, width = shared.m + shared.r * t, shared.r * off_t
-                found = _append(found, n, (float(here[i]), x, spread, omega, width, jump))
+                _note(entries[n], here[i], x, spread, omega, width, jump)
                 n += 1
         elif state == _HIDDEN:
-            x, spread = _hidden(row, shared, work)
-            found = _append(found, n, (float(here[i]), x, spread, shared.m, shared.r, 0.0))
+            _note_hidden(rows, here[i], shared, work, entries[n])
             n += 1
         elif state == _OPEN:
             still_open[kept] = here[i]
             kept += 1
-    return found, n, kept
+    return n, kept
 
 
 @_entry
@@ -1316,8 +1324,9 @@ def cross(
     number, space = rows.y.size, functions.space
     three = functions.steady.shape[0]
     work, spare = workspace(space, three), workspace(space, three)
-    room = members(np.zeros(4, np.int64), space.delays.size)
-    found, n, unfinished = np.empty((64, 6)), 0, np.zeros(number, np.bool_)
+    room = members(np.zeros(4, np.int64), functions)
+    found, entries, n = np.empty((64, 6)), np.empty((number, 6)), np.int64(0)
+    unfinished = np.zeros(number, np.bool_)
     # Which rows are open, after so many halvings.
     pool, size = np.empty((_DEEPEST + 1, number), np.int64), np.zeros(_DEEPEST + 1, np.int64)
     pool[0], size[0] = np.arange(number), number
@@ -1338,9 +1347,9 @@ def cross(
         enclose(functions, m, r, work)
         if size[d] > 1 and _rows_exclude_zero(rows, here, work, room):
             continue
-        shared, known = _share(space, (low, high, m, r), around, work), n
-        found, n, kept = _follow(
-            functions, rows, here, pool[d + 1], shared, fine, work, spare, room, found, n
+        shared = _share(space, (low, high, m, r), around, work)
+        new, kept = _follow(
+            functions, rows, here, pool[d + 1], shared, fine, work, spare, room, entries
         )
         halved = kept > 0 and d + 1 < _DEEPEST
         if halved and around:
@@ -1352,9 +1361,9 @@ def cross(
             top += 2
         else:
             for row in pool[d + 1, :kept]:
-                x, spread = _hidden(_row(rows, row, shared, work), shared, work)
-                found = _append(found, n, (float(row), x, spread, m, r, 0.0))
-                n += 1
-        for i in range(known, n):
-            undecided += found[i, 5] == 0.0
+                _note_hidden(rows, row, shared, work, entries[new])
+                new += 1
+        found, n = _append(found, n, entries[:new]), n + new
+        for i in range(new):
+            undecided += entries[i, 5] == 0.0
     return found[:n].copy(), unfinished
