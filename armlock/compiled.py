@@ -17,8 +17,8 @@ def njit(
     nogil: bool = False,
     error_model: str = "python",
     inner: bool = False,
+    inlined: bool = False,
     allocates: bool = True,
-    once: bool = False,
 ) -> Callable[[Callable[..., Any]], Any]:
     """Compile a function when it is first called with arguments of these types.
 
@@ -30,9 +30,12 @@ def njit(
         What a division by zero does: it raises, or with "numpy" gives inf or nan.
     inner : bool, optional
         Whether only compiled functions call it. Then it compiles in less time.
+    inlined : bool, optional
+        Whether it becomes part of the functions that call it. numba passes each array of an
+        argument as eight numbers, which takes longer than a short function runs.
     allocates : bool, optional
-        Whether it makes or returns arrays. If not, references to its arrays are not counted,
-        which takes as much time as short loops do.
+        Whether it makes or returns arrays. If not, numba does not count references to arrays,
+        which takes as long as a short loop.
 
     Returns
     -------
@@ -44,8 +47,8 @@ def njit(
         "error_model": error_model,
         "no_cfunc_wrapper": True,
         "no_cpython_wrapper": inner,
+        "inline": "always" if inlined else "never",
         "_nrt": allocates,
-        "inline": "always" if once else "never",
     }
 
     def decorate(function: Callable[..., Any]) -> Any:

@@ -47,10 +47,12 @@ _DEEPEST = 300
 # The goals of a search, see `_aim`.
 DISTANCE, PHASE, DELAY, REAL = range(4)
 
-_inner = njit(nogil=True, error_model="numpy", inner=True, allocates=False)
-_inlined = njit(nogil=True, error_model="numpy", inner=True, allocates=False, once=True)
-_maker = njit(nogil=True, error_model="numpy", inner=True)
+# Entries are called from Python. Of what they call, `_maker` makes or returns arrays, `_inner`
+# does not, and `_inlined` is a step of one or two others.
 _entry = njit(nogil=True, error_model="numpy")
+_maker = njit(nogil=True, error_model="numpy", inner=True)
+_inner = njit(nogil=True, error_model="numpy", inner=True, allocates=False)
+_inlined = njit(nogil=True, error_model="numpy", inner=True, allocates=False, inlined=True)
 
 
 # ------------------------------------------------------------------------------ the enclosure
@@ -1020,7 +1022,7 @@ class Row(NamedTuple):
     off: float  # error of N conj M, which is z of what is shared
 
 
-# What is known of a row on an interval: no zero, one at most, not enough; or rounding hides it.
+# What is known of a row on an interval: no zero; one at most; not enough; rounding hides it.
 _NONE, _ONE, _OPEN, _HIDDEN = range(4)
 
 
@@ -1196,7 +1198,13 @@ def _locate(
 
 @_inlined
 def _note(
-    entry: FloatArray, row: int, x: float, spread: float, omega: float, width: float, jump: float
+    entry: FloatArray,
+    row: int,
+    x: float,
+    spread: float,
+    omega: float,
+    width: float,
+    jump: float,
 ) -> None:
     """Write an entry of the table of `cross`."""
     entry[0], entry[1], entry[2] = row, x, spread
@@ -1204,16 +1212,18 @@ def _note(
 
 
 @_inner
-def _note_hidden(rows: Rows, k: int, shared: Shared, work: Workspace, entry: FloatArray) -> None:
-    """Note an undecided interval of a row, and around which x zeros may lie on it."""
-    row, x, spread = _row(rows, k, shared, work), 0.0, np.inf
+def _note_hidden(
+    rows: Rows, row: int, shared: Shared, work: Workspace, entry: FloatArray
+) -> None:
+    """Write an undecided interval of a row, and around which x zeros may lie on it."""
+    off, x, spread = _row(rows, row, shared, work).off, 0.0, np.inf
     if shared.least > 0.0:
         x = shared.z[0].real / shared.products[2, 0].real
-        reach = row.off + 3.0 * abs(x) * shared.sizes[2] * work.rest[2]
+        reach = off + 3.0 * abs(x) * shared.sizes[2] * work.rest[2]
         for i in range(1, shared.z.size):
             reach += abs(shared.z[i].real - x * shared.products[2, i].real)
         spread = 1.01 * reach / (shared.least * shared.least)
-    _note(entry, k, x, spread, shared.m, shared.r, 0.0)
+    _note(entry, row, (x, spread), (shared.m, shared.r), 0.0)
 
 
 @_maker
@@ -1277,8 +1287,7 @@ def _follow(
         row, state, slope = _row(rows, here[i], shared, work), _OPEN, 0.0
         if not shared.fast:
             state, slope = _decide(row, shared, work)
-        undecided = state == _OPEN or state == _HIDDEN
-        if undecided and alone and _rows_exclude_zero(rows, here[i : i + 1], work, room):
+        if alone and state >= _OPEN and _rows_exclude_zero(rows, here[i : i + 1], work, room):
             continue
         if state == _ONE:
             if not (shared.around or _sign_changes(functions, row, shared, spare)):
@@ -1287,8 +1296,8 @@ def _follow(
             # Where M vanishes x is no number, and the zero counts.
             if not (x + spread < row.lower or x - spread > row.upper):
                 jump = (1.0 if shared.around else 2.0) * np.sign(shared.z[1].imag)
-                omega, width = shared.m + shared.r * t, shared.r * off_t
-                _note(entries[n], here[i], x, spread, omega, width, jump)
+                omega = shared.m + shared.r * t, shared.r * off_t
+                _note(entries[n], here[i], (x, spread), omega, jump)
                 n += 1
         elif state == _HIDDEN:
             _note_hidden(rows, here[i], shared, work, entries[n])
