@@ -1200,15 +1200,14 @@ def _locate(
 def _note(
     entry: FloatArray,
     row: int,
-    x: float,
-    spread: float,
-    omega: float,
-    width: float,
+    x: tuple[float, float],
+    omega: tuple[float, float],
     jump: float,
 ) -> None:
-    """Write an entry of the table of `cross`."""
-    entry[0], entry[1], entry[2] = row, x, spread
-    entry[3], entry[4], entry[5] = omega, width, jump
+    """Write an entry of the table of `cross`: x and the frequency with how far they are off."""
+    entry[0], entry[5] = row, jump
+    entry[1], entry[2] = x
+    entry[3], entry[4] = omega
 
 
 @_inner
