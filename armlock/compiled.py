@@ -13,7 +13,12 @@ import numba
 
 
 def njit(
-    *, nogil: bool = False, error_model: str = "python", inner: bool = False
+    *,
+    nogil: bool = False,
+    error_model: str = "python",
+    inner: bool = False,
+    inlined: bool = False,
+    allocates: bool = True,
 ) -> Callable[[Callable[..., Any]], Any]:
     """Compile a function when it is first called with arguments of these types.
 
@@ -25,6 +30,12 @@ def njit(
         What a division by zero does: it raises, or with "numpy" gives inf or nan.
     inner : bool, optional
         Whether only compiled functions call it. Then it compiles in less time.
+    inlined : bool, optional
+        Whether it becomes part of the functions that call it. numba passes each array of an
+        argument as eight numbers, which takes longer than a short function runs.
+    allocates : bool, optional
+        Whether it makes or returns arrays. If not, numba does not count references to arrays,
+        which takes as long as a short loop.
 
     Returns
     -------
@@ -36,6 +47,8 @@ def njit(
         "error_model": error_model,
         "no_cfunc_wrapper": True,
         "no_cpython_wrapper": inner,
+        "inline": "always" if inlined else "never",
+        "_nrt": allocates,
     }
 
     def decorate(function: Callable[..., Any]) -> Any:

@@ -90,8 +90,8 @@ def workspace(space, functions):
 
 
 @numba.njit
-def members(kind, delays):
-    return inclusion.members(kind, delays)
+def members(kind, functions):
+    return inclusion.members(kind, functions)
 
 
 @numba.njit
@@ -108,7 +108,8 @@ def phase_of(theta, tail, omega):
 def holds(weights, along, gamma, work, room):
     """Whether members with these weights exclude zero."""
     for n in range(weights.shape[0]):
-        inclusion.mix(weights[n], work, room, n)
+        room.weights[:] = weights[n]
+        inclusion.mix(work, room, n)
     room.along[:] = along
     return inclusion._holds(room, gamma)
 
@@ -269,7 +270,7 @@ def test_zero_is_excluded_only_where_all_members_stay_on_one_side(shares):
         space = function.space
         other = space.function(rng.normal(size=len(space.polynomials)), 0.0 * function.delayed)
         work = workspace(space.arrays, 2)
-        room = members(np.array([1, 1, 2]), len(space.delays))
+        room = members(np.array([1, 1, 2]), compiled([function, other]))
         middle = float(rng.choice(space.corners)) * 10.0 ** rng.uniform(-1, 1)
         half = middle * 10.0 ** rng.uniform(-4, -0.3)
         enclose(compiled([function, other]), middle, half, work)

@@ -47,8 +47,12 @@ _DEEPEST = 300
 # The goals of a search, see `_aim`.
 DISTANCE, PHASE, DELAY, REAL = range(4)
 
-_inner = njit(nogil=True, error_model="numpy", inner=True)
+# Entries are called from Python. Of what they call, `_maker` makes or returns arrays, `_inner`
+# does not, and `_inlined` is a step of one or two others.
 _entry = njit(nogil=True, error_model="numpy")
+_maker = njit(nogil=True, error_model="numpy", inner=True)
+_inner = njit(nogil=True, error_model="numpy", inner=True, allocates=False)
+_inlined = njit(nogil=True, error_model="numpy", inner=True, allocates=False, inlined=True)
 
 
 # ------------------------------------------------------------------------------ the enclosure
@@ -125,7 +129,7 @@ class Workspace(NamedTuple):
     b: FloatArray
 
 
-@_inner
+@_maker
 def workspace(space: Arrays, functions: int) -> Workspace:
     """Return a workspace for so many functions."""
     j, k = space.lead.size, space.delays.size
@@ -151,6 +155,13 @@ def workspace(space: Arrays, functions: int) -> Workspace:
 
 
 @_inner
+def _size(z: complex) -> float:
+    """Magnitude of a complex number; `abs` takes three times as long."""
+    square = z.real * z.real + z.imag * z.imag
+    return float(np.sqrt(square)) if 1e-280 < square < 1e300 else abs(z)
+
+
+@_inlined
 def _expand_piece(space: Arrays, m: float, r: float, work: Workspace) -> None:
     """Expand all polynomials on a piece of the axis, factor by factor (Lemma 1)."""
     n, top = space.scale.size, 0
@@ -178,7 +189,7 @@ def _expand_piece(space: Arrays, m: float, r: float, work: Workspace) -> None:
                 p[0] *= w
                 if space.computed[j, k]:
                     # What is missed is a share of the product of abs(s) + abs(root).
-                    missed *= (m + r + abs(z)) * f / size
+                    missed *= (m + r + _size(z)) * f / size
             else:
                 for i in range(ORDER):
                     p[i] *= f
@@ -187,16 +198,20 @@ def _expand_piece(space: Arrays, m: float, r: float, work: Workspace) -> None:
             if bound[0] > _HUGE or 0.0 < bound[0] < 1.0 / _HUGE:
                 by = 1.0 / _HUGE if bound[0] > 1.0 else _HUGE
                 shift += 1 if bound[0] > 1.0 else -1
-                p *= by
-                bound *= by
+                for i in range(ORDER):
+                    p[i] *= by
+                    bound[i] *= by
+                bound[ORDER] *= by
         work.error[j] = 8.0 * (n + 1) * EPSILON + missed
         work.shift[j] = shift
         top = shift if j == 0 else max(top, shift)
     for j in range(space.lead.size):
         if work.shift[j] != top:
             by = _HUGE ** float(max(work.shift[j] - top, -2))
-            work.piece_p[j] *= by
-            work.piece_bound[j] *= by
+            for i in range(ORDER):
+                work.piece_p[j, i] *= by
+                work.piece_bound[j, i] *= by
+            work.piece_bound[j, ORDER] *= by
 
 
 # Two pi in three parts, of which the first two have 27 digits: their products with a number of
@@ -205,7 +220,7 @@ _TURN = 6.283185303211212, 3.968374295837407e-09, 2.2884754904439327e-17
 _MOST_TURNS = 2.0**26
 
 
-@_inner
+@_inlined
 def _phase(theta: float, tail: float, m: float) -> tuple[float, float]:
     """Return (theta + tail) m less whole turns, and a bound of its error in rad (Lemma 6)."""
     product, off = theta * m, tail * m
@@ -223,7 +238,7 @@ def _phase(theta: float, tail: float, m: float) -> tuple[float, float]:
     return phase + (low + off), EPSILON * min(2.0 * product, 16.0) + wrong
 
 
-@_inner
+@_inlined
 def _expand_polynomials(space: Arrays, m: float, r: float, work: Workspace) -> None:
     """Expand all polynomials about j m, from a longer piece of the axis where one serves."""
     own = False
@@ -259,7 +274,7 @@ def _expand_polynomials(space: Arrays, m: float, r: float, work: Workspace) -> N
         work.piece[1] = -1.0
 
 
-@_inner
+@_inlined
 def _expand_exponentials(space: Arrays, m: float, r: float, work: Workspace) -> None:
     """Expand all exponentials about j m, those that turn fast relative to a free phase."""
     lead = -1
@@ -285,16 +300,21 @@ def _expand_exponentials(space: Arrays, m: float, r: float, work: Workspace) -> 
             work.turn[k, i] = q
 
 
-@_inner
+@_inlined
 def expand(space: Arrays, m: float, r: float, work: Workspace) -> None:
     """Expand polynomials and exponentials about j m (Lemmas 1 to 3)."""
     _expand_polynomials(space, m, r, work)
     _expand_exponentials(space, m, r, work)
 
 
-@_inner
+@_inlined
 def _bracket(
-    steady: float, row: FloatArray, uncertain: float, lead: int, work: Workspace
+    steady: float,
+    row: FloatArray,
+    uncertain: float,
+    lead: int,
+    order: int,
+    work: Workspace,
 ) -> tuple[bool, float]:
     """Expand S + sum_k W_k (exp(-s theta_k) - 1), as far as it follows one free phase.
 
@@ -321,19 +341,19 @@ def _bracket(
         if lead >= 0:
             work.g[0] += weight
             wrong += size * few
-        for i in range(ORDER):
+        for i in range(order):
             work.g[i] += weight * work.turn[k, i]
             power *= x / (i + 1)
         work.b[ORDER] += power
-        wrong += size * few * (abs(work.turn[k, 0]) + 6.0 * grown)
+        wrong += size * few * (_size(work.turn[k, 0]) + 6.0 * grown)
         wrong += size * work.slip[k] * (1.0 + grown)
-    for i in range(ORDER - 1, -1, -1):
-        work.b[i] = abs(work.g[i]) + (i + 1) * work.b[i + 1]
+    for i in range(order - 1 if used else -1, -1, -1):
+        work.b[i] = _size(work.g[i]) + (i + 1) * work.b[i + 1]
     return used, wrong
 
 
-@_inner
-def combine(functions: Functions, n: int, work: Workspace) -> None:
+@_inlined
+def combine(functions: Functions, n: int, order: int, work: Workspace) -> None:
     """Enclose function n on the expanded interval (Lemmas 4, 7)."""
     steady, delayed, uncertain = (
         functions.steady[n],
@@ -347,12 +367,12 @@ def combine(functions: Functions, n: int, work: Workspace) -> None:
         for lead in range(-1, delays):
             if lead >= 0 and work.lead[lead] != lead:
                 continue
-            used, wrong = _bracket(steady[j], delayed[j], uncertain[j], lead, work)
+            used, wrong = _bracket(steady[j], delayed[j], uncertain[j], lead, order, work)
             if not used:
                 continue
             rest += work.bound[j, ORDER] * work.b[0]
             rounding += work.bound[j, 0] * ((work.error[j] + sums) * work.b[0] + wrong)
-            for i in range(ORDER):
+            for i in range(order):
                 total = 0j
                 for low in range(i + 1):
                     total += work.p[j, low] * work.g[i - low]
@@ -367,8 +387,9 @@ def combine(functions: Functions, n: int, work: Workspace) -> None:
 def enclose(functions: Functions, m: float, r: float, work: Workspace) -> None:
     """Enclose functions on an interval, as many as the workspace has room for."""
     expand(functions.space, m, r, work)
+    # At a point there is a value, and nothing else.
     for n in range(work.f.shape[0]):
-        combine(functions, n, work)
+        combine(functions, n, ORDER if r > 0.0 else 1, work)
 
 
 @_entry
@@ -411,7 +432,7 @@ def _divide(c: ComplexArray, by: ComplexArray, quotient: ComplexArray) -> float:
         if n < ORDER:
             quotient[n] = v / by[0]
         else:
-            left += abs(v)
+            left += _size(v)
     return left
 
 
@@ -430,14 +451,17 @@ def _least(
             q[i] = c[i] * turned
     else:
         # The quotient rounds by less than 64 EPSILON.
-        off = (_divide(c, along, q) + 64.0 * EPSILON * np.abs(c).sum()) / gamma
+        off = _divide(c, along, q)
+        for i in range(ORDER):
+            off += 64.0 * EPSILON * _size(c[i])
+        off /= gamma
     if vertex:
         for i in range(2, ORDER):
             off += abs(q[i].real)
         return (q[0] - q[1]).real - off, (q[0] + q[1]).real - off
     for i in range(2, ORDER):
-        off += abs(q[i])
-    return -abs(q[0] - q[1]) - off, -abs(q[0] + q[1]) - off
+        off += _size(q[i])
+    return -_size(q[0] - q[1]) - off, -_size(q[0] + q[1]) - off
 
 
 class Members(NamedTuple):
@@ -449,12 +473,13 @@ class Members(NamedTuple):
     along: ComplexArray  # (ORDER,), of the last test that held: direction or polynomial
     slow: ComplexArray  # (ORDER,)
     q: ComplexArray  # (ORDER,)
+    weights: ComplexArray  # (functions,), of the member that is made next
 
 
-@_inner
-def members(kind: IntArray, delays: int) -> Members:
-    """Return room for members of these kinds."""
-    size = kind.size
+@_maker
+def members(kind: IntArray, functions: Functions) -> Members:
+    """Return room for members of these kinds, combinations of these functions."""
+    size, delays = kind.size, functions.space.delays.size
     return Members(
         kind,
         np.zeros((size, 1 + delays, ORDER), np.complex128),
@@ -462,22 +487,24 @@ def members(kind: IntArray, delays: int) -> Members:
         np.zeros(ORDER, np.complex128),
         np.zeros(ORDER, np.complex128),
         np.zeros(ORDER, np.complex128),
+        np.zeros(functions.steady.shape[0], np.complex128),
     )
 
 
 @_inner
-def mix(weights: ComplexArray, work: Workspace, room: Members, n: int) -> None:
-    """Make member n, a linear combination of the functions."""
+def mix(work: Workspace, room: Members, n: int) -> None:
+    """Make member n, the combination of the functions with the weights."""
     room.v[n] = 0.0
     room.rest[n] = 0.0
-    for f in range(weights.size):
-        a = weights[f]
+    for f in range(room.weights.size):
+        a = room.weights[f]
         if a != 0.0:
             for k in range(work.f.shape[1]):
                 if _acts(work.f[f], k):
                     for i in range(ORDER):
                         room.v[n, k, i] += a * work.f[f, k, i]
-            room.rest[n] += abs(a) * (work.rest[f] + 4.0 * EPSILON * abs(work.f[f, 0, 0]))
+            size = _size(a)
+            room.rest[n] += size * (work.rest[f] + 4.0 * EPSILON * _size(work.f[f, 0, 0]))
 
 
 @_inner
@@ -514,14 +541,14 @@ def excludes_zero(room: Members) -> int:
     for n in range(room.kind.size):
         if room.kind[n] == 2:
             for k in range(room.v.shape[1]):
-                common += abs(room.v[n, k, 0])
+                common += _size(room.v[n, k, 0])
     turned, low, high, last, own = 1.0 + 0j, 10.0, -10.0, 0, 0.0
     for n in range(room.kind.size):
         if room.kind[n] != 1:
             continue
-        size, own = abs(room.v[n, 0, 0]), common
+        size, own = _size(room.v[n, 0, 0]), common
         for k in range(1, room.v.shape[1]):
-            own += abs(room.v[n, k, 0])
+            own += _size(room.v[n, k, 0])
         if not own < size < np.inf:
             return 0
         if vertices == 0:
@@ -545,16 +572,17 @@ def excludes_zero(room: Members) -> int:
         direction = turned * complex(np.cos(middle), np.sin(middle))
     else:
         direction = 0j
-    size = abs(direction)
+    size = _size(direction)
     if size > 0.0:
         room.along[0] = direction / size
         if _holds(room, 0.0):
             return 1
-    gamma = (1.0 - 16.0 * EPSILON) * abs(slow[0])
+    gamma = (1.0 - 16.0 * EPSILON) * _size(slow[0])
     for i in range(1, ORDER):
-        gamma -= abs(slow[i])
+        gamma -= _size(slow[i])
     if gamma > 0.0 and (vertices > 1 or own > 0.0):
-        room.along[:] = slow
+        for i in range(ORDER):
+            room.along[i] = slow[i]
         if _holds(room, gamma):
             return 2
     return 0
@@ -594,10 +622,9 @@ class Question(NamedTuple):
 
 
 @_inner
-def _test_holds(
-    question: Question, level: float, work: Workspace, room: Members, weights: ComplexArray
-) -> bool:
+def _test_holds(question: Question, level: float, work: Workspace, room: Members) -> bool:
     """Whether a test excludes zero at a level."""
+    weights = room.weights
     for i in range(question.kind.shape[0]):
         room.kind[:] = 0
         for n in range(question.kind.shape[1]):
@@ -605,13 +632,13 @@ def _test_holds(
             if room.kind[n]:
                 for f in range(weights.size):
                     weights[f] = question.weights[i, n, f] + level * question.slopes[i, n, f]
-                mix(weights, work, room, n)
+                mix(work, room, n)
         if excludes_zero(room):
             return True
     return False
 
 
-@_inner
+@_maker
 def _arc_holds(
     question: Question,
     level: float,
@@ -619,12 +646,11 @@ def _arc_holds(
     high: float,
     work: Workspace,
     room: Members,
-    weights: ComplexArray,
 ) -> bool:
     """Whether zero is excluded for all psi of the arc, triangle by triangle (Lemma 16)."""
     if not question.arc.size:
         return False
-    loose, functions = question.loose, weights.size
+    weights, loose, functions = room.weights, question.loose, room.weights.size
     arc = question.arc[0] + level * question.arc[1]
     begin = arc[0] + min(arc[1] * low, arc[1] * high)
     span = min(arc[2] + max(arc[3] * low, arc[3] * high) - begin, 2.0 * np.pi)
@@ -637,7 +663,7 @@ def _arc_holds(
         weights[:] = 0.0
         weights[functions - loose + n] = 1.0
         room.kind[3 + n] = 2
-        mix(weights, work, room, 3 + n)
+        mix(work, room, 3 + n)
     for i in range(parts):
         turn = begin + (2 * i + 1) * half
         for n in range(3):
@@ -651,7 +677,7 @@ def _arc_holds(
             weights[0], weights[1] = 1.0, complex(1.0 + less, sine)
             if functions - loose > 2:
                 weights[1], weights[2] = less, complex(0.0, sine)
-            mix(weights, work, room, n)
+            mix(work, room, n)
         if not excludes_zero(room):
             return False
     return True
@@ -689,7 +715,8 @@ def wind(
     number, space = begin.size, functions.space
     total, undecided, steps = np.zeros(number), np.zeros(number), np.zeros(number, np.int64)
     first, last = np.zeros(number, np.complex128), np.zeros(number, np.complex128)
-    room, stack = members(np.ones(1, np.int64), space.delays.size), np.empty((_DEEPEST, 2))
+    stack = np.empty((_DEEPEST, 2))
+    room = members(np.ones(1, np.int64), functions)
     work, along = workspace(space, room.kind.size), np.zeros(ORDER, np.complex128)
     for n in range(number):
         # What is found of a function does not depend on those before it.
@@ -854,7 +881,7 @@ def _crossing(
     return value, omega
 
 
-@_inner
+@_maker
 def _candidate(
     functions: Functions,
     question: Question,
@@ -920,8 +947,7 @@ def walk(
     # What is looked for are the first two functions and the loose ones.
     work, spare = workspace(space, number), workspace(space, 2 + question.loose)
     size = max(question.kind.shape[1], 3 + question.loose)
-    room = members(np.zeros(size, np.int64), space.delays.size)
-    weights = np.zeros(number, np.complex128)
+    room = members(np.zeros(size, np.int64), functions)
     top = pending.shape[0]
     stack = np.empty((top + _DEEPEST, 2))
     stack[:top] = pending
@@ -933,9 +959,9 @@ def walk(
         steps += 1
         level = min(start + (best - start) * (1.0 - question.tolerance), 1e300)
         enclose(functions, m, r, work)
-        if _test_holds(question, level, work, room, weights):
+        if _test_holds(question, level, work, room):
             continue
-        if _arc_holds(question, level, low, high, work, room, weights):
+        if _arc_holds(question, level, low, high, work, room):
             continue
         resolved = work.lead.size == 0 or work.lead[-1] < 0
         if resolved and best > start:
@@ -981,7 +1007,7 @@ class Shared(NamedTuple):
     products: ComplexArray  # (3, 2 ORDER - 1): the functions times the conjugate of M = f_2
     sizes: FloatArray  # (3,): most of the functions, but for their remainders
     least: float  # least of M; negative where this is not known
-    z: ComplexArray  # (2 ORDER - 1): room for a row
+    z: ComplexArray  # (2 ORDER - 1): N conj M of the row that is looked at
     ends: FloatArray  # (2, 2): Im(f_0 conj M) and Im(f_1 conj M) at both ends; nan before
 
 
@@ -993,15 +1019,14 @@ class Row(NamedTuple):
     upper: float
     size: float  # most of N, but for its remainder
     rest: float
-    z: ComplexArray  # (2 ORDER - 1): N conj M
-    off: float  # its error
+    off: float  # error of N conj M, which is z of what is shared
 
 
-# What is known of a row on an interval: no zero, one at most, not enough; or rounding hides it.
+# What is known of a row on an interval: no zero; one at most; not enough; rounding hides it.
 _NONE, _ONE, _OPEN, _HIDDEN = range(4)
 
 
-@_inner
+@_maker
 def _share(
     space: Arrays, interval: tuple[float, float, float, float], around: bool, work: Workspace
 ) -> Shared:
@@ -1009,7 +1034,7 @@ def _share(
     products, sizes = np.zeros((3, 2 * ORDER - 1), np.complex128), np.zeros(3)
     for f in range(3):
         for i in range(ORDER):
-            sizes[f] += abs(work.f[f, 0, i])
+            sizes[f] += _size(work.f[f, 0, i])
             for k in range(ORDER):
                 products[f, i + k] += work.f[f, 0, i] * work.f[2, 0, k].conjugate()
     low, high, m, r = interval
@@ -1017,7 +1042,7 @@ def _share(
     for k in range(space.delays.size):
         fast |= work.lead[k] >= 0
         long |= space.delays[k] * r > _LONG
-    least = -1.0 if fast else 2.0 * abs(work.f[2, 0, 0]) - sizes[2] - work.rest[2]
+    least = -1.0 if fast else 2.0 * _size(work.f[2, 0, 0]) - sizes[2] - work.rest[2]
     z, ends = np.zeros(2 * ORDER - 1, np.complex128), np.full((2, 2), np.nan)
     return Shared(low, high, m, r, around, fast, long, products, sizes, least, z, ends)
 
@@ -1031,17 +1056,18 @@ def _rows_exclude_zero(rows: Rows, here: IntArray, work: Workspace, room: Member
         x0, x1 = min(x0, rows.lower[row]), max(x1, rows.upper[row])
     if x1 == np.inf:
         return False
-    weights = np.ones(3, np.complex128)
+    room.weights[0] = 1.0
     room.kind[:] = 0
     # Of one row two corners suffice.
     for n in range(4 if y0 < y1 else 2):
         room.kind[n] = 1
-        weights[1], weights[2] = -(y0 if n < 2 else y1), -(x0 if n % 2 == 0 else x1)
-        mix(weights, work, room, n)
+        room.weights[1] = -(y0 if n < 2 else y1)
+        room.weights[2] = -(x0 if n % 2 == 0 else x1)
+        mix(work, room, n)
     return bool(excludes_zero(room) > 0)
 
 
-@_inner
+@_inlined
 def _row(rows: Rows, row: int, shared: Shared, work: Workspace) -> Row:
     """Return a row on an interval."""
     y, z, size_m, rest_m = rows.y[row], shared.z, shared.sizes[2], work.rest[2]
@@ -1050,13 +1076,13 @@ def _row(rows: Rows, row: int, shared: Shared, work: Workspace) -> Row:
     size = shared.sizes[0] + abs(y) * shared.sizes[1]
     rest = work.rest[0] + abs(y) * work.rest[1]
     off = (rest + 32.0 * EPSILON * size) * size_m + rest_m * (size + rest)
-    return Row(y, rows.lower[row], rows.upper[row], size, rest, z, off)
+    return Row(y, rows.lower[row], rows.upper[row], size, rest, off)
 
 
-@_inner
+@_inlined
 def _is_outside(row: Row, shared: Shared, work: Workspace) -> bool:
     """Whether Re(N / M) is below `lower` or above `upper` on the whole interval."""
-    z, square, size_m = row.z, shared.products[2], shared.sizes[2]
+    z, square, size_m = shared.z, shared.products[2], shared.sizes[2]
     above = (z[0] - row.upper * square[0]).real
     below = (z[0] - row.lower * square[0]).real
     for k in range(1, z.size):
@@ -1067,18 +1093,18 @@ def _is_outside(row: Row, shared: Shared, work: Workspace) -> bool:
     return bool(above > off or below < -off)
 
 
-@_inner
+@_inlined
 def _decide(row: Row, shared: Shared, work: Workspace) -> tuple[int, float]:
     """Tell what is known of h = Im(N conj M), and its least slope if it is monotonic."""
     varied, bent, everywhere = 0.0, 0.0, row.upper == np.inf
-    for k in range(1, row.z.size):
-        varied += abs(row.z[k].imag)
-        bent += k * abs(row.z[k].imag) if k > 1 else 0.0
-    middle = abs(row.z[0].imag)
+    for k in range(1, shared.z.size):
+        varied += abs(shared.z[k].imag)
+        bent += k * abs(shared.z[k].imag) if k > 1 else 0.0
+    middle = abs(shared.z[0].imag)
     if middle > varied + row.off or (not everywhere and _is_outside(row, shared, work)):
         return _NONE, 0.0
     # Errors of the coefficients, and that of the remainder's slope (Lemma 18).
-    slope = abs(row.z[1].imag) - bent - 10.0 * row.off
+    slope = abs(shared.z[1].imag) - bent - 10.0 * row.off
     if slope > 0.0 and (shared.least > 0.0 or everywhere):
         return _ONE, slope
     settled = middle + varied <= 2.0 * row.off
@@ -1088,7 +1114,7 @@ def _decide(row: Row, shared: Shared, work: Workspace) -> tuple[int, float]:
     return (_HIDDEN if settled else _OPEN), 0.0
 
 
-@_inner
+@_inlined
 def _sign_changes(functions: Functions, row: Row, shared: Shared, spare: Workspace) -> bool:
     """Whether h has two signs at the ends of an interval, of which all rows share the values.
 
@@ -1104,7 +1130,7 @@ def _sign_changes(functions: Functions, row: Row, shared: Shared, spare: Workspa
     return bool((a < 0.0) != (b < 0.0))
 
 
-@_inner
+@_inlined
 def _zero_of_polynomial(z: ComplexArray) -> tuple[float, float]:
     """Return where the imaginary part of a monotonic polynomial is zero, and its slope."""
     t, slope = 0.0, z[1].imag
@@ -1117,7 +1143,7 @@ def _zero_of_polynomial(z: ComplexArray) -> tuple[float, float]:
     return t, slope
 
 
-@_inner
+@_inlined
 def _locate(
     functions: Functions,
     row: Row,
@@ -1133,11 +1159,11 @@ def _locate(
     have another common factor, from which h over |N|^2 + |M|^2 is free (Lemma 18).
     """
     size_m, rest_m = shared.sizes[2], work.rest[2]
-    t, slope = (0.0, row.z[1].imag) if shared.around else _zero_of_polynomial(row.z)
+    t, slope = (0.0, shared.z[1].imag) if shared.around else _zero_of_polynomial(shared.z)
     f, g = _at(work.f[0, 0], t) - row.y * _at(work.f[1, 0], t), _at(work.f[2, 0], t)
     rough = min(2.0 * row.off / least_slope, 2.0)
     off_t = rough
-    slope /= abs(f) ** 2 + abs(g) ** 2
+    slope /= _size(f) ** 2 + _size(g) ** 2
     least_slope /= (row.size + row.rest) ** 2 + (size_m + rest_m) ** 2
     x, spread, before, at = 0.0, np.inf, 0.0, 0.0
     for step in range(8):
@@ -1170,27 +1196,43 @@ def _locate(
     return x, spread, t, off_t if off_t <= 2.0 else rough
 
 
-@_inner
-def _hidden(row: Row, shared: Shared, work: Workspace) -> tuple[float, float]:
-    """Return around which x zeros may lie on an interval, and how far from it."""
-    if not shared.least > 0.0:
-        return 0.0, np.inf
-    x = row.z[0].real / shared.products[2, 0].real
-    reach = row.off + 3.0 * abs(x) * shared.sizes[2] * work.rest[2]
-    for k in range(1, row.z.size):
-        reach += abs(row.z[k].real - x * shared.products[2, k].real)
-    return x, 1.01 * reach / (shared.least * shared.least)
+@_inlined
+def _note(
+    entry: FloatArray,
+    row: int,
+    x: tuple[float, float],
+    omega: tuple[float, float],
+    jump: float,
+) -> None:
+    """Write an entry of the table of `cross`: x and the frequency with how far they are off."""
+    entry[0], entry[5] = row, jump
+    entry[1], entry[2] = x
+    entry[3], entry[4] = omega
 
 
 @_inner
-def _append(table: FloatArray, n: int, entry: tuple[float, ...]) -> FloatArray:
-    """Return a table with entry n, for which room is made."""
-    if n == table.shape[0]:
-        longer = np.empty((2 * n, table.shape[1]))
-        longer[:n] = table
+def _note_hidden(
+    rows: Rows, row: int, shared: Shared, work: Workspace, entry: FloatArray
+) -> None:
+    """Write an undecided interval of a row, and around which x zeros may lie on it."""
+    off, x, spread = _row(rows, row, shared, work).off, 0.0, np.inf
+    if shared.least > 0.0:
+        x = shared.z[0].real / shared.products[2, 0].real
+        reach = off + 3.0 * abs(x) * shared.sizes[2] * work.rest[2]
+        for i in range(1, shared.z.size):
+            reach += abs(shared.z[i].real - x * shared.products[2, i].real)
+        spread = 1.01 * reach / (shared.least * shared.least)
+    _note(entry, row, (x, spread), (shared.m, shared.r), 0.0)
+
+
+@_maker
+def _append(table: FloatArray, n: int, entries: FloatArray) -> FloatArray:
+    """Return a table of n entries with more, for which room is made."""
+    if n + len(entries) > len(table):
+        longer = np.empty((2 * (n + len(entries)), table.shape[1]))
+        longer[:n] = table[:n]
         table = longer
-    for k, value in enumerate(entry):
-        table[n, k] = value
+    table[n : n + len(entries)] = entries
     return table
 
 
@@ -1231,40 +1273,38 @@ def _follow(
     work: Workspace,
     spare: Workspace,
     room: Members,
-    found: FloatArray,
-    n: int,
-) -> tuple[FloatArray, int, int]:
+    entries: FloatArray,
+) -> tuple[int, int]:
     """Decide on an interval what can be decided of some rows.
 
-    Returns the table of crossings, their number, and how many rows are still open.
+    Returns the number of entries, one at most of each row, and how many rows are still open.
     """
-    kept = 0
+    # Rows are tested one by one where that spares a long interval, or M may vanish.
+    alone = here.size == 1 or shared.long or not (shared.fast or shared.least > 0.0)
+    n, kept = 0, 0
     for i in range(here.size):
-        # Rows are tested one by one where that spares a long interval, or M may vanish.
-        alone = here.size == 1 or shared.long or not (shared.fast or shared.least > 0.0)
-        if alone and _rows_exclude_zero(rows, here[i : i + 1], work, room):
-            continue
         row, state, slope = _row(rows, here[i], shared, work), _OPEN, 0.0
         if not shared.fast:
             state, slope = _decide(row, shared, work)
+        if alone and state >= _OPEN and _rows_exclude_zero(rows, here[i : i + 1], work, room):
+            continue
         if state == _ONE:
             if not (shared.around or _sign_changes(functions, row, shared, spare)):
                 continue
             x, spread, t, off_t = _locate(functions, row, shared, slope, fine, work, spare)
             # Where M vanishes x is no number, and the zero counts.
             if not (x + spread < row.lower or x - spread > row.upper):
-                jump = (1.0 if shared.around else 2.0) * np.sign(row.z[1].imag)
-                omega, width = shared.m + shared.r * t, shared.r * off_t
-                found = _append(found, n, (float(here[i]), x, spread, omega, width, jump))
+                jump = (1.0 if shared.around else 2.0) * np.sign(shared.z[1].imag)
+                omega = shared.m + shared.r * t, shared.r * off_t
+                _note(entries[n], here[i], (x, spread), omega, jump)
                 n += 1
         elif state == _HIDDEN:
-            x, spread = _hidden(row, shared, work)
-            found = _append(found, n, (float(here[i]), x, spread, shared.m, shared.r, 0.0))
+            _note_hidden(rows, here[i], shared, work, entries[n])
             n += 1
         elif state == _OPEN:
             still_open[kept] = here[i]
             kept += 1
-    return found, n, kept
+    return n, kept
 
 
 @_entry
@@ -1292,8 +1332,9 @@ def cross(
     number, space = rows.y.size, functions.space
     three = functions.steady.shape[0]
     work, spare = workspace(space, three), workspace(space, three)
-    room = members(np.zeros(4, np.int64), space.delays.size)
-    found, n, unfinished = np.empty((64, 6)), 0, np.zeros(number, np.bool_)
+    room = members(np.zeros(4, np.int64), functions)
+    found, entries, n = np.empty((64, 6)), np.empty((number, 6)), np.int64(0)
+    unfinished = np.zeros(number, np.bool_)
     # Which rows are open, after so many halvings.
     pool, size = np.empty((_DEEPEST + 1, number), np.int64), np.zeros(_DEEPEST + 1, np.int64)
     pool[0], size[0] = np.arange(number), number
@@ -1314,9 +1355,9 @@ def cross(
         enclose(functions, m, r, work)
         if size[d] > 1 and _rows_exclude_zero(rows, here, work, room):
             continue
-        shared, known = _share(space, (low, high, m, r), around, work), n
-        found, n, kept = _follow(
-            functions, rows, here, pool[d + 1], shared, fine, work, spare, room, found, n
+        shared = _share(space, (low, high, m, r), around, work)
+        new, kept = _follow(
+            functions, rows, here, pool[d + 1], shared, fine, work, spare, room, entries
         )
         halved = kept > 0 and d + 1 < _DEEPEST
         if halved and around:
@@ -1328,9 +1369,9 @@ def cross(
             top += 2
         else:
             for row in pool[d + 1, :kept]:
-                x, spread = _hidden(_row(rows, row, shared, work), shared, work)
-                found = _append(found, n, (float(row), x, spread, m, r, 0.0))
-                n += 1
-        for i in range(known, n):
-            undecided += found[i, 5] == 0.0
+                _note_hidden(rows, row, shared, work, entries[new])
+                new += 1
+        found, n = _append(found, n, entries[:new]), n + new
+        for i in range(new):
+            undecided += entries[i, 5] == 0.0
     return found[:n].copy(), unfinished
