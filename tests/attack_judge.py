@@ -130,10 +130,12 @@ class View:
         self.low = 1e-8 * float(self.corners.min())
         for _ in range(60):
             one, two = np.abs(self.at(self.low * np.array([1.0, 0.5])))
-            if one == 0.0 or two < 1.4 * one or one > 1e3 * GAINS:
+            rises, falls = two > 1.4 * one, two < 0.7 * one
+            far = one > 1e3 * GAINS if rises else one < 1e-3 / GAINS
+            if far or not (rises or falls):
                 break
             self.low *= 0.1
-        # L there is a single power of s to some 1e-8.
+        # L there is a single power of s to some 1e-8: constant, or far above or below 1.
         self.power = int(np.round(np.log2(two / one))) if one else 0
 
     def start(self, w1, w2):

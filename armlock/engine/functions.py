@@ -209,7 +209,12 @@ class Function:
     @cached_property
     def weights(self) -> tuple[FloatArray, FloatArray]:
         """S and W, rounded."""
-        return self.steady.astype(np.float64), self.delayed.astype(np.float64)
+        try:
+            return self.steady.astype(np.float64), self.delayed.astype(np.float64)
+        except OverflowError as error:
+            raise ValueError(
+                "the loop must have coefficients below 1e308: choose another unit of time"
+            ) from error
 
     @property
     def is_zero(self) -> bool:

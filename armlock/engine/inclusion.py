@@ -154,6 +154,13 @@ def workspace(space: Arrays, functions: int) -> Workspace:
     )
 
 
+@_inlined
+def _copy(source: Any, target: Any) -> None:
+    """Copy a row; between slices numba copies it twice."""
+    for i in range(source.size):
+        target[i] = source[i]
+
+
 @_inner
 def _size(z: complex) -> float:
     """Magnitude of a complex number; `abs` takes three times as long."""
@@ -399,7 +406,7 @@ def values(functions: Functions, omega: FloatArray) -> ComplexArray:
     found, work = np.empty((n, omega.size), np.complex128), workspace(functions.space, n)
     for i in range(omega.size):
         enclose(functions, omega[i], 0.0, work)
-        found[:, i] = work.f[:, 0, 0]
+        _copy(work.f[:, 0, 0], found[:, i])
     return found
 
 
@@ -581,8 +588,7 @@ def excludes_zero(room: Members) -> int:
     for i in range(1, ORDER):
         gamma -= _size(slow[i])
     if gamma > 0.0 and (vertices > 1 or own > 0.0):
-        for i in range(ORDER):
-            room.along[i] = slow[i]
+        _copy(slow, room.along)
         if _holds(room, gamma):
             return 2
     return 0
@@ -731,7 +737,8 @@ def wind(
             m, r = 0.5 * (low + high), 0.5 * (high - low) + 2.0 * EPSILON * high
             steps[n] += 1
             enclose(one, m, r, work)
-            room.v[0] = work.f[0]
+            for k in range(1 + space.delays.size):
+                _copy(work.f[0, k], room.v[0, k])
             room.rest[0] = work.rest[0]
             held = excludes_zero(room)
             if not held:
@@ -740,7 +747,7 @@ def wind(
                     break
                 top += 2
                 continue
-            along[:] = room.along
+            _copy(room.along, along)
             if held == 1:
                 along[1:] = 0.0
             # An end takes part in two intervals with one value. What that is off by is below a
@@ -950,7 +957,8 @@ def walk(
     room = members(np.zeros(size, np.int64), functions)
     top = pending.shape[0]
     stack = np.empty((top + _DEEPEST, 2))
-    stack[:top] = pending
+    for i in range(top):
+        _copy(pending[i], stack[i])
     undecided, left, steps = np.empty((FEW_UNDECIDED, 2)), 0, 0
     while top > 0 and steps < most and left < FEW_UNDECIDED:
         top -= 1
@@ -1230,9 +1238,11 @@ def _append(table: FloatArray, n: int, entries: FloatArray) -> FloatArray:
     """Return a table of n entries with more, for which room is made."""
     if n + len(entries) > len(table):
         longer = np.empty((2 * (n + len(entries)), table.shape[1]))
-        longer[:n] = table[:n]
+        for i in range(n):
+            _copy(table[i], longer[i])
         table = longer
-    table[n : n + len(entries)] = entries
+    for i in range(len(entries)):
+        _copy(entries[i], table[n + i])
     return table
 
 
@@ -1337,7 +1347,9 @@ def cross(
     unfinished = np.zeros(number, np.bool_)
     # Which rows are open, after so many halvings.
     pool, size = np.empty((_DEEPEST + 1, number), np.int64), np.zeros(_DEEPEST + 1, np.int64)
-    pool[0], size[0] = np.arange(number), number
+    size[0] = number
+    for row in range(number):
+        pool[0, row] = row
     stack, depth = np.empty((_DEEPEST + 3, 2)), np.zeros(_DEEPEST + 3, np.int64)
     top, steps, undecided = _first_intervals(stack, begin, end, is_map), 0, 0
     while top > 0:
