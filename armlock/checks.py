@@ -54,6 +54,13 @@ def whole_number(name: str, value: object, lowest: int) -> int:
     return int(value)
 
 
+def true_or_false(name: str, value: object) -> bool:
+    """Return a Python or NumPy truth value, or raise."""
+    if not isinstance(value, bool | np.bool_):
+        raise TypeError(f"{name} must be True or False, got {value!r}")
+    return bool(value)
+
+
 def one_of(name: str, value: object, allowed: Collection[str]) -> str:
     """Return a text that is one of those allowed, or raise."""
     if not isinstance(value, str) or value not in allowed:

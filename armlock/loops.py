@@ -14,6 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import zip_longest
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ from armlock.checks import (
     one_of,
     positive_number,
     real_number,
+    true_or_false,
 )
 from armlock.controllers import Controller, integrating_actuator, table_two, white_paper
 from armlock.delays import DelaySystem, QuasiPolynomial, Term, WithDelays, functions
@@ -336,6 +338,16 @@ def _mapping_and_delays(
     return mapping, tau1, tau2
 
 
+def _gain(gain: object, sensor: str) -> float:
+    """Return a positive gain, or say what to write with a controller in its place."""
+    if isinstance(gain, Real):
+        return positive_number("gain", gain)
+    raise TypeError(
+        f"gain must be a real number, got {gain!r:.200}; with a controller of your own write "
+        f'Loop(controller, "{sensor}", ...)'
+    )
+
+
 def checked_loop(loop: Loop) -> Loop:
     """Return the loop, or say what was given in its place."""
     if not isinstance(loop, Loop):
@@ -394,7 +406,7 @@ def SingleArm(
     >>> unstable_roots(SingleArm(gain=1.0, tau1=20.1), [0.99, 1.0, 1.01], 0.0)
     array([0, 0, 1])
     """
-    return Loop(integrating_actuator(gain), SINGLE, tau1, delay=delay)
+    return Loop(integrating_actuator(_gain(gain, "single")), SINGLE, tau1, delay=delay)
 
 
 def CommonArm(
@@ -435,7 +447,7 @@ def CommonArm(
     >>> unstable_roots(CommonArm(gain=10.0), 1.0, 0.999)
     array(0)
     """
-    return Loop(integrating_actuator(gain), COMMON, tau1, tau2, delay)
+    return Loop(integrating_actuator(_gain(gain, "common")), COMMON, tau1, tau2, delay)
 
 
 def DualArm(
@@ -497,7 +509,7 @@ def DualArm(
     array([1, 0, 0])
     """
     mapping = sensors.dual(corner, tau1 - tau2 if difference is None else difference)
-    return Loop(integrating_actuator(gain), mapping, tau1, tau2, delay)
+    return Loop(integrating_actuator(_gain(gain, "dual")), mapping, tau1, tau2, delay)
 
 
 def paper_loop(
@@ -553,7 +565,7 @@ def paper_loop(
     array([0, 0])
     """
     chosen = table_two() if controller is None else Controller.of(controller)
-    if actuator:
+    if true_or_false("actuator", actuator):
         chosen = chosen * integrating_actuator()
     mapping = sensors.dual(corner, tau1 - tau2 if difference is None else difference)
     return Loop(chosen, mapping, tau1, tau2, delay)
@@ -612,6 +624,10 @@ def flight_loop(
     array([0, 2])
     """
     mapping = modified_dual(mean_delay, half_difference, corner)
+    if abs(half_difference) >= mean_delay:
+        raise ValueError(
+            f"half_difference must be below mean_delay ({mean_delay}), got {half_difference}"
+        )
     tau1, tau2 = mean_delay + half_difference, mean_delay - half_difference
     return Loop(white_paper(0.5 * positive_number("g2", g2)), mapping, tau1, tau2, delay)
 

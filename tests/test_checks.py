@@ -127,6 +127,7 @@ WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
     (CommonArm, "gain", 0.0, "be positive, got 0.0"),
     (CommonArm, "delay", np.array([0.1, 0.2]), "be a real number, got array([0.1, 0.2])"),
     (ARMS.neutral_margin, "c1", "1.0", "hold real numbers"),
+    (paper_loop, "actuator", "no", "be True or False, got 'no'"),
     (armlock.transfer, "s", 0.0, "not be a pole of the open loop, got 0j"),
     (armlock.Controller, "gain", 0.0, "not be zero"),
     (armlock.Controller, "poles", (1j,), "be real or in conjugate pairs"),
@@ -164,6 +165,7 @@ WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
     ),
     (armlock.flight_loop, "half_difference", 0.0, "not be zero"),
     (armlock.noise_budget, "frequency", [0.0, 1.0], "be positive"),
+    (armlock.flight_loop, "half_difference", 33.6, "be below mean_delay"),
     (armlock.pulling, "time", [0.0, 1.0], "be positive"),
     (armlock.pulling, "common", (1.0,), "hold nu0, gamma and alpha"),
 ]

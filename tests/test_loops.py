@@ -8,6 +8,7 @@ import pytest
 
 from armlock import (
     CommonArm,
+    Controller,
     DelaySystem,
     DualArm,
     Loop,
@@ -148,6 +149,13 @@ def test_advice_does_not_change_what_a_loop_is():
     assert loop.__class__ is Loop
     assert not hasattr(loop, "gains")
     assert copy.copy(loop) == pickle.loads(pickle.dumps(loop)) == loop
+
+
+@pytest.mark.parametrize("arm", [SingleArm, CommonArm, DualArm])
+@pytest.mark.parametrize("controller", [Controller(*K), K, PLANT])
+def test_a_controller_in_place_of_a_gain_is_told_what_to_write(arm, controller):
+    with pytest.raises(TypeError, match=r"(?s)^gain must .* write Loop\(controller, "):
+        arm(controller, 20.0)
 
 
 def test_what_is_missing_is_named():

@@ -115,7 +115,7 @@ def test_at_rest_starts_at_zero():
     assert np.abs(full).min() > 100.0
 
 
-def test_what_cannot_be_a_block_is_refused_before_anything_is_drawn():
+def test_what_cannot_be_a_block_or_a_flag_is_refused_before_anything_is_drawn():
     source = LaserNoise(1)
     for name, arguments in (
         ("size", (10, -1)), ("size", (10, 0)), ("samples", (-1,)), ("samples", (1.5,)),
@@ -123,6 +123,8 @@ def test_what_cannot_be_a_block_is_refused_before_anything_is_drawn():
         with pytest.raises(ValueError, match=f"^{name} must be an integer"):
             source.blocks(*arguments)
     assert np.array_equal(source.draw(3), LaserNoise(1).draw(3))
+    with pytest.raises(TypeError, match=r"^at_rest must be True or False"):
+        LaserNoise(1, at_rest="no")  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("name", ["perturbation", "own filter"])

@@ -286,6 +286,7 @@ def test_a_delay_may_outgrow_what_the_run_began_with():
         ),
         (lambda t: t[:-1], r"tau1\(t\) must have the shape of t, \(100,\), got \(99,\)"),
         (lambda t: np.where(t < 1.0, 2.0, np.nan), r"tau1\(t\) must be finite, got nan .* 20"),
+        (2.6, r"tau1 must be a function of the time in s, got 2.6; loop.replace\(tau1"),
     ],
 )
 def test_a_delay_that_cannot_be_is_refused(tau, message):

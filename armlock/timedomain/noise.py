@@ -19,6 +19,7 @@ from armlock.checks import (
     check_memory,
     positive_number,
     real_array,
+    true_or_false,
     whole_number,
 )
 from armlock.compiled import njit
@@ -138,7 +139,7 @@ class ShapedNoise:
         self._scale = math.sqrt(0.5 * self.sample_rate)
         self._state = np.zeros(2 * len(self._sampled.sections))
         self._root = stationary_root(self._sampled)
-        if not at_rest:
+        if not true_or_false("at_rest", at_rest):
             order = self._sampled.order
             start = self._root @ self._random.standard_normal(order)
             self._state[:order] = self._scale * start

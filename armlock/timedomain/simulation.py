@@ -261,7 +261,8 @@ class Simulation:
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no loop or has a dead time, or the sample rate is too low for its delays.
+        If `loop` is no loop or has a dead time, the sample rate is too low for its delays, or
+        `tau1` or `tau2` is no function.
 
     Notes
     -----
@@ -304,6 +305,12 @@ class Simulation:
         self.limit = positive_number("limit", limit)
         self.samples = 0
         self._moving = {"tau1": tau1, "tau2": tau2}
+        for name, move in self._moving.items():
+            if move is not None and not callable(move):
+                raise TypeError(
+                    f"{name} must be a function of the time in s, got {move!r}; "
+                    f"loop.replace({name}=...) gives the loop another constant delay"
+                )
         self._weights = _constant(loop, self.sample_rate)
         self._latest: dict[str, float] = {}
         self._diverged = False

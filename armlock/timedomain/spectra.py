@@ -110,6 +110,8 @@ class Spectrum:
         TypeError, ValueError
             If `asd` does not return finite real numbers.
         """
+        if not callable(asd):
+            raise TypeError(f"asd must be a function of the frequency, got {asd!r}")
         spread, weights = _response()
         result = np.empty(self.frequency.size)
         for i, centre in enumerate(self.frequency):
@@ -123,6 +125,8 @@ class Spectrum:
 
     def within(self, low: float, high: float) -> Spectrum:
         """Return the bands whose centres lie between two frequencies in Hz."""
+        if not high >= low:
+            raise ValueError(f"high must not lie below low = {low}, got {high}")
         keep = (self.frequency >= low) & (self.frequency <= high)
         return Spectrum(*(getattr(self, field.name)[keep] for field in fields(self)))
 
