@@ -161,11 +161,11 @@ def _copy(source: Any, target: Any) -> None:
         target[i] = source[i]
 
 
-@_inner
-def _size(z: complex) -> float:
-    """Magnitude of a complex number; `abs` takes three times as long."""
-    square = z.real * z.real + z.imag * z.imag
-    return float(np.sqrt(square)) if 1e-280 < square < 1e300 else abs(z)
+@_inlined
+def _scale(row: Any, by: float) -> None:
+    """Multiply a row by a number."""
+    for i in range(row.size):
+        row[i] *= by
 
 
 @_inlined
@@ -196,7 +196,7 @@ def _expand_piece(space: Arrays, m: float, r: float, work: Workspace) -> None:
                 p[0] *= w
                 if space.computed[j, k]:
                     # What is missed is a share of the product of abs(s) + abs(root).
-                    missed *= (m + r + _size(z)) * f / size
+                    missed *= (m + r + abs(z)) * f / size
             else:
                 for i in range(ORDER):
                     p[i] *= f
@@ -205,20 +205,16 @@ def _expand_piece(space: Arrays, m: float, r: float, work: Workspace) -> None:
             if bound[0] > _HUGE or 0.0 < bound[0] < 1.0 / _HUGE:
                 by = 1.0 / _HUGE if bound[0] > 1.0 else _HUGE
                 shift += 1 if bound[0] > 1.0 else -1
-                for i in range(ORDER):
-                    p[i] *= by
-                    bound[i] *= by
-                bound[ORDER] *= by
+                _scale(p, by)
+                _scale(bound, by)
         work.error[j] = 8.0 * (n + 1) * EPSILON + missed
         work.shift[j] = shift
         top = shift if j == 0 else max(top, shift)
     for j in range(space.lead.size):
         if work.shift[j] != top:
             by = _HUGE ** float(max(work.shift[j] - top, -2))
-            for i in range(ORDER):
-                work.piece_p[j, i] *= by
-                work.piece_bound[j, i] *= by
-            work.piece_bound[j, ORDER] *= by
+            _scale(work.piece_p[j], by)
+            _scale(work.piece_bound[j], by)
 
 
 # Two pi in three parts, of which the first two have 27 digits: their products with a number of
@@ -316,12 +312,7 @@ def expand(space: Arrays, m: float, r: float, work: Workspace) -> None:
 
 @_inlined
 def _bracket(
-    steady: float,
-    row: FloatArray,
-    uncertain: float,
-    lead: int,
-    order: int,
-    work: Workspace,
+    steady: float, row: FloatArray, uncertain: float, lead: int, work: Workspace
 ) -> tuple[bool, float]:
     """Expand S + sum_k W_k (exp(-s theta_k) - 1), as far as it follows one free phase.
 
@@ -348,19 +339,19 @@ def _bracket(
         if lead >= 0:
             work.g[0] += weight
             wrong += size * few
-        for i in range(order):
+        for i in range(ORDER):
             work.g[i] += weight * work.turn[k, i]
             power *= x / (i + 1)
         work.b[ORDER] += power
-        wrong += size * few * (_size(work.turn[k, 0]) + 6.0 * grown)
+        wrong += size * few * (abs(work.turn[k, 0]) + 6.0 * grown)
         wrong += size * work.slip[k] * (1.0 + grown)
-    for i in range(order - 1 if used else -1, -1, -1):
-        work.b[i] = _size(work.g[i]) + (i + 1) * work.b[i + 1]
+    for i in range(ORDER - 1, -1, -1):
+        work.b[i] = abs(work.g[i]) + (i + 1) * work.b[i + 1]
     return used, wrong
 
 
 @_inlined
-def combine(functions: Functions, n: int, order: int, work: Workspace) -> None:
+def combine(functions: Functions, n: int, work: Workspace) -> None:
     """Enclose function n on the expanded interval (Lemmas 4, 7)."""
     steady, delayed, uncertain = (
         functions.steady[n],
@@ -374,12 +365,12 @@ def combine(functions: Functions, n: int, order: int, work: Workspace) -> None:
         for lead in range(-1, delays):
             if lead >= 0 and work.lead[lead] != lead:
                 continue
-            used, wrong = _bracket(steady[j], delayed[j], uncertain[j], lead, order, work)
+            used, wrong = _bracket(steady[j], delayed[j], uncertain[j], lead, work)
             if not used:
                 continue
             rest += work.bound[j, ORDER] * work.b[0]
             rounding += work.bound[j, 0] * ((work.error[j] + sums) * work.b[0] + wrong)
-            for i in range(order):
+            for i in range(ORDER):
                 total = 0j
                 for low in range(i + 1):
                     total += work.p[j, low] * work.g[i - low]
@@ -394,9 +385,8 @@ def combine(functions: Functions, n: int, order: int, work: Workspace) -> None:
 def enclose(functions: Functions, m: float, r: float, work: Workspace) -> None:
     """Enclose functions on an interval, as many as the workspace has room for."""
     expand(functions.space, m, r, work)
-    # At a point there is a value, and nothing else.
     for n in range(work.f.shape[0]):
-        combine(functions, n, ORDER if r > 0.0 else 1, work)
+        combine(functions, n, work)
 
 
 @_entry
@@ -439,7 +429,7 @@ def _divide(c: ComplexArray, by: ComplexArray, quotient: ComplexArray) -> float:
         if n < ORDER:
             quotient[n] = v / by[0]
         else:
-            left += _size(v)
+            left += abs(v)
     return left
 
 
@@ -460,15 +450,15 @@ def _least(
         # The quotient rounds by less than 64 EPSILON.
         off = _divide(c, along, q)
         for i in range(ORDER):
-            off += 64.0 * EPSILON * _size(c[i])
+            off += 64.0 * EPSILON * abs(c[i])
         off /= gamma
     if vertex:
         for i in range(2, ORDER):
             off += abs(q[i].real)
         return (q[0] - q[1]).real - off, (q[0] + q[1]).real - off
     for i in range(2, ORDER):
-        off += _size(q[i])
-    return -_size(q[0] - q[1]) - off, -_size(q[0] + q[1]) - off
+        off += abs(q[i])
+    return -abs(q[0] - q[1]) - off, -abs(q[0] + q[1]) - off
 
 
 class Members(NamedTuple):
@@ -510,8 +500,7 @@ def mix(work: Workspace, room: Members, n: int) -> None:
                 if _acts(work.f[f], k):
                     for i in range(ORDER):
                         room.v[n, k, i] += a * work.f[f, k, i]
-            size = _size(a)
-            room.rest[n] += size * (work.rest[f] + 4.0 * EPSILON * _size(work.f[f, 0, 0]))
+            room.rest[n] += abs(a) * (work.rest[f] + 4.0 * EPSILON * abs(work.f[f, 0, 0]))
 
 
 @_inner
@@ -548,14 +537,14 @@ def excludes_zero(room: Members) -> int:
     for n in range(room.kind.size):
         if room.kind[n] == 2:
             for k in range(room.v.shape[1]):
-                common += _size(room.v[n, k, 0])
+                common += abs(room.v[n, k, 0])
     turned, low, high, last, own = 1.0 + 0j, 10.0, -10.0, 0, 0.0
     for n in range(room.kind.size):
         if room.kind[n] != 1:
             continue
-        size, own = _size(room.v[n, 0, 0]), common
+        size, own = abs(room.v[n, 0, 0]), common
         for k in range(1, room.v.shape[1]):
-            own += _size(room.v[n, k, 0])
+            own += abs(room.v[n, k, 0])
         if not own < size < np.inf:
             return 0
         if vertices == 0:
@@ -579,14 +568,14 @@ def excludes_zero(room: Members) -> int:
         direction = turned * complex(np.cos(middle), np.sin(middle))
     else:
         direction = 0j
-    size = _size(direction)
+    size = abs(direction)
     if size > 0.0:
         room.along[0] = direction / size
         if _holds(room, 0.0):
             return 1
-    gamma = (1.0 - 16.0 * EPSILON) * _size(slow[0])
+    gamma = (1.0 - 16.0 * EPSILON) * abs(slow[0])
     for i in range(1, ORDER):
-        gamma -= _size(slow[i])
+        gamma -= abs(slow[i])
     if gamma > 0.0 and (vertices > 1 or own > 0.0):
         _copy(slow, room.along)
         if _holds(room, gamma):
@@ -1042,7 +1031,7 @@ def _share(
     products, sizes = np.zeros((3, 2 * ORDER - 1), np.complex128), np.zeros(3)
     for f in range(3):
         for i in range(ORDER):
-            sizes[f] += _size(work.f[f, 0, i])
+            sizes[f] += abs(work.f[f, 0, i])
             for k in range(ORDER):
                 products[f, i + k] += work.f[f, 0, i] * work.f[2, 0, k].conjugate()
     low, high, m, r = interval
@@ -1050,7 +1039,7 @@ def _share(
     for k in range(space.delays.size):
         fast |= work.lead[k] >= 0
         long |= space.delays[k] * r > _LONG
-    least = -1.0 if fast else 2.0 * _size(work.f[2, 0, 0]) - sizes[2] - work.rest[2]
+    least = -1.0 if fast else 2.0 * abs(work.f[2, 0, 0]) - sizes[2] - work.rest[2]
     z, ends = np.zeros(2 * ORDER - 1, np.complex128), np.full((2, 2), np.nan)
     return Shared(low, high, m, r, around, fast, long, products, sizes, least, z, ends)
 
@@ -1171,7 +1160,7 @@ def _locate(
     f, g = _at(work.f[0, 0], t) - row.y * _at(work.f[1, 0], t), _at(work.f[2, 0], t)
     rough = min(2.0 * row.off / least_slope, 2.0)
     off_t = rough
-    slope /= _size(f) ** 2 + _size(g) ** 2
+    slope /= abs(f) ** 2 + abs(g) ** 2
     least_slope /= (row.size + row.rest) ** 2 + (size_m + rest_m) ** 2
     x, spread, before, at = 0.0, np.inf, 0.0, 0.0
     for step in range(8):
