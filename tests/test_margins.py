@@ -370,6 +370,28 @@ def test_roots_that_cross_just_below_the_limit_of_the_chain_come_first():
         assert counts[0] == 0
 
 
+def test_a_gain_margin_at_millions_of_rad_per_s_is_at_a_crossing():
+    """One step of a float turns 20 s by 1e-8 rad there, and L is small: it changes by 1e-3."""
+    zeros, poles = [0.0, 0.0, -7e-8, *[-2.8e-5] * 2, -2.9e-5], [*[-6.4e-6] * 2, -6.9e-6]
+    poles += [-3e-4, -2.5e-3, -3.5e-4]
+    loop = Loop((zeros, poles, 3850.0), dual(2.5, 20.1 - 19.9), 20.1, 19.9)
+    found = margins(loop, 1.000000018, 1.00000052)
+    with mpmath.workdps(30):
+        step = found.gain_omega * mpmath.mpf(2.0) ** -50
+
+        def open_loop(omega):
+            s = mpmath.mpc(0, omega)
+            gain = 3850 * mpmath.fprod(s - z for z in zeros) / mpmath.fprod(s - p for p in poles)
+            e = mpmath.mpf(2.5) / ((s + 2.5) * s * mpmath.mpf(20.1 - 19.9))
+            arm1 = 1 - mpmath.mpf(1.000000018) * mpmath.exp(-s * mpmath.mpf(20.1))
+            arm2 = 1 - mpmath.mpf(1.00000052) * mpmath.exp(-s * mpmath.mpf(19.9))
+            return gain * ((1 + e) * arm1 + (1 - e) * arm2)
+
+        ends = found.gain_omega - step, found.gain_omega + step
+        omega = mpmath.findroot(lambda w: open_loop(w).imag, ends, solver="anderson", tol=1e-40)
+        assert found.gain_upper == pytest.approx(float(-1 / open_loop(omega).real), rel=1e-6)
+
+
 @pytest.mark.parametrize(("gain", "damping"), [(1e-3, 1e-2), (1e-3, 1e-3), (1e-2, 1e-2)])
 def test_free_phases_of_a_difference_fill_a_disc_around_zero(gain, damping):
     """Of radius 2 |K|. At a resonance it may hold -1: the walk comes there in few steps."""

@@ -849,13 +849,15 @@ def sample(
 
 @_inner
 def _crossing(
-    functions: Functions, goal: int, a: float, b: float, spare: Workspace
+    functions: Functions, question: Question, a: float, b: float, spare: Workspace
 ) -> tuple[float, float]:
     """Return the value where a function of `_aim` is zero between two frequencies, and where.
 
-    By the rule of false position, with the weight of an end halved that stays (Illinois); inf
-    where the function has one sign at both.
+    By the rule of false position, with the weight of an end halved that stays (Illinois). It is
+    inf where the function has one sign at both, or where neighbours in double precision do not
+    agree on the value.
     """
+    goal = question.goal
     at_a, _ = _measure(functions, goal, a, spare)
     at_b, _ = _measure(functions, goal, b, spare)
     if (at_a < 0.0) == (at_b < 0.0):
@@ -874,7 +876,10 @@ def _crossing(
             a, at_a = omega, here
             at_b = 0.5 * at_b if side == -1 else at_b
             side = -1
-    return value, omega
+    _, below = _measure(functions, goal, omega * (1.0 - 4.0 * EPSILON), spare)
+    _, above = _measure(functions, goal, omega * (1.0 + 4.0 * EPSILON), spare)
+    resolved = abs(above - below) <= question.tolerance * (value - question.start)
+    return value if resolved else np.inf, omega
 
 
 @_maker
@@ -916,7 +921,7 @@ def _candidate(
         changes = (h[i] < 0.0) != (h[i + 1] < 0.0)
         if changes and min(v[i], v[i + 1]) < found + abs(v[i] - v[i + 1]):
             a, b = m + r * (0.25 * i - 1.0), m + r * (0.25 * i - 0.75)
-            value, omega = _crossing(functions, goal, a, b, spare)
+            value, omega = _crossing(functions, question, a, b, spare)
             if start < value < found:
                 found, where = value, omega
     return found, where
