@@ -325,6 +325,14 @@ def test_an_all_pass_just_below_unity_gain_is_stable_up_to_unity_gain(gain):
     assert upper == pytest.approx(1.0 / gain, rel=1e-14)
 
 
+def test_an_all_pass_just_below_unity_gain_has_no_crossover():
+    # L turns without end next to the unit circle, and is as good as -1 once in each turn.
+    loop = Loop(Controller([1.0], [-1.0], 1.0 - 1e-9), SINGLE, 1.0, 1.0, delay=0.5)
+    found = margins(loop, 0.0)
+    assert (found.phase, found.delay) == (np.inf, np.inf)
+    assert found.modulus == pytest.approx(1e-9, rel=1e-6)
+
+
 def test_what_l_fills_may_have_one_on_its_edge():
     # L = 4 - 2 exp(-2 s) is nearest to -1 at 2, and never of magnitude one.
     found = margins(Loop(((), (), 4.0), SINGLE, 2.0, 1.5), 0.5)

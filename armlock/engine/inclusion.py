@@ -456,6 +456,17 @@ def _least(
         for i in range(2, ORDER):
             off += abs(q[i].real)
         return (q[0] - q[1]).real - off, (q[0] + q[1]).real - off
+    if gamma > 0.0:
+        # The square of the magnitude, which turning alone leaves as it is.
+        square, size = 0.0, 0.0
+        for n in range(2 * ORDER - 1):
+            power = 0.0
+            for i in range(max(0, n - ORDER + 1), min(n + 1, ORDER)):
+                power += (q[i] * q[n - i].conjugate()).real
+            square += abs(power)
+            size += abs(q[n]) if n < ORDER else 0.0
+        off += np.sqrt(square + 16.0 * EPSILON * size * size)
+        return -off, -off
     for i in range(2, ORDER):
         off += abs(q[i])
     return -abs(q[0] - q[1]) - off, -abs(q[0] + q[1]) - off
