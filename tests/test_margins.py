@@ -389,7 +389,8 @@ def test_a_gain_margin_at_millions_of_rad_per_s_is_at_a_crossing():
 
         def open_loop(omega):
             s = mpmath.mpc(0, omega)
-            gain = 3850 * mpmath.fprod(s - z for z in zeros) / mpmath.fprod(s - p for p in poles)
+            gain = 3850 * mpmath.fprod(s - z for z in zeros)
+            gain /= mpmath.fprod(s - p for p in poles)
             e = mpmath.mpf(2.5) / ((s + 2.5) * s * mpmath.mpf(20.1 - 19.9))
             arm1 = 1 - mpmath.mpf(1.000000018) * mpmath.exp(-s * mpmath.mpf(20.1))
             arm2 = 1 - mpmath.mpf(1.00000052) * mpmath.exp(-s * mpmath.mpf(19.9))

@@ -198,6 +198,13 @@ def test_crossings_are_none_of_a_weak_loop():
     assert axis_crossings(weak).omega.size == 0
 
 
+def test_a_curve_through_zero_does_not_cross_the_negative_axis_there():
+    """Both arms vanish at multiples of 62.83 rad/s: there L is rounding of either sign."""
+    crossings = axis_crossings(paper_loop(), omega_max=1e4)
+    assert crossings.omega.size == 3
+    assert (crossings.value < -0.1).all()
+
+
 def test_a_pole_on_the_axis_is_no_crossing():
     loop = Loop(((), (2j, -2j, -1.0), 8.0), SINGLE, 2.0, 2.0)
     crossings = axis_crossings(loop, 1.5, omega_max=20.0)

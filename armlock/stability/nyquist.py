@@ -17,6 +17,7 @@ from armlock.checks import ComplexArray, FloatArray, positive_number
 from armlock.delays import DelaySystem
 from armlock.engine import decide
 from armlock.engine.functions import Function, at, common_zeros, stacked
+from armlock.engine.inclusion import EPSILON
 from armlock.engine.polynomials import rounded
 from armlock.loops import Loop, quotient_of
 from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 # Where |L| is below it no crossing of the negative real axis is of interest, and above the
 # other one a pole is on the axis.
 _SMALL, _LARGE = 1e-3, 1e12
+# To this share the floating-point frequencies next to a crossing have to agree on L.
+_AGREED = 1e-3
 # The share of a leading term that all others are at most, where a picture begins.
 _NEGLIGIBLE = 5e-4
 
@@ -294,7 +297,8 @@ def axis_crossings(
     -----
     These are zeros of Im L at omega > 0. Certified steps find them, so none is missed, however
     close to another. A pole on the axis, or a value beyond 1e12, is not a crossing. Where |L|
-    is above 1e-3 and rounding may hide a crossing, `CountError` is raised.
+    is above 1e-3 and rounding may hide a crossing, or its value, `CountError` is raised. Where
+    |L| is below it, as where the curve passes through 0, such a crossing is left out.
 
     Examples
     --------
@@ -333,15 +337,19 @@ def axis_crossings(
     )  # fmt: skip
     told = found.jump != 0
     hidden = ~told & (found.x - found.spread < -_SMALL) & (found.x + found.spread > -_LARGE)
+    below, value, above = (
+        _response(n, m, found.omega * (1.0 + k * EPSILON)).real for k in (-4, 0, 4)
+    )
+    agreed = np.abs(above - below) <= _AGREED * np.abs(value)
+    hidden |= told & ~agreed & (value < -_SMALL) & (value > -_LARGE)
     if found.unfinished.any() or hidden.any():
         why = "they take too many steps"
         if hidden.any():
             why = f"rounding hides some around {found.omega[hidden][0]} rad/s"
         raise CountError(f"no crossings at (c1, c2) = ({c1}, {c2}): {why}", point)
-    omega = np.sort(found.omega[told])
-    value = _response(n, m, omega).real
-    kept = (value < -least) & (value > -_LARGE)
-    return AxisCrossings(omega[kept], value[kept])
+    kept = told & agreed & (value < -least) & (value > -_LARGE)
+    order = np.argsort(found.omega[kept])
+    return AxisCrossings(found.omega[kept][order], value[kept][order])
 
 
 def _constant_sign_up_to(n: Function, m: Function) -> float:
