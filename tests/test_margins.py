@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+import control
 import mpmath
 import numpy as np
 import pytest
@@ -432,6 +433,32 @@ def test_forty_poles_do_not_overflow(size):
     assert stability_chart(weak, [0.5], [0.0]).counts == unstable_roots(weak, 0.5)
     if size > 1.0:
         assert margins(weak, 0.5).modulus == pytest.approx(1.0, rel=1e-6)
+
+
+def arms_over(polynomial, gains, lags, size):
+    """A sum of delays over a polynomial, all coefficients times the size."""
+    constants = [DelaySystem.of(control.tf([size * gain], [1.0])) for gain in gains]
+    arms = sum(gain * delay(lag) for gain, lag in zip(constants, lags, strict=True))
+    return arms / control.tf([size * value for value in polynomial], [1.0])
+
+
+@pytest.mark.parametrize("size", [1e-159, 1e-163, 1e-200])
+@pytest.mark.parametrize(
+    "parts",
+    [
+        ([1.954, 2.491, 1.356], [2.084, 2.805, 2.3], [6.05, 35.065, 0.273]),
+        ([2.409, 1.982, 0.755], [-1.657, -1.783, 2.345], [3.295, 27.96, 0.448]),
+        ([1.0, 3.0, 1.0], [3.0, 1.0], [0.5, 5.0]),
+    ],
+)
+def test_tiny_coefficients_do_not_underflow(parts, size):
+    plain, tiny = arms_over(*parts, size=1.0), arms_over(*parts, size=size)
+    assert unstable_roots(tiny) == unstable_roots(plain)
+    assert modulus_margin(tiny) == pytest.approx(modulus_margin(plain), rel=1e-9)
+    if unstable_roots(plain) == 0:
+        assert list(vars(margins(tiny)).values()) == pytest.approx(
+            list(vars(margins(plain)).values()), rel=1e-6
+        )
 
 
 @pytest.mark.parametrize("size", [1e-20, 1e20])

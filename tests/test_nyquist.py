@@ -6,6 +6,7 @@ import time
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from armlock import (
     CommonArm,
@@ -203,6 +204,20 @@ def test_a_curve_through_zero_does_not_cross_the_negative_axis_there():
     crossings = axis_crossings(paper_loop(), omega_max=1e4)
     assert crossings.omega.size == 3
     assert (crossings.value < -0.1).all()
+
+
+def test_a_steep_curve_crosses_once_in_each_turn():
+    """In each turn |L| falls from 2e4 to 1 and rises again within some 1e-4 rad/s."""
+    loop = Loop(((-1.0,), (-3.0,), 1e4), SINGLE, 2.0, 1.5)
+    crossings = axis_crossings(loop, 1.0001, omega_max=60.0)
+    turns = np.pi * np.arange(1, 20)
+    exact = [
+        brentq(lambda w: loop(1j * w, 1.0001).imag, w, w + 1e-4, xtol=1e-14) for w in turns
+    ]
+    np.testing.assert_allclose(crossings.omega, exact, rtol=1e-13)
+    np.testing.assert_allclose(
+        crossings.value, loop(1j * np.array(exact), 1.0001).real, rtol=1e-8
+    )
 
 
 def test_a_pole_on_the_axis_is_no_crossing():

@@ -28,7 +28,7 @@ BOUNDARY = -1
 #: What a count is where infinitely many roots do not stay left of the axis.
 UNCONFINED = -2
 
-# Most steps of a count, and of a search; some three seconds each.
+# Most steps of a count, and of a search; up to ten seconds each.
 _MOST_STEPS = 1_500_000
 _MOST_SEARCHED = 2_000_000
 # Steps between two looks at the keyboard.

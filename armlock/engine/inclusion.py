@@ -42,6 +42,8 @@ _PIECE, _SUBINTERVALS = 0.02, 4096.0
 # Undecided intervals after which a search ends; and, of a row on average, after which rows are
 # followed no further. Rounding hides much of the axis where N is nearly a multiple of M.
 FEW_UNDECIDED, _MANY_UNDECIDED = 16, 4096
+# Steps to locate a crossing: halvings of an interval, where Newton's method leads out of it.
+_MOST_LOCATED = 60
 # Room for halves of halves: geometric ones to a few rad/s apart, and 52 more.
 _DEEPEST = 300
 # The goals of a search, see `_aim`.
@@ -420,7 +422,7 @@ def _acts(parts: ComplexArray, k: int) -> bool:
 
 @_inner
 def _divide(c: ComplexArray, by: ComplexArray, quotient: ComplexArray) -> float:
-    """Divide Taylor polynomials; return a bound of what is left of higher powers (Lemma 9)."""
+    """Divide Taylor polynomials; return the size of the remainder's coefficients (Lemma 9)."""
     left = 0.0
     for n in range(2 * ORDER - 1):
         v = c[n] if n < ORDER else 0j
@@ -437,7 +439,7 @@ def _divide(c: ComplexArray, by: ComplexArray, quotient: ComplexArray) -> float:
 def _least(
     c: ComplexArray, along: ComplexArray, gamma: float, vertex: bool, q: ComplexArray
 ) -> tuple[float, float]:
-    """Least real part of a vertex, or minus the most of a term, for both ends of the interval.
+    """Bound the real part of a vertex from below at both ends, or minus the size of a term.
 
     Along the direction along[0] where gamma is 0, else as shares of the polynomial `along`,
     whose least size is gamma. Both bounds are concave in t, so that the ends suffice.
@@ -459,13 +461,14 @@ def _least(
     if gamma > 0.0:
         # The square of the magnitude, which turning alone leaves as it is.
         square, size = 0.0, 0.0
+        for i in range(ORDER):
+            size += abs(q[i])
         for n in range(2 * ORDER - 1):
             power = 0.0
             for i in range(max(0, n - ORDER + 1), min(n + 1, ORDER)):
-                power += (q[i] * q[n - i].conjugate()).real
+                power += (q[i] / size * (q[n - i] / size).conjugate()).real
             square += abs(power)
-            size += abs(q[n]) if n < ORDER else 0.0
-        off += np.sqrt(square + 16.0 * EPSILON * size * size)
+        off += size * np.sqrt(square + 16.0 * EPSILON)
         return -off, -off
     for i in range(2, ORDER):
         off += abs(q[i])
@@ -813,6 +816,10 @@ def _aim(goal: int, f: complex, g: complex, radius: float, omega: float) -> tupl
     L = f / g is known up to a disc of radius `radius` / abs(g). If that is not zero, or for a
     distance, the value itself is to be small, and there is no function.
     """
+    size = abs(f) + abs(g)
+    if size > 0.0:
+        # Of tiny functions no product underflows then.
+        f, g, radius = f / size, g / size, radius / size
     if goal == DISTANCE:
         return 0.0, max(abs(f) - radius, 0.0) / abs(g)
     if goal == REAL:
@@ -864,9 +871,9 @@ def _crossing(
 ) -> tuple[float, float]:
     """Return the value where a function of `_aim` is zero between two frequencies, and where.
 
-    By the rule of false position, with the weight of an end halved that stays (Illinois). It is
-    inf where the function has one sign at both, or where neighbours in double precision do not
-    agree on the value.
+    By the rule of false position. The function's value at an end that stays is halved
+    (Illinois). The result is inf where the function has one sign at both frequencies, or where
+    neighbours in double precision do not agree on the value.
     """
     goal = question.goal
     at_a, _ = _measure(functions, goal, a, spare)
@@ -887,6 +894,8 @@ def _crossing(
             a, at_a = omega, here
             at_b = 0.5 * at_b if side == -1 else at_b
             side = -1
+    else:
+        return np.inf, omega
     _, below = _measure(functions, goal, omega * (1.0 - 4.0 * EPSILON), spare)
     _, above = _measure(functions, goal, omega * (1.0 + 4.0 * EPSILON), spare)
     resolved = abs(above - below) <= question.tolerance * (value - question.start)
@@ -949,8 +958,8 @@ def walk(
 ) -> tuple[FloatArray, FloatArray, float, float, int]:
     """Halve intervals until a test holds on each, at the level of the best value so far.
 
-    An interval on which no test holds may hold a better value, which is looked for there. Past
-    that of the start nothing is: then no interval is left.
+    An interval on which no test holds may hold a better value, which is looked for there. The
+    search ends once the best value reaches the start: then no interval is left.
 
     Returns the intervals that are left after so many steps, those that are undecided, the best
     value, where it is, and the steps.
@@ -1168,8 +1177,9 @@ def _locate(
 ) -> tuple[float, float, float, float]:
     """Return x at the zero of h and how far it is off, and the same of its place t.
 
-    Newton's method finds it for the Taylor polynomials, then for the functions themselves. They
-    have another common factor, from which h over |N|^2 + |M|^2 is free (Lemma 18).
+    Newton's method finds it for the Taylor polynomials, then for the functions themselves,
+    between points where h is of either sign. The functions have another common factor, from
+    which h over |N|^2 + |M|^2 is free (Lemma 18).
     """
     size_m, rest_m = shared.sizes[2], work.rest[2]
     t, slope = (0.0, shared.z[1].imag) if shared.around else _zero_of_polynomial(shared.z)
@@ -1179,7 +1189,8 @@ def _locate(
     slope /= abs(f) ** 2 + abs(g) ** 2
     least_slope /= (row.size + row.rest) ** 2 + (size_m + rest_m) ** 2
     x, spread, before, at = 0.0, np.inf, 0.0, 0.0
-    for step in range(8):
+    low, high, rising = -1.0, 1.0, shared.z[1].imag > 0.0
+    for step in range(_MOST_LOCATED):
         enclose(functions, shared.m + shared.r * t, 0.0, spare)
         f, g, turned = spare.f[0, 0, 0], spare.f[2, 0, 0], row.y * spare.f[1, 0, 0]
         off_f = spare.rest[0] + abs(row.y) * spare.rest[1]
@@ -1204,7 +1215,10 @@ def _locate(
         if step > 0 and t != at and value != before:
             slope = (value - before) / (t - at)
         before, at = value, t
-        t = min(max(t - value / slope, -1.0), 1.0)
+        low, high = (t, high) if (value < 0.0) == rising else (low, t)
+        t -= value / slope
+        if not low < t < high:
+            t = 0.5 * (low + high)
     # At a root that was computed the error of one value is not known: it is no number.
     return x, spread, t, off_t if off_t <= 2.0 else rough
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from armlock.checks import ComplexArray, FloatArray, positive_number
+from armlock.checks import BoolArray, ComplexArray, FloatArray, positive_number
 from armlock.delays import DelaySystem
 from armlock.engine import decide
 from armlock.engine.functions import Function, at, common_zeros, stacked
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 # Where |L| is below it no crossing of the negative real axis is of interest, and above the
 # other one a pole is on the axis.
 _SMALL, _LARGE = 1e-3, 1e12
-# To this share the floating-point frequencies next to a crossing have to agree on L.
+# To this share L has to agree at both ends of the interval that holds a crossing.
 _AGREED = 1e-3
 # The share of a leading term that all others are at most, where a picture begins.
 _NEGLIGIBLE = 5e-4
@@ -337,19 +337,31 @@ def axis_crossings(
     )  # fmt: skip
     told = found.jump != 0
     hidden = ~told & (found.x - found.spread < -_SMALL) & (found.x + found.spread > -_LARGE)
-    below, value, above = (
-        _response(n, m, found.omega * (1.0 + k * EPSILON)).real for k in (-4, 0, 4)
-    )
-    agreed = np.abs(above - below) <= _AGREED * np.abs(value)
+    value = _response(n, m, found.omega).real
+    agreed = told & _agree(n, m, found.omega, value)
     hidden |= told & ~agreed & (value < -_SMALL) & (value > -_LARGE)
     if found.unfinished.any() or hidden.any():
         why = "they take too many steps"
         if hidden.any():
             why = f"rounding hides some around {found.omega[hidden][0]} rad/s"
         raise CountError(f"no crossings at (c1, c2) = ({c1}, {c2}): {why}", point)
-    kept = told & agreed & (value < -least) & (value > -_LARGE)
+    kept = agreed & (value < -least) & (value > -_LARGE)
     order = np.argsort(found.omega[kept])
     return AxisCrossings(found.omega[kept][order], value[kept][order])
+
+
+def _agree(n: Function, m: Function, omega: FloatArray, value: FloatArray) -> BoolArray:
+    """Tell whether L is this real value at crossings, where Im L changes its sign next to them.
+
+    The interval in which it does grows from the next floats to a millionth of the frequency.
+    """
+    found, open_ = np.zeros(omega.size, np.bool_), np.ones(omega.size, np.bool_)
+    for width in EPSILON * 8.0 ** np.arange(1, 12):
+        below, above = (_response(n, m, omega * (1.0 + k * width)) for k in (-1, 1))
+        between = open_ & ((below.imag < 0.0) != (above.imag < 0.0))
+        found |= between & (np.abs(above.real - below.real) <= _AGREED * np.abs(value))
+        open_ &= ~between
+    return found
 
 
 def _constant_sign_up_to(n: Function, m: Function) -> float:
