@@ -444,15 +444,15 @@ def arms_over(polynomial, gains, lags, size):
 
 @pytest.mark.parametrize("size", [1e-159, 1e-163, 1e-200])
 @pytest.mark.parametrize(
-    "parts",
+    ("polynomial", "gains", "lags"),
     [
         ([1.954, 2.491, 1.356], [2.084, 2.805, 2.3], [6.05, 35.065, 0.273]),
         ([2.409, 1.982, 0.755], [-1.657, -1.783, 2.345], [3.295, 27.96, 0.448]),
         ([1.0, 3.0, 1.0], [3.0, 1.0], [0.5, 5.0]),
     ],
 )
-def test_tiny_coefficients_do_not_underflow(parts, size):
-    plain, tiny = arms_over(*parts, size=1.0), arms_over(*parts, size=size)
+def test_tiny_coefficients_do_not_underflow(polynomial, gains, lags, size):
+    plain, tiny = (arms_over(polynomial, gains, lags, k) for k in (1.0, size))
     assert unstable_roots(tiny) == unstable_roots(plain)
     assert modulus_margin(tiny) == pytest.approx(modulus_margin(plain), rel=1e-9)
     if unstable_roots(plain) == 0:
