@@ -573,10 +573,10 @@ def excludes_zero(room: Members) -> int:
             low, high = min(low, angle - half), max(high, angle + half)
     if vertices == 1 and own == 0.0:
         # Of a single line the direction of its point nearest to zero.
-        v0, v1 = room.v[last, 0, 0], room.v[last, 0, 1]
-        length = v1.real * v1.real + v1.imag * v1.imag
-        t = -(v0.real * v1.real + v0.imag * v1.imag) / length if length > 0.0 else 0.0
-        direction = v0 + min(max(t, -1.0), 1.0) * v1
+        slope = room.v[last, 0, 1] / abs(room.v[last, 0, 0])
+        length = slope.real * slope.real + slope.imag * slope.imag
+        t = -(turned * slope.conjugate()).real / length if length > 0.0 else 0.0
+        direction = turned + min(max(t, -1.0), 1.0) * slope
     elif high - low < np.pi:
         middle = 0.5 * (low + high)
         direction = turned * complex(np.cos(middle), np.sin(middle))
