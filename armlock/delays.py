@@ -145,7 +145,7 @@ def functions(*sums: Iterable[Term], step: float = 0.0) -> list[Function]:
         delayed = np.zeros((len(basis), len(space.delays)), object)
         for weight, p, theta in terms:
             if theta:
-                delayed[basis.index(p), space.place(theta)] += weight
+                delayed[basis.index(p), space.delays.index(theta)] += weight
             else:
                 steady[basis.index(p)] += weight
         found.append(Function(space, steady, delayed))

@@ -292,6 +292,8 @@ def count(sketch, c1, c2, sigma=0.0):
         high *= 4.0
         if high > 1e40:
             raise UndecidedError("no end")
+    if high * view.tau.max() > 1e13:
+        raise UndecidedError("phases are rounded")
     a, b = view.cells(high)
     turn, used = 0.0, 0
     ends = 1.0 + view.at(np.array([a[0], b[-1]]))

@@ -18,6 +18,7 @@ from armlock import (
     unstable_roots,
 )
 from armlock.controllers import integrating_actuator
+from armlock.engine.functions import at
 from armlock.paper import DUAL_SENSOR_CORNER
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, SignalMapping, dual, modified_dual
 from tests import independent
@@ -175,5 +176,5 @@ def test_next_to_equal_parameters_the_response_keeps_its_digits():
     loop = DualArm(gain=1.0, corner=0.7)
     with mpmath.workdps(50):
         expected = complex(independent.exact(loop, mpmath.mpc(0, omega), c1, c2) - 1)
-    above, below = loop.quotient(c1, c2)
-    assert (above.at([omega]) / below.at([omega]))[0] == pytest.approx(expected, rel=1e-12)
+    above, below = at(loop.quotient(c1, c2), [omega])
+    assert (above / below)[0] == pytest.approx(expected, rel=1e-12)

@@ -20,7 +20,7 @@ import numpy as np
 from armlock.checks import FloatArray, IntArray
 from armlock.engine import inclusion
 from armlock.engine.functions import Function, Leading, Space, compiled, stacked
-from armlock.engine.inclusion import DISTANCE, Functions, Question
+from armlock.engine.inclusion import DISTANCE, VERTEX, Functions, Question
 from armlock.engine.polynomials import rounded
 
 #: What a count is where a root lies on the axis, or rounding does not decide on which side.
@@ -40,14 +40,11 @@ _BLOCK = 256
 
 
 class UndecidedError(RuntimeError):
-    """Double precision, or the steps allowed, did not decide.
+    """Double precision, or the steps allowed, did not decide; `index` of many functions."""
 
-    `omega` is where, in rad/s, and `index` of which of many functions.
-    """
-
-    def __init__(self, message: str, omega: float, index: int = 0) -> None:
+    def __init__(self, message: str, index: int = 0) -> None:
         super().__init__(message)
-        self.omega, self.index = omega, index
+        self.index = index
 
 
 def in_threads(function: Callable[[Any], Any], items: Iterable[Any]) -> list[Any]:
@@ -97,7 +94,7 @@ def counts(
     """
     _, steady, delayed, uncertain = functions
     n = len(steady)
-    # What weights are uncertain by counts as a term of any phase.
+    # The error of the weights is a term of any phase.
     ends = space.confined_from(steady, delayed, uncertain) * (1.0 if space.step else 2.0)
     order, begin = (leading.order, leading.radius) if leading else (0, 0.0)
     found = np.full(n, UNCONFINED, dtype=np.int64)
@@ -119,7 +116,6 @@ def counts(
         k = int(np.argmax(steps >= most))
         raise UndecidedError(
             f"a count takes more than {most:.0e} steps, up to {undecided[k]:.3g} rad/s",
-            float(undecided[k]),
             int(here[k]),
         )
     # At s = 0 all is real; the value found there is off by less than a quarter turn.
@@ -138,8 +134,10 @@ def counts(
     return found
 
 
-def count(function: Function, common: int = 0, *, most: int = _MOST_STEPS) -> int:
-    """Count the zeros of a function with positive real part.
+def count(
+    function: Function, common: int = 0, *, right_of: float = 0.0, most: int = _MOST_STEPS
+) -> int:
+    """Count the zeros of a function with a real part above a number.
 
     Parameters
     ----------
@@ -147,14 +145,19 @@ def count(function: Function, common: int = 0, *, most: int = _MOST_STEPS) -> in
         With exact weights.
     common : int, optional
         Order of a zero at s = 0 that is not to count.
+    right_of : float, optional
+        That number, in rad/s.
     most : int, optional
         Most steps.
 
     Returns
     -------
     int
-        BOUNDARY with another zero on the axis, or where rounding does not decide; UNCONFINED.
+        BOUNDARY with another zero on that line, or where rounding does not decide; UNCONFINED.
     """
+    if right_of:
+        found = int(counts(*function.shifted(right_of), most=most)[0])
+        return found - common if right_of < 0.0 <= found else found
     leading = function.leading()
     functions = compiled([function])
     if leading is None or leading.order > common:
@@ -173,9 +176,9 @@ class Family:
     functions : sequence of Function
         Of one space.
     tests : sequence of tests
-        Each a sequence of members (kind, weights, slopes): a vertex (1) or a term of any phase
-        (2), the combination of the functions with weights + level slopes. A test holds where
-        zero is in no convex combination of the vertices, whatever the terms add.
+        Each a sequence of members (kind, weights, slopes): a VERTEX, or a TERM of any phase, is
+        the combination of the functions with weights + level slopes. A test holds where zero is
+        in no convex combination of the vertices, whatever the terms add.
     arc : tuple of tuples, optional
         One more test: f_0 + exp(j psi) f_1, or f_0 + (cos psi - 1) f_1 + j sin psi f_2 of three
         functions, with psi from a + b omega to c + d omega; (a, b, c, d), and their slopes in
@@ -215,7 +218,7 @@ class Family:
             member = self.functions[0] * 0
             for f, a, b in zip(self.functions, weights, slopes, strict=True):
                 member = member + f * (Fraction(a) + Fraction(b) * Fraction(level))
-            found[kind - 1].append(member)
+            found[0 if kind == VERTEX else 1].append(member)
         return found
 
     def begins(self, level: float) -> float:
@@ -261,12 +264,8 @@ class Family:
             whole, _ = self.space.limits(steady, delayed)
             if (whole > 0.0).any() and (whole < 0.0).any():
                 continue
-            size = sum(
-                (abs(s - w.sum(1)) + abs(w).sum(1) for s, w in (f.weights for f in terms)),
-                np.zeros(steady.shape[1]),
-            )
-            tops = (self.space.limits(*f.weights) for f in terms)
-            top = float(sum(abs(still) + abs(turned).sum() for still, turned in tops))
+            size = sum((f.sizes for f in terms), np.zeros(steady.shape[1]))
+            top = sum(f.size_at_infinity for f in terms)
             ends = self.space.confined_from(steady, delayed, size, top_terms=top)
             found.append(float(ends.max()))
         two = len(self.functions) - self.loose == 2
@@ -278,13 +277,11 @@ class Family:
         """Do what `ends` does for an arc around zero: abs(1 + c exp(j psi)) is monotonic."""
         if angle >= np.pi:
             return np.inf
-        (n, m, *free), (wn, wm, *turned) = stacked(self.functions)
+        (n, m), (wn, wm) = stacked(self.functions[:2])
         turns = np.exp(1j * np.array([0.0, angle]))[:, None]
         steady = (n - wn.sum(1)) + turns * (m - wm.sum(1))
         parts = np.abs(wn) + np.abs(wm)
-        terms = parts.sum(1)
-        for s, w in zip(free, turned, strict=True):
-            terms = terms + np.abs(s - w.sum(1)) + np.abs(w).sum(1)
+        terms = parts.sum(1) + sum(f.sizes for f in self.functions[2:])
         # All that turns, as terms; and what the sum at other angles may have more.
         more = np.abs(n - wn.sum(1)) + np.abs(m - wm.sum(1))
         return float(
@@ -310,10 +307,9 @@ def _searched(
         [(pending, more, best, where, taken)] = in_threads(walk, [_A_WHILE])
         undecided, steps = np.concatenate((undecided, more)), steps + taken
         if steps > _MOST_SEARCHED:
-            omega = float(pending[-1, 0])
             raise UndecidedError(
-                f"a search takes more than {_MOST_SEARCHED:.0e} steps, at {omega:.3g} rad/s",
-                omega,
+                f"a search takes more than {_MOST_SEARCHED:.0e} steps, at "
+                f"{pending[-1, 0]:.3g} rad/s"
             )
     return best, where, undecided
 
@@ -368,9 +364,9 @@ def least(
     level = min(start + (best - start) * (1.0 - tolerance), 1e300)
     begin, end = low or family.begins(level), min(family.ends(level), high)
     if not begin > 0.0:
-        raise UndecidedError("the behaviour at s = 0 is not decided", 0.0)
+        raise UndecidedError("the behaviour at s = 0 is not decided")
     if not np.isfinite(end):
-        raise UndecidedError("the behaviour at high frequency is not decided", np.inf)
+        raise UndecidedError("the behaviour at high frequency is not decided")
     if end <= begin:
         return best, where
     edges = np.geomspace(begin, end, int(200 * np.log10(end / begin)) + 2)
@@ -379,8 +375,7 @@ def least(
     order = np.argsort(np.modf(np.arange(len(cover)) * 0.6180339887498949)[0])
     best, where, left = _searched(functions, question, cover[order], best, where)
     if len(left):
-        omega = float(left[0, 0])
-        raise UndecidedError(f"rounding does not decide at {omega:.6g} rad/s", omega)
+        raise UndecidedError(f"rounding does not decide at {left[0, 0]:.6g} rad/s")
     return best, where
 
 
@@ -409,7 +404,7 @@ def excludes(family: Family, begin: float = 0.0) -> bool:
         return False
     if end <= begin:
         return True
-    # At a distance of zero nothing is nearer, so that nothing is searched.
+    # The best distance is zero already, so that the walk only tests.
     question, axis = family.question(DISTANCE, 0.0, 0.0), np.array([[begin, end]])
     *_, left = _searched(compiled(family.functions), question, axis, 0.0, np.nan)
     return not len(left)

@@ -102,14 +102,12 @@ class Space:
             np.array([float(theta) for theta in self.delays]),
             np.array([float(theta - Fraction(float(theta))) for theta in self.delays]),
         )
+        #: Highest coefficients, 0 of polynomials of lower degree, shape (J,).
+        self.lead = np.where(present.all(axis=1), self.arrays.lead, 0.0)
         sizes = np.abs(roots[present])
         #: Sizes of roots and of one over the longest delay, ascending, in rad/s.
         self.corners = np.unique(np.append(sizes[sizes > 0.0], unit))
         self.sums = np.abs(roots).sum(axis=1)
-
-    def place(self, delay: Fraction) -> int:
-        """Index of a delay."""
-        return self.delays.index(delay)
 
     def function(self, steady: Sequence[Any], delayed: Sequence[Sequence[Any]]) -> Function:
         """Return the function with weights S, shape (J,), and W, shape (J, K)."""
@@ -123,10 +121,8 @@ class Space:
 
         The weights have shapes (..., J) and (..., J, K), the results (...) and (..., K).
         """
-        lead = np.where(
-            [p.degree == self.degree for p in self.polynomials], self.arrays.lead, 0.0
-        )
-        return (steady - delayed.sum(-1)) @ lead, np.einsum("...jk,j->...k", delayed, lead)
+        whole = (steady - delayed.sum(-1)) @ self.lead
+        return whole, np.einsum("...jk,j->...k", delayed, self.lead)
 
     def confined_from(
         self,
@@ -158,18 +154,16 @@ class Space:
         """
         if self.step:
             return np.full(len(steady), np.pi / self.step)
-        full = np.array([p.degree == self.degree for p in self.polynomials])
         gap = np.array([self.degree - p.degree for p in self.polynomials])
-        lead, size = np.where(full, self.arrays.lead, 0.0), np.abs(self.arrays.lead)
+        lead, size = np.abs(self.lead), np.abs(self.arrays.lead)
         whole, parts = steady - delayed.sum(-1), np.abs(delayed).sum(-1)
         terms = np.broadcast_to(np.abs(terms), whole.shape)
         parts = parts + terms + np.abs(extra)
-        _, turned = self.limits(steady, delayed)
-        others = np.abs(turned).sum(-1)
-        others = others + (terms @ np.abs(lead) if top_terms is None else top_terms)
-        top = np.abs(whole @ lead)
+        still, turned = self.limits(steady, delayed)
+        top, others = np.abs(still), np.abs(turned).sum(-1)
+        others = others + (terms @ lead if top_terms is None else top_terms)
         found = np.full(len(steady), np.inf)
-        rounding = 64.0 * EPSILON * ((np.abs(whole) + parts) @ np.abs(lead))
+        rounding = 64.0 * EPSILON * ((np.abs(whole) + parts) @ lead)
         left = np.flatnonzero(top - others > rounding)
         omega = self.corners[-1]
         for _ in range(300):
@@ -179,7 +173,7 @@ class Space:
             grown += self.arrays.missed * (1.0 + grown)
             with np.errstate(under="ignore", over="ignore"):
                 share = size * float(omega) ** -gap.astype(float)
-            off = np.where(full, share * grown, share * (1.0 + grown))
+            off = np.where(gap == 0, share * grown, share * (1.0 + grown))
             spent = (np.abs(whole[left]) + parts[left]) @ off
             done = top[left] - others[left] - rounding[left] > spent
             found[left[done]] = omega
@@ -215,6 +209,19 @@ class Function:
             raise ValueError(
                 "the loop must have coefficients below 1e308: choose another unit of time"
             ) from error
+
+    @property
+    def sizes(self) -> FloatArray:
+        """Largest sizes of the weights, whatever the phases of exponentials, shape (J,)."""
+        steady, delayed = self.weights
+        sizes: FloatArray = np.abs(steady - delayed.sum(1)) + np.abs(delayed).sum(1)
+        return sizes
+
+    @property
+    def size_at_infinity(self) -> float:
+        """Largest size of the function over s^degree at infinity, whatever these phases."""
+        still, turned = self.space.limits(*self.weights)
+        return float(abs(still) + np.abs(turned).sum())
 
     @property
     def is_zero(self) -> bool:
@@ -258,7 +265,7 @@ class Function:
     def radius(
         self, order: int, coefficient: Fraction, share: float, other: Function | None = None
     ) -> float:
-        """Up to where all terms past a power are at most a share of a term of that power.
+        """Radius up to which all terms of higher power are at most a share of this term.
 
         By Cauchy's bound of all coefficients, on circles of several radii (Lemma 11); of the
         product with another function, if there is one.
@@ -343,11 +350,6 @@ class Function:
         sizes = np.abs(steady) + np.abs(delayed) @ grown
         parts = steady + delayed @ change, turned, (8.0 + change.size) * EPSILON * sizes
         return space, inclusion.Functions(space.arrays, *(part[None] for part in parts))
-
-    def at(self, omega: npt.ArrayLike) -> ComplexArray:
-        """Evaluate at s = j omega, times one positive number at each frequency."""
-        value: ComplexArray = at([self], omega)[0]
-        return value
 
 
 def common_zeros(n: Function, m: Function) -> int:

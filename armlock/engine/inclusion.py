@@ -12,8 +12,8 @@ interval, so that arguments and signs remain.
 In order: the enclosure; whether it excludes zero; and the walks along the axis, which halve
 intervals until each is decided. An interval that double precision does not halve any more is
 undecided (`_halve`). All compiled code of the engine is in this module, because numba compiles
-a function again when its own file changes, but not when that of a function it calls does. No
-number is written out as an argument of a function: numba would compile it again for that one.
+a function again when its own file changes, but not when that of a function it calls does. Pass
+no literal number to a function: numba would compile the function again for this number.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ _TOGETHER = 0.3
 _LONG = 30.0
 # Polynomials are rescaled before they leave these bounds.
 _HUGE = 1e150
-# A piece of the axis is this share of the distance to the roots, together; it serves intervals
-# down to one of so many of its length.
+# A piece of the axis has this half width over the sum of 1 / distance to a root. It serves
+# intervals down to its length over `_SUBINTERVALS`.
 _PIECE, _SUBINTERVALS = 0.02, 4096.0
 # Undecided intervals after which a search ends; and, of a row on average, after which rows are
 # followed no further. Rounding hides much of the axis where N is nearly a multiple of M.
@@ -46,6 +46,8 @@ FEW_UNDECIDED, _MANY_UNDECIDED = 16, 4096
 _MOST_LOCATED = 60
 # Room for halves of halves: geometric ones to a few rad/s apart, and 52 more.
 _DEEPEST = 300
+#: Kinds of members of a test: a vertex, and a term of any phase.
+VERTEX, TERM = 1, 2
 # The goals of a search, see `_aim`.
 DISTANCE, PHASE, DELAY, REAL = range(4)
 
@@ -123,7 +125,7 @@ class Workspace(NamedTuple):
     turn: ComplexArray  # (K, ORDER): Taylor coefficients of these exponentials, less one
     angle: FloatArray  # (K,): by how much they turn, in rad, over half the interval
     slip: FloatArray  # (K,): error of their phases at the middle
-    # (functions, 1 + K, ORDER): what no free phase turns, then what that of each delay turns.
+    # (functions, 1 + K, ORDER): the part without a free phase, then the part with each of them.
     f: ComplexArray
     rest: FloatArray  # (functions,): remainder and rounding
     rounding: FloatArray  # (functions,): the rounding alone
@@ -306,13 +308,6 @@ def _expand_exponentials(space: Arrays, m: float, r: float, work: Workspace) -> 
 
 
 @_inlined
-def expand(space: Arrays, m: float, r: float, work: Workspace) -> None:
-    """Expand polynomials and exponentials about j m (Lemmas 1 to 3)."""
-    _expand_polynomials(space, m, r, work)
-    _expand_exponentials(space, m, r, work)
-
-
-@_inlined
 def _bracket(
     steady: float, row: FloatArray, uncertain: float, lead: int, work: Workspace
 ) -> tuple[bool, float]:
@@ -386,7 +381,8 @@ def combine(functions: Functions, n: int, work: Workspace) -> None:
 @_inner
 def enclose(functions: Functions, m: float, r: float, work: Workspace) -> None:
     """Enclose functions on an interval, as many as the workspace has room for."""
-    expand(functions.space, m, r, work)
+    _expand_polynomials(functions.space, m, r, work)
+    _expand_exponentials(functions.space, m, r, work)
     for n in range(work.f.shape[0]):
         combine(functions, n, work)
 
@@ -463,10 +459,11 @@ def _least(
         square, size = 0.0, 0.0
         for i in range(ORDER):
             size += abs(q[i])
+        by = 1.0 / size if size > 0.0 else 0.0
         for n in range(2 * ORDER - 1):
             power = 0.0
             for i in range(max(0, n - ORDER + 1), min(n + 1, ORDER)):
-                power += (q[i] / size * (q[n - i] / size).conjugate()).real
+                power += (q[i] * by * (q[n - i] * by).conjugate()).real
             square += abs(power)
         off += size * np.sqrt(square + 16.0 * EPSILON)
         return -off, -off
@@ -476,7 +473,7 @@ def _least(
 
 
 class Members(NamedTuple):
-    """Members of a test: vertices (kind 1) and terms of any phase (kind 2), see `mix`."""
+    """Members of a test, which `mix` makes: vertices and terms of any phase."""
 
     kind: IntArray  # (members,)
     v: ComplexArray  # (members, 1 + K, ORDER), as `f` of a workspace
@@ -522,17 +519,17 @@ def _holds(room: Members, gamma: float) -> bool:
     """Whether every vertex exceeds all terms of any phase, along a direction or in shares."""
     unit = gamma if gamma > 0.0 else 1.0
     low, high = 0.0, 0.0
-    for kind in (2, 1):
+    for kind in (TERM, VERTEX):
         for n in range(room.kind.size):
             if room.kind[n] != kind:
                 continue
             a, b = -room.rest[n] / unit, -room.rest[n] / unit
             for k in range(room.v.shape[1]):
                 if _acts(room.v[n], k):
-                    vertex = kind == 1 and k == 0
+                    vertex = kind == VERTEX and k == 0
                     e, f = _least(room.v[n, k], room.along, gamma, vertex, room.q)
                     a, b = a + e, b + f
-            if kind == 2:
+            if kind == TERM:
                 low, high = low + a, high + b
             elif not min(low + a, high + b) > 0.0:
                 return False
@@ -541,7 +538,7 @@ def _holds(room: Members, gamma: float) -> bool:
 
 @_inner
 def excludes_zero(room: Members) -> int:
-    """Whether zero is in no member of the hull of the vertices, after any terms (Lemmas 8, 9).
+    """Tell how zero is excluded from the hull of the vertices plus any terms (Lemmas 8, 9).
 
     0 if that is not shown; 1 along a direction, which is along[0] then; 2 by shares of the
     polynomial `along`.
@@ -549,12 +546,12 @@ def excludes_zero(room: Members) -> int:
     common, vertices, slow = 0.0, 0, room.slow
     slow[:] = 0.0
     for n in range(room.kind.size):
-        if room.kind[n] == 2:
+        if room.kind[n] == TERM:
             for k in range(room.v.shape[1]):
                 common += abs(room.v[n, k, 0])
     turned, low, high, last, own = 1.0 + 0j, 10.0, -10.0, 0, 0.0
     for n in range(room.kind.size):
-        if room.kind[n] != 1:
+        if room.kind[n] != VERTEX:
             continue
         size, own = abs(room.v[n, 0, 0]), common
         for k in range(1, room.v.shape[1]):
@@ -598,21 +595,18 @@ def excludes_zero(room: Members) -> int:
 
 
 class Question(NamedTuple):
-    """Tests of which one has to hold on each interval, affine in a level; and what is sought.
+    """A family (`armlock.engine.decide.Family`) as compiled functions take it, and a goal.
 
     Attributes
     ----------
     kind : int array, shape (tests, members)
-        1 for a vertex, 2 for a term of any phase, 0 for none.
+        VERTEX, TERM, or 0 for no member.
     weights, slopes : complex arrays, shape (tests, members, functions)
         A member is the combination of the functions with weights + level slopes.
     arc : float array, shape (0, 4) or (2, 4)
-        One more test: f_0 + exp(j psi) f_1, or f_0 + (cos psi - 1) f_1 + j sin psi f_2 of three
-        functions, with psi from a + b omega to c + d omega. The rows are (a, b, c, d), and
-        their slopes in the level.
+        Of the family: (a, b, c, d), and their slopes in the level.
     loose : int
-        So many functions, the last ones, are terms of any phase in that test, and in what a
-        search looks for.
+        Of the family. A search takes these functions as terms of any phase too.
     goal : int
         What a search looks for, see `_aim`.
     start, tolerance : float
@@ -667,11 +661,11 @@ def _arc_holds(
     # Neighbours overlap by more than angles are rounded by.
     half = 0.5 * span / parts + 4.0 * EPSILON * (abs(begin) + span)
     room.kind[:] = 0
-    room.kind[:3] = 1
+    room.kind[:3] = VERTEX
     for n in range(loose):
         weights[:] = 0.0
         weights[functions - loose + n] = 1.0
-        room.kind[3 + n] = 2
+        room.kind[3 + n] = TERM
         mix(work, room, 3 + n)
     for i in range(parts):
         turn = begin + (2 * i + 1) * half
@@ -765,7 +759,6 @@ def wind(
                 a, b = last[n] * g.conjugate(), g * along[0].conjugate()
                 total[n] += sign * (np.arctan2(a.imag, a.real) + np.arctan2(b.imag, b.real))
         if steps[n] >= most:
-            steps[n:] = steps[n]
             break
     return total, first, last, undecided, steps
 
@@ -898,8 +891,8 @@ def _crossing(
         return np.inf, omega
     _, below = _measure(functions, goal, omega * (1.0 - 4.0 * EPSILON), spare)
     _, above = _measure(functions, goal, omega * (1.0 + 4.0 * EPSILON), spare)
-    resolved = abs(above - below) <= question.tolerance * (value - question.start)
-    return value if resolved else np.inf, omega
+    agree = abs(above - below) <= question.tolerance * (value - question.start)
+    return value if agree else np.inf, omega
 
 
 @_maker
@@ -912,7 +905,7 @@ def _candidate(
     work: Workspace,
     spare: Workspace,
 ) -> tuple[float, float]:
-    """Return a value better than `best` in an interval, and where, or `best` and nan.
+    """Return a value better than `best` in an interval, and its frequency; else `best`, nan.
 
     The Taylor polynomials say where it may be; the functions themselves say what it is.
     """
@@ -985,8 +978,8 @@ def walk(
             continue
         if _arc_holds(question, level, low, high, work, room):
             continue
-        resolved = work.lead.size == 0 or work.lead[-1] < 0
-        if resolved and best > start:
+        fast = work.lead.size > 0 and work.lead[-1] >= 0
+        if not fast and best > start:
             better, at = _candidate(functions, question, m, r, best, work, spare)
             if better < best:
                 best, where = better, at
@@ -1082,7 +1075,7 @@ def _rows_exclude_zero(rows: Rows, here: IntArray, work: Workspace, room: Member
     room.kind[:] = 0
     # Of one row two corners suffice.
     for n in range(4 if y0 < y1 else 2):
-        room.kind[n] = 1
+        room.kind[n] = VERTEX
         room.weights[1] = -(y0 if n < 2 else y1)
         room.weights[2] = -(x0 if n % 2 == 0 else x1)
         mix(work, room, n)
@@ -1202,7 +1195,7 @@ def _locate(
             break
         value = (f * g.conjugate()).imag / total
         off = 2.0 * (off_f * abs(g) + off_g * abs(f)) / total
-        # Of the two around s = 0 and a map's end the place is known.
+        # Around s = 0 and a map's end the zero is in the middle.
         off_t = 0.0 if shared.around else min((abs(value) + off) / least_slope, 2.0)
         x = (f * g.conjugate()).real / abs(g) ** 2
         near = abs(_at(work.f[2, 0], t)) - rest_m - ORDER * off_t * size_m
@@ -1219,7 +1212,7 @@ def _locate(
         t -= value / slope
         if not low < t < high:
             t = 0.5 * (low + high)
-    # At a root that was computed the error of one value is not known: it is no number.
+    # At a root that was computed the error of one value is nan.
     return x, spread, t, off_t if off_t <= 2.0 else rough
 
 

@@ -7,6 +7,7 @@ imaginary axis (`armlock.engine.decide`). The limit at high frequency is known i
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -15,12 +16,12 @@ import numpy as np
 from armlock.engine import decide
 from armlock.engine.decide import Family, least
 from armlock.engine.functions import Function, common_zeros, stacked
-from armlock.engine.inclusion import DELAY, DISTANCE, EPSILON, PHASE, REAL
+from armlock.engine.inclusion import DELAY, DISTANCE, EPSILON, PHASE, REAL, TERM, VERTEX
 from armlock.engine.polynomials import rounded
 
 #: Gain factors up to this, and down to one over it, are looked at.
 LARGEST_GAIN = 1e4
-# So close to the limit of the neutral root chain, as a share, the limit is taken for roots.
+# So close to the limit of the neutral root chain, as a share, no root is looked for.
 _NEXT_TO_THE_CHAIN = 1e-5
 # What is left of the undelayed term at high frequency is decided if it is this share of it.
 _DECIDED = 256.0 * EPSILON
@@ -29,8 +30,6 @@ _LARGEST_DELAY = 1e300
 
 # Relative accuracy where phases are free.
 _FREE_TOLERANCE = 1e-5
-
-_VERTEX, _TERM = 1, 2
 
 
 class Free(NamedTuple):
@@ -54,7 +53,7 @@ def _unequal(number: int) -> list[list[tuple[int, tuple[float, ...], tuple[float
     """
     zero = (0.0,) * number
     return [
-        [(_TERM if k != most else _VERTEX, _unit(k, number), zero) for k in range(number)]
+        [(TERM if k != most else VERTEX, _unit(k, number), zero) for k in range(number)]
         for most in (0, 1)
     ]
 
@@ -191,7 +190,7 @@ def first_zero(f: Function, g: Function, most: float, start: float) -> tuple[flo
     if start < zero < best:
         best, where = zero, 0.0
     if not g.is_zero:
-        hull = [(_VERTEX, (1.0, start), (0.0, 0.0)), (_VERTEX, (1.0, 0.0), (0.0, 1.0))]
+        hull = [(VERTEX, (1.0, start), (0.0, 0.0)), (VERTEX, (1.0, 0.0), (0.0, 1.0))]
         best, where = least(Family([f, g], [hull]), REAL, best, where, start=start)
     return (chain, where) if where == math.inf else (best, where)
 
@@ -206,37 +205,34 @@ def modulus_of(n: Function, m: Function, free: Free | None = None) -> tuple[floa
     if zero < best:
         best, where = zero, 0.0
 
-    def family(f: Function, g: Function, *arms: Function) -> Family:
+    def family(n: Function, m: Function, *arms: Function) -> Family:
         number = 2 + len(arms)
         zero = (0.0,) * number
-        test = [(_VERTEX, _unit(0, number), zero), (_TERM, zero, _unit(1, number))]
-        test += [(_TERM, _unit(k, number), zero) for k in range(2, number)]
-        return Family([f, g, *arms], [test], loose=len(arms))
+        test = [(VERTEX, _unit(0, number), zero), (TERM, zero, _unit(1, number))]
+        test += [(TERM, _unit(k, number), zero) for k in range(2, number)]
+        return Family([n + m, m, *arms], [test], loose=len(arms))
 
-    if free is None:
-        return _over_axis(family(d, m), None, None, DISTANCE, best, where, tolerance)
-    other = family(free.centre + free.denominator, free.denominator, *free.arms)
-    return _over_axis(family(d, m), other, free, DISTANCE, best, where, tolerance)
+    return _over_axis(family, n, m, free, DISTANCE, best, where, tolerance)
 
 
 def _over_axis(
-    exact: Family,
-    other: Family | None,
+    family: Callable[..., Family],
+    n: Function,
+    m: Function,
     free: Free | None,
     goal: int,
     best: float,
     where: float,
     tolerance: float = 1e-6,
 ) -> tuple[float, float]:
-    """Find the least level of a family and, above a frequency, of another one."""
-    if not best > 0.0:
-        return best, where
-    high = free.above if free else math.inf
-    best, where = least(exact, goal, best, where, high=high, tolerance=tolerance)
-    if not (free and other and best > 0.0):
-        return best, where
-    tolerance = max(tolerance, _FREE_TOLERANCE)
-    return least(other, goal, best, where, low=free.above, tolerance=tolerance)
+    """Find the least level of the family of a loop; above a frequency with free phases."""
+    if best > 0.0:
+        high = free.above if free else math.inf
+        best, where = least(family(n, m), goal, best, where, high=high, tolerance=tolerance)
+    if free and best > 0.0:
+        other, tolerance = family(*free[:2], *free.arms), max(tolerance, _FREE_TOLERANCE)
+        best, where = least(other, goal, best, where, low=free.above, tolerance=tolerance)
+    return best, where
 
 
 def _crossover(
@@ -249,11 +245,12 @@ def _crossover(
     where: float,
 ) -> tuple[float, float]:
     """Find the least turn or delay that puts L on -1; `slope` says how the arc grows."""
-    arc, other = ((0.0, 0.0, 0.0, 0.0), slope), None
-    if free is not None:
-        functions = [free.centre, free.denominator, *free.arms]
-        other = Family(functions, _unequal(len(functions)), arc, len(free.arms))
-    return _over_axis(Family([n, m], _unequal(2), arc), other, free, goal, best, where)
+
+    def family(n: Function, m: Function, *arms: Function) -> Family:
+        arc = (0.0, 0.0, 0.0, 0.0), slope
+        return Family([n, m, *arms], _unequal(2 + len(arms)), arc, len(arms))
+
+    return _over_axis(family, n, m, free, goal, best, where)
 
 
 def _phase(n: Function, m: Function, free: Free | None) -> tuple[float, float]:

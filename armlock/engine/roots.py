@@ -21,9 +21,9 @@ from armlock.engine.decide import BOUNDARY, UNCONFINED, UndecidedError
 from armlock.engine.functions import Function, Space
 from armlock.engine.polynomials import Polynomial
 
-# No zero lies further right than the one returned by more than these shares of abs(Re s), or of
-# one over the longest delay; the first if so fine a count is decided in so many steps. Real
-# parts that differ by less than the first count as equal.
+# How far right of the zero that is returned no other one lies: the first share of abs(s), or of
+# one over the longest delay, if so fine a count is decided in so few steps. Otherwise it is the
+# second share of abs(Re s), or of one over the longest delay.
 _FINEST, _FINE = 1e-11, 1e-6
 _FEW_STEPS, _MANY_STEPS = 200_000, 2_000_000
 # The search for one zero ends once it has cost so many steps, some five seconds.
@@ -176,11 +176,7 @@ class _Search:
         if not np.isfinite(line.end):
             return UNCONFINED
         try:
-            if sigma == 0.0:
-                found = decide.count(self.function, self.common, most=most)
-            else:
-                found = int(decide.counts(line.space, line.functions, most=most)[0])
-                found -= self.common if found >= 0 and sigma < 0.0 else 0
+            found = decide.count(self.function, self.common, right_of=sigma, most=most)
         except UndecidedError:
             found = BOUNDARY
         self.steps += min(line.end / line.turn, most) if found >= 0 else most

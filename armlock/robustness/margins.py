@@ -14,11 +14,10 @@ import numpy as np
 
 from armlock.checks import positive_number, real_number
 from armlock.delays import DelaySystem
-from armlock.engine.decide import UndecidedError
 from armlock.engine.functions import Function
 from armlock.engine.margins import Margins, margins_of, modulus_of
 from armlock.loops import Loop, checked_loop, quotient_of
-from armlock.stability.counts import CountError
+from armlock.stability.counts import decided
 
 _T = TypeVar("_T")
 
@@ -28,10 +27,8 @@ def _certified(
 ) -> _T:
     """Return what the engine makes of numerator and denominator of a loop."""
     n, m = quotient_of(loop, c1, c2)
-    try:
+    with decided("no margin", np.array([[c1, c2]])):
         return compute(n, m)
-    except UndecidedError as error:
-        raise CountError(f"no margin: {error}", np.array([[c1, c2]])) from None
 
 
 def modulus_margin(loop: Loop | DelaySystem, c1: float = 1.0, c2: float = 1.0) -> float:

@@ -7,8 +7,6 @@ zero on the imaginary axis, and tells whether no function of a box has one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -18,14 +16,13 @@ import numpy.typing as npt
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import axis, positive_number, real_number
 from armlock.engine import decide
-from armlock.engine.decide import BOUNDARY, UNCONFINED, Family, UndecidedError
+from armlock.engine.decide import BOUNDARY, UNCONFINED, Family
 from armlock.engine.functions import Function, common_zeros
-from armlock.engine.inclusion import EPSILON
+from armlock.engine.inclusion import EPSILON, TERM, VERTEX
 from armlock.engine.margins import first_zero
 from armlock.loops import Loop, checked_loop
-from armlock.stability.counts import CountError
+from armlock.stability.counts import CountError, decided
 
-_VERTEX, _TERM = 1, 2
 # Nothing is looked at where the parameters are this many times as large as the start, or as 1.
 _FARTHEST = 1e9
 # Of a start on the boundary, crossings up to this share of its size, or of 1, are its own.
@@ -46,17 +43,6 @@ class Crossing(NamedTuple):
 
     position: float
     omega: float
-
-
-@contextmanager
-def _refusals(system: CharacteristicFunction, x: float, y: float) -> Iterator[None]:
-    """Raise what the engine does not decide as a `CountError` at a point."""
-    try:
-        yield
-    except UndecidedError as error:
-        name1, name2 = system.parameters
-        at = f"({name1}, {name2}) = ({x}, {y})"
-        raise CountError(f"not decided from {at}: {error}", np.array([[x, y]])) from None
 
 
 class _Ray:
@@ -181,7 +167,7 @@ def first_crossing(
     """
     ray = _Ray(system, start, direction)
     stop = _FARTHEST if stop is None else positive_number("stop", stop) / ray.scale
-    with _refusals(system, *ray.start):
+    with decided("not decided", np.array([ray.start])):
         u, omega = ray.first(ray.begin(), stop)
     return Crossing(u * ray.scale, omega)
 
@@ -233,7 +219,7 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
     2.9286e-06
     """
     ray = _Ray(checked_loop(loop), (1.0, 1.0), direction)
-    with _refusals(loop, 1.0, 1.0):
+    with decided("not decided", np.ones((1, 2))):
         at_start = ray.count(0.0)
         if at_start > 0 or at_start == UNCONFINED:
             raise ValueError(
@@ -308,9 +294,9 @@ def box_count(loop: Loop, size: float) -> int:
     size = positive_number("size", size)
     centre, terms = checked_loop(loop).function(1.0, 1.0), loop.terms
     signs = [(a, b) for a in (-size, size) for b in (-size, size)]
-    corners = [(_VERTEX, (1.0, a, b), (0.0, 0.0, 0.0)) for a, b in signs]
+    corners = [(VERTEX, (1.0, a, b), (0.0, 0.0, 0.0)) for a, b in signs]
     family = Family([centre, terms.first, terms.second], [corners])
-    with _refusals(loop, 1.0, 1.0):
+    with decided("not decided", np.ones((1, 2))):
         if not np.isfinite(family.ends(0.0)):
             return UNCONFINED
         return decide.count(centre) if decide.excludes(family) else BOUNDARY
@@ -386,10 +372,10 @@ def no_root_crosses(loop: Loop, low: float, high: float) -> bool:
     longest = between(mean + high, mean - low).function(1.0, 1.0)
     begin = longest.radius(a.order, min(abs(a.coefficient), abs(b.coefficient)), 0.25)
     # Past some frequency any phases may do.
-    free = (_VERTEX, (1.0, -1.0, 0.0)), (_TERM, (0.0, 0.5, 0.5)), (_TERM, (0.0, 0.5, -0.5))
+    free = (VERTEX, (1.0, -1.0, 0.0)), (TERM, (0.0, 0.5, 0.5)), (TERM, (0.0, 0.5, -0.5))
     test = [(*member, (0.0, 0.0, 0.0)) for member in free]
     both, apart = (terms.first + terms.second) * -1, terms.first + terms.second * -1
     functions = [terms.constant + both, both, apart]
     arc = (0.0, low, 0.0, high), (0.0, 0.0, 0.0, 0.0)
-    with _refusals(loop, 1.0, 1.0):
+    with decided("not decided", np.ones((1, 2))):
         return decide.excludes(Family(functions, [test], arc), begin)

@@ -178,7 +178,8 @@ def _chart_rows(
     if not (reserve(np.array([left, right]), np.array([[low], [high]])) > 0.0).all():
         # Rows end half-way between their last confined point and the limit of the chain.
         inside = np.where(confined, np.abs(x), 0.0).max(axis=1)
-        weight = rows.weight_at_infinity(first)
+        whole, _ = first.space.limits(*rows.constant.weights)
+        weight = first.size_at_infinity / abs(float(whole))
         if weight > 0.0:
             ends_at = inside + 0.5 * reserve(inside, y) / weight
             lower, upper = np.maximum(lower, -ends_at), np.minimum(upper, ends_at)
@@ -226,12 +227,6 @@ class _Rows:
         """Return D with x and y exchanged."""
         return _Rows(self.constant, self.at_centre, self.second, self.first, self.centre[::-1])
 
-    def weight_at_infinity(self, term: Function) -> float:
-        """Size of the highest power of a term over that of what nothing delays."""
-        still, turned = term.space.limits(*term.weights)
-        whole, _ = term.space.limits(*self.constant.weights)
-        return float((abs(still) + np.abs(turned).sum()) / abs(whole))
-
     def confined_from(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Frequency past which the constant exceeds x first and y second together."""
         steady, delayed = (
@@ -239,10 +234,8 @@ class _Rows:
         )
         sizes, top = np.zeros(steady.shape), np.zeros(x.size)
         for term, parameter in ((self.first, x), (self.second, y)):
-            s, w = term.weights
-            still, turned = term.space.limits(s, w)
-            sizes += np.multiply.outer(np.abs(parameter), abs(s - w.sum(1)) + abs(w).sum(1))
-            top += np.abs(parameter) * (abs(still) + np.abs(turned).sum())
+            sizes += np.multiply.outer(np.abs(parameter), term.sizes)
+            top += np.abs(parameter) * term.size_at_infinity
         found = self.first.space.confined_from(steady, delayed, sizes, top_terms=top)
         # A row that is nowhere confined has nothing to count.
         return np.where(np.isfinite(found), found, self.first.space.corners[0])

@@ -1,14 +1,15 @@
 """How many characteristic roots are unstable, at points of the parameter plane.
 
 By the argument principle along s = j omega (`armlock.engine.decide.counts`), up to a frequency
-past which no root can cross. Points are counted with rounded weights, of which the error is
-bounded. Those that this leaves undecided are counted again, exactly.
+past which no root can cross. Points are counted with rounded weights and a bound of their
+error. A point that this leaves undecided is counted again with exact weights. Among many
+points those where rounding hides the sign of D(0) are `BOUNDARY`: exact ones take 2 ms each.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 import numpy.typing as npt
@@ -58,13 +59,15 @@ class CountError(RuntimeError):
         return type(self), (str(self), self.points)
 
 
-def _decided(count: Callable[[], IntArray], x: FloatArray, y: FloatArray) -> IntArray:
-    """Return what counts functions at points, or say at which of them it is not decided."""
+@contextmanager
+def decided(what: str, points: FloatArray) -> Iterator[None]:
+    """Raise a `CountError` where the engine does not decide at one of some points."""
     try:
-        return count()
+        yield
     except UndecidedError as error:
-        at = np.array([[x[error.index], y[error.index]]])
-        raise CountError(f"no count at {tuple(at[0].tolist())}: {error}", at) from None
+        at = points[error.index : error.index + 1]
+        where = "".join(f" at {tuple(point)}" for point in at.tolist())
+        raise CountError(f"{what}{where}: {error}", at) from None
 
 
 def _count_exactly(system: CharacteristicFunction, x: float, y: float, right_of: float) -> int:
@@ -72,21 +75,18 @@ def _count_exactly(system: CharacteristicFunction, x: float, y: float, right_of:
     function = system.function(x, y)
     # No root cancels where D has none at s = 0.
     common = 0 if function.series(1)[0] else system.cancelled(x, y)
-    at = np.array([x]), np.array([y])
-    return int(_decided(lambda: np.array([_count(function, common, right_of)]), *at)[0])
+    with decided("no count", np.array([[x, y]])):
+        return _count(function, common, right_of)
 
 
 def _count(function: Function, common: int, right_of: float) -> int:
-    """Count the zeros right of a line, but `common` ones at s = 0."""
-    if right_of == 0.0:
-        return decide.count(function, common)
+    """Count the zeros right of a line, without `common` zeros at s = 0."""
     if abs(right_of) * function.space.longest > _LARGEST_EXPONENT:
         raise ValueError(
             f"right_of must be at most {_LARGEST_EXPONENT:.0f} over the longest delay in "
             f"magnitude, got {right_of}: its exponential is no float"
         )
-    found = int(decide.counts(*function.shifted(right_of))[0])
-    return found - common if right_of < 0.0 <= found else found
+    return decide.count(function, common, right_of=right_of)
 
 
 def count_points(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -> IntArray:
@@ -96,7 +96,7 @@ def count_points(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -
     terms = system.function(x0, y0), system.terms.first, system.terms.second
     (steady, delayed), space = stacked(terms), terms[0].space
     shares = np.stack((np.ones_like(x), x0 - x, y0 - y), axis=-1)
-    # D has a root at s = 0 on a line. A loop may have none there.
+    # On a line D has a root at s = 0. A loop may have none there.
     on_line = np.zeros(x.size, np.bool_)
     if not isinstance(system, Loop):
         at_zero = [term.series(1)[0] for term in terms]
@@ -113,7 +113,8 @@ def count_points(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -
         sizes = np.abs(shares[some]) @ (np.abs(steady) + 2.0 * np.abs(delayed).sum(axis=-1))
         weights = shares[some] @ steady, np.tensordot(shares[some], delayed, axes=1)
         functions = Functions(space.arrays, *weights, 4.0 * EPSILON * sizes)
-        found[some] = _decided(partial(decide.counts, space, functions), x[some], y[some])
+        with decided("no count", np.column_stack((x[some], y[some]))):
+            found[some] = decide.counts(space, functions)
     for i in left[found[left] == BOUNDARY]:
         found[i] = _count_exactly(system, float(x[i]), float(y[i]), 0.0)
     return found
@@ -144,10 +145,10 @@ def unstable_roots(
         Number of unstable roots, multiplicity included. The point is stable, with all roots
         in the open left half-plane, where it is 0. `BOUNDARY` (-1) where a root lies on the
         imaginary axis, or nearer to it than rounding can tell. Of a `Loop` these are the roots
-        of the closed loop: a root s = 0 that D has because numerator and denominator of L
-        cancel there is none. ``loop.plain()`` counts the roots of D. The rounding of the phase
-        omega tau is the largest: a point within some 8 EPSILON omega tau of the boundary,
-        relative to its parameters, may be given as -1 (4e-10 where a root crosses at 1e4 rad/s,
+        of the closed loop: a root s = 0 of D that cancels in L does not count. ``loop.plain()``
+        counts the roots of D. The rounding of the phase omega tau is the largest: a point
+        within some 8 EPSILON omega tau of the boundary, relative to its parameters, may be
+        given as -1 (4e-10 where a root crosses at 1e4 rad/s,
         with 20 s). `UNCONFINED` (-2) where the neutral root chain is not confined to the left
         half-plane (`CharacteristicFunction.neutral_margin` is not positive): an arbitrarily
         small change of the delays can then make infinitely many roots unstable. A chain that is
@@ -197,10 +198,8 @@ def unstable_roots(
         if c1 is not None or c2 is not None:
             raise TypeError(f"a DelaySystem has no free parameters, got {c1!r} and {c2!r}")
         n, m = system.functions
-        try:
+        with decided("no count", np.empty((0, 2))):
             return np.array(_count(n + m, system.common, right_of))
-        except UndecidedError as error:
-            raise CountError(f"no count: {error}", np.empty((0, 2))) from None
     xs, ys = broadcast_parameters(system, c1, c2)
     if xs.size > 1 and right_of == 0.0:
         return count_points(system, xs.ravel(), ys.ravel()).reshape(xs.shape)

@@ -20,7 +20,7 @@ from armlock.engine.functions import Function, at, common_zeros, stacked
 from armlock.engine.inclusion import EPSILON
 from armlock.engine.polynomials import rounded
 from armlock.loops import Loop, quotient_of
-from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError
+from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError, decided
 from armlock.stability.crossings import crossings
 
 if TYPE_CHECKING:
@@ -224,15 +224,14 @@ def nyquist(
     n, m = quotient_of(loop, c1, c2)
     poles = open_loop_poles(m)
     order, radius = _leading_radius(n, m)
-    try:
+    point = np.array([[c1, c2]])
+    with decided("no Nyquist count", point):
         count = decide.count(n + m, common_zeros(n, m))
-    except decide.UndecidedError as error:
-        raise CountError(f"no Nyquist count: {error}", np.array([[c1, c2]])) from None
     if count < 0:
         chain = "its high-frequency chain of roots is not confined"
         why = chain if count == UNCONFINED else "the curve passes through -1"
         where = f"(c1, c2) = ({c1}, {c2})"
-        raise CountError(f"no Nyquist count at {where}: {why}", np.array([[c1, c2]]))
+        raise CountError(f"no Nyquist count at {where}: {why}", point)
     last = float(n.space.confined_from(*stacked([n + m]))[0])
     longest = n.space.longest or 1.0 / last
     end = max(1.05 * last, 10.0 / longest, 10.0 * radius)
@@ -313,9 +312,7 @@ def axis_crossings(
     least = 0.0
     if omega_max is None:
         least = _SMALL
-        steady, delayed = n.weights
-        sizes = (np.abs(steady - delayed.sum(axis=1)) + np.abs(delayed).sum(axis=1)) / _SMALL
-        omega_max = float(n.space.confined_from(*stacked([m]), sizes)[0])
+        omega_max = float(n.space.confined_from(*stacked([m]), n.sizes / _SMALL)[0])
         if not np.isfinite(omega_max):
             raise ValueError(
                 "omega_max must be given for a loop whose |L| does not fall to zero at high "
