@@ -42,8 +42,8 @@ _PIECE, _SUBINTERVALS = 0.02, 4096.0
 # Undecided intervals after which a search ends; and, of a row on average, after which rows are
 # followed no further. Rounding hides much of the axis where N is nearly a multiple of M.
 FEW_UNDECIDED, _MANY_UNDECIDED = 16, 4096
-# Steps to locate a crossing: halvings of an interval, where Newton's method leads out of it.
-_MOST_LOCATED = 60
+# Most steps to a crossing. A third of them, at least, may be halvings of an interval.
+_MOST_LOCATED = 160
 # Room for halves of halves: geometric ones to a few rad/s apart, and 52 more.
 _DEEPEST = 300
 #: Kinds of members of a test: a vertex, and a term of any phase.
@@ -864,18 +864,19 @@ def _crossing(
 ) -> tuple[float, float]:
     """Return the value where a function of `_aim` is zero between two frequencies, and where.
 
-    By the rule of false position. The function's value at an end that stays is halved
-    (Illinois). The result is inf where the function has one sign at both frequencies, or where
-    neighbours in double precision do not agree on the value.
+    By the rule of false position, with each third step a halving. The function's value at an
+    end that stays is halved (Illinois). The result is inf where the function has one sign at
+    both frequencies, or where neighbours in double precision do not tell the value.
     """
     goal = question.goal
     at_a, _ = _measure(functions, goal, a, spare)
     at_b, _ = _measure(functions, goal, b, spare)
     if (at_a < 0.0) == (at_b < 0.0):
         return np.inf, a
-    side, value, omega = 0, np.inf, a
-    for _ in range(60):
-        last, omega = omega, (a * at_b - b * at_a) / (at_b - at_a)
+    side, here, value, omega = 0, at_a, np.inf, a
+    for step in range(_MOST_LOCATED):
+        last = omega
+        omega = (a * at_b - b * at_a) / (at_b - at_a) if step % 3 < 2 else 0.5 * (a + b)
         here, value = _measure(functions, goal, omega, spare)
         if here == 0.0 or abs(omega - last) <= 2.0 * EPSILON * omega:
             break
@@ -889,10 +890,15 @@ def _crossing(
             side = -1
     else:
         return np.inf, omega
-    _, below = _measure(functions, goal, omega * (1.0 - 4.0 * EPSILON), spare)
-    _, above = _measure(functions, goal, omega * (1.0 + 4.0 * EPSILON), spare)
-    agree = abs(above - below) <= question.tolerance * (value - question.start)
-    return value if agree else np.inf, omega
+    # Between two floats the value may change by more than the tolerance: it is interpolated.
+    at_a, below = _measure(functions, goal, omega * (1.0 - 4.0 * EPSILON), spare)
+    at_b, above = _measure(functions, goal, omega * (1.0 + 4.0 * EPSILON), spare)
+    change, bend = above - below, abs(above + below - 2.0 * value)
+    off = abs(change) + bend
+    if (at_a < 0.0) != (at_b < 0.0):
+        share = here / (at_b - at_a)
+        value, off = value - share * change, 2.0 * bend * share * share
+    return value if off <= question.tolerance * (value - question.start) else np.inf, omega
 
 
 @_maker
