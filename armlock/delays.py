@@ -96,11 +96,16 @@ class QuasiPolynomial:
 
     def at(self, s: ComplexArray, unit: Fraction, size: Fraction) -> ComplexArray:
         """Evaluate at s, over a size, by coefficients of powers of s / unit."""
+        first = min((float(theta) for theta, _ in self.terms if theta), default=0.0)
+        # Far on the right exponentials vanish beside one.
+        far = s.real * first > 1.0
         found = np.zeros_like(s)
-        for theta, coefficients in self.parts:
-            scaled = [float(c * unit**k / size) for k, c in enumerate(coefficients)]
-            value = poly.polyval(s / float(unit), scaled)
-            found += value * np.expm1(-s * float(theta)) if theta else value
+        for here, terms, turn in ((~far, self.parts, np.expm1), (far, self.terms, np.exp)):
+            at = s[here]
+            for theta, coefficients in terms:
+                scaled = [float(c * unit**k / size) for k, c in enumerate(coefficients)]
+                value = poly.polyval(at / float(unit), scaled)
+                found[here] += value * turn(-at * float(theta)) if theta else value
         return found
 
     def shifted(self, sigma: float) -> QuasiPolynomial:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import cached_property
 from itertools import zip_longest
 from numbers import Real
 from typing import Any
@@ -192,18 +193,28 @@ class Loop(WithDelays, CharacteristicFunction):
         """
         if not (self.b1 and self.b2):
             return super().parts()
+        half, zero = Fraction(1, 2), Fraction(0)
+        halves = [
+            (sign, p) for sign, p in zip((1, -1), self._sum_and_difference, strict=True) if p
+        ]
+        b1, b2 = ([(half * sign**k, p, zero) for sign, p in halves] for k in (0, 1))
+        return [(Fraction(1), self.rest, zero)], b1, b2
+
+    @cached_property
+    def _sum_and_difference(self) -> tuple[Polynomial, Polynomial]:
+        """B1 + B2 and B1 - B2, of which no term is left that cancels."""
         k, m = self.controller, self.mapping
         zeros = Polynomial.of_roots(k.zeros, k.gain)
-        common = zeros.order + Polynomial.of(m.numerator1).order - self.b1.order
-        halves = []
-        for sign in (1, -1):
-            pairs = zip_longest(m.numerator1, m.numerator2, fillvalue=0.0)
-            both = Polynomial.of([Fraction(a) + sign * Fraction(b) for a, b in pairs])
-            if both:
-                both = (zeros * both).over_powers(common)
-                halves.append((Fraction(1, 2), both, Fraction(0), sign))
-        b1, b2 = ([(w * s**k, p, lag) for w, p, lag, s in halves] for k in (0, 1))
-        return [(Fraction(1), self.rest, Fraction(0))], b1, b2
+        arms = (m.numerator1, self.b1), (m.numerator2, self.b2)
+        numerator, b = next(arm for arm in arms if arm[1])
+        common = zeros.order + Polynomial.of(numerator).order - b.order
+        both = (
+            Polynomial.of([Fraction(a) + sign * Fraction(b) for a, b in pairs])
+            for sign in (1, -1)
+            for pairs in [zip_longest(m.numerator1, m.numerator2, fillvalue=0.0)]
+        )
+        plus, minus = ((zeros * p).over_powers(common) for p in both)
+        return plus, minus
 
     def cancelled(self, c1: float | Fraction, c2: float | Fraction) -> int:
         """Order of the root at s = 0 that cancels in L, so that the closed loop has it not."""
@@ -282,6 +293,12 @@ class Loop(WithDelays, CharacteristicFunction):
                 )
         dead = np.exp(-s * self.delay)
         return self.b1.over(self.rest, s) * dead, self.b2.over(self.rest, s) * dead
+
+    def half_responses(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
+        """Evaluate half the sum and half the difference of `arm_responses`, each exactly."""
+        s, (plus, minus) = complex_array("s", s), self._sum_and_difference
+        half = 0.5 * np.exp(-s * self.delay)
+        return plus.over(self.rest, s) * half, minus.over(self.rest, s) * half
 
     def __call__(
         self, s: npt.ArrayLike, c1: npt.ArrayLike = 1.0, c2: npt.ArrayLike = 1.0

@@ -252,3 +252,13 @@ def test_many_fast_poles_overflow_neither_in_values_nor_in_print():
 def test_a_kind_of_system_needs_a_value_and_an_open_loop():
     with pytest.raises(TypeError, match="abstract"):
         type("Nothing", (WithDelays,), {})()
+
+
+def test_a_dead_time_before_a_growing_response_costs_no_digits():
+    unstable = control.tf([1], [1, -1]) * delay(30.0)
+    found = step_response(unstable, [10.0, 30.0, 31.0, 35.0]).outputs
+    assert found == pytest.approx([0.0, 0.0, np.expm1(1.0), np.expm1(5.0)], abs=2e-4)
+    ramp = step_response(control.tf([1], [1, 0, 0]) * delay(10.0), [10.0, 10.01]).outputs
+    assert ramp == pytest.approx([0.0, 5e-5], abs=1e-10)
+    low_pass = control.tf([1], [1, 1]) * delay(10.0)
+    assert low_pass(5.0) == pytest.approx(np.exp(-50.0) / 6.0, rel=1e-12)

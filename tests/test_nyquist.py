@@ -264,3 +264,16 @@ def test_a_picture_takes_fewer_than_a_million_samples():
         assert (abs(curve.response[::997] / drawn(1j * some) - 1.0) < allowed).all()
         assert (np.diff(curve.omega) > 0.0).all()
     assert far.omega[-1] == 1e9
+
+
+def test_a_picture_shows_a_resonance_between_its_even_samples():
+    import control
+
+    loop = (control.tf([0.1], [1, 0.2]) + control.tf([1.8e-3, 0], [1, 6e-4, 9])) * delay(1.0)
+    curve = nyquist(loop)
+    omega = 3.0 + np.linspace(-2e-3, 2e-3, 100_001)
+    assert abs(curve.response).max() == pytest.approx(abs(loop(1j * omega)).max(), rel=1e-3)
+    turns = np.unwrap(
+        np.angle(1.0 + np.concatenate((curve.response[::-1].conj(), curve.response)))
+    )
+    assert round((turns[0] - turns[-1]) / (2.0 * np.pi)) == curve.encirclements == 2

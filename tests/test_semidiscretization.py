@@ -31,6 +31,11 @@ def test_published_spectral_radius_of_the_hayes_equation(table):
     assert float(radius) == pytest.approx(float(row["value"]), abs=3e-15)
 
 
+@pytest.mark.parametrize("a", [-1.0, -30.0, -50.0])
+def test_a_small_spectral_radius_keeps_its_digits(a):
+    assert spectral_radius(HayesEquation(1.0), a, 0.0, step=1.0) == pytest.approx(np.exp(a))
+
+
 def test_spectral_radii_of_the_common_arm(table):
     rows = [r for r in table("semidiscretization.csv") if r["system"].startswith("common")]
     assert len(rows) == 2

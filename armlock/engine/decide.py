@@ -419,10 +419,7 @@ def _likely(
         # One turn of the longest delay at each frequency, and the first hundred turns.
         point = np.arange(16) * (2.0 * np.pi / (16.0 * space.longest))
         grids += [np.add.outer(grids[0], point).ravel(), point[1] * np.arange(1, 1600)]
-    for root in set(space.arrays.roots[space.arrays.present].tolist()):
-        if root.imag > 0.0:
-            off = max(abs(root.real), 1e-9 * root.imag) * np.geomspace(1e-2, 1e3, 24)
-            grids += [root.imag - off, root.imag + off]
+    grids.append(space.around_roots(24))
     omega = np.unique(np.concatenate(grids).clip(low, high))
     crossing, value = inclusion.sample(functions, question, omega)
     rank = np.minimum(value[1:], value[:-1])

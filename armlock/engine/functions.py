@@ -109,6 +109,18 @@ class Space:
         self.corners = np.unique(np.append(sizes[sizes > 0.0], unit))
         self.sums = np.abs(roots).sum(axis=1)
 
+    def around_roots(self, number: int) -> FloatArray:
+        """Frequencies around complex roots, closest where a function changes most.
+
+        So many on each side, from a hundredth of the distance of a root from the axis to 1000
+        times it.
+        """
+        roots = np.unique(self.arrays.roots[self.arrays.present])
+        roots = roots[roots.imag > 0.0]
+        near = np.maximum(np.abs(roots.real), 1e-9 * roots.imag)
+        off = np.multiply.outer(np.geomspace(1e-2, 1e3, number), near)
+        return np.concatenate((roots.imag - off, roots.imag + off)).ravel()
+
     def function(self, steady: Sequence[Any], delayed: Sequence[Sequence[Any]]) -> Function:
         """Return the function with weights S, shape (J,), and W, shape (J, K)."""
         shape = len(self.polynomials), len(self.delays)

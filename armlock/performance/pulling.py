@@ -81,7 +81,9 @@ def pulling(
     -----
     The transform is inverted on a line :math:`s = \sigma + \mathrm{j}\omega` to the right of
     all roots, as a sum over equal steps of :math:`\omega`. The result is not certified. Changes
-    within less than 4e-4 of the time are smoothed, such as the echo of an undelayed part.
+    within less than 4e-4 of the time are smoothed, such as the echo of an undelayed part. Of
+    an error that grows like :math:`t^2`, up to 5e-3 of the result may depend on the latest time
+    that is asked for.
 
     Examples
     --------
@@ -117,8 +119,8 @@ def largest_pulling(
     Returns
     -------
     Peak
-        The highest sample of three series, which resolve less than a millisecond over the first
-        ten round trips, 10 ms over an hour, and 4 s later. It is not certified.
+        The highest sample of three series, which resolve 1 ms over the first ten round trips,
+        20 ms over an hour, and 10 s later. It is not certified.
     """
     require_stable(loop)
     errors = _error("common", common), _error("differential", differential)

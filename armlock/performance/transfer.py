@@ -64,13 +64,13 @@ def transfer(
 def responses(loop: Loop, s: npt.ArrayLike) -> dict[str, ComplexArray]:
     """Evaluate the responses to all inputs at once, as `transfer` gives them one by one."""
     sensitivity = 1.0 / (1.0 + checked_loop(loop)(s))
-    first, second = loop.arm_responses(s)
-    errors = {
-        "arm 1": first,
-        "arm 2": second,
-        "common": 0.5 * (first + second),
-        "differential": 0.5 * (first - second),
-    }
+    errors = dict(
+        zip(
+            ("arm 1", "arm 2", "common", "differential"),
+            (*loop.arm_responses(s), *loop.half_responses(s)),
+            strict=True,
+        )
+    )
     found = {name: np.asarray(-error * sensitivity) for name, error in errors.items()}
     return {"laser": np.asarray(sensitivity), **found}
 

@@ -279,7 +279,7 @@ def d_curve_branches(
     # Samples in an interval of 1 rad/s.
     density *= system.longest_delay / (2.0 * np.pi)
     check_memory("omega_max", (int(min(density * omega_max, 1e18)),), 256)
-    poles = _poles(system, omega_max)
+    poles, around = _poles(system, omega_max), system.terms.rest.space.around_roots(200)
     branches = []
     for (_, start), (stop, _) in pairwise([(0.0, 0.0), *poles, (omega_max, omega_max)]):
         if stop <= start:
@@ -287,7 +287,8 @@ def d_curve_branches(
         count = int(np.ceil(max(density * (stop - start), 4.0 * points_per_turn)))
         # Closer towards both ends, where the curve runs off to its poles.
         share = 0.5 * (1.0 - np.cos(np.pi * (np.arange(count) + 0.5) / count))
-        omega = start + (stop - start) * share
+        near = around[(around > start) & (around < stop)]
+        omega = np.union1d(start + (stop - start) * share, near)
         x, y = d_curve(system, omega)
         kept = np.isfinite(x) & np.isfinite(y)
         branches.append(Branch(omega[kept], x[kept], y[kept]))

@@ -16,7 +16,7 @@ import numpy as np
 from armlock.checks import BoolArray, ComplexArray, FloatArray, positive_number
 from armlock.delays import DelaySystem
 from armlock.engine import decide
-from armlock.engine.functions import Function, at, common_zeros, stacked
+from armlock.engine.functions import Function, Space, at, common_zeros, stacked
 from armlock.engine.inclusion import EPSILON
 from armlock.engine.polynomials import rounded
 from armlock.loops import Loop, quotient_of
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 _SMALL, _LARGE = 1e-3, 1e12
 # To this share L has to agree at both ends of the interval that holds a crossing.
 _AGREED = 1e-3
+# Samples on each side of a resonance.
+_AROUND_A_ROOT = 200
 # The share of a leading term that all others are at most, where a picture begins.
 _NEGLIGIBLE = 5e-4
 
@@ -142,8 +144,8 @@ def open_loop_poles(m: Function) -> int:
     return count
 
 
-def _drawing_grid(per_turn: float, start: float, end: float) -> FloatArray:
-    """Frequencies close enough to draw the curve; finer at first, where L changes most.
+def _drawing_grid(space: Space, per_turn: float, start: float, end: float) -> FloatArray:
+    """Frequencies close enough to draw the curve; finer at first, and around resonances.
 
     Past a thousand turns of the delays no picture shows one turn beside the next.
     """
@@ -151,7 +153,8 @@ def _drawing_grid(per_turn: float, start: float, end: float) -> FloatArray:
     resolved = min(1000.0 * per_turn, end)
     whole = np.arange(0.0, resolved, per_turn / 400.0)
     far = np.geomspace(resolved, end, 100_000) if end > resolved else whole[:0]
-    every = np.concatenate((np.geomspace(start, end, 4000), first, whole, far, [end]))
+    near = space.around_roots(_AROUND_A_ROOT)
+    every = np.concatenate((np.geomspace(start, end, 4000), first, whole, far, near, [end]))
     return np.unique(every[(every >= start) & (every <= end)])
 
 
@@ -237,7 +240,7 @@ def nyquist(
     end = max(1.05 * last, 10.0 / longest, 10.0 * radius)
     if omega_max is not None:
         end = max(end, positive_number("omega_max", omega_max))
-    omega = _drawing_grid(2.0 * np.pi / longest, radius, end)
+    omega = _drawing_grid(n.space, 2.0 * np.pi / longest, radius, end)
     arc = radius * np.exp(0.5j * np.pi * np.linspace(0.0, 1.0, 64))[slice(64 if order else 0)]
     return NyquistCurve(
         omega=omega,

@@ -38,8 +38,8 @@ from armlock.engine.roots import RootError
 _DIGITS = 100
 # Bits of Schur's test, at first and at most.
 _BITS, _MOST_BITS = 800, 25600
-# Halvings of the interval that holds a spectral radius: some more than a float has bits.
-_HALVINGS = 56
+# A spectral radius is found to this share of itself. Below the least one it counts as zero.
+_SHARE, _LEAST = 2.0**-54, 1e-300
 
 
 class DelayedTerm(NamedTuple):
@@ -350,7 +350,7 @@ def _radius(
         low, high = mpmath.mpf(0), mpmath.mpf(3) / 2
         while not _within(powers, high):
             low, high = high, 2 * high
-        for _ in range(_HALVINGS):
+        while high - low > _SHARE * high and high > _LEAST:
             middle = (low + high) / 2
             low, high = (low, middle) if _within(powers, middle) else (middle, high)
         return float(high)

@@ -278,6 +278,10 @@ class Simulation:
     Here g is the gain of the sampled controller, and d_k are the direct shares of the arms in
     the sensor's output. The weights :math:`\ell_{k,i}` are those of `sampled_open_loop`.
 
+    The controller is sampled by Tustin's rule, which lowers a frequency omega of it by about
+    omega^3 T^2 / 12, with the step T. So close to the stability boundary a simulation may be
+    stable where the loop is not, or the reverse; half the step tells.
+
     One long call and many short ones give the same samples, bit by bit.
     ``copy.deepcopy(run)`` keeps the state.
 

@@ -236,7 +236,8 @@ class SpectrumEstimator:
         X_k &= \sum_{i=0}^{N-1} w_i\, (x_i - \bar x)\, e^{-2\pi\mathrm{j}\, i k / N} ,
 
     with a Kaiser window w. Segments overlap by three quarters, which the number of averages
-    takes into account.
+    takes into account. Filters before lower rates pass 1e-6 of higher frequencies, which is the
+    least ratio of two densities that the estimate tells.
 
     Examples
     --------
