@@ -1,8 +1,8 @@
 """What is decided on the imaginary axis: counts, and whether a family of functions has a zero.
 
 `count` follows the argument of one function. `Family` states functions of which none may have
-a zero, up to a level; `least` finds the largest level at which none has. Both stop where double
-precision does not decide: then they say at which frequency.
+a zero, up to a level; `least` finds the largest level at which none has. Where double
+precision does not decide, a count is `BOUNDARY`, and a search raises an `UndecidedError`.
 """
 
 from __future__ import annotations

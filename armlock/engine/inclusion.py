@@ -693,7 +693,8 @@ def _arc_holds(
 def _halve(stack: FloatArray, top: int, low: float, high: float) -> bool:
     """Put the halves of an interval on a stack, unless double precision tells none apart.
 
-    This is the one rule for what double precision cannot decide: such an interval is undecided.
+    This is the rule for what double precision cannot decide: such an interval is undecided. For
+    intervals around s = 0 and a map's end `_cut_around` applies it.
     """
     middle = 0.5 * (low + high)
     if high > 4.0 * low:
