@@ -73,14 +73,14 @@ def test_each_crossing_is_where_it_is_said_to_be():
         exact = [Exact(f) for f in functions]
         for row, x, spread, omega, width, jump in table[:20]:
             low, high = (mp.mpf(omega) + side * mp.mpf(width) for side in (-1, 1))
-            signs = []
+            ends = [pair(exact, y[int(row)], w) for w in (low, high)]
+            below, above = (mp.sign((n * mp.conj(m)).imag) for n, m in ends)
+            assert above == mp.sign(jump) == -below
             for _ in range(60):
-                found = [pair(exact, y[int(row)], w) for w in (low, high, (low + high) / 2)]
-                signs.append([mp.sign((n * mp.conj(m)).imag) for n, m in found])
                 middle = (low + high) / 2
-                low, high = (low, middle) if signs[-1][2] == signs[-1][1] else (middle, high)
-            assert signs[0][1] == mp.sign(jump) == -signs[0][0]
-            n, m = found[2]
+                n, m = pair(exact, y[int(row)], middle)
+                past = mp.sign((n * mp.conj(m)).imag) == above
+                low, high = (low, middle) if past else (middle, high)
             shares.append(float(abs((n / m).real - mp.mpf(x)) / mp.mpf(spread)))
     assert max(shares) <= 1.0
     assert max(shares) > 1e-3
