@@ -21,6 +21,7 @@ from armlock import (
 from armlock.performance.budget import LEVELS, tdi_capability
 from armlock.performance.pulling import largest_pulling
 from armlock.sensors import SINGLE, modified_dual
+from tests import independent
 
 FLIGHT = flight_loop()
 DAY = 86400.0
@@ -160,3 +161,23 @@ def test_what_an_unstable_loop_does_is_no_pulling():
     # With any dead time its neutral root chain is not confined.
     with pytest.raises(ValueError, match=r"^loop must be stable .* unstable_roots gives -2"):
         largest_pulling(paper_loop(delay=1e-6), common=(1.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("omega", [1e-6, 1e-3])
+def test_arms_that_cancel_at_low_frequency_leave_their_digits(omega):
+    k, m = FLIGHT.controller, FLIGHT.mapping
+    with mpmath.workdps(50):
+        s = mpmath.mpc(0, omega)
+        gain = k.gain * mpmath.fprod(s - mpmath.mpc(zero) for zero in k.zeros)
+        gain /= mpmath.fprod(s - mpmath.mpc(pole) for pole in k.poles)
+        one, two, below = (
+            mpmath.polyval(list(p), s, asc=True)
+            for p in (m.numerator1, m.numerator2, m.denominator)
+        )
+        factor = -gain * mpmath.exp(-s * FLIGHT.delay) / independent.exact(FLIGHT, s, 1, 1)
+        common, differential = (
+            complex(factor * v / (2 * below)) for v in (one + two, one - two)
+        )
+    assert transfer(FLIGHT, "common", 1j * omega) == pytest.approx(common, rel=1e-7, abs=0)
+    found = transfer(FLIGHT, "differential", 1j * omega)
+    assert found == pytest.approx(differential, rel=1e-7, abs=0)
