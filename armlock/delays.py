@@ -96,7 +96,7 @@ class QuasiPolynomial:
 
     def at(self, s: ComplexArray, unit: Fraction, size: Fraction) -> ComplexArray:
         """Evaluate at s, over a size, by coefficients of powers of s / unit."""
-        first = min((float(theta) for theta, _ in self.terms if theta), default=0.0)
+        first = next((float(theta) for theta, _ in self.terms if theta), 0.0)
         # Far on the right exponentials vanish beside one.
         far = s.real * first > 1.0
         found = np.zeros_like(s)

@@ -208,13 +208,12 @@ class Loop(WithDelays, CharacteristicFunction):
         arms = (m.numerator1, self.b1), (m.numerator2, self.b2)
         numerator, b = next(arm for arm in arms if arm[1])
         common = zeros.order + Polynomial.of(numerator).order - b.order
-        both = (
+        pairs = list(zip_longest(m.numerator1, m.numerator2, fillvalue=0.0))
+        plus, minus = (
             Polynomial.of([Fraction(a) + sign * Fraction(b) for a, b in pairs])
             for sign in (1, -1)
-            for pairs in [zip_longest(m.numerator1, m.numerator2, fillvalue=0.0)]
         )
-        plus, minus = ((zeros * p).over_powers(common) for p in both)
-        return plus, minus
+        return (zeros * plus).over_powers(common), (zeros * minus).over_powers(common)
 
     def cancelled(self, c1: float | Fraction, c2: float | Fraction) -> int:
         """Order of the root at s = 0 that cancels in L, so that the closed loop has it not."""
@@ -295,7 +294,7 @@ class Loop(WithDelays, CharacteristicFunction):
         return self.b1.over(self.rest, s) * dead, self.b2.over(self.rest, s) * dead
 
     def half_responses(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
-        """Evaluate half the sum and half the difference of `arm_responses`, each exactly."""
+        """Evaluate half the sum and half the difference of `arm_responses`; nothing cancels."""
         s, (plus, minus) = complex_array("s", s), self._sum_and_difference
         half = 0.5 * np.exp(-s * self.delay)
         return plus.over(self.rest, s) * half, minus.over(self.rest, s) * half

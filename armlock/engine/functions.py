@@ -109,7 +109,7 @@ class Space:
         self.corners = np.unique(np.append(sizes[sizes > 0.0], unit))
         self.sums = np.abs(roots).sum(axis=1)
 
-    def around_roots(self, number: int) -> FloatArray:
+    def around_roots(self, number: int = 200) -> FloatArray:
         """Frequencies around complex roots, closest where a function changes most.
 
         So many on each side, from a hundredth of the distance of a root from the axis to 1000

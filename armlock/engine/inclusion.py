@@ -42,7 +42,7 @@ _PIECE, _SUBINTERVALS = 0.02, 4096.0
 # Undecided intervals after which a search ends; and, of a row on average, after which rows are
 # followed no further. Rounding hides much of the axis where N is nearly a multiple of M.
 FEW_UNDECIDED, _MANY_UNDECIDED = 16, 4096
-# Most steps to a crossing. A third of them, at least, may be halvings of an interval.
+# Most steps to a crossing: three for each halving that double precision allows.
 _MOST_LOCATED = 160
 # Room for halves of halves: geometric ones to a few rad/s apart, and 52 more.
 _DEEPEST = 300

@@ -23,7 +23,8 @@ from armlock.engine.polynomials import Polynomial
 
 # How far right of the zero that is returned no other one lies: the first share of abs(s), or of
 # one over the longest delay, if so fine a count is decided in so few steps. Otherwise it is the
-# second share of abs(Re s), or of one over the longest delay.
+# second share of abs(Re s), or of one over the longest delay. Real parts that differ by less
+# than the first count as equal.
 _FINEST, _FINE = 1e-11, 1e-6
 _FEW_STEPS, _MANY_STEPS = 200_000, 2_000_000
 # The search for one zero ends once it has cost so many steps, some five seconds.

@@ -64,13 +64,9 @@ def transfer(
 def responses(loop: Loop, s: npt.ArrayLike) -> dict[str, ComplexArray]:
     """Evaluate the responses to all inputs at once, as `transfer` gives them one by one."""
     sensitivity = 1.0 / (1.0 + checked_loop(loop)(s))
-    errors = dict(
-        zip(
-            ("arm 1", "arm 2", "common", "differential"),
-            (*loop.arm_responses(s), *loop.half_responses(s)),
-            strict=True,
-        )
-    )
+    first, second = loop.arm_responses(s)
+    common, differential = loop.half_responses(s)
+    errors = {"arm 1": first, "arm 2": second, "common": common, "differential": differential}
     found = {name: np.asarray(-error * sensitivity) for name, error in errors.items()}
     return {"laser": np.asarray(sensitivity), **found}
 

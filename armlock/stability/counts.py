@@ -148,12 +148,12 @@ def unstable_roots(
         of the closed loop: a root s = 0 of D that cancels in L does not count. ``loop.plain()``
         counts the roots of D. The rounding of the phase omega tau is the largest: a point
         within some 8 EPSILON omega tau of the boundary, relative to its parameters, may be
-        given as -1 (4e-10 where a root crosses at 1e4 rad/s,
-        with 20 s). `UNCONFINED` (-2) where the neutral root chain is not confined to the left
-        half-plane (`CharacteristicFunction.neutral_margin` is not positive): an arbitrarily
-        small change of the delays can then make infinitely many roots unstable. A chain that is
-        confined by no more than rounding, about 1e-14, counts as not confined, and such a loop
-        has no margins.
+        given as -1 (4e-10 where a root crosses at 1e4 rad/s, with 20 s). `UNCONFINED` (-2)
+        where the neutral root chain is not confined to the left half-plane
+        (`CharacteristicFunction.neutral_margin` is not positive): an arbitrarily small change
+        of the delays can then make infinitely many roots unstable. A chain that is confined by
+        no more than rounding, about 1e-14, counts as not confined, and such a loop has no
+        margins.
 
     Raises
     ------

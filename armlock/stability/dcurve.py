@@ -279,7 +279,7 @@ def d_curve_branches(
     # Samples in an interval of 1 rad/s.
     density *= system.longest_delay / (2.0 * np.pi)
     check_memory("omega_max", (int(min(density * omega_max, 1e18)),), 256)
-    poles, around = _poles(system, omega_max), system.terms.rest.space.around_roots(200)
+    poles, around = _poles(system, omega_max), system.terms.rest.space.around_roots()
     branches = []
     for (_, start), (stop, _) in pairwise([(0.0, 0.0), *poles, (omega_max, omega_max)]):
         if stop <= start:

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 _SMALL, _LARGE = 1e-3, 1e12
 # To this share L has to agree at both ends of the interval that holds a crossing.
 _AGREED = 1e-3
-# Samples on each side of a resonance.
-_AROUND_A_ROOT = 200
 # The share of a leading term that all others are at most, where a picture begins.
 _NEGLIGIBLE = 5e-4
 
@@ -153,8 +151,8 @@ def _drawing_grid(space: Space, per_turn: float, start: float, end: float) -> Fl
     resolved = min(1000.0 * per_turn, end)
     whole = np.arange(0.0, resolved, per_turn / 400.0)
     far = np.geomspace(resolved, end, 100_000) if end > resolved else whole[:0]
-    near = space.around_roots(_AROUND_A_ROOT)
-    every = np.concatenate((np.geomspace(start, end, 4000), first, whole, far, near, [end]))
+    grids = np.geomspace(start, end, 4000), first, whole, far, space.around_roots(), [end]
+    every = np.concatenate(grids)
     return np.unique(every[(every >= start) & (every <= end)])
 
 
