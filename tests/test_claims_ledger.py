@@ -88,7 +88,7 @@ def test_formulas_are_typeset_and_claims_linked():
     assert r"\(c_{1} &lt; 10^{-6}\) at \(2.5 \times 10^{-7}\)" in text
     assert r"\(\exp (-s τ_{2})\)" in text
     for name in ("K5", "C7"):
-        assert f'<a href="15_ledger.html#ledger-{name}">{name}</a>' in text
+        assert f'<a href="16_ledger.html#ledger-{name}">{name}</a>' in text
 
 
 def test_a_terminal_shows_all_and_a_chapter_the_verdict(calls):

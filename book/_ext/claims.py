@@ -7,7 +7,7 @@ from sphinx.util.docutils import SphinxDirective
 from book.companion.claims.ledger import NAME, NAMING, all_names
 from book.companion.claims.page import LedgerPage, VerdictCounts, whole_ledger
 
-LEDGER = "notebooks/15_ledger"
+LEDGER = "notebooks/16_ledger"
 LOGGER = logging.getLogger(__name__)
 
 

@@ -431,7 +431,7 @@ def typeset(text: str) -> str:
 
 def ledger_link(identifier: str, attributes: str = "") -> str:
     """Return a link from a chapter to a claim's row in the ledger."""
-    return f'<a {attributes}href="15_ledger.html#ledger-{identifier}">{identifier}</a>'
+    return f'<a {attributes}href="16_ledger.html#ledger-{identifier}">{identifier}</a>'
 
 
 def badge(verdict: Verdict, text: str = "") -> str:
