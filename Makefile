@@ -27,7 +27,7 @@ sources = $(shell find $(1) -type f -not -name '*.py[co]' -not -name '*.nb[ic]' 
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help env book pdf print browser same lab test tests claims bench dist \
+.PHONY: help env book pdf print browser same lab test tests claims pins bench dist \
 	lint format lock clean
 
 help: ## List the targets
@@ -61,20 +61,17 @@ $(READY): environment.txt book/kernel.json
 	@cp book/kernel.json $(VENV)/etc/ipython/ipython_kernel_config.json
 	@echo "$(CURDIR)" > $@
 
-# nbmake runs copies of the notebooks for the tests and for the book, the longest first. All
-# claims are checked before: chapters and tests take what was found.
+# nbmake runs copies of the notebooks for the tests and for the book, the longest first.
 LONGEST := $(wildcard notebooks/09_* notebooks/13_* notebooks/16_*)
 PYTEST := $(PY) -m pytest --numprocesses auto --maxprocesses 4 --dist worksteal
 execute = export ARMLOCK_FIGURES=$(CURDIR)/$(1); \
 	$(PYTEST) --dist load --maxschedchunk 1 --nbmake --overwrite $(2:notebooks/%=build/executed/%) && \
 	$(PY) tools/collect_figures.py build/executed $(1) build/cache
-execute-all = rm -rf $(1) build/shared build/executed; \
-	echo "Checking every claim of the paper: build/claims.txt ..."; \
-	$(PY) -m book.companion.claims $(1) > build/claims.txt && cp -R notebooks build/executed && \
+execute-all = rm -rf $(1) build/shared build/executed; cp -R notebooks build/executed && \
 	$(call execute,$(1),$(LONGEST) $(NOTEBOOKS))
 
 # If notebooks alone have changed, only these run again.
-$(EXECUTED): $(READY) $(call sources,armlock book/companion notebooks)
+$(EXECUTED): $(READY) $(call sources,armlock book/companion notebooks) book/claims.toml
 	@rm -f $@
 	@$(if $(filter-out notebooks/%.ipynb,$?),$(call execute-all,build/figures),\
 		cp $? build/executed && $(call execute,build/figures,$?))
@@ -89,7 +86,8 @@ book: ## Run all notebooks and build the book, as HTML that needs no network
 	+@$(alone) $(BOOK)
 	@echo "The book is ready. Open it in a browser: file://$(CURDIR)/$(BOOK)"
 
-prepare = rm -rf $(1); mkdir -p $(1)/$(2); cp -R build/figures $(1)/$(2); cp -R build/cache $(1)/.jupyter_cache
+prepare = rm -rf $(1); mkdir -p $(1)/$(2); cp -R build/figures $(1)/$(2); \
+	cp -R build/cache $(1)/.jupyter_cache; $(PY) -m book.companion.ledger show $(1)/$(2)/figures > build/claims.txt
 jupyter-book = $(VENV)/bin/jupyter-book build . --all --config book/_config.yml --toc book/_toc.yml
 
 # The new book replaces the old one when it is complete.
@@ -125,8 +123,14 @@ test: ## Run all tests, notebooks included
 tests: $(EXECUTED)
 	$(PYTEST) tests
 
-claims: $(READY) ## Check every claim; print the ledger, write it as CSV and JSON
-	$(PY) -m book.companion.claims build/claims
+claims: $(READY) ## Print the ledger of claims, and write it as CSV and JSON
+	@$(PY) -m book.companion.ledger show build/claims
+
+# Of some chapters: make pins NOTEBOOKS=notebooks/08_controller.ipynb
+pins: $(READY) ## Run the notebooks, write what they find into the ledger's file, show what changed
+	@rm -rf build/found && mkdir -p build/found
+	ARMLOCK_FOUND=$(CURDIR)/build/found $(PYTEST) --dist load --maxschedchunk 1 --nbmake $(NOTEBOOKS)
+	@$(PY) -m book.companion.ledger update build/found
 
 bench: $(READY) ## Measure speed and memory, and print a table
 	$(PY) -m benchmarks

@@ -6,9 +6,9 @@ pages have both, and the directive `published` shows its content, with ADDRESS r
 which Jupyter Book always adds, goes: it would need the network.
 """
 
-from sphinx.util.docutils import SphinxDirective
+from importlib import metadata
 
-from book.companion.claims.page import project_url
+from sphinx.util.docutils import SphinxDirective
 
 # Links that a reader may follow; nothing is asked of these servers before.
 LAUNCHERS = {
@@ -16,6 +16,17 @@ LAUNCHERS = {
     "colab_url": "https://colab.research.google.com",
     "notebook_interface": "jupyterlab",
 }
+
+
+def project_url():
+    """Return where the sources are published, if the package's metadata say so."""
+    try:
+        entries = metadata.metadata("armlock").get_all("Project-URL") or []
+    except metadata.PackageNotFoundError:
+        return None
+    addresses = {k.lower(): v for k, _, v in (entry.partition(", ") for entry in entries)}
+    found = [addresses[k] for k in ("source", "repository", "homepage") if k in addresses]
+    return found[0].rstrip("/") if found else None
 
 
 class Published(SphinxDirective):

@@ -16,20 +16,14 @@ c₁ or 10⁻⁶, becomes TeX on a page (`typeset`); TeX may be written as well.
 
 from __future__ import annotations
 
-import csv
 import html
-import json
-import re
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from enum import StrEnum
-from multiprocessing import get_context
-from pathlib import Path
 
 import numpy as np
 
+from book.companion import ledger
 from book.companion.shared import shared
 
 #: Notebook of a claim by its letter, and the part of the paper that the claim is from.
@@ -309,62 +303,15 @@ class Ledger:
         AssertionError
             If one is not: which, what was found and what is pinned.
         """
-        wrong = []
+        pinned, wrong = ledger.Ledger(), []
         for entry, finding in self.entries:
-            pinned, value, tolerance = entry.pinned
-            if finding.verdict is not pinned or not abs(finding.value - value) <= tolerance:
-                wrong.append(
-                    f"{entry.identifier} is pinned as {pinned}, {value!r} within "
-                    f"{tolerance:g}; found {finding.verdict}, {finding.value!r}"
-                )
+            one = pinned[entry.identifier]
+            if str(one.verdict) != str(finding.verdict) or not (
+                abs(finding.value - one.value) <= one.tolerance + 1e-9 * abs(one.value)
+            ):
+                wrong.append(f"{entry.identifier}: {one.verdict}, {one.value!r} in the file")
         if wrong:
             raise AssertionError("\n".join(wrong))
-
-    def counts(self, *weights: Weight) -> Counter[Verdict]:
-        """Return how many findings met each verdict; of some weights, or of all."""
-        return Counter(
-            finding.verdict
-            for entry, finding in self.entries
-            if entry.weight in (weights or Weight)
-        )
-
-    def records(self) -> list[dict[str, str | float]]:
-        """Return the ledger as one flat record a claim."""
-        return [
-            {
-                "claim": " ".join(entry.names),
-                "place": entry.places,
-                "says": entry.says,
-                "printed": entry.printed,
-                "chapter": chapter_of(entry.identifier),
-                "weight": str(entry.weight),
-                "verdict": str(finding.verdict),
-                "clause": finding.verdict.clause,
-                "readings": "; ".join(finding.tried),
-                "value": finding.value,
-                "quantity": finding.quantity,
-                "note": finding.note,
-            }
-            for entry, finding in self.entries
-        ]
-
-    def write(self, folder: Path) -> list[Path]:
-        """Write claims.csv and claims.json into a folder, and return their paths."""
-        folder.mkdir(parents=True, exist_ok=True)
-        records = self.records()
-        table, tree = folder / "claims.csv", folder / "claims.json"
-        with table.open("w", newline="", encoding="utf-8") as stream:
-            writer = csv.DictWriter(stream, fieldnames=list(records[0]))
-            # Each number has a unit of its own, in the column beside it.
-            names = {name: name for name in records[0]} | {"value": "value [as quantity says]"}
-            writer.writerow(names)
-            # As many digits as in the figures' tables: more would differ between machines.
-            writer.writerows(record | {"value": f"{record['value']:.7g}"} for record in records)
-        # Other processes read this one: it is there as a whole, or not at all.
-        part = tree.with_suffix(".part")
-        part.write_text(json.dumps(records, indent=1, ensure_ascii=False) + "\n", "utf-8")
-        part.replace(tree)
-        return [table, tree]
 
     def __repr__(self) -> str:
         """Return the table as text."""
@@ -388,46 +335,6 @@ class Ledger:
 
 # HTML ----------------------------------------------------------------------------------------
 
-#: A text that names claims: "claim K5", "claims C7, C8 and C11".
-NAMING = re.compile(r"\b[Cc]laims?\s+[A-Z]\d+(?:(?:,\s+and|,|\s+and|\s+to)\s+[A-Z]\d+)*")
-#: One of the names in it.
-NAME = re.compile(r"[A-Z]\d+")
-_POWER = re.compile(r"(?<![\w.])([-+]?\d+(?:\.\d+)?)e([-+]\d+)")
-_RAISED = re.compile("[⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻]+")
-_LOWERED = re.compile("[₀₁₂₃₄₅₆₇₈₉₊₋]+")
-_FUNCTION = re.compile(r"(?<!\\)\b(exp|sin|cos|cot|ln|min|max)\b")
-_LEVEL = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻₀₁₂₃₄₅₆₇₈₉₊₋", "0123456789+-" * 2)
-
-
-def typeset(text: str) -> str:
-    r"""Return a text of the ledger as HTML, with formulas and links to the claims it names.
-
-    Examples
-    --------
-    >>> from book.companion.claims.ledger import typeset
-    >>> print(typeset("$c₁$ is 1.5e-06 here: $c₁ ≥ 10⁻⁶$"))
-    \(c_{1}\) is \(1.5 \times 10^{-6}\) here: \(c_{1} ≥ 10^{-6}\)
-    """
-
-    def power(found: re.Match[str]) -> str:
-        return rf"{found[1]} \times 10^{{{int(found[2])}}}"
-
-    def level(mark: str) -> Callable[[re.Match[str]], str]:
-        return lambda found: f"{mark}{{{found[0].translate(_LEVEL)}}}"
-
-    parts = html.escape(text).split("$")
-    for k, part in enumerate(parts):
-        if k % 2:
-            formula = _FUNCTION.sub(r"\\\1 ", _POWER.sub(power, part))
-            formula = _LOWERED.sub(level("_"), _RAISED.sub(level("^"), formula))
-            parts[k] = rf"\({formula}\)"
-        else:
-            part = _POWER.sub(lambda found: rf"\({power(found)}\)", part)
-            parts[k] = NAMING.sub(
-                lambda found: NAME.sub(lambda name: ledger_link(name[0]), found[0]), part
-            )
-    return "".join(parts)
-
 
 def ledger_link(identifier: str, attributes: str = "") -> str:
     """Return a link from a chapter to a claim's row in the ledger."""
@@ -437,31 +344,6 @@ def ledger_link(identifier: str, attributes: str = "") -> str:
 def badge(verdict: Verdict, text: str = "") -> str:
     """Return a text as HTML in the colour of a verdict; by default the verdict itself."""
     return f'<span class="verdict verdict-{verdict.name.lower()}">{text or verdict}</span>'
-
-
-def row(claim: Claim, finding: Finding, attributes: str, link: str, more: str) -> str:
-    """Return a claim as a row of the ledger: one line, and what unfolds below it."""
-    printed = f"Printed ({typeset(claim.places)}): {typeset(claim.printed)}."
-    place = f"{typeset(claim.places)}, in our words."
-    tried = "".join(f"<li>{typeset(line)}</li>" for line in finding.tried)
-    return (
-        f"<tr {attributes}><td>{link}</td><td>{badge(finding.verdict)}</td>"
-        f"<td>{claim.weight}</td><td><details><summary>{typeset(claim.says)}</summary>"
-        f"<p>{printed if claim.printed else place}</p>"
-        f"<p>{badge(finding.verdict)} {finding.verdict.clause}.</p>"
-        f"{f'<ul>{tried}</ul>' if tried else ''}<p>{typeset(finding.quantity)}: "
-        f"<strong>{typeset(finding.shown)}</strong>.</p>"
-        f"<p>{typeset(finding.note)}</p>{more}</details></td></tr>"
-    )
-
-
-def table(rows: str) -> str:
-    """Return rows of claims as an HTML table with a heading."""
-    heads = "".join(f'<th scope="col">{name}</th>' for name in ("Claim", "Verdict", "About"))
-    return (
-        f'<table class="claims"><thead><tr>{heads}<th scope="col">What the paper says</th>'
-        f"</tr></thead><tbody>{rows}</tbody></table>"
-    )
 
 
 def check(*identifiers: str) -> Ledger:
@@ -512,29 +394,3 @@ def chapter_claims(chapter: str) -> Ledger:
         known = ", ".join(dict.fromkeys(map(chapter_of, _REGISTER)))
         raise ValueError(f"chapter must be one of {known}; got {chapter!r}")
     return check(*names)
-
-
-def _check_chapter(chapter: str) -> dict[str, Finding]:
-    """Check the claims of a chapter in a process of its own."""
-    import book.companion.claims  # noqa: F401, a new process has an empty register
-
-    return {entry.identifier: finding for entry, finding in chapter_claims(chapter)}
-
-
-def check_in_parallel() -> Ledger:
-    """Check every claim, chapter by chapter, on all cores.
-
-    Returns
-    -------
-    Ledger
-        All claims. Those of a chapter share what they need, such as one simulation, and so
-        stay together.
-    """
-    # The longest first, and side by side those that compile different functions: what one
-    # process has compiled, the other one then finds.
-    first = "07_perturbations", "11_flight", "04_common_arm"
-    chapters = dict.fromkeys([*first, *map(chapter_of, _REGISTER)])
-    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
-        parts = pool.map(_check_chapter, chapters)
-        found = {name: finding for part in parts for name, finding in part.items()}
-    return Ledger((entry, found[entry.identifier]) for entry in all_claims())

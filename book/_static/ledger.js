@@ -37,7 +37,7 @@
     });
   });
   function unfold() {
-    const row = document.getElementById(location.hash.slice(1))?.closest('.ledger tbody tr');
+    const row = document.getElementById(location.hash.slice(1))?.closest('table.claims tbody tr');
     if (!row) return;
     form.reset();
     row.hidden = false;
