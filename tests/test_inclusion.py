@@ -195,7 +195,8 @@ def test_rounding_at_a_frequency(kind):
         enclosed(function, omega, 0.0, work)
         shares.append(share_of_bound(function, Exact(function), omega, 0.0, work, 0.0))
     assert max(shares) <= 1.0
-    assert max(shares) > 0.1
+    # Factor by factor the bound allows what no sum of so few roundings reaches.
+    assert max(shares) > (0.1 if kind == "cancelling" else 0.03)
 
 
 def test_phase_of_an_exponential():
@@ -215,18 +216,20 @@ def test_phase_of_an_exponential():
 
 def test_computed_roots_miss_a_polynomial_by_no_more_than_stated():
     rng, shares = np.random.default_rng(4), []
-    for trial in range(600):
+    for trial in range(1000):
         degree = rng.integers(1, 9)
         near = np.poly(-rng.uniform(0.9, 1.1, degree))[::-1]
         coefficients = near if trial % 2 else rng.normal(size=degree + 1)
-        p = Polynomial.of([Fraction(c) / 3 for c in coefficients])
+        p = Polynomial.of([Fraction(c) / (k + 10) for k, c in enumerate(coefficients)])
         found, size = [number(p.lead)], [abs(number(p.lead))]
         for root in p.roots:
             z = mp.mpc(root)
             found = [a - z * b for a, b in zip([0, *found], [*found, 0], strict=True)]
             size = [a + abs(z) * b for a, b in zip([0, *size], [*size, 0], strict=True)]
         off = [abs(a - number(c)) / b for a, c, b in zip(found, p.exact, size, strict=True)]
-        shares.append(float(max(off) / p.missed))
+        # Roots that are floats are known exactly, and nothing is missed.
+        assert p.missed or max(off) < 1e-45
+        shares.append(float(max(off) / p.missed) if p.missed else 0.0)
     assert max(shares) <= 1.0
     assert max(shares) > 0.9
 

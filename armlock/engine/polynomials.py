@@ -5,16 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, reduce
 from itertools import zip_longest
+from operator import mul
 from typing import Any
 
+import flint
 import mpmath
 import numpy as np
-from numpy.polynomial import polynomial as poly
 
 from armlock.checks import ComplexArray, FloatArray
 from armlock.engine.inclusion import EPSILON
+
+# Bits to which roots are found; lightly damped pairs keep the digits of their damping.
+_BITS = 128
 
 
 @dataclass(frozen=True)
@@ -44,30 +48,27 @@ class Polynomial:
 
     @classmethod
     def of(cls, coefficients: Iterable[Any]) -> Polynomial:
-        """Return the polynomial with these coefficients, ascending; zero has degree 0.
-
-        Raises
-        ------
-        ValueError
-            If its roots are not found.
-        """
-        exact = [Fraction(value) for value in coefficients]
-        while exact and exact[-1] == 0:
-            exact.pop()
-        if not exact:
+        """Return the polynomial with these coefficients, ascending; zero has degree 0."""
+        left = exactly(coefficients)
+        if not left:
             return cls(Fraction(0), ())
-        at_zero = next(k for k, value in enumerate(exact) if value)
-        scaled, scale = _scaled(exact[at_zero:])
-        other = np.array([float(value) for value in scaled])
-        roots = _roots(other)
-        if not roots.size:
-            return cls(exact[-1], (0j,) * at_zero)
+        lead, known, computed = left.leading_coefficient(), [], []
+        left /= lead
+        for root, number in _roots(left):
+            factor = _factor(root) ** number
+            pair = [root, root.conjugate()] if root.imag else [root]
+            if left % factor:
+                computed += pair * number
+            else:
+                left //= factor
+                known += pair * number
         return cls(
-            exact[-1],
-            (0j,) * at_zero + tuple((scale * roots).tolist()),
-            frozenset(range(at_zero, at_zero + roots.size)),
-            (tuple(value / exact[-1] for value in exact[at_zero:]),),
-            _missed(roots, other),
+            _fraction(lead),
+            (*known, *computed),
+            frozenset(range(len(known), len(known) + len(computed))),
+            (fractions(left),) if computed else (),
+            # Each of them is rounded by half an EPSILON.
+            0.51 * EPSILON * len(computed),
         )
 
     @classmethod
@@ -116,16 +117,10 @@ class Polynomial:
     @cached_property
     def exact(self) -> tuple[Fraction, ...]:
         """Coefficients in ascending powers of s, exactly."""
-        found = [self.lead]
-        for k, root in enumerate(self.roots):
-            a, b = Fraction(root.real), Fraction(root.imag)
-            if k not in self.computed and b == 0:
-                found = _product(found, [-a, Fraction(1)])
-            elif k not in self.computed and b > 0:
-                found = _product(found, [a * a + b * b, -2 * a, Fraction(1)])
-        for factor in self.factors:
-            found = _product(found, factor)
-        return tuple(found)
+        given = [root for k, root in enumerate(self.roots) if k not in self.computed]
+        known = [_factor(root) for root in given if root.imag >= 0.0]
+        found = reduce(mul, map(exactly, self.factors), exactly([self.lead]))
+        return fractions(reduce(mul, known, found)) or (Fraction(0),)
 
     @cached_property
     def coefficients(self) -> FloatArray:
@@ -134,12 +129,7 @@ class Polynomial:
 
     def shifted(self, sigma: float) -> Polynomial:
         """Return p(s + sigma), from its coefficients."""
-        moved: list[Fraction] = []
-        for value in reversed(self.exact):
-            # Horner's rule, with s + sigma in place of s.
-            moved = _product(moved, [Fraction(sigma), Fraction(1)]) if moved else [Fraction(0)]
-            moved[0] += value
-        return Polynomial.of(moved)
+        return Polynomial.of(exactly(self.exact)(exactly([sigma, 1])).coeffs())
 
     def over(self, other: Polynomial, s: ComplexArray) -> ComplexArray:
         """Evaluate p(s) / q(s), factor by factor."""
@@ -174,13 +164,41 @@ def quotients(
     return found
 
 
-def _product(p: Sequence[Fraction], q: Sequence[Fraction]) -> list[Fraction]:
-    """Multiply two polynomials in ascending powers."""
-    found = [Fraction(0)] * (len(p) + len(q) - 1)
-    for i, a in enumerate(p):
-        for k, b in enumerate(q):
-            found[i + k] += a * b
-    return found
+def exactly(coefficients: Iterable[Any]) -> Any:
+    """Return a polynomial of python-flint, from fractions, floats or its own numbers."""
+    pairs = (
+        (c.p, c.q) if isinstance(c, flint.fmpq) else Fraction(c).as_integer_ratio()
+        for c in coefficients
+    )
+    return flint.fmpq_poly([flint.fmpq(*pair) for pair in pairs])
+
+
+def _fraction(value: Any) -> Fraction:
+    """Return a number of python-flint as a fraction, which has a hash and is pickled."""
+    return Fraction(int(value.p), int(value.q))
+
+
+def fractions(p: Any) -> tuple[Fraction, ...]:
+    """Return the coefficients of a polynomial of python-flint, ascending."""
+    return tuple(_fraction(c) for c in p.coeffs())
+
+
+def _factor(root: complex) -> Any:
+    """Return s - root, or for a complex root the product with its conjugate."""
+    a, b = Fraction(root.real), Fraction(root.imag)
+    return exactly([a * a + b * b, -2 * a, 1] if b else [-a, 1])
+
+
+def _roots(p: Any) -> list[tuple[complex, int]]:
+    """Return the roots with Im s >= 0 and their multiplicities, rounded, and certified."""
+    with flint.ctx.workprec(_BITS):
+        found = p.complex_roots()
+    # What rounding may leave of the real part of an undamped pair is none.
+    rounded = [
+        (complex(0.0 if z.real.contains(0) else float(z.real), float(z.imag)), number)
+        for z, number in found
+    ]
+    return [(root, number) for root, number in rounded if root.imag >= 0.0]
 
 
 def rounded(coefficients: Iterable[Fraction]) -> FloatArray:
@@ -199,55 +217,3 @@ def _in(s: Any, value: Fraction) -> Any:
     if isinstance(s, mpmath.ctx_mp_python.mpnumeric):
         return mpmath.mpf(value.numerator) / value.denominator
     return float(value)
-
-
-def _scaled(exact: Sequence[Fraction]) -> tuple[Sequence[Fraction], float]:
-    """Return a polynomial in s / scale, so that its coefficients are floats."""
-    sizes = np.abs(rounded(exact))
-    if all(
-        1e-250 < size < 1e250 or not value for value, size in zip(exact, sizes, strict=True)
-    ):
-        return exact, 1.0
-    n = len(exact) - 1
-    ratio = abs(exact[0] / exact[-1])
-    power = (ratio.numerator.bit_length() - ratio.denominator.bit_length()) // max(n, 1)
-    # A power of two changes no digits.
-    scale = Fraction(2) ** power
-    return [v * scale ** (k - n) / exact[-1] for k, v in enumerate(exact)], float(scale)
-
-
-def _roots(coefficients: FloatArray) -> ComplexArray:
-    """Return roots of a polynomial with p(0) != 0, in extended precision where it is needed."""
-    found = poly.polyroots(coefficients).astype(np.complex128)
-    if found.size == 0 or _missed(found, coefficients) <= 1e-6:
-        return found
-    with mpmath.workdps(60):
-        try:
-            exact = mpmath.polyroots(
-                coefficients.tolist(),
-                maxsteps=500,
-                extraprec=400,
-                asc=True,
-                roots_init=found.tolist(),
-            )
-        except mpmath.libmp.NoConvergence:
-            raise ValueError(f"no roots of the polynomial {coefficients} are found") from None
-    return np.array([complex(root) for root in exact])
-
-
-def _missed(roots: ComplexArray, coefficients: FloatArray) -> float:
-    """By how much roots miss the polynomial with these coefficients, see Lemma 5.
-
-    A power of s that is off by no more than this share of what the magnitudes of the roots give
-    is off by no more than it at any s. The product itself rounds, two EPSILON a root.
-    """
-    product = np.array(coefficients[-1:], dtype=np.complex128)
-    magnitude = np.abs(coefficients[-1:])
-    for root in roots[np.argsort(np.abs(roots))]:
-        product = np.convolve(product, [-root, 1.0])
-        magnitude = np.convolve(magnitude, [abs(root), 1.0])
-    off = np.abs(product - coefficients)
-    if not (off <= magnitude).all():
-        return np.inf
-    shares = off[magnitude > 0.0] / magnitude[magnitude > 0.0]
-    return float(shares.max(initial=0.0)) + 2.0 * EPSILON * roots.size
