@@ -12,9 +12,11 @@ import re
 import secrets
 from typing import NamedTuple
 
+import control
 import numpy as np
 import pytest
 from matplotlib.pyplot import imread
+from scipy import signal
 
 from armlock import CommonArm, DualArm, paper_loop, stability_chart
 from armlock.orbits import esa
@@ -29,6 +31,7 @@ from tests.live_numbers import (
     draw,
     open_engine,
 )
+from tests.pasted import CERTAIN, DOUBTFUL, REFUSED, UNDERSTOOD
 from tests.systems import sketch_of
 from tests.test_browser import needs_chromium
 from tools import check_browser
@@ -160,12 +163,31 @@ def test_a_loop_on_the_boundary_has_undecided_margins(page):
 @pytest.fixture(scope="module")
 def text(chromium):
     page = chromium.new_page()
-    page.add_script_tag(path=LIVE / "text.js")
+    for name in ("loop.js", "read.js"):
+        page.add_script_tag(path=LIVE / name)
     return page
 
 
+#: Places in the s-plane at which two controllers are compared.
+PLACES = np.array([0.3 + 0.4j, 1.1 - 2j, -0.7 + 0.2j, 0.01 + 0.05j, 4 + 3j])
+
+
+def transfer_of(found):
+    """Return the function of s that the page has read."""
+
+    def transfer(s):
+        value = found["gain"] * np.exp(-s * found["delay"])
+        for kind, power in (("zeros", 1), ("poles", -1)):
+            for root in found[kind]:
+                value = value * (s - complex(*root)) ** power
+        return value
+
+    return transfer
+
+
 READ = """([reader, typed]) => {
-    try { return armlockText[reader]("zeros", typed, "Zeros"); }
+    const typing = reader === "readController" ? [typed] : ["zeros", typed, "Zeros"];
+    try { return armlockRead[reader](...typing); }
     catch (error) { return error.field + " " + error.message; } }"""
 
 
@@ -190,58 +212,55 @@ def test_what_programs_print_is_read(text, typed, roots):
     np.testing.assert_allclose(one, other, rtol=1e-15)
 
 
-@pytest.mark.parametrize(
-    ("typed", "parts"),
-    [
-        ("s + 0.02\n------\ns^2 + 0.1 s", [[1, 0.02], [1, 0.1, 0]]),
-        (
-            "\nsys =\n \n  1\n  -\n  s\n \nContinuous-time transfer function.\n",
-            [[1], [1, 0]],
-        ),
-        (
-            " 5 (s+0.02)\n ----------\n  s (s+0.1)\n\nContinuous-time zero/pole/gain model.",
-            [[5, 0.1], [1, 0.1, 0]],
-        ),
-        ("(s + 1)/(s^2 + s)", [[1, 1], [1, 1, 0]]),
-        ("s + 0.02 / ------ / s^2", [[1, 0.02], [1, 0, 0]]),
-        ("C = 0.3 + 5/s", [[0.3, 5], [1, 0]]),
-        ("1/s*(s+1)", [[1, 1], [1, 0]]),
-        ("2.5e-3 s**2 - 1", [[2.5e-3, 0, -1], [1]]),
-        ("5 (s+0.02) (s^2 + 0.2s + 1)", [[5, 1.1, 5.02, 0.1], [1]]),
-        ("tf([1 0.02], [1 0.1 0])", [[1, 0.02], [1, 0.1, 0]]),
-        ("C = tf(5, [1 0]);", [[5], [1, 0]]),
-        (
-            "TransferFunction(\narray([1.  , 0.02]),\narray([1. , 0.1, 0. ]),\nname='sys[0]')",
-            [[1, 0.02], [1, 0.1, 0]],
-        ),
-        (
-            "TransferFunctionContinuous(\narray([1., 0.02]),\narray([1., 0.1]),\ndt: None\n)",
-            [[1, 0.02], [1, 0.1]],
-        ),
-        ("Outputs (1): ['y[0]']\ndt = None\n\n  5\n  -\n  1", [[5], [1]]),
-        (
-            "  5 (s + (0.1-0.995j)) (s + (0.1+0.995j)) (s + 0.3)\n  ---------\n  (s) (s + 0.1)",
-            [[5, 2.5, 5.300125, 1.5000375], [1, 0.1, 0]],
-        ),
-        ("1\n---\nz\ndt = 0.1", "it is discrete"),
-        ("tf([1 0.02], [1 0.1 0], 0.1)", "it is discrete"),
-        ("exp(-2*s) *\n1\n---\ns", "write its dead time into the field"),
-        ("1\n---\n", "write it such as"),
-        ("s^2\n---\ns\n---\n1", "more than one line of dashes"),
-        ("s + 2j", "write it such as"),
-        ("much", "write it such as"),
-        ("", "write it such as"),
-    ],
-)
-def test_a_controller_is_read_as_programs_print_it(text, typed, parts):
+@pytest.mark.parametrize(("typed", "transfer"), UNDERSTOOD, ids=itertools.count())
+def test_a_pasted_text_is_understood_exactly(text, typed, transfer):
     found = text.evaluate(READ, ["readController", typed])
-    if isinstance(parts, str):
-        assert found.startswith("zeros This controller is not understood: ")
-        assert parts in found
-    else:
-        assert len(found) == 2
-        for coefficients, expected in zip(found, parts, strict=True):
-            assert coefficients == pytest.approx(expected)
+    assert isinstance(found, dict), found
+    assert transfer_of(found)(PLACES) == pytest.approx(transfer(PLACES), rel=1e-12)
+
+
+@pytest.mark.parametrize(("typed", "why"), REFUSED, ids=itertools.count())
+def test_a_pasted_text_is_refused_for_a_reason(text, typed, why):
+    found = text.evaluate(READ, ["readController", typed])
+    assert isinstance(found, str), found
+    assert found.startswith("pasted This text is not understood: ")
+    assert why in found
+
+
+def test_the_table_of_pasted_texts_is_long():
+    assert len(UNDERSTOOD) + len(REFUSED) >= 120
+
+
+@pytest.mark.parametrize("typed", [*DOUBTFUL, *CERTAIN], ids=itertools.count())
+def test_what_rounded_digits_leave_open_is_said(text, typed):
+    found = text.evaluate(READ, ["readController", typed])
+    assert ("Half a unit" in found["doubt"]) == (typed in DOUBTFUL)
+
+
+def test_what_python_prints_is_understood(text):
+    """Loops drawn anew, printed by python-control and scipy in all their ways."""
+    rng = np.random.default_rng(12)
+    for _ in range(25):
+        n = int(rng.integers(1, 5))
+        poles = -rng.uniform(0.1, 5.0, n).round(2)
+        zeros = -rng.uniform(0.1, 5.0, int(rng.integers(0, n + 1))).round(2)
+        gain = round(float(rng.uniform(1.0, 9.0)), 1)
+        own = control.zpk(zeros, poles, gain, display_format="zpk")
+        plain = control.tf(own, display_format="poly")
+        states = control.ss(own)
+        lists = own.num[0][0], own.den[0][0]
+        printed = {
+            str(own): 5e-3, str(plain): 2e-2, repr(plain): 1e-5, str(states): 1e-3,
+            repr(states): 1e-3, repr(signal.TransferFunction(*lists)): 1e-5,
+            repr(signal.ZerosPolesGain(zeros, poles, gain)): 1e-12,
+            repr(signal.StateSpace(states.A, states.B, states.C, states.D)): 1e-3,
+            repr((zeros, poles, gain)): 1e-12, repr(lists): 1e-5,
+        }  # fmt: skip
+        for typed, near in printed.items():
+            found = text.evaluate(READ, ["readController", typed])
+            assert isinstance(found, dict), (typed, found)
+            got, asked = transfer_of(found)(PLACES), own(PLACES)
+            assert got == pytest.approx(asked, rel=near * 50), typed
 
 
 @pytest.mark.parametrize(
@@ -253,7 +272,6 @@ def test_a_controller_is_read_as_programs_print_it(text, typed, parts):
         ("readRoots", "-0.1+2j", "come in pairs"),
         ("readRoots", "1/0", "is none"),
         ("readRoots", "s + 1", "is none"),
-        ("readController", "0,5 s", "decimals with a point"),
     ],
 )
 def test_what_is_no_number_is_refused_at_its_field(text, reader, typed, why):
@@ -546,7 +564,8 @@ Inputs (1): ['u[0]']
   s^2 + 0.1 s"""
 
 
-PASTE = "Paste a controller from MATLAB or python-control"
+DELAYED = next(text for text, _ in UNDERSTOOD if "delay(3.0)" in text)
+PASTE = "Paste a controller from MATLAB, Python or Julia"
 
 
 def test_a_printed_controller_is_understood_or_refused(opened):
@@ -559,7 +578,9 @@ def test_a_printed_controller_is_understood_or_refused(opened):
     assert page.get_by_label("Unit of roots").input_value() == "1"
     assert "0.4 * hertz" not in code
     assert "gain=1," in code
-    assert page.get_by_label(PASTE).input_value() == ""
+    assert page.get_by_label(PASTE).input_value() == PRINTED
+    echo = page.locator(".live-formula")
+    assert echo.inner_text() == "K(s) = (s + 0.02) / [s (s + 0.1)]"
     slide(page, "Gain factor:", 1)
     page.wait_for_function("() => /gain=100,/.test(document.querySelector('pre').textContent)")
     type_in(page, PASTE, "s^2\n---\ns\n---\n1")
@@ -568,6 +589,20 @@ def test_a_printed_controller_is_understood_or_refused(opened):
     press(page, "Undo")
     assert page.locator("[role=alert]").text_content() == ""
     assert "gain=100," in page.locator("pre").text_content()
+    assert "changed after the text above" in echo.inner_text()
+    assert page.get_by_label(PASTE).input_value() == PRINTED
+    # Another page that is opened with the link has text, controller and dead time.
+    type_in(page, PASTE, DELAYED)
+    page.wait_for_function("() => location.hash.includes('k=')")
+    again = opened(page.evaluate("location.hash"))
+    for tab in (page, again):
+        assert tab.get_by_label(PASTE).input_value() == DELAYED
+        assert tab.locator(".live-formula").inner_text() == (
+            "K(s) = 0.2 exp(−3 s) (s + 0.1) / [s (s + 0.1)]"
+        )
+        assert tab.get_by_label("Dead time in s").input_value() == "3"
+    type_in(page, PASTE, DOUBTFUL[0])
+    assert "Half a unit" in page.locator(".live-fields").inner_text()
     type_in(page, PASTE, "(s^3 + 1)/(s^2 + 0.1 s)")
     assert "3 zeros and 2 poles" in page.locator("[role=alert]").text_content()
 

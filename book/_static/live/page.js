@@ -3,12 +3,12 @@
  * The live pages: a form, a chart of the stable region that answers the pointer, plots that follow.
  *
  * A page loads this file. It loads those beside it, each with one job: loop.js counts, margins.js
- * and chart.js certify, text.js reads and writes, draw.js draws. What takes long runs in workers, which
+ * and chart.js certify, read.js reads, text.js writes, draw.js draws. What takes long runs in workers, which
  * are made of the functions' own text: a page that is opened from disk may load no script into one.
  */
 (function () {
   const here = document.currentScript.src;
-  const files = ["loop.js", "margins.js", "chart.js", "text.js", "draw.js",
+  const files = ["loop.js", "margins.js", "chart.js", "read.js", "text.js", "draw.js",
     ...document.querySelector("[data-live=year]") ? ["orbits.js"] : []];
   const missing = files.filter(name =>
     !Array.from(document.scripts).some(script => script.src.endsWith(`/live/${name}`)));
@@ -27,8 +27,8 @@
 })();
 
 function armlockPages() {
-  const { TURN, say, duration, shortest, exact, written, readRoots, readController, readNumber, python, address,
-    fromAddress } = armlockText;
+  const { TURN, say, duration, shortest, exact, written, formula, python, address, fromAddress } = armlockText;
+  const { readRoots, readController, readNumber } = armlockRead;
   const { element, nearest, Sheet, Chart, drawNyquist, drawBode, drawRoots, drawYear } = armlockDraw;
   const api = armlockLoop();
   Object.assign(api, armlockChart(api));
@@ -540,11 +540,15 @@ function armlockPages() {
     // The unit of the fields, the gain from which its slider goes, the steps that Undo can take back;
     // `quiet` while the page itself changes what it shows.
     let unit = 1, base = 1, depth = 0, quiet = true, before = null, later = 0;
+    // The controller of the pasted text, which stays in its field.
+    let pasted = null;
+    const understood = element("p", { class: "live-formula", "aria-label": "The controller" });
+    const doubt = element("p", { class: "live-note live-wrong", role: "status" });
 
     /* The address holds the loop, and its history undoes what was done to it. */
     live.moved = step => {
       if (!live.spec) return;
-      const hash = address(live.spec, live.chart, unit);
+      const hash = address(live.spec, live.chart, unit, fields.pasted.value);
       code.textContent = python(live.spec, live.kept, unit);
       orbit.href = `in_orbit.html${hash}`;
       if (quiet) return;
@@ -587,21 +591,17 @@ function armlockPages() {
       for (const name of Object.keys(errors)) blame(name, "");
       try {
         if (edited === "pasted") {
-          const [above, under] = readController("pasted", fields.pasted.value);
-          if (!above.some(v => v)) throw Object.assign(new RangeError("It must not be zero."), { field: "pasted" });
-          // Its coefficients are those of s in rad/s.
+          pasted = readController(fields.pasted.value);
+          // Its numbers are those of s in rad/s.
           unit = 1;
           fields.unit.value = "1";
-          fields.gain.value = exact(above.find(v => v) / under.find(v => v));
-          // Without the digits that finding the roots has rounded.
-          [fields.zeros.value, fields.poles.value] = [above, under].map(part => written(
-            api.rootsOf(part).map(root => root.map(v => Number(v.toPrecision(14))))));
-          fields.pasted.value = "";
+          put(pasted);
           // Another loop is seen whole, and at the ideal point.
           Object.assign(live.chart, { centre: [0, 0], half: 3, held: null });
         }
         const spec = read();
         wrong.textContent = "";
+        echo(spec);
         if (!dragged) {
           base = Number(fields.gain.value) || 1;
           gain.to(0);
@@ -622,10 +622,19 @@ function armlockPages() {
         wrong.textContent = error.message;
         undo.disabled = false;
         live.none("There is no loop to show, because a field has an error.");
-        code.textContent = "";
+        code.textContent = understood.textContent = doubt.textContent = "";
         orbit.removeAttribute("href");
         roots.draw();
       }
+    };
+
+    /* What the page has understood, and whether it is still what was pasted. */
+    const echo = spec => {
+      const order = roots => roots.map(([re, im]) => [re + 0, im + 0]).sort((p, q) => p[0] - q[0] || p[1] - q[1]);
+      const parts = ({ zeros, poles, gain, delay }) => JSON.stringify([order(zeros), order(poles), gain, delay]);
+      const same = pasted && parts(pasted) === parts(spec);
+      understood.textContent = `${formula(spec)}${pasted && !same ? ". It was changed after the text above was pasted." : ""}`;
+      doubt.textContent = same ? pasted.doubt : "";
     };
 
     const put = spec => {
@@ -654,7 +663,9 @@ function armlockPages() {
       return made;
     };
     /* Show another loop, with its view. Hertz where their numbers are shorter. */
-    const show = (spec, centre, half, held, given) => {
+    const show = (spec, centre, half, held, given, text = "") => {
+      fields.pasted.value = text;
+      pasted = text ? readController(text) : null;
       unit = given || ([1, TURN].map(one => [...spec.zeros, ...spec.poles].map(v => written([v], one)).join("").length).reduce((a, b) => b < a) ? TURN : 1);
       fields.unit.value = unit === 1 ? "1" : "hz";
       put(spec);
@@ -681,7 +692,7 @@ function armlockPages() {
       take("delay", moving, true);
     });
     const wrong = element("p", { class: "live-note live-wrong", role: "alert" });
-    const pasted = field("pasted", "Paste a controller from MATLAB or python-control", true);
+    const paste = field("pasted", "Paste a controller from MATLAB, Python or Julia", true);
     const inputs = element("form", { class: "live-form", onsubmit: event => event.preventDefault() },
       select("sensor", "Sensor", SENSORS, () => { shape(); take("sensor"); }),
       field("gain", "Gain"), field("delay", "Dead time in s"),
@@ -745,7 +756,7 @@ function armlockPages() {
       element("div", { class: "live-main" }, figures(live.figure, nyquist.figure),
         tools(live, "loop", undo, button("Paper\u2019s square", () => live.chart.show([1, 1], 3e-6)),
           button("Whole", () => live.chart.show([0, 0], 3))), live.note, bode.figure, live.following, live.numbers),
-      element("div", { class: "live-fields" }, pasted,
+      element("div", { class: "live-fields" }, paste, understood, doubt,
         element("figure", {}, element("figcaption", {}, "Drag a pole (\u00d7) or a zero (\u25cb)"), roots.canvas),
         inputs, legend(), element("p", {}, orbit))),
     element("details", {}, element("summary", {}, "This loop in Python"), code));
@@ -758,7 +769,7 @@ function armlockPages() {
         const given = fromAddress(location.hash);
         if (given) {
           api.make(given.spec);
-          show(given.spec, given.centre, given.half, given.held, given.unit);
+          show(given.spec, given.centre, given.half, given.held, given.unit, given.pasted);
         } else start(Object.keys(PRESETS)[0]);
       } catch (error) {
         live.none("There is no loop to show.");
