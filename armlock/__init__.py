@@ -13,6 +13,8 @@ The calls that matter most:
 - ``stability_chart(loop, c1, c2)`` counts on a grid; ``chart.plot()`` draws the chart.
 - ``margins(loop, c1, c2)`` finds the gain, phase, delay and modulus margins of a stable loop.
 - ``critical_perturbation(loop, direction)`` is the distance from (1, 1) to instability.
+- ``varying_radius(loop)`` is how far c1 and c2 may vary in time; ``peak_gain(system)`` is the
+  largest gain of a stable system.
 - ``rightmost_root(loop, c1, c2)`` is the root that decays slowest or grows fastest.
 - ``control.tf([1], [10, 1]) * delay(3.0)`` is a system with a dead time, for loops with any
   number of delays, also inside the controller.
@@ -49,7 +51,14 @@ from armlock.loops import (
 from armlock.performance.budget import NoiseBudget, noise_budget
 from armlock.performance.pulling import pulling
 from armlock.performance.transfer import transfer
-from armlock.robustness import Margins, critical_perturbation, margins, modulus_margin
+from armlock.robustness import (
+    Margins,
+    critical_perturbation,
+    margins,
+    modulus_margin,
+    peak_gain,
+    varying_radius,
+)
 from armlock.stability.charts import StabilityChart, stability_chart
 from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError, unstable_roots
 from armlock.stability.dcurve import d_curve, d_curve_branches, d_curve_line
@@ -114,6 +123,7 @@ __all__ = [
     "noise_budget",
     "nyquist",
     "paper_loop",
+    "peak_gain",
     "pulling",
     "rightmost_root",
     "robust_loop",
@@ -126,4 +136,5 @@ __all__ = [
     "transfer",
     "transition_matrix",
     "unstable_roots",
+    "varying_radius",
 ]

@@ -63,6 +63,8 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     armlock.axis_crossings: {"loop": paper_loop(), "omega_max": 3.0} | POINT,
     armlock.robustness.margins: {"loop": ARMS, "c1": 0.9, "c2": 0.9, "free_above": 1.0},
     armlock.modulus_margin: {"loop": ARMS, "c1": 0.9, "c2": 0.9},
+    armlock.peak_gain: {"system": ARMS},
+    armlock.varying_radius: {"loop": ARMS, "c1": 0.9, "c2": 0.9},
     armlock.critical_perturbation: {"loop": ARMS, "direction": (1.0, 1.0)},
     armlock.spectral_radius: {"system": ARMS, "step": 0.1, "order": 1} | POINT,
     armlock.transition_matrix: {"system": ARMS, "step": 0.1, "order": 1} | POINT,

@@ -23,10 +23,12 @@ from armlock import (
     modulus_margin,
     nyquist,
     paper_loop,
+    peak_gain,
     rightmost_root,
     spectral_radius,
     stability_chart,
     unstable_roots,
+    varying_radius,
 )
 from armlock.performance.pulling import pulling
 from armlock.robustness import box_count, first_crossing
@@ -84,6 +86,8 @@ def asked(rng, loop, point):
         "margins": partial(margins, loop, *point),
         "margins, free": lambda: margins(loop, *point, free_above=above),
         "modulus_margin": partial(modulus_margin, loop, *point),
+        "varying_radius": partial(varying_radius, loop, *point),
+        "peak_gain": lambda: peak_gain(loop.open_loop(*point).feedback()),
         "critical_perturbation": partial(critical_perturbation, loop, way),
         "first_crossing": partial(first_crossing, loop, point, way),
         "rightmost_root": partial(rightmost_root, loop, *point),

@@ -260,18 +260,23 @@ class Family:
         found = [np.inf]
         for test in self.tests:
             vertices, terms = self._members(test, level)
-            steady, delayed = stacked(vertices)
-            whole, _ = self.space.limits(steady, delayed)
-            if (whole > 0.0).any() and (whole < 0.0).any():
-                continue
-            size = sum((f.sizes for f in terms), np.zeros(steady.shape[1]))
-            top = sum(f.size_at_infinity for f in terms)
-            ends = self.space.confined_from(steady, delayed, size, top_terms=top)
-            found.append(float(ends.max()))
+            found.append(self._end(vertices, terms))
+            if mixed := _together(vertices, terms):
+                found.append(self._end(mixed[:1], mixed[1:]))
         two = len(self.functions) - self.loose == 2
         if two and self.arc is not None and self.arc[0][3] == self.arc[1][3] == 0.0:
             found.append(self._arc_ends(self.arc[0][2] + level * self.arc[1][2]))
         return min(found)
+
+    def _end(self, vertices: list[Function], terms: list[Function]) -> float:
+        """Return the frequency past which some vertices exceed some terms, or inf."""
+        steady, delayed = stacked(vertices)
+        whole, _ = self.space.limits(steady, delayed)
+        if (whole > 0.0).any() and (whole < 0.0).any():
+            return np.inf
+        size = sum((f.sizes for f in terms), np.zeros(steady.shape[1]))
+        top = sum(f.size_at_infinity for f in terms)
+        return float(self.space.confined_from(steady, delayed, size, top_terms=top).max())
 
     def _arc_ends(self, angle: float) -> float:
         """Do what `ends` does for an arc around zero: abs(1 + c exp(j psi)) is monotonic."""
@@ -289,6 +294,21 @@ class Family:
                 steady, np.zeros((2, *parts.shape)), terms, extra=more
             ).max()
         )
+
+
+def _together(vertices: list[Function], terms: list[Function]) -> list[Function]:
+    """Mix one vertex and one term by their highest coefficients (Lemma 19); else none."""
+    if not len(vertices) == len(terms) == 1:
+        return []
+    (vertex,), (term,) = vertices, terms
+    _, (v, a) = vertex.space.limits(*stacked([vertex, term]))
+    k = int(np.argmax(np.minimum(np.abs(v), np.abs(a)))) if v.size else 0
+    if not v.size or not v[k] * a[k]:
+        return []
+    share = float(a[k] / v[k] if abs(a[k]) < abs(v[k]) else v[k] / a[k])
+    if not abs(share) < 1.0 - 1e-9:
+        return []
+    return [vertex + term * -share, vertex * share + term * -1]
 
 
 def _searched(

@@ -594,6 +594,41 @@ def excludes_zero(room: Members) -> int:
     return 0
 
 
+@_inner
+def _turn_together(room: Members) -> bool:
+    """Mix the one vertex and the one term, so that one of them loses what delays turn in both.
+
+    Zero is in vertex plus term, for some phase of the term, if it is after that (Lemma 19).
+    Returns whether there is such a pair.
+    """
+    vertex, term, number = -1, -1, 0
+    for n in range(room.kind.size):
+        vertex = n if room.kind[n] == VERTEX else vertex
+        term = n if room.kind[n] == TERM else term
+        number += room.kind[n] != 0
+    if number != 2 or vertex < 0 or term < 0:
+        return False
+    most, share = 0.0, 0j
+    for k in range(1, room.v.shape[1]):
+        v, a = room.v[vertex, k, 0], room.v[term, k, 0]
+        if min(abs(v), abs(a)) > most:
+            most = min(abs(v), abs(a))
+            share = (a / v).conjugate() if abs(a) < abs(v) else v / a
+    if not 0.0 < abs(share) < 1.0 - 1e-9:
+        return False
+    wrong = 0.0
+    for k in range(room.v.shape[1]):
+        for i in range(ORDER):
+            v, a = room.v[vertex, k, i], room.v[term, k, i]
+            room.v[vertex, k, i] = v - share * a
+            room.v[term, k, i] = share.conjugate() * v - a
+            wrong += 4.0 * EPSILON * (abs(v) + abs(a))
+    rest_v, rest_a = room.rest[vertex], room.rest[term]
+    room.rest[vertex] = rest_v + abs(share) * rest_a + wrong
+    room.rest[term] = abs(share) * rest_v + rest_a + wrong
+    return True
+
+
 class Question(NamedTuple):
     """A family (`armlock.engine.decide.Family`) as compiled functions take it, and a goal.
 
@@ -636,7 +671,7 @@ def _test_holds(question: Question, level: float, work: Workspace, room: Members
                 for f in range(weights.size):
                     weights[f] = question.weights[i, n, f] + level * question.slopes[i, n, f]
                 mix(work, room, n)
-        if excludes_zero(room):
+        if excludes_zero(room) or (_turn_together(room) and excludes_zero(room)):
             return True
     return False
 

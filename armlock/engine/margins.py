@@ -6,6 +6,7 @@ imaginary axis (`armlock.engine.decide`). The limit at high frequency is known i
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -30,6 +31,8 @@ _LARGEST_DELAY = 1e300
 
 # Relative accuracy where phases are free.
 _FREE_TOLERANCE = 1e-5
+# Most delays at high frequency whose phases 0 and pi are tried.
+_MOST_SIGNS = 10
 
 
 class Free(NamedTuple):
@@ -195,24 +198,89 @@ def first_zero(f: Function, g: Function, most: float, start: float) -> tuple[flo
     return (chain, where) if where == math.inf else (best, where)
 
 
-def modulus_of(n: Function, m: Function, free: Free | None = None) -> tuple[float, float]:
-    """Smallest |1 + L|, and where."""
-    d, (centre, radius) = n + m, _disc_at_infinity(n, m)
-    best, where = max(abs(1.0 + centre) - radius, 0.0), math.inf
-    # A smaller one is excluded to a part in a million, or to what is decided at high frequency.
-    tolerance = min(max(1e-6, 2.0 * _DECIDED / best), 1.0) if best else 1e-6
-    zero = abs(at_zero(d, m))
+def _shares(d: Function, n: Function, *arms: Function) -> Family:
+    """Return D + u N with |u| up to the level, and arms of any phase beside it."""
+    number = 2 + len(arms)
+    zero = (0.0,) * number
+    test = [(VERTEX, _unit(0, number), zero), (TERM, zero, _unit(1, number))]
+    test += [(TERM, _unit(k, number), zero) for k in range(2, number)]
+    return Family([d, n, *arms], [test], loose=len(arms))
+
+
+def _limit_of_ratio(d: Function, n: Function) -> tuple[float, float, float]:
+    """Least |D / N| at infinite frequency over all phases, where, and what is decided there.
+
+    Where delays act on N too, it is the least one of phases 0 and pi: the search decides
+    whether there is a smaller one.
+    """
+    whole, turned = d.space.limits(*stacked([d, n]))
+    size = abs(whole[0]) + np.abs(turned[0]).sum()
+    acting = np.flatnonzero(turned.any(axis=0))
+    if not turned[1].any():
+        turns = -np.sign(turned[:1, acting]) * np.sign(whole[0])
+    elif acting.size <= _MOST_SIGNS:
+        turns = np.array(list(itertools.product((1.0, -1.0), repeat=acting.size)))
+    else:
+        return math.inf, math.nan, 0.0
+    above, below = (w + turns @ t for w, t in zip(whole, turned[:, acting], strict=True))
+    # Zero between phases is no limit of a stable D.
+    left = np.abs(whole[0]) - np.abs(turned[0]).sum()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratios = np.abs(above / below) if left > 0.0 else np.zeros(1)
+    ratios = np.where(np.isnan(ratios), np.inf, ratios)
+    k = int(np.argmin(ratios))
+    if not ratios[k] < math.inf:
+        return math.inf, math.nan, 0.0
+    decided = 2.0 * _DECIDED * size / abs(above[k]) if ratios[k] else 0.0
+    return float(ratios[k]), math.inf, float(decided)
+
+
+class Ratio(NamedTuple):
+    """The least |D / N| over the axis, a bound that is certified, and where in rad/s."""
+
+    value: float
+    certified: float
+    omega: float
+
+
+def least_ratio(
+    d: Function, n: Function, free: Free | None = None, *, tolerance: float = 1e-6
+) -> Ratio:
+    """Find the infimum of |D / N| over the axis, one over the peak gain of N / D (Lemma 19).
+
+    Parameters
+    ----------
+    d, n : Function
+        Of one space.
+    free : Free, optional
+        D and N above a frequency, with terms of D of any phase.
+    tolerance : float, optional
+        Smaller values are excluded up to this share, or up to what is decided at high
+        frequency.
+
+    Returns
+    -------
+    Ratio
+        At inf for the limit at high frequency, at 0 for the limit at s = 0. Infinite where N
+        is zero.
+    """
+    if n.is_zero:
+        return Ratio(math.inf, math.inf, math.nan)
+    best, where, decided = _limit_of_ratio(d, n)
+    tolerance = max(tolerance, decided)
+    zero = abs(at_zero(d, n))
     if zero < best:
         best, where = zero, 0.0
+    best, where = _over_axis(_shares, d, n, free, DISTANCE, best, where, min(tolerance, 1.0))
+    tolerance = max(tolerance, _FREE_TOLERANCE) if free else tolerance
+    return Ratio(best, best * max(1.0 - tolerance, 0.0) * (1.0 - 4.0 * EPSILON), where)
 
-    def family(n: Function, m: Function, *arms: Function) -> Family:
-        number = 2 + len(arms)
-        zero = (0.0,) * number
-        test = [(VERTEX, _unit(0, number), zero), (TERM, zero, _unit(1, number))]
-        test += [(TERM, _unit(k, number), zero) for k in range(2, number)]
-        return Family([n + m, m, *arms], [test], loose=len(arms))
 
-    return _over_axis(family, n, m, free, DISTANCE, best, where, tolerance)
+def modulus_of(n: Function, m: Function, free: Free | None = None) -> tuple[float, float]:
+    """Smallest |1 + L|, one over the peak gain of the sensitivity M / (M + N), and where."""
+    closed = free._replace(centre=free.centre + free.denominator) if free else None
+    found = least_ratio(n + m, m, closed)
+    return found.value, found.omega
 
 
 def _over_axis(
@@ -225,7 +293,7 @@ def _over_axis(
     where: float,
     tolerance: float = 1e-6,
 ) -> tuple[float, float]:
-    """Find the least level of the family of a loop; above a frequency with free phases."""
+    """Find the least level of a family of two functions; above a frequency with free phases."""
     if best > 0.0:
         high = free.above if free else math.inf
         best, where = least(family(n, m), goal, best, where, high=high, tolerance=tolerance)
@@ -303,7 +371,7 @@ def margins_of(n: Function, m: Function, free: Free | None = None) -> Margins:
     UndecidedError
         If a margin is not decided.
     """
-    require_stable(n, m)
+    require_stable(n + m, common_zeros(n, m))
     lower, upper, gain_omega = (math.nan,) * 3 if free else gain_range(n, m)
     phase, phase_omega = _phase(n, m, free)
     delay, _ = _delay(n, m, free)
@@ -320,15 +388,15 @@ def margins_of(n: Function, m: Function, free: Free | None = None) -> Margins:
     )
 
 
-def require_stable(n: Function, m: Function) -> None:
-    """Raise unless the loop N / M is stable."""
-    count = decide.count(n + m, common_zeros(n, m))
+def require_stable(d: Function, common: int = 0, what: str = "loop") -> None:
+    """Raise unless D has no zero with a real part of zero or more, but `common` at s = 0."""
+    count = decide.count(d, common)
     if count != 0:
         reasons = {
             decide.BOUNDARY: "a root on the axis",
             decide.UNCONFINED: "no confined chain",
         }
         raise ValueError(
-            f"the loop must be stable to have margins, but it has "
+            f"the {what} must be stable, but it has "
             f"{reasons.get(count, f'{count} unstable roots')}"
         )

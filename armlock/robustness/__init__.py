@@ -5,7 +5,7 @@ cannot be certified is refused.
 """
 
 from armlock.engine.margins import Margins
-from armlock.robustness.margins import margins, modulus_margin
+from armlock.robustness.margins import PeakGain, margins, modulus_margin, peak_gain
 from armlock.robustness.perturbations import (
     Crossing,
     box_count,
@@ -13,14 +13,19 @@ from armlock.robustness.perturbations import (
     first_crossing,
     no_root_crosses,
 )
+from armlock.robustness.varying import VaryingRadius, varying_radius
 
 __all__ = [
     "Crossing",
     "Margins",
+    "PeakGain",
+    "VaryingRadius",
     "box_count",
     "critical_perturbation",
     "first_crossing",
     "margins",
     "modulus_margin",
     "no_root_crosses",
+    "peak_gain",
+    "varying_radius",
 ]

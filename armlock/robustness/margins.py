@@ -1,21 +1,27 @@
-"""How far a stable loop is from instability: gain, phase, delay and modulus margins.
+"""How far a stable loop is from instability: gain, phase, delay and modulus margins, peak gain.
 
-`margins` and `modulus_margin` state a loop for the engine, which certifies each margin: no
-smaller one exists, to a part in a million (`armlock.engine.margins`).
+The functions state a loop or system for the engine, which certifies each number: no smaller
+margin and no larger gain exists, to a part in a million (`armlock.engine.margins`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from armlock.checks import positive_number, real_number
 from armlock.delays import DelaySystem
 from armlock.engine.functions import Function
-from armlock.engine.margins import Margins, margins_of, modulus_of
+from armlock.engine.margins import (
+    Margins,
+    least_ratio,
+    margins_of,
+    modulus_of,
+    require_stable,
+)
 from armlock.loops import Loop, checked_loop, quotient_of
 from armlock.stability.counts import decided
 
@@ -38,7 +44,7 @@ def modulus_margin(loop: Loop | DelaySystem, c1: float = 1.0, c2: float = 1.0) -
 
         \inf_{\omega > 0} |1 + L(\mathrm{j}\omega; c_1, c_2)|
 
-    It is one over the peak of the sensitivity.
+    It is one over the peak gain of the sensitivity 1 / (1 + L), see `peak_gain`.
 
     Parameters
     ----------
@@ -68,6 +74,68 @@ def modulus_margin(loop: Loop | DelaySystem, c1: float = 1.0, c2: float = 1.0) -
     0.6156
     """
     return _certified(lambda n, m: modulus_of(n, m)[0], loop, c1, c2)
+
+
+class PeakGain(NamedTuple):
+    """The largest gain of a system, and where it is in rad/s: 0 and inf stand for limits."""
+
+    gain: float
+    omega: float
+
+
+def peak_gain(system: Any) -> PeakGain:
+    r"""Largest gain of a stable system over all frequencies, its H-infinity norm.
+
+    .. math::
+
+        \sup_{\omega > 0} |G(\mathrm{j}\omega)|
+
+    Parameters
+    ----------
+    system : DelaySystem, or what `DelaySystem.of` takes
+        The system itself, for instance the sensitivity ``1 / (1 + loop)``. Of a `Loop` it is
+        the open loop.
+
+    Returns
+    -------
+    PeakGain
+        The gain, which no frequency exceeds by more than a part in a million, and where it is
+        in rad/s: 0 where it is the limit at s = 0, inf where it is the limit at high frequency,
+        nan for a system that is zero. The limit at high frequency is taken over all small
+        changes of the delays.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If `system` is no system, or is not stable: the message has the number of its poles with
+        positive real part.
+    CountError
+        If double precision, or the steps allowed, do not decide it. It is raised too where
+        several delays act on the highest powers of both numerator and denominator, in different
+        proportions, and the largest gain is a limit at high frequency.
+
+    See Also
+    --------
+    armlock.modulus_margin : one over the peak gain of the sensitivity.
+
+    Notes
+    -----
+    ``control.norm(system, inf)`` is the same for systems without delays.
+
+    Examples
+    --------
+    >>> from armlock import paper_loop, peak_gain
+    >>> loop = paper_loop()
+    >>> gain, omega = peak_gain(1 / (1 + loop))
+    >>> print(f"{gain:.4f} at {omega:.3e} rad/s")
+    1.6246 at 2.291e-05 rad/s
+    """
+    system = DelaySystem.of(system)
+    n, d = system.functions
+    with decided("no peak gain", np.empty((0, 0))):
+        require_stable(d, system.common, "system")
+        found = least_ratio(d, n)
+    return PeakGain(1.0 / found.value, found.omega)
 
 
 def margins(

@@ -1,0 +1,271 @@
+"""How far coefficients of a function D may vary in time, and how far they may differ.
+
+D changes by - sum_k eta_k B_k exp(-s theta_k). The loop stays stable for all eta_k(t) within a
+radius if the small-gain theorem holds with constant scalings (Lemma 20). One polynomial f with
+|f|^2 >= sum |B_k|^2 on the axis, a spectral factor, reduces this to the peak gain of f / D.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import flint
+import numpy as np
+from scipy import optimize
+
+from armlock.checks import FloatArray
+from armlock.engine import decide
+from armlock.engine.decide import Family, UndecidedError
+from armlock.engine.functions import Function, Space, at, stacked
+from armlock.engine.inclusion import VERTEX
+from armlock.engine.margins import first_zero, least_ratio
+from armlock.engine.polynomials import Polynomial, exactly, fractions
+
+# The radius is certified to this share, and the scalings are optimal to it.
+_TOLERANCE = 1e-7
+# Most scalings that are tried.
+_MOST_SCALINGS = 40
+# Larger constant perturbations are not looked at.
+_FARTHEST = 1e9
+# By how much a spectral factor is made larger, until it is one in exact arithmetic.
+_ENLARGED = (1e-13, 1e-11, 1e-9, 1e-8)
+
+
+class Varying(NamedTuple):
+    """A radius that is certified, where it is taken in rad/s, and the scalings d_k."""
+
+    radius: float
+    omega: float
+    scalings: tuple[float, ...]
+
+
+def _exact_polynomial(function: Function) -> flint.fmpq_poly:
+    """Return B of a function B exp(-s theta), exactly.
+
+    Raises
+    ------
+    ValueError
+        If the function has another form.
+    """
+    acting = np.flatnonzero((function.delayed != 0).any(axis=0))
+    undelayed = function.steady - function.delayed.sum(axis=1)
+    if acting.size > 1 or (acting.size and undelayed.any()):
+        raise ValueError("what varies must be a factor of one polynomial with one delay")
+    found = flint.fmpq_poly()
+    for weight, p in zip(function.steady, function.space.polynomials, strict=True):
+        if weight:
+            found += exactly(weight * c for c in p.exact)
+    return found
+
+
+def _fraction(value: flint.arb) -> Fraction:
+    """Return the middle of a ball, exactly."""
+    mantissa, exponent = value.mid().man_exp()
+    return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
+
+
+def _square(p: flint.fmpq_poly) -> flint.fmpq_poly:
+    """Return |p|^2 on the axis as a polynomial in omega^2."""
+    c = p.coeffs()
+    even, odd = (
+        flint.fmpq_poly([(-1) ** i * value for i, value in enumerate(c[first::2])])
+        for first in (0, 1)
+    )
+    return even * even + flint.fmpq_poly([0, 1]) * odd * odd
+
+
+def _roots(p: flint.fmpq_poly) -> list[tuple[flint.acb, int]]:
+    """Return the roots with their multiplicities, each in a ball that holds it."""
+    found: Any = p.complex_roots()
+    return list(found)
+
+
+def _is_positive(p: flint.fmpq_poly) -> bool:
+    """Tell whether a polynomial is positive for all arguments from zero on."""
+    if p(0) <= 0 or p.leading_coefficient() < 0:
+        return False
+    # Real roots have an imaginary part of exactly zero.
+    return not any(root.imag == 0 and not root.real < 0 for root, _ in _roots(p))
+
+
+def spectral_factor(
+    parts: Sequence[flint.fmpq_poly], weights: Sequence[Fraction]
+) -> Polynomial:
+    """Return f with |f|^2 >= sum_k weights_k |B_k|^2 on the axis, and next to no more.
+
+    Parameters
+    ----------
+    parts : sequence of flint.fmpq_poly
+        The B_k, not zero.
+    weights : sequence of Fraction
+        Positive.
+
+    Raises
+    ------
+    UndecidedError
+        If roots in double precision give none: the B_k nearly have a common zero on the axis.
+    """
+    common = parts[0]
+    for p in parts[1:]:
+        common = common.gcd(p)
+    whole = flint.fmpq_poly()
+    for p, weight in zip(parts, weights, strict=True):
+        whole += exactly([weight]) * _square(p / common)
+    # Without a common factor the sum is positive on the whole axis.
+    roots = []
+    for x, number in _roots(whole):
+        if x.imag < 0:
+            continue
+        s = -complex((-x).sqrt())
+        roots += ([complex(s.real)] if x.imag == 0 else [s, s.conjugate()]) * number
+    lead = _fraction(flint.arb(whole.leading_coefficient()).sqrt())
+    for more in _ENLARGED:
+        f = Polynomial.of_roots(roots) * Polynomial.of([lead * (1 + Fraction(more))])
+        if _is_positive(_square(exactly(f.exact)) - whole):
+            return f * Polynomial.of(fractions(common))
+    raise UndecidedError("rounding does not decide the sum of the squares of what varies")
+
+
+def _beside(d: Function, f: Polynomial) -> tuple[Function, Function]:
+    """Return D and a polynomial as functions of one space."""
+    space = Space([*d.space.polynomials, f], d.space.delays, d.space.step)
+    none = np.zeros((1, d.delayed.shape[1]), object)
+    zero, steady = np.array([Fraction(0)], object), np.zeros(len(space.polynomials), object)
+    steady[-1] = Fraction(1)
+    delayed = np.concatenate((d.delayed, none))
+    return (
+        Function(space, np.append(d.steady, zero), delayed),
+        Function(space, steady, np.zeros_like(delayed)),
+    )
+
+
+def _best_scalings(squares: FloatArray) -> tuple[FloatArray, float]:
+    """Minimise sum d_k^2 times the largest row of sum_k squares_k / d_k^2; d and the minimum.
+
+    With x_k = log d_k^2 this is a convex problem: minimise log sum exp x_k plus the largest
+    log sum_k squares_k exp(-x_k).
+    """
+    number = squares.shape[1]
+
+    def rows(x: FloatArray) -> FloatArray:
+        found: FloatArray = np.log(squares @ np.exp(-x))
+        return found
+
+    def whole(z: FloatArray) -> float:
+        return float(np.log(np.exp(z[:-1]).sum()) + z[-1])
+
+    start = np.append(np.zeros(number), rows(np.zeros(number)).max())
+    limits = [(0.0, 0.0), *[(-40.0, 40.0)] * (number - 1), (None, None)]
+    below = {"type": "ineq", "fun": lambda z: z[-1] - rows(z[:-1])}
+    z = optimize.minimize(
+        whole, start, bounds=limits, constraints=below, options={"ftol": 1e-15}
+    ).x
+    x = z[:-1]
+    return np.exp(0.5 * x), math.exp(np.log(np.exp(x).sum()) + rows(x).max())
+
+
+def varying_radius_of(d: Function, changes: Sequence[Function]) -> Varying:
+    """Find a radius of varying perturbations that is certified, scalings optimised (Lemma 20).
+
+    Parameters
+    ----------
+    d : Function
+        D at the constant point, whose zeros all have a negative real part, but for those at
+        s = 0 that are no roots of the loop.
+    changes : sequence of Function
+        The B_k exp(-s theta_k) by which D changes.
+
+    Raises
+    ------
+    ValueError
+        If a change has another form.
+    UndecidedError
+        If double precision, or the steps allowed, do not decide it.
+    """
+    acting = [k for k, change in enumerate(changes) if not change.is_zero]
+    if not acting:
+        return Varying(math.inf, math.nan, (1.0,) * len(changes))
+    at_zero = [lead.order for k in acting if (lead := changes[k].leading())]
+    lead = d.leading()
+    if lead is None or lead.order > min(at_zero, default=0):
+        # A root at s = 0 that is hidden at the constant point moves with any perturbation.
+        return Varying(0.0, 0.0, (1.0,) * len(changes))
+    parts = [_exact_polynomial(changes[k]) for k in acting]
+    best, scalings = Varying(0.0, math.nan, ()), np.ones(len(acting))
+    squares = np.zeros((0, len(acting)))
+    for _ in range(_MOST_SCALINGS):
+        sizes = [Fraction(size) ** 2 for size in scalings.tolist()]
+        f = spectral_factor(parts, [sum(sizes) / size for size in sizes])
+        _, radius, omega = least_ratio(*_beside(d, f), tolerance=_TOLERANCE)
+        if radius > best.radius:
+            spread = np.ones(len(changes))
+            spread[acting] = scalings
+            best = Varying(radius, omega, tuple(spread.tolist()))
+        if not 0.0 < omega < math.inf:
+            # There all magnitudes are those of leading or of highest coefficients.
+            values = _limits(d, [changes[k] for k in acting], lead.order, omega)
+        else:
+            values = np.abs(at([d, *(changes[k] for k in acting)], omega))
+        squares = np.vstack((squares, (values[1:] / values[0]) ** 2))
+        scalings, least = _best_scalings(squares)
+        # No other scalings do better at these frequencies than one over the root of this.
+        if best.radius * math.sqrt(least) >= 1.0 - 5.0 * _TOLERANCE:
+            break
+    return best
+
+
+def _limits(d: Function, changes: Sequence[Function], order: int, omega: float) -> FloatArray:
+    """Magnitudes of D, the least one, and of changes, at s = 0 or at high frequency."""
+    if omega == 0.0:
+        values = [f.series(order + 1)[order] for f in (d, *changes)]
+        return np.array([abs(float(value / values[0])) for value in values])
+    whole, turned = d.space.limits(*stacked([d, *changes]))
+    sizes: FloatArray = np.abs(whole) + np.abs(turned).sum(axis=1)
+    sizes[0] = abs(whole[0]) - np.abs(turned[0]).sum()
+    return sizes
+
+
+def constant_radius_of(d: Function, changes: Sequence[Function], below: float) -> float:
+    """Find the largest size of constant perturbations up to which no root reaches the axis.
+
+    Parameters
+    ----------
+    d, changes : Function, sequence of Function
+        As `varying_radius_of` takes them.
+    below : float
+        A size up to which no root does: a radius of varying perturbations.
+
+    Returns
+    -------
+    float
+        All |eta_k| below it, by more than a part in a million, leave the loop stable. At this
+        size one does not, or double precision does not decide it.
+
+    Raises
+    ------
+    UndecidedError
+        If a search takes too many steps.
+    """
+    signs = list(itertools.product((1.0, -1.0), repeat=len(changes)))
+    rays = [
+        sum((f * sign for f, sign in zip(changes, way, strict=True)), d * 0) for way in signs
+    ]
+    above = min(first_zero(d, g, _FARTHEST, 0.0)[0] for g in rays)
+
+    def excludes(size: float) -> bool:
+        hull = [
+            (VERTEX, (1.0, *(sign * size for sign in way)), (0.0,) * (1 + len(changes)))
+            for way in signs
+        ]
+        return decide.excludes(Family([d, *changes], [hull]))
+
+    if excludes(above * (1.0 - 1e-6)):
+        return above
+    while above > below * (1.0 + 1e-6):
+        middle = math.sqrt(below * above)
+        below, above = (middle, above) if excludes(middle) else (below, middle)
+    return above

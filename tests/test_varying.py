@@ -1,0 +1,261 @@
+"""Peak gains and radii of varying perturbations, against independent answers."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import control
+import flint
+import numpy as np
+import pytest
+
+from armlock import (
+    CommonArm,
+    Controller,
+    CountError,
+    DelaySystem,
+    DualArm,
+    Loop,
+    SingleArm,
+    buildable_loop,
+    critical_perturbation,
+    delay,
+    flight_loop,
+    modulus_margin,
+    paper,
+    paper_loop,
+    peak_gain,
+    robust_loop,
+    simulate,
+    unstable_roots,
+    varying_radius,
+)
+from armlock.engine import decide
+from armlock.engine.decide import Family
+from armlock.engine.inclusion import TERM, VERTEX
+from armlock.engine.varying import spectral_factor
+from armlock.sensors import SignalMapping
+from tests.peaks import dense_peak, draw, pair, system_of
+
+# Found by others with a dense grid.
+PUBLISHED = {
+    "paper": (paper_loop, 1.3213607e-6, 2.46134e-5, (1, -1), 1.4643205e-6),
+    "robust": (robust_loop, 2.5710454e-6, 4.59564e-5, (1, -1), 4.3751e-6),
+    "buildable": (buildable_loop, 2.5752707e-6, 4.59531e-5, (1, -1), 4.4004e-6),
+    "flight": (flight_loop, 5.5963872e-4, 2.56846e-5, (1, 1), 5.5979e-4),
+}
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_the_radii_of_the_loops_of_the_book(name):
+    make, radius, omega, direction, constant = PUBLISHED[name]
+    found = varying_radius(make())
+    assert found.radius == pytest.approx(radius, rel=1e-6)
+    assert found.omega == pytest.approx(omega, rel=1e-4)
+    assert found.constant == pytest.approx(constant, rel=2e-5)
+    assert found.constant == pytest.approx(critical_perturbation(make(), direction), rel=1e-6)
+    assert found.scaling == 1.0
+
+
+def test_the_radius_with_half_the_difference():
+    found = varying_radius(paper_loop(difference=0.5 * (paper.TAU1 - paper.TAU2)))
+    assert found.radius == pytest.approx(5.9495e-7, rel=1e-5)
+    assert found.constant == pytest.approx(6.3262e-7, rel=1e-5)
+
+
+def test_peak_gains_against_a_dense_search():
+    rng, number, places = np.random.default_rng(21), 0, set()
+    while number < 12:
+        _, n, d = draw(rng)
+        try:
+            found = peak_gain(system_of(n, d))
+        except ValueError:
+            continue
+        number += 1
+        assert found.gain == pytest.approx(dense_peak(n, d), rel=2e-6)
+        places.add(found.omega if found.omega in (0.0, math.inf) else "between")
+        if 0.0 < found.omega < math.inf:
+            at = abs(pair(n, found.omega) / pair(d, found.omega))
+            assert at == pytest.approx(found.gain, rel=1e-7)
+    assert places == {0.0, math.inf, "between"}
+
+
+def test_no_level_that_is_too_good_is_certified():
+    rng, number = np.random.default_rng(22), 0
+    while number < 12:
+        system = system_of(*draw(rng)[1:])
+        n, d = system.functions
+        if decide.count(d) != 0:
+            continue
+        number += 1
+        level = 1.0 / peak_gain(system).gain
+        for share, holds in ((1.0 - 1e-5, True), (1.0 + 1e-4, False)):
+            test = [(VERTEX, (1.0, 0.0), (0.0, 0.0)), (TERM, (0.0, level * share), (0.0, 0.0))]
+            assert decide.excludes(Family([d, n], [test])) == holds
+
+
+def test_peak_gains_that_are_known():
+    # Of a resonance with the damping z, 1 / (2 z sqrt(1 - z^2)); a delay changes no gain.
+    z = 1e-5
+    found = peak_gain(control.tf([1.0], [1.0, 2.0 * z, 1.0]) * delay(0.3))
+    assert found.gain == pytest.approx(0.5 / (z * math.sqrt(1.0 - z * z)), rel=1e-9)
+    assert found.omega == pytest.approx(math.sqrt(1.0 - 2.0 * z * z), rel=1e-9)
+    assert peak_gain(control.tf([2.0], [3.0, 1.0])) == (2.0, 0.0)
+    assert peak_gain(control.tf([1.0, 0.0], [4.0, 1.0])) == (0.25, math.inf)
+    # Both numerator and denominator are delayed at high frequency.
+    high = (1 + 0.2 * delay(3.0)) / (1 - 0.5 * delay(1.0)) * control.tf([1.0, 0.0], [1.0, 1.0])
+    assert peak_gain(high).gain == pytest.approx(2.4, rel=1e-12)
+    assert peak_gain(high).omega == math.inf
+    assert peak_gain(3.0).gain == 3.0
+    assert peak_gain(0.0).gain == 0.0
+
+
+@pytest.mark.parametrize("make", [paper_loop, robust_loop, buildable_loop, flight_loop])
+def test_modulus_and_peak_gain_of_the_loops(make):
+    loop = make()
+    assert modulus_margin(loop) == pytest.approx(1.0 / peak_gain(1 / (1 + loop)).gain, rel=1e-6)
+    # The other peak of control: |T| <= 1 + |S|, and |S| <= 1 + |T|.
+    closed = peak_gain(loop.feedback()).gain
+    assert abs(closed - 1.0 / modulus_margin(loop)) < 1.0
+
+
+def test_what_is_refused_says_why():
+    with pytest.raises(ValueError, match="system must be stable, but it has 5 unstable roots"):
+        peak_gain(1 / (1 + CommonArm().open_loop(1.1)))
+    with pytest.raises(ValueError, match="loop must be stable, but it has 5 unstable roots"):
+        varying_radius(CommonArm(), 1.1)
+    with pytest.raises(ValueError, match="no confined chain"):
+        varying_radius(Loop(((), (), 5.0), "single", 2.0), 1.3)
+    with pytest.raises(TypeError, match="loop must be a Loop"):
+        varying_radius(DelaySystem.of(1.0))  # type: ignore[arg-type]
+
+
+def test_loops_that_any_constant_perturbation_breaks_have_the_radius_zero():
+    for loop in (SingleArm(), CommonArm(), DualArm()):
+        found = varying_radius(loop)
+        assert (found.radius, found.constant, found.omega) == (0.0, 0.0, 0.0)
+        assert critical_perturbation(loop, (1.0, 1.0)) == 0.0 or isinstance(
+            loop.mapping, object
+        )
+
+
+def test_radii_that_are_known():
+    # An integrator with one arm is stable up to c = 1, where a root crosses at s = 0.
+    found = varying_radius(SingleArm(), 0.9)
+    assert found.radius == pytest.approx(0.1, rel=1e-6)
+    assert found.constant == pytest.approx(0.1, rel=1e-9)
+    # Without dynamics |1 + g (1 - c z)| is least at z = 1: the chain decides.
+    found = varying_radius(Loop(((), (), 5.0), "single", 2.0))
+    assert found.radius == pytest.approx(0.2, rel=1e-6)
+    # Arms of unequal weight: the least radius over the phases is 1 / (|G_1| + |G_2|) with the
+    # best d, and 1 / sqrt(2 (|G_1|^2 + |G_2|^2)) with d = 1.
+    unequal = SignalMapping([4.0], [1.0], [1.0], name="unequal")
+    found = varying_radius(Loop(((), (), 0.1), unequal, 2.0, 1.5))
+    assert found.radius == pytest.approx((1.5 - 0.5) / 0.5, rel=1e-6)
+    assert found.scaling == pytest.approx(0.5, rel=1e-3)
+
+
+def test_a_radius_is_that_of_a_dense_search():
+    rng, scalings = np.random.default_rng(23), []
+    for loop in drawn_loops(rng, 6):
+        found = varying_radius(loop)
+        omega = np.unique(
+            np.concatenate((np.geomspace(1e-5, 1e3, 10_000), np.arange(1, 10_000) * 8e-3))
+        )
+        s = 1j * omega
+        first, second = loop.arm_responses(s)
+        sensitivity = 1.0 / (1.0 + loop(s))
+        g1, g2 = (np.abs(g * sensitivity) ** 2 for g in (first, second))
+        d2 = np.geomspace(1e-2, 1e2, 501)
+        costs = [(1 + d) * (g1 + g2 / d).max() for d in d2]
+        assert found.radius == pytest.approx(1.0 / math.sqrt(min(costs)), rel=1e-3)
+        assert found.radius <= found.constant * (1.0 + 1e-6)
+        scalings.append(found.scaling)
+    assert np.ptp(scalings) > 0.1
+
+
+def drawn_loops(rng, number):
+    """Draw stable loops whose arms have unequal weights."""
+    found: list[Loop] = []
+    while len(found) < number:
+        weights = rng.uniform(0.3, 1.0), rng.uniform(0.3, 1.0)
+        mapping = SignalMapping([weights[0]], [weights[1]], [1.0], name="drawn")
+        zero, pole = -(10.0 ** rng.uniform(-1, 1, 2))
+        gain, tau = 10.0 ** rng.uniform(-1, 1), rng.uniform(0.5, 2.0, 2)
+        if rng.random() < 0.5:
+            controller = Controller([zero], [pole, -3.0 * abs(pole)], gain)
+        else:
+            controller = Controller([zero], [pole], 0.1 * gain)
+        loop = Loop(controller, mapping, *tau)
+        if unstable_roots(loop) == 0:
+            found.append(loop)
+    return found
+
+
+def growth(loop, r, omega, rng, patterns):
+    """Largest growth of the output over varying c that switch between 1 - r and 1 + r."""
+    rate, worst = 40.0, 0.0
+    timepts = np.arange(int(160.0 * rate)) / rate
+    noise = np.where(timepts < 2.0, rng.normal(size=timepts.size), 0.0)
+    for k in range(patterns):
+        # Periods about that at which the radius is taken, also twice and half of it.
+        turn = omega * rng.choice([0.5, 1.0, 2.0]) * rng.uniform(0.9, 1.1) * timepts
+        phases, duty = rng.uniform(0, 2 * np.pi, 2), rng.uniform(-0.7, 0.7)
+        signs = [np.where(np.sin(turn + phase) > duty, 1.0, -1.0) for phase in phases]
+        if k < 4:
+            # All four that are constant.
+            signs = [
+                np.full(timepts.size, sign) for sign in (1.0 - k // 2 * 2, 1.0 - k % 2 * 2)
+            ]
+        out = simulate(
+            loop, noise, c1=1 + r * signs[0], c2=1 + r * signs[1], sample_rate=rate, limit=1e30
+        )
+        quarter = out.size // 4
+        early, late = np.sum(out[quarter : 2 * quarter] ** 2), np.sum(out[-quarter:] ** 2)
+        worst = max(worst, late / early if early > 1e-200 else 0.0)
+    return worst
+
+
+def test_no_switching_within_the_radius_makes_a_loop_grow():
+    rng, grown = np.random.default_rng(24), 0
+    for loop in drawn_loops(rng, 10):
+        found = varying_radius(loop)
+        omega = found.omega if 0.0 < found.omega < 20.0 else 1.0
+        assert growth(loop, 0.99 * found.radius, omega, rng, 12) < 1.0
+        # The same search does see growth, where constant perturbations break the loop.
+        grown += growth(loop, 1.2 * found.constant, omega, rng, 4) > 1.0
+    assert grown >= 9
+
+
+def test_a_spectral_factor_is_no_smaller_than_what_it_stands_for():
+    rng = np.random.default_rng(25)
+    for _ in range(20):
+        common = [0, 0, 1] if rng.random() < 0.5 else [1]
+        parts = [
+            flint.fmpq_poly([flint.fmpq(int(c), 7) for c in rng.integers(-50, 50, 5)])
+            * flint.fmpq_poly(common)
+            for _ in range(2)
+        ]
+        weights = [Fraction(1), Fraction(int(rng.integers(1, 9)), 3)]
+        f = np.array([float(c) for c in spectral_factor(parts, weights).exact])
+        s = 1j * np.geomspace(1e-3, 1e3, 500)
+        squares = sum(
+            float(w) * np.abs(np.polyval([float(c) for c in p.coeffs()][::-1], s)) ** 2
+            for p, w in zip(parts, weights, strict=True)
+        )
+        assert np.abs(np.polyval(f[::-1], s)) ** 2 == pytest.approx(squares, rel=1e-9)
+
+
+def test_a_spectral_factor_with_a_common_zero_on_the_axis():
+    # 1 + s^2 divides both: so it does the factor, exactly.
+    both = flint.fmpq_poly([1, 0, 1])
+    f = spectral_factor([both * flint.fmpq_poly([1, 2]), both], [Fraction(1)] * 2)
+    assert np.polyval([float(c) for c in f.exact][::-1], 1j) == pytest.approx(0.0, abs=1e-15)
+
+
+def test_a_limit_that_is_not_decided_is_not_a_number():
+    # Two delays act in different proportions, and the largest gain is at no sign of either.
+    n, d = {0.0: [1.0], 1.0: [0.5], 1.37: [-0.4]}, {0.0: [1.0], 1.0: [0.3], 1.37: [0.2]}
+    with pytest.raises(CountError, match="no peak gain: the behaviour at high frequency"):
+        peak_gain(system_of(n, d))
