@@ -8,7 +8,6 @@ from book.companion.claims import single_arm  # isort: skip
 from book.companion.claims import common_arm  # isort: skip
 from book.companion.claims import dual_arm  # isort: skip
 from book.companion.claims import nyquist_cases  # isort: skip
-from book.companion.claims import controller  # isort: skip
 from book.companion.claims import simulation  # isort: skip
 from book.companion.claims import appendix  # isort: skip
 from book.companion.claims import flight  # isort: skip
@@ -21,7 +20,6 @@ __all__ = [
     "chapter_claims",
     "check",
     "common_arm",
-    "controller",
     "dual_arm",
     "flight",
     "nyquist_cases",
