@@ -4,7 +4,6 @@ from book.companion.claims.ledger import Verdict, Weight, all_claims, chapter_cl
 
 # In the order of the paper, which is the order of the register.
 from book.companion.claims import table1  # isort: skip
-from book.companion.claims import single_arm  # isort: skip
 from book.companion.claims import common_arm  # isort: skip
 from book.companion.claims import dual_arm  # isort: skip
 from book.companion.claims import nyquist_cases  # isort: skip
@@ -24,6 +23,5 @@ __all__ = [
     "flight",
     "nyquist_cases",
     "simulation",
-    "single_arm",
     "table1",
 ]
