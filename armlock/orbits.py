@@ -23,7 +23,15 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import make_interp_spline
 
-from armlock.checks import FloatArray, axis, finite_series, one_of, positive_number, real_array
+from armlock.checks import (
+    FloatArray,
+    axis,
+    finite_series,
+    one_of,
+    positive_number,
+    real_array,
+    real_number,
+)
 
 #: Speed of light in m/s.
 SPEED_OF_LIGHT = 299_792_458.0
@@ -185,13 +193,17 @@ def _link(receiver: _Path, emitter: _Path, t: FloatArray) -> tuple[FloatArray, F
     return light, d_rate / SPEED_OF_LIGHT + _SHAPIRO * bend
 
 
-def kepler(arm_length: float = 2.5e9) -> Constellation:
-    """Return two-body orbits with the elements of Dhurandhar et al. (2005), delta = 5/8.
+def kepler(arm_length: float = 2.5e9, delta: float = 0.625) -> Constellation:
+    """Return two-body orbits with the elements of Dhurandhar et al. (2005).
 
     Parameters
     ----------
     arm_length : float, optional
         Mean distance of the spacecraft in m, at most a tenth of the astronomical unit.
+    delta : float, optional
+        The plane of the triangle is tilted by pi/3 + delta * alpha, where alpha is half of the
+        arm length in astronomical units. The arms change least at 5/8; a tilt of 60 degrees
+        has delta = 0.
 
     Returns
     -------
@@ -201,7 +213,8 @@ def kepler(arm_length: float = 2.5e9) -> Constellation:
     Raises
     ------
     TypeError, ValueError
-        If the arm length is not positive or too long for these elements.
+        If the arm length is not positive or too long for these elements, or delta is not
+        finite.
 
     References
     ----------
@@ -215,14 +228,16 @@ def kepler(arm_length: float = 2.5e9) -> Constellation:
             f"astronomical unit, got {length}"
         )
     alpha = length / (2.0 * ASTRONOMICAL_UNIT)
-    paths = tuple(partial(_ellipse, alpha, k * 2.0 * np.pi / 3.0) for k in range(3))
+    nu = np.pi / 3.0 + real_number("delta", delta) * alpha
+    paths = tuple(partial(_ellipse, alpha, nu, k * 2.0 * np.pi / 3.0) for k in range(3))
     span = (-_KEPLER_SPAN, _KEPLER_SPAN)
     return Constellation("that of the elements, TCB", span, 0.0, paths)
 
 
-def _ellipse(alpha: float, theta: float, t: FloatArray, derivative: int) -> FloatArray:
+def _ellipse(
+    alpha: float, nu: float, theta: float, t: FloatArray, derivative: int
+) -> FloatArray:
     """Return the position or the velocity of the spacecraft with phase theta."""
-    nu = np.pi / 3.0 + 0.625 * alpha
     e = np.sqrt(1 + 4 * alpha * np.cos(nu) / np.sqrt(3) + 4 * alpha**2 / 3) - 1
     tilt = np.arctan2(alpha * np.sin(nu), np.sqrt(3) / 2 + alpha * np.cos(nu))
     a, n = ASTRONOMICAL_UNIT, np.sqrt(SUN / ASTRONOMICAL_UNIT**3)

@@ -59,6 +59,17 @@ def test_a_year_of_kepler_has_the_known_extremes_and_zeros():
     assert abs(brentq(half, 182 * DAY, 183 * DAY, xtol=1e-6) / DAY - 182.6285454) < 1e-7
 
 
+def test_round_trips_differ_least_at_five_eighths():
+    """The tilt of Nayak et al., Class. Quantum Grav. 23, 1763 (2006)."""
+    t = np.linspace(0.0, YEAR, 2001)
+    tilts = (0.0, 0.5, 0.625, 0.75)
+    most = [np.abs(np.subtract(*kepler(2.5e9, k).round_trips(t))).max() for k in tilts]
+    assert min(most) == most[2]
+    assert most[0] > 2.5 * most[2]
+    with pytest.raises(ValueError, match=r"^delta"):
+        kepler(2.5e9, np.nan)
+
+
 def test_a_century_later_the_arms_are_the_same():
     period = 2.0 * np.pi * np.sqrt(ASTRONOMICAL_UNIT**3 / SUN)
     t = np.linspace(0.0, period, 300)
