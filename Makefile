@@ -62,7 +62,7 @@ $(READY): environment.txt book/kernel.json
 	@echo "$(CURDIR)" > $@
 
 # nbmake runs copies of the notebooks for the tests and for the book, the longest first.
-LONGEST := $(wildcard notebooks/09_* notebooks/13_* notebooks/16_*)
+LONGEST := $(wildcard notebooks/09_* notebooks/13_* notebooks/14_*)
 PYTEST := $(PY) -m pytest --numprocesses auto --maxprocesses 4 --dist worksteal
 execute = export ARMLOCK_FIGURES=$(CURDIR)/$(1); \
 	$(PYTEST) --dist load --maxschedchunk 1 --nbmake --overwrite $(2:notebooks/%=build/executed/%) && \

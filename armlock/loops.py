@@ -616,7 +616,9 @@ def flight_loop(
         Corner of the difference arm's filter in rad/s, which the source does not print.
     delay : float, optional
         Dead time in s. The source has 5 us for the actuator, 2 us for the phasemeter, and
-        1 / (2 pi 30 kHz) for the transponder, 12.3 us in all.
+        1 / (2 pi 30 kHz) for the transponder, 12.3 us in all. A transponder acts on the
+        returned light alone: to put its dead time here is the source's model, and leaves out
+        the shape of its response (chapter 14 of the book).
 
     Returns
     -------
