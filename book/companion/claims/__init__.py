@@ -6,7 +6,6 @@ from book.companion.claims.ledger import Verdict, Weight, all_claims, chapter_cl
 from book.companion.claims import table1  # isort: skip
 from book.companion.claims import common_arm  # isort: skip
 from book.companion.claims import dual_arm  # isort: skip
-from book.companion.claims import nyquist_cases  # isort: skip
 from book.companion.claims import simulation  # isort: skip
 from book.companion.claims import appendix  # isort: skip
 from book.companion.claims import flight  # isort: skip
@@ -21,7 +20,6 @@ __all__ = [
     "common_arm",
     "dual_arm",
     "flight",
-    "nyquist_cases",
     "simulation",
     "table1",
 ]
