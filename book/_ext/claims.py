@@ -35,6 +35,11 @@ def link(name):
     return f'<a href="16_ledger.html#ledger-{name}">{name}</a>'
 
 
+def sentence(text):
+    """Return a text with a capital at its beginning, which may be a formula."""
+    return text[:1].upper() + text[1:]
+
+
 def details(claim):
     """Return what a row unfolds to."""
     source = f"Printed ({claim.places}): {claim.printed}."
@@ -44,7 +49,7 @@ def details(claim):
         f"{badge(claim.verdict)} {claim.verdict.clause}.",
         "\n".join(f"- {line}" for line in claim.tried),
         f"What decides: {claim.text('criterion')}." if claim.criterion else "",
-        f"{claim.text('quantity')}: **{claim.number}** ({decided}).",
+        f"{sentence(claim.text('quantity'))}: **{claim.number}** ({decided}).",
         claim.text("note"),
     ]
     return "\n\n".join(part for part in parts if part)
@@ -184,7 +189,7 @@ class Errata(LedgerDirective):
             affected = (one for one in ledger if set(one.names) & set(claim.affects))
             parts = {
                 "Printed" if claim.printed else "In our words": claim.printed or claim.says,
-                "What follows": f"{claim.text('quantity')}: **{claim.number}**. "
+                "What follows": f"{sentence(claim.text('quantity'))}: **{claim.number}**. "
                 f"{claim.text('note')}",
                 "What depends on it": ", ".join(
                     f"{link(one.name)} ({one.verdict})" for one in affected
