@@ -29,7 +29,6 @@ from armlock import (
 from armlock.loops import flight_loop
 from armlock.paper import DUAL_SENSOR_CORNER
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
-from book.companion.schemes import pseudospectral_roots
 from tests import independent
 
 PAPER = paper_loop(actuator=True).controller
@@ -133,14 +132,6 @@ def test_results_broadcast_and_scalars_stay_scalars():
     assert roots.dtype == complex
     assert roots[1, 0] == rightmost_root(HayesEquation(), -2.0, -1.5)
     assert type(rightmost_root(HayesEquation(), -1.0, -1.0)) is complex
-
-
-def test_pseudospectral_roots_converge_to_lambert():
-    expected = independent.hayes_roots(0.3, -2.0, branches=6)
-    expected = expected[np.argsort(-expected.real)][:6]
-    approximations = pseudospectral_roots(HayesEquation(), 0.3, -2.0, 60)
-    for root in expected:
-        assert abs(approximations - root).min() < 1e-9
 
 
 def test_a_root_that_cannot_be_certified_is_refused_at_once():

@@ -31,7 +31,6 @@ from armlock.robustness import Crossing, first_crossing, margins
 from armlock.stability.counts import unstable_roots
 from armlock.stability.dcurve import d_curve, d_curve_line
 from armlock.stability.semidiscretization import semi_discretization
-from book.companion.claims.common_arm import log_slope
 from book.companion.claims.ledger import PRINTED, Finding, Verdict, Weight, claim
 from book.companion.claims.table1 import FULL_DIFFERENCE, HALF_DIFFERENCE, MEAN_DELAY
 from book.companion.figures import svg
@@ -287,7 +286,7 @@ def edges_against_gain() -> Finding:
     corner = np.array([edges(float(gain)).corner for gain in GAINS])
     lines = {d_curve_line(DualArm(float(gain))) for gain in GAINS}
     high = GAINS >= 1e4
-    slope = log_slope(GAINS[high], corner[high])
+    slope = float(np.polyfit(np.log(GAINS[high]), np.log(corner[high]), 1)[0])
     falls = np.diff(corner) < -1e-9 * corner[:-1]
     k = int(np.argmax(falls))
 
