@@ -7,7 +7,6 @@ from book.companion.claims import table1  # isort: skip
 from book.companion.claims import dual_arm  # isort: skip
 from book.companion.claims import simulation  # isort: skip
 from book.companion.claims import appendix  # isort: skip
-from book.companion.claims import flight  # isort: skip
 
 __all__ = [
     "Verdict",
@@ -17,7 +16,6 @@ __all__ = [
     "chapter_claims",
     "check",
     "dual_arm",
-    "flight",
     "simulation",
     "table1",
 ]
