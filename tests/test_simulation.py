@@ -149,6 +149,36 @@ def test_blocks_and_a_saved_state_give_the_same_bits():
     assert np.array_equal(np.concatenate(parts), whole)
 
 
+@pytest.mark.parametrize("slope", [0.9, 0.5, 1e-3, 0.0, -0.02])
+@pytest.mark.parametrize("start", [5.0, 5.1, 4.95, 5.13])
+def test_blocks_of_any_size_give_the_same_bits(start, slope):
+    """Blocks of one sample too, in which a delay that moves may be whole samples."""
+    rng = np.random.default_rng(5)
+    noise = rng.standard_normal(1000)
+    loop = Loop(Controller([], [-0.1], 0.02), COMMON, 20.1, 19.9)
+    arms: dict[str, Any] = {"tau1": lambda t: start + slope * t}
+    whole = simulate(loop, noise, sample_rate=10.0, **arms)
+    run, ends = Simulation(loop, 10.0, **arms), np.cumsum(rng.choice([1, 1, 1, 2, 50], 1000))
+    parts = [run.advance(part) for part in np.split(noise, ends)]
+    assert np.array_equal(np.concatenate(parts), whole)
+
+
+def test_a_refused_delay_leaves_the_run_where_it_is():
+    """Arm 1, which shrinks, is accepted before arm 2 is refused."""
+    loop, right = Loop(Controller([], [-0.1], 0.02), COMMON, 20.1, 19.9), [False]
+    noise = np.random.default_rng(8).standard_normal(100)
+    run = Simulation(
+        loop, 10.0,
+        tau1=lambda t: 20.0 - 0.5 * t,
+        tau2=lambda t: 20.0 + 0.1 * t if right[0] else 20.0 + 2.0 * t,
+    )  # fmt: skip
+    with pytest.raises(ValueError, match=r"^tau2\(t\) must grow"):
+        run.advance(noise)
+    right[0] = True
+    assert run.advance(noise).shape == noise.shape
+    assert run.samples == 100
+
+
 @pytest.mark.parametrize("name", ["noise", "c1", "c2"])
 def test_another_sample_rate_is_noticed(name):
     """Of the noise, of c1 and of c2, also after arithmetic; thinned series have none."""
@@ -189,11 +219,11 @@ def test_what_memory_cannot_hold_is_refused():
 
 def test_a_share_of_a_sample_is_seen_at_any_rate():
     """A thousandth of a sample in 2 10^7, which is no rounding error."""
-    first, weights = lagrange_weights("tau", np.array([20.0 + 1e-9]), 1e6)
+    first, weights = lagrange_weights("tau", np.array(20.0 + 1e-9), 1e6)
     assert (first[0], weights.shape) == (20_000_000 - 3, (1, 8))
     assert weights[0] @ np.arange(8) == pytest.approx(3.001)
     # The last digit of 20.1 * 1e5 = 2010000.0000000002 is.
-    first, weights = lagrange_weights("tau", np.array([20.1]), 1e5)
+    first, weights = lagrange_weights("tau", np.array(20.1), 1e5)
     assert (first.tolist(), weights.tolist()) == ([2_010_000], [[1.0]])
 
 

@@ -21,8 +21,8 @@ Weights = tuple[IntArray, FloatArray]
 def lagrange_weights(name: str, tau: FloatArray, sample_rate: float) -> Weights:
     r"""Return the weights that delay a series.
 
-    A constant delay of whole samples has one weight. Otherwise the weights are those of
-    Lagrange's polynomial of order m = 7, with x the delay in samples less the smallest one:
+    A constant delay of whole samples has one weight. All others, and those of an arm that
+    moves, have the weights of Lagrange's polynomial of order m = 7, with x the delay in samples less the smallest one:
 
     .. math::
 
@@ -32,8 +32,8 @@ def lagrange_weights(name: str, tau: FloatArray, sample_rate: float) -> Weights:
     ----------
     name : str
         Name of the delay in messages.
-    tau : float array, shape (n,)
-        Delays in s.
+    tau : float array, shape () or (n,)
+        A constant delay, or those of successive samples, in s.
     sample_rate : float
         In Hz.
 
@@ -51,9 +51,9 @@ def lagrange_weights(name: str, tau: FloatArray, sample_rate: float) -> Weights:
     The order is odd and the delay lies between the two middle samples. Then interpolation
     amplifies no frequency, so that it adds no instability.
     """
-    samples = tau * sample_rate
+    samples = np.atleast_1d(tau) * sample_rate
     whole = np.rint(samples)
-    if tau.size == 1 and whole[0] > 0 and abs(samples[0] - whole[0]) <= _WHOLE:
+    if tau.ndim == 0 and whole[0] > 0 and abs(samples[0] - whole[0]) <= _WHOLE:
         return whole.astype(int), np.ones((1, 1))
     first = np.floor(samples).astype(int) - _SIDE + 1
     if first.min() < 1:
@@ -68,6 +68,6 @@ def lagrange_weights(name: str, tau: FloatArray, sample_rate: float) -> Weights:
 
 
 def reach(weights: Weights) -> int:
-    """Return how many samples a delay reaches back at its first sample."""
+    """Return how many samples before the first of a block the delays of the block reach back."""
     first, shares = weights
-    return int(first[0]) + int(shares.shape[1]) - 1
+    return int((first - np.arange(first.size)).max()) + int(shares.shape[1]) - 1

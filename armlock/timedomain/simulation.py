@@ -166,7 +166,7 @@ def _without_dead_time(loop: Loop, sample_rate: float) -> Loop:
 def _constant(loop: Loop, sample_rate: float) -> list[Weights]:
     """Return the weights of the loop's own delays."""
     return [
-        lagrange_weights(name, np.array([getattr(loop, name)]), sample_rate)
+        lagrange_weights(name, np.array(getattr(loop, name)), sample_rate)
         for name in ("tau1", "tau2")
     ]
 
@@ -387,8 +387,9 @@ class Simulation:
         sampled = self._sensor, self._controller
         end = _compute(phi, inputs, arms, *sampled, self._work, self.limit, self.samples)
         self.samples, self._diverged = self.samples + end, end < size
-        # The next sample needs no older one than the last sample did.
-        oldest = max(int(first[-1]) + shares.shape[1] for first, shares in arms)
+        # A delay grows by less than a sample, so the next sample needs none that is older than
+        # those of the last one; the 1 is for rounding.
+        oldest = 1 + max(int(first[-1]) + shares.shape[1] for first, shares in arms)
         self._past = phi[-oldest:].copy()
         return phi[known : known + end]
 
@@ -412,7 +413,7 @@ class Simulation:
 
     def _arms(self, size: int) -> tuple[Weights, Weights]:
         """Return the delays of both arms during the next samples."""
-        found = list(self._weights)
+        found, latest = list(self._weights), {}
         for k, (name, move) in enumerate(self._moving.items()):
             if move is None:
                 continue
@@ -430,7 +431,9 @@ class Simulation:
                     f"{time[at]:.9g} s"
                 )
             found[k] = lagrange_weights(f"{name}(t)", tau, self.sample_rate)
-            self._latest[name] = float(tau[-1])
+            latest[name] = float(tau[-1])
+        # Both arms are as they must be.
+        self._latest = latest
         return found[0], found[1]
 
 
