@@ -117,6 +117,15 @@ def finite_series(name: str, value: object, *dimensions: int) -> FloatArray:
     return array
 
 
+def check_rate(name: str, value: object, sample_rate: float) -> None:
+    """Raise if a series was drawn at another sample rate; most series do not know theirs."""
+    rate = getattr(value, "sample_rate", None)
+    if rate not in (None, sample_rate):
+        raise ValueError(
+            f"{name} must have a sample rate of {sample_rate:g} Hz; it was drawn at {rate:g} Hz"
+        )
+
+
 def broadcast_shape(
     names: tuple[str, ...], arrays: tuple[npt.NDArray[Any], ...]
 ) -> tuple[int, ...]:

@@ -43,6 +43,8 @@ SUN = 1.32712440017987e20
 _SHAPIRO = 4.0 * SUN / SPEED_OF_LIGHT**3
 # Each iteration of a light time gains four digits, and of Kepler's equation doubles them.
 _ITERATIONS = 6
+# Times computed together: few enough for the cache.
+_BLOCK = 1 << 16
 # Positions, or with 1 velocities, shape (n, 3), at times of shape (n,).
 _Path = Callable[[FloatArray, int], FloatArray]
 # Kepler's orbits are good to 5e-11 s within so many s of their epoch.
@@ -141,10 +143,9 @@ class Constellation:
 
         Arguments and errors as for `round_trips`; `receiver` and `emitter` are two of 1, 2, 3.
         """
-        if receiver not in _FAR or emitter not in _FAR[receiver]:
-            raise ValueError(
-                f"receiver and emitter must be two of 1, 2, 3, got {receiver!r} and {emitter!r}"
-            )
+        receiver, emitter = _spacecraft("receiver", receiver), _spacecraft("emitter", emitter)
+        if receiver == emitter:
+            raise ValueError(f"emitter must not be the receiver, got {emitter} for both")
         t = self._within(t)
         here, there = self._paths[receiver - 1], self._paths[emitter - 1]
         return _link(here, there, t.ravel())[0].reshape(t.shape)
@@ -152,8 +153,7 @@ class Constellation:
     def _arms(self, t: npt.ArrayLike, master: int) -> list[tuple[FloatArray, FloatArray]]:
         """Return the delay and the rate of both arms."""
         t = self._within(t)
-        if master not in (1, 2, 3) or isinstance(master, bool):
-            raise ValueError(f"master must be 1, 2 or 3, got {master!r}")
+        master = _spacecraft("master", master)
         found, here = [], self._paths[master - 1]
         for far in _FAR[master]:
             there = self._paths[far - 1]
@@ -174,8 +174,27 @@ class Constellation:
         return times
 
 
+def _spacecraft(name: str, value: object) -> int:
+    """Return the number of a spacecraft, or raise."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value not in _FAR:
+        raise ValueError(f"{name} must be 1, 2 or 3, got {value!r}")
+    return int(value)
+
+
 def _link(receiver: _Path, emitter: _Path, t: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the light time received at times of shape (n,), and its derivative."""
+    light, rate = np.empty(t.size), np.empty(t.size)
+    # An interrupt is heard between two blocks.
+    for at in range(0, t.size, _BLOCK):
+        part = slice(at, at + _BLOCK)
+        light[part], rate[part] = _link_block(receiver, emitter, t[part])
+    return light, rate
+
+
+def _link_block(
+    receiver: _Path, emitter: _Path, t: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return what `_link` does, for few times."""
     place, velocity = receiver(t, 0), receiver(t, 1)
     r = np.linalg.norm(place, axis=1)
     light = np.zeros(t.shape)
@@ -293,6 +312,8 @@ def from_table(
     if time.size < _FEWEST:
         raise ValueError(f"a table must hold at least {_FEWEST} states, got {time.size}")
     t = time - time[0]
+    if not isinstance(epoch, str):
+        raise TypeError(f"epoch must be text, got {epoch!r}")
     steps = np.diff(t)
     at = int(np.argmin(steps))
     if steps[at] <= 0.0:
@@ -360,10 +381,16 @@ def read_table(path: str | Path, *, epoch: str = "") -> Constellation:
     OSError
         If the file cannot be read.
     TypeError, ValueError
-        If a row does not hold ten numbers, or as for `from_table`.
+        If the file is no text in UTF-8, a row does not hold ten numbers, or as for
+        `from_table`.
     """
-    # What is no number is read as nan, and a row of another length raises.
-    values = np.genfromtxt(path, delimiter=",", encoding="utf-8")
+    if not isinstance(path, str | Path):
+        raise TypeError(f"path must be a str or a Path, got {path!r}")
+    try:
+        # What is no number is read as nan. The codec leaves out a byte-order mark.
+        values = np.genfromtxt(path, delimiter=",", encoding="utf-8-sig")
+    except ValueError as error:
+        raise ValueError(f"{path} must hold rows of ten numbers: {error}") from None
     if values.ndim != 2 or values.shape[1] != 10:
         raise ValueError(
             f"{path} must hold rows of ten numbers: time in s, then x, y and z in m of "
@@ -406,7 +433,8 @@ def read_oem(paths: Sequence[str | Path]) -> Constellation:
     ----------
     paths : sequence of three paths
         One file for each of the spacecraft 1 to 3: states around the Sun in TCB or TDB, in one
-        frame that does not rotate, as ESA publishes them.
+        frame that does not rotate, as ESA publishes them. Epochs have month and day, or the day
+        of the year.
 
     Returns
     -------
@@ -423,7 +451,11 @@ def read_oem(paths: Sequence[str | Path]) -> Constellation:
         another one; if the files differ in frame, time scale or epochs; or as for `from_table`,
         for instance at a gap between segments.
     """
-    if isinstance(paths, str | Path) or len(paths) != 3:
+    if not (
+        isinstance(paths, list | tuple)
+        and len(paths) == 3
+        and all(isinstance(path, str | Path) for path in paths)
+    ):
         raise ValueError(f"paths must hold three files, one for each spacecraft, got {paths!r}")
     headers, epochs, places = zip(*(_read_oem(Path(path)) for path in paths), strict=True)
     if len(set(headers)) > 1:
@@ -437,7 +469,7 @@ def read_oem(paths: Sequence[str | Path]) -> Constellation:
 
 def _read_oem(path: Path) -> tuple[tuple[str, ...], npt.NDArray[np.datetime64], FloatArray]:
     """Return centre, frame and scale, epochs of shape (n,) and positions (n, 3) in m."""
-    text = path.read_text("utf-8", errors="replace")
+    text = path.read_text("utf-8-sig", errors="replace")
     if "CCSDS_OEM_VERS" not in text:
         raise ValueError(f"{path} must be a CCSDS OEM in text form, with CCSDS_OEM_VERS")
     header = []
@@ -451,7 +483,7 @@ def _read_oem(path: Path) -> tuple[tuple[str, ...], npt.NDArray[np.datetime64], 
         header.append(said.pop())
     rows = [line.split() for line in re.findall(r"^\s*\d+-\S*T.*", text, re.MULTILINE)]
     try:
-        dates = np.array([row[0].removesuffix("Z") for row in rows], dtype="datetime64[ns]")
+        dates = np.array([_calendar(row[0]) for row in rows], dtype="datetime64[ns]")
         states = np.array([row[1:] for row in rows], dtype=np.float64)
     except ValueError as error:
         raise ValueError(f"states of {path} must hold dates and numbers: {error}") from None
@@ -463,3 +495,16 @@ def _read_oem(path: Path) -> tuple[tuple[str, ...], npt.NDArray[np.datetime64], 
     # Where a segment ends and the next begins, the epoch stands twice.
     epochs, kept = np.unique(dates, return_index=True)
     return tuple(header), epochs, 1e3 * states[kept, :3]
+
+
+def _calendar(epoch: str) -> str:
+    """Return an epoch with month and day in place of the day of the year, as 2035-005T00:00."""
+    epoch = epoch.removesuffix("Z")
+    found = re.fullmatch(r"(\d{4})-(\d{3})(T.*)", epoch)
+    if not found:
+        return epoch
+    year, day, clock = found.groups()
+    date = np.datetime64(f"{year}-01-01") + (int(day) - 1)
+    if not str(date).startswith(year):
+        raise ValueError(f"there is no day {day} in {year}")
+    return f"{date}{clock}"

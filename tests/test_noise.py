@@ -2,13 +2,16 @@
 
 from typing import Any
 
+import mpmath
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from armlock import LaserNoise, PerturbationNoise, ShapedNoise
+from armlock import Controller, LaserNoise, PerturbationNoise, ShapedNoise
+from armlock.timedomain.discretize import sampled_filter, stationary_root
 from armlock.timedomain.spectra import SpectrumEstimator
+from tests.test_in_time import ends_when_interrupted
 
 SOURCES: dict[str, Any] = {
     "laser": lambda seed, **more: LaserNoise(seed, **more),
@@ -88,6 +91,66 @@ def test_a_series_starts_in_the_middle_of_its_course():
     expected = [float(np.mean(later[: later.size - k] * later[k:])) for k in range(4)]
     found = [np.mean(first[:, 0] * first[:, k]) for k in range(4)]
     assert found == pytest.approx(expected, abs=0.1 * expected[0])
+
+
+@pytest.mark.parametrize("cutoff", [1e-6, 1e-15, 1e-100])
+def test_a_low_cutoff_leaves_a_series_with_its_rms(cutoff):
+    """Below half the rate, and in closed form but for what the rate cuts off."""
+    found = LaserNoise(1, cutoff=cutoff)
+    assert found.rms == pytest.approx(30.0 * np.sqrt(0.5 * np.pi / cutoff), rel=1e-8)
+    assert np.isfinite(found.draw(10)).all()
+    assert np.std([LaserNoise(seed, cutoff=cutoff).draw(1)[0] for seed in range(500)]) == (
+        pytest.approx(found.rms, rel=0.1)
+    )
+
+
+def test_a_filter_over_many_decades_starts_in_the_middle_of_its_course():
+    """The covariance, against sums over a sample's responses in many digits."""
+    rng = np.random.default_rng(11)
+    for _ in range(30):
+        poles = list(-(10.0 ** rng.uniform(-6.0, 3.0, int(rng.integers(1, 5)))))
+        size = 10.0 ** rng.uniform(-6.0, 3.0)
+        poles += [size * complex(-0.1, 1.0), size * complex(-0.1, -1.0)]
+        zeros = -(10.0 ** rng.uniform(-6.0, 3.0, len(poles) - 1))
+        sampled = sampled_filter(Controller(zeros.tolist(), poles, 1.0), 200.0)
+        expected = covariance(sampled)
+        root = stationary_root(sampled)
+        size = np.sqrt(np.diag(expected))
+        off = (root @ root.T - expected) / np.outer(size, size)
+        assert np.abs(off).max() < 1e-9
+
+
+def covariance(sampled):
+    """Covariance of the states under white noise, in 120 digits: the sum of 2^80 samples."""
+    n = 2 * len(sampled.sections)
+    with mpmath.workdps(120):
+        change, drive = mpmath.zeros(n, n), mpmath.zeros(n, 1)
+        shares = [mpmath.mpf(t) for *_, t1, t2 in sampled.sections for t in (t1, t2)]
+        for i, (r1, r2, k, _, _) in enumerate(sampled.sections):
+            change[2 * i, : 2 * i] = mpmath.matrix([shares[: 2 * i]]) if i else 0
+            change[2 * i, 2 * i], change[2 * i, 2 * i + 1] = r1, -mpmath.mpf(k)
+            change[2 * i + 1, 2 * i], change[2 * i + 1, 2 * i + 1] = 1, r2
+            drive[2 * i] = 1
+        order = sampled.order
+        change, drive = change[:order, :order], drive[:order, :]
+        total = drive * drive.T
+        for _ in range(80):
+            carried = mpmath.eye(order) + change
+            total += carried * total * carried.T
+            change = 2 * change + change * change
+        return np.array(total.tolist(), dtype=float)
+
+
+def test_noise_without_a_finite_rms_is_refused():
+    message = r"^noise must have a finite r\.m\.s\., got poles \(\(-3e-323"
+    with pytest.raises(ValueError, match=message):
+        LaserNoise(1, cutoff=5e-324)
+
+
+def test_an_interrupt_is_heard_while_noise_is_drawn():
+    source = LaserNoise(1)
+    source.draw(1)
+    assert ends_when_interrupted(lambda: source.draw(1 << 28)) < 1.0
 
 
 def test_a_filter_without_poles_leaves_white_noise():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 from typing import Any
 
 import numpy as np
@@ -110,10 +111,15 @@ def test_shapes_are_kept_and_masters_are_three():
     t = np.zeros((2, 3)) + 1e6
     assert KEPLER.round_trips(t)[0].shape == KEPLER.rates(t, 3)[1].shape == (2, 3)
     assert KEPLER.round_trips(1e6)[0].shape == ()
-    wrong: list[Any] = [0, 4, 1.5, True, "1", [1]]
-    for master in wrong:
-        with pytest.raises(ValueError, match="master must be 1, 2 or 3"):
-            KEPLER.round_trips(0.0, master)
+    wrong: list[Any] = [0, 4, 1.0, 1.5, True, "1", [1], b"1", np.datetime64("2035-01-01")]
+    for number in wrong:
+        for call in (KEPLER.round_trips, KEPLER.rates):
+            with pytest.raises(ValueError, match=r"^master must be 1, 2 or 3"):
+                call(0.0, number)
+        with pytest.raises(ValueError, match=r"^receiver must be 1, 2 or 3"):
+            KEPLER.light_time(0.0, number, 2)
+        with pytest.raises(ValueError, match=r"^emitter must be 1, 2 or 3"):
+            KEPLER.light_time(0.0, 2, number)
     # Around the triangle the three differences add up to nothing but the Sagnac effect.
     assert abs(sum(half(5e6, master) for master in (1, 2, 3))) < 1e-7
 
@@ -265,6 +271,25 @@ def test_files_in_segments_give_what_they_were_written_from(tmp_path):
     assert read_oem(files).span == orbits.span
 
 
+def test_epochs_may_have_the_day_of_the_year(tmp_path):
+    """Past the end of February of a leap year too; and a file may begin with a mark."""
+    t = 365 * DAY + np.arange(0.0, 90 * DAY, DAY)
+    files = [oem(tmp_path / f"{k}.oem", k, t) for k in (1, 2, 3)]
+    expected = read_oem(files)
+    assert expected.epoch.startswith("2036-01-01")
+    for file in files[:2]:
+        lines = file.read_text("utf-8").splitlines()
+        for i, line in enumerate(lines):
+            if line.startswith("2036-"):
+                date = datetime.date.fromisoformat(line[:10])
+                lines[i] = f"2036-{date.timetuple().tm_yday:03d}{line[10:]}"
+        assert lines[-1].startswith("2036-090T00:00:29")
+        file.write_text("\n".join(lines), "utf-8-sig")
+    orbits = read_oem(files)
+    assert (orbits.epoch, orbits.span) == (expected.epoch, expected.span)
+    assert np.array_equal(orbits.round_trips(5e6), expected.round_trips(5e6))
+
+
 def test_a_gap_between_segments_is_refused(tmp_path):
     t = np.r_[np.arange(0.0, 30 * DAY, DAY), np.arange(60 * DAY, 90 * DAY, DAY)]
     files = [oem(tmp_path / f"{k}.oem", k, t, border=30) for k in (1, 2, 3)]
@@ -302,7 +327,9 @@ def test_a_file_of_another_frame_is_refused(tmp_path, wrong, message):
         (lambda text: text[: text.rindex(" ")], "hold dates and numbers: "),
         (lambda text: text.split("META_STOP")[0], "position and velocity, .* shape \\(0,\\)"),
         (lambda text: text.replace("2035-01-05", "2034-01-05"), "same epochs"),
-        (lambda text: text.replace("2035-01-05", "2035-005"), "hold dates and numbers: "),
+        (lambda text: text.replace("2035-01-05", "2035-1-5"), "hold dates and numbers: "),
+        (lambda text: text.replace("2035-01-05", "2035-366"), "there is no day 366 in 2035"),
+        (lambda text: text.replace("2035-01-05", "2035-000"), "there is no day 000 in 2035"),
     ],
 )
 def test_a_file_that_is_damaged_is_refused(tmp_path, change, message):
@@ -329,7 +356,8 @@ def test_the_packages_tables_are_esas_orbits():
 NAMES = "time," + ",".join(f"{axis}{k}" for k in (1, 2, 3) for axis in "xyz") + "\n"
 
 
-@pytest.mark.parametrize("head", ["", NAMES, f"# mine\n{NAMES}"])
+# A program may write a byte-order mark, U+FEFF.
+@pytest.mark.parametrize("head", ["", NAMES, f"# mine\n{NAMES}", "\ufeff", f"\ufeff{NAMES}"])
 def test_a_table_is_read_with_and_without_names(tmp_path, head):
     """A line of names comes first where pandas has written the file."""
     time, positions = weeks(span=30.0)
@@ -359,13 +387,28 @@ def test_a_file_that_is_no_table_is_refused(tmp_path, text, message):
         read_table(file)
 
 
+def test_what_is_no_text_or_no_path_is_refused_by_name(tmp_path):
+    file = tmp_path / "mine.csv"
+    file.write_text("1,2", "utf-16")
+    with pytest.raises(ValueError, match=r"mine\.csv must hold rows of ten numbers: .*decode"):
+        read_table(file)
+    wrong: list[Any] = [object(), b"mine.csv", datetime.date(2035, 1, 1), None, 1.0]
+    for path in wrong:
+        with pytest.raises(TypeError, match=r"^path must be a str or a Path, got "):
+            read_table(path)
+        for paths in (path, [path] * 3):
+            with pytest.raises(ValueError, match=r"^paths must hold three files"):
+                read_oem(paths)
+        with pytest.raises(TypeError, match=r"^epoch must be text"):
+            from_table(*weeks(span=30.0), epoch=path)
+
+
 def test_links_add_up_to_round_trips():
     t = np.linspace(0.0, YEAR, 7)
     back = KEPLER.light_time(t, 1, 2)
     trip = back + KEPLER.light_time(t - back, 2, 1)
     assert np.abs(trip - KEPLER.round_trips(t)[0]).max() == 0.0
-    for pair in ((1, 1), (0, 2), (1, 4)):
-        with pytest.raises(ValueError, match="receiver and emitter must be two of 1, 2, 3"):
-            KEPLER.light_time(t, *pair)
+    with pytest.raises(ValueError, match="emitter must not be the receiver, got 1 for both"):
+        KEPLER.light_time(t, 1, 1)
     with pytest.raises(ValueError, match="t must lie within the span"):
         KEPLER.light_time([1e10], 1, 2)

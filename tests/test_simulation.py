@@ -17,6 +17,7 @@ from armlock import (
     Loop,
     PerturbationNoise,
     Simulation,
+    amplitude_spectrum,
     paper_loop,
     rightmost_root,
     sampled_open_loop,
@@ -184,12 +185,35 @@ def test_another_sample_rate_is_noticed(name):
     """Of the noise, of c1 and of c2, also after arithmetic; thinned series have none."""
     drawn = LaserNoise(1, 20.0).draw(100)
     given: dict[str, Any] = {"noise": np.ones(100), name: 1.0 + 1e-6 * drawn[:]}
-    message = rf"^{name} must have the sample rate of the simulation, 200 Hz; .* at 20 Hz"
+    message = rf"^{name} must have a sample rate of 200 Hz; it was drawn at 20 Hz"
     with pytest.raises(ValueError, match=message):
         simulate(CommonArm(), **given)
     simulate(CommonArm(), **given, sample_rate=20.0)
     thinned = LaserNoise(1, 200.0).draw(1000)[::10]
     simulate(CommonArm(), thinned, sample_rate=20.0)
+
+
+@pytest.mark.parametrize(
+    "copied",
+    [
+        copy.copy,
+        copy.deepcopy,
+        *(lambda x, k=k: pickle.loads(pickle.dumps(x, k)) for k in range(6)),
+        lambda x: np.concatenate([x[:30], x[30:]]),
+        lambda x: np.append(x, x),
+        lambda x: 2.0 * np.roll(x, 3) + x,
+    ],
+)
+def test_a_copy_of_a_series_knows_its_sample_rate(copied):
+    """So that it is noticed in another process too, and by a spectrum."""
+    series = copied(LaserNoise(1, 20.0).draw(1200))
+    with pytest.raises(ValueError, match=r"^noise must have a sample rate .* drawn at 20 Hz"):
+        simulate(CommonArm(), series)
+    with pytest.raises(ValueError, match=r"^series must have a sample rate .* drawn at 20 Hz"):
+        amplitude_spectrum(series, 200.0)
+    amplitude_spectrum(series, 20.0)
+    other = LaserNoise(1, 10.0).draw(9)
+    assert getattr(np.concatenate([series, other]), "sample_rate", None) is None
 
 
 def test_numbers_after_the_noise_have_names():

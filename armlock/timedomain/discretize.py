@@ -18,12 +18,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
-from scipy.linalg import solve_continuous_lyapunov
 
 from armlock.checks import ComplexArray, FloatArray, positive_number, real_array
 from armlock.compiled import njit
@@ -211,6 +211,7 @@ def readout(sampled: SampledFilter) -> FloatArray:
     return np.array(shares[: sampled.order])
 
 
+@lru_cache
 def stationary_root(sampled: SampledFilter) -> FloatArray:
     """Return a square root of the covariance of a filter's states under white noise.
 
@@ -223,7 +224,7 @@ def stationary_root(sampled: SampledFilter) -> FloatArray:
     -------
     float array, shape (order, order)
         A lower triangular R: the states' covariance is R R^T where the input's variance is
-        one.
+        one. It is not finite where the covariance overflows.
     """
     n = 2 * len(sampled.sections)
     change, drive, shares = np.zeros((n, n)), np.zeros(n), readout(sampled)
@@ -233,13 +234,20 @@ def stationary_root(sampled: SampledFilter) -> FloatArray:
         change[2 * j, : 2 * j] = shares[: 2 * j]
         change[here, here] = [[r1, -k], [1.0, r2]]
     change, drive = change[: sampled.order, : sampled.order], drive[: sampled.order]
-    # The trapezoidal rule undone: the continuous system whose samples these are.
-    undone = np.linalg.inv(np.eye(sampled.order) + 0.5 * change)
-    noise = undone @ drive
-    covariance = solve_continuous_lyapunov(undone @ change, -np.outer(noise, noise))
-    deviation = np.sqrt(np.diag(covariance))
-    correlation = covariance / np.outer(deviation, deviation)
-    return np.asarray(deviation[:, None] * np.linalg.cholesky(correlation))
+    # The root after 1, 2, 4, ... samples from rest, until none of the states then is left. How
+    # much the states change in so many samples is kept without the one that they are multiplied
+    # by, in which a slow pole would be lost.
+    root = np.zeros((sampled.order, sampled.order))
+    root[:, :1] = drive[:, None]
+    with np.errstate(all="ignore"):
+        while (carried := np.eye(sampled.order) + change).any() and np.isfinite(root).all():
+            # Of the sum of two covariances.
+            upper = np.linalg.qr(np.hstack((root, carried @ root)).T).R
+            root = (upper * np.where(np.diag(upper) < 0.0, -1.0, 1.0)[:, None]).T
+            change = 2.0 * change + change @ change
+    # It is kept for other series.
+    root.flags.writeable = False
+    return root
 
 
 def sampled_sensor(

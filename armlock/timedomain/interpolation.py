@@ -22,7 +22,8 @@ def lagrange_weights(name: str, tau: FloatArray, sample_rate: float) -> Weights:
     r"""Return the weights that delay a series.
 
     A constant delay of whole samples has one weight. All others, and those of an arm that
-    moves, have the weights of Lagrange's polynomial of order m = 7, with x the delay in samples less the smallest one:
+    moves, have the weights of Lagrange's polynomial of order m = 7, with x the delay in samples
+    less the smallest one:
 
     .. math::
 
@@ -68,6 +69,6 @@ def lagrange_weights(name: str, tau: FloatArray, sample_rate: float) -> Weights:
 
 
 def reach(weights: Weights) -> int:
-    """Return how many samples before the first of a block the delays of the block reach back."""
+    """Return how many samples before a block its delays reach back."""
     first, shares = weights
     return int((first - np.arange(first.size)).max()) + int(shares.shape[1]) - 1

@@ -42,7 +42,8 @@ _LASER_ZEROS, _LASER_POLE = (2.37, 7.87), 6.03
 class Samples(np.ndarray[Any, np.dtype[np.float64]]):
     """A drawn series that remembers its sample rate in Hz, for `armlock.simulate` to compare.
 
-    Arithmetic and contiguous slices keep the rate. Every other index forgets it.
+    Arithmetic, copies, pickles, contiguous slices and joined blocks of one rate keep the rate.
+    Every other index forgets it.
     """
 
     sample_rate: float | None
@@ -57,12 +58,31 @@ class Samples(np.ndarray[Any, np.dtype[np.float64]]):
         """Return a sum, a maximum and the like as a plain number."""
         return array[()] if array.ndim == 0 else super().__array_wrap__(array, context)
 
+    def __array_function__(self, func: Any, types: Any, args: Any, kwargs: Any) -> Any:
+        """Join blocks of one rate to a series of that rate, and leave the rest to NumPy."""
+        found = super().__array_function__(func, types, args, kwargs)
+        if func is np.concatenate:
+            rates = {getattr(part, "sample_rate", None) for part in args[0]}
+            return _sampled(np.asarray(found), rates.pop()) if len(rates) == 1 else found
+        return found
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Send the rate along to another process."""
+        return _sampled, (self.view(np.ndarray), self.sample_rate)
+
     def __getitem__(self, key: Any) -> Any:
         """Return samples; those that are not contiguous have no rate."""
         found = super().__getitem__(key)
         if isinstance(found, Samples) and not (isinstance(key, slice) and key.step is None):
             return found.view(np.ndarray)
         return found
+
+
+def _sampled(series: FloatArray, sample_rate: float | None) -> FloatArray:
+    """Return a series that remembers its sample rate."""
+    drawn = series.view(Samples)
+    drawn.sample_rate = sample_rate
+    return drawn
 
 
 class ShapedNoise:
@@ -139,6 +159,11 @@ class ShapedNoise:
         self._scale = math.sqrt(0.5 * self.sample_rate)
         self._state = np.zeros(2 * len(self._sampled.sections))
         self._root = stationary_root(self._sampled)
+        if not np.isfinite(self._root).all():
+            raise ValueError(
+                f"noise must have a finite r.m.s., got poles {self._filter.poles} in rad/s at "
+                f"a sample_rate of {self.sample_rate} Hz"
+            )
         if not true_or_false("at_rest", at_rest):
             order = self._sampled.order
             start = self._root @ self._random.standard_normal(order)
@@ -180,7 +205,7 @@ class ShapedNoise:
             \text{rms}^2 = \int_0^{f_s/2} \text{asd}_T^2(f)\, \mathrm{d}f .
         """
         states = self._root.T @ readout(self._sampled)
-        return float(abs(self._sampled.gain) * self._scale * np.sqrt(1.0 + states @ states))
+        return abs(self._sampled.gain) * self._scale * math.hypot(1.0, *states)
 
     def draw(self, samples: int) -> FloatArray:
         """Return the next samples of the series.
@@ -202,11 +227,14 @@ class ShapedNoise:
         """
         count = whole_number("samples", samples, 0)
         check_memory("samples", (count,), 8)
-        series = self._random.standard_normal(count) * self._scale
-        _shape(series, self._sampled.gain, self._sampled.sections, self._state)
-        drawn = series.view(Samples)
-        drawn.sample_rate = self.sample_rate
-        return drawn
+        series = np.empty(count)
+        for at in range(0, count, _BLOCK):
+            # An interrupt is heard between two blocks.
+            part = series[at : at + _BLOCK]
+            self._random.standard_normal(out=part)
+            part *= self._scale
+            _shape(part, self._sampled.gain, self._sampled.sections, self._state)
+        return _sampled(series, self.sample_rate)
 
     def blocks(self, samples: int, size: int = _BLOCK) -> Iterator[FloatArray]:
         """Yield the next samples in blocks.

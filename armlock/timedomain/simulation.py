@@ -22,6 +22,7 @@ from armlock.checks import (
     ComplexArray,
     FloatArray,
     check_memory,
+    check_rate,
     finite_series,
     positive_array,
     positive_number,
@@ -395,12 +396,7 @@ class Simulation:
 
     def _series(self, name: str, value: npt.ArrayLike, like: FloatArray | None) -> FloatArray:
         """Return a finite series, or a number or a series in the shape of another one."""
-        rate = getattr(value, "sample_rate", None)
-        if rate not in (None, self.sample_rate):
-            raise ValueError(
-                f"{name} must have the sample rate of the simulation, {self.sample_rate:g} Hz; "
-                f"it was drawn at {rate:g} Hz"
-            )
+        check_rate(name, value, self.sample_rate)
         array = np.asarray(finite_series(name, value, *([1] if like is None else [0, 1])))
         if like is None:
             return array

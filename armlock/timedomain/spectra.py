@@ -16,7 +16,15 @@ import numpy as np
 import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
-from armlock.checks import FloatArray, IntArray, finite_series, positive_number, real_array
+from armlock.checks import (
+    FloatArray,
+    IntArray,
+    check_rate,
+    finite_series,
+    positive_number,
+    real_array,
+    real_number,
+)
 
 #: Samples in a segment, and from one segment to the next.
 SEGMENT = 1024
@@ -124,8 +132,24 @@ class Spectrum:
         return result
 
     def within(self, low: float, high: float) -> Spectrum:
-        """Return the bands whose centres lie between two frequencies in Hz."""
-        if not high >= low:
+        """Return the bands whose centres lie between two frequencies in Hz.
+
+        Parameters
+        ----------
+        low, high : float
+            In Hz, `high` not below `low`.
+
+        Returns
+        -------
+        Spectrum
+
+        Raises
+        ------
+        TypeError, ValueError
+            If a frequency is not finite and real, or `high` lies below `low`.
+        """
+        low, high = real_number("low", low), real_number("high", high)
+        if high < low:
             raise ValueError(f"high must not lie below low = {low}, got {high}")
         keep = (self.frequency >= low) & (self.frequency <= high)
         return Spectrum(*(getattr(self, field.name)[keep] for field in fields(self)))
@@ -265,8 +289,10 @@ class SpectrumEstimator:
         Raises
         ------
         TypeError, ValueError
-            If they are not finite and real; none of them is taken in.
+            If they are not finite and real, or were drawn at another sample rate; none of them
+            is taken in.
         """
+        check_rate("series", series, self.sample_rate)
         whole = np.asarray(finite_series("series", series))
         for at in range(0, whole.size, _BLOCK):
             part, depth = whole[at : at + _BLOCK], 0
@@ -325,7 +351,8 @@ def amplitude_spectrum(series: npt.ArrayLike, sample_rate: float) -> Spectrum:
     Raises
     ------
     TypeError, ValueError
-        If the series is too short, not one-dimensional or not finite.
+        If the series is too short, not one-dimensional or not finite, or was drawn at another
+        sample rate.
 
     Examples
     --------
