@@ -85,7 +85,8 @@ def test_unstable_loops_have_no_noise_budget():
     ],
 )
 def test_both_ways_to_the_pulling_agree(source, error):
-    time = np.array([0.3, 4.0, 20.0]) * DAY
+    # Later the response to a step of the difference is smaller than rounding errors.
+    time = np.array([0.3, 4.0, 10.0 if source == "differential" else 20.0]) * DAY
 
     def transform(s):
         nu = error[0] / s + error[1] / s**2 + error[2] / s**3

@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from armlock import Controller, Loop, SingleArm, paper_loop, pulling
+from armlock import (
+    Controller,
+    Loop,
+    SingleArm,
+    paper_loop,
+    pulling,
+    rightmost_root,
+)
 from armlock.performance.pulling import largest_pulling
 from armlock.sensors import SINGLE, dual
 
@@ -64,3 +71,31 @@ def test_a_peak_next_to_an_echo_is_not_rounded_off():
     peak = largest_pulling(loop, common=STEP)
     found = pulling(loop, np.linspace(1.0, 70.0, 200_000), common=STEP)
     assert abs(np.abs(found).max() / peak.size - 1) < 5e-3
+
+
+@pytest.mark.parametrize("error", [(1.0, 0.0, 0.0), (0.0, 0.0, 1e-9)])
+def test_a_value_does_not_depend_on_the_other_times(error):
+    """Next to a power of 8 s a time has one of two series, which are computed apart."""
+    loop, border = paper_loop(), 8.0**6
+    together = pulling(loop, [3e3, border * (1 - 1e-12), border, 1.7e6], common=error)
+    assert together[2] == pulling(loop, border, common=error)
+    assert together[1] == pytest.approx(together[2], rel=1e-4)
+
+
+def test_the_largest_pulling_is_a_value_of_pulling():
+    error = (1e3, 0.0, 0.0)
+    peak = largest_pulling(paper_loop(), common=error)
+    assert abs(pulling(paper_loop(), peak.time, common=error)) == peak.size
+
+
+def test_what_has_decayed_below_rounding_is_no_number():
+    """Until then it decays as the rightmost root does."""
+    loop = Loop(Controller([0.0], [-0.05, -1e-3], 0.01), SINGLE, 20.0)
+    root = rightmost_root(loop)
+    assert root.imag == 0.0
+    time = np.array([2e3, 5e3, 1e4, 1.5e4, 2.5e4, 3.5e4])
+    with pytest.warns(UserWarning, match="decayed below rounding errors at time = 25000 s"):
+        found = pulling(loop, time, common=STEP)
+    assert np.isnan(found).tolist() == 4 * [False] + 2 * [True]
+    slope = np.diff(np.log(np.abs(found[:4]))) / np.diff(time[:4])
+    assert slope == pytest.approx(root.real, rel=1e-6)

@@ -7,6 +7,7 @@ computed as an inverse Laplace transform.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -20,16 +21,20 @@ from armlock.performance.transfer import require_stable, responses
 #: Errors of the sum and of the difference of the two arms: nu0, gamma and alpha of each.
 Errors = tuple[FloatArray, FloatArray]
 
-# Times at which a series is computed; the first half of them is kept.
+# Times of which half and one in eight more are kept: a series that begins at zero.
 _SAMPLES = 1 << 20
-# The response one period later comes in weakened by exp(-20) = 2e-9.
-_DAMPED = 20.0
+# The response one period later comes in weakened by exp(-26) = 5e-12. As half of these powers
+# of e multiply rounding errors, there are no more.
+_DAMPED = 26.0
 # Standard deviation, in samples, of the Gaussian that rounds off what is faster.
 _SMOOTHED = 3.0
-# A series of duration T gives the times from T / 64 to T, to 4e-4 of themselves.
-_RATIO = 64.0
+# A series of duration T gives the times from T / 8 to T, to 5e-5 of themselves. Durations are
+# powers of 8 s, so that a time has its series whatever other times are asked for.
+_RATIO_BITS = 3
+# Rounding errors of the response and its transform, relative to the sum of all frequencies.
+_ROUNDING = 1e-14
 # `largest_pulling` searches these times, from 1 s to twenty days.
-_EARLIEST, _ROUND_TRIPS, _SPANS = 1.0, 10.0, (3600.0, 1728e3)
+_EARLIEST, _LATEST = 1.0, 1728e3
 
 
 class Peak(NamedTuple):
@@ -77,13 +82,18 @@ def pulling(
         If `loop` is no `Loop` or not stable, a time is not positive, or an error does not hold
         three finite numbers.
 
+    Warns
+    -----
+    UserWarning
+        If the response has decayed below rounding errors at some of the times. Its values there
+        are nan.
+
     Notes
     -----
     The transform is inverted on a line :math:`s = \sigma + \mathrm{j}\omega` to the right of
     all roots, as a sum over equal steps of :math:`\omega`. The result is not certified. Changes
-    within less than 4e-4 of the time are smoothed, such as the echo of an undelayed part. Of
-    an error that grows like :math:`t^2`, up to 5e-3 of the result may depend on the latest time
-    that is asked for.
+    within less than 5e-5 of the time are smoothed, such as the echo of an undelayed part. A
+    value does not depend on the other times that are asked for.
 
     Examples
     --------
@@ -95,11 +105,18 @@ def pulling(
     require_stable(loop)
     t = positive_array("time", time)
     errors = _error("common", common), _error("differential", differential)
-    found, last = np.empty(t.shape), float(t.max(initial=0.0))
-    step = np.floor(np.log(last / t) / np.log(_RATIO))
-    for k in np.unique(step):
-        at, frequency = _series(loop, last / _RATIO**k, errors)
-        found[step == k] = np.interp(t[step == k], at, frequency)
+    found = np.empty(t.shape)
+    # The least power of two that is larger than the time.
+    series = -(-np.frexp(t)[1] // _RATIO_BITS)
+    for k in np.unique(series):
+        asked = series == k
+        at, frequency, ends = _series(loop, 2.0 ** (_RATIO_BITS * int(k)), errors)
+        found[asked] = np.where(t[asked] > ends, np.nan, np.interp(t[asked], at, frequency))
+    if np.isnan(found).any():
+        warnings.warn(
+            f"the response has decayed below rounding errors at time = "
+            f"{t[np.isnan(found)].min():g} s and is nan there", stacklevel=2,
+        )  # fmt: skip
     return found
 
 
@@ -119,18 +136,20 @@ def largest_pulling(
     Returns
     -------
     Peak
-        The highest sample of three series, which resolve 1 ms over the first ten round trips,
-        20 ms over an hour, and 10 s later. It is not certified.
+        The highest sample of series that resolve 2e-6 to 2e-5 of the time. It is not
+        certified.
     """
     require_stable(loop)
     errors = _error("common", common), _error("differential", differential)
-    size, at = 0.0, _EARLIEST
-    for span in (max(_ROUND_TRIPS * loop.longest_delay, 2.0 * _EARLIEST), *_SPANS):
-        time, frequency = _series(loop, span, errors)
-        sizes = np.where(time < _EARLIEST, 0.0, np.abs(frequency))
+    peaks = []
+    duration = _EARLIEST
+    while duration < _LATEST:
+        begin, duration = duration, min(duration * 2.0**_RATIO_BITS, _LATEST)
+        time, frequency, _ = _series(loop, begin * 2.0**_RATIO_BITS, errors)
+        sizes = np.where((time < begin) | (time > duration), 0.0, np.abs(frequency))
         best = int(np.argmax(sizes))
-        size, at = max((size, at), (float(sizes[best]), float(time[best])))
-    return Peak(size, at)
+        peaks.append(Peak(float(sizes[best]), float(time[best])))
+    return max(peaks)
 
 
 def _error(name: str, values: Sequence[float]) -> FloatArray:
@@ -141,8 +160,13 @@ def _error(name: str, values: Sequence[float]) -> FloatArray:
     return error
 
 
-def _series(loop: Loop, duration: float, errors: Errors) -> tuple[FloatArray, FloatArray]:
-    """Return times, beginning with zero, and the frequency of the laser at these times."""
+def _series(
+    loop: Loop, duration: float, errors: Errors
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return times from zero to past a duration, the frequency of the laser, and a time.
+
+    After this time the frequency is smaller than rounding errors.
+    """
     step = 2.0 * duration / _SAMPLES
     shift = _DAMPED / (2.0 * duration)
     omega = 2.0 * np.pi * np.fft.rfftfreq(_SAMPLES, step)
@@ -152,6 +176,9 @@ def _series(loop: Loop, duration: float, errors: Errors) -> tuple[FloatArray, Fl
     for source, (nu0, gamma, alpha) in zip(("common", "differential"), errors, strict=True):
         total += found[source] * (nu0 / s + gamma / s**2 + alpha / s**3)
     total *= np.exp(-0.5 * (omega * _SMOOTHED * step) ** 2)
-    time: FloatArray = step * np.arange(_SAMPLES // 2, dtype=np.float64)
-    frequency = np.fft.irfft(total, _SAMPLES)[: time.size] / step
-    return time, np.asarray(frequency * np.exp(shift * time))
+    time: FloatArray = step * np.arange(9 * _SAMPLES // 16, dtype=np.float64)
+    growth = np.exp(shift * time)
+    frequency = np.fft.irfft(total, _SAMPLES)[: time.size] / step * growth
+    rounding = _ROUNDING * np.abs(total).sum() / (_SAMPLES * step) * growth
+    above = np.flatnonzero(np.abs(frequency) >= rounding)
+    return time, np.asarray(frequency), float(time[above[-1]])
