@@ -1,14 +1,11 @@
-"""Figures for the book: their data to download, numbers for the prose, and a slider."""
+"""Figures for the book: their data to download, and numbers for the prose."""
 
 from __future__ import annotations
 
-import base64
 import csv
-import html
 import io
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 from itertools import zip_longest
 from string import ascii_lowercase
 from typing import SupportsFloat
@@ -19,8 +16,6 @@ from IPython.core.interactiveshell import InteractiveShell
 from matplotlib.collections import Collection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-
-from armlock.plotting import BLUE
 
 # Longer curves are thinned for the tables, and charts along both axes.
 _MOST_POINTS = 1000
@@ -153,74 +148,6 @@ def load_ipython_extension(shell: InteractiveShell) -> None:
 
     assert shell.display_formatter is not None
     shell.display_formatter.mimebundle_formatter.for_type(Figure, files)
-
-
-# Shows the picture that the slider stands at, and says its label.
-_SLIDE = """(box => {
-  const labels = box.dataset.labels.split("|"), pictures = box.querySelectorAll("img");
-  const range = box.querySelector("input"), text = box.querySelector("output");
-  const show = () => {
-    const k = Number(range.value);
-    pictures.forEach((picture, i) => { picture.hidden = i !== k; });
-    text.textContent = labels[k];
-    range.setAttribute("aria-valuetext", labels[k]);
-  };
-  range.addEventListener("input", show);
-  show();  // a browser may have kept the slider's place
-})"""
-
-
-@dataclass(frozen=True, repr=False)
-class FrameSlider:
-    """Pictures of a sweep behind a slider, as HTML that needs neither network nor library.
-
-    Attributes
-    ----------
-    frames : sequence of bytes
-        The pictures as SVG, see `svg`.
-    labels : sequence of str
-        What the slider says at each frame, plain text without a vertical bar.
-    name : str
-        Identifier, unique in the book; links can end in it.
-    slider : str
-        Name of the slider, for instance "Gain".
-    alt : str
-        What the pictures show, for those who do not see them.
-    start : int
-        Frame shown at first, and where scripts do not run.
-    """
-
-    frames: Sequence[bytes]
-    labels: Sequence[str]
-    name: str
-    slider: str
-    alt: str
-    start: int
-
-    def __repr__(self) -> str:
-        """Say how many frames there are."""
-        return f"FrameSlider({self.name!r}, {len(self.frames)} frames)"
-
-    def _repr_html_(self) -> str:
-        """Return pictures, slider and the few lines of script that join them."""
-        name, current = html.escape(self.name), html.escape(self.labels[self.start])
-        pictures = "".join(
-            f'<img src="data:image/svg+xml;base64,{base64.b64encode(frame).decode()}" '
-            f'alt="{html.escape(f"{self.alt} {label}")}" style="width: 100%; height: auto"'
-            f"{'' if index == self.start else ' hidden'}>"
-            for index, (frame, label) in enumerate(zip(self.frames, self.labels, strict=True))
-        )
-        labels = html.escape("|".join(self.labels))
-        return (
-            f'<div id="{name}" class="frame-slider" data-labels="{labels}" '
-            f'style="margin: 1rem auto; max-width: 34rem">{pictures}'
-            f'<p><label for="{name}-range">{html.escape(self.slider)}: '
-            f'<output for="{name}-range">{current}</output></label>'
-            f'<input id="{name}-range" type="range" min="0" max="{len(self.frames) - 1}" '
-            f'step="1" value="{self.start}" aria-valuetext="{current}" '
-            f'style="width: 100%; min-height: 2rem; accent-color: {BLUE}"></p>'
-            f'<script>{_SLIDE}(document.getElementById("{name}"));</script></div>'
-        )
 
 
 def svg(figure: Figure) -> bytes:

@@ -4,7 +4,6 @@ from book.companion.claims.ledger import Verdict, Weight, all_claims, chapter_cl
 
 # In the order of the paper, which is the order of the register.
 from book.companion.claims import table1  # isort: skip
-from book.companion.claims import dual_arm  # isort: skip
 from book.companion.claims import simulation  # isort: skip
 from book.companion.claims import appendix  # isort: skip
 
@@ -15,7 +14,6 @@ __all__ = [
     "appendix",
     "chapter_claims",
     "check",
-    "dual_arm",
     "simulation",
     "table1",
 ]
