@@ -34,6 +34,7 @@ from armlock.checks import (
     real_array,
     whole_steps,
 )
+from armlock.controllers import with_others
 from armlock.delays import Term, functions
 from armlock.engine.functions import Function
 from armlock.engine.inclusion import EPSILON
@@ -108,6 +109,8 @@ class CharacteristicFunction:
     step: float
     parameters: tuple[str, str]
     reference: tuple[float, float]
+    #: The same for other values of poles that may be meant to be zero; usually none.
+    others: tuple[CharacteristicFunction, ...] = ()
 
     def replace(self, **changes: Any) -> Self:
         """Return another one, made with other values of some arguments.
@@ -138,9 +141,12 @@ class CharacteristicFunction:
 
     def plain(self) -> DelayEquation:
         """Return D alone, with the arguments of `DelayEquation`."""
-        return DelayEquation(
-            self.rest, self.b1, self.b2, self.tau1, self.tau2, delay=self.delay,
-            step=self.step, parameters=self.parameters, reference=self.reference,
+        return with_others(
+            lambda one: DelayEquation(
+                one.rest, one.b1, one.b2, one.tau1, one.tau2, delay=one.delay,
+                step=one.step, parameters=one.parameters, reference=one.reference,
+            ),
+            self,
         )  # fmt: skip
 
     def polynomials(self) -> tuple[Polynomial, Polynomial, Polynomial]:

@@ -1,21 +1,21 @@
-"""Controllers and actuators, as zeros, poles and gain.
+"""Controllers and actuators, as exact quotients of polynomials.
 
-The factors are kept, not multiplied out: with poles at 1e-6 rad/s and crossings at some
+Given factors are kept, not multiplied out: with poles at 1e-6 rad/s and crossings at some
 rad/s, the factors stay exact where expanded coefficients do not.
 """
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import lru_cache, reduce
-from typing import TYPE_CHECKING, Any, Self
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import lru_cache
+from itertools import product
+from typing import Any, TypeVar
 
-import mpmath
 import numpy as np
 import numpy.typing as npt
-from numpy.polynomial import polynomial as poly
 
 from armlock import paper
 from armlock.checks import (
@@ -23,16 +23,14 @@ from armlock.checks import (
     complex_array,
     one_of,
     positive_number,
+    real_array,
     real_number,
     whole_number,
 )
-from armlock.engine.polynomials import quotients
+from armlock.engine import statespace
+from armlock.engine.polynomials import Polynomial
 
-if TYPE_CHECKING:
-    import control
-
-# Decimal digits in which the zeros of parallel branches are found.
-_DIGITS = 80
+_System = TypeVar("_System", bound=Any)
 
 
 @dataclass(frozen=True)
@@ -66,19 +64,48 @@ class Controller:
     (6+0j)
     """
 
-    zeros: tuple[complex, ...]
-    poles: tuple[complex, ...]
-    gain: float
+    numerator: Polynomial
+    denominator: Polynomial
+    #: The same controller for other values of poles that may be meant to be zero; usually none.
+    others: tuple[Controller, ...] = field(default=(), compare=False)
 
     def __init__(self, zeros: Sequence[complex], poles: Sequence[complex], gain: float) -> None:
-        object.__setattr__(self, "zeros", _factors("zeros", zeros))
-        object.__setattr__(self, "poles", _factors("poles", poles))
-        object.__setattr__(self, "gain", real_number("gain", gain))
-        if self.gain == 0.0:
+        above, below = _factors("zeros", zeros), _factors("poles", poles)
+        gain = real_number("gain", gain)
+        if gain == 0.0:
             raise ValueError("gain must not be zero: there would be no loop")
+        object.__setattr__(self, "numerator", Polynomial.of_roots(above, gain))
+        object.__setattr__(self, "denominator", Polynomial.of_roots(below))
 
-    @classmethod
-    def of(cls, controller: Any) -> Self:
+    @staticmethod
+    def of_polynomials(numerator: Polynomial, denominator: Polynomial) -> Controller:
+        """Return the quotient of two polynomials, which may be zero."""
+        found = object.__new__(Controller)
+        object.__setattr__(found, "numerator", numerator)
+        object.__setattr__(found, "denominator", denominator)
+        return found
+
+    @property
+    def zeros(self) -> tuple[complex, ...]:
+        """Zeros in rad/s, as given, or rounded."""
+        return self.numerator.roots
+
+    @property
+    def poles(self) -> tuple[complex, ...]:
+        """Poles in rad/s, as given, or rounded."""
+        return self.denominator.roots
+
+    @property
+    def gain(self) -> float:
+        """Factor in front."""
+        return float(self.numerator.lead / self.denominator.lead)
+
+    def __repr__(self) -> str:
+        """List zeros, poles and gain."""
+        return f"Controller(zeros={self.zeros}, poles={self.poles}, gain={self.gain})"
+
+    @staticmethod
+    def of(controller: Any, integrators: int | None = None) -> Controller:
         """Return a controller given as one, as a python-control system, or as a triple.
 
         Parameters
@@ -86,16 +113,26 @@ class Controller:
         controller : Controller, python-control system, or (zeros, poles, gain)
             A transfer function or state space of python-control must be continuous in time,
             with one input and output.
+        integrators : int, optional
+            How many poles of a python-control system are zero: 0, 1 or 2. It is needed where
+            rounding moved such poles, and a count depends on it.
 
         Raises
         ------
         TypeError, ValueError
-            If it is none of these, is in discrete time, or has several inputs or outputs; or if
-            the zeros and poles of a state space do not reproduce its response to a part in a
-            million.
+            If it is none of these, is zero, is in discrete time, has several inputs or outputs,
+            or if the coefficients contradict `integrators` by more than rounding.
 
         Notes
         -----
+        Coefficients and matrices are taken as the binary numbers that they are, exactly.
+
+        Rounding leaves some 1e-17 in place of a determinant that is meant to be zero, for
+        instance in other coordinates. A count that is not the same for all values that rounding
+        may leave raises `CountError`, unless `integrators` says what is meant. A transfer
+        function with such a lowest coefficient warns: ``control.tf(state_space)`` has rounded
+        it, so that the state space is the better argument.
+
         A `Controller` or a triple keeps repeated zeros and poles. python-control does not: it
         multiplies all factors out, those of `control.zpk` too. It turns
         ``control.zpk([], [-1e-3] * 5, 1)`` into five complex poles around -1e-3. Write
@@ -108,53 +145,111 @@ class Controller:
         >>> Controller.of(control.tf([2.0, 1.0], [1.0, 0.5, 0.0]))
         Controller(zeros=((-0.5+0j),), poles=((-0.5+0j), 0j), gain=2.0)
         """
-        if isinstance(controller, cls):
-            return controller
-        if isinstance(controller, tuple) and len(controller) == 3:
-            return cls(*controller)
-        import control
-
-        check_system("controller", controller, "a Controller, a triple (zeros, poles, gain)")
-        if isinstance(controller, control.StateSpace):
-            zeros, poles, gain = _factored(controller)
-            return cls(zeros.tolist(), poles.tolist(), gain)
-        # It has no zeros in front of the highest power.
-        gain = float(controller.num[0][0][0] / controller.den[0][0][0])
-        return cls(controller.zeros(), controller.poles(), gain)
+        found = rational(controller, integrators)
+        if not found.numerator:
+            raise ValueError(f"controller must not be zero, got {controller!r:.200}")
+        return found
 
     def __call__(self, s: npt.ArrayLike) -> ComplexArray:
         """Evaluate K(s), factor by factor; `s` in rad/s, any shape."""
-        return quotients(self.zeros, self.poles, self.gain, complex_array("s", s))
+        return self.numerator.over(self.denominator, complex_array("s", s))
 
     def __mul__(self, other: Controller) -> Controller:
-        """Return the two in series."""
+        """Return the two in series; common factors stay."""
         if not isinstance(other, Controller):
             return NotImplemented
-        return Controller(
-            self.zeros + other.zeros, self.poles + other.poles, self.gain * other.gain
+        return with_others(
+            lambda a, b: Controller.of_polynomials(
+                a.numerator * b.numerator, a.denominator * b.denominator
+            ),
+            self,
+            other,
         )
 
     def __add__(self, other: Controller) -> Controller:
-        """Return the two in parallel, as zeros, poles and gain again.
+        """Return the two in parallel, exactly.
 
-        The zeros of the sum are found in extended precision, from the factors of both.
+        Denominators that are equal up to a factor are one. All others are multiplied, and only
+        powers of s cancel, so that no unstable pole is lost.
         """
         if not isinstance(other, Controller):
             return NotImplemented
-        # Poles that both have are not doubled.
-        mine, yours = Counter(self.poles), Counter(other.poles)
-        only_mine, only_yours = (tuple(p.elements()) for p in (mine - yours, yours - mine))
-        with mpmath.workdps(_DIGITS):
-            total = poly.polyadd(
-                _precise(self.zeros + only_yours, self.gain),
-                _precise(other.zeros + only_mine, other.gain),
+        return with_others(_parallel, self, other)
+
+
+def _parallel(a: Controller, b: Controller) -> Controller:
+    """Return the sum of two controllers."""
+    (n, m), (p, q) = (a.numerator, a.denominator), (b.numerator, b.denominator)
+    ratio = Polynomial.of([m.lead / q.lead])
+    one = m.exact == (q * ratio).exact
+    above, below = (n + p * ratio, m) if one else (n * q + p * m, m * q)
+    if not above:
+        raise ValueError("gain must not be zero: there would be no loop")
+    # Nothing cancels but powers of s.
+    common = min(above.order, below.order)
+    return Controller.of_polynomials(above.over_powers(common), below.over_powers(common))
+
+
+def with_others(make: Callable[..., _System], *systems: Any) -> _System:
+    """Return what a function makes of systems, and as its `others` what it makes of theirs."""
+    found = make(*systems)
+    if any(system.others for system in systems):
+        chosen = product(*(system.others or (system,) for system in systems))
+        others = dict.fromkeys(make(*some) for some in chosen)
+        object.__setattr__(found, "others", tuple(others))
+    return found
+
+
+def rational(system: Any, integrators: int | None = None) -> Controller:
+    """Return what `Controller.of` does, but of a system that is zero too."""
+    if isinstance(system, tuple) and len(system) == 3:
+        system = Controller(*system)
+    if isinstance(system, Controller):
+        if integrators is not None:
+            raise TypeError(
+                "integrators is for a state space or transfer function of python-control, got "
+                f"{integrators} and {system!r:.200}"
             )
-            coefficients = [mpmath.re(value) for value in total]
-            zeros = []
-            if len(coefficients) > 1:
-                zeros = mpmath.polyroots(coefficients, maxsteps=500, extraprec=400, asc=True)
-            poles = self.poles + only_yours
-            return Controller([complex(z) for z in zeros], poles, float(coefficients[-1]))
+        return system
+    import control
+
+    check_system("controller", system, "a Controller, a triple (zeros, poles, gain)")
+    if isinstance(system, control.StateSpace):
+        a, b, c, d = (real_array("controller", getattr(system, name)) for name in "ABCD")
+        above, below = statespace.quotient(a.tolist(), b.tolist(), c.tolist(), d.item())
+        doubts = statespace.doubts(a.tolist())
+    else:
+        above, below = (
+            Polynomial.of(real_array("controller", p[0][0])[::-1].tolist())
+            for p in (system.num, system.den)
+        )
+        doubts = statespace.doubts_of_roots(below)
+        if doubts and integrators is None:
+            warnings.warn(
+                f"the lowest coefficient {float(below.exact[0]):.3g} of the denominator is no "
+                "larger than what rounding leaves of zero, and counts may rest on its sign: "
+                "give the state space that it was made of, or say how many poles are zero, "
+                "Controller.of(system, integrators=1)",
+                stacklevel=3,
+            )
+            doubts = ()
+    if integrators is not None:
+        number = whole_number("integrators", integrators, 0)
+        small = [bound or not c for c, bound in zip(below.exact, (*doubts, 0, 0), strict=False)]
+        above, below = statespace.with_lowest(above, below, [Fraction(0)] * number)
+        if below.order != number or not all(small[:number]):
+            raise ValueError(
+                "integrators must be the number of poles that are zero but for rounding, got "
+                f"{integrators} for {system!r:.200}"
+            )
+        doubts = ()
+    found = Controller.of_polynomials(above, below)
+    values = product(*((-bound, Fraction(0), bound)[: 3 if bound else 1] for bound in doubts))
+    others = (statespace.with_lowest(above, below, lowest) for lowest in values if doubts)
+    object.__setattr__(
+        found, "others", tuple(Controller.of_polynomials(*other) for other in others)
+    )
+    return found
 
 
 def check_system(name: str, system: Any, others: str) -> None:
@@ -178,35 +273,6 @@ def check_system(name: str, system: Any, others: str) -> None:
         )
 
 
-def _factored(system: control.StateSpace) -> tuple[ComplexArray, ComplexArray, float]:
-    """Return zeros, poles and gain of a state space, which give its response back.
-
-    D, C B, C A B, ... are the coefficients of 1, 1/s, 1/s^2, ... at high frequency. The first
-    of them that is not zero is the gain, and tells how many zeros there are.
-    """
-    poles, candidates = system.poles(), np.asarray(system.zeros())
-    gain, size = float(system.D[0, 0]), 0.0
-    column, number = system.B, poles.size
-    while abs(gain) <= 1e-12 * size or gain == 0.0:
-        if not number:
-            raise ValueError(f"controller must not be zero, got {system!r:.200}")
-        gain = (system.C @ column).item()
-        size = float(np.linalg.norm(system.C) * np.linalg.norm(column))
-        column, number = system.A @ column, number - 1
-    zeros = candidates[np.argsort(np.abs(candidates))][:number]
-    sizes = np.abs(np.concatenate((zeros, poles)))
-    # What rounding left of a zero at s = 0 is none of the places to look at.
-    sizes = sizes[sizes > 1e-12 * sizes.max()] if sizes.any() else np.ones(1)
-    s = np.geomspace(0.1 * sizes.min(), 10.0 * sizes.max(), 40) * np.exp(0.7j)
-    given, found = system(s), quotients(zeros.tolist(), poles.tolist(), gain, s)
-    if not (np.abs(found - given) <= 1e-6 * np.abs(given)).all():
-        raise ValueError(
-            "controller must be a state space whose zeros and poles are found to a part in a "
-            f"million, got {system!r:.200}: give it as (zeros, poles, gain)"
-        )
-    return zeros, poles, gain
-
-
 def _factors(name: str, values: Sequence[complex]) -> tuple[complex, ...]:
     """Return finite roots as a tuple, complex ones checked to come in pairs."""
     roots = np.atleast_1d(complex_array(name, values))
@@ -217,12 +283,6 @@ def _factors(name: str, values: Sequence[complex]) -> tuple[complex, ...]:
     if upper.size != lower.size or (np.abs(upper - lower) > 1e-12 * np.abs(lower)).any():
         raise ValueError(f"{name} must be real or in conjugate pairs, got {values!r}")
     return tuple(complex(root) for root in roots)
-
-
-def _precise(roots: tuple[complex, ...], gain: float) -> npt.NDArray[Any]:
-    """Return the coefficients of gain prod(s - roots), ascending, in extended precision."""
-    factors = [np.array([-mpmath.mpc(root), mpmath.mpf(1)]) for root in roots]
-    return reduce(np.convolve, factors, np.array([mpmath.mpf(gain)]))
 
 
 def integrating_actuator(gain: float = 1.0) -> Controller:
@@ -290,9 +350,10 @@ def _parallel_branches() -> Controller:
     """Return the low-pass filter of the white paper and the nine branches beside it."""
     turn = 2.0 * np.pi
     low, high = turn * 3e-3, turn * 0.238
-    total = Controller((), (-low, -high), low * high)
     gains = (1.3e-3, 3.7e-3, 4.2e-3, 16e-3, 30e-3, 69e-3, 0.11, 0.33, 0.70)
-    for k, gain in enumerate(gains, 1):
+    # The first branch has a pole of the filter, and that pole is one.
+    total = Controller((-high - low * high / gains[0],), (-low, -high), gains[0])
+    for k, gain in enumerate(gains[1:], 2):
         total = total + Controller((), (-turn * 3.0 * 10.0 ** (k - 4),), gain)
     return total
 

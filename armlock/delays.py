@@ -11,11 +11,12 @@ from __future__ import annotations
 
 import sys
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
 from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property, lru_cache
+from itertools import chain
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -23,8 +24,8 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial as poly
 
 from armlock.checks import ComplexArray, complex_array, real_array, real_number
-from armlock.controllers import Controller, check_system
-from armlock.engine.functions import Function, Space
+from armlock.controllers import Controller, check_system, rational, with_others
+from armlock.engine.functions import Function, Space, limit_at_zero
 from armlock.engine.polynomials import Polynomial
 
 if TYPE_CHECKING:
@@ -210,16 +211,14 @@ class WithDelays(ABC):
             return type(self)
 
     def __add__(self, other: Any) -> DelaySystem:
-        """Return the two in parallel; an equal denominator is kept."""
-        (n1, m1), (n2, m2) = _quotient(self), _quotient(other)
-        return DelaySystem(n1 + n2, m1) if m1 == m2 else DelaySystem(n1 * m2 + n2 * m1, m1 * m2)
+        """Return the two in parallel; denominators that are equal up to a factor are one."""
+        return _combined(_parallel, self, other)
 
     __radd__ = __add__
 
     def __neg__(self) -> DelaySystem:
         """Return the negative."""
-        n, m = _quotient(self)
-        return DelaySystem(-n, m)
+        return _combined(lambda n, m: (-n, m), self)
 
     def __sub__(self, other: Any) -> DelaySystem:
         """Return the difference."""
@@ -231,15 +230,13 @@ class WithDelays(ABC):
 
     def __mul__(self, other: Any) -> DelaySystem:
         """Return the two in series; common factors stay."""
-        (n1, m1), (n2, m2) = _quotient(self), _quotient(other)
-        return DelaySystem(n1 * n2, m1 * m2)
+        return _combined(lambda n, m, p, q: (n * p, m * q), self, other)
 
     __rmul__ = __mul__
 
     def __truediv__(self, other: Any) -> DelaySystem:
         """Return the quotient; common factors stay."""
-        (n1, m1), (n2, m2) = _quotient(self), _quotient(other)
-        return DelaySystem(n1 * m2, m1 * n2)
+        return _combined(lambda n, m, p, q: (n * q, m * p), self, other)
 
     def __rtruediv__(self, other: Any) -> DelaySystem:
         """Return the quotient."""
@@ -255,9 +252,8 @@ class WithDelays(ABC):
         sign : float, optional
             Factor of the feedback path, -1 by default.
         """
-        (n1, m1), (n2, m2) = _quotient(self), _quotient(other)
         back = DelaySystem.of(-sign).numerator
-        return DelaySystem(n1 * m2, m1 * m2 + back * n1 * n2)
+        return _combined(lambda n, m, p, q: (n * q, m * q + back * n * p), self, other)
 
     @abstractmethod
     def __call__(self, s: npt.ArrayLike) -> ComplexArray:
@@ -301,10 +297,23 @@ class WithDelays(ABC):
         )  # fmt: skip
 
 
-def _quotient(system: Any) -> tuple[QuasiPolynomial, QuasiPolynomial]:
-    """Return numerator and denominator of what `DelaySystem.of` takes."""
-    found = DelaySystem.of(system)
-    return found.numerator, found.denominator
+def _combined(combine: Callable[..., Any], *systems: Any) -> DelaySystem:
+    """Return what becomes of systems, from all their numerators and denominators in turn."""
+
+    def make(*some: DelaySystem) -> DelaySystem:
+        parts = ((system.numerator, system.denominator) for system in some)
+        return DelaySystem(*combine(*chain.from_iterable(parts)))
+
+    return with_others(make, *map(DelaySystem.of, systems))
+
+
+def _parallel(
+    n: QuasiPolynomial, m: QuasiPolynomial, p: QuasiPolynomial, q: QuasiPolynomial
+) -> tuple[QuasiPolynomial, QuasiPolynomial]:
+    """Return numerator and denominator of a sum."""
+    ratio = m.terms[-1][1][-1] / q.terms[-1][1][-1]
+    factor = QuasiPolynomial.of([(Fraction(0), [ratio])])
+    return (n + p * factor, m) if m == q * factor else (n * q + p * m, m * q)
 
 
 @dataclass(frozen=True)
@@ -352,6 +361,8 @@ class DelaySystem(WithDelays):
 
     numerator: QuasiPolynomial
     denominator: QuasiPolynomial
+    #: The same system for other values of poles that may be meant to be zero; usually none.
+    others: tuple[DelaySystem, ...] = field(default=(), compare=False, repr=False)
 
     _instead = (
         "combine systems with + - * /; for plots write "
@@ -406,22 +417,15 @@ class DelaySystem(WithDelays):
         if isinstance(system, Fraction | float | int | np.number | np.ndarray):
             value = system if isinstance(system, Fraction) else real_number("system", system)
             return cls(QuasiPolynomial.of([(zero, [Fraction(value)])]), _ONE)
-        if isinstance(system, Controller):
-            n = Polynomial.of_roots(system.zeros, system.gain)
-            m = Polynomial.of_roots(system.poles)
-            return cls(QuasiPolynomial(((zero, n.exact),)), QuasiPolynomial(((zero, m.exact),)))
-        import control
-
-        check_system("system", system, "a DelaySystem, a number, a Controller")
-        if isinstance(system, control.StateSpace):
-            # A controller is not zero, a system may be.
-            zero_everywhere = not (system.B.any() or system.D.any())
-            return cls.of(0.0 if zero_everywhere else Controller.of(system))
-        above, below = (
-            [Fraction(c) for c in real_array("system", p[0][0])[::-1].tolist()]
-            for p in (system.num, system.den)
+        if not isinstance(system, Controller):
+            check_system("system", system, "a DelaySystem, a number, a Controller")
+        return with_others(
+            lambda k: cls(
+                QuasiPolynomial.of([(zero, k.numerator.exact)]),
+                QuasiPolynomial.of([(zero, k.denominator.exact)]),
+            ),
+            rational(system),
         )
-        return cls(QuasiPolynomial.of([(zero, above)]), QuasiPolynomial.of([(zero, below)]))
 
     def open_loop(self) -> DelaySystem:
         """Return the system itself."""
@@ -432,7 +436,7 @@ class DelaySystem(WithDelays):
         return f"[{self.numerator}] / [{self.denominator}]"
 
     def __call__(self, s: npt.ArrayLike) -> ComplexArray:
-        """Evaluate at s in rad/s, of any shape."""
+        """Evaluate at s in rad/s, of any shape; at s = 0 the limit."""
         s = complex_array("s", s)
         # In a unit as large as the roots of M: powers of many fast poles would overflow.
         _, p = max(self.denominator.terms, key=lambda term: len(term[1]))
@@ -443,6 +447,9 @@ class DelaySystem(WithDelays):
         with np.errstate(all="ignore"):
             n, m = (f.at(s, unit, size) for f in (self.numerator, self.denominator))
             value: ComplexArray = n / m
+        undefined = (s == 0.0) & ~np.isfinite(value)
+        if undefined.any() and np.isfinite(limit := limit_at_zero(*self.functions)):
+            value = np.where(undefined, limit, value)
         return value
 
     @cached_property

@@ -32,9 +32,15 @@ from armlock.checks import (
     real_number,
     true_or_false,
 )
-from armlock.controllers import Controller, integrating_actuator, table_two, white_paper
+from armlock.controllers import (
+    Controller,
+    integrating_actuator,
+    table_two,
+    white_paper,
+    with_others,
+)
 from armlock.delays import DelaySystem, QuasiPolynomial, Term, WithDelays, functions
-from armlock.engine.functions import Function, common_zeros
+from armlock.engine.functions import Function, common_zeros, limit_at_zero
 from armlock.engine.margins import Free
 from armlock.engine.polynomials import Polynomial
 from armlock.sensors import COMMON, SINGLE, SignalMapping, modified_dual
@@ -144,6 +150,7 @@ class Loop(WithDelays, CharacteristicFunction):
     rest: Polynomial = field(init=False, repr=False, compare=False)
     b1: Polynomial = field(init=False, repr=False, compare=False)
     b2: Polynomial = field(init=False, repr=False, compare=False)
+    others: tuple[Loop, ...] = field(default=(), init=False, repr=False, compare=False)
 
     step = 0.0
     parameters = ("c1", "c2")
@@ -162,9 +169,8 @@ class Loop(WithDelays, CharacteristicFunction):
         m, tau1, tau2 = _mapping_and_delays(self.mapping, self.tau1, self.tau2)
         kept = {"controller": k, "mapping": m, "tau1": tau1, "tau2": tau2}
         kept["delay"] = delay = not_negative("delay", self.delay)
-        rest = Polynomial.of_roots(k.poles) * Polynomial.of(m.denominator)
-        zeros = Polynomial.of_roots(k.zeros, k.gain)
-        arms = [zeros * Polynomial.of(p) for p in (m.numerator1, m.numerator2)]
+        rest = k.denominator * Polynomial.of(m.denominator)
+        arms = [k.numerator * Polynomial.of(p) for p in (m.numerator1, m.numerator2)]
         for name, b in zip(("m1", "m2"), arms, strict=True):
             if b.degree > rest.degree:
                 raise ValueError(
@@ -184,6 +190,8 @@ class Loop(WithDelays, CharacteristicFunction):
         kept |= zip(("rest", "b1", "b2"), cleared, strict=True)
         for name, value in kept.items():
             object.__setattr__(self, name, value)
+        others = tuple(self.replace(controller=other) for other in k.others)
+        object.__setattr__(self, "others", others)
 
     def parts(self) -> tuple[list[Term], list[Term], list[Term]]:
         """Return R, B1 and B2, the last two by their half sum and half difference.
@@ -203,8 +211,7 @@ class Loop(WithDelays, CharacteristicFunction):
     @cached_property
     def _sum_and_difference(self) -> tuple[Polynomial, Polynomial]:
         """B1 + B2 and B1 - B2, of which no term is left that cancels."""
-        k, m = self.controller, self.mapping
-        zeros = Polynomial.of_roots(k.zeros, k.gain)
+        zeros, m = self.controller.numerator, self.mapping
         arms = (m.numerator1, self.b1), (m.numerator2, self.b2)
         numerator, b = next(arm for arm in arms if arm[1])
         common = zeros.order + Polynomial.of(numerator).order - b.order
@@ -249,14 +256,18 @@ class Loop(WithDelays, CharacteristicFunction):
         >>> print(SingleArm(gain=2.0, tau1=20.0).open_loop(c1=0.9))
         [(2) + (-1.8) exp(-20 s)] / [(1 s)]
         """
-        dead, above = Fraction(self.delay), []
-        for name, c, b, tau in (
-            ("c1", c1, self.b1, self.tau1), ("c2", c2, self.b2, self.tau2)
-        ):  # fmt: skip
-            factor = Fraction(real_number(name, c))
-            above += [(dead, b.exact), (dead + Fraction(tau), [-factor * p for p in b.exact])]
-        below = [(Fraction(0), self.rest.exact)]
-        return DelaySystem(QuasiPolynomial.of(above), QuasiPolynomial.of(below))
+        factors = [Fraction(real_number(*given)) for given in (("c1", c1), ("c2", c2))]
+
+        def quotient(loop: Loop) -> DelaySystem:
+            dead, above = Fraction(loop.delay), []
+            arms = zip(factors, (loop.b1, loop.b2), (loop.tau1, loop.tau2), strict=True)
+            for factor, b, tau in arms:
+                above += [(dead, b.exact)]
+                above += [(dead + Fraction(tau), tuple(-factor * p for p in b.exact))]
+            below = [(Fraction(0), loop.rest.exact)]
+            return DelaySystem(QuasiPolynomial.of(above), QuasiPolynomial.of(below))
+
+        return with_others(quotient, self)
 
     def with_free_phases(self, c1: float, c2: float, above: float) -> Free:
         """Return L with free phases of both arms above a frequency in rad/s, for the engine."""
@@ -319,9 +330,20 @@ class Loop(WithDelays, CharacteristicFunction):
         ------
         TypeError, ValueError
             If s does not hold finite numbers, or holds a pole of K, m1 or m2, c1 or c2 is not
-            finite and real, or the three do not broadcast.
+            finite and real, or the three do not broadcast. At s = 0 it is a pole of L that is
+            refused; where one of K cancels, the limit is returned.
         """
         s, c1, c2 = self._checked(s, c1, c2)
+        at_zero = (s == 0.0) & (self.rest.order > 0)
+        if at_zero.any():
+            every = np.broadcast_arrays(s, c1, c2, at_zero)
+            found = np.array([
+                limit_at_zero(*self.quotient(float(x), float(y))) if zero else self(z, x, y)
+                for z, x, y, zero in zip(*(a.flat for a in every), strict=True)
+            ])  # fmt: skip
+            if np.isinf(found).any():
+                raise ValueError("s must not be a pole of the open loop, got 0")
+            return found.reshape(every[0].shape).astype(np.complex128)
         first, second = self.arm_responses(s)
         result: ComplexArray = first * ((1.0 - c1) - c1 * np.expm1(-s * self.tau1))
         return result + second * ((1.0 - c2) - c2 * np.expm1(-s * self.tau2))

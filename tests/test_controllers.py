@@ -2,14 +2,30 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import control
 import numpy as np
 import pytest
 
-from armlock import Controller, Loop, unstable_roots
+from armlock import (
+    Controller,
+    CountError,
+    DelaySystem,
+    Loop,
+    critical_perturbation,
+    delay,
+    margins,
+    nyquist,
+    rightmost_root,
+    stability_chart,
+    unstable_roots,
+)
 from armlock.controllers import table_two
 from armlock.paper import TABLE_2_POLES, TABLE_2_STAGE_1_POLE, TABLE_2_ZEROS
+from armlock.robustness import box_count
 from armlock.sensors import COMMON
+from armlock.stability.semidiscretization import semi_discretization
 
 S = np.array([1e-9j, 1e-5j, 0.3 + 0.2j, -0.1 + 2j, 1.5])
 
@@ -52,17 +68,162 @@ def test_table_two_is_the_product_of_its_factors():
     np.testing.assert_allclose(table_two()(s), value, rtol=1e-13)
 
 
-def test_a_state_space_is_taken_or_refused_by_its_response():
-    """The eigenvalues of a matrix that is far from normal are not those that it was made of."""
-    turn, _ = np.linalg.qr(np.random.default_rng(0).normal(size=(8, 8)))
-    matrix = turn @ (np.triu(np.full((8, 8), 1e4), 1) - np.eye(8)) @ turn.T
-    far = control.ss(matrix, turn @ np.ones((8, 1)), np.ones((1, 8)) @ turn.T, 0)
-    with pytest.raises(ValueError, match=r"^controller must be a state space whose zeros and"):
-        Controller.of(far)
+def exact_quotient(a, b, c):
+    """Numerator and denominator of C (s - A)^-1 B in fractions, ascending, by Leverrier."""
+    a, b, c = (np.vectorize(Fraction, otypes=[object])(np.array(m)) for m in (a, b, c))
+    n, below, above = len(a), [Fraction(1)], []
+    power = np.array([[Fraction(int(i == k)) for i in range(n)] for k in range(n)])
+    for k in range(1, n + 1):
+        above.append((c @ power @ b).item())
+        power = a @ power
+        below.append(-np.trace(power) / k)
+        power = power + below[-1] * np.array(
+            [[Fraction(int(i == j)) for i in range(n)] for j in range(n)]
+        )
+    return above[::-1], below[::-1]
+
+
+def test_a_state_space_arrives_exactly():
+    rng = np.random.default_rng(0)
+    turn, _ = np.linalg.qr(rng.normal(size=(8, 8)))
+    far = turn @ (np.triu(np.full((8, 8), 1e4), 1) - np.eye(8)) @ turn.T
+    tanks = np.array([[-3, 1, 2], [1, -2, 1], [2, 1, -3]])
+    for matrix in (far, tanks, rng.normal(size=(4, 4))):
+        n = len(matrix)
+        b, c = rng.normal(size=(n, 1)), rng.normal(size=(1, n))
+        found = Controller.of(control.ss(matrix, b, c, 0))
+        above, below = exact_quotient(matrix, b, c)
+        assert list(found.numerator.exact) == above
+        assert list(found.denominator.exact) == below
+    through = Controller.of(control.ss([[-2.0]], [[1.0]], [[3.0]], [[0.5]]))
+    assert through.numerator.exact == (Fraction(4), Fraction(1, 2))
     with pytest.raises(ValueError, match=r"^controller must not be zero"):
         Controller.of(control.ss([[-1.0]], [[0.0]], [[1.0]], [[0.0]]))
     with pytest.raises(ValueError, match=r"^controller must be continuous in time"):
         Controller.of(control.ss([[0.5]], [[1.0]], [[1.0]], [[0.0]], 0.1))
+
+
+def test_a_pole_that_is_exactly_zero_cancels_with_the_sensor():
+    # Three tanks, exactly (2 s + 5) / (s^3 + 8 s^2 + 15 s).
+    a, b, c = [[-3, 1, 2], [1, -2, 1], [2, 1, -3]], [[1], [0], [0]], [[0, 0, 1]]
+    loop = Loop(control.ss(a, b, c, 0), "common", tau1=3.0, tau2=2.0)
+    assert unstable_roots(loop) == 0
+    assert rightmost_root(loop) == pytest.approx(-0.462922787 + 1.735157345j, rel=1e-9)
+    found = margins(loop)
+    assert (found.gain_upper, found.phase, found.delay, found.modulus) == pytest.approx(
+        (8.3171951, 1.4479440, 1.1925036, 0.7569841), rel=1e-6
+    )
+    # A rigid body with a flexible mode, exactly (2 s + 7) / (s^4 + 4 s^3 + 14 s^2).
+    a = [[0, 1, 0, 0], [-7, -2, 7, 2], [0, 0, 0, 1], [7, 2, -7, -2]]
+    body = DelaySystem.of(control.ss(a, [[0], [1], [0], [0]], [[0, 0, 1, 0]], 0))
+    found = margins(control.tf([0.3, 0.05], [0.05, 1]) * body * delay(0.2))
+    assert (found.gain_upper, found.phase, found.delay, found.modulus) == pytest.approx(
+        (16.7498748, 0.8192338, 4.1583202, 0.7906824), rel=1e-6
+    )
+
+
+# A PI controller in other coordinates: rounding leaves 4e-18 of its determinant.
+TURNED = control.ss(
+    [[0.2639750240018368, 0.15341104878230838], [-0.6262933241092226, -0.36397502400183684]],
+    [[-2.384531185626904], [0.9415187178512434]],
+    [[-0.5360263721298273, -0.295449888980301]],
+    0,
+)
+
+
+def test_a_pole_that_may_be_zero_is_asked_for_where_it_matters():
+    doubtful = Loop(TURNED, "common", tau1=3.0, tau2=2.0)
+    by_sums = DelaySystem.of(TURNED) * (2 - delay(3.0) - delay(2.0))
+    for ask in (
+        lambda: unstable_roots(doubtful),
+        lambda: unstable_roots(doubtful, [0.5, 1.0], 1.0),
+        lambda: unstable_roots(doubtful.plain(), 1.0, 1.0),
+        lambda: unstable_roots(doubtful.open_loop()),
+        lambda: unstable_roots(by_sums),
+        lambda: unstable_roots(1 / (1 / by_sums)),
+        lambda: unstable_roots(semi_discretization(doubtful, 0.5), 1.0, 1.0),
+        lambda: rightmost_root(doubtful),
+        lambda: margins(doubtful),
+        lambda: nyquist(doubtful),
+        lambda: critical_perturbation(doubtful, (1, 0)),
+        lambda: box_count(doubtful, 1e-6),
+    ):
+        with pytest.raises(CountError, match=r"Controller\.of\(state_space, integrators=1\)"):
+            ask()
+    counts = stability_chart(doubtful, [0.5, 1.0, 1.2], [0.8, 1.0]).counts
+    assert counts.tolist() == [[0, 0, -1], [0, -1, 1]]
+    # Away from there the pole does not matter.
+    assert unstable_roots(doubtful, [0.5, 0.9], 0.9).tolist() == [0, 0]
+    assert margins(0.1 * DelaySystem.of(TURNED) * delay(1.0)).gain_upper > 1.0
+    meant = Loop(Controller.of(TURNED, integrators=1), "common", tau1=3.0, tau2=2.0)
+    assert unstable_roots(meant) == 0
+    assert nyquist(meant).encirclements == 0
+    assert unstable_roots(doubtful.replace(controller=Controller.of(TURNED, 0))) in (0, 1)
+    for number in (2, 3):
+        with pytest.raises(ValueError, match=f"^integrators must be .*, got {number}"):
+            Controller.of(TURNED, number)
+    with pytest.raises(TypeError, match=r"^integrators is for a state space"):
+        Controller.of(((), (0.0,), 1.0), 1)
+
+
+@pytest.mark.parametrize("integrators", [1, 2])
+def test_controllers_in_general_coordinates_are_as_designed_or_asked_for(integrators):
+    rng = np.random.default_rng(integrators)
+    for _ in range(10):
+        n = int(rng.integers(max(2, integrators), 6))
+        design = np.zeros((n, n))
+        design[:integrators, :integrators] = np.eye(integrators, k=1)
+        design[integrators:, integrators:] = np.diag(
+            -(10.0 ** rng.uniform(-1, 1, n - integrators))
+        )
+        b, c, turn = rng.normal(size=(n, 1)), rng.normal(size=(1, n)), rng.normal(size=(n, n))
+        given = control.ss(
+            np.linalg.inv(turn) @ design @ turn, np.linalg.inv(turn) @ b, c @ turn, 0
+        )
+        # The design itself has exact zeros.
+        expected = unstable_roots(Loop(control.ss(design, b, c, 0), "common", 2.1, 1.9))
+        stated = Loop(Controller.of(given, integrators), "common", 2.1, 1.9)
+        assert unstable_roots(stated) == expected
+        try:
+            assert unstable_roots(stated.replace(controller=given)) == expected
+        except CountError:
+            continue
+
+
+def test_a_hidden_unstable_mode_is_counted():
+    for b, c in (([[0.0], [1.0]], [[1.0, 1.0]]), ([[1.0], [1.0]], [[0.0, 1.0]])):
+        hidden = control.ss([[1.0, 0.0], [0.0, -1.0]], b, c, 0)
+        assert unstable_roots(DelaySystem.of(hidden) * delay(1.0)) == 1
+        assert unstable_roots(Loop(hidden, "single", 3.0)) == 1
+
+
+def test_denominators_that_are_equal_up_to_a_factor_are_one_system():
+    def mode(gain, scale, *more):
+        return control.tf([gain * scale], scale * np.poly([1.0, *more]))
+
+    for scale in (1.0, 2.0, -3.0):
+        total = DelaySystem.of(mode(1.0, 1.0)) + mode(2.0, scale)
+        assert unstable_roots(total) == 0
+        assert Controller.of(mode(1.0, 1.0)) + Controller.of(mode(2.0, scale)) == Controller(
+            (), (1.0,), 3.0
+        )
+    # Others are multiplied: one of the two unstable modes is hidden in their sum.
+    first, second = mode(1.0, 1.0), mode(1.0, 1.0, -2.0)
+    both = Controller.of(first) + Controller.of(second)
+    assert sorted(pole.real for pole in both.poles) == [-2.0, 1.0, 1.0]
+    assert unstable_roots(DelaySystem.of(first) + second) == unstable_roots(
+        DelaySystem.of(both)
+    )
+
+
+def test_a_transfer_function_that_was_rounded_warns():
+    tanks = control.tf([-5e-15, 2.0, 5.0], [1.0, 8.0, 15.0, -1.3e-14])
+    with pytest.warns(UserWarning, match="lowest coefficient -1.3e-14 .* integrators=1"):
+        Controller.of(tanks)
+    meant = Loop(Controller.of(tanks, integrators=1), "common", tau1=3.0, tau2=2.0)
+    assert unstable_roots(meant) == 0
+    # Slow poles that somebody writes down do not.
+    Controller.of(control.tf([1.0], np.poly([-1e-6, -1e-6, -3e4])))
 
 
 def test_repeated_poles_stay_together_as_the_docstring_says():

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from armlock import (
+    CommonArm,
     Controller,
     DelaySystem,
     Loop,
@@ -262,3 +263,17 @@ def test_a_dead_time_before_a_growing_response_costs_no_digits():
     assert ramp == pytest.approx([0.0, 5e-5], abs=1e-10)
     low_pass = control.tf([1], [1, 1]) * delay(10.0)
     assert low_pass(5.0) == pytest.approx(np.exp(-50.0) / 6.0, rel=1e-12)
+
+
+def test_at_zero_a_system_has_its_limit():
+    block = (1 - delay(0.1)) / S
+    assert block(0) == pytest.approx(0.1, rel=1e-15)
+    assert block([0.0, 1j])[0] == pytest.approx(0.1, rel=1e-15)
+    closed = (2 * (1 - delay(1.0)) / (S * (S + 1))).feedback()
+    assert closed(0) == pytest.approx(2.0 / 3.0, rel=1e-15)
+    response = closed.frequency_response([0.0, 1.0])
+    assert response.frdata[0, 0, 0] == pytest.approx(2.0 / 3.0)
+    assert CommonArm(gain=2.0)(0) == pytest.approx(80.0, rel=1e-14)
+    assert CommonArm(gain=2.0)([0.0, 1j])[0] == pytest.approx(80.0, rel=1e-14)
+    with pytest.raises(ValueError, match="s must not be a pole of the open loop"):
+        CommonArm()(0, 0.9)

@@ -166,8 +166,8 @@ def test_what_is_missing_is_named():
         Loop(K, "common", tau1=20.0)
     with pytest.raises(ValueError, match=r"^mapping must be .* 'modified dual'; got 'triple'"):
         Loop(K, "triple", tau1=20.0)
-    with pytest.raises(ValueError, match=r"^s must not be a pole of the open loop, got 0j"):
-        CommonArm()([1j, 0.0])
+    with pytest.raises(ValueError, match=r"^s must not be a pole of the open loop, got 0"):
+        DualArm()([1j, 0.0])
 
 
 def test_next_to_equal_parameters_the_response_keeps_its_digits():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 
+import control
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -277,3 +278,12 @@ def test_a_picture_shows_a_resonance_between_its_even_samples():
         np.angle(1.0 + np.concatenate((curve.response[::-1].conj(), curve.response)))
     )
     assert round((turns[0] - turns[-1]) / (2.0 * np.pi)) == curve.encirclements == 2
+
+
+@pytest.mark.parametrize("below", [[1, 1, 1, 1], [1, 3, 4, 12], [1, 0.5, 9, 4.5]])
+def test_undamped_pairs_that_were_multiplied_out_stay_on_the_axis(below):
+    """P does not follow the sign of what rounding leaves of their damping."""
+    given = control.tf([0.3, 1.0], below)
+    for loop in (Loop(given, "single", 1.3), DelaySystem.of(given) * (1 - 0.9 * delay(1.3))):
+        with pytest.raises(ValueError, match="no pole on the imaginary axis except at s = 0"):
+            nyquist(loop)

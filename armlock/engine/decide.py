@@ -312,7 +312,12 @@ def _together(vertices: list[Function], terms: list[Function]) -> list[Function]
 
 
 def _searched(
-    functions: Functions, question: Question, pending: FloatArray, best: float, where: float
+    functions: Functions,
+    question: Question,
+    pending: FloatArray,
+    best: float,
+    where: float,
+    most: int = _MOST_SEARCHED,
 ) -> tuple[float, float, FloatArray]:
     """Walk over intervals, the last first; return the best value, where, and what is undecided.
 
@@ -324,12 +329,11 @@ def _searched(
     steps, undecided = 0, np.zeros((0, 2))
     while len(pending) and len(undecided) < inclusion.FEW_UNDECIDED:
         walk = partial(inclusion.walk, functions, question, pending, best, where)
-        [(pending, more, best, where, taken)] = in_threads(walk, [_A_WHILE])
+        [(pending, more, best, where, taken)] = in_threads(walk, [min(_A_WHILE, most)])
         undecided, steps = np.concatenate((undecided, more)), steps + taken
-        if steps > _MOST_SEARCHED:
+        if steps > most:
             raise UndecidedError(
-                f"a search takes more than {_MOST_SEARCHED:.0e} steps, at "
-                f"{pending[-1, 0]:.3g} rad/s"
+                f"a search takes more than {most:.0e} steps, at {pending[-1, 0]:.3g} rad/s"
             )
     return best, where, undecided
 
@@ -344,6 +348,7 @@ def least(
     tolerance: float = 1e-6,
     low: float = 0.0,
     high: float = np.inf,
+    patience: int = _MOST_SEARCHED,
 ) -> tuple[float, float]:
     """Find the largest level up to which no function of a family has a zero.
 
@@ -361,6 +366,8 @@ def least(
         No zero has a level below start + (best - start) (1 - tolerance).
     low, high : float, optional
         The frequencies in rad/s between which zeros count; all by default.
+    patience : int, optional
+        Most steps, as long as no level below `best` is known to have a zero.
 
     Returns
     -------
@@ -382,6 +389,7 @@ def least(
     if best <= start:
         return best, where
     level = min(start + (best - start) * (1.0 - tolerance), 1e300)
+    most = patience if np.isnan(where) else _MOST_SEARCHED
     begin, end = low or family.begins(level), min(family.ends(level), high)
     if not begin > 0.0:
         raise UndecidedError("the behaviour at s = 0 is not decided")
@@ -393,21 +401,26 @@ def least(
     edges[0], edges[-1] = begin, end
     cover = np.column_stack((edges[:-1], edges[1:]))
     order = np.argsort(np.modf(np.arange(len(cover)) * 0.6180339887498949)[0])
-    best, where, left = _searched(functions, question, cover[order], best, where)
+    best, where, left = _searched(functions, question, cover[order], best, where, most)
     if len(left):
         raise UndecidedError(f"rounding does not decide at {left[0, 0]:.6g} rad/s")
     return best, where
 
 
-def excludes(family: Family, begin: float = 0.0) -> bool:
+def excludes(
+    family: Family, begin: float = 0.0, end: float = np.inf, most: int = _MOST_SEARCHED
+) -> bool:
     """Tell whether no function of a family has a zero on the axis, but perhaps at s = 0.
 
     Parameters
     ----------
     family : Family
         At its level zero.
-    begin : float, optional
-        Frequency in rad/s up to which this is known; by default that of leading terms.
+    begin, end : float, optional
+        Frequencies in rad/s up to which this is known, and past which; by default those of
+        leading terms, and of the term that exceeds all others.
+    most : int, optional
+        Most steps.
 
     Returns
     -------
@@ -419,14 +432,14 @@ def excludes(family: Family, begin: float = 0.0) -> bool:
     UndecidedError
         If it takes too many steps.
     """
-    begin, end = begin or family.begins(0.0), family.ends(0.0)
+    begin, end = begin or family.begins(0.0), min(family.ends(0.0), end)
     if not (begin > 0.0 and np.isfinite(end)):
         return False
     if end <= begin:
         return True
     # The best distance is zero already, so that the walk only tests.
     question, axis = family.question(DISTANCE, 0.0, 0.0), np.array([[begin, end]])
-    *_, left = _searched(compiled(family.functions), question, axis, 0.0, np.nan)
+    *_, left = _searched(compiled(family.functions), question, axis, 0.0, np.nan, most)
     return not len(left)
 
 

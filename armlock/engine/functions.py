@@ -24,7 +24,7 @@ import numpy.typing as npt
 from armlock.checks import ComplexArray, FloatArray
 from armlock.engine import inclusion
 from armlock.engine.inclusion import EPSILON, Arrays
-from armlock.engine.polynomials import Polynomial
+from armlock.engine.polynomials import Polynomial, rounded
 
 Exact = npt.NDArray[np.object_]
 # Most coefficients of a series at s = 0 of which one has to differ from zero.
@@ -367,6 +367,29 @@ class Function:
 def common_zeros(n: Function, m: Function) -> int:
     """Order of the zero at s = 0 that two functions have in common."""
     return min((lead.order for f in (n, m) if (lead := f.leading())), default=0)
+
+
+def keeps_sign_up_to(f: Function, g: Function, *, odd: bool) -> float:
+    """Frequency up to which the real part of F conj(G), or the imaginary one, keeps its sign.
+
+    It is the even or the odd part of F(s) G(-s) on the axis (Lemma 19). Zero if the leading
+    term of that part is not known.
+    """
+    one, other = f.series(_MOST_TERMS), g.series(_MOST_TERMS)
+    for k in range(odd, _MOST_TERMS, 2):
+        product = sum(one[k - i] * other[i] * (-1) ** i for i in range(k + 1))
+        if product:
+            return f.radius(k, abs(Fraction(product)), 0.5, g)
+    return 0.0
+
+
+def limit_at_zero(n: Function, m: Function) -> float:
+    """Limit of N / M at s = 0; inf at a pole, nan where the first 16 coefficients are zero."""
+    pairs = zip(n.series(_MOST_TERMS), m.series(_MOST_TERMS), strict=True)
+    above, below = next((pair for pair in pairs if any(pair)), (None, None))
+    if above is None or below is None:
+        return np.nan
+    return float(rounded([above / below])[0]) if below else np.inf
 
 
 def _exactly(value: Fraction) -> Any:

@@ -15,13 +15,17 @@ from typing import NamedTuple
 import numpy as np
 
 from armlock.engine import decide
-from armlock.engine.decide import Family, least
-from armlock.engine.functions import Function, common_zeros, stacked
+from armlock.engine.decide import Family, UndecidedError, least
+from armlock.engine.functions import Function, Space, common_zeros, keeps_sign_up_to, stacked
 from armlock.engine.inclusion import DELAY, DISTANCE, EPSILON, PHASE, REAL, TERM, VERTEX
-from armlock.engine.polynomials import rounded
+from armlock.engine.polynomials import Polynomial, rounded
 
-#: Gain factors up to this, and down to one over it, are looked at.
-LARGEST_GAIN = 1e4
+# Gain factors up to which a search goes at first, and then goes on. Past the first one it ends
+# after so many steps if it has found nothing.
+_GAINS = 1e4, 1e8, 1e12, 1e24, 1e48, 1e96, 1e192
+_FEW_STEPS, _STEPS_OF_A_PROOF = 20_000, 200_000
+# Past this gain, rounding hides whether a neutral root chain is confined.
+_CHAIN_KNOWN = 1e12
 # So close to the limit of the neutral root chain, as a share, no root is looked for.
 _NEXT_TO_THE_CHAIN = 1e-5
 # What is left of the undelayed term at high frequency is decided if it is this share of it.
@@ -80,8 +84,10 @@ class Margins:
     Attributes
     ----------
     gain_lower, gain_upper : float
-        The loop stays stable for every gain factor between the two; 0 and inf where nothing
-        between factors of 1e-4 and 1e4 bounds it; nan where the arms' phases are free.
+        The loop stays stable for every gain factor between the two; 0 and inf where this is
+        proven for all. Where larger factors are not decided, the upper one is the largest that
+        was looked at, 1e4 or more, and `gain_omega` is nan; the lower one is then 1e-4 or less.
+        nan where the arms' phases are free.
     phase : float
         Smallest turn in rad, lag or lead, at a gain crossover that makes the loop marginal;
         inf without a crossover.
@@ -176,11 +182,13 @@ def chain_limit(
     return math.inf
 
 
-def first_zero(f: Function, g: Function, most: float, start: float) -> tuple[float, float]:
+def first_zero(
+    f: Function, g: Function, most: float, start: float, **options: int
+) -> tuple[float, float]:
     """Find the smallest t > start up to `most` at which f + t g has a zero on the axis.
 
-    Returns t and the frequency in rad/s: 0 for a zero at s = 0, inf where the neutral root
-    chain is not confined, nan where nothing is found up to `most`.
+    The options are those of `decide.least`. Returns t and the frequency in rad/s: 0 for a zero
+    at s = 0, inf where the neutral root chain is not confined, nan where nothing is found.
     """
     best, where = most, math.nan
     chain = chain_limit(f, g, start)
@@ -194,7 +202,7 @@ def first_zero(f: Function, g: Function, most: float, start: float) -> tuple[flo
         best, where = zero, 0.0
     if not g.is_zero:
         hull = [(VERTEX, (1.0, start), (0.0, 0.0)), (VERTEX, (1.0, 0.0), (0.0, 1.0))]
-        best, where = least(Family([f, g], [hull]), REAL, best, where, start=start)
+        best, where = least(Family([f, g], [hull]), REAL, best, where, start=start, **options)
     return (chain, where) if where == math.inf else (best, where)
 
 
@@ -295,8 +303,12 @@ def _over_axis(
 ) -> tuple[float, float]:
     """Find the least level of a family of two functions; above a frequency with free phases."""
     if best > 0.0:
-        high = free.above if free else math.inf
-        best, where = least(family(n, m), goal, best, where, high=high, tolerance=tolerance)
+        high, pair = free.above if free else math.inf, family(n, m)
+        low = 0.0
+        if goal in (PHASE, DELAY) and not pair.begins(0.0):
+            # abs(L(0)) is one: leading terms tell on which side of one abs(L) is next to it.
+            low = keeps_sign_up_to(n + m, n + m * -1, odd=False)
+        best, where = least(pair, goal, best, where, low=low, high=high, tolerance=tolerance)
     if free and best > 0.0:
         other, tolerance = family(*free[:2], *free.arms), max(tolerance, _FREE_TOLERANCE)
         best, where = least(other, goal, best, where, low=free.above, tolerance=tolerance)
@@ -340,10 +352,87 @@ def _delay(n: Function, m: Function, free: Free | None) -> tuple[float, float]:
     return _crossover(n, m, free, DELAY, arc, _LARGEST_DELAY, math.nan)
 
 
+def _none_past(f: Function, g: Function) -> float:
+    """Frequency past which f + t g has a zero at all t > 0 or at none (Lemma 19).
+
+    It is a bound for a polynomial f; inf if the lemma does not give one.
+    """
+    if f.delayed.any():
+        return math.inf
+    polynomials = f.space.polynomials
+    used = [j for j, w in enumerate(g.delayed) if g.steady[j] or w.any()]
+    own = Space([polynomials[j] for j in used], f.space.delays)
+    steady, delayed = g.steady[used], g.delayed[used]
+    still = steady - delayed.sum(1)
+    # Re(g conj(q)) is not below zero, with q a power of s, from some frequency on.
+    n = own.degree
+    top = sum(p.lead * a for p, a in zip(own.polynomials, still, strict=True) if p.degree == n)
+    start = own.confined_from(*(w.astype(np.float64)[None] for w in (steady, delayed)))[0]
+    bounds = [(float(start), Polynomial.of([*[0] * n, top]))]
+    if len(used) == 1 and abs(still[0]) >= np.abs(delayed).sum():
+        # The bracket of a single polynomial has no negative real part, at any frequency.
+        bounds.append((0.0, own.polynomials[0] * Polynomial.of([still[0]])))
+    whole = Polynomial.of([])
+    for p, weight in zip(polynomials, f.steady, strict=True):
+        whole = whole + p * Polynomial.of([weight])
+    ends = [math.inf]
+    for start, q in bounds:
+        real, imaginary = _on_the_axis(whole, q)
+        if real.lead >= 0:
+            ends.append(max(start, _last(real)))
+        if len(used) == 1 and not delayed.any() and imaginary:
+            ends.append(_last(imaginary))
+    return min(ends)
+
+
+def _on_the_axis(p: Polynomial, q: Polynomial) -> list[Polynomial]:
+    """Return Re(p conj(q)) and Im(p conj(q)) / omega, as polynomials of omega^2."""
+    turned = Polynomial.of(c * (-1) ** k for k, c in enumerate(q.exact))
+    product = (p * turned).exact
+    return [
+        Polynomial.of(c * (-1) ** k for k, c in enumerate(product[odd::2])) for odd in (0, 1)
+    ]
+
+
+def _last(p: Polynomial) -> float:
+    """Return the square root of the largest positive root, a little more for its rounding."""
+    squares = [root.real for root in p.roots if root.imag == 0.0 < root.real]
+    return math.sqrt(max(squares, default=0.0)) * (1.0 + 1e-14)
+
+
+def _no_zero_beyond(f: Function, g: Function, most: float) -> bool:
+    """Tell whether f + t g has no zero on the axis for any t from `most` on; True is proven."""
+    if at_zero(f, g) > most or chain_limit(f, g, most) < math.inf:
+        return False
+    hull = [(VERTEX, (1.0, most), (0.0, 0.0)), (VERTEX, (0.0, 1.0), (0.0, 0.0))]
+    family = Family([f, g], [hull])
+    # Where F conj(G) is not real, no real t makes F + t G zero.
+    begin = family.begins(0.0) or keeps_sign_up_to(f, g, odd=True)
+    end = _none_past(f, g)
+    return end == 0.0 or decide.excludes(family, begin, end, _STEPS_OF_A_PROOF)
+
+
 def _gain_up(m: Function, n: Function) -> tuple[float, float]:
-    """First k > 1 at which M + k N has a zero on the axis, and where; inf, nan without one."""
-    found, where = first_zero(m, n, LARGEST_GAIN, 1.0)
-    return (math.inf, math.nan) if math.isnan(where) else (found, where)
+    """First k > 1 at which M + k N has a zero on the axis, and where.
+
+    inf is proven. If neither is found, k is the largest one that was looked at. The frequency
+    is nan for both.
+    """
+    looked_at, chain = 1.0, n.space.limits(*n.weights)[1].any()
+    for most in [gain for gain in _GAINS if gain <= _CHAIN_KNOWN or not chain]:
+        try:
+            options = {"patience": _FEW_STEPS} if looked_at > 1.0 else {}
+            found, where = first_zero(m, n, most, 1.0, **options)
+            if not math.isnan(where):
+                return found, where
+            looked_at = most
+            if _no_zero_beyond(m, n, most):
+                return math.inf, math.nan
+        except UndecidedError:
+            if looked_at == 1.0:
+                raise
+            break
+    return looked_at, math.nan
 
 
 def gain_range(n: Function, m: Function) -> tuple[float, float, float]:

@@ -89,6 +89,10 @@ class Polynomial:
             (1.0 + self.missed) * (1.0 + other.missed) - 1.0,
         )
 
+    def __add__(self, other: Polynomial) -> Polynomial:
+        """Return the sum."""
+        return Polynomial.of((exactly(self.exact) + exactly(other.exact)).coeffs())
+
     def __bool__(self) -> bool:
         """Whether it is not zero."""
         return self.lead != 0

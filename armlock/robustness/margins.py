@@ -23,7 +23,7 @@ from armlock.engine.margins import (
     require_stable,
 )
 from armlock.loops import Loop, checked_loop, quotient_of
-from armlock.stability.counts import decided
+from armlock.stability.counts import decided, require_certain
 
 _T = TypeVar("_T")
 
@@ -33,6 +33,7 @@ def _certified(
 ) -> _T:
     """Return what the engine makes of numerator and denominator of a loop."""
     n, m = quotient_of(loop, c1, c2)
+    require_certain(loop, c1, c2)
     with decided("no margin", np.array([[c1, c2]])):
         return compute(n, m)
 

@@ -21,7 +21,7 @@ from armlock.engine.functions import Function, common_zeros
 from armlock.engine.inclusion import EPSILON, TERM, VERTEX
 from armlock.engine.margins import first_zero
 from armlock.loops import Loop, checked_loop
-from armlock.stability.counts import CountError, decided
+from armlock.stability.counts import CountError, decided, require_certain
 
 # Nothing is looked at where the parameters are this many times as large as the start, or as 1.
 _FARTHEST = 1e9
@@ -61,6 +61,7 @@ class _Ray:
         #: The t at which the point has moved by |start|, or by one if that is more.
         self.scale = max(1.0, float(np.hypot(*begin))) / float(np.hypot(*way))
         self.start, (d1, d2) = begin.tolist(), way.tolist()
+        require_certain(system, *self.start)
         _, _, first, second = system.terms
         self.f = system.function(*self.start)
         self.g = (first * -d1 + second * -d2) * self.scale
@@ -292,6 +293,7 @@ def box_count(loop: Loop, size: float) -> int:
     -1
     """
     size = positive_number("size", size)
+    require_certain(checked_loop(loop))
     centre, terms = checked_loop(loop).function(1.0, 1.0), loop.terms
     signs = [(a, b) for a in (-size, size) for b in (-size, size)]
     corners = [(VERTEX, (1.0, a, b), (0.0, 0.0, 0.0)) for a, b in signs]

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from armlock.characteristic import CharacteristicFunction, checked_system
 from armlock.checks import BoolArray, FloatArray, IntArray, axis, check_memory
-from armlock.engine.decide import UNCONFINED
+from armlock.engine.decide import BOUNDARY, UNCONFINED
 from armlock.engine.functions import Function
 from armlock.engine.inclusion import EPSILON
 from armlock.stability.counts import count_points
@@ -148,6 +148,10 @@ def stability_chart(
         counts = _chart_rows(system, ys[order_y], xs[order_x], swapped=True).T
     else:
         counts = _chart_rows(system, xs[order_x], ys[order_y], swapped=False)
+    for other in system.others:
+        # Rounding does not decide where a pole that may be zero changes the count.
+        differ = stability_chart(other, xs[order_x], ys[order_y]).counts != counts
+        counts[differ] = BOUNDARY
     if (np.diff(order_x) != 1).any() or (np.diff(order_y) != 1).any():
         counts = counts[np.ix_(np.argsort(order_y), np.argsort(order_x))]
     return StabilityChart(system, xs, ys, counts)

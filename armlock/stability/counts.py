@@ -160,7 +160,8 @@ def unstable_roots(
     TypeError, ValueError
         If a number is not finite and real, or c1 and c2 do not broadcast or fit into memory.
     CountError
-        If a count takes too many steps. Nothing is guessed.
+        If a count takes too many steps, or depends on a pole that may be meant to be zero, see
+        `Controller.of`. Nothing is guessed.
 
     Notes
     -----
@@ -199,10 +200,40 @@ def unstable_roots(
             raise TypeError(f"a DelaySystem has no free parameters, got {c1!r} and {c2!r}")
         n, m = system.functions
         with decided("no count", np.empty((0, 2))):
-            return np.array(_count(n + m, system.common, right_of))
-    xs, ys = broadcast_parameters(system, c1, c2)
-    if xs.size > 1 and right_of == 0.0:
-        return count_points(system, xs.ravel(), ys.ravel()).reshape(xs.shape)
-    points = zip(xs.ravel().tolist(), ys.ravel().tolist(), strict=True)
-    found = [_count_exactly(system, a, b, right_of) for a, b in points]
-    return np.array(found, dtype=np.int64).reshape(xs.shape)
+            found = np.array(_count(n + m, system.common, right_of))
+        points = np.empty((0, 2))
+    else:
+        xs, ys = broadcast_parameters(system, c1, c2)
+        points = np.column_stack((xs.ravel(), ys.ravel()))
+        if xs.size > 1 and right_of == 0.0:
+            found = count_points(system, *points.T)
+        else:
+            found = np.array(
+                [_count_exactly(system, a, b, right_of) for a, b in points.tolist()]
+            )
+        found = found.astype(np.int64).reshape(xs.shape)
+    for other in system.others:
+        differ = unstable_roots(other, c1, c2, right_of=right_of) != found
+        if differ.any():
+            raise in_doubt(points[differ.ravel()] if points.size else points)
+    return found
+
+
+def in_doubt(points: FloatArray) -> CountError:
+    """Return the error of a count that depends on what is meant by a pole next to zero."""
+    return CountError(
+        "no count: it depends on whether a pole of a state space is zero, which rounding of "
+        "its matrix does not decide; in place of the state space write "
+        "Controller.of(state_space, integrators=1), or 2, or 0 if no pole is meant to be zero",
+        points,
+    )
+
+
+def require_certain(
+    system: CharacteristicFunction | DelaySystem,
+    c1: npt.ArrayLike | None = None,
+    c2: npt.ArrayLike | None = None,
+) -> None:
+    """Raise a `CountError` where poles that may be meant to be zero change the count."""
+    if system.others:
+        unstable_roots(system, *(() if isinstance(system, DelaySystem) else (c1, c2)))

@@ -8,7 +8,6 @@ roots and the number P of unstable poles of L. The samples of the curve are for 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,11 +15,18 @@ import numpy as np
 from armlock.checks import BoolArray, ComplexArray, FloatArray, positive_number
 from armlock.delays import DelaySystem
 from armlock.engine import decide
-from armlock.engine.functions import Function, Space, at, common_zeros, stacked
+from armlock.engine.functions import (
+    Function,
+    Space,
+    at,
+    common_zeros,
+    keeps_sign_up_to,
+    stacked,
+)
 from armlock.engine.inclusion import EPSILON
 from armlock.engine.polynomials import rounded
 from armlock.loops import Loop, quotient_of
-from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError, decided
+from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError, decided, in_doubt
 from armlock.stability.crossings import crossings
 
 if TYPE_CHECKING:
@@ -223,9 +229,12 @@ def nyquist(
     (1, 0, 1)
     """
     n, m = quotient_of(loop, c1, c2)
+    point = np.array([[c1, c2]])
+    if loop.others:
+        # A pole that may be zero is on the right for some of its values.
+        raise in_doubt(point)
     poles = open_loop_poles(m)
     order, radius = _leading_radius(n, m)
-    point = np.array([[c1, c2]])
     with decided("no Nyquist count", point):
         count = decide.count(n + m, common_zeros(n, m))
     if count < 0:
@@ -322,7 +331,7 @@ def axis_crossings(
     else:
         omega_max = positive_number("omega_max", omega_max)
     point = np.array([[c1, c2]])
-    begin = _constant_sign_up_to(n, m)
+    begin = keeps_sign_up_to(n, m, odd=True)
     if not begin > 0.0:
         raise CountError(
             f"no crossings at (c1, c2) = ({c1}, {c2}): L is real near s = 0", point
@@ -360,19 +369,3 @@ def _agree(n: Function, m: Function, omega: FloatArray, value: FloatArray) -> Bo
         found |= between & (np.abs(above.real - below.real) <= _AGREED * np.abs(value))
         open_ &= ~between
     return found
-
-
-def _constant_sign_up_to(n: Function, m: Function) -> float:
-    """Frequency up to which the imaginary part of L has one sign; zero if it is not known.
-
-    Its leading term there, as in Lemma 11: Im(N conj M) is the odd part of N(s) M(-s).
-    """
-    number = 16
-    above, below = n.series(number), m.series(number)
-    for k in range(number):
-        product = sum(
-            a * b * (-1) ** i for i, b in enumerate(below[: k + 1]) for a in [above[k - i]]
-        )
-        if k % 2 and product:
-            return n.radius(k, abs(Fraction(product)), 0.5, m)
-    return 0.0

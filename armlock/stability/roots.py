@@ -14,6 +14,7 @@ from armlock.characteristic import CharacteristicFunction, broadcast_parameters
 from armlock.checks import ComplexArray
 from armlock.delays import DelaySystem
 from armlock.engine.roots import rightmost_zero
+from armlock.stability.counts import require_certain
 
 
 @overload
@@ -58,6 +59,8 @@ def rightmost_root(
     TypeError, ValueError
         If c1 or c2 is not finite and real, the two do not broadcast, or D has no root at all
         there because it is constant.
+    CountError
+        If a pole that may be meant to be zero changes the count, see `unstable_roots`.
     RootError
         If no root can be certified within a few seconds; its `estimate` is the best candidate,
         nan if there is none.
@@ -92,11 +95,13 @@ def rightmost_root(
     -0.3181315052+1.3372357014j
     """
     if isinstance(system, DelaySystem):
+        require_certain(system)
         if c1 is not None or c2 is not None:
             raise TypeError(f"a DelaySystem has no free parameters, got {c1!r} and {c2!r}")
         n, m = system.functions
         return rightmost_zero(n + m, system.common)
     xs, ys = broadcast_parameters(system, c1, c2)
+    require_certain(system, xs, ys)
     if xs.ndim == 0:
         return _at(system, float(xs), float(ys))
     flat = [_at(system, float(p), float(q)) for p, q in zip(xs.flat, ys.flat, strict=True)]

@@ -11,6 +11,7 @@ unit circle instead of the imaginary axis, so that `unstable_roots`, `stability_
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import mpmath
@@ -32,6 +33,7 @@ from armlock.checks import (
     whole_number,
     whole_steps,
 )
+from armlock.controllers import with_others
 from armlock.engine.roots import RootError
 
 # Digits of a map's coefficients.
@@ -450,6 +452,11 @@ def semi_discretization(
                 f"so that the map is not affine in it; use transition_matrix or "
                 f"spectral_radius at single points"
             )
+    return with_others(partial(_equation, step=step, order=order), system)
+
+
+def _equation(system: CharacteristicFunction, step: float, order: int) -> DelayEquation:
+    """Return the map of a system that was checked."""
     with mpmath.workdps(_DIGITS):
         a, b = _map(*realize(system, 1.0, 1.0), step, order)
     # Those before x and y; with a dead time there is a third one, x0 B1 + y0 B2.

@@ -1,0 +1,91 @@
+"""State spaces as quotients of polynomials, exactly, and which poles may be meant to be zero.
+
+With one input and one output two characteristic polynomials are enough,
+
+    C adj(s - A) B = det(s - A + B C) - det(s - A) .
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+import flint
+
+from armlock.engine.polynomials import Polynomial, exactly, fractions
+
+#: What rounding makes of a determinant: at most this share of sum |a_ij cofactor_ij|. It covers
+#: all changes of coordinates that were drawn, of two to five states.
+ROUNDED = Fraction(512, 2**53)
+#: So many poles may be in doubt.
+MOST_IN_DOUBT = 2
+
+
+def _matrix(rows: Any) -> Any:
+    """Return an exact matrix of python-flint, of floats."""
+    return flint.fmpq_mat([exactly([*row, 1]).coeffs()[:-1] for row in rows])
+
+
+def quotient(a: Any, b: Any, c: Any, d: float) -> tuple[Polynomial, Polynomial]:
+    """Return numerator and denominator of C (s - A)^-1 B + D, from matrices of floats."""
+    if not len(a):
+        return Polynomial.of([d]), Polynomial.of([1])
+    a, b, c = _matrix(a), _matrix(b), _matrix(c)
+    below = a.charpoly()
+    above = (a - b * c).charpoly() - below + exactly([d]) * below
+    return Polynomial.of(above.coeffs()), Polynomial.of(below.coeffs())
+
+
+def doubts(a: Any) -> tuple[Fraction, ...]:
+    """Return what rounding of A may make of the lowest coefficients of det(s - A).
+
+    Of as many as may all be meant to be zero, and at most two. The derivative of det(s - A) by
+    an entry of A is a cofactor of s - A: polynomials that Faddeev and Leverrier's recursion
+    gives, P_(k-1) = A P_k + c_k with the coefficient c_k.
+    """
+    if not len(a):
+        return ()
+    matrix = _matrix(a)
+    coefficients, found = fractions(matrix.charpoly()), []
+    n = len(coefficients) - 1
+    unit = flint.fmpq_mat(n, n, [int(i == k) for i in range(n) for k in range(n)])
+    cofactors = [unit]
+    for c in coefficients[n - 1 : 0 : -1]:
+        cofactors.append(matrix * cofactors[-1] + flint.fmpq(*c.as_integer_ratio()) * unit)
+    for c, adjugate in zip(coefficients, cofactors[: -MOST_IN_DOUBT - 1 : -1], strict=False):
+        products = zip(matrix.entries(), adjugate.transpose().entries(), strict=True)
+        terms = (abs(x * y) for x, y in products)
+        bound = ROUNDED * sum((Fraction(int(t.p), int(t.q)) for t in terms), Fraction(0))
+        if abs(c) >= bound and c:
+            break
+        found.append(bound if c else Fraction(0))
+    return tuple(found) if any(found) else ()
+
+
+def doubts_of_roots(below: Polynomial) -> tuple[Fraction, ...]:
+    """Return the same for a denominator that was multiplied out from rounded poles.
+
+    Poles are rounded by a share of the largest one, which python-control does to state spaces.
+    """
+    largest = Fraction(max(map(abs, below.roots), default=0.0))
+    for number in range(1, min(MOST_IN_DOUBT, below.degree) + 1):
+        lead = abs(below.exact[number])
+        bounds = [ROUNDED * lead * largest ** (number - k) for k in range(number)]
+        sizes = list(map(abs, below.exact[:number]))
+        if any(sizes) and all(x < y or not x for x, y in zip(sizes, bounds, strict=True)):
+            return tuple(y if x else Fraction(0) for x, y in zip(sizes, bounds, strict=True))
+    return ()
+
+
+def with_lowest(
+    above: Polynomial, below: Polynomial, lowest: Sequence[Fraction]
+) -> tuple[Polynomial, Polynomial]:
+    """Return the quotient with other lowest coefficients of the denominator.
+
+    What goes through directly stays as it is.
+    """
+    through = above.lead / below.lead if above.degree == below.degree else Fraction(0)
+    changes = [new - old for new, old in zip(lowest, below.exact, strict=False)]
+    other = above + Polynomial.of(through * change for change in changes)
+    return other, below + Polynomial.of(changes)
