@@ -3,7 +3,7 @@
 Usage: python tools/check_cells.py FOLDER [PAGE ...]
 
 Cells that a reader can unfold count as shown. A chapter runs in a process of its own, as it
-would in a terminal; claims are taken from the build. FOLDER is the built book.
+would in a terminal. FOLDER is the built book.
 """
 
 import html
