@@ -209,3 +209,50 @@ def plot_constellation(ax: Axes) -> None:
     ax.text(2.7, -2.3, "compare with\nreturned light", ha="center", va="center", bbox=box)
     ax.text(-2.7, -2.3, "controller\nsteers laser", ha="center", va="center", bbox=box)
     ax.set(xlim=(-4.6, 4.6), ylim=(-3.2, 6.6))
+
+
+def plot_growth(axes: Any) -> None:
+    """Draw one arm, an interferometer of two arms, and the constellation.
+
+    Parameters
+    ----------
+    axes : array of Axes, shape (3,)
+        Empty drawing areas.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> from book.companion.diagrams import plot_growth
+    >>> axes = Figure().subplots(3)
+    >>> plot_growth(axes)
+    >>> [len(ax.texts) > 3 for ax in axes]
+    [True, True, True]
+    """
+    one, two, three = axes
+    arrow = {"arrowstyle": "-|>", "color": ORANGE, "shrinkA": 0.0, "shrinkB": 0.0}
+
+    def arm(ax: Axes, start: float, end: float, words: str) -> None:
+        gap = 0.35 if end > start else -0.35
+        ax.annotate("", (end - gap, 0.12), (start + gap, 0.12), arrowprops=arrow)
+        ax.annotate("", (start + gap, -0.12), (end - gap, -0.12), arrowprops=arrow)
+        ax.text((start + end) / 2, 0.3, words, ha="center", va="bottom", color=ORANGE)
+
+    for ax, places in (
+        (one, {"laser": -3.5, "spacecraft 1": 3.5}),
+        (two, {"spacecraft 2": -2.6, "laser": -0.4, "spacecraft 1": 3.5}),
+    ):
+        ax.set_axis_off()
+        ax.set_aspect("equal")
+        for name, x in places.items():
+            ax.plot(x, 0, "s", color="white", markeredgecolor="black", ms=13, zorder=3)
+            ax.text(x, -0.45, name, ha="center", va="top")
+        ax.set_xlim(-4.6, 4.6)
+    arm(one, -3.5, 3.5, "out and back: about 20 s")
+    arm(two, -0.4, 3.5, "longer arm")
+    arm(two, -0.4, -2.6, "shorter arm")
+    two.text(0.3, -1.2, "the returned beams are compared", ha="center", va="top", color=BLUE)
+    one.set_ylim(-1.0, 0.9)
+    two.set_ylim(-1.7, 0.9)
+    plot_constellation(three)
+    for ax, letter in zip(axes, "abc", strict=True):
+        ax.text(0.0, 1.0, letter, transform=ax.transAxes, weight="bold", va="top")
