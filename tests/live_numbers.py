@@ -249,6 +249,7 @@ class Comparison:
             ours.gain_lower,
             clip=lambda value: value if value >= 1.0 / most else 0.0,
         )
+        told("delay", "delay", ours.delay)
         told("phase", "phase", ours.phase)
         told("modulus", "modulus", ours.modulus)
 

@@ -11,7 +11,7 @@
  * count, along one column, in the same way.
  */
 function armlockChart(api) {
-  const { BOUNDARY, UNCONFINED, UNDECIDED, at, along, Curve, tail, LOST, chain, tangentDistance,
+  const { BOUNDARY, UNCONFINED, UNDECIDED, at, along, Curve, tail, LOST, chain, Disc, tangentDistance,
     count } = api;
   // Samples in a radian of the longest delay, in a decade; halvings of an interval.
   const A_RADIAN = 6, A_DECADE = 24, DEEPEST = 14;
@@ -20,7 +20,7 @@ function armlockChart(api) {
   /* N, O and M along the axis, for rows (swap = false) or columns, as functions of c - 1. */
   class Lines {
     constructor(loop, swap) {
-      this.loop = loop;
+      [this.loop, this.swap] = [loop, swap];
       this.base = new Curve(loop, at(loop, 1, 1));
       const [m, o] = swap ? [[0, 1], [1, 0]] : [[1, 0], [0, 1]];
       this.m = new Curve(loop, along(...m));
@@ -71,6 +71,10 @@ function armlockChart(api) {
     const least = Math.min(...e), most = Math.max(...e), far = Math.max(Math.abs(low), Math.abs(high));
     const largest = Math.max(Math.abs(least), Math.abs(most)), { longest } = lines.loop;
     const start = 0.1 / longest, grow = 10 ** (1 / A_DECADE) - 1;
+    // Whatever the arms' phases are, at no point of the chart L = -1.
+    const corner = [[low, high], [least, most]].map(ends => Math.max(...ends.map(v => Math.abs(1 + v))));
+    const disc = new Disc(lines.loop, lines.swap ? corner.reverse() : corner);
+    const clear = h => (disc.look(omega), Math.hypot(1 + disc.re, disc.im) > disc.over(h));
     const outside = (p, bounds, h) => {
       // |N| > far |M| + largest |O|, first by the tangent of N: the longer steps.
       const { vr, vi, dr, di } = lines.base;
@@ -129,7 +133,7 @@ function armlockChart(api) {
     while (omega < end && lines.evaluated < samples) {
       // Where nothing crosses in the chart for long, in steps as long as that is certain.
       const long = Math.min(leap, end - omega);
-      if (begun && outside(p, lines.over(long), long)) {
+      if (begun && (outside(p, lines.over(long), long) || clear(long))) {
         p = lines.sample(omega += long);
         leap *= 2;
         continue;

@@ -323,24 +323,42 @@ const armlockDraw = (function () {
       });
     }
 
-    /* The D-curve, coloured by the frequency; a pinned one is thin and dashed. */
+    /* Whether the stable region ends at a place, as far as pixels can tell; any place while there is no chart. */
+    bounds(x, y) {
+      if (!this.grid || this.stale) return true;
+      const { counts, n, x0, x1, y0, y1 } = this.grid, i = Math.round((x - x0) / (x1 - x0) * (n - 1));
+      const j = Math.round((y - y0) / (y1 - y0) * (n - 1));
+      let [stable, other] = [false, false];
+      for (let k = Math.max(0, i - 1); k <= Math.min(n - 1, i + 1); k++)
+        for (let m = Math.max(0, j - 1); m <= Math.min(n - 1, j + 1); m++)
+          if (counts[m * n + k] === 0) stable = true; else other = true;
+      return stable && other;
+    }
+
+    /* The D-curve where it bounds the stable region, coloured by the frequency; a pinned one is dashed. */
     trace(pen, { curve, line, range }, colours, pinned) {
       const { px, py } = this, [first, last] = range;
-      pen.lineWidth = pinned ? 1.2 : 2;
+      pen.lineWidth = 1.2;
       pen.setLineDash(pinned ? [4, 4] : []);
       pen.strokeStyle = colours.text;
       if (line) {
         const [a, b, c] = line, { x0, x1, y0, y1 } = this.box;
         const ends = Math.abs(b) > Math.abs(a) ? [x0, x1].map(x => [x, 1 + (c - a * (x - 1)) / b])
           : [y0, y1].map(y => [1 + (c - b * (y - 1)) / a, y]);
+        const at = share => [0, 1].map(k => ends[0][k] + share * (ends[1][k] - ends[0][k]));
         pen.beginPath();
-        ends.forEach(([x, y], k) => k ? pen.lineTo(px(x), py(y)) : pen.moveTo(px(x), py(y)));
+        for (let k = 0; k < 400; k++) {
+          const [from, middle, to] = [0, 0.5, 1].map(part => at((k + part) / 400));
+          if (!pinned && !this.bounds(...middle)) continue;
+          pen.moveTo(px(from[0]), py(from[1]));
+          pen.lineTo(px(to[0]), py(to[1]));
+        }
         pen.stroke();
       }
       let bin = -1, down = false;
       pen.beginPath();
       for (let i = 0; i < curve.length; i += 3) {
-        if (Number.isNaN(curve[i])) { down = false; continue; }
+        if (Number.isNaN(curve[i]) || !pinned && !this.bounds(curve[i], curve[i + 1])) { down = false; continue; }
         const t = Math.log(curve[i + 2] / first) / (Math.log(last / first) || 1);
         const x = px(curve[i]), y = py(curve[i + 1]), next = pinned ? 0 : Math.floor(24 * t);
         if (next !== bin) {
@@ -458,13 +476,14 @@ const armlockDraw = (function () {
 
   /* A line through n places. One that is less than a pixel from the one before goes. */
   function curve(pen, n, place) {
-    let u = Infinity, v = Infinity;
+    let u = Infinity, v = Infinity, down = false;
     pen.beginPath();
     for (let i = 0; i < n; i++) {
       const [x, y] = place(i);
+      if (Number.isNaN(x)) { [u, v, down] = [Infinity, Infinity, false]; continue; }
       if (Math.abs(x - u) + Math.abs(y - v) < 0.7 && i < n - 1) continue;
-      pen.lineTo(x, y);
-      [u, v] = [x, y];
+      if (down) pen.lineTo(x, y); else pen.moveTo(x, y);
+      [u, v, down] = [x, y, true];
     }
     pen.stroke();
   }
@@ -567,7 +586,10 @@ const armlockDraw = (function () {
       };
       for (let i = 1; i < one.omega.length; i++) {
         const [x, y] = bent(one.re[i], one.im[i]);
-        if (Math.abs(x - u) + Math.abs(y - v) > 0.7) go(x, y, one.omega[i], 0);
+        if (one.gap(i)) {
+          found.push([NaN, NaN], [x, y]);
+          [u, v, from] = [x, y, one.omega[i]];
+        } else if (Math.abs(x - u) + Math.abs(y - v) > 0.7) go(x, y, one.omega[i], 0);
       }
       [one.cache.key, one.cache.path] = [key, found];
       return found;
@@ -612,13 +634,15 @@ const armlockDraw = (function () {
 
   /* |L| and |S| above, the phase of L below, with the margins where the certified walk met them. */
   function drawBode([now, pinned], lit, pen, wide, high, colours) {
-    const of = ({ omega, re, im }) => ({ omega, size: omega.map((_, i) => decibels(Math.hypot(re[i], im[i]))),
+    const of = ({ omega, re, im, gap }) => ({ omega, gap, size: omega.map((_, i) => decibels(Math.hypot(re[i], im[i]))),
       left: omega.map((_, i) => -decibels(Math.hypot(1 + re[i], im[i]))),
       phase: omega.map((_, i) => Math.atan2(im[i], re[i]) * 180 / Math.PI) });
     const shown = [now, pinned].filter(one => one).map(of), [{ omega, size, left: rest, phase }] = shown;
     const margins = now.margins || {}, n = omega.length, faint = -50;
     // What is too small to matter at both ends of the axis is left out.
-    const from = Math.max(0, size.findIndex(v => v > faint)), to = size.findLastIndex(v => v > faint);
+    const marked = Math.max(...["lower", "upper", "phase", "delay", "modulus"].map(name => margins[`${name}At`]).filter(w => w < Infinity), 0);
+    const from = Math.max(0, size.findIndex(v => v > faint));
+    const to = Math.min(n - 1, Math.max(size.findLastIndex(v => v > faint), marked ? nearest(omega, 1.2 * marked) : 0));
     const first = Math.log10(omega[from] / TURN), last = Math.log10(omega[to > from ? to : n - 1] / TURN);
     const top = size.reduce((a, b) => Math.max(a, b), rest.reduce((a, b) => Math.max(a, b), 0));
     const low = Math.max(-top - 10, Math.min(faint, rest.reduce((a, b) => Math.min(a, b))));
@@ -638,12 +662,23 @@ const armlockDraw = (function () {
       const trace = (one, part) => {
         pen.beginPath();
         one[part].forEach((v, i) => {
-          const on = i && Math.abs(v - one[part][i - 1]) < 300;
+          const on = i && !one.gap(i) && Math.abs(v - one[part][i - 1]) < 300;
           if (on) pen.lineTo(one.at[i], py(v)); else pen.moveTo(one.at[i], py(v));
         });
         pen.stroke();
       };
       for (const [part, colour] of parts) {
+        // The band that all turns fill.
+        pen.fillStyle = colour;
+        pen.globalAlpha = 0.25;
+        pen.beginPath();
+        const edge = sign => now.band.map(([w, re, im, radius]) => {
+          const centre = Math.hypot(part === "left" ? 1 + re : re, im), value = decibels(Math.max(0, centre + sign * radius));
+          return [px(w), py(Math.max(-1e4, part === "left" ? -value : value))];
+        });
+        if (part !== "phase" && now.band.length) for (const [x, y] of [...edge(1), ...edge(-1).reverse()]) pen.lineTo(x, y);
+        pen.fill();
+        pen.globalAlpha = 1;
         if (shown[1]) ghost(pen, colours, () => trace(shown[1], part));
         pen.strokeStyle = colour;
         trace(shown[0], part);
@@ -670,7 +705,7 @@ const armlockDraw = (function () {
       pen.fillStyle = colours.text;
       pen.textAlign = close ? "right" : "left";
       pen.textBaseline = "middle";
-      labelBeside(pen, text, x + (close ? -7 : 7), Math.min(0.5 * (a + b), high - 60), colours, taken, places);
+      labelBeside(pen, text, x + (close ? -7 : 7), Math.min(0.5 * (a + b), 2 * room - (a > room + 22 ? 8 : room + 8)), colours, taken, places);
     };
     for (const name of ["lower", "upper"]) if (margins[`${name}At`] > 0)
       margin(margins[`${name}At`], gain(-decibels(margins[name])), gain(0), `gain \u00d7 ${say(margins[name])}`);

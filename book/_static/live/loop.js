@@ -547,9 +547,26 @@ function armlockLoop() {
       if (!(Math.abs(argument) < 0.6)) return UNDECIDED;
       argument += 0.5 * Math.PI;
     }
-    for (let steps = 0; omega < end.omega; steps++) {
+    const { rest, parts, longest } = loop, disc = new Disc(loop, [point.c1, point.c2]);
+    for (let steps = 0, leap = 0; omega < end.omega; steps++) {
       if (steps > most) return UNDECIDED;
       const { vr, vi, dr, di } = curve;
+      // Where 1 + L stays in a disc without 0, whatever the arms' phases are, and R turns by less than 90
+      // degrees, both turn along the shorter way.
+      if (leap) {
+        const h = Math.min(leap, end.omega - omega), { vr: rr, vi: ri } = rest;
+        disc.look(omega);
+        for (const part of parts) part.over(h);
+        if (Math.hypot(1 + disc.re, disc.im) > disc.over(h)) {
+          curve.at(omega = h < leap ? end.omega : omega + h);
+          const [ur, ui] = [rest.vr * rr + rest.vi * ri, rest.vi * rr - rest.vr * ri];
+          const [wr, wi] = [curve.vr * vr + curve.vi * vi, curve.vi * vr - curve.vr * vi];
+          argument += Math.atan2(ui, ur) + Math.atan2(wi * ur - wr * ui, wr * ur + wi * ui);
+          leap *= 2;
+          continue;
+        }
+      }
+      leap = Math.max(0.5 * leap, 1 / longest);
       step = Math.min(4 * step, end.omega - omega);
       for (;;) {
         curve.over(step);
@@ -608,20 +625,6 @@ function armlockLoop() {
     const point = at(loop, c1, c2), end = tail(loop, point.c1, point.c2).omega;
     const top = Math.max(end < Infinity ? 3 * end : 0, 20 / loop.longest);
     return frequencies(loop, top, 0.1 * Math.min(...loop.scales), most);
-  }
-
-  /* The open loop for pictures: arrays omega, re, im, `at`, which gives [re, im] at any other frequency,
-   * and `cache` for what a picture made of them. */
-  function response(loop, c1, c2, most) {
-    const omega = around(loop, c1, c2, most), curve = new Curve(loop, at(loop, c1, c2));
-    const find = w => {
-      curve.at(w);
-      const { vr, vi } = loop.rest, square = vr * vr + vi * vi, { lr, li } = curve;
-      return [(lr * vr + li * vi) / square, (li * vr - lr * vi) / square];
-    };
-    const re = new Float64Array(omega.length), im = new Float64Array(omega.length);
-    for (let i = 0; i < omega.length; i++) [re[i], im[i]] = find(omega[i]);
-    return { omega, re, im, at: find, cache: {} };
   }
 
   /* The largest Re s to which the real parts of a neutral root chain tend, for all small changes of the
@@ -717,5 +720,5 @@ function armlockLoop() {
   }
 
   return { EPSILON, BOUNDARY, UNCONFINED, UNDECIDED, make, reduced, at, beside, along, Curve, tail,
-    LOST, chain, Disc, clearFrom, tangentDistance, vanishes, count, response, rightmost, rootsOf };
+    LOST, chain, Disc, clearFrom, tangentDistance, vanishes, count, frequencies, rightmost, rootsOf };
 }

@@ -16,7 +16,7 @@ function armlockMargins(api) {
   // How much smaller than what is shown a number may be, as a share.
   const NEAR = 1e-3;
   // Perturbations up to this, gain factors up to this, steps of one walk and of one count.
-  const FARTHEST = 2, LARGEST = [1000, 10], STEPS = 1000000, COUNTED = 4000000;
+  const FARTHEST = 2, LARGEST = [1000, 10], STEPS = 1000000, COUNTED = 4000000, SCOUTED = 100000, TURN = 2 * Math.PI;
   // Of a start on the boundary, crossings up to this share are the start's own.
   const OWN = 1e-10;
 
@@ -44,6 +44,8 @@ function armlockMargins(api) {
       this.disc = new Disc(loop, [c1, c2]);
       this.other = null;
     }
+
+    least() { return this.best; }
 
     /* The disc at infinite frequency: centre and radius. */
     limit() {
@@ -77,6 +79,29 @@ function armlockMargins(api) {
       this.df = left * this.curve.bend + error;
       this.dn = left * this.curve.l2 + error;
       this.dr = left * rest.b2 + rounded;
+    }
+
+    /* Look for small values first where free phases of the arms would allow the smallest one: a walk then
+     * leaps over what the disc tells. */
+    scout() {
+      const { disc, loop: { longest } } = this, end = this.end(), apart = 0.5 / longest;
+      let least = Infinity, w = 0;
+      for (let at = 1000 / longest; at < end && end < Infinity; at *= 1.01) {
+        this.place(at);
+        const found = this.level(disc.re, disc.im, disc.radius / disc.size);
+        if (found < least) [least, w] = [found, at];
+      }
+      if (least === Infinity) return;
+      for (let k = 0; k < SCOUTED && this.least() > (1 + 0.3 * NEAR) * least; k++, w += apart) {
+        this.place(w);
+        if (this.away(least) < 0.3 * disc.radius / disc.size) this.probe(w - apart, w + apart);
+      }
+    }
+
+    /* How far L is from a value. */
+    from(x, y) {
+      const { nr, ni, rr, ri } = this, square = rr * rr + ri * ri;
+      return Math.hypot((nr * rr + ni * ri) / square - x, (ni * rr - nr * ri) / square - y);
     }
 
     /* Read something of L = N / R at omega: at s = 0 of what is left where both vanish. */
@@ -147,6 +172,13 @@ function armlockMargins(api) {
       if (here < this.best) [this.best, this.where] = [here, this.omega];
     }
 
+    level(re, im, radius) { return Math.hypot(1 + re, im) - radius; }
+
+    away() {
+      this.visit();
+      return Infinity;
+    }
+
     probe() { return false; }
 
     safe(h) {
@@ -164,6 +196,7 @@ function armlockMargins(api) {
     found() {
       // On the way down to a minimum, a first walk takes what lies ahead for met already: it
       // finds small values fast. The second one certifies.
+      this.scout();
       this.scouting = true;
       walk(this);
       this.scouting = false;
@@ -181,18 +214,35 @@ function armlockMargins(api) {
     return Math.max(0, Math.abs(Math.atan2(-im, -re)) - half);
   }
 
-  /* The smallest |arg(-L)| where |L| = 1 */
-  class Phase extends Target {
-    constructor(loop, c1, c2) {
+  /* The smallest |arg(-L)| where |L| = 1; if it is `late`, the smallest arg(-L) / omega, 0 <= arg < 2 pi:
+   * the delay that makes L = -1. */
+  class Crossover extends Target {
+    constructor(loop, c1, c2, late) {
       super(loop, c1, c2);
-      this.best = discPhase(...this.limit());
+      const [re, im, radius] = this.limit(), lasts = Math.hypot(re, im) + radius >= 1;
+      this.late = late;
+      this.best = !late ? discPhase(re, im, radius) : lasts ? 0 : Infinity;
+      if (this.best < Infinity) this.where = Infinity;
     }
 
     state() { return this.best; }
+    level(re, im, radius) { return discPhase(re, im, radius) / (this.late ? this.omega : 1); }
+
+    away(least) {
+      const angle = least * (this.late ? this.omega : 1), [x, y] = [-Math.cos(angle), -Math.sin(angle)];
+      return this.late ? this.from(x, y) : Math.min(this.from(x, y), this.from(x, -y));
+    }
+
+    /* Half of the arc of turns that must not occur, and a value turned so that this arc is around 0. */
+    half(omega) { return Math.min(Math.PI, (1 - NEAR) * this.best * (this.late ? 0.5 * omega : 1)); }
+    turned(re, im, half) {
+      const [c, s] = this.late ? [Math.cos(half), Math.sin(half)] : [1, 0];
+      return [c * re + s * im, c * im - s * re];
+    }
 
     end() {
-      return clearFrom(this.disc,
-        (re, im, radius) => discPhase(re, im, radius) >= (1 - NEAR) * this.best);
+      return clearFrom(this.disc, (re, im, radius) => this.late ? Math.hypot(re, im) + radius < 1
+        : discPhase(re, im, radius) >= this.half());
     }
 
     visit() {}
@@ -203,22 +253,25 @@ function armlockMargins(api) {
       const excess = w => this.read(w, this.excess), before = this.best;
       if (excess(low) < 0 === excess(high) < 0) return false;
       const w = root(excess, low, high), { nr, ni, rr, ri } = (this.place(w), this);
-      const found = Math.abs(Math.atan2(nr * ri - ni * rr, -(nr * rr + ni * ri)));
+      const angle = Math.atan2(nr * ri - ni * rr, -(nr * rr + ni * ri));
+      const found = this.late ? (angle < 0 ? TURN + angle : angle) / w : Math.abs(angle);
       if (found < before) [this.best, this.where] = [found, w];
       return this.best < before;
     }
 
     safe(h) {
       this.over(h);
-      const { fr, fi, gr, gi, df, nr, ni, or, oi, dn, rr, ri, ur, ui, dr, best } = this;
-      return exceeds(nr, ni, or, oi, dn, rr, ri, ur, ui, dr, 1, h)
-        || exceeds(rr, ri, ur, ui, dr, nr, ni, or, oi, dn, 1, h)
-        || best < Infinity && exceeds(fr, fi, gr, gi, df, rr, ri, ur, ui, dr,
-          2 * Math.sin(0.5 * (1 - NEAR) * best), h)
-        || discPhase(this.disc.re, this.disc.im, this.disc.over(h)) >= (1 - NEAR) * best;
+      const { dn, rr, ri, ur, ui, dr, nr, ni, or, oi, best } = this, half = this.half(this.omega + h);
+      if (exceeds(nr, ni, or, oi, dn, rr, ri, ur, ui, dr, 1, h)
+        || exceeds(rr, ri, ur, ui, dr, nr, ni, or, oi, dn, 1, h)) return true;
+      const [pr, pi] = this.turned(nr, ni, half), [qr, qi] = this.turned(or, oi, half);
+      const { re, im } = this.disc;
+      return best < Infinity && half < Math.PI && exceeds(rr + pr, ri + pi, ur + qr, ui + qi, this.late ? dn + dr : this.df,
+        rr, ri, ur, ui, dr, 2 * Math.sin(0.5 * half), h)
+        || discPhase(...this.turned(re, im, half), this.disc.over(h)) >= half;
     }
 
-    found() { return walk(this) ? this.best : NaN; }
+    found() { return this.late && this.best === 0 || (this.scout(), walk(this)) ? this.best : NaN; }
   }
 
   /* U + k V = 0 for a k of an interval, on the axis. The interval shrinks to what is found. */
@@ -313,7 +366,15 @@ function armlockMargins(api) {
       return Math.hypot(re - Math.min(to, Math.max(from, re)), im) > radius;
     }
 
+    least() { return this.high; }
+    away(least) { return this.from(-1 / least, 0); }
+    level(re, im, radius) {
+      const k = 1 / (Math.sqrt(Math.max(0, radius * radius - im * im)) - re);
+      return Math.abs(im) < radius && k > 1 ? k : Infinity;
+    }
+
     found() {
+      this.scout();
       if (!walk(this)) return [NaN, NaN];
       const { low, high, base, chain, most } = this;
       return [low > base[0] ? low : chain[0] > 1 / most ? chain[0] : 0,
@@ -407,30 +468,26 @@ function armlockMargins(api) {
   }
 
   /* Margins of a stable loop, null of another: gain factors `lower` and `upper` between which it
-   * stays stable (0 and infinity where none from 1 / `most` to `most` bounds them), `phase` in
-   * rad, infinity without a crossover, and `modulus`; each nan where it is not certain. The names
+   * stays stable (0 and infinity where none from 1 / `most` to `most` bounds them), `delay` in s
+   * and `phase` in rad, infinity without a crossover, and `modulus`; each nan where it is not certain. The names
    * with `At` have the frequency of each in rad/s: infinity, or none, where it is a limit. */
   function margins(spec, c1, c2) {
     const loop = reduced(make(spec), c1, c2), begun = count(loop, c1, c2, { most: COUNTED });
     let [lower, upper, most, gains] = [NaN, NaN, LARGEST[0], null];
     if (begun !== 0)
-      return begun === UNDECIDED || begun === BOUNDARY ? { lower, upper, most, phase: NaN, modulus: NaN } : null;
+      return begun === UNDECIDED || begun === BOUNDARY ? { delay: NaN, lower, upper, most, phase: NaN, modulus: NaN } : null;
     for (most of LARGEST) {
       gains = new Gains(loop, c1, c2, most);
       [lower, upper] = gains.found();
       if (!Number.isNaN(lower)) break;
     }
-    const scaled = k => count(make({ ...loop.spec, gain: spec.gain * k }), c1, c2, { most: COUNTED });
-    // A second opinion from counts on both sides.
-    const confirmed = (k, inside, outside) => {
-      const out = scaled(k * outside);
-      return scaled(k * inside) === 0 && out !== 0 && out !== UNDECIDED;
-    };
-    if (lower > 0 && !confirmed(lower, 1 + NEAR, 1 - 1e-6)) lower = NaN;
-    if (upper < Infinity && !confirmed(upper, 1 - NEAR, 1 + 1e-6)) upper = NaN;
-    const [phase, modulus] = [new Phase(loop, c1, c2), new Modulus(loop, c1, c2)];
-    return { lower, upper, most, phase: phase.found(), modulus: modulus.found(), lowerAt: gains.lowerAt,
-      upperAt: gains.upperAt, phaseAt: phase.where, modulusAt: modulus.where };
+    // At what was found a root is on the axis. A second opinion from a count inside of it.
+    const stable = k => count(make({ ...loop.spec, gain: spec.gain * k }), c1, c2, { most: COUNTED }) === 0;
+    if (lower > 0 && !stable(lower * (1 + NEAR))) lower = NaN;
+    if (upper < Infinity && !stable(upper * (1 - NEAR))) upper = NaN;
+    const [delay, phase] = [true, false].map(late => new Crossover(loop, c1, c2, late)), modulus = new Modulus(loop, c1, c2);
+    return { delay: delay.found(), lower, upper, most, phase: phase.found(), modulus: modulus.found(), lowerAt: gains.lowerAt,
+      upperAt: gains.upperAt, delayAt: delay.where, phaseAt: phase.where, modulusAt: modulus.where };
   }
 
   return { firstBreak, margins };

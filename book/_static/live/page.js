@@ -8,7 +8,7 @@
  */
 (function () {
   const here = document.currentScript.src;
-  const files = ["loop.js", "margins.js", "chart.js", "read.js", "text.js", "draw.js",
+  const files = ["loop.js", "margins.js", "chart.js", "curves.js", "read.js", "text.js", "draw.js",
     ...document.querySelector("[data-live=year]") ? ["orbits.js"] : []];
   const missing = files.filter(name =>
     !Array.from(document.scripts).some(script => script.src.endsWith(`/live/${name}`)));
@@ -27,11 +27,11 @@
 })();
 
 function armlockPages() {
-  const { TURN, say, duration, shortest, exact, written, formula, python, address, fromAddress } = armlockText;
+  const { TURN, say, duration, time, shortest, exact, written, formula, python, address, fromAddress } = armlockText;
   const { readRoots, readController, readNumber } = armlockRead;
   const { element, nearest, Sheet, Chart, drawNyquist, drawBode, drawRoots, drawYear } = armlockDraw;
   const api = armlockLoop();
-  Object.assign(api, armlockChart(api));
+  Object.assign(api, armlockChart(api), armlockCurves(api));
 
   const hertz = values => values.map(f => [-TURN * f, 0]);
   const real = values => values.map(v => [v, 0]);
@@ -42,6 +42,9 @@ function armlockPages() {
     poles: hertz([1e-6, 1e-6, 1e-6, 5e-5, 4e-4, 5e-5]),
   };
   const ARM = { ...PAPER, zeros: [], poles: [[0, 0]], gain: 1 };
+  // As the package has them, `robust_loop()` and `buildable_loop()`.
+  const ROBUST = { ...PAPER, zeros: real([0, 0, -2.3247785636564467e-6, ...Array(3).fill(-0.00010524335389525808)]),
+    poles: real([-1.5707963267948965e-6, -6.785840131753953e-7, ...Array(4).fill(-0.0007206813547334985)]) };
   // As the package has it, `flight_loop()`: the zeros of the sum of ten terms are computed there.
   const FLIGHT = { sensor: "modified", tau1: 33.855, tau2: 33.345, delay: 0, corner: TURN * 0.4,
     difference: 0.51, gain: 83425.53428423413,
@@ -59,6 +62,12 @@ function armlockPages() {
     "Common arm with lead filter": [{ ...ARM, sensor: "common", delay: 0.1,
       zeros: [[-0.02, 0]], poles: [[0, 0], [-0.1, 0]] }, 0, 1.5],
     "The white paper's loop": [FLIGHT, 1, 2e-3],
+    "The robust loop": [ROBUST, 1, 6e-6],
+    "The buildable loop": [{ ...ROBUST, delay: 12.3e-6, gain: 40508.89142555669,
+      zeros: [...ROBUST.zeros, ...real([-0.6974335690969341, -29.34247538452867, -185.3539665617978, -1168.672467135403,
+        -7954.512598889356, -97075.21299592461])],
+      poles: [...ROBUST.poles, ...real([-0.03707079331235956, -5.15221195188726, -55.98318108697011, -343.0619177720054,
+        -2148.8493750554185, -13998.936864396119, -251327.41228718346])] }, 1, 9e-6],
   };
   const SENSORS = [["single", "single arm"], ["common", "common arm"],
     ["difference", "difference of the arms"], ["dual", "dual"], ["modified", "modified dual"]];
@@ -146,7 +155,7 @@ function armlockPages() {
   // What the table has of a loop, in the order in which it is found, and what it says where it is not.
   const TOLD = ["count", "root", "breaks", "margins"];
   const UNTOLD = { count: UNDECIDED, root: null, breaks: [NaN, NaN, NaN, NaN],
-    margins: { lower: NaN, upper: NaN, phase: NaN, modulus: NaN } };
+    margins: { delay: NaN, lower: NaN, upper: NaN, phase: NaN, modulus: NaN } };
   let number = 0;
 
   /* What all pages have: a chart that answers, plots that follow it, and the loop's numbers. */
@@ -160,6 +169,8 @@ function armlockPages() {
       this.out = element("output", { role: "status", "aria-live": "polite" });
       this.note = element("p", { class: "live-note", role: "status" });
       this.numbers = element("table", { class: "live-numbers" });
+      // The numbers that stay in sight beside the sliders.
+      this.summary = element("dl", { class: "live-summary" });
       // For who hears the page: said once all numbers are there.
       this.ready = element("p", { class: "visually-hidden", role: "status" });
       this.chart = new Chart(label, {
@@ -175,7 +186,7 @@ function armlockPages() {
       this.moved = () => {};
       this.plots = [
         this.plot("Nyquist curve of L, compressed beyond 1", drawNyquist, 1),
-        this.plot("Bode\u2019s plot of L, and the sensitivity S = 1/(1 + L)", drawBode, [0.42, 0.9]),
+        this.plot("Bode\u2019s plot of L, and the sensitivity S = 1/(1 + L)", drawBode, [0.72, 0.9]),
       ];
       this.following = element("p", { class: "live-note", role: "status" });
     }
@@ -227,7 +238,7 @@ function armlockPages() {
       if (omega === this.lit) return;
       this.lit = omega;
       this.chart.lit = null;
-      this.following.textContent = "";
+      this.following.textContent = this.cut || "";
       if (omega) {
         const { loop, response } = this.design, [x, y] = api.crossing(loop, omega);
         if (Number.isFinite(x + y)) this.chart.lit = [x, y];
@@ -255,6 +266,7 @@ function armlockPages() {
       this.out.textContent = why;
       this.note.textContent = this.following.textContent = this.ready.textContent = "";
       this.numbers.replaceChildren();
+      this.summary.replaceChildren();
       this.listed = null;
       this.draw();
     }
@@ -272,7 +284,12 @@ function armlockPages() {
 
     /* The open loop at the point, from few frequencies while the hand moves. */
     respond() {
-      this.design.response = api.response(this.design.loop, ...this.point, this.rough ? 1200 : 9000);
+      const { design } = this, { margins } = design.told;
+      const marks = ["lower", "upper", "delay", "phase", "modulus"].map(name => margins?.[`${name}At`]).filter(w => w > 0 && w < Infinity);
+      const response = design.response = api.response(design.loop, ...this.point, this.rough ? 1200 : 9000, marks);
+      this.cut = `Every turn of the curves is drawn up to ${say(response.dense / TURN)} Hz${response.band.length
+        ? `, and some turns and the band of all turns up to ${say(response.top / TURN)} Hz` : ""}.`;
+      if (!this.lit) this.following.textContent = this.cut;
       this.draw();
     }
 
@@ -372,7 +389,8 @@ function armlockPages() {
         this.slow.ask(kind, breaks ? [design.spec] : [design.spec, ...point], (found, error) => {
           (breaks ? design : told)[kind] = error ? UNTOLD[kind] : found;
           if (breaks) this.chart.broken = found?.[0];
-          this.draw();
+          // A margin may lie beyond what is drawn.
+          if (kind === "margins" && told === this.design?.told) this.respond(); else this.draw();
           this.write();
         });
       }
@@ -380,22 +398,23 @@ function armlockPages() {
 
     /* The numbers of the loop, and of the pinned one beside it. */
     list() {
-      if (!this.numbers.isConnected) return;
       const { designs } = this, wait = "\u2026";
-      const or = (value, special, words, at) => Number.isNaN(value) ? "undecided" : value === special ? words
-        : `${say(value)}${at > 0 && at < Infinity ? ` at ${say(at / TURN)}\u00a0Hz` : ""}`;
+      const or = (value, special, words, at, write = say) => Number.isNaN(value) ? "undecided" : value === special ? words
+        : `${write(value)}${at < Infinity ? at > 0 ? ` at ${say(at / TURN)}\u00a0Hz` : "" : ", in the limit of high frequency"}`;
       const broken = value => value === null ? "unstable at (1, 1)"
-        : value === 0 ? "0: none is tolerated" : or(value, Infinity, "none up to 2");
+        : value === 0 ? "0: none is tolerated" : or(value, Infinity, "none up to 2", 0);
       const of = (read, found) => designs.map(one => found(one) === undefined ? wait : read(found(one)));
       const margin = read => of(found => found ? read(found) : "none: unstable", one => one.told.margins);
+      const rows = [["Delay margin", margin(m => or(m.delay, Infinity, "no crossover", m.delayAt, time))],
+        ["Unstable roots", of(n => n >= 0 ? String(n) : WORDS[n], one => one.told.count)],
+        ["Phase margin in degrees", margin(m => or(m.phase * 180 / Math.PI, Infinity, "no crossover", m.phaseAt))],
+        ["Smallest gain factor of a stable loop", margin(m => or(m.lower, 0, `none above 1/${m.most}`, m.lowerAt))],
+        ["Largest gain factor of a stable loop", margin(m => or(m.upper, Infinity, `none up to ${m.most}`, m.upperAt))],
+        ["Smallest |1 + L|", margin(m => or(m.modulus, Infinity, "", m.modulusAt))]];
+      this.summarize(rows);
       const parts = [
-        [`At ${this.name}`, ["Unstable roots", of(n => n >= 0 ? String(n) : WORDS[n], one => one.told.count)],
-          ["Rightmost root in rad/s", designs.map(({ told: { count, root } }) => count < 0 ? WORDS[count]
-            : root === undefined ? wait : root ? this.rootText(root) : "undecided")],
-          ["Smallest gain factor of a stable loop", margin(m => or(m.lower, 0, `none above 1/${m.most}`, m.lowerAt))],
-          ["Largest gain factor of a stable loop", margin(m => or(m.upper, Infinity, `none up to ${m.most}`, m.upperAt))],
-          ["Phase margin in degrees", margin(m => or(m.phase * 180 / Math.PI, Infinity, "no crossover", m.phaseAt))],
-          ["Smallest |1 + L|", margin(m => or(m.modulus, Infinity, "", m.modulusAt))]],
+        [`At ${this.name}`, ...rows, ["Rightmost root in rad/s", designs.map(({ told: { count, root } }) => count < 0 ? WORDS[count]
+          : root === undefined ? wait : root ? this.rootText(root) : "undecided")]],
         ["Critical perturbation from (1, 1)", ...["(1, \u22121)", "(\u22121, 1)", "(1, 1)", "(\u22121, \u22121)"].map(
           (way, k) => [`along ${way}`, of(b => broken(b[k]), one => one.breaks)])],
       ];
@@ -413,6 +432,27 @@ function armlockPages() {
         kind => design.told[kind] !== undefined);
       this.ready.textContent = done ? `The table has all numbers at ${this.name}: ${parts[0].slice(1)
         .map(([name, [value]]) => `${name}: ${value}`).join("; ")}.` : "";
+    }
+
+    /* What stays in sight: values without their frequencies. One that is asked for anew stays, faint. */
+    summarize(rows) {
+      const short = ["Delay margin", "Unstable roots", "Phase margin", "Gain factor from", "to", "Smallest |1 + L|"];
+      if (!this.summary.children.length) this.summary.append(...short.map(name =>
+        element("div", {}, element("dt", {}, name), element("dd", {}))));
+      rows.forEach(([, [value]], k) => {
+        const place = this.summary.children[k].lastChild, pending = value === "\u2026";
+        place.classList.toggle("live-old", pending);
+        if (pending) return;
+        const [number, limit] = value.split(/ at |(?=, in the limit)/), text = `${number}${k === 2 && /^[\d.]/.test(number) ? "\u00b0" : ""}`;
+        place.textContent = limit?.startsWith(",") ? `${text}, in the limit` : text.replace("unstable at arbitrarily high frequency", "infinitely many");
+        place.title = value;
+      });
+    }
+
+    /* The table as plain text. */
+    copy() {
+      navigator.clipboard.writeText(Array.from(this.numbers.rows, row =>
+        Array.from(row.cells, cell => cell.textContent).join("\t")).join("\n"));
     }
 
     /* Pin curves and numbers as they are: what follows is seen against them. */
@@ -450,11 +490,11 @@ function armlockPages() {
     input.value = value;
     // Without `for` it would be the label of the output.
     const label = element("label", { class: "live-field", for: id }, element("span", {}, name, " ", shown), input);
-    label.to = at => {
+    label.to = (at, text = null) => {
       const end = at > high ? 2 * at : high;
       [input.max, input.step] = [end, (end - low) / 200];
       input.value = at;
-      shown.textContent = write(at);
+      shown.textContent = text || write(at);
     };
     return label;
   }
@@ -481,12 +521,13 @@ function armlockPages() {
   const key = (text, name) => element("span", { class: "live-key" }, element("i", { class: name }), text);
   const keys = () => element("p", { class: "live-note" }, key("stable", "live-stable"),
     key("unstable, few to many roots", "live-unstable"), key("unstable at high frequency", "live-lost"),
-    key("undecided", "live-unsure"));
+    key("undecided", "live-unsure"),
+    key("D-curve at the edge of the stable region, low to high frequency", "live-curve"));
 
   function legend() {
     return element("p", { class: "live-note" }, "Move over the chart for a preview. A click or a tap holds the point. "
-      + "The curve shows where a root lies on the imaginary axis, from low frequency (blue) to high (yellow); "
-      + "on the straight line, a root is 0. "
+      + "On the D-curve a root lies on the imaginary axis, from low frequency (blue) to high (yellow), or is 0 (straight line). "
+      + "It is drawn where it bounds the stable region. "
       + "Cross: the ideal point (1, 1). Dot: the critical perturbation along (1, \u22121). Square, in small charts: "
       + "the paper\u2019s perturbations, up to 10\u207b\u2076. Dashed: the pinned loop.");
   }
@@ -577,7 +618,13 @@ function armlockPages() {
     /* The loop that the fields hold; throws an error that names its field. */
     const read = () => {
       const spec = { sensor: fields.sensor.value };
-      for (const name of ["tau1", "tau2", "delay", "gain"]) spec[name] = readNumber(name, fields[name].value, NAMES[name]);
+      // A time may have its unit: 12.3 us.
+      const UNITS = { s: 1, ms: 1e-3, us: 1e-6, "\u00b5s": 1e-6, "\u03bcs": 1e-6, ns: 1e-9 };
+      for (const name of ["tau1", "tau2", "delay", "gain"]) {
+        const [, text, timed] = /^(.*?)\s*([mnu\u00b5\u03bc]?s)?$/s.exec(fields[name].value.trim());
+        const known = timed && name !== "gain";
+        spec[name] = +(readNumber(name, known ? text : fields[name].value, NAMES[name]) * (known ? UNITS[timed] : 1)).toPrecision(known ? 15 : 17);
+      }
       if (["dual", "modified"].includes(spec.sensor)) for (const name of ["corner", "difference"])
         spec[name] = readNumber(name, fields[name].value, NAMES[name]) * (name === "corner" ? TURN : 1);
       for (const [name, title] of [["zeros", "Zeros"], ["poles", "Poles"]])
@@ -605,7 +652,7 @@ function armlockPages() {
         if (!dragged) {
           base = Number(fields.gain.value) || 1;
           gain.to(0);
-          dead.to(spec.delay);
+          dead.to(Math.max(least, Math.log10(spec.delay)), time(spec.delay));
           const root = [...spec.zeros, ...spec.poles].map(v => Math.hypot(...v)).filter(v => v);
           range = [Math.min(...root, 1 / spec.tau1), Math.max(...root, 1 / spec.tau1)];
           if (range[1] < 100 * range[0]) range = [range[0] / 10, range[1] * 10];
@@ -616,6 +663,9 @@ function armlockPages() {
         undo.disabled = !depth;
         if (!moving) live.moved("loop");
       } catch (error) {
+        // What was typed, not what it is in rad/s or s.
+        const typed = fields[error.field]?.value;
+        if (/, got [-\d.e+]+$/.test(error.message) && typed) error.message = error.message.replace(/got \S+$/, `got ${typed}`);
         // Too few poles are too many zeros: the field that was edited is the one to look at.
         const name = error.field === "zeros" && edited === "poles" ? edited : error.field;
         if (errors[name]) blame(name, error.message);
@@ -687,8 +737,10 @@ function armlockPages() {
       fields.gain.value = exact(+(base * 10 ** v).toPrecision(6));
       take("gain", moving, true);
     });
-    const dead = slider(id("dead"), "Dead time:", 0, 1, 0, v => `${say(v)} s`, (v, moving) => {
-      fields.delay.value = exact(v);
+    // The left end is no dead time.
+    const least = -7, late = v => v > least ? +(10 ** v).toPrecision(3) : 0;
+    const dead = slider(id("dead"), "Dead time:", least, 1, least, v => time(late(v)), (v, moving) => {
+      fields.delay.value = time(late(v));
       take("delay", moving, true);
     });
     const wrong = element("p", { class: "live-note live-wrong", role: "alert" });
@@ -709,22 +761,22 @@ function armlockPages() {
     fields.pasted.placeholder = "(s + 0.02)/(s^2 + 0.1 s)";
 
     /* The s-plane: a root follows the pointer, a pair together; a root at 0 stays. */
-    let range = [0.01, 1], plane = null, caught = null;
+    let range = [0.01, 1], drawn = null, caught = null;
     const roots = new Sheet({ role: "img", "aria-label": "Roots of the controller in the s-plane. The fields Zeros "
       + "and Poles have them as text." }, 0.8, (pen, wide, high, colours) => {
       const { spec } = live;
-      plane = spec && drawRoots({ ...spec, unit, range }, pen, wide, high, colours);
+      drawn = spec && drawRoots({ ...spec, unit, range }, pen, wide, high, colours);
     });
     const near = event => {
-      if (!plane) return null;
+      if (!drawn) return null;
       const [x, y] = roots.place(event), all = ["zeros", "poles"].flatMap(kind => live.spec[kind].map((root, k) => {
-        const [u, v] = plane.place(root);
+        const [u, v] = drawn.place(root);
         return { kind, k, root, gap: Math.hypot(u - x, v - y) };
       })).filter(({ root, gap }) => gap < 16 && Math.hypot(...root)).sort((p, q) => p.gap - q.gap);
       return all[0] || null;
     };
     const drag = (event, moving) => {
-      const { kind, k, root: [re, im], spec } = caught, [x, y] = plane.root(...roots.place(event));
+      const { kind, k, root: [re, im], spec } = caught, [x, y] = drawn.root(...roots.place(event));
       const round = v => Number((v / unit).toPrecision(3)) * unit, moved = spec[kind].map(v => v);
       const to = im ? [round(x), round(Math.max(Math.abs(y), 1e-3 * Math.hypot(x, y)))]
         : [Math.sign(x) * round(Math.hypot(x, y)), 0];
@@ -750,15 +802,16 @@ function armlockPages() {
     on("pointercancel", () => { caught = null; });
     on("touchstart", event => { if (caught) event.preventDefault(); });
 
-    const [nyquist, bode] = live.plots;
+    const [nyquist, bode] = live.plots, plane = element("figure", { class: "live-plane" },
+      element("figcaption", {}, "Drag a pole (\u00d7) or a zero (\u25cb) of the controller"), roots.canvas);
+    bode.figure.classList.add("live-bode");
     place.replaceChildren(element("div", { class: "live-own" },
-      element("div", { class: "live-top" }, preset, wrong, gain, dead),
-      element("div", { class: "live-main" }, figures(live.figure, nyquist.figure),
+      element("div", { class: "live-main" }, figures(live.figure, plane, nyquist.figure, bode.figure), live.following,
         tools(live, "loop", undo, button("Paper\u2019s square", () => live.chart.show([1, 1], 3e-6)),
-          button("Whole", () => live.chart.show([0, 0], 3))), live.note, bode.figure, live.following, live.numbers),
-      element("div", { class: "live-fields" }, paste, understood, doubt,
-        element("figure", {}, element("figcaption", {}, "Drag a pole (\u00d7) or a zero (\u25cb)"), roots.canvas),
-        inputs, legend(), element("p", {}, orbit))),
+          button("Whole", () => live.chart.show([0, 0], 3)), button("Copy numbers", () => live.copy())), live.note, live.numbers),
+      element("div", { class: "live-side" }, element("div", { class: "live-top" }, preset, wrong),
+        element("div", { class: "live-panel" }, live.summary, gain, dead),
+        element("div", { class: "live-fields" }, paste, understood, doubt, inputs, legend(), element("p", {}, orbit)))),
     element("details", {}, element("summary", {}, "This loop in Python"), code));
 
     const open = () => {

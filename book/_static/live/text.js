@@ -33,6 +33,12 @@ const armlockText = (function () {
     return "";
   }
 
+  /* A short time with its unit. */
+  function time(seconds) {
+    const [unit, size] = [["s", 1], ["ms", 1e-3], ["\u00b5s", 1e-6], ["ns", 1e-9]].find(([, size]) => seconds >= size) || ["s", 1];
+    return `${say(seconds / size)} ${unit}`;
+  }
+
   /* A number in as few characters as hold all its digits. */
   function exact(number) {
     const plain = String(number), scientific = number.toExponential();
@@ -94,12 +100,14 @@ const armlockText = (function () {
     };
     const [name, sensor] = (sensors[spec.sensor] || (() => Array(2).fill(spec.sensor.toUpperCase())))();
     return [...unit === 1 ? [] : ["from math import pi", ""],
-      "from armlock import Controller, Loop, unstable_roots", `from armlock.sensors import ${name}`,
+      "from armlock import Controller, Loop, critical_perturbation, margins, rightmost_root, unstable_roots", `from armlock.sensors import ${name}`,
       "", ...unit === 1 ? [] : ["hertz = 2 * pi"],
       "controller = Controller(", `    zeros=${roots(spec.zeros)},`, `    poles=${roots(spec.poles)},`,
       `    gain=${spec.gain},`, ")", "loop = Loop(", `    controller, ${sensor},`,
       `    tau1=${spec.tau1}, tau2=${spec.tau2}, delay=${spec.delay},`, ")",
-      `print(unstable_roots(loop, ${c1}, ${c2}))`, ""].join("\n");
+      `count = unstable_roots(loop, ${c1}, ${c2})`, `print(count, rightmost_root(loop, ${c1}, ${c2}))`,
+      "if count == 0:", `    print(margins(loop, ${c1}, ${c2}))`, "for direction in [(1, -1), (-1, 1), (1, 1), (-1, -1)]:",
+      "    print(direction, critical_perturbation(loop, direction))", ""].join("\n");
   }
 
   const SHORT = { sensor: "s", tau1: "t1", tau2: "t2", delay: "d", gain: "g", corner: "p",
@@ -146,5 +154,5 @@ const armlockText = (function () {
       held: parts.has("pt") ? numbers("pt", 2) : null };
   }
 
-  return { TURN, say, scientific, power, duration, exact, shortest, written, formula, python, address, fromAddress };
+  return { TURN, say, scientific, power, duration, time, exact, shortest, written, formula, python, address, fromAddress };
 })();
