@@ -9,15 +9,17 @@ The calls that matter most:
 - ``Loop(controller, "common", tau1=20.1, tau2=19.9)`` is a loop of your own. `paper_loop` and
   `flight_loop` are published ones.
 - ``unstable_roots(loop, c1, c2)`` counts the roots with positive real part. 0 means stable,
-  -1 a root on the imaginary axis, -2 unstable roots at arbitrarily high frequency.
+  -1 a root on the imaginary axis, -2 unstable roots at arbitrarily high frequency, -3 that a
+  point among others takes too many steps.
 - ``stability_chart(loop, c1, c2)`` counts on a grid; ``chart.plot()`` draws the chart.
 - ``margins(loop, c1, c2)`` finds the gain, phase, delay and modulus margins of a stable loop.
 - ``critical_perturbation(loop, direction)`` is the distance from (1, 1) to instability.
 - ``varying_radius(loop)`` is how far c1 and c2 may vary in time; ``peak_gain(system)`` is the
   largest gain of a stable system.
 - ``rightmost_root(loop, c1, c2)`` is the root that decays slowest or grows fastest.
-- ``control.tf([1], [10, 1]) * delay(3.0)`` is a system with a dead time, for loops with any
-  number of delays, also inside the controller.
+- ``control.tf([1], [10, 1]) * delay(3.0)`` is a system with a dead time. Systems are combined
+  with ``+ - * / **`` and `feedback`, with any number of delays and of parameters such as
+  ``parameter("kp")``; every function above takes them. `equation` stands for D = 0.
 - ``nyquist(loop, omega_max=10.0)`` is the Nyquist curve with its encirclements of -1.
 - ``simulate(loop, noise)`` is the frequency noise of the locked laser, in Hz, from that of
   the free laser, such as ``LaserNoise(seed=1).draw(20_000)``.
@@ -33,9 +35,7 @@ This package is the companion to "Robustness Analysis and Controller Design of A
 System in Space-based Gravitational Wave Detectors".
 """
 
-from armlock.characteristic import CharacteristicFunction, DelayEquation
 from armlock.controllers import Controller
-from armlock.delays import DelaySystem, WithDelays, delay
 from armlock.engine.roots import RootError
 from armlock.loops import (
     CommonArm,
@@ -60,7 +60,13 @@ from armlock.robustness import (
     varying_radius,
 )
 from armlock.stability.charts import StabilityChart, stability_chart
-from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError, unstable_roots
+from armlock.stability.counts import (
+    BOUNDARY,
+    UNCONFINED,
+    UNDECIDED,
+    CountError,
+    unstable_roots,
+)
 from armlock.stability.dcurve import d_curve, d_curve_branches, d_curve_line
 from armlock.stability.nyquist import AxisCrossings, NyquistCurve, axis_crossings, nyquist
 from armlock.stability.roots import rightmost_root
@@ -69,6 +75,7 @@ from armlock.stability.semidiscretization import (
     spectral_radius,
     transition_matrix,
 )
+from armlock.systems import System, delay, equation, parameter, s
 from armlock.timedomain.noise import LaserNoise, PerturbationNoise, ShapedNoise
 from armlock.timedomain.responses import impulse_response, step_response
 from armlock.timedomain.simulation import (
@@ -84,13 +91,11 @@ __version__ = "0.1.0"
 __all__ = [
     "BOUNDARY",
     "UNCONFINED",
+    "UNDECIDED",
     "AxisCrossings",
-    "CharacteristicFunction",
     "CommonArm",
     "Controller",
     "CountError",
-    "DelayEquation",
-    "DelaySystem",
     "DivergenceError",
     "DualArm",
     "HayesEquation",
@@ -107,7 +112,7 @@ __all__ = [
     "Spectrum",
     "SpectrumEstimator",
     "StabilityChart",
-    "WithDelays",
+    "System",
     "amplitude_spectrum",
     "axis_crossings",
     "buildable_loop",
@@ -116,6 +121,7 @@ __all__ = [
     "d_curve_branches",
     "d_curve_line",
     "delay",
+    "equation",
     "flight_loop",
     "impulse_response",
     "margins",
@@ -123,10 +129,12 @@ __all__ = [
     "noise_budget",
     "nyquist",
     "paper_loop",
+    "parameter",
     "peak_gain",
     "pulling",
     "rightmost_root",
     "robust_loop",
+    "s",
     "sampled_open_loop",
     "semi_discretization",
     "simulate",

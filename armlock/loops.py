@@ -5,48 +5,53 @@ The open loop of every configuration is
     L(s; c1, c2) = K exp(-s delay) [m1 (1 - c1 exp(-s tau1)) + m2 (1 - c2 exp(-s tau2))],
 
 the product of the controller and actuator K, a dead time, and the signal of the two arms in
-the signal mapping m1, m2. Clearing the denominators of 1 + L gives the characteristic function
-of `armlock.characteristic`. The Hayes equation, which has no sensor, is one more.
+the signal mapping m1, m2. A `Loop` is a record of these parts, which simulation, noise budget
+and pulling read. It is also the expression L in c1 and c2, which all other functions take like
+any other `armlock.systems.System`. The Hayes equation has no sensor: it is an equation D = 0.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from fractions import Fraction
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from itertools import zip_longest
 from numbers import Real
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
+from flint import fmpq_poly
 
 from armlock import paper, sensors
-from armlock.characteristic import CharacteristicFunction, DelayEquation, late
+from armlock.affine import quotient_at
 from armlock.checks import (
     ComplexArray,
+    broadcast_shape,
     complex_array,
     not_negative,
     one_of,
     positive_number,
-    real_number,
+    real_array,
     true_or_false,
 )
-from armlock.controllers import (
-    Controller,
-    integrating_actuator,
-    table_two,
-    white_paper,
-    with_others,
-)
-from armlock.delays import DelaySystem, QuasiPolynomial, Term, WithDelays, functions
-from armlock.engine.functions import Function, common_zeros, limit_at_zero
-from armlock.engine.margins import Free
+from armlock.controllers import Controller, integrating_actuator, table_two, white_paper
+from armlock.engine.chain import NOW, Delay, Lag
+from armlock.engine.functions import limit_at_zero
 from armlock.engine.polynomials import Polynomial
 from armlock.sensors import COMMON, SINGLE, SignalMapping, modified_dual
+from armlock.systems import (
+    Sum,
+    System,
+    equation,
+    fraction,
+    order,
+    parameter,
+    polynomial,
+)
+from armlock.systems import delay as pure_delay
+from armlock.systems import s as laplace
 
 
-def HayesEquation(tau: float = 1.0) -> DelayEquation:
+def HayesEquation(tau: float = 1.0) -> System:
     r"""Return the equation x'(t) = a x(t) + b x(t - tau), with free parameters (a, b).
 
     Its characteristic function is (paper, Sec. II, after Eq. 3)
@@ -62,7 +67,8 @@ def HayesEquation(tau: float = 1.0) -> DelayEquation:
 
     Returns
     -------
-    DelayEquation
+    System
+        An equation.
 
     Raises
     ------
@@ -75,24 +81,23 @@ def HayesEquation(tau: float = 1.0) -> DelayEquation:
     >>> unstable_roots(HayesEquation(tau=1.0), -1.0, [-2.2, -2.4])
     array([0, 2])
     """
-    tau = positive_number("tau", tau)
-    return DelayEquation((0.0, 1.0), (1.0,), (1.0,), 0.0, tau, parameters=("a", "b"))
+    late = pure_delay(positive_number("tau", tau))
+    return equation(laplace - parameter("a") - parameter("b") * late)
 
 
 @dataclass(frozen=True)
-class Loop(WithDelays, CharacteristicFunction):
+class Loop(System):
     r"""An arm-locking loop, with free parameters (c1, c2).
 
-    With a controller K and a signal mapping with weights m1 and m2, the open loop and the
-    characteristic function are
+    With a controller K and a signal mapping with weights m1 and m2, the open loop is
 
     .. math::
 
-        L(s) &= K e^{-s\delta} \left[ m_1 \left( 1 - c_1 e^{-s\tau_1} \right)
-        + m_2 \left( 1 - c_2 e^{-s\tau_2} \right) \right] , \\
-        D(s) &= R \left( 1 + L \right) , \qquad B_k = R K m_k ,
+        L(s) = K e^{-s\delta} \left[ m_1 \left( 1 - c_1 e^{-s\tau_1} \right)
+        + m_2 \left( 1 - c_2 e^{-s\tau_2} \right) \right] .
 
-    where R, a polynomial, is the common denominator of L, and :math:`\delta` its dead time.
+    It is a `System` and is combined like one: ``loop * filter``, ``loop.feedback()``. A third
+    arm is one more term of such an expression (`armlock.parameter`, `armlock.delay`).
 
     Parameters
     ----------
@@ -120,11 +125,13 @@ class Loop(WithDelays, CharacteristicFunction):
         K(s).
     mapping : SignalMapping
         The weights m1 and m2.
+    arms : pair of System
+        The two delays, which are two even if they are equally long.
 
     Notes
     -----
     A pole of controller, sensor or actuator at s = 0 that a zero cancels is removed by
-    construction. It leaves no root of D at s = 0.
+    construction. It leaves no root of 1 + L at s = 0.
 
     Examples
     --------
@@ -147,135 +154,115 @@ class Loop(WithDelays, CharacteristicFunction):
     tau1: float
     tau2: float = None  # type: ignore[assignment]
     delay: float = 0.0
-    rest: Polynomial = field(init=False, repr=False, compare=False)
-    b1: Polynomial = field(init=False, repr=False, compare=False)
-    b2: Polynomial = field(init=False, repr=False, compare=False)
-    others: tuple[Loop, ...] = field(default=(), init=False, repr=False, compare=False)
-
-    step = 0.0
-    parameters = ("c1", "c2")
-    reference = (1.0, 1.0)
-
-    _instead = (
-        "for plots write control.bode_plot(loop.frequency_response(omega)), for a closed loop "
-        "loop.feedback(), for margins armlock.margins(loop), for responses "
-        "armlock.step_response(loop.feedback(), timepts), and for the controller alone "
-        "loop.controller"
-    )
+    #: The round trips as delays, for `armlock.margins` and others that ask for delay objects.
+    arms: tuple[System, System] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Check the arguments, keep them in one form, and clear the denominators of 1 + L."""
+        """Check the arguments, and keep them in one form."""
         k = Controller.of(self.controller)
         m, tau1, tau2 = _mapping_and_delays(self.mapping, self.tau1, self.tau2)
-        kept = {"controller": k, "mapping": m, "tau1": tau1, "tau2": tau2}
-        kept["delay"] = delay = not_negative("delay", self.delay)
-        rest = k.denominator * Polynomial.of(m.denominator)
-        arms = [k.numerator * Polynomial.of(p) for p in (m.numerator1, m.numerator2)]
-        for name, b in zip(("m1", "m2"), arms, strict=True):
-            if b.degree > rest.degree:
-                raise ValueError(
-                    f"controller times signal mapping {name} must be proper, got "
-                    f"{b.degree} zeros and {rest.degree} poles"
-                )
-        # The highest power of 1 + L.
-        highest = 1 + sum(b.lead for b in arms if b.degree == rest.degree) / rest.lead
-        if not delay and abs(highest) <= 1e-12:
-            raise ValueError(
-                f"the loop is not well posed: 1 + K (m1 + m2) must not vanish at high "
-                f"frequency, got {float(highest)}"
-            )
-        # As many poles at s = 0 as all three have zeros there.
-        common = min(p.order for p in (rest, *arms) if p)
-        cleared = (p.over_powers(common) for p in (rest, *arms))
-        kept |= zip(("rest", "b1", "b2"), cleared, strict=True)
+        kept = {
+            "controller": k, "mapping": m, "tau1": tau1, "tau2": tau2,
+            "delay": not_negative("delay", self.delay),
+            "arms": (pure_delay(tau1), pure_delay(tau2)),
+            "nominal": {"c1": 1.0, "c2": 1.0}, "step": 0.0,
+        }  # fmt: skip
         for name, value in kept.items():
             object.__setattr__(self, name, value)
+        rest, *arms = self._cleared
+        for name, b in zip(("m1", "m2"), arms, strict=True):
+            if b.degree() > rest.degree():
+                raise ValueError(
+                    f"controller times signal mapping {name} must be proper, got "
+                    f"{b.degree()} zeros and {rest.degree()} poles"
+                )
+        # The highest power of 1 + L.
+        highest = 1 + float(
+            fraction(sum(b[rest.degree()] for b in arms) / rest.leading_coefficient())
+        )
+        if not self.delay and abs(highest) <= 1e-12:
+            raise ValueError(
+                f"the loop is not well posed: 1 + K (m1 + m2) must not vanish at high "
+                f"frequency, got {highest}"
+            )
         others = tuple(self.replace(controller=other) for other in k.others)
         object.__setattr__(self, "others", others)
 
-    def parts(self) -> tuple[list[Term], list[Term], list[Term]]:
-        """Return R, B1 and B2, the last two by their half sum and half difference.
+    def __getstate__(self) -> dict[str, Any]:  # type: ignore[override]
+        """Return the arguments and the delay objects."""
+        names = [one.name for one in fields(self)]
+        return {name: getattr(self, name) for name in (*names, "nominal", "step", "others")}
 
-        Where the arms cancel, as in a difference or in the integral of the dual sensor, they do
-        so in these polynomials, and not in the numerical evaluation.
-        """
-        if not (self.b1 and self.b2):
-            return super().parts()
-        half, zero = Fraction(1, 2), Fraction(0)
-        halves = [
-            (sign, p) for sign, p in zip((1, -1), self._sum_and_difference, strict=True) if p
-        ]
-        b1, b2 = ([(half * sign**k, p, zero) for sign, p in halves] for k in (0, 1))
-        return [(Fraction(1), self.rest, zero)], b1, b2
+    def __setstate__(self, state: dict[str, Any]) -> None:  # type: ignore[override]
+        """Take them back."""
+        self.__dict__.update(state)
 
     @cached_property
-    def _sum_and_difference(self) -> tuple[Polynomial, Polynomial]:
-        """B1 + B2 and B1 - B2, of which no term is left that cancels."""
-        zeros, m = self.controller.numerator, self.mapping
-        arms = (m.numerator1, self.b1), (m.numerator2, self.b2)
-        numerator, b = next(arm for arm in arms if arm[1])
-        common = zeros.order + Polynomial.of(numerator).order - b.order
-        pairs = list(zip_longest(m.numerator1, m.numerator2, fillvalue=0.0))
-        plus, minus = (
-            Polynomial.of([Fraction(a) + sign * Fraction(b) for a, b in pairs])
-            for sign in (1, -1)
-        )
-        return (zeros * plus).over_powers(common), (zeros * minus).over_powers(common)
+    def _cleared(self) -> tuple[fmpq_poly, fmpq_poly, fmpq_poly]:
+        """R, B1 and B2, exactly, without a common power of s."""
+        k, m = self.controller, self.mapping
+        zeros, poles = (polynomial(p.exact) for p in (k.numerator, k.denominator))
+        rest = poles * polynomial(m.denominator)
+        arms = [zeros * polynomial(p) for p in (m.numerator1, m.numerator2)]
+        # As many poles at s = 0 as all three have zeros there.
+        power = fmpq_poly([0, 1]) ** min(order(p) for p in (rest, *arms) if p)
+        return rest // power, arms[0] // power, arms[1] // power
 
-    def cancelled(self, c1: float | Fraction, c2: float | Fraction) -> int:
-        """Order of the root at s = 0 that cancels in L, so that the closed loop has it not."""
-        return common_zeros(*self.quotient(c1, c2))
+    @cached_property
+    def numerator(self) -> Sum:  # type: ignore[override]
+        """N = exp(-s delay) [B1 (1 - c1 exp(-s tau1)) + B2 (1 - c2 exp(-s tau2))]."""
+        _, *arms = self._cleared
+        dead = self._dead
+        found = Sum({(dead, ()): arms[0] + arms[1]})
+        for name, b, arm in zip(self.nominal, arms, self.arms, strict=True):
+            ((lag, _),) = arm.numerator.terms
+            found = found + Sum.of(-b, lag.times(dead), name)
+        return found
 
-    def quotient(
-        self, c1: float | Fraction = 1.0, c2: float | Fraction = 1.0
-    ) -> tuple[Function, Function]:
-        """Return N and M of L = N / M at one point as functions of the engine, exactly."""
-        below = self.terms.rest
-        return self.function(c1, c2) + below * -1, below
+    @cached_property
+    def denominator(self) -> Sum:  # type: ignore[override]
+        """M = R."""
+        return Sum.of(self._cleared[0])
 
-    def open_loop(self, c1: float = 1.0, c2: float = 1.0) -> DelaySystem:
-        """Return L as a system that is combined with others, for instance by `feedback`.
+    @cached_property
+    def _dead(self) -> Lag:
+        """The dead time, one delay object with the mark of the first arm."""
+        ((((arm, _),), _),) = self.arms[0].numerator.terms
+        theta = fraction(polynomial([self.delay])[0])
+        return Lag([(Delay(theta, f"dead {arm.mark}"), 1)]) if theta else NOW
+
+    @cached_property
+    def _polynomials(self) -> tuple[Polynomial, ...]:
+        """R, B1, B2, half of B1 + B2 and of B1 - B2, of which no term is left that cancels."""
+        rest, b1, b2 = self._cleared
+        parts = rest, b1, b2, (b1 + b2) / 2, (b1 - b2) / 2
+        return tuple(Polynomial.of(map(fraction, p.coeffs())) for p in parts)
+
+    def replace(self, **changes: Any) -> Self:
+        """Return another one, made with other values of some arguments.
 
         Parameters
         ----------
-        c1, c2 : float, optional
-            Multiplicative perturbations.
+        **changes
+            Arguments of the class, by name. All others stay as they are. The sensor stays too
+            when its delays change. The delays of the other loop are objects of its own.
 
         Returns
         -------
-        DelaySystem
+        Loop
 
         Raises
         ------
         TypeError, ValueError
-            If c1 or c2 is no finite real number.
+            As the class does.
 
         Examples
         --------
-        >>> from armlock import SingleArm
-        >>> print(SingleArm(gain=2.0, tau1=20.0).open_loop(c1=0.9))
-        [(2) + (-1.8) exp(-20 s)] / [(1 s)]
+        >>> from armlock import CommonArm
+        >>> CommonArm(delay=20e-6).replace(delay=0.0) == CommonArm()
+        True
         """
-        factors = [Fraction(real_number(*given)) for given in (("c1", c1), ("c2", c2))]
-
-        def quotient(loop: Loop) -> DelaySystem:
-            dead, above = Fraction(loop.delay), []
-            arms = zip(factors, (loop.b1, loop.b2), (loop.tau1, loop.tau2), strict=True)
-            for factor, b, tau in arms:
-                above += [(dead, b.exact)]
-                above += [(dead + Fraction(tau), tuple(-factor * p for p in b.exact))]
-            below = [(Fraction(0), loop.rest.exact)]
-            return DelaySystem(QuasiPolynomial.of(above), QuasiPolynomial.of(below))
-
-        return with_others(quotient, self)
-
-    def with_free_phases(self, c1: float, c2: float, above: float) -> Free:
-        """Return L with free phases of both arms above a frequency in rad/s, for the engine."""
-        rest, b1, b2 = self.parts()
-        zero = Fraction(0)
-        free = [late(b, zero, c) for b, c in ((b1, c1), (b2, c2))]
-        centre, below, *arms = functions(late(b1 + b2, Fraction(self.delay)), rest, *free)
-        return Free(centre, below, tuple(arm for arm in arms if not arm.is_zero), above)
+        return replace(self, **changes)
 
     def arm_responses(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """Evaluate K m1 exp(-s delay) and K m2 exp(-s delay), factor by factor.
@@ -294,24 +281,28 @@ class Loop(WithDelays, CharacteristicFunction):
         TypeError, ValueError
             If s does not hold finite numbers, or holds a pole of K, m1 or m2.
         """
-        s = complex_array("s", s)
-        for pole in set(self.rest.roots):
+        s, (rest, b1, b2, _, _) = complex_array("s", s), self._polynomials
+        for pole in set(rest.roots):
             if (s == pole).any():
                 raise ValueError(
                     f"s must not be a pole of the open loop, got {pole}: a limit there is not "
                     f"computed"
                 )
         dead = np.exp(-s * self.delay)
-        return self.b1.over(self.rest, s) * dead, self.b2.over(self.rest, s) * dead
+        return b1.over(rest, s) * dead, b2.over(rest, s) * dead
 
     def half_responses(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """Evaluate half the sum and half the difference of `arm_responses`; nothing cancels."""
-        s, (plus, minus) = complex_array("s", s), self._sum_and_difference
-        half = 0.5 * np.exp(-s * self.delay)
-        return plus.over(self.rest, s) * half, minus.over(self.rest, s) * half
+        s, (rest, _, _, plus, minus) = complex_array("s", s), self._polynomials
+        dead = np.exp(-s * self.delay)
+        return plus.over(rest, s) * dead, minus.over(rest, s) * dead
 
-    def __call__(
-        self, s: npt.ArrayLike, c1: npt.ArrayLike = 1.0, c2: npt.ArrayLike = 1.0
+    def __call__(  # type: ignore[override]
+        self,
+        s: npt.ArrayLike,
+        c1: npt.ArrayLike = 1.0,
+        c2: npt.ArrayLike = 1.0,
+        squeeze: Any = None,
     ) -> ComplexArray:
         """Evaluate the open loop L(s; c1, c2), as python-control does.
 
@@ -333,13 +324,14 @@ class Loop(WithDelays, CharacteristicFunction):
             finite and real, or the three do not broadcast. At s = 0 it is a pole of L that is
             refused; where one of K cancels, the limit is returned.
         """
-        s, c1, c2 = self._checked(s, c1, c2)
-        at_zero = (s == 0.0) & (self.rest.order > 0)
+        s, c1, c2 = complex_array("s", s), real_array("c1", c1), real_array("c2", c2)
+        broadcast_shape(("s", "c1", "c2"), (s, c1, c2))
+        at_zero = (s == 0.0) & (self._polynomials[0].order > 0)
         if at_zero.any():
             every = np.broadcast_arrays(s, c1, c2, at_zero)
             found = np.array([
-                limit_at_zero(*self.quotient(float(x), float(y))) if zero else self(z, x, y)
-                for z, x, y, zero in zip(*(a.flat for a in every), strict=True)
+                limit_at_zero(*quotient_at(self, (x, y))) if zero else self(z, x, y)
+                for z, x, y, zero in zip(*(a.ravel().tolist() for a in every), strict=True)
             ])  # fmt: skip
             if np.isinf(found).any():
                 raise ValueError("s must not be a pole of the open loop, got 0")
@@ -357,7 +349,7 @@ def _mapping_and_delays(
         raise TypeError(
             "mapping must be a SignalMapping or a name, as in Loop(controller, 'single', tau1) "
             "or Loop(controller, 'common', tau1, tau2); with more arms write "
-            f"controller * (m1 * (1 - delay(tau1)) + ...), got {mapping!r:.200}"
+            f"controller * (m1 * (1 - c1 * delay(tau1)) + ...), got {mapping!r:.200}"
         )
     tau1 = positive_number("tau1", tau1)
     if isinstance(mapping, str):
@@ -390,20 +382,11 @@ def checked_loop(loop: Loop) -> Loop:
     """Return the loop, or say what was given in its place."""
     if not isinstance(loop, Loop):
         raise TypeError(
-            "loop must be a Loop, for instance CommonArm(), or, for counts, margins and the "
-            f"rightmost root, a DelaySystem, as DelaySystem.of(system), got {loop!r:.200}"
+            "loop must be a Loop, for instance CommonArm(), a record of the controller, the "
+            "sensor and the two arms that are simulated; counts, charts and margins take any "
+            f"other system, with three arms too, got {loop!r:.200}"
         )
     return loop
-
-
-def quotient_of(loop: Loop | DelaySystem, c1: float, c2: float) -> tuple[Function, Function]:
-    """Return N and M of L = N / M, or say what was given in place of a loop."""
-    c1, c2 = real_number("c1", c1), real_number("c2", c2)
-    if not isinstance(loop, DelaySystem):
-        return checked_loop(loop).quotient(c1, c2)
-    if (c1, c2) != (1.0, 1.0):
-        raise TypeError(f"a DelaySystem has no perturbations, got c1 = {c1} and c2 = {c2}")
-    return loop.functions
 
 
 def SingleArm(

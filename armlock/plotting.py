@@ -96,7 +96,7 @@ def plot_chart(
     shown = chart.counts if counts else np.where(chart.stable, 0, -1)
     shown = np.where(shown >= 0, np.minimum(shown, largest), np.nan)
     ax.pcolorfast(_edges("chart.x", chart.x), _edges("chart.y", chart.y), shown, **style)
-    label_parameters(ax, chart.system.parameters)
+    label_parameters(ax, chart.parameters)
     if labels:
         _label_regions(ax, chart)
     return ax

@@ -76,7 +76,7 @@ def chart_rows(name: str, side: int, points: int) -> list[Row]:
     rows, columns = np.random.default_rng(SEED).integers(0, side, (2, points))
     # A chart is that of D, with its root at s = 0.
     where = found.x[columns], found.y[rows]
-    seconds, counts = timed(unstable_roots, found.system.plain(), *where)
+    seconds, counts = timed(unstable_roots, found.system, *where)
     differ = int((counts != found.counts[rows, columns]).sum())
     what, limit = f"{name}: chart {side} x {side}", CASES[name].limit
     return [
@@ -91,7 +91,7 @@ def dense_rows(name: str, side: int, points: int, passes: int) -> list[Row]:
     """Compare a chart with dense eigenvalues, and the count of the map with theirs."""
     system, reach = CASES[name].make(), CASES[name].reach
     where = np.random.default_rng(SEED).uniform(-reach, reach, (points, 2))
-    matrices = [transition_matrix(system, x, y, STEP) for x, y in where]
+    matrices = [transition_matrix(system, x, y, step=STEP) for x, y in where]
     calls: list[Callable[[], object]] = [partial(chart, name, side)]
     calls += [partial(np.linalg.eigvals, matrix) for matrix in matrices]
     best, *each = in_turn(calls, passes).min(axis=0)

@@ -138,7 +138,9 @@ def without_delays(case: Case) -> int:
 def by_map(case: Case) -> int:
     """Count eigenvalues outside the unit circle of the semi-discretized map, step 0.1 s."""
     assert case.point is not None
-    return int((np.abs(np.linalg.eigvals(transition_matrix(*case.point, 0.1))) > 1.0).sum())
+    return int(
+        (np.abs(np.linalg.eigvals(transition_matrix(*case.point, step=0.1))) > 1.0).sum()
+    )
 
 
 def by_grid(samples: int) -> Callable[[Case], int]:

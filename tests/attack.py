@@ -32,12 +32,14 @@ from armlock import (
     RootError,
     critical_perturbation,
     d_curve,
+    equation,
     margins,
     modulus_margin,
     rightmost_root,
     stability_chart,
     unstable_roots,
 )
+from armlock.affine import Affine
 from armlock.robustness import first_crossing
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
 from armlock.stability.semidiscretization import semi_discretization
@@ -506,7 +508,7 @@ def check_root(tally, rng, sketch, loop, point):
     if number == -2:
         return
     # The judge counts the roots of D, with one at s = 0 that cancels in the loop.
-    root = tally.ask("rightmost_root", rightmost_root, loop.plain(), *point)
+    root = tally.ask("rightmost_root", rightmost_root, equation(1 + loop), *point)
     if root is None:
         return
     longest = max(sketch.tau1, sketch.tau2)
@@ -530,7 +532,7 @@ def check_chart(tally, rng, sketch, loop, point):
         return
     chart = tally.ask("stability_chart", stability_chart, loop, x, y)
     single = tally.ask("unstable_roots", unstable_roots, loop, *np.meshgrid(x, y))
-    of_d = tally.ask("unstable_roots", unstable_roots, loop.plain(), *np.meshgrid(x, y))
+    of_d = tally.ask("unstable_roots", unstable_roots, equation(1 + loop), *np.meshgrid(x, y))
     if chart is None or single is None or of_d is None:
         return
     # A chart is that of D, which has a root at s = 0 where one cancels in the loop.
@@ -600,7 +602,9 @@ def check_controls(tally, rng, sketch, loop, point):
     found = tally.ask("margins", margins, loop, *point)
     if found is None:
         return
-    for what in dense_judge.too_good_ones(*loop.quotient(*point), found, tally.controls):
+    for what in dense_judge.too_good_ones(
+        *Affine.of(loop).quotient(*point), found, tally.controls
+    ):
         tally.note("controls", point, what, "no certificate")
 
 

@@ -8,7 +8,9 @@ import control
 import numpy as np
 
 from armlock import delay, margins, unstable_roots
+from armlock.affine import Affine
 from armlock.engine import decide
+from armlock.engine.chain import UndecidedError
 
 
 class Judge:
@@ -193,7 +195,7 @@ def compared(
         equal = a == b or math.isclose(a, b, rel_tol=1e-5)
         if too_good or not equal:
             wrong.append(f"{name} {a} for {b}")
-    n, m = loop.functions
+    n, m = Affine.of(loop).quotient()
     return found, wrong + too_good_ones(n, m, certified, controls)
 
 
@@ -211,7 +213,7 @@ def is_certified(n, m, name, level):
         arc = turns[name], (0.0, 0.0, 0.0, 0.0)
     try:
         return decide.excludes(decide.Family([n, m], tests, arc))
-    except decide.UndecidedError:
+    except UndecidedError:
         return False
 
 

@@ -1,10 +1,13 @@
 """Second opinions: the same quantities by other routes, sharing no code with armlock.
 
-Only the coefficients, delays and the step of a characteristic function are read from it, the
-factors of a loop, and the numbers of the paper.
+Only the terms of N + M are read from a system, by `terms`, the factors of a loop, and the
+numbers of the paper.
 """
 
 from __future__ import annotations
+
+import math
+from fractions import Fraction
 
 import mpmath
 import numpy as np
@@ -16,52 +19,58 @@ from scipy.special import lambertw
 from armlock import paper
 
 
-def delayed_terms(system, x, y):
-    """What D holds beside A: coefficients and delay of each term."""
-    return (
-        (system.c, system.delay),
-        (-x * system.b1.coefficients, system.delay + system.tau1),
-        (-y * system.b2.coefficients, system.delay + system.tau2),
-    )
+def terms(system, x, y):
+    """Coefficients in ascending powers of s, exactly, and delay of all terms of D = N + M."""
+    values = dict(zip(system.parameters, (x, y), strict=False))
+    found: dict[Fraction, list[Fraction]] = {}
+    for part in (system.numerator, system.denominator):
+        for (lag, names), p in part.fractions():
+            delay = sum((one.theta * power for one, power in lag), Fraction(0))
+            factor = math.prod(Fraction(float(values[name])) for name in names)
+            known = found.setdefault(delay, [Fraction(0)] * len(p))
+            known += [Fraction(0)] * (len(p) - len(known))
+            for k, value in enumerate(p):
+                known[k] += factor * value
+    return found
+
+
+def split(system, x, y):
+    """What nothing delays, and coefficients and delay of each other term, as floats."""
+    found = {float(t): np.array([float(v) for v in p]) for t, p in terms(system, x, y).items()}
+    return np.trim_zeros(found.pop(0.0, np.zeros(1)), "b"), [(p, t) for t, p in found.items()]
 
 
 def value(system, s, x, y):
     """D(s; x, y), spelled out."""
-    s = np.asarray(s, dtype=complex)
-    z = np.exp(s * system.step) if system.step else s
-    return np.polyval(system.a[::-1], z) + sum(
-        np.polyval(b[::-1], z) * np.exp(-s * delay) for b, delay in delayed_terms(system, x, y)
-    )
+    s, (a, delayed) = np.asarray(s, dtype=complex), split(system, x, y)
+    return sum(np.polyval(b[::-1], s) * np.exp(-s * t) for b, t in [(a, 0.0), *delayed])
 
 
 def size(system, s, x, y):
     """Sum of the magnitudes of the terms of D(s; x, y)."""
-    s = complex(s)
-    z = np.exp(s * system.step) if system.step else s
-    terms = [(system.a, 0.0), *delayed_terms(system, x, y)]
-    return sum(abs(np.polyval(b[::-1], z) * np.exp(-s * delay)) for b, delay in terms)
+    s, (a, delayed) = complex(s), split(system, x, y)
+    return sum(abs(np.polyval(b[::-1], s) * np.exp(-s * t)) for b, t in [(a, 0.0), *delayed])
 
 
 def exact(system, s, x, y):
     """D(s; x, y) in mpmath's precision; of a loop 1 + L, from its controller and sensor."""
     s = mpmath.mpc(s)
-    if hasattr(system, "controller"):
-        k, m = system.controller, system.mapping
-        gain = k.gain * mpmath.fprod(s - mpmath.mpc(zero) for zero in k.zeros)
-        gain /= mpmath.fprod(s - mpmath.mpc(pole) for pole in k.poles)
-        first, second, below = (
-            mpmath.polyval(list(p), s, asc=True)
-            for p in (m.numerator1, m.numerator2, m.denominator)
+    if not hasattr(system, "controller"):
+        return sum(
+            mpmath.exp(-s * mpmath.mpf(t.numerator) / t.denominator)
+            * sum(mpmath.mpf(v.numerator) / v.denominator * s**k for k, v in enumerate(p))
+            for t, p in terms(system, x, y).items()
         )
-        rest, b1, b2 = 1, gain * first / below, gain * second / below
-    else:
-        z = mpmath.exp(s * system.step) if system.step else s
-        polynomials = system.rest.coefficients, system.b1.coefficients, system.b2.coefficients
-        rest, b1, b2 = (mpmath.polyval(p.tolist(), z, asc=True) for p in polynomials)
-    x0, y0 = system.reference
-    arms = b1 * (x0 - x * mpmath.exp(-s * system.tau1))
-    arms += b2 * (y0 - y * mpmath.exp(-s * system.tau2))
-    return rest + mpmath.exp(-s * system.delay) * arms
+    k, m = system.controller, system.mapping
+    gain = k.gain * mpmath.fprod(s - mpmath.mpc(zero) for zero in k.zeros)
+    gain /= mpmath.fprod(s - mpmath.mpc(pole) for pole in k.poles)
+    first, second, below = (
+        mpmath.polyval(list(p), s, asc=True)
+        for p in (m.numerator1, m.numerator2, m.denominator)
+    )
+    arms = first * (1 - x * mpmath.exp(-s * system.tau1))
+    arms += second * (1 - y * mpmath.exp(-s * system.tau2))
+    return 1 + mpmath.exp(-s * system.delay) * gain * arms / below
 
 
 def hayes_roots(a, b, tau=1.0, branches=60):
@@ -79,9 +88,10 @@ def hayes_count(a, b, tau=1.0):
 
 def radius_of_unstable_roots(system, x, y):
     """Radius past which |A| exceeds the delayed terms in the right half-plane."""
-    bound = -np.abs(system.a)
-    bound[-1] = abs(system.a[-1])
-    for b, _ in delayed_terms(system, x, y):
+    a, delayed = split(system, x, y)
+    bound = -np.abs(a)
+    bound[-1] = abs(a[-1])
+    for b, _ in delayed:
         bound[: b.size] -= np.abs(b)
     if bound[-1] <= 0.0:
         raise ValueError("unstable roots are not confined")
@@ -99,7 +109,7 @@ def rectangle_count(system, x, y, density=10.0, at_zero=0):
     many as `at_zero` says, are divided out.
     """
     radius = radius_of_unstable_roots(system, x, y)
-    longest = system.delay + max(system.tau1, system.tau2)
+    longest = max((t for _, t in split(system, x, y)[1]), default=0.0)
     size = int(density * (radius * longest + 30.0))
     side = np.linspace(0.0, radius, size)
     near = np.geomspace(1e-9 * radius, radius, 400)
@@ -128,17 +138,15 @@ def generator_eigenvalues(system, x, y, nodes=80):
 
     The state is (xi, xi', ...), as polynomials of degree `nodes` on the longest delay.
     """
-    order = system.a.size - 1
+    a, terms = split(system, x, y)
+    order = a.size - 1
     now = np.diag(np.ones(order - 1), 1)
-    now[-1] = -system.a[:-1] / system.a[-1]
+    now[-1] = -a[:-1] / a[-1]
     delayed = []
-    for b, delay in delayed_terms(system, x, y):
+    for b, delay in terms:
         last_row = np.zeros((order, order))
-        last_row[-1, : b.size] = -b / system.a[-1]
-        if delay == 0.0:
-            now = now + last_row
-        else:
-            delayed.append((delay, last_row))
+        last_row[-1, : b.size] = -b / a[-1]
+        delayed.append((delay, last_row))
     longest = max((delay for delay, _ in delayed), default=1.0)
     theta = 0.5 * longest * (np.cos(np.pi * np.arange(nodes + 1) / nodes) - 1.0)
     lagrange = BarycentricInterpolator(theta, np.eye(nodes + 1))
@@ -164,11 +172,10 @@ def map_eigenvalues(system, x, y):
 
 def map_polynomial(system, x, y):
     """Coefficients of z^r D in ascending powers of z."""
-    terms = [(system.a, 0.0), *delayed_terms(system, x, y)]
-    steps = [round(delay / system.step) for _, delay in terms]
-    polynomial = np.zeros(max(steps) + system.a.size)
-    for (b, _), back in zip(terms, steps, strict=True):
-        polynomial[max(steps) - back : max(steps) - back + b.size] += b
+    steps = {round(t / system.step): float(p[0]) for t, p in terms(system, x, y).items()}
+    polynomial = np.zeros(max(steps) + 1)
+    for back, value in steps.items():
+        polynomial[max(steps) - back] += value
     return polynomial
 
 

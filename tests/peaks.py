@@ -18,9 +18,10 @@ def pair(p, omega):
 
 
 def system_of(n, d):
-    """Return N / D as the package takes it."""
-    top = [control.tf(c, [1.0]) * delay(theta) for theta, c in n.items()]
-    below = [control.tf(c, [1.0]) * delay(theta) for theta, c in d.items()]
+    """Return N / D as the package takes it, with one delay object for each length."""
+    late = {theta: delay(theta) for theta in {*n, *d}}
+    top = [control.tf(c, [1.0]) * late[theta] for theta, c in n.items()]
+    below = [control.tf(c, [1.0]) * late[theta] for theta, c in d.items()]
     return sum(top[1:], top[0]) / sum(below[1:], below[0])
 
 

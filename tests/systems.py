@@ -7,11 +7,14 @@ import numpy as np
 from armlock import (
     CommonArm,
     Controller,
-    DelayEquation,
     DualArm,
     HayesEquation,
     Loop,
     SingleArm,
+    delay,
+    equation,
+    parameter,
+    s,
 )
 from armlock.sensors import COMMON
 from tests.attack_judge import Sketch
@@ -22,6 +25,13 @@ def with_roots(*roots):
     return np.real(np.poly(roots))[::-1]
 
 
+def two_delays(rest, b1, b2, tau1, tau2, dead=0.0):
+    """R - exp(-s dead) [x B1 exp(-s tau1) + y B2 exp(-s tau2)] = 0, by coefficients."""
+    r, p, q = (sum(c * s**k for k, c in enumerate(given)) for given in (rest, b1, b2))
+    x, y = parameter("x"), parameter("y")
+    return equation(r - (x * p * delay(tau1) + y * q * delay(tau2)) * delay(dead))
+
+
 RETARDED = {
     "Hayes": HayesEquation(1.0),
     "single arm": SingleArm(1.0, 20.1),
@@ -30,43 +40,43 @@ RETARDED = {
     "dual arm": DualArm(gain=0.3),
     "common arm, dead time": CommonArm(0.4, 3.0, 2.1, delay=0.7),
     "dual arm, dead time": DualArm(0.3, 2.1, 1.7, 1.5, delay=0.4),
-    "oscillator": DelayEquation([2.0, 0.3, 1.0], [1.0], [0.0, 1.0], 1.0, 2.5),
-    "unstable oscillator": DelayEquation([2.0, -0.3, 1.0], [1.0, 0.5], [0.7], 0.4, 1.3),
-    "double integrator": DelayEquation([0.0, 0.0, 1.0], [-0.3, -1.1], [0.2], 0.5, 0.9),
-    "roots of A on the axis": DelayEquation(
+    "oscillator": two_delays([2.0, 0.3, 1.0], [1.0], [0.0, 1.0], 1.0, 2.5),
+    "unstable oscillator": two_delays([2.0, -0.3, 1.0], [1.0, 0.5], [0.7], 0.4, 1.3),
+    "double integrator": two_delays([0.0, 0.0, 1.0], [-0.3, -1.1], [0.2], 0.5, 0.9),
+    "roots of A on the axis": two_delays(
         with_roots(1j, -1j, 0.0), [-0.4, 0.1, -0.9], [0.2, 0.3], 0.7, 1.1
     ),
-    "third order, unstable A": DelayEquation(
+    "third order, unstable A": two_delays(
         with_roots(0.4, -1.0, -2.0), [1.0, 0.2, 0.5], [0.6, -1.0], 1.0, 3.0
     ),
-    "fourth order, two roots on the axis twice": DelayEquation(
+    "fourth order, two roots on the axis twice": two_delays(
         with_roots(2j, -2j, 2j, -2j), [0.5, -3.0, 0.0, 1.0], [1.0, 1.0], 0.3, 0.8
     ),
-    "fifth order, mixed": DelayEquation(
+    "fifth order, mixed": two_delays(
         with_roots(0.1 + 1j, 0.1 - 1j, -1.0, -0.5 + 2j, -0.5 - 2j),
         [1.0, 0.0, -1.0, 0.4],
         [0.5, 1.0, 0.0, 0.0, 0.8],
         2.0,
         1.2,
     ),
-    "no first parameter": DelayEquation([1.0, 1.0], [0.0], [1.0], 1.0, 2.0),
-    "no second parameter": DelayEquation([1.0, 0.2, 1.0], [1.0], [0.0], 1.0, 2.0),
-    "no parameter": DelayEquation(with_roots(0.5, -1.0), [0.0], [0.0], 1.0, 2.0),
-    "undelayed first parameter": DelayEquation([0.5, 0.1, 1.0], [1.0, 1.0], [1.0], 0.0, 1.5),
-    "equal delays": DelayEquation([1.0, 0.5, 1.0], [1.0, 0.2], [0.3, 1.0], 2.0, 2.0),
-    "zero of B1 on the axis": DelayEquation(
+    "no first parameter": two_delays([1.0, 1.0], [0.0], [1.0], 1.0, 2.0),
+    "no second parameter": two_delays([1.0, 0.2, 1.0], [1.0], [0.0], 1.0, 2.0),
+    "no parameter": two_delays(with_roots(0.5, -1.0), [0.0], [0.0], 1.0, 2.0),
+    "undelayed first parameter": two_delays([0.5, 0.1, 1.0], [1.0, 1.0], [1.0], 0.0, 1.5),
+    "equal delays": two_delays([1.0, 0.5, 1.0], [1.0, 0.2], [0.3, 1.0], 2.0, 2.0),
+    "zero of B1 on the axis": two_delays(
         [1.0, 2.0, 3.0, 1.0], [1.0, 0.0, 1.0], [1.0], 1.0, 2.0
     ),
-    "zero of B1 at the origin": DelayEquation([1.0, 2.0, 1.0], [0.0, 1.0], [1.5], 1.0, 2.0),
+    "zero of B1 at the origin": two_delays([1.0, 2.0, 1.0], [0.0, 1.0], [1.5], 1.0, 2.0),
 }
 
 NEUTRAL = {
-    "first order": DelayEquation([1.0, 1.0], [0.5, 1.0], [0.2, -0.5], 1.0, 1.7),
-    "integrator": DelayEquation([0.0, 1.0], [-1.0, 0.8], [0.5], 1.0, 0.6),
-    "second order, one neutral term": DelayEquation(
+    "first order": two_delays([1.0, 1.0], [0.5, 1.0], [0.2, -0.5], 1.0, 1.7),
+    "integrator": two_delays([0.0, 1.0], [-1.0, 0.8], [0.5], 1.0, 0.6),
+    "second order, one neutral term": two_delays(
         [1.0, -0.2, 1.0], [0.3, 0.1], [0.4, 0.0, 1.0], 2.0, 1.0
     ),
-    "third order, unstable A": DelayEquation(
+    "third order, unstable A": two_delays(
         with_roots(0.3, -1.0, -1.0), [1.0, 0.0, 0.0, 0.5], [0.0, 1.0, 0.0, 0.5], 0.8, 1.5
     ),
     "dead time": Loop(Controller([-0.3], [0.2], 0.2), COMMON, 2.0, 1.5, 0.6),

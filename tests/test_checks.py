@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 
 import armlock
-from armlock import CommonArm, DelayEquation, HayesEquation, SingleArm, paper_loop
+from armlock import CommonArm, HayesEquation, SingleArm, equation, paper_loop
 from armlock.checks import axis, complex_array, finite_series, real_array
 from armlock.controllers import integrating_actuator, roll_off, stage_one, table_two
 from armlock.robustness import first_crossing
 from armlock.sensors import COMMON, SignalMapping, dual
 from armlock.timedomain.discretize import warped
-from tests.systems import NEUTRAL
+from tests.systems import NEUTRAL, two_delays
 
 ARMS = CommonArm()
 LASER = armlock.LaserNoise(1)
 # Depends on no free parameter at s = 0.
-FLAT = DelayEquation([1.0, 1.0, 1.0], [0.0, 1.0], [0.0, 1.0], 1.0, 2.0)
+FLAT = two_delays([1.0, 1.0, 1.0], [0.0, 1.0], [0.0, 1.0], 1.0, 2.0)
 RUN: dict[str, Any] = {"sample_rate": 10.0, "limit": 1e6}
 LOOP: dict[str, Any] = {"tau1": 20.1, "tau2": 19.9, "delay": 0.0}
 POINT: dict[str, Any] = {"c1": 1.0, "c2": 1.0}
@@ -31,9 +31,6 @@ NOISE: dict[str, Any] = {"seed": 1, "sample_rate": 10.0, "cutoff": 1e-3}
 
 # A call of everything that takes arguments, with sensible ones.
 CALLS: dict[Callable[..., object], dict[str, Any]] = {
-    DelayEquation: {"rest": [1.0, 1.0], "b1": [1.0], "b2": [1.0], "tau1": 1.0,
-                             "tau2": 2.0, "delay": 0.0, "step": 0.0,
-                             "reference": (0.0, 0.0)},
     HayesEquation: {"tau": 1.0},
     SingleArm: {"gain": 1.0, "tau1": 1.0, "delay": 0.0},
     CommonArm: {"gain": 1.0} | LOOP,
@@ -50,8 +47,7 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     table_two: {"gain": 1.0, "denominator": "table"},
     COMMON.weights: {"s": 1j},
     ARMS: {"s": 1j} | POINT,
-    ARMS.characteristic: {"s": 1j} | POINT,
-    ARMS.neutral_margin: POINT,
+    equation(1 + ARMS): {"s": 1j} | POINT,
     armlock.unstable_roots: {"system": ARMS} | POINT,
     armlock.stability_chart: {"system": ARMS, "c1": [1.0], "c2": [1.0]},
     armlock.rightmost_root: {"system": ARMS} | POINT,
@@ -87,6 +83,8 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     warped: {"omega": 1.0, "sample_rate": 10.0},
     roll_off: {"first": 1.0, "last": 2.0, "pairs": 3, "slope": 0.5},
     armlock.delay: {"theta": 1.0},
+    armlock.parameter: {"name": "k", "nominal": 1.0},
+    equation: {"d": 1 + ARMS, "step": 0.0},
     armlock.pulling: {"loop": CommonArm(), "time": 1e5, "common": (1.0, 0.0, 0.0),
                       "differential": (0.0, 0.0, 0.0)},
 }  # fmt: skip
@@ -123,12 +121,8 @@ def test_every_public_function_is_called_above():
 
 # Beyond that, what each argument must be: one value past the constraint.
 WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
-    (DelayEquation, "b1", [1.0, 1.0, 1.0], "not exceed the degree"),
-    (DelayEquation, "delay", -1.0, "not be negative, got -1.0"),
-    (DelayEquation, "step", 0.3, "divide every delay, got step=0.3 for tau1"),
     (CommonArm, "gain", 0.0, "be positive, got 0.0"),
     (CommonArm, "delay", np.array([0.1, 0.2]), "be a real number, got array([0.1, 0.2])"),
-    (ARMS.neutral_margin, "c1", "1.0", "hold real numbers"),
     (paper_loop, "actuator", "no", "be True or False, got 'no'"),
     (armlock.transfer, "s", 0.0, "not be a pole of the open loop, got 0j"),
     (armlock.Controller, "gain", 0.0, "not be zero"),
@@ -141,14 +135,14 @@ WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
     (SignalMapping, "denominator", [0.0], "not be zero, got (0.0,)"),
     (dual, "difference", 0.0, "not be zero"),
     (armlock.stability_chart, "c1", [], "hold at least one value, got 0"),
-    (armlock.stability_chart, "c2", 1.0, "be of dimension 1, got shape ()"),
+    (armlock.stability_chart, "c2", [[1.0]], "be of dimension 1, got shape (1, 1)"),
     (armlock.d_curve, "system", SingleArm(), "depend on both free parameters"),
     (armlock.d_curve_line, "system", FLAT, "depend on a free parameter at s = 0"),
-    (first_crossing, "start", (0.0,), "hold two numbers, got 1"),
+    (first_crossing, "start", (0.0,), "hold as many numbers as there are parameters"),
     (first_crossing, "direction", (0.0, 0.0), "not have length zero"),
-    (armlock.nyquist, "loop", HayesEquation(), "be a Loop, for instance CommonArm()"),
+    (armlock.nyquist, "loop", HayesEquation(), "be an open loop L, not an equation D = 0"),
     (armlock.axis_crossings, "omega_max", None, "be given"),
-    (armlock.spectral_radius, "system", NEUTRAL["integrator"], "be of retarded type"),
+    (armlock.spectral_radius, "system", NEUTRAL["dead time"], "be of retarded type"),
     (armlock.spectral_radius, "system", armlock.semi_discretization(ARMS, 0.1), "be in contin"),
     (armlock.transition_matrix, "step", 1e-6, "be of a size that memory holds"),
     (armlock.semi_discretization, "order", 2, "be 0 or 1, got 2"),
@@ -180,10 +174,10 @@ def test_what_breaks_a_constraint_is_refused_with_it(function, name, value, cons
         function(**CALLS[function] | {name: value})
 
 
-@pytest.mark.parametrize("function", [ARMS.characteristic, armlock.unstable_roots])
+@pytest.mark.parametrize("function", [ARMS, armlock.unstable_roots])
 def test_arrays_broadcast_to_one_shape_or_are_refused(function):
     points = {"c1": [1.0, 2.0], "c2": [1.0, 2.0, 3.0]}
-    with pytest.raises(ValueError, match=r"c1 and c2 must broadcast together, got shapes "):
+    with pytest.raises(ValueError, match=r"c1 and c2 must broadcast together, got shapes"):
         function(**CALLS[function] | points)
 
 

@@ -8,23 +8,24 @@ from armlock import (
     BOUNDARY,
     CommonArm,
     Controller,
-    DelayEquation,
     DualArm,
     Loop,
     critical_perturbation,
     margins,
     unstable_roots,
 )
+from armlock.affine import Affine
 from armlock.engine import decide
 from armlock.robustness import first_crossing
 from armlock.sensors import COMMON, DIFFERENCE, dual
 from tests import independent
+from tests.systems import two_delays
 
 
 def around(loop, start, direction, position, near=1e-6):
     """Count the unstable roots before and past a crossing."""
     points = start + position * np.outer([1.0 - near, 1.0 + near], direction)
-    return [decide.count(loop.function(*point)) for point in points]
+    return [decide.count(Affine.of(loop).function(*point)) for point in points]
 
 
 def test_a_crossing_below_what_a_walk_in_polynomials_of_each_arm_sees_is_found():
@@ -33,7 +34,7 @@ def test_a_crossing_below_what_a_walk_in_polynomials_of_each_arm_sees_is_found()
     start, direction = np.array([1.0000024, 1.0000003518]), np.array([1.0, 1.0])
     found = first_crossing(loop, start, direction, 0.2)
     before, after = around(loop, start, direction, found.position)
-    assert decide.count(loop.function(*start)) == before > after >= 0
+    assert decide.count(Affine.of(loop).function(*start)) == before > after >= 0
 
 
 @pytest.mark.parametrize("zeros", [(), (-0.5,)])
@@ -65,7 +66,7 @@ def test_a_lost_chain_is_not_passed_over():
 
 
 # An oscillator with two delayed forces, and one of its crossings, known to rounding.
-OSCILLATOR = DelayEquation([1.0, 0.2, 1.0], [1.0], [1.0], 1.0, 2.0)
+OSCILLATOR = two_delays([1.0, 0.2, 1.0], [1.0], [1.0], 1.0, 2.0)
 BOUNDARY_POINT = (-0.40709479644622093, 0.185983667443698)
 
 
@@ -90,14 +91,14 @@ def test_a_first_crossing_may_lie_many_turns_up():
     # The resonance is 1.5e5 turns of the delay up, and damps until x is 4 pi 1.5e5 1e-6.
     resonance = 2.0 * np.pi * 1.5e5
     squared = [resonance**2, 2e-6 * resonance, 1.0]
-    system = DelayEquation(squared, [0.0, 1.0], [0.0], 1.0, 1.0)
+    system = two_delays(squared, [0.0, 1.0], [0.0], 1.0, 1.0)
     found = first_crossing(system, (0.0, 0.0), (1.0, 0.0))
     assert found.position == pytest.approx(2e-6 * resonance, rel=1e-9)
 
 
 def test_a_factor_before_the_equation_moves_no_crossing():
     plain, scaled = (
-        DelayEquation([2.0 * f, 0.3 * f, f], [f], [0.0, f], 1.0, 2.5) for f in (1.0, 1e-158)
+        two_delays([2.0 * f, 0.3 * f, f], [f], [0.0, f], 1.0, 2.5) for f in (1.0, 1e-158)
     )
     for direction in ((1.0, 0.5), (-1.0, 1.0)):
         found, expected = (

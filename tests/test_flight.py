@@ -8,6 +8,7 @@ import pytest
 from armlock import (
     Controller,
     Loop,
+    equation,
     flight_loop,
     nyquist,
     paper_loop,
@@ -70,4 +71,4 @@ def test_published_loops_are_stable_or_at_the_boundary(name):
     assert unstable_roots(loop, 1.0, 1.0) == 0
     # D of the plain PI loops has a root s = 0 at the ideal point, as of every such loop.
     of_d = {"PI": -1, "high-gain single arm": -1}.get(name, 0)
-    assert unstable_roots(loop.plain(), 1.0, 1.0) == of_d
+    assert unstable_roots(equation(1 + loop), 1.0, 1.0) == of_d

@@ -87,7 +87,7 @@ def asked(rng, loop, point):
         "margins, free": lambda: margins(loop, *point, free_above=above),
         "modulus_margin": partial(modulus_margin, loop, *point),
         "varying_radius": partial(varying_radius, loop, *point),
-        "peak_gain": lambda: peak_gain(loop.open_loop(*point).feedback()),
+        "peak_gain": lambda: peak_gain(loop.at(c1=point[0], c2=point[1]).feedback()),
         "critical_perturbation": partial(critical_perturbation, loop, way),
         "first_crossing": partial(first_crossing, loop, point, way),
         "rightmost_root": partial(rightmost_root, loop, *point),
@@ -96,7 +96,7 @@ def asked(rng, loop, point):
         "axis_crossings, up to": partial(axis_crossings, loop, *point, omega_max=100 * above),
         "box_count": partial(box_count, loop, attack.between(rng, 1e-9, 1e-2)),
         "pulling": partial(pulling, loop, [0.1, 10.0, 1e3, 1e5]),
-        "spectral_radius": lambda: spectral_radius(loop, point[0], point[1], step),
+        "spectral_radius": lambda: spectral_radius(loop, point[0], point[1], step=step),
         "d_curve": partial(d_curve, loop, omega),
     }
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from functools import reduce
 
 import control
 import mpmath
@@ -16,18 +15,20 @@ from armlock import (
     CommonArm,
     Controller,
     CountError,
-    DelaySystem,
     DualArm,
     Loop,
     SingleArm,
+    System,
     critical_perturbation,
     delay,
+    equation,
     margins,
     modulus_margin,
     paper_loop,
     stability_chart,
     unstable_roots,
 )
+from armlock.affine import Affine
 from armlock.engine.decide import count
 from armlock.engine.margins import gain_range
 from armlock.engine.polynomials import Polynomial
@@ -161,7 +162,7 @@ def test_critical_perturbation_to_nine_digits(angle):
     ],
 )
 def test_critical_perturbation_from_the_boundary_inwards(loop, direction):
-    assert unstable_roots(loop.plain(), 1.0, 1.0) == BOUNDARY
+    assert unstable_roots(equation(1 + loop), 1.0, 1.0) == BOUNDARY
     eps = critical_perturbation(loop, direction)
     shares = [*np.geomspace(1e-5, 0.99, 20), 1.0 - 1e-9, 1.0 + 1e-9]
     counts = unstable_roots(loop, *(1.0 + eps * np.outer(direction, shares)))
@@ -213,7 +214,9 @@ def test_along_the_line_on_which_the_root_at_zero_cancels_another_root_is_first(
         found = []
         for share in (1e-6, 0.5, 1.0 - 1e-9, 1.0 + 1e-9):
             point = [1 + Fraction(share * eps) * Fraction(d) for d in direction]
-            found.append(count(loop.function(*point), loop.cancelled(*point)))
+            found.append(
+                count(Affine.of(loop).function(*point), Affine.of(loop).cancelled(*point))
+            )
         assert found == [0, 0, 0, 2]
 
 
@@ -236,7 +239,7 @@ def test_a_gain_that_takes_a_real_root_to_zero_is_that_of_the_finite_open_loop()
 
 @pytest.mark.parametrize("loop", [SingleArm(50.0, 10.0, 0.05), DualArm(gain=10.0, delay=1.0)])
 def test_roots_behind_the_one_at_zero_are_not_passed_over(loop):
-    assert unstable_roots(loop.plain(), 1.0, 1.0) == BOUNDARY
+    assert unstable_roots(equation(1 + loop), 1.0, 1.0) == BOUNDARY
     assert unstable_roots(loop) > 0
     with pytest.raises(ValueError, match=r"must be stable, but it has \d+ unstable roots"):
         margins(loop)
@@ -321,7 +324,7 @@ def test_an_all_pass_just_below_unity_gain_is_stable_up_to_unity_gain(gain):
     all_pass = Controller([1.0], [-1.0], gain)
     loop = Loop(all_pass, SINGLE, 1.0, 1.0, delay=0.5)
     assert unstable_roots(loop, 0.0) == 0
-    lower, upper, omega = gain_range(*loop.quotient(0.0, 1.0))
+    lower, upper, omega = gain_range(*Affine.of(loop).quotient(0.0, 1.0))
     assert (lower, omega) == (0.0, np.inf)
     assert upper == pytest.approx(1.0 / gain, rel=1e-14)
 
@@ -437,7 +440,7 @@ def test_forty_poles_do_not_overflow(size):
     weak = Loop(Controller([], poles, 0.1), SINGLE, 20.0)
     # |L| is far below one, or far above it up to 40 times the poles, where L turns ten times.
     assert unstable_roots(weak, 0.5) == (0 if size > 1.0 else 20)
-    by_sums = DelaySystem.of(weak.controller) * (1 - 0.5 * delay(20.0))
+    by_sums = System.of(weak.controller) * (1 - 0.5 * delay(20.0))
     assert unstable_roots(by_sums) == unstable_roots(weak, 0.5)
     assert stability_chart(weak, [0.5], [0.0]).counts == unstable_roots(weak, 0.5)
     if size > 1.0:
@@ -446,7 +449,7 @@ def test_forty_poles_do_not_overflow(size):
 
 def arms_over(polynomial, gains, lags, size):
     """A sum of delays over a polynomial, all coefficients times the size."""
-    constants = [DelaySystem.of(control.tf([size * gain], [1.0])) for gain in gains]
+    constants = [System.of(control.tf([size * gain], [1.0])) for gain in gains]
     arms = sum(gain * delay(lag) for gain, lag in zip(constants, lags, strict=True))
     return arms / control.tf([size * value for value in polynomial], [1.0])
 
@@ -480,17 +483,17 @@ def test_coefficients_that_are_no_floats_keep_their_roots(size):
 
 def test_slow_poles_that_were_multiplied_out_have_their_margins_through_every_door():
     """Eight of them, as coefficients: numpy's roots lie one percent off theirs."""
-    below = reduce(np.polymul, [[1.0, 1e-6]] * 8)
+    below = np.poly([-1e-6] * 8)
     given = control.tf([0.5e-48], below)
     loop = Loop(given, "single", tau1=20.1)
-    by_sums = DelaySystem.of(given) * (1 - 0.2 * delay(20.1))
+    by_sums = System.of(given) * (1 - 0.2 * delay(20.1))
     for found in (margins(loop, 0.2), margins(by_sums)):
         assert found.gain_upper == pytest.approx(4.709964, rel=1e-6)
     # Three equal slow zeros, of which numpy's roots are a thousandth off.
     above = np.poly([-3.14159e-5] * 3)
     slow = control.tf(0.3 * above, np.poly([-1e-6] * 3 + [-2.0]))
     factors = Controller([-3.14159e-5] * 3, [-1e-6] * 3 + [-2.0], 0.3)
-    found, expected = (margins(DelaySystem.of(k) * delay(0.5)) for k in (slow, factors))
+    found, expected = (margins(System.of(k) * delay(0.5)) for k in (slow, factors))
     assert found.gain_upper == pytest.approx(expected.gain_upper, rel=1e-6)
     assert found.modulus == pytest.approx(expected.modulus, rel=1e-6)
 
@@ -533,8 +536,8 @@ def test_a_gain_margin_is_searched_until_it_is_found():
 
 def test_a_gain_margin_is_infinite_only_if_that_is_proven():
     proven = (
-        SingleArm(), CommonArm(gain=10.0), DelaySystem.of(control.tf([1], [1, 0.1, 0])),
-        DualArm().open_loop(0.999, 1.0), DelaySystem.of(control.tf([4], [1, 2, 4])),
+        SingleArm(), CommonArm(gain=10.0), System.of(control.tf([1], [1, 0.1, 0])),
+        DualArm().at(c1=0.999, c2=1.0), System.of(control.tf([4], [1, 2, 4])),
     )  # fmt: skip
     for loop in proven:
         assert margins(loop).gain_upper == np.inf

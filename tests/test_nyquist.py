@@ -12,12 +12,13 @@ from scipy.optimize import brentq
 from armlock import (
     CommonArm,
     CountError,
-    DelaySystem,
     DualArm,
     Loop,
     SingleArm,
+    System,
     axis_crossings,
     delay,
+    equation,
     flight_loop,
     nyquist,
     paper_loop,
@@ -97,7 +98,7 @@ def test_roots_that_cancel_at_zero_hide_no_other(seed):
     loop = Loop(controller, mapping, 2.0, 1.5, delay=float(rng.choice([0.0, 0.3])))
     if mapping is DIFFERENCE and c == 0.0:
         cancelled = integrators
-    assert unstable_roots(loop.plain(), *point) == -1
+    assert unstable_roots(equation(1 + loop), *point) == -1
     expected = independent.rectangle_count(loop, point[0], point[1], at_zero=cancelled)
     assert unstable_roots(loop, *point) == expected
     assert nyquist(loop, *point).closed_loop_roots == expected
@@ -236,7 +237,7 @@ def test_a_system_with_three_delays_has_a_curve_and_crossings():
 
     # A Smith predictor that takes 1.2 s for 1 s.
     plant, pi = control.tf([1], [2, 1]), control.tf([4, 2], [1, 0])
-    predictor = DelaySystem.of(pi).feedback(plant - plant * delay(1))
+    predictor = System.of(pi).feedback(plant - plant * delay(1))
     loop = predictor * plant * delay(1.2)
     curve = nyquist(loop)
     assert (curve.pole_order, curve.open_loop_poles) == (1, 0)
@@ -247,7 +248,7 @@ def test_a_system_with_three_delays_has_a_curve_and_crossings():
     value = loop(1j * omega)
     change = (value.imag[1:] * value.imag[:-1] < 0.0) & (value.real[1:] < -1e-3)
     assert crossings.omega.size == change.sum() > 0
-    with pytest.raises(TypeError, match="a DelaySystem has no perturbations, got c1 = 2"):
+    with pytest.raises(TypeError, match="1 values are given for the parameters"):
         nyquist(loop, 2.0)
 
 
@@ -284,6 +285,6 @@ def test_a_picture_shows_a_resonance_between_its_even_samples():
 def test_undamped_pairs_that_were_multiplied_out_stay_on_the_axis(below):
     """P does not follow the sign of what rounding leaves of their damping."""
     given = control.tf([0.3, 1.0], below)
-    for loop in (Loop(given, "single", 1.3), DelaySystem.of(given) * (1 - 0.9 * delay(1.3))):
+    for loop in (Loop(given, "single", 1.3), System.of(given) * (1 - 0.9 * delay(1.3))):
         with pytest.raises(ValueError, match="no pole on the imaginary axis except at s = 0"):
             nyquist(loop)

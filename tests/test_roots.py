@@ -14,15 +14,16 @@ from scipy.special import lambertw
 
 from armlock import (
     CommonArm,
-    DelayEquation,
-    DelaySystem,
     DualArm,
     HayesEquation,
     Loop,
     RootError,
     SingleArm,
+    System,
     delay,
+    equation,
     paper_loop,
+    parameter,
     rightmost_root,
     unstable_roots,
 )
@@ -30,6 +31,7 @@ from armlock.loops import flight_loop
 from armlock.paper import DUAL_SENSOR_CORNER
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
 from tests import independent
+from tests.systems import two_delays
 
 PAPER = paper_loop(actuator=True).controller
 # Twenty-six poles over four decades.
@@ -73,9 +75,9 @@ def test_hayes_root_is_the_principal_branch_of_lambert(a, b, tau):
     assert root.imag == pytest.approx(abs(expected.imag), rel=1e-9, abs=1e-7 / tau)
 
 
-DEADBEAT = DelayEquation([0.0, 1.0], [1.0], [0.0], 1.0, 1.0, step=1.0)
-OSCILLATOR = DelayEquation([1.0, 0.0, 1.0], [1.0, 1.0], [1.0], 0.0, 0.0)
-LOST = DelayEquation(
+DEADBEAT = equation(1 - parameter("x") * (q := delay(1.0)) * q + 0 * parameter("y"), step=1.0)
+OSCILLATOR = two_delays([1.0, 0.0, 1.0], [1.0, 1.0], [1.0], 0.0, 0.0)
+LOST = two_delays(
     [-0.3585, -0.0848, -0.4575, -2.4528, 0.02115],
     [0.1308, 0.238, -0.497, 0.172, 0.10785],
     [-0.884, -1.101, 0.238, -0.477, 0.5011],
@@ -84,7 +86,7 @@ LOST = DelayEquation(
 )
 # Loop, point, root, and how far off it may be.
 CLOSED: dict[str, tuple[Any, tuple[float, float], complex, float]] = {
-    "at zero": (CommonArm().plain(), (1.0, 1.0), 0.0, 1e-15),
+    "at zero": (equation(1 + CommonArm()), (1.0, 1.0), 0.0, 1e-15),
     "on the axis": (HayesEquation(), (0.0, -np.pi / 2), 0.5j * np.pi, 1e-12),
     "double": (HayesEquation(), (0.0, -np.exp(-1.0)), -1.0, 1e-5),
     "without delays": (OSCILLATOR, (-1.0, 0.3), -0.5 + 1j * np.sqrt(1.45), 1e-12),
@@ -214,7 +216,7 @@ def test_roots_far_slower_than_the_delays_or_far_up_are_certified(loop, point):
 
 def test_a_root_that_cancels_in_the_loop_is_none_of_its_roots():
     # At c1 = c2 the sensor's integral has its root at s = 0.
-    assert rightmost_root(DualArm().plain(), 1.0, 1.0) == 0.0
+    assert rightmost_root(equation(1 + DualArm()), 1.0, 1.0) == 0.0
     loop = DualArm()
     root = rightmost_root(loop, 1.0, 1.0)
     assert unstable_roots(loop, 1.0, 1.0) == 0
@@ -239,7 +241,7 @@ def test_a_multiple_root_is_found(poles):
 def test_a_multiple_root_with_rounded_coefficients_is_a_cluster():
     # (s + 0.1)^4: four roots about 1e-5 from one another are those of the floats.
     p = [1.0, 0.4, 0.06, 0.004, 0.0001]
-    root = rightmost_root(DelaySystem.of(control.tf(p, [1.0, 2.0, 1.0, 4.0, 3.0])) - 1)
+    root = rightmost_root(System.of(control.tf(p, [1.0, 2.0, 1.0, 4.0, 3.0])) - 1)
     with mpmath.workdps(60):
         exact = mpmath.polyroots(p[::-1], maxsteps=500, extraprec=500, asc=True)
         assert abs(root - max(exact, key=lambda s: s.real)) < 1e-15
@@ -247,7 +249,7 @@ def test_a_multiple_root_with_rounded_coefficients_is_a_cluster():
 
 def test_a_double_real_root_of_a_loop_with_delays():
     # 1 + L = (s + 1)^2 (s + 2 + exp(-s) / 10) / (s + 2)^3, with other roots further left.
-    square = DelaySystem.of(control.tf([1, 2, 1], [1]))
+    square = System.of(control.tf([1, 2, 1], [1]))
     loop = square * (control.tf([1, 2], [1]) + 0.1 * delay(1.0)) / control.tf([1, 2], [1]) - 1
     assert abs(rightmost_root(loop) - -1.0) < 1e-12
 

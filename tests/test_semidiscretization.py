@@ -41,7 +41,11 @@ def test_spectral_radii_of_the_common_arm(table):
     assert len(rows) == 2
     for row in rows:
         radius = spectral_radius(
-            CommonArm(), float(row["c1"]), float(row["c2"]), float(row["h"]), int(row["order"])
+            CommonArm(),
+            float(row["c1"]),
+            float(row["c2"]),
+            step=float(row["h"]),
+            order=int(row["order"]),
         )
         given_digits = len(row["value"].split("e")[0].strip("-").replace(".", ""))
         excess = f"{float(radius) - 1.0:.{given_digits - 1}e}"
@@ -54,7 +58,7 @@ def test_convergence_of_the_dominant_eigenvalue(system, order, observed):
     exact = np.exp(rightmost_root(system, -0.4, 0.3).real)
     steps = np.array([0.1, 0.05, 0.025])
     errors = [
-        abs(float(spectral_radius(system, -0.4, 0.3, h, order)) ** (1.0 / h) - exact)
+        abs(float(spectral_radius(system, -0.4, 0.3, step=h, order=order)) ** (1.0 / h) - exact)
         for h in steps
     ]
     slope = np.polyfit(np.log(steps), np.log(errors), 1)[0]
@@ -63,8 +67,8 @@ def test_convergence_of_the_dominant_eigenvalue(system, order, observed):
 
 def test_delays_off_the_grid_by_rounding_alone_are_accepted():
     # The quotient 19.9 / 0.05 lies below 398 in floating point.
-    assert transition_matrix(CommonArm(), 1.0, 1.0, 0.05).shape == (403, 403)
-    row = transition_matrix(CommonArm(), 1.0, 2.0, 0.05)[0]
+    assert transition_matrix(CommonArm(), 1.0, 1.0, step=0.05).shape == (403, 403)
+    row = transition_matrix(CommonArm(), 1.0, 2.0, step=0.05)[0]
     assert np.flatnonzero(row).tolist() == [0, 398, 402]
     assert row[398] == pytest.approx(2.0 * row[402])
 
@@ -80,11 +84,11 @@ def test_a_dead_time_is_a_further_delay_of_the_map(order):
     loop = DualArm(0.3, 3.0, 2.0, delay=0.5)
     held = semi_discretization(loop, 0.25, order)
     for x, y in [(1.0, 0.0), (0.9, 1.05), (-1.2, 0.4)]:
-        eigenvalues = np.linalg.eigvals(transition_matrix(loop, x, y, 0.25, order))
+        eigenvalues = np.linalg.eigvals(transition_matrix(loop, x, y, step=0.25, order=order))
         assert unstable_roots(held, x, y) == np.count_nonzero(np.abs(eigenvalues) > 1.0)
         largest = np.abs(eigenvalues).max()
         assert np.exp(0.25 * rightmost_root(held, x, y).real) == pytest.approx(largest)
-    fine = float(spectral_radius(loop, 0.9, 1.05, 0.025, order)) ** 40.0
+    fine = float(spectral_radius(loop, 0.9, 1.05, step=0.025, order=order)) ** 40.0
     exact = np.exp(rightmost_root(loop, 0.9, 1.05).real)
     assert fine == pytest.approx(exact, rel=1e-2 if order == 0 else 1e-5)
     with pytest.raises(ValueError, match=r"^step must divide every delay, .* for delay=0.5"):
@@ -92,7 +96,7 @@ def test_a_dead_time_is_a_further_delay_of_the_map(order):
 
 
 def test_a_parameter_without_a_delay_makes_no_affine_map():
-    with pytest.raises(ValueError, match=r"^the free parameter x of .* undelayed signal"):
+    with pytest.raises(ValueError, match=r"^the parameter x of .* undelayed signal"):
         semi_discretization(RETARDED["undelayed first parameter"], 0.25)
 
 
@@ -109,9 +113,9 @@ def test_a_frequency_at_which_the_direction_has_no_effect_is_no_crossing(order):
 def test_slow_poles_that_rounding_scatters_have_a_spectral_radius(point):
     # Dense eigenvalues give 1.00002.
     loop = paper_loop(actuator=True)
-    eigenvalues = np.linalg.eigvals(transition_matrix(loop, point[0], point[1], 0.1))
+    eigenvalues = np.linalg.eigvals(transition_matrix(loop, point[0], point[1], step=0.1))
     assert np.abs(eigenvalues).max() > 1.0 + 1e-5
-    radius = float(spectral_radius(loop, point[0], point[1], 0.1))
+    radius = float(spectral_radius(loop, point[0], point[1], step=0.1))
     rate = rightmost_root(loop, *point).real
     assert radius - 1.0 == pytest.approx(0.1 * rate, rel=1e-4)
 

@@ -156,7 +156,7 @@ def two_trips(tau1, tau2, c1=1.0, c2=1.0, controller=None, difference=None):
         return 1 + rational(k, s) * arms
 
     loop = Loop(k, dual(paper.DUAL_SENSOR_CORNER, scale), tau1, tau2)
-    return f, loop.open_loop(c1, c2), (100.0, 30.0, tau1)
+    return f, loop.at(c1=c1, c2=c2), (100.0, 30.0, tau1)
 
 
 def weights(sensor):

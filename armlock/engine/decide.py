@@ -18,7 +18,8 @@ import numba
 import numpy as np
 
 from armlock.checks import FloatArray, IntArray
-from armlock.engine import inclusion
+from armlock.engine import chain, inclusion
+from armlock.engine.chain import UndecidedError
 from armlock.engine.functions import Function, Leading, Space, compiled, stacked
 from armlock.engine.inclusion import DISTANCE, VERTEX, Functions, Question
 from armlock.engine.polynomials import rounded
@@ -27,6 +28,8 @@ from armlock.engine.polynomials import rounded
 BOUNDARY = -1
 #: What a count is where infinitely many roots do not stay left of the axis.
 UNCONFINED = -2
+#: What a count among many is that takes too many steps; alone it raises an `UndecidedError`.
+UNDECIDED = -3
 
 # Most steps of a count, and of a search; up to ten seconds each.
 _MOST_STEPS = 1_500_000
@@ -37,14 +40,6 @@ _A_WHILE = 100_000
 _A_LOOK = 2_000
 # Points that one thread counts at a time.
 _BLOCK = 256
-
-
-class UndecidedError(RuntimeError):
-    """Double precision, or the steps allowed, did not decide; `index` of many functions."""
-
-    def __init__(self, message: str, index: int = 0) -> None:
-        super().__init__(message)
-        self.index = index
 
 
 def in_threads(function: Callable[[Any], Any], items: Iterable[Any]) -> list[Any]:
@@ -66,7 +61,7 @@ def counts(
     space: Space,
     functions: Functions,
     *,
-    leading: Leading | None = None,
+    leading: Sequence[Leading | None] | None = None,
     most: int = _MOST_STEPS,
 ) -> IntArray:
     """Count the zeros with positive real part of n functions (Lemma 13).
@@ -77,26 +72,23 @@ def counts(
         Of all functions.
     functions : Functions
         The n functions, by their weights.
-    leading : Leading, optional
-        Of one function, with zeros at s = 0 that are not to count.
+    leading : sequence of n Leading or None, optional
+        Of functions with zeros at s = 0 that are not to count.
     most : int, optional
         Most steps of a count.
 
     Returns
     -------
     int array, shape (n,)
-        BOUNDARY and UNCONFINED included.
-
-    Raises
-    ------
-    UndecidedError
-        If a count takes too many steps.
+        BOUNDARY, UNCONFINED and UNDECIDED included.
     """
     _, steady, delayed, uncertain = functions
     n = len(steady)
     # The error of the weights is a term of any phase.
     ends = space.confined_from(steady, delayed, uncertain) * (1.0 if space.step else 2.0)
-    order, begin = (leading.order, leading.radius) if leading else (0, 0.0)
+    leads = leading or [None] * n
+    order = np.array([lead.order if lead else 0 for lead in leads])
+    begin = np.array([lead.radius if lead else 0.0 for lead in leads])
     found = np.full(n, UNCONFINED, dtype=np.int64)
     here = np.flatnonzero(np.isfinite(ends))
     ends = np.maximum(ends, 2.0 * begin)
@@ -106,31 +98,34 @@ def counts(
     def some(block: slice) -> tuple[Any, ...]:
         k = here[block]
         chosen = Functions(space.arrays, steady[k], delayed[k], uncertain[k])
-        found: tuple[Any, ...] = inclusion.wind(chosen, np.full(k.size, begin), ends[k], most)
+        found: tuple[Any, ...] = inclusion.wind(chosen, begin[k], ends[k], most)
         return found
 
     turn, first, last, undecided, steps = map(
         np.concatenate, zip(*in_threads(some, blocks(here.size, _BLOCK)), strict=True)
     )
-    if (steps >= most).any():
-        k = int(np.argmax(steps >= most))
-        raise UndecidedError(
-            f"a count takes more than {most:.0e} steps, up to {undecided[k]:.3g} rad/s",
-            int(here[k]),
-        )
     # At s = 0 all is real; the value found there is off by less than a quarter turn.
-    direction = leading.direction if leading else np.sign(first.real)
-    still = np.sign(space.limits(steady[here], delayed[here])[0]) * 1j ** (space.degree % 4)
+    directions = [
+        lead.direction if lead else np.sign(value)
+        for lead, value in zip((leads[int(k)] for k in here), first.real, strict=True)
+    ]
+    still, late = space.limits(steady[here], delayed[here])
+    closing = np.zeros(here.size)
     if space.step:
         # There the function of a map is real.
-        still = np.sign(last.real)
+        at_end = np.sign(last.real)
+    else:
+        for i in np.flatnonzero(chain.shared(space.lags, late)):
+            closing[i] = chain.turned(space.lags, still[i], late[i], ends[here[i]])
+        at_end = np.sign(still) * 1j ** (space.degree % 4) * np.exp(1j * closing)
     with np.errstate(all="ignore"):
-        turn = turn + np.angle(first / direction) - np.angle(last / still)
+        turn = turn + np.angle(first / directions) - np.angle(last / at_end) - closing
     # A map counts zeros in the strip |Im s| < pi / step, at whose right end it is constant.
-    number = 0.5 * ((0 if space.step else space.degree) - order) - turn / np.pi
+    number = 0.5 * ((0 if space.step else space.degree) - order[here]) - turn / np.pi
     with np.errstate(invalid="ignore"):
         sure = np.isnan(undecided) & (np.abs(number - np.round(number)) < 1e-2)
         found[here] = np.where(sure & (number > -0.5), np.round(number), BOUNDARY)
+    found[here[steps >= most]] = UNDECIDED
     return found
 
 
@@ -154,17 +149,25 @@ def count(
     -------
     int
         BOUNDARY with another zero on that line, or where rounding does not decide; UNCONFINED.
+
+    Raises
+    ------
+    UndecidedError
+        If it takes too many steps.
     """
     if right_of:
         found = int(counts(*function.shifted(right_of), most=most)[0])
-        return found - common if right_of < 0.0 <= found else found
-    leading = function.leading()
-    functions = compiled([function])
-    if leading is None or leading.order > common:
-        end = function.space.confined_from(functions.steady, functions.delayed)[0]
-        return BOUNDARY if np.isfinite(end) else UNCONFINED
-    begin = leading if leading.order else None
-    return int(counts(function.space, functions, leading=begin, most=most)[0])
+        found -= common if right_of < 0.0 <= found else 0
+    else:
+        leading = function.leading()
+        if leading is None or leading.order > common:
+            return BOUNDARY if function.confined else UNCONFINED
+        begin = leading if leading.order else None
+        functions = compiled([function])
+        found = int(counts(function.space, functions, leading=[begin], most=most)[0])
+    if found == UNDECIDED:
+        raise UndecidedError(f"a count takes more than {most:.0e} steps")
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,12 +274,16 @@ class Family:
     def _end(self, vertices: list[Function], terms: list[Function]) -> float:
         """Return the frequency past which some vertices exceed some terms, or inf."""
         steady, delayed = stacked(vertices)
-        whole, _ = self.space.limits(steady, delayed)
-        if (whole > 0.0).any() and (whole < 0.0).any():
-            return np.inf
+        still, late = self.space.limits(steady, delayed)
         size = sum((f.sizes for f in terms), np.zeros(steady.shape[1]))
-        top = sum(f.size_at_infinity for f in terms)
-        return float(self.space.confined_from(steady, delayed, size, top_terms=top).max())
+        top, least = sum(f.size_at_infinity for f in terms), None
+        if not self.space.step and chain.shared(self.space.lags, late).any():
+            least = chain.hull_reserve(self.space.lags, still, late)
+        elif (still > 0.0).any() and (still < 0.0).any():
+            return np.inf
+        return float(
+            self.space.confined_from(steady, delayed, size, top_terms=top, reserve=least).max()
+        )
 
     def _arc_ends(self, angle: float) -> float:
         """Do what `ends` does for an arc around zero: abs(1 + c exp(j psi)) is monotonic."""

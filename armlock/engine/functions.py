@@ -21,8 +21,9 @@ import mpmath
 import numpy as np
 import numpy.typing as npt
 
-from armlock.checks import ComplexArray, FloatArray
-from armlock.engine import inclusion
+from armlock.checks import BoolArray, ComplexArray, FloatArray
+from armlock.engine import chain, inclusion
+from armlock.engine.chain import Delay, Lag
 from armlock.engine.inclusion import EPSILON, Arrays
 from armlock.engine.polynomials import Polynomial, rounded
 
@@ -64,19 +65,34 @@ class Space:
     ----------
     polynomials : sequence of Polynomial
         Not zero.
-    delays : iterable of Fraction
-        Delays in s; those that are not zero count, each of them once.
+    delays : iterable of Lag or Fraction
+        Products of delay objects, each of them once; a number stands for an object of its own.
+        Those of length zero do not count.
     step : float, optional
         Sampling step in s of which all delays are multiples, if the functions are those of a
         map. They repeat along the axis, which then ends at pi / step.
     """
 
     def __init__(
-        self, polynomials: Sequence[Polynomial], delays: Iterable[Fraction], step: float = 0.0
+        self,
+        polynomials: Sequence[Polynomial],
+        delays: Iterable[Lag | Fraction],
+        step: float = 0.0,
     ) -> None:
         self.polynomials = tuple(polynomials)
         self.step = step
-        self.delays = tuple(sorted({Fraction(theta) for theta in delays} - {Fraction(0)}))
+        given = (
+            lag if isinstance(lag, Lag) else Lag([(Delay(Fraction(lag), ""), 1)])
+            for lag in delays
+        )
+        #: Products of delay objects, by their length, one for each column of W.
+        self.lags = tuple(
+            sorted(
+                {lag for lag in given if lag.time},
+                key=lambda lag: (lag.time, [(d.mark, n) for d, n in lag]),
+            )
+        )
+        self.delays = tuple(lag.time for lag in self.lags)
         self.degree = max(p.degree for p in self.polynomials)
         self.longest = float(max(self.delays, default=Fraction(0)))
         unit = 1.0 / self.longest if self.longest else 1.0
@@ -136,6 +152,56 @@ class Space:
         whole = (steady - delayed.sum(-1)) @ self.lead
         return whole, np.einsum("...jk,j->...k", delayed, self.lead)
 
+    def radius(
+        self,
+        weights: Sequence[Sequence[FloatArray]],
+        orders: Sequence[int],
+        logs: Sequence[float],
+        share: float,
+    ) -> FloatArray:
+        """Radii up to which all terms of higher power are at most a share of a leading one.
+
+        By Cauchy's bound of all coefficients, on circles of several radii (Lemma 11).
+
+        Parameters
+        ----------
+        weights : sequence of pairs of float arrays, shapes (n, J) and (n, J, K)
+            Of n functions; or of two times n, whose products are meant.
+        orders, logs : sequences, length n
+            The power of the leading term, and the logarithm of its coefficient.
+        share : float
+            That share.
+        """
+        rho = np.geomspace(1e-4, 10.0, 24) * self.corners[0]
+        arrays = self.arrays
+        with np.errstate(divide="ignore", over="ignore"):
+            distances = np.log(np.abs(arrays.roots)[..., None] + rho)
+            sizes = np.where(arrays.present[..., None], distances, 0.0).sum(1)
+            sizes = sizes + np.log(np.abs(arrays.lead) * (1.0 + arrays.missed))[:, None]
+            turned = np.expm1(np.multiply.outer(arrays.delays, rho))
+            most = sum(
+                np.logaddexp.reduce(
+                    sizes + np.log(np.abs(s)[..., None] + np.abs(w) @ turned), axis=1
+                )
+                for s, w in weights
+            )
+        ratio = np.log(0.9 * share) + np.array(logs)[:, None]
+        ratio = ratio + np.multiply.outer(np.array(orders), np.log(rho)) - most
+        shares = np.exp(np.minimum(ratio, -np.log(10.0)))
+        found: FloatArray = (shares * rho).max(axis=1) * (1.0 - 1e-9)
+        return found
+
+    def confined(self, still: FloatArray, late: FloatArray) -> BoolArray:
+        """Tell of which functions the neutral chain is confined, by their limits, shape (n,).
+
+        By more than rounding; a map has no such chain.
+        """
+        if self.step:
+            return np.ones(len(still), np.bool_)
+        sizes = np.abs(still) + np.abs(late).sum(-1)
+        found: BoolArray = chain.reserve(self.lags, still, late) > 16.0 * EPSILON * sizes
+        return found
+
     def confined_from(
         self,
         steady: FloatArray | ComplexArray,
@@ -144,8 +210,9 @@ class Space:
         *,
         extra: float | FloatArray = 0.0,
         top_terms: float | FloatArray | None = None,
+        reserve: float | FloatArray | None = None,
     ) -> FloatArray:
-        """Frequency past which, for Re s >= 0, what nothing delays exceeds all else (Lemma 12).
+        """Frequency past which, for Re s >= 0, the highest power exceeds all else (Lemma 12).
 
         Parameters
         ----------
@@ -158,6 +225,9 @@ class Space:
         top_terms : float or float array, shape (n,), optional
             Size of the terms over s^degree at infinity; that of their weights by default.
             Polynomials that cancel there make it less.
+        reserve : float or float array, shape (n,), optional
+            A lower bound of the function over s^degree at infinity; that of `chain.reserve` by
+            default.
 
         Returns
         -------
@@ -172,11 +242,12 @@ class Space:
         terms = np.broadcast_to(np.abs(terms), whole.shape)
         parts = parts + terms + np.abs(extra)
         still, turned = self.limits(steady, delayed)
-        top, others = np.abs(still), np.abs(turned).sum(-1)
-        others = others + (terms @ lead if top_terms is None else top_terms)
-        found = np.full(len(steady), np.inf)
+        if reserve is None:
+            reserve = chain.reserve(self.lags, still, turned)
         rounding = 64.0 * EPSILON * ((np.abs(whole) + parts) @ lead)
-        left = np.flatnonzero(top - others > rounding)
+        room = reserve - (terms @ lead if top_terms is None else top_terms) - rounding
+        found = np.full(len(steady), np.inf)
+        left = np.flatnonzero(room > 0.0)
         omega = self.corners[-1]
         for _ in range(300):
             if not left.size:
@@ -187,7 +258,7 @@ class Space:
                 share = size * float(omega) ** -gap.astype(float)
             off = np.where(gap == 0, share * grown, share * (1.0 + grown))
             spent = (np.abs(whole[left]) + parts[left]) @ off
-            done = top[left] - others[left] - rounding[left] > spent
+            done = room[left] > spent
             found[left[done]] = omega
             left = left[~done]
             omega *= 2.0
@@ -236,6 +307,12 @@ class Function:
         return float(abs(still) + np.abs(turned).sum())
 
     @property
+    def confined(self) -> bool:
+        """Whether its neutral chain is confined, by more than rounding."""
+        still, late = self.space.limits(*(part[None] for part in self.weights))
+        return bool(self.space.confined(still, late)[0])
+
+    @property
     def is_zero(self) -> bool:
         """Whether the function is zero everywhere."""
         return not (self.steady.any() or self.delayed.any())
@@ -274,6 +351,14 @@ class Function:
         k = next(i for i, value in enumerate(c) if value)
         return Leading(k, c[k], self.radius(k, abs(c[k]), share))
 
+    @property
+    def order(self) -> int | None:
+        """Order of the zero at s = 0; None where the first 16 coefficients are zero."""
+        for number in (1, 2, _MOST_TERMS):
+            if any(c := self.series(number)):
+                return next(k for k, value in enumerate(c) if value)
+        return None
+
     def radius(
         self, order: int, coefficient: Fraction, share: float, other: Function | None = None
     ) -> float:
@@ -282,23 +367,8 @@ class Function:
         By Cauchy's bound of all coefficients, on circles of several radii (Lemma 11); of the
         product with another function, if there is one.
         """
-        rho = np.geomspace(1e-4, 10.0, 24) * self.space.corners[0]
-        most = self._largest(rho) if other is None else self._largest(rho) + other._largest(rho)
-        ratio = np.log(0.9 * share) + _log(coefficient) + order * np.log(rho) - most
-        shares = np.exp(np.minimum(ratio, -np.log(10.0)))
-        return float((shares * rho).max()) * (1.0 - 1e-9)
-
-    def _largest(self, rho: FloatArray) -> FloatArray:
-        """Logarithm of a bound of the function on circles around s = 0."""
-        arrays, (s, w) = self.space.arrays, self.weights
-        with np.errstate(divide="ignore", over="ignore"):
-            distances = np.log(np.abs(arrays.roots)[..., None] + rho)
-            sizes = np.where(arrays.present[..., None], distances, 0.0).sum(1)
-            sizes = sizes + np.log(np.abs(arrays.lead) * (1.0 + arrays.missed))[:, None]
-            turned = np.expm1(np.multiply.outer(arrays.delays, rho))
-            sizes = sizes + np.log(np.abs(s)[:, None] + np.abs(w) @ turned)
-        most: FloatArray = np.logaddexp.reduce(sizes, axis=0)
-        return most
+        weights = [[part[None] for part in f.weights] for f in (self, other) if f]
+        return float(self.space.radius(weights, [order], [log(coefficient)], share)[0])
 
     def value_and_slope(self, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """F and its derivative at any s, shape (n,), both times one number at each s."""
@@ -354,7 +424,7 @@ class Function:
             moved = Polynomial(p.lead, tuple(roots.tolist()), p.computed, (), missed)
             # Next to a root that was computed, the roots are computed again.
             polynomials.append(p.shifted(sigma) if missed > _MOST_MISSED else moved)
-        space = Space(polynomials, self.space.delays, self.space.step)
+        space = Space(polynomials, self.space.lags, self.space.step)
         steady, delayed = self.weights
         change = np.expm1(-sigma * space.arrays.delays)
         turned = delayed * (1.0 + change)
@@ -366,7 +436,7 @@ class Function:
 
 def common_zeros(n: Function, m: Function) -> int:
     """Order of the zero at s = 0 that two functions have in common."""
-    return min((lead.order for f in (n, m) if (lead := f.leading())), default=0)
+    return min((order for f in (n, m) if (order := f.order) is not None), default=0)
 
 
 def keeps_sign_up_to(f: Function, g: Function, *, odd: bool) -> float:
@@ -397,7 +467,7 @@ def _exactly(value: Fraction) -> Any:
     return mpmath.mpf(value.numerator) / value.denominator
 
 
-def _log(value: Fraction) -> float:
+def log(value: Fraction) -> float:
     """Natural logarithm of a positive fraction, of which a float may overflow."""
     return float(mpmath.log(value.numerator) - mpmath.log(value.denominator))
 

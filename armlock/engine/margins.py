@@ -14,8 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armlock.engine import decide
-from armlock.engine.decide import Family, UndecidedError, least
+from armlock.engine import chain, decide
+from armlock.engine.chain import UndecidedError
+from armlock.engine.decide import Family, least
 from armlock.engine.functions import Function, Space, common_zeros, keeps_sign_up_to, stacked
 from armlock.engine.inclusion import DELAY, DISTANCE, EPSILON, PHASE, REAL, TERM, VERTEX
 from armlock.engine.polynomials import Polynomial, rounded
@@ -154,32 +155,11 @@ def chain_limit(
 ) -> float:
     """First t >= start at which the neutral root chain of f + t g is not confined (Lemma 14).
 
-    What is left of the undelayed term is linear in t between the t at which a term vanishes.
-    At least a share `rounding` of that term has to be left. A map has no such chain.
+    At least a share `rounding` of the undelayed term has to be left. A map has no such chain.
     """
     if f.space.step:
         return math.inf
-    whole, turned = f.space.limits(*stacked([f, g]))
-    a, b = (np.append(whole[k], turned[k]) for k in range(2))
-    a, b = (np.where(np.abs(v) <= 16.0 * EPSILON * np.abs(v).max(), 0.0, v) for v in (a, b))
-    with np.errstate(all="ignore"):
-        breaks = (-a / b)[b != 0.0]
-    breaks = [start, *np.unique(breaks[breaks > start]).tolist()]
-
-    def left(t: float) -> float:
-        v = np.abs(a + b * t)
-        return float(v[0] - v[1:].sum() - rounding * v[0])
-
-    for low, high in zip(breaks, [*breaks[1:], math.inf], strict=True):
-        at_low = left(low)
-        if at_low <= 0.0:
-            return float(low)
-        inside = low + min(0.5 * (high - low), 1.0 + abs(low))
-        slope = (left(inside) - at_low) / (inside - low)
-        t = low - at_low / slope if slope < 0.0 else math.inf
-        if t <= high and math.isfinite(t):
-            return float(t)
-    return math.inf
+    return chain.line_limit(f.space.lags, *f.space.limits(*stacked([f, g])), start, rounding)
 
 
 def first_zero(
@@ -191,11 +171,11 @@ def first_zero(
     at s = 0, inf where the neutral root chain is not confined, nan where nothing is found.
     """
     best, where = most, math.nan
-    chain = chain_limit(f, g, start)
-    if chain <= start:
+    limit = chain_limit(f, g, start)
+    if limit <= start:
         return start, math.inf
-    if chain < most:
-        best, where = start + (chain - start) * (1.0 - _NEXT_TO_THE_CHAIN), math.inf
+    if limit < most:
+        best, where = start + (limit - start) * (1.0 - _NEXT_TO_THE_CHAIN), math.inf
         best = min(best, chain_limit(f, g, start, _DECIDED))
     zero = at_zero(f, g)
     if start < zero < best:
@@ -203,7 +183,7 @@ def first_zero(
     if not g.is_zero:
         hull = [(VERTEX, (1.0, start), (0.0, 0.0)), (VERTEX, (1.0, 0.0), (0.0, 1.0))]
         best, where = least(Family([f, g], [hull]), REAL, best, where, start=start, **options)
-    return (chain, where) if where == math.inf else (best, where)
+    return (limit, where) if where == math.inf else (best, where)
 
 
 def _shares(d: Function, n: Function, *arms: Function) -> Family:
@@ -221,18 +201,27 @@ def _limit_of_ratio(d: Function, n: Function) -> tuple[float, float, float]:
     Where delays act on N too, it is the least one of phases 0 and pi: the search decides
     whether there is a smaller one.
     """
-    whole, turned = d.space.limits(*stacked([d, n]))
+    space = d.space
+    whole, turned = space.limits(*stacked([d, n]))
     size = abs(whole[0]) + np.abs(turned[0]).sum()
+    # Zero between phases is no limit of a stable D.
+    left = float(chain.reserve(space.lags, whole[:1], turned[:1])[0])
     acting = np.flatnonzero(turned.any(axis=0))
-    if not turned[1].any():
-        turns = -np.sign(turned[:1, acting]) * np.sign(whole[0])
-    elif acting.size <= _MOST_SIGNS:
-        turns = np.array(list(itertools.product((1.0, -1.0), repeat=acting.size)))
+    lags, turned = [space.lags[k] for k in acting], turned[:, acting]
+    objects = sorted({one for lag in lags for one, _ in lag}, key=lambda one: one.mark)
+    if not turned[1].any() and not chain.shared(lags, turned[:1]).any():
+        turns = -np.sign(turned[:1]) * np.sign(whole[0])
+    elif len(objects) <= _MOST_SIGNS:
+        signs = [
+            dict(zip(objects, way, strict=True))
+            for way in itertools.product((1, -1), repeat=len(objects))
+        ]
+        turns = np.array(
+            [[math.prod(sign[one] ** k for one, k in lag) for lag in lags] for sign in signs]
+        )
     else:
         return math.inf, math.nan, 0.0
-    above, below = (w + turns @ t for w, t in zip(whole, turned[:, acting], strict=True))
-    # Zero between phases is no limit of a stable D.
-    left = np.abs(whole[0]) - np.abs(turned[0]).sum()
+    above, below = (w + turns @ t for w, t in zip(whole, turned, strict=True))
     with np.errstate(divide="ignore", invalid="ignore"):
         ratios = np.abs(above / below) if left > 0.0 else np.zeros(1)
     ratios = np.where(np.isnan(ratios), np.inf, ratios)
@@ -361,7 +350,7 @@ def _none_past(f: Function, g: Function) -> float:
         return math.inf
     polynomials = f.space.polynomials
     used = [j for j, w in enumerate(g.delayed) if g.steady[j] or w.any()]
-    own = Space([polynomials[j] for j in used], f.space.delays)
+    own = Space([polynomials[j] for j in used], f.space.lags)
     steady, delayed = g.steady[used], g.delayed[used]
     still = steady - delayed.sum(1)
     # Re(g conj(q)) is not below zero, with q a power of s, from some frequency on.
@@ -418,8 +407,8 @@ def _gain_up(m: Function, n: Function) -> tuple[float, float]:
     inf is proven. If neither is found, k is the largest one that was looked at. The frequency
     is nan for both.
     """
-    looked_at, chain = 1.0, n.space.limits(*n.weights)[1].any()
-    for most in [gain for gain in _GAINS if gain <= _CHAIN_KNOWN or not chain]:
+    looked_at, neutral = 1.0, n.space.limits(*n.weights)[1].any()
+    for most in [gain for gain in _GAINS if gain <= _CHAIN_KNOWN or not neutral]:
         try:
             options = {"patience": _FEW_STEPS} if looked_at > 1.0 else {}
             found, where = first_zero(m, n, most, 1.0, **options)

@@ -16,8 +16,9 @@ import mpmath
 import numpy as np
 
 from armlock.checks import ComplexArray, FloatArray
-from armlock.engine import decide, inclusion
-from armlock.engine.decide import BOUNDARY, UNCONFINED, UndecidedError
+from armlock.engine import chain, decide, inclusion
+from armlock.engine.chain import UndecidedError
+from armlock.engine.decide import BOUNDARY, UNCONFINED
 from armlock.engine.functions import Function, Space
 from armlock.engine.polynomials import Polynomial
 
@@ -33,8 +34,6 @@ _ALL_STEPS = 4e6
 _MOST_POINTS, _MOST_STARTS = 500_000, 1000
 # The line next to the limit of a neutral chain has been searched with so many points.
 _ENOUGH_POINTS = 200_000
-# Steps of Newton's method for that limit.
-_LIMIT_STEPS = 30
 # A line is followed up to where zeros can lie right of it, and so many turns of the longest
 # delay further, but at first no longer than 1000 times that; with each line twice as far.
 _TURNS_FURTHER, _MOST_TURNS_FURTHER = 4.0, 3e4
@@ -148,24 +147,14 @@ class _Search:
     def first_line(self) -> float:
         """Return a line just right of the limit of a neutral chain, or -inf without a chain.
 
-        At the limit, the delayed terms of the highest power are together as large as the term
-        of this power that nothing delays. Left of it no count is decided.
+        Left of the limit no count is decided.
         """
-        still, turned = self.function.space.limits(*self.function.weights)
-        delays, sizes = self.function.space.arrays.delays, np.abs(turned)
-        if self.function.space.step or not sizes.any():
+        space = self.function.space
+        if space.step:
             return -np.inf
-        if still == 0.0:
-            return np.inf
-        delays, sizes = delays[sizes > 0.0], sizes[sizes > 0.0] / abs(still)
-        limit = 0.0
-        # The logarithm of the sum is convex, so that Newton's method leads to its only zero.
-        for _ in range(_LIMIT_STEPS):
-            logs = np.log(sizes) - delays * limit
-            whole = np.logaddexp.reduce(logs)
-            limit += float(whole / (np.exp(logs - whole) @ delays))
-        if limit < -_LARGEST_EXPONENT * self.unit:
-            return -np.inf
+        limit = chain.real_part_limit(space.lags, *space.limits(*self.function.weights))
+        if not -_LARGEST_EXPONENT * self.unit <= limit < np.inf:
+            return limit if limit > 0.0 else -np.inf
         step = 0.25 * self.fine(limit)
         while not np.isfinite(self._line(limit + step).end):
             step *= 2.0

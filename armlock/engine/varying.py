@@ -18,8 +18,9 @@ import numpy as np
 from scipy import optimize
 
 from armlock.checks import FloatArray
-from armlock.engine import decide
-from armlock.engine.decide import Family, UndecidedError
+from armlock.engine import chain, decide
+from armlock.engine.chain import UndecidedError
+from armlock.engine.decide import Family
 from armlock.engine.functions import Function, Space, at, stacked
 from armlock.engine.inclusion import VERTEX
 from armlock.engine.margins import first_zero, least_ratio
@@ -225,7 +226,7 @@ def _limits(d: Function, changes: Sequence[Function], order: int, omega: float) 
         return np.array([abs(float(value / values[0])) for value in values])
     whole, turned = d.space.limits(*stacked([d, *changes]))
     sizes: FloatArray = np.abs(whole) + np.abs(turned).sum(axis=1)
-    sizes[0] = abs(whole[0]) - np.abs(turned[0]).sum()
+    sizes[:1] = chain.reserve(d.space.lags, whole[:1], turned[:1])
     return sizes
 
 

@@ -6,39 +6,42 @@ margin and no larger gain exists, to a part in a million (`armlock.engine.margin
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
-import numpy as np
-
-from armlock.checks import positive_number, real_number
-from armlock.delays import DelaySystem
+from armlock.affine import Affine, common, open_quotient
+from armlock.checks import positive_number
+from armlock.engine.chain import Lag
 from armlock.engine.functions import Function
 from armlock.engine.margins import (
+    Free,
     Margins,
     least_ratio,
     margins_of,
     modulus_of,
     require_stable,
 )
-from armlock.loops import Loop, checked_loop, quotient_of
 from armlock.stability.counts import decided, require_certain
+from armlock.systems import Sum, System, delay_object
 
 _T = TypeVar("_T")
 
 
 def _certified(
-    compute: Callable[[Function, Function], _T], loop: Loop | DelaySystem, c1: float, c2: float
+    compute: Callable[[Function, Function], _T],
+    loop: System,
+    values: tuple[float, ...],
+    numbers: dict[str, float],
 ) -> _T:
     """Return what the engine makes of numerator and denominator of a loop."""
-    n, m = quotient_of(loop, c1, c2)
-    require_certain(loop, c1, c2)
-    with decided("no margin", np.array([[c1, c2]])):
+    n, m, point = open_quotient(loop, values, numbers)
+    require_certain(System.of(loop, "loop"), point.tolist())
+    with decided("no margin", point):
         return compute(n, m)
 
 
-def modulus_margin(loop: Loop | DelaySystem, c1: float = 1.0, c2: float = 1.0) -> float:
+def modulus_margin(loop: System, *values: float, **numbers: float) -> float:
     r"""Smallest distance of the Nyquist curve from -1, min over omega of |1 + L|.
 
     .. math::
@@ -49,10 +52,10 @@ def modulus_margin(loop: Loop | DelaySystem, c1: float = 1.0, c2: float = 1.0) -
 
     Parameters
     ----------
-    loop : Loop or DelaySystem
-        The loop, stable or not.
-    c1, c2 : float, optional
-        Multiplicative perturbations of a `Loop`.
+    loop : System
+        The open loop, whose closed loop is stable or not.
+    *values, **numbers : float, optional
+        The parameters, in the order of their first use or by name; nominal ones by default.
 
     Returns
     -------
@@ -64,7 +67,7 @@ def modulus_margin(loop: Loop | DelaySystem, c1: float = 1.0, c2: float = 1.0) -
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no loop, or c1 or c2 is not finite and real.
+        If `loop` is no open loop, or a parameter is not finite and real.
     CountError
         If double precision, or the steps allowed, do not decide it.
 
@@ -74,7 +77,7 @@ def modulus_margin(loop: Loop | DelaySystem, c1: float = 1.0, c2: float = 1.0) -
     >>> print(f"{modulus_margin(paper_loop()):.4f}")
     0.6156
     """
-    return _certified(lambda n, m: modulus_of(n, m)[0], loop, c1, c2)
+    return _certified(lambda n, m: modulus_of(n, m)[0], loop, values, numbers)
 
 
 class PeakGain(NamedTuple):
@@ -93,9 +96,9 @@ def peak_gain(system: Any) -> PeakGain:
 
     Parameters
     ----------
-    system : DelaySystem, or what `DelaySystem.of` takes
-        The system itself, for instance the sensitivity ``1 / (1 + loop)``. Of a `Loop` it is
-        the open loop.
+    system : System
+        The system itself, for instance the sensitivity ``1 / (1 + loop)``, at nominal
+        parameters. Of a `Loop` it is the open loop.
 
     Returns
     -------
@@ -131,34 +134,38 @@ def peak_gain(system: Any) -> PeakGain:
     >>> print(f"{gain:.4f} at {omega:.3e} rad/s")
     1.6246 at 2.291e-05 rad/s
     """
-    system = DelaySystem.of(system)
-    n, d = system.functions
-    with decided("no peak gain", np.empty((0, 0))):
-        require_stable(d, system.common, "system")
+    n, d, point = open_quotient(system, (), {}, "system")
+    with decided("no peak gain", point):
+        require_stable(d, common(n, d), "system")
         found = least_ratio(d, n)
     return PeakGain(1.0 / found.value, found.omega)
 
 
 def margins(
-    loop: Loop | DelaySystem,
-    c1: float = 1.0,
-    c2: float = 1.0,
-    *,
+    loop: System,
+    *values: float,
     free_above: float | None = None,
+    free: Sequence[System] | None = None,
+    **numbers: float,
 ) -> Margins:
     r"""Compute all margins of a stable loop.
 
     Parameters
     ----------
-    loop : Loop or DelaySystem
-        The loop.
-    c1, c2 : float, optional
-        Multiplicative perturbations of a `Loop`.
+    loop : System
+        The open loop, for instance `CommonArm()`.
+    *values : float, optional
+        The parameters, in the order of their first use; nominal ones by default.
     free_above : float, optional
-        Angular frequency in rad/s above which the phases of both arms are taken as free, as
+        Angular frequency in rad/s above which the phases of the arms are taken as free, as
         they are once the arms have drifted by a fraction of the modulation's wavelength: the
         margins then hold for all of them. By default the phases are those of the delays, at
         all frequencies.
+    free : sequence of delays, optional
+        The delays whose phases are free, as `delay` made them. Those of the arms of a `Loop` by
+        default.
+    **numbers : float, optional
+        Parameters by name.
 
     Returns
     -------
@@ -167,8 +174,9 @@ def margins(
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no loop, c1 or c2 is not finite and real, `free_above` is not positive, or
-        the loop is not stable there.
+        If `loop` is no open loop, a parameter is not finite and real, `free_above` is not
+        positive, no delay is free, or one stands in the denominator of L; or the loop is not
+        stable there.
     CountError
         If double precision, or the steps allowed, do not decide a margin.
 
@@ -203,11 +211,34 @@ def margins(
     36.0 degrees
     """
     if free_above is None:
-        return _certified(margins_of, loop, c1, c2)
+        return _certified(margins_of, loop, values, numbers)
+    system = System.of(loop, "loop")
     above = positive_number("free_above", free_above)
-    if isinstance(loop, DelaySystem):
-        raise TypeError(f"free_above is for a Loop and its arms, got {free_above}")
-    free = checked_loop(loop).with_free_phases(
-        real_number("c1", c1), real_number("c2", c2), above
-    )
-    return _certified(partial(margins_of, free=free), loop, c1, c2)
+    objects = tuple(free if free is not None else getattr(loop, "arms", ()))
+    if not objects:
+        raise TypeError("free must hold the delays whose phases are free, as delay() made them")
+    loose = _with_free_phases(system.at(**system.given(values, numbers)), objects, above)
+    return _certified(partial(margins_of, free=loose), loop, values, numbers)
+
+
+def _with_free_phases(system: System, objects: tuple[System, ...], above: float) -> Free:
+    """Return L with free phases of some delay objects above a frequency, for the engine."""
+    free = {delay_object(one) for one in objects}
+    if any(d in free for lag in system.denominator.lags for d, _ in lag):
+        raise ValueError(
+            "the delays of free phase must not stand in the denominator of L: it would fill no "
+            f"disc, got {system!r}"
+        )
+    # Terms with the same powers of these delays turn together.
+    kinds = {
+        lag: tuple(pair for pair in lag if pair[0] in free) for lag in system.numerator.lags
+    }
+    names = {kind: f"arm{k}" for k, kind in enumerate(dict.fromkeys(kinds.values())) if kind}
+    above_line = Sum({})
+    for (lag, _), p in system.numerator.terms.items():
+        own = Lag(pair for pair in lag if pair[0] not in free)
+        given = (names[kinds[lag]],) if kinds[lag] else ()
+        above_line = above_line + Sum.of(p, own, *given)
+    affine = Affine(System(above_line, system.denominator), tuple(names.values()))
+    arms = tuple(f for f in affine.n[1:] if not f.is_zero)
+    return Free(affine.n[0], affine.m[0], arms, above)

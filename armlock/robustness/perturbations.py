@@ -7,26 +7,33 @@ zero on the imaginary axis, and tells whether no function of a box has one.
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from armlock.characteristic import CharacteristicFunction, checked_system
-from armlock.checks import axis, positive_number, real_number
+from armlock.affine import Affine, NotAffineError, common
+from armlock.checks import FloatArray, axis, positive_number, real_number
 from armlock.engine import decide
+from armlock.engine.chain import NOW, Delay, Lag
 from armlock.engine.decide import BOUNDARY, UNCONFINED, Family
-from armlock.engine.functions import Function, common_zeros
+from armlock.engine.functions import Function
 from armlock.engine.inclusion import EPSILON, TERM, VERTEX
 from armlock.engine.margins import first_zero
-from armlock.loops import Loop, checked_loop
 from armlock.stability.counts import CountError, decided, require_certain
+from armlock.systems import Sum, System, delay_object, polynomial
+
+#: Numbers in the order of the parameters, or by name.
+Point = Sequence[float] | FloatArray | Mapping[str, float]
 
 # Nothing is looked at where the parameters are this many times as large as the start, or as 1.
 _FARTHEST = 1e9
 # Of a start on the boundary, crossings up to this share of its size, or of 1, are its own.
 _NEXT_TO_START = Fraction(1, 10**10)
+# The parameter of a ray.
+_U = System(Sum.of(polynomial([1]), NOW, "u"), Sum.of(polynomial([1])), {"u": 0.0})
 
 
 class Crossing(NamedTuple):
@@ -45,31 +52,68 @@ class Crossing(NamedTuple):
     omega: float
 
 
-class _Ray:
-    """D along a ray, f + u g with t = u scale."""
+def _named(system: System, name: str, given: Any) -> dict[str, float]:
+    """Return numbers by the names of parameters; by default those of the others are nominal."""
+    if isinstance(given, Mapping):
+        named = {k: real_number(k, v) for k, v in given.items()}
+        for k in named:
+            if k not in system.nominal:
+                raise TypeError(f"{name} must name parameters of {system!r}, got {k!r}")
+        return named
+    flat = axis(name, given)
+    if flat.size != len(system.parameters):
+        raise ValueError(
+            f"{name} must hold as many numbers as there are parameters, {system.parameters}, "
+            f"got {flat.size}"
+        )
+    return dict(zip(system.parameters, flat.tolist(), strict=True))
 
-    def __init__(
-        self, system: CharacteristicFunction, start: npt.ArrayLike, direction: npt.ArrayLike
-    ) -> None:
-        self.system = checked_system(system)
-        begin, way = axis("start", start), axis("direction", direction)
-        for name, value in (("start", begin), ("direction", way)):
-            if value.size != 2:
-                raise ValueError(f"{name} must hold two numbers, got {value.size}")
-        if not way.any():
-            raise ValueError("direction must not have length zero, got (0, 0)")
+
+def _along(terms: Sequence[Function], way: FloatArray) -> Function:
+    """Return the change of D, N or M along a direction."""
+    found = terms[0] * 0
+    for term, w in zip(terms[1:], way.tolist(), strict=True):
+        found = found + term * w
+    return found
+
+
+class _Ray:
+    """N and M along a ray, affine in u, with t = u scale."""
+
+    def __init__(self, system: System, start: Point, direction: Point) -> None:
+        self.system = system = System.of(system)
+        way = _named(system, "direction", direction)
+        if not any(way.values()):
+            raise ValueError("direction must not have length zero")
+        begin = system.given((), _named(system, "start", start))
+        #: The names of the parameters, the start, and the direction in all of them.
+        self.start = np.array([real_number(k, v) for k, v in begin.items()])
+        self.way = np.array([way.get(name, 0.0) for name in begin])
+        require_certain(system, self.start.tolist())
         #: The t at which the point has moved by |start|, or by one if that is more.
-        self.scale = max(1.0, float(np.hypot(*begin))) / float(np.hypot(*way))
-        self.start, (d1, d2) = begin.tolist(), way.tolist()
-        require_certain(system, *self.start)
-        _, _, first, second = system.terms
-        self.f = system.function(*self.start)
-        self.g = (first * -d1 + second * -d2) * self.scale
+        self.scale = max(1.0, float(np.hypot.reduce(self.start))) / float(
+            np.hypot.reduce(self.way)
+        )
+        try:
+            affine = Affine.of(system)
+            self.n, self.m = affine.quotient(*self.start.tolist())
+            moved = [_along(part, self.way) * self.scale for part in (affine.n, affine.m)]
+        except NotAffineError:
+            line = {k: System.of(begin[k]) + way[k] * _U for k in way}
+            along = Affine(system.at(**{**begin, **line}), ("u",))
+            self.n, self.m = along.n[0], along.m[0]
+            moved = [part[1] * self.scale for part in (along.n, along.m)]
+        self.dn, self.dm = moved
+        self.f, self.g = self.n + self.m, self.dn + self.dm
+
+    def point(self, u: float) -> FloatArray:
+        """Return the parameters at a point of the ray."""
+        return self.start + u * self.scale * self.way
 
     def count(self, u: float | Fraction) -> int:
         """Count the unstable roots of the closed loop at a point of the ray, exactly given."""
-        d, below = self.f + self.g * u, self.system.terms.rest
-        return decide.count(d, common_zeros(d + below * -1, below))
+        n, m = self.n + self.dn * u, self.m + self.dm * u
+        return decide.count(n + m, common(n, m))
 
     def leaving(self) -> int:
         """Tell where roots of the start at s = 0 go, by the leading terms of f and g.
@@ -120,19 +164,17 @@ def _at_the_end(function: Function) -> Fraction:
 
 
 def first_crossing(
-    system: CharacteristicFunction,
-    start: npt.ArrayLike,
-    direction: npt.ArrayLike,
-    stop: float | None = None,
+    system: System, start: Point, direction: Point, stop: float | None = None
 ) -> Crossing:
     """Find where a root first reaches the imaginary axis along a ray.
 
     Parameters
     ----------
-    system : CharacteristicFunction
-        The loop, or a map.
-    start, direction : array_like of two floats
-        The ray start + t direction in the plane of the free parameters.
+    system : System
+        The open loop, an equation, or a map.
+    start, direction : sequence of float, or dict by name
+        The ray start + t direction of the parameters, in the order of their first use. By
+        name, others start at nominal values and stay there.
     stop : float, optional
         Largest t that is looked at; by default one at which the parameters are 1e9 times as
         large as the start, or as one.
@@ -145,8 +187,9 @@ def first_crossing(
     Raises
     ------
     TypeError, ValueError
-        If start or direction is not two finite real numbers, the direction has length zero, or
-        stop is not positive.
+        If start or direction does not hold a finite real number for each parameter, the
+        direction has length zero, the system is not affine along the ray, or stop is not
+        positive.
     CountError
         If rounding, or the steps allowed, do not decide it.
 
@@ -168,34 +211,37 @@ def first_crossing(
     """
     ray = _Ray(system, start, direction)
     stop = _FARTHEST if stop is None else positive_number("stop", stop) / ray.scale
-    with decided("not decided", np.array([ray.start])):
+    with decided("not decided", ray.start):
         u, omega = ray.first(ray.begin(), stop)
     return Crossing(u * ray.scale, omega)
 
 
-def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
-    r"""Return the smallest perturbation of (1, 1) in a direction that breaks the loop.
+def critical_perturbation(loop: System, direction: Point) -> float:
+    r"""Return the smallest perturbation in a direction that breaks the loop.
 
     Parameters
     ----------
-    loop : Loop
-        The loop.
-    direction : array_like of two floats
-        (d1, d2), taken as given and not normalised.
+    loop : System
+        The open loop, for instance `CommonArm()`, or an equation.
+    direction : sequence of float, or dict by name
+        How the parameters change from their nominal values, which are (1, 1) for a `Loop`:
+        taken as given and not normalised.
 
     Returns
     -------
     float
-        Smallest eps > 0 such that the count of the loop's unstable roots at (1, 1) +
-        eps (d1, d2) is not zero: a root reaches the imaginary axis there, or the neutral root
-        chain does. 0 if the loop is not stable next to (1, 1), inf if no eps breaks it, up to
-        parameters of 1e9. What is excluded below it, `first_crossing` says.
+        Smallest eps > 0 such that the count of the loop's unstable roots at the nominal
+        values + eps direction is not zero: a root reaches the imaginary axis there, or the
+        neutral root chain does. 0 if the loop is not stable next to the nominal values, inf if
+        no eps breaks it, up to parameters of 1e9. What is excluded below it, `first_crossing`
+        says.
 
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no `Loop`, the direction is not two finite real numbers or has length
-        zero, or the loop is unstable at (1, 1) itself. A boundary point is allowed there.
+        If the direction does not hold finite real numbers of parameters or has length zero, a
+        parameter has no nominal value, the loop is not affine along the ray, or unstable at
+        the nominal values themselves. A boundary point is allowed there.
     CountError
         If rounding, or the steps allowed, do not decide it, or the counts on the two sides of
         the result contradict it.
@@ -210,8 +256,7 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
 
     .. math::
 
-        \varepsilon = \frac{D(s; 1, 1)\, e^{s\delta}}
-        {d_1 B_1 e^{-s\tau_1} + d_2 B_2 e^{-s\tau_2}} \text{ is real.}
+        \varepsilon = -\frac{D}{\sum_k d_k\, \partial D / \partial x_k} \text{ is real.}
 
     Examples
     --------
@@ -219,12 +264,12 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
     >>> print(f"{critical_perturbation(paper_loop(), (0, -1)):.4e}")
     2.9286e-06
     """
-    ray = _Ray(checked_loop(loop), (1.0, 1.0), direction)
-    with decided("not decided", np.ones((1, 2))):
+    ray = _Ray(System.of(loop, "loop"), {}, direction)
+    with decided("not decided", ray.start):
         at_start = ray.count(0.0)
         if at_start > 0 or at_start == UNCONFINED:
             raise ValueError(
-                f"the loop must be stable at (c1, c2) = (1, 1) to lose stability, but "
+                f"the loop must be stable at its nominal parameters to lose stability, but "
                 f"unstable_roots gives {at_start}"
             )
         if ray.leaving() > 0:
@@ -243,45 +288,46 @@ def critical_perturbation(loop: Loop, direction: npt.ArrayLike) -> float:
                 break
     eps = u * ray.scale
     if any(counts[:2]) or counts[2:] in ([0], [BOUNDARY]):
-        way = axis("direction", direction)
         raise CountError(
-            f"the first crossing along {tuple(way.tolist())} lies at {eps}, but counts on the "
-            f"way there and past it contradict it: {counts}",
-            1.0 + np.array([min(u, _FARTHEST) * ray.scale * way]),
+            f"the first crossing along {tuple(ray.way.tolist())} lies at {eps}, but counts on "
+            f"the way there and past it contradict it: {counts}",
+            ray.point(min(u, _FARTHEST))[None],
         )
     return eps
 
 
-def box_count(loop: Loop, size: float) -> int:
-    r"""Count the unstable roots that all points of a box of perturbations share.
+def box_count(loop: System, size: float | Mapping[str, float]) -> int:
+    r"""Count the unstable roots that all points of a box of parameters share.
 
     Parameters
     ----------
-    loop : Loop
-        The loop.
-    size : float
-        The box is that of all |c1 - 1| <= size and |c2 - 1| <= size.
+    loop : System
+        The open loop, for instance `CommonArm()`, or an equation.
+    size : float, or dict by name
+        The box is that of all parameters that differ from their nominal value by at most this;
+        all of them, (1, 1) for a `Loop`, or those that are named.
 
     Returns
     -------
     int
         The number at all points of the box, certified. `BOUNDARY` where a root lies on the
         imaginary axis, or comes close to it, somewhere in the box; `UNCONFINED` where the
-        neutral root chain is not confined somewhere.
+        neutral root chain is not confined somewhere, or not known to be.
 
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no `Loop`, or the size is not positive.
+        If a size is not positive, a parameter has no nominal value, or the loop is not affine
+        in those of the box together.
     CountError
         If it takes too many steps.
 
     Notes
     -----
-    D is affine in c1 and c2, so that over a box its values at one frequency are the convex hull
-    of those at the four corners. Where no such hull on the whole axis holds zero, no root
-    crosses the axis within the box, and all its points have the count of (1, 1). A pole of L at
-    s = 0 that cancels at (1, 1) makes a real root cross at s = 0 in every box.
+    D is affine in the parameters, so that over a box its values at one frequency are the convex
+    hull of those at the corners. Where no such hull on the whole axis holds zero, no root
+    crosses the axis within the box, and all its points have the count of the centre. A pole of
+    L at s = 0 that cancels at the centre makes a real root cross at s = 0 in every box.
 
     Examples
     --------
@@ -292,27 +338,46 @@ def box_count(loop: Loop, size: float) -> int:
     >>> box_count(paper_loop(), 1.5e-6)
     -1
     """
-    size = positive_number("size", size)
-    require_certain(checked_loop(loop))
-    centre, terms = checked_loop(loop).function(1.0, 1.0), loop.terms
-    signs = [(a, b) for a in (-size, size) for b in (-size, size)]
-    corners = [(VERTEX, (1.0, a, b), (0.0, 0.0, 0.0)) for a, b in signs]
-    family = Family([centre, terms.first, terms.second], [corners])
-    with decided("not decided", np.ones((1, 2))):
+    system = System.of(loop, "loop")
+    given = size if isinstance(size, Mapping) else dict.fromkeys(system.parameters, size)
+    half = {name: positive_number(name, value) for name, value in given.items()}
+    at = {name: real_number(name, value) for name, value in system.given((), {}).items()}
+    require_certain(system, list(at.values()))
+    affine = Affine(system, tuple(half))
+    centre, terms = affine.function(*(at[name] for name in half)), affine.terms[1:]
+    corners = itertools.product(*((-v, v) for v in half.values()))
+    zero = (0.0,) * (1 + len(half))
+    family = Family([centre, *terms], [[(VERTEX, (1.0, *corner), zero) for corner in corners]])
+    with decided("not decided", np.array(list(at.values()))):
         if not np.isfinite(family.ends(0.0)):
             return UNCONFINED
         return decide.count(centre) if decide.excludes(family) else BOUNDARY
 
 
-def no_root_crosses(loop: Loop, low: float, high: float) -> bool:
-    r"""Tell whether no root crosses the imaginary axis while two round trips grow apart.
+def _by_powers(d: Sum, objects: tuple[Delay, Delay]) -> dict[tuple[int, ...], Sum]:
+    """Sort the terms of a sum by the powers of some delay objects, which are taken out."""
+    found: dict[tuple[int, ...], Sum] = {}
+    for (lag, names), p in d.terms.items():
+        powers = tuple(dict(lag).get(one, 0) for one in objects)
+        rest = Lag(pair for pair in lag if pair[0] not in objects)
+        found[powers] = found.get(powers, Sum({})) + Sum({(rest, names): p})
+    return found
+
+
+def no_root_crosses(
+    loop: System, low: float, high: float, *, between: tuple[System, System] | None = None
+) -> bool:
+    r"""Tell whether no root crosses the imaginary axis while two delays grow apart.
 
     Parameters
     ----------
-    loop : Loop
-        The loop, at c1 = c2 = 1. Sensor, controller and the mean of the round trips stay.
+    loop : System
+        The open loop, for instance `CommonArm()`, or an equation, at nominal parameters.
+        Sensor, controller and the mean of the two delays stay.
     low, high : float
         Half differences (tau1 - tau2) / 2 in s, ascending.
+    between : pair of delays, optional
+        The two, as `delay` made them; the arms of a `Loop` by default.
 
     Returns
     -------
@@ -323,8 +388,8 @@ def no_root_crosses(loop: Loop, low: float, high: float) -> bool:
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no `Loop`, or the half differences do not ascend, or leave a round trip no
-        longer than zero.
+        If two delays are not known, D is not affine in each of them, or the half differences
+        do not ascend, or leave a delay no longer than zero.
     CountError
         If it takes too many steps.
 
@@ -334,11 +399,11 @@ def no_root_crosses(loop: Loop, low: float, high: float) -> bool:
 
     .. math::
 
-        D &= R + e^{-s\delta} \left[ S \left( 1 - e^{-sT} \cos \psi \right)
-        + \mathrm{j} Q\, e^{-sT} \sin \psi \right] , \\
-        \psi &= \omega x , \quad S = B_1 + B_2 , \quad Q = B_1 - B_2 ,
+        D &= D_0 + e^{-sT} \left[ D_+ \cos \psi - \mathrm{j} D_- \sin \psi \right] , \\
+        \psi &= \omega x , \quad D_\pm = D_1 \pm D_2 ,
 
-    so that at each frequency only the phase psi is open, on an arc.
+    where the delays stand before D_1 and D_2, so that at each frequency only the phase psi is
+    open, on an arc. A term with the product of both does not depend on x.
 
     Examples
     --------
@@ -349,35 +414,55 @@ def no_root_crosses(loop: Loop, low: float, high: float) -> bool:
     >>> no_root_crosses(paper_loop(), 0.03, 0.2)
     True
     """
-    mean = 0.5 * (checked_loop(loop).tau1 + loop.tau2)
+    system = System.of(loop, "loop")
+    arms = getattr(loop, "arms", ()) if between is None else between
+    if len(arms) != 2:
+        raise TypeError(
+            "between must hold the two delays that grow apart, as delay() made them"
+        )
+    one, other = (delay_object(arm) for arm in arms)
+    mean = 0.5 * (float(one.theta) + float(other.theta))
     low, high = real_number("low", low), real_number("high", high)
     if not -mean < low <= high < mean:
         raise ValueError(
-            f"low and high must ascend between -{mean} and {mean} s, the mean of the round "
-            f"trips, got {low} and {high}"
+            f"low and high must ascend between -{mean} and {mean} s, the mean of the two "
+            f"delays, got {low} and {high}"
         )
     # What the mean, its sums with half differences and phases are rounded by.
     low, high = low - 8.0 * EPSILON * mean, high + 8.0 * EPSILON * mean
+    here = system.at(**system.given((), {}))
+    d = here.numerator + here.denominator
+    parts = _by_powers(d, (one, other))
+    if set(parts) - {(0, 0), (1, 0), (0, 1), (1, 1)}:
+        raise ValueError(f"D must be affine in each of the two delays, got {system!r}")
+    d0, d1, d2, d12 = (parts.get(k, Sum({})) for k in ((0, 0), (1, 0), (0, 1), (1, 1)))
 
-    def between(tau1: float, tau2: float) -> Loop:
-        return Loop(loop.controller, loop.mapping, tau1, tau2, loop.delay)
+    def of(part: Sum, x: float = 0.0) -> Function:
+        moved = {one: Delay(Fraction(mean + x)), other: Delay(Fraction(mean - x))}
+        terms = {
+            (Lag.of({moved.get(k, k): n for k, n in lag}), names): p
+            for (lag, names), p in part.terms.items()
+        }
+        return Affine(System(Sum(terms), Sum({}))).n[0]
 
-    terms = between(mean, mean).terms
-    ends = [between(mean + x, mean - x).function(1.0, 1.0).leading() for x in (low, high)]
-    arms = [lead.order for f in (terms.first, terms.second) if (lead := f.leading())]
-    a, b = ends
+    a, b = of(d, low).leading(), of(d, high).leading()
+    arm_orders = [lead.order for part in (d1, d2) if part and (lead := of(part).leading())]
     # Up to the first power of s that delays act on, coefficients of D are affine in x.
-    if a is None or b is None or not (a.order == b.order <= 1 + min(arms)):
+    if a is None or b is None or not (a.order == b.order <= 1 + min(arm_orders, default=0)):
         return False
     if a.direction != b.direction:
         return False
-    longest = between(mean + high, mean - low).function(1.0, 1.0)
+    longest = max(of(d, low), of(d, high), key=lambda f: f.space.longest)
     begin = longest.radius(a.order, min(abs(a.coefficient), abs(b.coefficient)), 0.25)
+    middle = Sum.of(polynomial([1]), Lag([(Delay(Fraction(mean)), 1)]))
+    both, apart = (d1 + d2) * middle, (d1 + -d2) * middle
+    names = [Sum.of(polynomial([1]), NOW, name) for name in ("both", "apart")]
+    whole = d0 + d12 * middle * middle + both * names[0] + apart * names[1]
+    affine = Affine(System(whole, Sum({}), {"both": 1.0, "apart": 0.0}), ("both", "apart"))
+    rest, plus, minus = affine.terms
     # Past some frequency any phases may do.
     free = (VERTEX, (1.0, -1.0, 0.0)), (TERM, (0.0, 0.5, 0.5)), (TERM, (0.0, 0.5, -0.5))
     test = [(*member, (0.0, 0.0, 0.0)) for member in free]
-    both, apart = (terms.first + terms.second) * -1, terms.first + terms.second * -1
-    functions = [terms.constant + both, both, apart]
     arc = (0.0, low, 0.0, high), (0.0, 0.0, 0.0, 0.0)
-    with decided("not decided", np.ones((1, 2))):
-        return decide.excludes(Family(functions, [test], arc), begin)
+    with decided("not decided", np.array(list(here.nominal.values()))):
+        return decide.excludes(Family([rest + plus, plus, minus * -1], [test], arc), begin)

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from armlock.affine import Affine
 from armlock.checks import real_number
-from armlock.engine.functions import common_zeros
 from armlock.engine.margins import require_stable
 from armlock.engine.varying import constant_radius_of, varying_radius_of
 from armlock.loops import Loop, checked_loop
@@ -90,11 +90,11 @@ def varying_radius(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> VaryingRadiu
     >>> print(f"varying: {found.radius:.3e}, constant: {found.constant:.3e}")
     varying: 1.321e-06, constant: 1.464e-06
     """
-    terms = checked_loop(loop).terms
-    c1, c2 = real_number("c1", c1), real_number("c2", c2)
-    d, arms = loop.function(c1, c2), [terms.first, terms.second]
-    with decided("no radius", np.array([[c1, c2]])):
-        require_stable(d, common_zeros(*loop.quotient(c1, c2)))
+    affine = Affine.of(checked_loop(loop))
+    point = np.array([real_number("c1", c1), real_number("c2", c2)])
+    d, arms = affine.function(*point.tolist()), [f * -1 for f in affine.terms[1:]]
+    with decided("no radius", point):
+        require_stable(d, affine.cancelled(*point.tolist()))
         radius, omega, scalings = varying_radius_of(d, arms)
         constant = constant_radius_of(d, arms, radius) if radius else 0.0
     return VaryingRadius(radius, constant, omega, scalings[1] / scalings[0])

@@ -1,26 +1,32 @@
 """Charts: how many characteristic roots are unstable over a grid of the two parameters.
 
-With D = N - x M, charts are counted row by row: with y fixed, roots cross the axis where
-Im(N / M) = 0, at x = Re(N / M). Each row starts from a count just outside of the chart, and is
-checked against an independent count at its other end. Points next to a crossing, and rows that
-do not add up, are counted one by one.
+With D = F + x G, charts are counted row by row: with y fixed, roots cross the axis where
+Im(F / G) = 0, at x = -Re(F / G). Each row starts from a count just outside of the chart, and is
+checked against an independent count at its other end. Points next to a crossing, rows that do
+not add up, and small charts are counted one by one.
 """
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+from tqdm import tqdm  # type: ignore[import-untyped]
 
-from armlock.characteristic import CharacteristicFunction, checked_system
-from armlock.checks import BoolArray, FloatArray, IntArray, axis, check_memory
-from armlock.engine.decide import BOUNDARY, UNCONFINED
-from armlock.engine.functions import Function
+from armlock.affine import Affine
+from armlock.checks import BoolArray, FloatArray, IntArray, axis, check_memory, real_number
+from armlock.engine import chain
+from armlock.engine.decide import BOUNDARY, UNCONFINED, UNDECIDED
+from armlock.engine.functions import Function, stacked
 from armlock.engine.inclusion import EPSILON
+from armlock.engine.polynomials import rounded
 from armlock.stability.counts import count_points
 from armlock.stability.crossings import crossings
+from armlock.systems import System
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,6 +40,12 @@ _OUTSIDE = (0.38196601125, 0.27639320225)
 _BYTES_A_POINT = 32
 # How exact a crossing has to be, in steps of the axis.
 _FINE = 1e-4
+# Charts of so many points are counted point by point. Others are filled by so many rows at
+# first, and then by as many as have this many crossings, or points; points are counted in
+# batches, of this size at first.
+_FEW, _ROWS, _MANY_CROSSINGS, _MANY_POINTS, _BATCH = 1024, 8, 2_000_000, 1_000_000, 1 << 9
+# The progress is shown after so many seconds.
+_PATIENCE = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,12 +54,14 @@ class StabilityChart:
 
     Attributes
     ----------
-    system : CharacteristicFunction
+    system : System
         The loop that was charted.
     x, y : float arrays, shapes (n,) and (m,)
         The axes, as given.
     counts : int array, shape (m, n)
-        As `unstable_roots`: number of unstable roots, or -1 or -2.
+        As `unstable_roots` at each point: number of unstable roots, or -1, -2 or -3.
+    parameters : pair of str
+        What the axes are.
 
     Examples
     --------
@@ -60,10 +74,11 @@ class StabilityChart:
     array([ True,  True, False, False])
     """
 
-    system: CharacteristicFunction
+    system: System
     x: FloatArray
     y: FloatArray
     counts: IntArray
+    parameters: tuple[str, str]
 
     @property
     def stable(self) -> BoolArray:
@@ -90,124 +105,188 @@ class StabilityChart:
 
 
 def stability_chart(
-    system: CharacteristicFunction,
-    c1: npt.ArrayLike,
-    c2: npt.ArrayLike,
+    system: System, *axes: npt.ArrayLike, **axes_and_numbers: npt.ArrayLike
 ) -> StabilityChart:
     r"""Count the unstable roots over a grid.
 
     Parameters
     ----------
-    system : CharacteristicFunction
-        The loop, for instance `CommonArm()`.
-    c1, c2 : array_like of float, one-dimensional
-        Axes of the two free parameters, in any order and spacing.
+    system : System
+        The open loop, for instance `CommonArm()`, or an equation; affine in both parameters
+        together.
+    *axes : array_like of float, one-dimensional
+        Axes of the first two parameters, in any order and spacing, such as c1 and c2.
+    **axes_and_numbers : array_like of float
+        Axes of two parameters by name, in the order x, y; and numbers for other parameters,
+        which are nominal by default.
 
     Returns
     -------
     StabilityChart
-        With `.counts` of shape (len(c2), len(c1)): at each point the count of D, which is -1 on
-        the line D(0) = 0.
+        With `.counts` of shape (len(y), len(x)): at each point the number that `unstable_roots`
+        gives.
 
     Raises
     ------
     TypeError, ValueError
-        If an axis is empty, not one-dimensional, or not finite and real, or the chart does not
-        fit into the memory.
-    CountError
-        As `unstable_roots` does.
+        If there are not two axes, an axis is empty, not one-dimensional, or not finite and
+        real, the system is not affine in both parameters, or the chart does not fit into the
+        memory.
 
     Notes
     -----
-    D-subdivision along each row. With c2 fixed, a root is at s = j omega where
+    D-subdivision along each row. With y fixed, a root is at s = j omega where
 
     .. math::
 
-        c_1 = \frac{N}{M} , \qquad \mathrm{Im}\, \frac{N}{M} = 0 , \qquad
-        N = A + C\, e^{-s\delta} - c_2\, B_2\, e^{-s(\delta + \theta_2)} , \quad
-        M = B_1\, e^{-s(\delta + \theta_1)} .
+        x = -\frac{F}{G} , \qquad \mathrm{Im}\, \frac{F}{G} = 0 , \qquad D = F + x\, G .
 
-    Past it, towards larger c1, a conjugate pair has become unstable if Im(N / M) ascends with
-    omega there, and stable if it descends; at omega = 0 one root. Of a retarded system the
+    Past it, towards larger x, a conjugate pair has become unstable if Im(F / G) descends with
+    omega there, and stable if it ascends; at omega = 0 one root. Of a retarded system the
     counts at the two ends of all rows come from two columns, and those of the columns from four
-    single counts; of a neutral one each end is counted.
+    single counts; of a neutral one each end is counted. A chart that takes longer shows its
+    progress.
 
     Examples
     --------
     >>> from armlock import CommonArm, stability_chart
     >>> stability_chart(CommonArm(), [0.0, 1.0, 1.5], [0.5, 1.5]).counts
-    array([[ 0,  0, -1],
+    array([[ 0,  0,  0],
            [ 0,  9, 13]])
+
+    Over the two gains of a controller:
+
+    >>> from armlock import delay, parameter, s
+    >>> loop = (parameter("kp") + parameter("ki") / s) * delay(1.0) / (s + 1)
+    >>> stability_chart(loop, kp=[0.5, 1.0, 3.0], ki=[0.5, 1.5]).stable
+    array([[ True,  True, False],
+           [ True,  True, False]])
     """
-    name1, name2 = checked_system(system).parameters
-    xs, ys = axis(name1, c1), axis(name2, c2)
+    system = System.of(system)
+    (name1, xs), (name2, ys), numbers = _axes(system, axes, axes_and_numbers)
     check_memory(f"{name1} and {name2}", (ys.size, xs.size), _BYTES_A_POINT)
+    affine = Affine(system, (name1, name2), **numbers)
     order_x, order_y = np.argsort(xs, kind="stable"), np.argsort(ys, kind="stable")
-    if system.terms.first.is_zero:
+    if affine.terms[1].is_zero:
         # Nothing crosses along a row: walk along the columns instead.
-        counts = _chart_rows(system, ys[order_y], xs[order_x], swapped=True).T
+        affine = Affine(system, (name2, name1), **numbers)
+        counts = _chart(affine, ys[order_y], xs[order_x]).T
     else:
-        counts = _chart_rows(system, xs[order_x], ys[order_y], swapped=False)
+        counts = _chart(affine, xs[order_x], ys[order_y])
     for other in system.others:
-        # Rounding does not decide where a pole that may be zero changes the count.
-        differ = stability_chart(other, xs[order_x], ys[order_y]).counts != counts
-        counts[differ] = BOUNDARY
+        # A pole that may be meant to be zero changes the count.
+        chart = stability_chart(other, **{name1: xs, name2: ys}, **numbers)
+        counts[chart.counts[np.ix_(order_y, order_x)] != counts] = UNDECIDED
     if (np.diff(order_x) != 1).any() or (np.diff(order_y) != 1).any():
         counts = counts[np.ix_(np.argsort(order_y), np.argsort(order_x))]
-    return StabilityChart(system, xs, ys, counts)
+    return StabilityChart(system, xs, ys, counts, (name1, name2))
 
 
-def _chart_rows(
-    system: CharacteristicFunction, x: FloatArray, y: FloatArray, swapped: bool
+def _axes(
+    system: System, axes: tuple[npt.ArrayLike, ...], named: dict[str, npt.ArrayLike]
+) -> tuple[tuple[str, FloatArray], tuple[str, FloatArray], dict[str, float]]:
+    """Return the two axes with their names, and the numbers."""
+    given = system.given(axes, {**dict.fromkeys(system.parameters, 0.0), **named})
+    numbers = {k: real_number(k, v) for k, v in named.items() if isinstance(v, Real)}
+    placed = [*system.parameters[: len(axes)], *(k for k in named if k not in numbers)]
+    chosen = list(zip(placed, [*axes, *(named[k] for k in placed[len(axes) :])], strict=True))
+    if len(chosen) != 2:
+        raise TypeError(
+            f"two axes must be given, of the parameters {tuple(given)}, got {len(chosen)}"
+        )
+    first, second = ((name, axis(name, value)) for name, value in chosen)
+    return first, second, numbers
+
+
+def _counted(
+    affine: Affine, x: FloatArray, y: FloatArray, progress: tqdm | None = None
 ) -> IntArray:
-    """Return the counts of a chart with ascending axes, of D or with x and y exchanged."""
+    """Count at points one by one."""
+    found, start, size = np.empty(x.size, np.int64), 0, _BATCH
+    while start < x.size:
+        some, begun = slice(start, start + size), time.monotonic()
+        found[some] = count_points(affine, np.column_stack((x[some], y[some])))
+        if progress:
+            progress.update(found[some].size)
+        start += size
+        size = size * 8 if time.monotonic() - begun < 0.2 else size
+    return found
 
-    def count(x: FloatArray, y: FloatArray) -> IntArray:
-        """Count D, with its root at s = 0."""
-        return count_points(plain, *((y, x) if swapped else (x, y)))
 
-    def reserve(x: FloatArray, y: FloatArray) -> FloatArray:
-        return system.neutral_margin(*((y, x) if swapped else (x, y)))
+def _chart(affine: Affine, x: FloatArray, y: FloatArray) -> IntArray:
+    """Return the counts of a chart with ascending axes."""
+    with tqdm(
+        total=x.size * y.size, desc="chart", unit=" points", delay=_PATIENCE, leave=False
+    ) as progress:
+        if x.size * y.size <= _FEW:
+            across, up = (v.ravel() for v in np.meshgrid(x, y))
+            return _counted(affine, across, up, progress).reshape(y.size, x.size)
+        return _filled(affine, x, y, progress)
 
-    plain, (_, _, first, second) = system.plain(), system.terms
-    centre = float(x[x.size // 2]), float(y[y.size // 2])
-    at_centre = system.function(*(centre[::-1] if swapped else centre))
-    if swapped:
-        first, second = second, first
+
+def _filled(affine: Affine, x: FloatArray, y: FloatArray, progress: tqdm) -> IntArray:
+    """Return the counts of a chart, row by row."""
+    rows = _Rows.of(affine, float(x[x.size // 2]), float(y[y.size // 2]))
+    swapped = rows.exchanged()
     left, right = _ends(x, _OUTSIDE[0])
     low, high = _ends(y, _OUTSIDE[1])
     lower, upper = np.full(y.size, left), np.full(y.size, right)
-    rows = _Rows(system.terms.constant, at_centre, first, second, centre)
-    confined = reserve(x, y[:, None]) > 0.0
-    if not (reserve(np.array([left, right]), np.array([[low], [high]])) > 0.0).all():
+
+    def count(x: FloatArray, y: FloatArray) -> IntArray:
+        found = _counted(affine, x, y)
+        # Where D has a root at s = 0, the row does not begin.
+        found[rows.at_zero(x, y)] = BOUNDARY
+        return found
+
+    corners = np.meshgrid([left, right], [low, high])
+    if not rows.plain:
+        base = top = np.full(y.size, BOUNDARY)
+    elif not rows.confined(*(v.ravel() for v in corners)).all():
         # Rows end half-way between their last confined point and the limit of the chain.
-        inside = np.where(confined, np.abs(x), 0.0).max(axis=1)
-        whole, _ = first.space.limits(*rows.constant.weights)
-        weight = first.size_at_infinity / abs(float(whole))
+        inside = np.array(
+            [np.abs(x[rows.confined(x, np.full(x.size, v))]).max(initial=0.0) for v in y]
+        )
+        weight = rows.first.size_at_infinity
         if weight > 0.0:
-            ends_at = inside + 0.5 * reserve(inside, y) / weight
+            ends_at = inside + 0.5 * rows.reserve(inside, y) / weight
             lower, upper = np.maximum(lower, -ends_at), np.minimum(upper, ends_at)
         base, top = count(lower, y), count(upper, y)
-    elif second.is_zero:
-        corners = count(np.array([left, right]), np.full(2, low))
-        base, top = np.repeat(corners[:, None], y.size, axis=1)
+    elif rows.second.is_zero:
+        ends = count(np.array([left, right]), np.full(2, low))
+        base, top = np.repeat(ends[:, None], y.size, axis=1)
     else:
         sides = np.array([left, right])
         at_low, at_high = (count(sides, np.full(2, at)) for at in (low, high))
-        columns, doubtful = rows.exchanged().filled(
+        columns, doubtful, _ = swapped.filled(
             y, sides, np.full(2, low), np.full(2, high), at_low, at_high
         )
-        for k in range(2):
-            here = doubtful[k]
-            columns[k, here] = count(np.full(here.sum(), sides[k]), y[here])
+        for side in range(2):
+            here = doubtful[side]
+            columns[side, here] = count(np.full(here.sum(), sides[side]), y[here])
         base, top = columns
-    counts, doubtful = rows.filled(x, y, lower, upper, base, top)
-    doubtful &= confined
-    counts[~confined] = UNCONFINED
-    # Few entries are found many times as fast in a flat array.
-    row, column = np.divmod(np.flatnonzero(doubtful), x.size)
-    counts[row, column] = count(x[column], y[row])
-    return counts
+    found = np.empty((y.size, x.size), np.int64)
+    start, number = 0, _ROWS
+    while start < y.size:
+        k = slice(start, min(start + number, y.size))
+        height = k.stop - k.start
+        if rows.plain:
+            some, doubtful, size = rows.filled(x, y[k], lower[k], upper[k], base[k], top[k])
+            confined = rows.confined(*(v.ravel() for v in np.meshgrid(x, y[k]))).reshape(
+                some.shape
+            )
+            some[~confined], doubtful = UNCONFINED, doubtful & confined
+        else:
+            some, size = np.empty((height, x.size), np.int64), 0
+            doubtful = np.ones(some.shape, np.bool_)
+        # Few entries are found many times as fast in a flat array.
+        row, column = np.divmod(np.flatnonzero(doubtful), x.size)
+        some[row, column] = _counted(affine, x[column], y[k][row], progress)
+        found[k] = some
+        progress.update(some.size - row.size)
+        start = k.stop
+        number = max(_ROWS, int(number * min(_MANY_CROSSINGS / max(size, 1), 64.0)))
+        number = min(number, max(_MANY_POINTS // x.size, 1))
+    return found
 
 
 def _ends(values: FloatArray, outside: float) -> tuple[float, float]:
@@ -219,7 +298,7 @@ def _ends(values: FloatArray, outside: float) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class _Rows:
-    """D = constant - x first - y second, exactly `at_centre` at the point `centre`."""
+    """D = constant + x first + y second, exactly `at_centre` at the point `centre`."""
 
     constant: Function
     at_centre: Function
@@ -227,9 +306,52 @@ class _Rows:
     second: Function
     centre: tuple[float, float]
 
+    @classmethod
+    def of(cls, affine: Affine, x: float, y: float) -> _Rows:
+        """Return D of two parameters, and its value at a centre."""
+        constant, first, second = affine.terms
+        return cls(constant, affine.function(x, y), first, second, (x, y))
+
     def exchanged(self) -> _Rows:
         """Return D with x and y exchanged."""
         return _Rows(self.constant, self.at_centre, self.second, self.first, self.centre[::-1])
+
+    @property
+    def plain(self) -> bool:
+        """Whether the sum of magnitudes tells where the chain is confined, for all x and y.
+
+        Then nothing undelayed of the highest power has a parameter.
+        """
+        space = self.first.space
+        still, late = space.limits(*stacked([self.constant, self.first, self.second]))
+        acting = np.abs(late).sum(0)[None]
+        return bool(space.step) or not (
+            still[1:].any() or chain.shared(space.lags, acting).any()
+        )
+
+    def _limits(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the limits of D at infinity at points, shapes (n,) and (n, K)."""
+        still, late = self.first.space.limits(
+            *stacked([self.constant, self.first, self.second])
+        )
+        shares = np.column_stack((np.ones(x.size), x, y))
+        return shares @ still, shares @ late
+
+    def confined(self, x: FloatArray, y: FloatArray) -> BoolArray:
+        """Tell where the chain is confined."""
+        return self.first.space.confined(*self._limits(x, y))
+
+    def reserve(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Tell by how much the chain is confined."""
+        return chain.reserve(self.first.space.lags, *self._limits(x, y))
+
+    def at_zero(self, x: FloatArray, y: FloatArray) -> BoolArray:
+        """Tell where rounding hides the sign of D(0)."""
+        exact = [f.series(1)[0] for f in (self.constant, self.first, self.second)]
+        # Of many fast poles the product is no float.
+        sizes = rounded([value / (max(map(abs, exact)) or 1) for value in exact])
+        sums = np.column_stack((np.ones(x.size), x, y)) * sizes
+        return np.asarray(np.abs(sums.sum(axis=1)) <= 8.0 * EPSILON * np.abs(sums).sum(axis=1))
 
     def confined_from(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Frequency past which the constant exceeds x first and y second together."""
@@ -252,14 +374,27 @@ class _Rows:
         upper: FloatArray,
         base: IntArray,
         top: IntArray,
-    ) -> tuple[IntArray, BoolArray]:
-        """Fill rows from their crossings; return counts, and which of them are doubtful.
+    ) -> tuple[IntArray, BoolArray, int]:
+        """Fill rows from their crossings; return counts, which are doubtful, and crossings.
 
         The counts at x = lower and at x = upper are `base` and `top`.
         """
+        known = (base >= 0) & (top >= 0)
+        if not known.all():
+            # A row without a count at its ends, such as one with a root at s = 0 all along.
+            counts, doubtful = (
+                np.zeros((y.size, x.size), np.int64),
+                np.ones((y.size, x.size), bool),
+            )
+            size = 0
+            if known.any():
+                counts[known], doubtful[known], size = self.filled(
+                    x, y[known], lower[known], upper[known], base[known], top[known]
+                )
+            return counts, doubtful, size
         x0, y0 = self.centre
         found = crossings(
-            (self.at_centre, self.second, self.first),
+            (self.at_centre, self.second * -1, self.first * -1),
             y - y0,
             lower - x0,
             upper - x0,
@@ -272,7 +407,7 @@ class _Rows:
         change = np.zeros((y.size, x.size + 1), dtype=np.int64)
         np.add.at(change, (row, np.searchsorted(x, at[inside])), jump)
         counts = base[:, None] + np.cumsum(change, axis=1)
-        doubted = found.unfinished | (base < 0) | (counts[:, -1] != top)
+        doubted = found.unfinished | (counts[:, -1] != top)
         doubtful = np.repeat(doubted[:, None], x.size, axis=1)
         # Centre and crossing are rounded, and so is their sum.
         rounding = 4.0 * EPSILON * (abs(x0) + np.abs(found.x))
@@ -280,4 +415,4 @@ class _Rows:
         from_k, to_k = np.searchsorted(x, at - off), np.searchsorted(x, at + off, side="right")
         for i in np.flatnonzero(from_k < to_k):
             doubtful[found.row[i], from_k[i] : to_k[i]] = True
-        return counts[:, :-1], doubtful
+        return counts[:, :-1], doubtful, at.size

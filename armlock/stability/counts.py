@@ -2,32 +2,43 @@
 
 By the argument principle along s = j omega (`armlock.engine.decide.counts`), up to a frequency
 past which no root can cross. Points are counted with rounded weights and a bound of their
-error. A point that this leaves undecided is counted again with exact weights. Among many
-points those where rounding hides the sign of D(0) are `BOUNDARY`: exact ones take 2 ms each.
+error. A point that this leaves undecided is counted again with exact weights, from which the
+behaviour at s = 0 is known.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from armlock.characteristic import CharacteristicFunction, broadcast_parameters
-from armlock.checks import FloatArray, IntArray, real_number
-from armlock.delays import DelaySystem
+from armlock.affine import Affine, NotAffineError, common, quotient_at
+from armlock.checks import (
+    FloatArray,
+    IntArray,
+    broadcast_shape,
+    check_memory,
+    real_array,
+    real_number,
+)
 from armlock.engine import decide
-from armlock.engine.decide import BOUNDARY, UNCONFINED, UndecidedError
-from armlock.engine.functions import Function, stacked
+from armlock.engine.chain import UndecidedError
+from armlock.engine.decide import BOUNDARY, UNCONFINED, UNDECIDED
+from armlock.engine.functions import Function, Leading, log, stacked
 from armlock.engine.inclusion import EPSILON, Functions
-from armlock.engine.polynomials import rounded
-from armlock.loops import Loop
+from armlock.systems import System
 
-__all__ = ["BOUNDARY", "UNCONFINED", "CountError", "unstable_roots"]
+__all__ = ["BOUNDARY", "UNCONFINED", "UNDECIDED", "CountError", "unstable_roots"]
 
 # Points whose weights are in memory at a time.
 _AT_A_TIME = 1 << 16
+# Coefficients at s = 0 from which zeros there are known; and what a count is until exact
+# weights decide it.
+_TERMS, _EXACTLY = 4, -4
 # Past this an exponential is no float.
 _LARGEST_EXPONENT = 700.0
 
@@ -37,8 +48,8 @@ class CountError(RuntimeError):
 
     Attributes
     ----------
-    points : float array, shape (n, 2)
-        Where.
+    points : float array, shape (n, k)
+        Where, in the order of the parameters.
 
     Examples
     --------
@@ -59,83 +70,136 @@ class CountError(RuntimeError):
         return type(self), (str(self), self.points)
 
 
+def place(point: FloatArray) -> str:
+    """Return " at (1.0, 1.0)", or nothing without parameters."""
+    return f" at {tuple(point.tolist())}" if point.size else ""
+
+
 @contextmanager
-def decided(what: str, points: FloatArray) -> Iterator[None]:
-    """Raise a `CountError` where the engine does not decide at one of some points."""
+def decided(what: str, point: FloatArray) -> Iterator[None]:
+    """Raise a `CountError` where the engine does not decide at a point, shape (k,)."""
     try:
         yield
     except UndecidedError as error:
-        at = points[error.index : error.index + 1]
-        where = "".join(f" at {tuple(point)}" for point in at.tolist())
-        raise CountError(f"{what}{where}: {error}", at) from None
+        raise CountError(f"{what}{place(point)}: {error}", point[None]) from None
 
 
-def _count_exactly(system: CharacteristicFunction, x: float, y: float, right_of: float) -> int:
-    """Count the roots at one point, of a Loop those of the closed loop."""
-    function = system.function(x, y)
+def _count_exactly(n: Function, m: Function, right_of: float = 0.0) -> int:
+    """Count the roots of N + M = 0, of a loop those of the closed loop."""
+    function = n + m
     # No root cancels where D has none at s = 0.
-    common = 0 if function.series(1)[0] else system.cancelled(x, y)
-    with decided("no count", np.array([[x, y]])):
-        return _count(function, common, right_of)
-
-
-def _count(function: Function, common: int, right_of: float) -> int:
-    """Count the zeros right of a line, without `common` zeros at s = 0."""
+    cancelled = 0 if function.series(1)[0] else common(n, m)
     if abs(right_of) * function.space.longest > _LARGEST_EXPONENT:
         raise ValueError(
             f"right_of must be at most {_LARGEST_EXPONENT:.0f} over the longest delay in "
             f"magnitude, got {right_of}: its exponential is no float"
         )
-    return decide.count(function, common, right_of=right_of)
+    return decide.count(function, cancelled, right_of=right_of)
 
 
-def count_points(system: CharacteristicFunction, x: FloatArray, y: FloatArray) -> IntArray:
-    """Count at flat arrays of points, as `unstable_roots` does."""
-    x0, y0 = system.reference
-    # Differences from the reference: next to it, where a loop is used, nothing cancels.
-    terms = system.function(x0, y0), system.terms.first, system.terms.second
-    (steady, delayed), space = stacked(terms), terms[0].space
-    shares = np.stack((np.ones_like(x), x0 - x, y0 - y), axis=-1)
-    # On a line D has a root at s = 0. A loop may have none there.
-    on_line = np.zeros(x.size, np.bool_)
-    if not isinstance(system, Loop):
-        at_zero = [term.series(1)[0] for term in terms]
-        # Of many fast poles the product is no float.
-        sums = shares * rounded([value / (max(map(abs, at_zero)) or 1) for value in at_zero])
-        on_line = np.abs(sums.sum(axis=1)) <= 8.0 * EPSILON * np.abs(sums).sum(axis=1)
-    confined = system.neutral_margin(x, y) > 0.0
-    found = np.where(confined, BOUNDARY, UNCONFINED)
-    left = np.flatnonzero(confined & ~on_line)
-    for start in range(0, left.size, _AT_A_TIME):
-        some = left[start : start + _AT_A_TIME]
-        # A share, a weight, their product and two sums round by half an EPSILON each. The
-        # factors exp(-s theta) - 1 of delayed weights are at most two.
-        sizes = np.abs(shares[some]) @ (np.abs(steady) + 2.0 * np.abs(delayed).sum(axis=-1))
-        weights = shares[some] @ steady, np.tensordot(shares[some], delayed, axes=1)
-        functions = Functions(space.arrays, *weights, 4.0 * EPSILON * sizes)
-        with decided("no count", np.column_stack((x[some], y[some]))):
-            found[some] = decide.counts(space, functions)
-    for i in left[found[left] == BOUNDARY]:
-        found[i] = _count_exactly(system, float(x[i]), float(y[i]), 0.0)
+def count_points(affine: Affine, points: FloatArray) -> IntArray:
+    """Count at points of the parameters that vary, shape (n, k), as `unstable_roots` does."""
+    found, space = np.full(len(points), UNCONFINED), affine.space
+    for start in range(0, len(points), _AT_A_TIME):
+        functions = _rounded(affine, points[start : start + _AT_A_TIME])
+        limits = space.limits(functions.steady, functions.delayed)
+        confined = np.flatnonzero(space.confined(*limits))
+        chosen = Functions(functions.space, *(v[confined] for v in functions[1:]))
+        counted = decide.counts(space, chosen)
+        # What rounded weights do not confine, exact ones may.
+        found[start + confined] = np.where(counted == UNCONFINED, _EXACTLY, counted)
+    left = np.flatnonzero(found == BOUNDARY)
+    for start in range(0, left.size, _AT_A_TIME // 64):
+        some = left[start : start + _AT_A_TIME // 64]
+        found[some] = _with_zeros(affine, points[some])
+    for i in np.flatnonzero(found == _EXACTLY):
+        try:
+            found[i] = _count_exactly(*affine.quotient(*points[i].tolist()))
+        except UndecidedError:
+            found[i] = UNDECIDED
     return found
 
 
+def _with_zeros(affine: Affine, points: FloatArray) -> IntArray:
+    """Count at points where D(0) may be zero; `_EXACTLY` where rounded weights do not decide.
+
+    Of a loop those zeros do not count that N and M have in common.
+    """
+    series = [[f.series(_TERMS) for f in part] for part in (affine.n, affine.m)]
+    found = np.full(len(points), _EXACTLY)
+    left, leads = [], []
+    for i, point in enumerate(points.tolist()):
+        shares = [Fraction(1), *map(Fraction, point)]
+        n, m = (
+            [
+                sum((x * c[k] for x, c in zip(shares, part, strict=True)), Fraction(0))
+                for k in range(_TERMS)
+            ]
+            for part in series
+        )
+        d = [a + b for a, b in zip(n, m, strict=True)]
+        orders = [_order(a) for a in (n, m, d)]
+        cancelled = 0 if affine.m_is_zero else min(orders[:2])
+        if orders[2] in (0, _TERMS):
+            continue
+        if orders[2] > cancelled:
+            found[i] = BOUNDARY
+            continue
+        left.append(i)
+        leads.append((orders[2], d[orders[2]]))
+    if left:
+        functions = _rounded(affine, points[left])
+        radii = affine.space.radius(
+            [(functions.steady, functions.delayed)],
+            [k for k, _ in leads],
+            [log(abs(c)) for _, c in leads],
+            0.25,
+        )
+        known = [Leading(k, c, r) for (k, c), r in zip(leads, radii.tolist(), strict=True)]
+        counted = decide.counts(affine.space, functions, leading=known)
+        found[left] = np.where(counted < 0, _EXACTLY, counted)
+    return found
+
+
+def _order(series: Sequence[Fraction]) -> int:
+    """Return the order of a zero at s = 0, or the length of the series."""
+    return next((k for k, c in enumerate(series) if c), len(series))
+
+
+def _rounded(affine: Affine, points: FloatArray) -> Functions:
+    """Return D at points with rounded weights and a bound of their error."""
+    # Differences from the origin: next to it, where a loop is used, nothing cancels.
+    terms = [affine.function(*affine.origin), *affine.terms[1:]]
+    steady, delayed = stacked(terms)
+    shares = np.column_stack((np.ones(len(points)), points - np.array(affine.origin)))
+    # A share, a weight, their product and the sums round by half an EPSILON each. The factors
+    # exp(-s theta) - 1 of delayed weights are at most two.
+    sizes = np.abs(shares) @ (np.abs(steady) + 2.0 * np.abs(delayed).sum(axis=-1))
+    return Functions(
+        affine.space.arrays,
+        shares @ steady,
+        np.tensordot(shares, delayed, axes=1),
+        (2.0 + len(terms)) * EPSILON * sizes,
+    )
+
+
 def unstable_roots(
-    system: CharacteristicFunction | DelaySystem,
-    c1: npt.ArrayLike | None = None,
-    c2: npt.ArrayLike | None = None,
-    *,
+    system: System,
+    *values: npt.ArrayLike,
     right_of: float = 0.0,
+    **numbers: npt.ArrayLike,
 ) -> IntArray:
     r"""Count the characteristic roots with positive real part.
 
     Parameters
     ----------
-    system : CharacteristicFunction or DelaySystem
-        The loop, for instance `CommonArm()`; of a `DelaySystem` L the closed loop 1 + L.
-    c1, c2 : array_like of float, optional
-        The two free parameters; they broadcast. Those of a loop are one if they are not given.
-        Others, such as a and b of `HayesEquation`, have to be given. A `DelaySystem` has none.
+    system : System
+        The open loop L, for instance `CommonArm()`, or an equation D = 0 (`equation`). A closed
+        loop in place of L would be closed again.
+    *values, **numbers : array_like of float, optional
+        The parameters, in the order of their first use or by name, such as c1 and c2 of a
+        `Loop`; they broadcast. Those that are not given are nominal, 1 for c1 and c2. The
+        system has to be affine in those that are arrays together.
     right_of : float, optional
         Count the roots with a larger real part than this, in rad/s.
 
@@ -144,33 +208,35 @@ def unstable_roots(
     int array, of the broadcast shape
         Number of unstable roots, multiplicity included. The point is stable, with all roots
         in the open left half-plane, where it is 0. `BOUNDARY` (-1) where a root lies on the
-        imaginary axis, or nearer to it than rounding can tell. Of a `Loop` these are the roots
-        of the closed loop: a root s = 0 of D that cancels in L does not count. ``loop.plain()``
-        counts the roots of D. The rounding of the phase omega tau is the largest: a point
-        within some 8 EPSILON omega tau of the boundary, relative to its parameters, may be
-        given as -1 (4e-10 where a root crosses at 1e4 rad/s, with 20 s). `UNCONFINED` (-2)
-        where the neutral root chain is not confined to the left half-plane
-        (`CharacteristicFunction.neutral_margin` is not positive): an arbitrarily small change
-        of the delays can then make infinitely many roots unstable. A chain that is confined by
-        no more than rounding, about 1e-14, counts as not confined, and such a loop has no
-        margins.
+        imaginary axis, or nearer to it than rounding can tell. Of a loop these are the roots
+        of the closed loop: a root s = 0 of D that cancels in L does not count.
+        ``equation(1 + loop)`` counts the roots of D. The rounding of the phase omega tau is the
+        largest: a point within some 8 EPSILON omega tau of the boundary, relative to its
+        parameters, may be given as -1 (4e-10 where a root crosses at 1e4 rad/s, with 20 s), and
+        where terms of D cancel, as many times further as they exceed their sum. `UNCONFINED`
+        (-2) where the neutral root chain is not confined to the left half-plane: an
+        arbitrarily small change of one delay object can then make infinitely many roots
+        unstable. A chain that is confined by no more than rounding, about 1e-14, counts as not
+        confined, and such a loop has no margins. `UNDECIDED` (-3) at a point among several that
+        takes too many steps.
 
     Raises
     ------
     TypeError, ValueError
-        If a number is not finite and real, or c1 and c2 do not broadcast or fit into memory.
+        If a number is not finite and real, a parameter is missing or unknown, the values do not
+        broadcast or fit into memory, or the system is not affine in those that are arrays.
     CountError
-        If a count takes too many steps, or depends on a pole that may be meant to be zero, see
-        `Controller.of`. Nothing is guessed.
+        If the count at a single point takes too many steps, or a count depends on a pole that
+        may be meant to be zero, see `Controller.of`. Nothing is guessed.
 
     Notes
     -----
-    By the argument principle. With n the degree of A,
+    By the argument principle. With n the degree of D,
 
     .. math::
 
         N = \frac{n}{2} - \frac{1}{\pi}\,
-        \Delta\!\arg_{0 \le \omega < \infty} D(\mathrm{j}\omega; c_1, c_2) ,
+        \Delta\!\arg_{0 \le \omega < \infty} D(\mathrm{j}\omega) ,
 
     which holds for retarded loops, and for neutral ones whose root chain is confined.
 
@@ -179,44 +245,32 @@ def unstable_roots(
     .. math::
 
         N = n - \frac{1}{\pi}\,
-        \Delta\!\arg_{0 \le \omega \le \pi / h} D(\mathrm{j}\omega; c_1, c_2) .
+        \Delta\!\arg_{0 \le \omega \le \pi / h} D(\mathrm{j}\omega) .
 
-    The argument is followed up to the frequency past which |A| > |C| + |c1 B1| + |c2 B2|.
+    The argument is followed up to a frequency past which the highest power of s exceeds all
+    else (Lemma 12).
 
     Examples
     --------
-    >>> from armlock import CommonArm, unstable_roots
+    >>> from armlock import CommonArm, equation, unstable_roots
     >>> unstable_roots(CommonArm(), [0.9, 0.5, 1.0], [1.05, 1.6, 1.0])
     array([0, 5, 0])
 
     At (1, 1) the pole of L at s = 0 cancels. D keeps a root there:
 
-    >>> int(unstable_roots(CommonArm().plain(), 1.0, 1.0))
+    >>> int(unstable_roots(equation(1 + CommonArm())))
     -1
     """
     right_of = real_number("right_of", right_of)
-    if isinstance(system, DelaySystem):
-        if c1 is not None or c2 is not None:
-            raise TypeError(f"a DelaySystem has no free parameters, got {c1!r} and {c2!r}")
-        n, m = system.functions
-        with decided("no count", np.empty((0, 2))):
-            found = np.array(_count(n + m, system.common, right_of))
-        points = np.empty((0, 2))
-    else:
-        xs, ys = broadcast_parameters(system, c1, c2)
-        points = np.column_stack((xs.ravel(), ys.ravel()))
-        if xs.size > 1 and right_of == 0.0:
-            found = count_points(system, *points.T)
-        else:
-            found = np.array(
-                [_count_exactly(system, a, b, right_of) for a, b in points.tolist()]
-            )
-        found = found.astype(np.int64).reshape(xs.shape)
+    system, arrays = broadcast_values(system, values, numbers)
+    shape = next((x.shape for x in arrays.values()), ())
+    flat = np.column_stack([x.ravel() for x in arrays.values()] or [np.empty((1, 0))])
+    counts = _counts(system, arrays, flat, right_of)
     for other in system.others:
-        differ = unstable_roots(other, c1, c2, right_of=right_of) != found
+        differ = _counts(other, arrays, flat, right_of) != counts
         if differ.any():
-            raise in_doubt(points[differ.ravel()] if points.size else points)
-    return found
+            raise in_doubt(flat[differ])
+    return counts.reshape(shape)
 
 
 def in_doubt(points: FloatArray) -> CountError:
@@ -229,11 +283,47 @@ def in_doubt(points: FloatArray) -> CountError:
     )
 
 
-def require_certain(
-    system: CharacteristicFunction | DelaySystem,
-    c1: npt.ArrayLike | None = None,
-    c2: npt.ArrayLike | None = None,
-) -> None:
+def require_certain(system: System, point: Sequence[Any]) -> None:
     """Raise a `CountError` where poles that may be meant to be zero change the count."""
     if system.others:
-        unstable_roots(system, *(() if isinstance(system, DelaySystem) else (c1, c2)))
+        unstable_roots(system, *point)
+
+
+def _counts(
+    system: System, arrays: dict[str, FloatArray], flat: FloatArray, right_of: float
+) -> IntArray:
+    """Count at points, shape (n, k), which arrays hold too."""
+    if len(flat) > 1 and right_of == 0.0:
+        varying = [name for name, x in arrays.items() if (x != x.flat[0]).any()]
+        return count_points(*over(system, arrays, varying))
+    found = np.empty(len(flat), np.int64)
+    for i, point in enumerate(flat):
+        try:
+            found[i] = _count_exactly(*quotient_at(system, point.tolist()), right_of)
+        except UndecidedError as error:
+            if len(flat) == 1:
+                raise CountError(f"no count{place(point)}: {error}", flat) from None
+            found[i] = UNDECIDED
+    return found
+
+
+def over(
+    system: System, arrays: dict[str, FloatArray], varying: list[str]
+) -> tuple[Affine, FloatArray]:
+    """Return a system, affine in the parameters that vary, and the points of these."""
+    with suppress(NotAffineError):
+        return Affine.of(system), np.column_stack([x.ravel() for x in arrays.values()])
+    held = {name: float(x.flat[0]) for name, x in arrays.items() if name not in varying}
+    points = np.column_stack([arrays[name].ravel() for name in varying])
+    return Affine(system, varying, **held), points
+
+
+def broadcast_values(
+    system: System, values: tuple[npt.ArrayLike, ...], numbers: dict[str, npt.ArrayLike]
+) -> tuple[System, dict[str, FloatArray]]:
+    """Return the system, and its parameters as finite real arrays of one shape."""
+    system = System.of(system)
+    given = {k: real_array(k, v) for k, v in system.given(values, numbers).items()}
+    shape = broadcast_shape(tuple(given), tuple(given.values()))
+    check_memory(" and ".join(given) or "values", shape, 64)
+    return system, {name: np.broadcast_to(x, shape).copy() for name, x in given.items()}

@@ -7,18 +7,27 @@ these curves the number of unstable roots of a retarded system is constant.
 
 from __future__ import annotations
 
+from fractions import Fraction
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numpy.polynomial import polynomial as poly
+from flint import fmpq_poly
 
-from armlock.characteristic import CharacteristicFunction, checked_system
+from armlock.affine import Affine, functions
 from armlock.checks import FloatArray, check_memory, positive_number, real_array
+from armlock.engine.chain import Delay, Lag
+from armlock.engine.functions import at
 from armlock.engine.inclusion import EPSILON
+from armlock.engine.polynomials import rounded
 from armlock.stability.counts import CountError
 from armlock.stability.crossings import crossings
+from armlock.systems import Sum, System, polynomial
+
+_S = fmpq_poly([0, 1])
+#: Polynomials by the length of their delay, which may be negative.
+_Sum = dict[Fraction, fmpq_poly]
 
 
 class Line(NamedTuple):
@@ -45,36 +54,94 @@ class Branch(NamedTuple):
     y: FloatArray
 
 
-def _require_two_parameters(system: CharacteristicFunction) -> None:
-    """Raise if D(j omega) = 0 does not determine both free parameters."""
-    b1, b2 = system.b1.coefficients, system.b2.coefficients
-    for name, b in zip(system.parameters, (b1, b2), strict=True):
-        if not b.any():
+def _two(system: Any, numbers: dict[str, Any]) -> tuple[System, str, str]:
+    """Return the system with numbers for all parameters but two, and the names of these."""
+    system = System.of(system)
+    system = system.at(**numbers)
+    if len(system.parameters) != 2:
+        raise TypeError(
+            f"two parameters must be left without a number, got {system.parameters} of "
+            f"{system!r}"
+        )
+    return system, *system.parameters
+
+
+def _crossed(b: _Sum, c: _Sum) -> _Sum:
+    """Return b conj(c) - conj(b) c, which on the axis is twice j Im(b conj(c)), exactly."""
+    found: _Sum = {}
+    for t, p in b.items():
+        for u, q in c.items():
+            for time, r in ((t - u, p * q(-_S)), (u - t, -p(-_S) * q)):
+                found[time] = found.get(time, fmpq_poly([0])) + r
+    return {time: p for time, p in found.items() if p}
+
+
+class _Curve:
+    """D = d + x b + y c on the axis, by Cramer's rule; the determinant is exact."""
+
+    def __init__(self, system: System, x: str, y: str) -> None:
+        self.affine = affine = Affine(system, (x, y))
+        d = system.numerator + system.denominator
+        b, c = d.by_length(x), d.by_length(y)
+        for name, part in ((x, b), (y, c)):
+            if not part:
+                raise ValueError(
+                    f"system must depend on both free parameters, but {system!r} does not "
+                    f"depend on {name}: there is no D-curve"
+                )
+        # Such as the zeros of a controller.
+        shared = fmpq_poly([0])
+        for p in (*b.values(), *c.values()):
+            shared = shared.gcd(p)
+        b, c = ({time: p // shared for time, p in part.items()} for part in (b, c))
+        determinant = _crossed(b, c)
+        if not determinant:
             raise ValueError(
-                f"system must depend on both free parameters, but {system!r} does not "
-                f"depend on {name}: there is no D-curve"
+                f"{x} and {y} must act differently, but only one combination of them enters "
+                f"{system!r}: the D-curve degenerates to lines"
             )
-    if system.tau1 == system.tau2:
-        ratio = b1[-1] / b2[-1]
-        if b1.size == b2.size and np.allclose(b1, ratio * b2, rtol=4 * EPSILON, atol=0.0):
-            raise ValueError(
-                f"tau1 and tau2 must differ, got {system.tau1} for both: only one "
-                f"combination of {' and '.join(system.parameters)} enters, and the D-curve "
-                f"degenerates to lines"
-            )
+        values = dict(zip((x, y), affine.origin, strict=True))
+        known = d.put({name: Sum.of(polynomial([v])) for name, v in values.items()})
+        early, one = min(determinant), fmpq_poly([1])
+        parts = (
+            known.by_length(), {Fraction(0): shared}, b, c, {Fraction(0): one},
+            {time - early: p for time, p in determinant.items()}, {-early: one},
+        )  # fmt: skip
+        groups = [
+            [{Lag([(Delay(time, ""), 1)]): p for time, p in part.items()}] for part in parts
+        ]
+        self.functions = functions(groups, system.step)
+
+    def at(self, omega: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the points of the curve; nan where rounding hides the determinant."""
+        shape, omega = np.shape(omega), np.abs(np.ravel(omega))
+        with np.errstate(all="ignore"):
+            known, shared, b, c, one, above, turned = at(self.functions, omega)
+            known, determinant = known / shared, (above / turned).imag / 2.0
+            determinant = np.where(omega == 0.0, np.nan, determinant)
+            # What the frequency is rounded by hides the determinant next to its zeros.
+            near = np.abs(determinant) < 1e-6 * np.abs(b * c / one**2)
+            value, slope = self.functions[5].value_and_slope(1j * omega[near])
+            hidden = np.abs(value) <= 4.0 * EPSILON * np.abs(omega[near] * slope)
+            determinant[near] = np.where(hidden, np.nan, determinant[near])
+            x = self.affine.origin[0] - (known * np.conj(c / one)).imag / determinant
+            y = self.affine.origin[1] + (known * np.conj(b / one)).imag / determinant
+        return x.reshape(shape), y.reshape(shape)
 
 
 def d_curve(
-    system: CharacteristicFunction, omega: npt.ArrayLike
+    system: System, omega: npt.ArrayLike, **numbers: float
 ) -> tuple[FloatArray, FloatArray]:
     r"""Parameters at which s = j omega is a characteristic root.
 
     Parameters
     ----------
-    system : CharacteristicFunction
-        The loop, for instance `CommonArm()`.
+    system : System
+        The open loop, for instance `CommonArm()`, or an equation.
     omega : array_like of float
         Angular frequencies in rad/s, any shape and sign.
+    **numbers : real numbers
+        Values of all parameters but two, which are x and y in the order of their first use.
 
     Returns
     -------
@@ -85,8 +152,8 @@ def d_curve(
     Raises
     ------
     TypeError, ValueError
-        If omega is not finite and real, or the system does not determine both parameters (equal
-        delays, or a free parameter without effect).
+        If omega is not finite and real, there are not two parameters, the system is not affine
+        in both, or does not determine both (equal delays, or a parameter without effect).
 
     See Also
     --------
@@ -104,13 +171,15 @@ def d_curve(
         \begin{pmatrix} x \\ y \end{pmatrix} =
         \begin{pmatrix} \mathrm{Re}\, V \\ \mathrm{Im}\, V \end{pmatrix}
 
-    with :math:`V = R\, e^{s\delta} + x_0 B_1 + y_0 B_2` and
-    :math:`\beta_k = B_k e^{-s\theta_k}` taken at s = j omega. It is solved by Cramer's rule:
+    with D = V at nominal parameters (or zero), from which x and y are counted, and
+    :math:`-\beta_k` what stands before them, at s = j omega. It is solved by Cramer's rule:
 
     .. math::
 
         x = \frac{\mathrm{Im}(V \bar\beta_2)}{\mathrm{Im}(\beta_1 \bar\beta_2)} , \qquad
         y = -\frac{\mathrm{Im}(V \bar\beta_1)}{\mathrm{Im}(\beta_1 \bar\beta_2)} .
+
+    The determinant is multiplied out exactly, and common factors of both are taken out.
 
     For the Hayes equation this is
 
@@ -135,42 +204,23 @@ def d_curve(
     >>> bool(abs(a) < 1e-12), round(float(b), 12)
     (True, -1.570796326795)
     """
-    checked_system(system)
     omega = real_array("omega", omega)
-    _require_two_parameters(system)
-    (x0, y0), s = system.reference, 1j * omega
-    rest, b1, b2 = system.polynomials()
-    change1, change2 = np.expm1(-s * system.tau1), np.expm1(-s * system.tau2)
-    with np.errstate(invalid="ignore"):
-        # All divided by B1, as factors: so the controller's part of it cancels.
-        z = np.asarray(np.exp(s * system.step) if system.step else s, dtype=np.complex128)
-        other = b2.over(b1, z)
-        # D at the reference, where nothing cancels; from there both parameters are solved for.
-        known = (
-            rest.over(b1, z) * np.exp(s * system.delay) - x0 * change1 - y0 * other * change2
-        )
-        # Only the difference of the delays enters here, which keeps low frequencies exact.
-        between = system.tau1 - system.tau2
-        across = np.conj(other)
-        determinant = np.imag(across) + np.imag(across * np.expm1(-s * between))
-        rounding = 4.0 * EPSILON * np.abs(omega * between * across)
-        determinant = np.where(np.abs(determinant) <= rounding, np.nan, determinant)
-        x = x0 + np.imag(known * np.conj(other * (1.0 + change2))) / determinant
-        y = y0 - np.imag(known * np.conj(1.0 + change1)) / determinant
-    return x, y
+    return _Curve(*_two(system, numbers)).at(omega)
 
 
-def d_curve_line(system: CharacteristicFunction) -> Line:
+def d_curve_line(system: System, **numbers: float) -> Line:
     r"""Straight line on which s = 0 is a characteristic root, in closed form.
 
     .. math::
 
-        x\, B_1(0) + y\, B_2(0) = A(0) + C(0)
+        D(0; x, y) = 0
 
     Parameters
     ----------
-    system : CharacteristicFunction
-        The loop.
+    system : System
+        The open loop, or an equation.
+    **numbers : real numbers
+        Values of all parameters but two.
 
     Returns
     -------
@@ -190,22 +240,19 @@ def d_curve_line(system: CharacteristicFunction) -> Line:
     >>> d_curve_line(CommonArm())
     Line(weight_x=1.0, weight_y=1.0, value=2.0)
     """
-    checked_system(system)
-    # From coefficients, which are exact there.
-    at = 1.0 if system.step else 0.0
-    rest, b1, b2 = (float(poly.polyval(at, p.coefficients)) for p in system.polynomials())
-    a = rest + system.reference[0] * b1 + system.reference[1] * b2
-    scale = max(b1, b2, key=abs)
-    if scale == 0.0:
+    system, x, y = _two(system, numbers)
+    value, first, second = (f.series(1)[0] for f in Affine(system, (x, y)).terms)
+    scale = max(first, second, key=abs)
+    if not scale:
         raise ValueError(
             f"system must depend on a free parameter at s = 0, but {system!r} does not"
         )
-    return Line(b1 / scale, b2 / scale, a / scale)
+    return Line(*rounded([first / scale, second / scale, -value / scale]).tolist())
 
 
-def _poles(system: CharacteristicFunction, omega_max: float) -> list[tuple[float, float]]:
+def _poles(affine: Affine, omega_max: float) -> list[tuple[float, float]]:
     """Return the intervals, ascending, in which the curve has a pole, or may have one."""
-    _, _, first, second = system.terms
+    _, first, second = affine.terms
     bound = np.array([np.inf])
     found = crossings(
         (first, first * 0, second), np.zeros(1), -bound, bound, np.array([omega_max])
@@ -224,18 +271,20 @@ def _poles(system: CharacteristicFunction, omega_max: float) -> list[tuple[float
 
 
 def d_curve_branches(
-    system: CharacteristicFunction, omega_max: float, *, points_per_turn: int = 48
+    system: System, omega_max: float, *, points_per_turn: int = 48, **numbers: float
 ) -> list[Branch]:
     r"""Sample the D-curve for 0 < omega < omega_max, cut at its poles.
 
     Parameters
     ----------
-    system : CharacteristicFunction
-        The loop.
+    system : System
+        The open loop, or an equation.
     omega_max : float
         Highest frequency in rad/s.
     points_per_turn : int, optional
         Samples per turn of the longest delay, 2 pi / delay.
+    **numbers : real numbers
+        Values of all parameters but two.
 
     Returns
     -------
@@ -256,8 +305,7 @@ def d_curve_branches(
 
     .. math::
 
-        \mathrm{Im} \left[ B_1(\mathrm{j}\omega)\, \overline{B_2(\mathrm{j}\omega)}\,
-        e^{-\mathrm{j}\omega (\theta_1 - \theta_2)} \right] = 0 ,
+        \mathrm{Im} \left( \beta_1 \bar\beta_2 \right) = 0 ,
 
     found with certified steps (`armlock.engine.inclusion.cross`).
 
@@ -270,16 +318,17 @@ def d_curve_branches(
     >>> [f"{branch.omega[0]:.2f} to {branch.omega[-1]:.2f}" for branch in branches]
     ['0.00 to 3.14', '3.14 to 6.28', '6.28 to 9.00']
     """
-    checked_system(system)
+    system, x, y = _two(system, numbers)
     omega_max = positive_number("omega_max", omega_max)
     if system.step:
         omega_max = min(omega_max, np.pi / system.step)
     density = positive_number("points_per_turn", points_per_turn)
-    _require_two_parameters(system)
+    curve = _Curve(system, x, y)
+    space = curve.affine.space
     # Samples in an interval of 1 rad/s.
-    density *= system.longest_delay / (2.0 * np.pi)
+    density *= space.longest / (2.0 * np.pi)
     check_memory("omega_max", (int(min(density * omega_max, 1e18)),), 256)
-    poles, around = _poles(system, omega_max), system.terms.rest.space.around_roots()
+    poles, around = _poles(curve.affine, omega_max), space.around_roots()
     branches = []
     for (_, start), (stop, _) in pairwise([(0.0, 0.0), *poles, (omega_max, omega_max)]):
         if stop <= start:
@@ -289,7 +338,7 @@ def d_curve_branches(
         share = 0.5 * (1.0 - np.cos(np.pi * (np.arange(count) + 0.5) / count))
         near = around[(around > start) & (around < stop)]
         omega = np.union1d(start + (stop - start) * share, near)
-        x, y = d_curve(system, omega)
-        kept = np.isfinite(x) & np.isfinite(y)
-        branches.append(Branch(omega[kept], x[kept], y[kept]))
+        first, second = curve.at(omega)
+        kept = np.isfinite(first) & np.isfinite(second)
+        branches.append(Branch(omega[kept], first[kept], second[kept]))
     return branches

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from armlock.affine import open_quotient
 from armlock.checks import BoolArray, ComplexArray, FloatArray, positive_number
-from armlock.delays import DelaySystem
 from armlock.engine import decide
 from armlock.engine.functions import (
     Function,
@@ -25,9 +25,9 @@ from armlock.engine.functions import (
 )
 from armlock.engine.inclusion import EPSILON
 from armlock.engine.polynomials import rounded
-from armlock.loops import Loop, quotient_of
-from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError, decided, in_doubt
+from armlock.stability.counts import BOUNDARY, UNCONFINED, CountError, decided, in_doubt, place
 from armlock.stability.crossings import crossings
+from armlock.systems import System
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -179,11 +179,10 @@ def _leading_radius(n: Function, m: Function) -> tuple[int, float]:
 
 
 def nyquist(
-    loop: Loop | DelaySystem,
-    c1: float = 1.0,
-    c2: float = 1.0,
-    *,
+    loop: System,
+    *values: float,
     omega_max: float | None = None,
+    **numbers: float,
 ) -> NyquistCurve:
     r"""Return the Nyquist curve for a picture, and its certified encirclements of -1.
 
@@ -195,10 +194,10 @@ def nyquist(
 
     Parameters
     ----------
-    loop : Loop or DelaySystem
-        The open loop.
-    c1, c2 : float, optional
-        Multiplicative perturbations of a `Loop`.
+    loop : System
+        The open loop, for instance `CommonArm()`.
+    *values, **numbers : float, optional
+        The parameters, in the order of their first use or by name; nominal ones by default.
     omega_max : float, optional
         Sample at least up to this frequency in rad/s.
 
@@ -209,8 +208,8 @@ def nyquist(
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no loop, an argument is not finite and real, `omega_max` is not positive,
-        or L has poles on the imaginary axis elsewhere than at s = 0.
+        If `loop` is no open loop, an argument is not finite and real, `omega_max` is not
+        positive, or L has poles on the imaginary axis elsewhere than at s = 0.
     CountError
         If the curve passes through -1, the loop's high-frequency chain is not confined, or the
         roots cannot be counted.
@@ -228,11 +227,10 @@ def nyquist(
     >>> curve.encirclements, curve.open_loop_poles, curve.closed_loop_roots
     (1, 0, 1)
     """
-    n, m = quotient_of(loop, c1, c2)
-    point = np.array([[c1, c2]])
-    if loop.others:
+    n, m, point = open_quotient(loop, values, numbers)
+    if System.of(loop).others:
         # A pole that may be zero is on the right for some of its values.
-        raise in_doubt(point)
+        raise in_doubt(point[None])
     poles = open_loop_poles(m)
     order, radius = _leading_radius(n, m)
     with decided("no Nyquist count", point):
@@ -240,8 +238,7 @@ def nyquist(
     if count < 0:
         chain = "its high-frequency chain of roots is not confined"
         why = chain if count == UNCONFINED else "the curve passes through -1"
-        where = f"(c1, c2) = ({c1}, {c2})"
-        raise CountError(f"no Nyquist count at {where}: {why}", point)
+        raise CountError(f"no Nyquist count{place(point)}: {why}", point[None])
     last = float(n.space.confined_from(*stacked([n + m]))[0])
     longest = n.space.longest or 1.0 / last
     end = max(1.05 * last, 10.0 / longest, 10.0 * radius)
@@ -268,11 +265,10 @@ def _response(n: Function, m: Function, omega: FloatArray) -> ComplexArray:
 
 
 def axis_crossings(
-    loop: Loop | DelaySystem,
-    c1: float = 1.0,
-    c2: float = 1.0,
-    *,
+    loop: System,
+    *values: float,
     omega_max: float | None = None,
+    **numbers: float,
 ) -> AxisCrossings:
     r"""Find every crossing of the negative real axis by the Nyquist curve.
 
@@ -282,10 +278,10 @@ def axis_crossings(
 
     Parameters
     ----------
-    loop : Loop or DelaySystem
-        The open loop.
-    c1, c2 : float, optional
-        Multiplicative perturbations of a `Loop`.
+    loop : System
+        The open loop, for instance `CommonArm()`.
+    *values, **numbers : float, optional
+        The parameters, in the order of their first use or by name; nominal ones by default.
     omega_max : float, optional
         Highest frequency in rad/s. By default all crossings with |L| above 1e-3 are found; a
         loop whose |L| does not fall below it needs the frequency.
@@ -297,7 +293,7 @@ def axis_crossings(
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no loop, an argument is not finite and real, or `omega_max` is not
+        If `loop` is no open loop, an argument is not finite and real, or `omega_max` is not
         positive, or not given where |L| does not fall below 1e-3.
     CountError
         If there are too many crossings to be found, or rounding hides some.
@@ -318,7 +314,7 @@ def axis_crossings(
     5.63e-05 rad/s: -5.13
     1.96e-04 rad/s: -113.07
     """
-    n, m = quotient_of(loop, c1, c2)
+    n, m, point = open_quotient(loop, values, numbers)
     least = 0.0
     if omega_max is None:
         least = _SMALL
@@ -330,12 +326,9 @@ def axis_crossings(
             )
     else:
         omega_max = positive_number("omega_max", omega_max)
-    point = np.array([[c1, c2]])
     begin = keeps_sign_up_to(n, m, odd=True)
     if not begin > 0.0:
-        raise CountError(
-            f"no crossings at (c1, c2) = ({c1}, {c2}): L is real near s = 0", point
-        )
+        raise CountError(f"no crossings{place(point)}: L is real near s = 0", point[None])
     if begin >= omega_max:
         return AxisCrossings(np.empty(0), np.empty(0))
     found = crossings(
@@ -351,7 +344,7 @@ def axis_crossings(
         why = "they take too many steps"
         if hidden.any():
             why = f"rounding hides some around {found.omega[hidden][0]} rad/s"
-        raise CountError(f"no crossings at (c1, c2) = ({c1}, {c2}): {why}", point)
+        raise CountError(f"no crossings{place(point)}: {why}", point[None])
     kept = agreed & (value < -least) & (value > -_LARGE)
     order = np.argsort(found.omega[kept])
     return AxisCrossings(found.omega[kept][order], value[kept][order])

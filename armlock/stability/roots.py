@@ -5,49 +5,30 @@ It is found and certified by `armlock.engine.roots`.
 
 from __future__ import annotations
 
-from typing import overload
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from armlock.characteristic import CharacteristicFunction, broadcast_parameters
-from armlock.checks import ComplexArray
-from armlock.delays import DelaySystem
+from armlock.affine import common, quotient_at
 from armlock.engine.roots import rightmost_zero
-from armlock.stability.counts import require_certain
+from armlock.stability.counts import broadcast_values, require_certain
+from armlock.systems import System
 
 
-@overload
-def rightmost_root(
-    system: CharacteristicFunction | DelaySystem,
-    c1: float | None = None,
-    c2: float | None = None,
-) -> complex: ...
-
-
-@overload
-def rightmost_root(
-    system: CharacteristicFunction, c1: npt.ArrayLike, c2: npt.ArrayLike
-) -> ComplexArray: ...
-
-
-def rightmost_root(
-    system: CharacteristicFunction | DelaySystem,
-    c1: npt.ArrayLike | None = None,
-    c2: npt.ArrayLike | None = None,
-) -> complex | ComplexArray:
+def rightmost_root(system: System, *values: npt.ArrayLike, **numbers: npt.ArrayLike) -> Any:
     r"""Return the characteristic root with the largest real part.
 
-    Of a `Loop` it is a root of the closed loop, as `unstable_roots` counts these: a root s = 0
-    of D that numerator and denominator of L cancel is none. ``loop.plain()`` keeps that root.
+    Of an open loop it is a root of the closed loop, as `unstable_roots` counts these: a root
+    s = 0 of D that numerator and denominator of L cancel is none. ``equation(1 + loop)`` keeps
+    that root.
 
     Parameters
     ----------
-    system : CharacteristicFunction or DelaySystem
-        The loop, for instance `CommonArm()`, or a map; of a `DelaySystem` L the closed loop.
-    c1, c2 : array_like of float, optional
-        The two free parameters; they broadcast. Those of a loop are one if they are not given.
-        Others, such as a and b of `HayesEquation`, have to be given.
+    system : System
+        The open loop L, for instance `CommonArm()`, an equation, or a map.
+    *values, **numbers : array_like of float, optional
+        The parameters, as `unstable_roots` takes them.
 
     Returns
     -------
@@ -57,8 +38,7 @@ def rightmost_root(
     Raises
     ------
     TypeError, ValueError
-        If c1 or c2 is not finite and real, the two do not broadcast, or D has no root at all
-        there because it is constant.
+        As `unstable_roots`, or if D has no root at all there because it is constant.
     CountError
         If a pole that may be meant to be zero changes the count, see `unstable_roots`.
     RootError
@@ -94,20 +74,12 @@ def rightmost_root(
     >>> print(f"{root:.10f}")
     -0.3181315052+1.3372357014j
     """
-    if isinstance(system, DelaySystem):
-        require_certain(system)
-        if c1 is not None or c2 is not None:
-            raise TypeError(f"a DelaySystem has no free parameters, got {c1!r} and {c2!r}")
-        n, m = system.functions
-        return rightmost_zero(n + m, system.common)
-    xs, ys = broadcast_parameters(system, c1, c2)
-    require_certain(system, xs, ys)
-    if xs.ndim == 0:
-        return _at(system, float(xs), float(ys))
-    flat = [_at(system, float(p), float(q)) for p, q in zip(xs.flat, ys.flat, strict=True)]
-    return np.array(flat, dtype=np.complex128).reshape(xs.shape)
-
-
-def _at(system: CharacteristicFunction, x: float, y: float) -> complex:
-    """Return the rightmost root at one point."""
-    return rightmost_zero(system.function(x, y), system.cancelled(x, y))
+    system, arrays = broadcast_values(system, values, numbers)
+    shape = next((x.shape for x in arrays.values()), ())
+    flat = np.column_stack([x.ravel() for x in arrays.values()] or [np.empty((1, 0))])
+    found = []
+    for point in flat.tolist():
+        require_certain(system, point)
+        n, m = quotient_at(system, point)
+        found.append(rightmost_zero(n + m, common(n, m)))
+    return np.array(found, np.complex128).reshape(shape) if shape else found[0]

@@ -4,27 +4,21 @@ Over a step h the delayed signal is held (order 0, as in the paper) or interpola
 (order 1); the equation between the samples is solved exactly. What is left is a linear map
 of the samples, stable when the spectral radius of its transition matrix is below one.
 
-The characteristic function of the map has the same affine form as that of the loop, on the
-unit circle instead of the imaginary axis, so that `unstable_roots`, `stability_chart` and
-`d_curve` take it as they take the loop.
+The map is an equation like the loop's own, affine in the same parameters, on the unit circle
+instead of the imaginary axis, so that `unstable_roots`, `stability_chart` and `d_curve` take it
+as they take the loop.
 """
 
 from __future__ import annotations
 
-from functools import partial
+from fractions import Fraction
 from typing import Any, NamedTuple
 
 import mpmath
 import numpy as np
 import numpy.typing as npt
+from flint import fmpq, fmpq_poly
 
-from armlock.characteristic import (
-    CharacteristicFunction,
-    DelayEquation,
-    broadcast_parameters,
-    checked_system,
-    given_or_one,
-)
 from armlock.checks import (
     FloatArray,
     check_memory,
@@ -34,7 +28,10 @@ from armlock.checks import (
     whole_steps,
 )
 from armlock.controllers import with_others
+from armlock.engine.chain import NOW, Delay, Lag
 from armlock.engine.roots import RootError
+from armlock.stability.counts import broadcast_values
+from armlock.systems import Sum, System, fraction, polynomial
 
 # Digits of a map's coefficients.
 _DIGITS = 100
@@ -53,18 +50,17 @@ class DelayedTerm(NamedTuple):
 
 
 def realize(
-    system: CharacteristicFunction, x: float | None, y: float | None
+    system: System, *values: float, **numbers: float
 ) -> tuple[FloatArray, list[DelayedTerm]]:
-    r"""Return a state space of `system` at (x, y), in which a single signal is delayed.
+    r"""Return a state space of D xi = 0, in which a single signal xi is delayed.
 
-    With C and A as in `armlock.characteristic.CharacteristicFunction`, D xi = 0 reads
+    With A what nothing delays, D xi = 0 reads
 
     .. math::
 
-        A\, \xi = -C\, \xi(t - \delta) + x\, B_1\, \xi(t - \delta - \tau_1)
-        + y\, B_2\, \xi(t - \delta - \tau_2) .
+        A\, \xi = \sum_k B_k\, \xi(t - \tau_k) .
 
-    In observer form, with as many states as D has degree and a term k for each delay, that is
+    In observer form, with as many states as D has degree, that is
 
     .. math::
 
@@ -73,68 +69,102 @@ def realize(
 
     Parameters
     ----------
-    system : CharacteristicFunction
-        With polynomials in s.
-    x, y : float
-        The free parameters.
+    system : System
+        The open loop, with D = N + M, or an equation.
+    *values, **numbers : float, optional
+        The parameters, in the order of their first use or by name; nominal ones by default.
 
     Returns
     -------
     state : float array, shape (n, n)
         The matrix F. Terms without delay are part of it.
     delayed : list of DelayedTerm
-        The others, free parameters included; d_k = 0 for retarded equations.
+        The others, by their delays; d_k = 0 for retarded equations.
 
     Raises
     ------
     TypeError, ValueError
-        If x or y is not a finite real number, or the system is a map.
+        If a parameter is not a finite real number, or the system is a map.
     """
-    name1, name2 = checked_system(system).parameters
-    given1, given2 = given_or_one(system, x, y)
-    x, y = real_number(name1, given1), real_number(name2, given2)
+    parts = _at_point(system, values, numbers).by_length()
+    undelayed = parts.pop(Fraction(0), fmpq_poly([0]))
+    state, columns = _observer(undelayed, [-p for p in parts.values()])
+    terms = zip(parts, columns, strict=True)
+    return state, [DelayedTerm(float(t), column, direct) for t, (column, direct) in terms]
+
+
+def _at_point(system: Any, values: Any, numbers: Any) -> Sum:
+    """Return D at given parameters."""
+    system = System.of(system)
     if system.step:
         raise ValueError(
             f"system must be in continuous time, got a map with step {system.step}"
         )
-    undelayed = system.a.copy()
-    terms = []
-    for weight, b, delay in (
-        (-1.0, system.c, system.delay),
-        (x, system.b1.coefficients, system.delay + system.tau1),
-        (y, system.b2.coefficients, system.delay + system.tau2),
-    ):
-        padded = np.zeros_like(undelayed)
-        padded[: b.size] = weight * b
-        if delay == 0.0:
-            undelayed -= padded
-        else:
-            terms.append((delay, padded))
-    # Descending powers below the highest one, as the observer form lists them.
-    lead = undelayed[-1]
-    below = undelayed[-2::-1] / lead
-    state = np.diag(np.ones(system.degree - 1), 1)
-    state[:, 0] = -below
-    delayed = []
-    for delay, b in terms:
-        direct = float(b[-1] / lead)
-        delayed.append(DelayedTerm(delay, b[-2::-1] / lead - direct * below, direct))
-    return state, delayed
+    given = {k: real_number(k, v) for k, v in system.given(values, numbers).items()}
+    here = system.at(**given)
+    found: Sum = here.numerator + here.denominator
+    return found
 
 
-def _checked(system: CharacteristicFunction, step: float | None, order: int) -> float:
-    """Return the step, or raise for what cannot be semi-discretized."""
-    step = positive_number("step", step)
+def _observer(
+    a: fmpq_poly, delayed: list[fmpq_poly]
+) -> tuple[FloatArray, list[tuple[FloatArray, float]]]:
+    """Return F, and the column G_k and direct share d_k of each delayed polynomial."""
+    size = a.degree()
+    state = np.diag(np.ones(max(size - 1, 0)), 1)
+    state[:, 0] = [-float(fraction(a[k] / a[size])) for k in range(size - 1, -1, -1)]
+    columns = []
+    for p in delayed:
+        direct = p[size] / a[size]
+        column = [
+            float(fraction((p[k] - direct * a[k]) / a[size])) for k in range(size - 1, -1, -1)
+        ]
+        columns.append((np.array(column), float(fraction(direct))))
+    return state, columns
+
+
+def _steps(lag: Lag, step: float) -> int:
+    """Return how many steps a product of delays is long; each of its objects is so many."""
+    return sum(n * whole_steps("delay", float(d.theta), step) for d, n in lag)
+
+
+def _checked(step: float | None, order: int) -> float:
+    """Return the step, or raise."""
     if whole_number("order", order, 0) > 1:
         raise ValueError(f"order must be 0 or 1, got {order!r}")
-    if checked_system(system).neutral:
+    return positive_number("step", step)
+
+
+def _retarded(parts: dict[Any, fmpq_poly], size: int) -> None:
+    """Raise unless all delayed terms are of lower degree than what nothing delays."""
+    if any(p.degree() >= size for p in parts.values()):
         raise ValueError(
             "system must be of retarded type: a neutral loop feeds back the delayed signal "
             "itself, which semi-discretization does not smooth"
         )
-    for name in ("delay", "tau1", "tau2"):
-        whole_steps(name, getattr(system, name), step)
-    return step
+
+
+def _realized(
+    system: Any, values: Any, numbers: Any, step: float
+) -> tuple[FloatArray, list[DelayedTerm], list[int]]:
+    """Return F, the delayed terms, and how many steps each of these is delayed."""
+    # A delay whose parameter is zero keeps its place.
+    whole = System.of(system)
+    parts = dict.fromkeys(whole.numerator.lags | whole.denominator.lags, fmpq_poly([0]))
+    parts |= _at_point(system, values, numbers).before()
+    parts = dict(sorted(parts.items(), key=lambda part: part[0].time))
+    undelayed = parts.pop(NOW, fmpq_poly([0]))
+    _retarded(parts, undelayed.degree())
+    found: dict[int, fmpq_poly] = {}
+    for lag, p in parts.items():
+        back = _steps(lag, step)
+        found[back] = found.get(back, fmpq_poly([0])) - p
+    state, columns = _observer(undelayed, list(found.values()))
+    terms = [
+        DelayedTerm(back * step, column, direct)
+        for back, (column, direct) in zip(found, columns, strict=True)
+    ]
+    return state, terms, list(found)
 
 
 def _sampled(
@@ -181,20 +211,20 @@ def _map(
 
 
 def transition_matrix(
-    system: CharacteristicFunction,
-    c1: float | None = None,
-    c2: float | None = None,
-    step: float | None = None,
+    system: System,
+    *values: float,
+    step: float,
     order: int = 0,
+    **numbers: float,
 ) -> FloatArray:
     r"""Build the transition matrix of the semi-discretized loop.
 
     Parameters
     ----------
-    system : CharacteristicFunction
-        A retarded loop, for instance `CommonArm()`.
-    c1, c2 : float, optional
-        The two free parameters. Those of a loop are one if they are not given.
+    system : System
+        A retarded loop, for instance `CommonArm()`, or an equation.
+    *values, **numbers : float, optional
+        The parameters, in the order of their first use or by name; nominal ones by default.
     step : float
         Sampling step h in s; it must divide all delays.
     order : {0, 1}, optional
@@ -210,13 +240,13 @@ def transition_matrix(
     Raises
     ------
     TypeError, ValueError
-        If c1 or c2 is not a finite real number, the step does not divide a delay, the order is
-        not 0 or 1, the loop is neutral, or the matrix does not fit into the memory.
+        If a parameter is not a finite real number, the step does not divide a delay, the order
+        is not 0 or 1, the loop is neutral, or the matrix does not fit into the memory.
 
     Notes
     -----
     In state space the loop is z' = F z + sum_k G_k xi(t - theta_k), where xi is the first
-    state, G_1 contains c1 and G_2 contains c2. What is not delayed is part of F (`realize`).
+    state. What is not delayed is part of F (`realize`).
     With :math:`\theta_k = r_k h`, a step is
 
     .. math::
@@ -255,15 +285,13 @@ def transition_matrix(
     >>> print(f"{matrix[0, 0]:.6f}")
     0.904837
     """
-    step = _checked(system, step, order)
+    step = _checked(step, order)
+    state, delayed, steps = _realized(system, values, numbers, step)
+    states, longest = len(state), max(steps, default=0)
     # The matrix, and what its eigenvalues take.
-    check_memory("step", (system.degree + round(system.longest_delay / step),) * 2, 24)
-    state, delayed = realize(system, c1, c2)
+    check_memory("step", (states + longest,) * 2, 24)
     with mpmath.workdps(_DIGITS):
         flow, columns = _sampled(state, delayed, step, order)
-    states = len(state)
-    steps = [whole_steps("delay", term.delay, step) for term in delayed]
-    longest = max(steps, default=0)
     matrix = np.zeros((states + longest, states + longest))
     matrix[:states, :states] = np.array(flow.tolist(), np.float64)
     # The present sample is the first state, older ones stand behind the states.
@@ -277,11 +305,11 @@ def transition_matrix(
 
 
 def spectral_radius(
-    system: CharacteristicFunction,
-    c1: npt.ArrayLike | None = None,
-    c2: npt.ArrayLike | None = None,
-    step: float | None = None,
+    system: System,
+    *values: npt.ArrayLike,
+    step: float,
     order: int = 0,
+    **numbers: npt.ArrayLike,
 ) -> FloatArray:
     r"""Spectral radius of the semi-discretized loop, certified.
 
@@ -293,11 +321,10 @@ def spectral_radius(
 
     Parameters
     ----------
-    system : CharacteristicFunction
-        A retarded loop, for instance `CommonArm()` or `HayesEquation()`.
-    c1, c2 : array_like of float, optional
-        The two free parameters; they broadcast. Those of a loop are one if they are not given.
-        Others, such as a and b of `HayesEquation`, have to be given.
+    system : System
+        A retarded loop, for instance `CommonArm()`, or an equation.
+    *values, **numbers : array_like of float, optional
+        The parameters, as `unstable_roots` takes them.
     step : float
         Sampling step h in s; it must divide all delays.
     order : {0, 1}, optional
@@ -311,8 +338,8 @@ def spectral_radius(
     Raises
     ------
     TypeError, ValueError
-        If c1 or c2 is not finite and real or the two do not broadcast, if the step does not
-        divide a delay, if the order is not 0 or 1, or if the loop is neutral.
+        As `unstable_roots`, and if the step does not divide a delay, the order is not 0 or 1,
+        or the loop is neutral.
     RootError
         If Schur's test is not decided.
 
@@ -329,23 +356,23 @@ def spectral_radius(
     >>> print(round(float(spectral_radius(HayesEquation(), -1, -1, step=0.1, order=1)), 12))
     0.941189374167
     """
-    xs, ys = broadcast_parameters(system, c1, c2)
-    h = _checked(system, step, order)
-    radii = [_radius(system, p, q, h, order) for p, q in zip(xs.flat, ys.flat, strict=True)]
-    return np.array(radii, np.float64).reshape(xs.shape)
+    system, arrays = broadcast_values(system, values, numbers)
+    h = _checked(step, order)
+    shape = next((x.shape for x in arrays.values()), ())
+    flat = np.column_stack([x.ravel() for x in arrays.values()] or [np.empty((1, 0))])
+    radii = [_radius(system, point, h, order) for point in flat.tolist()]
+    return np.array(radii, np.float64).reshape(shape)
 
 
-def _radius(
-    system: CharacteristicFunction, x: float, y: float, step: float, order: int
-) -> float:
+def _radius(system: System, point: list[float], step: float, order: int) -> float:
     """Return the spectral radius at one point."""
-    state, delayed = realize(system, x, y)
+    state, delayed, steps = _realized(system, point, {}, step)
     with mpmath.workdps(_DIGITS):
         a, b = _map(state, delayed, step, order)
-        longest = max((whole_steps("delay", term.delay, step) for term in delayed), default=0)
+        longest = max(steps, default=0)
         powers = [mpmath.mpf(0)] * longest + a
-        for term, numerator in zip(delayed, b, strict=True):
-            late = longest - whole_steps("delay", term.delay, step)
+        for back, numerator in zip(steps, b, strict=True):
+            late = longest - back
             for k, value in enumerate(numerator):
                 powers[late + k] -= value
         # Halving leads to no circle of radius one, on which a root often lies.
@@ -391,40 +418,41 @@ def _schur(powers: list[Any], radius: Any, bits: int) -> bool | None:
 
 
 def semi_discretization(
-    system: CharacteristicFunction, step: float, order: int = 0
-) -> CharacteristicFunction:
-    r"""Characteristic function of the semi-discretized loop, affine like the loop's own.
+    system: System, step: float, order: int = 0, **numbers: float
+) -> System:
+    r"""Equation of the semi-discretized loop, affine in the same parameters as the loop.
 
     Parameters
     ----------
-    system : CharacteristicFunction
-        A retarded loop in which both free parameters stand before a delayed signal.
+    system : System
+        A retarded loop, or an equation, in which all parameters stand before delayed signals.
     step : float
         Sampling step h in s; it must divide all delays.
     order : {0, 1}, optional
         As for `transition_matrix`.
+    **numbers : float, optional
+        Values of parameters; all others stay.
 
     Returns
     -------
-    CharacteristicFunction
-        With polynomials in exp(s h); its unstable roots are the eigenvalues of the
-        transition matrix outside the unit circle.
+    System
+        The equation of the map, in powers of the one delay exp(-s h); its unstable roots are
+        the eigenvalues of the transition matrix outside the unit circle.
 
     Raises
     ------
     ValueError
-        As `transition_matrix`, and if a free parameter stands before an undelayed signal:
-        it then enters through exp(F h) and the map is not affine in it.
+        As `transition_matrix`, and if a parameter stands before an undelayed signal: it then
+        enters through exp(F h) and the map is not affine in it.
 
     Notes
     -----
-    With F and the G_k of `transition_matrix`, the latter for x = y = 1, the delays
-    :math:`\theta_k = r_k h`, and :math:`z = e^{s h}`
+    With F and the G_k of `transition_matrix`, the latter without their parameters x_k, the
+    delays :math:`\theta_k = r_k h`, and :math:`z = e^{s h}`
 
     .. math::
 
-        D &= \det \left( z - e^{F h} \right)
-        - x\, B_1 z^{-r_1} - y\, B_2 z^{-r_2} , \\
+        D &= \det \left( z - e^{F h} \right) - \sum_k x_k\, B_k z^{-r_k} , \\
         B_k &= \left[ \mathrm{adj} \left( z - e^{F h} \right)
         \left( V_k + z\, W_k \right) \right]_1 ,
 
@@ -435,7 +463,9 @@ def semi_discretization(
         V_k &= \int_0^h e^{F (h - u)}\, G_k\, \mathrm{d}u - W_k , \\
         W_k &= \int_0^h e^{F (h - u)}\, G_k\, \frac{u}{h}\, \mathrm{d}u
 
-    to order 1. To order 0 the newer sample does not enter, W_k = 0.
+    to order 1. To order 0 the newer sample does not enter, W_k = 0. At z = 1 the map is a
+    multiple of D(0) of the loop. The coefficients are rounded so that this holds exactly: a
+    root at s = 0 stays a root at z = 1.
 
     Examples
     --------
@@ -444,26 +474,56 @@ def semi_discretization(
     >>> unstable_roots(semi_discretization(CommonArm(), step=0.05), [0.9, 0.5], [1.05, 1.6])
     array([0, 5])
     """
-    step = _checked(system, step, order)
-    for name, delay in zip(system.parameters, (system.tau1, system.tau2), strict=True):
-        if system.delay + delay == 0.0:
+    step, system = _checked(step, order), System.of(system)
+    if system.step:
+        raise ValueError(
+            f"system must be in continuous time, got a map with step {system.step}"
+        )
+    system = system.at(**numbers)
+    return with_others(lambda one: _map_of(one, step, order), system)
+
+
+def _map_of(system: System, step: float, order: int) -> System:
+    """Return the equation of the map of a system."""
+    d = (system.numerator + system.denominator).terms
+    for lag, names in d:
+        if names and not lag:
             raise ValueError(
-                f"the free parameter {name} of {system!r} stands before an undelayed signal, "
-                f"so that the map is not affine in it; use transition_matrix or "
-                f"spectral_radius at single points"
+                f"the parameter {names[0]} of {system!r} stands before an undelayed signal, so "
+                "that the map is not affine in it; use transition_matrix or spectral_radius at "
+                "single points"
             )
-    return with_others(partial(_equation, step=step, order=order), system)
-
-
-def _equation(system: CharacteristicFunction, step: float, order: int) -> DelayEquation:
-    """Return the map of a system that was checked."""
+    undelayed = d.get((NOW, ()), fmpq_poly([0]))
+    size, late = undelayed.degree(), {key: -p for key, p in d.items() if key[0]}
+    _retarded(late, size)
+    steps = [_steps(lag, step) for lag, _ in late]
+    state, columns = _observer(undelayed, list(late.values()))
+    terms = [
+        DelayedTerm(back * step, column, direct)
+        for back, (column, direct) in zip(steps, columns, strict=True)
+    ]
     with mpmath.workdps(_DIGITS):
-        a, b = _map(*realize(system, 1.0, 1.0), step, order)
-    # Those before x and y; with a dead time there is a third one, x0 B1 + y0 B2.
-    a, b1, b2 = ([float(value) for value in p] for p in (a, *b[-2:]))
-    return DelayEquation(
-        a, b1, b2, system.tau1, system.tau2, delay=system.delay, step=step,
-        parameters=system.parameters,
-        # Without a dead time x0 B1 + y0 B2 is a part of the flow.
-        reference=system.reference if system.delay else (0.0, 0.0),
-    )  # fmt: skip
+        above, below = _map(state, terms, step, order)
+        maps = [polynomial(float(v) for v in p) for p in (above, *below)]
+    at_rest = [undelayed[0], *(p[0] for p in late.values())]
+    maps = _with_root_at_one(maps, at_rest)
+    q, found = Delay(Fraction(step)), Sum({})
+    for (names, back), p, sign in zip(
+        [((), 0), *((names, back) for (_, names), back in zip(late, steps, strict=True))],
+        maps, (1, *[-1] * len(late)), strict=True,
+    ):  # fmt: skip
+        for k, value in enumerate(p.coeffs()):
+            lag = Lag.of({q: size - k + back})
+            found = found + Sum.of(fmpq_poly([sign * value]), lag, *names)
+    return System(found, Sum({}), system.nominal, step)
+
+
+def _with_root_at_one(maps: list[fmpq_poly], at_rest: list[fmpq]) -> list[fmpq_poly]:
+    """Change lowest coefficients, by rounding errors, so that all are one multiple at z = 1."""
+    sums = [p(fmpq(1)) for p in maps]
+    largest = max(range(len(maps)), key=lambda k: abs(at_rest[k]))
+    share = sums[largest] / at_rest[largest] if at_rest[largest] else fmpq(0)
+    return [
+        p + fmpq_poly([share * value - total])
+        for p, value, total in zip(maps, at_rest, sums, strict=True)
+    ]

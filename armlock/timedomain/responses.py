@@ -18,12 +18,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
+from flint import fmpq_poly
 from scipy.interpolate import CubicSpline
 
+from armlock.affine import Affine
 from armlock.checks import ComplexArray, FloatArray, finite_series, positive_number
-from armlock.controllers import Controller
-from armlock.delays import DelaySystem, QuasiPolynomial, functions, moved
+from armlock.engine.chain import NOW, Delay, Lag
 from armlock.engine.decide import count
+from armlock.engine.functions import Function
+from armlock.systems import Sum, System, fraction, polynomial
+from armlock.systems import s as laplace
 
 if TYPE_CHECKING:
     import control
@@ -40,19 +44,20 @@ _TOLERANCE = 1e-7
 # Jumps and kinks that are followed.
 _MOST_JUMPS = 20_000
 
-_INTEGRATOR = DelaySystem.of(Controller([], [0.0], 1.0))
-
 #: A sum of exponentials exp(-s theta): delays and coefficients.
 _Jumps = dict[Fraction, float]
+#: A sum of polynomials of s, by the lengths of their delays.
+_Terms = dict[Fraction, fmpq_poly]
 
 
-def step_response(system: DelaySystem, timepts: npt.ArrayLike) -> control.TimeResponseData:
+def step_response(system: System, timepts: npt.ArrayLike) -> control.TimeResponseData:
     """Return the response to a unit step at t = 0.
 
     Parameters
     ----------
-    system : DelaySystem
-        Stable or not, for instance ``loop.feedback()``.
+    system : System
+        Stable or not, for instance ``loop.feedback()``: the response is that of the system
+        itself. Its parameters are nominal.
     timepts : array_like of float, or float
         Ascending times in s from 0 on, evenly spaced or not; or the last of 1001 even times.
 
@@ -87,17 +92,16 @@ def step_response(system: DelaySystem, timepts: npt.ArrayLike) -> control.TimeRe
     >>> print(step_response(loop.feedback(), [0.5, 1.5, 2.5]).outputs.round(6))
     [0.    0.5   1.375]
     """
-    integrated = DelaySystem.of(system) * _INTEGRATOR
-    return _response(integrated, timepts, "Step")
+    return _response(System.of(system) / laplace, timepts, "Step")
 
 
-def impulse_response(system: DelaySystem, timepts: npt.ArrayLike) -> control.TimeResponseData:
+def impulse_response(system: System, timepts: npt.ArrayLike) -> control.TimeResponseData:
     """Return the response to a unit impulse at t = 0.
 
     Parameters
     ----------
-    system : DelaySystem
-        Stable or not.
+    system : System
+        As that of `step_response`.
     timepts : array_like of float, or float
         Ascending times in s from 0 on; or the last of 1001 even times.
 
@@ -128,15 +132,16 @@ def impulse_response(system: DelaySystem, timepts: npt.ArrayLike) -> control.Tim
     >>> print(found.outputs.round(6))
     [0.       1.       0.367879]
     """
-    return _response(DelaySystem.of(system), timepts, "Impulse")
+    return _response(System.of(system), timepts, "Impulse")
 
 
-def _response(
-    system: DelaySystem, timepts: npt.ArrayLike, what: str
-) -> control.TimeResponseData:
+def _response(system: System, timepts: npt.ArrayLike, what: str) -> control.TimeResponseData:
     """Return the response to an impulse."""
     import control
 
+    if system.is_equation:
+        raise TypeError(f"system must have an output, got {system!r}")
+    system = system.at(**system.given((), {}))
     if np.ndim(timepts) == 0:
         timepts = np.linspace(0.0, positive_number("timepts", timepts), 1001)
     time = finite_series("timepts", timepts)
@@ -145,26 +150,30 @@ def _response(
     inputs = np.full(time.size, float(what == "Step"))
     # Each term is delayed by this at least. Only what comes after is left to the inversion, in
     # which it would be small beside a growing response.
-    terms = system.numerator.terms
-    dead = terms[0][0] if terms else Fraction(0)
-    ahead = QuasiPolynomial(tuple((theta - dead, p) for theta, p in terms))
+    n, m = system.numerator.by_length(), system.denominator.by_length()
+    dead = min(n, default=Fraction(0))
+    ahead = {theta - dead: p for theta, p in n.items()}
     begin = int(np.searchsorted(time, float(dead) * (1.0 - 1e-12)))
     outputs = np.zeros(time.size)
     if begin < time.size:
-        outputs[begin:] = _inverted(DelaySystem(ahead, system.denominator), time[begin:], dead)
+        outputs[begin:] = _inverted(system, ahead, m, time[begin:], dead)
     return control.TimeResponseData(
         time, outputs, inputs=inputs, issiso=True, title=f"{what} response",
         input_labels=["u[0]"], output_labels=["y[0]"], plot_inputs=False,
     )  # fmt: skip
 
 
-def _inverted(system: DelaySystem, time: FloatArray, dead: Fraction) -> FloatArray:
-    """Invert G(s) at some times after a dead time."""
+def _inverted(
+    system: System, n: _Terms, m: _Terms, time: FloatArray, dead: Fraction
+) -> FloatArray:
+    """Invert N(s) / M(s) at some times after a dead time."""
+    below = Affine(System(system.denominator, Sum({}))).n[0]
+    ahead = System(_sum(n), _sum(m))
     time = np.maximum(time - float(dead), 0.0)
-    last, degree = float(time[-1]) or float(dead), _degree(system)
-    corner = float(functions(system.denominator)[0].space.corners[-1])
-    n, m = (_powers(q, degree, corner) for q in (system.numerator, system.denominator))
-    impulses, *jumps = _expansion(n, m, last * (1.0 + 1e-9))
+    last, degree = float(time[-1]) or float(dead), _degree(n, m)
+    corner = float(below.space.corners[-1])
+    above, under = (_powers(part, degree, corner) for part in (n, m))
+    impulses, *jumps = _expansion(above, under, last * (1.0 + 1e-9))
     if impulses:
         at = ", ".join(f"{float(theta + dead):g}" for theta in sorted(impulses)[:5])
         warnings.warn(f"impulses at t = {at} s are not in the outputs", stacklevel=4)
@@ -172,13 +181,13 @@ def _inverted(system: DelaySystem, time: FloatArray, dead: Fraction) -> FloatArr
         [_after(time, part, k, corner, last) for k, part in enumerate(jumps)], axis=0
     )
     period = 2.0 * last
-    sigma = _right_of_poles(system, last) + _DAMPED / period
+    sigma = _right_of_poles(below, last) + _DAMPED / period
     # Where nothing is left without the impulses, rounding is.
-    least = float(np.abs(system(sigma))) / last
+    least = float(np.abs(ahead(sigma))) / last
     before, points = None, _FIRST
     while points <= _MOST:
         s = np.asarray(sigma + 2j * np.pi / period * np.arange(points))
-        found: FloatArray = known + _smooth(system, n, m, s, corner, period, time)
+        found: FloatArray = known + _smooth(ahead, above, under, s, corner, period, time)
         size = max(float(np.abs(found).max()), least)
         if before is not None and np.abs(found - before).max() <= _TOLERANCE * size:
             return found
@@ -189,23 +198,30 @@ def _inverted(system: DelaySystem, time: FloatArray, dead: Fraction) -> FloatArr
     )
 
 
-def _degree(system: DelaySystem) -> int:
+def _sum(part: _Terms) -> Sum:
+    """Return a sum whose delays are objects of their own."""
+    lags = {theta: Lag([(Delay(theta, ""), 1)]) if theta else NOW for theta in part}
+    return Sum({(lags[theta], ()): p for theta, p in part.items()})
+
+
+def _degree(n: _Terms, m: _Terms) -> int:
     """Highest power of s in the denominator, which nothing delayed may exceed."""
-    theta, whole = system.denominator.terms[0]
-    top = max(len(p) for _, p in system.numerator.terms + system.denominator.terms)
-    if theta or len(whole) < top:
+    whole = m.get(Fraction(0), fmpq_poly([0])).degree()
+    top = max(p.degree() for p in (*n.values(), *m.values()))
+    if whole < top:
         raise ValueError(
             "system must have no more zeros than poles, and the highest power of s in its "
-            f"denominator must have no delay, got s^{top - 1} over s^{len(whole) - 1}"
+            f"denominator must have no delay, got s^{top} over s^{max(whole, 0)}"
         )
-    return len(whole) - 1
+    return whole
 
 
-def _powers(q: QuasiPolynomial, degree: int, corner: float) -> list[_Jumps]:
+def _powers(part: _Terms, degree: int, corner: float) -> list[_Jumps]:
     """Coefficients of the highest powers of s + corner, from `degree` on: sums of delays."""
-    of = [(theta, moved(p, -corner)) for theta, p in q.terms]
+    moved = polynomial([-Fraction(corner), 1])
+    of = [(theta, p(moved)) for theta, p in part.items()]
     return [
-        {theta: float(p[i]) for theta, p in of if 0 <= i < len(p) and p[i]}
+        {theta: float(fraction(p[i])) for theta, p in of if i >= 0 and p[i]}
         for i in range(degree, degree - _ORDERS - 1, -1)
     ]
 
@@ -258,22 +274,22 @@ def _after(time: FloatArray, part: _Jumps, k: int, corner: float, last: float) -
     return found
 
 
-def _right_of_poles(system: DelaySystem, last: float) -> float:
+def _right_of_poles(below: Function, last: float) -> float:
     """Real part right of all poles, and not farther than a few over the last time."""
     low, high = 0.0, 1.0 / last
-    while count(functions(system.denominator.shifted(high))[0]) != 0:
+    while count(below, right_of=high) != 0:
         low, high = high, 2.0 * high
         if high * last > 600.0:
             raise ValueError(f"timepts must end earlier: the response overflows at {last} s")
     while high - low > 2.0 / last:
         middle = 0.5 * (low + high)
-        stable = count(functions(system.denominator.shifted(middle))[0]) == 0
+        stable = count(below, right_of=middle) == 0
         low, high = (low, middle) if stable else (middle, high)
     return high
 
 
 def _smooth(
-    system: DelaySystem,
+    system: System,
     n: list[_Jumps],
     m: list[_Jumps],
     s: ComplexArray,

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.constants import speed_of_light
 
-from armlock import sensors
+from armlock import equation, sensors
 from armlock.controllers import Controller, table_two
 from armlock.loops import (
     CommonArm,
@@ -71,7 +71,7 @@ def _on_edge(name: str, loop: Loop) -> bool:
     line = d_curve_line(loop)
     sizes = np.array([-PERTURBATION, 0.0, PERTURBATION])
     # Of D, which has a root s = 0 at (1, 1).
-    inside, edge, outside = unstable_roots(loop.plain(), *perturbed(name, sizes))
+    inside, edge, outside = unstable_roots(equation(1 + loop), *perturbed(name, sizes))
     on_line = line.weight_x + line.weight_y == line.value
     return bool(on_line and inside == 0 and edge == -1 and outside >= 1)
 

@@ -1,0 +1,369 @@
+"""The neutral chain: the one place that decides whether it is confined, and where it ends.
+
+At high frequency a function of s is its highest power times
+
+    P(z_1 .. z_m) ,   z_k = exp(-s theta_k) ,
+
+a polynomial with one variable for each delay object. Where P vanishes, roots repeat along the
+imaginary axis for ever: the neutral chain. It stays left of the axis, for these delays and all
+small changes of them, if and only if P has no zero in the closed unit polydisc (Lemma 14).
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property, lru_cache
+from typing import Any, Self
+from uuid import uuid4
+
+import flint
+import numpy as np
+from flint import arb, fmpq, fmpq_poly
+
+from armlock.checks import BoolArray, FloatArray
+
+# Most cells of the torus that are looked at, some seconds.
+_MOST_CELLS = 1_000_000
+# The least |P| on the torus is bounded from below by this share of it.
+_SHARE = 0.8
+# A chain is followed along a line of parameters to this share of the largest |P|.
+_FINE = 1e-9
+# Most steps along such a line, and of the search for the limit of real parts.
+_MOST_STEPS = 2000
+# Bits in which P of one delay object is bounded.
+_BITS = 200
+
+
+class UndecidedError(RuntimeError):
+    """Double precision, or the steps allowed, did not decide; `index` of many functions."""
+
+    def __init__(self, message: str, index: int = 0) -> None:
+        super().__init__(message)
+        self.index = index
+
+
+@dataclass(frozen=True)
+class Delay:
+    """A delay object: theta in s, and the mark by which it differs from all others.
+
+    Two objects are two delays even if they are equally long: a small change of one of them
+    alone is a small change of the loop. The mark is the same in other processes.
+    """
+
+    theta: Fraction
+    mark: str = field(default_factory=lambda: uuid4().hex)
+
+    def __hash__(self) -> int:
+        """Hash the mark alone, which is faster."""
+        return hash(self.mark)
+
+
+class Lag(tuple[tuple[Delay, int], ...]):
+    """A product of delay objects: pairs of an object and its power, sorted."""
+
+    @classmethod
+    def of(cls, powers: Mapping[Delay, int]) -> Self:
+        """Return the product of objects to these powers."""
+        pairs = ((delay, n) for delay, n in powers.items() if n)
+        return cls(sorted(pairs, key=lambda pair: (pair[0].theta, pair[0].mark)))
+
+    def times(self, other: Lag) -> Lag:
+        """Return the product of two."""
+        if not (self and other):
+            return self or other
+        powers = dict(self)
+        for delay, n in other:
+            powers[delay] = powers.get(delay, 0) + n
+        return Lag.of(powers)
+
+    def inverse(self) -> Lag:
+        """Return the product of the objects' inverses."""
+        return Lag((delay, -n) for delay, n in self)
+
+    @cached_property
+    def time(self) -> Fraction:
+        """The delay of the product, in s."""
+        return sum((delay.theta * n for delay, n in self), Fraction(0))
+
+
+#: The product of no delays.
+NOW = Lag()
+
+
+def own_phases(lags: Iterable[Lag]) -> tuple[list[Lag], list[Lag]]:
+    """Return the products whose phase is free, and those that are left.
+
+    The phase of a product with an object of its own is free, whatever all others are. Taken
+    out, it may leave others with an object of their own.
+    """
+    left, free = [lag for lag in lags if lag], list[Lag]()
+    while True:
+        used = Counter(delay for lag in left for delay, _ in lag)
+        own = [lag for lag in left if any(used[delay] == 1 for delay, _ in lag)]
+        if not own:
+            return free, left
+        free += own
+        left = [lag for lag in left if lag not in own]
+
+
+def _exact(value: Any) -> fmpq:
+    """Return a number as a fraction of flint."""
+    exact = Fraction(value)
+    return fmpq(exact.numerator, exact.denominator)
+
+
+def _roots(p: fmpq_poly) -> list[Any]:
+    """Return enclosures of the roots of a polynomial, each once."""
+    pairs: Any = p.numer().complex_roots()
+    return [z for z, _ in pairs]
+
+
+def _in_disc(p: fmpq_poly) -> bool:
+    """Tell whether a polynomial has a zero in the closed unit disc, or next to it."""
+    if p.degree() < 1:
+        return not p
+    return any(not abs(z) > 1 for z in _roots(p))
+
+
+def _on_circle(coefficients: Sequence[fmpq]) -> float:
+    """Return a lower bound of |P| on the unit circle, but for rounding the least value.
+
+    Its square is a polynomial in the cosine of the angle.
+    """
+    square, t, before = fmpq_poly([0]), fmpq_poly([1]), fmpq_poly([0, 1])
+    number = len(coefficients)
+    for k in range(number):
+        products = (coefficients[i] * coefficients[i + k] for i in range(number - k))
+        square += t * sum(products, fmpq(0)) * (2 if k else 1)
+        t, before = fmpq_poly([0, 2]) * t - before, t
+    slope = square.derivative()
+    found = _roots(slope) if slope.degree() > 0 else []
+    at = [z.real for z in found if z.imag.contains(0) and not abs(z.real) > 1]
+    values = [
+        sum((arb(c) * x**k for k, c in enumerate(square.coeffs())), arb(0))
+        for x in (*at, arb(1), arb(-1))
+    ]
+    return math.sqrt(max(min(float(v.lower()) for v in values), 0.0))
+
+
+def _on_torus(powers: FloatArray, coefficients: FloatArray, free: float) -> float:
+    """Return a lower bound of |P| - free on the unit torus: a share of it, or 0."""
+    number, slope = powers.shape[1], np.abs(coefficients) @ np.abs(powers)
+    rounding = 1e-13 * float(np.abs(coefficients).sum())
+    centre, half = np.full((1, number), np.pi), np.full(number, np.pi)
+    lowest, kept = np.inf, np.inf
+    while len(centre):
+        value = np.abs(np.exp(-1j * (centre @ powers.T)) @ coefficients) - free
+        lowest = min(lowest, float(value.min()))
+        if lowest <= rounding:
+            return 0.0
+        bound = value - slope @ half - rounding
+        done = bound >= _SHARE * lowest
+        kept, centre = min(kept, float(bound[done].min(initial=np.inf))), centre[~done]
+        k = np.arange(number) == np.argmax(slope * half)
+        half = np.where(k, 0.5 * half, half)
+        centre = np.concatenate((centre - half * k, centre + half * k))
+        if len(centre) > _MOST_CELLS:
+            raise UndecidedError(f"the neutral chain is confined by less than {lowest:.1e}")
+    return kept
+
+
+@lru_cache(maxsize=4096)
+def _least(lags: tuple[Lag, ...], coefficients: tuple[float, ...], free: float) -> float:
+    """Return a lower bound of |P| - free on the closed polydisc; 0 where P has a zero there."""
+    objects = sorted({d for lag in lags for d, _ in lag}, key=lambda d: (d.theta, d.mark))
+    powers = np.array([[dict(lag).get(d, 0) for d in objects] for lag in lags], np.float64)
+    # With all variables equal, P has no zero in the disc. The torus is left (Strintzis).
+    diagonal = fmpq_poly([0])
+    for total, c in zip(powers.sum(1), coefficients, strict=True):
+        diagonal += _exact(c) * fmpq_poly([0, 1]) ** int(total)
+    before, flint.ctx.prec = flint.ctx.prec, _BITS
+    try:
+        if _in_disc(diagonal):
+            return 0.0
+        if len(objects) == 1:
+            return _on_circle(diagonal.coeffs()) - free
+    finally:
+        flint.ctx.prec = before
+    return _on_torus(powers, np.array(coefficients), free)
+
+
+def reserve(lags: Sequence[Lag], still: FloatArray, late: FloatArray) -> FloatArray:
+    """Bound |P| from below on the closed unit polydisc: what all else decides from.
+
+    Parameters
+    ----------
+    lags : sequence of Lag
+        The K products of delay objects.
+    still, late : float arrays, shapes (n,) and (n, K)
+        The coefficients of P that nothing delays, and those of the products, of n functions.
+
+    Returns
+    -------
+    float array, shape (n,)
+        Exact for products with an object of their own (the sum of magnitudes) and for one
+        object; a bound for others. Zero or negative where the chain is not confined.
+    """
+    sizes = np.abs(late)
+    found: FloatArray = np.abs(still) - sizes.sum(-1)
+    for i in np.flatnonzero(shared(lags, late)):
+        here = [lag for lag, c in zip(lags, late[i], strict=True) if c]
+        free, left = own_phases(here)
+        places = [lags.index(lag) for lag in left]
+        loose = float(sum(sizes[i, lags.index(lag)] for lag in free))
+        coefficients = float(still[i]), *late[i, places].tolist()
+        found[i] = _least((NOW, *left), coefficients, loose) if still[i] else -loose
+    return found
+
+
+def shared(lags: Sequence[Lag], late: FloatArray) -> BoolArray:
+    """Tell of which functions the sum of magnitudes is not the rule, shape (n,)."""
+    acts = late != 0.0
+    found: BoolArray = np.zeros(len(late), np.bool_)
+    if own_phases([lag for lag, a in zip(lags, acts.any(0), strict=True) if a])[1]:
+        kinds, which = np.unique(acts, axis=0, return_inverse=True)
+        odd = [
+            bool(own_phases([lag for lag, a in zip(lags, kind, strict=True) if a])[1])
+            for kind in kinds
+        ]
+        found = np.array(odd)[which.ravel()]
+    return found
+
+
+def turned(lags: Sequence[Lag], still: float, late: FloatArray, omega: float) -> float:
+    """Argument of P over that of its undelayed term, at s = j omega, followed from z = 0.
+
+    Along a radius of the polydisc, in which P has no zero.
+    """
+    if not shared(lags, late[None]).any():
+        return 0.0
+    acting = [(lag, c) for lag, c in zip(lags, late.tolist(), strict=True) if c]
+    c = np.array([v for _, v in acting]) / still
+    degrees = np.array([sum(n for _, n in lag) for lag, _ in acting])
+    turn = Fraction(2.0 * math.pi)
+    z = np.exp([-1j * float(Fraction(omega) * lag.time % turn) for lag, _ in acting])
+    least = float(reserve(lags, np.array([still]), late[None])[0]) / abs(still)
+    r = np.linspace(0.0, 1.0, 8 + int(4.0 * np.abs(c) @ degrees / least))[:, None]
+    return float(np.unwrap(np.angle(1.0 + (r**degrees * z) @ c))[-1])
+
+
+def hull_reserve(lags: Sequence[Lag], still: FloatArray, late: FloatArray) -> float:
+    """Bound |P| from below for all P between n of them, shapes (n,) and (n, K).
+
+    Of two, step by step along the line between them; of more, by what they differ from their
+    mean.
+    """
+    rows = np.column_stack((still, late))
+    if len(rows) != 2:
+        middle = rows.mean(axis=0)
+        apart = float(np.abs(rows - middle).sum(axis=1).max())
+        return float(reserve(lags, middle[:1], middle[None, 1:])[0]) - apart
+    slope, t, least = float(np.abs(rows[1] - rows[0]).sum()), 0.0, math.inf
+    for _ in range(_MOST_STEPS):
+        v = rows[0] + t * (rows[1] - rows[0])
+        here = float(reserve(lags, v[:1], v[None, 1:])[0])
+        least = min(least, 0.5 * here)
+        if least <= _FINE * float(np.abs(v).sum()):
+            return 0.0
+        if t >= 1.0:
+            return least
+        t = min(t + 0.5 * here / slope, 1.0) if slope else 1.0
+    return 0.0
+
+
+def line_limit(
+    lags: Sequence[Lag], still: FloatArray, late: FloatArray, start: float, rounding: float
+) -> float:
+    """First t >= start at which the chain of f + t g is not confined; inf where it always is.
+
+    Parameters
+    ----------
+    lags : sequence of Lag
+        The K products.
+    still, late : float arrays, shapes (2,) and (2, K)
+        Of f and of g.
+    start : float
+        Where to begin.
+    rounding : float
+        The share of the undelayed term that has to be left.
+    """
+    a, b = (np.append(still[k], late[k]) for k in range(2))
+    a, b = (np.where(np.abs(v) <= 2.0**-48 * np.abs(v).max(), 0.0, v) for v in (a, b))
+    if not shared(lags, (np.abs(a[1:]) + np.abs(b[1:]))[None]).any():
+        return _plain_line_limit(a, b, start, rounding)
+    t, slope = start, float(np.abs(b).sum())
+    for _ in range(_MOST_STEPS):
+        v = a + t * b
+        left = float(reserve(lags, v[:1], v[None, 1:])[0]) - rounding * abs(v[0])
+        if left <= _FINE * float(np.abs(v).sum()):
+            return t
+        if not slope or t > 1e300:
+            return math.inf
+        # |P| changes by no more than the slope.
+        t += left / slope
+    raise UndecidedError(f"the limit of the neutral chain is not found, from t = {t:.6g} on")
+
+
+def _plain_line_limit(a: FloatArray, b: FloatArray, start: float, rounding: float) -> float:
+    """Do what `line_limit` does, where the sum of magnitudes is the rule (Lemma 14).
+
+    What is left of the undelayed term is linear in t between the t at which a term vanishes.
+    """
+    with np.errstate(all="ignore"):
+        breaks = (-a / b)[b != 0.0]
+    ends = [start, *np.unique(breaks[breaks > start]).tolist()]
+
+    def left(t: float) -> float:
+        v = np.abs(a + b * t)
+        return float(v[0] - v[1:].sum() - rounding * v[0])
+
+    for low, high in zip(ends, [*ends[1:], math.inf], strict=True):
+        at_low = left(low)
+        if at_low <= 0.0:
+            return float(low)
+        inside = low + min(0.5 * (high - low), 1.0 + abs(low))
+        slope = (left(inside) - at_low) / (inside - low)
+        t = low - at_low / slope if slope < 0.0 else math.inf
+        if t <= high and math.isfinite(t):
+            return float(t)
+    return math.inf
+
+
+def real_part_limit(lags: Sequence[Lag], still: float, late: FloatArray) -> float:
+    """Limit to which the real parts of the chain's roots tend from the left; -inf without one.
+
+    Right of it P(z exp(-sigma theta)) has no zero in the polydisc.
+    """
+    acting = [(lag, abs(c)) for lag, c in zip(lags, late.tolist(), strict=True) if c]
+    if not acting:
+        return -math.inf
+    if still == 0.0:
+        return math.inf
+    delays = np.array([float(lag.time) for lag, _ in acting])
+    sizes, limit = np.array([size for _, size in acting]) / abs(still), 0.0
+    # The logarithm of the sum is convex, so that Newton's method leads to its only zero.
+    for _ in range(30):
+        logs = np.log(sizes) - delays * limit
+        whole = np.logaddexp.reduce(logs)
+        limit += float(whole / (np.exp(logs - whole) @ delays))
+    if not shared(lags, late[None]).any():
+        return limit
+    times = np.array([float(lag.time) for lag in lags])
+
+    def confined(sigma: float) -> bool:
+        weights = late * np.exp(-sigma * times)
+        return bool(reserve(lags, np.array([still]), weights[None])[0] > 0.0)
+
+    # The sum of magnitudes is an upper bound, and the limit is found by halving.
+    high, width = limit, 1.0 / float(delays.max())
+    low = high - width
+    while confined(low) and high - low < 1e3 * width:
+        low -= high - low
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if confined(middle) else (middle, high)
+    return high

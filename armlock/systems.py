@@ -1,0 +1,830 @@
+"""Systems with delays and named parameters, exact: one description of every loop.
+
+    L(s) = N(s) / M(s) ,   N, M = sums of  polynomial(s) * exp(-s theta) * parameters
+
+Numbers, controllers, systems of python-control, `delay(theta)` and `parameter("kp")` are
+combined with ``+ - * / **`` and `feedback`. All coefficients and delays are fractions. An
+expression is the open loop L: the roots that are counted are those of 1 + L = 0. `equation`
+makes D = 0 instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from decimal import Decimal
+from fractions import Fraction
+from itertools import chain
+from math import factorial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+from flint import fmpq, fmpq_poly
+from numpy.polynomial import polynomial as poly
+
+from armlock.checks import (
+    ComplexArray,
+    FloatArray,
+    broadcast_shape,
+    complex_array,
+    not_negative,
+    real_array,
+    real_number,
+    whole_steps,
+)
+from armlock.controllers import Controller, check_system, rational, with_others
+from armlock.engine.chain import NOW, Delay, Lag
+
+if TYPE_CHECKING:
+    import control
+
+#: A product of delays, and the names of the parameters that are multiplied.
+Key = tuple[Lag, tuple[str, ...]]
+
+_ONE, _S = fmpq_poly([1]), fmpq_poly([0, 1])
+# Arguments of the functions that take parameters by name.
+_TAKEN = frozenset(
+    [
+        "system",
+        "loop",
+        "s",
+        "omega",
+        "omega_max",
+        "free",
+        "free_above",
+        "right_of",
+        "step",
+        "order",
+        "direction",
+        "start",
+        "stop",
+        "size",
+        "low",
+        "high",
+        "between",
+        "points_per_turn",
+        "timepts",
+        "squeeze",
+        "axes",
+        "values",
+        "numbers",
+        "self",
+    ]
+)
+# Coefficients at s = 0 that are looked at for a limit there.
+_TERMS = 16
+# Longest text of a system.
+_LONGEST_TEXT = 400
+
+
+def fraction(value: fmpq) -> Fraction:
+    """Return a fraction of flint as one of Python."""
+    return Fraction(int(value.p), int(value.q))
+
+
+def exact(value: Any) -> fmpq:
+    """Return a number as a fraction of flint; a float is the binary number it is."""
+    f = Fraction(value)
+    return fmpq(f.numerator, f.denominator)
+
+
+def order(p: fmpq_poly) -> int:
+    """Order of the root at s = 0."""
+    return next(k for k, c in enumerate(p.coeffs()) if c)
+
+
+def polynomial(coefficients: Iterable[Any]) -> fmpq_poly:
+    """Return the polynomial with these coefficients, ascending."""
+    return fmpq_poly([exact(c) for c in coefficients])
+
+
+class Sum:
+    """A sum of polynomials of s times delays and parameters: {(lag, names): polynomial}."""
+
+    def __init__(self, terms: Mapping[Key, fmpq_poly]) -> None:
+        self.terms = {key: p for key, p in terms.items() if p}
+
+    @classmethod
+    def of(cls, p: fmpq_poly, lag: Lag = NOW, *names: str) -> Sum:
+        """Return a sum of one term."""
+        return cls({(lag, tuple(sorted(names))): p})
+
+    def __add__(self, other: Sum) -> Sum:
+        """Return the sum."""
+        found = dict(self.terms)
+        for key, p in other.terms.items():
+            found[key] = found[key] + p if key in found else p
+        return Sum(found)
+
+    def __mul__(self, other: Sum) -> Sum:
+        """Return the product."""
+        found: dict[Key, fmpq_poly] = {}
+        for (t, a), p in self.terms.items():
+            for (u, b), q in other.terms.items():
+                key = t.times(u), tuple(sorted(a + b)) if a and b else a or b
+                found[key] = found[key] + p * q if key in found else p * q
+        return Sum(found)
+
+    def __neg__(self) -> Sum:
+        """Return the negative."""
+        return Sum({key: -p for key, p in self.terms.items()})
+
+    def __bool__(self) -> bool:
+        """Whether it is not zero."""
+        return bool(self.terms)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether all terms are equal."""
+        return isinstance(other, Sum) and self.terms == other.terms
+
+    def __hash__(self) -> int:
+        """Hash the terms."""
+        return hash(frozenset(self.fractions()))
+
+    def __getstate__(self) -> list[tuple[Key, tuple[Fraction, ...]]]:
+        """Return the terms by fractions: those of flint cannot be pickled."""
+        return list(self.fractions())
+
+    def __setstate__(self, state: list[tuple[Key, tuple[Fraction, ...]]]) -> None:
+        """Take them back."""
+        self.terms = {key: polynomial(p) for key, p in state}
+
+    def fractions(self) -> Iterator[tuple[Key, tuple[Fraction, ...]]]:
+        """Return the terms, with coefficients in ascending powers of s."""
+        for key, p in self.terms.items():
+            yield key, tuple(fraction(c) for c in p.coeffs())
+
+    def put(self, values: Mapping[str, Sum]) -> Sum:
+        """Put sums in place of parameters."""
+        found = Sum({})
+        for (lag, names), p in self.terms.items():
+            term = Sum.of(p, lag, *(a for a in names if a not in values))
+            for name in names:
+                term = term * values[name] if name in values else term
+            found = found + term
+        return found
+
+    def before(self, *names: str) -> dict[Lag, fmpq_poly]:
+        """Return what stands before a product of parameters, by delays."""
+        return {lag: p for (lag, given), p in self.terms.items() if given == names}
+
+    def whole(self) -> fmpq_poly:
+        """Return the sum of all polynomials: what is left at s = 0."""
+        return sum(self.terms.values(), fmpq_poly([0]))
+
+    @property
+    def degree(self) -> int:
+        """Highest power of s."""
+        return max((p.degree() for p in self.terms.values()), default=0)
+
+    @property
+    def lags(self) -> set[Lag]:
+        """All products of delays."""
+        return {lag for lag, _ in self.terms}
+
+    def series(self, number: int) -> list[Fraction]:
+        """Return the first coefficients of the series at s = 0, without parameters, exactly."""
+        found = [Fraction(0)] * number
+        for theta, p in self.by_length().items():
+            for i, c in enumerate(p.coeffs()[:number]):
+                for k in range(i, number):
+                    found[k] += fraction(c) * (-theta) ** (k - i) / factorial(k - i)
+        return found
+
+    def by_length(self, *names: str) -> dict[Fraction, fmpq_poly]:
+        """Return what stands before a product of parameters, by lengths in ascending order."""
+        found: dict[Fraction, fmpq_poly] = {}
+        for lag, p in self.before(*names).items():
+            found[lag.time] = found.get(lag.time, fmpq_poly([0])) + p
+        return {time: p for time, p in sorted(found.items()) if p}
+
+    def at(
+        self,
+        s: ComplexArray,
+        values: Mapping[str, FloatArray],
+        unit: Fraction = Fraction(1),
+        size: Fraction = Fraction(1),
+    ) -> ComplexArray:
+        """Evaluate at s and at values of the parameters, all of one shape, over a size.
+
+        By coefficients of powers of s / unit.
+        """
+        delayed = [float(lag.time) for lag in self.lags if lag]
+        # Far on the right exponentials vanish beside one. Elsewhere no large terms cancel at
+        # low frequency where the sum is that of all polynomials, and of terms of exp(..) - 1.
+        far = s.real * min(delayed, default=0.0) > 1.0
+        near, found = ~far, np.zeros_like(s)
+        at = s / float(unit)
+        if not values:
+            found[near] += _polyval(self.whole(), at[near], unit, size)
+        for (lag, names), p in self.terms.items():
+            theta, value = float(lag.time), _polyval(p, at, unit, size)
+            for name in names:
+                value = value * values[name]
+            if values:
+                found[near] += value[near]
+            if theta:
+                found[near] += value[near] * np.expm1(-s[near] * theta)
+            found[far] += value[far] * np.exp(-s[far] * theta)
+        return found
+
+    def text(self, latex: bool = False) -> str:
+        """Return the sum as one writes it."""
+        shown = []
+        for (lag, names), p in sorted(
+            self.terms.items(), key=lambda term: (term[0][0].time, term[0][1])
+        ):
+            factors = [*names]
+            if lag:
+                factors.append(_exponential(lag, latex))
+            power = _powers(p, latex)
+            several = sum(map(bool, p.coeffs())) > 1 and (factors or len(self.terms) > 1)
+            if factors and power in ("1", "-1"):
+                shown.append(power[:-1] + " ".join(factors))
+            else:
+                shown.append(" ".join([f"({power})" if several else power, *factors]))
+        return " + ".join(shown).replace("+ -", "- ") or "0"
+
+
+def _polyval(p: fmpq_poly, at: ComplexArray, unit: Fraction, size: Fraction) -> ComplexArray:
+    """Evaluate a polynomial of s over a size, at s / unit."""
+    scaled = [float(fraction(c) * unit**k / size) for k, c in enumerate(p.coeffs())] or [0.0]
+    return np.asarray(poly.polyval(at, scaled))
+
+
+def _number(value: Fraction) -> str:
+    """Return a fraction, which may be no float, with six digits."""
+    try:
+        if value == 0 or abs(float(value)) > 1e-300:
+            return f"{float(value):.6g}"
+    except OverflowError:
+        pass
+    return f"{Decimal(value.numerator) / value.denominator:.5e}"
+
+
+def _exponential(lag: Lag, latex: bool) -> str:
+    """Return exp(-s theta) as text."""
+    time = _number(lag.time)
+    return f"e^{{-{time} s}}" if latex else f"exp(-{time} s)"
+
+
+def _powers(p: fmpq_poly, latex: bool) -> str:
+    """Return a polynomial as text, in descending powers."""
+    shown = []
+    for k, c in reversed(list(enumerate(p.coeffs()))):
+        if c:
+            number, power = _number(fraction(c)), ("", "s", f"s^{{{k}}}" if latex else f"s^{k}")
+            symbol = power[min(k, 2)]
+            if symbol and number in ("1", "-1"):
+                number = number[:-1]
+            if latex and "e" in number:
+                number = number.replace("e", r" \cdot 10^{") + "}"
+            shown.append(f"{number} {symbol}".strip() if number != "-" else f"-{symbol}")
+    return " + ".join(shown).replace("+ -", "- ")
+
+
+_UNITY = Sum.of(_ONE)
+
+
+class System:
+    r"""A system with one input and one output, any number of delays, and named parameters.
+
+    .. math::
+
+        L(s) = \frac{N(s)}{M(s)} , \qquad
+        N, M = \sum_k p_k(s)\, e^{-s\theta_k} \prod_i x_{ki}
+
+    Write ``control.tf([1], [2, 1]) * delay(0.5)`` to make one. Systems are combined with
+    ``+ - * / **`` and `feedback`. A system is the open loop: unstable roots, margins and charts
+    are those of 1 + L = 0. ``closed.feedback()`` of a closed loop would close it again. The
+    equation D = 0 is made by `equation`.
+
+    Where python-control's own operator comes first and does not know delays, as in
+    ``plant / system`` or ``plant.feedback(system)``, write ``System.of(plant)`` for ``plant``.
+
+    Attributes
+    ----------
+    numerator, denominator : Sum
+        N and M. An equation has no denominator.
+    nominal : dict of str to float or None
+        The parameters in the order of their first use, with their nominal values.
+    step : float
+        Zero, or the step in s of a map (`equation`).
+
+    Notes
+    -----
+    A common power of s is cancelled in N and M, so a root at s = 0 that both have is not a root
+    of the loop. No other common factor is cancelled: a hidden unstable mode counts. Where two
+    systems are added, equal denominators (up to a number) are those of one system, and are kept
+    once; different ones are multiplied.
+
+    Examples
+    --------
+    A Smith predictor, in a loop whose true delay is 1.2 s in place of 1 s:
+
+    >>> import control
+    >>> from armlock import System, delay
+    >>> plant, pi = control.tf([1], [2, 1]), control.tf([4, 2], [1, 0])
+    >>> predictor = System.of(pi).feedback(plant - plant * delay(1))
+    >>> loop = predictor * plant * delay(1.2)
+    >>> print(f"{abs(loop(1j)):.4f}")
+    0.7052
+    """
+
+    # numpy leaves arithmetic with such an object to it.
+    __array_ufunc__ = None
+
+    numerator: Sum
+    denominator: Sum
+    nominal: dict[str, float | None]
+    step: float
+    #: The same for other values of poles that may be meant to be zero; usually none.
+    others: tuple[System, ...] = ()
+
+    def __init__(
+        self,
+        numerator: Sum,
+        denominator: Sum,
+        nominal: Mapping[str, float | None] | None = None,
+        step: float = 0.0,
+    ) -> None:
+        self.numerator, self.denominator = _reduced(numerator, denominator)
+        self.nominal, self.step = dict(nominal or {}), step
+
+    @classmethod
+    def of(cls, system: Any, name: str = "system") -> System:
+        """Return a system given as one, a number, a controller, or by python-control.
+
+        Parameters
+        ----------
+        system : System, real number, Controller, or python-control system
+            A transfer function or state space must be continuous in time, with one input and
+            one output. Use a `Controller` for many or repeated factors: python-control
+            multiplies them out.
+        name : str, optional
+            What an error calls it.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If it is none of these, or not finite.
+        """
+        if isinstance(system, System):
+            return system
+        if isinstance(system, Fraction | float | int | np.number | np.ndarray):
+            value = system if isinstance(system, Fraction) else real_number(name, system)
+            return System(Sum.of(polynomial([value])), _UNITY)
+        if not isinstance(system, Controller):
+            check_system(name, system, "a System, a number, a Controller")
+
+        def made(k: Controller) -> System:
+            above, below = (polynomial(p.exact) for p in (k.numerator, k.denominator))
+            return System(Sum.of(above), Sum.of(below))
+
+        return with_others(made, rational(system))
+
+    @property
+    def is_equation(self) -> bool:
+        """Whether it is an equation D = 0, and no open loop."""
+        return not self.denominator
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the parameters, in the order of their first use."""
+        return tuple(self.nominal)
+
+    @property
+    def longest_delay(self) -> float:
+        """The longest time in s by which a term is delayed."""
+        lags = self.numerator.lags | self.denominator.lags
+        return float(max((lag.time for lag in lags), default=Fraction(0)))
+
+    def __add__(self, other: Any) -> System:
+        """Return the two in parallel; denominators that are equal up to a number are one."""
+        return _combined(_parallel, self, other)
+
+    __radd__ = __add__
+
+    def __neg__(self) -> System:
+        """Return the negative."""
+        return _combined(lambda n, m: (-n, m), self)
+
+    def __sub__(self, other: Any) -> System:
+        """Return the difference."""
+        return self + -System.of(other)
+
+    def __rsub__(self, other: Any) -> System:
+        """Return the difference."""
+        return System.of(other) - self
+
+    def __mul__(self, other: Any) -> System:
+        """Return the two in series; common factors stay."""
+        return _combined(lambda n, m, p, q: (n * p, m * q), self, other)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> System:
+        """Return the quotient; common factors stay."""
+        return _combined(lambda n, m, p, q: (n * q, m * p), self, other)
+
+    def __rtruediv__(self, other: Any) -> System:
+        """Return the quotient."""
+        return System.of(other) / self
+
+    def __pow__(self, power: int) -> System:
+        """Return a whole power; a delay's power is as long as so many of this one delay."""
+        if isinstance(power, bool) or not isinstance(power, int | np.integer):
+            raise TypeError(f"power must be a whole number, got {power!r}")
+        found, base = System.of(1), self if power >= 0 else 1 / self
+        left = abs(int(power))
+        while left:
+            found = found * base if left % 2 else found
+            left //= 2
+            base = base * base if left else base
+        return found
+
+    def feedback(self, other: Any = 1, sign: float = -1) -> System:
+        """Return the closed loop, with negative feedback by default.
+
+        Parameters
+        ----------
+        other : system, optional
+            In the feedback path, as `of` takes it.
+        sign : float, optional
+            Factor of the feedback path, -1 by default.
+        """
+        back = Sum.of(polynomial([-real_number("sign", sign)]))
+        return _combined(lambda n, m, p, q: (n * q, m * q + back * n * p), self, other)
+
+    def at(self, **values: Any) -> System:
+        """Return the system with numbers, or systems without a denominator, for parameters.
+
+        Parameters
+        ----------
+        **values
+            By name of the parameter.
+        """
+        for name in values:
+            if name not in self.nominal:
+                raise TypeError(f"{name} is no parameter of {self!r}: it has {self.parameters}")
+        put, names = {}, {k: v for k, v in self.nominal.items() if k not in values}
+        for name, value in values.items():
+            given = System.of(value)
+            if given.denominator.terms != _UNITY.terms:
+                raise ValueError(f"{name} must have no denominator, got {given!r}")
+            put[name], names = given.numerator, names | given.nominal
+        return with_others(
+            lambda one: System(
+                one.numerator.put(put), one.denominator.put(put), names, one.step
+            ),
+            self,
+        )
+
+    def given(self, values: Iterable[Any], numbers: Mapping[str, Any]) -> dict[str, Any]:
+        """Return a value of each parameter, by place, by name, or nominal; raise otherwise."""
+        found, values = dict(self.nominal), tuple(values)
+        if len(values) > len(found):
+            raise TypeError(
+                f"{len(values)} values are given for the parameters {self.parameters}"
+            )
+        for name, value in [*zip(found, values, strict=False), *numbers.items()]:
+            if name not in found:
+                raise TypeError(f"{name} is no parameter of {self!r}: it has {self.parameters}")
+            found[name] = self.nominal[name] if value is None else value
+        for name, value in found.items():
+            if value is None:
+                raise TypeError(f"{name} must be given: it has no nominal value")
+        return found
+
+    def __call__(
+        self, s: npt.ArrayLike, *values: Any, squeeze: Any = None, **numbers: Any
+    ) -> ComplexArray:
+        """Evaluate at s in rad/s, of any shape; of an equation D.
+
+        At s = 0 it is the limit.
+
+        Parameters
+        ----------
+        s : array_like of complex
+            Laplace variable.
+        *values, **numbers : array_like of float, optional
+            The parameters; nominal ones by default. All broadcast.
+        squeeze : optional
+            Without effect; ``control.evalfr`` passes it.
+        """
+        found, s = self.given(values, numbers), complex_array("s", s)
+        arrays = {
+            k: np.array(float(v)) if isinstance(v, Fraction) else real_array(k, v)
+            for k, v in found.items()
+        }
+        if found and not any(v.ndim for v in arrays.values()):
+            return self.at(**{k: _number_of(k, v) for k, v in found.items()})(s)
+        shape = broadcast_shape(("s", *arrays), (s, *arrays.values()))
+        s = np.broadcast_to(s, shape)
+        arrays = {k: np.broadcast_to(v, shape) for k, v in arrays.items()}
+        if self.is_equation:
+            return self.numerator.at(s, arrays)
+        # In a unit as large as the roots of M: powers of many fast poles would overflow.
+        p = max(self.denominator.terms.values(), key=lambda p: p.degree())
+        ratio = abs(fraction(p[order(p)] / p[p.degree()]))
+        bits = ratio.numerator.bit_length() - ratio.denominator.bit_length()
+        unit = Fraction(2) ** (bits // max(p.degree(), 1))
+        size = abs(fraction(p[p.degree()])) * unit ** p.degree()
+        with np.errstate(all="ignore"):
+            n, m = (f.at(s, arrays, unit, size) for f in (self.numerator, self.denominator))
+            value = np.asarray(n / m)
+        if not arrays and (s == 0.0).any():
+            value = np.where(s == 0.0, self._limit(), value)
+        return value
+
+    def _limit(self) -> complex:
+        """Return the value at s = 0, exactly; inf at a pole."""
+        n, m = (part.series(_TERMS) for part in (self.numerator, self.denominator))
+        for above, below in zip(n, m, strict=True):
+            if below:
+                return complex(float(above / below))
+            if above:
+                return complex(np.inf)
+        return complex(np.nan)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both are the same expression: the same coefficients and delay objects."""
+        return isinstance(other, System) and self._content() == other._content()
+
+    def __hash__(self) -> int:
+        """Hash the expression."""
+        return hash((self.numerator, self.denominator))
+
+    def _content(self) -> tuple[Any, ...]:
+        return self.numerator, self.denominator, self.nominal, self.step
+
+    def __getstate__(self) -> tuple[Any, ...]:
+        """Return what makes the system."""
+        return *self._content(), self.others
+
+    def __setstate__(self, state: tuple[Any, ...]) -> None:
+        """Take it back."""
+        self.numerator, self.denominator, self.nominal, self.step, self.others = state
+
+    def _equation(self, latex: bool = False) -> str:
+        """Return the equation as one writes it."""
+        above = self.numerator.text(latex)
+        if self.is_equation:
+            return f"{above} = 0"
+        below = self.denominator.text(latex)
+        if latex:
+            return above if below == "1" else rf"\frac{{{above}}}{{{below}}}"
+        return above if below == "1" else f"[{above}] / [{below}]"
+
+    def __str__(self) -> str:
+        """Return numerator and denominator as one writes them."""
+        return self._equation()
+
+    def __repr__(self) -> str:
+        """Return a short text that says whether it is an open loop or an equation."""
+        text = self._equation()
+        if len(text) > _LONGEST_TEXT:
+            terms = " over ".join(
+                f"{len(part.terms)} terms of degree {part.degree}"
+                for part in (self.numerator, self.denominator)
+                if part
+            )
+            text = f"{terms}{' = 0' if self.is_equation else ''}"
+        named = f", parameters {', '.join(self.parameters)}" if self.parameters else ""
+        what = "equation" if self.is_equation else "open loop"
+        return f"<{what} {text}{named}>"
+
+    def _repr_latex_(self) -> str | None:
+        text = self._equation(latex=True)
+        return f"${text}$" if len(text) <= 2 * _LONGEST_TEXT else None
+
+    def isdtime(self, strict: bool = False) -> bool:
+        """Whether time is discrete: it is not. So python-control's plots take the system."""
+        return False
+
+    def update_names(self, **names: Any) -> None:
+        """Keep no names of signals, so that ``control.series`` takes the system."""
+        return
+
+    def frequency_response(
+        self, omega: npt.ArrayLike, squeeze: bool | None = None, **numbers: Any
+    ) -> control.FrequencyResponseData:
+        """Return the response as python-control's plots and functions take it.
+
+        Parameters
+        ----------
+        omega : array_like of float
+            In rad/s. Choose them dense enough for the delays: exp(-j omega theta) turns once in
+            2 pi / theta.
+        squeeze : bool, optional
+            As in python-control.
+        **numbers : real numbers, optional
+            Values of the parameters.
+
+        Returns
+        -------
+        control.FrequencyResponseData
+        """
+        import control
+
+        omega = np.atleast_1d(real_array("omega", omega))
+        return control.FrequencyResponseData(
+            self(1j * omega, **numbers), omega, squeeze=squeeze, return_magphase=True,
+            sysname="system with delays", plot_type="bode",
+        )  # fmt: skip
+
+
+def _combined(combine: Callable[..., tuple[Sum, Sum]], *systems: Any) -> System:
+    """Return what becomes of open loops, from all their numerators and denominators in turn."""
+    given = [System.of(system) for system in systems]
+    names: dict[str, float | None] = {}
+    for system in given:
+        if system.is_equation:
+            raise TypeError(
+                f"an equation D = 0 cannot be combined with a system, got {system!r}"
+            )
+        for name, value in system.nominal.items():
+            known = names.setdefault(name, value)
+            if value is not None and known not in (None, value):
+                raise ValueError(
+                    f"parameter {name} must have one nominal value, got {known} and {value}"
+                )
+            names[name] = value if known is None else known
+
+    def made(*some: System) -> System:
+        parts = ((system.numerator, system.denominator) for system in some)
+        above, below = combine(*chain.from_iterable(parts))
+        if not below:
+            raise ZeroDivisionError("the denominator of a system must not be zero")
+        return System(above, below, names)
+
+    return with_others(made, *given)
+
+
+def _parallel(n: Sum, m: Sum, p: Sum, q: Sum) -> tuple[Sum, Sum]:
+    """Return numerator and denominator of a sum."""
+    ratio = _ratio(m, q)
+    if ratio:
+        return n + p * Sum.of(fmpq_poly([ratio])), m
+    return n * q + p * m, m * q
+
+
+def _number_of(name: str, value: Any) -> Any:
+    """Return a real number, exactly if it is a fraction."""
+    return value if isinstance(value, Fraction) else real_number(name, value)
+
+
+def _ratio(first: Sum, second: Sum) -> fmpq | None:
+    """Return the number by which the second sum is multiplied to be the first, or None."""
+    if first.terms.keys() != second.terms.keys():
+        return None
+    key = next(iter(first.terms))
+    ratio = first.terms[key].leading_coefficient() / second.terms[key].leading_coefficient()
+    return ratio if all(p == second.terms[k] * ratio for k, p in first.terms.items()) else None
+
+
+def _reduced(n: Sum, m: Sum) -> tuple[Sum, Sum]:
+    """Divide out the delay objects that all terms hold, and of N / M a common power of s."""
+    terms = [*n.terms.items(), *m.terms.items()]
+    if not terms:
+        raise ValueError("an equation must not be zero everywhere")
+    held = {d for (lag, _), _ in terms for d, _ in lag}
+    early = Lag.of({d: -min(dict(lag).get(d, 0) for (lag, _), _ in terms) for d in held})
+    if NOW not in {lag.times(early) for lag, _ in (m or n).terms}:
+        raise ValueError(
+            "the system must be causal: every term of its denominator is delayed by "
+            f"{' and '.join(sorted({_number(lag.time) for lag, _ in (m or n).terms}))} s"
+        )
+    power = _S ** (min(order(p) for _, p in terms) if m else 0)
+    if not early and power == _ONE:
+        return n, m
+    above, below = (
+        Sum({(lag.times(early), names): p // power for (lag, names), p in f.terms.items()})
+        for f in (n, m)
+    )
+    return above, below
+
+
+def delay(theta: float | Fraction) -> System:
+    r"""Return a pure delay, :math:`e^{-s\theta}`: one delay object.
+
+    Used twice, the object is one delay. Two calls make two delays, even of equal length: a
+    small change of one of them alone is then a small change of the loop.
+
+    Parameters
+    ----------
+    theta : float or Fraction
+        In s, not negative.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If it is not finite and real, or negative.
+
+    Examples
+    --------
+    >>> import control
+    >>> from armlock import delay
+    >>> loop = control.tf([1], [1, 1]) * delay(0.5)
+    >>> print(f"{loop(2j):.4f}")
+    -0.2285-0.3844j
+    """
+    value = theta if isinstance(theta, Fraction) else Fraction(real_number("theta", theta))
+    if value < 0:
+        raise ValueError(f"theta must not be negative, got {theta}")
+    lag = Lag([(Delay(value), 1)]) if value else NOW
+    return System(Sum.of(_ONE, lag), _UNITY)
+
+
+def delay_object(system: System) -> Delay:
+    """Return the object of a system that is one delay, or raise."""
+    terms = system.numerator.terms if isinstance(system, System) else {}
+    if len(terms) == 1 and system.denominator == _UNITY:
+        (((lag, names), p),) = terms.items()
+        if len(lag) == 1 and lag[0][1] == 1 and not names and p == _ONE:
+            return lag[0][0]
+    raise TypeError(f"a delay must be what delay(theta) returns, got {system!r:.200}")
+
+
+def parameter(name: str, nominal: float | None = None) -> System:
+    """Return a named real parameter, for charts and for values that are given later.
+
+    Parameters
+    ----------
+    name : str
+        A name of Python that is no argument of a function of this package.
+    nominal : float, optional
+        Its value where none is given.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the name is none, or taken, or the value is not finite and real.
+
+    Examples
+    --------
+    >>> from armlock import delay, parameter, s, unstable_roots
+    >>> kp, ki = parameter("kp"), parameter("ki")
+    >>> loop = (kp + ki / s) * delay(1.0) / (s + 1)
+    >>> loop
+    <open loop [ki exp(-1 s) + s kp exp(-1 s)] / [s^2 + s], parameters kp, ki>
+    >>> unstable_roots(loop, kp=1.0, ki=[0.5, 3.0])
+    array([0, 2])
+    """
+    if not isinstance(name, str) or not name.isidentifier():
+        raise ValueError(f"name must be a name of Python, got {name!r}")
+    if name in _TAKEN:
+        raise ValueError(
+            f"name must not be an argument of a function, got {name!r}: write for instance "
+            f"{name + '_'!r}"
+        )
+    value = None if nominal is None else real_number("nominal", nominal)
+    return System(Sum.of(_ONE, NOW, name), _UNITY, {name: value})
+
+
+#: The Laplace variable s.
+s = System(Sum.of(_S), _UNITY)
+
+
+def equation(d: Any, step: float = 0.0) -> System:
+    r"""Return the equation D(s) = 0, whose own roots are counted.
+
+    Parameters
+    ----------
+    d : System
+        D. Its denominator is cleared: the roots are those of its numerator. ``equation(1 + L)``
+        has the roots of the loop L, and those that cancel at s = 0.
+    step : float, optional
+        The step in s of a map. D is then a sum of numbers times powers of ``delay(step)``.
+
+    Returns
+    -------
+    System
+        Not taken where an open loop is meant, for instance by `margins`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If D is zero or an equation already, all of it is delayed, or a map holds s, or delays
+        that are no multiples of its step.
+
+    Examples
+    --------
+    An oscillator with a delayed force, x'' + 0.2 x' + x = k x(t - 1):
+
+    >>> from armlock import delay, equation, parameter, s, unstable_roots
+    >>> k = parameter("k")
+    >>> forced = equation(s**2 + 0.2 * s + 1 - k * delay(1.0))
+    >>> unstable_roots(forced, [0.1, -0.5])
+    array([0, 2])
+    """
+    system = System.of(d, "d")
+    if system.is_equation:
+        raise TypeError(f"d must be no equation yet, got {system!r}")
+    above, step = system.numerator, not_negative("step", step)
+    if step:
+        for lag in above.lags:
+            whole_steps("delay", float(lag.time), step)
+        if above.degree:
+            raise ValueError("a map must hold no s: its terms are numbers times delays")
+    return with_others(lambda one: System(one.numerator, Sum({}), one.nominal, step), system)

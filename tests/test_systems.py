@@ -1,0 +1,452 @@
+"""Expressions of delays and parameters: what they mean, and what is refused."""
+
+import copy
+import dataclasses
+import pickle
+
+import control
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import armlock
+from armlock import (
+    BOUNDARY,
+    UNCONFINED,
+    CommonArm,
+    Controller,
+    DualArm,
+    HayesEquation,
+    Loop,
+    SingleArm,
+    System,
+    critical_perturbation,
+    d_curve,
+    delay,
+    equation,
+    margins,
+    paper_loop,
+    parameter,
+    rightmost_root,
+    s,
+    semi_discretization,
+    simulate,
+    stability_chart,
+    unstable_roots,
+)
+from armlock.affine import Affine, basis
+from armlock.controllers import integrating_actuator
+from armlock.engine.chain import reserve
+from armlock.paper import TAU1, TAU2
+from armlock.robustness import box_count, first_crossing, no_root_crosses
+from armlock.sensors import DIFFERENCE, SignalMapping
+from armlock.systems import polynomial
+from tests import independent
+from tests.systems import NEUTRAL, RETARDED, two_delays
+
+MAP = semi_discretization(CommonArm(tau1=2.0, tau2=1.5), 0.5, order=1)
+KINDS = [*RETARDED.values(), *NEUTRAL.values(), MAP]
+reals = st.floats(-3.0, 3.0)
+frequencies = st.builds(complex, st.floats(-1.0, 1.0), st.floats(-5.0, 5.0))
+
+KP, KI = parameter("kp"), parameter("ki")
+PLANT = control.tf([1], [2, 1])
+C1, C2, C3 = (parameter(name, 1.0) for name in ("c1", "c2", "c3"))
+
+
+@given(st.sampled_from(KINDS), frequencies, reals, reals)
+def test_the_value_of_an_equation_is_that_of_its_terms(system, s, x, y):
+    d = system if system.is_equation else equation(1 + system)
+    expected = independent.value(d, s, x, y)
+    assert abs(d(s, x, y) - expected) <= 1e-12 * (1.0 + independent.size(d, s, x, y))
+
+
+# values, not objects ------------------------------------------------
+
+LOOPS = [
+    SingleArm(0.3, 2.0),
+    CommonArm(0.5, 2.1, 1.9),
+    DualArm(0.5, 2.1, 1.9, 1.3, difference=0.4),
+    paper_loop(),
+    Loop(Controller([-0.02], [0.0, -0.1 + 1j, -0.1 - 1j], 2.0), DIFFERENCE, 20.1, 19.9),
+    Loop(([-0.1], [0.0, -3.0], 2.0), "single", 20.0, delay=20e-6),
+    Loop(Controller([], [-1e-3] * 5, 1e-14), "dual", 20.1, 19.9),
+]
+EXPRESSIONS = [
+    HayesEquation(0.7),
+    MAP,
+    (KP + KI / s) * PLANT * delay(4.0),
+    two_delays([1.0, 0.2, 1.0], [1.0], [0.5], 1.0, 2.0),
+]
+
+
+@pytest.mark.parametrize("loop", LOOPS, ids=lambda loop: repr(loop)[:40])
+def test_a_loop_is_a_value(loop):
+    """Its representation and copies are equal to it, and no field can be changed."""
+    made = eval(repr(loop), vars(armlock) | {"SignalMapping": SignalMapping})
+    for again in (made, copy.deepcopy(loop), pickle.loads(pickle.dumps(loop))):
+        assert type(again) is type(loop)
+        assert (again, hash(again)) == (loop, hash(loop))
+        assert again(0.3j, 0.9, 1.05) == loop(0.3j, 0.9, 1.05)
+        assert unstable_roots(again, 0.9, 1.05) == unstable_roots(loop, 0.9, 1.05)
+    for field in dataclasses.fields(loop):
+        with pytest.raises(dataclasses.FrozenInstanceError):
+            setattr(loop, field.name, 3.0)
+
+
+@pytest.mark.parametrize("system", EXPRESSIONS, ids=repr)
+def test_an_expression_is_a_value_and_keeps_its_delay_objects(system):
+    for again in (copy.deepcopy(system), pickle.loads(pickle.dumps(system))):
+        assert (again, hash(again)) == (system, hash(system))
+        assert again(0.3j, 0.9, 1.05) == system(0.3j, 0.9, 1.05)
+        assert unstable_roots(again, 0.9, 1.05) == unstable_roots(system, 0.9, 1.05)
+    assert len(repr(system)) < 500
+
+
+def test_a_loop_keeps_its_delays_from_process_to_process():
+    loop = CommonArm(0.3)
+    again = pickle.loads(pickle.dumps(loop))
+    assert len((loop * 1 + again * 1).numerator.lags) == len(loop.numerator.lags)
+    assert len((loop + CommonArm(0.3)).numerator.lags) == 5
+
+
+def test_one_thing_is_replaced_and_all_else_stays():
+    loop = CommonArm(gain=2.0, delay=20e-6)
+    assert loop.replace(delay=0.0) == CommonArm(gain=2.0) != loop
+    assert margins(loop.replace(delay=0.0), 0.9, 0.9).delay > 0.0
+    faster = integrating_actuator(3.0)
+    again = loop.replace(controller=faster)
+    assert dataclasses.replace(loop, controller=faster) == again != loop
+    with pytest.raises(TypeError, match="unexpected keyword argument 'dead_time'"):
+        loop.replace(dead_time=0.0)
+    # The sensor keeps the difference that it divides by.
+    assert DualArm().replace(tau1=21.0) == DualArm(tau1=21.0, difference=TAU1 - TAU2)
+    assert Loop(((), (0.0,), 1.0), "dual", 20.0, 19.0).replace(tau1=30.0).mapping.name == "dual"
+    assert Loop(((), (0.0,), 1.0), "single", 20.0).replace(tau1=30.0).tau2 == 30.0
+    # Two loops of one L are not one loop: what is simulated are controller and sensor.
+    low_pass = SignalMapping([1.0], [0.0], [1.0, 1.0], "low pass")
+    one = Loop(((), (0.0, -1.0), 1.0), "single", 20.0)
+    other = Loop(((), (0.0,), 1.0), low_pass, 20.0)
+    assert one(0.3j) == pytest.approx(other(0.3j), rel=1e-14)
+    assert one != other
+
+
+# parameters ------------------------------------------------
+
+
+def test_parameters_are_given_by_place_by_name_or_are_nominal():
+    loop = DualArm(gain=3.0)
+    for made in (loop, loop.replace(delay=1e-3)):
+        assert unstable_roots(made, c2=0.999) == unstable_roots(made, 1.0, 0.999)
+    assert rightmost_root(paper_loop()) == rightmost_root(paper_loop(), 1.0, 1.0)
+    for arguments, name in (({"b": -1.0}, "a"), ({"a": -1.0}, "b")):
+        with pytest.raises(TypeError, match=f"^{name} must be given"):
+            unstable_roots(HayesEquation(), **arguments)
+    with pytest.raises(TypeError, match=r"^c3 is no parameter of "):
+        unstable_roots(loop, c3=1.0)
+
+
+@pytest.mark.parametrize("name", ["step", "direction", "omega_max", "free_above", "s"])
+def test_a_parameter_with_the_name_of_an_argument_is_refused(name):
+    with pytest.raises(ValueError, match=f"^name must not be an argument .* got '{name}'"):
+        parameter(name)
+
+
+def test_two_nominal_values_of_one_parameter_are_refused():
+    with pytest.raises(ValueError, match=r"^parameter k must have one nominal value"):
+        parameter("k", 1.0) + parameter("k", 2.0)
+    assert (parameter("k") + parameter("k", 2.0)).nominal == {"k": 2.0}
+
+
+def test_what_is_not_affine_in_what_varies_is_refused_with_what_to_write():
+    g = parameter("g")
+    loop = g / s * (2 - C1 * delay(20.1) - C2 * delay(19.9))
+    with pytest.raises(ValueError, match=r"affine in c1 and g .* make the product a parameter"):
+        stability_chart(loop, g=[0.5, 1.0], c1=[0.5, 1.0])
+    # With one of them held it is a chart, and single points need nothing.
+    chart = stability_chart(loop, c1=[0.5, 1.5], c2=[0.5, 1.6], g=1.0)
+    expected = stability_chart(CommonArm(), [0.5, 1.5], [0.5, 1.6])
+    np.testing.assert_array_equal(chart.counts, expected.counts)
+    assert unstable_roots(loop, g=1.0, c1=0.5, c2=1.6) == 5
+    # A gain and its product with c are a chart.
+    h = parameter("h")
+    single = (g - h * delay(20.1)) / s
+    chart = stability_chart(single, g=[0.5, 1.0], h=[0.4, 1.2])
+    for i, gain in enumerate((0.5, 1.0)):
+        for k, product in enumerate((0.4, 1.2)):
+            assert chart.counts[k, i] == unstable_roots(SingleArm(gain), product / gain)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_charts_of_any_two_parameters_are_the_counts_at_their_points(seed):
+    rng = np.random.default_rng([51, seed])
+    three = sum(
+        m * (1 - c * delay(tau))
+        for m, c, tau in ((0.5, C1, 20.1), (0.3, C2, 19.9), (0.2, C3, 16.6))
+    )
+    z = delay(1.0)
+    k, plant = KP + KI / s, 1 / (s + 1)
+    charts = [
+        ((KP + KI / s) * PLANT * delay(4.0), "kp", "ki", {}),
+        (three / s * delay(0.02), "c1", "c3", {"c2": 0.9}),
+        # A Smith predictor, with its parameters in the denominator too.
+        (k / (1 + k * (plant - plant * z)) * plant * z, "kp", "ki", {}),
+        ((parameter("u") * delay(1.0) + parameter("v") * delay(2.5)) / (s + 1), "u", "v", {}),
+        # A derivative: the parameter stands before the highest power.
+        ((KP + parameter("kd") * s) * delay(0.5) / (s + 1), "kd", "kp", {}),
+        ((KP + parameter("kd") * s) / (s + 1), "kd", "kp", {}),
+    ]
+    for loop, x, y, held in charts:
+        axes = {x: rng.uniform(-2.0, 3.0, 40), y: rng.uniform(-2.0, 3.0, 30)}
+        chart = stability_chart(loop, **axes, **held)
+        points = dict(zip((x, y), np.meshgrid(*axes.values()), strict=True))
+        counts = unstable_roots(loop, **points, **held)  # type: ignore[arg-type]
+        np.testing.assert_array_equal(chart.counts, counts)
+        for _ in range(5):
+            i, j = rng.integers(30), rng.integers(40)
+            at = {name: float(v[i, j]) for name, v in points.items()}
+            assert chart.counts[i, j] == unstable_roots(loop, **at, **held)
+
+
+def test_a_third_arm_is_one_more_term_for_every_function():
+    arms = [(0.5, C1, delay(20.1)), (0.3, C2, delay(19.9)), (0.2, C3, delay(16.6))]
+    loop = 0.4 / s * delay(0.02) * sum(m * (1 - c * z) for m, c, z in arms)
+    assert unstable_roots(loop) == 0
+    eps = critical_perturbation(loop, {"c1": 1.0, "c3": 1.0})
+    around = [unstable_roots(loop, c1=1 + e, c3=1 + e) for e in (0.999 * eps, 1.001 * eps)]
+    assert around[0] == 0 < around[1] or eps == 0.0
+    edge = first_crossing(loop, {"c3": 0.0}, {"c3": -1.0})
+    counts = [
+        unstable_roots(loop, c3=-edge.position * share) for share in (1.0 - 1e-6, 1.0 + 1e-6)
+    ]
+    assert counts[0] < counts[1]
+    assert box_count(loop * (1 - 0.1 / (s + 1)), {"c1": 1e-9}) in (0, BOUNDARY)
+    assert no_root_crosses(loop, 0.09, 0.11, between=(arms[0][2], arms[1][2]))
+    found = margins(loop, free_above=5.0, free=[z for _, _, z in arms])
+    assert 0.0 < found.modulus <= margins(loop).modulus
+    x, y = d_curve(loop, 0.7, c3=1.0)
+    assert abs(1 + loop(0.7j, c1=float(x), c2=float(y))) < 1e-12
+    with pytest.raises(TypeError, match="a record of the controller, the sensor and the two"):
+        simulate(loop, np.zeros(100))  # type: ignore[arg-type]
+
+
+# one meaning ------------------------------------------------
+
+
+def test_an_equation_is_no_open_loop():
+    forced = equation(s**2 + 0.2 * s + 1 - parameter("k", 0.1) * delay(1.0))
+    assert unstable_roots(forced) == 0
+    with pytest.raises(TypeError, match=r"^loop must be an open loop L, not an equation D = 0"):
+        margins(forced)
+    with pytest.raises(TypeError, match="an equation D = 0 cannot be combined"):
+        forced * 2
+    assert repr(forced).startswith("<equation ")
+    assert repr(forced).endswith(" = 0, parameters k>")
+    assert repr(1 / s).startswith("<open loop ")
+    assert "\\frac" in str((1 / (s + 1))._repr_latex_())
+
+
+def test_a_root_at_zero_is_that_of_the_equation_and_cancels_in_the_loop():
+    loop = CommonArm()
+    assert unstable_roots(loop) == 0
+    assert unstable_roots(equation(1 + loop)) == BOUNDARY
+    # A chart says the same, on the whole line.
+    axis = np.linspace(0.0, 2.0, 33)
+    chart = stability_chart(loop, axis, axis)
+    assert (chart.counts[::-1].diagonal() >= 0).all()
+    of_d = stability_chart(equation(1 + loop), axis, axis)
+    assert (of_d.counts[::-1].diagonal() == BOUNDARY).all()
+
+
+# delays have identity ------------------------------------------------
+
+
+def test_two_arms_of_equal_length_are_two_delays_in_every_form():
+    k = Controller([-1.0], [-2.0], 0.2)
+    loop = Loop(k, "common", 20.0, 20.0)
+    z1, z2 = delay(20.0), delay(20.0)
+    written = k * ((1 - C1 * z1) + (1 - C2 * z2))
+    for same in (loop, 1 * loop, loop.at(c1=5.0, c2=-4.9), written):
+        values = () if "c1" not in same.nominal else (5.0, -4.9)
+        assert unstable_roots(same, *values) == UNCONFINED
+    one = k * (2 - (C1 + C2) * z1)
+    assert unstable_roots(one, 5.0, -4.9) == 0
+    # By a small change of one arm roots become unstable.
+    assert unstable_roots(Loop(k, "common", 20.0, 20.001), 5.0, -4.9, right_of=1e-4) == -2
+
+
+def test_a_point_alone_and_in_an_array_agree_on_equal_delays():
+    x, y, dead = parameter("x"), parameter("y"), delay(0.3)
+    d = 1.3 + 0.93 * s + (0.9 + 0.75 * s) * dead - x * (0.9 + 0.75 * s) * dead
+    system = equation(d - y * dead * delay(2.0))
+    assert unstable_roots(system, 1.0, 0.5) == unstable_roots(system, [1.0, 1.0], 0.5)[0]
+    # With a delay of its own for x, equal by chance, the chain is not confined.
+    d = 1.3 + 0.93 * s + (0.9 + 0.75 * s) * (dead - x * delay(0.3))
+    own = equation(d - y * dead * delay(2.0))
+    assert unstable_roots(own, 1.0, 0.5) == UNCONFINED
+    assert unstable_roots(own, [1.0, 0.9], 0.5)[0] == UNCONFINED
+
+
+def test_a_nominal_smith_predictor_with_one_delay_object_and_with_two():
+    plant, k = (s + 2) / (s + 1), 3 + 1 / s
+
+    def loop(z, model):
+        return k / (1 + k * (plant - plant * model)) * plant * z
+
+    z = delay(1.0)
+    assert unstable_roots(loop(z, z)) == 0
+    assert unstable_roots(loop(z, delay(1.0))) == UNCONFINED
+
+
+def test_the_chain_of_one_object_is_a_polynomial_in_it():
+    for z, z2, limit in ((one := delay(1.0), one**2, -0.34657359), (one, delay(2.0), 0.1616)):
+        neutral = equation(s * (1 + 0.75 * z + 0.5 * z2) + 0.5)
+        confined = limit < 0.0
+        assert (unstable_roots(neutral) == UNCONFINED) != confined
+        if confined:
+            # Roots right of the limit: few; left of it: infinitely many.
+            assert unstable_roots(neutral, right_of=limit + 0.02) >= 0
+            assert unstable_roots(neutral, right_of=limit - 1e-4) == UNCONFINED
+    with pytest.raises(armlock.RootError, match=r"0\.16"):
+        rightmost_root(neutral)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_reserve_bounds_the_chain_from_below(seed):
+    rng = np.random.default_rng([18, seed])
+    z1, z2 = delay(1.0), delay(1.7)
+    a = rng.uniform(-0.5, 0.5, 4)
+    p = 1 + a[0] * z1 + a[1] * z2 + a[2] * z1 * z2 + a[3] * z1**2
+    lags = [lag for lag in p.numerator.lags if lag]
+    whole = p.numerator.before()
+    late = np.array(
+        [[float(str(whole[lag][0].p)) / float(str(whole[lag][0].q)) for lag in lags]]
+    )
+    found = float(reserve(lags, np.ones(1), late)[0])
+    # The least value on the torus, from a grid; P has a zero inside where it winds.
+    turn = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 400, endpoint=False))
+    u, v = np.meshgrid(turn, turn)
+    values = abs(1 + a[0] * u + a[1] * v + a[2] * u * v + a[3] * u**2)
+    radius = np.linspace(0.0, 1.0, 60)
+    inside = min(
+        abs(np.polyval([a[3], a[0] + a[2] * w, 1 + a[1] * w], r * turn)).min()
+        for r in radius
+        for w in turn[::20]
+    )
+    if inside > 0.05:
+        assert 0.75 * values.min() <= found <= values.min() + 1e-12
+    if found > 0.0:
+        assert inside > 0.0
+
+
+def test_powers_of_one_object_are_counted_as_roots_of_the_equation():
+    """Against the sampled argument; two objects would often not confine these equations."""
+    rng = np.random.default_rng(5)
+    for _ in range(12):
+        z = delay(1.0)
+        p, q = rng.uniform(-0.9, 0.9, 2)
+        d = s * (1 + p * z + q * z**2) + rng.uniform(-2.0, 2.0) + rng.uniform(-3.0, 3.0) * z
+        count = unstable_roots(equation(d))
+        confined = (np.abs(np.roots([q, p, 1.0])) > 1.0).all()
+        assert (count == UNCONFINED) != confined
+        if count >= 0:
+            angle = np.linspace(-np.pi / 2, np.pi / 2, 400_001)
+            arc = 2000.5 * np.exp(1j * angle)
+            line = 1j * np.linspace(2000.5, -2000.5, 4_000_001)
+            value = equation(d)(np.concatenate((arc, line)))
+            turns = np.angle(value[1:] / value[:-1]).sum() / (2.0 * np.pi)
+            assert count == round(turns)
+
+
+def test_delays_that_are_no_multiples_of_one_object_do_not_cancel():
+    with pytest.raises(ValueError, match=r"^the system must be causal"):
+        delay(1.0) / delay(0.25)
+    z = delay(1.0)
+    assert (z * s / z).numerator == s.numerator
+
+
+# hidden modes, and the basis ------------------------------------------------
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0, 0.3])
+def test_a_hidden_unstable_mode_counts_however_it_is_scaled(scale):
+    hidden = 1 / (s - 1) + 1 / ((s - 1) * (s + 2))
+    assert unstable_roots(hidden) == 1
+    # Equal denominators, up to a factor, are one system.
+    assert unstable_roots(1 / (s - 1) + 2 * scale / (scale * s - scale)) == 0
+    cancelled = control.tf([1, -1], [1, 2]) * delay(0.1) * control.tf([scale], [scale, -scale])
+    assert unstable_roots(cancelled) == 1
+
+
+def test_what_cancels_at_low_frequency_cancels_in_the_basis():
+    """Of the dual sensor it is the sum and the difference of the arms."""
+    loop = paper_loop()
+    found = [p.degree for p in Affine.of(loop).space.polynomials]
+    assert sorted(set(found)) == [5, 7]
+    assert len(found) == 3
+    chosen = basis([polynomial([1, 2, 1]), polynomial([0, 0, 1]), polynomial([3, 0, 1])])
+    assert [p.degree() for p in chosen] == [2, 1, 0]
+    # The one of highest order at s = 0 is kept.
+    assert chosen[0] == polynomial([0, 0, 1])
+    # At 1e-8 rad/s L = N / M keeps its digits.
+    above, below = Affine(loop).quotient()
+    value = (
+        above.value_and_slope(np.array([1e-8j]))[0]
+        / below.value_and_slope(np.array([1e-8j]))[0]
+    )
+    assert value[0] == pytest.approx(
+        complex(independent.exact(loop, 1e-8j, 1, 1) - 1), rel=1e-9
+    )
+
+
+# maps ------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "loop",
+    [
+        CommonArm(10.0),
+        CommonArm(),
+        DualArm(),
+        Loop(Controller([], [0.0, -2.0], 1.0), "common", 20.1, 19.9),
+    ],
+)
+@pytest.mark.parametrize("order", [0, 1])
+def test_a_map_keeps_its_root_at_one(loop, order):
+    made = semi_discretization(loop, 0.1, order)
+    assert unstable_roots(made, 1.0, 1.0) == unstable_roots(equation(1 + loop)) == BOUNDARY
+    edge = first_crossing(made, (1.0, 1.0), (-1.0, -1.0), 1e-6)
+    assert edge.position == np.inf
+
+
+def test_a_map_is_not_the_equation_of_its_delays():
+    q = delay(1.0)
+    assert unstable_roots(equation(1 - 1.2 * q, step=1.0)) == 1
+    assert unstable_roots(equation(1 - 1.2 * q)) == UNCONFINED
+    with pytest.raises(ValueError, match="a map must hold no s"):
+        equation(s - 1.2 * q, step=1.0)
+    with pytest.raises(ValueError, match="step must divide every delay"):
+        equation(1 - 1.2 * q, step=0.3)
+
+
+# numbers and controllers ------------------------------------------------
+
+
+def test_arithmetic_is_exact_and_takes_what_engineers_have():
+    controller = Controller([-1.0], [0.0], 2.0)
+    loop = 2 * System.of(controller) * PLANT * delay(0.5) ** 2 - 0.1 + 0.1
+    omega = np.array([0.2j, 3j])
+    np.testing.assert_allclose(
+        loop(omega), 2 * controller(omega) * PLANT(omega) * np.exp(-omega), rtol=1e-12
+    )
+    assert control.evalfr(loop, 0.2j) == loop(0.2j)
+    assert unstable_roots(PLANT) == 0
+    assert margins(control.tf([1], [4, 2])).gain_upper == np.inf
+    assert ((1 - delay(0.1)) / s)(0.0) == pytest.approx(0.1, rel=1e-15)
+    assert np.isinf((1 / s)(0.0))
+    closed = (2 * (1 - delay(1.0)) / (s * (s + 1))).feedback()
+    assert closed(0.0) == pytest.approx(2 / 3, rel=1e-15)
+    with pytest.raises(TypeError, match="power must be a whole number"):
+        s**0.5  # type: ignore[operator]
+    np.testing.assert_allclose(((s + 1) ** -2)(omega), (omega + 1) ** -2.0)
