@@ -191,7 +191,7 @@ def page(**changes):
     for old, new in changes.items():
         assert code.count(f"\n{old} = ") == 1
         code = re.sub(rf"\n{old} = .*", f"\n{old} = {new}", code)
-    names: dict[str, Any] = {}
+    names: dict[str, Any] = {"Controller": Controller}
     with contextlib.redirect_stdout(io.StringIO()) as out:
         exec(code, names)
     return names, out.getvalue()
@@ -212,7 +212,7 @@ def test_orbits_of_lisaorbits_are_read_as_the_page_shows():
 
 
 def test_the_page_gives_the_range_and_the_days_of_the_chapter(chapter, weak):
-    names, printed = page(controller="1 / (s + 0.1)")
+    names, printed = page(controller="Controller([], [-0.1], 1.0)")
     assert abs(names["low"] - weak[1][0]) < 1e-5
     x = chapter["half"]["Kepler", 1]
     days = chapter["stable_days"](chapter["ratio"](x), *weak[1])

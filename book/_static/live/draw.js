@@ -814,12 +814,17 @@ const armlockDraw = (function () {
     pen.lineWidth = 1;
     ghost(pen, colours, () => curve(pen, values.length, t => [px(t), above(1e3 * values[t][1])]));
     const found = days.map((v, t) => [t, v]).filter(([, v]) => v > 0 && v < Infinity);
-    const sizes = found.map(([, v]) => Math.log10(v)), first = Math.floor(Math.min(-1, ...sizes));
+    // The paper's perturbation is always in sight.
+    const sizes = found.map(([, v]) => Math.log10(v)), first = Math.floor(Math.min(-7, ...sizes));
     const top = Math.max(first + 1, ...sizes.map(Math.ceil));
     const below = v => 26 + room + room * (top - Math.log10(v)) / (top - first);
-    lines(pen, Array.from({ length: top - first + 1 }, (_, k) => 10 ** (first + k)),
+    lines(pen, Array.from({ length: Math.floor(top - first) + 1 }, (_, k) => 10 ** (first + k)),
       v => power(Math.round(Math.log10(v))), below, left, wide - right, colours);
-    upright(pen, "critical perturbation", 2, 26 + 1.5 * room);
+    upright(pen, "critical, along \u00b1(1, \u22121)", 2, 26 + 1.5 * room);
+    ghost(pen, colours, () => curve(pen, 2, k => [left + k * span, below(SQUARE)]));
+    pen.textAlign = "right";
+    pen.textBaseline = "bottom";
+    pen.fillText(`the paper\u2019s ${power(-6)}`, wide - right - 4, below(SQUARE) - 2);
     pen.fillStyle = colours.line;
     for (const [t, v] of found) pen.fillRect(px(t) - 1.5, below(v) - 1.5, 3, 3);
     pen.strokeStyle = colours.mark;

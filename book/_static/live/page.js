@@ -892,7 +892,7 @@ function armlockPages() {
       return { ...LOOPS[state.loop][0], tau1, tau2, difference: 2 * held(half, state.hold, day) };
     };
     const sheet = new Sheet({ role: "img", "aria-label": "The year: true and assumed half difference, days on "
-      + "which the loop is unstable, and the critical perturbation of the arms in opposite directions." }, [0.5, 1.2],
+      + "which the loop is unstable, and the critical perturbation of the arms in opposite directions." }, [1, 1.2],
     (pen, ...rest) => drawYear({ values, days, day: state.day }, pen, ...rest));
     for (const name of ["pointerdown", "pointermove"]) sheet.canvas.addEventListener(name, event => {
       const at = (sheet.place(event)[0] - 56) / (sheet.wide - 64);
@@ -967,12 +967,13 @@ function armlockPages() {
     today.querySelector("input").step = 1;
     const form = element("form", { class: "live-form", onsubmit: event => event.preventDefault() },
       pick("loop", "Loop", Object.keys(LOOPS)), pick("orbit", "Orbit", Object.keys(armlockOrbits)),
-      pick("master", "Master", Object.keys(ARMS)), pick("hold", "The sensor assumes", HOLDS), today);
-    place.replaceChildren(form, wrong,
-      element("figure", {}, element("figcaption", {}, "Solid: the true half difference. Dashed: the half difference "
-        + "that the sensor assumes. Dots: the critical perturbation of the arms in opposite directions."), sheet.canvas),
-      words, lost, figures(element("div", {}, live.figure, legend(), live.note),
-        element("div", {}, live.numbers, buttons(back))));
+      pick("master", "Master", Object.keys(ARMS)), pick("hold", "The sensor assumes", HOLDS));
+    place.replaceChildren(element("div", { class: "live-own" },
+      element("div", { class: "live-main" }, figures(element("figure", {}, element("figcaption", {}, "Solid: the true half "
+        + "difference. Dashed: the half difference that the sensor assumes. Dots: the critical perturbation along (1, \u22121) or "
+        + "(\u22121, 1), whichever is smaller."), sheet.canvas), live.figure), words, lost, live.note, live.numbers, buttons(back)),
+      element("div", { class: "live-side" }, element("div", { class: "live-top" }, form, wrong),
+        element("div", { class: "live-panel" }, live.summary, today), element("div", { class: "live-fields" }, legend()))));
     addEventListener("hashchange", () => location.reload());
     update();
   }
