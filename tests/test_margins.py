@@ -247,6 +247,14 @@ def test_roots_behind_the_one_at_zero_are_not_passed_over(loop):
         critical_perturbation(loop, (-1.0, -1.0))
 
 
+def test_a_search_that_ends_with_its_last_step_is_complete():
+    # Stable for every gain (Re P is not negative), and what is left of the search is nothing.
+    loop = Loop(Controller([-100.0], [0.0], 1e4), COMMON, 16.6825, 16.6175)
+    found = margins(loop)
+    assert found.gain_upper >= 1e4
+    assert np.degrees(found.phase) == pytest.approx(59.0867, abs=1e-4)
+
+
 def test_undamped_poles_bound_no_gain():
     """A crossing through infinity is none; the two factors are those of a dense sample."""
     plant = Controller([-0.5], [1j, -1j], 0.5)

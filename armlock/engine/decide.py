@@ -338,7 +338,7 @@ def _searched(
         walk = partial(inclusion.walk, functions, question, pending, best, where)
         [(pending, more, best, where, taken)] = in_threads(walk, [min(_A_WHILE, most)])
         undecided, steps = np.concatenate((undecided, more)), steps + taken
-        if steps > most:
+        if steps > most and len(pending):
             raise UndecidedError(
                 f"a search takes more than {most:.0e} steps, at {pending[-1, 0]:.3g} rad/s"
             )
