@@ -532,11 +532,9 @@ def check_chart(tally, rng, sketch, loop, point):
         return
     chart = tally.ask("stability_chart", stability_chart, loop, x, y)
     single = tally.ask("unstable_roots", unstable_roots, loop, *np.meshgrid(x, y))
-    of_d = tally.ask("unstable_roots", unstable_roots, equation(1 + loop), *np.meshgrid(x, y))
-    if chart is None or single is None or of_d is None:
+    if chart is None or single is None:
         return
-    # A chart is that of D, which has a root at s = 0 where one cancels in the loop.
-    for j, i in np.argwhere((chart.counts != single) & (chart.counts != of_d)):
+    for j, i in np.argwhere(chart.counts != single):
         tally.note("stability_chart", (x[i], y[j]), chart.counts[j, i], single[j, i])
     for _ in range(2):
         i, j = rng.integers(x.size), rng.integers(y.size)

@@ -407,6 +407,8 @@ def _gain_up(m: Function, n: Function) -> tuple[float, float]:
     inf is proven. If neither is found, k is the largest one that was looked at. The frequency
     is nan for both.
     """
+    if m.is_zero or n.is_zero:
+        return math.inf, math.nan
     looked_at, neutral = 1.0, n.space.limits(*n.weights)[1].any()
     for most in [gain for gain in _GAINS if gain <= _CHAIN_KNOWN or not neutral]:
         try:

@@ -343,7 +343,8 @@ def box_count(loop: System, size: float | Mapping[str, float]) -> int:
     half = {name: positive_number(name, value) for name, value in given.items()}
     at = {name: real_number(name, value) for name, value in system.given((), {}).items()}
     require_certain(system, list(at.values()))
-    affine = Affine(system, tuple(half))
+    affine = Affine.of(system) if set(half) == set(at) else Affine(system, tuple(half))
+    half = {name: half[name] for name in affine.free}
     centre, terms = affine.function(*(at[name] for name in half)), affine.terms[1:]
     corners = itertools.product(*((-v, v) for v in half.values()))
     zero = (0.0,) * (1 + len(half))
