@@ -27,10 +27,10 @@ from tests.attack_judge import Sketch, View
 
 LIVE = Path(__file__).parents[1] / "book" / "_static" / "live"
 #: The engine's files. Each function takes what those before it return.
-ENGINE = ("loop.js", "margins.js", "chart.js")
+ENGINE = ("loop.js", "margins.js", "chart.js", "curves.js")
 LOAD = """() => {
     window.live = armlockLoop();
-    Object.assign(live, armlockMargins(live), armlockChart(live));
+    Object.assign(live, armlockMargins(live), armlockChart(live), armlockCurves(live));
 }"""
 #: What a count in a browser is where it is no number of roots, as `loop.js` has it.
 BOUNDARY, UNCONFINED, UNDECIDED = -1, -2, -3

@@ -160,6 +160,38 @@ def test_a_loop_on_the_boundary_has_undecided_margins(page):
     assert np.isnan(page.evaluate(call, spec)[1])
 
 
+#: How far each margin that is not in the limit lies from the curve that is drawn: the distance
+#: of L there from the line between two samples, relative to their distance and |L|.
+FAR = """([spec, c1, c2]) => {
+    const loop = live.make(spec), found = live.margins(spec, c1, c2);
+    if (!found) return [];
+    const marks = ["lower", "upper", "delay", "phase", "modulus"]
+        .map(name => found[`${name}At`])
+        .filter(w => w > 0 && w < Infinity);
+    const { omega, re, im, gap, at } = live.response(loop, c1, c2, 9000, marks);
+    return marks.map(w => {
+        const k = omega.findIndex(v => v >= w), [x, y] = at(w);
+        if (k < 1 || gap(k) && omega[k] > w) return Infinity;
+        if (omega[k] === w) return 0;
+        const chord = Math.hypot(re[k] - re[k - 1], im[k] - im[k - 1]);
+        const apart = [k - 1, k].map(i => Math.hypot(x - re[i], y - im[i]));
+        return (apart[0] + apart[1] - chord) / Math.max(chord, Math.hypot(x, y));
+    }); }"""
+
+
+@pytest.mark.parametrize("number", [12])
+def test_margins_lie_on_a_drawn_curve(page, number):
+    rng = np.random.default_rng(secrets.randbits(32))
+    asked = 0
+    while asked < number:
+        sketch, point = draw(rng)
+        if len(sketch.poles) > 5:
+            continue
+        far = page.evaluate(FAR, [described(sketch), *map(float, point)])
+        assert all(distance < 0.1 for distance in far), (sketch, point, far)
+        asked += bool(far)
+
+
 @pytest.fixture(scope="module")
 def text(chromium):
     page = chromium.new_page()

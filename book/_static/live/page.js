@@ -583,7 +583,7 @@ function armlockPages() {
     let unit = 1, base = 1, depth = 0, quiet = true, before = null, later = 0;
     // The controller of the pasted text, which stays in its field.
     let pasted = null;
-    const understood = element("p", { class: "live-formula", "aria-label": "The controller" });
+    const understood = element("p", { class: "live-formula" });
     const doubt = element("p", { class: "live-note live-wrong", role: "status" });
 
     /* The address holds the loop, and its history undoes what was done to it. */
