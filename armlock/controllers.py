@@ -215,9 +215,11 @@ def rational(system: Any, integrators: int | None = None) -> Controller:
 
     check_system("controller", system, "a Controller, a triple (zeros, poles, gain)")
     if isinstance(system, control.StateSpace):
-        a, b, c, d = (real_array("controller", getattr(system, name)) for name in "ABCD")
-        above, below = statespace.quotient(a.tolist(), b.tolist(), c.tolist(), d.item())
-        doubts = statespace.doubts(a.tolist())
+        a, b, c, d = (
+            real_array("controller", getattr(system, name)).tolist() for name in "ABCD"
+        )
+        above, below = statespace.quotient(a, b, c, d[0][0])
+        doubts = statespace.doubts(a)
     else:
         above, below = (
             Polynomial.of(real_array("controller", p[0][0])[::-1].tolist())
@@ -243,6 +245,8 @@ def rational(system: Any, integrators: int | None = None) -> Controller:
                 f"{integrators} for {system!r:.200}"
             )
         doubts = ()
+        if isinstance(system, control.StateSpace) and number:
+            above = statespace.without_hidden(a, b, c, above, number)
     found = Controller.of_polynomials(above, below)
     values = product(*((-bound, Fraction(0), bound)[: 3 if bound else 1] for bound in doubts))
     others = (statespace.with_lowest(above, below, lowest) for lowest in values if doubts)

@@ -192,6 +192,21 @@ def test_controllers_in_general_coordinates_are_as_designed_or_asked_for(integra
             continue
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_an_integrator_that_is_hidden_cancels_in_other_coordinates_too(seed):
+    rng = np.random.default_rng(seed)
+    design = np.diag([0.0, -0.3, -2.0])
+    b, c, turn = rng.normal(size=(3, 1)), np.array([[0.0, 1.0, 0.5]]), rng.normal(size=(3, 3))
+    b, c = (b, c) if seed % 2 else (c.T, b.T)
+    given = control.ss(
+        np.linalg.inv(turn) @ design @ turn, np.linalg.inv(turn) @ b, c @ turn, 0.0
+    )
+    expected = unstable_roots(DelaySystem.of(control.ss(design, b, c, 0)) * delay(0.3))
+    stated = Controller.of(given, integrators=1)
+    assert stated.numerator.order == stated.denominator.order == 1
+    assert unstable_roots(DelaySystem.of(stated) * delay(0.3)) == expected
+
+
 def test_a_hidden_unstable_mode_is_counted():
     for b, c in (([[0.0], [1.0]], [[1.0, 1.0]]), ([[1.0], [1.0]], [[0.0, 1.0]])):
         hidden = control.ss([[1.0, 0.0], [0.0, -1.0]], b, c, 0)

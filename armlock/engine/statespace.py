@@ -7,7 +7,7 @@ With one input and one output two characteristic polynomials are enough,
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -37,30 +37,58 @@ def quotient(a: Any, b: Any, c: Any, d: float) -> tuple[Polynomial, Polynomial]:
     return Polynomial.of(above.coeffs()), Polynomial.of(below.coeffs())
 
 
+def _cofactors(matrix: Any) -> tuple[tuple[Fraction, ...], list[Any]]:
+    """Return the coefficients of det(s - A), and those of the adjugate of s - A.
+
+    By the recursion of Faddeev and Leverrier, P_(k-1) = A P_k + c_k.
+    """
+    coefficients = fractions(matrix.charpoly())
+    n = len(coefficients) - 1
+    unit = flint.fmpq_mat(n, n, [int(i == k) for i in range(n) for k in range(n)])
+    found = [unit]
+    for c in coefficients[n - 1 : 0 : -1]:
+        found.append(matrix * found[-1] + flint.fmpq(*c.as_integer_ratio()) * unit)
+    return coefficients, found[::-1]
+
+
+def _magnitude(terms: Iterable[Any]) -> Fraction:
+    """Return the sum of magnitudes of numbers of python-flint."""
+    return sum((Fraction(int(abs(t.p)), int(t.q)) for t in terms), Fraction(0))
+
+
 def doubts(a: Any) -> tuple[Fraction, ...]:
     """Return what rounding of A may make of the lowest coefficients of det(s - A).
 
     Of as many as may all be meant to be zero, and at most two. The derivative of det(s - A) by
-    an entry of A is a cofactor of s - A: polynomials that Faddeev and Leverrier's recursion
-    gives, P_(k-1) = A P_k + c_k with the coefficient c_k.
+    an entry of A is a cofactor of s - A.
     """
     if not len(a):
         return ()
     matrix = _matrix(a)
-    coefficients, found = fractions(matrix.charpoly()), []
-    n = len(coefficients) - 1
-    unit = flint.fmpq_mat(n, n, [int(i == k) for i in range(n) for k in range(n)])
-    cofactors = [unit]
-    for c in coefficients[n - 1 : 0 : -1]:
-        cofactors.append(matrix * cofactors[-1] + flint.fmpq(*c.as_integer_ratio()) * unit)
-    for c, adjugate in zip(coefficients, cofactors[: -MOST_IN_DOUBT - 1 : -1], strict=False):
-        products = zip(matrix.entries(), adjugate.transpose().entries(), strict=True)
-        terms = (abs(x * y) for x, y in products)
-        bound = ROUNDED * sum((Fraction(int(t.p), int(t.q)) for t in terms), Fraction(0))
-        if abs(c) >= bound and c:
+    found: list[Fraction] = []
+    for c, adjugate in zip(*_cofactors(matrix), strict=False):
+        pairs = zip(matrix.entries(), adjugate.transpose().entries(), strict=True)
+        bound = ROUNDED * _magnitude(x * y for x, y in pairs)
+        if len(found) == MOST_IN_DOUBT or (c and abs(c) >= bound):
             break
         found.append(bound if c else Fraction(0))
     return tuple(found) if any(found) else ()
+
+
+def without_hidden(a: Any, b: Any, c: Any, above: Polynomial, number: int) -> Polynomial:
+    """Return a numerator of which so many lowest coefficients, if small, are zero.
+
+    Poles at s = 0 that the input does not reach, or the output does not see, cancel there.
+    """
+    matrix, column, row = (_matrix(m) for m in (a, b, c))
+    lowest = []
+    for value, adjugate in zip(above.exact[:number], _cofactors(matrix)[1], strict=False):
+        weights = (column * row).transpose().entries()
+        pairs = zip(weights, adjugate.entries(), strict=True)
+        if abs(value) > ROUNDED * _magnitude(x * y for x, y in pairs):
+            break
+        lowest.append(-value)
+    return above + Polynomial.of(lowest)
 
 
 def doubts_of_roots(below: Polynomial) -> tuple[Fraction, ...]:
