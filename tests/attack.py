@@ -386,7 +386,7 @@ def check_margins(tally, rng, sketch, loop, point):
     for name in judge.NAMES:
         got, expected = getattr(found, name), getattr(verdict, name)
         if name == "gain_upper":
-            got, expected = (np.inf if v > judge.GAINS else v for v in (got, expected))
+            got, expected = (np.inf if v >= judge.GAINS else v for v in (got, expected))
         if name == "gain_lower":
             got, expected = (0.0 if v < 1.0 / judge.GAINS else v for v in (got, expected))
         tally.near(

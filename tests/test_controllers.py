@@ -201,10 +201,10 @@ def test_an_integrator_that_is_hidden_cancels_in_other_coordinates_too(seed):
     given = control.ss(
         np.linalg.inv(turn) @ design @ turn, np.linalg.inv(turn) @ b, c @ turn, 0.0
     )
-    expected = unstable_roots(DelaySystem.of(control.ss(design, b, c, 0)) * delay(0.3))
+    expected = unstable_roots(System.of(control.ss(design, b, c, 0)) * delay(0.3))
     stated = Controller.of(given, integrators=1)
     assert stated.numerator.order == stated.denominator.order == 1
-    assert unstable_roots(DelaySystem.of(stated) * delay(0.3)) == expected
+    assert unstable_roots(System.of(stated) * delay(0.3)) == expected
 
 
 def test_a_hidden_unstable_mode_is_counted():
