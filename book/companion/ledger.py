@@ -528,6 +528,7 @@ def updated(text: str, found: Mapping[str, Mapping[str, Any]]) -> str:
             blocks = [block for block in blocks if not block.startswith(head)]
             if one.get(part):
                 lines = "".join(f"{_key(k)} = {_toml(v)}\n" for k, v in one[part].items())
+                blocks[at] = blocks[at].rstrip() + "\n\n"
                 at += 1
                 blocks.insert(at, f"{head}{lines}\n")
     return "".join(blocks).rstrip() + "\n"
