@@ -28,7 +28,7 @@ from armlock.checks import (
 from armlock.engine import decide
 from armlock.engine.chain import UndecidedError
 from armlock.engine.decide import BOUNDARY, UNCONFINED, UNDECIDED
-from armlock.engine.functions import Function, Leading, log, stacked
+from armlock.engine.functions import Function, Leading, compiled, log, stacked
 from armlock.engine.inclusion import EPSILON, Functions
 from armlock.systems import System
 
@@ -127,7 +127,7 @@ def _with_zeros(affine: Affine, points: FloatArray) -> IntArray:
     """
     series = [[f.series(_TERMS) for f in part] for part in (affine.n, affine.m)]
     found = np.full(len(points), _EXACTLY)
-    left, leads = [], []
+    left, leads, away = [], [], list[int]()
     for i, point in enumerate(points.tolist()):
         shares = [Fraction(1), *map(Fraction, point)]
         n, m = (
@@ -140,13 +140,21 @@ def _with_zeros(affine: Affine, points: FloatArray) -> IntArray:
         d = [a + b for a, b in zip(n, m, strict=True)]
         orders = [_order(a) for a in (n, m, d)]
         cancelled = 0 if affine.m_is_zero else min(orders[:2])
-        if orders[2] in (0, _TERMS):
+        if orders[2] == _TERMS:
+            continue
+        if not orders[2]:
+            away.append(i)
             continue
         if orders[2] > cancelled:
             found[i] = BOUNDARY
             continue
         left.append(i)
         leads.append((orders[2], d[orders[2]]))
+    if away:
+        # Rounding hides the sign of D(0), which exact weights have.
+        exactly = [affine.function(*points[i].tolist()) for i in away]
+        counted = decide.counts(affine.space, compiled(exactly))
+        found[away] = np.where(counted == UNDECIDED, _EXACTLY, counted)
     if left:
         functions = _rounded(affine, points[left])
         radii = affine.space.radius(
