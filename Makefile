@@ -17,8 +17,6 @@ export MPLCONFIGDIR := $(CURDIR)/$(VENV)/matplotlib
 export IPYTHONDIR := $(CURDIR)/$(VENV)/ipython
 # The matrices here are small, and several processes share the machine.
 export OPENBLAS_NUM_THREADS := 1
-# Claims, notebooks and tests find here what one of them has computed.
-export ARMLOCK_SHARED := $(CURDIR)/build/shared
 unexport PYTHONPATH PYTHONHOME VIRTUAL_ENV MPLBACKEND
 
 # Two makes in one folder must not build the same files: the second waits for the first.
@@ -67,7 +65,7 @@ PYTEST := $(PY) -m pytest --numprocesses auto --maxprocesses 4 --dist worksteal
 execute = export ARMLOCK_FIGURES=$(CURDIR)/$(1); \
 	$(PYTEST) --dist load --maxschedchunk 1 --nbmake --overwrite $(2:notebooks/%=build/executed/%) && \
 	$(PY) tools/collect_figures.py build/executed $(1) build/cache
-execute-all = rm -rf $(1) build/shared build/executed; cp -R notebooks build/executed && \
+execute-all = rm -rf $(1) build/executed; cp -R notebooks build/executed && \
 	$(call execute,$(1),$(LONGEST) $(NOTEBOOKS))
 
 # If notebooks alone have changed, only these run again.

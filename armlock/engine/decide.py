@@ -304,7 +304,7 @@ class Family:
 
 
 def _together(vertices: list[Function], terms: list[Function]) -> list[Function]:
-    """Mix one vertex and one term by their highest coefficients (Lemma 19); else none."""
+    """Mix one vertex and one term by their highest coefficients (Lemma 20); else none."""
     if not len(vertices) == len(terms) == 1:
         return []
     (vertex,), (term,) = vertices, terms

@@ -598,7 +598,7 @@ def excludes_zero(room: Members) -> int:
 def _turn_together(room: Members) -> bool:
     """Mix the one vertex and the one term, so that one of them loses what delays turn in both.
 
-    Zero is in vertex plus term, for some phase of the term, if it is after that (Lemma 19).
+    Zero is in vertex plus term, for some phase of the term, if it is after that (Lemma 20).
     Returns whether there is such a pair.
     """
     vertex, term, number = -1, -1, 0

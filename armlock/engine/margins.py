@@ -243,7 +243,7 @@ class Ratio(NamedTuple):
 def least_ratio(
     d: Function, n: Function, free: Free | None = None, *, tolerance: float = 1e-6
 ) -> Ratio:
-    """Find the infimum of |D / N| over the axis, one over the peak gain of N / D (Lemma 19).
+    """Find the infimum of |D / N| over the axis, one over the peak gain of N / D (Lemma 20).
 
     Parameters
     ----------

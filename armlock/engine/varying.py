@@ -1,7 +1,7 @@
 """How far coefficients of a function D may vary in time, and how far they may differ.
 
 D changes by - sum_k eta_k B_k exp(-s theta_k). The loop stays stable for all eta_k(t) within a
-radius if the small-gain theorem holds with constant scalings (Lemma 20). One polynomial f with
+radius if the small-gain theorem holds with constant scalings (Lemma 22). One polynomial f with
 |f|^2 >= sum |B_k|^2 on the axis, a spectral factor, reduces this to the peak gain of f / D.
 """
 
@@ -170,7 +170,7 @@ def _best_scalings(squares: FloatArray) -> tuple[FloatArray, float]:
 
 
 def varying_radius_of(d: Function, changes: Sequence[Function]) -> Varying:
-    """Find a radius of varying perturbations that is certified, scalings optimised (Lemma 20).
+    """Find a radius of varying perturbations that is certified, scalings optimised (Lemma 22).
 
     Parameters
     ----------

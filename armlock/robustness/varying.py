@@ -76,7 +76,7 @@ def varying_radius(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> VaryingRadiu
     Notes
     -----
     This is the small-gain theorem: a delay does not change the L2 norm, and a factor of at most
-    r in magnitude changes it by at most r (Lemma 21 of the book has the proof, and what
+    r in magnitude changes it by at most r (Lemma 22 of the book has the proof, and what
     "stable" means). It says nothing about delays that vary. Below the radius the gain from the
     free to the locked laser is at most that of the constant loop over 1 - r / radius.
 
