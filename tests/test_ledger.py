@@ -4,6 +4,7 @@ import csv
 import json
 import re
 import tomllib
+from pathlib import Path
 
 import pytest
 
@@ -84,6 +85,24 @@ def test_the_ledger_is_written_as_data(tmp_path):
     assert len(rows) == len(json.loads(tree.read_text())) == len(BOOK.claims)
     assert rows[0]["claim"].split() == list(next(iter(BOOK)).names)
     assert sum(met.total() for met in BOOK.tally().values()) == len(rows)
+
+
+NOTEBOOKS = Path(__file__).parents[1] / "notebooks"
+CHAPTERS = sorted(NOTEBOOKS.glob("*.ipynb"))
+
+
+@pytest.mark.parametrize("notebook", CHAPTERS, ids=lambda path: path.stem)
+def test_a_chapter_decides_its_claims_in_sight_and_is_held_against_the_file(notebook):
+    cells = json.loads(notebook.read_text("utf-8"))["cells"]
+    cells = [(cell["metadata"].get("tags", []), "".join(cell["source"])) for cell in cells]
+    shown = [text for tags, text in cells if not {"remove-cell", "remove-input"} & set(tags)]
+    decided = re.findall(r'(?m)^claims\["(\w+)"\] = ', "\n".join(shown))
+    numbers = re.findall(r'(?m)^numbers\["(\w+)"\] = ', "\n".join(shown))
+    assert sorted(decided + numbers) == sorted(BOOK.of(notebook.stem))
+    if decided:
+        assert any("```{claims}\n```" in text for text in shown)
+    if decided or numbers:
+        assert f'ledger.confirm("{notebook.stem}"' in "\n".join(shown)
 
 
 # A chapter and a file -----------------------------------------------------------------------
