@@ -49,7 +49,12 @@ def not_negative(name: str, value: object) -> float:
 
 def whole_number(name: str, value: object, lowest: int) -> int:
     """Return a Python or NumPy integer that is no smaller than a bound, or raise."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < lowest:
+    # A time span of NumPy is one of its integers.
+    if (
+        isinstance(value, bool | np.timedelta64)
+        or not isinstance(value, int | np.integer)
+        or value < lowest
+    ):
         raise ValueError(f"{name} must be an integer of at least {lowest}, got {value!r}")
     return int(value)
 
@@ -154,7 +159,8 @@ def broadcast_pair(
 def check_memory(name: str, shape: tuple[int, ...], bytes_each: int) -> None:
     """Raise if so many values would take more than a share of the machine's memory."""
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    needed = math.prod(shape) * bytes_each
+    # Python's integers may be larger than any float.
+    needed = math.prod(float(min(size, 10**300)) for size in shape) * bytes_each
     if needed > _MEMORY_SHARE * memory:
         times = " x ".join(str(size) for size in shape)
         raise ValueError(

@@ -31,6 +31,7 @@ from armlock.checks import (
     positive_number,
     real_array,
     real_number,
+    whole_number,
 )
 
 #: Speed of light in m/s.
@@ -176,9 +177,10 @@ class Constellation:
 
 def _spacecraft(name: str, value: object) -> int:
     """Return the number of a spacecraft, or raise."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value not in _FAR:
+    number = whole_number(name, value, 1)
+    if number not in _FAR:
         raise ValueError(f"{name} must be 1, 2 or 3, got {value!r}")
-    return int(value)
+    return number
 
 
 def _link(receiver: _Path, emitter: _Path, t: FloatArray) -> tuple[FloatArray, FloatArray]:

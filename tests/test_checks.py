@@ -1,5 +1,6 @@
 """Arguments that make no sense are refused: by name, with the value and the constraint."""
 
+import datetime
 import inspect
 import itertools
 import re
@@ -14,13 +15,18 @@ import armlock
 from armlock import CommonArm, HayesEquation, SingleArm, equation, paper_loop
 from armlock.checks import axis, complex_array, finite_series, real_array
 from armlock.controllers import integrating_actuator, roll_off, stage_one, table_two
+from armlock.orbits import kepler
+from armlock.performance.pulling import largest_pulling
 from armlock.robustness import first_crossing
 from armlock.sensors import COMMON, SignalMapping, dual
 from armlock.timedomain.discretize import warped
+from armlock.timedomain.spectra import SpectrumEstimator
 from tests.systems import NEUTRAL, two_delays
 
 ARMS = CommonArm()
 LASER = armlock.LaserNoise(1)
+ORBITS = kepler()
+SPECTRUM = armlock.amplitude_spectrum(LASER.draw(2000), 200.0)
 # Depends on no free parameter at s = 0.
 FLAT = two_delays([1.0, 1.0, 1.0], [0.0, 1.0], [0.0, 1.0], 1.0, 2.0)
 RUN: dict[str, Any] = {"sample_rate": 10.0, "limit": 1e6}
@@ -85,6 +91,18 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     armlock.delay: {"theta": 1.0},
     armlock.parameter: {"name": "k", "nominal": 1.0},
     equation: {"d": 1 + ARMS, "step": 0.0},
+    armlock.step_response: {"system": ARMS.feedback(), "timepts": [1.0]},
+    armlock.impulse_response: {"system": ARMS.feedback(), "timepts": [1.0]},
+    armlock.Simulation(ARMS).advance: {"noise": [1.0]} | POINT,
+    LASER.blocks: {"samples": 3, "size": 2},
+    SPECTRUM.within: {"low": 0.1, "high": 0.3},
+    SpectrumEstimator: {"sample_rate": 1.0},
+    SpectrumEstimator(1.0).add: {"series": [1.0]},
+    ORBITS.round_trips: {"t": 0.0, "master": 1},
+    ORBITS.rates: {"t": 0.0, "master": 1},
+    ORBITS.light_time: {"t": 0.0, "receiver": 1, "emitter": 2},
+    kepler: {"arm_length": 2.5e9},
+    largest_pulling: {"loop": CommonArm(), "common": (1.0, 0.0, 0.0)},
     armlock.pulling: {"loop": CommonArm(), "time": 1e5, "common": (1.0, 0.0, 0.0),
                       "differential": (0.0, 0.0, 0.0)},
 }  # fmt: skip
@@ -95,6 +113,10 @@ JUNK = {
     "nan": np.nan,
     "ragged": [[1.0], [1.0, 2.0]],
     "object": object(),
+    "date": datetime.date(2035, 1, 1),
+    "NumPy's date": np.datetime64("2035-01-01"),
+    "NumPy's time span": np.timedelta64(3, "s"),
+    "bytes": b"1",
 }
 
 
@@ -115,7 +137,6 @@ def test_every_public_function_is_called_above():
     public = {name for name in armlock.__all__ if inspect.isfunction(getattr(armlock, name))}
     # They take no number, or have a test of what they refuse beside their own tests.
     elsewhere = {"robust_loop", "buildable_loop"}
-    elsewhere |= {"step_response", "impulse_response"}
     assert public - called == elsewhere
 
 
@@ -153,6 +174,10 @@ WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
     (armlock.LaserNoise, "seed", -1, "be an integer of at least 0"),
     (armlock.ShapedNoise, "poles", [1j, -1j], "lie in the left half-plane, got "),
     (LASER.draw, "samples", 10**13, "be of a size that memory holds"),
+    (LASER.draw, "samples", 10**400, "be of a size that memory holds"),
+    (SPECTRUM.within, "high", 0.0, "not lie below low = 0.1, got 0.0"),
+    (ORBITS.round_trips, "master", 1.0, "be an integer of at least 1, got 1.0"),
+    (ORBITS.rates, "master", 4, "be 1, 2 or 3, got 4"),
     (
         armlock.amplitude_spectrum,
         "series",

@@ -7,6 +7,7 @@ from fractions import Fraction
 
 import control
 import matplotlib.pyplot as plt
+import mpmath
 import numpy as np
 import pytest
 
@@ -15,7 +16,9 @@ from armlock import (
     Controller,
     Loop,
     System,
+    buildable_loop,
     delay,
+    flight_loop,
     impulse_response,
     margins,
     modulus_margin,
@@ -202,9 +205,68 @@ def test_jumps_of_a_neutral_loop_are_not_smeared():
         impulse_response(closed, 3.5)
 
 
-def test_a_response_that_is_not_found_is_refused():
-    with pytest.raises(ValueError, match="timepts must end earlier"):
-        step_response(control.tf([1], [1e-9, 1]) * delay(1.0), 1e3)
+# Loops whose corners are far above one over the last time, which comes before the first echo.
+STIFF = {"flight": (flight_loop(), 0.1), "buildable": (buildable_loop(), 1.0)}
+
+
+@pytest.mark.parametrize("name", STIFF)
+def test_responses_over_many_decades_are_those_of_talbots_method(name):
+    """Before the first echo the arms return nothing, and only the dead time is left."""
+    loop, last = STIFF[name]
+
+    def polynomial(ascending, s):
+        return sum(a * s**i for i, a in enumerate(ascending))
+
+    def transform(s):
+        k, m = loop.controller, loop.mapping
+        above = polynomial(m.numerator1, s) + polynomial(m.numerator2, s)
+        value = k.gain * mpmath.fprod(s - z for z in k.zeros) * above
+        below = mpmath.fprod(s - p for p in k.poles) * polynomial(m.denominator, s)
+        value *= mpmath.exp(-loop.delay * s) / below
+        return value / (1 + value) / s
+
+    time = np.linspace(0.0, last, 1001)
+    found = step_response(loop.feedback(), time).outputs
+    for i in (10, 300, 1000):
+        expected = float(mpmath.invertlaplace(transform, time[i], method="talbot", degree=40))
+        assert found[i] == pytest.approx(expected, abs=1e-9)
+    # The value at a time does not depend on the others.
+    some = [10, 300, 600]
+    alone = step_response(loop.feedback(), time[some]).outputs
+    assert np.abs(alone - found[some]).max() < 1e-9
+
+
+def test_a_response_may_be_a_billion_times_longer_than_its_time_constant():
+    before = np.seterr(all="raise")
+    try:
+        lag = control.tf([1], [1e-9, 1]) * delay(1.0)
+        found = step_response(lag, [1.0, 1.0 + 1e-9, 2.0, 1e3]).outputs
+        assert found == pytest.approx([0.0, 1.0 - np.exp(-1.0), 1.0, 1.0], abs=1e-6)
+        decayed = step_response(control.tf([1, 0], [1, 1]) * delay(0.5), 1e4).outputs
+        assert abs(decayed[-1]) < 1e-9
+    finally:
+        np.seterr(**before)
+
+
+def test_a_response_that_is_too_long_says_how_long_it_may_be(monkeypatch):
+    for most in ("inversion._MOST", "responses._MOST_JUMPS"):
+        monkeypatch.setattr(f"armlock.timedomain.{most}", 300)
+    integrator = control.tf([30.0], [1, 0])
+    for system in (
+        (integrator * (1 - 0.9 * delay(1.0))).feedback(),
+        (0.5 * delay(1.0) + 0.1 * delay(1.1)).feedback() * control.tf([1], [1, 1]),
+        control.tf([1], [1, -3]) * delay(1.0),
+    ):
+        with pytest.raises(ValueError, match=r"timepts must end by .* s, until when") as error:
+            step_response(system, 3e3)
+        until = float(str(error.value).split()[4])
+        assert until > 1.0
+        assert np.isfinite(step_response(system, until).outputs).all()
+        with pytest.raises(ValueError, match="timepts must end by"):
+            step_response(system, 1.5 * until)
+
+
+def test_a_response_that_is_none_is_refused():
     with pytest.raises(ValueError, match="no more zeros than poles"):
         step_response(S * S * delay(1.0), 10.0)
     with pytest.warns(UserWarning, match="impulses at t = 1 s"):

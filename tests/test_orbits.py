@@ -114,11 +114,11 @@ def test_shapes_are_kept_and_masters_are_three():
     wrong: list[Any] = [0, 4, 1.0, 1.5, True, "1", [1], b"1", np.datetime64("2035-01-01")]
     for number in wrong:
         for call in (KEPLER.round_trips, KEPLER.rates):
-            with pytest.raises(ValueError, match=r"^master must be 1, 2 or 3"):
+            with pytest.raises(ValueError, match=r"^master must be (1, 2 or 3|an integer)"):
                 call(0.0, number)
-        with pytest.raises(ValueError, match=r"^receiver must be 1, 2 or 3"):
+        with pytest.raises(ValueError, match=r"^receiver must be (1, 2 or 3|an integer)"):
             KEPLER.light_time(0.0, number, 2)
-        with pytest.raises(ValueError, match=r"^emitter must be 1, 2 or 3"):
+        with pytest.raises(ValueError, match=r"^emitter must be (1, 2 or 3|an integer)"):
             KEPLER.light_time(0.0, 2, number)
     # Around the triangle the three differences add up to nothing but the Sagnac effect.
     assert abs(sum(half(5e6, master) for master in (1, 2, 3))) < 1e-7

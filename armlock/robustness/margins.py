@@ -11,7 +11,7 @@ from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
 from armlock.affine import Affine, common, open_quotient
-from armlock.checks import positive_number
+from armlock.checks import positive_number, real_number
 from armlock.engine.chain import Lag
 from armlock.engine.functions import Function
 from armlock.engine.margins import (
@@ -217,7 +217,8 @@ def margins(
     objects = tuple(free if free is not None else getattr(loop, "arms", ()))
     if not objects:
         raise TypeError("free must hold the delays whose phases are free, as delay() made them")
-    loose = _with_free_phases(system.at(**system.given(values, numbers)), objects, above)
+    given = {name: real_number(name, x) for name, x in system.given(values, numbers).items()}
+    loose = _with_free_phases(system.at(**given), objects, above)
     return _certified(partial(margins_of, free=loose), loop, values, numbers)
 
 

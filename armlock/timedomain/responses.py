@@ -1,25 +1,23 @@
 """Step and impulse responses of systems with delays, by the inverse Laplace transform.
 
-With sigma to the right of all poles, the response is a Fourier integral,
-
-    y(t) = exp(sigma t) / (2 pi) int Y(sigma + j omega) exp(j omega t) d omega .
-
-Jumps and kinks would make it converge slowly. They follow from the expansion of G in powers of
-1 / (s + corner), whose coefficients are sums of delays, and are taken out and put back exactly.
+Jumps and kinks would make the integral of `armlock.timedomain.inversion` converge slowly. They
+follow from the expansion of G in powers of 1 / (s + corner), whose coefficients are sums of
+delays, and are taken out and put back exactly.
 """
 
 from __future__ import annotations
 
+import math
 import warnings
 from fractions import Fraction
+from functools import partial
 from heapq import heapify, heappop, heappush
 from math import factorial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from flint import fmpq_poly
-from scipy.interpolate import CubicSpline
 
 from armlock.affine import Affine
 from armlock.checks import ComplexArray, FloatArray, finite_series, positive_number
@@ -28,19 +26,16 @@ from armlock.engine.decide import count
 from armlock.engine.functions import Function
 from armlock.systems import Sum, System, fraction, polynomial
 from armlock.systems import s as laplace
+from armlock.timedomain.inversion import Panels, TooLongError, inverted, panels
 
 if TYPE_CHECKING:
     import control
 
 # Powers of 1 / (s + corner) that are taken out.
 _ORDERS = 3
-# By how many powers of e what comes after the period is damped, to 3e-10. As half of them
-# multiply rounding errors, there are no more.
-_DAMPED = 22.0
-# Frequencies of the transform, at first and at most.
-_FIRST, _MOST = 2**13, 2**21
-# Largest difference that doubling the frequencies may make, relative to the largest value.
-_TOLERANCE = 1e-7
+# How far right of all poles the transform is taken, times the last time. Poles are as far from
+# its panels, and rounding errors grow by so many powers of e.
+_AWAY = 6.0
 # Jumps and kinks that are followed.
 _MOST_JUMPS = 20_000
 
@@ -48,6 +43,17 @@ _MOST_JUMPS = 20_000
 _Jumps = dict[Fraction, float]
 #: A sum of polynomials of s, by the lengths of their delays.
 _Terms = dict[Fraction, fmpq_poly]
+
+
+class _Transformed(NamedTuple):
+    """A response up to a time, by what is known of its transform."""
+
+    # One sum of delays for each power of 1 / (s + corner), beginning with the impulses.
+    jumps: list[_Jumps]
+    corner: float
+    # The real part of the line, and the rest on its panels.
+    sigma: float
+    rest: Panels
 
 
 def step_response(system: System, timepts: npt.ArrayLike) -> control.TimeResponseData:
@@ -70,8 +76,8 @@ def step_response(system: System, timepts: npt.ArrayLike) -> control.TimeRespons
     ------
     TypeError, ValueError
         If `timepts` is not finite and ascending from 0 on, the response has derivatives of
-        impulses, its neutral chain is not confined, or the times end too late for its
-        fastest root.
+        impulses, its neutral chain is not confined, or the times end too late: the message
+        has a time up to which the response can be computed.
 
     Warns
     -----
@@ -80,9 +86,9 @@ def step_response(system: System, timepts: npt.ArrayLike) -> control.TimeRespons
 
     Notes
     -----
-    The error is at most 1e-6 of the largest value up to the last time, at jumps too. There
-    the value is the one after the jump. This is checked, not proved, by a transform with twice
-    as many frequencies. An oscillation that is faster than all of them is not seen.
+    The error is at most 1e-9 of the largest value up to the last time, at jumps too. There
+    the value is the one after the jump. This is checked, not proved: the transform is
+    interpolated over frequencies until the values in between agree.
 
     Examples
     --------
@@ -142,9 +148,9 @@ def _response(system: System, timepts: npt.ArrayLike, what: str) -> control.Time
     if system.is_equation:
         raise TypeError(f"system must have an output, got {system!r}")
     system = system.at(**system.given((), {}))
-    if np.ndim(timepts) == 0:
-        timepts = np.linspace(0.0, positive_number("timepts", timepts), 1001)
-    time = finite_series("timepts", timepts)
+    time = finite_series("timepts", timepts, 0, 1)
+    if time.ndim == 0:
+        time = np.linspace(0.0, positive_number("timepts", timepts), 1001)
     if time.size == 0 or time[0] < 0.0 or (np.diff(time) <= 0.0).any() or time[-1] == 0.0:
         raise ValueError(f"timepts must ascend from 0 s on, got {time}")
     inputs = np.full(time.size, float(what == "Step"))
@@ -156,46 +162,64 @@ def _response(system: System, timepts: npt.ArrayLike, what: str) -> control.Time
     begin = int(np.searchsorted(time, float(dead) * (1.0 - 1e-12)))
     outputs = np.zeros(time.size)
     if begin < time.size:
-        outputs[begin:] = _inverted(system, ahead, m, time[begin:], dead)
+        # What decays may underflow.
+        with np.errstate(all="ignore"):
+            outputs[begin:] = _inverted(ahead, m, time[begin:], dead)
     return control.TimeResponseData(
         time, outputs, inputs=inputs, issiso=True, title=f"{what} response",
         input_labels=["u[0]"], output_labels=["y[0]"], plot_inputs=False,
     )  # fmt: skip
 
 
-def _inverted(
-    system: System, n: _Terms, m: _Terms, time: FloatArray, dead: Fraction
-) -> FloatArray:
+def _inverted(n: _Terms, m: _Terms, time: FloatArray, dead: Fraction) -> FloatArray:
     """Invert N(s) / M(s) at some times after a dead time."""
-    below = Affine(System(system.denominator, Sum({}))).n[0]
-    ahead = System(_sum(n), _sum(m))
     time = np.maximum(time - float(dead), 0.0)
-    last, degree = float(time[-1]) or float(dead), _degree(n, m)
-    corner = float(below.space.corners[-1])
-    above, under = (_powers(part, degree, corner) for part in (n, m))
-    impulses, *jumps = _expansion(above, under, last * (1.0 + 1e-9))
+    last = float(time[-1]) or float(dead)
+    try:
+        (impulses, *jumps), corner, sigma, rest = _transformed(n, m, last)
+    except TooLongError as error:
+        until = _longest(n, m, last) + float(dead)
+        raise ValueError(
+            f"timepts must end by {until:.2g} s, until when this response can be computed, got "
+            f"{last + float(dead):g} s, with {error}"
+        ) from None
     if impulses:
         at = ", ".join(f"{float(theta + dead):g}" for theta in sorted(impulses)[:5])
         warnings.warn(f"impulses at t = {at} s are not in the outputs", stacklevel=4)
-    known = np.sum(
-        [_after(time, part, k, corner, last) for k, part in enumerate(jumps)], axis=0
-    )
-    period = 2.0 * last
-    sigma = _right_of_poles(below, last) + _DAMPED / period
+    known = [_after(time, part, k, corner, last) for k, part in enumerate(jumps)]
+    return np.asarray(sum(known, inverted(rest, sigma, time)))
+
+
+def _transformed(n: _Terms, m: _Terms, last: float) -> _Transformed:
+    """Transform the response to an impulse, as it is up to a time."""
+    # What comes later has no effect until then.
+    n, m = ({theta: p for theta, p in part.items() if theta <= last} for part in (n, m))
+    system, degree = System(_sum(n), _sum(m)), _degree(n, m)
+    below = Affine(System(_sum(m), Sum({}))).n[0]
+    # The largest of the roots of the denominator's polynomials.
+    found: Any = [p.numer().complex_roots() for p in m.values()]
+    corner = max([1.0 / last, *(abs(complex(root)) for roots in found for root, _ in roots)])
+    above, under = (_powers(part, degree, corner) for part in (n, m))
+    jumps = _expansion(above, under, last * (1.0 + 1e-9))
+    sigma = _right_of_poles(below, last) + _AWAY / last
     # Where nothing is left without the impulses, rounding is.
-    least = float(np.abs(ahead(sigma))) / last
-    before, points = None, _FIRST
-    while points <= _MOST:
-        s = np.asarray(sigma + 2j * np.pi / period * np.arange(points))
-        found: FloatArray = known + _smooth(ahead, above, under, s, corner, period, time)
-        size = max(float(np.abs(found).max()), least)
-        if before is not None and np.abs(found - before).max() <= _TOLERANCE * size:
-            return found
-        before, points = found, 2 * points
-    raise ValueError(
-        f"timepts must end earlier for a system with a root at {corner:.3g} rad/s, got "
-        f"{last + float(dead)} s"
-    )
+    least = sigma * float(np.abs(system(sigma * np.array([1.0, 1.0 + 1.0j]))).max())
+    rest = panels(partial(_smooth, system, above, under, corner), sigma, corner, least)
+    return _Transformed(jumps, corner, sigma, rest)
+
+
+def _longest(n: _Terms, m: _Terms, last: float) -> float:
+    """Return a time until which a response can be computed; a little later it cannot."""
+    short, long = 1e-12 * last, last
+    while long > 1.2 * short:
+        middle = math.sqrt(short * long)
+        try:
+            _transformed(n, m, middle)
+            short = middle
+        except TooLongError:
+            long = middle
+    # The message has two digits.
+    return 0.95 * short
 
 
 def _sum(part: _Terms) -> Sum:
@@ -252,10 +276,7 @@ def _quotient(left: _Jumps, by: _Jumps, last: float) -> _Jumps:
             continue
         found[theta] = value
         if len(found) > _MOST_JUMPS:
-            raise ValueError(
-                f"timepts must end earlier: there are more than {_MOST_JUMPS} jumps until "
-                f"{float(theta):.3g} s of {last:.3g} s"
-            )
+            raise TooLongError(f"more than {_MOST_JUMPS} jumps")
         for other, a in by.items():
             if other:
                 if theta + other not in left:
@@ -280,7 +301,7 @@ def _right_of_poles(below: Function, last: float) -> float:
     while count(below, right_of=high) != 0:
         low, high = high, 2.0 * high
         if high * last > 600.0:
-            raise ValueError(f"timepts must end earlier: the response overflows at {last} s")
+            raise TooLongError("values above 1e308")
     while high - low > 2.0 / last:
         middle = 0.5 * (low + high)
         stable = count(below, right_of=middle) == 0
@@ -289,15 +310,9 @@ def _right_of_poles(below: Function, last: float) -> float:
 
 
 def _smooth(
-    system: System,
-    n: list[_Jumps],
-    m: list[_Jumps],
-    s: ComplexArray,
-    corner: float,
-    period: float,
-    time: FloatArray,
-) -> FloatArray:
-    """Invert what remains without jumps and kinks, from values at s."""
+    system: System, n: list[_Jumps], m: list[_Jumps], corner: float, s: ComplexArray
+) -> ComplexArray:
+    """Evaluate what remains of G(s) without jumps and kinks."""
     turns = {theta: np.exp(-s * float(theta)) for theta in set().union(*n, *m)}
 
     def at(part: _Jumps) -> ComplexArray:
@@ -311,8 +326,4 @@ def _smooth(
     for order in range(_ORDERS + 1):
         left = above[order] - sum(below[k] * g[order - k] for k in range(1, order + 1))
         g.append(left / below[0])
-    left = system(s) - sum(part / (s + corner) ** k for k, part in enumerate(g))
-    size = 2 * s.size
-    wave = np.fft.irfft(left, size)[: s.size + 1] * (size / period)
-    even = np.arange(s.size + 1) * (period / size)
-    return np.asarray(CubicSpline(even, wave)(time) * np.exp(s[0].real * time))
+    return np.asarray(system(s) - sum(part / (s + corner) ** k for k, part in enumerate(g)))
