@@ -17,7 +17,6 @@ from armlock import (
     DualArm,
     Loop,
     SingleArm,
-    System,
     buildable_loop,
     critical_perturbation,
     delay,
@@ -25,6 +24,7 @@ from armlock import (
     modulus_margin,
     paper,
     paper_loop,
+    parameter,
     peak_gain,
     robust_loop,
     simulate,
@@ -56,7 +56,7 @@ def test_the_radii_of_the_loops_of_the_book(name):
     assert found.omega == pytest.approx(omega, rel=1e-4)
     assert found.constant == pytest.approx(constant, rel=2e-5)
     assert found.constant == pytest.approx(critical_perturbation(make(), direction), rel=1e-6)
-    assert found.scaling == 1.0
+    assert found.scalings == (1.0, 1.0)
 
 
 def test_the_radius_with_half_the_difference():
@@ -128,8 +128,6 @@ def test_what_is_refused_says_why():
         varying_radius(CommonArm(), 1.1)
     with pytest.raises(ValueError, match="no confined chain"):
         varying_radius(Loop(((), (), 5.0), "single", 2.0), 1.3)
-    with pytest.raises(TypeError, match="loop must be a Loop"):
-        varying_radius(System.of(1.0))  # type: ignore[arg-type]
 
 
 def test_loops_that_any_constant_perturbation_breaks_have_the_radius_zero():
@@ -154,7 +152,26 @@ def test_radii_that_are_known():
     unequal = SignalMapping([4.0], [1.0], [1.0], name="unequal")
     found = varying_radius(Loop(((), (), 0.1), unequal, 2.0, 1.5))
     assert found.radius == pytest.approx((1.5 - 0.5) / 0.5, rel=1e-6)
-    assert found.scaling == pytest.approx(0.5, rel=1e-3)
+    assert found.scalings == pytest.approx([1.0, 0.5], rel=1e-3)
+
+
+def test_the_radius_of_a_loop_with_three_arms():
+    # Without dynamics it is one over the sum of the |G_k| again, where the phases are alike.
+    weights, c = (0.6, 0.3, 0.1), [parameter(f"c{k}", 1.0) for k in (1, 2, 3)]
+    arms = [
+        m * (1 - one * delay(tau))
+        for m, one, tau in zip(weights, c, (2.0, 1.7, 1.3), strict=True)
+    ]
+    found = varying_radius(0.5 * (arms[0] + arms[1] + arms[2]))
+    assert found.radius == pytest.approx(1.0 / 0.5, rel=1e-6)
+    assert found.constant == pytest.approx(found.radius, rel=1e-5)
+    assert found.scalings == pytest.approx([1.0, math.sqrt(0.5), math.sqrt(1 / 6)], rel=1e-3)
+    # Where a factor multiplies two delays, the theorem is not stated.
+    twice = 0.5 * (1 - c[0] * (delay(2.0) + delay(1.0)) / 4)
+    with pytest.raises(ValueError, match="one polynomial with one delay"):
+        varying_radius(twice)
+    with pytest.raises(ValueError, match="loop must have a parameter"):
+        varying_radius(0.5 * delay(1.0))
 
 
 def test_a_radius_is_that_of_a_dense_search():
@@ -172,7 +189,7 @@ def test_a_radius_is_that_of_a_dense_search():
         costs = [(1 + d) * (g1 + g2 / d).max() for d in d2]
         assert found.radius == pytest.approx(1.0 / math.sqrt(min(costs)), rel=1e-3)
         assert found.radius <= found.constant * (1.0 + 1e-6)
-        scalings.append(found.scaling)
+        scalings.append(found.scalings[1])
     assert np.ptp(scalings) > 0.1
 
 
@@ -229,6 +246,15 @@ def test_no_switching_within_the_radius_makes_a_loop_grow():
     assert grown >= 9
 
 
+def square(coefficients, x):
+    """Square of the magnitude of a polynomial at omega^2 = x, exactly."""
+    even, odd = (
+        sum((-1) ** i * Fraction(c) * x**i for i, c in enumerate(coefficients[first::2]))
+        for first in (0, 1)
+    )
+    return even**2 + x * odd**2
+
+
 def test_a_spectral_factor_is_no_smaller_than_what_it_stands_for():
     rng = np.random.default_rng(25)
     for _ in range(20):
@@ -239,7 +265,14 @@ def test_a_spectral_factor_is_no_smaller_than_what_it_stands_for():
             for _ in range(2)
         ]
         weights = [Fraction(1), Fraction(int(rng.integers(1, 9)), 3)]
-        f = np.array([float(c) for c in spectral_factor(parts, weights).exact])
+        exact = spectral_factor(parts, weights).exact
+        for x in [Fraction(int(v), 64) for v in rng.integers(0, 10_000, 20)]:
+            needed = sum(
+                w * square([Fraction(str(c)) for c in p.coeffs()], x)
+                for p, w in zip(parts, weights, strict=True)
+            )
+            assert needed <= square(exact, x) <= needed * (1 + Fraction(1, 10**12))
+        f = np.array([float(c) for c in exact])
         s = 1j * np.geomspace(1e-3, 1e3, 500)
         squares = sum(
             float(w) * np.abs(np.polyval([float(c) for c in p.coeffs()][::-1], s)) ** 2

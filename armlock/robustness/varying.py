@@ -10,8 +10,8 @@ from armlock.affine import Affine
 from armlock.checks import real_number
 from armlock.engine.margins import require_stable
 from armlock.engine.varying import constant_radius_of, varying_radius_of
-from armlock.loops import Loop, checked_loop
-from armlock.stability.counts import decided
+from armlock.stability.counts import decided, require_certain
+from armlock.systems import System
 
 
 class VaryingRadius(NamedTuple):
@@ -23,37 +23,38 @@ class VaryingRadius(NamedTuple):
         All c_k(t) within this distance of their constant values leave the loop stable, however
         fast they vary. 0 where constant perturbations of any size break the loop.
     constant : float
-        The smallest size of a constant perturbation (eta_1, eta_2), the larger of the two
-        magnitudes, that breaks the loop.
+        The smallest size of constant perturbations, the largest of their magnitudes, that
+        breaks the loop.
     omega : float
         Frequency in rad/s at which the radius is taken; inf for the limit at high frequency.
-    scaling : float
-        The number d of the theorem; 1 for a loop with one arm.
+    scalings : tuple of float
+        The numbers d_k of the theorem, of which the first is one.
     """
 
     radius: float
     constant: float
     omega: float
-    scaling: float
+    scalings: tuple[float, ...]
 
 
-def varying_radius(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> VaryingRadius:
-    r"""Find how far c1(t) and c2(t) may vary, in any way, without making a loop unstable.
+def varying_radius(loop: System, *values: float, **numbers: float) -> VaryingRadius:
+    r"""Find how far factors c_k(t) may vary, in any way, without making a loop unstable.
 
     With the sensitivity S at the constant point and :math:`G_k = S K m_k`, the loop is stable
-    for all :math:`|c_k(t) - c_k| \le r` if, for one number d,
+    for all :math:`|c_k(t) - c_k| \le r` if, for some numbers :math:`d_k`,
 
     .. math::
 
-        r^2 \left( 1 + d^2 \right) \left( |G_1|^2 + |G_2|^2 / d^2 \right) < 1
-        \quad \text{at every frequency.}
+        r^2 \sum_k d_k^2 \, \sum_k |G_k|^2 / d_k^2 < 1 \quad \text{at every frequency.}
 
     Parameters
     ----------
-    loop : Loop
-        The loop, with constant delays.
-    c1, c2 : float, optional
-        The constant point.
+    loop : System
+        The open loop, a `Loop` or another one whose parameters are factors of delayed copies of
+        the loop's signal. Its delays are constant.
+    *values, **numbers : float, optional
+        The constant point: the parameters, in the order of their first use or by name; nominal
+        ones by default.
 
     Returns
     -------
@@ -64,8 +65,10 @@ def varying_radius(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> VaryingRadiu
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no Loop, c1 or c2 is not finite and real, or the loop is not stable there:
-        the message has the count. A loop whose neutral root chain is not confined is not.
+        If `loop` is no system, has no parameter or is not affine in them, a parameter is not
+        finite and real or multiplies more than one delayed polynomial, or the loop is not
+        stable there: the message has the count. A loop whose neutral root chain is not confined
+        is not.
     CountError
         If double precision, or the steps allowed, do not decide it.
 
@@ -90,11 +93,17 @@ def varying_radius(loop: Loop, c1: float = 1.0, c2: float = 1.0) -> VaryingRadiu
     >>> print(f"varying: {found.radius:.3e}, constant: {found.constant:.3e}")
     varying: 1.321e-06, constant: 1.464e-06
     """
-    affine = Affine.of(checked_loop(loop))
-    point = np.array([real_number("c1", c1), real_number("c2", c2)])
-    d, arms = affine.function(*point.tolist()), [f * -1 for f in affine.terms[1:]]
-    with decided("no radius", point):
-        require_stable(d, affine.cancelled(*point.tolist()))
-        radius, omega, scalings = varying_radius_of(d, arms)
-        constant = constant_radius_of(d, arms, radius) if radius else 0.0
-    return VaryingRadius(radius, constant, omega, scalings[1] / scalings[0])
+    system = System.of(loop, "loop")
+    given = {k: real_number(k, v) for k, v in system.given(values, numbers).items()}
+    if not given:
+        raise ValueError(f"loop must have a parameter that varies, got {system!r}")
+    affine, point = Affine.of(system), list(given.values())
+    require_certain(system, point)
+    d, changes = affine.function(*point), affine.terms[1:]
+    with decided("no radius", np.array(point)):
+        require_stable(d, affine.cancelled(*point))
+        radius, omega, scalings = varying_radius_of(d, changes)
+        constant = constant_radius_of(d, changes, radius) if radius else 0.0
+    return VaryingRadius(
+        radius, constant, omega, tuple(scaling / scalings[0] for scaling in scalings)
+    )
