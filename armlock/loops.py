@@ -264,6 +264,7 @@ class Loop(System):
         """
         return replace(self, **changes)
 
+    @np.errstate(under="ignore")
     def arm_responses(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """Evaluate K m1 exp(-s delay) and K m2 exp(-s delay), factor by factor.
 
@@ -291,12 +292,14 @@ class Loop(System):
         dead = np.exp(-s * self.delay)
         return b1.over(rest, s) * dead, b2.over(rest, s) * dead
 
+    @np.errstate(under="ignore")
     def half_responses(self, s: npt.ArrayLike) -> tuple[ComplexArray, ComplexArray]:
         """Evaluate half the sum and half the difference of `arm_responses`; nothing cancels."""
         s, (rest, _, _, plus, minus) = complex_array("s", s), self._polynomials
         dead = np.exp(-s * self.delay)
         return plus.over(rest, s) * dead, minus.over(rest, s) * dead
 
+    @np.errstate(under="ignore")
     def __call__(  # type: ignore[override]
         self,
         s: npt.ArrayLike,

@@ -198,6 +198,7 @@ class Sum:
             found[lag.time] = found.get(lag.time, fmpq_poly([0])) + p
         return {time: p for time, p in sorted(found.items()) if p}
 
+    @np.errstate(under="ignore")
     def at(
         self,
         s: ComplexArray,

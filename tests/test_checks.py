@@ -125,11 +125,29 @@ JUNK = {
 )
 def test_what_an_argument_cannot_be_is_refused_by_its_name(function):
     arguments = CALLS[function]
-    function(**arguments)
+    # Whatever numpy is told to do about values that underflow.
+    with np.errstate(all="raise"):
+        function(**arguments)
     for name, junk in itertools.product(arguments, JUNK):
         if name != "name":
             with pytest.raises((TypeError, ValueError), match=f"^{name} must "):
                 function(**arguments | {name: JUNK[junk]})
+
+
+def test_what_underflows_is_zero_whatever_numpy_is_told():
+    """Far on the right an echo is: exp(-1e5) at times of a millisecond, or s of 1e4 rad/s."""
+    loop = paper_loop()
+    calls = (
+        lambda: armlock.pulling(loop, 1e-3),
+        lambda: armlock.transfer(loop, "laser", 1e4),
+        lambda: loop(1e4),
+        lambda: loop.feedback()(1e4),
+        lambda: armlock.sampled_open_loop(loop, 1e-200),
+    )
+    for call in calls:
+        expected = call()
+        with np.errstate(all="raise"):
+            assert call() == expected
 
 
 def test_every_public_function_is_called_above():
@@ -188,6 +206,8 @@ WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
     (armlock.noise_budget, "frequency", [0.0, 1.0], "be positive"),
     (armlock.flight_loop, "half_difference", 33.6, "be below mean_delay"),
     (armlock.pulling, "time", [0.0, 1.0], "be positive"),
+    (armlock.pulling, "time", 1e-200, "not be so short or long that its third power"),
+    (armlock.pulling, "time", 1e200, "not be so short or long that its third power"),
     (armlock.pulling, "common", (1.0,), "hold nu0, gamma and alpha"),
 ]
 

@@ -153,6 +153,7 @@ class Polynomial:
         return value, slope
 
 
+@np.errstate(under="ignore")
 def quotients(
     zeros: Sequence[complex], poles: Sequence[complex], lead: float, s: ComplexArray
 ) -> ComplexArray:

@@ -160,6 +160,7 @@ def _error(name: str, values: Sequence[float]) -> FloatArray:
     return error
 
 
+@np.errstate(all="ignore")
 def _series(
     loop: Loop, duration: float, errors: Errors
 ) -> tuple[FloatArray, FloatArray, float]:
@@ -175,6 +176,11 @@ def _series(
     total = np.zeros(s.shape, dtype=np.complex128)
     for source, (nu0, gamma, alpha) in zip(("common", "differential"), errors, strict=True):
         total += found[source] * (nu0 / s + gamma / s**2 + alpha / s**3)
+    if not np.isfinite(total).all():
+        raise ValueError(
+            f"time must not be so short or long that its third power overflows, got times next "
+            f"to {duration:g} s"
+        )
     total *= np.exp(-0.5 * (omega * _SMOOTHED * step) ** 2)
     time: FloatArray = step * np.arange(9 * _SAMPLES // 16, dtype=np.float64)
     growth = np.exp(shift * time)

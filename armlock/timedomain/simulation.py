@@ -172,6 +172,7 @@ def _constant(loop: Loop, sample_rate: float) -> list[Weights]:
     ]
 
 
+@np.errstate(under="ignore")
 def sampled_open_loop(
     loop: Loop,
     omega: npt.ArrayLike,
