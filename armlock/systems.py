@@ -470,7 +470,7 @@ class System:
                 raise TypeError(f"{name} is no parameter of {self!r}: it has {self.parameters}")
         put, names = {}, {k: v for k, v in self.nominal.items() if k not in values}
         for name, value in values.items():
-            given = System.of(value)
+            given = System.of(value, name)
             if given.denominator.terms != _UNITY.terms:
                 raise ValueError(f"{name} must have no denominator, got {given!r}")
             put[name], names = given.numerator, names | given.nominal
