@@ -442,7 +442,7 @@ def common_zeros(n: Function, m: Function) -> int:
 def keeps_sign_up_to(f: Function, g: Function, *, odd: bool) -> float:
     """Frequency up to which the real part of F conj(G), or the imaginary one, keeps its sign.
 
-    It is the even or the odd part of F(s) G(-s) on the axis (Lemma 22). Zero if the leading
+    It is the even or the odd part of F(s) G(-s) on the axis (Lemma 19). Zero if the leading
     term of that part is not known.
     """
     one, other = f.series(_MOST_TERMS), g.series(_MOST_TERMS)

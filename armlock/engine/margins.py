@@ -342,7 +342,7 @@ def _delay(n: Function, m: Function, free: Free | None) -> tuple[float, float]:
 
 
 def _none_past(f: Function, g: Function) -> float:
-    """Frequency past which f + t g has a zero at all t > 0 or at none (Lemma 22).
+    """Frequency past which f + t g has a zero at all t > 0 or at none (Lemma 19).
 
     It is a bound for a polynomial f; inf if the lemma does not give one.
     """
