@@ -385,9 +385,10 @@ def checked_loop(loop: Loop) -> Loop:
     """Return the loop, or say what was given in its place."""
     if not isinstance(loop, Loop):
         raise TypeError(
-            "loop must be a Loop, for instance CommonArm(), a record of the controller, the "
-            "sensor and the two arms that are simulated; counts, charts and margins take any "
-            f"other system, with three arms too, got {loop!r:.200}"
+            "loop must be a Loop, for instance CommonArm(): a simulation samples the factors "
+            "of its controller, and noise and Doppler errors are those of its two arms; "
+            "counts, charts, margins and step responses take any other system, with three arms "
+            f"too, got {loop!r:.200}"
         )
     return loop
 

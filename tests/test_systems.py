@@ -227,7 +227,7 @@ def test_a_third_arm_is_one_more_term_for_every_function():
     assert 0.0 < found.modulus <= margins(loop).modulus
     x, y = d_curve(loop, 0.7, c3=1.0)
     assert abs(1 + loop(0.7j, c1=float(x), c2=float(y))) < 1e-12
-    with pytest.raises(TypeError, match="a record of the controller, the sensor and the two"):
+    with pytest.raises(TypeError, match="are those of its two arms; counts, charts, margins"):
         simulate(loop, np.zeros(100))  # type: ignore[arg-type]
 
 

@@ -32,8 +32,8 @@ from armlock.checks import ComplexArray, FloatArray
 # Points of a panel, and the most panels: a minute for a thousand times.
 _POINTS, _MOST = 20, 1 << 16
 # A panel is halved until its polynomial misses the values in its halves by less than this share
-# of the integral, or by rounding. The halves are used: they miss 2^20 times less.
-_MISSED, _ROUNDING = 1e-11, 1e-14
+# of the integral, or by rounding. The halves are used, which miss less.
+_MISSED, _ROUNDING = 1e-13, 1e-14
 # The last octave's share of the integral, after which no more is taken.
 _LEFT_OUT = 1e-13
 # Panels computed together: few enough that an interrupt is heard.

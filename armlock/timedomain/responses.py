@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 _ORDERS = 3
 # How far right of all poles the transform is taken, times the last time. Poles are as far from
 # its panels, and rounding errors grow by so many powers of e.
-_AWAY = 6.0
+_AWAY = 3.0
 # Jumps and kinks that are followed.
 _MOST_JUMPS = 20_000
 
