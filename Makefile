@@ -62,7 +62,8 @@ $(READY): environment.txt book/kernel.json
 # nbmake runs copies of the notebooks for the tests and for the book, the longest first.
 LONGEST := $(wildcard notebooks/09_* notebooks/13_* notebooks/14_*)
 PYTEST := $(PY) -m pytest --numprocesses auto --maxprocesses 4 --dist worksteal
-execute = export ARMLOCK_FIGURES=$(CURDIR)/$(1); \
+# A progress bar, which a slow machine would show, is no part of a page.
+execute = export TQDM_DISABLE=1 ARMLOCK_FIGURES=$(CURDIR)/$(1); \
 	$(PYTEST) --dist load --maxschedchunk 1 --nbmake --overwrite $(2:notebooks/%=build/executed/%) && \
 	$(PY) tools/collect_figures.py build/executed $(1) build/cache
 execute-all = rm -rf $(1) build/executed; cp -R notebooks build/executed && \
