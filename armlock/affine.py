@@ -19,8 +19,8 @@ from flint import fmpq_poly
 from armlock.checks import FloatArray, real_number
 from armlock.engine.chain import Delay, Lag
 from armlock.engine.functions import Function, Space, common_zeros
-from armlock.engine.polynomials import Polynomial
-from armlock.systems import Sum, System, exact, fraction, order, polynomial
+from armlock.engine.polynomials import Polynomial, exact, fraction, polynomial
+from armlock.systems import Sum, System, order
 
 
 class NotAffineError(ValueError):

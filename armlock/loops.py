@@ -13,6 +13,7 @@ any other `armlock.systems.System`. The Hayes equation has no sensor: it is an e
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
+from fractions import Fraction
 from functools import cached_property
 from numbers import Real
 from typing import Any, Self
@@ -36,17 +37,9 @@ from armlock.checks import (
 from armlock.controllers import Controller, integrating_actuator, table_two, white_paper
 from armlock.engine.chain import NOW, Delay, Lag
 from armlock.engine.functions import limit_at_zero
-from armlock.engine.polynomials import Polynomial
+from armlock.engine.polynomials import Polynomial, fraction, polynomial
 from armlock.sensors import COMMON, SINGLE, SignalMapping, modified_dual
-from armlock.systems import (
-    Sum,
-    System,
-    equation,
-    fraction,
-    order,
-    parameter,
-    polynomial,
-)
+from armlock.systems import Sum, System, equation, order, parameter
 from armlock.systems import delay as pure_delay
 from armlock.systems import s as laplace
 
@@ -228,7 +221,7 @@ class Loop(System):
     def _dead(self) -> Lag:
         """The dead time, one delay object with the mark of the first arm."""
         ((((arm, _),), _),) = self.arms[0].numerator.terms
-        theta = fraction(polynomial([self.delay])[0])
+        theta = Fraction(self.delay)
         return Lag([(Delay(theta, f"dead {arm.mark}"), 1)]) if theta else NOW
 
     @cached_property
@@ -236,7 +229,7 @@ class Loop(System):
         """R, B1, B2, half of B1 + B2 and of B1 - B2, of which no term is left that cancels."""
         rest, b1, b2 = self._cleared
         parts = rest, b1, b2, (b1 + b2) / 2, (b1 - b2) / 2
-        return tuple(Polynomial.of(map(fraction, p.coeffs())) for p in parts)
+        return tuple(Polynomial.of(p.coeffs()) for p in parts)
 
     def replace(self, **changes: Any) -> Self:
         """Return another one, made with other values of some arguments.

@@ -34,6 +34,7 @@ from armlock.checks import (
 )
 from armlock.controllers import Controller, check_system, rational, with_others
 from armlock.engine.chain import NOW, Delay, Lag
+from armlock.engine.polynomials import fraction, fractions, polynomial
 
 if TYPE_CHECKING:
     import control
@@ -77,25 +78,9 @@ _TERMS = 16
 _LONGEST_TEXT = 400
 
 
-def fraction(value: fmpq) -> Fraction:
-    """Return a fraction of flint as one of Python."""
-    return Fraction(int(value.p), int(value.q))
-
-
-def exact(value: Any) -> fmpq:
-    """Return a number as a fraction of flint; a float is the binary number it is."""
-    f = Fraction(value)
-    return fmpq(f.numerator, f.denominator)
-
-
 def order(p: fmpq_poly) -> int:
     """Order of the root at s = 0."""
     return next(k for k, c in enumerate(p.coeffs()) if c)
-
-
-def polynomial(coefficients: Iterable[Any]) -> fmpq_poly:
-    """Return the polynomial with these coefficients, ascending."""
-    return fmpq_poly([exact(c) for c in coefficients])
 
 
 class Sum:
@@ -152,7 +137,7 @@ class Sum:
     def fractions(self) -> Iterator[tuple[Key, tuple[Fraction, ...]]]:
         """Return the terms, with coefficients in ascending powers of s."""
         for key, p in self.terms.items():
-            yield key, tuple(fraction(c) for c in p.coeffs())
+            yield key, fractions(p)
 
     def put(self, values: Mapping[str, Sum]) -> Sum:
         """Put sums in place of parameters."""

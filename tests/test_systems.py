@@ -38,10 +38,10 @@ from armlock import (
 from armlock.affine import Affine, basis
 from armlock.controllers import integrating_actuator
 from armlock.engine.chain import reserve
+from armlock.engine.polynomials import polynomial
 from armlock.paper import TAU1, TAU2
 from armlock.robustness import box_count, first_crossing, no_root_crosses
 from armlock.sensors import DIFFERENCE, SignalMapping
-from armlock.systems import polynomial
 from tests import independent
 from tests.systems import NEUTRAL, RETARDED, two_delays
 

@@ -25,6 +25,7 @@ import numpy as np
 from flint import arb, fmpq, fmpq_poly
 
 from armlock.checks import BoolArray, FloatArray
+from armlock.engine.polynomials import exact
 
 # Most cells of the torus that are looked at, some seconds.
 _MOST_CELLS = 1_000_000
@@ -110,12 +111,6 @@ def own_phases(lags: Iterable[Lag]) -> tuple[list[Lag], list[Lag]]:
         left = [lag for lag in left if lag not in own]
 
 
-def _exact(value: Any) -> fmpq:
-    """Return a number as a fraction of flint."""
-    exact = Fraction(value)
-    return fmpq(exact.numerator, exact.denominator)
-
-
 def _roots(p: fmpq_poly) -> list[Any]:
     """Return enclosures of the roots of a polynomial, each once."""
     pairs: Any = p.numer().complex_roots()
@@ -180,7 +175,7 @@ def _least(lags: tuple[Lag, ...], coefficients: tuple[float, ...], free: float) 
     # With all variables equal, P has no zero in the disc. The torus is left (Strintzis).
     diagonal = fmpq_poly([0])
     for total, c in zip(powers.sum(1), coefficients, strict=True):
-        diagonal += _exact(c) * fmpq_poly([0, 1]) ** int(total)
+        diagonal += exact(c) * fmpq_poly([0, 1]) ** int(total)
     before, flint.ctx.prec = flint.ctx.prec, _BITS
     try:
         if _in_disc(diagonal):

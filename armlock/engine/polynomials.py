@@ -1,4 +1,4 @@
-"""Real polynomials of s, from their coefficients, with their roots."""
+"""Real polynomials of s, with their roots, and the numbers of python-flint."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Polynomial:
     @classmethod
     def of(cls, coefficients: Iterable[Any]) -> Polynomial:
         """Return the polynomial with these coefficients, ascending; zero has degree 0."""
-        left = exactly(coefficients)
+        left = polynomial(coefficients)
         if not left:
             return cls(Fraction(0), ())
         lead, known, computed = left.leading_coefficient(), [], []
@@ -63,7 +63,7 @@ class Polynomial:
                 left //= factor
                 known += pair * number
         return cls(
-            _fraction(lead),
+            fraction(lead),
             (*known, *computed),
             frozenset(range(len(known), len(known) + len(computed))),
             (fractions(left),) if computed else (),
@@ -91,7 +91,7 @@ class Polynomial:
 
     def __add__(self, other: Polynomial) -> Polynomial:
         """Return the sum."""
-        return Polynomial.of((exactly(self.exact) + exactly(other.exact)).coeffs())
+        return Polynomial.of((polynomial(self.exact) + polynomial(other.exact)).coeffs())
 
     def __bool__(self) -> bool:
         """Whether it is not zero."""
@@ -123,7 +123,7 @@ class Polynomial:
         """Coefficients in ascending powers of s, exactly."""
         given = [root for k, root in enumerate(self.roots) if k not in self.computed]
         known = [_factor(root) for root in given if root.imag >= 0.0]
-        found = reduce(mul, map(exactly, self.factors), exactly([self.lead]))
+        found = reduce(mul, map(polynomial, self.factors), polynomial([self.lead]))
         return fractions(reduce(mul, known, found)) or (Fraction(0),)
 
     @cached_property
@@ -133,7 +133,7 @@ class Polynomial:
 
     def shifted(self, sigma: float) -> Polynomial:
         """Return p(s + sigma), from its coefficients."""
-        return Polynomial.of(exactly(self.exact)(exactly([sigma, 1])).coeffs())
+        return Polynomial.of(polynomial(self.exact)(polynomial([sigma, 1])).coeffs())
 
     def over(self, other: Polynomial, s: ComplexArray) -> ComplexArray:
         """Evaluate p(s) / q(s), factor by factor."""
@@ -169,29 +169,32 @@ def quotients(
     return found
 
 
-def exactly(coefficients: Iterable[Any]) -> Any:
-    """Return a polynomial of python-flint, from fractions, floats or its own numbers."""
-    pairs = (
-        (c.p, c.q) if isinstance(c, flint.fmpq) else Fraction(c).as_integer_ratio()
-        for c in coefficients
-    )
-    return flint.fmpq_poly([flint.fmpq(*pair) for pair in pairs])
+def exact(value: Any) -> flint.fmpq:
+    """Return a number as a fraction of python-flint; a float is the binary number it is."""
+    if isinstance(value, flint.fmpq):
+        return value
+    return flint.fmpq(*Fraction(value).as_integer_ratio())
 
 
-def _fraction(value: Any) -> Fraction:
-    """Return a number of python-flint as a fraction, which has a hash and is pickled."""
+def polynomial(coefficients: Iterable[Any]) -> flint.fmpq_poly:
+    """Return the polynomial of python-flint with these coefficients, ascending."""
+    return flint.fmpq_poly([exact(c) for c in coefficients])
+
+
+def fraction(value: flint.fmpq) -> Fraction:
+    """Return a fraction of python-flint as one of Python, which has a hash and is pickled."""
     return Fraction(int(value.p), int(value.q))
 
 
-def fractions(p: Any) -> tuple[Fraction, ...]:
+def fractions(p: flint.fmpq_poly) -> tuple[Fraction, ...]:
     """Return the coefficients of a polynomial of python-flint, ascending."""
-    return tuple(_fraction(c) for c in p.coeffs())
+    return tuple(fraction(c) for c in p.coeffs())
 
 
 def _factor(root: complex) -> Any:
     """Return s - root, or for a complex root the product with its conjugate."""
     a, b = Fraction(root.real), Fraction(root.imag)
-    return exactly([a * a + b * b, -2 * a, 1] if b else [-a, 1])
+    return polynomial([a * a + b * b, -2 * a, 1] if b else [-a, 1])
 
 
 def _roots(p: Any) -> list[tuple[complex, int]]:

@@ -13,7 +13,7 @@ from typing import Any
 
 import flint
 
-from armlock.engine.polynomials import Polynomial, exactly, fractions
+from armlock.engine.polynomials import Polynomial, exact, fractions
 
 #: What rounding makes of a determinant: at most this share of sum |a_ij cofactor_ij|. It covers
 #: all changes of coordinates that were drawn, of two to five states.
@@ -24,7 +24,7 @@ MOST_IN_DOUBT = 2
 
 def _matrix(rows: Any) -> Any:
     """Return an exact matrix of python-flint, of floats."""
-    return flint.fmpq_mat([exactly([*row, 1]).coeffs()[:-1] for row in rows])
+    return flint.fmpq_mat([[exact(value) for value in row] for row in rows])
 
 
 def quotient(a: Any, b: Any, c: Any, d: float) -> tuple[Polynomial, Polynomial]:
@@ -33,7 +33,7 @@ def quotient(a: Any, b: Any, c: Any, d: float) -> tuple[Polynomial, Polynomial]:
         return Polynomial.of([d]), Polynomial.of([1])
     a, b, c = _matrix(a), _matrix(b), _matrix(c)
     below = a.charpoly()
-    above = (a - b * c).charpoly() - below + exactly([d]) * below
+    above = (a - b * c).charpoly() - below + exact(d) * below
     return Polynomial.of(above.coeffs()), Polynomial.of(below.coeffs())
 
 
@@ -47,7 +47,7 @@ def _cofactors(matrix: Any) -> tuple[tuple[Fraction, ...], list[Any]]:
     unit = flint.fmpq_mat(n, n, [int(i == k) for i in range(n) for k in range(n)])
     found = [unit]
     for c in coefficients[n - 1 : 0 : -1]:
-        found.append(matrix * found[-1] + flint.fmpq(*c.as_integer_ratio()) * unit)
+        found.append(matrix * found[-1] + exact(c) * unit)
     return coefficients, found[::-1]
 
 

@@ -24,7 +24,7 @@ from armlock.engine.decide import Family
 from armlock.engine.functions import Function, Space, at, stacked
 from armlock.engine.inclusion import VERTEX
 from armlock.engine.margins import first_zero, least_ratio
-from armlock.engine.polynomials import Polynomial, exactly, fractions
+from armlock.engine.polynomials import Polynomial, fractions, polynomial
 
 # The radius is certified to this share, and the scalings are optimal to it.
 _TOLERANCE = 1e-7
@@ -59,7 +59,7 @@ def _exact_polynomial(function: Function) -> flint.fmpq_poly:
     found = flint.fmpq_poly()
     for weight, p in zip(function.steady, function.space.polynomials, strict=True):
         if weight:
-            found += exactly(weight * c for c in p.exact)
+            found += polynomial(weight * c for c in p.exact)
     return found
 
 
@@ -115,7 +115,7 @@ def spectral_factor(
         common = common.gcd(p)
     whole = flint.fmpq_poly()
     for p, weight in zip(parts, weights, strict=True):
-        whole += exactly([weight]) * _square(p / common)
+        whole += polynomial([weight]) * _square(p / common)
     # Without a common factor the sum is positive on the whole axis.
     roots = []
     for x, number in _roots(whole):
@@ -126,7 +126,7 @@ def spectral_factor(
     lead = _fraction(flint.arb(whole.leading_coefficient()).sqrt())
     for more in _ENLARGED:
         f = Polynomial.of_roots(roots) * Polynomial.of([lead * (1 + Fraction(more))])
-        if _is_positive(_square(exactly(f.exact)) - whole):
+        if _is_positive(_square(polynomial(f.exact)) - whole):
             return f * Polynomial.of(fractions(common))
     raise UndecidedError("rounding does not decide the sum of the squares of what varies")
 

@@ -22,8 +22,9 @@ from armlock.engine.decide import BOUNDARY, UNCONFINED, Family
 from armlock.engine.functions import Function
 from armlock.engine.inclusion import EPSILON, TERM, VERTEX
 from armlock.engine.margins import first_zero
+from armlock.engine.polynomials import polynomial
 from armlock.stability.counts import CountError, decided, require_certain
-from armlock.systems import Sum, System, delay_object, polynomial
+from armlock.systems import Sum, System, delay_object
 
 #: Numbers in the order of the parameters, or by name.
 Point = Sequence[float] | FloatArray | Mapping[str, float]

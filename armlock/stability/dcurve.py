@@ -20,10 +20,10 @@ from armlock.checks import FloatArray, check_memory, positive_number, real_array
 from armlock.engine.chain import Delay, Lag
 from armlock.engine.functions import at
 from armlock.engine.inclusion import EPSILON
-from armlock.engine.polynomials import rounded
+from armlock.engine.polynomials import polynomial, rounded
 from armlock.stability.counts import CountError
 from armlock.stability.crossings import crossings
-from armlock.systems import Sum, System, polynomial
+from armlock.systems import Sum, System
 
 _S = fmpq_poly([0, 1])
 #: Polynomials by the length of their delay, which may be negative.

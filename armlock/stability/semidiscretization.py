@@ -29,9 +29,10 @@ from armlock.checks import (
 )
 from armlock.controllers import with_others
 from armlock.engine.chain import NOW, Delay, Lag
+from armlock.engine.polynomials import fraction, polynomial
 from armlock.engine.roots import RootError
 from armlock.stability.counts import broadcast_values
-from armlock.systems import Sum, System, fraction, polynomial
+from armlock.systems import Sum, System
 
 # Digits of a map's coefficients.
 _DIGITS = 100

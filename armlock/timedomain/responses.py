@@ -24,7 +24,8 @@ from armlock.checks import ComplexArray, FloatArray, finite_series, positive_num
 from armlock.engine.chain import NOW, Delay, Lag
 from armlock.engine.decide import count
 from armlock.engine.functions import Function
-from armlock.systems import Sum, System, fraction, polynomial
+from armlock.engine.polynomials import fraction, polynomial
+from armlock.systems import Sum, System
 from armlock.systems import s as laplace
 from armlock.timedomain.inversion import Panels, TooLongError, inverted, panels
 
