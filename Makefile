@@ -60,7 +60,7 @@ $(READY): environment.txt book/kernel.json
 	@echo "$(CURDIR)" > $@
 
 # nbmake runs copies of the notebooks for the tests and for the book, the longest first.
-LONGEST := $(wildcard notebooks/09_* notebooks/13_* notebooks/14_*)
+LONGEST := $(wildcard notebooks/09_* notebooks/13_* notebooks/15_*)
 PYTEST := $(PY) -m pytest --numprocesses auto --maxprocesses 4 --dist worksteal
 # A progress bar, which a slow machine would show, is no part of a page.
 execute = export TQDM_DISABLE=1 ARMLOCK_FIGURES=$(CURDIR)/$(1); \

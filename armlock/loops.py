@@ -620,7 +620,7 @@ def flight_loop(
         Dead time in s. The source has 5 us for the actuator, 2 us for the phasemeter, and
         1 / (2 pi 30 kHz) for the transponder, 12.3 us in all. A transponder acts on the
         returned light alone: to put its dead time here is the source's model, and leaves out
-        the shape of its response (chapter 14 of the book).
+        the shape of its response (chapter 15 of the book).
 
     Returns
     -------
@@ -684,7 +684,7 @@ def robust_loop() -> Loop:
     1.464e-06
     4.375e-06
     """
-    # What a search found, rounded; chapter 12 finds one like it from round numbers.
+    # What a search found, rounded; chapter 11 finds one like it from round numbers.
     zeros = _at_hertz(0.37e-6, *[16.75e-6] * 3)
     poles = _at_hertz(0.25e-6, 0.108e-6, *[114.7e-6] * 4)
     return paper_loop(controller=((0.0, 0.0, *zeros), poles, paper.CONTROLLER_GAIN))

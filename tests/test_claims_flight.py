@@ -1,4 +1,4 @@
-"""What chapter 11 computes the white paper's claims from, by other ways to the same numbers."""
+"""What chapter 10 computes the white paper's claims from, by other ways to the same numbers."""
 
 import ast
 import json
@@ -13,7 +13,7 @@ from armlock.orbits import SPEED_OF_LIGHT, kepler
 from armlock.performance import budget
 from book.companion.ledger import Ledger
 
-CHAPTER = Path(__file__).parents[1] / "notebooks" / "11_flight.ipynb"
+CHAPTER = Path(__file__).parents[1] / "notebooks" / "10_flight.ipynb"
 MEAN_DELAY = 2.0 * 5e9 / speed_of_light
 F = np.concatenate((np.geomspace(1e-6, 1e-4, 2000), np.arange(1e-4, 3, 5e-6)))
 YEARLY = 2.0 * np.pi / (365.25 * 86400.0)

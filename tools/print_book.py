@@ -14,7 +14,7 @@ from pathlib import Path
 from tools.check_browser import TYPESET, browser, find_chromium
 
 NAME = "armlock.pdf"
-SHEET = "notebooks/15_summary.html"
+SHEET = "notebooks/16_summary.html"
 FOOT = "Code: MIT License.</p>"
 NUMBER = (
     '<div style="width: 100%; font-size: 8px; text-align: center"><span class="pageNumber">'

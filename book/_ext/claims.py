@@ -15,7 +15,7 @@ from sphinx.util.docutils import SphinxDirective
 
 from book.companion.ledger import Ledger, Verdict, Weight
 
-PAGE = "notebooks/16_ledger"
+PAGE = "notebooks/17_ledger"
 LOGGER = logging.getLogger(__name__)
 #: A text that names claims: "claim K5", "claims C7, C8 and C11".
 NAMING = re.compile(r"\b[Cc]laims?\s+[A-Z]\d+(?:(?:,\s+and|,|\s+and|\s+to)\s+[A-Z]\d+)*")
@@ -32,7 +32,7 @@ def badge(verdict, text=""):
 
 def link(name):
     """Return a link to a claim's row in the ledger, from a page in the same folder."""
-    return f'<a href="16_ledger.html#ledger-{name}">{name}</a>'
+    return f'<a href="17_ledger.html#ledger-{name}">{name}</a>'
 
 
 def sentence(text):
