@@ -7,6 +7,7 @@ the cell of a chapter that decides a claim becomes the target `claim-NAME`.
 
 import html
 import re
+from itertools import groupby
 
 from docutils import nodes
 from docutils.parsers.rst import directives
@@ -226,8 +227,20 @@ def anchor(app, doctree):
             cell["ids"] += [f"claim-{name}" for name in DECIDES.findall(code)]
 
 
+def join_lines(element):
+    """Make one text of the lines of a paragraph: a name may stand on two of them."""
+    runs = groupby(element.children, key=lambda child: isinstance(child, nodes.Text))
+    children: list[nodes.Node] = []
+    for is_text, run in runs:
+        children += [nodes.Text("".join(run))] if is_text else run
+    element.clear()
+    element.extend(children)
+
+
 def name_claims(app, doctree, docname):
     """Link the names of claims on a page; a name that no claim has is a warning."""
+    for element in list(doctree.findall(nodes.TextElement)):
+        join_lines(element)
     known = [name for claim in Ledger() for name in claim.names]
     page = app.builder.get_relative_uri(docname, PAGE)
     for text in list(doctree.findall(nodes.Text)):

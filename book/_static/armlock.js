@@ -48,6 +48,15 @@ addEventListener("load", async () => {
   }
 });
 
+// A link to a cell whose code is folded unfolds it.
+const unfold = () => {
+  const cell = document.getElementById(location.hash.slice(1))?.closest(".cell");
+  for (const part of cell?.querySelectorAll("details.hide") ?? []) part.open = true;
+  cell?.scrollIntoView();
+};
+addEventListener("load", unfold);
+addEventListener("hashchange", unfold);
+
 // What the theme and docutils leave unnamed for a screen reader, or call by a role that is gone.
 addEventListener("DOMContentLoaded", () => {
   const set = (selector, name, value) => document.querySelectorAll(selector).forEach(
