@@ -18,9 +18,11 @@ from armlock import (
     equation,
     margins,
     nyquist,
+    peak_gain,
     rightmost_root,
     stability_chart,
     unstable_roots,
+    varying_radius,
 )
 from armlock.affine import Affine
 from armlock.controllers import table_two
@@ -146,6 +148,9 @@ def test_a_pole_that_may_be_zero_is_asked_for_where_it_matters():
         lambda: unstable_roots(semi_discretization(doubtful, 0.5), 1.0, 1.0),
         lambda: rightmost_root(doubtful),
         lambda: margins(doubtful),
+        lambda: peak_gain(1 / (1 + doubtful)),
+        lambda: peak_gain(System.of(TURNED)),
+        lambda: varying_radius(doubtful),
         lambda: nyquist(doubtful),
         lambda: critical_perturbation(doubtful, (1, 0)),
         lambda: box_count(doubtful, 1e-6),

@@ -347,3 +347,20 @@ def test_a_delay_that_cannot_be_is_refused(tau, message):
     loop = Loop(Controller([], [-0.1], 0.2), SINGLE, 2.0, 2.0)
     with pytest.raises((TypeError, ValueError), match=f"^{message}"):
         simulate(loop, np.ones(100), sample_rate=20.0, tau1=tau)
+
+
+def test_constant_factors_give_the_same_on_a_phase_and_on_its_frequency():
+    # Numbers and delays of whole samples: cumsum and diff commute with the recursion.
+    rate, loop = 10.0, paper_loop()
+    frequency = np.random.default_rng(4).normal(size=20_000)
+    run: Any = {"c1": 1.0, "c2": 1.0 - 1e-6, "sample_rate": rate, "limit": 1e30}
+    of_frequency = simulate(loop, frequency, **run)
+    phase = simulate(loop, np.cumsum(frequency) / rate, **run)
+    of_phase = np.diff(phase, prepend=0.0) * rate
+    assert np.allclose(of_phase, of_frequency, rtol=0, atol=1e-11 * np.abs(of_frequency).max())
+    # Factors that vary do not.
+    wander = 1.0 + 1e-3 * np.sin(np.arange(frequency.size) / 50.0)
+    of_frequency = simulate(loop, frequency, **run | {"c1": wander})
+    phase = simulate(loop, np.cumsum(frequency) / rate, **run | {"c1": wander})
+    of_phase = np.diff(phase, prepend=0.0) * rate
+    assert np.abs(of_phase - of_frequency).max() > 1e-3 * np.abs(of_frequency).max()

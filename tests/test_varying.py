@@ -288,6 +288,39 @@ def test_a_spectral_factor_with_a_common_zero_on_the_axis():
     assert np.polyval([float(c) for c in f.exact][::-1], 1j) == pytest.approx(0.0, abs=1e-15)
 
 
+def test_no_constant_perturbation_that_was_looked_at_breaks_the_loop():
+    weak = 1e-10 * (1 - parameter("c1", 1.0) * delay(1.0)) * control.tf([1.0], [1.0, 1.0])
+    found = varying_radius(weak)
+    assert found.radius == pytest.approx(1e10, rel=1e-5)
+    assert found.constant == math.inf
+
+
+def test_a_peak_that_rounding_does_not_certify_is_no_number():
+    # At a gain of 1e13 nothing is proved about 1 + g (1 - z) next to its zero.
+    assert peak_gain(1 / (1 + 1e5 * (1 - delay(1.0)))).gain == pytest.approx(1.0, rel=1e-6)
+    for ask in (lambda loop: peak_gain(1 / (1 + loop)), modulus_margin):
+        with pytest.raises(CountError, match="rounding does not decide"):
+            ask(1e13 * (1 - delay(1.0)))
+
+
+@pytest.mark.parametrize(
+    ("make", "largest"), [(paper_loop, 9995.5), (buildable_loop, 0.584), (flight_loop, 0.273)]
+)
+def test_a_phase_lock_is_a_perturbation_that_grows_with_frequency(make, largest):
+    # c_k = T of a lock with a bandwidth of 30 kHz: sum |G_k| |T - 1| on a dense grid.
+    loop = make()
+
+    def share(f):
+        s = 2j * np.pi * f
+        weights = np.abs(loop.arm_responses(s)).sum(axis=0)
+        return weights / np.abs(1 + loop(s)) * np.abs(s / (s + 2.0 * np.pi * 3e4))
+
+    assert share(np.geomspace(10.0, 1e6, 500_000)).max() == pytest.approx(largest, rel=1e-2)
+    if make is paper_loop:
+        # At a null 1 + L is 1, and the weights are the gain twice.
+        assert share(np.array([20.0])) == pytest.approx(1e4 * 20.0 / 3e4, rel=1e-5)
+
+
 def test_a_limit_that_is_not_decided_is_not_a_number():
     # Two delays act in different proportions, and the largest gain is at no sign of either.
     n, d = {0.0: [1.0], 1.0: [0.5], 1.37: [-0.4]}, {0.0: [1.0], 1.0: [0.3], 1.37: [0.2]}

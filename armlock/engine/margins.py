@@ -36,6 +36,8 @@ _LARGEST_DELAY = 1e300
 
 # Relative accuracy where phases are free.
 _FREE_TOLERANCE = 1e-5
+# Where rounding at high frequency decides, a share that may be open.
+_LEAST_CERTAIN = 1e-3
 # Most delays at high frequency whose phases 0 and pi are tried.
 _MOST_SIGNS = 10
 
@@ -273,10 +275,24 @@ def least_ratio(
     return Ratio(best, best * max(1.0 - tolerance, 0.0) * (1.0 - 4.0 * EPSILON), where)
 
 
+def decided_ratio(d: Function, n: Function, free: Free | None = None) -> Ratio:
+    """Return the infimum of |D / N|, as `least_ratio`, if it is certified to a thousandth.
+
+    Raises
+    ------
+    UndecidedError
+        If rounding at high frequency leaves room for a smaller one.
+    """
+    found = least_ratio(d, n, free)
+    if found.certified < (1.0 - _LEAST_CERTAIN) * found.value:
+        raise UndecidedError("rounding does not decide the limit at high frequency")
+    return found
+
+
 def modulus_of(n: Function, m: Function, free: Free | None = None) -> tuple[float, float]:
     """Smallest |1 + L|, one over the peak gain of the sensitivity M / (M + N), and where."""
     closed = free._replace(centre=free.centre + free.denominator) if free else None
-    found = least_ratio(n + m, m, closed)
+    found = decided_ratio(n + m, m, closed)
     return found.value, found.omega
 
 

@@ -244,7 +244,8 @@ def constant_radius_of(d: Function, changes: Sequence[Function], below: float) -
     -------
     float
         All |eta_k| below it, by more than a part in a million, leave the loop stable. At this
-        size one does not, or double precision does not decide it.
+        size one does not, or double precision does not decide it. Infinite if none up to 1e9
+        does.
 
     Raises
     ------
@@ -264,8 +265,8 @@ def constant_radius_of(d: Function, changes: Sequence[Function], below: float) -
         ]
         return decide.excludes(Family([d, *changes], [hull]))
 
-    if excludes(above * (1.0 - 1e-6)):
-        return above
+    if below >= _FARTHEST or excludes(above * (1.0 - 1e-6)):
+        return math.inf if max(below, above) >= _FARTHEST else above
     while above > below * (1.0 + 1e-6):
         middle = math.sqrt(below * above)
         below, above = (middle, above) if excludes(middle) else (below, middle)

@@ -12,17 +12,18 @@ from typing import Any, NamedTuple, TypeVar
 
 from armlock.affine import Affine, common, open_quotient
 from armlock.checks import positive_number, real_number
+from armlock.engine import decide
 from armlock.engine.chain import Lag
 from armlock.engine.functions import Function
 from armlock.engine.margins import (
     Free,
     Margins,
-    least_ratio,
+    decided_ratio,
     margins_of,
     modulus_of,
     require_stable,
 )
-from armlock.stability.counts import decided, require_certain
+from armlock.stability.counts import decided, in_doubt, require_certain
 from armlock.systems import Sum, System, delay_object
 
 _T = TypeVar("_T")
@@ -61,8 +62,9 @@ def modulus_margin(loop: System, *values: float, **numbers: float) -> float:
     -------
     float
         The infimum over all omega > 0, the limit at high frequency included, to a part in a
-        million. For a neutral loop that limit is taken over all small changes of the delays: it
-        is 0 where the neutral root chain is not confined.
+        million (a thousandth where rounding at high frequency allows no more). For a neutral
+        loop that limit is taken over all small changes of the delays: it is 0 where the neutral
+        root chain is not confined.
 
     Raises
     ------
@@ -103,10 +105,10 @@ def peak_gain(system: Any) -> PeakGain:
     Returns
     -------
     PeakGain
-        The gain, which no frequency exceeds by more than a part in a million, and where it is
-        in rad/s: 0 where it is the limit at s = 0, inf where it is the limit at high frequency,
-        nan for a system that is zero. The limit at high frequency is taken over all small
-        changes of the delays.
+        The gain, which no frequency exceeds by more than a part in a million (a thousandth
+        where rounding at high frequency allows no more), and where it is in rad/s: 0 where it
+        is the limit at s = 0, inf where it is the limit at high frequency, nan for a system
+        that is zero. The limit at high frequency is taken over all small changes of the delays.
 
     Raises
     ------
@@ -135,9 +137,14 @@ def peak_gain(system: Any) -> PeakGain:
     1.6246 at 2.291e-05 rad/s
     """
     n, d, point = open_quotient(system, (), {}, "system")
+    others = System.of(system, "system").others
     with decided("no peak gain", point):
+        # Poles that may be meant to be zero must not change the count of the poles.
+        pairs = [open_quotient(other, (), {}, "system")[:2] for other in others]
+        if len({decide.count(m, common(a, m)) for a, m in pairs}) > 1:
+            raise in_doubt(point[None])
         require_stable(d, common(n, d), "system")
-        found = least_ratio(d, n)
+        found = decided_ratio(d, n)
     return PeakGain(1.0 / found.value, found.omega)
 
 

@@ -24,7 +24,8 @@ class VaryingRadius(NamedTuple):
         fast they vary. 0 where constant perturbations of any size break the loop.
     constant : float
         The smallest size of constant perturbations, the largest of their magnitudes, that
-        breaks the loop.
+        breaks the loop, or for which double precision does not decide it. Infinite if none up
+        to 1e9 does.
     omega : float
         Frequency in rad/s at which the radius is taken; inf for the limit at high frequency.
     scalings : tuple of float
@@ -60,7 +61,7 @@ def varying_radius(loop: System, *values: float, **numbers: float) -> VaryingRad
     -------
     VaryingRadius
         The radius is certified from below. No other d makes it larger by more than a part in a
-        million, as far as the frequencies tell that were looked at.
+        million, as far as a search tells.
 
     Raises
     ------
