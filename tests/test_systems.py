@@ -40,7 +40,7 @@ from armlock.controllers import integrating_actuator
 from armlock.engine.chain import reserve
 from armlock.engine.polynomials import polynomial
 from armlock.paper import TAU1, TAU2
-from armlock.robustness import box_count, first_crossing, no_root_crosses
+from armlock.robustness import box_count, first_crossing, stable_half_differences
 from armlock.sensors import DIFFERENCE, SignalMapping
 from tests import independent
 from tests.systems import NEUTRAL, RETARDED, two_delays
@@ -222,7 +222,8 @@ def test_a_third_arm_is_one_more_term_for_every_function():
     ]
     assert counts[0] < counts[1]
     assert box_count(loop * (1 - 0.1 / (s + 1)), {"c1": 1e-9}) in (0, BOUNDARY)
-    assert no_root_crosses(loop, 0.09, 0.11, between=(arms[0][2], arms[1][2]))
+    low, high = stable_half_differences(loop, between=(arms[0][2], arms[1][2]))
+    assert low < 0.09 < 0.11 < high
     found = margins(loop, free_above=5.0, free=[z for _, _, z in arms])
     assert 0.0 < found.modulus <= margins(loop).modulus
     x, y = d_curve(loop, 0.7, c3=1.0)

@@ -11,7 +11,7 @@ from armlock.robustness.perturbations import (
     box_count,
     critical_perturbation,
     first_crossing,
-    no_root_crosses,
+    stable_half_differences,
 )
 from armlock.robustness.varying import VaryingRadius, varying_radius
 
@@ -25,7 +25,7 @@ __all__ = [
     "first_crossing",
     "margins",
     "modulus_margin",
-    "no_root_crosses",
     "peak_gain",
+    "stable_half_differences",
     "varying_radius",
 ]
