@@ -81,23 +81,13 @@ function armlockChart(api) {
       const left = 0.5 * bounds.n2 * h * h + bounds.error
         + far * Math.min(bounds.m0, p[5] + h * bounds.m1)
         + largest * Math.min(bounds.o0, Math.hypot(p[7], p[9]) + h * bounds.o1);
-      if (0.99 * tangentDistance(vr, vi, dr, di, h) > left) return true;
-      // |N - e O| > far |M| for all lines: the distance of a stretch from zero.
-      const [, , , , , size, nr, or, ni, oi] = p, square = or * or + oi * oi;
-      const nearest = square ? clamp((nr * or + ni * oi) / square, least, most) : least;
-      const apart = Math.hypot(nr - nearest * or, ni - nearest * oi)
-        - h * (bounds.n1 + largest * bounds.o1);
-      return apart > (1 + 1e-9) * far * (size + h * bounds.m1) + 1e-12 * Math.hypot(nr, ni);
+      return 0.99 * tangentDistance(vr, vi, dr, di, h) > left;
     };
     const out = [];
     /* What crosses on an interval, for all lines; whether that is certain. */
     const read = (p, q, bounds, final) => {
       out.length = 0;
       const h = q[0] - p[0], first = p[0] === 0;
-      const bend = bounds.k0 + largest * bounds.k1;
-      const corner = [p[1] - least * p[2], p[1] - most * p[2], q[1] - least * q[2], q[1] - most * q[2]];
-      if (!first && Math.min(...corner) > 0.125 * bend * h * h) return true;
-      if (!first && Math.max(...corner) < -0.125 * bend * h * h) return true;
       // How x, and its deviation from a chord, change over the interval at most.
       const size = p[5] - h * bounds.m1;
       const nOf = Math.hypot(p[6], p[8]) + largest * Math.hypot(p[7], p[9]);
@@ -247,19 +237,17 @@ function armlockChart(api) {
   }
 
   /* Where a root is on the axis at s = j omega: [c1, c2, omega]. */
-  function crossingOf(lines, omega) {
+  function crossing(loop, omega, lines = new Lines(loop, false)) {
     const { base, m, o } = lines;
     lines.sample(omega);
     const nr = base.vr, ni = base.vi, cross = m.lr * o.li - m.li * o.lr;
     return [1 - (nr * o.li - ni * o.lr) / cross, 1 - (m.lr * ni - m.li * nr) / cross, omega];
   }
 
-  const crossing = (loop, omega) => crossingOf(new Lines(loop, false), omega);
-
   /* The D-curve in a window: [c1, c2, omega, ...], nan between parts, and the line of s = 0 as
    * [a, b, c] with a (c1 - 1) + b (c2 - 1) = c, or null. For a picture: cut to a few pixels. */
   function dcurve(loop, x0, x1, y0, y1, most = 20000) {
-    const lines = new Lines(loop, false), found = [], spot = omega => crossingOf(lines, omega);
+    const lines = new Lines(loop, false), found = [], spot = omega => crossing(loop, omega, lines);
     const wide = x1 - x0, high = y1 - y0, { longest } = loop;
     const seen = ([x, y], [u, v], room) => Math.max(x, u) > x0 - room * wide
       && Math.min(x, u) < x1 + room * wide && Math.max(y, v) > y0 - room * high

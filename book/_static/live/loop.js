@@ -50,15 +50,16 @@ function armlockLoop() {
       this.relative = kept.length + 1;
     }
 
-    /* Value (vr, vi) and derivative (dr, di) at s = j omega. */
-    at(omega) {
+    /* Value (vr, vi) and derivative (dr, di) at s = j omega; at s = j / t as a function of t with
+     * omega = 1, to look at the far end of the axis: its value and bounds of its first derivative. */
+    at(omega, t = 1) {
       let vr = this.gain, vi = 0, dr = 0, di = 0;
       for (let k = 0; k < this.size; k++) {
-        const a = this.a[k], q = 1 / (a * a + omega * omega);
-        const ir = a * q, ii = -omega * q;
-        let fr = ir, fi = ii, tr = 0, ti = -1;
+        const a = this.a[k], q = 1 / (a * t * a * t + omega * omega);
+        const ir = a * t * q, ii = -omega * q;
+        let fr = t * ir, fi = t * ii, tr = 0, ti = -1;
         if (this.paired[k]) {
-          const nr = -this.re[k], ni = omega - this.im[k];
+          const nr = -this.re[k] * t, ni = omega - this.im[k] * t;
           fr = nr * ir - ni * ii;
           fi = nr * ii + ni * ir;
           tr = -this.im[k];
@@ -73,26 +74,6 @@ function armlockLoop() {
         this.f2[k] = 2 * this.lead[k] * q * Math.sqrt(q);
       }
       this.vr = vr; this.vi = vi; this.dr = dr; this.di = di;
-    }
-
-    /* The same at s = j / t as a function of t, to look at the far end of the axis. */
-    far(t) {
-      let vr = this.gain, vi = 0;
-      for (let k = 0; k < this.size; k++) {
-        const at = this.a[k] * t, q = 1 / (1 + at * at);
-        const ir = at * q, ii = -q;
-        let fr = t * ir, fi = t * ii;
-        if (this.paired[k]) {
-          const nr = -this.re[k] * t, ni = 1 - this.im[k] * t;
-          fr = nr * ir - ni * ii;
-          fi = nr * ii + ni * ir;
-        }
-        [vr, vi] = [vr * fr - vi * fi, vr * fi + vi * fr];
-        this.f0[k] = Math.sqrt(fr * fr + fi * fi);
-        this.f1[k] = this.lead[k] * q;
-        this.f2[k] = 0;
-      }
-      this.vr = vr; this.vi = vi;
     }
 
     /* Bounds b0, b1, b2 of the value and two derivatives over a step h from there. */
@@ -172,24 +153,7 @@ function armlockLoop() {
         moved = Math.max(moved, Math.hypot(mx, my) / (Math.hypot(x[i], y[i]) || 1));
       }
     }
-    // Roots as close as rounding of the coefficients could part one of m are one of m, which is a
-    // simple root of the derivative of order m - 1.
-    const left = x.map((re, k) => [re, y[k]]), settled = new Set();
-    for (let m = n; m > 1; m--) for (const root of left) {
-      const size = Math.hypot(...root), gap = r => Math.hypot(r[0] - root[0], r[1] - root[1]);
-      const group = left.filter(r => !settled.has(r)).sort((p, q) => gap(p) - gap(q)).slice(0, m);
-      const apart = 4 * (n * EPSILON) ** (1 / m) * size;
-      if (settled.has(root) || group.length < m || gap(group[m - 1]) > apart) continue;
-      const mean = [0, 1].map(k => group.reduce((sum, r) => sum + r[k], 0) / m);
-      let high = c;
-      for (let k = 1; k < m; k++) high = high.slice(1).map((v, i) => v * (i + 1));
-      for (let k = 0; k < 5; k++) {
-        const [u, v] = slope(high, ...mean), square = u * u + v * v;
-        if (square > 0 && square < Infinity) [mean[0], mean[1]] = [mean[0] - u / square, mean[1] + v / square];
-      }
-      if (Math.abs(mean[1]) < 1e-9 * size) mean[1] = 0;
-      for (const r of group) { [r[0], r[1]] = mean; settled.add(r); }
-    }
+    const left = x.map((re, k) => [re, y[k]]);
     // The upper one of each pair, the rest real.
     while (left.length) {
       const most = left.reduce((a, b) => Math.abs(b[1]) / Math.hypot(...b)
@@ -487,7 +451,7 @@ function armlockLoop() {
   function clearFrom(disc, clear, visit = () => {}) {
     const { loop: { parts, longest } } = disc;
     for (let t = 0, h = longest, k = 0; ; t += h, h *= 2, k++) {
-      for (const part of parts) part.far(t);
+      for (const part of parts) part.at(1, t);
       disc.look(null);
       visit();
       if (k === 300 || t >= 2 * longest) return 1 / t;
@@ -601,7 +565,7 @@ function armlockLoop() {
   /* Of the room that a neutral root chain has, the share that it takes at (c1, c2): confined below 1. */
   function chain(loop) {
     const { rest, common, sum, difference, second, delay, parts } = loop;
-    for (const part of parts) part.far(0);
+    for (const part of parts) part.at(1, 0);
     const s = common.vr * sum.vr, t = common.vr * difference.vr, both = (1 + second) * s;
     const room = delay ? Math.abs(rest.vr) - Math.abs(both) : Math.abs(rest.vr + both);
     const b1 = Math.abs(s + t), b2 = Math.abs(second * s - t);

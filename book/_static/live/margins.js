@@ -45,11 +45,13 @@ function armlockMargins(api) {
       this.other = null;
     }
 
-    least() { return this.best; }
+    /* What the walk makes smaller, and of it the margin that is sought. */
+    state() { return this.best; }
+    least() { return this.state(); }
 
     /* The disc at infinite frequency: centre and radius. */
     limit() {
-      for (const part of this.loop.parts) part.far(0);
+      for (const part of this.loop.parts) part.at(1, 0);
       this.disc.look(null);
       return [this.disc.re, this.disc.im, this.disc.radius / this.disc.size];
     }
@@ -94,6 +96,7 @@ function armlockMargins(api) {
       if (least === Infinity) return;
       for (let k = 0; k < SCOUTED && this.least() > (1 + 0.3 * NEAR) * least; k++, w += apart) {
         this.place(w);
+        this.visit();
         if (this.away(least) < 0.3 * disc.radius / disc.size) this.probe(w - apart, w + apart);
       }
     }
@@ -158,8 +161,6 @@ function armlockMargins(api) {
       this.where = Infinity;
     }
 
-    state() { return this.best; }
-
     end() {
       const level = (1 - NEAR) * this.best;
       return clearFrom(this.disc, (re, im, radius) => Math.hypot(1 + re, im) - radius >= level);
@@ -174,32 +175,18 @@ function armlockMargins(api) {
 
     level(re, im, radius) { return Math.hypot(1 + re, im) - radius; }
 
-    away() {
-      this.visit();
-      return Infinity;
-    }
-
+    away() { return Infinity; }
     probe() { return false; }
 
     safe(h) {
       this.over(h);
       const { fr, fi, gr, gi, df, rr, ri, ur, ui, dr, best } = this;
-      let level = (1 - NEAR) * best;
-      if (this.scouting) {
-        const ahead = Math.hypot(fr + h * gr, fi + h * gi) / Math.hypot(rr + h * ur, ri + h * ui);
-        if (ahead > 0.5 * best) level = Math.min(level, (1 - NEAR) * ahead);
-      }
-      return exceeds(fr, fi, gr, gi, df, rr, ri, ur, ui, dr, level, h)
+      return exceeds(fr, fi, gr, gi, df, rr, ri, ur, ui, dr, (1 - NEAR) * best, h)
         || Math.hypot(1 + this.disc.re, this.disc.im) - this.disc.over(h) >= (1 - NEAR) * best;
     }
 
     found() {
-      // On the way down to a minimum, a first walk takes what lies ahead for met already: it
-      // finds small values fast. The second one certifies.
       this.scout();
-      this.scouting = true;
-      walk(this);
-      this.scouting = false;
       return walk(this) ? this.best : NaN;
     }
   }
@@ -225,7 +212,6 @@ function armlockMargins(api) {
       if (this.best < Infinity) this.where = Infinity;
     }
 
-    state() { return this.best; }
     level(re, im, radius) { return discPhase(re, im, radius) / (this.late ? this.omega : 1); }
 
     away(least) {
@@ -449,16 +435,14 @@ function armlockMargins(api) {
     const last = Math.min(FARTHEST, limit * (1 - NEAR));
     const target = new Break(loop, d1, d2, 0, last);
     target.place(0);
-    let low = 0;
     // A root at s = 0 that cancels at (1, 1) may turn into the loop's own next to it.
     if (vanishes(target.curve)) {
-      low = OWN;
+      target.low = OWN;
       const next = inside(1e-9);
       if (next === UNDECIDED) return NaN;
       // Not zero where the loop is stable still nearer.
       if (next !== 0) return [1e-10, 1e-11, 1e-12].some(t => inside(t) === 0) ? NaN : 0;
     }
-    target.low = low;
     const found = target.found();
     if (Number.isNaN(found)) return NaN;
     if (found === last)

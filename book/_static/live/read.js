@@ -86,7 +86,8 @@ const armlockRead = (function () {
   /* The roots of a real polynomial, as pairs of doubles. Multiple roots are found exactly, and so is what
    * lies on the imaginary axis. */
   function rootsExactly(p) {
-    p = p.map(({ re }) => number(re));
+    p = trimmed(p.map(({ re }) => number(re)));
+    if (p.length < 2) return [];
     const found = [];
     let common = shared(p, derivative(p)), [rest] = divide(p, common);
     for (let m = 1; rest.length > 1; m++) {
@@ -145,7 +146,7 @@ const armlockRead = (function () {
     // Of even and of odd polynomials the roots stay on the axis as far as they are apart.
     if (sides.some(([values, off]) => [...values, ...off].every(v => v === 0))) return holds(sides[0], 0);
     return holds(sides[0], 0) || sides.some(([values, off]) => [1, -1].some(sign =>
-      rootsOf(values.map((v, k) => v + sign * off[k]).reverse()).some(([u, im]) =>
+      rootsExactly(values.map((v, k) => number(ofDouble(v + sign * off[k])))).some(([u, im]) =>
         im === 0 && u > 0 && sides.every(side => holds(side, u)))));
   }
 
