@@ -222,8 +222,8 @@ class Comparison:
                 inside, outside = (closed_loop_count(loop, *point) for point in near)
                 return first if first < ours and inside == 0 < outside else math.nan
 
-            # The page looks no farther than 2.
-            ours = ours if ours <= 2.0 else math.inf
+            # The page looks no farther than 2, and its 0 is at most 1e-12.
+            ours = math.inf if ours > 2.0 else ours if ours > 1e-12 else 0.0
             self.number(f"break {direction}", case, hers, ours, lost_earlier)
         ours = self.package("margins", margins, loop, *point)
         hers = page["margins"]

@@ -8,6 +8,8 @@ const armlockDraw = (function () {
   const { TURN, say, scientific, power } = armlockText, { UNCONFINED } = armlockLoop();
   // The paper's perturbations.
   const SQUARE = 1e-6;
+  // While the page is printed, the pictures are sharp and on white.
+  let printing = false;
 
   function element(tag, attributes = {}, ...children) {
     const made = document.createElement(tag);
@@ -20,7 +22,7 @@ const armlockDraw = (function () {
   }
 
   function palette() {
-    const dark = document.documentElement.dataset.theme === "dark";
+    const dark = document.documentElement.dataset.theme === "dark" && !printing;
     return dark
       ? { dark, text: "#e3e6e9", grid: "#55606a", line: "#56b4e9", other: "#3ecf9c", mark: "#f0a060", ground: "#12181d",
         stable: [70, 98, 124], few: [150, 84, 40], many: [255, 186, 120], lost: [112, 88, 148],
@@ -40,23 +42,28 @@ const armlockDraw = (function () {
     return value - values[low] < values[high] - value ? low : high;
   }
 
-  /* A canvas as wide as its place, sharp on every screen, drawn once a frame at most. `shape` is its
-   * height over its width, wide and on a telephone. */
+  /* A canvas as wide as its place, sharp on every screen and on paper, drawn once a frame at most.
+   * `height` says how high it is for its width. */
   class Sheet {
-    constructor(attributes, shape, draw) {
+    constructor(attributes, height, draw) {
       this.canvas = element("canvas", attributes);
       this.paint = draw;
       this.wide = this.high = 0;
       // Its size is asked for once, not in each frame: that would lay out the page anew.
       new ResizeObserver(() => {
-        const ratio = [].concat(shape).at(innerWidth < 600 ? -1 : 0);
+        // On paper it keeps its shape.
+        if (printing) return;
         this.wide = this.canvas.clientWidth;
-        this.high = Math.round(this.wide * ratio);
-        this.canvas.style.aspectRatio = String(1 / ratio);
+        this.high = Math.round(height(this.wide));
+        this.canvas.style.aspectRatio = `${this.wide} / ${this.high}`;
         this.now();
       }).observe(this.canvas);
       new MutationObserver(() => this.now()).observe(document.documentElement,
         { attributes: true, attributeFilter: ["data-theme"] });
+      for (const name of ["beforeprint", "afterprint"]) addEventListener(name, () => {
+        printing = name === "beforeprint";
+        this.now();
+      });
     }
 
     draw() {
@@ -67,25 +74,13 @@ const armlockDraw = (function () {
 
     now() {
       this.waiting = false;
-      if (this.wide) this.render(this.canvas, window.devicePixelRatio || 1);
+      if (this.wide) this.render(this.canvas, printing ? 4 : window.devicePixelRatio || 1);
     }
 
     /* Where on the canvas the pointer is. */
     place({ clientX, clientY }) {
       const { left, top } = this.canvas.getBoundingClientRect();
       return [clientX - left, clientY - top];
-    }
-
-    /* The picture as a file: 1600 pixels wide, on the page's ground. */
-    picture(done) {
-      const copy = element("canvas");
-      this.render(copy, 1600 / this.wide);
-      const pen = copy.getContext("2d");
-      pen.globalCompositeOperation = "destination-over";
-      pen.setTransform(1, 0, 0, 1, 0, 0);
-      pen.fillStyle = palette().ground;
-      pen.fillRect(0, 0, copy.width, copy.height);
-      copy.toBlob(done);
     }
 
     render(canvas, ratio) {
@@ -95,11 +90,33 @@ const armlockDraw = (function () {
       const pen = canvas.getContext("2d"), colours = palette();
       pen.setTransform(ratio, 0, 0, ratio, 0, 0);
       pen.clearRect(0, 0, wide, high);
+      pen.fillStyle = colours.ground;
+      if (printing) pen.fillRect(0, 0, wide, high);
       pen.font = "13px sans-serif";
       pen.lineWidth = 1;
       pen.fillStyle = pen.strokeStyle = colours.text;
       this.paint(pen, wide, high, colours);
     }
+  }
+
+  /* Pictures as one file, 1600 pixels wide: with their captions, as they stand on the page, on its ground. */
+  function snapshot(sheets, done) {
+    const found = sheets.flatMap(sheet => [sheet.canvas, sheet.canvas.parentElement.querySelector("figcaption")]
+      .map(one => ({ sheet, one, box: one.getBoundingClientRect() })));
+    const [left, top] = ["left", "top"].map(side => Math.min(...found.map(({ box }) => box[side])));
+    const [right, bottom] = ["right", "bottom"].map(side => Math.max(...found.map(({ box }) => box[side])));
+    const scale = 1600 / (right - left), colours = palette();
+    const all = element("canvas", { width: 1600, height: Math.round(scale * (bottom - top)) }), pen = all.getContext("2d");
+    pen.fillStyle = colours.ground;
+    pen.fillRect(0, 0, all.width, all.height);
+    pen.fillStyle = colours.text;
+    pen.font = `${13 * scale}px sans-serif`;
+    for (const { sheet, one, box } of found) {
+      const copy = element("canvas"), at = [scale * (box.left - left), scale * (box.top - top)];
+      if (one !== sheet.canvas) pen.fillText(one.textContent, at[0], at[1] + 14 * scale, scale * box.width);
+      else { sheet.render(copy, scale); pen.drawImage(copy, ...at); }
+    }
+    all.toBlob(done);
   }
 
   function ticks(low, high, most) {
@@ -165,7 +182,7 @@ const armlockDraw = (function () {
       Object.assign(this, { changed, pointed, centre: [1, 1], half: 3, held: null, hover: null, broken: null,
         grid: null, picture: null, curve: null, ghost: null, lit: null, stale: false, fingers: new Map() });
       this.sheet = new Sheet({ tabindex: 0, role: "application", "aria-label": `${label} Arrow keys `
-        + "move the point, with shift by ten steps; plus and minus zoom; Escape releases the point." }, 1,
+        + "move the point, with shift by ten steps; plus and minus zoom; Escape releases the point." }, wide => wide + 40,
         (pen, wide, high, colours) => this.draw(pen, wide, high, colours));
       const canvas = this.canvas = this.sheet.canvas;
       canvas.addEventListener("pointermove", event => this.move(event));
@@ -253,8 +270,8 @@ const armlockDraw = (function () {
     }
 
     get frame() {
-      const { wide, high } = this.sheet;
-      return { left: 58, top: 10, wide: wide - 58 - 12, high: high - 10 - 48 };
+      const size = this.sheet.wide - 58 - 12;
+      return { left: 58, top: 10, wide: size, high: size };
     }
 
     draw(pen, wide, high, colours) {
@@ -296,10 +313,11 @@ const armlockDraw = (function () {
       if (this.marked) ring(pen, px(this.marked[0]), py(this.marked[1]), this.held ? 8 : 5, colours);
       if (this.held) dot(pen, px(this.held[0]), py(this.held[1]), 3, colours.line);
       pen.restore();
-      this.axes(pen, frame, high, colours);
+      this.axes(pen, frame, colours);
+      this.keys(pen, wide, frame.top + frame.high + 56, colours);
     }
 
-    axes(pen, frame, high, colours) {
+    axes(pen, frame, colours) {
       const { x0, x1, y0, y1 } = this.box;
       pen.strokeStyle = pen.fillStyle = colours.text;
       pen.lineWidth = 1;
@@ -319,8 +337,29 @@ const armlockDraw = (function () {
         pen.textAlign = "center";
         pen.textBaseline = "bottom";
         if (axis) upright(pen, name, 4, frame.top + frame.high / 2);
-        else pen.fillText(name, frame.left + frame.wide / 2, high - 4);
+        else pen.fillText(name, frame.left + frame.wide / 2, frame.top + frame.high + 42);
       });
+    }
+
+    /* What the colours mean, so that a print and a file say it as well. */
+    keys(pen, wide, y, { stable, few, many, lost, unsure, text }) {
+      let x = 6;
+      pen.font = "12px sans-serif";
+      pen.textAlign = "left";
+      pen.textBaseline = "middle";
+      for (const [name, shades] of [["stable", [stable]], ["unstable, few to many roots", [few, many]],
+        ["unstable at high frequency", [lost]], ["undecided", [...unsure, ...unsure]],
+        ["D-curve at the edge, low to high frequency", RAINBOW]]) {
+        const long = pen.measureText(name).width + 34, half = shades === RAINBOW ? 1.5 : 5;
+        if (x + long > wide) [x, y] = [6, y + 17];
+        shades.forEach((shade, k) => {
+          pen.fillStyle = `rgb(${shade})`;
+          pen.fillRect(x + 15 * k / shades.length, y - half, 15 / shades.length, 2 * half);
+        });
+        pen.fillStyle = text;
+        pen.fillText(name, x + 20, y);
+        x += long;
+      }
     }
 
     /* Whether the stable region ends at a place, as far as pixels can tell; any place while there is no chart. */
@@ -605,6 +644,17 @@ const armlockDraw = (function () {
     sizes.shift();
     const places = half.flatMap(([x, y]) => [[x, y], [x, 2 * cy - y]]);
     const named = rings(pen, [cx, cy], sizes, radius, size => power(Math.round(Math.log10(size))), places, colours);
+    if (now.bound) {
+      // Here |S| is above its bound.
+      pen.fillStyle = colours.mark;
+      pen.globalAlpha = 0.25;
+      pen.beginPath();
+      for (let k = 0; k < 90; k++)
+        pen.lineTo(...bent(Math.cos(TURN * k / 90) / 10 ** (now.bound / 20) - 1, Math.sin(TURN * k / 90) / 10 ** (now.bound / 20)));
+      pen.fill();
+      pen.globalAlpha = 1;
+      pen.fillStyle = colours.text;
+    }
     pen.strokeStyle = colours.grid;
     curve(pen, half.length, i => [half[i][0], 2 * cy - half[i][1]]);
     pen.strokeStyle = colours.line;
@@ -644,7 +694,7 @@ const armlockDraw = (function () {
     const from = Math.max(0, size.findIndex(v => v > faint));
     const to = Math.min(n - 1, Math.max(size.findLastIndex(v => v > faint), marked ? nearest(omega, 1.2 * marked) : 0));
     const first = Math.log10(omega[from] / TURN), last = Math.log10(omega[to > from ? to : n - 1] / TURN);
-    const top = size.reduce((a, b) => Math.max(a, b), rest.reduce((a, b) => Math.max(a, b), 0));
+    const top = size.reduce((a, b) => Math.max(a, b), rest.reduce((a, b) => Math.max(a, b), now.bound || 0));
     const low = Math.max(-top - 10, Math.min(faint, rest.reduce((a, b) => Math.min(a, b))));
     const left = 56, right = 8, room = (high - 62) / 2, span = wide - left - right;
     const px = w => left + span * (Math.log10(w / TURN) - first) / (last - first);
@@ -717,6 +767,16 @@ const armlockDraw = (function () {
     if (margins.modulus > 0 && margins.modulusAt > 0) {
       const y = gain(-decibels(margins.modulus));
       margin(margins.modulusAt, y, y, `|S| \u2264 ${say(-decibels(margins.modulus))} dB`);
+    }
+    // The bound on |S|, and what is above it.
+    if (now.bound) {
+      ghost(pen, colours, () => curve(pen, 2, k => [left + k * span, gain(now.bound)]));
+      pen.textAlign = "right";
+      labelBeside(pen, "bound", left + 0.7 * span, gain(now.bound) - 9, colours, taken, places);
+      pen.strokeStyle = colours.mark;
+      pen.lineWidth = 3;
+      curve(pen, n, i => i >= from && i <= to && rest[i] > now.bound ? [shown[0].at[i], gain(rest[i])] : [NaN, NaN]);
+      pen.lineWidth = 1;
     }
     // The names stand at the curves.
     pen.textAlign = "left";
@@ -841,5 +901,5 @@ const armlockDraw = (function () {
     pen.fillText("day", left + span / 2, high - 2);
   }
 
-  return { element, nearest, Sheet, Chart, drawNyquist, drawBode, drawRoots, drawYear };
+  return { element, nearest, snapshot, Sheet, Chart, drawNyquist, drawBode, drawRoots, drawYear };
 })();

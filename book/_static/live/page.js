@@ -29,7 +29,7 @@
 function armlockPages() {
   const { TURN, say, duration, time, shortest, exact, written, formula, python, address, fromAddress } = armlockText;
   const { readRoots, readController, readNumber } = armlockRead;
-  const { element, nearest, Sheet, Chart, drawNyquist, drawBode, drawRoots, drawYear } = armlockDraw;
+  const { element, nearest, snapshot, Sheet, Chart, drawNyquist, drawBode, drawRoots, drawYear } = armlockDraw;
   const api = armlockLoop();
   Object.assign(api, armlockChart(api), armlockCurves(api));
 
@@ -170,7 +170,7 @@ function armlockPages() {
       this.note = element("p", { class: "live-note", role: "status" });
       this.numbers = element("table", { class: "live-numbers" });
       // The numbers that stay in sight beside the sliders.
-      this.summary = element("dl", { class: "live-summary" });
+      this.summary = element("div", { class: "live-summary" });
       // For who hears the page: said once all numbers are there.
       this.ready = element("p", { class: "visually-hidden", role: "status" });
       this.chart = new Chart(label, {
@@ -178,15 +178,16 @@ function armlockPages() {
         pointed: held => { this.tell(true); if (held) this.moved("point"); },
       });
       this.figure = element("figure", { class: "live-chart", "data-check": "hover" },
-        element("figcaption", {}, "Number of unstable roots over c1 and c2"), this.chart.canvas, keys(), this.out, this.ready);
-      this.lit = null;
+        element("figcaption", {}, "Number of unstable roots over c1 and c2"), this.chart.canvas, this.out, this.ready);
+      // A bound on |S| in dB, to design against.
+      this.lit = this.bound = null;
       // The loop as it is, and what was pinned, which stays as it was.
       this.design = this.pinned = null;
       // What a page does besides where the view, the held "point" or the "loop" is another.
       this.moved = () => {};
       this.plots = [
-        this.plot("Nyquist curve of L, compressed beyond 1", drawNyquist, 1),
-        this.plot("Bode\u2019s plot of L, and the sensitivity S = 1/(1 + L)", drawBode, [0.72, 0.9]),
+        this.plot("Nyquist curve of L, compressed beyond 1", drawNyquist, wide => wide),
+        this.plot("Bode\u2019s plot of L, and the sensitivity S = 1/(1 + L)", drawBode, wide => 0.9 * wide),
       ];
       this.following = element("p", { class: "live-note", role: "status" });
     }
@@ -200,12 +201,12 @@ function armlockPages() {
     get designs() { return [this.design, this.pinned].filter(one => one); }
 
     /* A plot over frequencies, on which one can be pointed at. */
-    plot(title, draw, shape) {
+    plot(title, draw, height) {
       let place = null, shown = null;
       const sheet = new Sheet({ role: "application", tabindex: 0, "aria-label": `${title}. Arrow keys `
-        + "move along the frequencies." }, shape, (pen, wide, high, colours) => {
+        + "move along the frequencies." }, height, (pen, wide, high, colours) => {
         if (!this.design) return;
-        shown = this.designs.map(({ response, told }) => ({ ...response, margins: told.margins, rough: this.rough }));
+        shown = this.designs.map(({ response, told }) => ({ ...response, margins: told.margins, rough: this.rough, bound: this.bound }));
         place = draw(shown, this.lit && nearest(shown[0].omega, this.lit), pen, wide, high, colours);
       });
       for (const name of ["pointermove", "pointerdown"]) sheet.canvas.addEventListener(name, event => {
@@ -437,15 +438,19 @@ function armlockPages() {
     /* What stays in sight: values without their frequencies. One that is asked for anew stays, faint. */
     summarize(rows) {
       const short = ["Delay margin", "Unstable roots", "Phase margin", "Gain factor from", "to", "Smallest |1 + L|"];
+      const modulus = this.design.told.margins?.modulus, beyond = this.bound && modulus < 10 ** (-this.bound / 20);
       if (!this.summary.children.length) this.summary.append(...short.map(name =>
-        element("div", {}, element("dt", {}, name), element("dd", {}))));
+        element("p", {}, element("span", {}, name), element("strong", {}))));
       rows.forEach(([, [value]], k) => {
         const place = this.summary.children[k].lastChild, pending = value === "\u2026";
         place.classList.toggle("live-old", pending);
         if (pending) return;
         const [number, limit] = value.split(/ at |(?=, in the limit)/), text = `${number}${k === 2 && /^[\d.]/.test(number) ? "\u00b0" : ""}`;
         place.textContent = limit?.startsWith(",") ? `${text}, in the limit` : text.replace("unstable at arbitrarily high frequency", "infinitely many");
-        place.title = value;
+        place.textContent = place.textContent.replace("none above", "below").replace("none up to", "above");
+        place.classList.toggle("live-wrong", k === 5 && beyond);
+        if (k === 5 && beyond) place.textContent += ` (> ${say(this.bound)} dB)`;
+        place.title = k === 5 && beyond ? `${value}: |S| is above its bound of ${say(this.bound)} dB` : value;
       });
     }
 
@@ -505,31 +510,25 @@ function armlockPages() {
     return element("label", { class: "live-field" }, element("span", {}, name), select);
   }
 
-  /* Zoom, download, and the ghost, of any explorer. */
-  function tools(live, file, ...more) {
+  /* Zoom, download of the pictures, and the ghost, of any explorer. */
+  function tools(live, file, sheets, ...more) {
     const pin = element("button", { type: "button", "aria-pressed": "false", onclick: () => {
       pin.setAttribute("aria-pressed", String(live.pin()));
     } }, "Pin this loop");
     return buttons(button("Zoom in", () => live.chart.zoom(0.5)), button("Zoom out", () => live.chart.zoom(2)),
-      ...more, pin, button("PNG", () => live.chart.sheet.picture(blob => {
+      ...more, pin, button("PNG", () => snapshot(sheets, blob => {
         const link = element("a", { href: URL.createObjectURL(blob), download: `${file}.png` });
         link.click();
         setTimeout(() => URL.revokeObjectURL(link.href), 1000);
       })));
   }
 
-  const key = (text, name) => element("span", { class: "live-key" }, element("i", { class: name }), text);
-  const keys = () => element("p", { class: "live-note" }, key("stable", "live-stable"),
-    key("unstable, few to many roots", "live-unstable"), key("unstable at high frequency", "live-lost"),
-    key("undecided", "live-unsure"),
-    key("D-curve at the edge of the stable region, low to high frequency", "live-curve"));
-
-  function legend() {
+  function legend(more = "") {
     return element("p", { class: "live-note" }, "Move over the chart for a preview. A click or a tap holds the point. "
       + "On the D-curve a root lies on the imaginary axis, from low frequency (blue) to high (yellow), or is 0 (straight line). "
       + "It is drawn where it bounds the stable region. "
       + "Cross: the ideal point (1, 1). Dot: the critical perturbation along (1, \u22121). Square, in small charts: "
-      + "the paper\u2019s perturbations, up to 10\u207b\u2076. Dashed: the pinned loop.");
+      + `the paper\u2019s perturbations, up to 10\u207b\u2076. Dashed curves: the pinned loop.${more}`);
   }
 
   const figures = (...all) => element("div", { class: "live-two" }, ...all);
@@ -566,7 +565,7 @@ function armlockPages() {
   function chapter(place) {
     const { live: name, centre, half } = place.dataset, live = new Live(`${name}: number of unstable roots over `
       + "c1 and c2.");
-    place.replaceChildren(figures(live.figure, live.plots[0].figure), tools(live, name.toLowerCase().replace(/\W+/g, "-")),
+    place.replaceChildren(figures(live.figure, live.plots[0].figure), tools(live, name.toLowerCase().replace(/\W+/g, "-"), [live.chart.sheet, ...live.plots]),
       legend(), live.note, live.plots[1].figure, live.following);
     live.chart.show([Number(centre), Number(centre)], Number(half));
     live.set(PRESETS[name][0]);
@@ -589,7 +588,7 @@ function armlockPages() {
     /* The address holds the loop, and its history undoes what was done to it. */
     live.moved = step => {
       if (!live.spec) return;
-      const hash = address(live.spec, live.chart, unit, fields.pasted.value);
+      const hash = address(live.spec, live.chart, unit, fields.pasted.value, live.bound);
       code.textContent = python(live.spec, live.kept, unit);
       orbit.href = `in_orbit.html${hash}`;
       if (quiet) return;
@@ -629,6 +628,7 @@ function armlockPages() {
         spec[name] = readNumber(name, fields[name].value, NAMES[name]) * (name === "corner" ? TURN : 1);
       for (const [name, title] of [["zeros", "Zeros"], ["poles", "Poles"]])
         spec[name] = readRoots(name, fields[name].value, title).map(v => v.map(x => x * unit));
+      live.bound = readNumber("bound", fields.bound.value, "The bound");
       api.make(spec);
       return spec;
     };
@@ -639,6 +639,8 @@ function armlockPages() {
       try {
         if (edited === "pasted") {
           pasted = readController(fields.pasted.value);
+          // Nothing of the loop before stays.
+          live.none("");
           // Its numbers are those of s in rad/s.
           unit = 1;
           fields.unit.value = "1";
@@ -657,7 +659,7 @@ function armlockPages() {
           range = [Math.min(...root, 1 / spec.tau1), Math.max(...root, 1 / spec.tau1)];
           if (range[1] < 100 * range[0]) range = [range[0] / 10, range[1] * 10];
         }
-        if (edited && edited !== "unit") presets.value = "";
+        if (edited && !["unit", "bound"].includes(edited)) presets.value = "";
         live.set(spec, moving);
         if (!dragged || caught) roots.draw();
         undo.disabled = !depth;
@@ -709,12 +711,12 @@ function armlockPages() {
     const select = (name, title, options, changed) => {
       const made = choice(id(name), title, options, changed);
       fields[name] = made.querySelector("select");
-      made.classList.add("live-wide");
       return made;
     };
     /* Show another loop, with its view. Hertz where their numbers are shorter. */
-    const show = (spec, centre, half, held, given, text = "") => {
+    const show = ({ spec, centre, half, held = null, unit: given, pasted: text = "", bound = 6 }) => {
       fields.pasted.value = text;
+      fields.bound.value = bound;
       pasted = text ? readController(text) : null;
       unit = given || ([1, TURN].map(one => [...spec.zeros, ...spec.poles].map(v => written([v], one)).join("").length).reduce((a, b) => b < a) ? TURN : 1);
       fields.unit.value = unit === 1 ? "1" : "hz";
@@ -727,7 +729,7 @@ function armlockPages() {
     const start = name => {
       const [spec, centre, half] = PRESETS[name];
       presets.value = name;
-      show(spec, [centre, centre], half, null);
+      show({ spec, centre: [centre, centre], half });
     };
 
     const preset = choice(id("preset"), "Start from", [["", "\u2014 your own loop \u2014"],
@@ -745,9 +747,10 @@ function armlockPages() {
     });
     const wrong = element("p", { class: "live-note live-wrong", role: "alert" });
     const paste = field("pasted", "Paste a controller from MATLAB, Python or Julia", true);
+    const sensor = select("sensor", "Sensor", SENSORS, () => { shape(); take("sensor"); });
+    sensor.classList.add("live-wide");
     const inputs = element("form", { class: "live-form", onsubmit: event => event.preventDefault() },
-      select("sensor", "Sensor", SENSORS, () => { shape(); take("sensor"); }),
-      field("gain", "Gain"), field("delay", "Dead time in s"),
+      sensor, field("gain", "Gain"), field("delay", "Dead time in s"),
       field("tau1", "Delay \u03c4\u2081 in s"), field("tau2", "Delay \u03c4\u2082 in s"),
       field("corner", "Corner p in Hz"), field("difference", "\u0394\u03c4 in s"),
       select("unit", "Unit of roots", [["1", "rad/s"], ["hz", "Hz"]], value => {
@@ -757,13 +760,13 @@ function armlockPages() {
         if (spec) put(spec);
         take("unit");
       }),
-      field("zeros", "Zeros", true), field("poles", "Poles", true));
+      field("bound", "Bound on |S|, dB"), field("zeros", "Zeros", true), field("poles", "Poles", true));
     fields.pasted.placeholder = "(s + 0.02)/(s^2 + 0.1 s)";
 
     /* The s-plane: a root follows the pointer, a pair together; a root at 0 stays. */
     let range = [0.01, 1], drawn = null, caught = null;
     const roots = new Sheet({ role: "img", "aria-label": "Roots of the controller in the s-plane. The fields Zeros "
-      + "and Poles have them as text." }, 0.8, (pen, wide, high, colours) => {
+      + "and Poles have them as text." }, wide => 0.8 * wide, (pen, wide, high, colours) => {
       const { spec } = live;
       drawn = spec && drawRoots({ ...spec, unit, range }, pen, wide, high, colours);
     });
@@ -807,11 +810,12 @@ function armlockPages() {
     bode.figure.classList.add("live-bode");
     place.replaceChildren(element("div", { class: "live-own" },
       element("div", { class: "live-main" }, figures(live.figure, plane, nyquist.figure, bode.figure), live.following,
-        tools(live, "loop", undo, button("Paper\u2019s square", () => live.chart.show([1, 1], 3e-6)),
+        tools(live, "loop", [live.chart.sheet, roots, nyquist, bode], undo, button("Paper\u2019s square", () => live.chart.show([1, 1], 3e-6)),
           button("Whole", () => live.chart.show([0, 0], 3)), button("Copy numbers", () => live.copy())), live.note, live.numbers),
       element("div", { class: "live-side" }, element("div", { class: "live-top" }, preset, wrong),
         element("div", { class: "live-panel" }, live.summary, gain, dead),
-        element("div", { class: "live-fields" }, paste, understood, doubt, inputs, legend(), element("p", {}, orbit)))),
+        element("div", { class: "live-fields" }, paste, understood, doubt, inputs, legend(" Shaded disc around \u22121 in the Nyquist "
+          + "plot, and dashed line in Bode\u2019s plot: the bound on |S|."), element("p", {}, orbit)))),
     element("details", {}, element("summary", {}, "This loop in Python"), code));
 
     const open = () => {
@@ -822,7 +826,7 @@ function armlockPages() {
         const given = fromAddress(location.hash);
         if (given) {
           api.make(given.spec);
-          show(given.spec, given.centre, given.half, given.held, given.unit, given.pasted);
+          show(given);
         } else start(Object.keys(PRESETS)[0]);
       } catch (error) {
         live.none("There is no loop to show.");
@@ -892,7 +896,7 @@ function armlockPages() {
       return { ...LOOPS[state.loop][0], tau1, tau2, difference: 2 * held(half, state.hold, day) };
     };
     const sheet = new Sheet({ role: "img", "aria-label": "The year: true and assumed half difference, days on "
-      + "which the loop is unstable, and the critical perturbation of the arms in opposite directions." }, [1, 1.2],
+      + "which the loop is unstable, and the critical perturbation of the arms in opposite directions." }, wide => (innerWidth < 600 ? 1.2 : 1) * wide,
     (pen, ...rest) => drawYear({ values, days, day: state.day }, pen, ...rest));
     for (const name of ["pointerdown", "pointermove"]) sheet.canvas.addEventListener(name, event => {
       const at = (sheet.place(event)[0] - 56) / (sheet.wide - 64);

@@ -17,7 +17,7 @@ const armlockText = (function () {
 
   function scientific(number, digits) {
     const [factor, exponent] = number.toExponential(digits).split("e");
-    return `${factor}\u00a0\u00d7\u00a0${power(Number(exponent))}`;
+    return `${Number(factor)}\u00a0\u00d7\u00a0${power(Number(exponent))}`;
   }
 
   function power(exponent) {
@@ -80,11 +80,12 @@ const armlockText = (function () {
           : re ? `(s ${term(-1, re)})` : "s";
         powers.set(factor, (powers.get(factor) || 0) + 1);
       }
-      return [...powers].map(([factor, n]) => n > 1 ? factor + power(n).slice(2) : factor).join(" ");
+      const factors = [...powers].map(([factor, n]) => n > 1 ? factor + power(n).slice(2) : factor);
+      return factors.length > 1 && roots === poles ? `[${factors.join(" ")}]` : factors.join(" ");
     };
     const above = [...gain === 1 && zeros.length ? [] : [say(gain, 6)], ...delay ? [`exp(\u2212${say(delay, 6)} s)`] : [], product(zeros)]
       .filter(part => part).join(" ");
-    return `K(s) = ${above}${poles.length ? ` / [${product(poles)}]` : ""}`;
+    return `K(s) = ${above}${poles.length ? ` / ${product(poles)}` : ""}`;
   }
 
   /* The lines that make the same loop with the package. */
@@ -115,8 +116,9 @@ const armlockText = (function () {
   const NEEDED = sensor => ["sensor", "tau1", "tau2", "delay", "gain", "zeros", "poles",
     ...["dual", "modified"].includes(sensor) ? ["corner", "difference"] : []];
 
-  /* The address holds all: loop, view, the held point, the unit of the fields and what was pasted. */
-  function address(spec, { centre, half, held }, unit, pasted = "") {
+  /* The address holds all: loop, view, the held point, the unit of the fields, what was pasted, and the
+   * bound on |S| if it is not 6 dB. */
+  function address(spec, { centre, half, held }, unit, pasted = "", bound = 6) {
     const parts = new URLSearchParams();
     for (const [name, key] of Object.entries(SHORT)) {
       const value = spec[name];
@@ -127,6 +129,7 @@ const armlockText = (function () {
     if (held) parts.set("pt", held.join(","));
     if (unit !== 1) parts.set("u", "Hz");
     if (pasted) parts.set("k", pasted);
+    if (bound !== 6) parts.set("b", bound);
     return `#${parts}`;
   }
 
@@ -151,6 +154,7 @@ const armlockText = (function () {
     const [x, y, half] = parts.has("at") ? numbers("at", 3) : [1, 1, 1];
     if (!(half > 0)) throw wrong("at", `its view has no width: ${half}`);
     return { spec, centre: [x, y], half, unit: parts.get("u") === "Hz" ? TURN : 1, pasted: parts.get("k") || "",
+      bound: parts.has("b") ? numbers("b", 1)[0] : 6,
       held: parts.has("pt") ? numbers("pt", 2) : null };
   }
 
