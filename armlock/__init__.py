@@ -48,6 +48,7 @@ from armlock.loops import (
     paper_loop,
     robust_loop,
 )
+from armlock.matrices import determinant, return_difference, state_space
 from armlock.performance.budget import NoiseBudget, noise_budget
 from armlock.performance.pulling import pulling
 from armlock.performance.transfer import transfer
@@ -75,7 +76,7 @@ from armlock.stability.semidiscretization import (
     spectral_radius,
     transition_matrix,
 )
-from armlock.systems import System, delay, equation, parameter, s
+from armlock.systems import System, delay, distributed_delay, equation, parameter, s
 from armlock.timedomain.noise import LaserNoise, PerturbationNoise, ShapedNoise
 from armlock.timedomain.responses import impulse_response, step_response
 from armlock.timedomain.simulation import (
@@ -121,6 +122,8 @@ __all__ = [
     "d_curve_branches",
     "d_curve_line",
     "delay",
+    "determinant",
+    "distributed_delay",
     "equation",
     "flight_loop",
     "impulse_response",
@@ -132,6 +135,7 @@ __all__ = [
     "parameter",
     "peak_gain",
     "pulling",
+    "return_difference",
     "rightmost_root",
     "robust_loop",
     "s",
@@ -140,6 +144,7 @@ __all__ = [
     "simulate",
     "spectral_radius",
     "stability_chart",
+    "state_space",
     "step_response",
     "transfer",
     "transition_matrix",

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -65,7 +66,11 @@ def _total(part: Mapping[Lag, fmpq_poly]) -> fmpq_poly:
     return sum(part.values(), fmpq_poly([0]))
 
 
-def functions(groups: Sequence[Sequence[Mapping[Lag, fmpq_poly]]], step: float = 0.0) -> Any:
+def functions(
+    groups: Sequence[Sequence[Mapping[Lag, fmpq_poly]]],
+    step: float = 0.0,
+    known: Mapping[Fraction, int] = MappingProxyType({}),
+) -> Any:
     """Return sums of polynomials times delays as functions of one space, group by group.
 
     Each group has a basis of its own, so that nothing is taken from one for another. Delays of
@@ -79,7 +84,7 @@ def functions(groups: Sequence[Sequence[Mapping[Lag, fmpq_poly]]], step: float =
     union = list({str(p): p for some in bases for p in some}.values()) or [fmpq_poly([1])]
     names = {str(p): k for k, p in enumerate(union)}
     lags = {lag for group in groups for part in group for lag in part}
-    space = Space([Polynomial.of(map(fraction, p.coeffs())) for p in union], lags, step)
+    space = Space([Polynomial.of(p.coeffs()) for p in union], lags, step, known)
     column = {lag: k for k, lag in enumerate(space.lags)}
     found = []
     for group, chosen in zip(groups, bases, strict=True):
@@ -152,7 +157,7 @@ class Affine:
             if value is None:
                 raise TypeError(f"{name} must be given: it has no nominal value")
         values = {name: Sum.of(polynomial([value])) for name, value in held.items()}
-        sums = [part.put(values) for part in (system.numerator, system.denominator)]
+        sums = [part.put(values).rounded() for part in (system.numerator, system.denominator)]
         for _, names in (key for part in sums for key in part.terms):
             if len(names) > 1:
                 raise NotAffineError(
@@ -170,7 +175,7 @@ class Affine:
                 for lag, p in some.items():
                     there[lag] = there.get(lag, fmpq_poly([0])) + p * exact(x)
             groups.append([there, *parts])
-        made, size = functions(groups, system.step), 2 + len(free)
+        made, size = functions(groups, system.step, system.known), 2 + len(free)
         self.n: list[Function] = made[1:size]
         self.m: list[Function] = made[size + 1 :]
 
@@ -213,7 +218,7 @@ class Affine:
         return _mixed(self.terms, point)
 
     def cancelled(self, *point: float | Fraction) -> int:
-        """Order of the root at s = 0 that N and M have in common; 0 of an equation."""
+        """Order of the root at s = 0 that does not count, as `common` has it."""
         return common(*self.quotient(*point))
 
 
@@ -225,8 +230,8 @@ def _mixed(terms: Sequence[Function], point: Sequence[float | Fraction]) -> Func
 
 
 def common(n: Function, m: Function) -> int:
-    """Order of the root at s = 0 that N and M have in common; 0 of an equation, without M."""
-    return 0 if m.is_zero else common_zeros(n, m)
+    """Order of the root at s = 0 that N and M have in common; of an equation a known one."""
+    return n.space.known.get(Fraction(0), 0) if m.is_zero else common_zeros(n, m)
 
 
 def quotient_at(

@@ -13,10 +13,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from decimal import Decimal
 from fractions import Fraction
+from functools import lru_cache
 from itertools import chain
 from math import factorial
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+import mpmath
 import numpy as np
 import numpy.typing as npt
 from flint import fmpq, fmpq_poly
@@ -34,7 +37,7 @@ from armlock.checks import (
 )
 from armlock.controllers import Controller, check_system, rational, with_others
 from armlock.engine.chain import NOW, Delay, Lag
-from armlock.engine.polynomials import fraction, fractions, polynomial
+from armlock.engine.polynomials import exact, fraction, fractions, polynomial
 
 if TYPE_CHECKING:
     import control
@@ -74,8 +77,21 @@ _TAKEN = frozenset(
 )
 # Coefficients at s = 0 that are looked at for a limit there.
 _TERMS = 16
+# Bits of the fraction that stands for exp(x), and of those how many may cancel (Lemma 23).
+_BITS, _MAY_CANCEL = 512, 200
+# So near to a zero that N and M share, in units of one over the longest delay, their series is
+# used.
+_NEAR = 0.1
 # Longest text of a system.
 _LONGEST_TEXT = 400
+
+
+@lru_cache
+def exponential(x: Fraction) -> fmpq:
+    """Return the fraction that stands for exp(x)."""
+    with mpmath.workprec(_BITS):
+        value = mpmath.exp(mpmath.mpf(x.numerator) / x.denominator)
+    return exact(Fraction(*mpmath.libmp.to_rational(value._mpf_)))
 
 
 def order(p: fmpq_poly) -> int:
@@ -151,7 +167,26 @@ class Sum:
 
     def before(self, *names: str) -> dict[Lag, fmpq_poly]:
         """Return what stands before a product of parameters, by delays."""
-        return {lag: p for (lag, given), p in self.terms.items() if given == names}
+        return {lag: p for (lag, given), p in self.rounded().terms.items() if given == names}
+
+    def rounded(self) -> Sum:
+        """Return the sum with fractions for the numbers exp(x) before delays (Lemma 23)."""
+        if not any(lag.growth for lag, _ in self.terms):
+            return self
+        grown: dict[tuple[Key, Fraction], fmpq_poly] = {}
+        for (lag, names), p in self.terms.items():
+            at = (lag.plain, names), lag.growth
+            grown[at] = grown[at] + p if at in grown else p
+        found, sizes = Sum({}), Sum({})
+        for (key, x), p in grown.items():
+            p = p * exponential(x)
+            found = found + Sum({key: p})
+            sizes = sizes + Sum({key: fmpq_poly([abs(c) for c in p.coeffs()])})
+        for key, size in sizes.terms.items():
+            p = found.terms.get(key, fmpq_poly([0]))
+            if any(b and abs(p[k]) * 2**_MAY_CANCEL < b for k, b in enumerate(size.coeffs())):
+                raise ValueError("exponentials of the system cancel to more than 200 bits")
+        return found
 
     def whole(self) -> fmpq_poly:
         """Return the sum of all polynomials: what is left at s = 0."""
@@ -165,16 +200,21 @@ class Sum:
     @property
     def lags(self) -> set[Lag]:
         """All products of delays."""
-        return {lag for lag, _ in self.terms}
+        return {lag.plain if lag.growth else lag for lag, _ in self.terms}
 
-    def series(self, number: int) -> list[Fraction]:
-        """Return the first coefficients of the series at s = 0, without parameters, exactly."""
-        found = [Fraction(0)] * number
-        for theta, p in self.by_length().items():
-            for i, c in enumerate(p.coeffs()[:number]):
+    def series(self, number: int, at: Fraction = Fraction(0)) -> list[Fraction]:
+        """Return the first coefficients of the series at a point, without parameters, exactly.
+
+        But for the fractions that stand for exponentials.
+        """
+        found = [fmpq(0)] * number
+        for (lag, _), p in self.terms.items():
+            moved, theta = p(polynomial([at, 1])), exact(lag.time)
+            factor = exponential(lag.growth - at * lag.time)
+            for i, c in enumerate(moved.coeffs()[:number]):
                 for k in range(i, number):
-                    found[k] += fraction(c) * (-theta) ** (k - i) / factorial(k - i)
-        return found
+                    found[k] += factor * c * (-theta) ** (k - i) / factorial(k - i)
+        return [fraction(c) for c in found]
 
     def by_length(self, *names: str) -> dict[Fraction, fmpq_poly]:
         """Return what stands before a product of parameters, by lengths in ascending order."""
@@ -205,13 +245,14 @@ class Sum:
             found[near] += _polyval(self.whole(), at[near], unit, size)
         for (lag, names), p in self.terms.items():
             theta, value = float(lag.time), _polyval(p, at, unit, size)
+            start = float(lag.growth / lag.time) if lag.growth else 0.0
             for name in names:
                 value = value * values[name]
             if values:
                 found[near] += value[near]
             if theta:
-                found[near] += value[near] * np.expm1(-s[near] * theta)
-            found[far] += value[far] * np.exp(-s[far] * theta)
+                found[near] += value[near] * np.expm1(-(s[near] - start) * theta)
+            found[far] += value[far] * np.exp(-(s[far] - start) * theta)
         return found
 
     def text(self, latex: bool = False) -> str:
@@ -249,9 +290,10 @@ def _number(value: Fraction) -> str:
 
 
 def _exponential(lag: Lag, latex: bool) -> str:
-    """Return exp(-s theta) as text."""
-    time = _number(lag.time)
-    return f"e^{{-{time} s}}" if latex else f"exp(-{time} s)"
+    """Return exp(x - s theta) as text."""
+    x = f"{_number(lag.growth)} - " if lag.growth else "-"
+    exponent = f"{x}{_number(lag.time)} s"
+    return f"e^{{{exponent}}}" if latex else f"exp({exponent})"
 
 
 def _powers(p: fmpq_poly, latex: bool) -> str:
@@ -296,6 +338,9 @@ class System:
         The parameters in the order of their first use, with their nominal values.
     step : float
         Zero, or the step in s of a map (`equation`).
+    known : mapping of Fraction to int
+        Real numbers in rad/s at which numerator and denominator are both zero, and the order:
+        these are no roots (`distributed_delay`).
 
     Notes
     -----
@@ -324,6 +369,7 @@ class System:
     denominator: Sum
     nominal: dict[str, float | None]
     step: float
+    known: Mapping[Fraction, int] = MappingProxyType({})
     #: The same for other values of poles that may be meant to be zero; usually none.
     others: tuple[System, ...] = ()
 
@@ -333,9 +379,12 @@ class System:
         denominator: Sum,
         nominal: Mapping[str, float | None] | None = None,
         step: float = 0.0,
+        known: Mapping[Fraction, int] = MappingProxyType({}),
     ) -> None:
         self.numerator, self.denominator = _reduced(numerator, denominator)
         self.nominal, self.step = dict(nominal or {}), step
+        if known:
+            self.known = dict(known)
 
     @classmethod
     def of(cls, system: Any, name: str = "system") -> System:
@@ -461,10 +510,34 @@ class System:
             put[name], names = given.numerator, names | given.nominal
         return with_others(
             lambda one: System(
-                one.numerator.put(put), one.denominator.put(put), names, one.step
+                one.numerator.put(put), one.denominator.put(put), names, one.step, one.known
             ),
             self,
         )
+
+    def opened(self, name: str) -> System:
+        """Return the open loop that a parameter closes, with all else as it is.
+
+        D = 0, of a loop 1 + L = 0, is affine in the parameter x: D = D_0 + x D_1. The open loop
+        is x D_1 / D_0, whose margins are those of the factor x.
+
+        Parameters
+        ----------
+        name : str
+            Of the parameter.
+        """
+        if name not in self.nominal:
+            raise TypeError(f"{name} is no parameter of {self!r}: it has {self.parameters}")
+
+        def made(one: System) -> System:
+            parts = Sum({}), Sum({}), Sum({})
+            for (lag, names), p in (one.numerator + one.denominator).terms.items():
+                parts[min(names.count(name), 2)].terms[lag, names] = p
+            if parts[2] or not parts[0]:
+                raise ValueError(f"{self!r} must be affine in {name}, and not zero without it")
+            return System(parts[1], parts[0], one.nominal, known=one.known)
+
+        return with_others(made, self)
 
     def given(self, values: Iterable[Any], numbers: Mapping[str, Any]) -> dict[str, Any]:
         """Return a value of each parameter, by place, by name, or nominal; raise otherwise."""
@@ -519,19 +592,26 @@ class System:
         with np.errstate(all="ignore"):
             n, m = (f.at(s, arrays, unit, size) for f in (self.numerator, self.denominator))
             value = np.asarray(n / m)
-        if not arrays and (s == 0.0).any():
-            value = np.where(s == 0.0, self._limit(), value)
+        for point in {Fraction(0), *self.known} if not arrays else ():
+            off = s - float(point)
+            near = np.abs(off) * self.longest_delay <= (_NEAR if point in self.known else 0.0)
+            near |= off == 0.0
+            if near.any():
+                value = np.where(near, self._next_to(point, np.where(near, off, 0.0)), value)
         return value
 
-    def _limit(self) -> complex:
-        """Return the value at s = 0, exactly; inf at a pole."""
-        n, m = (part.series(_TERMS) for part in (self.numerator, self.denominator))
-        for above, below in zip(n, m, strict=True):
-            if below:
-                return complex(float(above / below))
-            if above:
-                return complex(np.inf)
-        return complex(np.nan)
+    def _next_to(self, point: Fraction, off: ComplexArray) -> ComplexArray:
+        """Return the values so far from a point, by the series there; inf at a pole."""
+        # All powers of s, and the first ones of the exponentials.
+        number = _TERMS + max(self.numerator.degree, self.denominator.degree)
+        n, m = (part.series(number, point) for part in (self.numerator, self.denominator))
+        pairs = enumerate(zip(n, m, strict=True))
+        first = next((k for k, pair in pairs if any(pair)), number)
+        scale = next(filter(None, m[first:]), Fraction(1))
+        above, below = ([float(c / scale) for c in part[first:]] or [0.0] for part in (n, m))
+        with np.errstate(all="ignore"):
+            found = np.asarray(poly.polyval(off, above) / poly.polyval(off, below))
+        return np.where(np.isnan(found) & bool(above[0]), complex(np.inf), found)
 
     def __eq__(self, other: object) -> bool:
         """Whether both are the same expression: the same coefficients and delay objects."""
@@ -542,7 +622,7 @@ class System:
         return hash((self.numerator, self.denominator))
 
     def _content(self) -> tuple[Any, ...]:
-        return self.numerator, self.denominator, self.nominal, self.step
+        return self.numerator, self.denominator, self.nominal, self.step, dict(self.known)
 
     def __getstate__(self) -> tuple[Any, ...]:
         """Return what makes the system."""
@@ -550,7 +630,8 @@ class System:
 
     def __setstate__(self, state: tuple[Any, ...]) -> None:
         """Take it back."""
-        self.numerator, self.denominator, self.nominal, self.step, self.others = state
+        self.numerator, self.denominator, self.nominal, self.step, known, self.others = state
+        self.known = known
 
     def _equation(self, latex: bool = False) -> str:
         """Return the equation as one writes it."""
@@ -623,8 +704,27 @@ class System:
 def _combined(combine: Callable[..., tuple[Sum, Sum]], *systems: Any) -> System:
     """Return what becomes of open loops, from all their numerators and denominators in turn."""
     given = [System.of(system) for system in systems]
+    names = names_of(given)
+
+    def made(*some: System) -> System:
+        parts = ((system.numerator, system.denominator) for system in some)
+        above, below = combine(*chain.from_iterable(parts))
+        if not below:
+            raise ZeroDivisionError("the denominator of a system must not be zero")
+        known = [one.known for one in some]
+        if combine is _parallel and proportion(*(one.denominator for one in some)):
+            # The zeros of a denominator that is kept once, if both numerators have them.
+            both = {a: min(k, known[1][a]) for a, k in known[0].items() if a in known[1]}
+            return System(above, below, names, known=both)
+        return System(above, below, names, known=together(known))
+
+    return with_others(made, *given)
+
+
+def names_of(systems: Iterable[System]) -> dict[str, float | None]:
+    """Return the parameters of open loops, with one nominal value each, or raise."""
     names: dict[str, float | None] = {}
-    for system in given:
+    for system in systems:
         if system.is_equation:
             raise TypeError(
                 f"an equation D = 0 cannot be combined with a system, got {system!r}"
@@ -636,20 +736,21 @@ def _combined(combine: Callable[..., tuple[Sum, Sum]], *systems: Any) -> System:
                     f"parameter {name} must have one nominal value, got {known} and {value}"
                 )
             names[name] = value if known is None else known
+    return names
 
-    def made(*some: System) -> System:
-        parts = ((system.numerator, system.denominator) for system in some)
-        above, below = combine(*chain.from_iterable(parts))
-        if not below:
-            raise ZeroDivisionError("the denominator of a system must not be zero")
-        return System(above, below, names)
 
-    return with_others(made, *given)
+def together(known: Iterable[Mapping[Fraction, int]]) -> dict[Fraction, int]:
+    """Return the zeros of products, of which each factor has some."""
+    found: dict[Fraction, int] = {}
+    for some in known:
+        for a, k in some.items():
+            found[a] = found.get(a, 0) + k
+    return found
 
 
 def _parallel(n: Sum, m: Sum, p: Sum, q: Sum) -> tuple[Sum, Sum]:
     """Return numerator and denominator of a sum."""
-    ratio = _ratio(m, q)
+    ratio = proportion(m, q)
     if ratio:
         return n + p * Sum.of(fmpq_poly([ratio])), m
     return n * q + p * m, m * q
@@ -660,7 +761,7 @@ def _number_of(name: str, value: Any) -> Any:
     return value if isinstance(value, Fraction) else real_number(name, value)
 
 
-def _ratio(first: Sum, second: Sum) -> fmpq | None:
+def proportion(first: Sum, second: Sum) -> fmpq | None:
     """Return the number by which the second sum is multiplied to be the first, or None."""
     if first.terms.keys() != second.terms.keys():
         return None
@@ -720,6 +821,52 @@ def delay(theta: float | Fraction) -> System:
         raise ValueError(f"theta must not be negative, got {theta}")
     lag = Lag([(Delay(value), 1)]) if value else NOW
     return System(Sum.of(_ONE, lag), _UNITY)
+
+
+def distributed_delay(horizon: Any, rate: float | Fraction = 0.0) -> System:
+    r"""Return the delay over a horizon with exponential weights, which has no pole.
+
+    .. math::
+
+        \int_0^h e^{at} e^{-st}\, \mathrm{d}t = \frac{1 - e^{-(s - a) h}}{s - a}
+
+    Parameters
+    ----------
+    horizon : float, Fraction, or delay
+        h in s, positive; a delay as `delay` made it, to use the object that the loop has.
+    rate : float or Fraction, optional
+        a in rad/s. ``distributed_delay(h) / h`` is the uniform kernel.
+
+    Returns
+    -------
+    System
+        Whose numerator and denominator share the zero s = a. It is known (`System.known`), and
+        no count, root or value has it.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the horizon is no positive number and no delay, or the rate is not finite and real.
+
+    Examples
+    --------
+    The predictor of finite spectrum assignment, for an unstable process with a delay of 1 s:
+
+    >>> import math
+    >>> from armlock import delay, distributed_delay, rightmost_root, s
+    >>> z, gain = delay(1.0), 3.0
+    >>> predictor = gain * math.e / (1 + gain * distributed_delay(z, 1.0))
+    >>> print(f"{rightmost_root(predictor * z / (s - 1)):.6f}")
+    -2.000000+0.000000j
+    """
+    late = horizon if isinstance(horizon, System) else delay(horizon)
+    if late.denominator == late.numerator:
+        raise ValueError(f"horizon must be positive, got {horizon}")
+    one = delay_object(late)
+    a = rate if isinstance(rate, Fraction) else Fraction(real_number("rate", rate))
+    turned = Lag([(Delay(one.theta, one.mark, a * one.theta), 1)])
+    above = _UNITY + -Sum.of(_ONE, turned)
+    return System(above, Sum.of(polynomial([-a, 1])), known={a: 1})
 
 
 def delay_object(system: System) -> Delay:
@@ -813,4 +960,6 @@ def equation(d: Any, step: float = 0.0) -> System:
             whole_steps("delay", float(lag.time), step)
         if above.degree:
             raise ValueError("a map must hold no s: its terms are numbers times delays")
-    return with_others(lambda one: System(one.numerator, Sum({}), one.nominal, step), system)
+    return with_others(
+        lambda one: System(one.numerator, Sum({}), one.nominal, step, one.known), system
+    )

@@ -16,6 +16,7 @@ LAYERS = [
     "controllers",
     "systems",
     "affine",
+    "matrices",
     "sensors",
     "loops",
     "stability",

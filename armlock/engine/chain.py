@@ -52,11 +52,13 @@ class Delay:
     """A delay object: theta in s, and the mark by which it differs from all others.
 
     Two objects are two delays even if they are equally long: a small change of one of them
-    alone is a small change of the loop. The mark is the same in other processes.
+    alone is a small change of the loop. The mark is the same in other processes. With a growth
+    x it stands for exp(x) times the delay.
     """
 
     theta: Fraction
     mark: str = field(default_factory=lambda: uuid4().hex)
+    growth: Fraction = Fraction(0)
 
     def __hash__(self) -> int:
         """Hash the mark alone, which is faster."""
@@ -70,7 +72,9 @@ class Lag(tuple[tuple[Delay, int], ...]):
     def of(cls, powers: Mapping[Delay, int]) -> Self:
         """Return the product of objects to these powers."""
         pairs = ((delay, n) for delay, n in powers.items() if n)
-        return cls(sorted(pairs, key=lambda pair: (pair[0].theta, pair[0].mark)))
+        return cls(
+            sorted(pairs, key=lambda pair: (pair[0].theta, pair[0].mark, pair[0].growth))
+        )
 
     def times(self, other: Lag) -> Lag:
         """Return the product of two."""
@@ -89,6 +93,20 @@ class Lag(tuple[tuple[Delay, int], ...]):
     def time(self) -> Fraction:
         """The delay of the product, in s."""
         return sum((delay.theta * n for delay, n in self), Fraction(0))
+
+    @cached_property
+    def growth(self) -> Fraction:
+        """The x of the factor exp(x) before the delay."""
+        return sum((delay.growth * n for delay, n in self), Fraction(0))
+
+    @property
+    def plain(self) -> Lag:
+        """The product without that factor."""
+        found: dict[Delay, int] = {}
+        for one, n in self:
+            plain = Delay(one.theta, one.mark)
+            found[plain] = found.get(plain, 0) + n
+        return Lag.of(found)
 
 
 #: The product of no delays.

@@ -10,11 +10,12 @@ of the imaginary axis: a frequency past which one term exceeds all others.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from math import factorial
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import mpmath
@@ -71,6 +72,9 @@ class Space:
     step : float, optional
         Sampling step in s of which all delays are multiples, if the functions are those of a
         map. They repeat along the axis, which then ends at pi / step.
+    known : mapping of Fraction to int, optional
+        Real numbers at which all functions have a zero, and its order at least: zeros that are
+        no roots of the system (Lemma 23).
     """
 
     def __init__(
@@ -78,9 +82,10 @@ class Space:
         polynomials: Sequence[Polynomial],
         delays: Iterable[Lag | Fraction],
         step: float = 0.0,
+        known: Mapping[Fraction, int] = MappingProxyType({}),
     ) -> None:
         self.polynomials = tuple(polynomials)
-        self.step = step
+        self.step, self.known = step, known
         given = (
             lag if isinstance(lag, Lag) else Lag([(Delay(Fraction(lag), ""), 1)])
             for lag in delays
@@ -124,6 +129,10 @@ class Space:
         #: Sizes of roots and of one over the longest delay, ascending, in rad/s.
         self.corners = np.unique(np.append(sizes[sizes > 0.0], unit))
         self.sums = np.abs(roots).sum(axis=1)
+
+    def known_right_of(self, sigma: float) -> int:
+        """How many of the known zeros, but those at s = 0, have a larger real part."""
+        return sum(k for a, k in self.known.items() if a and a > sigma)
 
     def around_roots(self, number: int = 200) -> FloatArray:
         """Frequencies around complex roots, closest where a function changes most.

@@ -8,6 +8,7 @@ last count says that no zero lies further right.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from fractions import Fraction
 from itertools import zip_longest
 from typing import NamedTuple
@@ -20,7 +21,7 @@ from armlock.engine import chain, decide, inclusion
 from armlock.engine.chain import UndecidedError
 from armlock.engine.decide import BOUNDARY, UNCONFINED
 from armlock.engine.functions import Function, Space
-from armlock.engine.polynomials import Polynomial
+from armlock.engine.polynomials import Polynomial, polynomial
 
 # How far right of the zero that is returned no other one lies: the first share of abs(s), or of
 # one over the longest delay, if so fine a count is decided in so few steps. Otherwise it is the
@@ -42,12 +43,18 @@ _TURNS_FURTHER, _MOST_TURNS_FURTHER = 4.0, 3e4
 _STEPS, _EXTENDED_STEPS, _MULTIPLE_STEPS = 12, 100, 50
 # Most zeros near a line that are tried in extended precision.
 _MOST_TRIED = 8
+# Next to a known zero, to this share, none is looked for.
+_NEXT_TO_KNOWN = 1e-4
 # Zeros down to so many times one over the longest delay are looked for in steps of their size.
 _SLOWEST = 1e-9
 # So many times one over the longest delay left of the axis an exponential is no float.
 _LARGEST_EXPONENT = 600.0
 # Digits of a zero, and those that cancelling terms and multiple zeros take besides.
 _DIGITS, _GUARD_DIGITS = 20, 80
+
+
+#: Real numbers at which a function has zeros that are left out, and their orders.
+_Known = Mapping[Fraction, int]
 
 
 class RootError(RuntimeError):
@@ -73,8 +80,8 @@ class RootError(RuntimeError):
         return type(self), (str(self), self.estimate)
 
 
-def _polished(function: Function, common: int, start: complex) -> complex | None:
-    """Follow Newton's method for F(s) / s^common in extended precision to a zero.
+def _polished(function: Function, known: _Known, start: complex) -> complex | None:
+    """Follow Newton's method for F without known zeros in extended precision to a zero.
 
     Of a pair it is the upper one. None if the method does not settle.
     """
@@ -84,11 +91,13 @@ def _polished(function: Function, common: int, start: complex) -> complex | None
         digits = mpmath.mpf(10) ** -_DIGITS
         for step in range(_EXTENDED_STEPS):
             value, slope = function.exact_value_and_slope(s)
-            if common and s == 0:
+            # Of the zeros a fraction is known exactly.
+            away = [(s - mpmath.mpf(a.numerator) / a.denominator, k) for a, k in known.items()]
+            if any(abs(d) <= mpmath.eps * abs(s) for d, _ in away):
                 return None
             if value == 0:
                 break
-            slope = slope / value - (common / s if common else 0)
+            slope = slope / value - sum(k / d for d, k in away)
             if slope == 0:
                 return None
             move = 1 / slope
@@ -121,10 +130,11 @@ class _Line(NamedTuple):
 
 
 class _Search:
-    """A search for the rightmost zero of F(s) / s^common, and how many steps it has taken."""
+    """A search for the rightmost zero that is not known, and how many steps it has taken."""
 
-    def __init__(self, function: Function, common: int) -> None:
-        self.function, self.common, self.steps = function, common, 0.0
+    def __init__(self, function: Function, known: _Known) -> None:
+        self.function, self.known, self.steps = function, known, 0.0
+        self.common = known.get(Fraction(0), 0)
         self.unit = 1.0 / function.space.longest
         self.further, self.points = _TURNS_FURTHER, 0
 
@@ -173,13 +183,13 @@ class _Search:
         return found
 
     def _moved(self, s: ComplexArray, move: ComplexArray) -> tuple[ComplexArray, FloatArray]:
-        """Return where Newton's method for F(s) / s^common leads, and how far.
+        """Return where Newton's method for F without known zeros leads, and how far.
 
         `move` is F over its derivative at s.
         """
         with np.errstate(all="ignore"):
-            if self.common:
-                move = move / (1.0 - self.common * move / s)
+            known = [k * move / (s - float(a)) for a, k in self.known.items()]
+            move = move / (1.0 - sum(known)) if known else move
             length = np.abs(move)
         return s - move, np.where(np.isnan(length), np.inf, length)
 
@@ -216,10 +226,13 @@ class _Search:
         found = s[
             length <= np.minimum(1e-5 * line.turn, 1e-3 * np.abs(s) + _SLOWEST * line.turn)
         ]
+        for a in filter(None, map(float, self.known)):
+            # Next to a known zero all is rounding.
+            found = found[np.abs(found - a) > _NEXT_TO_KNOWN * max(abs(a), self.unit)]
         for top in found[np.argsort(-found.real, kind="stable")][:_MOST_TRIED]:
             equal = found[found.real >= top.real - _FINEST * max(abs(top), self.unit)]
             lowest = equal[np.argmin(np.abs(equal.imag))]
-            root = _polished(self.function, self.common, complex(lowest))
+            root = _polished(self.function, self.known, complex(lowest))
             if root is not None:
                 return root, root.real + float(top.real - lowest.real)
         return None
@@ -257,15 +270,17 @@ def _last_crossing(space: Space, steady: FloatArray, delayed: FloatArray) -> flo
     return float(omega[min(met[-1] + 1, 499)]) if met.size else 2.0 * np.pi / space.longest
 
 
-def _without_delay(function: Function, common: int) -> complex:
+def _without_delay(function: Function, known: _Known) -> complex:
     """Return the rightmost zero of a function that no delay acts on."""
     parts = [
         [weight * c for c in p.exact]
         for p, weight in zip(function.space.polynomials, function.steady, strict=True)
     ]
-    whole = [sum(powers) for powers in zip_longest(*parts, fillvalue=Fraction(0))][common:]
-    starts = Polynomial.of(whole).roots if any(whole) else ()
-    roots = [_polished(function, common, s) for s in starts]
+    whole = polynomial(sum(powers) for powers in zip_longest(*parts, fillvalue=Fraction(0)))
+    for a, k in known.items():
+        whole //= polynomial([-a, 1]) ** k
+    starts = Polynomial.of(whole.coeffs()).roots if whole else ()
+    roots = [_polished(function, known, s) for s in starts]
     if not roots:
         raise ValueError("the parameters must leave a loop with roots: D is constant")
     if None in roots:
@@ -286,7 +301,7 @@ def rightmost_zero(function: Function, common: int = 0) -> complex:
     function : Function
         Not zero.
     common : int, optional
-        Order of a zero at s = 0 that is left out.
+        Order of a zero at s = 0 that is left out, as the known zeros of the space are.
 
     Raises
     ------
@@ -295,9 +310,11 @@ def rightmost_zero(function: Function, common: int = 0) -> complex:
     RootError
         If no zero is certified.
     """
+    known = {**function.space.known, Fraction(0): common}
+    known = {a: k for a, k in known.items() if k}
     if not function.delayed.any():
-        return _without_delay(function, common)
-    search, best = _Search(function, common), complex(np.nan, np.nan)
+        return _without_delay(function, known)
+    search, best = _Search(function, known), complex(np.nan, np.nan)
     # There are zeros right of `low`, as far as is decided, and none right of `high`.
     first = search.first_line()
     low, high, sigma, width = -np.inf, np.inf, max(0.0, first), search.unit

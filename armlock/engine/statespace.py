@@ -56,18 +56,19 @@ def _magnitude(terms: Iterable[Any]) -> Fraction:
     return sum((Fraction(int(abs(t.p)), int(t.q)) for t in terms), Fraction(0))
 
 
-def doubts(a: Any) -> tuple[Fraction, ...]:
+def doubts(a: Any, sizes: Any = None) -> tuple[Fraction, ...]:
     """Return what rounding of A may make of the lowest coefficients of det(s - A).
 
     Of as many as may all be meant to be zero, and at most two. The derivative of det(s - A) by
-    an entry of A is a cofactor of s - A.
+    an entry of A is a cofactor of s - A. Sizes are those of the entries, where these are sums.
     """
     if not len(a):
         return ()
     matrix = _matrix(a)
+    weights = matrix if sizes is None else _matrix(sizes)
     found: list[Fraction] = []
     for c, adjugate in zip(*_cofactors(matrix), strict=False):
-        pairs = zip(matrix.entries(), adjugate.transpose().entries(), strict=True)
+        pairs = zip(weights.entries(), adjugate.transpose().entries(), strict=True)
         bound = ROUNDED * _magnitude(x * y for x, y in pairs)
         if len(found) == MOST_IN_DOUBT or (c and abs(c) >= bound):
             break

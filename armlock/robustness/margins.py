@@ -238,15 +238,14 @@ def _with_free_phases(system: System, objects: tuple[System, ...], above: float)
             f"disc, got {system!r}"
         )
     # Terms with the same powers of these delays turn together.
-    kinds = {
-        lag: tuple(pair for pair in lag if pair[0] in free) for lag in system.numerator.lags
-    }
+    given = system.numerator.rounded()
+    kinds = {lag: tuple(pair for pair in lag if pair[0] in free) for lag in given.lags}
     names = {kind: f"arm{k}" for k, kind in enumerate(dict.fromkeys(kinds.values())) if kind}
     above_line = Sum({})
-    for (lag, _), p in system.numerator.terms.items():
+    for (lag, _), p in given.terms.items():
         own = Lag(pair for pair in lag if pair[0] not in free)
-        given = (names[kinds[lag]],) if kinds[lag] else ()
-        above_line = above_line + Sum.of(p, own, *given)
+        arm = (names[kinds[lag]],) if kinds[lag] else ()
+        above_line = above_line + Sum.of(p, own, *arm)
     affine = Affine(System(above_line, system.denominator), tuple(names.values()))
     arms = tuple(f for f in affine.n[1:] if not f.is_zero)
     return Free(affine.n[0], affine.m[0], arms, above)

@@ -428,6 +428,8 @@ def stable_half_differences(
     mean = 0.5 * (float(one.theta) + float(other.theta))
     start = 0.5 * (float(one.theta) - float(other.theta))
     here = system.at(**system.given((), {}))
+    if here.known:
+        raise ValueError(f"loop must hold no distributed delay, got {system!r}")
     at_start = int(unstable_roots(here))
     if at_start != 0:
         raise ValueError(f"loop must be stable as it is, but unstable_roots gives {at_start}")

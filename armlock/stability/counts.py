@@ -139,7 +139,8 @@ def _with_zeros(affine: Affine, points: FloatArray) -> IntArray:
         )
         d = [a + b for a, b in zip(n, m, strict=True)]
         orders = [_order(a) for a in (n, m, d)]
-        cancelled = 0 if affine.m_is_zero else min(orders[:2])
+        apart = affine.space.known.get(Fraction(0), 0)
+        cancelled = apart if affine.m_is_zero else min(orders[:2])
         if orders[2] == _TERMS:
             continue
         if not orders[2]:

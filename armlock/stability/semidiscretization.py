@@ -94,13 +94,18 @@ def realize(
     return state, [DelayedTerm(float(t), column, direct) for t, (column, direct) in terms]
 
 
+def _continuous(system: Any) -> System:
+    """Return a system that is no map and whose roots are all those of D, or raise."""
+    found = System.of(system)
+    if found.step or found.known:
+        what = f"a map with step {found.step}" if found.step else "a distributed delay"
+        raise ValueError(f"system must be in continuous time, with delays alone, got {what}")
+    return found
+
+
 def _at_point(system: Any, values: Any, numbers: Any) -> Sum:
     """Return D at given parameters."""
-    system = System.of(system)
-    if system.step:
-        raise ValueError(
-            f"system must be in continuous time, got a map with step {system.step}"
-        )
+    system = _continuous(system)
     given = {k: real_number(k, v) for k, v in system.given(values, numbers).items()}
     here = system.at(**given)
     found: Sum = here.numerator + here.denominator
@@ -475,11 +480,7 @@ def semi_discretization(
     >>> unstable_roots(semi_discretization(CommonArm(), step=0.05), [0.9, 0.5], [1.05, 1.6])
     array([0, 5])
     """
-    step, system = _checked(step, order), System.of(system)
-    if system.step:
-        raise ValueError(
-            f"system must be in continuous time, got a map with step {system.step}"
-        )
+    step, system = _checked(step, order), _continuous(system)
     system = system.at(**numbers)
     return with_others(lambda one: _map_of(one, step, order), system)
 
