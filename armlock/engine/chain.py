@@ -25,7 +25,7 @@ import numpy as np
 from flint import arb, fmpq, fmpq_poly
 
 from armlock.checks import BoolArray, FloatArray
-from armlock.engine.polynomials import exact
+from armlock.engine.polynomials import exact, rounded
 
 # Most cells of the torus that are looked at, some seconds.
 _MOST_CELLS = 1_000_000
@@ -289,7 +289,11 @@ def hull_reserve(lags: Sequence[Lag], still: FloatArray, late: FloatArray) -> fl
 
 
 def line_limit(
-    lags: Sequence[Lag], still: FloatArray, late: FloatArray, start: float, rounding: float
+    lags: Sequence[Lag],
+    f: Sequence[Fraction],
+    g: Sequence[Fraction],
+    start: float,
+    rounding: float,
 ) -> float:
     """First t >= start at which the chain of f + t g is not confined; inf where it always is.
 
@@ -297,17 +301,16 @@ def line_limit(
     ----------
     lags : sequence of Lag
         The K products.
-    still, late : float arrays, shapes (2,) and (2, K)
-        Of f and of g.
+    f, g : sequence of Fraction, length 1 + K
+        The coefficients of P: that of the undelayed term, and those of the products.
     start : float
         Where to begin.
     rounding : float
         The share of the undelayed term that has to be left.
     """
-    a, b = (np.append(still[k], late[k]) for k in range(2))
-    a, b = (np.where(np.abs(v) <= 2.0**-48 * np.abs(v).max(), 0.0, v) for v in (a, b))
+    a, b = (np.array(v, np.float64) for v in (f, g))
     if not shared(lags, (np.abs(a[1:]) + np.abs(b[1:]))[None]).any():
-        return _plain_line_limit(a, b, start, rounding)
+        return _plain_line_limit(f, g, Fraction(start), Fraction(rounding))
     t, slope = start, float(np.abs(b).sum())
     for _ in range(_MOST_STEPS):
         v = a + t * b
@@ -321,28 +324,28 @@ def line_limit(
     raise UndecidedError(f"the limit of the neutral chain is not found, from t = {t:.6g} on")
 
 
-def _plain_line_limit(a: FloatArray, b: FloatArray, start: float, rounding: float) -> float:
-    """Do what `line_limit` does, where the sum of magnitudes is the rule (Lemma 14).
+def _plain_line_limit(
+    f: Sequence[Fraction], g: Sequence[Fraction], start: Fraction, rounding: Fraction
+) -> float:
+    """Do what `line_limit` does, exactly, where the sum of magnitudes is the rule (Lemma 14).
 
     What is left of the undelayed term is linear in t between the t at which a term vanishes.
     """
-    with np.errstate(all="ignore"):
-        breaks = (-a / b)[b != 0.0]
-    ends = [start, *np.unique(breaks[breaks > start]).tolist()]
+    breaks = {-a / b for a, b in zip(f, g, strict=True) if b}
 
-    def left(t: float) -> float:
-        v = np.abs(a + b * t)
-        return float(v[0] - v[1:].sum() - rounding * v[0])
+    def left(t: Fraction) -> Fraction:
+        still, *late = (abs(a + b * t) for a, b in zip(f, g, strict=True))
+        return still - sum(late) - rounding * still
 
-    for low, high in zip(ends, [*ends[1:], math.inf], strict=True):
+    ends = [start, *sorted(t for t in breaks if t > start)]
+    for low, high in zip(ends, [*ends[1:], None], strict=True):
         at_low = left(low)
-        if at_low <= 0.0:
+        if at_low <= 0:
             return float(low)
-        inside = low + min(0.5 * (high - low), 1.0 + abs(low))
+        inside = high or low + 1
         slope = (left(inside) - at_low) / (inside - low)
-        t = low - at_low / slope if slope < 0.0 else math.inf
-        if t <= high and math.isfinite(t):
-            return float(t)
+        if slope < 0 and (high is None or low - at_low / slope <= high):
+            return float(rounded([low - at_low / slope])[0])
     return math.inf
 
 

@@ -18,10 +18,10 @@ import numba
 import numpy as np
 
 from armlock.checks import FloatArray, IntArray
-from armlock.engine import chain, inclusion
+from armlock.engine import chain, extended, inclusion
 from armlock.engine.chain import UndecidedError
 from armlock.engine.functions import Function, Leading, Space, compiled, stacked
-from armlock.engine.inclusion import DISTANCE, VERTEX, Functions, Question
+from armlock.engine.inclusion import DISTANCE, REAL, VERTEX, Functions, Question
 from armlock.engine.polynomials import rounded
 
 #: What a count is where a root lies on the axis, or rounding does not decide on which side.
@@ -34,6 +34,9 @@ UNDECIDED = -3
 # Most steps of a count, and of a search; up to ten seconds each.
 _MOST_STEPS = 1_500_000
 _MOST_SEARCHED = 2_000_000
+# Most intervals that are decided in extended precision, and how far they reach beyond what
+# double precision does not decide, over the longest delay.
+_MOST_EXTENDED, _AROUND = 12, 1e-5
 # Steps between two looks at the keyboard.
 _A_WHILE = 100_000
 # Steps in likely intervals before a search.
@@ -328,8 +331,10 @@ def _searched(
     best: float,
     where: float,
     most: int = _MOST_SEARCHED,
-) -> tuple[float, float, FloatArray]:
-    """Walk over intervals, the last first; return the best value, where, and what is undecided.
+) -> tuple[float, float, FloatArray, FloatArray]:
+    """Walk over intervals, the last first, until none is left, or several are undecided.
+
+    Returns the best value, where, and the intervals that are undecided and left.
 
     Raises
     ------
@@ -345,7 +350,7 @@ def _searched(
             raise UndecidedError(
                 f"a search takes more than {most:.0e} steps, at {pending[-1, 0]:.3g} rad/s"
             )
-    return best, where, undecided
+    return best, where, undecided, pending
 
 
 def least(
@@ -411,10 +416,30 @@ def least(
     edges[0], edges[-1] = begin, end
     cover = np.column_stack((edges[:-1], edges[1:]))
     order = np.argsort(np.modf(np.arange(len(cover)) * 0.6180339887498949)[0])
-    best, where, left = _searched(functions, question, cover[order], best, where, most)
-    if len(left):
-        raise UndecidedError(f"rounding does not decide at {left[0, 0]:.6g} rad/s")
-    return best, where
+    pending, shortest = cover[order], _AROUND / (family.space.longest or np.inf)
+    for _ in range(_MOST_EXTENDED):
+        best, where, undecided, pending = _searched(
+            functions, question, pending, best, where, most
+        )
+        if not len(undecided):
+            return best, where
+        if goal != REAL or family.space.step:
+            break
+        low, high = undecided[0] + [-shortest, shortest]
+        f, g = family.functions
+        found, omega = extended.first_on(f, g, (low, high), (start, best))
+        best, where = (found, omega) if found < best else (best, where)
+        pending = _without(np.concatenate((undecided, pending)), low, high)
+    raise UndecidedError(f"rounding does not decide at {undecided[0, 0]:.6g} rad/s")
+
+
+def _without(intervals: FloatArray, low: float, high: float) -> FloatArray:
+    """Return what is left of intervals without one."""
+    below, above = intervals.copy(), intervals.copy()
+    below[:, 1] = np.minimum(below[:, 1], low)
+    above[:, 0] = np.maximum(above[:, 0], high)
+    found = np.concatenate((below, above))
+    return found[found[:, 0] < found[:, 1]]
 
 
 def excludes(
@@ -449,8 +474,8 @@ def excludes(
         return True
     # The best distance is zero already, so that the walk only tests.
     question, axis = family.question(DISTANCE, 0.0, 0.0), np.array([[begin, end]])
-    *_, left = _searched(compiled(family.functions), question, axis, 0.0, np.nan, most)
-    return not len(left)
+    *_, undecided, _ = _searched(compiled(family.functions), question, axis, 0.0, np.nan, most)
+    return not len(undecided)
 
 
 def _likely(

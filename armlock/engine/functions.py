@@ -309,6 +309,16 @@ class Function:
         sizes: FloatArray = np.abs(steady - delayed.sum(1)) + np.abs(delayed).sum(1)
         return sizes
 
+    @cached_property
+    def limits(self) -> tuple[Fraction, ...]:
+        """Over s^degree at infinity: what nothing delays, and what delays do, exactly."""
+        lead = [p.lead if p.degree == self.space.degree else 0 for p in self.space.polynomials]
+        still, late = self.steady - self.delayed.sum(axis=1), self.delayed.T
+        return tuple(
+            sum((a * w for a, w in zip(lead, row, strict=True)), Fraction(0))
+            for row in (still, *late)
+        )
+
     @property
     def size_at_infinity(self) -> float:
         """Largest size of the function over s^degree at infinity, whatever these phases."""

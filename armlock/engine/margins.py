@@ -10,25 +10,27 @@ import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
+from flint import fmpq, fmpq_poly
 
 from armlock.engine import chain, decide
 from armlock.engine.chain import UndecidedError
 from armlock.engine.decide import Family, least
-from armlock.engine.functions import Function, Space, common_zeros, keeps_sign_up_to, stacked
+from armlock.engine.functions import Function, common_zeros, keeps_sign_up_to, stacked
 from armlock.engine.inclusion import DELAY, DISTANCE, EPSILON, PHASE, REAL, TERM, VERTEX
-from armlock.engine.polynomials import Polynomial, rounded
+from armlock.engine.polynomials import Polynomial, exact, on_axis, polynomial, rounded
 
 # Gain factors up to which a search goes at first, and then goes on. Past the first one it ends
 # after so many steps if it has found nothing.
-_GAINS = 1e4, 1e8, 1e12, 1e24, 1e48, 1e96, 1e192
-_FEW_STEPS, _STEPS_OF_A_PROOF = 20_000, 200_000
-# Past this gain, rounding hides whether a neutral root chain is confined.
-_CHAIN_KNOWN = 1e12
+_GAINS = *(10.0**k for k in range(4, 17)), 1e24, 1e48, 1e96, 1e192
+_FEW_STEPS, _STEPS_OF_A_PROOF = 1_000_000, 200_000
 # So close to the limit of the neutral root chain, as a share, no root is looked for.
 _NEXT_TO_THE_CHAIN = 1e-5
+# And so close to it, as a share, what rounding hides is that limit.
+_DECIDED_SHARE = 1e-6
 # What is left of the undelayed term at high frequency is decided if it is this share of it.
 _DECIDED = 256.0 * EPSILON
 # Largest delay margin in s: beyond it there is none.
@@ -88,9 +90,7 @@ class Margins:
     ----------
     gain_lower, gain_upper : float
         The loop stays stable for every gain factor between the two; 0 and inf where this is
-        proven for all. Where larger factors are not decided, the upper one is the largest that
-        was looked at, 1e4 or more, and `gain_omega` is nan; the lower one is then 1e-4 or less.
-        nan where the arms' phases are free.
+        proven for all. nan where the arms' phases are free.
     phase : float
         Smallest turn in rad, lag or lead, at a gain crossover that makes the loop marginal;
         inf without a crossover.
@@ -100,6 +100,9 @@ class Margins:
         at high frequency.
     modulus : float
         Smallest |1 + L|.
+    gain_lower_is_bound, gain_upper_is_bound : bool
+        Whether the search ended at that factor, and has found no margin up to it: factors
+        beyond are not decided.
     gain_omega, phase_omega, modulus_omega : float
         Where the upper gain margin, the phase margin and the modulus margin are taken, in
         rad/s; inf where it is the limit at high frequency, nan where there is none.
@@ -122,13 +125,23 @@ class Margins:
     gain_omega: float
     phase_omega: float
     modulus_omega: float
+    gain_lower_is_bound: bool = False
+    gain_upper_is_bound: bool = False
 
     def __repr__(self) -> str:
         """List the margins with their units."""
         units = dict.fromkeys(vars(self), "")
         units |= {name: " rad/s" for name in units if name.endswith("_omega")}
         units |= {"phase": " rad", "delay": " s"}
-        shown = (f"{name}={value}{units[name]}" for name, value in vars(self).items())
+        signs = {
+            "gain_lower": "<=" if self.gain_lower_is_bound else "=",
+            "gain_upper": ">=" if self.gain_upper_is_bound else "=",
+        }
+        shown = (
+            f"{name}{signs.get(name, '=')}{value}{units[name]}"
+            for name, value in vars(self).items()
+            if not name.endswith("_is_bound")
+        )
         return f"Margins({', '.join(shown)})"
 
 
@@ -152,39 +165,51 @@ def at_zero(f: Function, g: Function) -> float:
     return float(rounded([-first.coefficient / other.coefficient])[0])
 
 
-def chain_limit(
-    f: Function, g: Function, start: float, rounding: float = 16.0 * EPSILON
-) -> float:
+def chain_limit(f: Function, g: Function, start: float, rounding: float = 0.0) -> float:
     """First t >= start at which the neutral root chain of f + t g is not confined (Lemma 14).
 
     At least a share `rounding` of the undelayed term has to be left. A map has no such chain.
     """
     if f.space.step:
         return math.inf
-    return chain.line_limit(f.space.lags, *f.space.limits(*stacked([f, g])), start, rounding)
+    return chain.line_limit(f.space.lags, f.limits, g.limits, start, rounding)
 
 
 def first_zero(
-    f: Function, g: Function, most: float, start: float, **options: int
+    f: Function, g: Function, most: float, start: float, high: float = math.inf, **options: int
 ) -> tuple[float, float]:
     """Find the smallest t > start up to `most` at which f + t g has a zero on the axis.
 
-    The options are those of `decide.least`. Returns t and the frequency in rad/s: 0 for a zero
-    at s = 0, inf where the neutral root chain is not confined, nan where nothing is found.
+    Past the frequency `high` there is none. The options are those of `decide.least`. Returns t
+    and the frequency in rad/s: 0 for a zero at s = 0, inf where the neutral root chain is not
+    confined, nan where nothing is found.
+
+    Raises
+    ------
+    UndecidedError
+        If it is not decided, for instance where rounding hides whether the chain is confined.
     """
     best, where = most, math.nan
-    limit = chain_limit(f, g, start)
+    limit, decided = chain_limit(f, g, start), math.inf
     if limit <= start:
         return start, math.inf
     if limit < most:
         best, where = start + (limit - start) * (1.0 - _NEXT_TO_THE_CHAIN), math.inf
-        best = min(best, chain_limit(f, g, start, _DECIDED))
+    if high == math.inf:
+        decided = chain_limit(f, g, start, _DECIDED)
+    if decided < best:
+        best, near = decided, decided >= limit * (1.0 - _DECIDED_SHARE)
+        where = where if near else math.nan
     zero = at_zero(f, g)
     if start < zero < best:
         best, where = zero, 0.0
     if not g.is_zero:
         hull = [(VERTEX, (1.0, start), (0.0, 0.0)), (VERTEX, (1.0, 0.0), (0.0, 1.0))]
-        best, where = least(Family([f, g], [hull]), REAL, best, where, start=start, **options)
+        best, where = least(
+            Family([f, g], [hull]), REAL, best, where, start=start, high=high, **options
+        )
+    if math.isnan(where) and decided < most * (1.0 - _DECIDED_SHARE):
+        raise UndecidedError(f"rounding hides whether the chain is confined from {decided} on")
     return (limit, where) if where == math.inf else (best, where)
 
 
@@ -357,97 +382,105 @@ def _delay(n: Function, m: Function, free: Free | None) -> tuple[float, float]:
     return _crossover(n, m, free, DELAY, arc, _LARGEST_DELAY, math.nan)
 
 
-def _none_past(f: Function, g: Function) -> float:
-    """Frequency past which f + t g has a zero at all t > 0 or at none (Lemma 19).
+def _returns_end(m: Function, n: Function, least: float) -> float:
+    """Frequency past which N + u M is not zero for any u > `least`, at any phases (Lemma 19).
 
-    It is a bound for a polynomial f; inf if the lemma does not give one.
+    Where it is zero for one of these u, it is zero for all. inf if the lemma gives none, or if
+    M has delays.
     """
-    if f.delayed.any():
+    if m.delayed.any():
         return math.inf
-    polynomials = f.space.polynomials
-    used = [j for j, w in enumerate(g.delayed) if g.steady[j] or w.any()]
-    own = Space([polynomials[j] for j in used], f.space.lags)
-    steady, delayed = g.steady[used], g.delayed[used]
-    still = steady - delayed.sum(1)
-    # Re(g conj(q)) is not below zero, with q a power of s, from some frequency on.
-    n = own.degree
-    top = sum(p.lead * a for p, a in zip(own.polynomials, still, strict=True) if p.degree == n)
-    start = own.confined_from(*(w.astype(np.float64)[None] for w in (steady, delayed)))[0]
-    bounds = [(float(start), Polynomial.of([*[0] * n, top]))]
-    if len(used) == 1 and abs(still[0]) >= np.abs(delayed).sum():
-        # The bracket of a single polynomial has no negative real part, at any frequency.
-        bounds.append((0.0, own.polynomials[0] * Polynomial.of([still[0]])))
-    whole = Polynomial.of([])
-    for p, weight in zip(polynomials, f.steady, strict=True):
-        whole = whole + p * Polynomial.of([weight])
-    ends = [math.inf]
-    for start, q in bounds:
-        real, imaginary = _on_the_axis(whole, q)
-        if real.lead >= 0:
-            ends.append(max(start, _last(real)))
-        if len(used) == 1 and not delayed.any() and imaginary:
-            ends.append(_last(imaginary))
-    return min(ends)
-
-
-def _on_the_axis(p: Polynomial, q: Polynomial) -> list[Polynomial]:
-    """Return Re(p conj(q)) and Im(p conj(q)) / omega, as polynomials of omega^2."""
-    turned = Polynomial.of(c * (-1) ** k for k, c in enumerate(q.exact))
-    product = (p * turned).exact
-    return [
-        Polynomial.of(c * (-1) ** k for k, c in enumerate(product[odd::2])) for odd in (0, 1)
+    polynomials, still = n.space.polynomials, n.steady - n.delayed.sum(axis=1)
+    parts = (
+        sum(
+            (polynomial(w * c for c in p.exact) for w, p in zip(f, polynomials, strict=True)),
+            fmpq_poly([0]),
+        )
+        for f in (still, m.steady, *n.delayed.T)
+    )
+    own, other, *late = parts
+    late = [p for p in late if p]
+    # As large as the delayed terms are next to each other at high frequency.
+    corner, degree = Fraction(n.space.corners[-1]), max((p.degree() for p in late), default=0)
+    shares = [
+        abs(p.leading_coefficient()) * exact(corner ** (p.degree() - degree)) for p in late
     ]
+    sizes = (on_axis(p, p) / share for p, share in zip(late, shares, strict=True))
+    a = on_axis(own, own) - sum(shares, fmpq(0)) * sum(sizes, fmpq_poly([0]))
+    b, c, u = on_axis(own, other), on_axis(other, other), exact(least)
+    # a + 2 b u + c u^2 bounds what is left of abs(N + u M)^2.
+    ends = [
+        max(map(_positive_past, parts))
+        for parts in ((b, a + 2 * b * u + c * u**2), (a, a * c - b * b))
+    ]
+    return min(ends if a * c != b * b else ends[:1])
 
 
-def _last(p: Polynomial) -> float:
-    """Return the square root of the largest positive root, a little more for its rounding."""
-    squares = [root.real for root in p.roots if root.imag == 0.0 < root.real]
+def _positive_past(p: fmpq_poly) -> float:
+    """Return the omega past which a polynomial of omega^2 is not negative, or inf."""
+    if p and p.leading_coefficient() < 0:
+        return math.inf
+    squares = [z.real for z in Polynomial.of(p.coeffs()).roots if z.imag == 0.0 < z.real]
     return math.sqrt(max(squares, default=0.0)) * (1.0 + 1e-14)
 
 
-def _no_zero_beyond(f: Function, g: Function, most: float) -> bool:
-    """Tell whether f + t g has no zero on the axis for any t from `most` on; True is proven."""
+def _no_zero_beyond(f: Function, g: Function, most: float, end: float) -> bool:
+    """Tell whether f + t g has no zero on the axis for any t from `most` on; True is proven.
+
+    Past the frequency `end` there is none.
+    """
     if at_zero(f, g) > most or chain_limit(f, g, most) < math.inf:
         return False
     hull = [(VERTEX, (1.0, most), (0.0, 0.0)), (VERTEX, (0.0, 1.0), (0.0, 0.0))]
     family = Family([f, g], [hull])
     # Where F conj(G) is not real, no real t makes F + t G zero.
     begin = family.begins(0.0) or keeps_sign_up_to(f, g, odd=True)
-    end = _none_past(f, g)
     return end == 0.0 or decide.excludes(family, begin, end, _STEPS_OF_A_PROOF)
 
 
-def _gain_up(m: Function, n: Function) -> tuple[float, float]:
-    """First k > 1 at which M + k N has a zero on the axis, and where.
+class GainLimit(NamedTuple):
+    """First t > 1 at which f + t g has a zero on the axis, and where in rad/s.
 
-    inf is proven. If neither is found, k is the largest one that was looked at. The frequency
-    is nan for both.
+    `is_bound` says that t is the largest one that was looked at, and that no zero was found.
     """
-    if m.is_zero or n.is_zero:
-        return math.inf, math.nan
-    looked_at, neutral = 1.0, n.space.limits(*n.weights)[1].any()
-    for most in [gain for gain in _GAINS if gain <= _CHAIN_KNOWN or not neutral]:
+
+    t: float
+    omega: float = math.nan
+    is_bound: bool = False
+
+
+def _gain_limit(f: Function, g: Function, end: Callable[[float], float]) -> GainLimit:
+    """Search until a zero is found, or none is proven to be, or the steps are used up.
+
+    `end` returns the frequency past which f + t g is not zero for any t up to a given one.
+    """
+    if f.is_zero or g.is_zero:
+        return GainLimit(math.inf)
+    looked_at = 1.0
+    for most in _GAINS:
         try:
-            options = {"patience": _FEW_STEPS} if looked_at > 1.0 else {}
-            found, where = first_zero(m, n, most, 1.0, **options)
+            # What was looked at overlaps: a search leaves a share of 1e-6.
+            start, first = max(1.0, looked_at * (1.0 - 1e-5)), looked_at == 1.0
+            options = {} if first else {"patience": _FEW_STEPS}
+            found, where = first_zero(f, g, most, start, end(most), **options)
             if not math.isnan(where):
-                return found, where
-            looked_at = most
-            if _no_zero_beyond(m, n, most):
-                return math.inf, math.nan
+                return GainLimit(found, where)
+            looked_at = most * (1.0 - 1e-5)
+            if _no_zero_beyond(f, g, most, end(math.inf)):
+                return GainLimit(math.inf)
         except UndecidedError:
             if looked_at == 1.0:
                 raise
             break
-    return looked_at, math.nan
+    return GainLimit(looked_at, is_bound=True)
 
 
-def gain_range(n: Function, m: Function) -> tuple[float, float, float]:
-    """Gain factors around one between which N / M stays stable, and where the upper one is."""
-    upper, where = _gain_up(m, n)
-    # With t = 1 / k the same.
-    lower, _ = _gain_up(n, m)
-    return 1.0 / lower, upper, where
+def gain_limits(n: Function, m: Function) -> tuple[GainLimit, GainLimit]:
+    """Return limits of the gain k of k N / M: of 1 / k from one up, and of k from one up."""
+    return (
+        _gain_limit(n, m, lambda t: _returns_end(m, n, 1.0)),
+        _gain_limit(m, n, lambda t: _returns_end(m, n, 1.0 / t)),
+    )
 
 
 def margins_of(n: Function, m: Function, free: Free | None = None) -> Margins:
@@ -468,19 +501,21 @@ def margins_of(n: Function, m: Function, free: Free | None = None) -> Margins:
         If a margin is not decided.
     """
     require_stable(n + m, common_zeros(n, m))
-    lower, upper, gain_omega = (math.nan,) * 3 if free else gain_range(n, m)
+    below, above = [GainLimit(math.nan)] * 2 if free else gain_limits(n, m)
     phase, phase_omega = _phase(n, m, free)
     delay, _ = _delay(n, m, free)
     modulus, modulus_omega = modulus_of(n, m, free)
     return Margins(
-        gain_lower=lower,
-        gain_upper=upper,
+        gain_lower=1.0 / below.t,
+        gain_upper=above.t,
         phase=phase if phase_omega == phase_omega else math.inf,
         delay=delay if delay < _LARGEST_DELAY else math.inf,
         modulus=modulus,
-        gain_omega=gain_omega,
+        gain_omega=above.omega,
         phase_omega=phase_omega,
         modulus_omega=modulus_omega,
+        gain_lower_is_bound=below.is_bound,
+        gain_upper_is_bound=above.is_bound,
     )
 
 

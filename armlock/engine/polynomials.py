@@ -191,6 +191,12 @@ def fractions(p: flint.fmpq_poly) -> tuple[Fraction, ...]:
     return tuple(fraction(c) for c in p.coeffs())
 
 
+def on_axis(p: flint.fmpq_poly, q: flint.fmpq_poly) -> flint.fmpq_poly:
+    """Return Re(p conj(q)) at s = j omega as a polynomial of omega^2."""
+    product = p * q(polynomial([0, -1]))
+    return flint.fmpq_poly([(-1) ** k * c for k, c in enumerate(product.coeffs()[::2])])
+
+
 def _factor(root: complex) -> Any:
     """Return s - root, or for a complex root the product with its conjugate."""
     a, b = Fraction(root.real), Fraction(root.imag)

@@ -24,7 +24,7 @@ from armlock.engine.decide import Family
 from armlock.engine.functions import Function, Space, at, stacked
 from armlock.engine.inclusion import VERTEX
 from armlock.engine.margins import first_zero, least_ratio
-from armlock.engine.polynomials import Polynomial, fractions, polynomial
+from armlock.engine.polynomials import Polynomial, fractions, on_axis, polynomial
 
 # The radius is certified to this share, and the scalings are optimal to it.
 _TOLERANCE = 1e-7
@@ -69,16 +69,6 @@ def _fraction(value: flint.arb) -> Fraction:
     return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
 
 
-def _square(p: flint.fmpq_poly) -> flint.fmpq_poly:
-    """Return |p|^2 on the axis as a polynomial in omega^2."""
-    c = p.coeffs()
-    even, odd = (
-        flint.fmpq_poly([(-1) ** i * value for i, value in enumerate(c[first::2])])
-        for first in (0, 1)
-    )
-    return even * even + flint.fmpq_poly([0, 1]) * odd * odd
-
-
 def _roots(p: flint.fmpq_poly) -> list[tuple[flint.acb, int]]:
     """Return the roots with their multiplicities, each in a ball that holds it."""
     found: Any = p.complex_roots()
@@ -115,7 +105,7 @@ def spectral_factor(
         common = common.gcd(p)
     whole = flint.fmpq_poly()
     for p, weight in zip(parts, weights, strict=True):
-        whole += polynomial([weight]) * _square(p / common)
+        whole += polynomial([weight]) * on_axis(p / common, p / common)
     # Without a common factor the sum is positive on the whole axis.
     roots = []
     for x, number in _roots(whole):
@@ -126,7 +116,8 @@ def spectral_factor(
     lead = _fraction(flint.arb(whole.leading_coefficient()).sqrt())
     for more in _ENLARGED:
         f = Polynomial.of_roots(roots) * Polynomial.of([lead * (1 + Fraction(more))])
-        if _is_positive(_square(polynomial(f.exact)) - whole):
+        whole_f = polynomial(f.exact)
+        if _is_positive(on_axis(whole_f, whole_f) - whole):
             return f * Polynomial.of(fractions(common))
     raise UndecidedError("rounding does not decide the sum of the squares of what varies")
 
