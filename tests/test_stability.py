@@ -18,6 +18,7 @@ from armlock import (
     DualArm,
     HayesEquation,
     Loop,
+    SingleArm,
     d_curve,
     equation,
     stability_chart,
@@ -27,6 +28,7 @@ from armlock.affine import Affine
 from armlock.engine.margins import chain_limit
 from armlock.sensors import DIFFERENCE
 from armlock.stability import crossings
+from armlock.stability.counts import count_points
 from tests import independent
 from tests.systems import NEUTRAL, RETARDED, two_delays, with_roots
 from tests.test_in_time import ends_when_interrupted
@@ -374,3 +376,20 @@ def test_an_interrupt_is_heard_while_points_are_counted():
     x, y = np.random.default_rng(0).uniform(-1.2, 1.2, (2, 4000))
     unstable_roots(CommonArm(3e3), 0.0, 0.0)
     assert ends_when_interrupted(lambda: unstable_roots(CommonArm(3e3), x, y)) < 1.0
+
+
+@pytest.mark.parametrize(
+    "system", [CommonArm(), DualArm(), equation(1 + CommonArm()), SingleArm(2.0)], ids=repr
+)
+def test_charts_place_crossings_at_zero_exactly(system, monkeypatch):
+    # On this grid D(0) vanishes at some points of a diagonal, and nearly at others.
+    x, counted = np.linspace(-0.6, 2.6, 41), []
+
+    def noted(affine, points):
+        counted.append(len(points))
+        return count_points(affine, points)
+
+    monkeypatch.setattr("armlock.stability.charts.count_points", noted)
+    found = stability_chart(system, x, x).counts
+    assert sum(counted) < x.size
+    assert (found == unstable_roots(system, *np.meshgrid(x, x))).all()

@@ -9,12 +9,13 @@ not add up, and small charts are counted one by one.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from flint import fmpq
 from tqdm import tqdm  # type: ignore[import-untyped]
 
 from armlock.affine import Affine
@@ -23,7 +24,7 @@ from armlock.engine import chain
 from armlock.engine.decide import BOUNDARY, UNCONFINED, UNDECIDED
 from armlock.engine.functions import Function, stacked
 from armlock.engine.inclusion import EPSILON
-from armlock.engine.polynomials import rounded
+from armlock.engine.polynomials import exact, fraction, rounded
 from armlock.stability.counts import count_points
 from armlock.stability.crossings import crossings
 from armlock.systems import System
@@ -218,103 +219,137 @@ def _chart(affine: Affine, x: FloatArray, y: FloatArray) -> IntArray:
     with tqdm(
         total=x.size * y.size, desc="chart", unit=" points", delay=_PATIENCE, leave=False
     ) as progress:
-        if x.size * y.size <= _FEW:
-            across, up = (v.ravel() for v in np.meshgrid(x, y))
+        rows = _Rows.of(affine, float(x[x.size // 2]), float(y[y.size // 2]))
+        if x.size * y.size <= _FEW or not rows.plain:
+            across, up = _points(x, y)
             return _counted(affine, across, up, progress).reshape(y.size, x.size)
-        return _filled(affine, x, y, progress)
+        return _filled(affine, rows, x, y, progress)
 
 
-def _filled(affine: Affine, x: FloatArray, y: FloatArray, progress: tqdm) -> IntArray:
-    """Return the counts of a chart, row by row."""
-    rows = _Rows.of(affine, float(x[x.size // 2]), float(y[y.size // 2]))
-    swapped = rows.exchanged()
-    left, right = _ends(x, _OUTSIDE[0])
-    low, high = _ends(y, _OUTSIDE[1])
-    lower, upper = np.full(y.size, left), np.full(y.size, right)
+def _points(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the points of a grid, row by row."""
+    across, up = np.meshgrid(x, y)
+    return across.ravel(), up.ravel()
 
-    def count(x: FloatArray, y: FloatArray) -> IntArray:
-        found = _counted(affine, x, y)
-        # Where D has a root at s = 0, the row does not begin.
-        found[rows.at_zero(x, y)] = BOUNDARY
-        return found
 
-    corners = np.meshgrid([left, right], [low, high])
-    if not rows.plain:
-        base = top = np.full(y.size, BOUNDARY)
-    elif not rows.confined(*(v.ravel() for v in corners)).all():
-        # Rows end half-way between their last confined point and the limit of the chain.
-        inside = np.array(
-            [np.abs(x[rows.confined(x, np.full(x.size, v))]).max(initial=0.0) for v in y]
-        )
-        weight = rows.first.size_at_infinity
-        if weight > 0.0:
-            ends_at = inside + 0.5 * rows.reserve(inside, y) / weight
-            lower, upper = np.maximum(lower, -ends_at), np.minimum(upper, ends_at)
-        base, top = count(lower, y), count(upper, y)
-    elif rows.second.is_zero:
-        ends = count(np.array([left, right]), np.full(2, low))
-        base, top = np.repeat(ends[:, None], y.size, axis=1)
+def _filled(
+    affine: Affine, rows: _Rows, x: FloatArray, y: FloatArray, progress: tqdm
+) -> IntArray:
+    """Return the counts of a chart, row by row; doubtful points are counted one by one."""
+    sides, levels = _ends(x, _OUTSIDE[0]), _ends(y, _OUTSIDE[1])
+    # The confined points are a convex set, because the reserve of the chain is concave.
+    everywhere = bool(rows.confined(*_points(sides, levels)).all())
+    if everywhere:
+        ends = _between_columns(affine, rows, y, sides, levels)
     else:
-        sides = np.array([left, right])
-        at_low, at_high = (count(sides, np.full(2, at)) for at in (low, high))
-        columns, doubtful, _ = swapped.filled(
-            y, sides, np.full(2, low), np.full(2, high), at_low, at_high
-        )
-        for side in range(2):
-            here = doubtful[side]
-            columns[side, here] = count(np.full(here.sum(), sides[side]), y[here])
-        base, top = columns
-    found = np.empty((y.size, x.size), np.int64)
-    start, number = 0, _ROWS
+        ends = _between_own_ends(affine, rows, x, y, sides)
+    found, start, number = np.empty((y.size, x.size), np.int64), 0, _ROWS
     while start < y.size:
-        k = slice(start, min(start + number, y.size))
-        height = k.stop - k.start
-        if rows.plain:
-            some, doubtful, size = rows.filled(x, y[k], lower[k], upper[k], base[k], top[k])
-            confined = rows.confined(*(v.ravel() for v in np.meshgrid(x, y[k]))).reshape(
-                some.shape
-            )
+        k = slice(start, start + number)
+        some, doubtful, size = rows.filled(x, y[k], ends.of(k))
+        if not everywhere:
+            confined = rows.confined(*_points(x, y[k])).reshape(some.shape)
             some[~confined], doubtful = UNCONFINED, doubtful & confined
-        else:
-            some, size = np.empty((height, x.size), np.int64), 0
-            doubtful = np.ones(some.shape, np.bool_)
         # Few entries are found many times as fast in a flat array.
         row, column = np.divmod(np.flatnonzero(doubtful), x.size)
         some[row, column] = _counted(affine, x[column], y[k][row], progress)
         found[k] = some
         progress.update(some.size - row.size)
-        start = k.stop
+        start += number
         number = max(_ROWS, int(number * min(_MANY_CROSSINGS / max(size, 1), 64.0)))
         number = min(number, max(_MANY_POINTS // x.size, 1))
     return found
 
 
-def _ends(values: FloatArray, outside: float) -> tuple[float, float]:
+class _Ends(NamedTuple):
+    """Where rows begin and end, and the counts there; negative where a row cannot begin."""
+
+    lower: FloatArray
+    upper: FloatArray
+    base: IntArray
+    top: IntArray
+
+    def of(self, rows: slice | BoolArray) -> _Ends:
+        """Return those of some rows."""
+        return _Ends(self.lower[rows], self.upper[rows], self.base[rows], self.top[rows])
+
+
+def _counted_ends(affine: Affine, rows: _Rows, x: FloatArray, y: FloatArray) -> IntArray:
+    """Count at ends of rows, which do not begin where D has a root at s = 0."""
+    found = _counted(affine, x, y)
+    found[rows.at_zero(x, y)] = BOUNDARY
+    return found
+
+
+def _between_columns(
+    affine: Affine, rows: _Rows, y: FloatArray, sides: FloatArray, levels: FloatArray
+) -> _Ends:
+    """Let all rows end at two columns, which are filled from counts at four corners."""
+    corners = _counted_ends(affine, rows, *_points(sides, levels)).reshape(2, 2)
+    if rows.second.is_zero:
+        columns = np.repeat(corners[0, :, None], y.size, axis=1)
+    else:
+        low, high = (np.full(2, level) for level in levels)
+        columns, doubtful, _ = rows.exchanged().filled(y, sides, _Ends(low, high, *corners))
+        side, row = np.nonzero(doubtful)
+        columns[side, row] = _counted_ends(affine, rows, sides[side], y[row])
+    lower, upper = (np.full(y.size, side) for side in sides)
+    return _Ends(lower, upper, *columns)
+
+
+def _between_own_ends(
+    affine: Affine, rows: _Rows, x: FloatArray, y: FloatArray, sides: FloatArray
+) -> _Ends:
+    """Let rows end half-way between their last confined point and the limit of the chain."""
+    lower, upper = (np.full(y.size, side) for side in sides)
+    inside = np.array(
+        [np.abs(x[rows.confined(x, np.full(x.size, v))]).max(initial=0.0) for v in y]
+    )
+    weight = rows.first.size_at_infinity
+    if weight > 0.0:
+        ends_at = inside + 0.5 * rows.reserve(inside, y) / weight
+        lower, upper = np.maximum(lower, -ends_at), np.minimum(upper, ends_at)
+    counted = (_counted_ends(affine, rows, side, y) for side in (lower, upper))
+    return _Ends(lower, upper, *counted)
+
+
+def _ends(values: FloatArray, outside: float) -> FloatArray:
     """Return the two places just outside of an ascending axis at which rows begin and end."""
-    span = float(values[-1] - values[0])
-    margin = outside * (span / (values.size - 1) if span else max(abs(float(values[0])), 1e-3))
-    return float(values[0]) - margin, float(values[-1]) + margin
+    first, last = float(values[0]), float(values[-1])
+    step = (last - first) / (values.size - 1) if last > first else max(abs(first), 1e-3)
+    return np.array([first - outside * step, last + outside * step])
 
 
 @dataclass(frozen=True)
 class _Rows:
-    """D = constant + x first + y second, exactly `at_centre` at the point `centre`."""
+    """D = constant + x first + y second, exactly `at_centre` at the point `centre`.
+
+    At s = 0 it is d[0] + x d[1] + y d[2], and M of the loop m[0] + x m[1] + y m[2].
+    """
 
     constant: Function
     at_centre: Function
     first: Function
     second: Function
     centre: tuple[float, float]
+    d: tuple[fmpq, ...]
+    m: tuple[fmpq, ...]
+    is_equation: bool
 
     @classmethod
     def of(cls, affine: Affine, x: float, y: float) -> _Rows:
         """Return D of two parameters, and its value at a centre."""
         constant, first, second = affine.terms
-        return cls(constant, affine.function(x, y), first, second, (x, y))
+        d, m = (tuple(exact(f.series(1)[0]) for f in p) for p in (affine.terms, affine.m))
+        there = affine.function(x, y)
+        return cls(constant, there, first, second, (x, y), d, m, affine.m_is_zero)
 
     def exchanged(self) -> _Rows:
         """Return D with x and y exchanged."""
-        return _Rows(self.constant, self.at_centre, self.second, self.first, self.centre[::-1])
+        d, m = ((constant, second, first) for constant, first, second in (self.d, self.m))
+        return replace(
+            self, first=self.second, second=self.first, centre=self.centre[::-1], d=d, m=m
+        )
 
     @property
     def plain(self) -> bool:
@@ -347,9 +382,8 @@ class _Rows:
 
     def at_zero(self, x: FloatArray, y: FloatArray) -> BoolArray:
         """Tell where rounding hides the sign of D(0)."""
-        exact = [f.series(1)[0] for f in (self.constant, self.first, self.second)]
         # Of many fast poles the product is no float.
-        sizes = rounded([value / (max(map(abs, exact)) or 1) for value in exact])
+        sizes = rounded([fraction(v / (max(map(abs, self.d)) or 1)) for v in self.d])
         sums = np.column_stack((np.ones(x.size), x, y)) * sizes
         return np.asarray(np.abs(sums.sum(axis=1)) <= 8.0 * EPSILON * np.abs(sums).sum(axis=1))
 
@@ -367,32 +401,19 @@ class _Rows:
         return np.where(np.isfinite(found), found, self.first.space.corners[0])
 
     def filled(
-        self,
-        x: FloatArray,
-        y: FloatArray,
-        lower: FloatArray,
-        upper: FloatArray,
-        base: IntArray,
-        top: IntArray,
+        self, x: FloatArray, y: FloatArray, ends: _Ends
     ) -> tuple[IntArray, BoolArray, int]:
-        """Fill rows from their crossings; return counts, which are doubtful, and crossings.
-
-        The counts at x = lower and at x = upper are `base` and `top`.
-        """
-        known = (base >= 0) & (top >= 0)
+        """Fill rows from their crossings; return counts, which are doubtful, and crossings."""
+        known = (ends.base >= 0) & (ends.top >= 0)
         if not known.all():
             # A row without a count at its ends, such as one with a root at s = 0 all along.
-            counts, doubtful = (
-                np.zeros((y.size, x.size), np.int64),
-                np.ones((y.size, x.size), bool),
-            )
-            size = 0
+            counts, size = np.zeros((y.size, x.size), np.int64), 0
+            doubtful = np.ones(counts.shape, np.bool_)
             if known.any():
-                counts[known], doubtful[known], size = self.filled(
-                    x, y[known], lower[known], upper[known], base[known], top[known]
-                )
+                counts[known], doubtful[known], size = self.filled(x, y[known], ends.of(known))
             return counts, doubtful, size
         x0, y0 = self.centre
+        lower, upper, base, top = ends
         found = crossings(
             (self.at_centre, self.second * -1, self.first * -1),
             y - y0,
@@ -413,6 +434,29 @@ class _Rows:
         rounding = 4.0 * EPSILON * (abs(x0) + np.abs(found.x))
         off = found.spread + rounding
         from_k, to_k = np.searchsorted(x, at - off), np.searchsorted(x, at + off, side="right")
+        exactly = inside & (found.omega == 0.0) & (found.jump != 0)
         for i in np.flatnonzero(from_k < to_k):
-            doubtful[found.row[i], from_k[i] : to_k[i]] = True
+            k, here = found.row[i], slice(from_k[i], to_k[i])
+            if exactly[i]:
+                by = int(found.jump[i])
+                left = counts[k, here] - by * (x[here] >= at[i])
+                counts[k, here] = self._past_zero(x[here], float(y[k]), by, left)
+            else:
+                doubtful[k, here] = True
         return counts[:, :-1], doubtful, at.size
+
+    def _past_zero(self, x: FloatArray, y: float, jump: int, left: IntArray) -> IntArray:
+        """Count beside a crossing at s = 0 from the counts left of it; D(0) is known exactly.
+
+        On the crossing D has a simple root s = 0. It does not count if N and M have it too.
+        """
+        found, up = left.copy(), exact(y)
+        d, m = (p[0] + p[2] * up for p in (self.d, self.m))
+        for k, value in enumerate(map(exact, x.tolist())):
+            past = d / self.d[1] + value
+            if past > 0:
+                found[k] += jump
+            elif past == 0:
+                cancels = not self.is_equation and m + self.m[1] * value == 0
+                found[k] = left[k] + min(jump, 0) if cancels else BOUNDARY
+        return found
