@@ -54,10 +54,13 @@ from armlock.performance.pulling import pulling
 from armlock.performance.transfer import transfer
 from armlock.robustness import (
     Margins,
+    box_count,
     critical_perturbation,
+    first_crossing,
     margins,
     modulus_margin,
     peak_gain,
+    stable_half_differences,
     varying_radius,
 )
 from armlock.stability.charts import StabilityChart, stability_chart
@@ -116,6 +119,7 @@ __all__ = [
     "System",
     "amplitude_spectrum",
     "axis_crossings",
+    "box_count",
     "buildable_loop",
     "critical_perturbation",
     "d_curve",
@@ -125,6 +129,7 @@ __all__ = [
     "determinant",
     "distributed_delay",
     "equation",
+    "first_crossing",
     "flight_loop",
     "impulse_response",
     "margins",
@@ -144,6 +149,7 @@ __all__ = [
     "simulate",
     "spectral_radius",
     "stability_chart",
+    "stable_half_differences",
     "state_space",
     "step_response",
     "transfer",

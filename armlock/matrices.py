@@ -207,6 +207,10 @@ def _parts(plant: Any) -> tuple[Any, ...]:
 
 def _array(name: str, matrix: Any) -> Any:
     """Return systems as an array; those of a sequence as one column."""
+    if isinstance(matrix, np.ndarray) and matrix.dtype != object:
+        matrix = real_array(name, matrix).tolist()
+    if not isinstance(matrix, list | tuple | np.ndarray):
+        raise TypeError(f"{name} must be a sequence of rows, got {matrix!r:.200}")
     listed = [row if isinstance(row, list | tuple | np.ndarray) else [row] for row in matrix]
     if len({len(row) for row in listed}) != 1:
         raise ValueError(f"{name} must have rows of one length, got {matrix!r:.200}")

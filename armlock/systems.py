@@ -31,6 +31,7 @@ from armlock.checks import (
     broadcast_shape,
     complex_array,
     not_negative,
+    positive_number,
     real_array,
     real_number,
     whole_steps,
@@ -859,24 +860,24 @@ def distributed_delay(horizon: Any, rate: float | Fraction = 0.0) -> System:
     >>> print(f"{rightmost_root(predictor * z / (s - 1)):.6f}")
     -2.000000+0.000000j
     """
+    if not isinstance(horizon, System | Fraction):
+        horizon = positive_number("horizon", horizon)
     late = horizon if isinstance(horizon, System) else delay(horizon)
-    if late.denominator == late.numerator:
-        raise ValueError(f"horizon must be positive, got {horizon}")
-    one = delay_object(late)
+    one = delay_object(late, "horizon")
     a = rate if isinstance(rate, Fraction) else Fraction(real_number("rate", rate))
     turned = Lag([(Delay(one.theta, one.mark, a * one.theta), 1)])
     above = _UNITY + -Sum.of(_ONE, turned)
     return System(above, Sum.of(polynomial([-a, 1])), known={a: 1})
 
 
-def delay_object(system: System) -> Delay:
+def delay_object(system: System, name: str) -> Delay:
     """Return the object of a system that is one delay, or raise."""
     terms = system.numerator.terms if isinstance(system, System) else {}
     if len(terms) == 1 and system.denominator == _UNITY:
         (((lag, names), p),) = terms.items()
         if len(lag) == 1 and lag[0][1] == 1 and not names and p == _ONE:
             return lag[0][0]
-    raise TypeError(f"a delay must be what delay(theta) returns, got {system!r:.200}")
+    raise TypeError(f"{name} must be what delay(theta) returns, got {system!r:.200}")
 
 
 def parameter(name: str, nominal: float | None = None) -> System:

@@ -33,6 +33,7 @@ from armlock import (
     critical_perturbation,
     d_curve,
     equation,
+    first_crossing,
     margins,
     modulus_margin,
     rightmost_root,
@@ -40,7 +41,6 @@ from armlock import (
     unstable_roots,
 )
 from armlock.affine import Affine
-from armlock.robustness import first_crossing
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
 from armlock.stability.semidiscretization import semi_discretization
 from tests import attack_judge as judge

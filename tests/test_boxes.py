@@ -10,13 +10,13 @@ from armlock import (
     Controller,
     DualArm,
     Loop,
+    box_count,
     buildable_loop,
     paper_loop,
     robust_loop,
     unstable_roots,
 )
 from armlock.controllers import roll_off, table_two
-from armlock.robustness import box_count
 from armlock.sensors import COMMON
 from tests.attack import between, draw, to_loop
 from tests.attack_judge import UndecidedError

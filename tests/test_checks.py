@@ -12,12 +12,11 @@ import numpy as np
 import pytest
 
 import armlock
-from armlock import CommonArm, HayesEquation, SingleArm, equation, paper_loop
+from armlock import CommonArm, HayesEquation, SingleArm, equation, first_crossing, paper_loop
 from armlock.checks import axis, complex_array, finite_series, real_array
 from armlock.controllers import integrating_actuator, roll_off, stage_one, table_two
 from armlock.orbits import kepler
 from armlock.performance.pulling import largest_pulling
-from armlock.robustness import first_crossing
 from armlock.sensors import COMMON, SignalMapping, dual
 from armlock.timedomain.discretize import warped
 from armlock.timedomain.spectra import SpectrumEstimator
@@ -90,6 +89,12 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     roll_off: {"first": 1.0, "last": 2.0, "pairs": 3, "slope": 0.5},
     armlock.delay: {"theta": 1.0},
     armlock.parameter: {"name": "k", "nominal": 1.0},
+    armlock.distributed_delay: {"horizon": 1.0, "rate": 0.5},
+    armlock.determinant: {"matrix": [[2.0]]},
+    armlock.return_difference: {"plant": [[1.0]], "controllers": [2.0]},
+    armlock.state_space: {"a": [[-1.0]], "b": [1.0], "c": [1.0], "d": 0.0},
+    armlock.box_count: {"loop": paper_loop(), "size": 1e-7},
+    armlock.stable_half_differences: {"loop": paper_loop(), "between": paper_loop().arms},
     equation: {"d": 1 + ARMS, "step": 0.0},
     armlock.step_response: {"system": ARMS.feedback(), "timepts": [1.0]},
     armlock.impulse_response: {"system": ARMS.feedback(), "timepts": [1.0]},

@@ -13,6 +13,7 @@ from armlock import (
     CountError,
     Loop,
     System,
+    box_count,
     critical_perturbation,
     delay,
     equation,
@@ -27,7 +28,6 @@ from armlock import (
 from armlock.affine import Affine
 from armlock.controllers import table_two
 from armlock.paper import TABLE_2_POLES, TABLE_2_STAGE_1_POLE, TABLE_2_ZEROS
-from armlock.robustness import box_count
 from armlock.sensors import COMMON
 from armlock.stability.semidiscretization import semi_discretization
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from armlock import Controller, Loop, unstable_roots
-from armlock.robustness import stable_half_differences
+from armlock import Controller, Loop, stable_half_differences, unstable_roots
 from armlock.sensors import COMMON, dual, modified_dual
 
 

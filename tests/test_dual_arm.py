@@ -11,12 +11,12 @@ from armlock import (
     DualArm,
     Loop,
     critical_perturbation,
+    first_crossing,
     margins,
     unstable_roots,
 )
 from armlock.affine import Affine
 from armlock.engine import decide
-from armlock.robustness import first_crossing
 from armlock.sensors import COMMON, DIFFERENCE, dual
 from tests import independent
 from tests.systems import two_delays

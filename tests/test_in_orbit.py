@@ -13,9 +13,16 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from armlock import Controller, DivergenceError, Loop, rightmost_root, simulate, unstable_roots
+from armlock import (
+    Controller,
+    DivergenceError,
+    Loop,
+    rightmost_root,
+    simulate,
+    stable_half_differences,
+    unstable_roots,
+)
 from armlock.orbits import SPEED_OF_LIGHT, kepler
-from armlock.robustness import stable_half_differences
 from armlock.sensors import dual
 
 ROOT = Path(__file__).parents[1]

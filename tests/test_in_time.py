@@ -17,8 +17,10 @@ from armlock import (
     CountError,
     RootError,
     axis_crossings,
+    box_count,
     critical_perturbation,
     d_curve,
+    first_crossing,
     margins,
     modulus_margin,
     nyquist,
@@ -31,7 +33,6 @@ from armlock import (
     varying_radius,
 )
 from armlock.performance.pulling import pulling
-from armlock.robustness import box_count, first_crossing
 from tests import attack
 from tests.attack_judge import Sketch, UndecidedError, View
 

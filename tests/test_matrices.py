@@ -249,7 +249,7 @@ def test_rounding_that_may_hide_an_integrator_is_told():
         (lambda: return_difference([[s]], [1]), ValueError, "must not have more zeros than"),
         (lambda: return_difference([[-1]], [1]), ValueError, "must be well posed"),
         (lambda: distributed_delay(0.0), ValueError, "horizon must be positive"),
-        (lambda: distributed_delay(s), TypeError, "a delay must be what delay"),
+        (lambda: distributed_delay(s), TypeError, "horizon must be what delay"),
         (
             lambda: semi_discretization(distributed_delay(1.0) / s, 0.1),
             ValueError,

@@ -6,6 +6,7 @@ from armlock import (
     CommonArm,
     DualArm,
     HayesEquation,
+    first_crossing,
     paper_loop,
     rightmost_root,
     semi_discretization,
@@ -13,7 +14,6 @@ from armlock import (
     transition_matrix,
     unstable_roots,
 )
-from armlock.robustness import first_crossing
 from armlock.stability.semidiscretization import _within
 from tests.systems import RETARDED
 

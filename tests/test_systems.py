@@ -21,10 +21,12 @@ from armlock import (
     Loop,
     SingleArm,
     System,
+    box_count,
     critical_perturbation,
     d_curve,
     delay,
     equation,
+    first_crossing,
     margins,
     paper_loop,
     parameter,
@@ -33,6 +35,7 @@ from armlock import (
     semi_discretization,
     simulate,
     stability_chart,
+    stable_half_differences,
     unstable_roots,
 )
 from armlock.affine import Affine, basis
@@ -40,7 +43,6 @@ from armlock.controllers import integrating_actuator
 from armlock.engine.chain import reserve
 from armlock.engine.polynomials import polynomial
 from armlock.paper import TAU1, TAU2
-from armlock.robustness import box_count, first_crossing, stable_half_differences
 from armlock.sensors import DIFFERENCE, SignalMapping
 from tests import independent
 from tests.systems import NEUTRAL, RETARDED, two_delays

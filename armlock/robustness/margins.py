@@ -231,7 +231,7 @@ def margins(
 
 def _with_free_phases(system: System, objects: tuple[System, ...], above: float) -> Free:
     """Return L with free phases of some delay objects above a frequency, for the engine."""
-    free = {delay_object(one) for one in objects}
+    free = {delay_object(one, "free") for one in objects}
     if any(d in free for lag in system.denominator.lags for d, _ in lag):
         raise ValueError(
             "the delays of free phase must not stand in the denominator of L: it would fill no "

@@ -206,8 +206,7 @@ def first_crossing(
 
     Examples
     --------
-    >>> from armlock import DualArm
-    >>> from armlock.robustness import first_crossing
+    >>> from armlock import DualArm, first_crossing
     >>> edge = first_crossing(DualArm(gain=10.0), (1.0, 1.0), (1.0, 1.0), stop=3.0)
     >>> print(f"{edge.position:.6f} {edge.omega:.4f}")
     0.254006 3.7746
@@ -334,16 +333,16 @@ def box_count(loop: System, size: float | Mapping[str, float]) -> int:
 
     Examples
     --------
-    >>> from armlock import paper_loop, robust_loop
-    >>> from armlock.robustness import box_count
+    >>> from armlock import box_count, paper_loop, robust_loop
     >>> [box_count(loop, 1e-6) for loop in (robust_loop(), paper_loop())]
     [0, 0]
     >>> box_count(paper_loop(), 1.5e-6)
     -1
     """
     system = System.of(loop, "loop")
-    given = size if isinstance(size, Mapping) else dict.fromkeys(system.parameters, size)
-    half = {name: positive_number(name, value) for name, value in given.items()}
+    if not isinstance(size, Mapping):
+        size = dict.fromkeys(system.parameters, positive_number("size", size))
+    half = {name: positive_number(name, value) for name, value in size.items()}
     at = {name: real_number(name, value) for name, value in system.given((), {}).items()}
     require_certain(system, list(at.values()))
     affine = Affine.of(system) if set(half) == set(at) else Affine(system, tuple(half))
@@ -412,19 +411,18 @@ def stable_half_differences(
     --------
     The sensor of this loop divides by its own half difference of 0.1 s:
 
-    >>> from armlock import paper_loop
-    >>> from armlock.robustness import stable_half_differences
+    >>> from armlock import paper_loop, stable_half_differences
     >>> low, high = stable_half_differences(paper_loop())
     >>> print(f"{low:.4f} s to {high:.4f} s")
     0.0202 s to 0.2454 s
     """
     system = System.of(loop, "loop")
     arms = getattr(loop, "arms", ()) if between is None else between
-    if len(arms) != 2:
+    if not isinstance(arms, tuple | list) or len(arms) != 2:
         raise TypeError(
             "between must hold the two delays that grow apart, as delay() made them"
         )
-    one, other = (delay_object(arm) for arm in arms)
+    one, other = (delay_object(arm, "between") for arm in arms)
     mean = 0.5 * (float(one.theta) + float(other.theta))
     start = 0.5 * (float(one.theta) - float(other.theta))
     here = system.at(**system.given((), {}))
