@@ -33,6 +33,19 @@ from armlock.engine.polynomials import Polynomial
 _System = TypeVar("_System", bound=Any)
 
 
+def _of_systems(name: str) -> Callable[..., Any]:
+    """Return an operator of `armlock.System`, which keeps a rational result a controller."""
+
+    def operator(self: Controller, *others: Any, **more: Any) -> Any:
+        from armlock.systems import System
+
+        found = getattr(System.of(self), name)(*others, **more)
+        return found if found.parameters or found.longest_delay else Controller.of(found)
+
+    operator.__name__, operator.__doc__ = name, f"Do what `System.{name}` does, exactly."
+    return operator
+
+
 @dataclass(frozen=True)
 class Controller:
     r"""A rational function K(s) = gain prod(s - zeros) / prod(s - poles).
@@ -56,6 +69,13 @@ class Controller:
         If a value is not finite, complex ones do not come in conjugate pairs, or the gain
         is zero.
 
+    Notes
+    -----
+    Controllers are combined by ``+ - * / **`` and `feedback` as a `System` is, with numbers,
+    systems of python-control, delays and parameters. What holds no delay and no parameter is a
+    controller again. Where python-control's own operator comes first and raises, as in
+    ``plant / controller``, write ``System.of(plant)`` for ``plant``.
+
     Examples
     --------
     >>> from armlock import Controller
@@ -63,6 +83,9 @@ class Controller:
     >>> complex(lag(0.0))
     (6+0j)
     """
+
+    # numpy leaves arithmetic with such an object to it.
+    __array_ufunc__ = None
 
     numerator: Polynomial
     denominator: Polynomial
@@ -110,9 +133,9 @@ class Controller:
 
         Parameters
         ----------
-        controller : Controller, python-control system, or (zeros, poles, gain)
+        controller : Controller, python-control system, (zeros, poles, gain), or System
             A transfer function or state space of python-control must be continuous in time,
-            with one input and output.
+            with one input and output. A `System` must hold no delay and no parameter.
         integrators : int, optional
             How many poles of a python-control system are zero: 0, 1 or 2. It is needed where
             rounding moved such poles, and a count depends on it.
@@ -150,14 +173,14 @@ class Controller:
             raise ValueError(f"controller must not be zero, got {controller!r:.200}")
         return found
 
-    def __call__(self, s: npt.ArrayLike) -> ComplexArray:
+    def __call__(self, s: npt.ArrayLike, squeeze: Any = None) -> ComplexArray:
         """Evaluate K(s), factor by factor; `s` in rad/s, any shape."""
         return self.numerator.over(self.denominator, complex_array("s", s))
 
-    def __mul__(self, other: Controller) -> Controller:
-        """Return the two in series; common factors stay."""
+    def __mul__(self, other: Any) -> Any:
+        """Do what `System.__mul__` does; factors of controllers stay as they are given."""
         if not isinstance(other, Controller):
-            return NotImplemented
+            return self.__rmul__(other)
         return with_others(
             lambda a, b: Controller.of_polynomials(
                 a.numerator * b.numerator, a.denominator * b.denominator
@@ -166,28 +189,12 @@ class Controller:
             other,
         )
 
-    def __add__(self, other: Controller) -> Controller:
-        """Return the two in parallel, exactly.
-
-        Denominators that are equal up to a factor are one. All others are multiplied, and only
-        powers of s cancel, so that no unstable pole is lost.
-        """
-        if not isinstance(other, Controller):
-            return NotImplemented
-        return with_others(_parallel, self, other)
-
-
-def _parallel(a: Controller, b: Controller) -> Controller:
-    """Return the sum of two controllers."""
-    (n, m), (p, q) = (a.numerator, a.denominator), (b.numerator, b.denominator)
-    ratio = Polynomial.of([m.lead / q.lead])
-    one = m.exact == (q * ratio).exact
-    above, below = (n + p * ratio, m) if one else (n * q + p * m, m * q)
-    if not above:
-        raise ValueError("gain must not be zero: there would be no loop")
-    # Nothing cancels but powers of s.
-    common = min(above.order, below.order)
-    return Controller.of_polynomials(above.over_powers(common), below.over_powers(common))
+    __add__ = __radd__ = _of_systems("__add__")
+    __sub__, __rsub__ = _of_systems("__sub__"), _of_systems("__rsub__")
+    __rmul__ = _of_systems("__mul__")
+    __truediv__, __rtruediv__ = _of_systems("__truediv__"), _of_systems("__rtruediv__")
+    __neg__, __pow__ = _of_systems("__neg__"), _of_systems("__pow__")
+    feedback = _of_systems("feedback")
 
 
 def with_others(make: Callable[..., _System], *systems: Any) -> _System:
@@ -202,8 +209,12 @@ def with_others(make: Callable[..., _System], *systems: Any) -> _System:
 
 def rational(system: Any, integrators: int | None = None) -> Controller:
     """Return what `Controller.of` does, but of a system that is zero too."""
+    from armlock.systems import System
+
     if isinstance(system, tuple) and len(system) == 3:
         system = Controller(*system)
+    if isinstance(system, System):
+        system = _of_system(system)
     if isinstance(system, Controller):
         if integrators is not None:
             raise TypeError(
@@ -254,6 +265,18 @@ def rational(system: Any, integrators: int | None = None) -> Controller:
         found, "others", tuple(Controller.of_polynomials(*other) for other in others)
     )
     return found
+
+
+def _of_system(system: Any) -> Controller:
+    """Return a system without delays and parameters as a controller."""
+    if system.parameters or system.longest_delay or system.is_equation:
+        raise ValueError(f"controller must hold no delay and no parameter, got {system!r:.200}")
+    return with_others(
+        lambda one: Controller.of_polynomials(
+            *(Polynomial.of(p.whole().coeffs()) for p in (one.numerator, one.denominator))
+        ),
+        system,
+    )
 
 
 def check_system(name: str, system: Any, others: str) -> None:
@@ -346,7 +369,8 @@ def table_two(gain: float = paper.CONTROLLER_GAIN, *, denominator: str = "table"
     poles = [-p for p in paper.TABLE_2_POLES]
     if denominator == "printed":
         zeros, poles = zeros[:-1], poles[:-1]
-    return stage_one(gain) * Controller(zeros, poles, 1.0)
+    found: Controller = stage_one(gain) * Controller(zeros, poles, 1.0)
+    return found
 
 
 @lru_cache
@@ -393,7 +417,8 @@ def white_paper(gain: float = 40.0) -> Controller:
     p1, p2, z3, p3 = (2.0 * np.pi * f for f in (0.8e-6, 210e-6, 36.6e-6, 185e-6))
     high_pass = Controller((0.0,) * 4, (-p1, -p1, -p1, -p2), positive_number("gain", gain))
     lead = Controller((-z3,) * 5, (-p3,) * 5, (p3 / z3) ** 5)
-    return high_pass * lead * _parallel_branches()
+    found: Controller = high_pass * lead * _parallel_branches()
+    return found
 
 
 def roll_off(first: float, last: float, pairs: int, slope: float = 2.0 / 3.0) -> Controller:

@@ -550,7 +550,11 @@ class System:
         for name, value in [*zip(found, values, strict=False), *numbers.items()]:
             if name not in found:
                 raise TypeError(f"{name} is no parameter of {self!r}: it has {self.parameters}")
-            found[name] = self.nominal[name] if value is None else value
+            if value is None:
+                raise TypeError(
+                    f"{name} must be a number, got None: leave it out if it is nominal"
+                )
+            found[name] = value
         for name, value in found.items():
             if value is None:
                 raise TypeError(f"{name} must be given: it has no nominal value")

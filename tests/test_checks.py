@@ -185,6 +185,7 @@ WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
     (first_crossing, "start", (0.0,), "hold as many numbers as there are parameters"),
     (first_crossing, "direction", (0.0, 0.0), "not have length zero"),
     (armlock.nyquist, "loop", HayesEquation(), "be an open loop L, not an equation D = 0"),
+    (armlock.unstable_roots, "c1", None, "be a number, got None"),
     (armlock.axis_crossings, "omega_max", None, "be given"),
     (armlock.spectral_radius, "system", NEUTRAL["dead time"], "be of retarded type"),
     (armlock.spectral_radius, "system", armlock.semi_discretization(ARMS, 0.1), "be in contin"),

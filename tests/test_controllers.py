@@ -72,6 +72,45 @@ def test_table_two_is_the_product_of_its_factors():
     np.testing.assert_allclose(table_two()(s), value, rtol=1e-13)
 
 
+@pytest.mark.parametrize(
+    ("combine", "expected"),
+    [
+        (lambda k, tf: 2 * k, lambda k, tf: 2 * k),
+        (lambda k, tf: np.float64(2.0) * k, lambda k, tf: 2 * k),
+        (lambda k, tf: k / 2, lambda k, tf: k / 2),
+        (lambda k, tf: 1 / k**2, lambda k, tf: k**-2),
+        (lambda k, tf: -k, lambda k, tf: -k),
+        (lambda k, tf: 1 - k, lambda k, tf: 1 - k),
+        (lambda k, tf: k + 1, lambda k, tf: k + 1),
+        (lambda k, tf: k * tf, lambda k, tf: k * tf),
+        (lambda k, tf: tf * k, lambda k, tf: k * tf),
+        (lambda k, tf: tf - k, lambda k, tf: tf - k),
+        (lambda k, tf: k.feedback(tf), lambda k, tf: k / (1 + k * tf)),
+    ],
+)
+def test_controllers_are_combined_as_systems_are(combine, expected):
+    k, tf = Controller((-2.0,), (-1.0, -3.0), 3.0), control.tf([1.0], [2.0, 1.0])
+    found = combine(k, tf)
+    values = k(S), 1.0 / (2.0 * S + 1.0)
+    assert isinstance(found, Controller)
+    np.testing.assert_allclose(found(S), expected(*values), rtol=1e-12)
+    np.testing.assert_allclose(combine(k, System.of(tf))(S), found(S), rtol=1e-12)
+    again = Loop(System.of(k), "common", 3.0, 2.0).controller
+    assert again.denominator.exact == k.denominator.exact
+    assert control.evalfr(k, 1j) == pytest.approx(complex(k(1j)))
+
+
+def test_what_has_a_delay_or_is_zero_is_no_controller():
+    k = Controller((-2.0,), (-1.0,), 3.0)
+    assert isinstance(k * delay(1.0), System)
+    with pytest.raises(ValueError, match=r"^controller must hold no delay"):
+        Controller.of(k * delay(1.0))
+    with pytest.raises(ValueError, match=r"^controller must not be zero"):
+        k - System.of(k)
+    with pytest.raises(TypeError, match=r"^system must be a System, a number"):
+        k * "x"
+
+
 def exact_quotient(a, b, c):
     """Numerator and denominator of C (s - A)^-1 B in fractions, ascending, by Leverrier."""
     a, b, c = (np.vectorize(Fraction, otypes=[object])(np.array(m)) for m in (a, b, c))

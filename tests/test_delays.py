@@ -305,7 +305,7 @@ def test_many_fast_poles_overflow_neither_in_values_nor_in_print():
     system = math.prod([lag] * 40) * delay(1e-9)
     s = np.array([0.0, 1e9j, 2e9j])
     assert system(s) == pytest.approx((1.0 + s / 1e9) ** -40.0 * np.exp(-1e-9 * s), rel=1e-12)
-    with pytest.raises(ValueError, match="coefficients below 1e308"):
+    with pytest.raises(ValueError, match=r"coefficients below 1e\+300"):
         unstable_roots(system)
     assert "s^39" in str(system)
     assert "1.00000e+360" in str(system)

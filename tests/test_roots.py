@@ -307,3 +307,11 @@ def test_next_to_a_cluster_of_modes_it_is_answered_or_refused_in_time(seed):
             assert least <= unstable_roots(loop, right_of=line) <= most
         with mpmath.workdps(60):
             assert newton_step(loop, root, 1.0, 1.0) < 1e-13 * abs(root)
+
+
+@pytest.mark.parametrize("system", [CommonArm(), HayesEquation(tau=1.0)])
+@pytest.mark.parametrize("ask", [unstable_roots, rightmost_root])
+def test_coefficients_whose_sums_are_no_floats_are_refused(system, ask):
+    for c1 in (0.9, [0.9, 0.5]):
+        with np.errstate(all="raise"), pytest.raises(ValueError, match=r"below 1e\+300"):
+            ask(system, c1, 1e308)

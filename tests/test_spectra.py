@@ -105,3 +105,9 @@ def test_a_part_of_a_spectrum_lies_between_two_frequencies():
         found.within(1.0, 0.1)
     with pytest.raises(TypeError, match=r"^asd must be a function of the frequency, got 1\.0"):
         found.expected(1.0)  # type: ignore[arg-type]
+
+
+def test_tiny_samples_count_as_zero_whatever_numpy_raises():
+    series = 1e-200 * np.random.default_rng(1).standard_normal(2048)
+    with np.errstate(all="raise"):
+        assert (amplitude_spectrum(series, 10.0).asd == 0.0).all()

@@ -31,6 +31,8 @@ from armlock.engine.polynomials import Polynomial, rounded
 Exact = npt.NDArray[np.object_]
 # Most coefficients of a series at s = 0 of which one has to differ from zero.
 _MOST_TERMS = 16
+# Largest weight.
+_LARGEST = 1e300
 # A moved polynomial may be missed by this share, see `Polynomial.missed`.
 _MOST_MISSED = 1e-12
 
@@ -295,12 +297,8 @@ class Function:
     @cached_property
     def weights(self) -> tuple[FloatArray, FloatArray]:
         """S and W, rounded."""
-        try:
-            return self.steady.astype(np.float64), self.delayed.astype(np.float64)
-        except OverflowError as error:
-            raise ValueError(
-                "the loop must have coefficients below 1e308: choose another unit of time"
-            ) from error
+        steady, delayed = self.steady, self.delayed
+        return check_sizes(rounded(steady), rounded(delayed.ravel()).reshape(delayed.shape))
 
     @property
     def sizes(self) -> FloatArray:
@@ -489,6 +487,15 @@ def _exactly(value: Fraction) -> Any:
 def log(value: Fraction) -> float:
     """Natural logarithm of a positive fraction, of which a float may overflow."""
     return float(mpmath.log(value.numerator) - mpmath.log(value.denominator))
+
+
+def check_sizes(steady: FloatArray, delayed: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return weights of which sums do not overflow, or raise."""
+    if max(np.abs(x).max(initial=0.0) for x in (steady, delayed)) > _LARGEST:
+        raise ValueError(
+            f"the loop must have coefficients below {_LARGEST:g}: choose another unit of time"
+        )
+    return steady, delayed
 
 
 def stacked(functions: Sequence[Function]) -> tuple[FloatArray, FloatArray]:

@@ -828,7 +828,7 @@ def resolved(
         close = close or (short and size <= 2.0 * rest)
         if (close and longest * r <= 0.3) or not _halve(stack, top, low, high):
             found[n] = m
-            moves[n] = complex(0.0, r) * f[0] / f[1]
+            moves[n] = complex(0.0, r) * f[0] / f[1] if f[1] != 0.0 else np.inf
             n += 1
         else:
             top += 2

@@ -138,6 +138,8 @@ class _Search:
         self.unit = 1.0 / function.space.longest
         self.further, self.points = _TURNS_FURTHER, 0
 
+    # Where an exponential overflows nothing is found.
+    @np.errstate(over="ignore", invalid="ignore")
     def _line(self, sigma: float) -> _Line:
         """Return the function on the line Re s = sigma."""
         space, functions = self.function.shifted(sigma)

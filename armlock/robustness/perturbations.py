@@ -177,7 +177,7 @@ def first_crossing(
         The open loop, an equation, or a map.
     start, direction : sequence of float, or dict by name
         The ray start + t direction of the parameters, in the order of their first use. By
-        name, others start at nominal values and stay there.
+        name, others start at nominal values and stay there; ``{}`` is the nominal point.
     stop : float, optional
         Largest t that is looked at; by default one at which the parameters are 1e9 times as
         large as the start, or as one.

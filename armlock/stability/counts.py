@@ -28,7 +28,7 @@ from armlock.checks import (
 from armlock.engine import decide
 from armlock.engine.chain import UndecidedError
 from armlock.engine.decide import BOUNDARY, UNCONFINED, UNDECIDED
-from armlock.engine.functions import Function, Leading, compiled, log, stacked
+from armlock.engine.functions import Function, Leading, check_sizes, compiled, log, stacked
 from armlock.engine.inclusion import EPSILON, Functions
 from armlock.systems import System
 
@@ -183,11 +183,12 @@ def _rounded(affine: Affine, points: FloatArray) -> Functions:
     shares = np.column_stack((np.ones(len(points)), points - np.array(affine.origin)))
     # A share, a weight, their product and the sums round by half an EPSILON each. The factors
     # exp(-s theta) - 1 of delayed weights are at most two.
-    sizes = np.abs(shares) @ (np.abs(steady) + 2.0 * np.abs(delayed).sum(axis=-1))
+    with np.errstate(over="ignore", invalid="ignore"):
+        sizes = np.abs(shares) @ (np.abs(steady) + 2.0 * np.abs(delayed).sum(axis=-1))
+        moved = check_sizes(shares @ steady, np.tensordot(shares, delayed, axes=1))
     return Functions(
         affine.space.arrays,
-        shares @ steady,
-        np.tensordot(shares, delayed, axes=1),
+        *moved,
         (2.0 + len(terms)) * EPSILON * sizes,
     )
 

@@ -201,6 +201,7 @@ class _Rate:
         self.waiting = np.empty(0)
         self.unfiltered = np.empty(0)
 
+    @np.errstate(under="ignore")
     def add(self, samples: FloatArray) -> FloatArray:
         """Take in samples; return those of the next rate."""
         series = np.concatenate((self.waiting, samples))
@@ -259,9 +260,10 @@ class SpectrumEstimator:
         \sum_{\text{segments}} \sum_{k} |X_k|^2 , \\
         X_k &= \sum_{i=0}^{N-1} w_i\, (x_i - \bar x)\, e^{-2\pi\mathrm{j}\, i k / N} ,
 
-    with a Kaiser window w. Segments overlap by three quarters, which the number of averages
-    takes into account. Filters before lower rates pass 1e-6 of higher frequencies, which is the
-    least ratio of two densities that the estimate tells.
+    with a Kaiser window w. Samples are squared, so that 1e-170 counts as zero. Segments
+    overlap by three quarters, which the number of averages takes into account. Filters before
+    lower rates pass 1e-6 of higher frequencies, which is the least ratio of two densities that
+    the estimate tells.
 
     Examples
     --------
