@@ -7,7 +7,7 @@ rad/s, the factors stay exact where expanded coefficients do not.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import lru_cache
@@ -128,7 +128,9 @@ class Controller:
         return f"Controller(zeros={self.zeros}, poles={self.poles}, gain={self.gain})"
 
     @staticmethod
-    def of(controller: Any, integrators: int | None = None) -> Controller:
+    def of(
+        controller: Any, integrators: int | None = None, zeros: int | None = None
+    ) -> Controller:
         """Return a controller given as one, as a python-control system, or as a triple.
 
         Parameters
@@ -139,22 +141,26 @@ class Controller:
         integrators : int, optional
             How many poles of a python-control system are zero: 0, 1 or 2. It is needed where
             rounding moved such poles, and a count depends on it.
+        zeros : int, optional
+            The same for the zeros of a state space, for instance 1 for a high-pass filter.
 
         Raises
         ------
         TypeError, ValueError
             If it is none of these, is zero, is in discrete time, has several inputs or outputs,
-            or if the coefficients contradict `integrators` by more than rounding.
+            or if the coefficients contradict `integrators` or `zeros` by more than
+            rounding.
 
         Notes
         -----
         Coefficients and matrices are taken as the binary numbers that they are, exactly.
 
         Rounding leaves some 1e-17 in place of a determinant that is meant to be zero, for
-        instance in other coordinates. A count that is not the same for all values that rounding
-        may leave raises `CountError`, unless `integrators` says what is meant. A transfer
-        function with such a lowest coefficient warns: ``control.tf(state_space)`` has rounded
-        it, so that the state space is the better argument.
+        instance in other coordinates. A count that is not the same for all values that
+        rounding may leave raises `CountError`, unless `integrators` or `zeros` says what is
+        meant. A transfer function with such a lowest coefficient warns:
+        ``control.tf(state_space)`` has rounded it, so that the state space is the better
+        argument.
 
         A `Controller` or a triple keeps repeated zeros and poles. python-control does not: it
         multiplies all factors out, those of `control.zpk` too. It turns
@@ -168,7 +174,7 @@ class Controller:
         >>> Controller.of(control.tf([2.0, 1.0], [1.0, 0.5, 0.0]))
         Controller(zeros=((-0.5+0j),), poles=((-0.5+0j), 0j), gain=2.0)
         """
-        found = rational(controller, integrators)
+        found = rational(controller, integrators, zeros)
         if not found.numerator:
             raise ValueError(f"controller must not be zero, got {controller!r:.200}")
         return found
@@ -207,7 +213,9 @@ def with_others(make: Callable[..., _System], *systems: Any) -> _System:
     return found
 
 
-def rational(system: Any, integrators: int | None = None) -> Controller:
+def rational(
+    system: Any, integrators: int | None = None, zeros: int | None = None
+) -> Controller:
     """Return what `Controller.of` does, but of a system that is zero too."""
     from armlock.systems import System
 
@@ -216,7 +224,7 @@ def rational(system: Any, integrators: int | None = None) -> Controller:
     if isinstance(system, System):
         system = _of_system(system)
     if isinstance(system, Controller):
-        if integrators is not None:
+        if integrators is not None or zeros is not None:
             raise TypeError(
                 "integrators is for a state space or transfer function of python-control, got "
                 f"{integrators} and {system!r:.200}"
@@ -231,12 +239,13 @@ def rational(system: Any, integrators: int | None = None) -> Controller:
         )
         above, below = statespace.quotient(a, b, c, d[0][0])
         doubts = statespace.doubts(a)
+        unsure = statespace.doubts_of_zeros(a, b, c, d[0][0], above)
     else:
         above, below = (
             Polynomial.of(real_array("controller", p[0][0])[::-1].tolist())
             for p in (system.num, system.den)
         )
-        doubts = statespace.doubts_of_roots(below)
+        doubts, unsure = statespace.doubts_of_roots(below), ()
         if doubts and integrators is None:
             warnings.warn(
                 f"the lowest coefficient {float(below.exact[0]):.3g} of the denominator is no "
@@ -246,25 +255,46 @@ def rational(system: Any, integrators: int | None = None) -> Controller:
                 stacklevel=3,
             )
             doubts = ()
+    at_zero = 0
     if integrators is not None:
-        number = whole_number("integrators", integrators, 0)
-        small = [bound or not c for c, bound in zip(below.exact, (*doubts, 0, 0), strict=False)]
+        number = _stated("integrators", integrators, below, doubts)
         above, below = statespace.with_lowest(above, below, [Fraction(0)] * number)
-        if below.order != number or not all(small[:number]):
-            raise ValueError(
-                "integrators must be the number of poles that are zero but for rounding, got "
-                f"{integrators} for {system!r:.200}"
-            )
-        doubts = ()
-        if isinstance(system, control.StateSpace) and number:
-            above = statespace.without_hidden(a, b, c, above, number)
+        # Poles at s = 0 that the input does not reach, or the output does not see, cancel.
+        doubts, at_zero = (), min(number, len(unsure))
+    if zeros is not None:
+        at_zero, unsure = _stated("zeros", zeros, above, unsure), ()
+    above = above + Polynomial.of(-c for c in above.exact[:at_zero])
+    unsure = tuple(bound if k >= at_zero else Fraction(0) for k, bound in enumerate(unsure))
     found = Controller.of_polynomials(above, below)
-    values = product(*((-bound, Fraction(0), bound)[: 3 if bound else 1] for bound in doubts))
-    others = (statespace.with_lowest(above, below, lowest) for lowest in values if doubts)
-    object.__setattr__(
-        found, "others", tuple(Controller.of_polynomials(*other) for other in others)
-    )
+    others = []
+    if any((*doubts, *unsure)):
+        for lowest in _around(doubts):
+            other, changed = statespace.with_lowest(above, below, lowest)
+            for values in _around(unsure):
+                pairs = zip(values, above.exact, strict=False)
+                moved = other + Polynomial.of(new - old for new, old in pairs)
+                if moved:
+                    others.append(Controller.of_polynomials(moved, changed))
+    object.__setattr__(found, "others", tuple(others))
     return found
+
+
+def _around(bounds: Sequence[Fraction]) -> Iterator[tuple[Fraction, ...]]:
+    """Return the values of coefficients that may be meant to be zero."""
+    return product(*((-bound, Fraction(0), bound)[: 3 if bound else 1] for bound in bounds))
+
+
+def _stated(name: str, given: int, p: Polynomial, bounds: Sequence[Fraction]) -> int:
+    """Return how many roots at s = 0 are stated, or raise if p has no such coefficients."""
+    number = whole_number(name, given, 0)
+    small = [bound or not c for c, bound in zip(p.exact, (*bounds, 0, 0), strict=False)]
+    if not all(small[:number]) or number > len(small) or not any(p.exact[number : number + 1]):
+        what = {"integrators": "poles", "zeros": "zeros"}[name]
+        raise ValueError(
+            f"{name} must be the number of {what} that are zero but for rounding, got {given} "
+            f"for coefficients {p!r:.200}"
+        )
+    return number
 
 
 def _of_system(system: Any) -> Controller:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from fractions import Fraction
 
 import control
@@ -249,6 +250,36 @@ def test_an_integrator_that_is_hidden_cancels_in_other_coordinates_too(seed):
     stated = Controller.of(given, integrators=1)
     assert stated.numerator.order == stated.denominator.order == 1
     assert unstable_roots(System.of(stated) * delay(0.3)) == expected
+
+
+@pytest.mark.parametrize("number", [1, 2])
+@pytest.mark.parametrize("seed", range(5))
+def test_a_zero_at_s_0_is_asked_for_where_it_matters(number, seed):
+    # A high-pass filter in other coordinates: the zeros of its numerator leave s = 0.
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(number, 6))
+    poles = -(10.0 ** rng.uniform(-1, 1, n))
+    design = Controller([0.0] * number, poles.tolist(), rng.normal())
+    given = control.tf2ss(control.tf(design.gain * np.poly([0.0] * number), np.poly(poles)))
+    turn = rng.normal(size=(n, n))
+    given = control.ss(
+        np.linalg.inv(turn) @ given.A @ turn, np.linalg.inv(turn) @ given.B, given.C @ turn,
+        given.D,
+    )  # fmt: skip
+
+    def loop(k):
+        return System.of(k) * Controller([-0.2] * number, [0.0] * number, 1.0) * delay(0.5)
+
+    stated = Controller.of(given, zeros=number)
+    assert stated.numerator.order == number
+    assert unstable_roots(loop(stated)) == unstable_roots(loop(design))
+    with contextlib.suppress(CountError):
+        assert unstable_roots(loop(given)) == unstable_roots(loop(design))
+    # Without an integrator it does not matter.
+    alone = [System.of(k) * delay(0.5) for k in (given, design)]
+    assert unstable_roots(alone[0]) == unstable_roots(alone[1])
+    with pytest.raises(ValueError, match=r"^zeros must be the number of zeros that are zero"):
+        Controller.of(given, zeros=number + 1)
 
 
 def test_a_hidden_unstable_mode_is_counted():

@@ -13,7 +13,7 @@ from typing import Any
 
 import flint
 
-from armlock.engine.polynomials import Polynomial, exact, fractions
+from armlock.engine.polynomials import Polynomial, exact, fractions, polynomial
 
 #: What rounding makes of a determinant: at most this share of sum |a_ij cofactor_ij|. It covers
 #: all changes of coordinates that were drawn, of two to five states.
@@ -65,9 +65,15 @@ def doubts(a: Any, sizes: Any = None) -> tuple[Fraction, ...]:
     if not len(a):
         return ()
     matrix = _matrix(a)
-    weights = matrix if sizes is None else _matrix(sizes)
+    return _in_doubt(*_cofactors(matrix), matrix if sizes is None else _matrix(sizes))
+
+
+def _in_doubt(
+    coefficients: Iterable[Fraction], adjugates: Iterable[Any], weights: Any
+) -> tuple[Fraction, ...]:
+    """Return bounds of the lowest coefficients of a determinant, from its cofactors."""
     found: list[Fraction] = []
-    for c, adjugate in zip(*_cofactors(matrix), strict=False):
+    for c, adjugate in zip(coefficients, adjugates, strict=False):
         pairs = zip(weights.entries(), adjugate.transpose().entries(), strict=True)
         bound = ROUNDED * _magnitude(x * y for x, y in pairs)
         if len(found) == MOST_IN_DOUBT or (c and abs(c) >= bound):
@@ -76,20 +82,29 @@ def doubts(a: Any, sizes: Any = None) -> tuple[Fraction, ...]:
     return tuple(found) if any(found) else ()
 
 
-def without_hidden(a: Any, b: Any, c: Any, above: Polynomial, number: int) -> Polynomial:
-    """Return a numerator of which so many lowest coefficients, if small, are zero.
+def doubts_of_zeros(
+    a: Any, b: Any, c: Any, d: float, above: Polynomial
+) -> tuple[Fraction, ...]:
+    """Return what rounding may make of the lowest coefficients of the numerator.
 
-    Poles at s = 0 that the input does not reach, or the output does not see, cancel there.
+    It is the determinant of [[s - A, B], [-C, D]], whose adjugate is interpolated.
     """
-    matrix, column, row = (_matrix(m) for m in (a, b, c))
-    lowest = []
-    for value, adjugate in zip(above.exact[:number], _cofactors(matrix)[1], strict=False):
-        weights = (column * row).transpose().entries()
-        pairs = zip(weights, adjugate.entries(), strict=True)
-        if abs(value) > ROUNDED * _magnitude(x * y for x, y in pairs):
-            break
-        lowest.append(-value)
-    return above + Polynomial.of(lowest)
+    if not (len(a) and above):
+        return ()
+    n = len(a)
+    rows = [[-x for x in row] + list(last) for row, last in zip(a, b, strict=True)]
+    matrix = _matrix([*rows, [*(-x for x in c[0]), d]])
+    size = range(n + 1)
+    unit = flint.fmpq_mat(n + 1, n + 1, [int(i == k < n) for i in size for k in size])
+    value = polynomial(above.exact)
+    points = [k for k in range(1, 2 * n + 2) if value(k)][: n + 1]
+    inverse = flint.fmpq_mat(n + 1, n + 1, [k**i for k in points for i in size]).inv()
+    known = [(unit * k + matrix).inv() * value(k) for k in points]
+    adjugates = (
+        sum((m * inverse[i, j] for j, m in enumerate(known)), 0 * matrix)
+        for i in range(MOST_IN_DOUBT)
+    )
+    return _in_doubt(above.exact, adjugates, matrix)
 
 
 def doubts_of_roots(below: Polynomial) -> tuple[Fraction, ...]:

@@ -286,9 +286,10 @@ def unstable_roots(
 def in_doubt(points: FloatArray) -> CountError:
     """Return the error of a count that depends on what is meant by a pole next to zero."""
     return CountError(
-        "no count: it depends on whether a pole of a state space is zero, which rounding of "
-        "its matrix does not decide; in place of the state space write "
-        "Controller.of(state_space, integrators=1), or 2, or 0 if no pole is meant to be zero",
+        "no count: it depends on whether a pole or a zero of a state space is at s = 0, which "
+        "rounding of its matrices does not decide; in place of the state space write "
+        "Controller.of(state_space, integrators=1), or 2, or 0 if no pole is meant to be zero, "
+        "and zeros=1, or 2, or 0, for its zeros",
         points,
     )
 
