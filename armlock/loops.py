@@ -707,7 +707,7 @@ def buildable_loop() -> Loop:
     --------
     >>> from armlock import buildable_loop, unstable_roots
     >>> loop = buildable_loop()
-    >>> int(unstable_roots(loop, 1.0 + 1e-6, 1.0 - 1e-6))
+    >>> unstable_roots(loop, 1.0 + 1e-6, 1.0 - 1e-6)
     0
     """
     # What a search found, rounded.

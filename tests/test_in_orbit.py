@@ -102,7 +102,7 @@ def test_stable_times_agree_with_counts_at_random_times(chapter, weak, name, rul
         else:
             loop = chapter["frozen"](name, tau1, tau2, h)
         unstable = bool(((start <= t) & (t <= stop)).any())
-        assert (int(unstable_roots(loop, 1.0, 1.0)) != 0) == unstable
+        assert (unstable_roots(loop, 1.0, 1.0) != 0) == unstable
 
 
 def test_days_of_the_wrong_sign_count_where_the_loop_is_stable(chapter, weak):

@@ -76,7 +76,7 @@ def test_encirclements_and_open_loop_poles_give_the_closed_loop_roots(name):
     assert curve.open_loop_poles == poles
     assert curve.closed_loop_roots == curve.encirclements + poles
     # On the boundary D has a root s = 0 that 1 + L has not.
-    assert max(int(unstable_roots(loop, c1, c2)), 0) == curve.closed_loop_roots
+    assert max(unstable_roots(loop, c1, c2), 0) == curve.closed_loop_roots
 
 
 @pytest.mark.parametrize("seed", range(40))

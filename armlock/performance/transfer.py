@@ -76,7 +76,7 @@ def require_stable(loop: Loop) -> None:
 
     The response of an unstable loop at s = j omega looks like that of a stable one.
     """
-    count = int(unstable_roots(checked_loop(loop), 1.0, 1.0))
+    count = unstable_roots(checked_loop(loop), 1.0, 1.0)
     if count != 0:
         raise ValueError(
             f"loop must be stable at c1 = c2 = 1, but unstable_roots gives {count}"

@@ -7,14 +7,15 @@ margin and no larger gain exists, to a part in a million (`armlock.engine.margin
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
 from armlock.affine import Affine, common, open_quotient
 from armlock.checks import positive_number, real_number
 from armlock.engine import decide
-from armlock.engine.chain import Lag
-from armlock.engine.functions import Function
+from armlock.engine.chain import Lag, UndecidedError
+from armlock.engine.functions import Function, common_zeros
 from armlock.engine.margins import (
     Free,
     Margins,
@@ -28,6 +29,10 @@ from armlock.systems import Sum, System, delay_object
 
 _T = TypeVar("_T")
 
+# Gain factors that are tried for an unstable loop, those next to one first; most steps of each.
+_STEPS_OF_A_TRY = 2000
+_TRIED = sorted((10.0 ** (k / 4) for k in range(-12, 13)), key=lambda k: max(k, 1.0 / k))
+
 
 def _certified(
     compute: Callable[[Function, Function], _T],
@@ -40,6 +45,23 @@ def _certified(
     require_certain(System.of(loop, "loop"), point.tolist())
     with decided("no margin", point):
         return compute(n, m)
+
+
+def _with_a_gain(n: Function, m: Function) -> Margins:
+    """Return the margins, or name a gain factor that makes an unstable loop stable."""
+    try:
+        return margins_of(n, m)
+    except ValueError as error:
+        shared, tried = common_zeros(n, m), 0
+        for gain in _TRIED:
+            with suppress(UndecidedError):
+                count = decide.count(m + n * gain, shared, most=_STEPS_OF_A_TRY)
+                tried += 1
+                if count == 0:
+                    found = f"with a gain factor of {gain:.3g} it is stable"
+                    raise ValueError(f"{error}; {found}") from None
+        found = f"none of {tried} gain factors from 0.001 to 1000 makes it stable"
+        raise ValueError(f"{error}; {found}") from None
 
 
 def modulus_margin(loop: System, *values: float, **numbers: float) -> float:
@@ -183,7 +205,7 @@ def margins(
     TypeError, ValueError
         If `loop` is no open loop, a parameter is not finite and real, `free_above` is not
         positive, no delay is free, or one stands in the denominator of L; or the loop is not
-        stable there.
+        stable there. The message then names a gain factor with which it is, if one was found.
     CountError
         If double precision, or the steps allowed, do not decide a margin.
 
@@ -218,7 +240,7 @@ def margins(
     36.0 degrees
     """
     if free_above is None:
-        return _certified(margins_of, loop, values, numbers)
+        return _certified(_with_a_gain, loop, values, numbers)
     system = System.of(loop, "loop")
     above = positive_number("free_above", free_above)
     objects = tuple(free if free is not None else getattr(loop, "arms", ()))

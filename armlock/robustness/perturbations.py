@@ -428,7 +428,7 @@ def stable_half_differences(
     here = system.at(**system.given((), {}))
     if here.known:
         raise ValueError(f"loop must hold no distributed delay, got {system!r}")
-    at_start = int(unstable_roots(here))
+    at_start = unstable_roots(here)
     if at_start != 0:
         raise ValueError(f"loop must be stable as it is, but unstable_roots gives {at_start}")
     finest = _FINEST_STEP * (abs(start) or mean)

@@ -198,7 +198,7 @@ def unstable_roots(
     *values: npt.ArrayLike,
     right_of: float = 0.0,
     **numbers: npt.ArrayLike,
-) -> IntArray:
+) -> Any:
     r"""Count the characteristic roots with positive real part.
 
     Parameters
@@ -215,7 +215,7 @@ def unstable_roots(
 
     Returns
     -------
-    int array, of the broadcast shape
+    int, or int array of the broadcast shape
         Number of unstable roots, multiplicity included. The point is stable, with all roots
         in the open left half-plane, where it is 0. `BOUNDARY` (-1) where a root lies on the
         imaginary axis, or nearer to it than rounding can tell. Of a loop these are the roots
@@ -268,7 +268,7 @@ def unstable_roots(
 
     At (1, 1) the pole of L at s = 0 cancels. D keeps a root there:
 
-    >>> int(unstable_roots(equation(1 + CommonArm())))
+    >>> unstable_roots(equation(1 + CommonArm()))
     -1
     """
     right_of = real_number("right_of", right_of)
@@ -280,7 +280,7 @@ def unstable_roots(
         differ = _counts(other, arrays, flat, right_of) != counts
         if differ.any():
             raise in_doubt(flat[differ])
-    return counts.reshape(shape)
+    return counts.reshape(shape) if shape else int(counts[0])
 
 
 def in_doubt(points: FloatArray) -> CountError:
