@@ -138,7 +138,7 @@ class Loop(System):
     The same with a dead time:
 
     >>> unstable_roots(loop.replace(delay=20e-6), 0.999)
-    array(0)
+    0
     """
 
     # Anything that `Controller.of` takes, and a name, until they are checked.
@@ -463,7 +463,7 @@ def CommonArm(
     --------
     >>> from armlock import CommonArm, unstable_roots
     >>> unstable_roots(CommonArm(gain=10.0), 1.0, 0.999)
-    array(0)
+    0
     """
     return Loop(integrating_actuator(_gain(gain, "common")), COMMON, tau1, tau2, delay)
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from armlock.checks import real_array, real_number
+from armlock.checks import real_array, real_number, whole_number
 from armlock.controllers import with_others
 from armlock.engine import statespace
 from armlock.engine.polynomials import exact, polynomial
@@ -126,7 +126,9 @@ def return_difference(plant: Any, controllers: Any) -> System:
     return equation(whole)
 
 
-def state_space(a: Any, b: Any = None, c: Any = None, d: float = 0.0) -> System:
+def state_space(
+    a: Any, b: Any = None, c: Any = None, d: float = 0.0, *, integrators: int | None = None
+) -> System:
     """Return a state space with delays, x' = sum of A_k x(t - h_k) + b u, y = c x + d u.
 
     Parameters
@@ -137,6 +139,8 @@ def state_space(a: Any, b: Any = None, c: Any = None, d: float = 0.0) -> System:
         Without them the equation of the poles is returned.
     d : float, optional
         What goes through directly.
+    integrators : int, optional
+        How many poles are meant to be zero, 0 or 1, where rounding of the matrices hides it.
 
     Returns
     -------
@@ -146,8 +150,9 @@ def state_space(a: Any, b: Any = None, c: Any = None, d: float = 0.0) -> System:
     Raises
     ------
     TypeError, ValueError
-        If a number is not finite, shapes do not fit, a delay is negative, or there are too many
-        states, see `determinant`. `return_difference` takes several inputs and outputs.
+        If a number is not finite, shapes do not fit, a delay is negative, rounding does not
+        hide as many integrators, or there are too many states, see `determinant`.
+        `return_difference` takes several inputs and outputs.
 
     Examples
     --------
@@ -162,9 +167,16 @@ def state_space(a: Any, b: Any = None, c: Any = None, d: float = 0.0) -> System:
     below = _determinant(rows)
     # Rounding of the matrices may hide that a pole is meant to be zero.
     (bound, *_), value = (*statespace.doubts(total, sizes), 0), below.whole()[0]
-    changes: list[Any] = [exact(v) - value for v in (-bound, 0, bound)] if bound else []
+    changes = [exact(0), *(exact(v) - value for v in (-bound, 0, bound) if bound)]
+    if integrators is not None:
+        if whole_number("integrators", integrators, 0) > bool(bound):
+            raise ValueError(
+                f"integrators must be {'0 or 1' if bound else '0'}, got {integrators}: "
+                "rounding of the matrices hides no more"
+            )
+        changes = [-value if integrators else exact(0)]
     if b is None:
-        made = [System(below + _number(v), Sum({})) for v in (0, *changes)]
+        made = [System(below + _number(v), Sum({})) for v in changes]
     else:
         column, row = (real_array(*pair).ravel() for pair in (("b", b), ("c", c)))
         if not len(column) == len(row) == len(rows):
@@ -176,8 +188,7 @@ def state_space(a: Any, b: Any = None, c: Any = None, d: float = 0.0) -> System:
         beside = [[*r, _number(-v)] for r, v in zip(rows, column, strict=True)]
         above = _determinant([*beside, [*map(_number, row), _number(through)]])
         made = [
-            System(above + _number(v * exact(through)), below + _number(v))
-            for v in (0, *changes)
+            System(above + _number(v * exact(through)), below + _number(v)) for v in changes
         ]
     found, *others = made
     found.others = tuple(others)

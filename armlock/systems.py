@@ -821,6 +821,13 @@ def delay(theta: float | Fraction) -> System:
     >>> print(f"{loop(2j):.4f}")
     -0.2285-0.3844j
     """
+    given: Any = theta
+    if isinstance(given, System):
+        raise TypeError(
+            f"theta must be a number, got {given!r}: no system is affine in a delay, so count "
+            "for one delay after the other, "
+            "[unstable_roots(k * plant * delay(t), k=gains) for t in delays]"
+        )
     value = theta if isinstance(theta, Fraction) else Fraction(real_number("theta", theta))
     if value < 0:
         raise ValueError(f"theta must not be negative, got {theta}")

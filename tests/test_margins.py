@@ -25,6 +25,7 @@ from armlock import (
     margins,
     modulus_margin,
     paper_loop,
+    s,
     stability_chart,
     unstable_roots,
 )
@@ -247,6 +248,17 @@ def test_roots_behind_the_one_at_zero_are_not_passed_over(loop):
         margins(loop)
     with pytest.raises(ValueError, match=r"to lose stability, but unstable_roots gives \d"):
         critical_perturbation(loop, (-1.0, -1.0))
+
+
+def test_margins_of_an_unstable_loop_name_a_gain_that_makes_it_stable():
+    loop = 0.5 / (s - 1) * delay(0.1)
+    with pytest.raises(
+        ValueError, match=r"has 1 unstable roots; with a gain factor of 3\.16 it"
+    ):
+        margins(loop)
+    assert unstable_roots(3.16 * loop) == 0
+    with pytest.raises(ValueError, match="none of 25 gain factors"):
+        margins(1 / ((s - 1) * (s - 1)))
 
 
 def test_a_search_that_ends_with_its_last_step_is_complete():

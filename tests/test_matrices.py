@@ -1,6 +1,7 @@
 """Several loops at once, state spaces with delays, and distributed delays."""
 
 import math
+from typing import Any
 
 import control
 import mpmath
@@ -10,6 +11,7 @@ from scipy.interpolate import BarycentricInterpolator
 
 from armlock import (
     BOUNDARY,
+    CountError,
     System,
     delay,
     determinant,
@@ -39,6 +41,9 @@ WU_MICHIELS = {
     0.15: [[7.7163, 4.5911, -5.5072], [-9.0056, -0.0260, -7.5404], [-3.3669, 0.9332, -0.2958]],
     0.25: [[7.4808, -7.2571, 9.4377], [2.8285, -7.1768, -1.4221], [-1.0353, 9.6519, 5.1208]],
 }
+
+
+LATE: Any = parameter("theta")
 
 
 def lag(gain, time, dead):
@@ -231,6 +236,18 @@ def test_rounding_that_may_hide_an_integrator_is_told():
     assert len(poles.others) == 3
     assert not state_space(VERHEYDEN).others
     assert unstable_roots(state_space({0: [[-1.0]], 1: [[1.0]]})) == BOUNDARY
+    # Two tanks, the flow from one to the other late: nothing leaves them.
+    still, late = np.diag([-0.1, -0.3 - 0.2]), [[0.0, 0.3 + 0.2], [0.1, 0.0]]
+    tanks = {0.0: turn @ still @ turn.T, 2.0: turn @ late @ turn.T}
+    b, c = turn @ [1.0, 0.0], turn @ [0.0, 1.0]
+    gain = 0.05
+    with pytest.raises(CountError, match=r"state_space\(\.\.\., integrators=1\)"):
+        unstable_roots(gain * state_space(tanks, b, c) * (1 - delay(3.0)))
+    meant = state_space(tanks, b, c, integrators=1)
+    assert not meant.others
+    assert unstable_roots(gain * meant * (1 - delay(3.0))) == 0
+    with pytest.raises(ValueError, match="integrators must be 0, got 1"):
+        state_space(VERHEYDEN, integrators=1)
 
 
 @pytest.mark.parametrize(
@@ -242,6 +259,7 @@ def test_rounding_that_may_hide_an_integrator_is_told():
         (lambda: determinant([["a"]]), TypeError, "matrix must be a System"),
         (lambda: state_space({0: [[np.nan]]}), ValueError, "a must be finite"),
         (lambda: state_space({-1.0: [[1.0]]}), ValueError, "theta must not be negative"),
+        (lambda: delay(LATE), TypeError, "no system is affine in a delay"),
         (lambda: state_space([[1.0, 2.0]]), ValueError, "a must hold square matrices"),
         (lambda: state_space([[1.0]], [1.0]), TypeError, "b and c must be given both"),
         (lambda: state_space([[1.0]], [1, 2], [1]), ValueError, "b and c must have 1 numbers"),

@@ -1,3 +1,4 @@
+import json
 import pickle
 import time
 
@@ -21,6 +22,7 @@ from armlock import (
     SingleArm,
     d_curve,
     equation,
+    margins,
     stability_chart,
     unstable_roots,
 )
@@ -215,11 +217,11 @@ class TestOtherLoops:
             assert unstable_roots(system, p, q) == np.count_nonzero(roots.real > 0.0)
 
     def test_scalars_and_arrays_keep_their_shapes(self):
-        assert unstable_roots(CommonArm(), 0.5, 0.5).shape == ()
+        assert type(unstable_roots(CommonArm(), 0.5, 0.5)) is int
         assert unstable_roots(CommonArm(), [0.5], 0.5).shape == (1,)
         assert unstable_roots(CommonArm(), [], 0.5).shape == (0,)
         assert unstable_roots(CommonArm(), np.zeros((2, 1)), np.zeros(3)).shape == (2, 3)
-        assert unstable_roots(CommonArm(), 0.5, 0.5).dtype == np.int64
+        assert unstable_roots(CommonArm(), [0.5], 0.5).dtype == np.int64
 
 
 class TestChart:
@@ -369,6 +371,14 @@ def test_all_points_real_are_boundary_points_up_to_the_end():
     real = two_delays([1.0, 0.0, 1.0], [1.0], [0.0], 0.0, 0.0)
     counts = stability_chart(real, [-3.0, 0.5, 2.0], [0.0]).counts
     np.testing.assert_array_equal(counts, [[BOUNDARY, BOUNDARY, 1]])
+
+
+def test_counts_and_margins_of_one_point_are_numbers_for_json():
+    found = {"count": unstable_roots(CommonArm(), 0.9, 0.9)} | vars(
+        margins(CommonArm(), 0.9, 0.9)
+    )
+    assert str(json.loads(json.dumps(found))) == str(found)
+    assert type(found["count"]) is int
 
 
 def test_an_interrupt_is_heard_while_points_are_counted():

@@ -289,7 +289,8 @@ def in_doubt(points: FloatArray) -> CountError:
         "no count: it depends on whether a pole or a zero of a state space is at s = 0, which "
         "rounding of its matrices does not decide; in place of the state space write "
         "Controller.of(state_space, integrators=1), or 2, or 0 if no pole is meant to be zero, "
-        "and zeros=1, or 2, or 0, for its zeros",
+        "and zeros=1, or 2, or 0, for its zeros; with delays write "
+        "armlock.state_space(..., integrators=1), or 0",
         points,
     )
 
