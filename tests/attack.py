@@ -41,6 +41,7 @@ from armlock import (
     unstable_roots,
 )
 from armlock.affine import Affine
+from armlock.engine.decide import UNDECIDED
 from armlock.sensors import COMMON, DIFFERENCE, SINGLE, dual
 from armlock.stability.semidiscretization import semi_discretization
 from tests import attack_judge as judge
@@ -350,7 +351,9 @@ class Tally:
             expected = judge.count(sketch, *point)
         except UndecidedError:
             expected = -1
-        if expected == -1 and got >= 0:
+        if got == UNDECIDED:
+            self.refused.append((name, self.where, point, "undecided", 0.0))
+        elif expected == -1 and got >= 0:
             self.skipped[f"{name}: judge undecided"] += 1
         elif got == -1 != expected:
             if expected == -2 or judge.distance(sketch, *point) > 1e-10:

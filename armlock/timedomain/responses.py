@@ -91,6 +91,11 @@ def step_response(system: System, timepts: npt.ArrayLike) -> control.TimeRespons
     the value is the one after the jump. This is checked, not proved: the transform is
     interpolated over frequencies until the values in between agree.
 
+    The transform turns once in 2 pi over the delays up to the highest crossover. A loop that is
+    fast beside its delays takes so many frequencies that 65 536 panels end soon after the first
+    echo: after 31 s for `flight_loop`, whose round trips take 33 s. Shorter times need none of
+    that, because what comes later than the last time is left out.
+
     Examples
     --------
     >>> import control
