@@ -26,9 +26,9 @@ The calls that matter most:
 - ``amplitude_spectrum(series, sample_rate)`` estimates an amplitude spectral density.
 - ``noise_budget(loop, frequency)`` is the noise of the locked laser, source by source.
 
-Angular frequencies are in rad/s, frequencies in Hz, and delays in s. The first call of a
-function compiles it, which takes 10 to 30 s. ``help(armlock.margins)`` describes one
-function. The modules `armlock.controllers`, `armlock.sensors`, `armlock.orbits` and
+Angular frequencies are in rad/s, frequencies in Hz, and delays in s. The first chart and
+the first margins of an installation compile what they need, which takes 5 to 20 s.
+``help(armlock.margins)`` describes one function. The modules `armlock.controllers`, `armlock.sensors`, `armlock.orbits` and
 `armlock.paper` hold controllers, sensors, real arms and the numbers of the paper.
 
 This package is the companion to "Robustness Analysis and Controller Design of Arm-locking

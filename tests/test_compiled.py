@@ -1,10 +1,22 @@
 """Compiled functions run where they cannot be kept, too, and say so once."""
 
+import gc
 import os
 import re
 import subprocess
 import sys
+import time
+from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
+from typing import ClassVar
+
+import numba
+import numpy as np
+
+from armlock import CommonArm, DualArm, compiled, unstable_roots
+from armlock.compiled import Plain
+from armlock.engine import decide, inclusion
 
 ROOT = Path(__file__).parents[1]
 MODULE = """
@@ -18,7 +30,7 @@ def times(x):
 def more(x):
     return x + 1
 
-print(times(3), more(3))
+print(times(3), more(3), times._cache.exists)
 """
 FULL = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))\n"
 NOT_KEPT = r"RuntimeWarning: compiled functions are not kept for the next process, .*: {}\n"
@@ -27,12 +39,16 @@ NOT_KEPT = r"RuntimeWarning: compiled functions are not kept for the next proces
 def printed(folder, factor=2, *, full=False, **more):
     """Compile two functions in a process, and return what it prints and warns of.
 
-    A limit on the size of files stands for a full disk.
+    A limit on the size of files stands for a full disk. The line that compiling prints after a
+    second, on a slow machine, is switched off with the progress bars.
     """
     (folder / "times.py").write_text(MODULE.format(factor), "utf-8")
     done = subprocess.run(
         [sys.executable, "-B", "-c", full * FULL + "import times"],
-        env={**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(folder), **more},
+        env={
+            **os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(folder),
+            "TQDM_DISABLE": "1", **more,
+        },
         cwd=folder, capture_output=True, text=True, check=True,
     )  # fmt: skip
     return done.stdout, done.stderr
@@ -49,20 +65,81 @@ def test_where_nothing_can_be_written_each_process_compiles(tmp_path):
     out, err = printed(
         tmp_path, HOME="/dev/null", XDG_CACHE_HOME="/dev/null", NUMBA_CACHE_DIR=""
     )
-    assert out == "6 4\n"
+    assert out == "6 4 False\n"
     assert said_once(err, "cannot cache function .*")
 
 
 def test_a_full_disk_or_a_damaged_cache_ends_no_call(tmp_path):
-    assert printed(tmp_path) == ("6 4\n", "")
+    assert printed(tmp_path) == ("6 4 True\n", "")
     # The index fits onto the disk, and what has been compiled does not: what was compiled from
     # the source before stays there.
     out, err = printed(tmp_path, factor=5, full=True)
-    assert out == "15 4\n"
+    assert out == "15 4 False\n"
     assert said_once(err, r"\[Errno 27\] File too large")
-    assert printed(tmp_path, factor=5) == ("15 4\n", "")
+    assert printed(tmp_path, factor=5) == ("15 4 True\n", "")
     for file in tmp_path.glob("**/*.nb[ic]"):
         os.truncate(file, file.stat().st_size // 2)
     out, err = printed(tmp_path, factor=5)
-    assert out == "15 4\n"
+    assert out.startswith("15 4 ")
     assert said_once(err, ".*")
+
+
+def test_compiling_restores_what_it_sets_and_says_once_what_takes_long(capsys, monkeypatch):
+    monkeypatch.setattr(compiled, "_PATIENCE", 0.01)
+    monkeypatch.setattr(compiled._Notice, "said", False)
+    monkeypatch.delenv("TQDM_DISABLE", raising=False)
+    before = numba.config.OPT, gc.isenabled()
+    for _ in range(2):
+        with suppress(KeyboardInterrupt), compiled._compiling():
+            assert (numba.config.OPT, gc.isenabled()) == (1, False)
+            time.sleep(0.2)
+            raise KeyboardInterrupt
+        assert before == (numba.config.OPT, gc.isenabled())
+    assert capsys.readouterr().err.count("compiling, once for this installation") == 1
+    monkeypatch.setattr(compiled._Notice, "said", False)
+    monkeypatch.setenv("TQDM_DISABLE", "1")
+    with compiled._compiling():
+        time.sleep(0.2)
+    assert not capsys.readouterr().err
+
+
+def test_walks_count_the_same_uncompiled(monkeypatch):
+    rng = np.random.default_rng(1)
+    points = rng.uniform(-2.0, 2.0, (12, 2))
+    loops = [CommonArm(g, delay=d) for g, d in ((0.3, 0.0), (1.0, 0.1))] + [DualArm(0.5)]
+    expected = [[int(unstable_roots(loop, *at)) for at in points] for loop in loops]
+    used = Plain(inclusion, 600.0)
+    monkeypatch.setattr(used, "serves", lambda entry: True)
+    monkeypatch.setattr(decide, "_uncompiled", used)
+    # No compiled function is left to fall back on, once the plain ones are copied.
+    assert used.functions
+    monkeypatch.setattr(inclusion, "wind", None)
+    assert [[int(unstable_roots(loop, *at)) for at in points] for loop in loops] == expected
+
+
+def test_plain_python_serves_where_nothing_is_compiled_and_time_is_left(monkeypatch):
+    class Entry:
+        signatures: ClassVar = []
+        _cache = SimpleNamespace(exists=False)
+
+    assert Plain(inclusion, 1.0).serves(Entry)
+    assert not Plain(inclusion, 0.0).serves(Entry)
+    monkeypatch.setattr(Entry._cache, "exists", True)
+    assert not Plain(inclusion, 1.0).serves(Entry)
+    monkeypatch.setattr(Entry._cache, "exists", False)
+    monkeypatch.setattr(Entry, "signatures", ["int64()"])
+    assert not Plain(inclusion, 1.0).serves(Entry)
+
+
+def test_what_plain_python_cannot_count_is_compiled(monkeypatch):
+    used, tried = Plain(inclusion, 600.0), []
+
+    def wind(*arguments):
+        tried.append(arguments)
+        raise ZeroDivisionError
+
+    used.functions.wind = wind
+    monkeypatch.setattr(used, "serves", lambda entry: True)
+    monkeypatch.setattr(decide, "_uncompiled", used)
+    assert unstable_roots(CommonArm(), 1.5, 1.5) > 0
+    assert tried

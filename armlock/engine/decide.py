@@ -18,6 +18,7 @@ import numba
 import numpy as np
 
 from armlock.checks import FloatArray, IntArray
+from armlock.compiled import Plain
 from armlock.engine import chain, extended, inclusion
 from armlock.engine.chain import UndecidedError
 from armlock.engine.functions import Function, Leading, Space, compiled, stacked
@@ -41,6 +42,9 @@ _MOST_EXTENDED, _AROUND = 12, 1e-5
 _A_WHILE = 100_000
 # Steps in likely intervals before a search.
 _A_LOOK = 2_000
+# Most steps of a count that is not compiled, about half a second.
+_FEW_STEPS = 1_200
+_uncompiled = Plain(inclusion, seconds=1.0)
 # Points that one thread counts at a time.
 _BLOCK = 256
 
@@ -101,8 +105,7 @@ def counts(
     def some(block: slice) -> tuple[Any, ...]:
         k = here[block]
         chosen = Functions(space.arrays, steady[k], delayed[k], uncertain[k])
-        found: tuple[Any, ...] = inclusion.wind(chosen, begin[k], ends[k], most)
-        return found
+        return _wound(chosen, begin[k], ends[k], most)
 
     turn, first, last, undecided, steps = map(
         np.concatenate, zip(*in_threads(some, blocks(here.size, _BLOCK)), strict=True)
@@ -131,6 +134,29 @@ def counts(
     found[here[steps >= most]] = UNDECIDED
     found[found >= 0] -= space.known_right_of(0.0)
     return found
+
+
+def _wound(
+    functions: Functions, begin: FloatArray, end: FloatArray, most: int
+) -> tuple[Any, ...]:
+    """Do what `inclusion.wind` does: uncompiled at first, as long as few steps suffice."""
+    found: list[tuple[Any, ...]] = []
+    if most >= _FEW_STEPS and _uncompiled.serves(inclusion.wind):
+        with _uncompiled.instead() as plain:
+            for n in range(begin.size):
+                k = slice(n, n + 1)
+                one = Functions(functions.space, *(part[k] for part in functions[1:]))
+                found.append(plain.wind(one, begin[k], end[k], _FEW_STEPS))
+                steps = found[-1][-1]
+                if steps >= _FEW_STEPS or not _uncompiled.serves(inclusion.wind):
+                    found.pop()
+                    break
+    # Those that are left are compiled.
+    rest = slice(len(found), begin.size)
+    if begin[rest].size:
+        left = Functions(functions.space, *(part[rest] for part in functions[1:]))
+        found.append(inclusion.wind(left, begin[rest], end[rest], most))
+    return tuple(map(np.concatenate, zip(*found, strict=True)))
 
 
 def count(

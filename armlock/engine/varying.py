@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 
 import flint
 import numpy as np
-from scipy import optimize
 
 from armlock.checks import FloatArray
 from armlock.engine import chain, decide
@@ -146,6 +145,9 @@ def _best_scalings(squares: FloatArray) -> tuple[FloatArray, float]:
     def rows(x: FloatArray) -> FloatArray:
         found: FloatArray = np.log(squares @ np.exp(-x))
         return found
+
+    # Importing scipy.optimize takes as long as importing this package.
+    from scipy import optimize
 
     def whole(z: FloatArray) -> float:
         return float(np.log(np.exp(z[:-1]).sum()) + z[-1])

@@ -25,7 +25,6 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.polynomial import legendre
-from scipy.special import spherical_jn
 
 from armlock.checks import ComplexArray, FloatArray
 
@@ -125,6 +124,8 @@ def panels(
 
 def inverted(of: Panels, sigma: float, time: FloatArray) -> FloatArray:
     """Return the inverse transform at times of shape (n,) in s."""
+    from scipy.special import spherical_jn
+
     total = np.zeros(time.size)
     begins, halves, values = of
     for half in np.unique(halves):
