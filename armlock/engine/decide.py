@@ -247,12 +247,14 @@ class Family:
     def _members(
         self, test: Sequence[tuple[int, Sequence[float], Sequence[float]]], level: float
     ) -> tuple[list[Function], list[Function]]:
-        """Return vertices and terms of a test."""
+        """Return vertices and terms of a test, over levels above one, which may be 1e300."""
         found: tuple[list[Function], list[Function]] = [], []
+        at = Fraction(level)
+        over = max(at, Fraction(1))
         for kind, weights, slopes in test:
             member = self.functions[0] * 0
             for f, a, b in zip(self.functions, weights, slopes, strict=True):
-                member = member + f * (Fraction(a) + Fraction(b) * Fraction(level))
+                member = member + f * ((Fraction(a) + Fraction(b) * at) / over)
             found[0 if kind == VERTEX else 1].append(member)
         return found
 
