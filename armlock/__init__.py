@@ -28,8 +28,9 @@ The calls that matter most:
 
 Angular frequencies are in rad/s, frequencies in Hz, and delays in s. The first chart and
 the first margins of an installation compile what they need, which takes 5 to 20 s.
-``help(armlock.margins)`` describes one function. The modules `armlock.controllers`, `armlock.sensors`, `armlock.orbits` and
-`armlock.paper` hold controllers, sensors, real arms and the numbers of the paper.
+``help(armlock.margins)`` describes one function. The modules `armlock.controllers`,
+`armlock.sensors`, `armlock.orbits` and `armlock.paper` hold controllers, sensors, real arms
+and the numbers of the paper.
 
 This package is the companion to "Robustness Analysis and Controller Design of Arm-locking
 System in Space-based Gravitational Wave Detectors".
