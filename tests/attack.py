@@ -392,6 +392,11 @@ def check_margins(tally, rng, sketch, loop, point):
             got, expected = (np.inf if v >= judge.GAINS else v for v in (got, expected))
         if name == "gain_lower":
             got, expected = (0.0 if v < 1.0 / judge.GAINS else v for v in (got, expected))
+        # A bound says that the loop is stable up to there, and no more.
+        if name == "gain_upper" and found.gain_upper_is_bound:
+            expected = min(got, expected)
+        if name == "gain_lower" and found.gain_lower_is_bound:
+            expected = max(got, expected)
         tally.near(
             f"margins.{name}",
             point,
@@ -423,8 +428,17 @@ def check_margins(tally, rng, sketch, loop, point):
         if unstable(factor):
             tally.note("gain interval", (*point, factor), interval, "unstable")
     # Past its end a pair that has crossed may cross back at once.
-    for edge, way in ((found.gain_lower, -1.0), (found.gain_upper, 1.0)):
-        if unstable(*(edge * (1.0 + way * past) for past in (1e-5, 1e-6, 1e-7))) is False:
+    ends = (
+        (found.gain_lower, -1.0, found.gain_lower_is_bound),
+        (
+            found.gain_upper,
+            1.0,
+            found.gain_upper_is_bound,
+        ),
+    )
+    for edge, way, is_bound in ends:
+        past = [edge * (1.0 + way * share) for share in (1e-5, 1e-6, 1e-7)]
+        if not is_bound and unstable(*past) is False:
             tally.note("gain interval", (*point, edge), interval, "stable past it")
 
 

@@ -247,14 +247,18 @@ class Family:
     def _members(
         self, test: Sequence[tuple[int, Sequence[float], Sequence[float]]], level: float
     ) -> tuple[list[Function], list[Function]]:
-        """Return vertices and terms of a test, over levels above one, which may be 1e300."""
+        """Return vertices and terms of a test, over its largest weight, which may be 1e300."""
         found: tuple[list[Function], list[Function]] = [], []
         at = Fraction(level)
-        over = max(at, Fraction(1))
-        for kind, weights, slopes in test:
+        rows = [
+            [Fraction(a) + Fraction(b) * at for a, b in zip(weights, slopes, strict=True)]
+            for _, weights, slopes in test
+        ]
+        over = max([Fraction(1), *(abs(w) for row in rows for w in row)])
+        for (kind, *_), row in zip(test, rows, strict=True):
             member = self.functions[0] * 0
-            for f, a, b in zip(self.functions, weights, slopes, strict=True):
-                member = member + f * ((Fraction(a) + Fraction(b) * at) / over)
+            for f, weight in zip(self.functions, row, strict=True):
+                member = member + f * (weight / over)
             found[0 if kind == VERTEX else 1].append(member)
         return found
 

@@ -255,7 +255,8 @@ class Space:
         still, turned = self.limits(steady, delayed)
         if reserve is None:
             reserve = chain.reserve(self.lags, still, turned)
-        rounding = 64.0 * EPSILON * ((np.abs(whole) + parts) @ lead)
+        with np.errstate(under="ignore"):
+            rounding = 64.0 * EPSILON * ((np.abs(whole) + parts) @ lead)
         room = reserve - (terms @ lead if top_terms is None else top_terms) - rounding
         found = np.full(len(steady), np.inf)
         left = np.flatnonzero(room > 0.0)

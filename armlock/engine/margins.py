@@ -495,7 +495,7 @@ def margins_of(n: Function, m: Function, free: Free | None = None) -> Margins:
 
     Raises
     ------
-    ValueError
+    UnstableError
         If the closed loop is not stable.
     UndecidedError
         If a margin is not decided.
@@ -519,6 +519,10 @@ def margins_of(n: Function, m: Function, free: Free | None = None) -> Margins:
     )
 
 
+class UnstableError(ValueError):
+    """A loop has to be stable, and is not."""
+
+
 def require_stable(d: Function, common: int = 0, what: str = "loop") -> None:
     """Raise unless D has no zero with a real part of zero or more, but `common` at s = 0."""
     count = decide.count(d, common)
@@ -527,7 +531,7 @@ def require_stable(d: Function, common: int = 0, what: str = "loop") -> None:
             decide.BOUNDARY: "a root on the axis",
             decide.UNCONFINED: "no confined chain",
         }
-        raise ValueError(
+        raise UnstableError(
             f"the {what} must be stable, but it has "
             f"{reasons.get(count, f'{count} unstable roots')}"
         )

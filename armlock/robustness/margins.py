@@ -19,6 +19,7 @@ from armlock.engine.functions import Function, common_zeros
 from armlock.engine.margins import (
     Free,
     Margins,
+    UnstableError,
     decided_ratio,
     margins_of,
     modulus_of,
@@ -51,7 +52,7 @@ def _with_a_gain(n: Function, m: Function) -> Margins:
     """Return the margins, or name a gain factor that makes an unstable loop stable."""
     try:
         return margins_of(n, m)
-    except ValueError as error:
+    except UnstableError as error:
         shared, tried = common_zeros(n, m), 0
         for gain in _TRIED:
             with suppress(UndecidedError):
