@@ -38,6 +38,8 @@ FAULTS = {
     f'<div style="overflow: hidden"><table><td>{200 * "cell"}</table></div>': (
         "cut without a hint at 390 px: cell"
     ),
+    '<p><mjx-container class="wide" data-more style="display: inline-block; width: 2em; '
+    'overflow: auto">formula</mjx-container></p>': "cut in a line with room at 390 px: formula",
     '<figure><input type="range" aria-label="x" id="dead"></figure>': (
         "a slider changes nothing: dead"
     ),

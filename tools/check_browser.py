@@ -72,7 +72,8 @@ SIDEWAYS = r"""() => {
     e => e.tagName.toLowerCase() + '.' + e.className).join(', ')];
 }"""
 
-# Code, tables and formulas that are cut, and do not say (armlock.js) that there is more.
+# Code, tables and formulas that are cut, and do not say (armlock.js) that there is more; and
+# formulas in a line that are cut although the line has room for them.
 CUT = r"""async () => {
   await new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)));
   const found = [];
@@ -83,6 +84,13 @@ CUT = r"""async () => {
     if (!box || !part.checkVisibility() || box.scrollWidth <= box.clientWidth + 1) continue;
     if (!scrolls || !('more' in box.dataset))
       found.push(`cut without a hint at ${innerWidth} px: ${part.textContent.slice(0, 40)}`);
+  }
+  for (const part of document.querySelectorAll('main mjx-container.wide[data-more]')) {
+    let line = part.parentElement;
+    while (line.clientWidth === 0) line = line.parentElement;
+    const room = part.checkVisibility() && part.scrollWidth <= line.clientWidth;
+    const text = line.textContent.slice(0, 40);
+    if (room) found.push(`cut in a line with room at ${innerWidth} px: ${text}`);
   }
   return found;
 }"""

@@ -39,9 +39,9 @@ addEventListener("load", async () => {
     if (before) whole.prepend(whole.previousSibling.splitText(before.index));
     if (after) whole.nextSibling.deleteData(0, after.length);
   }
-  const isWide = formula => formula.offsetWidth > (
-    formula.closest("p, dd, li, figcaption")?.clientWidth ?? Infinity);
-  for (const formula of formulas.filter(isWide)) {
+  // What is inline has no width of its own here.
+  const room = element => element.clientWidth || room(element.parentElement);
+  for (const formula of formulas.filter(one => one.offsetWidth > room(one.parentElement))) {
     formula.classList.add("wide");
     formula.addEventListener("scroll", () => look(formula), {passive: true});
     look(formula);
