@@ -3,6 +3,7 @@
 import ast
 import builtins
 import json
+import re
 import symtable
 from pathlib import Path
 
@@ -11,9 +12,14 @@ import pytest
 NOTEBOOKS = sorted((Path(__file__).parents[1] / "notebooks").glob("*.ipynb"))
 
 
+def all_cells(notebook):
+    """Return the cells of a notebook."""
+    return json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+
+
 def code_cells(notebook):
     """Return the code cells as (source, whether the page shows it)."""
-    cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+    cells = all_cells(notebook)
     removed = {"remove-cell", "remove-input"}
     return [
         ("".join(cell["source"]), not removed & set(cell["metadata"].get("tags", [])))
@@ -54,3 +60,15 @@ def test_bookkeeping_is_one_statement_a_cell(notebook):
     for source, shown in code_cells(notebook):
         if not shown:
             assert len(ast.parse(source).body) == 1, source
+
+
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
+def test_folded_cells_say_what_they_hold(notebook):
+    for cell in all_cells(notebook):
+        if {"hide-input", "hide-cell"} & set(cell["metadata"].get("tags", [])):
+            label = cell["metadata"].get("mystnb", {}).get("code_prompt_show")
+            assert label, cell["id"]
+            source = "".join(cell["source"])
+            decided = re.findall(r'^claims\["(\w+)"\] = ', source, re.MULTILINE)
+            named = re.findall(r"[A-Z]\d+", label) if label.startswith("Claim") else []
+            assert named == decided, label
