@@ -1,7 +1,7 @@
-"""Numbers of the run: in alternative texts as well, and with their powers of ten typeset.
+"""Numbers of the run: in alternative texts as well, and typeset; numbers beside their units.
 
-What the prose takes from the run as 1.5e-06 is shown as a formula; an alternative text, which
-is spoken, has 1.5 times 10 to the -6 instead.
+What the prose takes from the run as 1.5e-06 or as -1.5 is shown as a formula; an alternative
+text, which is spoken, has 1.5 times 10 to the -6 instead.
 
 An alternative text may hold `{name:format}`, where `name` was glued in the same notebook; it
 is replaced by the number in that format. An unknown name is a warning, which fails the build.
@@ -15,17 +15,28 @@ from myst_nb.ext.glue.crossref import read_glue_cache
 from sphinx.util import logging
 
 POWER = re.compile(r"([-+]?[\d.]+)e([-+]\d+)")
+NEGATIVE = re.compile(r"-[\d.]+")
+#: The space between a number, or what has just been put in, and its unit.
+UNIT = re.compile(r"(?:(?<=\d)|^) (?=%|(?:[mµkM]?(?:s|Hz|W)|rad|nm|km|pm|dB)\b)")
 PLACE = re.compile(r"\{(\w+):([^{}]*)\}")
 LOGGER = logging.getLogger(__name__)
 
 
 def typeset(app, doctree):
-    """Typeset the powers of ten that the prose of a page has from the run."""
+    """Typeset powers of ten and negative numbers that the prose of a page has from the run."""
     for node in list(doctree.findall(nodes.inline)):
-        power = POWER.fullmatch(node.astext())
-        if power and "pasted-text" in node["classes"]:
-            formula = rf"{power[1]} \times 10^{{{int(power[2])}}}"
+        text = node.astext()
+        power = POWER.fullmatch(text)
+        formula = rf"{power[1]} \times 10^{{{int(power[2])}}}" if power else text
+        if "pasted-text" in node["classes"] and (power or NEGATIVE.fullmatch(text)):
             node.replace_self(nodes.math(formula, formula))
+
+
+def join(app, doctree):
+    """Keep numbers in the same line as their units."""
+    for text in list(doctree.findall(nodes.Text)):
+        if isinstance(text.parent, (nodes.paragraph, nodes.caption, nodes.entry)):
+            text.parent.replace(text, nodes.Text(UNIT.sub("\N{NO-BREAK SPACE}", text)))
 
 
 def fill(app, doctree):
@@ -53,5 +64,6 @@ def setup(app):
     # A page may have formulas in the outputs of its cells only, which Sphinx does not see.
     app.set_html_assets_policy("always")
     app.connect("doctree-read", typeset)
+    app.connect("doctree-read", join)
     app.connect("doctree-read", fill)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

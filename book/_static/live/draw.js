@@ -25,7 +25,7 @@ const armlockDraw = (function () {
     const dark = document.documentElement.dataset.theme === "dark" && !printing;
     return dark
       ? { dark, text: "#e3e6e9", grid: "#55606a", line: "#56b4e9", other: "#3ecf9c", mark: "#f0a060", ground: "#12181d",
-        stable: [70, 98, 124], few: [150, 84, 40], many: [255, 186, 120], lost: [112, 88, 148],
+        stable: [70, 80, 90], few: [150, 84, 40], many: [255, 186, 120], lost: [112, 88, 148],
         unsure: [[18, 24, 29], [96, 104, 112]] }
       : { dark, text: "#222832", grid: "#c9d0d6", line: "#0072b2", other: "#00755a", mark: "#d55e00", ground: "#ffffff",
         stable: [184, 196, 206], few: [255, 232, 208], many: [209, 85, 34], lost: [147, 132, 160],
