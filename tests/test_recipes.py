@@ -15,6 +15,7 @@ BOOK = Path(__file__).parents[1] / "book"
 def test_a_page_prints_what_it_shows(tmp_path, name):
     page = (BOOK / f"{name}.md").read_text("utf-8")
     blocks = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    assert max(map(len, "\n".join(blocks).splitlines())) <= 77  # what a page has room for
     shown = "".join(re.findall(r"```text\n(.*?)```", page, re.DOTALL))
     (tmp_path / "page.py").write_text("\n\n".join(blocks))
     command = [sys.executable, "-W", "error", "page.py"]

@@ -17,7 +17,9 @@ from sphinx.util import logging
 POWER = re.compile(r"([-+]?[\d.]+)e([-+]\d+)")
 NEGATIVE = re.compile(r"-[\d.]+")
 #: The space between a number, or what has just been put in, and its unit.
-UNIT = re.compile(r"(?:(?<=\d)|^) (?=%|(?:[mµkM]?(?:s|Hz|W)|rad|nm|km|pm|dB)\b)")
+UNIT = re.compile(
+    r"(?:(?<=\d)|^) (?=%|× 10|(?:[mµkM]?(?:s|Hz|W)|rad|nm|km|pm|dB)\b)|(?<=×) (?=10)"
+)
 PLACE = re.compile(r"\{(\w+):([^{}]*)\}")
 LOGGER = logging.getLogger(__name__)
 
