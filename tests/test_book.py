@@ -17,7 +17,10 @@ from nbclient import NotebookClient
 from tools import check_html
 
 ROOT = Path(__file__).parents[1]
-TEXT = "# A chapter\n\n{numref}`fig-small`: {glue:text}`points:.1e` points. {doc}`/book/intro`"
+TEXT = (
+    "# A chapter\n\n{numref}`fig-small`: {glue:text}`points:.1e` points, down to "
+    "{glue:text}`least:.1f` s, or 20 s. {doc}`/book/intro`"
+)
 DRAW = """
 import numpy as np
 from matplotlib import pyplot as plt
@@ -28,7 +31,7 @@ fig, ax = plt.subplots()
 ax.plot(np.sin(omega), np.cos(omega), label="Curve")
 ax.set(xlabel="a [1/s]", ylabel="b [1/s]");
 """
-GLUE = "figures.glue(points=omega.size)"
+GLUE = "figures.glue(points=omega.size, least=-np.pi)"
 PAGES = ("bibliography.md", "status.md")
 OFFERED = ("LICENSE", "LICENSE-docs", "CITATION.cff", "CHANGELOG.md", "environment.txt")
 ADDRESS = "https://github.com/someone/something"
@@ -128,6 +131,8 @@ def test_a_book_has_its_data_numbers_and_links_and_needs_no_network(tmp_path):
     assert 'alt="A curve of 200 points."' in page
     assert "Reading time: 1 min" in page
     assert r"\(2.0 \times 10^{2}\)" in page
+    joined = page.replace("&#160;", "\N{NO-BREAK SPACE}")
+    assert "(-3.1\\)</span>\N{NO-BREAK SPACE}s, or 20\N{NO-BREAK SPACE}s." in joined
     for page, link in LINKS.items():
         assert link in (pages / page).read_text()
     status = (pages / "book/status.html").read_text()
