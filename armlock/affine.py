@@ -92,10 +92,10 @@ def functions(
         for part in group:
             steady = np.full(len(union), Fraction(0), object)
             delayed = np.full((len(union), len(column)), Fraction(0), object)
-            steady[places] += _weights(chosen, _total(part))
+            steady[places] = _weights(chosen, _total(part))
             for lag, p in part.items():
                 if lag in column:
-                    delayed[places, column[lag]] += _weights(chosen, p)
+                    delayed[places, column[lag]] = _weights(chosen, p)
             found.append(Function(space, steady, delayed))
     return found
 

@@ -145,17 +145,6 @@ def broadcast_shape(
         ) from None
 
 
-def broadcast_pair(
-    name1: str, value1: object, name2: str, value2: object
-) -> tuple[FloatArray, FloatArray]:
-    """Return two finite real arrays of one shape, or name both shapes and raise."""
-    first, second = real_array(name1, value1), real_array(name2, value2)
-    shape = broadcast_shape((name1, name2), (first, second))
-    check_memory(f"{name1} and {name2}", shape, 64)
-    # Copies, because broadcast views are not to be written to.
-    return np.broadcast_to(first, shape).copy(), np.broadcast_to(second, shape).copy()
-
-
 def check_memory(name: str, shape: tuple[int, ...], bytes_each: int) -> None:
     """Raise if so many values would take more than a share of the machine's memory."""
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")

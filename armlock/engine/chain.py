@@ -85,10 +85,6 @@ class Lag(tuple[tuple[Delay, int], ...]):
             powers[delay] = powers.get(delay, 0) + n
         return Lag.of(powers)
 
-    def inverse(self) -> Lag:
-        """Return the product of the objects' inverses."""
-        return Lag((delay, -n) for delay, n in self)
-
     @cached_property
     def time(self) -> Fraction:
         """The delay of the product, in s."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, reduce
 from itertools import zip_longest
@@ -110,13 +110,6 @@ class Polynomial:
     def order(self) -> int:
         """Order of the root at s = 0."""
         return self.roots.count(0j)
-
-    def over_powers(self, number: int) -> Polynomial:
-        """Return p(s) / s^number, for as many roots at s = 0."""
-        gone = [k for k, root in enumerate(self.roots) if root == 0j][:number]
-        left = [k for k in range(len(self.roots)) if k not in gone]
-        computed = frozenset(i for i, k in enumerate(left) if k in self.computed)
-        return replace(self, roots=tuple(self.roots[k] for k in left), computed=computed)
 
     @cached_property
     def exact(self) -> tuple[Fraction, ...]:
