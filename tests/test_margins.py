@@ -30,6 +30,8 @@ from armlock import (
     unstable_roots,
 )
 from armlock.affine import Affine
+from armlock.engine import chain
+from armlock.engine.chain import Delay, Lag
 from armlock.engine.decide import count
 from armlock.engine.margins import gain_limits
 from armlock.engine.polynomials import Polynomial
@@ -600,3 +602,44 @@ def test_a_margin_that_is_not_found_says_up_to_where_it_was_looked_for():
     assert np.isnan(found.gain_omega)
     assert f"gain_upper>={found.gain_upper}" in repr(found)
     assert "gain_lower=0.0" in repr(found)
+
+
+@pytest.mark.parametrize(("a", "b"), [(0.8, 0.6), (0.5, 0.7), (-0.7, 0.4)])
+def test_a_loop_of_one_delay_object_turns_by_its_curve_and_not_by_a_disc(a, b):
+    """L = a z + b z^2 lies on a curve; the disc of radius |a| + |b| reaches -1 at once."""
+    z = delay(2.0)
+    found = margins(a * z + b * z**2)
+    circle = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 1_000_001))
+    curve = a * circle + b * circle**2
+    there = curve[np.flatnonzero(np.diff(np.sign(np.abs(curve) - 1.0)))]
+    assert found.phase == pytest.approx(np.abs(np.angle(-there)).min(), abs=1e-5)
+    assert found.delay == 0.0
+
+
+def test_a_limit_that_is_not_found_does_not_hide_a_smaller_phase_margin(monkeypatch):
+    z = delay(2.0)
+    loop = (0.8 * z + 0.6 * z**2) * (s + 1.1) / (s + 1)
+    expected = margins(loop).phase
+    monkeypatch.setattr(chain, "_MOST_CELLS", 30)
+    assert margins(loop).phase == pytest.approx(expected, rel=1e-9)
+
+
+def test_the_reserve_of_an_arc_bounds_all_its_turns():
+    one, other = Delay(Fraction(2), "a"), Delay(Fraction(3), "b")
+    lags = [Lag.of(powers) for powers in ({one: 1}, {one: 2}, {one: 1, other: 1}, {other: 1})]
+    f, g = np.array([[1.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.8, 0.6, 0.0, 0.0]])
+    assert chain.arc_limit(lags, g, f)[0] == pytest.approx(np.arccos(0.6), rel=1e-8)
+    # At half a turn alone the least |P| is 0.4.
+    assert chain.arc_reserve(lags, g, f, 3.0) == 0.0
+    rng = np.random.default_rng(7)
+    turn = np.exp(-1j * np.linspace(0.0, 2.0 * np.pi, 181))
+    z, w = turn[:, None, None], turn[None, :, None]
+    products = [1.0, z, z**2, z * w, w]
+    for acting in ([1, 1, 1, 1, 1], [1, 1, 1, 0, 0], [1, 0, 0, 1, 1], [1, 0, 0, 0, 1]):
+        f, g = rng.uniform(-1.0, 1.0, (2, 5)) * acting
+        f[0] = 9.0
+        angle = rng.uniform(0.2, np.pi)
+        psi = np.linspace(-angle, angle, 121)
+        p = sum((a + np.exp(1j * psi) * b) * c for a, b, c in zip(f, g, products, strict=True))
+        least = np.abs(p).min()
+        assert 0.75 * least - 0.1 < chain.arc_reserve(lags, g, f, angle) <= least

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property, lru_cache
@@ -24,17 +24,22 @@ import flint
 import numpy as np
 from flint import arb, fmpq, fmpq_poly
 
-from armlock.checks import BoolArray, FloatArray
+from armlock.checks import BoolArray, ComplexArray, FloatArray
 from armlock.engine.polynomials import exact, rounded
 
+# On the torus a P that is smaller than this share of its coefficients is zero; and where a
+# candidate is looked for.
+_ROUNDING, _ROUGHLY = 1e-13, 1e-9
 # Most cells of the torus that are looked at, some seconds.
 _MOST_CELLS = 1_000_000
 # The least |P| on the torus is bounded from below by this share of it.
 _SHARE = 0.8
 # A chain is followed along a line of parameters to this share of the largest |P|.
 _FINE = 1e-9
-# Most steps along such a line, and of the search for the limit of real parts.
-_MOST_STEPS = 2000
+# Most steps along such a line; and along an arc of phases.
+_MOST_STEPS, _MOST_TURNS = 2000, 500
+# Past this point of a line there is no limit.
+_FARTHEST = 1e150
 # Bits in which P of one delay object is bounded.
 _BITS = 200
 
@@ -159,16 +164,29 @@ def _on_circle(coefficients: Sequence[fmpq]) -> float:
     return math.sqrt(max(min(float(v.lower()) for v in values), 0.0))
 
 
-def _on_torus(powers: FloatArray, coefficients: FloatArray, free: float) -> float:
-    """Return a lower bound of |P| - free on the unit torus: a share of it, or 0."""
-    number, slope = powers.shape[1], np.abs(coefficients) @ np.abs(powers)
-    rounding = 1e-13 * float(np.abs(coefficients).sum())
+def _on_torus(
+    powers: FloatArray,
+    rows: FloatArray,
+    free: float,
+    measure: Callable[[ComplexArray], FloatArray],
+    share: float = _ROUNDING,
+) -> float:
+    """Return a lower bound of a measure - free on the unit torus: `_SHARE` of it, or 0.
+
+    It is 0 up to a share of all coefficients. The measure of some P, one for each row of
+    coefficients, changes by no more than they do.
+    """
+    number, slope = powers.shape[1], np.abs(rows).sum(0) @ np.abs(powers)
+    rounding, least = (part * float(np.abs(rows).sum()) for part in (_ROUNDING, share))
     centre, half = np.full((1, number), np.pi), np.full(number, np.pi)
     lowest, kept = np.inf, np.inf
+    if not number:
+        return float(measure(rows.sum(axis=1)[None])[0]) - free
     while len(centre):
-        value = np.abs(np.exp(-1j * (centre @ powers.T)) @ coefficients) - free
+        value = measure(np.exp(-1j * (centre @ powers.T)) @ rows.T) - free
         lowest = min(lowest, float(value.min()))
-        if lowest <= rounding:
+        # A cell of this value has to pass by its share, less rounding.
+        if lowest <= max(least, 8.0 * rounding):
             return 0.0
         bound = value - slope @ half - rounding
         done = bound >= _SHARE * lowest
@@ -177,15 +195,21 @@ def _on_torus(powers: FloatArray, coefficients: FloatArray, free: float) -> floa
         half = np.where(k, 0.5 * half, half)
         centre = np.concatenate((centre - half * k, centre + half * k))
         if len(centre) > _MOST_CELLS:
-            raise UndecidedError(f"the neutral chain is confined by less than {lowest:.1e}")
+            raise UndecidedError(f"less than {lowest:.1e} is left at high frequency")
     return kept
+
+
+def _powers(lags: Iterable[Lag]) -> FloatArray:
+    """Return the powers of all delay objects in some products, shape (products, objects)."""
+    lags = list(lags)
+    objects = sorted({d for lag in lags for d, _ in lag}, key=lambda d: (d.theta, d.mark))
+    return np.array([[dict(lag).get(d, 0) for d in objects] for lag in lags], np.float64)
 
 
 @lru_cache(maxsize=4096)
 def _least(lags: tuple[Lag, ...], coefficients: tuple[float, ...], free: float) -> float:
     """Return a lower bound of |P| - free on the closed polydisc; 0 where P has a zero there."""
-    objects = sorted({d for lag in lags for d, _ in lag}, key=lambda d: (d.theta, d.mark))
-    powers = np.array([[dict(lag).get(d, 0) for d in objects] for lag in lags], np.float64)
+    powers = _powers(lags)
     # With all variables equal, P has no zero in the disc. The torus is left (Strintzis).
     diagonal = fmpq_poly([0])
     for total, c in zip(powers.sum(1), coefficients, strict=True):
@@ -194,11 +218,13 @@ def _least(lags: tuple[Lag, ...], coefficients: tuple[float, ...], free: float) 
     try:
         if _in_disc(diagonal):
             return 0.0
-        if len(objects) == 1:
-            return _on_circle(diagonal.coeffs()) - free
+        if powers.shape[1] == 1:
+            # Squares of large numbers would overflow.
+            size = max(map(abs, coefficients))
+            return size * _on_circle((diagonal / exact(size)).coeffs()) - free
     finally:
         flint.ctx.prec = before
-    return _on_torus(powers, np.array(coefficients), free)
+    return _on_torus(powers, np.array([coefficients]), free, lambda p: np.abs(p[:, 0]))
 
 
 def reserve(lags: Sequence[Lag], still: FloatArray, late: FloatArray) -> FloatArray:
@@ -284,6 +310,84 @@ def hull_reserve(lags: Sequence[Lag], still: FloatArray, late: FloatArray) -> fl
     return 0.0
 
 
+def _loosened(
+    lags: Sequence[Lag], n: FloatArray, m: FloatArray
+) -> tuple[FloatArray, FloatArray, float]:
+    """Take products of free phase out of two P: what is left, its powers, and their size.
+
+    The coefficients are those of N and M, in two rows. A product that stands in both has no
+    phase that is free.
+    """
+    rows = np.array([n, m])
+    acting = [(lag, k) for k, lag in enumerate(lags, 1)]
+    own, left = own_phases(lag for lag, k in acting for c in rows[:, k] if c)
+    kept = [0, *(k for lag, k in acting if lag in left)]
+    size = sum(float(np.abs(rows[:, k]).sum()) for lag, k in acting if lag in own)
+    return rows[:, kept], _powers([NOW, *(lags[k - 1] for k in kept[1:])]), size
+
+
+def arc_reserve(
+    lags: Sequence[Lag], n: FloatArray, m: FloatArray, angle: float, loose: float = 0.0
+) -> float:
+    """Bound abs(P_M + exp(j psi) P_N) - loose from below, for all abs(psi) <= angle (Lemma 24).
+
+    Parameters
+    ----------
+    lags : sequence of Lag
+        The K products.
+    n, m : float arrays, shape (1 + K,)
+        The coefficients of two P: that of the undelayed term, and those of the products.
+    angle : float
+        In rad, at most pi: there it is the least difference of both magnitudes.
+    loose : float, optional
+        Size of further terms of any phase.
+
+    Returns
+    -------
+    float
+        Zero or negative where the sum vanishes for one of these psi, on the unit torus.
+    """
+    rows, powers, size = _loosened(lags, n, m)
+    sign = np.sign(np.subtract(*np.abs(rows.sum(axis=1))))
+
+    def measure(p: ComplexArray) -> FloatArray:
+        f, g = p.T
+        if angle >= math.pi:
+            return np.asarray(sign * (np.abs(f) - np.abs(g)))
+        # The psi at which both are opposed, or the end of the arc that is next to it.
+        psi = np.clip(np.angle(-g * f.conj()), -angle, angle)
+        return np.asarray(np.abs(g + np.exp(1j * psi) * f))
+
+    share = _ROUNDING if angle >= math.pi else _ROUGHLY
+    return _on_torus(powers, rows, loose + size, measure, share)
+
+
+def arc_limit(
+    lags: Sequence[Lag], n: FloatArray, m: FloatArray, loose: float = 0.0
+) -> tuple[float, bool]:
+    """Largest angle up to which `arc_reserve` is positive, and whether it is found.
+
+    Otherwise the angle is a lower bound. It is inf where the two P differ in magnitude.
+    """
+    if arc_reserve(lags, n, m, math.pi, loose) > 0.0:
+        return math.inf, True
+    rows, powers, size = _loosened(lags, n, m)
+    size += loose
+    if not powers.any():
+        f, g = rows[:, 0]
+        cosine = (size**2 - f**2 - g**2) / (2.0 * f * g) if f * g else 1.0
+        return math.acos(min(max(cosine, -1.0), 1.0)), True
+    whole, slope, angle = float(np.abs(rows).sum()), float(np.abs(rows[0]).sum()), 0.0
+    for _ in range(_MOST_TURNS):
+        row = np.exp(1j * angle) * rows[:1] + rows[1:]
+        here = _on_torus(powers, row, size, lambda p: np.abs(p[:, 0]), _ROUGHLY)
+        if here <= _FINE * whole:
+            return angle, True
+        # The sum changes by no more than the slope.
+        angle += here / slope
+    return angle, False
+
+
 def line_limit(
     lags: Sequence[Lag],
     f: Sequence[Fraction],
@@ -313,7 +417,7 @@ def line_limit(
         left = float(reserve(lags, v[:1], v[None, 1:])[0]) - rounding * abs(v[0])
         if left <= _FINE * float(np.abs(v).sum()):
             return t
-        if not slope or t > 1e300:
+        if not slope or t > _FARTHEST:
             return math.inf
         # |P| changes by no more than the slope.
         t += left / slope

@@ -304,9 +304,10 @@ class Family:
             found.append(self._end(vertices, terms))
             if mixed := _together(vertices, terms):
                 found.append(self._end(mixed[:1], mixed[1:]))
-        two = len(self.functions) - self.loose == 2
-        if two and self.arc is not None and self.arc[0][3] == self.arc[1][3] == 0.0:
-            found.append(self._arc_ends(self.arc[0][2] + level * self.arc[1][2]))
+        if self.arc is not None and len(self.functions) - self.loose == 2:
+            (_, _, a, b), (_, _, c, d) = self.arc
+            # An arc that grows with omega is the whole circle there.
+            found.append(self._arc_ends(np.pi if b or d else min(a + level * c, np.pi)))
         return min(found)
 
     def _end(self, vertices: list[Function], terms: list[Function]) -> float:
@@ -324,20 +325,15 @@ class Family:
         )
 
     def _arc_ends(self, angle: float) -> float:
-        """Do what `ends` does for an arc around zero: abs(1 + c exp(j psi)) is monotonic."""
-        if angle >= np.pi:
-            return np.inf
-        (n, m), (wn, wm) = stacked(self.functions[:2])
-        turns = np.exp(1j * np.array([0.0, angle]))[:, None]
-        steady = (n - wn.sum(1)) + turns * (m - wm.sum(1))
-        parts = np.abs(wn) + np.abs(wm)
-        terms = parts.sum(1) + sum(f.sizes for f in self.functions[2:])
-        # All that turns, as terms; and what the sum at other angles may have more.
-        more = np.abs(n - wn.sum(1)) + np.abs(m - wm.sum(1))
+        """Do what `ends` does for f_0 + exp(j psi) f_1 on an arc around zero (Lemma 24)."""
+        others = self.functions[1:]
+        steady, delayed = stacked(self.functions[:1])
+        limits = np.column_stack(self.space.limits(*stacked(self.functions[:2])))
+        loose = sum(f.size_at_infinity for f in self.functions[2:])
+        reserve = chain.arc_reserve(self.space.lags, limits[1], limits[0], angle, loose)
+        more = sum((f.sizes for f in others), np.zeros(steady.shape[1]))
         return float(
-            self.space.confined_from(
-                steady, np.zeros((2, *parts.shape)), terms, extra=more
-            ).max()
+            self.space.confined_from(steady, delayed, extra=more, reserve=reserve).max()
         )
 
 

@@ -145,15 +145,6 @@ class Margins:
         return f"Margins({', '.join(shown)})"
 
 
-def _disc_at_infinity(n: Function, m: Function) -> tuple[float, float]:
-    """Centre and radius of the disc that L = N / M fills at infinite frequency.
-
-    M is not delayed at the highest power.
-    """
-    whole, turned = n.space.limits(*stacked([n, m]))
-    return float(whole[0] / whole[1]), float(np.abs(turned[0]).sum() / abs(whole[1]))
-
-
 def at_zero(f: Function, g: Function) -> float:
     """Return the t at which f + t g loses its leading term at s = 0; nan where none does.
 
@@ -363,20 +354,34 @@ def _crossover(
     return _over_axis(family, n, m, free, goal, best, where)
 
 
+def _turn_at_infinity(n: Function, m: Function, free: Free | None) -> tuple[float, bool]:
+    """Smallest abs(arg(-L)) where abs(L) is one at infinite frequency; inf where it never is.
+
+    Over all phases of the delay objects there (Lemma 24); and whether it is no lower bound.
+    """
+    arms: tuple[Function, ...] = ()
+    if free:
+        n, m, arms, _ = free
+    of_n, of_m = np.column_stack(n.space.limits(*stacked([n, m])))
+    loose = sum(f.size_at_infinity for f in arms)
+    return chain.arc_limit(n.space.lags, of_n, of_m, loose)
+
+
 def _phase(n: Function, m: Function, free: Free | None) -> tuple[float, float]:
     """Smallest |arg(-L)| where |L| = 1, and where."""
-    centre, radius = _disc_at_infinity(n, m)
-    best, where = math.pi, math.nan
-    if abs(abs(centre) - radius) <= 1.0 <= abs(centre) + radius:
-        cosine = (radius**2 - 1.0 - centre**2) / (2.0 * centre) if centre else 1.0
-        best, where = math.acos(min(max(cosine, -1.0), 1.0)), math.inf
-    return _crossover(n, m, free, PHASE, (-1.0, 0.0, 1.0, 0.0), best, where)
+    turn, is_found = _turn_at_infinity(n, m, free)
+    best, where = (turn, math.inf) if turn < math.inf else (math.pi, math.nan)
+    best, where = _crossover(n, m, free, PHASE, (-1.0, 0.0, 1.0, 0.0), best, where)
+    if where == math.inf and not is_found:
+        raise UndecidedError(f"the turn at high frequency is not found, from {turn:.6g} rad on")
+    return best, where
 
 
 def _delay(n: Function, m: Function, free: Free | None) -> tuple[float, float]:
     """Smallest arg(-L) / omega where |L| = 1, and where."""
-    centre, radius = _disc_at_infinity(n, m)
-    if abs(centre) + radius >= 1.0:
+    # abs(L) is below one at infinite frequency if it is so for one phase, and never one.
+    at_one, open_at_one = (abs(sum(f.limits, Fraction(0))) for f in (n, m))
+    if at_one >= open_at_one or _turn_at_infinity(n, m, free)[0] < math.inf:
         return 0.0, math.inf
     arc = 0.0, 0.0, 0.0, 1.0
     return _crossover(n, m, free, DELAY, arc, _LARGEST_DELAY, math.nan)
