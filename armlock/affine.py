@@ -258,6 +258,9 @@ def open_quotient(
     """
     system = System.of(loop, name)
     if system.is_equation:
-        raise TypeError(f"{name} must be an open loop L, not an equation D = 0, got {system!r}")
+        raise TypeError(
+            f"{name} must be an open loop L, not an equation D = 0, got {system!r}: "
+            "`System.opened` gives the open loop of a parameter"
+        )
     given = {k: real_number(k, v) for k, v in system.given(values, numbers).items()}
     return *quotient_at(system, given.values()), np.array(list(given.values()))
