@@ -183,9 +183,21 @@ class Controller:
         """Evaluate K(s), factor by factor; `s` in rad/s, any shape."""
         return self.numerator.over(self.denominator, complex_array("s", s))
 
+    def __mul__(self, other: Any) -> Any:
+        """Do what `System.__mul__` does; factors of controllers stay as they are given."""
+        if not isinstance(other, Controller):
+            return self.__rmul__(other)
+        return with_others(
+            lambda a, b: Controller.of_polynomials(
+                a.numerator * b.numerator, a.denominator * b.denominator
+            ),
+            self,
+            other,
+        )
+
     __add__ = __radd__ = _of_systems("__add__")
     __sub__, __rsub__ = _of_systems("__sub__"), _of_systems("__rsub__")
-    __mul__ = __rmul__ = _of_systems("__mul__")
+    __rmul__ = _of_systems("__mul__")
     __truediv__, __rtruediv__ = _of_systems("__truediv__"), _of_systems("__rtruediv__")
     __neg__, __pow__ = _of_systems("__neg__"), _of_systems("__pow__")
     feedback = _of_systems("feedback")

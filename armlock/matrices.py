@@ -13,7 +13,16 @@ from armlock.checks import real_array, real_number, whole_number
 from armlock.controllers import with_others
 from armlock.engine import statespace
 from armlock.engine.polynomials import exact, polynomial
-from armlock.systems import Sum, System, delay, equation, names_of, proportion, together
+from armlock.systems import (
+    Sum,
+    System,
+    delay,
+    delay_object,
+    equation,
+    names_of,
+    proportion,
+    together,
+)
 
 # Most terms that a determinant may multiply, about a minute.
 _MOST_PRODUCTS = 4_000_000
@@ -240,6 +249,8 @@ def _states(a: Any) -> tuple[list[list[Sum]], Any, Any]:
     found = [[Sum.of(polynomial([0, int(i == k)])) for k in range(n)] for i in range(n)]
     total, sizes = (np.full(shape, Fraction(0), object) for _ in range(2))
     for h, part in parts.items():
+        if isinstance(h, System):
+            delay_object(h, "a key of a")
         late = (h if isinstance(h, System) else delay(h)).numerator
         for i, k in zip(*np.nonzero(part), strict=True):
             value = Fraction(part[i, k])

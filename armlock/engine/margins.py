@@ -534,7 +534,7 @@ def require_stable(d: Function, common: int = 0, what: str = "loop") -> None:
     if count != 0:
         reasons = {
             decide.BOUNDARY: "a root on the axis",
-            decide.UNCONFINED: "no confined chain",
+            decide.UNCONFINED: "no confined chain: small changes of a delay make it unstable",
         }
         raise UnstableError(
             f"the {what} must be stable, but it has "
