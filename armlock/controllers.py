@@ -224,11 +224,12 @@ def rational(
     if isinstance(system, System):
         system = _of_system(system)
     if isinstance(system, Controller):
-        if integrators is not None or zeros is not None:
-            raise TypeError(
-                "integrators is for a state space or transfer function of python-control, got "
-                f"{integrators} and {system!r:.200}"
-            )
+        for name, given in (("integrators", integrators), ("zeros", zeros)):
+            if given is not None:
+                raise TypeError(
+                    f"{name} is for a state space or transfer function of python-control, got "
+                    f"{given} and {system!r:.200}"
+                )
         return system
     import control
 
@@ -266,17 +267,25 @@ def rational(
     above = above + Polynomial.of(-c for c in above.exact[:at_zero])
     unsure = tuple(bound if k >= at_zero else Fraction(0) for k, bound in enumerate(unsure))
     found = Controller.of_polynomials(above, below)
-    others = []
     if any((*doubts, *unsure)):
-        for lowest in _around(doubts):
-            other, changed = statespace.with_lowest(above, below, lowest)
-            for values in _around(unsure):
-                pairs = zip(values, above.exact, strict=False)
-                moved = other + Polynomial.of(new - old for new, old in pairs)
-                if moved:
-                    others.append(Controller.of_polynomials(moved, changed))
-    object.__setattr__(found, "others", tuple(others))
+        object.__setattr__(found, "others", tuple(_others(above, below, doubts, unsure)))
     return found
+
+
+def _others(
+    above: Polynomial,
+    below: Polynomial,
+    doubts: Sequence[Fraction],
+    unsure: Sequence[Fraction],
+) -> Iterator[Controller]:
+    """Return what else may be meant, by bounds of the lowest coefficients of both."""
+    for poles in _around(doubts):
+        other, changed = statespace.with_lowest(above, below, poles)
+        for zeros in _around(unsure):
+            pairs = zip(zeros, above.exact, strict=False)
+            moved = other + Polynomial.of(new - old for new, old in pairs)
+            if moved:
+                yield Controller.of_polynomials(moved, changed)
 
 
 def _around(bounds: Sequence[Fraction]) -> Iterator[tuple[Fraction, ...]]:

@@ -204,9 +204,9 @@ class Sum:
         return {lag.plain if lag.growth else lag for lag, _ in self.terms}
 
     def series(self, number: int, at: Fraction = Fraction(0)) -> list[Fraction]:
-        """Return the first coefficients of the series at a point, without parameters, exactly.
+        """Return the first coefficients of the series at a point, without parameters.
 
-        But for the fractions that stand for exponentials.
+        They are exact, apart from the fractions that stand for exponentials.
         """
         found = [fmpq(0)] * number
         for (lag, _), p in self.terms.items():

@@ -104,8 +104,7 @@ def counts(
 
     def some(block: slice) -> tuple[Any, ...]:
         k = here[block]
-        chosen = Functions(space.arrays, steady[k], delayed[k], uncertain[k])
-        return _wound(chosen, begin[k], ends[k], most)
+        return _wound(_some(functions, k), begin[k], ends[k], most)
 
     turn, first, last, undecided, steps = map(
         np.concatenate, zip(*in_threads(some, blocks(here.size, _BLOCK)), strict=True)
@@ -136,6 +135,11 @@ def counts(
     return found
 
 
+def _some(functions: Functions, which: IntArray | slice) -> Functions:
+    """Return some of many functions."""
+    return Functions(functions.space, *(part[which] for part in functions[1:]))
+
+
 def _wound(
     functions: Functions, begin: FloatArray, end: FloatArray, most: int
 ) -> tuple[Any, ...]:
@@ -145,8 +149,7 @@ def _wound(
         with _uncompiled.instead() as plain:
             for n in range(begin.size):
                 k = slice(n, n + 1)
-                one = Functions(functions.space, *(part[k] for part in functions[1:]))
-                found.append(plain.wind(one, begin[k], end[k], _FEW_STEPS))
+                found.append(plain.wind(_some(functions, k), begin[k], end[k], _FEW_STEPS))
                 steps = found[-1][-1]
                 if steps >= _FEW_STEPS or not _uncompiled.serves(inclusion.wind):
                     found.pop()
@@ -154,8 +157,7 @@ def _wound(
     # Those that are left are compiled.
     rest = slice(len(found), begin.size)
     if begin[rest].size:
-        left = Functions(functions.space, *(part[rest] for part in functions[1:]))
-        found.append(inclusion.wind(left, begin[rest], end[rest], most))
+        found.append(inclusion.wind(_some(functions, rest), begin[rest], end[rest], most))
     return tuple(map(np.concatenate, zip(*found, strict=True)))
 
 

@@ -367,9 +367,10 @@ def _turn_at_infinity(n: Function, m: Function, free: Free | None) -> tuple[floa
     return chain.arc_limit(n.space.lags, of_n, of_m, loose)
 
 
-def _phase(n: Function, m: Function, free: Free | None) -> tuple[float, float]:
-    """Smallest |arg(-L)| where |L| = 1, and where."""
-    turn, is_found = _turn_at_infinity(n, m, free)
+def _phase(
+    n: Function, m: Function, free: Free | None, turn: float, is_found: bool
+) -> tuple[float, float]:
+    """Smallest |arg(-L)| where |L| = 1, and where; `turn` is the one at infinity."""
     best, where = (turn, math.inf) if turn < math.inf else (math.pi, math.nan)
     best, where = _crossover(n, m, free, PHASE, (-1.0, 0.0, 1.0, 0.0), best, where)
     if where == math.inf and not is_found:
@@ -377,11 +378,11 @@ def _phase(n: Function, m: Function, free: Free | None) -> tuple[float, float]:
     return best, where
 
 
-def _delay(n: Function, m: Function, free: Free | None) -> tuple[float, float]:
-    """Smallest arg(-L) / omega where |L| = 1, and where."""
+def _delay(n: Function, m: Function, free: Free | None, turn: float) -> tuple[float, float]:
+    """Smallest arg(-L) / omega where |L| = 1, and where; `turn` is the one at infinity."""
     # abs(L) is below one at infinite frequency if it is so for one phase, and never one.
     at_one, open_at_one = (abs(sum(f.limits, Fraction(0))) for f in (n, m))
-    if at_one >= open_at_one or _turn_at_infinity(n, m, free)[0] < math.inf:
+    if at_one >= open_at_one or turn < math.inf:
         return 0.0, math.inf
     arc = 0.0, 0.0, 0.0, 1.0
     return _crossover(n, m, free, DELAY, arc, _LARGEST_DELAY, math.nan)
@@ -507,8 +508,9 @@ def margins_of(n: Function, m: Function, free: Free | None = None) -> Margins:
     """
     require_stable(n + m, common_zeros(n, m))
     below, above = [GainLimit(math.nan)] * 2 if free else gain_limits(n, m)
-    phase, phase_omega = _phase(n, m, free)
-    delay, _ = _delay(n, m, free)
+    turn, is_found = _turn_at_infinity(n, m, free)
+    phase, phase_omega = _phase(n, m, free, turn, is_found)
+    delay, _ = _delay(n, m, free, turn)
     modulus, modulus_omega = modulus_of(n, m, free)
     return Margins(
         gain_lower=1.0 / below.t,

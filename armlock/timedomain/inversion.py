@@ -124,6 +124,7 @@ def panels(
 
 def inverted(of: Panels, sigma: float, time: FloatArray) -> FloatArray:
     """Return the inverse transform at times of shape (n,) in s."""
+    # Importing scipy.special takes as long as a count.
     from scipy.special import spherical_jn
 
     total = np.zeros(time.size)
