@@ -211,6 +211,8 @@ def test_a_pole_that_may_be_zero_is_asked_for_where_it_matters():
             Controller.of(TURNED, number)
     with pytest.raises(TypeError, match=r"^integrators is for a state space"):
         Controller.of(((), (0.0,), 1.0), 1)
+    with pytest.raises(TypeError, match=r"^zeros is for a state space"):
+        Controller.of(((), (0.0,), 1.0), zeros=1)
 
 
 @pytest.mark.parametrize("integrators", [1, 2])
