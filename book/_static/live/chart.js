@@ -99,7 +99,7 @@ function armlockChart(api) {
         const a = p[1] - e[j] * p[2], b = q[1] - e[j] * q[2];
         const curved = (bounds.k0 + Math.abs(e[j]) * bounds.k1) * h * h;
         if (first ? Math.abs(b) > curved
-          : a < 0 === b < 0 && Math.min(Math.abs(a), Math.abs(b)) > 0.125 * curved) continue;
+          : a < 0 === b < 0 && Math.max(8 * Math.min(Math.abs(a), Math.abs(b)), Math.abs(b - a)) > curved) continue;
         const xa = p[3] - e[j] * p[4], xb = q[3] - e[j] * q[4];
         const from = Math.max(Math.min(xa, xb) - h * x1, -1e300);
         const to = Math.min(Math.max(xa, xb) + h * x1, 1e300);
@@ -119,7 +119,7 @@ function armlockChart(api) {
       return true;
     };
     const zero = lines.sample(0);
-    let p = zero, omega = 0, begun = false, leap = 0;
+    let p = zero, omega = 0, begun = false, leap = 0, before = start;
     while (omega < end && lines.evaluated < samples) {
       // Where nothing crosses in the chart for long, in steps as long as that is certain.
       const long = Math.min(leap, end - omega);
@@ -129,7 +129,7 @@ function armlockChart(api) {
         continue;
       }
       leap = Math.max(0.5 * leap, 1 / (A_RADIAN * longest));
-      let h = Math.min(end - omega, begun ? Math.max(Math.min(grow * omega, 1 / (A_RADIAN * longest)),
+      let h = Math.min(end - omega, begun ? Math.max(Math.min(grow * omega, 1 / (A_RADIAN * longest), 2 * before),
         1e-3 * start) : start);
       for (let depth = 0; ; depth++) {
         const bounds = lines.over(h), final = depth >= (begun ? DEEPEST : 3 * DEEPEST);
@@ -140,6 +140,7 @@ function armlockChart(api) {
             for (let j = 0; j < e.length; j++)
               found(j, zero[3] - e[j] * zero[4], Math.sign(q[1] - e[j] * q[2]), 0, zero, zero);
           if (!skip) for (const [j, x, jump, off] of out) found(j, x, jump, off, p, q);
+          before = depth ? 0.5 * h : h;
           omega = q[0];
           p = q;
           begun = true;
@@ -156,8 +157,8 @@ function armlockChart(api) {
     return omega;
   }
 
-  /* Counts over a grid, and where they are undecided: UNDECIDED. A picture in passing may take fewer
-   * samples of the axis, and leaves more unsure. */
+  /* Counts over a grid, and where they are undecided: UNDECIDED. Roots may cross up to the frequency `top`;
+   * up to `end` the axis was followed, with at most `samples`. */
   function chart(loop, x0, x1, nx, y0, y1, ny, samples = 3000000) {
     const counts = new Int16Array(nx * ny).fill(UNCONFINED);
     const px = (x1 - x0) / (nx - 1), py = (y1 - y0) / (ny - 1);
@@ -169,14 +170,16 @@ function armlockChart(api) {
       by = clamp(0, y0, y1) + (y1 > 0 ? 1 : -1) * (0.276393 + k) * py;
       base = count(loop, bx, by, { most: samples });
     }
-    // Where no chain is confined at this point, none is in the whole chart: that is certain.
-    if (base < 0) return base === UNCONFINED ? { counts, sure: 1 } : { counts: counts.fill(UNDECIDED), sure: 0 };
     const most = [Math.max(Math.abs(x0), Math.abs(x1), Math.abs(bx)),
       Math.max(Math.abs(y0), Math.abs(y1), Math.abs(by))];
-    // Next to the limit of the chain, roots cross at ever higher frequency.
-    const reach = share(...most) < 1 ? 1 : 0.98 / share(...most);
+    // Next to the limit of the chain, roots cross at ever higher frequency: 2 % of the way to it are left out.
+    const least = [[x0, x1], [y0, y1]].map(([from, to]) => Math.abs(clamp(0, from, to)));
+    const limit = 0.98 + 0.02 * share(...least), reach = share(...most) < 1 ? 1 : limit / share(...most);
     const endOf = part => tail(loop, part * most[0], part * most[1]).omega;
-    let end = endOf(reach);
+    const top = endOf(reach);
+    // Where no chain is confined at this point, none is in the whole chart: that is certain.
+    if (base < 0) return base === UNCONFINED ? { counts, sure: 1 } : { counts: counts.fill(UNDECIDED), sure: 0, top, end: 0 };
+    let end = top;
     const starts = new Int32Array(ny).fill(base), doubtful = new Uint8Array(ny);
     if (loop.second || loop.difference.gain) {
       const change = new Int32Array(ny + 1), lines = new Lines(loop, true);
@@ -227,13 +230,13 @@ function armlockChart(api) {
         total += change[j * wide + i];
         doubts += marks[j * wide + i];
         const beyond = seen < reach && Math.max(Math.abs(x) / most[0], Math.abs(y) / most[1]) > seen
-          || reach < 1 && taken > 0.98;
+          || reach < 1 && taken > limit;
         counts[j * nx + i] = taken >= LOST ? UNCONFINED
           : beyond || doubts || doubtful[j] || total < 0 ? UNDECIDED : Math.min(total, 30000);
         sure += counts[j * nx + i] !== UNDECIDED;
       }
     }
-    return { counts, sure: sure / (nx * ny), samples: lines.evaluated };
+    return { counts, sure: sure / (nx * ny), top, end };
   }
 
   /* Where a root is on the axis at s = j omega: [c1, c2, omega]. */

@@ -75,6 +75,14 @@ function armlockPages() {
   const { BOUNDARY, UNCONFINED, UNDECIDED } = api;
   const WORDS = { [BOUNDARY]: "a root on the imaginary axis", [UNCONFINED]: LOST, [UNDECIDED]: "undecided" };
 
+  /* How much of a chart is undecided, and why. */
+  function undecided({ sure, top, end }) {
+    const share = 1 - sure, hertz = omega => `${say(omega / TURN)} Hz`;
+    return `${share > 0.999 ? "All" : `${say(100 * share, 2)} %`} of the chart is undecided (striped)${end < top
+      ? `: there roots may cross the imaginary axis at frequencies up to ${hertz(top)}, and ${end ? `the axis was followed up to ${hertz(end)}`
+        : "these are too many to follow"}. A lower gain needs fewer.` : "."}`;
+  }
+
   function counted(count) {
     return count === 0 ? "stable" : count > 0
       ? `${count} unstable root${count > 1 ? "s" : ""}` : WORDS[count];
@@ -310,7 +318,7 @@ function armlockPages() {
       this.counting = true;
       this.wide.ask("chart", [...input, 100, 60000], (found, error) => {
         this.counting = false;
-        this.note.textContent = error || "Refining \u2026";
+        this.note.textContent = error || (found.sure < 1 && !moving ? `${undecided(found)} ` : "") + "Refining \u2026";
         if (!error) this.chart.fill(found);
         if (spec !== this.spec) {
           // It stays faint, because the loop has moved on.
@@ -321,9 +329,7 @@ function armlockPages() {
         if (moving || error) return;
         this.wide.ask("chart", [...input, 400, 3000000], finer => {
           this.chart.fill(finer);
-          const share = 1 - finer.sure;
-          this.note.textContent = share ? `${share > 0.999 ? "All" : `${say(100 * share, 2)} %`} of the chart is `
-            + "undecided (striped)." : finer.counts.every(count => count === UNCONFINED)
+          this.note.textContent = finer.sure < 1 ? undecided(finer) : finer.counts.every(count => count === UNCONFINED)
             ? `The loop is ${LOST} in the whole chart. This is certain.`
             : "Every pixel of the chart is certain. The lines between areas are true to a pixel.";
         });
