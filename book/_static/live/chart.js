@@ -119,31 +119,29 @@ function armlockChart(api) {
       return true;
     };
     const zero = lines.sample(0);
-    let p = zero, omega = 0, begun = false, leap = 0, before = start;
+    let p = zero, omega = 0, before = 0, leap = 0;
     while (omega < end && lines.evaluated < samples) {
       // Where nothing crosses in the chart for long, in steps as long as that is certain.
       const long = Math.min(leap, end - omega);
-      if (begun && (outside(p, lines.over(long), long) || clear(long))) {
+      if (before && (outside(p, lines.over(long), long) || clear(long))) {
         p = lines.sample(omega += long);
         leap *= 2;
         continue;
       }
       leap = Math.max(0.5 * leap, 1 / (A_RADIAN * longest));
-      let h = Math.min(end - omega, begun ? Math.max(Math.min(grow * omega, 1 / (A_RADIAN * longest), 2 * before),
+      let h = Math.min(end - omega, before ? Math.max(Math.min(grow * omega, 1 / (A_RADIAN * longest), 2 * before),
         1e-3 * start) : start);
       for (let depth = 0; ; depth++) {
-        const bounds = lines.over(h), final = depth >= (begun ? DEEPEST : 3 * DEEPEST);
+        const bounds = lines.over(h), final = depth >= (before ? DEEPEST : 3 * DEEPEST);
         const skip = outside(p, bounds, h), q = lines.sample(omega + h);
         if (skip || read(p, q, bounds, final)) {
-          if (!begun && Number.isFinite(zero[3]) && zero[5] > 0)
+          if (!before && Number.isFinite(zero[3]) && zero[5] > 0)
             // A real root at s = 0, by what h is after it.
             for (let j = 0; j < e.length; j++)
               found(j, zero[3] - e[j] * zero[4], Math.sign(q[1] - e[j] * q[2]), 0, zero, zero);
           if (!skip) for (const [j, x, jump, off] of out) found(j, x, jump, off, p, q);
           before = depth ? 0.5 * h : h;
-          omega = q[0];
-          p = q;
-          begun = true;
+          [p, omega] = [q, q[0]];
           break;
         }
         h *= 0.5;
@@ -173,13 +171,12 @@ function armlockChart(api) {
     const most = [Math.max(Math.abs(x0), Math.abs(x1), Math.abs(bx)),
       Math.max(Math.abs(y0), Math.abs(y1), Math.abs(by))];
     // Next to the limit of the chain, roots cross at ever higher frequency: 2 % of the way to it are left out.
-    const least = [[x0, x1], [y0, y1]].map(([from, to]) => Math.abs(clamp(0, from, to)));
-    const limit = 0.98 + 0.02 * share(...least), reach = share(...most) < 1 ? 1 : limit / share(...most);
+    const limit = 0.98 + 0.02 * share(...[[x0, x1], [y0, y1]].map(ends => Math.abs(clamp(0, ...ends))));
+    const reach = share(...most) < 1 ? 1 : limit / share(...most);
     const endOf = part => tail(loop, part * most[0], part * most[1]).omega;
-    const top = endOf(reach);
+    let top = endOf(reach), end = top;
     // Where no chain is confined at this point, none is in the whole chart: that is certain.
     if (base < 0) return base === UNCONFINED ? { counts, sure: 1 } : { counts: counts.fill(UNDECIDED), sure: 0, top, end: 0 };
-    let end = top;
     const starts = new Int32Array(ny).fill(base), doubtful = new Uint8Array(ny);
     if (loop.second || loop.difference.gain) {
       const change = new Int32Array(ny + 1), lines = new Lines(loop, true);
