@@ -89,8 +89,8 @@ class Loop(System):
         L(s) = K e^{-s\delta} \left[ m_1 \left( 1 - c_1 e^{-s\tau_1} \right)
         + m_2 \left( 1 - c_2 e^{-s\tau_2} \right) \right] .
 
-    It is a `System` and is combined like one: ``loop * filter``, ``loop.feedback()``. A third
-    arm is one more term of such an expression (`armlock.parameter`, `armlock.delay`).
+    It is a `System` and is combined like one: ``loop * filter``, ``loop.feedback()``. A loop
+    with a third arm is written as an expression, see the last example.
 
     Parameters
     ----------
@@ -139,6 +139,14 @@ class Loop(System):
 
     >>> unstable_roots(loop.replace(delay=20e-6), 0.999)
     0
+
+    A third arm is a term of the sum, with a parameter of its own:
+
+    >>> from armlock import delay, parameter, s
+    >>> c1, c2, c3 = parameter("c1", 1.0), parameter("c2", 1.0), parameter("c3", 1.0)
+    >>> mean = (3 - c1 * delay(20.1) - c2 * delay(19.9) - c3 * delay(20.0)) / 3
+    >>> unstable_roots(mean / s, c3=[0.999, 1.001])
+    array([0, 1])
     """
 
     # Anything that `Controller.of` takes, and a name, until they are checked.
