@@ -83,7 +83,7 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     armlock.amplitude_spectrum: {"series": np.ones(2000), "sample_rate": 1.0},
     armlock.flight_loop: {"mean_delay": 33.6, "half_difference": 0.255, "g2": 40.0,
                           "corner": 2.0, "delay": 0.0},
-    armlock.transfer: {"loop": ARMS, "source": "laser", "s": 1j},
+    armlock.transfer: {"loop": ARMS, "source": "arm 1", "s": 1j},
     armlock.noise_budget: {"loop": ARMS, "frequency": [1.0]},
     warped: {"omega": 1.0, "sample_rate": 10.0},
     roll_off: {"first": 1.0, "last": 2.0, "pairs": 3, "slope": 0.5},

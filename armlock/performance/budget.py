@@ -205,7 +205,7 @@ def noise_budget(
     f = axis("frequency", positive_array("frequency", frequency))
     require_stable(loop)
     s = 2j * np.pi * f
-    found = responses(loop, s)
+    found = responses(loop, s, ("laser", "arm 1", "arm 2"))
     arms = np.array([found["arm 1"], found["arm 2"]])
     beats, tau = np.array(LEVELS.beat_notes)[:, None], np.array([[loop.tau1], [loop.tau2]])
     # An arm's noise in cycles is turned into a frequency by 2 pi f.

@@ -172,7 +172,7 @@ def _series(
     shift = _DAMPED / (2.0 * duration)
     omega = 2.0 * np.pi * np.fft.rfftfreq(_SAMPLES, step)
     s = shift + 1j * omega
-    found = responses(loop, s)
+    found = responses(loop, s, ("common", "differential"))
     total = np.zeros(s.shape, dtype=np.complex128)
     for source, (nu0, gamma, alpha) in zip(("common", "differential"), errors, strict=True):
         total += found[source] * (nu0 / s + gamma / s**2 + alpha / s**3)

@@ -6,12 +6,17 @@ laser pulling are computed from these responses.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
 from armlock.checks import ComplexArray, one_of
 from armlock.loops import Loop, checked_loop
 from armlock.stability.counts import unstable_roots
+
+_ARMS = "arm 1", "arm 2"
+_HALVES = "common", "differential"
 
 
 def transfer(
@@ -57,18 +62,19 @@ def transfer(
     >>> print(f"{abs(transfer(flight_loop(), 'laser', 2j * 3.141592653589793 * 3e-3)):.2e}")
     1.13e-05
     """
-    found = responses(loop, s)
-    return found[one_of("source", source, found)]
+    one_of("source", source, ("laser", *_ARMS, *_HALVES))
+    return responses(loop, s, [source])[source]
 
 
-def responses(loop: Loop, s: npt.ArrayLike) -> dict[str, ComplexArray]:
-    """Evaluate the responses to all inputs at once, as `transfer` gives them one by one."""
+def responses(loop: Loop, s: npt.ArrayLike, sources: Sequence[str]) -> dict[str, ComplexArray]:
+    """Evaluate the responses to several inputs, as `transfer` gives them one by one."""
     sensitivity = 1.0 / (1.0 + checked_loop(loop)(s))
-    first, second = loop.arm_responses(s)
-    common, differential = loop.half_responses(s)
-    errors = {"arm 1": first, "arm 2": second, "common": common, "differential": differential}
-    found = {name: np.asarray(-error * sensitivity) for name, error in errors.items()}
-    return {"laser": np.asarray(sensitivity), **found}
+    found = {"laser": np.asarray(sensitivity)}
+    for names, errors in (_ARMS, Loop.arm_responses), (_HALVES, Loop.half_responses):
+        if set(names) & set(sources):
+            for name, error in zip(names, errors(loop, s), strict=True):
+                found[name] = np.asarray(-error * sensitivity)
+    return {source: found[source] for source in sources}
 
 
 def require_stable(loop: Loop) -> None:
