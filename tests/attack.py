@@ -397,14 +397,8 @@ def check_margins(tally, rng, sketch, loop, point):
             expected = min(got, expected)
         if name == "gain_lower" and found.gain_lower_is_bound:
             expected = max(got, expected)
-        tally.near(
-            f"margins.{name}",
-            point,
-            got,
-            expected,
-            name in verdict.unsure,
-            name == "gain_lower",
-        )
+        unsure, upward = name in verdict.unsure, name == "gain_lower"
+        tally.near(f"margins.{name}", point, got, expected, unsure, upward)
     low, high = max(found.gain_lower, 1.0 / judge.GAINS), min(found.gain_upper, judge.GAINS)
 
     def unstable(*factors):
@@ -430,11 +424,7 @@ def check_margins(tally, rng, sketch, loop, point):
     # Past its end a pair that has crossed may cross back at once.
     ends = (
         (found.gain_lower, -1.0, found.gain_lower_is_bound),
-        (
-            found.gain_upper,
-            1.0,
-            found.gain_upper_is_bound,
-        ),
+        (found.gain_upper, 1.0, found.gain_upper_is_bound),
     )
     for edge, way, is_bound in ends:
         past = [edge * (1.0 + way * share) for share in (1e-5, 1e-6, 1e-7)]
@@ -617,9 +607,8 @@ def check_controls(tally, rng, sketch, loop, point):
     found = tally.ask("margins", margins, loop, *point)
     if found is None:
         return
-    for what in dense_judge.too_good_ones(
-        *Affine.of(loop).quotient(*point), found, tally.controls
-    ):
+    quotient = Affine.of(loop).quotient(*point)
+    for what in dense_judge.too_good_ones(*quotient, found, tally.controls):
         tally.note("controls", point, what, "no certificate")
 
 

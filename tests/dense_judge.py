@@ -1,4 +1,4 @@
-"""Loops with three to six delays, against an argument and margins on a dense grid."""
+"""Loops with three to six delays, against winding numbers and margins on a dense grid."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ from armlock import delay, margins, unstable_roots
 from armlock.affine import Affine
 from armlock.engine import decide
 from armlock.engine.chain import UndecidedError
+from tests import independent
+
+NAMES = ("gain_upper", "gain_lower", "phase", "delay", "modulus")
 
 
 class Judge:
@@ -21,17 +24,12 @@ class Judge:
         self.degree = max(len(p) - 1 for _, p in numerator + denominator)
 
     @staticmethod
-    def _sum(terms, omega):
-        s = 1j * omega
+    def _sum(terms, s):
         return sum(np.polyval(p, s) * np.exp(-s * theta) for theta, p in terms)
 
     def loop(self, omega):
-        return self._sum(self.numerator, omega) / self._sum(self.denominator, omega)
-
-    def bounded(self, omega):
-        """D over (s + 1)^degree."""
-        terms = self.numerator + self.denominator
-        return self._sum(terms, omega) / (1j * omega + 1.0) ** self.degree
+        s = 1j * omega
+        return self._sum(self.numerator, s) / self._sum(self.denominator, s)
 
     def limit(self):
         """What nothing delays of D over s^degree, and the sizes of what delays do."""
@@ -43,80 +41,71 @@ class Judge:
         still = sum(top for theta, top in tops if not theta)
         return still, sum(abs(top) for theta, top in tops if theta)
 
-    def grid(self, f):
-        """Frequencies between which a function turns by no more than 0.2 rad."""
-        omega = np.unique(
-            np.concatenate((np.linspace(0.0, 400.0, 80_001), np.geomspace(1e-4, 1e4, 4000)))
-        )
-        for _ in range(40):
-            value = f(omega)
-            wide = np.abs(np.angle(value[1:] / value[:-1])) > 0.2
-            if not wide.any():
-                break
-            omega = np.insert(
-                omega, np.flatnonzero(wide) + 1, 0.5 * (omega[1:] + omega[:-1])[wide]
-            )
-        return omega
+    def d(self, s):
+        """D = N + M."""
+        return self._sum(self.numerator + self.denominator, s)
 
     def count(self):
-        value = self.bounded(self.grid(self.bounded))
-        turned = np.angle(value[1:] / value[:-1]).sum()
-        turned -= np.angle(value[-1] / self.limit()[0])
-        found = -turned / np.pi
-        assert abs(found - round(found)) < 1e-3
-        return round(found)
+        terms = self.numerator + self.denominator
+        size = self.degree + 1
+        still = np.sum([np.pad(p, (size - len(p), 0)) for t, p in terms if not t], axis=0)
+        delayed = [(np.asarray(p)[::-1], t) for t, p in terms if t]
+        top = independent.radius_of_unstable_roots(still[::-1], delayed)
+        return independent.winding(self.d, top, max(t for t, _ in terms))
 
     def margins(self):
-        """Gain up, gain down, phase, delay and modulus; golden sections and bisections.
+        """Gain up, gain down, phase, delay and modulus, with those at s = 0 and at infinity.
 
         Delays act on the numerator alone at the highest power: the chain's limit is known.
         """
         still, delayed = self.limit()
-        omega = np.unique(
-            np.concatenate((self.grid(self.bounded), np.geomspace(1e-3, 3e3, 400_000)))
-        )
-        omega = omega[omega > 0.0]
-        value = self.loop(omega)
-
-        def zeros(f):
-            y = f(value)
-            k = np.flatnonzero((y[1:] < 0.0) != (y[:-1] < 0.0))
-            low, high, sign = omega[k], omega[k + 1], y[k] < 0.0
-            for _ in range(60):
-                middle = 0.5 * (low + high)
-                same = (f(self.loop(middle)) < 0.0) == sign
-                low, high = np.where(same, middle, low), np.where(same, high, middle)
-            return 0.5 * (low + high)
-
-        w = zeros(lambda v: v.imag)
-        # L(0) is real; with a pole at s = 0 it is none of them.
-        at_zero = self.loop(1e-9)
-        k = (
-            -1.0
-            / np.append(
-                self.loop(w), at_zero if abs(at_zero.imag) < 1e-3 * abs(at_zero) else np.inf
-            ).real
-        )
-        k = np.append(k, still / delayed if delayed else np.inf)
+        omega = np.union1d(np.linspace(5e-3, 400.0, 80_000), np.geomspace(1e-4, 1e4, 400_000))
+        up, down, phase, late, modulus = dense_margins(self.loop, omega)
+        at_zero = complex(self.loop(1e-9))
+        # L(0) is real; with a pole at s = 0 it is none of the values that limit a gain.
+        ends = [-1.0 / at_zero.real] if abs(at_zero.imag) < 1e-3 * abs(at_zero) else []
+        ends += [still / delayed] if delayed else []
+        up = min([up, *(k for k in ends if k > 1.0)])
+        down = max([down, *(k for k in ends if 0.0 < k < 1.0)])
+        modulus = min(modulus, abs(1.0 + at_zero), 1.0 - delayed / still)
         # Gain factors past 1e4 are not looked at.
-        k = k[(k > 1e-4) & (k < 1e4)]
-        w = zeros(lambda v: np.abs(v) - 1.0)
-        angle = np.angle(-self.loop(w))
-        near = np.argsort(np.abs(1.0 + value))[:50]
-        low, high = omega[np.maximum(near - 1, 0)], omega[np.minimum(near + 1, omega.size - 1)]
-        share = (math.sqrt(5.0) - 1.0) / 2.0
+        return up if up < 1e4 else np.inf, down if down > 1e-4 else 0.0, phase, late, modulus
+
+
+def dense_margins(loop, omega):
+    """Gain up and down, phase, delay and modulus of L on a grid, refined between its points."""
+    value = loop(omega)
+
+    def where(function):
+        """Return where a real function of L changes its sign."""
+        y = function(value)
+        k = np.flatnonzero((y[1:] < 0.0) != (y[:-1] < 0.0))
+        low, high, sign = omega[k], omega[k + 1], y[k] < 0.0
         for _ in range(60):
-            a, b = high - share * (high - low), low + share * (high - low)
-            left = np.abs(1.0 + self.loop(a)) < np.abs(1.0 + self.loop(b))
-            low, high = np.where(left, low, a), np.where(left, b, high)
-        ends = abs(1.0 + self.loop(1e-9)), 1.0 - delayed / still
-        return np.array([
-            k[k > 1.0].min(initial=np.inf),
-            k[(k < 1.0) & (k > 0.0)].max(initial=0.0),
-            np.abs(angle).min(initial=np.inf),
-            ((angle % (2.0 * np.pi)) / w).min(initial=np.inf),
-            min(np.abs(1.0 + self.loop(low)).min(), *ends),
-        ])  # fmt: skip
+            middle = 0.5 * (low + high)
+            same = (function(loop(middle)) < 0.0) == sign
+            low, high = np.where(same, middle, low), np.where(same, high, middle)
+        return 0.5 * (low + high)
+
+    real = loop(where(np.imag))
+    # An imaginary part that jumps through a pole is no crossing of the real axis.
+    gains = -1.0 / real.real[(real.real < 0.0) & (np.abs(real) < 1e6)]
+    crossover = where(lambda v: np.abs(v) - 1.0)
+    turned = np.angle(-loop(crossover))
+    near = np.argsort(np.abs(1.0 + value))[:50]
+    low, high = omega[np.maximum(near - 1, 0)], omega[np.minimum(near + 1, omega.size - 1)]
+    share = (math.sqrt(5.0) - 1.0) / 2.0
+    for _ in range(60):
+        a, b = high - share * (high - low), low + share * (high - low)
+        left = np.abs(1.0 + loop(a)) < np.abs(1.0 + loop(b))
+        low, high = np.where(left, low, a), np.where(left, b, high)
+    return (
+        gains[gains > 1.0].min(initial=np.inf),
+        gains[gains < 1.0].max(initial=0.0),
+        np.abs(turned).min(initial=np.inf),
+        (np.mod(turned, 2.0 * np.pi) / crossover).min(initial=np.inf),
+        np.abs(1.0 + loop(low)).min(),
+    )
 
 
 def drawn(rng):
@@ -182,18 +171,13 @@ def compared(
     certified = ask("margins", margins, loop)
     if certified is None:
         return found, []
-    ours = np.array([
-        certified.gain_upper, certified.gain_lower, certified.phase,
-        certified.delay, certified.modulus,
-    ])  # fmt: skip
-    dense = judge.margins()
     wrong = []
-    for name, a, b in zip(
-        ("up", "down", "phase", "delay", "modulus"), ours, dense, strict=True
-    ):
+    for name, b in zip(NAMES, judge.margins(), strict=True):
+        a = getattr(certified, name)
         # The judge looks at gain factors from 1e-4 to 1e4.
-        a = np.inf if name == "up" and a >= 1e4 else 0.0 if name == "down" and a <= 1e-4 else a
-        too_good = a > b * (1 + 2e-6) if name != "down" else a < b * (1 - 2e-6)
+        if name.startswith("gain"):
+            a = np.inf if a >= 1e4 else 0.0 if a <= 1e-4 else a
+        too_good = a > b * (1 + 2e-6) if name != "gain_lower" else a < b * (1 - 2e-6)
         equal = a == b or math.isclose(a, b, rel_tol=1e-5)
         if too_good or not equal:
             wrong.append(f"{name} {a} for {b}")
@@ -225,11 +209,11 @@ def too_good_ones(n, m, found, tally=None):
     How many are not, and how many are that are 3e-5 worse, is counted.
     """
     wrong = []
-    for name in ("gain_upper", "gain_lower", "phase", "delay", "modulus"):
+    for name in NAMES:
         level, way = getattr(found, name), -1.0 if name == "gain_lower" else 1.0
         if not 0.0 < level < np.inf:
             continue
-        if name in ("gain_upper", "gain_lower") and not 1e-4 < level < 1e4:
+        if name.startswith("gain") and not 1e-4 < level < 1e4:
             # It may be the largest factor that was looked at, and no margin.
             continue
         for what, share in (("too good", 1e-5), ("too small", -3e-5)):

@@ -12,7 +12,6 @@ from fractions import Fraction
 import mpmath
 import numpy as np
 from numba import njit
-from scipy.interpolate import BarycentricInterpolator
 from scipy.linalg import block_diag
 from scipy.special import lambertw
 
@@ -86,11 +85,10 @@ def hayes_count(a, b, tau=1.0):
     return int(np.count_nonzero(hayes_roots(a, b, tau).real > 0.0))
 
 
-def radius_of_unstable_roots(system, x, y):
+def radius_of_unstable_roots(undelayed, delayed):
     """Radius past which |A| exceeds the delayed terms in the right half-plane."""
-    a, delayed = split(system, x, y)
-    bound = -np.abs(a)
-    bound[-1] = abs(a[-1])
+    bound = -np.abs(undelayed)
+    bound[-1] = abs(undelayed[-1])
     for b, _ in delayed:
         bound[: b.size] -= np.abs(b)
     if bound[-1] <= 0.0:
@@ -101,68 +99,50 @@ def radius_of_unstable_roots(system, x, y):
     return radius
 
 
-def rectangle_count(system, x, y, density=10.0, at_zero=0):
-    """Unstable roots by the argument of D along a sampled rectangle around them.
+def winding(f, top, longest, right=None, tiny=0.0):
+    """Zeros of f, real on the real axis, right of the imaginary axis and within a rectangle.
 
-    Half of it, from 0 up the imaginary axis, right, and down to the real axis; halved
-    wherever the argument moves by more than 0.5 between two samples. The roots at s = 0, as
-    many as `at_zero` says, are divided out.
+    Half of its contour: from the real axis up at `right` to `top`, back to the imaginary axis
+    and down it, around s = 0 at a distance `tiny`. Steps resolve the longest delay; they are
+    halved until the argument moves by less than 0.7 in each.
     """
-    radius = radius_of_unstable_roots(system, x, y)
-    longest = max((t for _, t in split(system, x, y)[1]), default=0.0)
-    size = int(density * (radius * longest + 30.0))
-    side = np.linspace(0.0, radius, size)
-    near = np.geomspace(1e-9 * radius, radius, 400)
-    up = 1j * np.unique(np.concatenate((side, near)))
-    across = 1j * radius + np.linspace(0.0, radius, 400)
-    down = radius + 1j * radius * np.linspace(1.0, 0.0, size)
-    s = np.concatenate((up, across, down))
-    s = s[np.abs(s) >= 1e-6 * radius] if at_zero else s
-    d = value(system, s, x, y) / s**at_zero
-    for _ in range(50):
-        assert d.all(), "a root lies on the rectangle"
-        turn = np.angle(d[1:] / d[:-1])
-        wide = np.flatnonzero(np.abs(turn) > 0.5)
-        if wide.size == 0:
-            count = -turn.sum() / np.pi
-            assert abs(count - round(count)) < (0.1 if at_zero else 1e-6)
-            return round(count)
-        middle = 0.5 * (s[wide] + s[wide + 1])
-        s = np.insert(s, wide + 1, middle)
-        d = np.insert(d, wide + 1, value(system, middle, x, y) / middle**at_zero)
-    raise AssertionError("a root lies on the rectangle")
+    right = right or top
+    low = tiny or 1e-9 * top
+    down = np.union1d(np.arange(low, top, 0.3 / longest), np.geomspace(low, top, 400))[::-1]
+    path = [right + 1j * np.linspace(0.0, top, 4000), np.linspace(right, 0.0, 4000) + 1j * top]
+    path += [1j * down, tiny * np.exp(1j * np.linspace(np.pi / 2, 0.0, 200)) if tiny else [0.0]]
+    s = np.concatenate(path)
+    turned = 0.0
+    for first in range(0, s.size - 1, 200_000):
+        here = s[first : first + 200_001]
+        value = f(here)
+        for _ in range(60):
+            assert value.all(), "a zero lies on the contour"
+            turn = np.angle(value[1:] / value[:-1])
+            wide = np.flatnonzero(np.abs(turn) > 0.7)
+            if not wide.size:
+                break
+            middle = 0.5 * (here[wide] + here[wide + 1])
+            here = np.insert(here, wide + 1, middle)
+            value = np.insert(value, wide + 1, f(middle))
+        assert not wide.size, "a zero lies on the contour"
+        turned += turn.sum()
+    count = turned / np.pi
+    assert abs(count - round(count)) < 1e-6
+    return round(count)
 
 
-def generator_eigenvalues(system, x, y, nodes=80):
-    """Eigenvalues of the collocated delay equation in companion form (retarded only).
+def count(system, x, y, at_zero=0):
+    """Unstable roots of D(s; x, y); as many at s = 0 as `at_zero` says are divided out."""
+    undelayed, delayed = split(system, x, y)
+    radius = radius_of_unstable_roots(undelayed, delayed)
 
-    The state is (xi, xi', ...), as polynomials of degree `nodes` on the longest delay.
-    """
-    a, terms = split(system, x, y)
-    order = a.size - 1
-    now = np.diag(np.ones(order - 1), 1)
-    now[-1] = -a[:-1] / a[-1]
-    delayed = []
-    for b, delay in terms:
-        last_row = np.zeros((order, order))
-        last_row[-1, : b.size] = -b / a[-1]
-        delayed.append((delay, last_row))
-    longest = max((delay for delay, _ in delayed), default=1.0)
-    theta = 0.5 * longest * (np.cos(np.pi * np.arange(nodes + 1) / nodes) - 1.0)
-    lagrange = BarycentricInterpolator(theta, np.eye(nodes + 1))
-    difference = lagrange.derivative(theta)
-    matrix = np.kron(difference, np.eye(order))
-    first = np.zeros((order, order * (nodes + 1)))
-    first[:, :order] = now
-    for delay, coupling in delayed:
-        first += np.kron(lagrange(-delay)[None, :], coupling)
-    matrix[:order] = first
-    return np.linalg.eigvals(matrix)
+    def f(s):
+        d = sum(np.polyval(b[::-1], s) * np.exp(-s * t) for b, t in delayed)
+        return (np.polyval(undelayed[::-1], s) + d) / s**at_zero
 
-
-def spectral_count(system, x, y, nodes=80):
-    """Unstable roots as eigenvalues of the collocated generator."""
-    return int(np.count_nonzero(generator_eigenvalues(system, x, y, nodes).real > 0.0))
+    longest = max((t for _, t in delayed), default=0.0) + 1.0
+    return winding(f, radius, longest, tiny=1e-6 * radius if at_zero else 0.0)
 
 
 def map_eigenvalues(system, x, y):

@@ -7,7 +7,6 @@ import control
 import mpmath
 import numpy as np
 import pytest
-from scipy.interpolate import BarycentricInterpolator
 
 from armlock import (
     BOUNDARY,
@@ -28,6 +27,7 @@ from armlock import (
 )
 from armlock.stability.semidiscretization import semi_discretization
 from armlock.systems import exponential
+from tests import independent
 
 # published systems ------------------------------------------------
 
@@ -93,31 +93,32 @@ def test_the_column_of_wood_and_berry(gains, times, count, first):
 # drawn systems ------------------------------------------------
 
 
-def generator_eigenvalues(parts, points=60):
-    """Eigenvalues of x' = sum A_k x(t - h_k), its history sampled at Chebyshev points."""
-    longest, n = max(parts), len(parts[0.0])
-    nodes = np.cos(np.pi * np.arange(points + 1) / points)
-    times = 0.5 * longest * (nodes - 1.0)
-    weight = np.r_[2.0, np.ones(points - 1), 2.0] * (-1.0) ** np.arange(points + 1)
-    apart = nodes[:, None] - nodes + np.eye(points + 1)
-    slopes = np.outer(weight, 1.0 / weight) / apart
-    slopes -= np.diag(slopes.sum(axis=1))
-    whole = np.kron(slopes * 2.0 / longest, np.eye(n))
-    at = BarycentricInterpolator(times, np.eye(points + 1))
-    whole[:n] = sum(np.kron(at(-h)[None], part) for h, part in parts.items())
-    return np.linalg.eigvals(whole)
+def winding(parts, right_of=0.0):
+    """Poles of x' = sum A_k x(t - h_k) on the right of a line."""
+    unit = np.eye(len(parts[0.0]))
+
+    def d(at):
+        at = at[:, None, None] + right_of
+        return np.linalg.det(at * unit - sum(a * np.exp(-at * h) for h, a in parts.items()))
+
+    # No pole is larger than the sum of the matrices.
+    top = abs(right_of) + sum(
+        np.linalg.norm(a) * np.exp(-min(right_of, 0.0) * h) for h, a in parts.items()
+    )
+    return independent.winding(d, top, 5.0)
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_drawn_state_spaces_have_the_eigenvalues_of_their_generator(seed):
+def test_drawn_state_spaces_have_the_poles_of_their_matrices(seed):
     rng = np.random.default_rng(seed)
     n, number = int(rng.integers(2, 7)), int(rng.integers(1, 4))
     parts = {0.0: rng.normal(size=(n, n)) - np.eye(n)}
     parts |= {h: rng.normal(size=(n, n)) for h in rng.uniform(0.1, 2.0, number)}
-    poles, found = state_space(parts), generator_eigenvalues(parts)
-    assert unstable_roots(poles) == (found.real > 0).sum()
-    last = found[np.argmax(found.real)]
-    assert rightmost_root(poles) == pytest.approx(complex(last.real, abs(last.imag)), rel=1e-7)
+    poles = state_space(parts)
+    assert unstable_roots(poles) == winding(parts)
+    root = rightmost_root(poles)
+    assert winding(parts, root.real + 1e-7) == 0
+    assert winding(parts, root.real - 1e-7) == (2 if root.imag else 1)
 
 
 def test_the_transfer_function_of_a_state_space_is_that_of_its_matrices():
@@ -128,16 +129,6 @@ def test_the_transfer_function_of_a_state_space_is_that_of_its_matrices():
     for at in (0.3j, 2.0 - 1.0j, 5.0):
         a = sum(part * np.exp(-at * h) for h, part in parts.items())
         assert system(at) == pytest.approx(c @ np.linalg.solve(at * np.eye(4) - a, b) + d)
-
-
-def turns(function, degree, end=1e4, points=200_000):
-    """Zeros on the right of a function that ends as s^degree, on a dense grid."""
-    omega = np.r_[0.0, np.geomspace(1e-5, end, points)]
-    angle = np.unwrap(np.angle(function(1j * omega)))
-    assert np.abs(np.diff(angle)).max() < 0.5
-    last = 0.5 * np.pi * degree
-    last += 2.0 * np.pi * round((angle[-1] - last) / (2.0 * np.pi))
-    return degree / 2 - (last - angle[0]) / np.pi
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -166,7 +157,7 @@ def test_drawn_matrices_have_the_winding_number_of_their_determinant(seed):
 
     loops = return_difference(plant, controllers)
     assert loops.numerator.degree == 6
-    assert unstable_roots(loops) == pytest.approx(turns(d, 6), abs=1e-6)
+    assert unstable_roots(loops) == independent.winding(d, 300.0, 6.0)
     root = rightmost_root(loops)
     assert abs(d(root)) < 1e-9
 
@@ -208,8 +199,7 @@ def test_a_state_space_closes_as_its_transfer_functions_do():
             [[closed[0.0] - k * np.outer(b[:, 0], c[0]), -b[:, 1:]], [c[1:], -3.0 * np.eye(1)]]
         )
         closed[0.4] = np.block([[closed[0.4], np.zeros((3, 1))], [np.zeros((1, 4))]])
-        found = generator_eigenvalues(closed)
-        assert unstable_roots(whole, k) == (found.real > 0).sum()
+        assert unstable_roots(whole, k) == winding(closed)
     ss = control.ss([[-1.0, 2.0], [0.5, -3.0]], np.eye(2), np.eye(2), np.zeros((2, 2)))
     found = return_difference(ss, [2.0, -1.0])
     assert rightmost_root(found).real == pytest.approx(
@@ -306,8 +296,8 @@ def test_finite_spectrum_assignment_has_one_root():
     for system in (loop, equation(1 + loop)):
         assert unstable_roots(system) == 0
         assert rightmost_root(system) == pytest.approx(-2.0, abs=1e-12)
-    inside = turns(lambda at: 1 + gain * kernel(at, 1.0, 1.0), 0)
-    assert inside == pytest.approx(2)
+    inside = independent.winding(lambda at: 1 + gain * kernel(at, 1.0, 1.0), 100.0, 1.0)
+    assert inside == 2
     # Those of the controller, and the pole of the plant.
     assert nyquist(loop).open_loop_poles == 3
     assert margins(loop).gain_lower < 1.0 < margins(loop).gain_upper
@@ -338,9 +328,8 @@ def test_loops_with_distributed_delays_are_counted_without_their_known_zeros(see
         whole = at + p + k * np.exp(-at * d) * kernel(at, h, a) * (1 + g * kernel(at, h2, a2))
         return whole / (1 + abs(at))
 
-    count = turns(closed, 1)
-    assert unstable_roots(loop) == pytest.approx(count, abs=1e-6)
-    assert unstable_roots(equation(1 + loop)) == pytest.approx(count, abs=1e-6)
+    count = independent.winding(closed, 300.0, 5.0)
+    assert unstable_roots(loop) == unstable_roots(equation(1 + loop)) == count
     root = rightmost_root(loop)
     assert abs(closed(root)) < 1e-9
     assert (root.real > 0) == (count > 0)

@@ -99,7 +99,7 @@ def test_roots_that_cancel_at_zero_hide_no_other(seed):
     if mapping is DIFFERENCE and c == 0.0:
         cancelled = integrators
     assert unstable_roots(equation(1 + loop), *point) == -1
-    expected = independent.rectangle_count(loop, point[0], point[1], at_zero=cancelled)
+    expected = independent.count(loop, point[0], point[1], at_zero=cancelled)
     assert unstable_roots(loop, *point) == expected
     assert nyquist(loop, *point).closed_loop_roots == expected
 
@@ -129,7 +129,7 @@ def test_poles_on_the_axis_are_refused_with_the_reason_and_counted_elsewhere(pol
     loop = Loop(((-1.0,), (pole, -pole, -1.0), 0.3), SINGLE, 2.0, 1.5)
     with pytest.raises(ValueError, match=r"no pole on the imaginary axis except at s = 0, got"):
         nyquist(loop, 0.9, 1.0)
-    assert unstable_roots(loop, 0.9, 1.0) == independent.rectangle_count(loop, 0.9, 1.0)
+    assert unstable_roots(loop, 0.9, 1.0) == independent.count(loop, 0.9, 1.0)
 
 
 def test_an_unconfined_chain_is_refused():

@@ -23,6 +23,7 @@ from armlock import (
     stability_chart,
     unstable_roots,
 )
+from tests.dense_judge import dense_margins
 
 
 def predictor(controller, plant, model, true):
@@ -30,52 +31,18 @@ def predictor(controller, plant, model, true):
     return System.of(controller).feedback(plant - plant * model) * plant * true
 
 
-class Dense:
-    """L at s = 2 pi j (n + x) / theta, for whole n up to 1e7 and x from 0 to 1."""
+def by_turns(controller, plant, theta):
+    """Margins of L, turn by turn of the delay up to the turn 1e6."""
+    above, below = (np.polymul(a, b) for a, b in zip(controller, plant, strict=True))
+    turns = np.union1d(np.arange(60), np.unique(np.geomspace(60, 1e6, 60).astype(int)))
+    share = np.concatenate((np.geomspace(1e-9, 1e-3, 400), np.linspace(1e-3, 1, 4000)[1:]))
 
-    def __init__(self, controller, plant, theta):
-        self.theta = theta
-        self.open = [np.polymul(a, b) for a, b in zip(controller, plant, strict=True)]
-        turns = np.unique(np.geomspace(60, 1e7, 60).astype(int))
-        self.turn = np.concatenate((np.arange(60), turns))[:, None]
-        self.x = np.concatenate((np.geomspace(1e-9, 1e-3, 400), np.linspace(1e-3, 1, 4000)[1:]))
-
-    def __call__(self, turn, x):
-        p = 2j * np.pi * (turn + x) / self.theta
-        k = np.polyval(self.open[0], p) / np.polyval(self.open[1], p)
-        z = np.exp(-2j * np.pi * x)
+    def loop(omega):
+        s = 1j * omega
+        k, z = np.polyval(above, s) / np.polyval(below, s), np.exp(-s * theta)
         return k * z / (1.0 + k * (1.0 - z))
 
-    def where(self, function):
-        """L where a real function of L changes its sign, to 50 halvings."""
-        value = function(self(self.turn, self.x))
-        turn, k = np.nonzero((value[:, 1:] < 0.0) != (value[:, :-1] < 0.0))
-        turn, low, high = self.turn[turn, 0], self.x[k], self.x[k + 1]
-        sign = function(self(turn, low)) < 0.0
-        for _ in range(50):
-            middle = 0.5 * (low + high)
-            left = (function(self(turn, middle)) < 0.0) == sign
-            low, high = np.where(left, middle, low), np.where(left, high, middle)
-        return self(turn, low), 2.0 * np.pi * (turn + low) / self.theta
-
-    def margins(self):
-        """Gain factors next to one, phase, delay and modulus."""
-        crossing, omega = self.where(lambda value: np.abs(value) - 1.0)
-        turned = np.angle(-crossing)
-        real, _ = self.where(np.imag)
-        # An imaginary part that jumps through a pole is no crossing of the real axis.
-        gains = -1.0 / real.real[(real.real < 0.0) & (np.abs(real) < 1e6)]
-        distance = np.abs(1.0 + self(self.turn, self.x))
-        n, k = divmod(int(np.argmin(distance)), self.x.size)
-        low, high = self.x[max(k - 1, 0)], self.x[min(k + 1, self.x.size - 1)]
-        near = np.linspace(low, high, 4001)
-        return (
-            max(gains[gains < 1.0], default=0.0),
-            min(gains[gains > 1.0], default=np.inf),
-            np.abs(turned).min(initial=np.inf),
-            (np.mod(turned, 2.0 * np.pi) / omega).min(initial=np.inf),
-            np.abs(1.0 + self(self.turn[n], near)).min(),
-        )
+    return dense_margins(loop, 2.0 * np.pi / theta * (turns[:, None] + share).ravel())
 
 
 def drawn(seed):
@@ -96,7 +63,7 @@ def test_smith_predictors_have_their_margins_by_the_identity_of_their_delay(seed
     loop = predictor(controller, process, z, z)
     assert unstable_roots(loop) == 0
     found = margins(loop)
-    lower, upper, phase, late, modulus = Dense(pi, plant, theta).margins()
+    upper, lower, phase, late, modulus = by_turns(pi, plant, theta)
     # At high frequency, L = k z / (1 + k - k z) with k = K P at infinity.
     assert found.gain_lower == pytest.approx(lower, rel=1e-6)
     assert found.gain_upper == pytest.approx(min(upper, 2.0 + 1.0 / direct), rel=1e-6)

@@ -1,7 +1,7 @@
 """The loops of six lasers: their equation from the tree of locks, counts by winding numbers.
 
-The determinant is that of the six equations, and the counts come from the phase along a
-contour, both written here with numpy alone.
+The determinant is that of the six equations, written here with numpy alone, and counts are the
+winding numbers of its formula.
 """
 
 import control
@@ -11,6 +11,7 @@ import pytest
 from armlock import Controller, Loop, delay, paper, paper_loop, unstable_roots
 from armlock.controllers import table_two, white_paper
 from armlock.sensors import dual, modified_dual
+from tests import independent
 
 RING = ("12", "13", "31", "32", "23", "21")
 # The trees of lisainstrument 2.3 with primary laser 12: the connection that is not used.
@@ -88,38 +89,6 @@ def test_the_determinant_of_all_lasers_is_the_loop_times_the_locks(tree):
     assert np.linalg.det(matrix) == pytest.approx(expected, rel=1e-12)
 
 
-def winding(f, top, right, longest):
-    """Zeros of f in the rectangle from the imaginary axis to `right`, up and down to `top`.
-
-    The phase is followed from the real axis along the right and upper edge, down the imaginary
-    axis and around s = 0, with steps that are halved until the phase turns by less than 0.7.
-    """
-    tiny = 1e-9
-    step = 0.3 / longest
-    down = np.r_[np.arange(top, 1e-2, -step), np.geomspace(1e-2, tiny, 4000)]
-    corner = tiny * np.exp(1j * np.linspace(np.pi / 2, 0, 200))
-    path = [right + 1j * np.linspace(0, top, 4000), np.linspace(right, 0, 4000) + 1j * top]
-    path += [1j * down, corner]
-    s = np.concatenate(path)
-    total, at, value = 0.0, s[:1], f(s[:1])
-    for part in np.array_split(s[1:], max(1, s.size // 200_000)):
-        here = np.concatenate((at, part))
-        values = np.concatenate((value, f(part)))
-        for _ in range(60):
-            turns = np.angle(values[1:] / values[:-1])
-            wide = np.flatnonzero(abs(turns) > 0.7)
-            if not wide.size:
-                break
-            middle = 0.5 * (here[wide] + here[wide + 1])
-            here = np.insert(here, wide + 1, middle)
-            values = np.insert(values, wide + 1, f(middle))
-        assert not wide.size
-        total += turns.sum()
-        at, value = here[-1:], values[-1:]
-    assert abs(total / np.pi - round(total / np.pi)) < 1e-6
-    return round(total / np.pi)
-
-
 def rational(controller, s):
     """Evaluate a controller, factor by factor."""
     value = np.full(s.shape, controller.gain, dtype=complex)
@@ -156,7 +125,7 @@ def two_trips(tau1, tau2, c1=1.0, c2=1.0, controller=None, difference=None):
         return 1 + rational(k, s) * arms
 
     loop = Loop(k, dual(paper.DUAL_SENSOR_CORNER, scale), tau1, tau2)
-    return f, loop.at(c1=c1, c2=c2), (100.0, 30.0, tau1)
+    return f, loop.at(c1=c1, c2=c2), (100.0, tau1, 30.0, 1e-9)
 
 
 def weights(sensor):
@@ -177,7 +146,7 @@ def n3(tau, sigma, corner=LOW, **errors):
 
     m1, m2 = weights(dual(corner, tau - sigma))
     sensor = m1 * (1 - t["21"] * delay(tau)) + m2 * (t["13"] - inner * delay(sigma))
-    return f, table_two() * sensor, (100.0, 30.0, sigma)
+    return f, table_two() * sensor, (100.0, sigma, 30.0, 1e-9)
 
 
 def flight(lock, response, mean=33.6, half=0.255, top=3e4):
@@ -192,13 +161,12 @@ def flight(lock, response, mean=33.6, half=0.255, top=3e4):
 
     m1, m2 = weights(modified_dual(mean, half))
     sensor = m1 * (1 - lock * delay(tau1)) + m2 * (1 - lock * delay(tau2))
-    return f, k * delay(7e-6) * sensor, (top, 1e4, tau1)
+    return f, k * delay(7e-6) * sensor, (top, tau1, 1e4, 1e-9)
 
 
 def triangle_of_the_white_paper():
     mean, half = 0.5 * (24.98 + 16.65), 0.5 * (24.98 - 16.65)
-    f, loop, box = flight(1.0, lambda s: 1.0, mean, half, top=3e3)
-    return f, loop, box
+    return flight(1.0, lambda s: 1.0, mean, half, top=3e3)
 
 
 W = 2 * np.pi * 300.0
@@ -238,10 +206,10 @@ SYSTEMS = {
 def test_the_count_is_the_winding_number(name):
     (f, loop, box), expected = SYSTEMS[name]
     assert unstable_roots(loop) == expected
-    assert winding(f, *box) == expected
+    assert independent.winding(f, *box) == expected
 
 
 def test_a_count_that_is_wrong_is_caught():
     # The same contour with the other sign of the arms' difference.
     f, _, box = two_trips(20.1, 19.9, difference=-0.2)
-    assert winding(f, *box) == unstable_roots(paper_loop(difference=-0.2)) != 0
+    assert independent.winding(f, *box) == unstable_roots(paper_loop(difference=-0.2)) != 0
