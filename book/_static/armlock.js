@@ -65,6 +65,8 @@ addEventListener("DOMContentLoaded", () => {
   set("#pst-primary-sidebar", "role", "complementary");
   set("#pst-primary-sidebar", "aria-label", "The book");
   set(".citation-list, .citation", "role");
+  // Their own words say more than the names that they are given.
+  set("details.hide summary, .search-button-field", "aria-label");
   for (const corner of document.querySelectorAll("th.head"))
     if (!corner.textContent.trim()) corner.outerHTML = "<td></td>";
 });

@@ -327,11 +327,11 @@ function armlockPages() {
           return;
         }
         if (moving || error) return;
-        this.wide.ask("chart", [...input, 400, 3000000], finer => {
-          this.chart.fill(finer);
-          this.note.textContent = finer.sure < 1 ? undecided(finer) : finer.counts.every(count => count === UNCONFINED)
+        this.wide.ask("chart", [...input, 400, 3000000], (finer, wrong) => {
+          if (!wrong) this.chart.fill(finer);
+          this.note.textContent = wrong || (finer.sure < 1 ? undecided(finer) : finer.counts.every(count => count === UNCONFINED)
             ? `The loop is ${LOST} in the whole chart. This is certain.`
-            : "Every pixel of the chart is certain. The lines between areas are true to a pixel.";
+            : "Every pixel of the chart is certain. The lines between areas are true to a pixel.");
         });
       });
     }
