@@ -112,7 +112,7 @@ class NoiseBudget:
 
     @property
     def total(self) -> FloatArray:
-        """All sources together: they are independent."""
+        """All sources together, which are independent."""
         return np.asarray(np.sqrt(sum(asd**2 for asd in self.sources.values())))
 
     @property
