@@ -3,11 +3,11 @@
 import gc
 import os
 import re
+import shutil
 import subprocess
 import sys
 import time
 from contextlib import suppress
-from pathlib import Path
 from types import SimpleNamespace
 from typing import ClassVar
 
@@ -18,9 +18,8 @@ from armlock import CommonArm, DualArm, compiled, unstable_roots
 from armlock.compiled import Plain
 from armlock.engine import decide, inclusion
 
-ROOT = Path(__file__).parents[1]
 MODULE = """
-from armlock.compiled import njit
+from compiled import njit
 
 @njit()
 def times(x):
@@ -39,14 +38,16 @@ NOT_KEPT = r"RuntimeWarning: compiled functions are not kept for the next proces
 def printed(folder, factor=2, *, full=False, **more):
     """Compile two functions in a process, and return what it prints and warns of.
 
-    A limit on the size of files stands for a full disk. The line that compiling prints after a
+    The module `compiled` stands alone there, because to import the package takes seconds. A
+    limit on the size of files stands for a full disk. The line that compiling prints after a
     second, on a slow machine, is switched off with the progress bars.
     """
     (folder / "times.py").write_text(MODULE.format(factor), "utf-8")
+    shutil.copy(compiled.__file__, folder)
     done = subprocess.run(
         [sys.executable, "-B", "-c", full * FULL + "import times"],
         env={
-            **os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(folder),
+            **os.environ, "NUMBA_CACHE_DIR": str(folder),
             "TQDM_DISABLE": "1", **more,
         },
         cwd=folder, capture_output=True, text=True, check=True,

@@ -51,7 +51,7 @@ def drawn(rng):
 def test_a_range_is_stable_at_random_differences_and_ends_where_a_root_crosses():
     rng = np.random.default_rng(7)
     ends = []
-    for _ in range(40):
+    for _ in range(16):
         loop = drawn(rng)
         if unstable_roots(loop) != 0:
             with pytest.raises(ValueError, match="stable as it is"):
@@ -64,5 +64,5 @@ def test_a_range_is_stable_at_random_differences_and_ends_where_a_root_crosses()
             if abs(end) < 0.98 * mean:
                 ends.append(stable_at(loop, [end + outwards])[0])
     # Next to all ranges end where counts do.
-    assert len(ends) > 10
-    assert sum(ends) <= 2
+    assert len(ends) > 5
+    assert sum(ends) <= 1

@@ -191,7 +191,7 @@ def simulated_rate(chapter, case, loop, start, duration):
 
 def test_frozen_rates_are_those_of_simulations_with_moving_delays(chapter):
     rates = []
-    for case, loop, start, duration, rate in drawn(chapter, 24):
+    for case, loop, start, duration, rate in drawn(chapter, 12):
         grown = simulated_rate(chapter, case, loop, start, duration)
         assert 0.5 < grown / rate < 2.0
         rates.append(rate)

@@ -65,7 +65,7 @@ def pair(functions, y, omega):
 def test_each_crossing_is_where_it_is_said_to_be():
     rng = np.random.default_rng(12)
     shares: list[float] = []
-    while len(shares) < 100:
+    while len(shares) < 60:
         space, functions = rows_of(rng)
         size = float(np.median(space.corners))
         y, most = rng.normal(size=3), np.full(3, 30.0)
@@ -106,7 +106,7 @@ def test_an_exponential_that_is_not_resolved_leaves_a_crossing_undecided():
 def test_a_family_is_clear_at_both_ends_of_the_axis(where):
     rng = np.random.default_rng(13)
     least: list[float] = []
-    while len(least) < 1000:
+    while len(least) < 400:
         first = draw(rng, 4)
         space, shape = first.space, first.delayed.shape
         second = first + space.function(0.3 * rng.normal(size=shape[0]), np.zeros(shape))

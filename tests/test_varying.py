@@ -237,13 +237,13 @@ def growth(loop, r, omega, rng, patterns):
 
 def test_no_switching_within_the_radius_makes_a_loop_grow():
     rng, grown = np.random.default_rng(24), 0
-    for loop in drawn_loops(rng, 10):
+    for loop in drawn_loops(rng, 6):
         found = varying_radius(loop)
         omega = found.omega if 0.0 < found.omega < 20.0 else 1.0
         assert growth(loop, 0.99 * found.radius, omega, rng, 12) < 1.0
         # The same search does see growth, where constant perturbations break the loop.
         grown += growth(loop, 1.2 * found.constant, omega, rng, 4) > 1.0
-    assert grown >= 9
+    assert grown >= 5
 
 
 def square(coefficients, x):
