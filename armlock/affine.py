@@ -9,19 +9,18 @@ at low frequency cancel exactly, in the polynomials that all functions are sums 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from fractions import Fraction
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from flint import fmpq_poly
+from flint import fmpq, fmpq_poly
 
 from armlock.checks import FloatArray, real_number
-from armlock.engine.chain import Delay, Lag
+from armlock.engine.chain import Lag
 from armlock.engine.functions import Function, Space, common_zeros
-from armlock.engine.polynomials import Polynomial, exact, fraction, polynomial
-from armlock.systems import Sum, System, order
+from armlock.engine.polynomials import Polynomial, collected, exact, order, polynomial
+from armlock.systems import Sum, System, exact_number
 
 
 class NotAffineError(ValueError):
@@ -42,7 +41,7 @@ def basis(vectors: Iterable[fmpq_poly]) -> list[fmpq_poly]:
     """
     left, found = [_monic(p) for p in vectors if p], []
     while left:
-        left.sort(key=lambda p: (-p.degree(), -order(p)))
+        left.sort(key=lambda p: (-p.degree(), -order(p.coeffs())))
         pivot = left[0]
         found.append(pivot)
         rest = (p - p[pivot.degree()] * pivot for p in left[1:])
@@ -50,11 +49,11 @@ def basis(vectors: Iterable[fmpq_poly]) -> list[fmpq_poly]:
     return found
 
 
-def _weights(chosen: Sequence[fmpq_poly], p: fmpq_poly) -> list[Fraction]:
+def _weights(chosen: Sequence[fmpq_poly], p: fmpq_poly) -> list[fmpq]:
     """Return p as a sum of weights times a basis, exactly."""
     found = []
     for b in chosen:
-        found.append(fraction(p[b.degree()]))
+        found.append(p[b.degree()])
         p = p - p[b.degree()] * b
     if p:
         raise AssertionError("a polynomial lies outside of its basis")
@@ -69,7 +68,7 @@ def _total(part: Mapping[Lag, fmpq_poly]) -> fmpq_poly:
 def functions(
     groups: Sequence[Sequence[Mapping[Lag, fmpq_poly]]],
     step: float = 0.0,
-    known: Mapping[Fraction, int] = MappingProxyType({}),
+    known: Mapping[fmpq, int] = MappingProxyType({}),
 ) -> Any:
     """Return sums of polynomials times delays as functions of one space, group by group.
 
@@ -84,19 +83,18 @@ def functions(
     union = list({str(p): p for some in bases for p in some}.values()) or [fmpq_poly([1])]
     names = {str(p): k for k, p in enumerate(union)}
     lags = {lag for group in groups for part in group for lag in part}
-    space = Space([Polynomial.of(p.coeffs()) for p in union], lags, step, known)
-    column = {lag: k for k, lag in enumerate(space.lags)}
+    space = Space([Polynomial.of(p) for p in union], lags, step, known)
+    column = {lag: k for k, lag in enumerate(space.lags, 1)}
     found = []
     for group, chosen in zip(groups, bases, strict=True):
         places = [names[str(p)] for p in chosen]
         for part in group:
-            steady = np.full(len(union), Fraction(0), object)
-            delayed = np.full((len(union), len(column)), Fraction(0), object)
-            steady[places] = _weights(chosen, _total(part))
+            weights = np.full((len(union), 1 + len(column)), fmpq(0), object)
+            weights[places, 0] = _weights(chosen, _total(part))
             for lag, p in part.items():
                 if lag in column:
-                    delayed[places, column[lag]] = _weights(chosen, p)
-            found.append(Function(space, steady, delayed))
+                    weights[places, column[lag]] = _weights(chosen, p)
+            found.append(Function(space, weights[:, 0], weights[:, 1:]))
     return found
 
 
@@ -109,17 +107,10 @@ def _told_apart(groups: Any) -> Any:
         lag.time and p.degree() == top for lag, p in terms
     ):
         return groups
-    one = {time: Lag([(Delay(time, ""), 1)]) for time in times}
-    merged: list[list[dict[Lag, fmpq_poly]]] = []
-    for group in groups:
-        merged.append([])
-        for part in group:
-            found: dict[Lag, fmpq_poly] = {}
-            for lag, p in part.items():
-                key = one[lag.time]
-                found[key] = found.get(key, fmpq_poly([0])) + p
-            merged[-1].append(found)
-    return merged
+    return [
+        [collected((Lag.after(lag.time), p) for lag, p in part.items()) for part in group]
+        for group in groups
+    ]
 
 
 class Affine:
@@ -170,10 +161,8 @@ class Affine:
         for part in sums:
             parts = [part.before(*names) for names in monomials]
             # What is left at the nominal values, where a loop is used, is one more sum.
-            there: dict[Lag, fmpq_poly] = {}
-            for some, x in zip(parts, (1.0, *self.origin), strict=True):
-                for lag, p in some.items():
-                    there[lag] = there.get(lag, fmpq_poly([0])) + p * exact(x)
+            shares = zip(parts, map(exact, (1, *self.origin)), strict=True)
+            there = collected((lag, p * x) for some, x in shares for lag, p in some.items())
             groups.append([there, *parts])
         made, size = functions(groups, system.step, system.known), 2 + len(free)
         self.n: list[Function] = made[1:size]
@@ -209,29 +198,25 @@ class Affine:
         """D before 1 and before the parameters."""
         return [a + b for a, b in zip(self.n, self.m, strict=True)]
 
-    def quotient(self, *point: float | Fraction) -> tuple[Function, Function]:
+    def quotient(self, *point: float | fmpq) -> tuple[Function, Function]:
         """Return N and M at a point, exactly."""
         return _mixed(self.n, point), _mixed(self.m, point)
 
-    def function(self, *point: float | Fraction) -> Function:
+    def function(self, *point: float | fmpq) -> Function:
         """Return D at a point, exactly."""
         return _mixed(self.terms, point)
 
-    def cancelled(self, *point: float | Fraction) -> int:
-        """Order of the root at s = 0 that does not count, as `common` has it."""
-        return common(*self.quotient(*point))
 
-
-def _mixed(terms: Sequence[Function], point: Sequence[float | Fraction]) -> Function:
+def _mixed(terms: Sequence[Function], point: Sequence[float | fmpq]) -> Function:
     found = terms[0]
     for term, x in zip(terms[1:], point, strict=True):
-        found = found + term * Fraction(x)
+        found = found + term * x
     return found
 
 
 def common(n: Function, m: Function) -> int:
     """Order of the root at s = 0 that N and M have in common; of an equation a known one."""
-    return n.space.known.get(Fraction(0), 0) if m.is_zero else common_zeros(n, m)
+    return n.space.known.get(fmpq(0), 0) if m.is_zero else common_zeros(n, m)
 
 
 def quotient_at(
@@ -239,10 +224,7 @@ def quotient_at(
 ) -> tuple[Function, Function]:
     """Return N and M of a system at given values of its parameters, exactly."""
     system = System.of(system)
-    given = {
-        name: value if isinstance(value, Fraction) else real_number(name, value)
-        for name, value in system.given(values, numbers or {}).items()
-    }
+    given = {k: exact_number(k, v) for k, v in system.given(values, numbers or {}).items()}
     try:
         return Affine.of(system).quotient(*given.values())
     except NotAffineError:

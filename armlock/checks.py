@@ -161,7 +161,7 @@ def check_memory(name: str, shape: tuple[int, ...], bytes_each: int) -> None:
 def _numbers(name: str, value: object, kinds: str) -> npt.NDArray[Any]:
     """Return `value` as an array of finite numbers of some kinds of dtype, or raise."""
     parts = (value, *value) if isinstance(value, list | tuple) else (value,)
-    if any(isinstance(part, np.ma.MaskedArray) for part in parts):
+    if any(map(np.ma.isMaskedArray, parts)):
         raise TypeError(
             f"{name} must hold no masked values, got a masked array: take its compressed() or "
             f"filled() values"

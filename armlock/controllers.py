@@ -9,13 +9,13 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from fractions import Fraction
 from functools import lru_cache
 from itertools import product
 from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
+from flint import fmpq, fmpq_poly
 
 from armlock import paper
 from armlock.checks import (
@@ -259,13 +259,13 @@ def rational(
     at_zero = 0
     if integrators is not None:
         number = _stated("integrators", integrators, below, doubts)
-        above, below = statespace.with_lowest(above, below, [Fraction(0)] * number)
+        above, below = statespace.with_lowest(above, below, [fmpq(0)] * number)
         # Poles at s = 0 that the input does not reach, or the output does not see, cancel.
         doubts, at_zero = (), min(number, len(unsure))
     if zeros is not None:
         at_zero, unsure = _stated("zeros", zeros, above, unsure), ()
-    above = above + Polynomial.of(-c for c in above.exact[:at_zero])
-    unsure = tuple(bound if k >= at_zero else Fraction(0) for k, bound in enumerate(unsure))
+    above = Polynomial.of(above.exact - fmpq_poly(above.exact.coeffs()[:at_zero]))
+    unsure = tuple(bound if k >= at_zero else fmpq(0) for k, bound in enumerate(unsure))
     found = Controller.of_polynomials(above, below)
     if any((*doubts, *unsure)):
         object.__setattr__(found, "others", tuple(_others(above, below, doubts, unsure)))
@@ -275,29 +275,31 @@ def rational(
 def _others(
     above: Polynomial,
     below: Polynomial,
-    doubts: Sequence[Fraction],
-    unsure: Sequence[Fraction],
+    doubts: Sequence[fmpq],
+    unsure: Sequence[fmpq],
 ) -> Iterator[Controller]:
     """Return what else may be meant, by bounds of the lowest coefficients of both."""
     for poles in _around(doubts):
         other, changed = statespace.with_lowest(above, below, poles)
         for zeros in _around(unsure):
-            pairs = zip(zeros, above.exact, strict=False)
-            moved = other + Polynomial.of(new - old for new, old in pairs)
+            change = fmpq_poly([new - above.exact[k] for k, new in enumerate(zeros)])
+            moved = Polynomial.of(other.exact + change)
             if moved:
                 yield Controller.of_polynomials(moved, changed)
 
 
-def _around(bounds: Sequence[Fraction]) -> Iterator[tuple[Fraction, ...]]:
+def _around(bounds: Sequence[fmpq]) -> Iterator[tuple[fmpq, ...]]:
     """Return the values of coefficients that may be meant to be zero."""
-    return product(*((-bound, Fraction(0), bound)[: 3 if bound else 1] for bound in bounds))
+    return product(*((-bound, fmpq(0), bound)[: 3 if bound else 1] for bound in bounds))
 
 
-def _stated(name: str, given: int, p: Polynomial, bounds: Sequence[Fraction]) -> int:
+def _stated(name: str, given: int, p: Polynomial, bounds: Sequence[fmpq]) -> int:
     """Return how many roots at s = 0 are stated, or raise if p has no such coefficients."""
     number = whole_number(name, given, 0)
-    small = [bound or not c for c, bound in zip(p.exact, (*bounds, 0, 0), strict=False)]
-    if not all(small[:number]) or number > len(small) or not any(p.exact[number : number + 1]):
+    small = [
+        bound or not c for c, bound in zip(p.exact.coeffs(), (*bounds, 0, 0), strict=False)
+    ]
+    if not all(small[:number]) or number > len(small) or not p.exact[number]:
         what = {"integrators": "poles", "zeros": "zeros"}[name]
         raise ValueError(
             f"{name} must be the number of {what} that are zero but for rounding, got {given} "
@@ -312,7 +314,7 @@ def _of_system(system: Any) -> Controller:
         raise ValueError(f"controller must hold no delay and no parameter, got {system!r:.200}")
     return with_others(
         lambda one: Controller.of_polynomials(
-            *(Polynomial.of(p.whole().coeffs()) for p in (one.numerator, one.denominator))
+            *(Polynomial.of(p.whole()) for p in (one.numerator, one.denominator))
         ),
         system,
     )

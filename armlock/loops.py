@@ -13,7 +13,6 @@ any other `armlock.systems.System`. The Hayes equation has no sensor: it is an e
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
-from fractions import Fraction
 from functools import cached_property
 from numbers import Real
 from typing import Any, Self
@@ -35,11 +34,11 @@ from armlock.checks import (
     true_or_false,
 )
 from armlock.controllers import Controller, integrating_actuator, table_two, white_paper
-from armlock.engine.chain import NOW, Delay, Lag
+from armlock.engine.chain import Lag
 from armlock.engine.functions import limit_at_zero
-from armlock.engine.polynomials import Polynomial, fraction, polynomial
+from armlock.engine.polynomials import Polynomial, exact, order, polynomial
 from armlock.sensors import COMMON, SINGLE, SignalMapping, modified_dual
-from armlock.systems import Sum, System, equation, order, parameter
+from armlock.systems import Sum, System, equation, parameter
 from armlock.systems import delay as pure_delay
 from armlock.systems import s as laplace
 
@@ -178,9 +177,7 @@ class Loop(System):
                     f"{b.degree()} zeros and {rest.degree()} poles"
                 )
         # The highest power of 1 + L.
-        highest = 1 + float(
-            fraction(sum(b[rest.degree()] for b in arms) / rest.leading_coefficient())
-        )
+        highest = 1 + float(sum(b[rest.degree()] for b in arms) / rest.leading_coefficient())
         if not self.delay and abs(highest) <= 1e-12:
             raise ValueError(
                 f"the loop is not well posed: 1 + K (m1 + m2) must not vanish at high "
@@ -202,11 +199,11 @@ class Loop(System):
     def _cleared(self) -> tuple[fmpq_poly, fmpq_poly, fmpq_poly]:
         """R, B1 and B2, exactly, without a common power of s."""
         k, m = self.controller, self.mapping
-        zeros, poles = (polynomial(p.exact) for p in (k.numerator, k.denominator))
+        zeros, poles = k.numerator.exact, k.denominator.exact
         rest = poles * polynomial(m.denominator)
         arms = [zeros * polynomial(p) for p in (m.numerator1, m.numerator2)]
         # As many poles at s = 0 as all three have zeros there.
-        power = fmpq_poly([0, 1]) ** min(order(p) for p in (rest, *arms) if p)
+        power = fmpq_poly([0, 1]) ** min(order(p.coeffs()) for p in (rest, *arms) if p)
         return rest // power, arms[0] // power, arms[1] // power
 
     @cached_property
@@ -229,15 +226,15 @@ class Loop(System):
     def _dead(self) -> Lag:
         """The dead time, one delay object with the mark of the first arm."""
         ((((arm, _),), _),) = self.arms[0].numerator.terms
-        theta = Fraction(self.delay)
-        return Lag([(Delay(theta, f"dead {arm.mark}"), 1)]) if theta else NOW
+        theta = exact(self.delay)
+        return Lag.after(theta, f"dead {arm.mark}")
 
     @cached_property
     def _polynomials(self) -> tuple[Polynomial, ...]:
         """R, B1, B2, half of B1 + B2 and of B1 - B2, of which no term is left that cancels."""
         rest, b1, b2 = self._cleared
         parts = rest, b1, b2, (b1 + b2) / 2, (b1 - b2) / 2
-        return tuple(Polynomial.of(p.coeffs()) for p in parts)
+        return tuple(Polynomial.of(p) for p in parts)
 
     def replace(self, **changes: Any) -> Self:
         """Return another one, made with other values of some arguments.

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from fractions import Fraction
 from math import prod
 from typing import Any
 
 import numpy as np
+from flint import fmpq
 
 from armlock.checks import real_array, real_number, whole_number
 from armlock.controllers import with_others
@@ -247,13 +247,13 @@ def _states(a: Any) -> tuple[list[list[Sum]], Any, Any]:
         raise ValueError(f"a must hold square matrices of one size, got {[shape, *shapes]}")
     n = len(next(iter(parts.values())))
     found = [[Sum.of(polynomial([0, int(i == k)])) for k in range(n)] for i in range(n)]
-    total, sizes = (np.full(shape, Fraction(0), object) for _ in range(2))
+    total, sizes = (np.full(shape, fmpq(0), object) for _ in range(2))
     for h, part in parts.items():
         if isinstance(h, System):
             delay_object(h, "a key of a")
         late = (h if isinstance(h, System) else delay(h)).numerator
         for i, k in zip(*np.nonzero(part), strict=True):
-            value = Fraction(part[i, k])
+            value = exact(part[i, k])
             found[i][k] = found[i][k] + late * _number(-value)
             total[i, k] += value
             sizes[i, k] += abs(value)
@@ -268,7 +268,7 @@ def _whole(matrix: Any) -> System:
         raise ValueError(f"matrix must be square, got {size} x {columns}")
 
     def made(*entries: System) -> System:
-        cleared, below, known = [], _ONE, list[Mapping[Fraction, int]]()
+        cleared, below, known = [], _ONE, list[Mapping[fmpq, int]]()
         for k in range(0, size**2, size):
             row, under, zeros = _cleared(entries[k : k + size])
             cleared.append(row)
@@ -278,7 +278,7 @@ def _whole(matrix: Any) -> System:
     return with_others(made, *rows.ravel())
 
 
-def _cleared(row: Sequence[System]) -> tuple[list[Sum], Sum, list[Mapping[Fraction, int]]]:
+def _cleared(row: Sequence[System]) -> tuple[list[Sum], Sum, list[Mapping[fmpq, int]]]:
     """Return a row times the denominators of its systems, their product, and known zeros."""
     kinds: list[System] = []
     places = []

@@ -10,7 +10,7 @@ makes D = 0 instead.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from decimal import Decimal
 from fractions import Fraction
 from functools import lru_cache
@@ -38,7 +38,7 @@ from armlock.checks import (
 )
 from armlock.controllers import Controller, check_system, rational, with_others
 from armlock.engine.chain import NOW, Delay, Lag
-from armlock.engine.polynomials import exact, fraction, fractions, polynomial
+from armlock.engine.polynomials import collected, exact, in_mpmath, order, polynomial
 
 if TYPE_CHECKING:
     import control
@@ -47,6 +47,7 @@ if TYPE_CHECKING:
 Key = tuple[Lag, tuple[str, ...]]
 
 _ONE, _S = fmpq_poly([1]), fmpq_poly([0, 1])
+_ZERO, _UNIT = fmpq(0), fmpq(1)
 # Arguments of the functions that take parameters by name.
 _TAKEN = frozenset(
     [
@@ -88,16 +89,11 @@ _LONGEST_TEXT = 400
 
 
 @lru_cache
-def exponential(x: Fraction) -> fmpq:
+def exponential(x: fmpq) -> fmpq:
     """Return the fraction that stands for exp(x)."""
     with mpmath.workprec(_BITS):
-        value = mpmath.exp(mpmath.mpf(x.numerator) / x.denominator)
-    return exact(Fraction(*mpmath.libmp.to_rational(value._mpf_)))
-
-
-def order(p: fmpq_poly) -> int:
-    """Order of the root at s = 0."""
-    return next(k for k, c in enumerate(p.coeffs()) if c)
+        value = mpmath.exp(in_mpmath(x))
+    return fmpq(*mpmath.libmp.to_rational(value._mpf_))
 
 
 class Sum:
@@ -113,19 +109,17 @@ class Sum:
 
     def __add__(self, other: Sum) -> Sum:
         """Return the sum."""
-        found = dict(self.terms)
-        for key, p in other.terms.items():
-            found[key] = found[key] + p if key in found else p
-        return Sum(found)
+        return Sum(collected((*self.terms.items(), *other.terms.items())))
 
     def __mul__(self, other: Sum) -> Sum:
         """Return the product."""
-        found: dict[Key, fmpq_poly] = {}
-        for (t, a), p in self.terms.items():
-            for (u, b), q in other.terms.items():
-                key = t.times(u), tuple(sorted(a + b)) if a and b else a or b
-                found[key] = found[key] + p * q if key in found else p * q
-        return Sum(found)
+        return Sum(
+            collected(
+                ((t.times(u), tuple(sorted(a + b))), p * q)
+                for (t, a), p in self.terms.items()
+                for (u, b), q in other.terms.items()
+            )
+        )
 
     def __neg__(self) -> Sum:
         """Return the negative."""
@@ -141,20 +135,7 @@ class Sum:
 
     def __hash__(self) -> int:
         """Hash the terms."""
-        return hash(frozenset(self.fractions()))
-
-    def __getstate__(self) -> list[tuple[Key, tuple[Fraction, ...]]]:
-        """Return the terms by fractions: those of flint cannot be pickled."""
-        return list(self.fractions())
-
-    def __setstate__(self, state: list[tuple[Key, tuple[Fraction, ...]]]) -> None:
-        """Take them back."""
-        self.terms = {key: polynomial(p) for key, p in state}
-
-    def fractions(self) -> Iterator[tuple[Key, tuple[Fraction, ...]]]:
-        """Return the terms, with coefficients in ascending powers of s."""
-        for key, p in self.terms.items():
-            yield key, fractions(p)
+        return hash(frozenset((key, tuple(p.coeffs())) for key, p in self.terms.items()))
 
     def put(self, values: Mapping[str, Sum]) -> Sum:
         """Put sums in place of parameters."""
@@ -168,26 +149,22 @@ class Sum:
 
     def before(self, *names: str) -> dict[Lag, fmpq_poly]:
         """Return what stands before a product of parameters, by delays."""
-        return {lag: p for (lag, given), p in self.rounded().terms.items() if given == names}
+        return {lag: p for (lag, given), p in self.terms.items() if given == names}
 
     def rounded(self) -> Sum:
         """Return the sum with fractions for the numbers exp(x) before delays (Lemma 23)."""
         if not any(lag.growth for lag, _ in self.terms):
             return self
-        grown: dict[tuple[Key, Fraction], fmpq_poly] = {}
-        for (lag, names), p in self.terms.items():
-            at = (lag.plain, names), lag.growth
-            grown[at] = grown[at] + p if at in grown else p
-        found, sizes = Sum({}), Sum({})
-        for (key, x), p in grown.items():
-            p = p * exponential(x)
-            found = found + Sum({key: p})
-            sizes = sizes + Sum({key: fmpq_poly([abs(c) for c in p.coeffs()])})
-        for key, size in sizes.terms.items():
-            p = found.terms.get(key, fmpq_poly([0]))
-            if any(b and abs(p[k]) * 2**_MAY_CANCEL < b for k, b in enumerate(size.coeffs())):
+        grown = collected(
+            (((lag.plain, names), lag.growth), p) for (lag, names), p in self.terms.items()
+        )
+        terms = [(key, p * exponential(x)) for (key, x), p in grown.items()]
+        found = collected(terms)
+        sizes = collected((key, fmpq_poly([abs(c) for c in p.coeffs()])) for key, p in terms)
+        for key, p in found.items():
+            if any(abs(p[k]) * 2**_MAY_CANCEL < b for k, b in enumerate(sizes[key].coeffs())):
                 raise ValueError("exponentials of the system cancel to more than 200 bits")
-        return found
+        return Sum(found)
 
     def whole(self) -> fmpq_poly:
         """Return the sum of all polynomials: what is left at s = 0."""
@@ -203,25 +180,24 @@ class Sum:
         """All products of delays."""
         return {lag.plain if lag.growth else lag for lag, _ in self.terms}
 
-    def series(self, number: int, at: Fraction = Fraction(0)) -> list[Fraction]:
+    def series(self, number: int, at: fmpq = _ZERO) -> list[fmpq]:
         """Return the first coefficients of the series at a point, without parameters.
 
         They are exact, apart from the fractions that stand for exponentials.
         """
         found = [fmpq(0)] * number
         for (lag, _), p in self.terms.items():
-            moved, theta = p(polynomial([at, 1])), exact(lag.time)
+            moved, theta = p(fmpq_poly([at, 1])), lag.time
             factor = exponential(lag.growth - at * lag.time)
             for i, c in enumerate(moved.coeffs()[:number]):
                 for k in range(i, number):
                     found[k] += factor * c * (-theta) ** (k - i) / factorial(k - i)
-        return [fraction(c) for c in found]
+        return found
 
-    def by_length(self, *names: str) -> dict[Fraction, fmpq_poly]:
+    def by_length(self, *names: str) -> dict[fmpq, fmpq_poly]:
         """Return what stands before a product of parameters, by lengths in ascending order."""
-        found: dict[Fraction, fmpq_poly] = {}
-        for lag, p in self.before(*names).items():
-            found[lag.time] = found.get(lag.time, fmpq_poly([0])) + p
+        parts = self.rounded().before(*names)
+        found = collected((lag.time, p) for lag, p in parts.items())
         return {time: p for time, p in sorted(found.items()) if p}
 
     @np.errstate(under="ignore")
@@ -229,8 +205,8 @@ class Sum:
         self,
         s: ComplexArray,
         values: Mapping[str, FloatArray],
-        unit: Fraction = Fraction(1),
-        size: Fraction = Fraction(1),
+        unit: fmpq = _UNIT,
+        size: fmpq = _UNIT,
     ) -> ComplexArray:
         """Evaluate at s and at values of the parameters, all of one shape, over a size.
 
@@ -274,20 +250,20 @@ class Sum:
         return " + ".join(shown).replace("+ -", "- ") or "0"
 
 
-def _polyval(p: fmpq_poly, at: ComplexArray, unit: Fraction, size: Fraction) -> ComplexArray:
+def _polyval(p: fmpq_poly, at: ComplexArray, unit: fmpq, size: fmpq) -> ComplexArray:
     """Evaluate a polynomial of s over a size, at s / unit."""
-    scaled = [float(fraction(c) * unit**k / size) for k, c in enumerate(p.coeffs())] or [0.0]
+    scaled = [float(c * unit**k / size) for k, c in enumerate(p.coeffs())] or [0.0]
     return np.asarray(poly.polyval(at, scaled))
 
 
-def _number(value: Fraction) -> str:
+def _number(value: fmpq) -> str:
     """Return a fraction, which may be no float, with six digits."""
     try:
         if value == 0 or abs(float(value)) > 1e-300:
             return f"{float(value):.6g}"
     except OverflowError:
         pass
-    return f"{Decimal(value.numerator) / value.denominator:.5e}"
+    return f"{Decimal(int(value.p)) / int(value.q):.5e}"
 
 
 def _exponential(lag: Lag, latex: bool) -> str:
@@ -302,7 +278,7 @@ def _powers(p: fmpq_poly, latex: bool) -> str:
     shown = []
     for k, c in reversed(list(enumerate(p.coeffs()))):
         if c:
-            number, power = _number(fraction(c)), ("", "s", f"s^{{{k}}}" if latex else f"s^{k}")
+            number, power = _number(c), ("", "s", f"s^{{{k}}}" if latex else f"s^{k}")
             symbol = power[min(k, 2)]
             if symbol and number in ("1", "-1"):
                 number = number[:-1]
@@ -339,7 +315,7 @@ class System:
         The parameters in the order of their first use, with their nominal values.
     step : float
         Zero, or the step in s of a map (`equation`).
-    known : mapping of Fraction to int
+    known : mapping of fmpq to int
         Real numbers in rad/s at which numerator and denominator are both zero, and the order:
         these are no roots (`distributed_delay`).
 
@@ -370,7 +346,7 @@ class System:
     denominator: Sum
     nominal: dict[str, float | None]
     step: float
-    known: Mapping[Fraction, int] = MappingProxyType({})
+    known: Mapping[fmpq, int] = MappingProxyType({})
     #: The same for other values of poles that may be meant to be zero; usually none.
     others: tuple[System, ...] = ()
 
@@ -380,7 +356,7 @@ class System:
         denominator: Sum,
         nominal: Mapping[str, float | None] | None = None,
         step: float = 0.0,
-        known: Mapping[Fraction, int] = MappingProxyType({}),
+        known: Mapping[fmpq, int] = MappingProxyType({}),
     ) -> None:
         self.numerator, self.denominator = _reduced(numerator, denominator)
         self.nominal, self.step = dict(nominal or {}), step
@@ -407,15 +383,13 @@ class System:
         """
         if isinstance(system, System):
             return system
-        if isinstance(system, Fraction | float | int | np.number | np.ndarray):
-            value = system if isinstance(system, Fraction) else real_number(name, system)
-            return System(Sum.of(polynomial([value])), _UNITY)
+        if isinstance(system, fmpq | Fraction | float | int | np.number | np.ndarray):
+            return System(Sum.of(fmpq_poly([exact_number(name, system)])), _UNITY)
         if not isinstance(system, Controller):
             check_system(name, system, "a System, a number, a Controller")
 
         def made(k: Controller) -> System:
-            above, below = (polynomial(p.exact) for p in (k.numerator, k.denominator))
-            return System(Sum.of(above), Sum.of(below))
+            return System(Sum.of(k.numerator.exact), Sum.of(k.denominator.exact))
 
         return with_others(made, rational(system))
 
@@ -433,7 +407,7 @@ class System:
     def longest_delay(self) -> float:
         """The longest time in s by which a term is delayed."""
         lags = self.numerator.lags | self.denominator.lags
-        return float(max((lag.time for lag in lags), default=Fraction(0)))
+        return float(max((lag.time for lag in lags), default=fmpq(0)))
 
     def __add__(self, other: Any) -> System:
         """Return the two in parallel; denominators that are equal up to a number are one."""
@@ -578,11 +552,11 @@ class System:
         """
         found, s = self.given(values, numbers), complex_array("s", s)
         arrays = {
-            k: np.array(float(v)) if isinstance(v, Fraction) else real_array(k, v)
+            k: np.array(float(v)) if isinstance(v, fmpq | Fraction) else real_array(k, v)
             for k, v in found.items()
         }
         if found and not any(v.ndim for v in arrays.values()):
-            return self.at(**{k: _number_of(k, v) for k, v in found.items()})(s)
+            return self.at(**{k: exact_number(k, v) for k, v in found.items()})(s)
         shape = broadcast_shape(("s", *arrays), (s, *arrays.values()))
         s = np.broadcast_to(s, shape)
         arrays = {k: np.broadcast_to(v, shape) for k, v in arrays.items()}
@@ -590,14 +564,14 @@ class System:
             return self.numerator.at(s, arrays)
         # In a unit as large as the roots of M: powers of many fast poles would overflow.
         p = max(self.denominator.terms.values(), key=lambda p: p.degree())
-        ratio = abs(fraction(p[order(p)] / p[p.degree()]))
-        bits = ratio.numerator.bit_length() - ratio.denominator.bit_length()
-        unit = Fraction(2) ** (bits // max(p.degree(), 1))
-        size = abs(fraction(p[p.degree()])) * unit ** p.degree()
+        ratio = abs(p[order(p.coeffs())] / p[p.degree()])
+        bits = ratio.p.bit_length() - ratio.q.bit_length()
+        unit = fmpq(2) ** (bits // max(p.degree(), 1))
+        size = abs(p[p.degree()]) * unit ** p.degree()
         with np.errstate(all="ignore"):
             n, m = (f.at(s, arrays, unit, size) for f in (self.numerator, self.denominator))
             value = np.asarray(n / m)
-        for point in {Fraction(0), *self.known} if not arrays else ():
+        for point in {_ZERO, *self.known} if not arrays else ():
             off = s - float(point)
             near = np.abs(off) * self.longest_delay <= (_NEAR if point in self.known else 0.0)
             near |= off == 0.0
@@ -605,14 +579,13 @@ class System:
                 value = np.where(near, self._next_to(point, np.where(near, off, 0.0)), value)
         return value
 
-    def _next_to(self, point: Fraction, off: ComplexArray) -> ComplexArray:
+    def _next_to(self, point: fmpq, off: ComplexArray) -> ComplexArray:
         """Return the values so far from a point, by the series there; inf at a pole."""
         # All powers of s, and the first ones of the exponentials.
         number = _TERMS + max(self.numerator.degree, self.denominator.degree)
         n, m = (part.series(number, point) for part in (self.numerator, self.denominator))
-        pairs = enumerate(zip(n, m, strict=True))
-        first = next((k for k, pair in pairs if any(pair)), number)
-        scale = next(filter(None, m[first:]), Fraction(1))
+        first = min(order(n), order(m))
+        scale = next(filter(None, m[first:]), fmpq(1))
         above, below = ([float(c / scale) for c in part[first:]] or [0.0] for part in (n, m))
         with np.errstate(all="ignore"):
             found = np.asarray(poly.polyval(off, above) / poly.polyval(off, below))
@@ -744,13 +717,9 @@ def names_of(systems: Iterable[System]) -> dict[str, float | None]:
     return names
 
 
-def together(known: Iterable[Mapping[Fraction, int]]) -> dict[Fraction, int]:
+def together(known: Iterable[Mapping[fmpq, int]]) -> dict[fmpq, int]:
     """Return the zeros of products, of which each factor has some."""
-    found: dict[Fraction, int] = {}
-    for some in known:
-        for a, k in some.items():
-            found[a] = found.get(a, 0) + k
-    return found
+    return collected(zero for some in known for zero in some.items())
 
 
 def _parallel(n: Sum, m: Sum, p: Sum, q: Sum) -> tuple[Sum, Sum]:
@@ -761,9 +730,10 @@ def _parallel(n: Sum, m: Sum, p: Sum, q: Sum) -> tuple[Sum, Sum]:
     return n * q + p * m, m * q
 
 
-def _number_of(name: str, value: Any) -> Any:
-    """Return a real number, exactly if it is a fraction."""
-    return value if isinstance(value, Fraction) else real_number(name, value)
+def exact_number(name: str, value: Any) -> fmpq:
+    """Return a finite real number, or a fraction, as the fraction that it is, or raise."""
+    is_fraction = isinstance(value, fmpq | Fraction)
+    return exact(value if is_fraction else real_number(name, value))
 
 
 def proportion(first: Sum, second: Sum) -> fmpq | None:
@@ -787,7 +757,7 @@ def _reduced(n: Sum, m: Sum) -> tuple[Sum, Sum]:
             "the system must be causal: every term of its denominator is delayed by "
             f"{' and '.join(sorted({_number(lag.time) for lag, _ in (m or n).terms}))} s"
         )
-    power = _S ** (min(order(p) for _, p in terms) if m else 0)
+    power = _S ** (min(order(p.coeffs()) for _, p in terms) if m else 0)
     if not early and power == _ONE:
         return n, m
     above, below = (
@@ -828,10 +798,10 @@ def delay(theta: float | Fraction) -> System:
             "for one delay after the other, "
             "[unstable_roots(k * plant * delay(t), k=gains) for t in delays]"
         )
-    value = theta if isinstance(theta, Fraction) else Fraction(real_number("theta", theta))
+    value = exact_number("theta", theta)
     if value < 0:
         raise ValueError(f"theta must not be negative, got {theta}")
-    lag = Lag([(Delay(value), 1)]) if value else NOW
+    lag = Lag.of({Delay.new(value): 1}) if value else NOW
     return System(Sum.of(_ONE, lag), _UNITY)
 
 
@@ -875,10 +845,10 @@ def distributed_delay(horizon: Any, rate: float | Fraction = 0.0) -> System:
         horizon = positive_number("horizon", horizon)
     late = horizon if isinstance(horizon, System) else delay(horizon)
     one = delay_object(late, "horizon")
-    a = rate if isinstance(rate, Fraction) else Fraction(real_number("rate", rate))
-    turned = Lag([(Delay(one.theta, one.mark, a * one.theta), 1)])
+    a = exact_number("rate", rate)
+    turned = Lag.of({one._replace(growth=a * one.theta): 1})
     above = _UNITY + -Sum.of(_ONE, turned)
-    return System(above, Sum.of(polynomial([-a, 1])), known={a: 1})
+    return System(above, Sum.of(fmpq_poly([-a, 1])), known={a: 1})
 
 
 def delay_object(system: System, name: str) -> Delay:

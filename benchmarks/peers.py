@@ -15,10 +15,10 @@ from typing import Any
 
 import control
 import numpy as np
+from flint import fmpq
 
 from armlock import CommonArm, DualArm, Loop, delay, transition_matrix, unstable_roots
 from armlock.checks import ComplexArray, FloatArray
-from armlock.stability.semidiscretization import realize
 from benchmarks.measure import timed
 from benchmarks.report import Row, Topic
 
@@ -45,16 +45,16 @@ def two_arms() -> list[Case]:
         gain = float(10.0 ** rng.uniform(-1.0, 0.5))
         c = rng.uniform(-2.5, 2.5, 4) * (1.0, 1.0, 0.4, 0.4)
         for loop, c1, c2 in ((CommonArm(gain=gain), *c[:2]), (DualArm(gain=gain), *c[2:])):
-            state, delayed = realize(loop, c1, c2)
-            cases.append(
-                Case(
-                    partial(unstable_roots, loop, c1, c2),
-                    partial(loop.characteristic, c1=c1, c2=c2),
-                    [state, *(_first_column(term.column) for term in delayed)],
-                    [0.0, *(term.delay for term in delayed)],
-                    (loop, c1, c2),
-                )
-            )
+            here = loop.at(c1=c1, c2=c2)
+            parts = (here.numerator + here.denominator).by_length()
+            lead = parts[fmpq(0)].leading_coefficient()
+            # Highest powers first, as numpy has them, and without that of the whole.
+            order = parts[fmpq(0)].degree()
+            rows = [[float(p[k] / lead) for k in range(order, -1, -1)] for p in parts.values()]
+            q, *b = np.array(rows)
+            count = partial(unstable_roots, loop, c1, c2)
+            theta = np.array([float(time) for time in parts])[1:]
+            cases.append(_case(count, q, theta, np.array(b)[:, 1:], (loop, c1, c2)))
     return cases
 
 
@@ -67,15 +67,21 @@ def many_delays() -> list[Case]:
         q: FloatArray = np.poly(-(10.0 ** rng.uniform(-1.0, 0.5, order))).astype(float)
         theta = 10.0 ** rng.uniform(np.log10(0.3), np.log10(20.0), number)
         b = rng.normal(size=(number, order)) * q[1:] * 10.0 ** rng.uniform(-0.5, 2.0) / number
-        cases.append(
-            Case(
-                partial(_count, q, theta, b),
-                partial(_characteristic, q, theta, b),
-                [np.eye(order, k=1) - _first_column(q[1:]), *(-_first_column(p) for p in b)],
-                [0.0, *theta.tolist()],
-            )
-        )
+        cases.append(_case(partial(_count, q, theta, b), q, theta, b))
     return cases
+
+
+def _case(
+    count: Callable[[], Any], q: FloatArray, theta: FloatArray, b: FloatArray, *point: Any
+) -> Case:
+    """Return the case of D = q + sum_k b_k exp(-s theta_k), q monic and of higher degree."""
+    return Case(
+        count,
+        partial(_characteristic, q, theta, b),
+        [np.eye(len(q) - 1, k=1) - _first_column(q[1:]), *(-_first_column(p) for p in b)],
+        [0.0, *theta.tolist()],
+        *point,
+    )
 
 
 def _count(q: FloatArray, theta: FloatArray, b: FloatArray) -> Any:

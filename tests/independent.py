@@ -23,8 +23,9 @@ def terms(system, x, y):
     values = dict(zip(system.parameters, (x, y), strict=False))
     found: dict[Fraction, list[Fraction]] = {}
     for part in (system.numerator, system.denominator):
-        for (lag, names), p in part.fractions():
-            delay = sum((one.theta * power for one, power in lag), Fraction(0))
+        for (lag, names), whole in part.terms.items():
+            p = [Fraction(str(c)) for c in whole.coeffs()]
+            delay = sum((Fraction(str(one.theta)) * power for one, power in lag), Fraction(0))
             factor = math.prod(Fraction(float(values[name])) for name in names)
             known = found.setdefault(delay, [Fraction(0)] * len(p))
             known += [Fraction(0)] * (len(p) - len(known))

@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 from armlock.engine import inclusion
+from armlock.engine.chain import Lag
 from armlock.engine.functions import Function, Space, compiled
 from armlock.engine.inclusion import EPSILON
-from armlock.engine.polynomials import Polynomial
+from armlock.engine.polynomials import Polynomial, exact
 
 mp = mpmath.mp.clone()
 mp.dps = 50
@@ -23,7 +24,7 @@ mp.dps = 50
 
 def number(value):
     """Return a fraction or a float in 50 digits."""
-    value = Fraction(value)
+    value = Fraction(value if isinstance(value, float) else str(value))
     return mp.mpf(value.numerator) / value.denominator
 
 
@@ -59,11 +60,26 @@ def draw(rng, most=6, delays=4, longest=2.0):
     lags = [Fraction(10.0 ** rng.uniform(-2, longest)) for _ in range(rng.integers(delays + 1))]
     if len(lags) > 1 and rng.random() < 0.5:
         lags[1] = lags[0] * (1 + Fraction(10.0 ** rng.uniform(-18, -1)))
-    space = Space(polynomials, lags)
+    space = Space(polynomials, after(lags))
     shape = len(polynomials), len(lags)
     steady = rng.normal(size=shape[0]) * 10.0 ** rng.uniform(-1, 2, shape[0])
     delayed = rng.normal(size=shape) * 10.0 ** rng.uniform(-1, 2, shape)
-    return space.function([Fraction(v) / 3 for v in steady], delayed)
+    return function_of(space, [Fraction(v) / 3 for v in steady], delayed)
+
+
+def after(delays):
+    """Delays of these lengths, as a space takes them."""
+    return [Lag.after(exact(theta)) for theta in delays]
+
+
+def function_of(space, steady, delayed):
+    """The function of a space with weights S, shape (J,), and W, shape (J, K)."""
+    shape = len(space.polynomials), len(space.delays)
+    s, w = (
+        np.array([exact(v) for v in np.ravel(np.array(part, object))], object)
+        for part in (steady, delayed)
+    )
+    return Function(space, s, w.reshape(shape))
 
 
 class Exact:
@@ -161,12 +177,13 @@ def test_enclosures_hold_on_intervals_and_on_parts_of_them():
 def test_a_factor_of_each_power_reaches_the_remainder():
     # (s - z)^4 has a constant fourth derivative: its remainder is the bound.
     for roots in ([-1e-3] * 4, [-1e-3] * 3 + [-1.0], [-2.0] * 7):
-        function = Space([Polynomial.of_roots(roots)], []).function([1], [[]])
+        function = function_of(Space([Polynomial.of_roots(roots)], []), [1], [[]])
         work = workspace(function.space.arrays, 1)
         enclosed(function, 1.0, 0.3, work)
         assert share_of_bound(function, Exact(function), 1.0, 0.3, work, 1.0) <= 1.0
     # A part of a long piece keeps its remainder, here with an exponential on the part.
-    function = Space([Polynomial.of_roots([-1.0] * 4)], [Fraction(1)]).function([0], [[1]])
+    space = Space([Polynomial.of_roots([-1.0] * 4)], after([1]))
+    function = function_of(space, [0], [[1]])
     exact, work = Exact(function), workspace(function.space.arrays, 1)
     for middle, half in ((1.0, 0.5), (1.4, 0.1), (1.45, 0.05)):
         enclosed(function, middle, half, work)
@@ -190,7 +207,7 @@ def test_rounding_at_a_frequency(kind):
             rows = np.array([np.append(1.0, turns.real), np.append(0.0, turns.imag)])
             kept = np.linalg.svd(rows)[2][2:].T
             chosen = [kept @ rng.normal(size=kept.shape[1]) for _ in space.polynomials]
-            function = space.function([v[0] for v in chosen], [v[1:] for v in chosen])
+            function = function_of(space, [v[0] for v in chosen], [v[1:] for v in chosen])
         work = workspace(space.arrays, 1)
         enclosed(function, omega, 0.0, work)
         shares.append(share_of_bound(function, Exact(function), omega, 0.0, work, 0.0))
@@ -271,7 +288,9 @@ def test_zero_is_excluded_only_where_all_members_stay_on_one_side(shares):
     for _ in range(120):
         function = draw(rng, 4)
         space = function.space
-        other = space.function(rng.normal(size=len(space.polynomials)), 0.0 * function.delayed)
+        other = function_of(
+            space, rng.normal(size=len(space.polynomials)), 0 * function.delayed
+        )
         work = workspace(space.arrays, 2)
         room = members(np.array([1, 1, 2]), compiled([function, other]))
         middle = float(rng.choice(space.corners)) * 10.0 ** rng.uniform(-1, 1)
@@ -326,7 +345,7 @@ def test_a_function_moved_along_the_real_axis():
 
 def test_delays_that_are_equal_but_for_rounding():
     lags = [Fraction(1000), Fraction(1000) + Fraction(3, 10**14)]
-    function = Space([Polynomial.of([1])], lags).function([0], [[1, -1]])
+    function = function_of(Space([Polynomial.of([1])], after(lags)), [0], [[1, -1]])
     work = workspace(function.space.arrays, 1)
     enclosed(function, 1e7, 1e6, work)
     for t in (-1.0, 1.0):

@@ -13,7 +13,16 @@ from armlock.engine import decide, inclusion
 from armlock.engine.decide import UNCONFINED, Family
 from armlock.engine.functions import Space, compiled, stacked
 from armlock.engine.polynomials import Polynomial
-from tests.test_inclusion import Exact, draw, enclosed, mp, share_of_bound, workspace
+from tests.test_inclusion import (
+    Exact,
+    after,
+    draw,
+    enclosed,
+    function_of,
+    mp,
+    share_of_bound,
+    workspace,
+)
 
 
 def test_differences_of_delays_that_are_no_floats():
@@ -26,8 +35,8 @@ def test_differences_of_delays_that_are_no_floats():
         half = max(10.0 / float(first), 1e-15 * middle)
         if half > middle or float(apart) * half > 0.3:
             continue
-        space = Space([Polynomial.of([1])], [first, first + apart])
-        function = space.function([0], [[1, -1]])
+        space = Space([Polynomial.of([1])], after([first, first + apart]))
+        function = function_of(space, [0], [[1, -1]])
         work = workspace(space.arrays, 1)
         enclosed(function, middle, half, work)
         exact = Exact(function)
@@ -44,7 +53,7 @@ def rows_of(rng):
     space = function.space
     shape = function.delayed.shape
     others = [
-        space.function(rng.normal(size=shape[0]), rng.normal(size=shape)) for _ in range(2)
+        function_of(space, rng.normal(size=shape[0]), rng.normal(size=shape)) for _ in range(2)
     ]
     return space, [function, *others]
 
@@ -88,9 +97,9 @@ def test_each_crossing_is_where_it_is_said_to_be():
 
 def test_an_exponential_that_is_not_resolved_leaves_a_crossing_undecided():
     # exp(-1e10 s) - x (1 + 1e-6 s) has zeros at abs(x) near 0.7, but no float resolves them.
-    space = Space([Polynomial.of([1]), Polynomial.of([1e6, 1.0])], [Fraction(10**10)])
-    delayed = space.function([1, 0], [[1], [0]])
-    other = space.function([0, Fraction(1, 10**6)], [[0], [0]])
+    space = Space([Polynomial.of([1]), Polynomial.of([1e6, 1.0])], after([10**10]))
+    delayed = function_of(space, [1, 0], [[1], [0]])
+    other = function_of(space, [0, Fraction(1, 10**6)], [[0], [0]])
     rows = [delayed, delayed * 0, other]
     one = np.ones(1)
     found, undecided = crossings_of(rows, 0.0 * one, -one, one, 1e6, 1e6 + 5e-7)
@@ -109,9 +118,9 @@ def test_a_family_is_clear_at_both_ends_of_the_axis(where):
     while len(least) < 400:
         first = draw(rng, 4)
         space, shape = first.space, first.delayed.shape
-        second = first + space.function(0.3 * rng.normal(size=shape[0]), np.zeros(shape))
-        term = space.function(
-            10.0 ** rng.uniform(-3, 1) * rng.normal(size=shape[0]), np.zeros(shape)
+        second = first + function_of(space, 0.3 * rng.normal(size=shape[0]), np.zeros(shape))
+        term = function_of(
+            space, 10.0 ** rng.uniform(-3, 1) * rng.normal(size=shape[0]), np.zeros(shape)
         )
         units, none = np.eye(3).tolist(), [0.0] * 3
         test = [(1 if k < 2 else 2, units[k], none) for k in range(3)]
@@ -139,10 +148,10 @@ def test_a_family_is_clear_at_both_ends_of_the_axis(where):
 def test_rounding_does_not_confine_the_zeros_of_a_moved_function():
     # Only delays act on the highest power: zeros of F lie arbitrarily far to the right.
     polynomials = [Polynomial.of([1]), Polynomial.of([0, 1])]
-    space = Space(polynomials, [Fraction(1), Fraction(11, 10)])
+    space = Space(polynomials, after([1, Fraction(11, 10)]))
     rng = np.random.default_rng(14)
     for _ in range(400):
         weights = rng.uniform(0.1, 3.0, 2).tolist()
-        function = space.function([1, sum(map(Fraction, weights))], [[0, 0], weights])
+        function = function_of(space, [1, sum(map(Fraction, weights))], [[0, 0], weights])
         moved = function.shifted(rng.uniform(30.0, 40.0))
         assert decide.counts(*moved, most=1000) == UNCONFINED

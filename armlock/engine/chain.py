@@ -14,10 +14,8 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from fractions import Fraction
 from functools import cached_property, lru_cache
-from typing import Any, Self
+from typing import NamedTuple, Self
 from uuid import uuid4
 
 import flint
@@ -25,7 +23,7 @@ import numpy as np
 from flint import arb, fmpq, fmpq_poly
 
 from armlock.checks import BoolArray, ComplexArray, FloatArray
-from armlock.engine.polynomials import exact, rounded
+from armlock.engine.polynomials import collected, enclosed_roots, exact, rounded
 
 # On the torus a P that is smaller than this share of its coefficients is zero; and where a
 # candidate is looked for.
@@ -45,15 +43,10 @@ _BITS = 200
 
 
 class UndecidedError(RuntimeError):
-    """Double precision, or the steps allowed, did not decide; `index` of many functions."""
-
-    def __init__(self, message: str, index: int = 0) -> None:
-        super().__init__(message)
-        self.index = index
+    """Double precision, or the steps allowed, did not decide."""
 
 
-@dataclass(frozen=True)
-class Delay:
+class Delay(NamedTuple):
     """A delay object: theta in s, and the mark by which it differs from all others.
 
     Two objects are two delays even if they are equally long: a small change of one of them
@@ -61,12 +54,17 @@ class Delay:
     x it stands for exp(x) times the delay.
     """
 
-    theta: Fraction
-    mark: str = field(default_factory=lambda: uuid4().hex)
-    growth: Fraction = Fraction(0)
+    theta: fmpq
+    mark: str
+    growth: fmpq = fmpq(0)
+
+    @classmethod
+    def new(cls, theta: fmpq) -> Self:
+        """Return an object that is none other."""
+        return cls(theta, uuid4().hex)
 
     def __hash__(self) -> int:
-        """Hash the mark alone, which is faster."""
+        """Hash the mark alone: python-flint's fractions take long."""
         return hash(self.mark)
 
 
@@ -76,38 +74,33 @@ class Lag(tuple[tuple[Delay, int], ...]):
     @classmethod
     def of(cls, powers: Mapping[Delay, int]) -> Self:
         """Return the product of objects to these powers."""
-        pairs = ((delay, n) for delay, n in powers.items() if n)
-        return cls(
-            sorted(pairs, key=lambda pair: (pair[0].theta, pair[0].mark, pair[0].growth))
-        )
+        return cls(sorted((delay, n) for delay, n in powers.items() if n))
+
+    @classmethod
+    def after(cls, theta: fmpq, mark: str = "") -> Self:
+        """Return one object of a length, by default the one that all of this length share."""
+        return cls([(Delay(theta, mark), 1)] if theta else [])
 
     def times(self, other: Lag) -> Lag:
         """Return the product of two."""
         if not (self and other):
             return self or other
-        powers = dict(self)
-        for delay, n in other:
-            powers[delay] = powers.get(delay, 0) + n
-        return Lag.of(powers)
+        return Lag.of(collected((*self, *other)))
 
     @cached_property
-    def time(self) -> Fraction:
+    def time(self) -> fmpq:
         """The delay of the product, in s."""
-        return sum((delay.theta * n for delay, n in self), Fraction(0))
+        return sum((delay.theta * n for delay, n in self), fmpq(0))
 
     @cached_property
-    def growth(self) -> Fraction:
+    def growth(self) -> fmpq:
         """The x of the factor exp(x) before the delay."""
-        return sum((delay.growth * n for delay, n in self), Fraction(0))
+        return sum((delay.growth * n for delay, n in self), fmpq(0))
 
     @property
     def plain(self) -> Lag:
         """The product without that factor."""
-        found: dict[Delay, int] = {}
-        for one, n in self:
-            plain = Delay(one.theta, one.mark)
-            found[plain] = found.get(plain, 0) + n
-        return Lag.of(found)
+        return Lag.of(collected((Delay(one.theta, one.mark), n) for one, n in self))
 
 
 #: The product of no delays.
@@ -130,17 +123,11 @@ def own_phases(lags: Iterable[Lag]) -> tuple[list[Lag], list[Lag]]:
         left = [lag for lag in left if lag not in own]
 
 
-def _roots(p: fmpq_poly) -> list[Any]:
-    """Return enclosures of the roots of a polynomial, each once."""
-    pairs: Any = p.numer().complex_roots()
-    return [z for z, _ in pairs]
-
-
 def _in_disc(p: fmpq_poly) -> bool:
     """Tell whether a polynomial has a zero in the closed unit disc, or next to it."""
     if p.degree() < 1:
         return not p
-    return any(not abs(z) > 1 for z in _roots(p))
+    return any(not abs(z) > 1 for z, _ in enclosed_roots(p))
 
 
 def _on_circle(coefficients: Sequence[fmpq]) -> float:
@@ -155,8 +142,8 @@ def _on_circle(coefficients: Sequence[fmpq]) -> float:
         square += t * sum(products, fmpq(0)) * (2 if k else 1)
         t, before = fmpq_poly([0, 2]) * t - before, t
     slope = square.derivative()
-    found = _roots(slope) if slope.degree() > 0 else []
-    at = [z.real for z in found if z.imag.contains(0) and not abs(z.real) > 1]
+    found = enclosed_roots(slope) if slope.degree() > 0 else []
+    at = [z.real for z, _ in found if z.imag.contains(0) and not abs(z.real) > 1]
     values = [
         sum((arb(c) * x**k for k, c in enumerate(square.coeffs())), arb(0))
         for x in (*at, arb(1), arb(-1))
@@ -202,7 +189,7 @@ def _on_torus(
 def _powers(lags: Iterable[Lag]) -> FloatArray:
     """Return the powers of all delay objects in some products, shape (products, objects)."""
     lags = list(lags)
-    objects = sorted({d for lag in lags for d, _ in lag}, key=lambda d: (d.theta, d.mark))
+    objects = sorted({d for lag in lags for d, _ in lag})
     return np.array([[dict(lag).get(d, 0) for d in objects] for lag in lags], np.float64)
 
 
@@ -279,8 +266,8 @@ def turned(lags: Sequence[Lag], still: float, late: FloatArray, omega: float) ->
     acting = [(lag, c) for lag, c in zip(lags, late.tolist(), strict=True) if c]
     c = np.array([v for _, v in acting]) / still
     degrees = np.array([sum(n for _, n in lag) for lag, _ in acting])
-    turn = Fraction(2.0 * math.pi)
-    z = np.exp([-1j * float(Fraction(omega) * lag.time % turn) for lag, _ in acting])
+    phases = (exact(omega) * lag.time / exact(2.0 * math.pi) for lag, _ in acting)
+    z = np.exp([-1j * float((x - x.floor()) * exact(2.0 * math.pi)) for x in phases])
     least = float(reserve(lags, np.array([still]), late[None])[0]) / abs(still)
     r = np.linspace(0.0, 1.0, 8 + int(4.0 * np.abs(c) @ degrees / least))[:, None]
     return float(np.unwrap(np.angle(1.0 + (r**degrees * z) @ c))[-1])
@@ -390,8 +377,8 @@ def arc_limit(
 
 def line_limit(
     lags: Sequence[Lag],
-    f: Sequence[Fraction],
-    g: Sequence[Fraction],
+    f: Sequence[fmpq],
+    g: Sequence[fmpq],
     start: float,
     rounding: float,
 ) -> float:
@@ -401,7 +388,7 @@ def line_limit(
     ----------
     lags : sequence of Lag
         The K products.
-    f, g : sequence of Fraction, length 1 + K
+    f, g : sequence of fmpq, length 1 + K
         The coefficients of P: that of the undelayed term, and those of the products.
     start : float
         Where to begin.
@@ -410,7 +397,7 @@ def line_limit(
     """
     a, b = (np.array(v, np.float64) for v in (f, g))
     if not shared(lags, (np.abs(a[1:]) + np.abs(b[1:]))[None]).any():
-        return _plain_line_limit(f, g, Fraction(start), Fraction(rounding))
+        return _plain_line_limit(f, g, exact(start), exact(rounding))
     t, slope = start, float(np.abs(b).sum())
     for _ in range(_MOST_STEPS):
         v = a + t * b
@@ -425,7 +412,7 @@ def line_limit(
 
 
 def _plain_line_limit(
-    f: Sequence[Fraction], g: Sequence[Fraction], start: Fraction, rounding: Fraction
+    f: Sequence[fmpq], g: Sequence[fmpq], start: fmpq, rounding: fmpq
 ) -> float:
     """Do what `line_limit` does, exactly, where the sum of magnitudes is the rule (Lemma 14).
 
@@ -433,7 +420,7 @@ def _plain_line_limit(
     """
     breaks = {-a / b for a, b in zip(f, g, strict=True) if b}
 
-    def left(t: Fraction) -> Fraction:
+    def left(t: fmpq) -> fmpq:
         still, *late = (abs(a + b * t) for a, b in zip(f, g, strict=True))
         return still - sum(late) - rounding * still
 

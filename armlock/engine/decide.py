@@ -10,12 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from fractions import Fraction
 from functools import partial
 from typing import Any
 
 import numba
 import numpy as np
+from flint import fmpq
 
 from armlock.checks import FloatArray, IntArray
 from armlock.compiled import Plain
@@ -23,7 +23,7 @@ from armlock.engine import chain, extended, inclusion
 from armlock.engine.chain import UndecidedError
 from armlock.engine.functions import Function, Leading, Space, compiled, stacked
 from armlock.engine.inclusion import DISTANCE, REAL, VERTEX, Functions, Question
-from armlock.engine.polynomials import rounded
+from armlock.engine.polynomials import exact, rounded
 
 #: What a count is where a root lies on the axis, or rounding does not decide on which side.
 BOUNDARY = -1
@@ -251,12 +251,12 @@ class Family:
     ) -> tuple[list[Function], list[Function]]:
         """Return vertices and terms of a test, over its largest weight, which may be 1e300."""
         found: tuple[list[Function], list[Function]] = [], []
-        at = Fraction(level)
+        at = exact(level)
         rows = [
-            [Fraction(a) + Fraction(b) * at for a, b in zip(weights, slopes, strict=True)]
+            [exact(a) + exact(b) * at for a, b in zip(weights, slopes, strict=True)]
             for _, weights, slopes in test
         ]
-        over = max([Fraction(1), *(abs(w) for row in rows for w in row)])
+        over = max([fmpq(1), *(abs(w) for row in rows for w in row)])
         for (kind, *_), row in zip(test, rows, strict=True):
             member = self.functions[0] * 0
             for f, weight in zip(self.functions, row, strict=True):

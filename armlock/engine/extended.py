@@ -9,11 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from fractions import Fraction
 from typing import Any
 
 import flint
-from flint import acb, acb_series, arb
+from flint import acb, acb_series, arb, fmpq
 
 from armlock.engine.chain import UndecidedError
 from armlock.engine.functions import Function
@@ -40,11 +39,11 @@ class _Product:
 
     def __init__(self, f: Function, g: Function) -> None:
         space = f.space
-        self.delays = [acb(exact(-theta)) for theta in space.delays]
-        self.polynomials = [[acb(exact(c)) for c in p.exact][::-1] for p in space.polynomials]
+        self.delays = [acb(-theta) for theta in space.delays]
+        self.polynomials = [[acb(c) for c in p.exact.coeffs()][::-1] for p in space.polynomials]
         self.weights = [
             [
-                [acb(exact(w)) for w in (s, *row)]
+                [acb(w) for w in (s, *row)]
                 for s, row in zip(one.steady, one.delayed, strict=True)
             ]
             for one in (f, g)
@@ -104,14 +103,14 @@ def first_on(
         If the digits do not decide it.
     """
     (start, best), where = between, math.nan
-    pieces = [(Fraction(omega[0]), Fraction(omega[1]))]
+    pieces = [(exact(omega[0]), exact(omega[1]))]
     with _many_digits():
         product = _Product(f, g)
         for _ in range(_MOST_PIECES):
             if not pieces:
                 return best, where
             a, b = pieces.pop()
-            m, r = exact((a + b) / 2), exact((b - a) / 2)
+            m, r = (a + b) / 2, (b - a) / 2
             around, size, other = product.at(arb(m, r))
             if abs(other) * best < abs(size) or around[0].real > 0:
                 continue
@@ -124,16 +123,15 @@ def first_on(
                 t, at = _zero(product, a, b)
                 best, where = (t, at) if start < t < best else (best, where)
                 continue
-            middle = (a + b) / 2
-            pieces += [(middle, b), (a, middle)]
+            pieces += [(m, b), (a, m)]
     raise UndecidedError(f"{_BITS} bits do not decide at {omega[0]:.6g} rad/s")
 
 
-def _zero(product: _Product, a: Fraction, b: Fraction) -> tuple[float, float]:
+def _zero(product: _Product, a: fmpq, b: fmpq) -> tuple[float, float]:
     """Return t at the zero of Im A, which is monotonic between two frequencies; inf if none."""
 
-    def sign(omega: Fraction) -> int:
-        value = product.at(arb(exact(omega)))[0][0].imag
+    def sign(omega: fmpq) -> int:
+        value = product.at(arb(omega))[0][0].imag
         return 1 if value > 0 else -1 if value < 0 else 0
 
     first, last = sign(a), sign(b)
@@ -144,6 +142,6 @@ def _zero(product: _Product, a: Fraction, b: Fraction) -> tuple[float, float]:
     for _ in range(_HALVINGS):
         middle = (a + b) / 2
         a, b = (middle, b) if sign(middle) == first else (a, middle)
-    value, _, size = product.at(arb(exact(a)))
+    value, _, size = product.at(arb(a))
     t = -value[0].real / abs(size) ** 2
     return float(t) if t.is_finite() else math.inf, float(a)

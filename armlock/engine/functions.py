@@ -11,8 +11,7 @@ of the imaginary axis: a frequency past which one term exceeds all others.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from fractions import Fraction
+from dataclasses import dataclass
 from functools import cached_property
 from math import factorial
 from types import MappingProxyType
@@ -21,12 +20,13 @@ from typing import Any, NamedTuple
 import mpmath
 import numpy as np
 import numpy.typing as npt
+from flint import fmpq
 
 from armlock.checks import BoolArray, ComplexArray, FloatArray
 from armlock.engine import chain, inclusion
-from armlock.engine.chain import Delay, Lag
+from armlock.engine.chain import Lag
 from armlock.engine.inclusion import EPSILON, Arrays
-from armlock.engine.polynomials import Polynomial, rounded
+from armlock.engine.polynomials import Polynomial, exact, in_mpmath, order, rounded
 
 Exact = npt.NDArray[np.object_]
 # Most coefficients of a series at s = 0 of which one has to differ from zero.
@@ -44,14 +44,14 @@ class Leading(NamedTuple):
     ----------
     order : int
         The power k.
-    coefficient : Fraction
+    coefficient : fmpq
         The coefficient c.
     radius : float
         Up to this abs(s), all other terms together are at most a share of it (Lemma 11).
     """
 
     order: int
-    coefficient: Fraction
+    coefficient: fmpq
     radius: float
 
     @property
@@ -68,13 +68,12 @@ class Space:
     ----------
     polynomials : sequence of Polynomial
         Not zero.
-    delays : iterable of Lag or Fraction
-        Products of delay objects, each of them once; a number stands for an object of its own.
-        Those of length zero do not count.
+    lags : iterable of Lag
+        Products of delay objects, each of them once. Those of length zero do not count.
     step : float, optional
         Sampling step in s of which all delays are multiples, if the functions are those of a
         map. They repeat along the axis, which then ends at pi / step.
-    known : mapping of Fraction to int, optional
+    known : mapping of fmpq to int, optional
         Real numbers at which all functions have a zero, and its order at least: zeros that are
         no roots of the system (Lemma 23).
     """
@@ -82,26 +81,22 @@ class Space:
     def __init__(
         self,
         polynomials: Sequence[Polynomial],
-        delays: Iterable[Lag | Fraction],
+        lags: Iterable[Lag],
         step: float = 0.0,
-        known: Mapping[Fraction, int] = MappingProxyType({}),
+        known: Mapping[fmpq, int] = MappingProxyType({}),
     ) -> None:
         self.polynomials = tuple(polynomials)
         self.step, self.known = step, known
-        given = (
-            lag if isinstance(lag, Lag) else Lag([(Delay(Fraction(lag), ""), 1)])
-            for lag in delays
-        )
         #: Products of delay objects, by their length, one for each column of W.
         self.lags = tuple(
             sorted(
-                {lag for lag in given if lag.time},
+                {lag for lag in lags if lag.time},
                 key=lambda lag: (lag.time, [(d.mark, n) for d, n in lag]),
             )
         )
         self.delays = tuple(lag.time for lag in self.lags)
         self.degree = max(p.degree for p in self.polynomials)
-        self.longest = float(max(self.delays, default=Fraction(0)))
+        self.longest = float(max(self.delays, default=fmpq(0)))
         unit = 1.0 / self.longest if self.longest else 1.0
         whole = next(p for p in self.polynomials if p.degree == self.degree)
         scale = np.array([abs(root) or unit for root in whole.roots])
@@ -123,7 +118,7 @@ class Space:
             np.array([float(p.lead) for p in self.polynomials]),
             np.array([p.missed for p in self.polynomials]),
             np.array([float(theta) for theta in self.delays]),
-            np.array([float(theta - Fraction(float(theta))) for theta in self.delays]),
+            np.array([float(theta - exact(float(theta))) for theta in self.delays]),
         )
         #: Highest coefficients, 0 of polynomials of lower degree, shape (J,).
         self.lead = np.where(present.all(axis=1), self.arrays.lead, 0.0)
@@ -134,7 +129,8 @@ class Space:
 
     def known_right_of(self, sigma: float) -> int:
         """How many of the known zeros, but those at s = 0, have a larger real part."""
-        return sum(k for a, k in self.known.items() if a and a > sigma)
+        line = exact(sigma)
+        return sum(k for a, k in self.known.items() if a != 0 and a > line)
 
     def around_roots(self, number: int = 200) -> FloatArray:
         """Frequencies around complex roots, closest where a function changes most.
@@ -147,13 +143,6 @@ class Space:
         near = np.maximum(np.abs(roots.real), 1e-9 * roots.imag)
         off = np.multiply.outer(np.geomspace(1e-2, 1e3, number), near)
         return np.concatenate((roots.imag - off, roots.imag + off)).ravel()
-
-    def function(self, steady: Sequence[Any], delayed: Sequence[Sequence[Any]]) -> Function:
-        """Return the function with weights S, shape (J,), and W, shape (J, K)."""
-        shape = len(self.polynomials), len(self.delays)
-        s = np.array([Fraction(v) for v in steady], dtype=object)
-        w = np.array([Fraction(v) for row in delayed for v in row], dtype=object)
-        return Function(self, s, w.reshape(shape))
 
     def limits(self, steady: Any, delayed: FloatArray) -> tuple[Any, FloatArray]:
         """Of functions over s^degree at infinity: what nothing delays, and what delays do.
@@ -284,15 +273,14 @@ class Function:
     space: Space
     steady: Exact
     delayed: Exact
-    _kept: dict[float, Leading | None] = field(default_factory=dict, repr=False)
 
     def __add__(self, other: Function) -> Function:
         """Return the sum."""
         return Function(self.space, self.steady + other.steady, self.delayed + other.delayed)
 
-    def __mul__(self, factor: float | Fraction) -> Function:
+    def __mul__(self, factor: float | fmpq) -> Function:
         """Return a multiple."""
-        factor = Fraction(factor)
+        factor = exact(factor)
         return Function(self.space, self.steady * factor, self.delayed * factor)
 
     @cached_property
@@ -309,12 +297,12 @@ class Function:
         return sizes
 
     @cached_property
-    def limits(self) -> tuple[Fraction, ...]:
+    def limits(self) -> tuple[fmpq, ...]:
         """Over s^degree at infinity: what nothing delays, and what delays do, exactly."""
         lead = [p.lead if p.degree == self.space.degree else 0 for p in self.space.polynomials]
         still, late = self.steady - self.delayed.sum(axis=1), self.delayed.T
         return tuple(
-            sum((a * w for a, w in zip(lead, row, strict=True)), Fraction(0))
+            sum((a * w for a, w in zip(lead, row, strict=True)), fmpq(0))
             for row in (still, *late)
         )
 
@@ -335,50 +323,43 @@ class Function:
         """Whether the function is zero everywhere."""
         return not (self.steady.any() or self.delayed.any())
 
-    def series(self, number: int) -> list[Fraction]:
+    def series(self, number: int) -> list[fmpq]:
         """First coefficients of the Taylor series at s = 0, exactly; at most 16."""
-        out = [Fraction(0)] * number
+        out = [fmpq(0)] * number
         for p, s, row in zip(self.space.polynomials, self.steady, self.delayed, strict=True):
             acting = [(w, t) for w, t in zip(row, self.space.delays, strict=True) if w]
             e = [s] + [
-                sum((w * (-t) ** i for w, t in acting), Fraction(0)) / factorial(i)
+                sum((w * (-t) ** i for w, t in acting), fmpq(0)) / factorial(i)
                 for i in range(1, number)
             ]
-            for i, a in enumerate(p.exact[:number]):
+            for i, a in enumerate(p.exact.coeffs()[:number]):
                 if a:
                     for k in range(number - i):
                         if e[k]:
                             out[i + k] += a * e[k]
         return out
 
-    def leading(self, share: float = 0.25) -> Leading | None:
-        """Leading term at s = 0, and up to where all others are at most a share of it.
+    @cached_property
+    def lowest(self) -> tuple[int, fmpq] | None:
+        """Power and coefficient of the leading term at s = 0.
 
         None of a function whose first 16 coefficients are zero.
         """
-        if share not in self._kept:
-            self._kept[share] = self._leading(share)
-        return self._kept[share]
-
-    def _leading(self, share: float) -> Leading | None:
-        number = 2
-        while not any(c := self.series(number)):
-            if number == _MOST_TERMS:
-                return None
-            number = min(2 * number, _MOST_TERMS)
-        k = next(i for i, value in enumerate(c) if value)
-        return Leading(k, c[k], self.radius(k, abs(c[k]), share))
-
-    @property
-    def order(self) -> int | None:
-        """Order of the zero at s = 0; None where the first 16 coefficients are zero."""
         for number in (1, 2, _MOST_TERMS):
-            if any(c := self.series(number)):
-                return next(k for k, value in enumerate(c) if value)
+            c = self.series(number)
+            if any(c):
+                return order(c), c[order(c)]
         return None
 
+    def leading(self, share: float = 0.25) -> Leading | None:
+        """Leading term at s = 0, if it is known, and where all others are at most a share."""
+        if self.lowest is None:
+            return None
+        k, c = self.lowest
+        return Leading(k, c, self.radius(k, abs(c), share))
+
     def radius(
-        self, order: int, coefficient: Fraction, share: float, other: Function | None = None
+        self, order: int, coefficient: fmpq, share: float, other: Function | None = None
     ) -> float:
         """Radius up to which all terms of higher power are at most a share of this term.
 
@@ -415,10 +396,10 @@ class Function:
             self.space.polynomials, self.steady, self.delayed, strict=True
         ):
             q, dq = p.evaluated(s)
-            g, dg = _exactly(steady), mpmath.mpf(0)
+            g, dg = in_mpmath(steady), mpmath.mpf(0)
             for weight, theta in zip(row, self.space.delays, strict=True):
                 if weight:
-                    w, t = _exactly(weight), _exactly(theta)
+                    w, t = in_mpmath(weight), in_mpmath(theta)
                     g, dg = g + w * mpmath.expm1(-s * t), dg - w * t * mpmath.exp(-s * t)
             value, slope = value + q * g, slope + dq * g + q * dg
         return value, slope
@@ -454,7 +435,7 @@ class Function:
 
 def common_zeros(n: Function, m: Function) -> int:
     """Order of the zero at s = 0 that two functions have in common."""
-    return min((order for f in (n, m) if (order := f.order) is not None), default=0)
+    return min((f.lowest[0] for f in (n, m) if f.lowest), default=0)
 
 
 def keeps_sign_up_to(f: Function, g: Function, *, odd: bool) -> float:
@@ -467,7 +448,7 @@ def keeps_sign_up_to(f: Function, g: Function, *, odd: bool) -> float:
     for k in range(odd, _MOST_TERMS, 2):
         product = sum(one[k - i] * other[i] * (-1) ** i for i in range(k + 1))
         if product:
-            return f.radius(k, abs(Fraction(product)), 0.5, g)
+            return f.radius(k, abs(product), 0.5, g)
     return 0.0
 
 
@@ -480,14 +461,9 @@ def limit_at_zero(n: Function, m: Function) -> float:
     return float(rounded([above / below])[0]) if below else np.inf
 
 
-def _exactly(value: Fraction) -> Any:
-    """Return a fraction in mpmath's precision."""
-    return mpmath.mpf(value.numerator) / value.denominator
-
-
-def log(value: Fraction) -> float:
+def log(value: fmpq) -> float:
     """Natural logarithm of a positive fraction, of which a float may overflow."""
-    return float(mpmath.log(value.numerator) - mpmath.log(value.denominator))
+    return float(mpmath.log(int(value.p)) - mpmath.log(int(value.q)))
 
 
 def check_sizes(steady: FloatArray, delayed: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -10,7 +10,6 @@ import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +20,7 @@ from armlock.engine.chain import UndecidedError
 from armlock.engine.decide import Family, least
 from armlock.engine.functions import Function, common_zeros, keeps_sign_up_to, stacked
 from armlock.engine.inclusion import DELAY, DISTANCE, EPSILON, PHASE, REAL, TERM, VERTEX
-from armlock.engine.polynomials import Polynomial, exact, on_axis, polynomial, rounded
+from armlock.engine.polynomials import Polynomial, exact, on_axis, rounded
 
 # Gain factors up to which a search goes at first, and then goes on. Past the first one it ends
 # after so many steps if it has found nothing.
@@ -381,7 +380,7 @@ def _phase(
 def _delay(n: Function, m: Function, free: Free | None, turn: float) -> tuple[float, float]:
     """Smallest arg(-L) / omega where |L| = 1, and where; `turn` is the one at infinity."""
     # abs(L) is below one at infinite frequency if it is so for one phase, and never one.
-    at_one, open_at_one = (abs(sum(f.limits, Fraction(0))) for f in (n, m))
+    at_one, open_at_one = (abs(sum(f.limits, fmpq(0))) for f in (n, m))
     if at_one >= open_at_one or turn < math.inf:
         return 0.0, math.inf
     arc = 0.0, 0.0, 0.0, 1.0
@@ -399,7 +398,7 @@ def _returns_end(m: Function, n: Function, least: float) -> float:
     polynomials, still = n.space.polynomials, n.steady - n.delayed.sum(axis=1)
     parts = (
         sum(
-            (polynomial(w * c for c in p.exact) for w, p in zip(f, polynomials, strict=True)),
+            (w * p.exact for w, p in zip(f, polynomials, strict=True)),
             fmpq_poly([0]),
         )
         for f in (still, m.steady, *n.delayed.T)
@@ -407,10 +406,8 @@ def _returns_end(m: Function, n: Function, least: float) -> float:
     own, other, *late = parts
     late = [p for p in late if p]
     # As large as the delayed terms are next to each other at high frequency.
-    corner, degree = Fraction(n.space.corners[-1]), max((p.degree() for p in late), default=0)
-    shares = [
-        abs(p.leading_coefficient()) * exact(corner ** (p.degree() - degree)) for p in late
-    ]
+    corner, degree = exact(n.space.corners[-1]), max((p.degree() for p in late), default=0)
+    shares = [abs(p.leading_coefficient()) * corner ** (p.degree() - degree) for p in late]
     sizes = (on_axis(p, p) / share for p, share in zip(late, shares, strict=True))
     a = on_axis(own, own) - sum(shares, fmpq(0)) * sum(sizes, fmpq_poly([0]))
     b, c, u = on_axis(own, other), on_axis(other, other), exact(least)
@@ -426,7 +423,7 @@ def _positive_past(p: fmpq_poly) -> float:
     """Return the omega past which a polynomial of omega^2 is not negative, or inf."""
     if p and p.leading_coefficient() < 0:
         return math.inf
-    squares = [z.real for z in Polynomial.of(p.coeffs()).roots if z.imag == 0.0 < z.real]
+    squares = [z.real for z in Polynomial.of(p).roots if z.imag == 0.0 < z.real]
     return math.sqrt(max(squares, default=0.0)) * (1.0 + 1e-14)
 
 

@@ -1,24 +1,31 @@
-"""Real polynomials of s, with their roots, and the numbers of python-flint."""
+"""Real polynomials of s, with their roots; exact numbers are those of python-flint."""
 
 from __future__ import annotations
 
+import copyreg
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from functools import cached_property, reduce
 from itertools import zip_longest
 from operator import mul
-from typing import Any
+from typing import Any, TypeVar
 
 import flint
 import mpmath
 import numpy as np
+from flint import fmpq, fmpq_poly
 
 from armlock.checks import ComplexArray, FloatArray
 from armlock.engine.inclusion import EPSILON
 
+_Key = TypeVar("_Key")
+_Term = TypeVar("_Term", bound=Any)
+
 # Bits to which roots are found; lightly damped pairs keep the digits of their damping.
 _BITS = 128
+
+# python-flint pickles its fractions, but not its polynomials.
+copyreg.pickle(fmpq_poly, lambda p: (fmpq_poly, (p.coeffs(),)))
 
 
 @dataclass(frozen=True)
@@ -27,31 +34,31 @@ class Polynomial:
 
     Attributes
     ----------
-    lead : Fraction
+    lead : fmpq
         The highest coefficient.
     roots : tuple of complex
         In conjugate pairs. They define the polynomial, or were computed.
     computed : frozenset of int
         Places of the roots that were computed; the others are exact.
-    factors : tuple of tuple of Fraction
+    factors : tuple of tuple of fmpq
         The monic polynomials of which the computed roots are those, ascending.
     missed : float
         By how much the polynomial that has the computed roots is missed at any s, over the
         product of abs(s) + abs(root) of these roots.
     """
 
-    lead: Fraction
+    lead: fmpq
     roots: tuple[complex, ...]
     computed: frozenset[int] = frozenset()
-    factors: tuple[tuple[Fraction, ...], ...] = ()
+    factors: tuple[tuple[fmpq, ...], ...] = ()
     missed: float = 0.0
 
     @classmethod
-    def of(cls, coefficients: Iterable[Any]) -> Polynomial:
+    def of(cls, coefficients: fmpq_poly | Iterable[Any]) -> Polynomial:
         """Return the polynomial with these coefficients, ascending; zero has degree 0."""
         left = polynomial(coefficients)
         if not left:
-            return cls(Fraction(0), ())
+            return cls(fmpq(0), ())
         lead, known, computed = left.leading_coefficient(), [], []
         left /= lead
         for root, number in _roots(left):
@@ -63,10 +70,10 @@ class Polynomial:
                 left //= factor
                 known += pair * number
         return cls(
-            fraction(lead),
+            lead,
             (*known, *computed),
             frozenset(range(len(known), len(known) + len(computed))),
-            (fractions(left),) if computed else (),
+            (tuple(left.coeffs()),) if computed else (),
             # Each of them is rounded by half an EPSILON.
             0.51 * EPSILON * len(computed),
         )
@@ -74,12 +81,12 @@ class Polynomial:
     @classmethod
     def of_roots(cls, roots: Iterable[complex], lead: float = 1.0) -> Polynomial:
         """Return the polynomial with these roots, which come in conjugate pairs."""
-        return cls(Fraction(lead), tuple(complex(root) for root in roots))
+        return cls(exact(lead), tuple(complex(root) for root in roots))
 
     def __mul__(self, other: Polynomial) -> Polynomial:
         """Return the product, with the roots of both."""
         if not (self and other):
-            return Polynomial(Fraction(0), ())
+            return Polynomial(fmpq(0), ())
         moved = frozenset(len(self.roots) + k for k in other.computed)
         return Polynomial(
             self.lead * other.lead,
@@ -88,10 +95,6 @@ class Polynomial:
             self.factors + other.factors,
             (1.0 + self.missed) * (1.0 + other.missed) - 1.0,
         )
-
-    def __add__(self, other: Polynomial) -> Polynomial:
-        """Return the sum."""
-        return Polynomial.of((polynomial(self.exact) + polynomial(other.exact)).coeffs())
 
     def __bool__(self) -> bool:
         """Whether it is not zero."""
@@ -112,36 +115,36 @@ class Polynomial:
         return self.roots.count(0j)
 
     @cached_property
-    def exact(self) -> tuple[Fraction, ...]:
-        """Coefficients in ascending powers of s, exactly."""
+    def exact(self) -> fmpq_poly:
+        """The polynomial of python-flint."""
         given = [root for k, root in enumerate(self.roots) if k not in self.computed]
         known = [_factor(root) for root in given if root.imag >= 0.0]
         found = reduce(mul, map(polynomial, self.factors), polynomial([self.lead]))
-        return fractions(reduce(mul, known, found)) or (Fraction(0),)
+        return reduce(mul, known, found)
 
     @cached_property
     def coefficients(self) -> FloatArray:
         """Coefficients in ascending powers of s, rounded; inf where a number overflows."""
-        return rounded(self.exact)
+        return rounded(self.exact.coeffs() or [fmpq(0)])
 
     def shifted(self, sigma: float) -> Polynomial:
         """Return p(s + sigma), from its coefficients."""
-        return Polynomial.of(polynomial(self.exact)(polynomial([sigma, 1])).coeffs())
+        return Polynomial.of(self.exact(polynomial([sigma, 1])))
 
     def over(self, other: Polynomial, s: ComplexArray) -> ComplexArray:
         """Evaluate p(s) / q(s), factor by factor."""
         return quotients(self.roots, other.roots, float(self.lead / other.lead), s)
 
     def evaluated(self, s: Any) -> tuple[Any, Any]:
-        """Value and derivative at s, in numpy's or mpmath's numbers."""
-        value, slope = 0.0 * s + _in(s, self.lead), 0.0 * s
+        """Value and derivative at an mpmath number, in mpmath's precision."""
+        value, slope = in_mpmath(self.lead), mpmath.mpf(0)
         for k, root in enumerate(self.roots):
             if k not in self.computed:
                 value, slope = value * (s - root), slope * (s - root) + value
         for factor in self.factors:
-            p, dp = 0.0 * s, 0.0 * s
+            p, dp = mpmath.mpf(0), mpmath.mpf(0)
             for c in reversed(factor):
-                p, dp = p * s + _in(s, c), dp * s + p
+                p, dp = p * s + in_mpmath(c), dp * s + p
             value, slope = value * p, slope * p + value * dp
         return value, slope
 
@@ -162,44 +165,60 @@ def quotients(
     return found
 
 
-def exact(value: Any) -> flint.fmpq:
+def exact(value: Any) -> fmpq:
     """Return a number as a fraction of python-flint; a float is the binary number it is."""
-    if isinstance(value, flint.fmpq):
-        return value
-    return flint.fmpq(*Fraction(value).as_integer_ratio())
+    return value if isinstance(value, fmpq) else fmpq(*value.as_integer_ratio())
 
 
-def polynomial(coefficients: Iterable[Any]) -> flint.fmpq_poly:
+def in_mpmath(value: fmpq) -> Any:
+    """Return a fraction in mpmath's precision."""
+    return mpmath.mpf(int(value.p)) / int(value.q)
+
+
+def polynomial(coefficients: fmpq_poly | Iterable[Any]) -> fmpq_poly:
     """Return the polynomial of python-flint with these coefficients, ascending."""
-    return flint.fmpq_poly([exact(c) for c in coefficients])
+    if isinstance(coefficients, fmpq_poly):
+        return coefficients
+    return fmpq_poly([exact(c) for c in coefficients])
 
 
-def fraction(value: flint.fmpq) -> Fraction:
-    """Return a fraction of python-flint as one of Python, which has a hash and is pickled."""
-    return Fraction(int(value.p), int(value.q))
+def collected(terms: Iterable[tuple[_Key, _Term]]) -> dict[_Key, _Term]:
+    """Return terms by their keys, those of one key added."""
+    found: dict[_Key, _Term] = {}
+    for key, term in terms:
+        found[key] = found[key] + term if key in found else term
+    return found
 
 
-def fractions(p: flint.fmpq_poly) -> tuple[Fraction, ...]:
-    """Return the coefficients of a polynomial of python-flint, ascending."""
-    return tuple(fraction(c) for c in p.coeffs())
+def order(coefficients: Sequence[Any]) -> int:
+    """Return the place of the first coefficient that is not zero, or their number."""
+    for k, c in enumerate(coefficients):
+        if c:
+            return k
+    return len(coefficients)
 
 
-def on_axis(p: flint.fmpq_poly, q: flint.fmpq_poly) -> flint.fmpq_poly:
+def on_axis(p: fmpq_poly, q: fmpq_poly) -> fmpq_poly:
     """Return Re(p conj(q)) at s = j omega as a polynomial of omega^2."""
     product = p * q(polynomial([0, -1]))
-    return flint.fmpq_poly([(-1) ** k * c for k, c in enumerate(product.coeffs()[::2])])
+    return fmpq_poly([(-1) ** k * c for k, c in enumerate(product.coeffs()[::2])])
 
 
 def _factor(root: complex) -> Any:
     """Return s - root, or for a complex root the product with its conjugate."""
-    a, b = Fraction(root.real), Fraction(root.imag)
+    a, b = exact(root.real), exact(root.imag)
     return polynomial([a * a + b * b, -2 * a, 1] if b else [-a, 1])
 
 
-def _roots(p: Any) -> list[tuple[complex, int]]:
+def enclosed_roots(p: fmpq_poly) -> Any:
+    """Return the roots and their multiplicities, each root in a ball that holds it alone."""
+    return p.complex_roots()
+
+
+def _roots(p: fmpq_poly) -> list[tuple[complex, int]]:
     """Return the roots with Im s >= 0 and their multiplicities, rounded, and certified."""
     with flint.ctx.workprec(_BITS):
-        found = p.complex_roots()
+        found = enclosed_roots(p)
     # What rounding may leave of the real part of an undamped pair is none.
     rounded = [
         (complex(0.0 if z.real.contains(0) else float(z.real), float(z.imag)), number)
@@ -208,7 +227,7 @@ def _roots(p: Any) -> list[tuple[complex, int]]:
     return [(root, number) for root, number in rounded if root.imag >= 0.0]
 
 
-def rounded(coefficients: Iterable[Fraction]) -> FloatArray:
+def rounded(coefficients: Iterable[fmpq]) -> FloatArray:
     """Return fractions as floats; inf where one overflows."""
     found = []
     for value in coefficients:
@@ -217,10 +236,3 @@ def rounded(coefficients: Iterable[Fraction]) -> FloatArray:
         except OverflowError:
             found.append(np.inf if value > 0 else -np.inf)
     return np.array(found)
-
-
-def _in(s: Any, value: Fraction) -> Any:
-    """Return a fraction in the numbers of s."""
-    if isinstance(s, mpmath.ctx_mp_python.mpnumeric):
-        return mpmath.mpf(value.numerator) / value.denominator
-    return float(value)

@@ -9,19 +9,18 @@ last count says that no zero lies further right.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from fractions import Fraction
-from itertools import zip_longest
 from typing import NamedTuple
 
 import mpmath
 import numpy as np
+from flint import fmpq, fmpq_poly
 
 from armlock.checks import ComplexArray, FloatArray
 from armlock.engine import chain, decide, inclusion
 from armlock.engine.chain import UndecidedError
 from armlock.engine.decide import BOUNDARY, UNCONFINED
 from armlock.engine.functions import Function, Space
-from armlock.engine.polynomials import Polynomial, polynomial
+from armlock.engine.polynomials import Polynomial, in_mpmath
 
 # How far right of the zero that is returned no other one lies: the first share of abs(s), or of
 # one over the longest delay, if so fine a count is decided in so few steps. Otherwise it is the
@@ -54,7 +53,7 @@ _DIGITS, _GUARD_DIGITS = 20, 80
 
 
 #: Real numbers at which a function has zeros that are left out, and their orders.
-_Known = Mapping[Fraction, int]
+_Known = Mapping[fmpq, int]
 
 
 class RootError(RuntimeError):
@@ -92,7 +91,7 @@ def _polished(function: Function, known: _Known, start: complex) -> complex | No
         for step in range(_EXTENDED_STEPS):
             value, slope = function.exact_value_and_slope(s)
             # Of the zeros a fraction is known exactly.
-            away = [(s - mpmath.mpf(a.numerator) / a.denominator, k) for a, k in known.items()]
+            away = [(s - in_mpmath(a), k) for a, k in known.items()]
             if any(abs(d) <= mpmath.eps * abs(s) for d, _ in away):
                 return None
             if value == 0:
@@ -134,7 +133,7 @@ class _Search:
 
     def __init__(self, function: Function, known: _Known) -> None:
         self.function, self.known, self.steps = function, known, 0.0
-        self.common = known.get(Fraction(0), 0)
+        self.common = known.get(fmpq(0), 0)
         self.unit = 1.0 / function.space.longest
         self.further, self.points = _TURNS_FURTHER, 0
 
@@ -274,14 +273,11 @@ def _last_crossing(space: Space, steady: FloatArray, delayed: FloatArray) -> flo
 
 def _without_delay(function: Function, known: _Known) -> complex:
     """Return the rightmost zero of a function that no delay acts on."""
-    parts = [
-        [weight * c for c in p.exact]
-        for p, weight in zip(function.space.polynomials, function.steady, strict=True)
-    ]
-    whole = polynomial(sum(powers) for powers in zip_longest(*parts, fillvalue=Fraction(0)))
+    parts = zip(function.space.polynomials, function.steady, strict=True)
+    whole = sum((weight * p.exact for p, weight in parts), fmpq_poly([0]))
     for a, k in known.items():
-        whole //= polynomial([-a, 1]) ** k
-    starts = Polynomial.of(whole.coeffs()).roots if whole else ()
+        whole //= fmpq_poly([-a, 1]) ** k
+    starts = Polynomial.of(whole).roots if whole else ()
     roots = [_polished(function, known, s) for s in starts]
     if not roots:
         raise ValueError("the parameters must leave a loop with roots: D is constant")
@@ -312,7 +308,7 @@ def rightmost_zero(function: Function, common: int = 0) -> complex:
     RootError
         If no zero is certified.
     """
-    known = {**function.space.known, Fraction(0): common}
+    known = {**function.space.known, fmpq(0): common}
     known = {a: k for a, k in known.items() if k}
     if not function.delayed.any():
         return _without_delay(function, known)

@@ -10,11 +10,11 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import flint
 import numpy as np
+from flint import fmpq, fmpq_poly
 
 from armlock.checks import FloatArray
 from armlock.engine import chain, decide
@@ -23,7 +23,7 @@ from armlock.engine.decide import Family
 from armlock.engine.functions import Function, Space, at, stacked
 from armlock.engine.inclusion import VERTEX
 from armlock.engine.margins import first_zero, least_ratio
-from armlock.engine.polynomials import Polynomial, fractions, on_axis, polynomial
+from armlock.engine.polynomials import Polynomial, enclosed_roots, exact, on_axis
 
 # The radius is certified to this share, and the scalings are optimal to it.
 _TOLERANCE = 1e-7
@@ -43,7 +43,7 @@ class Varying(NamedTuple):
     scalings: tuple[float, ...]
 
 
-def _exact_polynomial(function: Function) -> flint.fmpq_poly:
+def _exact_polynomial(function: Function) -> fmpq_poly:
     """Return B of a function B exp(-s theta), exactly.
 
     Raises
@@ -55,43 +55,35 @@ def _exact_polynomial(function: Function) -> flint.fmpq_poly:
     undelayed = function.steady - function.delayed.sum(axis=1)
     if acting.size > 1 or (acting.size and undelayed.any()):
         raise ValueError("what varies must be a factor of one polynomial with one delay")
-    found = flint.fmpq_poly()
+    found = fmpq_poly()
     for weight, p in zip(function.steady, function.space.polynomials, strict=True):
         if weight:
-            found += polynomial(weight * c for c in p.exact)
+            found += weight * p.exact
     return found
 
 
-def _fraction(value: flint.arb) -> Fraction:
+def _fraction(value: flint.arb) -> fmpq:
     """Return the middle of a ball, exactly."""
     mantissa, exponent = value.mid().man_exp()
-    return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
+    return mantissa * fmpq(2) ** int(exponent)
 
 
-def _roots(p: flint.fmpq_poly) -> list[tuple[flint.acb, int]]:
-    """Return the roots with their multiplicities, each in a ball that holds it."""
-    found: Any = p.complex_roots()
-    return list(found)
-
-
-def _is_positive(p: flint.fmpq_poly) -> bool:
+def _is_positive(p: fmpq_poly) -> bool:
     """Tell whether a polynomial is positive for all arguments from zero on."""
     if p(0) <= 0 or p.leading_coefficient() < 0:
         return False
     # Real roots have an imaginary part of exactly zero.
-    return not any(root.imag == 0 and not root.real < 0 for root, _ in _roots(p))
+    return not any(root.imag == 0 and not root.real < 0 for root, _ in enclosed_roots(p))
 
 
-def spectral_factor(
-    parts: Sequence[flint.fmpq_poly], weights: Sequence[Fraction]
-) -> Polynomial:
+def spectral_factor(parts: Sequence[fmpq_poly], weights: Sequence[fmpq]) -> Polynomial:
     """Return f with |f|^2 >= sum_k weights_k |B_k|^2 on the axis, and next to no more.
 
     Parameters
     ----------
-    parts : sequence of flint.fmpq_poly
+    parts : sequence of fmpq_poly
         The B_k, not zero.
-    weights : sequence of Fraction
+    weights : sequence of fmpq
         Positive.
 
     Raises
@@ -102,31 +94,30 @@ def spectral_factor(
     common = parts[0]
     for p in parts[1:]:
         common = common.gcd(p)
-    whole = flint.fmpq_poly()
+    whole = fmpq_poly()
     for p, weight in zip(parts, weights, strict=True):
-        whole += polynomial([weight]) * on_axis(p / common, p / common)
+        whole += weight * on_axis(p / common, p / common)
     # Without a common factor the sum is positive on the whole axis.
     roots = []
-    for x, number in _roots(whole):
+    for x, number in enclosed_roots(whole):
         if x.imag < 0:
             continue
         s = -complex((-x).sqrt())
         roots += ([complex(s.real)] if x.imag == 0 else [s, s.conjugate()]) * number
     lead = _fraction(flint.arb(whole.leading_coefficient()).sqrt())
     for more in _ENLARGED:
-        f = Polynomial.of_roots(roots) * Polynomial.of([lead * (1 + Fraction(more))])
-        whole_f = polynomial(f.exact)
-        if _is_positive(on_axis(whole_f, whole_f) - whole):
-            return f * Polynomial.of(fractions(common))
+        f = Polynomial.of_roots(roots) * Polynomial.of([lead * (1 + exact(more))])
+        if _is_positive(on_axis(f.exact, f.exact) - whole):
+            return f * Polynomial.of(common)
     raise UndecidedError("rounding does not decide the sum of the squares of what varies")
 
 
 def _beside(d: Function, f: Polynomial) -> tuple[Function, Function]:
     """Return D and a polynomial as functions of one space."""
-    space = Space([*d.space.polynomials, f], d.space.delays, d.space.step)
+    space = Space([*d.space.polynomials, f], d.space.lags, d.space.step)
     none = np.zeros((1, d.delayed.shape[1]), object)
-    zero, steady = np.array([Fraction(0)], object), np.zeros(len(space.polynomials), object)
-    steady[-1] = Fraction(1)
+    zero, steady = np.array([fmpq(0)], object), np.zeros(len(space.polynomials), object)
+    steady[-1] = fmpq(1)
     delayed = np.concatenate((d.delayed, none))
     return (
         Function(space, np.append(d.steady, zero), delayed),
@@ -192,7 +183,7 @@ def varying_radius_of(d: Function, changes: Sequence[Function]) -> Varying:
     best, scalings = Varying(0.0, math.nan, ()), np.ones(len(acting))
     squares = np.zeros((0, len(acting)))
     for _ in range(_MOST_SCALINGS):
-        sizes = [Fraction(size) ** 2 for size in scalings.tolist()]
+        sizes = [exact(size) ** 2 for size in scalings.tolist()]
         f = spectral_factor(parts, [sum(sizes) / size for size in sizes])
         _, radius, omega = least_ratio(*_beside(d, f), tolerance=_TOLERANCE)
         if radius > best.radius:

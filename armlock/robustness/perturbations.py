@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
+from flint import fmpq
 
 from armlock.affine import Affine, NotAffineError, common
 from armlock.checks import FloatArray, axis, positive_number, real_number
@@ -22,7 +22,7 @@ from armlock.engine.decide import BOUNDARY, UNCONFINED, Family
 from armlock.engine.functions import Function
 from armlock.engine.inclusion import EPSILON, TERM, VERTEX
 from armlock.engine.margins import first_zero
-from armlock.engine.polynomials import polynomial
+from armlock.engine.polynomials import collected, exact, polynomial, rounded
 from armlock.stability.counts import CountError, decided, require_certain, unstable_roots
 from armlock.systems import Sum, System, delay_object
 
@@ -34,7 +34,7 @@ _FARTHEST = 1e9
 # Delays are moved up to this share of their mean, in steps down to that share of their start.
 _FARTHEST_SHARE, _FINEST_STEP = 0.99, 1e-8
 # Of a start on the boundary, crossings up to this share of its size, or of 1, are its own.
-_NEXT_TO_START = Fraction(1, 10**10)
+_NEXT_TO_START = fmpq(1, 10**10)
 # The parameter of a ray.
 _U = System(Sum.of(polynomial([1]), NOW, "u"), Sum.of(polynomial([1])), {"u": 0.0})
 
@@ -113,7 +113,7 @@ class _Ray:
         """Return the parameters at a point of the ray."""
         return self.start + u * self.scale * self.way
 
-    def count(self, u: float | Fraction) -> int:
+    def count(self, u: float | fmpq) -> int:
         """Count the unstable roots of the closed loop at a point of the ray, exactly given."""
         n, m = self.n + self.dn * u, self.m + self.dm * u
         return decide.count(n + m, common(n, m))
@@ -131,7 +131,7 @@ class _Ray:
         opposed = (here.coefficient > 0) != (change.coefficient > 0)
         return 1 if opposed or number > 2 else 1 - int(number)
 
-    def begin(self) -> Fraction:
+    def begin(self) -> fmpq:
         """Return the u from which the ray is searched.
 
         Zero, so that nothing is skipped, unless the start has roots on the axis off s = 0, or
@@ -140,17 +140,18 @@ class _Ray:
         here = self.f.leading()
         is_clear = here is not None and decide.count(self.f, here.order) != BOUNDARY
         if is_clear and self.leaving() >= 0:
-            return Fraction(0)
+            return fmpq(0)
         return _NEXT_TO_START
 
-    def first(self, begin: Fraction, stop: float) -> Crossing:
+    def first(self, begin: fmpq, stop: float) -> Crossing:
         """Find the first crossing between two u, at its u."""
         f, nearest = self.f + self.g * begin, Crossing(stop - float(begin), np.nan)
         if step := self.system.step:
             # The axis of a map ends where D is real.
             here, change = (_at_the_end(function) for function in (f, self.g))
-            if change and 0 < -here / change < nearest.position:
-                nearest = Crossing(float(-here / change), np.pi / step)
+            at = float(rounded([-here / change])[0]) if change else np.nan
+            if 0.0 < at < nearest.position:
+                nearest = Crossing(at, np.pi / step)
         found = Crossing(*first_zero(f, self.g, nearest.position, 0.0))
         if np.isnan(found.omega):
             found = nearest
@@ -159,11 +160,12 @@ class _Ray:
         return Crossing(float(begin) + found.position, found.omega)
 
 
-def _at_the_end(function: Function) -> Fraction:
+def _at_the_end(function: Function) -> fmpq:
     """Return a function of a map at the end of its axis, s = j pi / step, exactly."""
-    step = Fraction(function.space.step)
-    turns = [(-1) ** int(theta / step) - 1 for theta in function.space.delays]
-    return Fraction(function.steady.sum() + (function.delayed @ turns).sum())
+    step = exact(function.space.step)
+    turns = [fmpq(-1) ** int(theta / step) - 1 for theta in function.space.delays]
+    found: fmpq = function.steady.sum() + (function.delayed @ turns).sum()
+    return found
 
 
 def first_crossing(
@@ -359,12 +361,13 @@ def box_count(loop: System, size: float | Mapping[str, float]) -> int:
 
 def _by_powers(d: Sum, objects: tuple[Delay, Delay]) -> dict[tuple[int, ...], Sum]:
     """Sort the terms of a sum by the powers of some delay objects, which are taken out."""
-    found: dict[tuple[int, ...], Sum] = {}
-    for (lag, names), p in d.terms.items():
-        powers = tuple(dict(lag).get(one, 0) for one in objects)
-        rest = Lag(pair for pair in lag if pair[0] not in objects)
-        found[powers] = found.get(powers, Sum({})) + Sum({(rest, names): p})
-    return found
+    return collected(
+        (
+            tuple(dict(lag).get(one, 0) for one in objects),
+            Sum.of(p, Lag(pair for pair in lag if pair[0] not in objects), *names),
+        )
+        for (lag, names), p in d.terms.items()
+    )
 
 
 def stable_half_differences(
@@ -450,7 +453,7 @@ def stable_half_differences(
 
 def _moved(system: System, arms: tuple[Delay, Delay], mean: float, x: float) -> System:
     """Return a system with the delays mean + x and mean - x for two of its own."""
-    moved = dict(zip(arms, (Delay(Fraction(mean + x)), Delay(Fraction(mean - x))), strict=True))
+    moved = dict(zip(arms, map(Delay.new, (exact(mean + x), exact(mean - x))), strict=True))
 
     def of(part: Sum) -> Sum:
         return Sum(
@@ -487,7 +490,7 @@ def _no_root_crosses(
         return False
     longest = max(of(d, low), of(d, high), key=lambda f: f.space.longest)
     begin = longest.radius(a.order, min(abs(a.coefficient), abs(b.coefficient)), 0.25)
-    middle = Sum.of(polynomial([1]), Lag([(Delay(Fraction(mean)), 1)]))
+    middle = Sum.of(polynomial([1]), Lag.after(exact(mean)))
     both, apart = (d1 + d2) * middle, (d1 + -d2) * middle
     names = [Sum.of(polynomial([1]), NOW, name) for name in ("both", "apart")]
     whole = d0 + d12 * middle * middle + both * names[0] + apart * names[1]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armlock.affine import Affine
+from armlock.affine import Affine, common
 from armlock.checks import real_number
 from armlock.engine.margins import require_stable
 from armlock.engine.varying import constant_radius_of, varying_radius_of
@@ -100,9 +100,10 @@ def varying_radius(loop: System, *values: float, **numbers: float) -> VaryingRad
         raise ValueError(f"loop must have a parameter that varies, got {system!r}")
     affine, point = Affine.of(system), list(given.values())
     require_certain(system, point)
-    d, changes = affine.function(*point), affine.terms[1:]
+    n, m = affine.quotient(*point)
+    d, changes = n + m, affine.terms[1:]
     with decided("no radius", np.array(point)):
-        require_stable(d, affine.cancelled(*point))
+        require_stable(d, common(n, m))
         radius, omega, scalings = varying_radius_of(d, changes)
         constant = constant_radius_of(d, changes, radius) if radius else 0.0
     return VaryingRadius(

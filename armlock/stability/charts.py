@@ -24,7 +24,7 @@ from armlock.engine import chain
 from armlock.engine.decide import BOUNDARY, UNCONFINED, UNDECIDED
 from armlock.engine.functions import Function, stacked
 from armlock.engine.inclusion import EPSILON
-from armlock.engine.polynomials import exact, fraction, rounded
+from armlock.engine.polynomials import exact, rounded
 from armlock.stability.counts import count_points
 from armlock.stability.crossings import crossings
 from armlock.systems import System
@@ -340,7 +340,7 @@ class _Rows:
     def of(cls, affine: Affine, x: float, y: float) -> _Rows:
         """Return D of two parameters, and its value at a centre."""
         constant, first, second = affine.terms
-        d, m = (tuple(exact(f.series(1)[0]) for f in p) for p in (affine.terms, affine.m))
+        d, m = (tuple(f.series(1)[0] for f in p) for p in (affine.terms, affine.m))
         there = affine.function(x, y)
         return cls(constant, there, first, second, (x, y), d, m, affine.m_is_zero)
 
@@ -383,7 +383,7 @@ class _Rows:
     def at_zero(self, x: FloatArray, y: FloatArray) -> BoolArray:
         """Tell where rounding hides the sign of D(0)."""
         # Of many fast poles the product is no float.
-        sizes = rounded([fraction(v / (max(map(abs, self.d)) or 1)) for v in self.d])
+        sizes = rounded([v / (max(map(abs, self.d)) or 1) for v in self.d])
         sums = np.column_stack((np.ones(x.size), x, y)) * sizes
         return np.asarray(np.abs(sums.sum(axis=1)) <= 8.0 * EPSILON * np.abs(sums).sum(axis=1))
 

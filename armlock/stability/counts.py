@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from flint import fmpq
 
 from armlock.affine import Affine, NotAffineError, common, quotient_at
 from armlock.checks import (
@@ -30,6 +30,7 @@ from armlock.engine.chain import UndecidedError
 from armlock.engine.decide import BOUNDARY, UNCONFINED, UNDECIDED
 from armlock.engine.functions import Function, Leading, check_sizes, compiled, log, stacked
 from armlock.engine.inclusion import EPSILON, Functions
+from armlock.engine.polynomials import exact, order
 from armlock.systems import System
 
 __all__ = ["BOUNDARY", "UNCONFINED", "UNDECIDED", "CountError", "unstable_roots"]
@@ -129,17 +130,17 @@ def _with_zeros(affine: Affine, points: FloatArray) -> IntArray:
     found = np.full(len(points), _EXACTLY)
     left, leads, away = [], [], list[int]()
     for i, point in enumerate(points.tolist()):
-        shares = [Fraction(1), *map(Fraction, point)]
+        shares = [fmpq(1), *map(exact, point)]
         n, m = (
             [
-                sum((x * c[k] for x, c in zip(shares, part, strict=True)), Fraction(0))
+                sum((x * c[k] for x, c in zip(shares, part, strict=True)), fmpq(0))
                 for k in range(_TERMS)
             ]
             for part in series
         )
         d = [a + b for a, b in zip(n, m, strict=True)]
-        orders = [_order(a) for a in (n, m, d)]
-        apart = affine.space.known.get(Fraction(0), 0)
+        orders = [order(a) for a in (n, m, d)]
+        apart = affine.space.known.get(fmpq(0), 0)
         cancelled = apart if affine.m_is_zero else min(orders[:2])
         if orders[2] == _TERMS:
             continue
@@ -168,11 +169,6 @@ def _with_zeros(affine: Affine, points: FloatArray) -> IntArray:
         counted = decide.counts(affine.space, functions, leading=known)
         found[left] = np.where(counted < 0, _EXACTLY, counted)
     return found
-
-
-def _order(series: Sequence[Fraction]) -> int:
-    """Return the order of a zero at s = 0, or the length of the series."""
-    return next((k for k, c in enumerate(series) if c), len(series))
 
 
 def _rounded(affine: Affine, points: FloatArray) -> Functions:
@@ -272,14 +268,12 @@ def unstable_roots(
     -1
     """
     right_of = real_number("right_of", right_of)
-    system, arrays = broadcast_values(system, values, numbers)
-    shape = next((x.shape for x in arrays.values()), ())
-    flat = np.column_stack([x.ravel() for x in arrays.values()] or [np.empty((1, 0))])
-    counts = _counts(system, arrays, flat, right_of)
+    system, points, shape = at_points(system, values, numbers)
+    counts = _counts(system, points, right_of)
     for other in system.others:
-        differ = _counts(other, arrays, flat, right_of) != counts
+        differ = _counts(other, points, right_of) != counts
         if differ.any():
-            raise in_doubt(flat[differ])
+            raise in_doubt(points[differ])
     return counts.reshape(shape) if shape else int(counts[0])
 
 
@@ -301,41 +295,38 @@ def require_certain(system: System, point: Sequence[Any]) -> None:
         unstable_roots(system, *point)
 
 
-def _counts(
-    system: System, arrays: dict[str, FloatArray], flat: FloatArray, right_of: float
-) -> IntArray:
-    """Count at points, shape (n, k), which arrays hold too."""
-    if len(flat) > 1 and right_of == 0.0:
-        varying = [name for name, x in arrays.items() if (x != x.flat[0]).any()]
-        return count_points(*over(system, arrays, varying))
-    found = np.empty(len(flat), np.int64)
-    for i, point in enumerate(flat):
+def _counts(system: System, points: FloatArray, right_of: float) -> IntArray:
+    """Count at points, shape (n, k)."""
+    if len(points) > 1 and right_of == 0.0:
+        return count_points(*_over(system, points))
+    found = np.empty(len(points), np.int64)
+    for i, point in enumerate(points):
         try:
             found[i] = _count_exactly(*quotient_at(system, point.tolist()), right_of)
         except UndecidedError as error:
-            if len(flat) == 1:
-                raise CountError(f"no count{place(point)}: {error}", flat) from None
+            if len(points) == 1:
+                raise CountError(f"no count{place(point)}: {error}", points) from None
             found[i] = UNDECIDED
     return found
 
 
-def over(
-    system: System, arrays: dict[str, FloatArray], varying: list[str]
-) -> tuple[Affine, FloatArray]:
+def _over(system: System, points: FloatArray) -> tuple[Affine, FloatArray]:
     """Return a system, affine in the parameters that vary, and the points of these."""
     with suppress(NotAffineError):
-        return Affine.of(system), np.column_stack([x.ravel() for x in arrays.values()])
-    held = {name: float(x.flat[0]) for name, x in arrays.items() if name not in varying}
-    points = np.column_stack([arrays[name].ravel() for name in varying])
-    return Affine(system, varying, **held), points
+        return Affine.of(system), points
+    varies = (points != points[0]).any(axis=0)
+    names = np.array(system.parameters)
+    held = dict(zip(names[~varies].tolist(), points[0, ~varies].tolist(), strict=True))
+    return Affine(system, names[varies].tolist(), **held), points[:, varies]
 
 
-def broadcast_values(
+def at_points(
     system: System, values: tuple[npt.ArrayLike, ...], numbers: dict[str, npt.ArrayLike]
-) -> tuple[System, dict[str, FloatArray]]:
-    """Return the system, and its parameters as finite real arrays of one shape."""
+) -> tuple[System, FloatArray, tuple[int, ...]]:
+    """Return the system, points of its parameters, shape (n, k), and the shape of results."""
     system = System.of(system)
     given = {k: real_array(k, v) for k, v in system.given(values, numbers).items()}
     shape = broadcast_shape(tuple(given), tuple(given.values()))
     check_memory(" and ".join(given) or "values", shape, 64)
-    return system, {name: np.broadcast_to(x, shape).copy() for name, x in given.items()}
+    columns = [np.broadcast_to(x, shape).ravel() for x in given.values()]
+    return system, np.column_stack(columns or [np.empty((1, 0))]), shape

@@ -7,27 +7,26 @@ these curves the number of unstable roots of a retarded system is constant.
 
 from __future__ import annotations
 
-from fractions import Fraction
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from flint import fmpq_poly
+from flint import fmpq, fmpq_poly
 
 from armlock.affine import Affine, functions
 from armlock.checks import FloatArray, check_memory, positive_number, real_array
-from armlock.engine.chain import Delay, Lag
+from armlock.engine.chain import Lag
 from armlock.engine.functions import at
 from armlock.engine.inclusion import EPSILON
-from armlock.engine.polynomials import polynomial, rounded
+from armlock.engine.polynomials import collected, polynomial, rounded
 from armlock.stability.counts import CountError
 from armlock.stability.crossings import crossings
 from armlock.systems import Sum, System
 
 _S = fmpq_poly([0, 1])
 #: Polynomials by the length of their delay, which may be negative.
-_Sum = dict[Fraction, fmpq_poly]
+_Sum = dict[fmpq, fmpq_poly]
 
 
 class Line(NamedTuple):
@@ -68,11 +67,12 @@ def _two(system: Any, numbers: dict[str, Any]) -> tuple[System, str, str]:
 
 def _crossed(b: _Sum, c: _Sum) -> _Sum:
     """Return b conj(c) - conj(b) c, which on the axis is twice j Im(b conj(c)), exactly."""
-    found: _Sum = {}
-    for t, p in b.items():
-        for u, q in c.items():
-            for time, r in ((t - u, p * q(-_S)), (u - t, -p(-_S) * q)):
-                found[time] = found.get(time, fmpq_poly([0])) + r
+    found = collected(
+        term
+        for t, p in b.items()
+        for u, q in c.items()
+        for term in ((t - u, p * q(-_S)), (u - t, -p(-_S) * q))
+    )
     return {time: p for time, p in found.items() if p}
 
 
@@ -104,12 +104,10 @@ class _Curve:
         known = d.put({name: Sum.of(polynomial([v])) for name, v in values.items()})
         early, one = min(determinant), fmpq_poly([1])
         parts = (
-            known.by_length(), {Fraction(0): shared}, b, c, {Fraction(0): one},
+            known.by_length(), {fmpq(0): shared}, b, c, {fmpq(0): one},
             {time - early: p for time, p in determinant.items()}, {-early: one},
         )  # fmt: skip
-        groups = [
-            [{Lag([(Delay(time, ""), 1)]): p for time, p in part.items()}] for part in parts
-        ]
+        groups = [[{Lag.after(time): p for time, p in part.items()}] for part in parts]
         self.functions = functions(groups, system.step)
 
     def at(self, omega: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from armlock.affine import common, quotient_at
 from armlock.engine.roots import rightmost_zero
-from armlock.stability.counts import broadcast_values, require_certain
+from armlock.stability.counts import at_points, require_certain
 from armlock.systems import System
 
 
@@ -74,11 +74,9 @@ def rightmost_root(system: System, *values: npt.ArrayLike, **numbers: npt.ArrayL
     >>> print(f"{root:.10f}")
     -0.3181315052+1.3372357014j
     """
-    system, arrays = broadcast_values(system, values, numbers)
-    shape = next((x.shape for x in arrays.values()), ())
-    flat = np.column_stack([x.ravel() for x in arrays.values()] or [np.empty((1, 0))])
+    system, points, shape = at_points(system, values, numbers)
     found = []
-    for point in flat.tolist():
+    for point in points.tolist():
         require_certain(system, point)
         n, m = quotient_at(system, point)
         found.append(rightmost_zero(n + m, common(n, m)))

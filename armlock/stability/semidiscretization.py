@@ -11,8 +11,7 @@ as they take the loop.
 
 from __future__ import annotations
 
-from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -29,9 +28,9 @@ from armlock.checks import (
 )
 from armlock.controllers import with_others
 from armlock.engine.chain import NOW, Delay, Lag
-from armlock.engine.polynomials import fraction, polynomial
+from armlock.engine.polynomials import collected, exact, polynomial
 from armlock.engine.roots import RootError
-from armlock.stability.counts import broadcast_values
+from armlock.stability.counts import at_points
 from armlock.systems import Sum, System
 
 # Digits of a map's coefficients.
@@ -40,58 +39,6 @@ _DIGITS = 100
 _BITS, _MOST_BITS = 800, 25600
 # A spectral radius is found to this share of itself. Below the least one it counts as zero.
 _SHARE, _LEAST = 2.0**-54, 1e-300
-
-
-class DelayedTerm(NamedTuple):
-    """One delayed term at given parameters: delay, input column and direct share."""
-
-    delay: float
-    column: FloatArray
-    direct: float
-
-
-def realize(
-    system: System, *values: float, **numbers: float
-) -> tuple[FloatArray, list[DelayedTerm]]:
-    r"""Return a state space of D xi = 0, in which a single signal xi is delayed.
-
-    With A what nothing delays, D xi = 0 reads
-
-    .. math::
-
-        A\, \xi = \sum_k B_k\, \xi(t - \tau_k) .
-
-    In observer form, with as many states as D has degree, that is
-
-    .. math::
-
-        \dot z(t) &= F z(t) + \sum_k G_k\, \xi(t - \tau_k) , \\
-        \xi(t) &= z_1(t) + \sum_k d_k\, \xi(t - \tau_k) .
-
-    Parameters
-    ----------
-    system : System
-        The open loop, with D = N + M, or an equation.
-    *values, **numbers : float, optional
-        The parameters, in the order of their first use or by name; nominal ones by default.
-
-    Returns
-    -------
-    state : float array, shape (n, n)
-        The matrix F. Terms without delay are part of it.
-    delayed : list of DelayedTerm
-        The others, by their delays; d_k = 0 for retarded equations.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If a parameter is not a finite real number, or the system is a map.
-    """
-    parts = _at_point(system, values, numbers).by_length()
-    undelayed = parts.pop(Fraction(0), fmpq_poly([0]))
-    state, columns = _observer(undelayed, [-p for p in parts.values()])
-    terms = zip(parts, columns, strict=True)
-    return state, [DelayedTerm(float(t), column, direct) for t, (column, direct) in terms]
 
 
 def _continuous(system: Any) -> System:
@@ -112,20 +59,14 @@ def _at_point(system: Any, values: Any, numbers: Any) -> Sum:
     return found
 
 
-def _observer(
-    a: fmpq_poly, delayed: list[fmpq_poly]
-) -> tuple[FloatArray, list[tuple[FloatArray, float]]]:
-    """Return F, and the column G_k and direct share d_k of each delayed polynomial."""
-    size = a.degree()
-    state = np.diag(np.ones(max(size - 1, 0)), 1)
-    state[:, 0] = [-float(fraction(a[k] / a[size])) for k in range(size - 1, -1, -1)]
-    columns = []
-    for p in delayed:
-        direct = p[size] / a[size]
-        column = [
-            float(fraction((p[k] - direct * a[k]) / a[size])) for k in range(size - 1, -1, -1)
-        ]
-        columns.append((np.array(column), float(fraction(direct))))
+def _observer(a: fmpq_poly, delayed: list[fmpq_poly]) -> tuple[FloatArray, list[FloatArray]]:
+    """Return F, and the column G_k of each delayed polynomial, which are of lower degree."""
+    powers = range(a.degree() - 1, -1, -1)
+    state = np.diag(np.ones(max(len(powers) - 1, 0)), 1)
+    whole, *columns = (
+        np.array([float(p[k] / a.leading_coefficient()) for k in powers]) for p in (a, *delayed)
+    )
+    state[:, 0] = -whole
     return state, columns
 
 
@@ -152,29 +93,21 @@ def _retarded(parts: dict[Any, fmpq_poly], size: int) -> None:
 
 def _realized(
     system: Any, values: Any, numbers: Any, step: float
-) -> tuple[FloatArray, list[DelayedTerm], list[int]]:
-    """Return F, the delayed terms, and how many steps each of these is delayed."""
+) -> tuple[FloatArray, list[FloatArray], list[int]]:
+    """Return F, the columns of delayed terms, and how many steps each of these is delayed."""
     # A delay whose parameter is zero keeps its place.
     whole = System.of(system)
     parts = dict.fromkeys(whole.numerator.lags | whole.denominator.lags, fmpq_poly([0]))
-    parts |= _at_point(system, values, numbers).before()
+    parts |= _at_point(system, values, numbers).rounded().before()
     parts = dict(sorted(parts.items(), key=lambda part: part[0].time))
     undelayed = parts.pop(NOW, fmpq_poly([0]))
     _retarded(parts, undelayed.degree())
-    found: dict[int, fmpq_poly] = {}
-    for lag, p in parts.items():
-        back = _steps(lag, step)
-        found[back] = found.get(back, fmpq_poly([0])) - p
-    state, columns = _observer(undelayed, list(found.values()))
-    terms = [
-        DelayedTerm(back * step, column, direct)
-        for back, (column, direct) in zip(found, columns, strict=True)
-    ]
-    return state, terms, list(found)
+    found = collected((_steps(lag, step), -p) for lag, p in parts.items())
+    return *_observer(undelayed, list(found.values())), list(found)
 
 
 def _sampled(
-    state: FloatArray, delayed: list[DelayedTerm], step: float, order: int
+    state: FloatArray, delayed: list[FloatArray], step: float, order: int
 ) -> tuple[Any, list[tuple[Any, Any]]]:
     """Return exp(F h) and, per delayed term, the columns of its older and newer sample.
 
@@ -183,11 +116,11 @@ def _sampled(
     """
     states, h = len(state), mpmath.mpf(step)
     flow, columns = mpmath.expm(mpmath.matrix(state.tolist()) * h), []
-    for term in delayed:
+    for column in delayed:
         # exp of this block matrix holds the integrals of exp(F u) G and of u exp(F u) G.
         block = mpmath.zeros(states + 2)
         block[:states, :states] = mpmath.matrix(state.tolist())
-        block[:states, states] = mpmath.matrix(term.column.tolist())
+        block[:states, states] = mpmath.matrix(column.tolist())
         block[states, states + 1] = 1 / h
         integrals = mpmath.expm(block * h)
         held, ramp = integrals[:states, states], integrals[:states, states + 1]
@@ -196,7 +129,7 @@ def _sampled(
 
 
 def _map(
-    state: FloatArray, delayed: list[DelayedTerm], step: float, order: int
+    state: FloatArray, delayed: list[FloatArray], step: float, order: int
 ) -> tuple[list[Any], list[list[Any]]]:
     """Return A and the B_k of `semi_discretization` in ascending powers of z.
 
@@ -251,9 +184,8 @@ def transition_matrix(
 
     Notes
     -----
-    In state space the loop is z' = F z + sum_k G_k xi(t - theta_k), where xi is the first
-    state. What is not delayed is part of F (`realize`).
-    With :math:`\theta_k = r_k h`, a step is
+    In observer form the loop is z' = F z + sum_k G_k xi(t - theta_k), where xi is the first
+    state. What is not delayed is part of F. With :math:`\theta_k = r_k h`, a step is
 
     .. math::
 
@@ -362,11 +294,9 @@ def spectral_radius(
     >>> print(round(float(spectral_radius(HayesEquation(), -1, -1, step=0.1, order=1)), 12))
     0.941189374167
     """
-    system, arrays = broadcast_values(system, values, numbers)
+    system, points, shape = at_points(system, values, numbers)
     h = _checked(step, order)
-    shape = next((x.shape for x in arrays.values()), ())
-    flat = np.column_stack([x.ravel() for x in arrays.values()] or [np.empty((1, 0))])
-    radii = [_radius(system, point, h, order) for point in flat.tolist()]
+    radii = [_radius(system, point, h, order) for point in points.tolist()]
     return np.array(radii, np.float64).reshape(shape)
 
 
@@ -500,16 +430,12 @@ def _map_of(system: System, step: float, order: int) -> System:
     _retarded(late, size)
     steps = [_steps(lag, step) for lag, _ in late]
     state, columns = _observer(undelayed, list(late.values()))
-    terms = [
-        DelayedTerm(back * step, column, direct)
-        for back, (column, direct) in zip(steps, columns, strict=True)
-    ]
     with mpmath.workdps(_DIGITS):
-        above, below = _map(state, terms, step, order)
+        above, below = _map(state, columns, step, order)
         maps = [polynomial(float(v) for v in p) for p in (above, *below)]
     at_rest = [undelayed[0], *(p[0] for p in late.values())]
     maps = _with_root_at_one(maps, at_rest)
-    q, found = Delay(Fraction(step)), Sum({})
+    q, found = Delay.new(exact(step)), Sum({})
     for (names, back), p, sign in zip(
         [((), 0), *((names, back) for (_, names), back in zip(late, steps, strict=True))],
         maps, (1, *[-1] * len(late)), strict=True,

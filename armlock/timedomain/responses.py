@@ -9,22 +9,21 @@ from __future__ import annotations
 
 import math
 import warnings
-from fractions import Fraction
 from functools import partial
 from heapq import heapify, heappop, heappush
 from math import factorial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from flint import fmpq_poly
+from flint import fmpq, fmpq_poly
 
 from armlock.affine import Affine
 from armlock.checks import ComplexArray, FloatArray, finite_series, positive_number
-from armlock.engine.chain import NOW, Delay, Lag
+from armlock.engine.chain import Lag
 from armlock.engine.decide import count
 from armlock.engine.functions import Function
-from armlock.engine.polynomials import fraction, polynomial
+from armlock.engine.polynomials import enclosed_roots, exact, polynomial
 from armlock.systems import Sum, System
 from armlock.systems import s as laplace
 from armlock.timedomain.inversion import Panels, TooLongError, inverted, panels
@@ -41,9 +40,9 @@ _AWAY = 3.0
 _MOST_JUMPS = 20_000
 
 #: A sum of exponentials exp(-s theta): delays and coefficients.
-_Jumps = dict[Fraction, float]
+_Jumps = dict[fmpq, float]
 #: A sum of polynomials of s, by the lengths of their delays.
-_Terms = dict[Fraction, fmpq_poly]
+_Terms = dict[fmpq, fmpq_poly]
 
 
 class _Transformed(NamedTuple):
@@ -163,7 +162,7 @@ def _response(system: System, timepts: npt.ArrayLike, what: str) -> control.Time
     # Each term is delayed by this at least. Only what comes after is left to the inversion, in
     # which it would be small beside a growing response.
     n, m = system.numerator.by_length(), system.denominator.by_length()
-    dead = min(n, default=Fraction(0))
+    dead = min(n, default=fmpq(0))
     ahead = {theta - dead: p for theta, p in n.items()}
     begin = int(np.searchsorted(time, float(dead) * (1.0 - 1e-12)))
     outputs = np.zeros(time.size)
@@ -177,7 +176,7 @@ def _response(system: System, timepts: npt.ArrayLike, what: str) -> control.Time
     )  # fmt: skip
 
 
-def _inverted(n: _Terms, m: _Terms, time: FloatArray, dead: Fraction) -> FloatArray:
+def _inverted(n: _Terms, m: _Terms, time: FloatArray, dead: fmpq) -> FloatArray:
     """Invert N(s) / M(s) at some times after a dead time."""
     time = np.maximum(time - float(dead), 0.0)
     last = float(time[-1]) or float(dead)
@@ -199,12 +198,13 @@ def _inverted(n: _Terms, m: _Terms, time: FloatArray, dead: Fraction) -> FloatAr
 def _transformed(n: _Terms, m: _Terms, last: float) -> _Transformed:
     """Transform the response to an impulse, as it is up to a time."""
     # What comes later has no effect until then.
-    n, m = ({theta: p for theta, p in part.items() if theta <= last} for part in (n, m))
+    end = exact(last)
+    n, m = ({theta: p for theta, p in part.items() if theta <= end} for part in (n, m))
     system, degree = System(_sum(n), _sum(m)), _degree(n, m)
     below = Affine(System(_sum(m), Sum({}))).n[0]
     # The largest of the roots of the denominator's polynomials.
-    found: Any = [p.numer().complex_roots() for p in m.values()]
-    corner = max([1.0 / last, *(abs(complex(root)) for roots in found for root, _ in roots)])
+    roots = [root for p in m.values() for root, _ in enclosed_roots(p)]
+    corner = max([1.0 / last, *(abs(complex(root)) for root in roots)])
     above, under = (_powers(part, degree, corner) for part in (n, m))
     jumps = _expansion(above, under, last * (1.0 + 1e-9))
     sigma = _right_of_poles(below, last) + _AWAY / last
@@ -230,13 +230,12 @@ def _longest(n: _Terms, m: _Terms, last: float) -> float:
 
 def _sum(part: _Terms) -> Sum:
     """Return a sum whose delays are objects of their own."""
-    lags = {theta: Lag([(Delay(theta, ""), 1)]) if theta else NOW for theta in part}
-    return Sum({(lags[theta], ()): p for theta, p in part.items()})
+    return Sum({(Lag.after(theta), ()): p for theta, p in part.items()})
 
 
 def _degree(n: _Terms, m: _Terms) -> int:
     """Highest power of s in the denominator, which nothing delayed may exceed."""
-    whole = m.get(Fraction(0), fmpq_poly([0])).degree()
+    whole = m.get(fmpq(0), fmpq_poly([0])).degree()
     top = max(p.degree() for p in (*n.values(), *m.values()))
     if whole < top:
         raise ValueError(
@@ -248,10 +247,10 @@ def _degree(n: _Terms, m: _Terms) -> int:
 
 def _powers(part: _Terms, degree: int, corner: float) -> list[_Jumps]:
     """Coefficients of the highest powers of s + corner, from `degree` on: sums of delays."""
-    moved = polynomial([-Fraction(corner), 1])
+    moved = polynomial([-corner, 1])
     of = [(theta, p(moved)) for theta, p in part.items()]
     return [
-        {theta: float(fraction(p[i])) for theta, p in of if i >= 0 and p[i]}
+        {theta: float(p[i]) for theta, p in of if i >= 0 and p[i]}
         for i in range(degree, degree - _ORDERS - 1, -1)
     ]
 
@@ -274,11 +273,11 @@ def _quotient(left: _Jumps, by: _Jumps, last: float) -> _Jumps:
     queue, found = list(left), {}
     smallest = 1e-14 * max(map(abs, left.values()), default=0.0)
     heapify(queue)
-    zero = Fraction(0)
+    zero, end = fmpq(0), exact(last)
     while queue:
         theta = heappop(queue)
         value = left.pop(theta, 0.0) / by[zero]
-        if theta > last or abs(value) <= smallest:
+        if theta > end or abs(value) <= smallest:
             continue
         found[theta] = value
         if len(found) > _MOST_JUMPS:
