@@ -357,6 +357,13 @@ def test_powers_of_one_object_are_counted_as_roots_of_the_equation():
             assert count == independent.winding(equation(d), 2000.5, 2.0)
 
 
+@pytest.mark.parametrize("theta", np.linspace(0.8, 1.2, 9))
+def test_a_chain_may_turn_by_more_than_half_a_turn(theta):
+    """(1 + 0.9 z)^4 turns by up to 257 degrees, and no root exceeds 0.5 / 0.1^4."""
+    neutral = equation(s * (1 + 0.9 * delay(theta)) ** 4 + 0.5)
+    assert unstable_roots(neutral) == independent.winding(neutral, 5001.0, 5.0)
+
+
 def test_delays_that_are_no_multiples_of_one_object_do_not_cancel():
     with pytest.raises(ValueError, match=r"^the system must be causal"):
         delay(1.0) / delay(0.25)
