@@ -1,9 +1,11 @@
 """A few of the random loops of `tests.attack`; `python -m tests.attack` takes ten thousand."""
 
+import mpmath
 import numpy as np
 import pytest
 
-from armlock import margins
+from armlock import BOUNDARY, first_crossing, margins, unstable_roots
+from armlock.engine.inclusion import EPSILON
 from tests import attack
 from tests.attack_judge import Sketch
 
@@ -94,3 +96,42 @@ def test_margins_that_are_too_good_are_not_certified():
 def test_loops_that_were_refused_or_late_are_answered(seed, loop, kind):
     tally = attack.attack(seed, [loop], (kind,), attack.Tally(patient=False))
     assert listed(tally) == []
+
+
+def terms(loop, c, s):
+    """The terms of D at s, in mpmath's precision."""
+    found = []
+    for part in (loop.numerator, loop.denominator):
+        for (lag, names), p in part.terms.items():
+            powers = [mpmath.mpf(int(a.p)) / int(a.q) * s**k for k, a in enumerate(p.coeffs())]
+            late = mpmath.fsum(mpmath.mpf(float(one.theta)) * k for one, k in lag)
+            factors = mpmath.fsum(powers), mpmath.exp(-s * late), *(c[name] for name in names)
+            found.append(mpmath.fprod(factors))
+    return found
+
+
+@mpmath.workdps(50)
+def nearly_zero(loop, c, omega):
+    """How far D is from zero at the height of a root, in the sum of its terms' sizes."""
+    root = mpmath.findroot(lambda s: mpmath.fsum(terms(loop, c, s)), mpmath.mpc(0, omega))
+    found = terms(loop, c, mpmath.mpc(0, root.imag))
+    return abs(mpmath.fsum(found)) / mpmath.fsum(map(abs, found))
+
+
+def test_a_count_of_minus_one_has_a_root_at_the_axis():
+    """As near as the docstring of `unstable_roots` says."""
+    rng, seen = np.random.default_rng(51), 0
+    while seen < 30:
+        sketch, point = attack.draw(rng)
+        loop, way = attack.to_loop(sketch), rng.normal(size=2)
+        found = first_crossing(loop, point, way)
+        if not 0.0 < found.omega < np.inf:
+            continue
+        off = 1.0 + rng.normal(size=(8, 2)) * 10.0 ** rng.uniform(-15.0, -9.0, (8, 1))
+        near = (point + found.position * way) * off
+        parts = loop.numerator, loop.denominator
+        n = sum(max(p.degree() for p in part.terms.values()) for part in parts)
+        allowed = 10.0 * EPSILON * (n + found.omega * max(loop.tau1, loop.tau2))
+        for x, y in near[unstable_roots(loop, *near.T) == BOUNDARY].tolist():
+            assert nearly_zero(loop, {"c1": x, "c2": y}, found.omega) < allowed
+            seen += 1

@@ -216,10 +216,10 @@ def unstable_roots(
         in the open left half-plane, where it is 0. `BOUNDARY` (-1) where a root lies on the
         imaginary axis, or nearer to it than rounding can tell. Of a loop these are the roots
         of the closed loop: a root s = 0 of D that cancels in L does not count.
-        ``equation(1 + loop)`` counts the roots of D. The rounding of the phase omega tau is the
-        largest: a point within some 8 EPSILON omega tau of the boundary, relative to its
-        parameters, may be given as -1 (4e-10 where a root crosses at 1e4 rad/s, with 20 s), and
-        where terms of D cancel, as many times further as they exceed their sum. `UNCONFINED`
+        ``equation(1 + loop)`` counts the roots of D. -1 says that D(j omega) at some omega is
+        below some 10 EPSILON (n + omega tau) of the sum of its terms' sizes, with the degrees
+        of N and M together as n and the longest delay as tau. This is 4e-10 of the parameters
+        where a root crosses at 1e4 rad/s, with 20 s, and no terms cancel. `UNCONFINED`
         (-2) where the neutral root chain is not confined to the left half-plane: an
         arbitrarily small change of one delay object can then make infinitely many roots
         unstable. A chain that is confined by no more than rounding, about 1e-14, counts as not
