@@ -51,7 +51,7 @@ def drawn(rng):
 def test_a_range_is_stable_at_random_differences_and_ends_where_a_root_crosses():
     rng = np.random.default_rng(7)
     ends = []
-    for _ in range(16):
+    for _ in range(24):
         loop = drawn(rng)
         if unstable_roots(loop) != 0:
             with pytest.raises(ValueError, match="stable as it is"):
