@@ -143,11 +143,8 @@ class Affine:
     def __init__(self, system: System, free: Sequence[str] = (), **numbers: Any) -> None:
         self.free, self.step = tuple(free), system.step
         self.origin = tuple(system.nominal.get(name) or 0.0 for name in free)
-        held = {k: v for k, v in system.nominal.items() if k not in free} | numbers
-        for name, value in held.items():
-            if value is None:
-                raise TypeError(f"{name} must be given: it has no nominal value")
-        values = {name: Sum.of(polynomial([value])) for name, value in held.items()}
+        given = system.given((), {**dict.fromkeys(free, 0.0), **numbers})
+        values = {k: Sum.of(polynomial([v])) for k, v in given.items() if k not in free}
         sums = [part.put(values).rounded() for part in (system.numerator, system.denominator)]
         for _, names in (key for part in sums for key in part.terms):
             if len(names) > 1:

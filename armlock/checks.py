@@ -172,7 +172,9 @@ def _numbers(name: str, value: object, kinds: str) -> npt.NDArray[Any]:
         raise ValueError(f"{name} must be a rectangular array, got {value!r}") from None
     if array.dtype.kind not in kinds:
         what = "real numbers" if kinds == _REAL else "numbers"
-        raise TypeError(f"{name} must hold {what}, got dtype {array.dtype}")
+        is_object = array.dtype.kind == "O" and array.size
+        got = f"a {type(array.flat[0]).__name__}" if is_object else f"dtype {array.dtype}"
+        raise TypeError(f"{name} must hold {what}, got {got}")
     finite = np.isfinite(array)
     if not finite.all():
         first = tuple(int(at) for at in np.argwhere(~finite)[0])

@@ -334,6 +334,11 @@ def check_system(name: str, system: Any, others: str) -> None:
             f"{name} must have one input and one output, got {system.ninputs} and "
             f"{system.noutputs}"
         )
+    check_continuous(name, system)
+
+
+def check_continuous(name: str, system: Any) -> None:
+    """Raise if a system of python-control is in discrete time."""
     if system.isdtime(strict=True):
         raise ValueError(
             f"{name} must be continuous in time, got sampling time {system.dt}: give the "

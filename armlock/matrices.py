@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from flint import fmpq
 
-from armlock.checks import real_array, real_number, whole_number
-from armlock.controllers import with_others
+from armlock.checks import FloatArray, real_array, whole_number
+from armlock.controllers import check_continuous, with_others
 from armlock.engine import statespace
 from armlock.engine.polynomials import exact, polynomial
 from armlock.systems import (
@@ -136,7 +136,7 @@ def return_difference(plant: Any, controllers: Any) -> System:
 
 
 def state_space(
-    a: Any, b: Any = None, c: Any = None, d: float = 0.0, *, integrators: int | None = None
+    a: Any, b: Any = None, c: Any = None, d: Any = 0.0, *, integrators: int | None = None
 ) -> System:
     """Return a state space with delays, x' = sum of A_k x(t - h_k) + b u, y = c x + d u.
 
@@ -146,7 +146,7 @@ def state_space(
         ``{0: A_0, 1.5: A_1}``. A delay is a number in s, or what `delay` returns.
     b, c : array_like of float, shape (n,), optional
         Without them the equation of the poles is returned.
-    d : float, optional
+    d : float, or array_like of one, optional
         What goes through directly.
     integrators : int, optional
         How many poles are meant to be zero, 0 or 1, where rounding of the matrices hides it.
@@ -187,18 +187,19 @@ def state_space(
     if b is None:
         made = [System(below + _number(v), Sum({})) for v in changes]
     else:
-        column, row = (real_array(*pair).ravel() for pair in (("b", b), ("c", c)))
-        if not len(column) == len(row) == len(rows):
+        column, row, direct = (
+            _matrix(*pair).ravel() for pair in (("b", b), ("c", c), ("d", d))
+        )
+        if (len(column), len(row), len(direct)) != (len(rows), len(rows), 1):
             raise ValueError(
-                f"b and c must have {len(rows)} numbers, got {len(column)} and {len(row)}: "
-                "several inputs or outputs are for return_difference"
+                f"b and c must have {len(rows)} numbers, and d one, got {len(column)}, "
+                f"{len(row)} and {len(direct)}: several inputs or outputs are for "
+                "return_difference"
             )
-        through = real_number("d", d)
+        through = exact(direct[0])
         beside = [[*r, _number(-v)] for r, v in zip(rows, column, strict=True)]
         above = _determinant([*beside, [*map(_number, row), _number(through)]])
-        made = [
-            System(above + _number(v * exact(through)), below + _number(v)) for v in changes
-        ]
+        made = [System(above + _number(v * through), below + _number(v)) for v in changes]
     found, *others = made
     found.others = tuple(others)
     return found
@@ -208,9 +209,25 @@ def _number(value: Any) -> Sum:
     return Sum.of(polynomial([value]))
 
 
+def _is_of_control(value: Any) -> bool:
+    """Tell whether it is a system of python-control."""
+    return hasattr(value, "isdtime") and not isinstance(value, System)
+
+
+def _matrix(name: str, value: Any) -> FloatArray:
+    """Return numbers; for a system of python-control raise, and say what to write."""
+    if _is_of_control(value):
+        raise TypeError(
+            f"{name} must hold numbers, got a {type(value).__name__}: without delays write "
+            "System.of(p) for p; with delays write matrices, {0: p.A, 1.5: A_1}, p.B, p.C, p.D"
+        )
+    return real_array(name, value)
+
+
 def _parts(plant: Any) -> tuple[Any, ...]:
     """Return A with s on its diagonal, B, C and D; without states for a matrix of systems."""
-    if hasattr(plant, "A"):
+    if _is_of_control(plant) and hasattr(plant, "A"):
+        check_continuous("plant", plant)
         plant = plant.A, plant.B, plant.C, plant.D
     if not (isinstance(plant, tuple) and len(plant) in (3, 4)):
         d = _array("plant", plant)
@@ -218,9 +235,9 @@ def _parts(plant: Any) -> tuple[Any, ...]:
         return *none, d
     a, b, c, *d = plant
     rows, _, _ = _states(a)
-    b, c = (np.atleast_2d(real_array(*pair)) for pair in (("B", b), ("C", c)))
+    b, c = (np.atleast_2d(_matrix(*pair)) for pair in (("B", b), ("C", c)))
     b = b.reshape(len(rows), -1)
-    d = real_array("D", d[0]) if d else np.zeros((len(c), b.shape[1]))
+    d = _matrix("D", d[0]) if d else np.zeros((len(c), b.shape[1]))
     states = [[System(p, _ONE) for p in row] for row in rows]
     return tuple(np.array(part, object) for part in (states, b, c, d))
 
@@ -229,6 +246,11 @@ def _array(name: str, matrix: Any) -> Any:
     """Return systems as an array; those of a sequence as one column."""
     if isinstance(matrix, np.ndarray) and matrix.dtype != object:
         matrix = real_array(name, matrix).tolist()
+    if _is_of_control(matrix):
+        raise TypeError(
+            f"{name} must be a sequence of rows, got a {type(matrix).__name__}: for p write "
+            "[[p[i, k] for k in range(p.ninputs)] for i in range(p.noutputs)]"
+        )
     if not isinstance(matrix, list | tuple | np.ndarray):
         raise TypeError(f"{name} must be a sequence of rows, got {matrix!r:.200}")
     listed = [row if isinstance(row, list | tuple | np.ndarray) else [row] for row in matrix]
@@ -240,7 +262,7 @@ def _array(name: str, matrix: Any) -> Any:
 def _states(a: Any) -> tuple[list[list[Sum]], Any, Any]:
     """Return s - A_0 - A_1 exp(-s h_1) - ..., and the exact sums of A_k and of sizes."""
     given = a if isinstance(a, Mapping) else {0.0: a}
-    parts = {h: real_array("a", part) for h, part in given.items()}
+    parts = {h: _matrix("a", part) for h, part in given.items()}
     shapes = {part.shape for part in parts.values()}
     shape = shapes.pop()
     if shapes or len(shape) != 2 or shape[0] != shape[1]:

@@ -474,9 +474,7 @@ class System:
         **values
             By name of the parameter.
         """
-        for name in values:
-            if name not in self.nominal:
-                raise TypeError(f"{name} is no parameter of {self!r}: it has {self.parameters}")
+        self.check_names("a keyword", values)
         put, names = {}, {k: v for k, v in self.nominal.items() if k not in values}
         for name, value in values.items():
             given = System.of(value, name)
@@ -501,15 +499,17 @@ class System:
         name : str
             Of the parameter.
         """
-        if name not in self.nominal:
-            raise TypeError(f"{name} is no parameter of {self!r}: it has {self.parameters}")
+        self.check_names("name", [name])
 
         def made(one: System) -> System:
             parts = Sum({}), Sum({}), Sum({})
             for (lag, names), p in (one.numerator + one.denominator).terms.items():
                 parts[min(names.count(name), 2)].terms[lag, names] = p
             if parts[2] or not parts[0]:
-                raise ValueError(f"{self!r} must be affine in {name}, and not zero without it")
+                raise ValueError(
+                    f"name must be a parameter in which D is affine, and not zero without it, "
+                    f"got {name!r}"
+                )
             return System(parts[1], parts[0], one.nominal, known=one.known)
 
         return with_others(made, self)
@@ -521,9 +521,8 @@ class System:
             raise TypeError(
                 f"{len(values)} values are given for the parameters {self.parameters}"
             )
+        self.check_names("a keyword", numbers)
         for name, value in [*zip(found, values, strict=False), *numbers.items()]:
-            if name not in found:
-                raise TypeError(f"{name} is no parameter of {self!r}: it has {self.parameters}")
             if value is None:
                 raise TypeError(
                     f"{name} must be a number, got None: leave it out if it is nominal"
@@ -531,8 +530,20 @@ class System:
             found[name] = value
         for name, value in found.items():
             if value is None:
-                raise TypeError(f"{name} must be given: it has no nominal value")
+                raise TypeError(
+                    f"{name} must be given, or have a nominal value, as "
+                    f"parameter({name!r}, 1.0) has"
+                )
         return found
+
+    def check_names(self, argument: str, names: Iterable[Any]) -> None:
+        """Raise unless an argument names parameters of the system."""
+        for name in names:
+            if name not in self.parameters:
+                raise TypeError(
+                    f"{argument} must be one of the parameters of the system "
+                    f"({', '.join(self.parameters) or 'it has none'}), got {name!r:.80}"
+                )
 
     def __call__(
         self, s: npt.ArrayLike, *values: Any, squeeze: Any = None, **numbers: Any

@@ -255,7 +255,7 @@ def test_roots_behind_the_one_at_zero_are_not_passed_over(loop):
 def test_margins_of_an_unstable_loop_name_a_gain_that_makes_it_stable():
     loop = 0.5 / (s - 1) * delay(0.1)
     with pytest.raises(
-        ValueError, match=r"has 1 unstable roots; with a gain factor of 3\.16 it"
+        ValueError, match=r"has 1 unstable root; with a gain factor of 3\.16 it"
     ):
         margins(loop)
     assert unstable_roots(3.16 * loop) == 0

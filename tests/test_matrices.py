@@ -1,6 +1,7 @@
 """Several loops at once, state spaces with delays, and distributed delays."""
 
 import math
+import re
 from typing import Any
 
 import control
@@ -213,9 +214,12 @@ def test_a_loop_is_opened_at_a_parameter():
     for whole in (loop, equation(1 + loop)):
         assert whole.opened("k")(0.7j) == pytest.approx(loop(0.7j))
         assert margins(whole.opened("k")) == margins(loop)
-    with pytest.raises(TypeError, match="kp is no parameter"):
-        loop.opened("kp")
-    with pytest.raises(ValueError, match="must be affine in k"):
+    several = loop * parameter("k2")
+    for system, known in ((loop, "(k)"), (several, "(k, k2)"), (1 / s, "(it has none)")):
+        words = f"name must be one of the parameters of the system {known}, got 'kp'"
+        with pytest.raises(TypeError, match=f"^{re.escape(words)}$"):
+            system.opened("kp")
+    with pytest.raises(ValueError, match=r"in which D is affine, .* got 'k'$"):
         (loop * k).opened("k")
 
 
@@ -256,6 +260,7 @@ def test_rounding_that_may_hide_an_integrator_is_told():
         (lambda: state_space([[1.0, 2.0]]), ValueError, "a must hold square matrices"),
         (lambda: state_space([[1.0]], [1.0]), TypeError, "b and c must be given both"),
         (lambda: state_space([[1.0]], [1, 2], [1]), ValueError, "b and c must have 1 numbers"),
+        (lambda: state_space([[1]], [1], [1], [0, 1]), ValueError, "and d one, got 1, 1 and 2"),
         (lambda: return_difference([[1 / s]], [1, 1]), ValueError, "controllers must be 1 x 1"),
         (lambda: return_difference([[s]], [1]), ValueError, "must not have more zeros than"),
         (lambda: return_difference([[-1]], [1]), ValueError, "must be well posed"),
@@ -271,6 +276,50 @@ def test_rounding_that_may_hide_an_integrator_is_told():
 def test_what_is_refused(make, error, words):
     with pytest.raises(error, match=words):
         make()
+
+
+PLANT = control.ss([[-1.0, 2.0], [0.0, -3.0]], [[1.0], [1.0]], [[1.0, 0.0]], 0.5)
+PAIR = control.tf([[[1], [2]], [[0], [3]]], [[[1, 1], [1, 4]], [[1], [1, 3]]])
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: state_space(PLANT),
+        lambda: state_space({0: PLANT, 1.0: PLANT}),
+        lambda: state_space(control.tf([1], [1, 1])),
+        lambda: state_space(PLANT.A, PLANT, PLANT.C),
+        lambda: return_difference((PLANT, PLANT.B, PLANT.C), [1]),
+    ],
+)
+def test_a_system_in_place_of_matrices_is_refused_with_what_to_write(make):
+    with pytest.raises(TypeError, match=r"^[ab] must hold numbers, got a .*System\.of\(p\)"):
+        make()
+
+
+def test_what_to_write_for_systems_of_python_control_is_right():
+    written = state_space(PLANT.A, PLANT.B, PLANT.C, PLANT.D)
+    assert written(0.3j) == pytest.approx(PLANT(0.3j))
+    assert System.of(PLANT)(0.3j) == pytest.approx(PLANT(0.3j))
+    for name, make in {
+        "matrix": determinant,
+        "plant": lambda p: return_difference(p, [1, 1]),
+        "controllers": lambda p: return_difference([[1, 0], [0, 1]], p),
+    }.items():
+        with pytest.raises(TypeError, match=rf"^{name} must be .* rows, .* write \[\[p\[i, k"):
+            make(PAIR)
+    entries = [[PAIR[i, k] for k in range(PAIR.ninputs)] for i in range(PAIR.noutputs)]
+    # (s + 2)(s + 6), and the mode of the entry that closes no loop.
+    loops = return_difference(entries, [1, 1])
+    for root in (-2.0, -4.0, -6.0):
+        assert loops(root) == pytest.approx(0.0, abs=1e-12)
+    assert loops.numerator.degree == 3
+
+
+def test_a_plant_in_discrete_time_is_refused():
+    sampled = control.ss([[0.5]], [[1.0]], [[1.0]], 0, dt=0.1)
+    with pytest.raises(ValueError, match=r"^plant must be continuous in time, got .* 0\.1"):
+        return_difference(sampled, [1.0])
 
 
 def test_too_many_states_are_refused(monkeypatch):

@@ -143,10 +143,30 @@ def test_parameters_are_given_by_place_by_name_or_are_nominal():
         assert unstable_roots(made, c2=0.999) == unstable_roots(made, 1.0, 0.999)
     assert rightmost_root(paper_loop()) == rightmost_root(paper_loop(), 1.0, 1.0)
     for arguments, name in (({"b": -1.0}, "a"), ({"a": -1.0}, "b")):
-        with pytest.raises(TypeError, match=f"^{name} must be given"):
+        with pytest.raises(TypeError, match=f"^{name} must be given, or have a nominal value"):
             unstable_roots(HayesEquation(), **arguments)
-    with pytest.raises(TypeError, match=r"^c3 is no parameter of "):
-        unstable_roots(loop, c3=1.0)
+    words = r"must be one of the parameters of the system \(c1, c2\), got 'c3'$"
+    for make in (unstable_roots, System.at):
+        with pytest.raises(TypeError, match=f"^a keyword {words}"):
+            make(loop, c3=1.0)
+    with pytest.raises(TypeError, match=f"^a name in start {words}"):
+        first_crossing(loop, {"c3": 1.0}, (1.0, 1.0))
+    with pytest.raises(TypeError, match=f"^a keyword {words}"):
+        box_count(loop, {"c3": 1e-6})
+
+
+def test_no_start_of_a_ray_is_assumed_where_a_parameter_has_no_nominal_value():
+    loop = (parameter("kp") + parameter("ki", 0.1) / s) / (s + 1) * delay(1.0)
+    for start, way in (({}, (1.0, 0.0)), ({}, {"ki": 1.0}), ({"ki": 0.2}, {"kp": 1.0})):
+        with pytest.raises(TypeError, match=r"^kp must be given, or have a nominal value"):
+            first_crossing(loop, start, way)
+    with pytest.raises(TypeError, match=r"^kp must be given"):
+        critical_perturbation(loop, {"ki": 1.0})
+    for short in ([], [1.0]):
+        with pytest.raises(ValueError, match=r"start .* \{\} as a start is the nominal point"):
+            first_crossing(loop, short, {"kp": 1.0})
+    found = first_crossing(loop, {"kp": 0.5}, {"kp": 1.0})
+    assert found == first_crossing(loop, (0.5, 0.1), (1.0, 0.0))
 
 
 @pytest.mark.parametrize("name", ["step", "direction", "omega_max", "free_above", "s"])

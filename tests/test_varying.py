@@ -26,6 +26,7 @@ from armlock import (
     parameter,
     peak_gain,
     robust_loop,
+    s,
     simulate,
     unstable_roots,
     varying_radius,
@@ -121,8 +122,15 @@ def test_modulus_and_peak_gain_of_the_loops(make):
 
 
 def test_what_is_refused_says_why():
-    with pytest.raises(ValueError, match="system must be stable, but it has 5 unstable roots"):
-        peak_gain(1 / (1 + CommonArm().at(c1=1.1, c2=1.0)))
+    hint = r"; of an open loop L take 1 / \(1 \+ L\) or L\.feedback\(\)"
+    unstable = 1 / (1 + CommonArm().at(c1=1.1, c2=1.0))
+    with pytest.raises(ValueError, match="^system must be stable, .* 5 unstable poles" + hint):
+        peak_gain(unstable)
+    for axis in (1 / s, 1 / (s**2 + 4), 3 * delay(0.1) / (s * (s + 1))):
+        with pytest.raises(ValueError, match="it has a pole on the imaginary axis" + hint):
+            peak_gain(axis)
+    with pytest.raises(ValueError, match="it has 1 unstable pole" + hint):
+        peak_gain(1 / (s - 1))
     with pytest.raises(ValueError, match="loop must be stable, but it has 5 unstable roots"):
         varying_radius(CommonArm(), 1.1)
     with pytest.raises(ValueError, match="no confined chain"):

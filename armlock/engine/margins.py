@@ -527,15 +527,16 @@ class UnstableError(ValueError):
     """A loop has to be stable, and is not."""
 
 
-def require_stable(d: Function, common: int = 0, what: str = "loop") -> None:
+def require_stable(
+    d: Function, common: int = 0, what: str = "loop", zero: str = "root"
+) -> None:
     """Raise unless D has no zero with a real part of zero or more, but `common` at s = 0."""
     count = decide.count(d, common)
     if count != 0:
         reasons = {
-            decide.BOUNDARY: "a root on the axis",
+            decide.BOUNDARY: f"a {zero} on the imaginary axis",
             decide.UNCONFINED: "no confined chain: small changes of a delay make it unstable",
+            1: f"1 unstable {zero}",
         }
-        raise UnstableError(
-            f"the {what} must be stable, but it has "
-            f"{reasons.get(count, f'{count} unstable roots')}"
-        )
+        found = reasons.get(count, f"{count} unstable {zero}s")
+        raise UnstableError(f"{what} must be stable, but it has {found}")

@@ -77,7 +77,8 @@ def modulus_margin(loop: System, *values: float, **numbers: float) -> float:
     Parameters
     ----------
     loop : System
-        The open loop, whose closed loop is stable or not.
+        The open loop L, whose closed loop is stable or not. A closed loop in place of L would
+        be closed again.
     *values, **numbers : float, optional
         The parameters, in the order of their first use or by name; nominal ones by default.
 
@@ -136,8 +137,8 @@ def peak_gain(system: Any) -> PeakGain:
     Raises
     ------
     TypeError, ValueError
-        If `system` is no system, or is not stable: the message has the number of its poles with
-        positive real part.
+        If `system` is no system, or has a pole on the imaginary axis or right of it, as an
+        open loop with an integrator has.
     CountError
         If double precision, or the steps allowed, do not decide it. It is raised too where
         several delays act on the highest powers of both numerator and denominator, in different
@@ -166,7 +167,11 @@ def peak_gain(system: Any) -> PeakGain:
         pairs = [open_quotient(other, (), {}, "system")[:2] for other in others]
         if len({decide.count(m, common(a, m)) for a, m in pairs}) > 1:
             raise in_doubt(point[None])
-        require_stable(d, common(n, d), "system")
+        try:
+            require_stable(d, common(n, d), "system", "pole")
+        except UnstableError as error:
+            hint = "of an open loop L take 1 / (1 + L) or L.feedback()"
+            raise ValueError(f"{error}; {hint}") from None
         found = decided_ratio(d, n)
     return PeakGain(1.0 / found.value, found.omega)
 
@@ -183,7 +188,8 @@ def margins(
     Parameters
     ----------
     loop : System
-        The open loop, for instance `CommonArm()`.
+        The open loop L, for instance `CommonArm()`; the margins are those of its closed loop,
+        1 + L = 0. A closed loop in place of L would be closed again.
     *values : float, optional
         The parameters, in the order of their first use; nominal ones by default.
     free_above : float, optional
@@ -269,6 +275,7 @@ def _with_free_phases(system: System, objects: tuple[System, ...], above: float)
         own = Lag(pair for pair in lag if pair[0] not in free)
         arm = (names[kinds[lag]],) if kinds[lag] else ()
         above_line = above_line + Sum.of(p, own, *arm)
-    affine = Affine(System(above_line, system.denominator), tuple(names.values()))
+    turned = dict.fromkeys(names.values(), 0.0)
+    affine = Affine(System(above_line, system.denominator, turned), tuple(turned))
     arms = tuple(f for f in affine.n[1:] if not f.is_zero)
     return Free(affine.n[0], affine.m[0], arms, above)

@@ -15,7 +15,7 @@ import numpy as np
 from flint import fmpq
 
 from armlock.affine import Affine, NotAffineError, common
-from armlock.checks import FloatArray, axis, positive_number, real_number
+from armlock.checks import FloatArray, finite_series, positive_number, real_number
 from armlock.engine import decide
 from armlock.engine.chain import NOW, Delay, Lag
 from armlock.engine.decide import BOUNDARY, UNCONFINED, Family
@@ -58,16 +58,13 @@ class Crossing(NamedTuple):
 def _named(system: System, name: str, given: Any) -> dict[str, float]:
     """Return numbers by the names of parameters; by default those of the others are nominal."""
     if isinstance(given, Mapping):
-        named = {k: real_number(k, v) for k, v in given.items()}
-        for k in named:
-            if k not in system.nominal:
-                raise TypeError(f"{name} must name parameters of {system!r}, got {k!r}")
-        return named
-    flat = axis(name, given)
+        system.check_names(f"a name in {name}", given)
+        return {k: real_number(k, v) for k, v in given.items()}
+    flat = finite_series(name, given)
     if flat.size != len(system.parameters):
         raise ValueError(
             f"{name} must hold as many numbers as there are parameters, {system.parameters}, "
-            f"got {flat.size}"
+            f"got {flat.size}; {{}} as a start is the nominal point"
         )
     return dict(zip(system.parameters, flat.tolist(), strict=True))
 
@@ -177,9 +174,12 @@ def first_crossing(
     ----------
     system : System
         The open loop, an equation, or a map.
-    start, direction : sequence of float, or dict by name
-        The ray start + t direction of the parameters, in the order of their first use. By
-        name, others start at nominal values and stay there; ``{}`` is the nominal point.
+    start : sequence of float, or dict by name
+        Where the ray start + t direction begins: a number for each parameter, in the order of
+        their first use. By name, the others are nominal, so that ``{}`` is the nominal point.
+        A parameter without a nominal value has to be given.
+    direction : sequence of float, or dict by name
+        In which the parameters change. By name, the others stay where they start.
     stop : float, optional
         Largest t that is looked at; by default one at which the parameters are 1e9 times as
         large as the start, or as one.
