@@ -727,8 +727,15 @@ PUSH = """([from, frames]) => new Promise(done => {
     next(0); })"""
 
 
-def test_thirty_frames_a_second_while_a_slider_moves(opened):
-    """The processor's time of the page, since other programs slow down the clock's."""
+#: A fixed piece of work, which takes about as long as a frame.
+SINES = """() => {
+    let sum = 0;
+    for (let k = 0; k < 1e6; k++) sum += Math.sin(k) * Math.sqrt(k);
+    return sum; }"""
+
+
+def test_a_frame_is_drawn_fast_enough_while_a_slider_moves(opened):
+    """Beside a fixed piece of work, in processor time: machines differ, and are shared."""
     page = opened()
     start(page, WHITE_PAPER)
     table(page)
@@ -739,9 +746,12 @@ def test_thirty_frames_a_second_while_a_slider_moves(opened):
         found = session.send("Performance.getMetrics")["metrics"]
         return next(one["value"] for one in found if one["name"] == "TaskDuration")
 
-    before = busy()
-    page.evaluate(PUSH, [0, 60])
-    assert busy() - before < 60 / 30
+    times = [busy()]
+    for call in (PUSH, [0, 60]), *[(SINES,)] * 30:
+        page.evaluate(*call)
+        times.append(busy())
+    # Thirty frames a second where the work takes 17 ms.
+    assert (times[1] - times[0]) / 60 < 2.0 * (times[-1] - times[1]) / 30
 
 
 def test_numbers_in_the_fields_are_short(opened):
