@@ -226,8 +226,7 @@ class Loop(System):
     def _dead(self) -> Lag:
         """The dead time, one delay object with the mark of the first arm."""
         ((((arm, _),), _),) = self.arms[0].numerator.terms
-        theta = exact(self.delay)
-        return Lag.after(theta, f"dead {arm.mark}")
+        return Lag.after(exact(self.delay), f"dead {arm.mark}")
 
     @cached_property
     def _polynomials(self) -> tuple[Polynomial, ...]:

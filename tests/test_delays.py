@@ -133,6 +133,9 @@ def test_common_factors():
     assert unstable_roots(average) == 0
     assert (S * average / S).numerator == average.numerator
     assert unstable_roots(control.tf([1, 0], [1, 0]) * delay(1.0) * 0.5) == 0
+    # An unstable factor stays, because the state behind it grows.
+    hidden = control.tf([1, -1], [1, 2]) * delay(0.1) * control.tf([1], [1, -1])
+    assert unstable_roots(hidden) == 1
 
 
 def test_what_is_advanced_or_next_to_it_is_unconfined():
@@ -152,6 +155,8 @@ def test_a_loop_of_two_arms_has_the_numbers_of_the_loop_class():
     ours, theirs = margins(same), margins(loop)
     assert ours.phase == pytest.approx(theirs.phase, rel=1e-5)
     assert ours.modulus == pytest.approx(theirs.modulus, rel=1e-5)
+    three = sum(m * (1 - delay(tau)) for m, tau in ((0.5, 20.1), (0.3, 19.9), (0.2, 16.6)))
+    assert unstable_roots(three * control.tf([0.1], [1, 0]) * delay(0.02)) == 0
 
 
 def steps(gain, time, derivative=0):

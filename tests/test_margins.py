@@ -604,6 +604,18 @@ def test_a_margin_that_is_not_found_says_up_to_where_it_was_looked_for():
     assert "gain_lower=0.0" in repr(found)
 
 
+@pytest.mark.parametrize(("a", "b"), [(0.8, 0.6), (0.5, 0.7), (-0.7, 0.4)])
+def test_a_loop_of_one_delay_object_turns_by_its_curve_and_not_by_a_disc(a, b):
+    """L = a z + b z^2 lies on a curve; the disc of radius |a| + |b| reaches -1 at once."""
+    z = delay(2.0)
+    found = margins(a * z + b * z**2)
+    circle = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 1_000_001))
+    curve = a * circle + b * circle**2
+    there = curve[np.flatnonzero(np.diff(np.sign(np.abs(curve) - 1.0)))]
+    assert found.phase == pytest.approx(np.abs(np.angle(-there)).min(), abs=1e-5)
+    assert found.delay == 0.0
+
+
 def test_a_limit_that_is_not_found_does_not_hide_a_smaller_phase_margin(monkeypatch):
     z = delay(2.0)
     loop = (0.8 * z + 0.6 * z**2) * (s + 1.1) / (s + 1)
