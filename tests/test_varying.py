@@ -308,9 +308,10 @@ def test_no_constant_perturbation_that_was_looked_at_breaks_the_loop():
 def test_a_peak_that_rounding_does_not_certify_is_no_number():
     # At a gain of 1e13 nothing is proved about 1 + g (1 - z) next to its zero.
     assert peak_gain(1 / (1 + 1e5 * (1 - delay(1.0)))).gain == pytest.approx(1.0, rel=1e-6)
-    for ask in (lambda loop: peak_gain(1 / (1 + loop)), modulus_margin):
+    factor = parameter("c", 1.0)
+    for ask in (lambda loop: peak_gain(1 / (1 + loop)), modulus_margin, varying_radius):
         with pytest.raises(CountError, match="rounding does not decide"):
-            ask(1e13 * (1 - delay(1.0)))
+            ask(1e13 * (1 - factor * delay(1.0)))
 
 
 @pytest.mark.parametrize(

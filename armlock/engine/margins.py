@@ -290,7 +290,9 @@ def least_ratio(
     return Ratio(best, best * max(1.0 - tolerance, 0.0) * (1.0 - 4.0 * EPSILON), where)
 
 
-def decided_ratio(d: Function, n: Function, free: Free | None = None) -> Ratio:
+def decided_ratio(
+    d: Function, n: Function, free: Free | None = None, **options: float
+) -> Ratio:
     """Return the infimum of |D / N|, as `least_ratio`, if it is certified to a thousandth.
 
     Raises
@@ -298,7 +300,7 @@ def decided_ratio(d: Function, n: Function, free: Free | None = None) -> Ratio:
     UndecidedError
         If rounding at high frequency leaves room for a smaller one.
     """
-    found = least_ratio(d, n, free)
+    found = least_ratio(d, n, free, **options)
     if found.certified < (1.0 - _LEAST_CERTAIN) * found.value:
         raise UndecidedError("rounding does not decide the limit at high frequency")
     return found

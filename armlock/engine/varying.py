@@ -22,7 +22,7 @@ from armlock.engine.chain import UndecidedError
 from armlock.engine.decide import Family
 from armlock.engine.functions import Function, Space, at, stacked
 from armlock.engine.inclusion import VERTEX
-from armlock.engine.margins import first_zero, least_ratio
+from armlock.engine.margins import decided_ratio, first_zero
 from armlock.engine.polynomials import Polynomial, enclosed_roots, exact, on_axis
 
 # The radius is certified to this share, and the scalings are optimal to it.
@@ -185,7 +185,7 @@ def varying_radius_of(d: Function, changes: Sequence[Function]) -> Varying:
     for _ in range(_MOST_SCALINGS):
         sizes = [exact(size) ** 2 for size in scalings.tolist()]
         f = spectral_factor(parts, [sum(sizes) / size for size in sizes])
-        _, radius, omega = least_ratio(*_beside(d, f), tolerance=_TOLERANCE)
+        _, radius, omega = decided_ratio(*_beside(d, f), tolerance=_TOLERANCE)
         if radius > best.radius:
             spread = np.ones(len(changes))
             spread[acting] = scalings

@@ -68,8 +68,8 @@ def varying_radius(loop: System, *values: float, **numbers: float) -> VaryingRad
     TypeError, ValueError
         If `loop` is no system, has no parameter or is not affine in them, a parameter is not
         finite and real or multiplies more than one delayed polynomial, or the loop is not
-        stable there: the message has the count. A loop whose neutral root chain is not confined
-        is not.
+        stable there: the message has the count, or says that the neutral root chain is not
+        confined.
     CountError
         If double precision, or the steps allowed, do not decide it.
 
