@@ -7,15 +7,13 @@ rad/s, the factors stay exact where expanded coefficients do not.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from itertools import product
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from flint import fmpq, fmpq_poly
 
 from armlock import paper
 from armlock.checks import (
@@ -29,8 +27,7 @@ from armlock.checks import (
 )
 from armlock.engine import statespace
 from armlock.engine.polynomials import Polynomial
-
-_System = TypeVar("_System", bound=Any)
+from armlock.engine.statespace import with_others
 
 
 def _of_systems(name: str) -> Callable[..., Any]:
@@ -203,16 +200,6 @@ class Controller:
     feedback = _of_systems("feedback")
 
 
-def with_others(make: Callable[..., _System], *systems: Any) -> _System:
-    """Return what a function makes of systems, and as its `others` what it makes of theirs."""
-    found = make(*systems)
-    if any(system.others for system in systems):
-        chosen = product(*(system.others or (system,) for system in systems))
-        others = dict.fromkeys(make(*some) for some in chosen)
-        object.__setattr__(found, "others", tuple(others))
-    return found
-
-
 def rational(
     system: Any, integrators: int | None = None, zeros: int | None = None
 ) -> Controller:
@@ -235,77 +222,30 @@ def rational(
 
     check_system("controller", system, "a Controller, a triple (zeros, poles, gain)")
     if isinstance(system, control.StateSpace):
-        a, b, c, d = (
-            real_array("controller", getattr(system, name)).tolist() for name in "ABCD"
+        found = statespace.of_matrices(
+            *(real_array("controller", getattr(system, name)).tolist() for name in "ABCD")
         )
-        above, below = statespace.quotient(a, b, c, d[0][0])
-        doubts = statespace.doubts(a)
-        unsure = statespace.doubts_of_zeros(a, b, c, d[0][0], above)
     else:
-        above, below = (
-            Polynomial.of(real_array("controller", p[0][0])[::-1].tolist())
-            for p in (system.num, system.den)
+        found = statespace.of_coefficients(
+            *(
+                real_array("controller", p[0][0])[::-1].tolist()
+                for p in (system.num, system.den)
+            )
         )
-        doubts, unsure = statespace.doubts_of_roots(below), ()
-        if doubts and integrators is None:
+        if found.poles and integrators is None:
             warnings.warn(
-                f"the lowest coefficient {float(below.exact[0]):.3g} of the denominator is no "
-                "larger than what rounding leaves of zero, and counts may rest on its sign: "
-                "give the state space that it was made of, or say how many poles are zero, "
-                "Controller.of(system, integrators=1)",
+                f"the lowest coefficient {float(found.below.exact[0]):.3g} of the denominator "
+                "is no larger than what rounding leaves of zero, and counts may rest on its "
+                "sign: give the state space that it was made of, or say how many poles are "
+                "zero, Controller.of(system, integrators=1)",
                 stacklevel=3,
             )
-            doubts = ()
-    at_zero = 0
-    if integrators is not None:
-        number = _stated("integrators", integrators, below, doubts)
-        above, below = statespace.with_lowest(above, below, [fmpq(0)] * number)
-        # Poles at s = 0 that the input does not reach, or the output does not see, cancel.
-        doubts, at_zero = (), min(number, len(unsure))
-    if zeros is not None:
-        at_zero, unsure = _stated("zeros", zeros, above, unsure), ()
-    above = Polynomial.of(above.exact - fmpq_poly(above.exact.coeffs()[:at_zero]))
-    unsure = tuple(bound if k >= at_zero else fmpq(0) for k, bound in enumerate(unsure))
-    found = Controller.of_polynomials(above, below)
-    if any((*doubts, *unsure)):
-        object.__setattr__(found, "others", tuple(_others(above, below, doubts, unsure)))
-    return found
-
-
-def _others(
-    above: Polynomial,
-    below: Polynomial,
-    doubts: Sequence[fmpq],
-    unsure: Sequence[fmpq],
-) -> Iterator[Controller]:
-    """Return what else may be meant, by bounds of the lowest coefficients of both."""
-    for poles in _around(doubts):
-        other, changed = statespace.with_lowest(above, below, poles)
-        for zeros in _around(unsure):
-            change = fmpq_poly([new - above.exact[k] for k, new in enumerate(zeros)])
-            moved = Polynomial.of(other.exact + change)
-            if moved:
-                yield Controller.of_polynomials(moved, changed)
-
-
-def _around(bounds: Sequence[fmpq]) -> Iterator[tuple[fmpq, ...]]:
-    """Return the values of coefficients that may be meant to be zero."""
-    return product(*((-bound, fmpq(0), bound)[: 3 if bound else 1] for bound in bounds))
-
-
-def _stated(name: str, given: int, p: Polynomial, bounds: Sequence[fmpq]) -> int:
-    """Return how many roots at s = 0 are stated, or raise if p has no such coefficients."""
-    number = whole_number(name, given, 0)
-    small = [
-        bound or not c for c, bound in zip(p.exact.coeffs(), (*bounds, 0, 0), strict=False)
-    ]
-    if not all(small[:number]) or number > len(small) or not p.exact[number]:
-        what = {"integrators": "poles", "zeros": "zeros"}[name]
-        raise ValueError(
-            f"{name} must be the number of {what} that are zero but for rounding, got {given} "
-            f"for coefficients {p!r:.200}"
-        )
-    return number
+            found = found._replace(poles=())
+    found = found.stated(integrators, zeros)
+    k = Controller.of_polynomials(found.above, found.below)
+    others = tuple(Controller.of_polynomials(*pair) for pair in found.others())
+    object.__setattr__(k, "others", others)
+    return k
 
 
 def _of_system(system: Any) -> Controller:

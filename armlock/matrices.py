@@ -10,9 +10,10 @@ import numpy as np
 from flint import fmpq
 
 from armlock.checks import FloatArray, real_array, whole_number
-from armlock.controllers import check_continuous, with_others
+from armlock.controllers import check_continuous
 from armlock.engine import statespace
 from armlock.engine.polynomials import exact, polynomial
+from armlock.engine.statespace import with_others
 from armlock.systems import (
     Sum,
     System,

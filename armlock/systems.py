@@ -36,9 +36,10 @@ from armlock.checks import (
     real_number,
     whole_steps,
 )
-from armlock.controllers import Controller, check_system, rational, with_others
+from armlock.controllers import Controller, check_system, rational
 from armlock.engine.chain import NOW, Delay, Lag
 from armlock.engine.polynomials import collected, exact, in_mpmath, order, polynomial
+from armlock.engine.statespace import with_others
 
 if TYPE_CHECKING:
     import control

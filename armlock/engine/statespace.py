@@ -3,17 +3,25 @@
 With one input and one output two characteristic polynomials are enough,
 
     C adj(s - A) B = det(s - A + B C) - det(s - A) .
+
+Where rounding of the matrices may have moved a pole or a zero from s = 0, the quotient is *in
+doubt*: it comes with bounds of its lowest coefficients. A system that is made of it keeps as
+its `others` what it is for the values -bound, 0 and +bound. A count has to be the same for all.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import product
+from typing import Any, NamedTuple, TypeVar
 
 import flint
 from flint import fmpq, fmpq_poly
 
+from armlock.checks import whole_number
 from armlock.engine.polynomials import Polynomial, exact
+
+_System = TypeVar("_System", bound=Any)
 
 #: What rounding makes of a determinant: at most this share of sum |a_ij cofactor_ij|. It covers
 #: all changes of coordinates that were drawn, of two to five states.
@@ -22,19 +30,113 @@ ROUNDED = fmpq(512, 2**53)
 MOST_IN_DOUBT = 2
 
 
+class Quotient(NamedTuple):
+    """Numerator and denominator, and bounds of their lowest coefficients that are in doubt.
+
+    A bound is what rounding may make of a coefficient that is meant to be zero; it is zero
+    where the coefficient is.
+    """
+
+    above: Polynomial
+    below: Polynomial
+    poles: tuple[fmpq, ...] = ()
+    zeros: tuple[fmpq, ...] = ()
+
+    def stated(self, integrators: int | None, zeros: int | None) -> Quotient:
+        """Return the quotient with so many poles and zeros at s = 0, or raise.
+
+        None leaves them in doubt.
+        """
+        above, below, poles, unsure = self
+        at_zero = 0
+        if integrators is not None:
+            number = _stated("integrators", integrators, below, poles)
+            above, below = _with_lowest(above, below, [fmpq(0)] * number)
+            # Poles at s = 0 that the input does not reach, or the output does not see, cancel.
+            poles, at_zero = (), min(number, len(unsure))
+        if zeros is not None:
+            at_zero, unsure = _stated("zeros", zeros, above, unsure), ()
+        above = Polynomial.of(above.exact - fmpq_poly(above.exact.coeffs()[:at_zero]))
+        left = tuple(bound if k >= at_zero else fmpq(0) for k, bound in enumerate(unsure))
+        return Quotient(above, below, poles, left)
+
+    def others(self) -> Iterator[tuple[Polynomial, Polynomial]]:
+        """Return what else may be meant; nothing if nothing is in doubt."""
+        if not any((*self.poles, *self.zeros)):
+            return
+        for poles in _around(self.poles):
+            other, changed = _with_lowest(self.above, self.below, poles)
+            for zeros in _around(self.zeros):
+                moved = [new - self.above.exact[k] for k, new in enumerate(zeros)]
+                above = Polynomial.of(other.exact + fmpq_poly(moved))
+                if above:
+                    yield above, changed
+
+
+def with_others(make: Callable[..., _System], *systems: Any) -> _System:
+    """Return what a function makes of systems, and as its `others` what it makes of theirs."""
+    found = make(*systems)
+    if any(system.others for system in systems):
+        chosen = product(*(system.others or (system,) for system in systems))
+        others = dict.fromkeys(make(*some) for some in chosen)
+        object.__setattr__(found, "others", tuple(others))
+    return found
+
+
+def _around(bounds: Sequence[fmpq]) -> Iterator[tuple[fmpq, ...]]:
+    """Return the values of coefficients that may be meant to be zero."""
+    return product(*((-bound, fmpq(0), bound)[: 3 if bound else 1] for bound in bounds))
+
+
+def _stated(name: str, given: int, p: Polynomial, bounds: Sequence[fmpq]) -> int:
+    """Return how many roots at s = 0 are stated, or raise if p has no such coefficients."""
+    number = whole_number(name, given, 0)
+    small = [
+        bound or not c for c, bound in zip(p.exact.coeffs(), (*bounds, 0, 0), strict=False)
+    ]
+    if not all(small[:number]) or number > len(small) or not p.exact[number]:
+        what = {"integrators": "poles", "zeros": "zeros"}[name]
+        raise ValueError(
+            f"{name} must be the number of {what} that are zero but for rounding, got {given} "
+            f"for coefficients {p!r:.200}"
+        )
+    return number
+
+
+def _with_lowest(
+    above: Polynomial, below: Polynomial, lowest: Sequence[fmpq]
+) -> tuple[Polynomial, Polynomial]:
+    """Return the quotient with other lowest coefficients of the denominator.
+
+    What goes through directly stays as it is.
+    """
+    through = above.lead / below.lead if above.degree == below.degree else fmpq(0)
+    change = fmpq_poly([new - below.exact[k] for k, new in enumerate(lowest)])
+    return Polynomial.of(above.exact + through * change), Polynomial.of(below.exact + change)
+
+
+def of_matrices(a: Any, b: Any, c: Any, d: Any) -> Quotient:
+    """Return C (s - A)^-1 B + D of matrices of floats."""
+    if not len(a):
+        return Quotient(Polynomial.of(d[0]), Polynomial.of([1]))
+    first, column, row = _matrix(a), _matrix(b), _matrix(c)
+    below = first.charpoly()
+    above = (first - column * row).charpoly() - below + exact(d[0][0]) * below
+    above = Polynomial.of(above)
+    return Quotient(
+        above, Polynomial.of(below), doubts(a), _doubts_of_zeros(a, b, c, d[0][0], above)
+    )
+
+
+def of_coefficients(above: Any, below: Any) -> Quotient:
+    """Return a quotient of polynomials that were multiplied out, in ascending powers."""
+    denominator = Polynomial.of(below)
+    return Quotient(Polynomial.of(above), denominator, _doubts_of_roots(denominator))
+
+
 def _matrix(rows: Any) -> Any:
     """Return an exact matrix of python-flint, of floats."""
     return flint.fmpq_mat([[exact(value) for value in row] for row in rows])
-
-
-def quotient(a: Any, b: Any, c: Any, d: float) -> tuple[Polynomial, Polynomial]:
-    """Return numerator and denominator of C (s - A)^-1 B + D, from matrices of floats."""
-    if not len(a):
-        return Polynomial.of([d]), Polynomial.of([1])
-    a, b, c = _matrix(a), _matrix(b), _matrix(c)
-    below = a.charpoly()
-    above = (a - b * c).charpoly() - below + exact(d) * below
-    return Polynomial.of(above), Polynomial.of(below)
 
 
 def _cofactors(matrix: Any) -> tuple[list[fmpq], list[Any]]:
@@ -77,7 +179,7 @@ def _in_doubt(
     return tuple(found) if any(found) else ()
 
 
-def doubts_of_zeros(a: Any, b: Any, c: Any, d: float, above: Polynomial) -> tuple[fmpq, ...]:
+def _doubts_of_zeros(a: Any, b: Any, c: Any, d: float, above: Polynomial) -> tuple[fmpq, ...]:
     """Return what rounding may make of the lowest coefficients of the numerator.
 
     It is the determinant of [[s - A, B], [-C, D]], whose adjugate is interpolated.
@@ -100,7 +202,7 @@ def doubts_of_zeros(a: Any, b: Any, c: Any, d: float, above: Polynomial) -> tupl
     return _in_doubt(value.coeffs(), adjugates, matrix)
 
 
-def doubts_of_roots(below: Polynomial) -> tuple[fmpq, ...]:
+def _doubts_of_roots(below: Polynomial) -> tuple[fmpq, ...]:
     """Return the same for a denominator that was multiplied out from rounded poles.
 
     Poles are rounded by a share of the largest one, which python-control does to state spaces.
@@ -113,15 +215,3 @@ def doubts_of_roots(below: Polynomial) -> tuple[fmpq, ...]:
         if any(sizes) and all(x < y or not x for x, y in zip(sizes, bounds, strict=True)):
             return tuple(y if x else fmpq(0) for x, y in zip(sizes, bounds, strict=True))
     return ()
-
-
-def with_lowest(
-    above: Polynomial, below: Polynomial, lowest: Sequence[fmpq]
-) -> tuple[Polynomial, Polynomial]:
-    """Return the quotient with other lowest coefficients of the denominator.
-
-    What goes through directly stays as it is.
-    """
-    through = above.lead / below.lead if above.degree == below.degree else fmpq(0)
-    change = fmpq_poly([new - below.exact[k] for k, new in enumerate(lowest)])
-    return Polynomial.of(above.exact + through * change), Polynomial.of(below.exact + change)

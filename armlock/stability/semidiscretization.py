@@ -26,10 +26,10 @@ from armlock.checks import (
     whole_number,
     whole_steps,
 )
-from armlock.controllers import with_others
 from armlock.engine.chain import NOW, Delay, Lag
 from armlock.engine.polynomials import collected, exact, polynomial
 from armlock.engine.roots import RootError
+from armlock.engine.statespace import with_others
 from armlock.stability.counts import at_points
 from armlock.systems import Sum, System
 

@@ -62,8 +62,8 @@ def step_response(system: System, timepts: npt.ArrayLike) -> control.TimeRespons
     Parameters
     ----------
     system : System
-        Stable or not, for instance ``loop.feedback()``: the response is that of the system
-        itself. Its parameters are nominal.
+        For instance ``loop.feedback()``: the response is that of the system itself. Its
+        parameters are nominal.
     timepts : array_like of float, or float
         Ascending times in s from 0 on, evenly spaced or not; or the last of 1001 even times.
 
@@ -86,6 +86,9 @@ def step_response(system: System, timepts: npt.ArrayLike) -> control.TimeRespons
 
     Notes
     -----
+    As with ``control.step_response``, an unstable system is no error: its response grows. A
+    slow growth may not show by the last time. `armlock.unstable_roots` decides stability.
+
     The error is at most 1e-9 of the largest value up to the last time, at jumps too. There
     the value is the one after the jump. This is checked, not proved: the transform is
     interpolated over frequencies until the values in between agree.
