@@ -50,6 +50,11 @@ def test_a_verdict_follows_from_the_readings(readings, missing, expected):
     assert verdict(readings, missing) is expected
 
 
+def test_no_reading_is_no_verdict():
+    with pytest.raises(ValueError, match=r"^readings must not be empty"):
+        verdict({})
+
+
 def test_numbers_of_a_text_are_written_for_a_reader():
     numbers = {"half": 6.3262e-7, "count": 3}
     assert fill(r"{count:d} of $\frac{a}{b}$: {half:.2g}", numbers) == (

@@ -86,6 +86,11 @@ def verdict(readings: Mapping[str, Holds], missing: str = "") -> Verdict:
     -------
     Verdict
 
+    Raises
+    ------
+    ValueError
+        If no reading was tried, although the source prints all.
+
     Examples
     --------
     >>> from book.companion.ledger import verdict
@@ -100,6 +105,8 @@ def verdict(readings: Mapping[str, Holds], missing: str = "") -> Verdict:
     whole = [all(part) for part in parts]
     if missing and len(set(whole)) != 1:
         return Verdict.OPEN
+    if not readings:
+        raise ValueError("readings must not be empty unless a value is missing, got {}")
     if all(whole):
         return Verdict.REPRODUCED
     if any(whole):
