@@ -360,8 +360,7 @@ def to_arc(value, turn):
 
 def zeros_of(view, a, b, excess):
     """Zeros of `excess(L)` in cells at whose ends its sign differs."""
-    near = {"fatol": 1e-11}
-    return find_root(lambda omega: excess(view.at(omega)), (a, b), tolerances=near).x
+    return find_root(lambda omega: excess(view.at(omega)), (a, b)).x
 
 
 @quiet

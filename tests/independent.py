@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
+from typing import Any
 
 import mpmath
 import numpy as np
+from flint import fmpq, fmpq_poly
 from numba import njit
 from scipy.linalg import block_diag
 from scipy.special import lambertw
@@ -147,17 +149,15 @@ def count(system, x, y, at_zero=0):
 
 
 def map_eigenvalues(system, x, y):
-    """Roots of z^r D for a map, r the longest delay in steps, by a companion matrix."""
-    return np.roots(map_polynomial(system, x, y)[::-1])
-
-
-def map_polynomial(system, x, y):
-    """Coefficients of z^r D in ascending powers of z."""
-    steps = {round(t / system.step): float(p[0]) for t, p in terms(system, x, y).items()}
-    polynomial = np.zeros(max(steps) + 1)
+    """Roots of z^r D for a map, r the longest delay in steps; rounding would scatter them."""
+    steps = {round(t / system.step): p[0] for t, p in terms(system, x, y).items()}
+    polynomial = fmpq_poly([0])
     for back, value in steps.items():
-        polynomial[max(steps) - back] += value
-    return polynomial
+        power = [0] * (max(steps) - back)
+        polynomial += fmpq_poly([*power, fmpq(value.numerator, value.denominator)])
+    roots: Any = polynomial.complex_roots()
+    found = [root for root, number in roots for _ in range(number)]
+    return np.array([complex(float(root.real), float(root.imag)) for root in found])
 
 
 def series(zeros, poles, gain):
