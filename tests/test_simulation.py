@@ -216,6 +216,23 @@ def test_a_copy_of_a_series_knows_its_sample_rate(copied):
     assert getattr(np.concatenate([series, other]), "sample_rate", None) is None
 
 
+@pytest.mark.parametrize(
+    "resampled",
+    [
+        lambda x: x[::2],
+        lambda x: x.reshape(-1, 2).mean(axis=1),
+        lambda x: np.repeat(x, 2),
+        lambda x: np.take(x, range(0, x.size, 2)),
+        lambda x: np.compress(np.arange(x.size) % 2 == 0, x),
+        lambda x: np.delete(x, np.s_[::2]),
+    ],
+)
+def test_a_series_at_another_rate_does_not_claim_the_one_of_its_samples(resampled):
+    series = resampled(LaserNoise(1, 20.0).draw(1200))
+    assert getattr(series, "sample_rate", None) is None
+    assert simulate(CommonArm(), series, sample_rate=10.0).size == series.size
+
+
 def test_numbers_after_the_noise_have_names():
     """The third one could be c1, and 20 for c1 diverges."""
     with pytest.raises(TypeError, match="positional argument"):

@@ -43,14 +43,16 @@ class Samples(np.ndarray[Any, np.dtype[np.float64]]):
     """A drawn series that remembers its sample rate in Hz, for `armlock.simulate` to compare.
 
     Arithmetic, copies, pickles, contiguous slices and joined blocks of one rate keep the rate.
-    Every other index forgets it.
+    Every other index forgets it, and so does what has another number of samples, such as the
+    means of blocks.
     """
 
     sample_rate: float | None
 
     def __array_finalize__(self, other: object) -> None:
-        """Take over the rate of the array that this one was made from."""
-        self.sample_rate = getattr(other, "sample_rate", None)
+        """Take over the rate of an array of as many samples, from which this one was made."""
+        alike = isinstance(other, Samples) and other.size == self.size
+        self.sample_rate = other.sample_rate if alike else None
 
     def __array_wrap__(
         self, array: Any, context: Any = None, return_scalar: bool = False
@@ -73,8 +75,10 @@ class Samples(np.ndarray[Any, np.dtype[np.float64]]):
     def __getitem__(self, key: Any) -> Any:
         """Return samples; those that are not contiguous have no rate."""
         found = super().__getitem__(key)
-        if isinstance(found, Samples) and not (isinstance(key, slice) and key.step is None):
-            return found.view(np.ndarray)
+        if isinstance(found, Samples):
+            if not (isinstance(key, slice) and key.step is None):
+                return found.view(np.ndarray)
+            found.sample_rate = self.sample_rate
         return found
 
 
