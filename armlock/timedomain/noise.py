@@ -51,8 +51,9 @@ class Samples(np.ndarray[Any, np.dtype[np.float64]]):
 
     def __array_finalize__(self, other: object) -> None:
         """Take over the rate of an array of as many samples, from which this one was made."""
-        alike = isinstance(other, Samples) and other.size == self.size
-        self.sample_rate = other.sample_rate if alike else None
+        self.sample_rate = None
+        if isinstance(other, Samples) and other.size == self.size:
+            self.sample_rate = other.sample_rate
 
     def __array_wrap__(
         self, array: Any, context: Any = None, return_scalar: bool = False
