@@ -23,6 +23,8 @@ _Term = TypeVar("_Term", bound=Any)
 
 # Bits to which roots are found; lightly damped pairs keep the digits of their damping.
 _BITS = 128
+# So many values at once stay in a processor's cache, which takes half the time.
+_BLOCK = 1 << 13
 
 # python-flint pickles its fractions, but not its polynomials.
 copyreg.pickle(fmpq_poly, lambda p: (fmpq_poly, (p.coeffs(),)))
@@ -156,12 +158,14 @@ def quotients(
     """Evaluate `lead` times the product of s - zeros over that of s - poles, at any s."""
     found = np.full(s.shape, complex(lead))
     with np.errstate(divide="ignore", invalid="ignore"):
-        # In turn, so that the product neither overflows nor underflows on the way.
-        for zero, pole in zip_longest(zeros, poles):
-            if zero is not None:
-                found *= s - zero
-            if pole is not None:
-                found /= s - pole
+        for first in range(0, s.size, _BLOCK):
+            value, at = (x.reshape(-1)[first : first + _BLOCK] for x in (found, s))
+            # In turn, so that the product neither overflows nor underflows on the way.
+            for zero, pole in zip_longest(zeros, poles):
+                if zero is not None:
+                    value *= at - zero
+                if pole is not None:
+                    value /= at - pole
     return found
 
 
