@@ -86,7 +86,7 @@ class Controller:
 
     numerator: Polynomial
     denominator: Polynomial
-    #: The same controller for other values of poles that may be meant to be zero; usually none.
+    #: The same controller for other values of poles and zeros that may be meant to be at s = 0.
     others: tuple[Controller, ...] = field(default=(), compare=False)
 
     def __init__(self, zeros: Sequence[complex], poles: Sequence[complex], gain: float) -> None:
@@ -139,7 +139,8 @@ class Controller:
             How many poles of a python-control system are zero: 0, 1 or 2. It is needed where
             rounding moved such poles, and a count depends on it.
         zeros : int, optional
-            The same for the zeros of a state space, for instance 1 for a high-pass filter.
+            The same for the zeros of a state space, for instance 1 for a high-pass filter, or
+            for an integrator that the input does not reach.
 
         Raises
         ------
@@ -232,7 +233,7 @@ def rational(
                 for p in (system.num, system.den)
             )
         )
-        if found.poles and integrators is None:
+        if found.below_bounds and integrators is None:
             warnings.warn(
                 f"the lowest coefficient {float(found.below.exact[0]):.3g} of the denominator "
                 "is no larger than what rounding leaves of zero, and counts may rest on its "
@@ -240,7 +241,7 @@ def rational(
                 "zero, Controller.of(system, integrators=1)",
                 stacklevel=3,
             )
-            found = found._replace(poles=())
+            found = found._replace(below_bounds=())
     found = found.stated(integrators, zeros)
     k = Controller.of_polynomials(found.above, found.below)
     others = tuple(Controller.of_polynomials(*pair) for pair in found.others())

@@ -137,7 +137,13 @@ def return_difference(plant: Any, controllers: Any) -> System:
 
 
 def state_space(
-    a: Any, b: Any = None, c: Any = None, d: Any = 0.0, *, integrators: int | None = None
+    a: Any,
+    b: Any = None,
+    c: Any = None,
+    d: Any = 0.0,
+    *,
+    integrators: int | None = None,
+    zeros: int | None = None,
 ) -> System:
     """Return a state space with delays, x' = sum of A_k x(t - h_k) + b u, y = c x + d u.
 
@@ -151,6 +157,8 @@ def state_space(
         What goes through directly.
     integrators : int, optional
         How many poles are meant to be zero, 0 or 1, where rounding of the matrices hides it.
+    zeros : int, optional
+        The same for the zeros, of which a pole that `b` does not reach is one.
 
     Returns
     -------
@@ -161,7 +169,7 @@ def state_space(
     ------
     TypeError, ValueError
         If a number is not finite, shapes do not fit, a delay is negative, rounding does not
-        hide as many integrators, or there are too many states, see `determinant`.
+        hide as many integrators or zeros, or there are too many states, see `determinant`.
         `return_difference` takes several inputs and outputs.
 
     Examples
@@ -176,16 +184,11 @@ def state_space(
     rows, total, sizes = _states(a)
     below = _determinant(rows)
     # Rounding of the matrices may hide that a pole is meant to be zero.
-    (bound, *_), value = (*statespace.doubts(total, sizes), 0), below.whole()[0]
-    changes = [exact(0), *(exact(v) - value for v in (-bound, 0, bound) if bound)]
-    if integrators is not None:
-        if whole_number("integrators", integrators, 0) > bool(bound):
-            raise ValueError(
-                f"integrators must be {'0 or 1' if bound else '0'}, got {integrators}: "
-                "rounding of the matrices hides no more"
-            )
-        changes = [-value if integrators else exact(0)]
+    bound, lowest = statespace.doubt(-total, sizes), below.whole()[0]
+    changes = [v - lowest for v in _meant("integrators", integrators, lowest, bound)]
     if b is None:
+        if zeros is not None:
+            raise TypeError(f"zeros must not be given without b and c, got {zeros}")
         made = [System(below + _number(v), Sum({})) for v in changes]
     else:
         column, row, direct = (
@@ -198,12 +201,39 @@ def state_space(
                 "return_difference"
             )
         through = exact(direct[0])
-        beside = [[*r, _number(-v)] for r, v in zip(rows, column, strict=True)]
-        above = _determinant([*beside, [*map(_number, row), _number(through)]])
-        made = [System(above + _number(v * through), below + _number(v)) for v in changes]
+        above = _determinant(
+            _bordered(rows, map(_number, -column), map(_number, row), _number(through))
+        )
+        bound = statespace.doubt(
+            _bordered(-total, -column, row, through),
+            _bordered(sizes, abs(column), abs(row), abs(through)),
+        )
+        made = []
+        for v in changes:
+            lowest = above.whole()[0] + v * through
+            for w in _meant("zeros", zeros, lowest, bound):
+                moved = _number(v * through + w - lowest)
+                made.append(System(above + moved, below + _number(v)))
     found, *others = made
     found.others = tuple(others)
     return found
+
+
+def _bordered(block: Any, column: Any, row: Any, corner: Any) -> list[list[Any]]:
+    """Return the rows of a block with a column beside it, a row below it and a corner."""
+    return [*([*r, v] for r, v in zip(block, column, strict=True)), [*row, corner]]
+
+
+def _meant(name: str, given: int | None, value: fmpq, bound: fmpq) -> list[fmpq]:
+    """Return what a lowest coefficient may be: as it is, and if in doubt around zero."""
+    if given is None:
+        return [value, *((-bound, fmpq(0), bound) if bound else ())]
+    if whole_number(name, given, 0) > bool(bound):
+        raise ValueError(
+            f"{name} must be {'0 or 1' if bound else '0'}, got {given}: rounding of the "
+            "matrices hides no more"
+        )
+    return [fmpq(0) if given else value]
 
 
 def _number(value: Any) -> Sum:

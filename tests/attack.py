@@ -429,7 +429,7 @@ def check_margins(tally, rng, sketch, loop, point):
     centre, radius = View(sketch, *point).limit()
     for edge, way, is_bound in ends:
         if radius < 1e-7 * abs(centre) and abs(1.0 + edge * centre) < 1e-6:
-            continue  # the chain is lost within a window that no float lies in
+            continue  # the chain is lost within 1e-7 of here only, nearer than any of `past`
         past = [edge * (1.0 + way * share) for share in (1e-5, 1e-6, 1e-7)]
         if not is_bound and unstable(*past) is False:
             tally.note("gain interval", (*point, edge), interval, "stable past it")

@@ -50,7 +50,8 @@ class Judge:
         size = self.degree + 1
         still = np.sum([np.pad(p, (size - len(p), 0)) for t, p in terms if not t], axis=0)
         delayed = [(np.asarray(p)[::-1], t) for t, p in terms if t]
-        if abs(still[0]) <= sum(abs(p[-1]) for p, _ in delayed if len(p) == size):
+        highest, moved = self.limit()
+        if abs(highest) <= moved:
             raise attack_judge.UndecidedError  # a chain may hold infinitely many
         top = independent.radius_of_unstable_roots(still[::-1], delayed)
         return independent.winding(self.d, top, max(t for t, _ in terms))

@@ -149,7 +149,7 @@ def count(system, x, y, at_zero=0):
 
 
 def map_eigenvalues(system, x, y):
-    """Roots of z^r D for a map, r the longest delay in steps; rounding would scatter them."""
+    """Roots of z^r D for a map, r the longest delay in steps; exact, as they may be close."""
     steps = {round(t / system.step): p[0] for t, p in terms(system, x, y).items()}
     polynomial = fmpq_poly([0])
     for back, value in steps.items():

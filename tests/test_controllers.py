@@ -24,6 +24,7 @@ from armlock import (
     peak_gain,
     rightmost_root,
     stability_chart,
+    state_space,
     unstable_roots,
     varying_radius,
 )
@@ -241,7 +242,7 @@ def test_controllers_in_general_coordinates_are_as_designed_or_asked_for(integra
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_an_integrator_that_is_hidden_cancels_in_other_coordinates_too(seed):
+def test_an_integrator_that_is_hidden_is_a_zero_too_in_other_coordinates(seed):
     rng = np.random.default_rng(seed)
     design = np.diag([0.0, -0.3, -2.0])
     b, c, turn = rng.normal(size=(3, 1)), np.array([[0.0, 1.0, 0.5]]), rng.normal(size=(3, 3))
@@ -250,9 +251,37 @@ def test_an_integrator_that_is_hidden_cancels_in_other_coordinates_too(seed):
         np.linalg.inv(turn) @ design @ turn, np.linalg.inv(turn) @ b, c @ turn, 0.0
     )
     expected = unstable_roots(System.of(control.ss(design, b, c, 0)) * delay(0.3))
-    stated = Controller.of(given, integrators=1)
+    with pytest.raises(CountError, match="zeros=1"):
+        unstable_roots(System.of(Controller.of(given, integrators=1)) * delay(0.3))
+    stated = Controller.of(given, integrators=1, zeros=1)
     assert stated.numerator.order == stated.denominator.order == 1
     assert unstable_roots(System.of(stated) * delay(0.3)) == expected
+    whole = {0.0: given.A}, given.B.ravel(), given.C.ravel()
+    with pytest.raises(CountError, match="zeros=1"):
+        unstable_roots(state_space(*whole, integrators=1) * delay(0.3))
+    meant = state_space(*whole, integrators=1, zeros=1)
+    assert unstable_roots(meant * delay(0.3)) == expected
+
+
+def test_a_zero_next_to_an_integrator_is_not_taken_for_it():
+    # The zero is at +1e-9: it is no integrator that the input does not reach.
+    turn, design = np.array([[1.0, 2.0], [3.0, 5.0]]), np.diag([0.0, -1e5])
+    b, c = np.array([[1.0], [1.0]]), np.array([[-1e-9, 1e5 + 1e-9]])
+    inverse = np.array([[-5.0, 2.0], [3.0, -1.0]])
+    given = control.ss(turn @ design @ inverse, turn @ b, c @ inverse, 0.0)
+    assert unstable_roots(System.of(control.ss(design, b, c, 0.0)) * delay(1.0)) == 1
+    with pytest.raises(CountError):
+        unstable_roots(System.of(Controller.of(given, integrators=1)) * delay(1.0))
+    meant = Controller.of(given, integrators=1, zeros=0)
+    assert unstable_roots(System.of(meant) * delay(1.0)) == 1
+
+
+@pytest.mark.parametrize("number", range(5))
+def test_any_number_of_poles_that_are_zero_may_be_stated(number):
+    given = control.tf([1.0], [1.0, *[0.0] * number])
+    assert Controller.of(given, integrators=number).denominator.order == number
+    with pytest.raises(ValueError, match="integrators must be the number of poles"):
+        Controller.of(given, integrators=number + 1)
 
 
 @pytest.mark.parametrize("number", [1, 2])

@@ -233,6 +233,13 @@ def test_a_series_at_another_rate_does_not_claim_the_one_of_its_samples(resample
     assert simulate(CommonArm(), series, sample_rate=10.0).size == series.size
 
 
+@pytest.mark.parametrize("combine", [np.add, np.maximum, lambda a, b: 2.0 * b - a])
+def test_series_of_two_rates_make_one_of_none(combine):
+    one, other = LaserNoise(1, 10.0).draw(50), LaserNoise(1, 20.0).draw(50)
+    assert combine(one, other).sample_rate is None
+    assert combine(one, one[::1] * 0.5).sample_rate == 10.0
+
+
 def test_numbers_after_the_noise_have_names():
     """The third one could be c1, and 20 for c1 diverges."""
     with pytest.raises(TypeError, match="positional argument"):

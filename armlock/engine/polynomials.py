@@ -158,8 +158,9 @@ def quotients(
     """Evaluate `lead` times the product of s - zeros over that of s - poles, at any s."""
     found = np.full(s.shape, complex(lead))
     with np.errstate(divide="ignore", invalid="ignore"):
+        flat = found.reshape(-1), s.reshape(-1)
         for first in range(0, s.size, _BLOCK):
-            value, at = (x.reshape(-1)[first : first + _BLOCK] for x in (found, s))
+            value, at = (x[first : first + _BLOCK] for x in flat)
             # In turn, so that the product neither overflows nor underflows on the way.
             for zero, pole in zip_longest(zeros, poles):
                 if zero is not None:

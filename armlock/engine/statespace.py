@@ -39,35 +39,33 @@ class Quotient(NamedTuple):
 
     above: Polynomial
     below: Polynomial
-    poles: tuple[fmpq, ...] = ()
-    zeros: tuple[fmpq, ...] = ()
+    below_bounds: tuple[fmpq, ...] = ()
+    above_bounds: tuple[fmpq, ...] = ()
 
     def stated(self, integrators: int | None, zeros: int | None) -> Quotient:
         """Return the quotient with so many poles and zeros at s = 0, or raise.
 
         None leaves them in doubt.
         """
-        above, below, poles, unsure = self
-        at_zero = 0
+        above, below, below_bounds, above_bounds = self
         if integrators is not None:
-            number = _stated("integrators", integrators, below, poles)
+            number = _stated("integrators", integrators, below, below_bounds)
             above, below = _with_lowest(above, below, [fmpq(0)] * number)
-            # Poles at s = 0 that the input does not reach, or the output does not see, cancel.
-            poles, at_zero = (), min(number, len(unsure))
+            below_bounds = ()
         if zeros is not None:
-            at_zero, unsure = _stated("zeros", zeros, above, unsure), ()
-        above = Polynomial.of(above.exact - fmpq_poly(above.exact.coeffs()[:at_zero]))
-        left = tuple(bound if k >= at_zero else fmpq(0) for k, bound in enumerate(unsure))
-        return Quotient(above, below, poles, left)
+            number = _stated("zeros", zeros, above, above_bounds)
+            above = Polynomial.of(above.exact - fmpq_poly(above.exact.coeffs()[:number]))
+            above_bounds = ()
+        return Quotient(above, below, below_bounds, above_bounds)
 
     def others(self) -> Iterator[tuple[Polynomial, Polynomial]]:
         """Return what else may be meant; nothing if nothing is in doubt."""
-        if not any((*self.poles, *self.zeros)):
+        if not any((*self.below_bounds, *self.above_bounds)):
             return
-        for poles in _around(self.poles):
-            other, changed = _with_lowest(self.above, self.below, poles)
-            for zeros in _around(self.zeros):
-                moved = [new - self.above.exact[k] for k, new in enumerate(zeros)]
+        for lowest in _around(self.below_bounds):
+            other, changed = _with_lowest(self.above, self.below, lowest)
+            for lowest_above in _around(self.above_bounds):
+                moved = [new - self.above.exact[k] for k, new in enumerate(lowest_above)]
                 above = Polynomial.of(other.exact + fmpq_poly(moved))
                 if above:
                     yield above, changed
@@ -85,16 +83,15 @@ def with_others(make: Callable[..., _System], *systems: Any) -> _System:
 
 def _around(bounds: Sequence[fmpq]) -> Iterator[tuple[fmpq, ...]]:
     """Return the values of coefficients that may be meant to be zero."""
-    return product(*((-bound, fmpq(0), bound)[: 3 if bound else 1] for bound in bounds))
+    return product(*((-bound, fmpq(0), bound) if bound else (bound,) for bound in bounds))
 
 
 def _stated(name: str, given: int, p: Polynomial, bounds: Sequence[fmpq]) -> int:
     """Return how many roots at s = 0 are stated, or raise if p has no such coefficients."""
     number = whole_number(name, given, 0)
-    small = [
-        bound or not c for c, bound in zip(p.exact.coeffs(), (*bounds, 0, 0), strict=False)
-    ]
-    if not all(small[:number]) or number > len(small) or not p.exact[number]:
+    lowest = p.exact.coeffs()[:number]
+    small = [not c or (k < len(bounds) and bounds[k]) for k, c in enumerate(lowest)]
+    if not all(small) or not p.exact[number]:
         what = {"integrators": "poles", "zeros": "zeros"}[name]
         raise ValueError(
             f"{name} must be the number of {what} that are zero but for rounding, got {given} "
@@ -124,7 +121,7 @@ def of_matrices(a: Any, b: Any, c: Any, d: Any) -> Quotient:
     above = (first - column * row).charpoly() - below + exact(d[0][0]) * below
     above = Polynomial.of(above)
     return Quotient(
-        above, Polynomial.of(below), doubts(a), _doubts_of_zeros(a, b, c, d[0][0], above)
+        above, Polynomial.of(below), _doubts(a), _doubts_of_zeros(a, b, c, d[0][0], above)
     )
 
 
@@ -153,16 +150,27 @@ def _cofactors(matrix: Any) -> tuple[list[fmpq], list[Any]]:
     return coefficients, found[::-1]
 
 
-def doubts(a: Any, sizes: Any = None) -> tuple[fmpq, ...]:
+def _doubts(a: Any) -> tuple[fmpq, ...]:
     """Return what rounding of A may make of the lowest coefficients of det(s - A).
 
-    Of as many as may all be meant to be zero, and at most two. The derivative of det(s - A) by
-    an entry of A is a cofactor of s - A. Sizes are those of the entries, where these are sums.
+    Of at most two, as long as each is below its bound. The derivative of det(s - A) by
+    an entry of A is a cofactor of s - A.
     """
     if not len(a):
         return ()
     matrix = _matrix(a)
-    return _in_doubt(*_cofactors(matrix), matrix if sizes is None else _matrix(sizes))
+    return _in_doubt(*_cofactors(matrix), matrix)
+
+
+def doubt(rows: Any, sizes: Any) -> fmpq:
+    """Return what rounding may make of a determinant, or zero if the determinant is larger.
+
+    Sizes are those of the entries, where these are sums.
+    """
+    matrix = _matrix(rows)
+    value = matrix.det()
+    found = _in_doubt([value], [matrix.inv() * value], _matrix(sizes)) if value else ()
+    return found[0] if found else fmpq(0)
 
 
 def _in_doubt(
@@ -203,7 +211,7 @@ def _doubts_of_zeros(a: Any, b: Any, c: Any, d: float, above: Polynomial) -> tup
 
 
 def _doubts_of_roots(below: Polynomial) -> tuple[fmpq, ...]:
-    """Return the same for a denominator that was multiplied out from rounded poles.
+    """Return bounds for a denominator that was multiplied out from rounded poles.
 
     Poles are rounded by a share of the largest one, which python-control does to state spaces.
     """

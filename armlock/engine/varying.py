@@ -54,7 +54,10 @@ def _exact_polynomial(function: Function) -> fmpq_poly:
     acting = np.flatnonzero((function.delayed != 0).any(axis=0))
     undelayed = function.steady - function.delayed.sum(axis=1)
     if acting.size > 1 or (acting.size and undelayed.any()):
-        raise ValueError("what varies must be a factor of one polynomial with one delay")
+        raise ValueError(
+            "loop must have each parameter as a factor of one polynomial with one delay, got "
+            f"{acting.size + bool(undelayed.any())} delays"
+        )
     found = fmpq_poly()
     for weight, p in zip(function.steady, function.space.polynomials, strict=True):
         if weight:

@@ -278,19 +278,19 @@ def unstable_roots(
 
 
 def in_doubt(points: FloatArray) -> CountError:
-    """Return the error of a count that depends on what is meant by a pole next to zero."""
+    """Return the error of a count that depends on a pole or zero next to s = 0."""
     return CountError(
         "no count: it depends on whether a pole or a zero of a state space is at s = 0, which "
         "rounding of its matrices does not decide; in place of the state space write "
         "Controller.of(state_space, integrators=1), or 2, or 0 if no pole is meant to be zero, "
         "and zeros=1, or 2, or 0, for its zeros; with delays write "
-        "armlock.state_space(..., integrators=1), or 0",
+        "armlock.state_space(..., integrators=1), or 0, and zeros=1, or 0",
         points,
     )
 
 
 def require_certain(system: System, point: Sequence[Any]) -> None:
-    """Raise a `CountError` where poles that may be meant to be zero change the count."""
+    """Raise a `CountError` where what rounding hides at s = 0 changes the count."""
     if system.others:
         unstable_roots(system, *point)
 

@@ -58,13 +58,19 @@ class Samples(np.ndarray[Any, np.dtype[np.float64]]):
     def __array_wrap__(
         self, array: Any, context: Any = None, return_scalar: bool = False
     ) -> Any:
-        """Return a sum, a maximum and the like as a plain number."""
-        return array[()] if array.ndim == 0 else super().__array_wrap__(array, context)
+        """Return a sum over all samples as a plain number; series of two rates have none."""
+        if array.ndim == 0:
+            return array[()]
+        found: Any = super().__array_wrap__(array, context)
+        given = context[1] if context else ()
+        if len({one.sample_rate for one in given if isinstance(one, Samples)}) > 1:
+            found.sample_rate = None
+        return found
 
     def __array_function__(self, func: Any, types: Any, args: Any, kwargs: Any) -> Any:
         """Join blocks of one rate to a series of that rate, and leave the rest to NumPy."""
         found = super().__array_function__(func, types, args, kwargs)
-        if func is np.concatenate:
+        if func is np.concatenate and np.ndim(found) == 1:
             rates = {getattr(part, "sample_rate", None) for part in args[0]}
             return _sampled(np.asarray(found), rates.pop()) if len(rates) == 1 else found
         return found
