@@ -13,7 +13,7 @@ from armlock.checks import FloatArray, real_array, whole_number
 from armlock.controllers import check_continuous
 from armlock.engine import statespace
 from armlock.engine.polynomials import exact, polynomial
-from armlock.engine.statespace import with_others
+from armlock.engine.statespace import bordered, with_others
 from armlock.systems import (
     Sum,
     System,
@@ -202,11 +202,11 @@ def state_space(
             )
         through = exact(direct[0])
         above = _determinant(
-            _bordered(rows, map(_number, -column), map(_number, row), _number(through))
+            bordered(rows, map(_number, -column), map(_number, row), _number(through))
         )
         bound = statespace.doubt(
-            _bordered(-total, -column, row, through),
-            _bordered(sizes, abs(column), abs(row), abs(through)),
+            bordered(-total, -column, row, through),
+            bordered(sizes, abs(column), abs(row), abs(through)),
         )
         made = []
         for v in changes:
@@ -217,11 +217,6 @@ def state_space(
     found, *others = made
     found.others = tuple(others)
     return found
-
-
-def _bordered(block: Any, column: Any, row: Any, corner: Any) -> list[list[Any]]:
-    """Return the rows of a block with a column beside it, a row below it and a corner."""
-    return [*([*r, v] for r, v in zip(block, column, strict=True)), [*row, corner]]
 
 
 def _meant(name: str, given: int | None, value: fmpq, bound: fmpq) -> list[fmpq]:

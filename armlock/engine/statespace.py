@@ -136,6 +136,11 @@ def _matrix(rows: Any) -> Any:
     return flint.fmpq_mat([[exact(value) for value in row] for row in rows])
 
 
+def bordered(block: Any, column: Any, row: Any, corner: Any) -> list[list[Any]]:
+    """Return the rows of a block with a column beside it, a row below it and a corner."""
+    return [*([*r, v] for r, v in zip(block, column, strict=True)), [*row, corner]]
+
+
 def _cofactors(matrix: Any) -> tuple[list[fmpq], list[Any]]:
     """Return the coefficients of det(s - A), and those of the adjugate of s - A.
 
@@ -195,8 +200,8 @@ def _doubts_of_zeros(a: Any, b: Any, c: Any, d: float, above: Polynomial) -> tup
     if not (len(a) and above):
         return ()
     n = len(a)
-    rows = [[-x for x in row] + list(last) for row, last in zip(a, b, strict=True)]
-    matrix = _matrix([*rows, [*(-x for x in c[0]), d]])
+    turned, column, row = [[-x for x in row] for row in a], [x for (x,) in b], c[0]
+    matrix = _matrix(bordered(turned, column, [-x for x in row], d))
     size = range(n + 1)
     unit = flint.fmpq_mat(n + 1, n + 1, [int(i == k < n) for i in size for k in size])
     value = above.exact
