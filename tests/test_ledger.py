@@ -107,7 +107,7 @@ def test_a_chapter_decides_its_claims_in_sight_and_is_held_against_the_file(note
     if decided:
         assert any("```{claims}\n```" in text for text in shown)
     if decided or numbers:
-        assert f'ledger.confirm("{notebook.stem}"' in "\n".join(shown)
+        assert any(f'ledger.confirm("{notebook.stem}"' in text for _, text in cells)
 
 
 # A chapter and a file -----------------------------------------------------------------------
