@@ -3,133 +3,101 @@
 numba compiles a function when it is first called, which takes seconds, and keeps the result for
 the next process beside the source, in the user's cache, or in the folder that NUMBA_CACHE_DIR
 names. `make clean` removes those beside the source. Where they cannot be kept (nothing can be
-written, the disk is full) or not be read, each process compiles for itself, and says so once.
+written, or the disk is full), each process compiles for itself, and says so once.
 
 A compiled function is called through numba's *dispatcher*, which also holds the function as it
 was written. So a call that is over after a few steps need not wait for the compiler: `Plain`
 copies a module, with every function as it was written. A step takes some thousand times as
 long, and last digits may differ, so only whole numbers are taken from it.
-
-While numba compiles, Python does not collect reference cycles, because it would search the many
-objects of the compiler again and again; and LLVM optimises at its level 1, because higher
-levels take longer and gain little here. Both are settings of the whole process, and are
-restored; numba's own lock keeps other threads from compiling meanwhile.
 """
 
 from __future__ import annotations
 
 import contextlib
-import gc
 import os
 import sys
-import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from functools import cached_property, partial
-from pickle import UnpicklingError
+from functools import cached_property
+from threading import Timer
 from types import FunctionType, ModuleType, SimpleNamespace
 from typing import Any
 
 import numba
 import numpy as np
-from numba.core.caching import FunctionCache, NullCache
-from numba.core.compiler_lock import global_compiler_lock
+from numba.core.caching import FunctionCache
+from numba.core.event import Listener, register
 from tqdm import tqdm  # type: ignore[import-untyped]
 
-# How a cache fails: the folder, or a file that was cut short.
-_FAILURES = OSError, EOFError, UnpicklingError
 # After so many seconds compiling says that it does.
 _PATIENCE = 1.0
 
 
-class _Lost(NullCache):  # type: ignore[misc]
-    """No cache: it says why when the first function has been compiled."""
+_lost: list[Exception] = []
 
-    # Of the process.
-    said = False
-    exists = False
 
-    def __init__(self, reason: Exception) -> None:
-        self._reason = reason
-
-    def save_overload(self, sig: Any, data: Any) -> None:
-        """Say once that nothing is kept."""
-        if not _Lost.said:
-            _Lost.said = True
-            warnings.warn(
-                "compiled functions are not kept for the next process, which will take as long "
-                f"to compile them: {self._reason}",
-                RuntimeWarning,
-                stacklevel=2,
-            )
+def _not_kept(reason: Exception) -> None:
+    """Say once that nothing is kept."""
+    _lost.append(reason)
+    if len(_lost) > 1:
+        return
+    warnings.warn(
+        "compiled functions are not kept for the next process, which will take as long to "
+        f"compile them: {reason}",
+        RuntimeWarning,
+        stacklevel=3,
+    )
 
 
 class _Kept(FunctionCache):  # type: ignore[misc]
-    """The cache of a function, whose failures do not end the call."""
+    """The cache of a function; a full disk ends no call, for which numba has no setting."""
 
     @property
     def exists(self) -> bool:
         """Whether an earlier process has kept something, perhaps of other source."""
         return os.path.exists(self._cache_file._index_path)
 
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return what an earlier process has compiled, if there is such and it can be read."""
-        try:
-            return super().load_overload(sig, target_context)
-        except _FAILURES as error:
-            self._forget(error, sig)
-
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what has been compiled, or say that it is not kept."""
         try:
             super().save_overload(sig, data)
-        except _FAILURES as error:
-            self._forget(error, sig)
-
-    def _forget(self, error: Exception, sig: Any) -> None:
-        """Remove the index, which may name a file that was compiled from other source."""
-        with contextlib.suppress(OSError):
-            os.unlink(self._cache_file._index_path)
-        _Lost(error).save_overload(sig, None)
+        except OSError as error:
+            # The index may already name a file that was compiled from other source.
+            with contextlib.suppress(OSError):
+                os.unlink(self._cache_file._index_path)
+            _not_kept(error)
 
 
-class _Notice(threading.Timer):
-    """A line that says, once in a process, what takes so long."""
+class _Notice(Listener):  # type: ignore[misc]
+    """A line that says, once in a process, what takes so long while numba compiles."""
 
-    said = False
+    depth, said = 0, False
 
-    def __init__(self) -> None:
-        super().__init__(_PATIENCE, self._say)
-        self.daemon = True
+    def on_start(self, event: Any) -> None:
+        """Begin to wait with the first function; others are compiled on its way."""
+        self.depth += 1
+        if self.depth == 1:
+            self.timer = Timer(_PATIENCE, self.say)
+            self.timer.daemon = True
+            self.timer.start()
 
-    def _say(self) -> None:
+    def on_end(self, event: Any) -> None:
+        """Wait no longer."""
+        self.depth -= 1
+        if self.depth == 0:
+            self.timer.cancel()
+
+    def say(self) -> None:
+        """Print the line."""
         # Where progress bars are off, as in the book's notebooks, it is no part of a page.
-        if not (_Notice.said or os.environ.get("TQDM_DISABLE")):
-            _Notice.said = True
+        if not (self.said or os.environ.get("TQDM_DISABLE")):
+            self.said = True
             tqdm.write("armlock: compiling, once for this installation ...", file=sys.stderr)
 
 
-@contextlib.contextmanager
-def _compiling() -> Iterator[None]:
-    """Compile in less time, and say so if it takes long."""
-    with global_compiler_lock:
-        level, collects, notice = numba.config.OPT, gc.isenabled(), _Notice()
-        gc.disable()
-        numba.config.OPT = min(level, type(level)(1))
-        notice.start()
-        try:
-            yield
-        finally:
-            notice.cancel()
-            numba.config.OPT = level
-            if collects:
-                gc.enable()
-
-
-def _compile(compiler: Callable[[Any], Any], signature: Any) -> Any:
-    with _compiling():
-        return compiler(signature)
+notice = _Notice()
+register("numba:compile", notice)
 
 
 class Plain:
@@ -161,8 +129,8 @@ class Plain:
 
     def serves(self, compiled: Any) -> bool:
         """Whether a function would have to be compiled, and there is time left."""
-        compiles = not getattr(compiled, "signatures", True) and not compiled._cache.exists
-        return compiles and self._left > 0.0
+        compiles = not getattr(compiled, "signatures", True)
+        return compiles and self._left > 0.0 and not getattr(compiled._cache, "exists", False)
 
     @contextlib.contextmanager
     def instead(self) -> Iterator[SimpleNamespace]:
@@ -222,9 +190,7 @@ def njit(
         try:
             dispatcher._cache = _Kept(function)
         except RuntimeError as error:
-            dispatcher._cache = _Lost(error)
-        if not inner and not numba.config.DISABLE_JIT:
-            dispatcher.compile = partial(_compile, dispatcher.compile)
+            _not_kept(error)
         return dispatcher
 
     return decorate

@@ -1,17 +1,14 @@
 """Compiled functions run where they cannot be kept, too, and say so once."""
 
-import gc
 import os
 import re
 import shutil
 import subprocess
 import sys
 import time
-from contextlib import suppress
 from types import SimpleNamespace
 from typing import ClassVar
 
-import numba
 import numpy as np
 
 from armlock import CommonArm, DualArm, compiled, unstable_roots
@@ -29,7 +26,7 @@ def times(x):
 def more(x):
     return x + 1
 
-print(times(3), more(3), times._cache.exists)
+print(times(3), more(3), getattr(times._cache, "exists", False))
 """
 FULL = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))\n"
 NOT_KEPT = r"RuntimeWarning: compiled functions are not kept for the next process, .*: {}\n"
@@ -70,7 +67,7 @@ def test_where_nothing_can_be_written_each_process_compiles(tmp_path):
     assert said_once(err, "cannot cache function .*")
 
 
-def test_a_full_disk_or_a_damaged_cache_ends_no_call(tmp_path):
+def test_a_full_disk_ends_no_call(tmp_path):
     assert printed(tmp_path) == ("6 4 True\n", "")
     # The index fits onto the disk, and what has been compiled does not: what was compiled from
     # the source before stays there.
@@ -78,30 +75,40 @@ def test_a_full_disk_or_a_damaged_cache_ends_no_call(tmp_path):
     assert out == "15 4 False\n"
     assert said_once(err, r"\[Errno 27\] File too large")
     assert printed(tmp_path, factor=5) == ("15 4 True\n", "")
-    for file in tmp_path.glob("**/*.nb[ic]"):
-        os.truncate(file, file.stat().st_size // 2)
-    out, err = printed(tmp_path, factor=5)
-    assert out.startswith("15 4 ")
-    assert said_once(err, ".*")
 
 
-def test_compiling_restores_what_it_sets_and_says_once_what_takes_long(capsys, monkeypatch):
+def test_compiling_says_once_what_takes_long(capsys, monkeypatch):
+    notice = compiled._Notice()
     monkeypatch.setattr(compiled, "_PATIENCE", 0.01)
-    monkeypatch.setattr(compiled._Notice, "said", False)
     monkeypatch.delenv("TQDM_DISABLE", raising=False)
-    before = numba.config.OPT, gc.isenabled()
     for _ in range(2):
-        with suppress(KeyboardInterrupt), compiled._compiling():
-            assert (numba.config.OPT, gc.isenabled()) == (1, False)
-            time.sleep(0.2)
-            raise KeyboardInterrupt
-        assert before == (numba.config.OPT, gc.isenabled())
-    assert capsys.readouterr().err.count("compiling, once for this installation") == 1
-    monkeypatch.setattr(compiled._Notice, "said", False)
-    monkeypatch.setenv("TQDM_DISABLE", "1")
-    with compiled._compiling():
+        # The second function is compiled on the way of the first.
+        notice.on_start(None)
+        notice.on_start(None)
         time.sleep(0.2)
+        notice.on_end(None)
+        notice.on_end(None)
+    assert capsys.readouterr().err.count("compiling, once for this installation") == 1
+    monkeypatch.setattr(notice, "said", False)
+    monkeypatch.setenv("TQDM_DISABLE", "1")
+    notice.on_start(None)
+    time.sleep(0.2)
+    notice.on_end(None)
     assert not capsys.readouterr().err
+
+
+def test_what_is_kept_is_not_compiled_again(tmp_path):
+    (tmp_path / "heard.py").write_text(
+        "import compiled\ncompiled.notice.on_start = lambda event: print('compiles')\n"
+        "compiled.notice.on_end = print\nimport times\n", "utf-8"
+    )  # fmt: skip
+    printed(tmp_path)
+    done = subprocess.run(
+        [sys.executable, "-B", "-c", "import heard"],
+        env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)},
+        cwd=tmp_path, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert done.stdout == "6 4 True\n"
 
 
 def test_walks_count_the_same_uncompiled(monkeypatch):
