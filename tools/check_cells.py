@@ -2,8 +2,9 @@
 
 Usage: python tools/check_cells.py FOLDER [PAGE ...]
 
-Cells that a reader can unfold count as shown. A chapter runs in a process of its own, as it
-would in a terminal. FOLDER is the built book.
+Each chapter runs twice, in processes of their own, as it would in a terminal: the open cells
+after *Imports*, and all cells, those that a reader can unfold included. FOLDER is the built
+book.
 """
 
 import html
@@ -15,22 +16,30 @@ import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-CELL = re.compile(r'<div class="cell_input [^>]*>.*?<pre>(.*?)</pre>', re.DOTALL)
+#: A cell: what stands between its begin and its code, which names it if it is folded; its code.
+CELL = re.compile(
+    r'<div class="cell\b((?:(?!<div).)*)<div class="cell_input [^>]*>.*?<pre>(.*?)</pre>',
+    re.DOTALL,
+)
 
 
-def shown(page: Path) -> list[str]:
-    """Return the code of a page, cell by cell."""
+def shown(page: Path, folded: bool = True) -> list[str]:
+    """Return the code of a page, cell by cell; of the folded cells, if need be, the imports."""
     cells = CELL.findall(page.read_text(encoding="utf-8"))
-    return [html.unescape(re.sub(r"<[^>]+>", "", cell)) for cell in cells]
+    return [
+        html.unescape(re.sub(r"<[^>]+>", "", code))
+        for head, code in cells
+        if folded or "<details" not in head or "Imports" in head
+    ]
 
 
-def run(page: Path) -> str:
+def run(page: Path, folded: bool) -> str:
     """Run the code of a page; return what went wrong, or nothing."""
     with tempfile.TemporaryDirectory() as folder:
         figures = Path(folder) / "figures"
         figures.mkdir()
         code = Path(folder) / f"{page.stem}.py"
-        code.write_text("\n\n".join(shown(page)), encoding="utf-8")
+        code.write_text("\n\n".join(shown(page, folded)), encoding="utf-8")
         environment = os.environ | {"MPLBACKEND": "Agg", "ARMLOCK_FIGURES": str(figures)}
         command = [sys.executable, "-W", "error", str(code)]
         result = subprocess.run(command, env=environment, capture_output=True, text=True)
@@ -43,12 +52,16 @@ def main() -> int:
     named = [folder / name for name in sys.argv[2:]]
     found = named or sorted((folder / "notebooks").glob("*.html"))
     pages = [page for page in found if shown(page)]
+    runs = [(page, folded) for page in pages for folded in (False, True)]
     with ThreadPoolExecutor(2) as pool:
-        errors = list(pool.map(run, pages))
-    failed = {page.name: error for page, error in zip(pages, errors, strict=True) if error}
-    for name, error in failed.items():
-        print(f"{name}, its code run in order:\n{error}")
-    print(f"The code of {len(pages)} pages runs in order, but for {len(failed)}")
+        errors = list(pool.map(run, *zip(*runs, strict=True)))
+    failed = [one for one in zip(runs, errors, strict=True) if one[1]]
+    for (page, folded), error in failed:
+        cells = "all its cells" if folded else "its open cells"
+        print(f"{page.name}, {cells} run in order:\n{error}")
+    print(
+        f"The code of {len(pages)} pages ran in order; {len(failed)} of {len(runs)} runs failed"
+    )
     return 1 if failed or not pages else 0
 
 

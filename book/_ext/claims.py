@@ -129,10 +129,16 @@ class LedgerDirective(SphinxDirective):
 class Claims(LedgerDirective):
     """The claims of the chapter that holds the directive."""
 
+    def run(self):
+        """Return them as one part of the page, which takes no time to read."""
+        return [nodes.container("", *super().run(), classes=["claims-decided"])]
+
     def write(self, ledger):
-        """Return them as a table."""
+        """Return their names and a table."""
         chapter = self.env.docname.rpartition("/")[2]
-        return table(ledger, [claim for claim in ledger if claim.chapter == chapter])
+        claims = [claim for claim in ledger if claim.chapter == chapter]
+        names = ", ".join(link(claim.name) for claim in claims)
+        return f"Claims decided here: {names}.\n\n{table(ledger, claims)}"
 
 
 class Whole(LedgerDirective):

@@ -7,8 +7,18 @@ WORDS, LINES, FIGURES = 200, 20, 2
 
 
 def minutes(doctree):
-    """Return the minutes for a page; folded code takes none."""
-    words = sum(len(text.astext().split()) for text in doctree.findall(nodes.paragraph))
+    """Return the minutes for a page; what is folded takes none."""
+    aside = [
+        node
+        for node in doctree.findall(nodes.Element)
+        if {"claims-decided", "dropdown"} & set(node["classes"])
+    ]
+    later = {id(text) for node in aside for text in node.findall(nodes.paragraph)}
+    words = sum(
+        len(text.astext().split())
+        for text in doctree.findall(nodes.paragraph)
+        if id(text) not in later
+    )
     lines = sum(
         len(block.astext().split("\n"))
         for cell in doctree.findall(nodes.container)
