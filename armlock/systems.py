@@ -10,6 +10,7 @@ makes D = 0 instead.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from decimal import Decimal
 from fractions import Fraction
@@ -19,13 +20,15 @@ from math import factorial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+import flint
 import mpmath
 import numpy as np
 import numpy.typing as npt
-from flint import fmpq, fmpq_poly
+from flint import acb, acb_poly, arb, fmpq, fmpq_poly
 from numpy.polynomial import polynomial as poly
 
 from armlock.checks import (
+    BoolArray,
     ComplexArray,
     FloatArray,
     broadcast_shape,
@@ -85,6 +88,11 @@ _BITS, _MAY_CANCEL = 512, 200
 # So near to a zero that N and M share, in units of one over the longest delay, their series is
 # used.
 _NEAR = 0.1
+# Where the terms of a sum are larger than the sum by this factor, it is computed with balls: of
+# so many bits at first, and at most, until so many of them are known.
+_MAY_LOSE, _FEWEST_BITS, _MOST_BITS, _ENOUGH_BITS = 2.0**11, 128, 1 << 14, 60
+# Rounding errors of a sum in double precision, over the size of its terms.
+_ROUNDING = 2.0**-51
 # Longest text of a system.
 _LONGEST_TEXT = 400
 
@@ -208,30 +216,62 @@ class Sum:
         values: Mapping[str, FloatArray],
         unit: fmpq = _UNIT,
         size: fmpq = _UNIT,
-    ) -> ComplexArray:
+    ) -> tuple[ComplexArray, FloatArray]:
         """Evaluate at s and at values of the parameters, all of one shape, over a size.
 
-        By coefficients of powers of s / unit.
+        By coefficients of powers of s / unit. Where terms cancel, the sum is computed again
+        with more bits. The second result bounds rounding errors, apart from those of s theta.
         """
         delayed = [float(lag.time) for lag in self.lags if lag]
-        # Far on the right exponentials vanish beside one. Elsewhere no large terms cancel at
-        # low frequency where the sum is that of all polynomials, and of terms of exp(..) - 1.
+        # Far on the right exponentials vanish beside one. Elsewhere the sum is that of all
+        # polynomials, and of terms of exp(..) - 1, in which large terms cancel exactly.
         far = s.real * min(delayed, default=0.0) > 1.0
-        near, found = ~far, np.zeros_like(s)
-        at = s / float(unit)
+        at, near = s / float(unit), ~far
+        found, terms = np.zeros_like(s), np.zeros(s.shape)
+
+        def add(p: fmpq_poly, here: BoolArray, factor: Any = 1.0) -> None:
+            scaled = np.array(
+                [float(c * unit**k / size) for k, c in enumerate(p.coeffs())] or [0.0]
+            )
+            found[here] += poly.polyval(at[here], scaled) * factor
+            terms[here] += poly.polyval(np.abs(at[here]), np.abs(scaled)) * np.abs(factor)
+
         if not values:
-            found[near] += _polyval(self.whole(), at[near], unit, size)
+            add(self.whole(), near)
         for (lag, names), p in self.terms.items():
-            theta, value = float(lag.time), _polyval(p, at, unit, size)
             start = float(lag.growth / lag.time) if lag.growth else 0.0
-            for name in names:
-                value = value * values[name]
+            gain = np.prod([values[name] for name in names], axis=0) + np.zeros(s.shape)
+            turn = -(s - start) * float(lag.time)
             if values:
-                found[near] += value[near]
-            if theta:
-                found[near] += value[near] * np.expm1(-(s[near] - start) * theta)
-            found[far] += value[far] * np.exp(-(s[far] - start) * theta)
-        return found
+                add(p, near, gain[near])
+            if lag.time:
+                add(p, near, gain[near] * np.expm1(turn[near]))
+            add(p, far, gain[far] * np.exp(turn[far]))
+        cancelled = terms > _MAY_LOSE * np.abs(found)
+        for k in map(tuple, np.argwhere(cancelled)):
+            found[k] = self._in_balls(s[k], {name: v[k] for name, v in values.items()}, size)
+        terms[cancelled] = np.abs(found[cancelled])
+        return found, _ROUNDING * terms
+
+    def _in_balls(self, s: complex, values: Mapping[str, float], size: fmpq) -> complex:
+        """Evaluate at one point, with as many bits as the terms cancel."""
+        # Delays of one length are one here: no sum that is left is zero but at s = 0 and at
+        # zeros of its polynomials, which are exact in balls.
+        terms = collected(
+            ((lag.time, lag.growth, names), p) for (lag, names), p in self.terms.items()
+        )
+        at, bits = acb(s.real, s.imag), _FEWEST_BITS
+        while True:
+            with flint.ctx.workprec(bits):
+                total = acb(0)
+                for (theta, growth, names), p in terms.items():
+                    if p:
+                        term = acb_poly(p)(at) * (arb(growth) - at * arb(theta)).exp()
+                        total += math.prod((acb(values[name]) for name in names), start=term)
+                total /= arb(size)
+            if total.rel_accuracy_bits() > _ENOUGH_BITS or total == 0 or bits > _MOST_BITS:
+                return complex(total)
+            bits *= 2
 
     def text(self, latex: bool = False) -> str:
         """Return the sum as one writes it."""
@@ -249,12 +289,6 @@ class Sum:
             else:
                 shown.append(" ".join([f"({power})" if several else power, *factors]))
         return " + ".join(shown).replace("+ -", "- ") or "0"
-
-
-def _polyval(p: fmpq_poly, at: ComplexArray, unit: fmpq, size: fmpq) -> ComplexArray:
-    """Evaluate a polynomial of s over a size, at s / unit."""
-    scaled = [float(c * unit**k / size) for k, c in enumerate(p.coeffs())] or [0.0]
-    return np.asarray(poly.polyval(at, scaled))
 
 
 def _number(value: fmpq) -> str:
@@ -573,16 +607,8 @@ class System:
         s = np.broadcast_to(s, shape)
         arrays = {k: np.broadcast_to(v, shape) for k, v in arrays.items()}
         if self.is_equation:
-            return self.numerator.at(s, arrays)
-        # In a unit as large as the roots of M: powers of many fast poles would overflow.
-        p = max(self.denominator.terms.values(), key=lambda p: p.degree())
-        ratio = abs(p[order(p.coeffs())] / p[p.degree()])
-        bits = ratio.p.bit_length() - ratio.q.bit_length()
-        unit = fmpq(2) ** (bits // max(p.degree(), 1))
-        size = abs(p[p.degree()]) * unit ** p.degree()
-        with np.errstate(all="ignore"):
-            n, m = (f.at(s, arrays, unit, size) for f in (self.numerator, self.denominator))
-            value = np.asarray(n / m)
+            return self.numerator.at(s, arrays)[0]
+        value, _ = self.quotient(s, arrays)
         for point in {_ZERO, *self.known} if not arrays else ():
             off = s - float(point)
             near = np.abs(off) * self.longest_delay <= (_NEAR if point in self.known else 0.0)
@@ -590,6 +616,23 @@ class System:
             if near.any():
                 value = np.where(near, self._next_to(point, np.where(near, off, 0.0)), value)
         return value
+
+    def quotient(
+        self, s: ComplexArray, values: Mapping[str, FloatArray]
+    ) -> tuple[ComplexArray, FloatArray]:
+        """Evaluate N / M as `Sum.at` evaluates each of them, and bound the rounding errors."""
+        # In a unit as large as the roots of M: powers of many fast poles would overflow.
+        p = max(self.denominator.terms.values(), key=lambda p: p.degree())
+        ratio = abs(p[order(p.coeffs())] / p[p.degree()])
+        bits = ratio.p.bit_length() - ratio.q.bit_length()
+        unit = fmpq(2) ** (bits // max(p.degree(), 1))
+        size = abs(p[p.degree()]) * unit ** p.degree()
+        with np.errstate(all="ignore"):
+            (n, of_n), (m, of_m) = (
+                part.at(s, values, unit, size) for part in (self.numerator, self.denominator)
+            )
+            value = np.asarray(n / m)
+            return value, np.asarray((of_n + np.abs(value) * of_m) / np.abs(m))
 
     def _next_to(self, point: fmpq, off: ComplexArray) -> ComplexArray:
         """Return the values so far from a point, by the series there; inf at a pole."""

@@ -23,10 +23,12 @@ from armlock import (
     margins,
     modulus_margin,
     paper_loop,
+    parameter,
     rightmost_root,
     step_response,
     unstable_roots,
 )
+from armlock import s as laplace
 from armlock.sensors import dual
 from tests.dense_judge import compared, drawn
 
@@ -333,3 +335,34 @@ def test_at_zero_a_system_has_its_limit():
     assert CommonArm(gain=2.0)([0.0, 1j])[0] == pytest.approx(80.0, rel=1e-14)
     with pytest.raises(ValueError, match="s must not be a pole of the open loop"):
         CommonArm()(0, 0.9)
+
+
+def test_terms_that_cancel_cost_no_digits():
+    """Down to the lowest frequencies, and with parameters: against 400 digits."""
+    k = parameter("k", 1.0)
+    kernels = [(1 - delay(theta)) / (Fraction(theta) * laplace) for theta in (1.0, 1e-3)]
+    systems = {
+        "powers": lambda s, f: f(s, 1) ** 6,
+        "differences": lambda s, f: (1 - f(s, 1)) ** 2 / s**2,
+        "scales": lambda s, f: (1 - f(s, 1)) ** 2 * (1 - f(s, 0)) ** 2 / s**4,
+    }
+    made = {
+        "powers": kernels[0] ** 6,
+        "differences": (1 - kernels[0]) ** 2 / laplace**2,
+        "scales": ((1 - kernels[0]) * (1 - kernels[1]) / laplace**2) ** 2,
+    }
+    omega = np.geomspace(1e-9, 30.0, 40)
+
+    def kernel(s, which):
+        theta = mpmath.mpf(1.0 if which else 1e-3)
+        return (1 - mpmath.exp(-s * theta)) / (s * theta)
+
+    for name, formula in systems.items():
+        with mpmath.workdps(400):
+            expected = [complex(formula(mpmath.mpc(0.0, w), kernel)) for w in omega]
+        found = made[name](1j * omega)
+        assert found == pytest.approx(np.array(expected), rel=2e-12), name
+        doubled = (k * made[name])(1j * omega, np.full(omega.size, 2.0))
+        assert doubled == pytest.approx(2.0 * found, rel=2e-12), name
+    # Two objects of one length cancel everywhere.
+    assert (delay(1.0) * delay(1.0) - delay(2.0))(0.3 + 1j) == 0.0
