@@ -38,6 +38,7 @@ PARTLY = {"this": True, "that": False}
         ({PRINTED: PARTLY, "corrected": True}, "", Verdict.NOT_AS_WRITTEN),
         ({PRINTED: True, "corrected": True}, "", Verdict.REPRODUCED),
         ({PRINTED: True, "corrected": False}, "", Verdict.ONE_READING),
+        ({PRINTED: False, "corrected": True, "otherwise": False}, "", Verdict.ONE_READING),
         ({PRINTED: False, "corrected": PARTLY}, "", Verdict.IN_PART),
         ({PRINTED: False, "corrected": False}, "", Verdict.DIFFERS),
         ({}, "the scale", Verdict.OPEN),

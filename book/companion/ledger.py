@@ -51,8 +51,8 @@ _CLAUSES = {
     Verdict.ONE_READING: "found under one reading and not under another; the verdict names it",
     Verdict.IN_PART: "one stated part of the claim is found, another is not",
     Verdict.DIFFERS: "found under no reading that the text allows",
-    Verdict.NOT_AS_WRITTEN: "the text has an error whose correction is evident, and the "
-    "corrected text is found",
+    Verdict.NOT_AS_WRITTEN: "the text has an error whose correction is evident, and it is "
+    "found with every correction that the text allows",
     Verdict.OPEN: "the source does not print what decides it",
 }
 
@@ -110,8 +110,9 @@ def verdict(readings: Mapping[str, Holds], missing: str = "") -> Verdict:
     if all(whole):
         return Verdict.REPRODUCED
     if any(whole):
-        literal = dict(zip(readings, whole, strict=True)).get(PRINTED, True)
-        return Verdict.ONE_READING if literal else Verdict.NOT_AS_WRITTEN
+        # An error is evident only if every correction that the text allows is found.
+        wrong = [name for name, found in zip(readings, whole, strict=True) if not found]
+        return Verdict.NOT_AS_WRITTEN if wrong == [PRINTED] else Verdict.ONE_READING
     return Verdict.IN_PART if any(map(any, parts)) else Verdict.DIFFERS
 
 
