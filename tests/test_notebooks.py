@@ -27,7 +27,6 @@ NOT_YET = {
     "05_dual_arm": "open alone behind",
     "06_nyquist": "open alone behind",
     "07_perturbations": "alone behind",
-    "08_controller": "open alone behind short",
     "09_simulation": "open alone behind short",
     "10_flight": "alone behind bare",
     "11_robust_controller": "alone",
