@@ -48,7 +48,10 @@ ASK = """cases => cases.map(([spec, c1, c2]) => {
     const root = live.rightmost(spec, c1, c2);
     return {
         count: live.count(loop, c1, c2), root,
-        breaks: [[1, -1], [1, 1], [-1, -1]].map(([x, y]) => say(live.firstBreak(loop, x, y))),
+        breaks: [[1, -1], [1, 1], [-1, -1]].map(([x, y]) => {
+            const broken = live.firstBreak(loop, x, y);
+            return broken && say(broken.size);
+        }),
         margins: found && Object.fromEntries(
             Object.entries(found).map(([name, value]) => [name, say(value)])),
     };

@@ -12,7 +12,7 @@
  */
 function armlockChart(api) {
   const { BOUNDARY, UNCONFINED, UNDECIDED, at, along, Curve, tail, LOST, chain, Disc, tangentDistance,
-    count } = api;
+    count, halved } = api;
   // Samples in a radian of the longest delay, in a decade; halvings of an interval.
   const A_RADIAN = 6, A_DECADE = 24, DEEPEST = 14;
   const clamp = (value, low, high) => Math.min(high, Math.max(low, value));
@@ -54,13 +54,9 @@ function armlockChart(api) {
 
     /* The crossing of one line between two samples, by halving. */
     placed(e, from, to) {
-      let low = from[0], high = to[0], value = null;
-      const below = from[1] - e * from[2] < 0;
-      for (let k = 0; k < 60 && high - low > 1e-15 * high; k++) {
-        value = this.sample(0.5 * (low + high));
-        if (value[1] - e * value[2] < 0 === below) low = value[0]; else high = value[0];
-      }
-      return value ? value[3] - e * value[4] : from[3] - e * from[4];
+      const below = sample => sample[1] - e * sample[2] < 0, begins = below(from);
+      const place = this.sample(halved(from[0], to[0], w => below(this.sample(w)) !== begins)[1]);
+      return place[3] - e * place[4];
     }
   }
 

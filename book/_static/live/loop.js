@@ -21,6 +21,10 @@ function armlockLoop() {
   // The share of its room from which on a chain counts as lost: 1, less what rounding leaves.
   const LOST = 1 - 1e-14;
   const SENSORS = ["single", "common", "difference", "dual", "modified"];
+  // Zeros of the modified sensor's sum times the mean delay: the roots of
+  // x^6 + 5 pi x^5 + 6.5 (x + 10 pi / 13) (x + 7/5) (x + 11/20) (x + pi / 45)^2.
+  const SUM = [[-20.89506391392525, 0], [-0.4209560284110969, 0], [-0.07155303833923905, 0], [-0.06827392782369161, 0],
+    [-0.37605817972484534, 1.109269369420754], [-0.37605817972484534, -1.109269369420754]];
 
   /* gain prod (s - zero_k) / prod (s + below_k), all below_k > 0, as a function of omega.
    *
@@ -99,90 +103,6 @@ function armlockLoop() {
     return value;
   }
 
-  /* Roots of a polynomial with real coefficients, the highest power first, by Aberth's method.
-   * They come in exact pairs. The first guesses lie where the polynomial's Newton polygon has
-   * its slopes, so that sizes over many decades do no harm. */
-  function rootsOf(coefficients) {
-    const from = coefficients.findIndex(c => c !== 0);
-    if (from < 0) return [];
-    const c = coefficients.slice(from).reverse(), found = [];
-    while (c[0] === 0) { c.shift(); found.push([0, 0]); }
-    const n = c.length - 1, x = [], y = [];
-    for (let low = 0; low < n;) {
-      const rise = k => (Math.log(Math.abs(c[k])) - Math.log(Math.abs(c[low]))) / (k - low);
-      let high = low + 1;
-      while (c[high] === 0) high++;
-      for (let k = high + 1; k <= n; k++) if (c[k] !== 0 && rise(k) >= rise(high)) high = k;
-      for (let k = low; k < high; k++) {
-        const size = Math.exp(-rise(high)), turn = 2 * Math.PI * (k - low) / (high - low) + 0.7 * n;
-        x.push(size * Math.cos(turn));
-        y.push(size * Math.sin(turn));
-      }
-      low = high;
-    }
-    // f' / f at a point; outside of the unit circle from the reversed polynomial, with z = 1 / s:
-    // n z - z^2 f' / f.
-    const slope = (c, re, im) => {
-      const n = c.length - 1, square = re * re + im * im, far = square > 1;
-      const [a, b] = far ? [re / square, -im / square] : [re, im];
-      let [p, q, dp, dq] = [0, 0, 0, 0];
-      for (let k = 0; k <= n; k++) {
-        [dp, dq] = [dp * a - dq * b + p, dp * b + dq * a + q];
-        [p, q] = [p * a - q * b + c[far ? k : n - k], p * b + q * a];
-      }
-      const size = p * p + q * q;
-      const [u, v] = size ? [(dp * p + dq * q) / size, (dq * p - dp * q) / size] : [Infinity, 0];
-      if (!far) return [u, v];
-      const zr = a * a - b * b, zi = 2 * a * b;
-      return [n * a - (zr * u - zi * v), n * b - (zr * v + zi * u)];
-    };
-    for (let round = 0, moved = 1; round < 200 && moved > 1e-15; round++) {
-      moved = 0;
-      for (let i = 0; i < n; i++) {
-        let [u, v] = slope(c, x[i], y[i]);
-        if (!Number.isFinite(u + v)) continue;
-        for (let k = 0; k < n; k++) if (k !== i) {
-          const dx = x[i] - x[k], dy = y[i] - y[k], square = dx * dx + dy * dy || 1e-300;
-          u -= dx / square;
-          v += dy / square;
-        }
-        const square = u * u + v * v, mx = u / square, my = -v / square;
-        if (!Number.isFinite(mx + my)) continue;
-        x[i] -= mx;
-        y[i] -= my;
-        moved = Math.max(moved, Math.hypot(mx, my) / (Math.hypot(x[i], y[i]) || 1));
-      }
-    }
-    const left = x.map((re, k) => [re, y[k]]);
-    // The upper one of each pair, the rest real.
-    while (left.length) {
-      const most = left.reduce((a, b) => Math.abs(b[1]) / Math.hypot(...b)
-        > Math.abs(a[1]) / Math.hypot(...a) ? b : a);
-      left.splice(left.indexOf(most), 1);
-      const gap = r => Math.hypot(r[0] - most[0], r[1] + most[1]);
-      const partner = left.length ? left.reduce((a, b) => gap(b) < gap(a) ? b : a) : null;
-      if (!partner || Math.abs(most[1]) < 1e-12 * Math.abs(most[0]) || gap(most) < gap(partner)) {
-        found.push([most[0], 0]);
-      } else {
-        left.splice(left.indexOf(partner), 1);
-        const re = 0.5 * (most[0] + partner[0]), im = 0.5 * Math.abs(most[1] - partner[1]);
-        found.push([re, im], [re, -im]);
-      }
-    }
-    return found;
-  }
-
-  const times = (p, q) => {
-    const product = new Array(p.length + q.length - 1).fill(0);
-    p.forEach((a, i) => q.forEach((b, k) => { product[i + k] += a * b; }));
-    return product;
-  };
-
-  const plus = (p, q) => {
-    const size = Math.max(p.length, q.length), at = (r, k) => r[k - size + r.length] || 0;
-    return Array.from({ length: size }, (_, k) => at(p, k) + at(q, k));
-  };
-
   /* The sensor of a loop: the arms' weights are m1 = sum + difference and m2 = second sum -
    * difference, each a gain and zeros over the sensor's poles. Kept so, what nearly cancels
    * between the arms does so before it is rounded. */
@@ -201,11 +121,9 @@ function armlockLoop() {
       return { ...plain, sum: fraction(1, [[0, 0], [-corner, 0]]),
         difference: fraction(corner / spec.difference), poles: [[0, 0], [-corner, 0]] };
     // The white paper's: common arm at low frequency, dual arm in the band.
-    const mean = 0.5 * (tau1 + tau2), zb = 10 * Math.PI / (13 * mean), pb = 5 * Math.PI / mean;
+    const mean = 0.5 * (tau1 + tau2), pb = 5 * Math.PI / mean;
     const pe = 2 * Math.PI / (90 * mean), fast = [7 / (5 * mean), 11 / (20 * mean), pe, pe];
-    const real = a => [-a, 0], product = roots => roots.reduce((p, a) => times(p, [1, a]), [1]);
-    const gain = pb / (zb * mean), slow = [1, pb, 0, 0, 0, 0, 0];
-    const plusZeros = rootsOf(plus(product([zb, ...fast]).map(v => gain * v), slow));
+    const real = a => [-a, 0], plusZeros = SUM.map(root => root.map(v => v / mean));
     return { ...plain, poles: [[0, 0], ...[pb, ...fast, corner].map(real)],
       sum: fraction(1, [...plusZeros, real(corner)]),
       difference: fraction(2 * corner / spec.difference,
@@ -572,6 +490,15 @@ function armlockLoop() {
     return (c1, c2) => room > 0 ? (Math.abs(c1) * b1 + Math.abs(c2) * b2) / room : Infinity;
   }
 
+  /* The ends [low, high] to which halving shrinks the stretch in which `after` begins to be true. */
+  function halved(low, high, after, apart = 1e-15) {
+    for (let k = 0; k < 100 && high - low > apart * Math.max(-low, high); k++) {
+      const middle = 0.5 * (low + high);
+      if (after(middle)) high = middle; else low = middle;
+    }
+    return [low, high];
+  }
+
   /* Frequencies close enough to draw and to follow D by: in decades, then in turns. Where these would
    * be too many they are farther apart, down to eight in a turn: then the last ones are missing. */
   function frequencies(loop, top, lowest, most = MOST_SAMPLES) {
@@ -599,13 +526,9 @@ function armlockLoop() {
       return chain(loop)(point.c1, point.c2) >= LOST;
     };
     const { difference, second } = make(spec), apart = spec.tau1 !== spec.tau2;
-    let low = -50 / Math.max(spec.tau1, spec.tau2), high = 0;
-    if (!lost(low) || lost(high) || !apart && (difference.gain || second * c1 * c2 < 0)) return -Infinity;
-    while (high - low > -1e-9 * low) {
-      const middle = 0.5 * (low + high);
-      if (lost(middle)) low = middle; else high = middle;
-    }
-    return low;
+    const low = -50 / Math.max(spec.tau1, spec.tau2);
+    if (!lost(low) || lost(0) || !apart && (difference.gain || second * c1 * c2 < 0)) return -Infinity;
+    return halved(low, 0, sigma => !lost(sigma), 1e-9)[0];
   }
 
   /* The rightmost root at (c1, c2), null where counts right and left of it do not confirm it. Lines
@@ -684,5 +607,5 @@ function armlockLoop() {
   }
 
   return { EPSILON, BOUNDARY, UNCONFINED, UNDECIDED, make, reduced, at, beside, along, Curve, tail,
-    LOST, chain, Disc, clearFrom, tangentDistance, vanishes, count, frequencies, rightmost, rootsOf };
+    LOST, chain, Disc, clearFrom, tangentDistance, vanishes, count, halved, frequencies, rightmost };
 }

@@ -12,7 +12,7 @@
  */
 function armlockMargins(api) {
   const { EPSILON, UNDECIDED, BOUNDARY, make, reduced, at, beside, along, Curve, LOST, chain, Disc, clearFrom,
-    vanishes, count } = api;
+    vanishes, count, halved } = api;
   // How much smaller than what is shown a number may be, as a share.
   const NEAR = 1e-3;
   // Perturbations up to this, gain factors up to this, steps of one walk and of one count.
@@ -143,12 +143,8 @@ function armlockMargins(api) {
 
   /* Where a function of omega changes its sign between two frequencies. */
   function root(value, low, high) {
-    const begins = value(low) < 0;
-    for (let k = 0; k < 80 && high - low > 1e-15 * high; k++) {
-      const middle = 0.5 * (low + high);
-      if (value(middle) < 0 === begins) low = middle; else high = middle;
-    }
-    return 0.5 * (low + high);
+    const begins = value(low) < 0, ends = halved(low, high, w => value(w) < 0 !== begins);
+    return 0.5 * (ends[0] + ends[1]);
   }
 
   /* inf |1 + L| */
@@ -403,7 +399,7 @@ function armlockMargins(api) {
       return [this.df, this.hidden ? left : left * this.step + other.error];
     }
 
-    take(t) { if (t > this.low && t < this.high) this.high = t; }
+    take(t, omega) { if (t > this.low && t < this.high) [this.high, this.where] = [t, omega]; }
     interval() { return [this.low, Math.max(this.low, this.high * (1 - NEAR))]; }
     clear(re, im, radius) { return Math.hypot(1 + re, im) > radius; }
 
@@ -415,23 +411,19 @@ function armlockMargins(api) {
     found() { return walk(this) ? this.high : NaN; }
   }
 
-  /* The critical perturbation along a ray from (1, 1): 0 where the loop is not stable next to it,
-   * infinity where there is none up to |c - 1| = 2, the limit where the neutral root chain is lost
-   * first; nan where that is not certain, null where the loop is not stable at (1, 1). */
-  function firstBreak(loop, d1, d2) {
+  /* The critical perturbation along a ray from (1, 1), its `size` and the `omega` of the root that crosses:
+   * 0 where the loop is not stable next to it, infinity where there is none up to |c - 1| = 2, the limit where
+   * the neutral root chain is lost first; nan where that is not certain. Null where the loop is not stable at
+   * (1, 1), where it has `begun` unstable roots. */
+  function firstBreak(loop, d1, d2, begun = count(loop, 1, 1, { most: COUNTED })) {
     if (d1 === d2) loop = reduced(loop, 1, 1);
     const inside = t => count(loop, 1 + t * d1, 1 + t * d2,
       { most: COUNTED, exact: beside(t * d1, t * d2) });
-    const begun = inside(0);
     // Whether a loop that is on the boundary as far as rounding can tell is stable, nobody can tell.
-    if (begun === UNDECIDED || begun === BOUNDARY) return NaN;
+    if (begun === UNDECIDED || begun === BOUNDARY) return { size: NaN };
     if (begun > 0 || begun < BOUNDARY) return null;
     const share = chain(loop), lost = t => share(1 + t * d1, 1 + t * d2) >= LOST;
-    let [confined, limit] = [0, lost(FARTHEST) ? FARTHEST : Infinity];
-    for (let k = 0; k < 100 && limit < Infinity; k++) {
-      const middle = 0.5 * (confined + limit);
-      if (lost(middle)) limit = middle; else confined = middle;
-    }
+    const limit = lost(FARTHEST) ? halved(0, FARTHEST, lost)[1] : Infinity;
     const last = Math.min(FARTHEST, limit * (1 - NEAR));
     const target = new Break(loop, d1, d2, 0, last);
     target.place(0);
@@ -439,24 +431,22 @@ function armlockMargins(api) {
     if (vanishes(target.curve)) {
       target.low = OWN;
       const next = inside(1e-9);
-      if (next === UNDECIDED) return NaN;
+      if (next === UNDECIDED) return { size: NaN };
       // Not zero where the loop is stable still nearer.
-      if (next !== 0) return [1e-10, 1e-11, 1e-12].some(t => inside(t) === 0) ? NaN : 0;
+      if (next !== 0) return { size: [1e-10, 1e-11, 1e-12].some(t => inside(t) === 0) ? NaN : 0 };
     }
-    const found = target.found();
-    if (Number.isNaN(found)) return NaN;
-    if (found === last)
-      return inside((1 - 2 * NEAR) * last) === 0 ? limit : NaN;
-    const next = inside(found * (1 + 1e-6));
-    return inside(found * (1 - NEAR)) === 0 && next !== 0 && next !== UNDECIDED ? found : NaN;
+    const size = target.found(), next = size < last && inside(size * (1 + 1e-6));
+    if (size === last) return { size: inside((1 - 2 * NEAR) * last) === 0 ? limit : NaN, omega: Infinity };
+    const certain = next && next !== UNDECIDED && inside(size * (1 - NEAR)) === 0;
+    return { size: certain ? size : NaN, omega: target.where };
   }
 
   /* Margins of a stable loop, null of another: gain factors `lower` and `upper` between which it
    * stays stable (0 and infinity where none from 1 / `most` to `most` bounds them), `delay` in s
    * and `phase` in rad, infinity without a crossover, and `modulus`; each nan where it is not certain. The names
    * with `At` have the frequency of each in rad/s: infinity, or none, where it is a limit. */
-  function margins(spec, c1, c2) {
-    const loop = reduced(make(spec), c1, c2), begun = count(loop, c1, c2, { most: COUNTED });
+  function margins(spec, c1, c2, begun = count(make(spec), c1, c2, { most: COUNTED })) {
+    const loop = reduced(make(spec), c1, c2);
     let [lower, upper, most, gains] = [NaN, NaN, LARGEST[0], null];
     if (begun !== 0)
       return begun === UNDECIDED || begun === BOUNDARY ? { delay: NaN, lower, upper, most, phase: NaN, modulus: NaN } : null;

@@ -3,12 +3,12 @@
  * The live pages: a form, a chart of the stable region that answers the pointer, plots that follow.
  *
  * A page loads this file. It loads those beside it, each with one job: loop.js counts, margins.js
- * and chart.js certify, read.js reads, text.js writes, draw.js draws. What takes long runs in workers, which
- * are made of the functions' own text: a page that is opened from disk may load no script into one.
+ * and chart.js certify, read.js reads, text.js writes, draw.js draws, desk.js has the workers, and table.js the
+ * numbers.
  */
 (function () {
   const here = document.currentScript.src;
-  const files = ["loop.js", "margins.js", "chart.js", "curves.js", "read.js", "text.js", "draw.js",
+  const files = ["loop.js", "margins.js", "chart.js", "curves.js", "read.js", "text.js", "draw.js", "desk.js", "table.js",
     ...document.querySelector("[data-live=year]") ? ["orbits.js"] : []];
   const missing = files.filter(name =>
     !Array.from(document.scripts).some(script => script.src.endsWith(`/live/${name}`)));
@@ -30,6 +30,7 @@ function armlockPages() {
   const { TURN, say, duration, time, shortest, exact, written, formula, python, address, fromAddress } = armlockText;
   const { readRoots, readController, readNumber } = armlockRead;
   const { element, nearest, snapshot, Sheet, Chart, drawNyquist, drawBode, drawRoots, drawYear } = armlockDraw;
+  const { Desk } = armlockDesk, { LOST, TOLD, WAYS, UNTOLD, UNBROKEN, counted, rootText, partsOf, complete, fill, fillPanel, copied } = armlockTable;
   const api = armlockLoop();
   Object.assign(api, armlockChart(api), armlockCurves(api));
 
@@ -71,9 +72,7 @@ function armlockPages() {
   };
   const SENSORS = [["single", "single arm"], ["common", "common arm"],
     ["difference", "difference of the arms"], ["dual", "dual"], ["modified", "modified dual"]];
-  const LOST = "unstable at arbitrarily high frequency";
-  const { BOUNDARY, UNCONFINED, UNDECIDED } = api;
-  const WORDS = { [BOUNDARY]: "a root on the imaginary axis", [UNCONFINED]: LOST, [UNDECIDED]: "undecided" };
+  const { UNCONFINED, UNDECIDED } = api;
 
   /* How much of a chart is undecided, and why. */
   function undecided({ sure, top, end }) {
@@ -83,87 +82,10 @@ function armlockPages() {
         : "these are too many to follow"}. A lower gain needs fewer.` : "."}`;
   }
 
-  function counted(count) {
-    return count === 0 ? "stable" : count > 0
-      ? `${count} unstable root${count > 1 ? "s" : ""}` : WORDS[count];
-  }
-
-  /* ---------------------------------------------------------------------------- workers */
-
-  /* Runs in a worker: `api` is what the engine's files give. */
-  function tasks(api) {
-    const breaks = (spec, ways) => ways.map(([x, y]) => api.firstBreak(api.make(spec), x, y));
-    const look = {
-      chart: (spec, x0, x1, y0, y1, n, samples) => ({ n, box: { x0, x1, y0, y1 },
-        ...api.chart(api.make(spec), x0, x1, n, y0, y1, n, samples) }),
-      point: (spec, c1, c2) => api.count(api.make(spec), c1, c2),
-      // With ten times the steps, for a reader who waits.
-      count: (spec, c1, c2) => api.count(api.make(spec), c1, c2, { most: 4000000 }),
-      root: (spec, c1, c2) => api.rightmost(spec, c1, c2),
-      breaks: spec => breaks(spec, [[1, -1], [-1, 1], [1, 1], [-1, -1]]),
-      margins: (spec, c1, c2) => api.margins(spec, c1, c2),
-      // Of one day of a year: the critical perturbation of the arms in opposite directions, null where
-      // the loop is unstable. Without `whole` only whether it is.
-      day: (spec, whole) => {
-        const count = api.count(api.make(spec), 1, 1);
-        if (count > 0 || count === api.UNCONFINED) return null;
-        const found = whole || count ? breaks(spec, [[1, -1], [-1, 1]]) : [NaN];
-        return found.includes(null) ? null : Math.min(...found);
-      },
-    };
-    return ({ data: { kind, input } }) => {
-      let result = null, error = null;
-      try { result = look[kind.split(" ")[0]](...input); } catch (problem) { error = problem.message; }
-      postMessage({ result, error }, result?.counts ? [result.counts.buffer] : []);
-    };
-  }
-
-  /* Asks a worker one thing at a time, the most urgent first; of each kind only the last. */
-  class Desk {
-    constructor(order) {
-      const text = `const api = (${armlockLoop})();
-        for (const more of [${armlockMargins}, ${armlockChart}]) Object.assign(api, more(api));
-        onmessage = (${tasks})(api);`;
-      this.worker = new Worker(URL.createObjectURL(new Blob([text], { type: "text/javascript" })));
-      this.worker.onmessage = ({ data }) => {
-        const { running } = this;
-        this.running = null;
-        if (this.last[running.kind] === running) running.heard(data.result, data.error);
-        this.next();
-      };
-      this.order = order;
-      this.last = {};
-      this.waiting = {};
-      this.running = null;
-    }
-
-    ask(kind, input, heard) {
-      this.last[kind] = this.waiting[kind] = { kind, input, heard };
-      this.next();
-    }
-
-    drop(...kinds) {
-      for (const kind of kinds) {
-        delete this.waiting[kind];
-        delete this.last[kind];
-      }
-    }
-
-    next() {
-      const kind = this.order.find(name => this.waiting[name]);
-      if (this.running || !kind) return;
-      this.running = this.waiting[kind];
-      delete this.waiting[kind];
-      this.worker.postMessage({ kind, input: this.running.input });
-    }
-  }
-
   /* ---------------------------------------------------------------------------- an explorer */
 
-  // What the table has of a loop, in the order in which it is found, and what it says where it is not.
-  const TOLD = ["count", "root", "breaks", "margins"];
-  const UNTOLD = { count: UNDECIDED, root: null, breaks: [NaN, NaN, NaN, NaN],
-    margins: { delay: NaN, lower: NaN, upper: NaN, phase: NaN, modulus: NaN } };
+  // The critical perturbations, one job for each direction.
+  const BREAKS = WAYS.map((_, k) => `break ${k}`);
   let number = 0;
 
   /* What all pages have: a chart that answers, plots that follow it, and the loop's numbers. */
@@ -173,7 +95,9 @@ function armlockPages() {
       // What answers the pointer waits for nothing else.
       this.near = new Desk(["point"]);
       this.wide = new Desk(["chart", "day"]);
-      this.slow = new Desk([...TOLD, "day"]);
+      this.slow = new Desk([...TOLD, ...BREAKS, "day"]);
+      // The numbers of a pinned loop; its worker begins with the first one.
+      this.beside = null;
       this.out = element("output", { role: "status", "aria-live": "polite" });
       this.note = element("p", { class: "live-note", role: "status" });
       this.numbers = element("table", { class: "live-numbers" });
@@ -191,8 +115,10 @@ function armlockPages() {
       this.lit = this.bound = null;
       // The loop as it is, and what was pinned, which stays as it was.
       this.design = this.pinned = null;
-      // What a page does besides where the view, the held "point" or the "loop" is another.
+      // What a page does besides where the view, the held "point", the "pin" or the "loop" is another.
       this.moved = () => {};
+      // What it does where a loop is pinned, or none.
+      this.compared = () => {};
       this.plots = [
         this.plot("Nyquist curve of L, compressed beyond 1", drawNyquist, wide => wide),
         this.plot("Bode\u2019s plot of L, and the sensitivity S = 1/(1 + L)", drawBode, wide => 0.9 * wide),
@@ -268,7 +194,7 @@ function armlockPages() {
       this.near.drop("point");
       this.wide.drop("chart");
       this.counting = false;
-      this.slow.drop(...TOLD);
+      this.slow.drop(...TOLD, ...BREAKS);
       clearTimeout(this.rest);
       this.design = this.lit = null;
       this.chart.clear();
@@ -283,8 +209,8 @@ function armlockPages() {
     /* Take another loop. While a slider moves, `moving`, pictures are coarser and nothing is asked
      * that takes long. */
     set(spec, moving = false) {
-      this.slow.drop(...TOLD);
-      this.design = { spec, loop: api.make(spec), kept: {}, told: {} };
+      this.slow.drop(...TOLD, ...BREAKS);
+      this.design = { spec, loop: api.make(spec), kept: {}, told: {}, breaks: Array(WAYS.length).fill(undefined), asked: false };
       this.chart.broken = null;
       this.lit = this.chart.lit = null;
       this.redraw(moving);
@@ -293,19 +219,23 @@ function armlockPages() {
 
     /* The open loop at the point, from few frequencies while the hand moves. */
     respond() {
-      const { design } = this, { margins } = design.told;
-      const marks = ["lower", "upper", "delay", "phase", "modulus"].map(name => margins?.[`${name}At`]).filter(w => w > 0 && w < Infinity);
-      const response = design.response = api.response(design.loop, ...this.point, this.rough ? 1200 : 9000, marks);
+      const response = this.design.response = this.responseOf(this.design, this.point);
       this.cut = `Every turn of the curves is drawn up to ${say(response.dense / TURN)} Hz${response.band.length
         ? `, and some turns and the band of all turns up to ${say(response.top / TURN)} Hz` : ""}.`;
       if (!this.lit) this.following.textContent = this.cut;
       this.draw();
     }
 
+    responseOf({ loop, told: { margins } }, point) {
+      const marks = ["lower", "upper", "delay", "phase", "modulus"].map(name => margins?.[`${name}At`]).filter(w => w > 0 && w < Infinity);
+      return api.response(loop, ...point, this.rough ? 1200 : 9000, marks);
+    }
+
     redraw(moving = false) {
       if (!this.spec) return;
       this.chart.stale = true;
-      this.chart.curve = this.dcurve(moving ? 1500 : 20000);
+      this.chart.curve = this.dcurve(this.design, moving ? 1500 : 20000);
+      if (!moving) this.chart.ghost = this.pinned && this.dcurve(this.pinned, 20000);
       this.chart.sheet.draw();
       // A chart that is being counted while a slider moves is waited for: dropped at each frame, none
       // would ever be drawn.
@@ -336,9 +266,9 @@ function armlockPages() {
       });
     }
 
-    dcurve(most) {
+    dcurve({ loop }, most) {
       const { x0, x1, y0, y1 } = this.chart.box, range = [Infinity, 0];
-      const found = api.dcurve(this.design.loop, x0, x1, y0, y1, most);
+      const found = api.dcurve(loop, x0, x1, y0, y1, most);
       for (let i = 2; i < found.curve.length; i += 3) {
         if (found.curve[i] < range[0]) range[0] = found.curve[i];
         if (found.curve[i] > range[1]) range[1] = found.curve[i];
@@ -352,14 +282,14 @@ function armlockPages() {
       if (!this.spec) return;
       const { point, design } = this;
       this.rough = rough;
-      this.slow.drop(...TOLD.filter(kind => kind !== "breaks"));
+      this.slow.drop(...TOLD);
       design.told = this.chart.hover ? {} : design.kept[point] ||= {};
       this.respond();
       this.write();
       const { told } = design;
       if (told.count === undefined) this.near.ask("point", [this.spec, ...point], (count, error) => {
         if (error) this.out.textContent = error;
-        else if (count !== UNDECIDED && told === this.design?.told) {
+        else if (count > UNDECIDED && told === this.design?.told) {
           told.count = count;
           this.write();
         }
@@ -372,14 +302,10 @@ function armlockPages() {
     write() {
       const { count, root } = this.design.told;
       const parts = [`${this.name}: ${count === undefined ? "counting \u2026" : counted(count)}`];
-      if (root && count >= 0) parts.push(`rightmost root in rad/s: ${this.rootText(root)}; it `
+      if (root && count >= 0) parts.push(`rightmost root in rad/s: ${rootText(root)}; it `
         + `${root[0] < 0 ? "decays" : "grows"} by a factor of e in ${duration(1 / Math.abs(root[0]))}`);
       this.out.textContent = `${parts.join("; ")}.${this.chart.held ? " Held: Escape or a click on it releases it." : ""}`;
       this.list();
-    }
-
-    rootText([re, im]) {
-      return `${say(re)}${im === Infinity ? ", the limit at high frequency" : im ? ` \u00b1 ${say(Math.abs(im))}j` : ""}`;
     }
 
     /* Ask for what takes longer. */
@@ -389,90 +315,71 @@ function armlockPages() {
         this.rough = false;
         this.respond();
       }
-      for (const kind of TOLD) {
-        const breaks = kind === "breaks";
-        if ((breaks ? design.breaks : told[kind]) !== undefined || breaks && design.breaking) continue;
-        design.breaking ||= breaks;
-        this.slow.ask(kind, breaks ? [design.spec] : [design.spec, ...point], (found, error) => {
-          (breaks ? design : told)[kind] = error ? UNTOLD[kind] : found;
-          if (breaks) this.chart.broken = found?.[0];
-          // A margin may lie beyond what is drawn.
-          if (kind === "margins" && told === this.design?.told) this.respond(); else this.draw();
-          this.write();
-        });
-      }
+      this.asks(this.slow, design, told, point, () => {
+        this.chart.broken = design.breaks[0]?.size;
+        // A margin may lie beyond what is drawn.
+        if (told === this.design?.told) this.respond(); else this.draw();
+        this.write();
+      });
+    }
+
+    /* Ask a desk for the numbers of a design at a point that are not there yet. */
+    asks(desk, design, told, point, heard) {
+      for (const kind of TOLD) if (told[kind] === undefined) desk.ask(kind, [design.spec, ...point], (found, error) => {
+        told[kind] = error ? UNTOLD[kind] : found;
+        heard(kind);
+      });
+      if (design.asked) return;
+      design.asked = true;
+      BREAKS.forEach((kind, k) => desk.ask(kind, [design.spec, k], (found, error) => {
+        design.breaks[k] = error ? UNBROKEN : found;
+        heard(kind);
+      }));
     }
 
     /* The numbers of the loop, and of the pinned one beside it. */
     list() {
-      const { designs } = this, wait = "\u2026";
-      const or = (value, special, words, at, write = say) => Number.isNaN(value) ? "undecided" : value === special ? words
-        : `${write(value)}${at < Infinity ? at > 0 ? ` at ${say(at / TURN)}\u00a0Hz` : "" : ", in the limit of high frequency"}`;
-      const broken = value => value === null ? "unstable at (1, 1)"
-        : value === 0 ? "0: none is tolerated" : or(value, Infinity, "none up to 2", 0);
-      const of = (read, found) => designs.map(one => found(one) === undefined ? wait : read(found(one)));
-      const margin = read => of(found => found ? read(found) : "none: unstable", one => one.told.margins);
-      const rows = [["Delay margin", margin(m => or(m.delay, Infinity, "no crossover", m.delayAt, time))],
-        ["Unstable roots", of(n => n >= 0 ? String(n) : WORDS[n], one => one.told.count)],
-        ["Phase margin in degrees", margin(m => or(m.phase * 180 / Math.PI, Infinity, "no crossover", m.phaseAt))],
-        ["Smallest gain factor of a stable loop", margin(m => or(m.lower, 0, `none above 1/${m.most}`, m.lowerAt))],
-        ["Largest gain factor of a stable loop", margin(m => or(m.upper, Infinity, `none up to ${m.most}`, m.upperAt))],
-        ["Smallest |1 + L|", margin(m => or(m.modulus, Infinity, "", m.modulusAt))]];
-      this.summarize(rows);
-      const parts = [
-        [`At ${this.name}`, ...rows, ["Rightmost root in rad/s", designs.map(({ told: { count, root } }) => count < 0 ? WORDS[count]
-          : root === undefined ? wait : root ? this.rootText(root) : "undecided")]],
-        ["Critical perturbation from (1, 1)", ...["(1, \u22121)", "(\u22121, 1)", "(1, 1)", "(\u22121, \u22121)"].map(
-          (way, k) => [`along ${way}`, of(b => broken(b[k]), one => one.breaks)])],
-      ];
+      const { designs, design } = this, parts = partsOf(designs, this.name);
+      fillPanel(this.summary, design, this.bound);
       const text = JSON.stringify(parts);
       if (text === this.listed) return;
       this.listed = text;
-      this.numbers.replaceChildren(element("thead", {}, element("tr", {},
-        ...["Number", "This loop", `Pinned at ${this.pinned?.at}`].slice(0, 1 + designs.length)
-          .map(text => element("th", { scope: "col" }, text)))),
-      ...parts.map(([title, ...rows]) => element("tbody", {},
-        element("tr", {}, element("th", { scope: "rowgroup", colspan: 1 + designs.length }, title)),
-        ...rows.map(([name, values]) => element("tr", {}, element("th", { scope: "row" }, name),
-          ...values.map(value => element("td", {}, value)))))));
-      const { design } = this, done = design?.breaks && ["count", "root", "margins"].every(
-        kind => design.told[kind] !== undefined);
-      this.ready.textContent = done ? `The table has all numbers at ${this.name}: ${parts[0].slice(1)
-        .map(([name, [value]]) => `${name}: ${value}`).join("; ")}.` : "";
-    }
-
-    /* What stays in sight: values without their frequencies. One that is asked for anew stays, faint. */
-    summarize(rows) {
-      const short = ["Delay margin", "Unstable roots", "Phase margin", "Gain factor from", "to", "Smallest |1 + L|"];
-      const modulus = this.design.told.margins?.modulus, beyond = this.bound && modulus < 10 ** (-this.bound / 20);
-      if (!this.summary.children.length) this.summary.append(...short.map(name =>
-        element("p", {}, element("span", {}, name), element("strong", {}))));
-      rows.forEach(([, [value]], k) => {
-        const place = this.summary.children[k].lastChild, pending = value === "\u2026";
-        place.classList.toggle("live-old", pending);
-        if (pending) return;
-        const [number, limit] = value.split(/ at |(?=, in the limit)/), text = `${number}${k === 2 && /^[\d.]/.test(number) ? "\u00b0" : ""}`;
-        place.textContent = limit?.startsWith(",") ? `${text}, in the limit` : text.replace("unstable at arbitrarily high frequency", "infinitely many");
-        place.textContent = place.textContent.replace("none above", "below").replace("none up to", "above");
-        place.classList.toggle("live-wrong", k === 5 && beyond);
-        if (k === 5 && beyond) place.textContent += ` (> ${say(this.bound)} dB)`;
-        place.title = k === 5 && beyond ? `${value}: |S| is above its bound of ${say(this.bound)} dB` : value;
-      });
+      fill(this.numbers, parts, ["Number", "This loop", `Pinned at ${this.pinned?.at}`].slice(0, 1 + designs.length));
+      this.ready.textContent = complete(parts) ? `The table has all numbers at ${this.name}: ${parts[0].slice(1)
+        .map(([name, [{ text }]]) => `${name}: ${text}`).join("; ")}.` : "";
     }
 
     /* The table as plain text. */
-    copy() {
-      navigator.clipboard.writeText(Array.from(this.numbers.rows, row =>
-        Array.from(row.cells, cell => cell.textContent).join("\t")).join("\n"));
+    copy() { navigator.clipboard.writeText(copied(this.numbers)); }
+
+    /* Pin the loop as it is, or release it: what follows is seen against it. */
+    pin() {
+      this.compare(this.pinned || !this.design ? null : { spec: this.spec, held: this.chart.held });
+      this.moved("pin");
     }
 
-    /* Pin curves and numbers as they are: what follows is seen against them. */
-    pin() {
-      this.pinned = this.pinned || !this.design ? null : { ...this.design, at: this.name };
-      this.chart.ghost = this.pinned && this.chart.curve;
+    /* Show a loop at its held point beside the loop, dashed, with its numbers; null for none. */
+    compare(given) {
+      if (this.beside) this.beside.drop(...TOLD, ...BREAKS);
+      this.pinned = null;
+      if (given) {
+        const { spec, held } = given, point = held || [1, 1], same = this.design && JSON.stringify(spec) === JSON.stringify(this.spec);
+        // What is known of it by now is not asked for again.
+        const told = { ...same && this.design.kept[point] }, breaks = same ? [...this.design.breaks] : Array(WAYS.length).fill(undefined);
+        const pinned = this.pinned = { spec, held, point, told, breaks, loop: api.make(spec), at: held ? this.chart.name(held) : "(1, 1)",
+          asked: breaks.every(one => one !== undefined) };
+        pinned.response = this.responseOf(pinned, point);
+        this.beside ||= new Desk([...TOLD, ...BREAKS]);
+        this.asks(this.beside, pinned, told, point, () => {
+          pinned.response = this.responseOf(pinned, point);
+          this.draw();
+          if (this.design) this.list();
+        });
+      }
+      this.chart.ghost = this.pinned && this.dcurve(this.pinned, 20000);
+      this.compared(Boolean(this.pinned));
       this.draw();
       if (this.design) this.list();
-      return Boolean(this.pinned);
     }
   }
 
@@ -518,9 +425,8 @@ function armlockPages() {
 
   /* Zoom, download of the pictures, and the ghost, of any explorer. */
   function tools(live, file, sheets, ...more) {
-    const pin = element("button", { type: "button", "aria-pressed": "false", onclick: () => {
-      pin.setAttribute("aria-pressed", String(live.pin()));
-    } }, "Pin this loop");
+    const pin = element("button", { type: "button", "aria-pressed": "false", onclick: () => live.pin() }, "Pin this loop");
+    live.compared = pinned => pin.setAttribute("aria-pressed", String(pinned));
     return buttons(button("Zoom in", () => live.chart.zoom(0.5)), button("Zoom out", () => live.chart.zoom(2)),
       ...more, pin, button("PNG", () => snapshot(sheets, blob => {
         const link = element("a", { href: URL.createObjectURL(blob), download: `${file}.png` });
@@ -584,8 +490,8 @@ function armlockPages() {
     const code = element("pre", { class: "live-code", "aria-label": "Python" });
     const orbit = element("a", {}, "Open this loop in orbit");
     // The unit of the fields, the gain from which its slider goes, the steps that Undo can take back;
-    // `quiet` while the page itself changes what it shows.
-    let unit = 1, base = 1, depth = 0, quiet = true, before = null, later = 0;
+    // `quiet` while the page itself changes what it shows; the timer of what is being typed.
+    let unit = 1, base = 1, depth = 0, quiet = true, before = null, later = 0, typing = 0;
     // The controller of the pasted text, which stays in its field.
     let pasted = null;
     const understood = element("p", { class: "live-formula" });
@@ -594,12 +500,12 @@ function armlockPages() {
     /* The address holds the loop, and its history undoes what was done to it. */
     live.moved = step => {
       if (!live.spec) return;
-      const hash = address(live.spec, live.chart, unit, fields.pasted.value, live.bound);
+      const hash = address(live.spec, live.chart, unit, fields.pasted.value, live.bound, live.pinned);
       code.textContent = python(live.spec, live.kept, unit);
       orbit.href = `in_orbit.html${hash}`;
       if (quiet) return;
-      // A point that goes on moving is one step, and another view is none.
-      const further = step && hash !== location.hash && !(step === "point" && before === "point");
+      // A point that goes on moving is one step, and so is a text that is being typed; another view is none.
+      const further = step && hash !== location.hash && !(step === before && step !== "loop");
       before = step || before;
       const write = () => {
         history[further ? "pushState" : "replaceState"]({ depth }, "", hash);
@@ -639,12 +545,50 @@ function armlockPages() {
       return spec;
     };
 
-    /* Take what the fields hold. `edited` is the field that has changed. */
-    const take = (edited = null, moving = false, dragged = false) => {
+    /* What is shown is not what the fields hold: it is grey until it is. */
+    const old = is => {
+      clearTimeout(typing);
+      if (is) place.setAttribute("aria-busy", "true"); else place.removeAttribute("aria-busy");
+    };
+
+    /* A field is edited: what is shown is old at once. A text that was pasted is taken at once, one that is
+     * typed half a second after the last key. While it is typed it may be unfinished, and is not called wrong. */
+    const edit = (name, { inputType = "" }) => {
+      old(true);
+      const whole = /^insertFrom(Paste|Drop)/.test(inputType);
+      typing = setTimeout(() => take(name, whole ? {} : { typed: true, step: `typed ${name}` }), whole ? 0 : 500);
+    };
+    /* The field is left: its text is whole. Further typing in it is another step of the history. */
+    const leave = name => {
+      if (place.hasAttribute("aria-busy")) take(name, { step: `typed ${name}` });
+      before = null;
+    };
+
+    /* The controller of a text; none of an empty one. */
+    const controller = text => {
+      const found = text.trim() ? readController(text) : null;
+      if (found && found.zeros.length > found.poles.length) throw armlockRead.wrong("pasted", `This controller has ${found.zeros.length} zeros `
+        + `and ${found.poles.length} poles. A controller here has as many poles as zeros or more.`);
+      return found;
+    };
+
+    /* Take what the fields hold. `edited` is the field that has changed, by a slider or a hand (`dragged`) that
+     * may be `moving`, or by text that may be unfinished (`typed`). */
+    const take = (edited = null, { moving = false, dragged = false, typed = false, step = "loop" } = {}) => {
+      let text = null, problem = null;
+      try {
+        if (edited === "pasted") text = controller(fields.pasted.value); else read();
+      } catch (error) {
+        problem = error;
+      }
+      // An unfinished text stays grey.
+      if (typed && problem) return;
+      old(false);
       for (const name of Object.keys(errors)) blame(name, "");
       try {
-        if (edited === "pasted") {
-          pasted = readController(fields.pasted.value);
+        if (problem) throw problem;
+        if (edited === "pasted") pasted = text;
+        if (text) {
           // Nothing of the loop before stays.
           live.none("");
           // Its numbers are those of s in rad/s.
@@ -669,7 +613,7 @@ function armlockPages() {
         live.set(spec, moving);
         if (!dragged || caught) roots.draw();
         undo.disabled = !depth;
-        if (!moving) live.moved("loop");
+        if (!moving) live.moved(step);
       } catch (error) {
         // What was typed, not what it is in rad/s or s.
         const typed = fields[error.field]?.value;
@@ -709,7 +653,7 @@ function armlockPages() {
     const field = (name, label, area = false) => {
       fields[name] = element(area ? "textarea" : "input", { id: id(name), spellcheck: "false",
         autocomplete: "off", autocapitalize: "off", rows: area ? 2 : null,
-        "aria-describedby": id(`${name}-wrong`), onchange: () => take(name) });
+        "aria-describedby": id(`${name}-wrong`), oninput: event => edit(name, event), onchange: () => leave(name) });
       errors[name] = element("span", { id: id(`${name}-wrong`), class: "live-wrong" });
       return element("div", { class: `live-field${area ? " live-wide" : ""}` },
         element("label", { for: id(name) }, label), fields[name], errors[name]);
@@ -743,13 +687,13 @@ function armlockPages() {
     const presets = preset.querySelector("select");
     const gain = slider(id("factor"), "Gain factor:", -2, 2, 0, v => say(10 ** v), (v, moving) => {
       fields.gain.value = exact(+(base * 10 ** v).toPrecision(6));
-      take("gain", moving, true);
+      take("gain", { moving, dragged: true });
     });
     // The left end is no dead time.
     const least = -7, late = v => v > least ? +(10 ** v).toPrecision(3) : 0;
     const dead = slider(id("dead"), "Dead time:", least, 1, least, v => time(late(v)), (v, moving) => {
       fields.delay.value = time(late(v));
-      take("delay", moving, true);
+      take("delay", { moving, dragged: true });
     });
     const wrong = element("p", { class: "live-note live-wrong", role: "alert" });
     const paste = field("pasted", "Paste a controller from MATLAB, Python or Julia", true);
@@ -792,7 +736,7 @@ function armlockPages() {
       moved[k] = [to[0], Math.sign(im) * to[1]];
       if (im) moved[spec[kind].findIndex(([a, b]) => a === re && b === -im)] = [to[0], -Math.sign(im) * to[1]];
       put({ ...spec, [kind]: moved });
-      take(kind, moving, moving);
+      take(kind, { moving, dragged: moving });
     };
     const on = (name, done) => roots.canvas.addEventListener(name, done);
     on("pointerdown", event => {
@@ -831,10 +775,12 @@ function armlockPages() {
       try {
         const given = fromAddress(location.hash);
         if (given) {
-          api.make(given.spec);
+          for (const one of [given, given.pinned]) if (one) api.make(one.spec);
           show(given);
+          live.compare(given.pinned);
         } else start(Object.keys(PRESETS)[0]);
       } catch (error) {
+        old(false);
         live.none("There is no loop to show.");
         shape();
         roots.draw();

@@ -9,8 +9,6 @@
  * state space its determinant, and a pole at s = 0 its place.
  */
 const armlockRead = (function () {
-  const { rootsOf } = armlockLoop();
-
   /* ---------------------------------------------------------------------------- exact numbers */
 
   /* Fractions [n, d] of whole numbers, d > 0, in lowest terms. */
@@ -82,6 +80,79 @@ const armlockRead = (function () {
 
   const shared = (p, q) => { while (q.length) [p, q] = [q, divide(p, q)[1]]; return p.map(v => over(v, p.at(-1))); };
   const derivative = p => p.slice(1).map((v, k) => times(v, number([BigInt(k + 1), 1n])));
+
+  /* Roots of a polynomial with real coefficients, the highest power first, by Aberth's method.
+   * They come in exact pairs. The first guesses lie where the polynomial's Newton polygon has
+   * its slopes, so that sizes over many decades do no harm. */
+  function rootsOf(coefficients) {
+    const from = coefficients.findIndex(c => c !== 0);
+    if (from < 0) return [];
+    const c = coefficients.slice(from).reverse(), found = [];
+    while (c[0] === 0) { c.shift(); found.push([0, 0]); }
+    const n = c.length - 1, x = [], y = [];
+    for (let low = 0; low < n;) {
+      const rise = k => (Math.log(Math.abs(c[k])) - Math.log(Math.abs(c[low]))) / (k - low);
+      let high = low + 1;
+      while (c[high] === 0) high++;
+      for (let k = high + 1; k <= n; k++) if (c[k] !== 0 && rise(k) >= rise(high)) high = k;
+      for (let k = low; k < high; k++) {
+        const size = Math.exp(-rise(high)), turn = 2 * Math.PI * (k - low) / (high - low) + 0.7 * n;
+        x.push(size * Math.cos(turn));
+        y.push(size * Math.sin(turn));
+      }
+      low = high;
+    }
+    // f' / f at a point; outside of the unit circle from the reversed polynomial, with z = 1 / s:
+    // n z - z^2 f' / f.
+    const slope = (c, re, im) => {
+      const n = c.length - 1, square = re * re + im * im, far = square > 1;
+      const [a, b] = far ? [re / square, -im / square] : [re, im];
+      let [p, q, dp, dq] = [0, 0, 0, 0];
+      for (let k = 0; k <= n; k++) {
+        [dp, dq] = [dp * a - dq * b + p, dp * b + dq * a + q];
+        [p, q] = [p * a - q * b + c[far ? k : n - k], p * b + q * a];
+      }
+      const size = p * p + q * q;
+      const [u, v] = size ? [(dp * p + dq * q) / size, (dq * p - dp * q) / size] : [Infinity, 0];
+      if (!far) return [u, v];
+      const zr = a * a - b * b, zi = 2 * a * b;
+      return [n * a - (zr * u - zi * v), n * b - (zr * v + zi * u)];
+    };
+    for (let round = 0, moved = 1; round < 200 && moved > 1e-15; round++) {
+      moved = 0;
+      for (let i = 0; i < n; i++) {
+        let [u, v] = slope(c, x[i], y[i]);
+        if (!Number.isFinite(u + v)) continue;
+        for (let k = 0; k < n; k++) if (k !== i) {
+          const dx = x[i] - x[k], dy = y[i] - y[k], square = dx * dx + dy * dy || 1e-300;
+          u -= dx / square;
+          v += dy / square;
+        }
+        const square = u * u + v * v, mx = u / square, my = -v / square;
+        if (!Number.isFinite(mx + my)) continue;
+        x[i] -= mx;
+        y[i] -= my;
+        moved = Math.max(moved, Math.hypot(mx, my) / (Math.hypot(x[i], y[i]) || 1));
+      }
+    }
+    const left = x.map((re, k) => [re, y[k]]);
+    // The upper one of each pair, the rest real.
+    while (left.length) {
+      const most = left.reduce((a, b) => Math.abs(b[1]) / Math.hypot(...b)
+        > Math.abs(a[1]) / Math.hypot(...a) ? b : a);
+      left.splice(left.indexOf(most), 1);
+      const gap = r => Math.hypot(r[0] - most[0], r[1] + most[1]);
+      const partner = left.length ? left.reduce((a, b) => gap(b) < gap(a) ? b : a) : null;
+      if (!partner || Math.abs(most[1]) < 1e-12 * Math.abs(most[0]) || gap(most) < gap(partner)) {
+        found.push([most[0], 0]);
+      } else {
+        left.splice(left.indexOf(partner), 1);
+        const re = 0.5 * (most[0] + partner[0]), im = 0.5 * Math.abs(most[1] - partner[1]);
+        found.push([re, im], [re, -im]);
+      }
+    }
+    return found;
+  }
 
   /* The roots of a real polynomial, as pairs of doubles. Multiple roots are found exactly, and so is what
    * lies on the imaginary axis. */

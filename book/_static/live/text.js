@@ -116,28 +116,27 @@ const armlockText = (function () {
   const NEEDED = sensor => ["sensor", "tau1", "tau2", "delay", "gain", "zeros", "poles",
     ...["dual", "modified"].includes(sensor) ? ["corner", "difference"] : []];
 
-  /* The address holds all: loop, view, the held point, the unit of the fields, what was pasted, and the
-   * bound on |S| if it is not 6 dB. */
-  function address(spec, { centre, half, held }, unit, pasted = "", bound = 6) {
+  /* A loop and its held point, as an address names them. */
+  function named(spec, held) {
     const parts = new URLSearchParams();
     for (const [name, key] of Object.entries(SHORT)) {
       const value = spec[name];
       if (value === undefined || !NEEDED(spec.sensor).includes(name)) continue;
       parts.set(key, Array.isArray(value) ? written(value) : value);
     }
-    parts.set("at", [...centre, half].join(","));
     if (held) parts.set("pt", held.join(","));
-    if (unit !== 1) parts.set("u", "Hz");
-    if (pasted) parts.set("k", pasted);
-    if (bound !== 6) parts.set("b", bound);
-    return `#${parts}`;
+    return parts;
   }
 
-  /* What an address holds; null where it is none of a loop. An error says what it lacks. */
-  function fromAddress(hash) {
-    const parts = new URLSearchParams(hash.slice(1)), sensor = parts.get("s");
-    if (!hash.includes("=")) return null;
-    const needed = NEEDED(sensor).filter(name => name !== "delay"), spec = { delay: 0 };
+  function numbers(parts, key, size) {
+    const found = parts.get(key).split(",").map(text => text.trim() ? Number(text) : NaN);
+    if (found.length === size && found.every(Number.isFinite)) return found;
+    throw wrong(key, `\u201c${key}=${parts.get(key)}\u201d is not ${size} numbers`);
+  }
+
+  /* The loop and the held point that parts of an address name. An error says what they lack. */
+  function loopOf(parts) {
+    const sensor = parts.get("s"), needed = NEEDED(sensor).filter(name => name !== "delay"), spec = { delay: 0 };
     for (const [name, key] of Object.entries(SHORT)) {
       const text = parts.get(key);
       if (text === null && needed.includes(name)) throw wrong(name, `it has no \u201c${key}=\u201d`);
@@ -146,16 +145,30 @@ const armlockText = (function () {
         : name === "zeros" || name === "poles" ? readRoots(name, text, name)
           : readNumber(name, text, `\u201c${key}\u201d`);
     }
-    const numbers = (key, size) => {
-      const found = parts.get(key).split(",").map(text => text.trim() ? Number(text) : NaN);
-      if (found.length === size && found.every(Number.isFinite)) return found;
-      throw wrong(key, `\u201c${key}=${parts.get(key)}\u201d is not ${size} numbers`);
-    };
-    const [x, y, half] = parts.has("at") ? numbers("at", 3) : [1, 1, 1];
+    return { spec, held: parts.has("pt") ? numbers(parts, "pt", 2) : null };
+  }
+
+  /* The address holds all: loop, view, the held point, the unit of the fields, what was pasted, the
+   * bound on |S| if it is not 6 dB, and the pinned loop. */
+  function address(spec, { centre, half, held }, unit, pasted = "", bound = 6, pinned = null) {
+    const parts = named(spec, held);
+    parts.set("at", [...centre, half].join(","));
+    if (unit !== 1) parts.set("u", "Hz");
+    if (pasted) parts.set("k", pasted);
+    if (bound !== 6) parts.set("b", bound);
+    if (pinned) parts.set("pin", named(pinned.spec, pinned.held));
+    return `#${parts}`;
+  }
+
+  /* What an address holds; null where it is none of a loop. */
+  function fromAddress(hash) {
+    if (!hash.includes("=")) return null;
+    const parts = new URLSearchParams(hash.slice(1)), [x, y, half] = parts.has("at") ? numbers(parts, "at", 3) : [1, 1, 1];
+    const loop = loopOf(parts);
     if (!(half > 0)) throw wrong("at", `its view has no width: ${half}`);
-    return { spec, centre: [x, y], half, unit: parts.get("u") === "Hz" ? TURN : 1, pasted: parts.get("k") || "",
-      bound: parts.has("b") ? numbers("b", 1)[0] : 6,
-      held: parts.has("pt") ? numbers("pt", 2) : null };
+    return { ...loop, centre: [x, y], half, unit: parts.get("u") === "Hz" ? TURN : 1, pasted: parts.get("k") || "",
+      bound: parts.has("b") ? numbers(parts, "b", 1)[0] : 6,
+      pinned: parts.has("pin") ? loopOf(new URLSearchParams(parts.get("pin"))) : null };
   }
 
   return { TURN, say, scientific, power, duration, time, exact, shortest, written, formula, python, address, fromAddress };
