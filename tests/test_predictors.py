@@ -115,18 +115,16 @@ def test_two_delays_in_the_plant_turn_independently():
 
 
 def test_powers_of_one_delay_do_not_turn_independently():
-    # |z + z^2 - z^3| is at most sqrt(5), at z = j: below one with 0.4, above one with 0.46.
-    z, w = delay(1.0), delay(1.0)
-    found = margins(0.4 * (z + z**2 - z**3))
-    assert (found.phase, found.delay) == (math.inf, math.inf)
-    x = np.exp(1j * np.linspace(0.0, np.pi, 2_000_001))
-    assert found.modulus == pytest.approx(np.abs(1 + 0.4 * (x + x**2 - x**3)).min(), rel=1e-6)
-    assert unstable_roots(0.4 * (z + w - z * w)) == UNCONFINED
-    level = 0.46 * (x + x**2 - x**3)
-    least = np.abs(np.angle(-level[np.flatnonzero(np.diff(np.abs(level) < 1.0))])).min()
-    found = margins(0.46 * (z + z**2 - z**3))
-    assert found.phase == pytest.approx(least, abs=1e-5)
-    assert found.delay == 0.0
+    # With u = z - z^2 + z^3, of which Re u is 1.32 at most, L = u / (d - u).
+    z, x = delay(1.0), np.exp(1j * np.linspace(0.0, np.pi, 2_000_001))
+    late, u = z - z**2 + z**3, x - x**2 + x**3
+    for d in (2.7, 1.8):
+        found, level = margins(late / (d - late)), u / (d - u)
+        crossings = np.flatnonzero(np.diff(np.abs(level) < 1.0))
+        least = np.abs(np.angle(-level[crossings])).min(initial=np.inf)
+        assert found.phase == pytest.approx(least, abs=1e-5)
+        assert found.delay == (0.0 if crossings.size else math.inf)
+        assert found.modulus == pytest.approx(np.abs(1 + level).min(), rel=1e-6)
 
 
 def test_a_chart_of_a_predictor_with_two_delays_ends_where_its_chain_does():

@@ -154,7 +154,7 @@ def test_a_neutral_loop_whose_roots_tend_to_the_limit_of_the_chain_is_refused_so
     loop = sum(control.tf([0.2, 1.0], [1.0, 5.0]) * delay(theta) for theta in delays)
     limit = brentq(lambda x: 0.2 * np.exp(-x * delays).sum() - 1.0, -5.0, 5.0)
     begun = time.process_time()
-    with pytest.raises(RootError, match="the limit to which neutral root chains tend") as error:
+    with pytest.raises(RootError, match="neutral root chains may tend to") as error:
         rightmost_root(loop)
     assert time.process_time() - begun < 10.0
     named = float(str(error.value).split("Re s = ")[1].split(",")[0])

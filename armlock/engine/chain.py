@@ -1,12 +1,8 @@
-"""The neutral chain: the one place that decides whether it is confined, and where it ends.
+"""Delay objects, and the neutral chain: whether it is confined, and where it ends.
 
-At high frequency a function of s is its highest power times
-
-    P(z_1 .. z_m) ,   z_k = exp(-s theta_k) ,
-
-a polynomial with one variable for each delay object. Where P vanishes, roots repeat along the
-imaginary axis for ever: the neutral chain. It stays left of the axis, for these delays and all
-small changes of them, if and only if P has no zero in the closed unit polydisc (Lemma 14).
+At high frequency a function of s is its highest power times A + sum A_k z_k, with one z_k for
+each product of delay objects. The neutral chain counts as confined where abs(A) exceeds the sum
+of the abs(A_k) (Lemma 14). Of products that share objects this asks for more than is necessary.
 """
 
 from __future__ import annotations
@@ -14,16 +10,15 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import NamedTuple, Self
 from uuid import uuid4
 
-import flint
 import numpy as np
-from flint import arb, fmpq, fmpq_poly
+from flint import fmpq
 
-from armlock.checks import BoolArray, ComplexArray, FloatArray
-from armlock.engine.polynomials import collected, enclosed_roots, exact, rounded
+from armlock.checks import ComplexArray, FloatArray
+from armlock.engine.polynomials import collected, rounded
 
 # On the torus a P that is smaller than this share of its coefficients is zero; and where a
 # candidate is looked for.
@@ -32,14 +27,8 @@ _ROUNDING, _ROUGHLY = 1e-13, 1e-9
 _MOST_CELLS = 1_000_000
 # The least |P| on the torus is bounded from below by this share of it.
 _SHARE = 0.8
-# A chain is followed along a line of parameters to this share of the largest |P|.
-_FINE = 1e-9
-# Most steps along such a line; and along an arc of phases.
-_MOST_STEPS, _MOST_TURNS = 2000, 500
-# Past this point of a line there is no limit.
-_FARTHEST = 1e150
-# Bits in which P of one delay object is bounded.
-_BITS = 200
+# An arc of phases is followed in so many steps, to this share of the coefficients.
+_MOST_TURNS, _FINE = 500, 1e-9
 
 
 class UndecidedError(RuntimeError):
@@ -123,34 +112,6 @@ def own_phases(lags: Iterable[Lag]) -> tuple[list[Lag], list[Lag]]:
         left = [lag for lag in left if lag not in own]
 
 
-def _in_disc(p: fmpq_poly) -> bool:
-    """Tell whether a polynomial has a zero in the closed unit disc, or next to it."""
-    if p.degree() < 1:
-        return not p
-    return any(not abs(z) > 1 for z, _ in enclosed_roots(p))
-
-
-def _on_circle(coefficients: Sequence[fmpq]) -> float:
-    """Return a lower bound of |P| on the unit circle, but for rounding the least value.
-
-    Its square is a polynomial in the cosine of the angle.
-    """
-    square, t, before = fmpq_poly([0]), fmpq_poly([1]), fmpq_poly([0, 1])
-    number = len(coefficients)
-    for k in range(number):
-        products = (coefficients[i] * coefficients[i + k] for i in range(number - k))
-        square += t * sum(products, fmpq(0)) * (2 if k else 1)
-        t, before = fmpq_poly([0, 2]) * t - before, t
-    slope = square.derivative()
-    found = enclosed_roots(slope) if slope.degree() > 0 else []
-    at = [z.real for z, _ in found if z.imag.contains(0) and not abs(z.real) > 1]
-    values = [
-        sum((arb(c) * x**k for k, c in enumerate(square.coeffs())), arb(0))
-        for x in (*at, arb(1), arb(-1))
-    ]
-    return math.sqrt(max(min(float(v.lower()) for v in values), 0.0))
-
-
 def _on_torus(
     powers: FloatArray,
     rows: FloatArray,
@@ -193,108 +154,12 @@ def _powers(lags: Iterable[Lag]) -> FloatArray:
     return np.array([[dict(lag).get(d, 0) for d in objects] for lag in lags], np.float64)
 
 
-@lru_cache(maxsize=4096)
-def _least(lags: tuple[Lag, ...], coefficients: tuple[float, ...], free: float) -> float:
-    """Return a lower bound of |P| - free on the closed polydisc; 0 where P has a zero there."""
-    powers = _powers(lags)
-    # With all variables equal, P has no zero in the disc. The torus is left (Strintzis).
-    diagonal = fmpq_poly([0])
-    for total, c in zip(powers.sum(1), coefficients, strict=True):
-        diagonal += exact(c) * fmpq_poly([0, 1]) ** int(total)
-    before, flint.ctx.prec = flint.ctx.prec, _BITS
-    try:
-        if _in_disc(diagonal):
-            return 0.0
-        if powers.shape[1] == 1:
-            # Squares of large numbers would overflow.
-            size = max(map(abs, coefficients))
-            return size * _on_circle((diagonal / exact(size)).coeffs()) - free
-    finally:
-        flint.ctx.prec = before
-    return _on_torus(powers, np.array([coefficients]), free, lambda p: np.abs(p[:, 0]))
+def reserve(still: FloatArray, late: FloatArray) -> FloatArray:
+    """Return what products of delays leave of undelayed terms, shapes (n,) and (n, K).
 
-
-def reserve(lags: Sequence[Lag], still: FloatArray, late: FloatArray) -> FloatArray:
-    """Bound |P| from below on the closed unit polydisc: what all else decides from.
-
-    Parameters
-    ----------
-    lags : sequence of Lag
-        The K products of delay objects.
-    still, late : float arrays, shapes (n,) and (n, K)
-        The coefficients of P that nothing delays, and those of the products, of n functions.
-
-    Returns
-    -------
-    float array, shape (n,)
-        Exact for products with an object of their own (the sum of magnitudes) and for one
-        object; a bound for others. Zero or negative where the chain is not confined.
+    By the sum of magnitudes. The chain is confined where it is positive.
     """
-    sizes = np.abs(late)
-    found: FloatArray = np.abs(still) - sizes.sum(-1)
-    for i in np.flatnonzero(shared(lags, late)):
-        here = [lag for lag, c in zip(lags, late[i], strict=True) if c]
-        free, left = own_phases(here)
-        places = [lags.index(lag) for lag in left]
-        loose = float(sum(sizes[i, lags.index(lag)] for lag in free))
-        coefficients = float(still[i]), *late[i, places].tolist()
-        found[i] = _least((NOW, *left), coefficients, loose) if still[i] else -loose
-    return found
-
-
-def shared(lags: Sequence[Lag], late: FloatArray) -> BoolArray:
-    """Tell of which functions the sum of magnitudes is not the rule, shape (n,)."""
-    acts = late != 0.0
-    found: BoolArray = np.zeros(len(late), np.bool_)
-    if own_phases([lag for lag, a in zip(lags, acts.any(0), strict=True) if a])[1]:
-        kinds, which = np.unique(acts, axis=0, return_inverse=True)
-        odd = [
-            bool(own_phases([lag for lag, a in zip(lags, kind, strict=True) if a])[1])
-            for kind in kinds
-        ]
-        found = np.array(odd)[which.ravel()]
-    return found
-
-
-def turned(lags: Sequence[Lag], still: float, late: FloatArray, omega: float) -> float:
-    """Argument of P over that of its undelayed term, at s = j omega, followed from z = 0.
-
-    Along a radius of the polydisc, in which P has no zero.
-    """
-    if not shared(lags, late[None]).any():
-        return 0.0
-    acting = [(lag, c) for lag, c in zip(lags, late.tolist(), strict=True) if c]
-    c = np.array([v for _, v in acting]) / still
-    degrees = np.array([sum(n for _, n in lag) for lag, _ in acting])
-    phases = (exact(omega) * lag.time / exact(2.0 * math.pi) for lag, _ in acting)
-    z = np.exp([-1j * float((x - x.floor()) * exact(2.0 * math.pi)) for x in phases])
-    least = float(reserve(lags, np.array([still]), late[None])[0]) / abs(still)
-    r = np.linspace(0.0, 1.0, 8 + int(4.0 * np.abs(c) @ degrees / least))[:, None]
-    return float(np.unwrap(np.angle(1.0 + (r**degrees * z) @ c))[-1])
-
-
-def hull_reserve(lags: Sequence[Lag], still: FloatArray, late: FloatArray) -> float:
-    """Bound |P| from below for all P between n of them, shapes (n,) and (n, K).
-
-    Of two, step by step along the line between them; of more, by what they differ from their
-    mean.
-    """
-    rows = np.column_stack((still, late))
-    if len(rows) != 2:
-        middle = rows.mean(axis=0)
-        apart = float(np.abs(rows - middle).sum(axis=1).max())
-        return float(reserve(lags, middle[:1], middle[None, 1:])[0]) - apart
-    slope, t, least = float(np.abs(rows[1] - rows[0]).sum()), 0.0, math.inf
-    for _ in range(_MOST_STEPS):
-        v = rows[0] + t * (rows[1] - rows[0])
-        here = float(reserve(lags, v[:1], v[None, 1:])[0])
-        least = min(least, 0.5 * here)
-        if least <= _FINE * float(np.abs(v).sum()):
-            return 0.0
-        if t >= 1.0:
-            return least
-        t = min(t + 0.5 * here / slope, 1.0) if slope else 1.0
-    return 0.0
+    return np.asarray(np.abs(still) - np.abs(late).sum(-1))
 
 
 def _loosened(
@@ -375,48 +240,20 @@ def arc_limit(
     return angle, False
 
 
-def line_limit(
-    lags: Sequence[Lag],
-    f: Sequence[fmpq],
-    g: Sequence[fmpq],
-    start: float,
-    rounding: float,
-) -> float:
+def line_limit(f: Sequence[fmpq], g: Sequence[fmpq], start: fmpq, rounding: fmpq) -> float:
     """First t >= start at which the chain of f + t g is not confined; inf where it always is.
+
+    Exactly: what is left of the undelayed term, less a share for rounding, is linear in t
+    between the t at which a term vanishes.
 
     Parameters
     ----------
-    lags : sequence of Lag
-        The K products.
     f, g : sequence of fmpq, length 1 + K
-        The coefficients of P: that of the undelayed term, and those of the products.
-    start : float
+        The coefficient of the undelayed term, and those of the K products.
+    start : fmpq
         Where to begin.
-    rounding : float
+    rounding : fmpq
         The share of the undelayed term that has to be left.
-    """
-    a, b = (np.array(v, np.float64) for v in (f, g))
-    if not shared(lags, (np.abs(a[1:]) + np.abs(b[1:]))[None]).any():
-        return _plain_line_limit(f, g, exact(start), exact(rounding))
-    t, slope = start, float(np.abs(b).sum())
-    for _ in range(_MOST_STEPS):
-        v = a + t * b
-        left = float(reserve(lags, v[:1], v[None, 1:])[0]) - rounding * abs(v[0])
-        if left <= _FINE * float(np.abs(v).sum()):
-            return t
-        if not slope or t > _FARTHEST:
-            return math.inf
-        # |P| changes by no more than the slope.
-        t += left / slope
-    raise UndecidedError(f"the limit of the neutral chain is not found, from t = {t:.6g} on")
-
-
-def _plain_line_limit(
-    f: Sequence[fmpq], g: Sequence[fmpq], start: fmpq, rounding: fmpq
-) -> float:
-    """Do what `line_limit` does, exactly, where the sum of magnitudes is the rule (Lemma 14).
-
-    What is left of the undelayed term is linear in t between the t at which a term vanishes.
     """
     breaks = {-a / b for a, b in zip(f, g, strict=True) if b}
 
@@ -437,9 +274,9 @@ def _plain_line_limit(
 
 
 def real_part_limit(lags: Sequence[Lag], still: float, late: FloatArray) -> float:
-    """Limit to which the real parts of the chain's roots tend from the left; -inf without one.
+    """Limit right of which the chain has no roots; -inf without a chain.
 
-    Right of it P(z exp(-sigma theta)) has no zero in the polydisc.
+    Unless products share objects, the real parts of the roots tend to it.
     """
     acting = [(lag, abs(c)) for lag, c in zip(lags, late.tolist(), strict=True) if c]
     if not acting:
@@ -453,20 +290,4 @@ def real_part_limit(lags: Sequence[Lag], still: float, late: FloatArray) -> floa
         logs = np.log(sizes) - delays * limit
         whole = np.logaddexp.reduce(logs)
         limit += float(whole / (np.exp(logs - whole) @ delays))
-    if not shared(lags, late[None]).any():
-        return limit
-    times = np.array([float(lag.time) for lag in lags])
-
-    def confined(sigma: float) -> bool:
-        weights = late * np.exp(-sigma * times)
-        return bool(reserve(lags, np.array([still]), weights[None])[0] > 0.0)
-
-    # The sum of magnitudes is an upper bound, and the limit is found by halving.
-    high, width = limit, 1.0 / float(delays.max())
-    low = high - width
-    while confined(low) and high - low < 1e3 * width:
-        low -= high - low
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if confined(middle) else (middle, high)
-    return high
+    return limit

@@ -19,10 +19,10 @@ from flint import fmpq
 
 from armlock.checks import FloatArray, IntArray
 from armlock.compiled import Plain
-from armlock.engine import chain, extended, inclusion
+from armlock.engine import chain, inclusion
 from armlock.engine.chain import UndecidedError
 from armlock.engine.functions import Function, Leading, Space, compiled, stacked
-from armlock.engine.inclusion import DISTANCE, REAL, VERTEX, Functions, Question
+from armlock.engine.inclusion import DISTANCE, VERTEX, Functions, Question
 from armlock.engine.polynomials import exact, rounded
 
 #: What a count is where a root lies on the axis, or rounding does not decide on which side.
@@ -35,9 +35,6 @@ UNDECIDED = -3
 # Most steps of a count, and of a search; up to ten seconds each.
 _MOST_STEPS = 1_500_000
 _MOST_SEARCHED = 2_000_000
-# Most intervals that are decided in extended precision, and how far they reach beyond what
-# double precision does not decide, over the longest delay.
-_MOST_EXTENDED, _AROUND = 12, 1e-5
 # Steps between two looks at the keyboard.
 _A_WHILE = 100_000
 # Steps in likely intervals before a search.
@@ -114,17 +111,11 @@ def counts(
         lead.direction if lead else np.sign(value)
         for lead, value in zip((leads[int(k)] for k in here), first.real, strict=True)
     ]
-    still, late = space.limits(steady[here], delayed[here])
-    closing = np.zeros(here.size)
-    if space.step:
-        # There the function of a map is real.
-        at_end = np.sign(last.real)
-    else:
-        for i in np.flatnonzero(chain.shared(space.lags, late)):
-            closing[i] = chain.turned(space.lags, still[i], late[i], ends[here[i]])
-        at_end = np.sign(still) * 1j ** (space.degree % 4) * np.exp(1j * closing)
+    still, _ = space.limits(steady[here], delayed[here])
+    # There the function of a map is real.
+    at_end = np.sign(last.real) if space.step else np.sign(still) * 1j ** (space.degree % 4)
     with np.errstate(all="ignore"):
-        turn = turn + np.angle(first / directions) - np.angle(last / at_end) - closing
+        turn = turn + np.angle(first / directions) - np.angle(last / at_end)
     # A map counts zeros in the strip |Im s| < pi / step, at whose right end it is constant.
     number = 0.5 * ((0 if space.step else space.degree) - order[here]) - turn / np.pi
     with np.errstate(invalid="ignore"):
@@ -315,16 +306,12 @@ class Family:
     def _end(self, vertices: list[Function], terms: list[Function]) -> float:
         """Return the frequency past which some vertices exceed some terms, or inf."""
         steady, delayed = stacked(vertices)
-        still, late = self.space.limits(steady, delayed)
-        size = sum((f.sizes for f in terms), np.zeros(steady.shape[1]))
-        top, least = sum(f.size_at_infinity for f in terms), None
-        if not self.space.step and chain.shared(self.space.lags, late).any():
-            least = chain.hull_reserve(self.space.lags, still, late)
-        elif (still > 0.0).any() and (still < 0.0).any():
+        still, _ = self.space.limits(steady, delayed)
+        if (still > 0.0).any() and (still < 0.0).any():
             return np.inf
-        return float(
-            self.space.confined_from(steady, delayed, size, top_terms=top, reserve=least).max()
-        )
+        size = sum((f.sizes for f in terms), np.zeros(steady.shape[1]))
+        top = sum(f.size_at_infinity for f in terms)
+        return float(self.space.confined_from(steady, delayed, size, top_terms=top).max())
 
     def _arc_ends(self, angle: float) -> float:
         """Do what `ends` does for f_0 + exp(j psi) f_1 on an arc around zero (Lemma 24)."""
@@ -361,10 +348,10 @@ def _searched(
     best: float,
     where: float,
     most: int = _MOST_SEARCHED,
-) -> tuple[float, float, FloatArray, FloatArray]:
+) -> tuple[float, float, FloatArray]:
     """Walk over intervals, the last first, until none is left, or several are undecided.
 
-    Returns the best value, where, and the intervals that are undecided and left.
+    Returns the best value, where, and the intervals that are undecided.
 
     Raises
     ------
@@ -380,7 +367,7 @@ def _searched(
             raise UndecidedError(
                 f"a search takes more than {most:.0e} steps, at {pending[-1, 0]:.3g} rad/s"
             )
-    return best, where, undecided, pending
+    return best, where, undecided
 
 
 def least(
@@ -393,7 +380,6 @@ def least(
     tolerance: float = 1e-6,
     low: float = 0.0,
     high: float = np.inf,
-    patience: int = _MOST_SEARCHED,
 ) -> tuple[float, float]:
     """Find the largest level up to which no function of a family has a zero.
 
@@ -411,8 +397,6 @@ def least(
         No zero has a level below start + (best - start) (1 - tolerance).
     low, high : float, optional
         The frequencies in rad/s between which zeros count; all by default.
-    patience : int, optional
-        Most steps, as long as no level below `best` is known to have a zero.
 
     Returns
     -------
@@ -434,7 +418,6 @@ def least(
     if best <= start:
         return best, where
     level = min(start + (best - start) * (1.0 - tolerance), 1e300)
-    most = patience if np.isnan(where) else _MOST_SEARCHED
     begin, end = low or family.begins(level), min(family.ends(level), high)
     if not begin > 0.0:
         raise UndecidedError("the behaviour at s = 0 is not decided")
@@ -446,30 +429,10 @@ def least(
     edges[0], edges[-1] = begin, end
     cover = np.column_stack((edges[:-1], edges[1:]))
     order = np.argsort(np.modf(np.arange(len(cover)) * 0.6180339887498949)[0])
-    pending, shortest = cover[order], _AROUND / (family.space.longest or np.inf)
-    for _ in range(_MOST_EXTENDED):
-        best, where, undecided, pending = _searched(
-            functions, question, pending, best, where, most
-        )
-        if not len(undecided):
-            return best, where
-        if goal != REAL or family.space.step:
-            break
-        low, high = undecided[0] + [-shortest, shortest]
-        f, g = family.functions
-        found, omega = extended.first_on(f, g, (low, high), (start, best))
-        best, where = (found, omega) if found < best else (best, where)
-        pending = _without(np.concatenate((undecided, pending)), low, high)
-    raise UndecidedError(f"rounding does not decide at {undecided[0, 0]:.6g} rad/s")
-
-
-def _without(intervals: FloatArray, low: float, high: float) -> FloatArray:
-    """Return what is left of intervals without one."""
-    below, above = intervals.copy(), intervals.copy()
-    below[:, 1] = np.minimum(below[:, 1], low)
-    above[:, 0] = np.maximum(above[:, 0], high)
-    found = np.concatenate((below, above))
-    return found[found[:, 0] < found[:, 1]]
+    best, where, undecided = _searched(functions, question, cover[order], best, where)
+    if len(undecided):
+        raise UndecidedError(f"rounding does not decide at {undecided[0, 0]:.6g} rad/s")
+    return best, where
 
 
 def excludes(
@@ -504,7 +467,7 @@ def excludes(
         return True
     # The best distance is zero already, so that the walk only tests.
     question, axis = family.question(DISTANCE, 0.0, 0.0), np.array([[begin, end]])
-    *_, undecided, _ = _searched(compiled(family.functions), question, axis, 0.0, np.nan, most)
+    *_, undecided = _searched(compiled(family.functions), question, axis, 0.0, np.nan, most)
     return not len(undecided)
 
 

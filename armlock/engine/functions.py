@@ -199,7 +199,7 @@ class Space:
         if self.step:
             return np.ones(len(still), np.bool_)
         sizes = np.abs(still) + np.abs(late).sum(-1)
-        found: BoolArray = chain.reserve(self.lags, still, late) > 16.0 * EPSILON * sizes
+        found: BoolArray = chain.reserve(still, late) > 16.0 * EPSILON * sizes
         return found
 
     def confined_from(
@@ -243,7 +243,7 @@ class Space:
         parts = parts + terms + np.abs(extra)
         still, turned = self.limits(steady, delayed)
         if reserve is None:
-            reserve = chain.reserve(self.lags, still, turned)
+            reserve = chain.reserve(still, turned)
         with np.errstate(under="ignore"):
             rounding = 64.0 * EPSILON * ((np.abs(whole) + parts) @ lead)
         room = reserve - (terms @ lead if top_terms is None else top_terms) - rounding

@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -22,10 +23,9 @@ from armlock.engine.functions import Function, common_zeros, keeps_sign_up_to, s
 from armlock.engine.inclusion import DELAY, DISTANCE, EPSILON, PHASE, REAL, TERM, VERTEX
 from armlock.engine.polynomials import Polynomial, exact, on_axis, rounded
 
-# Gain factors up to which a search goes at first, and then goes on. Past the first one it ends
-# after so many steps if it has found nothing.
-_GAINS = *(10.0**k for k in range(4, 17)), 1e24, 1e48, 1e96, 1e192
-_FEW_STEPS, _STEPS_OF_A_PROOF = 1_000_000, 200_000
+# Gain factors up to which is searched, the next one where doubles do not decide the last one;
+# and most steps of a proof that no gain is too large.
+_GAINS, _STEPS_OF_A_PROOF = (1e6, 1e4, 1e2), 200_000
 # So close to the limit of the neutral root chain, as a share, no root is looked for.
 _NEXT_TO_THE_CHAIN = 1e-5
 # And so close to it, as a share, what rounding hides is that limit.
@@ -100,8 +100,8 @@ class Margins:
     modulus : float
         Smallest |1 + L|.
     gain_lower_is_bound, gain_upper_is_bound : bool
-        Whether the search ended at that factor, and has found no margin up to it: factors
-        beyond are not decided.
+        Whether the search, which goes up to 1e6 at most, has found no margin up to that factor:
+        factors beyond it are not decided.
     gain_omega, phase_omega, modulus_omega : float
         Where the upper gain margin, the phase margin and the modulus margin are taken, in
         rad/s; inf where it is the limit at high frequency, nan where there is none.
@@ -162,17 +162,17 @@ def chain_limit(f: Function, g: Function, start: float, rounding: float = 0.0) -
     """
     if f.space.step:
         return math.inf
-    return chain.line_limit(f.space.lags, f.limits, g.limits, start, rounding)
+    return chain.line_limit(f.limits, g.limits, exact(start), exact(rounding))
 
 
 def first_zero(
-    f: Function, g: Function, most: float, start: float, high: float = math.inf, **options: int
+    f: Function, g: Function, most: float, start: float, high: float = math.inf
 ) -> tuple[float, float]:
     """Find the smallest t > start up to `most` at which f + t g has a zero on the axis.
 
-    Past the frequency `high` there is none. The options are those of `decide.least`. Returns t
-    and the frequency in rad/s: 0 for a zero at s = 0, inf where the neutral root chain is not
-    confined, nan where nothing is found.
+    Past the frequency `high` there is none. Returns t and the frequency in rad/s: 0 for a zero
+    at s = 0, inf where the neutral root chain is not shown to be confined, nan where nothing is
+    found.
 
     Raises
     ------
@@ -195,9 +195,7 @@ def first_zero(
         best, where = zero, 0.0
     if not g.is_zero:
         hull = [(VERTEX, (1.0, start), (0.0, 0.0)), (VERTEX, (1.0, 0.0), (0.0, 1.0))]
-        best, where = least(
-            Family([f, g], [hull]), REAL, best, where, start=start, high=high, **options
-        )
+        best, where = least(Family([f, g], [hull]), REAL, best, where, start=start, high=high)
     if math.isnan(where) and decided < most * (1.0 - _DECIDED_SHARE):
         raise UndecidedError(f"rounding hides whether the chain is confined from {decided} on")
     return (limit, where) if where == math.inf else (best, where)
@@ -222,11 +220,15 @@ def _limit_of_ratio(d: Function, n: Function) -> tuple[float, float, float]:
     whole, turned = space.limits(*stacked([d, n]))
     size = abs(whole[0]) + np.abs(turned[0]).sum()
     # Zero between phases is no limit of a stable D.
-    left = float(chain.reserve(space.lags, whole[:1], turned[:1])[0])
+    left = float(chain.reserve(whole[:1], turned[:1])[0])
     acting = np.flatnonzero(turned.any(axis=0))
     lags, turned = [space.lags[k] for k in acting], turned[:, acting]
     objects = sorted({one for lag in lags for one, _ in lag}, key=lambda one: one.mark)
-    if not turned[1].any() and not chain.shared(lags, turned[:1]).any():
+    # Of shared objects the sum of magnitudes is no limit.
+    shared = bool(chain.own_phases(lag for lag, c in zip(lags, turned[0], strict=True) if c)[1])
+    if left <= 0.0 and shared:
+        return math.inf, math.nan, 0.0
+    if not turned[1].any() and not shared:
         turns = -np.sign(turned[:1]) * np.sign(whole[0])
     elif len(objects) <= _MOST_SIGNS:
         signs = [
@@ -432,7 +434,7 @@ def _positive_past(p: fmpq_poly) -> float:
 def _no_zero_beyond(f: Function, g: Function, most: float, end: float) -> bool:
     """Tell whether f + t g has no zero on the axis for any t from `most` on; True is proven.
 
-    Past the frequency `end` there is none.
+    Past the frequency `end` there is none. False where doubles do not decide.
     """
     if at_zero(f, g) > most or chain_limit(f, g, most) < math.inf:
         return False
@@ -440,7 +442,9 @@ def _no_zero_beyond(f: Function, g: Function, most: float, end: float) -> bool:
     family = Family([f, g], [hull])
     # Where F conj(G) is not real, no real t makes F + t G zero.
     begin = family.begins(0.0) or keeps_sign_up_to(f, g, odd=True)
-    return end == 0.0 or decide.excludes(family, begin, end, _STEPS_OF_A_PROOF)
+    with suppress(UndecidedError):
+        return end == 0.0 or decide.excludes(family, begin, end, _STEPS_OF_A_PROOF)
+    return False
 
 
 class GainLimit(NamedTuple):
@@ -455,29 +459,35 @@ class GainLimit(NamedTuple):
 
 
 def _gain_limit(f: Function, g: Function, end: Callable[[float], float]) -> GainLimit:
-    """Search until a zero is found, or none is proven to be, or the steps are used up.
+    """Search as far as doubles decide; where nothing is found, try to prove that nothing is.
 
     `end` returns the frequency past which f + t g is not zero for any t up to a given one.
     """
     if f.is_zero or g.is_zero:
         return GainLimit(math.inf)
-    looked_at = 1.0
     for most in _GAINS:
+        # A search leaves a share of 1e-6.
+        further = most * (1.0 + 1e-5)
         try:
-            # What was looked at overlaps: a search leaves a share of 1e-6.
-            start, first = max(1.0, looked_at * (1.0 - 1e-5)), looked_at == 1.0
-            options = {} if first else {"patience": _FEW_STEPS}
-            found, where = first_zero(f, g, most, start, end(most), **options)
-            if not math.isnan(where):
-                return GainLimit(found, where)
-            looked_at = most * (1.0 - 1e-5)
-            if _no_zero_beyond(f, g, most, end(math.inf)):
-                return GainLimit(math.inf)
+            found, where = first_zero(f, g, further, 1.0, end(further))
         except UndecidedError:
-            if looked_at == 1.0:
+            if most == _GAINS[-1]:
                 raise
-            break
-    return GainLimit(looked_at, is_bound=True)
+            continue
+        if where == math.inf and _shares_objects(f, g):
+            return GainLimit(found, is_bound=True)
+        if not math.isnan(where):
+            return GainLimit(found, where)
+        if _no_zero_beyond(f, g, most, end(math.inf)):
+            return GainLimit(math.inf)
+        break
+    return GainLimit(most, is_bound=True)
+
+
+def _shares_objects(f: Function, g: Function) -> bool:
+    """Tell whether the sum of magnitudes asks for more than f + t g needs at high frequency."""
+    pairs = zip(f.space.lags, f.limits[1:], g.limits[1:], strict=True)
+    return bool(chain.own_phases(lag for lag, a, b in pairs if a or b)[1])
 
 
 def gain_limits(n: Function, m: Function) -> tuple[GainLimit, GainLimit]:
@@ -537,7 +547,7 @@ def require_stable(
     if count != 0:
         reasons = {
             decide.BOUNDARY: f"a {zero} on the imaginary axis",
-            decide.UNCONFINED: "no confined chain: small changes of a delay make it unstable",
+            decide.UNCONFINED: "no confined chain: small delay changes may make it unstable",
             1: f"1 unstable {zero}",
         }
         found = reasons.get(count, f"{count} unstable {zero}s")

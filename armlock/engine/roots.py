@@ -333,8 +333,8 @@ def rightmost_zero(function: Function, common: int = 0) -> complex:
                 low = sigma
         if high == first and search.points > _ENOUGH_POINTS:
             why = (
-                f": no root lies right of Re s = {first:.6g}, the limit to which neutral root "
-                "chains tend"
+                f": no root lies right of Re s = {first:.6g}, the limit that neutral root "
+                "chains may tend to"
             )
             break
         search.further = min(2.0 * search.further, _MOST_TURNS_FURTHER)

@@ -213,7 +213,7 @@ def _limits(d: Function, changes: Sequence[Function], order: int, omega: float) 
         return np.array([abs(float(value / values[0])) for value in values])
     whole, turned = d.space.limits(*stacked([d, *changes]))
     sizes: FloatArray = np.abs(whole) + np.abs(turned).sum(axis=1)
-    sizes[:1] = chain.reserve(d.space.lags, whole[:1], turned[:1])
+    sizes[:1] = chain.reserve(whole[:1], turned[:1])
     return sizes
 
 

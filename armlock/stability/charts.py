@@ -353,16 +353,10 @@ class _Rows:
 
     @property
     def plain(self) -> bool:
-        """Whether the sum of magnitudes tells where the chain is confined, for all x and y.
-
-        Then nothing undelayed of the highest power has a parameter.
-        """
+        """Whether nothing undelayed of the highest power has a parameter."""
         space = self.first.space
-        still, late = space.limits(*stacked([self.constant, self.first, self.second]))
-        acting = np.abs(late).sum(0)[None]
-        return bool(space.step) or not (
-            still[1:].any() or chain.shared(space.lags, acting).any()
-        )
+        still, _ = space.limits(*stacked([self.constant, self.first, self.second]))
+        return bool(space.step) or not still[1:].any()
 
     def _limits(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the limits of D at infinity at points, shapes (n,) and (n, K)."""
@@ -378,7 +372,7 @@ class _Rows:
 
     def reserve(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Tell by how much the chain is confined."""
-        return chain.reserve(self.first.space.lags, *self._limits(x, y))
+        return chain.reserve(*self._limits(x, y))
 
     def at_zero(self, x: FloatArray, y: FloatArray) -> BoolArray:
         """Tell where rounding hides the sign of D(0)."""

@@ -220,11 +220,12 @@ def unstable_roots(
         below some 10 EPSILON (n + omega tau) of the sum of its terms' sizes, with the degrees
         of N and M together as n and the longest delay as tau. This is 4e-10 of the parameters
         where a root crosses at 1e4 rad/s, with 20 s, and no terms cancel. `UNCONFINED`
-        (-2) where the neutral root chain is not confined to the left half-plane: an
-        arbitrarily small change of one delay object can then make infinitely many roots
-        unstable. A chain that is confined by no more than rounding, about 1e-14, counts as not
-        confined, and such a loop has no margins. `UNDECIDED` (-3) at a point among several that
-        takes too many steps.
+        (-2) where the neutral root chain is not shown to be confined to the left half-plane: at
+        the highest power of s, delayed terms are together as large as what is not delayed, up
+        to rounding of about 1e-14. An arbitrarily small change of one delay object can then
+        make infinitely many roots unstable; only where several products share one object, the
+        chain may be confined all the same. Such a loop has no margins. `UNDECIDED` (-3) at a
+        point among several that takes too many steps.
 
     Raises
     ------
