@@ -30,7 +30,6 @@ NOT_YET = {
     "11_robust_controller": "alone",
     "13_orbits": "behind short bare",
     "14_tdi": "behind bare",
-    "15_six_lasers": "open alone short bare",
     "18_errata": "behind",
 }
 

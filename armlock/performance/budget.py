@@ -137,12 +137,14 @@ class NoiseBudget:
         import matplotlib.pyplot as plt
 
         ax = plt.gca() if ax is None else ax
+        # Below the sources: the largest of them is seen on the total.
+        wide = {"color": "0.75", "linestyle": "-", "linewidth": 4.0, "label": "total"}
+        ax.loglog(self.frequency, self.total, **wide)
         for line, (name, asd) in zip(cycle(("-", "--", "-.", ":")), self.sources.items()):
             shown = {"linestyle": line, "linewidth": 0.9, "label": name, **style}
             ax.loglog(self.frequency, asd, **shown)
-        ax.loglog(self.frequency, self.total, color="black", linewidth=1.4, label="total")
         ax.loglog(
-            self.frequency, self.requirement, color="0.5", dashes=(6, 2), label="required"
+            self.frequency, self.requirement, color="black", dashes=(6, 2), label="required"
         )
         ax.set(xlabel="frequency [Hz]", ylabel=r"frequency noise [Hz/$\sqrt{\mathrm{Hz}}$]")
         return ax
