@@ -211,6 +211,22 @@ def _mixed(terms: Sequence[Function], point: Sequence[float | fmpq]) -> Function
     return found
 
 
+def present(n: Function, m: Function) -> tuple[Function, Function]:
+    """Return N and M at a point by the polynomials that they hold there.
+
+    Where the highest power of s has a parameter that is zero, what is left has a lower degree.
+    """
+    space, (one, other) = n.space, ((f.steady != 0) | f.delayed.any(axis=1) for f in (n, m))
+    kept = np.flatnonzero(one | other)
+    if not kept.size or max(space.polynomials[j].degree for j in kept) == space.degree:
+        return n, m
+    left = [space.polynomials[j] for j in kept]
+    own = Space(left, space.lags, space.step, space.known)
+    return Function(own, n.steady[kept], n.delayed[kept]), Function(
+        own, m.steady[kept], m.delayed[kept]
+    )
+
+
 def common(n: Function, m: Function) -> int:
     """Order of the root at s = 0 that N and M have in common; of an equation a known one."""
     return n.space.known.get(fmpq(0), 0) if m.is_zero else common_zeros(n, m)
@@ -223,7 +239,7 @@ def quotient_at(
     system = System.of(system)
     given = {k: exact_number(k, v) for k, v in system.given(values, numbers or {}).items()}
     try:
-        return Affine.of(system).quotient(*given.values())
+        return present(*Affine.of(system).quotient(*given.values()))
     except NotAffineError:
         return Affine(system, (), **given).quotient()
 

@@ -28,8 +28,10 @@ from armlock import (
     equation,
     first_crossing,
     margins,
+    modulus_margin,
     paper_loop,
     parameter,
+    peak_gain,
     rightmost_root,
     s,
     semi_discretization,
@@ -443,3 +445,38 @@ def test_arithmetic_is_exact_and_takes_what_engineers_have():
     with pytest.raises(TypeError, match="power must be a whole number"):
         s**0.5  # type: ignore[operator]
     np.testing.assert_allclose(((s + 1) ** -2)(omega), (omega + 1) ** -2.0)
+
+
+# a parameter that is zero before the highest power of s -----------------------
+
+
+def filtered(nominal=None):
+    """A loop whose filter has the time constant T."""
+    k, t = parameter("k", 1.0), parameter("T", nominal)
+    return k * delay(1.0) / ((t * s + 1) * (s + 1))
+
+
+def test_what_a_zero_leaves_at_the_highest_power_is_what_is_asked_about():
+    loop, there = filtered(), filtered().at(T=0.0)
+    assert unstable_roots(loop, T=0.0) == unstable_roots(there) == 0
+    # A negative time constant is a fast unstable pole.
+    assert unstable_roots(loop, T=[0.0, 1e-9, 0.1, -0.1]).tolist() == [0, 0, 0, 1]
+    assert modulus_margin(loop, T=0.0) == modulus_margin(there)
+    assert repr(margins(loop, T=0.0)) == repr(margins(there))
+    assert rightmost_root(loop, T=0.0) == rightmost_root(there)
+    nominal = filtered(0.0)
+    assert peak_gain(1 / (1 + nominal)) == peak_gain(1 / (1 + there))
+    assert critical_perturbation(nominal, {"k": 1.0}) == critical_perturbation(there, [1.0])
+    improper = (parameter("k", 1.0) + parameter("q") * s**2) / (s + 1)
+    assert unstable_roots(improper, q=0.0) == 0
+    # With k the highest power is only delayed.
+    advanced = equation(parameter("k") * s * delay(1.0) + 2)
+    assert unstable_roots(advanced, [0.0, 1.0]).tolist() == [0, UNCONFINED]
+
+
+def test_a_chart_has_the_column_in_which_a_time_constant_is_zero():
+    gain, constant = np.linspace(0.0, 8.0, 33), np.arange(-20, 21) / 64
+    chart = stability_chart(filtered(), k=gain, T=constant)
+    expected = unstable_roots(filtered().at(T=0.0), gain)
+    assert set(expected) == {0, 2}
+    np.testing.assert_array_equal(chart.counts[20], expected)

@@ -98,6 +98,8 @@ class _Ray:
             affine = Affine.of(system)
             self.n, self.m = affine.quotient(*self.start.tolist())
             moved = [_along(part, self.way) * self.scale for part in (affine.n, affine.m)]
+            if not any(f.size_at_infinity for f in (self.n, self.m, *moved)):
+                raise NotAffineError("a parameter that stays is zero at the highest power")
         except NotAffineError:
             line = {k: System.of(begin[k]) + way[k] * _U for k in way}
             along = Affine(system.at(**{**begin, **line}), ("u",))

@@ -353,10 +353,10 @@ class _Rows:
 
     @property
     def plain(self) -> bool:
-        """Whether nothing undelayed of the highest power has a parameter."""
+        """Whether the highest power has an undelayed term, and none with a parameter."""
         space = self.first.space
         still, _ = space.limits(*stacked([self.constant, self.first, self.second]))
-        return bool(space.step) or not still[1:].any()
+        return bool(space.step) or bool(still[0] and not still[1:].any())
 
     def _limits(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the limits of D at infinity at points, shapes (n,) and (n, K)."""

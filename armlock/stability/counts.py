@@ -16,8 +16,9 @@ import numpy as np
 import numpy.typing as npt
 from flint import fmpq
 
-from armlock.affine import Affine, NotAffineError, common, quotient_at
+from armlock.affine import Affine, NotAffineError, common, present, quotient_at
 from armlock.checks import (
+    BoolArray,
     FloatArray,
     IntArray,
     broadcast_shape,
@@ -109,16 +110,28 @@ def count_points(affine: Affine, points: FloatArray) -> IntArray:
         counted = decide.counts(space, chosen)
         # What rounded weights do not confine, exact ones may.
         found[start + confined] = np.where(counted == UNCONFINED, _EXACTLY, counted)
+        here = np.flatnonzero(found[start : start + _AT_A_TIME] == UNCONFINED)
+        found[start + here[_degree_falls(affine, points[start + here])]] = _EXACTLY
     left = np.flatnonzero(found == BOUNDARY)
     for start in range(0, left.size, _AT_A_TIME // 64):
         some = left[start : start + _AT_A_TIME // 64]
         found[some] = _with_zeros(affine, points[some])
     for i in np.flatnonzero(found == _EXACTLY):
         try:
-            found[i] = _count_exactly(*affine.quotient(*points[i].tolist()))
+            found[i] = _count_exactly(*present(*affine.quotient(*points[i].tolist())))
         except UndecidedError:
             found[i] = UNDECIDED
     return found
+
+
+def _degree_falls(affine: Affine, points: FloatArray) -> BoolArray:
+    """Tell at which points rounding hides whether N and M have the degree of their space."""
+    shares, falls = np.column_stack((np.ones(len(points)), points)), np.ones(len(points), bool)
+    for part in (affine.n, affine.m):
+        limits = np.column_stack(affine.space.limits(*stacked(part)))
+        off = (2.0 + len(part)) * EPSILON * (np.abs(shares) @ np.abs(limits))
+        falls &= (np.abs(shares @ limits) <= off).all(axis=1)
+    return falls
 
 
 def _with_zeros(affine: Affine, points: FloatArray) -> IntArray:
