@@ -21,8 +21,8 @@ The calls that matter most:
   with ``+ - * / **`` and `feedback`, with any number of delays and of parameters such as
   ``parameter("kp")``; every function above takes them. `equation` stands for D = 0.
 - ``nyquist(loop, omega_max=10.0)`` is the Nyquist curve with its encirclements of -1.
-- ``simulate(loop, noise)`` is the frequency noise of the locked laser, in Hz, from that of
-  the free laser, such as ``LaserNoise(seed=1).draw(20_000)``.
+- ``simulate(loop, noise, sample_rate=200.0)`` is the frequency noise of the locked laser, in
+  Hz, from that of the free laser, such as ``LaserNoise(1, sample_rate=200.0).draw(20_000)``.
 - ``amplitude_spectrum(series, sample_rate)`` estimates an amplitude spectral density.
 - ``noise_budget(loop, frequency)`` is the noise of the locked laser, source by source.
 
@@ -36,6 +36,11 @@ This package is the companion to "Robustness Analysis and Controller Design of A
 System in Space-based Gravitational Wave Detectors".
 """
 
+from typing import Any
+
+from armlock import controllers as controllers
+from armlock import paper as paper
+from armlock import sensors as sensors
 from armlock.controllers import Controller
 from armlock.engine.roots import RootError
 from armlock.loops import (
@@ -92,6 +97,21 @@ from armlock.timedomain.simulation import (
 from armlock.timedomain.spectra import Spectrum, SpectrumEstimator, amplitude_spectrum
 
 __version__ = "0.1.0"
+
+
+def __dir__() -> list[str]:
+    """List what users call, and no inner modules."""
+    return [*__all__, "__version__", "controllers", "orbits", "paper", "sensors"]
+
+
+def __getattr__(name: str) -> Any:
+    """Import the orbits when they are asked for: SciPy's splines take half a second."""
+    if name == "orbits":
+        import importlib
+
+        return importlib.import_module("armlock.orbits")
+    raise AttributeError(f"module 'armlock' has no attribute {name!r}")
+
 
 __all__ = [
     "BOUNDARY",

@@ -122,15 +122,6 @@ def finite_series(name: str, value: object, *dimensions: int) -> FloatArray:
     return array
 
 
-def check_rate(name: str, value: object, sample_rate: float) -> None:
-    """Raise if a series was drawn at another sample rate; most series do not know theirs."""
-    rate = getattr(value, "sample_rate", None)
-    if rate not in (None, sample_rate):
-        raise ValueError(
-            f"{name} must have a sample rate of {sample_rate:g} Hz; it was drawn at {rate:g} Hz"
-        )
-
-
 def broadcast_shape(
     names: tuple[str, ...], arrays: tuple[npt.NDArray[Any], ...]
 ) -> tuple[int, ...]:
@@ -172,6 +163,8 @@ def _numbers(name: str, value: object, kinds: str) -> npt.NDArray[Any]:
         raise ValueError(f"{name} must be a rectangular array, got {value!r}") from None
     if array.dtype.kind not in kinds:
         what = "real numbers" if kinds == _REAL else "numbers"
+        if isinstance(value, int):
+            raise ValueError(f"{name} must be at most 1.8e308 in size, got a larger number")
         is_object = array.dtype.kind == "O" and array.size
         got = f"a {type(array.flat[0]).__name__}" if is_object else f"dtype {array.dtype}"
         raise TypeError(f"{name} must hold {what}, got {got}")

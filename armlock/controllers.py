@@ -37,7 +37,7 @@ def _of_systems(name: str) -> Callable[..., Any]:
         from armlock.systems import System
 
         found = getattr(System.of(self), name)(*others, **more)
-        return found if found.parameters or found.longest_delay else Controller.of(found)
+        return found if found.parameters or found.longest_delay else rational(found)
 
     operator.__name__, operator.__doc__ = name, f"Do what `System.{name}` does, exactly."
     return operator
@@ -199,6 +199,10 @@ class Controller:
     __truediv__, __rtruediv__ = _of_systems("__truediv__"), _of_systems("__rtruediv__")
     __neg__, __pow__ = _of_systems("__neg__"), _of_systems("__pow__")
     feedback = _of_systems("feedback")
+
+    def update_names(self, **names: Any) -> None:
+        """Keep no names of signals, so that ``control.series`` takes the controller."""
+        return
 
 
 def rational(

@@ -256,8 +256,8 @@ class Loop(System):
         Examples
         --------
         >>> from armlock import CommonArm
-        >>> CommonArm(delay=20e-6).replace(delay=0.0) == CommonArm()
-        True
+        >>> CommonArm().replace(delay=20e-6).delay
+        2e-05
         """
         return replace(self, **changes)
 
@@ -378,22 +378,25 @@ def _gain(gain: object, sensor: str) -> float:
     )
 
 
-def checked_loop(loop: Loop) -> Loop:
-    """Return the loop, or say what was given in its place."""
+_SAMPLED = (
+    "a simulation samples the factors of its controller, and noise and Doppler errors are "
+    "those of its two arms; counts, charts, margins and step responses take any other system, "
+    "with three arms too"
+)
+
+
+def checked_loop(loop: Any, reason: str = _SAMPLED) -> Loop:
+    """Return the loop, or say what was given in its place, and why it must be a loop."""
     if not isinstance(loop, Loop):
         raise TypeError(
-            "loop must be a Loop, for instance CommonArm(): a simulation samples the factors "
-            "of its controller, and noise and Doppler errors are those of its two arms; "
-            "counts, charts, margins and step responses take any other system, with three arms "
-            f"too, got {loop!r:.200}"
+            f"loop must be a Loop, for instance CommonArm(): {reason}, got {loop!r:.200}"
         )
     return loop
 
 
 def SingleArm(
-    gain: float = paper.COMMON_ARM_GAIN,
+    gain: float = 1.0,
     tau1: float = paper.TAU1,
-    delay: float = 0.0,
 ) -> Loop:
     r"""Return single-arm locking with an integrating actuator (paper, Secs. II and IV.A).
 
@@ -410,8 +413,6 @@ def SingleArm(
         Loop gain g in rad/s, 1 by default.
     tau1 : float, optional
         Round-trip delay in s.
-    delay : float, optional
-        Dead time in s, see `Loop`.
 
     Returns
     -------
@@ -428,14 +429,13 @@ def SingleArm(
     >>> unstable_roots(SingleArm(gain=1.0, tau1=20.1), [0.99, 1.0, 1.01], 0.0)
     array([0, 0, 1])
     """
-    return Loop(integrating_actuator(_gain(gain, "single")), SINGLE, tau1, delay=delay)
+    return Loop(integrating_actuator(_gain(gain, "single")), SINGLE, tau1)
 
 
 def CommonArm(
-    gain: float = paper.COMMON_ARM_GAIN,
+    gain: float = 1.0,
     tau1: float = paper.TAU1,
     tau2: float = paper.TAU2,
-    delay: float = 0.0,
 ) -> Loop:
     r"""Return common-arm locking with an integrating actuator (paper, Eq. 4).
 
@@ -451,8 +451,6 @@ def CommonArm(
         Loop gain g in rad/s, 1 by default.
     tau1, tau2 : float, optional
         Round-trip delays in s.
-    delay : float, optional
-        Dead time in s, see `Loop`.
 
     Returns
     -------
@@ -469,17 +467,16 @@ def CommonArm(
     >>> unstable_roots(CommonArm(gain=10.0), 1.0, 0.999)
     0
     """
-    return Loop(integrating_actuator(_gain(gain, "common")), COMMON, tau1, tau2, delay)
+    return Loop(integrating_actuator(_gain(gain, "common")), COMMON, tau1, tau2)
 
 
 def DualArm(
-    gain: float = paper.DUAL_ARM_GAIN,
+    gain: float = 10.0,
     tau1: float = paper.TAU1,
     tau2: float = paper.TAU2,
     corner: float = paper.DUAL_SENSOR_CORNER,
     *,
     difference: float | None = None,
-    delay: float = 0.0,
 ) -> Loop:
     r"""Return dual-arm locking with an integrating actuator (paper, Sec. III.B).
 
@@ -500,8 +497,6 @@ def DualArm(
     difference : float, optional
         The dtau that scales the sensor's integral, in s: tau1 - tau2 by default, as in
         Sec. III.B. The source of Table I takes half of it.
-    delay : float, optional
-        Dead time in s, see `Loop`.
 
     Returns
     -------
@@ -531,7 +526,7 @@ def DualArm(
     array([1, 0, 0])
     """
     mapping = sensors.dual(corner, tau1 - tau2 if difference is None else difference)
-    return Loop(integrating_actuator(_gain(gain, "dual")), mapping, tau1, tau2, delay)
+    return Loop(integrating_actuator(_gain(gain, "dual")), mapping, tau1, tau2)
 
 
 def paper_loop(

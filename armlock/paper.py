@@ -14,11 +14,6 @@ TAU1: Final = 20.1
 #: Round-trip delay of the shorter arm in s (Sec. III.A, the example of Fig. 4a).
 TAU2: Final = 19.9
 
-#: Loop gain of the common-arm example (Sec. III.A).
-COMMON_ARM_GAIN: Final = 1.0
-#: Loop gain of the dual-arm chart (Sec. III.B).
-DUAL_ARM_GAIN: Final = 10.0
-
 #: Step of the semi-discretization in s (caption of Fig. 4b).
 STEP: Final = 0.05
 

@@ -93,7 +93,15 @@ _NEAR = 0.1
 _MAY_LOSE, _FEWEST_BITS, _MOST_BITS, _ENOUGH_BITS = 2.0**11, 128, 1 << 14, 60
 # Rounding errors of a sum in double precision, over the size of its terms.
 _ROUNDING = 2.0**-51
-# Longest text of a system.
+# What to write where python-control, or its user, asks a system for something.
+_INSTEAD = {
+    "plot_phase": "control.bode_plot(L.frequency_response(omega))",
+    "response": "armlock.nyquist(L, omega_max=...).plot()",
+    "poles": "armlock.rightmost_root(L), or unstable_roots(L, right_of=...),",
+    "dcgain": "L(0)",
+}
+# Largest power of a system, and longest text of one.
+_LARGEST_POWER = 10**6
 _LONGEST_TEXT = 400
 
 
@@ -480,6 +488,10 @@ class System:
         """Return a whole power; a delay's power is as long as so many of this one delay."""
         if isinstance(power, bool) or not isinstance(power, int | np.integer):
             raise TypeError(f"power must be a whole number, got {power!r}")
+        if abs(power) > _LARGEST_POWER:
+            raise ValueError(
+                f"power must be at most {_LARGEST_POWER} in size, got a larger one"
+            )
         found, base = System.of(1), self if power >= 0 else 1 / self
         left = abs(int(power))
         while left:
@@ -697,6 +709,12 @@ class System:
     def _repr_latex_(self) -> str | None:
         text = self._equation(latex=True)
         return f"${text}$" if len(text) <= 2 * _LONGEST_TEXT else None
+
+    def __getattr__(self, name: str) -> Any:
+        """Say what to write for a name of python-control that a system has not."""
+        hint = _INSTEAD.get(name)
+        what = f"; write {hint} for a system L with delays" if hint else ""
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{what}")
 
     def isdtime(self, strict: bool = False) -> bool:
         """Whether time is discrete: it is not. So python-control's plots take the system."""

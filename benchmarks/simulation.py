@@ -85,8 +85,10 @@ def plain_arguments(loop: Loop) -> tuple[Any, ...]:
 
 
 def inputs(samples: int) -> Inputs:
-    noise = LaserNoise(1).draw(samples)
-    c1, c2 = (1.0 + 1e-4 * PerturbationNoise(seed).draw(samples) for seed in (2, 3))
+    noise = LaserNoise(1, SAMPLE_RATE).draw(samples)
+    c1, c2 = (
+        1.0 + 1e-4 * PerturbationNoise(seed, SAMPLE_RATE).draw(samples) for seed in (2, 3)
+    )
     return noise, c1, c2
 
 
@@ -104,7 +106,7 @@ def plain_rows(loop: Loop, series: Inputs, passes: int) -> list[Row]:
     ]
     ours, theirs = in_turn(calls, passes).min(axis=0)
     some = part(series, 4_000_000)
-    output = simulate(loop, some[0], c1=some[1], c2=some[2])
+    output = simulate(loop, some[0], sample_rate=SAMPLE_RATE, c1=some[1], c2=some[2])
     phi = plain_output(some, arguments)
     differ = float(np.abs(output - phi).max() / np.abs(output).max())
     return [
@@ -135,7 +137,9 @@ def moving(t: FloatArray, *, tau: float, rate: float) -> FloatArray:
 def locked_size(loop: Loop, series: Inputs, delays: Sequence[Any] = (None, None)) -> int:
     """Run a loop; nothing is kept."""
     noise, c1, c2 = series
-    return simulate(loop, noise, c1=c1, c2=c2, tau1=delays[0], tau2=delays[1]).size
+    return simulate(
+        loop, noise, sample_rate=SAMPLE_RATE, c1=c1, c2=c2, tau1=delays[0], tau2=delays[1]
+    ).size
 
 
 def run(*, quick: bool) -> Topic:

@@ -23,23 +23,24 @@ from armlock.timedomain.spectra import SpectrumEstimator
 from tests.systems import NEUTRAL, two_delays
 
 ARMS = CommonArm()
-LASER = armlock.LaserNoise(1)
+LASER = armlock.LaserNoise(1, 200.0)
 ORBITS = kepler()
 SPECTRUM = armlock.amplitude_spectrum(LASER.draw(2000), 200.0)
 # Depends on no free parameter at s = 0.
 FLAT = two_delays([1.0, 1.0, 1.0], [0.0, 1.0], [0.0, 1.0], 1.0, 2.0)
 RUN: dict[str, Any] = {"sample_rate": 10.0, "limit": 1e6}
-LOOP: dict[str, Any] = {"tau1": 20.1, "tau2": 19.9, "delay": 0.0}
+ARM_PAIR: dict[str, Any] = {"tau1": 20.1, "tau2": 19.9}
+LOOP: dict[str, Any] = ARM_PAIR | {"delay": 0.0}
 POINT: dict[str, Any] = {"c1": 1.0, "c2": 1.0}
 SHAPE: dict[str, Any] = {"zeros": [], "poles": [-1.0], "gain": 1.0}
-NOISE: dict[str, Any] = {"seed": 1, "sample_rate": 10.0, "cutoff": 1e-3}
+NOISE: dict[str, Any] = {"seed": 1, "sample_rate": 10.0}
 
 # A call of everything that takes arguments, with sensible ones.
 CALLS: dict[Callable[..., object], dict[str, Any]] = {
     HayesEquation: {"tau": 1.0},
-    SingleArm: {"gain": 1.0, "tau1": 1.0, "delay": 0.0},
-    CommonArm: {"gain": 1.0} | LOOP,
-    armlock.DualArm: {"gain": 1.0, "corner": 2.0, "difference": 0.1} | LOOP,
+    SingleArm: {"gain": 1.0, "tau1": 1.0},
+    CommonArm: {"gain": 1.0} | ARM_PAIR,
+    armlock.DualArm: {"gain": 1.0, "corner": 2.0, "difference": 0.1} | ARM_PAIR,
     paper_loop: {"corner": 2.0, "controller": table_two(),
                  "difference": 0.1} | LOOP,
     armlock.Loop: {"controller": table_two(), "mapping": COMMON} | LOOP,
@@ -75,7 +76,7 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     armlock.Simulation: {"loop": ARMS} | RUN,
     armlock.sampled_open_loop: {"loop": ARMS, "omega": 1.0, "sample_rate": 10.0} | POINT,
     armlock.LaserNoise: {"level": 30.0} | NOISE,
-    armlock.PerturbationNoise: NOISE,
+    armlock.PerturbationNoise: NOISE | {"cutoff": 1e-3},
     armlock.ShapedNoise: {"seed": 1, "sample_rate": 10.0} | SHAPE,
     LASER.draw: {"samples": 3},
     LASER.asd: {"frequency": 3.0},
@@ -84,7 +85,8 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     armlock.flight_loop: {"mean_delay": 33.6, "half_difference": 0.255, "g2": 40.0,
                           "corner": 2.0, "delay": 0.0},
     armlock.transfer: {"loop": ARMS, "source": "arm 1", "s": 1j},
-    armlock.noise_budget: {"loop": ARMS, "frequency": [1.0]},
+    armlock.noise_budget: {"loop": ARMS, "frequency": [1.0], "laser": LASER, "shot": 1e-5,
+                           "clock": 1e-12},
     warped: {"omega": 1.0, "sample_rate": 10.0},
     roll_off: {"first": 1.0, "last": 2.0, "pairs": 3, "slope": 0.5},
     armlock.delay: {"theta": 1.0},
@@ -94,11 +96,11 @@ CALLS: dict[Callable[..., object], dict[str, Any]] = {
     armlock.return_difference: {"plant": [[1.0]], "controllers": [2.0]},
     armlock.state_space: {"a": [[-1.0]], "b": [1.0], "c": [1.0], "d": 0.0},
     armlock.box_count: {"loop": paper_loop(), "size": 1e-7},
-    armlock.stable_half_differences: {"loop": paper_loop(), "between": paper_loop().arms},
+    armlock.stable_half_differences: {"loop": paper_loop()},
     equation: {"d": 1 + ARMS, "step": 0.0},
     armlock.step_response: {"system": ARMS.feedback(), "timepts": [1.0]},
     armlock.impulse_response: {"system": ARMS.feedback(), "timepts": [1.0]},
-    armlock.Simulation(ARMS).advance: {"noise": [1.0]} | POINT,
+    armlock.Simulation(ARMS, 10.0).advance: {"noise": [1.0]} | POINT,
     LASER.blocks: {"samples": 3, "size": 2},
     SPECTRUM.within: {"low": 0.1, "high": 0.3},
     SpectrumEstimator: {"sample_rate": 1.0},
@@ -147,7 +149,7 @@ def test_what_underflows_is_zero_whatever_numpy_is_told():
         lambda: armlock.transfer(loop, "laser", 1e4),
         lambda: loop(1e4),
         lambda: loop.feedback()(1e4),
-        lambda: armlock.sampled_open_loop(loop, 1e-200),
+        lambda: armlock.sampled_open_loop(loop, 1e-200, sample_rate=200.0),
     )
     for call in calls:
         expected = call()
@@ -166,7 +168,7 @@ def test_every_public_function_is_called_above():
 # Beyond that, what each argument must be: one value past the constraint.
 WRONG: list[tuple[Callable[..., object], str, Any, str]] = [
     (CommonArm, "gain", 0.0, "be positive, got 0.0"),
-    (CommonArm, "delay", np.array([0.1, 0.2]), "be a real number, got array([0.1, 0.2])"),
+    (paper_loop, "delay", np.array([0.1, 0.2]), "be a real number, got array([0.1, 0.2])"),
     (paper_loop, "actuator", "no", "be True or False, got 'no'"),
     (armlock.transfer, "s", 0.0, "not be a pole of the open loop, got 0j"),
     (armlock.Controller, "gain", 0.0, "not be zero"),

@@ -114,7 +114,9 @@ def test_what_is_kept_is_not_compiled_again(tmp_path):
 def test_walks_count_the_same_uncompiled(monkeypatch):
     rng = np.random.default_rng(1)
     points = rng.uniform(-2.0, 2.0, (12, 2))
-    loops = [CommonArm(g, delay=d) for g, d in ((0.3, 0.0), (1.0, 0.1))] + [DualArm(0.5)]
+    loops = [CommonArm(g).replace(delay=d) for g, d in ((0.3, 0.0), (1.0, 0.1))] + [
+        DualArm(0.5)
+    ]
     expected = [[int(unstable_roots(loop, *at)) for at in points] for loop in loops]
     used = Plain(inclusion, 600.0)
     monkeypatch.setattr(used, "serves", lambda entry: True)

@@ -95,7 +95,7 @@ PLANT = control.tf([1.0], [1.0, 1.0])
 
 def test_a_loop_is_combined_as_any_system_with_delays():
     s = np.array([0.3j, 1.0 + 2j])
-    for loop in (CommonArm(delay=1e-3), Loop(K, "dual", 20.1, 19.9)):
+    for loop in (CommonArm().replace(delay=1e-3), Loop(K, "dual", 20.1, 19.9)):
         pairs = [
             (loop * PLANT, loop(s) * PLANT(s)),
             (PLANT * loop, loop(s) * PLANT(s)),

@@ -224,7 +224,14 @@ def test_along_the_line_on_which_the_root_at_zero_cancels_another_root_is_first(
 
 
 @pytest.mark.parametrize(
-    "loop", [SingleArm(), SingleArm(0.5, 3.0, 0.7), CommonArm(), CommonArm(0.05), DualArm()]
+    "loop",
+    [
+        SingleArm(),
+        SingleArm(0.5, 3.0).replace(delay=0.7),
+        CommonArm(),
+        CommonArm(0.05),
+        DualArm(),
+    ],
 )
 def test_the_ideal_point_has_the_margins_that_its_neighbours_tend_to(loop):
     # Next to it, inside, a slow real root leaves all as it is at higher frequency.
@@ -242,7 +249,9 @@ def test_a_gain_that_takes_a_real_root_to_zero_is_that_of_the_finite_open_loop()
     assert (found.gain_lower, found.gain_upper, found.gain_omega) == (0.0, 2.5, 0.0)
 
 
-@pytest.mark.parametrize("loop", [SingleArm(50.0, 10.0, 0.05), DualArm(gain=10.0, delay=1.0)])
+@pytest.mark.parametrize(
+    "loop", [SingleArm(50.0, 10.0).replace(delay=0.05), DualArm(gain=10.0).replace(delay=1.0)]
+)
 def test_roots_behind_the_one_at_zero_are_not_passed_over(loop):
     assert unstable_roots(equation(1 + loop), 1.0, 1.0) == BOUNDARY
     assert unstable_roots(loop) > 0

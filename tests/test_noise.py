@@ -14,11 +14,11 @@ from armlock.timedomain.spectra import SpectrumEstimator
 from tests.test_in_time import ends_when_interrupted
 
 SOURCES: dict[str, Any] = {
-    "laser": lambda seed, **more: LaserNoise(seed, **more),
-    "laser at rest": lambda seed, **more: LaserNoise(seed, at_rest=True, **more),
-    "perturbation": lambda seed, **more: PerturbationNoise(seed, **more),
-    "own filter": lambda seed, **more: ShapedNoise(
-        (-1.0,), (-3 + 9j, -3 - 9j), 4.0, seed=seed, **more
+    "laser": lambda seed, rate=200.0: LaserNoise(seed, rate),
+    "laser at rest": lambda seed, rate=200.0: LaserNoise(seed, rate, at_rest=True),
+    "perturbation": lambda seed, rate=200.0: PerturbationNoise(seed, rate),
+    "own filter": lambda seed, rate=200.0: ShapedNoise(
+        (-1.0,), (-3 + 9j, -3 - 9j), 4.0, seed=seed, sample_rate=rate
     ),
 }
 
@@ -65,7 +65,7 @@ def test_density_is_the_prescribed_one(name):
 )
 def test_the_laser_is_as_close_to_the_formula_as_the_docstring_says(share, error):
     for rate in (200.0, 7.0):
-        source = LaserNoise(1, rate, cutoff=1e-6 * rate)
+        source = LaserNoise(1, rate)
         frequency = (
             np.append(np.geomspace(1e-9, 1e-3, 50), np.linspace(1e-3, share, 500)) * rate
         )
@@ -75,7 +75,7 @@ def test_the_laser_is_as_close_to_the_formula_as_the_docstring_says(share, error
 
 def test_the_perturbations_follow_the_formula_up_to_the_end():
     frequency = np.geomspace(1e-7, 95.0, 300)
-    source = PerturbationNoise(1)
+    source = PerturbationNoise(1, 200.0)
     assert source.sampled_asd(frequency) == pytest.approx(source.asd(frequency), rel=1e-8)
 
 
@@ -96,10 +96,16 @@ def test_a_series_starts_in_the_middle_of_its_course():
 @pytest.mark.parametrize("cutoff", [1e-6, 1e-15, 1e-100])
 def test_a_low_cutoff_leaves_a_series_with_its_rms(cutoff):
     """Below half the rate, and in closed form but for what the rate cuts off."""
-    found = LaserNoise(1, cutoff=cutoff)
-    assert found.rms == pytest.approx(30.0 * np.sqrt(0.5 * np.pi / cutoff), rel=1e-8)
+
+    def source(seed):
+        corner = 2.0 * np.pi * cutoff
+        return ShapedNoise([], [-corner], 1.0, seed=seed, sample_rate=200.0)
+
+    found = source(1)
+    # The density 1 / |s + corner| has the variance 1 / (4 corner).
+    assert found.rms == pytest.approx(np.sqrt(0.25 / (2.0 * np.pi * cutoff)), rel=1e-8)
     assert np.isfinite(found.draw(10)).all()
-    assert np.std([LaserNoise(seed, cutoff=cutoff).draw(1)[0] for seed in range(500)]) == (
+    assert np.std([source(seed).draw(1)[0] for seed in range(500)]) == (
         pytest.approx(found.rms, rel=0.1)
     )
 
@@ -144,11 +150,11 @@ def covariance(sampled):
 def test_noise_without_a_finite_rms_is_refused():
     message = r"^noise must have a finite r\.m\.s\., got poles \(\(-3e-323"
     with pytest.raises(ValueError, match=message):
-        LaserNoise(1, cutoff=5e-324)
+        ShapedNoise([], [-3e-323], 1.0, seed=1, sample_rate=200.0)
 
 
 def test_an_interrupt_is_heard_while_noise_is_drawn():
-    source = LaserNoise(1)
+    source = LaserNoise(1, 200.0)
     source.draw(1)
     assert ends_when_interrupted(lambda: source.draw(1 << 28)) < 1.0
 
@@ -164,39 +170,39 @@ def test_a_filter_without_poles_leaves_white_noise():
 
 def test_formulas_of_the_paper():
     frequency = np.geomspace(1e-3, 50.0, 50)
-    laser = LaserNoise(1, cutoff=1e-9)
-    assert laser.asd(frequency) == pytest.approx(30.0 / frequency, rel=1e-9)
-    eta = PerturbationNoise(1, cutoff=1e-9)
+    laser = LaserNoise(1, 200.0)
+    assert laser.asd(frequency) == pytest.approx(30.0 / frequency, rel=1e-6)
+    eta = PerturbationNoise(1, 200.0, cutoff=1e-9)
     printed = 3.6e-5 * np.sqrt(1.0 + (2.8e-3 / frequency) ** 4)
     assert eta.asd(frequency) == pytest.approx(printed, rel=1e-9)
 
 
 def test_at_rest_starts_at_zero():
-    quiet = LaserNoise(4, at_rest=True).draw(200)
-    full = LaserNoise(4).draw(200)
+    quiet = LaserNoise(4, 200.0, at_rest=True).draw(200)
+    full = LaserNoise(4, 200.0).draw(200)
     assert np.abs(quiet).max() < 100.0
     assert np.abs(full).min() > 100.0
 
 
 def test_what_cannot_be_a_block_or_a_flag_is_refused_before_anything_is_drawn():
-    source = LaserNoise(1)
+    source = LaserNoise(1, 200.0)
     for name, arguments in (
         ("size", (10, -1)), ("size", (10, 0)), ("samples", (-1,)), ("samples", (1.5,)),
     ):  # fmt: skip
         with pytest.raises(ValueError, match=f"^{name} must be an integer"):
             source.blocks(*arguments)
-    assert np.array_equal(source.draw(3), LaserNoise(1).draw(3))
+    assert np.array_equal(source.draw(3), LaserNoise(1, 200.0).draw(3))
     with pytest.raises(TypeError, match=r"^at_rest must be True or False"):
-        LaserNoise(1, at_rest="no")  # type: ignore[arg-type]
+        LaserNoise(1, 200.0, at_rest="no")  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("name", ["perturbation", "own filter"])
 def test_rms_is_that_of_what_is_drawn(name):
-    source = SOURCES[name](5, sample_rate=10.0)
+    source = SOURCES[name](5, 10.0)
     frequency = np.geomspace(1e-11, 0.499999 * source.sample_rate, 200_001)
     variance = np.trapezoid(source.sampled_asd(frequency) ** 2 * frequency, np.log(frequency))
     assert source.rms == pytest.approx(np.sqrt(variance), rel=1e-4)
-    quick = [SOURCES[name](seed, sample_rate=10.0).draw(1)[0] for seed in range(4000)]
+    quick = [SOURCES[name](seed, 10.0).draw(1)[0] for seed in range(4000)]
     assert np.std(quick) == pytest.approx(source.rms, rel=0.05)
 
 
@@ -204,4 +210,6 @@ def test_rms_of_the_perturbations_has_the_closed_form_of_the_docstring():
     """A spectrum that ends sharply at the cut-off would have sqrt(3 pi / 4) less."""
     level, corner, cutoff = 3.6e-5, 2.8e-3, 5e-6
     variance = level**2 * (100.0 + np.pi * corner**4 / (4.0 * cutoff**3))
-    assert PerturbationNoise(1, cutoff=cutoff).rms == pytest.approx(np.sqrt(variance), rel=1e-9)
+    assert PerturbationNoise(1, 200.0, cutoff=cutoff).rms == pytest.approx(
+        np.sqrt(variance), rel=1e-9
+    )

@@ -118,7 +118,7 @@ CLOSED: dict[str, tuple[Any, tuple[float, float], complex, float]] = {
 # s + g exp(-s delay) = 0
 for gain, dead in ((1.0, 0.5), (1.0, 1.7), (0.2, 3.0)):
     root = lambertw(-gain * dead) / dead
-    loop = SingleArm(gain, 20.0, delay=dead)
+    loop = SingleArm(gain, 20.0).replace(delay=dead)
     CLOSED[f"an integrator with a dead time of {dead} s"] = loop, (0.0, 0.0), root, 1e-14
 
 

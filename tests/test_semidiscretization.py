@@ -81,7 +81,7 @@ def test_a_step_too_fine_for_a_matrix_still_counts():
 
 @pytest.mark.parametrize("order", [0, 1])
 def test_a_dead_time_is_a_further_delay_of_the_map(order):
-    loop = DualArm(0.3, 3.0, 2.0, delay=0.5)
+    loop = DualArm(0.3, 3.0, 2.0).replace(delay=0.5)
     held = semi_discretization(loop, 0.25, order)
     for x, y in [(1.0, 0.0), (0.9, 1.05), (-1.2, 0.4)]:
         eigenvalues = np.linalg.eigvals(transition_matrix(loop, x, y, step=0.25, order=order))

@@ -3,6 +3,7 @@
 import copy
 import dataclasses
 import pickle
+from functools import partial
 
 import control
 import numpy as np
@@ -115,7 +116,7 @@ def test_a_loop_keeps_its_delays_from_process_to_process():
 
 
 def test_one_thing_is_replaced_and_all_else_stays():
-    loop = CommonArm(gain=2.0, delay=20e-6)
+    loop = CommonArm(gain=2.0).replace(delay=20e-6)
     assert loop.replace(delay=0.0) == CommonArm(gain=2.0) != loop
     assert margins(loop.replace(delay=0.0), 0.9, 0.9).delay > 0.0
     faster = integrating_actuator(3.0)
@@ -182,11 +183,20 @@ def test_two_nominal_values_of_one_parameter_are_refused():
     assert (parameter("k") + parameter("k", 2.0)).nominal == {"k": 2.0}
 
 
-def test_what_is_not_affine_in_what_varies_is_refused_with_what_to_write():
-    g = parameter("g")
+def test_what_is_not_affine_in_what_varies_is_counted_or_says_what_to_write():
+    g = parameter("g", 1.0)
     loop = g / s * (2 - C1 * delay(20.1) - C2 * delay(19.9))
-    with pytest.raises(ValueError, match=r"affine in c1 and g .* make the product a parameter"):
-        stability_chart(loop, g=[0.5, 1.0], c1=[0.5, 1.0])
+    gains, c = [0.5, 1.0, 2.0], [0.5, 1.0, 1.4]
+    counts = [[unstable_roots(loop, g=one, c1=x) for one in gains] for x in c]
+    assert stability_chart(loop, g=gains, c1=c).counts.tolist() == counts
+    assert unstable_roots(loop, g=gains, c1=np.array(c)[:, None]).tolist() == counts
+    assert len(set(np.ravel(counts))) > 1
+    for ask in (critical_perturbation, lambda loop, way: first_crossing(loop, {}, way)):
+        message = (
+            r"^direction must .*got g, c1: .* make the product a parameter, or count along"
+        )
+        with pytest.raises(ValueError, match=message):
+            ask(loop, {"g": 1.0, "c1": 1.0})
     # With one of them held it is a chart, and single points need nothing.
     chart = stability_chart(loop, c1=[0.5, 1.5], c2=[0.5, 1.6], g=1.0)
     expected = stability_chart(CommonArm(), [0.5, 1.5], [0.5, 1.6])
@@ -245,14 +255,62 @@ def test_a_third_arm_is_one_more_term_for_every_function():
     ]
     assert counts[0] < counts[1]
     assert box_count(loop * (1 - 0.1 / (s + 1)), {"c1": 1e-9}) in (0, BOUNDARY)
-    low, high = stable_half_differences(loop, between=(arms[0][2], arms[1][2]))
-    assert low < 0.09 < 0.11 < high
-    found = margins(loop, free_above=5.0, free=[z for _, _, z in arms])
-    assert 0.0 < found.modulus <= margins(loop).modulus
+    assert margins(loop).modulus > 0.0
+    for call in (stable_half_differences, partial(margins, free_above=5.0)):
+        with pytest.raises(TypeError, match=r"^loop must be a Loop, .*: .*its arms"):
+            call(loop)  # type: ignore[arg-type]
     x, y = d_curve(loop, 0.7, c3=1.0)
     assert abs(1 + loop(0.7j, c1=float(x), c2=float(y))) < 1e-12
     with pytest.raises(TypeError, match="are those of its two arms; counts, charts, margins"):
-        simulate(loop, np.zeros(100))  # type: ignore[arg-type]
+        simulate(loop, np.zeros(100), sample_rate=1.0)  # type: ignore[arg-type]
+
+
+def test_what_is_improper_zero_or_too_large_is_called_so():
+    for improper in (s, 1 + s * delay(1.0), (s**2 + 1) / (s + 1)):
+        with pytest.raises(
+            ValueError, match=r"^system must be proper, .* denominator of degree"
+        ):
+            peak_gain(improper)
+    k = Controller([-1.0], [-2.0, 0.0], 3.0)
+    assert [unstable_roots(one) for one in (k - k, k * 0, 0 * k)] == [0, 0, 0]
+    assert complex((k - k)(1j)) == 0.0
+    with pytest.raises(ValueError, match=r"^controller must not be zero"):
+        Controller.of(k - k)
+    lag = control.tf([1], [1, 1])
+    for pair in (control.series(lag, k), control.parallel(k, lag), control.series(k, k)):
+        assert isinstance(pair, Controller)
+    assert complex(control.series(lag, k)(1j)) == pytest.approx(complex(lag(1j)) * k(1j))
+    with pytest.raises(ValueError, match=r"^power must be at most 1000000 in size"):
+        delay(1.0) ** 10**400
+    with pytest.raises(ValueError, match=r"^system must be at most 1\.8e308 in size"):
+        2**1330 * delay(1.0)
+
+
+def test_what_python_control_asks_for_names_the_call():
+    loop = delay(1.0) / (s + 1)
+    calls = {
+        r"control\.bode_plot\(L\.frequency_response\(omega\)\)": control.bode_plot,
+        r"nyquist\(L, omega_max=\.\.\.\)": control.nyquist_plot,
+        r"rightmost_root\(L\)": lambda one: one.poles(),
+        r"L\(0\)": lambda one: one.dcgain(),
+    }
+    for message, call in calls.items():
+        with pytest.raises(AttributeError, match=message):
+            call(loop)
+        with pytest.raises(AttributeError, match=message):
+            call(paper_loop())
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        loop.nothing()
+    assert not hasattr(loop, "__array__")
+
+
+def test_the_package_shows_what_users_call():
+    shown = set(dir(armlock))
+    assert {"controllers", "sensors", "orbits", "paper", *armlock.__all__} <= shown
+    inner = {"engine", "checks", "compiled", "loops", "affine", "stability", "systems"}
+    assert not shown & inner
+    assert all(hasattr(armlock, name) for name in shown)
+    assert callable(armlock.orbits.kepler)
 
 
 # one meaning ------------------------------------------------

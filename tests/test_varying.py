@@ -8,6 +8,7 @@ import control
 import numpy as np
 import pytest
 from flint import fmpq, fmpq_poly
+from scipy.linalg import expm
 
 from armlock import (
     CommonArm,
@@ -16,6 +17,7 @@ from armlock import (
     DualArm,
     Loop,
     SingleArm,
+    System,
     buildable_loop,
     critical_perturbation,
     delay,
@@ -169,23 +171,52 @@ def test_two_equal_arms_of_a_neutral_loop_stay_two():
     assert (found.radius, found.constant) == pytest.approx((2.5, 2.5), rel=1e-6)
 
 
-def test_the_radius_of_a_loop_with_three_arms():
-    # Without dynamics it is one over the sum of the |G_k| again, where the phases are alike.
-    weights, c = (0.6, 0.3, 0.1), [parameter(f"c{k}", 1.0) for k in (1, 2, 3)]
-    arms = [
-        m * (1 - one * delay(tau))
-        for m, one, tau in zip(weights, c, (2.0, 1.7, 1.3), strict=True)
-    ]
-    found = varying_radius(0.5 * (arms[0] + arms[1] + arms[2]))
-    assert found.radius == pytest.approx(1.0 / 0.5, rel=1e-6)
-    assert found.constant == pytest.approx(found.radius, rel=1e-5)
-    assert found.scalings == pytest.approx([1.0, math.sqrt(0.5), math.sqrt(1 / 6)], rel=1e-3)
-    # Where a factor multiplies two delays, the theorem is not stated.
-    twice = 0.5 * (1 - c[0] * (delay(2.0) + delay(1.0)) / 4)
-    with pytest.raises(ValueError, match="one polynomial with one delay"):
-        varying_radius(twice)
-    with pytest.raises(ValueError, match="loop must have a parameter"):
-        varying_radius(0.5 * delay(1.0))
+def test_an_expression_does_not_say_where_a_factor_acts():
+    """The same transfer function, with a factor behind or before the filter."""
+    c1, c2 = parameter("c1", 1.0), parameter("c2", 1.0)
+    filtered = System.of(control.tf([100], [1, 1]))
+    alike = 0.5 * (c1 * filtered + c2 * filtered) * delay(1e-6)
+    for expression in (alike, paper_loop() * 1, paper_loop().at(c1=1.0), 0.5 * delay(1.0)):
+        message = r"^loop must be a Loop.* not commute .*loop\.replace.*1 / peak_gain\(G\)"
+        with pytest.raises(TypeError, match=message):
+            varying_radius(expression)  # type: ignore[arg-type]
+    # If both stood before the filter, S F / 2 would be added twice.
+    gain = peak_gain(0.5 * filtered / (1 + filtered * delay(1e-6))).gain
+    assert 1.0 / (2.0 * gain) == pytest.approx(1.01, rel=1e-4)
+
+    def growth(e1, e2, period):
+        """Growth per s with c1 behind the filter and c2 before it, switched together."""
+        halves = [
+            expm(0.5 * period * np.array([[-1 - 50 * a, -50], [-50 * a * b, -1 - 50 * b]]))
+            for a, b in ((1 + e1, 1 + e2), (1 - e1, 1 - e2))
+        ]
+        return np.log(np.abs(np.linalg.eigvals(halves[0] @ halves[1])).max()) / period
+
+    assert growth(0.25, 0.25, 1e-3) == pytest.approx(0.54, abs=0.01)
+    assert growth(0.25, -0.25, 1e-3) < 0.0
+
+
+def test_a_factor_of_one_signal_has_the_radius_of_one_over_a_peak_gain():
+    """k(t) (x(t) - x(t - tau)) on one mode, whose switching a run in time confirms."""
+    mode, z, k = 1 / (s**2 + 0.4 * s + 1), delay(2.0), 0.05
+    radius = 1.0 / peak_gain((1 - z) * mode / (1 + k * (1 - z) * mode)).gain
+    rate, rng = 100.0, np.random.default_rng(27)
+    t = np.arange(int(200 * rate)) / rate
+
+    def left(share, turn):
+        """Size in the second half over that in the first, switched at twice a frequency."""
+        back = np.zeros((t.size, 2))
+        back[0] = 1.0, 0.0
+        for i in range(1, t.size):
+            x, v = back[i - 1]
+            late = back[i - 201, 0] if i > 200 else 0.0
+            factor = k + share * radius * np.sign(np.sin(turn * t[i]))
+            v += (-0.4 * v - x - factor * (x - late)) / rate
+            back[i] = x + v / rate, v
+        half = t.size // 2
+        return np.abs(back[half:, 0]).max() / np.abs(back[:half, 0]).max()
+
+    assert max(left(0.99, turn) for turn in (0.0, *rng.uniform(1.0, 3.0, 4))) < 1.0
 
 
 def test_a_radius_is_that_of_a_dense_search():
@@ -299,7 +330,7 @@ def test_a_spectral_factor_with_a_common_zero_on_the_axis():
 
 
 def test_no_constant_perturbation_that_was_looked_at_breaks_the_loop():
-    weak = 1e-10 * (1 - parameter("c1", 1.0) * delay(1.0)) * control.tf([1.0], [1.0, 1.0])
+    weak = Loop(1e-10 * control.tf([1.0], [1.0, 1.0]), "single", 1.0)
     found = varying_radius(weak)
     assert found.radius == pytest.approx(1e10, rel=1e-5)
     assert found.constant == math.inf
@@ -308,10 +339,10 @@ def test_no_constant_perturbation_that_was_looked_at_breaks_the_loop():
 def test_a_peak_that_rounding_does_not_certify_is_no_number():
     # At a gain of 1e13 nothing is proved about 1 + g (1 - z) next to its zero.
     assert peak_gain(1 / (1 + 1e5 * (1 - delay(1.0)))).gain == pytest.approx(1.0, rel=1e-6)
-    factor = parameter("c", 1.0)
+    steep = Loop(((), (), 1e13), "single", 1.0)
     for ask in (lambda loop: peak_gain(1 / (1 + loop)), modulus_margin, varying_radius):
         with pytest.raises(CountError, match="rounding does not decide"):
-            ask(1e13 * (1 - factor * delay(1.0)))
+            ask(steep)
 
 
 @pytest.mark.parametrize(

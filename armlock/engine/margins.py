@@ -83,7 +83,8 @@ class Margins:
         \quad 0 \le \arg < 2\pi , \\
         \text{modulus} &= \inf_\omega |1 + L| ,
 
-    with L at s = j omega.
+    with L at s = j omega and omega > 0. So 1 / (s + 1), whose magnitude is one at s = 0 alone,
+    has no crossover.
 
     Attributes
     ----------

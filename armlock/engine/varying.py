@@ -44,20 +44,7 @@ class Varying(NamedTuple):
 
 
 def _exact_polynomial(function: Function) -> fmpq_poly:
-    """Return B of a function B exp(-s theta), exactly.
-
-    Raises
-    ------
-    ValueError
-        If the function has another form.
-    """
-    acting = np.flatnonzero((function.delayed != 0).any(axis=0))
-    undelayed = function.steady - function.delayed.sum(axis=1)
-    if acting.size > 1 or (acting.size and undelayed.any()):
-        raise ValueError(
-            "loop must have each parameter as a factor of one polynomial with one delay, got "
-            f"{acting.size + bool(undelayed.any())} delays"
-        )
+    """Return B of a function B exp(-s theta), exactly."""
     found = fmpq_poly()
     for weight, p in zip(function.steady, function.space.polynomials, strict=True):
         if weight:
@@ -169,8 +156,6 @@ def varying_radius_of(d: Function, changes: Sequence[Function]) -> Varying:
 
     Raises
     ------
-    ValueError
-        If a change has another form.
     UndecidedError
         If double precision, or the steps allowed, do not decide it.
     """

@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import cycle
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from armlock.checks import FloatArray, axis, positive_array
+from armlock.checks import FloatArray, axis, finite_series, not_negative, positive_array
 from armlock.loops import Loop
 from armlock.performance.transfer import require_stable, responses
 
@@ -59,30 +59,25 @@ def free_running(frequency: FloatArray) -> FloatArray:
     return LEVELS.free_running / frequency
 
 
-def cavity(frequency: FloatArray) -> FloatArray:
-    """Return the noise of a cavity-stabilised laser in Hz/sqrt(Hz)."""
-    return 30.0 * np.sqrt(1.0 + (3e-3 / frequency) ** 4)
-
-
-def mach_zehnder(frequency: FloatArray) -> FloatArray:
-    """Return the noise of a laser stabilised to a Mach-Zehnder interferometer in Hz/sqrt(Hz).
-
-    Two readouts of 1 pm/sqrt(Hz), over a path difference of 0.5 m (Sec. 2.5 of the source).
-    The source's loop has a bandwidth of 20 Hz, which is left out here.
-    """
-    return 800.0 * np.sqrt(1.0 + (2.8e-3 / frequency) ** 4)
-
-
 def tdi_capability(frequency: FloatArray) -> FloatArray:
     """Return the laser noise in Hz/sqrt(Hz) that time-delay interferometry can remove."""
     return 300.0 * (1.0 + (3e-3 / frequency) ** 2)
 
 
+class Laser(Protocol):
+    """What knows its own density, such as `armlock.LaserNoise`."""
+
+    def asd(self, frequency: npt.ArrayLike, /) -> npt.ArrayLike:
+        """Return the density at a frequency in Hz."""
+
+
 #: Laser noises by name, as functions of the frequency in Hz.
 LASERS: dict[str, Callable[[FloatArray], FloatArray]] = {
     "free-running": free_running,
-    "Mach-Zehnder": mach_zehnder,
-    "cavity": cavity,
+    # Two readouts of 1 pm/sqrt(Hz), over a path difference of 0.5 m (Sec. 2.5 of the source).
+    # The source's loop has a bandwidth of 20 Hz, which is left out here.
+    "Mach-Zehnder": lambda f: 800.0 * np.sqrt(1.0 + (2.8e-3 / f) ** 4),
+    "cavity": lambda f: 30.0 * np.sqrt(1.0 + (3e-3 / f) ** 4),
 }
 
 
@@ -98,6 +93,8 @@ class NoiseBudget:
         What each source leaves on the locked laser: "laser", "shot", "clock" and "motion".
     requirement : float array, shape (n,)
         Requirement on the total.
+    free : float array, shape (n,)
+        The laser without the lock.
 
     Examples
     --------
@@ -109,6 +106,7 @@ class NoiseBudget:
     frequency: FloatArray
     sources: dict[str, FloatArray]
     requirement: FloatArray
+    free: FloatArray
 
     @property
     def total(self) -> FloatArray:
@@ -150,11 +148,35 @@ class NoiseBudget:
         return ax
 
 
+def _density(laser: Callable[[FloatArray], npt.ArrayLike] | Laser, f: FloatArray) -> FloatArray:
+    """Return the noise of a free laser in Hz/sqrt(Hz), or raise."""
+    density = getattr(laser, "asd", laser)
+    if not callable(density):
+        raise TypeError(
+            "laser must be a function of the frequency in Hz, or have such a method asd, "
+            f"got {laser!r:.200}"
+        )
+    found = finite_series("laser(frequency)", density(f))
+    if found.shape != f.shape or (found < 0.0).any():
+        raise ValueError(
+            "laser(frequency) must hold no negative number and have the shape of frequency, "
+            f"{f.shape}, got shape {found.shape} and {found.min(initial=0.0)} as the least"
+        )
+    return found
+
+
 def noise_budget(
     loop: Loop,
     frequency: npt.ArrayLike,
+    *,
+    laser: Callable[[FloatArray], npt.ArrayLike] | Laser = free_running,
+    shot: float = LEVELS.shot,
+    clock: float = LEVELS.clock,
 ) -> NoiseBudget:
     r"""Compute what noise is left on the locked laser, at c1 = c2 = 1.
+
+    If nothing else is given, the free laser has 30 kHz/sqrt(Hz) at 1 Hz and falls as 1/f. That
+    is the free-running laser of the source, a thousand times the default of `LaserNoise`.
 
     .. math::
 
@@ -165,9 +187,9 @@ def noise_budget(
 
     .. math::
 
-        N_{S,k} &= \text{two links of } 10^{-5} / \sqrt{\mathrm{Hz}} , \\
+        N_{S,k} &= \text{two links of the shot noise} , \\
         N_{C,k} &= \Delta_k \frac{y_0 + y_k}{2\pi f} , \quad
-        y = 2.4 \cdot 10^{-12} f^{-1/2} / \sqrt{\mathrm{Hz}} , \\
+        y = \text{clock} \cdot f^{-1/2} , \\
         N_{X,k} &= X_0 \left( 1 + e^{-s\tau_k} \right) + 2 X_k .
 
     The clock and the motion of the spacecraft with the laser, index 0, act on both arms.
@@ -178,18 +200,27 @@ def noise_budget(
         The loop.
     frequency : array_like of float, one-dimensional
         In Hz, positive.
+    laser : callable, or object with a method asd, optional
+        Noise of the free laser in Hz/sqrt(Hz) as a function of the frequency in Hz, for
+        instance a `LaserNoise`. By default 30 kHz/sqrt(Hz) at 1 Hz, falling as 1/f.
+    shot : float, optional
+        Shot noise of one link in cycles/sqrt(Hz), 1e-5 by default.
+    clock : float, optional
+        Fractional frequency noise of a clock at 1 Hz in 1/sqrt(Hz), 2.4e-12 by default. It
+        falls as 1/sqrt(f).
 
     Returns
     -------
     NoiseBudget
-        With a free-running laser, and the capability of time-delay interferometry as the
-        requirement, 300 (1 + (3 mHz / f)^2).
+        With the capability of time-delay interferometry as the requirement,
+        300 (1 + (3 mHz / f)^2).
 
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no `Loop` or not stable, or the frequencies are not positive and
-        one-dimensional.
+        If `loop` is no `Loop` or not stable, the frequencies are not positive and
+        one-dimensional, `laser` is no function that returns densities, or another level is
+        negative.
 
     References
     ----------
@@ -202,17 +233,25 @@ def noise_budget(
     >>> print(f"{found.total[0]:.0f} Hz/sqrt(Hz), {found.factor[0]:.1f} times below")
     113 Hz/sqrt(Hz), 5.3 times below
 
+    With the paper's laser, of 30 Hz/sqrt(Hz) at 1 Hz:
+
+    >>> from armlock import LaserNoise
+    >>> paper = LaserNoise(seed=1, sample_rate=200.0)
+    >>> left = noise_budget(flight_loop(), [3e-3], laser=paper).sources["laser"]
+    >>> print(f"{left[0]:.2f} Hz/sqrt(Hz)")
+    0.11 Hz/sqrt(Hz)
+
     As a table: ``pandas.DataFrame(found.sources, index=found.frequency)``.
     """
     f = axis("frequency", positive_array("frequency", frequency))
+    free = _density(laser, f)
+    shot, clock = not_negative("shot", shot), not_negative("clock", clock)
     require_stable(loop)
     s = 2j * np.pi * f
     found = responses(loop, s, ("laser", "arm 1", "arm 2"))
     arms = np.array([found["arm 1"], found["arm 2"]])
     beats, tau = np.array(LEVELS.beat_notes)[:, None], np.array([[loop.tau1], [loop.tau2]])
     # An arm's noise in cycles is turned into a frequency by 2 pi f.
-    shot = np.sqrt(2.0) * LEVELS.shot * np.abs(s)
-    clock = LEVELS.clock / np.sqrt(f)
     motion = LEVELS.motion * np.abs(s) / np.sqrt(1.0 + (f / LEVELS.motion_corner) ** 4)
 
     def through(shared: npt.ArrayLike, separate: npt.ArrayLike) -> FloatArray:
@@ -221,9 +260,9 @@ def noise_budget(
         return np.asarray(np.hypot(together, np.linalg.norm(separate * arms, axis=0)))
 
     locked = {
-        "laser": np.abs(found["laser"]) * free_running(f),
-        "shot": shot * through(0.0, 1.0),
-        "clock": clock * through(beats, beats),
+        "laser": np.abs(found["laser"]) * free,
+        "shot": np.sqrt(2.0) * shot * np.abs(s) * through(0.0, 1.0),
+        "clock": clock / np.sqrt(f) * through(beats, beats),
         "motion": motion * through(1.0 + np.exp(-s * tau), 2.0),
     }
-    return NoiseBudget(f, locked, tdi_capability(f))
+    return NoiseBudget(f, locked, tdi_capability(f), free)

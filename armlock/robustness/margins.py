@@ -6,7 +6,7 @@ margin and no larger gain exists, to a part in a million (`armlock.engine.margin
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from typing import Any, NamedTuple, TypeVar
@@ -25,6 +25,7 @@ from armlock.engine.margins import (
     modulus_of,
     require_stable,
 )
+from armlock.loops import checked_loop
 from armlock.stability.counts import decided, in_doubt, require_certain
 from armlock.systems import Sum, System, delay_object
 
@@ -137,8 +138,8 @@ def peak_gain(system: Any) -> PeakGain:
     Raises
     ------
     TypeError, ValueError
-        If `system` is no system, or has a pole on the imaginary axis or right of it, as an
-        open loop with an integrator has.
+        If `system` is no system, is improper, so that its gain grows without limit, or has a
+        pole on the imaginary axis or right of it, as an open loop with an integrator has.
     CountError
         If double precision, or the steps allowed, do not decide it. It is raised too where
         several delays act on the highest powers of both numerator and denominator, in different
@@ -161,7 +162,13 @@ def peak_gain(system: Any) -> PeakGain:
     1.6246 at 2.291e-05 rad/s
     """
     n, d, point = open_quotient(system, (), {}, "system")
-    others = System.of(system, "system").others
+    given = System.of(system, "system")
+    held, others = given.at(**given.nominal), given.others
+    if held.numerator.degree > held.denominator.degree:
+        raise ValueError(
+            "system must be proper, or its gain grows without limit, got a numerator of degree "
+            f"{held.numerator.degree} and a denominator of degree {held.denominator.degree}"
+        )
     with decided("no peak gain", point):
         # Poles that may be meant to be zero must not change the count of the poles.
         pairs = [open_quotient(other, (), {}, "system")[:2] for other in others]
@@ -180,7 +187,6 @@ def margins(
     loop: System,
     *values: float,
     free_above: float | None = None,
-    free: Sequence[System] | None = None,
     **numbers: float,
 ) -> Margins:
     r"""Compute all margins of a stable loop.
@@ -193,13 +199,10 @@ def margins(
     *values : float, optional
         The parameters, in the order of their first use; nominal ones by default.
     free_above : float, optional
-        Angular frequency in rad/s above which the phases of the arms are taken as free, as
-        they are once the arms have drifted by a fraction of the modulation's wavelength: the
-        margins then hold for all of them. By default the phases are those of the delays, at
-        all frequencies.
-    free : sequence of delays, optional
-        The delays whose phases are free, as `delay` made them. Those of the arms of a `Loop` by
-        default.
+        Angular frequency in rad/s above which the phases of the arms of a `Loop` are taken as
+        free, as they are once the arms have drifted by a fraction of the modulation's
+        wavelength: the margins then hold for all of them. By default the phases are those of
+        the delays, at all frequencies.
     **numbers : float, optional
         Parameters by name.
 
@@ -210,9 +213,9 @@ def margins(
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no open loop, a parameter is not finite and real, `free_above` is not
-        positive, no delay is free, or one stands in the denominator of L; or the loop is not
-        stable there. The message then names a gain factor with which it is, if one was found.
+        If `loop` is no open loop, or no `Loop` where phases are free, a parameter is not finite
+        and real, or `free_above` is not positive; or the loop is not stable there. The message
+        then names a gain factor with which it is, if one was found.
     CountError
         If double precision, or the steps allowed, do not decide a margin.
 
@@ -248,24 +251,16 @@ def margins(
     """
     if free_above is None:
         return _certified(_with_a_gain, loop, values, numbers)
-    system = System.of(loop, "loop")
+    loop = checked_loop(loop, "free_above frees the phases of its arms, which it alone names")
     above = positive_number("free_above", free_above)
-    objects = tuple(free if free is not None else getattr(loop, "arms", ()))
-    if not objects:
-        raise TypeError("free must hold the delays whose phases are free, as delay() made them")
-    given = {name: real_number(name, x) for name, x in system.given(values, numbers).items()}
-    loose = _with_free_phases(system.at(**given), objects, above)
+    given = {name: real_number(name, x) for name, x in loop.given(values, numbers).items()}
+    loose = _with_free_phases(loop.at(**given), loop.arms, above)
     return _certified(partial(margins_of, free=loose), loop, values, numbers)
 
 
-def _with_free_phases(system: System, objects: tuple[System, ...], above: float) -> Free:
-    """Return L with free phases of some delay objects above a frequency, for the engine."""
-    free = {delay_object(one, "free") for one in objects}
-    if any(d in free for lag in system.denominator.lags for d, _ in lag):
-        raise ValueError(
-            "the delays of free phase must not stand in the denominator of L: it would fill no "
-            f"disc, got {system!r}"
-        )
+def _with_free_phases(system: System, arms: tuple[System, System], above: float) -> Free:
+    """Return L with free phases of both arms above a frequency, for the engine."""
+    free = {delay_object(one, "arm") for one in arms}
     # Terms with the same powers of these delays turn together.
     given = system.numerator.rounded()
     kinds = {lag: tuple(pair for pair in lag if pair[0] in free) for lag in given.lags}
@@ -277,5 +272,5 @@ def _with_free_phases(system: System, objects: tuple[System, ...], above: float)
         above_line = above_line + Sum.of(p, own, *arm)
     turned = dict.fromkeys(names.values(), 0.0)
     affine = Affine(System(above_line, system.denominator, turned), tuple(turned))
-    arms = tuple(f for f in affine.n[1:] if not f.is_zero)
-    return Free(affine.n[0], affine.m[0], arms, above)
+    discs = tuple(f for f in affine.n[1:] if not f.is_zero)
+    return Free(affine.n[0], affine.m[0], discs, above)

@@ -23,6 +23,7 @@ from armlock.engine.functions import Function
 from armlock.engine.inclusion import EPSILON, TERM, VERTEX
 from armlock.engine.margins import first_zero
 from armlock.engine.polynomials import collected, exact, polynomial, rounded
+from armlock.loops import Loop, checked_loop
 from armlock.stability.counts import CountError, decided, require_certain, unstable_roots
 from armlock.systems import Sum, System, delay_object
 
@@ -102,11 +103,23 @@ class _Ray:
                 raise NotAffineError("a parameter that stays is zero at the highest power")
         except NotAffineError:
             line = {k: System.of(begin[k]) + way[k] * _U for k in way}
-            along = Affine(system.at(**{**begin, **line}), ("u",))
+            along = self._along(system.at(**{**begin, **line}), way)
             self.n, self.m = along.n[0], along.m[0]
             moved = [part[1] * self.scale for part in (along.n, along.m)]
         self.dn, self.dm = moved
         self.f, self.g = self.n + self.m, self.dn + self.dm
+
+    @staticmethod
+    def _along(system: System, way: dict[str, float]) -> Affine:
+        """Return a system, affine in the parameter of the ray, or say what is multiplied."""
+        try:
+            return Affine(system, ("u",))
+        except NotAffineError:
+            raise NotAffineError(
+                "direction must change parameters that are not multiplied with each other or "
+                f"with themselves, got {', '.join(way)}: change one of them, make the product "
+                "a parameter, or count along the way: unstable_roots takes arrays of all"
+            ) from None
 
     def point(self, u: float) -> FloatArray:
         """Return the parameters at a point of the ray."""
@@ -372,18 +385,14 @@ def _by_powers(d: Sum, objects: tuple[Delay, Delay]) -> dict[tuple[int, ...], Su
     )
 
 
-def stable_half_differences(
-    loop: System, *, between: tuple[System, System] | None = None
-) -> tuple[float, float]:
-    r"""Return half differences of two delays between which a loop is stable.
+def stable_half_differences(loop: Loop) -> tuple[float, float]:
+    r"""Return half differences of the two arms between which a loop is stable.
 
     Parameters
     ----------
-    loop : System
-        The open loop, for instance `paper_loop()`, or an equation, at nominal parameters.
-        Sensor, controller and the mean of the two delays stay.
-    between : pair of delays, optional
-        The two, as `delay` made them; the arms of a `Loop` by default.
+    loop : Loop
+        For instance `paper_loop()`, at c1 = c2 = 1. Sensor, controller and the mean of the two
+        delays stay.
 
     Returns
     -------
@@ -394,8 +403,7 @@ def stable_half_differences(
     Raises
     ------
     TypeError, ValueError
-        If two delays are not known, D is not affine in each of them, or the loop is not
-        stable as it is.
+        If `loop` is no `Loop`, or not stable as it is.
     CountError
         If it takes too many steps.
 
@@ -421,18 +429,11 @@ def stable_half_differences(
     >>> print(f"{low:.4f} s to {high:.4f} s")
     0.0202 s to 0.2454 s
     """
-    system = System.of(loop, "loop")
-    arms = getattr(loop, "arms", ()) if between is None else between
-    if not isinstance(arms, tuple | list) or len(arms) != 2:
-        raise TypeError(
-            "between must hold the two delays that grow apart, as delay() made them"
-        )
-    one, other = (delay_object(arm, "between") for arm in arms)
+    loop = checked_loop(loop, "its arms are the two delays that grow apart")
+    one, other = (delay_object(arm, "arm") for arm in loop.arms)
     mean = 0.5 * (float(one.theta) + float(other.theta))
     start = 0.5 * (float(one.theta) - float(other.theta))
-    here = system.at(**system.given((), {}))
-    if here.known:
-        raise ValueError(f"loop must hold no distributed delay, got {system!r}")
+    here = loop.at(**loop.nominal)
     at_start = unstable_roots(here)
     if at_start != 0:
         raise ValueError(f"loop must be stable as it is, but unstable_roots gives {at_start}")

@@ -10,8 +10,8 @@ from armlock.affine import Affine, common
 from armlock.checks import real_number
 from armlock.engine.margins import require_stable
 from armlock.engine.varying import constant_radius_of, varying_radius_of
+from armlock.loops import Loop, checked_loop
 from armlock.stability.counts import decided, require_certain
-from armlock.systems import System
 
 
 class VaryingRadius(NamedTuple):
@@ -38,8 +38,20 @@ class VaryingRadius(NamedTuple):
     scalings: tuple[float, ...]
 
 
-def varying_radius(loop: System, *values: float, **numbers: float) -> VaryingRadius:
+_PLACE = (
+    "there each factor acts on the delayed signal, before every filter. An expression does not "
+    "say where a factor acts, and one that varies in time does not commute with a filter. "
+    "Write another gain or filter as loop.replace(controller=...). One factor that multiplies "
+    "one signal has the radius 1 / peak_gain(G), with the response G from what the factor adds "
+    "to what it multiplies"
+)
+
+
+def varying_radius(loop: Loop, *values: float, **numbers: float) -> VaryingRadius:
     r"""Find how far factors c_k(t) may vary, in any way, without making a loop unstable.
+
+    Each factor acts on the delayed signal of its arm, before every filter: the arm returns
+    :math:`c_k(t)\, x(t - \tau_k)`.
 
     With the sensitivity S at the constant point and :math:`G_k = S K m_k`, the loop is stable
     for all :math:`|c_k(t) - c_k| \le r` if, for some numbers :math:`d_k`,
@@ -50,9 +62,8 @@ def varying_radius(loop: System, *values: float, **numbers: float) -> VaryingRad
 
     Parameters
     ----------
-    loop : System
-        The open loop, a `Loop` or another one whose parameters are factors of delayed copies of
-        the loop's signal. Its delays are constant.
+    loop : Loop
+        The loop, whose delays are constant.
     *values, **numbers : float, optional
         The constant point: the parameters, in the order of their first use or by name; nominal
         ones by default.
@@ -67,10 +78,8 @@ def varying_radius(loop: System, *values: float, **numbers: float) -> VaryingRad
     Raises
     ------
     TypeError, ValueError
-        If `loop` is no system, has no parameter or is not affine in them, a parameter is not
-        finite and real or multiplies more than one delayed polynomial, or the loop is not
-        stable there: the message has the count, or says that the neutral root chain is not
-        confined.
+        If `loop` is no `Loop`, a parameter is not finite and real, or the loop is not stable
+        there: the message has the count, or says that the neutral root chain is not confined.
     CountError
         If double precision, or the steps allowed, do not decide it.
 
@@ -85,6 +94,11 @@ def varying_radius(loop: System, *values: float, **numbers: float) -> VaryingRad
     "stable" means). It says nothing about delays that vary. Below the radius the gain from the
     free to the locked laser is at most that of the constant loop over 1 - r / radius.
 
+    The place of the factors matters. The loop 0.5 (c1 F + c2 F) exp(-s theta), with
+    F = 100 / (s + 1) and theta = 1e-6 s, has the radius 1.01 if both factors act before F. With
+    c1 behind F and c2 before it, factors that switch by 0.25 together, with a period of 1 ms,
+    make it grow.
+
     A loop with a root at s = 0 that cancels at the constant point, as an integrator and a
     common-arm sensor have, has the radius zero.
 
@@ -95,12 +109,9 @@ def varying_radius(loop: System, *values: float, **numbers: float) -> VaryingRad
     >>> print(f"varying: {found.radius:.3e}, constant: {found.constant:.3e}")
     varying: 1.321e-06, constant: 1.464e-06
     """
-    system = System.of(loop, "loop")
-    given = {k: real_number(k, v) for k, v in system.given(values, numbers).items()}
-    if not given:
-        raise ValueError(f"loop must have a parameter that varies, got {system!r}")
-    affine, point = Affine.of(system), list(given.values())
-    require_certain(system, point)
+    given = checked_loop(loop, _PLACE).given(values, numbers)
+    affine, point = Affine.of(loop), [real_number(k, v) for k, v in given.items()]
+    require_certain(loop, point)
     n, m = affine.quotient(*point)
     d, changes = n + m, affine.terms[1:]
     with decided("no radius", np.array(point)):

@@ -18,14 +18,14 @@ import numpy.typing as npt
 from flint import fmpq
 from tqdm import tqdm  # type: ignore[import-untyped]
 
-from armlock.affine import Affine
+from armlock.affine import Affine, NotAffineError
 from armlock.checks import BoolArray, FloatArray, IntArray, axis, check_memory, real_number
 from armlock.engine import chain
 from armlock.engine.decide import BOUNDARY, UNCONFINED, UNDECIDED
 from armlock.engine.functions import Function, stacked
 from armlock.engine.inclusion import EPSILON
 from armlock.engine.polynomials import exact, rounded
-from armlock.stability.counts import count_points
+from armlock.stability.counts import count_points, unstable_roots
 from armlock.stability.crossings import crossings
 from armlock.systems import System
 
@@ -113,8 +113,8 @@ def stability_chart(
     Parameters
     ----------
     system : System
-        The open loop, for instance `CommonArm()`, or an equation; affine in both parameters
-        together.
+        The open loop, for instance `CommonArm()`, or an equation. Where the two parameters are
+        multiplied, rows are counted one by one, which takes longer.
     *axes : array_like of float, one-dimensional
         Axes of the first two parameters, in any order and spacing, such as c1 and c2.
     **axes_and_numbers : array_like of float
@@ -131,8 +131,7 @@ def stability_chart(
     ------
     TypeError, ValueError
         If there are not two axes, an axis is empty, not one-dimensional, or not finite and
-        real, the system is not affine in both parameters, or the chart does not fit into the
-        memory.
+        real, or the chart does not fit into the memory.
 
     Notes
     -----
@@ -166,7 +165,11 @@ def stability_chart(
     system = System.of(system)
     (name1, xs), (name2, ys), numbers = _axes(system, axes, axes_and_numbers)
     check_memory(f"{name1} and {name2}", (ys.size, xs.size), _BYTES_A_POINT)
-    affine = Affine(system, (name1, name2), **numbers)
+    try:
+        affine = Affine(system, (name1, name2), **numbers)
+    except NotAffineError:
+        counts = _by_rows(system, {name1: xs}, {name2: ys}, numbers)
+        return StabilityChart(system, xs, ys, counts, (name1, name2))
     order_x, order_y = np.argsort(xs, kind="stable"), np.argsort(ys, kind="stable")
     if affine.terms[1].is_zero:
         # Nothing crosses along a row: walk along the columns instead.
@@ -199,6 +202,25 @@ def _axes(
     return first, second, numbers
 
 
+def _by_rows(
+    system: System, x: dict[str, FloatArray], y: dict[str, FloatArray], held: dict[str, float]
+) -> IntArray:
+    """Count row by row: with the second parameter held, the first one is not multiplied."""
+    ((name, values),) = y.items()
+    with _progress(values.size, " rows") as progress:
+        rows = []
+        for value in values:
+            given: dict[str, Any] = {**x, name: value, **held}
+            rows.append(unstable_roots(system, **given))
+            progress.update()
+    return np.array(rows)
+
+
+def _progress(total: int, unit: str) -> tqdm:
+    """Return the progress bar of a chart that takes longer."""
+    return tqdm(total=total, desc="chart", unit=unit, delay=_PATIENCE, leave=False)
+
+
 def _counted(
     affine: Affine, x: FloatArray, y: FloatArray, progress: tqdm | None = None
 ) -> IntArray:
@@ -216,9 +238,7 @@ def _counted(
 
 def _chart(affine: Affine, x: FloatArray, y: FloatArray) -> IntArray:
     """Return the counts of a chart with ascending axes."""
-    with tqdm(
-        total=x.size * y.size, desc="chart", unit=" points", delay=_PATIENCE, leave=False
-    ) as progress:
+    with _progress(x.size * y.size, " points") as progress:
         rows = _Rows.of(affine, float(x[x.size // 2]), float(y[y.size // 2]))
         if x.size * y.size <= _FEW or not rows.plain:
             across, up = _points(x, y)

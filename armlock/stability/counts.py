@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from flint import fmpq
 
 from armlock.affine import Affine, NotAffineError, common, present, quotient_at
 from armlock.checks import (
@@ -29,18 +28,16 @@ from armlock.checks import (
 from armlock.engine import decide
 from armlock.engine.chain import UndecidedError
 from armlock.engine.decide import BOUNDARY, UNCONFINED, UNDECIDED
-from armlock.engine.functions import Function, Leading, check_sizes, compiled, log, stacked
+from armlock.engine.functions import Function, check_sizes, stacked
 from armlock.engine.inclusion import EPSILON, Functions
-from armlock.engine.polynomials import exact, order
 from armlock.systems import System
 
 __all__ = ["BOUNDARY", "UNCONFINED", "UNDECIDED", "CountError", "unstable_roots"]
 
 # Points whose weights are in memory at a time.
 _AT_A_TIME = 1 << 16
-# Coefficients at s = 0 from which zeros there are known; and what a count is until exact
-# weights decide it.
-_TERMS, _EXACTLY = 4, -4
+# What a count is until exact weights decide it.
+_EXACTLY = -4
 # Past this an exponential is no float.
 _LARGEST_EXPONENT = 700.0
 
@@ -57,7 +54,7 @@ class CountError(RuntimeError):
     --------
     >>> from armlock import CommonArm, CountError, unstable_roots
     >>> try:
-    ...     unstable_roots(CommonArm(gain=1e10, delay=0.001), 0.5, 0.5)
+    ...     unstable_roots(CommonArm(gain=1e10).replace(delay=0.001), 0.5, 0.5)
     ... except CountError as error:
     ...     print("undecided at", error.points)
     undecided at [[0.5 0.5]]
@@ -108,14 +105,11 @@ def count_points(affine: Affine, points: FloatArray) -> IntArray:
         confined = np.flatnonzero(space.confined(*limits))
         chosen = Functions(functions.space, *(v[confined] for v in functions[1:]))
         counted = decide.counts(space, chosen)
-        # What rounded weights do not confine, exact ones may.
-        found[start + confined] = np.where(counted == UNCONFINED, _EXACTLY, counted)
+        # What rounded weights do not confine, or leave on the axis, exact ones may decide.
+        unsure = np.isin(counted, (UNCONFINED, BOUNDARY))
+        found[start + confined] = np.where(unsure, _EXACTLY, counted)
         here = np.flatnonzero(found[start : start + _AT_A_TIME] == UNCONFINED)
         found[start + here[_degree_falls(affine, points[start + here])]] = _EXACTLY
-    left = np.flatnonzero(found == BOUNDARY)
-    for start in range(0, left.size, _AT_A_TIME // 64):
-        some = left[start : start + _AT_A_TIME // 64]
-        found[some] = _with_zeros(affine, points[some])
     for i in np.flatnonzero(found == _EXACTLY):
         try:
             found[i] = _count_exactly(*present(*affine.quotient(*points[i].tolist())))
@@ -132,56 +126,6 @@ def _degree_falls(affine: Affine, points: FloatArray) -> BoolArray:
         off = (2.0 + len(part)) * EPSILON * (np.abs(shares) @ np.abs(limits))
         falls &= (np.abs(shares @ limits) <= off).all(axis=1)
     return falls
-
-
-def _with_zeros(affine: Affine, points: FloatArray) -> IntArray:
-    """Count at points where D(0) may be zero; `_EXACTLY` where rounded weights do not decide.
-
-    Of a loop those zeros do not count that N and M have in common.
-    """
-    series = [[f.series(_TERMS) for f in part] for part in (affine.n, affine.m)]
-    found = np.full(len(points), _EXACTLY)
-    left, leads, away = [], [], list[int]()
-    for i, point in enumerate(points.tolist()):
-        shares = [fmpq(1), *map(exact, point)]
-        n, m = (
-            [
-                sum((x * c[k] for x, c in zip(shares, part, strict=True)), fmpq(0))
-                for k in range(_TERMS)
-            ]
-            for part in series
-        )
-        d = [a + b for a, b in zip(n, m, strict=True)]
-        orders = [order(a) for a in (n, m, d)]
-        apart = affine.space.known.get(fmpq(0), 0)
-        cancelled = apart if affine.m_is_zero else min(orders[:2])
-        if orders[2] == _TERMS:
-            continue
-        if not orders[2]:
-            away.append(i)
-            continue
-        if orders[2] > cancelled:
-            found[i] = BOUNDARY
-            continue
-        left.append(i)
-        leads.append((orders[2], d[orders[2]]))
-    if away:
-        # Rounding hides the sign of D(0), which exact weights have.
-        exactly = [affine.function(*points[i].tolist()) for i in away]
-        counted = decide.counts(affine.space, compiled(exactly))
-        found[away] = np.where(counted == UNDECIDED, _EXACTLY, counted)
-    if left:
-        functions = _rounded(affine, points[left])
-        radii = affine.space.radius(
-            [(functions.steady, functions.delayed)],
-            [k for k, _ in leads],
-            [log(abs(c)) for _, c in leads],
-            0.25,
-        )
-        known = [Leading(k, c, r) for (k, c), r in zip(leads, radii.tolist(), strict=True)]
-        counted = decide.counts(affine.space, functions, leading=known)
-        found[left] = np.where(counted < 0, _EXACTLY, counted)
-    return found
 
 
 def _rounded(affine: Affine, points: FloatArray) -> Functions:
@@ -217,8 +161,8 @@ def unstable_roots(
         loop in place of L would be closed again.
     *values, **numbers : array_like of float, optional
         The parameters, in the order of their first use or by name, such as c1 and c2 of a
-        `Loop`; they broadcast. Those that are not given are nominal, 1 for c1 and c2. The
-        system has to be affine in those that are arrays together.
+        `Loop`; they broadcast. Those that are not given are nominal, 1 for c1 and c2. Where
+        those that are arrays are multiplied, the points are counted one by one.
     right_of : float, optional
         Count the roots with a larger real part than this, in rad/s.
 
@@ -243,8 +187,8 @@ def unstable_roots(
     Raises
     ------
     TypeError, ValueError
-        If a number is not finite and real, a parameter is missing or unknown, the values do not
-        broadcast or fit into memory, or the system is not affine in those that are arrays.
+        If a number is not finite and real, a parameter is missing or unknown, or the values do
+        not broadcast or fit into memory.
     CountError
         If the count at a single point takes too many steps, or a count depends on a pole that
         may be meant to be zero, see `Controller.of`. Nothing is guessed.
@@ -312,7 +256,8 @@ def require_certain(system: System, point: Sequence[Any]) -> None:
 def _counts(system: System, points: FloatArray, right_of: float) -> IntArray:
     """Count at points, shape (n, k)."""
     if len(points) > 1 and right_of == 0.0:
-        return count_points(*_over(system, points))
+        with suppress(NotAffineError):
+            return count_points(*_over(system, points))
     found = np.empty(len(points), np.int64)
     for i, point in enumerate(points):
         try:

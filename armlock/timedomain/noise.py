@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -39,63 +38,6 @@ _BLOCK = 1 << 20
 _LASER_ZEROS, _LASER_POLE = (2.37, 7.87), 6.03
 
 
-class Samples(np.ndarray[Any, np.dtype[np.float64]]):
-    """A drawn series that remembers its sample rate in Hz, for `armlock.simulate` to compare.
-
-    Arithmetic, copies, pickles, contiguous slices and joined blocks of one rate keep the rate.
-    Every other index forgets it, and so does what has another number of samples, such as the
-    means of blocks.
-    """
-
-    sample_rate: float | None
-
-    def __array_finalize__(self, other: object) -> None:
-        """Take over the rate of an array of as many samples, from which this one was made."""
-        self.sample_rate = None
-        if isinstance(other, Samples) and other.size == self.size:
-            self.sample_rate = other.sample_rate
-
-    def __array_wrap__(
-        self, array: Any, context: Any = None, return_scalar: bool = False
-    ) -> Any:
-        """Return a sum over all samples as a plain number; series of two rates have none."""
-        if array.ndim == 0:
-            return array[()]
-        found: Any = super().__array_wrap__(array, context)
-        given = context[1] if context else ()
-        if len({one.sample_rate for one in given if isinstance(one, Samples)}) > 1:
-            found.sample_rate = None
-        return found
-
-    def __array_function__(self, func: Any, types: Any, args: Any, kwargs: Any) -> Any:
-        """Join blocks of one rate to a series of that rate, and leave the rest to NumPy."""
-        found = super().__array_function__(func, types, args, kwargs)
-        if func is np.concatenate and np.ndim(found) == 1:
-            rates = {getattr(part, "sample_rate", None) for part in args[0]}
-            return _sampled(np.asarray(found), rates.pop()) if len(rates) == 1 else found
-        return found
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Send the rate along to another process."""
-        return _sampled, (self.view(np.ndarray), self.sample_rate)
-
-    def __getitem__(self, key: Any) -> Any:
-        """Return samples; those that are not contiguous have no rate."""
-        found = super().__getitem__(key)
-        if isinstance(found, Samples):
-            if not (isinstance(key, slice) and key.step is None):
-                return found.view(np.ndarray)
-            found.sample_rate = self.sample_rate
-        return found
-
-
-def _sampled(series: FloatArray, sample_rate: float | None) -> FloatArray:
-    """Return a series that remembers its sample rate."""
-    drawn = series.view(Samples)
-    drawn.sample_rate = sample_rate
-    return drawn
-
-
 class ShapedNoise:
     r"""White noise through a rational filter: the sampled form of one in continuous time.
 
@@ -114,11 +56,8 @@ class ShapedNoise:
         Its gain, not zero; its magnitude at s = j omega is the amplitude spectral density.
     seed : int
         Of the random numbers.
-    sample_rate : float, optional
+    sample_rate : float
         In Hz.
-    at_rest : bool, optional
-        Whether the filter starts at rest, so that the series starts near zero, as when a
-        simulation is switched on. By default the series is stationary from the start.
 
     Raises
     ------
@@ -149,6 +88,8 @@ class ShapedNoise:
     True
     """
 
+    _at_rest = False
+
     def __init__(
         self,
         zeros: Sequence[complex],
@@ -156,8 +97,7 @@ class ShapedNoise:
         gain: float,
         *,
         seed: int,
-        sample_rate: float = 200.0,
-        at_rest: bool = False,
+        sample_rate: float,
     ) -> None:
         self.sample_rate = positive_number("sample_rate", sample_rate)
         self._filter = Controller(zeros, poles, gain)
@@ -175,7 +115,7 @@ class ShapedNoise:
                 f"noise must have a finite r.m.s., got poles {self._filter.poles} in rad/s at "
                 f"a sample_rate of {self.sample_rate} Hz"
             )
-        if not true_or_false("at_rest", at_rest):
+        if not self._at_rest:
             order = self._sampled.order
             start = self._root @ self._random.standard_normal(order)
             self._state[:order] = self._scale * start
@@ -229,7 +169,6 @@ class ShapedNoise:
         Returns
         -------
         float array, shape (samples,)
-            A simulation at another sample rate refuses it.
 
         Raises
         ------
@@ -245,7 +184,7 @@ class ShapedNoise:
             self._random.standard_normal(out=part)
             part *= self._scale
             _shape(part, self._sampled.gain, self._sampled.sections, self._state)
-        return _sampled(series, self.sample_rate)
+        return series
 
     def blocks(self, samples: int, size: int = _BLOCK) -> Iterator[FloatArray]:
         """Yield the next samples in blocks.
@@ -279,32 +218,32 @@ def _shape(series: FloatArray, gain: float, sections: Rows, state: FloatArray) -
 
 
 class LaserNoise(ShapedNoise):
-    r"""Frequency noise of a free-running laser, of density level / sqrt(f^2 + cutoff^2).
+    r"""Frequency noise of a free-running laser, of density level / f.
 
     .. math::
 
-        \text{asd}(f) = \frac{\text{level}}{\sqrt{f^2 + \text{cutoff}^2}}
+        \text{asd}(f) = \frac{\text{level}}{\sqrt{f^2 + f_c^2}} , \quad
+        f_c = 10^{-6}\,\text{Hz}
 
     Parameters
     ----------
     seed : int
         Of the random numbers.
-    sample_rate : float, optional
+    sample_rate : float
         In Hz.
     level : float, optional
         Density at 1 Hz, in Hz/sqrt(Hz); the paper's 30 by default.
-    cutoff : float, optional
-        Frequency in Hz below which the density is flat. The variance grows as 1 / cutoff.
     at_rest : bool, optional
-        Whether the series starts at zero; see `ShapedNoise`.
+        Whether the filter starts at rest, so that the series starts near zero, as when a
+        simulation is switched on. By default the series is stationary from the start.
 
     Notes
     -----
     At half the sample rate the trapezoidal rule alone would give a density of zero. Zeros at
     2.37 and 7.87 and a pole at 6.03 times the sample rate, in rad/s, correct this. The
     remaining error is 0.02 percent at a tenth of the sample rate (20 Hz at 200 Hz), 0.7
-    percent at a quarter, and 1.6 percent at most. These numbers are for cutoffs far below the
-    sample rate; `sampled_asd` is exact for all.
+    percent at a quarter, and 1.6 percent at most. These numbers are for sample rates far above
+    the cutoff; `sampled_asd` is exact for all.
 
     Examples
     --------
@@ -314,17 +253,19 @@ class LaserNoise(ShapedNoise):
     (10,)
     """
 
+    #: Frequency in Hz below which the density is flat.
+    cutoff = 1e-6
+
     def __init__(
         self,
         seed: int,
-        sample_rate: float = 200.0,
+        sample_rate: float,
         *,
         level: float = paper.LASER_NOISE,
-        cutoff: float = 1e-6,
         at_rest: bool = False,
     ) -> None:
         self.level = positive_number("level", level)
-        self.cutoff = positive_number("cutoff", cutoff)
+        self._at_rest = true_or_false("at_rest", at_rest)
         rate = positive_number("sample_rate", sample_rate)
         zeros = [-rate * zero for zero in _LASER_ZEROS]
         pole = -rate * _LASER_POLE
@@ -332,7 +273,7 @@ class LaserNoise(ShapedNoise):
         unity = pole / math.prod(zeros)
         super().__init__(
             zeros, (-2.0 * math.pi * self.cutoff, pole), -2.0 * math.pi * self.level * unity,
-            seed=seed, sample_rate=rate, at_rest=at_rest,
+            seed=seed, sample_rate=rate,
         )  # fmt: skip
 
     def asd(self, frequency: npt.ArrayLike) -> FloatArray:
@@ -359,13 +300,11 @@ class PerturbationNoise(ShapedNoise):
     ----------
     seed : int
         Of the random numbers.
-    sample_rate : float, optional
+    sample_rate : float
         In Hz.
     cutoff : float, optional
         Frequency in Hz below which the density is flat. It decides the r.m.s., which grows as
         cutoff^(-3/2).
-    at_rest : bool, optional
-        Whether the series starts near zero; see `ShapedNoise`.
 
     Notes
     -----
@@ -395,9 +334,9 @@ class PerturbationNoise(ShapedNoise):
     Examples
     --------
     >>> from armlock import PerturbationNoise
-    >>> print(f"{PerturbationNoise(seed=1).rms:.4f}")
+    >>> print(f"{PerturbationNoise(seed=1, sample_rate=200.0).rms:.4f}")
     0.0224
-    >>> c1 = 1.0 + PerturbationNoise(seed=1, sample_rate=10.0, at_rest=True).draw(100)
+    >>> c1 = 1.0 + PerturbationNoise(seed=1, sample_rate=10.0).draw(100)
     >>> c1.shape
     (100,)
     """
@@ -405,15 +344,14 @@ class PerturbationNoise(ShapedNoise):
     def __init__(
         self,
         seed: int,
-        sample_rate: float = 200.0,
+        sample_rate: float,
         *,
         cutoff: float = 5e-6,
-        at_rest: bool = False,
     ) -> None:
         self.cutoff = positive_number("cutoff", cutoff)
         corner = 2.0 * math.pi * self.cutoff
         root = 2.0 * math.pi * paper.PHASE_NOISE_CORNER * math.sqrt(0.5)
         super().__init__(
             (complex(-root, root), complex(-root, -root)), (-corner, -corner),
-            paper.PHASE_NOISE_LEVEL, seed=seed, sample_rate=sample_rate, at_rest=at_rest,
+            paper.PHASE_NOISE_LEVEL, seed=seed, sample_rate=sample_rate,
         )  # fmt: skip

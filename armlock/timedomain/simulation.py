@@ -22,7 +22,6 @@ from armlock.checks import (
     ComplexArray,
     FloatArray,
     check_memory,
-    check_rate,
     finite_series,
     positive_array,
     positive_number,
@@ -60,8 +59,9 @@ class DivergenceError(ArithmeticError):
     --------
     >>> import numpy as np
     >>> from armlock import DivergenceError, SingleArm, simulate
+    >>> run = {"sample_rate": 200.0, "c1": 3.0, "limit": 10.0}
     >>> try:
-    ...     locked = simulate(SingleArm(), np.ones(20_000), c1=3.0, limit=10.0)
+    ...     locked = simulate(SingleArm(), np.ones(20_000), **run)
     ... except DivergenceError as error:
     ...     print(0.0 <= error.time < error.output.size / 200.0)
     True
@@ -177,9 +177,9 @@ def sampled_open_loop(
     loop: Loop,
     omega: npt.ArrayLike,
     *,
+    sample_rate: float,
     c1: float = 1.0,
     c2: float = 1.0,
-    sample_rate: float = 200.0,
 ) -> ComplexArray:
     r"""Open loop of a simulation, in closed form.
 
@@ -201,10 +201,10 @@ def sampled_open_loop(
         The loop, without dead time.
     omega : array_like of float
         In rad/s, positive.
+    sample_rate : float
+        In Hz.
     c1, c2 : float, optional
         Constant perturbations.
-    sample_rate : float, optional
-        In Hz.
 
     Returns
     -------
@@ -222,7 +222,7 @@ def sampled_open_loop(
     >>> import numpy as np
     >>> from armlock import paper_loop, sampled_open_loop
     >>> loop, omega = paper_loop(), np.array([0.01])
-    >>> bool(np.allclose(sampled_open_loop(loop, omega), loop(1j * omega), rtol=1e-5))
+    >>> bool(np.allclose(sampled_open_loop(loop, omega, sample_rate=200.0), loop(1j * omega)))
     True
     """
     rate = positive_number("sample_rate", sample_rate)
@@ -247,8 +247,8 @@ class Simulation:
     ----------
     loop : Loop
         The loop, without dead time.
-    sample_rate : float, optional
-        In Hz.
+    sample_rate : float
+        In Hz, of all series that the run takes.
     tau1, tau2 : callable, optional
         Round-trip delays of arms that move, in place of the loop's own: functions that take an
         array of times in s since the first sample, and return the delays in s.
@@ -300,7 +300,7 @@ class Simulation:
     def __init__(
         self,
         loop: Loop,
-        sample_rate: float = 200.0,
+        sample_rate: float,
         *,
         tau1: Moving | None = None,
         tau2: Moving | None = None,
@@ -347,9 +347,9 @@ class Simulation:
         Raises
         ------
         TypeError, ValueError
-            If an argument is not finite and real, has another shape, or was drawn at another
-            sample rate: nothing is computed. If a delay that moves is shorter than four
-            samples, or grows by a second a second or more.
+            If an argument is not finite and real, or has another shape: nothing is computed. If
+            a delay that moves is shorter than four samples, or grows by a second a second or
+            more.
         DivergenceError
             If the output exceeds its limit. The run cannot be continued.
         """
@@ -397,7 +397,6 @@ class Simulation:
 
     def _series(self, name: str, value: npt.ArrayLike, like: FloatArray | None) -> FloatArray:
         """Return a finite series, or a number or a series in the shape of another one."""
-        check_rate(name, value, self.sample_rate)
         array = np.asarray(finite_series(name, value, *([1] if like is None else [0, 1])))
         if like is None:
             return array
@@ -438,9 +437,9 @@ def simulate(
     loop: Loop,
     noise: npt.ArrayLike,
     *,
+    sample_rate: float,
     c1: npt.ArrayLike = 1.0,
     c2: npt.ArrayLike = 1.0,
-    sample_rate: float = 200.0,
     tau1: Moving | None = None,
     tau2: Moving | None = None,
     limit: float = LIMIT,
@@ -460,10 +459,10 @@ def simulate(
         For instance `paper_loop()`; without dead time.
     noise : array_like, shape (n,)
         Frequency noise of the free-running laser, for instance in Hz.
+    sample_rate : float
+        Of the noise, of c1 and of c2, in Hz.
     c1, c2 : float or array_like, shape (n,), optional
         Multiplicative perturbations of the two arms.
-    sample_rate : float, optional
-        In Hz.
     tau1, tau2, limit
         As for `Simulation`.
 
@@ -490,14 +489,15 @@ def simulate(
     --------
     >>> import numpy as np
     >>> from armlock import paper_loop, simulate
-    >>> step = simulate(paper_loop(), np.ones(2000))
+    >>> step = simulate(paper_loop(), np.ones(2000), sample_rate=200.0)
     >>> print(f"{step[0]:.4e}")
     9.9991e-05
 
     An arm that grows by 10 m a second:
 
     >>> drift = 2 * 10.0 / 299_792_458.0
-    >>> step = simulate(paper_loop(), np.ones(2000), tau1=lambda t: 20.1 + drift * t)
+    >>> arm = lambda t: 20.1 + drift * t
+    >>> step = simulate(paper_loop(), np.ones(2000), sample_rate=200.0, tau1=arm)
     """
     run = Simulation(loop, sample_rate, tau1=tau1, tau2=tau2, limit=limit)
     return run.advance(noise, c1=c1, c2=c2)

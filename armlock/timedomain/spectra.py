@@ -19,7 +19,6 @@ from numpy.lib.stride_tricks import sliding_window_view
 from armlock.checks import (
     FloatArray,
     IntArray,
-    check_rate,
     finite_series,
     positive_number,
     real_array,
@@ -291,10 +290,8 @@ class SpectrumEstimator:
         Raises
         ------
         TypeError, ValueError
-            If they are not finite and real, or were drawn at another sample rate; none of them
-            is taken in.
+            If they are not finite and real; none of them is taken in.
         """
-        check_rate("series", series, self.sample_rate)
         whole = np.asarray(finite_series("series", series))
         for at in range(0, whole.size, _BLOCK):
             part, depth = whole[at : at + _BLOCK], 0
