@@ -21,7 +21,6 @@ LONGEST = 25
 
 #: Chapters that are not rewritten yet, and the tests that they do not pass.
 NOT_YET = {
-    "05_dual_arm": "open alone behind",
     "06_nyquist": "open alone behind",
     "07_perturbations": "alone behind",
     "09_simulation": "open alone behind short",
