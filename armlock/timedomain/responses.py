@@ -2,7 +2,8 @@
 
 Jumps and kinks would make the integral of `armlock.timedomain.inversion` converge slowly. They
 follow from the expansion of G in powers of 1 / (s + corner), whose coefficients are sums of
-delays, and are taken out and put back exactly.
+delays, and are taken out and put back exactly. Factors that N and M share are divided out
+first, because rounding errors would grow with hidden modes.
 """
 
 from __future__ import annotations
@@ -16,17 +17,17 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from flint import fmpq, fmpq_poly
+from flint import Ordering, fmpq, fmpq_mpoly, fmpq_mpoly_ctx, fmpq_poly
 
 from armlock.affine import Affine
 from armlock.checks import ComplexArray, FloatArray, finite_series, positive_number
-from armlock.engine.chain import Lag
+from armlock.engine.chain import Delay, Lag
 from armlock.engine.decide import count
-from armlock.engine.functions import Function
-from armlock.engine.polynomials import enclosed_roots, exact, polynomial
+from armlock.engine.inclusion import EPSILON
+from armlock.engine.polynomials import collected, enclosed_roots, exact, polynomial
 from armlock.systems import Sum, System
 from armlock.systems import s as laplace
-from armlock.timedomain.inversion import Panels, TooLongError, inverted, panels
+from armlock.timedomain.inversion import Line, TooLongError, inverted
 
 if TYPE_CHECKING:
     import control
@@ -36,24 +37,23 @@ _ORDERS = 3
 # How far right of all poles the transform is taken, times the last time. Poles are as far from
 # its panels, and rounding errors grow by so many powers of e.
 _AWAY = 3.0
+# Kinks are taken out with a corner at which none is so many times larger than the response.
+_MOST_ABOVE = 1e3
+# Values above exp of this are no floats.
+_MOST_GROWTH = 600.0
+# The errors, over the largest value, which is looked for at twice so many times.
+_CLAIMED, _BETWEEN = 1e-9, 100
+# Share of the panels that are computed, up to which they are promised from a few.
+_SURELY = 0.7
 # Jumps and kinks that are followed.
 _MOST_JUMPS = 20_000
+
+_S = fmpq_poly([0, 1])
 
 #: A sum of exponentials exp(-s theta): delays and coefficients.
 _Jumps = dict[fmpq, float]
 #: A sum of polynomials of s, by the lengths of their delays.
 _Terms = dict[fmpq, fmpq_poly]
-
-
-class _Transformed(NamedTuple):
-    """A response up to a time, by what is known of its transform."""
-
-    # One sum of delays for each power of 1 / (s + corner), beginning with the impulses.
-    jumps: list[_Jumps]
-    corner: float
-    # The real part of the line, and the rest on its panels.
-    sigma: float
-    rest: Panels
 
 
 def step_response(system: System, timepts: npt.ArrayLike) -> control.TimeResponseData:
@@ -76,8 +76,8 @@ def step_response(system: System, timepts: npt.ArrayLike) -> control.TimeRespons
     ------
     TypeError, ValueError
         If `timepts` is not finite and ascending from 0 on, the response has derivatives of
-        impulses, its neutral chain is not confined, or the times end too late: the message
-        has a time up to which the response can be computed.
+        impulses, or the times end too late: the message has a time up to which the response
+        can be computed.
 
     Warns
     -----
@@ -90,8 +90,13 @@ def step_response(system: System, timepts: npt.ArrayLike) -> control.TimeRespons
     slow growth may not show by the last time. `armlock.unstable_roots` decides stability.
 
     The error is at most 1e-9 of the largest value up to the last time, at jumps too. There
-    the value is the one after the jump. This is checked, not proved: the transform is
-    interpolated over frequencies until the values in between agree.
+    the value is the one after the jump. An impulse counts by its area over the last time. This
+    is checked, not proved: the transform is interpolated over frequencies until the values in
+    between agree, and what rounding errors make of the response is summed. Where that is more
+    than 1e-9, the response is refused.
+
+    Factors of numerator and denominator that are equal are divided out, with delays too: a
+    hidden mode is no part of a response, unstable or not.
 
     The transform turns once in 2 pi over the delays up to the highest crossover. A loop that is
     fast beside its delays takes so many frequencies that 65 536 panels end soon after the first
@@ -162,73 +167,171 @@ def _response(system: System, timepts: npt.ArrayLike, what: str) -> control.Time
     if time.size == 0 or time[0] < 0.0 or (np.diff(time) <= 0.0).any() or time[-1] == 0.0:
         raise ValueError(f"timepts must ascend from 0 s on, got {time}")
     inputs = np.full(time.size, float(what == "Step"))
-    # Each term is delayed by this at least. Only what comes after is left to the inversion, in
-    # which it would be small beside a growing response.
-    n, m = system.numerator.by_length(), system.denominator.by_length()
-    dead = min(n, default=fmpq(0))
-    ahead = {theta - dead: p for theta, p in n.items()}
-    begin = int(np.searchsorted(time, float(dead) * (1.0 - 1e-12)))
-    outputs = np.zeros(time.size)
-    if begin < time.size:
-        # What decays may underflow.
-        with np.errstate(all="ignore"):
-            outputs[begin:] = _inverted(ahead, m, time[begin:], dead)
+    outputs = _inverted(*coprime(system.numerator, system.denominator), time)
     return control.TimeResponseData(
         time, outputs, inputs=inputs, issiso=True, title=f"{what} response",
         input_labels=["u[0]"], output_labels=["y[0]"], plot_inputs=False,
     )  # fmt: skip
 
 
-def _inverted(n: _Terms, m: _Terms, time: FloatArray, dead: fmpq) -> FloatArray:
-    """Invert N(s) / M(s) at some times after a dead time."""
-    time = np.maximum(time - float(dead), 0.0)
-    last = float(time[-1]) or float(dead)
+# What decays may underflow.
+@np.errstate(all="ignore")
+def _inverted(n: Sum, m: Sum, time: FloatArray) -> FloatArray:
+    """Invert N(s) / M(s) at some times."""
+    # Each term is delayed by this at least. Only what comes after is left to the inversion, in
+    # which it would be small beside a growing response.
+    dead = min((lag.time for lag in n.lags), default=fmpq(0))
+    begin = int(np.searchsorted(time, float(dead) * (1.0 - 1e-12)))
+    outputs, late = np.zeros(time.size), np.maximum(time[begin:] - float(dead), 0.0)
+    if not late.size:
+        return outputs
+    response, last = _Response(n, m, dead), float(late[-1]) or float(dead)
     try:
-        (impulses, *jumps), corner, sigma, rest = _transformed(n, m, last)
+        found = response.until(last)
+        outputs[begin:], claimed = found.at(late)
+        why = "rounding errors above 1e-9 of the largest value"
     except TooLongError as error:
-        until = _longest(n, m, last) + float(dead)
+        claimed, why = False, str(error)
+    if not claimed:
+        until = response.longest(last) + float(dead)
         raise ValueError(
             f"timepts must end by {until:.2g} s, until when this response can be computed, got "
-            f"{last + float(dead):g} s, with {error}"
-        ) from None
-    if impulses:
+            f"{last + float(dead):g} s, with {why}"
+        )
+    if impulses := found.jumps[0]:
         at = ", ".join(f"{float(theta + dead):g}" for theta in sorted(impulses)[:5])
-        warnings.warn(f"impulses at t = {at} s are not in the outputs", stacklevel=4)
-    known = [_after(time, part, k, corner, last) for k, part in enumerate(jumps)]
-    return np.asarray(sum(known, inverted(rest, sigma, time)))
+        warnings.warn(f"impulses at t = {at} s are not in the outputs", stacklevel=5)
+    return outputs
 
 
-def _transformed(n: _Terms, m: _Terms, last: float) -> _Transformed:
-    """Transform the response to an impulse, as it is up to a time."""
-    # What comes later has no effect until then.
-    end = exact(last)
-    n, m = ({theta: p for theta, p in part.items() if theta <= end} for part in (n, m))
-    system, degree = System(_sum(n), _sum(m)), _degree(n, m)
-    below = Affine(System(_sum(m), Sum({}))).n[0]
-    # The largest of the roots of the denominator's polynomials.
-    roots = [root for p in m.values() for root, _ in enclosed_roots(p)]
-    corner = max([1.0 / last, *(abs(complex(root)) for root in roots)])
-    above, under = (_powers(part, degree, corner) for part in (n, m))
-    jumps = _expansion(above, under, last * (1.0 + 1e-9))
-    sigma = _right_of_poles(below, last) + _AWAY / last
-    # Where nothing is left without the impulses, rounding is.
-    least = sigma * float(np.abs(system(sigma * np.array([1.0, 1.0 + 1.0j]))).max())
-    rest = panels(partial(_smooth, system, above, under, corner), sigma, corner, least)
-    return _Transformed(jumps, corner, sigma, rest)
+class _Until(NamedTuple):
+    """A response up to a time, by what is known of its transform."""
+
+    last: float
+    # One sum of delays for each power of 1 / (s + corner), beginning with the impulses.
+    jumps: list[_Jumps]
+    corner: float
+    # The rest on a line right of all poles.
+    line: Line
+
+    def works(self) -> bool:
+        """Whether it can be computed, and its errors are as small as claimed."""
+        self.line.check(_SURELY)
+        growth = np.exp(self.line.sigma * self.last)
+        if growth * self.line.error <= 0.1 * _CLAIMED * self.line.least:
+            return True
+        return self.at(np.array([self.last]))[1]
+
+    def at(self, time: FloatArray) -> tuple[FloatArray, bool]:
+        """Return the response at some times, and whether its errors are as small as claimed."""
+        rest = self.line.panels()
+
+        def found(at: FloatArray) -> tuple[FloatArray, FloatArray]:
+            value, error = inverted(rest, self.line.sigma, at)
+            for k, part in enumerate(self.jumps[1:]):
+                known, size = _after(at, part, k, self.corner, self.last)
+                value, error = value + known, error + 8.0 * EPSILON * size
+            return value, error
+
+        outputs, errors = found(time)
+        # An impulse counts by its area over the last time.
+        area = sum(map(abs, self.jumps[0].values()))
+        largest, error = max(np.abs(outputs).max(), area / self.last), errors.max()
+        if not error <= _CLAIMED * largest:
+            # The largest value may lie between the times that are asked for.
+            between = np.append(
+                np.linspace(0.0, 1.0, _BETWEEN), np.geomspace(1e-12, 1.0, _BETWEEN)
+            )
+            largest = max(largest, np.abs(found(self.last * np.unique(between))[0]).max())
+        return outputs, bool(error <= _CLAIMED * largest)
 
 
-def _longest(n: _Terms, m: _Terms, last: float) -> float:
-    """Return a time until which a response can be computed; a little later it cannot."""
-    short, long = 1e-12 * last, last
-    while long > 1.2 * short:
-        middle = math.sqrt(short * long)
-        try:
-            _transformed(n, m, middle)
-            short = middle
-        except TooLongError:
-            long = middle
-    # The message has two digits.
-    return 0.95 * short
+class _Response:
+    """N / M without common factors, and what is known of its truncations."""
+
+    def __init__(self, n: Sum, m: Sum, dead: fmpq) -> None:
+        self.n, self.m, self.dead = n, m, dead
+        self.truncated: dict[tuple[int, int], _Truncated] = {}
+
+    def until(self, last: float) -> _Until:
+        """Transform the response to an impulse, as it is up to a time."""
+        # What comes later has no effect until then.
+        end = exact(last)
+        parts = (self.n, self.dead + end), (self.m, end)
+        n, m = (
+            Sum({key: p for key, p in part.terms.items() if key[0].time <= to})
+            for part, to in parts
+        )
+        key = len(n.terms), len(m.terms)
+        if key not in self.truncated:
+            self.truncated[key] = _Truncated(*coprime(n, m), self.dead)
+        return self.truncated[key].until(last)
+
+    def longest(self, last: float) -> float:
+        """Return a time until which a response can be computed; a little later it cannot."""
+        short, long = 1e-12 * last, last
+        while long > 1.2 * short:
+            middle = math.sqrt(short * long)
+            try:
+                works = self.until(middle).works()
+            except TooLongError:
+                works = False
+            short, long = (middle, long) if works else (short, middle)
+        # The message has two digits.
+        return 0.95 * short
+
+
+class _Truncated:
+    """N / M of the delays up to a time, and between which lines the rightmost pole lies."""
+
+    def __init__(self, n: Sum, m: Sum, dead: fmpq) -> None:
+        self.n = {theta - dead: p for theta, p in n.by_length().items()}
+        self.m = m.by_length()
+        self.degree = _degree(self.n, self.m)
+        self.system = System(_sum(self.n), _sum(self.m))
+        # The largest of the roots of the denominator's polynomials.
+        roots = [root for p in self.m.values() for root, _ in enclosed_roots(p)]
+        self.fastest = max((abs(complex(root)) for root in roots), default=0.0)
+        #: One over the shortest delay.
+        delays = [float(theta) for part in (self.n, self.m) for theta in part if theta]
+        self.soonest = 1.0 / min(delays, default=np.inf)
+        self.below = Affine(System(_sum(self.m), Sum({}))).n[0]
+        self.low, self.high = 0.0, np.inf
+
+    def until(self, last: float) -> _Until:
+        """Transform the response to an impulse, as it is up to a time."""
+        sigma = self.right_of_poles(last) + _AWAY / last
+        corner, end = max(1.0 / last, self.fastest), last * (1.0 + 1e-9)
+        while True:
+            above, under = (_powers(part, self.degree, corner) for part in (self.n, self.m))
+            jumps = _expansion(above, under, end)
+            # Without impulses the response is as large as s times its transform at any real s.
+            s = np.geomspace(sigma, 100.0 * max(corner, self.soonest), 50).astype(complex)
+            impulses = _parts(above, under, corner, s)[0]
+            size = float(np.abs(s * (self.system.quotient(s, {})[0] - impulses)).max())
+            # Parts that are far larger than the response would cancel against the rest.
+            heights = [abs(a) / corner ** (k - 1) for k in (2, 3) for a in jumps[k].values()]
+            if corner >= self.soonest or max(heights, default=0.0) <= _MOST_ABOVE * size:
+                rest = partial(_smooth, self.system, above, under, corner)
+                return _Until(last, jumps, corner, Line(rest, sigma, corner, size))
+            corner *= 8.0
+
+    def right_of_poles(self, last: float) -> float:
+        """Real part right of all poles, and not farther than two over the last time."""
+        # Lines are multiples of a power of two, so that no other time that was asked for before
+        # makes another line.
+        unit, most = 0.5 ** math.floor(math.log2(last)), _MOST_GROWTH / last
+        while self.high - self.low > unit and self.low < most:
+            found = np.isfinite(self.high)
+            line = 0.5 * (self.low + self.high) if found else max(2.0 * self.low, unit)
+            if count(self.below, right_of=line) == 0:
+                self.high = line
+            else:
+                self.low = line
+        line = unit * math.ceil(min(self.high, 2.0 * most) / unit)
+        if line > most:
+            raise TooLongError("values above 1e308")
+        return line
 
 
 def _sum(part: _Terms) -> Sum:
@@ -293,34 +396,27 @@ def _quotient(left: _Jumps, by: _Jumps, last: float) -> _Jumps:
     return found
 
 
-def _after(time: FloatArray, part: _Jumps, k: int, corner: float, last: float) -> FloatArray:
-    """Sum t^k / k! exp(-corner t) after each delay; a time just before counts as at it."""
-    found = np.zeros(time.size)
+def _after(
+    time: FloatArray, part: _Jumps, k: int, corner: float, last: float
+) -> tuple[FloatArray, FloatArray]:
+    """Sum t^k / k! exp(-corner t) after each delay; a time just before counts as at it.
+
+    The second result is the sum of the sizes of the terms.
+    """
+    found, size = np.zeros(time.size), np.zeros(time.size)
     for theta, value in part.items():
         begin = np.searchsorted(time, float(theta) - 1e-12 * last)
         t = np.maximum(time[begin:] - float(theta), 0.0)
-        found[begin:] += value / factorial(k) * t**k * np.exp(-corner * t)
-    return found
+        term = value / factorial(k) * t**k * np.exp(-corner * t)
+        found[begin:] += term
+        size[begin:] += np.abs(term)
+    return found, size
 
 
-def _right_of_poles(below: Function, last: float) -> float:
-    """Real part right of all poles, and not farther than a few over the last time."""
-    low, high = 0.0, 1.0 / last
-    while count(below, right_of=high) != 0:
-        low, high = high, 2.0 * high
-        if high * last > 600.0:
-            raise TooLongError("values above 1e308")
-    while high - low > 2.0 / last:
-        middle = 0.5 * (low + high)
-        stable = count(below, right_of=middle) == 0
-        low, high = (low, middle) if stable else (middle, high)
-    return high
-
-
-def _smooth(
-    system: System, n: list[_Jumps], m: list[_Jumps], corner: float, s: ComplexArray
-) -> ComplexArray:
-    """Evaluate what remains of G(s) without jumps and kinks."""
+def _parts(
+    n: list[_Jumps], m: list[_Jumps], corner: float, s: ComplexArray
+) -> list[ComplexArray]:
+    """Evaluate impulses, jumps and kinks: the powers of 1 / (s + corner) of N / M."""
     turns = {theta: np.exp(-s * float(theta)) for theta in set().union(*n, *m)}
 
     def at(part: _Jumps) -> ComplexArray:
@@ -334,4 +430,52 @@ def _smooth(
     for order in range(_ORDERS + 1):
         left = above[order] - sum(below[k] * g[order - k] for k in range(1, order + 1))
         g.append(left / below[0])
-    return np.asarray(system(s) - sum(part / (s + corner) ** k for k, part in enumerate(g)))
+    return [part / (s + corner) ** k for k, part in enumerate(g)]
+
+
+def _smooth(
+    system: System, n: list[_Jumps], m: list[_Jumps], corner: float, s: ComplexArray
+) -> tuple[ComplexArray, FloatArray]:
+    """Evaluate what remains of G(s) without these parts, and bound its rounding errors."""
+    parts, (value, error) = _parts(n, m, corner, s), system.quotient(s, {})
+    rest = value - sum(parts)
+    # Delays turn by the same rounded products s theta in G and in its parts.
+    turned = 1.0 + np.abs(s) * system.longest_delay
+    error = error + EPSILON * (8.0 * sum(map(np.abs, parts)) + turned * np.abs(rest))
+    return rest, np.asarray(error)
+
+
+def coprime(n: Sum, m: Sum) -> tuple[Sum, Sum]:
+    """Divide out what two sums share, as polynomials of s and of delays of one length.
+
+    What is left shares zeros at s = 0 alone, if all delays are powers of one: elsewhere
+    exp(-s theta) is transcendental where s is algebraic.
+    """
+    lags = n.lags | m.lags
+    lengths = sorted({one.theta for lag in lags for one, _ in lag})
+    delays = [Delay(theta, str(theta)) for theta in lengths]
+    names = ["s", *(f"z{k}" for k in range(len(lengths)))]
+    ring = fmpq_mpoly_ctx.get(names, Ordering.lex)
+
+    def polynomial_of(part: Sum) -> fmpq_mpoly:
+        terms = collected(
+            ((k, *powers(lag)), c)
+            for (lag, _), p in part.terms.items()
+            for k, c in enumerate(p.coeffs())
+        )
+        return ring.from_dict(terms)
+
+    def powers(lag: Lag) -> list[int]:
+        number = collected((one.theta, times) for one, times in lag)
+        return [number.get(theta, 0) for theta in lengths]
+
+    def sum_of(p: fmpq_mpoly) -> Sum:
+        found = collected(
+            (Lag.of(dict(zip(delays, map(int, powers), strict=True))), c * _S ** int(k))
+            for (k, *powers), c in p.to_dict().items()
+        )
+        return Sum({(lag, ()): p for lag, p in found.items()})
+
+    above, below = map(polynomial_of, (n, m))
+    common = above.gcd(below)
+    return sum_of(above / common), sum_of(below / common)
