@@ -23,10 +23,7 @@ LONGEST = 25
 NOT_YET = {
     "06_nyquist": "open alone behind",
     "07_perturbations": "alone behind",
-    "09_simulation": "open alone behind short",
-    "10_flight": "alone behind bare",
     "11_robust_controller": "alone",
-    "13_orbits": "behind short bare",
     "14_tdi": "behind bare",
     "18_errata": "behind",
 }
