@@ -18,7 +18,7 @@ import pytest
 from matplotlib.pyplot import imread
 from scipy import signal
 
-from armlock import CommonArm, DualArm, paper_loop, stability_chart
+from armlock import CommonArm, DualArm, first_crossing, margins, paper_loop, stability_chart
 from armlock.orbits import esa
 from book._ext import year
 from tests.attack import to_loop
@@ -138,6 +138,41 @@ def test_what_rounding_left_undecided_is_decided(page):
     assert found.unsure.total() == 0
     assert found.asked["root"] >= 3
     assert found.asked["break (1, 1)"] == 4
+
+
+def test_a_loop_whose_open_loop_is_zero_has_the_numbers_of_the_package(page):
+    """The difference of equal arms: two integrators made all of them undecided."""
+    same = ("difference", 5.0, 5.0, 0.0, 2.5, 5.0)
+    sketches = [
+        Sketch(zeros, poles, 1.0, *same)
+        for zeros, poles in (
+            ((), (0j,)),
+            ((), (0j, 0j)),
+            ((0j,), (0j, 0j, -3.0)),
+            ((-2.0,), (0j, -1.0)),
+            ((), (1.0,)),
+        )
+    ]
+    found = compare(page, zip(sketches, [(1.0, 1.0)] * 5, strict=True))
+    assert found.wrong == []
+    assert found.unsure.total() == 0
+    assert found.asked["count"] == 5
+    assert found.asked["break (1, -1)"] == found.asked["delay"] == 4
+
+
+def test_none_up_to_two_is_true_where_the_package_looks_farther(page):
+    """Where c1 + c2 = 2, exactly, nearly equal arms change L by next to nothing.
+
+    `critical_perturbation` looks up to 1e9, and may refuse what it finds there.
+    """
+    late, arms = 1.23e-05, (10.540193934941918, 10.540193918503295)
+    sketch = Sketch((), (-0.0235,), 0.2, "common", *arms, late, 2.5, 1.0)
+    loop = to_loop(sketch)
+    # |K (E1 - E2)| is at most the gain times the difference of the delays.
+    assert 2.0 * sketch.gain * (arms[0] - arms[1]) < 1e-6 * margins(loop).modulus
+    call = "spec => String(live.firstBreak(live.make(spec), 1, -1).size)"
+    assert page.evaluate(call, described(sketch)) == "Infinity"
+    assert first_crossing(loop, {}, (1, -1), stop=2.0).position == np.inf
 
 
 def test_a_loop_on_the_boundary_has_undecided_margins(page):

@@ -97,6 +97,8 @@ function armlockLoop() {
   /* Bad input, with the name of the field that holds it. */
   const wrong = (field, message) => Object.assign(new RangeError(message), { field });
 
+  const isZero = ([re, im]) => re === 0 && im === 0;
+
   function positive(field, name, value) {
     if (!(value > 0 && Number.isFinite(value)))
       throw wrong(field, `${name} must be a positive number, got ${value}`);
@@ -147,7 +149,6 @@ function armlockLoop() {
     if (zeros.length > poles.length)
       throw wrong("zeros", "the controller must have as many poles as zeros or more, got "
         + `${zeros.length} zeros and ${poles.length} poles`);
-    const isZero = ([re, im]) => re === 0 && im === 0;
     const has = list => list.some(isZero), drop = list => list.splice(list.findIndex(isZero), 1);
     // Zeros and poles at s = 0 cancel. One factor of Q then belongs to the other product.
     while (has(zeros) && has(poles)) { drop(zeros); drop(poles); }
@@ -172,11 +173,16 @@ function armlockLoop() {
     return loop;
   }
 
+  /* Whether L is zero at all frequencies: the difference of equal arms. */
+  const silent = ({ sensor, tau1, tau2 }, c1, c2) => sensor === "difference" && tau1 === tau2 && c1 === c2;
+
   /* Where equal arms return the same, the dual sensor has only their sum. Its integrator then cancels and
    * goes. Its corner cancels as well, but s = -corner stays a root of the closed loop: as in the package
    * only common roots at s = 0 are left out. */
   function reduced(loop, c1, c2) {
     const { spec, tau1, tau2, sigma } = loop, corner = [-spec.corner, 0];
+    // Roots of R at s = 0 are not the loop's: they go to the left.
+    if (silent(spec, c1, c2)) return make({ ...spec, poles: spec.poles.map(p => isZero(p) ? [-1 / tau1, 0] : p) }, sigma);
     if (spec.sensor !== "dual" || tau1 !== tau2 || c1 !== c2) return loop;
     const zeros = [...spec.zeros, corner], poles = [...spec.poles, corner];
     return make({ ...spec, sensor: "common", zeros, poles }, sigma);
@@ -534,8 +540,13 @@ function armlockLoop() {
   /* The rightmost root at (c1, c2), null where counts right and left of it do not confirm it. Lines
    * Re s = low and high have it between them, by counts; Newton's method looks from one of them, at
    * first from few frequencies. The root at s = 0 that `count` leaves out is not the loop's. Where no
-   * root lies right of the chain's limit the limit is given, with an infinite frequency. */
+   * root lies right of the chain's limit the limit is given, with an infinite frequency. A loop whose L is zero
+   * has the poles other than 0, or no root: minus infinity. */
   function rightmost(spec, c1, c2) {
+    if (silent(spec, c1, c2)) {
+      const [re, im] = spec.poles.filter(p => !isZero(p)).reduce((p, q) => q[0] > p[0] ? q : p, [-Infinity, 0]);
+      return [re, Math.abs(im)];
+    }
     const loop = reduced(make(spec), c1, c2), curve = new Curve(loop, at(loop, c1, c2));
     ({ spec } = loop);
     let low = chainLimit(spec, c1, c2), high = Infinity, line = 0, step = 1 / Math.max(spec.tau1, spec.tau2);

@@ -302,7 +302,7 @@ function armlockPages() {
     write() {
       const { count, root } = this.design.told;
       const parts = [`${this.name}: ${count === undefined ? "counting \u2026" : counted(count)}`];
-      if (root && count >= 0) parts.push(`rightmost root in rad/s: ${rootText(root)}; it `
+      if (count >= 0 && Number.isFinite(root?.[0])) parts.push(`rightmost root in rad/s: ${rootText(root)}; it `
         + `${root[0] < 0 ? "decays" : "grows"} by a factor of e in ${duration(1 / Math.abs(root[0]))}`);
       this.out.textContent = `${parts.join("; ")}.${this.chart.held ? " Held: Escape or a click on it releases it." : ""}`;
       this.list();

@@ -26,6 +26,7 @@ const armlockTable = (function () {
   }
 
   function rootText([re, im]) {
+    if (re === -Infinity) return "none: L is zero";
     return `${say(re)}${im === Infinity ? ", the limit at high frequency" : im ? ` \u00b1 ${say(Math.abs(im))}j` : ""}`;
   }
 
