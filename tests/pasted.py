@@ -156,6 +156,24 @@ UNDERSTOOD = [
         "  s^3 + 2 s^2\n\n        + 3 s + 4\n  -----------\n  s^4",
         lambda s: (s**3 + 2 * s**2 + 3 * s + 4) / s**4,
     ),
+    (S1 + "C = 2/s;\nC.InputDelay = 0.05", lambda s: 2 * exp(-0.05 * s) / s),
+    ("C = tf(1,[1 0]);\nC.InputDelay = 0.1;\nC.OutputDelay = 0.2", lambda s: exp(-0.3 * s) / s),
+    (
+        "C =\n \n             1            s    \n  Kp + Ki * --- + Kd * --------\n"
+        "             s          Tf*s+1 \n\n  with Kp = 2, Ki = 3, Kd = 4, Tf = 0.1\n \n"
+        "Continuous-time PIDF controller in parallel form.",
+        lambda s: 2 + 3 / s + 4 * s / (0.1 * s + 1),
+    ),
+    (
+        "C =\n \n             1 \n  Kp + Ki * ---\n             s \n\n"
+        "  with Kp = 0.5, Ki = 1.2e-05\n \nContinuous-time PI controller in parallel form.",
+        lambda s: 0.5 + 1.2e-5 / s,
+    ),
+    (
+        "C =\n \n             1      1              \n  Kp * (1 + ---- * --- + Td * s)\n"
+        "             Ti     s              \n\n  with Kp = 2, Ti = 3, Td = 0.5\n",
+        lambda s: 2 * (1 + 1 / (3 * s) + 0.5 * s),
+    ),
     # Octave
     (
         "Transfer function 'C' from input 'u1' to output ...\n\n      s + 0.02\n"
@@ -285,6 +303,17 @@ UNDERSTOOD = [
     ("exp(-s)/s + exp(-s)", lambda s: exp(-s) * (1 / s + 1)),
     ("exp(-3*s)/exp(-s)/s", lambda s: exp(-2 * s) / s),
     ("exp(-12.3e-6 s)/s", lambda s: exp(-12.3e-6 * s) / s),
+    ("e^(-0.3 s)/s", lambda s: exp(-0.3 * s) / s),
+    ("T = 0.3; 2e**(-T*s)/s", lambda s: 2 * exp(-0.3 * s) / s),
+    (
+        "e^{-0.3 s} \\frac{10 s + 0.2}{s^{2} + 0.1 s}",
+        lambda s: exp(-0.3 * s) * (10 * s + 0.2) / (s**2 + 0.1 * s),
+    ),
+    ("$K(s) = \\frac{5}{s}\\, e^{-2s}$", lambda s: 5 * exp(-2 * s) / s),
+    ("\\dfrac{1}{s \\cdot \\left(s + 1\\right)}", lambda s: 1 / (s * (s + 1))),
+    ("2 tf(1,[1 0])", lambda s: 2 / s),
+    ("(1/s) (1/(s+1))", lambda s: 1 / (s * (s + 1))),
+    ("--s", lambda s: s),
     ("sqrt(2)/(s + sqrt(2))", lambda s: sqrt(2) / (s + sqrt(2))),
     (
         "(1+2j)/(s+1-3j) + (1-2j)/(s+1+3j)",
@@ -362,7 +391,29 @@ REFUSED = [
     ("s = 3", "s stands for the variable"),
     ("C = 1/s\nC = 2/s", "given twice"),
     ("G = 5/(S+1)", "S is not known"),
-    ("\\frac{10 s + 0.2}{s^{2} + 0.1 s}", "this sign is not known"),
+    ("\\frac{1}{s", "here should be"),
+    ("\\frac12", "here should be"),
+    ("e^2/s", "write the exponent of e in brackets"),
+    # decimal commas
+    ("tf([1 0,02],[1 0,1 0])", "write decimals with a point"),
+    ("tf([1,0 0,02],[1 1])", "write decimals with a point"),
+    ("007/s", "write decimals with a point"),
+    # two controllers
+    ("tf(1,[1 0])tf(1,[1 1])", "two things stand side by side"),
+    ("tf([1 2],[1 3]) tf(1,[1 0])", "two things stand side by side"),
+    ("C = 1/s; D = 1/(s+1); C D", "two things stand side by side"),
+    ("C = tf(1,[1 0],'InputDelay',1);\nC.InputDelay = 0.05", "dead time is given twice"),
+    ("C = tf(1,[1 0]); C.InputDelay = 1; C.InputDelay = 2", "dead time is given twice"),
+    # more than a page can work on
+    ("a" * 10_000, f"{'a' * 30}… is not known"),
+    ("(" * 5000 + "s" + ")" * 5000, "more than 100 brackets stand in each other"),
+    ("[" * 5000 + "1" + "]" * 5000, "more than 100 brackets stand in each other"),
+    ("\n".join(f"tf([1 {k}],[1 0 2])" for k in range(500)), "which of them"),
+    (
+        S1
+        + "\n".join(f"C{k + 1} = C{k} + 1/(s+{k})" for k in range(1, 500)).replace("C1 ", "1 "),
+        "it takes too long to work out",
+    ),
     ("12.3 us", "us is not known"),
     ("Hello, world!", ""),
     ("=", "here should be"),
@@ -393,4 +444,8 @@ CERTAIN = [
     "ss([-0.1 0; 1 0], [1; 0], [1 0.02], 0)",
     "1/(s^3 + s^2 + s + 1)",
     "1/(s*(s + 1.234e-5))",
+    # A zero in exponent form is exact, as python-control, numpy and scipy print it.
+    "tf([1.00000000e+00 2.34567891e-05], [1.00000000e+00 1.23456789e-01 0.00000000e+00])",
+    "array([1.00000000e+00, 2.34567891e-05]), "
+    "array([1.00000000e+00, 1.23456789e-01, 0.00000000e+00])",
 ]

@@ -291,6 +291,38 @@ def test_what_rounded_digits_leave_open_is_said(text, typed):
     assert ("Half a unit" in found["doubt"]) == (typed in DOUBTFUL)
 
 
+def test_no_print_of_an_integrator_asks_for_more_digits(text):
+    """Controllers over many decades, whose zeros numpy writes in exponent form."""
+    rng = np.random.default_rng(3)
+    for _ in range(10):
+        poles = [0.0, *-(10.0 ** rng.uniform(-6.0, 2.0, 3))]
+        zeros = -(10.0 ** rng.uniform(-6.0, 2.0, 2))
+        plain = control.tf(control.zpk(zeros, poles, 10.0 ** rng.uniform(-2.0, 4.0)))
+        states, lists = control.ss(plain), (plain.num[0][0], plain.den[0][0])
+        for printed in (plain, lists, states, signal.TransferFunction(*lists)):
+            for typed in (str(printed), repr(printed)):
+                if "object at" not in typed:
+                    found = text.evaluate(READ, ["readController", typed])
+                    assert found["doubt"] == "", typed
+
+
+def test_no_text_blocks_the_page(text):
+    """Heavy ones are refused, or read in a moment: a polynomial of degree 41 took seconds."""
+    rng = np.random.default_rng(41)
+    lists = [" ".join(map(repr, rng.uniform(0.0, 10.0, n).tolist())) for n in (41, 42)]
+    timed = (
+        "typed => { const from = performance.now(); READ; return performance.now() - from; }"
+    )
+    timed = timed.replace("READ", "try { armlockRead.readController(typed) } catch (error) {}")
+    quick = text.evaluate(timed, "1/s")
+    for typed in (f"tf([{lists[0]}], [{lists[1]}])", *(typed for typed, _ in REFUSED)):
+        assert text.evaluate(timed, typed) < 4000 + 100 * quick
+    high = text.evaluate(READ, ["readController", f"tf([{lists[0]}], [{lists[1]}])"])
+    poles = np.array([complex(*pole) for pole in high["poles"]])
+    expected = np.roots([float(part) for part in lists[1].split()])
+    assert np.sort_complex(poles) == pytest.approx(np.sort_complex(expected), rel=1e-6)
+
+
 def test_what_python_prints_is_understood(text):
     """Loops drawn anew, printed by python-control and scipy in all their ways."""
     rng = np.random.default_rng(12)

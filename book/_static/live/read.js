@@ -11,16 +11,26 @@
 const armlockRead = (function () {
   /* ---------------------------------------------------------------------------- exact numbers */
 
+  const bits = v => v.toString(16).length * 4;
+
+  // What the arithmetic of a text may cost, in bits, so that no text blocks the page: about a second.
+  const COST = 1.5e7;
+  let spent = 0;
+  function spend(cost) {
+    if ((spent += cost) > COST) throw Object.assign(new RangeError(""), { costly: true });
+  }
+
   /* Fractions [n, d] of whole numbers, d > 0, in lowest terms. */
   const divisor = (a, b) => { while (b) [a, b] = [b, a % b]; return a < 0n ? -a : a; };
   const fraction = (n, d = 1n) => {
+    if (d === 1n) return [n, d];
+    spend(Math.min(bits(n), bits(d)));
     const shared = divisor(n, d) * (d < 0n ? -1n : 1n);
     return [n / shared, d / shared];
   };
   const NIL = [0n, 1n];
-  const sumOf = ([a, b], [c, d]) => b === d ? fraction(a + c, b) : fraction(a * d + c * b, b * d);
-  const productOf = ([a, b], [c, d]) => fraction(a * c, b * d);
-  const bits = v => v.toString(16).length * 4;
+  const sumOf = ([a, b], [c, d]) => !a ? [c, d] : !c ? [a, b] : b === d ? fraction(a + c, b) : fraction(a * d + c * b, b * d);
+  const productOf = ([a, b], [c, d]) => a && c ? fraction(a * c, b * d) : NIL;
 
   /* The nearest double. */
   function double([n, d]) {
@@ -45,9 +55,9 @@ const armlockRead = (function () {
   const isNil = ({ re, im }) => !re[0] && !im[0];
   const plus = (a, b) => number(sumOf(a.re, b.re), sumOf(a.im, b.im), a.off + b.off);
   const negative = a => number([-a.re[0], a.re[1]], [-a.im[0], a.im[1]], a.off);
-  const times = (a, b) => number(sumOf(productOf(a.re, b.re), negative({ re: productOf(a.im, b.im), im: NIL }).re),
+  const times = (a, b) => (spend(10), number(sumOf(productOf(a.re, b.re), negative({ re: productOf(a.im, b.im), im: NIL }).re),
     sumOf(productOf(a.re, b.im), productOf(a.im, b.re)),
-    a.off || b.off ? sizeOf(a) * b.off + sizeOf(b) * a.off + a.off * b.off : 0);
+    a.off || b.off ? sizeOf(a) * b.off + sizeOf(b) * a.off + a.off * b.off : 0));
   const over = (a, b) => {
     const { re, im } = b, [n, d] = sumOf(productOf(re, re), productOf(im, im)), part = [d, n], size = sizeOf(b);
     const inverse = number(productOf(re, part), productOf([-im[0], im[1]], part), b.off && b.off / (size * (size - b.off)));
@@ -78,7 +88,36 @@ const armlockRead = (function () {
     }
   }
 
-  const shared = (p, q) => { while (q.length) [p, q] = [q, divide(p, q)[1]]; return p.map(v => over(v, p.at(-1))); };
+  /* Whether two real polynomials have no common root for certain: they have none if they have none modulo a prime
+   * that does not divide what leads them. */
+  const PRIME = 2n ** 61n - 1n, residue = v => (v % PRIME + PRIME) % PRIME;
+  function reciprocal(v) {
+    let found = 1n;
+    for (let power = PRIME - 2n; power; power >>= 1n, v = v * v % PRIME) if (power & 1n) found = found * v % PRIME;
+    return found;
+  }
+  function coprime(p, q) {
+    if ([...p, ...q].some(({ re: [, d] }) => !residue(d))) return false;
+    let [a, b] = [p, q].map(all => all.map(({ re: [n, d] }) => d === 1n ? residue(n) : residue(n) * reciprocal(residue(d)) % PRIME));
+    if (!a.at(-1) || !b.at(-1)) return false;
+    while (b.length > 1) {
+      const inverse = reciprocal(b.at(-1));
+      while (a.length >= b.length) {
+        const share = a.at(-1) * inverse % PRIME, from = a.length - b.length;
+        b.forEach((v, k) => { a[from + k] = residue(a[from + k] - share * v); });
+        while (a.length && !a.at(-1)) a.pop();
+      }
+      [a, b] = [b, a];
+    }
+    return b.length === 1;
+  }
+
+  /* The greatest common divisor of two real polynomials. */
+  const shared = (p, q) => {
+    if (q.length && coprime(p, q)) return [ONE];
+    while (q.length) [p, q] = [q, divide(p, q)[1]];
+    return p.map(v => over(v, p.at(-1)));
+  };
   const derivative = p => p.slice(1).map((v, k) => times(v, number([BigInt(k + 1), 1n])));
 
   /* Roots of a polynomial with real coefficients, the highest power first, by Aberth's method.
@@ -191,17 +230,27 @@ const armlockRead = (function () {
       const far = -double(half) - (double(half) < 0 ? -root : root);
       return [[far, 0], [double(c) / far, 0]];
     }
-    const slope = derivative(p), value = (q, z) => q.reduceRight((sum, v) => plus(times(sum, z), v), ZERO);
     // The rounding of the coefficients to doubles is made good by steps of Newton's method.
+    const scale = p.reduce((all, { re: [, d] }) => all / divisor(all, d) * d, 1n), whole = p.map(({ re: [n, d] }) => n * (scale / d));
+    const slope = whole.slice(1).map((v, k) => v * BigInt(k + 1)), size = Math.max(...whole.map(bits));
     return rootsOf(p.map(v => double(v.re)).reverse()).map(([re, im]) => {
       for (let k = 0; k < 3; k++) {
-        const z = number(ofDouble(re), ofDouble(im)), down = value(slope, z);
-        const step = isNil(down) ? ZERO : over(value(p, z), down), [dx, dy] = [double(step.re), double(step.im)];
+        spend(1e-3 * p.length ** 2 * size);
+        const [dx, dy] = newton(whole, slope, re, im);
         if (!(Math.hypot(dx, dy) < 1e-3 * Math.hypot(re, im))) break;
         [re, im] = [re - dx, im - dy];
       }
       return [re, im];
     });
+  }
+
+  /* p / p' at a double, exactly but for the last rounding; coefficients are whole numbers. */
+  function newton(p, slope, re, im) {
+    const [[a, c], [b, d]] = [re, im].map(ofDouble), unit = c > d ? c : d, [x, y] = [a * (unit / c), b * (unit / d)];
+    // Horner's rule, times a power of the unit, which is that of the doubles' last bit.
+    const value = q => q.reduceRight(([u, v, power], w) => [u * x - v * y + w * power, u * y + v * x, power * unit], [0n, 0n, 1n]);
+    const [u, v] = value(p), [s, t] = value(slope), below = (s * s + t * t) * unit;
+    return below ? [double([u * s + v * t, below]), double([v * s - u * t, below])] : [0, 0];
   }
 
   /* Whether the roots of a real polynomial may cross the imaginary axis, or leave s = 0, within what its
@@ -362,6 +411,7 @@ const armlockRead = (function () {
     "From input .* to output .*:", "Model Properties", "dt = (None|0)", "import [\\w., ]+( as \\w+)?",
     "from [\\w.]+ import [\\w*, ]+", "using [\\w, ]+", "clear( all)?;?", "clc;?", "close all;?", "format (long|short)( g)?;?",
     "pkg load control;?", "syms s;?"].map(part => `^(${part})$`).join("|"));
+  const WITH = /^with( [A-Z]\w = [-+.\de]+,?)+$/;
   const NOT = [[/^Sampl(e|ing) time\b|^Discrete|\{Discrete\b|^dt\s*=/, DISCRETE],
     [/^(Inputs|Outputs) \(/, "it has several inputs or outputs"]];
 
@@ -478,9 +528,10 @@ const armlockRead = (function () {
 
   /* ---------------------------------------------------------------------------- words */
 
-  const WORD = new RegExp(["(?<space>[ \\t]+|\\.\\.\\.[^\\n]*\\n|\\\\\\n)", "(?<line>\\n)",
+  const TEX = { "**": "^", "\\frac": "\\frac", "\\dfrac": "\\frac", "\\tfrac": "\\frac", "\\cdot": "*", "\\times": "*" };
+  const WORD = new RegExp(["(?<space>[ \\t]+|\\.\\.\\.[^\\n]*\\n|\\\\\\n|\\\\[,;!: ]|\\\\(?:left|right|quad)(?![A-Za-z])|\\$+)", "(?<line>\\n)",
     "(?<digits>(?:\\d+\\.?\\d*|\\.\\d+)(?:[eEdD][-+]?\\d+)?)(?<unit>[ij](?!\\w))?", "(?<name>[A-Za-z_]\\w*(?:\\.[A-Za-z_]\\w*)*)",
-    "(?<quoted>'[^'\\n]*'|\"[^\"\\n]*\")", "(?<sign>\\*\\*|\\.[*/^]|[-+*/^()[\\],;=:])"].join("|"), "y");
+    "(?<quoted>'[^'\\n]*'|\"[^\"\\n]*\")", "(?<sign>\\*\\*|\\.[*/^]|[-+*/^()[\\]{},;=:]|\\\\(?:[dt]?frac|cdot|times)(?![A-Za-z]))"].join("|"), "y");
 
   function wordsOf(piece, refuse) {
     const words = [], { text, at } = piece;
@@ -494,7 +545,7 @@ const armlockRead = (function () {
       if (digits) words.push({ ...place, kind: "number", digits: digits.replace(/d/i, "e"), unit: Boolean(unit) });
       else if (name) words.push({ ...place, kind: "name" });
       else if (quoted) words.push({ ...place, kind: "quoted", value: quoted.slice(1, -1) });
-      else if (line || sign) words.push({ ...place, kind: line ? "\n" : sign === "**" ? "^" : sign.replace(/^\.(?=.)/, "") });
+      else if (line || sign) words.push({ ...place, kind: line ? "\n" : TEX[sign] || sign.replace(/^\.(?=.)/, "") });
     }
     words.push({ kind: "end", at: at.at(-1) ?? 0, text: "the end", gap: false });
     return words;
@@ -508,6 +559,8 @@ const armlockRead = (function () {
 
   /* ---------------------------------------------------------------------------- statements */
 
+  // Brackets in each other, at most.
+  const DEEPEST = 100;
   const MODULES = /^(control|ct|ctl|co|np|numpy|math|cmath|signal|scipy|sp|sympy|matlab|armlock|TransferFunction)$/;
   const IGNORED = /^(name|inputs?|outputs?|states?|inputname|outputname|statename|displayname|notes|display_format|input_prefix|output_prefix|state_prefix|remove_useless_states|dtype)$/i;
   const DEAD = /^(inputdelay|outputdelay|iodelay)$/i;
@@ -516,7 +569,7 @@ const armlockRead = (function () {
    * `{ word }` of what is none: None, True, a quoted text. */
   class Reader {
     constructor(words, refuse) {
-      Object.assign(this, { words, refuse, next: 0, names: {}, used: new Set(), results: [] });
+      Object.assign(this, { words, refuse, next: 0, depth: 0, called: false, names: {}, used: new Set(), results: [] });
       const figures = words.filter(word => word.kind === "number").map(word => precision(word.digits).figures);
       // What a program prints has four digits or more, as many at most in all of its numbers. Those of a
       // double are all there.
@@ -530,14 +583,17 @@ const armlockRead = (function () {
     expect(kind) { if (!this.is(kind)) this.fail(`here should be \u201c${kind}\u201d`); this.next++; }
     lines() { while (this.is("\n")) this.next++; }
 
-    literal({ digits, unit }) {
+    literal(word) {
+      const { digits, unit } = word;
+      if (/^0\d/.test(digits)) this.fail("no program writes a number so: write decimals with a point", word);
       const { figures, decimals, last } = precision(digits), [mantissa, power = "0"] = digits.toLowerCase().split("e");
       if (Math.abs(Number(power)) > 300) this.fail("this number is too large or too small");
       const whole = BigInt(mantissa.replace(".", "")), down = decimals - Number(power);
       const value = down > 0 ? fraction(whole, 10n ** BigInt(down)) : [whole * 10n ** BigInt(-down), 1n];
       // Half a unit of the last digit; zeros at the end may have been left out.
       const place = Math.min(last, figures ? last + figures - this.figures : last);
-      const off = this.figures && (figures || decimals >= 4) ? 0.5 * 10 ** place : 0;
+      // No program prints a number in exponent form as zero unless it is zero.
+      const off = this.figures && (figures || decimals >= 4 && !/e/i.test(digits)) ? 0.5 * 10 ** place : 0;
       return scalar(unit ? number(NIL, value, off) : number(value, NIL, off));
     }
 
@@ -556,7 +612,7 @@ const armlockRead = (function () {
           return this.call(left[0].word, function_, keys.map(key => named[key].value), {});
       if (!left.length) this.fail("there is no controller");
       if (left.length > 1) this.fail(`there are several things, and which of them is the controller is not said: ${
-        left.map(({ name, word }) => name || word.text).join(", ")}`, left[1].word);
+        left.slice(0, 5).map(({ name, word }) => name || word.text).join(", ")}${left.length > 5 ? ", \u2026" : ""}`, left[1].word);
       return this.system(left[0].value, left[0].word);
     }
 
@@ -568,11 +624,23 @@ const armlockRead = (function () {
         this.next += head;
         this.lines();
         const value = this.list();
+        const [, owner, property] = /^(\w+)\.(\w+)$/.exec(word.text) || [];
+        if (DEAD.test(property) && this.names[owner]) {
+          this.delayed(this.names[owner], property.toLowerCase(), value, word);
+          return;
+        }
         if (word.text === "s" && value !== LAPLACE) this.fail("s stands for the variable of the transfer function", word);
         if (this.names[word.text]) this.fail(`${word.text} is given twice`, word);
         this.names[word.text] = { value, word };
         if (word.text === "s") this.used.add("s");
       } else this.results.push({ word, value: this.list() });
+    }
+
+    /* C.InputDelay = .. of a controller that has a name. */
+    delayed(named, property, value, word) {
+      const one = this.system(named.value, word), { later = [] } = named;
+      if (later.includes(property) || one.delay[0] && !later.length) this.fail("its dead time is given twice", word);
+      Object.assign(named, { value: inSeries(one, system(ONE, [], [], this.real(value, word))), later: [...later, property] });
     }
 
     /* Values with commas between them, without brackets. */
@@ -616,11 +684,14 @@ const armlockRead = (function () {
           const other = this.signed(apart);
           divided = word.kind === "/";
           value = divided ? this.over(value, other, word) : this.times(value, other, word);
-        } else if (this.is("name", "(", "number") && !(apart && word.gap)) {
+        } else if (this.is("name", "(", "number", "\\frac") && !(apart && word.gap)) {
           // 2 s, s (s + 1), (s + 1) (s + 2)
           if (word.kind === "number") this.fail("a sign is missing before this number");
           if (divided) this.fail("what is divided by can be read in two ways: write * or brackets");
-          value = this.times(value, this.signed(apart), word);
+          const before = this.called, other = this.signed(apart);
+          // tf(..) tf(..) are two controllers, and not a product.
+          if ((before || this.called) && !(isScalar(value) && !before)) this.fail("two things stand side by side: write * for their product", word);
+          value = this.times(value, other, word);
         } else return value;
       }
     }
@@ -638,20 +709,29 @@ const armlockRead = (function () {
     }
 
     signed(apart) {
-      if (!this.is("+", "-")) return this.power(apart);
-      const { word } = this;
-      this.next++;
-      const value = this.signed(apart);
-      return word.kind === "-" ? this.times(scalar(MINUS), value, word) : value;
+      let negative = false, { word } = this;
+      for (; this.is("+", "-"); this.next++) negative = negative !== (this.word.kind === "-");
+      if (++this.depth > DEEPEST) this.fail(`more than ${DEEPEST} brackets stand in each other`);
+      const value = this.power(apart);
+      this.depth--;
+      return negative ? this.times(scalar(MINUS), value, word) : value;
     }
 
     power(apart) {
-      const { word } = this, base = this.atom(apart);
+      const { word } = this;
+      // Euler's number has one power here: a dead time.
+      if (word.text === "e" && !this.names.e && this.words[this.next + 1].kind === "^") {
+        this.next += 2;
+        if (!this.is("(", "{")) this.fail("write the exponent of e in brackets", word);
+        const exponent = this.is("{") ? this.braces() : this.atom(apart);
+        return this.call(word, "exp", [exponent], {});
+      }
+      const base = this.atom(apart);
       if (!this.is("^")) return base;
       this.next++;
       const negative = this.is("-"), sign = this.word;
       if (this.is("+", "-")) this.next++;
-      const exponent = this.atom(apart), n = isScalar(exponent) && !exponent.k.im[0] ? double(exponent.k.re) : NaN;
+      const exponent = this.is("{") ? this.braces() : this.atom(apart), n = isScalar(exponent) && !exponent.k.im[0] ? double(exponent.k.re) : NaN;
       if (!Number.isInteger(n) || Math.abs(n) > 60) this.fail("a power must be a whole number up to 60", sign);
       if (this.is("^")) this.fail("a power of a power can be read in two ways: write brackets");
       const one = this.plain(base, word);
@@ -663,10 +743,16 @@ const armlockRead = (function () {
     atom(apart) {
       const { word } = this;
       this.next++;
+      this.called = false;
       if (word.kind === "number") return this.literal(word);
       if (word.kind === "quoted") return { word: word.value };
       if (word.kind === "(") return this.brackets();
       if (word.kind === "[") return this.matrix(apart !== "inner" && apart);
+      if (word.kind === "\\frac") {
+        const [above, below] = [this.braces(), this.braces()];
+        return this.over(above, below, word);
+      }
+      if (word.kind === "{" || word.kind === "}") this.fail("this sign is not known", word);
       if (word.kind !== "name") this.fail("here should be a number, s, or what can be calculated", word);
       const parts = word.text.split("."), name = parts.slice(0, -1).every(part => MODULES.test(part)) ? parts.at(-1) : word.text;
       const known = this.names[word.text];
@@ -677,7 +763,7 @@ const armlockRead = (function () {
           if (this.words[this.next + 1].text !== "s" || this.words[this.next + 2].kind !== ")")
             this.fail(`a value of ${word.text} is not understood; for a product write *`);
           this.next += 3;
-        }
+        } else this.called = Boolean(known?.value.k) && known.value !== LAPLACE && !isScalar(known.value);
         return known ? known.value : LAPLACE;
       }
       if (name === "pi") return scalar(number(ofDouble(Math.PI)));
@@ -687,7 +773,18 @@ const armlockRead = (function () {
       this.next++;
       const [all, options] = this.given();
       if (this.is("(")) this.fail(`a value of ${word.text}(..) is not understood; for a product write *`);
-      return this.call(word, name, all, options);
+      const value = this.call(word, name, all, options);
+      this.called = !/^(exp|sqrt|db2mag)$/.test(name);
+      return value;
+    }
+
+    /* What stands in braces, as in LaTeX. */
+    braces() {
+      this.expect("{");
+      const value = this.sum(false);
+      this.expect("}");
+      this.called = false;
+      return value;
     }
 
     brackets() {
@@ -700,6 +797,7 @@ const armlockRead = (function () {
         this.lines();
         if (this.is(",")) { tuple = true; this.next++; } else if (!this.is(")")) this.fail("a bracket is not closed here");
       }
+      this.called = false;
       return tuple || !all.length ? { tuple: all } : all[0];
     }
 
@@ -902,8 +1000,9 @@ const armlockRead = (function () {
   /* The line of a place in a text. */
   const lineOf = (text, at) => Array.from(text.replace(/\r\n?/g, "\n")).slice(0, at).filter(sign => sign === "\n").length + 1;
 
-  /* Bad text, with the name of the field that holds it. */
-  const wrong = (field, message) => Object.assign(new RangeError(message), { field });
+  /* Bad text, with the name of the field that holds it. Long words of it are cut. */
+  const cut = text => text.length > 40 ? `${text.slice(0, 30)}\u2026` : text;
+  const wrong = (field, message) => Object.assign(new RangeError(message.replace(/\S+/g, cut)), { field });
 
   const readerOf = (lines, refuse) => new Reader(wordsOf(Piece.join(...lines.flatMap(line =>
     [line, new Piece("\n", line.at.at(-1) ?? 0)])), refuse), refuse);
@@ -916,6 +1015,16 @@ const armlockRead = (function () {
         String(found).trim().slice(0, 30)}\u201d).`);
     };
     if (!text.trim()) refuse(0, "", "it is empty");
+    spent = 0;
+    try {
+      return controllerOf(text, refuse);
+    } catch (error) {
+      if (!error.costly) throw error;
+      return refuse(0, text.trim().split("\n")[0], "it takes too long to work out. Write it as zeros, poles and gain, zpk(z, p, k)");
+    }
+  }
+
+  function controllerOf(text, refuse) {
     let dead = NIL;
     const lines = linesOf(text).map(line => {
       for (const [pattern, why] of NOT) if (pattern.test(line.bare) && !REMARK.test(line.bare)) refuse(line.from, line.bare, why);
@@ -924,7 +1033,10 @@ const armlockRead = (function () {
       if (!held && !REMARK.test(line.bare)) return line;
       return Object.assign(new Piece("", []), { remark: true });
     });
-    const found = readerOf(matricesInLine(fractionsInLine(lines, refuse), refuse), refuse).program();
+    // "with Kp = 2, Ki = 3" below MATLAB's formula of a PID controller: its numbers come first.
+    const given = lines.filter(line => WITH.test(line.bare)).map(line => line.blank(/^\s*with/));
+    const rest = lines.map(line => WITH.test(line.bare) ? new Piece("", []) : line);
+    const found = readerOf([...given, ...matricesInLine(fractionsInLine(rest, refuse), refuse)], refuse).program();
     const none = why => refuse(0, text.trim().split("\n")[0], why);
     if (isNil(found.k)) none("it is zero");
     if (found.k.im[0]) none("its gain is not real");
@@ -940,6 +1052,7 @@ const armlockRead = (function () {
   /* The numbers of a list as MATLAB or Python print it, as pairs of doubles: [..], array(..), columns, a
    * common factor in front, \u00b1 for a conjugate pair. */
   function numbers(field, text, bad) {
+    spent = 0;
     const comma = /[-+]?\d+,\d+/.exec(text);
     if (comma)
       throw wrong(field, `Write decimals with a point, and a space after the comma between two numbers: ${comma[0]} `
